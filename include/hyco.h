@@ -1,0 +1,28 @@
+/*
+  hyco: hybrid hyper-reduced contact.
+
+  Full-order and reduced models of elastic bodies in frictionless unilateral contact, after
+  J. Fauque, I. Ramiere, D. Ryckelynck, Hybrid hyper-reduced modeling for contact mechanics
+  problems, Int. J. Numer. Meth. Engng 115 (2018) 117-139, doi 10.1002/nme.5798 ("the paper").
+  Equation numbers in the headers are the paper's. docs/architecture.md holds the table of symbols.
+
+  Conventions, everywhere unless a docstring says otherwise:
+  - Create and Load own what they return; Set references or copies; Get borrows.
+  - Every function returns a PetscErrorCode; 0 is success. Messages are one line.
+  - Functions on an object are collective on the object's communicator.
+  - Lengths, forces and stresses are in the scene's own consistent units.
+*/
+#ifndef HYCO_H
+#define HYCO_H
+
+#include <hycosys.h>
+#include <hycoscene.h>
+#include <hycosamples.h>
+#include <hycosystem.h>
+#include <hycosolver.h>
+#include <hycofom.h>
+#include <hycosnapshots.h>
+#include <hycotrainer.h>
+#include <hycomodel.h>
+
+#endif

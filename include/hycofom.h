@@ -1,0 +1,60 @@
+/* HycoFOM: the full-order model of a scene, (16): assembled and solved for one parameter value after another. */
+#ifndef HYCOFOM_H
+#define HYCOFOM_H
+
+#include <hycoscene.h>
+#include <hycosolver.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+typedef struct _p_HycoFOM *HycoFOM;
+
+/* Seconds of the last solve, by stage. */
+typedef struct {
+  PetscReal setup, assemble, factor, solve, total;
+} HycoSeconds;
+
+/* What a solution amounts to, in scene units. Strain energy W = 1/2 U^T K U over free and fixed unknowns. */
+typedef struct {
+  PetscInt n_dof, n_contacts, n_active; /* free unknowns N, contacts N_lambda, contacts with L_i > 0 */
+  PetscInt iterations, dim;
+  PetscReal total_contact_force, lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3], strain_energy;
+  HycoKKT kkt;
+  HycoReason reason;
+  HycoSeconds seconds;
+} HycoSummary;
+
+/* Reads and distributes the scene's mesh over `comm` (which may be smaller than the scene's communicator).
+   Collective on `comm`. The scene must outlive it. The caller owns it. */
+PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom);
+/* Frees; sets the handle to NULL; NULL-safe. Collective. */
+PetscErrorCode HycoFOMDestroy(HycoFOM *fom);
+/* The solver, to be configured. Borrowed. */
+PetscErrorCode HycoFOMGetSolver(HycoFOM fom, HycoSolver *solver);
+
+/* Assembles what depends on the parameters that changed and solves (16) at mu (length n). Collective. Fails outside
+   the ranges; not converging is no error: see HycoSummary.reason. */
+PetscErrorCode HycoFOMSolve(HycoFOM fom, PetscInt n, const PetscReal mu[]);
+/* The system of the last solve (K with the fixed unknowns decoupled, F with their lifting). Borrowed. */
+PetscErrorCode HycoFOMGetSystem(HycoFOM fom, HycoSystem *system);
+/* What the last solution amounts to. Collective. */
+PetscErrorCode HycoFOMGetSummary(HycoFOM fom, HycoSummary *summary);
+
+/*
+  The last solution on rank 0 (empty elsewhere), in the mesh file's order (ascending tags). Collective. Borrowed until
+  the next solve:
+    U       n_nodes x dim, displacement
+    Lambda  n_contacts, contact forces (nodal forces, compression positive)
+    sigma   n_cells x n_sigma, stress averaged over each cell: (xx) | (xx, yy, zz, xy) | (xx, yy, zz, xy, yz, xz)
+*/
+PetscErrorCode HycoFOMGetSolution(HycoFOM fom, PetscInt *n_nodes, const PetscReal *U[], PetscInt *n_contacts,
+                                  const PetscReal *Lambda[], PetscInt *n_cells, const PetscReal *sigma[]);
+/* Writes the last solution to PATH.h5 and PATH.xdmf (`path` names the latter). Collective. */
+PetscErrorCode HycoFOMWrite(HycoFOM fom, const char path[]);
+
+#if defined(__cplusplus)
+}
+#endif
+#endif

@@ -1,0 +1,62 @@
+/* HycoModel: the hybrid hyper-reduced model (38)-(41) of a file; online it knows nothing of the full mesh. */
+#ifndef HYCOMODEL_H
+#define HYCOMODEL_H
+
+#include <hycofom.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+typedef struct _p_HycoModel *HycoModel;
+
+/* What a prediction amounts to, in scene units. */
+typedef struct {
+  PetscInt n_dof, n_contacts, n_modes, n_fe_dofs; /* reduced unknowns (modes + FE unknowns), contacts in the RID */
+  PetscInt n_active, iterations, rid_nodes, rid_elements, dim;
+  PetscReal rid_fraction;  /* share of the mesh's elements in the RID */
+  PetscReal covered_force; /* share of the total contact force that the RID's own multipliers carry; 1 without force */
+  PetscReal total_contact_force;                                   /* reconstructed, whole contact surface */
+  PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
+  PetscReal strain_energy;                                         /* of the RID */
+  PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
+  HycoKKT kkt;                                                     /* of the reduced system (38) */
+  HycoReason reason;
+  HycoSeconds seconds;
+} HycoPrediction;
+
+/* Opens a model file on this process alone; the whole-mesh part stays in the file. Not collective: every process that
+   calls it opens the file for reading. The caller owns it. Errors: not a model, damaged, of another version. */
+PetscErrorCode HycoModelLoad(const char path[], HycoModel *model);
+/* Frees; sets the handle to NULL; NULL-safe. */
+PetscErrorCode HycoModelDestroy(HycoModel *model);
+/* The scene that the model carries. Borrowed. */
+PetscErrorCode HycoModelGetScene(HycoModel model, HycoScene *scene);
+
+/* Solves (38) at mu (length n) and reconstructs the contact forces (41). Not collective. Fails outside the trained
+   ranges; not converging is no error: see HycoPrediction.reason. */
+PetscErrorCode HycoModelPredict(HycoModel model, PetscInt n, const PetscReal mu[]);
+/* Whether Predict reconstructs the forces outside the RID (default: yes). */
+PetscErrorCode HycoModelSetReconstruct(HycoModel model, PetscBool reconstruct);
+PetscErrorCode HycoModelGetPrediction(HycoModel model, HycoPrediction *prediction);
+
+/* Displacement of the RID's nodes (n_nodes x dim) and stress of its cells (n_cells x n_sigma, as HycoFOMGetSolution),
+   with the mesh-file tags of the nodes and cells. Any output may be NULL. Borrowed until the next prediction. */
+PetscErrorCode HycoModelGetRID(HycoModel model, PetscInt *n_nodes, const PetscInt *node_ids[], const PetscReal *U[],
+                               PetscInt *n_cells, const PetscInt *cell_ids[], const PetscReal *sigma[]);
+/* Contact forces of the whole contact surface (n_contacts, ordered as HycoFOMGetSolution's), the slave nodes' tags, and
+   whether each is the RID's own multiplier (1) or reconstructed (0). Any output may be NULL. Borrowed. */
+PetscErrorCode HycoModelGetLambda(HycoModel model, PetscInt *n_contacts, const PetscReal *Lambda[],
+                                  const PetscInt *node_ids[], const PetscInt *in_rid[]);
+/* Displacement of the whole mesh, n_nodes x dim in the mesh file's order: reads the whole-mesh part on first use.
+ * Borrowed. */
+PetscErrorCode HycoModelGetWholeU(HycoModel model, PetscInt *n_nodes, const PetscReal *U[]);
+/* Writes the last prediction on the whole mesh to `path` (.xdmf) and the .h5 beside it. */
+PetscErrorCode HycoModelWrite(HycoModel model, const char path[]);
+/* Prints what is in the model, in words, on an ASCII viewer. */
+PetscErrorCode HycoModelView(HycoModel model, PetscViewer viewer);
+
+#if defined(__cplusplus)
+}
+#endif
+#endif

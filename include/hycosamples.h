@@ -1,0 +1,38 @@
+/* HycoSamples: an ordered set of points in the scene's parameter space. */
+#ifndef HYCOSAMPLES_H
+#define HYCOSAMPLES_H
+
+#include <hycoscene.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+typedef struct _p_HycoSamples *HycoSamples;
+
+/* An empty set over the scene's parameters. The scene must outlive it. Not collective. The caller owns it. */
+PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples);
+/* Frees; sets the handle to NULL; NULL-safe. */
+PetscErrorCode HycoSamplesDestroy(HycoSamples *samples);
+
+/*
+  Appends the tensor grid of counts[i] >= 1 points per parameter (length = number of parameters), the last
+  parameter running fastest. closed = PETSC_FALSE: the cell centres lo + (k + 1/2) (hi - lo) / counts;
+  closed = PETSC_TRUE: both ends included (counts[i] >= 2).
+*/
+PetscErrorCode HycoSamplesAddGrid(HycoSamples samples, const PetscInt counts[], PetscBool closed);
+/* Appends the tensor product of the lists values[i][0..counts[i]-1], the last parameter running fastest. */
+PetscErrorCode HycoSamplesAddProduct(HycoSamples samples, const PetscInt counts[], const PetscReal *const values[]);
+/* Appends one point (length = number of parameters); fails outside the range. */
+PetscErrorCode HycoSamplesAddPoint(HycoSamples samples, const PetscReal mu[]);
+/* Appends the points of a CSV file: a header with the parameters' names in any order, then a point per line.
+   Collective on the scene's communicator. */
+PetscErrorCode HycoSamplesAddFile(HycoSamples samples, const char path[]);
+
+/* Number of points and their values, point by point (n_points x n_parameters, row major). Borrowed. */
+PetscErrorCode HycoSamplesGet(HycoSamples samples, PetscInt *n_points, PetscInt *n_parameters, const PetscReal *mu[]);
+
+#if defined(__cplusplus)
+}
+#endif
+#endif

@@ -1,0 +1,46 @@
+/* HycoScene: the user's description of bodies, supports, loads, contacts and parameters (architecture: scene/). */
+#ifndef HYCOSCENE_H
+#define HYCOSCENE_H
+
+#include <hycosys.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+typedef struct _p_HycoScene *HycoScene;
+
+/*
+  Reads a scene. Collective on `comm`. The caller owns `*scene`.
+
+  `path` is a folder that holds scene.yaml, or a YAML file. Entries of PETSc's options database
+  whose name is a scene entry (-scene_mesh, -body_pellet_young, -hyco_pod_tol, ...) win over the file's.
+  Errors: a missing or unreadable file, an entry that the scene does not know (with the nearest
+  known one), an expression that does not parse or names something unknown, a range that is empty.
+*/
+PetscErrorCode HycoSceneLoad(MPI_Comm comm, const char path[], HycoScene *scene);
+
+/* Frees the scene and sets the handle to NULL. NULL-safe. Collective. */
+PetscErrorCode HycoSceneDestroy(HycoScene *scene);
+
+/* Number of parameters, their names in declared order, and their closed ranges lo[i] <= mu_i <= hi[i].
+   Any output may be NULL. Not collective. Borrowed. */
+PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *const *names[], const PetscReal *lo[],
+                                      const PetscReal *hi[]);
+
+/* The scene's title (may be empty). Not collective. Borrowed. */
+PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[]);
+
+/* Fails with a clear line when mu[i] (length n) is not finite or leaves its range. Not collective. */
+PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const PetscReal mu[]);
+
+/* The options that the scene carries (its hyco: section, overridden by the command line). Not collective. Borrowed. */
+PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options);
+
+/* Prints what the scene says, in words, on an ASCII viewer. Collective. */
+PetscErrorCode HycoSceneView(HycoScene scene, PetscViewer viewer);
+
+#if defined(__cplusplus)
+}
+#endif
+#endif

@@ -1,0 +1,31 @@
+/* HycoSnapshots: the store of full-order solutions, a folder with one file per parameter value; resumable. */
+#ifndef HYCOSNAPSHOTS_H
+#define HYCOSNAPSHOTS_H
+
+#include <hycofom.h>
+#include <hycosamples.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+typedef struct _p_HycoSnapshots *HycoSnapshots;
+
+/* Called on rank 0 of the store's communicator after each solution: done of n so far. */
+typedef PetscErrorCode (*HycoProgress)(PetscInt done, PetscInt n, void *ctx);
+
+/* Opens (creates if missing) the folder. Collective on `comm`. The scene must outlive it. The caller owns it. */
+PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char folder[], HycoSnapshots *snapshots);
+/* Closes; sets the handle to NULL; NULL-safe. Collective. */
+PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots);
+/*
+  Solves full order at each sample that is not in the store yet. Collective. -hyco_groups G splits the communicator:
+  G samples at a time. Each solution is written to a temporary name and renamed, so that a run that was
+  killed resumes and loses at most the samples in flight. Fails, naming the sample, when a solve does not converge.
+*/
+PetscErrorCode HycoSnapshotsFill(HycoSnapshots snapshots, HycoSamples samples, HycoProgress progress, void *ctx);
+
+#if defined(__cplusplus)
+}
+#endif
+#endif

@@ -1,0 +1,77 @@
+/* HycoSolver: solves a HycoSystem; every method is judged by the recomputed KKT residuals. */
+#ifndef HYCOSOLVER_H
+#define HYCOSOLVER_H
+
+#include <hycosystem.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+typedef struct _p_HycoSolver *HycoSolver;
+
+typedef const char *HycoSolverType;
+#define HYCO_SOLVER_ACTIVE_SET "active_set" /* primal-dual active set, the paper's section 6.2 */
+#define HYCO_SOLVER_TAO        "tao"        /* a bound-constrained solver of TAO on the same problem */
+#define HYCO_SOLVER_LEMKE      "lemke"      /* Lemke's complementary pivoting on the dense dual problem */
+
+/* The unknowns in which the complementarity problem is posed. */
+typedef enum {
+  HYCO_FORM_AUTO,  /* dual for few contacts, primal when there are about as many as unknowns */
+  HYCO_FORM_DUAL,  /* w = (D - B K^-1 F) + (B K^-1 Bt) L */
+  HYCO_FORM_PRIMAL /* gap coordinates: one unknown of each contact row is replaced by its gap, a bound */
+} HycoForm;
+
+/* How a solve ended. Negative: not solved, x and L are the last iterate. */
+typedef enum {
+  HYCO_CONVERGED = 1,            /* KKT residuals below the tolerance */
+  HYCO_CONVERGED_FALLBACK = 2,   /* the same, by another method than the chosen one (HycoSolverGetMethod says which) */
+  HYCO_DIVERGED_RESIDUAL = -1,   /* a residual above the tolerance */
+  HYCO_DIVERGED_ITERATIONS = -2, /* the limit of iterations */
+  HYCO_DIVERGED_SINGULAR = -3    /* K (or its active saddle point) is singular */
+} HycoReason;
+
+/* Collective. The caller owns it. */
+PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver);
+/* Frees; sets the handle to NULL; NULL-safe. Collective. */
+PetscErrorCode HycoSolverDestroy(HycoSolver *solver);
+/* Sets the system, which must outlive the solver (borrowed). */
+PetscErrorCode HycoSolverSetSystem(HycoSolver solver, HycoSystem system);
+/* -hyco_solver_type */
+PetscErrorCode HycoSolverSetType(HycoSolver solver, HycoSolverType type);
+/* -hyco_solver_form */
+PetscErrorCode HycoSolverSetForm(HycoSolver solver, HycoForm form);
+/* -hyco_solver_rtol: the largest relative KKT residual that counts as solved (default 1e-8). */
+PetscErrorCode HycoSolverSetTolerance(HycoSolver solver, PetscReal rtol);
+/* -hyco_solver_max_its: of the active set (0: chosen from the number of contacts). */
+PetscErrorCode HycoSolverSetMaxIts(HycoSolver solver, PetscInt max_its);
+/* -hyco_solver_warm_start: begin from the last solution's active set (default) or from no contact. */
+PetscErrorCode HycoSolverSetWarmStart(HycoSolver solver, PetscBool warm);
+/* Reads the options above from `options` (NULL: the global database). Collective. */
+PetscErrorCode HycoSolverSetFromOptions(HycoSolver solver, PetscOptions options);
+
+/* Called after each iteration of the active set, on every rank: its number, active contacts, changes made. */
+typedef PetscErrorCode (*HycoMonitor)(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx);
+PetscErrorCode HycoSolverSetMonitor(HycoSolver solver, HycoMonitor monitor, void *ctx);
+
+/*
+  Solves for x (length n) and L (length m; NULL without contact). Collective. What depends on K and B alone (factor,
+  flexibility) is kept between solves until a matrix changes. Not solving is no error: ask HycoSolverGetReason.
+*/
+PetscErrorCode HycoSolverSolve(HycoSolver solver, Vec x, Vec L);
+
+PetscErrorCode HycoSolverGetReason(HycoSolver solver, HycoReason *reason);
+/* Iterations of the last solve, and the KKT residuals recomputed after it. */
+PetscErrorCode HycoSolverGetIterations(HycoSolver solver, PetscInt *its);
+PetscErrorCode HycoSolverGetKKT(HycoSolver solver, HycoKKT *kkt);
+/* What solved, in words: "active_set dual", "active_set dual, then lemke". Borrowed, until the next solve. */
+PetscErrorCode HycoSolverGetMethod(HycoSolver solver, const char *method[]);
+/* Seconds in the factorisation (and the flexibility) and in the rest of the last solve. Either may be NULL. */
+PetscErrorCode HycoSolverGetSeconds(HycoSolver solver, PetscReal *factor, PetscReal *solve);
+/* A word for the reason, for messages. Not collective. Borrowed. */
+const char *HycoReasonName(HycoReason reason);
+
+#if defined(__cplusplus)
+}
+#endif
+#endif

@@ -1,0 +1,41 @@
+/* The package: start, stop, version, and the table of options that every class reads. */
+#ifndef HYCOSYS_H
+#define HYCOSYS_H
+
+#include <petscsys.h>
+
+#if !defined(PETSC_USE_REAL_DOUBLE) || defined(PETSC_USE_COMPLEX)
+#error "hyco needs PETSc configured with real scalars in double precision"
+#endif
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+/* One option: its name without the dash, the form of its value, its default and its meaning. */
+typedef struct {
+  const char *name;    /* "hyco_pod_tol" */
+  const char *value;   /* "<real>", "<a|b|c>", "" for a flag */
+  const char *initial; /* the default, as text */
+  const char *meaning; /* one line */
+} HycoOption;
+
+/* Starts PETSc (if needed) and SLEPc for hyco. Collective on all processes. `argc`, `argv` may be NULL. */
+PetscErrorCode HycoInitialize(int *argc, char ***argv);
+/* Ends what HycoInitialize started. Collective on all processes. */
+PetscErrorCode HycoFinalize(void);
+
+/* The version as "major.minor.patch". Not collective. Borrowed. */
+const char *HycoVersion(void);
+
+/* Every -hyco_ option of the library, in the order of the method; `*n` receives their number. Not collective. Borrowed.
+ */
+PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *table[]);
+
+/* The name in `names[n]` nearest to `word` by edit distance, or NULL when none is close. Not collective. Borrowed. */
+const char *HycoNearest(const char *word, PetscInt n, const char *const names[]);
+
+#if defined(__cplusplus)
+}
+#endif
+#endif

@@ -1,0 +1,53 @@
+/*
+  HycoSystem: the one problem of the paper,
+
+      K x + Bt L = F,     0 <= L  complementary to  D - B x >= 0
+
+  full order (16), hybrid hyper-reduced (38), projection-based (44), local indicator (43): they differ in who
+  builds K, Bt, B, F and D, not in what is solved.
+*/
+#ifndef HYCOSYSTEM_H
+#define HYCOSYSTEM_H
+
+#include <hycosys.h>
+#include <petscmat.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+typedef struct _p_HycoSystem *HycoSystem;
+
+/*
+  The four Karush-Kuhn-Tucker residuals, relative (dimensionless), recomputed from K, Bt, B, F, D:
+    stationarity     |K x + Bt L - F|_2 / max(|K x|_2, |Bt L|_2, |F|_2)
+    penetration      max_i [B x - D]_i^+ / d       d = max(|D|_inf, |B|_inf |x|_inf), a gap of the scene's size
+    adhesion         max_i [-L_i]^+ / |L|_inf
+    complementarity  max_i |L_i (D - B x)_i| / (|L|_inf d)
+  A quotient 0/0 is 0.
+*/
+typedef struct {
+  PetscReal stationarity, penetration, adhesion, complementarity;
+} HycoKKT;
+
+/* An empty system. Collective. The caller owns it. */
+PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system);
+/* Frees; sets the handle to NULL; NULL-safe. Collective. */
+PetscErrorCode HycoSystemDestroy(HycoSystem *system);
+
+/*
+  Sets (references) the matrices: K n x n, Bt n x m, B m x n. B and Bt may be NULL: no contact. `symmetric` says
+  that K is symmetric positive definite and Bt = B^T. Changing a matrix in place is noticed through its state.
+*/
+PetscErrorCode HycoSystemSetMatrices(HycoSystem system, Mat K, Mat Bt, Mat B, PetscBool symmetric);
+/* Sets (references) F of length n and D of length m (NULL without contact). */
+PetscErrorCode HycoSystemSetVectors(HycoSystem system, Vec F, Vec D);
+/* The largest of the four residuals of `kkt`. Not collective. */
+PetscReal HycoKKTMax(const HycoKKT *kkt);
+/* Recomputes the residuals at x (length n), L (length m, or NULL without contact). Collective. */
+PetscErrorCode HycoSystemComputeKKT(HycoSystem system, Vec x, Vec L, HycoKKT *kkt);
+
+#if defined(__cplusplus)
+}
+#endif
+#endif

@@ -1,0 +1,86 @@
+/*
+  HycoFE: the scene on one mesh at one parameter value. It moves the nodes, fixes the supports, evaluates materials and
+  loads, and assembles K, F, B, D, stresses and norms over the cells it has: the whole mesh, a rank's part, or the RID.
+*/
+#ifndef HYCOFE_H
+#define HYCOFE_H
+
+#include <hycomesh.h>
+#include <petscmat.h>
+
+/* Shape functions at the quadrature points of the reference cell (or facet). */
+typedef struct {
+  PetscInt dim, nv, nq;
+  PetscReal w[8], N[8][8], dN[8][8][3];
+} HycoElement;
+
+const HycoElement *HycoElementGet(HycoCellType type);
+/* The facet of a cell type: a point, line2, tri3 or quad4. */
+const HycoElement *HycoElementGetFacet(HycoCellType type);
+
+#define HYCO_MAX_CELL_DOFS 24
+
+typedef struct _n_HycoFE *HycoFE;
+
+struct _n_HycoFE {
+  HycoScene scene;              /* borrowed */
+  HycoMesh mesh;                /* borrowed */
+  PetscInt dim, n_dof, n_sigma; /* space dimension, n_nodes * dim, stress components */
+  /* at the current mu */
+  PetscBool ready;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscReal *X;                                 /* n_nodes x 3, moved nodes */
+  PetscBool *fixed;                             /* n_dof */
+  PetscReal *u0;                                /* n_dof, prescribed displacement, 0 where free */
+  PetscReal *lame;                              /* n_cells x nq x 2: lambda and mu of Lame (1D: 0 and nu) */
+  PetscBool stiffness_changed, contact_changed; /* by the last HycoFESetParameters */
+};
+
+PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
+PetscErrorCode HycoFEDestroy(HycoFE *fe);
+/* Brings everything to mu (length scene->n_parameters), touching only what depends on what changed. */
+PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
+
+/* Element stiffness of a cell, row major, nv * dim square, nodes outer, components inner. */
+PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
+
+/* An empty, preallocated AIJ matrix for K or a norm over the nodes `n_owned` from `first` of the distributed numbering.
+ */
+PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, PetscInt first, Mat *A);
+/* K (11): rows and columns of fixed unknowns hold only their own diagonal. Local values only: no communication but the
+   assembly's. */
+PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K);
+/* F (12), with the lifting of the prescribed displacements: K u0 moved to the right, F_i = K_ii u0_i where fixed. */
+PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
+/* The norm matrix of H1: mass plus gradient, fixed unknowns as in K. */
+PetscErrorCode HycoFEAssembleH1(HycoFE fe, Mat M);
+
+/* Stress of u (n_dof, local order) averaged over each cell: sigma n_cells x n_sigma. */
+PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
+/* Strain energy 1/2 u^T K u of each cell. */
+PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[]);
+
+/* -- contact: all on one process, over a mesh that has every contact node -- */
+
+/* N_lambda contacts in the order of the scene's contacts, then of the slave's tag. */
+typedef struct {
+  PetscInt n;
+  PetscInt *slave, *master; /* node indices; master -1 for an obstacle */
+  PetscInt *contact;        /* index in scene->contact */
+} HycoPairs;
+
+PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
+PetscErrorCode HycoPairsDestroy(HycoPairs *pairs);
+/* Normals n (n x 3) and gaps D (n) at fe's mu. */
+PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal normal[], PetscReal gap[]);
+/*
+  The rows of B over the free unknowns, in CSR over local dofs (node * dim + component), and D less what the fixed
+  unknowns contribute: start[n + 1], dof[], value[] (room for 6 n entries). Fails when a row has no free unknown and
+  the prescribed displacements penetrate.
+*/
+PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
+                               PetscReal gap[]);
+/* Area (length in 2D, 1 in 1D) that each contact's slave node stands for; 0 when its group is no surface. */
+PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
+
+#endif

@@ -1,0 +1,34 @@
+/* HDF5 on one process: typed arrays and text by name, checked against the expected size; whole-file writes are atomic.
+ */
+#ifndef HYCOH5_H
+#define HYCOH5_H
+
+#include <hycoimpl.h>
+
+typedef struct _n_HycoH5 *HycoH5;
+
+/* Creates PATH.partial; HycoH5Close(commit) renames it to `path`, HycoH5Close(no commit) removes it. */
+PetscErrorCode HycoH5Create(const char path[], HycoH5 *file);
+/* Opens for reading. */
+PetscErrorCode HycoH5Open(const char path[], HycoH5 *file);
+PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit);
+
+/* Writes rows x cols (cols 1: a vector). Groups in the name ("mesh/cells") are made as needed. */
+PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscReal *data);
+PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscInt *data);
+PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[]);
+
+/* Size of a dataset. */
+PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols);
+/* Reads a dataset whose size must be rows x cols, into the caller's memory. */
+PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, PetscReal *data);
+/* The same into new memory; a size given as -1 is taken from the file. Integers must lie in [lo, hi]. */
+PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols, PetscReal **data);
+PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt *rows, PetscInt *cols,
+                             PetscInt **data);
+/* Rows [start, start + n) of a two-dimensional dataset. */
+PetscErrorCode HycoH5ReadRows(HycoH5 file, const char name[], PetscInt start, PetscInt n, PetscInt cols,
+                              PetscReal *data);
+PetscErrorCode HycoH5LoadText(HycoH5 file, const char name[], char **text);
+
+#endif

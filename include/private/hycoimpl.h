@@ -1,0 +1,83 @@
+/* What every file of the library shares: PETSc versions, errors that reach every rank, files of HDF5. */
+#ifndef HYCOIMPL_H
+#define HYCOIMPL_H
+
+#include <hycosys.h>
+#include <petscmat.h>
+#include <strings.h>
+
+/* The code reads as for the newest supported PETSc; what older ones lack is here. */
+#if PETSC_VERSION_LT(3, 19, 0)
+#define PETSC_SUCCESS ((PetscErrorCode)0)
+#endif
+
+/* Length of a message or a name that the library builds. */
+#define HYCO_LINE 1024
+
+/* Fails on every rank with the message of the lowest rank whose `message` is not empty. Collective. */
+PetscErrorCode HycoAgree(MPI_Comm comm, const char message[]);
+
+/* Begin and end catching PETSc errors on this rank as text: between the two, errors print nothing. */
+PetscErrorCode HycoCatchBegin(void);
+PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE]);
+
+/* Runs `call` on rank 0 of comm; its error becomes the error of every rank. Collective. */
+#define HycoOnRoot(comm, call)                                                                                         \
+  do {                                                                                                                 \
+    char message_[HYCO_LINE] = "";                                                                                     \
+    PetscMPIInt rank_;                                                                                                 \
+    PetscErrorCode caught_ = 0;                                                                                        \
+    PetscCallMPI(MPI_Comm_rank((comm), &rank_));                                                                       \
+    if (rank_ == 0) {                                                                                                  \
+      PetscCall(HycoCatchBegin());                                                                                     \
+      caught_ = (call);                                                                                                \
+      PetscCall(HycoCatchEnd(caught_, message_));                                                                      \
+    }                                                                                                                  \
+    PetscCall(HycoAgree((comm), message_));                                                                            \
+  } while (0)
+
+/* Runs `call`, which may differ from rank to rank, on every rank; an error on any becomes the error of all. Collective.
+ */
+#define HycoOnEach(comm, call)                                                                                         \
+  do {                                                                                                                 \
+    char message_[HYCO_LINE] = "";                                                                                     \
+    PetscErrorCode caught_;                                                                                            \
+    PetscCall(HycoCatchBegin());                                                                                       \
+    caught_ = (call);                                                                                                  \
+    PetscCall(HycoCatchEnd(caught_, message_));                                                                        \
+    PetscCall(HycoAgree((comm), message_));                                                                            \
+  } while (0)
+
+/* A user's error on this rank: one line. */
+#define HycoFail(...) SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, __VA_ARGS__)
+
+/* A public handle that is NULL, with the call that makes it. */
+#define HycoCheckHandle(handle, maker)                                                                                 \
+  PetscCheck((handle) != NULL, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,                                                    \
+             "%s: the handle is NULL; make it by " maker " first", PETSC_FUNCTION_NAME)
+
+/* 64-bit FNV-1a hash, continued from `hash` (start with HYCO_HASH_START). */
+#define HYCO_HASH_START 14695981039346656037ULL
+unsigned long long HycoHash(unsigned long long hash, const void *data, size_t bytes);
+
+/* Seconds since the first call, on this rank's clock. */
+PetscReal HycoNow(void);
+
+/* Option look-up with the library's own checks: a value that does not parse is one clear line. */
+PetscErrorCode HycoOptionsReal(PetscOptions options, const char name[], PetscReal lo, PetscReal hi, PetscReal *value);
+PetscErrorCode HycoOptionsInt(PetscOptions options, const char name[], PetscInt lo, PetscInt hi, PetscInt *value);
+PetscErrorCode HycoOptionsBool(PetscOptions options, const char name[], PetscBool *value);
+/* One word of `words` (NULL-terminated); `*index` is left alone when the option is absent. */
+PetscErrorCode HycoOptionsWord(PetscOptions options, const char name[], const char *const words[], PetscInt *index);
+
+/* Whether an option is in the library's table; name without the dash. */
+PetscBool HycoOptionKnown(const char name[]);
+
+/* A copy of `n` items of type `type`: *to = copy of from. */
+#define HycoDuplicate(n, from, to)                                                                                     \
+  do {                                                                                                                 \
+    PetscCall(PetscMalloc1((n), (to)));                                                                                \
+    PetscCall(PetscArraycpy(*(to), (from), (n)));                                                                      \
+  } while (0)
+
+#endif

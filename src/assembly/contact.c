@@ -1,0 +1,146 @@
+/* B and D: normals, gaps and the rows of the potential contacts at the current parameters. */
+#include "kinematics.h"
+
+/* Sum of n dS over the facets of `group` around each node (n_nodes x 3). */
+static PetscErrorCode SurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGetFacet(m->type);
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(vector, 3 * m->n_nodes));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (m->facet_group[f] != group) continue;
+    for (PetscInt q = 0; q < el->nq; q++) {
+      PetscReal n[3];
+
+      PetscCall(HycoFacetNormal(fe, el, f, q, n));
+      for (PetscInt a = 0; a < m->nf; a++) {
+        for (PetscInt c = 0; c < 3; c++) vector[3 * m->facets[f * m->nf + a] + c] += el->N[q][a] * n[c];
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The normal of one pair: given, at the master's node (obstacle: the slave's), or from the slave's surface. */
+static PetscErrorCode PairNormal(HycoFE fe, const HycoContact *c, PetscInt slave, PetscInt master,
+                                 const PetscReal *vector, PetscReal n[3])
+{
+  const PetscInt at = master >= 0 ? master : slave;
+  PetscReal length = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < 3; k++) {
+    n[k] = 0;
+    if (vector)
+      n[k] = vector[3 * slave + k];
+    else if (c->normal[k])
+      PetscCall(HycoExprEval(c->normal[k], fe->mu, 1, fe->X + 3 * at, &n[k]));
+    if (k < fe->dim) length += n[k] * n[k];
+  }
+  length = PetscSqrtReal(length);
+  PetscCheck(length > 0, PETSC_COMM_SELF, PETSC_ERR_USER, "contact %s: the normal at node %d has no length", c->name,
+             (int)fe->mesh->node_id[slave]);
+  for (PetscInt k = 0; k < 3; k++) n[k] /= length;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal normal[], PetscReal gap[])
+{
+  PetscReal *vector = NULL;
+  PetscInt last = -1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * fe->mesh->n_nodes, &vector));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const HycoContact *c = &fe->scene->contact[pairs->contact[k]];
+    const PetscBool given = (PetscBool)(c->normal[0] || c->normal[1] || c->normal[2]);
+    const PetscInt s = pairs->slave[k], r = pairs->master[k];
+    PetscReal *n = normal + 3 * k;
+
+    if (!given && last != pairs->contact[k]) {
+      PetscInt g = 0;
+
+      PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
+      PetscCall(SurfaceVectors(fe, g, vector));
+    }
+    last = pairs->contact[k];
+    PetscCall(PairNormal(fe, c, s, r, given ? NULL : vector, n));
+    if (c->gap) {
+      PetscCall(HycoExprEval(c->gap, fe->mu, 1, fe->X + 3 * (r >= 0 ? r : s), &gap[k]));
+    } else {
+      gap[k] = 0;
+      for (PetscInt d = 0; d < 3; d++) gap[k] += n[d] * (fe->X[3 * r + d] - fe->X[3 * s + d]);
+    }
+  }
+  PetscCall(PetscFree(vector));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
+                               PetscReal gap[])
+{
+  PetscReal *normal;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * pairs->n, &normal));
+  PetscCall(HycoContactGeometry(fe, pairs, normal, gap));
+  start[0] = 0;
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    for (PetscInt side = 0; side < 2; side++) {
+      const PetscInt node = side ? pairs->master[k] : pairs->slave[k];
+
+      for (PetscInt c = 0; node >= 0 && c < fe->dim; c++) {
+        const PetscReal entry = side ? -normal[3 * k + c] : normal[3 * k + c];
+        const PetscInt i = node * fe->dim + c;
+
+        if (fe->fixed[i]) {
+          gap[k] -= entry * fe->u0[i];
+        } else if (PetscAbsReal(entry) > 1e-14) {
+          dof[n] = i;
+          value[n++] = entry;
+        }
+      }
+    }
+    start[k + 1] = n;
+    PetscCheck(start[k + 1] > start[k] || gap[k] >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "contact %s: node %d is fixed, and its prescribed displacement penetrates by %g",
+               fe->scene->contact[pairs->contact[k]].name, (int)fe->mesh->node_id[pairs->slave[k]], (double)-gap[k]);
+  }
+  PetscCall(PetscFree(normal));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGetFacet(m->type);
+  PetscReal *share;
+  PetscInt last = -1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_nodes, &share));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    if (last != pairs->contact[k]) {
+      PetscInt g = 0;
+
+      last = pairs->contact[k];
+      PetscCall(HycoMeshFindGroup(m, "contact", fe->scene->contact[last].slave, &g));
+      PetscCall(PetscArrayzero(share, m->n_nodes));
+      for (PetscInt f = 0; f < m->n_facets; f++) {
+        for (PetscInt q = 0; m->facet_group[f] == g && q < el->nq; q++) {
+          PetscReal n[3];
+
+          PetscCall(HycoFacetNormal(fe, el, f, q, n));
+          for (PetscInt a = 0; a < m->nf; a++)
+            share[m->facets[f * m->nf + a]] += el->N[q][a] * PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        }
+      }
+    }
+    area[k] = share[pairs->slave[k]];
+  }
+  PetscCall(PetscFree(share));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,162 @@
+/* HycoFE: the scene on a mesh at one parameter value: nodes moved, supports, materials. */
+#include <hycofe.h>
+
+PetscErrorCode HycoFEDestroy(HycoFE *fe)
+{
+  PetscFunctionBegin;
+  if (!*fe) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*fe)->X));
+  PetscCall(PetscFree((*fe)->fixed));
+  PetscCall(PetscFree((*fe)->u0));
+  PetscCall(PetscFree((*fe)->lame));
+  PetscCall(PetscFree(*fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
+{
+  const HycoElement *el = HycoElementGet(mesh->type);
+  HycoFE f;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&f));
+  f->scene = scene;
+  f->mesh = mesh;
+  f->dim = mesh->dim;
+  f->n_dof = mesh->n_nodes * mesh->dim;
+  f->n_sigma = mesh->dim == 1 ? 1 : mesh->dim == 2 ? 4 : 6;
+  PetscCall(PetscMalloc1(3 * mesh->n_nodes, &f->X));
+  PetscCall(PetscCalloc1(f->n_dof, &f->fixed));
+  PetscCall(PetscCalloc1(f->n_dof, &f->u0));
+  PetscCall(PetscMalloc1(mesh->n_cells * el->nq * 2, &f->lame));
+  *fe = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X = map(x, mu), body by body. */
+static PetscErrorCode MoveNodes(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(fe->X, m->xyz, 3 * m->n_nodes));
+  for (PetscInt b = 0; b < fe->scene->n_bodies; b++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      HycoExpr map = fe->scene->body[b].map[c];
+
+      if (!map) continue;
+      PetscCheck(
+          c<m->dim, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: the mesh has %d space dimension%s; there is no component %c",
+              HycoExprKey(map), (int)m->dim, m->dim> 1
+              ? "s"
+              : "",
+          "xyz"[c]);
+      for (PetscInt i = 0; i < m->n_nodes; i++) {
+        if (m->node_body[i] == b) PetscCall(HycoExprEval(map, fe->mu, 1, m->xyz + 3 * i, fe->X + 3 * i + c));
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fixed components and their values, evaluated at the moved nodes. */
+static PetscErrorCode SetSupports(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(fe->fixed, fe->n_dof));
+  PetscCall(PetscArrayzero(fe->u0, fe->n_dof));
+  for (PetscInt k = 0; k < fe->scene->n_fixed; k++) {
+    HycoFixed *fixed = &fe->scene->fixed[k];
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "fixed", fixed->group, &g));
+    for (PetscInt c = 0; c < m->dim; c++) {
+      for (PetscInt j = m->group_start[g]; fixed->value[c] && j < m->group_start[g + 1]; j++) {
+        const PetscInt i = m->group_node[j], dof = i * m->dim + c;
+        PetscReal value;
+
+        PetscCall(HycoExprEval(fixed->value[c], fe->mu, 1, fe->X + 3 * i, &value));
+        PetscCheck(!fe->fixed[dof] ||
+                       PetscAbsReal(value - fe->u0[dof]) <= 1e-12 * (PetscAbsReal(value) + PetscAbsReal(fe->u0[dof])),
+                   PETSC_COMM_SELF, PETSC_ERR_USER, "node %d is fixed twice in %c, to %g and to %g (by %s)",
+                   (int)m->node_id[i], "xyz"[c], (double)fe -> u0[dof], (double)value, HycoExprKey(fixed->value[c]));
+        fe->fixed[dof] = PETSC_TRUE;
+        fe->u0[dof] = value;
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lame's constants at the quadrature points from Young's modulus and Poisson's ratio. */
+static PetscErrorCode SetMaterial(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGet(m->type);
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const HycoBody *body = &fe->scene->body[m->cell_body[e]];
+
+    for (PetscInt q = 0; q < el->nq; q++) {
+      PetscReal x[3] = {0, 0, 0}, young, poisson = 0;
+      PetscReal *lame = fe->lame + 2 * (e * el->nq + q);
+
+      for (PetscInt a = 0; a < m->nv; a++) {
+        for (PetscInt c = 0; c < 3; c++) x[c] += el->N[q][a] * fe->X[3 * m->cells[e * m->nv + a] + c];
+      }
+      PetscCall(HycoExprEval(body->young, fe->mu, 1, x, &young));
+      if (body->poisson) PetscCall(HycoExprEval(body->poisson, fe->mu, 1, x, &poisson));
+      PetscCheck(young > 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+                 "%s is %g at x = %g, y = %g, z = %g; Young's modulus must be positive", HycoExprKey(body->young),
+                 (double)young, (double)x[0], (double)x[1], (double)x[2]);
+      PetscCheck(poisson > -1 && poisson < 0.5, PETSC_COMM_SELF, PETSC_ERR_USER,
+                 "%s is %g; Poisson's ratio must lie between -1 and 0.5", HycoExprKey(body->poisson), (double)poisson);
+      lame[0] = m->dim == 1 ? 0 : young * poisson / ((1 + poisson) * (1 - 2 * poisson));
+      lame[1] = m->dim == 1 ? young : young / (2 * (1 + poisson));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the changed parameters reach: the map, the stiffness, the contact rows. */
+static void FindChanges(HycoFE fe, const PetscBool changed[], PetscBool *moved)
+{
+  HycoScene s = fe->scene;
+
+  *moved = PETSC_FALSE;
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    for (PetscInt c = 0; c < 3; c++) *moved = (PetscBool)(*moved || HycoExprChanges(s->body[b].map[c], changed));
+  }
+  fe->stiffness_changed = fe->contact_changed = *moved;
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    if (HycoExprChanges(s->body[b].young, changed) || HycoExprChanges(s->body[b].poisson, changed))
+      fe->stiffness_changed = PETSC_TRUE;
+  }
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      if (HycoExprChanges(s->contact[k].normal[c], changed)) fe->contact_changed = PETSC_TRUE;
+    }
+  }
+}
+
+PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
+{
+  PetscBool changed[HYCO_MAX_PARAMETERS], moved;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {
+    changed[p] = (PetscBool)(!fe->ready || mu[p] != fe->mu[p]);
+    fe->mu[p] = mu[p];
+  }
+  FindChanges(fe, changed, &moved);
+  if (!fe->ready) fe->stiffness_changed = fe->contact_changed = moved = PETSC_TRUE;
+  fe->ready = PETSC_FALSE; /* until all of it is done */
+  if (moved) PetscCall(MoveNodes(fe));
+  PetscCall(SetSupports(fe));
+  if (fe->stiffness_changed) PetscCall(SetMaterial(fe));
+  fe->ready = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

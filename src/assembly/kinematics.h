@@ -1,0 +1,12 @@
+/* The map from the reference cell to the moved one: private to assembly/. */
+#ifndef HYCO_KINEMATICS_H
+#define HYCO_KINEMATICS_H
+#include <hycofe.h>
+
+/* Gradients dN/dX (nv x 3) of the shape functions at quadrature point q, and |det J| w. */
+PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal g[8][3],
+                             PetscReal *weight);
+/* Outward normal times area weight (n dS) at point q of a facet; in 1D the sign away from its cell. */
+PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);
+
+#endif

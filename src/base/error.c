@@ -1,0 +1,69 @@
+/* Errors: caught as one line of text, and agreed on by all ranks so that none is left waiting. */
+#include <hycoimpl.h>
+#include <time.h>
+
+static char caught_line[HYCO_LINE];
+
+static PetscErrorCode CatchHandler(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
+                                   PetscErrorType type, const char *message, void *ctx)
+{
+  (void)comm, (void)line, (void)function, (void)file, (void)ctx;
+  if (type == PETSC_ERROR_INITIAL) {
+    if (message && message[0]) {
+      snprintf(caught_line, sizeof(caught_line), "%s", message);
+    } else {
+      snprintf(caught_line, sizeof(caught_line), "PETSc error %d in %s()", (int)code, function ? function : "?");
+    }
+  }
+  return code;
+}
+
+PetscErrorCode HycoCatchBegin(void)
+{
+  PetscFunctionBegin;
+  caught_line[0] = '\0';
+  PetscCall(PetscPushErrorHandler(CatchHandler, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscPopErrorHandler());
+  message[0] = '\0';
+  if (caught) snprintf(message, HYCO_LINE, "%s", caught_line[0] ? caught_line : "unknown error");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoAgree(MPI_Comm comm, const char message[])
+{
+  PetscMPIInt rank, size, mine, first;
+  char line[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  mine = message[0] ? rank : size;
+  first = mine;
+  if (size > 1) PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm));
+  if (first == size) PetscFunctionReturn(PETSC_SUCCESS);
+  if (rank == first) snprintf(line, sizeof(line), "%s", message);
+  if (size > 1) PetscCallMPI(MPI_Bcast(line, sizeof(line), MPI_CHAR, first, comm));
+  SETERRQ(comm, PETSC_ERR_USER, "%s", line);
+}
+
+unsigned long long HycoHash(unsigned long long hash, const void *data, size_t bytes)
+{
+  const unsigned char *byte = (const unsigned char *)data;
+
+  for (size_t k = 0; k < bytes; k++) hash = (hash ^ byte[k]) * 1099511628211ULL;
+  return hash;
+}
+
+PetscReal HycoNow(void)
+{
+  struct timespec now;
+
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (PetscReal)now.tv_sec + 1e-9 * (PetscReal)now.tv_nsec;
+}

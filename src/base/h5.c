@@ -1,0 +1,265 @@
+/* HDF5 on one process. */
+#include <hycoh5.h>
+#include <hdf5.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+struct _n_HycoH5 {
+  hid_t id;
+  char path[PETSC_MAX_PATH_LEN], partial[PETSC_MAX_PATH_LEN + 16];
+  PetscBool writing;
+};
+
+/* The largest dataset that the library writes or believes: 2^40 items. */
+#define HYCO_H5_ITEMS ((hsize_t)1 << 40)
+
+PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
+{
+  HycoH5 f;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&f));
+  f->writing = PETSC_TRUE;
+  PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
+  PetscCall(PetscSNPrintf(f->partial, sizeof(f->partial), "%s.partial", path));
+  H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+  f->id = H5Fcreate(f->partial, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  if (f->id < 0) {
+    PetscCall(PetscFree(f));
+    HycoFail("%s cannot be written: is there such a folder, may you write there, is there room?", path);
+  }
+  *file = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
+{
+  HycoH5 f;
+  FILE *probe;
+
+  PetscFunctionBegin;
+  probe = fopen(path, "rb");
+  PetscCheck(probe, PETSC_COMM_SELF, PETSC_ERR_USER, "%s cannot be opened: no such file, or not readable", path);
+  fclose(probe);
+  PetscCall(PetscNew(&f));
+  PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
+  H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+  f->id = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+  if (f->id < 0) {
+    PetscCall(PetscFree(f));
+    HycoFail("%s is no HDF5 file, or it is damaged", path);
+  }
+  *file = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
+{
+  HycoH5 f = *file;
+  char path[PETSC_MAX_PATH_LEN];
+  int failed = 0;
+
+  PetscFunctionBegin;
+  if (!f) PetscFunctionReturn(PETSC_SUCCESS);
+  *file = NULL;
+  if (f->writing && H5Fflush(f->id, H5F_SCOPE_GLOBAL) < 0) failed = 1;
+  if (H5Fclose(f->id) < 0) failed = 1;
+  PetscCall(PetscStrncpy(path, f->path, sizeof(path)));
+  if (f->writing) {
+    if (commit && !failed && rename(f->partial, f->path) != 0) failed = 1;
+    if (!commit || failed) unlink(f->partial);
+  }
+  PetscCall(PetscFree(f));
+  PetscCheck(!failed || !commit, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s could not be written to its end: is the disk full?", path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, const void *data)
+{
+  hsize_t dims[2] = {(hsize_t)rows, (hsize_t)cols};
+  hid_t space, links, set;
+  herr_t failed = 0;
+
+  PetscFunctionBegin;
+  space = H5Screate_simple(2, dims, NULL);
+  links = H5Pcreate(H5P_LINK_CREATE);
+  H5Pset_create_intermediate_group(links, 1);
+  set = H5Dcreate2(f->id, name, type, space, links, H5P_DEFAULT, H5P_DEFAULT);
+  if (set < 0 || (rows && cols && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)) failed = -1;
+  if (set >= 0) H5Dclose(set);
+  H5Pclose(links);
+  H5Sclose(space);
+  PetscCheck(failed >= 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: writing %s failed: is the disk full?", f->path, name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscReal *data)
+{
+  PetscFunctionBegin;
+  PetscCall(Write(file, name, H5T_NATIVE_DOUBLE, rows, cols, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscInt *data)
+{
+  PetscFunctionBegin;
+  PetscCall(Write(file, name, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32, rows, cols, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[])
+{
+  PetscFunctionBegin;
+  PetscCall(Write(file, name, H5T_NATIVE_CHAR, (PetscInt)strlen(text), 1, text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Opens a two-dimensional dataset of the wanted class and gives its size. */
+static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, hid_t *set, hsize_t dims[2])
+{
+  hid_t space, type;
+  H5T_class_t class;
+  int rank;
+
+  PetscFunctionBegin;
+  *set = H5Dopen2(f->id, name, H5P_DEFAULT);
+  PetscCheck(*set >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s holds no %s: it was not written by this version of hyco, or is damaged", f->path, name);
+  space = H5Dget_space(*set);
+  type = H5Dget_type(*set);
+  rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
+  class = type >= 0 ? H5Tget_class(type) : H5T_NO_CLASS;
+  if (rank == 2) H5Sget_simple_extent_dims(space, dims, NULL);
+  if (space >= 0) H5Sclose(space);
+  if (type >= 0) H5Tclose(type);
+  /* What the set claims must lie in the file: a damaged size must not become a wild allocation. */
+  if (rank != 2 || class != wanted || dims[0] > HYCO_H5_ITEMS || dims[1] > HYCO_H5_ITEMS ||
+      dims[0] * dims[1] > (hsize_t)PETSC_MAX_INT ||
+      H5Dget_storage_size(*set) < dims[0] * dims[1] * (wanted == H5T_FLOAT ? 8 : 1)) {
+    H5Dclose(*set);
+    HycoFail("%s: %s is damaged (its shape or type is not what hyco writes)", f->path, name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadSet(HycoH5 f, const char name[], hid_t set, hid_t type, hid_t memory, hid_t space, void *data)
+{
+  herr_t status = H5Dread(set, type, memory, space, H5P_DEFAULT, data);
+
+  PetscFunctionBegin;
+  H5Dclose(set);
+  PetscCheck(status >= 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s cannot be read: the file is damaged", f->path, name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckSize(HycoH5 f, const char name[], const hsize_t dims[2], PetscInt rows, PetscInt cols)
+{
+  PetscFunctionBegin;
+  PetscCheck((rows < 0 || dims[0] == (hsize_t)rows) && (cols < 0 || dims[1] == (hsize_t)cols), PETSC_COMM_SELF,
+             PETSC_ERR_USER, "%s: %s is %ld x %ld where %d x %d was expected: the file is damaged", f->path, name,
+             (long)dims[0], (long)dims[1], (int)rows, (int)cols);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols)
+{
+  hid_t set;
+  hsize_t dims[2];
+
+  PetscFunctionBegin;
+  PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
+  H5Dclose(set);
+  *rows = (PetscInt)dims[0];
+  *cols = (PetscInt)dims[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, PetscReal *data)
+{
+  hid_t set;
+  hsize_t dims[2];
+
+  PetscFunctionBegin;
+  PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
+  PetscCall(CheckSize(file, name, dims, rows, cols));
+  PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols, PetscReal **data)
+{
+  hid_t set;
+  hsize_t dims[2];
+
+  PetscFunctionBegin;
+  PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
+  PetscCall(CheckSize(file, name, dims, *rows, *cols));
+  *rows = (PetscInt)dims[0];
+  *cols = (PetscInt)dims[1];
+  PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
+  PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, *data));
+  for (size_t k = 0; k < dims[0] * dims[1]; k++) {
+    PetscCheck(PetscIsNormalReal((*data)[k]) || (*data)[k] == 0 || PetscAbsReal((*data)[k]) < 1, PETSC_COMM_SELF,
+               PETSC_ERR_USER, "%s: %s holds a value that is not finite: the file is damaged", file->path, name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt *rows, PetscInt *cols,
+                             PetscInt **data)
+{
+  hid_t set;
+  hsize_t dims[2];
+
+  PetscFunctionBegin;
+  PetscCall(OpenSet(file, name, H5T_INTEGER, &set, dims));
+  PetscCall(CheckSize(file, name, dims, *rows, *cols));
+  *rows = (PetscInt)dims[0];
+  *cols = (PetscInt)dims[1];
+  PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
+  PetscCall(
+      ReadSet(file, name, set, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, *data));
+  for (size_t k = 0; k < dims[0] * dims[1]; k++) {
+    PetscCheck((*data)[k] >= lo && (*data)[k] <= hi, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s: %s holds %d, outside %d to %d: the file is damaged", file->path, name, (int)(*data)[k], (int)lo,
+               (int)hi);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5ReadRows(HycoH5 file, const char name[], PetscInt start, PetscInt n, PetscInt cols,
+                              PetscReal *data)
+{
+  hid_t set, space, memory;
+  hsize_t dims[2], offset[2] = {(hsize_t)start, 0}, count[2] = {(hsize_t)n, (hsize_t)cols};
+
+  PetscFunctionBegin;
+  if (n == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
+  PetscCall(CheckSize(file, name, dims, -1, cols));
+  PetscCheck((hsize_t)(start + n) <= dims[0], PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s: %s has %ld rows, %d are needed: the file is damaged", file->path, name, (long)dims[0],
+             (int)(start + n));
+  space = H5Dget_space(set);
+  H5Sselect_hyperslab(space, H5S_SELECT_SET, offset, NULL, count, NULL);
+  memory = H5Screate_simple(2, count, NULL);
+  PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, memory, space, data));
+  H5Sclose(memory);
+  H5Sclose(space);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5LoadText(HycoH5 file, const char name[], char **text)
+{
+  hid_t set;
+  hsize_t dims[2];
+
+  PetscFunctionBegin;
+  PetscCall(OpenSet(file, name, H5T_INTEGER, &set, dims));
+  PetscCheck(dims[1] == 1, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s is damaged", file->path, name);
+  PetscCall(PetscCalloc1(dims[0] + 1, text));
+  PetscCall(ReadSet(file, name, set, H5T_NATIVE_CHAR, H5S_ALL, H5S_ALL, *text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,174 @@
+/* The table of options, and look-ups whose complaints are one clear line. */
+#include <hycoimpl.h>
+#include <ctype.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const HycoOption option_table[] = {
+    {"hyco_solver_type", "<active_set|tao|lemke>", "active_set", "method for every contact problem"},
+    {"hyco_solver_form", "<auto|dual|primal>", "auto",
+     "pose it in the forces (few contacts) or in the gaps (as many as unknowns)"},
+    {"hyco_solver_rtol", "<real>", "1e-8", "largest relative KKT residual that counts as solved"},
+    {"hyco_solver_max_its", "<int>", "0", "iterations of the active set (0: from the number of contacts)"},
+    {"hyco_solver_warm_start", "<bool>", "true", "start from the last solution's active contacts"},
+    {"hyco_groups", "<int>", "0", "groups of ranks that solve snapshots side by side (0: from the mesh's size)"},
+    {"hyco_snapshots", "<folder>", "MODEL.snapshots", "where full-order solutions are stored"},
+    {"hyco_pod_tol", "<real>", "1e-7", "energy left out of the displacement basis, the epsilon of (18)"},
+    {"hyco_pod_noise", "<real>", "1e-11", "singular values below this share of the first are noise"},
+    {"hyco_pod_max_modes", "<int>", "0", "at most so many displacement modes (0: no limit)"},
+    {"hyco_rid_modes", "<list>", "displacement,stress,force",
+     "bases whose DEIM points seed the RID: displacement, stress, force, dual"},
+    {"hyco_rid_dual_tol", "<real>", "1e-1", "epsilon of (18) for the dual basis"},
+    {"hyco_rid_stress_tol", "<real>", "hyco_pod_tol", "epsilon of (18) for the stress basis"},
+    {"hyco_rid_force_tol", "<real>", "hyco_pod_tol", "epsilon of (18) for the basis of generalised forces"},
+    {"hyco_rid_layers", "<int>", "0", "layers of elements added around the RID"},
+    {"hyco_rid_contact_extension", "<length>", "0",
+     "contact nodes this close to the RID's join it with their elements"},
+    {"hyco_rid_groups", "<list>", "none", "mesh groups whose elements join the RID (region of interest)"},
+    {"hyco_rid_region", "<expression>", "none", "elements with a node where this is positive join the RID"},
+    {"hyco_rid_whole", "<bool>", "false", "take the whole mesh as the RID"},
+    {"hyco_hybrid", "<auto|rank|contact|all>", "auto",
+     "displacements kept full order: fewest for full row rank, all contact ones, all"},
+    {"hyco_hybrid_trials", "<int>", "3000", "candidate sets judged by their training error when hybrid is rank"},
+    {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
+};
+
+PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *table[])
+{
+  PetscFunctionBegin;
+  if (n) *n = (PetscInt)(sizeof(option_table) / sizeof(option_table[0]));
+  if (table) *table = option_table;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool HycoOptionKnown(const char name[])
+{
+  for (size_t k = 0; k < sizeof(option_table) / sizeof(option_table[0]); k++) {
+    if (strcasecmp(option_table[k].name, name) == 0) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Levenshtein distance of two words of fewer than 128 letters, letter case ignored. */
+static PetscInt EditDistance(const char *a, const char *b)
+{
+  PetscInt row[129];
+  PetscInt m = (PetscInt)strlen(a), n = (PetscInt)strlen(b);
+
+  if (m > 127 || n > 127) return PETSC_MAX_INT;
+  for (PetscInt j = 0; j <= n; j++) row[j] = j;
+  for (PetscInt i = 1; i <= m; i++) {
+    PetscInt diagonal = row[0];
+
+    row[0] = i;
+    for (PetscInt j = 1; j <= n; j++) {
+      PetscInt cost = diagonal + (tolower((unsigned char)a[i - 1]) != tolower((unsigned char)b[j - 1]));
+
+      diagonal = row[j];
+      row[j] = PetscMin(cost, 1 + PetscMin(row[j], row[j - 1]));
+    }
+  }
+  return row[n];
+}
+
+const char *HycoNearest(const char *word, PetscInt n, const char *const names[])
+{
+  const char *nearest = NULL;
+  PetscInt best = PetscMax(2, (PetscInt)strlen(word) / 3) + 1;
+
+  for (PetscInt k = 0; k < n; k++) {
+    PetscInt distance = EditDistance(word, names[k]);
+
+    if (distance < best) {
+      best = distance;
+      nearest = names[k];
+    }
+  }
+  return nearest;
+}
+
+static PetscErrorCode GetText(PetscOptions options, const char name[], char text[HYCO_LINE], PetscBool *set)
+{
+  char dashed[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", name));
+  PetscCall(PetscOptionsGetString(options, NULL, dashed, text, HYCO_LINE, set));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoOptionsReal(PetscOptions options, const char name[], PetscReal lo, PetscReal hi, PetscReal *value)
+{
+  char text[HYCO_LINE], *end;
+  PetscBool set;
+  double number;
+
+  PetscFunctionBegin;
+  PetscCall(GetText(options, name, text, &set));
+  if (!set) PetscFunctionReturn(PETSC_SUCCESS);
+  number = strtod(text, &end);
+  if (end == text || *end != '\0' || !(number >= lo && number <= hi)) {
+    HycoFail("-%s is \"%s\"; it must be a number from %g to %g", name, text, (double)lo, (double)hi);
+  }
+  *value = number;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoOptionsInt(PetscOptions options, const char name[], PetscInt lo, PetscInt hi, PetscInt *value)
+{
+  char text[HYCO_LINE], *end;
+  PetscBool set;
+  long number;
+
+  PetscFunctionBegin;
+  PetscCall(GetText(options, name, text, &set));
+  if (!set) PetscFunctionReturn(PETSC_SUCCESS);
+  errno = 0;
+  number = strtol(text, &end, 10);
+  if (end == text || *end != '\0' || errno || number < lo || number > hi) {
+    if (hi == PETSC_MAX_INT) HycoFail("-%s is \"%s\"; it must be a whole number, at least %d", name, text, (int)lo);
+    HycoFail("-%s is \"%s\"; it must be a whole number from %d to %d", name, text, (int)lo, (int)hi);
+  }
+  *value = (PetscInt)number;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoOptionsBool(PetscOptions options, const char name[], PetscBool *value)
+{
+  static const char *const words[] = {"false", "no", "off", "0", "true", "yes", "on", "1", NULL};
+  char text[HYCO_LINE];
+  PetscBool set;
+
+  PetscFunctionBegin;
+  PetscCall(GetText(options, name, text, &set));
+  if (!set) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!text[0])
+    *value = PETSC_TRUE;
+  else {
+    PetscInt index = -1;
+
+    PetscCall(HycoOptionsWord(options, name, words, &index));
+    *value = (PetscBool)(index >= 4);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoOptionsWord(PetscOptions options, const char name[], const char *const words[], PetscInt *index)
+{
+  char text[HYCO_LINE], list[HYCO_LINE] = "";
+  PetscBool set;
+
+  PetscFunctionBegin;
+  PetscCall(GetText(options, name, text, &set));
+  if (!set) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; words[k]; k++) {
+    if (strcasecmp(text, words[k]) == 0) {
+      *index = k;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+    PetscCall(PetscStrlcat(list, k ? ", " : "", sizeof(list)));
+    PetscCall(PetscStrlcat(list, words[k], sizeof(list)));
+  }
+  HycoFail("-%s is \"%s\"; it must be one of: %s", name, text, list);
+}

@@ -1,0 +1,422 @@
+/*
+  The primal form, in gap coordinates: of each contact row one unknown (its pivot) is replaced by the row's value, so
+  that B x <= D becomes the bound y_p <= D_i. With x = T y: Kg = T^T K T, f = T^T F, and the force of a contact is the
+  residual at its pivot, L_i = (f - Kg y)_p. No dense matrix appears, whatever the number of contacts.
+*/
+#include <hycosolverimpl.h>
+
+/* Pivot (global unknown) of each of this rank's rows: the largest entry whose unknown no other row has; -1: none. */
+static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[])
+{
+  PetscInt lo, hi;
+  Mat Bt = y->Bt;
+  Vec count, mine;
+  PetscInt first, last;
+  PetscScalar *c;
+  VecScatter scatter;
+  IS is;
+  PetscInt *need, n_need = 0, at = 0;
+  const PetscScalar *shared;
+
+  PetscFunctionBegin;
+  /* the number of contacts of each unknown, fetched for the unknowns of this rank's rows */
+  PetscCall(MatCreateVecs(Bt, NULL, &count));
+  PetscCall(MatGetOwnershipRange(Bt, &first, &last));
+  PetscCall(VecGetArray(count, &c));
+  for (PetscInt r = first; r < last; r++) {
+    PetscInt n;
+
+    PetscCall(MatGetRow(Bt, r, &n, NULL, NULL));
+    c[r - first] = n;
+    PetscCall(MatRestoreRow(Bt, r, &n, NULL, NULL));
+  }
+  PetscCall(VecRestoreArray(count, &c));
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    if (pass) PetscCall(PetscMalloc1(n_need, &need));
+    n_need = 0;
+    for (PetscInt r = lo; r < hi; r++) {
+      PetscInt n;
+      const PetscInt *cols;
+
+      PetscCall(MatGetRow(y->B, r, &n, &cols, NULL));
+      for (PetscInt k = 0; k < n; k++, n_need++) {
+        if (pass) need[n_need] = cols[k];
+      }
+      PetscCall(MatRestoreRow(y->B, r, &n, &cols, NULL));
+    }
+  }
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n_need, need, PETSC_OWN_POINTER, &is));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, n_need, &mine));
+  PetscCall(VecScatterCreate(count, is, mine, NULL, &scatter));
+  PetscCall(VecScatterBegin(scatter, count, mine, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(scatter, count, mine, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArrayRead(mine, &shared));
+  for (PetscInt r = lo; r < hi; r++) {
+    PetscInt n;
+    const PetscInt *cols;
+    const PetscScalar *vals;
+    PetscReal best = 0;
+
+    pivot[r - lo] = -1;
+    PetscCall(MatGetRow(y->B, r, &n, &cols, &vals));
+    for (PetscInt k = 0; k < n; k++, at++) {
+      if (shared[at] < 1.5 && PetscAbsScalar(vals[k]) > best * (1 + 1e-12)) {
+        best = PetscAbsScalar(vals[k]);
+        pivot[r - lo] = cols[k];
+      }
+    }
+    PetscCall(MatRestoreRow(y->B, r, &n, &cols, &vals));
+  }
+  PetscCall(VecRestoreArrayRead(mine, &shared));
+  PetscCall(VecScatterDestroy(&scatter));
+  PetscCall(ISDestroy(&is));
+  PetscCall(VecDestroy(&mine));
+  PetscCall(VecDestroy(&count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPrimalPossible(HycoSystem y, PetscBool *possible)
+{
+  PetscInt lo, hi, *pivot;
+  PetscMPIInt bad = 0, any;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  PetscCall(PetscMalloc1(hi - lo, &pivot));
+  PetscCall(FindPivots(y, pivot));
+  for (PetscInt k = 0; k < hi - lo; k++) bad = bad || pivot[k] < 0;
+  PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, y->comm));
+  *possible = (PetscBool)!any;
+  PetscCall(PetscFree(pivot));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* T = I, but in a pivot's row: x_p = (y_p - sum_j B_ij y_j) / B_ip. */
+static PetscErrorCode BuildT(HycoSolver s)
+{
+  HycoSystem y = s->system;
+  PetscInt lo, hi, first, last;
+  Mat shape;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(y->K, &first, &last));
+  PetscCall(MatCreate(s->comm, &shape));
+  PetscCall(MatSetSizes(shape, last - first, last - first, y->n, y->n));
+  PetscCall(MatSetType(shape, MATPREALLOCATOR));
+  PetscCall(MatSetUp(shape));
+  PetscCall(MatDestroy(&s->T));
+  PetscCall(MatCreate(s->comm, &s->T));
+  PetscCall(MatSetSizes(s->T, last - first, last - first, y->n, y->n));
+  PetscCall(MatSetType(s->T, MATAIJ));
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    Mat A = pass ? s->T : shape;
+
+    if (pass) PetscCall(MatPreallocatorPreallocate(shape, PETSC_TRUE, A));
+    for (PetscInt r = first; r < last; r++) PetscCall(MatSetValue(A, r, r, 1, INSERT_VALUES));
+    PetscCall(MatAssemblyBegin(A, MAT_FLUSH_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(A, MAT_FLUSH_ASSEMBLY));
+    for (PetscInt r = lo; r < hi; r++) {
+      const PetscInt p = s->pivot[r - lo];
+      PetscInt n;
+      const PetscInt *cols;
+      const PetscScalar *vals;
+      PetscScalar Bp = 1;
+
+      PetscCall(MatGetRow(y->B, r, &n, &cols, &vals));
+      for (PetscInt k = 0; k < n; k++) {
+        if (cols[k] == p) Bp = vals[k];
+      }
+      for (PetscInt k = 0; k < n; k++)
+        PetscCall(MatSetValue(A, p, cols[k], cols[k] == p ? 1 / Bp : -vals[k] / Bp, INSERT_VALUES));
+      PetscCall(MatRestoreRow(y->B, r, &n, &cols, &vals));
+    }
+    PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  }
+  PetscCall(MatDestroy(&shape));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUpPrimal(HycoSolver s)
+{
+  HycoSystem y = s->system;
+  PetscBool same;
+  PetscInt lo, hi;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  PetscCall(HycoSeenUpdate(&s->transformed, y->K, y->B, &same));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  PetscCall(PetscFree(s->pivot));
+  PetscCall(PetscMalloc1(hi - lo, &s->pivot));
+  PetscCall(FindPivots(y, s->pivot));
+  for (PetscInt k = 0; k < hi - lo; k++) {
+    PetscCheck(s->pivot[k] >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
+  }
+  PetscCall(BuildT(s));
+  PetscCall(MatDestroy(&s->Kg));
+  PetscCall(MatDestroy(&s->Kw));
+  PetscCall(MatPtAP(y->K, s->T, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &s->Kg));
+  PetscCall(MatSetOption(s->Kg, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatDuplicate(s->Kg, MAT_COPY_VALUES, &s->Kw));
+  PetscCall(MatSetOption(s->Kw, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(s->Kw, MAT_SPD, PETSC_TRUE));
+  PetscCall(MatSetOption(s->Kw, MAT_KEEP_NONZERO_PATTERN, PETSC_TRUE));
+  if (s->ksp_gap) {
+    PetscInt n_old, n_new;
+    Mat old;
+
+    PetscCall(KSPGetOperators(s->ksp_gap, &old, NULL));
+    PetscCall(MatGetSize(old, &n_old, NULL));
+    PetscCall(MatGetSize(s->Kw, &n_new, NULL));
+    if (n_old != n_new)
+      PetscCall(KSPDestroy(&s->ksp_gap));
+    else
+      PetscCall(KSPReset(s->ksp_gap));
+  }
+  if (!s->ksp_gap) PetscCall(HycoDirectSolver(s->comm, "hyco_primal_", s->Kw, PETSC_TRUE, &s->ksp_gap));
+  PetscCall(KSPSetOperators(s->ksp_gap, s->Kw, s->Kw));
+  if (s->m != y->m) {
+    PetscCall(PetscFree(s->active));
+    PetscCall(PetscFree(s->S));
+    PetscCall(PetscFree(s->g));
+    PetscCall(PetscFree(s->L));
+    PetscCall(PetscCalloc1(y->m + 1, &s->active));
+    s->m = y->m;
+    s->started = PETSC_FALSE;
+  }
+  s->seconds_factor += HycoNow() - begin;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solves with y_p = D_i on this rank's active contacts. `a` lists their pivots, `d` their gaps. */
+static PetscErrorCode SolveOnSet(HycoSolver s, Vec f, PetscInt n, const PetscInt a[], const PetscReal d[], Vec rhs,
+                                 Vec y)
+{
+  Vec diagonal;
+  PetscScalar mean;
+  KSPConvergedReason why;
+
+  PetscFunctionBegin;
+  PetscCall(MatCopy(s->Kg, s->Kw, SAME_NONZERO_PATTERN));
+  PetscCall(VecDuplicate(y, &diagonal));
+  PetscCall(MatGetDiagonal(s->Kg, diagonal));
+  PetscCall(VecSum(diagonal, &mean));
+  mean /= s->system->n;
+  PetscCall(VecDestroy(&diagonal));
+  PetscCall(VecSet(y, 0));
+  for (PetscInt k = 0; k < n; k++) PetscCall(VecSetValue(y, a[k], d[k], INSERT_VALUES));
+  PetscCall(VecAssemblyBegin(y));
+  PetscCall(VecAssemblyEnd(y));
+  PetscCall(VecCopy(f, rhs));
+  PetscCall(MatZeroRowsColumns(s->Kw, n, a, mean, y, rhs));
+  PetscCall(KSPSetOperators(s->ksp_gap, s->Kw, s->Kw));
+  PetscCall(KSPSolve(s->ksp_gap, rhs, y));
+  PetscCall(KSPGetConvergedReason(s->ksp_gap, &why));
+  if (why < 0) s->reason = HYCO_DIVERGED_SINGULAR;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The value of a distributed vector at this rank's pivots. */
+static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, PetscReal out[])
+{
+  const PetscScalar *w;
+
+  PetscFunctionBegin;
+  PetscCall(VecScatterBegin(scatter, v, work, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(scatter, v, work, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArrayRead(work, &w));
+  PetscCall(PetscArraycpy(out, w, n));
+  PetscCall(VecRestoreArrayRead(work, &w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the iterations share. */
+typedef struct {
+  PetscInt lo, n; /* this rank's contacts */
+  PetscReal *gap, *value, *force, *at_d;
+  PetscInt *at;
+  Vec f, rhs, residual, work;
+  VecScatter scatter;
+} Primal;
+
+/* One pass of the active set: solve, then change every contact that violates (or only the last, after a cycle). */
+static PetscErrorCode Step(HycoSolver s, Primal *p, Vec y, PetscBool one, PetscInt *changes)
+{
+  PetscInt n = 0, local = 0, last = -1, last_all;
+  PetscReal size[2] = {0, 0}, sizes[2];
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < p->n; k++) {
+    if (!s->active[p->lo + k]) continue;
+    p->at[n] = s->pivot[k];
+    p->at_d[n++] = p->gap[k];
+  }
+  PetscCall(SolveOnSet(s, p->f, n, p->at, p->at_d, p->rhs, y));
+  PetscCall(MatMult(s->Kg, y, p->residual));
+  PetscCall(VecAYPX(p->residual, -1, p->f));
+  PetscCall(AtPivots(y, p->scatter, p->work, p->n, p->value));
+  PetscCall(AtPivots(p->residual, p->scatter, p->work, p->n, p->force));
+  for (PetscInt k = 0; k < p->n; k++) {
+    size[0] = PetscMax(size[0], PetscMax(PetscAbsReal(p->gap[k]), PetscAbsReal(p->value[k])));
+    if (s->active[p->lo + k]) size[1] = PetscMax(size[1], PetscAbsReal(p->force[k]));
+  }
+  PetscCallMPI(MPI_Allreduce(size, sizes, 2, MPIU_REAL, MPI_MAX, s->comm));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt k = 0; k < p->n; k++) {
+      const PetscInt i = p->lo + k;
+      const PetscBool flip =
+          (PetscBool)(s->active[i] ? p->force[k] < -1e-12 * sizes[1] : p->value[k] > p->gap[k] + 1e-14 * sizes[0]);
+
+      if (!flip) continue;
+      if (pass == 0)
+        last = i;
+      else if (!one || i == last_all) {
+        s->active[i] = (PetscBool)!s->active[i];
+        local++;
+      }
+    }
+    if (pass == 0) PetscCallMPI(MPI_Allreduce(&last, &last_all, 1, MPIU_INT, MPI_MAX, s->comm));
+  }
+  PetscCallMPI(MPI_Allreduce(&local, changes, 1, MPIU_INT, MPI_SUM, s->comm));
+  s->its++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Hash of the distributed set, the same on every rank. */
+static PetscErrorCode SharedHash(HycoSolver s, const Primal *p, unsigned long long *hash)
+{
+  unsigned long long mine = HycoHash(HycoSetHash(p->n, s->active + p->lo), &p->lo, sizeof(p->lo));
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Allreduce(&mine, hash, 1, MPI_UNSIGNED_LONG_LONG, MPI_BXOR, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Report(HycoSolver s, const Primal *p, PetscInt changes)
+{
+  PetscInt mine = 0, all;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < p->n; k++) mine += s->active[p->lo + k];
+  PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_INT, MPI_SUM, s->comm));
+  PetscCall(s->monitor(s->its, all, changes, s->monitor_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ActiveSet(HycoSolver s, Primal *p, Vec y, PetscBool *solved)
+{
+  const PetscInt max_its = s->max_its ? s->max_its : 100 + s->system->m;
+  unsigned long long *past;
+  PetscBool one = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *solved = PETSC_FALSE;
+  PetscCall(PetscMalloc1(max_its + 1, &past));
+  if (!s->warm || !s->started) PetscCall(PetscArrayzero(s->active, s->system->m));
+  while (s->its < max_its && !*solved && s->reason != HYCO_DIVERGED_SINGULAR) {
+    PetscInt changes;
+
+    PetscCall(SharedHash(s, p, &past[s->its]));
+    for (PetscInt t = 0; t < s->its; t++) one = (PetscBool)(one || past[t] == past[s->its]);
+    PetscCall(Step(s, p, y, one, &changes));
+    if (s->monitor) PetscCall(Report(s, p, changes));
+    *solved = (PetscBool)(changes == 0);
+  }
+  PetscCall(PetscFree(past));
+  s->started = *solved;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* TAO on the same bounds. */
+static PetscErrorCode BoundQP(HycoSolver s, Primal *p, Vec y, PetscBool *solved)
+{
+  Vec lo, hi;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(y, &lo));
+  PetscCall(VecDuplicate(y, &hi));
+  PetscCall(VecSet(lo, PETSC_NINFINITY));
+  PetscCall(VecSet(hi, PETSC_INFINITY));
+  for (PetscInt k = 0; k < p->n; k++) PetscCall(VecSetValue(hi, s->pivot[k], p->gap[k], INSERT_VALUES));
+  PetscCall(VecAssemblyBegin(hi));
+  PetscCall(VecAssemblyEnd(hi));
+  PetscCall(VecSet(y, 0));
+  PetscCall(VecPointwiseMin(y, y, hi));
+  PetscCall(HycoTaoBoundQP(s->Kg, p->f, lo, hi, y, &s->its, solved));
+  PetscCall(MatMult(s->Kg, y, p->residual));
+  PetscCall(VecAYPX(p->residual, -1, p->f));
+  PetscCall(AtPivots(p->residual, p->scatter, p->work, p->n, p->force));
+  PetscCall(AtPivots(y, p->scatter, p->work, p->n, p->value));
+  for (PetscInt k = 0; k < p->n; k++) s->active[p->lo + k] = (PetscBool)(p->value[k] >= p->gap[k]);
+  PetscCall(VecDestroy(&lo));
+  PetscCall(VecDestroy(&hi));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PrimalCreate(HycoSolver s, Vec x, Primal *p)
+{
+  HycoSystem y = s->system;
+  PetscInt hi;
+  IS is;
+  const PetscScalar *d;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(y->D, &p->lo, &hi));
+  p->n = hi - p->lo;
+  PetscCall(PetscMalloc5(p->n, &p->gap, p->n, &p->value, p->n, &p->force, p->n, &p->at_d, p->n, &p->at));
+  PetscCall(VecGetArrayRead(y->D, &d));
+  PetscCall(PetscArraycpy(p->gap, d, p->n));
+  PetscCall(VecRestoreArrayRead(y->D, &d));
+  PetscCall(VecDuplicate(x, &p->f));
+  PetscCall(VecDuplicate(x, &p->rhs));
+  PetscCall(VecDuplicate(x, &p->residual));
+  PetscCall(MatMultTranspose(s->T, y->F, p->f));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, p->n, s->pivot, PETSC_COPY_VALUES, &is));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, p->n, &p->work));
+  PetscCall(VecScatterCreate(x, is, p->work, NULL, &p->scatter));
+  PetscCall(ISDestroy(&is));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PrimalDestroy(Primal *p)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree5(p->gap, p->value, p->force, p->at_d, p->at));
+  PetscCall(VecDestroy(&p->f));
+  PetscCall(VecDestroy(&p->rhs));
+  PetscCall(VecDestroy(&p->residual));
+  PetscCall(VecDestroy(&p->work));
+  PetscCall(VecScatterDestroy(&p->scatter));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBool *solved)
+{
+  Primal p;
+  Vec y;
+  PetscScalar *l;
+
+  PetscFunctionBegin;
+  PetscCheck(s->system->symmetric && s->system->m, s->comm, PETSC_ERR_USER,
+             "the primal form needs a symmetric system with contacts; use -hyco_solver_form dual");
+  PetscCall(SetUpPrimal(s));
+  PetscCall(PrimalCreate(s, x, &p));
+  PetscCall(VecDuplicate(x, &y));
+  PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s primal", HycoSolverTypes[type]));
+  if (type == HYCO_TYPE_TAO)
+    PetscCall(BoundQP(s, &p, y, solved));
+  else
+    PetscCall(ActiveSet(s, &p, y, solved));
+  PetscCall(MatMult(s->T, y, x));
+  PetscCall(VecGetArray(L, &l));
+  for (PetscInt k = 0; k < p.n; k++) l[k] = s->active[p.lo + k] ? PetscMax(p.force[k], 0) : 0;
+  PetscCall(VecRestoreArray(L, &l));
+  PetscCall(VecDestroy(&y));
+  PetscCall(PrimalDestroy(&p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

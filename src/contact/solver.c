@@ -1,0 +1,285 @@
+/* HycoSolver: chooses the form, runs the method, judges it by the recomputed residuals, falls back when it failed. */
+#include <hycosolverimpl.h>
+#include <petsc/private/petscimpl.h> /* PetscObjectStateGet() */
+
+const char *const HycoSolverTypes[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, HYCO_SOLVER_LEMKE, NULL};
+
+/* Lemke's tableau has 2 m^2 entries: beyond this many contacts it is no fallback. */
+#define HYCO_LEMKE_MAX 3000
+
+PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscNew(solver));
+  (*solver)->comm = comm;
+  (*solver)->rtol = 1e-8;
+  (*solver)->warm = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
+{
+  HycoSolver s;
+
+  PetscFunctionBegin;
+  if (!solver || !*solver) PetscFunctionReturn(PETSC_SUCCESS);
+  s = *solver;
+  PetscCall(KSPDestroy(&s->ksp));
+  PetscCall(KSPDestroy(&s->ksp_gap));
+  PetscCall(MatDestroy(&s->T));
+  PetscCall(MatDestroy(&s->Kg));
+  PetscCall(MatDestroy(&s->Kw));
+  PetscCall(PetscFree(s->S));
+  PetscCall(PetscFree(s->g));
+  PetscCall(PetscFree(s->L));
+  PetscCall(PetscFree(s->active));
+  PetscCall(PetscFree(s->pivot));
+  PetscCall(PetscFree(*solver));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetSystem(HycoSolver s, HycoSystem system)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  s->system = system; /* borrowed: the owner of both destroys it after the solver */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetType(HycoSolver s, HycoSolverType type)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  for (PetscInt k = 0; HycoSolverTypes[k]; k++) {
+    PetscBool same;
+
+    PetscCall(PetscStrcasecmp(type, HycoSolverTypes[k], &same));
+    if (same) {
+      s->type = k;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+  }
+  HycoFail("the solver type \"%s\" is unknown; types are active_set, tao and lemke", type);
+}
+
+PetscErrorCode HycoSolverSetForm(HycoSolver s, HycoForm form)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  s->form = form;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetTolerance(HycoSolver s, PetscReal rtol)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  PetscCheck(rtol > 0 && rtol < 1, PETSC_COMM_SELF, PETSC_ERR_USER, "the tolerance is %g; it must lie between 0 and 1",
+             (double)rtol);
+  s->rtol = rtol;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetMaxIts(HycoSolver s, PetscInt max_its)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  s->max_its = max_its;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetWarmStart(HycoSolver s, PetscBool warm)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  s->warm = warm;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetMonitor(HycoSolver s, HycoMonitor monitor, void *ctx)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  s->monitor = monitor;
+  s->monitor_ctx = ctx;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
+{
+  static const char *const forms[] = {"auto", "dual", "primal", NULL};
+  PetscInt form;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  form = (PetscInt)s->form;
+  PetscCall(HycoOptionsWord(options, "hyco_solver_type", HycoSolverTypes, &s->type));
+  PetscCall(HycoOptionsWord(options, "hyco_solver_form", forms, &form));
+  s->form = (HycoForm)form;
+  PetscCall(HycoOptionsReal(options, "hyco_solver_rtol", 1e-15, 0.1, &s->rtol));
+  PetscCall(HycoOptionsInt(options, "hyco_solver_max_its", 0, PETSC_MAX_INT, &s->max_its));
+  PetscCall(HycoOptionsBool(options, "hyco_solver_warm_start", &s->warm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSeenUpdate(HycoSeen *seen, Mat K, Mat B, PetscBool *same)
+{
+  PetscObjectState k, b = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectStateGet((PetscObject)K, &k));
+  if (B) PetscCall(PetscObjectStateGet((PetscObject)B, &b));
+  *same = (PetscBool)(seen->K == K && seen->B == B && seen->K_state == k && seen->B_state == b);
+  seen->K = K;
+  seen->B = B;
+  seen->K_state = k;
+  seen->B_state = b;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, PetscBool symmetric, KSP *ksp)
+{
+  PC pc;
+  PetscInt n;
+  PetscMPIInt size;
+  PetscBool dense;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(MatGetSize(K, &n, NULL));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)K, &dense, MATSEQDENSE, MATMPIDENSE, ""));
+  PetscCall(KSPCreate(comm, ksp));
+  PetscCall(KSPSetOptionsPrefix(*ksp, prefix));
+  PetscCall(KSPSetOperators(*ksp, K, K));
+  PetscCall(KSPSetType(*ksp, KSPPREONLY));
+  PetscCall(KSPGetPC(*ksp, &pc));
+  PetscCall(PCSetType(pc, symmetric ? PCCHOLESKY : PCLU));
+  if (!dense && (size > 1 || n > 3000))
+    PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+  else {
+    PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERPETSC));
+    if (!dense) PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGND));
+  }
+  PetscCall(KSPSetFromOptions(*ksp));
+  PetscCall(KSPSetErrorIfNotConverged(*ksp, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Few contacts: the dual, with its dense flexibility. About as many as unknowns: the primal. */
+static PetscErrorCode ChooseForm(HycoSolver s, HycoForm *form)
+{
+  PetscBool aij, possible = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *form = s->type == HYCO_TYPE_LEMKE ? HYCO_FORM_DUAL : s->form;
+  if (*form != HYCO_FORM_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
+  *form = HYCO_FORM_DUAL;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)s->system->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
+  if (aij && s->system->symmetric && (4 * s->system->m > s->system->n || s->system->m > 6000))
+    PetscCall(HycoPrimalPossible(s->system, &possible));
+  if (possible) *form = HYCO_FORM_PRIMAL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSystemComputeKKT(s->system, x, L, &s->kkt));
+  if (HycoKKTMax(&s->kkt) <= s->rtol)
+    s->reason = HYCO_CONVERGED;
+  else if (s->reason != HYCO_DIVERGED_SINGULAR)
+    s->reason = solved || s->kkt.stationarity > s->rtol ? HYCO_DIVERGED_RESIDUAL : HYCO_DIVERGED_ITERATIONS;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
+{
+  HycoForm form;
+  PetscBool solved = PETSC_FALSE;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  PetscCheck(s->system && s->system->F, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+             "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
+  s->seconds_factor = 0;
+  s->its = 0;
+  s->reason = HYCO_DIVERGED_RESIDUAL;
+  PetscCall(ChooseForm(s, &form));
+  if (form == HYCO_FORM_PRIMAL)
+    PetscCall(HycoSolvePrimal(s, s->type, x, L, &solved));
+  else
+    PetscCall(HycoSolveDual(s, s->type, x, L, &solved));
+  PetscCall(Judge(s, x, L, solved));
+  if (s->reason < 0 && s->reason != HYCO_DIVERGED_SINGULAR && s->type != HYCO_TYPE_LEMKE && s->system->m &&
+      s->system->m <= HYCO_LEMKE_MAX) {
+    char first[96];
+    PetscInt its = s->its;
+
+    PetscCall(PetscStrncpy(first, s->method, sizeof(first)));
+    PetscCall(HycoSolveDual(s, HYCO_TYPE_LEMKE, x, L, &solved));
+    PetscCall(Judge(s, x, L, solved));
+    s->its += its;
+    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then lemke", first));
+    if (s->reason == HYCO_CONVERGED) s->reason = HYCO_CONVERGED_FALLBACK;
+  }
+  s->seconds_solve = HycoNow() - begin - s->seconds_factor;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverGetReason(HycoSolver s, HycoReason *reason)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  *reason = s->reason;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverGetIterations(HycoSolver s, PetscInt *its)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  *its = s->its;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverGetKKT(HycoSolver s, HycoKKT *kkt)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  *kkt = s->kkt;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverGetMethod(HycoSolver s, const char *method[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  *method = s->method;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverGetSeconds(HycoSolver s, PetscReal *factor, PetscReal *solve)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  if (factor) *factor = s->seconds_factor;
+  if (solve) *solve = s->seconds_solve;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const char *HycoReasonName(HycoReason reason)
+{
+  switch (reason) {
+  case HYCO_CONVERGED:
+    return "converged";
+  case HYCO_CONVERGED_FALLBACK:
+    return "converged by the fallback solver";
+  case HYCO_DIVERGED_RESIDUAL:
+    return "not converged: a KKT residual is above the tolerance";
+  case HYCO_DIVERGED_ITERATIONS:
+    return "not converged: the limit of iterations, or a cycle";
+  default:
+    return "not converged: the stiffness is singular (is a body held by nothing?)";
+  }
+}

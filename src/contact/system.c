@@ -1,0 +1,153 @@
+/* HycoSystem: holds K, Bt, B, F, D; recomputes the KKT residuals. */
+#include <hycosolverimpl.h>
+
+PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscNew(system));
+  (*system)->comm = comm;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemDestroy(HycoSystem *system)
+{
+  HycoSystem s;
+
+  PetscFunctionBegin;
+  if (!system || !*system) PetscFunctionReturn(PETSC_SUCCESS);
+  s = *system;
+  PetscCall(MatDestroy(&s->K));
+  PetscCall(MatDestroy(&s->Bt));
+  PetscCall(MatDestroy(&s->B));
+  PetscCall(VecDestroy(&s->F));
+  PetscCall(VecDestroy(&s->D));
+  PetscCall(PetscFree(*system));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBool symmetric)
+{
+  PetscInt rows, cols;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSystemCreate()");
+  PetscCall(MatGetSize(K, &rows, &cols));
+  PetscCheck(rows == cols, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "K is %d x %d; it must be square", (int)rows, (int)cols);
+  PetscCheck(!B == !Bt, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "B and Bt must both be given, or neither");
+  s->n = rows;
+  s->m = 0;
+  if (B) {
+    PetscInt tr, tc;
+
+    PetscCall(MatGetSize(B, &s->m, &cols));
+    PetscCall(MatGetSize(Bt, &tr, &tc));
+    PetscCheck(cols == s->n && tr == s->n && tc == s->m, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
+               "B is %d x %d and Bt %d x %d with K of size %d: they do not match", (int)s->m, (int)cols, (int)tr,
+               (int)tc, (int)s->n);
+    PetscCall(PetscObjectReference((PetscObject)B));
+    PetscCall(PetscObjectReference((PetscObject)Bt));
+  }
+  PetscCall(PetscObjectReference((PetscObject)K));
+  PetscCall(MatDestroy(&s->K));
+  PetscCall(MatDestroy(&s->B));
+  PetscCall(MatDestroy(&s->Bt));
+  s->K = K;
+  s->B = B;
+  s->Bt = Bt;
+  s->symmetric = symmetric;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
+{
+  PetscInt n, m = 0;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSystemCreate()");
+  PetscCall(VecGetSize(F, &n));
+  if (D) PetscCall(VecGetSize(D, &m));
+  PetscCheck(s->K, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetMatrices() before HycoSystemSetVectors()");
+  PetscCheck(n == s->n && m == s->m, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
+             "F has length %d and D %d where %d and %d are expected", (int)n, (int)m, (int)s->n, (int)s->m);
+  PetscCall(PetscObjectReference((PetscObject)F));
+  if (D) PetscCall(PetscObjectReference((PetscObject)D));
+  PetscCall(VecDestroy(&s->F));
+  PetscCall(VecDestroy(&s->D));
+  s->F = F;
+  s->D = D;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal HycoKKTMax(const HycoKKT *kkt)
+{
+  return PetscMax(PetscMax(kkt->stationarity, kkt->penetration), PetscMax(kkt->adhesion, kkt->complementarity));
+}
+
+static PetscReal Quotient(PetscReal a, PetscReal b)
+{
+  return a == 0 ? 0 : b > 0 ? a / b : PETSC_MAX_REAL;
+}
+
+static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value)
+{
+  Vec Kx, BtL;
+  PetscReal nK, nB = 0, nF, nr;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(x, &Kx));
+  PetscCall(MatMult(s->K, x, Kx));
+  PetscCall(VecNorm(Kx, NORM_2, &nK));
+  PetscCall(VecNorm(s->F, NORM_2, &nF));
+  if (s->m) {
+    PetscCall(VecDuplicate(x, &BtL));
+    PetscCall(MatMult(s->Bt, L, BtL));
+    PetscCall(VecNorm(BtL, NORM_2, &nB));
+    PetscCall(VecAXPY(Kx, 1, BtL));
+    PetscCall(VecDestroy(&BtL));
+  }
+  PetscCall(VecAXPY(Kx, -1, s->F));
+  PetscCall(VecNorm(Kx, NORM_2, &nr));
+  PetscCall(VecDestroy(&Kx));
+  *value = Quotient(nr, PetscMax(nK, PetscMax(nB, nF)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
+{
+  Vec gap;
+  const PetscScalar *w, *l;
+  PetscInt m;
+  PetscReal local[3] = {0, 0, 0}, worst[3], size_B, size_x, size_D, size_L, size_gap;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSystemCreate()");
+  PetscCheck(s->F, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
+  PetscCall(PetscMemzero(kkt, sizeof(*kkt)));
+  PetscCall(Stationarity(s, x, L, &kkt->stationarity));
+  if (PetscIsInfOrNanReal(kkt->stationarity)) kkt->stationarity = PETSC_MAX_REAL;
+  if (!s->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(s->D, &gap));
+  PetscCall(MatMult(s->B, x, gap));
+  PetscCall(VecAYPX(gap, -1, s->D));
+  PetscCall(MatNorm(s->B, NORM_INFINITY, &size_B));
+  PetscCall(VecNorm(x, NORM_INFINITY, &size_x));
+  PetscCall(VecNorm(s->D, NORM_INFINITY, &size_D));
+  PetscCall(VecNorm(L, NORM_INFINITY, &size_L));
+  size_gap = PetscMax(size_D, size_B * size_x);
+  PetscCall(VecGetLocalSize(gap, &m));
+  PetscCall(VecGetArrayRead(gap, &w));
+  PetscCall(VecGetArrayRead(L, &l));
+  for (PetscInt i = 0; i < m; i++) {
+    local[0] = PetscMax(local[0], -w[i]);
+    local[1] = PetscMax(local[1], -l[i]);
+    local[2] = PetscMax(local[2], PetscAbsReal(w[i] * l[i]));
+  }
+  PetscCall(VecRestoreArrayRead(gap, &w));
+  PetscCall(VecRestoreArrayRead(L, &l));
+  PetscCall(VecDestroy(&gap));
+  PetscCallMPI(MPI_Allreduce(local, worst, 3, MPIU_REAL, MPI_MAX, s->comm));
+  kkt->penetration = Quotient(worst[0], size_gap);
+  kkt->adhesion = Quotient(worst[1], size_L);
+  kkt->complementarity = Quotient(worst[2], size_gap * size_L);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,409 @@
+/* Options of the command line: checked, read, explained. */
+#include "driver.h"
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The driver's own options, for -help; which command takes which stands in the table of commands. */
+static const HycoOption own[] = {
+    {"scene", "<folder>", "",
+     "folder with scene.yaml, or the YAML file; every entry can be overridden: -body_NAME_young 2e5"},
+    {"model", "<file.h5>", "", "the reduced model: written by train, read by the others"},
+    {"mu", "<v,v,...>", "", "parameter values in declared order; or one by one: -mu_NAME v"},
+    {"mu_", "<v>", "", "the parameter NAME: -mu_radius 4.06"},
+    {"grid", "<n,n,...>", "", "a set of points: n per parameter"},
+    {"grid_type", "<centred|closed>", "centred", "cell centres, or with both ends of the ranges"},
+    {"values_", "<v,v,...>", "", "a set of points: values of the parameter NAME, all combined"},
+    {"points", "<file.csv>", "", "a set of points: a header with the names, then a point per line"},
+    {"output", "<file.xdmf>", "", "fields for ParaView; the numbers in the .h5 beside it"},
+    {"report", "<file.json>", "", "the result as one JSON object"},
+    {"table", "<file.csv>", "", "a line per point"},
+    {"hyco_monitor", "", "", "a line per iteration of the active set"},
+};
+
+/* Options of PETSc, SLEPc and the solvers inside: known by their beginnings, checked by who reads them. */
+static const char *const foreign[] = {"hyco_dual_",
+                                      "hyco_primal_",
+                                      "hyco_tao_",
+                                      "log_",
+                                      "info",
+                                      "malloc",
+                                      "memory_view",
+                                      "options_",
+                                      "mat_",
+                                      "vec_",
+                                      "ksp_",
+                                      "pc_",
+                                      "bv_",
+                                      "svd_",
+                                      "st_",
+                                      "ds_",
+                                      "tao_",
+                                      "on_error_",
+                                      "start_in_debugger",
+                                      "stop_for_debugger",
+                                      "fp_trap",
+                                      "error_output",
+                                      "check_pointer",
+                                      "nox",
+                                      "viewer_",
+                                      "citations",
+                                      "use_gpu",
+                                      "skip_petscrc",
+                                      "no_signal",
+                                      "petsc_",
+                                      "device_",
+                                      NULL};
+
+static PetscBool TakesOption(const Command *command, const char name[])
+{
+  const char *at = command->options;
+  size_t n = strlen(name);
+
+  for (; *at; at += strcspn(at, " ") + (at[strcspn(at, " ")] == ' ')) {
+    const size_t length = strcspn(at, " ");
+
+    if (at[length - 1] == '_' ? n > length && strncasecmp(at, name, length) == 0
+                              : n == length && strncasecmp(at, name, length) == 0)
+      return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+static PetscBool IsForeign(const char name[])
+{
+  for (PetscInt k = 0; foreign[k]; k++) {
+    if (strncasecmp(name, foreign[k], strlen(foreign[k])) == 0) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+static PetscBool IsSceneEntry(const char name[])
+{
+  static const char *const begin[] = {"scene_",    "parameter_", "body_",    "fixed_", "pressure_",
+                                      "traction_", "force_",     "contact_", NULL};
+
+  for (PetscInt k = 0; begin[k]; k++) {
+    if (strncasecmp(name, begin[k], strlen(begin[k])) == 0) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+static PetscErrorCode Unknown(const Command *command, const char name[])
+{
+  const HycoOption *table;
+  PetscInt n, m = 0;
+  const char *names[96], *near;
+  char copy[DRIVER_LINE], *rest;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGetOptionTable(&n, &table));
+  for (PetscInt k = 0; k < n && m < 64; k++) names[m++] = table[k].name;
+  PetscCall(PetscStrncpy(copy, command->options, sizeof(copy)));
+  for (char *word = strtok_r(copy, " ", &rest); word && m < 96; word = strtok_r(NULL, " ", &rest)) names[m++] = word;
+  near = HycoNearest(name, m, names);
+  if (near)
+    HycoFail("hyco %s knows no option -%s; did you mean -%s? (hyco %s -help lists them)", command->name, name, near,
+             command->name);
+  HycoFail("hyco %s knows no option -%s (hyco %s -help lists them)", command->name, name, command->name);
+}
+
+static PetscBool IsKey(const char word[])
+{
+  return (PetscBool)(word[0] == '-' &&
+                     (isalpha((unsigned char)word[1]) || (word[1] == '-' && isalpha((unsigned char)word[2]))));
+}
+
+PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv)
+{
+  PetscFunctionBegin;
+  for (int k = 2; k < argc; k++) {
+    const char *name = argv[k] + (argv[k][1] == '-' ? 2 : 1);
+
+    if (!IsKey(argv[k])) HycoFail("\"%s\" is no option; options begin with a dash, and take one value each", argv[k]);
+    if (!TakesOption(command, name) && !HycoOptionKnown(name) && !IsForeign(name) &&
+        !(IsSceneEntry(name) && TakesOption(command, "scene"))) {
+      PetscCall(Unknown(command, name));
+    }
+    if (k + 1 < argc && !IsKey(argv[k + 1])) k++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverCheckLeft(void)
+{
+  PetscInt n;
+  char **names, **values, first[DRIVER_LINE] = "";
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
+  for (PetscInt k = 0; k < n && !first[0]; k++) {
+    if (strncmp(names[k], "options_left", 12) && strncmp(names[k], "skip_petscrc", 12) && strcmp(names[k], "nox"))
+      PetscCall(PetscStrncpy(first, names[k], sizeof(first)));
+  }
+  PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
+  PetscCheck(!first[0], PETSC_COMM_SELF, PETSC_ERR_USER,
+             "nothing reads the option -%s here; take it away, or see hyco -help", first);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverGet(const char name[], PetscBool required, char value[PETSC_MAX_PATH_LEN])
+{
+  char dashed[DRIVER_LINE];
+  PetscBool set;
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", name));
+  value[0] = '\0';
+  PetscCall(PetscOptionsGetString(NULL, NULL, dashed, value, PETSC_MAX_PATH_LEN, &set));
+  PetscCheck(!set || value[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s needs a value", name);
+  PetscCheck(set || !required, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is missing (hyco -help explains it)", name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numbers with commas between, into new memory. */
+static PetscErrorCode ParseNumbers(const char name[], const char text[], PetscInt *n, PetscReal **values)
+{
+  const char *at = text;
+
+  PetscFunctionBegin;
+  *n = 0;
+  PetscCall(PetscMalloc1(strlen(text) / 2 + 2, values));
+  for (;;) {
+    char *end;
+
+    (*values)[*n] = strtod(at, &end);
+    PetscCheck(end != at && (*end == ',' || *end == '\0') && !PetscIsInfOrNanReal((*values)[*n]), PETSC_COMM_SELF,
+               PETSC_ERR_USER, "-%s is \"%s\"; numbers with commas between are expected", name, text);
+    (*n)++;
+    if (*end == '\0') break;
+    at = end + 1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ListNames(HycoScene scene, char list[DRIVER_LINE])
+{
+  PetscInt n;
+  const char *const *names;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  list[0] = '\0';
+  for (PetscInt p = 0; p < n; p++) {
+    PetscCall(PetscStrlcat(list, p ? "," : "", DRIVER_LINE));
+    PetscCall(PetscStrlcat(list, names[p], DRIVER_LINE));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -mu_foo where foo is no parameter. `prefix` is "mu_" or "values_". */
+static PetscErrorCode CheckNamed(HycoScene scene, const char prefix[])
+{
+  PetscInt n, left;
+  const char *const *names;
+  char **keys, **values, bad[DRIVER_LINE] = "", list[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  PetscCall(PetscOptionsLeftGet(NULL, &left, &keys, &values));
+  for (PetscInt k = 0; k < left; k++) {
+    PetscBool known = PETSC_FALSE;
+
+    if (strncasecmp(keys[k], prefix, strlen(prefix))) continue;
+    for (PetscInt p = 0; p < n; p++) known = (PetscBool)(known || strcasecmp(keys[k] + strlen(prefix), names[p]) == 0);
+    if (!known) PetscCall(PetscStrncpy(bad, keys[k], sizeof(bad)));
+  }
+  PetscCall(PetscOptionsLeftRestore(NULL, &left, &keys, &values));
+  PetscCall(ListNames(scene, list));
+  PetscCheck(!bad[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s names no parameter; the scene's are: %s", bad,
+             list[0] ? list : "(none)");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
+{
+  PetscInt n, given = 0;
+  const char *const *names;
+  char text[PETSC_MAX_PATH_LEN], list[DRIVER_LINE], key[DRIVER_LINE];
+  PetscBool whole;
+  PetscReal *values;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  PetscCall(ListNames(scene, list));
+  PetscCall(CheckNamed(scene, "mu_"));
+  PetscCall(DriverGet("mu", PETSC_FALSE, text));
+  whole = (PetscBool)(text[0] != '\0');
+  if (whole) {
+    PetscInt m;
+
+    PetscCall(ParseNumbers("mu", text, &m, &values));
+    PetscCheck(m == n, PETSC_COMM_SELF, PETSC_ERR_USER, "-mu has %d values; the scene has %d parameters: %s", (int)m,
+               (int)n, n ? list : "(none)");
+    PetscCall(PetscArraycpy(mu, values, n));
+    PetscCall(PetscFree(values));
+  }
+  for (PetscInt p = 0; p < n; p++) {
+    PetscInt m;
+
+    PetscCall(PetscSNPrintf(key, sizeof(key), "mu_%s", names[p]));
+    PetscCall(DriverGet(key, PETSC_FALSE, text));
+    if (!text[0]) continue;
+    PetscCall(ParseNumbers(key, text, &m, &values));
+    PetscCheck(m == 1, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s has %d values; one is expected", key, (int)m);
+    mu[p] = values[0];
+    given++;
+    PetscCall(PetscFree(values));
+  }
+  PetscCheck(whole || given == n, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "the scene has %d parameters (%s); give -mu with all of them, or -mu_NAME for each", (int)n, list);
+  PetscCall(HycoSceneCheckParameters(scene, n, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
+{
+  PetscInt n;
+  const char *const *names;
+  PetscBool set;
+
+  PetscFunctionBegin;
+  *given = PETSC_FALSE;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-grid", &set));
+  *given = (PetscBool)(*given || set);
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-points", &set));
+  *given = (PetscBool)(*given || set);
+  for (PetscInt p = 0; p < n; p++) {
+    char key[DRIVER_LINE];
+
+    PetscCall(PetscSNPrintf(key, sizeof(key), "-values_%s", names[p]));
+    PetscCall(PetscOptionsHasName(NULL, NULL, key, &set));
+    *given = (PetscBool)(*given || set);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char text[])
+{
+  static const char *const types[] = {"centred", "closed", NULL};
+  PetscInt n, m, counts[64], type = 0;
+  PetscReal *values;
+  char list[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  PetscCall(ListNames(scene, list));
+  PetscCall(HycoOptionsWord(NULL, "grid_type", types, &type));
+  PetscCall(ParseNumbers("grid", text, &m, &values));
+  PetscCheck(m == n && n > 0, PETSC_COMM_SELF, PETSC_ERR_USER, "-grid has %d numbers; the scene has %d parameters: %s",
+             (int)m, (int)n, n ? list : "(none)");
+  for (PetscInt p = 0; p < n; p++) {
+    PetscCheck(values[p] >= 1 && values[p] <= 1e8 && values[p] == PetscFloorReal(values[p]), PETSC_COMM_SELF,
+               PETSC_ERR_USER, "-grid is \"%s\"; whole numbers, at least 1, are expected", text);
+    counts[p] = (PetscInt)values[p];
+  }
+  PetscCall(PetscFree(values));
+  PetscCall(HycoSamplesAddGrid(samples, counts, (PetscBool)(type == 1)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -values_NAME for every parameter, combined. */
+static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscBool *any)
+{
+  PetscInt n, counts[64], given = 0;
+  const char *const *names;
+  PetscReal *values[64];
+  char text[PETSC_MAX_PATH_LEN], key[DRIVER_LINE], missing[DRIVER_LINE] = "";
+
+  PetscFunctionBegin;
+  PetscCall(CheckNamed(scene, "values_"));
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  for (PetscInt p = 0; p < n; p++) {
+    values[p] = NULL;
+    PetscCall(PetscSNPrintf(key, sizeof(key), "values_%s", names[p]));
+    PetscCall(DriverGet(key, PETSC_FALSE, text));
+    if (text[0]) {
+      PetscCall(ParseNumbers(key, text, &counts[p], &values[p]));
+      given++;
+    } else
+      PetscCall(PetscStrncpy(missing, names[p], sizeof(missing)));
+  }
+  *any = (PetscBool)(given > 0);
+  PetscCheck(!given || given == n, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-values_ are given for %d of the %d parameters; -values_%s is missing", (int)given, (int)n, missing);
+  if (given) PetscCall(HycoSamplesAddProduct(samples, counts, (const PetscReal *const *)values));
+  for (PetscInt p = 0; p < n; p++) PetscCall(PetscFree(values[p]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given)
+{
+  char text[PETSC_MAX_PATH_LEN];
+  PetscInt n_sets = 0, n;
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(scene, samples));
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  PetscCall(DriverGet("grid", PETSC_FALSE, text));
+  if (text[0]) {
+    PetscCall(AddGrid(scene, *samples, text));
+    n_sets++;
+  }
+  PetscCall(AddValues(scene, *samples, &any));
+  n_sets += any;
+  PetscCall(DriverGet("points", PETSC_FALSE, text));
+  if (text[0]) {
+    PetscCall(HycoSamplesAddFile(*samples, text));
+    n_sets++;
+  }
+  if (!n_sets && !n) { /* a scene without parameters has one point */
+    PetscCall(HycoSamplesAddPoint(*samples, NULL));
+    n_sets = 1;
+  }
+  PetscCheck(n_sets <= 1, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "give one set of points: -grid, or -values_NAME, or -points");
+  *given = (PetscBool)(n_sets == 1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void HelpLine(const char *name, const char *value, const char *initial, const char *meaning)
+{
+  char left[128];
+
+  snprintf(left, sizeof(left), "-%s%s %s", name, name[strlen(name) - 1] == '_' ? "NAME" : "", value);
+  printf("  %-46s %s%s%s%s\n", left, meaning, initial[0] ? " [" : "", initial, initial[0] ? "]" : "");
+}
+
+void DriverHelp(const char *command)
+{
+  const HycoOption *table;
+  PetscInt n;
+
+  (void)!HycoGetOptionTable(&n, &table);
+  printf("hyco %s: reduced and full-order models of parametrised unilateral contact\n\n", HycoVersion());
+  for (PetscInt k = 0; commands[k].name; k++) {
+    if (command && strcmp(command, commands[k].name)) continue;
+    printf("  %s\n      %s\n", commands[k].usage, commands[k].meaning);
+  }
+  printf("\nOptions of %s%s\n", command ? "hyco " : "the commands", command ? command : "");
+  for (size_t k = 0; k < sizeof(own) / sizeof(own[0]); k++) {
+    PetscBool taken = (PetscBool)!command;
+
+    for (PetscInt c = 0; command && commands[c].name; c++) {
+      char probe[64];
+
+      snprintf(probe, sizeof(probe), "%s%s", own[k].name, own[k].name[strlen(own[k].name) - 1] == '_' ? "x" : "");
+      if (strcmp(commands[c].name, command) == 0 && TakesOption(&commands[c], probe)) taken = PETSC_TRUE;
+    }
+    if (taken) HelpLine(own[k].name, own[k].value, own[k].initial, own[k].meaning);
+  }
+  printf("\nOptions of the method (a scene may set them too, in its hyco: section without the prefix)\n");
+  for (PetscInt k = 0; k < n; k++) HelpLine(table[k].name, table[k].value, table[k].initial, table[k].meaning);
+  printf("\nPETSc's options work too: -log_view, -info, -hyco_dual_mat_mumps_icntl_7 5 (solver of K), "
+         "-hyco_primal_..., -hyco_tao_type bntr.\n");
+  printf("Under MPI: mpiexec -n 2 hyco ...; set OPENBLAS_NUM_THREADS=1.\n");
+}

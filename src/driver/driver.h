@@ -1,0 +1,65 @@
+/* The command line: what the commands share. */
+#ifndef HYCO_DRIVER_H
+#define HYCO_DRIVER_H
+
+#include <hyco.h>
+#include <cjson/cJSON.h>
+
+/* What compat the driver needs of the library's own. */
+#include <hycoimpl.h>
+
+#define DRIVER_LINE 1024
+
+typedef struct {
+  const char *name;
+  PetscErrorCode (*run)(void);
+  const char *options; /* names of its own options, separated by spaces */
+  const char *usage, *meaning;
+} Command;
+
+extern const Command commands[];
+
+/* -- args.c: options -- */
+
+/* Every option on the command line is one that `command` knows, or PETSc's; no stray words. */
+PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
+/* Nothing was given that nobody read. To be called when all options have been read and before anything is written. */
+PetscErrorCode DriverCheckLeft(void);
+/* The value of -name; fails when it is required and missing. `value` is "" when absent. */
+PetscErrorCode DriverGet(const char name[], PetscBool required, char value[PETSC_MAX_PATH_LEN]);
+/* One point: -mu v,v,... or -mu_NAME v. */
+PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
+/* A set of points: -grid (with -grid_type), -values_NAME, or -points. *given: whether any was. */
+PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given);
+/* Whether any point-set option was given. */
+PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given);
+void DriverHelp(const char *command);
+
+/* -- report.c: JSON -- */
+
+/* A report with command, scene title, mu (NULL: none) and ranks. */
+PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscReal mu[], cJSON **json);
+void ReportKKT(cJSON *json, const HycoKKT *kkt);
+void ReportSeconds(cJSON *json, const HycoSeconds *seconds);
+void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[]);
+/* Adds memory_mb, writes to -report (if given) on rank 0 and frees. */
+PetscErrorCode ReportWrite(cJSON **json);
+/* Writes text to a file through a temporary name. */
+PetscErrorCode DriverWriteText(const char path[], const char text[]);
+
+/* -- progress.c -- */
+
+/* Prints on rank 0. */
+PetscErrorCode Say(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
+/* A HycoProgress: a bar that moves on a terminal, a line now and then elsewhere. ctx: a word for what is done. */
+PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx);
+/* A HycoMonitor. */
+PetscErrorCode DriverMonitor(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx);
+
+PetscErrorCode CommandSolve(void);
+PetscErrorCode CommandTrain(void);
+PetscErrorCode CommandPredict(void);
+PetscErrorCode CommandCompare(void);
+PetscErrorCode CommandView(void);
+
+#endif

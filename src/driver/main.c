@@ -1,0 +1,131 @@
+/* hyco: a table of commands. */
+#include "driver.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+const Command commands[] = {
+    {"solve", CommandSolve, "scene mu mu_ output report hyco_monitor",
+     "hyco solve -scene FOLDER -mu V,V,... [-output F.xdmf] [-report R.json]", "solve one parameter value, full order"},
+    {"train", CommandTrain, "scene model grid grid_type values_ points report hyco_monitor",
+     "hyco train -scene FOLDER -grid N,N,... -model M.h5 [-report R.json]",
+     "solve a set of points full order (resumable), reduce, write the model"},
+    {"predict", CommandPredict, "model mu mu_ grid grid_type values_ points output report table hyco_monitor",
+     "hyco predict -model M.h5 -mu V,V,... [-output F.xdmf] [-report R.json]",
+     "solve the reduced model, for one point or a set (-table T.csv); reads only the model file"},
+    {"compare", CommandCompare, "scene model grid grid_type values_ points report table hyco_monitor",
+     "hyco compare -scene FOLDER -model M.h5 -grid N,N,... [-report R.json] [-table T.csv]",
+     "errors and speed-up of the reduced model against full order over a set of points"},
+    {"view", CommandView, "scene model", "hyco view -model M.h5 | -scene FOLDER",
+     "what is in a model or a scene, in words"},
+    {NULL, NULL, NULL, NULL, NULL},
+};
+
+static char message[DRIVER_LINE];
+
+/* The first error's text is kept; what a person reads is one line, printed by Stop. */
+static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
+                                  PetscErrorType type, const char *text, void *ctx)
+{
+  (void)comm, (void)ctx;
+  if (type == PETSC_ERROR_INITIAL) {
+    if (code == PETSC_ERR_USER || code == PETSC_ERR_ORDER)
+      snprintf(message, sizeof(message), "%s", text ? text : "");
+    else
+      snprintf(message, sizeof(message), "internal error %d in %s (%s:%d): %s", (int)code, function ? function : "?",
+               file ? file : "?", line, text ? text : "");
+  }
+  return code;
+}
+
+/* Ends a failed run: one line from the lowest rank that has it. Ranks that wait in a call for this one are not left
+ * hanging. */
+static void Stop(void)
+{
+  PetscMPIInt rank;
+  MPI_Request request;
+  int together = 0;
+
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (rank == 0) {
+    fprintf(stderr, "hyco: error: %s\n", message);
+    fflush(stderr);
+  }
+  MPI_Ibarrier(MPI_COMM_WORLD, &request);
+  for (int k = 0; k < 300 && !together; k++) {
+    const struct timespec nap = {0, 10000000};
+
+    MPI_Test(&request, &together, MPI_STATUS_IGNORE);
+    if (!together) nanosleep(&nap, NULL);
+  }
+  if (!together) {
+    if (rank) fprintf(stderr, "hyco: error on rank %d: %s\n", rank, message);
+    fflush(stderr);
+    MPI_Abort(MPI_COMM_WORLD, 1);
+  }
+}
+
+static const Command *FindCommand(const char name[])
+{
+  for (PetscInt k = 0; commands[k].name; k++) {
+    if (strcmp(name, commands[k].name) == 0) return &commands[k];
+  }
+  return NULL;
+}
+
+/* Answers that need no PETSc: no command, an unknown one, -help, -version. Returns -1 to go on. */
+static int AnswerAtOnce(int argc, char **argv)
+{
+  const Command *command = argc > 1 ? FindCommand(argv[1]) : NULL;
+
+  for (int k = 1; k < argc; k++) {
+    if (strcmp(argv[k], "-help") == 0 || strcmp(argv[k], "--help") == 0 || strcmp(argv[k], "-h") == 0 ||
+        (k == 1 && strcmp(argv[k], "help") == 0)) {
+      DriverHelp(command ? command->name : NULL);
+      return 0;
+    }
+    if (strcmp(argv[k], "-version") == 0 || strcmp(argv[k], "--version") == 0) {
+      printf("hyco %s\n", HycoVersion());
+      return 0;
+    }
+  }
+  if (command) return -1;
+  if (argc > 1) {
+    const char *names[8], *near;
+    PetscInt n = 0;
+
+    for (; commands[n].name; n++) names[n] = commands[n].name;
+    near = HycoNearest(argv[1], n, names);
+    fprintf(stderr,
+            "hyco: error: there is no command \"%s\"; commands are solve, train, predict, compare and view%s%s%s\n",
+            argv[1], near ? "; did you mean " : "", near ? near : "", near ? "?" : "");
+  } else
+    fprintf(stderr, "hyco: error: give a command: solve, train, predict, compare or view (hyco -help explains them)\n");
+  return 1;
+}
+
+static PetscErrorCode Run(const Command *command, int argc, char **argv)
+{
+  PetscFunctionBegin;
+  PetscCall(DriverCheckArguments(command, argc, argv));
+  PetscCall(command->run());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  const int answer = AnswerAtOnce(argc, argv);
+  PetscErrorCode ierr;
+
+  if (answer >= 0) return answer;
+  setenv("OPENBLAS_NUM_THREADS", "1", 0);
+  if (HycoInitialize(&argc, &argv)) return 1;
+  PetscPushErrorHandler(KeepMessage, NULL);
+  ierr = Run(FindCommand(argv[1]), argc, argv);
+  PetscPopErrorHandler();
+  if (ierr) Stop();
+  PetscOptionsSetValue(NULL, "-options_left", "0"); /* what is left was checked where it matters */
+  if (HycoFinalize()) return 1;
+  return ierr ? 1 : 0;
+}

@@ -1,0 +1,95 @@
+/* The JSON report. */
+#include "driver.h"
+#include <stdio.h>
+#include <string.h>
+#include <sys/resource.h>
+
+PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscReal mu[], cJSON **json)
+{
+  PetscInt n;
+  const char *const *names;
+  const char *title;
+  PetscMPIInt size;
+  cJSON *point;
+
+  PetscFunctionBegin;
+  *json = cJSON_CreateObject();
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCall(HycoSceneGetTitle(scene, &title));
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  cJSON_AddStringToObject(*json, "command", command);
+  cJSON_AddStringToObject(*json, "scene", title);
+  point = cJSON_AddObjectToObject(*json, "mu");
+  for (PetscInt p = 0; mu && p < n; p++) cJSON_AddNumberToObject(point, names[p], mu[p]);
+  cJSON_AddNumberToObject(*json, "ranks", size);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void ReportKKT(cJSON *json, const HycoKKT *kkt)
+{
+  cJSON *object = cJSON_AddObjectToObject(json, "kkt");
+
+  cJSON_AddNumberToObject(object, "stationarity", kkt->stationarity);
+  cJSON_AddNumberToObject(object, "penetration", kkt->penetration);
+  cJSON_AddNumberToObject(object, "adhesion", kkt->adhesion);
+  cJSON_AddNumberToObject(object, "complementarity", kkt->complementarity);
+}
+
+void ReportSeconds(cJSON *json, const HycoSeconds *seconds)
+{
+  cJSON *object = cJSON_AddObjectToObject(json, "seconds");
+
+  cJSON_AddNumberToObject(object, "setup", seconds->setup);
+  cJSON_AddNumberToObject(object, "assemble", seconds->assemble);
+  cJSON_AddNumberToObject(object, "factor", seconds->factor);
+  cJSON_AddNumberToObject(object, "solve", seconds->solve);
+  cJSON_AddNumberToObject(object, "total", seconds->total);
+}
+
+void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[])
+{
+  cJSON *array = cJSON_AddArrayToObject(json, name);
+
+  for (PetscInt k = 0; k < n; k++) cJSON_AddItemToArray(array, cJSON_CreateNumber(v[k]));
+}
+
+PetscErrorCode DriverWriteText(const char path[], const char text[])
+{
+  char partial[PETSC_MAX_PATH_LEN + 16];
+  FILE *out;
+  int failed;
+
+  PetscFunctionBegin;
+  snprintf(partial, sizeof(partial), "%s.partial", path);
+  out = fopen(partial, "w");
+  PetscCheck(out, PETSC_COMM_SELF, PETSC_ERR_USER, "%s cannot be written: is there such a folder, may you write there?",
+             path);
+  failed = fputs(text, out) < 0;
+  failed = fclose(out) != 0 || failed;
+  failed = failed || rename(partial, path) != 0;
+  if (failed) remove(partial);
+  PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_USER, "%s could not be written to its end: is the disk full?", path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ReportWrite(cJSON **json)
+{
+  char path[PETSC_MAX_PATH_LEN], *text;
+  struct rusage usage;
+  PetscReal mine, all;
+
+  PetscFunctionBegin;
+  getrusage(RUSAGE_SELF, &usage);
+  mine = (PetscReal)usage.ru_maxrss / 1024;
+  PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  cJSON_AddNumberToObject(*json, "memory_mb", all);
+  PetscCall(DriverGet("report", PETSC_FALSE, path));
+  if (path[0]) {
+    text = cJSON_Print(*json);
+    HycoOnRoot(PETSC_COMM_WORLD, DriverWriteText(path, text));
+    cJSON_free(text);
+  }
+  cJSON_Delete(*json);
+  *json = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,436 @@
+/* HycoFOM: reads and spreads the mesh, assembles (16), solves it, brings the solution home in the file's order. */
+#include <hycofomimpl.h>
+#include <hycofields.h>
+
+PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
+{
+  HycoFOM f;
+
+  PetscFunctionBegin;
+  if (!fom || !*fom) PetscFunctionReturn(PETSC_SUCCESS);
+  f = *fom;
+  PetscCall(HycoSolverDestroy(&f->solver));
+  PetscCall(HycoSystemDestroy(&f->system));
+  PetscCall(MatDestroy(&f->K));
+  PetscCall(MatDestroy(&f->B));
+  PetscCall(MatDestroy(&f->Bt));
+  PetscCall(VecDestroy(&f->U));
+  PetscCall(VecDestroy(&f->Lambda));
+  PetscCall(VecDestroy(&f->F));
+  PetscCall(VecDestroy(&f->D));
+  PetscCall(VecScatterDestroy(&f->to_local));
+  PetscCall(VecScatterDestroy(&f->to_root));
+  PetscCall(VecScatterDestroy(&f->lambda_to_root));
+  PetscCall(VecDestroy(&f->U_local));
+  PetscCall(VecDestroy(&f->U_root));
+  PetscCall(VecDestroy(&f->lambda_root));
+  if (f->fe_whole != f->fe) PetscCall(HycoFEDestroy(&f->fe_whole));
+  PetscCall(HycoFEDestroy(&f->fe));
+  if (f->part != f->whole) PetscCall(HycoMeshDestroy(&f->part));
+  PetscCall(HycoMeshDestroy(&f->whole));
+  PetscCall(HycoPairsDestroy(&f->pairs));
+  PetscCall(PetscFree(f->global));
+  PetscCall(PetscFree(f->u));
+  PetscCall(PetscFree(f->lambda));
+  PetscCall(PetscFree(f->sigma));
+  PetscCall(PetscFree(f->gap));
+  PetscCallMPI(MPI_Comm_free(&f->comm));
+  PetscCall(PetscFree(*fom));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The mesh, its contacts and its parts. */
+static PetscErrorCode ReadMesh(HycoFOM f)
+{
+  PetscInt *both = NULL, sizes[3] = {0, 0, 0};
+
+  PetscFunctionBegin;
+  HycoOnRoot(f->comm, HycoMeshRead(f->scene, &f->whole));
+  HycoOnRoot(f->comm, HycoPairsFind(f->scene, f->whole, &f->pairs));
+  if (f->rank == 0) {
+    sizes[0] = f->whole->n_nodes;
+    sizes[1] = f->whole->n_cells;
+    sizes[2] = f->pairs.n;
+    PetscCall(PetscMalloc1(2 * f->pairs.n, &both));
+    for (PetscInt k = 0; k < f->pairs.n; k++) {
+      both[2 * k] = f->pairs.slave[k];
+      both[2 * k + 1] = f->pairs.master[k];
+    }
+  }
+  PetscCallMPI(MPI_Bcast(sizes, 3, MPIU_INT, 0, f->comm));
+  f->n_nodes = sizes[0];
+  f->n_cells = sizes[1];
+  f->n_contacts = sizes[2];
+  PetscCheck(f->n_cells >= f->size, f->comm, PETSC_ERR_USER, "the mesh has %d cells; run it on at most as many ranks",
+             (int)f->n_cells);
+  PetscCall(HycoMeshDistribute(f->comm, f->whole, sizes[2], both, &f->part, &f->n_owned, &f->first, &f->global));
+  PetscCall(PetscFree(both));
+  PetscCall(HycoFECreate(f->scene, f->part, &f->fe));
+  f->fe_whole = f->fe;
+  if (f->size > 1) {
+    f->fe_whole = NULL;
+    if (f->rank == 0) PetscCall(HycoFECreate(f->scene, f->whole, &f->fe_whole));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Scatters of U to each rank's part and to rank 0 in the file's order; of Lambda to rank 0. */
+static PetscErrorCode CreateScatters(HycoFOM f)
+{
+  const PetscInt dim = f->part->dim, n_root = f->rank == 0 ? f->n_nodes : 0, m_root = f->rank == 0 ? f->n_contacts : 0;
+  IS is;
+
+  PetscFunctionBegin;
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->part->n_nodes * dim, &f->U_local));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, n_root * dim, &f->U_root));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, m_root, &f->lambda_root));
+  if (f->part->node_global)
+    PetscCall(ISCreateBlock(PETSC_COMM_SELF, dim, f->part->n_nodes, f->part->node_global, PETSC_COPY_VALUES, &is));
+  else
+    PetscCall(ISCreateStride(PETSC_COMM_SELF, f->part->n_nodes * dim, 0, 1, &is));
+  PetscCall(VecScatterCreate(f->U, is, f->U_local, NULL, &f->to_local));
+  PetscCall(ISDestroy(&is));
+  if (f->global)
+    PetscCall(ISCreateBlock(PETSC_COMM_SELF, dim, n_root, f->global, PETSC_COPY_VALUES, &is));
+  else
+    PetscCall(ISCreateStride(PETSC_COMM_SELF, n_root * dim, 0, 1, &is));
+  PetscCall(VecScatterCreate(f->U, is, f->U_root, NULL, &f->to_root));
+  PetscCall(ISDestroy(&is));
+  if (f->n_contacts) {
+    PetscCall(ISCreateStride(PETSC_COMM_SELF, m_root, 0, 1, &is));
+    PetscCall(VecScatterCreate(f->Lambda, is, f->lambda_root, NULL, &f->lambda_to_root));
+    PetscCall(ISDestroy(&is));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* B and Bt with the pattern that any parameter gives: all of both nodes' components. */
+static PetscErrorCode CreateB(HycoFOM f)
+{
+  const PetscInt dim = f->part->dim;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreate(f->comm, &f->B));
+  PetscCall(MatSetSizes(f->B, PETSC_DECIDE, f->n_owned * dim, f->n_contacts, f->n_nodes * dim));
+  PetscCall(MatSetType(f->B, MATAIJ));
+  PetscCall(MatSeqAIJSetPreallocation(f->B, 2 * dim, NULL));
+  PetscCall(MatMPIAIJSetPreallocation(f->B, 2 * dim, NULL, 2 * dim, NULL));
+  PetscCall(MatSetOption(f->B, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
+{
+  HycoFOM f;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  PetscCall(PetscNew(&f));
+  *fom = NULL;
+  PetscCallMPI(MPI_Comm_dup(comm, &f->comm));
+  PetscCallMPI(MPI_Comm_rank(f->comm, &f->rank));
+  PetscCallMPI(MPI_Comm_size(f->comm, &f->size));
+  f->scene = scene;
+  f->summary.seconds.setup = -HycoNow();
+  PetscCall(ReadMesh(f));
+  PetscCall(HycoFECreateMatrix(f->fe, f->comm, f->n_owned, f->first, &f->K));
+  PetscCall(MatCreateVecs(f->K, &f->U, &f->F));
+  if (f->n_contacts) {
+    PetscCall(CreateB(f));
+    PetscCall(MatCreateVecs(f->B, NULL, &f->Lambda));
+    PetscCall(VecDuplicate(f->Lambda, &f->D));
+  }
+  PetscCall(CreateScatters(f));
+  PetscCall(HycoSystemCreate(f->comm, &f->system));
+  PetscCall(HycoSolverCreate(f->comm, &f->solver));
+  PetscCall(HycoSolverSetFromOptions(f->solver, scene->options));
+  if (f->rank == 0) {
+    PetscCall(PetscMalloc1(f->n_nodes * f->part->dim, &f->u));
+    PetscCall(PetscCalloc1(f->n_contacts + 1, &f->lambda));
+    PetscCall(PetscCalloc1(f->n_contacts + 1, &f->gap));
+    PetscCall(PetscMalloc1(f->n_cells * f->fe->n_sigma, &f->sigma));
+  }
+  f->summary.seconds.setup += HycoNow();
+  *fom = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(f, "HycoFOMCreate()");
+  *solver = f->solver;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* B (if what it depends on changed) and D, from rank 0. */
+static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
+{
+  const PetscInt m = f->pairs.n, dim = f->part->dim;
+  PetscInt *start, *dof;
+  PetscReal *value;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(m + 1, &start, 6 * m, &dof, 6 * m, &value));
+  PetscCall(HycoContactRows(f->fe_whole, &f->pairs, start, dof, value, f->gap));
+  for (PetscInt k = 0; k < m; k++) {
+    PetscCall(VecSetValue(f->D, k, f->gap[k], INSERT_VALUES));
+    for (PetscInt j = start[k]; rows_changed && j < start[k + 1]; j++) {
+      const PetscInt node = f->global ? f->global[dof[j] / dim] : dof[j] / dim;
+
+      PetscCall(MatSetValue(f->B, k, node * dim + dof[j] % dim, value[j], INSERT_VALUES));
+    }
+  }
+  PetscCall(PetscFree3(start, dof, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
+{
+  PetscFunctionBegin;
+  if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  if (rows_changed && f->Bt) PetscCall(MatZeroEntries(f->B));
+  HycoOnRoot(f->comm, FillContact(f, rows_changed));
+  PetscCall(VecAssemblyBegin(f->D));
+  PetscCall(VecAssemblyEnd(f->D));
+  if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatAssemblyBegin(f->B, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(f->B, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatTranspose(f->B, f->Bt ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &f->Bt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CountFree(HycoFOM f)
+{
+  PetscInt mine = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    const PetscInt row = (f->part->node_global ? f->part->node_global[i] : i) - f->first;
+
+    for (PetscInt c = 0; row >= 0 && row < f->n_owned && c < f->fe->dim; c++) mine += !f->fe->fixed[i * f->fe->dim + c];
+  }
+  PetscCallMPI(MPI_Allreduce(&mine, &f->n_free, 1, MPIU_INT, MPI_SUM, f->comm));
+  PetscCheck(f->n_free, f->comm, PETSC_ERR_USER, "every displacement of the scene is fixed; there is nothing to solve");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Assemble(HycoFOM f, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  f->solved = f->sigma_ready = PETSC_FALSE;
+  HycoOnEach(f->comm, HycoFESetParameters(f->fe, mu));
+  if (f->fe_whole != f->fe) HycoOnRoot(f->comm, HycoFESetParameters(f->fe_whole, mu));
+  if (!f->n_free) PetscCall(CountFree(f));
+  if (f->fe->stiffness_changed) {
+    HycoOnEach(f->comm, HycoFEAssembleStiffness(f->fe, f->K));
+    PetscCall(MatSetOption(f->K, MAT_SPD, PETSC_TRUE));
+  }
+  HycoOnEach(f->comm, HycoFEAssembleForce(f->fe, f->F));
+  PetscCall(AssembleContact(f, f->fe->contact_changed));
+  PetscCall(HycoSystemSetMatrices(f->system, f->K, f->Bt, f->B, PETSC_TRUE));
+  PetscCall(HycoSystemSetVectors(f->system, f->F, f->D));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U and Lambda to rank 0, in the file's order. */
+static PetscErrorCode Gather(HycoFOM f)
+{
+  const PetscScalar *v;
+
+  PetscFunctionBegin;
+  PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterBegin(f->to_root, f->U, f->U_root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(f->to_root, f->U, f->U_root, INSERT_VALUES, SCATTER_FORWARD));
+  if (f->n_contacts) {
+    PetscCall(VecScatterBegin(f->lambda_to_root, f->Lambda, f->lambda_root, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecScatterEnd(f->lambda_to_root, f->Lambda, f->lambda_root, INSERT_VALUES, SCATTER_FORWARD));
+  }
+  if (f->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(f->U_root, &v));
+  PetscCall(PetscArraycpy(f->u, v, f->n_nodes * f->fe->dim));
+  PetscCall(VecRestoreArrayRead(f->U_root, &v));
+  PetscCall(VecGetArrayRead(f->lambda_root, &v));
+  PetscCall(PetscArraycpy(f->lambda, v, f->n_contacts));
+  PetscCall(VecRestoreArrayRead(f->lambda_root, &v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
+{
+  HycoSeconds *t = &f->summary.seconds;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  HycoCheckHandle(f, "HycoFOMCreate()");
+  PetscCall(HycoSceneCheckParameters(f->scene, n, mu));
+  PetscCall(Assemble(f, mu));
+  t->assemble = HycoNow() - begin;
+  PetscCall(HycoSolverSetSystem(f->solver, f->system));
+  PetscCall(HycoSolverSolve(f->solver, f->U, f->Lambda));
+  PetscCall(HycoSolverGetSeconds(f->solver, &t->factor, &t->solve));
+  PetscCall(Gather(f));
+  t->total = HycoNow() - begin;
+  f->solved = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMGetSystem(HycoFOM f, HycoSystem *system)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(f, "HycoFOMCreate()");
+  *system = f->system;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Strain energy over every cell once: a cell counts on the rank that owns its first node. */
+static PetscErrorCode Energy(HycoFOM f, PetscReal *energy)
+{
+  const PetscScalar *u;
+  PetscReal *each, mine = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(f->part->n_cells, &each));
+  PetscCall(VecGetArrayRead(f->U_local, &u));
+  PetscCall(HycoFEEnergy(f->fe, u, each));
+  PetscCall(VecRestoreArrayRead(f->U_local, &u));
+  for (PetscInt e = 0; e < f->part->n_cells; e++) {
+    const PetscInt i = f->part->cells[e * f->part->nv],
+                   row = (f->part->node_global ? f->part->node_global[i] : i) - f->first;
+
+    if (row >= 0 && row < f->n_owned) mine += each[e];
+  }
+  PetscCall(PetscFree(each));
+  PetscCallMPI(MPI_Allreduce(&mine, energy, 1, MPIU_REAL, MPI_SUM, f->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
+{
+  HycoSummary *s = &f->summary;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(f, "HycoFOMCreate()");
+  PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetSummary()");
+  s->dim = f->fe->dim;
+  s->n_dof = f->n_free;
+  s->n_contacts = f->n_contacts;
+  PetscCall(HycoSolverGetIterations(f->solver, &s->iterations));
+  PetscCall(HycoSolverGetKKT(f->solver, &s->kkt));
+  PetscCall(HycoSolverGetReason(f->solver, &s->reason));
+  PetscCall(Energy(f, &s->strain_energy));
+  s->n_active = 0;
+  s->total_contact_force = s->lambda_max = s->lambda_norm2 = s->u_norm2 = 0;
+  if (f->rank == 0) {
+    for (PetscInt k = 0; k < f->n_contacts; k++) {
+      s->n_active += f->lambda[k] > 0;
+      s->total_contact_force += f->lambda[k];
+      s->lambda_max = PetscMax(s->lambda_max, f->lambda[k]);
+      s->lambda_norm2 += f->lambda[k] * f->lambda[k];
+    }
+    for (PetscInt c = 0; c < s->dim; c++) s->u_min[c] = s->u_max[c] = f->u[c];
+    for (PetscInt k = 0; k < f->n_nodes * s->dim; k++) {
+      s->u_norm2 += f->u[k] * f->u[k];
+      s->u_min[k % s->dim] = PetscMin(s->u_min[k % s->dim], f->u[k]);
+      s->u_max[k % s->dim] = PetscMax(s->u_max[k % s->dim], f->u[k]);
+    }
+    s->lambda_norm2 = PetscSqrtReal(s->lambda_norm2);
+    s->u_norm2 = PetscSqrtReal(s->u_norm2);
+  }
+  PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, f->comm));
+  *out = *s;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Stresses, computed by cell on every rank, brought to rank 0. */
+static PetscErrorCode GatherStress(HycoFOM f)
+{
+  const PetscInt ns = f->fe->n_sigma, n_root = f->rank == 0 ? f->n_cells * ns : 0;
+  const PetscScalar *u, *v;
+  PetscReal *sigma;
+  Vec all, root;
+  VecScatter scatter;
+  IS is;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(f->part->n_cells * ns, &sigma));
+  PetscCall(VecGetArrayRead(f->U_local, &u));
+  PetscCall(HycoFEStress(f->fe, u, sigma));
+  PetscCall(VecRestoreArrayRead(f->U_local, &u));
+  if (f->size == 1) {
+    PetscCall(PetscArraycpy(f->sigma, sigma, f->n_cells * ns));
+    PetscCall(PetscFree(sigma));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecCreateMPI(f->comm, PETSC_DECIDE, f->n_cells * ns, &all));
+  for (PetscInt e = 0; e < f->part->n_cells; e++) {
+    for (PetscInt k = 0; k < ns; k++)
+      PetscCall(VecSetValue(all, f->part->cell_whole[e] * ns + k, sigma[e * ns + k], INSERT_VALUES));
+  }
+  PetscCall(PetscFree(sigma));
+  PetscCall(VecAssemblyBegin(all));
+  PetscCall(VecAssemblyEnd(all));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, n_root, &root));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, n_root, 0, 1, &is));
+  PetscCall(VecScatterCreate(all, is, root, NULL, &scatter));
+  PetscCall(VecScatterBegin(scatter, all, root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(scatter, all, root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArrayRead(root, &v));
+  if (f->rank == 0) PetscCall(PetscArraycpy(f->sigma, v, n_root));
+  PetscCall(VecRestoreArrayRead(root, &v));
+  PetscCall(VecScatterDestroy(&scatter));
+  PetscCall(ISDestroy(&is));
+  PetscCall(VecDestroy(&root));
+  PetscCall(VecDestroy(&all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMGetSolution(HycoFOM f, PetscInt *n_nodes, const PetscReal *U[], PetscInt *n_contacts,
+                                  const PetscReal *Lambda[], PetscInt *n_cells, const PetscReal *sigma[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(f, "HycoFOMCreate()");
+  PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetSolution()");
+  if (!f->sigma_ready) PetscCall(GatherStress(f));
+  f->sigma_ready = PETSC_TRUE;
+  if (n_nodes) *n_nodes = f->rank ? 0 : f->n_nodes;
+  if (U) *U = f->u;
+  if (n_contacts) *n_contacts = f->rank ? 0 : f->n_contacts;
+  if (Lambda) *Lambda = f->lambda;
+  if (n_cells) *n_cells = f->rank ? 0 : f->n_cells;
+  if (sigma) *sigma = f->sigma;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMGetForces(HycoFOM f, PetscReal forces[])
+{
+  Vec work, root;
+  const PetscScalar *v;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(f->F, &work));
+  if (f->n_contacts) {
+    PetscCall(MatMult(f->Bt, f->Lambda, work));
+    PetscCall(VecAYPX(work, -1, f->F));
+  } else
+    PetscCall(VecCopy(f->F, work));
+  PetscCall(VecDuplicate(f->U_root, &root));
+  PetscCall(VecScatterBegin(f->to_root, work, root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(f->to_root, work, root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArrayRead(root, &v));
+  for (PetscInt k = 0; f->rank == 0 && k < f->n_nodes * f->fe->dim; k++) forces[k] = f->fe_whole->fixed[k] ? 0 : v[k];
+  PetscCall(VecRestoreArrayRead(root, &v));
+  PetscCall(VecDestroy(&root));
+  PetscCall(VecDestroy(&work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMWrite(HycoFOM f, const char path[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(f, "HycoFOMCreate()");
+  PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMWrite()");
+  HycoOnRoot(f->comm, HycoSolutionWrite(path, f->fe_whole, &f->pairs, f->u, f->lambda, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,162 @@
+/* HDF5 for the numbers, XDMF for ParaView. */
+#include <hycofields.h>
+#include <hycoh5.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
+                                                        "Hexahedron"};
+
+PetscErrorCode HycoFieldsCheckPath(const char path[])
+{
+  const size_t n = strlen(path);
+
+  PetscFunctionBegin;
+  PetscCheck(n > 5 && n < PETSC_MAX_PATH_LEN - 16 && strcmp(path + n - 5, ".xdmf") == 0, PETSC_COMM_SELF,
+             PETSC_ERR_USER,
+             "the output is named %s; give a name that ends in .xdmf (the numbers go to the .h5 beside it)", path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteNumbers(HycoH5 h, HycoMesh m, const PetscReal X[], HycoScene scene, const PetscReal mu[],
+                                   PetscInt n, const HycoField field[], const HycoContactTable *contact)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoH5WriteReal(h, "mesh/xyz", m->n_nodes, 3, X));
+  PetscCall(HycoH5WriteInt(h, "mesh/cells", m->n_cells, m->nv, m->cells));
+  PetscCall(HycoH5WriteInt(h, "mesh/node_id", m->n_nodes, 1, m->node_id));
+  PetscCall(HycoH5WriteInt(h, "mesh/cell_id", m->n_cells, 1, m->cell_id));
+  for (PetscInt p = 0; p < scene->n_parameters; p++) {
+    char name[HYCO_LINE];
+
+    PetscCall(PetscSNPrintf(name, sizeof(name), "mu/%s", scene->parameter[p]));
+    PetscCall(HycoH5WriteReal(h, name, 1, 1, &mu[p]));
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    char name[HYCO_LINE];
+
+    PetscCall(PetscSNPrintf(name, sizeof(name), "%s/%s", field[k].on_cells ? "cells" : "nodes", field[k].name));
+    PetscCall(
+        HycoH5WriteReal(h, name, field[k].on_cells ? m->n_cells : m->n_nodes, field[k].components, field[k].data));
+  }
+  if (contact && contact->n) {
+    PetscCall(HycoH5WriteInt(h, "contact/node_id", contact->n, 1, contact->node_id));
+    PetscCall(HycoH5WriteReal(h, "contact/lambda", contact->n, 1, contact->lambda));
+    PetscCall(HycoH5WriteReal(h, "contact/gap", contact->n, 1, contact->gap));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void WriteXDMF(FILE *out, const char h5[], HycoMesh m, PetscInt n, const HycoField field[])
+{
+  fprintf(out, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n  <Grid Name=\"mesh\">\n");
+  fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", topology[m->type], (long)m->n_cells,
+          m->type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
+  fprintf(out,
+          "    <DataItem Format=\"HDF\" NumberType=\"Int\" Precision=\"%d\" Dimensions=\"%ld "
+          "%ld\">%s:/mesh/cells</DataItem>\n   </Topology>\n",
+          (int)sizeof(PetscInt), (long)m->n_cells, (long)m->nv, h5);
+  fprintf(out,
+          "   <Geometry GeometryType=\"XYZ\">\n    <DataItem Format=\"HDF\" Precision=\"8\" Dimensions=\"%ld "
+          "3\">%s:/mesh/xyz</DataItem>\n   </Geometry>\n",
+          (long)m->n_nodes, h5);
+  for (PetscInt k = 0; k < n; k++) {
+    const char *kind = field[k].components == 1 ? "Scalar" : field[k].components == 3 ? "Vector" : "Tensor6";
+
+    fprintf(out, "   <Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"%s\">\n", field[k].name, kind,
+            field[k].on_cells ? "Cell" : "Node");
+    fprintf(
+        out,
+        "    <DataItem Format=\"HDF\" Precision=\"8\" Dimensions=\"%ld %ld\">%s:/%s/%s</DataItem>\n   </Attribute>\n",
+        (long)(field[k].on_cells ? m->n_cells : m->n_nodes), (long)field[k].components, h5,
+        field[k].on_cells ? "cells" : "nodes", field[k].name);
+  }
+  fprintf(out, "  </Grid>\n </Domain>\n</Xdmf>\n");
+}
+
+PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[], HycoScene scene,
+                               const PetscReal mu[], PetscInt n, const HycoField field[],
+                               const HycoContactTable *contact)
+{
+  char h5[PETSC_MAX_PATH_LEN], partial[PETSC_MAX_PATH_LEN];
+  const char *slash;
+  HycoH5 h;
+  FILE *out;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFieldsCheckPath(path));
+  snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
+  PetscCall(HycoH5Create(h5, &h));
+  ierr = WriteNumbers(h, m, X, scene, mu, n, field, contact);
+  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  PetscCall(ierr);
+  PetscCall(PetscSNPrintf(partial, sizeof(partial), "%s.partial", path));
+  out = fopen(partial, "w");
+  PetscCheck(out, PETSC_COMM_SELF, PETSC_ERR_USER, "%s cannot be written", path);
+  slash = strrchr(h5, '/');
+  WriteXDMF(out, slash ? slash + 1 : h5, m, n, field);
+  PetscCheck(fclose(out) == 0 && rename(partial, path) == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s cannot be written: is the disk full?", path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Stress in ParaView's order xx, xy, xz, yy, yz, zz. */
+static void Tensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[])
+{
+  static const PetscInt place[6] = {0, 3, 5, 1, 4, 2};
+
+  for (PetscInt e = 0; e < n_cells; e++) {
+    for (PetscInt k = 0; k < 6; k++) tensor[6 * e + place[k]] = k < ns ? sigma[e * ns + k] : 0;
+  }
+}
+
+PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, const HycoPairs *pairs, const PetscReal u[],
+                                 const PetscReal lambda[], const PetscReal *rid)
+{
+  HycoMesh m = fe->mesh;
+  PetscReal *u3, *sigma, *tensor, *force, *pressure, *gap, *normal, *area, *gap_node;
+  PetscInt *slave_id, n = 5;
+  HycoContactTable table;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc5(3 * m->n_nodes, &u3, m->n_cells * fe->n_sigma, &sigma, 6 * m->n_cells, &tensor, 3 * m->n_nodes,
+                         &force, m->n_nodes, &pressure));
+  PetscCall(
+      PetscCalloc5(pairs->n, &gap, 3 * pairs->n, &normal, pairs->n, &area, pairs->n, &slave_id, m->n_nodes, &gap_node));
+  for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
+  PetscCall(HycoFEStress(fe, u, sigma));
+  Tensor6(m->n_cells, fe->n_sigma, sigma, tensor);
+  PetscCall(HycoContactGeometry(fe, pairs, normal, gap));
+  PetscCall(HycoContactAreas(fe, pairs, area));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscInt s = pairs->slave[k], r = pairs->master[k];
+
+    slave_id[k] = m->node_id[s];
+    for (PetscInt c = 0; c < fe->dim; c++) {
+      force[3 * s + c] -= lambda[k] * normal[3 * k + c];
+      gap[k] -= normal[3 * k + c] * u[s * fe->dim + c];
+      if (r < 0) continue;
+      force[3 * r + c] += lambda[k] * normal[3 * k + c];
+      gap[k] += normal[3 * k + c] * u[r * fe->dim + c];
+    }
+    pressure[s] = area[k] > 0 ? lambda[k] / area[k] : 0;
+    gap_node[s] = gap[k];
+  }
+  table.n = pairs->n;
+  table.node_id = slave_id;
+  table.lambda = lambda;
+  table.gap = gap;
+  {
+    const HycoField field[6] = {
+        {"displacement", PETSC_FALSE, 3, u3},     {"stress", PETSC_TRUE, 6, tensor},
+        {"contact_force", PETSC_FALSE, 3, force}, {"contact_pressure", PETSC_FALSE, 1, pressure},
+        {"gap", PETSC_FALSE, 1, gap_node},        {"rid", PETSC_TRUE, 1, rid}};
+
+    if (rid) n = 6;
+    PetscCall(HycoFieldsWrite(path, m, fe->X, fe->scene, fe->mu, n, field, &table));
+  }
+  PetscCall(PetscFree5(u3, sigma, tensor, force, pressure));
+  PetscCall(PetscFree5(gap, normal, area, slave_id, gap_node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,154 @@
+/*
+  A scene's entries: read from YAML into an options database of the scene's own, overridden by the command line,
+  and listed by key. Known entries are spelled SECTION_NAME_FIELD: body_pellet_young, fixed_sym_x0_x.
+*/
+#include <hycosceneimpl.h>
+#include "entries.h"
+#include <string.h>
+#include <sys/stat.h>
+
+static const char *const sections[] = {"scene_",    "parameter_", "body_",    "fixed_", "pressure_",
+                                       "traction_", "force_",     "contact_", "hyco_"};
+
+PetscBool HycoIsSceneKey(const char name[])
+{
+  for (size_t s = 0; s < sizeof(sections) / sizeof(sections[0]); s++) {
+    if (strncasecmp(name, sections[s], strlen(sections[s])) == 0) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* The names (without dash) of the options that are set in `options` (NULL: global) and are scene keys. */
+static PetscErrorCode ListKeys(PetscOptions options, PetscInt *n, char ***keys)
+{
+  char *all, *word, *rest;
+  PetscInt room = 0;
+
+  PetscFunctionBegin;
+  *n = 0;
+  *keys = NULL;
+  PetscCall(PetscOptionsGetAll(options, &all));
+  for (word = all; *word; word++) room += *word == '-';
+  PetscCall(PetscCalloc1(room + 1, keys));
+  for (word = strtok_r(all, " ", &rest); word; word = strtok_r(NULL, " ", &rest)) {
+    PetscBool set = PETSC_FALSE, seen = PETSC_FALSE;
+
+    if (word[0] != '-' || !HycoIsSceneKey(word + 1)) continue;
+    PetscCall(PetscOptionsHasName(options, NULL, word, &set));
+    for (PetscInt k = 0; k < *n; k++) seen = (PetscBool)(seen || strcasecmp((*keys)[k], word + 1) == 0);
+    if (set && !seen) PetscCall(PetscStrallocpy(word + 1, &(*keys)[(*n)++]));
+  }
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads one option of any length. */
+static PetscErrorCode GetLong(PetscOptions options, const char key[], char **value)
+{
+  char dashed[HYCO_LINE], text[8 * HYCO_LINE];
+  PetscBool set;
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", key));
+  PetscCall(PetscOptionsGetString(options, NULL, dashed, text, sizeof(text), &set));
+  if (!set) text[0] = '\0';
+  PetscCall(PetscStrallocpy(text, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Copies the global database's scene entries over the scene's own. */
+static PetscErrorCode Override(PetscOptions options)
+{
+  PetscInt n;
+  char **keys;
+
+  PetscFunctionBegin;
+  PetscCall(ListKeys(NULL, &n, &keys));
+  for (PetscInt k = 0; k < n; k++) {
+    char dashed[HYCO_LINE];
+    char *value;
+
+    /* an unknown -hyco_ option is the caller's: it may be meant for PETSc's own solvers (-hyco_tao_type) */
+    if (strncasecmp(keys[k], "hyco_", 5) == 0 && !HycoOptionKnown(keys[k])) {
+      PetscCall(PetscFree(keys[k]));
+      continue;
+    }
+    PetscCall(GetLong(NULL, keys[k], &value));
+    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", keys[k]));
+    PetscCall(PetscOptionsSetValue(options, dashed, value));
+    PetscCall(PetscFree(value));
+    PetscCall(PetscFree(keys[k]));
+  }
+  PetscCall(PetscFree(keys));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int CompareEntries(const void *a, const void *b)
+{
+  return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
+PetscErrorCode HycoEntriesList(HycoScene scene)
+{
+  PetscInt n;
+  char **keys;
+
+  PetscFunctionBegin;
+  PetscCall(ListKeys(scene->options, &n, &keys));
+  qsort(keys, (size_t)n, sizeof(*keys), CompareEntries);
+  PetscCall(PetscMalloc1(n, &scene->value));
+  for (PetscInt k = 0; k < n; k++) PetscCall(GetLong(scene->options, keys[k], &scene->value[k]));
+  scene->n_entries = n;
+  scene->key = keys;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The scene's file and folder: `path` is a folder with scene.yaml, or the file. */
+static PetscErrorCode FindFile(const char path[], char file[PETSC_MAX_PATH_LEN], char folder[PETSC_MAX_PATH_LEN])
+{
+  struct stat info;
+  char *slash;
+
+  PetscFunctionBegin;
+  PetscCheck(strlen(path) + 16 < PETSC_MAX_PATH_LEN, PETSC_COMM_SELF, PETSC_ERR_USER, "the scene's path is too long");
+  PetscCheck(stat(path, &info) == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "there is no scene %s; give a folder with scene.yaml, or a .yaml file", path);
+  if (S_ISDIR(info.st_mode)) {
+    snprintf(file, PETSC_MAX_PATH_LEN, "%s%sscene.yaml", path, path[strlen(path) - 1] == '/' ? "" : "/");
+    PetscCheck(stat(file, &info) == 0, PETSC_COMM_SELF, PETSC_ERR_USER, "the folder %s holds no scene.yaml", path);
+  } else {
+    snprintf(file, PETSC_MAX_PATH_LEN, "%s", path);
+  }
+  snprintf(folder, PETSC_MAX_PATH_LEN, "%s", file);
+  slash = strrchr(folder, '/');
+  if (slash)
+    *slash = '\0';
+  else
+    snprintf(folder, PETSC_MAX_PATH_LEN, ".");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
+{
+  char message[HYCO_LINE];
+  PetscErrorCode caught;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCatchBegin());
+  caught = PetscOptionsInsertFileYAML(PETSC_COMM_SELF, options, file, PETSC_TRUE);
+  PetscCall(HycoCatchEnd(caught, message));
+  PetscCheck(!caught, PETSC_COMM_SELF, PETSC_ERR_USER, "%s is not YAML that hyco reads: %s", file, message);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoEntriesRead(MPI_Comm comm, const char path[], PetscOptions *options, char folder[PETSC_MAX_PATH_LEN])
+{
+  char file[PETSC_MAX_PATH_LEN] = "";
+
+  PetscFunctionBegin;
+  HycoOnEach(comm, FindFile(path, file, folder));
+  PetscCall(PetscOptionsCreate(options));
+  HycoOnEach(comm, ReadYAML(*options, file));
+  PetscCall(Override(*options));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

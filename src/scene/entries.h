@@ -1,0 +1,14 @@
+/* Entries of a scene: private to scene/. */
+#ifndef HYCO_ENTRIES_H
+#define HYCO_ENTRIES_H
+#include <hycosceneimpl.h>
+
+/* Whether an option's name (without dash) begins as a scene entry does. */
+PetscBool HycoIsSceneKey(const char name[]);
+/* Reads the scene's file into `*options`, the command line's entries over it. Collective. */
+PetscErrorCode HycoEntriesRead(MPI_Comm comm, const char path[], PetscOptions *options,
+                               char folder[PETSC_MAX_PATH_LEN]);
+/* Fills scene->key, value from scene->options, sorted by key. */
+PetscErrorCode HycoEntriesList(HycoScene scene);
+
+#endif

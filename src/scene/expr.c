@@ -1,0 +1,146 @@
+/* Expressions of a scene, parsed by muParser. */
+#include <hycosceneimpl.h>
+#include <muParserDLL.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct _n_HycoExpr {
+  char *key, *text;
+  muParserHandle_t parser; /* NULL when the text is a number */
+  double constant;         /* its value then */
+  double x[3], mu[HYCO_MAX_PARAMETERS];
+  PetscInt n_parameters;
+  PetscBool in_space, in_mu[HYCO_MAX_PARAMETERS];
+};
+
+PetscErrorCode HycoExprDestroy(HycoExpr *expr)
+{
+  PetscFunctionBegin;
+  if (!*expr) PetscFunctionReturn(PETSC_SUCCESS);
+  if ((*expr)->parser) mupRelease((*expr)->parser);
+  PetscCall(PetscFree((*expr)->key));
+  PetscCall(PetscFree((*expr)->text));
+  PetscCall(PetscFree(*expr));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* muParser reports through a handler that is not called by default: its flag is read and cleared here. */
+static void Quiet(muParserHandle_t parser)
+{
+  (void)parser;
+}
+
+static PetscErrorCode Raise(HycoExpr e)
+{
+  char line[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(
+      PetscSNPrintf(line, sizeof(line), "%s: \"%s\" is no expression: %s", e->key, e->text, mupGetErrorMsg(e->parser)));
+  HycoFail("%s", line);
+}
+
+static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const names[])
+{
+  int n_used = mupGetExprVarNum(e->parser);
+
+  PetscFunctionBegin;
+  if (mupError(e->parser)) PetscCall(Raise(e));
+  for (int k = 0; k < n_used; k++) {
+    const char *name = NULL;
+    double *address = NULL;
+
+    mupGetExprVar(e->parser, (unsigned)k, &name, &address);
+    if (address >= e->x && address < e->x + 3) {
+      e->in_space = PETSC_TRUE;
+    } else if (address >= e->mu && address < e->mu + n) {
+      e->in_mu[address - e->mu] = PETSC_TRUE;
+    } else {
+      char list[HYCO_LINE] = "x, y, z";
+
+      for (PetscInt p = 0; p < n; p++) {
+        PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
+        PetscCall(PetscStrlcat(list, names[p], sizeof(list)));
+      }
+      HycoFail("%s: \"%s\" names %s, which is unknown; known are %s, pi", e->key, e->text, name, list);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, const char *const names[],
+                              HycoExpr *expr)
+{
+  static const char *const axis[3] = {"x", "y", "z"};
+  HycoExpr e;
+  char *end;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&e));
+  *expr = e;
+  PetscCall(PetscStrallocpy(key, &e->key));
+  PetscCall(PetscStrallocpy(text, &e->text));
+  e->n_parameters = n;
+  e->constant = strtod(text, &end);
+  while (*end == ' ') end++;
+  if (end != text && *end == '\0' && strpbrk(text, "0123456789")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(text[strspn(text, " \t")] != '\0', PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s is empty; give a number or an expression", key);
+  e->parser = mupCreate(muBASETYPE_FLOAT);
+  mupSetErrorHandler(e->parser, Quiet);
+  mupDefineConst(e->parser, "pi", PETSC_PI); /* muParser's own _pi has 12 digits */
+  for (int c = 0; c < 3; c++) mupDefineVar(e->parser, axis[c], &e->x[c]);
+  for (PetscInt p = 0; p < n; p++) mupDefineVar(e->parser, names[p], &e->mu[p]);
+  if (mupError(e->parser)) PetscCall(Raise(e));
+  mupSetExpr(e->parser, text);
+  if (mupError(e->parser)) PetscCall(Raise(e));
+  PetscCall(FindVariables(e, n, names));
+  (void)mupEval(e->parser);
+  if (mupError(e->parser)) PetscCall(Raise(e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExprEval(HycoExpr e, const PetscReal mu[], PetscInt n, const PetscReal xyz[], PetscReal value[])
+{
+  PetscFunctionBegin;
+  if (!e->parser) {
+    for (PetscInt k = 0; k < n; k++) value[k] = e->constant;
+  } else {
+    for (PetscInt p = 0; p < e->n_parameters; p++) e->mu[p] = mu[p];
+    for (PetscInt k = 0; k < n; k++) {
+      if (e->in_space || k == 0) {
+        for (int c = 0; c < 3; c++) e->x[c] = xyz[3 * k + c];
+        value[k] = mupEval(e->parser);
+      } else {
+        value[k] = value[0];
+      }
+    }
+    if (mupError(e->parser)) PetscCall(Raise(e));
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    if (PetscIsInfOrNanReal(value[k])) {
+      HycoFail("%s: \"%s\" is not finite at x = %g, y = %g, z = %g", e->key, e->text, (double)xyz[3 * k],
+               (double)xyz[3 * k + 1], (double)xyz[3 * k + 2]);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool HycoExprInSpace(HycoExpr e)
+{
+  return (PetscBool)(e && e->in_space);
+}
+
+PetscBool HycoExprChanges(HycoExpr e, const PetscBool changed[])
+{
+  if (!e) return PETSC_FALSE;
+  for (PetscInt p = 0; p < e->n_parameters; p++) {
+    if (e->in_mu[p] && changed[p]) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+const char *HycoExprKey(HycoExpr e)
+{
+  return e->key;
+}

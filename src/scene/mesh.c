@@ -1,0 +1,224 @@
+/* HycoMesh: groups, extraction of parts, adjacency. */
+#include <hycomesh.h>
+#include <string.h>
+
+PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
+{
+  HycoMesh m = *mesh;
+
+  PetscFunctionBegin;
+  if (!m) PetscFunctionReturn(PETSC_SUCCESS);
+  *mesh = NULL;
+  for (PetscInt g = 0; g < m->n_groups; g++) PetscCall(PetscFree(m->group_name[g]));
+  PetscCall(PetscFree(m->group_name));
+  PetscCall(PetscFree(m->group_dim));
+  PetscCall(PetscFree(m->group_start));
+  PetscCall(PetscFree(m->group_node));
+  PetscCall(PetscFree(m->group_cell_start));
+  PetscCall(PetscFree(m->group_cell));
+  PetscCall(PetscFree(m->xyz));
+  PetscCall(PetscFree(m->node_id));
+  PetscCall(PetscFree(m->node_body));
+  PetscCall(PetscFree(m->node_global));
+  PetscCall(PetscFree(m->node_whole));
+  PetscCall(PetscFree(m->cells));
+  PetscCall(PetscFree(m->cell_id));
+  PetscCall(PetscFree(m->cell_body));
+  PetscCall(PetscFree(m->cell_whole));
+  PetscCall(PetscFree(m->facets));
+  PetscCall(PetscFree(m->facet_group));
+  PetscCall(PetscFree(m->facet_cell));
+  PetscCall(PetscFree(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeshFindGroup(HycoMesh mesh, const char key[], const char name[], PetscInt *group)
+{
+  char list[HYCO_LINE] = "";
+  const char *near;
+
+  PetscFunctionBegin;
+  for (PetscInt g = 0; g < mesh->n_groups; g++) {
+    if (strcmp(mesh->group_name[g], name) == 0) {
+      *group = g;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+    PetscCall(PetscStrlcat(list, g ? ", " : "", sizeof(list)));
+    PetscCall(PetscStrlcat(list, mesh->group_name[g], sizeof(list)));
+  }
+  near = HycoNearest(name, mesh->n_groups, (const char *const *)mesh->group_name);
+  if (near) HycoFail("%s: the mesh has no group \"%s\"; its groups are: %s; did you mean %s?", key, name, list, near);
+  HycoFail("%s: the mesh has no group \"%s\"; its groups are: %s", key, name, list);
+}
+
+PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
+{
+  PetscInt group;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < scene->n_fixed; k++)
+    PetscCall(HycoMeshFindGroup(mesh, "fixed", scene->fixed[k].group, &group));
+  for (PetscInt k = 0; k < scene->n_fixed; k++) {
+    for (PetscInt c = mesh->dim; c < 3; c++) {
+      PetscCheck(!scene->fixed[k].value[c], PETSC_COMM_SELF, PETSC_ERR_USER,
+                 "%s: the mesh has %d space dimension%s; there is no component %c",
+                 HycoExprKey(scene->fixed[k].value[c]), (int)mesh->dim, mesh->dim > 1 ? "s" : "", "xyz"[c]);
+    }
+  }
+  for (PetscInt k = 0; k < scene->n_loads; k++) {
+    PetscCall(HycoMeshFindGroup(mesh, scene->load[k].pressure ? "pressure" : "traction", scene->load[k].group, &group));
+    PetscCheck(mesh->group_dim[group] == mesh->dim - 1, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "the load on %s needs a group of dimension %d; that group has dimension %d", scene->load[k].group,
+               (int)mesh->dim - 1, (int)mesh->group_dim[group]);
+  }
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
+    HycoContact *c = &scene->contact[k];
+
+    PetscCall(HycoMeshFindGroup(mesh, "contact", c->slave, &group));
+    if (!c->normal[0] && !c->normal[1] && !c->normal[2]) {
+      PetscCheck(mesh->group_dim[group] == mesh->dim - 1, PETSC_COMM_SELF, PETSC_ERR_USER,
+                 "contact %s takes its normal from the group %s, which is no surface; give normal: {x: ..., ...}",
+                 c->name, c->slave);
+    }
+    if (c->master) PetscCall(HycoMeshFindGroup(mesh, "contact", c->master, &group));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
+{
+  PetscInt *next;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_nodes + 1, start));
+  PetscCall(PetscMalloc1(m->n_cells * m->nv, cell));
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) (*start)[m->cells[k] + 1]++;
+  for (PetscInt i = 0; i < m->n_nodes; i++) (*start)[i + 1] += (*start)[i];
+  PetscCall(PetscMalloc1(m->n_nodes, &next));
+  PetscCall(PetscArraycpy(next, *start, m->n_nodes));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    for (PetscInt v = 0; v < m->nv; v++) (*cell)[next[m->cells[e * m->nv + v]]++] = e;
+  }
+  PetscCall(PetscFree(next));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* index[i] = place of whole node i in the part, or -1; part->node_whole is filled. */
+static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
+                                  const PetscInt extra[], HycoMesh part, PetscInt index[])
+{
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < whole->n_nodes; i++) index[i] = -1;
+  for (PetscInt k = 0; k < n_keep; k++) {
+    for (PetscInt v = 0; v < whole->nv; v++) index[whole->cells[keep[k] * whole->nv + v]] = 0;
+  }
+  for (PetscInt k = 0; k < n_extra; k++) index[extra[k]] = 0;
+  for (PetscInt i = 0; i < whole->n_nodes; i++) {
+    if (index[i] == 0) index[i] = part->n_nodes++;
+  }
+  PetscCall(PetscMalloc1(part->n_nodes, &part->node_whole));
+  PetscCall(PetscMalloc1(part->n_nodes * 3, &part->xyz));
+  PetscCall(PetscMalloc1(part->n_nodes, &part->node_id));
+  PetscCall(PetscMalloc1(part->n_nodes, &part->node_body));
+  for (PetscInt i = 0; i < whole->n_nodes; i++) {
+    const PetscInt p = index[i];
+
+    if (p < 0) continue;
+    part->node_whole[p] = i;
+    part->node_id[p] = whole->node_id[i];
+    part->node_body[p] = whole->node_body[i];
+    for (PetscInt c = 0; c < 3; c++) part->xyz[3 * p + c] = whole->xyz[3 * i + c];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SelectCells(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], const PetscInt index[],
+                                  HycoMesh part, PetscInt cell_index[])
+{
+  const PetscInt nv = whole->nv;
+
+  PetscFunctionBegin;
+  part->n_cells = n_keep;
+  PetscCall(PetscMalloc1(n_keep * nv, &part->cells));
+  PetscCall(PetscMalloc1(n_keep, &part->cell_id));
+  PetscCall(PetscMalloc1(n_keep, &part->cell_body));
+  PetscCall(PetscMalloc1(n_keep, &part->cell_whole));
+  for (PetscInt e = 0; e < whole->n_cells; e++) cell_index[e] = -1;
+  for (PetscInt k = 0; k < n_keep; k++) {
+    cell_index[keep[k]] = k;
+    part->cell_whole[k] = keep[k];
+    part->cell_id[k] = whole->cell_id[keep[k]];
+    part->cell_body[k] = whole->cell_body[keep[k]];
+    for (PetscInt v = 0; v < nv; v++) part->cells[k * nv + v] = index[whole->cells[keep[k] * nv + v]];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SelectFacets(HycoMesh whole, PetscInt n_all, const PetscInt all_facets[], const PetscInt index[],
+                                   const PetscInt cell_index[], HycoMesh part)
+{
+  const PetscInt nf = whole->nf;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(whole->n_facets * nf, &part->facets));
+  PetscCall(PetscMalloc1(whole->n_facets, &part->facet_group));
+  PetscCall(PetscMalloc1(whole->n_facets, &part->facet_cell));
+  for (PetscInt f = 0; f < whole->n_facets; f++) {
+    PetscBool take = (PetscBool)(cell_index[whole->facet_cell[f]] >= 0);
+
+    for (PetscInt k = 0; k < n_all; k++) take = (PetscBool)(take || whole->facet_group[f] == all_facets[k]);
+    if (!take) continue;
+    for (PetscInt v = 0; v < nf; v++) part->facets[part->n_facets * nf + v] = index[whole->facets[f * nf + v]];
+    part->facet_group[part->n_facets] = whole->facet_group[f];
+    part->facet_cell[part->n_facets] = cell_index[whole->facet_cell[f]];
+    part->n_facets++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* CSR lists of a group's members that survive, renumbered. */
+static PetscErrorCode SelectGroups(PetscInt n_groups, const PetscInt start[], const PetscInt member[],
+                                   const PetscInt index[], PetscInt **new_start, PetscInt **new_member)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n_groups + 1, new_start));
+  PetscCall(PetscMalloc1(start[n_groups], new_member));
+  (*new_start)[0] = 0;
+  for (PetscInt g = 0; g < n_groups; g++) {
+    for (PetscInt k = start[g]; k < start[g + 1]; k++) {
+      if (index[member[k]] >= 0) (*new_member)[n++] = index[member[k]];
+    }
+    (*new_start)[g + 1] = n;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
+                               const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh *part)
+{
+  HycoMesh m;
+  PetscInt *index, *cell_index;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&m));
+  m->dim = whole->dim;
+  m->nv = whole->nv;
+  m->nf = whole->nf;
+  m->type = whole->type;
+  PetscCall(PetscMalloc2(whole->n_nodes, &index, whole->n_cells, &cell_index));
+  PetscCall(SelectNodes(whole, n_keep, keep, n_extra, extra, m, index));
+  PetscCall(SelectCells(whole, n_keep, keep, index, m, cell_index));
+  PetscCall(SelectFacets(whole, n_all, all_facets, index, cell_index, m));
+  m->n_groups = whole->n_groups;
+  PetscCall(PetscMalloc1(m->n_groups, &m->group_name));
+  for (PetscInt g = 0; g < m->n_groups; g++) PetscCall(PetscStrallocpy(whole->group_name[g], &m->group_name[g]));
+  HycoDuplicate(m->n_groups, whole->group_dim, &m->group_dim);
+  PetscCall(SelectGroups(m->n_groups, whole->group_start, whole->group_node, index, &m->group_start, &m->group_node));
+  PetscCall(SelectGroups(m->n_groups, whole->group_cell_start, whole->group_cell, cell_index, &m->group_cell_start,
+                         &m->group_cell));
+  PetscCall(PetscFree2(index, cell_index));
+  *part = m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

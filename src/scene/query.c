@@ -1,0 +1,107 @@
+/* What a scene answers: its parameters, its options, its words, its fingerprint. */
+#include <hycosceneimpl.h>
+#include <stdio.h>
+#include <string.h>
+#include <petscviewer.h>
+
+PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *const *names[], const PetscReal *lo[],
+                                      const PetscReal *hi[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  if (n) *n = scene->n_parameters;
+  if (names) *names = (const char *const *)scene->parameter;
+  if (lo) *lo = scene->lo;
+  if (hi) *hi = scene->hi;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  *title = scene->title;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  *options = scene->options;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  if (n != scene->n_parameters) {
+    char list[HYCO_LINE] = "none";
+
+    for (PetscInt p = 0; p < scene->n_parameters; p++) {
+      if (p == 0)
+        list[0] = '\0';
+      else
+        PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
+      PetscCall(PetscStrlcat(list, scene->parameter[p], sizeof(list)));
+    }
+    HycoFail("%d parameter values were given; the scene has %d: %s", (int)n, (int)scene->n_parameters, list);
+  }
+  for (PetscInt p = 0; p < n; p++) {
+    const PetscReal slack = 1e-12 * PetscMax(PetscAbsReal(scene->lo[p]), PetscAbsReal(scene->hi[p]));
+
+    PetscCheck(mu[p] >= scene->lo[p] - slack && mu[p] <= scene->hi[p] + slack, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s = %.10g lies outside its range [%.10g, %.10g]", scene->parameter[p], (double)mu[p],
+               (double)scene->lo[p], (double)scene->hi[p]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode HashFile(HycoScene scene, unsigned long long *hash)
+{
+  unsigned char buffer[65536];
+  FILE *file = fopen(scene->mesh_path, "rb");
+  size_t n;
+
+  PetscFunctionBegin;
+  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_USER, "the mesh %s cannot be opened", scene->mesh_path);
+  while ((n = fread(buffer, 1, sizeof(buffer), file)) > 0) *hash = HycoHash(*hash, buffer, n);
+  fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
+{
+  PetscFunctionBegin;
+  *hash = HYCO_HASH_START;
+  for (PetscInt k = 0; k < scene->n_entries; k++) {
+    if (strncasecmp(scene->key[k], "hyco_", 5) == 0 || strcasecmp(scene->key[k], "scene_mesh") == 0 ||
+        strcasecmp(scene->key[k], "scene_title") == 0)
+      continue;
+    *hash = HycoHash(*hash, scene->key[k], strlen(scene->key[k]) + 1);
+    *hash = HycoHash(*hash, scene->value[k], strlen(scene->value[k]) + 1);
+  }
+  HycoOnRoot(scene->comm, HashFile(scene, hash));
+  PetscCallMPI(MPI_Bcast(hash, 1, MPI_UNSIGNED_LONG_LONG, 0, scene->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneView(HycoScene scene, PetscViewer viewer)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  PetscCall(PetscViewerASCIIPrintf(viewer, "scene: %s\n", scene->title[0] ? scene->title : "(no title)"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  mesh: %s\n", scene->mesh_path[0] ? scene->mesh_path : "(none)"));
+  for (PetscInt p = 0; p < scene->n_parameters; p++) {
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  parameter %s in [%g, %g]\n", scene->parameter[p], (double)scene->lo[p],
+                                     (double)scene->hi[p]));
+  }
+  for (PetscInt k = 0; k < scene->n_entries; k++) {
+    const char *key = scene->key[k];
+
+    if (strncasecmp(key, "scene_", 6) == 0 || strncasecmp(key, "parameter_", 10) == 0) continue;
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s\n", key, scene->value[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

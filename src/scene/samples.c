@@ -1,0 +1,168 @@
+/* HycoSamples: grids, products, single points and CSV files of parameter values. */
+#include <hycosceneimpl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct _p_HycoSamples {
+  HycoScene scene; /* borrowed */
+  PetscInt n, room;
+  PetscReal *mu; /* n x n_parameters */
+};
+
+PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  PetscCall(PetscNew(samples));
+  (*samples)->scene = scene;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesDestroy(HycoSamples *samples)
+{
+  PetscFunctionBegin;
+  if (!samples || !*samples) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*samples)->mu));
+  PetscCall(PetscFree(*samples));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesAddPoint(HycoSamples s, const PetscReal mu[])
+{
+  const PetscInt P = s ? s->scene->n_parameters : 0;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSamplesCreate()");
+  PetscCall(HycoSceneCheckParameters(s->scene, P, mu));
+  if (s->n == s->room) {
+    s->room = 2 * s->room + 16;
+    PetscCall(PetscRealloc((size_t)s->room * (size_t)PetscMax(P, 1) * sizeof(PetscReal), &s->mu));
+  }
+  PetscCall(PetscArraycpy(s->mu + s->n * P, mu, P));
+  s->n++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], const PetscReal *const values[])
+{
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscInt total = 1;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSamplesCreate()");
+  for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
+    PetscCheck(counts[p] >= 1, PETSC_COMM_SELF, PETSC_ERR_USER, "parameter %s has %d values; at least 1 is needed",
+               s->scene->parameter[p], (int)counts[p]);
+    PetscCheck(total <= 100000000 / counts[p], PETSC_COMM_SELF, PETSC_ERR_USER,
+               "the set has more than 100 million points; use fewer per parameter");
+    total *= counts[p];
+  }
+  for (PetscInt k = 0; k < total; k++) {
+    PetscInt rest = k;
+
+    for (PetscInt p = s->scene->n_parameters - 1; p >= 0; p--) {
+      mu[p] = values[p][rest % counts[p]];
+      rest /= counts[p];
+    }
+    PetscCall(HycoSamplesAddPoint(s, mu));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscBool closed)
+{
+  PetscReal *values[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSamplesCreate()");
+  for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
+    const PetscReal lo = s->scene->lo[p], hi = s->scene->hi[p];
+    const PetscInt n = counts[p];
+
+    PetscCheck(n >= (closed ? 2 : 1) && n <= 100000000, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "the grid has %d points for %s; at least %d are needed", (int)n, s->scene->parameter[p], closed ? 2 : 1);
+    PetscCall(PetscMalloc1(n, &values[p]));
+    for (PetscInt k = 0; k < n; k++) {
+      values[p][k] = closed ? (k == n - 1 ? hi : lo + k * (hi - lo) / (n - 1)) : lo + (k + 0.5) * (hi - lo) / n;
+    }
+  }
+  PetscCall(HycoSamplesAddProduct(s, counts, (const PetscReal *const *)values));
+  for (PetscInt p = 0; p < s->scene->n_parameters; p++) PetscCall(PetscFree(values[p]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The header's columns: column[c] = parameter of column c. */
+static PetscErrorCode ReadHeader(HycoSamples s, const char path[], char *line, PetscInt column[])
+{
+  const PetscInt P = s->scene->n_parameters;
+  char *word, *rest;
+  PetscInt c = 0;
+
+  PetscFunctionBegin;
+  for (word = strtok_r(line, ", \t\r\n", &rest); word; word = strtok_r(NULL, ", \t\r\n", &rest), c++) {
+    PetscInt p = 0;
+
+    while (p < P && strcmp(word, s->scene->parameter[p])) p++;
+    PetscCheck(p < P && c < P, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s: the column \"%s\" is no parameter of the scene, or too many", path, word);
+    for (PetscInt b = 0; b < c; b++)
+      PetscCheck(column[b] != p, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: the column %s stands twice", path, word);
+    column[c] = p;
+  }
+  PetscCheck(c == P, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: its first line names %d of the scene's %d parameters", path,
+             (int)c, (int)P);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadFile(HycoSamples s, const char path[])
+{
+  const PetscInt P = s->scene->n_parameters;
+  FILE *file = fopen(path, "r");
+  char line[4096];
+  PetscInt column[HYCO_MAX_PARAMETERS], number = 0;
+
+  PetscFunctionBegin;
+  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_USER, "the file of points %s cannot be opened", path);
+  while (fgets(line, sizeof(line), file)) {
+    PetscReal mu[HYCO_MAX_PARAMETERS];
+    char *next = line;
+
+    number++;
+    if (number == 1) {
+      PetscCall(ReadHeader(s, path, line, column));
+      continue;
+    }
+    if (line[strspn(line, " \t\r\n")] == '\0') continue;
+    for (PetscInt c = 0; c < P; c++) {
+      char *end;
+
+      mu[column[c]] = strtod(next, &end);
+      end += strspn(end, " \t\r\n");
+      PetscCheck(end != next && (*end == (c == P - 1 ? '\0' : ',')), PETSC_COMM_SELF, PETSC_ERR_USER,
+                 "%s, line %d: %d numbers with commas between are expected", path, (int)number, (int)P);
+      next = end + 1;
+    }
+    PetscCall(HycoSamplesAddPoint(s, mu));
+  }
+  fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesAddFile(HycoSamples s, const char path[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSamplesCreate()");
+  HycoOnEach(s->scene->comm, ReadFile(s, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesGet(HycoSamples s, PetscInt *n_points, PetscInt *n_parameters, const PetscReal *mu[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSamplesCreate()");
+  if (n_points) *n_points = s->n;
+  if (n_parameters) *n_parameters = s->scene->n_parameters;
+  if (mu) *mu = s->mu;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

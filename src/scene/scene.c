@@ -1,0 +1,464 @@
+/* HycoScene: from entries to bodies, supports, loads, contacts and parameters. */
+#include "entries.h"
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Fields of a section's members; a member's name is what stands between the section and the field. */
+static const char *const body_fields[] = {"young", "poisson", "map_x", "map_y", "map_z", NULL};
+static const char *const component_fields[] = {"x", "y", "z", NULL};
+static const char *const contact_fields[] = {"type", "group",    "slave",    "master",   "tolerance",
+                                             "gap",  "normal_x", "normal_y", "normal_z", NULL};
+static const char *const scene_fields[] = {"title", "mesh", "parameters", NULL};
+static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
+
+/* Splits "body_pellet_young" after "body_" into "pellet" and the index of "young"; false if no field ends it. */
+static PetscBool SplitKey(const char *rest, const char *const fields[], char name[HYCO_LINE], PetscInt *field)
+{
+  size_t length = strlen(rest), best = 0;
+
+  for (PetscInt f = 0; fields[f]; f++) {
+    size_t tail = strlen(fields[f]);
+
+    if (tail > best && length > tail + 1 && rest[length - tail - 1] == '_' &&
+        strcasecmp(rest + length - tail, fields[f]) == 0) {
+      best = tail;
+      *field = f;
+    }
+  }
+  if (!best || length - best - 1 >= HYCO_LINE) return PETSC_FALSE;
+  memcpy(name, rest, length - best - 1);
+  name[length - best - 1] = '\0';
+  return PETSC_TRUE;
+}
+
+static PetscErrorCode UnknownKey(const char key[], const char what[], const char *const fields[])
+{
+  char list[HYCO_LINE] = "";
+  const char *last = strrchr(key, '_'), *near = NULL;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  while (fields[n]) {
+    PetscCall(PetscStrlcat(list, n ? ", " : "", sizeof(list)));
+    PetscCall(PetscStrlcat(list, fields[n++], sizeof(list)));
+  }
+  if (last) near = HycoNearest(last + 1, n, fields);
+  if (near) HycoFail("the scene's entry %s is unknown; %s has: %s; did you mean %s?", key, what, list, near);
+  HycoFail("the scene's entry %s is unknown; %s has: %s", key, what, list);
+}
+
+/* Finds or adds the member `name` of an array of structs whose first field is its name. */
+static PetscErrorCode Member(const char name[], size_t size, PetscInt *n, void **array, PetscInt *index)
+{
+  char *items = (char *)*array;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < *n; k++) {
+    char *known;
+
+    memcpy(&known, items + (size_t)k * size, sizeof(known));
+    if (strcmp(known, name) == 0) {
+      *index = k;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+  }
+  PetscCall(PetscRealloc(((size_t)*n + 1) * size, array));
+  items = (char *)*array;
+  memset(items + (size_t)*n * size, 0, size);
+  {
+    char *copy;
+
+    PetscCall(PetscStrallocpy(name, &copy));
+    memcpy(items + (size_t)*n * size, &copy, sizeof(copy));
+  }
+  *index = (*n)++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode NewExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoExprDestroy(expr)); /* the same entry in another letter case */
+  PetscCall(HycoExprCreate(s->key[entry], s->value[entry], s->n_parameters, (const char *const *)s->parameter, expr));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadRange(HycoScene s, PetscInt p)
+{
+  char key[HYCO_LINE];
+  PetscReal range[2];
+  PetscInt n = 2;
+  PetscBool set;
+  PetscErrorCode caught;
+  char message[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(key, sizeof(key), "-parameter_%s_range", s->parameter[p]));
+  PetscCall(HycoCatchBegin());
+  caught = PetscOptionsGetRealArray(s->options, NULL, key, range, &n, &set);
+  PetscCall(HycoCatchEnd(caught, message));
+  PetscCheck(!caught && set && n == 2 && range[0] <= range[1] && !PetscIsInfOrNanReal(range[0]) &&
+                 !PetscIsInfOrNanReal(range[1]),
+             PETSC_COMM_SELF, PETSC_ERR_USER,
+             "parameter %s: its range is missing or wrong; write parameter: %s: range: [lowest, highest]",
+             s->parameter[p], s->parameter[p]);
+  s->lo[p] = range[0];
+  s->hi[p] = range[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool IsIdentifier(const char *word)
+{
+  if (!isalpha((unsigned char)word[0])) return PETSC_FALSE;
+  for (; *word; word++) {
+    if (!isalnum((unsigned char)*word) && *word != '_') return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+static PetscErrorCode ReadParameters(HycoScene s)
+{
+  PetscInt n = HYCO_MAX_PARAMETERS;
+  PetscBool set;
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsGetStringArray(s->options, NULL, "-scene_parameters", s->parameter, &n, &set));
+  s->n_parameters = set ? n : 0;
+  for (PetscInt p = 0; p < s->n_parameters; p++) {
+    const char *name = s->parameter[p];
+
+    PetscCheck(IsIdentifier(name) && strcmp(name, "x") && strcmp(name, "y") && strcmp(name, "z") && strcmp(name, "pi"),
+               PETSC_COMM_SELF, PETSC_ERR_USER,
+               "scene_parameters: \"%s\" cannot name a parameter; use letters, digits and _, and none of x, y, z, pi",
+               name);
+    for (PetscInt q = 0; q < p; q++)
+      PetscCheck(strcasecmp(s->parameter[q], name), PETSC_COMM_SELF, PETSC_ERR_USER,
+                 "scene_parameters: %s stands twice", name);
+    PetscCall(ReadRange(s, p));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadContactField(HycoScene s, PetscInt entry, HycoContact *c, PetscInt field)
+{
+  const char *value = s->value[entry];
+
+  PetscFunctionBegin;
+  switch (field) {
+  case 0:
+    if (strcmp(value, "obstacle") == 0)
+      c->type = HYCO_CONTACT_OBSTACLE;
+    else if (strcmp(value, "pair") == 0)
+      c->type = HYCO_CONTACT_PAIR;
+    else
+      HycoFail("%s is \"%s\"; it must be obstacle or pair", s->key[entry], value);
+    break;
+  case 1:
+  case 2:
+    PetscCall(PetscFree(c->slave));
+    PetscCall(PetscStrallocpy(value, &c->slave));
+    break;
+  case 3:
+    PetscCall(PetscStrallocpy(value, &c->master));
+    break;
+  case 4: {
+    char *end;
+
+    c->tolerance = strtod(value, &end);
+    PetscCheck(*end == '\0' && end != value && c->tolerance >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s is \"%s\"; it must be a length, 0 or more", s->key[entry], value);
+    break;
+  }
+  case 5:
+    PetscCall(NewExpr(s, entry, &c->gap));
+    break;
+  default:
+    PetscCall(NewExpr(s, entry, &c->normal[field - 6]));
+    break;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One entry of a section with members. */
+static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
+{
+  const char *key = s->key[entry], *rest = strchr(key, '_') + 1;
+  char name[HYCO_LINE];
+  PetscInt field = 0, k = 0;
+
+  PetscFunctionBegin;
+  if (strncasecmp(key, "body_", 5) == 0) {
+    if (!SplitKey(rest, body_fields, name, &field)) PetscCall(UnknownKey(key, "a body", body_fields));
+    PetscCall(Member(name, sizeof(HycoBody), &s->n_bodies, (void **)&s->body, &k));
+    PetscCall(NewExpr(s, entry,
+                      field == 0   ? &s->body[k].young
+                      : field == 1 ? &s->body[k].poisson
+                                   : &s->body[k].map[field - 2]));
+  } else if (strncasecmp(key, "force_", 6) == 0) {
+    if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, "a body force", component_fields));
+    PetscCall(Member(name, sizeof(HycoBody), &s->n_bodies, (void **)&s->body, &k));
+    PetscCall(NewExpr(s, entry, &s->body[k].force[field]));
+  } else if (strncasecmp(key, "fixed_", 6) == 0) {
+    if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, "a fixed group", component_fields));
+    PetscCall(Member(name, sizeof(HycoFixed), &s->n_fixed, (void **)&s->fixed, &k));
+    PetscCall(NewExpr(s, entry, &s->fixed[k].value[field]));
+  } else if (strncasecmp(key, "pressure_", 9) == 0) {
+    PetscCall(Member(rest, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
+    PetscCall(NewExpr(s, entry, &s->load[k].pressure));
+  } else if (strncasecmp(key, "traction_", 9) == 0) {
+    if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, "a traction", component_fields));
+    PetscCall(Member(name, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
+    PetscCall(NewExpr(s, entry, &s->load[k].traction[field]));
+  } else {
+    if (!SplitKey(rest, contact_fields, name, &field)) PetscCall(UnknownKey(key, "a contact", contact_fields));
+    PetscCall(Member(name, sizeof(HycoContact), &s->n_contacts, (void **)&s->contact, &k));
+    PetscCall(ReadContactField(s, entry, &s->contact[k], field));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* scene_, parameter_ and hyco_ entries are read elsewhere; here their names are checked. */
+static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
+{
+  const char *key = s->key[entry];
+  char name[HYCO_LINE];
+  PetscInt field, n = 0;
+  PetscBool known = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (strncasecmp(key, "scene_", 6) == 0) {
+    for (; scene_fields[n]; n++) known = (PetscBool)(known || strcasecmp(key + 6, scene_fields[n]) == 0);
+    if (!known) PetscCall(UnknownKey(key, "scene", scene_fields));
+  } else if (strncasecmp(key, "parameter_", 10) == 0) {
+    if (!SplitKey(key + 10, parameter_fields, name, &field))
+      PetscCall(UnknownKey(key, "a parameter", parameter_fields));
+    for (PetscInt p = 0; p < s->n_parameters; p++) known = (PetscBool)(known || strcasecmp(s->parameter[p], name) == 0);
+    PetscCheck(known, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "the scene's entry %s is about a parameter that scene: parameters: does not list", key);
+  } else if (!HycoOptionKnown(key)) {
+    const HycoOption *table;
+    const char *names[64];
+
+    PetscCall(HycoGetOptionTable(&n, &table));
+    for (PetscInt k = 0; k < n && k < 64; k++) names[k] = table[k].name;
+    if (HycoNearest(key, n, names))
+      HycoFail("the option %s is unknown; did you mean %s?", key, HycoNearest(key, n, names));
+    HycoFail("the option %s is unknown; hyco -help lists them", key);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A description that cannot be solved is refused here, before any mesh is read. */
+static PetscErrorCode CheckScene(HycoScene s)
+{
+  PetscFunctionBegin;
+  PetscCheck(s->n_bodies, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "the scene has no body; write body: NAME: {young: ..., poisson: ...}");
+  for (PetscInt k = 0; k < s->n_bodies; k++) {
+    PetscCheck(s->body[k].young, PETSC_COMM_SELF, PETSC_ERR_USER, "body %s has no young (Young's modulus)",
+               s->body[k].name);
+  }
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    HycoContact *c = &s->contact[k];
+
+    PetscCheck(c->slave, PETSC_COMM_SELF, PETSC_ERR_USER, "contact %s names no %s", c->name,
+               c->type == HYCO_CONTACT_PAIR ? "slave group" : "group");
+    PetscCheck(c->type == HYCO_CONTACT_OBSTACLE || c->master, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "contact %s is a pair and names no master group", c->name);
+    PetscCheck(c->type == HYCO_CONTACT_PAIR || (c->gap && !c->master), PETSC_COMM_SELF, PETSC_ERR_USER,
+               "contact %s is an obstacle: it needs a gap, and no master", c->name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode GetString(HycoScene s, const char key[], char **value)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(*value));
+  for (PetscInt k = 0; k < s->n_entries; k++) {
+    if (strcasecmp(s->key[k], key) == 0) PetscCall(PetscStrallocpy(s->value[k], value));
+  }
+  if (!*value) PetscCall(PetscStrallocpy("", value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FindMesh(HycoScene s, const char folder[])
+{
+  char *mesh = NULL, path[PETSC_MAX_PATH_LEN];
+  PetscBool set;
+
+  PetscFunctionBegin;
+  PetscCall(GetString(s, "scene_mesh", &mesh));
+  /* On the command line a relative path starts where the user stands, in the file where the scene is. */
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-scene_mesh", &set));
+  if (set || mesh[0] == '/' || !mesh[0])
+    snprintf(path, sizeof(path), "%s", mesh);
+  else
+    snprintf(path, sizeof(path), "%s/%s", folder, mesh);
+  PetscCall(PetscFree(mesh));
+  PetscCall(PetscStrallocpy(path, &s->mesh_path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Everything after the entries are in scene->options. */
+static PetscErrorCode Build(HycoScene s, const char folder[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoEntriesList(s));
+  PetscCall(GetString(s, "scene_title", &s->title));
+  PetscCall(FindMesh(s, folder));
+  PetscCall(ReadParameters(s));
+  for (PetscInt k = 0; k < s->n_entries; k++) {
+    const char *key = s->key[k];
+
+    if (strncasecmp(key, "scene_", 6) == 0 || strncasecmp(key, "parameter_", 10) == 0 ||
+        strncasecmp(key, "hyco_", 5) == 0)
+      PetscCall(CheckPlainEntry(s, k));
+    else
+      PetscCall(ReadMember(s, k));
+  }
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    char dashed[HYCO_LINE];
+    PetscBool set;
+
+    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-contact_%s_tolerance", s->contact[k].name));
+    PetscCall(PetscOptionsHasName(s->options, NULL, dashed, &set));
+    if (!set) s->contact[k].tolerance = -1;
+  }
+  PetscCall(CheckScene(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneLoad(MPI_Comm comm, const char path[], HycoScene *scene)
+{
+  HycoScene s;
+  char folder[PETSC_MAX_PATH_LEN] = "";
+
+  PetscFunctionBegin;
+  PetscCheck(path && scene, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
+             "HycoSceneLoad: the path or the handle's address is NULL");
+  *scene = NULL;
+  PetscCall(PetscNew(&s));
+  PetscCallMPI(MPI_Comm_dup(comm, &s->comm));
+  PetscCall(HycoEntriesRead(comm, path, &s->options, folder));
+  HycoOnEach(comm, Build(s, folder));
+  *scene = s;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[], char *const value[],
+                                    const char folder[], HycoScene *scene)
+{
+  HycoScene s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s));
+  PetscCallMPI(MPI_Comm_dup(comm, &s->comm));
+  PetscCall(PetscOptionsCreate(&s->options));
+  for (PetscInt k = 0; k < n; k++) {
+    char dashed[HYCO_LINE];
+
+    PetscCheck(HycoIsSceneKey(key[k]) && strlen(key[k]) < 256, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "\"%.64s\" is no entry of a scene", key[k]);
+    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", key[k]));
+    PetscCall(PetscOptionsSetValue(s->options, dashed, value[k]));
+  }
+  PetscCall(Build(s, folder));
+  *scene = s;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneToText(HycoScene scene, char **text)
+{
+  size_t length = 1;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < scene->n_entries; k++) length += strlen(scene->key[k]) + strlen(scene->value[k]) + 2;
+  PetscCall(PetscMalloc1(length, text));
+  (*text)[0] = '\0';
+  for (PetscInt k = 0; k < scene->n_entries; k++) {
+    PetscCall(PetscStrlcat(*text, scene->key[k], length));
+    PetscCall(PetscStrlcat(*text, "\t", length));
+    PetscCall(PetscStrlcat(*text, scene->value[k], length));
+    PetscCall(PetscStrlcat(*text, "\n", length));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *scene)
+{
+  char *copy, *line, *rest, **key, **value;
+  PetscInt n = 0, lines = 1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscStrallocpy(text, &copy));
+  for (const char *c = text; *c; c++) lines += *c == '\n';
+  PetscCall(PetscMalloc2(lines, &key, lines, &value));
+  for (line = strtok_r(copy, "\n", &rest); line; line = strtok_r(NULL, "\n", &rest)) {
+    char *tab = strchr(line, '\t');
+
+    PetscCheck(tab, PETSC_COMM_SELF, PETSC_ERR_USER, "the model's scene text is damaged");
+    *tab = '\0';
+    key[n] = line;
+    value[n] = tab + 1;
+    n++;
+  }
+  PetscCall(HycoSceneFromEntries(comm, n, key, value, ".", scene));
+  PetscCall(PetscFree2(key, value));
+  PetscCall(PetscFree(copy));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneDestroy(HycoScene *scene)
+{
+  HycoScene s;
+
+  PetscFunctionBegin;
+  if (!scene || !*scene) PetscFunctionReturn(PETSC_SUCCESS);
+  s = *scene;
+  *scene = NULL;
+  for (PetscInt k = 0; k < s->n_bodies; k++) {
+    PetscCall(HycoExprDestroy(&s->body[k].young));
+    PetscCall(HycoExprDestroy(&s->body[k].poisson));
+    for (PetscInt c = 0; c < 3; c++) {
+      PetscCall(HycoExprDestroy(&s->body[k].map[c]));
+      PetscCall(HycoExprDestroy(&s->body[k].force[c]));
+    }
+    PetscCall(PetscFree(s->body[k].name));
+  }
+  for (PetscInt k = 0; k < s->n_fixed; k++) {
+    for (PetscInt c = 0; c < 3; c++) PetscCall(HycoExprDestroy(&s->fixed[k].value[c]));
+    PetscCall(PetscFree(s->fixed[k].group));
+  }
+  for (PetscInt k = 0; k < s->n_loads; k++) {
+    PetscCall(HycoExprDestroy(&s->load[k].pressure));
+    for (PetscInt c = 0; c < 3; c++) PetscCall(HycoExprDestroy(&s->load[k].traction[c]));
+    PetscCall(PetscFree(s->load[k].group));
+  }
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    PetscCall(HycoExprDestroy(&s->contact[k].gap));
+    for (PetscInt c = 0; c < 3; c++) PetscCall(HycoExprDestroy(&s->contact[k].normal[c]));
+    PetscCall(PetscFree(s->contact[k].slave));
+    PetscCall(PetscFree(s->contact[k].master));
+    PetscCall(PetscFree(s->contact[k].name));
+  }
+  for (PetscInt k = 0; k < s->n_entries; k++) {
+    PetscCall(PetscFree(s->key[k]));
+    PetscCall(PetscFree(s->value[k]));
+  }
+  for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(PetscFree(s->parameter[p]));
+  PetscCall(PetscFree(s->key));
+  PetscCall(PetscFree(s->value));
+  PetscCall(PetscFree(s->body));
+  PetscCall(PetscFree(s->fixed));
+  PetscCall(PetscFree(s->load));
+  PetscCall(PetscFree(s->contact));
+  PetscCall(PetscFree(s->title));
+  PetscCall(PetscFree(s->mesh_path));
+  PetscCall(PetscOptionsDestroy(&s->options));
+  PetscCallMPI(MPI_Comm_free(&s->comm));
+  PetscCall(PetscFree(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
