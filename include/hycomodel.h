@@ -38,6 +38,8 @@ PetscErrorCode HycoModelGetScene(HycoModel model, HycoScene *scene);
 PetscErrorCode HycoModelPredict(HycoModel model, PetscInt n, const PetscReal mu[]);
 /* Whether Predict reconstructs the forces outside the RID (default: yes). */
 PetscErrorCode HycoModelSetReconstruct(HycoModel model, PetscBool reconstruct);
+/* Called after each iteration of the active set. */
+PetscErrorCode HycoModelSetMonitor(HycoModel model, HycoMonitor monitor, void *ctx);
 PetscErrorCode HycoModelGetPrediction(HycoModel model, HycoPrediction *prediction);
 
 /* Displacement of the RID's nodes (n_nodes x dim) and stress of its cells (n_cells x n_sigma, as HycoFOMGetSolution),
@@ -53,6 +55,21 @@ PetscErrorCode HycoModelGetLambda(HycoModel model, PetscInt *n_contacts, const P
 PetscErrorCode HycoModelGetWholeU(HycoModel model, PetscInt *n_nodes, const PetscReal *U[]);
 /* Writes the last prediction on the whole mesh to `path` (.xdmf) and the .h5 beside it. */
 PetscErrorCode HycoModelWrite(HycoModel model, const char path[]);
+/*
+  Errors of the last prediction against the last full-order solution at the same parameters; relative, as fractions.
+  Norms: 2 (Euclidean over the nodal or cell values) or max. 0/0 counts as 0; x/0 is PETSC_INFINITY. u           2-norm,
+  displacement of the whole mesh u_rid       max norm, displacement of the RID's nodes sigma       2-norm, stress of the
+  RID's cells sigma_11    max norm, first stress component of the RID's cells lambda_rid  2-norm, the RID's own contact
+  forces lambda      2-norm, all contact forces, reconstructed outside the RID
+*/
+typedef struct {
+  PetscReal u, u_rid, sigma, sigma_11, lambda_rid, lambda;
+} HycoErrors;
+
+/* Collective on the full-order model's communicator; model on its rank 0 (NULL elsewhere), errors filled there. Both
+   must have been solved at the same parameters, on the same mesh. */
+PetscErrorCode HycoModelCompare(HycoModel model, HycoFOM fom, HycoErrors *errors);
+
 /* Prints what is in the model, in words, on an ASCII viewer. */
 PetscErrorCode HycoModelView(HycoModel model, PetscViewer viewer);
 

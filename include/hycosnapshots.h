@@ -25,6 +25,10 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots);
 */
 PetscErrorCode HycoSnapshotsFill(HycoSnapshots snapshots, HycoSamples samples, HycoProgress progress, void *ctx);
 
+/* How many groups of ranks solve n samples side by side: -hyco_groups, or as many as fit in half the memory when each
+   factors the stiffness of its own mesh. Collective. */
+PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups);
+
 #if defined(__cplusplus)
 }
 #endif

@@ -18,6 +18,8 @@ PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, Pe
 PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscInt *data);
 PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[]);
 
+/* Whether the file has a dataset of that name. */
+PetscBool HycoH5Has(HycoH5 file, const char name[]);
 /* Size of a dataset. */
 PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols);
 /* Reads a dataset whose size must be rows x cols, into the caller's memory. */

@@ -32,7 +32,9 @@ struct _p_HycoSolver {
   HycoMonitor monitor;
   void *monitor_ctx;
   /* factor of K (dual) */
-  KSP ksp;
+  KSP ksp;       /* sparse */
+  PetscReal *lu; /* dense: LAPACK's factors, column major n x n */
+  PetscBLASInt *ipiv, n_lu;
   HycoSeen factored;
   /* dual form, replicated on every rank: column-major m x m flexibility, gap without forces */
   PetscInt m;

@@ -163,6 +163,11 @@ static PetscErrorCode CheckSize(HycoH5 f, const char name[], const hsize_t dims[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscBool HycoH5Has(HycoH5 file, const char name[])
+{
+  return (PetscBool)(H5Lexists(file->id, name, H5P_DEFAULT) > 0);
+}
+
 PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols)
 {
   hid_t set;

@@ -3,6 +3,7 @@
   complementarity problem w = (D - B K^-1 F) + S L in the contact forces alone, small and dense on every rank.
 */
 #include <hycosolverimpl.h>
+#include <petscblaslapack.h>
 
 #define CHUNK 64
 
@@ -146,48 +147,118 @@ static PetscErrorCode Resize(HycoSolver s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Factor of a small dense K by LAPACK; a zero pivot is singular, not an error. */
+static PetscErrorCode FactorDense(HycoSolver s, PetscBool *singular)
+{
+  const PetscScalar *k;
+  PetscInt n, lda;
+  PetscBLASInt info;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(s->system->K, &n, NULL));
+  if (s->n_lu != n) {
+    PetscCall(PetscFree(s->lu));
+    PetscCall(PetscFree(s->ipiv));
+    PetscCall(PetscMalloc1((size_t)n * (size_t)n, &s->lu));
+    PetscCall(PetscMalloc1(n, &s->ipiv));
+    PetscCall(PetscBLASIntCast(n, &s->n_lu));
+  }
+  PetscCall(MatDenseGetLDA(s->system->K, &lda));
+  PetscCall(MatDenseGetArrayRead(s->system->K, &k));
+  for (PetscInt j = 0; j < n; j++)
+    PetscCall(PetscArraycpy(s->lu + (size_t)j * (size_t)n, k + (size_t)j * (size_t)lda, n));
+  PetscCall(MatDenseRestoreArrayRead(s->system->K, &k));
+  LAPACKgetrf_(&s->n_lu, &s->n_lu, s->lu, &s->n_lu, s->ipiv, &info);
+  *singular = (PetscBool)(info != 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FactorSparse(HycoSolver s, PetscBool *singular)
+{
+  Mat K = s->system->K, old = NULL;
+  PC pc;
+  PCFailedReason failed;
+
+  PetscFunctionBegin;
+  if (s->ksp) PetscCall(KSPGetOperators(s->ksp, &old, NULL));
+  if (old != K) {
+    PetscCall(KSPDestroy(&s->ksp));
+    PetscCall(HycoDirectSolver(s->comm, "hyco_dual_", K, s->system->symmetric, &s->ksp));
+  }
+  PetscCall(KSPSetOperators(s->ksp, K, K));
+  PetscCall(KSPSetUp(s->ksp));
+  PetscCall(KSPGetPC(s->ksp, &pc));
+  PetscCall(PCGetFailedReason(pc, &failed));
+  *singular = (PetscBool)(failed != PC_NOERROR);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* S = B K^-1 Bt with everything dense on one process. */
+static PetscErrorCode CondenseDense(HycoSolver s)
+{
+  const PetscScalar *b, *bt;
+  PetscReal *X, one = 1, zero = 0;
+  PetscBLASInt m, n = s->n_lu, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(s->m, &m));
+  PetscCall(PetscMalloc1((size_t)n * (size_t)m, &X));
+  PetscCall(MatDenseGetArrayRead(s->system->Bt, &bt));
+  PetscCall(PetscArraycpy(X, bt, (size_t)n * (size_t)m));
+  PetscCall(MatDenseRestoreArrayRead(s->system->Bt, &bt));
+  LAPACKgetrs_("N", &n, &m, s->lu, &n, s->ipiv, X, &n, &info);
+  PetscCall(MatDenseGetArrayRead(s->system->B, &b));
+  BLASgemm_("N", "N", &m, &m, &n, &one, b, &m, X, &n, &zero, s->S, &m);
+  PetscCall(MatDenseRestoreArrayRead(s->system->B, &b));
+  PetscCall(PetscFree(X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x = K^-1 r */
+static PetscErrorCode SolveK(HycoSolver s, Vec r, Vec x)
+{
+  PetscFunctionBegin;
+  if (s->lu) {
+    PetscScalar *v;
+    PetscBLASInt one = 1, info;
+
+    PetscCall(VecCopy(r, x));
+    PetscCall(VecGetArray(x, &v));
+    LAPACKgetrs_("N", &s->n_lu, &one, s->lu, &s->n_lu, s->ipiv, v, &s->n_lu, &info);
+    PetscCall(VecRestoreArray(x, &v));
+  } else
+    PetscCall(KSPSolve(s->ksp, r, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Factor and flexibility, unless K and B are as they were. */
 static PetscErrorCode SetUpDual(HycoSolver s, PetscBool *singular)
 {
   HycoSystem y = s->system;
-  PetscBool same_K, same_B;
+  PetscBool same_K, same_B, dense, dense_B = PETSC_FALSE;
   PetscReal begin = HycoNow();
-  KSPConvergedReason why;
-  Mat factor;
-  PC pc;
 
   PetscFunctionBegin;
   *singular = PETSC_FALSE;
+  PetscCall(PetscObjectTypeCompare((PetscObject)y->K, MATSEQDENSE, &dense));
+  if (y->B) PetscCall(PetscObjectTypeCompare((PetscObject)y->B, MATSEQDENSE, &dense_B));
   PetscCall(HycoSeenUpdate(&s->factored, y->K, NULL, &same_K));
   PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same_B));
-  if (!same_K) {
-    PetscBool keep = PETSC_FALSE;
-
-    if (s->ksp) {
-      Mat old;
-
-      PetscCall(KSPGetOperators(s->ksp, &old, NULL));
-      keep = (PetscBool)(old == y->K);
-    }
-    if (!keep) {
-      PetscCall(KSPDestroy(&s->ksp));
-      PetscCall(HycoDirectSolver(s->comm, "hyco_dual_", y->K, y->symmetric, &s->ksp));
-    }
-    PetscCall(KSPSetOperators(s->ksp, y->K, y->K));
-    PetscCall(KSPSetUp(s->ksp));
-  }
-  PetscCall(KSPGetPC(s->ksp, &pc));
-  {
-    PCFailedReason failed;
-
-    PetscCall(PCGetFailedReason(pc, &failed));
-    PetscCall(KSPGetConvergedReason(s->ksp, &why));
-    if (failed) *singular = PETSC_TRUE;
-  }
+  if (!same_K && dense) PetscCall(FactorDense(s, singular));
+  if (!same_K && !dense) PetscCall(FactorSparse(s, singular));
   if (!same_B && y->m && !*singular) {
     PetscCall(Resize(s));
-    PetscCall(PCFactorGetMatrix(pc, &factor));
-    PetscCall(Condense(s, factor));
+    if (dense && dense_B)
+      PetscCall(CondenseDense(s));
+    else {
+      PC pc;
+      Mat factor;
+
+      PetscCheck(!dense, PETSC_COMM_SELF, PETSC_ERR_SUP, "a dense K needs a dense B");
+      PetscCall(KSPGetPC(s->ksp, &pc));
+      PetscCall(PCFactorGetMatrix(pc, &factor));
+      PetscCall(Condense(s, factor));
+    }
   }
   if (*singular) s->factored.K = s->condensed.K = NULL;
   s->seconds_factor += HycoNow() - begin;
@@ -309,12 +380,12 @@ static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
   } else
     PetscCall(VecCopy(y->F, r));
   PetscCall(VecNorm(r, NORM_2, &size));
-  PetscCall(KSPSolve(s->ksp, r, x));
+  PetscCall(SolveK(s, r, x));
   PetscCall(MatMult(y->K, x, dx));
   PetscCall(VecAXPY(r, -1, dx));
   PetscCall(VecNorm(r, NORM_2, &residual));
   if (residual > 1e-13 * size && residual < size) {
-    PetscCall(KSPSolve(s->ksp, r, dx));
+    PetscCall(SolveK(s, r, dx));
     PetscCall(VecAXPY(x, 1, dx));
   }
   PetscCall(VecDestroy(&r));
@@ -346,7 +417,7 @@ PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBoo
     PetscCall(Recover(s, x, NULL));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(KSPSolve(s->ksp, y->F, x));
+  PetscCall(SolveK(s, y->F, x));
   PetscCall(VecDuplicate(y->D, &gap));
   PetscCall(MatMult(y->B, x, gap));
   PetscCall(VecAYPX(gap, -1, y->D));

@@ -29,6 +29,8 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscCall(MatDestroy(&s->T));
   PetscCall(MatDestroy(&s->Kg));
   PetscCall(MatDestroy(&s->Kw));
+  PetscCall(PetscFree(s->lu));
+  PetscCall(PetscFree(s->ipiv));
   PetscCall(PetscFree(s->S));
   PetscCall(PetscFree(s->g));
   PetscCall(PetscFree(s->L));

@@ -47,6 +47,10 @@ PetscErrorCode ReportWrite(cJSON **json);
 /* Writes text to a file through a temporary name. */
 PetscErrorCode DriverWriteText(const char path[], const char text[]);
 
+/* Writes a CSV: the parameters of each point, then its columns (n x n_columns row major). Collective. */
+PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, const PetscReal mu[],
+                                PetscInt n_columns, const char *const names[], const PetscReal value[]);
+
 /* -- progress.c -- */
 
 /* Prints on rank 0. */

@@ -72,6 +72,33 @@ PetscErrorCode DriverWriteText(const char path[], const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, const PetscReal mu[],
+                                PetscInt n_columns, const char *const names[], const PetscReal value[])
+{
+  PetscInt n_par;
+  const char *const *par;
+  char *text;
+  size_t at = 0, room;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n_par, &par, NULL, NULL));
+  room = (size_t)(n + 1) * (size_t)(n_par + n_columns) * 64 + 64;
+  PetscCall(PetscMalloc1(room, &text));
+  for (PetscInt p = 0; p < n_par; p++) at += (size_t)snprintf(text + at, room - at, "%s,", par[p]);
+  for (PetscInt c = 0; c < n_columns; c++)
+    at += (size_t)snprintf(text + at, room - at, "%s%s", names[c], c < n_columns - 1 ? "," : "\n");
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt p = 0; p < n_par; p++)
+      at += (size_t)snprintf(text + at, room - at, "%.10g,", (double)mu[k * n_par + p]);
+    for (PetscInt c = 0; c < n_columns; c++)
+      at += (size_t)snprintf(text + at, room - at, "%.8g%s", (double)value[k * n_columns + c],
+                             c < n_columns - 1 ? "," : "\n");
+  }
+  HycoOnRoot(PETSC_COMM_WORLD, DriverWriteText(path, text));
+  PetscCall(PetscFree(text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode ReportWrite(cJSON **json)
 {
   char path[PETSC_MAX_PATH_LEN], *text;

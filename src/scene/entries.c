@@ -19,7 +19,7 @@ PetscBool HycoIsSceneKey(const char name[])
 }
 
 /* The names (without dash) of the options that are set in `options` (NULL: global) and are scene keys. */
-static PetscErrorCode ListKeys(PetscOptions options, PetscInt *n, char ***keys)
+static PetscErrorCode ListKeys(PetscOptions options, PetscBool method_only, PetscInt *n, char ***keys)
 {
   char *all, *word, *rest;
   PetscInt room = 0;
@@ -34,6 +34,9 @@ static PetscErrorCode ListKeys(PetscOptions options, PetscInt *n, char ***keys)
     PetscBool set = PETSC_FALSE, seen = PETSC_FALSE;
 
     if (word[0] != '-' || !HycoIsSceneKey(word + 1)) continue;
+    /* an unknown -hyco_ option on the command line is the caller's: it may be meant for the solvers (-hyco_tao_type) */
+    if (!options && strncasecmp(word + 1, "hyco_", 5) == 0 && !HycoOptionKnown(word + 1)) continue;
+    if (method_only && strncasecmp(word + 1, "hyco_", 5)) continue;
     PetscCall(PetscOptionsHasName(options, NULL, word, &set));
     for (PetscInt k = 0; k < *n; k++) seen = (PetscBool)(seen || strcasecmp((*keys)[k], word + 1) == 0);
     if (set && !seen) PetscCall(PetscStrallocpy(word + 1, &(*keys)[(*n)++]));
@@ -56,23 +59,18 @@ static PetscErrorCode GetLong(PetscOptions options, const char key[], char **val
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies the global database's scene entries over the scene's own. */
-static PetscErrorCode Override(PetscOptions options)
+/* Copies the global database's entries over the scene's own; only those of the method when the scene is a model's. */
+PetscErrorCode HycoEntriesOverride(PetscOptions options, PetscBool method_only)
 {
   PetscInt n;
   char **keys;
 
   PetscFunctionBegin;
-  PetscCall(ListKeys(NULL, &n, &keys));
+  PetscCall(ListKeys(NULL, method_only, &n, &keys));
   for (PetscInt k = 0; k < n; k++) {
     char dashed[HYCO_LINE];
     char *value;
 
-    /* an unknown -hyco_ option is the caller's: it may be meant for PETSc's own solvers (-hyco_tao_type) */
-    if (strncasecmp(keys[k], "hyco_", 5) == 0 && !HycoOptionKnown(keys[k])) {
-      PetscCall(PetscFree(keys[k]));
-      continue;
-    }
     PetscCall(GetLong(NULL, keys[k], &value));
     PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", keys[k]));
     PetscCall(PetscOptionsSetValue(options, dashed, value));
@@ -94,7 +92,7 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
   char **keys;
 
   PetscFunctionBegin;
-  PetscCall(ListKeys(scene->options, &n, &keys));
+  PetscCall(ListKeys(scene->options, PETSC_FALSE, &n, &keys));
   qsort(keys, (size_t)n, sizeof(*keys), CompareEntries);
   PetscCall(PetscMalloc1(n, &scene->value));
   for (PetscInt k = 0; k < n; k++) PetscCall(GetLong(scene->options, keys[k], &scene->value[k]));
@@ -149,6 +147,6 @@ PetscErrorCode HycoEntriesRead(MPI_Comm comm, const char path[], PetscOptions *o
   HycoOnEach(comm, FindFile(path, file, folder));
   PetscCall(PetscOptionsCreate(options));
   HycoOnEach(comm, ReadYAML(*options, file));
-  PetscCall(Override(*options));
+  PetscCall(HycoEntriesOverride(*options, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -365,6 +365,7 @@ PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[]
     PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", key[k]));
     PetscCall(PetscOptionsSetValue(s->options, dashed, value[k]));
   }
+  PetscCall(HycoEntriesOverride(s->options, PETSC_TRUE));
   PetscCall(Build(s, folder));
   *scene = s;
   PetscFunctionReturn(PETSC_SUCCESS);

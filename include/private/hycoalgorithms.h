@@ -1,0 +1,45 @@
+/* Algorithms on arrays and matrices alone: no scene, no mesh, no printing. */
+#ifndef HYCOALGORITHMS_H
+#define HYCOALGORITHMS_H
+
+#include <hycoimpl.h>
+
+/*
+  POD (17)-(18) in the 2-norm of a dense matrix S (N x n_s, any row distribution). V (N x l, the caller owns it) holds
+  the first l left singular vectors with the smallest l whose energy is at least 1 - tol; singular values below noise *
+  sigma_1 are never taken, nor more than max_modes (0: no limit). sigma (room for n_s) receives min(N, n_s) singular
+  values. The sign of a mode: its entry of largest magnitude is positive. A zero matrix gives l = 0 and V = NULL.
+  Collective.
+*/
+PetscErrorCode HycoPOD(Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
+                       PetscReal sigma[]);
+
+/*
+  POD from a Gram matrix G = S^T M S (n_s x n_s, column major, on every rank): coefficients W (n_s x l, column major,
+  the caller frees) such that S W is orthonormal in M. Singular values below 1e-7 of the first are out of its reach. Not
+  collective.
+*/
+PetscErrorCode HycoPODGram(PetscInt n_s, const PetscReal G[], PetscReal tol, PetscReal noise, PetscReal **W,
+                           PetscInt *l, PetscReal sigma[]);
+
+/*
+  DEIM (Chaturantabut, Sorensen, SIAM J. Sci. Comput. 32 (2010) 2737-2764): l interpolation rows of the basis V
+  (N x l). Of rows equally large (to 1e-10) the lowest is taken. Collective; index on every rank.
+*/
+PetscErrorCode HycoDEIM(Mat V, PetscInt index[]);
+
+/* Rows of a dense distributed matrix (n x cols row major), on every rank. Collective. */
+PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscReal values[]);
+
+/* min |A x - b|_2, x >= 0: Lawson, Hanson, Solving Least Squares Problems (1974), chapter 23. A: m x n column major.
+ * Not collective. */
+PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscReal x[],
+                        PetscReal *residual);
+
+/* The first k columns chosen by QR with column pivoting of A (m x n column major, overwritten). Not collective. */
+PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt k, PetscInt pivot[]);
+/* Smallest and largest singular value of A (m x n column major, kept). Not collective. */
+PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal *smallest,
+                                         PetscReal *largest);
+
+#endif

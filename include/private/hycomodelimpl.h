@@ -1,0 +1,84 @@
+/* HycoModel, inside. All on one process. */
+#ifndef HYCOMODELIMPL_H
+#define HYCOMODELIMPL_H
+
+#include <hycodomain.h>
+#include <hycofe.h>
+#include <hycomodel.h>
+#include <hycosolverimpl.h>
+
+/* Which displacements are full order; the order of -hyco_hybrid's words. */
+typedef enum {
+  HYCO_HYBRID_AUTO,
+  HYCO_HYBRID_RANK,    /* as many as give full row rank (39)-(40) */
+  HYCO_HYBRID_CONTACT, /* every one on Gamma_A^C */
+  HYCO_HYBRID_ALL      /* all of A; the interface follows from them through V: gamma = G U[A] */
+} HycoHybrid;
+
+struct _p_HycoModel {
+  char path[PETSC_MAX_PATH_LEN]; /* "" while training */
+  /* the reduced problem's description, as in the file */
+  HycoScene scene;
+  HycoMesh mesh;    /* cells of Omega_A; its nodes and those of every contact */
+  HycoPairs pairs;  /* all N_lambda contacts, node indices of mesh */
+  PetscInt *role;   /* by node of mesh */
+  PetscInt *in_rid; /* by contact: in A_lambda */
+  PetscInt l;       /* POD modes */
+  PetscReal *V;     /* (mesh n_nodes * dim) x l, row major: the modes on the nodes of mesh */
+  PetscReal *sigma; /* l singular values */
+  HycoHybrid hybrid;
+  PetscReal ridge;        /* of G, relative to sigma_1^2 (hybrid all) */
+  PetscInt n_fe, *fe_dof; /* full-order unknowns, dofs of mesh, ascending */
+  PetscReal *G;           /* l x n_fe row major (hybrid all), else NULL */
+  PetscInt n_dual;        /* dual snapshots that are not zero */
+  PetscReal *S_lambda;    /* N_lambda x n_dual column major */
+  PetscInt n_points;
+  PetscReal *points; /* training points, n_points x n_parameters */
+  char *provenance;
+  PetscInt whole_nodes, whole_cells;
+  PetscInt counts[3];   /* modes of the dual, stress and force bases that seeded the RID */
+  PetscReal numbers[3]; /* condition of the reduced stiffness, training errors of u and lambda */
+  /* the whole mesh, on demand */
+  HycoMesh whole;
+  HycoFE fe_whole;
+  HycoPairs whole_pairs;
+  PetscReal *V_whole, *U_whole;
+  /* online */
+  PetscBool ready, reconstruct, solved, whole_current;
+  HycoFE fe;
+  PetscInt n_free, n, m; /* modes that are unknowns, all unknowns, contacts of A_lambda */
+  PetscInt *contact;     /* m: index in pairs */
+  PetscInt *fe_at;       /* by dof of mesh: place in fe_dof, or -1 */
+  PetscReal *Vp;         /* V, zero on full-order and fixed unknowns */
+  Mat K, Kr, Br, Btr;
+  Vec F, Fr, Dr, x, L;
+  PetscInt *row_start, *row_dof; /* rows of B over dofs of mesh, all contacts */
+  PetscReal *row_value, *gap;
+  HycoSystem system;
+  HycoSolver solver;
+  PetscReal *gamma, *U, *Lambda, *stress;
+  PetscInt *slave_id; /* mesh-file tag of each contact's slave */
+  HycoPrediction prediction;
+};
+
+PetscErrorCode HycoModelCreate(HycoModel *model);
+/* Builds what the online phase needs from the description; again after the full-order set changed. */
+PetscErrorCode HycoModelSetUp(HycoModel model);
+PetscErrorCode HycoModelReset(HycoModel model);
+/* hybrid all: G = diag(s) (X^T X + r s_1^2 I)^-1 X^T, X = V[A] diag(s). */
+PetscErrorCode HycoModelSetRidge(HycoModel model, PetscReal ridge);
+/* Sets the full-order unknowns (dofs of mesh, any order). */
+PetscErrorCode HycoModelSetFE(HycoModel model, HycoHybrid hybrid, PetscInt n, const PetscInt dof[]);
+
+/* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
+PetscErrorCode HycoModelReconstruct(HycoModel model);
+
+/* Condition number of the reduced stiffness of the last prediction (dense SVD). */
+PetscErrorCode HycoModelCondition(HycoModel model, PetscReal *condition);
+
+/* Writes the model; whole: the mesh and the modes on it (n_nodes * dim x l row major). */
+PetscErrorCode HycoModelSave(HycoModel model, HycoMesh whole, const PetscReal V_whole[], const char path[]);
+/* Reads the whole-mesh part. */
+PetscErrorCode HycoModelLoadWhole(HycoModel model);
+
+#endif

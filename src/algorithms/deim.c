@@ -1,0 +1,81 @@
+/* The discrete empirical interpolation method (section 4.2). */
+#include <hycoalgorithms.h>
+#include <petscblaslapack.h>
+
+PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscReal values[])
+{
+  PetscInt lo, hi, cols, lda;
+  const PetscScalar *v;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(V, &lo, &hi));
+  PetscCall(MatGetSize(V, NULL, &cols));
+  PetscCall(MatDenseGetLDA(V, &lda));
+  PetscCall(MatDenseGetArrayRead(V, &v));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscBool mine = (PetscBool)(rows[k] >= lo && rows[k] < hi);
+
+    for (PetscInt j = 0; j < cols; j++)
+      values[k * cols + j] = mine ? v[(size_t)j * (size_t)lda + (size_t)(rows[k] - lo)] : 0;
+  }
+  PetscCall(MatDenseRestoreArrayRead(V, &v));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, values, (PetscMPIInt)(n * cols), MPIU_REAL, MPI_SUM,
+                             PetscObjectComm((PetscObject)V)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* c: V[index[0..k), 0..k) c = V[index[0..k), k]. */
+static PetscErrorCode Interpolate(PetscInt k, PetscInt l, const PetscReal rows[], PetscReal c[])
+{
+  PetscReal *A;
+  PetscBLASInt kb, one = 1, info, *ipiv;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(k * k, &A, k, &ipiv));
+  for (PetscInt i = 0; i < k; i++) {
+    for (PetscInt j = 0; j < k; j++) A[j * k + i] = rows[i * l + j];
+    c[i] = rows[i * l + k];
+  }
+  PetscCall(PetscBLASIntCast(k, &kb));
+  LAPACKgesv_(&kb, &one, A, &kb, ipiv, c, &kb, &info);
+  PetscCall(PetscFree2(A, ipiv));
+  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "DEIM: the interpolation matrix of mode %d is singular",
+             (int)k);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDEIM(Mat V, PetscInt index[])
+{
+  PetscInt l, lo, hi, lda;
+  const PetscScalar *v;
+  PetscReal *rows, *c, *r;
+  MPI_Comm comm = PetscObjectComm((PetscObject)V);
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(V, NULL, &l));
+  PetscCall(MatGetOwnershipRange(V, &lo, &hi));
+  PetscCall(MatDenseGetLDA(V, &lda));
+  PetscCall(PetscMalloc3(l * l, &rows, l, &c, hi - lo, &r));
+  for (PetscInt k = 0; k < l; k++) {
+    PetscReal largest = 0, all;
+    PetscInt at = PETSC_MAX_INT;
+
+    if (k) PetscCall(Interpolate(k, l, rows, c));
+    PetscCall(MatDenseGetArrayRead(V, &v));
+    for (PetscInt i = 0; i < hi - lo; i++) {
+      r[i] = v[(size_t)k * (size_t)lda + (size_t)i];
+      for (PetscInt j = 0; j < k; j++) r[i] -= v[(size_t)j * (size_t)lda + (size_t)i] * c[j];
+      r[i] = PetscAbsReal(r[i]);
+      largest = PetscMax(largest, r[i]);
+    }
+    PetscCall(MatDenseRestoreArrayRead(V, &v));
+    PetscCallMPI(MPI_Allreduce(&largest, &all, 1, MPIU_REAL, MPI_MAX, comm));
+    for (PetscInt i = hi - lo - 1; i >= 0; i--) {
+      if (r[i] >= all * (1 - 1e-10)) at = lo + i;
+    }
+    PetscCallMPI(MPI_Allreduce(&at, &index[k], 1, MPIU_INT, MPI_MIN, comm));
+    PetscCall(HycoGatherRows(V, 1, &index[k], rows + k * l));
+  }
+  PetscCall(PetscFree3(rows, c, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

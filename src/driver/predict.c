@@ -1,0 +1,162 @@
+/* hyco predict: the reduced model at one point, or over a set. */
+#include "driver.h"
+#include <stdio.h>
+#include <string.h>
+
+static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p)
+{
+  cJSON *json;
+
+  PetscFunctionBegin;
+  PetscCall(ReportCreate("predict", scene, mu, &json));
+  cJSON_AddNumberToObject(json, "n_dof", p->n_dof);
+  cJSON_AddNumberToObject(json, "n_contacts", p->n_contacts);
+  cJSON_AddNumberToObject(json, "n_active", p->n_active);
+  cJSON_AddNumberToObject(json, "active_set_iterations", p->iterations);
+  cJSON_AddStringToObject(json, "solver", HycoReasonName(p->reason));
+  cJSON_AddBoolToObject(json, "converged", p->reason > 0);
+  cJSON_AddNumberToObject(json, "n_modes", p->n_modes);
+  cJSON_AddNumberToObject(json, "n_fe_dofs", p->n_fe_dofs);
+  cJSON_AddNumberToObject(json, "rid_nodes", p->rid_nodes);
+  cJSON_AddNumberToObject(json, "rid_elements", p->rid_elements);
+  cJSON_AddNumberToObject(json, "rid_fraction", p->rid_fraction);
+  cJSON_AddNumberToObject(json, "covered_force", p->covered_force);
+  cJSON_AddNumberToObject(json, "total_contact_force", p->total_contact_force);
+  cJSON_AddNumberToObject(json, "lambda_max", p->lambda_max);
+  cJSON_AddNumberToObject(json, "lambda_norm2", p->lambda_norm2);
+  cJSON_AddNumberToObject(json, "u_norm2", p->u_norm2);
+  ReportVector(json, "u_min", p->dim, p->u_min);
+  ReportVector(json, "u_max", p->dim, p->u_max);
+  cJSON_AddNumberToObject(json, "strain_energy", p->strain_energy);
+  ReportKKT(json, &p->kkt);
+  ReportSeconds(json, &p->seconds);
+  PetscCall(ReportWrite(&json));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One point: rank 0 predicts, the others wait. */
+static PetscErrorCode One(HycoModel model, HycoScene scene, const char output[])
+{
+  HycoPrediction p = {0};
+  PetscInt n;
+  PetscReal mu[64];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  PetscCall(DriverGetPoint(scene, mu));
+  HycoOnRoot(PETSC_COMM_WORLD, HycoModelPredict(model, n, mu));
+  HycoOnRoot(PETSC_COMM_WORLD, HycoModelGetPrediction(model, &p));
+  PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
+  PetscCall(DriverCheckLeft());
+  PetscCheck(p.reason > 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", HycoReasonName(p.reason),
+             (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
+             (double)p.kkt.complementarity);
+  if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoModelWrite(model, output));
+  PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
+                (int)p.n_modes, (int)p.n_fe_dofs, (int)p.n_contacts, (int)p.rid_elements,
+                100 * (double)p.rid_fraction));
+  PetscCall(Say("total contact force %.10g (%.1f %% of it in the RID), %d active; %s after %d iterations\n",
+                (double)p.total_contact_force, 100 * (double)p.covered_force, (int)p.n_active, HycoReasonName(p.reason),
+                (int)p.iterations));
+  PetscCall(Say("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
+                (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
+                (double)p.kkt.complementarity));
+  PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
+  PetscCall(Report(scene, mu, &p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What a set's table holds of each point. */
+enum { FORCE, LAMBDA_MAX, COVERED, ACTIVE, U_NORM, KKT, CONVERGED, ITERATIONS, SECONDS, N_COLUMNS };
+static const char *const columns[N_COLUMNS] = {
+    "total_contact_force",   "lambda_max", "covered_force", "n_active", "u_norm2", "kkt_max", "converged",
+    "active_set_iterations", "seconds"};
+
+static PetscErrorCode PredictMine(HycoModel model, PetscInt n, PetscInt n_par, const PetscReal mu[], PetscReal value[])
+{
+  PetscMPIInt rank, size;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  for (PetscInt k = (PetscInt)rank * n / size; k < ((PetscInt)rank + 1) * n / size; k++) {
+    HycoPrediction p;
+    PetscReal *v = value + k * N_COLUMNS;
+
+    PetscCall(HycoModelPredict(model, n_par, mu + k * n_par));
+    PetscCall(HycoModelGetPrediction(model, &p));
+    v[FORCE] = p.total_contact_force;
+    v[LAMBDA_MAX] = p.lambda_max;
+    v[COVERED] = p.covered_force;
+    v[ACTIVE] = p.n_active;
+    v[U_NORM] = p.u_norm2;
+    v[KKT] = HycoKKTMax(&p.kkt);
+    v[CONVERGED] = p.reason > 0;
+    v[ITERATIONS] = p.iterations;
+    v[SECONDS] = p.seconds.total;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Many(HycoModel model, HycoScene scene, HycoSamples samples)
+{
+  PetscInt n, n_par, failed = 0;
+  const PetscReal *mu;
+  PetscReal *value, begin;
+  cJSON *json;
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCall(DriverGet("table", PETSC_FALSE, path));
+  PetscCall(DriverCheckLeft());
+  PetscCall(PetscCalloc1(n * N_COLUMNS, &value));
+  begin = HycoNow();
+  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, n, n_par, mu, value));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)(n * N_COLUMNS), MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  begin = HycoNow() - begin;
+  for (PetscInt k = 0; k < n; k++) failed += value[k * N_COLUMNS + CONVERGED] < 0.5;
+  if (path[0]) PetscCall(DriverWriteTable(path, scene, n, mu, N_COLUMNS, columns, value));
+  PetscCall(Say("%d points in %.3f s, %d not converged\n", (int)n, (double)begin, (int)failed));
+  PetscCall(ReportCreate("predict", scene, NULL, &json));
+  cJSON_AddNumberToObject(json, "n_points", n);
+  cJSON_AddNumberToObject(json, "not_converged", failed);
+  cJSON_AddNumberToObject(json, "seconds_total", begin);
+  PetscCall(ReportWrite(&json));
+  PetscCall(PetscFree(value));
+  PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%d of the %d predictions did not converge; the column converged of the table says which", (int)failed,
+             (int)n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CommandPredict(void)
+{
+  HycoModel model = NULL;
+  HycoScene scene;
+  HycoSamples samples = NULL;
+  PetscBool set, monitor;
+  char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(DriverGet("model", PETSC_TRUE, path));
+  PetscCall(DriverGet("output", PETSC_FALSE, output));
+  PetscCall(DriverGet("report", PETSC_FALSE, report));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_monitor", &monitor));
+  HycoOnEach(PETSC_COMM_WORLD, HycoModelLoad(path, &model));
+  PetscCall(HycoModelGetScene(model, &scene));
+  if (monitor) PetscCall(HycoModelSetMonitor(model, DriverMonitor, NULL));
+  PetscCall(DriverHasSamples(scene, &set));
+  if (set) {
+    PetscCheck(!output[0], PETSC_COMM_SELF, PETSC_ERR_USER,
+               "-output is for one point (-mu); a set of points gives a -table");
+    PetscCall(DriverGetSamples(scene, &samples, &set));
+    PetscCall(Many(model, scene, samples));
+  } else {
+    PetscCall(One(model, scene, output));
+  }
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoModelDestroy(&model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

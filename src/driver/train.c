@@ -1,0 +1,69 @@
+/* hyco train: snapshots, reduction, model. */
+#include "driver.h"
+
+static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
+{
+  cJSON *json, *seconds;
+
+  PetscFunctionBegin;
+  PetscCall(ReportCreate("train", scene, NULL, &json));
+  cJSON_AddNumberToObject(json, "n_samples", t->n_samples);
+  cJSON_AddNumberToObject(json, "n_modes", t->n_modes);
+  cJSON_AddNumberToObject(json, "n_dual_modes", t->n_dual_modes);
+  cJSON_AddNumberToObject(json, "n_stress_modes", t->n_stress_modes);
+  cJSON_AddNumberToObject(json, "n_force_modes", t->n_force_modes);
+  cJSON_AddNumberToObject(json, "n_fe_dofs", t->n_fe_dofs);
+  cJSON_AddNumberToObject(json, "rid_nodes", t->rid_nodes);
+  cJSON_AddNumberToObject(json, "rid_a_nodes", t->rid_a_nodes);
+  cJSON_AddNumberToObject(json, "rid_elements", t->rid_elements);
+  cJSON_AddNumberToObject(json, "rid_contacts", t->rid_contacts);
+  cJSON_AddNumberToObject(json, "rid_fraction", t->rid_fraction);
+  cJSON_AddNumberToObject(json, "condition", t->condition);
+  cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
+  cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
+  seconds = cJSON_AddObjectToObject(json, "seconds");
+  cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots);
+  cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
+  cJSON_AddNumberToObject(seconds, "total", t->seconds_snapshots + t->seconds_reduction);
+  PetscCall(ReportWrite(&json));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CommandTrain(void)
+{
+  HycoScene scene;
+  HycoSamples samples;
+  HycoTrainer trainer;
+  HycoTraining t;
+  PetscBool given;
+  char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
+
+  PetscFunctionBegin;
+  PetscCall(DriverGet("scene", PETSC_TRUE, path));
+  PetscCall(DriverGet("model", PETSC_TRUE, model));
+  PetscCall(DriverGet("report", PETSC_FALSE, report));
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
+  PetscCall(DriverGetSamples(scene, &samples, &given));
+  PetscCheck(
+      given, PETSC_COMM_SELF, PETSC_ERR_USER,
+      "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
+  PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
+  PetscCall(HycoTrainerSetFromOptions(trainer));
+  PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
+  PetscCall(DriverCheckLeft());
+  PetscCall(HycoTrainerRun(trainer, samples, model, &t));
+  PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t.n_samples,
+                (int)t.n_modes, (int)t.n_stress_modes, (int)t.n_force_modes, (int)t.n_dual_modes));
+  PetscCall(Say("RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
+                (int)t.rid_elements, 100 * (double)t.rid_fraction, (int)t.rid_nodes, (int)t.rid_a_nodes,
+                (int)t.rid_contacts, (int)t.n_fe_dofs));
+  PetscCall(Say("mean training errors: u %.2e, RID forces %.2e; condition of the reduced stiffness %.1e\n",
+                (double)t.error_u, (double)t.error_lambda, (double)t.condition));
+  PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
+                (double)t.seconds_reduction, model));
+  PetscCall(Report(scene, &t));
+  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,29 @@
+/* hyco view: what is in a model or a scene. */
+#include "driver.h"
+#include <petscviewer.h>
+
+PetscErrorCode CommandView(void)
+{
+  char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
+  HycoModel model = NULL;
+  HycoScene scene;
+  PetscMPIInt rank;
+
+  PetscFunctionBegin;
+  PetscCall(DriverGet("scene", PETSC_FALSE, path));
+  PetscCall(DriverGet("model", PETSC_FALSE, file));
+  PetscCheck(!path[0] != !file[0], PETSC_COMM_SELF, PETSC_ERR_USER, "give -model FILE.h5 or -scene FOLDER");
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (file[0]) {
+    HycoOnRoot(PETSC_COMM_WORLD, HycoModelLoad(file, &model));
+    PetscCall(DriverCheckLeft());
+    if (rank == 0) PetscCall(HycoModelView(model, PETSC_VIEWER_STDOUT_SELF));
+    PetscCall(HycoModelDestroy(&model));
+  } else {
+    PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
+    PetscCall(DriverCheckLeft());
+    if (rank == 0) PetscCall(HycoSceneView(scene, PETSC_VIEWER_STDOUT_SELF));
+    PetscCall(HycoSceneDestroy(&scene));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,70 @@
+/* Errors of a prediction against the full-order solution. */
+#include <hycofomimpl.h>
+#include <hycomodelimpl.h>
+
+/* Sums and maxima of one quantity, and the quotient they end in. */
+typedef struct {
+  PetscReal lost2, size2, lost, size;
+} Norms;
+
+static void Add(Norms *n, PetscReal value, PetscReal reference)
+{
+  n->lost2 += (value - reference) * (value - reference);
+  n->size2 += reference * reference;
+  n->lost = PetscMax(n->lost, PetscAbsReal(value - reference));
+  n->size = PetscMax(n->size, PetscAbsReal(reference));
+}
+
+static PetscReal Quotient(PetscReal lost, PetscReal size)
+{
+  return size > 0 ? lost / size : lost > 0 ? PETSC_INFINITY : 0;
+}
+
+static PetscErrorCode Compare(HycoModel m, HycoFOM f, const PetscReal sigma[], HycoErrors *e)
+{
+  const PetscReal *U, *stress;
+  const PetscInt dim = f->fe->dim, ns = f->fe->n_sigma;
+  Norms u = {0}, rid = {0}, s = {0}, s11 = {0}, lr = {0}, l = {0};
+
+  PetscFunctionBegin;
+  PetscCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
+             PETSC_COMM_SELF, PETSC_ERR_USER,
+             "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
+             "training mesh",
+             (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
+  PetscCall(HycoModelGetWholeU(m, NULL, &U));
+  for (PetscInt k = 0; k < f->n_nodes * dim; k++) Add(&u, U[k], f->u[k]);
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
+    for (PetscInt c = 0; m->role[i] != HYCO_ROLE_OUTSIDE && c < dim; c++)
+      Add(&rid, m->U[i * dim + c], f->u[m->mesh->node_whole[i] * dim + c]);
+  }
+  PetscCall(HycoModelGetRID(m, NULL, NULL, NULL, NULL, NULL, &stress));
+  for (PetscInt k = 0; k < m->mesh->n_cells * ns; k++) {
+    const PetscReal reference = sigma[m->mesh->cell_whole[k / ns] * ns + k % ns];
+
+    Add(&s, stress[k], reference);
+    if (k % ns == 0) Add(&s11, stress[k], reference);
+  }
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    Add(&l, m->Lambda[k], f->lambda[k]);
+    if (m->in_rid[k]) Add(&lr, m->Lambda[k], f->lambda[k]);
+  }
+  e->u = Quotient(PetscSqrtReal(u.lost2), PetscSqrtReal(u.size2));
+  e->u_rid = Quotient(rid.lost, rid.size);
+  e->sigma = Quotient(PetscSqrtReal(s.lost2), PetscSqrtReal(s.size2));
+  e->sigma_11 = Quotient(s11.lost, s11.size);
+  e->lambda_rid = Quotient(PetscSqrtReal(lr.lost2), PetscSqrtReal(lr.size2));
+  e->lambda = Quotient(PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelCompare(HycoModel m, HycoFOM f, HycoErrors *e)
+{
+  const PetscReal *sigma;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(f, "HycoFOMCreate()");
+  PetscCall(HycoFOMGetSolution(f, NULL, NULL, NULL, NULL, NULL, &sigma));
+  HycoOnRoot(f->comm, Compare(m, f, sigma, e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,355 @@
+/*
+  The model file. Groups: /mesh and /problem (what the online phase opens), /reconstruction, /training, /whole (read
+  only when a field on the whole mesh is asked for). Every index is checked on load.
+*/
+#include <hycoh5.h>
+#include <hycomodelimpl.h>
+#include <string.h>
+
+/* The file's own version: raised when a reader of the old must not read the new. */
+#define HYCO_MODEL_FORMAT 1
+#define HYCO_MODEL_KIND   "hyco hybrid model"
+
+static PetscErrorCode Name(const char prefix[], const char name[], char out[128])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(out, 128, "%s/%s", prefix, name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SaveGroups(HycoH5 h, const char prefix[], HycoMesh m)
+{
+  char *names, at[128];
+  size_t length = 1;
+
+  PetscFunctionBegin;
+  for (PetscInt g = 0; g < m->n_groups; g++) length += strlen(m->group_name[g]) + 1;
+  PetscCall(PetscCalloc1(length, &names));
+  for (PetscInt g = 0; g < m->n_groups; g++) {
+    PetscCall(PetscStrlcat(names, m->group_name[g], length));
+    PetscCall(PetscStrlcat(names, "\n", length));
+  }
+  PetscCall(Name(prefix, "group_name", at));
+  PetscCall(HycoH5WriteText(h, at, names));
+  PetscCall(PetscFree(names));
+  PetscCall(Name(prefix, "group_dim", at));
+  PetscCall(HycoH5WriteInt(h, at, m->n_groups, 1, m->group_dim));
+  PetscCall(Name(prefix, "group_start", at));
+  PetscCall(HycoH5WriteInt(h, at, m->n_groups + 1, 1, m->group_start));
+  PetscCall(Name(prefix, "group_node", at));
+  PetscCall(HycoH5WriteInt(h, at, m->group_start[m->n_groups], 1, m->group_node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SaveMesh(HycoH5 h, const char prefix[], HycoMesh m)
+{
+  const PetscInt head[2] = {(PetscInt)m->type, m->dim};
+  char at[128];
+
+  PetscFunctionBegin;
+  PetscCall(Name(prefix, "head", at));
+  PetscCall(HycoH5WriteInt(h, at, 2, 1, head));
+  PetscCall(Name(prefix, "xyz", at));
+  PetscCall(HycoH5WriteReal(h, at, m->n_nodes, 3, m->xyz));
+  PetscCall(Name(prefix, "node_id", at));
+  PetscCall(HycoH5WriteInt(h, at, m->n_nodes, 1, m->node_id));
+  PetscCall(Name(prefix, "node_body", at));
+  PetscCall(HycoH5WriteInt(h, at, m->n_nodes, 1, m->node_body));
+  PetscCall(Name(prefix, "cells", at));
+  PetscCall(HycoH5WriteInt(h, at, m->n_cells, m->nv, m->cells));
+  PetscCall(Name(prefix, "cell_id", at));
+  PetscCall(HycoH5WriteInt(h, at, m->n_cells, 1, m->cell_id));
+  PetscCall(Name(prefix, "cell_body", at));
+  PetscCall(HycoH5WriteInt(h, at, m->n_cells, 1, m->cell_body));
+  PetscCall(Name(prefix, "facets", at));
+  PetscCall(HycoH5WriteInt(h, at, m->n_facets, m->nf, m->facets));
+  PetscCall(Name(prefix, "facet_group", at));
+  PetscCall(HycoH5WriteInt(h, at, m->n_facets, 1, m->facet_group));
+  PetscCall(Name(prefix, "facet_cell", at));
+  PetscCall(HycoH5WriteInt(h, at, m->n_facets, 1, m->facet_cell));
+  PetscCall(SaveGroups(h, prefix, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadGroups(HycoH5 h, const char prefix[], HycoMesh m)
+{
+  char *names, *word, *rest, at[128];
+  PetscInt n = -1, one = 1, g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(Name(prefix, "group_dim", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, 3, &n, &one, &m->group_dim));
+  PetscCall(PetscCalloc1(n + 1, &m->group_name));
+  PetscCall(Name(prefix, "group_name", at));
+  PetscCall(HycoH5LoadText(h, at, &names));
+  for (word = strtok_r(names, "\n", &rest); word && g < n; word = strtok_r(NULL, "\n", &rest))
+    PetscCall(PetscStrallocpy(word, &m->group_name[g++]));
+  PetscCall(PetscFree(names));
+  PetscCheck(g == n, PETSC_COMM_SELF, PETSC_ERR_USER, "the model's group names are damaged");
+  m->n_groups = n;
+  n++;
+  PetscCall(Name(prefix, "group_start", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &n, &one, &m->group_start));
+  for (g = 0; g < m->n_groups; g++)
+    PetscCheck(m->group_start[0] == 0 && m->group_start[g] <= m->group_start[g + 1], PETSC_COMM_SELF, PETSC_ERR_USER,
+               "the model's groups are damaged");
+  n = m->group_start[m->n_groups];
+  PetscCall(Name(prefix, "group_node", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, m->n_nodes - 1, &n, &one, &m->group_node));
+  PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_cell_start));
+  PetscCall(PetscMalloc1(1, &m->group_cell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadMesh(HycoH5 h, const char prefix[], PetscInt n_bodies, HycoMesh *mesh)
+{
+  static const PetscInt nv[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 8}, nf[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 4},
+                        dim[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 3};
+  HycoMesh m;
+  PetscInt *head, two = 2, one = 1, three = 3;
+  char at[128];
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&m));
+  *mesh = m;
+  PetscCall(Name(prefix, "head", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, HYCO_N_CELL_TYPES - 1, &two, &one, &head));
+  m->type = (HycoCellType)head[0];
+  m->dim = dim[head[0]];
+  m->nv = nv[head[0]];
+  m->nf = nf[head[0]];
+  PetscCall(PetscFree(head));
+  m->n_nodes = m->n_cells = m->n_facets = -1;
+  PetscCall(Name(prefix, "xyz", at));
+  PetscCall(HycoH5LoadReal(h, at, &m->n_nodes, &three, &m->xyz));
+  PetscCall(Name(prefix, "node_id", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &m->n_nodes, &one, &m->node_id));
+  PetscCall(Name(prefix, "node_body", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, n_bodies - 1, &m->n_nodes, &one, &m->node_body));
+  PetscCall(Name(prefix, "cells", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, m->n_nodes - 1, &m->n_cells, &m->nv, &m->cells));
+  PetscCall(Name(prefix, "cell_id", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &m->n_cells, &one, &m->cell_id));
+  PetscCall(Name(prefix, "cell_body", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, n_bodies - 1, &m->n_cells, &one, &m->cell_body));
+  PetscCall(Name(prefix, "facets", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, m->n_nodes - 1, &m->n_facets, &m->nf, &m->facets));
+  PetscCall(LoadGroups(h, prefix, m));
+  PetscCall(Name(prefix, "facet_group", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, m->n_groups - 1, &m->n_facets, &one, &m->facet_group));
+  PetscCall(Name(prefix, "facet_cell", at));
+  PetscCall(HycoH5LoadInt(h, at, -1, m->n_cells - 1, &m->n_facets, &one, &m->facet_cell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SavePairs(HycoH5 h, const char prefix[], const HycoPairs *p)
+{
+  char at[128];
+
+  PetscFunctionBegin;
+  PetscCall(Name(prefix, "slave", at));
+  PetscCall(HycoH5WriteInt(h, at, p->n, 1, p->slave));
+  PetscCall(Name(prefix, "master", at));
+  PetscCall(HycoH5WriteInt(h, at, p->n, 1, p->master));
+  PetscCall(Name(prefix, "contact", at));
+  PetscCall(HycoH5WriteInt(h, at, p->n, 1, p->contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadPairs(HycoH5 h, const char prefix[], PetscInt n_nodes, PetscInt n_contacts, HycoPairs *p)
+{
+  PetscInt one = 1;
+  char at[128];
+
+  PetscFunctionBegin;
+  p->n = -1;
+  PetscCall(Name(prefix, "slave", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, n_nodes - 1, &p->n, &one, &p->slave));
+  PetscCall(Name(prefix, "master", at));
+  PetscCall(HycoH5LoadInt(h, at, -1, n_nodes - 1, &p->n, &one, &p->master));
+  PetscCall(Name(prefix, "contact", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, n_contacts - 1, &p->n, &one, &p->contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
+{
+  const PetscInt n_dof = m->mesh->n_nodes * m->mesh->dim,
+                 sizes[6] = {m->whole_nodes, m->whole_cells, (PetscInt)m->hybrid,
+                             m->counts[0],   m->counts[1],   m->counts[2]};
+  char *text;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneToText(m->scene, &text));
+  PetscCall(HycoH5WriteText(h, "problem/scene", text));
+  PetscCall(PetscFree(text));
+  PetscCall(SaveMesh(h, "mesh", m->mesh));
+  PetscCall(HycoH5WriteInt(h, "mesh/node_whole", m->mesh->n_nodes, 1, m->mesh->node_whole));
+  PetscCall(HycoH5WriteInt(h, "mesh/cell_whole", m->mesh->n_cells, 1, m->mesh->cell_whole));
+  PetscCall(HycoH5WriteInt(h, "problem/sizes", 6, 1, sizes));
+  PetscCall(HycoH5WriteInt(h, "problem/role", m->mesh->n_nodes, 1, m->role));
+  PetscCall(SavePairs(h, "problem/pairs", &m->pairs));
+  PetscCall(HycoH5WriteInt(h, "problem/in_rid", m->pairs.n, 1, m->in_rid));
+  PetscCall(HycoH5WriteReal(h, "problem/V", n_dof, m->l, m->V));
+  PetscCall(HycoH5WriteReal(h, "problem/singular_values", m->l, 1, m->sigma));
+  PetscCall(HycoH5WriteInt(h, "problem/fe_dof", m->n_fe, 1, m->fe_dof));
+  if (m->G) {
+    PetscCall(HycoH5WriteReal(h, "problem/G", m->l, m->n_fe, m->G));
+    PetscCall(HycoH5WriteReal(h, "problem/ridge", 1, 1, &m->ridge));
+  }
+  PetscCall(HycoH5WriteReal(h, "reconstruction/S_lambda", m->n_dual, m->pairs.n, m->S_lambda));
+  PetscCall(HycoH5WriteReal(h, "training/points", m->n_points, m->scene->n_parameters, m->points));
+  PetscCall(HycoH5WriteReal(h, "training/numbers", 3, 1, m->numbers));
+  PetscCall(HycoH5WriteText(h, "training/provenance", m->provenance));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SaveAll(HycoH5 h, HycoModel m, HycoMesh whole, const PetscReal V_whole[])
+{
+  const PetscInt format = HYCO_MODEL_FORMAT;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5WriteText(h, "kind", HYCO_MODEL_KIND));
+  PetscCall(HycoH5WriteInt(h, "format", 1, 1, &format));
+  PetscCall(SaveProblem(h, m));
+  PetscCall(SaveMesh(h, "whole", whole));
+  PetscCall(HycoH5WriteReal(h, "whole/V", whole->n_nodes * whole->dim, m->l, V_whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelSave(HycoModel m, HycoMesh whole, const PetscReal V_whole[], const char path[])
+{
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Create(path, &h));
+  ierr = SaveAll(h, m, whole, V_whole);
+  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckKind(HycoH5 h, const char path[])
+{
+  char *kind;
+  PetscInt one = 1, *format, version, same;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadText(h, "kind", &kind));
+  same = strcmp(kind, HYCO_MODEL_KIND) == 0;
+  PetscCall(PetscFree(kind));
+  PetscCheck(same, PETSC_COMM_SELF, PETSC_ERR_USER, "%s is no hyco model", path);
+  PetscCall(HycoH5LoadInt(h, "format", 0, PETSC_MAX_INT, &one, &one, &format));
+  version = *format;
+  PetscCall(PetscFree(format));
+  PetscCheck(version == HYCO_MODEL_FORMAT, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s has model format %d; this hyco (%s) reads format %d: train it again, or use the hyco that wrote it",
+             path, (int)version, HycoVersion(), HYCO_MODEL_FORMAT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
+{
+  PetscInt one = 1, six = 6, n_dof, *sizes, three = 3, n_par;
+  PetscReal *numbers;
+  char *text;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadText(h, "problem/scene", &text));
+  PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene));
+  PetscCall(PetscFree(text));
+  PetscCall(LoadMesh(h, "mesh", m->scene->n_bodies, &m->mesh));
+  PetscCall(HycoH5LoadInt(h, "problem/sizes", 0, PETSC_MAX_INT, &six, &one, &sizes));
+  m->whole_nodes = sizes[0];
+  m->whole_cells = sizes[1];
+  m->hybrid = (HycoHybrid)sizes[2];
+  for (PetscInt k = 0; k < 3; k++) m->counts[k] = sizes[3 + k];
+  PetscCheck(sizes[2] <= HYCO_HYBRID_ALL && sizes[0] > 0 && sizes[1] > 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s: problem/sizes is damaged", m->path);
+  PetscCall(PetscFree(sizes));
+  PetscCall(HycoH5LoadInt(h, "mesh/node_whole", 0, m->whole_nodes - 1, &m->mesh->n_nodes, &one, &m->mesh->node_whole));
+  PetscCall(HycoH5LoadInt(h, "mesh/cell_whole", 0, m->whole_cells - 1, &m->mesh->n_cells, &one, &m->mesh->cell_whole));
+  n_dof = m->mesh->n_nodes * m->mesh->dim;
+  PetscCall(HycoH5LoadInt(h, "problem/role", 0, HYCO_ROLE_A, &m->mesh->n_nodes, &one, &m->role));
+  PetscCall(LoadPairs(h, "problem/pairs", m->mesh->n_nodes, m->scene->n_contacts, &m->pairs));
+  PetscCall(HycoH5LoadInt(h, "problem/in_rid", 0, 1, &m->pairs.n, &one, &m->in_rid));
+  m->l = m->n_fe = m->n_dual = m->n_points = -1;
+  PetscCall(HycoH5LoadReal(h, "problem/V", &n_dof, &m->l, &m->V));
+  PetscCall(HycoH5LoadReal(h, "problem/singular_values", &m->l, &one, &m->sigma));
+  PetscCall(HycoH5LoadInt(h, "problem/fe_dof", 0, n_dof - 1, &m->n_fe, &one, &m->fe_dof));
+  for (PetscInt k = 1; k < m->n_fe; k++)
+    PetscCheck(m->fe_dof[k] > m->fe_dof[k - 1], PETSC_COMM_SELF, PETSC_ERR_USER, "%s: problem/fe_dof is damaged",
+               m->path);
+  if (HycoH5Has(h, "problem/G")) {
+    PetscReal *ridge;
+
+    PetscCall(HycoH5LoadReal(h, "problem/G", &m->l, &m->n_fe, &m->G));
+    PetscCall(HycoH5LoadReal(h, "problem/ridge", &one, &one, &ridge));
+    m->ridge = *ridge;
+    PetscCall(PetscFree(ridge));
+  }
+  PetscCall(HycoH5LoadReal(h, "reconstruction/S_lambda", &m->n_dual, &m->pairs.n, &m->S_lambda));
+  n_par = m->scene->n_parameters;
+  PetscCall(HycoH5LoadReal(h, "training/points", &m->n_points, &n_par, &m->points));
+  PetscCall(HycoH5LoadReal(h, "training/numbers", &three, &one, &numbers));
+  PetscCall(PetscArraycpy(m->numbers, numbers, 3));
+  PetscCall(PetscFree(numbers));
+  PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadAll(HycoH5 h, HycoModel m)
+{
+  PetscFunctionBegin;
+  PetscCall(CheckKind(h, m->path));
+  PetscCall(LoadProblem(h, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelLoad(const char path[], HycoModel *model)
+{
+  HycoModel m;
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *model = NULL;
+  PetscCall(HycoH5Open(path, &h));
+  PetscCall(HycoModelCreate(&m));
+  PetscCall(PetscStrncpy(m->path, path, sizeof(m->path)));
+  ierr = LoadAll(h, m);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  if (ierr) (void)!HycoModelDestroy(&m);
+  PetscCall(ierr);
+  PetscCall(HycoOptionsBool(m->scene->options, "hyco_reconstruct", &m->reconstruct));
+  *model = m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelLoadWhole(HycoModel m)
+{
+  HycoH5 h;
+  PetscInt n_dof;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Open(m->path, &h));
+  PetscCall(LoadMesh(h, "whole", m->scene->n_bodies, &m->whole));
+  n_dof = m->whole->n_nodes * m->whole->dim;
+  PetscCall(HycoH5LoadReal(h, "whole/V", &n_dof, &m->l, &m->V_whole));
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCheck(m->whole->n_nodes == m->whole_nodes && m->whole->n_cells == m->whole_cells, PETSC_COMM_SELF,
+             PETSC_ERR_USER, "%s: the whole mesh is damaged", m->path);
+  PetscCall(HycoFECreate(m->scene, m->whole, &m->fe_whole));
+  PetscCall(PetscMalloc1(n_dof, &m->U_whole));
+  /* the contacts again, in the whole mesh's numbers */
+  m->whole_pairs.n = m->pairs.n;
+  PetscCall(PetscMalloc1(m->pairs.n, &m->whole_pairs.slave));
+  PetscCall(PetscMalloc1(m->pairs.n, &m->whole_pairs.master));
+  HycoDuplicate(m->pairs.n, m->pairs.contact, &m->whole_pairs.contact);
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    m->whole_pairs.slave[k] = m->mesh->node_whole[m->pairs.slave[k]];
+    m->whole_pairs.master[k] = m->pairs.master[k] < 0 ? -1 : m->mesh->node_whole[m->pairs.master[k]];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

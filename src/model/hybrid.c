@@ -1,0 +1,357 @@
+/*
+  Which displacements are full order (section 5.2). A full row rank alone is not enough: choices that have it differ a
+  hundredfold in error. A choice is judged by the conditioning of its basis and by the error of the model it gives on
+  the training snapshots.
+
+  rank: the fewest that give B[A_lambda, A_c] Vbar[A_c,:] full row rank. Start: the contacts whose balance rows K V
+  depend on those of others; then exchange one for one while the mean training error of u falls. all: the modes'
+  coefficients follow from U[A] by ridge regression, its strength chosen by the same error.
+*/
+#include <hycoalgorithms.h>
+#include <hycotrainerimpl.h>
+
+#define WORST 10.0 /* what an unsolved or wild prediction counts */
+
+/* Relative error of the last prediction against snapshot k: u on the whole mesh (by the coefficients: V is
+ * orthonormal), forces on A_lambda. */
+static void SnapshotErrors(HycoTrainer t, HycoModel m, PetscInt k, PetscReal *u, PetscReal *lambda)
+{
+  const PetscInt dim = t->sizes[3];
+  const PetscReal *U = t->U + (size_t)k * (size_t)(t->sizes[0] * dim), *L = t->Lambda + (size_t)k * (size_t)t->sizes[2],
+                  *c = t->VtU + k * t->l;
+  PetscReal sum, lost = 0, size = 0;
+
+  sum = t->U_norm[k] * t->U_norm[k];
+  for (PetscInt j = 0; j < t->l; j++) sum += (m->gamma[j] - c[j]) * (m->gamma[j] - c[j]) - c[j] * c[j];
+  for (PetscInt f = 0; f < m->n_fe; f++) {
+    const PetscInt dof = m->fe_dof[f], whole = m->mesh->node_whole[dof / dim] * dim + dof % dim;
+    PetscReal by_modes = 0;
+
+    for (PetscInt j = 0; j < m->l; j++) by_modes += m->V[dof * m->l + j] * m->gamma[j];
+    sum += (m->U[dof] - U[whole]) * (m->U[dof] - U[whole]) - (by_modes - U[whole]) * (by_modes - U[whole]);
+  }
+  *u = t->U_norm[k] > 0 ? PetscSqrtReal(PetscMax(sum, 0)) / t->U_norm[k] : 0;
+  for (PetscInt j = 0; j < m->m; j++) {
+    lost += (m->Lambda[m->contact[j]] - L[m->contact[j]]) * (m->Lambda[m->contact[j]] - L[m->contact[j]]);
+    size += L[m->contact[j]] * L[m->contact[j]];
+  }
+  *lambda = size > 0 ? PetscSqrtReal(lost / size) : lost > 0 ? WORST : 0;
+}
+
+/* Mean training errors of the model as it stands. */
+static PetscErrorCode Judge(HycoTrainer t, HycoModel m, PetscReal *u, PetscReal *lambda)
+{
+  PetscInt n_par;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  m->reconstruct = PETSC_FALSE;
+  *u = *lambda = 0;
+  for (PetscInt k = 0; k < t->n_s; k++) {
+    PetscReal eu, el;
+
+    PetscCall(HycoModelPredict(m, n_par, mu + k * n_par));
+    SnapshotErrors(t, m, k, &eu, &el);
+    if (m->prediction.reason < 0 || !(eu < WORST)) eu = WORST;
+    if (m->prediction.reason < 0 || !(el < WORST)) el = WORST;
+    *u += eu / t->n_s;
+    *lambda += el / t->n_s;
+  }
+  m->reconstruct = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The unknown of each contact of A_lambda that could be full order: its largest entry in A. */
+static PetscErrorCode Candidates(HycoModel m, PetscInt candidate[])
+{
+  const PetscInt dim = m->mesh->dim;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->m; k++) {
+    PetscReal best = 0;
+
+    candidate[k] = -1;
+    for (PetscInt t = m->row_start[m->contact[k]]; t < m->row_start[m->contact[k] + 1]; t++) {
+      if (m->role[m->row_dof[t] / dim] == HYCO_ROLE_A && PetscAbsReal(m->row_value[t]) > best * (1 + 1e-12)) {
+        best = PetscAbsReal(m->row_value[t]);
+        candidate[k] = m->row_dof[t];
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Smallest singular value of B[A_lambda, A_c] Vbar[A_c,:] over its largest, for the model's present choice. */
+static PetscErrorCode RowRank(HycoModel m, PetscReal *ratio)
+{
+  Mat dense;
+  PetscScalar *b;
+  PetscReal smallest, largest;
+
+  PetscFunctionBegin;
+  *ratio = 1;
+  if (!m->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatConvert(m->Br, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
+  PetscCall(MatDenseGetArray(dense, &b));
+  PetscCall(HycoExtremeSingularValues(m->m, m->n, b, &smallest, &largest));
+  PetscCall(MatDenseRestoreArray(dense, &b));
+  PetscCall(MatDestroy(&dense));
+  *ratio = m->m > m->n || largest == 0 ? 0 : smallest / largest;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The model at the middle of the training points, with no full-order unknown, so that rows can be looked at. */
+static PetscErrorCode Assembled(HycoTrainer t, HycoModel m)
+{
+  PetscInt n_par;
+  const PetscReal *mu;
+  PetscReal middle[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  for (PetscInt p = 0; p < n_par; p++) middle[p] = (t->scene->lo[p] + t->scene->hi[p]) / 2;
+  m->reconstruct = PETSC_FALSE;
+  PetscCall(HycoModelPredict(m, n_par, middle));
+  m->reconstruct = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numerical rank of B[A_lambda, A_c] V[A_c,:] and the contacts whose balance rows the modes resolve best (first `rank`
+ * of pivot). */
+static PetscErrorCode ResolvedContacts(HycoModel m, const PetscInt candidate[], PetscInt *rank, PetscInt pivot[])
+{
+  const PetscInt l = m->l, dim = m->mesh->dim;
+  const PetscInt *ia, *ja;
+  const PetscScalar *a;
+  PetscReal *BV, *KV;
+  PetscInt n;
+  PetscBool done;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(l * m->m, &BV, l * m->m, &KV));
+  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatSeqAIJGetArrayRead(m->K, &a));
+  for (PetscInt k = 0; k < m->m; k++) {
+    for (PetscInt t = m->row_start[m->contact[k]]; t < m->row_start[m->contact[k] + 1]; t++) {
+      for (PetscInt j = 0; m->role[m->row_dof[t] / dim] == HYCO_ROLE_A && j < l; j++)
+        BV[k * l + j] += m->row_value[t] * m->V[m->row_dof[t] * l + j];
+    }
+    for (PetscInt t = ia[candidate[k]]; t < ia[candidate[k] + 1]; t++) {
+      for (PetscInt j = 0; j < l; j++) KV[k * l + j] += a[t] * m->V[ja[t] * l + j];
+    }
+  }
+  PetscCall(MatSeqAIJRestoreArrayRead(m->K, &a));
+  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  *rank = 0;
+  {
+    PetscReal smallest = 0, largest = 1;
+
+    for (PetscInt r = PetscMin(l, m->m); r > 0 && !*rank;
+         r--) { /* the first r modes that are independent on the contacts */
+      PetscReal *first;
+
+      PetscCall(PetscMalloc1(r * m->m, &first));
+      for (PetscInt k = 0; k < m->m; k++) PetscCall(PetscArraycpy(first + k * r, BV + k * l, r));
+      PetscCall(HycoExtremeSingularValues(r, m->m, first, &smallest, &largest));
+      if (smallest > 1e-10 * largest) *rank = r;
+      PetscCall(PetscFree(first));
+    }
+  }
+  PetscCall(HycoPivotColumns(l, m->m, KV, *rank, pivot));
+  PetscCall(PetscFree2(BV, KV));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One candidate set, judged; remembered by its hash so that none is judged twice. */
+typedef struct {
+  PetscReal u, lambda, rank;
+} Verdict;
+
+static PetscErrorCode JudgeSet(HycoTrainer t, HycoModel m, PetscInt n, const PetscInt dof[], Verdict *v)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoModelSetFE(m, HYCO_HYBRID_RANK, n, dof));
+  PetscCall(Assembled(t, m));
+  PetscCall(RowRank(m, &v->rank));
+  v->u = v->lambda = WORST;
+  if (v->rank > 1e-10) PetscCall(Judge(t, m, &v->u, &v->lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool Better(const Verdict *a, const Verdict *b)
+{
+  if (a->u < b->u * (1 - 1e-6)) return PETSC_TRUE;
+  return (PetscBool)(a->u <= b->u * (1 + 1e-6) && a->rank > b->rank * (1 + 1e-6));
+}
+
+/* Exchanges one full-order unknown for one candidate outside while that helps. chosen[k]: whether candidate k is full
+ * order. */
+static PetscErrorCode Exchange(HycoTrainer t, HycoModel m, PetscInt n, const PetscInt candidate[], PetscBool chosen[],
+                               Verdict *best)
+{
+  const PetscInt N = m->m;
+  PetscInt trials = 1, n_seen = 0, *dof;
+  unsigned long long *seen;
+  PetscBool improved = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n, &dof, t->trials + 1, &seen));
+  while (improved && trials < t->trials) {
+    PetscInt out = -1, in = -1;
+    Verdict verdict, round = *best;
+
+    improved = PETSC_FALSE;
+    for (PetscInt i = 0; i < N; i++) {
+      for (PetscInt j = 0; j < N && trials < t->trials; j++) {
+        PetscInt k = 0;
+        PetscBool past = PETSC_FALSE;
+        unsigned long long hash;
+
+        if (!chosen[i] || chosen[j]) continue;
+        chosen[i] = PETSC_FALSE;
+        chosen[j] = PETSC_TRUE;
+        hash = HycoSetHash(N, chosen);
+        for (PetscInt s = 0; s < n_seen; s++) past = (PetscBool)(past || seen[s] == hash);
+        for (PetscInt c = 0; c < N; c++) {
+          if (chosen[c]) dof[k++] = candidate[c];
+        }
+        if (!past) {
+          seen[n_seen++] = hash;
+          trials++;
+          PetscCall(JudgeSet(t, m, n, dof, &verdict));
+          if (Better(&verdict, &round)) {
+            round = verdict;
+            out = i;
+            in = j;
+          }
+        }
+        chosen[i] = PETSC_TRUE;
+        chosen[j] = PETSC_FALSE;
+      }
+    }
+    if (out >= 0) {
+      chosen[out] = PETSC_FALSE;
+      chosen[in] = PETSC_TRUE;
+      *best = round;
+      improved = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree2(dof, seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ChooseRank(HycoTrainer t, HycoModel m, Verdict *best)
+{
+  PetscInt n = 0, rank = 0, *candidate, *pivot, *dof;
+  PetscBool *chosen;
+
+  PetscFunctionBegin;
+  PetscCall(HycoModelSetFE(m, HYCO_HYBRID_RANK, 0, NULL));
+  PetscCall(Assembled(t, m));
+  PetscCall(PetscMalloc4(m->m, &candidate, m->m, &pivot, m->m, &chosen, m->m, &dof));
+  PetscCall(Candidates(m, candidate));
+  PetscCall(ResolvedContacts(m, candidate, &rank, pivot));
+  for (PetscInt k = 0; k < m->m; k++) chosen[k] = PETSC_TRUE;
+  for (PetscInt k = 0; k < rank; k++) chosen[pivot[k]] = PETSC_FALSE;
+  for (PetscInt k = 0; k < m->m; k++) {
+    if (chosen[k]) dof[n++] = candidate[k];
+  }
+  PetscCall(JudgeSet(t, m, n, dof, best));
+  if (n && n < m->m) PetscCall(Exchange(t, m, n, candidate, chosen, best));
+  n = 0;
+  for (PetscInt k = 0; k < m->m; k++) {
+    if (chosen[k]) dof[n++] = candidate[k];
+  }
+  PetscCall(HycoModelSetFE(m, HYCO_HYBRID_RANK, n, dof));
+  PetscCall(PetscFree4(candidate, pivot, chosen, dof));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The free unknowns of the nodes of A: all, or those of contact nodes. */
+static PetscErrorCode FreeUnknowns(HycoTrainer t, HycoModel m, PetscBool contact_only, PetscInt *n, PetscInt dof[])
+{
+  const PetscInt dim = m->mesh->dim;
+  PetscBool *contact;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->mesh->n_nodes, &contact));
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    contact[m->pairs.slave[k]] = PETSC_TRUE;
+    if (m->pairs.master[k] >= 0) contact[m->pairs.master[k]] = PETSC_TRUE;
+  }
+  *n = 0;
+  for (PetscInt i = 0; i < m->mesh->n_nodes * dim; i++) {
+    if (m->role[i / dim] != HYCO_ROLE_A || t->fe->fixed[m->mesh->node_whole[i / dim] * dim + i % dim]) continue;
+    if (contact[i / dim] || !contact_only) dof[(*n)++] = i;
+  }
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All of A, with the strength of the ridge that gives the least training error. Without an interface there is nothing
+ * to regress. */
+static PetscErrorCode ChooseAll(HycoTrainer t, HycoModel m, PetscInt n, const PetscInt dof[], Verdict *best)
+{
+  PetscBool interface = PETSC_FALSE;
+  PetscReal strength = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
+    interface = (PetscBool)(interface || m->role[i] == HYCO_ROLE_INTERFACE);
+  PetscCall(HycoModelSetFE(m, HYCO_HYBRID_ALL, n, dof));
+  best->u = best->lambda = PETSC_MAX_REAL;
+  best->rank = 1;
+  if (!interface) PetscCall(Judge(t, m, &best->u, &best->lambda));
+  for (PetscReal ridge = 1e-14; interface && ridge < 1e-5; ridge *= 10) {
+    Verdict v;
+
+    PetscCall(HycoModelSetRidge(m, ridge));
+    PetscCall(Judge(t, m, &v.u, &v.lambda));
+    if (v.u < best->u) {
+      *best = v;
+      best->rank = 1;
+      strength = ridge;
+    }
+  }
+  if (interface) PetscCall(HycoModelSetRidge(m, strength));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel m)
+{
+  PetscInt n_all, n_contact, *all, *contact;
+  HycoHybrid kind = t->hybrid;
+  Verdict v = {0, 0, 1}, other;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(m->mesh->n_nodes * m->mesh->dim, &all, m->mesh->n_nodes * m->mesh->dim, &contact));
+  PetscCall(FreeUnknowns(t, m, PETSC_FALSE, &n_all, all));
+  PetscCall(FreeUnknowns(t, m, PETSC_TRUE, &n_contact, contact));
+  PetscCheck(n_all, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
+  if (!n_contact && kind != HYCO_HYBRID_ALL)
+    kind = HYCO_HYBRID_CONTACT; /* no contact in the RID: plain hyper-reduction (31) */
+  if (kind == HYCO_HYBRID_AUTO && n_contact < n_all) kind = HYCO_HYBRID_CONTACT;
+  if (kind == HYCO_HYBRID_CONTACT && n_contact == n_all && n_contact) {
+    HycoFail("-hyco_hybrid contact leaves the modes without equation: every unknown of A is a contact's; use rank, all "
+             "or auto");
+  }
+  if (kind == HYCO_HYBRID_RANK || kind == HYCO_HYBRID_AUTO) PetscCall(ChooseRank(t, m, &v));
+  if (kind == HYCO_HYBRID_AUTO) {
+    PetscInt n_rank = m->n_fe, *rank;
+
+    HycoDuplicate(n_rank, m->fe_dof, &rank);
+    PetscCall(ChooseAll(t, m, n_all, all, &other));
+    if (v.u <= other.u) PetscCall(HycoModelSetFE(m, HYCO_HYBRID_RANK, n_rank, rank));
+    PetscCall(PetscFree(rank));
+  }
+  if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all, &v));
+  if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoModelSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));
+  PetscCall(Judge(t, m, &v.u, &v.lambda));
+  m->numbers[1] = v.u;
+  m->numbers[2] = v.lambda;
+  PetscCall(HycoModelCondition(m, &m->numbers[0]));
+  PetscCall(PetscFree2(all, contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,261 @@
+/* HycoModel: made, asked, destroyed. */
+#include <hycomodelimpl.h>
+#include <hycofields.h>
+#include <petscviewer.h>
+
+PetscErrorCode HycoModelCreate(HycoModel *model)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscNew(model));
+  (*model)->reconstruct = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelReset(HycoModel m)
+{
+  PetscFunctionBegin;
+  m->ready = m->solved = PETSC_FALSE;
+  PetscCall(HycoSolverDestroy(&m->solver));
+  PetscCall(HycoSystemDestroy(&m->system));
+  PetscCall(MatDestroy(&m->K));
+  PetscCall(MatDestroy(&m->Kr));
+  PetscCall(MatDestroy(&m->Br));
+  PetscCall(MatDestroy(&m->Btr));
+  PetscCall(VecDestroy(&m->F));
+  PetscCall(VecDestroy(&m->Fr));
+  PetscCall(VecDestroy(&m->Dr));
+  PetscCall(VecDestroy(&m->x));
+  PetscCall(VecDestroy(&m->L));
+  PetscCall(HycoFEDestroy(&m->fe));
+  PetscCall(PetscFree(m->contact));
+  PetscCall(PetscFree(m->fe_at));
+  PetscCall(PetscFree(m->Vp));
+  PetscCall(PetscFree(m->row_start));
+  PetscCall(PetscFree(m->row_dof));
+  PetscCall(PetscFree(m->row_value));
+  PetscCall(PetscFree(m->gap));
+  PetscCall(PetscFree(m->gamma));
+  PetscCall(PetscFree(m->U));
+  PetscCall(PetscFree(m->Lambda));
+  PetscCall(PetscFree(m->stress));
+  PetscCall(PetscFree(m->slave_id));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelDestroy(HycoModel *model)
+{
+  HycoModel m;
+
+  PetscFunctionBegin;
+  if (!model || !*model) PetscFunctionReturn(PETSC_SUCCESS);
+  m = *model;
+  PetscCall(HycoModelReset(m));
+  PetscCall(HycoFEDestroy(&m->fe_whole));
+  PetscCall(HycoPairsDestroy(&m->whole_pairs));
+  PetscCall(HycoMeshDestroy(&m->whole));
+  PetscCall(PetscFree(m->V_whole));
+  PetscCall(PetscFree(m->U_whole));
+  PetscCall(HycoPairsDestroy(&m->pairs));
+  PetscCall(HycoMeshDestroy(&m->mesh));
+  PetscCall(HycoSceneDestroy(&m->scene));
+  PetscCall(PetscFree(m->role));
+  PetscCall(PetscFree(m->in_rid));
+  PetscCall(PetscFree(m->V));
+  PetscCall(PetscFree(m->sigma));
+  PetscCall(PetscFree(m->fe_dof));
+  PetscCall(PetscFree(m->G));
+  PetscCall(PetscFree(m->S_lambda));
+  PetscCall(PetscFree(m->points));
+  PetscCall(PetscFree(m->provenance));
+  PetscCall(PetscFree(*model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelGetScene(HycoModel m, HycoScene *scene)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
+  *scene = m->scene;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelSetReconstruct(HycoModel m, PetscBool reconstruct)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
+  m->reconstruct = reconstruct;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelSetMonitor(HycoModel m, HycoMonitor monitor, void *ctx)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
+  PetscCall(HycoModelSetUp(m));
+  PetscCall(HycoSolverSetMonitor(m->solver, monitor, ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckSolved(HycoModel m)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
+  PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoModelPredict() before asking for its results");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Stresses of the RID's cells and the numbers that need them or the reconstruction. */
+PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
+{
+  HycoPrediction *p;
+  PetscReal *energy;
+
+  PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  p = &m->prediction;
+  p->dim = m->fe->dim;
+  p->n_dof = m->n;
+  p->n_contacts = m->m;
+  p->n_modes = m->l;
+  p->n_fe_dofs = m->n_fe;
+  p->rid_nodes = 0;
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) p->rid_nodes += m->role[i] != HYCO_ROLE_OUTSIDE;
+  p->rid_elements = m->mesh->n_cells;
+  p->rid_fraction = (PetscReal)m->mesh->n_cells / m->whole_cells;
+  p->condition = m->numbers[0];
+  p->n_active = 0;
+  p->total_contact_force = p->lambda_max = p->lambda_norm2 = p->covered_force = 0;
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    p->n_active += m->Lambda[k] > 0;
+    p->total_contact_force += m->Lambda[k];
+    if (m->in_rid[k]) p->covered_force += m->Lambda[k];
+    p->lambda_max = PetscMax(p->lambda_max, m->Lambda[k]);
+    p->lambda_norm2 += m->Lambda[k] * m->Lambda[k];
+  }
+  p->covered_force = p->total_contact_force > 0 ? p->covered_force / p->total_contact_force : 1;
+  p->lambda_norm2 = PetscSqrtReal(p->lambda_norm2);
+  p->u_norm2 = 0;
+  for (PetscInt c = 0; c < 3; c++) p->u_min[c] = p->u_max[c] = 0;
+  for (PetscInt k = 0, first = 1; k < m->fe->n_dof; k++) {
+    const PetscInt c = k % p->dim;
+
+    if (m->role[k / p->dim] == HYCO_ROLE_OUTSIDE) continue;
+    if (first) p->u_min[c] = p->u_max[c] = m->U[k];
+    if (c == p->dim - 1) first = 0;
+    p->u_min[c] = PetscMin(p->u_min[c], m->U[k]);
+    p->u_max[c] = PetscMax(p->u_max[c], m->U[k]);
+    p->u_norm2 += m->U[k] * m->U[k];
+  }
+  p->u_norm2 = PetscSqrtReal(p->u_norm2);
+  PetscCall(PetscMalloc1(m->mesh->n_cells, &energy));
+  PetscCall(HycoFEEnergy(m->fe, m->U, energy));
+  p->strain_energy = 0;
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) p->strain_energy += energy[e];
+  PetscCall(PetscFree(energy));
+  *out = *p;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelGetRID(HycoModel m, PetscInt *n_nodes, const PetscInt *node_ids[], const PetscReal *U[],
+                               PetscInt *n_cells, const PetscInt *cell_ids[], const PetscReal *sigma[])
+{
+  PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  if (n_nodes) *n_nodes = m->mesh->n_nodes;
+  if (node_ids) *node_ids = m->mesh->node_id;
+  if (U) *U = m->U;
+  if (n_cells) *n_cells = m->mesh->n_cells;
+  if (cell_ids) *cell_ids = m->mesh->cell_id;
+  if (sigma) {
+    PetscCall(HycoFEStress(m->fe, m->U, m->stress));
+    *sigma = m->stress;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelGetLambda(HycoModel m, PetscInt *n_contacts, const PetscReal *Lambda[],
+                                  const PetscInt *node_ids[], const PetscInt *in_rid[])
+{
+  PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  if (n_contacts) *n_contacts = m->pairs.n;
+  if (Lambda) *Lambda = m->Lambda;
+  if (node_ids) *node_ids = m->slave_id;
+  if (in_rid) *in_rid = m->in_rid;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U = r(u0) + V gamma (30), with the full-order values where there are any. */
+PetscErrorCode HycoModelGetWholeU(HycoModel m, PetscInt *n_nodes, const PetscReal *U[])
+{
+  PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  if (!m->whole) PetscCall(HycoModelLoadWhole(m));
+  if (!m->whole_current) {
+    const PetscInt dim = m->fe->dim;
+
+    PetscCall(HycoFESetParameters(m->fe_whole, m->fe->mu));
+    for (PetscInt k = 0; k < m->fe_whole->n_dof; k++) {
+      PetscReal sum = m->fe_whole->u0[k];
+
+      for (PetscInt j = 0; j < m->l; j++) sum += m->V_whole[k * m->l + j] * m->gamma[j];
+      m->U_whole[k] = sum;
+    }
+    for (PetscInt k = 0; k < m->n_fe; k++)
+      m->U_whole[m->mesh->node_whole[m->fe_dof[k] / dim] * dim + m->fe_dof[k] % dim] = m->U[m->fe_dof[k]];
+    m->whole_current = PETSC_TRUE;
+  }
+  if (n_nodes) *n_nodes = m->whole->n_nodes;
+  if (U) *U = m->U_whole;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelWrite(HycoModel m, const char path[])
+{
+  const PetscReal *U;
+  PetscReal *rid;
+
+  PetscFunctionBegin;
+  PetscCall(HycoModelGetWholeU(m, NULL, &U));
+  PetscCall(PetscCalloc1(m->whole->n_cells, &rid));
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) rid[m->mesh->cell_whole[e]] = 1;
+  PetscCall(HycoSolutionWrite(path, m->fe_whole, &m->whole_pairs, U, m->Lambda, rid));
+  PetscCall(PetscFree(rid));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
+{
+  static const char *const words[] = {"auto", "rank: the fewest that give full row rank",
+                                      "contact: all on the contact surfaces of the RID",
+                                      "all of A, interface by ridge regression on the modes"};
+  PetscInt nodes = 0, a = 0, in = 0;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
+    nodes += m->role[i] != HYCO_ROLE_OUTSIDE;
+    a += m->role[i] == HYCO_ROLE_A;
+  }
+  for (PetscInt k = 0; k < m->pairs.n; k++) in += m->in_rid[k];
+  PetscCall(PetscViewerASCIIPrintf(viewer, "hybrid hyper-reduced model\n"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, RID forces %.2e\n",
+                                   (int)m->n_points, (double)m->numbers[1], (double)m->numbers[2]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
+                                   (int)m->l, m->l ? (double)m->sigma[0] : 0., m->l ? (double)m->sigma[m->l - 1] : 0.));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  modes that seeded the RID besides: %d dual, %d stress, %d force\n",
+                                   (int)m->counts[0], (int)m->counts[1], (int)m->counts[2]));
+  PetscCall(PetscViewerASCIIPrintf(
+      viewer, "  RID: %d of %d elements (%.1f %%), %d of %d nodes, %d in A; %d of %d contacts\n", (int)m->mesh->n_cells,
+      (int)m->whole_cells, 100. * (double)m->mesh->n_cells / (double)m->whole_cells, (int)nodes, (int)m->whole_nodes,
+      (int)a, (int)in, (int)m->pairs.n));
+  if (m->pairs.n)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  full-order displacements: %d (%s)\n", (int)m->n_fe, words[m->hybrid]));
+  if (m->hybrid == HYCO_HYBRID_ALL && m->G)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  ridge: %.0e of the first squared singular value\n", (double)m->ridge));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  dual snapshots for the reconstruction: %d\n", (int)m->n_dual));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->provenance));
+  PetscCall(HycoSceneView(m->scene, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,417 @@
+/*
+  The online phase: the hybrid system (38) assembled on the RID alone and solved.
+
+  x = (gamma, U_fe): POD coefficients and full-order unknowns. With the modes zeroed on the full-order unknowns,
+
+      U[A u I] = Vp gamma + E x_fe      test space: the same restricted to A      (39)-(40)
+
+  (hybrid all: every unknown of A is full order and gamma = G U[A] is no unknown.) Row i of K meets the reduced matrix
+  once: y = K[i,:] Vp gives its part on the modes, its entries on full-order unknowns the rest.
+*/
+#include <hycomodelimpl.h>
+#include <hycoalgorithms.h>
+#include <petscblaslapack.h>
+
+/* Beyond this many unknowns the reduced matrix is stored sparse (a dense border of l modes). */
+#define HYCO_DENSE_MAX 700
+
+PetscErrorCode HycoModelSetFE(HycoModel m, HycoHybrid hybrid, PetscInt n, const PetscInt dof[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoModelReset(m));
+  PetscCall(PetscFree(m->fe_dof));
+  PetscCall(PetscFree(m->G));
+  HycoDuplicate(n, dof, &m->fe_dof);
+  PetscCall(PetscSortInt(n, m->fe_dof));
+  m->n_fe = n;
+  m->hybrid = hybrid;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelSetRidge(HycoModel m, PetscReal ridge)
+{
+  const PetscInt l = m->l, n = m->n_fe;
+  PetscReal *X, *N;
+  PetscBLASInt lb, nb, info;
+
+  PetscFunctionBegin;
+  PetscCall(HycoModelReset(m));
+  PetscCall(PetscFree(m->G));
+  m->ridge = ridge;
+  PetscCall(
+      PetscMalloc1(l * n, &m->G)); /* row major l x n is column major n x l: solve N Z = X^T, l x n column major */
+  PetscCall(PetscMalloc2(l * n, &X, l * l, &N));
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt j = 0; j < l; j++) X[k * l + j] = m->V[m->fe_dof[k] * l + j] * m->sigma[j] / m->sigma[0];
+  }
+  for (PetscInt i = 0; i < l; i++) {
+    for (PetscInt j = 0; j < l; j++) {
+      N[j * l + i] = i == j ? ridge : 0;
+      for (PetscInt k = 0; k < n; k++) N[j * l + i] += X[k * l + i] * X[k * l + j];
+    }
+  }
+  PetscCall(PetscBLASIntCast(l, &lb));
+  PetscCall(PetscBLASIntCast(n, &nb));
+  LAPACKpotrf_("U", &lb, N, &lb, &info);
+  if (!info) LAPACKpotrs_("U", &lb, &nb, N, &lb, X, &lb, &info);
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt j = 0; j < l; j++) m->G[j * n + k] = info ? 0 : X[k * l + j] * m->sigma[j] / m->sigma[0];
+  }
+  PetscCall(PetscFree2(X, N));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Places of the full-order unknowns, modes zeroed on them. */
+static PetscErrorCode SetUpBasis(HycoModel m)
+{
+  const PetscInt n_dof = m->fe->n_dof, l = m->l;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n_dof, &m->fe_at));
+  HycoDuplicate(n_dof * l, m->V, &m->Vp);
+  for (PetscInt k = 0; k < n_dof; k++) m->fe_at[k] = -1;
+  for (PetscInt k = 0; k < m->n_fe; k++) {
+    m->fe_at[m->fe_dof[k]] = k;
+    PetscCall(PetscArrayzero(m->Vp + m->fe_dof[k] * l, l));
+  }
+  m->n_free = m->hybrid == HYCO_HYBRID_ALL ? 0 : l;
+  m->n = m->n_free + m->n_fe;
+  m->m = 0;
+  PetscCall(PetscMalloc1(m->pairs.n, &m->contact));
+  PetscCall(PetscMalloc1(m->pairs.n, &m->slave_id));
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    m->slave_id[k] = m->mesh->node_id[m->pairs.slave[k]];
+    if (m->in_rid[k]) m->contact[m->m++] = k;
+  }
+  PetscCheck(m->n > 0, PETSC_COMM_SELF, PETSC_ERR_USER, "the model has no unknown: every training solution is zero");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CreateReduced(HycoModel m, PetscInt rows, PetscInt cols, PetscBool dense, Mat *A)
+{
+  PetscFunctionBegin;
+  if (dense)
+    PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, rows, cols, NULL, A));
+  else {
+    PetscCall(MatCreate(PETSC_COMM_SELF, A));
+    PetscCall(MatSetSizes(*A, rows, cols, rows, cols));
+    PetscCall(MatSetType(*A, MATSEQAIJ));
+    PetscCall(MatSeqAIJSetPreallocation(*A, m->n_free + 12, NULL));
+    PetscCall(MatSetOption(*A, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Pattern of a sparse reduced stiffness: full rows of the modes, border and neighbours in the others. */
+static PetscErrorCode PreallocateReduced(HycoModel m)
+{
+  PetscInt *nnz;
+  const PetscInt *ia, *ja;
+  PetscInt n;
+  PetscBool done;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n, &nnz));
+  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  for (PetscInt k = 0; k < m->n_free; k++) nnz[k] = m->n;
+  for (PetscInt k = 0; k < m->n_fe; k++) nnz[m->n_free + k] = m->n_free + ia[m->fe_dof[k] + 1] - ia[m->fe_dof[k]];
+  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatCreate(PETSC_COMM_SELF, &m->Kr));
+  PetscCall(MatSetSizes(m->Kr, m->n, m->n, m->n, m->n));
+  PetscCall(MatSetType(m->Kr, MATSEQAIJ));
+  for (PetscInt k = 0; k < m->n; k++) nnz[k] = PetscMin(nnz[k], m->n);
+  PetscCall(MatSeqAIJSetPreallocation(m->Kr, 0, nnz));
+  PetscCall(PetscFree(nnz));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelSetUp(HycoModel m)
+{
+  PetscBool dense, interface = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (m->ready) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
+  PetscCall(SetUpBasis(m));
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
+    interface = (PetscBool)(interface || m->role[i] == HYCO_ROLE_INTERFACE);
+  dense = (PetscBool)(m->n <= HYCO_DENSE_MAX || (m->hybrid == HYCO_HYBRID_ALL && interface));
+  PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->mesh->n_nodes, 0, &m->K));
+  PetscCall(MatCreateVecs(m->K, &m->F, NULL));
+  if (dense)
+    PetscCall(CreateReduced(m, m->n, m->n, PETSC_TRUE, &m->Kr));
+  else
+    PetscCall(PreallocateReduced(m));
+  PetscCall(MatCreateVecs(m->Kr, &m->x, &m->Fr));
+  if (m->m) {
+    PetscCall(CreateReduced(m, m->m, m->n, dense, &m->Br));
+    PetscCall(CreateReduced(m, m->n, m->m, dense, &m->Btr));
+    PetscCall(MatCreateVecs(m->Br, NULL, &m->L));
+    PetscCall(VecDuplicate(m->L, &m->Dr));
+  }
+  PetscCall(PetscMalloc1(m->pairs.n + 1, &m->row_start));
+  PetscCall(PetscMalloc1(6 * m->pairs.n, &m->row_dof));
+  PetscCall(PetscMalloc1(6 * m->pairs.n, &m->row_value));
+  PetscCall(PetscMalloc1(m->pairs.n, &m->gap));
+  PetscCall(PetscCalloc1(m->l, &m->gamma));
+  PetscCall(PetscCalloc1(m->fe->n_dof, &m->U));
+  PetscCall(PetscCalloc1(m->pairs.n, &m->Lambda));
+  PetscCall(PetscMalloc1(m->mesh->n_cells * m->fe->n_sigma, &m->stress));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &m->system));
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver));
+  PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
+  PetscCall(HycoSolverSetWarmStart(m->solver,
+                                   PETSC_FALSE)); /* the nonsymmetric problem may have several solutions: no history */
+  PetscCall(HycoSolverSetFromOptions(m->solver, m->scene->options));
+  m->ready = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* y = K[i,:] Vp over the modes. */
+static void RowTimesModes(HycoModel m, PetscInt n, const PetscInt col[], const PetscScalar val[], PetscReal y[])
+{
+  const PetscInt l = m->l;
+
+  for (PetscInt j = 0; j < l; j++) y[j] = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal *v = m->Vp + (size_t)col[k] * (size_t)l;
+
+    for (PetscInt j = 0; j < l; j++) y[j] += val[k] * v[j];
+  }
+}
+
+/* The part of row i of A on each unknown: `index`, `value`; returns their number. Modes first, all of them. */
+static PetscInt ReducedRow(HycoModel m, PetscInt n, const PetscInt col[], const PetscScalar val[], PetscReal y[],
+                           PetscInt index[], PetscReal value[])
+{
+  PetscInt count = 0;
+
+  RowTimesModes(m, n, col, val, y);
+  if (m->G) {
+    for (PetscInt f = 0; f < m->n_fe; f++) {
+      PetscReal sum = 0;
+
+      for (PetscInt j = 0; j < m->l; j++) sum += y[j] * m->G[j * m->n_fe + f];
+      index[f] = f;
+      value[f] = sum;
+    }
+    for (PetscInt k = 0; k < n; k++) {
+      if (m->fe_at[col[k]] >= 0) value[m->fe_at[col[k]]] += val[k];
+    }
+    return m->n_fe;
+  }
+  for (; count < m->n_free; count++) {
+    index[count] = count;
+    value[count] = y[count];
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    if (m->fe_at[col[k]] < 0) continue;
+    index[count] = m->n_free + m->fe_at[col[k]];
+    value[count++] = val[k];
+  }
+  return count;
+}
+
+/* Vbar[A,:]^T K[A, A u I] Vbar[A u I,:] */
+static PetscErrorCode FillStiffness(HycoModel m)
+{
+  const PetscInt *ia, *ja;
+  const PetscScalar *a;
+  PetscReal *y, *value, *modes;
+  PetscInt *index, *all, n, dim = m->fe->dim;
+  PetscBool done;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc5(m->l, &y, m->n + 100, &value, m->n + 100, &index, m->n, &all, m->n_free * m->n, &modes));
+  PetscCall(PetscArrayzero(modes, m->n_free * m->n));
+  for (PetscInt k = 0; k < m->n; k++) all[k] = k;
+  PetscCall(MatZeroEntries(m->Kr));
+  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatSeqAIJGetArrayRead(m->K, &a));
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    PetscInt count;
+
+    if (m->role[i / dim] != HYCO_ROLE_A || m->fe->fixed[i]) continue;
+    count = ReducedRow(m, ia[i + 1] - ia[i], ja + ia[i], a + ia[i], y, index, value);
+    if (m->fe_at[i] >= 0) {
+      const PetscInt row = m->n_free + m->fe_at[i];
+
+      PetscCall(MatSetValues(m->Kr, 1, &row, count, index, value, ADD_VALUES));
+    } else {
+      for (PetscInt j = 0; j < m->n_free; j++) {
+        const PetscReal v = m->Vp[(size_t)i * (size_t)m->l + (size_t)j];
+
+        for (PetscInt k = 0; v != 0 && k < count; k++) modes[j * m->n + index[k]] += v * value[k];
+      }
+    }
+  }
+  PetscCall(MatSeqAIJRestoreArrayRead(m->K, &a));
+  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  for (PetscInt j = 0; j < m->n_free; j++)
+    PetscCall(MatSetValues(m->Kr, 1, &j, m->n, all, modes + j * m->n, ADD_VALUES));
+  PetscCall(MatAssemblyBegin(m->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(m->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(PetscFree5(y, value, index, all, modes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* B[A_lambda, A'_c] Vbar[A'_c,:] and Vbar[A_c,:]^T B[A_lambda, A_c]^T */
+static PetscErrorCode FillContact(HycoModel m)
+{
+  PetscReal *y, *value;
+  PetscInt *index, dim = m->fe->dim;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(m->l, &y, m->n + 100, &value, m->n + 100, &index));
+  PetscCall(MatZeroEntries(m->Br));
+  PetscCall(MatZeroEntries(m->Btr));
+  for (PetscInt k = 0; k < m->m; k++) {
+    const PetscInt lo = m->row_start[m->contact[k]], hi = m->row_start[m->contact[k] + 1];
+    PetscInt count = ReducedRow(m, hi - lo, m->row_dof + lo, m->row_value + lo, y, index, value);
+
+    PetscCall(MatSetValues(m->Br, 1, &k, count, index, value, INSERT_VALUES));
+    for (PetscInt j = 0; j < m->n_free; j++) {
+      value[j] = 0;
+      index[j] = j;
+    }
+    count = m->n_free;
+    for (PetscInt t = lo; t < hi; t++) {
+      const PetscInt i = m->row_dof[t];
+
+      if (m->role[i / dim] != HYCO_ROLE_A) continue;
+      for (PetscInt j = 0; j < m->n_free; j++)
+        value[j] += m->row_value[t] * m->Vp[(size_t)i * (size_t)m->l + (size_t)j];
+      if (m->fe_at[i] < 0) continue;
+      index[count] = m->n_free + m->fe_at[i];
+      value[count++] = m->row_value[t];
+    }
+    PetscCall(MatSetValues(m->Btr, count, index, 1, &k, value, INSERT_VALUES));
+  }
+  PetscCall(MatAssemblyBegin(m->Br, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(m->Br, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyBegin(m->Btr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(m->Btr, MAT_FINAL_ASSEMBLY));
+  PetscCall(PetscFree3(y, value, index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Vbar[A,:]^T F[A] and D[A_lambda] */
+static PetscErrorCode FillVectors(HycoModel m)
+{
+  const PetscScalar *F;
+  PetscScalar *f, *d;
+  const PetscInt dim = m->fe->dim;
+
+  PetscFunctionBegin;
+  PetscCall(VecSet(m->Fr, 0));
+  PetscCall(VecGetArrayRead(m->F, &F));
+  PetscCall(VecGetArray(m->Fr, &f));
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    if (m->role[i / dim] != HYCO_ROLE_A || m->fe->fixed[i]) continue;
+    if (m->fe_at[i] >= 0) f[m->n_free + m->fe_at[i]] += F[i];
+    for (PetscInt j = 0; j < m->n_free; j++) f[j] += m->Vp[(size_t)i * (size_t)m->l + (size_t)j] * F[i];
+  }
+  PetscCall(VecRestoreArray(m->Fr, &f));
+  PetscCall(VecRestoreArrayRead(m->F, &F));
+  if (!m->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArray(m->Dr, &d));
+  for (PetscInt k = 0; k < m->m; k++) d[k] = m->gap[m->contact[k]];
+  PetscCall(VecRestoreArray(m->Dr, &d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
+{
+  PetscBool first = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  first = (PetscBool)!m->system->K;
+  PetscCall(HycoFESetParameters(m->fe, mu));
+  if (m->fe->stiffness_changed) {
+    PetscCall(HycoFEAssembleStiffness(m->fe, m->K));
+    PetscCall(FillStiffness(m));
+  }
+  PetscCall(HycoFEAssembleForce(m->fe, m->F));
+  PetscCall(HycoContactRows(m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap));
+  if (m->m && m->fe->contact_changed) PetscCall(FillContact(m));
+  PetscCall(FillVectors(m));
+  if (first) {
+    PetscCall(HycoSystemSetMatrices(m->system, m->Kr, m->Btr, m->Br, PETSC_FALSE));
+    PetscCall(HycoSystemSetVectors(m->system, m->Fr, m->Dr));
+    PetscCall(HycoSolverSetSystem(m->solver, m->system));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* gamma, U on the nodes of mesh, Lambda on A_lambda. */
+static PetscErrorCode Unpack(HycoModel m)
+{
+  const PetscScalar *x, *L;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(m->x, &x));
+  for (PetscInt j = 0; j < m->l; j++) {
+    m->gamma[j] = m->n_free ? x[j] : 0;
+    for (PetscInt f = 0; m->G && f < m->n_fe; f++) m->gamma[j] += m->G[j * m->n_fe + f] * x[f];
+  }
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    m->U[i] = m->fe->u0[i];
+    if (m->fe_at[i] >= 0)
+      m->U[i] = x[m->n_free + m->fe_at[i]];
+    else {
+      for (PetscInt j = 0; j < m->l; j++) m->U[i] += m->Vp[(size_t)i * (size_t)m->l + (size_t)j] * m->gamma[j];
+    }
+  }
+  PetscCall(VecRestoreArrayRead(m->x, &x));
+  PetscCall(PetscArrayzero(m->Lambda, m->pairs.n));
+  if (!m->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(m->L, &L));
+  for (PetscInt k = 0; k < m->m; k++) m->Lambda[m->contact[k]] = L[k];
+  PetscCall(VecRestoreArrayRead(m->L, &L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
+{
+  HycoPrediction *p;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
+  p = &m->prediction;
+  PetscCall(HycoSceneCheckParameters(m->scene, n, mu));
+  m->solved = m->whole_current = PETSC_FALSE;
+  PetscCall(HycoModelSetUp(m));
+  p->seconds.setup = HycoNow() - begin;
+  begin = HycoNow();
+  PetscCall(Assemble(m, mu));
+  p->seconds.assemble = HycoNow() - begin;
+  PetscCall(HycoSolverSolve(m->solver, m->x, m->L));
+  PetscCall(HycoSolverGetSeconds(m->solver, &p->seconds.factor, &p->seconds.solve));
+  PetscCall(HycoSolverGetReason(m->solver, &p->reason));
+  PetscCall(HycoSolverGetIterations(m->solver, &p->iterations));
+  PetscCall(HycoSolverGetKKT(m->solver, &p->kkt));
+  PetscCall(Unpack(m));
+  if (m->reconstruct && p->reason > 0) PetscCall(HycoModelReconstruct(m));
+  p->seconds.total = HycoNow() - begin;
+  m->solved = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelCondition(HycoModel m, PetscReal *condition)
+{
+  Mat dense;
+  PetscScalar *a;
+  PetscReal smallest, largest;
+
+  PetscFunctionBegin;
+  *condition = 0;
+  if (m->n > 2500) PetscFunctionReturn(PETSC_SUCCESS); /* an SVD would take minutes */
+  PetscCall(MatConvert(m->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
+  PetscCall(MatDenseGetArray(dense, &a));
+  PetscCall(HycoExtremeSingularValues(m->n, m->n, a, &smallest, &largest));
+  PetscCall(MatDenseRestoreArray(dense, &a));
+  PetscCall(MatDestroy(&dense));
+  *condition = smallest > 0 ? largest / smallest : PETSC_MAX_REAL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,282 @@
+/* HycoSnapshots: a folder with one file per parameter value, each complete or absent. */
+#include <hycosnapshotsimpl.h>
+#include <hycoh5.h>
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static PetscErrorCode MakeFolder(const char folder[])
+{
+  struct stat info;
+
+  PetscFunctionBegin;
+  PetscCheck(strlen(folder) < PETSC_MAX_PATH_LEN - 64, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "the snapshot folder's name is too long");
+  if (mkdir(folder, 0777) != 0) {
+    PetscCheck(errno == EEXIST && stat(folder, &info) == 0 && S_ISDIR(info.st_mode), PETSC_COMM_SELF, PETSC_ERR_USER,
+               "the snapshot folder %s cannot be made: is there such a place, may you write there?", folder);
+  }
+  PetscCheck(access(folder, W_OK) == 0, PETSC_COMM_SELF, PETSC_ERR_USER, "the snapshot folder %s cannot be written",
+             folder);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char folder[], HycoSnapshots *snapshots)
+{
+  HycoSnapshots s;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  PetscCall(PetscNew(&s));
+  PetscCallMPI(MPI_Comm_dup(comm, &s->comm));
+  s->scene = scene;
+  PetscCall(PetscStrncpy(s->folder, folder, sizeof(s->folder)));
+  HycoOnRoot(s->comm, MakeFolder(folder));
+  PetscCall(HycoSceneFingerprint(scene, &s->fingerprint));
+  *snapshots = s;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
+{
+  PetscFunctionBegin;
+  if (!snapshots || !*snapshots) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Comm_free(&(*snapshots)->comm));
+  PetscCall(PetscFree(*snapshots));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The file of a parameter value. */
+static PetscErrorCode SamplePath(HycoSnapshots s, const PetscReal mu[], char path[PETSC_MAX_PATH_LEN])
+{
+  const unsigned long long hash = HycoHash(HYCO_HASH_START, mu, (size_t)s->scene->n_parameters * sizeof(PetscReal));
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(path, PETSC_MAX_PATH_LEN, "%s/%016llx.h5", s->folder, hash));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char path[])
+{
+  char *text, mine[32];
+  int same;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadText(h, "fingerprint", &text));
+  snprintf(mine, sizeof(mine), "%016llx", s->fingerprint);
+  same = strcmp(text, mine) == 0;
+  PetscCall(PetscFree(text));
+  PetscCheck(same, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s is a snapshot of another scene or mesh; remove the folder %s, or name another with -hyco_snapshots",
+             path, s->folder);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* missing[]: the samples without a file, in order. On rank 0. */
+static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, const PetscReal mu[],
+                                  PetscInt *n_missing, PetscInt missing[])
+{
+  PetscFunctionBegin;
+  *n_missing = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    char path[PETSC_MAX_PATH_LEN];
+    HycoH5 h;
+
+    PetscCall(SamplePath(s, mu + k * n_par, path));
+    if (access(path, F_OK) != 0) {
+      missing[(*n_missing)++] = k;
+      continue;
+    }
+    PetscCall(HycoH5Open(path, &h));
+    PetscCall(CheckFingerprint(s, h, path));
+    PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups)
+{
+  PetscMPIInt size;
+  struct stat info;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  *groups = 0;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(HycoOptionsInt(scene->options, "hyco_groups", 0, PETSC_MAX_INT, groups));
+  PetscCheck(*groups <= size, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-hyco_groups is %d on %d ranks; it can be at most the number of ranks", (int)*groups, (int)size);
+  if (*groups) PetscFunctionReturn(PETSC_SUCCESS);
+  *groups = PetscMax(1, PetscMin((PetscInt)size, n));
+  if (stat(scene->mesh_path, &info) == 0) {
+    const double factor = 400.0 * (double)info.st_size,
+                 memory = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGE_SIZE);
+
+    while (*groups > 1 && *groups * factor > memory / 2) (*groups)--;
+  }
+  PetscCallMPI(MPI_Bcast(groups, 1, MPIU_INT, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Writes the solution that the group's rank 0 holds. */
+static PetscErrorCode WriteSample(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], const PetscReal force[])
+{
+  const PetscInt N = fom->n_nodes * fom->fe->dim;
+  char path[PETSC_MAX_PATH_LEN], fingerprint[32];
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
+  PetscCall(HycoH5Create(path, &h));
+  ierr = HycoH5WriteText(h, "fingerprint", fingerprint);
+  if (!ierr) ierr = HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu);
+  if (!ierr) ierr = HycoH5WriteReal(h, "U", N, 1, fom->u);
+  if (!ierr) ierr = HycoH5WriteReal(h, "lambda", fom->n_contacts, 1, fom->lambda);
+  if (!ierr) ierr = HycoH5WriteReal(h, "sigma", fom->n_cells * fom->fe->n_sigma, 1, fom->sigma);
+  if (!ierr) ierr = HycoH5WriteReal(h, "force", N, 1, force);
+  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One sample by one group: solve, check, store. Collective on the group. */
+static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], PetscReal force[])
+{
+  HycoSummary summary;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMSolve(fom, s->scene->n_parameters, mu));
+  PetscCall(HycoFOMGetSummary(fom, &summary));
+  if (summary.reason < 0) {
+    char at[HYCO_LINE] = "";
+
+    for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
+      const size_t length = strlen(at);
+
+      snprintf(at + length, sizeof(at) - length, "%s%s = %.10g", p ? ", " : "", s->scene->parameter[p], (double)mu[p]);
+    }
+    SETERRQ(fom->comm, PETSC_ERR_USER, "the snapshot at %s: %s", at, HycoReasonName(summary.reason));
+  }
+  PetscCall(HycoFOMGetSolution(fom, NULL, NULL, NULL, NULL, NULL, NULL));
+  PetscCall(HycoFOMGetForces(fom, force));
+  HycoOnRoot(fom->comm, WriteSample(s, fom, mu, force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* This rank's group solves its run of the missing samples. */
+static PetscErrorCode SolveGroup(HycoSnapshots s, MPI_Comm group, PetscInt color, PetscInt groups, PetscInt n_par,
+                                 const PetscReal mu[], PetscInt n_all, PetscInt n_missing, const PetscInt missing[],
+                                 HycoProgress progress, void *ctx)
+{
+  const PetscInt first = color * n_missing / groups, last = (color + 1) * n_missing / groups;
+  PetscMPIInt rank;
+  HycoFOM fom;
+  PetscReal *force;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
+  PetscCall(HycoFOMCreate(group, s->scene, &fom));
+  PetscCall(PetscMalloc1(fom->n_nodes * fom->fe->dim, &force));
+  for (PetscInt k = first; k < last; k++) {
+    PetscCall(SolveSample(s, fom, mu + missing[k] * n_par, force));
+    if (rank == 0 && progress)
+      PetscCall(progress(PetscMin(n_all, n_all - n_missing + (k - first + 1) * groups), n_all, ctx));
+  }
+  PetscCall(PetscFree(force));
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgress progress, void *ctx)
+{
+  PetscInt n, n_par, n_missing = 0, *missing, groups = 1, color;
+  const PetscReal *mu;
+  PetscMPIInt rank, size;
+  MPI_Comm group;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSnapshotsOpen()");
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCheck(n > 0, PETSC_COMM_SELF, PETSC_ERR_USER, "the set of samples is empty");
+  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  PetscCall(PetscMalloc1(n, &missing));
+  HycoOnRoot(s->comm, FindMissing(s, n, n_par, mu, &n_missing, missing));
+  PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, s->comm));
+  PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, s->comm));
+  if (n_missing) {
+    PetscCall(HycoSnapshotsChooseGroups(s->comm, s->scene, n_missing, &groups));
+    color = (PetscInt)rank * groups / size;
+    PetscCallMPI(MPI_Comm_split(s->comm, (PetscMPIInt)color, rank, &group));
+    HycoOnEach(s->comm, SolveGroup(s, group, color, groups, n_par, mu, n, n_missing, missing, progress, ctx));
+    PetscCallMPI(MPI_Comm_free(&group));
+  }
+  PetscCall(PetscFree(missing));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadColumns(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt lo, PetscInt rows,
+                                  PetscInt total, PetscScalar data[], PetscInt lda)
+{
+  PetscInt n, n_par;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  for (PetscInt k = 0; k < n; k++) {
+    char path[PETSC_MAX_PATH_LEN];
+    HycoH5 h;
+    PetscInt size, one;
+
+    PetscCall(SamplePath(s, mu + k * n_par, path));
+    PetscCall(HycoH5Open(path, &h));
+    PetscCall(CheckFingerprint(s, h, path));
+    PetscCall(HycoH5GetSize(h, field, &size, &one));
+    PetscCheck(size == total, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s: %s has %d rows where other snapshots have %d; remove the folder", path, field, (int)size,
+               (int)total);
+    PetscCall(HycoH5ReadRows(h, field, lo, rows, 1, data + (size_t)k * (size_t)lda));
+    PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt *rows)
+{
+  const PetscReal *mu;
+  char path[PETSC_MAX_PATH_LEN];
+  HycoH5 h;
+  PetscInt one;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(HycoH5Open(path, &h));
+  PetscCall(HycoH5GetSize(h, field, rows, &one));
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const char field[], Mat *S)
+{
+  PetscInt n, total = 0, lo, hi, lda;
+  PetscScalar *data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
+  HycoOnRoot(s->comm, FirstSize(s, samples, field, &total));
+  PetscCallMPI(MPI_Bcast(&total, 1, MPIU_INT, 0, s->comm));
+  PetscCall(MatCreateDense(s->comm, PETSC_DECIDE, PETSC_DECIDE, total, n, NULL, S));
+  PetscCall(MatGetOwnershipRange(*S, &lo, &hi));
+  PetscCall(MatDenseGetLDA(*S, &lda));
+  PetscCall(MatDenseGetArray(*S, &data));
+  HycoOnEach(s->comm, ReadColumns(s, samples, field, lo, hi - lo, total, data, lda));
+  PetscCall(MatDenseRestoreArray(*S, &data));
+  PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
