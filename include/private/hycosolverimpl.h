@@ -60,8 +60,11 @@ enum { HYCO_TYPE_ACTIVE_SET, HYCO_TYPE_TAO, HYCO_TYPE_LEMKE };
 
 /* Whether K and B are those last seen, unchanged; then remember them. */
 PetscErrorCode HycoSeenUpdate(HycoSeen *seen, Mat K, Mat B, PetscBool *same);
-/* A direct solver for K: MUMPS on several ranks or large, PETSc's own when small or dense. Cholesky when symmetric. */
+/* A direct solver for a sparse K: MUMPS on several ranks or large, PETSc's own when small. Cholesky when symmetric. */
 PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, PetscBool symmetric, KSP *ksp);
+
+/* Factors the operators of such a solver, with more workspace when MUMPS asks for it. */
+PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular);
 
 /* The forms: fill x and L, set its and method; *solved says whether the method finished by its own account. */
 PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBool *solved);

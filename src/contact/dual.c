@@ -176,8 +176,6 @@ static PetscErrorCode FactorDense(HycoSolver s, PetscBool *singular)
 static PetscErrorCode FactorSparse(HycoSolver s, PetscBool *singular)
 {
   Mat K = s->system->K, old = NULL;
-  PC pc;
-  PCFailedReason failed;
 
   PetscFunctionBegin;
   if (s->ksp) PetscCall(KSPGetOperators(s->ksp, &old, NULL));
@@ -186,10 +184,7 @@ static PetscErrorCode FactorSparse(HycoSolver s, PetscBool *singular)
     PetscCall(HycoDirectSolver(s->comm, "hyco_dual_", K, s->system->symmetric, &s->ksp));
   }
   PetscCall(KSPSetOperators(s->ksp, K, K));
-  PetscCall(KSPSetUp(s->ksp));
-  PetscCall(KSPGetPC(s->ksp, &pc));
-  PetscCall(PCGetFailedReason(pc, &failed));
-  *singular = (PetscBool)(failed != PC_NOERROR);
+  PetscCall(HycoFactor(s->ksp, singular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -260,7 +255,12 @@ static PetscErrorCode SetUpDual(HycoSolver s, PetscBool *singular)
       PetscCall(Condense(s, factor));
     }
   }
-  if (*singular) s->factored.K = s->condensed.K = NULL;
+  if (*singular)
+    s->factored.K = s->condensed.K = NULL;
+  else { /* factoring may have touched K's state */
+    PetscCall(HycoSeenUpdate(&s->factored, y->K, NULL, &same_K));
+    PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same_B));
+  }
   s->seconds_factor += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

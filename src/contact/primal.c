@@ -199,7 +199,7 @@ static PetscErrorCode SolveOnSet(HycoSolver s, Vec f, PetscInt n, const PetscInt
 {
   Vec diagonal;
   PetscScalar mean;
-  KSPConvergedReason why;
+  PetscBool singular;
 
   PetscFunctionBegin;
   PetscCall(MatCopy(s->Kg, s->Kw, SAME_NONZERO_PATTERN));
@@ -215,9 +215,11 @@ static PetscErrorCode SolveOnSet(HycoSolver s, Vec f, PetscInt n, const PetscInt
   PetscCall(VecCopy(f, rhs));
   PetscCall(MatZeroRowsColumns(s->Kw, n, a, mean, y, rhs));
   PetscCall(KSPSetOperators(s->ksp_gap, s->Kw, s->Kw));
-  PetscCall(KSPSolve(s->ksp_gap, rhs, y));
-  PetscCall(KSPGetConvergedReason(s->ksp_gap, &why));
-  if (why < 0) s->reason = HYCO_DIVERGED_SINGULAR;
+  PetscCall(HycoFactor(s->ksp_gap, &singular));
+  if (singular)
+    s->reason = HYCO_DIVERGED_SINGULAR;
+  else
+    PetscCall(KSPSolve(s->ksp_gap, rhs, y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -337,6 +337,7 @@ static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
   Mat M, R, X, GX;
   PetscScalar *r;
   KSP ksp;
+  PetscBool singular;
   PC pc;
   Mat factor;
 
@@ -359,7 +360,8 @@ static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
   PetscCall(HycoFEAssembleH1(t->fe, M));
   PetscCall(MatSetOption(M, MAT_SPD, PETSC_TRUE));
   PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_dual_", M, PETSC_TRUE, &ksp));
-  PetscCall(KSPSetUp(ksp));
+  PetscCall(HycoFactor(ksp, &singular));
+  PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the H1 norm's matrix is singular");
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCFactorGetMatrix(pc, &factor));
   PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, &X));

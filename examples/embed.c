@@ -1,0 +1,55 @@
+/* hyco from a program of your own: a scene, a full-order solution, a reduced model, a prediction.
+
+     examples/embed examples/rope model.h5 0.07 0.17
+*/
+#include <hyco.h>
+#include <petscviewer.h>
+#include <stdlib.h>
+
+static PetscErrorCode Run(const char *folder, const char *file, PetscInt n, const PetscReal mu[])
+{
+  HycoScene scene;
+  HycoFOM fom;
+  HycoSummary full;
+  HycoSamples samples;
+  HycoTrainer trainer;
+  HycoModel model;
+  HycoPrediction reduced;
+  const PetscInt grid[] = {6, 6};
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, folder, &scene));
+  PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom)); /* full order */
+  PetscCall(HycoFOMSolve(fom, n, mu));
+  PetscCall(HycoFOMGetSummary(fom, &full));
+  PetscCall(HycoSamplesCreate(scene, &samples)); /* learn from 36 solutions */
+  PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_FALSE));
+  PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
+  PetscCall(HycoTrainerSetFromOptions(trainer));
+  PetscCall(HycoTrainerRun(trainer, samples, file, NULL));
+  PetscCall(HycoModelLoad(file, &model)); /* predict; needs the model file alone */
+  PetscCall(HycoModelPredict(model, n, mu));
+  PetscCall(HycoModelGetPrediction(model, &reduced));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "contact force: full order %.6f (%s), reduced %.6f (%s, %.0f us)\n",
+                        (double)full.total_contact_force, HycoReasonName(full.reason),
+                        (double)reduced.total_contact_force, HycoReasonName(reduced.reason),
+                        1e6 * (double)reduced.seconds.total));
+  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(0);
+}
+
+int main(int argc, char **argv)
+{
+  PetscReal mu[2];
+
+  if (argc < 5) return 2;
+  mu[0] = atof(argv[3]);
+  mu[1] = atof(argv[4]);
+  PetscCall(HycoInitialize(&argc, &argv));
+  PetscCall(Run(argv[1], argv[2], 2, mu));
+  return (int)HycoFinalize();
+}
