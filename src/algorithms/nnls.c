@@ -1,114 +1,147 @@
-/* Nonnegative least squares, Lawson and Hanson's algorithm on the normal equations of the passive set by QR. */
+/* Nonnegative least squares: Lawson and Hanson's active set, the passive columns kept in a QR factorisation that grows
+ * with them. */
 #include <hycoalgorithms.h>
-#include <petscblaslapack.h>
 
-/* Least squares on the columns p[0..k) of A: z (k). */
-static PetscErrorCode LeastSquares(PetscInt m, const PetscReal A[], const PetscReal b[], PetscInt k, const PetscInt p[],
-                                   PetscReal z[], PetscBool *deficient)
+/* Q R = A[:, p[0..k)], y = Q^T b; Q m x k and R column major with leading dimensions m and n. */
+typedef struct {
+  PetscInt m, n, k, *p;
+  PetscReal *Q, *R, *y;
+} Passive;
+
+/* Appends column j of A by modified Gram-Schmidt, twice; false if it depends on those there. */
+static PetscBool Append(Passive *f, const PetscReal A[], const PetscReal b[], PetscInt j)
 {
-  PetscReal *Ap, *y, *work;
-  PetscBLASInt mb, kb, one = 1, lwork, info;
+  const PetscInt m = f->m, k = f->k;
+  PetscReal *q = f->Q + (size_t)k * (size_t)m, *r = f->R + (size_t)k * (size_t)f->n, before = 0, after = 0;
 
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc3(m * k, &Ap, PetscMax(m, k), &y, 64 * (k + 1), &work));
-  for (PetscInt j = 0; j < k; j++) PetscCall(PetscArraycpy(Ap + j * m, A + p[j] * m, m));
-  PetscCall(PetscArraycpy(y, b, m));
-  PetscCall(PetscBLASIntCast(m, &mb));
-  PetscCall(PetscBLASIntCast(k, &kb));
-  PetscCall(PetscBLASIntCast(64 * (k + 1), &lwork));
-  LAPACKgels_("N", &mb, &kb, &one, Ap, &mb, y, &mb, work, &lwork, &info);
-  *deficient = (PetscBool)(info != 0);
-  /* a column that depends on the others to round-off is no better than one that does so exactly */
-  for (PetscInt j = 0; j < k; j++)
-    *deficient = (PetscBool)(*deficient || PetscAbsReal(Ap[j * m + j]) < 1e-12 * PetscAbsReal(Ap[0]));
-  PetscCall(PetscArraycpy(z, y, k));
-  PetscCall(PetscFree3(Ap, y, work));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < m; i++) {
+    q[i] = A[(size_t)j * (size_t)m + (size_t)i];
+    before += q[i] * q[i];
+  }
+  for (PetscInt c = 0; c < k; c++) r[c] = 0;
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt c = 0; c < k; c++) {
+      const PetscReal *other = f->Q + (size_t)c * (size_t)m;
+      PetscReal dot = 0;
+
+      for (PetscInt i = 0; i < m; i++) dot += other[i] * q[i];
+      for (PetscInt i = 0; i < m; i++) q[i] -= dot * other[i];
+      r[c] += dot;
+    }
+  }
+  for (PetscInt i = 0; i < m; i++) after += q[i] * q[i];
+  if (!(after > 1e-24 * before)) return PETSC_FALSE;
+  r[k] = PetscSqrtReal(after);
+  f->y[k] = 0;
+  for (PetscInt i = 0; i < m; i++) {
+    q[i] /= r[k];
+    f->y[k] += q[i] * b[i];
+  }
+  f->p[f->k++] = j;
+  return PETSC_TRUE;
 }
 
-/* r = b - A x and the gradient w = A^T r. */
-static void Gradient(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], const PetscReal x[],
-                     PetscReal r[], PetscReal w[])
+/* z = R^-1 y */
+static void BackSolve(const Passive *f, PetscReal z[])
 {
-  for (PetscInt i = 0; i < m; i++) r[i] = b[i];
-  for (PetscInt j = 0; j < n; j++) {
-    for (PetscInt i = 0; x[j] != 0 && i < m; i++) r[i] -= A[j * m + i] * x[j];
-  }
-  for (PetscInt j = 0; j < n; j++) {
-    w[j] = 0;
-    for (PetscInt i = 0; i < m; i++) w[j] += A[j * m + i] * r[i];
+  for (PetscInt i = f->k - 1; i >= 0; i--) {
+    z[i] = f->y[i];
+    for (PetscInt c = i + 1; c < f->k; c++) z[i] -= f->R[(size_t)c * (size_t)f->n + (size_t)i] * z[c];
+    z[i] /= f->R[(size_t)i * (size_t)f->n + (size_t)i];
   }
 }
 
-/* Moves from x towards z (on the passive set p) until an entry meets 0, which leaves the set; true when z itself is
- * reached. */
-static PetscBool MoveTowards(PetscInt *k, PetscInt p[], const PetscReal z[], PetscReal x[], PetscBool passive[])
+/* Moves from x towards z until an entry meets 0, which leaves the set; true when z itself is reached. */
+static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[], const PetscReal z[], PetscReal x[],
+                             PetscBool passive[])
 {
+  const PetscInt k = f->k;
   PetscReal alpha = 1;
-  PetscInt left = 0, blocking = -1;
+  PetscInt blocking = -1;
 
-  for (PetscInt j = 0; j < *k; j++) {
-    const PetscReal step = z[j] < 0 ? x[p[j]] / (x[p[j]] - z[j]) : 0; /* z = 0: it is there already */
+  for (PetscInt j = 0; j < k; j++) {
+    const PetscReal step = z[j] < 0 ? x[f->p[j]] / (x[f->p[j]] - z[j]) : 0; /* z = 0: it is there already */
 
     if (z[j] <= 0 && (blocking < 0 || step < alpha)) {
       alpha = step;
       blocking = j;
     }
   }
-  for (PetscInt j = 0; j < *k; j++) x[p[j]] += alpha * (z[j] - x[p[j]]);
+  for (PetscInt j = 0; j < k; j++) x[f->p[j]] += alpha * (z[j] - x[f->p[j]]);
   if (blocking < 0) return PETSC_TRUE;
-  for (PetscInt j = 0; j < *k; j++) {
-    if (j == blocking || x[p[j]] <= 0) {
-      x[p[j]] = 0;
-      passive[p[j]] = PETSC_FALSE;
-    } else
-      p[left++] = p[j];
+  x[f->p[blocking]] = 0;
+  f->k = 0;
+  for (PetscInt j = 0; j < k; j++) {
+    const PetscInt column = f->p[j];
+
+    if (x[column] > 0 && Append(f, A, b, column)) continue;
+    x[column] = 0;
+    passive[column] = PETSC_FALSE;
   }
-  *k = left;
   return PETSC_FALSE;
+}
+
+/* r = b - A x = b - Q Q^T b, and the gradient w = A^T r. */
+static void Gradient(const Passive *f, const PetscReal A[], const PetscReal b[], PetscReal r[], PetscReal w[])
+{
+  for (PetscInt i = 0; i < f->m; i++) r[i] = b[i];
+  for (PetscInt c = 0; c < f->k; c++) {
+    const PetscReal *q = f->Q + (size_t)c * (size_t)f->m;
+    PetscReal dot = 0;
+
+    for (PetscInt i = 0; i < f->m; i++) dot += q[i] * r[i];
+    for (PetscInt i = 0; i < f->m; i++) r[i] -= dot * q[i];
+  }
+  for (PetscInt j = 0; j < f->n; j++) {
+    const PetscReal *a = A + (size_t)j * (size_t)f->m;
+
+    w[j] = 0;
+    for (PetscInt i = 0; i < f->m; i++) w[j] += a[i] * r[i];
+  }
 }
 
 PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscReal x[],
                         PetscReal *residual)
 {
+  const PetscInt most = PetscMin(m, n);
+  Passive f = {m, n, 0, NULL, NULL, NULL, NULL};
   PetscReal *r, *w, *z, tol = 0;
-  PetscInt *p, k = 0;
   PetscBool *passive, *banned;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(m, &r, n, &w, n, &z));
-  PetscCall(PetscCalloc3(n, &p, n, &passive, n, &banned));
+  PetscCall(PetscMalloc4(n + 1, &f.p, (size_t)m * (size_t)(most + 1), &f.Q, (size_t)n * (size_t)(most + 1), &f.R, n + 1,
+                         &f.y));
+  PetscCall(PetscMalloc3(m, &r, n, &w, n + 1, &z));
+  PetscCall(PetscCalloc2(n, &passive, n, &banned));
   PetscCall(PetscArrayzero(x, n));
-  Gradient(m, n, A, b, x, r, w);
+  Gradient(&f, A, b, r, w);
   for (PetscInt j = 0; j < n; j++) tol = PetscMax(tol, 1e-12 * PetscAbsReal(w[j]));
-  for (PetscInt it = 0; it < 3 * n + 10; it++) {
+  for (PetscInt it = 0; it < 3 * n + 10 && f.k < most; it++) {
     PetscInt best = -1;
-    PetscBool deficient;
 
     for (PetscInt j = 0; j < n; j++) {
       if (!passive[j] && !banned[j] && w[j] > tol && (best < 0 || w[j] > w[best])) best = j;
     }
-    if (best < 0 || k >= m) break;
-    passive[best] = PETSC_TRUE;
-    p[k++] = best;
-    PetscCall(LeastSquares(m, A, b, k, p, z, &deficient));
-    if (deficient || z[k - 1] <= 0) { /* no way down along this column */
-      passive[best] = PETSC_FALSE;
-      banned[best] = PETSC_TRUE;
-      k--;
+    if (best < 0) break;
+    banned[best] = PETSC_TRUE; /* until the set has changed */
+    if (!Append(&f, A, b, best)) continue;
+    BackSolve(&f, z);
+    if (z[f.k - 1] <= 0) { /* no way down along this column */
+      f.k--;
       continue;
     }
-    while (!MoveTowards(&k, p, z, x, passive)) PetscCall(LeastSquares(m, A, b, k, p, z, &deficient));
+    passive[best] = PETSC_TRUE;
+    while (!MoveTowards(&f, A, b, z, x, passive)) BackSolve(&f, z);
     PetscCall(PetscArrayzero(banned, n));
-    Gradient(m, n, A, b, x, r, w);
+    Gradient(&f, A, b, r, w);
   }
-  Gradient(m, n, A, b, x, r, w);
   if (residual) {
     *residual = 0;
     for (PetscInt i = 0; i < m; i++) *residual += r[i] * r[i];
     *residual = PetscSqrtReal(*residual);
   }
+  PetscCall(PetscFree4(f.p, f.Q, f.R, f.y));
   PetscCall(PetscFree3(r, w, z));
-  PetscCall(PetscFree3(p, passive, banned));
+  PetscCall(PetscFree2(passive, banned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

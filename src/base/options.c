@@ -30,7 +30,8 @@ static const HycoOption option_table[] = {
     {"hyco_rid_whole", "<bool>", "false", "take the whole mesh as the RID"},
     {"hyco_hybrid", "<auto|rank|contact|all>", "auto",
      "displacements kept full order: fewest for full row rank, all contact ones, all"},
-    {"hyco_hybrid_trials", "<int>", "3000", "candidate sets judged by their training error when hybrid is rank"},
+    {"hyco_hybrid_trials", "<int>", "0",
+     "candidate sets judged by their training error when hybrid is rank (0: from the size)"},
     {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
 };
 

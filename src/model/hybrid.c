@@ -117,9 +117,10 @@ static PetscErrorCode Assembled(HycoTrainer t, HycoModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Numerical rank of B[A_lambda, A_c] V[A_c,:] and the contacts whose balance rows the modes resolve best (first `rank`
- * of pivot). */
-static PetscErrorCode ResolvedContacts(HycoModel m, const PetscInt candidate[], PetscInt *rank, PetscInt pivot[])
+/* Numerical rank of B[A_lambda, A_c] V[A_c,:] and the contacts that the modes resolve best (first `rank` of pivot), by
+   their balance rows K V or by their rows B V weighted with the singular values. */
+static PetscErrorCode ResolvedContacts(HycoModel m, const PetscInt candidate[], PetscBool balance, PetscInt *rank,
+                                       PetscInt pivot[])
 {
   const PetscInt l = m->l, dim = m->mesh->dim;
   const PetscInt *ia, *ja;
@@ -158,7 +159,8 @@ static PetscErrorCode ResolvedContacts(HycoModel m, const PetscInt candidate[], 
       PetscCall(PetscFree(first));
     }
   }
-  PetscCall(HycoPivotColumns(l, m->m, KV, *rank, pivot));
+  for (PetscInt k = 0; k < m->m * l; k++) BV[k] *= m->sigma[k % l] / m->sigma[0];
+  PetscCall(HycoPivotColumns(l, m->m, balance ? KV : BV, *rank, pivot));
   PetscCall(PetscFree2(BV, KV));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -191,19 +193,21 @@ static PetscErrorCode Exchange(HycoTrainer t, HycoModel m, PetscInt n, const Pet
                                Verdict *best)
 {
   const PetscInt N = m->m;
+  /* a trial solves every snapshot: bounded by the work, so that a large model is not judged for hours */
+  const PetscInt limit = t->trials ? t->trials : 1 + (PetscInt)(1e6 / ((PetscReal)t->n_s * (PetscReal)m->n));
   PetscInt trials = 1, n_seen = 0, *dof;
   unsigned long long *seen;
   PetscBool improved = PETSC_TRUE;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(n, &dof, t->trials + 1, &seen));
-  while (improved && trials < t->trials) {
+  PetscCall(PetscMalloc2(n, &dof, limit + 1, &seen));
+  while (improved && trials < limit) {
     PetscInt out = -1, in = -1;
     Verdict verdict, round = *best;
 
     improved = PETSC_FALSE;
     for (PetscInt i = 0; i < N; i++) {
-      for (PetscInt j = 0; j < N && trials < t->trials; j++) {
+      for (PetscInt j = 0; j < N && trials < limit; j++) {
         PetscInt k = 0;
         PetscBool past = PETSC_FALSE;
         unsigned long long hash;
@@ -241,30 +245,56 @@ static PetscErrorCode Exchange(HycoTrainer t, HycoModel m, PetscInt n, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ChooseRank(HycoTrainer t, HycoModel m, Verdict *best)
+/* One start, then exchanges. Starts 0 and 1: the contacts that the modes do not resolve, by balance rows and by contact
+   rows; later ones: as many, spread evenly. */
+static PetscErrorCode SearchFrom(HycoTrainer t, HycoModel m, PetscInt start, PetscInt *n, PetscInt dof[],
+                                 Verdict *verdict)
 {
-  PetscInt n = 0, rank = 0, *candidate, *pivot, *dof;
+  PetscInt rank = 0, N, *candidate, *pivot;
   PetscBool *chosen;
 
   PetscFunctionBegin;
   PetscCall(HycoModelSetFE(m, HYCO_HYBRID_RANK, 0, NULL));
   PetscCall(Assembled(t, m));
-  PetscCall(PetscMalloc4(m->m, &candidate, m->m, &pivot, m->m, &chosen, m->m, &dof));
+  N = m->m;
+  PetscCall(PetscMalloc3(N, &candidate, N, &pivot, N, &chosen));
   PetscCall(Candidates(m, candidate));
-  PetscCall(ResolvedContacts(m, candidate, &rank, pivot));
-  for (PetscInt k = 0; k < m->m; k++) chosen[k] = PETSC_TRUE;
-  for (PetscInt k = 0; k < rank; k++) chosen[pivot[k]] = PETSC_FALSE;
-  for (PetscInt k = 0; k < m->m; k++) {
-    if (chosen[k]) dof[n++] = candidate[k];
+  PetscCall(ResolvedContacts(m, candidate, (PetscBool)(start == 0), &rank, pivot));
+  for (PetscInt k = 0; k < N; k++) chosen[k] = (PetscBool)(start < 2);
+  for (PetscInt k = 0; k < rank && start < 2; k++) chosen[pivot[k]] = PETSC_FALSE;
+  for (PetscInt k = 0; k < N - rank && start >= 2; k++) chosen[(k * N / (N - rank) + start - 2) % N] = PETSC_TRUE;
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    *n = 0;
+    for (PetscInt k = 0; k < N; k++) {
+      if (chosen[k]) dof[(*n)++] = candidate[k];
+    }
+    if (pass) break;
+    PetscCall(JudgeSet(t, m, *n, dof, verdict));
+    if (*n && *n < N) PetscCall(Exchange(t, m, *n, candidate, chosen, verdict));
   }
-  PetscCall(JudgeSet(t, m, n, dof, best));
-  if (n && n < m->m) PetscCall(Exchange(t, m, n, candidate, chosen, best));
-  n = 0;
-  for (PetscInt k = 0; k < m->m; k++) {
-    if (chosen[k]) dof[n++] = candidate[k];
+  PetscCall(PetscFree3(candidate, pivot, chosen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The best end of several starts; of the first alone when a trial is expensive, or one choice of several (auto). */
+static PetscErrorCode ChooseRank(HycoTrainer t, HycoModel m, Verdict *best)
+{
+  const PetscInt room = m->pairs.n,
+                 starts = t->hybrid == HYCO_HYBRID_RANK && (PetscReal)t->n_s * (PetscReal)m->l < 1e4 ? 5 : 1;
+  PetscInt n = 0, other, *dof, *rival;
+  Verdict verdict;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(room, &dof, room, &rival));
+  for (PetscInt start = 0; start < starts; start++) {
+    PetscCall(SearchFrom(t, m, start, &other, rival, &verdict));
+    if (start && !Better(&verdict, best)) continue;
+    *best = verdict;
+    n = other;
+    PetscCall(PetscArraycpy(dof, rival, n));
   }
   PetscCall(HycoModelSetFE(m, HYCO_HYBRID_RANK, n, dof));
-  PetscCall(PetscFree4(candidate, pivot, chosen, dof));
+  PetscCall(PetscFree2(dof, rival));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

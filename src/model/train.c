@@ -19,7 +19,6 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   PetscCallMPI(MPI_Comm_rank(t->comm, &t->rank));
   t->scene = scene;
   t->noise = 1e-11;
-  t->trials = 3000;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *trainer = t;
@@ -124,7 +123,7 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   PetscCall(HycoOptionsReal(o, "hyco_rid_contact_extension", 0, PETSC_MAX_REAL, &t->extension));
   PetscCall(HycoOptionsBool(o, "hyco_rid_whole", &t->whole_rid));
   PetscCall(HycoOptionsWord(o, "hyco_hybrid", hybrids, &hybrid));
-  PetscCall(HycoOptionsInt(o, "hyco_hybrid_trials", 1, PETSC_MAX_INT / 8, &t->trials));
+  PetscCall(HycoOptionsInt(o, "hyco_hybrid_trials", 0, PETSC_MAX_INT / 8, &t->trials));
   t->hybrid = (HycoHybrid)hybrid;
   PetscCall(ReadSeedKinds(t));
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
