@@ -39,6 +39,10 @@ struct _p_HycoTrainer {
   PetscInt n_s;
 };
 
+/* Frees what one run leaves behind. */
+PetscErrorCode HycoTrainerReset(HycoTrainer t);
+/* The bases of all snapshots in the store and the points that seed the RID. Collective. */
+PetscErrorCode HycoTrainerReduce(HycoTrainer t, HycoSnapshots store);
 /* Chooses the full-order displacements of a model under training; numbers[] of the model are filled. Rank 0. */
 PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel model);
 

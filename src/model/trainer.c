@@ -1,0 +1,129 @@
+/* HycoTrainer: made, configured, destroyed. */
+#include <hycotrainerimpl.h>
+#include <string.h>
+
+PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *trainer)
+{
+  HycoTrainer t;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  PetscCall(PetscNew(&t));
+  PetscCallMPI(MPI_Comm_dup(comm, &t->comm));
+  PetscCallMPI(MPI_Comm_rank(t->comm, &t->rank));
+  t->scene = scene;
+  t->noise = 1e-11;
+  for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
+  t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
+  *trainer = t;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerReset(HycoTrainer t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEDestroy(&t->fe));
+  PetscCall(HycoPairsDestroy(&t->pairs));
+  PetscCall(HycoMeshDestroy(&t->whole));
+  PetscCall(PetscFree(t->seeds_node));
+  PetscCall(PetscFree(t->seeds_cell));
+  PetscCall(PetscFree(t->sigma));
+  PetscCall(PetscFree(t->V_whole));
+  PetscCall(PetscFree(t->U));
+  PetscCall(PetscFree(t->Lambda));
+  PetscCall(PetscFree(t->VtU));
+  PetscCall(PetscFree(t->U_norm));
+  t->n_seeds_node = t->n_seeds_cell = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerDestroy(HycoTrainer *trainer)
+{
+  HycoTrainer t;
+
+  PetscFunctionBegin;
+  if (!trainer || !*trainer) PetscFunctionReturn(PETSC_SUCCESS);
+  t = *trainer;
+  PetscCall(HycoTrainerReset(t));
+  for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
+  PetscCall(PetscFree(t->region));
+  PetscCallMPI(MPI_Comm_free(&t->comm));
+  PetscCall(PetscFree(*trainer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetSnapshotFolder(HycoTrainer t, const char folder[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetProgress(HycoTrainer t, HycoProgress progress, void *ctx)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  t->progress = progress;
+  t->progress_ctx = ctx;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadSeedKinds(HycoTrainer t)
+{
+  static const char *const words[HYCO_N_SEEDS] = {"displacement", "stress", "force", "dual"};
+  char *list[16];
+  PetscInt n = 16;
+  PetscBool set;
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsGetStringArray(t->scene->options, NULL, "-hyco_rid_modes", list, &n, &set));
+  if (!set) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt k = 0;
+
+    while (k < HYCO_N_SEEDS && strcmp(list[i], words[k])) k++;
+    if (k == HYCO_N_SEEDS)
+      HycoFail("-hyco_rid_modes has \"%s\"; its words are displacement, stress, force and dual", list[i]);
+    t->seed[k] = PETSC_TRUE;
+    PetscCall(PetscFree(list[i]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
+{
+  static const char *const hybrids[] = {"auto", "rank", "contact", "all", NULL};
+  PetscOptions o;
+  PetscInt hybrid, n = 64;
+  PetscBool set;
+  char text[4 * HYCO_LINE];
+
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  o = t->scene->options;
+  hybrid = (PetscInt)t->hybrid;
+  PetscCall(PetscOptionsGetString(o, NULL, "-hyco_snapshots", t->folder, sizeof(t->folder), NULL));
+  PetscCall(HycoOptionsReal(o, "hyco_pod_tol", 0, 1, &t->tol[HYCO_SEED_DISPLACEMENT]));
+  t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_DISPLACEMENT];
+  PetscCall(HycoOptionsReal(o, "hyco_rid_stress_tol", 0, 1, &t->tol[HYCO_SEED_STRESS]));
+  PetscCall(HycoOptionsReal(o, "hyco_rid_force_tol", 0, 1, &t->tol[HYCO_SEED_FORCE]));
+  PetscCall(HycoOptionsReal(o, "hyco_rid_dual_tol", 0, 1, &t->tol[HYCO_SEED_DUAL]));
+  PetscCall(HycoOptionsReal(o, "hyco_pod_noise", 0, 1, &t->noise));
+  PetscCall(HycoOptionsInt(o, "hyco_pod_max_modes", 0, PETSC_MAX_INT, &t->max_modes));
+  PetscCall(HycoOptionsInt(o, "hyco_rid_layers", 0, PETSC_MAX_INT, &t->layers));
+  PetscCall(HycoOptionsReal(o, "hyco_rid_contact_extension", 0, PETSC_MAX_REAL, &t->extension));
+  PetscCall(HycoOptionsBool(o, "hyco_rid_whole", &t->whole_rid));
+  PetscCall(HycoOptionsWord(o, "hyco_hybrid", hybrids, &hybrid));
+  PetscCall(HycoOptionsInt(o, "hyco_hybrid_trials", 0, PETSC_MAX_INT / 8, &t->trials));
+  t->hybrid = (HycoHybrid)hybrid;
+  PetscCall(ReadSeedKinds(t));
+  for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
+  PetscCall(PetscOptionsGetStringArray(o, NULL, "-hyco_rid_groups", t->groups, &n, &set));
+  t->n_groups = set ? n : 0;
+  PetscCall(PetscOptionsGetString(o, NULL, "-hyco_rid_region", text, sizeof(text), &set));
+  PetscCall(PetscFree(t->region));
+  if (set) PetscCall(PetscStrallocpy(text, &t->region));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
