@@ -34,6 +34,9 @@ PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[]);
 /* Fails with a clear line when mu[i] (length n) is not finite or leaves its range. Not collective. */
 PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const PetscReal mu[]);
 
+/* Whether the scene has any contact. Not collective. */
+PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact);
+
 /* The options that the scene carries (its hyco: section, overridden by the command line). Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options);
 

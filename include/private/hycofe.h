@@ -41,6 +41,9 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* Brings everything to mu (length scene->n_parameters), touching only what depends on what changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
 
+/* Fails when a connected part of the mesh can move rigidly whatever its supports, and says how. On the whole mesh. */
+PetscErrorCode HycoFECheckSupports(HycoFE fe);
+
 /* Element stiffness of a cell, row major, nv * dim square, nodes outer, components inner. */
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 

@@ -87,13 +87,18 @@ static void AddStatistics(cJSON *json, PetscInt n, const PetscReal value[], Pets
     worst = PetscMax(worst, e);
     used++;
   }
-  cJSON_AddNumberToObject(object, "mean", used ? sum / used : 0);
-  cJSON_AddNumberToObject(object, "max", worst);
-  (void)!Say("  %-18s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(used ? sum / used : 0),
-             100 * (double)worst);
+  if (used) {
+    cJSON_AddNumberToObject(object, "mean", sum / used);
+    cJSON_AddNumberToObject(object, "max", worst);
+    (void)!Say("  %-18s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(sum / used), 100 * (double)worst);
+  } else { /* no point where it is defined */
+    cJSON_AddNullToObject(object, "mean");
+    cJSON_AddNullToObject(object, "max");
+    (void)!Say("  %-18s undefined at every point\n", name);
+  }
 }
 
-static PetscErrorCode Report(HycoScene scene, PetscInt n, const PetscReal value[])
+static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal value[])
 {
   cJSON *json, *object;
   PetscReal *ratio, mean = 0, kkt = 0, covered[2] = {0, 1};
@@ -120,20 +125,23 @@ static PetscErrorCode Report(HycoScene scene, PetscInt n, const PetscReal value[
   AddStatistics(json, n, value, E_U_RID, "error_u_rid", &none);
   AddStatistics(json, n, value, E_SIGMA, "error_sigma", &none);
   AddStatistics(json, n, value, E_SIGMA_11, "error_sigma_11", &none);
-  AddStatistics(json, n, value, E_LAMBDA_RID, "error_lambda_rid", &undefined);
-  AddStatistics(json, n, value, E_LAMBDA, "error_lambda", &undefined);
+  if (contact) AddStatistics(json, n, value, E_LAMBDA_RID, "error_lambda_rid", &undefined);
+  if (contact) AddStatistics(json, n, value, E_LAMBDA, "error_lambda", &undefined);
   object = cJSON_AddObjectToObject(json, "speedup");
   cJSON_AddNumberToObject(object, "mean", mean);
   cJSON_AddNumberToObject(object, "median", ratio[n / 2]);
-  object = cJSON_AddObjectToObject(json, "covered_force");
-  cJSON_AddNumberToObject(object, "mean", covered[0]);
-  cJSON_AddNumberToObject(object, "min", covered[1]);
+  PetscCall(Say("speed-up: mean %.3g, median %.3g\n", (double)mean, (double)ratio[n / 2]));
+  if (contact) {
+    object = cJSON_AddObjectToObject(json, "covered_force");
+    cJSON_AddNumberToObject(object, "mean", covered[0]);
+    cJSON_AddNumberToObject(object, "min", covered[1]);
+    PetscCall(Say("contact force in the RID: mean %.1f %%, least %.1f %%\n", 100 * (double)covered[0],
+                  100 * (double)covered[1]));
+  }
   cJSON_AddNumberToObject(json, "undefined", undefined);
   cJSON_AddNumberToObject(json, "not_converged", failed);
   cJSON_AddNumberToObject(json, "fallback", fallback);
   cJSON_AddNumberToObject(json, "kkt_max", kkt);
-  PetscCall(Say("speed-up: mean %.3g, median %.3g; force covered by the RID: mean %.1f %%\n", (double)mean,
-                (double)ratio[n / 2], 100 * (double)covered[0]));
   PetscCall(Say("%d not converged, %d by the fallback solver, %d force errors undefined; largest KKT residual %.1e\n",
                 (int)failed, (int)fallback, (int)undefined, (double)kkt));
   PetscCall(PetscFree(ratio));
@@ -151,7 +159,7 @@ PetscErrorCode CommandCompare(void)
   PetscInt n, n_par, groups = 0, color;
   const PetscReal *mu;
   PetscReal *value;
-  PetscBool given;
+  PetscBool given, contact;
   PetscMPIInt rank, size;
   MPI_Comm group;
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
@@ -168,6 +176,7 @@ PetscErrorCode CommandCompare(void)
              "give the test points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverCheckLeft());
+  PetscCall(HycoSceneHasContact(scene, &contact));
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(HycoSnapshotsChooseGroups(PETSC_COMM_WORLD, scene, n, &groups));
@@ -178,7 +187,7 @@ PetscErrorCode CommandCompare(void)
              CompareMine(scene, model, group, color * n / groups, (color + 1) * n / groups, n, n_par, mu, value));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)(n * N_COLUMNS), MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   if (table[0]) PetscCall(DriverWriteTable(table, scene, n, mu, N_COLUMNS, columns, value));
-  PetscCall(Report(scene, n, value));
+  PetscCall(Report(scene, contact, n, value));
   PetscCall(PetscFree(value));
   PetscCallMPI(MPI_Comm_free(&group));
   PetscCall(HycoSamplesDestroy(&samples));

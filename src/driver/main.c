@@ -1,5 +1,6 @@
 /* hyco: a table of commands. */
 #include "driver.h"
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -121,6 +122,7 @@ int main(int argc, char **argv)
   if (answer >= 0) return answer;
   setenv("OPENBLAS_NUM_THREADS", "1", 0);
   if (HycoInitialize(&argc, &argv)) return 1;
+  signal(SIGPIPE, SIG_IGN); /* "hyco ... | head" is no error */
   PetscPushErrorHandler(KeepMessage, NULL);
   ierr = Run(FindCommand(argv[1]), argc, argv);
   PetscPopErrorHandler();

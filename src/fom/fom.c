@@ -221,7 +221,10 @@ static PetscErrorCode Assemble(HycoFOM f, const PetscReal mu[])
   f->solved = f->sigma_ready = PETSC_FALSE;
   HycoOnEach(f->comm, HycoFESetParameters(f->fe, mu));
   if (f->fe_whole != f->fe) HycoOnRoot(f->comm, HycoFESetParameters(f->fe_whole, mu));
-  if (!f->n_free) PetscCall(CountFree(f));
+  if (!f->n_free) {
+    PetscCall(CountFree(f));
+    HycoOnRoot(f->comm, HycoFECheckSupports(f->fe_whole));
+  }
   if (f->fe->stiffness_changed) {
     HycoOnEach(f->comm, HycoFEAssembleStiffness(f->fe, f->K));
     PetscCall(MatSetOption(f->K, MAT_SPD, PETSC_TRUE));

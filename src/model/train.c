@@ -135,6 +135,18 @@ static void Report(HycoTrainer t, HycoModel m, HycoTraining *r)
   r->error_lambda = m->numbers[2];
 }
 
+/* A model that misses its own training solutions by half is refused. */
+static PetscErrorCode CheckUseful(HycoModel m)
+{
+  PetscFunctionBegin;
+  PetscCheck(m->numbers[1] < 0.5, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
+             "condition %.0e): enlarge the RID (-hyco_rid_layers 1, "
+             "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)",
+             100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Rank 0: the RID, the model on it, its full-order displacements, the file. */
 static PetscErrorCode BuildAndSave(HycoTrainer t, const char path[], HycoTraining *report)
 {
@@ -146,6 +158,7 @@ static PetscErrorCode BuildAndSave(HycoTrainer t, const char path[], HycoTrainin
   ierr = CutDomain(t, m);
   if (!ierr) ierr = FillModel(t, m);
   if (!ierr) ierr = HycoTrainerChooseHybrid(t, m);
+  if (!ierr) ierr = CheckUseful(m);
   if (!ierr) ierr = HycoModelSave(m, t->whole, t->V_whole, path);
   if (!ierr) Report(t, m, report);
   PetscCall(HycoModelDestroy(&m));

@@ -122,8 +122,12 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
   PetscCall(PetscOptionsGetStringArray(o, NULL, "-hyco_rid_groups", t->groups, &n, &set));
   t->n_groups = set ? n : 0;
+  if (set && n == 1 && strcmp(t->groups[0], "none") == 0) {
+    PetscCall(PetscFree(t->groups[0]));
+    t->n_groups = 0;
+  }
   PetscCall(PetscOptionsGetString(o, NULL, "-hyco_rid_region", text, sizeof(text), &set));
   PetscCall(PetscFree(t->region));
-  if (set) PetscCall(PetscStrallocpy(text, &t->region));
+  if (set && strcmp(text, "none")) PetscCall(PetscStrallocpy(text, &t->region));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -21,7 +21,11 @@ PetscErrorCode HycoFieldsCheckPath(const char path[])
 static PetscErrorCode WriteNumbers(HycoH5 h, HycoMesh m, const PetscReal X[], HycoScene scene, const PetscReal mu[],
                                    PetscInt n, const HycoField field[], const HycoContactTable *contact)
 {
+  const PetscInt head[2] = {(PetscInt)m->type, m->dim};
+
   PetscFunctionBegin;
+  PetscCall(HycoH5WriteText(h, "title", scene->title));
+  PetscCall(HycoH5WriteInt(h, "mesh/head", 2, 1, head)); /* cell type (line2, tri3, quad4, tet4, hex8), dimension */
   PetscCall(HycoH5WriteReal(h, "mesh/xyz", m->n_nodes, 3, X));
   PetscCall(HycoH5WriteInt(h, "mesh/cells", m->n_cells, m->nv, m->cells));
   PetscCall(HycoH5WriteInt(h, "mesh/node_id", m->n_nodes, 1, m->node_id));

@@ -24,6 +24,14 @@ PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  *contact = (PetscBool)(scene->n_contacts > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options)
 {
   PetscFunctionBegin;
