@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 /* The driver's own options, for -help; which command takes which stands in the table of commands. */
 static const HycoOption own[] = {
@@ -131,8 +132,30 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The folder of a file to be written is there and may be written: asked before the first is, so that none is left
+ * alone. */
+static PetscErrorCode CheckFolder(const char name[], const char path[])
+{
+  char folder[PETSC_MAX_PATH_LEN];
+  char *slash;
+
+  PetscFunctionBegin;
+  PetscCall(PetscStrncpy(folder, path, sizeof(folder)));
+  slash = strrchr(folder, '/');
+  if (slash == folder)
+    slash[1] = '\0';
+  else if (slash)
+    *slash = '\0';
+  else
+    PetscCall(PetscStrncpy(folder, ".", sizeof(folder)));
+  PetscCheck(access(folder, W_OK | X_OK) == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s %s cannot be written: is there such a folder, may you write there?", name, path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode DriverCheckLeft(void)
 {
+  static const char *const files[] = {"report", "table", "output"};
   PetscInt n;
   char **names, **values, first[DRIVER_LINE] = "";
 
@@ -145,6 +168,12 @@ PetscErrorCode DriverCheckLeft(void)
   PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
   PetscCheck(!first[0], PETSC_COMM_SELF, PETSC_ERR_USER,
              "nothing reads the option -%s here; take it away, or see hyco -help", first);
+  for (size_t k = 0; k < sizeof(files) / sizeof(files[0]); k++) {
+    char path[PETSC_MAX_PATH_LEN];
+
+    PetscCall(DriverGet(files[k], PETSC_FALSE, path));
+    if (path[0]) HycoOnRoot(PETSC_COMM_WORLD, CheckFolder(files[k], path));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
