@@ -33,6 +33,10 @@ PetscErrorCode HycoModelDestroy(HycoModel *model);
 /* The scene that the model carries. Borrowed. */
 PetscErrorCode HycoModelGetScene(HycoModel model, HycoScene *scene);
 
+/* Fails unless the model was trained on this scene and mesh (its entries but titles, ranges and options; the mesh
+   file's bytes). Collective on the scene's communicator. */
+PetscErrorCode HycoModelCheckScene(HycoModel model, HycoScene scene);
+
 /* Solves (38) at mu (length n) and reconstructs the contact forces (41). Not collective. Fails outside the trained
    ranges; not converging is no error: see HycoPrediction.reason. */
 PetscErrorCode HycoModelPredict(HycoModel model, PetscInt n, const PetscReal mu[]);

@@ -35,6 +35,7 @@ struct _p_HycoModel {
   PetscInt n_points;
   PetscReal *points; /* training points, n_points x n_parameters */
   char *provenance;
+  char fingerprint[32]; /* of the scene and mesh that it was trained on */
   PetscInt whole_nodes, whole_cells;
   PetscInt counts[3];   /* modes of the dual, stress and force bases that seeded the RID */
   PetscReal numbers[3]; /* condition of the reduced stiffness, training errors of u and lambda */

@@ -16,7 +16,7 @@ struct _p_HycoSystem {
 
 /* What a form keeps between solves while K and B stay as they are. */
 typedef struct {
-  Mat K, B; /* borrowed: only compared */
+  PetscObjectId K, B; /* 0: none */
   PetscObjectState K_state, B_state;
 } HycoSeen;
 

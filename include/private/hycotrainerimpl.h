@@ -37,6 +37,7 @@ struct _p_HycoTrainer {
   PetscReal *VtU;        /* l x n_s column major: V^T of the snapshots less their lifting */
   PetscReal *U_norm;     /* n_s: of the whole snapshot */
   PetscInt n_s;
+  unsigned long long fingerprint;
 };
 
 /* Frees what one run leaves behind. */

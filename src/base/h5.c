@@ -48,7 +48,7 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
   f->id = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
   if (f->id < 0) {
     PetscCall(PetscFree(f));
-    HycoFail("%s is no HDF5 file, or it is damaged", path);
+    HycoFail("%s is no HDF5 file, or it is damaged; if it is a snapshot, remove it and run again", path);
   }
   *file = f;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -6,12 +6,13 @@
 #include <string.h>
 
 static const HycoOption option_table[] = {
-    {"hyco_solver_type", "<active_set|tao|lemke>", "active_set", "method for every contact problem"},
+    {"hyco_solver_type", "<active_set|tao|lemke>", "active_set",
+     "method for the full order (tao) and every contact problem (the others)"},
     {"hyco_solver_form", "<auto|dual|primal>", "auto",
-     "pose it in the forces (few contacts) or in the gaps (as many as unknowns)"},
+     "full order: pose it in the forces (few contacts) or in the gaps (as many as unknowns)"},
     {"hyco_solver_rtol", "<real>", "1e-8", "largest relative KKT residual that counts as solved"},
     {"hyco_solver_max_its", "<int>", "0", "iterations of the active set (0: from the number of contacts)"},
-    {"hyco_solver_warm_start", "<bool>", "true", "start from the last solution's active contacts"},
+    {"hyco_solver_warm_start", "<bool>", "true", "full order: start from the last solution's active contacts"},
     {"hyco_groups", "<int>", "0", "groups of ranks that solve snapshots side by side (0: from the mesh's size)"},
     {"hyco_snapshots", "<folder>", "MODEL.snapshots", "where full-order solutions are stored"},
     {"hyco_pod_tol", "<real>", "1e-7", "energy left out of the displacement basis, the epsilon of (18)"},
@@ -92,10 +93,14 @@ const char *HycoNearest(const char *word, PetscInt n, const char *const names[])
 static PetscErrorCode GetText(PetscOptions options, const char name[], char text[HYCO_LINE], PetscBool *set)
 {
   char dashed[HYCO_LINE];
+  const char *value = NULL;
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", name));
-  PetscCall(PetscOptionsGetString(options, NULL, dashed, text, HYCO_LINE, set));
+  PetscCall(PetscOptionsFindPair(options, NULL, dashed, &value, set));
+  PetscCheck(!*set || !value || strlen(value) < HYCO_LINE, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s is longer than %d characters", name, HYCO_LINE - 1);
+  if (*set) PetscCall(PetscStrncpy(text, value ? value : "", HYCO_LINE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

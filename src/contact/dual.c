@@ -256,7 +256,7 @@ static PetscErrorCode SetUpDual(HycoSolver s, PetscBool *singular)
     }
   }
   if (*singular)
-    s->factored.K = s->condensed.K = NULL;
+    s->factored.K = s->condensed.K = 0;
   else { /* factoring may have touched K's state */
     PetscCall(HycoSeenUpdate(&s->factored, y->K, NULL, &same_K));
     PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same_B));

@@ -5,13 +5,16 @@
 PetscErrorCode HycoSeenUpdate(HycoSeen *seen, Mat K, Mat B, PetscBool *same)
 {
   PetscObjectState k, b = 0;
+  PetscObjectId K_id, B_id = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectStateGet((PetscObject)K, &k));
   if (B) PetscCall(PetscObjectStateGet((PetscObject)B, &b));
-  *same = (PetscBool)(seen->K == K && seen->B == B && seen->K_state == k && seen->B_state == b);
-  seen->K = K;
-  seen->B = B;
+  PetscCall(PetscObjectGetId((PetscObject)K, &K_id));
+  if (B) PetscCall(PetscObjectGetId((PetscObject)B, &B_id));
+  *same = (PetscBool)(seen->K == K_id && seen->B == B_id && seen->K_state == k && seen->B_state == b);
+  seen->K = K_id;
+  seen->B = B_id;
   seen->K_state = k;
   seen->B_state = b;
   PetscFunctionReturn(PETSC_SUCCESS);

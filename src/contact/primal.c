@@ -153,8 +153,13 @@ static PetscErrorCode SetUpPrimal(HycoSolver s)
   PetscCall(PetscFree(s->pivot));
   PetscCall(PetscMalloc1(hi - lo, &s->pivot));
   PetscCall(FindPivots(y, s->pivot));
-  for (PetscInt k = 0; k < hi - lo; k++) {
-    PetscCheck(s->pivot[k] >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+  {
+    PetscMPIInt bad = 0, any;
+
+    for (PetscInt k = 0; k < hi - lo; k++) bad = bad || s->pivot[k] < 0;
+    PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, s->comm));
+    if (any) s->transformed.K = 0;
+    PetscCheck(!any, s->comm, PETSC_ERR_USER,
                "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
   }
   PetscCall(BuildT(s));

@@ -145,6 +145,8 @@ static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
   PetscCall(HycoSystemComputeKKT(s->system, x, L, &s->kkt));
   if (HycoKKTMax(&s->kkt) <= s->rtol)
     s->reason = HYCO_CONVERGED;
+  else if (!(s->kkt.stationarity <= 1e-3))
+    s->reason = HYCO_DIVERGED_SINGULAR; /* K x = r was not even nearly solved */
   else if (s->reason != HYCO_DIVERGED_SINGULAR)
     s->reason = solved || s->kkt.stationarity > s->rtol ? HYCO_DIVERGED_RESIDUAL : HYCO_DIVERGED_ITERATIONS;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -85,6 +85,7 @@ PetscReal HycoKKTMax(const HycoKKT *kkt)
 
 static PetscReal Quotient(PetscReal a, PetscReal b)
 {
+  if (PetscIsInfOrNanReal(a) || PetscIsInfOrNanReal(b)) return PETSC_MAX_REAL;
   return a == 0 ? 0 : b > 0 ? a / b : PETSC_MAX_REAL;
 }
 

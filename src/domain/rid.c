@@ -124,15 +124,18 @@ static PetscErrorCode ExtendContact(HycoMesh m, const HycoPairs *pairs, PetscRea
 }
 
 /* Cells that share a node with Omega_A. */
-static PetscErrorCode AddLayer(HycoMesh m, PetscBool in[])
+static PetscErrorCode AddLayer(HycoMesh m, PetscBool in[], PetscInt *added)
 {
   PetscBool *node;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_nodes, &node));
   PetscCall(MarkNodes(m, in, node));
+  *added = 0;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
-    if (node[m->cells[k]]) in[k / m->nv] = PETSC_TRUE;
+    if (!node[m->cells[k]] || in[k / m->nv]) continue;
+    in[k / m->nv] = PETSC_TRUE;
+    (*added)++;
   }
   PetscCall(PetscFree(node));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -140,7 +143,7 @@ static PetscErrorCode AddLayer(HycoMesh m, PetscBool in[])
 
 PetscErrorCode HycoRIDBuild(HycoScene scene, HycoMesh m, const HycoPairs *pairs, const HycoRIDRecipe *r, PetscBool in[])
 {
-  PetscInt *start, *around;
+  PetscInt *start, *around, added = 1;
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) in[e] = r->whole;
@@ -149,7 +152,7 @@ PetscErrorCode HycoRIDBuild(HycoScene scene, HycoMesh m, const HycoPairs *pairs,
   for (PetscInt k = 0; k < r->n_groups; k++) PetscCall(AddGroup(m, r->groups[k], start, around, in));
   if (r->region) PetscCall(AddRegion(scene, m, r->region, start, around, in));
   if (r->extension > 0) PetscCall(ExtendContact(m, pairs, r->extension, start, around, in));
-  for (PetscInt k = 0; k < r->layers; k++) PetscCall(AddLayer(m, in));
+  for (PetscInt k = 0; k < r->layers && added; k++) PetscCall(AddLayer(m, in, &added));
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(around));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -110,6 +110,20 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
   HycoFail("hyco %s knows no option -%s (hyco %s -help lists them)", command->name, name, command->name);
 }
 
+/* An option of the reduction given where nothing is reduced. */
+static PetscErrorCode CheckTraining(const Command *command, const char name[])
+{
+  static const char *const training[] = {"hyco_pod_", "hyco_rid_", "hyco_hybrid", "hyco_snapshots", NULL};
+
+  PetscFunctionBegin;
+  if (command->run == CommandTrain) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; training[k]; k++) {
+    if (strncasecmp(name, training[k], strlen(training[k])) == 0)
+      HycoFail("hyco %s does not read -%s: it decides a model when that is trained", command->name, name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscBool IsKey(const char word[])
 {
   return (PetscBool)(word[0] == '-' &&
@@ -127,6 +141,7 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
         !(IsSceneEntry(name) && TakesOption(command, "scene"))) {
       PetscCall(Unknown(command, name));
     }
+    PetscCall(CheckTraining(command, name));
     if (k + 1 < argc && !IsKey(argv[k + 1])) k++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -180,12 +195,17 @@ PetscErrorCode DriverCheckLeft(void)
 PetscErrorCode DriverGet(const char name[], PetscBool required, char value[PETSC_MAX_PATH_LEN])
 {
   char dashed[DRIVER_LINE];
+  const char *text = NULL;
   PetscBool set;
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", name));
   value[0] = '\0';
-  PetscCall(PetscOptionsGetString(NULL, NULL, dashed, value, PETSC_MAX_PATH_LEN, &set));
+  PetscCall(PetscOptionsFindPair(NULL, NULL, dashed, &text, &set));
+  PetscCheck(!set || !text || strlen(text) < PETSC_MAX_PATH_LEN - 32, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s is longer than %d characters; put the points in a file: -points FILE.csv", name,
+             PETSC_MAX_PATH_LEN - 32);
+  if (set && text) PetscCall(PetscStrncpy(value, text, PETSC_MAX_PATH_LEN));
   PetscCheck(!set || value[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s needs a value", name);
   PetscCheck(set || !required, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is missing (hyco -help explains it)", name);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -395,6 +415,13 @@ PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool
   }
   PetscCheck(n_sets <= 1, PETSC_COMM_SELF, PETSC_ERR_USER,
              "give one set of points: -grid, or -values_NAME, or -points");
+  {
+    PetscInt n_points;
+
+    PetscCall(HycoSamplesGet(*samples, &n_points, NULL, NULL));
+    PetscCheck(!n_sets || n_points > 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "the set of points is empty; give at least one");
+  }
   *given = (PetscBool)(n_sets == 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -177,6 +177,7 @@ PetscErrorCode CommandCompare(void)
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverCheckLeft());
   PetscCall(HycoSceneHasContact(scene, &contact));
+  PetscCall(HycoModelCheckScene(model, scene));
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(HycoSnapshotsChooseGroups(PETSC_COMM_WORLD, scene, n, &groups));

@@ -9,13 +9,13 @@
 const Command commands[] = {
     {"solve", CommandSolve, "scene mu mu_ output report hyco_monitor",
      "hyco solve -scene FOLDER -mu V,V,... [-output F.xdmf] [-report R.json]", "solve one parameter value, full order"},
-    {"train", CommandTrain, "scene model grid grid_type values_ points report hyco_monitor",
+    {"train", CommandTrain, "scene model grid grid_type values_ points report",
      "hyco train -scene FOLDER -grid N,N,... -model M.h5 [-report R.json]",
      "solve a set of points full order (resumable), reduce, write the model"},
     {"predict", CommandPredict, "model mu mu_ grid grid_type values_ points output report table hyco_monitor",
      "hyco predict -model M.h5 -mu V,V,... [-output F.xdmf] [-report R.json]",
      "solve the reduced model, for one point or a set (-table T.csv); reads only the model file"},
-    {"compare", CommandCompare, "scene model grid grid_type values_ points report table hyco_monitor",
+    {"compare", CommandCompare, "scene model grid grid_type values_ points report table",
      "hyco compare -scene FOLDER -model M.h5 -grid N,N,... [-report R.json] [-table T.csv]",
      "errors and speed-up of the reduced model against full order over a set of points"},
     {"view", CommandView, "scene model", "hyco view -model M.h5 | -scene FOLDER",
@@ -121,9 +121,12 @@ int main(int argc, char **argv)
 
   if (answer >= 0) return answer;
   setenv("OPENBLAS_NUM_THREADS", "1", 0);
-  if (HycoInitialize(&argc, &argv)) return 1;
-  signal(SIGPIPE, SIG_IGN); /* "hyco ... | head" is no error */
   PetscPushErrorHandler(KeepMessage, NULL);
+  if (HycoInitialize(&argc, &argv)) {
+    fprintf(stderr, "hyco: error: %s\n", message[0] ? message : "PETSc does not start");
+    return 1;
+  }
+  signal(SIGPIPE, SIG_IGN); /* "hyco ... | head" is no error */
   ierr = Run(FindCommand(argv[1]), argc, argv);
   PetscPopErrorHandler();
   if (ierr) Stop();

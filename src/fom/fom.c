@@ -221,6 +221,7 @@ static PetscErrorCode Assemble(HycoFOM f, const PetscReal mu[])
   f->solved = f->sigma_ready = PETSC_FALSE;
   HycoOnEach(f->comm, HycoFESetParameters(f->fe, mu));
   if (f->fe_whole != f->fe) HycoOnRoot(f->comm, HycoFESetParameters(f->fe_whole, mu));
+  f->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
   if (!f->n_free) {
     PetscCall(CountFree(f));
     HycoOnRoot(f->comm, HycoFECheckSupports(f->fe_whole));
@@ -233,6 +234,7 @@ static PetscErrorCode Assemble(HycoFOM f, const PetscReal mu[])
   PetscCall(AssembleContact(f, f->fe->contact_changed));
   PetscCall(HycoSystemSetMatrices(f->system, f->K, f->Bt, f->B, PETSC_TRUE));
   PetscCall(HycoSystemSetVectors(f->system, f->F, f->D));
+  f->fe->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

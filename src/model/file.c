@@ -201,6 +201,7 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
   PetscCall(HycoH5WriteReal(h, "training/points", m->n_points, m->scene->n_parameters, m->points));
   PetscCall(HycoH5WriteReal(h, "training/numbers", 3, 1, m->numbers));
   PetscCall(HycoH5WriteText(h, "training/provenance", m->provenance));
+  PetscCall(HycoH5WriteText(h, "training/fingerprint", m->fingerprint));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -296,6 +297,9 @@ static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
   PetscCall(PetscArraycpy(m->numbers, numbers, 3));
   PetscCall(PetscFree(numbers));
   PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
+  PetscCall(HycoH5LoadText(h, "training/fingerprint", &text));
+  PetscCall(PetscStrncpy(m->fingerprint, text, sizeof(m->fingerprint)));
+  PetscCall(PetscFree(text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

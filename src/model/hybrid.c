@@ -101,7 +101,7 @@ static PetscErrorCode RowRank(HycoModel m, PetscReal *ratio)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model at the middle of the training points, with no full-order unknown, so that rows can be looked at. */
+/* The model at the middle of the parameters' ranges, with no full-order unknown, so that rows can be looked at. */
 static PetscErrorCode Assembled(HycoTrainer t, HycoModel m)
 {
   PetscInt n_par;

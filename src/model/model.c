@@ -2,6 +2,8 @@
 #include <hycomodelimpl.h>
 #include <hycofields.h>
 #include <petscviewer.h>
+#include <stdio.h>
+#include <string.h>
 
 PetscErrorCode HycoModelCreate(HycoModel *model)
 {
@@ -79,6 +81,22 @@ PetscErrorCode HycoModelGetScene(HycoModel m, HycoScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoModelCheckScene(HycoModel m, HycoScene scene)
+{
+  unsigned long long hash;
+  char text[32];
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
+  PetscCall(HycoSceneFingerprint(scene, &hash));
+  snprintf(text, sizeof(text), "%016llx", hash);
+  PetscCheck(
+      strcmp(text, m->fingerprint) == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+      "%s was trained on another scene or mesh; give the scene, the mesh and the entries that it was trained with",
+      m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoModelSetReconstruct(HycoModel m, PetscBool reconstruct)
 {
   PetscFunctionBegin;
@@ -126,12 +144,13 @@ PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
   p->n_active = 0;
   p->total_contact_force = p->lambda_max = p->lambda_norm2 = p->covered_force = 0;
   for (PetscInt k = 0; k < m->pairs.n; k++) {
-    p->n_active += m->Lambda[k] > 0;
     p->total_contact_force += m->Lambda[k];
     if (m->in_rid[k]) p->covered_force += m->Lambda[k];
     p->lambda_max = PetscMax(p->lambda_max, m->Lambda[k]);
     p->lambda_norm2 += m->Lambda[k] * m->Lambda[k];
   }
+  for (PetscInt k = 0; k < m->pairs.n; k++)
+    p->n_active += m->Lambda[k] > 1e-10 * p->lambda_max; /* the reconstruction leaves round-off */
   p->covered_force = p->total_contact_force > 0 ? p->covered_force / p->total_contact_force : 1;
   p->lambda_norm2 = PetscSqrtReal(p->lambda_norm2);
   p->u_norm2 = 0;

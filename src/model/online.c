@@ -159,10 +159,13 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
   PetscCall(PetscMalloc1(m->mesh->n_cells * m->fe->n_sigma, &m->stress));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &m->system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver));
-  PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
   PetscCall(HycoSolverSetWarmStart(m->solver,
                                    PETSC_FALSE)); /* the nonsymmetric problem may have several solutions: no history */
   PetscCall(HycoSolverSetFromOptions(m->solver, m->scene->options));
+  /* the reduced problem is not symmetric and may have several solutions: the dual form, no history, no TAO */
+  PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
+  PetscCall(HycoSolverSetWarmStart(m->solver, PETSC_FALSE));
+  if (m->solver->type == HYCO_TYPE_TAO) PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
   m->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -327,6 +330,7 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   PetscFunctionBegin;
   first = (PetscBool)!m->system->K;
   PetscCall(HycoFESetParameters(m->fe, mu));
+  m->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
   if (m->fe->stiffness_changed) {
     PetscCall(HycoFEAssembleStiffness(m->fe, m->K));
     PetscCall(FillStiffness(m));
@@ -335,6 +339,7 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   PetscCall(HycoContactRows(m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap));
   if (m->m && m->fe->contact_changed) PetscCall(FillContact(m));
   PetscCall(FillVectors(m));
+  m->fe->ready = PETSC_TRUE;
   if (first) {
     PetscCall(HycoSystemSetMatrices(m->system, m->Kr, m->Btr, m->Br, PETSC_FALSE));
     PetscCall(HycoSystemSetVectors(m->system, m->Fr, m->Dr));

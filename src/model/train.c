@@ -6,6 +6,7 @@
 #include <hycotrainerimpl.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* The whole mesh on rank 0, its sizes everywhere. */
@@ -32,6 +33,27 @@ static PetscErrorCode ReadMesh(HycoTrainer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* (35)-(36): a contact without a free unknown in A_c is not in A_lambda. */
+static PetscErrorCode DropFixedContacts(HycoTrainer t, const PetscInt role[], PetscInt in_rid[])
+{
+  const PetscInt n = t->pairs.n;
+  PetscInt *start, *dof;
+  PetscReal *value, *gap;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc4(n + 1, &start, 6 * n, &dof, 6 * n, &value, n, &gap));
+  PetscCall(HycoContactRows(t->fe, &t->pairs, start, dof, value, gap));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscBool free = PETSC_FALSE;
+
+    for (PetscInt j = start[k]; j < start[k + 1]; j++)
+      free = (PetscBool)(free || role[dof[j] / t->sizes[3]] == HYCO_ROLE_A);
+    if (!free) in_rid[k] = 0;
+  }
+  PetscCall(PetscFree4(start, dof, value, gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Omega_A and the reduced mesh: its cells, their nodes, the nodes and surfaces of every contact. */
 static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
 {
@@ -47,6 +69,7 @@ static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
   PetscCall(HycoRIDBuild(t->scene, whole, &t->pairs, &recipe, in));
   PetscCall(PetscMalloc1(t->pairs.n, &m->in_rid));
   PetscCall(HycoRIDSets(whole, &t->pairs, in, role, m->in_rid));
+  PetscCall(DropFixedContacts(t, role, m->in_rid));
   for (PetscInt e = 0; e < whole->n_cells; e++) {
     if (in[e]) keep[n_keep++] = e;
   }
@@ -107,6 +130,7 @@ static PetscErrorCode FillModel(HycoTrainer t, HycoModel m)
   snprintf(line, sizeof(line), "  written by hyco %s with PETSc %d.%d.%d\n", HycoVersion(), PETSC_VERSION_MAJOR,
            PETSC_VERSION_MINOR, PETSC_VERSION_SUBMINOR);
   PetscCall(PetscStrallocpy(line, &m->provenance));
+  snprintf(m->fingerprint, sizeof(m->fingerprint), "%016llx", t->fingerprint);
   /* the model has a scene of its own, read from the text it will carry */
   PetscCall(HycoSceneToText(t->scene, &text));
   PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene));
@@ -169,11 +193,14 @@ static PetscErrorCode BuildAndSave(HycoTrainer t, const char path[], HycoTrainin
 /* The model's place can be written before hours of work. */
 static PetscErrorCode CheckWritable(const char path[])
 {
+  struct stat info;
   char probe[PETSC_MAX_PATH_LEN + 16];
   FILE *file;
 
   PetscFunctionBegin;
   snprintf(probe, sizeof(probe), "%s.partial", path);
+  PetscCheck(stat(path, &info) || !S_ISDIR(info.st_mode), PETSC_COMM_SELF, PETSC_ERR_USER,
+             "the model %s is a folder; give the name of a file", path);
   file = fopen(probe, "wb");
   PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_USER,
              "the model %s cannot be written: is there such a folder, may you write there?", path);
@@ -202,6 +229,7 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
   else
     PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s.snapshots", path));
   PetscCall(HycoSnapshotsOpen(t->comm, t->scene, folder, &store));
+  t->fingerprint = store->fingerprint;
   PetscCall(HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
   solved = HycoNow();
   PetscCall(HycoTrainerReduce(t, store));

@@ -78,11 +78,35 @@ static void WriteXDMF(FILE *out, const char h5[], HycoMesh m, PetscInt n, const 
   fprintf(out, "  </Grid>\n </Domain>\n</Xdmf>\n");
 }
 
+/* The numbers must not take the place of a model or a snapshot: those took hours. */
+static PetscErrorCode CheckPlace(const char h5[], const char path[])
+{
+  HycoH5 h;
+  FILE *there = fopen(h5, "rb");
+  PetscBool precious;
+  PetscErrorCode caught;
+  char message[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (!there) PetscFunctionReturn(PETSC_SUCCESS);
+  fclose(there);
+  PetscCall(HycoCatchBegin());
+  caught = HycoH5Open(h5, &h);
+  PetscCall(HycoCatchEnd(caught, message));
+  if (caught) PetscFunctionReturn(PETSC_SUCCESS);
+  precious = (PetscBool)(HycoH5Has(h, "kind") || HycoH5Has(h, "fingerprint"));
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCheck(!precious, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s is a model or a snapshot, and the numbers of %s would go there; give the output another name", h5,
+             path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[], HycoScene scene,
                                const PetscReal mu[], PetscInt n, const HycoField field[],
                                const HycoContactTable *contact)
 {
-  char h5[PETSC_MAX_PATH_LEN], partial[PETSC_MAX_PATH_LEN];
+  char h5[PETSC_MAX_PATH_LEN], partial[PETSC_MAX_PATH_LEN + 16];
   const char *slash;
   HycoH5 h;
   FILE *out;
@@ -91,17 +115,22 @@ PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[
   PetscFunctionBegin;
   PetscCall(HycoFieldsCheckPath(path));
   snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
-  PetscCall(HycoH5Create(h5, &h));
-  ierr = WriteNumbers(h, m, X, scene, mu, n, field, contact);
-  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
-  PetscCall(ierr);
-  PetscCall(PetscSNPrintf(partial, sizeof(partial), "%s.partial", path));
+  PetscCall(CheckPlace(h5, path));
+  snprintf(partial, sizeof(partial), "%s.partial", path);
   out = fopen(partial, "w");
-  PetscCheck(out, PETSC_COMM_SELF, PETSC_ERR_USER, "%s cannot be written", path);
+  PetscCheck(out, PETSC_COMM_SELF, PETSC_ERR_USER, "%s cannot be written: is there such a folder, may you write there?",
+             path);
   slash = strrchr(h5, '/');
   WriteXDMF(out, slash ? slash + 1 : h5, m, n, field);
-  PetscCheck(fclose(out) == 0 && rename(partial, path) == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s cannot be written: is the disk full?", path);
+  ierr = fclose(out) ? PETSC_ERR_FILE_WRITE : HycoH5Create(h5, &h);
+  if (!ierr) {
+    ierr = WriteNumbers(h, m, X, scene, mu, n, field, contact);
+    if (!ierr && rename(partial, path) != 0) ierr = PETSC_ERR_FILE_WRITE;
+    PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  }
+  if (ierr) remove(partial);
+  PetscCheck(!ierr, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s or its .h5 could not be written: is a folder in the way, is the disk full?", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -48,14 +48,17 @@ static PetscErrorCode ListKeys(PetscOptions options, PetscBool method_only, Pets
 /* Reads one option of any length. */
 static PetscErrorCode GetLong(PetscOptions options, const char key[], char **value)
 {
-  char dashed[HYCO_LINE], text[8 * HYCO_LINE];
+  char dashed[HYCO_LINE];
+  const char *text = NULL;
   PetscBool set;
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", key));
-  PetscCall(PetscOptionsGetString(options, NULL, dashed, text, sizeof(text), &set));
-  if (!set) text[0] = '\0';
-  PetscCall(PetscStrallocpy(text, value));
+  PetscCall(PetscOptionsFindPair(options, NULL, dashed, &text, &set));
+  PetscCall(PetscStrallocpy(set && text ? text : "", value));
+  for (char *c = *value; *c; c++) { /* an entry is one line: a model file carries it so */
+    if (*c == '\n' || *c == '\r' || *c == '\t') *c = ' ';
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

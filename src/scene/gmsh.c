@@ -19,6 +19,7 @@ typedef struct {
   char name[256];
   PetscInt body;  /* index in scene->body or -1 */
   PetscInt n, nv; /* elements and nodes of each */
+  PetscInt inner; /* facets between two cells */
   size_t *node, *id;
 } Group;
 
@@ -97,7 +98,7 @@ static PetscErrorCode ReadGroup(HycoScene scene, Group *g)
   gmshFree(name);
   g->body = -1;
   for (PetscInt b = 0; b < scene->n_bodies; b++) {
-    if (strcmp(scene->body[b].name, g->name) == 0) g->body = b;
+    if (g->dim > 0 && strcmp(scene->body[b].name, g->name) == 0) g->body = b;
   }
   gmshModelGetEntitiesForPhysicalGroup(g->dim, g->tag, &entities, &n_entities, &ierr);
   PetscCall(CheckGmsh(ierr, scene->mesh_path));
@@ -197,17 +198,8 @@ static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m, size_
     Group *g = &r->group[k];
 
     for (PetscInt e = 0; g->body >= 0 && e < g->n; e++) {
-      order[n].tag = g->id[e];
-      order[n].place = k;
-      n++;
-    }
-  }
-  n = 0;
-  for (PetscInt k = 0; k < r->n_groups; k++) {
-    Group *g = &r->group[k];
-
-    for (PetscInt e = 0; g->body >= 0 && e < g->n; e++) {
       source[n] = g->node + e * m->nv;
+      order[n].tag = g->id[e];
       order[n].place = n;
       m->cell_body[n] = g->body;
       n++;
@@ -355,7 +347,10 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
     }
     PetscCheck(n > 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: facet %ld of group \"%s\" bounds no cell of a body",
                scene->mesh_path, (long)g->id[f], g->name);
-    if (n > 1) continue; /* between two cells: no boundary, but its nodes are still in the group */
+    if (n > 1) { /* between two cells: no boundary, but its nodes are still in the group */
+      g->inner++;
+      continue;
+    }
     TurnOutward(m, cell, facet);
     m->facet_group[m->n_facets] = group;
     m->facet_cell[m->n_facets] = cell;
@@ -425,6 +420,20 @@ static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
   }
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(around));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A load pushes on a boundary, not between two cells. */
+static PetscErrorCode CheckLoads(HycoScene scene, Reader *r)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < scene->n_loads; k++) {
+    for (PetscInt g = 0; g < r->n_groups; g++) {
+      PetscCheck(!r->group[g].inner || strcmp(r->group[g].name, scene->load[k].group), PETSC_COMM_SELF, PETSC_ERR_USER,
+                 "the load on %s: %d of its facets lie between two cells; give a group on the boundary",
+                 r->group[g].name, (int)r->group[g].inner);
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -529,6 +538,7 @@ static PetscErrorCode ReadOpen(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(PetscFree(node));
   PetscCall(CheckTwins(scene, m));
   PetscCall(CollectGroups(scene, r, m));
+  PetscCall(CheckLoads(scene, r));
   PetscCall(SetNodeBodies(scene, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -51,6 +51,18 @@ PetscErrorCode HycoMeshFindGroup(HycoMesh mesh, const char key[], const char nam
   HycoFail("%s: the mesh has no group \"%s\"; its groups are: %s", key, name, list);
 }
 
+/* No expression for a component that the mesh does not have. */
+static PetscErrorCode CheckComponents(HycoMesh mesh, HycoExpr component[3])
+{
+  PetscFunctionBegin;
+  for (PetscInt c = mesh->dim; c < 3; c++) {
+    PetscCheck(!component[c], PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s: the mesh has %d space dimension%s; there is no component %c", HycoExprKey(component[c]),
+               (int)mesh->dim, mesh->dim > 1 ? "s" : "", "xyz"[c]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
 {
   PetscInt group;
@@ -58,13 +70,10 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   PetscFunctionBegin;
   for (PetscInt k = 0; k < scene->n_fixed; k++)
     PetscCall(HycoMeshFindGroup(mesh, "fixed", scene->fixed[k].group, &group));
-  for (PetscInt k = 0; k < scene->n_fixed; k++) {
-    for (PetscInt c = mesh->dim; c < 3; c++) {
-      PetscCheck(!scene->fixed[k].value[c], PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "%s: the mesh has %d space dimension%s; there is no component %c",
-                 HycoExprKey(scene->fixed[k].value[c]), (int)mesh->dim, mesh->dim > 1 ? "s" : "", "xyz"[c]);
-    }
-  }
+  for (PetscInt k = 0; k < scene->n_fixed; k++) PetscCall(CheckComponents(mesh, scene->fixed[k].value));
+  for (PetscInt k = 0; k < scene->n_bodies; k++) PetscCall(CheckComponents(mesh, scene->body[k].force));
+  for (PetscInt k = 0; k < scene->n_loads; k++) PetscCall(CheckComponents(mesh, scene->load[k].traction));
+  for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(CheckComponents(mesh, scene->contact[k].normal));
   for (PetscInt k = 0; k < scene->n_loads; k++) {
     PetscCall(HycoMeshFindGroup(mesh, scene->load[k].pressure ? "pressure" : "traction", scene->load[k].group, &group));
     PetscCheck(mesh->group_dim[group] == mesh->dim - 1, PETSC_COMM_SELF, PETSC_ERR_USER,

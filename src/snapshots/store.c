@@ -86,7 +86,11 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
 
     PetscCall(SamplePath(s, mu + k * n_par, path));
     if (access(path, F_OK) != 0) {
-      missing[(*n_missing)++] = k;
+      PetscBool twin = PETSC_FALSE;
+
+      for (PetscInt j = 0; j < *n_missing && !twin; j++)
+        PetscCall(PetscArraycmp(mu + missing[j] * n_par, mu + k * n_par, n_par, &twin));
+      if (!twin) missing[(*n_missing)++] = k;
       continue;
     }
     PetscCall(HycoH5Open(path, &h));
