@@ -4,6 +4,7 @@
 
 #include <hycosys.h>
 #include <petscmat.h>
+#include <stdio.h>
 #include <strings.h>
 
 /* The code reads as for the newest supported PETSc; what older ones lack is here. */
@@ -48,8 +49,20 @@ PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE]);
     PetscCall(HycoAgree((comm), message_));                                                                            \
   } while (0)
 
-/* A user's error on this rank: one line. */
-#define HycoFail(...) SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, __VA_ARGS__)
+/* Text as C's printf makes it, cut at HYCO_LINE. */
+void HycoFormat(char line[HYCO_LINE], const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
+
+/* A user's error on this rank: one line, its numbers as C prints them (PETSc would write 2 as "2."). */
+#define HycoFail(...)                                                                                                  \
+  do {                                                                                                                 \
+    char line_[HYCO_LINE];                                                                                             \
+    HycoFormat(line_, __VA_ARGS__);                                                                                    \
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s", line_);                                                             \
+  } while (0)
+#define HycoCheck(condition, ...)                                                                                      \
+  do {                                                                                                                 \
+    if (PetscUnlikely(!(condition))) HycoFail(__VA_ARGS__);                                                            \
+  } while (0)
 
 /* A public handle that is NULL, with the call that makes it. */
 #define HycoCheckHandle(handle, maker)                                                                                 \

@@ -40,8 +40,7 @@ static PetscErrorCode PairNormal(HycoFE fe, const HycoContact *c, PetscInt slave
     if (k < fe->dim) length += n[k] * n[k];
   }
   length = PetscSqrtReal(length);
-  PetscCheck(length > 0, PETSC_COMM_SELF, PETSC_ERR_USER, "contact %s: the normal at node %d has no length", c->name,
-             (int)fe->mesh->node_id[slave]);
+  HycoCheck(length > 0, "contact %s: the normal at node %d has no length", c->name, (int)fe->mesh->node_id[slave]);
   for (PetscInt k = 0; k < 3; k++) n[k] /= length;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -105,9 +104,9 @@ PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start
       }
     }
     start[k + 1] = n;
-    PetscCheck(start[k + 1] > start[k] || gap[k] >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "contact %s: node %d is fixed, and its prescribed displacement penetrates by %g",
-               fe->scene->contact[pairs->contact[k]].name, (int)fe->mesh->node_id[pairs->slave[k]], (double)-gap[k]);
+    HycoCheck(start[k + 1] > start[k] || gap[k] >= 0,
+              "contact %s: node %d is fixed, and its prescribed displacement penetrates by %g",
+              fe->scene->contact[pairs->contact[k]].name, (int)fe->mesh->node_id[pairs->slave[k]], (double)-gap[k]);
   }
   PetscCall(PetscFree(normal));
   PetscFunctionReturn(PETSC_SUCCESS);

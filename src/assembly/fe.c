@@ -45,12 +45,11 @@ static PetscErrorCode MoveNodes(HycoFE fe)
       HycoExpr map = fe->scene->body[b].map[c];
 
       if (!map) continue;
-      PetscCheck(
-          c<m->dim, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: the mesh has %d space dimension%s; there is no component %c",
-              HycoExprKey(map), (int)m->dim, m->dim> 1
-              ? "s"
-              : "",
-          "xyz"[c]);
+      HycoCheck(c<m->dim, "%s: the mesh has %d space dimension%s; there is no component %c", HycoExprKey(map),
+                    (int)m->dim, m->dim> 1
+                    ? "s"
+                    : "",
+                "xyz"[c]);
       for (PetscInt i = 0; i < m->n_nodes; i++) {
         if (m->node_body[i] == b) PetscCall(HycoExprEval(map, fe->mu, 1, m->xyz + 3 * i, fe->X + 3 * i + c));
       }
@@ -78,10 +77,10 @@ static PetscErrorCode SetSupports(HycoFE fe)
         PetscReal value;
 
         PetscCall(HycoExprEval(fixed->value[c], fe->mu, 1, fe->X + 3 * i, &value));
-        PetscCheck(!fe->fixed[dof] ||
-                       PetscAbsReal(value - fe->u0[dof]) <= 1e-12 * (PetscAbsReal(value) + PetscAbsReal(fe->u0[dof])),
-                   PETSC_COMM_SELF, PETSC_ERR_USER, "node %d is fixed twice in %c, to %g and to %g (by %s)",
-                   (int)m->node_id[i], "xyz"[c], (double)fe -> u0[dof], (double)value, HycoExprKey(fixed->value[c]));
+        HycoCheck(!fe->fixed[dof] ||
+                      PetscAbsReal(value - fe->u0[dof]) <= 1e-12 * (PetscAbsReal(value) + PetscAbsReal(fe->u0[dof])),
+                  "node %d is fixed twice in %c, to %g and to %g (by %s)", (int)m->node_id[i], "xyz"[c],
+                  (double)fe -> u0[dof], (double)value, HycoExprKey(fixed->value[c]));
         fe->fixed[dof] = PETSC_TRUE;
         fe->u0[dof] = value;
       }
@@ -109,11 +108,10 @@ static PetscErrorCode SetMaterial(HycoFE fe)
       }
       PetscCall(HycoExprEval(body->young, fe->mu, 1, x, &young));
       if (body->poisson) PetscCall(HycoExprEval(body->poisson, fe->mu, 1, x, &poisson));
-      PetscCheck(young > 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "%s is %g at x = %g, y = %g, z = %g; Young's modulus must be positive", HycoExprKey(body->young),
-                 (double)young, (double)x[0], (double)x[1], (double)x[2]);
-      PetscCheck(poisson > -1 && poisson < 0.5, PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "%s is %g; Poisson's ratio must lie between -1 and 0.5", HycoExprKey(body->poisson), (double)poisson);
+      HycoCheck(young > 0, "%s is %g at x = %g, y = %g, z = %g; Young's modulus must be positive",
+                HycoExprKey(body->young), (double)young, (double)x[0], (double)x[1], (double)x[2]);
+      HycoCheck(poisson > -1 && poisson < 0.5, "%s is %g; Poisson's ratio must lie between -1 and 0.5",
+                HycoExprKey(body->poisson), (double)poisson);
       lame[0] = m->dim == 1 ? 0 : young * poisson / ((1 + poisson) * (1 - 2 * poisson));
       lame[1] = m->dim == 1 ? young : young / (2 * (1 + poisson));
     }

@@ -26,8 +26,8 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
     }
   }
   det = J[0][0] * inv[0][0] + J[0][1] * inv[1][0] + J[0][2] * inv[2][0];
-  PetscCheck(PetscAbsReal(det) > 1e-14 * size, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "cell %d is degenerate: its volume vanishes at a quadrature point", (int)fe->mesh->cell_id[cell]);
+  HycoCheck(PetscAbsReal(det) > 1e-14 * size, "cell %d is degenerate: its volume vanishes at a quadrature point",
+            (int)fe->mesh->cell_id[cell]);
   for (PetscInt a = 0; a < el->nv; a++) {
     for (PetscInt c = 0; c < 3; c++) {
       g[a][c] = 0;

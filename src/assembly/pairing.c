@@ -143,8 +143,7 @@ static PetscErrorCode FindPairs(HycoMesh m, const HycoContact *c, PetscInt index
   Boxes boxes;
 
   PetscFunctionBegin;
-  PetscCheck(n_slave && n_master, PETSC_COMM_SELF, PETSC_ERR_USER, "contact %s: the group %s is empty", c->name,
-             n_slave ? c->master : c->slave);
+  HycoCheck(n_slave && n_master, "contact %s: the group %s is empty", c->name, n_slave ? c->master : c->slave);
   PetscCall(BoxesCreate(m, n_master, master, tolerance, &boxes));
   PetscCall(PetscMalloc1(m->n_nodes, &partner_of));
   for (PetscInt i = 0; i < m->n_nodes; i++) partner_of[i] = -1;
@@ -155,12 +154,11 @@ static PetscErrorCode FindPairs(HycoMesh m, const HycoContact *c, PetscInt index
       if (!missed++) first = slave[k];
       continue;
     }
-    PetscCheck(j != slave[k], PETSC_COMM_SELF, PETSC_ERR_USER,
-               "contact %s: node %d is in both %s and %s; the two surfaces must be apart", c->name, (int)m->node_id[j],
-               c->slave, c->master);
-    PetscCheck(partner_of[j] < 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "contact %s: nodes %d and %d of %s are both nearest to node %d of %s; mesh both surfaces alike", c->name,
-               (int)m->node_id[partner_of[j]], (int)m->node_id[slave[k]], c->slave, (int)m->node_id[j], c->master);
+    HycoCheck(j != slave[k], "contact %s: node %d is in both %s and %s; the two surfaces must be apart", c->name,
+              (int)m->node_id[j], c->slave, c->master);
+    HycoCheck(partner_of[j] < 0,
+              "contact %s: nodes %d and %d of %s are both nearest to node %d of %s; mesh both surfaces alike", c->name,
+              (int)m->node_id[partner_of[j]], (int)m->node_id[slave[k]], c->slave, (int)m->node_id[j], c->master);
     partner_of[j] = slave[k];
     p->slave[p->n] = slave[k];
     p->master[p->n] = j;
@@ -181,10 +179,8 @@ static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const HycoPairs *
   PetscCall(PetscMalloc1(m->n_nodes, &seen));
   for (PetscInt i = 0; i < m->n_nodes; i++) seen[i] = -1;
   for (PetscInt k = 0; k < p->n; k++) {
-    PetscCheck(seen[p->slave[k]] < 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "node %d is a slave of the contacts %s and %s; a node may be the slave of one",
-               (int)m->node_id[p->slave[k]], scene->contact[seen[p->slave[k]]].name,
-               scene->contact[p->contact[k]].name);
+    HycoCheck(seen[p->slave[k]] < 0, "node %d is a slave of the contacts %s and %s; a node may be the slave of one",
+              (int)m->node_id[p->slave[k]], scene->contact[seen[p->slave[k]]].name, scene->contact[p->contact[k]].name);
     seen[p->slave[k]] = p->contact[k];
   }
   PetscCall(PetscFree(seen));
@@ -196,8 +192,8 @@ static PetscErrorCode FindObstacle(HycoScene scene, HycoMesh m, PetscInt index, 
                                    HycoPairs *p)
 {
   PetscFunctionBegin;
-  PetscCheck(m->group_start[group + 1] > m->group_start[group], PETSC_COMM_SELF, PETSC_ERR_USER,
-             "contact %s: the group %s is empty", scene->contact[index].name, m->group_name[group]);
+  HycoCheck(m->group_start[group + 1] > m->group_start[group], "contact %s: the group %s is empty",
+            scene->contact[index].name, m->group_name[group]);
   for (PetscInt k = m->group_start[group]; k < m->group_start[group + 1]; k++) {
     if (held[m->group_node[k]] == m->dim) continue;
     p->slave[p->n] = m->group_node[k];

@@ -1,5 +1,6 @@
 /* Errors: caught as one line of text, and agreed on by all ranks so that none is left waiting. */
 #include <hycoimpl.h>
+#include <stdarg.h>
 #include <time.h>
 
 static char caught_line[HYCO_LINE];
@@ -16,6 +17,15 @@ static PetscErrorCode CatchHandler(MPI_Comm comm, int line, const char *function
     }
   }
   return code;
+}
+
+void HycoFormat(char line[HYCO_LINE], const char format[], ...)
+{
+  va_list args;
+
+  va_start(args, format);
+  vsnprintf(line, HYCO_LINE, format, args);
+  va_end(args);
 }
 
 PetscErrorCode HycoCatchBegin(void)

@@ -40,12 +40,18 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
 
   PetscFunctionBegin;
   probe = fopen(path, "rb");
-  PetscCheck(probe, PETSC_COMM_SELF, PETSC_ERR_USER, "%s cannot be opened: no such file, or not readable", path);
+  HycoCheck(probe, "%s cannot be opened: no such file, or not readable", path);
   fclose(probe);
   PetscCall(PetscNew(&f));
   PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
   H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-  f->id = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+  {
+    hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+
+    H5Pset_fclose_degree(access, H5F_CLOSE_STRONG); /* closing the file closes what a refusal left open in it */
+    f->id = H5Fopen(path, H5F_ACC_RDONLY, access);
+    H5Pclose(access);
+  }
   if (f->id < 0) {
     PetscCall(PetscFree(f));
     HycoFail("%s is no HDF5 file, or it is damaged; if it is a snapshot, remove it and run again", path);
@@ -71,8 +77,7 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
     if (!commit || failed) unlink(f->partial);
   }
   PetscCall(PetscFree(f));
-  PetscCheck(!failed || !commit, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s could not be written to its end: is the disk full?", path);
+  HycoCheck(!failed || !commit, "%s could not be written to its end: is the disk full?", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -91,7 +96,7 @@ static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt ro
   if (set >= 0) H5Dclose(set);
   H5Pclose(links);
   H5Sclose(space);
-  PetscCheck(failed >= 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: writing %s failed: is the disk full?", f->path, name);
+  HycoCheck(failed >= 0, "%s: writing %s failed: is the disk full?", f->path, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -125,8 +130,7 @@ static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, h
 
   PetscFunctionBegin;
   *set = H5Dopen2(f->id, name, H5P_DEFAULT);
-  PetscCheck(*set >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s holds no %s: it was not written by this version of hyco, or is damaged", f->path, name);
+  HycoCheck(*set >= 0, "%s holds no %s: it was not written by this version of hyco, or is damaged", f->path, name);
   space = H5Dget_space(*set);
   type = H5Dget_type(*set);
   rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
@@ -150,16 +154,16 @@ static PetscErrorCode ReadSet(HycoH5 f, const char name[], hid_t set, hid_t type
 
   PetscFunctionBegin;
   H5Dclose(set);
-  PetscCheck(status >= 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s cannot be read: the file is damaged", f->path, name);
+  HycoCheck(status >= 0, "%s: %s cannot be read: the file is damaged", f->path, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode CheckSize(HycoH5 f, const char name[], const hsize_t dims[2], PetscInt rows, PetscInt cols)
 {
   PetscFunctionBegin;
-  PetscCheck((rows < 0 || dims[0] == (hsize_t)rows) && (cols < 0 || dims[1] == (hsize_t)cols), PETSC_COMM_SELF,
-             PETSC_ERR_USER, "%s: %s is %ld x %ld where %d x %d was expected: the file is damaged", f->path, name,
-             (long)dims[0], (long)dims[1], (int)rows, (int)cols);
+  HycoCheck((rows < 0 || dims[0] == (hsize_t)rows) && (cols < 0 || dims[1] == (hsize_t)cols),
+            "%s: %s is %ld x %ld where %d x %d was expected: the file is damaged", f->path, name, (long)dims[0],
+            (long)dims[1], (int)rows, (int)cols);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -206,8 +210,8 @@ PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, Pe
   PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
   PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, *data));
   for (size_t k = 0; k < dims[0] * dims[1]; k++) {
-    PetscCheck(PetscIsNormalReal((*data)[k]) || (*data)[k] == 0 || PetscAbsReal((*data)[k]) < 1, PETSC_COMM_SELF,
-               PETSC_ERR_USER, "%s: %s holds a value that is not finite: the file is damaged", file->path, name);
+    HycoCheck(PetscIsNormalReal((*data)[k]) || (*data)[k] == 0 || PetscAbsReal((*data)[k]) < 1,
+              "%s: %s holds a value that is not finite: the file is damaged", file->path, name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -227,9 +231,8 @@ PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscI
   PetscCall(
       ReadSet(file, name, set, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, *data));
   for (size_t k = 0; k < dims[0] * dims[1]; k++) {
-    PetscCheck((*data)[k] >= lo && (*data)[k] <= hi, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s: %s holds %d, outside %d to %d: the file is damaged", file->path, name, (int)(*data)[k], (int)lo,
-               (int)hi);
+    HycoCheck((*data)[k] >= lo && (*data)[k] <= hi, "%s: %s holds %d, outside %d to %d: the file is damaged",
+              file->path, name, (int)(*data)[k], (int)lo, (int)hi);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -244,9 +247,8 @@ PetscErrorCode HycoH5ReadRows(HycoH5 file, const char name[], PetscInt start, Pe
   if (n == 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
   PetscCall(CheckSize(file, name, dims, -1, cols));
-  PetscCheck((hsize_t)(start + n) <= dims[0], PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s: %s has %ld rows, %d are needed: the file is damaged", file->path, name, (long)dims[0],
-             (int)(start + n));
+  HycoCheck((hsize_t)(start + n) <= dims[0], "%s: %s has %ld rows, %d are needed: the file is damaged", file->path,
+            name, (long)dims[0], (int)(start + n));
   space = H5Dget_space(set);
   H5Sselect_hyperslab(space, H5S_SELECT_SET, offset, NULL, count, NULL);
   memory = H5Screate_simple(2, count, NULL);
@@ -263,7 +265,7 @@ PetscErrorCode HycoH5LoadText(HycoH5 file, const char name[], char **text)
 
   PetscFunctionBegin;
   PetscCall(OpenSet(file, name, H5T_INTEGER, &set, dims));
-  PetscCheck(dims[1] == 1, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s is damaged", file->path, name);
+  HycoCheck(dims[1] == 1, "%s: %s is damaged", file->path, name);
   PetscCall(PetscCalloc1(dims[0] + 1, text));
   PetscCall(ReadSet(file, name, set, H5T_NATIVE_CHAR, H5S_ALL, H5S_ALL, *text));
   PetscFunctionReturn(PETSC_SUCCESS);

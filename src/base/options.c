@@ -98,8 +98,7 @@ static PetscErrorCode GetText(PetscOptions options, const char name[], char text
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", name));
   PetscCall(PetscOptionsFindPair(options, NULL, dashed, &value, set));
-  PetscCheck(!*set || !value || strlen(value) < HYCO_LINE, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-%s is longer than %d characters", name, HYCO_LINE - 1);
+  HycoCheck(!*set || !value || strlen(value) < HYCO_LINE, "-%s is longer than %d characters", name, HYCO_LINE - 1);
   if (*set) PetscCall(PetscStrncpy(text, value ? value : "", HYCO_LINE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -75,8 +75,7 @@ PetscErrorCode HycoSolverSetTolerance(HycoSolver s, PetscReal rtol)
 {
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
-  PetscCheck(rtol > 0 && rtol < 1, PETSC_COMM_SELF, PETSC_ERR_USER, "the tolerance is %g; it must lie between 0 and 1",
-             (double)rtol);
+  HycoCheck(rtol > 0 && rtol < 1, "the tolerance is %g; it must lie between 0 and 1", (double)rtol);
   s->rtol = rtol;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -163,12 +163,12 @@ static PetscErrorCode CheckFolder(const char name[], const char path[])
     *slash = '\0';
   else
     PetscCall(PetscStrncpy(folder, ".", sizeof(folder)));
-  PetscCheck(access(folder, W_OK | X_OK) == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-%s %s cannot be written: is there such a folder, may you write there?", name, path);
+  HycoCheck(access(folder, W_OK | X_OK) == 0, "-%s %s cannot be written: is there such a folder, may you write there?",
+            name, path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverCheckLeft(void)
+static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
 {
   static const char *const files[] = {"report", "table", "output"};
   PetscInt n;
@@ -177,18 +177,40 @@ PetscErrorCode DriverCheckLeft(void)
   PetscFunctionBegin;
   PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
   for (PetscInt k = 0; k < n && !first[0]; k++) {
+    if (early && (strncasecmp(names[k], "hyco_dual_", 10) == 0 || strncasecmp(names[k], "hyco_primal_", 12) == 0))
+      continue;
+    if (tao && strncasecmp(names[k], "hyco_tao_", 9) == 0) continue;
     if (strncmp(names[k], "options_left", 12) && strncmp(names[k], "skip_petscrc", 12) && strcmp(names[k], "nox"))
       PetscCall(PetscStrncpy(first, names[k], sizeof(first)));
   }
   PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
-  PetscCheck(!first[0], PETSC_COMM_SELF, PETSC_ERR_USER,
-             "nothing reads the option -%s here; take it away, or see hyco -help", first);
+  HycoCheck(!first[0], "nothing reads the option -%s here; take it away, or see hyco -help", first);
   for (size_t k = 0; k < sizeof(files) / sizeof(files[0]); k++) {
     char path[PETSC_MAX_PATH_LEN];
 
     PetscCall(DriverGet(files[k], PETSC_FALSE, path));
     if (path[0]) HycoOnRoot(PETSC_COMM_WORLD, CheckFolder(files[k], path));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverCheckLeft(void)
+{
+  PetscFunctionBegin;
+  PetscCall(CheckLeft(PETSC_FALSE, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverCheckLeftEarly(HycoScene scene)
+{
+  static const char *const types[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, HYCO_SOLVER_LEMKE, NULL};
+  PetscOptions options;
+  PetscInt type = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetOptions(scene, &options));
+  PetscCall(HycoOptionsWord(options, "hyco_solver_type", types, &type));
+  PetscCall(CheckLeft(PETSC_TRUE, (PetscBool)(type == 1)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -202,12 +224,12 @@ PetscErrorCode DriverGet(const char name[], PetscBool required, char value[PETSC
   PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", name));
   value[0] = '\0';
   PetscCall(PetscOptionsFindPair(NULL, NULL, dashed, &text, &set));
-  PetscCheck(!set || !text || strlen(text) < PETSC_MAX_PATH_LEN - 32, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-%s is longer than %d characters; put the points in a file: -points FILE.csv", name,
-             PETSC_MAX_PATH_LEN - 32);
+  HycoCheck(!set || !text || strlen(text) < PETSC_MAX_PATH_LEN - 32,
+            "-%s is longer than %d characters; put the points in a file: -points FILE.csv", name,
+            PETSC_MAX_PATH_LEN - 32);
   if (set && text) PetscCall(PetscStrncpy(value, text, PETSC_MAX_PATH_LEN));
-  PetscCheck(!set || value[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s needs a value", name);
-  PetscCheck(set || !required, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is missing (hyco -help explains it)", name);
+  HycoCheck(!set || value[0], "-%s needs a value", name);
+  HycoCheck(set || !required, "-%s is missing (hyco -help explains it)", name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -223,8 +245,8 @@ static PetscErrorCode ParseNumbers(const char name[], const char text[], PetscIn
     char *end;
 
     (*values)[*n] = strtod(at, &end);
-    PetscCheck(end != at && (*end == ',' || *end == '\0') && !PetscIsInfOrNanReal((*values)[*n]), PETSC_COMM_SELF,
-               PETSC_ERR_USER, "-%s is \"%s\"; numbers with commas between are expected", name, text);
+    HycoCheck(end != at && (*end == ',' || *end == '\0') && !PetscIsInfOrNanReal((*values)[*n]),
+              "-%s is \"%s\"; numbers with commas between are expected", name, text);
     (*n)++;
     if (*end == '\0') break;
     at = end + 1;
@@ -266,8 +288,7 @@ static PetscErrorCode CheckNamed(HycoScene scene, const char prefix[])
   }
   PetscCall(PetscOptionsLeftRestore(NULL, &left, &keys, &values));
   PetscCall(ListNames(scene, list));
-  PetscCheck(!bad[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s names no parameter; the scene's are: %s", bad,
-             list[0] ? list : "(none)");
+  HycoCheck(!bad[0], "-%s names no parameter; the scene's are: %s", bad, list[0] ? list : "(none)");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -289,8 +310,7 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
     PetscInt m;
 
     PetscCall(ParseNumbers("mu", text, &m, &values));
-    PetscCheck(m == n, PETSC_COMM_SELF, PETSC_ERR_USER, "-mu has %d values; the scene has %d parameters: %s", (int)m,
-               (int)n, n ? list : "(none)");
+    HycoCheck(m == n, "-mu has %d values; the scene has %d parameters: %s", (int)m, (int)n, n ? list : "(none)");
     PetscCall(PetscArraycpy(mu, values, n));
     PetscCall(PetscFree(values));
   }
@@ -301,13 +321,13 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
     PetscCall(DriverGet(key, PETSC_FALSE, text));
     if (!text[0]) continue;
     PetscCall(ParseNumbers(key, text, &m, &values));
-    PetscCheck(m == 1, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s has %d values; one is expected", key, (int)m);
+    HycoCheck(m == 1, "-%s has %d values; one is expected", key, (int)m);
     mu[p] = values[0];
     given++;
     PetscCall(PetscFree(values));
   }
-  PetscCheck(whole || given == n, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the scene has %d parameters (%s); give -mu with all of them, or -mu_NAME for each", (int)n, list);
+  HycoCheck(whole || given == n, "the scene has %d parameters (%s); give -mu with all of them, or -mu_NAME for each",
+            (int)n, list);
   PetscCall(HycoSceneCheckParameters(scene, n, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -347,11 +367,11 @@ static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char t
   PetscCall(ListNames(scene, list));
   PetscCall(HycoOptionsWord(NULL, "grid_type", types, &type));
   PetscCall(ParseNumbers("grid", text, &m, &values));
-  PetscCheck(m == n && n > 0, PETSC_COMM_SELF, PETSC_ERR_USER, "-grid has %d numbers; the scene has %d parameters: %s",
-             (int)m, (int)n, n ? list : "(none)");
+  HycoCheck(m == n && n > 0, "-grid has %d numbers; the scene has %d parameters: %s", (int)m, (int)n,
+            n ? list : "(none)");
   for (PetscInt p = 0; p < n; p++) {
-    PetscCheck(values[p] >= 1 && values[p] <= 1e8 && values[p] == PetscFloorReal(values[p]), PETSC_COMM_SELF,
-               PETSC_ERR_USER, "-grid is \"%s\"; whole numbers, at least 1, are expected", text);
+    HycoCheck(values[p] >= 1 && values[p] <= 1e8 && values[p] == PetscFloorReal(values[p]),
+              "-grid is \"%s\"; whole numbers, at least 1, are expected", text);
     counts[p] = (PetscInt)values[p];
   }
   PetscCall(PetscFree(values));
@@ -381,8 +401,8 @@ static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscBool 
       PetscCall(PetscStrncpy(missing, names[p], sizeof(missing)));
   }
   *any = (PetscBool)(given > 0);
-  PetscCheck(!given || given == n, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-values_ are given for %d of the %d parameters; -values_%s is missing", (int)given, (int)n, missing);
+  HycoCheck(!given || given == n, "-values_ are given for %d of the %d parameters; -values_%s is missing", (int)given,
+            (int)n, missing);
   if (given) PetscCall(HycoSamplesAddProduct(samples, counts, (const PetscReal *const *)values));
   for (PetscInt p = 0; p < n; p++) PetscCall(PetscFree(values[p]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -413,14 +433,12 @@ PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool
     PetscCall(HycoSamplesAddPoint(*samples, NULL));
     n_sets = 1;
   }
-  PetscCheck(n_sets <= 1, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "give one set of points: -grid, or -values_NAME, or -points");
+  HycoCheck(n_sets <= 1, "give one set of points: -grid, or -values_NAME, or -points");
   {
     PetscInt n_points;
 
     PetscCall(HycoSamplesGet(*samples, &n_points, NULL, NULL));
-    PetscCheck(!n_sets || n_points > 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "the set of points is empty; give at least one");
+    HycoCheck(!n_sets || n_points > 0, "the set of points is empty; give at least one");
   }
   *given = (PetscBool)(n_sets == 1);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -20,9 +20,8 @@ static PetscErrorCode ComparePoint(HycoFOM fom, HycoModel model, PetscInt n_par,
   PetscCall(HycoFOMSolve(fom, n_par, mu));
   PetscCall(HycoFOMGetSummary(fom, &s));
   PetscCall(HycoModelGetScene(model, &scene));
-  PetscCheck(s.reason > 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the full-order solution at the first parameter = %.10g: %s", n_par ? (double)mu[0] : 0.,
-             HycoReasonName(s.reason));
+  HycoCheck(s.reason > 0, "the full-order solution at the first parameter = %.10g: %s", n_par ? (double)mu[0] : 0.,
+            HycoReasonName(s.reason));
   PetscCall(HycoModelPredict(model, n_par, mu));
   PetscCall(HycoModelGetPrediction(model, &p));
   PetscCall(HycoModelCompare(model, fom, &e));
@@ -146,8 +145,7 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
                 (int)failed, (int)fallback, (int)undefined, (double)kkt));
   PetscCall(PetscFree(ratio));
   PetscCall(ReportWrite(&json));
-  PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%d of the %d predictions did not converge; the errors leave them out", (int)failed, (int)n);
+  HycoCheck(!failed, "%d of the %d predictions did not converge; the errors leave them out", (int)failed, (int)n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -171,13 +169,13 @@ PetscErrorCode CommandCompare(void)
   PetscCall(DriverGet("report", PETSC_FALSE, report));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   HycoOnEach(PETSC_COMM_WORLD, HycoModelLoad(file, &model));
-  PetscCall(DriverGetSamples(scene, &samples, &given));
-  PetscCheck(given, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "give the test points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
-  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCall(DriverCheckLeft());
-  PetscCall(HycoSceneHasContact(scene, &contact));
   PetscCall(HycoModelCheckScene(model, scene));
+  PetscCall(DriverGetSamples(scene, &samples, &given));
+  HycoCheck(given,
+            "give the test points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCall(DriverCheckLeftEarly(scene));
+  PetscCall(HycoSceneHasContact(scene, &contact));
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(HycoSnapshotsChooseGroups(PETSC_COMM_WORLD, scene, n, &groups));

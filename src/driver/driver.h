@@ -25,6 +25,9 @@ extern const Command commands[];
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
 /* Nothing was given that nobody read. To be called when all options have been read and before anything is written. */
 PetscErrorCode DriverCheckLeft(void);
+/* The same before the solvers have run: what is meant for them (-hyco_dual_..., -hyco_tao_... with that type) passes.
+ */
+PetscErrorCode DriverCheckLeftEarly(HycoScene scene);
 /* The value of -name; fails when it is required and missing. `value` is "" when absent. */
 PetscErrorCode DriverGet(const char name[], PetscBool required, char value[PETSC_MAX_PATH_LEN]);
 /* One point: -mu v,v,... or -mu_NAME v. */

@@ -48,10 +48,9 @@ static PetscErrorCode One(HycoModel model, HycoScene scene, const char output[])
   HycoOnRoot(PETSC_COMM_WORLD, HycoModelGetPrediction(model, &p));
   PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
   PetscCall(DriverCheckLeft());
-  PetscCheck(p.reason > 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", HycoReasonName(p.reason),
-             (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
-             (double)p.kkt.complementarity);
+  HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", HycoReasonName(p.reason),
+            (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
+            (double)p.kkt.complementarity);
   if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoModelWrite(model, output));
   PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
                 (int)p.n_modes, (int)p.n_fe_dofs, (int)p.n_contacts, (int)p.rid_elements,
@@ -125,9 +124,8 @@ static PetscErrorCode Many(HycoModel model, HycoScene scene, HycoSamples samples
   cJSON_AddNumberToObject(json, "seconds_total", begin);
   PetscCall(ReportWrite(&json));
   PetscCall(PetscFree(value));
-  PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%d of the %d predictions did not converge; the column converged of the table says which", (int)failed,
-             (int)n);
+  HycoCheck(!failed, "%d of the %d predictions did not converge; the column converged of the table says which",
+            (int)failed, (int)n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -149,8 +147,7 @@ PetscErrorCode CommandPredict(void)
   if (monitor) PetscCall(HycoModelSetMonitor(model, DriverMonitor, NULL));
   PetscCall(DriverHasSamples(scene, &set));
   if (set) {
-    PetscCheck(!output[0], PETSC_COMM_SELF, PETSC_ERR_USER,
-               "-output is for one point (-mu); a set of points gives a -table");
+    HycoCheck(!output[0], "-output is for one point (-mu); a set of points gives a -table");
     PetscCall(DriverGetSamples(scene, &samples, &set));
     PetscCall(Many(model, scene, samples));
   } else {

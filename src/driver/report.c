@@ -62,13 +62,12 @@ PetscErrorCode DriverWriteText(const char path[], const char text[])
   PetscFunctionBegin;
   snprintf(partial, sizeof(partial), "%s.partial", path);
   out = fopen(partial, "w");
-  PetscCheck(out, PETSC_COMM_SELF, PETSC_ERR_USER, "%s cannot be written: is there such a folder, may you write there?",
-             path);
+  HycoCheck(out, "%s cannot be written: is there such a folder, may you write there?", path);
   failed = fputs(text, out) < 0;
   failed = fclose(out) != 0 || failed;
   failed = failed || rename(partial, path) != 0;
   if (failed) remove(partial);
-  PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_USER, "%s could not be written to its end: is the disk full?", path);
+  HycoCheck(!failed, "%s could not be written to its end: is the disk full?", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -64,10 +64,9 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
   PetscCall(DriverCheckLeft());
-  PetscCheck(summary.reason > 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", HycoReasonName(summary.reason),
-             (double)summary.kkt.stationarity, (double)summary.kkt.penetration, (double)summary.kkt.adhesion,
-             (double)summary.kkt.complementarity);
+  HycoCheck(summary.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written",
+            HycoReasonName(summary.reason), (double)summary.kkt.stationarity, (double)summary.kkt.penetration,
+            (double)summary.kkt.adhesion, (double)summary.kkt.complementarity);
   if (output[0]) PetscCall(HycoFOMWrite(fom, output));
   PetscCall(Report(scene, mu, fom, &summary));
   PetscCall(HycoFOMDestroy(&fom));

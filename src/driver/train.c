@@ -44,13 +44,12 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverGet("report", PETSC_FALSE, report));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
-  PetscCheck(
-      given, PETSC_COMM_SELF, PETSC_ERR_USER,
-      "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
+  HycoCheck(given,
+            "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
-  PetscCall(DriverCheckLeft());
+  PetscCall(DriverCheckLeftEarly(scene));
   PetscCall(HycoTrainerRun(trainer, samples, model, &t));
   PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t.n_samples,
                 (int)t.n_modes, (int)t.n_stress_modes, (int)t.n_force_modes, (int)t.n_dual_modes));

@@ -12,7 +12,7 @@ PetscErrorCode CommandView(void)
   PetscFunctionBegin;
   PetscCall(DriverGet("scene", PETSC_FALSE, path));
   PetscCall(DriverGet("model", PETSC_FALSE, file));
-  PetscCheck(!path[0] != !file[0], PETSC_COMM_SELF, PETSC_ERR_USER, "give -model FILE.h5 or -scene FOLDER");
+  HycoCheck(!path[0] != !file[0], "give -model FILE.h5 or -scene FOLDER");
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   if (file[0]) {
     HycoOnRoot(PETSC_COMM_WORLD, HycoModelLoad(file, &model));

@@ -27,11 +27,10 @@ static PetscErrorCode Compare(HycoModel m, HycoFOM f, const PetscReal sigma[], H
   Norms u = {0}, rid = {0}, s = {0}, s11 = {0}, lr = {0}, l = {0};
 
   PetscFunctionBegin;
-  PetscCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
-             PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
-             "training mesh",
-             (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
+  HycoCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
+            "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
+            "training mesh",
+            (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
   PetscCall(HycoModelGetWholeU(m, NULL, &U));
   for (PetscInt k = 0; k < f->n_nodes * dim; k++) Add(&u, U[k], f->u[k]);
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {

@@ -85,14 +85,13 @@ static PetscErrorCode LoadGroups(HycoH5 h, const char prefix[], HycoMesh m)
   for (word = strtok_r(names, "\n", &rest); word && g < n; word = strtok_r(NULL, "\n", &rest))
     PetscCall(PetscStrallocpy(word, &m->group_name[g++]));
   PetscCall(PetscFree(names));
-  PetscCheck(g == n, PETSC_COMM_SELF, PETSC_ERR_USER, "the model's group names are damaged");
+  HycoCheck(g == n, "the model's group names are damaged");
   m->n_groups = n;
   n++;
   PetscCall(Name(prefix, "group_start", at));
   PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &n, &one, &m->group_start));
   for (g = 0; g < m->n_groups; g++)
-    PetscCheck(m->group_start[0] == 0 && m->group_start[g] <= m->group_start[g + 1], PETSC_COMM_SELF, PETSC_ERR_USER,
-               "the model's groups are damaged");
+    HycoCheck(m->group_start[0] == 0 && m->group_start[g] <= m->group_start[g + 1], "the model's groups are damaged");
   n = m->group_start[m->n_groups];
   PetscCall(Name(prefix, "group_node", at));
   PetscCall(HycoH5LoadInt(h, at, 0, m->n_nodes - 1, &n, &one, &m->group_node));
@@ -240,13 +239,13 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
   PetscCall(HycoH5LoadText(h, "kind", &kind));
   same = strcmp(kind, HYCO_MODEL_KIND) == 0;
   PetscCall(PetscFree(kind));
-  PetscCheck(same, PETSC_COMM_SELF, PETSC_ERR_USER, "%s is no hyco model", path);
+  HycoCheck(same, "%s is no hyco model", path);
   PetscCall(HycoH5LoadInt(h, "format", 0, PETSC_MAX_INT, &one, &one, &format));
   version = *format;
   PetscCall(PetscFree(format));
-  PetscCheck(version == HYCO_MODEL_FORMAT, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s has model format %d; this hyco (%s) reads format %d: train it again, or use the hyco that wrote it",
-             path, (int)version, HycoVersion(), HYCO_MODEL_FORMAT);
+  HycoCheck(version == HYCO_MODEL_FORMAT,
+            "%s has model format %d; this hyco (%s) reads format %d: train it again, or use the hyco that wrote it",
+            path, (int)version, HycoVersion(), HYCO_MODEL_FORMAT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -266,8 +265,7 @@ static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
   m->whole_cells = sizes[1];
   m->hybrid = (HycoHybrid)sizes[2];
   for (PetscInt k = 0; k < 3; k++) m->counts[k] = sizes[3 + k];
-  PetscCheck(sizes[2] <= HYCO_HYBRID_ALL && sizes[0] > 0 && sizes[1] > 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s: problem/sizes is damaged", m->path);
+  HycoCheck(sizes[2] <= HYCO_HYBRID_ALL && sizes[0] > 0 && sizes[1] > 0, "%s: problem/sizes is damaged", m->path);
   PetscCall(PetscFree(sizes));
   PetscCall(HycoH5LoadInt(h, "mesh/node_whole", 0, m->whole_nodes - 1, &m->mesh->n_nodes, &one, &m->mesh->node_whole));
   PetscCall(HycoH5LoadInt(h, "mesh/cell_whole", 0, m->whole_cells - 1, &m->mesh->n_cells, &one, &m->mesh->cell_whole));
@@ -280,8 +278,7 @@ static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
   PetscCall(HycoH5LoadReal(h, "problem/singular_values", &m->l, &one, &m->sigma));
   PetscCall(HycoH5LoadInt(h, "problem/fe_dof", 0, n_dof - 1, &m->n_fe, &one, &m->fe_dof));
   for (PetscInt k = 1; k < m->n_fe; k++)
-    PetscCheck(m->fe_dof[k] > m->fe_dof[k - 1], PETSC_COMM_SELF, PETSC_ERR_USER, "%s: problem/fe_dof is damaged",
-               m->path);
+    HycoCheck(m->fe_dof[k] > m->fe_dof[k - 1], "%s: problem/fe_dof is damaged", m->path);
   if (HycoH5Has(h, "problem/G")) {
     PetscReal *ridge;
 
@@ -342,8 +339,8 @@ PetscErrorCode HycoModelLoadWhole(HycoModel m)
   n_dof = m->whole->n_nodes * m->whole->dim;
   PetscCall(HycoH5LoadReal(h, "whole/V", &n_dof, &m->l, &m->V_whole));
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCheck(m->whole->n_nodes == m->whole_nodes && m->whole->n_cells == m->whole_cells, PETSC_COMM_SELF,
-             PETSC_ERR_USER, "%s: the whole mesh is damaged", m->path);
+  HycoCheck(m->whole->n_nodes == m->whole_nodes && m->whole->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
+            m->path);
   PetscCall(HycoFECreate(m->scene, m->whole, &m->fe_whole));
   PetscCall(PetscMalloc1(n_dof, &m->U_whole));
   /* the contacts again, in the whole mesh's numbers */

@@ -358,8 +358,7 @@ PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel m)
   PetscCall(PetscMalloc2(m->mesh->n_nodes * m->mesh->dim, &all, m->mesh->n_nodes * m->mesh->dim, &contact));
   PetscCall(FreeUnknowns(t, m, PETSC_FALSE, &n_all, all));
   PetscCall(FreeUnknowns(t, m, PETSC_TRUE, &n_contact, contact));
-  PetscCheck(n_all, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
+  HycoCheck(n_all, "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
   if (!n_contact && kind != HYCO_HYBRID_ALL)
     kind = HYCO_HYBRID_CONTACT; /* no contact in the RID: plain hyper-reduction (31) */
   if (kind == HYCO_HYBRID_AUTO && n_contact < n_all) kind = HYCO_HYBRID_CONTACT;

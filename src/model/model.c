@@ -90,8 +90,8 @@ PetscErrorCode HycoModelCheckScene(HycoModel m, HycoScene scene)
   HycoCheckHandle(m, "HycoModelLoad()");
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
-  PetscCheck(
-      strcmp(text, m->fingerprint) == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+  HycoCheck(
+      strcmp(text, m->fingerprint) == 0,
       "%s was trained on another scene or mesh; give the scene, the mesh and the entries that it was trained with",
       m->path);
   PetscFunctionReturn(PETSC_SUCCESS);

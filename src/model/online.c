@@ -83,7 +83,7 @@ static PetscErrorCode SetUpBasis(HycoModel m)
     m->slave_id[k] = m->mesh->node_id[m->pairs.slave[k]];
     if (m->in_rid[k]) m->contact[m->m++] = k;
   }
-  PetscCheck(m->n > 0, PETSC_COMM_SELF, PETSC_ERR_USER, "the model has no unknown: every training solution is zero");
+  HycoCheck(m->n > 0, "the model has no unknown: every training solution is zero");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

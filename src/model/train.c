@@ -163,11 +163,11 @@ static void Report(HycoTrainer t, HycoModel m, HycoTraining *r)
 static PetscErrorCode CheckUseful(HycoModel m)
 {
   PetscFunctionBegin;
-  PetscCheck(m->numbers[1] < 0.5, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
-             "condition %.0e): enlarge the RID (-hyco_rid_layers 1, "
-             "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)",
-             100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0]);
+  HycoCheck(m->numbers[1] < 0.5,
+            "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
+            "condition %.0e): enlarge the RID (-hyco_rid_layers 1, "
+            "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)",
+            100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -199,11 +199,9 @@ static PetscErrorCode CheckWritable(const char path[])
 
   PetscFunctionBegin;
   snprintf(probe, sizeof(probe), "%s.partial", path);
-  PetscCheck(stat(path, &info) || !S_ISDIR(info.st_mode), PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the model %s is a folder; give the name of a file", path);
+  HycoCheck(stat(path, &info) || !S_ISDIR(info.st_mode), "the model %s is a folder; give the name of a file", path);
   file = fopen(probe, "wb");
-  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the model %s cannot be written: is there such a folder, may you write there?", path);
+  HycoCheck(file, "the model %s cannot be written: is there such a folder, may you write there?", path);
   fclose(file);
   unlink(probe);
   PetscFunctionReturn(PETSC_SUCCESS);

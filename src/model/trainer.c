@@ -128,6 +128,12 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   }
   PetscCall(PetscOptionsGetString(o, NULL, "-hyco_rid_region", text, sizeof(text), &set));
   PetscCall(PetscFree(t->region));
-  if (set && strcmp(text, "none")) PetscCall(PetscStrallocpy(text, &t->region));
+  if (set && strcmp(text, "none")) {
+    HycoExpr region = NULL; /* parsed now, so that a slip does not show after hours */
+
+    PetscCall(HycoExprCreate("hyco_rid_region", text, 0, NULL, &region));
+    PetscCall(HycoExprDestroy(&region));
+    PetscCall(PetscStrallocpy(text, &t->region));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -12,9 +12,8 @@ PetscErrorCode HycoFieldsCheckPath(const char path[])
   const size_t n = strlen(path);
 
   PetscFunctionBegin;
-  PetscCheck(n > 5 && n < PETSC_MAX_PATH_LEN - 16 && strcmp(path + n - 5, ".xdmf") == 0, PETSC_COMM_SELF,
-             PETSC_ERR_USER,
-             "the output is named %s; give a name that ends in .xdmf (the numbers go to the .h5 beside it)", path);
+  HycoCheck(n > 5 && n < PETSC_MAX_PATH_LEN - 16 && strcmp(path + n - 5, ".xdmf") == 0,
+            "the output is named %s; give a name that ends in .xdmf (the numbers go to the .h5 beside it)", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,9 +95,9 @@ static PetscErrorCode CheckPlace(const char h5[], const char path[])
   if (caught) PetscFunctionReturn(PETSC_SUCCESS);
   precious = (PetscBool)(HycoH5Has(h, "kind") || HycoH5Has(h, "fingerprint"));
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCheck(!precious, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s is a model or a snapshot, and the numbers of %s would go there; give the output another name", h5,
-             path);
+  HycoCheck(!precious,
+            "%s is a model or a snapshot, and the numbers of %s would go there; give the output another name", h5,
+            path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -118,8 +117,7 @@ PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[
   PetscCall(CheckPlace(h5, path));
   snprintf(partial, sizeof(partial), "%s.partial", path);
   out = fopen(partial, "w");
-  PetscCheck(out, PETSC_COMM_SELF, PETSC_ERR_USER, "%s cannot be written: is there such a folder, may you write there?",
-             path);
+  HycoCheck(out, "%s cannot be written: is there such a folder, may you write there?", path);
   slash = strrchr(h5, '/');
   WriteXDMF(out, slash ? slash + 1 : h5, m, n, field);
   ierr = fclose(out) ? PETSC_ERR_FILE_WRITE : HycoH5Create(h5, &h);
@@ -129,8 +127,7 @@ PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[
     PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
   }
   if (ierr) remove(partial);
-  PetscCheck(!ierr, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s or its .h5 could not be written: is a folder in the way, is the disk full?", path);
+  HycoCheck(!ierr, "%s or its .h5 could not be written: is a folder in the way, is the disk full?", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -111,12 +111,11 @@ static PetscErrorCode FindFile(const char path[], char file[PETSC_MAX_PATH_LEN],
   char *slash;
 
   PetscFunctionBegin;
-  PetscCheck(strlen(path) + 16 < PETSC_MAX_PATH_LEN, PETSC_COMM_SELF, PETSC_ERR_USER, "the scene's path is too long");
-  PetscCheck(stat(path, &info) == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "there is no scene %s; give a folder with scene.yaml, or a .yaml file", path);
+  HycoCheck(strlen(path) + 16 < PETSC_MAX_PATH_LEN, "the scene's path is too long");
+  HycoCheck(stat(path, &info) == 0, "there is no scene %s; give a folder with scene.yaml, or a .yaml file", path);
   if (S_ISDIR(info.st_mode)) {
     snprintf(file, PETSC_MAX_PATH_LEN, "%s%sscene.yaml", path, path[strlen(path) - 1] == '/' ? "" : "/");
-    PetscCheck(stat(file, &info) == 0, PETSC_COMM_SELF, PETSC_ERR_USER, "the folder %s holds no scene.yaml", path);
+    HycoCheck(stat(file, &info) == 0, "the folder %s holds no scene.yaml", path);
   } else {
     snprintf(file, PETSC_MAX_PATH_LEN, "%s", path);
   }
@@ -138,7 +137,7 @@ static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
   PetscCall(HycoCatchBegin());
   caught = PetscOptionsInsertFileYAML(PETSC_COMM_SELF, options, file, PETSC_TRUE);
   PetscCall(HycoCatchEnd(caught, message));
-  PetscCheck(!caught, PETSC_COMM_SELF, PETSC_ERR_USER, "%s is not YAML that hyco reads: %s", file, message);
+  HycoCheck(!caught, "%s is not YAML that hyco reads: %s", file, message);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

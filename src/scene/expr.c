@@ -84,8 +84,7 @@ PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, c
   e->constant = strtod(text, &end);
   while (*end == ' ') end++;
   if (end != text && *end == '\0' && strpbrk(text, "0123456789")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(text[strspn(text, " \t")] != '\0', PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s is empty; give a number or an expression", key);
+  HycoCheck(text[strspn(text, " \t")] != '\0', "%s is empty; give a number or an expression", key);
   e->parser = mupCreate(muBASETYPE_FLOAT);
   mupSetErrorHandler(e->parser, Quiet);
   mupDefineConst(e->parser, "pi", PETSC_PI); /* muParser's own _pi has 12 digits */

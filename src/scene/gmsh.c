@@ -58,14 +58,13 @@ static PetscErrorCode ReadEntity(const char path[], Group *g, int entity)
     int known = types[t] == 15;
 
     for (int k = 0; k < HYCO_N_CELL_TYPES; k++) known = known || types[t] == gmsh_type[k];
-    PetscCheck(
-        known, PETSC_COMM_SELF, PETSC_ERR_USER,
+    HycoCheck(
+        known,
         "%s: group \"%s\" has elements of gmsh type %d; hyco takes line2, tri3, quad4, tet4 and hex8 (first order)",
         path, g->name, types[t]);
     if (!n_ids[t]) continue;
-    PetscCheck(!g->n || g->nv == nv, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s: group \"%s\" mixes elements of %d and %d nodes; hyco takes one type per mesh", path, g->name,
-               (int)g->nv, (int)nv);
+    HycoCheck(!g->n || g->nv == nv, "%s: group \"%s\" mixes elements of %d and %d nodes; hyco takes one type per mesh",
+              path, g->name, (int)g->nv, (int)nv);
     g->nv = nv;
     PetscCall(PetscRealloc((size_t)(g->n + (PetscInt)n_ids[t]) * sizeof(size_t), &g->id));
     PetscCall(PetscRealloc((size_t)(g->n + (PetscInt)n_ids[t]) * (size_t)nv * sizeof(size_t), &g->node));
@@ -124,12 +123,10 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
       if (r->group[k].dim == 0) continue;
       if (r->group[k].body == b) {
         n += r->group[k].n;
-        PetscCheck(r->group[k].dim == r->dim, PETSC_COMM_SELF, PETSC_ERR_USER,
-                   "body %s is a group of dimension %d; the other bodies have dimension %d", r->group[k].name,
-                   r->group[k].dim, (int)r->dim);
-        PetscCheck(!nv || nv == r->group[k].nv, PETSC_COMM_SELF, PETSC_ERR_USER,
-                   "%s mixes cells of %d and %d nodes; hyco takes one cell type per mesh", scene->mesh_path, (int)nv,
-                   (int)r->group[k].nv);
+        HycoCheck(r->group[k].dim == r->dim, "body %s is a group of dimension %d; the other bodies have dimension %d",
+                  r->group[k].name, r->group[k].dim, (int)r->dim);
+        HycoCheck(!nv || nv == r->group[k].nv, "%s mixes cells of %d and %d nodes; hyco takes one cell type per mesh",
+                  scene->mesh_path, (int)nv, (int)r->group[k].nv);
         nv = r->group[k].nv;
       }
       if (!r->dim || r->group[k].dim == r->dim) {
@@ -137,16 +134,16 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
         PetscCall(PetscStrlcat(list, r->group[k].name, sizeof(list)));
       }
     }
-    PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER, "body \"%s\" has no cells in %s; its cell groups are: %s",
-               scene->body[b].name, scene->mesh_path, list[0] ? list : "(none)");
+    HycoCheck(n, "body \"%s\" has no cells in %s; its cell groups are: %s", scene->body[b].name, scene->mesh_path,
+              list[0] ? list : "(none)");
     cells += n;
   }
   for (int t = 0; t < HYCO_N_CELL_TYPES; t++) {
     if (cell_dim[t] == r->dim && cell_nodes[t] == nv) m->type = (HycoCellType)t;
   }
-  PetscCheck(cell_dim[m->type] == r->dim && cell_nodes[m->type] == nv, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s: cells of dimension %d with %d nodes are no line2, tri3, quad4, tet4 or hex8", scene->mesh_path,
-             (int)r->dim, (int)nv);
+  HycoCheck(cell_dim[m->type] == r->dim && cell_nodes[m->type] == nv,
+            "%s: cells of dimension %d with %d nodes are no line2, tri3, quad4, tet4 or hex8", scene->mesh_path,
+            (int)r->dim, (int)nv);
   m->dim = r->dim;
   m->nv = nv;
   m->nf = facet_nodes[m->type];
@@ -211,10 +208,10 @@ static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m, size_
     HycoDuplicate(n, m->cell_body, &body);
     qsort(order, (size_t)n, sizeof(*order), CompareTagged);
     for (PetscInt e = 0; e < n; e++) {
-      PetscCheck(!e || order[e].tag != order[e - 1].tag, PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "%s: cell %ld lies in two bodies; each cell must lie in one", scene->mesh_path, (long)order[e].tag);
-      PetscCheck(order[e].tag < PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: the cell tag %ld is too large",
-                 scene->mesh_path, (long)order[e].tag);
+      HycoCheck(!e || order[e].tag != order[e - 1].tag, "%s: cell %ld lies in two bodies; each cell must lie in one",
+                scene->mesh_path, (long)order[e].tag);
+      HycoCheck(order[e].tag < PETSC_MAX_INT, "%s: the cell tag %ld is too large", scene->mesh_path,
+                (long)order[e].tag);
       m->cell_id[e] = (PetscInt)order[e].tag;
       m->cell_body[e] = body[order[e].place];
       PetscCall(PetscArraycpy(*node + e * m->nv, source[order[e].place], m->nv));
@@ -258,23 +255,21 @@ static PetscErrorCode CollectNodes(HycoScene scene, Reader *r, HycoMesh m, const
     const PetscInt i = FindTag(r, tags[k]);
 
     if (i < 0) continue;
-    PetscCheck(m->node_id[i] < 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: node %ld stands twice", scene->mesh_path,
-               (long)tags[k]);
-    PetscCheck(tags[k] < PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: the node tag %ld is too large",
-               scene->mesh_path, (long)tags[k]);
+    HycoCheck(m->node_id[i] < 0, "%s: node %ld stands twice", scene->mesh_path, (long)tags[k]);
+    HycoCheck(tags[k] < PETSC_MAX_INT, "%s: the node tag %ld is too large", scene->mesh_path, (long)tags[k]);
     m->node_id[i] = (PetscInt)tags[k];
     found++;
     for (int c = 0; c < 3; c++) {
       m->xyz[3 * i + c] = xyz[3 * k + (size_t)c];
-      PetscCheck(!PetscIsInfOrNanReal(m->xyz[3 * i + c]), PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "%s: node %ld has a coordinate that is not finite", scene->mesh_path, (long)tags[k]);
+      HycoCheck(!PetscIsInfOrNanReal(m->xyz[3 * i + c]), "%s: node %ld has a coordinate that is not finite",
+                scene->mesh_path, (long)tags[k]);
     }
   }
   gmshFree(tags);
   gmshFree(xyz);
   gmshFree(par);
-  PetscCheck(found == m->n_nodes, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s: its cells name %d nodes that the file does not define", scene->mesh_path, (int)(m->n_nodes - found));
+  HycoCheck(found == m->n_nodes, "%s: its cells name %d nodes that the file does not define", scene->mesh_path,
+            (int)(m->n_nodes - found));
   for (PetscInt k = 0; k < total; k++) m->cells[k] = FindTag(r, node[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -328,9 +323,8 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
 {
   PetscFunctionBegin;
   if (g->dim != m->dim - 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(!g->n || g->nv == m->nf, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s: group \"%s\" has facets of %d nodes where the cells' have %d", scene->mesh_path, g->name, (int)g->nv,
-             (int)m->nf);
+  HycoCheck(!g->n || g->nv == m->nf, "%s: group \"%s\" has facets of %d nodes where the cells' have %d",
+            scene->mesh_path, g->name, (int)g->nv, (int)m->nf);
   for (PetscInt f = 0; f < g->n; f++) {
     PetscInt *facet = m->facets + m->n_facets * m->nf, cell = -1, n = 0;
     PetscBool missing = PETSC_FALSE;
@@ -345,8 +339,8 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
         n++;
       }
     }
-    PetscCheck(n > 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: facet %ld of group \"%s\" bounds no cell of a body",
-               scene->mesh_path, (long)g->id[f], g->name);
+    HycoCheck(n > 0, "%s: facet %ld of group \"%s\" bounds no cell of a body", scene->mesh_path, (long)g->id[f],
+              g->name);
     if (n > 1) { /* between two cells: no boundary, but its nodes are still in the group */
       g->inner++;
       continue;
@@ -429,9 +423,9 @@ static PetscErrorCode CheckLoads(HycoScene scene, Reader *r)
   PetscFunctionBegin;
   for (PetscInt k = 0; k < scene->n_loads; k++) {
     for (PetscInt g = 0; g < r->n_groups; g++) {
-      PetscCheck(!r->group[g].inner || strcmp(r->group[g].name, scene->load[k].group), PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "the load on %s: %d of its facets lie between two cells; give a group on the boundary",
-                 r->group[g].name, (int)r->group[g].inner);
+      HycoCheck(!r->group[g].inner || strcmp(r->group[g].name, scene->load[k].group),
+                "the load on %s: %d of its facets lie between two cells; give a group on the boundary",
+                r->group[g].name, (int)r->group[g].inner);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -448,9 +442,9 @@ static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m)
     const PetscInt *cell = m->cells + e * m->nv;
 
     for (PetscInt k = start[cell[0]]; k < start[cell[0] + 1]; k++) {
-      PetscCheck(around[k] >= e || !CellHas(m, around[k], m->nv, cell), PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "%s: cells %d and %d have the same nodes: is one cell in two bodies?", scene->mesh_path,
-                 (int)m->cell_id[around[k]], (int)m->cell_id[e]);
+      HycoCheck(around[k] >= e || !CellHas(m, around[k], m->nv, cell),
+                "%s: cells %d and %d have the same nodes: is one cell in two bodies?", scene->mesh_path,
+                (int)m->cell_id[around[k]], (int)m->cell_id[e]);
     }
   }
   PetscCall(PetscFree(start));
@@ -476,9 +470,9 @@ static PetscErrorCode SetNodeBodies(HycoScene scene, HycoMesh m)
     PetscInt *body = &m->node_body[m->cells[k]], b = m->cell_body[k / m->nv];
 
     if (*body >= 0 && *body != b) {
-      PetscCheck(SameMap(&scene->body[*body], &scene->body[b]), PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "%s: the bodies %s and %s share node %d, and a map moves one of them", scene->mesh_path,
-                 scene->body[*body].name, scene->body[b].name, (int)m->node_id[m->cells[k]]);
+      HycoCheck(SameMap(&scene->body[*body], &scene->body[b]),
+                "%s: the bodies %s and %s share node %d, and a map moves one of them", scene->mesh_path,
+                scene->body[*body].name, scene->body[b].name, (int)m->node_id[m->cells[k]]);
       *body = PetscMin(*body, b);
     } else
       *body = b;
@@ -492,9 +486,8 @@ static PetscErrorCode SetNodeBodies(HycoScene scene, HycoMesh m)
       hi = PetscMax(hi, m->xyz[3 * i + c]);
       size = PetscMax(size, PetscAbsReal(m->xyz[3 * i] - m->xyz[0]));
     }
-    PetscCheck(hi - lo <= 1e-9 * size, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s has cells of dimension %d, but its %c coordinates run from %g to %g", scene->mesh_path, (int)m->dim,
-               "xyz"[c], (double)lo, (double)hi);
+    HycoCheck(hi - lo <= 1e-9 * size, "%s has cells of dimension %d, but its %c coordinates run from %g to %g",
+              scene->mesh_path, (int)m->dim, "xyz"[c], (double)lo, (double)hi);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -508,9 +501,9 @@ static PetscErrorCode ReadGroups(HycoScene scene, Reader *r)
   gmshModelGetPhysicalGroups(&dim_tags, &n, -1, &ierr);
   PetscCall(CheckGmsh(ierr, scene->mesh_path));
   r->n_groups = (PetscInt)(n / 2);
-  PetscCheck(r->n_groups, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s has no physical groups; name the bodies and surfaces in gmsh (Physical Volume, Physical Surface, ...)",
-             scene->mesh_path);
+  HycoCheck(r->n_groups,
+            "%s has no physical groups; name the bodies and surfaces in gmsh (Physical Volume, Physical Surface, ...)",
+            scene->mesh_path);
   PetscCall(PetscCalloc1(r->n_groups, &r->group));
   for (PetscInt k = 0; k < r->n_groups; k++) {
     r->group[k].dim = dim_tags[2 * k];
@@ -552,15 +545,13 @@ static PetscErrorCode CheckPath(HycoScene scene)
   FILE *file;
 
   PetscFunctionBegin;
-  PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the scene names no mesh; write scene: mesh: FILE.msh, or give -scene_mesh FILE.msh");
+  HycoCheck(n, "the scene names no mesh; write scene: mesh: FILE.msh, or give -scene_mesh FILE.msh");
   file = fopen(path, "rb");
-  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the mesh %s cannot be opened; scripts/meshes makes the examples' meshes, gmsh -3 a .geo's", path);
+  HycoCheck(file, "the mesh %s cannot be opened; scripts/meshes makes the examples' meshes, gmsh -3 a .geo's", path);
   n = fread(head, 1, 11, file);
   fclose(file);
-  PetscCheck(n == 11 && strncmp(head, "$MeshFormat", 11) == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s is no gmsh mesh: it does not begin with $MeshFormat", path);
+  HycoCheck(n == 11 && strncmp(head, "$MeshFormat", 11) == 0, "%s is no gmsh mesh: it does not begin with $MeshFormat",
+            path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -56,9 +56,8 @@ static PetscErrorCode CheckComponents(HycoMesh mesh, HycoExpr component[3])
 {
   PetscFunctionBegin;
   for (PetscInt c = mesh->dim; c < 3; c++) {
-    PetscCheck(!component[c], PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s: the mesh has %d space dimension%s; there is no component %c", HycoExprKey(component[c]),
-               (int)mesh->dim, mesh->dim > 1 ? "s" : "", "xyz"[c]);
+    HycoCheck(!component[c], "%s: the mesh has %d space dimension%s; there is no component %c",
+              HycoExprKey(component[c]), (int)mesh->dim, mesh->dim > 1 ? "s" : "", "xyz"[c]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -76,18 +75,18 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(CheckComponents(mesh, scene->contact[k].normal));
   for (PetscInt k = 0; k < scene->n_loads; k++) {
     PetscCall(HycoMeshFindGroup(mesh, scene->load[k].pressure ? "pressure" : "traction", scene->load[k].group, &group));
-    PetscCheck(mesh->group_dim[group] == mesh->dim - 1, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "the load on %s needs a group of dimension %d; that group has dimension %d", scene->load[k].group,
-               (int)mesh->dim - 1, (int)mesh->group_dim[group]);
+    HycoCheck(mesh->group_dim[group] == mesh->dim - 1,
+              "the load on %s needs a group of dimension %d; that group has dimension %d", scene->load[k].group,
+              (int)mesh->dim - 1, (int)mesh->group_dim[group]);
   }
   for (PetscInt k = 0; k < scene->n_contacts; k++) {
     HycoContact *c = &scene->contact[k];
 
     PetscCall(HycoMeshFindGroup(mesh, "contact", c->slave, &group));
     if (!c->normal[0] && !c->normal[1] && !c->normal[2]) {
-      PetscCheck(mesh->group_dim[group] == mesh->dim - 1, PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "contact %s takes its normal from the group %s, which is no surface; give normal: {x: ..., ...}",
-                 c->name, c->slave);
+      HycoCheck(mesh->group_dim[group] == mesh->dim - 1,
+                "contact %s takes its normal from the group %s, which is no surface; give normal: {x: ..., ...}",
+                c->name, c->slave);
     }
     if (c->master) PetscCall(HycoMeshFindGroup(mesh, "contact", c->master, &group));
   }

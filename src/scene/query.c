@@ -59,9 +59,9 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
   for (PetscInt p = 0; p < n; p++) {
     const PetscReal slack = 1e-12 * PetscMax(PetscAbsReal(scene->lo[p]), PetscAbsReal(scene->hi[p]));
 
-    PetscCheck(mu[p] >= scene->lo[p] - slack && mu[p] <= scene->hi[p] + slack, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s = %.10g lies outside its range [%.10g, %.10g]", scene->parameter[p], (double)mu[p],
-               (double)scene->lo[p], (double)scene->hi[p]);
+    HycoCheck(mu[p] >= scene->lo[p] - slack && mu[p] <= scene->hi[p] + slack,
+              "%s = %.10g lies outside its range [%.10g, %.10g]", scene->parameter[p], (double)mu[p],
+              (double)scene->lo[p], (double)scene->hi[p]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -73,7 +73,7 @@ static PetscErrorCode HashFile(HycoScene scene, unsigned long long *hash)
   size_t n;
 
   PetscFunctionBegin;
-  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_USER, "the mesh %s cannot be opened", scene->mesh_path);
+  HycoCheck(file, "the mesh %s cannot be opened", scene->mesh_path);
   while ((n = fread(buffer, 1, sizeof(buffer), file)) > 0) *hash = HycoHash(*hash, buffer, n);
   fclose(file);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -52,10 +52,9 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], con
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
-    PetscCheck(counts[p] >= 1, PETSC_COMM_SELF, PETSC_ERR_USER, "parameter %s has %d values; at least 1 is needed",
-               s->scene->parameter[p], (int)counts[p]);
-    PetscCheck(total <= 100000000 / counts[p], PETSC_COMM_SELF, PETSC_ERR_USER,
-               "the set has more than 100 million points; use fewer per parameter");
+    HycoCheck(counts[p] >= 1, "parameter %s has %d values; at least 1 is needed", s->scene->parameter[p],
+              (int)counts[p]);
+    HycoCheck(total <= 100000000 / counts[p], "the set has more than 100 million points; use fewer per parameter");
     total *= counts[p];
   }
   for (PetscInt k = 0; k < total; k++) {
@@ -80,8 +79,8 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscB
     const PetscReal lo = s->scene->lo[p], hi = s->scene->hi[p];
     const PetscInt n = counts[p];
 
-    PetscCheck(n >= (closed ? 2 : 1) && n <= 100000000, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "the grid has %d points for %s; at least %d are needed", (int)n, s->scene->parameter[p], closed ? 2 : 1);
+    HycoCheck(n >= (closed ? 2 : 1) && n <= 100000000, "the grid has %d points for %s; at least %d are needed", (int)n,
+              s->scene->parameter[p], closed ? 2 : 1);
     PetscCall(PetscMalloc1(n, &values[p]));
     for (PetscInt k = 0; k < n; k++) {
       values[p][k] = closed ? (k == n - 1 ? hi : lo + k * (hi - lo) / (n - 1)) : lo + (k + 0.5) * (hi - lo) / n;
@@ -104,14 +103,11 @@ static PetscErrorCode ReadHeader(HycoSamples s, const char path[], char *line, P
     PetscInt p = 0;
 
     while (p < P && strcmp(word, s->scene->parameter[p])) p++;
-    PetscCheck(p < P && c < P, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s: the column \"%s\" is no parameter of the scene, or too many", path, word);
-    for (PetscInt b = 0; b < c; b++)
-      PetscCheck(column[b] != p, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: the column %s stands twice", path, word);
+    HycoCheck(p < P && c < P, "%s: the column \"%s\" is no parameter of the scene, or too many", path, word);
+    for (PetscInt b = 0; b < c; b++) HycoCheck(column[b] != p, "%s: the column %s stands twice", path, word);
     column[c] = p;
   }
-  PetscCheck(c == P, PETSC_COMM_SELF, PETSC_ERR_USER, "%s: its first line names %d of the scene's %d parameters", path,
-             (int)c, (int)P);
+  HycoCheck(c == P, "%s: its first line names %d of the scene's %d parameters", path, (int)c, (int)P);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -123,7 +119,7 @@ static PetscErrorCode ReadFile(HycoSamples s, const char path[])
   PetscInt column[HYCO_MAX_PARAMETERS], number = 0;
 
   PetscFunctionBegin;
-  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_USER, "the file of points %s cannot be opened", path);
+  HycoCheck(file, "the file of points %s cannot be opened", path);
   while (fgets(line, sizeof(line), file)) {
     PetscReal mu[HYCO_MAX_PARAMETERS];
     char *next = line;
@@ -139,8 +135,8 @@ static PetscErrorCode ReadFile(HycoSamples s, const char path[])
 
       mu[column[c]] = strtod(next, &end);
       end += strspn(end, " \t\r\n");
-      PetscCheck(end != next && (*end == (c == P - 1 ? '\0' : ',')), PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "%s, line %d: %d numbers with commas between are expected", path, (int)number, (int)P);
+      HycoCheck(end != next && (*end == (c == P - 1 ? '\0' : ',')),
+                "%s, line %d: %d numbers with commas between are expected", path, (int)number, (int)P);
       next = end + 1;
     }
     PetscCall(HycoSamplesAddPoint(s, mu));

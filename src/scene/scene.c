@@ -99,11 +99,10 @@ static PetscErrorCode ReadRange(HycoScene s, PetscInt p)
   PetscCall(HycoCatchBegin());
   caught = PetscOptionsGetRealArray(s->options, NULL, key, range, &n, &set);
   PetscCall(HycoCatchEnd(caught, message));
-  PetscCheck(!caught && set && n == 2 && range[0] <= range[1] && !PetscIsInfOrNanReal(range[0]) &&
-                 !PetscIsInfOrNanReal(range[1]),
-             PETSC_COMM_SELF, PETSC_ERR_USER,
-             "parameter %s: its range is missing or wrong; write parameter: %s: range: [lowest, highest]",
-             s->parameter[p], s->parameter[p]);
+  HycoCheck(!caught && set && n == 2 && range[0] <= range[1] && !PetscIsInfOrNanReal(range[0]) &&
+                !PetscIsInfOrNanReal(range[1]),
+            "parameter %s: its range is missing or wrong; write parameter: %s: range: [lowest, highest]",
+            s->parameter[p], s->parameter[p]);
   s->lo[p] = range[0];
   s->hi[p] = range[1];
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -129,13 +128,11 @@ static PetscErrorCode ReadParameters(HycoScene s)
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     const char *name = s->parameter[p];
 
-    PetscCheck(IsIdentifier(name) && strcmp(name, "x") && strcmp(name, "y") && strcmp(name, "z") && strcmp(name, "pi"),
-               PETSC_COMM_SELF, PETSC_ERR_USER,
-               "scene_parameters: \"%s\" cannot name a parameter; use letters, digits and _, and none of x, y, z, pi",
-               name);
+    HycoCheck(IsIdentifier(name) && strcmp(name, "x") && strcmp(name, "y") && strcmp(name, "z") && strcmp(name, "pi"),
+              "scene_parameters: \"%s\" cannot name a parameter; use letters, digits and _, and none of x, y, z, pi",
+              name);
     for (PetscInt q = 0; q < p; q++)
-      PetscCheck(strcasecmp(s->parameter[q], name), PETSC_COMM_SELF, PETSC_ERR_USER,
-                 "scene_parameters: %s stands twice", name);
+      HycoCheck(strcasecmp(s->parameter[q], name), "scene_parameters: %s stands twice", name);
     PetscCall(ReadRange(s, p));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -167,8 +164,8 @@ static PetscErrorCode ReadContactField(HycoScene s, PetscInt entry, HycoContact 
     char *end;
 
     c->tolerance = strtod(value, &end);
-    PetscCheck(*end == '\0' && end != value && c->tolerance >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s is \"%s\"; it must be a length, 0 or more", s->key[entry], value);
+    HycoCheck(*end == '\0' && end != value && c->tolerance >= 0, "%s is \"%s\"; it must be a length, 0 or more",
+              s->key[entry], value);
     break;
   }
   case 5:
@@ -235,8 +232,7 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
     if (!SplitKey(key + 10, parameter_fields, name, &field))
       PetscCall(UnknownKey(key, "a parameter", parameter_fields));
     for (PetscInt p = 0; p < s->n_parameters; p++) known = (PetscBool)(known || strcasecmp(s->parameter[p], name) == 0);
-    PetscCheck(known, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "the scene's entry %s is about a parameter that scene: parameters: does not list", key);
+    HycoCheck(known, "the scene's entry %s is about a parameter that scene: parameters: does not list", key);
   } else if (!HycoOptionKnown(key)) {
     const HycoOption *table;
     const char *names[64];
@@ -254,21 +250,17 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
 static PetscErrorCode CheckScene(HycoScene s)
 {
   PetscFunctionBegin;
-  PetscCheck(s->n_bodies, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the scene has no body; write body: NAME: {young: ..., poisson: ...}");
+  HycoCheck(s->n_bodies, "the scene has no body; write body: NAME: {young: ..., poisson: ...}");
   for (PetscInt k = 0; k < s->n_bodies; k++) {
-    PetscCheck(s->body[k].young, PETSC_COMM_SELF, PETSC_ERR_USER, "body %s has no young (Young's modulus)",
-               s->body[k].name);
+    HycoCheck(s->body[k].young, "body %s has no young (Young's modulus)", s->body[k].name);
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) {
     HycoContact *c = &s->contact[k];
 
-    PetscCheck(c->slave, PETSC_COMM_SELF, PETSC_ERR_USER, "contact %s names no %s", c->name,
-               c->type == HYCO_CONTACT_PAIR ? "slave group" : "group");
-    PetscCheck(c->type == HYCO_CONTACT_OBSTACLE || c->master, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "contact %s is a pair and names no master group", c->name);
-    PetscCheck(c->type == HYCO_CONTACT_PAIR || (c->gap && !c->master), PETSC_COMM_SELF, PETSC_ERR_USER,
-               "contact %s is an obstacle: it needs a gap, and no master", c->name);
+    HycoCheck(c->slave, "contact %s names no %s", c->name, c->type == HYCO_CONTACT_PAIR ? "slave group" : "group");
+    HycoCheck(c->type == HYCO_CONTACT_OBSTACLE || c->master, "contact %s is a pair and names no master group", c->name);
+    HycoCheck(c->type == HYCO_CONTACT_PAIR || (c->gap && !c->master),
+              "contact %s is an obstacle: it needs a gap, and no master", c->name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -360,8 +352,7 @@ PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[]
   for (PetscInt k = 0; k < n; k++) {
     char dashed[HYCO_LINE];
 
-    PetscCheck(HycoIsSceneKey(key[k]) && strlen(key[k]) < 256, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "\"%.64s\" is no entry of a scene", key[k]);
+    HycoCheck(HycoIsSceneKey(key[k]) && strlen(key[k]) < 256, "\"%.64s\" is no entry of a scene", key[k]);
     PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", key[k]));
     PetscCall(PetscOptionsSetValue(s->options, dashed, value[k]));
   }
@@ -400,7 +391,7 @@ PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *sc
   for (line = strtok_r(copy, "\n", &rest); line; line = strtok_r(NULL, "\n", &rest)) {
     char *tab = strchr(line, '\t');
 
-    PetscCheck(tab, PETSC_COMM_SELF, PETSC_ERR_USER, "the model's scene text is damaged");
+    HycoCheck(tab, "the model's scene text is damaged");
     *tab = '\0';
     key[n] = line;
     value[n] = tab + 1;

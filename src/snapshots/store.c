@@ -12,14 +12,12 @@ static PetscErrorCode MakeFolder(const char folder[])
   struct stat info;
 
   PetscFunctionBegin;
-  PetscCheck(strlen(folder) < PETSC_MAX_PATH_LEN - 64, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "the snapshot folder's name is too long");
+  HycoCheck(strlen(folder) < PETSC_MAX_PATH_LEN - 64, "the snapshot folder's name is too long");
   if (mkdir(folder, 0777) != 0) {
-    PetscCheck(errno == EEXIST && stat(folder, &info) == 0 && S_ISDIR(info.st_mode), PETSC_COMM_SELF, PETSC_ERR_USER,
-               "the snapshot folder %s cannot be made: is there such a place, may you write there?", folder);
+    HycoCheck(errno == EEXIST && stat(folder, &info) == 0 && S_ISDIR(info.st_mode),
+              "the snapshot folder %s cannot be made: is there such a place, may you write there?", folder);
   }
-  PetscCheck(access(folder, W_OK) == 0, PETSC_COMM_SELF, PETSC_ERR_USER, "the snapshot folder %s cannot be written",
-             folder);
+  HycoCheck(access(folder, W_OK) == 0, "the snapshot folder %s cannot be written", folder);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -68,9 +66,9 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   snprintf(mine, sizeof(mine), "%016llx", s->fingerprint);
   same = strcmp(text, mine) == 0;
   PetscCall(PetscFree(text));
-  PetscCheck(same, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s is a snapshot of another scene or mesh; remove the folder %s, or name another with -hyco_snapshots",
-             path, s->folder);
+  HycoCheck(same,
+            "%s is a snapshot of another scene or mesh; remove the folder %s, or name another with -hyco_snapshots",
+            path, s->folder);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -110,8 +108,8 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   *groups = 0;
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(HycoOptionsInt(scene->options, "hyco_groups", 0, PETSC_MAX_INT, groups));
-  PetscCheck(*groups <= size, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-hyco_groups is %d on %d ranks; it can be at most the number of ranks", (int)*groups, (int)size);
+  HycoCheck(*groups <= size, "-hyco_groups is %d on %d ranks; it can be at most the number of ranks", (int)*groups,
+            (int)size);
   if (*groups) PetscFunctionReturn(PETSC_SUCCESS);
   *groups = PetscMax(1, PetscMin((PetscInt)size, n));
   if (stat(scene->mesh_path, &info) == 0) {
@@ -205,7 +203,7 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSnapshotsOpen()");
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCheck(n > 0, PETSC_COMM_SELF, PETSC_ERR_USER, "the set of samples is empty");
+  HycoCheck(n > 0, "the set of samples is empty");
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
   PetscCall(PetscMalloc1(n, &missing));
@@ -240,9 +238,8 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, HycoSamples samples, const ch
     PetscCall(HycoH5Open(path, &h));
     PetscCall(CheckFingerprint(s, h, path));
     PetscCall(HycoH5GetSize(h, field, &size, &one));
-    PetscCheck(size == total, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s: %s has %d rows where other snapshots have %d; remove the folder", path, field, (int)size,
-               (int)total);
+    HycoCheck(size == total, "%s: %s has %d rows where other snapshots have %d; remove the folder", path, field,
+              (int)size, (int)total);
     PetscCall(HycoH5ReadRows(h, field, lo, rows, 1, data + (size_t)k * (size_t)lda));
     PetscCall(HycoH5Close(&h, PETSC_FALSE));
   }

@@ -1,0 +1,182 @@
+"""What a user does wrong: one clear line on stderr, a status that is not 0, soon, and no file left."""
+import glob
+import os
+import shutil
+import time
+import unittest
+
+from common import PELLET, ROPE, Case
+
+R = ['-scene', ROPE, '-mu', '0.07,0.17']
+P = ['-scene', PELLET, '-mu', '4.06,1']
+T = ['-scene', ROPE, '-model', 'out.h5']
+N = ['-grid', '2,2']
+OUT = ['-output', 'out.xdmf', '-report', 'out.json']
+
+# (arguments, expected text); solve writes its output and report, train its model: none of it may be left
+CASES = [
+    # the command line
+    (['slve', *R], 'there is no command "slve"'),
+    ([], 'give a command: solve, train, predict, compare or view'),
+    (['solve', *R, '-hyco_solver_typ', 'tao'], 'knows no option -hyco_solver_typ; did you mean -hyco_solver_type?'),
+    (['solve', *R, '-zzz', '1'], 'knows no option -zzz'),
+    (['solve', *R, '-grid', '2,2'], 'hyco solve knows no option -grid'),
+    (['predict', '-model', 'rope.h5', '-scene', ROPE, '-mu', '0.07,0.17'], 'hyco predict knows no option -scene'),
+    (['solve', *R, 'stray'], '"stray" is no option'),
+    (['solve', '-mu', '0.07,0.17'], '-scene is missing'),
+    (['solve', *R, '-output'], '-output needs a value'),
+    (['train', '-scene', ROPE, *N], '-model is missing'),
+    (['solve', *R, '-hyco_solver_type', 'newton'], 'it must be one of: active_set, tao, lemke'),
+    (['solve', *R, '-hyco_solver_rtol', '2'], '-hyco_solver_rtol is "2"; it must be a number from'),
+    (['solve', *R, '-hyco_solver_max_its', '1.5'], 'it must be a whole number'),
+    (['solve', *R, '-hyco_tao_type', 'tron'], 'nothing reads the option -hyco_tao_type here'),
+    (['solve', *P, '-hyco_dual_pc_typ', 'lu'], 'nothing reads the option -hyco_dual_pc_typ here'),
+    # the scene
+    (['solve', '-scene', 'nowhere', '-mu', '1'], 'there is no scene nowhere'),
+    (['solve', '-scene', 'empty', '-mu', '1'], 'the folder empty holds no scene.yaml'),
+    (['solve', '-scene', 'broken.yaml', '-mu', '1'], 'broken.yaml is not YAML that hyco reads'),
+    (['solve', *R, '-body_rope_yung', '3'], "the scene's entry body_rope_yung is unknown"),
+    (['solve', *R, '-body_rope_yung', '3'], 'did you mean young?'),
+    (['solve', *R, '-fixed_end_x', '0'], 'the mesh has no group "end"; its groups are: ends, rope; did you mean ends?'),
+    (['solve', *R, '-body_string_young', '1'], 'body "string" has no cells'),
+    (['solve', *R, '-fixed_ends_y', '0'], 'there is no component y'),
+    (['solve', *R, '-body_rope_young', '2*(x'], 'body_rope_young: "2*(x" is no expression'),
+    (['solve', *R, '-body_rope_young', '2*foo'], 'names foo, which is unknown; known are x, y, z, mu1, mu2, pi'),
+    (['solve', *R, '-contact_ground_gap', '1/0'], 'contact_ground_gap: "1/0" is not finite'),
+    (['solve', *R, '-body_rope_young', '1/(x-x)'], 'is not finite'),
+    (['solve', *R, '-body_rope_young', '-3'], "Young's modulus must be positive"),
+    (['solve', *P, '-body_pellet_young', 'x-4'], "Young's modulus must be positive"),
+    (['solve', *P, '-body_pellet_poisson', '0.5'], "Poisson's ratio must lie between -1 and 0.5"),
+    (['solve', *R, '-contact_ground_type', 'wall'], 'it must be obstacle or pair'),
+    # parameters
+    (['solve', '-scene', ROPE, '-mu', '0.04,0.17'], 'mu1 = 0.04 lies outside its range [0.05, 0.25]'),
+    (['solve', '-scene', ROPE, '-mu', '0.07'], '-mu has 1 values; the scene has 2 parameters: mu1,mu2'),
+    (['solve', '-scene', ROPE, '-mu', '0.07,0.17,1'], '-mu has 3 values; the scene has 2 parameters'),
+    (['solve', '-scene', ROPE, '-mu', '0.07,a'], 'numbers with commas between are expected'),
+    (['solve', '-scene', ROPE, '-mu', 'nan,0.1'], '-mu is "nan,0.1"'),
+    (['solve', '-scene', ROPE, '-mu_mu1', '0.07'], 'give -mu with all of them, or -mu_NAME for each'),
+    (['solve', *R, '-mu_mu3', '1'], '-mu_mu3 names no parameter'),
+    # the mesh
+    (['solve', *R, '-scene_mesh', 'none.msh'], 'the mesh none.msh cannot be opened'),
+    (['solve', *R, '-scene_mesh', 'text.msh'], 'text.msh is no gmsh mesh'),
+    (['solve', *P, '-scene_mesh', 'cut.msh'], 'the mesh cut.msh cannot be read'),
+    (['solve', *R, '-scene_mesh', os.path.join(PELLET, 'A.msh')], 'body "rope" has no cells'),
+    (['solve', *P, '-contact_gap_master', 'clad_outer_low'], 'of the 189 nodes of contact_pellet have no node of'),
+    (['solve', *P, '-contact_gap_master', 'contact_pellet'], 'the two surfaces must be apart'),
+    (['solve', *P, '-scene_mesh', 'shifted.msh', '-contact_gap_tolerance', '1e-12'], 'have no node of contact_clad'),
+    # outputs
+    (['solve', *R, '-output', 'rope.vtk'], 'give a name that ends in .xdmf'),
+    (['solve', *R, '-output', 'none/rope.xdmf'], 'cannot be written'),
+    (['solve', *R, '-report', 'none/r.json'], 'none/r.json cannot be written'),
+    # models
+    (['predict', '-model', 'none.h5', '-mu', '0.07,0.17'], 'none.h5 cannot be opened'),
+    (['predict', '-model', 'cut.h5', '-mu', '0.07,0.17'], 'cut.h5 is no HDF5 file, or it is damaged'),
+    (['predict', '-model', 'text.h5', '-mu', '0.07,0.17'], 'text.h5 is no HDF5 file, or it is damaged'),
+    (['predict', '-model', 'fields.h5', '-mu', '0.07,0.17'], 'fields.h5'),
+    (['predict', '-model', 'rope.h5', '-mu', '0.07'], '-mu has 1 values'),
+    (['predict', '-model', 'rope.h5', '-mu', '0.7,0.1'], 'mu1 = 0.7 lies outside its range'),
+    (['predict', '-model', 'rope.h5', '-mu', '0.07,0.1', '-output', 'out.vtk'], 'ends in .xdmf'),
+    (['predict', '-model', 'rope.h5', '-mu', '0.07,0.1', '-output', 'none/out.xdmf'], 'cannot be written'),
+    (['compare', '-scene', PELLET, '-model', 'rope.h5', *N], ''),
+    (['view', '-model', 'text.h5'], 'text.h5 is no HDF5 file'),
+    # training
+    (['train', *T], 'give the training points'),
+    (['train', *T, '-grid', '10'], '-grid has 1 numbers; the scene has 2 parameters'),
+    (['train', *T, '-grid', '2,2,2'], '-grid has 3 numbers'),
+    (['train', *T, '-grid', '2,0'], 'whole numbers, at least 1, are expected'),
+    (['train', *T, '-grid', '2,1', '-grid_type', 'closed'], 'at least 2 are needed'),
+    (['train', *T, '-values_mu1', '0.1'], '-values_mu2 is missing'),
+    (['train', *T, '-points', 'none.csv'], 'none.csv cannot be opened'),
+    (['train', *T, *N, '-points', 'p.csv'], 'give one set of points'),
+    (['train', '-scene', ROPE, '-model', 'none/out.h5', *N], 'none/out.h5 cannot be written'),
+    (['train', *T, *N, '-hyco_rid_modes', 'foo'], '-hyco_rid_modes has "foo"'),
+    (['train', *T, *N, '-hyco_rid_groups', 'foo'], 'the mesh has no group "foo"'),
+    (['train', *T, *N, '-hyco_rid_region', 'foo'], 'names foo, which is unknown'),
+    (['train', *T, *N, '-hyco_hybrid', 'foo'], 'it must be one of: auto, rank, contact, all'),
+    (['train', *T, *N, '-hyco_pod_tol', 'abc'], '-hyco_pod_tol is "abc"'),
+    (['train', *T, *N, '-hyco_groups', '9'], '-hyco_groups is 9 on'),
+    (['train', *T, *N, '-force_rope_x', '0'], 'there is nothing to learn'),
+]
+# on two ranks: errors found by one rank, by all, or while files are written
+TWO = ('body_rope_young: "2*(x"', 'must be positive', 'none.msh cannot', 'mu1 = 0.04', 'cut.h5', 'contact_clad', 'not YAML',
+       'knows no option -zzz', 'none/out.h5', '-hyco_rid_region', 'none/r.json', 'nothing to learn')
+MPI_NOISE = ('mpiexec', '-----', 'Primary job', 'a non-zero exit code', 'the job to be', 'Process name', 'Exit code')
+
+
+class Faults(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.hyco('train', '-scene', ROPE, '-grid', '4,4', '-model', 'rope.h5')
+        cls.hyco('solve', *R, '-output', 'fields.xdmf')
+        os.mkdir(cls.path('empty'))
+        for name, text in (('broken.yaml', 'scene:\n  mesh: [a\nbody: {x\n'), ('text.msh', 'hello\n'),
+                           ('text.h5', 'hello\n'), ('p.csv', 'mu1,mu2\n0.1,0.1\n')):
+            with open(cls.path(name), 'w', encoding='ascii') as f:
+                f.write(text)
+        for source, name, size in ((cls.path('rope.h5'), 'cut.h5', 9000), (os.path.join(PELLET, 'A.msh'), 'cut.msh',
+                                                                           60000)):
+            with open(source, 'rb') as f, open(cls.path(name), 'wb') as g:
+                g.write(f.read(size))
+        cls.shift()
+
+    @classmethod
+    def shift(cls):
+        """Mesh A with the nodes of the cladding raised by 1e-6."""
+        with open(os.path.join(PELLET, 'A.msh'), encoding='ascii') as f:
+            lines = f.read().split('\n')
+        start, end = lines.index('$Nodes'), lines.index('$EndNodes')
+        for k in range(start + 2, end):
+            x = lines[k].split()
+            if len(x) == 3 and float(x[0])**2 + float(x[1])**2 > 4.2**2:
+                lines[k] = f'{x[0]} {x[1]} {float(x[2]) + 1e-6!r}'
+        # where the two surfaces coincide, the second of two nodes in the same place
+        seen = {}
+        for k in range(start + 2, end):
+            x = lines[k].split()
+            if len(x) == 3 and abs(float(x[0])**2 + float(x[1])**2 - 4.1**2) < 1e-6:
+                key = tuple(round(float(c), 7) for c in x)
+                if key in seen:
+                    lines[k] = f'{x[0]} {x[1]} {float(x[2]) + 1e-6!r}'
+                seen[key] = k
+        with open(cls.path('shifted.msh'), 'w', encoding='ascii') as f:
+            f.write('\n'.join(lines))
+
+    def check(self, args, text, ranks):
+        names = set(os.listdir(self.folder))
+        if args and args[0] in ('solve', 'slve'):
+            args = args + [a for k in (0, 2) if OUT[k] not in args for a in OUT[k:k + 2]]
+        begin = time.monotonic()
+        run = self.run_raw(*args, ranks=ranks, timeout=20)
+        self.assertLess(time.monotonic() - begin, 20)
+        self.assertNotEqual(run.returncode, 0, run.stdout)
+        said = [line for line in run.stderr.splitlines()
+                if line.strip() and not any(n in line for n in MPI_NOISE) and 'snapshots:' not in line]
+        self.assertEqual(len(said), 1, f'one line is expected:\n{run.stderr}')
+        self.assertTrue(said[0].startswith('hyco: error: '), said[0])
+        self.assertIn(text, said[0])
+        self.assertNotIn('internal error', said[0])
+        left = set(os.listdir(self.folder)) - names
+        left |= set(glob.glob(self.path('**', '*.partial'), recursive=True))
+        shutil.rmtree(self.path('out.h5.snapshots'), ignore_errors=True)
+        for name in ('out.xdmf', 'out.h5', 'out.json'):
+            if os.path.exists(self.path(name)):
+                os.remove(self.path(name))
+        # snapshots stay for the next try; -output may be complete when only the report could not be written
+        left -= {'out.h5.snapshots'} | ({'out.xdmf', 'out.h5'} if 'none/r.json' in args else set())
+        self.assertEqual(left, set())
+
+    def test_one_process(self):
+        for args, text in CASES:
+            with self.subTest(args=' '.join(args), text=text):
+                self.check(list(args), text, 0)
+
+    def test_two_ranks(self):
+        for args, text in CASES:
+            if any(part in text or part in args for part in TWO):
+                with self.subTest(args=' '.join(args), text=text, ranks=2):
+                    self.check(list(args), text, 2)
+
+
+if __name__ == '__main__':
+    unittest.main()

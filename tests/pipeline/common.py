@@ -1,0 +1,74 @@
+"""Runs the hyco command in a temporary folder and reads what it wrote."""
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+HYCO = os.environ['HYCO']
+SOURCE = os.environ['HYCO_SOURCE']
+MPIEXEC = os.environ.get('MPIEXEC', 'mpiexec')
+ROPE = os.path.join(SOURCE, 'examples', 'rope')
+PELLET = os.path.join(SOURCE, 'examples', 'pellet')
+
+
+class Case(unittest.TestCase):
+    """A test with a folder of its own for everything that hyco writes."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp(prefix='hyco-test-')
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder, ignore_errors=True)
+
+    @classmethod
+    def path(cls, *names):
+        return os.path.join(cls.folder, *names)
+
+    @classmethod
+    def run_raw(cls, *args, ranks=0, cwd=None, timeout=100):
+        """The finished process; ranks 0: without mpiexec."""
+        command = [HYCO, *(str(a) for a in args)]
+        if ranks:
+            command = [MPIEXEC, '--oversubscribe', '-n', str(ranks), *command]
+        return subprocess.run(command, cwd=cwd or cls.folder, timeout=timeout, capture_output=True, text=True)
+
+    @classmethod
+    def hyco(cls, *args, **options):
+        """The JSON report of a run that must succeed."""
+        report = cls.path('report.json')
+        if os.path.exists(report):
+            os.remove(report)
+        run = cls.run_raw(*args, '-report', report, **options)
+        if run.returncode:
+            raise AssertionError(f'hyco {" ".join(str(a) for a in args)} ended with {run.returncode}:\n{run.stderr}')
+        with open(report, encoding='utf-8') as file:
+            return json.load(file)
+
+    def near(self, found, expected, relative, what=''):
+        self.assertLessEqual(abs(found - expected), relative * abs(expected), f'{what}: {found!r} for {expected!r}')
+
+    def solved(self, report, tolerance=1e-8):
+        """The Karush-Kuhn-Tucker residuals that the run recomputed."""
+        self.assertTrue(report['converged'])
+        for name, value in report['kkt'].items():
+            self.assertLess(value, tolerance, f'KKT residual {name}')
+
+
+def msh(path, nodes, elements, names, binary=False):
+    """Writes a gmsh 2.2 file: nodes [(x, y, z)], elements [(gmsh type, group, [nodes from 1])], names {group: (dim, name)}."""
+    assert not binary
+    with open(path, 'w', encoding='ascii') as f:
+        f.write('$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n%d\n' % len(names))
+        for tag, (dim, name) in names.items():
+            f.write(f'{dim} {tag} "{name}"\n')
+        f.write('$EndPhysicalNames\n$Nodes\n%d\n' % len(nodes))
+        for i, x in enumerate(nodes):
+            f.write('%d %.17g %.17g %.17g\n' % (i + 1, *x))
+        f.write('$EndNodes\n$Elements\n%d\n' % len(elements))
+        for i, (kind, tag, nodes_of) in enumerate(elements):
+            f.write(f'{i + 1} {kind} 2 {tag} {tag} {" ".join(str(n) for n in nodes_of)}\n')
+        f.write('$EndElements\n')

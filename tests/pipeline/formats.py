@@ -1,0 +1,35 @@
+"""The same mesh in gmsh's formats 2.2 and 4.1, ASCII and binary: the same solution."""
+import os
+import subprocess
+import unittest
+
+from common import PELLET, ROPE, Case
+
+
+class Formats(Case):
+    def same(self, scene, mesh, mu):
+        expected = self.hyco('solve', '-scene', scene, '-mu', mu)
+        for version in ('msh22', 'msh41'):
+            for binary in (False, True):
+                with self.subTest(version=version, binary=binary):
+                    out = self.path(f'{version}{binary}.msh')
+                    subprocess.run(['gmsh', mesh, '-save', '-format', version, '-o', out, '-v', '1'] +
+                                   (['-bin'] if binary else []), check=True, timeout=60)
+                    with open(out, 'rb') as f:
+                        head = f.read(60).split(b'\n')[1].split()
+                    self.assertEqual((head[0][:3], head[1]), ({'msh22': b'2.2', 'msh41': b'4.1'}[version],
+                                                              b'1' if binary else b'0'))
+                    r = self.hyco('solve', '-scene', scene, '-mu', mu, '-scene_mesh', out)
+                    self.near(r['total_contact_force'], expected['total_contact_force'], 1e-9)
+                    self.near(r['strain_energy'], expected['strain_energy'], 1e-9)
+                    self.assertEqual((r['n_dof'], r['n_active']), (expected['n_dof'], expected['n_active']))
+
+    def test_rope(self):
+        self.same(ROPE, os.path.join(ROPE, 'rope.msh'), '0.07,0.17')
+
+    def test_pellet(self):
+        self.same(PELLET, os.path.join(PELLET, 'A.msh'), '4.06,1')
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,36 @@
+#!/usr/bin/python3
+"""Every command of the README works as written: the indented lines that call build/hyco or build/embed, in order."""
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+
+SOURCE = os.environ["HYCO_SOURCE"]
+BUILD = os.path.dirname(os.environ["HYCO"])
+
+
+def commands():
+    with open(f"{SOURCE}/README.md", encoding="utf-8") as file:
+        for line in file:
+            words = line.split()
+            if line.startswith("    ") and any(w in ("build/hyco", "build/embed") for w in words[:5]) and "..." not in words:
+                yield line.strip()
+
+
+def main():
+    listed = list(commands())
+    if len(listed) < 6:
+        sys.exit(f"the README lists {len(listed)} commands; at least 6 were expected")
+    with tempfile.TemporaryDirectory() as folder:
+        os.symlink(f"{SOURCE}/examples", f"{folder}/examples")
+        os.symlink(BUILD, f"{folder}/build")
+        for command in listed:
+            run = subprocess.run(shlex.split(command), cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+            print(f"{run.returncode}  {command}")
+            if run.returncode:
+                sys.exit(run.stdout + run.stderr)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,88 @@
+"""Rules that the sources keep: who prints, who knows whom, the table of options, the public header alone."""
+import glob
+import os
+import re
+import subprocess
+import unittest
+
+SOURCE = os.environ['HYCO_SOURCE']
+
+
+def text(path):
+    with open(path, encoding='utf-8') as f:
+        return f.read()
+
+
+def code(path):
+    """Without comments and string literals."""
+    return re.sub(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"', lambda m: '""' if m[0][0] == '"' else ' ', text(path),
+                  flags=re.S)
+
+
+def sources(folder='*'):
+    found = sorted(glob.glob(os.path.join(SOURCE, 'src', folder, '*.[ch]')))
+    assert found, folder
+    return found
+
+
+class Sources(unittest.TestCase):
+    def test_library_is_silent(self):
+        """No printing and no world communicator outside the driver."""
+        word = re.compile(r'\b(PETSC_COMM_WORLD|MPI_COMM_WORLD|printf|puts|putchar|vprintf|PetscPrintf|'
+                          r'PetscSynchronizedPrintf|stdout|stderr)\b')
+        for path in sources():
+            if os.sep + 'driver' + os.sep in path or path.endswith(os.path.join('base', 'init.c')):
+                continue
+            self.assertEqual(word.findall(code(path)), [], path)
+
+    def test_layers(self):
+        """Algorithms and contact know no scene, mesh or cells; nothing but the driver includes driver.h."""
+        above = ('hycoscene', 'hycosceneimpl', 'hycomesh', 'hycofe', 'hycofom', 'hycodomain', 'hycomodel', 'hycotrainer',
+                 'hycosnapshots', 'hycosamples', 'hycofields', 'hyco')
+        for folder in ('algorithms', 'contact'):
+            for path in sources(folder):
+                names = re.findall(r'#include\s*[<"](\w+)\.h[>"]', text(path))
+                self.assertEqual([n for n in names if n in above], [], path)
+        for path in sources():
+            if os.sep + 'driver' + os.sep not in path:
+                self.assertNotIn('driver.h', text(path), path)
+        for name in ('hycoalgorithms.h', 'hycosolverimpl.h'):
+            path = os.path.join(SOURCE, 'include', 'private', name)
+            names = re.findall(r'#include\s*[<"](\w+)\.h[>"]', text(path))
+            self.assertEqual([n for n in names if n in above], [], name)
+
+    def test_options(self):
+        """Each option that is read stands in the table, and each of the table is read."""
+        table_path = os.path.join(SOURCE, 'src', 'base', 'options.c')
+        table = set(re.findall(r'^\s*\{"(hyco_\w+)",', text(table_path), flags=re.M))
+        self.assertGreater(len(table), 15)
+        read = set()
+        for path in sources():
+            if path == table_path:
+                continue
+            body = re.sub(r'/\*.*?\*/', ' ', text(path), flags=re.S)
+            read |= set(re.findall(r'"-?(hyco_[a-z_]*[a-z])"', body))
+        read -= {'hyco_monitor'}  # the driver's own, in args.c
+        self.assertEqual(read - table, set(), 'read, but not in the table')
+        self.assertEqual(table - read, set(), 'in the table, but not read')
+
+    def test_public_header(self):
+        """include/hyco.h compiles alone, in C and in C++, without the private headers."""
+        flags = subprocess.run(['pkg-config', '--cflags', 'petsc', 'slepc'], capture_output=True, text=True, check=True,
+                               timeout=20).stdout.split()
+        mpi = subprocess.run(['mpicc', '--showme:compile'], capture_output=True, text=True, timeout=20).stdout.split()
+        for compiler in (['gcc', '-std=c11', '-x', 'c'], ['g++', '-x', 'c++']):
+            run = subprocess.run([*compiler, '-fsyntax-only', '-Wall', '-Werror', *flags, *mpi, '-I',
+                                  os.path.join(SOURCE, 'include'), '-'], input='#include <hyco.h>\n', text=True,
+                                 capture_output=True, timeout=50)
+            self.assertEqual(run.returncode, 0, f'{compiler[0]}: {run.stderr}')
+
+    def test_public_headers_hide(self):
+        for path in glob.glob(os.path.join(SOURCE, 'include', '*.h')):
+            self.assertNotIn('impl.h', text(path), path)
+            if not path.endswith('hyco.h'):
+                self.assertIn('extern "C"', text(path), path)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,127 @@
+/* The public classes called in the wrong order or with NULL: the named message, on every rank. */
+#include "check.h"
+#include <hyco.h>
+
+static PetscErrorCode TestNull(void)
+{
+  HycoSummary summary;
+  HycoSystem system = NULL;
+  HycoSolver solver = NULL;
+  HycoScene scene = NULL;
+  HycoFOM fom = NULL;
+  HycoModel model = NULL;
+  HycoSamples samples = NULL;
+  HycoSnapshots snapshots = NULL;
+  HycoTrainer trainer = NULL;
+  HycoPrediction prediction;
+  HycoReason reason;
+  HycoKKT kkt;
+  PetscInt n;
+  const PetscReal *mu, point[2] = {0, 0};
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemDestroy(&system)); /* Destroy is NULL-safe */
+  PetscCall(HycoSolverDestroy(&solver));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSnapshotsDestroy(&snapshots));
+  PetscCall(HycoTrainerDestroy(&trainer));
+  CHECK_FAILS(HycoSystemComputeKKT(system, NULL, NULL, &kkt), "the handle is NULL; make it by HycoSystemCreate()");
+  CHECK_FAILS(HycoSystemSetVectors(system, NULL, NULL), "the handle is NULL; make it by HycoSystemCreate()");
+  CHECK_FAILS(HycoSolverSolve(solver, NULL, NULL), "the handle is NULL; make it by HycoSolverCreate()");
+  CHECK_FAILS(HycoSolverGetReason(solver, &reason), "the handle is NULL; make it by HycoSolverCreate()");
+  CHECK_FAILS(HycoSolverSetType(solver, HYCO_SOLVER_TAO), "the handle is NULL; make it by HycoSolverCreate()");
+  CHECK_FAILS(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL), "the handle is NULL; make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSceneCheckParameters(scene, 2, point), "the handle is NULL; make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSamplesCreate(scene, &samples), "the handle is NULL; make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSamplesGet(samples, &n, NULL, &mu), "the handle is NULL; make it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom), "the handle is NULL; make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoFOMSolve(fom, 2, point), "the handle is NULL; make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMGetSummary(fom, &summary), "the handle is NULL; make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoModelPredict(model, 2, point), "the handle is NULL; make it by HycoModelLoad()");
+  CHECK_FAILS(HycoModelGetPrediction(model, &prediction), "the handle is NULL; make it by HycoModelLoad()");
+  CHECK_FAILS(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer), "the handle is NULL; make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoTrainerSetFromOptions(trainer), "the handle is NULL; make it by HycoTrainerCreate()");
+  CHECK_FAILS(HycoSnapshotsFill(snapshots, samples, NULL, NULL), "the handle is NULL; make it by HycoSnapshotsOpen()");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestSolverOrder(void)
+{
+  HycoSystem system;
+  HycoSolver solver;
+  HycoKKT kkt;
+  Mat K, B;
+  Vec F;
+
+  PetscFunctionBegin;
+  PetscCall(VecCreateMPI(PETSC_COMM_WORLD, PETSC_DECIDE, 3, &F));
+  PetscCall(MatCreateConstantDiagonal(PETSC_COMM_WORLD, PETSC_DECIDE, PETSC_DECIDE, 3, 3, 2, &K));
+  PetscCall(MatCreateDense(PETSC_COMM_WORLD, PETSC_DECIDE, PETSC_DECIDE, 3, 2, NULL, &B));
+  PetscCall(HycoSystemCreate(PETSC_COMM_WORLD, &system));
+  PetscCall(HycoSolverCreate(PETSC_COMM_WORLD, &solver));
+  CHECK_FAILS(HycoSystemSetVectors(system, F, NULL), "call HycoSystemSetMatrices() before HycoSystemSetVectors()");
+  CHECK_FAILS(HycoSystemComputeKKT(system, F, NULL, &kkt), "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
+  CHECK_FAILS(HycoSolverSolve(solver, F, NULL), "call HycoSolverSetSystem()");
+  PetscCall(HycoSolverSetSystem(solver, system));
+  CHECK_FAILS(HycoSolverSolve(solver, F, NULL), "matrices and vectors are set, before HycoSolverSolve()");
+  CHECK_FAILS(HycoSystemSetMatrices(system, B, NULL, NULL, PETSC_FALSE), "K is 3 x 2; it must be square");
+  CHECK_FAILS(HycoSystemSetMatrices(system, K, NULL, B, PETSC_FALSE), "B and Bt must both be given, or neither");
+  CHECK_FAILS(HycoSystemSetMatrices(system, K, B, B, PETSC_FALSE), "do not match");
+  PetscCall(HycoSystemSetMatrices(system, K, NULL, NULL, PETSC_TRUE));
+  CHECK_FAILS(HycoSystemSetVectors(system, F, F), "F has length 3 and D 3 where 3 and 0 are expected");
+  CHECK_FAILS(HycoSolverSetType(solver, "newton"), "the solver type \"newton\" is unknown");
+  CHECK_FAILS(HycoSolverSetTolerance(solver, 2), "it must lie between 0 and 1");
+  PetscCall(HycoSolverDestroy(&solver));
+  PetscCall(HycoSystemDestroy(&system));
+  CHECK(!solver && !system, "Destroy must clear the handles");
+  PetscCall(MatDestroy(&K));
+  PetscCall(MatDestroy(&B));
+  PetscCall(VecDestroy(&F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On the rope: nothing may be asked before Solve; a point outside the ranges; then the numbers of readings.md. */
+static PetscErrorCode TestFOMOrder(void)
+{
+  const PetscReal inside[2] = {0.07, 0.17}, outside[2] = {0.04, 0.17};
+  char folder[PETSC_MAX_PATH_LEN];
+  HycoScene scene;
+  HycoFOM fom;
+  HycoSummary summary;
+  HycoModel model;
+
+  PetscFunctionBegin;
+  PetscCheck(getenv("HYCO_SOURCE"), PETSC_COMM_SELF, PETSC_ERR_USER, "HYCO_SOURCE is not set");
+  snprintf(folder, sizeof(folder), "%s/examples/rope", getenv("HYCO_SOURCE"));
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, folder, &scene));
+  PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
+  CHECK_FAILS(HycoFOMGetSummary(fom, &summary), "call HycoFOMSolve() before HycoFOMGetSummary()");
+  CHECK_FAILS(HycoFOMGetSolution(fom, NULL, NULL, NULL, NULL, NULL, NULL),
+              "call HycoFOMSolve() before HycoFOMGetSolution()");
+  CHECK_FAILS(HycoFOMWrite(fom, "/tmp/x.xdmf"), "call HycoFOMSolve() before HycoFOMWrite()");
+  CHECK_FAILS(HycoFOMSolve(fom, 2, outside), "mu1 = 0.04 lies outside its range [0.05, 0.25]");
+  CHECK_FAILS(HycoFOMSolve(fom, 1, inside), "1 parameter values were given; the scene has 2: mu1");
+  CHECK_FAILS(HycoModelLoad("/no/such.h5", &model), "/no/such.h5");
+  PetscCall(HycoFOMSolve(fom, 2, inside));
+  PetscCall(HycoFOMGetSummary(fom, &summary));
+  CHECK(summary.n_active == 17, "expected 17 active, found %d", (int)summary.n_active);
+  CHECK_NEAR(summary.total_contact_force, 0.3502256293, 1e-9);
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Test(void)
+{
+  PetscFunctionBegin;
+  CHECK(HycoVersion()[0] >= '0' && HycoVersion()[0] <= '9', "the version is \"%s\"", HycoVersion());
+  PetscCall(TestNull());
+  PetscCall(TestSolverOrder());
+  PetscCall(TestFOMOrder());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+TEST_MAIN

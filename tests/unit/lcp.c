@@ -1,0 +1,199 @@
+/* Dense linear complementarity: w = q + M z >= 0, z >= 0, w.z = 0, by the active set and by Lemke's method. */
+#include "check.h"
+#include <hycosolverimpl.h>
+#include <math.h>
+
+/* Largest violation of the three conditions, relative to the size of q. */
+static double Violation(PetscInt n, const PetscReal M[], const PetscReal q[], const PetscReal z[])
+{
+  double worst = 0, size = 0, size_z = 0;
+
+  for (PetscInt i = 0; i < n; i++) {
+    size = fmax(size, fabs(q[i]));
+    size_z = fmax(size_z, fabs(z[i]));
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    double w = q[i];
+
+    for (PetscInt j = 0; j < n; j++) w += M[j * n + i] * z[j];
+    worst = fmax(worst, -w / (size > 0 ? size : 1));
+    worst = fmax(worst, -z[i] / (size_z > 0 ? size_z : 1));
+    worst = fmax(worst, fabs(w * z[i]) / (size * size_z > 0 ? size * size_z : 1));
+  }
+  return worst;
+}
+
+/* Both methods from the empty set; Lemke must solve; the active set must solve or say that it did not. */
+static PetscErrorCode Both(const char what[], PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool must,
+                           PetscReal z_lemke[])
+{
+  PetscBool *active;
+  PetscReal *z;
+  PetscInt its;
+  HycoLCPStatus status;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n, &active));
+  PetscCall(PetscMalloc1(n, &z));
+  PetscCall(HycoLCPLemke(n, M, q, 20 * n + 100, z_lemke, &its, &status));
+  CHECK(status == HYCO_LCP_SOLVED, "Lemke, %s, n = %d: status %d", what, (int)n, (int)status);
+  CHECK(Violation(n, M, q, z_lemke) < 1e-10, "Lemke, %s, n = %d: violation %g", what, (int)n,
+        Violation(n, M, q, z_lemke));
+  PetscCall(HycoLCPActiveSet(n, M, q, 10 * n + 50, NULL, NULL, active, z, &its, &status));
+  CHECK(status == HYCO_LCP_SOLVED || !must, "active set, %s, n = %d: status %d", what, (int)n, (int)status);
+  if (status == HYCO_LCP_SOLVED) {
+    double size = 0, apart = 0;
+
+    CHECK(Violation(n, M, q, z) < 1e-10, "active set, %s, n = %d: violation %g", what, (int)n, Violation(n, M, q, z));
+    for (PetscInt i = 0; i < n; i++) { /* P-matrices: one solution */
+      size = fmax(size, fabs(z[i]));
+      apart = fmax(apart, fabs(z[i] - z_lemke[i]));
+    }
+    CHECK(apart <= 1e-9 * size, "%s, n = %d: the two methods differ by %g of %g", what, (int)n, apart, size);
+  } else {
+    CHECK(status == HYCO_LCP_CYCLE || status == HYCO_LCP_LIMIT || status == HYCO_LCP_SINGULAR,
+          "active set, %s: status %d", what, (int)status);
+  }
+  PetscCall(PetscFree(active));
+  PetscCall(PetscFree(z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nonsymmetric, positive definite: R R^T / n + 0.1 I + skew: a P-matrix (Cottle, Pang, Stone 1992, theorem 3.1.6). */
+static PetscErrorCode TestRandom(void)
+{
+  const PetscInt sizes[] = {1, 2, 3, 5, 10, 40, 120, 300};
+  unsigned long long state = 12345;
+
+  PetscFunctionBegin;
+  for (size_t t = 0; t < sizeof(sizes) / sizeof(sizes[0]); t++) {
+    const PetscInt n = sizes[t];
+    PetscReal *R, *M, *q, *z;
+
+    PetscCall(PetscMalloc4(n * n, &R, n * n, &M, n, &q, n, &z));
+    for (PetscInt k = 0; k < n * n; k++) R[k] = Draw(&state);
+    for (PetscInt i = 0; i < n; i++) {
+      q[i] = Draw(&state);
+      for (PetscInt j = 0; j < n; j++) {
+        M[j * n + i] = (i == j ? 0.1 : 0) + (i < j ? R[j * n + i] : -R[i * n + j]) * (i == j ? 0 : 1.0 / (double)n);
+        for (PetscInt k = 0; k < n; k++) M[j * n + i] += R[k * n + i] * R[k * n + j] / (double)n;
+      }
+    }
+    PetscCall(Both("random P-matrix", n, M, q, PETSC_FALSE, z));
+    for (PetscInt i = 0; i < n; i++) q[i] = fabs(q[i]);
+    PetscCall(Both("q >= 0", n, M, q, PETSC_TRUE, z));
+    for (PetscInt i = 0; i < n; i++) CHECK_NEAR(z[i], 0, 0); /* w = q, z = 0 solves it */
+    PetscCall(PetscFree4(R, M, q, z));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* K. G. Murty, Math. Programming Study 7 (1978) 61-73: triangular with 2s, hard for pivoting. With q = -e the solution
+   of the lower triangular one is z = (1, 0, ..., 0) (forward substitution), of the upper one z = (0, ..., 0, 1). */
+static PetscErrorCode TestMurty(void)
+{
+  PetscFunctionBegin;
+  for (PetscInt n = 1; n <= 50; n++) {
+    for (int upper = 0; upper < 2; upper++) {
+      const PetscInt one = upper ? n - 1 : 0;
+      PetscReal *M, *q, *z;
+
+      PetscCall(PetscCalloc1(n * n, &M));
+      PetscCall(PetscMalloc2(n, &q, n, &z));
+      for (PetscInt j = 0; j < n; j++) {
+        q[j] = -1;
+        for (PetscInt i = 0; i < n; i++) M[j * n + i] = i == j ? 1 : ((upper ? i < j : i > j) ? 2 : 0);
+      }
+      PetscCall(Both(upper ? "Murty, upper" : "Murty, lower", n, M, q, PETSC_FALSE, z));
+      for (PetscInt i = 0; i < n; i++) CHECK_NEAR(z[i], i == one ? 1 : 0, 1e-12);
+      PetscCall(PetscFree(M));
+      PetscCall(PetscFree2(q, z));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* I. Ben Gharbia, J. C. Gilbert, Math. Programming 134 (2012) 349-364: on this P-matrix the active set cycles from {1}:
+   {1}, {1,3}, {2,3}, {1,2}, {1,3}. The solution is z = e / 3, by symmetry. */
+static PetscErrorCode TestCycle(void)
+{
+  const PetscReal M[9] = {1, 2, 0, 0, 1, 2, 2, 0, 1}, q[3] = {-1, -1, -1}; /* columns of [1 0 2; 2 1 0; 0 2 1] */
+  PetscBool active[3] = {PETSC_TRUE, PETSC_FALSE, PETSC_FALSE};
+  PetscReal z[3];
+  PetscInt its;
+  HycoLCPStatus status;
+
+  PetscFunctionBegin;
+  PetscCall(HycoLCPActiveSet(3, M, q, 100, NULL, NULL, active, z, &its, &status));
+  CHECK(status == HYCO_LCP_CYCLE, "expected a cycle, found status %d", (int)status);
+  CHECK(its == 4, "expected 4 iterations until a set comes back, found %d", (int)its);
+  PetscCall(HycoLCPLemke(3, M, q, 100, z, &its, &status));
+  CHECK(status == HYCO_LCP_SOLVED, "Lemke: status %d", (int)status);
+  for (PetscInt i = 0; i < 3; i++) CHECK_NEAR(z[i], 1.0 / 3, 1e-14);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The string's flexibility, inverse of tridiag(-1, 2, -1): min(i,j) (n + 1 - max(i,j)) / (n + 1), closed form; a flat
+   obstacle at distance d under a unit load; and gaps that are zero exactly where nothing pushes (degenerate). */
+static PetscErrorCode TestString(void)
+{
+  const PetscInt sizes[] = {1, 2, 7, 50, 98, 300};
+
+  PetscFunctionBegin;
+  for (size_t t = 0; t < sizeof(sizes) / sizeof(sizes[0]); t++) {
+    const PetscInt n = sizes[t];
+    PetscReal *M, *q, *z, sum = 0;
+
+    PetscCall(PetscMalloc3(n * n, &M, n, &q, n, &z));
+    for (PetscInt j = 0; j < n; j++) {
+      for (PetscInt i = 0; i < n; i++)
+        M[j * n + i] = (double)((PetscMin(i, j) + 1) * (n - PetscMax(i, j))) / (double)(n + 1);
+    }
+    /* free deflection under e: i (n + 1 - i) / 2; the gap is half of its largest */
+    for (PetscInt i = 0; i < n; i++) q[i] = (n + 1) * (n + 1) / 16.0 - (i + 1) * (n - i) / 2.0;
+    PetscCall(Both("string", n, M, q, PETSC_TRUE, z));
+    for (PetscInt i = 0; i < n; i++) sum += z[i];
+    CHECK(n < 7 || (sum > 0 && sum < n), "the obstacle carries a part of the load %d, found %g", (int)n, sum);
+    PetscCall(PetscArrayzero(q, n));
+    PetscCall(Both("string, no load, no gap", n, M, q, PETSC_TRUE, z));
+    for (PetscInt i = 0; i < n; i++) CHECK_NEAR(z[i], 0, 0);
+    /* the load pushes up on one half, down on the other: zero gaps everywhere */
+    for (PetscInt i = 0; i < n; i++) {
+      q[i] = 0;
+      for (PetscInt j = 0; j < n; j++) q[i] -= M[j * n + i] * (2 * j < n ? 1 : -1);
+    }
+    PetscCall(Both("string, zero gaps", n, M, q, PETSC_TRUE, z));
+    PetscCall(PetscFree3(M, q, z));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* No solution: M = 0 and q < 0; both methods must say so. */
+static PetscErrorCode TestNone(void)
+{
+  const PetscReal M[4] = {0, 0, 0, 0}, q[2] = {-1, 1};
+  PetscBool active[2] = {PETSC_FALSE, PETSC_FALSE};
+  PetscReal z[2];
+  PetscInt its;
+  HycoLCPStatus status;
+
+  PetscFunctionBegin;
+  PetscCall(HycoLCPLemke(2, M, q, 100, z, &its, &status));
+  CHECK(status == HYCO_LCP_RAY, "expected a ray, found status %d", (int)status);
+  PetscCall(HycoLCPActiveSet(2, M, q, 100, NULL, NULL, active, z, &its, &status));
+  CHECK(status == HYCO_LCP_SINGULAR, "expected a singular set, found status %d", (int)status);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Test(void)
+{
+  PetscFunctionBegin;
+  PetscCall(TestRandom());
+  PetscCall(TestMurty());
+  PetscCall(TestCycle());
+  PetscCall(TestString());
+  PetscCall(TestNone());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+TEST_MAIN

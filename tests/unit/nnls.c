@@ -1,0 +1,98 @@
+/* min |A x - b|, x >= 0: the Karush-Kuhn-Tucker conditions, and cases solved by hand. */
+#include "check.h"
+#include <hycoalgorithms.h>
+#include <math.h>
+
+/* x >= 0, g = A^T (b - A x) <= 0, x.g = 0, and the residual returned is |A x - b|. Returns |A x - b|. */
+static PetscErrorCode CheckKKT(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscReal *norm)
+{
+  PetscReal *x, *r, residual, size = 0, scale = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n, &x, m, &r));
+  PetscCall(HycoNNLS(m, n, A, b, x, &residual));
+  *norm = 0;
+  for (PetscInt i = 0; i < m; i++) {
+    r[i] = b[i];
+    for (PetscInt j = 0; j < n; j++) r[i] -= A[j * m + i] * x[j];
+    *norm += r[i] * r[i];
+    size += b[i] * b[i];
+  }
+  *norm = sqrt(*norm);
+  size = sqrt(size);
+  CHECK(fabs(residual - *norm) <= 1e-10 * size, "%d x %d: residual %.12g, recomputed %.12g", (int)m, (int)n, residual,
+        *norm);
+  for (PetscInt j = 0; j < n; j++) {
+    PetscReal g = 0, length = 0;
+
+    for (PetscInt i = 0; i < m; i++) {
+      g += A[j * m + i] * r[i];
+      length += A[j * m + i] * A[j * m + i];
+    }
+    scale = sqrt(length) * size;
+    CHECK(x[j] >= 0, "%d x %d: x[%d] = %g", (int)m, (int)n, (int)j, x[j]);
+    CHECK(g <= 1e-10 * scale, "%d x %d: gradient %g of %g at %d", (int)m, (int)n, g, scale, (int)j);
+    CHECK(x[j] == 0 || fabs(g) <= 1e-10 * scale, "%d x %d: gradient %g where x = %g", (int)m, (int)n, g, x[j]);
+  }
+  PetscCall(PetscFree2(x, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestRandom(void)
+{
+  const PetscInt sizes[][2] = {{1, 1}, {5, 3}, {10, 10}, {40, 25}, {15, 40}, {98, 120}};
+  unsigned long long state = 2024;
+
+  PetscFunctionBegin;
+  for (size_t t = 0; t < 4 * sizeof(sizes) / sizeof(sizes[0]); t++) {
+    const PetscInt m = sizes[t / 4][0], n = sizes[t / 4][1];
+    PetscReal *A, *b, *x, norm;
+
+    PetscCall(PetscMalloc3(m * n, &A, m, &b, n, &x));
+    for (PetscInt k = 0; k < m * n; k++) A[k] = Draw(&state) + (t % 2 ? 1 : 0);
+    for (PetscInt i = 0; i < m; i++) b[i] = Draw(&state);
+    if (t % 4 > 1) { /* b = A x with x >= 0: the residual vanishes */
+      PetscCall(PetscArrayzero(b, m));
+      for (PetscInt j = 0; j < n; j++) {
+        x[j] = fmax(Draw(&state), 0);
+        for (PetscInt i = 0; i < m; i++) b[i] += A[j * m + i] * x[j];
+      }
+    }
+    PetscCall(CheckKKT(m, n, A, b, &norm));
+    if (t % 4 > 1) CHECK(norm <= 1e-8, "%d x %d: b is in the cone, residual %g", (int)m, (int)n, norm);
+    PetscCall(PetscFree3(A, b, x));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A = I: x = max(b, 0). A column twice, a zero column, b = 0. */
+static PetscErrorCode TestByHand(void)
+{
+  const PetscReal eye[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, b[3] = {2, -3, 0.5}, zero[3] = {0, 0, 0};
+  const PetscReal twice[6] = {1, 1, 0, 1, 1, 0}, nothing[6] = {0, 0, 0, 1, 0, 0};
+  PetscReal x[3], residual, norm;
+
+  PetscFunctionBegin;
+  PetscCall(HycoNNLS(3, 3, eye, b, x, &residual));
+  CHECK_NEAR(x[0], 2, 1e-15);
+  CHECK_NEAR(x[1], 0, 0);
+  CHECK_NEAR(x[2], 0.5, 1e-15);
+  CHECK_NEAR(residual, 3, 1e-14);
+  PetscCall(HycoNNLS(3, 3, eye, zero, x, &residual));
+  CHECK_NEAR(x[0] + x[1] + x[2] + residual, 0, 0);
+  PetscCall(CheckKKT(3, 2, twice, b, &norm)); /* both columns push the same way: |r|^2 with x = 0 is best */
+  CHECK_NEAR(norm, sqrt(4 + 9 + 0.25), 1e-14);
+  PetscCall(CheckKKT(3, 2, nothing, b, &norm));
+  CHECK_NEAR(norm, sqrt(9 + 0.25), 1e-14);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Test(void)
+{
+  PetscFunctionBegin;
+  PetscCall(TestRandom());
+  PetscCall(TestByHand());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+TEST_MAIN

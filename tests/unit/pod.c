@@ -1,0 +1,181 @@
+/* POD (17)-(18): known singular values, orthonormality, the energy criterion, small and tall paths. On any ranks. */
+#include "check.h"
+#include <hycoalgorithms.h>
+#include <math.h>
+
+/* Orthonormal columns for any n: the discrete cosine transform. */
+static double Cosine(PetscInt n, PetscInt i, PetscInt j)
+{
+  return j == 0 ? sqrt(1.0 / (double)n)
+                : sqrt(2.0 / (double)n) * cos(PETSC_PI * ((double)i + 0.5) * (double)j / (double)n);
+}
+
+/* S = sum_k s_k c_k(N) c_k(n)^T: its singular values are s (r of them). */
+static PetscErrorCode Make(PetscInt N, PetscInt n, PetscInt r, const PetscReal s[], Mat *S)
+{
+  PetscInt lo, hi;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateDense(PETSC_COMM_WORLD, PETSC_DECIDE, PETSC_DECIDE, N, n, NULL, S));
+  PetscCall(MatGetOwnershipRange(*S, &lo, &hi));
+  for (PetscInt i = lo; i < hi; i++) {
+    for (PetscInt j = 0; j < n; j++) {
+      PetscReal value = 0;
+
+      for (PetscInt k = r - 1; k >= 0; k--) value += s[k] * Cosine(N, i, k) * Cosine(n, j, k);
+      PetscCall(MatSetValue(*S, i, j, value, INSERT_VALUES));
+    }
+  }
+  PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* V^T V = I, and mode k is +-c_k to tol[k], its largest entry positive. */
+static PetscErrorCode CheckModes(Mat V, PetscInt N, PetscInt l, const PetscReal s[])
+{
+  Mat G;
+  PetscReal *value;
+  PetscInt *row;
+
+  PetscFunctionBegin;
+  PetscCall(MatTransposeMatMult(V, V, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &G));
+  PetscCall(PetscMalloc2(PetscMax(N, l) * l, &value, PetscMax(N, l), &row));
+  for (PetscInt i = 0; i < PetscMax(N, l); i++) row[i] = i;
+  PetscCall(HycoGatherRows(G, l, row, value));
+  for (PetscInt i = 0; i < l * l; i++) CHECK_NEAR(value[i], i / l == i % l ? 1 : 0, 1e-13);
+  PetscCall(HycoGatherRows(V, N, row, value));
+  for (PetscInt k = 0; k < l; k++) {
+    PetscReal dot = 0, highest = 0, lowest = 0;
+
+    for (PetscInt i = 0; i < N; i++) {
+      dot += value[i * l + k] * Cosine(N, i, k);
+      highest = fmax(highest, value[i * l + k]);
+      lowest = fmin(lowest, value[i * l + k]);
+    }
+    CHECK(fabs(fabs(dot) - 1) < 1e-6, "mode %d of %d rows, sigma %g: cosine with the exact one %.10g", (int)k, (int)N,
+          s[k], dot);
+    CHECK(highest >= -lowest * (1 - 1e-6), "mode %d: its entries run from %g to %g", (int)k, lowest, highest);
+  }
+  PetscCall(PetscFree2(value, row));
+  PetscCall(MatDestroy(&G));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Singular values 1, 0.1, ..., 1e-12: found to 1e-3 relative, on a small, a square, a wide and a tall matrix. */
+static PetscErrorCode TestKnown(void)
+{
+  const PetscInt sizes[][2] = {{60, 13}, {13, 13}, {20, 40}, {1999, 20}, {2500, 13}, {6000, 30}};
+  PetscReal s[13], sigma[64];
+  Mat S, V;
+  PetscInt l;
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 13; k++) s[k] = pow(10, -k);
+  for (size_t t = 0; t < sizeof(sizes) / sizeof(sizes[0]); t++) {
+    const PetscInt N = sizes[t][0], n = sizes[t][1];
+
+    PetscCall(Make(N, n, 13, s, &S));
+    PetscCall(HycoPOD(S, 0, 3e-13, 0, &V, &l, sigma));
+    CHECK(l == 13, "%d x %d: expected 13 modes, found %d", (int)N, (int)n, (int)l);
+    for (int k = 0; k < 13; k++)
+      CHECK(fabs(sigma[k] / s[k] - 1) < 1e-3, "%d x %d: expected sigma %g, found %.10g", (int)N, (int)n, s[k],
+            sigma[k]);
+    PetscCall(CheckModes(V, N, l, s));
+    PetscCall(MatDestroy(&V));
+    PetscCall(MatDestroy(&S));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* (18) by hand for s = 1, 1e-1, 1e-2, 1e-3: left out after 1: 1.0e-2, after 2: 1.0e-4, after 3: 9.9e-7. */
+static PetscErrorCode TestCriterion(void)
+{
+  const PetscReal s[4] = {1, 1e-1, 1e-2, 1e-3};
+  const struct {
+    PetscReal tol, noise;
+    PetscInt max_modes, l;
+  } cases[] = {{0.5, 0, 0, 1},  {1.1e-2, 0, 0, 1}, {9e-3, 0, 0, 2}, {1e-4, 0, 0, 2},  {9e-5, 0, 0, 3},
+               {9e-7, 0, 0, 4}, {0, 1e-11, 0, 4},  {0, 5e-3, 0, 3}, {0, 1e-11, 2, 2}, {9e-3, 1e-11, 3, 2}};
+  const PetscInt rows[] = {40, 2100};
+  PetscReal sigma[8];
+  Mat S, V;
+  PetscInt l;
+
+  PetscFunctionBegin;
+  for (int r = 0; r < 2; r++) {
+    PetscCall(Make(rows[r], 8, 4, s, &S));
+    for (size_t t = 0; t < sizeof(cases) / sizeof(cases[0]); t++) {
+      PetscCall(HycoPOD(S, cases[t].tol, cases[t].noise, cases[t].max_modes, &V, &l, sigma));
+      CHECK(l == cases[t].l, "%d rows, tol %g, noise %g, at most %d: expected %d modes, found %d", (int)rows[r],
+            cases[t].tol, cases[t].noise, (int)cases[t].max_modes, (int)cases[t].l, (int)l);
+      PetscCall(MatDestroy(&V));
+    }
+    PetscCall(MatDestroy(&S));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestZeroAndOne(void)
+{
+  const PetscReal zero = 0, one = 7;
+  const PetscInt rows[] = {30, 2500};
+  PetscReal sigma[5];
+  Mat S, V;
+  PetscInt l;
+
+  PetscFunctionBegin;
+  for (int r = 0; r < 2; r++) {
+    PetscCall(Make(rows[r], 5, 1, &zero, &S));
+    PetscCall(HycoPOD(S, 1e-7, 1e-11, 0, &V, &l, sigma));
+    CHECK(l == 0 && !V, "%d rows of zeros: expected no mode, found %d", (int)rows[r], (int)l);
+    CHECK_NEAR(sigma[0], 0, 0);
+    PetscCall(MatDestroy(&S));
+    PetscCall(Make(rows[r], 5, 1, &one, &S));
+    PetscCall(HycoPOD(S, 0, 1e-11, 0, &V, &l, sigma));
+    CHECK(l == 1, "%d rows of rank one: found %d modes", (int)rows[r], (int)l);
+    CHECK_NEAR(sigma[0], 7, 1e-13);
+    CHECK(sigma[1] < 1e-13, "second singular value %g", sigma[1]);
+    PetscCall(CheckModes(V, rows[r], 1, &one));
+    PetscCall(MatDestroy(&V));
+    PetscCall(MatDestroy(&S));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The Gram path on diag(4, 1, 0.25) as G = S^T M S: sigma = 2, 1, 0.5; S W orthonormal means W^T G W = I. */
+static PetscErrorCode TestGram(void)
+{
+  const PetscReal G[9] = {4, 0, 0, 0, 1, 0, 0, 0, 0.25};
+  PetscReal *W, sigma[3];
+  PetscInt l;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPODGram(3, G, 0.1, 1e-7, &W, &l, sigma)); /* left out after 1: 1.25 / 5.25; after 2: 0.25 / 5.25 */
+  CHECK(l == 2, "expected 2 modes, found %d", (int)l);
+  CHECK_NEAR(sigma[0], 2, 1e-14);
+  CHECK_NEAR(sigma[1], 1, 1e-14);
+  CHECK_NEAR(sigma[2], 0.5, 1e-14);
+  for (PetscInt a = 0; a < l; a++) {
+    for (PetscInt b = 0; b < l; b++) {
+      PetscReal dot = 0;
+
+      for (int k = 0; k < 3; k++) dot += W[a * 3 + k] * G[4 * k] * W[b * 3 + k];
+      CHECK_NEAR(dot, a == b ? 1 : 0, 1e-13);
+    }
+  }
+  PetscCall(PetscFree(W));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Test(void)
+{
+  PetscFunctionBegin;
+  PetscCall(TestKnown());
+  PetscCall(TestCriterion());
+  PetscCall(TestZeroAndOne());
+  PetscCall(TestGram());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+TEST_MAIN

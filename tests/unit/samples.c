@@ -1,0 +1,137 @@
+/* Sets of parameter points, the scene's ranges and its text, the table of options. */
+#include "check.h"
+#include <hycosceneimpl.h>
+#include <unistd.h>
+
+static char *const keys[] = {"scene_parameters", "parameter_a_range", "parameter_b_range", "body_rope_young",
+                             "scene_mesh"};
+static char *const values[] = {"a,b", "0,1", "-1,3", "a + 2*b", "none.msh"};
+
+static PetscErrorCode TestGrids(HycoScene scene)
+{
+  const PetscInt counts[2] = {2, 4}, lists[2] = {1, 2}, one[2] = {1, 1};
+  const PetscReal a[1] = {0.5}, b[2] = {2, -1}, outside[2] = {0.5, 3.01};
+  const PetscReal *const product[2] = {a, b};
+  /* cell centres lo + (k + 1/2) (hi - lo) / n, the last parameter fastest */
+  const PetscReal centred[8][2] = {{0.25, -0.5}, {0.25, 0.5}, {0.25, 1.5}, {0.25, 2.5},
+                                   {0.75, -0.5}, {0.75, 0.5}, {0.75, 1.5}, {0.75, 2.5}};
+  HycoSamples samples;
+  PetscInt n, p;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_FALSE));
+  PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_TRUE));
+  PetscCall(HycoSamplesAddProduct(samples, lists, product));
+  PetscCall(HycoSamplesGet(samples, &n, &p, &mu));
+  CHECK(n == 18 && p == 2, "expected 18 points of 2 values, found %d of %d", (int)n, (int)p);
+  for (int k = 0; k < 16; k++) CHECK_NEAR(mu[k], centred[k / 2][k % 2], 1e-15);
+  CHECK_NEAR(mu[16], 0, 0); /* closed: from corner to corner */
+  CHECK_NEAR(mu[17], -1, 0);
+  CHECK_NEAR(mu[30], 1, 0);
+  CHECK_NEAR(mu[31], 3, 0);
+  CHECK_NEAR(mu[32], 0.5, 0);
+  CHECK_NEAR(mu[33], 2, 0);
+  CHECK_NEAR(mu[35], -1, 0);
+  CHECK_FAILS(HycoSamplesAddPoint(samples, outside), "b = 3.01 lies outside its range [-1");
+  CHECK_FAILS(HycoSamplesAddGrid(samples, one, PETSC_TRUE), "the grid has 1 points for a; at least 2 are needed");
+  PetscCall(HycoSamplesDestroy(&samples));
+  CHECK(!samples, "Destroy must clear the handle");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FromFile(HycoScene scene, const char text[], PetscInt *n, PetscReal first[2])
+{
+  char path[128];
+  FILE *out;
+  HycoSamples samples;
+  PetscInt p;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  snprintf(path, sizeof(path), "/tmp/hyco_points_%ld.csv", (long)getpid());
+  out = fopen(path, "w");
+  fputs(text, out);
+  fclose(out);
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoSamplesAddFile(samples, path));
+  PetscCall(HycoSamplesGet(samples, n, &p, &mu));
+  PetscCall(PetscArraycpy(first, mu, 2));
+  PetscCall(HycoSamplesDestroy(&samples));
+  unlink(path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestFile(HycoScene scene)
+{
+  PetscInt n;
+  PetscReal first[2];
+
+  PetscFunctionBegin;
+  PetscCall(FromFile(scene, "b,a\n2.5,0.25\r\n1,1\n", &n, first)); /* columns in any order */
+  CHECK(n == 2, "expected 2 points, found %d", (int)n);
+  CHECK_NEAR(first[0], 0.25, 0);
+  CHECK_NEAR(first[1], 2.5, 0);
+  CHECK_FAILS(FromFile(scene, "a,c\n1,1\n", &n, first), "\"c\" is no parameter");
+  CHECK_FAILS(FromFile(scene, "a\n1\n", &n, first), "names 1 of the scene's 2 parameters");
+  CHECK_FAILS(FromFile(scene, "a,a\n1,1\n", &n, first), "stands twice");
+  CHECK_FAILS(FromFile(scene, "a,b\n1,1\n1;2\n", &n, first), "line 3: 2 numbers");
+  CHECK_FAILS(FromFile(scene, "a,b\n1,9\n", &n, first), "b = 9");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The text that a model carries gives the same scene again; the fields of the scene are what was written. */
+static PetscErrorCode TestScene(HycoScene scene)
+{
+  HycoScene again;
+  char *text, *twice;
+  PetscInt n;
+  const char *const *names;
+  const PetscReal *lo, *hi, at[3] = {0, 0, 0}, mu[2] = {1, 2};
+  PetscReal young;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, &lo, &hi));
+  CHECK(n == 2 && !strcmp(names[0], "a") && !strcmp(names[1], "b"), "expected the parameters a, b");
+  CHECK_NEAR(lo[1], -1, 0);
+  CHECK_NEAR(hi[1], 3, 0);
+  PetscCall(HycoSceneToText(scene, &text));
+  PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &again));
+  PetscCall(HycoSceneToText(again, &twice));
+  CHECK(strcmp(text, twice) == 0, "the text changed from\n%s\nto\n%s", text, twice);
+  PetscCall(HycoExprEval(again->body[0].young, mu, 1, at, &young));
+  CHECK_NEAR(young, 5, 0);
+  PetscCall(PetscFree(text));
+  PetscCall(PetscFree(twice));
+  PetscCall(HycoSceneDestroy(&again));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestNearest(void)
+{
+  const char *const names[] = {"young", "poisson", "map_x"};
+
+  PetscFunctionBegin;
+  CHECK(HycoNearest("yung", 3, names) == names[0], "yung is nearest to young");
+  CHECK(HycoNearest("Poison", 3, names) == names[1], "Poison is nearest to poisson");
+  CHECK(!HycoNearest("gravity", 3, names), "gravity is near to none");
+  CHECK(HycoOptionKnown("hyco_pod_tol") && !HycoOptionKnown("hyco_pod_tl"), "the table of options is wrong");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Test(void)
+{
+  HycoScene scene;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneFromEntries(PETSC_COMM_SELF, 5, keys, values, "/", &scene));
+  PetscCall(TestGrids(scene));
+  PetscCall(TestFile(scene));
+  PetscCall(TestScene(scene));
+  PetscCall(TestNearest());
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+TEST_MAIN
