@@ -119,18 +119,9 @@ static PetscErrorCode CreateB(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
+static PetscErrorCode SetUp(HycoFOM f)
 {
-  HycoFOM f;
-
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
-  PetscCall(PetscNew(&f));
-  *fom = NULL;
-  PetscCallMPI(MPI_Comm_dup(comm, &f->comm));
-  PetscCallMPI(MPI_Comm_rank(f->comm, &f->rank));
-  PetscCallMPI(MPI_Comm_size(f->comm, &f->size));
-  f->scene = scene;
   f->summary.seconds.setup = -HycoNow();
   PetscCall(ReadMesh(f));
   PetscCall(HycoFECreateMatrix(f->fe, f->comm, f->n_owned, f->first, &f->K));
@@ -143,7 +134,7 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscCall(CreateScatters(f));
   PetscCall(HycoSystemCreate(f->comm, &f->system));
   PetscCall(HycoSolverCreate(f->comm, &f->solver));
-  PetscCall(HycoSolverSetFromOptions(f->solver, scene->options));
+  PetscCall(HycoSolverSetFromOptions(f->solver, f->scene->options));
   if (f->rank == 0) {
     PetscCall(PetscMalloc1(f->n_nodes * f->part->dim, &f->u));
     PetscCall(PetscCalloc1(f->n_contacts + 1, &f->lambda));
@@ -151,7 +142,23 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
     PetscCall(PetscMalloc1(f->n_cells * f->fe->n_sigma, &f->sigma));
   }
   f->summary.seconds.setup += HycoNow();
-  *fom = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  PetscCall(PetscNew(fom));
+  PetscCallMPI(MPI_Comm_dup(comm, &(*fom)->comm));
+  PetscCallMPI(MPI_Comm_rank((*fom)->comm, &(*fom)->rank));
+  PetscCallMPI(MPI_Comm_size((*fom)->comm, &(*fom)->size));
+  (*fom)->scene = scene;
+  ierr = SetUp(*fom);
+  if (ierr) PetscCall(HycoFOMDestroy(fom));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,11 +271,12 @@ static PetscErrorCode Gather(HycoFOM f)
 
 PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
 {
-  HycoSeconds *t = &f->summary.seconds;
+  HycoSeconds *t;
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
   HycoCheckHandle(f, "HycoFOMCreate()");
+  t = &f->summary.seconds;
   PetscCall(HycoSceneCheckParameters(f->scene, n, mu));
   PetscCall(Assemble(f, mu));
   t->assemble = HycoNow() - begin;
@@ -313,10 +321,11 @@ static PetscErrorCode Energy(HycoFOM f, PetscReal *energy)
 
 PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
 {
-  HycoSummary *s = &f->summary;
+  HycoSummary *s;
 
   PetscFunctionBegin;
   HycoCheckHandle(f, "HycoFOMCreate()");
+  s = &f->summary;
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetSummary()");
   s->dim = f->fe->dim;
   s->n_dof = f->n_free;

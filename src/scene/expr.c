@@ -68,34 +68,43 @@ static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const na
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, const char *const names[],
-                              HycoExpr *expr)
+static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
 {
   static const char *const axis[3] = {"x", "y", "z"};
-  HycoExpr e;
   char *end;
 
   PetscFunctionBegin;
-  PetscCall(PetscNew(&e));
-  *expr = e;
-  PetscCall(PetscStrallocpy(key, &e->key));
-  PetscCall(PetscStrallocpy(text, &e->text));
   e->n_parameters = n;
-  e->constant = strtod(text, &end);
+  e->constant = strtod(e->text, &end);
   while (*end == ' ') end++;
-  if (end != text && *end == '\0' && strpbrk(text, "0123456789")) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(text[strspn(text, " \t")] != '\0', "%s is empty; give a number or an expression", key);
+  if (end != e->text && *end == '\0' && strpbrk(e->text, "0123456789")) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(e->text[strspn(e->text, " \t")] != '\0', "%s is empty; give a number or an expression", e->key);
   e->parser = mupCreate(muBASETYPE_FLOAT);
   mupSetErrorHandler(e->parser, Quiet);
   mupDefineConst(e->parser, "pi", PETSC_PI); /* muParser's own _pi has 12 digits */
   for (int c = 0; c < 3; c++) mupDefineVar(e->parser, axis[c], &e->x[c]);
   for (PetscInt p = 0; p < n; p++) mupDefineVar(e->parser, names[p], &e->mu[p]);
   if (mupError(e->parser)) PetscCall(Raise(e));
-  mupSetExpr(e->parser, text);
+  mupSetExpr(e->parser, e->text);
   if (mupError(e->parser)) PetscCall(Raise(e));
   PetscCall(FindVariables(e, n, names));
   (void)mupEval(e->parser);
   if (mupError(e->parser)) PetscCall(Raise(e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, const char *const names[],
+                              HycoExpr *expr)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(expr));
+  PetscCall(PetscStrallocpy(key, &(*expr)->key));
+  PetscCall(PetscStrallocpy(text, &(*expr)->text));
+  ierr = Parse(*expr, n, names);
+  if (ierr) PetscCall(HycoExprDestroy(expr));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

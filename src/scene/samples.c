@@ -111,15 +111,13 @@ static PetscErrorCode ReadHeader(HycoSamples s, const char path[], char *line, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReadFile(HycoSamples s, const char path[])
+static PetscErrorCode ReadLines(HycoSamples s, const char path[], FILE *file)
 {
   const PetscInt P = s->scene->n_parameters;
-  FILE *file = fopen(path, "r");
   char line[4096];
   PetscInt column[HYCO_MAX_PARAMETERS], number = 0;
 
   PetscFunctionBegin;
-  HycoCheck(file, "the file of points %s cannot be opened", path);
   while (fgets(line, sizeof(line), file)) {
     PetscReal mu[HYCO_MAX_PARAMETERS];
     char *next = line;
@@ -141,7 +139,19 @@ static PetscErrorCode ReadFile(HycoSamples s, const char path[])
     }
     PetscCall(HycoSamplesAddPoint(s, mu));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadFile(HycoSamples s, const char path[])
+{
+  FILE *file = fopen(path, "r");
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheck(file, "the file of points %s cannot be opened", path);
+  ierr = ReadLines(s, path, file);
   fclose(file);
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -323,31 +323,35 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode LoadInto(HycoScene s, const char path[])
+{
+  char folder[PETSC_MAX_PATH_LEN] = "";
+
+  PetscFunctionBegin;
+  PetscCall(HycoEntriesRead(s->comm, path, &s->options, folder));
+  HycoOnEach(s->comm, Build(s, folder));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSceneLoad(MPI_Comm comm, const char path[], HycoScene *scene)
 {
-  HycoScene s;
-  char folder[PETSC_MAX_PATH_LEN] = "";
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCheck(path && scene, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
              "HycoSceneLoad: the path or the handle's address is NULL");
-  *scene = NULL;
-  PetscCall(PetscNew(&s));
-  PetscCallMPI(MPI_Comm_dup(comm, &s->comm));
-  PetscCall(HycoEntriesRead(comm, path, &s->options, folder));
-  HycoOnEach(comm, Build(s, folder));
-  *scene = s;
+  PetscCall(PetscNew(scene));
+  PetscCallMPI(MPI_Comm_dup(comm, &(*scene)->comm));
+  ierr = LoadInto(*scene, path);
+  if (ierr) PetscCall(HycoSceneDestroy(scene));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[], char *const value[],
-                                    const char folder[], HycoScene *scene)
+static PetscErrorCode FillFromEntries(HycoScene s, PetscInt n, char *const key[], char *const value[],
+                                      const char folder[])
 {
-  HycoScene s;
-
   PetscFunctionBegin;
-  PetscCall(PetscNew(&s));
-  PetscCallMPI(MPI_Comm_dup(comm, &s->comm));
   PetscCall(PetscOptionsCreate(&s->options));
   for (PetscInt k = 0; k < n; k++) {
     char dashed[HYCO_LINE];
@@ -358,7 +362,20 @@ PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[]
   }
   PetscCall(HycoEntriesOverride(s->options, PETSC_TRUE));
   PetscCall(Build(s, folder));
-  *scene = s;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[], char *const value[],
+                                    const char folder[], HycoScene *scene)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(scene));
+  PetscCallMPI(MPI_Comm_dup(comm, &(*scene)->comm));
+  ierr = FillFromEntries(*scene, n, key, value, folder);
+  if (ierr) PetscCall(HycoSceneDestroy(scene));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
