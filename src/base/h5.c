@@ -210,8 +210,10 @@ PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, Pe
   PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
   PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, *data));
   for (size_t k = 0; k < dims[0] * dims[1]; k++) {
-    HycoCheck(PetscIsNormalReal((*data)[k]) || (*data)[k] == 0 || PetscAbsReal((*data)[k]) < 1,
-              "%s: %s holds a value that is not finite: the file is damaged", file->path, name);
+    if (PetscIsInfOrNanReal((*data)[k])) {
+      PetscCall(PetscFree(*data));
+      HycoFail("%s: %s holds a value that is not finite: the file is damaged", file->path, name);
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -231,8 +233,11 @@ PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscI
   PetscCall(
       ReadSet(file, name, set, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, *data));
   for (size_t k = 0; k < dims[0] * dims[1]; k++) {
-    HycoCheck((*data)[k] >= lo && (*data)[k] <= hi, "%s: %s holds %d, outside %d to %d: the file is damaged",
-              file->path, name, (int)(*data)[k], (int)lo, (int)hi);
+    const PetscInt value = (*data)[k];
+
+    if (value >= lo && value <= hi) continue;
+    PetscCall(PetscFree(*data));
+    HycoFail("%s: %s holds %d, outside %d to %d: the file is damaged", file->path, name, (int)value, (int)lo, (int)hi);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -10,11 +10,13 @@ static const PetscReal mu[] = {3, 4.05}, at[] = {0.25, -2, 7};
 static PetscErrorCode Value(const char text[], PetscReal *value)
 {
   HycoExpr e = NULL;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoExprCreate("key", text, 2, names, &e));
-  PetscCall(HycoExprEval(e, mu, 1, at, value));
+  ierr = HycoExprEval(e, mu, 1, at, value);
   PetscCall(HycoExprDestroy(&e));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -48,6 +48,7 @@ static PetscErrorCode FromFile(HycoScene scene, const char text[], PetscInt *n, 
   HycoSamples samples;
   PetscInt p;
   const PetscReal *mu;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   snprintf(path, sizeof(path), "/tmp/hyco_points_%ld.csv", (long)getpid());
@@ -55,11 +56,14 @@ static PetscErrorCode FromFile(HycoScene scene, const char text[], PetscInt *n, 
   fputs(text, out);
   fclose(out);
   PetscCall(HycoSamplesCreate(scene, &samples));
-  PetscCall(HycoSamplesAddFile(samples, path));
-  PetscCall(HycoSamplesGet(samples, n, &p, &mu));
-  PetscCall(PetscArraycpy(first, mu, 2));
-  PetscCall(HycoSamplesDestroy(&samples));
+  ierr = HycoSamplesAddFile(samples, path);
   unlink(path);
+  if (!ierr) {
+    PetscCall(HycoSamplesGet(samples, n, &p, &mu));
+    PetscCall(PetscArraycpy(first, mu, 2));
+  }
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
