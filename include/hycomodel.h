@@ -21,6 +21,7 @@ typedef struct {
   PetscReal strain_energy;                                         /* of the RID */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
   HycoKKT kkt;                                                     /* of the reduced system (38) */
+  char method[64];                                                 /* what solved, in words */
   HycoReason reason;
   HycoSeconds seconds;
 } HycoPrediction;

@@ -13,7 +13,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddNumberToObject(json, "n_contacts", p->n_contacts);
   cJSON_AddNumberToObject(json, "n_active", p->n_active);
   cJSON_AddNumberToObject(json, "active_set_iterations", p->iterations);
-  cJSON_AddStringToObject(json, "solver", HycoReasonName(p->reason));
+  cJSON_AddStringToObject(json, "solver", p->method);
   cJSON_AddBoolToObject(json, "converged", p->reason > 0);
   cJSON_AddNumberToObject(json, "n_modes", p->n_modes);
   cJSON_AddNumberToObject(json, "n_fe_dofs", p->n_fe_dofs);

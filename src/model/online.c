@@ -379,6 +379,7 @@ static PetscErrorCode Unpack(HycoModel m)
 PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
 {
   HycoPrediction *p;
+  const char *method;
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
@@ -396,6 +397,8 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   PetscCall(HycoSolverGetReason(m->solver, &p->reason));
   PetscCall(HycoSolverGetIterations(m->solver, &p->iterations));
   PetscCall(HycoSolverGetKKT(m->solver, &p->kkt));
+  PetscCall(HycoSolverGetMethod(m->solver, &method));
+  PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
   PetscCall(Unpack(m));
   if (m->reconstruct && p->reason > 0) PetscCall(HycoModelReconstruct(m));
   p->seconds.total = HycoNow() - begin;
