@@ -1,24 +1,34 @@
 /*
   Contact forces outside the RID, (41): the nonnegative combination of dual snapshots that agrees with the RID's forces
   and vanishes where the predicted displacement leaves a gap. ([B D - D]_- in the paper's print is [B U - D]_-.)
+  With many snapshots (41) has many minimisers that round-off would choose among: a small weight on the coefficients
+  picks the one near the least norm.
 */
 #include <hycoalgorithms.h>
 #include <hycomodelimpl.h>
 
+/* The weight, relative to the largest snapshot force in the RID. */
+#define SMALL 1e-3
+
 PetscErrorCode HycoModelReconstruct(HycoModel m)
 {
   const PetscInt N = m->pairs.n, n = m->n_dual;
-  PetscInt rows = m->m;
+  PetscInt rows = m->m + n;
+  PetscReal scale = 0;
   PetscReal *A, *b, *c, *open, force = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m->m; k++) force += m->Lambda[m->contact[k]];
   if (m->m == N || !n || !m->m || force == 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc4((m->m + N) * n, &A, m->m + N, &b, n, &c, N, &open));
+  PetscCall(PetscMalloc4((m->m + N + n) * n, &A, m->m + N + n, &b, n, &c, N, &open));
   for (PetscInt k = 0; k < N; k++) {
     open[k] = -m->gap[k];
     for (PetscInt j = m->row_start[k]; j < m->row_start[k + 1]; j++) open[k] += m->row_value[j] * m->U[m->row_dof[j]];
     rows += open[k] < 0;
+  }
+  for (PetscInt k = 0; k < m->m; k++) {
+    for (PetscInt j = 0; j < n; j++)
+      scale = PetscMax(scale, m->S_lambda[(size_t)j * (size_t)N + (size_t)m->contact[k]]);
   }
   for (PetscInt j = 0; j < n; j++) {
     const PetscReal *s = m->S_lambda + (size_t)j * (size_t)N;
@@ -28,6 +38,7 @@ PetscErrorCode HycoModelReconstruct(HycoModel m)
     for (PetscInt k = 0; k < N; k++) {
       if (open[k] < 0) A[j * rows + r++] = open[k] * s[k];
     }
+    for (PetscInt i = 0; i < n; i++) A[j * rows + r++] = i == j ? SMALL * scale : 0;
   }
   for (PetscInt r = 0; r < rows; r++) b[r] = r < m->m ? m->Lambda[m->contact[r]] : 0;
   PetscCall(HycoNNLS(rows, n, A, b, c, NULL));
