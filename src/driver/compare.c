@@ -14,12 +14,10 @@ static PetscErrorCode ComparePoint(HycoFOM fom, HycoModel model, PetscInt n_par,
   HycoSummary s;
   HycoPrediction p;
   HycoErrors e = {0};
-  HycoScene scene;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMSolve(fom, n_par, mu));
   PetscCall(HycoFOMGetSummary(fom, &s));
-  PetscCall(HycoModelGetScene(model, &scene));
   HycoCheck(s.reason > 0, "the full-order solution at the first parameter = %.10g: %s", n_par ? (double)mu[0] : 0.,
             HycoReasonName(s.reason));
   PetscCall(HycoModelPredict(model, n_par, mu));
@@ -49,7 +47,6 @@ static PetscErrorCode CompareMine(HycoScene scene, HycoModel model, MPI_Comm gro
   char word[] = "points:";
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(HycoFOMCreate(group, scene, &fom));
   PetscCallMPI(MPI_Comm_rank(group, &rank));
   for (PetscInt k = first; k < last; k++) {

@@ -17,6 +17,17 @@ static PetscErrorCode Name(const char prefix[], const char name[], char out[128]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode PutInt(HycoH5 h, const char prefix[], const char name[], PetscInt rows, PetscInt cols,
+                             const PetscInt *data)
+{
+  char at[128];
+
+  PetscFunctionBegin;
+  PetscCall(Name(prefix, name, at));
+  PetscCall(HycoH5WriteInt(h, at, rows, cols, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SaveGroups(HycoH5 h, const char prefix[], HycoMesh m)
 {
   char *names, at[128];
@@ -32,12 +43,9 @@ static PetscErrorCode SaveGroups(HycoH5 h, const char prefix[], HycoMesh m)
   PetscCall(Name(prefix, "group_name", at));
   PetscCall(HycoH5WriteText(h, at, names));
   PetscCall(PetscFree(names));
-  PetscCall(Name(prefix, "group_dim", at));
-  PetscCall(HycoH5WriteInt(h, at, m->n_groups, 1, m->group_dim));
-  PetscCall(Name(prefix, "group_start", at));
-  PetscCall(HycoH5WriteInt(h, at, m->n_groups + 1, 1, m->group_start));
-  PetscCall(Name(prefix, "group_node", at));
-  PetscCall(HycoH5WriteInt(h, at, m->group_start[m->n_groups], 1, m->group_node));
+  PetscCall(PutInt(h, prefix, "group_dim", m->n_groups, 1, m->group_dim));
+  PetscCall(PutInt(h, prefix, "group_start", m->n_groups + 1, 1, m->group_start));
+  PetscCall(PutInt(h, prefix, "group_node", m->group_start[m->n_groups], 1, m->group_node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -47,26 +55,17 @@ static PetscErrorCode SaveMesh(HycoH5 h, const char prefix[], HycoMesh m)
   char at[128];
 
   PetscFunctionBegin;
-  PetscCall(Name(prefix, "head", at));
-  PetscCall(HycoH5WriteInt(h, at, 2, 1, head));
+  PetscCall(PutInt(h, prefix, "head", 2, 1, head));
   PetscCall(Name(prefix, "xyz", at));
   PetscCall(HycoH5WriteReal(h, at, m->n_nodes, 3, m->xyz));
-  PetscCall(Name(prefix, "node_id", at));
-  PetscCall(HycoH5WriteInt(h, at, m->n_nodes, 1, m->node_id));
-  PetscCall(Name(prefix, "node_body", at));
-  PetscCall(HycoH5WriteInt(h, at, m->n_nodes, 1, m->node_body));
-  PetscCall(Name(prefix, "cells", at));
-  PetscCall(HycoH5WriteInt(h, at, m->n_cells, m->nv, m->cells));
-  PetscCall(Name(prefix, "cell_id", at));
-  PetscCall(HycoH5WriteInt(h, at, m->n_cells, 1, m->cell_id));
-  PetscCall(Name(prefix, "cell_body", at));
-  PetscCall(HycoH5WriteInt(h, at, m->n_cells, 1, m->cell_body));
-  PetscCall(Name(prefix, "facets", at));
-  PetscCall(HycoH5WriteInt(h, at, m->n_facets, m->nf, m->facets));
-  PetscCall(Name(prefix, "facet_group", at));
-  PetscCall(HycoH5WriteInt(h, at, m->n_facets, 1, m->facet_group));
-  PetscCall(Name(prefix, "facet_cell", at));
-  PetscCall(HycoH5WriteInt(h, at, m->n_facets, 1, m->facet_cell));
+  PetscCall(PutInt(h, prefix, "node_id", m->n_nodes, 1, m->node_id));
+  PetscCall(PutInt(h, prefix, "node_body", m->n_nodes, 1, m->node_body));
+  PetscCall(PutInt(h, prefix, "cells", m->n_cells, m->nv, m->cells));
+  PetscCall(PutInt(h, prefix, "cell_id", m->n_cells, 1, m->cell_id));
+  PetscCall(PutInt(h, prefix, "cell_body", m->n_cells, 1, m->cell_body));
+  PetscCall(PutInt(h, prefix, "facets", m->n_facets, m->nf, m->facets));
+  PetscCall(PutInt(h, prefix, "facet_group", m->n_facets, 1, m->facet_group));
+  PetscCall(PutInt(h, prefix, "facet_cell", m->n_facets, 1, m->facet_cell));
   PetscCall(SaveGroups(h, prefix, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -102,8 +101,6 @@ static PetscErrorCode LoadGroups(HycoH5 h, const char prefix[], HycoMesh m)
 
 static PetscErrorCode LoadMesh(HycoH5 h, const char prefix[], PetscInt n_bodies, HycoMesh *mesh)
 {
-  static const PetscInt nv[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 8}, nf[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 4},
-                        dim[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 3};
   HycoMesh m;
   PetscInt *head, two = 2, one = 1, three = 3;
   char at[128];
@@ -114,9 +111,9 @@ static PetscErrorCode LoadMesh(HycoH5 h, const char prefix[], PetscInt n_bodies,
   PetscCall(Name(prefix, "head", at));
   PetscCall(HycoH5LoadInt(h, at, 0, HYCO_N_CELL_TYPES - 1, &two, &one, &head));
   m->type = (HycoCellType)head[0];
-  m->dim = dim[head[0]];
-  m->nv = nv[head[0]];
-  m->nf = nf[head[0]];
+  m->dim = HycoElementGet(m->type)->dim;
+  m->nv = HycoElementGet(m->type)->nv;
+  m->nf = HycoElementGetFacet(m->type)->nv;
   PetscCall(PetscFree(head));
   m->n_nodes = m->n_cells = m->n_facets = -1;
   PetscCall(Name(prefix, "xyz", at));
@@ -143,15 +140,10 @@ static PetscErrorCode LoadMesh(HycoH5 h, const char prefix[], PetscInt n_bodies,
 
 static PetscErrorCode SavePairs(HycoH5 h, const char prefix[], const HycoPairs *p)
 {
-  char at[128];
-
   PetscFunctionBegin;
-  PetscCall(Name(prefix, "slave", at));
-  PetscCall(HycoH5WriteInt(h, at, p->n, 1, p->slave));
-  PetscCall(Name(prefix, "master", at));
-  PetscCall(HycoH5WriteInt(h, at, p->n, 1, p->master));
-  PetscCall(Name(prefix, "contact", at));
-  PetscCall(HycoH5WriteInt(h, at, p->n, 1, p->contact));
+  PetscCall(PutInt(h, prefix, "slave", p->n, 1, p->slave));
+  PetscCall(PutInt(h, prefix, "master", p->n, 1, p->master));
+  PetscCall(PutInt(h, prefix, "contact", p->n, 1, p->contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
