@@ -20,6 +20,8 @@ typedef struct {
   PetscObjectState K_state, B_state;
 } HycoSeen;
 
+typedef struct _n_HycoDirect *HycoDirect;
+
 struct _p_HycoSolver {
   MPI_Comm comm;
   /* user parameters */
@@ -32,10 +34,10 @@ struct _p_HycoSolver {
   HycoMonitor monitor;
   void *monitor_ctx;
   /* factor of K (dual) */
-  KSP ksp;       /* sparse */
-  PetscReal *lu; /* dense: LAPACK's factors, column major n x n */
+  HycoDirect direct; /* sparse */
+  PetscReal bytes;   /* estimated for it, all ranks together */
+  PetscReal *lu;     /* dense: LAPACK's factors, column major n x n */
   PetscBLASInt *ipiv, n_lu;
-  HycoSeen factored;
   /* dual form, replicated on every rank: column-major m x m flexibility, gap without forces */
   PetscInt m;
   PetscReal *S, *g, *L;
@@ -62,6 +64,26 @@ enum { HYCO_TYPE_ACTIVE_SET, HYCO_TYPE_TAO, HYCO_TYPE_LEMKE };
 PetscErrorCode HycoSeenUpdate(HycoSeen *seen, Mat K, Mat B, PetscBool *same);
 /* A direct solver for a sparse K: MUMPS on several ranks or large, PETSc's own when small. Cholesky when symmetric. */
 PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, PetscBool symmetric, KSP *ksp);
+
+/* -- the direct solver of the dual form; all calls collective on its communicator -- */
+
+PetscErrorCode HycoDirectCreate(MPI_Comm comm, HycoDirect *direct);
+/* Frees; sets the handle to NULL. NULL-safe. */
+PetscErrorCode HycoDirectDestroy(HycoDirect *direct);
+/* Orders and analyses [K Bt; B 0] (B and Bt may be NULL) unless the pattern is the last one's; bytes: what the factor
+   is estimated to take on all ranks together. */
+PetscErrorCode HycoDirectAnalyse(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscBool symmetric, PetscReal *bytes);
+/* Factors, after HycoDirectAnalyse() with the same matrices: S = B K^-1 Bt, m x m, column major, on every rank. */
+PetscErrorCode HycoDirectFactor(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscReal S[], PetscBool *singular);
+/* g = D - B K^-1 F on every rank; D (length m) is read on rank 0. */
+PetscErrorCode HycoDirectReduce(HycoDirect direct, Vec F, const PetscReal D[], PetscReal g[]);
+/* x = K^-1 (F - Bt L) with the F of the last HycoDirectReduce(); L (length m) is read on rank 0. */
+PetscErrorCode HycoDirectExpand(HycoDirect direct, const PetscReal L[], Vec x);
+/* x = K^-1 r */
+PetscErrorCode HycoDirectSolve(HycoDirect direct, Vec r, Vec x);
+
+/* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
+PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);
 
 /* Factors the operators of such a solver, with more workspace when MUMPS asks for it. */
 PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular);

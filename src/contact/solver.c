@@ -23,7 +23,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscFunctionBegin;
   if (!solver || !*solver) PetscFunctionReturn(PETSC_SUCCESS);
   s = *solver;
-  PetscCall(KSPDestroy(&s->ksp));
+  PetscCall(HycoDirectDestroy(&s->direct));
   PetscCall(KSPDestroy(&s->ksp_gap));
   PetscCall(MatDestroy(&s->T));
   PetscCall(MatDestroy(&s->Kg));

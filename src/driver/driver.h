@@ -25,7 +25,7 @@ extern const Command commands[];
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
 /* Nothing was given that nobody read. To be called when all options have been read and before anything is written. */
 PetscErrorCode DriverCheckLeft(void);
-/* The same before the solvers have run: what is meant for them (-hyco_dual_..., -hyco_tao_... with that type) passes.
+/* The same before the solvers have run: what is meant for them (-hyco_mumps_..., -hyco_tao_... with that type) passes.
  */
 PetscErrorCode DriverCheckLeftEarly(HycoScene scene);
 /* The value of -name; fails when it is required and missing. `value` is "" when absent. */
