@@ -151,55 +151,6 @@ static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TAO on min 1/2 l^T S l + g^T l, l >= 0, scaled to a unit diagonal. */
-static PetscErrorCode SolveTao(HycoSolver s, PetscBool *solved)
-{
-  const PetscInt m = s->m;
-  Mat H;
-  Vec f, lo, hi, l;
-  PetscScalar *h, *p;
-  PetscReal *scale, size = 0;
-
-  PetscFunctionBegin;
-  PetscCheck(s->system->symmetric, s->comm, PETSC_ERR_USER,
-             "TAO's bound-constrained solvers need a symmetric system; use -hyco_solver_type active_set or lemke");
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, m, NULL, &H));
-  PetscCall(MatCreateVecs(H, &f, &l));
-  PetscCall(VecDuplicate(l, &lo));
-  PetscCall(VecDuplicate(l, &hi));
-  PetscCall(PetscMalloc1(m, &scale));
-  for (PetscInt i = 0; i < m; i++)
-    scale[i] = 1 / PetscSqrtReal(PetscMax(s->S[(size_t)i * (size_t)m + (size_t)i], PETSC_SMALL));
-  for (PetscInt i = 0; i < m; i++) size = PetscMax(size, PetscAbsReal(s->g[i] * scale[i]));
-  if (size == 0) size = 1;
-  PetscCall(MatDenseGetArray(H, &h));
-  for (PetscInt j = 0; j < m; j++) {
-    for (PetscInt i = 0; i < m; i++)
-      h[(size_t)j * (size_t)m + (size_t)i] = s->S[(size_t)j * (size_t)m + (size_t)i] * scale[i] * scale[j];
-  }
-  PetscCall(MatDenseRestoreArray(H, &h));
-  PetscCall(MatAssemblyBegin(H, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(H, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatSetOption(H, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(VecGetArray(f, &p));
-  for (PetscInt i = 0; i < m; i++) p[i] = -s->g[i] * scale[i] / size;
-  PetscCall(VecRestoreArray(f, &p));
-  PetscCall(VecSet(lo, 0));
-  PetscCall(VecSet(hi, PETSC_INFINITY));
-  PetscCall(VecSet(l, 0));
-  PetscCall(HycoTaoBoundQP(H, f, lo, hi, l, &s->its, solved));
-  PetscCall(VecGetArray(l, &p));
-  for (PetscInt i = 0; i < m; i++) s->L[i] = p[i] * scale[i] * size;
-  PetscCall(VecRestoreArray(l, &p));
-  PetscCall(PetscFree(scale));
-  PetscCall(VecDestroy(&f));
-  PetscCall(VecDestroy(&l));
-  PetscCall(VecDestroy(&lo));
-  PetscCall(VecDestroy(&hi));
-  PetscCall(MatDestroy(&H));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved)
 {
   const PetscInt max_its = s->max_its ? s->max_its : 50 + 4 * s->m;
@@ -208,14 +159,15 @@ static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s dual", HycoSolverTypes[type]));
   if (type == HYCO_TYPE_TAO) {
-    PetscCall(SolveTao(s, solved));
+    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "tao %s dual", HycoTaoTypes[s->tao]));
+    PetscCall(HycoTaoLCP(s->m, s->S, s->g, s->system->symmetric, s->tao, s->max_its, s->L, &s->its, solved));
   } else if (type == HYCO_TYPE_LEMKE) {
     PetscCall(HycoLCPLemke(s->m, s->S, s->g, 50 * (s->m + 10), s->L, &s->its, &status));
     *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   } else {
     if (!s->warm || !s->started) PetscCall(PetscArrayzero(s->active, s->m));
-    PetscCall(
-        HycoLCPActiveSet(s->m, s->S, s->g, max_its, s->monitor, s->monitor_ctx, s->active, s->L, &s->its, &status));
+    PetscCall(HycoLCPActiveSet(s->m, s->S, s->g, s->system->symmetric, max_its, s->monitor, s->monitor_ctx, s->active,
+                               s->L, &s->its, &status));
     *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   }
   for (PetscInt i = 0; i < s->m; i++) {
