@@ -13,6 +13,7 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
   (*solver)->comm = comm;
   (*solver)->rtol = 1e-8;
   (*solver)->warm = PETSC_TRUE;
+  (*solver)->multilevel = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -119,6 +120,7 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
   PetscCall(HycoOptionsReal(options, "hyco_solver_rtol", 1e-15, 0.1, &s->rtol));
   PetscCall(HycoOptionsInt(options, "hyco_solver_max_its", 0, PETSC_MAX_INT, &s->max_its));
   PetscCall(HycoOptionsBool(options, "hyco_solver_warm_start", &s->warm));
+  PetscCall(HycoOptionsBool(options, "hyco_solver_multilevel", &s->multilevel));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

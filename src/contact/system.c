@@ -89,10 +89,39 @@ static PetscReal Quotient(PetscReal a, PetscReal b)
   return a == 0 ? 0 : b > 0 ? a / b : PETSC_MAX_REAL;
 }
 
-static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value)
+/* Takes out of r what rounding x alone can make: entries of at most 16 eps (|K_ii x_i| + |F_i|); their bound's norm. */
+static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, PetscReal *bound)
+{
+  PetscInt n;
+  PetscScalar *residual, *floor_i;
+  const PetscScalar *X, *F;
+  Vec size;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(r, &size));
+  PetscCall(MatGetDiagonal(s->K, size));
+  PetscCall(VecGetLocalSize(r, &n));
+  PetscCall(VecGetArray(r, &residual));
+  PetscCall(VecGetArray(size, &floor_i));
+  PetscCall(VecGetArrayRead(x, &X));
+  PetscCall(VecGetArrayRead(s->F, &F));
+  for (PetscInt i = 0; i < n; i++) {
+    floor_i[i] = 16 * PETSC_MACHINE_EPSILON * (PetscAbsReal(floor_i[i] * X[i]) + PetscAbsReal(F[i]));
+    if (PetscAbsReal(residual[i]) <= floor_i[i]) residual[i] = 0;
+  }
+  PetscCall(VecRestoreArrayRead(x, &X));
+  PetscCall(VecRestoreArrayRead(s->F, &F));
+  PetscCall(VecRestoreArray(r, &residual));
+  PetscCall(VecRestoreArray(size, &floor_i));
+  PetscCall(VecNorm(size, NORM_2, bound));
+  PetscCall(VecDestroy(&size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value, PetscReal *rounding)
 {
   Vec Kx, BtL;
-  PetscReal nK, nB = 0, nF, nr;
+  PetscReal nK, nB = 0, nF, nr, bound;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(x, &Kx));
@@ -107,9 +136,11 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value)
     PetscCall(VecDestroy(&BtL));
   }
   PetscCall(VecAXPY(Kx, -1, s->F));
+  PetscCall(DropRounding(s, x, Kx, &bound));
   PetscCall(VecNorm(Kx, NORM_2, &nr));
   PetscCall(VecDestroy(&Kx));
   *value = Quotient(nr, PetscMax(nK, PetscMax(nB, nF)));
+  *rounding = Quotient(bound, PetscMax(nK, PetscMax(nB, nF)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -124,7 +155,7 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   HycoCheckHandle(s, "HycoSystemCreate()");
   PetscCheck(s->F, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
   PetscCall(PetscMemzero(kkt, sizeof(*kkt)));
-  PetscCall(Stationarity(s, x, L, &kkt->stationarity));
+  PetscCall(Stationarity(s, x, L, &kkt->stationarity, &kkt->rounding));
   if (PetscIsInfOrNanReal(kkt->stationarity)) kkt->stationarity = PETSC_MAX_REAL;
   if (!s->m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(s->D, &gap));

@@ -25,6 +25,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   ReportVector(json, "u_max", s->dim, s->u_max);
   cJSON_AddNumberToObject(json, "strain_energy", s->strain_energy);
   ReportKKT(json, &s->kkt);
+  cJSON_AddNumberToObject(json, "rounding", s->kkt.rounding);
   ReportSeconds(json, &s->seconds);
   PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
                 (int)s->n_active, (int)s->iterations, method));
