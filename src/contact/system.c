@@ -89,39 +89,43 @@ static PetscReal Quotient(PetscReal a, PetscReal b)
   return a == 0 ? 0 : b > 0 ? a / b : PETSC_MAX_REAL;
 }
 
-/* Takes out of r what rounding x alone can make: entries of at most 16 eps (|K_ii x_i| + |F_i|); their bound's norm. */
-static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, PetscReal *bound)
+/* Takes out of r what rounding x alone can make, entries of at most 16 eps (|K_ii x_i| + |F_i|); their norm. */
+static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, PetscReal *dropped)
 {
   PetscInt n;
-  PetscScalar *residual, *floor_i;
-  const PetscScalar *X, *F;
-  Vec size;
+  PetscReal squares = 0, sum;
+  PetscScalar *residual;
+  const PetscScalar *K, *X, *F;
+  Vec diagonal;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(r, &size));
-  PetscCall(MatGetDiagonal(s->K, size));
+  PetscCall(VecDuplicate(r, &diagonal));
+  PetscCall(MatGetDiagonal(s->K, diagonal));
   PetscCall(VecGetLocalSize(r, &n));
   PetscCall(VecGetArray(r, &residual));
-  PetscCall(VecGetArray(size, &floor_i));
+  PetscCall(VecGetArrayRead(diagonal, &K));
   PetscCall(VecGetArrayRead(x, &X));
   PetscCall(VecGetArrayRead(s->F, &F));
   for (PetscInt i = 0; i < n; i++) {
-    floor_i[i] = 16 * PETSC_MACHINE_EPSILON * (PetscAbsReal(floor_i[i] * X[i]) + PetscAbsReal(F[i]));
-    if (PetscAbsReal(residual[i]) <= floor_i[i]) residual[i] = 0;
+    if (!(PetscAbsReal(residual[i]) <= 16 * PETSC_MACHINE_EPSILON * (PetscAbsReal(K[i] * X[i]) + PetscAbsReal(F[i]))))
+      continue;
+    squares += residual[i] * residual[i];
+    residual[i] = 0;
   }
   PetscCall(VecRestoreArrayRead(x, &X));
   PetscCall(VecRestoreArrayRead(s->F, &F));
+  PetscCall(VecRestoreArrayRead(diagonal, &K));
   PetscCall(VecRestoreArray(r, &residual));
-  PetscCall(VecRestoreArray(size, &floor_i));
-  PetscCall(VecNorm(size, NORM_2, bound));
-  PetscCall(VecDestroy(&size));
+  PetscCall(VecDestroy(&diagonal));
+  PetscCallMPI(MPI_Allreduce(&squares, &sum, 1, MPIU_REAL, MPI_SUM, s->comm));
+  *dropped = PetscSqrtReal(sum);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value, PetscReal *rounding)
 {
   Vec Kx, BtL;
-  PetscReal nK, nB = 0, nF, nr, bound;
+  PetscReal nK, nB = 0, nF, nr, dropped = 0;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(x, &Kx));
@@ -136,11 +140,11 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value,
     PetscCall(VecDestroy(&BtL));
   }
   PetscCall(VecAXPY(Kx, -1, s->F));
-  PetscCall(DropRounding(s, x, Kx, &bound));
+  PetscCall(DropRounding(s, x, Kx, &dropped));
   PetscCall(VecNorm(Kx, NORM_2, &nr));
   PetscCall(VecDestroy(&Kx));
   *value = Quotient(nr, PetscMax(nK, PetscMax(nB, nF)));
-  *rounding = Quotient(bound, PetscMax(nK, PetscMax(nB, nF)));
+  *rounding = Quotient(dropped, PetscMax(nK, PetscMax(nB, nF)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
