@@ -95,6 +95,56 @@ PetscErrorCode HycoPrimalPossible(HycoSystem y, PetscBool *possible)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether every contact row has one entry: T is then diagonal. */
+static PetscErrorCode OneEach(Mat B, PetscBool *diagonal)
+{
+  PetscInt lo, hi;
+  PetscMPIInt more = 0, any;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(B, &lo, &hi));
+  for (PetscInt r = lo; r < hi && !more; r++) {
+    PetscInt n;
+
+    PetscCall(MatGetRow(B, r, &n, NULL, NULL));
+    more = n > 1;
+    PetscCall(MatRestoreRow(B, r, &n, NULL, NULL));
+  }
+  PetscCallMPI(MPI_Allreduce(&more, &any, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)B)));
+  *diagonal = (PetscBool)!any;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Kg = T^T K T for contacts that are each on one unknown: no product of matrices. */
+static PetscErrorCode ScaleOnly(HycoSolver s)
+{
+  HycoSystem y = s->system;
+  PetscInt lo, hi, n;
+  Vec t;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateVecs(y->K, &t, NULL));
+  PetscCall(VecSet(t, 1));
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  for (PetscInt r = lo; r < hi; r++) {
+    const PetscScalar *vals;
+
+    PetscCall(MatGetRow(y->B, r, &n, NULL, &vals));
+    PetscCall(VecSetValue(t, s->pivot[r - lo], 1 / vals[0], INSERT_VALUES));
+    PetscCall(MatRestoreRow(y->B, r, &n, NULL, &vals));
+  }
+  PetscCall(VecAssemblyBegin(t));
+  PetscCall(VecAssemblyEnd(t));
+  PetscCall(VecGetLocalSize(t, &n));
+  PetscCall(MatDestroy(&s->T));
+  PetscCall(MatCreateAIJ(s->comm, n, n, y->n, y->n, 1, NULL, 0, NULL, &s->T));
+  PetscCall(MatDiagonalSet(s->T, t, INSERT_VALUES));
+  PetscCall(MatDuplicate(y->K, MAT_COPY_VALUES, &s->Kg));
+  PetscCall(MatDiagonalScale(s->Kg, t, t));
+  PetscCall(VecDestroy(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* T = I, but in a pivot's row: x_p = (y_p - sum_j B_ij y_j) / B_ip. */
 static PetscErrorCode BuildT(HycoSolver s)
 {
@@ -145,7 +195,7 @@ static PetscErrorCode BuildT(HycoSolver s)
 static PetscErrorCode SetUpPrimal(HycoSolver s)
 {
   HycoSystem y = s->system;
-  PetscBool same;
+  PetscBool same, diagonal = PETSC_FALSE;
   PetscInt lo, hi;
   PetscReal begin = HycoNow();
 
@@ -165,10 +215,15 @@ static PetscErrorCode SetUpPrimal(HycoSolver s)
     PetscCheck(!any, s->comm, PETSC_ERR_USER,
                "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
   }
-  PetscCall(BuildT(s));
   PetscCall(MatDestroy(&s->Kg));
   PetscCall(MatDestroy(&s->Kw));
-  PetscCall(MatPtAP(y->K, s->T, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &s->Kg));
+  PetscCall(OneEach(y->B, &diagonal));
+  if (diagonal)
+    PetscCall(ScaleOnly(s));
+  else {
+    PetscCall(BuildT(s));
+    PetscCall(MatPtAP(y->K, s->T, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &s->Kg));
+  }
   PetscCall(MatSetOption(s->Kg, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatDuplicate(s->Kg, MAT_COPY_VALUES, &s->Kw));
   PetscCall(HycoGapWork(s->Kw));
