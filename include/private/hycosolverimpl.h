@@ -30,7 +30,7 @@ struct _p_HycoSolver {
   HycoForm form;
   PetscReal rtol;
   PetscInt max_its;
-  PetscBool warm, fallback;
+  PetscBool warm, fallback, multilevel;
   PetscInt tao_type; /* index in HycoTaoTypes; HYCO_TAO_AUTO: by the problem */
   HycoMonitor monitor;
   void *monitor_ctx;
@@ -67,7 +67,8 @@ enum { HYCO_TYPE_ACTIVE_SET, HYCO_TYPE_TAO, HYCO_TYPE_LEMKE };
 
 /* Whether K and B are those last seen, unchanged; then remember them. */
 PetscErrorCode HycoSeenUpdate(HycoSeen *seen, Mat K, Mat B, PetscBool *same);
-/* A direct solver for a sparse K: MUMPS on several ranks or large, PETSc's own when small. Cholesky when symmetric. */
+/* A direct solver for a sparse K: MUMPS on several ranks or large, PETSc's own when small or thin. Cholesky when
+   symmetric. */
 PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, PetscBool symmetric, KSP *ksp);
 
 /* -- the direct solver of the dual form; all calls collective on its communicator -- */
@@ -90,6 +91,8 @@ PetscErrorCode HycoDirectSolve(HycoDirect direct, Vec r, Vec x);
 /* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);
 
+/* Whether K, on one process, has so short an envelope in reverse Cuthill-McKee order that its factor hardly fills. */
+PetscErrorCode HycoThin(Mat K, PetscBool *thin);
 /* Factors the operators of such a solver, with more workspace when MUMPS asks for it. */
 PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular);
 
@@ -115,6 +118,29 @@ PetscErrorCode HycoTaoLCP(PetscInt n, const PetscReal M[], const PetscReal q[], 
                           PetscInt max_its, PetscReal z[], PetscInt *its, PetscBool *solved);
 /* The dual form by TAO with S = B K^-1 Bt never formed (form dual_free). */
 PetscErrorCode HycoSolveDualFree(HycoSolver s, Vec x, Vec L, PetscBool *solved);
+
+/*
+  Gap coordinates. HycoGapWork() prepares Kw, a copy of Kg that keeps its pattern; HycoSolveOnSet() solves Kg y = f with
+  y = d at this rank's n rows a[], through Kw, its solver and rhs. Collective.
+*/
+PetscErrorCode HycoGapWork(Mat Kw);
+PetscErrorCode HycoSolveOnSet(Mat Kg, Mat Kw, KSP ksp, Vec f, PetscInt n, const PetscInt a[], const PetscReal d[],
+                              Vec rhs, Vec y, PetscBool *singular);
+/*
+  Where the active set of min 1/2 y^T K y - f^T y, y <= bound (PETSC_INFINITY: none) starts: set is 1 at its bound, else
+  0; *made says whether K has what the coarser problems need, else set is not touched. Collective.
+*/
+PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *made);
+/* Whether a held unknown pulls at its bound, or a free one is past it, beyond round-off. `largest` is the largest
+   force, `size` the largest gap or displacement, `diagonal` the unknown's own stiffness. */
+static inline PetscBool HycoPulls(PetscReal force, PetscReal largest, PetscReal diagonal, PetscReal bound)
+{
+  return (PetscBool)(force < -1e-12 * largest - 16 * PETSC_MACHINE_EPSILON * diagonal * PetscAbsReal(bound));
+}
+static inline PetscBool HycoPenetrates(PetscReal value, PetscReal bound, PetscReal size)
+{
+  return (PetscBool)(value > bound + 1e-14 * size);
+}
 
 /* -- dense complementarity, w = q + M z >= 0, z >= 0, w.z = 0; M column major n x n; all replicated -- */
 

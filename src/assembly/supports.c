@@ -2,7 +2,7 @@
 #include <hycofe.h>
 #include <petscblaslapack.h>
 
-/* part[i]: the smallest node that i is connected to through cells. */
+/* The node that stands for all that i is connected to; part leads to it. */
 static PetscInt Root(PetscInt part[], PetscInt i)
 {
   while (part[i] != i) {
@@ -12,7 +12,8 @@ static PetscInt Root(PetscInt part[], PetscInt i)
   return i;
 }
 
-static PetscErrorCode FindParts(HycoMesh m, PetscInt part[])
+/* part[i]: number of the connected part that node i is in. */
+static PetscErrorCode FindParts(HycoMesh m, PetscInt part[], PetscInt *n_parts)
 {
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = i;
@@ -22,6 +23,9 @@ static PetscErrorCode FindParts(HycoMesh m, PetscInt part[])
     part[PetscMax(a, b)] = PetscMin(a, b);
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = Root(part, i);
+  *n_parts = 0;
+  for (PetscInt i = 0; i < m->n_nodes; i++)
+    part[i] = part[i] == i ? (*n_parts)++ : part[part[i]]; /* roots come first */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,20 +92,20 @@ static PetscErrorCode CheckPart(HycoFE fe, Part *p)
 PetscErrorCode HycoFECheckSupports(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
-  PetscInt *part;
+  PetscInt *part, n_parts;
   Part *parts;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_nodes, &part));
-  PetscCall(PetscCalloc1(m->n_nodes, &parts));
-  PetscCall(FindParts(m, part));
+  PetscCall(FindParts(m, part, &n_parts));
+  PetscCall(PetscCalloc1(n_parts, &parts));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     parts[part[i]].nodes++;
     parts[part[i]].body = m->node_body[i];
     for (PetscInt c = 0; c < 3; c++) parts[part[i]].centre[c] += fe->X[3 * i + c];
   }
-  for (PetscInt i = 0; i < m->n_nodes; i++) {
-    for (PetscInt c = 0; part[i] == i && c < 3; c++) parts[i].centre[c] /= parts[i].nodes;
+  for (PetscInt p = 0; p < n_parts; p++) {
+    for (PetscInt c = 0; c < 3; c++) parts[p].centre[c] /= parts[p].nodes;
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     for (PetscInt c = 0; c < 3; c++)
@@ -119,9 +123,7 @@ PetscErrorCode HycoFECheckSupports(HycoFE fe)
       for (PetscInt b = 0; b < n; b++) p->gram[a][b] += row[a] * row[b];
     }
   }
-  for (PetscInt i = 0; i < m->n_nodes; i++) {
-    if (part[i] == i) PetscCall(CheckPart(fe, &parts[i]));
-  }
+  for (PetscInt p = 0; p < n_parts; p++) PetscCall(CheckPart(fe, &parts[p]));
   PetscCall(PetscFree(part));
   PetscCall(PetscFree(parts));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -105,7 +105,7 @@ static PetscErrorCode Factor(HycoSolver s, PetscBool *singular)
   if (s->ksp_free) PetscCall(KSPGetOperators(s->ksp_free, &old, NULL));
   if (old != K) {
     PetscCall(KSPDestroy(&s->ksp_free));
-    PetscCall(HycoDirectSolver(s->comm, "hyco_dual_", K, s->system->symmetric, &s->ksp_free));
+    PetscCall(HycoDirectSolver(s->comm, "hyco_mumps_", K, s->system->symmetric, &s->ksp_free));
   }
   PetscCall(KSPSetOperators(s->ksp_free, K, K));
   PetscCall(HycoFactor(s->ksp_free, singular));

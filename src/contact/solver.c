@@ -15,6 +15,7 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
   (*solver)->warm = PETSC_TRUE;
   (*solver)->fallback = PETSC_TRUE;
   (*solver)->tao_type = HYCO_TAO_AUTO;
+  (*solver)->multilevel = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -149,6 +150,7 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
   PetscCall(HycoOptionsInt(options, "hyco_solver_max_its", 0, PETSC_MAX_INT, &s->max_its));
   PetscCall(HycoOptionsBool(options, "hyco_solver_warm_start", &s->warm));
   PetscCall(HycoOptionsBool(options, "hyco_solver_fallback", &s->fallback));
+  PetscCall(HycoOptionsBool(options, "hyco_solver_multilevel", &s->multilevel));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -25,14 +25,16 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   ReportVector(json, "u_max", s->dim, s->u_max);
   cJSON_AddNumberToObject(json, "strain_energy", s->strain_energy);
   ReportKKT(json, &s->kkt);
+  cJSON_AddNumberToObject(json, "rounding", s->kkt.rounding);
   ReportSeconds(json, &s->seconds);
   PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
                 (int)s->n_active, (int)s->iterations, method));
   PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g\n", (double)s->total_contact_force,
                 (double)s->lambda_max, (double)s->strain_energy));
-  PetscCall(Say("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
-                (double)s->kkt.stationarity, (double)s->kkt.penetration, (double)s->kkt.adhesion,
-                (double)s->kkt.complementarity));
+  PetscCall(
+      Say("KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
+          (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,
+          (double)s->kkt.complementarity));
   PetscCall(Say("seconds: %.3f assemble, %.3f factor, %.3f solve\n", (double)s->seconds.assemble,
                 (double)s->seconds.factor, (double)s->seconds.solve));
   PetscCall(ReportWrite(&json));
