@@ -23,6 +23,13 @@ typedef enum {
   HYCO_FORM_DUAL_FREE /* the dual with B K^-1 Bt applied, never formed: TAO's bound-constrained types, symmetric */
 } HycoForm;
 
+/* Solves with the stiffness K. */
+typedef enum {
+  HYCO_LINEAR_AUTO,     /* direct, unless the factor is estimated to take more memory than there is */
+  HYCO_LINEAR_DIRECT,   /* MUMPS, ordered by nested dissection */
+  HYCO_LINEAR_ITERATIVE /* conjugate gradients with algebraic multigrid, on the primal form */
+} HycoLinear;
+
 /* How a solve ended. Negative: not solved, x and L are the last iterate. */
 typedef enum {
   HYCO_CONVERGED = 1,            /* KKT residuals below the tolerance */
@@ -50,6 +57,8 @@ PetscErrorCode HycoSolverSetType(HycoSolver solver, HycoSolverType type);
 PetscErrorCode HycoSolverSetTaoType(HycoSolver solver, const char type[]);
 /* -hyco_solver_form */
 PetscErrorCode HycoSolverSetForm(HycoSolver solver, HycoForm form);
+/* -hyco_linear; `gigabytes` (-hyco_memory): what a factor may take on all ranks together, 0: most of what is free. */
+PetscErrorCode HycoSolverSetLinear(HycoSolver solver, HycoLinear linear, PetscReal gigabytes);
 /* -hyco_solver_rtol: the largest relative KKT residual that counts as solved (default 1e-8). */
 PetscErrorCode HycoSolverSetTolerance(HycoSolver solver, PetscReal rtol);
 /* -hyco_solver_max_its: of the active set or TAO (0: chosen from the number of contacts; TAO 2000). */
@@ -80,6 +89,8 @@ PetscErrorCode HycoSolverGetIterations(HycoSolver solver, PetscInt *its);
 PetscErrorCode HycoSolverGetKKT(HycoSolver solver, HycoKKT *kkt);
 /* What solved, in words: "active_set dual", "tao tron primal, then active_set". Borrowed, until the next solve. */
 PetscErrorCode HycoSolverGetMethod(HycoSolver solver, const char *method[]);
+/* What solved with K in the last solve, in words: "direct: mumps, 0.9 GB estimated". Borrowed, until the next solve. */
+PetscErrorCode HycoSolverGetLinear(HycoSolver solver, const char *linear[]);
 /* Seconds in the factorisation (and the flexibility) and in the rest of the last solve. Either may be NULL. */
 PetscErrorCode HycoSolverGetSeconds(HycoSolver solver, PetscReal *factor, PetscReal *solve);
 /* A word for the reason, for messages. Not collective. Borrowed. */

@@ -31,6 +31,11 @@ struct _p_HycoSolver {
   PetscReal rtol;
   PetscInt max_its;
   PetscBool warm, fallback, multilevel;
+  HycoLinear linear;
+  PetscReal memory;         /* bytes that factors may take, all ranks together; 0: most of what is free */
+  PetscBool iterative;      /* chosen: solve with K iteratively */
+  PetscObjectId chosen_for; /* the K that it was chosen for */
+  char linear_method[128], why_iterative[96];
   PetscInt tao_type; /* index in HycoTaoTypes; HYCO_TAO_AUTO: by the problem */
   HycoMonitor monitor;
   void *monitor_ctx;
@@ -76,8 +81,8 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
 PetscErrorCode HycoDirectCreate(MPI_Comm comm, HycoDirect *direct);
 /* Frees; sets the handle to NULL. NULL-safe. */
 PetscErrorCode HycoDirectDestroy(HycoDirect *direct);
-/* Leaves the unknowns pinned[0..n) (ascending) to the dense problem, z = (x_pinned, L), because K is singular. */
-PetscErrorCode HycoDirectPin(HycoDirect direct, PetscInt n, const PetscInt pinned[]);
+/* Leaves as many unknowns as K has a kernel to the dense problem, z = (x_pinned, L). */
+PetscErrorCode HycoDirectPinKernel(HycoDirect direct, Mat K);
 /* Orders and analyses [K Bt; B 0] (B and Bt may be NULL) unless the pattern is the last one's; bytes: what the factor
    is estimated to take on all ranks together. */
 PetscErrorCode HycoDirectAnalyse(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscBool symmetric, PetscReal *bytes);
@@ -100,6 +105,17 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
 /* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);
 
+/* Conjugate gradients with algebraic multigrid for a sparse, symmetric K, from the last solution. */
+PetscErrorCode HycoIterativeSolver(MPI_Comm comm, const char prefix[], Mat K, KSP *ksp);
+/* K x = F without contact. */
+PetscErrorCode HycoSolveIterative(HycoSolver s, Vec x, PetscBool *solved);
+/* Says in linear_method what solves with K. */
+PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp);
+/* Chooses between a factor and iterations (s->iterative), which need the primal form. */
+PetscErrorCode HycoChooseLinear(HycoSolver s, HycoForm *form);
+extern const char *const HycoLinearNames[];
+/* Attaches K's near-kernel (MatSetNearNullSpace()) to Kw, in gap coordinates. Collective. */
+PetscErrorCode HycoGapNearKernel(HycoSystem system, const PetscInt pivot[], Mat Kw);
 /* Whether K, on one process, has so short an envelope in reverse Cuthill-McKee order that its factor hardly fills. */
 PetscErrorCode HycoThin(Mat K, PetscBool *thin);
 /* Factors the operators of such a solver, with more workspace when MUMPS asks for it. */

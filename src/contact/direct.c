@@ -76,17 +76,25 @@ PetscErrorCode HycoDirectDestroy(HycoDirect *d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoDirectPin(HycoDirect d, PetscInt n, const PetscInt pinned[])
+PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
 {
-  PetscBool same = (PetscBool)(n == d->n_pinned);
+  PetscInt n, *pinned;
+  PetscBool same;
 
   PetscFunctionBegin;
+  PetscCall(HycoKernelSize(K, &n));
+  PetscCall(PetscMalloc1(n, &pinned));
+  PetscCall(HycoKernelPins(d->comm, K, n, pinned));
+  same = (PetscBool)(n == d->n_pinned);
   for (PetscInt k = 0; same && k < n; k++) same = (PetscBool)(pinned[k] == d->pinned[k]);
-  if (same) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Release(d));
-  PetscCall(PetscFree(d->pinned));
-  HycoDuplicate(n, pinned, &d->pinned);
-  d->n_pinned = n;
+  if (same)
+    PetscCall(PetscFree(pinned));
+  else {
+    PetscCall(Release(d));
+    PetscCall(PetscFree(d->pinned));
+    d->pinned = pinned;
+    d->n_pinned = n;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

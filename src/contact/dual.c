@@ -55,18 +55,17 @@ static PetscErrorCode FactorDense(HycoSolver s, PetscBool *singular)
 static PetscErrorCode FactorSparse(HycoSolver s, PetscBool *singular)
 {
   HycoSystem y = s->system;
-  PetscInt p, *pinned;
+  PetscInt p;
 
   PetscFunctionBegin;
   if (!s->direct) PetscCall(HycoDirectCreate(s->comm, &s->direct));
   PetscCall(HycoKernelSize(y->K, &p));
   PetscCall(Resize(s, p));
-  PetscCall(PetscMalloc1(p, &pinned));
-  PetscCall(HycoKernelPins(s->comm, y->K, p, pinned));
-  PetscCall(HycoDirectPin(s->direct, p, pinned));
-  PetscCall(PetscFree(pinned));
+  PetscCall(HycoDirectPinKernel(s->direct, y->K));
   PetscCall(HycoDirectAnalyse(s->direct, y->K, y->Bt, y->B, y->symmetric, &s->bytes));
   PetscCall(HycoDirectFactor(s->direct, y->K, y->Bt, y->B, s->S, singular));
+  PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: mumps, %.3g GB estimated",
+                          (double)(1e-9 * s->bytes)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -290,6 +289,10 @@ PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBoo
   PetscBool singular;
 
   PetscFunctionBegin;
+  if (s->iterative && !s->system->m) {
+    PetscCall(HycoSolveIterative(s, x, solved));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SetUpDual(s, &singular));
   if (singular) {
     s->reason = HYCO_DIVERGED_SINGULAR;

@@ -7,6 +7,9 @@
 
 /* A warm start that is not over by then began too far off: coarser problems give a better one. */
 #define HYCO_WARM_ITS 4
+/* Noise of iterative solves while the set changes, and in the last. */
+#define HYCO_NOISE_FIRST 1e-5
+#define HYCO_NOISE       1e-9
 
 /* Pivot (global unknown) of each of this rank's rows: the largest entry whose unknown no other row has; -1: none. */
 static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[])
@@ -149,18 +152,21 @@ static PetscErrorCode ScaleOnly(HycoSolver s)
 static PetscErrorCode BuildT(HycoSolver s)
 {
   HycoSystem y = s->system;
-  PetscInt lo, hi, first, last;
+  PetscInt lo, hi, first, last, bs;
   Mat shape;
 
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(y->K, &first, &last));
+  PetscCall(MatGetBlockSize(y->K, &bs));
   PetscCall(MatCreate(s->comm, &shape));
   PetscCall(MatSetSizes(shape, last - first, last - first, y->n, y->n));
+  PetscCall(MatSetBlockSize(shape, bs)); /* multigrid coarsens by node */
   PetscCall(MatSetType(shape, MATPREALLOCATOR));
   PetscCall(MatSetUp(shape));
   PetscCall(MatDestroy(&s->T));
   PetscCall(MatCreate(s->comm, &s->T));
   PetscCall(MatSetSizes(s->T, last - first, last - first, y->n, y->n));
+  PetscCall(MatSetBlockSize(s->T, bs));
   PetscCall(MatSetType(s->T, MATAIJ));
   PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
   for (PetscInt pass = 0; pass < 2; pass++) {
@@ -239,7 +245,10 @@ static PetscErrorCode SetUpPrimal(HycoSolver s)
     else
       PetscCall(KSPReset(s->ksp_gap));
   }
-  if (!s->ksp_gap) PetscCall(HycoDirectSolver(s->comm, "hyco_primal_", s->Kw, PETSC_TRUE, &s->ksp_gap));
+  if (s->iterative) PetscCall(HycoGapNearKernel(y, s->pivot, s->Kw));
+  if (!s->ksp_gap)
+    PetscCall(s->iterative ? HycoIterativeSolver(s->comm, "hyco_primal_", s->Kw, &s->ksp_gap)
+                           : HycoDirectSolver(s->comm, "hyco_primal_", s->Kw, PETSC_TRUE, &s->ksp_gap));
   PetscCall(KSPSetOperators(s->ksp_gap, s->Kw, s->Kw));
   if (s->m != y->m) {
     PetscCall(PetscFree(s->active));
@@ -267,9 +276,12 @@ PetscErrorCode HycoGapWork(Mat Kw)
 static PetscErrorCode SolveRefined(Mat Kw, KSP ksp, Vec rhs, Vec y)
 {
   Vec r, dy;
+  PetscBool iterative;
 
   PetscFunctionBegin;
   PetscCall(KSPSolve(ksp, rhs, y));
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &iterative)); /* of its own accuracy */
+  if (iterative) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(y, &r));
   PetscCall(VecDuplicate(y, &dy));
   PetscCall(MatMult(Kw, y, r));
@@ -293,7 +305,6 @@ PetscErrorCode HycoSolveOnSet(Mat Kg, Mat Kw, KSP ksp, Vec f, PetscInt n, const 
   PetscCall(MatGetDiagonal(Kg, rhs));
   PetscCall(VecSum(rhs, &mean));
   mean /= size;
-  PetscCall(VecSet(y, 0));
   for (PetscInt k = 0; k < n; k++) PetscCall(VecSetValue(y, a[k], d[k], INSERT_VALUES));
   PetscCall(VecAssemblyBegin(y));
   PetscCall(VecAssemblyEnd(y));
@@ -323,6 +334,7 @@ static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, 
 typedef struct {
   PetscInt lo, n; /* this rank's contacts */
   PetscReal *gap, *value, *force, *diagonal, *at_d;
+  PetscReal noise; /* share of the largest force and gap that iterative solves leave */
   PetscInt *at;
   Vec f, rhs, residual, work;
   VecScatter scatter;
@@ -355,8 +367,10 @@ static PetscErrorCode Step(HycoSolver s, Primal *p, Vec y, PetscBool one, PetscI
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt k = 0; k < p->n; k++) {
       const PetscInt i = p->lo + k;
-      const PetscBool flip = s->active[i] ? HycoPulls(p->force[k], sizes[1], p->diagonal[k], p->gap[k])
-                                          : HycoPenetrates(p->value[k], p->gap[k], sizes[0]);
+      const PetscBool flip =
+          s->active[i]
+              ? p->force[k] < -p->noise * sizes[1] && HycoPulls(p->force[k], sizes[1], p->diagonal[k], p->gap[k])
+              : p->value[k] > p->gap[k] + p->noise * sizes[0] && HycoPenetrates(p->value[k], p->gap[k], sizes[0]);
 
       if (!flip) continue;
       if (pass == 0)
@@ -418,6 +432,15 @@ static PetscErrorCode StartFromCoarse(HycoSolver s, const Primal *p, PetscBool *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Iterative solves leave residuals of 1 % of `noise`; changes of the set below it are not to be believed. */
+static PetscErrorCode SetAccuracy(HycoSolver s, Primal *p, PetscReal noise)
+{
+  PetscFunctionBegin;
+  p->noise = noise;
+  PetscCall(KSPSetTolerances(s->ksp_gap, noise / 100, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /*
   A set that comes back means a cycle: from then on one contact changes at a time, which ends in exact arithmetic
   (K. G. Murty's least index rule). If a set comes back even so, round-off decides, and the residuals judge.
@@ -432,6 +455,7 @@ static PetscErrorCode ActiveSet(HycoSolver s, Primal *p, Vec y, PetscBool *solve
   PetscFunctionBegin;
   *solved = PETSC_FALSE;
   PetscCall(PetscMalloc1(max_its + 1, &past));
+  if (s->iterative) PetscCall(SetAccuracy(s, p, HYCO_NOISE_FIRST));
   if (!s->warm || !s->started) {
     PetscCall(HycoKernelSize(s->system->K, &n_free));
     for (PetscInt i = 0; i < s->system->m; i++)
@@ -455,7 +479,11 @@ static PetscErrorCode ActiveSet(HycoSolver s, Primal *p, Vec y, PetscBool *solve
     }
     PetscCall(Step(s, p, y, one, &changes));
     if (s->monitor) PetscCall(Report(s, p, changes));
-    *solved = (PetscBool)(changes == 0);
+    if (changes == 0 && p->noise > HYCO_NOISE) { /* the set settled: now in earnest */
+      PetscCall(SetAccuracy(s, p, HYCO_NOISE));
+      since = s->its;
+    } else
+      *solved = (PetscBool)(changes == 0);
   }
   PetscCall(PetscFree(past));
   s->started = *solved;
@@ -505,6 +533,7 @@ static PetscErrorCode PrimalCreate(HycoSolver s, Vec x, Primal *p)
   const PetscScalar *d;
 
   PetscFunctionBegin;
+  p->noise = 0;
   PetscCall(VecGetOwnershipRange(y->D, &p->lo, &hi));
   p->n = hi - p->lo;
   PetscCall(
@@ -549,12 +578,14 @@ PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscB
   PetscCall(SetUpPrimal(s));
   PetscCall(PrimalCreate(s, x, &p));
   PetscCall(VecDuplicate(x, &y));
+  PetscCall(VecSet(y, 0));
   PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s primal", HycoSolverTypes[type]));
   if (type == HYCO_TYPE_TAO) {
     PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "tao %s primal", HycoTaoTypes[s->tao]));
     PetscCall(BoundQP(s, &p, y, solved));
   } else
     PetscCall(ActiveSet(s, &p, y, solved));
+  PetscCall(HycoNameLinear(s, s->ksp_gap));
   PetscCall(MatMult(s->T, y, x));
   PetscCall(VecGetArray(L, &l));
   for (PetscInt k = 0; k < p.n; k++) {

@@ -92,6 +92,17 @@ PetscErrorCode HycoSolverSetForm(HycoSolver s, HycoForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSolverSetLinear(HycoSolver s, HycoLinear linear, PetscReal gigabytes)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheck(gigabytes >= 0, "the memory is %g GB; it must be 0 (what is free) or more", (double)gigabytes);
+  s->linear = linear;
+  s->memory = 1e9 * gigabytes;
+  s->chosen_for = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSolverSetTolerance(HycoSolver s, PetscReal rtol)
 {
   PetscFunctionBegin;
@@ -137,15 +148,22 @@ PetscErrorCode HycoSolverSetMonitor(HycoSolver s, HycoMonitor monitor, void *ctx
 PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
 {
   static const char *const forms[] = {"auto", "dual", "primal", "dual_free", NULL};
-  PetscInt form;
+  PetscInt form, linear;
+  PetscReal gigabytes;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
   form = (PetscInt)s->form;
+  linear = (PetscInt)s->linear;
+  gigabytes = 1e-9 * s->memory;
   PetscCall(HycoOptionsWord(options, "hyco_solver_type", HycoSolverTypes, &s->type));
   if (s->type == HYCO_TYPE_TAO) PetscCall(HycoOptionsWord(options, "hyco_tao_type", HycoTaoTypes, &s->tao_type));
   PetscCall(HycoOptionsWord(options, "hyco_solver_form", forms, &form));
   s->form = (HycoForm)form;
+  PetscCall(HycoOptionsWord(options, "hyco_linear", HycoLinearNames, &linear));
+  PetscCall(HycoOptionsReal(options, "hyco_memory", 0, 1e9, &gigabytes));
+  s->linear = (HycoLinear)linear;
+  s->memory = 1e9 * gigabytes;
   PetscCall(HycoOptionsReal(options, "hyco_solver_rtol", 1e-15, 0.1, &s->rtol));
   PetscCall(HycoOptionsInt(options, "hyco_solver_max_its", 0, PETSC_MAX_INT, &s->max_its));
   PetscCall(HycoOptionsBool(options, "hyco_solver_warm_start", &s->warm));
@@ -254,6 +272,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   s->seconds_factor = 0;
   type = s->type;
   PetscCall(ChooseForm(s, &form));
+  PetscCall(HycoChooseLinear(s, &form));
   PetscCall(ChooseTao(s, form));
   PetscCall(Attempt(s, type, form, x, L));
   its = s->its;
@@ -304,6 +323,14 @@ PetscErrorCode HycoSolverGetMethod(HycoSolver s, const char *method[])
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
   *method = s->method;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverGetLinear(HycoSolver s, const char *linear[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  *linear = s->linear_method;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -5,17 +5,19 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
 {
   cJSON *json;
   HycoSolver solver;
-  const char *method;
+  const char *method, *linear;
 
   PetscFunctionBegin;
   PetscCall(ReportCreate("solve", scene, mu, &json));
   PetscCall(HycoFOMGetSolver(fom, &solver));
   PetscCall(HycoSolverGetMethod(solver, &method));
+  PetscCall(HycoSolverGetLinear(solver, &linear));
   cJSON_AddNumberToObject(json, "n_dof", s->n_dof);
   cJSON_AddNumberToObject(json, "n_contacts", s->n_contacts);
   cJSON_AddNumberToObject(json, "n_active", s->n_active);
   cJSON_AddNumberToObject(json, "active_set_iterations", s->iterations);
   cJSON_AddStringToObject(json, "solver", method);
+  cJSON_AddStringToObject(json, "linear", linear);
   cJSON_AddBoolToObject(json, "converged", s->reason > 0);
   cJSON_AddNumberToObject(json, "total_contact_force", s->total_contact_force);
   cJSON_AddNumberToObject(json, "lambda_max", s->lambda_max);
@@ -35,8 +37,8 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
       Say("KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
           (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,
           (double)s->kkt.complementarity));
-  PetscCall(Say("seconds: %.3f assemble, %.3f factor, %.3f solve\n", (double)s->seconds.assemble,
-                (double)s->seconds.factor, (double)s->seconds.solve));
+  PetscCall(Say("seconds: %.3f assemble, %.3f factor, %.3f solve (%s)\n", (double)s->seconds.assemble,
+                (double)s->seconds.factor, (double)s->seconds.solve, linear));
   PetscCall(ReportWrite(&json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

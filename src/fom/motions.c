@@ -70,11 +70,13 @@ static PetscErrorCode SetKernel(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Translations and rotations of the moved nodes. */
+/* Translations and rotations of the moved nodes, zero where fixed. */
 static PetscErrorCode SetNearKernel(HycoFOM f)
 {
   const PetscInt dim = f->fe->dim;
   MatNullSpace near;
+  PetscInt n;
+  const Vec *v;
   Vec x;
 
   PetscFunctionBegin;
@@ -89,6 +91,17 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
   PetscCall(VecAssemblyBegin(x));
   PetscCall(VecAssemblyEnd(x));
   PetscCall(MatNullSpaceCreateRigidBody(x, &near));
+  PetscCall(MatNullSpaceGetVecs(near, NULL, &n, &v));
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt i = 0; i < f->part->n_nodes * dim; i++) {
+      const PetscInt node = f->part->node_global ? f->part->node_global[i / dim] : i / dim;
+
+      if (f->fe->fixed[i] && node >= f->first && node < f->first + f->n_owned)
+        PetscCall(VecSetValue(v[k], node * dim + i % dim, 0, INSERT_VALUES));
+    }
+    PetscCall(VecAssemblyBegin(v[k]));
+    PetscCall(VecAssemblyEnd(v[k]));
+  }
   PetscCall(MatSetNearNullSpace(f->K, near));
   PetscCall(MatNullSpaceDestroy(&near));
   PetscCall(VecDestroy(&x));

@@ -103,6 +103,21 @@ class Pellet(Case):
             self.near(float(row['total_contact_force']), one['total_contact_force'], 2e-7)
             self.near(float(row['strain_energy']), one['strain_energy'], 2e-7)
 
+    def test_linear(self):
+        """Without a factor: by request, or because it would not fit; the report says which."""
+        for ranks, options in ((0, ('-hyco_linear', 'iterative')), (2, ('-hyco_memory', '0.001')),
+                               (0, ('-hyco_linear', 'iterative', '-hyco_primal_pc_type', 'icc'))):
+            with self.subTest(options=options):
+                r = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1', *options, ranks=ranks)
+                self.assertEqual((r['n_contacts'], r['n_active']), (189, 45))
+                self.near(r['total_contact_force'], 1409.70532353, 1e-7)
+                self.solved(r)
+                self.assertRegex(r['linear'], 'iterative: cg with (gamg|icc)')
+        self.assertRegex(self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1')['linear'], '^direct: mumps, 0.* GB')
+        run = self.run_raw('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_linear', 'iterative', '-hyco_solver_form', 'dual')
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('-hyco_linear iterative solves the primal form', run.stderr)
+
     def test_no_contact_at_no_load(self):
         r = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,0')
         self.assertEqual((r['n_active'], r['total_contact_force'], r['strain_energy']), (0, 0, 0))
