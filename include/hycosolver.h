@@ -47,6 +47,9 @@ PetscErrorCode HycoSolverSetTolerance(HycoSolver solver, PetscReal rtol);
 PetscErrorCode HycoSolverSetMaxIts(HycoSolver solver, PetscInt max_its);
 /* -hyco_solver_warm_start: begin from the last solution's active set (default) or from no contact. */
 PetscErrorCode HycoSolverSetWarmStart(HycoSolver solver, PetscBool warm);
+/* -hyco_solver_multilevel: in the primal form, where contacts are more than a quarter of the unknowns and couplings
+   have one sign (a rope, a membrane), begin from the active set of coarser problems (default). */
+PetscErrorCode HycoSolverSetMultilevel(HycoSolver solver, PetscBool multilevel);
 /* Reads the options above from `options` (NULL: the global database). Collective. */
 PetscErrorCode HycoSolverSetFromOptions(HycoSolver solver, PetscOptions options);
 

@@ -97,6 +97,14 @@ PetscErrorCode HycoSolverSetWarmStart(HycoSolver s, PetscBool warm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSolverSetMultilevel(HycoSolver s, PetscBool multilevel)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  s->multilevel = multilevel;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSolverSetMonitor(HycoSolver s, HycoMonitor monitor, void *ctx)
 {
   PetscFunctionBegin;
