@@ -7,11 +7,14 @@
 
 static const HycoOption option_table[] = {
     {"hyco_solver_type", "<active_set|tao|lemke>", "active_set",
-     "method for the full order (tao) and every contact problem (the others)"},
-    {"hyco_solver_form", "<auto|dual|primal>", "auto",
-     "full order: pose it in the forces (few contacts) or in the gaps (as many as unknowns)"},
+     "method for every contact problem (a model's takes active_set where a TAO type needs symmetry)"},
+    {"hyco_tao_type", "<gpcg|tron|...|ssils|...>", "gpcg; ssils if nonsymmetric",
+     "with the type tao: its solver; docs/solvers.md says which for what (-hyco_tao_... sets its own options)"},
+    {"hyco_solver_form", "<auto|dual|primal|dual_free>", "auto",
+     "full order: pose it in the forces (few contacts; _free: no matrix) or in the gaps (as many as unknowns)"},
     {"hyco_solver_rtol", "<real>", "1e-8", "largest relative KKT residual that counts as solved"},
-    {"hyco_solver_max_its", "<int>", "0", "iterations of the active set (0: from the number of contacts)"},
+    {"hyco_solver_max_its", "<int>", "0", "iterations of the active set or TAO (0: from the number of contacts; 2000)"},
+    {"hyco_solver_fallback", "<bool>", "true", "what is not solved is tried again: tao, then active_set, then lemke"},
     {"hyco_solver_warm_start", "<bool>", "true", "full order: start from the last solution's active contacts"},
     {"hyco_solver_multilevel", "<bool>", "true", "full order, every unknown a contact: start from coarser problems"},
     {"hyco_groups", "<int>", "0", "groups of ranks that solve snapshots side by side (0: from the mesh's size)"},

@@ -463,6 +463,7 @@ static PetscErrorCode ActiveSet(HycoSolver s, Primal *p, Vec y, PetscBool *solve
 /* TAO on the same bounds. */
 static PetscErrorCode BoundQP(HycoSolver s, Primal *p, Vec y, PetscBool *solved)
 {
+  Mat H;
   Vec lo, hi;
 
   PetscFunctionBegin;
@@ -475,12 +476,20 @@ static PetscErrorCode BoundQP(HycoSolver s, Primal *p, Vec y, PetscBool *solved)
   PetscCall(VecAssemblyEnd(hi));
   PetscCall(VecSet(y, 0));
   PetscCall(VecPointwiseMin(y, y, hi));
-  PetscCall(HycoTaoBoundQP(s->Kg, p->f, lo, hi, y, &s->its, solved));
+  PetscCall(VecCopy(p->f, p->rhs));
+  PetscCall(MatDuplicate(s->Kg, MAT_COPY_VALUES, &H));
+  PetscCall(MatSetOption(H, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(HycoTaoSolve(s->tao, s->max_its, H, p->rhs, lo, hi, y, &s->its, solved));
+  PetscCall(MatDestroy(&H));
   PetscCall(MatMult(s->Kg, y, p->residual));
   PetscCall(VecAYPX(p->residual, -1, p->f));
   PetscCall(AtPivots(p->residual, p->scatter, p->work, p->n, p->force));
   PetscCall(AtPivots(y, p->scatter, p->work, p->n, p->value));
-  for (PetscInt k = 0; k < p->n; k++) s->active[p->lo + k] = (PetscBool)(p->value[k] >= p->gap[k]);
+  for (PetscInt k = 0; k < p->n; k++) { /* a value on its bound has gone through a scale and back */
+    const PetscReal ulps = 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(p->gap[k]);
+
+    s->active[p->lo + k] = (PetscBool)(p->value[k] >= p->gap[k] - ulps);
+  }
   PetscCall(VecDestroy(&lo));
   PetscCall(VecDestroy(&hi));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -539,9 +548,10 @@ PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscB
   PetscCall(PrimalCreate(s, x, &p));
   PetscCall(VecDuplicate(x, &y));
   PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s primal", HycoSolverTypes[type]));
-  if (type == HYCO_TYPE_TAO)
+  if (type == HYCO_TYPE_TAO) {
+    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "tao %s primal", HycoTaoTypes[s->tao]));
     PetscCall(BoundQP(s, &p, y, solved));
-  else
+  } else
     PetscCall(ActiveSet(s, &p, y, solved));
   PetscCall(MatMult(s->T, y, x));
   PetscCall(VecGetArray(L, &l));

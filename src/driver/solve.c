@@ -1,4 +1,4 @@
-/* hyco solve: one parameter value, full order. */
+/* hyco solve: full order, at one parameter value or over a set. */
 #include "driver.h"
 
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom, const HycoSummary *s)
@@ -41,28 +41,13 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CommandSolve(void)
+static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[])
 {
-  HycoScene scene;
-  HycoFOM fom;
-  HycoSolver solver;
   HycoSummary summary;
   PetscInt n;
-  PetscReal mu[64];
-  PetscBool monitor;
-  char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
-  PetscCall(DriverGet("scene", PETSC_TRUE, path));
-  PetscCall(DriverGet("output", PETSC_FALSE, output));
-  PetscCall(DriverGet("report", PETSC_FALSE, report));
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_monitor", &monitor));
-  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
-  PetscCall(DriverGetPoint(scene, mu));
-  PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
-  PetscCall(HycoFOMGetSolver(fom, &solver));
-  if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
   PetscCall(DriverCheckLeft());
@@ -71,7 +56,77 @@ PetscErrorCode CommandSolve(void)
             (double)summary.kkt.adhesion, (double)summary.kkt.complementarity);
   if (output[0]) PetscCall(HycoFOMWrite(fom, output));
   PetscCall(Report(scene, mu, fom, &summary));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What a set's table holds of each point. */
+enum { FORCE, LAMBDA_MAX, ACTIVE, U_NORM, ENERGY, KKT, CONVERGED, ITERATIONS, SECONDS, N_COLUMNS };
+static const char *const columns[N_COLUMNS] = {
+    "total_contact_force", "lambda_max", "n_active", "u_norm2", "strain_energy", "kkt_max",
+    "converged",           "iterations", "seconds"};
+
+/* The points in their order, each from the last one's active contacts, all ranks together. */
+static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, const char table[])
+{
+  PetscInt n, n_par;
+  const PetscReal *mu;
+  PetscReal *value, begin;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCall(PetscCalloc1(n * N_COLUMNS, &value));
+  begin = HycoNow();
+  for (PetscInt k = 0; k < n; k++) {
+    HycoSummary s;
+    PetscReal *v = value + k * N_COLUMNS;
+
+    PetscCall(HycoFOMSolve(fom, n_par, mu + k * n_par));
+    PetscCall(HycoFOMGetSummary(fom, &s));
+    if (k == 0) PetscCall(DriverCheckLeft());
+    v[FORCE] = s.total_contact_force;
+    v[LAMBDA_MAX] = s.lambda_max;
+    v[ACTIVE] = s.n_active;
+    v[U_NORM] = s.u_norm2;
+    v[ENERGY] = s.strain_energy;
+    v[KKT] = HycoKKTMax(&s.kkt);
+    v[CONVERGED] = s.reason > 0;
+    v[ITERATIONS] = s.iterations;
+    v[SECONDS] = s.seconds.total;
+  }
+  PetscCall(ReportSet("solve", table, scene, samples, N_COLUMNS, columns, value, HycoNow() - begin));
+  PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CommandSolve(void)
+{
+  HycoScene scene;
+  HycoSamples samples = NULL;
+  HycoFOM fom;
+  HycoSolver solver;
+  PetscBool monitor, set;
+  PetscReal mu[64];
+  char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN] = "";
+
+  PetscFunctionBegin;
+  PetscCall(DriverGet("scene", PETSC_TRUE, path));
+  PetscCall(DriverGet("output", PETSC_FALSE, output));
+  PetscCall(DriverGet("report", PETSC_FALSE, report));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_monitor", &monitor));
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
+  PetscCall(DriverHasSamples(scene, &set));
+  HycoCheck(!set || !output[0], "-output is for one point (-mu); a set of points gives a -table");
+  if (set) {
+    PetscCall(DriverGetSamples(scene, &samples, &set));
+    PetscCall(DriverGet("table", PETSC_FALSE, table));
+  } else
+    PetscCall(DriverGetPoint(scene, mu));
+  PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
+  PetscCall(HycoFOMGetSolver(fom, &solver));
+  if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
+  PetscCall(set ? Many(fom, scene, samples, table) : One(fom, scene, mu, output));
   PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
