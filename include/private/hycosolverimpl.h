@@ -91,8 +91,11 @@ PetscErrorCode HycoDirectSolve(HycoDirect direct, Vec r, Vec x);
 /* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);
 
-/* Whether K, on one process, has so short an envelope in reverse Cuthill-McKee order that its factor hardly fills. */
+/* Whether K has so short an envelope in reverse Cuthill-McKee order that its factor hardly fills; on several ranks only
+   a line's has. Collective. */
 PetscErrorCode HycoThin(Mat K, PetscBool *thin);
+/* Sets up a PCCHOLESKY for such a K. Collective. */
+PetscErrorCode HycoThinSolver(PC pc);
 /* Factors the operators of such a solver, with more workspace when MUMPS asks for it. */
 PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular);
 
