@@ -48,7 +48,7 @@ struct _p_HycoSolver {
   /* primal form in gap coordinates */
   Mat T, Kg, Kw;
   KSP ksp_gap;
-  PetscInt *pivot; /* this rank's contacts' pivot unknowns */
+  PetscInt *pivot, *contact, n_pivots; /* this rank's contacts' pivot unknowns, the contacts' numbers on this rank */
   HycoSeen transformed;
   /* dual form without its matrix */
   KSP ksp_free;

@@ -39,6 +39,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
   PetscCall(PetscFree(s->pivot));
+  PetscCall(PetscFree(s->contact));
   PetscCall(PetscFree(*solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

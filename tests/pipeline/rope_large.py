@@ -1,4 +1,5 @@
 """The rope on meshes of 1e2 to 1e5 nodes: the active set starts from coarser problems, and its iterations stay few."""
+import csv
 import os
 import subprocess
 import unittest
@@ -81,6 +82,24 @@ class RopeLarge(Case):
             fraction = [a['n_active'] / n for a, n in zip(r, SIZES)]
             self.assertLess(abs(fraction[k] - fraction[3]), 4 / SIZES[k])
             self.near(r[k]['total_contact_force'], r[3]['total_contact_force'], 10 / SIZES[k], SIZES[k])
+
+    def test_steps(self):
+        """One solver over a set of points, near ones and far ones: a few iterations from the last set, then a new start."""
+        for n in (1000, 10000):
+            run = self.run_raw('solve', '-scene', ROPE, '-scene_mesh', self.path(f'{n}.msh'), '-values_mu1',
+                               '0.05,0.0501,0.06,0.25,0.07', '-values_mu2', '0,0.01,0.5', '-table', 'steps.csv')
+            self.assertEqual(run.returncode, 0, run.stderr)
+            with open(self.path('steps.csv'), encoding='utf-8') as f:
+                rows = list(csv.DictReader(f))
+            self.assertEqual(len(rows), 15)
+            for row in rows:
+                with self.subTest(nodes=n, mu=(row['mu1'], row['mu2'])):
+                    self.assertLessEqual(int(row['iterations']), 4 + MOST)
+                    self.assertLess(float(row['kkt_max']), 1e-8)
+                    if n > 1000:
+                        continue
+                    alone = self.rope(n, row['mu1'] + ',' + row['mu2'])
+                    self.assertEqual(alone['n_active'], int(row['n_active']))
 
     def test_ranks(self):
         for n in SIZES[1:3]:
