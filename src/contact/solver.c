@@ -39,6 +39,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
   PetscCall(PetscFree(s->pivot));
+  PetscCall(PetscFree(s->contact));
   PetscCall(PetscFree(*solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -125,6 +126,14 @@ PetscErrorCode HycoSolverSetWarmStart(HycoSolver s, PetscBool warm)
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
   s->warm = warm;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetMultilevel(HycoSolver s, PetscBool multilevel)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  s->multilevel = multilevel;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -85,6 +85,14 @@ static PetscErrorCode TestResiduals(Case *c)
   PetscCall(SetState(c, 0.5, 1, 2));
   PetscCall(HycoSystemComputeKKT(c->system, c->x, c->L, &kkt));
   CHECK_NEAR(HycoKKTMax(&kkt), 0, 1e-16);
+  /* r_2 = 4 (x_2 - 1): 4 eps is within the round-off of K_22 x_2 and F_2, 16 eps (4 + 4), and 256 eps is not; |F| = 5
+   */
+  for (int k = 0; k < 2; k++) {
+    PetscCall(SetState(c, 0.5, 1 + (k ? 64 : 1) * PETSC_MACHINE_EPSILON, 2));
+    PetscCall(HycoSystemComputeKKT(c->system, c->x, c->L, &kkt));
+    CHECK_NEAR(kkt.stationarity, k ? 256 * PETSC_MACHINE_EPSILON / 5 : 0, 1e-18);
+    CHECK_NEAR(kkt.rounding, k ? 0 : 4 * PETSC_MACHINE_EPSILON / 5, 1e-18);
+  }
   /* not finite is no solution */
   PetscCall(SetState(c, NAN, 1, 2));
   PetscCall(HycoSystemComputeKKT(c->system, c->x, c->L, &kkt));
