@@ -216,6 +216,8 @@ static PetscErrorCode ChooseTao(HycoSolver s, HycoForm form)
              HycoTaoTypes[s->tao]);
   PetscCheck(form == HYCO_FORM_DUAL || !HycoTaoSemismooth(s->tao), s->comm, PETSC_ERR_USER,
              "TAO's %s needs the matrix of the dual form; use -hyco_solver_form dual", HycoTaoTypes[s->tao]);
+  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->tao != HYCO_TAO_BQPIP, s->comm, PETSC_ERR_USER,
+             "TAO's bqpip reads the matrix of the dual form; use -hyco_solver_form dual");
   PetscCheck(form != HYCO_FORM_DUAL_FREE || s->system->symmetric, s->comm, PETSC_ERR_USER,
              "the form dual_free needs a symmetric system; use -hyco_solver_form dual");
   PetscFunctionReturn(PETSC_SUCCESS);
