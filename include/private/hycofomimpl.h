@@ -35,5 +35,7 @@ struct _p_HycoFOM {
 /* Generalised forces F - B^T Lambda of the last solution (n_nodes x dim) on rank 0, zero on fixed unknowns. Collective.
  */
 PetscErrorCode HycoFOMGetForces(HycoFOM fom, PetscReal forces[]);
+/* Fills strain_energy, external_work, gap_work and energy_defect from the last solution. Collective. */
+PetscErrorCode HycoFOMEnergy(HycoFOM fom, HycoSummary *summary);
 
 #endif

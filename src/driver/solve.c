@@ -24,6 +24,9 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   ReportVector(json, "u_min", s->dim, s->u_min);
   ReportVector(json, "u_max", s->dim, s->u_max);
   cJSON_AddNumberToObject(json, "strain_energy", s->strain_energy);
+  cJSON_AddNumberToObject(json, "external_work", s->external_work);
+  cJSON_AddNumberToObject(json, "gap_work", s->gap_work);
+  cJSON_AddNumberToObject(json, "energy_defect", s->energy_defect);
   ReportKKT(json, &s->kkt);
   ReportSeconds(json, &s->seconds);
   PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
