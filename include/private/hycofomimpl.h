@@ -29,7 +29,6 @@ struct _p_HycoFOM {
   PetscReal *u, *lambda, *sigma, *gap;
   PetscBool solved, sigma_ready;
   HycoSummary summary;
-  PetscReal energy;
 };
 
 /* Generalised forces F - B^T Lambda of the last solution (n_nodes x dim) on rank 0, zero on fixed unknowns. Collective.

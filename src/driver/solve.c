@@ -31,8 +31,9 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   ReportSeconds(json, &s->seconds);
   PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
                 (int)s->n_active, (int)s->iterations, method));
-  PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g\n", (double)s->total_contact_force,
-                (double)s->lambda_max, (double)s->strain_energy));
+  PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g, identity to %.1e\n",
+                (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
+                (double)s->energy_defect));
   PetscCall(Say("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
                 (double)s->kkt.stationarity, (double)s->kkt.penetration, (double)s->kkt.adhesion,
                 (double)s->kkt.complementarity));

@@ -1,7 +1,7 @@
-"""The energy identity 2 W = work - sum(lambda D): Clapeyron's theorem (Timoshenko and Goodier, Theory of Elasticity, 3rd
-ed. 1970, chapter 8) with contact, where lambda (D - B U) = 0 makes the contact forces' work the sum of lambda D. The work
-counts loads and supports that move. It holds to round-off on every mesh; on a column in uniaxial strain each term has
-its closed form.
+"""The energy identity 2 W = work - sum(lambda D): Clapeyron's theorem (Timoshenko and Goodier, Theory of Elasticity,
+3rd ed. 1970, chapter 8) with contact, where lambda (D - B U) = 0 makes the contact forces' work the sum of lambda D.
+The work counts loads and supports that move. It holds to round-off on every mesh; on a column in uniaxial strain each
+term has its closed form.
 """
 import os
 import subprocess

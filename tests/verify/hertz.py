@@ -5,12 +5,12 @@ solution itself carries, so that the load's place and the body's size matter onl
     spheres:                  a^3 = 3 F R/(4 E*),    p0 = 3 F/(2 pi a^2),  p = p0 sqrt(1 - r^2/a^2)
     1/R = 1/R1 + 1/R2,  1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 (a rigid plane: 0)
 
-A body pressed by its mirror image's plane (prescribed displacement there): a quarter of a disc, an eighth of a ball. The
-peak is the pressure of the node in the middle, its force over the length or area it stands for; the half-width follows
-from the second moment of the nodal forces, which for Hertz's profile is F a^2/4 (cylinders) and 2 F a^2/5 (spheres); the
-last active node tells it to a cell. The body's radius is 100 half-widths. The displacements are such that the cylinders'
-half-width is near a whole number of cells on every mesh: elsewhere errors change sign from mesh to mesh and show no
-order.
+A body pressed by its mirror image's plane (prescribed displacement there): a quarter of a disc, an eighth of a ball.
+The peak is the pressure of the node in the middle, its force over the length or area it stands for; the half-width
+follows from the second moment of the nodal forces, which for Hertz's profile is F a^2/4 (cylinders) and 2 F a^2/5
+(spheres); the last active node tells it to a cell. The body's radius is 100 half-widths. The displacements are such
+that the cylinders' half-width is near a whole number of cells on every mesh: elsewhere errors change sign from mesh to
+mesh and show no order.
 """
 import unittest
 

@@ -5,8 +5,7 @@ radius b), plane strain: uniform pressure
     E' = E/(1 - nu^2),  n = nu/(1 - nu)
 
 (Timoshenko and Goodier, Theory of Elasticity, 3rd ed. 1970, chapter 4, stress symmetrical about an axis; a = 0 for a
-solid cylinder.) The
-interference is a negative gap. The pressure is each node's force over the length (area) that stands for it.
+solid cylinder.) The interference is a negative gap. The pressure is each node's force over its length or area.
 """
 import os
 import unittest

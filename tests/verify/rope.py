@@ -2,8 +2,8 @@
 
 nu u'' = 1 - p with p >= 0 where the rope lies on the obstacle, u = -d(x), else u'' = 1/nu; u and u' are continuous at
 the edges of contact (no point force where the obstacle is smooth: Kinderlehrer and Stampacchia, An Introduction to
-Variational Inequalities, 1980), nu u' at x = 1/2. With one interval of contact [a, b] and [c, e] in each half the pieces
-are parabolas:
+Variational Inequalities, 1980), nu u' at x = 1/2. With one interval of contact [a, b] and [c, e] in each half the
+pieces are parabolas:
     [0, a]   through u(0) = 0, meeting -d at a with its slope:  d(a) - a d'(a) - a^2/(2 nu) = 0
     [b, c]   leaving -d at b with its slope, bent anew at 1/2, meeting -d at c with its slope: two equations for b, c
     [e, 1]   as the first, from the other end
