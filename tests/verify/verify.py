@@ -53,10 +53,16 @@ class Verify(Case):
         return self.folder
 
     def solve(self, scene, *args, **options):
-        """The report, which must satisfy the KKT conditions and the energy identity, and the fields as arrays."""
+        """The report and the fields as arrays. The solution satisfies the KKT conditions, the energy identity, and, by the
+        written gaps, that contacts with a force are closed and no node penetrates."""
         report = self.hyco('solve', '-scene', scene, '-output', self.path('out.xdmf'), *args, **options)
         self.solved(report)
-        return report, read(self.path('out.h5'))
+        out = read(self.path('out.h5'))
+        if 'lambda' in out:
+            small = 1e-9 * abs(out['nodes/displacement']).max()
+            self.assertLessEqual(abs(out['gap'][out['lambda'] > 0]).max(initial=0), small)
+            self.assertGreaterEqual(out['gap'].min(), -small)
+        return report, out
 
 
 def read(path):
@@ -66,7 +72,7 @@ def read(path):
                                              'nodes/contact_pressure')}
         out['dim'] = int(f['mesh/head'][1, 0])
         if 'contact' in f:
-            out['lambda'] = f['contact/lambda'][:, 0]
+            out['lambda'], out['gap'] = f['contact/lambda'][:, 0], f['contact/gap'][:, 0]
             index = {int(i): k for k, i in enumerate(f['mesh/node_id'][:, 0])}
             slave = [index[int(i)] for i in f['contact/node_id'][:, 0]]
             out['at'] = out['mesh/xyz'][slave]
