@@ -53,8 +53,8 @@ class Verify(Case):
         return self.folder
 
     def solve(self, scene, *args, **options):
-        """The report and the fields as arrays. The solution satisfies the KKT conditions, the energy identity, and, by the
-        written gaps, that contacts with a force are closed and no node penetrates."""
+        """The report and the fields as arrays. The solution must satisfy the KKT conditions and the energy identity; by
+        the written gaps, contacts with a force are closed and no node penetrates."""
         report = self.hyco('solve', '-scene', scene, '-output', self.path('out.xdmf'), *args, **options)
         self.solved(report)
         out = read(self.path('out.h5'))
