@@ -4,6 +4,8 @@ radius b), plane strain: uniform pressure
     delta = p c [ ((b^2 + c^2)/(b^2 - c^2) + n2)/E2' + ((c^2 + a^2)/(c^2 - a^2) - n1)/E1' ],
     E' = E/(1 - nu^2),  n = nu/(1 - nu)
 
+and the stresses sigma_r, sigma_t = A (1 -+ q^2/r^2), sigma_z = nu (sigma_r + sigma_t), with q = a,
+A = -p c^2/(c^2 - a^2) in the inner cylinder, q = b, A = p c^2/(b^2 - c^2) in the outer
 (Timoshenko and Goodier, Theory of Elasticity, 3rd ed. 1970, chapter 4, stress symmetrical about an axis; a = 0 for a
 solid cylinder.) The interference is a negative gap. The pressure is each node's force over its length or area.
 """
@@ -46,6 +48,16 @@ def worst(pressures, exact):
     return max(pressures, key=lambda p: abs(p - exact))
 
 
+def stress(x, p):
+    """(xx, xy, xz, yy, yz, zz) of the rings a = 1, c = 2, b = 3 at the points x (n x 3)."""
+    r = np.hypot(x[:, 0], x[:, 1])
+    cos, sin, inside = x[:, 0] / r, x[:, 1] / r, r < 2
+    mean, rim, poisson = (np.where(inside, a, b) for a, b in ((-p * 4 / 3, p * 4 / 5), (1, 3), (0.25, 0.35)))
+    radial, hoop = mean * (1 - rim**2 / r**2), mean * (1 + rim**2 / r**2)
+    return np.column_stack([cos**2 * radial + sin**2 * hoop, cos * sin * (radial - hoop), 0 * r,
+                            sin**2 * radial + cos**2 * hoop, 0 * r, poisson * (radial + hoop)])
+
+
 def polar(x):
     return x[:, :1] * np.column_stack([np.cos(x[:, 1]), np.sin(x[:, 1])])
 
@@ -56,16 +68,21 @@ class Lame(Verify):
     def test_rings(self):
         """A quarter of two rings, 1 to 2 and 2 to 3, quadrilaterals."""
         exact = pressure(1, 2, 3, (2e5, 0.25), (1e5, 0.35), 1e-3)
-        sizes, found = (8, 16, 32), []
+        sizes, found, off = (8, 16, 32), [], []
         for n in sizes:
             grid = Grid()
             angle = np.linspace(0, np.pi / 2, 2 * n + 1)
             for body, low, faces in (('inner', 1, {'x1': 'shaft'}), ('outer', 2, {'x0': 'sleeve'})):
                 grid.box('quad4', [np.linspace(low, low + 1, n + 1), angle], polar, body,
                          {**faces, 'y0': 'y0', 'y1': 'x0'})
-            found.append(worst(self.solve(self.scene(SCENE, grid))[1]['pressure'], exact))
+            out = self.solve(self.scene(SCENE, grid))[1]
+            found.append(worst(out['pressure'], exact))
+            centre = out['mesh/xyz'][out['mesh/cells']].mean(axis=1)
+            off.append(abs(out['cells/stress'] - stress(centre, exact)).max() / exact)
         self.row('rings: order of the pressure', order(1 / np.array(sizes), abs(np.array(found) - exact)), 2, 5)
         self.row('rings: pressure at its worst node', found[-1], exact, 0.1)
+        self.row('rings: order of the stresses', order(1 / np.array(sizes), off), 2, 10)
+        self.row('rings: largest stress error over the pressure', off[-1], 0, 2e-3)
 
     def test_pellet(self):
         """The pellet's meshes A, B, C at radius 4.1 with an interference of 0.01 mm."""

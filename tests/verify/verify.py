@@ -69,7 +69,7 @@ def read(path):
     """The arrays of an output, and for each contact the place of its (slave) node and its pressure there."""
     with h5py.File(path) as f:
         out = {name: f[name][:] for name in ('mesh/xyz', 'mesh/cells', 'nodes/displacement',
-                                             'nodes/contact_pressure')}
+                                             'nodes/contact_pressure', 'cells/stress')}
         out['dim'] = int(f['mesh/head'][1, 0])
         if 'contact' in f:
             out['lambda'], out['gap'] = f['contact/lambda'][:, 0], f['contact/gap'][:, 0]
