@@ -29,7 +29,8 @@ typedef enum {
   HYCO_CONVERGED_FALLBACK = 2,   /* the same, by another method than the chosen one (HycoSolverGetMethod says which) */
   HYCO_DIVERGED_RESIDUAL = -1,   /* a residual above the tolerance */
   HYCO_DIVERGED_ITERATIONS = -2, /* the limit of iterations */
-  HYCO_DIVERGED_SINGULAR = -3    /* K (or its active saddle point) is singular */
+  HYCO_DIVERGED_SINGULAR = -3,   /* K (or its active saddle point) is singular */
+  HYCO_DIVERGED_UNHELD = -4      /* the load takes a body away from the contact that alone holds it */
 } HycoReason;
 
 /* Collective. The caller owns it. */

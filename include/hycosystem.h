@@ -39,7 +39,8 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system);
 
 /*
   Sets (references) the matrices: K n x n, Bt n x m, B m x n. B and Bt may be NULL: no contact. `symmetric` says
-  that K is symmetric positive definite and Bt = B^T. Changing a matrix in place is noticed through its state.
+  that K is symmetric positive definite and Bt = B^T. Where contact alone holds a body, K is only semidefinite: attach
+  its kernel, an orthonormal basis, by MatSetNullSpace(). Changing a matrix in place is noticed through its state.
 */
 PetscErrorCode HycoSystemSetMatrices(HycoSystem system, Mat K, Mat Bt, Mat B, PetscBool symmetric);
 /* Sets (references) F of length n and D of length m (NULL without contact). */

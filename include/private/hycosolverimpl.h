@@ -40,7 +40,7 @@ struct _p_HycoSolver {
   PetscReal *lu;     /* dense: LAPACK's factors, column major n x n */
   PetscBLASInt *ipiv, n_lu;
   /* dual form, replicated on every rank: column-major m x m flexibility, gap without forces */
-  PetscInt m;
+  PetscInt m, p; /* contacts; unknowns pinned because K is singular: they come before the contacts in S, g and L */
   PetscReal *S, *g, *L;
   PetscBool *active;
   PetscBool started; /* active holds a solution's set */
@@ -76,6 +76,8 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
 PetscErrorCode HycoDirectCreate(MPI_Comm comm, HycoDirect *direct);
 /* Frees; sets the handle to NULL. NULL-safe. */
 PetscErrorCode HycoDirectDestroy(HycoDirect *direct);
+/* Leaves the unknowns pinned[0..n) (ascending) to the dense problem, z = (x_pinned, L), because K is singular. */
+PetscErrorCode HycoDirectPin(HycoDirect direct, PetscInt n, const PetscInt pinned[]);
 /* Orders and analyses [K Bt; B 0] (B and Bt may be NULL) unless the pattern is the last one's; bytes: what the factor
    is estimated to take on all ranks together. */
 PetscErrorCode HycoDirectAnalyse(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscBool symmetric, PetscReal *bytes);
@@ -87,6 +89,13 @@ PetscErrorCode HycoDirectReduce(HycoDirect direct, Vec F, const PetscReal D[], P
 PetscErrorCode HycoDirectExpand(HycoDirect direct, const PetscReal L[], Vec x);
 /* x = K^-1 r */
 PetscErrorCode HycoDirectSolve(HycoDirect direct, Vec r, Vec x);
+
+/* -- a singular K -- */
+
+/* How many motions the attached kernel of K has (0: none is attached). */
+PetscErrorCode HycoKernelSize(Mat K, PetscInt *n);
+/* As many unknowns, ascending, without which K is regular; the same on every rank. Collective. */
+PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[]);
 
 /* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);
@@ -163,6 +172,13 @@ PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal
 */
 PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric, PetscInt *k,
                                  PetscInt a[], PetscReal z[], PetscBool *singular);
+/*
+  The active set with p free unknowns before m contacts (bodies that contact alone holds): M and q as HycoDirectFactor()
+  and HycoDirectReduce() give them, z = (x_pinned, L). SINGULAR: contact does not hold them under this load.
+*/
+PetscErrorCode HycoSolveHeld(PetscInt p, PetscInt m, const PetscReal M[], const PetscReal q[], PetscInt max_its,
+                             HycoMonitor monitor, void *ctx, PetscBool active[], PetscReal z[], PetscInt *its,
+                             HycoLCPStatus *status);
 /* Lemke's complementary pivoting. */
 PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt max_its, PetscReal z[],
                             PetscInt *its, HycoLCPStatus *status);

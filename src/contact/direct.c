@@ -76,6 +76,20 @@ PetscErrorCode HycoDirectDestroy(HycoDirect *d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoDirectPin(HycoDirect d, PetscInt n, const PetscInt pinned[])
+{
+  PetscBool same = (PetscBool)(n == d->n_pinned);
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; same && k < n; k++) same = (PetscBool)(pinned[k] == d->pinned[k]);
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Release(d));
+  PetscCall(PetscFree(d->pinned));
+  HycoDuplicate(n, pinned, &d->pinned);
+  d->n_pinned = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Entries of the saddle point in this rank's rows of K, B (and Bt): the lower triangle when symmetric. */
 static PetscErrorCode Entries(HycoDirect d, Mat A, PetscInt row0, PetscInt col0, PetscBool pattern, MUMPS_INT8 *at)
 {

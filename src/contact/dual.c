@@ -5,22 +5,23 @@
 #include <hycosolverimpl.h>
 #include <petscblaslapack.h>
 
-/* Makes room for m contacts; a change of m forgets the last solution's set. */
-static PetscErrorCode Resize(HycoSolver s)
+/* Makes room for m contacts and p pinned unknowns; a change forgets the last solution's set. */
+static PetscErrorCode Resize(HycoSolver s, PetscInt p)
 {
-  const PetscInt m = s->system->m;
+  const PetscInt m = s->system->m, n = m + p;
 
   PetscFunctionBegin;
-  if (s->m == m && s->S) PetscFunctionReturn(PETSC_SUCCESS);
+  if (s->m == m && s->p == p && s->S) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(s->S));
   PetscCall(PetscFree(s->g));
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
-  PetscCall(PetscMalloc1((size_t)m * (size_t)m + 1, &s->S));
-  PetscCall(PetscCalloc1(m + 1, &s->g));
-  PetscCall(PetscCalloc1(m + 1, &s->L));
+  PetscCall(PetscMalloc1((size_t)n * (size_t)n + 1, &s->S));
+  PetscCall(PetscCalloc1(n + 1, &s->g));
+  PetscCall(PetscCalloc1(n + 1, &s->L));
   PetscCall(PetscCalloc1(m + 1, &s->active));
   s->m = m;
+  s->p = p;
   s->started = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -54,9 +55,16 @@ static PetscErrorCode FactorDense(HycoSolver s, PetscBool *singular)
 static PetscErrorCode FactorSparse(HycoSolver s, PetscBool *singular)
 {
   HycoSystem y = s->system;
+  PetscInt p, *pinned;
 
   PetscFunctionBegin;
   if (!s->direct) PetscCall(HycoDirectCreate(s->comm, &s->direct));
+  PetscCall(HycoKernelSize(y->K, &p));
+  PetscCall(Resize(s, p));
+  PetscCall(PetscMalloc1(p, &pinned));
+  PetscCall(HycoKernelPins(s->comm, y->K, p, pinned));
+  PetscCall(HycoDirectPin(s->direct, p, pinned));
+  PetscCall(PetscFree(pinned));
   PetscCall(HycoDirectAnalyse(s->direct, y->K, y->Bt, y->B, y->symmetric, &s->bytes));
   PetscCall(HycoDirectFactor(s->direct, y->K, y->Bt, y->B, s->S, singular));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -112,13 +120,13 @@ static PetscErrorCode SetUpDual(HycoSolver s, PetscBool *singular)
   PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   s->condensed.K = 0; /* until it is done */
-  PetscCall(Resize(s));
   PetscCall(PetscObjectTypeCompare((PetscObject)y->K, MATSEQDENSE, &dense));
   if (!dense)
     PetscCall(FactorSparse(s, singular));
   else {
     if (y->B) PetscCall(PetscObjectTypeCompare((PetscObject)y->B, MATSEQDENSE, &dense_B));
     PetscCheck(dense_B, PETSC_COMM_SELF, PETSC_ERR_SUP, "a dense K needs a dense B");
+    PetscCall(Resize(s, 0));
     PetscCall(FactorDense(s, singular));
     if (y->m && !*singular) PetscCall(CondenseDense(s));
   }
@@ -148,6 +156,27 @@ static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
   PetscCallMPI(MPI_Allgatherv(local, (PetscMPIInt)n, MPIU_REAL, all, counts, offsets, MPIU_REAL, comm));
   PetscCall(VecRestoreArrayRead(v, &local));
   PetscCall(PetscFree2(counts, offsets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bodies that contact alone holds. */
+static PetscErrorCode SolveHeld(HycoSolver s, PetscInt type, PetscBool *solved)
+{
+  const PetscInt max_its = s->max_its ? s->max_its : 50 + 4 * s->m;
+  HycoLCPStatus status;
+
+  PetscFunctionBegin;
+  PetscCheck(type == HYCO_TYPE_ACTIVE_SET, s->comm, PETSC_ERR_USER,
+             "contact alone holds a body, and %s cannot solve that; use -hyco_solver_type active_set",
+             HycoSolverTypes[type]);
+  for (PetscInt i = 0; i < s->m && (!s->warm || !s->started); i++) s->active[i] = PETSC_TRUE;
+  PetscCall(
+      HycoSolveHeld(s->p, s->m, s->S, s->g, max_its, s->monitor, s->monitor_ctx, s->active, s->L, &s->its, &status));
+  *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
+  for (PetscInt i = 0; i < s->m; i++) s->L[s->p + i] = s->active[i] ? PetscMax(s->L[s->p + i], 0) : 0;
+  s->started = *solved;
+  PetscCall(
+      PetscSNPrintf(s->method, sizeof(s->method), "active_set dual, %d rigid motions held by contact", (int)s->p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,7 +262,7 @@ static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
   PetscCall(VecNorm(y->F, NORM_2, &size));
   PetscCall(Residual(y, x, L, work, r));
   PetscCall(VecNorm(r, NORM_2, &residual));
-  if (residual > 1e-12 * size) {
+  if (residual > 1e-12 * size && !s->p) {
     PetscCall(SolveK(s, r, work));
     PetscCall(VecAXPY(x, 1, work));
   }
@@ -251,7 +280,7 @@ static PetscErrorCode SetForces(HycoSolver s, Vec L)
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
   PetscCall(VecGetArray(L, &l));
-  PetscCall(PetscArraycpy(l, s->L + lo, hi - lo));
+  PetscCall(PetscArraycpy(l, s->L + s->p + lo, hi - lo));
   PetscCall(VecRestoreArray(L, &l));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -277,7 +306,7 @@ PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBoo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(FreeGap(s, x));
-  PetscCall(SolveForces(s, type, solved));
+  PetscCall(s->p ? SolveHeld(s, type, solved) : SolveForces(s, type, solved));
   PetscCall(SetForces(s, L));
   PetscCall(Recover(s, x, L));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -446,15 +446,17 @@ static PetscErrorCode ActiveSet(HycoSolver s, Primal *p, Vec y, PetscBool *solve
 {
   const PetscInt max_its = s->max_its ? s->max_its : 100 + s->system->m;
   unsigned long long *past;
-  PetscInt since = 0;
+  PetscInt since = 0, n_free;
   PetscBool one = PETSC_FALSE, again = PETSC_FALSE, fresh = PETSC_FALSE;
 
   PetscFunctionBegin;
   *solved = PETSC_FALSE;
   PetscCall(PetscMalloc1(max_its + 1, &past));
   if (!s->warm || !s->started) {
-    PetscCall(PetscArrayzero(s->active, s->system->m));
-    PetscCall(StartFromCoarse(s, p, &fresh));
+    PetscCall(HycoKernelSize(s->system->K, &n_free));
+    for (PetscInt i = 0; i < s->system->m; i++)
+      s->active[i] = (PetscBool)(n_free > 0); /* a body that contact alone holds begins held */
+    if (!n_free) PetscCall(StartFromCoarse(s, p, &fresh));
     if (fresh) PetscCall(PetscStrlcat(s->method, ", multilevel start", sizeof(s->method)));
   }
   while (s->its < max_its && !*solved && !again && s->reason != HYCO_DIVERGED_SINGULAR) {

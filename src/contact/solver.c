@@ -241,7 +241,7 @@ static PetscBool NextAttempt(const HycoSolver s, PetscInt *type, HycoForm *form)
 {
   const PetscBool dense = (PetscBool)(s->system->m && s->system->m <= HYCO_LEMKE_MAX);
 
-  if (!s->fallback || s->reason > 0 || s->reason == HYCO_DIVERGED_SINGULAR) return PETSC_FALSE;
+  if (!s->fallback || s->reason > 0 || s->reason == HYCO_DIVERGED_SINGULAR || s->p) return PETSC_FALSE;
   if (*type == HYCO_TYPE_LEMKE || (*type == HYCO_TYPE_ACTIVE_SET && !dense)) return PETSC_FALSE;
   if (*form == HYCO_FORM_DUAL_FREE && !dense) return PETSC_FALSE;
   *type = *type == HYCO_TYPE_TAO ? HYCO_TYPE_ACTIVE_SET : HYCO_TYPE_LEMKE;
@@ -252,7 +252,7 @@ static PetscBool NextAttempt(const HycoSolver s, PetscInt *type, HycoForm *form)
 PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
 {
   HycoForm form;
-  PetscInt type, its;
+  PetscInt type, its, n_free = 0;
   PetscBool fell_back = PETSC_FALSE;
   PetscReal begin = HycoNow();
 
@@ -277,6 +277,8 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
     PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then %s", before, next));
   }
   s->its = its;
+  if (s->reason < 0) PetscCall(HycoKernelSize(s->system->K, &n_free));
+  if (n_free) s->reason = HYCO_DIVERGED_UNHELD;
   if (fell_back && s->reason == HYCO_CONVERGED) s->reason = HYCO_CONVERGED_FALLBACK;
   s->seconds_solve = HycoNow() - begin - s->seconds_factor;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -332,6 +334,8 @@ const char *HycoReasonName(HycoReason reason)
     return "converged by the fallback solver";
   case HYCO_DIVERGED_RESIDUAL:
     return "not converged: a KKT residual is above the tolerance";
+  case HYCO_DIVERGED_UNHELD:
+    return "not converged: contact alone holds a body, and this load takes it away";
   case HYCO_DIVERGED_ITERATIONS:
     return "not converged: the limit of iterations, or a cycle";
   default:

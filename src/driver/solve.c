@@ -51,9 +51,10 @@ static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], co
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
   PetscCall(DriverCheckLeft());
-  HycoCheck(summary.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written",
-            HycoReasonName(summary.reason), (double)summary.kkt.stationarity, (double)summary.kkt.penetration,
-            (double)summary.kkt.adhesion, (double)summary.kkt.complementarity);
+  HycoCheck(summary.reason > 0, "%s%s%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written",
+            HycoReasonName(summary.reason), summary.free_motion[0] ? "; no support keeps " : "", summary.free_motion,
+            (double)summary.kkt.stationarity, (double)summary.kkt.penetration, (double)summary.kkt.adhesion,
+            (double)summary.kkt.complementarity);
   if (output[0]) PetscCall(HycoFOMWrite(fom, output));
   PetscCall(Report(scene, mu, fom, &summary));
   PetscFunctionReturn(PETSC_SUCCESS);
