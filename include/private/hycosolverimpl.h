@@ -56,7 +56,7 @@ struct _p_HycoSolver {
   PetscInt *pivot, *contact, n_pivots; /* this rank's contacts' pivot unknowns, the contacts' numbers on this rank */
   HycoSeen transformed;
   /* dual form without its matrix */
-  KSP ksp_free;
+  HycoDirect direct_free;
   HycoSeen factored_free;
   /* the last solve */
   PetscInt tao; /* the type that serves its system */

@@ -17,7 +17,7 @@ static PetscErrorCode MultS(Mat S, Vec v, Vec Sv)
   PetscFunctionBegin;
   PetscCall(MatShellGetContext(S, &f));
   PetscCall(MatMult(f->s->system->Bt, v, f->force));
-  PetscCall(KSPSolve(f->s->ksp_free, f->force, f->motion));
+  PetscCall(HycoDirectSolve(f->s->direct_free, f->force, f->motion));
   PetscCall(MatMult(f->s->system->B, f->motion, Sv));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -94,7 +94,7 @@ static PetscErrorCode EstimateDiagonal(Mat S, Free *f)
 
 static PetscErrorCode Factor(HycoSolver s, PetscBool *singular)
 {
-  Mat K = s->system->K, old = NULL;
+  Mat K = s->system->K;
   PetscBool same;
   PetscReal begin = HycoNow();
 
@@ -102,17 +102,12 @@ static PetscErrorCode Factor(HycoSolver s, PetscBool *singular)
   *singular = PETSC_FALSE;
   PetscCall(HycoSeenUpdate(&s->factored_free, K, NULL, &same));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
-  if (s->ksp_free) PetscCall(KSPGetOperators(s->ksp_free, &old, NULL));
-  if (old != K) {
-    PetscCall(KSPDestroy(&s->ksp_free));
-    PetscCall(HycoDirectSolver(s->comm, "hyco_mumps_", K, s->system->symmetric, &s->ksp_free));
-  }
-  PetscCall(KSPSetOperators(s->ksp_free, K, K));
-  PetscCall(HycoFactor(s->ksp_free, singular));
-  if (*singular)
-    s->factored_free.K = 0;
-  else
-    PetscCall(HycoSeenUpdate(&s->factored_free, K, NULL, &same)); /* factoring may have touched K's state */
+  if (!s->direct_free) PetscCall(HycoDirectCreate(s->comm, &s->direct_free));
+  PetscCall(HycoDirectAnalyse(s->direct_free, K, NULL, NULL, s->system->symmetric, &s->bytes));
+  PetscCall(HycoDirectFactor(s->direct_free, K, NULL, NULL, NULL, singular));
+  if (*singular) s->factored_free.K = 0;
+  PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: mumps, %.3g GB estimated",
+                          (double)(1e-9 * s->bytes)));
   s->seconds_factor += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -127,7 +122,7 @@ static PetscErrorCode Forces(HycoSolver s, Mat S, Vec x, Vec L, PetscBool *solve
   PetscCall(VecDuplicate(L, &f));
   PetscCall(VecDuplicate(L, &lo));
   PetscCall(VecDuplicate(L, &hi));
-  PetscCall(KSPSolve(s->ksp_free, y->F, x));
+  PetscCall(HycoDirectSolve(s->direct_free, y->F, x));
   PetscCall(MatMult(y->B, x, f));
   PetscCall(VecAXPY(f, -1, y->D));
   PetscCall(VecSet(lo, 0));
@@ -154,7 +149,7 @@ static PetscErrorCode Displacements(HycoSolver s, Free *f, Vec x, Vec L)
     PetscCall(MatMult(y->Bt, L, r));
     PetscCall(MatMultAdd(y->K, x, r, r));
     PetscCall(VecAYPX(r, -1, y->F));
-    PetscCall(KSPSolve(s->ksp_free, r, dx));
+    PetscCall(HycoDirectSolve(s->direct_free, r, dx));
     PetscCall(VecAXPY(x, 1, dx));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -165,10 +160,13 @@ PetscErrorCode HycoSolveDualFree(HycoSolver s, Vec x, Vec L, PetscBool *solved)
   HycoSystem y = s->system;
   Free f = {s, NULL, NULL, NULL};
   Mat S;
-  PetscInt m;
+  PetscInt m, n_free;
   PetscBool singular;
 
   PetscFunctionBegin;
+  PetscCall(HycoKernelSize(y->K, &n_free));
+  PetscCheck(!n_free, s->comm, PETSC_ERR_USER,
+             "contact alone holds a body, and the form dual_free cannot solve that; use -hyco_solver_type active_set");
   PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "tao %s dual_free", HycoTaoTypes[s->tao]));
   PetscCall(Factor(s, &singular));
   if (singular) {

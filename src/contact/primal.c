@@ -590,8 +590,11 @@ PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscB
   Primal p;
   Vec y;
   PetscScalar *l;
+  PetscBool aij;
 
   PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)s->system->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
+  PetscCheck(aij, s->comm, PETSC_ERR_USER, "the primal form needs a sparse K (AIJ); use -hyco_solver_form dual");
   PetscCheck(s->system->symmetric && s->system->m, s->comm, PETSC_ERR_USER,
              "the primal form needs a symmetric system with contacts; use -hyco_solver_form dual");
   PetscCall(SetUpPrimal(s));

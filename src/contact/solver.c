@@ -28,7 +28,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   s = *solver;
   PetscCall(HycoDirectDestroy(&s->direct));
   PetscCall(KSPDestroy(&s->ksp_gap));
-  PetscCall(KSPDestroy(&s->ksp_free));
+  PetscCall(HycoDirectDestroy(&s->direct_free));
   PetscCall(MatDestroy(&s->T));
   PetscCall(MatDestroy(&s->Kg));
   PetscCall(MatDestroy(&s->Kw));
