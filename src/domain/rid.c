@@ -135,6 +135,34 @@ static PetscErrorCode ExtendContact(HycoScene scene, HycoMesh m, const HycoPairs
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Surfaces that do not match: the cells with the masters of the slaves that Omega_A has, so that their gaps can be
+   computed. (Their other neighbours then have an interface of their own: the other way round all of Gamma^C would
+   come.) */
+static PetscErrorCode CompleteSlaves(HycoMesh m, const HycoPairs *pairs, const PetscInt start[],
+                                     const PetscInt around[], PetscBool in[])
+{
+  PetscBool *node;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &node));
+  PetscCall(MarkNodes(m, in, node));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
+
+    if (hi - lo < 2 || !node[pairs->slave[k]]) continue;
+    for (PetscInt j = start[pairs->master[lo]]; j < start[pairs->master[lo] + 1]; j++) {
+      PetscInt has = 0;
+
+      for (PetscInt v = 0; v < m->nv; v++) {
+        for (PetscInt i = lo; i < hi; i++) has += m->cells[around[j] * m->nv + v] == pairs->master[i];
+      }
+      if (has == hi - lo) in[around[j]] = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree(node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Cells that share a node with Omega_A. */
 static PetscErrorCode AddLayer(HycoMesh m, PetscBool in[], PetscInt *added)
 {
@@ -164,7 +192,9 @@ PetscErrorCode HycoRIDBuild(HycoScene scene, HycoMesh m, const HycoPairs *pairs,
   for (PetscInt k = 0; k < r->n_groups; k++) PetscCall(AddGroup(m, r->groups[k], start, around, in));
   if (r->region) PetscCall(AddRegion(scene, m, r->region, start, around, in));
   if (r->extension > 0) PetscCall(ExtendContact(scene, m, pairs, r->extension, start, around, in));
+  PetscCall(CompleteSlaves(m, pairs, start, around, in));
   for (PetscInt k = 0; k < r->layers && added; k++) PetscCall(AddLayer(m, in, &added));
+  PetscCall(CompleteSlaves(m, pairs, start, around, in));
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(around));
   PetscFunctionReturn(PETSC_SUCCESS);

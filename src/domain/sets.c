@@ -28,9 +28,10 @@ static void CloseIncomplete(const HycoPairs *pairs, PetscInt role[])
 }
 
 /*
-  B[A_lambda, A_c] needs full row rank (property 1). A contact whose slave is in A has that node for itself; one whose
-  slave is on the interface acts on masters alone, and where surfaces do not match several may share them: each takes a
-  master of its own in A, and where none is left its masters join the interface too. *lost: nodes that left A.
+  B[A_lambda, A_c] needs full row rank (property 1). A contact whose slave is in A has that node for itself. One whose
+  slave is on the interface acts on masters alone: it stays if it has one master that no other contact has. Of a facet's
+  masters, shared by several contacts, its force would be badly determined (errors several times larger were measured):
+  they join the interface. *lost: nodes that left A.
 */
 static PetscErrorCode CloseDependent(HycoMesh m, const HycoPairs *pairs, PetscInt role[], PetscInt *lost)
 {
@@ -44,16 +45,13 @@ static PetscErrorCode CloseDependent(HycoMesh m, const HycoPairs *pairs, PetscIn
   }
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscInt masters = CountMasters(pairs, k), *node = pairs->master + pairs->master_start[k];
-    const PetscReal *weight = pairs->weight + pairs->master_start[k];
-    PetscInt own = -1;
 
-    if (role[pairs->slave[k]] == HYCO_ROLE_A) continue;
-    for (PetscInt j = 0; j < masters; j++) {
-      if (role[node[j]] == HYCO_ROLE_A && !taken[node[j]] && (own < 0 || weight[j] > weight[own] * (1 + 1e-12)))
-        own = j;
+    if (role[pairs->slave[k]] == HYCO_ROLE_A || !masters) continue;
+    if (masters == 1 && !taken[node[0]])
+      taken[node[0]] = PETSC_TRUE;
+    else {
+      for (PetscInt j = 0; j < masters; j++) close[node[j]] = (PetscBool)(role[node[j]] == HYCO_ROLE_A);
     }
-    if (own >= 0) taken[node[own]] = PETSC_TRUE;
-    for (PetscInt j = 0; own < 0 && j < masters; j++) close[node[j]] = (PetscBool)(role[node[j]] == HYCO_ROLE_A);
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     if (!close[i]) continue;
