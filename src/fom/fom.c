@@ -208,7 +208,8 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
   if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatAssemblyBegin(f->B, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(f->B, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatTranspose(f->B, f->Bt ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &f->Bt));
+  PetscCall(MatDestroy(&f->Bt)); /* a normal that turns may have brought B an entry */
+  PetscCall(MatTranspose(f->B, MAT_INITIAL_MATRIX, &f->Bt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -252,6 +252,15 @@ class Crowned(Verify):
                     for found, expected in zip((u, lam), one):
                         self.assertLess(abs(found - expected).max(), 1e-9 * abs(expected).max())
 
+    def test_turning_normals(self):
+        """From a flat underside to a crowned one in one run: the normals gain a component, B entries."""
+        for ranks in (1, 2):
+            scene = self.crowned('quad4', 4, 5)
+            self.hyco('train', '-scene', scene, '-values_press', '0.05', '-values_gap', '0,0.05', '-model', f't{ranks}.h5',
+                      '-hyco_rid_whole', 'true', '-hyco_hybrid', 'all', '-hyco_groups', 1, ranks=ranks)
+            e = self.compare(scene, f't{ranks}.h5', '-values_press', '0.08', '-values_gap', '0.03,0.05')
+            self.assertLess(max(e.values()), 1e-9)
+
     def test_methods(self):
         for kind in ('quad4', 'tet4'):
             scene = self.crowned(kind, 5, 6)
