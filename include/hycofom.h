@@ -24,6 +24,7 @@ typedef struct {
   HycoKKT kkt;
   HycoReason reason;
   HycoSeconds seconds;
+  char free_motion[128]; /* one that contact alone prevents: "body block from moving along (0, 1, 0)"; "": none */
 } HycoSummary;
 
 /* Reads and distributes the scene's mesh over `comm` (which may be smaller than the scene's communicator).

@@ -12,15 +12,23 @@ typedef struct _p_HycoSolver *HycoSolver;
 
 typedef const char *HycoSolverType;
 #define HYCO_SOLVER_ACTIVE_SET "active_set" /* primal-dual active set, the paper's section 6.2 */
-#define HYCO_SOLVER_TAO        "tao"        /* a bound-constrained solver of TAO on the same problem */
+#define HYCO_SOLVER_TAO        "tao"        /* a solver of TAO on the same problem (HycoSolverSetTaoType()) */
 #define HYCO_SOLVER_LEMKE      "lemke"      /* Lemke's complementary pivoting on the dense dual problem */
 
 /* The unknowns in which the complementarity problem is posed. */
 typedef enum {
-  HYCO_FORM_AUTO,  /* dual for few contacts, primal when there are about as many as unknowns */
-  HYCO_FORM_DUAL,  /* w = (D - B K^-1 F) + (B K^-1 Bt) L */
-  HYCO_FORM_PRIMAL /* gap coordinates: one unknown of each contact row is replaced by its gap, a bound */
+  HYCO_FORM_AUTO,     /* dual for few contacts, primal when there are about as many as unknowns */
+  HYCO_FORM_DUAL,     /* w = (D - B K^-1 F) + (B K^-1 Bt) L */
+  HYCO_FORM_PRIMAL,   /* gap coordinates: one unknown of each contact row is replaced by its gap, a bound */
+  HYCO_FORM_DUAL_FREE /* the dual with B K^-1 Bt applied, never formed: TAO's bound-constrained types, symmetric */
 } HycoForm;
+
+/* Solves with the stiffness K. */
+typedef enum {
+  HYCO_LINEAR_AUTO,     /* direct, unless the factor is estimated to take more memory than there is */
+  HYCO_LINEAR_DIRECT,   /* MUMPS, ordered by nested dissection */
+  HYCO_LINEAR_ITERATIVE /* conjugate gradients with algebraic multigrid, on the primal form */
+} HycoLinear;
 
 /* How a solve ended. Negative: not solved, x and L are the last iterate. */
 typedef enum {
@@ -28,7 +36,8 @@ typedef enum {
   HYCO_CONVERGED_FALLBACK = 2,   /* the same, by another method than the chosen one (HycoSolverGetMethod says which) */
   HYCO_DIVERGED_RESIDUAL = -1,   /* a residual above the tolerance */
   HYCO_DIVERGED_ITERATIONS = -2, /* the limit of iterations */
-  HYCO_DIVERGED_SINGULAR = -3    /* K (or its active saddle point) is singular */
+  HYCO_DIVERGED_SINGULAR = -3,   /* K (or its active saddle point) is singular */
+  HYCO_DIVERGED_UNHELD = -4      /* the load takes a body away from the contact that alone holds it */
 } HycoReason;
 
 /* Collective. The caller owns it. */
@@ -39,14 +48,28 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver);
 PetscErrorCode HycoSolverSetSystem(HycoSolver solver, HycoSystem system);
 /* -hyco_solver_type */
 PetscErrorCode HycoSolverSetType(HycoSolver solver, HycoSolverType type);
+/*
+  -hyco_tao_type: for the type tao. Bound-constrained (symmetric systems): gpcg, tron, bntr, bnls, bntl, blmvm, bncg,
+  bqnls, bqnkls, bqnktr, bqnktl, bqpip; semismooth (any, dual form): ssils, asils, ssfls, asfls. NULL (default): gpcg
+  for a symmetric system, ssils for another. A solve refuses a bound-constrained type for a nonsymmetric system.
+  docs/solvers.md says which suits which problem.
+*/
+PetscErrorCode HycoSolverSetTaoType(HycoSolver solver, const char type[]);
 /* -hyco_solver_form */
 PetscErrorCode HycoSolverSetForm(HycoSolver solver, HycoForm form);
+/* -hyco_linear; `gigabytes` (-hyco_memory): what a factor may take on all ranks together, 0: most of what is free. */
+PetscErrorCode HycoSolverSetLinear(HycoSolver solver, HycoLinear linear, PetscReal gigabytes);
 /* -hyco_solver_rtol: the largest relative KKT residual that counts as solved (default 1e-8). */
 PetscErrorCode HycoSolverSetTolerance(HycoSolver solver, PetscReal rtol);
-/* -hyco_solver_max_its: of the active set (0: chosen from the number of contacts). */
+/* -hyco_solver_max_its: of the active set or TAO (0: chosen from the number of contacts; TAO 2000). */
 PetscErrorCode HycoSolverSetMaxIts(HycoSolver solver, PetscInt max_its);
 /* -hyco_solver_warm_start: begin from the last solution's active set (default) or from no contact. */
 PetscErrorCode HycoSolverSetWarmStart(HycoSolver solver, PetscBool warm);
+/*
+  -hyco_solver_fallback: when the residuals of the chosen method are too large, try the next of: TAO, active set,
+  Lemke's method on the dense dual (default). Without it, such a solve ends not converged.
+*/
+PetscErrorCode HycoSolverSetFallback(HycoSolver solver, PetscBool fallback);
 /* Reads the options above from `options` (NULL: the global database). Collective. */
 PetscErrorCode HycoSolverSetFromOptions(HycoSolver solver, PetscOptions options);
 
@@ -64,8 +87,10 @@ PetscErrorCode HycoSolverGetReason(HycoSolver solver, HycoReason *reason);
 /* Iterations of the last solve, and the KKT residuals recomputed after it. */
 PetscErrorCode HycoSolverGetIterations(HycoSolver solver, PetscInt *its);
 PetscErrorCode HycoSolverGetKKT(HycoSolver solver, HycoKKT *kkt);
-/* What solved, in words: "active_set dual", "active_set dual, then lemke". Borrowed, until the next solve. */
+/* What solved, in words: "active_set dual", "tao tron primal, then active_set". Borrowed, until the next solve. */
 PetscErrorCode HycoSolverGetMethod(HycoSolver solver, const char *method[]);
+/* What solved with K in the last solve, in words: "direct: mumps, 0.9 GB estimated". Borrowed, until the next solve. */
+PetscErrorCode HycoSolverGetLinear(HycoSolver solver, const char *linear[]);
 /* Seconds in the factorisation (and the flexibility) and in the rest of the last solve. Either may be NULL. */
 PetscErrorCode HycoSolverGetSeconds(HycoSolver solver, PetscReal *factor, PetscReal *solve);
 /* A word for the reason, for messages. Not collective. Borrowed. */

@@ -41,8 +41,19 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* Brings everything to mu (length scene->n_parameters), touching only what depends on what changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
 
-/* Fails when a connected part of the mesh can move rigidly whatever its supports, and says how. On the whole mesh. */
-PetscErrorCode HycoFECheckSupports(HycoFE fe);
+/* Rigid motions that the supports leave free, an orthonormal basis of the kernel of K. */
+typedef struct {
+  PetscInt n;
+  PetscReal *motion;       /* n x n_dof, zero where fixed */
+  char (*name)[HYCO_LINE]; /* "body pellet from moving along (0, 0, 1)" */
+} HycoMotions;
+
+/* Finds them on the whole mesh. */
+PetscErrorCode HycoFEFreeMotions(HycoFE fe, HycoMotions *motions);
+PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
+/* Fails, naming one, when the m contact rows (as of HycoContactRows()) leave a motion free too. */
+PetscErrorCode HycoFECheckHeld(HycoFE fe, const HycoMotions *motions, PetscInt m, const PetscInt start[],
+                               const PetscInt dof[], const PetscReal value[]);
 
 /* Element stiffness of a cell, row major, nv * dim square, nodes outer, components inner. */
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);

@@ -33,6 +33,8 @@ struct _p_HycoFOM {
   PetscReal energy;
 };
 
+/* Attaches the rigid motions to K; fails when nothing holds one of the free ones. Collective. */
+PetscErrorCode HycoFOMSetMotions(HycoFOM fom);
 /* Generalised forces F - B^T Lambda of the last solution (n_nodes x dim) on rank 0, zero on fixed unknowns. Collective.
  */
 PetscErrorCode HycoFOMGetForces(HycoFOM fom, PetscReal forces[]);

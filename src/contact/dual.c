@@ -1,148 +1,27 @@
 /*
-  The dual form: K factored once, the flexibility S = B K^-1 Bt by chunks of right-hand sides (X is never kept), the
-  complementarity problem w = (D - B K^-1 F) + S L in the contact forces alone, small and dense on every rank.
+  The dual form: the flexibility S = B K^-1 Bt and the gap without forces g = D - B K^-1 F, from one factorisation, and
+  the complementarity problem w = g + S L in the contact forces alone, small and dense on every rank.
 */
 #include <hycosolverimpl.h>
 #include <petscblaslapack.h>
 
-#define CHUNK 64
-
-/* Entries of this rank's rows of Bt. */
-typedef struct {
-  PetscInt n, *row, *col;
-  PetscReal *value;
-} Entries;
-
-static PetscErrorCode ListEntries(Mat Bt, Entries *e)
+/* Makes room for m contacts and p pinned unknowns; a change forgets the last solution's set. */
+static PetscErrorCode Resize(HycoSolver s, PetscInt p)
 {
-  PetscInt lo, hi;
+  const PetscInt m = s->system->m, n = m + p;
 
   PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(Bt, &lo, &hi));
-  for (PetscInt pass = 0; pass < 2; pass++) {
-    if (pass) PetscCall(PetscMalloc3(e->n, &e->row, e->n, &e->col, e->n, &e->value));
-    e->n = 0;
-    for (PetscInt r = lo; r < hi; r++) {
-      PetscInt n;
-      const PetscInt *cols;
-      const PetscScalar *vals;
-
-      PetscCall(MatGetRow(Bt, r, &n, &cols, &vals));
-      for (PetscInt k = 0; k < n; k++) {
-        if (pass) {
-          e->row[e->n] = r - lo;
-          e->col[e->n] = cols[k];
-          e->value[e->n] = vals[k];
-        }
-        e->n++;
-      }
-      PetscCall(MatRestoreRow(Bt, r, &n, &cols, &vals));
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Gathers this rank's rows of a dense m x c matrix into every rank's columns S[first..]. */
-static PetscErrorCode GatherColumns(HycoSolver s, Mat SX, PetscInt first, PetscInt c)
-{
-  PetscMPIInt size, *counts, *offsets;
-  PetscInt lo, hi, lda;
-  const PetscScalar *local;
-  PetscReal *mine, *all;
-  const PetscInt *ranges;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  PetscCall(MatGetOwnershipRange(SX, &lo, &hi));
-  PetscCall(MatGetOwnershipRanges(SX, &ranges));
-  PetscCall(PetscMalloc4(size, &counts, size, &offsets, (hi - lo) * c, &mine, s->m * c, &all));
-  PetscCall(MatDenseGetLDA(SX, &lda));
-  PetscCall(MatDenseGetArrayRead(SX, &local));
-  for (PetscInt j = 0; j < c; j++)
-    PetscCall(PetscArraycpy(mine + j * (hi - lo), local + (size_t)j * (size_t)lda, hi - lo));
-  PetscCall(MatDenseRestoreArrayRead(SX, &local));
-  for (PetscMPIInt r = 0; r < size; r++) {
-    counts[r] = (PetscMPIInt)((ranges[r + 1] - ranges[r]) * c);
-    offsets[r] = (PetscMPIInt)(ranges[r] * c);
-  }
-  PetscCallMPI(MPI_Allgatherv(mine, (PetscMPIInt)((hi - lo) * c), MPIU_REAL, all, counts, offsets, MPIU_REAL, s->comm));
-  for (PetscMPIInt r = 0; r < size; r++) {
-    const PetscInt rows = ranges[r + 1] - ranges[r];
-
-    for (PetscInt j = 0; j < c; j++)
-      PetscCall(
-          PetscArraycpy(s->S + (size_t)(first + j) * (size_t)s->m + ranges[r], all + offsets[r] + j * rows, rows));
-  }
-  PetscCall(PetscFree4(counts, offsets, mine, all));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Columns first .. first + c of S. */
-static PetscErrorCode CondenseChunk(HycoSolver s, Mat factor, const Entries *e, PetscInt first, PetscInt c)
-{
-  Mat R, X, SX;
-  PetscInt rows, lda;
-  PetscScalar *r;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetLocalSize(s->system->K, &rows, NULL));
-  PetscCall(MatCreateDense(s->comm, rows, PETSC_DECIDE, s->system->n, c, NULL, &R));
-  PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, &X));
-  PetscCall(MatDenseGetLDA(R, &lda));
-  PetscCall(MatDenseGetArray(R, &r));
-  for (PetscInt k = 0; k < e->n; k++) {
-    if (e->col[k] >= first && e->col[k] < first + c)
-      r[(size_t)(e->col[k] - first) * (size_t)lda + (size_t)e->row[k]] = e->value[k];
-  }
-  PetscCall(MatDenseRestoreArray(R, &r));
-  PetscCall(MatAssemblyBegin(R, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(R, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatMatSolve(factor, R, X));
-  PetscCall(MatMatMult(s->system->B, X, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &SX));
-  PetscCall(GatherColumns(s, SX, first, c));
-  PetscCall(MatDestroy(&SX));
-  PetscCall(MatDestroy(&X));
-  PetscCall(MatDestroy(&R));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Condense(HycoSolver s, Mat factor)
-{
-  Entries e = {0, NULL, NULL, NULL};
-  const PetscInt m = s->m;
-
-  PetscFunctionBegin;
-  PetscCall(ListEntries(s->system->Bt, &e));
-  for (PetscInt first = 0; first < m; first += CHUNK)
-    PetscCall(CondenseChunk(s, factor, &e, first, PetscMin(CHUNK, m - first)));
-  PetscCall(PetscFree3(e.row, e.col, e.value));
-  if (!s->system->symmetric) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt j = 0; j < m; j++) {
-    for (PetscInt i = 0; i < j; i++) {
-      PetscReal *a = &s->S[(size_t)j * (size_t)m + (size_t)i], *b = &s->S[(size_t)i * (size_t)m + (size_t)j];
-
-      *a = *b = (*a + *b) / 2;
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Makes room for m contacts; a change of m forgets the last solution's set. */
-static PetscErrorCode Resize(HycoSolver s)
-{
-  const PetscInt m = s->system->m;
-
-  PetscFunctionBegin;
-  if (s->m == m && s->S) PetscFunctionReturn(PETSC_SUCCESS);
+  if (s->m == m && s->p == p && s->S) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(s->S));
   PetscCall(PetscFree(s->g));
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
-  PetscCall(PetscMalloc1((size_t)m * (size_t)m + 1, &s->S));
-  PetscCall(PetscCalloc1(m + 1, &s->g));
-  PetscCall(PetscCalloc1(m + 1, &s->L));
+  PetscCall(PetscMalloc1((size_t)n * (size_t)n + 1, &s->S));
+  PetscCall(PetscCalloc1(n + 1, &s->g));
+  PetscCall(PetscCalloc1(n + 1, &s->L));
   PetscCall(PetscCalloc1(m + 1, &s->active));
   s->m = m;
+  s->p = p;
   s->started = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -175,16 +54,18 @@ static PetscErrorCode FactorDense(HycoSolver s, PetscBool *singular)
 
 static PetscErrorCode FactorSparse(HycoSolver s, PetscBool *singular)
 {
-  Mat K = s->system->K, old = NULL;
+  HycoSystem y = s->system;
+  PetscInt p;
 
   PetscFunctionBegin;
-  if (s->ksp) PetscCall(KSPGetOperators(s->ksp, &old, NULL));
-  if (old != K) {
-    PetscCall(KSPDestroy(&s->ksp));
-    PetscCall(HycoDirectSolver(s->comm, "hyco_dual_", K, s->system->symmetric, &s->ksp));
-  }
-  PetscCall(KSPSetOperators(s->ksp, K, K));
-  PetscCall(HycoFactor(s->ksp, singular));
+  if (!s->direct) PetscCall(HycoDirectCreate(s->comm, &s->direct));
+  PetscCall(HycoKernelSize(y->K, &p));
+  PetscCall(Resize(s, p));
+  PetscCall(HycoDirectPinKernel(s->direct, y->K));
+  PetscCall(HycoDirectAnalyse(s->direct, y->K, y->Bt, y->B, y->symmetric, &s->bytes));
+  PetscCall(HycoDirectFactor(s->direct, y->K, y->Bt, y->B, s->S, singular));
+  PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: mumps, %.3g GB estimated",
+                          (double)(1e-9 * s->bytes)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -222,7 +103,7 @@ static PetscErrorCode SolveK(HycoSolver s, Vec r, Vec x)
     LAPACKgetrs_("N", &s->n_lu, &one, s->lu, &s->n_lu, s->ipiv, v, &s->n_lu, &info);
     PetscCall(VecRestoreArray(x, &v));
   } else
-    PetscCall(KSPSolve(s->ksp, r, x));
+    PetscCall(HycoDirectSolve(s->direct, r, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -230,37 +111,25 @@ static PetscErrorCode SolveK(HycoSolver s, Vec r, Vec x)
 static PetscErrorCode SetUpDual(HycoSolver s, PetscBool *singular)
 {
   HycoSystem y = s->system;
-  PetscBool same_K, same_B, dense, dense_B = PETSC_FALSE;
+  PetscBool same, dense, dense_B = PETSC_TRUE;
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
   *singular = PETSC_FALSE;
+  PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  s->condensed.K = 0; /* until it is done */
   PetscCall(PetscObjectTypeCompare((PetscObject)y->K, MATSEQDENSE, &dense));
-  if (y->B) PetscCall(PetscObjectTypeCompare((PetscObject)y->B, MATSEQDENSE, &dense_B));
-  PetscCall(HycoSeenUpdate(&s->factored, y->K, NULL, &same_K));
-  PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same_B));
-  if (!same_K && dense) PetscCall(FactorDense(s, singular));
-  if (!same_K && !dense) PetscCall(FactorSparse(s, singular));
-  if (!same_B && y->m && !*singular) {
-    PetscCall(Resize(s));
-    if (dense && dense_B)
-      PetscCall(CondenseDense(s));
-    else {
-      PC pc;
-      Mat factor;
-
-      PetscCheck(!dense, PETSC_COMM_SELF, PETSC_ERR_SUP, "a dense K needs a dense B");
-      PetscCall(KSPGetPC(s->ksp, &pc));
-      PetscCall(PCFactorGetMatrix(pc, &factor));
-      PetscCall(Condense(s, factor));
-    }
+  if (!dense)
+    PetscCall(FactorSparse(s, singular));
+  else {
+    if (y->B) PetscCall(PetscObjectTypeCompare((PetscObject)y->B, MATSEQDENSE, &dense_B));
+    PetscCheck(dense_B, PETSC_COMM_SELF, PETSC_ERR_SUP, "a dense K needs a dense B");
+    PetscCall(Resize(s, 0));
+    PetscCall(FactorDense(s, singular));
+    if (y->m && !*singular) PetscCall(CondenseDense(s));
   }
-  if (*singular)
-    s->factored.K = s->condensed.K = 0;
-  else { /* factoring may have touched K's state */
-    PetscCall(HycoSeenUpdate(&s->factored, y->K, NULL, &same_K));
-    PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same_B));
-  }
+  if (!*singular) PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same));
   s->seconds_factor += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -289,52 +158,24 @@ static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TAO on min 1/2 l^T S l + g^T l, l >= 0, scaled to a unit diagonal. */
-static PetscErrorCode SolveTao(HycoSolver s, PetscBool *solved)
+/* Bodies that contact alone holds. */
+static PetscErrorCode SolveHeld(HycoSolver s, PetscInt type, PetscBool *solved)
 {
-  const PetscInt m = s->m;
-  Mat H;
-  Vec f, lo, hi, l;
-  PetscScalar *h, *p;
-  PetscReal *scale, size = 0;
+  const PetscInt max_its = s->max_its ? s->max_its : 50 + 4 * s->m;
+  HycoLCPStatus status;
 
   PetscFunctionBegin;
-  PetscCheck(s->system->symmetric, s->comm, PETSC_ERR_USER,
-             "TAO's bound-constrained solvers need a symmetric system; use -hyco_solver_type active_set or lemke");
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, m, NULL, &H));
-  PetscCall(MatCreateVecs(H, &f, &l));
-  PetscCall(VecDuplicate(l, &lo));
-  PetscCall(VecDuplicate(l, &hi));
-  PetscCall(PetscMalloc1(m, &scale));
-  for (PetscInt i = 0; i < m; i++)
-    scale[i] = 1 / PetscSqrtReal(PetscMax(s->S[(size_t)i * (size_t)m + (size_t)i], PETSC_SMALL));
-  for (PetscInt i = 0; i < m; i++) size = PetscMax(size, PetscAbsReal(s->g[i] * scale[i]));
-  if (size == 0) size = 1;
-  PetscCall(MatDenseGetArray(H, &h));
-  for (PetscInt j = 0; j < m; j++) {
-    for (PetscInt i = 0; i < m; i++)
-      h[(size_t)j * (size_t)m + (size_t)i] = s->S[(size_t)j * (size_t)m + (size_t)i] * scale[i] * scale[j];
-  }
-  PetscCall(MatDenseRestoreArray(H, &h));
-  PetscCall(MatAssemblyBegin(H, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(H, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatSetOption(H, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(VecGetArray(f, &p));
-  for (PetscInt i = 0; i < m; i++) p[i] = -s->g[i] * scale[i] / size;
-  PetscCall(VecRestoreArray(f, &p));
-  PetscCall(VecSet(lo, 0));
-  PetscCall(VecSet(hi, PETSC_INFINITY));
-  PetscCall(VecSet(l, 0));
-  PetscCall(HycoTaoBoundQP(H, f, lo, hi, l, &s->its, solved));
-  PetscCall(VecGetArray(l, &p));
-  for (PetscInt i = 0; i < m; i++) s->L[i] = p[i] * scale[i] * size;
-  PetscCall(VecRestoreArray(l, &p));
-  PetscCall(PetscFree(scale));
-  PetscCall(VecDestroy(&f));
-  PetscCall(VecDestroy(&l));
-  PetscCall(VecDestroy(&lo));
-  PetscCall(VecDestroy(&hi));
-  PetscCall(MatDestroy(&H));
+  PetscCheck(type == HYCO_TYPE_ACTIVE_SET, s->comm, PETSC_ERR_USER,
+             "contact alone holds a body, and %s cannot solve that; use -hyco_solver_type active_set",
+             HycoSolverTypes[type]);
+  for (PetscInt i = 0; i < s->m && (!s->warm || !s->started); i++) s->active[i] = PETSC_TRUE;
+  PetscCall(
+      HycoSolveHeld(s->p, s->m, s->S, s->g, max_its, s->monitor, s->monitor_ctx, s->active, s->L, &s->its, &status));
+  *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
+  for (PetscInt i = 0; i < s->m; i++) s->L[s->p + i] = s->active[i] ? PetscMax(s->L[s->p + i], 0) : 0;
+  s->started = *solved;
+  PetscCall(
+      PetscSNPrintf(s->method, sizeof(s->method), "active_set dual, %d rigid motions held by contact", (int)s->p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -346,14 +187,15 @@ static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s dual", HycoSolverTypes[type]));
   if (type == HYCO_TYPE_TAO) {
-    PetscCall(SolveTao(s, solved));
+    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "tao %s dual", HycoTaoTypes[s->tao]));
+    PetscCall(HycoTaoLCP(s->m, s->S, s->g, s->system->symmetric, s->tao, s->max_its, s->L, &s->its, solved));
   } else if (type == HYCO_TYPE_LEMKE) {
     PetscCall(HycoLCPLemke(s->m, s->S, s->g, 50 * (s->m + 10), s->L, &s->its, &status));
     *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   } else {
     if (!s->warm || !s->started) PetscCall(PetscArrayzero(s->active, s->m));
-    PetscCall(
-        HycoLCPActiveSet(s->m, s->S, s->g, max_its, s->monitor, s->monitor_ctx, s->active, s->L, &s->its, &status));
+    PetscCall(HycoLCPActiveSet(s->m, s->S, s->g, s->system->symmetric, max_its, s->monitor, s->monitor_ctx, s->active,
+                               s->L, &s->its, &status));
     *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   }
   for (PetscInt i = 0; i < s->m; i++) {
@@ -364,44 +206,93 @@ static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x = K^-1 (F - Bt L), with one step of refinement when round-off shows. */
-static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
+/* g = D - B K^-1 F, on every rank. */
+static PetscErrorCode FreeGap(HycoSolver s, Vec x)
 {
   HycoSystem y = s->system;
-  Vec r, dx;
-  PetscReal size, residual;
+  Vec gap;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(x, &r));
-  PetscCall(VecDuplicate(x, &dx));
+  if (!s->lu) {
+    PetscCall(GatherVec(s->comm, y->D, s->L));
+    PetscCall(HycoDirectReduce(s->direct, y->F, s->L, s->g));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SolveK(s, y->F, x));
+  PetscCall(VecDuplicate(y->D, &gap));
+  PetscCall(MatMult(y->B, x, gap));
+  PetscCall(VecAYPX(gap, -1, y->D));
+  PetscCall(GatherVec(s->comm, gap, s->g));
+  PetscCall(VecDestroy(&gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* r = F - Bt L - K x */
+static PetscErrorCode Residual(HycoSystem y, Vec x, Vec L, Vec work, Vec r)
+{
+  PetscFunctionBegin;
   if (y->m) {
     PetscCall(MatMult(y->Bt, L, r));
     PetscCall(VecAYPX(r, -1, y->F));
   } else
     PetscCall(VecCopy(y->F, r));
-  PetscCall(VecNorm(r, NORM_2, &size));
-  PetscCall(SolveK(s, r, x));
-  PetscCall(MatMult(y->K, x, dx));
-  PetscCall(VecAXPY(r, -1, dx));
+  if (!x) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatMult(y->K, x, work));
+  PetscCall(VecAXPY(r, -1, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x = K^-1 (F - Bt L), with one step of refinement when round-off shows. */
+static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
+{
+  HycoSystem y = s->system;
+  Vec r, work;
+  PetscReal size, residual;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(x, &r));
+  PetscCall(VecDuplicate(x, &work));
+  if (y->m && !s->lu)
+    PetscCall(HycoDirectExpand(s->direct, s->L, x));
+  else {
+    PetscCall(Residual(y, NULL, L, work, r));
+    PetscCall(SolveK(s, r, x));
+  }
+  PetscCall(VecNorm(y->F, NORM_2, &size));
+  PetscCall(Residual(y, x, L, work, r));
   PetscCall(VecNorm(r, NORM_2, &residual));
-  if (residual > 1e-13 * size && residual < size) {
-    PetscCall(SolveK(s, r, dx));
-    PetscCall(VecAXPY(x, 1, dx));
+  if (residual > 1e-12 * size && !s->p) {
+    PetscCall(SolveK(s, r, work));
+    PetscCall(VecAXPY(x, 1, work));
   }
   PetscCall(VecDestroy(&r));
-  PetscCall(VecDestroy(&dx));
+  PetscCall(VecDestroy(&work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* This rank's part of the forces that every rank has. */
+static PetscErrorCode SetForces(HycoSolver s, Vec L)
+{
+  PetscInt lo, hi;
+  PetscScalar *l;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(L, &lo, &hi));
+  PetscCall(VecGetArray(L, &l));
+  PetscCall(PetscArraycpy(l, s->L + s->p + lo, hi - lo));
+  PetscCall(VecRestoreArray(L, &l));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBool *solved)
 {
-  HycoSystem y = s->system;
   PetscBool singular;
-  Vec gap;
-  PetscScalar *l;
-  PetscInt lo, hi;
 
   PetscFunctionBegin;
+  if (s->iterative && !s->system->m) {
+    PetscCall(HycoSolveIterative(s, x, solved));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SetUpDual(s, &singular));
   if (singular) {
     s->reason = HYCO_DIVERGED_SINGULAR;
@@ -411,23 +302,15 @@ PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBoo
     if (L) PetscCall(VecSet(L, 0));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!y->m) {
+  if (!s->system->m) {
     PetscCall(PetscStrncpy(s->method, "linear", sizeof(s->method)));
     *solved = PETSC_TRUE;
     PetscCall(Recover(s, x, NULL));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SolveK(s, y->F, x));
-  PetscCall(VecDuplicate(y->D, &gap));
-  PetscCall(MatMult(y->B, x, gap));
-  PetscCall(VecAYPX(gap, -1, y->D));
-  PetscCall(GatherVec(s->comm, gap, s->g));
-  PetscCall(VecDestroy(&gap));
-  PetscCall(SolveForces(s, type, solved));
-  PetscCall(VecGetOwnershipRange(L, &lo, &hi));
-  PetscCall(VecGetArray(L, &l));
-  PetscCall(PetscArraycpy(l, s->L + lo, hi - lo));
-  PetscCall(VecRestoreArray(L, &l));
+  PetscCall(FreeGap(s, x));
+  PetscCall(s->p ? SolveHeld(s, type, solved) : SolveForces(s, type, solved));
+  PetscCall(SetForces(s, L));
   PetscCall(Recover(s, x, L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -40,6 +40,7 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
   PC pc;
   PetscInt n;
   PetscMPIInt size;
+  PetscBool thin = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(comm, &size));
@@ -50,11 +51,12 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
   PetscCall(KSPSetType(*ksp, KSPPREONLY));
   PetscCall(KSPGetPC(*ksp, &pc));
   PetscCall(PCSetType(pc, symmetric ? PCCHOLESKY : PCLU));
-  if (size > 1 || n > 3000)
+  if (size == 1 && symmetric && n > 3000) PetscCall(HycoThin(K, &thin));
+  if (!thin && (size > 1 || n > 3000))
     PetscCall(PrepareMumps(pc, K, prefix));
   else {
     PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERPETSC));
-    PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGND));
+    PetscCall(PCFactorSetMatOrderingType(pc, thin ? MATORDERINGRCM : MATORDERINGND));
   }
   PetscCall(KSPSetFromOptions(*ksp));
   PetscCall(KSPSetErrorIfNotConverged(*ksp, PETSC_FALSE));

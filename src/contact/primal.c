@@ -5,6 +5,12 @@
 */
 #include <hycosolverimpl.h>
 
+/* A warm start that is not over by then began too far off: coarser problems give a better one. */
+#define HYCO_WARM_ITS 4
+/* Noise of iterative solves while the set changes, and in the last. */
+#define HYCO_NOISE_FIRST 1e-5
+#define HYCO_NOISE       1e-9
+
 /* Pivot (global unknown) of each of this rank's rows: the largest entry whose unknown no other row has; -1: none. */
 static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[])
 {
@@ -92,22 +98,75 @@ PetscErrorCode HycoPrimalPossible(HycoSystem y, PetscBool *possible)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether every contact row has one entry: T is then diagonal. */
+static PetscErrorCode OneEach(Mat B, PetscBool *diagonal)
+{
+  PetscInt lo, hi;
+  PetscMPIInt more = 0, any;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(B, &lo, &hi));
+  for (PetscInt r = lo; r < hi && !more; r++) {
+    PetscInt n;
+
+    PetscCall(MatGetRow(B, r, &n, NULL, NULL));
+    more = n > 1;
+    PetscCall(MatRestoreRow(B, r, &n, NULL, NULL));
+  }
+  PetscCallMPI(MPI_Allreduce(&more, &any, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)B)));
+  *diagonal = (PetscBool)!any;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Kg = T^T K T for contacts that are each on one unknown: no product of matrices. */
+static PetscErrorCode ScaleOnly(HycoSolver s)
+{
+  HycoSystem y = s->system;
+  PetscInt lo, hi, n;
+  Vec t;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateVecs(y->K, &t, NULL));
+  PetscCall(VecSet(t, 1));
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  for (PetscInt r = lo; r < hi; r++) {
+    const PetscScalar *vals;
+
+    PetscCall(MatGetRow(y->B, r, &n, NULL, &vals));
+    PetscCall(VecSetValue(t, s->pivot[r - lo], 1 / vals[0], INSERT_VALUES));
+    PetscCall(MatRestoreRow(y->B, r, &n, NULL, &vals));
+  }
+  PetscCall(VecAssemblyBegin(t));
+  PetscCall(VecAssemblyEnd(t));
+  PetscCall(VecGetLocalSize(t, &n));
+  PetscCall(MatDestroy(&s->T));
+  PetscCall(MatCreateAIJ(s->comm, n, n, y->n, y->n, 1, NULL, 0, NULL, &s->T));
+  PetscCall(MatDiagonalSet(s->T, t, INSERT_VALUES));
+  PetscCall(MatDuplicate(y->K, MAT_COPY_VALUES, &s->Kg));
+  PetscCall(MatDiagonalScale(s->Kg, t, t));
+  PetscCall(VecDestroy(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* T = I, but in a pivot's row: x_p = (y_p - sum_j B_ij y_j) / B_ip. */
 static PetscErrorCode BuildT(HycoSolver s)
 {
   HycoSystem y = s->system;
-  PetscInt lo, hi, first, last;
+  PetscInt lo, hi, first, last, bs;
   Mat shape;
 
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(y->K, &first, &last));
+  PetscCall(MatGetBlockSize(y->K, &bs));
   PetscCall(MatCreate(s->comm, &shape));
   PetscCall(MatSetSizes(shape, last - first, last - first, y->n, y->n));
+  PetscCall(MatSetBlockSize(shape, bs)); /* multigrid coarsens by node */
   PetscCall(MatSetType(shape, MATPREALLOCATOR));
   PetscCall(MatSetUp(shape));
   PetscCall(MatDestroy(&s->T));
   PetscCall(MatCreate(s->comm, &s->T));
   PetscCall(MatSetSizes(s->T, last - first, last - first, y->n, y->n));
+  PetscCall(MatSetBlockSize(s->T, bs));
   PetscCall(MatSetType(s->T, MATAIJ));
   PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
   for (PetscInt pass = 0; pass < 2; pass++) {
@@ -142,7 +201,7 @@ static PetscErrorCode BuildT(HycoSolver s)
 static PetscErrorCode SetUpPrimal(HycoSolver s)
 {
   HycoSystem y = s->system;
-  PetscBool same;
+  PetscBool same, diagonal = PETSC_FALSE;
   PetscInt lo, hi;
   PetscReal begin = HycoNow();
 
@@ -162,15 +221,18 @@ static PetscErrorCode SetUpPrimal(HycoSolver s)
     PetscCheck(!any, s->comm, PETSC_ERR_USER,
                "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
   }
-  PetscCall(BuildT(s));
   PetscCall(MatDestroy(&s->Kg));
   PetscCall(MatDestroy(&s->Kw));
-  PetscCall(MatPtAP(y->K, s->T, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &s->Kg));
+  PetscCall(OneEach(y->B, &diagonal));
+  if (diagonal)
+    PetscCall(ScaleOnly(s));
+  else {
+    PetscCall(BuildT(s));
+    PetscCall(MatPtAP(y->K, s->T, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &s->Kg));
+  }
   PetscCall(MatSetOption(s->Kg, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatDuplicate(s->Kg, MAT_COPY_VALUES, &s->Kw));
-  PetscCall(MatSetOption(s->Kw, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(MatSetOption(s->Kw, MAT_SPD, PETSC_TRUE));
-  PetscCall(MatSetOption(s->Kw, MAT_KEEP_NONZERO_PATTERN, PETSC_TRUE));
+  PetscCall(HycoGapWork(s->Kw));
   if (s->ksp_gap) {
     PetscInt n_old, n_new;
     Mat old;
@@ -183,7 +245,10 @@ static PetscErrorCode SetUpPrimal(HycoSolver s)
     else
       PetscCall(KSPReset(s->ksp_gap));
   }
-  if (!s->ksp_gap) PetscCall(HycoDirectSolver(s->comm, "hyco_primal_", s->Kw, PETSC_TRUE, &s->ksp_gap));
+  if (s->iterative) PetscCall(HycoGapNearKernel(y, s->pivot, s->Kw));
+  if (!s->ksp_gap)
+    PetscCall(s->iterative ? HycoIterativeSolver(s->comm, "hyco_primal_", s->Kw, &s->ksp_gap)
+                           : HycoDirectSolver(s->comm, "hyco_primal_", s->Kw, PETSC_TRUE, &s->ksp_gap));
   PetscCall(KSPSetOperators(s->ksp_gap, s->Kw, s->Kw));
   if (s->m != y->m) {
     PetscCall(PetscFree(s->active));
@@ -198,33 +263,56 @@ static PetscErrorCode SetUpPrimal(HycoSolver s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves with y_p = D_i on this rank's active contacts. `a` lists their pivots, `d` their gaps. */
-static PetscErrorCode SolveOnSet(HycoSolver s, Vec f, PetscInt n, const PetscInt a[], const PetscReal d[], Vec rhs,
-                                 Vec y)
+PetscErrorCode HycoGapWork(Mat Kw)
 {
-  Vec diagonal;
-  PetscScalar mean;
-  PetscBool singular;
+  PetscFunctionBegin;
+  PetscCall(MatSetOption(Kw, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(Kw, MAT_SPD, PETSC_TRUE));
+  PetscCall(MatSetOption(Kw, MAT_KEEP_NONZERO_PATTERN, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One step of refinement makes the residual small entry by entry (R. D. Skeel, Math. Comp. 35, 1980). */
+static PetscErrorCode SolveRefined(Mat Kw, KSP ksp, Vec rhs, Vec y)
+{
+  Vec r, dy;
+  PetscBool iterative;
 
   PetscFunctionBegin;
-  PetscCall(MatCopy(s->Kg, s->Kw, SAME_NONZERO_PATTERN));
-  PetscCall(VecDuplicate(y, &diagonal));
-  PetscCall(MatGetDiagonal(s->Kg, diagonal));
-  PetscCall(VecSum(diagonal, &mean));
-  mean /= s->system->n;
-  PetscCall(VecDestroy(&diagonal));
-  PetscCall(VecSet(y, 0));
+  PetscCall(KSPSolve(ksp, rhs, y));
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &iterative)); /* of its own accuracy */
+  if (iterative) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(y, &r));
+  PetscCall(VecDuplicate(y, &dy));
+  PetscCall(MatMult(Kw, y, r));
+  PetscCall(VecAYPX(r, -1, rhs));
+  PetscCall(KSPSolve(ksp, r, dy));
+  PetscCall(VecAXPY(y, 1, dy));
+  PetscCall(VecDestroy(&r));
+  PetscCall(VecDestroy(&dy));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolveOnSet(Mat Kg, Mat Kw, KSP ksp, Vec f, PetscInt n, const PetscInt a[], const PetscReal d[],
+                              Vec rhs, Vec y, PetscBool *singular)
+{
+  PetscScalar mean;
+  PetscInt size;
+
+  PetscFunctionBegin;
+  PetscCall(MatCopy(Kg, Kw, SAME_NONZERO_PATTERN));
+  PetscCall(MatGetSize(Kg, &size, NULL));
+  PetscCall(MatGetDiagonal(Kg, rhs));
+  PetscCall(VecSum(rhs, &mean));
+  mean /= size;
   for (PetscInt k = 0; k < n; k++) PetscCall(VecSetValue(y, a[k], d[k], INSERT_VALUES));
   PetscCall(VecAssemblyBegin(y));
   PetscCall(VecAssemblyEnd(y));
   PetscCall(VecCopy(f, rhs));
-  PetscCall(MatZeroRowsColumns(s->Kw, n, a, mean, y, rhs));
-  PetscCall(KSPSetOperators(s->ksp_gap, s->Kw, s->Kw));
-  PetscCall(HycoFactor(s->ksp_gap, &singular));
-  if (singular)
-    s->reason = HYCO_DIVERGED_SINGULAR;
-  else
-    PetscCall(KSPSolve(s->ksp_gap, rhs, y));
+  PetscCall(MatZeroRowsColumns(Kw, n, a, mean, y, rhs));
+  PetscCall(KSPSetOperators(ksp, Kw, Kw));
+  PetscCall(HycoFactor(ksp, singular));
+  if (!*singular) PetscCall(SolveRefined(Kw, ksp, rhs, y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -245,7 +333,8 @@ static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, 
 /* What the iterations share. */
 typedef struct {
   PetscInt lo, n; /* this rank's contacts */
-  PetscReal *gap, *value, *force, *at_d;
+  PetscReal *gap, *value, *force, *diagonal, *at_d;
+  PetscReal noise; /* share of the largest force and gap that iterative solves leave */
   PetscInt *at;
   Vec f, rhs, residual, work;
   VecScatter scatter;
@@ -256,6 +345,7 @@ static PetscErrorCode Step(HycoSolver s, Primal *p, Vec y, PetscBool one, PetscI
 {
   PetscInt n = 0, local = 0, last = -1, last_all;
   PetscReal size[2] = {0, 0}, sizes[2];
+  PetscBool singular;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < p->n; k++) {
@@ -263,7 +353,8 @@ static PetscErrorCode Step(HycoSolver s, Primal *p, Vec y, PetscBool one, PetscI
     p->at[n] = s->pivot[k];
     p->at_d[n++] = p->gap[k];
   }
-  PetscCall(SolveOnSet(s, p->f, n, p->at, p->at_d, p->rhs, y));
+  PetscCall(HycoSolveOnSet(s->Kg, s->Kw, s->ksp_gap, p->f, n, p->at, p->at_d, p->rhs, y, &singular));
+  if (singular) s->reason = HYCO_DIVERGED_SINGULAR;
   PetscCall(MatMult(s->Kg, y, p->residual));
   PetscCall(VecAYPX(p->residual, -1, p->f));
   PetscCall(AtPivots(y, p->scatter, p->work, p->n, p->value));
@@ -277,7 +368,9 @@ static PetscErrorCode Step(HycoSolver s, Primal *p, Vec y, PetscBool one, PetscI
     for (PetscInt k = 0; k < p->n; k++) {
       const PetscInt i = p->lo + k;
       const PetscBool flip =
-          (PetscBool)(s->active[i] ? p->force[k] < -1e-12 * sizes[1] : p->value[k] > p->gap[k] + 1e-14 * sizes[0]);
+          s->active[i]
+              ? p->force[k] < -p->noise * sizes[1] && HycoPulls(p->force[k], sizes[1], p->diagonal[k], p->gap[k])
+              : p->value[k] > p->gap[k] + p->noise * sizes[0] && HycoPenetrates(p->value[k], p->gap[k], sizes[0]);
 
       if (!flip) continue;
       if (pass == 0)
@@ -315,24 +408,82 @@ static PetscErrorCode Report(HycoSolver s, const Primal *p, PetscInt changes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The set from coarser problems, where they exist: most unknowns are contacts, coupled with one sign. */
+static PetscErrorCode StartFromCoarse(HycoSolver s, const Primal *p, PetscBool *made)
+{
+  Vec bound, set;
+
+  PetscFunctionBegin;
+  *made = PETSC_FALSE;
+  if (!s->multilevel || 4 * s->system->m <= s->system->n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(p->f, &bound));
+  PetscCall(VecDuplicate(p->f, &set));
+  PetscCall(VecSet(bound, PETSC_INFINITY));
+  for (PetscInt k = 0; k < p->n; k++) PetscCall(VecSetValue(bound, s->pivot[k], p->gap[k], INSERT_VALUES));
+  PetscCall(VecAssemblyBegin(bound));
+  PetscCall(VecAssemblyEnd(bound));
+  PetscCall(HycoMultilevelStart(s->Kg, p->f, bound, set, made));
+  if (*made) {
+    PetscCall(AtPivots(set, p->scatter, p->work, p->n, p->value));
+    for (PetscInt k = 0; k < p->n; k++) s->active[p->lo + k] = (PetscBool)(p->value[k] > 0.5);
+  }
+  PetscCall(VecDestroy(&bound));
+  PetscCall(VecDestroy(&set));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Iterative solves leave residuals of 1 % of `noise`; changes of the set below it are not to be believed. */
+static PetscErrorCode SetAccuracy(HycoSolver s, Primal *p, PetscReal noise)
+{
+  PetscFunctionBegin;
+  p->noise = noise;
+  PetscCall(KSPSetTolerances(s->ksp_gap, noise / 100, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  A set that comes back means a cycle: from then on one contact changes at a time, which ends in exact arithmetic
+  (K. G. Murty's least index rule). If a set comes back even so, round-off decides, and the residuals judge.
+*/
 static PetscErrorCode ActiveSet(HycoSolver s, Primal *p, Vec y, PetscBool *solved)
 {
   const PetscInt max_its = s->max_its ? s->max_its : 100 + s->system->m;
   unsigned long long *past;
-  PetscBool one = PETSC_FALSE;
+  PetscInt since = 0, n_free;
+  PetscBool one = PETSC_FALSE, again = PETSC_FALSE, fresh = PETSC_FALSE;
 
   PetscFunctionBegin;
   *solved = PETSC_FALSE;
   PetscCall(PetscMalloc1(max_its + 1, &past));
-  if (!s->warm || !s->started) PetscCall(PetscArrayzero(s->active, s->system->m));
-  while (s->its < max_its && !*solved && s->reason != HYCO_DIVERGED_SINGULAR) {
+  if (s->iterative) PetscCall(SetAccuracy(s, p, HYCO_NOISE_FIRST));
+  if (!s->warm || !s->started) {
+    PetscCall(HycoKernelSize(s->system->K, &n_free));
+    for (PetscInt i = 0; i < s->system->m; i++)
+      s->active[i] = (PetscBool)(n_free > 0); /* a body that contact alone holds begins held */
+    if (!n_free) PetscCall(StartFromCoarse(s, p, &fresh));
+    if (fresh) PetscCall(PetscStrlcat(s->method, ", multilevel start", sizeof(s->method)));
+  }
+  while (s->its < max_its && !*solved && !again && s->reason != HYCO_DIVERGED_SINGULAR) {
     PetscInt changes;
 
+    if (s->warm && s->started && s->its == HYCO_WARM_ITS) { /* the last solution's set is far off */
+      PetscCall(StartFromCoarse(s, p, &fresh));
+      if (fresh) since = s->its;
+    }
     PetscCall(SharedHash(s, p, &past[s->its]));
-    for (PetscInt t = 0; t < s->its; t++) one = (PetscBool)(one || past[t] == past[s->its]);
+    for (PetscInt t = since; t < s->its && !again; t++) {
+      if (past[t] != past[s->its]) continue;
+      again = one;
+      one = PETSC_TRUE;
+      since = s->its;
+    }
     PetscCall(Step(s, p, y, one, &changes));
     if (s->monitor) PetscCall(Report(s, p, changes));
-    *solved = (PetscBool)(changes == 0);
+    if (changes == 0 && p->noise > HYCO_NOISE) { /* the set settled: now in earnest */
+      PetscCall(SetAccuracy(s, p, HYCO_NOISE));
+      since = s->its;
+    } else
+      *solved = (PetscBool)(changes == 0);
   }
   PetscCall(PetscFree(past));
   s->started = *solved;
@@ -342,6 +493,7 @@ static PetscErrorCode ActiveSet(HycoSolver s, Primal *p, Vec y, PetscBool *solve
 /* TAO on the same bounds. */
 static PetscErrorCode BoundQP(HycoSolver s, Primal *p, Vec y, PetscBool *solved)
 {
+  Mat H;
   Vec lo, hi;
 
   PetscFunctionBegin;
@@ -354,12 +506,20 @@ static PetscErrorCode BoundQP(HycoSolver s, Primal *p, Vec y, PetscBool *solved)
   PetscCall(VecAssemblyEnd(hi));
   PetscCall(VecSet(y, 0));
   PetscCall(VecPointwiseMin(y, y, hi));
-  PetscCall(HycoTaoBoundQP(s->Kg, p->f, lo, hi, y, &s->its, solved));
+  PetscCall(VecCopy(p->f, p->rhs));
+  PetscCall(MatDuplicate(s->Kg, MAT_COPY_VALUES, &H));
+  PetscCall(MatSetOption(H, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(HycoTaoSolve(s->tao, s->max_its, H, p->rhs, lo, hi, y, &s->its, solved));
+  PetscCall(MatDestroy(&H));
   PetscCall(MatMult(s->Kg, y, p->residual));
   PetscCall(VecAYPX(p->residual, -1, p->f));
   PetscCall(AtPivots(p->residual, p->scatter, p->work, p->n, p->force));
   PetscCall(AtPivots(y, p->scatter, p->work, p->n, p->value));
-  for (PetscInt k = 0; k < p->n; k++) s->active[p->lo + k] = (PetscBool)(p->value[k] >= p->gap[k]);
+  for (PetscInt k = 0; k < p->n; k++) { /* a value on its bound has gone through a scale and back */
+    const PetscReal ulps = 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(p->gap[k]);
+
+    s->active[p->lo + k] = (PetscBool)(p->value[k] >= p->gap[k] - ulps);
+  }
   PetscCall(VecDestroy(&lo));
   PetscCall(VecDestroy(&hi));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -373,9 +533,11 @@ static PetscErrorCode PrimalCreate(HycoSolver s, Vec x, Primal *p)
   const PetscScalar *d;
 
   PetscFunctionBegin;
+  p->noise = 0;
   PetscCall(VecGetOwnershipRange(y->D, &p->lo, &hi));
   p->n = hi - p->lo;
-  PetscCall(PetscMalloc5(p->n, &p->gap, p->n, &p->value, p->n, &p->force, p->n, &p->at_d, p->n, &p->at));
+  PetscCall(
+      PetscMalloc6(p->n, &p->gap, p->n, &p->value, p->n, &p->force, p->n, &p->diagonal, p->n, &p->at_d, p->n, &p->at));
   PetscCall(VecGetArrayRead(y->D, &d));
   PetscCall(PetscArraycpy(p->gap, d, p->n));
   PetscCall(VecRestoreArrayRead(y->D, &d));
@@ -387,13 +549,15 @@ static PetscErrorCode PrimalCreate(HycoSolver s, Vec x, Primal *p)
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, p->n, &p->work));
   PetscCall(VecScatterCreate(x, is, p->work, NULL, &p->scatter));
   PetscCall(ISDestroy(&is));
+  PetscCall(MatGetDiagonal(s->Kg, p->rhs));
+  PetscCall(AtPivots(p->rhs, p->scatter, p->work, p->n, p->diagonal));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode PrimalDestroy(Primal *p)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree5(p->gap, p->value, p->force, p->at_d, p->at));
+  PetscCall(PetscFree6(p->gap, p->value, p->force, p->diagonal, p->at_d, p->at));
   PetscCall(VecDestroy(&p->f));
   PetscCall(VecDestroy(&p->rhs));
   PetscCall(VecDestroy(&p->residual));
@@ -414,14 +578,20 @@ PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscB
   PetscCall(SetUpPrimal(s));
   PetscCall(PrimalCreate(s, x, &p));
   PetscCall(VecDuplicate(x, &y));
+  PetscCall(VecSet(y, 0));
   PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s primal", HycoSolverTypes[type]));
-  if (type == HYCO_TYPE_TAO)
+  if (type == HYCO_TYPE_TAO) {
+    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "tao %s primal", HycoTaoTypes[s->tao]));
     PetscCall(BoundQP(s, &p, y, solved));
-  else
+  } else
     PetscCall(ActiveSet(s, &p, y, solved));
+  PetscCall(HycoNameLinear(s, s->ksp_gap));
   PetscCall(MatMult(s->T, y, x));
   PetscCall(VecGetArray(L, &l));
-  for (PetscInt k = 0; k < p.n; k++) l[k] = s->active[p.lo + k] ? PetscMax(p.force[k], 0) : 0;
+  for (PetscInt k = 0; k < p.n; k++) {
+    l[k] = s->active[p.lo + k] ? PetscMax(p.force[k], 0) : 0;
+    if (!*solved) l[k] = p.force[k]; /* the set has changed since: show what the residuals say of it */
+  }
   PetscCall(VecRestoreArray(L, &l));
   PetscCall(VecDestroy(&y));
   PetscCall(PrimalDestroy(&p));

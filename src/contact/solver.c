@@ -3,7 +3,7 @@
 
 const char *const HycoSolverTypes[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, HYCO_SOLVER_LEMKE, NULL};
 
-/* Lemke's tableau has 2 m^2 entries: beyond this many contacts it is no fallback. */
+/* Lemke's dictionary has m^2 entries, and each of its some m pivots changes them all: beyond this it is no fallback. */
 #define HYCO_LEMKE_MAX 3000
 
 PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
@@ -13,6 +13,9 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
   (*solver)->comm = comm;
   (*solver)->rtol = 1e-8;
   (*solver)->warm = PETSC_TRUE;
+  (*solver)->fallback = PETSC_TRUE;
+  (*solver)->tao_type = HYCO_TAO_AUTO;
+  (*solver)->multilevel = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -23,8 +26,9 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscFunctionBegin;
   if (!solver || !*solver) PetscFunctionReturn(PETSC_SUCCESS);
   s = *solver;
-  PetscCall(KSPDestroy(&s->ksp));
+  PetscCall(HycoDirectDestroy(&s->direct));
   PetscCall(KSPDestroy(&s->ksp_gap));
+  PetscCall(KSPDestroy(&s->ksp_free));
   PetscCall(MatDestroy(&s->T));
   PetscCall(MatDestroy(&s->Kg));
   PetscCall(MatDestroy(&s->Kw));
@@ -63,11 +67,39 @@ PetscErrorCode HycoSolverSetType(HycoSolver s, HycoSolverType type)
   HycoFail("the solver type \"%s\" is unknown; types are active_set, tao and lemke", type);
 }
 
+PetscErrorCode HycoSolverSetTaoType(HycoSolver s, const char type[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  s->tao_type = HYCO_TAO_AUTO;
+  if (!type) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; HycoTaoTypes[k] && s->tao_type == HYCO_TAO_AUTO; k++) {
+    PetscBool same;
+
+    PetscCall(PetscStrcasecmp(type, HycoTaoTypes[k], &same));
+    if (same) s->tao_type = k;
+  }
+  HycoCheck(s->tao_type != HYCO_TAO_AUTO,
+            "the TAO type \"%s\" is unknown here; hyco -help lists those of -hyco_tao_type", type);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSolverSetForm(HycoSolver s, HycoForm form)
 {
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
   s->form = form;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetLinear(HycoSolver s, HycoLinear linear, PetscReal gigabytes)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheck(gigabytes >= 0, "the memory is %g GB; it must be 0 (what is free) or more", (double)gigabytes);
+  s->linear = linear;
+  s->memory = 1e9 * gigabytes;
+  s->chosen_for = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,6 +128,14 @@ PetscErrorCode HycoSolverSetWarmStart(HycoSolver s, PetscBool warm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSolverSetFallback(HycoSolver s, PetscBool fallback)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  s->fallback = fallback;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSolverSetMonitor(HycoSolver s, HycoMonitor monitor, void *ctx)
 {
   PetscFunctionBegin;
@@ -107,18 +147,28 @@ PetscErrorCode HycoSolverSetMonitor(HycoSolver s, HycoMonitor monitor, void *ctx
 
 PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
 {
-  static const char *const forms[] = {"auto", "dual", "primal", NULL};
-  PetscInt form;
+  static const char *const forms[] = {"auto", "dual", "primal", "dual_free", NULL};
+  PetscInt form, linear;
+  PetscReal gigabytes;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
   form = (PetscInt)s->form;
+  linear = (PetscInt)s->linear;
+  gigabytes = 1e-9 * s->memory;
   PetscCall(HycoOptionsWord(options, "hyco_solver_type", HycoSolverTypes, &s->type));
+  if (s->type == HYCO_TYPE_TAO) PetscCall(HycoOptionsWord(options, "hyco_tao_type", HycoTaoTypes, &s->tao_type));
   PetscCall(HycoOptionsWord(options, "hyco_solver_form", forms, &form));
   s->form = (HycoForm)form;
+  PetscCall(HycoOptionsWord(options, "hyco_linear", HycoLinearNames, &linear));
+  PetscCall(HycoOptionsReal(options, "hyco_memory", 0, 1e9, &gigabytes));
+  s->linear = (HycoLinear)linear;
+  s->memory = 1e9 * gigabytes;
   PetscCall(HycoOptionsReal(options, "hyco_solver_rtol", 1e-15, 0.1, &s->rtol));
   PetscCall(HycoOptionsInt(options, "hyco_solver_max_its", 0, PETSC_MAX_INT, &s->max_its));
   PetscCall(HycoOptionsBool(options, "hyco_solver_warm_start", &s->warm));
+  PetscCall(HycoOptionsBool(options, "hyco_solver_fallback", &s->fallback));
+  PetscCall(HycoOptionsBool(options, "hyco_solver_multilevel", &s->multilevel));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,9 +178,12 @@ static PetscErrorCode ChooseForm(HycoSolver s, HycoForm *form)
   PetscBool aij, possible = PETSC_FALSE;
 
   PetscFunctionBegin;
-  *form = s->type == HYCO_TYPE_LEMKE ? HYCO_FORM_DUAL : s->form;
+  *form = s->form;
+  if (s->type == HYCO_TYPE_LEMKE && *form == HYCO_FORM_PRIMAL) *form = HYCO_FORM_DUAL;
   if (*form != HYCO_FORM_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
   *form = HYCO_FORM_DUAL;
+  if (s->type == HYCO_TYPE_LEMKE || (s->type == HYCO_TYPE_TAO && s->tao_type >= HYCO_TAO_SEMISMOOTH))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectTypeCompareAny((PetscObject)s->system->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
   if (aij && s->system->symmetric && (4 * s->system->m > s->system->n || s->system->m > 6000))
     PetscCall(HycoPrimalPossible(s->system, &possible));
@@ -138,23 +191,78 @@ static PetscErrorCode ChooseForm(HycoSolver s, HycoForm *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
+/* The TAO type for the system, and whether type, form and system go together. */
+static PetscErrorCode ChooseTao(HycoSolver s, HycoForm form)
+{
+  PetscFunctionBegin;
+  PetscCheck(
+      form != HYCO_FORM_DUAL_FREE || s->type == HYCO_TYPE_TAO, s->comm, PETSC_ERR_USER,
+      "%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with dual_free",
+      HycoSolverTypes[s->type]);
+  s->tao = s->tao_type;
+  if (s->tao == HYCO_TAO_AUTO) s->tao = s->system->symmetric ? HYCO_TAO_GPCG : HYCO_TAO_SEMISMOOTH;
+  if (s->type != HYCO_TYPE_TAO || !s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(s->system->symmetric || HycoTaoSemismooth(s->tao), s->comm, PETSC_ERR_USER,
+             "TAO's %s needs a symmetric system and this one is not; use -hyco_tao_type ssils, asils, ssfls or asfls",
+             HycoTaoTypes[s->tao]);
+  PetscCheck(form == HYCO_FORM_DUAL || !HycoTaoSemismooth(s->tao), s->comm, PETSC_ERR_USER,
+             "TAO's %s needs the matrix of the dual form; use -hyco_solver_form dual", HycoTaoTypes[s->tao]);
+  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->system->symmetric, s->comm, PETSC_ERR_USER,
+             "the form dual_free needs a symmetric system; use -hyco_solver_form dual");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* `direct`: x came from a solve with K, so that no equilibrium means no good solve. */
+static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool direct, PetscBool solved)
 {
   PetscFunctionBegin;
   PetscCall(HycoSystemComputeKKT(s->system, x, L, &s->kkt));
   if (HycoKKTMax(&s->kkt) <= s->rtol)
     s->reason = HYCO_CONVERGED;
-  else if (!(s->kkt.stationarity <= 1e-3))
+  else if (direct && !(s->kkt.stationarity <= 1e-3))
     s->reason = HYCO_DIVERGED_SINGULAR; /* K x = r was not even nearly solved */
   else if (s->reason != HYCO_DIVERGED_SINGULAR)
     s->reason = solved || s->kkt.stationarity > s->rtol ? HYCO_DIVERGED_RESIDUAL : HYCO_DIVERGED_ITERATIONS;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One method on one form, judged. */
+static PetscErrorCode Attempt(HycoSolver s, PetscInt type, HycoForm form, Vec x, Vec L)
+{
+  const PetscBool direct = (PetscBool)(form != HYCO_FORM_PRIMAL || type != HYCO_TYPE_TAO);
+  PetscBool solved = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  s->its = 0;
+  s->reason = HYCO_DIVERGED_RESIDUAL;
+  if (form == HYCO_FORM_PRIMAL)
+    PetscCall(HycoSolvePrimal(s, type, x, L, &solved));
+  else if (form == HYCO_FORM_DUAL_FREE && s->system->m)
+    PetscCall(HycoSolveDualFree(s, x, L, &solved));
+  else
+    PetscCall(HycoSolveDual(s, type, x, L, &solved));
+  PetscCall(Judge(s, x, L, direct, solved));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The next method after one that did not solve: TAO, the active set, Lemke's. */
+static PetscBool NextAttempt(const HycoSolver s, PetscInt *type, HycoForm *form)
+{
+  const PetscBool dense = (PetscBool)(s->system->m && s->system->m <= HYCO_LEMKE_MAX);
+
+  if (!s->fallback || s->reason > 0 || s->reason == HYCO_DIVERGED_SINGULAR || s->p) return PETSC_FALSE;
+  if (*type == HYCO_TYPE_LEMKE || (*type == HYCO_TYPE_ACTIVE_SET && !dense)) return PETSC_FALSE;
+  if (*form == HYCO_FORM_DUAL_FREE && !dense) return PETSC_FALSE;
+  *type = *type == HYCO_TYPE_TAO ? HYCO_TYPE_ACTIVE_SET : HYCO_TYPE_LEMKE;
+  if (*type == HYCO_TYPE_LEMKE || *form == HYCO_FORM_DUAL_FREE) *form = HYCO_FORM_DUAL;
+  return PETSC_TRUE;
+}
+
 PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
 {
   HycoForm form;
-  PetscBool solved = PETSC_FALSE;
+  PetscInt type, its, n_free = 0;
+  PetscBool fell_back = PETSC_FALSE;
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
@@ -162,26 +270,26 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   PetscCheck(s->system && s->system->F, PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
   s->seconds_factor = 0;
-  s->its = 0;
-  s->reason = HYCO_DIVERGED_RESIDUAL;
+  type = s->type;
   PetscCall(ChooseForm(s, &form));
-  if (form == HYCO_FORM_PRIMAL)
-    PetscCall(HycoSolvePrimal(s, s->type, x, L, &solved));
-  else
-    PetscCall(HycoSolveDual(s, s->type, x, L, &solved));
-  PetscCall(Judge(s, x, L, solved));
-  if (s->reason < 0 && s->reason != HYCO_DIVERGED_SINGULAR && s->type != HYCO_TYPE_LEMKE && s->system->m &&
-      s->system->m <= HYCO_LEMKE_MAX) {
-    char first[96];
-    PetscInt its = s->its;
+  PetscCall(HycoChooseLinear(s, &form));
+  PetscCall(ChooseTao(s, form));
+  PetscCall(Attempt(s, type, form, x, L));
+  its = s->its;
+  while (NextAttempt(s, &type, &form)) {
+    char before[sizeof(s->method)], next[32];
 
-    PetscCall(PetscStrncpy(first, s->method, sizeof(first)));
-    PetscCall(HycoSolveDual(s, HYCO_TYPE_LEMKE, x, L, &solved));
-    PetscCall(Judge(s, x, L, solved));
-    s->its += its;
-    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then lemke", first));
-    if (s->reason == HYCO_CONVERGED) s->reason = HYCO_CONVERGED_FALLBACK;
+    PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
+    PetscCall(Attempt(s, type, form, x, L));
+    its += s->its;
+    fell_back = PETSC_TRUE;
+    PetscCall(PetscStrncpy(next, HycoSolverTypes[type], sizeof(next)));
+    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then %s", before, next));
   }
+  s->its = its;
+  if (s->reason < 0) PetscCall(HycoKernelSize(s->system->K, &n_free));
+  if (n_free) s->reason = HYCO_DIVERGED_UNHELD;
+  if (fell_back && s->reason == HYCO_CONVERGED) s->reason = HYCO_CONVERGED_FALLBACK;
   s->seconds_solve = HycoNow() - begin - s->seconds_factor;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -218,6 +326,14 @@ PetscErrorCode HycoSolverGetMethod(HycoSolver s, const char *method[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSolverGetLinear(HycoSolver s, const char *linear[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  *linear = s->linear_method;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSolverGetSeconds(HycoSolver s, PetscReal *factor, PetscReal *solve)
 {
   PetscFunctionBegin;
@@ -236,6 +352,8 @@ const char *HycoReasonName(HycoReason reason)
     return "converged by the fallback solver";
   case HYCO_DIVERGED_RESIDUAL:
     return "not converged: a KKT residual is above the tolerance";
+  case HYCO_DIVERGED_UNHELD:
+    return "not converged: contact alone holds a body, and this load takes it away";
   case HYCO_DIVERGED_ITERATIONS:
     return "not converged: the limit of iterations, or a cycle";
   default:

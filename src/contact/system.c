@@ -89,10 +89,43 @@ static PetscReal Quotient(PetscReal a, PetscReal b)
   return a == 0 ? 0 : b > 0 ? a / b : PETSC_MAX_REAL;
 }
 
-static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value)
+/* Takes out of r what rounding x alone can make, entries of at most 16 eps (|K_ii x_i| + |F_i|); their norm. */
+static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, PetscReal *dropped)
+{
+  PetscInt n;
+  PetscReal squares = 0, sum;
+  PetscScalar *residual;
+  const PetscScalar *K, *X, *F;
+  Vec diagonal;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(r, &diagonal));
+  PetscCall(MatGetDiagonal(s->K, diagonal));
+  PetscCall(VecGetLocalSize(r, &n));
+  PetscCall(VecGetArray(r, &residual));
+  PetscCall(VecGetArrayRead(diagonal, &K));
+  PetscCall(VecGetArrayRead(x, &X));
+  PetscCall(VecGetArrayRead(s->F, &F));
+  for (PetscInt i = 0; i < n; i++) {
+    if (!(PetscAbsReal(residual[i]) <= 16 * PETSC_MACHINE_EPSILON * (PetscAbsReal(K[i] * X[i]) + PetscAbsReal(F[i]))))
+      continue;
+    squares += residual[i] * residual[i];
+    residual[i] = 0;
+  }
+  PetscCall(VecRestoreArrayRead(x, &X));
+  PetscCall(VecRestoreArrayRead(s->F, &F));
+  PetscCall(VecRestoreArrayRead(diagonal, &K));
+  PetscCall(VecRestoreArray(r, &residual));
+  PetscCall(VecDestroy(&diagonal));
+  PetscCallMPI(MPI_Allreduce(&squares, &sum, 1, MPIU_REAL, MPI_SUM, s->comm));
+  *dropped = PetscSqrtReal(sum);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value, PetscReal *rounding)
 {
   Vec Kx, BtL;
-  PetscReal nK, nB = 0, nF, nr;
+  PetscReal nK, nB = 0, nF, nr, dropped = 0;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(x, &Kx));
@@ -107,9 +140,11 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value)
     PetscCall(VecDestroy(&BtL));
   }
   PetscCall(VecAXPY(Kx, -1, s->F));
+  PetscCall(DropRounding(s, x, Kx, &dropped));
   PetscCall(VecNorm(Kx, NORM_2, &nr));
   PetscCall(VecDestroy(&Kx));
   *value = Quotient(nr, PetscMax(nK, PetscMax(nB, nF)));
+  *rounding = Quotient(dropped, PetscMax(nK, PetscMax(nB, nF)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -124,7 +159,7 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   HycoCheckHandle(s, "HycoSystemCreate()");
   PetscCheck(s->F, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
   PetscCall(PetscMemzero(kkt, sizeof(*kkt)));
-  PetscCall(Stationarity(s, x, L, &kkt->stationarity));
+  PetscCall(Stationarity(s, x, L, &kkt->stationarity, &kkt->rounding));
   if (PetscIsInfOrNanReal(kkt->stationarity)) kkt->stationarity = PETSC_MAX_REAL;
   if (!s->m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(s->D, &gap));

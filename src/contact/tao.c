@@ -1,6 +1,23 @@
-/* TAO's bound-constrained solvers on a quadratic: min 1/2 y^T H y - f^T y, lo <= y <= hi. */
+/*
+  TAO on the contact problem. Its bound-constrained types minimise the quadratic
+
+      min 1/2 y^T H y - f^T y,  lo <= y <= hi            H symmetric positive (semi)definite
+
+  and its semismooth types solve the complementarity problem w = q + M z >= 0, z >= 0, w.z = 0, symmetric or not, by the
+  Fischer-Burmeister function (T. S. Munson et al., INFORMS J. Comput. 13 (2001) 294-311). Both stop on absolute sizes,
+  so the problem is scaled first: unit diagonal, right-hand side of size one. What TAO says is not evidence: the caller
+  recomputes the residuals. A PETSC error inside TAO is caught: it means not solved, like a limit of iterations.
+*/
 #include <hycosolverimpl.h>
 #include <petsctao.h>
+
+const char *const HycoTaoTypes[] = {"gpcg",   "tron",   "bntr",  "bnls",  "bntl",  "blmvm", "bncg",  "bqnls", "bqnkls",
+                                    "bqnktr", "bqnktl", "bqpip", "ssils", "asils", "ssfls", "asfls", NULL};
+
+PetscBool HycoTaoSemismooth(PetscInt type)
+{
+  return (PetscBool)(type >= HYCO_TAO_SEMISMOOTH);
+}
 
 typedef struct {
   Mat H;
@@ -29,26 +46,195 @@ static PetscErrorCode Hessian(Tao tao, Vec y, Mat H, Mat P, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTaoBoundQP(Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscInt *its, PetscBool *solved)
+/* w = M z - f */
+static PetscErrorCode Slack(Tao tao, Vec z, Vec w, void *ctx)
 {
-  Quadratic q = {H, f};
-  Tao tao;
+  Quadratic *q = (Quadratic *)ctx;
+
+  PetscFunctionBegin;
+  (void)tao;
+  PetscCall(MatMult(q->H, z, w));
+  PetscCall(VecAXPY(w, -1, q->f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The types overwrite J by their own Newton matrix: M again at each call. */
+static PetscErrorCode Jacobian(Tao tao, Vec z, Mat J, Mat P, void *ctx)
+{
+  Quadratic *q = (Quadratic *)ctx;
+
+  PetscFunctionBegin;
+  (void)tao, (void)z, (void)P;
+  PetscCall(MatCopy(q->H, J, SAME_NONZERO_PATTERN));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetBoundProblem(Tao tao, Quadratic *q)
+{
+  PetscBool shell;
+  KSP ksp;
+
+  PetscFunctionBegin;
+  PetscCall(TaoSetObjectiveAndGradient(tao, NULL, Objective, q));
+  PetscCall(TaoSetHessian(tao, q->H, q->H, Hessian, NULL));
+  PetscCall(TaoSetTolerances(tao, 1e-13, 1e-14, 0));
+  PetscCall(PetscObjectTypeCompare((PetscObject)q->H, MATSHELL, &shell));
+  PetscCall(TaoGetKSP(tao, &ksp));
+  if (shell && ksp) { /* no entries, nothing to precondition with */
+    PC pc;
+
+    PetscCall(KSPGetPC(ksp, &pc));
+    PetscCall(PCSetType(pc, PCNONE));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetComplementarity(Tao tao, Quadratic *q, Mat J, Vec w)
+{
+  KSP ksp;
+  PC pc;
+
+  PetscFunctionBegin;
+  PetscCall(TaoSetConstraintsRoutine(tao, w, Slack, q));
+  PetscCall(TaoSetJacobianRoutine(tao, J, J, Jacobian, q));
+  PetscCall(TaoSetTolerances(tao, 0, 0, 0));
+  PetscCall(TaoSetFunctionLowerBound(tao, 1e-12)); /* 1e-8, its default, is too coarse; 1e-20 never stops */
+  PetscCall(TaoGetKSP(tao, &ksp));
+  PetscCall(KSPSetType(ksp, KSPPREONLY));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCSetType(pc, PCLU));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What may fail inside TAO. */
+static PetscErrorCode Run(Tao tao, PetscInt type, PetscInt max_its, Quadratic *q, Vec lo, Vec hi, Vec y, Mat J, Vec w,
+                          PetscInt *its, PetscBool *solved)
+{
   TaoConvergedReason why;
 
   PetscFunctionBegin;
-  PetscCall(TaoCreate(PetscObjectComm((PetscObject)y), &tao));
-  PetscCall(TaoSetType(tao, TAOGPCG));
+  PetscCall(TaoSetType(tao, HycoTaoTypes[type]));
   PetscCall(TaoSetOptionsPrefix(tao, "hyco_"));
   PetscCall(TaoSetSolution(tao, y));
-  PetscCall(TaoSetObjectiveAndGradient(tao, NULL, Objective, &q));
-  PetscCall(TaoSetHessian(tao, H, H, Hessian, NULL));
   PetscCall(TaoSetVariableBounds(tao, lo, hi));
-  PetscCall(TaoSetTolerances(tao, 1e-13, 1e-14, 0));
+  PetscCall(TaoSetMaximumIterations(tao, max_its ? max_its : 2000));
+  if (HycoTaoSemismooth(type))
+    PetscCall(SetComplementarity(tao, q, J, w));
+  else
+    PetscCall(SetBoundProblem(tao, q));
   PetscCall(TaoSetFromOptions(tao));
   PetscCall(TaoSolve(tao));
   PetscCall(TaoGetConvergedReason(tao, &why));
   PetscCall(TaoGetIterationNumber(tao, its));
   *solved = (PetscBool)(why > 0);
-  PetscCall(TaoDestroy(&tao));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* y = d size y', lo and hi alike; f' = d f / size; H' = d H d: unit diagonal, max |f'| = 1. Infinite bounds stay. */
+static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscReal *size)
+{
+  PetscInt n;
+  PetscScalar *v[5];
+  Vec all[5];
+  PetscReal mine = 0, largest = 0, most;
+
+  PetscFunctionBegin;
+  all[0] = f, all[1] = lo, all[2] = hi, all[3] = y, all[4] = d;
+  PetscCall(MatGetDiagonal(H, d));
+  PetscCall(VecNorm(d, NORM_INFINITY, &most));
+  PetscCall(VecGetLocalSize(d, &n));
+  for (int k = 0; k < 5; k++) PetscCall(VecGetArray(all[k], &v[k]));
+  for (PetscInt i = 0; i < n; i++) {
+    v[4][i] = most > 0 ? 1 / PetscSqrtReal(PetscMax(PetscAbsReal(v[4][i]), 1e-8 * most)) : 1;
+    mine = PetscMax(mine, PetscMax(PetscAbsReal(v[0][i] * v[4][i]), PetscAbsReal(v[3][i] / v[4][i])));
+  }
+  PetscCallMPI(MPI_Allreduce(&mine, &largest, 1, MPIU_REAL, MPI_MAX, PetscObjectComm((PetscObject)d)));
+  *size = largest > 0 ? largest : 1;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal unit = v[4][i] * *size;
+
+    v[0][i] *= v[4][i] / *size;
+    if (v[1][i] > PETSC_NINFINITY) v[1][i] /= unit;
+    if (v[2][i] < PETSC_INFINITY) v[2][i] /= unit;
+    v[3][i] /= unit;
+  }
+  for (int k = 0; k < 5; k++) PetscCall(VecRestoreArray(all[k], &v[k]));
+  PetscCall(MatDiagonalScale(H, d, d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTaoSolve(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscInt *its,
+                            PetscBool *solved)
+{
+  Quadratic q = {H, f};
+  Tao tao;
+  Vec d, w;
+  Mat J = NULL;
+  PetscReal size = 1, norm;
+  PetscErrorCode caught;
+  char message[HYCO_LINE];
+
+  PetscFunctionBegin;
+  *its = 0;
+  *solved = PETSC_FALSE;
+  PetscCall(VecDuplicate(y, &d));
+  PetscCall(VecDuplicate(y, &w));
+  PetscCall(Scale(H, f, lo, hi, y, d, &size));
+  if (HycoTaoSemismooth(type)) PetscCall(MatDuplicate(H, MAT_COPY_VALUES, &J));
+  PetscCall(TaoCreate(PetscObjectComm((PetscObject)y), &tao));
+  PetscCall(HycoCatchBegin());
+  caught = Run(tao, type, max_its, &q, lo, hi, y, J, w, its, solved);
+  if (caught)
+    (void)TaoDestroy(&tao);
+  else
+    caught = TaoDestroy(&tao);
+  PetscCall(HycoCatchEnd(caught, message));
+  if (caught) {
+    PetscCall(PetscInfo(NULL, "TAO %s failed: %s\n", HycoTaoTypes[type], message));
+    *solved = PETSC_FALSE;
+  }
+  PetscCall(VecPointwiseMult(y, y, d));
+  PetscCall(VecScale(y, size));
+  PetscCall(VecNorm(y, NORM_2, &norm));
+  if (PetscIsInfOrNanReal(norm)) PetscCall(VecSet(y, 0));
+  PetscCall(MatDestroy(&J));
+  PetscCall(VecDestroy(&d));
+  PetscCall(VecDestroy(&w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTaoLCP(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric, PetscInt type,
+                          PetscInt max_its, PetscReal z[], PetscInt *its, PetscBool *solved)
+{
+  Mat H;
+  Vec f, lo, hi, y;
+  PetscScalar *h;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, n, n, NULL, &H));
+  PetscCall(MatDenseGetArray(H, &h));
+  PetscCall(PetscArraycpy(h, M, (size_t)n * (size_t)n));
+  PetscCall(MatDenseRestoreArray(H, &h));
+  PetscCall(MatAssemblyBegin(H, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(H, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatSetOption(H, MAT_SYMMETRIC, symmetric));
+  PetscCall(MatCreateVecs(H, &y, &f));
+  PetscCall(VecDuplicate(y, &lo));
+  PetscCall(VecDuplicate(y, &hi));
+  PetscCall(VecSet(y, 0));
+  PetscCall(VecSet(lo, 0));
+  PetscCall(VecSet(hi, PETSC_INFINITY));
+  PetscCall(VecGetArray(f, &h));
+  for (PetscInt i = 0; i < n; i++) h[i] = -q[i];
+  PetscCall(VecRestoreArray(f, &h));
+  PetscCall(HycoTaoSolve(type, max_its, H, f, lo, hi, y, its, solved));
+  PetscCall(VecGetArray(y, &h));
+  PetscCall(PetscArraycpy(z, h, n));
+  PetscCall(VecRestoreArray(y, &h));
+  PetscCall(VecDestroy(&y));
+  PetscCall(VecDestroy(&f));
+  PetscCall(VecDestroy(&lo));
+  PetscCall(VecDestroy(&hi));
+  PetscCall(MatDestroy(&H));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -24,8 +24,9 @@ static const HycoOption own[] = {
 };
 
 /* Options of PETSc, SLEPc and the solvers inside: known by their beginnings, checked by who reads them. */
-static const char *const foreign[] = {"hyco_dual_",
+static const char *const foreign[] = {"hyco_mumps_",
                                       "hyco_primal_",
+                                      "hyco_norm_",
                                       "hyco_tao_",
                                       "log_",
                                       "info",
@@ -177,7 +178,8 @@ static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
   PetscFunctionBegin;
   PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
   for (PetscInt k = 0; k < n && !first[0]; k++) {
-    if (early && (strncasecmp(names[k], "hyco_dual_", 10) == 0 || strncasecmp(names[k], "hyco_primal_", 12) == 0))
+    if (early && (strncasecmp(names[k], "hyco_mumps_", 11) == 0 || strncasecmp(names[k], "hyco_primal_", 12) == 0 ||
+                  strncasecmp(names[k], "hyco_norm_", 10) == 0))
       continue;
     if (tao && strncasecmp(names[k], "hyco_tao_", 9) == 0) continue;
     if (strncmp(names[k], "options_left", 12) && strncmp(names[k], "skip_petscrc", 12) && strcmp(names[k], "nox"))
@@ -477,7 +479,7 @@ void DriverHelp(const char *command)
   }
   printf("\nOptions of the method (a scene may set them too, in its hyco: section without the prefix)\n");
   for (PetscInt k = 0; k < n; k++) HelpLine(table[k].name, table[k].value, table[k].initial, table[k].meaning);
-  printf("\nPETSc's options work too: -log_view, -info, -hyco_dual_mat_mumps_icntl_7 5 (solver of K), "
+  printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "
          "-hyco_primal_..., -hyco_tao_type bntr.\n");
   printf("Under MPI: mpiexec -n 2 hyco ...; set OPENBLAS_NUM_THREADS=1.\n");
 }

@@ -25,7 +25,7 @@ extern const Command commands[];
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
 /* Nothing was given that nobody read. To be called when all options have been read and before anything is written. */
 PetscErrorCode DriverCheckLeft(void);
-/* The same before the solvers have run: what is meant for them (-hyco_dual_..., -hyco_tao_... with that type) passes.
+/* The same before the solvers have run: what is meant for them (-hyco_mumps_..., -hyco_tao_... with that type) passes.
  */
 PetscErrorCode DriverCheckLeftEarly(HycoScene scene);
 /* The value of -name; fails when it is required and missing. `value` is "" when absent. */
@@ -47,6 +47,10 @@ void ReportSeconds(cJSON *json, const HycoSeconds *seconds);
 void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[]);
 /* Adds memory_mb, writes to -report (if given) on rank 0 and frees. */
 PetscErrorCode ReportWrite(cJSON **json);
+/* The report of a set of points, n rows of values by column (one named "converged"), and their CSV at `table` ("":
+   none); fails when a point did not converge. */
+PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
+                         PetscInt n_columns, const char *const columns[], const PetscReal value[], PetscReal seconds);
 /* Writes text to a file through a temporary name. */
 PetscErrorCode DriverWriteText(const char path[], const char text[]);
 

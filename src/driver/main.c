@@ -7,8 +7,9 @@
 #include <time.h>
 
 const Command commands[] = {
-    {"solve", CommandSolve, "scene mu mu_ output report hyco_monitor",
-     "hyco solve -scene FOLDER -mu V,V,... [-output F.xdmf] [-report R.json]", "solve one parameter value, full order"},
+    {"solve", CommandSolve, "scene mu mu_ grid grid_type values_ points output report table hyco_monitor",
+     "hyco solve -scene FOLDER -mu V,V,... [-output F.xdmf] [-report R.json]",
+     "solve full order, for one point or a set (-table T.csv)"},
     {"train", CommandTrain, "scene model grid grid_type values_ points report",
      "hyco train -scene FOLDER -grid N,N,... -model M.h5 [-report R.json]",
      "solve a set of points full order (resumable), reduce, write the model"},

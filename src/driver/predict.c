@@ -100,32 +100,22 @@ static PetscErrorCode PredictMine(HycoModel model, PetscInt n, PetscInt n_par, c
 
 static PetscErrorCode Many(HycoModel model, HycoScene scene, HycoSamples samples)
 {
-  PetscInt n, n_par, failed = 0;
+  PetscInt n, n_par;
   const PetscReal *mu;
   PetscReal *value, begin;
-  cJSON *json;
-  char path[PETSC_MAX_PATH_LEN];
+  char table[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCall(DriverGet("table", PETSC_FALSE, path));
+  PetscCall(DriverGet("table", PETSC_FALSE, table));
   PetscCall(DriverCheckLeft());
   PetscCall(PetscCalloc1(n * N_COLUMNS, &value));
   begin = HycoNow();
   HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, n, n_par, mu, value));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)(n * N_COLUMNS), MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   begin = HycoNow() - begin;
-  for (PetscInt k = 0; k < n; k++) failed += value[k * N_COLUMNS + CONVERGED] < 0.5;
-  if (path[0]) PetscCall(DriverWriteTable(path, scene, n, mu, N_COLUMNS, columns, value));
-  PetscCall(Say("%d points in %.3f s, %d not converged\n", (int)n, (double)begin, (int)failed));
-  PetscCall(ReportCreate("predict", scene, NULL, &json));
-  cJSON_AddNumberToObject(json, "n_points", n);
-  cJSON_AddNumberToObject(json, "not_converged", failed);
-  cJSON_AddNumberToObject(json, "seconds_total", begin);
-  PetscCall(ReportWrite(&json));
+  PetscCall(ReportSet("predict", table, scene, samples, N_COLUMNS, columns, value, begin));
   PetscCall(PetscFree(value));
-  HycoCheck(!failed, "%d of the %d predictions did not converge; the column converged of the table says which",
-            (int)failed, (int)n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -98,6 +98,38 @@ PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The column of a set's table that says whether a point converged. */
+static PetscInt FindConverged(PetscInt n_columns, const char *const columns[])
+{
+  for (PetscInt c = 0; c < n_columns; c++) {
+    if (strcmp(columns[c], "converged") == 0) return c;
+  }
+  return 0;
+}
+
+PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
+                         PetscInt n_columns, const char *const columns[], const PetscReal value[], PetscReal seconds)
+{
+  const PetscInt converged = FindConverged(n_columns, columns);
+  PetscInt n, failed = 0;
+  const PetscReal *mu;
+  cJSON *json;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
+  for (PetscInt k = 0; k < n; k++) failed += value[k * n_columns + converged] < 0.5;
+  if (table[0]) PetscCall(DriverWriteTable(table, scene, n, mu, n_columns, columns, value));
+  PetscCall(Say("%d points in %.3f s, %d not converged\n", (int)n, (double)seconds, (int)failed));
+  PetscCall(ReportCreate(command, scene, NULL, &json));
+  cJSON_AddNumberToObject(json, "n_points", n);
+  cJSON_AddNumberToObject(json, "not_converged", failed);
+  cJSON_AddNumberToObject(json, "seconds_total", seconds);
+  PetscCall(ReportWrite(&json));
+  HycoCheck(!failed, "%d of the %d points did not converge; the column converged of the table says which", (int)failed,
+            (int)n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode ReportWrite(cJSON **json)
 {
   char path[PETSC_MAX_PATH_LEN], *text;

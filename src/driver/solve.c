@@ -1,21 +1,23 @@
-/* hyco solve: one parameter value, full order. */
+/* hyco solve: full order, at one parameter value or over a set. */
 #include "driver.h"
 
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom, const HycoSummary *s)
 {
   cJSON *json;
   HycoSolver solver;
-  const char *method;
+  const char *method, *linear;
 
   PetscFunctionBegin;
   PetscCall(ReportCreate("solve", scene, mu, &json));
   PetscCall(HycoFOMGetSolver(fom, &solver));
   PetscCall(HycoSolverGetMethod(solver, &method));
+  PetscCall(HycoSolverGetLinear(solver, &linear));
   cJSON_AddNumberToObject(json, "n_dof", s->n_dof);
   cJSON_AddNumberToObject(json, "n_contacts", s->n_contacts);
   cJSON_AddNumberToObject(json, "n_active", s->n_active);
   cJSON_AddNumberToObject(json, "active_set_iterations", s->iterations);
   cJSON_AddStringToObject(json, "solver", method);
+  cJSON_AddStringToObject(json, "linear", linear);
   cJSON_AddBoolToObject(json, "converged", s->reason > 0);
   cJSON_AddNumberToObject(json, "total_contact_force", s->total_contact_force);
   cJSON_AddNumberToObject(json, "lambda_max", s->lambda_max);
@@ -25,30 +27,89 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   ReportVector(json, "u_max", s->dim, s->u_max);
   cJSON_AddNumberToObject(json, "strain_energy", s->strain_energy);
   ReportKKT(json, &s->kkt);
+  cJSON_AddNumberToObject(json, "rounding", s->kkt.rounding);
   ReportSeconds(json, &s->seconds);
   PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
                 (int)s->n_active, (int)s->iterations, method));
   PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g\n", (double)s->total_contact_force,
                 (double)s->lambda_max, (double)s->strain_energy));
-  PetscCall(Say("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
-                (double)s->kkt.stationarity, (double)s->kkt.penetration, (double)s->kkt.adhesion,
-                (double)s->kkt.complementarity));
-  PetscCall(Say("seconds: %.3f assemble, %.3f factor, %.3f solve\n", (double)s->seconds.assemble,
-                (double)s->seconds.factor, (double)s->seconds.solve));
+  PetscCall(
+      Say("KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
+          (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,
+          (double)s->kkt.complementarity));
+  PetscCall(Say("seconds: %.3f assemble, %.3f factor, %.3f solve (%s)\n", (double)s->seconds.assemble,
+                (double)s->seconds.factor, (double)s->seconds.solve, linear));
   PetscCall(ReportWrite(&json));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[])
+{
+  HycoSummary summary;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  PetscCall(HycoFOMSolve(fom, n, mu));
+  PetscCall(HycoFOMGetSummary(fom, &summary));
+  PetscCall(DriverCheckLeft());
+  HycoCheck(summary.reason > 0, "%s%s%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written",
+            HycoReasonName(summary.reason), summary.free_motion[0] ? "; no support keeps " : "", summary.free_motion,
+            (double)summary.kkt.stationarity, (double)summary.kkt.penetration, (double)summary.kkt.adhesion,
+            (double)summary.kkt.complementarity);
+  if (output[0]) PetscCall(HycoFOMWrite(fom, output));
+  PetscCall(Report(scene, mu, fom, &summary));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What a set's table holds of each point. */
+enum { FORCE, LAMBDA_MAX, ACTIVE, U_NORM, ENERGY, KKT, CONVERGED, ITERATIONS, SECONDS, N_COLUMNS };
+static const char *const columns[N_COLUMNS] = {
+    "total_contact_force", "lambda_max", "n_active", "u_norm2", "strain_energy", "kkt_max",
+    "converged",           "iterations", "seconds"};
+
+/* The points in their order, each from the last one's active contacts, all ranks together. */
+static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, const char table[])
+{
+  PetscInt n, n_par;
+  const PetscReal *mu;
+  PetscReal *value, begin;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCall(PetscCalloc1(n * N_COLUMNS, &value));
+  begin = HycoNow();
+  for (PetscInt k = 0; k < n; k++) {
+    HycoSummary s;
+    PetscReal *v = value + k * N_COLUMNS;
+
+    PetscCall(HycoFOMSolve(fom, n_par, mu + k * n_par));
+    PetscCall(HycoFOMGetSummary(fom, &s));
+    if (k == 0) PetscCall(DriverCheckLeft());
+    v[FORCE] = s.total_contact_force;
+    v[LAMBDA_MAX] = s.lambda_max;
+    v[ACTIVE] = s.n_active;
+    v[U_NORM] = s.u_norm2;
+    v[ENERGY] = s.strain_energy;
+    v[KKT] = HycoKKTMax(&s.kkt);
+    v[CONVERGED] = s.reason > 0;
+    v[ITERATIONS] = s.iterations;
+    v[SECONDS] = s.seconds.total;
+  }
+  PetscCall(ReportSet("solve", table, scene, samples, N_COLUMNS, columns, value, HycoNow() - begin));
+  PetscCall(PetscFree(value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode CommandSolve(void)
 {
   HycoScene scene;
+  HycoSamples samples = NULL;
   HycoFOM fom;
   HycoSolver solver;
-  HycoSummary summary;
-  PetscInt n;
+  PetscBool monitor, set;
   PetscReal mu[64];
-  PetscBool monitor;
-  char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
+  char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN] = "";
 
   PetscFunctionBegin;
   PetscCall(DriverGet("scene", PETSC_TRUE, path));
@@ -56,20 +117,19 @@ PetscErrorCode CommandSolve(void)
   PetscCall(DriverGet("report", PETSC_FALSE, report));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_monitor", &monitor));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
-  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
-  PetscCall(DriverGetPoint(scene, mu));
+  PetscCall(DriverHasSamples(scene, &set));
+  HycoCheck(!set || !output[0], "-output is for one point (-mu); a set of points gives a -table");
+  if (set) {
+    PetscCall(DriverGetSamples(scene, &samples, &set));
+    PetscCall(DriverGet("table", PETSC_FALSE, table));
+  } else
+    PetscCall(DriverGetPoint(scene, mu));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMGetSolver(fom, &solver));
   if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
-  PetscCall(HycoFOMSolve(fom, n, mu));
-  PetscCall(HycoFOMGetSummary(fom, &summary));
-  PetscCall(DriverCheckLeft());
-  HycoCheck(summary.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written",
-            HycoReasonName(summary.reason), (double)summary.kkt.stationarity, (double)summary.kkt.penetration,
-            (double)summary.kkt.adhesion, (double)summary.kkt.complementarity);
-  if (output[0]) PetscCall(HycoFOMWrite(fom, output));
-  PetscCall(Report(scene, mu, fom, &summary));
+  PetscCall(set ? Many(fom, scene, samples, table) : One(fom, scene, mu, output));
   PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

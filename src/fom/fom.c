@@ -235,13 +235,11 @@ static PetscErrorCode Assemble(HycoFOM f, const PetscReal mu[])
   HycoOnEach(f->comm, HycoFESetParameters(f->fe, mu));
   if (f->fe_whole != f->fe) HycoOnRoot(f->comm, HycoFESetParameters(f->fe_whole, mu));
   f->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
-  if (!f->n_free) {
-    PetscCall(CountFree(f));
-    HycoOnRoot(f->comm, HycoFECheckSupports(f->fe_whole));
-  }
+  if (!f->n_free) PetscCall(CountFree(f));
   if (f->fe->stiffness_changed) {
     HycoOnEach(f->comm, HycoFEAssembleStiffness(f->fe, f->K));
     PetscCall(MatSetOption(f->K, MAT_SPD, PETSC_TRUE));
+    PetscCall(HycoFOMSetMotions(f));
   }
   HycoOnEach(f->comm, HycoFEAssembleForce(f->fe, f->F));
   PetscCall(AssembleContact(f, f->fe->contact_changed));

@@ -162,10 +162,13 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
   PetscCall(HycoSolverSetWarmStart(m->solver,
                                    PETSC_FALSE)); /* the nonsymmetric problem may have several solutions: no history */
   PetscCall(HycoSolverSetFromOptions(m->solver, m->scene->options));
-  /* the reduced problem is not symmetric and may have several solutions: the dual form, no history, no TAO */
+  /* the reduced problem is not symmetric and may have several solutions: the dual form, no history; a TAO type that
+     needs symmetry is meant for the full order */
   PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
   PetscCall(HycoSolverSetWarmStart(m->solver, PETSC_FALSE));
-  if (m->solver->type == HYCO_TYPE_TAO) PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
+  if (m->solver->type == HYCO_TYPE_TAO && m->solver->tao_type != HYCO_TAO_AUTO &&
+      !HycoTaoSemismooth(m->solver->tao_type))
+    PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
   m->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

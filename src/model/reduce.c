@@ -207,7 +207,7 @@ static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
   PetscCall(HycoFECreateMatrix(t->fe, PETSC_COMM_SELF, t->sizes[0], 0, &M));
   PetscCall(HycoFEAssembleH1(t->fe, M));
   PetscCall(MatSetOption(M, MAT_SPD, PETSC_TRUE));
-  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_dual_", M, PETSC_TRUE, &ksp));
+  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", M, PETSC_TRUE, &ksp));
   PetscCall(HycoFactor(ksp, &singular));
   PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the H1 norm's matrix is singular");
   PetscCall(KSPGetPC(ksp, &pc));

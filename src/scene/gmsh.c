@@ -168,6 +168,8 @@ static PetscInt FindTag(const Reader *r, size_t tag)
 {
   PetscInt lo = 0, hi = r->n_tags;
 
+  if (hi > 0 && r->tag[hi - 1] - r->tag[0] == (size_t)hi - 1) /* no tag is missing between the first and the last */
+    return tag >= r->tag[0] && tag <= r->tag[hi - 1] ? (PetscInt)(tag - r->tag[0]) : -1;
   while (lo < hi) {
     PetscInt mid = lo + (hi - lo) / 2;
 

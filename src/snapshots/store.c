@@ -161,7 +161,8 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
 
       snprintf(at + length, sizeof(at) - length, "%s%s = %.10g", p ? ", " : "", s->scene->parameter[p], (double)mu[p]);
     }
-    SETERRQ(fom->comm, PETSC_ERR_USER, "the snapshot at %s: %s", at, HycoReasonName(summary.reason));
+    SETERRQ(fom->comm, PETSC_ERR_USER, "the snapshot at %s: %s%s%s", at, HycoReasonName(summary.reason),
+            summary.free_motion[0] ? "; no support keeps " : "", summary.free_motion);
   }
   PetscCall(HycoFOMGetSolution(fom, NULL, NULL, NULL, NULL, NULL, NULL));
   PetscCall(HycoFOMGetForces(fom, force));

@@ -30,7 +30,7 @@ CASES = [
     (['solve', *R, '-hyco_solver_rtol', '2'], '-hyco_solver_rtol is "2"; it must be a number from'),
     (['solve', *R, '-hyco_solver_max_its', '1.5'], 'it must be a whole number'),
     (['solve', *R, '-hyco_tao_type', 'tron'], 'nothing reads the option -hyco_tao_type here'),
-    (['solve', *P, '-hyco_dual_pc_typ', 'lu'], 'nothing reads the option -hyco_dual_pc_typ here'),
+    (['solve', *P, '-hyco_mumps_icntl14', 'lu'], 'nothing reads the option -hyco_mumps_icntl14 here'),
     # the scene
     (['solve', '-scene', 'nowhere', '-mu', '1'], 'there is no scene nowhere'),
     (['solve', '-scene', 'empty', '-mu', '1'], 'the folder empty holds no scene.yaml'),

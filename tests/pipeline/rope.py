@@ -1,4 +1,4 @@
-"""The rope of section 6 reduced: sizes of the paper, errors no worse than readings.md has with the same RID."""
+"""The rope of section 6 reduced: sizes of the paper, errors no worse than an independent computation has with the same RID."""
 import unittest
 
 import h5py
@@ -42,7 +42,7 @@ class Reduced(Case):
         self.assertEqual(int(np.argmax(left <= 1e-7)) + 1, 9)
 
     def test_errors(self):
-        """100 x 120 points: u as the best of readings' table, forces as its best row by hybrid all."""
+        """100 x 120 points: u as the best of an independent computation, forces as its best row by hybrid all."""
         c = self.hyco('compare', '-scene', ROPE, '-model', 'rope.h5', '-grid', '100,120', '-table', 'table.csv')
         for name, mean, worst in (('error_u', 0.97e-2, 4.1e-2), ('error_lambda_rid', 0.31, 2.28),
                                   ('error_lambda', 0.44, 1.30)):
@@ -73,7 +73,7 @@ class Reduced(Case):
                       'rope.h5.snapshots', '-hyco_hybrid', 'rank', '-hyco_hybrid_trials', 300)
         self.assertEqual((t['n_fe_dofs'], t['rid_nodes'], t['n_modes']), (5, 28, 9))
         c = self.hyco('compare', '-scene', ROPE, '-model', 'rank.h5', '-grid', '10,12')
-        self.assertLess(c['error_u']['mean'], 0.12)  # worse than "first five of A" (readings): not judged by error
+        self.assertLess(c['error_u']['mean'], 0.12)  # worse than the first five of A: not judged by error
         self.assertLess(c['kkt_max'], 1e-8)
 
 

@@ -1,4 +1,5 @@
-"""Full order on the two examples, by every method and form. Numbers: design/readings.md and the paper's sections 6, 7."""
+"""Full order on the two examples, by every method and form. Numbers: an independent computation of the paper's sections 6, 7."""
+import csv
 import unittest
 
 import h5py
@@ -89,12 +90,40 @@ class Pellet(Case):
         self.assertLess(abs(gap[active]).max(), 1e-12)
         self.assertGreater(gap[~active].min(), 0)
 
+    def test_set(self):
+        """A set of points: a line each, the same numbers as one at a time, whatever was solved before."""
+        r = self.hyco('solve', '-scene', PELLET, '-values_radius', '4.06,4.08', '-values_load', '0.4,1', '-table', 'set.csv')
+        self.assertEqual((r['n_points'], r['not_converged']), (4, 0))
+        with open(self.path('set.csv'), encoding='ascii') as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(len(rows), 4)
+        for row in rows:
+            one = self.hyco('solve', '-scene', PELLET, '-mu', f'{row["radius"]},{row["load"]}')
+            self.assertEqual((int(row['n_active']), int(row['converged'])), (one['n_active'], 1))
+            self.near(float(row['total_contact_force']), one['total_contact_force'], 2e-7)
+            self.near(float(row['strain_energy']), one['strain_energy'], 2e-7)
+
+    def test_linear(self):
+        """Without a factor: by request, or because it would not fit; the report says which."""
+        for ranks, options in ((0, ('-hyco_linear', 'iterative')), (2, ('-hyco_memory', '0.001')),
+                               (0, ('-hyco_linear', 'iterative', '-hyco_primal_pc_type', 'icc'))):
+            with self.subTest(options=options):
+                r = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1', *options, ranks=ranks)
+                self.assertEqual((r['n_contacts'], r['n_active']), (189, 45))
+                self.near(r['total_contact_force'], 1409.70532353, 1e-7)
+                self.solved(r)
+                self.assertRegex(r['linear'], 'iterative: cg with (gamg|icc)')
+        self.assertRegex(self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1')['linear'], '^direct: mumps, 0.* GB')
+        run = self.run_raw('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_linear', 'iterative', '-hyco_solver_form', 'dual')
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('-hyco_linear iterative solves the primal form', run.stderr)
+
     def test_no_contact_at_no_load(self):
         r = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,0')
         self.assertEqual((r['n_active'], r['total_contact_force'], r['strain_energy']), (0, 0, 0))
 
     def test_linear_without_gap(self):
-        """At radius 4.1 the gap is zero and the problem positively homogeneous: all grows with the load (readings)."""
+        """At radius 4.1 the gap is zero and the problem positively homogeneous: all grows with the load."""
         half, full = (self.hyco('solve', '-scene', PELLET, '-mu', f'4.1,{load}') for load in (0.5, 1))
         self.assertEqual(half['n_active'], full['n_active'])
         self.near(2 * half['total_contact_force'], full['total_contact_force'], 1e-10)

@@ -23,6 +23,16 @@ static double Violation(PetscInt n, const PetscReal M[], const PetscReal q[], co
   return worst;
 }
 
+static PetscBool Symmetric(PetscInt n, const PetscReal M[])
+{
+  for (PetscInt j = 0; j < n; j++) {
+    for (PetscInt i = 0; i < j; i++) {
+      if (M[j * n + i] != M[i * n + j]) return PETSC_FALSE;
+    }
+  }
+  return PETSC_TRUE;
+}
+
 /* Both methods from the empty set; Lemke must solve; the active set must solve or say that it did not. */
 static PetscErrorCode Both(const char what[], PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool must,
                            PetscReal z_lemke[])
@@ -39,7 +49,7 @@ static PetscErrorCode Both(const char what[], PetscInt n, const PetscReal M[], c
   CHECK(status == HYCO_LCP_SOLVED, "Lemke, %s, n = %d: status %d", what, (int)n, (int)status);
   CHECK(Violation(n, M, q, z_lemke) < 1e-10, "Lemke, %s, n = %d: violation %g", what, (int)n,
         Violation(n, M, q, z_lemke));
-  PetscCall(HycoLCPActiveSet(n, M, q, 10 * n + 50, NULL, NULL, active, z, &its, &status));
+  PetscCall(HycoLCPActiveSet(n, M, q, Symmetric(n, M), 10 * n + 50, NULL, NULL, active, z, &its, &status));
   CHECK(status == HYCO_LCP_SOLVED || !must, "active set, %s, n = %d: status %d", what, (int)n, (int)status);
   if (status == HYCO_LCP_SOLVED) {
     double size = 0, apart = 0;
@@ -124,7 +134,7 @@ static PetscErrorCode TestCycle(void)
   HycoLCPStatus status;
 
   PetscFunctionBegin;
-  PetscCall(HycoLCPActiveSet(3, M, q, 100, NULL, NULL, active, z, &its, &status));
+  PetscCall(HycoLCPActiveSet(3, M, q, PETSC_FALSE, 100, NULL, NULL, active, z, &its, &status));
   CHECK(status == HYCO_LCP_CYCLE, "expected a cycle, found status %d", (int)status);
   CHECK(its == 4, "expected 4 iterations until a set comes back, found %d", (int)its);
   PetscCall(HycoLCPLemke(3, M, q, 100, z, &its, &status));
@@ -180,7 +190,7 @@ static PetscErrorCode TestNone(void)
   PetscFunctionBegin;
   PetscCall(HycoLCPLemke(2, M, q, 100, z, &its, &status));
   CHECK(status == HYCO_LCP_RAY, "expected a ray, found status %d", (int)status);
-  PetscCall(HycoLCPActiveSet(2, M, q, 100, NULL, NULL, active, z, &its, &status));
+  PetscCall(HycoLCPActiveSet(2, M, q, PETSC_TRUE, 100, NULL, NULL, active, z, &its, &status));
   CHECK(status == HYCO_LCP_SINGULAR, "expected a singular set, found status %d", (int)status);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

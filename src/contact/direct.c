@@ -1,0 +1,437 @@
+/*
+  The direct solver of the dual form: MUMPS (P. R. Amestoy et al., SIAM J. Matrix Anal. Appl. 23 (2001) 15-41) on
+
+      [ K  Bt ] [x]   [F]
+      [ B   0 ] [L] = [D]
+
+  with the forces, and the unknowns that pin free bodies, as Schur variables z = (x_pinned, L): they are eliminated
+  last, so that one factorisation of K yields the flexibility, no right-hand side being solved for:
+
+      M = [ K'    A ]      q = (-f', g),     w = q + M z,     w = 0 for x_pinned,  0 <= w complementary to L >= 0
+          [ -A^T  S ]
+
+  with S = B K^-1 Bt and g = D - B K^-1 F when nothing is pinned.
+*/
+#include <hycosolverimpl.h>
+#include <dmumps_c.h>
+
+struct _n_HycoDirect {
+  MPI_Comm comm;
+  PetscMPIInt rank;
+  DMUMPS_STRUC_C id;
+  PetscBool begun;                           /* MUMPS holds an instance */
+  PetscInt n, m, n_pinned, n_schur, *pinned; /* pinned: on every rank, ascending */
+  PetscBool symmetric;
+  PetscObjectId K_id, B_id; /* whose pattern was analysed */
+  PetscObjectState K_pattern, B_pattern;
+  PetscReal *rhs, *reduced; /* rank 0: n + m, n_schur */
+  VecScatter to_root;
+  Vec root;
+};
+
+enum { BEGIN = -1, END = -2, ANALYSE = 1, FACTOR = 2, SOLVE = 3 };
+#define ICNTL(d, k) ((d)->id.icntl[(k)-1])
+#define INFOG(d, k) ((d)->id.infog[(k)-1])
+
+static void Call(HycoDirect d, int job)
+{
+  d->id.job = job;
+  dmumps_c(&d->id);
+}
+
+static PetscErrorCode Release(HycoDirect d)
+{
+  PetscFunctionBegin;
+  if (d->begun) Call(d, END);
+  d->begun = PETSC_FALSE;
+  d->K_id = d->B_id = 0;
+  PetscCall(PetscFree(d->id.irn_loc));
+  PetscCall(PetscFree(d->id.jcn_loc));
+  PetscCall(PetscFree(d->id.a_loc));
+  PetscCall(PetscFree(d->id.perm_in));
+  PetscCall(PetscFree(d->id.listvar_schur));
+  PetscCall(PetscFree(d->rhs));
+  PetscCall(PetscFree(d->reduced));
+  PetscCall(VecScatterDestroy(&d->to_root));
+  PetscCall(VecDestroy(&d->root));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectCreate(MPI_Comm comm, HycoDirect *d)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscNew(d));
+  (*d)->comm = comm;
+  PetscCallMPI(MPI_Comm_rank(comm, &(*d)->rank));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectDestroy(HycoDirect *d)
+{
+  PetscFunctionBegin;
+  if (!*d) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Release(*d));
+  PetscCall(PetscFree((*d)->pinned));
+  PetscCall(PetscFree(*d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
+{
+  PetscInt n, *pinned;
+  PetscBool same;
+
+  PetscFunctionBegin;
+  PetscCall(HycoKernelSize(K, &n));
+  PetscCall(PetscMalloc1(n, &pinned));
+  PetscCall(HycoKernelPins(d->comm, K, n, pinned));
+  same = (PetscBool)(n == d->n_pinned);
+  for (PetscInt k = 0; same && k < n; k++) same = (PetscBool)(pinned[k] == d->pinned[k]);
+  if (same)
+    PetscCall(PetscFree(pinned));
+  else {
+    PetscCall(Release(d));
+    PetscCall(PetscFree(d->pinned));
+    d->pinned = pinned;
+    d->n_pinned = n;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Entries of the saddle point in this rank's rows of K, B (and Bt): the lower triangle when symmetric. */
+static PetscErrorCode Entries(HycoDirect d, Mat A, PetscInt row0, PetscInt col0, PetscBool pattern, MUMPS_INT8 *at)
+{
+  PetscInt lo, hi;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(A, &lo, &hi));
+  for (PetscInt r = lo; r < hi; r++) {
+    PetscInt n;
+    const PetscInt *cols;
+    const PetscScalar *vals;
+
+    PetscCall(MatGetRow(A, r, &n, &cols, &vals));
+    for (PetscInt k = 0; k < n; k++) {
+      if (d->symmetric && col0 + cols[k] > row0 + r) continue;
+      if (pattern) {
+        d->id.irn_loc[*at] = (MUMPS_INT)(row0 + r + 1);
+        d->id.jcn_loc[*at] = (MUMPS_INT)(col0 + cols[k] + 1);
+      }
+      if (d->id.a_loc) d->id.a_loc[*at] = vals[k];
+      (*at)++;
+    }
+    PetscCall(MatRestoreRow(A, r, &n, &cols, &vals));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AllEntries(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool pattern)
+{
+  MUMPS_INT8 at = 0;
+
+  PetscFunctionBegin;
+  PetscCall(Entries(d, K, 0, 0, pattern, &at));
+  if (B) PetscCall(Entries(d, B, d->n, 0, pattern, &at));
+  if (B && !d->symmetric) PetscCall(Entries(d, Bt, 0, d->n, pattern, &at));
+  d->id.nnz_loc = at;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Room for every entry, whether kept or not. */
+static PetscErrorCode CountEntries(Mat K, Mat Bt, Mat B, size_t *n)
+{
+  const Mat all[3] = {K, Bt, B};
+
+  PetscFunctionBegin;
+  *n = 1;
+  for (int k = 0; k < 3; k++) {
+    MatInfo info;
+
+    if (!all[k]) continue;
+    PetscCall(MatGetInfo(all[k], MAT_LOCAL, &info));
+    *n += (size_t)info.nz_used;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The order of elimination: nested dissection, the pinned unknowns and the forces last. On rank 0. */
+static PetscErrorCode PlaceLast(HycoDirect d, const PetscInt place[])
+{
+  PetscInt *at, next = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(d->n, &at));
+  PetscCall(PetscMalloc1(d->n + d->m, &d->id.perm_in));
+  for (PetscInt i = 0; i < d->n; i++) at[place[i]] = i;
+  for (PetscInt k = 0; k < d->n_pinned; k++) at[place[d->pinned[k]]] = -1;
+  for (PetscInt p = 0; p < d->n; p++) {
+    if (at[p] >= 0) d->id.perm_in[at[p]] = (MUMPS_INT)(++next);
+  }
+  for (PetscInt k = 0; k < d->n_pinned; k++) d->id.perm_in[d->pinned[k]] = (MUMPS_INT)(++next);
+  for (PetscInt k = 0; k < d->m; k++) d->id.perm_in[d->n + k] = (MUMPS_INT)(++next);
+  PetscCall(PetscFree(at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Order(HycoDirect d, Mat K)
+{
+  PetscInt *place = NULL;
+
+  PetscFunctionBegin;
+  if (!d->symmetric) PetscFunctionReturn(PETSC_SUCCESS); /* MUMPS chooses */
+  if (d->rank == 0) PetscCall(PetscMalloc1(d->n, &place));
+  PetscCall(HycoDissection(d->comm, K, place));
+  if (d->rank == 0) PetscCall(PlaceLast(d, place));
+  PetscCall(PetscFree(place));
+  ICNTL(d, 7) = 1; /* the order is given */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -hyco_mumps_icntl_K and -hyco_mumps_cntl_K, MUMPS's own controls. */
+static PetscErrorCode ReadControls(HycoDirect d)
+{
+  PetscFunctionBegin;
+  for (int k = 1; k <= 58; k++) {
+    char name[32];
+    PetscInt i = ICNTL(d, k);
+    PetscReal r;
+
+    PetscCall(PetscSNPrintf(name, sizeof(name), "-icntl_%d", k));
+    PetscCall(PetscOptionsGetInt(NULL, "hyco_mumps_", name, &i, NULL));
+    ICNTL(d, k) = (MUMPS_INT)i;
+    if (k > 15) continue;
+    r = d->id.cntl[k - 1];
+    PetscCall(PetscSNPrintf(name, sizeof(name), "-cntl_%d", k));
+    PetscCall(PetscOptionsGetReal(NULL, "hyco_mumps_", name, &r, NULL));
+    d->id.cntl[k - 1] = r;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Begin(HycoDirect d)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(&d->id, sizeof(d->id)));
+  d->id.comm_fortran = (MUMPS_INT)MPI_Comm_c2f(d->comm);
+  d->id.par = 1;
+  d->id.sym = d->symmetric ? 1 : 0;
+  Call(d, BEGIN);
+  PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB, "MUMPS could not start (INFOG(1) = %d)", (int)INFOG(d, 1));
+  d->begun = PETSC_TRUE;
+  ICNTL(d, 1) = ICNTL(d, 2) = ICNTL(d, 3) = -1; /* quiet */
+  ICNTL(d, 4) = 0;
+  ICNTL(d, 14) = 50; /* per cent more workspace than estimated */
+  ICNTL(d, 18) = 3;  /* entries where they are */
+  ICNTL(d, 28) = 1;  /* analysis on one process */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The Schur variables, their matrix centralised by rows. */
+static PetscErrorCode DeclareSchur(HycoDirect d)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(d->n_schur + 1, &d->id.listvar_schur));
+  for (PetscInt k = 0; k < d->n_pinned; k++) d->id.listvar_schur[k] = (MUMPS_INT)(d->pinned[k] + 1);
+  for (PetscInt k = 0; k < d->m; k++) d->id.listvar_schur[d->n_pinned + k] = (MUMPS_INT)(d->n + k + 1);
+  d->id.size_schur = (MUMPS_INT)d->n_schur;
+  ICNTL(d, 19) = d->n_schur ? 1 : 0;
+  d->id.nprow = d->id.npcol = 1;
+  d->id.mblock = d->id.nblock = 100;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Analyse(HycoDirect d, Mat K, Mat Bt, Mat B)
+{
+  size_t room;
+  Vec x;
+
+  PetscFunctionBegin;
+  PetscCall(Begin(d));
+  PetscCall(CountEntries(K, d->symmetric ? NULL : Bt, B, &room));
+  PetscCall(PetscMalloc1(room, &d->id.irn_loc));
+  PetscCall(PetscMalloc1(room, &d->id.jcn_loc));
+  PetscCall(AllEntries(d, K, Bt, B, PETSC_TRUE));
+  d->id.n = (MUMPS_INT)(d->n + d->m);
+  PetscCall(DeclareSchur(d));
+  PetscCall(Order(d, K));
+  PetscCall(ReadControls(d));
+  Call(d, ANALYSE);
+  PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB, "MUMPS could not analyse K (INFOG(1) = %d, INFOG(2) = %d)",
+             (int)INFOG(d, 1), (int)INFOG(d, 2));
+  PetscCall(PetscFree(d->id.perm_in));
+  PetscCall(MatCreateVecs(K, &x, NULL));
+  PetscCall(VecScatterCreateToZero(x, &d->to_root, &d->root));
+  PetscCall(VecDestroy(&x));
+  if (d->rank == 0) {
+    PetscCall(PetscMalloc1(d->n + d->m, &d->rhs));
+    PetscCall(PetscMalloc1(d->n_schur + 1, &d->reduced));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether K and B have the pattern that was analysed; then remember it. */
+static PetscErrorCode SamePattern(HycoDirect d, Mat K, Mat B, PetscBool *same)
+{
+  PetscObjectId K_id, B_id = 0;
+  PetscObjectState K_pattern, B_pattern = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetId((PetscObject)K, &K_id));
+  PetscCall(MatGetNonzeroState(K, &K_pattern));
+  if (B) {
+    PetscCall(PetscObjectGetId((PetscObject)B, &B_id));
+    PetscCall(MatGetNonzeroState(B, &B_pattern));
+  }
+  *same = (PetscBool)(d->begun && d->K_id == K_id && d->B_id == B_id && d->K_pattern == K_pattern &&
+                      d->B_pattern == B_pattern);
+  if (!*same) PetscCall(Release(d));
+  d->K_id = K_id;
+  d->B_id = B_id;
+  d->K_pattern = K_pattern;
+  d->B_pattern = B_pattern;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectAnalyse(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool symmetric, PetscReal *bytes)
+{
+  PetscBool same = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (symmetric != d->symmetric) PetscCall(Release(d));
+  PetscCall(SamePattern(d, K, B, &same));
+  if (!same) {
+    PetscCall(MatGetSize(K, &d->n, NULL));
+    d->m = 0;
+    if (B) PetscCall(MatGetSize(B, &d->m, NULL));
+    d->symmetric = symmetric;
+    d->n_schur = d->n_pinned + d->m;
+    PetscCall(Analyse(d, K, Bt, B));
+  }
+  *bytes = 1e6 * (PetscReal)INFOG(d, 17) + 8. * (PetscReal)d->n_schur * (PetscReal)d->n_schur;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rank 0's Schur complement (by rows; the lower triangle when symmetric) to M on every rank, by columns. */
+static PetscErrorCode SpreadSchur(HycoDirect d, PetscReal M[])
+{
+  const size_t n = (size_t)d->n_schur;
+
+  PetscFunctionBegin;
+  for (size_t i = 0; i < n && d->rank == 0; i++) {
+    for (size_t j = 0; j < i; j++) {
+      const PetscReal lower = M[i * n + j], upper = d->symmetric ? lower : M[j * n + i];
+
+      M[j * n + i] = lower;
+      M[i * n + j] = upper;
+    }
+  }
+  for (size_t j = 0; j < n && d->rank == 0; j++) {
+    for (size_t i = (size_t)d->n_pinned; i < n; i++) M[j * n + i] = -M[j * n + i];
+  }
+  for (size_t j = 0; j < n; j++) PetscCallMPI(MPI_Bcast(M + j * n, (PetscMPIInt)n, MPIU_REAL, 0, d->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[], PetscBool *singular)
+{
+  PetscFunctionBegin;
+  PetscCheck(d->begun, d->comm, PETSC_ERR_ORDER, "call HycoDirectAnalyse() before HycoDirectFactor()");
+  PetscCall(PetscMalloc1((size_t)d->id.nnz_loc + 1, &d->id.a_loc));
+  PetscCall(AllEntries(d, K, Bt, B, PETSC_FALSE));
+  if (d->rank == 0) d->id.schur = M;
+  d->id.schur_lld = (MUMPS_INT)d->n_schur;
+  for (;;) {
+    Call(d, FACTOR);
+    /* -8, -9 and their like: the workspace was underestimated */
+    if ((INFOG(d, 1) != -8 && INFOG(d, 1) != -9 && INFOG(d, 1) != -17 && INFOG(d, 1) != -20) || ICNTL(d, 14) > 3000)
+      break;
+    ICNTL(d, 14) *= 4;
+  }
+  PetscCall(PetscFree(d->id.a_loc));
+  *singular = (PetscBool)(INFOG(d, 1) == -10);
+  PetscCheck(
+      INFOG(d, 1) != -13, d->comm, PETSC_ERR_USER,
+      "the factor of the stiffness does not fit in memory (%d MB estimated); use -hyco_linear iterative, or more "
+      "ranks on more machines",
+      (int)INFOG(d, 17));
+  PetscCheck(INFOG(d, 1) >= 0 || *singular, d->comm, PETSC_ERR_LIB,
+             "MUMPS could not factor K (INFOG(1) = %d, INFOG(2) = %d)", (int)INFOG(d, 1), (int)INFOG(d, 2));
+  if (!*singular) PetscCall(SpreadSchur(d, M));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A distributed vector of n unknowns to rank 0's right-hand side, or back. */
+static PetscErrorCode Fetch(HycoDirect d, Vec v)
+{
+  const PetscScalar *r;
+
+  PetscFunctionBegin;
+  PetscCall(VecScatterBegin(d->to_root, v, d->root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(d->to_root, v, d->root, INSERT_VALUES, SCATTER_FORWARD));
+  if (d->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(d->root, &r));
+  PetscCall(PetscArraycpy(d->rhs, r, d->n));
+  PetscCall(VecRestoreArrayRead(d->root, &r));
+  d->id.rhs = d->rhs;
+  d->id.nrhs = 1;
+  d->id.lrhs = d->id.n;
+  d->id.redrhs = d->reduced;
+  d->id.lredrhs = d->id.size_schur;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Deliver(HycoDirect d, Vec v)
+{
+  PetscScalar *r;
+
+  PetscFunctionBegin;
+  if (d->rank == 0) {
+    PetscCall(VecGetArray(d->root, &r));
+    PetscCall(PetscArraycpy(r, d->rhs, d->n));
+    PetscCall(VecRestoreArray(d->root, &r));
+  }
+  PetscCall(VecScatterBegin(d->to_root, d->root, v, INSERT_VALUES, SCATTER_REVERSE));
+  PetscCall(VecScatterEnd(d->to_root, d->root, v, INSERT_VALUES, SCATTER_REVERSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Run(HycoDirect d, int part)
+{
+  PetscFunctionBegin;
+  ICNTL(d, 26) = part;
+  Call(d, SOLVE);
+  PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB, "MUMPS could not solve (INFOG(1) = %d, INFOG(2) = %d)",
+             (int)INFOG(d, 1), (int)INFOG(d, 2));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectReduce(HycoDirect d, Vec F, const PetscReal D[], PetscReal q[])
+{
+  PetscFunctionBegin;
+  PetscCall(Fetch(d, F));
+  if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs + d->n, D, d->m));
+  PetscCall(Run(d, 1));
+  for (PetscInt k = 0; k < d->n_schur && d->rank == 0; k++) q[k] = k < d->n_pinned ? -d->reduced[k] : d->reduced[k];
+  PetscCallMPI(MPI_Bcast(q, (PetscMPIInt)d->n_schur, MPIU_REAL, 0, d->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectExpand(HycoDirect d, const PetscReal z[], Vec x)
+{
+  PetscFunctionBegin;
+  if (d->rank == 0) PetscCall(PetscArraycpy(d->reduced, z, d->n_schur));
+  PetscCall(Run(d, 2));
+  PetscCall(Deliver(d, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectSolve(HycoDirect d, Vec r, Vec x)
+{
+  PetscFunctionBegin;
+  PetscCall(Fetch(d, r));
+  if (d->rank == 0) PetscCall(PetscArrayzero(d->rhs + d->n, d->m));
+  PetscCall(Run(d, 0));
+  for (PetscInt k = 0; k < d->n_pinned && d->rank == 0; k++) d->rhs[d->pinned[k]] = 0;
+  PetscCall(Deliver(d, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,119 @@
+/*
+  The iterative solver of the primal form, for stiffnesses whose factor does not fit: conjugate gradients with smoothed
+  aggregation (PETSc's GAMG), which knows the rigid motions in gap coordinates. -hyco_primal_pc_type hypre takes
+  BoomerAMG instead.
+*/
+#include <hycosolverimpl.h>
+
+/* y = T^-1 x: each pivot holds its contact's B x. */
+static PetscErrorCode ToGaps(Mat B, const PetscInt pivot[], Vec x, Vec y)
+{
+  PetscInt m, lo;
+  Vec gap;
+  const PetscScalar *g;
+
+  PetscFunctionBegin;
+  PetscCall(VecCopy(x, y));
+  PetscCall(MatCreateVecs(B, NULL, &gap));
+  PetscCall(MatMult(B, x, gap));
+  PetscCall(VecGetLocalSize(gap, &m));
+  PetscCall(VecGetOwnershipRange(gap, &lo, NULL));
+  PetscCall(VecGetArrayRead(gap, &g));
+  for (PetscInt k = 0; k < m; k++) PetscCall(VecSetValue(y, pivot[k], g[k], INSERT_VALUES));
+  PetscCall(VecRestoreArrayRead(gap, &g));
+  PetscCall(VecAssemblyBegin(y));
+  PetscCall(VecAssemblyEnd(y));
+  PetscCall(VecDestroy(&gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGapNearKernel(HycoSystem s, const PetscInt pivot[], Mat Kw)
+{
+  MatNullSpace near = NULL, mine;
+  PetscBool constant;
+  PetscInt n;
+  const Vec *x;
+  Vec *y;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetNearNullSpace(s->K, &near));
+  if (!near) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatNullSpaceGetVecs(near, &constant, &n, &x));
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicateVecs(x[0], n, &y));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(ToGaps(s->B, pivot, x[k], y[k]));
+    for (PetscInt j = 0; j < k; j++) {
+      PetscScalar dot;
+
+      PetscCall(VecDot(y[k], y[j], &dot));
+      PetscCall(VecAXPY(y[k], -dot, y[j]));
+    }
+    PetscCall(VecNormalize(y[k], NULL));
+  }
+  PetscCall(MatNullSpaceCreate(s->comm, PETSC_FALSE, n, y, &mine));
+  PetscCall(MatSetNearNullSpace(Kw, mine));
+  PetscCall(MatNullSpaceDestroy(&mine));
+  PetscCall(VecDestroyVecs(n, &y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoIterativeSolver(MPI_Comm comm, const char prefix[], Mat K, KSP *ksp)
+{
+  PC pc;
+
+  PetscFunctionBegin;
+  PetscCall(KSPCreate(comm, ksp));
+  PetscCall(KSPSetOptionsPrefix(*ksp, prefix));
+  PetscCall(KSPSetOperators(*ksp, K, K));
+  PetscCall(KSPSetType(*ksp, KSPCG));
+  PetscCall(KSPSetInitialGuessNonzero(*ksp, PETSC_TRUE));
+  PetscCall(KSPSetTolerances(*ksp, 1e-11, 1e-300, 1e10, 2000));
+  PetscCall(KSPGetPC(*ksp, &pc));
+  PetscCall(PCSetType(pc, PCGAMG));
+  PetscCall(PCGAMGSetType(pc, PCGAMGAGG));
+  PetscCall(PCGAMGSetReuseInterpolation(pc, PETSC_TRUE));
+  PetscCall(KSPSetFromOptions(*ksp));
+  PetscCall(KSPSetErrorIfNotConverged(*ksp, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
+{
+  KSPType method;
+  PCType pc;
+  MatSolverType package = NULL;
+  PC handle;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetType(ksp, &method));
+  PetscCall(KSPGetPC(ksp, &handle));
+  PetscCall(PCGetType(handle, &pc));
+  if (!s->iterative) PetscCall(PCFactorGetMatSolverType(handle, &package));
+  if (package)
+    PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: %s by %s", pc, package));
+  else
+    PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "iterative: %s with %s%s", method, pc,
+                            s->why_iterative));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolveIterative(HycoSolver s, Vec x, PetscBool *solved)
+{
+  KSPConvergedReason why;
+  PetscBool same;
+
+  PetscFunctionBegin;
+  PetscCall(PetscStrncpy(s->method, "linear", sizeof(s->method)));
+  PetscCall(HycoSeenUpdate(&s->transformed, s->system->K, NULL, &same));
+  if (!same) {
+    PetscCall(KSPDestroy(&s->ksp_gap));
+    PetscCall(HycoIterativeSolver(s->comm, "hyco_primal_", s->system->K, &s->ksp_gap));
+  }
+  PetscCall(VecSet(x, 0));
+  PetscCall(KSPSolve(s->ksp_gap, s->system->F, x));
+  PetscCall(KSPGetConvergedReason(s->ksp_gap, &why));
+  PetscCall(HycoNameLinear(s, s->ksp_gap));
+  *solved = (PetscBool)(why > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,91 @@
+/*
+  A singular K: bodies that contact alone holds. The user of the system attaches the kernel (MatSetNullSpace()). As many
+  unknowns as it has motions, chosen so that K without them is well conditioned, are left to the dense problem.
+*/
+#include <hycosolverimpl.h>
+
+PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
+{
+  MatNullSpace kernel = NULL;
+  PetscBool constant = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *n = 0;
+  PetscCall(MatGetNullSpace(K, &kernel));
+  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, &constant, n, NULL));
+  PetscCheck(!constant, PetscObjectComm((PetscObject)K), PETSC_ERR_SUP,
+             "give the kernel of K by vectors alone (MatNullSpaceCreate() without the constant)");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* This rank's rows of the kernel, row major. */
+static PetscErrorCode Rows(Mat K, PetscInt n, PetscInt *rows, PetscReal **row)
+{
+  MatNullSpace kernel;
+  const Vec *v;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetNullSpace(K, &kernel));
+  PetscCall(MatNullSpaceGetVecs(kernel, NULL, NULL, &v));
+  PetscCall(MatGetLocalSize(K, rows, NULL));
+  PetscCall(PetscMalloc1(*rows * n, row));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscScalar *a;
+
+    PetscCall(VecGetArrayRead(v[k], &a));
+    for (PetscInt i = 0; i < *rows; i++) (*row)[i * n + k] = a[i];
+    PetscCall(VecRestoreArrayRead(v[k], &a));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The unknown whose row is longest, the lowest among equals; its row, of length 1, on every rank. */
+static PetscErrorCode Longest(MPI_Comm comm, PetscInt first, PetscInt rows, PetscInt n, const PetscReal row[],
+                              PetscInt *at, PetscReal unit[])
+{
+  PetscReal best = 0, largest;
+  PetscInt mine = PETSC_MAX_INT;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < rows; i++) {
+    PetscReal size = 0;
+
+    for (PetscInt k = 0; k < n; k++) size += row[i * n + k] * row[i * n + k];
+    if (size > best * (1 + 1e-10)) {
+      best = size;
+      mine = first + i;
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(&best, &largest, 1, MPIU_REAL, MPI_MAX, comm));
+  if (best < largest * (1 - 1e-10)) mine = PETSC_MAX_INT;
+  PetscCallMPI(MPI_Allreduce(&mine, at, 1, MPIU_INT, MPI_MIN, comm));
+  for (PetscInt k = 0; k < n; k++)
+    unit[k] = *at >= first && *at < first + rows ? row[(*at - first) * n + k] / PetscSqrtReal(largest) : 0;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, unit, (PetscMPIInt)n, MPIU_REAL, MPI_SUM, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[])
+{
+  PetscInt rows, first;
+  PetscReal *row, *unit;
+
+  PetscFunctionBegin;
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetOwnershipRange(K, &first, NULL));
+  PetscCall(Rows(K, n, &rows, &row));
+  PetscCall(PetscMalloc1(n, &unit));
+  for (PetscInt p = 0; p < n; p++) { /* pivoted Gram-Schmidt on the rows */
+    PetscCall(Longest(comm, first, rows, n, row, &pinned[p], unit));
+    for (PetscInt i = 0; i < rows; i++) {
+      PetscReal dot = 0;
+
+      for (PetscInt k = 0; k < n; k++) dot += row[i * n + k] * unit[k];
+      for (PetscInt k = 0; k < n; k++) row[i * n + k] -= dot * unit[k];
+    }
+  }
+  PetscCall(PetscSortInt(n, pinned));
+  PetscCall(PetscFree(row));
+  PetscCall(PetscFree(unit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,293 @@
+/*
+  Lemke's complementary pivoting for w = q + M z >= 0, z >= 0, w.z = 0: C. E. Lemke, Management Sci. 11 (1965) 681-689,
+  with the lexicographic rule of Cottle, Pang, Stone, The Linear Complementarity Problem (1992), section 4.4; finite
+  whenever M is a P-matrix or copositive plus.
+
+  The covering vector of the artificial variable is not (1, ..., 1): along it Murty's matrices take 2^n pivots, along a
+  vector without pattern a few.
+
+  The dictionary holds the nonbasic columns alone, basic = value + T nonbasic; the inverse basis that the lexicographic
+  rule compares are those of its columns that belong to a w. A pivot is a change of rank one; CHUNK of them wait in U, V
+  (T stands for T - U V^T) and are applied by one matrix product, so that a pivot costs a column and a row, not a pass
+  over the whole dictionary. The last basis is solved afresh: its round-off is that of one solve, not of all pivots.
+*/
+#include <hycosolverimpl.h>
+#include <petscblaslapack.h>
+
+#define CHUNK 48
+
+/* Variables by number: w_i is i, z_i is n + i, the artificial z0 is 2 n. */
+typedef struct {
+  PetscInt n, waiting;
+  PetscReal *T, *U, *V;            /* column major: n x (n + 1), n x CHUNK, (n + 1) x CHUNK */
+  PetscReal *value, *column, *row; /* of the basic variables (n); of the pivot (n, n + 1) */
+  PetscInt *basic, *nonbasic;      /* variable of each row (n), of each column (n + 1) */
+  PetscInt *where;                 /* of each variable (2 n + 1): its row i as i, its column j as -1 - j */
+  PetscInt *tied;
+} Dictionary;
+
+/* Entry i of the covering vector, in [1, 2): multiples of the golden ratio, without their whole part. */
+static PetscReal Cover(PetscInt i)
+{
+  const PetscReal x = 0.6180339887498949 * (PetscReal)(i + 1);
+
+  return 1 + x - PetscFloorReal(x);
+}
+
+static PetscErrorCode DictionaryCreate(PetscInt n, const PetscReal M[], const PetscReal q[], PetscReal size_M,
+                                       PetscReal size_q, Dictionary *d)
+{
+  PetscFunctionBegin;
+  d->n = n;
+  d->waiting = 0;
+  PetscCall(PetscMalloc3((size_t)n * (size_t)(n + 1), &d->T, n * CHUNK, &d->U, (n + 1) * CHUNK, &d->V));
+  PetscCall(PetscMalloc3(n, &d->value, n, &d->column, n + 1, &d->row));
+  PetscCall(PetscMalloc4(n, &d->basic, n + 1, &d->nonbasic, 2 * n + 1, &d->where, n, &d->tied));
+  for (size_t k = 0; k < (size_t)n * (size_t)n; k++) d->T[k] = M[k] / size_M;
+  for (PetscInt i = 0; i < n; i++) {
+    d->T[(size_t)n * (size_t)n + (size_t)i] = Cover(i);
+    d->value[i] = q[i] / size_q;
+    d->basic[i] = d->where[i] = i;
+    d->nonbasic[i] = n + i;
+    d->where[n + i] = -1 - i;
+  }
+  d->nonbasic[n] = 2 * n;
+  d->where[2 * n] = -1 - n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode DictionaryDestroy(Dictionary *d)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree3(d->T, d->U, d->V));
+  PetscCall(PetscFree3(d->value, d->column, d->row));
+  PetscCall(PetscFree4(d->basic, d->nonbasic, d->where, d->tied));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal Entry(const Dictionary *d, PetscInt i, PetscInt j)
+{
+  const size_t n = (size_t)d->n;
+  PetscReal sum = d->T[(size_t)j * n + (size_t)i];
+
+  for (PetscInt k = 0; k < d->waiting; k++)
+    sum -= d->U[(size_t)k * n + (size_t)i] * d->V[(size_t)k * (n + 1) + (size_t)j];
+  return sum;
+}
+
+/* column = T[:,j] */
+static PetscErrorCode FetchColumn(Dictionary *d, PetscInt j)
+{
+  PetscBLASInt n, cols, k, one = 1;
+  const PetscReal plus = 1, minus = -1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(d->n, &n));
+  PetscCall(PetscBLASIntCast(d->n + 1, &cols));
+  PetscCall(PetscBLASIntCast(d->waiting, &k));
+  PetscCall(PetscArraycpy(d->column, d->T + (size_t)j * (size_t)n, n));
+  if (k) BLASgemv_("N", &n, &k, &minus, d->U, &n, d->V + j, &cols, &plus, d->column, &one);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* row = T[i,:] */
+static PetscErrorCode FetchRow(Dictionary *d, PetscInt i)
+{
+  PetscBLASInt n, cols, k, one = 1;
+  const PetscReal plus = 1, minus = -1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(d->n, &n));
+  PetscCall(PetscBLASIntCast(d->n + 1, &cols));
+  PetscCall(PetscBLASIntCast(d->waiting, &k));
+  for (PetscInt j = 0; j < cols; j++) d->row[j] = d->T[(size_t)j * (size_t)n + (size_t)i];
+  if (k) BLASgemv_("N", &cols, &k, &minus, d->V, &cols, d->U + i, &n, &plus, d->row, &one);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Apply(Dictionary *d)
+{
+  PetscBLASInt n, cols, k;
+  const PetscReal plus = 1, minus = -1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(d->n, &n));
+  PetscCall(PetscBLASIntCast(d->n + 1, &cols));
+  PetscCall(PetscBLASIntCast(d->waiting, &k));
+  if (k) BLASgemm_("N", "T", &n, &cols, &k, &minus, d->U, &n, d->V, &cols, &plus, d->T, &n);
+  d->waiting = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The variable of column c becomes basic in row r; d->column holds T[:,c]. Row and column are stored, the rest waits.
+ */
+static PetscErrorCode Pivot(Dictionary *d, PetscInt r, PetscInt c)
+{
+  const PetscInt n = d->n, enters = d->nonbasic[c], leaves = d->basic[r];
+  const PetscReal p = d->column[r], step = -d->value[r] / p;
+
+  PetscFunctionBegin;
+  PetscCall(FetchRow(d, r));
+  for (PetscInt k = 0; k < d->waiting; k++)
+    d->U[(size_t)k * (size_t)n + (size_t)r] = d->V[(size_t)k * (size_t)(n + 1) + (size_t)c] = 0;
+  for (PetscInt j = 0; j <= n; j++) d->T[(size_t)j * (size_t)n + (size_t)r] = -d->row[j] / p;
+  for (PetscInt i = 0; i < n; i++) {
+    d->T[(size_t)c * (size_t)n + (size_t)i] = d->column[i] / p;
+    d->value[i] += d->column[i] * step;
+  }
+  d->T[(size_t)c * (size_t)n + (size_t)r] = 1 / p;
+  d->value[r] = step;
+  d->column[r] = 0;
+  d->row[c] = 0;
+  PetscCall(PetscArraycpy(d->U + (size_t)d->waiting * (size_t)n, d->column, n));
+  for (PetscInt j = 0; j <= n; j++) d->V[(size_t)d->waiting * (size_t)(n + 1) + (size_t)j] = d->row[j] / p;
+  if (++d->waiting == CHUNK) PetscCall(Apply(d));
+  d->basic[r] = enters;
+  d->where[enters] = r;
+  d->nonbasic[c] = leaves;
+  d->where[leaves] = -1 - c;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of the n_tied rows that leave together, the lexicographically least row of the inverse basis over the pivot. */
+static PetscInt BreakTie(const Dictionary *d, PetscInt n_tied)
+{
+  PetscInt *tied = d->tied;
+
+  for (PetscInt t = 0; t < n_tied; t++) {
+    if (d->basic[tied[t]] == 2 * d->n) return tied[t]; /* the artificial variable leaves when it may */
+  }
+  for (PetscInt w = 0; w < d->n && n_tied > 1; w++) {
+    PetscReal least = PETSC_MAX_REAL;
+    PetscInt left = 0;
+
+    for (PetscInt pass = 0; pass < 2; pass++) {
+      for (PetscInt t = 0; t < n_tied; t++) {
+        const PetscInt i = tied[t];
+        const PetscReal inverse = d->where[w] < 0 ? -Entry(d, i, -1 - d->where[w]) : d->where[w] == i;
+        const PetscReal x = -inverse / d->column[i];
+
+        if (pass == 0) least = PetscMin(least, x);
+        if (pass == 1 && x <= least + 1e-11 * PetscMax(1, PetscAbsReal(least))) tied[left++] = i;
+      }
+    }
+    n_tied = left;
+  }
+  return tied[0];
+}
+
+/* The row that leaves when the variable of d->column grows: the first whose value reaches 0; -1: none does. */
+static PetscInt Leaving(Dictionary *d)
+{
+  PetscReal size = 0, largest = 0, step = PETSC_MAX_REAL;
+  PetscInt n_tied = 0;
+
+  for (PetscInt i = 0; i < d->n; i++) {
+    size = PetscMax(size, PetscAbsReal(d->column[i]));
+    largest = PetscMax(largest, PetscAbsReal(d->value[i]));
+  }
+  for (PetscInt i = 0; i < d->n; i++) {
+    if (d->column[i] < -1e-11 * size) step = PetscMin(step, PetscMax(d->value[i], 0) / -d->column[i]);
+  }
+  for (PetscInt i = 0; i < d->n; i++) {
+    if (d->column[i] < -1e-11 * size && d->value[i] + step * d->column[i] <= 1e-13 * largest) d->tied[n_tied++] = i;
+  }
+  return n_tied ? BreakTie(d, n_tied) : -1;
+}
+
+/* The pivots from the first, in row `row`, to the end. */
+static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscInt *its, HycoLCPStatus *status)
+{
+  const PetscInt n = d->n;
+  PetscInt col = n;
+
+  PetscFunctionBegin;
+  PetscCall(FetchColumn(d, n));
+  *status = HYCO_LCP_LIMIT;
+  for (; *its < max_its; (*its)++) {
+    const PetscInt left = d->basic[row];
+
+    PetscCall(Pivot(d, row, col));
+    if (left == 2 * n) {
+      *status = HYCO_LCP_SOLVED;
+      break;
+    }
+    col = -1 - d->where[left < n ? left + n : left - n]; /* the complement of what left enters */
+    PetscCall(FetchColumn(d, col));
+    row = Leaving(d);
+    if (row < 0) {
+      *status = HYCO_LCP_RAY;
+      break;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Largest violation of w >= 0 over the size of q, and of z >= 0 over that of z. */
+static PetscReal Violation(PetscInt n, const PetscReal M[], const PetscReal q[], const PetscReal z[])
+{
+  PetscReal worst = 0, size_q = 0, size_z = 0, least_z = 0;
+
+  for (PetscInt i = 0; i < n; i++) {
+    PetscReal w = q[i];
+
+    for (PetscInt j = 0; j < n; j++) {
+      if (z[j] != 0) w += M[(size_t)j * (size_t)n + (size_t)i] * z[j];
+    }
+    worst = PetscMax(worst, z[i] > 0 ? PetscAbsReal(w) : -w);
+    size_q = PetscMax(size_q, PetscAbsReal(q[i]));
+    size_z = PetscMax(size_z, PetscAbsReal(z[i]));
+    least_z = PetscMin(least_z, z[i]);
+  }
+  return PetscMax(worst / size_q, size_z > 0 ? -least_z / size_z : 0);
+}
+
+/* z of the last basis: as the pivots left it, or solved afresh, whichever violates less. */
+static PetscErrorCode Unpack(const Dictionary *d, const PetscReal M[], const PetscReal q[], PetscReal scale,
+                             PetscReal z[])
+{
+  PetscInt *a, k = 0;
+  PetscReal *fresh;
+  PetscBool singular;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(d->n, &a, d->n, &fresh));
+  for (PetscInt i = 0; i < d->n; i++) {
+    z[i] = 0;
+    if (d->where[d->n + i] < 0) continue;
+    z[i] = PetscMax(d->value[d->where[d->n + i]], 0) * scale;
+    if (z[i] > 0) a[k++] = i;
+  }
+  PetscCall(HycoLCPSolveOnSet(d->n, M, q, PETSC_FALSE, &k, a, fresh, &singular));
+  if (!singular && Violation(d->n, M, q, fresh) < Violation(d->n, M, q, z)) {
+    for (PetscInt i = 0; i < d->n; i++) z[i] = PetscMax(fresh[i], 0);
+  }
+  PetscCall(PetscFree2(a, fresh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt max_its, PetscReal z[],
+                            PetscInt *its, HycoLCPStatus *status)
+{
+  Dictionary d;
+  PetscInt row = -1;
+  PetscReal size_M = 0, size_q = 0;
+
+  PetscFunctionBegin;
+  *its = 0;
+  *status = HYCO_LCP_SOLVED;
+  PetscCall(PetscArrayzero(z, n));
+  for (PetscInt i = 0; i < n; i++) {
+    size_M = PetscMax(size_M, PetscAbsReal(M[(size_t)i * (size_t)n + (size_t)i]));
+    size_q = PetscMax(size_q, PetscAbsReal(q[i]));
+    if (q[i] < 0 && (row < 0 || q[i] / Cover(i) <= q[row] / Cover(row)))
+      row = i; /* of equal ones the last: lexicographic */
+  }
+  if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (size_M == 0) size_M = 1;
+  PetscCall(DictionaryCreate(n, M, q, size_M, size_q, &d));
+  PetscCall(Run(&d, row, max_its, its, status));
+  if (*status == HYCO_LCP_SOLVED) PetscCall(Unpack(&d, M, q, size_q / size_M, z));
+  PetscCall(DictionaryDestroy(&d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

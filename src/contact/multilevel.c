@@ -1,0 +1,464 @@
+/*
+  Where the active set starts when most unknowns are contacts: nested iteration. From no contact, the edges of a contact
+  zone move by about one node an iteration, so that their number grows with the mesh. Coarser problems, made from the
+  matrix alone, are solved first, each from the set of the coarser one; then an edge is off by a few nodes at most.
+
+  Coarsening is classical: a maximal independent set of the strong couplings, taken breadth first, stays; the others are
+  interpolated from it (J. Ruge, K. Stueben, Algebraic multigrid, in: Multigrid methods, SIAM 1987: direct
+  interpolation); the coarse matrix is P^T K P. Coarse unknowns are unknowns of the finer level, so that their bounds
+  are too. All of this needs couplings of one sign, K_ij <= 0 off the diagonal once some unknowns are counted negative:
+  membranes and ropes have them. Elasticity in 2D and 3D does not, and then no start is offered.
+
+  The levels live on rank 0: together they take as much room as the finest one.
+*/
+#include <hycosolverimpl.h>
+
+/* The coarsest problem is solved from no contact at all. */
+#define HYCO_COARSEST   24
+#define HYCO_MAX_LEVELS 64
+/* A coarse problem is only a start: this many iterations without an end are enough. */
+#define HYCO_LEVEL_ITS 40
+/* A coupling is strong above this part of the row's largest. */
+#define HYCO_STRONG 0.25
+
+typedef struct {
+  PetscInt n;
+  Mat K, P; /* P: from the next coarser level */
+  Vec f;
+  PetscReal *bound;    /* PETSC_INFINITY: none */
+  PetscBool *active;   /* at its bound */
+  PetscInt *coarse_of; /* number in the next coarser level, -1: interpolated from it */
+} Level;
+
+/* The rows of a sequential matrix, borrowed. */
+typedef struct {
+  Mat K;
+  PetscInt n;
+  const PetscInt *start, *col;
+  const PetscScalar *value;
+} Rows;
+
+static PetscErrorCode RowsGet(Mat K, Rows *r)
+{
+  PetscBool done;
+
+  PetscFunctionBegin;
+  r->K = K;
+  PetscCall(MatGetRowIJ(K, 0, PETSC_FALSE, PETSC_FALSE, &r->n, &r->start, &r->col, &done));
+  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_SUP, "the matrix shows no rows");
+  PetscCall(MatSeqAIJGetArrayRead(K, &r->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode RowsRestore(Rows *r)
+{
+  PetscBool done;
+
+  PetscFunctionBegin;
+  PetscCall(MatSeqAIJRestoreArrayRead(r->K, &r->value));
+  PetscCall(MatRestoreRowIJ(r->K, 0, PETSC_FALSE, PETSC_FALSE, &r->n, &r->start, &r->col, &done));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Counts unknowns without a bound negative where that makes all couplings <= 0: sign[i] = 1 or -1. */
+static PetscErrorCode FindSigns(const Rows *r, const PetscReal bound[], PetscReal sign[], PetscBool *found)
+{
+  PetscInt *queue;
+
+  PetscFunctionBegin;
+  *found = PETSC_TRUE;
+  PetscCall(PetscMalloc1(r->n, &queue));
+  for (PetscInt i = 0; i < r->n; i++) sign[i] = 0;
+  for (PetscInt pass = 0; pass < 2; pass++) { /* from the bounded ones, then what they do not reach */
+    for (PetscInt s = 0; s < r->n; s++) {
+      PetscInt head = 0, tail = 0;
+
+      if (sign[s] != 0 || (pass == 0 && bound[s] >= PETSC_INFINITY)) continue;
+      sign[s] = 1;
+      queue[tail++] = s;
+      while (head < tail) {
+        const PetscInt i = queue[head++];
+
+        for (PetscInt k = r->start[i]; k < r->start[i + 1]; k++) {
+          const PetscInt j = r->col[k];
+
+          if (j == i || r->value[k] == 0 || sign[j] != 0) continue;
+          sign[j] = r->value[k] * sign[i] < 0 || bound[j] < PETSC_INFINITY ? 1 : -1;
+          queue[tail++] = j;
+        }
+      }
+    }
+  }
+  for (PetscInt i = 0; i < r->n; i++) {
+    PetscReal diagonal = 0, worst = 0;
+
+    for (PetscInt k = r->start[i]; k < r->start[i + 1]; k++) {
+      if (r->col[k] == i)
+        diagonal = r->value[k];
+      else
+        worst = PetscMax(worst, sign[i] * sign[r->col[k]] * r->value[k]);
+    }
+    if (!(diagonal > 0) || worst > 1e-10 * diagonal) *found = PETSC_FALSE;
+  }
+  PetscCall(PetscFree(queue));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The weakest strong coupling of a row, as a negative number; 0: the row is alone. */
+static PetscReal Strong(const Rows *r, PetscInt i)
+{
+  PetscReal least = 0;
+
+  for (PetscInt k = r->start[i]; k < r->start[i + 1]; k++) {
+    if (r->col[k] != i) least = PetscMin(least, r->value[k]);
+  }
+  return HYCO_STRONG * least;
+}
+
+/* coarse_of: a maximal independent set, numbered in the order of the unknowns; returns its size. */
+static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coarse)
+{
+  PetscInt *queue, head = 0, tail = 0;
+  PetscBool *seen;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(r->n, &queue));
+  PetscCall(PetscCalloc1(r->n, &seen));
+  for (PetscInt i = 0; i < r->n; i++) coarse_of[i] = -1;
+  for (PetscInt s = 0; s < r->n; s++) {
+    if (seen[s]) continue;
+    seen[s] = PETSC_TRUE;
+    queue[tail++] = s;
+    while (head < tail) {
+      const PetscInt i = queue[head++];
+      const PetscReal strong = Strong(r, i);
+      PetscBool stays = (PetscBool)(strong < 0);
+
+      for (PetscInt k = r->start[i]; strong < 0 && k < r->start[i + 1]; k++) {
+        const PetscInt j = r->col[k];
+
+        if (j == i || r->value[k] > strong) continue;
+        if (coarse_of[j] >= 0) stays = PETSC_FALSE;
+        if (seen[j]) continue;
+        seen[j] = PETSC_TRUE;
+        queue[tail++] = j;
+      }
+      if (stays) coarse_of[i] = 0;
+    }
+  }
+  *n_coarse = 0;
+  for (PetscInt i = 0; i < r->n; i++) {
+    if (coarse_of[i] == 0) coarse_of[i] = (*n_coarse)++;
+  }
+  PetscCall(PetscFree(queue));
+  PetscCall(PetscFree(seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* P: identity on what stays; elsewhere w_ij = -(sum_k K_ik / sum of its strong coarse K_ij) K_ij / K_ii. */
+static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], PetscInt n_coarse, Mat *P)
+{
+  PetscInt *length, *col, longest = 1;
+  PetscScalar *weight;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(r->n, &length));
+  for (PetscInt i = 0; i < r->n; i++) {
+    const PetscReal strong = Strong(r, i);
+
+    length[i] = coarse_of[i] >= 0;
+    for (PetscInt k = r->start[i]; coarse_of[i] < 0 && strong < 0 && k < r->start[i + 1]; k++)
+      length[i] += r->col[k] != i && r->value[k] <= strong && coarse_of[r->col[k]] >= 0;
+    longest = PetscMax(longest, length[i]);
+  }
+  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, r->n, n_coarse, 0, length, P));
+  PetscCall(PetscMalloc2(longest, &col, longest, &weight));
+  for (PetscInt i = 0; i < r->n; i++) {
+    const PetscReal strong = Strong(r, i);
+    PetscReal diagonal = 0, all = 0, taken = 0;
+    PetscInt n = 0;
+
+    if (coarse_of[i] >= 0) {
+      PetscCall(MatSetValue(*P, i, coarse_of[i], 1, INSERT_VALUES));
+      continue;
+    }
+    for (PetscInt k = r->start[i]; strong < 0 && k < r->start[i + 1]; k++) {
+      const PetscInt j = r->col[k];
+
+      if (j == i) {
+        diagonal = r->value[k];
+        continue;
+      }
+      all += r->value[k];
+      if (r->value[k] > strong || coarse_of[j] < 0) continue;
+      taken += r->value[k];
+      col[n] = coarse_of[j];
+      weight[n++] = r->value[k];
+    }
+    for (PetscInt k = 0; k < n; k++) weight[k] *= -all / taken / diagonal;
+    PetscCall(MatSetValues(*P, 1, &i, n, col, weight, INSERT_VALUES));
+  }
+  PetscCall(MatAssemblyBegin(*P, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*P, MAT_FINAL_ASSEMBLY));
+  PetscCall(PetscFree(length));
+  PetscCall(PetscFree2(col, weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The next coarser level; *made is false where the matrix is small, or does not coarsen. */
+static PetscErrorCode Coarsen(Level *fine, Level *coarse, PetscBool *made)
+{
+  Rows r;
+
+  PetscFunctionBegin;
+  *made = PETSC_FALSE;
+  if (fine->n <= HYCO_COARSEST) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(RowsGet(fine->K, &r));
+  PetscCall(PetscMalloc1(fine->n, &fine->coarse_of));
+  PetscCall(Split(&r, fine->coarse_of, &coarse->n));
+  *made = (PetscBool)(coarse->n > 0 && coarse->n <= 0.8 * fine->n);
+  if (*made) PetscCall(Interpolate(&r, fine->coarse_of, coarse->n, &fine->P));
+  PetscCall(RowsRestore(&r));
+  if (!*made) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatPtAP(fine->K, fine->P, MAT_INITIAL_MATRIX, 2, &coarse->K));
+  PetscCall(MatSetOption(coarse->K, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatCreateVecs(coarse->K, &coarse->f, NULL));
+  PetscCall(MatMultTranspose(fine->P, fine->f, coarse->f));
+  PetscCall(PetscMalloc1(coarse->n, &coarse->bound));
+  PetscCall(PetscCalloc1(coarse->n, &coarse->active));
+  for (PetscInt i = 0; i < fine->n; i++) {
+    if (fine->coarse_of[i] >= 0) coarse->bound[fine->coarse_of[i]] = fine->bound[i];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Changes what violates; returns the number of changes. */
+static PetscErrorCode Flip(Level *l, Vec y, Vec residual, Vec diagonal, PetscInt *changes)
+{
+  const PetscScalar *value, *force, *d;
+  PetscReal size = 0, largest = 0;
+
+  PetscFunctionBegin;
+  *changes = 0;
+  PetscCall(VecGetArrayRead(y, &value));
+  PetscCall(VecGetArrayRead(residual, &force));
+  PetscCall(VecGetArrayRead(diagonal, &d));
+  for (PetscInt i = 0; i < l->n; i++) {
+    size = PetscMax(size, PetscAbsReal(value[i]));
+    if (l->active[i]) largest = PetscMax(largest, PetscAbsReal(force[i]));
+  }
+  for (PetscInt i = 0; i < l->n; i++) {
+    if (l->bound[i] >= PETSC_INFINITY) continue;
+    if (l->active[i] ? HycoPulls(force[i], largest, d[i], l->bound[i]) : HycoPenetrates(value[i], l->bound[i], size)) {
+      l->active[i] = (PetscBool)!l->active[i];
+      (*changes)++;
+    }
+  }
+  PetscCall(VecRestoreArrayRead(y, &value));
+  PetscCall(VecRestoreArrayRead(residual, &force));
+  PetscCall(VecRestoreArrayRead(diagonal, &d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The active set from l->active; y is the last solution. */
+static PetscErrorCode SolveLevel(Level *l, Vec y)
+{
+  PetscInt *at, changes = 1;
+  PetscReal *at_bound;
+  PetscBool singular = PETSC_FALSE;
+  Vec rhs, residual, diagonal;
+  Mat work;
+  KSP ksp;
+
+  PetscFunctionBegin;
+  PetscCall(MatDuplicate(l->K, MAT_COPY_VALUES, &work));
+  PetscCall(HycoGapWork(work));
+  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_primal_", work, PETSC_TRUE, &ksp));
+  PetscCall(VecDuplicate(y, &rhs));
+  PetscCall(VecDuplicate(y, &residual));
+  PetscCall(VecDuplicate(y, &diagonal));
+  PetscCall(MatGetDiagonal(l->K, diagonal));
+  PetscCall(PetscMalloc2(l->n, &at, l->n, &at_bound));
+  for (PetscInt its = 0; its < HYCO_LEVEL_ITS && changes && !singular; its++) {
+    PetscInt n = 0;
+
+    for (PetscInt i = 0; i < l->n; i++) {
+      if (!l->active[i]) continue;
+      at[n] = i;
+      at_bound[n++] = l->bound[i];
+    }
+    PetscCall(HycoSolveOnSet(l->K, work, ksp, l->f, n, at, at_bound, rhs, y, &singular));
+    if (singular) break;
+    PetscCall(MatMult(l->K, y, residual));
+    PetscCall(VecAYPX(residual, -1, l->f));
+    PetscCall(Flip(l, y, residual, diagonal, &changes));
+  }
+  PetscCall(PetscFree2(at, at_bound));
+  PetscCall(VecDestroy(&rhs));
+  PetscCall(VecDestroy(&residual));
+  PetscCall(VecDestroy(&diagonal));
+  PetscCall(MatDestroy(&work));
+  PetscCall(KSPDestroy(&ksp));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The finer set: what stays keeps its state; what is interpolated is relaxed once, and held if that passes its bound.
+ */
+static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
+{
+  Vec fine_y, diagonal;
+  const PetscScalar *value, *f, *d;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateVecs(fine->K, &fine_y, &diagonal));
+  PetscCall(MatMult(fine->P, y, fine_y));
+  PetscCall(MatGetDiagonal(fine->K, diagonal));
+  PetscCall(VecGetArrayRead(fine_y, &value));
+  PetscCall(VecGetArrayRead(fine->f, &f));
+  PetscCall(VecGetArrayRead(diagonal, &d));
+  for (PetscInt i = 0; i < fine->n; i++) {
+    const PetscInt c = fine->coarse_of[i];
+
+    fine->active[i] = c >= 0 ? coarse->active[c] : (PetscBool)(value[i] + f[i] / d[i] > fine->bound[i]);
+  }
+  PetscCall(VecRestoreArrayRead(fine_y, &value));
+  PetscCall(VecRestoreArrayRead(fine->f, &f));
+  PetscCall(VecRestoreArrayRead(diagonal, &d));
+  PetscCall(VecDestroy(&fine_y));
+  PetscCall(VecDestroy(&diagonal));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LevelDestroy(Level *l)
+{
+  PetscFunctionBegin;
+  PetscCall(MatDestroy(&l->K));
+  PetscCall(MatDestroy(&l->P));
+  PetscCall(VecDestroy(&l->f));
+  PetscCall(PetscFree(l->bound));
+  PetscCall(PetscFree(l->active));
+  PetscCall(PetscFree(l->coarse_of));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Down to the coarsest level, and up again to level 0, which is not solved. */
+static PetscErrorCode Cascade(Level level[], PetscBool *made)
+{
+  PetscInt n = 1;
+  PetscBool more = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  while (more && n < HYCO_MAX_LEVELS) {
+    PetscCall(Coarsen(&level[n - 1], &level[n], &more));
+    n += more;
+  }
+  *made = (PetscBool)(n > 1);
+  for (PetscInt l = n - 1; l > 0; l--) {
+    Vec y;
+
+    PetscCall(VecDuplicate(level[l].f, &y));
+    PetscCall(SolveLevel(&level[l], y));
+    PetscCall(Prolong(&level[l - 1], &level[l], y));
+    PetscCall(VecDestroy(&y));
+    PetscCall(LevelDestroy(&level[l]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rank 0's part: from the whole matrix, right-hand side and bounds to the set. */
+static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *made)
+{
+  Level *level;
+  Rows r;
+  Vec signs;
+  const PetscScalar *b;
+  PetscScalar *sign, *out;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(HYCO_MAX_LEVELS + 1, &level));
+  PetscCall(MatGetSize(K, &level->n, NULL));
+  PetscCall(PetscMalloc1(level->n, &level->bound));
+  PetscCall(PetscCalloc1(level->n, &level->active));
+  PetscCall(VecGetArrayRead(bound, &b));
+  PetscCall(PetscArraycpy(level->bound, b, level->n));
+  PetscCall(VecRestoreArrayRead(bound, &b));
+  PetscCall(VecDuplicate(f, &signs));
+  PetscCall(RowsGet(K, &r));
+  PetscCall(VecGetArray(signs, &sign));
+  PetscCall(FindSigns(&r, level->bound, sign, made));
+  PetscCall(VecRestoreArray(signs, &sign));
+  PetscCall(RowsRestore(&r));
+  if (*made) {
+    PetscCall(MatDuplicate(K, MAT_COPY_VALUES, &level->K));
+    PetscCall(MatDiagonalScale(level->K, signs, signs));
+    PetscCall(VecDuplicate(f, &level->f));
+    PetscCall(VecPointwiseMult(level->f, f, signs));
+    PetscCall(Cascade(level, made));
+  }
+  PetscCall(VecGetArray(set, &out));
+  for (PetscInt i = 0; *made && i < level->n; i++) out[i] = level->active[i] ? 1 : 0;
+  PetscCall(VecRestoreArray(set, &out));
+  PetscCall(VecDestroy(&signs));
+  PetscCall(LevelDestroy(level));
+  PetscCall(PetscFree(level));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The whole matrix on rank 0, an empty one elsewhere. */
+static PetscErrorCode GatherMatrix(MPI_Comm comm, Mat K, Mat *whole)
+{
+  PetscMPIInt rank, size;
+  PetscInt n;
+  Mat *part;
+  IS all;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  if (size == 1) {
+    PetscCall(PetscObjectReference((PetscObject)K));
+    *whole = K;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(MatGetSize(K, &n, NULL));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, rank ? 0 : n, 0, 1, &all));
+  PetscCall(MatCreateSubMatrices(K, 1, &all, &all, MAT_INITIAL_MATRIX, &part));
+  PetscCall(PetscObjectReference((PetscObject)part[0]));
+  *whole = part[0];
+  PetscCall(MatDestroySubMatrices(1, &part));
+  PetscCall(ISDestroy(&all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *made)
+{
+  MPI_Comm comm = PetscObjectComm((PetscObject)K);
+  PetscMPIInt rank;
+  Mat whole;
+  Vec f_root, bound_root, set_root;
+  VecScatter scatter;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCall(GatherMatrix(comm, K, &whole));
+  PetscCall(VecScatterCreateToZero(f, &scatter, &f_root));
+  PetscCall(VecDuplicate(f_root, &bound_root));
+  PetscCall(VecDuplicate(f_root, &set_root));
+  PetscCall(VecScatterBegin(scatter, f, f_root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(scatter, f, f_root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterBegin(scatter, bound, bound_root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(scatter, bound, bound_root, INSERT_VALUES, SCATTER_FORWARD));
+  *made = PETSC_FALSE;
+  HycoOnRoot(comm, StartOnRoot(whole, f_root, bound_root, set_root, made));
+  PetscCallMPI(MPI_Bcast(made, 1, MPIU_BOOL, 0, comm));
+  if (*made) {
+    PetscCall(VecScatterBegin(scatter, set_root, set, INSERT_VALUES, SCATTER_REVERSE));
+    PetscCall(VecScatterEnd(scatter, set_root, set, INSERT_VALUES, SCATTER_REVERSE));
+  }
+  PetscCall(VecScatterDestroy(&scatter));
+  PetscCall(VecDestroy(&f_root));
+  PetscCall(VecDestroy(&bound_root));
+  PetscCall(VecDestroy(&set_root));
+  PetscCall(MatDestroy(&whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,106 @@
+/*
+  A fill-reducing order of a sparse symmetric matrix: METIS's nested dissection of its graph of nodes (G. Karypis,
+  V. Kumar, SIAM J. Sci. Comput. 20 (1998) 359-392). Debian's MUMPS has no METIS of its own, and takes a given order.
+*/
+#include <hycosolverimpl.h>
+#include <metis.h>
+
+/* Neighbours, by node of bs unknowns, of this rank's rows: CSR, columns global, without the node itself. */
+static PetscErrorCode LocalGraph(Mat K, PetscInt bs, PetscInt *n_nodes, PetscInt **start, PetscInt **next)
+{
+  PetscInt lo, hi, n, room, *seen, at = 0;
+  MatInfo info;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(K, &lo, &hi));
+  PetscCall(MatGetSize(K, &n, NULL));
+  PetscCall(MatGetInfo(K, MAT_LOCAL, &info));
+  *n_nodes = (hi - lo) / bs;
+  room = (PetscInt)info.nz_used;
+  PetscCall(PetscMalloc1(*n_nodes + 1, start));
+  PetscCall(PetscMalloc1(room + 1, next));
+  PetscCall(PetscCalloc1(n / bs, &seen));
+  (*start)[0] = 0;
+  for (PetscInt r = lo; r < hi; r++) {
+    const PetscInt *cols, node = r / bs;
+    PetscInt nc;
+
+    PetscCall(MatGetRow(K, r, &nc, &cols, NULL));
+    for (PetscInt k = 0; k < nc; k++) {
+      const PetscInt other = cols[k] / bs;
+
+      if (other == node || seen[other] == node + 1) continue;
+      seen[other] = node + 1;
+      (*next)[at++] = other;
+    }
+    PetscCall(MatRestoreRow(K, r, &nc, &cols, NULL));
+    (*start)[(r - lo) / bs + 1] = at;
+  }
+  PetscCall(PetscFree(seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Concatenates every rank's items on rank 0. The caller frees all (NULL elsewhere). */
+static PetscErrorCode ToRoot(MPI_Comm comm, PetscInt n, const PetscInt mine[], PetscInt *n_all, PetscInt **all)
+{
+  PetscMPIInt rank, size, count = (PetscMPIInt)n, *counts, *offsets;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(PetscMalloc2(size, &counts, size + 1, &offsets));
+  PetscCallMPI(MPI_Gather(&count, 1, MPI_INT, counts, 1, MPI_INT, 0, comm));
+  offsets[0] = 0;
+  for (PetscMPIInt r = 0; r < size && rank == 0; r++) offsets[r + 1] = offsets[r] + counts[r];
+  *n_all = rank == 0 ? offsets[size] : 0;
+  *all = NULL;
+  if (rank == 0) PetscCall(PetscMalloc1(*n_all + 1, all));
+  PetscCallMPI(MPI_Gatherv(mine, count, MPIU_INT, *all, counts, offsets, MPIU_INT, 0, comm));
+  PetscCall(PetscFree2(counts, offsets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* METIS on the whole graph: degree and neighbours of each node, to place[node]. On rank 0. */
+static PetscErrorCode Dissect(PetscInt n, const PetscInt degree[], const PetscInt next[], PetscInt place[])
+{
+  idx_t nv = (idx_t)n, *xadj, *adjncy, *perm, *iperm;
+  int status;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(n + 1, &xadj, n, &perm, n, &iperm));
+  xadj[0] = 0;
+  for (PetscInt i = 0; i < n; i++) xadj[i + 1] = xadj[i] + (idx_t)degree[i];
+  PetscCall(PetscMalloc1(xadj[n] + 1, &adjncy));
+  for (idx_t k = 0; k < xadj[n]; k++) adjncy[k] = (idx_t)next[k];
+  status = METIS_NodeND(&nv, xadj, adjncy, NULL, NULL, perm, iperm);
+  PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS_NodeND failed (%d)", status);
+  for (PetscInt i = 0; i < n; i++) place[i] = (PetscInt)iperm[i];
+  PetscCall(PetscFree(adjncy));
+  PetscCall(PetscFree3(xadj, perm, iperm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[])
+{
+  PetscInt bs, n_nodes = 0, *start, *next, n_all = 0, n_edges, *degree, *edges, *node = NULL;
+  PetscMPIInt rank;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCall(MatGetBlockSize(K, &bs));
+  PetscCall(LocalGraph(K, bs, &n_nodes, &start, &next));
+  PetscCall(ToRoot(comm, start[n_nodes], next, &n_edges, &edges));
+  for (PetscInt i = 0; i < n_nodes; i++) start[i] = start[i + 1] - start[i];
+  PetscCall(ToRoot(comm, n_nodes, start, &n_all, &degree));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(next));
+  if (rank == 0) PetscCall(PetscMalloc1(n_all, &node));
+  HycoOnRoot(comm, Dissect(n_all, degree, edges, node));
+  for (PetscInt i = 0; i < n_all; i++) {
+    for (PetscInt c = 0; c < bs; c++) place[i * bs + c] = node[i] * bs + c;
+  }
+  PetscCall(PetscFree(node));
+  PetscCall(PetscFree(degree));
+  PetscCall(PetscFree(edges));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

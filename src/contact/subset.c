@@ -1,0 +1,141 @@
+/*
+  The linear problem inside a complementarity problem: on a set a of contacts, M_aa z_a = -q_a.
+
+  Contacts may repeat each other (a node constrained twice, a surface on a symmetry plane): M_aa is then singular
+  although the displacements are not in doubt. By diagonal pivoting as many contacts are kept as M_aa has rank, those
+  with the smaller gap first where several are equally good; the others depend on them and carry no force.
+*/
+#include <hycosolverimpl.h>
+#include <petscblaslapack.h>
+
+/* Pivots below this share of the (scaled) diagonal are dependence: round-off of a flexibility leaves about 1e-14. */
+#define DEPENDENT 1e-12
+
+/* A = D M_aa D with D = |diag|^-1/2 (0 for a contact that nothing moves). */
+static void CopyScaled(PetscInt n, const PetscReal M[], PetscInt k, const PetscInt a[], PetscReal A[], PetscReal d[])
+{
+  for (PetscInt j = 0; j < k; j++) {
+    const PetscReal diagonal = PetscAbsReal(M[(size_t)a[j] * (size_t)n + (size_t)a[j]]);
+
+    d[j] = diagonal > 0 ? 1 / PetscSqrtReal(diagonal) : 0;
+  }
+  for (PetscInt j = 0; j < k; j++) {
+    const PetscReal *column = M + (size_t)a[j] * (size_t)n;
+
+    for (PetscInt i = 0; i < k; i++) A[(size_t)j * (size_t)k + (size_t)i] = column[a[i]] * d[i] * d[j];
+  }
+}
+
+/* Factors A (k x k, overwritten) and solves in place; *regular: no pivot below `tol` of the largest, a finite answer.
+ */
+static PetscErrorCode Solve(PetscInt k, PetscReal A[], PetscBool symmetric, PetscReal tol, PetscReal x[],
+                            PetscBool *regular)
+{
+  PetscBLASInt n, one = 1, info = 0, *ipiv;
+  PetscReal least = PETSC_MAX_REAL, most = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(k, &n));
+  PetscCall(PetscMalloc1(k, &ipiv));
+  if (symmetric)
+    LAPACKpotrf_("L", &n, A, &n, &info);
+  else
+    LAPACKgetrf_(&n, &n, A, &n, ipiv, &info);
+  for (PetscInt j = 0; j < k; j++) {
+    const PetscReal pivot = PetscAbsReal(A[(size_t)j * (size_t)k + (size_t)j]);
+
+    least = PetscMin(least, symmetric ? pivot * pivot : pivot);
+    most = PetscMax(most, symmetric ? pivot * pivot : pivot);
+  }
+  *regular = (PetscBool)(info == 0 && least > tol * most);
+  if (*regular && symmetric) LAPACKpotrs_("L", &n, &one, A, &n, x, &n, &info);
+  if (*regular && !symmetric) LAPACKgetrs_("N", &n, &one, A, &n, ipiv, x, &n, &info);
+  for (PetscInt j = 0; j < k; j++) *regular = (PetscBool)(*regular && !PetscIsInfOrNanReal(x[j]));
+  PetscCall(PetscFree(ipiv));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The next pivot: the largest diagonal; of those equal to 1e-8, the smallest gap per motion. -1: what is left depends.
+ */
+static PetscInt NextPivot(PetscInt k, const PetscReal A[], const PetscReal gap[], const PetscBool kept[])
+{
+  PetscReal largest = 0;
+  PetscInt best = -1;
+
+  for (PetscInt i = 0; i < k; i++) {
+    if (!kept[i]) largest = PetscMax(largest, PetscAbsReal(A[(size_t)i * (size_t)k + (size_t)i]));
+  }
+  for (PetscInt i = 0; i < k && largest > DEPENDENT; i++) {
+    if (kept[i] || PetscAbsReal(A[(size_t)i * (size_t)k + (size_t)i]) < largest * (1 - 1e-8)) continue;
+    if (best < 0 || gap[i] < gap[best]) best = i;
+  }
+  return best;
+}
+
+/* Diagonal pivoting of A (k x k, overwritten): kept[i] marks a set on which A is regular, as large as its rank. */
+static PetscErrorCode Reveal(PetscInt k, PetscReal A[], const PetscReal gap[], PetscBool kept[])
+{
+  PetscReal *row;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(k, &row));
+  PetscCall(PetscArrayzero(kept, k));
+  for (PetscInt p = NextPivot(k, A, gap, kept); p >= 0; p = NextPivot(k, A, gap, kept)) {
+    const PetscReal *column = A + (size_t)p * (size_t)k, pivot = column[p];
+
+    kept[p] = PETSC_TRUE;
+    for (PetscInt j = 0; j < k; j++) row[j] = kept[j] ? 0 : A[(size_t)j * (size_t)k + (size_t)p] / pivot;
+    for (PetscInt j = 0; j < k; j++) {
+      if (row[j] == 0) continue;
+      for (PetscInt i = 0; i < k; i++) A[(size_t)j * (size_t)k + (size_t)i] -= column[i] * row[j];
+    }
+  }
+  PetscCall(PetscFree(row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One solve on a set. */
+static PetscErrorCode TrySet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric, PetscReal tol,
+                             PetscInt k, const PetscInt a[], PetscReal A[], PetscReal z[], PetscBool *regular)
+{
+  PetscReal *x, *d;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(k, &x, k, &d));
+  CopyScaled(n, M, k, a, A, d);
+  for (PetscInt j = 0; j < k; j++) x[j] = -q[a[j]] * d[j];
+  PetscCall(Solve(k, A, symmetric, tol, x, regular));
+  for (PetscInt j = 0; *regular && j < k; j++) z[a[j]] = x[j] * d[j];
+  PetscCall(PetscFree2(x, d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric, PetscInt *k,
+                                 PetscInt a[], PetscReal z[], PetscBool *singular)
+{
+  PetscReal *A, *d;
+  PetscBool regular = PETSC_TRUE, *kept;
+  PetscInt n_kept = 0;
+
+  PetscFunctionBegin;
+  *singular = PETSC_FALSE;
+  PetscCall(PetscArrayzero(z, n));
+  if (!*k) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1((size_t)*k * (size_t)*k, &A));
+  PetscCall(TrySet(n, M, q, symmetric, symmetric ? DEPENDENT : 1e-15, *k, a, A, z, &regular));
+  if (!regular) {
+    PetscCall(PetscMalloc2(*k, &d, *k, &kept));
+    CopyScaled(n, M, *k, a, A, d);
+    for (PetscInt j = 0; j < *k; j++) d[j] *= q[a[j]];
+    PetscCall(Reveal(*k, A, d, kept));
+    for (PetscInt j = 0; j < *k; j++) {
+      if (kept[j]) a[n_kept++] = a[j];
+    }
+    PetscCall(PetscFree2(d, kept));
+    *k = n_kept;
+    if (n_kept) PetscCall(TrySet(n, M, q, symmetric, 0, n_kept, a, A, z, &regular));
+    *singular = (PetscBool)(n_kept && !regular);
+  }
+  PetscCall(PetscFree(A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
