@@ -205,6 +205,22 @@ class Patch(Verify):
                 self.held(f'{name}, sum of forces', m['force'], 0, m['force'], 1e-10)
                 self.held(f'{name}, sum of moments', m['moment'], 0, m['moment'], 1e-10)
 
+    def test_pressed(self):
+        """The upper block under a pressure, held by the contact alone: the nodal forces add up to it on any mesh."""
+        for kind, slaves, masters in (('quad4', 5, 4), ('tri3', 7, 5), ('hex8', 4, 3), ('tet4', 4, 3)):
+            with self.subTest(kind=kind):
+                flat, up = KINDS[kind] == 2, 'xyz'[KINDS[kind] - 1]
+                stack(self, kind, [masters, 4] if flat else [masters, masters, 3],
+                      [slaves, 6] if flat else [slaves, slaves, 4], 'surface', 'b', '')
+                with open(self.path('two.yaml'), encoding='utf-8') as f:
+                    text = f.read().replace(f', b_{up}1: {{{up}: -press}}', '')
+                with open(self.path('two.yaml'), 'w', encoding='utf-8') as f:
+                    f.write(text + f'pressure: {{b_{up}1: press}}\n')
+                r = self.hyco('solve', '-scene', self.path('two.yaml'), '-mu', '0.1,0')
+                self.solved(r)
+                self.held(f'pressed {kind} {slaves} slave cells on {masters}, resultant', r['total_contact_force'], 0.1,
+                          abs(r['total_contact_force'] / 0.1 - 1), 1e-10)
+
     def test_confined(self):
         """Both sides finer by two, twice: as wrong at the interface; half a block away less and less; the total to first
         order."""
