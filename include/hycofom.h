@@ -16,11 +16,16 @@ typedef struct {
   PetscReal setup, assemble, factor, solve, total;
 } HycoSeconds;
 
-/* What a solution amounts to, in scene units. Strain energy W = 1/2 U^T K U over free and fixed unknowns. */
+/*
+  What a solution amounts to, in scene units. Strain energy W = 1/2 U^T K U over free and fixed unknowns; external work
+  F.U of the loads and R.u0 of the supports that move; gap work L.D with the gaps as drawn. Energy defect:
+  |2 W - (external_work - gap_work)| / max(2 W, |external_work|, |gap_work|), 0 for a solution without round-off.
+*/
 typedef struct {
   PetscInt n_dof, n_contacts, n_active; /* free unknowns N, contacts N_lambda, contacts with L_i > 0 */
   PetscInt iterations, dim;
-  PetscReal total_contact_force, lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3], strain_energy;
+  PetscReal total_contact_force, lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3];
+  PetscReal strain_energy, external_work, gap_work, energy_defect;
   HycoKKT kkt;
   HycoReason reason;
   HycoSeconds seconds;

@@ -65,6 +65,9 @@ PetscErrorCode HycoSolverSetTolerance(HycoSolver solver, PetscReal rtol);
 PetscErrorCode HycoSolverSetMaxIts(HycoSolver solver, PetscInt max_its);
 /* -hyco_solver_warm_start: begin from the last solution's active set (default) or from no contact. */
 PetscErrorCode HycoSolverSetWarmStart(HycoSolver solver, PetscBool warm);
+/* -hyco_solver_multilevel: in the primal form, where contacts are more than a quarter of the unknowns and couplings
+   have one sign (a rope, a membrane), begin from the active set of coarser problems (default). */
+PetscErrorCode HycoSolverSetMultilevel(HycoSolver solver, PetscBool multilevel);
 /*
   -hyco_solver_fallback: when the residuals of the chosen method are too large, try the next of: TAO, active set,
   Lemke's method on the dense dual (default). Without it, such a solve ends not converged.

@@ -30,7 +30,6 @@ struct _p_HycoFOM {
   PetscReal *u, *lambda, *sigma, *gap;
   PetscBool solved, sigma_ready;
   HycoSummary summary;
-  PetscReal energy;
 };
 
 /* Attaches the rigid motions to K; fails when nothing holds one of the free ones. Collective. */
@@ -38,5 +37,7 @@ PetscErrorCode HycoFOMSetMotions(HycoFOM fom);
 /* Generalised forces F - B^T Lambda of the last solution (n_nodes x dim) on rank 0, zero on fixed unknowns. Collective.
  */
 PetscErrorCode HycoFOMGetForces(HycoFOM fom, PetscReal forces[]);
+/* Fills strain_energy, external_work, gap_work and energy_defect from the last solution. Collective. */
+PetscErrorCode HycoFOMEnergy(HycoFOM fom, HycoSummary *summary);
 
 #endif

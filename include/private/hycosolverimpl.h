@@ -53,7 +53,7 @@ struct _p_HycoSolver {
   /* primal form in gap coordinates */
   Mat T, Kg, Kw;
   KSP ksp_gap;
-  PetscInt *pivot; /* this rank's contacts' pivot unknowns */
+  PetscInt *pivot, *contact, n_pivots; /* this rank's contacts' pivot unknowns, the contacts' numbers on this rank */
   HycoSeen transformed;
   /* dual form without its matrix */
   KSP ksp_free;
@@ -115,9 +115,12 @@ PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp);
 PetscErrorCode HycoChooseLinear(HycoSolver s, HycoForm *form);
 extern const char *const HycoLinearNames[];
 /* Attaches K's near-kernel (MatSetNearNullSpace()) to Kw, in gap coordinates. Collective. */
-PetscErrorCode HycoGapNearKernel(HycoSystem system, const PetscInt pivot[], Mat Kw);
-/* Whether K, on one process, has so short an envelope in reverse Cuthill-McKee order that its factor hardly fills. */
+PetscErrorCode HycoGapNearKernel(HycoSolver s, Mat Kw);
+/* Whether K has so short an envelope in reverse Cuthill-McKee order that its factor hardly fills; on several ranks only
+   a line's has. Collective. */
 PetscErrorCode HycoThin(Mat K, PetscBool *thin);
+/* Sets up a PCCHOLESKY for such a K. Collective. */
+PetscErrorCode HycoThinSolver(PC pc);
 /* Factors the operators of such a solver, with more workspace when MUMPS asks for it. */
 PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular);
 
@@ -129,7 +132,7 @@ PetscErrorCode HycoPrimalPossible(HycoSystem system, PetscBool *possible);
 
 /* TAO's types that hyco knows, by the index that the functions below take; from HYCO_TAO_SEMISMOOTH on semismooth. */
 extern const char *const HycoTaoTypes[];
-enum { HYCO_TAO_AUTO = -1, HYCO_TAO_GPCG = 0, HYCO_TAO_SEMISMOOTH = 12 };
+enum { HYCO_TAO_AUTO = -1, HYCO_TAO_GPCG = 0, HYCO_TAO_BQPIP = 11, HYCO_TAO_SEMISMOOTH = 12 };
 PetscBool HycoTaoSemismooth(PetscInt type);
 /*
   min 1/2 y^T H y - f^T y, lo <= y <= hi, by a bound-constrained type, H symmetric; or w = H y - f >= 0, y >= 0, w.y = 0

@@ -51,12 +51,14 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
   PetscCall(KSPSetType(*ksp, KSPPREONLY));
   PetscCall(KSPGetPC(*ksp, &pc));
   PetscCall(PCSetType(pc, symmetric ? PCCHOLESKY : PCLU));
-  if (size == 1 && symmetric && n > 3000) PetscCall(HycoThin(K, &thin));
-  if (!thin && (size > 1 || n > 3000))
+  if (symmetric && n > 3000) PetscCall(HycoThin(K, &thin));
+  if (thin)
+    PetscCall(HycoThinSolver(pc));
+  else if (size > 1 || n > 3000)
     PetscCall(PrepareMumps(pc, K, prefix));
   else {
     PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERPETSC));
-    PetscCall(PCFactorSetMatOrderingType(pc, thin ? MATORDERINGRCM : MATORDERINGND));
+    PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGND));
   }
   PetscCall(KSPSetFromOptions(*ksp));
   PetscCall(KSPSetErrorIfNotConverged(*ksp, PETSC_FALSE));

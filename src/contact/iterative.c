@@ -6,20 +6,17 @@
 #include <hycosolverimpl.h>
 
 /* y = T^-1 x: each pivot holds its contact's B x. */
-static PetscErrorCode ToGaps(Mat B, const PetscInt pivot[], Vec x, Vec y)
+static PetscErrorCode ToGaps(HycoSolver s, Vec x, Vec y)
 {
-  PetscInt m, lo;
   Vec gap;
   const PetscScalar *g;
 
   PetscFunctionBegin;
   PetscCall(VecCopy(x, y));
-  PetscCall(MatCreateVecs(B, NULL, &gap));
-  PetscCall(MatMult(B, x, gap));
-  PetscCall(VecGetLocalSize(gap, &m));
-  PetscCall(VecGetOwnershipRange(gap, &lo, NULL));
+  PetscCall(MatCreateVecs(s->system->B, NULL, &gap));
+  PetscCall(MatMult(s->system->B, x, gap));
   PetscCall(VecGetArrayRead(gap, &g));
-  for (PetscInt k = 0; k < m; k++) PetscCall(VecSetValue(y, pivot[k], g[k], INSERT_VALUES));
+  for (PetscInt k = 0; k < s->n_pivots; k++) PetscCall(VecSetValue(y, s->pivot[k], g[s->contact[k]], INSERT_VALUES));
   PetscCall(VecRestoreArrayRead(gap, &g));
   PetscCall(VecAssemblyBegin(y));
   PetscCall(VecAssemblyEnd(y));
@@ -27,7 +24,7 @@ static PetscErrorCode ToGaps(Mat B, const PetscInt pivot[], Vec x, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoGapNearKernel(HycoSystem s, const PetscInt pivot[], Mat Kw)
+PetscErrorCode HycoGapNearKernel(HycoSolver s, Mat Kw)
 {
   MatNullSpace near = NULL, mine;
   PetscBool constant;
@@ -36,13 +33,13 @@ PetscErrorCode HycoGapNearKernel(HycoSystem s, const PetscInt pivot[], Mat Kw)
   Vec *y;
 
   PetscFunctionBegin;
-  PetscCall(MatGetNearNullSpace(s->K, &near));
+  PetscCall(MatGetNearNullSpace(s->system->K, &near));
   if (!near) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatNullSpaceGetVecs(near, &constant, &n, &x));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicateVecs(x[0], n, &y));
   for (PetscInt k = 0; k < n; k++) {
-    PetscCall(ToGaps(s->B, pivot, x[k], y[k]));
+    PetscCall(ToGaps(s, x[k], y[k]));
     for (PetscInt j = 0; j < k; j++) {
       PetscScalar dot;
 

@@ -11,7 +11,10 @@
 #define HYCO_NOISE_FIRST 1e-5
 #define HYCO_NOISE       1e-9
 
-/* Pivot (global unknown) of each of this rank's rows: the largest entry whose unknown no other row has; -1: none. */
+enum { HYCO_NO_PIVOT = -1, HYCO_IDLE = -2 };
+
+/* Pivot (global unknown) of each of this rank's rows: the largest entry whose unknown no other row has; HYCO_NO_PIVOT:
+   none; HYCO_IDLE: the row is empty, of a contact between fixed unknowns. */
 static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[])
 {
   PetscInt lo, hi;
@@ -64,8 +67,8 @@ static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[])
     const PetscScalar *vals;
     PetscReal best = 0;
 
-    pivot[r - lo] = -1;
     PetscCall(MatGetRow(y->B, r, &n, &cols, &vals));
+    pivot[r - lo] = n ? HYCO_NO_PIVOT : HYCO_IDLE;
     for (PetscInt k = 0; k < n; k++, at++) {
       if (shared[at] < 1.5 && PetscAbsScalar(vals[k]) > best * (1 + 1e-12)) {
         best = PetscAbsScalar(vals[k]);
@@ -91,7 +94,7 @@ PetscErrorCode HycoPrimalPossible(HycoSystem y, PetscBool *possible)
   PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
   PetscCall(PetscMalloc1(hi - lo, &pivot));
   PetscCall(FindPivots(y, pivot));
-  for (PetscInt k = 0; k < hi - lo; k++) bad = bad || pivot[k] < 0;
+  for (PetscInt k = 0; k < hi - lo; k++) bad = bad || pivot[k] == HYCO_NO_PIVOT;
   PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, y->comm));
   *possible = (PetscBool)!any;
   PetscCall(PetscFree(pivot));
@@ -132,6 +135,7 @@ static PetscErrorCode ScaleOnly(HycoSolver s)
   for (PetscInt r = lo; r < hi; r++) {
     const PetscScalar *vals;
 
+    if (s->pivot[r - lo] == HYCO_IDLE) continue;
     PetscCall(MatGetRow(y->B, r, &n, NULL, &vals));
     PetscCall(VecSetValue(t, s->pivot[r - lo], 1 / vals[0], INSERT_VALUES));
     PetscCall(MatRestoreRow(y->B, r, &n, NULL, &vals));
@@ -198,6 +202,21 @@ static PetscErrorCode BuildT(HycoSolver s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Leaves out the idle contacts: pivot and contact then hold the others, and so does the active set. */
+static PetscErrorCode DropIdle(HycoSolver s, PetscInt n)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(s->contact));
+  PetscCall(PetscMalloc1(n, &s->contact));
+  s->n_pivots = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    if (s->pivot[k] == HYCO_IDLE) continue;
+    s->contact[s->n_pivots] = k;
+    s->pivot[s->n_pivots++] = s->pivot[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SetUpPrimal(HycoSolver s)
 {
   HycoSystem y = s->system;
@@ -215,7 +234,7 @@ static PetscErrorCode SetUpPrimal(HycoSolver s)
   {
     PetscMPIInt bad = 0, any;
 
-    for (PetscInt k = 0; k < hi - lo; k++) bad = bad || s->pivot[k] < 0;
+    for (PetscInt k = 0; k < hi - lo; k++) bad = bad || s->pivot[k] == HYCO_NO_PIVOT;
     PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, s->comm));
     if (any) s->transformed.K = 0;
     PetscCheck(!any, s->comm, PETSC_ERR_USER,
@@ -230,6 +249,7 @@ static PetscErrorCode SetUpPrimal(HycoSolver s)
     PetscCall(BuildT(s));
     PetscCall(MatPtAP(y->K, s->T, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &s->Kg));
   }
+  PetscCall(DropIdle(s, hi - lo));
   PetscCall(MatSetOption(s->Kg, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatDuplicate(s->Kg, MAT_COPY_VALUES, &s->Kw));
   PetscCall(HycoGapWork(s->Kw));
@@ -245,7 +265,7 @@ static PetscErrorCode SetUpPrimal(HycoSolver s)
     else
       PetscCall(KSPReset(s->ksp_gap));
   }
-  if (s->iterative) PetscCall(HycoGapNearKernel(y, s->pivot, s->Kw));
+  if (s->iterative) PetscCall(HycoGapNearKernel(s, s->Kw));
   if (!s->ksp_gap)
     PetscCall(s->iterative ? HycoIterativeSolver(s->comm, "hyco_primal_", s->Kw, &s->ksp_gap)
                            : HycoDirectSolver(s->comm, "hyco_primal_", s->Kw, PETSC_TRUE, &s->ksp_gap));
@@ -332,7 +352,7 @@ static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, 
 
 /* What the iterations share. */
 typedef struct {
-  PetscInt lo, n; /* this rank's contacts */
+  PetscInt lo, n; /* this rank's contacts, without the idle ones; their active set begins at lo */
   PetscReal *gap, *value, *force, *diagonal, *at_d;
   PetscReal noise; /* share of the largest force and gap that iterative solves leave */
   PetscInt *at;
@@ -528,18 +548,17 @@ static PetscErrorCode BoundQP(HycoSolver s, Primal *p, Vec y, PetscBool *solved)
 static PetscErrorCode PrimalCreate(HycoSolver s, Vec x, Primal *p)
 {
   HycoSystem y = s->system;
-  PetscInt hi;
   IS is;
   const PetscScalar *d;
 
   PetscFunctionBegin;
   p->noise = 0;
-  PetscCall(VecGetOwnershipRange(y->D, &p->lo, &hi));
-  p->n = hi - p->lo;
+  PetscCall(VecGetOwnershipRange(y->D, &p->lo, NULL));
+  p->n = s->n_pivots;
   PetscCall(
       PetscMalloc6(p->n, &p->gap, p->n, &p->value, p->n, &p->force, p->n, &p->diagonal, p->n, &p->at_d, p->n, &p->at));
   PetscCall(VecGetArrayRead(y->D, &d));
-  PetscCall(PetscArraycpy(p->gap, d, p->n));
+  for (PetscInt k = 0; k < p->n; k++) p->gap[k] = d[s->contact[k]];
   PetscCall(VecRestoreArrayRead(y->D, &d));
   PetscCall(VecDuplicate(x, &p->f));
   PetscCall(VecDuplicate(x, &p->rhs));
@@ -587,10 +606,13 @@ PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscB
     PetscCall(ActiveSet(s, &p, y, solved));
   PetscCall(HycoNameLinear(s, s->ksp_gap));
   PetscCall(MatMult(s->T, y, x));
+  PetscCall(VecSet(L, 0));
   PetscCall(VecGetArray(L, &l));
   for (PetscInt k = 0; k < p.n; k++) {
-    l[k] = s->active[p.lo + k] ? PetscMax(p.force[k], 0) : 0;
-    if (!*solved) l[k] = p.force[k]; /* the set has changed since: show what the residuals say of it */
+    if (!*solved) /* the set has changed since: show what the residuals say of it */
+      l[s->contact[k]] = p.force[k];
+    else if (s->active[p.lo + k])
+      l[s->contact[k]] = PetscMax(p.force[k], 0);
   }
   PetscCall(VecRestoreArray(L, &l));
   PetscCall(VecDestroy(&y));

@@ -39,6 +39,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
   PetscCall(PetscFree(s->pivot));
+  PetscCall(PetscFree(s->contact));
   PetscCall(PetscFree(*solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -128,6 +129,14 @@ PetscErrorCode HycoSolverSetWarmStart(HycoSolver s, PetscBool warm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSolverSetMultilevel(HycoSolver s, PetscBool multilevel)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSolverCreate()");
+  s->multilevel = multilevel;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSolverSetFallback(HycoSolver s, PetscBool fallback)
 {
   PetscFunctionBegin;
@@ -207,6 +216,8 @@ static PetscErrorCode ChooseTao(HycoSolver s, HycoForm form)
              HycoTaoTypes[s->tao]);
   PetscCheck(form == HYCO_FORM_DUAL || !HycoTaoSemismooth(s->tao), s->comm, PETSC_ERR_USER,
              "TAO's %s needs the matrix of the dual form; use -hyco_solver_form dual", HycoTaoTypes[s->tao]);
+  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->tao != HYCO_TAO_BQPIP, s->comm, PETSC_ERR_USER,
+             "TAO's bqpip reads the matrix of the dual form; use -hyco_solver_form dual");
   PetscCheck(form != HYCO_FORM_DUAL_FREE || s->system->symmetric, s->comm, PETSC_ERR_USER,
              "the form dual_free needs a symmetric system; use -hyco_solver_form dual");
   PetscFunctionReturn(PETSC_SUCCESS);

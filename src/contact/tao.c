@@ -19,9 +19,17 @@ PetscBool HycoTaoSemismooth(PetscInt type)
   return (PetscBool)(type >= HYCO_TAO_SEMISMOOTH);
 }
 
+/* The residual that TAO reports is small enough below GOOD; then PATIENCE iterations without halving it end the solve.
+   Above GOOD, first-order types may stand still for a while. */
+#define GOOD          1e-10
+#define PATIENCE      5
+#define PATIENCE_LONG 300
+
 typedef struct {
   Mat H;
   Vec f;
+  PetscReal best; /* least residual so far, and its iteration */
+  PetscInt best_at;
 } Quadratic;
 
 static PetscErrorCode Objective(Tao tao, Vec y, PetscReal *value, Vec gradient, void *ctx)
@@ -69,7 +77,28 @@ static PetscErrorCode Jacobian(Tao tao, Vec z, Mat J, Mat P, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SetBoundProblem(Tao tao, Quadratic *q)
+/* TAO's own test; and an end to iterations that round-off or stagnation makes useless. */
+static PetscErrorCode Converged(Tao tao, void *ctx)
+{
+  Quadratic *q = (Quadratic *)ctx;
+  TaoConvergedReason why;
+  PetscInt it;
+  PetscReal residual;
+
+  PetscFunctionBegin;
+  PetscCall(TaoDefaultConvergenceTest(tao, NULL));
+  PetscCall(TaoGetSolutionStatus(tao, &it, NULL, &residual, NULL, NULL, &why));
+  if (why != TAO_CONTINUE_ITERATING) PetscFunctionReturn(PETSC_SUCCESS);
+  if (residual <= q->best / 2) {
+    q->best = residual;
+    q->best_at = it;
+  } else if (it - q->best_at >= (q->best <= GOOD ? PATIENCE : PATIENCE_LONG))
+    PetscCall(TaoSetConvergedReason(tao, q->best <= GOOD ? TAO_CONVERGED_USER : TAO_DIVERGED_USER));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* `krylov`: without a factor, which a singular H (dependent contacts) does not have. */
+static PetscErrorCode SetBoundProblem(Tao tao, Quadratic *q, PetscBool krylov)
 {
   PetscBool shell;
   KSP ksp;
@@ -80,7 +109,7 @@ static PetscErrorCode SetBoundProblem(Tao tao, Quadratic *q)
   PetscCall(TaoSetTolerances(tao, 1e-13, 1e-14, 0));
   PetscCall(PetscObjectTypeCompare((PetscObject)q->H, MATSHELL, &shell));
   PetscCall(TaoGetKSP(tao, &ksp));
-  if (shell && ksp) { /* no entries, nothing to precondition with */
+  if ((shell || krylov) && ksp) { /* a shell has no entries to precondition with */
     PC pc;
 
     PetscCall(KSPGetPC(ksp, &pc));
@@ -89,10 +118,11 @@ static PetscErrorCode SetBoundProblem(Tao tao, Quadratic *q)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SetComplementarity(Tao tao, Quadratic *q, Mat J, Vec w)
+static PetscErrorCode SetComplementarity(Tao tao, Quadratic *q, Mat J, Vec w, PetscBool krylov)
 {
   KSP ksp;
   PC pc;
+  PetscInt n;
 
   PetscFunctionBegin;
   PetscCall(TaoSetConstraintsRoutine(tao, w, Slack, q));
@@ -100,15 +130,18 @@ static PetscErrorCode SetComplementarity(Tao tao, Quadratic *q, Mat J, Vec w)
   PetscCall(TaoSetTolerances(tao, 0, 0, 0));
   PetscCall(TaoSetFunctionLowerBound(tao, 1e-12)); /* 1e-8, its default, is too coarse; 1e-20 never stops */
   PetscCall(TaoGetKSP(tao, &ksp));
-  PetscCall(KSPSetType(ksp, KSPPREONLY));
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCSetType(pc, PCLU));
+  PetscCall(PCSetType(pc, krylov ? PCNONE : PCLU));
+  PetscCall(KSPSetType(ksp, krylov ? KSPGMRES : KSPPREONLY));
+  PetscCall(VecGetSize(w, &n));
+  if (krylov) PetscCall(KSPGMRESSetRestart(ksp, PetscMin(n, 200)));
+  if (krylov) PetscCall(KSPSetTolerances(ksp, 1e-12, PETSC_DEFAULT, PETSC_DEFAULT, 2 * n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What may fail inside TAO. */
 static PetscErrorCode Run(Tao tao, PetscInt type, PetscInt max_its, Quadratic *q, Vec lo, Vec hi, Vec y, Mat J, Vec w,
-                          PetscInt *its, PetscBool *solved)
+                          PetscBool krylov, PetscInt *its, PetscBool *solved)
 {
   TaoConvergedReason why;
 
@@ -118,10 +151,11 @@ static PetscErrorCode Run(Tao tao, PetscInt type, PetscInt max_its, Quadratic *q
   PetscCall(TaoSetSolution(tao, y));
   PetscCall(TaoSetVariableBounds(tao, lo, hi));
   PetscCall(TaoSetMaximumIterations(tao, max_its ? max_its : 2000));
+  PetscCall(TaoSetConvergenceTest(tao, Converged, q));
   if (HycoTaoSemismooth(type))
-    PetscCall(SetComplementarity(tao, q, J, w));
+    PetscCall(SetComplementarity(tao, q, J, w, krylov));
   else
-    PetscCall(SetBoundProblem(tao, q));
+    PetscCall(SetBoundProblem(tao, q, krylov));
   PetscCall(TaoSetFromOptions(tao));
   PetscCall(TaoSolve(tao));
   PetscCall(TaoGetConvergedReason(tao, &why));
@@ -163,44 +197,76 @@ static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTaoSolve(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscInt *its,
-                            PetscBool *solved)
+/* One run of TAO from y; an error inside it is told by *failed. y ends finite. */
+static PetscErrorCode CatchRun(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscBool krylov,
+                               PetscInt *its, PetscBool *solved, PetscBool *failed)
 {
-  Quadratic q = {H, f};
+  Quadratic q = {H, f, PETSC_MAX_REAL, 0};
   Tao tao;
-  Vec d, w;
+  Vec w;
   Mat J = NULL;
-  PetscReal size = 1, norm;
+  PetscReal norm;
   PetscErrorCode caught;
   char message[HYCO_LINE];
 
   PetscFunctionBegin;
   *its = 0;
   *solved = PETSC_FALSE;
-  PetscCall(VecDuplicate(y, &d));
   PetscCall(VecDuplicate(y, &w));
-  PetscCall(Scale(H, f, lo, hi, y, d, &size));
   if (HycoTaoSemismooth(type)) PetscCall(MatDuplicate(H, MAT_COPY_VALUES, &J));
   PetscCall(TaoCreate(PetscObjectComm((PetscObject)y), &tao));
   PetscCall(HycoCatchBegin());
-  caught = Run(tao, type, max_its, &q, lo, hi, y, J, w, its, solved);
+  caught = Run(tao, type, max_its, &q, lo, hi, y, J, w, krylov, its, solved);
   if (caught)
     (void)TaoDestroy(&tao);
   else
     caught = TaoDestroy(&tao);
   PetscCall(HycoCatchEnd(caught, message));
-  if (caught) {
-    PetscCall(PetscInfo(NULL, "TAO %s failed: %s\n", HycoTaoTypes[type], message));
-    *solved = PETSC_FALSE;
-  }
-  PetscCall(VecPointwiseMult(y, y, d));
-  PetscCall(VecScale(y, size));
+  if (caught) PetscCall(PetscInfo(NULL, "TAO %s failed: %s\n", HycoTaoTypes[type], message));
+  if (caught) *solved = PETSC_FALSE;
+  *failed = (PetscBool)(caught != 0);
   PetscCall(VecNorm(y, NORM_2, &norm));
   if (PetscIsInfOrNanReal(norm)) PetscCall(VecSet(y, 0));
+  PetscCall(VecMedian(lo, y, hi, y));
   PetscCall(MatDestroy(&J));
-  PetscCall(VecDestroy(&d));
   PetscCall(VecDestroy(&w));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTaoSolve(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscInt *its,
+                            PetscBool *solved)
+{
+  Vec d;
+  PetscReal size = 1;
+  PetscBool failed;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(y, &d));
+  PetscCall(Scale(H, f, lo, hi, y, d, &size));
+  PetscCall(CatchRun(type, max_its, H, f, lo, hi, y, PETSC_FALSE, its, solved, &failed));
+  if (failed) PetscCall(CatchRun(type, max_its, H, f, lo, hi, y, PETSC_TRUE, its, solved, &failed));
+  PetscCall(VecPointwiseMult(y, y, d));
+  PetscCall(VecScale(y, size));
+  PetscCall(VecDestroy(&d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of each pair (z_i, w_i) the smaller is 0: a force that an interior or first-order type left where the gap is open. */
+static void Clean(PetscInt n, const PetscReal M[], const PetscReal q[], PetscReal z[])
+{
+  PetscReal size_z = 0, size_q = 0;
+
+  for (PetscInt i = 0; i < n; i++) {
+    size_z = PetscMax(size_z, PetscAbsReal(z[i]));
+    size_q = PetscMax(size_q, PetscAbsReal(q[i]));
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    PetscReal w = q[i];
+
+    if (z[i] == 0 || z[i] > 1e-9 * size_z) continue;
+    for (PetscInt j = 0; j < n; j++) w += M[(size_t)j * (size_t)n + (size_t)i] * z[j];
+    if (w * size_z > z[i] * size_q) z[i] = 0;
+  }
 }
 
 PetscErrorCode HycoTaoLCP(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric, PetscInt type,
@@ -231,6 +297,7 @@ PetscErrorCode HycoTaoLCP(PetscInt n, const PetscReal M[], const PetscReal q[], 
   PetscCall(VecGetArray(y, &h));
   PetscCall(PetscArraycpy(z, h, n));
   PetscCall(VecRestoreArray(y, &h));
+  Clean(n, M, q, z);
   PetscCall(VecDestroy(&y));
   PetscCall(VecDestroy(&f));
   PetscCall(VecDestroy(&lo));

@@ -34,6 +34,40 @@ static PetscErrorCode Envelope(Mat K, IS order, PetscReal *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On several ranks, without looking at an order: at most two neighbours in the mean, a mesh of lines. */
+static PetscErrorCode IsLine(Mat K, PetscBool *line)
+{
+  PetscInt n;
+  MatInfo info;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(K, &n, NULL));
+  PetscCall(MatGetInfo(K, MAT_GLOBAL_SUM, &info));
+  *line = (PetscBool)(info.nz_used <= 3 * (PetscReal)n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoThinSolver(PC pc)
+{
+  MPI_Comm comm = PetscObjectComm((PetscObject)pc);
+  PetscMPIInt size;
+  KSP each;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  if (size > 1) { /* every rank factors all of it: less work than agreeing on a part */
+    PetscCall(PCSetType(pc, PCREDUNDANT));
+    PetscCall(PCRedundantSetNumber(pc, size));
+    PetscCall(PCRedundantGetKSP(pc, &each));
+    PetscCall(KSPSetType(each, KSPPREONLY));
+    PetscCall(KSPGetPC(each, &pc));
+    PetscCall(PCSetType(pc, PCCHOLESKY));
+  }
+  PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERPETSC));
+  PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGRCM));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoThin(Mat K, PetscBool *thin)
 {
   PetscInt n;
@@ -45,7 +79,11 @@ PetscErrorCode HycoThin(Mat K, PetscBool *thin)
   PetscFunctionBegin;
   *thin = PETSC_FALSE;
   PetscCall(PetscObjectTypeCompare((PetscObject)K, MATSEQAIJ, &aij));
-  if (!aij) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!aij) {
+    PetscCall(PetscObjectTypeCompare((PetscObject)K, MATMPIAIJ, &aij));
+    if (aij) PetscCall(IsLine(K, thin));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(MatGetSize(K, &n, NULL));
   PetscCall(MatGetInfo(K, MAT_LOCAL, &info));
   if (info.nz_used > HYCO_THIN_ROW * (PetscReal)n) PetscFunctionReturn(PETSC_SUCCESS);

@@ -26,13 +26,17 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   ReportVector(json, "u_min", s->dim, s->u_min);
   ReportVector(json, "u_max", s->dim, s->u_max);
   cJSON_AddNumberToObject(json, "strain_energy", s->strain_energy);
+  cJSON_AddNumberToObject(json, "external_work", s->external_work);
+  cJSON_AddNumberToObject(json, "gap_work", s->gap_work);
+  cJSON_AddNumberToObject(json, "energy_defect", s->energy_defect);
   ReportKKT(json, &s->kkt);
   cJSON_AddNumberToObject(json, "rounding", s->kkt.rounding);
   ReportSeconds(json, &s->seconds);
   PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
                 (int)s->n_active, (int)s->iterations, method));
-  PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g\n", (double)s->total_contact_force,
-                (double)s->lambda_max, (double)s->strain_energy));
+  PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g, identity to %.1e\n",
+                (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
+                (double)s->energy_defect));
   PetscCall(
       Say("KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
           (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,

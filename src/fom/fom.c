@@ -301,28 +301,6 @@ PetscErrorCode HycoFOMGetSystem(HycoFOM f, HycoSystem *system)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Strain energy over every cell once: a cell counts on the rank that owns its first node. */
-static PetscErrorCode Energy(HycoFOM f, PetscReal *energy)
-{
-  const PetscScalar *u;
-  PetscReal *each, mine = 0;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(f->part->n_cells, &each));
-  PetscCall(VecGetArrayRead(f->U_local, &u));
-  PetscCall(HycoFEEnergy(f->fe, u, each));
-  PetscCall(VecRestoreArrayRead(f->U_local, &u));
-  for (PetscInt e = 0; e < f->part->n_cells; e++) {
-    const PetscInt i = f->part->cells[e * f->part->nv],
-                   row = (f->part->node_global ? f->part->node_global[i] : i) - f->first;
-
-    if (row >= 0 && row < f->n_owned) mine += each[e];
-  }
-  PetscCall(PetscFree(each));
-  PetscCallMPI(MPI_Allreduce(&mine, energy, 1, MPIU_REAL, MPI_SUM, f->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
 {
   HycoSummary *s;
@@ -337,7 +315,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(HycoSolverGetIterations(f->solver, &s->iterations));
   PetscCall(HycoSolverGetKKT(f->solver, &s->kkt));
   PetscCall(HycoSolverGetReason(f->solver, &s->reason));
-  PetscCall(Energy(f, &s->strain_energy));
+  PetscCall(HycoFOMEnergy(f, s));
   s->n_active = 0;
   s->total_contact_force = s->lambda_max = s->lambda_norm2 = s->u_norm2 = 0;
   if (f->rank == 0) {

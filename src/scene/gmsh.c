@@ -28,6 +28,7 @@ typedef struct {
   Group *group;
   size_t *tag; /* ascending tags of the kept nodes */
   PetscInt n_tags;
+  PetscInt *last, *before; /* of each cell its last facet, of each facet the cell's one before, or -1 */
 } Reader;
 
 static PetscErrorCode CheckGmsh(int ierr, const char path[])
@@ -320,6 +321,21 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
   }
 }
 
+/* Format 2.2 saves a facet once for each of its groups, and gmsh then gives every group all copies: one counts. */
+static PetscBool HasTwin(const Reader *r, HycoMesh m, PetscInt cell, PetscInt group, const PetscInt facet[])
+{
+  for (PetscInt f = r->last[cell]; f >= 0; f = r->before[f]) {
+    const PetscInt *other = m->facets + f * m->nf;
+    PetscInt same = 0;
+
+    for (PetscInt v = 0; v < m->nf; v++) {
+      for (PetscInt w = 0; w < m->nf; w++) same += facet[v] == other[w];
+    }
+    if (m->facet_group[f] == group && same == m->nf) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
 static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g, PetscInt group,
                                 const PetscInt start[], const PetscInt around[])
 {
@@ -347,7 +363,10 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
       g->inner++;
       continue;
     }
+    if (HasTwin(r, m, cell, group, facet)) continue;
     TurnOutward(m, cell, facet);
+    r->before[m->n_facets] = r->last[cell];
+    r->last[cell] = m->n_facets;
     m->facet_group[m->n_facets] = group;
     m->facet_cell[m->n_facets] = cell;
     m->n_facets++;
@@ -407,6 +426,9 @@ static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(PetscMalloc1(n_facets * m->nf, &m->facets));
   PetscCall(PetscMalloc1(n_facets, &m->facet_group));
   PetscCall(PetscMalloc1(n_facets, &m->facet_cell));
+  PetscCall(PetscMalloc1(n_facets, &r->before));
+  PetscCall(PetscMalloc1(m->n_cells, &r->last));
+  for (PetscInt e = 0; e < m->n_cells; e++) r->last[e] = -1;
   PetscCall(HycoMeshNodeCells(m, &start, &around));
   for (PetscInt k = 0; k < r->n_groups; k++) {
     PetscCall(PetscStrallocpy(r->group[k].name, &m->group_name[k]));
@@ -445,8 +467,9 @@ static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m)
 
     for (PetscInt k = start[cell[0]]; k < start[cell[0] + 1]; k++) {
       HycoCheck(around[k] >= e || !CellHas(m, around[k], m->nv, cell),
-                "%s: cells %d and %d have the same nodes: is one cell in two bodies?", scene->mesh_path,
-                (int)m->cell_id[around[k]], (int)m->cell_id[e]);
+                "%s: cells %d and %d have the same nodes: is one cell in two bodies? Format 2.2 saves a cell once for "
+                "each of its groups; save as 4.1 to keep it in several",
+                scene->mesh_path, (int)m->cell_id[around[k]], (int)m->cell_id[e]);
     }
   }
   PetscCall(PetscFree(start));
@@ -577,6 +600,8 @@ PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
   }
   PetscCall(PetscFree(r.group));
   PetscCall(PetscFree(r.tag));
+  PetscCall(PetscFree(r.last));
+  PetscCall(PetscFree(r.before));
   if (ierr) PetscCall(HycoMeshDestroy(&m));
   PetscCall(ierr);
   PetscCall(HycoMeshCheckGroups(m, scene));

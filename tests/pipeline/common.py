@@ -52,10 +52,12 @@ class Case(unittest.TestCase):
         self.assertLessEqual(abs(found - expected), relative * abs(expected), f'{what}: {found!r} for {expected!r}')
 
     def solved(self, report, tolerance=1e-8):
-        """The Karush-Kuhn-Tucker residuals that the run recomputed."""
+        """The Karush-Kuhn-Tucker residuals that the run recomputed; of full order, the energy identity too."""
         self.assertTrue(report['converged'])
         for name, value in report['kkt'].items():
             self.assertLess(value, tolerance, f'KKT residual {name}')
+        if report['command'] == 'solve':
+            self.assertLess(report['energy_defect'], tolerance, 'energy identity')
 
 
 def msh(path, nodes, elements, names, binary=False):

@@ -97,6 +97,24 @@ class Scenes(Case):
         self.near(forces[2], forces[0], 1e-6)
         self.near(self.balance(r), 2 * 2.5, 1e-6)
 
+    def test_obstacle_on_whole_body(self):
+        """Every node has an obstacle, those of the foot one that they cannot move to: gap coordinates, as in the dual
+        form. Elasticity couples with both signs: no start from coarser problems, and none that changes anything."""
+        self.block('quad4', 12, CONTACT.replace('group: head', 'group: block') % 'gap*(1 + 2*y*sin(4*x)^2)')
+        dual = self.hyco('solve', '-scene', self.folder, '-mu', '4,0.01', '-hyco_solver_form', 'dual')
+        self.assertEqual(dual['n_contacts'], 13 * 13 - 2)  # the foot's ends are wholly fixed
+        self.assertTrue(10 < dual['n_active'] < 13 * 12)
+        for more in ([], ['-hyco_solver_multilevel', 'false']):
+            for ranks in (1, 2):
+                with self.subTest(more=more, ranks=ranks):
+                    r = self.hyco('solve', '-scene', self.folder, '-mu', '4,0.01', *more, ranks=ranks)
+                    self.solved(r)
+                    self.assertEqual(r['solver'], 'active_set primal')
+                    self.assertEqual(r['active_set_iterations'], dual['active_set_iterations'])
+                    self.assertEqual(r['n_active'], dual['n_active'])
+                    for name in ('total_contact_force', 'strain_energy', 'lambda_norm2'):
+                        self.near(r[name], dual[name], 1e-10, name)
+
     def balance(self, report):
         """Contact force plus the foot's reaction from the cell stresses: all of the pull (equilibrium)."""
         self.hyco('solve', '-scene', self.folder, '-mu', '2.5,0.01', '-output', 'b.xdmf')

@@ -83,7 +83,8 @@ static PetscErrorCode TestSolverOrder(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On the rope: nothing may be asked before Solve; a point outside the ranges; then the numbers of an independent computation. */
+/* On the rope: nothing may be asked before Solve; a point outside the ranges; then the numbers of an independent
+ * computation. */
 static PetscErrorCode TestFOMOrder(void)
 {
   const PetscReal inside[2] = {0.07, 0.17}, outside[2] = {0.04, 0.17};

@@ -195,9 +195,64 @@ static PetscErrorCode TestNone(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Two contacts that are one: the smaller gap decides; one of them may carry the force, the other none. */
+static PetscErrorCode TestTwice(void)
+{
+  const PetscReal M[4] = {2, 2, 2, 2}, q[4][2] = {{-4, -4}, {-4, -6}, {-6, -4}, {-4, 1}};
+  const PetscReal force[4] = {2, 3, 3, 2}; /* largest -q / 2 */
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 4; k++) {
+    for (int symmetric = 0; symmetric < 2; symmetric++) {
+      PetscBool active[2] = {PETSC_FALSE, PETSC_FALSE};
+      PetscReal z[2];
+      PetscInt its;
+      HycoLCPStatus status;
+
+      PetscCall(HycoLCPActiveSet(2, M, q[k], (PetscBool)symmetric, 100, NULL, NULL, active, z, &its, &status));
+      CHECK(status == HYCO_LCP_SOLVED, "case %d: status %d", k, (int)status);
+      CHECK_NEAR(z[0] + z[1], force[k], 1e-14);
+      CHECK(z[0] * z[1] == 0, "case %d: forces %g, %g: one of them must be zero", k, z[0], z[1]);
+      CHECK(active[0] + active[1] == 1, "case %d: the other must leave the set", k);
+      PetscCall(HycoLCPLemke(2, M, q[k], 100, z, &its, &status));
+      CHECK(status == HYCO_LCP_SOLVED, "Lemke, case %d: status %d", k, (int)status);
+      CHECK_NEAR(z[0] + z[1], force[k], 1e-14);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* M = C C^T with the rows e1, e2, (e1 + e2): the third repeats the first two together; pushed at by all three, with
+   gaps that agree (-1, -1, -2) or not. Two independent contacts then hold x = -C^T z, and Violation() sees the third.
+ */
+static PetscErrorCode TestThree(void)
+{
+  const PetscReal M[9] = {1, 0, 1, 0, 1, 1, 1, 1, 2}, q[4][3] = {{-1, -1, -2}, {-1, -1, -3}, {-1, -1, -1}, {-2, 1, -2}};
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 4; k++) {
+    PetscBool active[3] = {PETSC_FALSE, PETSC_FALSE, PETSC_FALSE};
+    PetscReal z[3];
+    PetscInt its;
+    HycoLCPStatus status;
+
+    PetscCall(HycoLCPLemke(3, M, q[k], 100, z, &its, &status));
+    CHECK(status == HYCO_LCP_SOLVED && Violation(3, M, q[k], z) < 1e-14, "Lemke, case %d: status %d, violation %g", k,
+          (int)status, Violation(3, M, q[k], z));
+    PetscCall(HycoLCPActiveSet(3, M, q[k], PETSC_TRUE, 100, NULL, NULL, active, z, &its, &status));
+    CHECK(status == HYCO_LCP_SOLVED || status == HYCO_LCP_SINGULAR, "case %d: status %d", k, (int)status);
+    CHECK(status != HYCO_LCP_SOLVED || Violation(3, M, q[k], z) < 1e-14, "case %d: violation %g", k,
+          Violation(3, M, q[k], z));
+    CHECK(status == HYCO_LCP_SOLVED || k == 1 || k == 3, "case %d: its gaps agree, it must be solved", k);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
+  PetscCall(TestTwice());
+  PetscCall(TestThree());
   PetscCall(TestRandom());
   PetscCall(TestMurty());
   PetscCall(TestCycle());

@@ -1,0 +1,122 @@
+/*
+  The energies of a full-order solution, and the identity that ties them. With the whole stiffness (no unknown taken
+  out), loads F, support reactions R and the gap D as drawn, K U = F + R - B^T L and L_i (D - B U)_i = 0 give
+
+      2 W = F.U + R.u0 - L.D
+
+  W comes from the stresses, the work from F and the element matrices, so that neither can hide an error of the other.
+*/
+#include <hycofomimpl.h>
+
+/* The place of a node of the part among this rank's rows, or -1. */
+static PetscInt Owned(HycoFOM f, PetscInt node)
+{
+  const PetscInt row = (f->part->node_global ? f->part->node_global[node] : node) - f->first;
+
+  return row >= 0 && row < f->n_owned ? row : -1;
+}
+
+/* F.U over this rank's free unknowns; F holds the lifting -K u0 of the prescribed displacements, given back below. */
+static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
+{
+  const PetscInt dim = f->part->dim;
+  const PetscScalar *F, *u;
+
+  PetscFunctionBegin;
+  *work = 0;
+  PetscCall(VecGetArrayRead(f->F, &F));
+  PetscCall(VecGetArrayRead(f->U_local, &u));
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    const PetscInt row = Owned(f, i);
+
+    for (PetscInt c = 0; row >= 0 && c < dim; c++) {
+      if (!f->fe->fixed[i * dim + c]) *work += F[row * dim + c] * u[i * dim + c];
+    }
+  }
+  PetscCall(VecRestoreArrayRead(f->F, &F));
+  PetscCall(VecRestoreArrayRead(f->U_local, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* u0.K (2 u - u0) of one cell: u0.K (u - u0), which the lifting took from F.U, and the elastic part u0.K u of R.u0. */
+static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[], PetscReal *work)
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt *node = m->cells + cell * m->nv, n = m->nv * m->dim;
+  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *work = 0;
+  for (PetscInt k = 0; k < n; k++) any = (PetscBool)(any || fe->u0[node[k / m->dim] * m->dim + k % m->dim] != 0);
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFEElementStiffness(fe, cell, Ke));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal u0 = fe->u0[node[k / m->dim] * m->dim + k % m->dim];
+
+    for (PetscInt j = 0; u0 != 0 && j < n; j++) {
+      const PetscInt dof = node[j / m->dim] * m->dim + j % m->dim;
+
+      *work += u0 * Ke[k * n + j] * (2 * u[dof] - fe->u0[dof]);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sums strain energy and lifting over this rank's cells: a cell counts on the rank that owns its first node. */
+static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
+{
+  const PetscScalar *u;
+  PetscReal *each, one;
+
+  PetscFunctionBegin;
+  *strain = *lifting = 0;
+  PetscCall(PetscMalloc1(f->part->n_cells, &each));
+  PetscCall(VecGetArrayRead(f->U_local, &u));
+  PetscCall(HycoFEEnergy(f->fe, u, each));
+  for (PetscInt e = 0; e < f->part->n_cells; e++) {
+    if (Owned(f, f->part->cells[e * f->part->nv]) < 0) continue;
+    PetscCall(LiftingWork(f->fe, e, u, &one));
+    *strain += each[e];
+    *lifting += one;
+  }
+  PetscCall(VecRestoreArrayRead(f->U_local, &u));
+  PetscCall(PetscFree(each));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On rank 0: L.D with the gap as drawn, and what contacts push on fixed unknowns, L.(B u0) over those. */
+static PetscErrorCode ContactSums(HycoFOM f, PetscReal *gap_work, PetscReal *fixed_work)
+{
+  PetscReal *normal, *gap;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(3 * f->pairs.n, &normal, f->pairs.n, &gap));
+  PetscCall(HycoContactGeometry(f->fe_whole, &f->pairs, normal, gap));
+  *gap_work = *fixed_work = 0;
+  for (PetscInt k = 0; k < f->pairs.n; k++) {
+    *gap_work += f->lambda[k] * gap[k];
+    *fixed_work += f->lambda[k] * (gap[k] - f->gap[k]);
+  }
+  PetscCall(PetscFree2(normal, gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMEnergy(HycoFOM f, HycoSummary *s)
+{
+  PetscReal mine[4] = {0, 0, 0, 0}, all[4], free_work = 0, lifting = 0, largest;
+
+  PetscFunctionBegin;
+  PetscCall(FreeWork(f, &free_work));
+  PetscCall(CellSums(f, &mine[0], &lifting));
+  if (f->rank == 0) PetscCall(ContactSums(f, &mine[2], &mine[3]));
+  mine[1] = free_work + lifting;
+  PetscCallMPI(MPI_Allreduce(mine, all, 4, MPIU_REAL, MPI_SUM, f->comm));
+  s->strain_energy = all[0];
+  s->external_work = all[1] + all[3];
+  s->gap_work = all[2];
+  largest = PetscMax(PetscMax(2 * s->strain_energy, PetscAbsReal(s->external_work)), PetscAbsReal(s->gap_work));
+  s->energy_defect = PetscAbsReal(2 * s->strain_energy - s->external_work + s->gap_work);
+  if (largest > 0) s->energy_defect /= largest;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

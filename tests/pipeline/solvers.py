@@ -1,0 +1,119 @@
+"""Every method and form on full-order problems, on 1 and 2 ranks: the same forces, one table (solvers.md).
+
+UNFIT names what does not solve alone, and why; it must then end not converged without a report, or, with the fallback,
+solved by another method that the report names. Nothing may give another force."""
+import json
+import os
+import sys
+import time
+import unittest
+
+from common import PELLET, ROPE, SOURCE, Case, msh
+
+BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
+NEWTON = ['gpcg', 'tron', 'bntr', 'bnls', 'bntl']
+FIRST_ORDER = ['blmvm', 'bncg']
+QUASI = ['bqnls', 'bqnkls', 'bqnktr', 'bqnktl', 'bqpip']
+SEMISMOOTH = ['ssils', 'asils', 'ssfls', 'asfls']
+METHODS = ([('active_set', 'dual', ''), ('active_set', 'primal', ''), ('lemke', 'dual', '')]
+           + [('tao', form, t) for form in ('dual', 'primal', 'dual_free') for t in NEWTON + FIRST_ORDER + QUASI]
+           + [('tao', 'dual', t) for t in SEMISMOOTH])
+STANDS = 'stands still before the tolerance'
+
+# (scene, form, TAO types): why it does not solve alone. Whether it does on some machine is not promised.
+UNFIT = [
+    ('*', '*', QUASI, 'quasi-Newton-Krylov and interior-point types are unfit everywhere (unit/battery.c)'),
+]
+
+
+def unfit(scene, form, tao):
+    for s, f, types, why in UNFIT:
+        if s in ('*', scene) and f in ('*', form) and tao in types:
+            return why
+    return ''
+
+
+class Solvers(Case):
+    rows = {}
+
+    @classmethod
+    def tearDownClass(cls):
+        table = cls.table()
+        print(table, file=sys.stderr)
+        with open('solvers.md', 'w', encoding='utf-8') as f:
+            f.write(table)
+        super().tearDownClass()
+
+    @classmethod
+    def table(cls):
+        scenes = list(dict.fromkeys(scene for _, scene in cls.rows))
+        lines = ['| method | ' + ' | '.join(scenes) + ' |', '|---' * (len(scenes) + 1) + '|']
+        for method in dict.fromkeys(method for method, _ in cls.rows):
+            lines.append(f'| {method} | ' + ' | '.join(cls.rows.get((method, s), '') for s in scenes) + ' |')
+        return '\n'.join(lines) + '\n'
+
+    def one(self, scene, base, method, ranks, expected):
+        kind, form, tao = method
+        args = ['solve', *base, '-hyco_solver_type', kind, '-hyco_solver_form', form, '-hyco_solver_fallback', 'false',
+                *(['-hyco_tao_type', tao] if tao else [])]
+        report = self.path('one.json')
+        if os.path.exists(report):
+            os.remove(report)
+        begin = time.monotonic()
+        run = self.run_raw(*args, '-report', report, ranks=ranks)
+        name = ' '.join(w for w in (kind, tao, form) if w)
+        why = unfit(scene, form, tao)
+        cell = f'unfit: {why}'
+        if run.returncode:
+            self.assertTrue(why, f'{name} on {scene}, {ranks} ranks: {run.stderr}')
+            self.assertIn('not converged', run.stderr)
+            self.assertFalse(os.path.exists(report), f'{name} on {scene}: a report of what did not converge')
+        else:
+            with open(report, encoding='utf-8') as f:
+                r = json.load(f)
+            self.solved(r)
+            self.near(r['total_contact_force'], expected, 1e-8 if not why else 1e-6, f'{name} on {scene}, {ranks} ranks')
+            self.assertEqual(r['solver'], name)
+            if not why:
+                cell = f"{r['active_set_iterations']} its, {max(r['kkt'].values()):.0e}, {r['seconds']['solve']:.2g} s"
+        key = (name, f'{scene}, {ranks} rank' + 's' * (ranks > 1))
+        self.rows[key] = cell
+        self.assertLess(time.monotonic() - begin, 90)
+
+    def every(self, scene, base, methods=METHODS):
+        expected = self.hyco('solve', *base)['total_contact_force']
+        for ranks in (1, 2):
+            for method in methods:
+                with self.subTest(scene=scene, method=method, ranks=ranks):
+                    self.one(scene, base, method, ranks, expected)
+        return expected
+
+    def test_rope_100(self):
+        self.near(self.every('rope 100', ['-scene', ROPE, '-mu', '0.07,0.17']), 0.3502256293, 1e-9)
+
+    def test_rope_2000(self):
+        n = 2000
+        mesh = self.path('rope2000.msh')
+        msh(mesh, [(i / (n - 1), 0, 0) for i in range(n)],
+            [(1, 1, [i + 1, i + 2]) for i in range(n - 1)] + [(15, 2, [1]), (15, 2, [n])],
+            {1: (1, 'rope'), 2: (0, 'ends')})
+        self.every('rope 2000', ['-scene', ROPE, '-scene_mesh', mesh, '-mu', '0.07,0.17'])
+
+    def test_blocks(self):
+        self.every('blocks', ['-scene', BLOCKS, '-mu', '0.05,0.05'])
+
+    def test_pellet(self):
+        self.near(self.every('pellet A', ['-scene', PELLET, '-mu', '4.06,1']), 1409.70532353, 1e-8)
+
+    def test_fallback(self):
+        """What does not solve alone is solved by the next method, and the report says by which."""
+        for form in ('dual', 'dual_free'):
+            r = self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17', '-hyco_solver_type', 'tao', '-hyco_solver_form', form,
+                          '-hyco_tao_type', 'bqpip')
+            self.solved(r)
+            self.assertEqual(r['solver'], f'tao bqpip {form}, then active_set')
+            self.near(r['total_contact_force'], 0.3502256293, 1e-9)
+
+
+if __name__ == '__main__':
+    unittest.main()
