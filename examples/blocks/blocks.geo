@@ -1,9 +1,9 @@
 // A block [0, a] x [0, h] on a foundation [0, b] x [-d, 0], right half of both, triangles; the two lines of contact
-// coincide and are meshed alike. gmsh -2 blocks.geo -setnumber n 24 -o out.msh
-// n: elements of the contact line. Each body has points of its own and nothing is made coherent, so that gmsh does not
+// coincide and are meshed alike, or not. gmsh -2 blocks.geo -setnumber n 24 -setnumber m 17 -o out.msh
+// n, m: elements of the contact line of the block and of the foundation (0: n). Each body has points of its own and nothing is made coherent, so that gmsh does not
 // merge the two lines.
 Geometry.AutoCoherence = 0;
-DefineConstant[ n = {24}, a = {20}, h = {16}, b = {40}, d = {24} ];
+DefineConstant[ n = {24}, m = {0}, a = {20}, h = {16}, b = {40}, d = {24} ];
 fine = a/n;
 coarse = 5*fine;
 // the block
@@ -16,7 +16,8 @@ Point(11) = {0, 0, 0, fine};     Point(12) = {a, 0, 0, fine};    Point(13) = {b,
 Point(14) = {b, -d, 0, coarse};  Point(15) = {0, -d, 0, coarse};
 Line(11) = {11, 12};  Line(12) = {12, 13};  Line(13) = {13, 14};  Line(14) = {14, 15};  Line(15) = {15, 11};
 Curve Loop(2) = {11, 12, 13, 14, 15};  Plane Surface(2) = {2};
-Transfinite Curve {1, 11} = n+1;
+Transfinite Curve {1} = n+1;
+Transfinite Curve {11} = (m > 0 ? m : n)+1;
 Physical Surface("block", 1) = {1};
 Physical Surface("foundation", 2) = {2};
 Physical Curve("block_sym", 11) = {4};

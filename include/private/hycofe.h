@@ -76,21 +76,34 @@ PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[]);
 
 /* -- contact: all on one process, over a mesh that has every contact node -- */
 
-/* N_lambda contacts in the order of the scene's contacts, then of the slave's tag. */
+/*
+  N_lambda contacts in the order of the scene's contacts, then of the slave's tag. A contact's master point is the sum
+  of weight[j] times node master[j], j in master_start[k] .. master_start[k+1] - 1: no node for an obstacle, one of
+  weight 1 for a pair, up to four (of a facet, ascending, weights positive with sum 1) on a surface.
+*/
 typedef struct {
   PetscInt n;
-  PetscInt *slave, *master; /* node indices; master -1 for an obstacle */
-  PetscInt *contact;        /* index in scene->contact */
+  PetscInt *slave;   /* node indices */
+  PetscInt *contact; /* index in scene->contact */
+  PetscInt *master_start, *master;
+  PetscReal *weight;
 } HycoPairs;
 
 PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
 PetscErrorCode HycoPairsDestroy(HycoPairs *pairs);
-/* Normals n (n x 3) and gaps D (n) at fe's mu. */
+/* The same contacts with node i called index[i]. The caller destroys it. */
+PetscErrorCode HycoPairsRenumber(const HycoPairs *pairs, const PetscInt index[], HycoPairs *out);
+/* Sets node[i] for every slave and master node; the others are left alone. */
+void HycoPairsMark(const HycoPairs *pairs, PetscBool node[]);
+/* The most nodes of one contact: a row of B has at most dim times as many entries. */
+PetscInt HycoPairsWidth(const HycoPairs *pairs);
+/* Normals n (n x 3) and gaps D (n) at fe's mu: given ones are evaluated at the master point (obstacle: the slave), a
+   measured gap is n . (master point - slave), on moved nodes. */
 PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal normal[], PetscReal gap[]);
 /*
   The rows of B over the free unknowns, in CSR over local dofs (node * dim + component), and D less what the fixed
-  unknowns contribute: start[n + 1], dof[], value[] (room for 6 n entries). Fails when a row has no free unknown and
-  the prescribed displacements penetrate.
+  unknowns contribute: start[n + 1], dof[], value[] (room for HycoPairsWidth() dim n entries). Fails when a row has no
+  free unknown and the prescribed displacements penetrate.
 */
 PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
                                PetscReal gap[]);

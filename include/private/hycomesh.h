@@ -61,9 +61,9 @@ PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt k
 /* Cells around each node: CSR start[n_nodes + 1], cell[]. The caller frees both. */
 PetscErrorCode HycoMeshNodeCells(HycoMesh mesh, PetscInt **start, PetscInt **cell);
 
-/* Spreads rank 0's whole mesh over comm: each rank receives its part. Pairs (n_pairs x 2 node indices, rank 0) stay
-   on one rank. n_owned, first: this rank's rows of nodes in the distributed numbering. On one rank *part = whole.
-   Collective. */
+/* Spreads rank 0's whole mesh over comm: each rank receives its part. Pairs (n_pairs x 2 node indices slave, master,
+   rank 0) stay on one rank where they can: always, when no master has two slaves. n_owned, first: this rank's rows of
+   nodes in the distributed numbering. On one rank *part = whole. Collective. */
 PetscErrorCode HycoMeshDistribute(MPI_Comm comm, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
                                   HycoMesh *part, PetscInt *n_owned, PetscInt *first, PetscInt **global_of_whole);
 

@@ -42,15 +42,16 @@ typedef struct {
 
 typedef enum {
   HYCO_CONTACT_OBSTACLE, /* n . u <= gap on the nodes of a group */
-  HYCO_CONTACT_PAIR      /* n . (u_slave - u_master) <= gap on node pairs */
+  HYCO_CONTACT_PAIR,     /* n . (u_slave - u_master) <= gap on node pairs */
+  HYCO_CONTACT_SURFACE   /* the same at a slave node's projection on the master's facets */
 } HycoContactType;
 
 typedef struct {
   char *name;
   HycoContactType type;
   char *slave, *master; /* groups; an obstacle has only the slave ("group") */
-  PetscReal tolerance;  /* largest distance of a pair in the mesh file; < 0: a tenth of the local facet size */
-  HycoExpr normal[3];   /* all or none: outward normal of the slave side, at the master's node (obstacle: slave's) */
+  PetscReal tolerance;  /* largest distance to the master in the mesh file; < 0: from the facets' size */
+  HycoExpr normal[3];   /* all or none: outward normal of the slave side, at the master point (obstacle: slave) */
   HycoExpr gap;         /* NULL: measured along the normal between the moved nodes */
 } HycoContact;
 

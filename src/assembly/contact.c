@@ -23,11 +23,21 @@ static PetscErrorCode SurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The normal of one pair: given, at the master's node (obstacle: the slave's), or from the slave's surface. */
-static PetscErrorCode PairNormal(HycoFE fe, const HycoContact *c, PetscInt slave, PetscInt master,
+/* The master point of contact k on the moved mesh; an obstacle's is the slave itself. */
+static void MasterPoint(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal x[3])
+{
+  const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
+
+  for (PetscInt c = 0; c < 3; c++) {
+    x[c] = lo == hi ? fe->X[3 * pairs->slave[k] + c] : 0;
+    for (PetscInt j = lo; j < hi; j++) x[c] += pairs->weight[j] * fe->X[3 * pairs->master[j] + c];
+  }
+}
+
+/* The normal of one contact: given, at the master point x, or from the slave's surface. */
+static PetscErrorCode PairNormal(HycoFE fe, const HycoContact *c, PetscInt slave, const PetscReal x[3],
                                  const PetscReal *vector, PetscReal n[3])
 {
-  const PetscInt at = master >= 0 ? master : slave;
   PetscReal length = 0;
 
   PetscFunctionBegin;
@@ -36,7 +46,7 @@ static PetscErrorCode PairNormal(HycoFE fe, const HycoContact *c, PetscInt slave
     if (vector)
       n[k] = vector[3 * slave + k];
     else if (c->normal[k])
-      PetscCall(HycoExprEval(c->normal[k], fe->mu, 1, fe->X + 3 * at, &n[k]));
+      PetscCall(HycoExprEval(c->normal[k], fe->mu, 1, x, &n[k]));
     if (k < fe->dim) length += n[k] * n[k];
   }
   length = PetscSqrtReal(length);
@@ -55,8 +65,8 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal 
   for (PetscInt k = 0; k < pairs->n; k++) {
     const HycoContact *c = &fe->scene->contact[pairs->contact[k]];
     const PetscBool given = (PetscBool)(c->normal[0] || c->normal[1] || c->normal[2]);
-    const PetscInt s = pairs->slave[k], r = pairs->master[k];
-    PetscReal *n = normal + 3 * k;
+    const PetscInt s = pairs->slave[k];
+    PetscReal *n = normal + 3 * k, x[3];
 
     if (!given && last != pairs->contact[k]) {
       PetscInt g = 0;
@@ -65,16 +75,34 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal 
       PetscCall(SurfaceVectors(fe, g, vector));
     }
     last = pairs->contact[k];
-    PetscCall(PairNormal(fe, c, s, r, given ? NULL : vector, n));
+    MasterPoint(fe, pairs, k, x);
+    PetscCall(PairNormal(fe, c, s, x, given ? NULL : vector, n));
     if (c->gap) {
-      PetscCall(HycoExprEval(c->gap, fe->mu, 1, fe->X + 3 * (r >= 0 ? r : s), &gap[k]));
+      PetscCall(HycoExprEval(c->gap, fe->mu, 1, x, &gap[k]));
     } else {
       gap[k] = 0;
-      for (PetscInt d = 0; d < 3; d++) gap[k] += n[d] * (fe->X[3 * r + d] - fe->X[3 * s + d]);
+      for (PetscInt d = 0; d < 3; d++) gap[k] += n[d] * (x[d] - fe->X[3 * s + d]);
     }
   }
   PetscCall(PetscFree(vector));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds `scale` times the normal at a node to a row: to its free unknowns as entries, to its fixed ones in the gap. */
+static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal normal[3], PetscInt *n, PetscInt dof[],
+                     PetscReal value[], PetscReal *gap)
+{
+  for (PetscInt c = 0; c < fe->dim; c++) {
+    const PetscReal entry = scale * normal[c];
+    const PetscInt i = node * fe->dim + c;
+
+    if (fe->fixed[i]) {
+      *gap -= entry * fe->u0[i];
+    } else if (PetscAbsReal(entry) > 1e-14) {
+      dof[*n] = i;
+      value[(*n)++] = entry;
+    }
+  }
 }
 
 PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
@@ -88,21 +116,9 @@ PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start
   PetscCall(HycoContactGeometry(fe, pairs, normal, gap));
   start[0] = 0;
   for (PetscInt k = 0; k < pairs->n; k++) {
-    for (PetscInt side = 0; side < 2; side++) {
-      const PetscInt node = side ? pairs->master[k] : pairs->slave[k];
-
-      for (PetscInt c = 0; node >= 0 && c < fe->dim; c++) {
-        const PetscReal entry = side ? -normal[3 * k + c] : normal[3 * k + c];
-        const PetscInt i = node * fe->dim + c;
-
-        if (fe->fixed[i]) {
-          gap[k] -= entry * fe->u0[i];
-        } else if (PetscAbsReal(entry) > 1e-14) {
-          dof[n] = i;
-          value[n++] = entry;
-        }
-      }
-    }
+    AddToRow(fe, pairs->slave[k], 1, normal + 3 * k, &n, dof, value, &gap[k]);
+    for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++)
+      AddToRow(fe, pairs->master[j], -pairs->weight[j], normal + 3 * k, &n, dof, value, &gap[k]);
     start[k + 1] = n;
     HycoCheck(start[k + 1] > start[k] || gap[k] >= 0,
               "contact %s: node %d is fixed, and its prescribed displacement penetrates by %g",

@@ -7,7 +7,7 @@
 
 #define HEAVY 1000
 
-/* The cell graph: cells sharing a facet, plus cells on the two sides of a contact pair. */
+/* The cell graph: cells sharing a facet, plus cells on the two sides of a contact. */
 static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pairs[], idx_t **xadj, idx_t **adjncy,
                                 idx_t **weight)
 {
@@ -23,15 +23,13 @@ static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pai
              PETSC_ERR_LIB, "METIS_MeshToDual failed");
   PetscCall(PetscFree2(eptr, eind));
   PetscCall(HycoMeshNodeCells(m, &start, &around));
-  /* One tie a pair: the first cell of each side. extra_of counts, tie lists both ends. */
+  /* One tie a pair of nodes: the first cell of each. extra_of counts, tie lists both ends. */
   PetscCall(PetscMalloc2(m->n_cells + 1, &extra_of, 2 * n_pairs, &tie));
   PetscCall(PetscArrayzero(extra_of, m->n_cells + 1));
   for (PetscInt k = 0; k < n_pairs; k++) {
-    if (pairs[2 * k + 1] < 0) continue;
-    for (PetscInt side = 0; side < 2; side++) {
-      tie[2 * n_extra + side] = (idx_t)around[start[pairs[2 * k + side]]];
-      extra_of[tie[2 * n_extra + side]]++;
-    }
+    for (PetscInt side = 0; side < 2; side++) tie[2 * n_extra + side] = (idx_t)around[start[pairs[2 * k + side]]];
+    if (tie[2 * n_extra] == tie[2 * n_extra + 1]) continue;
+    for (PetscInt side = 0; side < 2; side++) extra_of[tie[2 * n_extra + side]]++;
     n_extra++;
   }
   PetscCall(PetscMalloc1(m->n_cells + 1, xadj));
@@ -64,7 +62,7 @@ static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pai
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* owner[i] = rank of node i: the lowest rank among its cells'; both nodes of a pair follow the slave. */
+/* owner[i] = rank of node i: the lowest rank among its cells'; a master follows its slave (of several the last). */
 static PetscErrorCode OwnNodes(PetscMPIInt size, HycoMesh m, PetscInt n_pairs, const PetscInt pairs[], PetscInt owner[])
 {
   idx_t ne = (idx_t)m->n_cells, ncon = 1, parts = size, cut, *xadj, *adjncy, *weight, *part;
@@ -78,9 +76,7 @@ static PetscErrorCode OwnNodes(PetscMPIInt size, HycoMesh m, PetscInt n_pairs, c
   for (PetscInt i = 0; i < m->n_nodes; i++) owner[i] = size;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++)
     owner[m->cells[k]] = PetscMin(owner[m->cells[k]], (PetscInt)part[k / m->nv]);
-  for (PetscInt k = 0; k < n_pairs; k++) {
-    if (pairs[2 * k + 1] >= 0) owner[pairs[2 * k + 1]] = owner[pairs[2 * k]];
-  }
+  for (PetscInt k = 0; k < n_pairs; k++) owner[pairs[2 * k + 1]] = owner[pairs[2 * k]];
   PetscCall(PetscFree(xadj));
   PetscCall(PetscFree(adjncy));
   PetscCall(PetscFree(weight));

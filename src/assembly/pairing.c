@@ -1,39 +1,11 @@
 /*
-  Potential contacts: the nodes of an obstacle's group, or pairs of nodes by minimal distance between two surfaces
-  (section 3), found on the mesh as it stands in the file.
+  Potential contacts: the nodes of an obstacle's group, pairs of nodes by minimal distance between two surfaces (section
+  3), or a surface's nodes projected on the facets of another; found on the mesh as it stands in the file.
 */
+#include "nearest.h"
 #include <hycofe.h>
 #include <stdlib.h>
-
-/* The master nodes in boxes of one edge length, sorted by box, so that a search looks at 3^dim boxes. */
-typedef struct {
-  long long key;
-  PetscInt node;
-} Boxed;
-
-typedef struct {
-  PetscReal lo[3], edge;
-  PetscInt n;
-  Boxed *item;
-} Boxes;
-
-static long long BoxKey(const PetscInt at[3])
-{
-  return ((long long)at[0] * 2097152 + at[1]) * 2097152 + at[2];
-}
-
-static void BoxOf(const Boxes *b, const PetscReal x[3], PetscInt at[3])
-{
-  for (PetscInt c = 0; c < 3; c++) at[c] = (PetscInt)PetscFloorReal(PetscMin((x[c] - b->lo[c]) / b->edge, 2e6)) + 2;
-}
-
-static int CompareBoxed(const void *a, const void *b)
-{
-  const Boxed *p = (const Boxed *)a, *q = (const Boxed *)b;
-
-  if (p->key != q->key) return p->key < q->key ? -1 : 1;
-  return (p->node > q->node) - (p->node < q->node);
-}
+#include <string.h>
 
 static PetscReal Distance(HycoMesh m, PetscInt i, PetscInt j)
 {
@@ -42,69 +14,6 @@ static PetscReal Distance(HycoMesh m, PetscInt i, PetscInt j)
   for (PetscInt c = 0; c < 3; c++)
     sum += (m->xyz[3 * i + c] - m->xyz[3 * j + c]) * (m->xyz[3 * i + c] - m->xyz[3 * j + c]);
   return PetscSqrtReal(sum);
-}
-
-static PetscErrorCode BoxesCreate(HycoMesh m, PetscInt n, const PetscInt node[], PetscReal edge, Boxes *b)
-{
-  PetscReal span = 0;
-
-  PetscFunctionBegin;
-  for (PetscInt c = 0; c < 3; c++) {
-    PetscReal hi = PETSC_MIN_REAL;
-
-    b->lo[c] = PETSC_MAX_REAL;
-    for (PetscInt k = 0; k < n; k++) {
-      b->lo[c] = PetscMin(b->lo[c], m->xyz[3 * node[k] + c]);
-      hi = PetscMax(hi, m->xyz[3 * node[k] + c]);
-    }
-    span = PetscMax(span, hi - b->lo[c]);
-  }
-  b->edge = PetscMax(PetscMax(edge, span * 1e-6), PETSC_SMALL * 1e-200);
-  b->n = n;
-  PetscCall(PetscMalloc1(n, &b->item));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscInt at[3];
-
-    BoxOf(b, m->xyz + 3 * node[k], at);
-    b->item[k].key = BoxKey(at);
-    b->item[k].node = node[k];
-  }
-  qsort(b->item, (size_t)n, sizeof(Boxed), CompareBoxed);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The nearest master within one edge of node i, or -1; of equally near ones the smallest tag. */
-static PetscInt BoxesNearest(HycoMesh m, const Boxes *b, PetscInt i)
-{
-  PetscInt at[3], best = -1;
-  PetscReal distance = 0;
-
-  BoxOf(b, m->xyz + 3 * i, at);
-  for (PetscInt k = 0; k < 27; k++) {
-    const PetscInt near[3] = {at[0] + k % 3 - 1, at[1] + k / 3 % 3 - 1, at[2] + k / 9 - 1};
-    const long long key = BoxKey(near);
-    PetscInt lo = 0, hi = b->n;
-
-    if (near[0] < 0 || near[1] < 0 || near[2] < 0) continue;
-    while (lo < hi) {
-      const PetscInt mid = lo + (hi - lo) / 2;
-
-      if (b->item[mid].key < key)
-        lo = mid + 1;
-      else
-        hi = mid;
-    }
-    for (; lo < b->n && b->item[lo].key == key; lo++) {
-      const PetscInt j = b->item[lo].node;
-      const PetscReal d = Distance(m, i, j);
-
-      if (best < 0 || d < distance || (d == distance && m->node_id[j] < m->node_id[best])) {
-        best = j;
-        distance = d;
-      }
-    }
-  }
-  return best;
 }
 
 /* The tolerance when none is stated: a tenth of the shortest edge between the slave's facet corners. */
@@ -120,53 +29,180 @@ static PetscReal DefaultTolerance(HycoMesh m, PetscInt group)
   return shortest < PETSC_MAX_REAL ? shortest / 10 : 0;
 }
 
-static PetscErrorCode Complain(HycoMesh m, const HycoContact *c, PetscInt missed, PetscInt slaves, PetscInt first,
-                               PetscReal tolerance, PetscInt n_master, const PetscInt master[])
-{
-  PetscReal nearest = PETSC_MAX_REAL;
+/* A slave node too far from the master. */
+typedef struct {
+  PetscReal distance;
+  PetscInt node;
+} Missed;
 
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < n_master; k++) nearest = PetscMin(nearest, Distance(m, first, master[k]));
-  HycoFail("contact %s: %d of the %d nodes of %s have no node of %s within %g; the first is node %d, %g away; mesh "
-           "both surfaces alike, or raise contact_%s_tolerance",
-           c->name, (int)missed, (int)slaves, c->slave, c->master, (double)tolerance, (int)m->node_id[first],
-           (double)nearest, c->name);
+static int FarthestFirst(const void *a, const void *b)
+{
+  const Missed *p = (const Missed *)a, *q = (const Missed *)b;
+
+  if (p->distance != q->distance) return p->distance > q->distance ? -1 : 1;
+  return (p->node > q->node) - (p->node < q->node);
 }
 
-static PetscErrorCode FindPairs(HycoMesh m, const HycoContact *c, PetscInt index, PetscInt gs, PetscInt gm,
-                                HycoPairs *p)
+/* What one contact's search needs: the master's patches, and for pairs the slave that each node has found. */
+typedef struct {
+  HycoPatches patches;
+  PetscInt n, nf, *node; /* patches' nodes, n x nf */
+  PetscInt *partner_of;  /* by node, or -1 */
+  Missed *missed;
+} Partners;
+
+/* Whether a point of a surface lies on its border: the edge that it is on, or an edge at the node that it is, has one
+   facet. */
+static PetscBool AtBorder(const Partners *t, const HycoProjection *p)
 {
-  const PetscInt *slave = m->group_node + m->group_start[gs], n_slave = m->group_start[gs + 1] - m->group_start[gs];
-  const PetscInt *master = m->group_node + m->group_start[gm], n_master = m->group_start[gm + 1] - m->group_start[gm];
-  const PetscReal tolerance = c->tolerance >= 0 ? c->tolerance : DefaultTolerance(m, gs);
-  PetscInt missed = 0, first = -1, *partner_of;
-  Boxes boxes;
+  const PetscInt nf = t->nf;
+
+  if (nf == 1 || p->n > 2) return PETSC_FALSE;
+  for (PetscInt k = 0; k < t->n * nf; k++) { /* each edge of each facet (2D: each end) */
+    const PetscInt a = t->node[k], b = nf == 2 ? a : t->node[k / nf * nf + (k + 1) % nf];
+    PetscInt shared = 0;
+    PetscBool on = (PetscBool)(a == p->node[0] || b == p->node[0]);
+
+    if (p->n == 2) on = (PetscBool)(on && nf > 2 && (a == p->node[1] || b == p->node[1]));
+    for (PetscInt g = 0; on && g < t->n; g++) {
+      PetscInt has = 0;
+
+      for (PetscInt v = 0; v < nf; v++) has += t->node[g * nf + v] == a || t->node[g * nf + v] == b;
+      shared += has == (a == b ? 1 : 2);
+    }
+    if (on && shared == 1) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Names the n slave nodes that are too far from the master, the farthest five of them. */
+static PetscErrorCode Complain(HycoMesh m, const HycoContact *c, const Partners *t, PetscInt n, PetscInt slaves,
+                               PetscReal tolerance)
+{
+  const PetscBool pair = (PetscBool)(c->type == HYCO_CONTACT_PAIR);
+  char list[HYCO_LINE / 2] = "";
 
   PetscFunctionBegin;
-  HycoCheck(n_slave && n_master, "contact %s: the group %s is empty", c->name, n_slave ? c->master : c->slave);
-  PetscCall(BoxesCreate(m, n_master, master, tolerance, &boxes));
-  PetscCall(PetscMalloc1(m->n_nodes, &partner_of));
-  for (PetscInt i = 0; i < m->n_nodes; i++) partner_of[i] = -1;
-  for (PetscInt k = 0; k < n_slave; k++) {
-    const PetscInt j = BoxesNearest(m, &boxes, slave[k]);
+  qsort(t->missed, (size_t)n, sizeof(Missed), FarthestFirst);
+  for (PetscInt k = 0; k < PetscMin(n, 5); k++) {
+    const size_t used = strlen(list);
+    HycoProjection at;
 
-    if (j < 0 || Distance(m, slave[k], j) > tolerance) {
-      if (!missed++) first = slave[k];
+    HycoPatchesProject(t->patches, m->xyz + 3 * t->missed[k].node, &at);
+    snprintf(list + used, sizeof(list) - used, "%s%d (%.4g away%s)", k ? ", " : "", (int)m->node_id[t->missed[k].node],
+             (double)at.distance, AtBorder(t, &at) ? ", past its border" : "");
+  }
+  HycoFail("contact %s: %d of the %d nodes of %s have no %s of %s within %g: %snode%s %s; %s, or raise "
+           "contact_%s_tolerance",
+           c->name, (int)n, (int)slaves, c->slave, pair ? "node" : "point", c->master, (double)tolerance,
+           n > 5 ? "the farthest are " : "", n > 1 ? "s" : "", list,
+           pair ? "mesh both surfaces alike, take type: surface" : "draw the surfaces closer, extend the master",
+           c->name);
+}
+
+static PetscErrorCode Append(HycoPairs *p, PetscInt contact, PetscInt slave, const HycoProjection *at)
+{
+  PetscInt *end = p->master_start + p->n;
+
+  PetscFunctionBegin;
+  p->slave[p->n] = slave;
+  p->contact[p->n++] = contact;
+  end[1] = end[0];
+  for (PetscInt a = 0; at && a < at->n; a++) {
+    p->master[end[1]] = at->node[a];
+    p->weight[end[1]++] = at->weight[a];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Room for `contacts` more contacts of `width` master nodes. */
+static PetscErrorCode Reserve(HycoPairs *p, PetscInt contacts, PetscInt width)
+{
+  const PetscInt n = p->n + contacts;
+
+  PetscFunctionBegin;
+  PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->slave));
+  PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->contact));
+  PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->master_start));
+  if (!p->n) p->master_start[0] = 0;
+  PetscCall(PetscRealloc((size_t)(p->master_start[p->n] + contacts * width + 1) * sizeof(PetscInt), &p->master));
+  PetscCall(PetscRealloc((size_t)(p->master_start[p->n] + contacts * width + 1) * sizeof(PetscReal), &p->weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PartnersCreate(HycoMesh m, const HycoContact *c, PetscInt gs, PetscInt gm, Partners *t)
+{
+  PetscFunctionBegin;
+  t->n = 0;
+  t->nf = c->type == HYCO_CONTACT_PAIR ? 1 : m->nf;
+  PetscCall(PetscMalloc1(PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets * t->nf), &t->node));
+  if (c->type == HYCO_CONTACT_PAIR) {
+    for (PetscInt k = m->group_start[gm]; k < m->group_start[gm + 1]; k++) t->node[t->n++] = m->group_node[k];
+  } else {
+    for (PetscInt f = 0; f < m->n_facets; f++) {
+      if (m->facet_group[f] == gm) PetscCall(PetscArraycpy(t->node + t->nf * t->n++, m->facets + f * m->nf, t->nf));
+    }
+  }
+  PetscCall(HycoPatchesCreate(m, t->n, t->nf, t->node, &t->patches));
+  PetscCall(PetscMalloc1(m->group_start[gs + 1] - m->group_start[gs], &t->missed));
+  PetscCall(PetscMalloc1(m->n_nodes, &t->partner_of));
+  for (PetscInt i = 0; i < m->n_nodes; i++) t->partner_of[i] = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PartnersDestroy(Partners *t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoPatchesDestroy(&t->patches));
+  PetscCall(PetscFree(t->node));
+  PetscCall(PetscFree(t->missed));
+  PetscCall(PetscFree(t->partner_of));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The two surfaces are apart, and a pair's master has one slave. */
+static PetscErrorCode CheckPartner(HycoMesh m, const HycoContact *c, PetscInt slave, const HycoProjection *at,
+                                   PetscInt partner_of[])
+{
+  const PetscInt j = at->node[0];
+
+  PetscFunctionBegin;
+  for (PetscInt a = 0; a < at->n; a++)
+    HycoCheck(at->node[a] != slave, "contact %s: node %d is in both %s and %s; the two surfaces must be apart", c->name,
+              (int)m->node_id[slave], c->slave, c->master);
+  if (c->type != HYCO_CONTACT_PAIR) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(partner_of[j] < 0,
+            "contact %s: nodes %d and %d of %s are both nearest to node %d of %s; mesh both surfaces alike, or take "
+            "type: surface",
+            c->name, (int)m->node_id[partner_of[j]], (int)m->node_id[slave], c->slave, (int)m->node_id[j], c->master);
+  partner_of[j] = slave;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each node of group gs with its nearest master node (pair) or its projection on the master's facets (surface). */
+static PetscErrorCode FindPartners(HycoMesh m, const HycoContact *c, PetscInt index, PetscInt gs, Partners *t,
+                                   HycoPairs *p)
+{
+  const PetscInt *slave = m->group_node + m->group_start[gs], n_slave = m->group_start[gs + 1] - m->group_start[gs];
+  const PetscReal tolerance = c->tolerance >= 0 ? c->tolerance : DefaultTolerance(m, gs);
+  PetscInt missed = 0;
+
+  PetscFunctionBegin;
+  HycoCheck(n_slave && t->n, "contact %s: the group %s is empty", c->name, n_slave ? c->master : c->slave);
+  PetscCall(Reserve(p, n_slave, t->nf));
+  for (PetscInt k = 0; k < n_slave; k++) {
+    HycoProjection at;
+
+    HycoPatchesProject(t->patches, m->xyz + 3 * slave[k], &at);
+    if (at.distance > tolerance) {
+      t->missed[missed].distance = at.distance;
+      t->missed[missed++].node = slave[k];
       continue;
     }
-    HycoCheck(j != slave[k], "contact %s: node %d is in both %s and %s; the two surfaces must be apart", c->name,
-              (int)m->node_id[j], c->slave, c->master);
-    HycoCheck(partner_of[j] < 0,
-              "contact %s: nodes %d and %d of %s are both nearest to node %d of %s; mesh both surfaces alike", c->name,
-              (int)m->node_id[partner_of[j]], (int)m->node_id[slave[k]], c->slave, (int)m->node_id[j], c->master);
-    partner_of[j] = slave[k];
-    p->slave[p->n] = slave[k];
-    p->master[p->n] = j;
-    p->contact[p->n++] = index;
+    PetscCall(CheckPartner(m, c, slave[k], &at, t->partner_of));
+    PetscCall(Append(p, index, slave[k], &at));
   }
-  PetscCall(PetscFree(partner_of));
-  PetscCall(PetscFree(boxes.item));
-  if (missed) PetscCall(Complain(m, c, missed, n_slave, first, tolerance, n_master, master));
+  if (missed) PetscCall(Complain(m, c, t, missed, n_slave, tolerance));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -194,11 +230,9 @@ static PetscErrorCode FindObstacle(HycoScene scene, HycoMesh m, PetscInt index, 
   PetscFunctionBegin;
   HycoCheck(m->group_start[group + 1] > m->group_start[group], "contact %s: the group %s is empty",
             scene->contact[index].name, m->group_name[group]);
+  PetscCall(Reserve(p, m->group_start[group + 1] - m->group_start[group], 0));
   for (PetscInt k = m->group_start[group]; k < m->group_start[group + 1]; k++) {
-    if (held[m->group_node[k]] == m->dim) continue;
-    p->slave[p->n] = m->group_node[k];
-    p->master[p->n] = -1;
-    p->contact[p->n++] = index;
+    if (held[m->group_node[k]] < m->dim) PetscCall(Append(p, index, m->group_node[k], NULL));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -227,32 +261,41 @@ static PetscErrorCode CountHeld(HycoScene scene, HycoMesh m, PetscInt held[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoPairs *pairs)
+/* The contacts of scene->contact[index]. */
+static PetscErrorCode FindContact(HycoScene scene, HycoMesh m, PetscInt index, const PetscInt held[], HycoPairs *pairs)
 {
-  PetscInt *held, total = 0, gs = 0, gm = 0;
+  const HycoContact *c = &scene->contact[index];
+  PetscInt gs = 0, gm = 0;
+  Partners partners = {0};
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  pairs->n = 0;
-  for (PetscInt k = 0; k < scene->n_contacts; k++) {
-    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k].slave, &gs));
-    total += m->group_start[gs + 1] - m->group_start[gs];
+  PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &gs));
+  if (c->type == HYCO_CONTACT_OBSTACLE) {
+    PetscCall(FindObstacle(scene, m, index, gs, held, pairs));
+  } else {
+    PetscCall(HycoMeshFindGroup(m, "contact", c->master, &gm));
+    PetscCall(PartnersCreate(m, c, gs, gm, &partners));
+    ierr = FindPartners(m, c, index, gs, &partners, pairs);
+    PetscCall(PartnersDestroy(&partners));
+    PetscCall(ierr);
   }
-  PetscCall(PetscMalloc1(total, &pairs->slave));
-  PetscCall(PetscMalloc1(total, &pairs->master));
-  PetscCall(PetscMalloc1(total, &pairs->contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoPairs *pairs)
+{
+  PetscInt *held;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
+  PetscCall(Reserve(pairs, 0, 0));
   PetscCall(PetscMalloc1(m->n_nodes, &held));
   PetscCall(CountHeld(scene, m, held));
-  for (PetscInt k = 0; k < scene->n_contacts; k++) {
-    const HycoContact *c = &scene->contact[k];
-
-    PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &gs));
-    if (c->type == HYCO_CONTACT_PAIR) {
-      PetscCall(HycoMeshFindGroup(m, "contact", c->master, &gm));
-      PetscCall(FindPairs(m, c, k, gs, gm, pairs));
-    } else
-      PetscCall(FindObstacle(scene, m, k, gs, held, pairs));
-  }
+  for (PetscInt k = 0; k < scene->n_contacts && !ierr; k++) ierr = FindContact(scene, m, k, held, pairs);
   PetscCall(PetscFree(held));
+  PetscCall(ierr);
   PetscCall(CheckSlaves(scene, m, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -261,8 +304,43 @@ PetscErrorCode HycoPairsDestroy(HycoPairs *pairs)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree(pairs->slave));
-  PetscCall(PetscFree(pairs->master));
   PetscCall(PetscFree(pairs->contact));
+  PetscCall(PetscFree(pairs->master_start));
+  PetscCall(PetscFree(pairs->master));
+  PetscCall(PetscFree(pairs->weight));
   pairs->n = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsRenumber(const HycoPairs *pairs, const PetscInt index[], HycoPairs *out)
+{
+  const PetscInt n = pairs->n, entries = pairs->master_start[n];
+
+  PetscFunctionBegin;
+  out->n = n;
+  HycoDuplicate(n, pairs->slave, &out->slave);
+  HycoDuplicate(n, pairs->contact, &out->contact);
+  HycoDuplicate(n + 1, pairs->master_start, &out->master_start);
+  HycoDuplicate(entries, pairs->master, &out->master);
+  HycoDuplicate(entries, pairs->weight, &out->weight);
+  for (PetscInt k = 0; k < n; k++) out->slave[k] = index[out->slave[k]];
+  for (PetscInt j = 0; j < entries; j++) out->master[j] = index[out->master[j]];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoPairsMark(const HycoPairs *pairs, PetscBool node[])
+{
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    node[pairs->slave[k]] = PETSC_TRUE;
+    for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++) node[pairs->master[j]] = PETSC_TRUE;
+  }
+}
+
+PetscInt HycoPairsWidth(const HycoPairs *pairs)
+{
+  PetscInt most = 0;
+
+  for (PetscInt k = 0; k < pairs->n; k++)
+    most = PetscMax(most, 1 + pairs->master_start[k + 1] - pairs->master_start[k]);
+  return most;
 }

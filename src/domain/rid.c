@@ -79,21 +79,33 @@ static PetscErrorCode MarkNodes(HycoMesh m, const PetscBool in[], PetscBool node
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Gamma^C: the nodes of the contacts and, of surfaces that do not match, the master nodes between them. */
+static PetscErrorCode MarkContact(HycoScene scene, HycoMesh m, const HycoPairs *pairs, PetscBool node[])
+{
+  PetscFunctionBegin;
+  HycoPairsMark(pairs, node);
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
+    PetscInt g = 0;
+
+    if (scene->contact[k].type != HYCO_CONTACT_SURFACE) continue;
+    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k].master, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) node[m->group_node[j]] = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Section 7.2: cells on Gamma^C with a node closer than d to a node of Gamma^C that Omega_A has. */
-static PetscErrorCode ExtendContact(HycoMesh m, const HycoPairs *pairs, PetscReal d, const PetscInt start[],
-                                    const PetscInt around[], PetscBool in[])
+static PetscErrorCode ExtendContact(HycoScene scene, HycoMesh m, const HycoPairs *pairs, PetscReal d,
+                                    const PetscInt start[], const PetscInt around[], PetscBool in[])
 {
   PetscBool *node, *contact;
   PetscInt *list, n = 0, n_in = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_nodes, &node));
-  PetscCall(PetscCalloc2(m->n_nodes, &contact, 2 * pairs->n, &list));
+  PetscCall(PetscCalloc2(m->n_nodes, &contact, m->n_nodes, &list));
   PetscCall(MarkNodes(m, in, node));
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    contact[pairs->slave[k]] = PETSC_TRUE;
-    if (pairs->master[k] >= 0) contact[pairs->master[k]] = PETSC_TRUE;
-  }
+  PetscCall(MarkContact(scene, m, pairs, contact));
   for (PetscInt pass = 0; pass < 2; pass++) { /* those in Omega_A first */
     for (PetscInt i = 0; i < m->n_nodes; i++) {
       if (contact[i] && node[i] == (pass == 0)) list[n++] = i;
@@ -120,6 +132,34 @@ static PetscErrorCode ExtendContact(HycoMesh m, const HycoPairs *pairs, PetscRea
   }
   PetscCall(PetscFree(node));
   PetscCall(PetscFree2(contact, list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Surfaces that do not match: the cells with the masters of the slaves that Omega_A has, so that their gaps can be
+   computed. (Their other neighbours then have an interface of their own: the other way round all of Gamma^C would
+   come.) */
+static PetscErrorCode CompleteSlaves(HycoMesh m, const HycoPairs *pairs, const PetscInt start[],
+                                     const PetscInt around[], PetscBool in[])
+{
+  PetscBool *node;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &node));
+  PetscCall(MarkNodes(m, in, node));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
+
+    if (hi - lo < 2 || !node[pairs->slave[k]]) continue;
+    for (PetscInt j = start[pairs->master[lo]]; j < start[pairs->master[lo] + 1]; j++) {
+      PetscInt has = 0;
+
+      for (PetscInt v = 0; v < m->nv; v++) {
+        for (PetscInt i = lo; i < hi; i++) has += m->cells[around[j] * m->nv + v] == pairs->master[i];
+      }
+      if (has == hi - lo) in[around[j]] = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree(node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -151,8 +191,10 @@ PetscErrorCode HycoRIDBuild(HycoScene scene, HycoMesh m, const HycoPairs *pairs,
   PetscCall(AddSupports(m, r, start, around, in));
   for (PetscInt k = 0; k < r->n_groups; k++) PetscCall(AddGroup(m, r->groups[k], start, around, in));
   if (r->region) PetscCall(AddRegion(scene, m, r->region, start, around, in));
-  if (r->extension > 0) PetscCall(ExtendContact(m, pairs, r->extension, start, around, in));
+  if (r->extension > 0) PetscCall(ExtendContact(scene, m, pairs, r->extension, start, around, in));
+  PetscCall(CompleteSlaves(m, pairs, start, around, in));
   for (PetscInt k = 0; k < r->layers && added; k++) PetscCall(AddLayer(m, in, &added));
+  PetscCall(CompleteSlaves(m, pairs, start, around, in));
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(around));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,8 +1,71 @@
 /* The sets A, I and A_lambda of an RID, by node and by contact: (21)-(22), (32)-(37). */
 #include <hycodomain.h>
 
+/* The nodes of contact k: j = -1 the slave, then its masters. */
+static PetscInt ContactNode(const HycoPairs *pairs, PetscInt k, PetscInt j)
+{
+  return j < 0 ? pairs->slave[k] : pairs->master[pairs->master_start[k] + j];
+}
+
+static PetscInt CountMasters(const HycoPairs *pairs, PetscInt k)
+{
+  return pairs->master_start[k + 1] - pairs->master_start[k];
+}
+
+/* Gamma_I^C, (32): of a contact that misses a node the gap cannot be computed, nor the force on those it has. */
+static void CloseIncomplete(const HycoPairs *pairs, PetscInt role[])
+{
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscInt masters = CountMasters(pairs, k);
+    PetscBool missing = PETSC_FALSE;
+
+    for (PetscInt j = -1; j < masters; j++)
+      missing = (PetscBool)(missing || role[ContactNode(pairs, k, j)] == HYCO_ROLE_OUTSIDE);
+    for (PetscInt j = -1; missing && j < masters; j++) {
+      if (role[ContactNode(pairs, k, j)] == HYCO_ROLE_A) role[ContactNode(pairs, k, j)] = HYCO_ROLE_INTERFACE;
+    }
+  }
+}
+
+/*
+  B[A_lambda, A_c] needs full row rank (property 1). A contact whose slave is in A has that node for itself. One whose
+  slave is on the interface acts on masters alone: it stays if it has one master that no other contact has. Of a facet's
+  masters, shared by several contacts, its force would be badly determined (errors several times larger were measured):
+  they join the interface. *lost: nodes that left A.
+*/
+static PetscErrorCode CloseDependent(HycoMesh m, const HycoPairs *pairs, PetscInt role[], PetscInt *lost)
+{
+  PetscBool *taken, *close;
+
+  PetscFunctionBegin;
+  *lost = 0;
+  PetscCall(PetscCalloc2(m->n_nodes, &taken, m->n_nodes, &close));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    if (role[pairs->slave[k]] == HYCO_ROLE_A) taken[pairs->slave[k]] = PETSC_TRUE;
+  }
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscInt masters = CountMasters(pairs, k), *node = pairs->master + pairs->master_start[k];
+
+    if (role[pairs->slave[k]] == HYCO_ROLE_A || !masters) continue;
+    if (masters == 1 && !taken[node[0]])
+      taken[node[0]] = PETSC_TRUE;
+    else {
+      for (PetscInt j = 0; j < masters; j++) close[node[j]] = (PetscBool)(role[node[j]] == HYCO_ROLE_A);
+    }
+  }
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    if (!close[i]) continue;
+    role[i] = HYCO_ROLE_INTERFACE;
+    (*lost)++;
+  }
+  PetscCall(PetscFree2(taken, close));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoRIDSets(HycoMesh m, const HycoPairs *pairs, const PetscBool in[], PetscInt role[], PetscInt in_rid[])
 {
+  PetscInt lost = 1;
+
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->n_nodes; i++) role[i] = HYCO_ROLE_OUTSIDE;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
@@ -11,17 +74,12 @@ PetscErrorCode HycoRIDSets(HycoMesh m, const HycoPairs *pairs, const PetscBool i
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) { /* connected to Omega_B */
     if (!in[k / m->nv] && role[m->cells[k]] == HYCO_ROLE_A) role[m->cells[k]] = HYCO_ROLE_INTERFACE;
   }
-  for (PetscInt k = 0; k < pairs->n; k++) { /* Gamma_I^C: the gap cannot be computed, one node of the pair is missing */
-    const PetscInt s = pairs->slave[k], r = pairs->master[k];
-
-    if (r < 0 || (role[s] == HYCO_ROLE_OUTSIDE) == (role[r] == HYCO_ROLE_OUTSIDE)) continue;
-    if (role[s] != HYCO_ROLE_OUTSIDE)
-      role[s] = HYCO_ROLE_INTERFACE;
-    else
-      role[r] = HYCO_ROLE_INTERFACE;
+  CloseIncomplete(pairs, role);
+  while (lost) PetscCall(CloseDependent(m, pairs, role, &lost));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    in_rid[k] = 0;
+    for (PetscInt j = -1; j < CountMasters(pairs, k); j++)
+      in_rid[k] = in_rid[k] || role[ContactNode(pairs, k, j)] == HYCO_ROLE_A;
   }
-  for (PetscInt k = 0; k < pairs->n; k++)
-    in_rid[k] =
-        role[pairs->slave[k]] == HYCO_ROLE_A || (pairs->master[k] >= 0 && role[pairs->master[k]] == HYCO_ROLE_A);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

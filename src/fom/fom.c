@@ -42,7 +42,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
 /* The mesh, its contacts and its parts. */
 static PetscErrorCode ReadMesh(HycoFOM f)
 {
-  PetscInt *both = NULL, sizes[3] = {0, 0, 0};
+  PetscInt *both = NULL, sizes[5] = {0, 0, 0, 0, 0};
 
   PetscFunctionBegin;
   HycoOnRoot(f->comm, HycoMeshRead(f->scene, &f->whole));
@@ -51,19 +51,24 @@ static PetscErrorCode ReadMesh(HycoFOM f)
     sizes[0] = f->whole->n_nodes;
     sizes[1] = f->whole->n_cells;
     sizes[2] = f->pairs.n;
-    PetscCall(PetscMalloc1(2 * f->pairs.n, &both));
+    sizes[3] = f->pairs.master_start[f->pairs.n];
+    sizes[4] = HycoPairsWidth(&f->pairs);
+    PetscCall(PetscMalloc1(2 * sizes[3], &both));
     for (PetscInt k = 0; k < f->pairs.n; k++) {
-      both[2 * k] = f->pairs.slave[k];
-      both[2 * k + 1] = f->pairs.master[k];
+      for (PetscInt j = f->pairs.master_start[k]; j < f->pairs.master_start[k + 1]; j++) {
+        both[2 * j] = f->pairs.slave[k];
+        both[2 * j + 1] = f->pairs.master[j];
+      }
     }
   }
-  PetscCallMPI(MPI_Bcast(sizes, 3, MPIU_INT, 0, f->comm));
+  PetscCallMPI(MPI_Bcast(sizes, 5, MPIU_INT, 0, f->comm));
   f->n_nodes = sizes[0];
   f->n_cells = sizes[1];
   f->n_contacts = sizes[2];
+  f->width = sizes[4];
   PetscCheck(f->n_cells >= f->size, f->comm, PETSC_ERR_USER, "the mesh has %d cells; run it on at most as many ranks",
              (int)f->n_cells);
-  PetscCall(HycoMeshDistribute(f->comm, f->whole, sizes[2], both, &f->part, &f->n_owned, &f->first, &f->global));
+  PetscCall(HycoMeshDistribute(f->comm, f->whole, sizes[3], both, &f->part, &f->n_owned, &f->first, &f->global));
   PetscCall(PetscFree(both));
   PetscCall(HycoFECreate(f->scene, f->part, &f->fe));
   f->fe_whole = f->fe;
@@ -104,17 +109,17 @@ static PetscErrorCode CreateScatters(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B and Bt with the pattern that any parameter gives: all of both nodes' components. */
+/* B and Bt with the pattern that any parameter gives: all components of a contact's nodes. */
 static PetscErrorCode CreateB(HycoFOM f)
 {
-  const PetscInt dim = f->part->dim;
+  const PetscInt dim = f->part->dim, entries = f->width * dim;
 
   PetscFunctionBegin;
   PetscCall(MatCreate(f->comm, &f->B));
   PetscCall(MatSetSizes(f->B, PETSC_DECIDE, f->n_owned * dim, f->n_contacts, f->n_nodes * dim));
   PetscCall(MatSetType(f->B, MATAIJ));
-  PetscCall(MatSeqAIJSetPreallocation(f->B, 2 * dim, NULL));
-  PetscCall(MatMPIAIJSetPreallocation(f->B, 2 * dim, NULL, 2 * dim, NULL));
+  PetscCall(MatSeqAIJSetPreallocation(f->B, entries, NULL));
+  PetscCall(MatMPIAIJSetPreallocation(f->B, entries, NULL, entries, NULL));
   PetscCall(MatSetOption(f->B, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -173,12 +178,12 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
 /* B (if what it depends on changed) and D, from rank 0. */
 static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
 {
-  const PetscInt m = f->pairs.n, dim = f->part->dim;
+  const PetscInt m = f->pairs.n, dim = f->part->dim, entries = f->width * dim * m;
   PetscInt *start, *dof;
   PetscReal *value;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(m + 1, &start, 6 * m, &dof, 6 * m, &value));
+  PetscCall(PetscMalloc3(m + 1, &start, entries, &dof, entries, &value));
   PetscCall(HycoContactRows(f->fe_whole, &f->pairs, start, dof, value, f->gap));
   for (PetscInt k = 0; k < m; k++) {
     PetscCall(VecSetValue(f->D, k, f->gap[k], INSERT_VALUES));
@@ -203,7 +208,8 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
   if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatAssemblyBegin(f->B, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(f->B, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatTranspose(f->B, f->Bt ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &f->Bt));
+  PetscCall(MatDestroy(&f->Bt)); /* a normal that turns may have brought B an entry */
+  PetscCall(MatTranspose(f->B, MAT_INITIAL_MATRIX, &f->Bt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

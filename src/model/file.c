@@ -6,8 +6,8 @@
 #include <hycomodelimpl.h>
 #include <string.h>
 
-/* The file's own version: raised when a reader of the old must not read the new. */
-#define HYCO_MODEL_FORMAT 1
+/* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters. */
+#define HYCO_MODEL_FORMAT 2
 #define HYCO_MODEL_KIND   "hyco hybrid model"
 
 static PetscErrorCode Name(const char prefix[], const char name[], char out[128])
@@ -140,26 +140,41 @@ static PetscErrorCode LoadMesh(HycoH5 h, const char prefix[], PetscInt n_bodies,
 
 static PetscErrorCode SavePairs(HycoH5 h, const char prefix[], const HycoPairs *p)
 {
+  const PetscInt entries = p->master_start[p->n];
+  char at[128];
+
   PetscFunctionBegin;
   PetscCall(PutInt(h, prefix, "slave", p->n, 1, p->slave));
-  PetscCall(PutInt(h, prefix, "master", p->n, 1, p->master));
   PetscCall(PutInt(h, prefix, "contact", p->n, 1, p->contact));
+  PetscCall(PutInt(h, prefix, "master_start", p->n + 1, 1, p->master_start));
+  PetscCall(PutInt(h, prefix, "master", entries, 1, p->master));
+  PetscCall(Name(prefix, "weight", at));
+  PetscCall(HycoH5WriteReal(h, at, entries, 1, p->weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode LoadPairs(HycoH5 h, const char prefix[], PetscInt n_nodes, PetscInt n_contacts, HycoPairs *p)
 {
-  PetscInt one = 1;
+  PetscInt one = 1, starts, entries;
   char at[128];
 
   PetscFunctionBegin;
   p->n = -1;
   PetscCall(Name(prefix, "slave", at));
   PetscCall(HycoH5LoadInt(h, at, 0, n_nodes - 1, &p->n, &one, &p->slave));
-  PetscCall(Name(prefix, "master", at));
-  PetscCall(HycoH5LoadInt(h, at, -1, n_nodes - 1, &p->n, &one, &p->master));
   PetscCall(Name(prefix, "contact", at));
   PetscCall(HycoH5LoadInt(h, at, 0, n_contacts - 1, &p->n, &one, &p->contact));
+  starts = p->n + 1;
+  PetscCall(Name(prefix, "master_start", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &starts, &one, &p->master_start));
+  for (PetscInt k = 0; k < p->n; k++)
+    HycoCheck(p->master_start[0] == 0 && p->master_start[k] <= p->master_start[k + 1],
+              "the model's contacts are damaged");
+  entries = p->master_start[p->n];
+  PetscCall(Name(prefix, "master", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, n_nodes - 1, &entries, &one, &p->master));
+  PetscCall(Name(prefix, "weight", at));
+  PetscCall(HycoH5LoadReal(h, at, &entries, &one, &p->weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -336,13 +351,6 @@ PetscErrorCode HycoModelLoadWhole(HycoModel m)
   PetscCall(HycoFECreate(m->scene, m->whole, &m->fe_whole));
   PetscCall(PetscMalloc1(n_dof, &m->U_whole));
   /* the contacts again, in the whole mesh's numbers */
-  m->whole_pairs.n = m->pairs.n;
-  PetscCall(PetscMalloc1(m->pairs.n, &m->whole_pairs.slave));
-  PetscCall(PetscMalloc1(m->pairs.n, &m->whole_pairs.master));
-  HycoDuplicate(m->pairs.n, m->pairs.contact, &m->whole_pairs.contact);
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
-    m->whole_pairs.slave[k] = m->mesh->node_whole[m->pairs.slave[k]];
-    m->whole_pairs.master[k] = m->pairs.master[k] < 0 ? -1 : m->mesh->node_whole[m->pairs.master[k]];
-  }
+  PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -62,23 +62,37 @@ static PetscErrorCode Judge(HycoTrainer t, HycoModel m, PetscReal *u, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknown of each contact of A_lambda that could be full order: its largest entry in A. */
+/* The unknown of each contact of A_lambda that could be full order: its largest entry in A that no other has taken. */
 static PetscErrorCode Candidates(HycoModel m, PetscInt candidate[])
 {
   const PetscInt dim = m->mesh->dim;
+  PetscBool *taken;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < m->m; k++) {
-    PetscReal best = 0;
+  PetscCall(PetscCalloc1(m->mesh->n_nodes * dim, &taken));
+  for (PetscInt k = 0; k < m->m; k++) candidate[k] = -1;
+  for (PetscInt pass = 0; pass < 2; pass++) { /* those whose slave is in A first: the others have shared masters only */
+    for (PetscInt k = 0; k < m->m; k++) {
+      const PetscInt slave = m->pairs.slave[m->contact[k]];
+      PetscReal best = 0;
 
-    candidate[k] = -1;
-    for (PetscInt t = m->row_start[m->contact[k]]; t < m->row_start[m->contact[k] + 1]; t++) {
-      if (m->role[m->row_dof[t] / dim] == HYCO_ROLE_A && PetscAbsReal(m->row_value[t]) > best * (1 + 1e-12)) {
+      if ((m->role[slave] == HYCO_ROLE_A) != (pass == 0)) continue;
+      for (PetscInt t = m->row_start[m->contact[k]]; t < m->row_start[m->contact[k] + 1]; t++) {
+        const PetscInt dof = m->row_dof[t];
+
+        if (taken[dof] || m->role[dof / dim] != HYCO_ROLE_A) continue;
+        if (PetscAbsReal(m->row_value[t]) <= best * (1 + 1e-12)) continue;
         best = PetscAbsReal(m->row_value[t]);
-        candidate[k] = m->row_dof[t];
+        candidate[k] = dof;
       }
+      if (candidate[k] >= 0) taken[candidate[k]] = PETSC_TRUE;
     }
   }
+  PetscCall(PetscFree(taken));
+  for (PetscInt k = 0; k < m->m; k++)
+    HycoCheck(candidate[k] >= 0,
+              "the contact of node %d has no displacement in A of its own to keep full order; use -hyco_hybrid contact",
+              (int)m->slave_id[m->contact[k]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -306,10 +320,7 @@ static PetscErrorCode FreeUnknowns(HycoTrainer t, HycoModel m, PetscBool contact
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->mesh->n_nodes, &contact));
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
-    contact[m->pairs.slave[k]] = PETSC_TRUE;
-    if (m->pairs.master[k] >= 0) contact[m->pairs.master[k]] = PETSC_TRUE;
-  }
+  HycoPairsMark(&m->pairs, contact);
   *n = 0;
   for (PetscInt i = 0; i < m->mesh->n_nodes * dim; i++) {
     if (m->role[i / dim] != HYCO_ROLE_A || t->fe->fixed[m->mesh->node_whole[i / dim] * dim + i % dim]) continue;

@@ -96,7 +96,7 @@ static PetscErrorCode CreateReduced(HycoModel m, PetscInt rows, PetscInt cols, P
     PetscCall(MatCreate(PETSC_COMM_SELF, A));
     PetscCall(MatSetSizes(*A, rows, cols, rows, cols));
     PetscCall(MatSetType(*A, MATSEQAIJ));
-    PetscCall(MatSeqAIJSetPreallocation(*A, m->n_free + 12, NULL));
+    PetscCall(MatSeqAIJSetPreallocation(*A, m->n_free + 15, NULL));
     PetscCall(MatSetOption(*A, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -150,8 +150,8 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
     PetscCall(VecDuplicate(m->L, &m->Dr));
   }
   PetscCall(PetscMalloc1(m->pairs.n + 1, &m->row_start));
-  PetscCall(PetscMalloc1(6 * m->pairs.n, &m->row_dof));
-  PetscCall(PetscMalloc1(6 * m->pairs.n, &m->row_value));
+  PetscCall(PetscMalloc1(HycoPairsWidth(&m->pairs) * m->mesh->dim * m->pairs.n, &m->row_dof));
+  PetscCall(PetscMalloc1(HycoPairsWidth(&m->pairs) * m->mesh->dim * m->pairs.n, &m->row_value));
   PetscCall(PetscMalloc1(m->pairs.n, &m->gap));
   PetscCall(PetscCalloc1(m->l, &m->gamma));
   PetscCall(PetscCalloc1(m->fe->n_dof, &m->U));

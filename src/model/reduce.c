@@ -178,7 +178,7 @@ static PetscErrorCode SeedFrom(HycoTrainer t, HycoSnapshots store, const char fi
 /* Gram matrix of the dual snapshots in the norm of the dual of H1: (B^T L)^T M^-1 (B^T L). On rank 0. */
 static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
 {
-  const PetscInt m = t->sizes[2], n = t->n_s, dim = t->sizes[3];
+  const PetscInt m = t->sizes[2], n = t->n_s, dim = t->sizes[3], entries = HycoPairsWidth(&t->pairs) * dim * m;
   PetscInt *start, *dof, n_par;
   PetscReal *value, *gap;
   const PetscReal *mu;
@@ -191,7 +191,7 @@ static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  PetscCall(PetscMalloc4(m + 1, &start, 6 * m, &dof, 6 * m, &value, m, &gap));
+  PetscCall(PetscMalloc4(m + 1, &start, entries, &dof, entries, &value, m, &gap));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, t->sizes[0] * dim, n, NULL, &R));
   PetscCall(MatDenseGetArray(R, &r));
   for (PetscInt k = 0; k < n; k++) {
@@ -229,7 +229,7 @@ static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* POD of the multipliers in (H1)', DEIM on it: both nodes of each point's contact are seeds. On rank 0. */
+/* POD of the multipliers in (H1)', DEIM on it: the nodes of each point's contact are seeds. On rank 0. */
 static PetscErrorCode DualSeeds(HycoTrainer t, PetscInt *n_nodes, PetscInt nodes[])
 {
   const PetscInt m = t->sizes[2], n = t->n_s;
@@ -257,7 +257,8 @@ static PetscErrorCode DualSeeds(HycoTrainer t, PetscInt *n_nodes, PetscInt nodes
     PetscCall(HycoDEIM(V, index));
     for (PetscInt k = 0; k < l; k++) {
       nodes[(*n_nodes)++] = t->pairs.slave[index[k]];
-      if (t->pairs.master[index[k]] >= 0) nodes[(*n_nodes)++] = t->pairs.master[index[k]];
+      for (PetscInt j = t->pairs.master_start[index[k]]; j < t->pairs.master_start[index[k] + 1]; j++)
+        nodes[(*n_nodes)++] = t->pairs.master[j];
     }
     PetscCall(PetscFree(index));
     PetscCall(MatDestroy(&V));
@@ -277,7 +278,7 @@ static PetscErrorCode ReduceForces(HycoTrainer t, HycoSnapshots store)
   PetscCall(ToRoot(t, S, PETSC_FALSE, &t->Lambda));
   PetscCall(MatDestroy(&S));
   if (!t->seed[HYCO_SEED_DUAL] || !t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(2 * t->n_s, &nodes));
+  PetscCall(PetscMalloc1(5 * t->n_s, &nodes));
   HycoOnRoot(t->comm, DualSeeds(t, &n, nodes));
   if (t->rank == 0) PetscCall(AddSeeds(n, nodes, 1, &t->n_seeds_node, &t->seeds_node));
   PetscCall(PetscFree(nodes));

@@ -36,12 +36,12 @@ static PetscErrorCode ReadMesh(HycoTrainer t)
 /* (35)-(36): a contact without a free unknown in A_c is not in A_lambda. */
 static PetscErrorCode DropFixedContacts(HycoTrainer t, const PetscInt role[], PetscInt in_rid[])
 {
-  const PetscInt n = t->pairs.n;
+  const PetscInt n = t->pairs.n, entries = HycoPairsWidth(&t->pairs) * t->sizes[3] * n;
   PetscInt *start, *dof;
   PetscReal *value, *gap;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc4(n + 1, &start, 6 * n, &dof, 6 * n, &value, n, &gap));
+  PetscCall(PetscMalloc4(n + 1, &start, entries, &dof, entries, &value, n, &gap));
   PetscCall(HycoContactRows(t->fe, &t->pairs, start, dof, value, gap));
   for (PetscInt k = 0; k < n; k++) {
     PetscBool free = PETSC_FALSE;
@@ -60,12 +60,14 @@ static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
   HycoRIDRecipe recipe = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell, t->layers,
                           t->extension,    t->n_groups,     t->groups,     t->region,     t->whole_rid};
   HycoMesh whole = t->whole;
-  PetscBool *in;
+  PetscBool *in, *contact;
   PetscInt *role, *keep, *extra, *index, n_keep = 0, n_extra = 0, n_all = 0, all[64];
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc5(whole->n_cells, &in, whole->n_nodes, &role, whole->n_cells, &keep, 2 * t->pairs.n, &extra,
+  PetscCall(PetscMalloc5(whole->n_cells, &in, whole->n_nodes, &role, whole->n_cells, &keep, whole->n_nodes, &extra,
                          whole->n_nodes, &index));
+  PetscCall(PetscCalloc1(whole->n_nodes, &contact));
+  HycoPairsMark(&t->pairs, contact);
   PetscCall(HycoRIDBuild(t->scene, whole, &t->pairs, &recipe, in));
   PetscCall(PetscMalloc1(t->pairs.n, &m->in_rid));
   PetscCall(HycoRIDSets(whole, &t->pairs, in, role, m->in_rid));
@@ -73,9 +75,8 @@ static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
   for (PetscInt e = 0; e < whole->n_cells; e++) {
     if (in[e]) keep[n_keep++] = e;
   }
-  for (PetscInt k = 0; k < t->pairs.n; k++) {
-    extra[n_extra++] = t->pairs.slave[k];
-    if (t->pairs.master[k] >= 0) extra[n_extra++] = t->pairs.master[k];
+  for (PetscInt i = 0; i < whole->n_nodes; i++) {
+    if (contact[i]) extra[n_extra++] = i;
   }
   for (PetscInt k = 0; k < t->scene->n_contacts && n_all < 64; k++)
     PetscCall(HycoMeshFindGroup(whole, "contact", t->scene->contact[k].slave, &all[n_all++]));
@@ -85,14 +86,8 @@ static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
     m->role[i] = role[m->mesh->node_whole[i]];
     index[m->mesh->node_whole[i]] = i;
   }
-  m->pairs.n = t->pairs.n;
-  PetscCall(PetscMalloc1(t->pairs.n, &m->pairs.slave));
-  PetscCall(PetscMalloc1(t->pairs.n, &m->pairs.master));
-  HycoDuplicate(t->pairs.n, t->pairs.contact, &m->pairs.contact);
-  for (PetscInt k = 0; k < t->pairs.n; k++) {
-    m->pairs.slave[k] = index[t->pairs.slave[k]];
-    m->pairs.master[k] = t->pairs.master[k] < 0 ? -1 : index[t->pairs.master[k]];
-  }
+  PetscCall(HycoPairsRenumber(&t->pairs, index, &m->pairs));
+  PetscCall(PetscFree(contact));
   PetscCall(PetscFree5(in, role, keep, extra, index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

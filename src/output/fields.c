@@ -160,15 +160,16 @@ PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, const HycoPairs *
   PetscCall(HycoContactGeometry(fe, pairs, normal, gap));
   PetscCall(HycoContactAreas(fe, pairs, area));
   for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscInt s = pairs->slave[k], r = pairs->master[k];
+    const PetscInt s = pairs->slave[k];
 
     slave_id[k] = m->node_id[s];
     for (PetscInt c = 0; c < fe->dim; c++) {
       force[3 * s + c] -= lambda[k] * normal[3 * k + c];
       gap[k] -= normal[3 * k + c] * u[s * fe->dim + c];
-      if (r < 0) continue;
-      force[3 * r + c] += lambda[k] * normal[3 * k + c];
-      gap[k] += normal[3 * k + c] * u[r * fe->dim + c];
+      for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++) {
+        force[3 * pairs->master[j] + c] += pairs->weight[j] * lambda[k] * normal[3 * k + c];
+        gap[k] += pairs->weight[j] * normal[3 * k + c] * u[pairs->master[j] * fe->dim + c];
+      }
     }
     pressure[s] = area[k] > 0 ? lambda[k] / area[k] : 0;
     gap_node[s] = gap[k];

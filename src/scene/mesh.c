@@ -89,6 +89,9 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
                 c->name, c->slave);
     }
     if (c->master) PetscCall(HycoMeshFindGroup(mesh, "contact", c->master, &group));
+    HycoCheck(c->type != HYCO_CONTACT_SURFACE || mesh->group_dim[group] == mesh->dim - 1,
+              "contact %s projects nodes on the group %s, which has dimension %d; a group of dimension %d is needed",
+              c->name, c->master, (int)mesh->group_dim[group], (int)mesh->dim - 1);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -149,8 +149,10 @@ static PetscErrorCode ReadContactField(HycoScene s, PetscInt entry, HycoContact 
       c->type = HYCO_CONTACT_OBSTACLE;
     else if (strcmp(value, "pair") == 0)
       c->type = HYCO_CONTACT_PAIR;
+    else if (strcmp(value, "surface") == 0)
+      c->type = HYCO_CONTACT_SURFACE;
     else
-      HycoFail("%s is \"%s\"; it must be obstacle or pair", s->key[entry], value);
+      HycoFail("%s is \"%s\"; it must be obstacle, pair or surface", s->key[entry], value);
     break;
   case 1:
   case 2:
@@ -257,9 +259,10 @@ static PetscErrorCode CheckScene(HycoScene s)
   for (PetscInt k = 0; k < s->n_contacts; k++) {
     HycoContact *c = &s->contact[k];
 
-    HycoCheck(c->slave, "contact %s names no %s", c->name, c->type == HYCO_CONTACT_PAIR ? "slave group" : "group");
-    HycoCheck(c->type == HYCO_CONTACT_OBSTACLE || c->master, "contact %s is a pair and names no master group", c->name);
-    HycoCheck(c->type == HYCO_CONTACT_PAIR || (c->gap && !c->master),
+    HycoCheck(c->slave, "contact %s names no %s", c->name, c->type == HYCO_CONTACT_OBSTACLE ? "group" : "slave group");
+    HycoCheck(c->type == HYCO_CONTACT_OBSTACLE || c->master, "contact %s is a %s and names no master group", c->name,
+              c->type == HYCO_CONTACT_PAIR ? "pair" : "surface contact");
+    HycoCheck(c->type != HYCO_CONTACT_OBSTACLE || (c->gap && !c->master),
               "contact %s is an obstacle: it needs a gap, and no master", c->name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -75,6 +75,16 @@ class Files(Case):
         again = self.train()
         self.near(again['training_error_u'], first['training_error_u'], 1e-6)
 
+    def test_other_format(self):
+        """A model of an older format is refused by its number, before anything of it is believed."""
+        self.train()
+        with h5py.File(self.path('m.h5'), 'r+') as f:
+            f['format'][...] = 1
+        run = self.run_raw('predict', '-model', 'm.h5', '-mu', '0.07,0.17')
+        self.assertNotEqual(run.returncode, 0)
+        self.assertIn('m.h5 has model format 1; this hyco', run.stderr)
+        self.assertIn('reads format 2: train it again', run.stderr)
+
     def test_more_samples(self):
         """A larger set in the same folder keeps the samples it has in common; another scene in it is refused."""
         for mu1 in ('0.1,0.2', '0.1,0.2,0.15'):

@@ -7,7 +7,7 @@ import sys
 
 from verify import FOLDER, HEAD
 
-TESTS = ('mms', 'rope', 'lame', 'hertz', 'energy', 'ranks')
+TESTS = ('mms', 'rope', 'lame', 'hertz', 'energy', 'ranks', 'patch', 'hybrid')
 
 
 def main():

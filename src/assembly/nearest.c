@@ -1,0 +1,277 @@
+/*
+  Projection of points on a surface: its patches stand in a tree of bounding boxes that is split at the median, so that
+  n points find their nearest patch in about n log n steps, whatever the sizes of the patches.
+*/
+#include "nearest.h"
+#include <stdlib.h>
+
+#define LEAF 4
+/* A smaller weight is round-off of a projection on an edge or a node. */
+#define SNAP 1e-12
+
+typedef struct {
+  PetscReal centre[3];
+  PetscInt patch;
+} Item;
+
+typedef struct {
+  PetscReal lo[3], hi[3];
+} Box;
+
+struct _n_HycoPatches {
+  HycoMesh mesh; /* borrowed, like node */
+  PetscInt n, nf;
+  const PetscInt *node;
+  Item *item; /* in the order of the tree's leaves */
+  Box *box;   /* of tree node t; its children are 2 t + 1 and 2 t + 2 */
+};
+
+static PetscReal Dot(const PetscReal a[3], const PetscReal b[3])
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static int Compare(const Item *p, const Item *q, PetscInt axis)
+{
+  if (p->centre[axis] != q->centre[axis]) return p->centre[axis] < q->centre[axis] ? -1 : 1;
+  return (p->patch > q->patch) - (p->patch < q->patch);
+}
+
+static int CompareX(const void *p, const void *q)
+{
+  return Compare((const Item *)p, (const Item *)q, 0);
+}
+
+static int CompareY(const void *p, const void *q)
+{
+  return Compare((const Item *)p, (const Item *)q, 1);
+}
+
+static int CompareZ(const void *p, const void *q)
+{
+  return Compare((const Item *)p, (const Item *)q, 2);
+}
+
+/* Box t of the items lo .. hi - 1, split at the median of the centres along its longest side. */
+static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
+{
+  static int (*const by[3])(const void *, const void *) = {CompareX, CompareY, CompareZ};
+  Box *b = &s->box[t];
+  PetscInt axis = 0;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    b->lo[c] = PETSC_MAX_REAL;
+    b->hi[c] = PETSC_MIN_REAL;
+    for (PetscInt k = lo * s->nf; k < hi * s->nf; k++) {
+      const PetscReal x = s->mesh->xyz[3 * s->node[s->item[k / s->nf].patch * s->nf + k % s->nf] + c];
+
+      b->lo[c] = PetscMin(b->lo[c], x);
+      b->hi[c] = PetscMax(b->hi[c], x);
+    }
+    if (b->hi[c] - b->lo[c] > b->hi[axis] - b->lo[axis]) axis = c;
+  }
+  if (hi - lo <= LEAF) return;
+  qsort(s->item + lo, (size_t)(hi - lo), sizeof(Item), by[axis]);
+  Build(s, 2 * t + 1, lo, (lo + hi) / 2);
+  Build(s, 2 * t + 2, (lo + hi) / 2, hi);
+}
+
+PetscErrorCode HycoPatchesCreate(HycoMesh mesh, PetscInt n, PetscInt nf, const PetscInt node[], HycoPatches *patches)
+{
+  HycoPatches s;
+  PetscInt boxes = 1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s));
+  s->mesh = mesh;
+  s->n = n;
+  s->nf = nf;
+  s->node = node;
+  for (PetscInt most = n; most > LEAF; most = (most + 1) / 2) boxes = 2 * boxes + 1;
+  PetscCall(PetscMalloc1(n, &s->item));
+  PetscCall(PetscMalloc1(boxes, &s->box));
+  for (PetscInt k = 0; k < n; k++) {
+    s->item[k].patch = k;
+    for (PetscInt c = 0; c < 3; c++) {
+      s->item[k].centre[c] = 0;
+      for (PetscInt a = 0; a < nf; a++) s->item[k].centre[c] += mesh->xyz[3 * node[k * nf + a] + c] / nf;
+    }
+  }
+  Build(s, 0, 0, n);
+  *patches = s;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPatchesDestroy(HycoPatches *patches)
+{
+  PetscFunctionBegin;
+  if (!*patches) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*patches)->item));
+  PetscCall(PetscFree((*patches)->box));
+  PetscCall(PetscFree(*patches));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Square of the distance from x to the combination w of n points. */
+static PetscReal Distance2(PetscInt n, const PetscReal *const X[], const PetscReal w[], const PetscReal x[3])
+{
+  PetscReal sum = 0;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    PetscReal r = -x[c];
+
+    for (PetscInt a = 0; a < n; a++) r += w[a] * X[a][c];
+    sum += r * r;
+  }
+  return sum;
+}
+
+/* The foot of the perpendicular on a triangle's plane; whether it lies inside. */
+static PetscBool InTriangle(const PetscReal *const X[], const PetscReal x[3], PetscReal w[4])
+{
+  PetscReal a[3], b[3], r[3], aa, ab, bb, det;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    a[c] = X[1][c] - X[0][c];
+    b[c] = X[2][c] - X[0][c];
+    r[c] = x[c] - X[0][c];
+  }
+  aa = Dot(a, a);
+  ab = Dot(a, b);
+  bb = Dot(b, b);
+  det = aa * bb - ab * ab;
+  if (!(det > 1e-28 * aa * bb)) return PETSC_FALSE;
+  w[1] = (bb * Dot(a, r) - ab * Dot(b, r)) / det;
+  w[2] = (aa * Dot(b, r) - ab * Dot(a, r)) / det;
+  w[0] = 1 - w[1] - w[2];
+  return (PetscBool)(w[0] >= 0 && w[1] >= 0 && w[2] >= 0);
+}
+
+/* The point of a bilinear patch where its tangents are orthogonal to x - point, by Newton from its centre; whether it
+   lies inside. Where the distance is not convex the step is that of Gauss and Newton. */
+static PetscBool InQuadrilateral(const PetscReal *const X[], const PetscReal x[3], PetscReal w[4])
+{
+  PetscReal at[2] = {0, 0}, t[2][3], r[3], twist[3];
+
+  for (PetscInt it = 0; it < 50; it++) {
+    const PetscReal m0 = 1 - at[0], p0 = 1 + at[0], m1 = 1 - at[1], p1 = 1 + at[1];
+    PetscReal a, b, d, g[2], step[2], det, size;
+
+    for (PetscInt c = 0; c < 3; c++) {
+      t[0][c] = (m1 * (X[1][c] - X[0][c]) + p1 * (X[2][c] - X[3][c])) / 4;
+      t[1][c] = (m0 * (X[3][c] - X[0][c]) + p0 * (X[2][c] - X[1][c])) / 4;
+      r[c] = (m0 * m1 * X[0][c] + p0 * m1 * X[1][c] + p0 * p1 * X[2][c] + m0 * p1 * X[3][c]) / 4 - x[c];
+      twist[c] = (X[0][c] - X[1][c] + X[2][c] - X[3][c]) / 4;
+    }
+    a = Dot(t[0], t[0]);
+    b = Dot(t[0], t[1]) + Dot(r, twist);
+    d = Dot(t[1], t[1]);
+    if (!(a * d - b * b > 1e-3 * a * d)) b = Dot(t[0], t[1]);
+    det = a * d - b * b;
+    if (!(det > 1e-28 * a * d)) return PETSC_FALSE;
+    g[0] = Dot(t[0], r);
+    g[1] = Dot(t[1], r);
+    step[0] = (b * g[1] - d * g[0]) / det;
+    step[1] = (b * g[0] - a * g[1]) / det;
+    size = PetscMax(PetscAbsReal(step[0]), PetscAbsReal(step[1]));
+    for (PetscInt k = 0; k < 2; k++) at[k] += step[k] / PetscMax(size, 1);
+    if (size < 1e-14) break;
+    if (PetscMax(PetscAbsReal(at[0]), PetscAbsReal(at[1])) > 10) return PETSC_FALSE;
+  }
+  if (PetscMax(PetscAbsReal(at[0]), PetscAbsReal(at[1])) > 1) return PETSC_FALSE;
+  w[0] = (1 - at[0]) * (1 - at[1]) / 4;
+  w[1] = (1 + at[0]) * (1 - at[1]) / 4;
+  w[2] = (1 + at[0]) * (1 + at[1]) / 4;
+  w[3] = (1 - at[0]) * (1 + at[1]) / 4;
+  return PETSC_TRUE;
+}
+
+/* The nearest point of one patch: inside it, or on one of its edges. Returns the square of its distance. */
+static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], PetscReal w[4])
+{
+  const PetscInt nf = s->nf, edges = nf == 2 ? 1 : nf;
+  const PetscReal *X[4];
+  PetscReal best = PETSC_MAX_REAL;
+
+  for (PetscInt a = 0; a < nf; a++) X[a] = s->mesh->xyz + 3 * s->node[patch * nf + a];
+  if ((nf == 3 && InTriangle(X, x, w)) || (nf == 4 && InQuadrilateral(X, x, w))) best = Distance2(nf, X, w, x);
+  for (PetscInt k = 0; k < edges; k++) {
+    const PetscInt l = (k + 1) % nf;
+    PetscReal e[3], r[3], along[4] = {0, 0, 0, 0}, length, at, d;
+
+    for (PetscInt c = 0; c < 3; c++) {
+      e[c] = X[l][c] - X[k][c];
+      r[c] = x[c] - X[k][c];
+    }
+    length = Dot(e, e);
+    at = length > 0 ? PetscMin(PetscMax(Dot(e, r) / length, 0), 1) : 0;
+    along[l] = at;
+    along[k] = nf > 1 ? 1 - at : 1;
+    d = Distance2(nf, X, along, x);
+    if (d >= best) continue;
+    best = d;
+    for (PetscInt a = 0; a < nf; a++) w[a] = along[a];
+  }
+  return best;
+}
+
+static PetscReal BoxDistance2(const Box *b, const PetscReal x[3])
+{
+  PetscReal sum = 0;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    const PetscReal out = PetscMax(PetscMax(b->lo[c] - x[c], x[c] - b->hi[c]), 0);
+
+    sum += out * out;
+  }
+  return sum;
+}
+
+/* Brings (best, patch, w) down to the nearest of the items lo .. hi - 1 under box t, nearer child first. */
+static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const PetscReal x[3], PetscReal *best,
+                   PetscInt *patch, PetscReal w[4])
+{
+  const PetscInt mid = (lo + hi) / 2;
+  PetscBool right;
+
+  if (BoxDistance2(&s->box[t], x) > *best) return;
+  if (hi - lo > LEAF) {
+    right = (PetscBool)(BoxDistance2(&s->box[2 * t + 2], x) < BoxDistance2(&s->box[2 * t + 1], x));
+    for (PetscInt child = 0; child < 2; child++, right = (PetscBool)!right)
+      Search(s, 2 * t + 1 + right, right ? mid : lo, right ? hi : mid, x, best, patch, w);
+    return;
+  }
+  for (PetscInt k = lo; k < hi; k++) {
+    PetscReal trial[4] = {0, 0, 0, 0};
+    const PetscReal d = OnPatch(s, s->item[k].patch, x, trial);
+
+    if (d > *best || (d == *best && s->item[k].patch > *patch)) continue;
+    *best = d;
+    *patch = s->item[k].patch;
+    for (PetscInt a = 0; a < 4; a++) w[a] = trial[a];
+  }
+}
+
+void HycoPatchesProject(HycoPatches s, const PetscReal x[3], HycoProjection *p)
+{
+  PetscReal best = PETSC_MAX_REAL, w[4] = {0, 0, 0, 0}, sum = 0;
+  PetscInt patch = 0;
+
+  Search(s, 0, 0, s->n, x, &best, &patch, w);
+  p->distance = PetscSqrtReal(best);
+  p->n = 0;
+  for (PetscInt a = 0; a < s->nf; a++) {
+    PetscInt at = p->n;
+
+    if (w[a] < SNAP) continue;
+    for (; at > 0 && p->node[at - 1] > s->node[patch * s->nf + a]; at--) {
+      p->node[at] = p->node[at - 1];
+      p->weight[at] = p->weight[at - 1];
+    }
+    p->node[at] = s->node[patch * s->nf + a];
+    p->weight[at] = w[a];
+    p->n++;
+    sum += w[a];
+  }
+  for (PetscInt a = 0; a < p->n; a++) p->weight[a] /= sum;
+}
