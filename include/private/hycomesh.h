@@ -61,10 +61,19 @@ PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt k
 /* Cells around each node: CSR start[n_nodes + 1], cell[]. The caller frees both. */
 PetscErrorCode HycoMeshNodeCells(HycoMesh mesh, PetscInt **start, PetscInt **cell);
 
+/* What cuts the mesh: -hyco_partition. */
+typedef enum { HYCO_PARTITION_METIS, HYCO_PARTITION_PTSCOTCH } HycoPartitioner;
+extern const char *const HycoPartitioners[];
+
+/* part[e] in 0..n_parts-1 for each cell; the cells of a pair (n_pairs x 2 node indices) tied. On one process. */
+PetscErrorCode HycoMeshPartition(HycoMesh mesh, PetscInt n_pairs, const PetscInt pairs[], HycoPartitioner partitioner,
+                                 PetscInt n_parts, PetscInt part[]);
+
 /* Spreads rank 0's whole mesh over comm: each rank receives its part. Pairs (n_pairs x 2 node indices slave, master,
    rank 0) stay on one rank where they can: always, when no master has two slaves. n_owned, first: this rank's rows of
    nodes in the distributed numbering. On one rank *part = whole. Collective. */
 PetscErrorCode HycoMeshDistribute(MPI_Comm comm, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
-                                  HycoMesh *part, PetscInt *n_owned, PetscInt *first, PetscInt **global_of_whole);
+                                  HycoPartitioner partitioner, HycoMesh *part, PetscInt *n_owned, PetscInt *first,
+                                  PetscInt **global_of_whole);
 
 #endif

@@ -3,83 +3,19 @@
   each rank the cells that touch the nodes it owns. Each rank can then assemble its rows without its neighbours.
 */
 #include <hycomesh.h>
-#include <metis.h>
-
-#define HEAVY 1000
-
-/* The cell graph: cells sharing a facet, plus cells on the two sides of a contact. */
-static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pairs[], idx_t **xadj, idx_t **adjncy,
-                                idx_t **weight)
-{
-  idx_t ne = (idx_t)m->n_cells, nn = (idx_t)m->n_nodes, ncommon = (idx_t)m->nf, zero = 0, *eptr, *eind, *x, *a;
-  PetscInt *start, *around, *extra_of, n_extra = 0;
-  idx_t *tie;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc2(ne + 1, &eptr, m->n_cells * m->nv, &eind));
-  for (idx_t e = 0; e <= ne; e++) eptr[e] = e * (idx_t)m->nv;
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) eind[k] = (idx_t)m->cells[k];
-  PetscCheck(METIS_MeshToDual(&ne, &nn, eptr, eind, &ncommon, &zero, &x, &a) == METIS_OK, PETSC_COMM_SELF,
-             PETSC_ERR_LIB, "METIS_MeshToDual failed");
-  PetscCall(PetscFree2(eptr, eind));
-  PetscCall(HycoMeshNodeCells(m, &start, &around));
-  /* One tie a pair of nodes: the first cell of each. extra_of counts, tie lists both ends. */
-  PetscCall(PetscMalloc2(m->n_cells + 1, &extra_of, 2 * n_pairs, &tie));
-  PetscCall(PetscArrayzero(extra_of, m->n_cells + 1));
-  for (PetscInt k = 0; k < n_pairs; k++) {
-    for (PetscInt side = 0; side < 2; side++) tie[2 * n_extra + side] = (idx_t)around[start[pairs[2 * k + side]]];
-    if (tie[2 * n_extra] == tie[2 * n_extra + 1]) continue;
-    for (PetscInt side = 0; side < 2; side++) extra_of[tie[2 * n_extra + side]]++;
-    n_extra++;
-  }
-  PetscCall(PetscMalloc1(m->n_cells + 1, xadj));
-  PetscCall(PetscMalloc1(x[ne] + 2 * n_extra, adjncy));
-  PetscCall(PetscMalloc1(x[ne] + 2 * n_extra, weight));
-  (*xadj)[0] = 0;
-  for (idx_t e = 0; e < ne; e++) {
-    idx_t at = (*xadj)[e];
-
-    for (idx_t k = x[e]; k < x[e + 1]; k++, at++) {
-      (*adjncy)[at] = a[k];
-      (*weight)[at] = 1;
-    }
-    (*xadj)[e + 1] = at + (idx_t)extra_of[e];
-    extra_of[e] = (PetscInt)at;
-  }
-  for (PetscInt k = 0; k < n_extra; k++) {
-    for (PetscInt side = 0; side < 2; side++) {
-      const PetscInt at = extra_of[tie[2 * k + side]]++;
-
-      (*adjncy)[at] = tie[2 * k + 1 - side];
-      (*weight)[at] = HEAVY;
-    }
-  }
-  METIS_Free(x);
-  METIS_Free(a);
-  PetscCall(PetscFree2(extra_of, tie));
-  PetscCall(PetscFree(start));
-  PetscCall(PetscFree(around));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* owner[i] = rank of node i: the lowest rank among its cells'; a master follows its slave (of several the last). */
-static PetscErrorCode OwnNodes(PetscMPIInt size, HycoMesh m, PetscInt n_pairs, const PetscInt pairs[], PetscInt owner[])
+static PetscErrorCode OwnNodes(PetscMPIInt size, HycoMesh m, PetscInt n_pairs, const PetscInt pairs[],
+                               HycoPartitioner partitioner, PetscInt owner[])
 {
-  idx_t ne = (idx_t)m->n_cells, ncon = 1, parts = size, cut, *xadj, *adjncy, *weight, *part;
-  int status;
+  PetscInt *part;
 
   PetscFunctionBegin;
-  PetscCall(CellGraph(m, n_pairs, pairs, &xadj, &adjncy, &weight));
-  PetscCall(PetscCalloc1(ne, &part));
-  status = METIS_PartGraphKway(&ne, &ncon, xadj, adjncy, NULL, NULL, weight, &parts, NULL, NULL, NULL, &cut, part);
-  PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS_PartGraphKway failed (%d)", status);
+  PetscCall(PetscMalloc1(m->n_cells, &part));
+  PetscCall(HycoMeshPartition(m, n_pairs, pairs, partitioner, size, part));
   for (PetscInt i = 0; i < m->n_nodes; i++) owner[i] = size;
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++)
-    owner[m->cells[k]] = PetscMin(owner[m->cells[k]], (PetscInt)part[k / m->nv]);
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) owner[m->cells[k]] = PetscMin(owner[m->cells[k]], part[k / m->nv]);
   for (PetscInt k = 0; k < n_pairs; k++) owner[pairs[2 * k + 1]] = owner[pairs[2 * k]];
-  PetscCall(PetscFree(xadj));
-  PetscCall(PetscFree(adjncy));
-  PetscCall(PetscFree(weight));
   PetscCall(PetscFree(part));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -198,7 +134,8 @@ static PetscErrorCode CutPart(HycoMesh whole, PetscInt r, const PetscInt owner[]
 }
 
 PetscErrorCode HycoMeshDistribute(MPI_Comm comm, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
-                                  HycoMesh *part, PetscInt *n_owned, PetscInt *first, PetscInt **global_of_whole)
+                                  HycoPartitioner partitioner, HycoMesh *part, PetscInt *n_owned, PetscInt *first,
+                                  PetscInt **global_of_whole)
 {
   PetscMPIInt rank, size;
   PetscInt *owner = NULL, *counts, *global = NULL;
@@ -215,7 +152,7 @@ PetscErrorCode HycoMeshDistribute(MPI_Comm comm, HycoMesh whole, PetscInt n_pair
   }
   PetscCall(PetscCalloc1(size + 1, &counts));
   if (rank == 0) PetscCall(PetscMalloc2(whole->n_nodes, &owner, whole->n_nodes, &global));
-  HycoOnRoot(comm, OwnNodes(size, whole, n_pairs, pairs, owner));
+  HycoOnRoot(comm, OwnNodes(size, whole, n_pairs, pairs, partitioner, owner));
   if (rank == 0) {
     for (PetscInt i = 0; i < whole->n_nodes; i++) counts[owner[i] + 1]++;
     for (PetscInt r = 0; r < size; r++) counts[r + 1] += counts[r];

@@ -20,6 +20,7 @@ static const HycoOption option_table[] = {
     {"hyco_solver_fallback", "<bool>", "true", "what is not solved is tried again: tao, then active_set, then lemke"},
     {"hyco_solver_warm_start", "<bool>", "true", "full order: start from the last solution's active contacts"},
     {"hyco_solver_multilevel", "<bool>", "true", "full order, every unknown a contact: start from coarser problems"},
+    {"hyco_partition", "<metis|ptscotch>", "metis", "cuts the mesh for the ranks; PT-Scotch also where METIS fails"},
     {"hyco_groups", "<int>", "0", "groups of ranks that solve snapshots side by side (0: from the mesh's size)"},
     {"hyco_snapshots", "<folder>", "MODEL.snapshots", "where full-order solutions are stored"},
     {"hyco_pod_tol", "<real>", "1e-7", "energy left out of the displacement basis, the epsilon of (18)"},

@@ -43,6 +43,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
 static PetscErrorCode ReadMesh(HycoFOM f)
 {
   PetscInt *both = NULL, sizes[5] = {0, 0, 0, 0, 0};
+  PetscInt cut = HYCO_PARTITION_METIS;
 
   PetscFunctionBegin;
   HycoOnRoot(f->comm, HycoMeshRead(f->scene, &f->whole));
@@ -68,7 +69,9 @@ static PetscErrorCode ReadMesh(HycoFOM f)
   f->width = sizes[4];
   PetscCheck(f->n_cells >= f->size, f->comm, PETSC_ERR_USER, "the mesh has %d cells; run it on at most as many ranks",
              (int)f->n_cells);
-  PetscCall(HycoMeshDistribute(f->comm, f->whole, sizes[3], both, &f->part, &f->n_owned, &f->first, &f->global));
+  PetscCall(HycoOptionsWord(f->scene->options, "hyco_partition", HycoPartitioners, &cut));
+  PetscCall(HycoMeshDistribute(f->comm, f->whole, sizes[3], both, (HycoPartitioner)cut, &f->part, &f->n_owned,
+                               &f->first, &f->global));
   PetscCall(PetscFree(both));
   PetscCall(HycoFECreate(f->scene, f->part, &f->fe));
   f->fe_whole = f->fe;

@@ -7,14 +7,14 @@
 /* Fails when neither support nor contact holds a motion. Rank 0. */
 static PetscErrorCode FindFree(HycoFOM f, HycoMotions *motions)
 {
-  const PetscInt m = f->pairs.n;
+  const PetscInt m = f->pairs.n, entries = HycoPairsWidth(&f->pairs) * f->fe->dim * m;
   PetscInt *start, *dof;
   PetscReal *value, *gap;
 
   PetscFunctionBegin;
   PetscCall(HycoFEFreeMotions(f->fe_whole, motions));
   if (!motions->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc4(m + 1, &start, 6 * m, &dof, 6 * m, &value, m, &gap));
+  PetscCall(PetscMalloc4(m + 1, &start, entries, &dof, entries, &value, m, &gap));
   PetscCall(HycoContactRows(f->fe_whole, &f->pairs, start, dof, value, gap));
   PetscCall(HycoFECheckHeld(f->fe_whole, motions, m, start, dof, value));
   PetscCall(PetscFree4(start, dof, value, gap));

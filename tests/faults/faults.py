@@ -20,7 +20,7 @@ CASES = [
     ([], 'give a command: solve, train, predict, compare or view'),
     (['solve', *R, '-hyco_solver_typ', 'tao'], 'knows no option -hyco_solver_typ; did you mean -hyco_solver_type?'),
     (['solve', *R, '-zzz', '1'], 'knows no option -zzz'),
-    (['solve', *R, '-grid', '2,2'], 'hyco solve knows no option -grid'),
+    (['solve', *R, '-model', 'm.h5'], 'hyco solve knows no option -model'),
     (['predict', '-model', 'rope.h5', '-scene', ROPE, '-mu', '0.07,0.17'], 'hyco predict knows no option -scene'),
     (['solve', *R, 'stray'], '"stray" is no option'),
     (['solve', '-mu', '0.07,0.17'], '-scene is missing'),
@@ -29,7 +29,7 @@ CASES = [
     (['solve', *R, '-hyco_solver_type', 'newton'], 'it must be one of: active_set, tao, lemke'),
     (['solve', *R, '-hyco_solver_rtol', '2'], '-hyco_solver_rtol is "2"; it must be a number from'),
     (['solve', *R, '-hyco_solver_max_its', '1.5'], 'it must be a whole number'),
-    (['solve', *R, '-hyco_tao_type', 'tron'], 'nothing reads the option -hyco_tao_type here'),
+    (['solve', *R, '-hyco_tao_gatol', '1e-9'], 'nothing reads the option -hyco_tao_gatol here'),
     (['solve', *P, '-hyco_mumps_icntl14', 'lu'], 'nothing reads the option -hyco_mumps_icntl14 here'),
     # the scene
     (['solve', '-scene', 'nowhere', '-mu', '1'], 'there is no scene nowhere'),

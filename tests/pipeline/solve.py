@@ -103,6 +103,12 @@ class Pellet(Case):
             self.near(float(row['total_contact_force']), one['total_contact_force'], 2e-7)
             self.near(float(row['strain_energy']), one['strain_energy'], 2e-7)
 
+    def test_partition(self):
+        for ranks in (2, 3, 4):
+            r = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_partition', 'ptscotch', ranks=ranks)
+            self.near(r['total_contact_force'], 1409.70532353, 1e-9)
+            self.solved(r)
+
     def test_linear(self):
         """Without a factor: by request, or because it would not fit; the report says which."""
         for ranks, options in ((0, ('-hyco_linear', 'iterative')), (2, ('-hyco_memory', '0.001')),

@@ -1,0 +1,132 @@
+/*
+  Cuts the cells into parts: the graph of cells that share a facet, with heavy edges between the cells on the two sides
+  of a contact, so that no cut separates them. METIS, or PT-Scotch (through PETSc) by request and where METIS fails.
+*/
+#include <hycomesh.h>
+#include <metis.h>
+#include <petscmat.h>
+
+#define HEAVY 1000
+
+/* Neighbours of each cell in CSR, with the weight of each edge. */
+typedef struct {
+  idx_t *xadj, *adjncy, *weight;
+} Graph;
+
+const char *const HycoPartitioners[] = {"metis", "ptscotch", NULL};
+
+/* The cell graph: cells sharing a facet, plus cells on the two sides of a contact. */
+static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pairs[], Graph *graph)
+{
+  idx_t ne = (idx_t)m->n_cells, nn = (idx_t)m->n_nodes, ncommon = (idx_t)m->nf, zero = 0, *eptr, *eind, *x, *a;
+  PetscInt *start, *around, *extra_of, n_extra = 0;
+  idx_t *tie;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(ne + 1, &eptr, m->n_cells * m->nv, &eind));
+  for (idx_t e = 0; e <= ne; e++) eptr[e] = e * (idx_t)m->nv;
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) eind[k] = (idx_t)m->cells[k];
+  PetscCheck(METIS_MeshToDual(&ne, &nn, eptr, eind, &ncommon, &zero, &x, &a) == METIS_OK, PETSC_COMM_SELF,
+             PETSC_ERR_LIB, "METIS_MeshToDual failed");
+  PetscCall(PetscFree2(eptr, eind));
+  PetscCall(HycoMeshNodeCells(m, &start, &around));
+  /* One tie a pair of nodes: the first cell of each. extra_of counts, tie lists both ends. */
+  PetscCall(PetscMalloc2(m->n_cells + 1, &extra_of, 2 * n_pairs, &tie));
+  PetscCall(PetscArrayzero(extra_of, m->n_cells + 1));
+  for (PetscInt k = 0; k < n_pairs; k++) {
+    for (PetscInt side = 0; side < 2; side++) tie[2 * n_extra + side] = (idx_t)around[start[pairs[2 * k + side]]];
+    if (tie[2 * n_extra] == tie[2 * n_extra + 1]) continue;
+    for (PetscInt side = 0; side < 2; side++) extra_of[tie[2 * n_extra + side]]++;
+    n_extra++;
+  }
+  PetscCall(PetscMalloc1(m->n_cells + 1, &graph->xadj));
+  PetscCall(PetscMalloc1(x[ne] + 2 * n_extra, &graph->adjncy));
+  PetscCall(PetscMalloc1(x[ne] + 2 * n_extra, &graph->weight));
+  graph->xadj[0] = 0;
+  for (idx_t e = 0; e < ne; e++) {
+    idx_t at = graph->xadj[e];
+
+    for (idx_t k = x[e]; k < x[e + 1]; k++, at++) {
+      graph->adjncy[at] = a[k];
+      graph->weight[at] = 1;
+    }
+    graph->xadj[e + 1] = at + (idx_t)extra_of[e];
+    extra_of[e] = (PetscInt)at;
+  }
+  for (PetscInt k = 0; k < n_extra; k++) {
+    for (PetscInt side = 0; side < 2; side++) {
+      const PetscInt at = extra_of[tie[2 * k + side]]++;
+
+      graph->adjncy[at] = tie[2 * k + 1 - side];
+      graph->weight[at] = HEAVY;
+    }
+  }
+  METIS_Free(x);
+  METIS_Free(a);
+  PetscCall(PetscFree2(extra_of, tie));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(around));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ByMetis(PetscInt n, const Graph *g, PetscInt n_parts, PetscInt part[], PetscBool *done)
+{
+  idx_t ne = (idx_t)n, ncon = 1, parts = (idx_t)n_parts, cut, *p;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n, &p));
+  *done = (PetscBool)(METIS_PartGraphKway(&ne, &ncon, g->xadj, g->adjncy, NULL, NULL, g->weight, &parts, NULL, NULL,
+                                          NULL, &cut, p) == METIS_OK);
+  for (PetscInt e = 0; e < n; e++) part[e] = (PetscInt)p[e];
+  PetscCall(PetscFree(p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, PetscInt part[])
+{
+  PetscInt *i, *j, *weight;
+  Mat graph;
+  MatPartitioning partitioning;
+  IS is;
+  const PetscInt *p;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n + 1, &i));
+  PetscCall(PetscMalloc1(g->xadj[n], &j));
+  PetscCall(PetscMalloc1(g->xadj[n], &weight));
+  for (PetscInt e = 0; e <= n; e++) i[e] = (PetscInt)g->xadj[e];
+  for (PetscInt k = 0; k < i[n]; k++) {
+    j[k] = (PetscInt)g->adjncy[k];
+    weight[k] = (PetscInt)g->weight[k];
+  }
+  PetscCall(MatCreateMPIAdj(PETSC_COMM_SELF, n, n, i, j, weight, &graph)); /* takes the arrays */
+  PetscCall(MatPartitioningCreate(PETSC_COMM_SELF, &partitioning));
+  PetscCall(MatPartitioningSetAdjacency(partitioning, graph));
+  PetscCall(MatPartitioningSetType(partitioning, MATPARTITIONINGPTSCOTCH));
+  PetscCall(MatPartitioningSetNParts(partitioning, n_parts));
+  PetscCall(MatPartitioningSetUseEdgeWeights(partitioning, PETSC_TRUE));
+  PetscCall(MatPartitioningApply(partitioning, &is));
+  PetscCall(ISGetIndices(is, &p));
+  PetscCall(PetscArraycpy(part, p, n));
+  PetscCall(ISRestoreIndices(is, &p));
+  PetscCall(ISDestroy(&is));
+  PetscCall(MatPartitioningDestroy(&partitioning));
+  PetscCall(MatDestroy(&graph));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeshPartition(HycoMesh m, PetscInt n_pairs, const PetscInt pairs[], HycoPartitioner partitioner,
+                                 PetscInt n_parts, PetscInt part[])
+{
+  Graph graph;
+  PetscBool done = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(CellGraph(m, n_pairs, pairs, &graph));
+  if (partitioner == HYCO_PARTITION_METIS) PetscCall(ByMetis(m->n_cells, &graph, n_parts, part, &done));
+  if (!done) PetscCall(ByScotch(m->n_cells, &graph, n_parts, part));
+  PetscCall(PetscFree(graph.xadj));
+  PetscCall(PetscFree(graph.adjncy));
+  PetscCall(PetscFree(graph.weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
