@@ -598,7 +598,7 @@ static void WriteCell(FILE *out, const Cell *cell, const char reason[])
     fprintf(out, " ok to %d: %d its, %.0e, %.2g ms |", (int)cell->largest, (int)cell->its, cell->worst,
             1e3 * cell->seconds);
   else
-    fprintf(out, " unfit: %s |", reason);
+    fprintf(out, " %s%s |", strncmp(reason, "refused", 7) ? "unfit: " : "", reason);
 }
 
 static PetscErrorCode Write(const char path[], int n_methods, const Method methods[], const Cell *cells)
