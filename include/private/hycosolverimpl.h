@@ -132,7 +132,7 @@ PetscErrorCode HycoPrimalPossible(HycoSystem system, PetscBool *possible);
 
 /* TAO's types that hyco knows, by the index that the functions below take; from HYCO_TAO_SEMISMOOTH on semismooth. */
 extern const char *const HycoTaoTypes[];
-enum { HYCO_TAO_AUTO = -1, HYCO_TAO_GPCG = 0, HYCO_TAO_BQPIP = 11, HYCO_TAO_SEMISMOOTH = 12 };
+enum { HYCO_TAO_AUTO = -1, HYCO_TAO_GPCG = 0, HYCO_TAO_BLMVM = 5, HYCO_TAO_BQPIP = 11, HYCO_TAO_SEMISMOOTH = 12 };
 PetscBool HycoTaoSemismooth(PetscInt type);
 /*
   min 1/2 y^T H y - f^T y, lo <= y <= hi, by a bound-constrained type, H symmetric; or w = H y - f >= 0, y >= 0, w.y = 0

@@ -159,6 +159,7 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
   static const char *const forms[] = {"auto", "dual", "primal", "dual_free", NULL};
   PetscInt form, linear;
   PetscReal gigabytes;
+  PetscBool tao;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
@@ -166,7 +167,11 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
   linear = (PetscInt)s->linear;
   gigabytes = 1e-9 * s->memory;
   PetscCall(HycoOptionsWord(options, "hyco_solver_type", HycoSolverTypes, &s->type));
-  if (s->type == HYCO_TYPE_TAO) PetscCall(HycoOptionsWord(options, "hyco_tao_type", HycoTaoTypes, &s->tao_type));
+  PetscCall(PetscOptionsHasName(options, NULL, "-hyco_tao_type", &tao));
+  HycoCheck(!tao || s->type == HYCO_TYPE_TAO,
+            "nothing reads the option -hyco_tao_type here: the type is %s; give -hyco_solver_type tao",
+            HycoSolverTypes[s->type]);
+  PetscCall(HycoOptionsWord(options, "hyco_tao_type", HycoTaoTypes, &s->tao_type));
   PetscCall(HycoOptionsWord(options, "hyco_solver_form", forms, &form));
   s->form = (HycoForm)form;
   PetscCall(HycoOptionsWord(options, "hyco_linear", HycoLinearNames, &linear));

@@ -19,18 +19,21 @@ PetscBool HycoTaoSemismooth(PetscInt type)
   return (PetscBool)(type >= HYCO_TAO_SEMISMOOTH);
 }
 
-/* The residual that TAO reports is small enough below GOOD; then PATIENCE iterations without halving it end the solve.
-   Above GOOD, first-order types may stand still for a while. */
-#define GOOD          1e-10
-#define PATIENCE      5
-#define PATIENCE_LONG 300
-
 typedef struct {
   Mat H;
   Vec f;
+  PetscBool newton;
   PetscReal best; /* least residual so far, and its iteration */
   PetscInt best_at;
 } Quadratic;
+
+/* So many iterations without halving the residual end a run: few once it is small, where round-off rules; many above,
+   and for first-order types, which may stand still for a while. */
+static PetscInt Patience(const Quadratic *q)
+{
+  if (q->best <= 1e-10) return 5;
+  return q->newton && q->best <= 1e-8 ? 20 : 300;
+}
 
 static PetscErrorCode Objective(Tao tao, Vec y, PetscReal *value, Vec gradient, void *ctx)
 {
@@ -92,8 +95,8 @@ static PetscErrorCode Converged(Tao tao, void *ctx)
   if (residual <= q->best / 2) {
     q->best = residual;
     q->best_at = it;
-  } else if (it - q->best_at >= (q->best <= GOOD ? PATIENCE : PATIENCE_LONG))
-    PetscCall(TaoSetConvergedReason(tao, q->best <= GOOD ? TAO_CONVERGED_USER : TAO_DIVERGED_USER));
+  } else if (it - q->best_at >= Patience(q))
+    PetscCall(TaoSetConvergedReason(tao, q->best <= 1e-10 ? TAO_CONVERGED_USER : TAO_DIVERGED_USER));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -201,7 +204,7 @@ static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscRea
 static PetscErrorCode CatchRun(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscBool krylov,
                                PetscInt *its, PetscBool *solved, PetscBool *failed)
 {
-  Quadratic q = {H, f, PETSC_MAX_REAL, 0};
+  Quadratic q = {H, f, (PetscBool)(type < HYCO_TAO_BLMVM || HycoTaoSemismooth(type)), PETSC_MAX_REAL, 0};
   Tao tao;
   Vec w;
   Mat J = NULL;

@@ -592,13 +592,15 @@ static PetscErrorCode RunClass(const Class *c, PetscInt largest, PetscBool few, 
 
 static void WriteCell(FILE *out, const Cell *cell, const char reason[])
 {
+  const double s = cell->seconds;
+
   if (!cell->runs)
     fprintf(out, " |");
-  else if (!reason[0])
-    fprintf(out, " ok to %d: %d its, %.0e, %.2g ms |", (int)cell->largest, (int)cell->its, cell->worst,
-            1e3 * cell->seconds);
+  else if (reason[0])
+    fprintf(out, " %s%s |", strncmp(reason, "refused", 7) ? "unfit: " : "", reason);
   else
-    fprintf(out, " unfit: %s |", reason);
+    fprintf(out, " ok to %d: %d its, %.0e, %.*f %s |", (int)cell->largest, (int)cell->its, cell->worst,
+            s < 0.01 || s >= 1 ? 1 : 0, s < 1 ? 1e3 * s : s, s < 1 ? "ms" : "s");
 }
 
 static PetscErrorCode Write(const char path[], int n_methods, const Method methods[], const Cell *cells)
