@@ -612,7 +612,7 @@ PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscB
   PetscCall(VecSet(L, 0));
   PetscCall(VecGetArray(L, &l));
   for (PetscInt k = 0; k < p.n; k++) {
-    if (!*solved) /* the set has changed since: show what the residuals say of it */
+    if (!*solved && type != HYCO_TYPE_TAO) /* the set has changed since: show what the residuals say of it */
       l[s->contact[k]] = p.force[k];
     else if (s->active[p.lo + k])
       l[s->contact[k]] = PetscMax(p.force[k], 0);
