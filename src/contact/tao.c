@@ -236,6 +236,47 @@ static PetscErrorCode CatchRun(PetscInt type, PetscInt max_its, Mat H, Vec f, Ve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* | y - median(lo, y - (H y - f), hi) |, 0 at the solution. */
+static PetscErrorCode Projected(Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscReal *size)
+{
+  Vec step;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(y, &step));
+  PetscCall(MatMult(H, y, step));
+  PetscCall(VecAXPY(step, -1, f));
+  PetscCall(VecAYPX(step, -1, y));
+  PetscCall(VecMedian(lo, step, hi, step));
+  PetscCall(VecAXPY(step, -1, y));
+  PetscCall(VecNorm(step, NORM_INFINITY, size));
+  PetscCall(VecDestroy(&step));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Newton types that stood still come through from elsewhere; the better of the two is kept. */
+static PetscErrorCode SecondStart(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec lo, Vec hi, Vec y,
+                                  PetscBool krylov, PetscInt *its, PetscBool *solved)
+{
+  const PetscInt first_its = *its;
+  Vec first;
+  PetscReal before, after;
+  PetscBool failed;
+
+  PetscFunctionBegin;
+  PetscCall(Projected(H, f, lo, hi, y, &before));
+  if (before < 1e-10) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(y, &first));
+  PetscCall(VecCopy(y, first));
+  PetscCall(VecSet(y, 1));
+  PetscCall(VecMedian(lo, y, hi, y));
+  PetscCall(CatchRun(type, max_its, H, f, lo, hi, y, krylov, its, solved, &failed));
+  *its += first_its;
+  PetscCall(Projected(H, f, lo, hi, y, &after));
+  if (!*solved && !(after < before)) PetscCall(VecCopy(first, y));
+  PetscCall(VecDestroy(&first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoTaoSolve(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscInt *its,
                             PetscBool *solved)
 {
@@ -248,6 +289,7 @@ PetscErrorCode HycoTaoSolve(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec l
   PetscCall(Scale(H, f, lo, hi, y, d, &size));
   PetscCall(CatchRun(type, max_its, H, f, lo, hi, y, PETSC_FALSE, its, solved, &failed));
   if (failed) PetscCall(CatchRun(type, max_its, H, f, lo, hi, y, PETSC_TRUE, its, solved, &failed));
+  if (!*solved && type < HYCO_TAO_BLMVM) PetscCall(SecondStart(type, max_its, H, f, lo, hi, y, failed, its, solved));
   PetscCall(VecPointwiseMult(y, y, d));
   PetscCall(VecScale(y, size));
   PetscCall(VecDestroy(&d));

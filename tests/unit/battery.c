@@ -453,6 +453,7 @@ static const Rule rules[] = {
     {"tao bncg *", "degenerate", 200, ""},
     {"tao [sa]sils *", "murty", 200, ""},
     {"tao [sa]sfls *", "obstacle", 200, ""},
+    {"tao [sa]sfls *", "twice", 200, ""},
     {"tao [sa]s* *", "*", 500, ""}, /* beyond, a factor each iteration takes the test's time */
     {"tao b[ln]* *", "halfspace", 500, ""},
     {"tao bn* primal", "obstacle", 500, ""},
