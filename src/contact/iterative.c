@@ -1,8 +1,4 @@
-/*
-  The iterative solver of the primal form, for stiffnesses whose factor does not fit: conjugate gradients with smoothed
-  aggregation (PETSc's GAMG), which knows the rigid motions in gap coordinates. -hyco_primal_pc_type hypre takes
-  BoomerAMG instead.
-*/
+/* Iterative solves in the forms: what multigrid must know in gap coordinates, and problems without contact. */
 #include <hycosolverimpl.h>
 
 /* y = T^-1 x: each pivot holds its contact's B x. */
@@ -52,26 +48,6 @@ PetscErrorCode HycoGapNearKernel(HycoSolver s, Mat Kw)
   PetscCall(MatSetNearNullSpace(Kw, mine));
   PetscCall(MatNullSpaceDestroy(&mine));
   PetscCall(VecDestroyVecs(n, &y));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoIterativeSolver(MPI_Comm comm, const char prefix[], Mat K, KSP *ksp)
-{
-  PC pc;
-
-  PetscFunctionBegin;
-  PetscCall(KSPCreate(comm, ksp));
-  PetscCall(KSPSetOptionsPrefix(*ksp, prefix));
-  PetscCall(KSPSetOperators(*ksp, K, K));
-  PetscCall(KSPSetType(*ksp, KSPCG));
-  PetscCall(KSPSetInitialGuessNonzero(*ksp, PETSC_TRUE));
-  PetscCall(KSPSetTolerances(*ksp, 1e-11, 1e-300, 1e10, 2000));
-  PetscCall(KSPGetPC(*ksp, &pc));
-  PetscCall(PCSetType(pc, PCGAMG));
-  PetscCall(PCGAMGSetType(pc, PCGAMGAGG));
-  PetscCall(PCGAMGSetReuseInterpolation(pc, PETSC_TRUE));
-  PetscCall(KSPSetFromOptions(*ksp));
-  PetscCall(KSPSetErrorIfNotConverged(*ksp, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -186,48 +186,6 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Few contacts: the dual, with its dense flexibility. About as many as unknowns: the primal. */
-static PetscErrorCode ChooseForm(HycoSolver s, HycoForm *form)
-{
-  PetscBool aij, possible = PETSC_FALSE;
-
-  PetscFunctionBegin;
-  *form = s->form;
-  if (s->type == HYCO_TYPE_LEMKE && *form == HYCO_FORM_PRIMAL) *form = HYCO_FORM_DUAL;
-  if (*form != HYCO_FORM_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
-  *form = HYCO_FORM_DUAL;
-  if (s->type == HYCO_TYPE_LEMKE || (s->type == HYCO_TYPE_TAO && s->tao_type >= HYCO_TAO_SEMISMOOTH))
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)s->system->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
-  if (aij && s->system->symmetric && (4 * s->system->m > s->system->n || s->system->m > 6000))
-    PetscCall(HycoPrimalPossible(s->system, &possible));
-  if (possible) *form = HYCO_FORM_PRIMAL;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The TAO type for the system, and whether type, form and system go together. */
-static PetscErrorCode ChooseTao(HycoSolver s, HycoForm form)
-{
-  PetscFunctionBegin;
-  PetscCheck(
-      form != HYCO_FORM_DUAL_FREE || s->type == HYCO_TYPE_TAO, s->comm, PETSC_ERR_USER,
-      "%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with dual_free",
-      HycoSolverTypes[s->type]);
-  s->tao = s->tao_type;
-  if (s->tao == HYCO_TAO_AUTO) s->tao = s->system->symmetric ? HYCO_TAO_GPCG : HYCO_TAO_SEMISMOOTH;
-  if (s->type != HYCO_TYPE_TAO || !s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(s->system->symmetric || HycoTaoSemismooth(s->tao), s->comm, PETSC_ERR_USER,
-             "TAO's %s needs a symmetric system and this one is not; use -hyco_tao_type ssils, asils, ssfls or asfls",
-             HycoTaoTypes[s->tao]);
-  PetscCheck(form == HYCO_FORM_DUAL || !HycoTaoSemismooth(s->tao), s->comm, PETSC_ERR_USER,
-             "TAO's %s needs the matrix of the dual form; use -hyco_solver_form dual", HycoTaoTypes[s->tao]);
-  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->tao != HYCO_TAO_BQPIP, s->comm, PETSC_ERR_USER,
-             "TAO's bqpip reads the matrix of the dual form; use -hyco_solver_form dual");
-  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->system->symmetric, s->comm, PETSC_ERR_USER,
-             "the form dual_free needs a symmetric system; use -hyco_solver_form dual");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* `direct`: x came from a solve with K, so that no equilibrium means no good solve. */
 static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool direct, PetscBool solved)
 {
@@ -287,9 +245,9 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
              "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
   s->seconds_factor = 0;
   type = s->type;
-  PetscCall(ChooseForm(s, &form));
+  PetscCall(HycoChooseForm(s, &form));
   PetscCall(HycoChooseLinear(s, &form));
-  PetscCall(ChooseTao(s, form));
+  PetscCall(HycoChooseTao(s, form));
   PetscCall(Attempt(s, type, form, x, L));
   its = s->its;
   while (NextAttempt(s, &type, &form)) {

@@ -30,23 +30,26 @@ class Sources(unittest.TestCase):
         """No printing and no world communicator outside the driver."""
         word = re.compile(r'\b(PETSC_COMM_WORLD|MPI_COMM_WORLD|printf|puts|putchar|vprintf|PetscPrintf|'
                           r'PetscSynchronizedPrintf|stdout|stderr)\b')
+        for folder in ('algorithms', 'linear', 'complementarity'):
+            for path in sources(folder):
+                self.assertNotRegex(text(path), r'#include\s*[<"](hycosystem|hycosolver|hycosolverimpl)\.h', path)
         for path in sources():
             if os.sep + 'driver' + os.sep in path or path.endswith(os.path.join('base', 'init.c')):
                 continue
             self.assertEqual(word.findall(code(path)), [], path)
 
     def test_layers(self):
-        """Algorithms and contact know no scene, mesh or cells; nothing but the driver includes driver.h."""
+        """Algorithms, linear solves, complementarity and contact know no scene, mesh or cells; nothing but the driver includes driver.h."""
         above = ('hycoscene', 'hycosceneimpl', 'hycomesh', 'hycofe', 'hycofom', 'hycodomain', 'hycomodel', 'hycotrainer',
                  'hycosnapshots', 'hycosamples', 'hycofields', 'hyco')
-        for folder in ('algorithms', 'contact'):
+        for folder in ('algorithms', 'contact', 'linear', 'complementarity'):
             for path in sources(folder):
                 names = re.findall(r'#include\s*[<"](\w+)\.h[>"]', text(path))
                 self.assertEqual([n for n in names if n in above], [], path)
         for path in sources():
             if os.sep + 'driver' + os.sep not in path:
                 self.assertNotIn('driver.h', text(path), path)
-        for name in ('hycoalgorithms.h', 'hycosolverimpl.h'):
+        for name in ('hycoalgorithms.h', 'hycosolverimpl.h', 'hycolinear.h', 'hycolcp.h'):
             path = os.path.join(SOURCE, 'include', 'private', name)
             names = re.findall(r'#include\s*[<"](\w+)\.h[>"]', text(path))
             self.assertEqual([n for n in names if n in above], [], name)

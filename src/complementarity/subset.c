@@ -5,7 +5,7 @@
   although the displacements are not in doubt. By diagonal pivoting as many contacts are kept as M_aa has rank, those
   with the smaller gap first where several are equally good; the others depend on them and carry no force.
 */
-#include <hycosolverimpl.h>
+#include <hycolcp.h>
 #include <petscblaslapack.h>
 
 /* Pivots below this share of the (scaled) diagonal are dependence: round-off of a flexibility leaves about 1e-14. */

@@ -2,7 +2,7 @@
   A singular K: bodies that contact alone holds. The user of the system attaches the kernel (MatSetNullSpace()). As many
   unknowns as it has motions, chosen so that K without them is well conditioned, are left to the dense problem.
 */
-#include <hycosolverimpl.h>
+#include <hycolinear.h>
 
 PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
 {

@@ -6,7 +6,7 @@
 
   by the active set. It begins with every contact closed, which holds what contact can hold, and opens those that pull.
 */
-#include <hycosolverimpl.h>
+#include <hycolcp.h>
 #include <petscblaslapack.h>
 
 typedef struct {
@@ -86,7 +86,7 @@ static PetscInt Flip(Held *h, PetscReal size_w, PetscBool one, PetscBool active[
 }
 
 PetscErrorCode HycoSolveHeld(PetscInt p, PetscInt m, const PetscReal M[], const PetscReal q[], PetscInt max_its,
-                             HycoMonitor monitor, void *ctx, PetscBool active[], PetscReal z[], PetscInt *its,
+                             HycoLCPMonitor monitor, void *ctx, PetscBool active[], PetscReal z[], PetscInt *its,
                              HycoLCPStatus *status)
 {
   Held h = {p, m, p + m, M, q, 0, NULL, z, NULL};

@@ -2,7 +2,7 @@
   A fill-reducing order of a sparse symmetric matrix: METIS's nested dissection of its graph of nodes (G. Karypis,
   V. Kumar, SIAM J. Sci. Comput. 20 (1998) 359-392). Debian's MUMPS has no METIS of its own, and takes a given order.
 */
-#include <hycosolverimpl.h>
+#include <hycolinear.h>
 #include <metis.h>
 
 /* Neighbours, by node of bs unknowns, of this rank's rows: CSR, columns global, without the node itself. */

@@ -8,7 +8,7 @@
   so the problem is scaled first: unit diagonal, right-hand side of size one. What TAO says is not evidence: the caller
   recomputes the residuals. A PETSC error inside TAO is caught: it means not solved, like a limit of iterations.
 */
-#include <hycosolverimpl.h>
+#include <hycolcp.h>
 #include <petsctao.h>
 
 const char *const HycoTaoTypes[] = {"gpcg",   "tron",   "bntr",  "bnls",  "bntl",  "blmvm", "bncg",  "bqnls", "bqnkls",

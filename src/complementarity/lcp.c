@@ -2,7 +2,7 @@
   The active set for dense linear complementarity, w = q + M z >= 0, z >= 0, w.z = 0: the paper's section 6.2
   (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002) 865-888, for its convergence).
 */
-#include <hycosolverimpl.h>
+#include <hycolcp.h>
 
 unsigned long long HycoSetHash(PetscInt n, const PetscBool active[])
 {
@@ -78,7 +78,7 @@ static PetscBool Met(PetscInt n, const PetscBool active[], PetscInt its, unsigne
 }
 
 PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
-                                PetscInt max_its, HycoMonitor monitor, void *ctx, PetscBool active[], PetscReal z[],
+                                PetscInt max_its, HycoLCPMonitor monitor, void *ctx, PetscBool active[], PetscReal z[],
                                 PetscInt *its, HycoLCPStatus *status)
 {
   PetscInt *a, changes = 1, n_aside = 0;

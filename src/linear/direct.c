@@ -12,7 +12,7 @@
 
   with S = B K^-1 Bt and g = D - B K^-1 F when nothing is pinned.
 */
-#include <hycosolverimpl.h>
+#include <hycolinear.h>
 #include <dmumps_c.h>
 
 struct _n_HycoDirect {

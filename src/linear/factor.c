@@ -1,5 +1,5 @@
 /* Factors of sparse stiffnesses, and knowing when they are still good. */
-#include <hycosolverimpl.h>
+#include <hycolinear.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateGet() */
 
 PetscErrorCode HycoSeenUpdate(HycoSeen *seen, Mat K, Mat B, PetscBool *same)

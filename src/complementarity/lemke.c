@@ -11,7 +11,7 @@
   (T stands for T - U V^T) and are applied by one matrix product, so that a pivot costs a column and a row, not a pass
   over the whole dictionary. The last basis is solved afresh: its round-off is that of one solve, not of all pivots.
 */
-#include <hycosolverimpl.h>
+#include <hycolcp.h>
 #include <petscblaslapack.h>
 
 #define CHUNK 48

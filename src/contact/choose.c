@@ -1,4 +1,5 @@
-/* Direct or iterative: chosen by the memory that the factor of K is estimated to take. */
+/* What is left to hyco: the form by the contacts, direct or iterative by the memory that a factor of K is estimated to
+ * take. */
 #include <hycosolverimpl.h>
 #include <stdio.h>
 #include <unistd.h>
@@ -120,5 +121,47 @@ PetscErrorCode HycoChooseLinear(HycoSolver s, HycoForm *form)
   if (!aij) PetscFunctionReturn(PETSC_SUCCESS);
   if (s->linear == HYCO_LINEAR_AUTO) PetscCall(DecideByMemory(s, form));
   if (s->linear == HYCO_LINEAR_ITERATIVE) PetscCall(TakeIterative(s, form));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Few contacts: the dual, with its dense flexibility. About as many as unknowns: the primal. */
+PetscErrorCode HycoChooseForm(HycoSolver s, HycoForm *form)
+{
+  PetscBool aij, possible = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *form = s->form;
+  if (s->type == HYCO_TYPE_LEMKE && *form == HYCO_FORM_PRIMAL) *form = HYCO_FORM_DUAL;
+  if (*form != HYCO_FORM_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
+  *form = HYCO_FORM_DUAL;
+  if (s->type == HYCO_TYPE_LEMKE || (s->type == HYCO_TYPE_TAO && s->tao_type >= HYCO_TAO_SEMISMOOTH))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)s->system->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
+  if (aij && s->system->symmetric && (4 * s->system->m > s->system->n || s->system->m > 6000))
+    PetscCall(HycoPrimalPossible(s->system, &possible));
+  if (possible) *form = HYCO_FORM_PRIMAL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The TAO type for the system, and whether type, form and system go together. */
+PetscErrorCode HycoChooseTao(HycoSolver s, HycoForm form)
+{
+  PetscFunctionBegin;
+  PetscCheck(
+      form != HYCO_FORM_DUAL_FREE || s->type == HYCO_TYPE_TAO, s->comm, PETSC_ERR_USER,
+      "%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with dual_free",
+      HycoSolverTypes[s->type]);
+  s->tao = s->tao_type;
+  if (s->tao == HYCO_TAO_AUTO) s->tao = s->system->symmetric ? HYCO_TAO_GPCG : HYCO_TAO_SEMISMOOTH;
+  if (s->type != HYCO_TYPE_TAO || !s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(s->system->symmetric || HycoTaoSemismooth(s->tao), s->comm, PETSC_ERR_USER,
+             "TAO's %s needs a symmetric system and this one is not; use -hyco_tao_type ssils, asils, ssfls or asfls",
+             HycoTaoTypes[s->tao]);
+  PetscCheck(form == HYCO_FORM_DUAL || !HycoTaoSemismooth(s->tao), s->comm, PETSC_ERR_USER,
+             "TAO's %s needs the matrix of the dual form; use -hyco_solver_form dual", HycoTaoTypes[s->tao]);
+  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->tao != HYCO_TAO_BQPIP, s->comm, PETSC_ERR_USER,
+             "TAO's bqpip reads the matrix of the dual form; use -hyco_solver_form dual");
+  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->system->symmetric, s->comm, PETSC_ERR_USER,
+             "the form dual_free needs a symmetric system; use -hyco_solver_form dual");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,5 +1,5 @@
 /* Matrices of thin bodies (ropes, strips): little fill in an order by breadth first, so that a plain factor is best. */
-#include <hycosolverimpl.h>
+#include <hycolinear.h>
 
 /* More entries in a row than a strip of quadrilaterals has: not worth ordering. */
 #define HYCO_THIN_ROW 20

@@ -1,0 +1,64 @@
+/* Solves with a sparse K: direct, ordered by nested dissection, with its Schur complement; iterative. */
+#ifndef HYCOLINEAR_H
+#define HYCOLINEAR_H
+
+#include <hycoimpl.h>
+#include <petscksp.h>
+
+/* What a form keeps between solves while K and B stay as they are. */
+typedef struct {
+  PetscObjectId K, B; /* 0: none */
+  PetscObjectState K_state, B_state;
+} HycoSeen;
+
+/* Whether K and B are those last seen, unchanged; then remember them. */
+PetscErrorCode HycoSeenUpdate(HycoSeen *seen, Mat K, Mat B, PetscBool *same);
+/* -- MUMPS on the saddle point of K and B; all calls collective on its communicator -- */
+
+typedef struct _n_HycoDirect *HycoDirect;
+
+PetscErrorCode HycoDirectCreate(MPI_Comm comm, HycoDirect *direct);
+/* Frees; sets the handle to NULL. NULL-safe. */
+PetscErrorCode HycoDirectDestroy(HycoDirect *direct);
+/* Leaves as many unknowns as K has a kernel to the dense problem, z = (x_pinned, L). */
+PetscErrorCode HycoDirectPinKernel(HycoDirect direct, Mat K);
+/* Orders and analyses [K Bt; B 0] (B and Bt may be NULL) unless the pattern is the last one's; bytes: what the factor
+   is estimated to take on all ranks together. */
+PetscErrorCode HycoDirectAnalyse(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscBool symmetric, PetscReal *bytes);
+/* Factors, after HycoDirectAnalyse() with the same matrices: S = B K^-1 Bt, m x m, column major, on every rank. */
+PetscErrorCode HycoDirectFactor(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscReal S[], PetscBool *singular);
+/* g = D - B K^-1 F on every rank; D (length m) is read on rank 0. */
+PetscErrorCode HycoDirectReduce(HycoDirect direct, Vec F, const PetscReal D[], PetscReal g[]);
+/* x = K^-1 (F - Bt L) with the F of the last HycoDirectReduce(); L (length m) is read on rank 0. */
+PetscErrorCode HycoDirectExpand(HycoDirect direct, const PetscReal L[], Vec x);
+/* x = K^-1 r */
+PetscErrorCode HycoDirectSolve(HycoDirect direct, Vec r, Vec x);
+
+/* -- a singular K -- */
+
+/* How many motions the attached kernel of K has (0: none is attached). */
+PetscErrorCode HycoKernelSize(Mat K, PetscInt *n);
+/* As many unknowns, ascending, without which K is regular; the same on every rank. Collective. */
+PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[]);
+
+/* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
+PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);
+
+/* -- PETSc's solvers -- */
+
+/* A direct solver for a sparse K: MUMPS on several ranks or large, PETSc's own when small or thin. Cholesky when
+   symmetric. */
+PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, PetscBool symmetric, KSP *ksp);
+
+/* Whether K has so short an envelope in reverse Cuthill-McKee order that its factor hardly fills; on several ranks only
+   a line's has. Collective. */
+PetscErrorCode HycoThin(Mat K, PetscBool *thin);
+/* Sets up a PCCHOLESKY for such a K. Collective. */
+PetscErrorCode HycoThinSolver(PC pc);
+/* Factors the operators of such a solver, with more workspace when MUMPS asks for it. */
+PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular);
+
+/* Conjugate gradients with algebraic multigrid for a sparse, symmetric K, from the last solution. */
+PetscErrorCode HycoIterativeSolver(MPI_Comm comm, const char prefix[], Mat K, KSP *ksp);
+
+#endif

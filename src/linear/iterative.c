@@ -1,0 +1,25 @@
+/*
+  For stiffnesses whose factor does not fit: conjugate gradients with smoothed aggregation (PETSc's GAMG), which knows
+  the rigid motions from the matrix's near-kernel. -hyco_primal_pc_type hypre takes BoomerAMG instead.
+*/
+#include <hycolinear.h>
+
+PetscErrorCode HycoIterativeSolver(MPI_Comm comm, const char prefix[], Mat K, KSP *ksp)
+{
+  PC pc;
+
+  PetscFunctionBegin;
+  PetscCall(KSPCreate(comm, ksp));
+  PetscCall(KSPSetOptionsPrefix(*ksp, prefix));
+  PetscCall(KSPSetOperators(*ksp, K, K));
+  PetscCall(KSPSetType(*ksp, KSPCG));
+  PetscCall(KSPSetInitialGuessNonzero(*ksp, PETSC_TRUE));
+  PetscCall(KSPSetTolerances(*ksp, 1e-11, 1e-300, 1e10, 2000));
+  PetscCall(KSPGetPC(*ksp, &pc));
+  PetscCall(PCSetType(pc, PCGAMG));
+  PetscCall(PCGAMGSetType(pc, PCGAMGAGG));
+  PetscCall(PCGAMGSetReuseInterpolation(pc, PETSC_TRUE));
+  PetscCall(KSPSetFromOptions(*ksp));
+  PetscCall(KSPSetErrorIfNotConverged(*ksp, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
