@@ -29,8 +29,10 @@ ON_TWO_RANKS = OURS + tao(['gpcg', 'tron', 'bnls'], FORMS) + tao(['ssils'], ('du
 
 # (scene, form, TAO types): why they do not solve alone. Whether they do on some machine is not promised.
 UNFIT = [
-    ('*', '*', QUASI, 'stops early or stands still'),
-    ('*', 'primal', FIRST_ORDER, 'stands still'),
+    ('*', '*', ['bqpip'], 'cannot take infinite bounds'),
+    ('*', 'primal', QUASI, 'stands still'),
+    ('*', 'primal', ['blmvm'], 'stands still'),
+    ('pellet A', 'primal', ['bncg'], 'stands still'),
     ('rope 2000', '*', FIRST_ORDER, 'stands still'),
     ('rope 2000', 'primal', ['bntr', 'bnls', 'bntl'], 'stands still at 1e-7'),
 ]
@@ -67,19 +69,17 @@ class Solvers(Case):
         args = ['solve', *base, '-hyco_solver_type', kind, '-hyco_solver_form', form, '-hyco_solver_fallback', 'false',
                 *(['-hyco_tao_type', tao] if tao else [])]
         why = unfit(scene, form, tao)
-        if why:  # it is over sooner
-            args += ['-hyco_solver_max_its', '50']
         report = self.path('one.json')
         if os.path.exists(report):
             os.remove(report)
         begin = time.monotonic()
         run = self.run_raw(*args, '-report', report, ranks=ranks)
         name = ' '.join(w for w in (kind, tao, form) if w)
-        cell = f'unfit: {why}'
         if run.returncode:
             self.assertTrue(why, f'{name} on {scene}, {ranks} ranks: {run.stderr}')
             self.assertIn('not converged', run.stderr)
             self.assertFalse(os.path.exists(report), f'{name} on {scene}: a report of what did not converge')
+            cell = f'not converged: {why}'
         else:
             with open(report, encoding='utf-8') as f:
                 r = json.load(f)
@@ -88,8 +88,7 @@ class Solvers(Case):
             tolerance = max(1e-8, 30 * max(r['kkt'].values()))
             self.near(r['total_contact_force'], expected, tolerance, f'{name} on {scene}, {ranks} ranks')
             self.assertEqual(r['solver'], name)
-            if not why:
-                cell = f"{r['active_set_iterations']} its, {max(r['kkt'].values()):.0e}, {r['seconds']['solve']:.2g} s"
+            cell = f"{r['active_set_iterations']} its, {max(r['kkt'].values()):.0e}, {r['seconds']['solve']:.2g} s" + ' (declared unfit)' * bool(why)
         key = (name, f'{scene}, {ranks} rank' + 's' * (ranks > 1))
         self.rows[key] = cell
         self.assertLess(time.monotonic() - begin, 90)
@@ -98,7 +97,9 @@ class Solvers(Case):
         expected = self.hyco('solve', *base)['total_contact_force']
         for ranks in (1, 2):
             for method in ON_TWO_RANKS if ranks == 2 else [*METHODS, *further]:
-                if method[2] in without:
+                # thousands of solves, each of two ranks' messages and little else
+                slow = ranks == 2 and scene == 'rope 2000' and (method[1] == 'dual_free' or method[1:] == ('primal', 'bnls'))
+                if method[2] in without or slow:
                     continue
                 with self.subTest(scene=scene, method=method, ranks=ranks):
                     self.one(scene, base, method, ranks, expected)

@@ -441,8 +441,18 @@ static const Rule rules[] = {
     {"* primal", "twice", 0, "refused, contacts share unknowns"},
     {"tao bqpip dual_free", "*", 0, "refused, reads the matrix"},
     {"tao bqpip *", "*", 0, "cannot take infinite bounds"},
-    {"tao bqn* *", "*", 0, "stops early or stands still"},
+
+    {"tao bqnktr dual", "spd", 0, "stops early"},
     /* from here on: fit up to a size */
+    {"tao bqn* dual*", "obstacle", 50, ""},
+    {"tao bqn* dual*", "degenerate", 50, ""},
+    {"tao bqnktr dual_free", "twice", 200, ""},
+    {"tao bqn* primal", "surface", 10, ""},
+    {"tao bqnls primal", "obstacle", 5, ""},
+    {"tao bqn* primal", "obstacle", 50, ""},
+    {"tao bqnls primal", "degenerate", 500, ""},
+    {"tao bqn* primal", "degenerate", 10, ""},
+    {"tao bqn* *", "*", 500, ""},
     {"tao blmvm primal", "surface", 10, ""},
     {"tao blmvm *", "obstacle", 50, ""},
     {"tao blmvm dual*", "degenerate", 50, ""},
@@ -475,8 +485,8 @@ static PetscInt Fit(const char method[], const Class *c, const char *reason[])
 /* -- runs -- */
 
 typedef struct {
-  PetscInt runs, largest, its; /* of the largest size: its iterations and seconds */
-  PetscReal seconds, worst;    /* worst residual of all sizes */
+  PetscInt runs, solved, largest, its; /* of the largest size that it is fit for: its iterations and seconds */
+  PetscReal seconds, worst;            /* worst residual of all sizes */
 } Cell;
 
 typedef struct {
@@ -537,6 +547,7 @@ static PetscErrorCode Try(Problem *p, HycoSolver solver, const Method *m, const 
   PetscCall(Solve(p, solver, m, PETSC_FALSE, &o));
   right = (PetscBool)(o.reason == HYCO_CONVERGED && o.kkt <= 1e-8 && o.apart <= 1e-5);
   cell->runs++;
+  cell->solved += right;
   if (right && fit) {
     cell->largest = n;
     cell->its = o.its;
@@ -597,8 +608,10 @@ static void WriteCell(FILE *out, const Cell *cell, const char reason[])
 
   if (!cell->runs)
     fprintf(out, " |");
+  else if (!strncmp(reason, "refused", 7))
+    fprintf(out, " %s |", reason);
   else if (reason[0])
-    fprintf(out, " %s%s |", strncmp(reason, "refused", 7) ? "unfit: " : "", reason);
+    fprintf(out, " unfit, %d of %d: %s |", (int)cell->solved, (int)cell->runs, reason);
   else
     fprintf(out, " ok to %d: %d its, %.0e, %.*f %s |", (int)cell->largest, (int)cell->its, cell->worst,
             s < 0.01 || s >= 1 ? 1 : 0, s < 1 ? 1e3 * s : s, s < 1 ? "ms" : "s");
