@@ -36,7 +36,8 @@ def sparse(entries, rows, columns):
 
 def contact_matrix(p, first, n):
     """B of rows n.(u_slave - u_master)."""
-    return sparse(((row, first[node] + axis, sign * p["normal"][row, axis]) for nodes, sign in ((p["slave"], 1), (p["master"], -1))
+    sides = (p["slave"], 1), (p["master"], -1)
+    return sparse(((row, first[node] + axis, sign * p["normal"][row, axis]) for nodes, sign in sides
                    for row, node in enumerate(nodes) for axis in range(3)), len(p["slave"]), n)
 
 
@@ -77,8 +78,8 @@ def main():
     contact = -model.variable("pressure")
     with open(sys.argv[2], "w", encoding="utf-8") as file:
         json.dump({"seconds": time.monotonic() - begin, "cpu_seconds": time.process_time() - cpu,
-                   "iterations": int(answer[0]), "converged": bool(answer[1]),
-                   "total_contact_force": float(contact.sum()), "n_active": int((contact > 1e-6 * contact.max()).sum())}, file)
+                   "iterations": int(answer[0]), "converged": bool(answer[1]), "total_contact_force": float(contact.sum()),
+                   "n_active": int((contact > 1e-6 * contact.max()).sum())}, file)
 
 
 if __name__ == "__main__":

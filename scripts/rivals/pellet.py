@@ -1,5 +1,6 @@
-"""The discrete problem of examples/pellet as arrays, for solvers other than hyco: the moved mesh, fixed components, consistent
-nodal forces, pairs of nodes with their normal and gap. Written apart from hyco's own code, so that agreement means something."""
+"""The discrete problem of examples/pellet as arrays, for solvers other than hyco: the moved mesh, fixed components,
+consistent nodal forces, pairs of nodes with their normal and gap. Written apart from hyco's own code, so that agreement
+means something."""
 import subprocess
 
 import numpy as np

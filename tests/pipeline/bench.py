@@ -1,0 +1,78 @@
+"""scripts/bench-full-order on mesh A: its CSV, its picture, the problem it gives to other solvers, and what it does when a
+command fails or takes too long."""
+import csv
+import importlib.machinery
+import importlib.util
+import math
+import os
+import subprocess
+import sys
+import time
+import unittest
+
+from common import PELLET, SOURCE, Case
+
+SCRIPT = os.path.join(SOURCE, 'scripts', 'bench-full-order')
+FORCE = 1409.70532353  # as pellet.py has it
+
+
+def load():
+    loader = importlib.machinery.SourceFileLoader('bench_full_order', SCRIPT)
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader('bench_full_order', loader))
+    loader.exec_module(module)
+    return module
+
+
+class Bench(Case):
+    def test_mesh_a(self):
+        run = subprocess.run([sys.executable, SCRIPT, '--meshes', 'A', '--rivals', 'A', '--repeat', '1', '--timeout', '60',
+                              '--output', self.folder], cwd=SOURCE, capture_output=True, text=True, timeout=180)
+        self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
+        with open(self.path('full-order.csv'), encoding='utf-8', newline='') as file:
+            rows = {(r['solver'], int(r['ranks']), int(r['steps'])): r for r in csv.DictReader(file)}
+        self.assertEqual(list(rows), [('hyco', 1, 25), ('hyco', 2, 25), ('hyco', 1, 1), ('hyco iterative', 1, 1),
+                                      ('hyco factor per iteration', 1, 1), ('GetFEM', 1, 1), ('CalculiX', 1, 1)])
+        for (solver, _, steps), row in rows.items():
+            with self.subTest(solver=solver, steps=steps):
+                if row['status'] == 'not installed':
+                    self.assertIn(solver, ('GetFEM', 'CalculiX'))
+                    continue
+                self.assertEqual((row['status'], row['unknowns'], row['n_active']), ('ok', '4952', '45'))
+                self.near(float(row['total_force']), FORCE, 0.01 if solver == 'CalculiX' else 1e-6, solver)
+                self.assertGreater(float(row['wall_s']), 0)
+                self.assertGreater(float(row['memory_mb']), 10)
+        with open(self.path('full-order.png'), 'rb') as file:
+            self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
+        self.assertIn('mesh A: hyco factor per iteration takes', run.stdout)
+
+    def test_problem(self):
+        """Sums of the loads for other solvers: pressure times the projected area of the cladding, or the top's polygon."""
+        p = load().pellet.problem(os.path.join(PELLET, 'A.msh'), 4.06, 1.0, self.path('text.msh'))
+        for axis in (0, 1):
+            self.near(p['force'][:, axis].sum(), -(250 * 2 + 50 * 4.75) * 4.7, 1e-9, 'sum of the pressures on the cladding')
+        top = 8 * 4.06**2 / 2 * math.sin(math.pi / 16)  # eight triangles a quarter
+        self.near(p['force'][:, 2].sum(), -5 * top, 1e-9, 'sum of the pressure on the top')
+        self.near(float(p['gap']), 0.04, 1e-12)
+        self.assertEqual(len(p['slave']), 189)
+        distance = p['normal'] * (p['xyz'][p['master']] - p['xyz'][p['slave']])
+        self.assertLess(abs(distance.sum(axis=1) - 0.04).max(), 1e-6)
+
+    def test_failures(self):
+        bench = load()
+        bench.timed.folder = self.folder
+        begin = time.monotonic()
+        *_, failure = bench.timed(['sleep', '30'], 0.3)
+        self.assertEqual(failure, 'timed out after 0.3 s')
+        self.assertLess(time.monotonic() - begin, 15)
+        *_, failure = bench.timed(['sh', '-c', 'echo no factor; exit 3'], 10)
+        self.assertEqual(failure, 'ended with 3: no factor')
+        self.assertIn('ended with', bench.run_hyco('nowhere.msh', 1, 1, [], 60)['status'])
+        row = bench.median_row({'solver': 'x'}, [{'status': 'ended with 3: no factor'}])
+        self.assertEqual((row['status'], row['runs']), ('ended with 3: no factor', 1))
+        times = [{'wall_s': w, 'cpu_s': w, 'memory_mb': 1, 'status': 'ok'} for w in (3, 1, 2)]
+        row = bench.median_row({'solver': 'x'}, times)
+        self.assertEqual((row['wall_s'], row['wall_min'], row['wall_max']), (2, 1, 3))
+
+
+if __name__ == '__main__':
+    unittest.main()
