@@ -7,27 +7,27 @@ YIELD = 1e12  # never reached: CalculiX iterates on gap elements only where some
 
 
 def write(path, p):
-    """The input file path.inp for ccx -i path."""
+    """The input file path.inp for ccx -i path. CalculiX reads no more than 20 characters of a number: 12 digits fit."""
     with open(path + ".inp", "w", encoding="ascii") as file:
         file.write("*NODE, NSET=ALL\n")
         for i, x in enumerate(p["xyz"]):
-            file.write("%d, %.15g, %.15g, %.15g\n" % (i + 1, *x))
+            file.write("%d, %.12g, %.12g, %.12g\n" % (i + 1, *x))
         file.write("*ELEMENT, TYPE=C3D8, ELSET=SOLID\n")
         for i, cell in enumerate(p["hexes"] + 1):
             file.write(f"{i + 1}, {', '.join(map(str, cell))}\n")
-        file.write(f"*MATERIAL, NAME=BODY\n*ELASTIC\n{p['young']:.15g}, {p['poisson']:.15g}\n"
-                   f"*PLASTIC\n{YIELD:.15g}, 0.\n{2 * YIELD:.15g}, 1.\n"
+        file.write(f"*MATERIAL, NAME=BODY\n*ELASTIC\n{p['young']:.12g}, {p['poisson']:.12g}\n"
+                   f"*PLASTIC\n{YIELD:.12g}, 0.\n{2 * YIELD:.12g}, 1.\n"
                    "*SOLID SECTION, ELSET=SOLID, MATERIAL=BODY\n")
         for i, (slave, master, n) in enumerate(zip(p["slave"], p["master"], p["normal"])):
             # the stretch of a gap element is gap + n.(u_second - u_first)
             file.write(f"*ELEMENT, TYPE=GAPUNI, ELSET=G{i}\n{len(p['hexes']) + 1 + i}, {slave + 1}, {master + 1}\n"
-                       f"*GAP, ELSET=G{i}\n{p['gap']:.15g}, {n[0]:.15g}, {n[1]:.15g}, {n[2]:.15g}, , {STIFFNESS:.15g}\n")
+                       f"*GAP, ELSET=G{i}\n{p['gap']:.12g}, {n[0]:.12g}, {n[1]:.12g}, {n[2]:.12g}, , {STIFFNESS:.12g}\n")
         file.write("*BOUNDARY\n")
         for node, axis in p["fixed"]:
             file.write(f"{node + 1}, {axis + 1}, {axis + 1}\n")
         file.write("*STEP\n*STATIC\n1., 1.\n*CLOAD\n")
         for node, axis in np.argwhere(p["force"]):
-            file.write(f"{node + 1}, {axis + 1}, {p['force'][node, axis]:.15g}\n")
+            file.write(f"{node + 1}, {axis + 1}, {p['force'][node, axis]:.12g}\n")
         file.write("*NODE PRINT, NSET=ALL\nU\n*END STEP\n")
 
 

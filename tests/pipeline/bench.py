@@ -38,7 +38,7 @@ class Bench(Case):
                     self.assertIn(solver, ('GetFEM', 'CalculiX'))
                     continue
                 self.assertEqual((row['status'], row['unknowns'], row['n_active']), ('ok', '4952', '45'))
-                self.near(float(row['total_force']), FORCE, 0.01 if solver == 'CalculiX' else 1e-6, solver)
+                self.near(float(row['total_force']), FORCE, 1e-3 if solver == 'CalculiX' else 1e-6, solver)
                 self.assertGreater(float(row['wall_s']), 0)
                 self.assertGreater(float(row['memory_mb']), 10)
         with open(self.path('full-order.png'), 'rb') as file:
@@ -56,6 +56,16 @@ class Bench(Case):
         self.assertEqual(len(p['slave']), 189)
         distance = p['normal'] * (p['xyz'][p['master']] - p['xyz'][p['slave']])
         self.assertLess(abs(distance.sum(axis=1) - 0.04).max(), 1e-6)
+
+    def test_calculix_input(self):
+        """CalculiX cuts a number after 20 characters, and with it an exponent."""
+        bench = load()
+        bench.calculix.write(self.path('input'), bench.pellet.problem(os.path.join(PELLET, 'A.msh'), 4.06, 1.0,
+                                                                      self.path('text.msh')))
+        with open(self.path('input.inp'), encoding='ascii') as file:
+            fields = [f.strip() for line in file if not line.startswith('*') for f in line.split(',')]
+        self.assertGreater(len(fields), 10000)
+        self.assertLessEqual(max(map(len, fields)), 20)
 
     def test_failures(self):
         bench = load()
