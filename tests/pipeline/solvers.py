@@ -26,6 +26,8 @@ def tao(types, forms):
 FORMS = ('dual', 'primal', 'dual_free')
 METHODS = OURS + tao(NEWTON + FIRST_ORDER, FORMS) + tao(SEMISMOOTH, ('dual',))
 ON_TWO_RANKS = OURS + tao(['gpcg', 'tron', 'bnls'], FORMS) + tao(['ssils'], ('dual',))
+QUICK = OURS + tao(['gpcg', 'tron'], ('dual', 'primal'))
+ALL = 'HYCO_ALL_SOLVERS' in os.environ  # scripts/solver-tables: minutes more
 
 # (scene, form, TAO types): why they do not solve alone. Whether they do on some machine is not promised.
 UNFIT = [
@@ -87,7 +89,7 @@ class Solvers(Case):
             # a residual near the tolerance (gpcg's line search ends at round-off of the energy) leaves the force less exact
             tolerance = max(1e-8, 30 * max(r['kkt'].values()))
             self.near(r['total_contact_force'], expected, tolerance, f'{name} on {scene}, {ranks} ranks')
-            self.assertEqual(r['solver'], name)
+            self.assertEqual(r['solver'].replace(', multilevel start', ''), name)
             cell = f"{r['active_set_iterations']} its, {max(r['kkt'].values()):.0e}, {r['seconds']['solve']:.2g} s" + ' (declared unfit)' * bool(why)
         key = (name, f'{scene}, {ranks} rank' + 's' * (ranks > 1))
         self.rows[key] = cell
@@ -96,7 +98,8 @@ class Solvers(Case):
     def every(self, scene, base, further=(), without=()):
         expected = self.hyco('solve', *base)['total_contact_force']
         for ranks in (1, 2):
-            for method in ON_TWO_RANKS if ranks == 2 else [*METHODS, *further]:
+            for method in (QUICK if scene == 'rope 2000' and not ALL else ON_TWO_RANKS if ranks == 2 else
+                           [*METHODS, *further]):
                 # thousands of solves, each of two ranks' messages and little else
                 slow = ranks == 2 and scene == 'rope 2000' and (method[1] == 'dual_free' or method[1:] == ('primal', 'bnls'))
                 if method[2] in without or slow:
