@@ -46,6 +46,7 @@ static PetscErrorCode Estimate(HycoSolver s, HycoForm form, PetscReal *bytes)
 {
   HycoSystem y = s->system;
   HycoDirect probe = NULL;
+  PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
   if (form == HYCO_FORM_DUAL) {
@@ -60,6 +61,7 @@ static PetscErrorCode Estimate(HycoSolver s, HycoForm form, PetscReal *bytes)
     PetscCall(HycoDirectDestroy(&probe));
   }
   s->bytes = *bytes;
+  s->seconds_factor += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
