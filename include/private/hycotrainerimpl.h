@@ -17,6 +17,7 @@ struct _p_HycoTrainer {
   PetscReal tol[HYCO_N_SEEDS], noise, extension;
   PetscInt max_modes, layers, trials;
   PetscBool seed[HYCO_N_SEEDS], whole_rid;
+  PetscInt deim; /* of each basis that seeds the RID: 0 DEIM, 1 Q-DEIM */
   PetscInt n_groups;
   char *groups[64], *region;
   HycoHybrid hybrid;

@@ -1,4 +1,4 @@
-/* DEIM on a basis small enough to follow by hand, pivoted columns and singular values. On any ranks. */
+/* DEIM and Q-DEIM on a basis small enough to follow by hand, pivoted columns and singular values. On any ranks. */
 #include "check.h"
 #include <hycoalgorithms.h>
 #include <math.h>
@@ -44,6 +44,32 @@ static PetscErrorCode TestByHand(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  Q-DEIM on rows (1 1), (0 2), (3 0), (0 -2): the longest is row 2; taking (1 0) out of the others leaves (0 1), (0 2),
+  (0 -2): row 1, which ties with row 3. Turning the modes changes nothing (DEIM's points it would).
+*/
+static PetscErrorCode TestPivotedQR(void)
+{
+  const PetscReal v[8] = {1, 1, 0, 2, 3, 0, 0, -2}, c = cos(0.7), s = sin(0.7);
+  PetscReal turned[8];
+  PetscInt index[2];
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < 4; i++) {
+    turned[2 * i] = c * v[2 * i] - s * v[2 * i + 1];
+    turned[2 * i + 1] = s * v[2 * i] + c * v[2 * i + 1];
+  }
+  for (int k = 0; k < 2; k++) {
+    Mat V;
+
+    PetscCall(Make(4, 2, k ? turned : v, &V));
+    PetscCall(HycoQDEIM(V, index));
+    CHECK(index[0] == 2 && index[1] == 1, "expected rows 2, 1, found %d, %d", (int)index[0], (int)index[1]);
+    PetscCall(MatDestroy(&V));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Rows equally large up to round-off: the lowest is taken. */
 static PetscErrorCode TestTie(void)
 {
@@ -60,7 +86,7 @@ static PetscErrorCode TestTie(void)
 }
 
 /* The property of any DEIM: l rows, each once, on which the basis is regular. */
-static PetscErrorCode TestProperty(void)
+static PetscErrorCode TestProperty(PetscErrorCode (*deim)(Mat, PetscInt[]))
 {
   const PetscInt n = 60, l = 12;
   unsigned long long state = 99;
@@ -72,7 +98,7 @@ static PetscErrorCode TestProperty(void)
   PetscCall(PetscMalloc2(n * l, &v, l * l, &P));
   for (PetscInt k = 0; k < n * l; k++) v[k] = Draw(&state);
   PetscCall(Make(n, l, v, &V));
-  PetscCall(HycoDEIM(V, index));
+  PetscCall(deim(V, index));
   PetscCall(HycoGatherRows(V, l, index, P));
   PetscCall(HycoExtremeSingularValues(l, l, P, &smallest, &largest));
   CHECK(smallest > 1e-3 * largest, "singular values of the chosen rows from %g to %g", smallest, largest);
@@ -111,7 +137,9 @@ static PetscErrorCode Test(void)
   PetscFunctionBegin;
   PetscCall(TestByHand());
   PetscCall(TestTie());
-  PetscCall(TestProperty());
+  PetscCall(TestPivotedQR());
+  PetscCall(TestProperty(HycoDEIM));
+  PetscCall(TestProperty(HycoQDEIM));
   PetscCall(TestDense());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
