@@ -26,6 +26,14 @@ typedef struct {
   HycoSeconds seconds;
 } HycoPrediction;
 
+/* What training's scan of the parameters' ranges found about the reduced stiffness. */
+typedef struct {
+  PetscInt n;          /* points; 0: not scanned (too many unknowns, or an older file) */
+  PetscInt n_singular; /* points where its determinant has the rarer sign; more than 0: it is singular in the ranges */
+  PetscReal smallest;  /* smallest singular value over the largest, the least of all points */
+  PetscReal at[32];    /* the parameter values of that point */
+} HycoScan;
+
 /* Opens a model file on this process alone; the whole-mesh part stays in the file. Not collective: every process that
    calls it opens the file for reading. The caller owns it. Errors: not a model, damaged, of another version. */
 PetscErrorCode HycoModelLoad(const char path[], HycoModel *model);

@@ -46,5 +46,8 @@ PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt 
 /* Smallest and largest singular value of A (m x n column major, kept). Not collective. */
 PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal *smallest,
                                          PetscReal *largest);
+/* Sign of the determinant of A (n x n column major, kept; 0: singular), and its smallest singular value over the
+ * largest, by power iterations to about 1e-3. Not collective. */
+PetscErrorCode HycoSingularity(PetscInt n, const PetscReal A[], PetscInt *sign, PetscReal *ratio);
 
 #endif

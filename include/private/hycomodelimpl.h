@@ -37,7 +37,8 @@ struct _p_HycoModel {
   char *provenance;
   char fingerprint[32]; /* of the scene and mesh that it was trained on */
   PetscInt whole_nodes, whole_cells;
-  PetscInt counts[3];   /* modes of the dual, stress and force bases that seeded the RID */
+  PetscInt counts[3]; /* modes of the dual, stress and force bases that seeded the RID */
+  HycoScan scan;
   PetscReal numbers[3]; /* condition of the reduced stiffness, training errors of u and lambda */
   /* the whole mesh, on demand */
   HycoMesh whole;
@@ -70,6 +71,9 @@ PetscErrorCode HycoModelReset(HycoModel model);
 PetscErrorCode HycoModelSetRidge(HycoModel model, PetscReal ridge);
 /* Sets the full-order unknowns (dofs of mesh, any order). */
 PetscErrorCode HycoModelSetFE(HycoModel model, HycoHybrid hybrid, PetscInt n, const PetscInt dof[]);
+
+/* K and the reduced system at mu, without solving: Kr, Br, Btr and the vectors are current, the prediction is not. */
+PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);
 
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoModelReconstruct(HycoModel model);

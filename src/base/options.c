@@ -43,6 +43,9 @@ static const HycoOption option_table[] = {
      "displacements kept full order: fewest for full row rank, all contact ones, all"},
     {"hyco_hybrid_trials", "<int>", "0",
      "candidate sets judged by their training error when hybrid is rank (0: from the size)"},
+    {"hyco_scan", "<int>", "0",
+     "points per parameter that look for a singular reduced stiffness (0: some hundred in all)"},
+    {"hyco_keep_singular", "<bool>", "false", "keep a model whose reduced stiffness is singular inside the ranges"},
     {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
 };
 

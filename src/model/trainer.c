@@ -120,6 +120,8 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   PetscCall(HycoOptionsWord(o, "hyco_hybrid", hybrids, &hybrid));
   PetscCall(HycoOptionsInt(o, "hyco_hybrid_trials", 0, PETSC_MAX_INT / 8, &t->trials));
   t->hybrid = (HycoHybrid)hybrid;
+  PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
+  PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
   PetscCall(ReadSeedKinds(t));
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
   PetscCall(PetscOptionsGetStringArray(o, NULL, "-hyco_rid_groups", t->groups, &n, &set));
