@@ -70,13 +70,18 @@ PetscErrorCode HycoModelGetWholeU(HycoModel model, PetscInt *n_nodes, const Pets
 PetscErrorCode HycoModelWrite(HycoModel model, const char path[]);
 /*
   Errors of the last prediction against the last full-order solution at the same parameters; relative, as fractions.
-  Norms: 2 (Euclidean over the nodal or cell values) or max. 0/0 counts as 0; x/0 is PETSC_INFINITY. u           2-norm,
-  displacement of the whole mesh u_rid       max norm, displacement of the RID's nodes sigma       2-norm, stress of the
-  RID's cells sigma_11    max norm, first stress component of the RID's cells lambda_rid  2-norm, the RID's own contact
-  forces lambda      2-norm, all contact forces, reconstructed outside the RID
+  0/0 counts as 0; x/0 is PETSC_INFINITY. On a mesh that moves, H1 and its dual are those of the middle of the ranges.
 */
 typedef struct {
-  PetscReal u, u_rid, sigma, sigma_11, lambda_rid, lambda;
+  PetscReal u;               /* displacement of the whole mesh, 2-norm of the nodal values */
+  PetscReal u_h1;            /* the same, H1 */
+  PetscReal u_rid;           /* displacement of the RID's nodes, max norm */
+  PetscReal sigma;           /* stress of the RID's cells, 2-norm of the cell values */
+  PetscReal sigma_11;        /* its first component, max norm */
+  PetscReal lambda_rid;      /* the RID's own contact forces (Gamma_A^C), 2-norm */
+  PetscReal lambda_rid_dual; /* the same, dual of H1 */
+  PetscReal lambda;          /* all contact forces, reconstructed outside the RID, 2-norm */
+  PetscReal lambda_dual;     /* the same, dual of H1 */
 } HycoErrors;
 
 /* Collective on the full-order model's communicator; model on its rank 0 (NULL elsewhere), errors filled there. Both

@@ -52,6 +52,7 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
   if (!model || !*model) PetscFunctionReturn(PETSC_SUCCESS);
   m = *model;
   PetscCall(HycoModelReset(m));
+  PetscCall(HycoNormsDestroy(&m->norms));
   PetscCall(HycoFEDestroy(&m->fe_whole));
   PetscCall(HycoPairsDestroy(&m->whole_pairs));
   PetscCall(HycoMeshDestroy(&m->whole));
