@@ -110,6 +110,36 @@ static PetscErrorCode TestProperty(PetscErrorCode (*deim)(Mat, PetscInt[]))
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The sign of the determinant (rows exchanged: the other one), and of [1 1; 0 1] the golden ratio's square between its
+   singular values; a random matrix as by its SVD; 0 where two rows are equal. */
+static PetscErrorCode TestSingularity(void)
+{
+  const PetscReal J[4] = {1, 0, 1, 1}, swapped[4] = {0, 1, 1, 1}, equal[4] = {1, 1, 2, 2}, minus[1] = {-2};
+  const PetscInt n = 30;
+  unsigned long long state = 7;
+  PetscReal *A, ratio, smallest, largest;
+  PetscInt sign;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSingularity(2, J, &sign, &ratio));
+  CHECK(sign == 1, "sign %d", (int)sign);
+  CHECK_NEAR(ratio, (3 - sqrt(5)) / 2, 1e-3);
+  PetscCall(HycoSingularity(2, swapped, &sign, &ratio));
+  CHECK(sign == -1, "sign %d", (int)sign);
+  PetscCall(HycoSingularity(2, equal, &sign, &ratio));
+  CHECK(sign == 0 && ratio == 0, "sign %d, ratio %g", (int)sign, ratio);
+  PetscCall(HycoSingularity(1, minus, &sign, &ratio));
+  CHECK(sign == -1, "sign %d", (int)sign);
+  CHECK_NEAR(ratio, 1, 1e-14);
+  PetscCall(PetscMalloc1(n * n, &A));
+  for (PetscInt k = 0; k < n * n; k++) A[k] = Draw(&state);
+  PetscCall(HycoSingularity(n, A, &sign, &ratio));
+  PetscCall(HycoExtremeSingularValues(n, n, A, &smallest, &largest));
+  CHECK_NEAR(ratio * largest / smallest, 1, 0.02);
+  PetscCall(PetscFree(A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Columns (1 0), (0 3), (2 2), (0 3): the longest is column 1 (|.|^2 = 9; column 3 ties); what is left of the others is
    (1 0), (2 0), 0: then column 2. Singular values of diag(3, 4): 3 and 4; of [1 1; 0 1]: the golden ratio and its
    inverse. */
@@ -129,6 +159,7 @@ static PetscErrorCode TestDense(void)
   PetscCall(HycoExtremeSingularValues(2, 2, J, &smallest, &largest));
   CHECK_NEAR(largest, (1 + sqrt(5)) / 2, 1e-14);
   CHECK_NEAR(smallest, (sqrt(5) - 1) / 2, 1e-14);
+  PetscCall(TestSingularity());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
