@@ -26,6 +26,14 @@ typedef struct {
   HycoSeconds seconds;
 } HycoPrediction;
 
+/* What training's scan of the parameters' ranges found about the reduced stiffness. */
+typedef struct {
+  PetscInt n;          /* points; 0: not scanned (too many unknowns, or an older file) */
+  PetscInt n_singular; /* points where its determinant has the rarer sign; more than 0: it is singular in the ranges */
+  PetscReal smallest;  /* smallest singular value over the largest, the least of all points */
+  PetscReal at[32];    /* the parameter values of that point */
+} HycoScan;
+
 /* Opens a model file on this process alone; the whole-mesh part stays in the file. Not collective: every process that
    calls it opens the file for reading. The caller owns it. Errors: not a model, damaged, of another version. */
 PetscErrorCode HycoModelLoad(const char path[], HycoModel *model);
@@ -62,13 +70,18 @@ PetscErrorCode HycoModelGetWholeU(HycoModel model, PetscInt *n_nodes, const Pets
 PetscErrorCode HycoModelWrite(HycoModel model, const char path[]);
 /*
   Errors of the last prediction against the last full-order solution at the same parameters; relative, as fractions.
-  Norms: 2 (Euclidean over the nodal or cell values) or max. 0/0 counts as 0; x/0 is PETSC_INFINITY. u           2-norm,
-  displacement of the whole mesh u_rid       max norm, displacement of the RID's nodes sigma       2-norm, stress of the
-  RID's cells sigma_11    max norm, first stress component of the RID's cells lambda_rid  2-norm, the RID's own contact
-  forces lambda      2-norm, all contact forces, reconstructed outside the RID
+  0/0 counts as 0; x/0 is PETSC_INFINITY. On a mesh that moves, H1 and its dual are those of the middle of the ranges.
 */
 typedef struct {
-  PetscReal u, u_rid, sigma, sigma_11, lambda_rid, lambda;
+  PetscReal u;               /* displacement of the whole mesh, 2-norm of the nodal values */
+  PetscReal u_h1;            /* the same, H1 */
+  PetscReal u_rid;           /* displacement of the RID's nodes, max norm */
+  PetscReal sigma;           /* stress of the RID's cells, 2-norm of the cell values */
+  PetscReal sigma_11;        /* its first component, max norm */
+  PetscReal lambda_rid;      /* the RID's own contact forces (Gamma_A^C), 2-norm */
+  PetscReal lambda_rid_dual; /* the same, dual of H1 */
+  PetscReal lambda;          /* all contact forces, reconstructed outside the RID, 2-norm */
+  PetscReal lambda_dual;     /* the same, dual of H1 */
 } HycoErrors;
 
 /* Collective on the full-order model's communicator; model on its rank 0 (NULL elsewhere), errors filled there. Both

@@ -2,6 +2,7 @@
 #ifndef HYCOTRAINER_H
 #define HYCOTRAINER_H
 
+#include <hycomodel.h>
 #include <hycosnapshots.h>
 
 #if defined(__cplusplus)
@@ -17,6 +18,7 @@ typedef struct {
   PetscReal rid_fraction;                                                 /* share of the elements */
   PetscReal condition;             /* of the reduced stiffness, worst of the judged snapshots */
   PetscReal error_u, error_lambda; /* mean relative training errors, 2-norm, displacement and RID contact forces */
+  HycoScan scan;                   /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
 
@@ -24,14 +26,16 @@ typedef struct {
 PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *trainer);
 /* Frees; sets the handle to NULL; NULL-safe. Collective. */
 PetscErrorCode HycoTrainerDestroy(HycoTrainer *trainer);
-/* Reads the -hyco_pod_, -hyco_rid_, -hyco_hybrid options from the scene's options. Collective. */
+/* Reads the -hyco_pod_, -hyco_deim_, -hyco_rid_, -hyco_hybrid, -hyco_scan options from the scene's options. Collective.
+ */
 PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer trainer);
 /* Where the snapshots live (default: the model's name with .snapshots appended). */
 PetscErrorCode HycoTrainerSetSnapshotFolder(HycoTrainer trainer, const char folder[]);
 /* Called as snapshots are solved. */
 PetscErrorCode HycoTrainerSetProgress(HycoTrainer trainer, HycoProgress progress, void *ctx);
 /* Solves the samples that are missing, reduces, and writes the model to `path` (temporary name, then renamed).
-   Collective. `training` may be NULL. */
+   Collective. `training` may be NULL. Fails for a model that misses its training solutions by half, and, unless
+   -hyco_keep_singular, for one whose reduced stiffness is singular inside the parameters' ranges. */
 PetscErrorCode HycoTrainerRun(HycoTrainer trainer, HycoSamples samples, const char path[], HycoTraining *training);
 
 #if defined(__cplusplus)

@@ -27,6 +27,11 @@ PetscErrorCode HycoPODGram(PetscInt n_s, const PetscReal G[], PetscReal tol, Pet
   (N x l). Of rows equally large (to 1e-10) the lowest is taken. Collective; index on every rank.
 */
 PetscErrorCode HycoDEIM(Mat V, PetscInt index[]);
+/*
+  Q-DEIM (Drmac, Gugercin, SIAM J. Sci. Comput. 38 (2016) A631-A648): the first l pivots of QR with column pivoting of
+  V^T, which any rotation of the modes leaves the same. Ties and ranks as HycoDEIM().
+*/
+PetscErrorCode HycoQDEIM(Mat V, PetscInt index[]);
 
 /* Rows of a dense distributed matrix (n x cols row major), on every rank. Collective. */
 PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscReal values[]);
@@ -41,5 +46,8 @@ PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt 
 /* Smallest and largest singular value of A (m x n column major, kept). Not collective. */
 PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal *smallest,
                                          PetscReal *largest);
+/* Sign of the determinant of A (n x n column major, kept; 0: singular), and its smallest singular value over the
+ * largest, by power iterations to about 1e-3. Not collective. */
+PetscErrorCode HycoSingularity(PetscInt n, const PetscReal A[], PetscInt *sign, PetscReal *ratio);
 
 #endif

@@ -15,6 +15,8 @@ typedef enum {
   HYCO_HYBRID_ALL      /* all of A; the interface follows from them through V: gamma = G U[A] */
 } HycoHybrid;
 
+typedef struct _n_HycoNorms *HycoNorms;
+
 struct _p_HycoModel {
   char path[PETSC_MAX_PATH_LEN]; /* "" while training */
   /* the reduced problem's description, as in the file */
@@ -37,13 +39,15 @@ struct _p_HycoModel {
   char *provenance;
   char fingerprint[32]; /* of the scene and mesh that it was trained on */
   PetscInt whole_nodes, whole_cells;
-  PetscInt counts[3];   /* modes of the dual, stress and force bases that seeded the RID */
+  PetscInt counts[3]; /* modes of the dual, stress and force bases that seeded the RID */
+  HycoScan scan;
   PetscReal numbers[3]; /* condition of the reduced stiffness, training errors of u and lambda */
   /* the whole mesh, on demand */
   HycoMesh whole;
   HycoFE fe_whole;
   HycoPairs whole_pairs;
   PetscReal *V_whole, *U_whole;
+  HycoNorms norms; /* made by the first comparison */
   /* online */
   PetscBool ready, reconstruct, solved, whole_current;
   HycoFE fe;
@@ -71,11 +75,25 @@ PetscErrorCode HycoModelSetRidge(HycoModel model, PetscReal ridge);
 /* Sets the full-order unknowns (dofs of mesh, any order). */
 PetscErrorCode HycoModelSetFE(HycoModel model, HycoHybrid hybrid, PetscInt n, const PetscInt dof[]);
 
+/* K and the reduced system at mu, without solving: Kr, Br, Btr and the vectors are current, the prediction is not. */
+PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);
+
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoModelReconstruct(HycoModel model);
 
 /* Condition number of the reduced stiffness of the last prediction (dense SVD). */
 PetscErrorCode HycoModelCondition(HycoModel model, PetscReal *condition);
+
+/* Norms of errors on the whole mesh (norms.c). Scene and mesh are borrowed. */
+PetscErrorCode HycoNormsCreate(HycoScene scene, HycoMesh whole, HycoNorms *norms);
+/* NULL-safe. */
+PetscErrorCode HycoNormsDestroy(HycoNorms *norms);
+/* H1 norm of u - minus (n_nodes * dim of the whole mesh; minus may be NULL). */
+PetscErrorCode HycoNormH1(HycoNorms norms, const PetscReal u[], const PetscReal minus[], PetscReal *norm);
+/* Norm in the dual of H1 of B^T (L - minus), of all contacts or those of the RID, B as at the last prediction; minus
+   may be NULL. */
+PetscErrorCode HycoNormDual(HycoNorms norms, HycoModel model, PetscBool rid_only, const PetscReal L[],
+                            const PetscReal minus[], PetscReal *norm);
 
 /* Writes the model; whole: the mesh and the modes on it (n_nodes * dim x l row major). */
 PetscErrorCode HycoModelSave(HycoModel model, HycoMesh whole, const PetscReal V_whole[], const char path[]);

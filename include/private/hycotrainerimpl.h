@@ -17,9 +17,12 @@ struct _p_HycoTrainer {
   PetscReal tol[HYCO_N_SEEDS], noise, extension;
   PetscInt max_modes, layers, trials;
   PetscBool seed[HYCO_N_SEEDS], whole_rid;
+  PetscInt deim; /* of each basis that seeds the RID: 0 DEIM, 1 Q-DEIM */
   PetscInt n_groups;
   char *groups[64], *region;
   HycoHybrid hybrid;
+  PetscInt scan; /* points per parameter; 0: chosen */
+  PetscBool keep_singular;
   HycoProgress progress;
   void *progress_ctx;
   /* state of a run, rank 0 unless said */
@@ -46,5 +49,8 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t);
 PetscErrorCode HycoTrainerReduce(HycoTrainer t, HycoSnapshots store);
 /* Chooses the full-order displacements of a model under training; numbers[] of the model are filled. Rank 0. */
 PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel model);
+/* Scans the ranges for a singular reduced stiffness, the points spread over the ranks: the model at `candidate`
+   (removed) goes to `path` with what was found, or is refused. Collective. */
+PetscErrorCode HycoTrainerScan(HycoTrainer t, const char candidate[], const char path[], HycoScan *found);
 
 #endif

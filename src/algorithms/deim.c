@@ -1,4 +1,4 @@
-/* The discrete empirical interpolation method (section 4.2). */
+/* The discrete empirical interpolation method (section 4.2), and its points by pivoted QR. */
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
@@ -77,5 +77,66 @@ PetscErrorCode HycoDEIM(Mat V, PetscInt index[])
     PetscCall(HycoGatherRows(V, 1, &index[k], rows + k * l));
   }
   PetscCall(PetscFree3(rows, c, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The largest of this rank's squared row lengths over all ranks; of rows equally long (to 1e-10) the lowest. */
+static PetscErrorCode LongestRow(Mat V, const PetscReal length2[], PetscInt *row)
+{
+  PetscInt lo, hi, at = PETSC_MAX_INT;
+  PetscReal largest = 0, all;
+  MPI_Comm comm = PetscObjectComm((PetscObject)V);
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(V, &lo, &hi));
+  for (PetscInt i = 0; i < hi - lo; i++) largest = PetscMax(largest, length2[i]);
+  PetscCallMPI(MPI_Allreduce(&largest, &all, 1, MPIU_REAL, MPI_MAX, comm));
+  for (PetscInt i = hi - lo - 1; i >= 0; i--) {
+    if (length2[i] >= all * (1 - 1e-10)) at = lo + i;
+  }
+  PetscCallMPI(MPI_Allreduce(&at, row, 1, MPIU_INT, MPI_MIN, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQDEIM(Mat V, PetscInt index[])
+{
+  Mat R;
+  PetscInt l, lo, hi, lda;
+  PetscScalar *r;
+  PetscReal *pivot, *length2;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(V, NULL, &l));
+  PetscCall(MatGetOwnershipRange(V, &lo, &hi));
+  PetscCall(MatDuplicate(V, MAT_COPY_VALUES, &R));
+  PetscCall(MatDenseGetLDA(R, &lda));
+  PetscCall(PetscMalloc2(l, &pivot, hi - lo, &length2));
+  for (PetscInt k = 0; k < l; k++) {
+    PetscReal size2 = 0;
+
+    PetscCall(PetscArrayzero(length2, hi - lo));
+    PetscCall(MatDenseGetArray(R, &r));
+    for (PetscInt j = 0; j < l; j++) {
+      for (PetscInt i = 0; i < hi - lo; i++) length2[i] += PetscSqr(r[(size_t)j * (size_t)lda + (size_t)i]);
+    }
+    PetscCall(MatDenseRestoreArray(R, &r));
+    for (PetscInt p = 0; p < k; p++) {
+      if (index[p] >= lo && index[p] < hi) length2[index[p] - lo] = 0;
+    }
+    PetscCall(LongestRow(R, length2, &index[k]));
+    PetscCall(HycoGatherRows(R, 1, &index[k], pivot));
+    for (PetscInt j = 0; j < l; j++) size2 += pivot[j] * pivot[j];
+    PetscCheck(size2 > 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "Q-DEIM: the basis has rank %d of %d", (int)k, (int)l);
+    PetscCall(MatDenseGetArray(R, &r));
+    for (PetscInt i = 0; i < hi - lo; i++) {
+      PetscReal dot = 0;
+
+      for (PetscInt j = 0; j < l; j++) dot += r[(size_t)j * (size_t)lda + (size_t)i] * pivot[j];
+      for (PetscInt j = 0; j < l; j++) r[(size_t)j * (size_t)lda + (size_t)i] -= dot / size2 * pivot[j];
+    }
+    PetscCall(MatDenseRestoreArray(R, &r));
+  }
+  PetscCall(PetscFree2(pivot, length2));
+  PetscCall(MatDestroy(&R));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -54,3 +54,63 @@ PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal
   PetscCall(PetscFree3(copy, s, work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* The largest eigenvalue of A^T A, or with LU of A of its inverse: power iterations from a fixed start. */
+static PetscReal LargestOfSquare(PetscBLASInt n, const PetscReal A[], const PetscReal LU[], const PetscBLASInt ipiv[],
+                                 PetscReal x[], PetscReal y[])
+{
+  const PetscBLASInt one = 1;
+  const PetscReal unit = 1, zero = 0;
+  PetscReal value = 0;
+
+  for (PetscInt i = 0; i < n; i++) x[i] = 1 + 0.5 * PetscSinReal((PetscReal)(i + 1));
+  for (PetscInt it = 0; it < 200; it++) {
+    PetscReal before = value, size = 0;
+    PetscBLASInt info;
+
+    for (PetscInt i = 0; i < n; i++) size += x[i] * x[i];
+    size = PetscSqrtReal(size);
+    if (!(size > 0) || PetscIsInfOrNanReal(size)) return size;
+    for (PetscInt i = 0; i < n; i++) x[i] /= size;
+    if (LU) {
+      LAPACKgetrs_("T", &n, &one, LU, &n, ipiv, x, &n, &info);
+      LAPACKgetrs_("N", &n, &one, LU, &n, ipiv, x, &n, &info);
+    } else {
+      BLASgemv_("N", &n, &n, &unit, A, &n, x, &one, &zero, y, &one);
+      BLASgemv_("T", &n, &n, &unit, A, &n, y, &one, &zero, x, &one);
+    }
+    value = 0;
+    for (PetscInt i = 0; i < n; i++) value += x[i] * x[i];
+    value = PetscSqrtReal(value);
+    if (PetscAbsReal(value - before) <= 1e-3 * value) return value;
+  }
+  return value;
+}
+
+PetscErrorCode HycoSingularity(PetscInt n, const PetscReal A[], PetscInt *sign, PetscReal *ratio)
+{
+  PetscReal *LU, *x, *y, large, inverse;
+  PetscBLASInt nb, info, *ipiv;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(n, &nb));
+  PetscCall(PetscMalloc4((size_t)n * (size_t)n, &LU, n, &x, n, &y, n, &ipiv));
+  PetscCall(PetscArraycpy(LU, A, (size_t)n * (size_t)n));
+  LAPACKgetrf_(&nb, &nb, LU, &nb, ipiv, &info);
+  *sign = 1;
+  *ratio = 0;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal u = LU[(size_t)i * (size_t)n + (size_t)i];
+
+    *sign *= (u > 0) - (u < 0);
+    if (ipiv[i] != i + 1) *sign = -*sign;
+  }
+  if (*sign) {
+    large = LargestOfSquare(nb, A, NULL, NULL, x, y);
+    inverse = LargestOfSquare(nb, A, LU, ipiv, x, y);
+    if (large > 0 && inverse > 0 && !PetscIsInfOrNanReal(inverse))
+      *ratio = 1 / PetscSqrtReal(large) / PetscSqrtReal(inverse);
+  }
+  PetscCall(PetscFree4(LU, x, y, ipiv));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

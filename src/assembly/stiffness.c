@@ -146,6 +146,7 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, Mat M)
   PetscReal Me[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
 
   PetscFunctionBegin;
+  PetscCall(MatSetOption(M, MAT_IGNORE_ZERO_ENTRIES, PETSC_TRUE)); /* components do not couple */
   PetscCall(MatZeroEntries(M));
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     PetscCall(PetscArrayzero(Me, n * n));

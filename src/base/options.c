@@ -31,6 +31,8 @@ static const HycoOption option_table[] = {
     {"hyco_rid_dual_tol", "<real>", "1e-1", "epsilon of (18) for the dual basis"},
     {"hyco_rid_stress_tol", "<real>", "hyco_pod_tol", "epsilon of (18) for the stress basis"},
     {"hyco_rid_force_tol", "<real>", "hyco_pod_tol", "epsilon of (18) for the basis of generalised forces"},
+    {"hyco_deim_type", "<deim|qdeim>", "deim",
+     "how a basis chooses the points that seed the RID: greedily, or by pivoted QR"},
     {"hyco_rid_layers", "<int>", "0", "layers of elements added around the RID"},
     {"hyco_rid_contact_extension", "<length>", "0",
      "contact nodes this close to the RID's join it with their elements"},
@@ -41,6 +43,9 @@ static const HycoOption option_table[] = {
      "displacements kept full order: fewest for full row rank, all contact ones, all"},
     {"hyco_hybrid_trials", "<int>", "0",
      "candidate sets judged by their training error when hybrid is rank (0: from the size)"},
+    {"hyco_scan", "<int>", "0",
+     "points per parameter that look for a singular reduced stiffness (0: some hundred in all)"},
+    {"hyco_keep_singular", "<bool>", "false", "keep a model whose reduced stiffness is singular inside the ranges"},
     {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
 };
 

@@ -2,11 +2,23 @@
 #include "driver.h"
 #include <stdlib.h>
 
-enum { E_U, E_U_RID, E_SIGMA, E_SIGMA_11, E_LAMBDA_RID, E_LAMBDA, N_ERRORS };
+enum { E_U, E_U_H1, E_U_RID, E_SIGMA, E_SIGMA_11, E_LAMBDA_RID, E_LAMBDA_RID_DUAL, E_LAMBDA, E_LAMBDA_DUAL, N_ERRORS };
 enum { CONVERGED = N_ERRORS, FALLBACK, KKT, COVERED, SECONDS_FOM, SECONDS_ROM, N_COLUMNS };
-static const char *const columns[N_COLUMNS] = {
-    "error_u",   "error_u_rid", "error_sigma", "error_sigma_11", "error_lambda_rid",   "error_lambda",
-    "converged", "fallback",    "kkt_max",     "covered_force",  "seconds_full_order", "seconds_reduced"};
+static const char *const columns[N_COLUMNS] = {"error_u",
+                                               "error_u_h1",
+                                               "error_u_rid",
+                                               "error_sigma",
+                                               "error_sigma_11",
+                                               "error_lambda_rid",
+                                               "error_lambda_rid_dual",
+                                               "error_lambda",
+                                               "error_lambda_dual",
+                                               "converged",
+                                               "fallback",
+                                               "kkt_max",
+                                               "covered_force",
+                                               "seconds_full_order",
+                                               "seconds_reduced"};
 
 /* One point on one group: both solutions, their difference. */
 static PetscErrorCode ComparePoint(HycoFOM fom, HycoModel model, PetscInt n_par, const PetscReal mu[], PetscReal v[])
@@ -24,11 +36,14 @@ static PetscErrorCode ComparePoint(HycoFOM fom, HycoModel model, PetscInt n_par,
   PetscCall(HycoModelGetPrediction(model, &p));
   PetscCall(HycoModelCompare(model, fom, &e));
   v[E_U] = e.u;
+  v[E_U_H1] = e.u_h1;
   v[E_U_RID] = e.u_rid;
   v[E_SIGMA] = e.sigma;
   v[E_SIGMA_11] = e.sigma_11;
   v[E_LAMBDA_RID] = e.lambda_rid;
+  v[E_LAMBDA_RID_DUAL] = e.lambda_rid_dual;
   v[E_LAMBDA] = e.lambda;
+  v[E_LAMBDA_DUAL] = e.lambda_dual;
   v[CONVERGED] = p.reason > 0;
   v[FALLBACK] = p.reason == HYCO_CONVERGED_FALLBACK;
   v[KKT] = HycoKKTMax(&p.kkt);
@@ -64,33 +79,35 @@ static int CompareReal(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-/* Mean and worst over the points where the error is defined. */
-static void AddStatistics(cJSON *json, PetscInt n, const PetscReal value[], PetscInt column, const char *name,
-                          PetscInt *undefined)
+/* Mean and worst over the points where the error is defined, and how many there are where it is not (x/0). */
+static void AddStatistics(cJSON *json, PetscInt n, const PetscReal value[], PetscInt column, PetscInt *all_undefined)
 {
+  const char *name = columns[column];
   cJSON *object = cJSON_AddObjectToObject(json, name);
   PetscReal sum = 0, worst = 0;
-  PetscInt used = 0;
+  PetscInt used = 0, undefined = 0;
 
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal e = value[k * N_COLUMNS + column];
 
     if (e > PETSC_MAX_REAL / 8 || value[k * N_COLUMNS + CONVERGED] < 0.5) {
-      *undefined += value[k * N_COLUMNS + CONVERGED] > 0.5;
+      undefined += value[k * N_COLUMNS + CONVERGED] > 0.5;
       continue;
     }
     sum += e;
     worst = PetscMax(worst, e);
     used++;
   }
+  *all_undefined += undefined;
+  cJSON_AddNumberToObject(object, "undefined", undefined);
   if (used) {
     cJSON_AddNumberToObject(object, "mean", sum / used);
     cJSON_AddNumberToObject(object, "max", worst);
-    (void)!Say("  %-18s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(sum / used), 100 * (double)worst);
+    (void)!Say("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(sum / used), 100 * (double)worst);
   } else { /* no point where it is defined */
     cJSON_AddNullToObject(object, "mean");
     cJSON_AddNullToObject(object, "max");
-    (void)!Say("  %-18s undefined at every point\n", name);
+    (void)!Say("  %-21s undefined at every point\n", name);
   }
 }
 
@@ -98,7 +115,7 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
 {
   cJSON *json, *object;
   PetscReal *ratio, mean = 0, kkt = 0, covered[2] = {0, 1};
-  PetscInt undefined = 0, failed = 0, fallback = 0, none = 0;
+  PetscInt undefined = 0, failed = 0, fallback = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &ratio));
@@ -117,12 +134,7 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
   PetscCall(ReportCreate("compare", scene, NULL, &json));
   cJSON_AddNumberToObject(json, "n_points", n);
   PetscCall(Say("%d points\n", (int)n));
-  AddStatistics(json, n, value, E_U, "error_u", &none);
-  AddStatistics(json, n, value, E_U_RID, "error_u_rid", &none);
-  AddStatistics(json, n, value, E_SIGMA, "error_sigma", &none);
-  AddStatistics(json, n, value, E_SIGMA_11, "error_sigma_11", &none);
-  if (contact) AddStatistics(json, n, value, E_LAMBDA_RID, "error_lambda_rid", &undefined);
-  if (contact) AddStatistics(json, n, value, E_LAMBDA, "error_lambda", &undefined);
+  for (PetscInt k = 0; k < (contact ? N_ERRORS : E_LAMBDA_RID); k++) AddStatistics(json, n, value, k, &undefined);
   object = cJSON_AddObjectToObject(json, "speedup");
   cJSON_AddNumberToObject(object, "mean", mean);
   cJSON_AddNumberToObject(object, "median", ratio[n / 2]);
@@ -138,7 +150,7 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
   cJSON_AddNumberToObject(json, "not_converged", failed);
   cJSON_AddNumberToObject(json, "fallback", fallback);
   cJSON_AddNumberToObject(json, "kkt_max", kkt);
-  PetscCall(Say("%d not converged, %d by the fallback solver, %d force errors undefined; largest KKT residual %.1e\n",
+  PetscCall(Say("%d not converged, %d by the fallback solver, %d errors undefined (x/0); largest KKT residual %.1e\n",
                 (int)failed, (int)fallback, (int)undefined, (double)kkt));
   PetscCall(PetscFree(ratio));
   PetscCall(ReportWrite(&json));

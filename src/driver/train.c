@@ -1,8 +1,25 @@
 /* hyco train: snapshots, reduction, model. */
 #include "driver.h"
 
+/* "scan": how near the reduced stiffness comes to being singular inside the parameters' ranges; null: not scanned. */
+static void ReportScan(cJSON *json, const HycoScan *s, PetscInt n_par)
+{
+  cJSON *object;
+
+  if (!s->n) {
+    cJSON_AddNullToObject(json, "scan");
+    return;
+  }
+  object = cJSON_AddObjectToObject(json, "scan");
+  cJSON_AddNumberToObject(object, "points", s->n);
+  cJSON_AddNumberToObject(object, "points_of_other_sign", s->n_singular);
+  cJSON_AddNumberToObject(object, "smallest_singular_value", s->smallest);
+  ReportVector(object, "at", n_par, s->at);
+}
+
 static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
 {
+  PetscInt n_par;
   cJSON *json, *seconds;
 
   PetscFunctionBegin;
@@ -19,6 +36,8 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
   cJSON_AddNumberToObject(json, "rid_contacts", t->rid_contacts);
   cJSON_AddNumberToObject(json, "rid_fraction", t->rid_fraction);
   cJSON_AddNumberToObject(json, "condition", t->condition);
+  PetscCall(HycoSceneGetParameters(scene, &n_par, NULL, NULL, NULL));
+  ReportScan(json, &t->scan, n_par);
   cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
   cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
   seconds = cJSON_AddObjectToObject(json, "seconds");
@@ -58,6 +77,9 @@ PetscErrorCode CommandTrain(void)
                 (int)t.rid_contacts, (int)t.n_fe_dofs));
   PetscCall(Say("mean training errors: u %.2e, RID forces %.2e; condition of the reduced stiffness %.1e\n",
                 (double)t.error_u, (double)t.error_lambda, (double)t.condition));
+  if (t.scan.n)
+    PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,
+                  (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept as asked" : ""));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));
   PetscCall(Report(scene, &t));

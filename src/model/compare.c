@@ -20,6 +20,25 @@ static PetscReal Quotient(PetscReal lost, PetscReal size)
   return size > 0 ? lost / size : lost > 0 ? PETSC_INFINITY : 0;
 }
 
+/* The errors in H1 and its dual. */
+static PetscErrorCode CompareH1(HycoModel m, const PetscReal U[], const PetscReal u[], const PetscReal lambda[],
+                                HycoErrors *e)
+{
+  PetscReal lost, size;
+
+  PetscFunctionBegin;
+  if (!m->norms) PetscCall(HycoNormsCreate(m->scene, m->whole, &m->norms));
+  PetscCall(HycoNormH1(m->norms, U, u, &lost));
+  PetscCall(HycoNormH1(m->norms, u, NULL, &size));
+  e->u_h1 = Quotient(lost, size);
+  for (int rid = 0; rid < 2; rid++) {
+    PetscCall(HycoNormDual(m->norms, m, (PetscBool)rid, m->Lambda, lambda, &lost));
+    PetscCall(HycoNormDual(m->norms, m, (PetscBool)rid, lambda, NULL, &size));
+    *(rid ? &e->lambda_rid_dual : &e->lambda_dual) = Quotient(lost, size);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Compare(HycoModel m, HycoFOM f, const PetscReal sigma[], HycoErrors *e)
 {
   const PetscReal *U, *stress;
@@ -54,6 +73,7 @@ static PetscErrorCode Compare(HycoModel m, HycoFOM f, const PetscReal sigma[], H
   e->sigma_11 = Quotient(s11.lost, s11.size);
   e->lambda_rid = Quotient(PetscSqrtReal(lr.lost2), PetscSqrtReal(lr.size2));
   e->lambda = Quotient(PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2));
+  PetscCall(CompareH1(m, U, f->u, f->lambda, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

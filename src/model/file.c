@@ -206,6 +206,13 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
   PetscCall(HycoH5WriteReal(h, "reconstruction/S_lambda", m->n_dual, m->pairs.n, m->S_lambda));
   PetscCall(HycoH5WriteReal(h, "training/points", m->n_points, m->scene->n_parameters, m->points));
   PetscCall(HycoH5WriteReal(h, "training/numbers", 3, 1, m->numbers));
+  if (m->scan.n) {
+    const PetscInt counts[2] = {m->scan.n, m->scan.n_singular};
+
+    PetscCall(HycoH5WriteInt(h, "training/scan_counts", 2, 1, counts));
+    PetscCall(HycoH5WriteReal(h, "training/scan_smallest", 1, 1, &m->scan.smallest));
+    PetscCall(HycoH5WriteReal(h, "training/scan_at", m->scene->n_parameters, 1, m->scan.at));
+  }
   PetscCall(HycoH5WriteText(h, "training/provenance", m->provenance));
   PetscCall(HycoH5WriteText(h, "training/fingerprint", m->fingerprint));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -256,6 +263,26 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode LoadScan(HycoH5 h, HycoModel m)
+{
+  PetscInt one = 1, two = 2, n = m->scene->n_parameters, *counts;
+  PetscReal *smallest, *at;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "training/scan_counts")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadInt(h, "training/scan_counts", 0, PETSC_MAX_INT, &two, &one, &counts));
+  PetscCall(HycoH5LoadReal(h, "training/scan_smallest", &one, &one, &smallest));
+  PetscCall(HycoH5LoadReal(h, "training/scan_at", &n, &one, &at));
+  m->scan.n = counts[0];
+  m->scan.n_singular = counts[1];
+  m->scan.smallest = *smallest;
+  PetscCall(PetscArraycpy(m->scan.at, at, n));
+  PetscCall(PetscFree(counts));
+  PetscCall(PetscFree(smallest));
+  PetscCall(PetscFree(at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
 {
   PetscInt one = 1, six = 6, n_dof, *sizes, three = 3, n_par;
@@ -300,6 +327,7 @@ static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
   PetscCall(HycoH5LoadReal(h, "training/numbers", &three, &one, &numbers));
   PetscCall(PetscArraycpy(m->numbers, numbers, 3));
   PetscCall(PetscFree(numbers));
+  PetscCall(LoadScan(h, m));
   PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
   PetscCall(HycoH5LoadText(h, "training/fingerprint", &text));
   PetscCall(PetscStrncpy(m->fingerprint, text, sizeof(m->fingerprint)));

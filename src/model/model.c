@@ -52,6 +52,7 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
   if (!model || !*model) PetscFunctionReturn(PETSC_SUCCESS);
   m = *model;
   PetscCall(HycoModelReset(m));
+  PetscCall(HycoNormsDestroy(&m->norms));
   PetscCall(HycoFEDestroy(&m->fe_whole));
   PetscCall(HycoPairsDestroy(&m->whole_pairs));
   PetscCall(HycoMeshDestroy(&m->whole));
@@ -243,6 +244,25 @@ PetscErrorCode HycoModelWrite(HycoModel m, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode ViewScan(HycoModel m, PetscViewer viewer)
+{
+  PetscFunctionBegin;
+  if (!m->scan.n) {
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  not scanned for a singular reduced stiffness\n"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  scanned at %d points: smallest singular value %.2e of the largest",
+                                   (int)m->scan.n, (double)m->scan.smallest));
+  for (PetscInt p = 0; p < m->scene->n_parameters; p++)
+    PetscCall(
+        PetscViewerASCIIPrintf(viewer, "%s %s = %.6g", p ? "," : " at", m->scene->parameter[p], (double)m->scan.at[p]));
+  if (m->scan.n_singular)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "; SINGULAR inside the ranges: the determinant has the other sign at %d",
+                                     (int)m->scan.n_singular));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
 {
   static const char *const words[] = {"auto", "rank: the fewest that give full row rank",
@@ -273,6 +293,7 @@ PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
   if (m->hybrid == HYCO_HYBRID_ALL && m->G)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  ridge: %.0e of the first squared singular value\n", (double)m->ridge));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
+  PetscCall(ViewScan(m, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  dual snapshots for the reconstruction: %d\n", (int)m->n_dual));
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->provenance));
   PetscCall(HycoSceneView(m->scene, viewer));

@@ -351,6 +351,15 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoModelAssemble(HycoModel m, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoModelSetUp(m));
+  m->solved = m->whole_current = PETSC_FALSE;
+  PetscCall(Assemble(m, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* gamma, U on the nodes of mesh, Lambda on A_lambda. */
 static PetscErrorCode Unpack(HycoModel m)
 {

@@ -120,6 +120,13 @@ static PetscErrorCode Project(HycoTrainer t, Mat S, Mat V)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode Points(HycoTrainer t, Mat V, PetscInt index[])
+{
+  PetscFunctionBegin;
+  PetscCall(t->deim ? HycoQDEIM(V, index) : HycoDEIM(V, index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The primal basis V, and DEIM on it. */
 static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store)
 {
@@ -138,7 +145,7 @@ static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store)
   t->counts[HYCO_SEED_DISPLACEMENT] = t->l;
   if (t->seed[HYCO_SEED_DISPLACEMENT]) {
     PetscCall(PetscMalloc1(t->l, &index));
-    PetscCall(HycoDEIM(V, index));
+    PetscCall(Points(t, V, index));
     PetscCall(AddSeeds(t->l, index, t->sizes[3], &t->n_seeds_node, &t->seeds_node));
     PetscCall(PetscFree(index));
   }
@@ -165,7 +172,7 @@ static PetscErrorCode SeedFrom(HycoTrainer t, HycoSnapshots store, const char fi
   t->counts[kind] = l;
   if (l) {
     PetscCall(PetscMalloc1(l, &index));
-    PetscCall(HycoDEIM(V, index));
+    PetscCall(Points(t, V, index));
     PetscCall(AddSeeds(l, index, divide, n_seeds, seeds));
     PetscCall(PetscFree(index));
     PetscCall(MatDestroy(&V));
@@ -254,7 +261,7 @@ static PetscErrorCode DualSeeds(HycoTrainer t, PetscInt *n_nodes, PetscInt nodes
     }
     PetscCall(MatDenseRestoreArray(V, &v));
     PetscCall(PetscMalloc1(l, &index));
-    PetscCall(HycoDEIM(V, index));
+    PetscCall(Points(t, V, index));
     for (PetscInt k = 0; k < l; k++) {
       nodes[(*n_nodes)++] = t->pairs.slave[index[k]];
       for (PetscInt j = t->pairs.master_start[index[k]]; j < t->pairs.master_start[index[k] + 1]; j++)

@@ -227,8 +227,10 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
   solved = HycoNow();
   PetscCall(HycoTrainerReduce(t, store));
   PetscCall(HycoSnapshotsDestroy(&store));
-  HycoOnRoot(t->comm, BuildAndSave(t, path, &report));
+  PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s.candidate", path));
+  HycoOnRoot(t->comm, BuildAndSave(t, folder, &report));
   PetscCallMPI(MPI_Bcast(&report, sizeof(report), MPI_BYTE, 0, t->comm));
+  PetscCall(HycoTrainerScan(t, folder, path, &report.scan));
   report.seconds_snapshots = solved - begin;
   report.seconds_reduction = HycoNow() - solved;
   if (training) *training = report;

@@ -94,7 +94,8 @@ static PetscErrorCode ReadSeedKinds(HycoTrainer t)
 
 PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
 {
-  static const char *const hybrids[] = {"auto", "rank", "contact", "all", NULL};
+  static const char *const hybrids[] = {"auto", "rank", "contact", "all", NULL}, *const deims[] = {"deim", "qdeim",
+                                                                                                   NULL};
   PetscOptions o;
   PetscInt hybrid, n = 64;
   PetscBool set;
@@ -112,12 +113,15 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   PetscCall(HycoOptionsReal(o, "hyco_rid_dual_tol", 0, 1, &t->tol[HYCO_SEED_DUAL]));
   PetscCall(HycoOptionsReal(o, "hyco_pod_noise", 0, 1, &t->noise));
   PetscCall(HycoOptionsInt(o, "hyco_pod_max_modes", 0, PETSC_MAX_INT, &t->max_modes));
+  PetscCall(HycoOptionsWord(o, "hyco_deim_type", deims, &t->deim));
   PetscCall(HycoOptionsInt(o, "hyco_rid_layers", 0, PETSC_MAX_INT, &t->layers));
   PetscCall(HycoOptionsReal(o, "hyco_rid_contact_extension", 0, PETSC_MAX_REAL, &t->extension));
   PetscCall(HycoOptionsBool(o, "hyco_rid_whole", &t->whole_rid));
   PetscCall(HycoOptionsWord(o, "hyco_hybrid", hybrids, &hybrid));
   PetscCall(HycoOptionsInt(o, "hyco_hybrid_trials", 0, PETSC_MAX_INT / 8, &t->trials));
   t->hybrid = (HycoHybrid)hybrid;
+  PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
+  PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
   PetscCall(ReadSeedKinds(t));
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
   PetscCall(PetscOptionsGetStringArray(o, NULL, "-hyco_rid_groups", t->groups, &n, &set));

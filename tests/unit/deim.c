@@ -1,4 +1,4 @@
-/* DEIM on a basis small enough to follow by hand, pivoted columns and singular values. On any ranks. */
+/* DEIM and Q-DEIM on a basis small enough to follow by hand, pivoted columns and singular values. On any ranks. */
 #include "check.h"
 #include <hycoalgorithms.h>
 #include <math.h>
@@ -44,6 +44,32 @@ static PetscErrorCode TestByHand(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  Q-DEIM on rows (1 1), (0 2), (3 0), (0 -2): the longest is row 2; taking (1 0) out of the others leaves (0 1), (0 2),
+  (0 -2): row 1, which ties with row 3. Turning the modes changes nothing (DEIM's points it would).
+*/
+static PetscErrorCode TestPivotedQR(void)
+{
+  const PetscReal v[8] = {1, 1, 0, 2, 3, 0, 0, -2}, c = cos(0.7), s = sin(0.7);
+  PetscReal turned[8];
+  PetscInt index[2];
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < 4; i++) {
+    turned[2 * i] = c * v[2 * i] - s * v[2 * i + 1];
+    turned[2 * i + 1] = s * v[2 * i] + c * v[2 * i + 1];
+  }
+  for (int k = 0; k < 2; k++) {
+    Mat V;
+
+    PetscCall(Make(4, 2, k ? turned : v, &V));
+    PetscCall(HycoQDEIM(V, index));
+    CHECK(index[0] == 2 && index[1] == 1, "expected rows 2, 1, found %d, %d", (int)index[0], (int)index[1]);
+    PetscCall(MatDestroy(&V));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Rows equally large up to round-off: the lowest is taken. */
 static PetscErrorCode TestTie(void)
 {
@@ -60,7 +86,7 @@ static PetscErrorCode TestTie(void)
 }
 
 /* The property of any DEIM: l rows, each once, on which the basis is regular. */
-static PetscErrorCode TestProperty(void)
+static PetscErrorCode TestProperty(PetscErrorCode (*deim)(Mat, PetscInt[]))
 {
   const PetscInt n = 60, l = 12;
   unsigned long long state = 99;
@@ -72,7 +98,7 @@ static PetscErrorCode TestProperty(void)
   PetscCall(PetscMalloc2(n * l, &v, l * l, &P));
   for (PetscInt k = 0; k < n * l; k++) v[k] = Draw(&state);
   PetscCall(Make(n, l, v, &V));
-  PetscCall(HycoDEIM(V, index));
+  PetscCall(deim(V, index));
   PetscCall(HycoGatherRows(V, l, index, P));
   PetscCall(HycoExtremeSingularValues(l, l, P, &smallest, &largest));
   CHECK(smallest > 1e-3 * largest, "singular values of the chosen rows from %g to %g", smallest, largest);
@@ -81,6 +107,36 @@ static PetscErrorCode TestProperty(void)
   }
   PetscCall(MatDestroy(&V));
   PetscCall(PetscFree2(v, P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The sign of the determinant (rows exchanged: the other one), and of [1 1; 0 1] the golden ratio's square between its
+   singular values; a random matrix as by its SVD; 0 where two rows are equal. */
+static PetscErrorCode TestSingularity(void)
+{
+  const PetscReal J[4] = {1, 0, 1, 1}, swapped[4] = {0, 1, 1, 1}, equal[4] = {1, 1, 2, 2}, minus[1] = {-2};
+  const PetscInt n = 30;
+  unsigned long long state = 7;
+  PetscReal *A, ratio, smallest, largest;
+  PetscInt sign;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSingularity(2, J, &sign, &ratio));
+  CHECK(sign == 1, "sign %d", (int)sign);
+  CHECK_NEAR(ratio, (3 - sqrt(5)) / 2, 1e-3);
+  PetscCall(HycoSingularity(2, swapped, &sign, &ratio));
+  CHECK(sign == -1, "sign %d", (int)sign);
+  PetscCall(HycoSingularity(2, equal, &sign, &ratio));
+  CHECK(sign == 0 && ratio == 0, "sign %d, ratio %g", (int)sign, ratio);
+  PetscCall(HycoSingularity(1, minus, &sign, &ratio));
+  CHECK(sign == -1, "sign %d", (int)sign);
+  CHECK_NEAR(ratio, 1, 1e-14);
+  PetscCall(PetscMalloc1(n * n, &A));
+  for (PetscInt k = 0; k < n * n; k++) A[k] = Draw(&state);
+  PetscCall(HycoSingularity(n, A, &sign, &ratio));
+  PetscCall(HycoExtremeSingularValues(n, n, A, &smallest, &largest));
+  CHECK_NEAR(ratio * largest / smallest, 1, 0.02);
+  PetscCall(PetscFree(A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -103,6 +159,7 @@ static PetscErrorCode TestDense(void)
   PetscCall(HycoExtremeSingularValues(2, 2, J, &smallest, &largest));
   CHECK_NEAR(largest, (1 + sqrt(5)) / 2, 1e-14);
   CHECK_NEAR(smallest, (sqrt(5) - 1) / 2, 1e-14);
+  PetscCall(TestSingularity());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -111,7 +168,9 @@ static PetscErrorCode Test(void)
   PetscFunctionBegin;
   PetscCall(TestByHand());
   PetscCall(TestTie());
-  PetscCall(TestProperty());
+  PetscCall(TestPivotedQR());
+  PetscCall(TestProperty(HycoDEIM));
+  PetscCall(TestProperty(HycoQDEIM));
   PetscCall(TestDense());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
