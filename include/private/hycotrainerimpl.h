@@ -20,6 +20,9 @@ struct _p_HycoTrainer {
   PetscInt n_groups;
   char *groups[64], *region;
   HycoHybrid hybrid;
+  HycoModelType type;
+  HycoDual dual;
+  PetscInt nnmf_max_its;
   HycoProgress progress;
   void *progress_ctx;
   /* state of a run, rank 0 unless said */
@@ -46,5 +49,11 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t);
 PetscErrorCode HycoTrainerReduce(HycoTrainer t, HycoSnapshots store);
 /* Chooses the full-order displacements of a model under training; numbers[] of the model are filled. Rank 0. */
 PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel model);
+/* Makes the force basis of a projection-based model under training from its dual snapshots, and fills numbers[]. Rank
+ * 0.
+ */
+PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel model);
+/* Fills numbers[]: condition and mean training errors of the model as it stands. Rank 0. */
+PetscErrorCode HycoTrainerJudge(HycoTrainer t, HycoModel model);
 
 #endif

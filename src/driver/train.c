@@ -7,6 +7,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
 
   PetscFunctionBegin;
   PetscCall(ReportCreate("train", scene, NULL, &json));
+  cJSON_AddStringToObject(json, "model_type", HycoModelTypes[t->type]);
   cJSON_AddNumberToObject(json, "n_samples", t->n_samples);
   cJSON_AddNumberToObject(json, "n_modes", t->n_modes);
   cJSON_AddNumberToObject(json, "n_dual_modes", t->n_dual_modes);
@@ -21,11 +22,30 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
   cJSON_AddNumberToObject(json, "condition", t->condition);
   cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
   cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
+  if (t->type == HYCO_MODEL_PROJECTION) cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);
   seconds = cJSON_AddObjectToObject(json, "seconds");
   cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots);
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
   cJSON_AddNumberToObject(seconds, "total", t->seconds_snapshots + t->seconds_reduction);
   PetscCall(ReportWrite(&json));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SayBases(const HycoTraining *t)
+{
+  PetscFunctionBegin;
+  if (t->type == HYCO_MODEL_PROJECTION) {
+    PetscCall(
+        Say("projection-based: %d snapshots, %d displacement modes, %d force vectors, which leave out %.2e of the "
+            "dual snapshots' energy\n",
+            (int)t->n_samples, (int)t->n_modes, (int)t->n_dual_modes, (double)t->dual_misfit));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t->n_samples,
+                (int)t->n_modes, (int)t->n_stress_modes, (int)t->n_force_modes, (int)t->n_dual_modes));
+  PetscCall(Say("RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
+                (int)t->rid_elements, 100 * (double)t->rid_fraction, (int)t->rid_nodes, (int)t->rid_a_nodes,
+                (int)t->rid_contacts, (int)t->n_fe_dofs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -51,11 +71,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
   PetscCall(DriverCheckLeftEarly(scene));
   PetscCall(HycoTrainerRun(trainer, samples, model, &t));
-  PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t.n_samples,
-                (int)t.n_modes, (int)t.n_stress_modes, (int)t.n_force_modes, (int)t.n_dual_modes));
-  PetscCall(Say("RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
-                (int)t.rid_elements, 100 * (double)t.rid_fraction, (int)t.rid_nodes, (int)t.rid_a_nodes,
-                (int)t.rid_contacts, (int)t.n_fe_dofs));
+  PetscCall(SayBases(&t));
   PetscCall(Say("mean training errors: u %.2e, RID forces %.2e; condition of the reduced stiffness %.1e\n",
                 (double)t.error_u, (double)t.error_lambda, (double)t.condition));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
