@@ -15,7 +15,8 @@ typedef struct _p_HycoTrainer *HycoTrainer;
 /* What a training gave. */
 typedef struct {
   HycoModelType type;
-  PetscReal dual_misfit; /* projection: share of the dual snapshots' squares that their nonnegative basis leaves out */
+  PetscReal dual_misfit;  /* projection: share of the dual snapshots' squares that their nonnegative basis leaves out */
+  PetscInt n_supremizers; /* of n_modes, -hyco_dual snapshots */
   PetscInt n_samples, n_modes, n_dual_modes, n_stress_modes, n_force_modes; /* l_u and the sizes of the other bases */
   PetscInt n_fe_dofs, rid_nodes, rid_elements, rid_a_nodes, rid_contacts; /* FE unknowns, RID, nodes of A, |A_lambda| */
   PetscReal rid_fraction;                                                 /* share of the elements */

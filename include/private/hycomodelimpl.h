@@ -41,7 +41,8 @@ struct _p_HycoModel {
   char *provenance;
   char fingerprint[32]; /* of the scene and mesh that it was trained on */
   PetscInt whole_nodes, whole_cells;
-  PetscInt counts[3];   /* modes of the dual, stress and force bases that seeded the RID */
+  PetscInt counts[3];   /* modes of the dual, stress and force bases that seeded the RID; projection: force vectors,
+                           supremizers among the l modes (the last, with singular value 0), 0 */
   PetscReal numbers[3]; /* condition of the reduced stiffness, training errors of u and lambda */
   /* projection: the whole mesh is the RID; no full-order unknown, no dual snapshot */
   HycoModelType type;

@@ -33,12 +33,12 @@ struct _p_HycoTrainer {
   PetscInt sizes[4];                                             /* every rank: nodes, cells, contacts, dim */
   PetscInt n_seeds_node, n_seeds_cell, *seeds_node, *seeds_cell; /* every rank */
   PetscInt counts[HYCO_N_SEEDS];
-  PetscInt l;
-  PetscReal *sigma;      /* every rank: l */
-  PetscReal *V_whole;    /* (n_nodes * dim) x l row major */
-  PetscReal *U, *Lambda; /* snapshots, column major: n_dof x n_s, n_contacts x n_s */
-  PetscReal *VtU;        /* l x n_s column major: V^T of the snapshots less their lifting */
-  PetscReal *U_norm;     /* n_s: of the whole snapshot */
+  PetscInt l, n_supremizers; /* modes, and how many of them (the last) Enrich added */
+  PetscReal *sigma;          /* every rank: l */
+  PetscReal *V_whole;        /* (n_nodes * dim) x l row major */
+  PetscReal *U, *Lambda;     /* snapshots, column major: n_dof x n_s, n_contacts x n_s */
+  PetscReal *VtU;            /* l x n_s column major: V^T of the snapshots less their lifting */
+  PetscReal *U_norm;         /* n_s: of the whole snapshot */
   PetscInt n_s;
   unsigned long long fingerprint;
 };
@@ -49,9 +49,13 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t);
 PetscErrorCode HycoTrainerReduce(HycoTrainer t, HycoSnapshots store);
 /* Chooses the full-order displacements of a model under training; numbers[] of the model are filled. Rank 0. */
 PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel model);
-/* Makes the force basis of a projection-based model under training from its dual snapshots, and fills numbers[]. Rank
- * 0.
- */
+/* B^T of the dual snapshots, and M^-1 of it with the matrix M of the H1 norm: where each force works most. Both n_dof x
+   n_s, dense, the caller's. Rank 0. */
+PetscErrorCode HycoTrainerSupremizers(HycoTrainer t, Mat *forces, Mat *supremizers);
+/* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V_whole, sigma (0 for these)
+   and VtU have more columns. Rank 0. */
+PetscErrorCode HycoTrainerEnrich(HycoTrainer t);
+/* The force basis of a projection-based model under training from its dual snapshots; fills numbers[]. Rank 0. */
 PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel model);
 /* Fills numbers[]: condition and mean training errors of the model as it stands. Rank 0. */
 PetscErrorCode HycoTrainerJudge(HycoTrainer t, HycoModel model);

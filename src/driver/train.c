@@ -22,7 +22,10 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
   cJSON_AddNumberToObject(json, "condition", t->condition);
   cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
   cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
-  if (t->type == HYCO_MODEL_PROJECTION) cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);
+  if (t->type == HYCO_MODEL_PROJECTION) {
+    cJSON_AddNumberToObject(json, "n_supremizers", t->n_supremizers);
+    cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);
+  }
   seconds = cJSON_AddObjectToObject(json, "seconds");
   cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots);
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
@@ -36,9 +39,9 @@ static PetscErrorCode SayBases(const HycoTraining *t)
   PetscFunctionBegin;
   if (t->type == HYCO_MODEL_PROJECTION) {
     PetscCall(
-        Say("projection-based: %d snapshots, %d displacement modes, %d force vectors, which leave out %.2e of the "
-            "dual snapshots' energy\n",
-            (int)t->n_samples, (int)t->n_modes, (int)t->n_dual_modes, (double)t->dual_misfit));
+        Say("projection-based: %d snapshots; %d displacement modes, %d of them supremizers; %d force vectors, which "
+            "leave out %.2e of the dual snapshots' energy\n",
+            (int)t->n_samples, (int)t->n_modes, (int)t->n_supremizers, (int)t->n_dual_modes, (double)t->dual_misfit));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t->n_samples,
@@ -72,8 +75,9 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverCheckLeftEarly(scene));
   PetscCall(HycoTrainerRun(trainer, samples, model, &t));
   PetscCall(SayBases(&t));
-  PetscCall(Say("mean training errors: u %.2e, RID forces %.2e; condition of the reduced stiffness %.1e\n",
-                (double)t.error_u, (double)t.error_lambda, (double)t.condition));
+  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e; condition of the reduced stiffness %.1e\n",
+                (double)t.error_u, t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda,
+                (double)t.condition));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));
   PetscCall(Report(scene, &t));

@@ -218,6 +218,7 @@ static PetscErrorCode LoadType(HycoH5 h, HycoModel m)
   if (m->type == HYCO_MODEL_HYBRID) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LoadWord(h, m->path, "problem/dual", HycoDuals, &word));
   m->dual = (HycoDual)word;
+  HycoCheck(m->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);
   m->l_lambda = -1;
   PetscCall(HycoH5LoadReal(h, "problem/V_lambda", &m->l_lambda, &m->pairs.n, &m->V_lambda));
   PetscCall(HycoH5LoadReal(h, "training/dual_misfit", &one, &one, &misfit));

@@ -276,15 +276,18 @@ static PetscErrorCode ViewHybrid(HycoModel m, PetscViewer viewer)
 
 PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
 {
+  PetscInt pod;
+
   PetscFunctionBegin;
   HycoCheckHandle(m, "HycoModelLoad()");
+  pod = m->type == HYCO_MODEL_PROJECTION ? m->l - m->counts[1] : m->l;
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n",
                                    m->type == HYCO_MODEL_HYBRID ? "hybrid hyper-reduced" : "projection-based"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, %sforces %.2e\n",
                                    (int)m->n_points, (double)m->numbers[1], m->type == HYCO_MODEL_HYBRID ? "RID " : "",
                                    (double)m->numbers[2]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
-                                   (int)m->l, m->l ? (double)m->sigma[0] : 0., m->l ? (double)m->sigma[m->l - 1] : 0.));
+                                   (int)pod, pod ? (double)m->sigma[0] : 0., pod ? (double)m->sigma[pod - 1] : 0.));
   if (m->type == HYCO_MODEL_HYBRID)
     PetscCall(ViewHybrid(m, viewer));
   else

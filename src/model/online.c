@@ -136,7 +136,8 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
   PetscCall(SetUpBasis(m));
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
     interface = (PetscBool)(interface || m->role[i] == HYCO_ROLE_INTERFACE);
-  dense = (PetscBool)(m->n <= HYCO_DENSE_MAX || (m->hybrid == HYCO_HYBRID_ALL && interface));
+  dense = (PetscBool)(m->n <= HYCO_DENSE_MAX || m->type == HYCO_MODEL_PROJECTION ||
+                      (m->hybrid == HYCO_HYBRID_ALL && interface));
   PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->mesh->n_nodes, 0, &m->K));
   PetscCall(MatCreateVecs(m->K, &m->F, NULL));
   if (dense)

@@ -80,6 +80,9 @@ PetscErrorCode HycoProjectionView(HycoModel m, PetscViewer viewer)
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer, "  on the whole mesh: %d elements, %d nodes, %d contacts\n",
                                    (int)m->whole_cells, (int)m->whole_nodes, (int)m->pairs.n));
+  if (m->counts[1])
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  supremizers of the dual snapshots, which join the modes: %d\n",
+                                     (int)m->counts[1]));
   PetscCall(PetscViewerASCIIPrintf(
       viewer, "  force vectors: %d (%s); energy of the training forces that they leave out: %.2e\n", (int)m->l_lambda,
       m->dual == HYCO_DUAL_NNMF ? "nonnegative factorisation of the dual snapshots" : "the dual snapshots",

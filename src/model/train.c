@@ -139,6 +139,7 @@ static void Report(HycoTrainer t, HycoModel m, HycoTraining *r)
 {
   r->type = m->type;
   r->dual_misfit = m->dual_misfit;
+  r->n_supremizers = t->n_supremizers;
   r->n_samples = t->n_s;
   r->n_modes = t->l;
   r->n_dual_modes = t->counts[HYCO_SEED_DUAL];
@@ -178,7 +179,8 @@ static PetscErrorCode BuildAndSave(HycoTrainer t, const char path[], HycoTrainin
 
   PetscFunctionBegin;
   PetscCall(HycoModelCreate(&m));
-  ierr = CutDomain(t, m);
+  ierr = t->dual == HYCO_DUAL_SNAPSHOTS ? HycoTrainerEnrich(t) : PETSC_SUCCESS;
+  if (!ierr) ierr = CutDomain(t, m);
   if (!ierr) ierr = FillModel(t, m);
   if (!ierr) ierr = t->type == HYCO_MODEL_PROJECTION ? HycoTrainerProject(t, m) : HycoTrainerChooseHybrid(t, m);
   if (!ierr) ierr = CheckUseful(m);

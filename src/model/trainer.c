@@ -34,7 +34,7 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t)
   PetscCall(PetscFree(t->Lambda));
   PetscCall(PetscFree(t->VtU));
   PetscCall(PetscFree(t->U_norm));
-  t->n_seeds_node = t->n_seeds_cell = 0;
+  t->n_seeds_node = t->n_seeds_cell = t->n_supremizers = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
