@@ -1,4 +1,5 @@
-/* HycoModel: the hybrid hyper-reduced model (38)-(41) of a file; online it knows nothing of the full mesh. */
+/* HycoModel: the reduced model of a file, hybrid hyper-reduced (38)-(41), where online nothing of the full mesh is
+   known, or projection-based (44), on the whole mesh. */
 #ifndef HYCOMODEL_H
 #define HYCOMODEL_H
 
@@ -10,8 +11,13 @@ extern "C" {
 
 typedef struct _p_HycoModel *HycoModel;
 
-/* What a prediction amounts to, in scene units. */
+typedef enum { HYCO_MODEL_HYBRID, HYCO_MODEL_PROJECTION } HycoModelType; /* -hyco_model_type */
+extern const char *const HycoModelTypes[];                               /* their words; NULL ends */
+
+/* What a prediction amounts to, in scene units. Of a projection-based model the RID is the whole mesh. */
 typedef struct {
+  HycoModelType type;
+  PetscInt n_multipliers; /* force unknowns: n_contacts, or the force vectors of a projection-based model */
   PetscInt n_dof, n_contacts, n_modes, n_fe_dofs; /* reduced unknowns (modes + FE unknowns), contacts in the RID */
   PetscInt n_active, iterations, rid_nodes, rid_elements, dim;
   PetscReal rid_fraction;  /* share of the mesh's elements in the RID */
@@ -20,7 +26,7 @@ typedef struct {
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
   PetscReal strain_energy;                                         /* of the RID */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
-  HycoKKT kkt;                                                     /* of the reduced system (38) */
+  HycoKKT kkt;                                                     /* of the reduced system (38) or (44) */
   char method[64];                                                 /* what solved, in words */
   HycoReason reason;
   HycoSeconds seconds;
@@ -46,8 +52,8 @@ PetscErrorCode HycoModelGetScene(HycoModel model, HycoScene *scene);
    file's bytes). Collective on the scene's communicator. */
 PetscErrorCode HycoModelCheckScene(HycoModel model, HycoScene scene);
 
-/* Solves (38) at mu (length n) and reconstructs the contact forces (41). Not collective. Fails outside the trained
-   ranges; not converging is no error: see HycoPrediction.reason. */
+/* Solves (38) or (44) at mu (length n) and reconstructs the contact forces, (41) or V_lambda. Not collective. Fails
+   outside the trained ranges; not converging is no error: see HycoPrediction.reason. */
 PetscErrorCode HycoModelPredict(HycoModel model, PetscInt n, const PetscReal mu[]);
 /* Whether Predict reconstructs the forces outside the RID (default: yes). */
 PetscErrorCode HycoModelSetReconstruct(HycoModel model, PetscBool reconstruct);

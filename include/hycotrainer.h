@@ -1,4 +1,5 @@
-/* HycoTrainer: snapshots -> POD, DEIM -> reduced integration domain -> hybrid model in a file (sections 4 and 5). */
+/* HycoTrainer: snapshots -> POD, DEIM -> reduced integration domain -> hybrid model in a file (sections 4 and 5); or
+   snapshots -> POD, NNMF -> projection-based model in a file (6.3). */
 #ifndef HYCOTRAINER_H
 #define HYCOTRAINER_H
 
@@ -13,6 +14,9 @@ typedef struct _p_HycoTrainer *HycoTrainer;
 
 /* What a training gave. */
 typedef struct {
+  HycoModelType type;
+  PetscReal dual_misfit;  /* projection: share of the dual snapshots' squares that their nonnegative basis leaves out */
+  PetscInt n_supremizers; /* of n_modes, -hyco_dual snapshots */
   PetscInt n_samples, n_modes, n_dual_modes, n_stress_modes, n_force_modes; /* l_u and the sizes of the other bases */
   PetscInt n_fe_dofs, rid_nodes, rid_elements, rid_a_nodes, rid_contacts; /* FE unknowns, RID, nodes of A, |A_lambda| */
   PetscReal rid_fraction;                                                 /* share of the elements */
@@ -26,8 +30,8 @@ typedef struct {
 PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *trainer);
 /* Frees; sets the handle to NULL; NULL-safe. Collective. */
 PetscErrorCode HycoTrainerDestroy(HycoTrainer *trainer);
-/* Reads the -hyco_pod_, -hyco_deim_, -hyco_rid_, -hyco_hybrid, -hyco_scan options from the scene's options. Collective.
- */
+/* Reads the -hyco_model_type, -hyco_dual, -hyco_nnmf_, -hyco_pod_, -hyco_deim_, -hyco_rid_, -hyco_hybrid, -hyco_scan
+   options from the scene's options. Collective. */
 PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer trainer);
 /* Where the snapshots live (default: the model's name with .snapshots appended). */
 PetscErrorCode HycoTrainerSetSnapshotFolder(HycoTrainer trainer, const char folder[]);

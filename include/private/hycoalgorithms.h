@@ -41,6 +41,15 @@ PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscRea
 PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscReal x[],
                         PetscReal *residual);
 
+/*
+  Nonnegative factorisation S ~ W H by at most max_its alternations from the NNDSVD start: the same S, the same W. S: m
+  x n column major, no entry negative (else an error). W (room for m x k, column major) receives n_vectors <= k columns
+  of unit 2-norm, no entry negative; fewer than k when S has a smaller rank, none when S is zero. misfit = |S - W H|_F^2
+  / |S|_F^2 (0 for S = 0). A local minimum. Not collective.
+*/
+PetscErrorCode HycoNNMF(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k, PetscInt max_its, PetscReal W[],
+                        PetscInt *n_vectors, PetscReal *misfit);
+
 /* The first k columns chosen by QR with column pivoting of A (m x n column major, overwritten). Not collective. */
 PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt k, PetscInt pivot[]);
 /* Smallest and largest singular value of A (m x n column major, kept). Not collective. */

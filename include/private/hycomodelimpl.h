@@ -17,6 +17,10 @@ typedef enum {
 
 typedef struct _n_HycoNorms *HycoNorms;
 
+/* The basis of the contact forces; fe: none, the true multipliers of the hybrid model. */
+typedef enum { HYCO_DUAL_FE, HYCO_DUAL_NNMF, HYCO_DUAL_SNAPSHOTS } HycoDual;
+extern const char *const HycoDuals[]; /* their words, as options and files have them; NULL ends */
+
 struct _p_HycoModel {
   char path[PETSC_MAX_PATH_LEN]; /* "" while training */
   /* the reduced problem's description, as in the file */
@@ -39,9 +43,16 @@ struct _p_HycoModel {
   char *provenance;
   char fingerprint[32]; /* of the scene and mesh that it was trained on */
   PetscInt whole_nodes, whole_cells;
-  PetscInt counts[3]; /* modes of the dual, stress and force bases that seeded the RID */
+  PetscInt counts[3]; /* modes of the dual, stress and force bases that seeded the RID; projection: force vectors,
+                         supremizers among the l modes (the last, with singular value 0), 0 */
   HycoScan scan;
   PetscReal numbers[3]; /* condition of the reduced stiffness, training errors of u and lambda */
+  /* projection: the whole mesh is the RID; no full-order unknown, no dual snapshot */
+  HycoModelType type;
+  HycoDual dual;
+  PetscInt l_lambda;
+  PetscReal *V_lambda;   /* N_lambda x l_lambda column major, no entry negative, columns of unit 2-norm */
+  PetscReal dual_misfit; /* |S_lambda - V_lambda H|^2 / |S_lambda|^2, the best H >= 0 that training found */
   /* the whole mesh, on demand */
   HycoMesh whole;
   HycoFE fe_whole;
@@ -52,6 +63,7 @@ struct _p_HycoModel {
   PetscBool ready, reconstruct, solved, whole_current;
   HycoFE fe;
   PetscInt n_free, n, m; /* modes that are unknowns, all unknowns, contacts of A_lambda */
+  PetscInt n_L;          /* multipliers of the reduced system: m, or l_lambda */
   PetscInt *contact;     /* m: index in pairs */
   PetscInt *fe_at;       /* by dof of mesh: place in fe_dof, or -1 */
   PetscReal *Vp;         /* V, zero on full-order and fixed unknowns */
@@ -80,6 +92,13 @@ PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);
 
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoModelReconstruct(HycoModel model);
+
+/* (44), once the modes and the contacts' rows and gaps are there: V_lambda^T B V and its transpose; V_lambda^T D;
+   Lambda from the system's multipliers. The rest of a projection-based model in words. */
+PetscErrorCode HycoProjectionFillContact(HycoModel model);
+PetscErrorCode HycoProjectionFillGap(HycoModel model);
+PetscErrorCode HycoProjectionExpand(HycoModel model);
+PetscErrorCode HycoProjectionView(HycoModel model, PetscViewer viewer);
 
 /* Condition number of the reduced stiffness of the last prediction (dense SVD). */
 PetscErrorCode HycoModelCondition(HycoModel model, PetscReal *condition);

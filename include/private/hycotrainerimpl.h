@@ -23,6 +23,9 @@ struct _p_HycoTrainer {
   HycoHybrid hybrid;
   PetscInt scan; /* points per parameter; 0: chosen */
   PetscBool keep_singular;
+  HycoModelType type;
+  HycoDual dual;
+  PetscInt nnmf_max_its;
   HycoProgress progress;
   void *progress_ctx;
   /* state of a run, rank 0 unless said */
@@ -33,12 +36,12 @@ struct _p_HycoTrainer {
   PetscInt sizes[4];                                             /* every rank: nodes, cells, contacts, dim */
   PetscInt n_seeds_node, n_seeds_cell, *seeds_node, *seeds_cell; /* every rank */
   PetscInt counts[HYCO_N_SEEDS];
-  PetscInt l;
-  PetscReal *sigma;      /* every rank: l */
-  PetscReal *V_whole;    /* (n_nodes * dim) x l row major */
-  PetscReal *U, *Lambda; /* snapshots, column major: n_dof x n_s, n_contacts x n_s */
-  PetscReal *VtU;        /* l x n_s column major: V^T of the snapshots less their lifting */
-  PetscReal *U_norm;     /* n_s: of the whole snapshot */
+  PetscInt l, n_supremizers; /* modes, and how many of them (the last) Enrich added */
+  PetscReal *sigma;          /* every rank: l */
+  PetscReal *V_whole;        /* (n_nodes * dim) x l row major */
+  PetscReal *U, *Lambda;     /* snapshots, column major: n_dof x n_s, n_contacts x n_s */
+  PetscReal *VtU;            /* l x n_s column major: V^T of the snapshots less their lifting */
+  PetscReal *U_norm;         /* n_s: of the whole snapshot */
   PetscInt n_s;
   unsigned long long fingerprint;
 };
@@ -52,5 +55,15 @@ PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel model);
 /* Scans the ranges for a singular reduced stiffness, the points spread over the ranks: the model at `candidate`
    (removed) goes to `path` with what was found, or is refused. Collective. */
 PetscErrorCode HycoTrainerScan(HycoTrainer t, const char candidate[], const char path[], HycoScan *found);
+/* B^T of the dual snapshots, and M^-1 of it with the matrix M of the H1 norm: where each force works most. Both n_dof x
+   n_s, dense, the caller's. Rank 0. */
+PetscErrorCode HycoTrainerSupremizers(HycoTrainer t, Mat *forces, Mat *supremizers);
+/* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V_whole, sigma (0 for these)
+   and VtU have more columns. Rank 0. */
+PetscErrorCode HycoTrainerEnrich(HycoTrainer t);
+/* The force basis of a projection-based model under training from its dual snapshots; fills numbers[]. Rank 0. */
+PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel model);
+/* Fills numbers[]: condition and mean training errors of the model as it stands. Rank 0. */
+PetscErrorCode HycoTrainerJudge(HycoTrainer t, HycoModel model);
 
 #endif

@@ -114,8 +114,9 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
 /* An option of the reduction given where nothing is reduced. */
 static PetscErrorCode CheckTraining(const Command *command, const char name[])
 {
-  static const char *const training[] = {"hyco_pod_", "hyco_deim_",         "hyco_rid_",      "hyco_hybrid",
-                                         "hyco_scan", "hyco_keep_singular", "hyco_snapshots", NULL};
+  static const char *const training[] = {"hyco_model_type",    "hyco_dual",      "hyco_nnmf_",  "hyco_pod_",
+                                         "hyco_deim_",         "hyco_rid_",      "hyco_hybrid", "hyco_scan",
+                                         "hyco_keep_singular", "hyco_snapshots", NULL};
 
   PetscFunctionBegin;
   if (command->run == CommandTrain) PetscFunctionReturn(PETSC_SUCCESS);

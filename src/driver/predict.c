@@ -9,7 +9,9 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
 
   PetscFunctionBegin;
   PetscCall(ReportCreate("predict", scene, mu, &json));
+  cJSON_AddStringToObject(json, "model_type", HycoModelTypes[p->type]);
   cJSON_AddNumberToObject(json, "n_dof", p->n_dof);
+  cJSON_AddNumberToObject(json, "n_multipliers", p->n_multipliers);
   cJSON_AddNumberToObject(json, "n_contacts", p->n_contacts);
   cJSON_AddNumberToObject(json, "n_active", p->n_active);
   cJSON_AddNumberToObject(json, "active_set_iterations", p->iterations);
@@ -52,9 +54,13 @@ static PetscErrorCode One(HycoModel model, HycoScene scene, const char output[])
             (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
             (double)p.kkt.complementarity);
   if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoModelWrite(model, output));
-  PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
-                (int)p.n_modes, (int)p.n_fe_dofs, (int)p.n_contacts, (int)p.rid_elements,
-                100 * (double)p.rid_fraction));
+  if (p.type == HYCO_MODEL_PROJECTION)
+    PetscCall(Say("projection-based: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n",
+                  (int)p.n_modes, (int)p.n_multipliers, (int)p.n_contacts, (int)p.rid_elements));
+  else
+    PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
+                  (int)p.n_modes, (int)p.n_fe_dofs, (int)p.n_contacts, (int)p.rid_elements,
+                  100 * (double)p.rid_fraction));
   PetscCall(Say("total contact force %.10g (%.1f %% of it in the RID), %d active; %s after %d iterations\n",
                 (double)p.total_contact_force, 100 * (double)p.covered_force, (int)p.n_active, HycoReasonName(p.reason),
                 (int)p.iterations));

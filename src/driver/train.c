@@ -24,6 +24,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
 
   PetscFunctionBegin;
   PetscCall(ReportCreate("train", scene, NULL, &json));
+  cJSON_AddStringToObject(json, "model_type", HycoModelTypes[t->type]);
   cJSON_AddNumberToObject(json, "n_samples", t->n_samples);
   cJSON_AddNumberToObject(json, "n_modes", t->n_modes);
   cJSON_AddNumberToObject(json, "n_dual_modes", t->n_dual_modes);
@@ -40,11 +41,33 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
   ReportScan(json, &t->scan, n_par);
   cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
   cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
+  if (t->type == HYCO_MODEL_PROJECTION) {
+    cJSON_AddNumberToObject(json, "n_supremizers", t->n_supremizers);
+    cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);
+  }
   seconds = cJSON_AddObjectToObject(json, "seconds");
   cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots);
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
   cJSON_AddNumberToObject(seconds, "total", t->seconds_snapshots + t->seconds_reduction);
   PetscCall(ReportWrite(&json));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SayBases(const HycoTraining *t)
+{
+  PetscFunctionBegin;
+  if (t->type == HYCO_MODEL_PROJECTION) {
+    PetscCall(
+        Say("projection-based: %d snapshots; %d displacement modes, %d of them supremizers; %d force vectors, which "
+            "leave out %.2e of the dual snapshots' energy\n",
+            (int)t->n_samples, (int)t->n_modes, (int)t->n_supremizers, (int)t->n_dual_modes, (double)t->dual_misfit));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t->n_samples,
+                (int)t->n_modes, (int)t->n_stress_modes, (int)t->n_force_modes, (int)t->n_dual_modes));
+  PetscCall(Say("RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
+                (int)t->rid_elements, 100 * (double)t->rid_fraction, (int)t->rid_nodes, (int)t->rid_a_nodes,
+                (int)t->rid_contacts, (int)t->n_fe_dofs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -70,13 +93,10 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
   PetscCall(DriverCheckLeftEarly(scene));
   PetscCall(HycoTrainerRun(trainer, samples, model, &t));
-  PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t.n_samples,
-                (int)t.n_modes, (int)t.n_stress_modes, (int)t.n_force_modes, (int)t.n_dual_modes));
-  PetscCall(Say("RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
-                (int)t.rid_elements, 100 * (double)t.rid_fraction, (int)t.rid_nodes, (int)t.rid_a_nodes,
-                (int)t.rid_contacts, (int)t.n_fe_dofs));
-  PetscCall(Say("mean training errors: u %.2e, RID forces %.2e; condition of the reduced stiffness %.1e\n",
-                (double)t.error_u, (double)t.error_lambda, (double)t.condition));
+  PetscCall(SayBases(&t));
+  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e; condition of the reduced stiffness %.1e\n",
+                (double)t.error_u, t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda,
+                (double)t.condition));
   if (t.scan.n)
     PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,
                   (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept as asked" : ""));

@@ -6,8 +6,10 @@
 #include <hycomodelimpl.h>
 #include <string.h>
 
-/* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters. */
-#define HYCO_MODEL_FORMAT 2
+/* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters.
+   3: problem/type; what has none is hybrid. The kind is every type's, so that an older reader tells the format. */
+#define HYCO_MODEL_FORMAT 3
+#define HYCO_MODEL_OLDEST 2
 #define HYCO_MODEL_KIND   "hyco hybrid model"
 
 static PetscErrorCode Name(const char prefix[], const char name[], char out[128])
@@ -178,6 +180,53 @@ static PetscErrorCode LoadPairs(HycoH5 h, const char prefix[], PetscInt n_nodes,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode SaveType(HycoH5 h, HycoModel m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoH5WriteText(h, "problem/type", HycoModelTypes[m->type]));
+  if (m->type == HYCO_MODEL_HYBRID) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5WriteText(h, "problem/dual", HycoDuals[m->dual]));
+  PetscCall(HycoH5WriteReal(h, "problem/V_lambda", m->l_lambda, m->pairs.n, m->V_lambda));
+  PetscCall(HycoH5WriteReal(h, "training/dual_misfit", 1, 1, &m->dual_misfit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The place of a dataset's text among the words. */
+static PetscErrorCode LoadWord(HycoH5 h, const char path[], const char name[], const char *const words[],
+                               PetscInt *index)
+{
+  char *text;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadText(h, name, &text));
+  for (*index = 0; words[*index] && strcmp(text, words[*index]); (*index)++)
+    ;
+  PetscCall(PetscFree(text));
+  HycoCheck(words[*index], "%s: %s is damaged", path, name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadType(HycoH5 h, HycoModel m)
+{
+  PetscInt word, one = 1;
+  PetscReal *misfit;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "problem/type")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LoadWord(h, m->path, "problem/type", HycoModelTypes, &word));
+  m->type = (HycoModelType)word;
+  if (m->type == HYCO_MODEL_HYBRID) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LoadWord(h, m->path, "problem/dual", HycoDuals, &word));
+  m->dual = (HycoDual)word;
+  HycoCheck(m->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);
+  m->l_lambda = -1;
+  PetscCall(HycoH5LoadReal(h, "problem/V_lambda", &m->l_lambda, &m->pairs.n, &m->V_lambda));
+  PetscCall(HycoH5LoadReal(h, "training/dual_misfit", &one, &one, &misfit));
+  m->dual_misfit = *misfit;
+  PetscCall(PetscFree(misfit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
 {
   const PetscInt n_dof = m->mesh->n_nodes * m->mesh->dim,
@@ -203,6 +252,7 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
     PetscCall(HycoH5WriteReal(h, "problem/G", m->l, m->n_fe, m->G));
     PetscCall(HycoH5WriteReal(h, "problem/ridge", 1, 1, &m->ridge));
   }
+  PetscCall(SaveType(h, m));
   PetscCall(HycoH5WriteReal(h, "reconstruction/S_lambda", m->n_dual, m->pairs.n, m->S_lambda));
   PetscCall(HycoH5WriteReal(h, "training/points", m->n_points, m->scene->n_parameters, m->points));
   PetscCall(HycoH5WriteReal(h, "training/numbers", 3, 1, m->numbers));
@@ -257,9 +307,10 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
   PetscCall(HycoH5LoadInt(h, "format", 0, PETSC_MAX_INT, &one, &one, &format));
   version = *format;
   PetscCall(PetscFree(format));
-  HycoCheck(version == HYCO_MODEL_FORMAT,
-            "%s has model format %d; this hyco (%s) reads format %d: train it again, or use the hyco that wrote it",
-            path, (int)version, HycoVersion(), HYCO_MODEL_FORMAT);
+  HycoCheck(
+      version >= HYCO_MODEL_OLDEST && version <= HYCO_MODEL_FORMAT,
+      "%s has model format %d; this hyco (%s) reads formats %d to %d: train it again, or use the hyco that wrote it",
+      path, (int)version, HycoVersion(), HYCO_MODEL_OLDEST, HYCO_MODEL_FORMAT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -321,6 +372,7 @@ static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
     m->ridge = *ridge;
     PetscCall(PetscFree(ridge));
   }
+  PetscCall(LoadType(h, m));
   PetscCall(HycoH5LoadReal(h, "reconstruction/S_lambda", &m->n_dual, &m->pairs.n, &m->S_lambda));
   n_par = m->scene->n_parameters;
   PetscCall(HycoH5LoadReal(h, "training/points", &m->n_points, &n_par, &m->points));

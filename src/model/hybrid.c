@@ -395,3 +395,11 @@ PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel m)
   PetscCall(PetscFree2(all, contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode HycoTrainerJudge(HycoTrainer t, HycoModel m)
+{
+  PetscFunctionBegin;
+  PetscCall(Judge(t, m, &m->numbers[1], &m->numbers[2]));
+  PetscCall(HycoModelCondition(m, &m->numbers[0]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -68,6 +68,7 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
   PetscCall(PetscFree(m->fe_dof));
   PetscCall(PetscFree(m->G));
   PetscCall(PetscFree(m->S_lambda));
+  PetscCall(PetscFree(m->V_lambda));
   PetscCall(PetscFree(m->points));
   PetscCall(PetscFree(m->provenance));
   PetscCall(PetscFree(*model));
@@ -134,6 +135,8 @@ PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
   p = &m->prediction;
   p->dim = m->fe->dim;
   p->n_dof = m->n;
+  p->type = m->type;
+  p->n_multipliers = m->n_L;
   p->n_contacts = m->m;
   p->n_modes = m->l;
   p->n_fe_dofs = m->n_fe;
@@ -263,7 +266,8 @@ static PetscErrorCode ViewScan(HycoModel m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
+/* The RID, what is full order in it, what the reconstruction has. */
+static PetscErrorCode ViewHybrid(HycoModel m, PetscViewer viewer)
 {
   static const char *const words[] = {"auto", "rank: the fewest that give full row rank",
                                       "contact: all on the contact surfaces of the RID",
@@ -271,17 +275,11 @@ PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
   PetscInt nodes = 0, a = 0, in = 0;
 
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoModelLoad()");
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
     nodes += m->role[i] != HYCO_ROLE_OUTSIDE;
     a += m->role[i] == HYCO_ROLE_A;
   }
   for (PetscInt k = 0; k < m->pairs.n; k++) in += m->in_rid[k];
-  PetscCall(PetscViewerASCIIPrintf(viewer, "hybrid hyper-reduced model\n"));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, RID forces %.2e\n",
-                                   (int)m->n_points, (double)m->numbers[1], (double)m->numbers[2]));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
-                                   (int)m->l, m->l ? (double)m->sigma[0] : 0., m->l ? (double)m->sigma[m->l - 1] : 0.));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  modes that seeded the RID besides: %d dual, %d stress, %d force\n",
                                    (int)m->counts[0], (int)m->counts[1], (int)m->counts[2]));
   PetscCall(PetscViewerASCIIPrintf(
@@ -292,9 +290,30 @@ PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  full-order displacements: %d (%s)\n", (int)m->n_fe, words[m->hybrid]));
   if (m->hybrid == HYCO_HYBRID_ALL && m->G)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  ridge: %.0e of the first squared singular value\n", (double)m->ridge));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
-  PetscCall(ViewScan(m, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  dual snapshots for the reconstruction: %d\n", (int)m->n_dual));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
+{
+  PetscInt pod;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
+  pod = m->type == HYCO_MODEL_PROJECTION ? m->l - m->counts[1] : m->l;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n",
+                                   m->type == HYCO_MODEL_HYBRID ? "hybrid hyper-reduced" : "projection-based"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, %sforces %.2e\n",
+                                   (int)m->n_points, (double)m->numbers[1], m->type == HYCO_MODEL_HYBRID ? "RID " : "",
+                                   (double)m->numbers[2]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
+                                   (int)pod, pod ? (double)m->sigma[0] : 0., pod ? (double)m->sigma[pod - 1] : 0.));
+  if (m->type == HYCO_MODEL_HYBRID)
+    PetscCall(ViewHybrid(m, viewer));
+  else
+    PetscCall(HycoProjectionView(m, viewer));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
+  if (m->type == HYCO_MODEL_HYBRID) PetscCall(ViewScan(m, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->provenance));
   PetscCall(HycoSceneView(m->scene, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);

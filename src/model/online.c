@@ -83,6 +83,7 @@ static PetscErrorCode SetUpBasis(HycoModel m)
     m->slave_id[k] = m->mesh->node_id[m->pairs.slave[k]];
     if (m->in_rid[k]) m->contact[m->m++] = k;
   }
+  m->n_L = m->type == HYCO_MODEL_PROJECTION ? m->l_lambda : m->m;
   HycoCheck(m->n > 0, "the model has no unknown: every training solution is zero");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -135,7 +136,8 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
   PetscCall(SetUpBasis(m));
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
     interface = (PetscBool)(interface || m->role[i] == HYCO_ROLE_INTERFACE);
-  dense = (PetscBool)(m->n <= HYCO_DENSE_MAX || (m->hybrid == HYCO_HYBRID_ALL && interface));
+  dense = (PetscBool)(m->n <= HYCO_DENSE_MAX || m->type == HYCO_MODEL_PROJECTION ||
+                      (m->hybrid == HYCO_HYBRID_ALL && interface));
   PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->mesh->n_nodes, 0, &m->K));
   PetscCall(MatCreateVecs(m->K, &m->F, NULL));
   if (dense)
@@ -143,9 +145,9 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
   else
     PetscCall(PreallocateReduced(m));
   PetscCall(MatCreateVecs(m->Kr, &m->x, &m->Fr));
-  if (m->m) {
-    PetscCall(CreateReduced(m, m->m, m->n, dense, &m->Br));
-    PetscCall(CreateReduced(m, m->n, m->m, dense, &m->Btr));
+  if (m->n_L) {
+    PetscCall(CreateReduced(m, m->n_L, m->n, dense, &m->Br));
+    PetscCall(CreateReduced(m, m->n, m->n_L, dense, &m->Btr));
     PetscCall(MatCreateVecs(m->Br, NULL, &m->L));
     PetscCall(VecDuplicate(m->L, &m->Dr));
   }
@@ -268,6 +270,10 @@ static PetscErrorCode FillContact(HycoModel m)
   PetscInt *index, dim = m->fe->dim;
 
   PetscFunctionBegin;
+  if (m->type == HYCO_MODEL_PROJECTION) {
+    PetscCall(HycoProjectionFillContact(m));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(PetscMalloc3(m->l, &y, m->n + 100, &value, m->n + 100, &index));
   PetscCall(MatZeroEntries(m->Br));
   PetscCall(MatZeroEntries(m->Btr));
@@ -319,7 +325,11 @@ static PetscErrorCode FillVectors(HycoModel m)
   }
   PetscCall(VecRestoreArray(m->Fr, &f));
   PetscCall(VecRestoreArrayRead(m->F, &F));
-  if (!m->m) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->type == HYCO_MODEL_PROJECTION) {
+    PetscCall(HycoProjectionFillGap(m));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(VecGetArray(m->Dr, &d));
   for (PetscInt k = 0; k < m->m; k++) d[k] = m->gap[m->contact[k]];
   PetscCall(VecRestoreArray(m->Dr, &d));
@@ -340,11 +350,11 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   }
   PetscCall(HycoFEAssembleForce(m->fe, m->F));
   PetscCall(HycoContactRows(m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap));
-  if (m->m && m->fe->contact_changed) PetscCall(FillContact(m));
+  if (m->n_L && m->fe->contact_changed) PetscCall(FillContact(m));
   PetscCall(FillVectors(m));
   m->fe->ready = PETSC_TRUE;
   if (first) {
-    PetscCall(HycoSystemSetMatrices(m->system, m->Kr, m->Btr, m->Br, PETSC_FALSE));
+    PetscCall(HycoSystemSetMatrices(m->system, m->Kr, m->Btr, m->Br, m->type == HYCO_MODEL_PROJECTION));
     PetscCall(HycoSystemSetVectors(m->system, m->Fr, m->Dr));
     PetscCall(HycoSolverSetSystem(m->solver, m->system));
   }
@@ -381,7 +391,11 @@ static PetscErrorCode Unpack(HycoModel m)
   }
   PetscCall(VecRestoreArrayRead(m->x, &x));
   PetscCall(PetscArrayzero(m->Lambda, m->pairs.n));
-  if (!m->m) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->type == HYCO_MODEL_PROJECTION) {
+    PetscCall(HycoProjectionExpand(m));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(VecGetArrayRead(m->L, &L));
   for (PetscInt k = 0; k < m->m; k++) m->Lambda[m->contact[k]] = L[k];
   PetscCall(VecRestoreArrayRead(m->L, &L));
@@ -412,7 +426,7 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   PetscCall(HycoSolverGetMethod(m->solver, &method));
   PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
   PetscCall(Unpack(m));
-  if (m->reconstruct && p->reason > 0) PetscCall(HycoModelReconstruct(m));
+  if (m->reconstruct && p->reason > 0 && m->type == HYCO_MODEL_HYBRID) PetscCall(HycoModelReconstruct(m));
   p->seconds.total = HycoNow() - begin;
   m->solved = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

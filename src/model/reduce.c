@@ -182,14 +182,13 @@ static PetscErrorCode SeedFrom(HycoTrainer t, HycoSnapshots store, const char fi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gram matrix of the dual snapshots in the norm of the dual of H1: (B^T L)^T M^-1 (B^T L). On rank 0. */
-static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
+PetscErrorCode HycoTrainerSupremizers(HycoTrainer t, Mat *forces, Mat *supremizers)
 {
   const PetscInt m = t->sizes[2], n = t->n_s, dim = t->sizes[3], entries = HycoPairsWidth(&t->pairs) * dim * m;
   PetscInt *start, *dof, n_par;
   PetscReal *value, *gap;
   const PetscReal *mu;
-  Mat M, R, X, GX;
+  Mat M, R, X;
   PetscScalar *r;
   KSP ksp;
   PetscBool singular;
@@ -221,6 +220,23 @@ static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
   PetscCall(PCFactorGetMatrix(pc, &factor));
   PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, &X));
   PetscCall(MatMatSolve(factor, R, X));
+  PetscCall(MatDestroy(&M));
+  PetscCall(KSPDestroy(&ksp));
+  PetscCall(PetscFree4(start, dof, value, gap));
+  *forces = R;
+  *supremizers = X;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Gram matrix of the dual snapshots in the norm of the dual of H1: (B^T L)^T M^-1 (B^T L). On rank 0. */
+static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
+{
+  const PetscInt n = t->n_s;
+  Mat R, X, GX;
+  PetscScalar *r;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTrainerSupremizers(t, &R, &X));
   PetscCall(MatTransposeMatMult(R, X, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &GX));
   PetscCall(MatDenseGetArray(GX, &r));
   for (PetscInt j = 0; j < n; j++) {
@@ -230,9 +246,6 @@ static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
   PetscCall(MatDestroy(&GX));
   PetscCall(MatDestroy(&X));
   PetscCall(MatDestroy(&R));
-  PetscCall(MatDestroy(&M));
-  PetscCall(KSPDestroy(&ksp));
-  PetscCall(PetscFree4(start, dof, value, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -103,6 +103,8 @@ static PetscErrorCode FillModel(HycoTrainer t, HycoModel m)
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, &m->n_points, &n_par, &mu));
+  m->type = t->type;
+  m->dual = t->dual;
   m->l = t->l;
   HycoDuplicate(t->l, t->sigma, &m->sigma);
   PetscCall(PetscMalloc1(m->mesh->n_nodes * dim * m->l, &m->V));
@@ -135,6 +137,9 @@ static PetscErrorCode FillModel(HycoTrainer t, HycoModel m)
 
 static void Report(HycoTrainer t, HycoModel m, HycoTraining *r)
 {
+  r->type = m->type;
+  r->dual_misfit = m->dual_misfit;
+  r->n_supremizers = t->n_supremizers;
   r->n_samples = t->n_s;
   r->n_modes = t->l;
   r->n_dual_modes = t->counts[HYCO_SEED_DUAL];
@@ -174,9 +179,10 @@ static PetscErrorCode BuildAndSave(HycoTrainer t, const char path[], HycoTrainin
 
   PetscFunctionBegin;
   PetscCall(HycoModelCreate(&m));
-  ierr = CutDomain(t, m);
+  ierr = t->dual == HYCO_DUAL_SNAPSHOTS ? HycoTrainerEnrich(t) : PETSC_SUCCESS;
+  if (!ierr) ierr = CutDomain(t, m);
   if (!ierr) ierr = FillModel(t, m);
-  if (!ierr) ierr = HycoTrainerChooseHybrid(t, m);
+  if (!ierr) ierr = t->type == HYCO_MODEL_PROJECTION ? HycoTrainerProject(t, m) : HycoTrainerChooseHybrid(t, m);
   if (!ierr) ierr = CheckUseful(m);
   if (!ierr) ierr = HycoModelSave(m, t->whole, t->V_whole, path);
   if (!ierr) Report(t, m, report);

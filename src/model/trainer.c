@@ -13,6 +13,7 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   PetscCallMPI(MPI_Comm_rank(t->comm, &t->rank));
   t->scene = scene;
   t->noise = 1e-11;
+  t->nnmf_max_its = 100;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *trainer = t;
@@ -33,7 +34,7 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t)
   PetscCall(PetscFree(t->Lambda));
   PetscCall(PetscFree(t->VtU));
   PetscCall(PetscFree(t->U_norm));
-  t->n_seeds_node = t->n_seeds_cell = 0;
+  t->n_seeds_node = t->n_seeds_cell = t->n_supremizers = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,6 +93,34 @@ static PetscErrorCode ReadSeedKinds(HycoTrainer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A projection-based model takes the whole mesh, so nothing seeds an RID. */
+static PetscErrorCode ReadType(HycoTrainer t)
+{
+  PetscOptions o = t->scene->options;
+  PetscInt type = (PetscInt)t->type, dual = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoOptionsWord(o, "hyco_model_type", HycoModelTypes, &type));
+  PetscCall(HycoOptionsWord(o, "hyco_dual", HycoDuals, &dual));
+  PetscCall(HycoOptionsInt(o, "hyco_nnmf_max_its", 1, PETSC_MAX_INT, &t->nnmf_max_its));
+  t->type = (HycoModelType)type;
+  t->dual = (HycoDual)dual;
+  HycoCheck(t->type == HYCO_MODEL_PROJECTION || t->dual == HYCO_DUAL_FE,
+            "-hyco_dual %s is for -hyco_model_type projection; the hybrid model has the finite-element forces",
+            HycoDuals[dual]);
+  if (t->type == HYCO_MODEL_HYBRID) PetscFunctionReturn(PETSC_SUCCESS);
+  if (t->dual == HYCO_DUAL_FE) {
+    PetscBool set;
+
+    PetscCall(PetscOptionsHasName(o, NULL, "-hyco_dual", &set));
+    HycoCheck(!set, "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
+    t->dual = HYCO_DUAL_NNMF;
+  }
+  t->whole_rid = PETSC_TRUE;
+  for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
 {
   static const char *const hybrids[] = {"auto", "rank", "contact", "all", NULL}, *const deims[] = {"deim", "qdeim",
@@ -123,6 +152,7 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
   PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
   PetscCall(ReadSeedKinds(t));
+  PetscCall(ReadType(t));
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
   PetscCall(PetscOptionsGetStringArray(o, NULL, "-hyco_rid_groups", t->groups, &n, &set));
   t->n_groups = set ? n : 0;
