@@ -41,6 +41,9 @@ static const HycoOption option_table[] = {
      "displacements kept full order: fewest for full row rank, all contact ones, all"},
     {"hyco_hybrid_trials", "<int>", "0",
      "candidate sets judged by their training error when hybrid is rank (0: from the size)"},
+    {"hyco_greedy_indicator", "<local|penetration>", "local",
+     "what train -greedy judges by: distance from a full-order problem on the RID (43), or penetration (45)"},
+    {"hyco_greedy_keep", "<bool>", "false", "train -greedy keeps each iteration's model beside the snapshots"},
     {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
 };
 

@@ -1,7 +1,7 @@
 /* hyco train: snapshots, reduction, model. */
 #include "driver.h"
 
-static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
+static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const GreedyLog *log)
 {
   cJSON *json, *seconds;
 
@@ -21,6 +21,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
   cJSON_AddNumberToObject(json, "condition", t->condition);
   cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
   cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
+  if (log->scene) DriverReportGreedy(json, log);
   seconds = cJSON_AddObjectToObject(json, "seconds");
   cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots);
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
@@ -32,10 +33,11 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
 PetscErrorCode CommandTrain(void)
 {
   HycoScene scene;
-  HycoSamples samples;
+  HycoSamples samples, training = NULL;
   HycoTrainer trainer;
   HycoTraining t;
-  PetscBool given;
+  GreedyLog log = {0};
+  PetscBool given, greedy = PETSC_FALSE;
   char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
 
   PetscFunctionBegin;
@@ -44,13 +46,18 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverGet("report", PETSC_FALSE, report));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
-  HycoCheck(given,
+  PetscCall(HycoOptionsBool(NULL, "greedy", &greedy));
+  HycoCheck(given || greedy,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
+  if (greedy) PetscCall(DriverReadGreedy(scene, trainer, &training, &log));
   PetscCall(DriverCheckLeftEarly(scene));
-  PetscCall(HycoTrainerRun(trainer, samples, model, &t));
+  if (greedy)
+    PetscCall(HycoTrainerRunGreedy(trainer, given ? samples : NULL, training, model, &t));
+  else
+    PetscCall(HycoTrainerRun(trainer, samples, model, &t));
   PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t.n_samples,
                 (int)t.n_modes, (int)t.n_stress_modes, (int)t.n_force_modes, (int)t.n_dual_modes));
   PetscCall(Say("RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
@@ -60,7 +67,9 @@ PetscErrorCode CommandTrain(void)
                 (double)t.error_u, (double)t.error_lambda, (double)t.condition));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));
-  PetscCall(Report(scene, &t));
+  PetscCall(Report(scene, &t, &log));
+  PetscCall(PetscFree(log.text));
+  PetscCall(HycoSamplesDestroy(&training));
   PetscCall(HycoTrainerDestroy(&trainer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
