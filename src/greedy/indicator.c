@@ -15,6 +15,7 @@
 #include <hycoalgorithms.h>
 #include <hycogreedy.h>
 #include <hycolinear.h>
+#include <math.h>
 
 struct _n_HycoIndicator {
   HycoModel model; /* borrowed */
@@ -253,7 +254,7 @@ static PetscErrorCode NormOfForce(HycoIndicator d, Vec L, PetscReal *norm)
 
 static PetscReal Quotient(PetscReal lost, PetscReal size)
 {
-  return size > 0 ? lost / size : lost > 0 ? PETSC_INFINITY : 0;
+  return size > 0 ? lost / size : lost > 0 ? INFINITY : 0;
 }
 
 /* (43), with the local solution in x and L, which are spent. */
@@ -317,6 +318,6 @@ PetscErrorCode HycoIndicatorEvaluate(HycoIndicator d, const PetscReal mu[], Hyco
     PetscCall(Distances(d, v));
   }
   v->solved = (PetscBool)(m->prediction.reason > 0 && reason > 0 && !PetscIsNanReal(v->eta));
-  if (!v->solved) v->eta = v->eta_u = v->eta_lambda = v->size = PETSC_INFINITY;
+  if (!v->solved) v->eta = v->eta_u = v->eta_lambda = v->size = INFINITY;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

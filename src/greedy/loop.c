@@ -3,6 +3,7 @@
   point's full-order solution added. All choices follow from the stored solutions alone, so a run that was killed makes
   them again.
 */
+#include <hycoalgorithms.h>
 #include <hycogreedy.h>
 #include <stdio.h>
 #include <string.h>
@@ -54,6 +55,25 @@ static PetscErrorCode Start(HycoTrainer t, HycoSamples start, HycoSamples *sampl
     for (PetscInt j = 0; j < k && !twin; j++) PetscCall(PetscArraycmp(mu + j * n_par, mu + k * n_par, n_par, &twin));
     if (!twin) PetscCall(HycoSamplesAddPoint(*samples, mu + k * n_par));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Before anything is solved: enough to start from, not more than asked for, and nothing that (42) cannot interpolate.
+ */
+static PetscErrorCode CheckStart(HycoTrainer t, HycoSamples samples)
+{
+  PetscInt n, n_par;
+  const PetscReal *mu;
+  HycoInterpolant interpolant = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  HycoCheck(!t->greedy.max_snapshots || t->greedy.max_snapshots >= n,
+            "at most %d snapshots are asked for; the greedy training starts from %d already",
+            (int)t->greedy.max_snapshots, (int)n);
+  if (t->greedy.indicator != HYCO_INDICATOR_LOCAL) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoInterpolantCreate(n_par, n, mu, &interpolant));
+  PetscCall(HycoInterpolantDestroy(&interpolant));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -229,17 +249,13 @@ PetscErrorCode HycoTrainerRunGreedy(HycoTrainer t, HycoSamples start, HycoSample
   Loop loop = {0};
   HycoTraining report = {0};
   PetscBool last = PETSC_FALSE;
-  PetscInt n_start;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
   loop.begin = HycoNow();
   PetscCall(TakeTraining(training, &loop));
   PetscCall(Start(t, start, &loop.samples));
-  PetscCall(HycoSamplesGet(loop.samples, &n_start, NULL, NULL));
-  HycoCheck(!t->greedy.max_snapshots || t->greedy.max_snapshots >= n_start,
-            "at most %d snapshots are asked for; the greedy training starts from %d already",
-            (int)t->greedy.max_snapshots, (int)n_start);
+  PetscCall(CheckStart(t, loop.samples));
   PetscCall(HycoTrainerOpen(t, loop.samples, path, &loop.store));
   PetscCall(PetscCalloc1(t->rank == 0 ? t->whole->n_cells : 0, &t->grown));
   for (PetscInt iteration = 0; !last; iteration++) PetscCall(Iterate(t, &loop, iteration, &report, &last));
