@@ -42,6 +42,46 @@ PetscErrorCode HycoTrainerSetProgress(HycoTrainer trainer, HycoProgress progress
    -hyco_keep_singular, for one whose reduced stiffness is singular inside the parameters' ranges. */
 PetscErrorCode HycoTrainerRun(HycoTrainer trainer, HycoSamples samples, const char path[], HycoTraining *training);
 
+/* -- greedy training (section 5.4) -- */
+
+/* What judges a model where no full-order solution is known; the order of -hyco_greedy_indicator's words. */
+typedef enum {
+  HYCO_INDICATOR_LOCAL,      /* (43): distance from the full-order problem on the RID, its interface interpolated */
+  HYCO_INDICATOR_PENETRATION /* (45): 2-norm of the penetration, a length */
+} HycoIndicatorKind;
+
+/* One iteration: a model from n_samples solutions, judged at every training point. Borrowed by the monitor. */
+typedef struct {
+  PetscInt iteration, n_samples, n_modes, rid_nodes, rid_elements; /* iteration 0: the start alone */
+  PetscInt n_points, n_infinite;    /* training points, and those where the indicator is x/0 or was not solved */
+  const PetscReal *worst;           /* parameters (length n_parameters) of the point that is the worst of those */
+  PetscReal eta, eta_u, eta_lambda; /* not solved yet, and its indicator (45: eta = eta_u); NULL and 0: none is left */
+  PetscReal max_eta;                /* over all training points; this is what the target is for */
+  PetscReal mean_eta_u, mean_eta_lambda; /* over those where the indicator is finite */
+  PetscReal seconds;                     /* since the training began */
+  const char *stop; /* NULL, or why this iteration is the last: target, snapshots, seconds, points */
+} HycoGreedyStep;
+/* Called on rank 0 after each iteration. */
+typedef PetscErrorCode (*HycoGreedyMonitor)(const HycoGreedyStep *step, void *ctx);
+
+PetscErrorCode HycoTrainerSetGreedyMonitor(HycoTrainer trainer, HycoGreedyMonitor monitor, void *ctx);
+/* -hyco_greedy_indicator (default: local) */
+PetscErrorCode HycoTrainerSetGreedyIndicator(HycoTrainer trainer, HycoIndicatorKind kind);
+/* The loop ends when max_eta <= target (> 0, default 1e-3), with max_snapshots solutions (0, default: no limit), after
+   max_seconds (0, default: no limit), or when every training point is solved. */
+PetscErrorCode HycoTrainerSetGreedyStop(HycoTrainer trainer, PetscReal target, PetscInt max_snapshots,
+                                        PetscReal max_seconds);
+/*
+  As HycoTrainerRun(), the samples chosen: from `start` (NULL: the corners of the parameters' ranges), the loop builds a
+  model, evaluates the indicator at every point of `training` (at least two; shared out over the ranks), and adds the
+  worst point's full-order solution, of equals the first in `training`. The RID only grows; the modes are no more than
+  the unknowns of A. Solutions come from the snapshot folder when they are there: a run that was killed makes the same
+  choices again, without their solves. Collective. `training_report` may be NULL. -hyco_greedy_keep keeps each
+  iteration's model in that folder, named greedy-NNN.h5.
+*/
+PetscErrorCode HycoTrainerRunGreedy(HycoTrainer trainer, HycoSamples start, HycoSamples training, const char path[],
+                                    HycoTraining *training_report);
+
 #if defined(__cplusplus)
 }
 #endif

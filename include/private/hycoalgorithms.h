@@ -59,4 +59,17 @@ PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal
  * largest, by power iterations to about 1e-3. Not collective. */
 PetscErrorCode HycoSingularity(PetscInt n, const PetscReal A[], PetscInt *sign, PetscReal *ratio);
 
+/*
+  Interpolation in a space of dim parameters from n points (n x dim row major, distinct or not): weight[k] >= 0 of point
+  k with sum 1, such that linear functions of a point inside the hull come out exact. Multilinear when the points form a
+  grid (always with one parameter), else linear on the simplices of their Delaunay triangulation (to 8 parameters).
+  Outside: a grid takes the nearest point of its box; a triangulation the simplex whose barycentric coordinates are
+  least negative, negative ones cut to 0. Fails when the points lie on one line or plane. Not collective.
+*/
+#define HYCO_INTERPOLANT_MAX_DIM 32
+typedef struct _n_HycoInterpolant *HycoInterpolant;
+PetscErrorCode HycoInterpolantCreate(PetscInt dim, PetscInt n, const PetscReal points[], HycoInterpolant *interpolant);
+PetscErrorCode HycoInterpolantDestroy(HycoInterpolant *interpolant);
+PetscErrorCode HycoInterpolantGetWeights(HycoInterpolant interpolant, const PetscReal point[], PetscReal weight[]);
+
 #endif

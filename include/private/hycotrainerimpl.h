@@ -28,6 +28,14 @@ struct _p_HycoTrainer {
   PetscInt nnmf_max_its;
   HycoProgress progress;
   void *progress_ctx;
+  struct {
+    HycoIndicatorKind indicator;
+    PetscReal target, max_seconds;
+    PetscInt max_snapshots;
+    PetscBool keep;
+    HycoGreedyMonitor monitor;
+    void *ctx;
+  } greedy;
   /* state of a run, rank 0 unless said */
   HycoSamples samples; /* borrowed, every rank */
   HycoMesh whole;
@@ -44,10 +52,18 @@ struct _p_HycoTrainer {
   PetscReal *U_norm;         /* n_s: of the whole snapshot */
   PetscInt n_s;
   unsigned long long fingerprint;
+  PetscBool *grown; /* rank 0, greedy: cells of the RIDs so far; else NULL */
 };
 
 /* Frees what one run leaves behind. */
 PetscErrorCode HycoTrainerReset(HycoTrainer t);
+/* Frees the bases, seeds and snapshots, and keeps the mesh. */
+PetscErrorCode HycoTrainerResetBases(HycoTrainer t);
+/* Begins a run: checks, the mesh, the store of snapshots (the caller destroys it). Collective. */
+PetscErrorCode HycoTrainerOpen(HycoTrainer t, HycoSamples samples, const char path[], HycoSnapshots *store);
+/* From the bases: the RID, the model on it, its full-order displacements, the file; what it gave, on every rank.
+   `useful`: refuse a model that misses its own training solutions. Collective. */
+PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path[], HycoTraining *report);
 /* The bases of all snapshots in the store and the points that seed the RID. Collective. */
 PetscErrorCode HycoTrainerReduce(HycoTrainer t, HycoSnapshots store);
 /* Chooses the full-order displacements of a model under training; numbers[] of the model are filled. Rank 0. */

@@ -51,6 +51,9 @@ static const HycoOption option_table[] = {
     {"hyco_scan", "<int>", "0",
      "points per parameter that look for a singular reduced stiffness (0: some hundred in all)"},
     {"hyco_keep_singular", "<bool>", "false", "keep a model whose reduced stiffness is singular inside the ranges"},
+    {"hyco_greedy_indicator", "<local|penetration>", "local",
+     "what train -greedy judges by: distance from a full-order problem on the RID (43), or penetration (45)"},
+    {"hyco_greedy_keep", "<bool>", "false", "train -greedy keeps each iteration's model beside the snapshots"},
     {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
 };
 

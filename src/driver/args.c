@@ -17,6 +17,12 @@ static const HycoOption own[] = {
     {"grid_type", "<centred|closed>", "centred", "cell centres, or with both ends of the ranges"},
     {"values_", "<v,v,...>", "", "a set of points: values of the parameter NAME, all combined"},
     {"points", "<file.csv>", "", "a set of points: a header with the names, then a point per line"},
+    {"greedy", "", "", "add solutions where an error indicator is worst, from the corners of the ranges or -grid ..."},
+    {"training_grid", "<n,n,...>", "",
+     "greedy: the grid of points to choose from, closed unless -grid_type says centred"},
+    {"target", "<real>", "1e-3", "greedy: stop when the indicator is no larger anywhere on that grid"},
+    {"max_snapshots", "<int>", "0", "greedy: stop with so many solutions (0: no limit)"},
+    {"max_seconds", "<real>", "0", "greedy: stop after the iteration in which this has passed (0: no limit)"},
     {"output", "<file.xdmf>", "", "fields for ParaView; the numbers in the .h5 beside it"},
     {"report", "<file.json>", "", "the result as one JSON object"},
     {"table", "<file.csv>", "", "a line per point"},
@@ -114,9 +120,9 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
 /* An option of the reduction given where nothing is reduced. */
 static PetscErrorCode CheckTraining(const Command *command, const char name[])
 {
-  static const char *const training[] = {"hyco_model_type",    "hyco_dual",      "hyco_nnmf_",  "hyco_pod_",
-                                         "hyco_deim_",         "hyco_rid_",      "hyco_hybrid", "hyco_scan",
-                                         "hyco_keep_singular", "hyco_snapshots", NULL};
+  static const char *const training[] = {"hyco_model_type",    "hyco_dual",      "hyco_nnmf_",   "hyco_pod_",
+                                         "hyco_deim_",         "hyco_rid_",      "hyco_hybrid",  "hyco_scan",
+                                         "hyco_keep_singular", "hyco_snapshots", "hyco_greedy_", NULL};
 
   PetscFunctionBegin;
   if (command->run == CommandTrain) PetscFunctionReturn(PETSC_SUCCESS);
@@ -359,10 +365,11 @@ PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char text[])
+/* The grid that the option `name` gives as `text`; its type unless -grid_type says otherwise: 0 centred, 1 closed. */
+static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char name[], PetscInt type, const char text[])
 {
   static const char *const types[] = {"centred", "closed", NULL};
-  PetscInt n, m, counts[64], type = 0;
+  PetscInt n, m, counts[64];
   PetscReal *values;
   char list[DRIVER_LINE];
 
@@ -370,16 +377,28 @@ static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char t
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   PetscCall(ListNames(scene, list));
   PetscCall(HycoOptionsWord(NULL, "grid_type", types, &type));
-  PetscCall(ParseNumbers("grid", text, &m, &values));
-  HycoCheck(m == n && n > 0, "-grid has %d numbers; the scene has %d parameters: %s", (int)m, (int)n,
+  PetscCall(ParseNumbers(name, text, &m, &values));
+  HycoCheck(m == n && n > 0, "-%s has %d numbers; the scene has %d parameters: %s", name, (int)m, (int)n,
             n ? list : "(none)");
   for (PetscInt p = 0; p < n; p++) {
     HycoCheck(values[p] >= 1 && values[p] <= 1e8 && values[p] == PetscFloorReal(values[p]),
-              "-grid is \"%s\"; whole numbers, at least 1, are expected", text);
+              "-%s is \"%s\"; whole numbers, at least 1, are expected", name, text);
     counts[p] = (PetscInt)values[p];
   }
   PetscCall(PetscFree(values));
   PetscCall(HycoSamplesAddGrid(samples, counts, (PetscBool)(type == 1)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples)
+{
+  char text[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(DriverGet("training_grid", PETSC_FALSE, text));
+  HycoCheck(text[0], "give a greedy training the points to choose from: -training_grid N,N,...");
+  PetscCall(HycoSamplesCreate(scene, samples));
+  PetscCall(AddGrid(scene, *samples, "training_grid", 1, text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -423,7 +442,7 @@ PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   PetscCall(DriverGet("grid", PETSC_FALSE, text));
   if (text[0]) {
-    PetscCall(AddGrid(scene, *samples, text));
+    PetscCall(AddGrid(scene, *samples, "grid", 0, text));
     n_sets++;
   }
   PetscCall(AddValues(scene, *samples, &any));

@@ -34,6 +34,8 @@ PetscErrorCode DriverGet(const char name[], PetscBool required, char value[PETSC
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
 /* A set of points: -grid (with -grid_type), -values_NAME, or -points. *given: whether any was. */
 PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given);
+/* The points among which a greedy training chooses: -training_grid, closed unless -grid_type says otherwise. */
+PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples);
 /* Whether any point-set option was given. */
 PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given);
 void DriverHelp(const char *command);
@@ -66,6 +68,23 @@ PetscErrorCode Say(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx);
 /* A HycoMonitor. */
 PetscErrorCode DriverMonitor(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx);
+
+/* -- greedy.c -- */
+
+/* What a greedy training said, on rank 0: its table, and how it ended. */
+typedef struct {
+  HycoScene scene;                /* borrowed */
+  char table[PETSC_MAX_PATH_LEN]; /* "": none */
+  char *text;                     /* the table; PetscFree() it */
+  size_t length, room;
+  PetscInt iterations, infinite;
+  PetscReal max_eta;
+  char stop[16];
+} GreedyLog;
+
+/* Reads the options of train -greedy, makes the training set and sets the trainer, which will fill `log`. */
+PetscErrorCode DriverReadGreedy(HycoScene scene, HycoTrainer trainer, HycoSamples *training, GreedyLog *log);
+void DriverReportGreedy(cJSON *json, const GreedyLog *log);
 
 PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);

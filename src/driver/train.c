@@ -17,7 +17,7 @@ static void ReportScan(cJSON *json, const HycoScan *s, PetscInt n_par)
   ReportVector(object, "at", n_par, s->at);
 }
 
-static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
+static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const GreedyLog *log)
 {
   PetscInt n_par;
   cJSON *json, *seconds;
@@ -45,6 +45,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t)
     cJSON_AddNumberToObject(json, "n_supremizers", t->n_supremizers);
     cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);
   }
+  if (log->scene) DriverReportGreedy(json, log);
   seconds = cJSON_AddObjectToObject(json, "seconds");
   cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots);
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
@@ -74,10 +75,11 @@ static PetscErrorCode SayBases(const HycoTraining *t)
 PetscErrorCode CommandTrain(void)
 {
   HycoScene scene;
-  HycoSamples samples;
+  HycoSamples samples, training = NULL;
   HycoTrainer trainer;
   HycoTraining t;
-  PetscBool given;
+  GreedyLog log = {0};
+  PetscBool given, greedy = PETSC_FALSE;
   char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
 
   PetscFunctionBegin;
@@ -86,13 +88,18 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverGet("report", PETSC_FALSE, report));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
-  HycoCheck(given,
+  PetscCall(HycoOptionsBool(NULL, "greedy", &greedy));
+  HycoCheck(given || greedy,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
+  if (greedy) PetscCall(DriverReadGreedy(scene, trainer, &training, &log));
   PetscCall(DriverCheckLeftEarly(scene));
-  PetscCall(HycoTrainerRun(trainer, samples, model, &t));
+  if (greedy)
+    PetscCall(HycoTrainerRunGreedy(trainer, given ? samples : NULL, training, model, &t));
+  else
+    PetscCall(HycoTrainerRun(trainer, samples, model, &t));
   PetscCall(SayBases(&t));
   PetscCall(Say("mean training errors: u %.2e, %sforces %.2e; condition of the reduced stiffness %.1e\n",
                 (double)t.error_u, t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda,
@@ -102,7 +109,9 @@ PetscErrorCode CommandTrain(void)
                   (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept as asked" : ""));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));
-  PetscCall(Report(scene, &t));
+  PetscCall(Report(scene, &t, &log));
+  PetscCall(PetscFree(log.text));
+  PetscCall(HycoSamplesDestroy(&training));
   PetscCall(HycoTrainerDestroy(&trainer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));

@@ -69,6 +69,7 @@ static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
   PetscCall(PetscCalloc1(whole->n_nodes, &contact));
   HycoPairsMark(&t->pairs, contact);
   PetscCall(HycoRIDBuild(t->scene, whole, &t->pairs, &recipe, in));
+  for (PetscInt e = 0; t->grown && e < whole->n_cells; e++) t->grown[e] = in[e] = (PetscBool)(in[e] || t->grown[e]);
   PetscCall(PetscMalloc1(t->pairs.n, &m->in_rid));
   PetscCall(HycoRIDSets(whole, &t->pairs, in, role, m->in_rid));
   PetscCall(DropFixedContacts(t, role, m->in_rid));
@@ -89,6 +90,24 @@ static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
   PetscCall(HycoPairsRenumber(&t->pairs, index, &m->pairs));
   PetscCall(PetscFree(contact));
   PetscCall(PetscFree5(in, role, keep, extra, index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Greedy: more modes than unknowns in A would leave some without an equation. */
+static PetscErrorCode LimitModes(HycoTrainer t, HycoModel m)
+{
+  const PetscInt dim = t->sizes[3], l = t->l;
+  PetscInt n_A = 0;
+
+  PetscFunctionBegin;
+  if (!t->grown) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < m->mesh->n_nodes * dim; i++)
+    n_A += m->role[i / dim] == HYCO_ROLE_A && !t->fe->fixed[m->mesh->node_whole[i / dim] * dim + i % dim];
+  if (n_A >= l || !n_A) PetscFunctionReturn(PETSC_SUCCESS);
+  t->l = n_A; /* rows of V and columns of V^T U move together */
+  for (PetscInt i = 1; i < t->sizes[0] * dim; i++)
+    PetscCall(PetscArraymove(t->V_whole + i * n_A, t->V_whole + i * l, n_A));
+  for (PetscInt k = 1; k < t->n_s; k++) PetscCall(PetscArraymove(t->VtU + k * n_A, t->VtU + k * l, n_A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,7 +191,7 @@ static PetscErrorCode CheckUseful(HycoModel m)
 }
 
 /* Rank 0: the RID, the model on it, its full-order displacements, the file. */
-static PetscErrorCode BuildAndSave(HycoTrainer t, const char path[], HycoTraining *report)
+static PetscErrorCode BuildAndSave(HycoTrainer t, PetscBool useful, const char path[], HycoTraining *report)
 {
   HycoModel m;
   PetscErrorCode ierr;
@@ -181,13 +200,26 @@ static PetscErrorCode BuildAndSave(HycoTrainer t, const char path[], HycoTrainin
   PetscCall(HycoModelCreate(&m));
   ierr = t->dual == HYCO_DUAL_SNAPSHOTS ? HycoTrainerEnrich(t) : PETSC_SUCCESS;
   if (!ierr) ierr = CutDomain(t, m);
+  if (!ierr) ierr = LimitModes(t, m);
   if (!ierr) ierr = FillModel(t, m);
   if (!ierr) ierr = t->type == HYCO_MODEL_PROJECTION ? HycoTrainerProject(t, m) : HycoTrainerChooseHybrid(t, m);
-  if (!ierr) ierr = CheckUseful(m);
+  if (!ierr && useful) ierr = CheckUseful(m);
   if (!ierr) ierr = HycoModelSave(m, t->whole, t->V_whole, path);
   if (!ierr) Report(t, m, report);
   PetscCall(HycoModelDestroy(&m));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path[], HycoTraining *report)
+{
+  char candidate[PETSC_MAX_PATH_LEN + 16];
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(candidate, sizeof(candidate), "%s%s", path, useful ? ".candidate" : ""));
+  HycoOnRoot(t->comm, BuildAndSave(t, useful, candidate, report));
+  PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, t->comm));
+  if (useful) PetscCall(HycoTrainerScan(t, candidate, path, &report->scan));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,15 +240,11 @@ static PetscErrorCode CheckWritable(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char path[], HycoTraining *training)
+PetscErrorCode HycoTrainerOpen(HycoTrainer t, HycoSamples samples, const char path[], HycoSnapshots *store)
 {
-  HycoSnapshots store;
-  HycoTraining report = {0};
   char folder[PETSC_MAX_PATH_LEN];
-  PetscReal begin = HycoNow(), solved;
 
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoTrainerCreate()");
   PetscCall(HycoTrainerReset(t));
   t->samples = samples;
   PetscCall(HycoSamplesGet(samples, &t->n_s, NULL, NULL));
@@ -227,16 +255,25 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
     PetscCall(PetscStrncpy(folder, t->folder, sizeof(folder)));
   else
     PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s.snapshots", path));
-  PetscCall(HycoSnapshotsOpen(t->comm, t->scene, folder, &store));
-  t->fingerprint = store->fingerprint;
+  PetscCall(HycoSnapshotsOpen(t->comm, t->scene, folder, store));
+  t->fingerprint = (*store)->fingerprint;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char path[], HycoTraining *training)
+{
+  HycoSnapshots store;
+  HycoTraining report = {0};
+  PetscReal begin = HycoNow(), solved;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  PetscCall(HycoTrainerOpen(t, samples, path, &store));
   PetscCall(HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
   solved = HycoNow();
   PetscCall(HycoTrainerReduce(t, store));
   PetscCall(HycoSnapshotsDestroy(&store));
-  PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s.candidate", path));
-  HycoOnRoot(t->comm, BuildAndSave(t, folder, &report));
-  PetscCallMPI(MPI_Bcast(&report, sizeof(report), MPI_BYTE, 0, t->comm));
-  PetscCall(HycoTrainerScan(t, folder, path, &report.scan));
+  PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, &report));
   report.seconds_snapshots = solved - begin;
   report.seconds_reduction = HycoNow() - solved;
   if (training) *training = report;

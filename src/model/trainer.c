@@ -14,6 +14,7 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   t->scene = scene;
   t->noise = 1e-11;
   t->nnmf_max_its = 100;
+  t->greedy.target = 1e-3;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *trainer = t;
@@ -23,9 +24,17 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
 PetscErrorCode HycoTrainerReset(HycoTrainer t)
 {
   PetscFunctionBegin;
+  PetscCall(HycoTrainerResetBases(t));
   PetscCall(HycoFEDestroy(&t->fe));
   PetscCall(HycoPairsDestroy(&t->pairs));
   PetscCall(HycoMeshDestroy(&t->whole));
+  PetscCall(PetscFree(t->grown));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerResetBases(HycoTrainer t)
+{
+  PetscFunctionBegin;
   PetscCall(PetscFree(t->seeds_node));
   PetscCall(PetscFree(t->seeds_cell));
   PetscCall(PetscFree(t->sigma));
@@ -67,6 +76,37 @@ PetscErrorCode HycoTrainerSetProgress(HycoTrainer t, HycoProgress progress, void
   HycoCheckHandle(t, "HycoTrainerCreate()");
   t->progress = progress;
   t->progress_ctx = ctx;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetGreedyMonitor(HycoTrainer t, HycoGreedyMonitor monitor, void *ctx)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  t->greedy.monitor = monitor;
+  t->greedy.ctx = ctx;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetGreedyIndicator(HycoTrainer t, HycoIndicatorKind kind)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  t->greedy.indicator = kind;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetGreedyStop(HycoTrainer t, PetscReal target, PetscInt max_snapshots, PetscReal max_seconds)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  HycoCheck(target > 0, "the target of the greedy training is %g; it must be positive, as 1e-3 is", (double)target);
+  HycoCheck(max_snapshots >= 0 && max_seconds >= 0,
+            "the greedy training may take %d snapshots and %g seconds; neither can be negative (0: no limit)",
+            (int)max_snapshots, (double)max_seconds);
+  t->greedy.target = target;
+  t->greedy.max_snapshots = max_snapshots;
+  t->greedy.max_seconds = max_seconds;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -125,8 +165,9 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
 {
   static const char *const hybrids[] = {"auto", "rank", "contact", "all", NULL}, *const deims[] = {"deim", "qdeim",
                                                                                                    NULL};
+  static const char *const indicators[] = {"local", "penetration", NULL};
   PetscOptions o;
-  PetscInt hybrid, n = 64;
+  PetscInt hybrid, indicator, n = 64;
   PetscBool set;
   char text[4 * HYCO_LINE];
 
@@ -151,6 +192,10 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   t->hybrid = (HycoHybrid)hybrid;
   PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
   PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
+  indicator = (PetscInt)t->greedy.indicator;
+  PetscCall(HycoOptionsWord(o, "hyco_greedy_indicator", indicators, &indicator));
+  t->greedy.indicator = (HycoIndicatorKind)indicator;
+  PetscCall(HycoOptionsBool(o, "hyco_greedy_keep", &t->greedy.keep));
   PetscCall(ReadSeedKinds(t));
   PetscCall(ReadType(t));
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));

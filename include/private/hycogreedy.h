@@ -1,0 +1,26 @@
+/* Greedy training (section 5.4), inside: the indicator of a model at a parameter value. All on one process. */
+#ifndef HYCOGREEDY_H
+#define HYCOGREEDY_H
+
+#include <hycotrainerimpl.h>
+
+typedef struct {
+  PetscReal eta; /* what is to fall: eta_u + eta_lambda (43), or I (45); infinite: x/0 or not solved */
+  PetscReal eta_u, eta_lambda;
+  PetscReal size; /* ranks what is infinite: the numerators' sum; infinite when not solved */
+  PetscBool solved;
+} HycoIndication;
+
+typedef struct _n_HycoIndicator *HycoIndicator;
+
+/*
+  The indicator of `model` (borrowed). U_at: snapshots on the unknowns of the model's mesh (n_dof x n row major) at the
+  n points (n x n_parameters); read by (43) alone, borrowed. Not collective.
+*/
+PetscErrorCode HycoIndicatorCreate(HycoModel model, HycoIndicatorKind kind, PetscInt n, const PetscReal points[],
+                                   const PetscReal U_at[], HycoIndicator *indicator);
+PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator);
+/* Predicts at mu and judges the prediction. What it gives does not depend on what was asked before. */
+PetscErrorCode HycoIndicatorEvaluate(HycoIndicator indicator, const PetscReal mu[], HycoIndication *value);
+
+#endif
