@@ -49,6 +49,7 @@ struct _p_HycoModel {
   PetscReal *V_whole, *U_whole;
   HycoNorms norms; /* made by the first comparison */
   /* online */
+  PetscInt reconstruct_solver; /* of (41), index in HycoReconstructSolvers */
   PetscBool ready, reconstruct, solved, whole_current;
   HycoFE fe;
   PetscInt n_free, n, m; /* modes that are unknowns, all unknowns, contacts of A_lambda */
@@ -80,6 +81,7 @@ PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);
 
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoModelReconstruct(HycoModel model);
+extern const char *const HycoReconstructSolvers[];
 
 /* Condition number of the reduced stiffness of the last prediction (dense SVD). */
 PetscErrorCode HycoModelCondition(HycoModel model, PetscReal *condition);

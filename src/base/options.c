@@ -47,6 +47,8 @@ static const HycoOption option_table[] = {
      "points per parameter that look for a singular reduced stiffness (0: some hundred in all)"},
     {"hyco_keep_singular", "<bool>", "false", "keep a model whose reduced stiffness is singular inside the ranges"},
     {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
+    {"hyco_reconstruct_solver", "<auto|nnls|tao>", "auto",
+     "of (41): Lawson and Hanson's active set, or TAO's bnls; auto: TAO where the active set stops short"},
 };
 
 PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *table[])
