@@ -42,7 +42,14 @@ unsigned long long HycoSetHash(PetscInt n, const PetscBool active[]);
 
 /* TAO's types that hyco knows, by the index that the functions below take; from HYCO_TAO_SEMISMOOTH on semismooth. */
 extern const char *const HycoTaoTypes[];
-enum { HYCO_TAO_AUTO = -1, HYCO_TAO_GPCG = 0, HYCO_TAO_BLMVM = 5, HYCO_TAO_BQPIP = 11, HYCO_TAO_SEMISMOOTH = 12 };
+enum {
+  HYCO_TAO_AUTO = -1,
+  HYCO_TAO_GPCG = 0,
+  HYCO_TAO_BNLS = 3,
+  HYCO_TAO_BLMVM = 5,
+  HYCO_TAO_BQPIP = 11,
+  HYCO_TAO_SEMISMOOTH = 12
+};
 PetscBool HycoTaoSemismooth(PetscInt type);
 /*
   min 1/2 y^T H y - f^T y, lo <= y <= hi, by a bound-constrained type, H symmetric; or w = H y - f >= 0, y >= 0, w.y = 0
@@ -54,4 +61,17 @@ PetscErrorCode HycoTaoSolve(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec l
 /* The same on dense, replicated arrays: w = q + M z >= 0, z >= 0, w.z = 0; M column major n x n. */
 PetscErrorCode HycoTaoLCP(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric, PetscInt type,
                           PetscInt max_its, PetscReal z[], PetscInt *its, PetscBool *solved);
+/*
+  Whether x solves min |A x - b|_2, x >= 0 (A: m x n column major): no entry negative, and each of the gradient A^T (b -
+  A x) within rtol of its column's length times |b| (where x is 0: not above it). `residual`, |A x - b|, may be NULL.
+  Not collective.
+*/
+PetscErrorCode HycoNNLSCheck(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], const PetscReal x[],
+                             PetscReal rtol, PetscReal *residual, PetscBool *solved);
+/*
+  The same problem by a bound-constrained TAO type on the normal equations; *solved is HycoNNLSCheck()'s. Not
+  collective.
+*/
+PetscErrorCode HycoTaoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscInt type,
+                           PetscReal rtol, PetscReal x[], PetscReal *residual, PetscBool *solved);
 #endif

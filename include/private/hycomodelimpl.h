@@ -60,6 +60,7 @@ struct _p_HycoModel {
   PetscReal *V_whole, *U_whole;
   HycoNorms norms; /* made by the first comparison */
   /* online */
+  PetscInt reconstruct_solver; /* of (41), index in HycoReconstructSolvers */
   PetscBool ready, reconstruct, solved, whole_current;
   HycoFE fe;
   PetscInt n_free, n, m; /* modes that are unknowns, all unknowns, contacts of A_lambda */
@@ -92,6 +93,7 @@ PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);
 
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoModelReconstruct(HycoModel model);
+extern const char *const HycoReconstructSolvers[];
 
 /* (44), once the modes and the contacts' rows and gaps are there: V_lambda^T B V and its transpose; V_lambda^T D;
    Lambda from the system's multipliers. The rest of a projection-based model in words. */

@@ -55,6 +55,8 @@ static const HycoOption option_table[] = {
      "what train -greedy judges by: distance from a full-order problem on the RID (43), or penetration (45)"},
     {"hyco_greedy_keep", "<bool>", "false", "train -greedy keeps each iteration's model beside the snapshots"},
     {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
+    {"hyco_reconstruct_solver", "<auto|nnls|tao>", "auto",
+     "of (41): Lawson and Hanson's active set, or TAO's bnls; auto: TAO where the active set stops short"},
 };
 
 PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *table[])

@@ -411,6 +411,8 @@ PetscErrorCode HycoModelLoad(const char path[], HycoModel *model)
   if (ierr) (void)!HycoModelDestroy(&m);
   PetscCall(ierr);
   PetscCall(HycoOptionsBool(m->scene->options, "hyco_reconstruct", &m->reconstruct));
+  PetscCall(
+      HycoOptionsWord(m->scene->options, "hyco_reconstruct_solver", HycoReconstructSolvers, &m->reconstruct_solver));
   *model = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

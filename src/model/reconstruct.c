@@ -7,6 +7,26 @@
 #include <hycoalgorithms.h>
 #include <hycomodelimpl.h>
 
+const char *const HycoReconstructSolvers[] = {"auto", "nnls", "tao", NULL};
+enum { SOLVER_AUTO, SOLVER_NNLS, SOLVER_TAO };
+#define RTOL 1e-8 /* of the optimality conditions, recomputed */
+
+/* Lawson and Hanson's active set, or TAO; with auto or tao the other one where the first stops short. */
+static PetscErrorCode Solve(PetscInt solver, PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[],
+                            PetscReal c[])
+{
+  PetscBool solved = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (solver == SOLVER_TAO) PetscCall(HycoTaoNNLS(m, n, A, b, HYCO_TAO_BNLS, RTOL, c, NULL, &solved));
+  if (solved) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoNNLS(m, n, A, b, c, NULL));
+  if (solver != SOLVER_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoNNLSCheck(m, n, A, b, c, RTOL, NULL, &solved));
+  if (!solved) PetscCall(HycoTaoNNLS(m, n, A, b, HYCO_TAO_BNLS, RTOL, c, NULL, &solved));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The weight, relative to the largest snapshot force in the RID. */
 #define SMALL 1e-3
 
@@ -41,7 +61,7 @@ PetscErrorCode HycoModelReconstruct(HycoModel m)
     for (PetscInt i = 0; i < n; i++) A[j * rows + r++] = i == j ? SMALL * scale : 0;
   }
   for (PetscInt r = 0; r < rows; r++) b[r] = r < m->m ? m->Lambda[m->contact[r]] : 0;
-  PetscCall(HycoNNLS(rows, n, A, b, c, NULL));
+  PetscCall(Solve(m->reconstruct_solver, rows, n, A, b, c));
   for (PetscInt k = 0; k < N; k++) {
     if (m->in_rid[k]) continue;
     for (PetscInt j = 0; j < n; j++) m->Lambda[k] += c[j] * m->S_lambda[(size_t)j * (size_t)N + (size_t)k];

@@ -145,6 +145,21 @@ class Choices(Case):
         self.assertEqual(refused, 1, 'none of these models is singular: the refusal was not tried')
         self.assertEqual([n for n in os.listdir(self.folder) if 'candidate' in n], [])
 
+    def test_reconstruction(self):
+        """(41) by Lawson and Hanson and by TAO: the same forces outside the RID, which carry most of the total."""
+        force = {}
+        for solver in ('auto', 'nnls', 'tao'):
+            self.hyco('predict', '-model', 'base.h5', '-mu', '0.07,0.17', '-output', 'f.xdmf',
+                      '-hyco_reconstruct_solver', solver)
+            with h5py.File(self.path('f.h5')) as f:
+                force[solver] = f['contact/lambda'][:].ravel()
+        with h5py.File(self.path('base.h5')) as f:
+            outside = f['problem/in_rid'][:, 0] == 0
+        self.assertGreater(force['nnls'][outside].sum(), 0.3 * force['nnls'].sum())
+        self.assertEqual(abs(force['auto'] - force['nnls']).max(), 0)
+        self.assertGreater(abs(force['tao'] - force['nnls']).max(), 0)  # another method indeed
+        self.assertLess(abs(force['tao'] - force['nnls']).max(), 1e-6 * force['nnls'].max())
+
     def test_norms(self):
         """The errors of compare from the fields of solve and predict, in the norms of 2, H1 and its dual."""
         point = ('-mu', '0.07,0.17')

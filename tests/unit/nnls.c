@@ -1,6 +1,7 @@
 /* min |A x - b|, x >= 0: the Karush-Kuhn-Tucker conditions, and cases solved by hand. */
 #include "check.h"
 #include <hycoalgorithms.h>
+#include <hycolcp.h>
 #include <math.h>
 
 /* x >= 0, g = A^T (b - A x) <= 0, x.g = 0, and the residual returned is |A x - b|. Returns |A x - b|. */
@@ -87,11 +88,58 @@ static PetscErrorCode TestByHand(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  The problem of the reconstruction: bumps that move, agreement where they are asked, a small weight on the
+  coefficients, which makes the solution unique. The active set and each Newton or gradient-projection type of TAO
+  agree.
+*/
+static PetscErrorCode TestTao(void)
+{
+  const PetscInt N = 90;
+  const PetscInt types[] = {HYCO_TAO_GPCG, HYCO_TAO_BNLS};
+  unsigned long long state = 5;
+
+  PetscFunctionBegin;
+  for (PetscInt n = 30; n <= 240; n *= 2) {
+    const PetscInt m = N + n;
+    PetscReal *A, *b, *x, *y, one, other, largest = 0;
+    PetscBool solved;
+
+    PetscCall(PetscCalloc4(m * n, &A, m, &b, n, &x, n, &y));
+    for (PetscInt j = 0; j < n; j++) {
+      const PetscReal centre = (1 + Draw(&state)) / 2, width = 0.15 + 0.1 * Draw(&state);
+
+      for (PetscInt i = 0; i < N; i++) A[j * m + i] = fmax(0, 1 - pow(((PetscReal)i / N - centre) / width, 2));
+      A[j * m + N + j] = 1e-3;
+    }
+    for (PetscInt i = 0; i < N; i++) b[i] = fmax(0, 1 - pow(((PetscReal)i / N - 0.5) / 0.2, 2)) + 0.1 * Draw(&state);
+    PetscCall(HycoNNLS(m, n, A, b, x, &one));
+    PetscCall(HycoNNLSCheck(m, n, A, b, x, 1e-10, &other, &solved));
+    CHECK(solved, "n = %d: the active set's solution is no minimum", (int)n);
+    CHECK_NEAR(other, one, 1e-12);
+    for (PetscInt j = 0; j < n; j++) largest = fmax(largest, x[j]);
+    for (size_t t = 0; t < sizeof(types) / sizeof(types[0]); t++) {
+      PetscCall(HycoTaoNNLS(m, n, A, b, types[t], 1e-9, y, &other, &solved));
+      CHECK(solved, "n = %d: %s did not solve it", (int)n, HycoTaoTypes[types[t]]);
+      CHECK_NEAR(other, one, 1e-10);
+      for (PetscInt j = 0; j < n; j++)
+        CHECK(fabs(x[j] - y[j]) <= 1e-5 * largest, "n = %d, %s: x[%d] %g for %g", (int)n, HycoTaoTypes[types[t]],
+              (int)j, y[j], x[j]);
+    }
+    for (PetscInt j = 0; j < n; j++) y[j] = 1.01 * x[j];
+    PetscCall(HycoNNLSCheck(m, n, A, b, y, 1e-9, NULL, &solved));
+    CHECK(!solved, "n = %d: the check takes a wrong solution", (int)n);
+    PetscCall(PetscFree4(A, b, x, y));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
   PetscCall(TestRandom());
   PetscCall(TestByHand());
+  PetscCall(TestTao());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
