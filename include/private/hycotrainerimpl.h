@@ -22,7 +22,7 @@ struct _p_HycoTrainer {
   HycoHybrid hybrid;
   HycoModelType type;
   HycoDual dual;
-  PetscInt nnmf_max_its;
+  PetscInt nnmf_max_its, nnmf_vectors;
   HycoProgress progress;
   void *progress_ctx;
   /* state of a run, rank 0 unless said */
