@@ -25,7 +25,7 @@ struct _p_HycoTrainer {
   PetscBool keep_singular;
   HycoModelType type;
   HycoDual dual;
-  PetscInt nnmf_max_its;
+  PetscInt nnmf_max_its, nnmf_vectors;
   HycoProgress progress;
   void *progress_ctx;
   struct {

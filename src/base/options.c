@@ -27,6 +27,7 @@ static const HycoOption option_table[] = {
      "hybrid hyper-reduced (38) on an RID, or projection-based (44) on the whole mesh"},
     {"hyco_dual", "<fe|nnmf|snapshots>", "fe; nnmf if projection",
      "forces: of the finite elements (hybrid); factorised dual snapshots, or they themselves (projection)"},
+    {"hyco_nnmf_vectors", "<int>", "0", "vectors of the nonnegative factorisation (0: as many as displacement modes)"},
     {"hyco_nnmf_max_its", "<int>", "100", "alternations of the nonnegative factorisation"},
     {"hyco_pod_tol", "<real>", "1e-7", "energy left out of the displacement basis, the epsilon of (18)"},
     {"hyco_pod_noise", "<real>", "1e-11", "singular values below this share of the first are noise"},

@@ -1,9 +1,9 @@
 /*
   The nonnegative basis of the contact forces of a projection-based model (6.3, 6.4), made from the dual snapshots:
-  their nonnegative factorisation, with as many vectors as there are displacement modes (the extended necessary
-  condition l_u >= l_lambda), or the snapshots themselves (Haasdonk, Salomon, Wohlmuth, SIAM J. Numer. Anal. 50 (2012)
-  2656-2681). With these the modes take in
-  the snapshots' supremizers, without which they would be fewer than the forces to determine.
+  their nonnegative factorisation, by default with as many vectors as there are displacement modes (the extended
+  necessary condition l_u >= l_lambda), or the snapshots themselves (Haasdonk, Salomon, Wohlmuth, SIAM J. Numer. Anal.
+  50 (2012) 2656-2676). With these the modes take in the snapshots' supremizers, without which they would be fewer than
+  the forces to determine.
 */
 #include <hycoalgorithms.h>
 #include <hycotrainerimpl.h>
@@ -118,17 +118,17 @@ static PetscErrorCode FromSnapshots(HycoModel m, const PetscReal S[])
 /* V_lambda from the model's dual snapshots, which it needs no more. */
 static PetscErrorCode MakeBasis(HycoTrainer t, HycoModel m)
 {
-  const PetscInt N = m->pairs.n, n = m->n_dual;
+  const PetscInt N = m->pairs.n, n = m->n_dual, k = t->nnmf_vectors ? PetscMin(t->nnmf_vectors, PetscMin(N, n)) : m->l;
   PetscReal *S;
 
   PetscFunctionBegin;
   HycoDuplicate(N * n, m->S_lambda, &S);
-  for (PetscInt k = 0; k < N * n; k++) S[k] = PetscMax(S[k], 0); /* round-off of iterative solves */
-  PetscCall(PetscMalloc1(N * PetscMax(n, m->l) + 1, &m->V_lambda));
+  for (PetscInt i = 0; i < N * n; i++) S[i] = PetscMax(S[i], 0); /* round-off of iterative solves */
+  PetscCall(PetscMalloc1(N * PetscMax(n, k) + 1, &m->V_lambda));
   if (m->dual == HYCO_DUAL_SNAPSHOTS)
     PetscCall(FromSnapshots(m, S));
   else if (n)
-    PetscCall(HycoNNMF(N, n, S, m->l, t->nnmf_max_its, m->V_lambda, &m->l_lambda, &m->dual_misfit));
+    PetscCall(HycoNNMF(N, n, S, k, t->nnmf_max_its, m->V_lambda, &m->l_lambda, &m->dual_misfit));
   PetscCall(PetscFree(S));
   m->n_dual = 0;
   m->counts[1] = t->n_supremizers;

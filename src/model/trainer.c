@@ -143,6 +143,7 @@ static PetscErrorCode ReadType(HycoTrainer t)
   PetscCall(HycoOptionsWord(o, "hyco_model_type", HycoModelTypes, &type));
   PetscCall(HycoOptionsWord(o, "hyco_dual", HycoDuals, &dual));
   PetscCall(HycoOptionsInt(o, "hyco_nnmf_max_its", 1, PETSC_MAX_INT, &t->nnmf_max_its));
+  PetscCall(HycoOptionsInt(o, "hyco_nnmf_vectors", 0, PETSC_MAX_INT, &t->nnmf_vectors));
   t->type = (HycoModelType)type;
   t->dual = (HycoDual)dual;
   HycoCheck(t->type == HYCO_MODEL_PROJECTION || t->dual == HYCO_DUAL_FE,
