@@ -6,6 +6,9 @@ import subprocess
 import time
 import unittest
 
+import h5py
+import numpy as np
+
 from common import HYCO, ROPE, Case
 
 # the rope's recipe for small errors: nearly all energy, every displacement of A full order, a layer around the RID
@@ -96,10 +99,67 @@ class Greedy(Case):
                       '1e-9', '-values_mu1', '0.05,0.15,0.25', '-values_mu2', '-0.05,0.5', *FINE, '-model', 's.h5')
         self.assertEqual((t['greedy']['stop'], t['n_samples'], t['greedy']['iterations']), ('seconds', 6, 0))
 
+    def rope(self, name, mu):
+        """Of the prediction of a model with four snapshots at mu: x, A, I, displacement, forces, interpolated snapshots."""
+        self.hyco('predict', '-model', name, '-mu', f'{mu[0]!r},{mu[1]!r}', '-output', 'at.xdmf')
+        with h5py.File(self.path('at.h5')) as f, h5py.File(self.path(name)) as m:
+            order = np.argsort(f['mesh/xyz'][:, 0])
+            x, u = f['mesh/xyz'][:, 0][order], f['nodes/displacement'][:, 0][order]
+            force = dict(zip(f['contact/node_id'][:].ravel(), f['contact/lambda'][:].ravel()))
+            force = np.array([force.get(i, 0) for i in f['mesh/node_id'][:].ravel()[order]])
+            role = np.zeros(len(x), int)
+            role[m['mesh/node_whole'][:, 0]] = m['problem/role'][:, 0]
+            n = m['problem/sizes'][0, 0]
+        self.assertEqual((len(x), n), (100, 100))
+        t = [(mu[0] - 0.05) / 0.2, (mu[1] + 0.05) / 0.55]
+        between = np.zeros(100)
+        for file in os.listdir(self.path(name + '.snapshots')):
+            with h5py.File(self.path(name + '.snapshots', file)) as f:
+                corner = f['mu'][:].ravel() > [0.15, 0.2]
+                between += np.prod(np.where(corner, t, [1 - t[0], 1 - t[1]])) * f['U'][:, 0][order]
+        role = role[order]
+        return x, role == 2, role == 1, u, force, between
+
+    def test_local_indicator(self):
+        """(43) at the first model's worst point: the local contact problem and both norms solved again by numpy."""
+        self.hyco('train', '-scene', ROPE, '-greedy', '-training_grid', '20,24', '-max_snapshots', 4, *FINE, '-model',
+                  'l.h5', '-table', 'l.csv')
+        row = [float(v) for v in self.rows('l.csv')[1]]
+        mu = row[5:7]
+        x, A, I, u, force, between = self.rope('l.h5', mu)
+        h, nu = 1 / 99, np.where(x[1:] + x[:-1] < 1 - 1e-9, mu[0], 0.15)
+        nu[49] = (mu[0] + 0.15) / 2  # the element over x = 0.5
+        K = (np.diag(np.r_[nu, 0] + np.r_[0, nu]) - np.diag(nu, 1) - np.diag(nu, -1)) / h
+        one = np.ones(99)
+        M = (np.diag(np.r_[one, 0] + np.r_[0, one]) - np.diag(one, 1) - np.diag(one, -1)) / h
+        M += h / 6 * (2 * np.diag(np.r_[one, 0] + np.r_[0, one]) + np.diag(one, 1) + np.diag(one, -1))
+        K_A, M_A = K[np.ix_(A, A)], M[np.ix_(A, A)]
+        f = -h - K[np.ix_(A, I)] @ between[I]
+        floor = -(0.2 * (np.sin(np.pi * x) - np.sin(3 * np.pi * x)) + 0.5 - mu[1] * (x - 0.5))[A]
+        active = np.zeros(A.sum(), bool)
+        for _ in range(100):  # K u - L = f, u >= floor
+            v, L = floor.copy(), np.zeros(A.sum())
+            free = ~active
+            v[free] = np.linalg.solve(K_A[np.ix_(free, free)], f[free] - K_A[np.ix_(free, active)] @ floor[active])
+            L[active] = (K_A @ v - f)[active]
+            before, active = active, np.where(active, L > 0, v < floor)
+            if (before == active).all():
+                break
+        self.assertTrue((before == active).all())
+        norm = lambda w: np.sqrt(w @ M_A @ w)
+        dual = lambda w: np.sqrt(w @ np.linalg.solve(M_A, w))
+        self.near(norm(u[A] - v) / norm(v), row[8], 1e-6, 'eta_u')
+        self.near(dual(force[A] - L) / dual(L), row[9], 1e-6, 'eta_lambda')
+        self.near(row[8] + row[9], row[7], 1e-6, 'eta')
+
+    def test_whole(self):
+        """With the whole mesh as RID there is no interface: the local problem is the full order, and the model is, too."""
+        t = self.hyco('train', '-scene', ROPE, '-greedy', '-training_grid', '5,6', '-target', '1e-9', '-hyco_hybrid', 'all',
+                      '-hyco_rid_whole', '-model', 'w.h5')
+        self.assertEqual((t['greedy']['stop'], t['greedy']['iterations']), ('target', 0))
+
     def test_penetration(self):
         """(45) is the penetration of the prediction: of the first model's at the point it names, by the stored fields."""
-        import h5py
-        import numpy as np
         self.hyco('train', '-scene', ROPE, '-greedy', '-training_grid', '6,7', '-max_snapshots', 4, '-target', '1e-30',
                   '-hyco_greedy_indicator', 'penetration', '-hyco_hybrid', 'all', '-model', 'i.h5', '-table', 'i.csv')
         row = self.rows('i.csv')[1]
