@@ -343,8 +343,12 @@ static PetscErrorCode ChooseAll(HycoTrainer t, HycoModel m, PetscInt n, const Pe
   PetscCall(HycoModelSetFE(m, HYCO_HYBRID_ALL, n, dof));
   best->u = best->lambda = PETSC_MAX_REAL;
   best->rank = 1;
-  if (!interface) PetscCall(Judge(t, m, &best->u, &best->lambda));
-  for (PetscReal ridge = 1e-14; interface && ridge < 1e-5; ridge *= 10) {
+  if (interface && t->ridge >= 0) PetscCall(HycoModelSetRidge(m, t->ridge));
+  if (!interface || t->ridge >= 0) {
+    PetscCall(Judge(t, m, &best->u, &best->lambda));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscReal ridge = 1e-14; ridge < 1e-5; ridge *= 10) {
     Verdict v;
 
     PetscCall(HycoModelSetRidge(m, ridge));
@@ -355,7 +359,7 @@ static PetscErrorCode ChooseAll(HycoTrainer t, HycoModel m, PetscInt n, const Pe
       strength = ridge;
     }
   }
-  if (interface) PetscCall(HycoModelSetRidge(m, strength));
+  PetscCall(HycoModelSetRidge(m, strength));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

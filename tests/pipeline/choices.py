@@ -5,7 +5,7 @@ import unittest
 import h5py
 import numpy as np
 
-from common import ROPE, Case
+from common import PELLET, ROPE, Case
 
 SNAPSHOTS = ('-hyco_snapshots', 'snapshots')
 # fewest full-order displacements, hardly judged: good at the training points, some singular between them
@@ -144,6 +144,28 @@ class Choices(Case):
             os.remove(self.path('h.h5'))
         self.assertEqual(refused, 1, 'none of these models is singular: the refusal was not tried')
         self.assertEqual([n for n in os.listdir(self.folder) if 'candidate' in n], [])
+
+    def test_all(self):
+        """hybrid all: gamma = G U[A] by least squares on V[A] with -hyco_hybrid_ridge 0; the ridge does no worse in training."""
+        least = self.train('least.h5', '-hyco_hybrid', 'all', '-hyco_hybrid_ridge', 0, '-hyco_keep_singular')
+        with h5py.File(self.path('least.h5')) as f:
+            V, G = f['problem/V'][:][f['problem/fe_dof'][:, 0]], f['problem/G'][:]
+        self.assertLess(abs(G - np.linalg.pinv(V)).max(), 1e-10 * abs(G).max())
+        ridge = self.train('ridge.h5', '-hyco_hybrid', 'all')
+        self.assertLess(ridge['training_error_u'], least['training_error_u'])
+
+    def test_contact(self):
+        """hybrid contact on the pellet: all displacements of the contact nodes of A; rank keeps fewer, of full row rank."""
+        options = ('-values_radius', '4.02,4.10', '-values_load', '0.5,1', '-hyco_snapshots', 'pellet')
+        t = self.hyco('train', '-scene', PELLET, *options, '-model', 'c.h5', '-hyco_hybrid', 'contact')
+        with h5py.File(self.path('c.h5')) as f:
+            role, fe = f['problem/role'][:, 0], f['problem/fe_dof'][:, 0]
+            pairs = np.concatenate([f['problem/pairs/slave'][:, 0], f['problem/pairs/master'][:, 0]])
+        expected = {3 * i + c for i in pairs if role[i] == 2 for c in range(3)}
+        self.assertLessEqual(set(fe), expected)
+        self.assertTrue({d // 3 for d in expected} == {d // 3 for d in fe})
+        self.assertEqual(t['n_fe_dofs'], len(fe))
+        self.assertGreater(len(fe), t['rid_contacts'])
 
     def test_reconstruction(self):
         """(41) by Lawson and Hanson and by TAO: the same forces outside the RID, which carry most of the total."""
