@@ -83,7 +83,7 @@ PetscErrorCode HycoModelCreate(HycoModel *model);
 /* Builds what the online phase needs from the description; again after the full-order set changed. */
 PetscErrorCode HycoModelSetUp(HycoModel model);
 PetscErrorCode HycoModelReset(HycoModel model);
-/* hybrid all: G = diag(s) (X^T X + r s_1^2 I)^-1 X^T, X = V[A] diag(s). */
+/* hybrid all: G = diag(s) (X^T X + r s_1^2 I)^-1 X^T, X = V[A] diag(s); r = 0: the pseudo-inverse of V[A]. */
 PetscErrorCode HycoModelSetRidge(HycoModel model, PetscReal ridge);
 /* Sets the full-order unknowns (dofs of mesh, any order). */
 PetscErrorCode HycoModelSetFE(HycoModel model, HycoHybrid hybrid, PetscInt n, const PetscInt dof[]);

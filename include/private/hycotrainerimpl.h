@@ -21,7 +21,8 @@ struct _p_HycoTrainer {
   PetscInt n_groups;
   char *groups[64], *region;
   HycoHybrid hybrid;
-  PetscInt scan; /* points per parameter; 0: chosen */
+  PetscReal ridge; /* hybrid all; < 0: chosen */
+  PetscInt scan;   /* points per parameter; 0: chosen */
   PetscBool keep_singular;
   HycoModelType type;
   HycoDual dual;

@@ -49,6 +49,8 @@ static const HycoOption option_table[] = {
      "displacements kept full order: fewest for full row rank, all contact ones, all"},
     {"hyco_hybrid_trials", "<int>", "0",
      "candidate sets judged by their training error when hybrid is rank (0: from the size)"},
+    {"hyco_hybrid_ridge", "<real>", "-1",
+     "of the interface's regression when hybrid is all (-1: by the training error; 0: plain least squares)"},
     {"hyco_scan", "<int>", "0",
      "points per parameter that look for a singular reduced stiffness (0: some hundred in all)"},
     {"hyco_keep_singular", "<bool>", "false", "keep a model whose reduced stiffness is singular inside the ranges"},

@@ -290,11 +290,10 @@ static PetscErrorCode SearchFrom(HycoTrainer t, HycoModel m, PetscInt start, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The best end of several starts; of the first alone when a trial is expensive, or one choice of several (auto). */
+/* The best end of several starts; of the first alone when a trial is expensive. */
 static PetscErrorCode ChooseRank(HycoTrainer t, HycoModel m, Verdict *best)
 {
-  const PetscInt room = m->pairs.n,
-                 starts = t->hybrid == HYCO_HYBRID_RANK && (PetscReal)t->n_s * (PetscReal)m->l < 1e4 ? 5 : 1;
+  const PetscInt room = m->pairs.n, starts = (PetscReal)t->n_s * (PetscReal)m->l < 1e4 ? 5 : 1;
   PetscInt n = 0, other, *dof, *rival;
   Verdict verdict;
 
@@ -343,8 +342,12 @@ static PetscErrorCode ChooseAll(HycoTrainer t, HycoModel m, PetscInt n, const Pe
   PetscCall(HycoModelSetFE(m, HYCO_HYBRID_ALL, n, dof));
   best->u = best->lambda = PETSC_MAX_REAL;
   best->rank = 1;
-  if (!interface) PetscCall(Judge(t, m, &best->u, &best->lambda));
-  for (PetscReal ridge = 1e-14; interface && ridge < 1e-5; ridge *= 10) {
+  if (interface && t->ridge >= 0) PetscCall(HycoModelSetRidge(m, t->ridge));
+  if (!interface || t->ridge >= 0) {
+    PetscCall(Judge(t, m, &best->u, &best->lambda));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscReal ridge = 1e-14; ridge < 1e-5; ridge *= 10) {
     Verdict v;
 
     PetscCall(HycoModelSetRidge(m, ridge));
@@ -355,7 +358,7 @@ static PetscErrorCode ChooseAll(HycoTrainer t, HycoModel m, PetscInt n, const Pe
       strength = ridge;
     }
   }
-  if (interface) PetscCall(HycoModelSetRidge(m, strength));
+  PetscCall(HycoModelSetRidge(m, strength));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -363,7 +366,7 @@ PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel m)
 {
   PetscInt n_all, n_contact, *all, *contact;
   HycoHybrid kind = t->hybrid;
-  Verdict v = {0, 0, 1}, other;
+  Verdict v = {0, 0, 1};
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(m->mesh->n_nodes * m->mesh->dim, &all, m->mesh->n_nodes * m->mesh->dim, &contact));
@@ -372,20 +375,12 @@ PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel m)
   HycoCheck(n_all, "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
   if (!n_contact && kind != HYCO_HYBRID_ALL)
     kind = HYCO_HYBRID_CONTACT; /* no contact in the RID: plain hyper-reduction (31) */
-  if (kind == HYCO_HYBRID_AUTO && n_contact < n_all) kind = HYCO_HYBRID_CONTACT;
+  if (kind == HYCO_HYBRID_AUTO) kind = n_contact < n_all ? HYCO_HYBRID_CONTACT : HYCO_HYBRID_ALL;
   if (kind == HYCO_HYBRID_CONTACT && n_contact == n_all && n_contact) {
     HycoFail("-hyco_hybrid contact leaves the modes without equation: every unknown of A is a contact's; use rank, all "
              "or auto");
   }
-  if (kind == HYCO_HYBRID_RANK || kind == HYCO_HYBRID_AUTO) PetscCall(ChooseRank(t, m, &v));
-  if (kind == HYCO_HYBRID_AUTO) {
-    PetscInt n_rank = m->n_fe, *rank;
-
-    HycoDuplicate(n_rank, m->fe_dof, &rank);
-    PetscCall(ChooseAll(t, m, n_all, all, &other));
-    if (v.u <= other.u) PetscCall(HycoModelSetFE(m, HYCO_HYBRID_RANK, n_rank, rank));
-    PetscCall(PetscFree(rank));
-  }
+  if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
   if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all, &v));
   if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoModelSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));
   PetscCall(Judge(t, m, &v.u, &v.lambda));

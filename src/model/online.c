@@ -31,7 +31,7 @@ PetscErrorCode HycoModelSetFE(HycoModel m, HycoHybrid hybrid, PetscInt n, const 
 PetscErrorCode HycoModelSetRidge(HycoModel m, PetscReal ridge)
 {
   const PetscInt l = m->l, n = m->n_fe;
-  PetscReal *X, *N;
+  PetscReal *X, *N, *weight;
   PetscBLASInt lb, nb, info;
 
   PetscFunctionBegin;
@@ -40,9 +40,10 @@ PetscErrorCode HycoModelSetRidge(HycoModel m, PetscReal ridge)
   m->ridge = ridge;
   PetscCall(
       PetscMalloc1(l * n, &m->G)); /* row major l x n is column major n x l: solve N Z = X^T, l x n column major */
-  PetscCall(PetscMalloc2(l * n, &X, l * l, &N));
+  PetscCall(PetscMalloc3(l * n, &X, l * l, &N, l, &weight));
+  for (PetscInt j = 0; j < l; j++) weight[j] = ridge > 0 ? m->sigma[j] / m->sigma[0] : 1;
   for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt j = 0; j < l; j++) X[k * l + j] = m->V[m->fe_dof[k] * l + j] * m->sigma[j] / m->sigma[0];
+    for (PetscInt j = 0; j < l; j++) X[k * l + j] = m->V[m->fe_dof[k] * l + j] * weight[j];
   }
   for (PetscInt i = 0; i < l; i++) {
     for (PetscInt j = 0; j < l; j++) {
@@ -53,11 +54,13 @@ PetscErrorCode HycoModelSetRidge(HycoModel m, PetscReal ridge)
   PetscCall(PetscBLASIntCast(l, &lb));
   PetscCall(PetscBLASIntCast(n, &nb));
   LAPACKpotrf_("U", &lb, N, &lb, &info);
+  HycoCheck(!info || ridge > 0,
+            "-hyco_hybrid_ridge 0: the %d modes are not independent on the %d unknowns of A; take -1", (int)l, (int)n);
   if (!info) LAPACKpotrs_("U", &lb, &nb, N, &lb, X, &lb, &info);
   for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt j = 0; j < l; j++) m->G[j * n + k] = info ? 0 : X[k * l + j] * m->sigma[j] / m->sigma[0];
+    for (PetscInt j = 0; j < l; j++) m->G[j * n + k] = info ? 0 : X[k * l + j] * weight[j];
   }
-  PetscCall(PetscFree2(X, N));
+  PetscCall(PetscFree3(X, N, weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -15,6 +15,7 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   t->noise = 1e-11;
   t->nnmf_max_its = 100;
   t->greedy.target = 1e-3;
+  t->ridge = -1;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *trainer = t;
@@ -191,6 +192,7 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   PetscCall(HycoOptionsWord(o, "hyco_hybrid", hybrids, &hybrid));
   PetscCall(HycoOptionsInt(o, "hyco_hybrid_trials", 0, PETSC_MAX_INT / 8, &t->trials));
   t->hybrid = (HycoHybrid)hybrid;
+  PetscCall(HycoOptionsReal(o, "hyco_hybrid_ridge", -1, 1, &t->ridge));
   PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
   PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
   indicator = (PetscInt)t->greedy.indicator;

@@ -5,11 +5,9 @@ import unittest
 import h5py
 import numpy as np
 
-from common import ROPE, Case
+from common import PELLET, ROPE, Case
 
 SNAPSHOTS = ('-hyco_snapshots', 'snapshots')
-# fewest full-order displacements, hardly judged: good at the training points, some singular between them
-HASTY = ('-hyco_hybrid', 'rank', '-hyco_hybrid_trials', 20, '-hyco_pod_tol', 1e-12)
 
 
 def young(mu1, a, b):
@@ -106,44 +104,76 @@ class Choices(Case):
         with h5py.File(self.path(model)) as f:
             x, cells = f['mesh/xyz'][:, 0], f['mesh/cells'][:]
             role, fe, V = f['problem/role'][:, 0], f['problem/fe_dof'][:, 0], f['problem/V'][:].copy()
-        V[fe] = 0
+            G = f['problem/G'][:] if 'G' in f['problem'] else None
         E = np.zeros((len(x), len(fe)))
         E[fe, range(len(fe))] = 1
-        W = np.hstack([V, E])
+        if G is None:
+            V[fe] = 0
+            W = np.hstack([V, E])
+        else:  # every unknown of A is full order, the interface follows
+            V[fe] = 0
+            W = E + V @ G
         A = (role == 2) & (x > 0) & (x < 1)
-        a, b = x[cells].min(1), x[cells].max(1)
-        K = W[A].T @ matrix(x, cells, young(mu1, a, b))[A] @ W
+        T = E if G is not None else W
+        K = T[A].T @ matrix(x, cells, young(mu1, x[cells].min(1), x[cells].max(1)))[A] @ W
         s = np.linalg.svd(K, compute_uv=False)
         return np.linalg.slogdet(K)[0], s[-1] / s[0]
 
-    def test_scan(self):
+    def check_scan(self, *options):
         """What the scan reports is what numpy finds at its points; only a model that is regular on them is written."""
-        refused = 0
-        for modes, kind in ((8, 'qdeim'), (9, 'deim'), (7, 'qdeim'), (10, 'deim'), (11, 'qdeim'), (12, 'deim')):
-            options = (*HASTY, '-hyco_pod_max_modes', modes, '-hyco_deim_type', kind, '-hyco_scan', 51)
-            command = ('train', '-scene', ROPE, '-grid', '10,12', *SNAPSHOTS, *options, '-model')
-            run = self.run_raw(*command, 'h.h5')
-            if 'misses its own training' in run.stderr:
-                continue
-            scan = self.train('kept.h5', *options, '-hyco_keep_singular')['scan']
-            mu1 = np.linspace(0.05, 0.25, 51)
-            sign, ratio = np.array([self.scanned('kept.h5', v) for v in mu1]).T
-            others = int(min((sign > 0).sum(), (sign < 0).sum()))
-            self.assertEqual((scan['points'], scan['points_of_other_sign']), (51, others))
-            self.near(scan['smallest_singular_value'], ratio.min(), 0.02)
-            self.near(ratio[np.argmin(abs(mu1 - scan['at'][0]))], ratio.min(), 0.02)
-            view = self.run_raw('view', '-model', 'kept.h5').stdout
-            self.assertIn('scanned at 51 points', view)
-            self.assertEqual('SINGULAR' in view, others > 0)
-            self.assertEqual(run.returncode != 0, others > 0, run.stderr)
-            if others:
-                refused += 1
-                self.assertIn('its determinant changes sign', run.stderr)
-                self.assertFalse(os.path.exists(self.path('h.h5')))
-                break
-            os.remove(self.path('h.h5'))
-        self.assertEqual(refused, 1, 'none of these models is singular: the refusal was not tried')
+        options = (*options, '-hyco_scan', 51)
+        run = self.run_raw('train', '-scene', ROPE, '-grid', '10,12', *SNAPSHOTS, *options, '-model', 'h.h5')
+        t = self.train('kept.h5', *options, '-hyco_keep_singular')
+        mu1 = np.linspace(0.05, 0.25, 51)
+        sign, ratio = np.array([self.scanned('kept.h5', v) for v in mu1]).T
+        others = int(min((sign > 0).sum(), (sign < 0).sum()))
+        self.assertEqual((t['scan']['points'], t['scan']['points_of_other_sign']), (51, others))
+        self.near(t['scan']['smallest_singular_value'], ratio.min(), 0.02)
+        self.near(ratio[np.argmin(abs(mu1 - t['scan']['at'][0]))], ratio.min(), 0.02)
+        view = self.run_raw('view', '-model', 'kept.h5').stdout
+        self.assertIn('scanned at 51 points', view)
+        self.assertEqual('SINGULAR' in view, others > 0)
+        self.assertEqual(run.returncode != 0, others > 0, run.stderr)
+        self.assertEqual('its determinant changes sign' in run.stderr, others > 0)
+        self.assertEqual(os.path.exists(self.path('h.h5')), others == 0)
         self.assertEqual([n for n in os.listdir(self.folder) if 'candidate' in n], [])
+        if not others:
+            os.remove(self.path('h.h5'))
+        return t, others
+
+    def test_scan(self):
+        for hybrid in ('all', 'rank'):
+            self.assertEqual(self.check_scan('-hyco_hybrid', hybrid, '-hyco_hybrid_trials', 20)[1], 0)
+
+    def test_resonance(self):
+        """A model that is good at all its training points and useless between them: the scan refuses it."""
+        t, others = self.check_scan('-hyco_deim_type', 'qdeim', '-hyco_hybrid', 'all')
+        self.assertGreater(others, 0)
+        self.assertLess(t['training_error_u'], 0.02)
+        c = self.hyco('compare', '-scene', ROPE, '-model', 'kept.h5', '-grid', '25,30')
+        self.assertGreater(c['error_u']['max'], 1)
+
+    def test_all(self):
+        """hybrid all: gamma = G U[A] by least squares on V[A] with -hyco_hybrid_ridge 0; the ridge does no worse in training."""
+        least = self.train('least.h5', '-hyco_hybrid', 'all', '-hyco_hybrid_ridge', 0, '-hyco_keep_singular')
+        with h5py.File(self.path('least.h5')) as f:
+            V, G = f['problem/V'][:][f['problem/fe_dof'][:, 0]], f['problem/G'][:]
+        self.assertLess(abs(G - np.linalg.pinv(V)).max(), 1e-10 * abs(G).max())
+        ridge = self.train('ridge.h5', '-hyco_hybrid', 'all')
+        self.assertLess(ridge['training_error_u'], least['training_error_u'])
+
+    def test_contact(self):
+        """hybrid contact on the pellet: all displacements of the contact nodes of A; rank keeps fewer, of full row rank."""
+        options = ('-values_radius', '4.02,4.10', '-values_load', '0.5,1', '-hyco_snapshots', 'pellet')
+        t = self.hyco('train', '-scene', PELLET, *options, '-model', 'c.h5', '-hyco_hybrid', 'contact')
+        with h5py.File(self.path('c.h5')) as f:
+            role, fe = f['problem/role'][:, 0], f['problem/fe_dof'][:, 0]
+            pairs = np.concatenate([f['problem/pairs/slave'][:, 0], f['problem/pairs/master'][:, 0]])
+        expected = {3 * i + c for i in pairs if role[i] == 2 for c in range(3)}
+        self.assertLessEqual(set(fe), expected)
+        self.assertTrue({d // 3 for d in expected} == {d // 3 for d in fe})
+        self.assertEqual(t['n_fe_dofs'], len(fe))
+        self.assertGreater(len(fe), t['rid_contacts'])
 
     def test_reconstruction(self):
         """(41) by Lawson and Hanson and by TAO: the same forces outside the RID, which carry most of the total."""
