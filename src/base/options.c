@@ -46,7 +46,7 @@ static const HycoOption option_table[] = {
     {"hyco_hybrid_ridge", "<real>", "-1",
      "of the interface's regression when hybrid is all (-1: by the training error; 0: plain least squares)"},
     {"hyco_scan", "<int>", "0",
-     "points per parameter that look for a singular reduced stiffness (0: some hundred in all)"},
+     "points per parameter that look for a singular reduced stiffness (0: up to some hundred in all)"},
     {"hyco_keep_singular", "<bool>", "false", "keep a model whose reduced stiffness is singular inside the ranges"},
     {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
     {"hyco_reconstruct_solver", "<auto|nnls|tao>", "auto",
