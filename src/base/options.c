@@ -52,7 +52,7 @@ static const HycoOption option_table[] = {
     {"hyco_hybrid_ridge", "<real>", "-1",
      "of the interface's regression when hybrid is all (-1: by the training error; 0: plain least squares)"},
     {"hyco_scan", "<int>", "0",
-     "points per parameter that look for a singular reduced stiffness (0: some hundred in all)"},
+     "points per parameter that look for a singular reduced stiffness (0: up to some hundred in all)"},
     {"hyco_keep_singular", "<bool>", "false", "keep a model whose reduced stiffness is singular inside the ranges"},
     {"hyco_greedy_indicator", "<local|penetration>", "local",
      "what train -greedy judges by: distance from a full-order problem on the RID (43), or penetration (45)"},

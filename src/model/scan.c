@@ -29,16 +29,19 @@ static PetscErrorCode FindParameters(HycoModel m, PetscBool reaches[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* So many points for each parameter that reaches the stiffness: as asked, or a few hundred in all. */
-static PetscErrorCode ChooseGrid(PetscInt asked, PetscInt n_par, const PetscBool reaches[], PetscInt *each, PetscInt *n)
+/* So many points for each parameter that reaches the stiffness: as asked; else some hundred in all, fewer where the
+   factors of that many unknowns would take more than seconds. */
+static PetscErrorCode ChooseGrid(PetscInt asked, PetscInt unknowns, PetscInt n_par, const PetscBool reaches[],
+                                 PetscInt *each, PetscInt *n)
 {
+  const PetscReal most = PetscMin(401, 5e10 / PetscPowReal((PetscReal)unknowns, 3));
   PetscInt q = 0;
   PetscReal all;
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < n_par; p++) q += reaches[p];
   *each = asked;
-  if (!asked) *each = q > 12 || !q ? 1 : PetscMax(2, PetscMin(101, (PetscInt)PetscPowReal(401, 1 / (PetscReal)q)));
+  if (!asked) *each = q > 12 || !q ? 1 : PetscMax(2, PetscMin(101, (PetscInt)PetscPowReal(most, 1 / (PetscReal)q)));
   all = PetscPowReal((PetscReal)*each, (PetscReal)q);
   HycoCheck(all <= 1e6, "-hyco_scan %d gives %.0e points for %d parameters; give less", (int)asked, (double)all,
             (int)q);
@@ -131,7 +134,7 @@ static PetscErrorCode Scan(HycoTrainer t, HycoModel m)
   PetscCallMPI(MPI_Comm_size(t->comm, &size));
   HycoOnEach(t->comm, FindParameters(m, reaches));
   if (m->n > LARGEST) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ChooseGrid(t->scan, m->scene->n_parameters, reaches, &each, &m->scan.n));
+  PetscCall(ChooseGrid(t->scan, m->n, m->scene->n_parameters, reaches, &each, &m->scan.n));
   PetscCall(PetscCalloc2(m->scan.n, &sign, m->scan.n, &ratio));
   HycoOnEach(t->comm,
              ScanMine(m, reaches, each, t->rank * m->scan.n / size, (t->rank + 1) * m->scan.n / size, sign, ratio));
