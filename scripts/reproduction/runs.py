@@ -1,0 +1,57 @@
+"""Runs of hyco, in their own folder, as many at once as there are workers; their reports."""
+import concurrent.futures
+import json
+import os
+import subprocess
+
+SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+HYCO = os.environ.get("HYCO", os.path.join(SOURCE, "build", "hyco"))
+ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1",
+               "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+
+
+class RunError(Exception):
+    """A run that wrote no report, in one line."""
+
+
+class Runs:
+    """Everything that hyco writes goes to a folder; reports come back as dictionaries."""
+
+    def __init__(self, folder, workers=2):
+        self.folder = folder
+        self.pool = concurrent.futures.ThreadPoolExecutor(workers)
+        os.makedirs(folder, exist_ok=True)
+
+    def path(self, *names):
+        return os.path.join(self.folder, *names)
+
+    def hyco(self, name, command, *options):
+        """The report NAME.json of one run. A comparison with points that did not converge ends with an error and still
+        has a report, which counts them; any other command must succeed."""
+        report = self.path(f"{name}.json")
+        if os.path.exists(report):
+            os.remove(report)
+        words = [HYCO, command, *(str(o) for o in options), "-report", report]
+        run = subprocess.run(words, cwd=SOURCE, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+        if not os.path.exists(report) or (run.returncode and command != "compare"):
+            reason = (run.stderr.strip().splitlines() or ["no message"])[-1]
+            raise RunError(f"hyco {command} ({name}) ended with {run.returncode}: {reason}")
+        with open(report, encoding="utf-8") as file:
+            return json.load(file)
+
+    def later(self, function, *arguments):
+        return self.pool.submit(function, *arguments)
+
+    def close(self):
+        """Forgets what has not begun, so that an error ends the script soon."""
+        self.pool.shutdown(cancel_futures=True)
+
+
+def load_script(name):
+    """A script of scripts/ without .py, as a module."""
+    import importlib.machinery
+    import importlib.util
+    loader = importlib.machinery.SourceFileLoader(name, os.path.join(SOURCE, "scripts", name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
+    loader.exec_module(module)
+    return module
