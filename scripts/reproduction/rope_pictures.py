@@ -79,8 +79,8 @@ def figure_6(runs, pictures):
                                      (plot.IN_A, plot.RED, 16, "A")):
         at = x[m.role == role]
         top.plot(at, np.zeros(len(at)), "|", ms=size, mew=2 if size > 5 else 1, color=colour, label=name)
-    top.set(yticks=[], ylim=(-1, 1), title=m.counts())
-    top.legend(loc="upper center", bbox_to_anchor=(0.5, 1.1), ncol=3, fontsize=9, frameon=False)
+    top.set(yticks=[], ylim=(-1, 2.2), title=m.counts())
+    top.legend(loc="upper center", ncol=3, fontsize=9, frameon=False)
     s = plot.Solution(runs.path("full-point.h5"))
     inside, ground = plot.obstacle(s)
     bottom.fill_between(inside, ground, ground.min() - 0.05, color="#cfc6b8", lw=0)

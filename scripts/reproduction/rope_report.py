@@ -1,8 +1,10 @@
 """Section 6: the runs in their order, the pictures, and the words beside them. Every number of ours is a run's."""
 import csv
 
+import numpy as np
 import rope
 import rope_pictures as draw
+import rope_text
 
 BLUE, RED, GREEN = draw.plot.BLUE, draw.plot.RED, draw.plot.GREEN
 
@@ -186,7 +188,7 @@ def table_1(found):
 def figure_4_rows(runs, size, found):
     dual = rope.left_by_pod(rope.grid_snapshots(runs)[1])
     fast, slow = dict(found["nnmf"][100]), dict(found["nnmf"][size.slow_its])
-    rows = [[k, f"{dual[k - 1]:.2g}", f"{fast[k]:.2g}" if k in fast else "", f"{slow[k]:.2g}" if k in slow else ""]
+    rows = [[k, f"{dual[k - 1]:.2g}" if dual[k - 1] > 1e-25 else "round-off", f"{fast[k]:.2g}" if k in fast else "", f"{slow[k]:.2g}" if k in slow else ""]
             for k in sorted({*fast, *slow})]
     return ["vectors", "POD", "NNMF, 100 iterations", f"NNMF, {size.slow_its} iterations"], rows
 
@@ -203,15 +205,43 @@ def write_tables(runs, size, found):
 
 def report(runs, size, found, folder):
     """The Markdown text; `folder` is where its pictures are."""
-    import rope_text
     write_tables(runs, size, found)
     values = {"folder": folder, "test_grid": size.test_grid.replace(",", " x "), "iterations": size.iterations,
               "history_grid": size.history_grid.replace(",", " x "), "numbers": table(*numbers(found)),
               "table_1": table(*table_1(found)), "figure_4": table(*figure_4_rows(runs, size, found)),
               "failed": sum(v["failed"] for some in found["histories"].values() for _, v in some), "slow": size.slow_its}
-    t, c = found["grid"]["all"]["train"], found["grid"]["all"]["compare"]
-    values.update(modes=t["n_modes"], a=t["rid_a_nodes"], nodes=t["rid_nodes"], dual=t["n_dual_modes"],
-                  pb14=found["grid"]["pb14"]["train"]["n_modes"], covered=percent(c["covered_force"]["mean"]),
-                  least=percent(c["covered_force"]["min"]), rank_fe=found["grid"]["rank"]["train"]["n_fe_dofs"],
-                  point_covered=percent(found["grid"]["all"]["point"][0]["covered_force"]))
+    values.update(regular_values(found))
+    values.update(greedy_values(runs, found))
     return rope_text.TEXT.format(**values)
+
+
+def regular_values(found):
+    grid = found["grid"]
+    t, c, p = grid["all"]["train"], grid["all"]["compare"], grid["pb14"]["compare"]
+
+    def at(name, key):
+        return percent(grid[name]["point"][1][key]["mean"])
+
+    return {"modes": t["n_modes"], "a": t["rid_a_nodes"], "nodes": t["rid_nodes"], "dual": t["n_dual_modes"],
+            "pb14": grid["pb14"]["train"]["n_modes"], "covered": percent(c["covered_force"]["mean"]),
+            "least": percent(c["covered_force"]["min"]), "rank_fe": grid["rank"]["train"]["n_fe_dofs"],
+            "point_covered": percent(grid["all"]["point"][0]["covered_force"]), "rid_force": percent(c["error_lambda_rid"]["mean"]),
+            "all_force": percent(c["error_lambda"]["mean"]), "pb_force": percent(p["error_lambda"]["mean"]),
+            "pb_u": percent(p["error_u"]["mean"]), "all_u": percent(c["error_u"]["mean"]),
+            "at_rid": at("all", "error_lambda_rid"), "at_pb14": at("pb14", "error_lambda"), "at_all": at("all", "error_lambda")}
+
+
+def greedy_values(runs, found):
+    """What the histories end with, how often the indicator is above the error, where the last models are worst."""
+    last = {name: some[-1][1] for name, some in found["histories"].items()}
+    values = {f"{key}_{name.replace('-', '_')}": percent(v[f"error_{key}"])
+              for name, v in last.items() for key in ("u_h1", "u", "lambda_rid", "lambda_rid_dual")}
+    rows, judged = rope.indicators(runs, "greedy-paper"), found["histories"]["greedy-paper"]
+    values["judged"] = len(judged)
+    values["above_u"] = sum(rows["mean_eta_u"][k] > v["error_u_h1"] for k, v in judged)
+    values["above_lambda"] = sum(rows["mean_eta_lambda"][k] > v["error_lambda_rid_dual"] for k, v in judged)
+    for name in ("greedy-paper", "greedy-fine"):
+        _, errors = draw.plot.read_table(runs.path(f"{name}.csv"))
+        worst = np.argmax(errors["error_u"])
+        values[f"worst_{name[7:]}"] = f"({errors['mu1'][worst]:.2f}, {errors['mu2'][worst]:.2f})"
+    return values

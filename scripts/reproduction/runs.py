@@ -1,5 +1,7 @@
 """Runs of hyco, in their own folder, as many at once as there are workers; their reports."""
 import concurrent.futures
+import importlib.machinery
+import importlib.util
 import json
 import os
 import subprocess
@@ -49,8 +51,6 @@ class Runs:
 
 def load_script(name):
     """A script of scripts/ without .py, as a module."""
-    import importlib.machinery
-    import importlib.util
     loader = importlib.machinery.SourceFileLoader(name, os.path.join(SOURCE, "scripts", name))
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
     loader.exec_module(module)

@@ -14,7 +14,7 @@ SCRIPT = os.path.join(SOURCE, 'scripts', 'reproduce')
 
 def reproduce(*args, hyco=HYCO):
     return subprocess.run([sys.executable, SCRIPT, *args], env={**os.environ, 'HYCO': hyco}, capture_output=True, text=True,
-                          timeout=110)
+                          timeout=280)
 
 
 class Reproduce(Case):
