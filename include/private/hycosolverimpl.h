@@ -64,7 +64,7 @@ enum { HYCO_TYPE_ACTIVE_SET, HYCO_TYPE_TAO, HYCO_TYPE_LEMKE };
 
 /* K x = F without contact. */
 PetscErrorCode HycoSolveIterative(HycoSolver s, Vec x, PetscBool *solved);
-/* Says in linear_method what solves with K. */
+/* Says in linear_method what solves with K: `ksp`, or (NULL) the factor of a HycoDirect. */
 PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp);
 /* Few contacts: dual. About as many as unknowns: primal. */
 PetscErrorCode HycoChooseForm(HycoSolver s, HycoForm *form);

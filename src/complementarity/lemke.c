@@ -75,6 +75,16 @@ static PetscReal Entry(const Dictionary *d, PetscInt i, PetscInt j)
   return sum;
 }
 
+/* Rows and columns of T, and the pivots that wait. */
+static PetscErrorCode Sizes(const Dictionary *d, PetscBLASInt *n, PetscBLASInt *cols, PetscBLASInt *waiting)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(d->n, n));
+  PetscCall(PetscBLASIntCast(d->n + 1, cols));
+  PetscCall(PetscBLASIntCast(d->waiting, waiting));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* column = T[:,j] */
 static PetscErrorCode FetchColumn(Dictionary *d, PetscInt j)
 {
@@ -82,9 +92,7 @@ static PetscErrorCode FetchColumn(Dictionary *d, PetscInt j)
   const PetscReal plus = 1, minus = -1;
 
   PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(d->n, &n));
-  PetscCall(PetscBLASIntCast(d->n + 1, &cols));
-  PetscCall(PetscBLASIntCast(d->waiting, &k));
+  PetscCall(Sizes(d, &n, &cols, &k));
   PetscCall(PetscArraycpy(d->column, d->T + (size_t)j * (size_t)n, n));
   if (k) BLASgemv_("N", &n, &k, &minus, d->U, &n, d->V + j, &cols, &plus, d->column, &one);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -97,9 +105,7 @@ static PetscErrorCode FetchRow(Dictionary *d, PetscInt i)
   const PetscReal plus = 1, minus = -1;
 
   PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(d->n, &n));
-  PetscCall(PetscBLASIntCast(d->n + 1, &cols));
-  PetscCall(PetscBLASIntCast(d->waiting, &k));
+  PetscCall(Sizes(d, &n, &cols, &k));
   for (PetscInt j = 0; j < cols; j++) d->row[j] = d->T[(size_t)j * (size_t)n + (size_t)i];
   if (k) BLASgemv_("N", &cols, &k, &minus, d->V, &cols, d->U + i, &n, &plus, d->row, &one);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -111,9 +117,7 @@ static PetscErrorCode Apply(Dictionary *d)
   const PetscReal plus = 1, minus = -1;
 
   PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(d->n, &n));
-  PetscCall(PetscBLASIntCast(d->n + 1, &cols));
-  PetscCall(PetscBLASIntCast(d->waiting, &k));
+  PetscCall(Sizes(d, &n, &cols, &k));
   if (k) BLASgemm_("N", "T", &n, &cols, &k, &minus, d->U, &n, d->V, &cols, &plus, d->T, &n);
   d->waiting = 0;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -64,8 +64,7 @@ static PetscErrorCode FactorSparse(HycoSolver s, PetscBool *singular)
   PetscCall(HycoDirectPinKernel(s->direct, y->K));
   PetscCall(HycoDirectAnalyse(s->direct, y->K, y->Bt, y->B, y->symmetric, &s->bytes));
   PetscCall(HycoDirectFactor(s->direct, y->K, y->Bt, y->B, s->S, singular));
-  PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: mumps, %.3g GB estimated",
-                          (double)(1e-9 * s->bytes)));
+  PetscCall(HycoNameLinear(s, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -106,8 +106,7 @@ static PetscErrorCode Factor(HycoSolver s, PetscBool *singular)
   PetscCall(HycoDirectAnalyse(s->direct_free, K, NULL, NULL, s->system->symmetric, &s->bytes));
   PetscCall(HycoDirectFactor(s->direct_free, K, NULL, NULL, NULL, singular));
   if (*singular) s->factored_free.K = 0;
-  PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: mumps, %.3g GB estimated",
-                          (double)(1e-9 * s->bytes)));
+  PetscCall(HycoNameLinear(s, NULL));
   s->seconds_factor += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -7,9 +7,10 @@
 enum { HYCO_NO_PIVOT = -1, HYCO_IDLE = -2 };
 
 /* Pivot (global unknown) of each of this rank's rows: the largest entry whose unknown no other row has; HYCO_NO_PIVOT:
-   none; HYCO_IDLE: the row is empty, of a contact between fixed unknowns. */
-static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[])
+   none; HYCO_IDLE: the row is empty, of a contact between fixed unknowns. *all: no rank has a row of the former. */
+static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
 {
+  PetscMPIInt bad = 0, any;
   PetscInt lo, hi;
   Mat Bt = y->Bt;
   Vec count, mine;
@@ -69,7 +70,10 @@ static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[])
       }
     }
     PetscCall(MatRestoreRow(y->B, r, &n, &cols, &vals));
+    bad = bad || pivot[r - lo] == HYCO_NO_PIVOT;
   }
+  PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, y->comm));
+  *all = (PetscBool)!any;
   PetscCall(VecRestoreArrayRead(mine, &shared));
   PetscCall(VecScatterDestroy(&scatter));
   PetscCall(ISDestroy(&is));
@@ -81,15 +85,11 @@ static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[])
 PetscErrorCode HycoPrimalPossible(HycoSystem y, PetscBool *possible)
 {
   PetscInt lo, hi, *pivot;
-  PetscMPIInt bad = 0, any;
 
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
   PetscCall(PetscMalloc1(hi - lo, &pivot));
-  PetscCall(FindPivots(y, pivot));
-  for (PetscInt k = 0; k < hi - lo; k++) bad = bad || pivot[k] == HYCO_NO_PIVOT;
-  PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, y->comm));
-  *possible = (PetscBool)!any;
+  PetscCall(FindPivots(y, pivot, possible));
   PetscCall(PetscFree(pivot));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -213,7 +213,7 @@ static PetscErrorCode DropIdle(HycoSolver s, PetscInt n)
 PetscErrorCode HycoGapSetUp(HycoSolver s)
 {
   HycoSystem y = s->system;
-  PetscBool same, diagonal = PETSC_FALSE;
+  PetscBool same, possible = PETSC_FALSE, diagonal = PETSC_FALSE;
   PetscInt lo, hi;
   PetscReal begin = HycoNow();
 
@@ -223,16 +223,10 @@ PetscErrorCode HycoGapSetUp(HycoSolver s)
   PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
   PetscCall(PetscFree(s->pivot));
   PetscCall(PetscMalloc1(hi - lo, &s->pivot));
-  PetscCall(FindPivots(y, s->pivot));
-  {
-    PetscMPIInt bad = 0, any;
-
-    for (PetscInt k = 0; k < hi - lo; k++) bad = bad || s->pivot[k] == HYCO_NO_PIVOT;
-    PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, s->comm));
-    if (any) s->transformed.K = 0;
-    PetscCheck(!any, s->comm, PETSC_ERR_USER,
-               "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
-  }
+  PetscCall(FindPivots(y, s->pivot, &possible));
+  if (!possible) s->transformed.K = 0;
+  PetscCheck(possible, s->comm, PETSC_ERR_USER,
+             "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
   PetscCall(MatDestroy(&s->Kg));
   PetscCall(MatDestroy(&s->Kw));
   PetscCall(OneEach(y->B, &diagonal));

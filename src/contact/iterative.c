@@ -59,6 +59,11 @@ PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
   PC handle;
 
   PetscFunctionBegin;
+  if (!ksp) {
+    PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: mumps, %.3g GB estimated",
+                            (double)(1e-9 * s->bytes)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(KSPGetType(ksp, &method));
   PetscCall(KSPGetPC(ksp, &handle));
   PetscCall(PCGetType(handle, &pc));
