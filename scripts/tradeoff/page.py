@@ -1,0 +1,19 @@
+"""Sections of a document that scripts write: between `<!-- NAME: written by ... -->` and `<!-- end NAME -->`."""
+import os
+import re
+
+
+def machine():
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        names = [line.split(":")[1].strip() for line in file if line.startswith("model name")]
+    return f"{names[0] if names else os.uname().machine}, {os.cpu_count()} cores"
+
+
+def write_section(path, name, lines):
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    found = re.compile(rf"(<!-- {re.escape(name)}: [^\n]*-->\n).*?(<!-- end {re.escape(name)} -->)", re.S)
+    if not found.search(text):
+        raise SystemExit(f"{path} has no section {name}")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(found.sub(lambda m: m[1] + "\n" + "\n".join(lines) + "\n\n" + m[2], text))

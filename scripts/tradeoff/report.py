@@ -1,0 +1,128 @@
+"""The sweep's tables and its Pareto picture."""
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+LEVELS = [0.1, 0.01, 0.001, 0.0001]
+QUANTITIES = [("u", "displacement"), ("sigma", "stress of the RID's cells"), ("lambda_rid", "forces on the RID's contacts"),
+              ("lambda", "all contact forces")]
+COLORS = {"hybrid": "#2c5aa0", "projection": "#c8352c", "condensed": "#3a9a4e"}
+MARKS = {"hybrid": "o", "projection": "s", "condensed": "^"}
+TIMES = {"batch_s": "seconds a solve, as a set", "single_s": "seconds of a single solve"}
+
+
+def good(rows):
+    return [r for r in rows if r["status"] == "ok"]
+
+
+def pareto(rows, error, time="batch_s"):
+    """Those that no other beats in both."""
+    front, best = [], float("inf")
+    for row in sorted(good(rows), key=lambda r: (r[time], r[error])):
+        if row[error] < best:
+            front.append(row)
+            best = row[error]
+    return front
+
+
+def cheapest(rows, error, level, time="batch_s"):
+    return min((r for r in good(rows) if r[error] <= level), key=lambda r: r[time], default=None)
+
+
+def recommended(rows):
+    """(quantity, statistic, level): row or None."""
+    return {(q, s, level): cheapest(rows, f"{q}_{s}", level) for q, _ in QUANTITIES for s in ("mean", "max")
+            for level in LEVELS}
+
+
+def finalists(rows):
+    """All that a table names: the recommended, and the fronts of the mean errors."""
+    named = [r for r in recommended(rows).values() if r] + [r for q, _ in QUANTITIES for r in pareto(rows, f"{q}_mean")]
+    return list({r["id"]: r for r in named}.values())
+
+
+def seconds(value):
+    if value is None:
+        return ""
+    unit = next((u for u in ((1, "s"), (1e-3, "ms"), (1e-6, "us")) if value >= u[0]), (1e-6, "us"))
+    return f"{value / unit[0]:.3g} {unit[1]}"
+
+
+def percent(value):
+    return f"{100 * value:.2g}" if value < 1e6 else f"{value:.0e}"
+
+
+def table(head, lines):
+    return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(map(str, line)) + " |" for line in lines)]
+
+
+def answer(rows, full):
+    """The cheapest settings for each accuracy, with their speed-ups over the warm full order."""
+    found = recommended(rows)
+    lines = []
+    for q, words in QUANTITIES:
+        for s in ("mean", "max"):
+            cells = []
+            for level in LEVELS:
+                r = found[q, s, level]
+                cells.append(f"{r['id']}: {r['type']}, {seconds(r['batch_s'])}, {full['batch_s'] / r['batch_s']:.3g}x" if r else "none")
+            lines.append([words, "mean" if s == "mean" else "largest", *cells])
+    return table(["error of", "over unseen points", *(f"{100 * level:g} %" for level in LEVELS)], lines)
+
+
+def settings(rows):
+    lines = []
+    for r in sorted(rows, key=lambda r: r["batch_s"]):
+        lines.append([r["id"], r["label"], r["modes"], f"{100 * r['rid_fraction']:.1f}", seconds(r["offline_s"]),
+                      f"{r['model_bytes'] / 1e6:.2g}",
+                      f"{seconds(r['batch_s'])} ({seconds(r['batch_s_min'])}..{seconds(r['batch_s_max'])})",
+                      f"{seconds(r['single_s'])} ({seconds(r['single_s_min'])}..{seconds(r['single_s_max'])})",
+                      *(f"{percent(r[q + '_mean'])} / {percent(r[q + '_max'])}" for q, _ in QUANTITIES)])
+    return table(["", "setting", "modes", "RID %", "offline", "MB", "a solve of a set", "a single solve", "u %", "sigma %",
+                  "forces, RID %", "forces %"], lines)
+
+
+def full_orders(full):
+    lines = [[name, seconds(r["batch_s"]), seconds(r["single_s"]), f"{r['memory_mb']:.0f}"] for name, r in full.items()]
+    return table(["full order", "a solve of the set", "a single solve", "MB"], lines)
+
+
+def plot(case, rows, full, path):
+    figure, axes = plt.subplots(2, 2, figsize=(11, 8.2), layout="constrained", sharex=True)
+    for axis, (q, words) in zip(axes.flat, QUANTITIES):
+        for kind in COLORS:
+            mine = [r for r in good(rows) if r["type"] == kind]
+            axis.scatter([r["batch_s"] for r in mine], [max(100 * r[q + "_mean"], 1e-9) for r in mine], s=22, alpha=0.55,
+                         marker=MARKS[kind], color=COLORS[kind], label=kind if mine else None)
+        front = pareto(rows, q + "_mean")
+        axis.step([r["batch_s"] for r in front], [max(100 * r[q + "_mean"], 1e-9) for r in front], where="post", color="k", lw=1)
+        for r in front:
+            axis.annotate(str(r["id"]), (r["batch_s"], max(100 * r[q + "_mean"], 1e-9)), xytext=(3, 4),
+                          textcoords="offset points", fontsize=8)
+        for name, style in (("warm", "-"), ("a factor per iteration", "--")):
+            if name in full:
+                axis.axvline(full[name]["batch_s"], color="0.4", ls=style, label=f"full order, {name}")
+        for level in LEVELS:
+            axis.axhline(100 * level, color="0.85", lw=0.8, zorder=0)
+        axis.set(xscale="log", yscale="log", title=f"{words}", ylabel="mean relative error, %")
+    for axis in axes[1]:
+        axis.set_xlabel("seconds a solve, as a set")
+    axes[0, 0].legend(fontsize=8, framealpha=0.9)
+    figure.suptitle(f"{case}: error against online time; the line joins what nothing beats in both")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def section(name, rows, full, words, picture):
+    """What docs/tradeoff.md says of one case."""
+    warm = full["warm"]
+    failed = [r for r in rows if r["status"] != "ok"]
+    lines = [words, "", f"![error against online time, {name}]({picture})", "",
+             f"**The cheapest that is accurate enough** (of {len(rows)} settings; number in the table below, type, time of a solve "
+             "in a set, speed-up over warm full order):", "", *answer(rows, warm), "", *full_orders(full), "",
+             *settings(finalists(rows))]
+    if failed:
+        lines += ["", f"{len(failed)} settings gave no model or no converged answer:", "",
+                  *(f"- {r['label']}: {r['status']}" for r in failed)]
+    return lines
