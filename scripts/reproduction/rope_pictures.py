@@ -1,8 +1,11 @@
 """Section 6: the pictures, by scripts/plot where it has them."""
+import io
 import os
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.lines import Line2D
+from PIL import Image
 from runs import load_script
 
 plot = load_script("plot")
@@ -17,8 +20,13 @@ class Pictures:
         os.makedirs(folder, exist_ok=True)
 
     def save(self, fig, name):
-        fig.savefig(os.path.join(self.folder, name), format="png", dpi=100)
+        """In 256 colours: a third of the bytes."""
+        whole = io.BytesIO()
+        fig.savefig(whole, format="png", dpi=100)
         plt.close(fig)
+        with Image.open(whole) as picture:
+            picture.convert("RGB").quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(
+                os.path.join(self.folder, name), optimize=True)
 
 
 def rope_of(runs, name):
@@ -106,13 +114,19 @@ def point_solutions(runs, pictures, name, models):
 
 
 def history(panels, pictures, name):
-    """panels: a title and curves (label, iterations, values, style, colour), two panels a row."""
+    """panels: a title and curves (label, iterations, values, style, colour), two panels a row; perhaps one more curve, that
+    has its own axis."""
     rows = (len(panels) + 1) // 2
     fig, axes = plt.subplots(rows, 2, figsize=(12, 4.4 * rows), squeeze=False, constrained_layout=True)
-    for ax, (title, curves) in zip(axes.ravel(), panels):
+    for ax, (title, curves, *other) in zip(axes.ravel(), panels):
         for label, iterations, values, style, colour in curves:
             ax.semilogy(iterations, 100 * np.array(values), style, ms=4, lw=1.4, color=colour, label=label)
         ax.set(title=title, xlabel="iteration", ylabel="mean relative error [%]")
         ax.grid(alpha=0.3, which="major")
+        for label, iterations, values, style, colour in other:
+            right = ax.twinx()
+            drawn = right.semilogy(iterations, values, style, lw=1.4, color=colour, label=label)
+            right.set(ylabel="mean penetration, 2-norm")
+            ax.add_line(Line2D([], [], ls=style, color=colour, label=drawn[0].get_label()))
         ax.legend(fontsize=8)
     pictures.save(fig, name)
