@@ -15,8 +15,9 @@ RADII = {"S1 + S2": (4.02, 4.10), "5 radii": (4.02, 4.04, 4.05, 4.07, 4.10),
 VARIANTS = {"recipe": (), "no extension": ("-hyco_rid_contact_extension", 0), "no layer": ("-hyco_rid_layers", 0),
             "2 layers": ("-hyco_rid_layers", 2)}
 PAPER, FINE = ("S1 + S2", "1e-5", "recipe"), ("9 radii", "1e-10", "recipe")
-MODELS = [PAPER, *[(*PAPER[:2], v) for v in ("no extension", "no layer")], ("5 radii", "1e-5", "recipe"),
-          ("5 radii", "1e-7", "recipe"), *[("5 radii", "1e-10", v) for v in ("recipe", "no extension", "no layer")], ("9 radii", "1e-7", "recipe"),
+PARTS = ("recipe", "no extension", "no layer")
+MODELS = [*[(*PAPER[:2], v) for v in PARTS], ("5 radii", "1e-5", "recipe"), ("5 radii", "1e-7", "recipe"),
+          *[("5 radii", "1e-10", v) for v in PARTS], ("9 radii", "1e-7", "recipe"),
           *[("9 radii", "1e-10", v) for v in VARIANTS]]
 SHOWN = (0.6, 0.8, 1.0)                           # the loads at which S3's fields are asked for
 SPAN_FLOOR = 1e-9                                 # singular values below this share of the first are no directions
@@ -46,9 +47,10 @@ def train(runs, size, model, ranks=1):
     path = runs.path(f"{name_of(model)}.h5")
     if os.path.exists(path):
         os.remove(path)
+    values = ",".join(f"{r:g}" for r in RADII[radii])
     try:
-        return runs.hyco(f"{name_of(model)}-train", "train", *size.scene, "-values_radius", ",".join(f"{r:g}" for r in RADII[radii]),
-                         "-values_load", LOADS, "-hyco_snapshots", store(runs, size), "-model", path, "-hyco_pod_tol", tol,
+        return runs.hyco(f"{name_of(model)}-train", "train", *size.scene, "-values_radius", values, "-values_load", LOADS,
+                         "-hyco_snapshots", store(runs, size), "-model", path, "-hyco_pod_tol", tol,
                          *VARIANTS[variant], ranks=ranks)
     except RunError as error:
         return {"refused": error.reason}
@@ -101,17 +103,28 @@ def predicted(runs, model):
 # ------------------------------------------------------------------------------------------------ errors
 
 def worst(entry, contact):
-    """Over the steps with contact: the largest errors, the RID's shares of the force, what did not converge."""
+    """Over the steps with contact: the largest errors, times, what did not converge."""
     table = entry["table"]
     steps = contact & (table["converged"] > 0.5)
     found = {key: largest(table[key][steps]) for key in ("error_u_rid", "error_sigma_11", "error_lambda_rid", "error_u")}
     found["failed"] = int((contact & (table["converged"] < 0.5)).sum())
     found["failed_without"] = int((~contact & (table["converged"] < 0.5)).sum())
-    share = table["covered_force"][contact]
-    found["share"] = (share.min(), share.max())
     found["speedup"] = entry["compare"]["speedup"]["median"]
     found["ramp"] = table["seconds_full_order"].sum() / table["seconds_reduced"].sum()
     found["ms"], found["full_ms"] = (1e3 * np.median(table[f"seconds_{key}"]) for key in ("reduced", "full_order"))
+    return found
+
+
+def shares(runs, model, loads=SHOWN):
+    """Of the full-order contact force of S3, what the contacts of a model's RID carry."""
+    found = []
+    with h5py.File(runs.path(f"{name_of(model)}.h5"), "r") as h:
+        slave, own = h["problem/pairs/slave"][:].ravel(), h["problem/in_rid"][:].ravel() > 0
+        node_id = h["whole/node_id"][:].ravel()[h["mesh/node_whole"][:].ravel()[slave[own]]]
+    for load in loads:
+        with h5py.File(runs.path(f"{field_name(load)}.h5"), "r") as h:
+            force = h["contact/lambda"][:].ravel()
+            found.append(force[np.isin(h["contact/node_id"][:].ravel(), node_id)].sum() / force.sum())
     return found
 
 

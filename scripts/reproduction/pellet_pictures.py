@@ -95,6 +95,7 @@ def loads(ax, runs, model, mesh):
         names = bytes(h["whole/group_name"][:].ravel().astype(np.uint8)).decode().split("\n")
         facets, group = h["whole/facets"][:], h["whole/facet_group"][:].ravel()
     clad = cladding_of(mesh)
+    ax.computed_zorder = False                    # the loaded surfaces last
     for chosen, colour in ((~clad, "#e9dfd2"), (clad, "#cfd8e3")):
         plot.draw_faces(ax, mesh.xyz, mesh.skin(chosen)[0], 3, facecolors=colour, edgecolors="none")
     for name, colour in (("pellet_top", ORANGE), ("clad_outer_high", VIOLET), ("clad_outer_low", plot.RED)):

@@ -17,6 +17,9 @@ def run(runs, size):
     found = {"entries": {m: task.result() for m, task in entries.items()}, "ramp": full.result()}
     for task in shown:
         task.result()
+    for model, entry in found["entries"].items():
+        if "compare" in entry:
+            entry["shares"] = pellet.shares(runs, model)
     found["contact"] = found["ramp"]["total_contact_force"] > 0
     found["fields"] = {m: fields_of(runs, m) for m in size.models if "compare" in found["entries"][m]}
     for m in (pellet.PAPER, pellet.FINE):
@@ -79,7 +82,7 @@ def measured(entry, contact):
     note = f" (not converged at {w['failed']} of {contact.sum()} steps)" if w["failed"] else ""
     return [f"{t['n_modes']} / {t['n_stress_modes']} / {t['n_force_modes']}", f"{percent(t['rid_fraction'])} %",
             one(w["error_u_rid"]) + note, one(w["error_sigma_11"]), one(w["error_lambda_rid"]),
-            f"{percent(w['share'][0])} to {percent(w['share'][1])}", f"{w['speedup']:.2g}"]
+            " / ".join(percent(share) for share in entry["shares"]), f"{w['speedup']:.2g}"]
 
 
 def one(value):
@@ -114,20 +117,24 @@ def report(runs, size, found, folder):
     contact, b = found["contact"], found["bounds"]
     second, touching = found["history"]
     fine = pellet.worst(found["entries"][pellet.FINE], contact)
-    allowed = [key for key, paper_s in (("displacement", 0.01), ("stress", 0.05))
-               if max(s["u" if key == "displacement" else "sigma"] for s in b["steps"]) > paper_s]
-    values = {"excluded": " and ".join(allowed) or "neither", "folder": folder, "mesh": size.mesh, "numbers": table(*numbers(found)), "bounds": table(*bound_rows(found)),
+    values = {"folder": folder, "mesh": size.mesh, "numbers": table(*numbers(found)), "bounds": table(*bound_rows(found)),
               "first": np.flatnonzero(contact)[0] + 1, "contacts": contact.sum(), "second": f"{second:.0e}",
-              "touching": touching, "dimension": b["dimension"], "least": percent(max(s["u"] for s in b["steps"])),
-              "least_sigma": percent(max(s["sigma"] for s in b["steps"])),
-              "projection": percent(max(s["projection"] for s in b["steps"])),
-              "five": radii_of("5 radii"), "nine": radii_of("9 radii"), "refusals": refusals(found),
-              "without": effects(found, "no extension"), "layers": effects(found, "no layer"),
-              "ms": f"{fine['ms']:.3g}", "ramp": f"{fine['ramp']:.2g}", "speed": f"{fine['speedup']:.2g}",
-              "full_ms": f"{fine['full_ms']:.3g}",
-              "force": f"{found['ramp']['total_contact_force'][-1]:.1f}", "shown": ", ".join(", ".join(m[:2]) for m in shown_models(found)) }
+              "touching": touching, "dimension": b["dimension"], "five": radii_of("5 radii"), "nine": radii_of("9 radii"),
+              "refusals": refusals(found), "without": effects(found, "no extension"), "layers": effects(found, "no layer"),
+              "fine_u": one(fine["error_u_rid"]), "fine_sigma": one(fine["error_sigma_11"]), "ms": f"{fine['ms']:.3g}",
+              "full_ms": f"{fine['full_ms']:.3g}", "ramp": f"{fine['ramp']:.2g}",
+              "force": f"{found['ramp']['total_contact_force'][-1]:.1f}",
+              "shown": "; ".join(", ".join(m[:2]) for m in shown_models(found))}
+    values.update(bound_values(b))
     values.update(part_values(found))
     return pellet_text.TEXT.format(**values)
+
+
+def bound_values(b):
+    """The largest bounds of the steps, and which of the paper's numbers they exclude."""
+    u, sigma = (max(s[key] for s in b["steps"]) for key in ("u", "sigma"))
+    excluded = [name for name, low, paper in (("displacement", u, 0.01), ("stress", sigma, 0.05)) if low > paper]
+    return {"least": percent(u), "least_sigma": percent(sigma), "excluded": " and ".join(excluded) or "neither"}
 
 
 def radii_of(name):
@@ -147,9 +154,9 @@ def effects(found, variant):
         whole = found["entries"].get((*m[:2], "recipe"))
         if m[2] != variant or not whole or "compare" not in whole:
             continue
-        told.append(f"{m[0]}, {m[1]}: {said(whole, found['contact'])} with it, "
-                    + ("refused" if "compare" not in entry else said(entry, found["contact"])) + " without")
-    return "; ".join(told)
+        told.append([m[0], m[1], said(whole, found["contact"]),
+                     "refused" if "compare" not in entry else said(entry, found["contact"])])
+    return table(["trained on", "energy left", "with", "without"], told)
 
 
 def said(entry, contact):

@@ -10,6 +10,7 @@ from runs import load_script
 
 plot = load_script("plot")
 VIOLET, ORANGE = "#7a4fa3", "#e08a1e"
+LARGE = 140000                                    # bytes of a picture
 
 
 class Pictures:
@@ -20,13 +21,18 @@ class Pictures:
         os.makedirs(folder, exist_ok=True)
 
     def save(self, fig, name):
-        """In 256 colours: a third of the bytes."""
+        """Large ones in 256 colours: a third of the bytes."""
         whole = io.BytesIO()
         fig.savefig(whole, format="png", dpi=100)
         plt.close(fig)
+        path = os.path.join(self.folder, name)
+        if whole.tell() <= LARGE:
+            with open(path, "wb") as file:
+                file.write(whole.getvalue())
+            return
         with Image.open(whole) as picture:
-            picture.convert("RGB").quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(
-                os.path.join(self.folder, name), optimize=True)
+            few = picture.convert("RGB").quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+            few.save(path, optimize=True)
 
 
 def rope_of(runs, name):
