@@ -188,7 +188,8 @@ def least_maximum(A, b, its=300):
 
 def bounds(runs, size, loads=SHOWN):
     """What the solutions of S1 and S2 can tell of S3 at best: the projection on the whole mesh, and the least error that
-    any coefficients leave on those unknowns of the paper's RID that its modes describe, and in its cells made of them."""
+    any coefficients leave on those unknowns of the paper's RID that its modes describe, and in its cells of the cladding
+    made of them (the pellet's strains depend on its radius, so that its stresses are not those of the snapshots)."""
     radii = RADII["S1 + S2"]
     (U, s), sigma = basis(snapshots(runs, size, radii, "U")), snapshots(runs, size, radii, "sigma")
     U, (S, t) = U[:, s > SPAN_FLOOR * s[0]], basis(sigma)
@@ -196,12 +197,13 @@ def bounds(runs, size, loads=SHOWN):
     with h5py.File(runs.path(f"{name_of(PAPER)}.h5"), "r") as h:
         node, cell = h["mesh/node_whole"][:].ravel(), h["mesh/cell_whole"][:].ravel()
         order_n, order_c = h["whole/node_id"][:].ravel(), h["whole/cell_id"][:].ravel()
+        clad = outside(h["whole/xyz"][:][h["whole/cells"][:]])[cell]
         role, full, cells = h["problem/role"][:].ravel(), h["problem/fe_dof"][:].ravel(), h["mesh/cells"][:]
     inside = role > 0                                          # the RID's own nodes; others only carry contacts
     modal = np.ones((len(node), 3), bool)
     modal.reshape(-1)[full] = False
     rows = (3 * node[:, None] + np.arange(3))[modal & inside[:, None]]
-    own = cell[modal[cells].all(axis=(1, 2))]
+    own = cell[modal[cells].all(axis=(1, 2)) & clad]
     found = {"dimension": U.shape[1], "dimension_sigma": S.shape[1], "steps": []}
     for load in loads:
         with h5py.File(runs.path(f"{field_name(load)}.h5"), "r") as h:
@@ -213,6 +215,12 @@ def bounds(runs, size, loads=SHOWN):
         found["steps"].append({"load": load, "projection": np.linalg.norm(u - U @ (U.T @ u)) / np.linalg.norm(u),
                                "u": u_low, "sigma": s_low})
     return found
+
+
+def outside(corners):
+    """The cells of the cladding, by their corners: outside radius 4.1 as drawn."""
+    middle = corners.mean(axis=1)
+    return np.hypot(middle[:, 0], middle[:, 1]) > 4.1
 
 
 def in_order(values, ids, wanted):

@@ -60,9 +60,7 @@ def bar(fig, drawn, ax, label):
 
 
 def cladding_of(mesh):
-    """The cells of the cladding: outside radius 4.1 as drawn."""
-    middle = mesh.xyz[mesh.cells].mean(axis=1)
-    return np.hypot(middle[:, 0], middle[:, 1]) > 4.1
+    return pellet.outside(mesh.xyz[mesh.cells])
 
 
 # ------------------------------------------------------------------------------------------------ figure 13
@@ -121,7 +119,7 @@ def figure_14(runs, model, pictures):
     fig, axes = panels(2, 4)
     for ax, k in zip(axes.ravel(), numbers):
         values = m.V[:, k].reshape(-1, 3)[:, 0]
-        largest = abs(values[np.unique(m.whole.cells[clad])]).max() or 1.0
+        largest = np.percentile(abs(values[np.unique(m.whole.cells[clad])]), 99)
         coloured(ax, m.whole, clad, values / largest, False, Normalize(-1, 1), "RdBu_r")
         ax.set_title(f"mode {k + 1} of {m.V.shape[1]}", fontsize=9)
         bare(ax, m.whole.xyz)

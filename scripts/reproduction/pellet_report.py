@@ -82,7 +82,7 @@ def measured(entry, contact):
     note = f" (not converged at {w['failed']} of {contact.sum()} steps)" if w["failed"] else ""
     return [f"{t['n_modes']} / {t['n_stress_modes']} / {t['n_force_modes']}", f"{percent(t['rid_fraction'])} %",
             one(w["error_u_rid"]) + note, one(w["error_sigma_11"]), one(w["error_lambda_rid"]),
-            " / ".join(percent(share) for share in entry["shares"]), f"{w['speedup']:.2g}"]
+            " / ".join(percent(share) for share in entry["shares"]), f"{w['speedup']:.{0 if w['speedup'] > 10 else 1}f}"]
 
 
 def one(value):

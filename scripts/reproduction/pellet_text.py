@@ -3,10 +3,11 @@
 TEXT = """\
 # Section 7: the pellet in its cladding
 
-Mesh {mesh}. S1, S2 and S3 are the radii 4.10 (no gap), 4.02 and 4.06, each over 25 load steps. 5 radii: {five}; 9: {nine};
-S3's is never among them. Errors are those of S3, in percent: the largest error over the RID divided by the largest value
-there, and of these the largest over all of its {contacts} steps with contact (from step {first} on). Before contact there are no forces, and
-nothing is divided by them. *Recipe* is the paper's RID: DEIM points of displacements, stresses and generalised forces, the top of the
+Mesh {mesh}. S1, S2 and S3 are the radii 4.10 (no gap), 4.02 and 4.06, each over 25 load steps. 5 radii: {five};
+9 radii: {nine}; S3's is never among them.
+
+Errors are those of S3, in percent: the largest error over the RID divided by the largest value there, and of these the largest
+over all of its {contacts} steps with contact (from step {first} on). Before contact there are no forces, and nothing is divided by them. *Recipe* is the paper's RID: DEIM points of displacements, stresses and generalised forces, the top of the
 pellet, contact nodes within 0.1 mm, one layer.
 
 {numbers}
@@ -24,14 +25,13 @@ that solves with a new matrix in each iteration (and its 8.5 on the rope as well
   from the same two. Elastic bodies, one ramp and frictionless contact leave no room for more.
 - S3 is not in that span, whatever the reduced model does. The table has the relative error of its projection on all of it, and for the
   RID the least largest error that any coefficients leave: on the unknowns that the modes describe (those on the contact are
-  full order and may be exact), and on the stress of the elements made of these alone. The bounds hold for displacement and
+  full order and may be exact), and on the stress of the cladding's elements made of these alone. The bounds hold for displacement and
   stress each by itself, by whatever weights make them largest.
 
 {bounds}
 No model with these modes has a displacement error over the RID below {least} %, where the paper states 1, or a stress error
 below {least_sigma} %, where it states 5: the bounds exclude its number for {excluded}. Its snapshots seem to hold more than its
-text says. On 9 radii at 1e-10 the same recipe
-has {fine_u} and {fine_sigma} %:
+text says. On 9 radii at 1e-10 the same recipe has {fine_u} and {fine_sigma} %:
 
 ![errors by step]({folder}/pellet-errors.png)
 
@@ -46,7 +46,6 @@ need not fall for it, since it is taken over another RID, which the modes must e
 **Without the layer**:
 
 {layers}
-
 Accuracy is not monotone in modes, radii or layers: DEIM's few elements move with each, and so does the share of the contact that
 can be computed. Judge by the worst over all steps, never by one.
 
@@ -63,7 +62,7 @@ snapshots by numpy; {outside} of the elements found so are outside of the RID th
 
 ![figure 14]({folder}/figure-14.png)
 
-The first six and the last, component 1, each scaled to its largest value; as in the paper, later modes have larger gradients.
+The first six and the last, component 1, each scaled to what one node in a hundred exceeds; as in the paper, later modes have larger gradients.
 
 ## Figures 15 and 16: S3 at full load, reduced beside full order
 

@@ -31,7 +31,7 @@ class Pictures:
                 file.write(whole.getvalue())
             return
         with Image.open(whole) as picture:
-            few = picture.convert("RGB").quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+            few = picture.convert("RGB").quantize(256, method=Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE)
             few.save(path, optimize=True)
 
 
