@@ -7,7 +7,8 @@ Mesh {mesh}. S1, S2 and S3 are the radii 4.10 (no gap), 4.02 and 4.06, each over
 9 radii: {nine}; S3's is never among them.
 
 Errors are those of S3, in percent: the largest error over the RID divided by the largest value there, and of these the largest
-over all of its {contacts} steps with contact (from step {first} on). Before contact there are no forces, and nothing is divided by them. *Recipe* is the paper's RID: DEIM points of displacements, stresses and generalised forces, the top of the
+over all of its {contacts} steps with contact (from step {first} on). Before contact there are no forces, and nothing
+is divided by them. *Recipe* is the paper's RID: DEIM points of displacements, stresses and generalised forces, the top of the
 pellet, contact nodes within 0.1 mm, one layer.
 
 {numbers}
