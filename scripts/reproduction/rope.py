@@ -16,7 +16,7 @@ PROJECTION = ("-hyco_model_type", "projection")
 
 # name: options of train on the 10 x 12 grid
 REGULAR = {"rank": ("-hyco_hybrid", "rank"), "all": ("-hyco_hybrid", "all"), "fine": FINE_GRID, "pb9": PROJECTION,
-           "pb14": (*PROJECTION, "-hyco_pod_tol", "6e-9")}
+           "pb14": (*PROJECTION, "-hyco_pod_tol", "6e-9"), "pb-dual": (*PROJECTION, "-hyco_dual", "snapshots")}
 GREEDY = {"greedy-paper": PAPER_GREEDY, "greedy-1e-12": (*PAPER_GREEDY, "-hyco_pod_tol", "1e-12"),
           "greedy-fine": FINE_GREEDY,
           "greedy-pb": (*PROJECTION, "-hyco_pod_tol", "1e-10", "-hyco_greedy_indicator", "penetration")}

@@ -1,12 +1,16 @@
 """Section 6: the pictures, by scripts/plot where it has them."""
+import io
 import os
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.lines import Line2D
+from PIL import Image
 from runs import load_script
 
 plot = load_script("plot")
 VIOLET, ORANGE = "#7a4fa3", "#e08a1e"
+LARGE = 140000                                    # bytes of a picture
 
 
 class Pictures:
@@ -17,8 +21,18 @@ class Pictures:
         os.makedirs(folder, exist_ok=True)
 
     def save(self, fig, name):
-        fig.savefig(os.path.join(self.folder, name), format="png", dpi=100)
+        """Large ones in 256 colours: a third of the bytes."""
+        whole = io.BytesIO()
+        fig.savefig(whole, format="png", dpi=100)
         plt.close(fig)
+        path = os.path.join(self.folder, name)
+        if whole.tell() <= LARGE:
+            with open(path, "wb") as file:
+                file.write(whole.getvalue())
+            return
+        with Image.open(whole) as picture:
+            few = picture.convert("RGB").quantize(256, method=Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE)
+            few.save(path, optimize=True)
 
 
 def rope_of(runs, name):
@@ -106,13 +120,19 @@ def point_solutions(runs, pictures, name, models):
 
 
 def history(panels, pictures, name):
-    """panels: a title and curves (label, iterations, values, style, colour), two panels a row."""
+    """panels: a title and curves (label, iterations, values, style, colour), two panels a row; perhaps one more curve, that
+    has its own axis."""
     rows = (len(panels) + 1) // 2
     fig, axes = plt.subplots(rows, 2, figsize=(12, 4.4 * rows), squeeze=False, constrained_layout=True)
-    for ax, (title, curves) in zip(axes.ravel(), panels):
+    for ax, (title, curves, *other) in zip(axes.ravel(), panels):
         for label, iterations, values, style, colour in curves:
             ax.semilogy(iterations, 100 * np.array(values), style, ms=4, lw=1.4, color=colour, label=label)
         ax.set(title=title, xlabel="iteration", ylabel="mean relative error [%]")
         ax.grid(alpha=0.3, which="major")
+        for label, iterations, values, style, colour in other:
+            right = ax.twinx()
+            drawn = right.semilogy(iterations, values, style, lw=1.4, color=colour, label=label)
+            right.set(ylabel="mean penetration, 2-norm")
+            ax.add_line(Line2D([], [], ls=style, color=colour, label=drawn[0].get_label()))
         ax.legend(fontsize=8)
     pictures.save(fig, name)

@@ -10,7 +10,7 @@ BLUE, RED, GREEN = draw.plot.BLUE, draw.plot.RED, draw.plot.GREEN
 
 
 def percent(value):
-    return f"{100 * value:.2g}" if value < 1 else f"{100 * value:.0f}"
+    return f"{100 * value:.2g}" if value < 0.995 else f"{100 * value:.0f}"
 
 
 def spread(report, key):
@@ -122,7 +122,9 @@ def figure_11(runs, found):
             lines.append(line(found, "hr-on-pb", rebuilt, "hybrid, eps 1e-10, reconstructed", "o--", draw.ORANGE))
         return title, lines
 
-    return [panel("A: displacement, 2-norm", "error_u", None),
+    table_of = rope.indicators(runs, "greedy-pb")
+    shown = ("indicator (45), a length (right)", table_of["iteration"], table_of["mean_eta_u"], "--", "#777777")
+    return [(*panel("A: displacement, 2-norm", "error_u", None), shown),
             panel("B: contact forces, 2-norm", "error_lambda_rid", "error_lambda")]
 
 
@@ -144,6 +146,7 @@ def numbers(found):
     ours("`" + words(rope.FINE_GRID) + "`", grid["fine"])
     ours("projection-based", grid["pb9"])
     ours("projection-based, `-hyco_pod_tol 6e-9`", grid["pb14"])
+    ours("projection-based, `-hyco_dual snapshots`", grid["pb-dual"])
     rows.append(["**paper**, greedy, 50 iterations", 54, "", "", "0.004 / 0.077", "0.34 / 10", "1.3 / 18", "", ""])
     ours("its thresholds: `" + words(rope.PAPER_GREEDY) + "`", greedy["greedy-paper"])
     ours("the same with `-hyco_pod_tol 1e-12`", greedy["greedy-1e-12"])
@@ -223,7 +226,8 @@ def regular_values(found):
         return percent(grid[name]["point"][1][key]["mean"])
 
     return {"modes": t["n_modes"], "a": t["rid_a_nodes"], "nodes": t["rid_nodes"], "dual": t["n_dual_modes"],
-            "pb14": grid["pb14"]["train"]["n_modes"], "covered": percent(c["covered_force"]["mean"]),
+            "pb14": grid["pb14"]["train"]["n_modes"], "pb_dual_modes": grid["pb-dual"]["train"]["n_modes"],
+            "pb_dual_vectors": grid["pb-dual"]["train"]["n_dual_modes"], "covered": percent(c["covered_force"]["mean"]),
             "least": percent(c["covered_force"]["min"]), "rank_fe": grid["rank"]["train"]["n_fe_dofs"],
             "point_covered": percent(grid["all"]["point"][0]["covered_force"]), "rid_force": percent(c["error_lambda_rid"]["mean"]),
             "all_force": percent(c["error_lambda"]["mean"]), "pb_force": percent(p["error_lambda"]["mean"]),

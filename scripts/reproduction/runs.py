@@ -8,12 +8,24 @@ import subprocess
 
 SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 HYCO = os.environ.get("HYCO", os.path.join(SOURCE, "build", "hyco"))
+MPIEXEC = os.environ.get("MPIEXEC", "mpiexec")
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1",
                "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
 
 class RunError(Exception):
-    """A run that wrote no report, in one line."""
+    """A run that wrote no report, in one line; `reason` is hyco's own."""
+
+    def __init__(self, what, reason):
+        super().__init__(f"{what}: {reason}")
+        self.reason = reason
+
+
+def reason_of(stderr):
+    """The line with which hyco ended; the last line where it had none."""
+    lines = stderr.strip().splitlines() or ["no message"]
+    own = [line.split("hyco: error: ", 1)[1] for line in lines if "hyco: error: " in line]
+    return (own or lines)[-1]
 
 
 class Runs:
@@ -27,17 +39,18 @@ class Runs:
     def path(self, *names):
         return os.path.join(self.folder, *names)
 
-    def hyco(self, name, command, *options):
+    def hyco(self, name, command, *options, ranks=1):
         """The report NAME.json of one run. A comparison with points that did not converge ends with an error and still
         has a report, which counts them; any other command must succeed."""
         report = self.path(f"{name}.json")
         if os.path.exists(report):
             os.remove(report)
         words = [HYCO, command, *(str(o) for o in options), "-report", report]
+        if ranks > 1:
+            words = [MPIEXEC, "--oversubscribe", "-n", str(ranks), *words]
         run = subprocess.run(words, cwd=SOURCE, env=ENVIRONMENT, capture_output=True, text=True, check=False)
         if not os.path.exists(report) or (run.returncode and command != "compare"):
-            reason = (run.stderr.strip().splitlines() or ["no message"])[-1]
-            raise RunError(f"hyco {command} ({name}) ended with {run.returncode}: {reason}")
+            raise RunError(f"hyco {command} ({name}) ended with {run.returncode}", reason_of(run.stderr))
         with open(report, encoding="utf-8") as file:
             return json.load(file)
 

@@ -175,7 +175,10 @@ class Greedy(Case):
             file.write('mu1,mu2\n0.05,0\n0.1,0.1\n0.15,0.2\n')
         for options, words in (
                 (('-training_grid', '20'), '-training_grid has 1 numbers; the scene has 2 parameters: mu1,mu2'),
+                (('-training_grid', '20,24,3'), '-training_grid has 3 numbers; the scene has 2 parameters: mu1,mu2'),
                 (('-training_grid', '4,4', '-target', 0), '-target is 0'),
+                (('-training_grid', '4,4', '-target', 'nan'), '-target is "nan"'),
+                (('-training_grid', '20,1'), 'the grid has 1 points for mu2; at least 2 are needed'),
                 (('-training_grid', '1,1'), 'the grid has 1 points for mu1; at least 2 are needed'),
                 (('-training_grid', '1,1', '-grid_type', 'centred'), 'has 1 training point'),
                 (('-training_grid', '4,4', '-max_snapshots', 3), 'starts from 4 already'),

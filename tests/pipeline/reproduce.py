@@ -21,7 +21,7 @@ class Reproduce(Case):
     def test_help(self):
         run = reproduce('--help')
         self.assertEqual(run.returncode, 0, run.stderr)
-        for word in ('rope', '--output', '--docs', '--quick'):
+        for word in ('rope', 'pellet', 'all', '--output', '--docs', '--quick'):
             self.assertIn(word, run.stdout)
 
     def test_refusals(self):
@@ -59,6 +59,38 @@ class Reproduce(Case):
         self.assertEqual({h['run'] for h in histories}, {'greedy-paper', 'greedy-fine', 'greedy-pb', 'pb-on-paper', 'hr-on-pb'})
         for h in histories:
             self.assertGreater(float(h['u']), 0, h)
+
+    def test_pellet(self):
+        """Mesh A: the table carries what compare found over the steps with contact; the span of S1 and S2 bounds their model."""
+        out, docs = self.path('pellet'), self.path('pellet-docs')
+        run = reproduce('pellet', '--quick', '--output', out, '--docs', docs)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        with open(os.path.join(docs, 'reproduction.md'), encoding='utf-8') as file:
+            text = file.read()
+        pictures = re.findall(r'\]\((reproduction/[^)]+\.png)\)', text)
+        self.assertEqual(len(pictures), 5)
+        for name in pictures:
+            with open(os.path.join(docs, name), 'rb') as file:
+                self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n', name)
+        with open(os.path.join(out, 'pellet-numbers.csv'), encoding='utf-8', newline='') as file:
+            rows = {(row['trained on'], row['RID']): row for row in csv.DictReader(file)}
+        with open(os.path.join(out, 'pellet-bounds.csv'), encoding='utf-8', newline='') as file:
+            bounds = list(csv.reader(file))[1:]
+        paper, fine = rows[('S1 + S2', 'recipe')], rows[('9 radii', 'recipe')]
+        error = float(paper['displacement'])
+        with open(os.path.join(out, 'pellet-S1+S2-1e-5-recipe.csv'), encoding='ascii', newline='') as file:
+            steps = [row for row in csv.DictReader(file) if float(row['load']) > 0.46]  # contact from step 12 on
+        self.assertEqual(len(steps), 14)
+        self.near(error / 100, max(float(row['error_u_rid']) for row in steps), 0.06)
+        self.assertIn('14 steps with contact (from step 12 on)', text)
+        # S1 and S2 span four dimensions; on mesh A by an independent computation S3 is about 6 % away in the 2-norm
+        self.assertIn('they span 4 dimensions', text)
+        self.assertEqual([row[0] for row in bounds], ['0.6', '0.8', '1'])
+        self.near(float(bounds[-1][1]), 5.5, 0.2)
+        self.assertGreater(float(bounds[-1][2]), 1)      # the paper's error is out of reach
+        self.assertLess(float(bounds[-1][2]), error)     # and a bound is none if the model beats it
+        self.assertLess(float(fine['displacement']), 0.1 * error)
+        self.assertIn('; 0 of the elements found so are outside', text)
 
 
 if __name__ == '__main__':
