@@ -23,6 +23,9 @@ static const HycoOption own[] = {
     {"target", "<real>", "1e-3", "greedy: stop when the indicator is no larger anywhere on that grid"},
     {"max_snapshots", "<int>", "0", "greedy: stop with so many solutions (0: no limit)"},
     {"max_seconds", "<real>", "0", "greedy: stop after the iteration in which this has passed (0: no limit)"},
+    {"extrapolate", "", "", "predict outside the trained ranges too, where nothing has tested the model"},
+    {"target_u", "<real>", "", "predict -hyco_fallback: solve full order where the estimated error of u is above this"},
+    {"target_lambda", "<real>", "", "the same for the contact forces"},
     {"output", "<file.xdmf>", "", "fields for ParaView; the numbers in the .h5 beside it"},
     {"report", "<file.json>", "", "the result as one JSON object"},
     {"table", "<file.csv>", "", "a line per point"},
@@ -120,9 +123,10 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
 /* An option of the reduction given where nothing is reduced. */
 static PetscErrorCode CheckTraining(const Command *command, const char name[])
 {
-  static const char *const training[] = {"hyco_model_type",    "hyco_dual",      "hyco_nnmf_",   "hyco_pod_",
-                                         "hyco_deim_",         "hyco_rid_",      "hyco_hybrid",  "hyco_scan",
-                                         "hyco_keep_singular", "hyco_snapshots", "hyco_greedy_", NULL};
+  static const char *const training[] = {
+      "hyco_model_type", "hyco_dual",   "hyco_nnmf_", "hyco_pod_",          "hyco_deim_",
+      "hyco_rid_",       "hyco_hybrid", "hyco_scan",  "hyco_keep_singular", "hyco_snapshots",
+      "hyco_greedy_",    "hyco_trust_", NULL};
 
   PetscFunctionBegin;
   if (command->run == CommandTrain) PetscFunctionReturn(PETSC_SUCCESS);

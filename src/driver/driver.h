@@ -86,6 +86,26 @@ typedef struct {
 PetscErrorCode DriverReadGreedy(HycoScene scene, HycoTrainer trainer, HycoSamples *training, GreedyLog *log);
 void DriverReportGreedy(cJSON *json, const GreedyLog *log);
 
+/* -- fallback.c: predict -hyco_fallback -- */
+
+/* When predict solves full order instead, and with what. */
+typedef struct {
+  PetscBool on;
+  PetscReal target_u, target_lambda; /* 0: none */
+  HycoScene scene;                   /* NULL unless on */
+  HycoFOM fom;                       /* made by the first solve */
+} Fallback;
+
+/* A relative error above 0 and at most 1; 0 when absent. */
+PetscErrorCode DriverReadTarget(const char name[], PetscReal *target);
+/* Reads the options and the scene, which must be the model's. Collective. */
+PetscErrorCode DriverReadFallback(HycoModel model, PetscBool extrapolate, Fallback *fallback);
+PetscErrorCode DriverEndFallback(Fallback *fallback);
+/* Why this prediction is not enough; "": it is. */
+void DriverWantsFullOrder(const Fallback *fallback, const HycoPrediction *p, char why[DRIVER_LINE]);
+/* Solves at mu (length n); the results take the prediction's place, u over the whole mesh. Collective. */
+PetscErrorCode DriverSolveFullOrder(Fallback *fallback, PetscInt n, const PetscReal mu[], HycoPrediction *p);
+
 PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);
 PetscErrorCode CommandPredict(void);

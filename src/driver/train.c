@@ -41,6 +41,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
   ReportScan(json, &t->scan, n_par);
   cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
   cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
+  cJSON_AddNumberToObject(json, "held_out_predictions", t->n_held);
   if (t->type == HYCO_MODEL_PROJECTION) {
     cJSON_AddNumberToObject(json, "n_supremizers", t->n_supremizers);
     cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);

@@ -16,6 +16,7 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   t->nnmf_max_its = 100;
   t->greedy.target = 1e-3;
   t->ridge = -1;
+  t->folds = 3;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *trainer = t;
@@ -195,6 +196,9 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   PetscCall(HycoOptionsReal(o, "hyco_hybrid_ridge", -1, 1, &t->ridge));
   PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
   PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
+  PetscCall(HycoOptionsInt(o, "hyco_trust_folds", 0, 1000, &t->folds));
+  HycoCheck(t->folds != 1,
+            "-hyco_trust_folds is 1; one fold leaves nothing to train on: give 2 or more, or 0 for none");
   indicator = (PetscInt)t->greedy.indicator;
   PetscCall(HycoOptionsWord(o, "hyco_greedy_indicator", indicators, &indicator));
   t->greedy.indicator = (HycoIndicatorKind)indicator;
