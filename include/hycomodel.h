@@ -102,6 +102,9 @@ typedef struct {
    must have been solved at the same parameters, on the same mesh. */
 PetscErrorCode HycoModelCompare(HycoModel model, HycoFOM fom, HycoErrors *errors);
 
+/* Writes into the model's file, at `path`, how it was chosen: lines that HycoModelView() shows. Not collective. */
+PetscErrorCode HycoModelNote(const char path[], const char text[]);
+
 /* Prints what is in the model, in words, on an ASCII viewer. */
 PetscErrorCode HycoModelView(HycoModel model, PetscViewer viewer);
 

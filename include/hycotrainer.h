@@ -43,6 +43,37 @@ PetscErrorCode HycoTrainerSetProgress(HycoTrainer trainer, HycoProgress progress
    -hyco_keep_singular, for one whose reduced stiffness is singular inside the parameters' ranges. */
 PetscErrorCode HycoTrainerRun(HycoTrainer trainer, HycoSamples samples, const char path[], HycoTraining *training);
 
+/* In how many parts the training solutions are held out, one after the other, to calibrate the estimated errors of a
+   hybrid model (-hyco_trust_folds; default 3; 0: none). */
+PetscErrorCode HycoTrainerSetTrustFolds(HycoTrainer trainer, PetscInt folds);
+
+/* -- judging a model by stored solutions -- */
+
+typedef enum {
+  HYCO_ERROR_U,
+  HYCO_ERROR_U_RID,
+  HYCO_ERROR_SIGMA,
+  HYCO_ERROR_SIGMA_11,
+  HYCO_ERROR_LAMBDA,
+  HYCO_ERROR_LAMBDA_RID,
+  HYCO_N_ERRORS
+} HycoErrorKind;                           /* of HycoErrors, those without H1 */
+extern const char *const HycoErrorKinds[]; /* their words: u, u_rid, sigma, ...; NULL ends */
+
+/* Errors over a set of points, as fractions. Of contact forces (HYCO_ERROR_LAMBDA and _RID), those smaller than a tenth
+   of the largest of the set count as that tenth. PETSC_INFINITY where a solve did not converge. */
+typedef struct {
+  PetscInt n, not_converged;
+  PetscReal largest[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];
+  PetscReal
+      seconds; /* of an online solve, wall clock: the mean over the points, in their order, of each one's median */
+} HycoValidation;
+
+/* Predicts at each sample and compares with its solution, which must be in the store. `model` on every rank; the ranks
+   share the samples out. Collective on `comm`. */
+PetscErrorCode HycoModelValidate(MPI_Comm comm, HycoModel model, HycoSnapshots store, HycoSamples samples,
+                                 HycoValidation *validation);
+
 /* -- greedy training (section 5.4) -- */
 
 /* What judges a model where no full-order solution is known; the order of -hyco_greedy_indicator's words. */

@@ -23,6 +23,8 @@ extern const char *const HycoDuals[]; /* their words, as options and files have 
 
 /* What an estimate of the error is made of (trust.c): log(1 + feature / floor), a coefficient each, and a constant. */
 #define HYCO_TRUST_FEATURES 4
+/* Contact forces below this share of the largest of a set count as that much where errors are divided by them. */
+#define HYCO_SMALL_FORCE 0.1
 typedef struct {
   PetscInt n; /* held-out predictions behind it; 0: not calibrated */
   PetscReal floor[HYCO_TRUST_FEATURES];

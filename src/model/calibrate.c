@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #define SHARE      0.95
-#define FORCE      0.1  /* of the largest training force: what smaller ones' errors are divided by */
 #define SMALL      1e-2 /* of a feature's median: its floor */
 #define TRIALS     100  /* of a fold's search for full-order unknowns, where the user says nothing */
 #define NEGLIGIBLE 1e-3 /* of the errors' median: smaller ones count as that */
@@ -212,7 +211,7 @@ static PetscErrorCode FitAll(HycoTrainer t, PetscInt n, PetscReal rows[], HycoTr
   for (PetscInt i = 0; i < n; i++) error[i] = rows[i * N_ROW + U];
   PetscCall(FitError(trust, n, rows, error, trust->u));
   for (PetscInt i = 0; i < n; i++) {
-    const PetscReal size = PetscMax(rows[i * N_ROW + SIZE], FORCE * trust->force);
+    const PetscReal size = PetscMax(rows[i * N_ROW + SIZE], HYCO_SMALL_FORCE * trust->force);
 
     error[i] = size > 0 ? rows[i * N_ROW + LOST] / size : 0;
   }

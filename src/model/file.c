@@ -492,3 +492,18 @@ PetscErrorCode HycoModelRewrite(HycoModel m, const char path[])
   PetscCall(HycoModelSave(m, m->whole, m->V_whole, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode HycoModelNote(const char path[], const char text[])
+{
+  HycoModel m;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoModelLoad(path, &m));
+  PetscCall(PetscFree(m->search));
+  PetscCall(PetscStrallocpy(text, &m->search));
+  ierr = HycoModelRewrite(m, path);
+  PetscCall(HycoModelDestroy(&m));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

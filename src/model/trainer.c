@@ -81,6 +81,16 @@ PetscErrorCode HycoTrainerSetProgress(HycoTrainer t, HycoProgress progress, void
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoTrainerSetTrustFolds(HycoTrainer t, PetscInt folds)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  HycoCheck(folds >= 0 && folds != 1, "%d folds cannot calibrate: give 2 or more, or 0 for no estimated errors",
+            (int)folds);
+  t->folds = folds;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoTrainerSetGreedyMonitor(HycoTrainer t, HycoGreedyMonitor monitor, void *ctx)
 {
   PetscFunctionBegin;
@@ -197,8 +207,7 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
   PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
   PetscCall(HycoOptionsInt(o, "hyco_trust_folds", 0, 1000, &t->folds));
-  HycoCheck(t->folds != 1,
-            "-hyco_trust_folds is 1; one fold leaves nothing to train on: give 2 or more, or 0 for none");
+  PetscCall(HycoTrainerSetTrustFolds(t, t->folds));
   indicator = (PetscInt)t->greedy.indicator;
   PetscCall(HycoOptionsWord(o, "hyco_greedy_indicator", indicators, &indicator));
   t->greedy.indicator = (HycoIndicatorKind)indicator;
