@@ -68,6 +68,15 @@ static void Describe(const Attempt *a, char text[DRIVER_LINE])
     snprintf(text + at, DRIVER_LINE - (size_t)at, ", contact extension %s", a->option[EXTENSION]);
 }
 
+/* "1.2e-03", or "inf": a solve did not converge, or x/0. */
+static void Number(PetscReal value, char text[32])
+{
+  if (value > PETSC_MAX_REAL / 8)
+    snprintf(text, 32, "inf");
+  else
+    snprintf(text, 32, "%.3g", (double)value);
+}
+
 /* The errors that have a target: "u 0.0012, lambda 0.034". */
 static void DescribeErrors(const Search *s, const Attempt *a, char text[DRIVER_LINE])
 {
@@ -75,9 +84,11 @@ static void DescribeErrors(const Search *s, const Attempt *a, char text[DRIVER_L
 
   text[0] = '\0';
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    char number[32];
+
+    Number(a->v.largest[j], number);
     if (s->target[j] > 0 && at + 64 < DRIVER_LINE)
-      at += (size_t)snprintf(text + at, DRIVER_LINE - at, "%s%s %.2e", at ? ", " : "", HycoErrorKinds[j],
-                             (double)a->v.largest[j]);
+      at += (size_t)snprintf(text + at, DRIVER_LINE - at, "%s%s %s", at ? ", " : "", HycoErrorKinds[j], number);
   }
 }
 
@@ -118,12 +129,15 @@ static PetscErrorCode WriteTable(const Search *s)
   at += (size_t)snprintf(text + at, room - at, ",not_converged,seconds,meets,failure\n");
   for (PetscInt k = 0; k < s->n; k++) {
     const Attempt *a = &s->attempt[k];
+    char number[32];
 
     at += (size_t)snprintf(text + at, room - at, "%d,%s,%s,%s,%s,%d,%d,%.6g", (int)a->number, a->option[TYPE],
                            a->option[TOLERANCE], a->option[LAYERS], a->option[EXTENSION], (int)a->t.n_modes,
                            (int)a->t.rid_elements, (double)a->t.rid_fraction);
-    for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
-      at += (size_t)snprintf(text + at, room - at, ",%.6g", a->failure[0] ? NAN : (double)a->v.largest[j]);
+    for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+      Number(a->failure[0] ? NAN : a->v.largest[j], number);
+      at += (size_t)snprintf(text + at, room - at, ",%s", number);
+    }
     at += (size_t)snprintf(text + at, room - at, ",%d,%.6g,%d,\"%s\"\n", (int)a->v.not_converged,
                            a->failure[0] ? NAN : (double)a->v.seconds, Ratio(s, a, &worst) <= 1, a->failure);
   }
