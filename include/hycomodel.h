@@ -28,6 +28,11 @@ typedef struct {
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
   HycoKKT kkt;                                                     /* of the reduced system (38) or (44) */
   char method[64];                                                 /* what solved, in words */
+  /* An upper estimate of the relative errors of u (whole mesh, 2-norm) and of all contact forces (2-norm; a force below
+     a tenth of the largest in training counts as that tenth), calibrated at training; < 0: the model has none, or the
+     solve did not converge. */
+  PetscReal estimated_error_u, estimated_error_lambda;
+  PetscReal beyond; /* how far the parameters lie outside the ranges: the most, as a share of the parameter's range */
   HycoReason reason;
   HycoSeconds seconds;
 } HycoPrediction;
@@ -55,6 +60,9 @@ PetscErrorCode HycoModelCheckScene(HycoModel model, HycoScene scene);
 /* Solves (38) or (44) at mu (length n) and reconstructs the contact forces, (41) or V_lambda. Not collective. Fails
    outside the trained ranges; not converging is no error: see HycoPrediction.reason. */
 PetscErrorCode HycoModelPredict(HycoModel model, PetscInt n, const PetscReal mu[]);
+/* Whether Predict takes parameters outside the trained ranges (default: it refuses them). There the estimated errors
+   grow with the distance, and nothing has tested them. */
+PetscErrorCode HycoModelSetExtrapolate(HycoModel model, PetscBool extrapolate);
 /* Whether Predict reconstructs the forces outside the RID (default: yes). */
 PetscErrorCode HycoModelSetReconstruct(HycoModel model, PetscBool reconstruct);
 /* Called after each iteration of the active set. */
@@ -93,6 +101,9 @@ typedef struct {
 /* Collective on the full-order model's communicator; model on its rank 0 (NULL elsewhere), errors filled there. Both
    must have been solved at the same parameters, on the same mesh. */
 PetscErrorCode HycoModelCompare(HycoModel model, HycoFOM fom, HycoErrors *errors);
+
+/* Writes into the model's file, at `path`, how it was chosen: lines that HycoModelView() shows. Not collective. */
+PetscErrorCode HycoModelNote(const char path[], const char text[]);
 
 /* Prints what is in the model, in words, on an ASCII viewer. */
 PetscErrorCode HycoModelView(HycoModel model, PetscViewer viewer);

@@ -29,6 +29,15 @@ PetscErrorCode HycoSamplesAddPoint(HycoSamples samples, const PetscReal mu[]);
    Collective on the scene's communicator. */
 PetscErrorCode HycoSamplesAddFile(HycoSamples samples, const char path[]);
 
+/*
+  Splits a set into what is held out and the rest, both in the set's order: of the parameter with the fewest distinct
+  values (three or more, each shared by several points) the values number offset, offset + every, ... in ascending
+  order, with all their points; so that nothing that was kept lies next to what was held out, as a step of the same load
+  ramp would. Where no value is shared, every such point. The caller owns both new sets. Not collective.
+*/
+PetscErrorCode HycoSamplesHoldOut(HycoSamples samples, PetscInt every, PetscInt offset, HycoSamples *kept,
+                                  HycoSamples *held);
+
 /* Number of points and their values, point by point (n_points x n_parameters, row major). Borrowed. */
 PetscErrorCode HycoSamplesGet(HycoSamples samples, PetscInt *n_points, PetscInt *n_parameters, const PetscReal *mu[]);
 

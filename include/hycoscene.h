@@ -28,6 +28,9 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene);
 PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *const *names[], const PetscReal *lo[],
                                       const PetscReal *hi[]);
 
+/* Whether parameter values outside the ranges are refused (default) or taken. Not collective. */
+PetscErrorCode HycoSceneSetExtrapolate(HycoScene scene, PetscBool extrapolate);
+
 /* The scene's title (may be empty). Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[]);
 

@@ -22,6 +22,7 @@ typedef struct {
   PetscReal rid_fraction;                                                 /* share of the elements */
   PetscReal condition;             /* of the reduced stiffness, worst of the judged snapshots */
   PetscReal error_u, error_lambda; /* mean relative training errors, 2-norm, displacement and RID contact forces */
+  PetscInt n_held;                 /* held-out predictions that calibrate the estimated errors; 0: none */
   HycoScan scan;                   /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
@@ -41,6 +42,37 @@ PetscErrorCode HycoTrainerSetProgress(HycoTrainer trainer, HycoProgress progress
    Collective. `training` may be NULL. Fails for a model that misses its training solutions by half, and, unless
    -hyco_keep_singular, for one whose reduced stiffness is singular inside the parameters' ranges. */
 PetscErrorCode HycoTrainerRun(HycoTrainer trainer, HycoSamples samples, const char path[], HycoTraining *training);
+
+/* In how many parts the training solutions are held out, one after the other, to calibrate the estimated errors of a
+   hybrid model (-hyco_trust_folds; default 3; 0: none). */
+PetscErrorCode HycoTrainerSetTrustFolds(HycoTrainer trainer, PetscInt folds);
+
+/* -- judging a model by stored solutions -- */
+
+typedef enum {
+  HYCO_ERROR_U,
+  HYCO_ERROR_U_RID,
+  HYCO_ERROR_SIGMA,
+  HYCO_ERROR_SIGMA_11,
+  HYCO_ERROR_LAMBDA,
+  HYCO_ERROR_LAMBDA_RID,
+  HYCO_N_ERRORS
+} HycoErrorKind;                           /* of HycoErrors, those without H1 */
+extern const char *const HycoErrorKinds[]; /* their words: u, u_rid, sigma, ...; NULL ends */
+
+/* Errors over a set of points, as fractions. Of contact forces (HYCO_ERROR_LAMBDA and _RID), those smaller than a tenth
+   of the largest of the set count as that tenth. PETSC_INFINITY where a solve did not converge. */
+typedef struct {
+  PetscInt n, not_converged;
+  PetscReal largest[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];
+  PetscReal
+      seconds; /* of an online solve, wall clock: the mean over the points, in their order, of each one's median */
+} HycoValidation;
+
+/* Predicts at each sample and compares with its solution, which must be in the store. `model` on every rank; the ranks
+   share the samples out. Collective on `comm`. */
+PetscErrorCode HycoModelValidate(MPI_Comm comm, HycoModel model, HycoSnapshots store, HycoSamples samples,
+                                 HycoValidation *validation);
 
 /* -- greedy training (section 5.4) -- */
 

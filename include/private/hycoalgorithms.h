@@ -42,6 +42,14 @@ PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Petsc
                         PetscReal *residual);
 
 /*
+  c with y <= sum_j c_j X_j + c[p] for `share` of the rows that are held (the quantile number ceil(share (m + 1)) of m
+  of them), c_j >= 0 by least squares over all n rows. X: n x p row major; c: p + 1. At least one row must be held. Not
+  collective.
+*/
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], const PetscBool held[],
+                              PetscReal share, PetscReal c[]);
+
+/*
   Nonnegative factorisation S ~ W H by at most max_its alternations from the NNDSVD start: the same S, the same W. S: m
   x n column major, no entry negative (else an error). W (room for m x k, column major) receives n_vectors <= k columns
   of unit 2-norm, no entry negative; fewer than k when S has a smaller rank, none when S is zero. misfit = |S - W H|_F^2

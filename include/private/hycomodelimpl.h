@@ -21,6 +21,17 @@ typedef struct _n_HycoNorms *HycoNorms;
 typedef enum { HYCO_DUAL_FE, HYCO_DUAL_NNMF, HYCO_DUAL_SNAPSHOTS } HycoDual;
 extern const char *const HycoDuals[]; /* their words, as options and files have them; NULL ends */
 
+/* What an estimate of the error is made of (trust.c): log(1 + feature / floor), a coefficient each, and a constant. */
+#define HYCO_TRUST_FEATURES 4
+/* Contact forces below this share of the largest of a set count as that much where errors are divided by them. */
+#define HYCO_SMALL_FORCE 0.1
+typedef struct {
+  PetscInt n; /* held-out predictions behind it; 0: not calibrated */
+  PetscReal floor[HYCO_TRUST_FEATURES];
+  PetscReal u[HYCO_TRUST_FEATURES + 1], lambda[HYCO_TRUST_FEATURES + 1]; /* coefficients >= 0, then the constant */
+  PetscReal force; /* 2-norm of the largest contact forces in training: a tenth of it divides smaller ones' errors */
+} HycoTrust;
+
 struct _p_HycoModel {
   char path[PETSC_MAX_PATH_LEN]; /* "" while training */
   /* the reduced problem's description, as in the file */
@@ -46,6 +57,8 @@ struct _p_HycoModel {
   PetscInt counts[3]; /* modes of the dual, stress and force bases that seeded the RID; projection: force vectors,
                          supremizers among the l modes (the last, with singular value 0), 0 */
   HycoScan scan;
+  HycoTrust trust;
+  char *search;         /* how train -target_... chose it, in words; NULL: it was not chosen so */
   PetscReal numbers[3]; /* condition of the reduced stiffness, training errors of u and lambda */
   /* projection: the whole mesh is the RID; no full-order unknown, no dual snapshot */
   HycoModelType type;
@@ -115,6 +128,28 @@ PetscErrorCode HycoNormH1(HycoNorms norms, const PetscReal u[], const PetscReal 
    may be NULL. */
 PetscErrorCode HycoNormDual(HycoNorms norms, HycoModel model, PetscBool rid_only, const PetscReal L[],
                             const PetscReal minus[], PetscReal *norm);
+
+/* What tells of the last prediction's error without a full-order solution: feature[HYCO_TRUST_FEATURES], all >= 0. */
+PetscErrorCode HycoTrustMeasure(HycoModel model, PetscReal feature[]);
+/* The estimated errors of the last prediction, and how far outside the ranges it lies. */
+PetscErrorCode HycoTrustEstimate(HycoModel model, HycoPrediction *prediction);
+PetscErrorCode HycoTrustView(HycoModel model, PetscViewer viewer);
+/* Distance of two points, each parameter scaled to its range. */
+PetscReal HycoTrustDistance(HycoScene scene, const PetscReal a[], const PetscReal b[]);
+/* Writes a model that came from a file once more, to `path`, with what was added to it since. */
+PetscErrorCode HycoModelRewrite(HycoModel model, const char path[]);
+
+/* The contact forces' part of a comparison before any division: 2-norms of what is missed and of the reference, of all
+   contacts and of the RID's. */
+typedef struct {
+  PetscReal lost, size, rid_lost, rid_size;
+} HycoForceErrors;
+
+/* Errors of the last prediction against a full-order solution on the whole mesh: u (n_nodes * dim), sigma (n_cells *
+   n_sigma; NULL: not compared), lambda (n_contacts). The errors in H1 and its dual are left alone. `forces` may be
+   NULL. */
+PetscErrorCode HycoModelCompareFields(HycoModel model, const PetscReal u[], const PetscReal sigma[],
+                                      const PetscReal lambda[], HycoErrors *errors, HycoForceErrors *forces);
 
 /* Writes the model; whole: the mesh and the modes on it (n_nodes * dim x l row major). */
 PetscErrorCode HycoModelSave(HycoModel model, HycoMesh whole, const PetscReal V_whole[], const char path[]);

@@ -63,6 +63,7 @@ struct _p_HycoScene {
   PetscInt n_parameters;
   char *parameter[HYCO_MAX_PARAMETERS];
   PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS];
+  PetscBool extrapolate; /* values outside the ranges pass */
   /* description */
   PetscInt n_bodies, n_fixed, n_loads, n_contacts;
   HycoBody *body;
@@ -80,6 +81,8 @@ PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[]
 /* The entries as text, one "key\tvalue" per line, and back. The caller frees the text. */
 PetscErrorCode HycoSceneToText(HycoScene scene, char **text);
 PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *scene);
+/* The scene of a set of points. Borrowed. */
+PetscErrorCode HycoSamplesGetScene(HycoSamples samples, HycoScene *scene);
 /* A hash of all that decides a full-order solution: entries (but not hyco_ ones) and the mesh file's bytes. Collective.
  */
 PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash);

@@ -18,5 +18,8 @@ struct _p_HycoSnapshots {
   Collective; the caller owns it. A field without rows gives a matrix of zero rows.
 */
 PetscErrorCode HycoSnapshotsGetField(HycoSnapshots store, HycoSamples samples, const char field[], Mat *S);
+/* One field of the solution at mu, n values into the caller's memory, on this process alone. Not collective. */
+PetscErrorCode HycoSnapshotsRead(HycoSnapshots store, const PetscReal mu[], const char field[], PetscInt n,
+                                 PetscReal value[]);
 
 #endif

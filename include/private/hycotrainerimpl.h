@@ -24,6 +24,7 @@ struct _p_HycoTrainer {
   PetscReal ridge; /* hybrid all; < 0: chosen */
   PetscInt scan;   /* points per parameter; 0: chosen */
   PetscBool keep_singular;
+  PetscInt folds; /* that calibrate the estimated errors; 0: none */
   HycoModelType type;
   HycoDual dual;
   PetscInt nnmf_max_its, nnmf_vectors;
@@ -80,6 +81,9 @@ PetscErrorCode HycoTrainerSupremizers(HycoTrainer t, Mat *forces, Mat *supremize
 PetscErrorCode HycoTrainerEnrich(HycoTrainer t);
 /* The force basis of a projection-based model under training from its dual snapshots; fills numbers[]. Rank 0. */
 PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel model);
+/* Calibrates the estimated errors of the hybrid model at `path` and writes it once more: n_held held-out predictions
+   (0: too few solutions, or a fold gave no model). The bases are a fold's afterwards. Collective. */
+PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const char path[], PetscInt *n_held);
 /* Fills numbers[]: condition and mean training errors of the model as it stands. Rank 0. */
 PetscErrorCode HycoTrainerJudge(HycoTrainer t, HycoModel model);
 

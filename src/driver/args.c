@@ -23,6 +23,19 @@ static const HycoOption own[] = {
     {"target", "<real>", "1e-3", "greedy: stop when the indicator is no larger anywhere on that grid"},
     {"max_snapshots", "<int>", "0", "greedy: stop with so many solutions (0: no limit)"},
     {"max_seconds", "<real>", "0", "greedy: stop after the iteration in which this has passed (0: no limit)"},
+    {"extrapolate", "", "", "predict outside the trained ranges too, where nothing has tested the model"},
+    {"target_u", "<real>", "",
+     "train: choose the cheapest model whose errors on held-out solutions are no larger; predict -hyco_fallback: solve "
+     "full order where the estimated error is"},
+    {"target_u_rid", "<real>", "", "train: the same for the displacement over the RID, max norm"},
+    {"target_sigma", "<real>", "", "train: the same for the stress over the RID"},
+    {"target_sigma_11", "<real>", "", "train: the same for its first component, max norm"},
+    {"target_lambda", "<real>", "", "train, predict: the same for all contact forces"},
+    {"target_lambda_rid", "<real>", "", "train: the same for the RID's own contact forces"},
+    {"validation_grid", "<n,n,...>", "",
+     "train -target_...: solutions to judge by, closed unless -grid_type says centred (else every fourth value is held "
+     "out)"},
+    {"validation_points", "<file.csv>", "", "the same, as a file of points"},
     {"output", "<file.xdmf>", "", "fields for ParaView; the numbers in the .h5 beside it"},
     {"report", "<file.json>", "", "the result as one JSON object"},
     {"table", "<file.csv>", "", "a line per point"},
@@ -120,9 +133,10 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
 /* An option of the reduction given where nothing is reduced. */
 static PetscErrorCode CheckTraining(const Command *command, const char name[])
 {
-  static const char *const training[] = {"hyco_model_type",    "hyco_dual",      "hyco_nnmf_",   "hyco_pod_",
-                                         "hyco_deim_",         "hyco_rid_",      "hyco_hybrid",  "hyco_scan",
-                                         "hyco_keep_singular", "hyco_snapshots", "hyco_greedy_", NULL};
+  static const char *const training[] = {
+      "hyco_model_type", "hyco_dual",   "hyco_nnmf_", "hyco_pod_",          "hyco_deim_",
+      "hyco_rid_",       "hyco_hybrid", "hyco_scan",  "hyco_keep_singular", "hyco_snapshots",
+      "hyco_greedy_",    "hyco_trust_", NULL};
 
   PetscFunctionBegin;
   if (command->run == CommandTrain) PetscFunctionReturn(PETSC_SUCCESS);
@@ -399,6 +413,24 @@ PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples)
   HycoCheck(text[0], "give a greedy training the points to choose from: -training_grid N,N,...");
   PetscCall(HycoSamplesCreate(scene, samples));
   PetscCall(AddGrid(scene, *samples, "training_grid", 1, text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples)
+{
+  char grid[PETSC_MAX_PATH_LEN], points[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  *samples = NULL;
+  PetscCall(DriverGet("validation_grid", PETSC_FALSE, grid));
+  PetscCall(DriverGet("validation_points", PETSC_FALSE, points));
+  HycoCheck(!grid[0] || !points[0], "give one set of points to validate by: -validation_grid or -validation_points");
+  if (!grid[0] && !points[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesCreate(scene, samples));
+  if (grid[0])
+    PetscCall(AddGrid(scene, *samples, "validation_grid", 1, grid));
+  else
+    PetscCall(HycoSamplesAddFile(*samples, points));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -36,6 +36,8 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
 PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given);
 /* The points among which a greedy training chooses: -training_grid, closed unless -grid_type says otherwise. */
 PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples);
+/* The points that models are judged by: -validation_grid or -validation_points; NULL when neither is given. */
+PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples);
 /* Whether any point-set option was given. */
 PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given);
 void DriverHelp(const char *command);
@@ -85,6 +87,57 @@ typedef struct {
 /* Reads the options of train -greedy, makes the training set and sets the trainer, which will fill `log`. */
 PetscErrorCode DriverReadGreedy(HycoScene scene, HycoTrainer trainer, HycoSamples *training, GreedyLog *log);
 void DriverReportGreedy(cJSON *json, const GreedyLog *log);
+
+/* -- fallback.c: predict -hyco_fallback -- */
+
+/* When predict solves full order instead, and with what. */
+typedef struct {
+  PetscBool on;
+  PetscReal target_u, target_lambda; /* 0: none */
+  HycoScene scene;                   /* NULL unless on */
+  HycoFOM fom;                       /* made by the first solve */
+} Fallback;
+
+/* A relative error above 0 and at most 1; 0 when absent. */
+PetscErrorCode DriverReadTarget(const char name[], PetscReal *target);
+/* Reads the options and the scene, which must be the model's. Collective. */
+PetscErrorCode DriverReadFallback(HycoModel model, PetscBool extrapolate, Fallback *fallback);
+PetscErrorCode DriverEndFallback(Fallback *fallback);
+/* Why this prediction is not enough; "": it is. */
+void DriverWantsFullOrder(const Fallback *fallback, const HycoPrediction *p, char why[DRIVER_LINE]);
+/* Solves at mu (length n); the results take the prediction's place, u over the whole mesh. Collective. */
+PetscErrorCode DriverSolveFullOrder(Fallback *fallback, PetscInt n, const PetscReal mu[], HycoPrediction *p);
+
+/* -- targets.c: train -target_u ... -- */
+
+#define MAX_ATTEMPTS 256
+
+typedef struct {
+  PetscInt number;
+  char option[4][64]; /* model type, POD tolerance, layers, contact extension; "": not set */
+  HycoTraining t;
+  HycoValidation v;
+  char failure[HYCO_LINE]; /* "": it gave a model */
+} Attempt;
+
+/* A search for the cheapest model that meets the targets. */
+typedef struct {
+  PetscBool on;
+  PetscReal target[HYCO_N_ERRORS]; /* 0: none */
+  char scene[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], folder[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN];
+  PetscInt n;
+  Attempt *attempt; /* n of them; PetscFree() it */
+  const Attempt *chosen;
+} Search;
+
+/* The -target_ options; search->on: one was given. */
+PetscErrorCode DriverReadTargets(Search *search);
+/* Tries recipes on the training points, judged by `validation` (which it destroys; NULL: every fourth value of the
+   points is held out for it), and trains the cheapest that meets the targets. Fails, without a model, when none does.
+   Collective. */
+PetscErrorCode DriverTrainForTargets(Search *search, HycoScene scene, HycoSamples samples, HycoSamples validation,
+                                     HycoTraining *t);
+void DriverReportTargets(cJSON *json, const Search *search);
 
 PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);

@@ -11,12 +11,18 @@ const Command commands[] = {
      "hyco solve -scene FOLDER -mu V,V,... [-output F.xdmf] [-report R.json]",
      "solve full order, for one point or a set (-table T.csv)"},
     {"train", CommandTrain,
-     "scene model grid grid_type values_ points report greedy training_grid target max_snapshots max_seconds table",
+     "scene model grid grid_type values_ points report greedy training_grid target max_snapshots max_seconds table "
+     "target_u target_u_rid target_sigma target_sigma_11 target_lambda target_lambda_rid validation_grid "
+     "validation_points",
      "hyco train -scene FOLDER -grid N,N,... | -greedy -training_grid N,N,... -model M.h5 [-report R.json]",
-     "solve a set of points full order (resumable), or choose them one by one; reduce, write the model"},
-    {"predict", CommandPredict, "model mu mu_ grid grid_type values_ points output report table hyco_monitor",
+     "solve a set of points full order (resumable), or choose them one by one; reduce, write the model; with -target_u "
+     "1e-2 -target_lambda 5e-2 ... the cheapest that is so accurate"},
+    {"predict", CommandPredict,
+     "model mu mu_ grid grid_type values_ points output report table extrapolate scene target_u target_lambda "
+     "hyco_monitor",
      "hyco predict -model M.h5 -mu V,V,... [-output F.xdmf] [-report R.json]",
-     "solve the reduced model, for one point or a set (-table T.csv); reads only the model file"},
+     "solve the reduced model, for one point or a set (-table T.csv), and estimate its errors; reads only the model "
+     "file, but with -hyco_fallback -scene FOLDER"},
     {"compare", CommandCompare, "scene model grid grid_type values_ points report table",
      "hyco compare -scene FOLDER -model M.h5 -grid N,N,... [-report R.json] [-table T.csv]",
      "errors and speed-up of the reduced model against full order over a set of points"},

@@ -1,9 +1,37 @@
 /* hyco predict: the reduced model at one point, or over a set. */
 #include "driver.h"
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p)
+/* The estimated errors (null: none), and how far outside the ranges the point lies. */
+static void ReportTrust(cJSON *json, const HycoPrediction *p)
+{
+  if (p->estimated_error_u >= 0) {
+    cJSON_AddNumberToObject(json, "estimated_error_u", p->estimated_error_u);
+    cJSON_AddNumberToObject(json, "estimated_error_lambda", p->estimated_error_lambda);
+  } else {
+    cJSON_AddNullToObject(json, "estimated_error_u");
+    cJSON_AddNullToObject(json, "estimated_error_lambda");
+  }
+  cJSON_AddBoolToObject(json, "extrapolated", p->beyond > 0);
+  cJSON_AddNumberToObject(json, "beyond", p->beyond);
+}
+
+static PetscErrorCode SayTrust(const HycoPrediction *p)
+{
+  PetscFunctionBegin;
+  if (p->estimated_error_u >= 0)
+    PetscCall(Say("estimated errors: u %.2g %%, contact forces %.2g %%\n", 100 * (double)p->estimated_error_u,
+                  100 * (double)p->estimated_error_lambda));
+  else
+    PetscCall(Say("estimated errors: none, this model was not calibrated\n"));
+  if (p->beyond > 0)
+    PetscCall(Say("EXTRAPOLATED: outside the trained ranges by %.3g %% of a range\n", 100 * (double)p->beyond));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, const char fallback[])
 {
   cJSON *json;
 
@@ -30,18 +58,35 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   ReportVector(json, "u_min", p->dim, p->u_min);
   ReportVector(json, "u_max", p->dim, p->u_max);
   cJSON_AddNumberToObject(json, "strain_energy", p->strain_energy);
+  ReportTrust(json, p);
+  cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
+  if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
   ReportKKT(json, &p->kkt);
   ReportSeconds(json, &p->seconds);
   PetscCall(ReportWrite(&json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One point: rank 0 predicts, the others wait. */
-static PetscErrorCode One(HycoModel model, HycoScene scene, const char output[])
+static PetscErrorCode SayReduced(const HycoPrediction *p)
+{
+  PetscFunctionBegin;
+  if (p->type == HYCO_MODEL_PROJECTION)
+    PetscCall(Say("projection-based: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n",
+                  (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements));
+  else
+    PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
+                  (int)p->n_modes, (int)p->n_fe_dofs, (int)p->n_contacts, (int)p->rid_elements,
+                  100 * (double)p->rid_fraction));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One point: rank 0 predicts, the others wait; all solve full order where the fallback says so. */
+static PetscErrorCode One(HycoModel model, HycoScene scene, Fallback *fallback, const char output[])
 {
   HycoPrediction p = {0};
   PetscInt n;
   PetscReal mu[64];
+  char why[DRIVER_LINE];
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
@@ -49,64 +94,127 @@ static PetscErrorCode One(HycoModel model, HycoScene scene, const char output[])
   HycoOnRoot(PETSC_COMM_WORLD, HycoModelPredict(model, n, mu));
   HycoOnRoot(PETSC_COMM_WORLD, HycoModelGetPrediction(model, &p));
   PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
+  PetscCall(DriverCheckLeftEarly(scene));
+  DriverWantsFullOrder(fallback, &p, why);
+  if (why[0]) {
+    PetscCall(DriverSolveFullOrder(fallback, n, mu, &p));
+    PetscCall(Say("FULL ORDER instead of the reduced model: %s\n", why));
+  } else
+    PetscCall(SayReduced(&p));
   PetscCall(DriverCheckLeft());
   HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", HycoReasonName(p.reason),
             (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
             (double)p.kkt.complementarity);
-  if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoModelWrite(model, output));
-  if (p.type == HYCO_MODEL_PROJECTION)
-    PetscCall(Say("projection-based: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n",
-                  (int)p.n_modes, (int)p.n_multipliers, (int)p.n_contacts, (int)p.rid_elements));
-  else
-    PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
-                  (int)p.n_modes, (int)p.n_fe_dofs, (int)p.n_contacts, (int)p.rid_elements,
-                  100 * (double)p.rid_fraction));
+  if (output[0] && why[0])
+    PetscCall(HycoFOMWrite(fallback->fom, output));
+  else if (output[0])
+    HycoOnRoot(PETSC_COMM_WORLD, HycoModelWrite(model, output));
   PetscCall(Say("total contact force %.10g (%.1f %% of it in the RID), %d active; %s after %d iterations\n",
                 (double)p.total_contact_force, 100 * (double)p.covered_force, (int)p.n_active, HycoReasonName(p.reason),
                 (int)p.iterations));
   PetscCall(Say("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
                 (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
                 (double)p.kkt.complementarity));
+  if (!why[0]) PetscCall(SayTrust(&p));
   PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
-  PetscCall(Report(scene, mu, &p));
+  PetscCall(Report(scene, mu, &p, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What a set's table holds of each point. */
-enum { FORCE, LAMBDA_MAX, COVERED, ACTIVE, U_NORM, KKT, CONVERGED, ITERATIONS, SECONDS, N_COLUMNS };
-static const char *const columns[N_COLUMNS] = {
-    "total_contact_force",   "lambda_max", "covered_force", "n_active", "u_norm2", "kkt_max", "converged",
-    "active_set_iterations", "seconds"};
+enum {
+  FORCE,
+  LAMBDA_MAX,
+  COVERED,
+  ACTIVE,
+  U_NORM,
+  KKT,
+  CONVERGED,
+  ITERATIONS,
+  SECONDS,
+  ESTIMATE_U,
+  ESTIMATE_LAMBDA,
+  BEYOND,
+  FULL_ORDER,
+  N_COLUMNS
+};
+static const char *const columns[N_COLUMNS] = {"total_contact_force",
+                                               "lambda_max",
+                                               "covered_force",
+                                               "n_active",
+                                               "u_norm2",
+                                               "kkt_max",
+                                               "converged",
+                                               "active_set_iterations",
+                                               "seconds",
+                                               "estimated_error_u",
+                                               "estimated_error_lambda",
+                                               "beyond",
+                                               "full_order"};
 
-static PetscErrorCode PredictMine(HycoModel model, PetscInt n, PetscInt n_par, const PetscReal mu[], PetscReal value[])
+static void FillRow(const HycoPrediction *p, PetscReal v[])
+{
+  v[FORCE] = p->total_contact_force;
+  v[LAMBDA_MAX] = p->lambda_max;
+  v[COVERED] = p->covered_force;
+  v[ACTIVE] = p->n_active;
+  v[U_NORM] = p->u_norm2;
+  v[KKT] = HycoKKTMax(&p->kkt);
+  v[CONVERGED] = p->reason > 0;
+  v[ITERATIONS] = p->iterations;
+  v[SECONDS] = p->seconds.total;
+  v[ESTIMATE_U] = p->estimated_error_u >= 0 ? p->estimated_error_u : NAN; /* a table's word for none */
+  v[ESTIMATE_LAMBDA] = p->estimated_error_lambda >= 0 ? p->estimated_error_lambda : NAN;
+  v[BEYOND] = p->beyond;
+}
+
+/* This rank's points. full[k]: point k is to be solved full order. */
+static PetscErrorCode PredictMine(HycoModel model, const Fallback *fallback, PetscInt n, PetscInt n_par,
+                                  const PetscReal mu[], PetscReal value[], PetscInt full[])
 {
   PetscMPIInt rank, size;
+  char why[DRIVER_LINE];
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   for (PetscInt k = (PetscInt)rank * n / size; k < ((PetscInt)rank + 1) * n / size; k++) {
     HycoPrediction p;
-    PetscReal *v = value + k * N_COLUMNS;
 
     PetscCall(HycoModelPredict(model, n_par, mu + k * n_par));
     PetscCall(HycoModelGetPrediction(model, &p));
-    v[FORCE] = p.total_contact_force;
-    v[LAMBDA_MAX] = p.lambda_max;
-    v[COVERED] = p.covered_force;
-    v[ACTIVE] = p.n_active;
-    v[U_NORM] = p.u_norm2;
-    v[KKT] = HycoKKTMax(&p.kkt);
-    v[CONVERGED] = p.reason > 0;
-    v[ITERATIONS] = p.iterations;
-    v[SECONDS] = p.seconds.total;
+    FillRow(&p, value + k * N_COLUMNS);
+    DriverWantsFullOrder(fallback, &p, why);
+    full[k] = why[0] != '\0';
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Many(HycoModel model, HycoScene scene, HycoSamples samples)
+/* All ranks together, the points where the reduced model was not enough. */
+static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, const PetscReal mu[],
+                                const PetscInt full[], PetscReal value[])
 {
-  PetscInt n, n_par;
+  PetscInt count = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    HycoPrediction p = {0};
+
+    if (!full[k]) continue;
+    PetscCall(DriverSolveFullOrder(fallback, n_par, mu + k * n_par, &p));
+    p.estimated_error_u = p.estimated_error_lambda = 0;
+    p.beyond = value[k * N_COLUMNS + BEYOND];
+    FillRow(&p, value + k * N_COLUMNS);
+    value[k * N_COLUMNS + FULL_ORDER] = 1;
+    count++;
+  }
+  if (fallback->on) PetscCall(Say("%d of the %d points were solved full order\n", (int)count, (int)n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Many(HycoModel model, HycoScene scene, Fallback *fallback, HycoSamples samples)
+{
+  PetscInt n, n_par, *full;
   const PetscReal *mu;
   PetscReal *value, begin;
   char table[PETSC_MAX_PATH_LEN];
@@ -114,14 +222,16 @@ static PetscErrorCode Many(HycoModel model, HycoScene scene, HycoSamples samples
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverGet("table", PETSC_FALSE, table));
-  PetscCall(DriverCheckLeft());
-  PetscCall(PetscCalloc1(n * N_COLUMNS, &value));
+  PetscCall(fallback->on ? DriverCheckLeftEarly(scene) : DriverCheckLeft());
+  PetscCall(PetscCalloc2(n * N_COLUMNS, &value, n, &full));
   begin = HycoNow();
-  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, n, n_par, mu, value));
+  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, value, full));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)(n * N_COLUMNS), MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, full, (PetscMPIInt)n, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCall(SolveRest(fallback, n, n_par, mu, full, value));
   begin = HycoNow() - begin;
   PetscCall(ReportSet("predict", table, scene, samples, N_COLUMNS, columns, value, begin));
-  PetscCall(PetscFree(value));
+  PetscCall(PetscFree2(value, full));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -130,7 +240,8 @@ PetscErrorCode CommandPredict(void)
   HycoModel model = NULL;
   HycoScene scene;
   HycoSamples samples = NULL;
-  PetscBool set, monitor;
+  Fallback fallback = {0};
+  PetscBool set, monitor, extrapolate = PETSC_FALSE;
   char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
@@ -138,18 +249,22 @@ PetscErrorCode CommandPredict(void)
   PetscCall(DriverGet("output", PETSC_FALSE, output));
   PetscCall(DriverGet("report", PETSC_FALSE, report));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_monitor", &monitor));
+  PetscCall(HycoOptionsBool(NULL, "extrapolate", &extrapolate));
   HycoOnEach(PETSC_COMM_WORLD, HycoModelLoad(path, &model));
+  PetscCall(HycoModelSetExtrapolate(model, extrapolate));
   PetscCall(HycoModelGetScene(model, &scene));
+  PetscCall(DriverReadFallback(model, extrapolate, &fallback));
   if (monitor) PetscCall(HycoModelSetMonitor(model, DriverMonitor, NULL));
   PetscCall(DriverHasSamples(scene, &set));
   if (set) {
     HycoCheck(!output[0], "-output is for one point (-mu); a set of points gives a -table");
     PetscCall(DriverGetSamples(scene, &samples, &set));
-    PetscCall(Many(model, scene, samples));
+    PetscCall(Many(model, scene, &fallback, samples));
   } else {
-    PetscCall(One(model, scene, output));
+    PetscCall(One(model, scene, &fallback, output));
   }
   PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(DriverEndFallback(&fallback));
   PetscCall(HycoModelDestroy(&model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

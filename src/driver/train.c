@@ -17,7 +17,7 @@ static void ReportScan(cJSON *json, const HycoScan *s, PetscInt n_par)
   ReportVector(object, "at", n_par, s->at);
 }
 
-static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const GreedyLog *log)
+static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const GreedyLog *log, const Search *search)
 {
   PetscInt n_par;
   cJSON *json, *seconds;
@@ -41,11 +41,13 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
   ReportScan(json, &t->scan, n_par);
   cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
   cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
+  cJSON_AddNumberToObject(json, "held_out_predictions", t->n_held);
   if (t->type == HYCO_MODEL_PROJECTION) {
     cJSON_AddNumberToObject(json, "n_supremizers", t->n_supremizers);
     cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);
   }
   if (log->scene) DriverReportGreedy(json, log);
+  if (search->on) DriverReportTargets(json, search);
   seconds = cJSON_AddObjectToObject(json, "seconds");
   cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots);
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
@@ -72,13 +74,28 @@ static PetscErrorCode SayBases(const HycoTraining *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The kinds of training exclude each other, and each its own points. */
+static PetscErrorCode CheckKind(PetscBool given, PetscBool greedy, const Search *search, HycoSamples validation)
+{
+  PetscFunctionBegin;
+  HycoCheck(given || greedy,
+            "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
+  HycoCheck(!greedy || !search->on,
+            "-target_u and the like choose a model for a given set of points; train -greedy stops by -target");
+  HycoCheck(search->on || !validation,
+            "-validation_grid and -validation_points judge models against targets: give one, "
+            "as -target_u 1e-2");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CommandTrain(void)
 {
   HycoScene scene;
-  HycoSamples samples, training = NULL;
+  HycoSamples samples, training = NULL, validation;
   HycoTrainer trainer;
   HycoTraining t;
   GreedyLog log = {0};
+  Search search = {0};
   PetscBool given, greedy = PETSC_FALSE;
   char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
 
@@ -89,8 +106,11 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
   PetscCall(HycoOptionsBool(NULL, "greedy", &greedy));
-  HycoCheck(given || greedy,
-            "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
+  PetscCall(DriverReadTargets(&search));
+  PetscCall(DriverGetValidation(scene, &validation));
+  PetscCall(CheckKind(given, greedy, &search, validation));
+  PetscCall(PetscStrncpy(search.scene, path, sizeof(search.scene)));
+  PetscCall(PetscStrncpy(search.model, model, sizeof(search.model)));
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
@@ -98,6 +118,8 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverCheckLeftEarly(scene));
   if (greedy)
     PetscCall(HycoTrainerRunGreedy(trainer, given ? samples : NULL, training, model, &t));
+  else if (search.on)
+    PetscCall(DriverTrainForTargets(&search, scene, samples, validation, &t));
   else
     PetscCall(HycoTrainerRun(trainer, samples, model, &t));
   PetscCall(SayBases(&t));
@@ -109,7 +131,8 @@ PetscErrorCode CommandTrain(void)
                   (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept as asked" : ""));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));
-  PetscCall(Report(scene, &t, &log));
+  PetscCall(Report(scene, &t, &log, &search));
+  PetscCall(PetscFree(search.attempt));
   PetscCall(PetscFree(log.text));
   PetscCall(HycoSamplesDestroy(&training));
   PetscCall(HycoTrainerDestroy(&trainer));

@@ -260,6 +260,7 @@ PetscErrorCode HycoTrainerRunGreedy(HycoTrainer t, HycoSamples start, HycoSample
   PetscCall(PetscCalloc1(t->rank == 0 ? t->whole->n_cells : 0, &t->grown));
   for (PetscInt iteration = 0; !last; iteration++) PetscCall(Iterate(t, &loop, iteration, &report, &last));
   PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, &report));
+  PetscCall(HycoTrainerCalibrate(t, loop.store, path, &report.n_held));
   if (!t->greedy.keep && t->rank == 0) unlink(loop.file);
   report.seconds_reduction = HycoNow() - loop.begin;
   PetscCall(HycoTrainerReset(t));

@@ -39,33 +39,30 @@ static PetscErrorCode CompareH1(HycoModel m, const PetscReal U[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Compare(HycoModel m, HycoFOM f, const PetscReal sigma[], HycoErrors *e)
+PetscErrorCode HycoModelCompareFields(HycoModel m, const PetscReal u_full[], const PetscReal sigma[],
+                                      const PetscReal lambda[], HycoErrors *e, HycoForceErrors *forces)
 {
   const PetscReal *U, *stress;
-  const PetscInt dim = f->fe->dim, ns = f->fe->n_sigma;
+  const PetscInt dim = m->mesh->dim, ns = m->fe->n_sigma;
   Norms u = {0}, rid = {0}, s = {0}, s11 = {0}, lr = {0}, l = {0};
 
   PetscFunctionBegin;
-  HycoCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
-            "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
-            "training mesh",
-            (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
   PetscCall(HycoModelGetWholeU(m, NULL, &U));
-  for (PetscInt k = 0; k < f->n_nodes * dim; k++) Add(&u, U[k], f->u[k]);
+  for (PetscInt k = 0; k < m->whole_nodes * dim; k++) Add(&u, U[k], u_full[k]);
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
     for (PetscInt c = 0; m->role[i] != HYCO_ROLE_OUTSIDE && c < dim; c++)
-      Add(&rid, m->U[i * dim + c], f->u[m->mesh->node_whole[i] * dim + c]);
+      Add(&rid, m->U[i * dim + c], u_full[m->mesh->node_whole[i] * dim + c]);
   }
   PetscCall(HycoModelGetRID(m, NULL, NULL, NULL, NULL, NULL, &stress));
-  for (PetscInt k = 0; k < m->mesh->n_cells * ns; k++) {
+  for (PetscInt k = 0; sigma && k < m->mesh->n_cells * ns; k++) {
     const PetscReal reference = sigma[m->mesh->cell_whole[k / ns] * ns + k % ns];
 
     Add(&s, stress[k], reference);
     if (k % ns == 0) Add(&s11, stress[k], reference);
   }
   for (PetscInt k = 0; k < m->pairs.n; k++) {
-    Add(&l, m->Lambda[k], f->lambda[k]);
-    if (m->in_rid[k]) Add(&lr, m->Lambda[k], f->lambda[k]);
+    Add(&l, m->Lambda[k], lambda[k]);
+    if (m->in_rid[k]) Add(&lr, m->Lambda[k], lambda[k]);
   }
   e->u = Quotient(PetscSqrtReal(u.lost2), PetscSqrtReal(u.size2));
   e->u_rid = Quotient(rid.lost, rid.size);
@@ -73,7 +70,21 @@ static PetscErrorCode Compare(HycoModel m, HycoFOM f, const PetscReal sigma[], H
   e->sigma_11 = Quotient(s11.lost, s11.size);
   e->lambda_rid = Quotient(PetscSqrtReal(lr.lost2), PetscSqrtReal(lr.size2));
   e->lambda = Quotient(PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2));
-  PetscCall(CompareH1(m, U, f->u, f->lambda, e));
+  if (forces)
+    *forces = (HycoForceErrors){PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2), PetscSqrtReal(lr.lost2),
+                                PetscSqrtReal(lr.size2)};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Compare(HycoModel m, HycoFOM f, const PetscReal sigma[], HycoErrors *e)
+{
+  PetscFunctionBegin;
+  HycoCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
+            "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
+            "training mesh",
+            (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
+  PetscCall(HycoModelCompareFields(m, f->u, sigma, f->lambda, e, NULL));
+  PetscCall(CompareH1(m, m->U_whole, f->u, f->lambda, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

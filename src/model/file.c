@@ -227,6 +227,52 @@ static PetscErrorCode LoadType(HycoH5 h, HycoModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* training/trust: the count, the floors, the coefficients of u and of the forces, the largest force. */
+#define TRUST_NUMBERS (2 + HYCO_TRUST_FEATURES + 2 * (HYCO_TRUST_FEATURES + 1))
+
+static PetscErrorCode SaveTrust(HycoH5 h, HycoModel m)
+{
+  const HycoTrust *t = &m->trust;
+  PetscReal numbers[TRUST_NUMBERS], *at = numbers;
+
+  PetscFunctionBegin;
+  if (m->search) PetscCall(HycoH5WriteText(h, "training/search", m->search));
+  if (!t->n) PetscFunctionReturn(PETSC_SUCCESS);
+  *at++ = (PetscReal)t->n;
+  for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) *at++ = t->floor[j];
+  for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) *at++ = t->u[j];
+  for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) *at++ = t->lambda[j];
+  *at = t->force;
+  PetscCall(HycoH5WriteReal(h, "training/trust", TRUST_NUMBERS, 1, numbers));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadTrust(HycoH5 h, HycoModel m)
+{
+  HycoTrust *t = &m->trust;
+  PetscReal *numbers, *at;
+  PetscInt n = TRUST_NUMBERS, one = 1;
+  PetscBool good = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  if (HycoH5Has(h, "training/search")) PetscCall(HycoH5LoadText(h, "training/search", &m->search));
+  if (!HycoH5Has(h, "training/trust")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "training/trust", &n, &one, &numbers));
+  for (PetscInt k = 0; k < n; k++) good = (PetscBool)(good && !PetscIsInfOrNanReal(numbers[k]));
+  at = numbers;
+  t->n = (PetscInt)*at++;
+  for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) {
+    t->floor[j] = *at++;
+    good = (PetscBool)(good && t->floor[j] > 0);
+  }
+  for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) t->u[j] = *at++;
+  for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) t->lambda[j] = *at++;
+  t->force = *at;
+  PetscCall(PetscFree(numbers));
+  HycoCheck(good && t->n > 0 && t->force >= 0, "%s: training/trust is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
 {
   const PetscInt n_dof = m->mesh->n_nodes * m->mesh->dim,
@@ -263,6 +309,7 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
     PetscCall(HycoH5WriteReal(h, "training/scan_smallest", 1, 1, &m->scan.smallest));
     PetscCall(HycoH5WriteReal(h, "training/scan_at", m->scene->n_parameters, 1, m->scan.at));
   }
+  PetscCall(SaveTrust(h, m));
   PetscCall(HycoH5WriteText(h, "training/provenance", m->provenance));
   PetscCall(HycoH5WriteText(h, "training/fingerprint", m->fingerprint));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -380,6 +427,7 @@ static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
   PetscCall(PetscArraycpy(m->numbers, numbers, 3));
   PetscCall(PetscFree(numbers));
   PetscCall(LoadScan(h, m));
+  PetscCall(LoadTrust(h, m));
   PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
   PetscCall(HycoH5LoadText(h, "training/fingerprint", &text));
   PetscCall(PetscStrncpy(m->fingerprint, text, sizeof(m->fingerprint)));
@@ -434,5 +482,28 @@ PetscErrorCode HycoModelLoadWhole(HycoModel m)
   PetscCall(PetscMalloc1(n_dof, &m->U_whole));
   /* the contacts again, in the whole mesh's numbers */
   PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelRewrite(HycoModel m, const char path[])
+{
+  PetscFunctionBegin;
+  if (!m->whole) PetscCall(HycoModelLoadWhole(m));
+  PetscCall(HycoModelSave(m, m->whole, m->V_whole, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelNote(const char path[], const char text[])
+{
+  HycoModel m;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoModelLoad(path, &m));
+  PetscCall(PetscFree(m->search));
+  PetscCall(PetscStrallocpy(text, &m->search));
+  ierr = HycoModelRewrite(m, path);
+  PetscCall(HycoModelDestroy(&m));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -71,6 +71,7 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
   PetscCall(PetscFree(m->V_lambda));
   PetscCall(PetscFree(m->points));
   PetscCall(PetscFree(m->provenance));
+  PetscCall(PetscFree(m->search));
   PetscCall(PetscFree(*model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -104,6 +105,14 @@ PetscErrorCode HycoModelSetReconstruct(HycoModel m, PetscBool reconstruct)
   PetscFunctionBegin;
   HycoCheckHandle(m, "HycoModelLoad()");
   m->reconstruct = reconstruct;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelSetExtrapolate(HycoModel m, PetscBool extrapolate)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
+  PetscCall(HycoSceneSetExtrapolate(m->scene, extrapolate));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -175,6 +184,7 @@ PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
   p->strain_energy = 0;
   for (PetscInt e = 0; e < m->mesh->n_cells; e++) p->strain_energy += energy[e];
   PetscCall(PetscFree(energy));
+  PetscCall(HycoTrustEstimate(m, p));
   *out = *p;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -314,6 +324,7 @@ PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
     PetscCall(HycoProjectionView(m, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
   if (m->type == HYCO_MODEL_HYBRID) PetscCall(ViewScan(m, viewer));
+  PetscCall(HycoTrustView(m, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->provenance));
   PetscCall(HycoSceneView(m->scene, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);

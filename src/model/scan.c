@@ -145,14 +145,6 @@ static PetscErrorCode Scan(HycoTrainer t, HycoModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SaveScanned(HycoModel m, const char path[])
-{
-  PetscFunctionBegin;
-  PetscCall(HycoModelLoadWhole(m));
-  PetscCall(HycoModelSave(m, m->whole, m->V_whole, path));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoTrainerScan(HycoTrainer t, const char candidate[], const char path[], HycoScan *found)
 {
   HycoModel m = NULL;
@@ -163,7 +155,7 @@ PetscErrorCode HycoTrainerScan(HycoTrainer t, const char candidate[], const char
   HycoOnEach(t->comm, HycoModelLoad(candidate, &m));
   PetscCall(HycoCatchBegin());
   ierr = Scan(t, m);
-  if (!ierr && t->rank == 0) ierr = SaveScanned(m, path);
+  if (!ierr && t->rank == 0) ierr = HycoModelRewrite(m, path);
   PetscCall(HycoCatchEnd(ierr, message));
   *found = m->scan;
   if (t->rank == 0) (void)unlink(candidate);

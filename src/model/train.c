@@ -272,8 +272,9 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
   PetscCall(HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
   solved = HycoNow();
   PetscCall(HycoTrainerReduce(t, store));
-  PetscCall(HycoSnapshotsDestroy(&store));
   PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, &report));
+  PetscCall(HycoTrainerCalibrate(t, store, path, &report.n_held));
+  PetscCall(HycoSnapshotsDestroy(&store));
   report.seconds_snapshots = solved - begin;
   report.seconds_reduction = HycoNow() - solved;
   if (training) *training = report;

@@ -16,6 +16,7 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   t->nnmf_max_its = 100;
   t->greedy.target = 1e-3;
   t->ridge = -1;
+  t->folds = 3;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *trainer = t;
@@ -77,6 +78,16 @@ PetscErrorCode HycoTrainerSetProgress(HycoTrainer t, HycoProgress progress, void
   HycoCheckHandle(t, "HycoTrainerCreate()");
   t->progress = progress;
   t->progress_ctx = ctx;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetTrustFolds(HycoTrainer t, PetscInt folds)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  HycoCheck(folds >= 0 && folds != 1, "%d folds cannot calibrate: give 2 or more, or 0 for no estimated errors",
+            (int)folds);
+  t->folds = folds;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -195,6 +206,8 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   PetscCall(HycoOptionsReal(o, "hyco_hybrid_ridge", -1, 1, &t->ridge));
   PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
   PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
+  PetscCall(HycoOptionsInt(o, "hyco_trust_folds", 0, 1000, &t->folds));
+  PetscCall(HycoTrainerSetTrustFolds(t, t->folds));
   indicator = (PetscInt)t->greedy.indicator;
   PetscCall(HycoOptionsWord(o, "hyco_greedy_indicator", indicators, &indicator));
   t->greedy.indicator = (HycoIndicatorKind)indicator;

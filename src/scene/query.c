@@ -59,10 +59,19 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
   for (PetscInt p = 0; p < n; p++) {
     const PetscReal slack = 1e-12 * PetscMax(PetscAbsReal(scene->lo[p]), PetscAbsReal(scene->hi[p]));
 
-    HycoCheck(mu[p] >= scene->lo[p] - slack && mu[p] <= scene->hi[p] + slack,
+    HycoCheck(!PetscIsInfOrNanReal(mu[p]), "%s is not a finite number", scene->parameter[p]);
+    HycoCheck(scene->extrapolate || (mu[p] >= scene->lo[p] - slack && mu[p] <= scene->hi[p] + slack),
               "%s = %.10g lies outside its range [%.10g, %.10g]", scene->parameter[p], (double)mu[p],
               (double)scene->lo[p], (double)scene->hi[p]);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneSetExtrapolate(HycoScene scene, PetscBool extrapolate)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  scene->extrapolate = extrapolate;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

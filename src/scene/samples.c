@@ -28,6 +28,14 @@ PetscErrorCode HycoSamplesDestroy(HycoSamples *samples)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSamplesGetScene(HycoSamples s, HycoScene *scene)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSamplesCreate()");
+  *scene = s->scene;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSamplesAddPoint(HycoSamples s, const PetscReal mu[])
 {
   const PetscInt P = s ? s->scene->n_parameters : 0;

@@ -282,3 +282,20 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const
   PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode HycoSnapshotsRead(HycoSnapshots s, const PetscReal mu[], const char field[], PetscInt n,
+                                 PetscReal value[])
+{
+  char path[PETSC_MAX_PATH_LEN];
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(HycoH5Open(path, &h));
+  ierr = CheckFingerprint(s, h, path);
+  if (!ierr) ierr = HycoH5ReadReal(h, field, n, 1, value);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -134,12 +134,44 @@ static PetscErrorCode TestTao(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* y = 2 x_0 + noise in [0, 1], x_1 without weight, x_2 with a negative one: c_0 near 2, the others 0, and nine tenths
+   of what is held below the bound, neither fewer nor many more. */
+static PetscErrorCode TestBound(void)
+{
+  enum { N = 400 };
+  PetscReal X[3 * N], y[N], c[4];
+  PetscBool held[N];
+  PetscInt below = 0, n_held = 0;
+
+  PetscFunctionBegin;
+  for (int i = 0; i < N; i++) {
+    const PetscReal noise = (i * 37 % 101) / 101.;
+
+    X[3 * i] = i / 100.;
+    X[3 * i + 1] = i % 2;
+    X[3 * i + 2] = (i * 17 % 29) / 29.;
+    y[i] = 2 * X[3 * i] - X[3 * i + 2] + noise;
+    held[i] = (PetscBool)(i % 4 == 0);
+  }
+  PetscCall(HycoUpperBound(N, 3, X, y, held, 0.9, c));
+  CHECK_NEAR(c[0], 2, 0.05); /* the ridge of 1 % takes 2 % off */
+  CHECK(c[1] >= 0 && c[1] < 0.1, "x_1 says nothing, its weight is %g", (double)c[1]);
+  CHECK_NEAR(c[2], 0, 0);
+  for (int i = 0; i < N; i++) {
+    n_held += held[i];
+    below += held[i] && y[i] <= c[3] + c[0] * X[3 * i] + c[1] * X[3 * i + 1] + c[2] * X[3 * i + 2] + 1e-12;
+  }
+  CHECK(n_held == 100 && below == 91, "expected 91 of 100 below, the number ceil(0.9 * 101); found %d", (int)below);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
   PetscCall(TestRandom());
   PetscCall(TestByHand());
   PetscCall(TestTao());
+  PetscCall(TestBound());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -112,6 +112,55 @@ static PetscErrorCode TestScene(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of a 3 x 8 product the parameter with the fewest values splits: all points of its value number 1. */
+static PetscErrorCode TestHoldOut(HycoScene scene)
+{
+  const PetscInt counts[2] = {3, 8}, line[2] = {1, 7};
+  HycoSamples samples, kept, held;
+  PetscInt n;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_TRUE));
+  PetscCall(HycoSamplesHoldOut(samples, 3, 1, &kept, &held));
+  PetscCall(HycoSamplesGet(held, &n, NULL, &mu));
+  CHECK(n == 8, "expected 8 points held out, found %d", (int)n);
+  for (PetscInt k = 0; k < n; k++) CHECK_NEAR(mu[2 * k], 0.5, 0);
+  PetscCall(HycoSamplesGet(kept, &n, NULL, &mu));
+  CHECK(n == 16, "expected 16 points kept, found %d", (int)n);
+  for (PetscInt k = 0; k < n; k++) CHECK_NEAR(mu[2 * k], k < 8 ? 0 : 1, 0);
+  PetscCall(HycoSamplesDestroy(&kept));
+  PetscCall(HycoSamplesDestroy(&held));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSamplesCreate(scene, &samples)); /* no value that points share: every third point */
+  PetscCall(HycoSamplesAddGrid(samples, line, PETSC_FALSE));
+  PetscCall(HycoSamplesHoldOut(samples, 3, 2, &kept, &held));
+  PetscCall(HycoSamplesGet(held, &n, NULL, &mu));
+  CHECK(n == 2, "expected points 2 and 5 of 7, found %d", (int)n);
+  CHECK_NEAR(mu[1], -1 + 2.5 * 4. / 7, 1e-15);
+  CHECK_NEAR(mu[3], -1 + 5.5 * 4. / 7, 1e-15);
+  PetscCall(HycoSamplesDestroy(&kept));
+  PetscCall(HycoSamplesDestroy(&held));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestExtrapolate(HycoScene scene)
+{
+  const PetscReal outside[2] = {0.5, 3.01};
+  PetscReal nan[2] = {0.5, 0};
+
+  PetscFunctionBegin;
+  nan[1] = strtod("nan", NULL);
+  CHECK_FAILS(HycoSceneCheckParameters(scene, 2, outside), "lies outside its range");
+  PetscCall(HycoSceneSetExtrapolate(scene, PETSC_TRUE));
+  PetscCall(HycoSceneCheckParameters(scene, 2, outside));
+  CHECK_FAILS(HycoSceneCheckParameters(scene, 2, nan), "b is not a finite number");
+  PetscCall(HycoSceneSetExtrapolate(scene, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode TestNearest(void)
 {
   const char *const names[] = {"young", "poisson", "map_x"};
@@ -133,6 +182,8 @@ static PetscErrorCode Test(void)
   PetscCall(TestGrids(scene));
   PetscCall(TestFile(scene));
   PetscCall(TestScene(scene));
+  PetscCall(TestHoldOut(scene));
+  PetscCall(TestExtrapolate(scene));
   PetscCall(TestNearest());
   PetscCall(HycoSceneDestroy(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);

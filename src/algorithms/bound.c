@@ -1,0 +1,54 @@
+/* An upper bound fitted to data: a log-linear law with nonnegative exponents, lifted above a share of what was held
+ * out. */
+#include <hycoalgorithms.h>
+#include <petscsys.h>
+
+#define RIDGE 1e-2 /* of a column's own square sum: correlated features share the weight */
+
+/* c >= 0 that minimises |X c - y|^2 about the means, regularised. */
+static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal c[])
+{
+  const PetscInt rows = n + p;
+  PetscReal *A, *b, mean = 0, residual;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(rows * p, &A, rows, &b));
+  for (PetscInt i = 0; i < n; i++) mean += y[i] / n;
+  for (PetscInt i = 0; i < n; i++) b[i] = y[i] - mean;
+  for (PetscInt j = 0; j < p; j++) {
+    PetscReal at = 0, square = 0;
+
+    for (PetscInt i = 0; i < n; i++) at += X[i * p + j] / n;
+    for (PetscInt i = 0; i < n; i++) {
+      A[j * rows + i] = X[i * p + j] - at;
+      square += A[j * rows + i] * A[j * rows + i];
+    }
+    A[j * rows + n + j] = PetscSqrtReal(RIDGE * square);
+  }
+  PetscCall(HycoNNLS(rows, p, A, b, c, &residual));
+  PetscCall(PetscFree2(A, b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], const PetscBool held[],
+                              PetscReal share, PetscReal c[])
+{
+  PetscReal *above;
+  PetscInt m = 0, at;
+
+  PetscFunctionBegin;
+  PetscCall(Fit(n, p, X, y, c));
+  PetscCall(PetscMalloc1(n, &above));
+  for (PetscInt i = 0; i < n; i++) {
+    if (!held[i]) continue;
+    above[m] = y[i];
+    for (PetscInt j = 0; j < p; j++) above[m] -= c[j] * X[i * p + j];
+    m++;
+  }
+  PetscCheck(m, PETSC_COMM_SELF, PETSC_ERR_PLIB, "nothing is held out to lift the bound by");
+  PetscCall(PetscSortReal(m, above));
+  at = (PetscInt)PetscCeilReal(share * (PetscReal)(m + 1)) - 1;
+  c[p] = above[PetscMax(0, PetscMin(at, m - 1))];
+  PetscCall(PetscFree(above));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
