@@ -1,5 +1,6 @@
 /* HycoTrainer: snapshots -> POD, DEIM -> reduced integration domain -> hybrid model in a file (sections 4 and 5); or
-   snapshots -> POD, NNMF -> projection-based model in a file (6.3). */
+   snapshots -> POD, NNMF -> projection-based model in a file (6.3); or snapshots -> POD, B K^-1 B^T -> condensed model.
+ */
 #ifndef HYCOTRAINER_H
 #define HYCOTRAINER_H
 
@@ -17,6 +18,8 @@ typedef struct {
   HycoModelType type;
   PetscReal dual_misfit;  /* projection: share of the dual snapshots' squares that their nonnegative basis leaves out */
   PetscInt n_supremizers; /* of n_modes, -hyco_dual snapshots */
+  PetscInt n_flexibilities; /* condensed: points at which B K^-1 B^T was factored */
+  PetscReal left_out[3];    /* condensed: relative errors of flexibility, gap and forces, one training value left out */
   PetscInt n_samples, n_modes, n_dual_modes, n_stress_modes, n_force_modes; /* l_u and the sizes of the other bases */
   PetscInt n_fe_dofs, rid_nodes, rid_elements, rid_a_nodes, rid_contacts; /* FE unknowns, RID, nodes of A, |A_lambda| */
   PetscReal rid_fraction;                                                 /* share of the elements */

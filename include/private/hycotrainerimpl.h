@@ -2,6 +2,7 @@
 #ifndef HYCOTRAINERIMPL_H
 #define HYCOTRAINERIMPL_H
 
+#include <hycocondensed.h>
 #include <hycomodelimpl.h>
 #include <hycosnapshotsimpl.h>
 #include <hycotrainer.h>
@@ -53,7 +54,8 @@ struct _p_HycoTrainer {
   PetscReal *U_norm;         /* n_s: of the whole snapshot */
   PetscInt n_s;
   unsigned long long fingerprint;
-  PetscBool *grown; /* rank 0, greedy: cells of the RIDs so far; else NULL */
+  HycoCondensed condensed; /* of a condensed model under training; the grid on every rank, the fields on rank 0 */
+  PetscBool *grown;        /* rank 0, greedy: cells of the RIDs so far; else NULL */
 };
 
 /* Frees what one run leaves behind. */
@@ -80,6 +82,12 @@ PetscErrorCode HycoTrainerSupremizers(HycoTrainer t, Mat *forces, Mat *supremize
 PetscErrorCode HycoTrainerEnrich(HycoTrainer t);
 /* The force basis of a projection-based model under training from its dual snapshots; fills numbers[]. Rank 0. */
 PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel model);
+/* A condensed model: checks that scene and samples are fit for one, before hours of work; after the modes, G and H at
+   all their nodes, factoring where no file has them. Collective. */
+PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t);
+PetscErrorCode HycoTrainerFlexibility(HycoTrainer t, HycoSnapshots store);
+/* Its fields, degrees and errors, handed to the model; fills numbers[]. Rank 0. */
+PetscErrorCode HycoTrainerCondense(HycoTrainer t, HycoModel model);
 /* Fills numbers[]: condition and mean training errors of the model as it stands. Rank 0. */
 PetscErrorCode HycoTrainerJudge(HycoTrainer t, HycoModel model);
 

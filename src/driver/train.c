@@ -45,6 +45,10 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
     cJSON_AddNumberToObject(json, "n_supremizers", t->n_supremizers);
     cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);
   }
+  if (t->type == HYCO_MODEL_CONDENSED) {
+    cJSON_AddNumberToObject(json, "n_flexibilities", t->n_flexibilities);
+    ReportVector(json, "left_out_flexibility_gap_forces", 3, t->left_out);
+  }
   if (log->scene) DriverReportGreedy(json, log);
   seconds = cJSON_AddObjectToObject(json, "seconds");
   cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots);
@@ -62,6 +66,13 @@ static PetscErrorCode SayBases(const HycoTraining *t)
         Say("projection-based: %d snapshots; %d displacement modes, %d of them supremizers; %d force vectors, which "
             "leave out %.2e of the dual snapshots' energy\n",
             (int)t->n_samples, (int)t->n_modes, (int)t->n_supremizers, (int)t->n_dual_modes, (double)t->dual_misfit));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (t->type == HYCO_MODEL_CONDENSED) {
+    PetscCall(Say("condensed: %d snapshots, flexibility at %d points; one training value left out, relative: "
+                  "flexibility %.1e, gap %.1e, forces %.1e; %d displacement modes\n",
+                  (int)t->n_samples, (int)t->n_flexibilities, (double)t->left_out[0], (double)t->left_out[1],
+                  (double)t->left_out[2], (int)t->n_modes));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t->n_samples,

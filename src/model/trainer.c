@@ -30,6 +30,7 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t)
   PetscCall(HycoPairsDestroy(&t->pairs));
   PetscCall(HycoMeshDestroy(&t->whole));
   PetscCall(PetscFree(t->grown));
+  PetscCall(HycoCondensedDestroy(&t->condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -148,9 +149,9 @@ static PetscErrorCode ReadType(HycoTrainer t)
   t->type = (HycoModelType)type;
   t->dual = (HycoDual)dual;
   HycoCheck(t->type == HYCO_MODEL_PROJECTION || t->dual == HYCO_DUAL_FE,
-            "-hyco_dual %s is for -hyco_model_type projection; the hybrid model has the finite-element forces",
+            "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
             HycoDuals[dual]);
-  if (t->type == HYCO_MODEL_HYBRID) PetscFunctionReturn(PETSC_SUCCESS);
+  if (t->type != HYCO_MODEL_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
   if (t->dual == HYCO_DUAL_FE) {
     PetscBool set;
 
