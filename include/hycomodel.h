@@ -27,7 +27,8 @@ typedef struct {
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
   PetscReal strain_energy;                                         /* of the RID */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
-  PetscReal interpolation_error; /* condensed: of the forces, relative, one training value left out; else 0 */
+  PetscReal interpolation_error; /* condensed: of the forces, relative, one training value left out, more outside
+                                    the values; else 0 */
   HycoKKT kkt; /* of the reduced system (38) or (44); condensed: of w = g + G L, equilibrium (0) holding by its form */
   char method[64]; /* what solved, in words */
   HycoReason reason;

@@ -88,6 +88,9 @@ PetscErrorCode HycoChebyshevNodes(PetscInt n, PetscReal lo, PetscReal hi, PetscR
    many as there are); node `skip` is left out, its weight 0 (-1: none). */
 PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt degree, PetscInt skip, PetscReal at,
                                      PetscReal weight[]);
+/* By how much the remainder of interpolation grows from the nodes' interval to a point outside: the product of the
+   distances to the nodes over its largest value inside; 1 inside. */
+PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at);
 PetscInt HycoTensorSize(const HycoTensor *t);
 /* The weights of all grid nodes; the nodes with number `skip` along `axis` left out (-1, -1: none). */
 PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscInt axis, PetscInt skip,

@@ -29,13 +29,19 @@ struct _n_HycoCondensed {
   PetscReal *x[HYCO_MAX_PARAMETERS];                                /* ascending */
   PetscInt stiff[HYCO_MAX_PARAMETERS], affine[HYCO_MAX_PARAMETERS]; /* reaches K or B; F and D are affine in it */
   HycoGridField field[HYCO_N_FIELDS];
+  PetscReal *bounds;   /* by node of G: lower and upper of it by the middle node's G; 0, 0: none are known */
   PetscReal *Lambda;   /* m x nodes of the whole grid: training forces */
   PetscReal errors[3]; /* one node left out: G, g, forces; relative */
-  /* training only: the sample of each node of the whole grid */
+  /* training only: the error of the forces by parameter; the sample of each node of the whole grid */
+  PetscReal by_parameter[HYCO_MAX_PARAMETERS];
+  PetscBool target_met; /* the points were chosen, and the target was reached */
   PetscInt *sample;
   /* online */
   PetscBool current; /* M and H hold the stiffness's parameters `at` */
   PetscReal at[HYCO_MAX_PARAMETERS];
+  PetscBool solved; /* active is the set of the solution at `last` */
+  PetscReal last[HYCO_MAX_PARAMETERS];
+  PetscReal gap_size;                           /* largest |g| in training */
   PetscReal *packed, *M, *work, *g, *H, *a, *w; /* M: G, m x m */
   PetscBool *active;
 };
@@ -50,6 +56,8 @@ PetscErrorCode HycoCondensedPrepare(HycoCondensed condensed);
 /* To and from the model's file. */
 PetscErrorCode HycoCondensedSave(HycoModel model, HycoH5 file);
 PetscErrorCode HycoCondensedLoad(HycoModel model, HycoH5 file);
+/* The bounds of G at its nodes. */
+PetscErrorCode HycoCondensedBound(HycoCondensed condensed);
 /* A field at mu, the nodes with number `skip` along `axis` left out (-1, -1: none). */
 PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *field, const PetscReal mu[], PetscInt axis, PetscInt skip,
                                      PetscReal value[]);

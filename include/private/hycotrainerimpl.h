@@ -28,6 +28,8 @@ struct _p_HycoTrainer {
   HycoModelType type;
   HycoDual dual;
   PetscInt nnmf_max_its, nnmf_vectors;
+  PetscReal condensed_tol; /* where the points are chosen */
+  PetscInt condensed_max_values;
   HycoProgress progress;
   void *progress_ctx;
   struct {
@@ -83,10 +85,16 @@ PetscErrorCode HycoTrainerEnrich(HycoTrainer t);
 /* The force basis of a projection-based model under training from its dual snapshots; fills numbers[]. Rank 0. */
 PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel model);
 /* A condensed model: checks that scene and samples are fit for one, before hours of work; after the modes, G and H at
-   all their nodes, factoring where no file has them. Collective. */
+   all their nodes (`modes` false: G alone), factoring where no file has them. Collective. */
 PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t);
-PetscErrorCode HycoTrainerFlexibility(HycoTrainer t, HycoSnapshots store);
-/* Its fields, degrees and errors, handed to the model; fills numbers[]. Rank 0. */
+PetscErrorCode HycoTrainerFlexibility(HycoTrainer t, HycoSnapshots store, PetscBool modes);
+/* The points of a condensed training that names none: two values of each parameter, to begin with; after
+   HycoTrainerBeginCondensed(), solving and factoring on the way, those that meet -hyco_condensed_tol, in *samples (the
+   caller's), the bases made. Collective. */
+PetscErrorCode HycoTrainerStartPoints(HycoTrainer t, HycoSamples *samples);
+PetscErrorCode HycoTrainerChoosePoints(HycoTrainer t, HycoSnapshots store, HycoSamples *samples);
+/* Its fields, degrees and errors; the same, handed to the model, with numbers[]. Rank 0. */
+PetscErrorCode HycoTrainerFillFields(HycoTrainer t);
 PetscErrorCode HycoTrainerCondense(HycoTrainer t, HycoModel model);
 /* Fills numbers[]: condition and mean training errors of the model as it stands. Rank 0. */
 PetscErrorCode HycoTrainerJudge(HycoTrainer t, HycoModel model);

@@ -67,6 +67,22 @@ PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt d
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at)
+{
+  PetscReal inside = 0, there = 1;
+
+  if (n < 2 || (at >= x[0] && at <= x[n - 1])) return 1;
+  for (PetscInt k = 0; k < n; k++) there *= PetscAbsReal(at - x[k]) / (x[n - 1] - x[0]);
+  for (PetscInt s = 1; s < 20 * n; s++) {
+    const PetscReal y = x[0] + (x[n - 1] - x[0]) * (PetscReal)s / (20 * (PetscReal)n);
+    PetscReal product = 1;
+
+    for (PetscInt k = 0; k < n; k++) product *= PetscAbsReal(y - x[k]) / (x[n - 1] - x[0]);
+    inside = PetscMax(inside, product);
+  }
+  return PetscMax(1, there / inside);
+}
+
 PetscInt HycoTensorSize(const HycoTensor *t)
 {
   PetscInt size = 1;

@@ -121,9 +121,10 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
 /* An option of the reduction given where nothing is reduced. */
 static PetscErrorCode CheckTraining(const Command *command, const char name[])
 {
-  static const char *const training[] = {"hyco_model_type",    "hyco_dual",      "hyco_nnmf_",   "hyco_pod_",
-                                         "hyco_deim_",         "hyco_rid_",      "hyco_hybrid",  "hyco_scan",
-                                         "hyco_keep_singular", "hyco_snapshots", "hyco_greedy_", NULL};
+  static const char *const training[] = {
+      "hyco_model_type", "hyco_dual",    "hyco_nnmf_", "hyco_pod_",          "hyco_deim_",
+      "hyco_rid_",       "hyco_hybrid",  "hyco_scan",  "hyco_keep_singular", "hyco_condensed_",
+      "hyco_snapshots",  "hyco_greedy_", NULL};
 
   PetscFunctionBegin;
   if (command->run == CommandTrain) PetscFunctionReturn(PETSC_SUCCESS);

@@ -90,7 +90,7 @@ PetscErrorCode CommandTrain(void)
   HycoTrainer trainer;
   HycoTraining t;
   GreedyLog log = {0};
-  PetscBool given, greedy = PETSC_FALSE;
+  PetscBool given, chooses, greedy = PETSC_FALSE;
   char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
 
   PetscFunctionBegin;
@@ -100,18 +100,21 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
   PetscCall(HycoOptionsBool(NULL, "greedy", &greedy));
-  HycoCheck(given || greedy,
-            "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
+  PetscCall(HycoTrainerChooses(trainer, &chooses));
+  HycoCheck(given || greedy || chooses,
+            "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
   if (greedy) PetscCall(DriverReadGreedy(scene, trainer, &training, &log));
   PetscCall(DriverCheckLeftEarly(scene));
   if (greedy)
     PetscCall(HycoTrainerRunGreedy(trainer, given ? samples : NULL, training, model, &t));
   else
-    PetscCall(HycoTrainerRun(trainer, samples, model, &t));
+    PetscCall(HycoTrainerRun(trainer, given ? samples : NULL, model, &t));
   PetscCall(SayBases(&t));
+  if (!given && t.type == HYCO_MODEL_CONDENSED && !t.target_met)
+    PetscCall(Say("-hyco_condensed_tol was not reached with -hyco_condensed_max_values\n"));
   PetscCall(Say("mean training errors: u %.2e, %sforces %.2e; condition of the reduced stiffness %.1e\n",
                 (double)t.error_u, t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda,
                 (double)t.condition));

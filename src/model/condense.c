@@ -186,6 +186,7 @@ PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t)
   PetscCall(FindGrid(t, c));
   HycoOnRoot(t->comm, Inspect(t, c));
   PetscCallMPI(MPI_Bcast(c->stiff, HYCO_MAX_PARAMETERS, MPIU_INT, 0, t->comm));
+  PetscCallMPI(MPI_Bcast(c->affine, HYCO_MAX_PARAMETERS, MPIU_INT, 0, t->comm));
   PetscCall(HycoCondensedAllocate(c));
   HycoCheck((PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=
                 MOST_NUMBERS,
@@ -219,7 +220,7 @@ static PetscErrorCode Paths(HycoTrainer t, HycoSnapshots store, PetscInt k, cons
   StiffPoint(c, k, mu, key);
   hash = HycoHash(HYCO_HASH_START, key, (size_t)c->dim * sizeof(PetscReal));
   PetscCall(PetscSNPrintf(G, PETSC_MAX_PATH_LEN, "%s/flexibility-%016llx.h5", store->folder, hash));
-  hash = HycoHash(hash, V, (size_t)(t->sizes[0] * t->sizes[3]) * (size_t)t->l * sizeof(PetscReal));
+  hash = HycoHash(hash, V, (size_t)(t->sizes[0] * t->sizes[3]) * (size_t)c->l * sizeof(PetscReal));
   PetscCall(PetscSNPrintf(H, PETSC_MAX_PATH_LEN, "%s/modes-%016llx.h5", store->folder, hash));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -271,12 +272,12 @@ static PetscErrorCode FindMissing(HycoTrainer t, HycoSnapshots store, PetscInt *
   *n_missing = 0;
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(Paths(t, store, k, t->V_whole, G, H));
-    if (access(G, F_OK) || access(H, F_OK)) {
+    if (access(G, F_OK) || (t->condensed->l && access(H, F_OK))) {
       missing[(*n_missing)++] = k;
       continue;
     }
     PetscCall(ReadOne(store, G, "G", 0, 0, NULL));
-    PetscCall(ReadOne(store, H, "H", 0, 0, NULL));
+    if (t->condensed->l) PetscCall(ReadOne(store, H, "H", 0, 0, NULL));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -289,7 +290,7 @@ static PetscErrorCode WriteBoth(HycoTrainer t, HycoSnapshots store, PetscInt k, 
   PetscFunctionBegin;
   PetscCall(Paths(t, store, k, V, path[0], path[1]));
   PetscCall(WriteOne(store, path[0], "G", t->condensed->field[HYCO_FIELD_G].rows, 1, G));
-  PetscCall(WriteOne(store, path[1], "H", t->l, t->condensed->m, H));
+  if (t->condensed->l) PetscCall(WriteOne(store, path[1], "H", t->condensed->l, t->condensed->m, H));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -303,10 +304,10 @@ static PetscErrorCode FactorGroup(HycoTrainer t, HycoSnapshots store, MPI_Comm g
 
   PetscFunctionBegin;
   PetscCall(HycoFOMCreate(group, t->scene, &fom));
-  PetscCall(PetscMalloc2(c->field[HYCO_FIELD_G].rows, &G, t->l * c->m, &H));
+  PetscCall(PetscMalloc2(c->field[HYCO_FIELD_G].rows, &G, c->l * c->m, &H));
   for (PetscInt k = color * n_missing / groups; k < (color + 1) * n_missing / groups; k++) {
     StiffPoint(c, missing[k], mu, key);
-    PetscCall(HycoFOMFlexibility(fom, mu, t->l, V, G, H));
+    PetscCall(HycoFOMFlexibility(fom, mu, c->l, V, G, H));
     HycoOnRoot(group, WriteBoth(t, store, missing[k], V, G, H));
   }
   PetscCall(PetscFree2(G, H));
@@ -322,27 +323,30 @@ static PetscErrorCode ReadFields(HycoTrainer t, HycoSnapshots store)
   char path[2][PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
+  PetscCall(PetscFree(G->data));
+  PetscCall(PetscFree(H->data));
   PetscCall(PetscMalloc1((size_t)G->rows * (size_t)n, &G->data));
   PetscCall(PetscMalloc1((size_t)H->rows * (size_t)n, &H->data));
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(Paths(t, store, k, t->V_whole, path[0], path[1]));
     PetscCall(ReadOne(store, path[0], "G", G->rows, 1, G->data + (size_t)k * (size_t)G->rows));
-    PetscCall(ReadOne(store, path[1], "H", t->l, t->condensed->m, H->data + (size_t)k * (size_t)H->rows));
+    if (H->rows)
+      PetscCall(ReadOne(store, path[1], "H", t->condensed->l, t->condensed->m, H->data + (size_t)k * (size_t)H->rows));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTrainerFlexibility(HycoTrainer t, HycoSnapshots store)
+PetscErrorCode HycoTrainerFlexibility(HycoTrainer t, HycoSnapshots store, PetscBool modes)
 {
   HycoCondensed c = t->condensed;
-  const PetscInt N = t->sizes[0] * t->sizes[3] * t->l;
+  const PetscInt l = modes ? t->l : 0, N = t->sizes[0] * t->sizes[3] * l;
   PetscInt n_missing = 0, *missing, groups = 1, color;
   PetscMPIInt size;
   PetscReal *V;
   MPI_Comm group;
 
   PetscFunctionBegin;
-  c->l = t->l;
+  c->l = l;
   PetscCall(HycoCondensedAllocate(c));
   PetscCallMPI(MPI_Comm_size(t->comm, &size));
   PetscCall(PetscMalloc1(HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), &missing));
@@ -351,7 +355,7 @@ PetscErrorCode HycoTrainerFlexibility(HycoTrainer t, HycoSnapshots store)
   PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, t->comm));
   if (n_missing) {
     PetscCall(PetscMalloc1(N, &V));
-    if (t->rank == 0) PetscCall(PetscArraycpy(V, t->V_whole, N));
+    if (t->rank == 0) PetscCall(PetscArraycpy(V, t->V_whole, N)); /* l is t->l or 0 */
     PetscCallMPI(MPI_Bcast(V, (PetscMPIInt)N, MPIU_REAL, 0, t->comm));
     PetscCall(HycoSnapshotsChooseGroups(t->comm, t->scene, n_missing, &groups));
     color = (PetscInt)t->rank * groups / size;
@@ -416,6 +420,9 @@ static PetscErrorCode FromSnapshots(HycoTrainer t, HycoCondensed c)
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, NULL, &mu));
+  PetscCall(PetscFree(gap->data));
+  PetscCall(PetscFree(unloaded->data));
+  PetscCall(PetscFree(c->Lambda));
   PetscCall(PetscMalloc1(m * n, &gap->data));
   PetscCall(PetscMalloc1(l * n, &unloaded->data));
   PetscCall(PetscMalloc1(m * n, &c->Lambda));
@@ -427,7 +434,7 @@ static PetscErrorCode FromSnapshots(HycoTrainer t, HycoCondensed c)
     PetscCall(FreeGap(t, mu + s * c->dim, t->U + (size_t)s * n_dof, L, G->data + (size_t)node * (size_t)G->rows,
                       gap->data + k * m));
     for (PetscInt j = 0; j < l; j++) {
-      unloaded->data[k * l + j] = t->VtU[s * l + j];
+      unloaded->data[k * l + j] = t->VtU[s * t->l + j];
       for (PetscInt i = 0; i < m; i++) unloaded->data[k * l + j] += h[j * m + i] * L[i];
     }
   }
@@ -438,6 +445,7 @@ static PetscErrorCode FromSnapshots(HycoTrainer t, HycoCondensed c)
 static PetscErrorCode ChooseDegrees(HycoCondensed c)
 {
   PetscFunctionBegin;
+  PetscCall(PetscArrayzero(c->errors, 3));
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) {
     HycoGridField *field = &c->field[f];
 
@@ -509,9 +517,20 @@ static PetscErrorCode ForceError(HycoTrainer t, HycoCondensed c)
           LeaveOut(c, p, k / stride % c->n[p], k, mu + c->sample[k] * c->dim, largest, &last, &definite, L, &error));
       worst = PetscMax(worst, error);
     }
+    c->by_parameter[p] = worst;
     c->errors[2] += worst;
   }
   PetscCall(PetscFree(L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerFillFields(HycoTrainer t)
+{
+  PetscFunctionBegin;
+  PetscCall(FromSnapshots(t, t->condensed));
+  PetscCall(ChooseDegrees(t->condensed));
+  PetscCall(HycoCondensedBound(t->condensed));
+  PetscCall(ForceError(t, t->condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -520,9 +539,7 @@ PetscErrorCode HycoTrainerCondense(HycoTrainer t, HycoModel m)
   HycoCondensed c = t->condensed;
 
   PetscFunctionBegin;
-  PetscCall(FromSnapshots(t, c));
-  PetscCall(ChooseDegrees(c));
-  PetscCall(ForceError(t, c));
+  PetscCall(HycoTrainerFillFields(t));
   m->condensed = c;
   t->condensed = NULL;
   m->n_dual = 0; /* nothing is reconstructed */

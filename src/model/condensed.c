@@ -1,8 +1,9 @@
 /*
   The condensed model, online: the exact dual problem of linear elasticity, small and dense in the forces, with its
   matrix and vector interpolated over the parameters (hycocondensed.h). Interpolated entry by entry, G may lose its
-  definiteness between nodes; a Cholesky factorisation looks, and such a point is refused. A definite G gives one
-  solution, so the start of the active set, the forces of the nearest training point, decides nothing but the time.
+  definiteness between nodes: bounds of the nodes' matrices by one of them, found in training, show that it does not, or
+  else a Cholesky factorisation looks; a point where it does is refused. A definite G gives one solution, so the start
+  of the active set, the forces of the nearest training point, decides nothing but the time.
 */
 #include <hycocondensed.h>
 #include <hycomodelimpl.h>
@@ -36,6 +37,7 @@ PetscErrorCode HycoCondensedDestroy(HycoCondensed *condensed)
   for (PetscInt p = 0; p < c->dim; p++) PetscCall(PetscFree(c->x[p]));
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) PetscCall(PetscFree(c->field[f].data));
   PetscCall(PetscFree(c->Lambda));
+  PetscCall(PetscFree(c->bounds));
   PetscCall(PetscFree(c->sample));
   PetscCall(PetscFree(c->packed));
   PetscCall(PetscFree(c->M));
@@ -71,15 +73,20 @@ PetscErrorCode HycoCondensedAllocate(HycoCondensed c)
 
 PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
 {
+  const HycoGridField *gap = &c->field[HYCO_FIELD_GAP];
   const size_t m = (size_t)c->m;
 
   PetscFunctionBegin;
+  c->gap_size = 0;
+  for (size_t k = 0; k < (size_t)HycoTensorSize(&gap->tensor) * m; k++)
+    c->gap_size = PetscMax(c->gap_size, PetscAbsReal(gap->data[k]));
+  PetscCall(PetscFree(c->H));
+  PetscCall(PetscFree(c->a));
+  PetscCall(PetscMalloc1(c->l * c->m + 1, &c->H));
+  PetscCall(PetscMalloc1(c->l + 1, &c->a));
   if (c->M) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(m * (m + 1) / 2 + 1, &c->packed));
   PetscCall(PetscMalloc1(m * m + 1, &c->M));
-  PetscCall(PetscMalloc1(m * m + 1, &c->work));
-  PetscCall(PetscMalloc1(c->l * c->m + 1, &c->H));
-  PetscCall(PetscMalloc1(c->l + 1, &c->a));
   PetscCall(PetscMalloc1(m + 1, &c->g));
   PetscCall(PetscMalloc1(m + 1, &c->w));
   PetscCall(PetscCalloc1(m + 1, &c->active));
@@ -106,33 +113,122 @@ PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *f, const PetscReal mu[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Both triangles of M from the columns of the lower one. */
+#define TILE 64
+
+/* Both triangles of M from the columns of the lower one, by tiles, so that the transposed entries stay near. */
 static void Unpack(PetscInt m, const PetscReal packed[], PetscReal M[])
 {
-  for (PetscInt j = 0; j < m; j++) {
-    const PetscReal *column = packed;
+  for (PetscInt jb = 0; jb < m; jb += TILE) {
+    for (PetscInt ib = jb; ib < m; ib += TILE) {
+      for (PetscInt j = jb; j < PetscMin(jb + TILE, m); j++) {
+        const PetscReal *column = packed + (size_t)j * (size_t)(2 * m - j + 1) / 2;
 
-    packed += m - j;
-    for (PetscInt i = j; i < m; i++) M[(size_t)j * (size_t)m + (size_t)i] = column[i - j];
-    for (PetscInt i = j; i < m; i++) M[(size_t)i * (size_t)m + (size_t)j] = column[i - j];
+        for (PetscInt i = PetscMax(ib, j); i < PetscMin(ib + TILE, m); i++) {
+          M[(size_t)j * (size_t)m + (size_t)i] = column[i - j];
+          M[(size_t)i * (size_t)m + (size_t)j] = column[i - j];
+        }
+      }
+    }
   }
 }
 
-PetscErrorCode HycoCondensedFlexibility(HycoCondensed c, const PetscReal mu[], PetscInt axis, PetscInt skip,
-                                        PetscBool *definite)
+/* Whether a packed matrix, shifted by a share of its largest diagonal entry, has a Cholesky factor. */
+static PetscErrorCode HasFactor(HycoCondensed c, const PetscReal packed[], PetscReal share, PetscBool *definite)
 {
   PetscReal largest = 0;
   PetscBLASInt m, info;
 
   PetscFunctionBegin;
-  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_G], mu, axis, skip, c->packed));
-  Unpack(c->m, c->packed, c->M);
-  PetscCall(PetscArraycpy(c->work, c->M, (size_t)c->m * (size_t)c->m));
+  if (!c->work) PetscCall(PetscMalloc1((size_t)c->m * (size_t)c->m, &c->work));
+  Unpack(c->m, packed, c->work);
   for (PetscInt i = 0; i < c->m; i++) largest = PetscMax(largest, c->work[(size_t)i * (size_t)(c->m + 1)]);
-  for (PetscInt i = 0; i < c->m; i++) c->work[(size_t)i * (size_t)(c->m + 1)] += SEMIDEFINITE * largest;
+  for (PetscInt i = 0; i < c->m; i++) c->work[(size_t)i * (size_t)(c->m + 1)] += share * largest;
   PetscCall(PetscBLASIntCast(c->m, &m));
   LAPACKpotrf_("L", &m, c->work, &m, &info);
   *definite = (PetscBool)(info == 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The narrowest of some intervals about the ratio of the traces with lower R <= G_k <= upper R, R the middle node's. */
+static PetscErrorCode BoundNode(HycoCondensed c, const PetscReal R[], const PetscReal G[], PetscReal bound[2])
+{
+  static const PetscReal widths[] = {0.01, 0.05, 0.2, 0.5};
+  const PetscInt rows = c->field[HYCO_FIELD_G].rows;
+  PetscReal *difference, trace[2] = {0, 0};
+  PetscBool definite = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  bound[0] = bound[1] = 0; /* none */
+  PetscCall(PetscMalloc1(rows, &difference));
+  for (PetscInt j = 0, at = 0; j < c->m; at += c->m - j++) {
+    trace[0] += R[at];
+    trace[1] += G[at];
+  }
+  for (int k = 0; k < 4 && !definite; k++) {
+    const PetscReal low = (1 - widths[k]) * trace[1] / trace[0], high = (1 + widths[k]) * trace[1] / trace[0];
+
+    for (PetscInt r = 0; r < rows; r++) difference[r] = G[r] - low * R[r];
+    PetscCall(HasFactor(c, difference, 0, &definite));
+    if (!definite) continue;
+    for (PetscInt r = 0; r < rows; r++) difference[r] = high * R[r] - G[r];
+    PetscCall(HasFactor(c, difference, 0, &definite));
+    if (!definite) continue;
+    bound[0] = low;
+    bound[1] = high;
+  }
+  PetscCall(PetscFree(difference));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedBound(HycoCondensed c)
+{
+  const HycoGridField *G = &c->field[HYCO_FIELD_G];
+  const PetscInt n = HycoTensorSize(&G->tensor);
+  const PetscReal *R = G->data + (size_t)(n / 2) * (size_t)G->rows;
+  PetscBool definite;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(c->bounds));
+  PetscCall(PetscCalloc1(2 * n, &c->bounds));
+  PetscCall(HasFactor(c, R, 0, &definite));
+  for (PetscInt k = 0; definite && k < n; k++) {
+    if (k == n / 2)
+      c->bounds[2 * k] = c->bounds[2 * k + 1] = 1;
+    else
+      PetscCall(BoundNode(c, R, G->data + (size_t)k * (size_t)G->rows, c->bounds + 2 * k));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether sum of w_k G_k >= (sum of w_k times its lower or, where w_k < 0, upper bound) R is definite by that alone. */
+static PetscErrorCode KnownDefinite(HycoCondensed c, const PetscReal mu[], PetscInt axis, PetscInt skip,
+                                    PetscBool *known)
+{
+  const HycoTensor *t = &c->field[HYCO_FIELD_G].tensor;
+  const PetscInt n = HycoTensorSize(t);
+  PetscReal *w, sum = 0;
+
+  PetscFunctionBegin;
+  *known = PETSC_TRUE;
+  PetscCall(PetscMalloc1(n, &w));
+  PetscCall(HycoTensorWeights(t, mu, axis, skip, w));
+  for (PetscInt k = 0; k < n; k++) {
+    sum += w[k] * c->bounds[2 * k + (w[k] < 0)];
+    if (c->bounds[2 * k] <= 0 && w[k] < 0) *known = PETSC_FALSE;
+  }
+  *known = (PetscBool)(*known && sum > 1e-3);
+  PetscCall(PetscFree(w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedFlexibility(HycoCondensed c, const PetscReal mu[], PetscInt axis, PetscInt skip,
+                                        PetscBool *definite)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_G], mu, axis, skip, c->packed));
+  Unpack(c->m, c->packed, c->M);
+  PetscCall(KnownDefinite(c, mu, axis, skip, definite));
+  if (!*definite) PetscCall(HasFactor(c, c->packed, SEMIDEFINITE, definite));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -147,7 +243,7 @@ static PetscErrorCode BringStiffness(HycoCondensed c, const PetscReal mu[])
   c->current = PETSC_FALSE;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
   HycoCheck(definite,
-            "the interpolated flexibility is not positive definite here (left-one-out error %.1e): train on "
+            "the interpolated flexibility is not positive definite here (one value left out: error %.1e): train on "
             "more values of the parameters that reach the stiffness",
             (double)c->errors[0]);
   PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_H], mu, -1, -1, c->H));
@@ -156,20 +252,25 @@ static PetscErrorCode BringStiffness(HycoCondensed c, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The active contacts of the nearest training point. */
+/* The active contacts of the nearest training point, or of the last prediction where that is nearer. The solution does
+   not depend on it: it is that of the last set's equations. */
 static void StartSet(HycoCondensed c, const PetscReal mu[])
 {
   PetscInt node = 0;
+  PetscReal there = 0, back = 0;
 
   for (PetscInt p = 0; p < c->dim; p++) {
+    const PetscReal width = c->n[p] > 1 ? c->x[p][c->n[p] - 1] - c->x[p][0] : 1;
     PetscInt nearest = 0;
 
     for (PetscInt k = 1; k < c->n[p]; k++) {
       if (PetscAbsReal(c->x[p][k] - mu[p]) < PetscAbsReal(c->x[p][nearest] - mu[p])) nearest = k;
     }
     node = node * c->n[p] + nearest;
+    there += PetscSqr((c->x[p][nearest] - mu[p]) / width);
+    back += PetscSqr((c->last[p] - mu[p]) / width);
   }
-  for (PetscInt i = 0; i < c->m; i++)
+  for (PetscInt i = 0; (!c->solved || there < back) && i < c->m; i++)
     c->active[i] = (PetscBool)(c->Lambda[(size_t)node * (size_t)c->m + (size_t)i] > 0);
 }
 
@@ -283,13 +384,21 @@ PetscErrorCode HycoCondensedPredict(HycoModel m, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(BringStiffness(c, mu));
   PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_GAP], mu, -1, -1, c->g));
+  for (PetscInt i = 0; i < c->m; i++) { /* a closed gap without load is 0, not round-off that presses or not */
+    if (PetscAbsReal(c->g[i]) <= 1e-14 * c->gap_size) c->g[i] = 0;
+  }
   solve = HycoNow();
   p->seconds.factor = 0;
   p->seconds.assemble = solve - begin;
   PetscCall(SolveForces(m, mu));
+  c->solved = (PetscBool)(p->reason == HYCO_CONVERGED && m->solver->type == HYCO_TYPE_ACTIVE_SET);
+  PetscCall(PetscArraycpy(c->last, mu, c->dim));
   p->seconds.solve = HycoNow() - solve;
   PetscCall(Displacements(m, mu));
   p->interpolation_error = c->errors[2];
+  for (PetscInt q = 0; q < c->dim; q++) {
+    if (!c->affine[q]) p->interpolation_error *= HycoPolynomialGrowth(c->n[q], c->x[q], mu[q]);
+  }
   p->seconds.total = HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,6 +22,7 @@ PetscErrorCode HycoCondensedSave(HycoModel m, HycoH5 h)
   PetscCall(HycoH5WriteInt(h, "condensed/affine", c->dim, 1, c->affine));
   PetscCall(HycoH5WriteReal(h, "condensed/left_out", 3, 1, c->errors));
   PetscCall(HycoH5WriteReal(h, "condensed/lambda", HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), c->m, c->Lambda));
+  PetscCall(HycoH5WriteReal(h, "condensed/bounds", HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), 2, c->bounds));
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) {
     const HycoGridField *field = &c->field[f];
 
@@ -84,7 +85,7 @@ static PetscErrorCode LoadField(HycoH5 h, HycoCondensed c, PetscInt f)
 PetscErrorCode HycoCondensedLoad(HycoModel m, HycoH5 h)
 {
   HycoCondensed c;
-  PetscInt n, three = 3, one = 1;
+  PetscInt n, three = 3, two = 2, one = 1;
   PetscReal *errors;
 
   PetscFunctionBegin;
@@ -99,6 +100,10 @@ PetscErrorCode HycoCondensedLoad(HycoModel m, HycoH5 h)
   PetscCall(PetscFree(errors));
   n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
   PetscCall(HycoH5LoadReal(h, "condensed/lambda", &n, &c->m, &c->Lambda));
+  n = HycoTensorSize(&c->field[HYCO_FIELD_G].tensor);
+  PetscCall(HycoH5LoadReal(h, "condensed/bounds", &n, &two, &c->bounds));
+  for (PetscInt k = 0; k < n; k++)
+    HycoCheck(c->bounds[2 * k] >= 0 && c->bounds[2 * k + 1] >= c->bounds[2 * k], "condensed/bounds is damaged");
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) PetscCall(LoadField(h, c, f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

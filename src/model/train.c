@@ -159,6 +159,7 @@ static void Report(HycoTrainer t, HycoModel m, HycoTraining *r)
   r->type = m->type;
   r->dual_misfit = m->dual_misfit;
   if (m->condensed) {
+    r->target_met = m->condensed->target_met;
     r->n_flexibilities = HycoTensorSize(&m->condensed->field[HYCO_FIELD_G].tensor);
     for (PetscInt k = 0; k < 3; k++) r->left_out[k] = m->condensed->errors[k];
   }
@@ -271,19 +272,30 @@ PetscErrorCode HycoTrainerOpen(HycoTrainer t, HycoSamples samples, const char pa
 PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;
+  HycoSamples chosen = NULL;
   HycoTraining report = {0};
   PetscReal begin = HycoNow(), solved;
+  const PetscBool condensed = (PetscBool)(t && t->type == HYCO_MODEL_CONDENSED), choose = (PetscBool)!samples;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
+  HycoCheck(samples || condensed, "give the training points");
+  if (choose) {
+    PetscCall(HycoTrainerStartPoints(t, &chosen));
+    samples = chosen;
+  }
   PetscCall(HycoTrainerOpen(t, samples, path, &store));
-  if (t->type == HYCO_MODEL_CONDENSED) PetscCall(HycoTrainerBeginCondensed(t));
-  PetscCall(HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
+  if (condensed) PetscCall(HycoTrainerBeginCondensed(t));
+  if (choose)
+    PetscCall(HycoTrainerChoosePoints(t, store, &chosen));
+  else
+    PetscCall(HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
   solved = HycoNow();
-  PetscCall(HycoTrainerReduce(t, store));
-  if (t->type == HYCO_MODEL_CONDENSED) PetscCall(HycoTrainerFlexibility(t, store));
+  if (!choose) PetscCall(HycoTrainerReduce(t, store));
+  if (condensed) PetscCall(HycoTrainerFlexibility(t, store, PETSC_TRUE));
   PetscCall(HycoSnapshotsDestroy(&store));
   PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, &report));
+  PetscCall(HycoSamplesDestroy(&chosen));
   report.seconds_snapshots = solved - begin;
   report.seconds_reduction = HycoNow() - solved;
   if (training) *training = report;

@@ -14,6 +14,8 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   t->scene = scene;
   t->noise = 1e-11;
   t->nnmf_max_its = 100;
+  t->condensed_tol = 1e-7;
+  t->condensed_max_values = 24;
   t->greedy.target = 1e-3;
   t->ridge = -1;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
@@ -69,6 +71,14 @@ PetscErrorCode HycoTrainerSetSnapshotFolder(HycoTrainer t, const char folder[])
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
   PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerChooses(HycoTrainer t, PetscBool *chooses)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  *chooses = (PetscBool)(t->type == HYCO_MODEL_CONDENSED);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -146,6 +156,8 @@ static PetscErrorCode ReadType(HycoTrainer t)
   PetscCall(HycoOptionsWord(o, "hyco_dual", HycoDuals, &dual));
   PetscCall(HycoOptionsInt(o, "hyco_nnmf_max_its", 1, PETSC_MAX_INT, &t->nnmf_max_its));
   PetscCall(HycoOptionsInt(o, "hyco_nnmf_vectors", 0, PETSC_MAX_INT, &t->nnmf_vectors));
+  PetscCall(HycoOptionsReal(o, "hyco_condensed_tol", 0, 1, &t->condensed_tol));
+  PetscCall(HycoOptionsInt(o, "hyco_condensed_max_values", 3, 1000, &t->condensed_max_values));
   t->type = (HycoModelType)type;
   t->dual = (HycoDual)dual;
   HycoCheck(t->type == HYCO_MODEL_PROJECTION || t->dual == HYCO_DUAL_FE,
