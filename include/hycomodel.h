@@ -1,5 +1,6 @@
 /* HycoModel: the reduced model of a file, hybrid hyper-reduced (38)-(41), where online nothing of the full mesh is
-   known, or projection-based (44), on the whole mesh. */
+   known; projection-based (44), on the whole mesh; or condensed on the contact forces, interpolated over the
+   parameters. */
 #ifndef HYCOMODEL_H
 #define HYCOMODEL_H
 
@@ -11,8 +12,8 @@ extern "C" {
 
 typedef struct _p_HycoModel *HycoModel;
 
-typedef enum { HYCO_MODEL_HYBRID, HYCO_MODEL_PROJECTION } HycoModelType; /* -hyco_model_type */
-extern const char *const HycoModelTypes[];                               /* their words; NULL ends */
+typedef enum { HYCO_MODEL_HYBRID, HYCO_MODEL_PROJECTION, HYCO_MODEL_CONDENSED } HycoModelType; /* -hyco_model_type */
+extern const char *const HycoModelTypes[]; /* their words; NULL ends */
 
 /* What a prediction amounts to, in scene units. Of a projection-based model the RID is the whole mesh. */
 typedef struct {
@@ -26,13 +27,15 @@ typedef struct {
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
   PetscReal strain_energy;                                         /* of the RID */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
-  HycoKKT kkt;                                                     /* of the reduced system (38) or (44) */
-  char method[64];                                                 /* what solved, in words */
   /* An upper estimate of the relative errors of u (whole mesh, 2-norm) and of all contact forces (2-norm; a force below
      a tenth of the largest in training counts as that tenth), calibrated at training; < 0: the model has none, or the
      solve did not converge. */
   PetscReal estimated_error_u, estimated_error_lambda;
   PetscReal beyond; /* how far the parameters lie outside the ranges: the most, as a share of the parameter's range */
+  PetscReal interpolation_error; /* condensed: of the forces, relative, one training value left out, more outside
+                                    the values; else 0 */
+  HycoKKT kkt; /* of the reduced system (38) or (44); condensed: of w = g + G L, equilibrium (0) holding by its form */
+  char method[64]; /* what solved, in words */
   HycoReason reason;
   HycoSeconds seconds;
 } HycoPrediction;
@@ -57,8 +60,8 @@ PetscErrorCode HycoModelGetScene(HycoModel model, HycoScene *scene);
    file's bytes). Collective on the scene's communicator. */
 PetscErrorCode HycoModelCheckScene(HycoModel model, HycoScene scene);
 
-/* Solves (38) or (44) at mu (length n) and reconstructs the contact forces, (41) or V_lambda. Not collective. Fails
-   outside the trained ranges; not converging is no error: see HycoPrediction.reason. */
+/* Solves (38), (44) or the condensed problem at mu (length n) and reconstructs the contact forces, (41) or V_lambda.
+   Not collective. Fails outside the trained ranges; not converging is no error: see HycoPrediction.reason. */
 PetscErrorCode HycoModelPredict(HycoModel model, PetscInt n, const PetscReal mu[]);
 /* Whether Predict takes parameters outside the trained ranges (default: it refuses them). There the estimated errors
    grow with the distance, and nothing has tested them. */

@@ -21,6 +21,9 @@ PetscErrorCode HycoSamplesDestroy(HycoSamples *samples);
   closed = PETSC_TRUE: both ends included (counts[i] >= 2).
 */
 PetscErrorCode HycoSamplesAddGrid(HycoSamples samples, const PetscInt counts[], PetscBool closed);
+/* The same at the roots of Chebyshev polynomials over each range, counts[i] >= 1 of them: the nodes for interpolation
+   by polynomials, as in a condensed model. */
+PetscErrorCode HycoSamplesAddChebyshev(HycoSamples samples, const PetscInt counts[]);
 /* Appends the tensor product of the lists values[i][0..counts[i]-1], the last parameter running fastest. */
 PetscErrorCode HycoSamplesAddProduct(HycoSamples samples, const PetscInt counts[], const PetscReal *const values[]);
 /* Appends one point (length = number of parameters); fails outside the range. */

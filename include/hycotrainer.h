@@ -1,5 +1,6 @@
 /* HycoTrainer: snapshots -> POD, DEIM -> reduced integration domain -> hybrid model in a file (sections 4 and 5); or
-   snapshots -> POD, NNMF -> projection-based model in a file (6.3). */
+   snapshots -> POD, NNMF -> projection-based model in a file (6.3); or snapshots -> POD, B K^-1 B^T -> condensed model.
+ */
 #ifndef HYCOTRAINER_H
 #define HYCOTRAINER_H
 
@@ -16,7 +17,10 @@ typedef struct _p_HycoTrainer *HycoTrainer;
 typedef struct {
   HycoModelType type;
   PetscReal dual_misfit;  /* projection: share of the dual snapshots' squares that their nonnegative basis leaves out */
+  PetscBool target_met;   /* condensed, points chosen: -hyco_condensed_tol was reached */
   PetscInt n_supremizers; /* of n_modes, -hyco_dual snapshots */
+  PetscInt n_flexibilities; /* condensed: points at which B K^-1 B^T was factored */
+  PetscReal left_out[3];    /* condensed: relative errors of flexibility, gap and forces, one training value left out */
   PetscInt n_samples, n_modes, n_dual_modes, n_stress_modes, n_force_modes; /* l_u and the sizes of the other bases */
   PetscInt n_fe_dofs, rid_nodes, rid_elements, rid_a_nodes, rid_contacts; /* FE unknowns, RID, nodes of A, |A_lambda| */
   PetscReal rid_fraction;                                                 /* share of the elements */
@@ -36,11 +40,15 @@ PetscErrorCode HycoTrainerDestroy(HycoTrainer *trainer);
 PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer trainer);
 /* Where the snapshots live (default: the model's name with .snapshots appended). */
 PetscErrorCode HycoTrainerSetSnapshotFolder(HycoTrainer trainer, const char folder[]);
+/* Whether HycoTrainerRun() chooses the points itself when it is given none: for a condensed model. */
+PetscErrorCode HycoTrainerChooses(HycoTrainer trainer, PetscBool *chooses);
 /* Called as snapshots are solved. */
 PetscErrorCode HycoTrainerSetProgress(HycoTrainer trainer, HycoProgress progress, void *ctx);
 /* Solves the samples that are missing, reduces, and writes the model to `path` (temporary name, then renamed).
-   Collective. `training` may be NULL. Fails for a model that misses its training solutions by half, and, unless
-   -hyco_keep_singular, for one whose reduced stiffness is singular inside the parameters' ranges. */
+   Collective. `training` may be NULL; so may `samples` for a condensed model, which then chooses them until its
+   estimate of the forces' error is below -hyco_condensed_tol, or says in target_met that it is not. Fails for a model
+   that misses its training solutions by half, and, unless -hyco_keep_singular, for one whose reduced stiffness is
+   singular inside the parameters' ranges. */
 PetscErrorCode HycoTrainerRun(HycoTrainer trainer, HycoSamples samples, const char path[], HycoTraining *training);
 
 /* In how many parts the training solutions are held out, one after the other, to calibrate the estimated errors of a

@@ -80,4 +80,35 @@ PetscErrorCode HycoInterpolantCreate(PetscInt dim, PetscInt n, const PetscReal p
 PetscErrorCode HycoInterpolantDestroy(HycoInterpolant *interpolant);
 PetscErrorCode HycoInterpolantGetWeights(HycoInterpolant interpolant, const PetscReal point[], PetscReal weight[]);
 
+/*
+  Polynomials on a tensor grid. Axis p has n[p] nodes x[p][], ascending (borrowed; not read where n[p] is 1), and a
+  degree; a grid node's number runs fastest along the last axis. Values at the grid nodes: data, a column of `rows`
+  numbers per node. Not collective.
+*/
+#define HYCO_TENSOR_MAX_DIM 32
+typedef struct {
+  PetscInt dim, n[HYCO_TENSOR_MAX_DIM], degree[HYCO_TENSOR_MAX_DIM];
+  const PetscReal *x[HYCO_TENSOR_MAX_DIM];
+} HycoTensor;
+/* The n roots of the Chebyshev polynomial on [lo, hi], ascending: the nodes whose interpolation is nearly best. */
+PetscErrorCode HycoChebyshevNodes(PetscInt n, PetscReal lo, PetscReal hi, PetscReal x[]);
+/* weight[k] of node k in the value at `at` of the least-squares polynomial of that degree (interpolation: n - 1, or as
+   many as there are); node `skip` is left out, its weight 0 (-1: none). */
+PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt degree, PetscInt skip, PetscReal at,
+                                     PetscReal weight[]);
+/* By how much the remainder of interpolation grows from the nodes' interval to a point outside: the product of the
+   distances to the nodes over its largest value inside; 1 inside. */
+PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at);
+PetscInt HycoTensorSize(const HycoTensor *t);
+/* The weights of all grid nodes; the nodes with number `skip` along `axis` left out (-1, -1: none). */
+PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscInt axis, PetscInt skip,
+                                 PetscReal weight[]);
+/* Each node along `axis` left out and predicted by the others on its line: the largest error, 2-norm of a column, over
+   the largest column. With interpolation this is the error of one degree less. */
+PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
+                                     PetscReal *error);
+/* Sets degree[axis] to the one that this error favours, the highest unless a lower one halves it, and gives it. */
+PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
+                                      PetscReal *error);
+
 #endif

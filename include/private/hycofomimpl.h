@@ -40,4 +40,12 @@ PetscErrorCode HycoFOMGetForces(HycoFOM fom, PetscReal forces[]);
 /* Fills strain_energy, external_work, gap_work and energy_defect from the last solution. Collective. */
 PetscErrorCode HycoFOMEnergy(HycoFOM fom, HycoSummary *summary);
 
+/*
+  What condensing the model on its forces takes, at mu: on rank 0, G = B K^-1 B^T as the columns of its lower triangle
+  (m (m + 1) / 2, unless NULL) and H = V^T K^-1 B^T (l x m row major) for l modes V (n_nodes * dim x l row major in the
+  file's order, read on rank 0, zero on fixed unknowns). Solves at mu in the dual form on the way. Collective.
+*/
+PetscErrorCode HycoFOMFlexibility(HycoFOM fom, const PetscReal mu[], PetscInt l, const PetscReal V[], PetscReal G[],
+                                  PetscReal H[]);
+
 #endif

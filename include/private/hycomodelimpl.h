@@ -16,6 +16,7 @@ typedef enum {
 } HycoHybrid;
 
 typedef struct _n_HycoNorms *HycoNorms;
+typedef struct _n_HycoCondensed *HycoCondensed;
 
 /* The basis of the contact forces; fe: none, the true multipliers of the hybrid model. */
 typedef enum { HYCO_DUAL_FE, HYCO_DUAL_NNMF, HYCO_DUAL_SNAPSHOTS } HycoDual;
@@ -64,8 +65,9 @@ struct _p_HycoModel {
   HycoModelType type;
   HycoDual dual;
   PetscInt l_lambda;
-  PetscReal *V_lambda;   /* N_lambda x l_lambda column major, no entry negative, columns of unit 2-norm */
-  PetscReal dual_misfit; /* |S_lambda - V_lambda H|^2 / |S_lambda|^2, the best H >= 0 that training found */
+  PetscReal *V_lambda;     /* N_lambda x l_lambda column major, no entry negative, columns of unit 2-norm */
+  PetscReal dual_misfit;   /* |S_lambda - V_lambda H|^2 / |S_lambda|^2, the best H >= 0 that training found */
+  HycoCondensed condensed; /* else NULL */
   /* the whole mesh, on demand */
   HycoMesh whole;
   HycoFE fe_whole;
@@ -114,6 +116,12 @@ PetscErrorCode HycoProjectionFillContact(HycoModel model);
 PetscErrorCode HycoProjectionFillGap(HycoModel model);
 PetscErrorCode HycoProjectionExpand(HycoModel model);
 PetscErrorCode HycoProjectionView(HycoModel model, PetscViewer viewer);
+
+/* The condensed model: what is online; the forces and the modes' coefficients at mu, all of the prediction; in words.
+ */
+PetscErrorCode HycoCondensedSetUp(HycoModel model);
+PetscErrorCode HycoCondensedPredict(HycoModel model, const PetscReal mu[]);
+PetscErrorCode HycoCondensedView(HycoModel model, PetscViewer viewer);
 
 /* Condition number of the reduced stiffness of the last prediction (dense SVD). */
 PetscErrorCode HycoModelCondition(HycoModel model, PetscReal *condition);

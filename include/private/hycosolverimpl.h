@@ -81,6 +81,12 @@ PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscB
 /* Whether gap coordinates exist: each contact row has an unknown that no other row has. Collective. */
 PetscErrorCode HycoPrimalPossible(HycoSystem system, PetscBool *possible);
 
+/* S = B K^-1 Bt of the last solve, which was in the dual form with a factor of a regular K: m x m column major, the
+   same on every rank. Borrowed until a matrix changes. Collective. */
+PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[]);
+/* x = K^-1 r by that factor. Collective. */
+PetscErrorCode HycoSolverApplyInverse(HycoSolver s, Vec r, Vec x);
+
 /* The dual form by TAO with S = B K^-1 Bt never formed (form dual_free). */
 PetscErrorCode HycoSolveDualFree(HycoSolver s, Vec x, Vec L, PetscBool *solved);
 

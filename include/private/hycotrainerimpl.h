@@ -2,6 +2,7 @@
 #ifndef HYCOTRAINERIMPL_H
 #define HYCOTRAINERIMPL_H
 
+#include <hycocondensed.h>
 #include <hycomodelimpl.h>
 #include <hycosnapshotsimpl.h>
 #include <hycotrainer.h>
@@ -28,6 +29,8 @@ struct _p_HycoTrainer {
   HycoModelType type;
   HycoDual dual;
   PetscInt nnmf_max_its, nnmf_vectors;
+  PetscReal condensed_tol; /* where the points are chosen */
+  PetscInt condensed_max_values;
   HycoProgress progress;
   void *progress_ctx;
   struct {
@@ -54,7 +57,8 @@ struct _p_HycoTrainer {
   PetscReal *U_norm;         /* n_s: of the whole snapshot */
   PetscInt n_s;
   unsigned long long fingerprint;
-  PetscBool *grown; /* rank 0, greedy: cells of the RIDs so far; else NULL */
+  HycoCondensed condensed; /* of a condensed model under training; the grid on every rank, the fields on rank 0 */
+  PetscBool *grown;        /* rank 0, greedy: cells of the RIDs so far; else NULL */
 };
 
 /* Frees what one run leaves behind. */
@@ -84,6 +88,18 @@ PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel model);
 /* Calibrates the estimated errors of the hybrid model at `path` and writes it once more: n_held held-out predictions
    (0: too few solutions, or a fold gave no model). The bases are a fold's afterwards. Collective. */
 PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const char path[], PetscInt *n_held);
+/* A condensed model: checks that scene and samples are fit for one, before hours of work; after the modes, G and H at
+   all their nodes (`modes` false: G alone), factoring where no file has them. Collective. */
+PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t);
+PetscErrorCode HycoTrainerFlexibility(HycoTrainer t, HycoSnapshots store, PetscBool modes);
+/* The points of a condensed training that names none: two values of each parameter, to begin with; after
+   HycoTrainerBeginCondensed(), solving and factoring on the way, those that meet -hyco_condensed_tol, in *samples (the
+   caller's), the bases made. Collective. */
+PetscErrorCode HycoTrainerStartPoints(HycoTrainer t, HycoSamples *samples);
+PetscErrorCode HycoTrainerChoosePoints(HycoTrainer t, HycoSnapshots store, HycoSamples *samples);
+/* Its fields, degrees and errors; the same, handed to the model, with numbers[]. Rank 0. */
+PetscErrorCode HycoTrainerFillFields(HycoTrainer t);
+PetscErrorCode HycoTrainerCondense(HycoTrainer t, HycoModel model);
 /* Fills numbers[]: condition and mean training errors of the model as it stands. Rank 0. */
 PetscErrorCode HycoTrainerJudge(HycoTrainer t, HycoModel model);
 

@@ -14,7 +14,8 @@ static const HycoOption own[] = {
     {"mu", "<v,v,...>", "", "parameter values in declared order; or one by one: -mu_NAME v"},
     {"mu_", "<v>", "", "the parameter NAME: -mu_radius 4.06"},
     {"grid", "<n,n,...>", "", "a set of points: n per parameter"},
-    {"grid_type", "<centred|closed>", "centred", "cell centres, or with both ends of the ranges"},
+    {"grid_type", "<centred|closed|chebyshev>", "centred",
+     "cell centres; with both ends of the ranges; or the roots of Chebyshev polynomials (for a condensed model)"},
     {"values_", "<v,v,...>", "", "a set of points: values of the parameter NAME, all combined"},
     {"points", "<file.csv>", "", "a set of points: a header with the names, then a point per line"},
     {"greedy", "", "", "add solutions where an error indicator is worst, from the corners of the ranges or -grid ..."},
@@ -134,9 +135,9 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
 static PetscErrorCode CheckTraining(const Command *command, const char name[])
 {
   static const char *const training[] = {
-      "hyco_model_type", "hyco_dual",   "hyco_nnmf_", "hyco_pod_",          "hyco_deim_",
-      "hyco_rid_",       "hyco_hybrid", "hyco_scan",  "hyco_keep_singular", "hyco_snapshots",
-      "hyco_greedy_",    "hyco_trust_", NULL};
+      "hyco_model_type", "hyco_dual", "hyco_nnmf_",         "hyco_pod_",       "hyco_deim_",     "hyco_rid_",
+      "hyco_hybrid",     "hyco_scan", "hyco_keep_singular", "hyco_condensed_", "hyco_snapshots", "hyco_greedy_",
+      "hyco_trust_",     NULL};
 
   PetscFunctionBegin;
   if (command->run == CommandTrain) PetscFunctionReturn(PETSC_SUCCESS);
@@ -379,10 +380,11 @@ PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The grid that the option `name` gives as `text`; its type unless -grid_type says otherwise: 0 centred, 1 closed. */
+/* The grid that the option `name` gives as `text`; its type unless -grid_type says otherwise: 0 centred, 1 closed, 2
+ * Chebyshev. */
 static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char name[], PetscInt type, const char text[])
 {
-  static const char *const types[] = {"centred", "closed", NULL};
+  static const char *const types[] = {"centred", "closed", "chebyshev", NULL};
   PetscInt n, m, counts[64];
   PetscReal *values;
   char list[DRIVER_LINE];
@@ -400,7 +402,10 @@ static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char n
     counts[p] = (PetscInt)values[p];
   }
   PetscCall(PetscFree(values));
-  PetscCall(HycoSamplesAddGrid(samples, counts, (PetscBool)(type == 1)));
+  if (type == 2)
+    PetscCall(HycoSamplesAddChebyshev(samples, counts));
+  else
+    PetscCall(HycoSamplesAddGrid(samples, counts, (PetscBool)(type == 1)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -46,6 +46,10 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
     cJSON_AddNumberToObject(json, "n_supremizers", t->n_supremizers);
     cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);
   }
+  if (t->type == HYCO_MODEL_CONDENSED) {
+    cJSON_AddNumberToObject(json, "n_flexibilities", t->n_flexibilities);
+    ReportVector(json, "left_out_flexibility_gap_forces", 3, t->left_out);
+  }
   if (log->scene) DriverReportGreedy(json, log);
   if (search->on) DriverReportTargets(json, search);
   seconds = cJSON_AddObjectToObject(json, "seconds");
@@ -66,6 +70,13 @@ static PetscErrorCode SayBases(const HycoTraining *t)
             (int)t->n_samples, (int)t->n_modes, (int)t->n_supremizers, (int)t->n_dual_modes, (double)t->dual_misfit));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  if (t->type == HYCO_MODEL_CONDENSED) {
+    PetscCall(Say("condensed: %d snapshots, flexibility at %d points; one training value left out, relative: "
+                  "flexibility %.1e, gap %.1e, forces %.1e; %d displacement modes\n",
+                  (int)t->n_samples, (int)t->n_flexibilities, (double)t->left_out[0], (double)t->left_out[1],
+                  (double)t->left_out[2], (int)t->n_modes));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t->n_samples,
                 (int)t->n_modes, (int)t->n_stress_modes, (int)t->n_force_modes, (int)t->n_dual_modes));
   PetscCall(Say("RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
@@ -75,11 +86,9 @@ static PetscErrorCode SayBases(const HycoTraining *t)
 }
 
 /* The kinds of training exclude each other, and each its own points. */
-static PetscErrorCode CheckKind(PetscBool given, PetscBool greedy, const Search *search, HycoSamples validation)
+static PetscErrorCode CheckKind(PetscBool greedy, const Search *search, HycoSamples validation)
 {
   PetscFunctionBegin;
-  HycoCheck(given || greedy,
-            "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   HycoCheck(!greedy || !search->on,
             "-target_u and the like choose a model for a given set of points; train -greedy stops by -target");
   HycoCheck(search->on || !validation,
@@ -96,7 +105,7 @@ PetscErrorCode CommandTrain(void)
   HycoTraining t;
   GreedyLog log = {0};
   Search search = {0};
-  PetscBool given, greedy = PETSC_FALSE;
+  PetscBool given, chooses, greedy = PETSC_FALSE;
   char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
 
   PetscFunctionBegin;
@@ -108,11 +117,14 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoOptionsBool(NULL, "greedy", &greedy));
   PetscCall(DriverReadTargets(&search));
   PetscCall(DriverGetValidation(scene, &validation));
-  PetscCall(CheckKind(given, greedy, &search, validation));
+  PetscCall(CheckKind(greedy, &search, validation));
   PetscCall(PetscStrncpy(search.scene, path, sizeof(search.scene)));
   PetscCall(PetscStrncpy(search.model, model, sizeof(search.model)));
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
+  PetscCall(HycoTrainerChooses(trainer, &chooses));
+  HycoCheck(given || greedy || (chooses && !search.on),
+            "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
   if (greedy) PetscCall(DriverReadGreedy(scene, trainer, &training, &log));
   PetscCall(DriverCheckLeftEarly(scene));
@@ -121,8 +133,10 @@ PetscErrorCode CommandTrain(void)
   else if (search.on)
     PetscCall(DriverTrainForTargets(&search, scene, samples, validation, &t));
   else
-    PetscCall(HycoTrainerRun(trainer, samples, model, &t));
+    PetscCall(HycoTrainerRun(trainer, given ? samples : NULL, model, &t));
   PetscCall(SayBases(&t));
+  if (!given && t.type == HYCO_MODEL_CONDENSED && !t.target_met)
+    PetscCall(Say("-hyco_condensed_tol was not reached with -hyco_condensed_max_values\n"));
   PetscCall(Say("mean training errors: u %.2e, %sforces %.2e; condition of the reduced stiffness %.1e\n",
                 (double)t.error_u, t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda,
                 (double)t.condition));

@@ -252,6 +252,9 @@ PetscErrorCode HycoTrainerRunGreedy(HycoTrainer t, HycoSamples start, HycoSample
 
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
+  HycoCheck(t->type != HYCO_MODEL_CONDENSED,
+            "a condensed model needs a tensor grid of training points, which -greedy does not give: use -grid, or "
+            "-values_NAME");
   loop.begin = HycoNow();
   PetscCall(TakeTraining(training, &loop));
   PetscCall(Start(t, start, &loop.samples));

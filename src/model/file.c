@@ -2,13 +2,14 @@
   The model file. Groups: /mesh and /problem (what the online phase opens), /reconstruction, /training, /whole (read
   only when a field on the whole mesh is asked for). Every index is checked on load.
 */
+#include <hycocondensed.h>
 #include <hycoh5.h>
-#include <hycomodelimpl.h>
 #include <string.h>
 
 /* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters.
-   3: problem/type; what has none is hybrid. The kind is every type's, so that an older reader tells the format. */
-#define HYCO_MODEL_FORMAT 3
+   3: problem/type; what has none is hybrid. 4: the type may be condensed. The kind is every type's, so that an older
+   reader tells the format. */
+#define HYCO_MODEL_FORMAT 4
 #define HYCO_MODEL_OLDEST 2
 #define HYCO_MODEL_KIND   "hyco hybrid model"
 
@@ -184,7 +185,8 @@ static PetscErrorCode SaveType(HycoH5 h, HycoModel m)
 {
   PetscFunctionBegin;
   PetscCall(HycoH5WriteText(h, "problem/type", HycoModelTypes[m->type]));
-  if (m->type == HYCO_MODEL_HYBRID) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->condensed) PetscCall(HycoCondensedSave(m, h));
+  if (m->type != HYCO_MODEL_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5WriteText(h, "problem/dual", HycoDuals[m->dual]));
   PetscCall(HycoH5WriteReal(h, "problem/V_lambda", m->l_lambda, m->pairs.n, m->V_lambda));
   PetscCall(HycoH5WriteReal(h, "training/dual_misfit", 1, 1, &m->dual_misfit));
@@ -215,7 +217,8 @@ static PetscErrorCode LoadType(HycoH5 h, HycoModel m)
   if (!HycoH5Has(h, "problem/type")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LoadWord(h, m->path, "problem/type", HycoModelTypes, &word));
   m->type = (HycoModelType)word;
-  if (m->type == HYCO_MODEL_HYBRID) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->type == HYCO_MODEL_CONDENSED) PetscCall(HycoCondensedLoad(m, h));
+  if (m->type != HYCO_MODEL_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LoadWord(h, m->path, "problem/dual", HycoDuals, &word));
   m->dual = (HycoDual)word;
   HycoCheck(m->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);

@@ -1,5 +1,5 @@
 /* HycoModel: made, asked, destroyed. */
-#include <hycomodelimpl.h>
+#include <hycocondensed.h>
 #include <hycofields.h>
 #include <petscviewer.h>
 #include <stdio.h>
@@ -53,6 +53,7 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
   m = *model;
   PetscCall(HycoModelReset(m));
   PetscCall(HycoNormsDestroy(&m->norms));
+  PetscCall(HycoCondensedDestroy(&m->condensed));
   PetscCall(HycoFEDestroy(&m->fe_whole));
   PetscCall(HycoPairsDestroy(&m->whole_pairs));
   PetscCall(HycoMeshDestroy(&m->whole));
@@ -306,13 +307,13 @@ static PetscErrorCode ViewHybrid(HycoModel m, PetscViewer viewer)
 
 PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
 {
+  static const char *const words[] = {"hybrid hyper-reduced", "projection-based", "condensed"};
   PetscInt pod;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, "HycoModelLoad()");
   pod = m->type == HYCO_MODEL_PROJECTION ? m->l - m->counts[1] : m->l;
-  PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n",
-                                   m->type == HYCO_MODEL_HYBRID ? "hybrid hyper-reduced" : "projection-based"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n", words[m->type]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, %sforces %.2e\n",
                                    (int)m->n_points, (double)m->numbers[1], m->type == HYCO_MODEL_HYBRID ? "RID " : "",
                                    (double)m->numbers[2]));
@@ -321,8 +322,9 @@ PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
   if (m->type == HYCO_MODEL_HYBRID)
     PetscCall(ViewHybrid(m, viewer));
   else
-    PetscCall(HycoProjectionView(m, viewer));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
+    PetscCall(m->condensed ? HycoCondensedView(m, viewer) : HycoProjectionView(m, viewer));
+  if (!m->condensed)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
   if (m->type == HYCO_MODEL_HYBRID) PetscCall(ViewScan(m, viewer));
   PetscCall(HycoTrustView(m, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->provenance));

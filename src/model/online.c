@@ -135,6 +135,10 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
 
   PetscFunctionBegin;
   if (m->ready) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->type == HYCO_MODEL_CONDENSED) {
+    PetscCall(HycoCondensedSetUp(m));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
   PetscCall(SetUpBasis(m));
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
@@ -418,6 +422,11 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   m->solved = m->whole_current = PETSC_FALSE;
   PetscCall(HycoModelSetUp(m));
   p->seconds.setup = HycoNow() - begin;
+  if (m->type == HYCO_MODEL_CONDENSED) {
+    PetscCall(HycoCondensedPredict(m, mu));
+    m->solved = PETSC_TRUE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   begin = HycoNow();
   PetscCall(Assemble(m, mu));
   p->seconds.assemble = HycoNow() - begin;
@@ -443,7 +452,7 @@ PetscErrorCode HycoModelCondition(HycoModel m, PetscReal *condition)
 
   PetscFunctionBegin;
   *condition = 0;
-  if (m->n > 2500) PetscFunctionReturn(PETSC_SUCCESS); /* an SVD would take minutes */
+  if (m->n > 2500 || m->condensed) PetscFunctionReturn(PETSC_SUCCESS); /* an SVD would take minutes */
   PetscCall(MatConvert(m->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
   PetscCall(MatDenseGetArray(dense, &a));
   PetscCall(HycoExtremeSingularValues(m->n, m->n, a, &smallest, &largest));

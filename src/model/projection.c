@@ -10,7 +10,7 @@
 */
 #include <hycomodelimpl.h>
 
-const char *const HycoModelTypes[] = {"hybrid", "projection", NULL};
+const char *const HycoModelTypes[] = {"hybrid", "projection", "condensed", NULL};
 const char *const HycoDuals[] = {"fe", "nnmf", "snapshots", NULL};
 
 PetscErrorCode HycoProjectionFillContact(HycoModel m)

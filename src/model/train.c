@@ -158,6 +158,11 @@ static void Report(HycoTrainer t, HycoModel m, HycoTraining *r)
 {
   r->type = m->type;
   r->dual_misfit = m->dual_misfit;
+  if (m->condensed) {
+    r->target_met = m->condensed->target_met;
+    r->n_flexibilities = HycoTensorSize(&m->condensed->field[HYCO_FIELD_G].tensor);
+    for (PetscInt k = 0; k < 3; k++) r->left_out[k] = m->condensed->errors[k];
+  }
   r->n_supremizers = t->n_supremizers;
   r->n_samples = t->n_s;
   r->n_modes = t->l;
@@ -202,7 +207,10 @@ static PetscErrorCode BuildAndSave(HycoTrainer t, PetscBool useful, const char p
   if (!ierr) ierr = CutDomain(t, m);
   if (!ierr) ierr = LimitModes(t, m);
   if (!ierr) ierr = FillModel(t, m);
-  if (!ierr) ierr = t->type == HYCO_MODEL_PROJECTION ? HycoTrainerProject(t, m) : HycoTrainerChooseHybrid(t, m);
+  if (!ierr)
+    ierr = t->type == HYCO_MODEL_PROJECTION  ? HycoTrainerProject(t, m)
+           : t->type == HYCO_MODEL_CONDENSED ? HycoTrainerCondense(t, m)
+                                             : HycoTrainerChooseHybrid(t, m);
   if (!ierr && useful) ierr = CheckUseful(m);
   if (!ierr) ierr = HycoModelSave(m, t->whole, t->V_whole, path);
   if (!ierr) Report(t, m, report);
@@ -214,12 +222,13 @@ static PetscErrorCode BuildAndSave(HycoTrainer t, PetscBool useful, const char p
 PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path[], HycoTraining *report)
 {
   char candidate[PETSC_MAX_PATH_LEN + 16];
+  const PetscBool scan = (PetscBool)(useful && t->type != HYCO_MODEL_CONDENSED); /* which has no reduced stiffness */
 
   PetscFunctionBegin;
-  PetscCall(PetscSNPrintf(candidate, sizeof(candidate), "%s%s", path, useful ? ".candidate" : ""));
+  PetscCall(PetscSNPrintf(candidate, sizeof(candidate), "%s%s", path, scan ? ".candidate" : ""));
   HycoOnRoot(t->comm, BuildAndSave(t, useful, candidate, report));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, t->comm));
-  if (useful) PetscCall(HycoTrainerScan(t, candidate, path, &report->scan));
+  if (scan) PetscCall(HycoTrainerScan(t, candidate, path, &report->scan));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -263,18 +272,31 @@ PetscErrorCode HycoTrainerOpen(HycoTrainer t, HycoSamples samples, const char pa
 PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;
+  HycoSamples chosen = NULL;
   HycoTraining report = {0};
   PetscReal begin = HycoNow(), solved;
+  const PetscBool condensed = (PetscBool)(t && t->type == HYCO_MODEL_CONDENSED), choose = (PetscBool)!samples;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
+  HycoCheck(samples || condensed, "give the training points");
+  if (choose) {
+    PetscCall(HycoTrainerStartPoints(t, &chosen));
+    samples = chosen;
+  }
   PetscCall(HycoTrainerOpen(t, samples, path, &store));
-  PetscCall(HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
+  if (condensed) PetscCall(HycoTrainerBeginCondensed(t));
+  if (choose)
+    PetscCall(HycoTrainerChoosePoints(t, store, &chosen));
+  else
+    PetscCall(HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
   solved = HycoNow();
-  PetscCall(HycoTrainerReduce(t, store));
+  if (!choose) PetscCall(HycoTrainerReduce(t, store));
+  if (condensed) PetscCall(HycoTrainerFlexibility(t, store, PETSC_TRUE));
   PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, &report));
   PetscCall(HycoTrainerCalibrate(t, store, path, &report.n_held));
   PetscCall(HycoSnapshotsDestroy(&store));
+  PetscCall(HycoSamplesDestroy(&chosen));
   report.seconds_snapshots = solved - begin;
   report.seconds_reduction = HycoNow() - solved;
   if (training) *training = report;

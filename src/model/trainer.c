@@ -14,6 +14,8 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   t->scene = scene;
   t->noise = 1e-11;
   t->nnmf_max_its = 100;
+  t->condensed_tol = 1e-7;
+  t->condensed_max_values = 24;
   t->greedy.target = 1e-3;
   t->ridge = -1;
   t->folds = 3;
@@ -31,6 +33,7 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t)
   PetscCall(HycoPairsDestroy(&t->pairs));
   PetscCall(HycoMeshDestroy(&t->whole));
   PetscCall(PetscFree(t->grown));
+  PetscCall(HycoCondensedDestroy(&t->condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -69,6 +72,14 @@ PetscErrorCode HycoTrainerSetSnapshotFolder(HycoTrainer t, const char folder[])
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
   PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerChooses(HycoTrainer t, PetscBool *chooses)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  *chooses = (PetscBool)(t->type == HYCO_MODEL_CONDENSED);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -156,12 +167,14 @@ static PetscErrorCode ReadType(HycoTrainer t)
   PetscCall(HycoOptionsWord(o, "hyco_dual", HycoDuals, &dual));
   PetscCall(HycoOptionsInt(o, "hyco_nnmf_max_its", 1, PETSC_MAX_INT, &t->nnmf_max_its));
   PetscCall(HycoOptionsInt(o, "hyco_nnmf_vectors", 0, PETSC_MAX_INT, &t->nnmf_vectors));
+  PetscCall(HycoOptionsReal(o, "hyco_condensed_tol", 0, 1, &t->condensed_tol));
+  PetscCall(HycoOptionsInt(o, "hyco_condensed_max_values", 3, 1000, &t->condensed_max_values));
   t->type = (HycoModelType)type;
   t->dual = (HycoDual)dual;
   HycoCheck(t->type == HYCO_MODEL_PROJECTION || t->dual == HYCO_DUAL_FE,
-            "-hyco_dual %s is for -hyco_model_type projection; the hybrid model has the finite-element forces",
+            "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
             HycoDuals[dual]);
-  if (t->type == HYCO_MODEL_HYBRID) PetscFunctionReturn(PETSC_SUCCESS);
+  if (t->type != HYCO_MODEL_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
   if (t->dual == HYCO_DUAL_FE) {
     PetscBool set;
 

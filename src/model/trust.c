@@ -110,6 +110,10 @@ PetscErrorCode HycoTrustEstimate(HycoModel m, HycoPrediction *p)
   PetscFunctionBegin;
   p->estimated_error_u = p->estimated_error_lambda = -1;
   p->beyond = Beyond(m->scene, m->fe->mu, nearest);
+  if (p->reason > 0 && m->type == HYCO_MODEL_CONDENSED) { /* its own estimate; displacements lose what the modes miss */
+    p->estimated_error_lambda = p->interpolation_error;
+    p->estimated_error_u = p->interpolation_error + m->numbers[1];
+  }
   if (!m->trust.n || p->reason <= 0 || !m->reconstruct) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTrustMeasure(m, feature));
   outside = 1 + (p->beyond > 0 ? HycoTrustDistance(m->scene, m->fe->mu, nearest) / m->trust.floor[DISTANCE] : 0);

@@ -1,4 +1,5 @@
 /* HycoSamples: grids, products, single points and CSV files of parameter values. */
+#include <hycoalgorithms.h>
 #include <hycosceneimpl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -93,6 +94,23 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscB
     for (PetscInt k = 0; k < n; k++) {
       values[p][k] = closed ? (k == n - 1 ? hi : lo + k * (hi - lo) / (n - 1)) : lo + (k + 0.5) * (hi - lo) / n;
     }
+  }
+  PetscCall(HycoSamplesAddProduct(s, counts, (const PetscReal *const *)values));
+  for (PetscInt p = 0; p < s->scene->n_parameters; p++) PetscCall(PetscFree(values[p]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
+{
+  PetscReal *values[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSamplesCreate()");
+  for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
+    HycoCheck(counts[p] >= 1 && counts[p] <= 100000000, "the grid has %d points for %s; at least 1 is needed",
+              (int)counts[p], s->scene->parameter[p]);
+    PetscCall(PetscMalloc1(counts[p], &values[p]));
+    PetscCall(HycoChebyshevNodes(counts[p], s->scene->lo[p], s->scene->hi[p], values[p]));
   }
   PetscCall(HycoSamplesAddProduct(s, counts, (const PetscReal *const *)values));
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) PetscCall(PetscFree(values[p]));

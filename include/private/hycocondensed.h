@@ -1,0 +1,68 @@
+/*
+  The condensed model's data: what the contact forces and the modes' coefficients need at any parameter value,
+
+      w = g + G L >= 0,  L >= 0,  w.L = 0        G = B K^-1 B^T,    g = D - B K^-1 F
+      gamma = a - H L                            H = V^T K^-1 B^T,  a = V^T K^-1 F
+
+  each a polynomial on a tensor grid of training values. All on one process.
+*/
+#ifndef HYCOCONDENSED_H
+#define HYCOCONDENSED_H
+
+#include <hycoalgorithms.h>
+#include <hycoh5.h>
+#include <hycomodelimpl.h>
+
+enum { HYCO_FIELD_G, HYCO_FIELD_GAP, HYCO_FIELD_H, HYCO_FIELD_FREE, HYCO_N_FIELDS };
+extern const char *const HycoGridFieldNames[]; /* as in files */
+
+typedef struct {
+  HycoTensor tensor; /* axes on which it does not depend have one node, and node 0 stands for all */
+  PetscInt rows;
+  PetscReal
+      *data; /* rows x nodes column major; G: the columns of its lower triangle, m (m + 1) / 2; H: l x m row major */
+} HycoGridField;
+
+struct _n_HycoCondensed {
+  PetscInt dim, m, l;                                               /* parameters, contacts, modes */
+  PetscInt n[HYCO_MAX_PARAMETERS];                                  /* training values of each parameter */
+  PetscReal *x[HYCO_MAX_PARAMETERS];                                /* ascending */
+  PetscInt stiff[HYCO_MAX_PARAMETERS], affine[HYCO_MAX_PARAMETERS]; /* reaches K or B; F and D are affine in it */
+  HycoGridField field[HYCO_N_FIELDS];
+  PetscReal *bounds;   /* by node of G: lower and upper of it by the middle node's G; 0, 0: none are known */
+  PetscReal *Lambda;   /* m x nodes of the whole grid: training forces */
+  PetscReal errors[3]; /* one node left out: G, g, forces; relative */
+  /* training only: the error of the forces by parameter; the sample of each node of the whole grid */
+  PetscReal by_parameter[HYCO_MAX_PARAMETERS];
+  PetscBool target_met; /* the points were chosen, and the target was reached */
+  PetscInt *sample;
+  /* online */
+  PetscBool current; /* M and H hold the stiffness's parameters `at` */
+  PetscReal at[HYCO_MAX_PARAMETERS];
+  PetscBool solved; /* active is the set of the solution at `last` */
+  PetscReal last[HYCO_MAX_PARAMETERS];
+  PetscReal gap_size;                           /* largest |g| in training */
+  PetscReal *packed, *M, *work, *g, *H, *a, *w; /* M: G, m x m */
+  PetscBool *active;
+};
+
+PetscErrorCode HycoCondensedCreate(PetscInt dim, PetscInt m, PetscInt l, HycoCondensed *condensed);
+/* NULL-safe. */
+PetscErrorCode HycoCondensedDestroy(HycoCondensed *condensed);
+/* The fields' tensors, sizes and memory once n, x, stiff and l are there; degrees: as many as there are nodes. */
+PetscErrorCode HycoCondensedAllocate(HycoCondensed condensed);
+/* Room for what is online. */
+PetscErrorCode HycoCondensedPrepare(HycoCondensed condensed);
+/* To and from the model's file. */
+PetscErrorCode HycoCondensedSave(HycoModel model, HycoH5 file);
+PetscErrorCode HycoCondensedLoad(HycoModel model, HycoH5 file);
+/* The bounds of G at its nodes. */
+PetscErrorCode HycoCondensedBound(HycoCondensed condensed);
+/* A field at mu, the nodes with number `skip` along `axis` left out (-1, -1: none). */
+PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *field, const PetscReal mu[], PetscInt axis, PetscInt skip,
+                                     PetscReal value[]);
+/* M = G(mu), and whether it is positive definite beyond round-off (only semidefinite counts: contacts may repeat). */
+PetscErrorCode HycoCondensedFlexibility(HycoCondensed condensed, const PetscReal mu[], PetscInt axis, PetscInt skip,
+                                        PetscBool *definite);
+
+#endif

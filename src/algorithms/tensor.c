@@ -1,0 +1,181 @@
+/*
+  Polynomials on tensor grids by weights of their nodes: value(at) = sum of weight[k] data[k], interpolation where the
+  degree is one less than the nodes, least squares where it is lower. On each axis the weights are sums of products of
+  polynomials orthonormal on the nodes, made by Arnoldi's process on x (Brubeck, Nakatsukasa, Trefethen, SIAM Rev. 63
+  (2021) 405-415), which spans what Chebyshev polynomials span and stays well conditioned on any nodes.
+*/
+#include <hycoalgorithms.h>
+
+/* Errors no larger than this share of the data are round-off: the lowest such degree is taken. */
+#define ROUNDING 1e-12
+
+PetscErrorCode HycoChebyshevNodes(PetscInt n, PetscReal lo, PetscReal hi, PetscReal x[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++)
+    x[k] = (lo + hi) / 2 - (hi - lo) / 2 * PetscCosReal(PETSC_PI * (2 * k + 1) / (2 * (PetscReal)n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The next orthonormal polynomial, x times the last one less what lies in the span of those before, on the n nodes and,
+   as its entry n, at the point. */
+static void NextPolynomial(PetscInt n, const PetscReal s[], PetscInt d, PetscReal P[])
+{
+  PetscReal *p = P + d * (n + 1), length = 0;
+
+  for (PetscInt k = 0; k <= n; k++) p[k] = d ? s[k] * p[k - (n + 1)] : 1;
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt j = 0; j < d; j++) {
+      const PetscReal *q = P + j * (n + 1);
+      PetscReal dot = 0;
+
+      for (PetscInt k = 0; k < n; k++) dot += p[k] * q[k];
+      for (PetscInt k = 0; k <= n; k++) p[k] -= dot * q[k];
+    }
+  }
+  for (PetscInt k = 0; k < n; k++) length += p[k] * p[k];
+  for (PetscInt k = 0; k <= n; k++) p[k] /= PetscSqrtReal(length);
+}
+
+PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt degree, PetscInt skip, PetscReal at,
+                                     PetscReal weight[])
+{
+  const PetscInt n_kept = skip >= 0 && skip < n ? n - 1 : n, top = PetscMin(degree, n_kept - 1);
+  PetscReal *s, *P, middle, half;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(weight, n));
+  if (!n_kept) PetscFunctionReturn(PETSC_SUCCESS);
+  middle = (x[0] + x[n - 1]) / 2;
+  half = x[n - 1] > x[0] ? (x[n - 1] - x[0]) / 2 : 1;
+  PetscCall(PetscMalloc2(n_kept + 1, &s, (top + 1) * (n_kept + 1), &P));
+  for (PetscInt k = 0, at_k = 0; k < n; k++) {
+    if (k != skip) s[at_k++] = (x[k] - middle) / half;
+  }
+  s[n_kept] = (at - middle) / half;
+  for (PetscInt d = 0; d <= top; d++) {
+    const PetscReal *p = P + d * (n_kept + 1);
+
+    NextPolynomial(n_kept, s, d, P);
+    for (PetscInt k = 0, at_k = 0; k < n; k++) {
+      if (k == skip) continue;
+      weight[k] += p[at_k] * p[n_kept];
+      at_k++;
+    }
+  }
+  PetscCall(PetscFree2(s, P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at)
+{
+  PetscReal inside = 0, there = 1;
+
+  if (n < 2 || (at >= x[0] && at <= x[n - 1])) return 1;
+  for (PetscInt k = 0; k < n; k++) there *= PetscAbsReal(at - x[k]) / (x[n - 1] - x[0]);
+  for (PetscInt s = 1; s < 20 * n; s++) {
+    const PetscReal y = x[0] + (x[n - 1] - x[0]) * (PetscReal)s / (20 * (PetscReal)n);
+    PetscReal product = 1;
+
+    for (PetscInt k = 0; k < n; k++) product *= PetscAbsReal(y - x[k]) / (x[n - 1] - x[0]);
+    inside = PetscMax(inside, product);
+  }
+  return PetscMax(1, there / inside);
+}
+
+PetscInt HycoTensorSize(const HycoTensor *t)
+{
+  PetscInt size = 1;
+
+  for (PetscInt p = 0; p < t->dim; p++) size *= t->n[p];
+  return size;
+}
+
+PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscInt axis, PetscInt skip,
+                                 PetscReal weight[])
+{
+  PetscReal *w;
+  PetscInt size = 1, most = 1;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < t->dim; p++) most = PetscMax(most, t->n[p]);
+  PetscCall(PetscMalloc1(most, &w));
+  weight[0] = 1;
+  for (PetscInt p = 0; p < t->dim; p++) {
+    if (t->n[p] == 1) continue;
+    PetscCall(HycoPolynomialWeights(t->n[p], t->x[p], t->degree[p], p == axis ? skip : -1, at[p], w));
+    for (PetscInt k = size - 1; k >= 0; k--) { /* from the end: the product grows in place */
+      for (PetscInt j = t->n[p] - 1; j >= 0; j--) weight[k * t->n[p] + j] = weight[k] * w[j];
+    }
+    size *= t->n[p];
+  }
+  PetscCall(PetscFree(w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numbers between neighbours along an axis. */
+static PetscInt Stride(const HycoTensor *t, PetscInt axis)
+{
+  PetscInt stride = 1;
+
+  for (PetscInt p = axis + 1; p < t->dim; p++) stride *= t->n[p];
+  return stride;
+}
+
+PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
+                                     PetscReal *error)
+{
+  const PetscInt n = t->n[axis], size = HycoTensorSize(t), stride = Stride(t, axis);
+  PetscReal *w, *lost, worst = 0, largest = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n * n, &w, rows, &lost));
+  for (PetscInt i = 0; i < n; i++)
+    PetscCall(HycoPolynomialWeights(n, t->x[axis], t->degree[axis], i, t->x[axis][i], w + i * n));
+  for (PetscInt k = 0; k < size; k++) {
+    const PetscInt i = k / stride % n, first = k - i * stride;
+    const PetscReal *own = data + (size_t)k * (size_t)rows;
+    PetscReal square = 0, own_square = 0;
+
+    PetscCall(PetscArraycpy(lost, own, rows));
+    for (PetscInt j = 0; j < n; j++) {
+      const PetscReal *other = data + (size_t)(first + j * stride) * (size_t)rows, weight = w[i * n + j];
+
+      if (j == i) continue;
+      for (PetscInt r = 0; r < rows; r++) lost[r] -= weight * other[r];
+    }
+    for (PetscInt r = 0; r < rows; r++) {
+      square += lost[r] * lost[r];
+      own_square += own[r] * own[r];
+    }
+    worst = PetscMax(worst, square);
+    largest = PetscMax(largest, own_square);
+  }
+  PetscCall(PetscFree2(w, lost));
+  *error = largest > 0 ? PetscSqrtReal(worst / largest) : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
+                                      PetscReal *error)
+{
+  const PetscInt n = t->n[axis];
+  PetscInt best = n - 1;
+
+  PetscFunctionBegin;
+  t->degree[axis] = n - 1;
+  *error = 0;
+  if (n == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoTensorLeaveOneOut(t, axis, rows, data, error));
+  for (PetscInt d = n - 2; d >= 0; d--) { /* n - 2, one node left out, is n - 1 once more: taken when exact */
+    PetscReal e;
+
+    t->degree[axis] = d;
+    PetscCall(HycoTensorLeaveOneOut(t, axis, rows, data, &e));
+    if (e > ROUNDING && e > *error / 2) continue; /* the higher degree unless the lower one is clearly better */
+    best = d;
+    *error = PetscMin(e, *error);
+  }
+  t->degree[axis] = best;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

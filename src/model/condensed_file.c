@@ -1,0 +1,109 @@
+/* The condensed model's part of the model file: the grid's values, each field's degrees and data. */
+#include <hycocondensed.h>
+#include <hycoh5.h>
+#include <stdio.h>
+
+static void Dataset(const char name[], char path[64])
+{
+  (void)snprintf(path, 64, "condensed/%s", name);
+}
+
+PetscErrorCode HycoCondensedSave(HycoModel m, HycoH5 h)
+{
+  HycoCondensed c = m->condensed;
+  char path[64];
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < c->dim; p++) {
+    PetscCall(PetscSNPrintf(path, sizeof(path), "condensed/values_%d", (int)p));
+    PetscCall(HycoH5WriteReal(h, path, c->n[p], 1, c->x[p]));
+  }
+  PetscCall(HycoH5WriteInt(h, "condensed/stiff", c->dim, 1, c->stiff));
+  PetscCall(HycoH5WriteInt(h, "condensed/affine", c->dim, 1, c->affine));
+  PetscCall(HycoH5WriteReal(h, "condensed/left_out", 3, 1, c->errors));
+  PetscCall(HycoH5WriteReal(h, "condensed/lambda", HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), c->m, c->Lambda));
+  PetscCall(HycoH5WriteReal(h, "condensed/bounds", HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), 2, c->bounds));
+  for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) {
+    const HycoGridField *field = &c->field[f];
+
+    Dataset(HycoGridFieldNames[f], path);
+    PetscCall(HycoH5WriteReal(h, path, HycoTensorSize(&field->tensor), field->rows, field->data));
+    PetscCall(PetscSNPrintf(path, sizeof(path), "condensed/degree_%s", HycoGridFieldNames[f]));
+    PetscCall(HycoH5WriteInt(h, path, c->dim, 1, field->tensor.degree));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadFlags(HycoH5 h, const char name[], PetscInt n, PetscInt flags[])
+{
+  PetscInt *read, one = 1;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadInt(h, name, 0, 1, &n, &one, &read));
+  PetscCall(PetscArraycpy(flags, read, n));
+  PetscCall(PetscFree(read));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The values of parameter p: ascending, finite. */
+static PetscErrorCode LoadValues(HycoH5 h, HycoCondensed c, PetscInt p)
+{
+  char path[64];
+  PetscInt one = 1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(path, sizeof(path), "condensed/values_%d", (int)p));
+  c->n[p] = -1;
+  PetscCall(HycoH5LoadReal(h, path, &c->n[p], &one, &c->x[p]));
+  HycoCheck(c->n[p] > 0, "%s is damaged", path);
+  for (PetscInt k = 0; k < c->n[p]; k++)
+    HycoCheck(!PetscIsInfOrNanReal(c->x[p][k]) && (!k || c->x[p][k] > c->x[p][k - 1]), "%s is damaged", path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadField(HycoH5 h, HycoCondensed c, PetscInt f)
+{
+  HycoGridField *field = &c->field[f];
+  PetscInt n = HycoTensorSize(&field->tensor), rows = field->rows, dim = c->dim, one = 1, *degree;
+  char path[64];
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(path, sizeof(path), "condensed/degree_%s", HycoGridFieldNames[f]));
+  PetscCall(HycoH5LoadInt(h, path, 0, PETSC_MAX_INT, &dim, &one, &degree));
+  for (PetscInt p = 0; p < c->dim; p++) {
+    HycoCheck(degree[p] < field->tensor.n[p], "%s is damaged", path);
+    field->tensor.degree[p] = degree[p];
+  }
+  PetscCall(PetscFree(degree));
+  Dataset(HycoGridFieldNames[f], path);
+  PetscCall(HycoH5LoadReal(h, path, &n, &rows, &field->data));
+  for (size_t k = 0; k < (size_t)n * (size_t)rows; k++)
+    HycoCheck(!PetscIsInfOrNanReal(field->data[k]), "%s is damaged: an entry is not finite", path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedLoad(HycoModel m, HycoH5 h)
+{
+  HycoCondensed c;
+  PetscInt n, three = 3, two = 2, one = 1;
+  PetscReal *errors;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedCreate(m->scene->n_parameters, m->pairs.n, m->l, &c));
+  m->condensed = c;
+  for (PetscInt p = 0; p < c->dim; p++) PetscCall(LoadValues(h, c, p));
+  PetscCall(LoadFlags(h, "condensed/stiff", c->dim, c->stiff));
+  PetscCall(LoadFlags(h, "condensed/affine", c->dim, c->affine));
+  PetscCall(HycoCondensedAllocate(c));
+  PetscCall(HycoH5LoadReal(h, "condensed/left_out", &three, &one, &errors));
+  PetscCall(PetscArraycpy(c->errors, errors, 3));
+  PetscCall(PetscFree(errors));
+  n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
+  PetscCall(HycoH5LoadReal(h, "condensed/lambda", &n, &c->m, &c->Lambda));
+  n = HycoTensorSize(&c->field[HYCO_FIELD_G].tensor);
+  PetscCall(HycoH5LoadReal(h, "condensed/bounds", &n, &two, &c->bounds));
+  for (PetscInt k = 0; k < n; k++)
+    HycoCheck(c->bounds[2 * k] >= 0 && c->bounds[2 * k + 1] >= c->bounds[2 * k], "condensed/bounds is damaged");
+  for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) PetscCall(LoadField(h, c, f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
