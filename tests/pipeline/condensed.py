@@ -61,7 +61,7 @@ class Condensed(Case):
         self.assertTrue(os.path.exists(self.path('out.xdmf')))
         view = self.run_raw('view', '-model', 'p.h5').stdout
         self.assertIn('condensed model', view)
-        self.assertIn('degree 1 of the gap (affine: exact)', view)
+        self.assertIn('load: 5 values; degree 0 of the flexibility, 1 of the gap (affine: exact)', view)
 
     def test_closed_form(self):
         """The rope's flexibility at each training value, by numpy from K in closed form; between them, forces by the
