@@ -139,6 +139,7 @@ class Condensed(Case):
         train = ('train', *TYPE, '-model', 'no.h5', '-scene')
         self.refused('are no tensor grid', *train, PELLET, '-points', 'points.csv')
         self.refused('have one value of radius', *train, PELLET, '-grid', '1,3')
+        self.refused('a condensed model needs one', *train, ROPE, '-grid', '2,2', '-hyco_linear', 'iterative')
         self.refused('the scene has no contact', *train, PLATE, '-grid', '2,2')
         self.refused('-greedy does not give', *train, ROPE, '-greedy', '-training_grid', '3,3')
         with open(os.path.join(BLOCKS, 'scene.yaml'), encoding='utf-8') as f, \
