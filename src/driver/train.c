@@ -36,7 +36,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
   cJSON_AddNumberToObject(json, "rid_elements", t->rid_elements);
   cJSON_AddNumberToObject(json, "rid_contacts", t->rid_contacts);
   cJSON_AddNumberToObject(json, "rid_fraction", t->rid_fraction);
-  cJSON_AddNumberToObject(json, "condition", t->condition);
+  if (t->type != HYCO_MODEL_CONDENSED) cJSON_AddNumberToObject(json, "condition", t->condition);
   PetscCall(HycoSceneGetParameters(scene, &n_par, NULL, NULL, NULL));
   ReportScan(json, &t->scan, n_par);
   cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
@@ -137,9 +137,10 @@ PetscErrorCode CommandTrain(void)
   PetscCall(SayBases(&t));
   if (!given && t.type == HYCO_MODEL_CONDENSED && !t.target_met)
     PetscCall(Say("-hyco_condensed_tol was not reached with -hyco_condensed_max_values\n"));
-  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e; condition of the reduced stiffness %.1e\n",
-                (double)t.error_u, t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda,
-                (double)t.condition));
+  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u,
+                t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda));
+  if (t.type != HYCO_MODEL_CONDENSED) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
+  PetscCall(Say("\n"));
   if (t.scan.n)
     PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,
                   (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept as asked" : ""));

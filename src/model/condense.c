@@ -173,8 +173,13 @@ PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t)
 {
   HycoCondensed c;
   const PetscInt m = t->sizes[2];
+  PetscInt linear = HYCO_LINEAR_AUTO;
 
   PetscFunctionBegin;
+  PetscCall(HycoOptionsWord(t->scene->options, "hyco_linear", HycoLinearNames, &linear));
+  HycoCheck(linear != HYCO_LINEAR_ITERATIVE,
+            "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a hybrid "
+            "model, or take -hyco_linear auto");
   HycoCheck(m > 0, "the scene has no contact, and a condensed model is one of contact forces; train a hybrid model");
   HycoCheck(m <= MOST_CONTACTS,
             "the scene has %d contacts: a condensed model stores the square of their number at every training point, "

@@ -61,7 +61,7 @@ class Condensed(Case):
         self.assertTrue(os.path.exists(self.path('out.xdmf')))
         view = self.run_raw('view', '-model', 'p.h5').stdout
         self.assertIn('condensed model', view)
-        self.assertIn('degree 1 of the gap (affine: exact)', view)
+        self.assertIn('load: 5 values; degree 0 of the flexibility, 1 of the gap (affine: exact)', view)
 
     def test_closed_form(self):
         """The rope's flexibility at each training value, by numpy from K in closed form; between them, forces by the
@@ -139,6 +139,7 @@ class Condensed(Case):
         train = ('train', *TYPE, '-model', 'no.h5', '-scene')
         self.refused('are no tensor grid', *train, PELLET, '-points', 'points.csv')
         self.refused('have one value of radius', *train, PELLET, '-grid', '1,3')
+        self.refused('a condensed model needs one', *train, ROPE, '-grid', '2,2', '-hyco_linear', 'iterative')
         self.refused('the scene has no contact', *train, PLATE, '-grid', '2,2')
         self.refused('-greedy does not give', *train, ROPE, '-greedy', '-training_grid', '3,3')
         with open(os.path.join(BLOCKS, 'scene.yaml'), encoding='utf-8') as f, \
