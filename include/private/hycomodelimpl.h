@@ -16,6 +16,7 @@ typedef enum {
 } HycoHybrid;
 
 typedef struct _n_HycoNorms *HycoNorms;
+typedef struct _n_HycoReconstruction *HycoReconstruction;
 
 /* The basis of the contact forces; fe: none, the true multipliers of the hybrid model. */
 typedef enum { HYCO_DUAL_FE, HYCO_DUAL_NNMF, HYCO_DUAL_SNAPSHOTS } HycoDual;
@@ -60,7 +61,8 @@ struct _p_HycoModel {
   PetscReal *V_whole, *U_whole;
   HycoNorms norms; /* made by the first comparison */
   /* online */
-  PetscInt reconstruct_solver; /* of (41), index in HycoReconstructSolvers */
+  PetscInt reconstruct_solver;       /* of (41), index in HycoReconstructSolvers */
+  HycoReconstruction reconstruction; /* what (41) keeps, made by the first */
   PetscBool ready, reconstruct, solved, whole_current;
   HycoFE fe;
   PetscInt n_free, n, m; /* modes that are unknowns, all unknowns, contacts of A_lambda */
@@ -93,6 +95,8 @@ PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);
 
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoModelReconstruct(HycoModel model);
+/* NULL-safe. */
+PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction);
 extern const char *const HycoReconstructSolvers[];
 
 /* (44), once the modes and the contacts' rows and gaps are there: V_lambda^T B V and its transpose; V_lambda^T D;

@@ -17,6 +17,7 @@ PetscErrorCode HycoModelReset(HycoModel m)
 {
   PetscFunctionBegin;
   m->ready = m->solved = PETSC_FALSE;
+  PetscCall(HycoReconstructionDestroy(&m->reconstruction));
   PetscCall(HycoSolverDestroy(&m->solver));
   PetscCall(HycoSystemDestroy(&m->system));
   PetscCall(MatDestroy(&m->K));
