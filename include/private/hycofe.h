@@ -21,17 +21,24 @@ const HycoElement *HycoElementGetFacet(HycoCellType type);
 #define HYCO_MAX_CELL_DOFS 24
 
 typedef struct _n_HycoFE *HycoFE;
+typedef struct _n_HycoPlaces *HycoPlaces;
 
 struct _n_HycoFE {
   HycoScene scene;              /* borrowed */
   HycoMesh mesh;                /* borrowed */
   PetscInt dim, n_dof, n_sigma; /* space dimension, n_nodes * dim, stress components */
+  /* what no parameter reaches */
+  PetscBool *constant; /* by cell: neither its nodes nor its material */
+  PetscInt n_constant;
+  PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
+  HycoPlaces places;        /* of the entries of K; made by the second assembly into it */
   /* at the current mu */
   PetscBool ready;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscReal *X;                                 /* n_nodes x 3, moved nodes */
   PetscBool *fixed;                             /* n_dof */
   PetscReal *u0;                                /* n_dof, prescribed displacement, 0 where free */
+  PetscBool lifted;                             /* whether any of u0 is not 0 */
   PetscReal *lame;                              /* n_cells x nq x 2: lambda and mu of Lame (1D: 0 and nu) */
   PetscBool stiffness_changed, contact_changed; /* by the last HycoFESetParameters */
 };

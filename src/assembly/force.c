@@ -101,7 +101,7 @@ PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
     const HycoBody *body = &fe->scene->body[m->cell_body[e]];
 
     if (body->force[0] || body->force[1] || body->force[2]) PetscCall(AddBodyForces(fe, e, F));
-    PetscCall(AddLifting(fe, e, F));
+    if (fe->lifted) PetscCall(AddLifting(fe, e, F));
   }
   for (PetscInt k = 0; k < fe->scene->n_loads; k++) {
     PetscInt g = 0;
