@@ -41,6 +41,7 @@ struct _n_HycoFE {
   PetscBool lifted;                             /* whether any of u0 is not 0 */
   PetscReal *lame;                              /* n_cells x nq x 2: lambda and mu of Lame (1D: 0 and nu) */
   PetscBool stiffness_changed, contact_changed; /* by the last HycoFESetParameters */
+  PetscBool gap_changed;                        /* the same: the contacts' gaps, or what the supports take from them */
 };
 
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);

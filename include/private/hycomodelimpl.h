@@ -17,6 +17,7 @@ typedef enum {
 
 typedef struct _n_HycoNorms *HycoNorms;
 typedef struct _n_HycoReconstruction *HycoReconstruction;
+typedef struct _n_HycoReduced *HycoReduced;
 
 /* The basis of the contact forces; fe: none, the true multipliers of the hybrid model. */
 typedef enum { HYCO_DUAL_FE, HYCO_DUAL_NNMF, HYCO_DUAL_SNAPSHOTS } HycoDual;
@@ -70,6 +71,7 @@ struct _p_HycoModel {
   PetscInt *contact;     /* m: index in pairs */
   PetscInt *fe_at;       /* by dof of mesh: place in fe_dof, or -1 */
   PetscReal *Vp;         /* V, zero on full-order and fixed unknowns */
+  HycoReduced reduced;   /* how K goes into Kr, and what of it stays; made by the first */
   Mat K, Kr, Br, Btr;
   Vec F, Fr, Dr, x, L;
   PetscInt *row_start, *row_dof; /* rows of B over dofs of mesh, all contacts */
@@ -89,6 +91,14 @@ PetscErrorCode HycoModelReset(HycoModel model);
 PetscErrorCode HycoModelSetRidge(HycoModel model, PetscReal ridge);
 /* Sets the full-order unknowns (dofs of mesh, any order). */
 PetscErrorCode HycoModelSetFE(HycoModel model, HycoHybrid hybrid, PetscInt n, const PetscInt dof[]);
+
+/* The reduced system (38) from K, F, the contacts' rows and gaps on the RID (reduced.c): a sparse Kr, without entries;
+   Kr; Br and Btr; Fr and Dr. HycoReducedDestroy() is NULL-safe. */
+PetscErrorCode HycoReducedCreateSparse(HycoModel model);
+PetscErrorCode HycoReducedFillStiffness(HycoModel model);
+PetscErrorCode HycoReducedFillContact(HycoModel model);
+PetscErrorCode HycoReducedFillVectors(HycoModel model);
+PetscErrorCode HycoReducedDestroy(HycoReduced *reduced);
 
 /* K and the reduced system at mu, without solving: Kr, Br, Btr and the vectors are current, the prediction is not. */
 PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);

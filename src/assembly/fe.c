@@ -173,11 +173,13 @@ static void FindChanges(HycoFE fe, const PetscBool changed[], PetscBool *moved)
     for (PetscInt c = 0; c < 3; c++) *moved = (PetscBool)(*moved || HycoExprChanges(s->body[b].map[c], changed));
   }
   fe->stiffness_changed = fe->contact_changed = *moved;
+  fe->gap_changed = (PetscBool)(*moved || !fe->fixed_constant);
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     if (HycoExprChanges(s->body[b].young, changed) || HycoExprChanges(s->body[b].poisson, changed))
       fe->stiffness_changed = PETSC_TRUE;
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) {
+    if (HycoExprChanges(s->contact[k].gap, changed)) fe->gap_changed = PETSC_TRUE;
     for (PetscInt c = 0; c < 3; c++) {
       if (HycoExprChanges(s->contact[k].normal[c], changed)) fe->contact_changed = PETSC_TRUE;
     }
@@ -194,7 +196,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
     fe->mu[p] = mu[p];
   }
   FindChanges(fe, changed, &moved);
-  if (first) fe->stiffness_changed = fe->contact_changed = moved = PETSC_TRUE;
+  if (first) fe->gap_changed = fe->stiffness_changed = fe->contact_changed = moved = PETSC_TRUE;
   fe->ready = PETSC_FALSE; /* until all of it is done */
   if (moved) PetscCall(MoveNodes(fe));
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
