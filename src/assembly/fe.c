@@ -186,9 +186,23 @@ static void FindChanges(HycoFE fe, const PetscBool changed[], PetscBool *moved)
   }
 }
 
+void HycoFEReaches(HycoFE fe, PetscBool reaches[])
+{
+  const struct _n_HycoFE kept = *fe;
+
+  for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {
+    PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moved;
+
+    changed[p] = PETSC_TRUE;
+    FindChanges(fe, changed, &moved);
+    reaches[p] = (PetscBool)(fe->stiffness_changed || fe->contact_changed);
+  }
+  *fe = kept;
+}
+
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
 {
-  PetscBool changed[HYCO_MAX_PARAMETERS], moved, first = (PetscBool)!fe->ready;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moved, first = (PetscBool)!fe->ready;
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {

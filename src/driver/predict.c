@@ -81,16 +81,20 @@ static const char *const columns[N_COLUMNS] = {
 static PetscErrorCode PredictMine(HycoModel model, PetscInt n, PetscInt n_par, const PetscReal mu[], PetscReal value[])
 {
   PetscMPIInt rank, size;
+  PetscInt first, count;
+  HycoPrediction *all;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  for (PetscInt k = (PetscInt)rank * n / size; k < ((PetscInt)rank + 1) * n / size; k++) {
-    HycoPrediction p;
-    PetscReal *v = value + k * N_COLUMNS;
+  first = (PetscInt)rank * n / size;
+  count = ((PetscInt)rank + 1) * n / size - first;
+  PetscCall(PetscMalloc1(count, &all));
+  PetscCall(HycoModelSolveMany(model, count, n_par, mu + first * n_par, all, NULL, NULL));
+  for (PetscInt k = 0; k < count; k++) {
+    const HycoPrediction p = all[k];
+    PetscReal *v = value + (first + k) * N_COLUMNS;
 
-    PetscCall(HycoModelPredict(model, n_par, mu + k * n_par));
-    PetscCall(HycoModelGetPrediction(model, &p));
     v[FORCE] = p.total_contact_force;
     v[LAMBDA_MAX] = p.lambda_max;
     v[COVERED] = p.covered_force;
@@ -101,6 +105,7 @@ static PetscErrorCode PredictMine(HycoModel model, PetscInt n, PetscInt n_par, c
     v[ITERATIONS] = p.iterations;
     v[SECONDS] = p.seconds.total;
   }
+  PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -164,6 +164,8 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   m->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
   if (m->fe->stiffness_changed) {
     PetscCall(HycoFEAssembleStiffness(m->fe, m->K));
+    if (first && m->fe->n_constant) /* again in the order of all that come: the same sums to the last bit */
+      PetscCall(HycoFEAssembleStiffness(m->fe, m->K));
     PetscCall(HycoReducedFillStiffness(m));
   }
   PetscCall(HycoFEAssembleForce(m->fe, m->F));
