@@ -150,9 +150,9 @@ PetscErrorCode CommandPredict(void)
   if (set) {
     HycoCheck(!output[0], "-output is for one point (-mu); a set of points gives a -table");
     PetscCall(DriverGetSamples(scene, &samples, &set));
-    PetscCall(Many(model, scene, samples));
+    HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, samples));
   } else {
-    PetscCall(One(model, scene, output));
+    HycoStaged(HYCO_STAGE_ONLINE, One(model, scene, output));
   }
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoModelDestroy(&model));

@@ -163,16 +163,16 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   PetscCall(HycoFESetParameters(m->fe, mu));
   m->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
   if (m->fe->stiffness_changed) {
-    PetscCall(HycoFEAssembleStiffness(m->fe, m->K));
+    HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, m->K));
     if (first && m->fe->n_constant) /* again in the order of all that come: the same sums to the last bit */
-      PetscCall(HycoFEAssembleStiffness(m->fe, m->K));
-    PetscCall(HycoReducedFillStiffness(m));
+      HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, m->K));
+    HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillStiffness(m));
   }
-  PetscCall(HycoFEAssembleForce(m->fe, m->F));
+  HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, m->F));
   if (m->fe->contact_changed || m->fe->gap_changed)
-    PetscCall(HycoContactRows(m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap));
-  if (m->n_L && m->fe->contact_changed) PetscCall(HycoReducedFillContact(m));
-  PetscCall(HycoReducedFillVectors(m));
+    HycoLogged(HYCO_EVENT_CONTACT, HycoContactRows(m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap));
+  if (m->n_L && m->fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
+  HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
   m->fe->ready = PETSC_TRUE;
   if (first) {
     PetscCall(HycoSystemSetMatrices(m->system, m->Kr, m->Btr, m->Br, m->type == HYCO_MODEL_PROJECTION));
@@ -233,12 +233,12 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   p = &m->prediction;
   PetscCall(HycoSceneCheckParameters(m->scene, n, mu));
   m->solved = m->whole_current = PETSC_FALSE;
-  PetscCall(HycoModelSetUp(m));
+  HycoLogged(HYCO_EVENT_SETUP, HycoModelSetUp(m));
   p->seconds.setup = HycoNow() - begin;
   begin = HycoNow();
   PetscCall(Assemble(m, mu));
   p->seconds.assemble = HycoNow() - begin;
-  PetscCall(HycoSolverSolve(m->solver, m->x, m->L));
+  HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(m->solver, m->x, m->L));
   PetscCall(HycoSolverGetSeconds(m->solver, &p->seconds.factor, &p->seconds.solve));
   PetscCall(HycoSolverGetReason(m->solver, &p->reason));
   PetscCall(HycoSolverGetIterations(m->solver, &p->iterations));
@@ -246,7 +246,8 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   PetscCall(HycoSolverGetMethod(m->solver, &method));
   PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
   PetscCall(Unpack(m));
-  if (m->reconstruct && p->reason > 0 && m->type == HYCO_MODEL_HYBRID) PetscCall(HycoModelReconstruct(m));
+  if (m->reconstruct && p->reason > 0 && m->type == HYCO_MODEL_HYBRID)
+    HycoLogged(HYCO_EVENT_RECONSTRUCT, HycoModelReconstruct(m));
   p->seconds.total = HycoNow() - begin;
   m->solved = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -68,7 +68,7 @@ static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
                          whole->n_nodes, &index));
   PetscCall(PetscCalloc1(whole->n_nodes, &contact));
   HycoPairsMark(&t->pairs, contact);
-  PetscCall(HycoRIDBuild(t->scene, whole, &t->pairs, &recipe, in));
+  HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->scene, whole, &t->pairs, &recipe, in));
   for (PetscInt e = 0; t->grown && e < whole->n_cells; e++) t->grown[e] = in[e] = (PetscBool)(in[e] || t->grown[e]);
   PetscCall(PetscMalloc1(t->pairs.n, &m->in_rid));
   PetscCall(HycoRIDSets(whole, &t->pairs, in, role, m->in_rid));
@@ -217,9 +217,11 @@ PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(candidate, sizeof(candidate), "%s%s", path, useful ? ".candidate" : ""));
+  PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_TRUE));
   HycoOnRoot(t->comm, BuildAndSave(t, useful, candidate, report));
+  PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, t->comm));
-  if (useful) PetscCall(HycoTrainerScan(t, candidate, path, &report->scan));
+  if (useful) HycoLogged(HYCO_EVENT_SCAN, HycoTrainerScan(t, candidate, path, &report->scan));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -269,11 +271,11 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
   PetscCall(HycoTrainerOpen(t, samples, path, &store));
-  PetscCall(HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
+  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
   solved = HycoNow();
-  PetscCall(HycoTrainerReduce(t, store));
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerReduce(t, store));
   PetscCall(HycoSnapshotsDestroy(&store));
-  PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, &report));
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerBuild(t, PETSC_TRUE, path, &report));
   report.seconds_snapshots = solved - begin;
   report.seconds_reduction = HycoNow() - solved;
   if (training) *training = report;
