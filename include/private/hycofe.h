@@ -23,6 +23,13 @@ const HycoElement *HycoElementGetFacet(HycoCellType type);
 typedef struct _n_HycoFE *HycoFE;
 typedef struct _n_HycoPlaces *HycoPlaces;
 
+/* What a uniform load gives to the nodes that carry it. */
+typedef struct {
+  PetscBool ready; /* for the nodes as they are */
+  PetscInt n, *node;
+  PetscReal *share; /* n x 4: the sum of n dS, of dS */
+} HycoLoadShares;
+
 struct _n_HycoFE {
   HycoScene scene;              /* borrowed */
   HycoMesh mesh;                /* borrowed */
@@ -32,6 +39,8 @@ struct _n_HycoFE {
   PetscInt n_constant;
   PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
   HycoPlaces places;        /* of the entries of K; made by the second assembly into it */
+  PetscInt n_loads;
+  HycoLoadShares *shares; /* n_loads: by load of the scene */
   /* at the current mu */
   PetscBool ready;
   PetscReal mu[HYCO_MAX_PARAMETERS];

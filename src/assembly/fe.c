@@ -6,6 +6,11 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscFunctionBegin;
   if (!*fe) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoPlacesDestroy(&(*fe)->places));
+  for (PetscInt k = 0; k < (*fe)->n_loads; k++) {
+    PetscCall(PetscFree((*fe)->shares[k].node));
+    PetscCall(PetscFree((*fe)->shares[k].share));
+  }
+  PetscCall(PetscFree((*fe)->shares));
   PetscCall(PetscFree((*fe)->constant));
   PetscCall(PetscFree((*fe)->X));
   PetscCall(PetscFree((*fe)->fixed));
@@ -67,6 +72,8 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscCalloc1(f->n_dof, &f->u0));
   PetscCall(PetscMalloc1(mesh->n_cells * el->nq * 2, &f->lame));
   PetscCall(PetscCalloc1(mesh->n_cells, &f->constant));
+  f->n_loads = scene->n_loads;
+  PetscCall(PetscCalloc1(f->n_loads, &f->shares));
   PetscCall(FindConstant(f));
   *fe = f;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -213,6 +220,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   if (first) fe->gap_changed = fe->stiffness_changed = fe->contact_changed = moved = PETSC_TRUE;
   fe->ready = PETSC_FALSE; /* until all of it is done */
   if (moved) PetscCall(MoveNodes(fe));
+  for (PetscInt k = 0; k < fe->n_loads && moved; k++) fe->shares[k].ready = PETSC_FALSE;
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
   if (fe->stiffness_changed) PetscCall(SetMaterial(fe, first));
   fe->ready = PETSC_TRUE;

@@ -193,7 +193,8 @@ static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved
   HycoLCPStatus status;
 
   PetscFunctionBegin;
-  PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s dual", HycoSolverTypes[type]));
+  PetscCall(PetscStrncpy(s->method, HycoSolverTypes[type], sizeof(s->method)));
+  PetscCall(PetscStrlcat(s->method, " dual", sizeof(s->method)));
   if (type == HYCO_TYPE_TAO) {
     PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "tao %s dual", HycoTaoTypes[s->tao]));
     PetscCall(HycoTaoLCP(s->m, s->S, s->g, s->system->symmetric, s->tao, s->max_its, s->L, &s->its, solved));
