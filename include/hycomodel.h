@@ -66,6 +66,18 @@ PetscErrorCode HycoModelPredict(HycoModel model, PetscInt n, const PetscReal mu[
 /* Whether Predict takes parameters outside the trained ranges (default: it refuses them). There the estimated errors
    grow with the distance, and nothing has tested them. */
 PetscErrorCode HycoModelSetExtrapolate(HycoModel model, PetscBool extrapolate);
+/* Sizes of what a prediction gives: contacts, nodes of the RID (with those of the contacts outside it), components. Any
+   output may be NULL. */
+PetscErrorCode HycoModelGetSizes(HycoModel model, PetscInt *n_contacts, PetscInt *n_nodes, PetscInt *dim);
+/*
+  HycoModelPredict() at n points, mu n x n_parameters, with the same answers to the last bit in the caller's order;
+  inside, points that share their stiffness share its factor. The caller's arrays, each of which may be NULL:
+  prediction (n), Lambda (n x n_contacts), U (n x n_nodes x dim, as HycoModelGetRID()'s). Not converging is no error:
+  see HycoPrediction.reason. Afterwards no prediction is held. Not collective. Fails before any solve when a point lies
+  outside the ranges.
+*/
+PetscErrorCode HycoModelSolveMany(HycoModel model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
+                                  HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
 /* Whether Predict reconstructs the forces outside the RID (default: yes). */
 PetscErrorCode HycoModelSetReconstruct(HycoModel model, PetscBool reconstruct);
 /* Called after each iteration of the active set. */

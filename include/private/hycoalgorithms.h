@@ -50,6 +50,18 @@ PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const
                               PetscReal share, PetscReal c[]);
 
 /*
+  Many problems over one S (m x n column major, borrowed): min 1/2 sum_k d_k (S x)_k^2 - h^T S x + shift/2 |x|^2, x >=
+  0, that is |diag(sqrt(d)) S x - b|^2 / 2 with h = sqrt(d) b. d >= 0 and h: m each. shift > 0, so that there is one
+  answer. Nothing is allocated after Create; an answer does not depend on the problems before. *solved: the optimality
+  conditions, recomputed from S, hold to rtol of the largest entry of S^T h. Not collective.
+*/
+typedef struct _n_HycoWeighted *HycoWeighted;
+PetscErrorCode HycoWeightedCreate(PetscInt m, PetscInt n, const PetscReal S[], PetscReal shift, HycoWeighted *weighted);
+PetscErrorCode HycoWeightedDestroy(HycoWeighted *weighted);
+PetscErrorCode HycoWeightedNNLS(HycoWeighted weighted, const PetscReal d[], const PetscReal h[], PetscReal rtol,
+                                PetscReal x[], PetscBool *solved);
+
+/*
   Nonnegative factorisation S ~ W H by at most max_its alternations from the NNDSVD start: the same S, the same W. S: m
   x n column major, no entry negative (else an error). W (room for m x k, column major) receives n_vectors <= k columns
   of unit 2-norm, no entry negative; fewer than k when S has a smaller rank, none when S is zero. misfit = |S - W H|_F^2

@@ -21,25 +21,44 @@ const HycoElement *HycoElementGetFacet(HycoCellType type);
 #define HYCO_MAX_CELL_DOFS 24
 
 typedef struct _n_HycoFE *HycoFE;
+typedef struct _n_HycoPlaces *HycoPlaces;
+
+/* What a uniform load gives to the nodes that carry it. */
+typedef struct {
+  PetscBool ready; /* for the nodes as they are */
+  PetscInt n, *node;
+  PetscReal *share; /* n x 4: the sum of n dS, of dS */
+} HycoLoadShares;
 
 struct _n_HycoFE {
   HycoScene scene;              /* borrowed */
   HycoMesh mesh;                /* borrowed */
   PetscInt dim, n_dof, n_sigma; /* space dimension, n_nodes * dim, stress components */
+  /* what no parameter reaches */
+  PetscBool *constant; /* by cell: neither its nodes nor its material */
+  PetscInt n_constant;
+  PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
+  HycoPlaces places;        /* of the entries of K; made by the second assembly into it */
+  PetscInt n_loads;
+  HycoLoadShares *shares; /* n_loads: by load of the scene */
   /* at the current mu */
   PetscBool ready;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscReal *X;                                 /* n_nodes x 3, moved nodes */
   PetscBool *fixed;                             /* n_dof */
   PetscReal *u0;                                /* n_dof, prescribed displacement, 0 where free */
+  PetscBool lifted;                             /* whether any of u0 is not 0 */
   PetscReal *lame;                              /* n_cells x nq x 2: lambda and mu of Lame (1D: 0 and nu) */
   PetscBool stiffness_changed, contact_changed; /* by the last HycoFESetParameters */
+  PetscBool gap_changed;                        /* the same: the contacts' gaps, or what the supports take from them */
 };
 
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* Brings everything to mu (length scene->n_parameters), touching only what depends on what changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
+/* Which parameters (room for n_parameters) reach the stiffness or the contacts' rows. */
+void HycoFEReaches(HycoFE fe, PetscBool reaches[]);
 
 /* Rigid motions that the supports leave free, an orthonormal basis of the kernel of K. */
 typedef struct {

@@ -73,6 +73,48 @@ void HycoFormat(char line[HYCO_LINE], const char format[], ...) PETSC_ATTRIBUTE_
 #define HYCO_HASH_START 14695981039346656037ULL
 unsigned long long HycoHash(unsigned long long hash, const void *data, size_t bytes);
 
+/* What -log_view tells of, in the order of log.c's names. */
+typedef enum {
+  HYCO_EVENT_MESH,
+  HYCO_EVENT_ASSEMBLE, /* K */
+  HYCO_EVENT_FORCE,    /* F */
+  HYCO_EVENT_CONTACT,  /* B, D */
+  HYCO_EVENT_REDUCE,   /* the reduced system from K, F, B, D of the RID */
+  HYCO_EVENT_FACTOR,   /* with the flexibility */
+  HYCO_EVENT_FORCES,   /* the complementarity problem: active set, Lemke, TAO */
+  HYCO_EVENT_KKT,
+  HYCO_EVENT_POD,
+  HYCO_EVENT_DEIM,
+  HYCO_EVENT_RID,
+  HYCO_EVENT_MODEL, /* choice of the full-order unknowns, writing */
+  HYCO_EVENT_SCAN,
+  HYCO_EVENT_LOAD,
+  HYCO_EVENT_SETUP, /* online */
+  HYCO_EVENT_SOLVE, /* any contact system, whole */
+  HYCO_EVENT_RECONSTRUCT,
+  HYCO_N_EVENTS
+} HycoEvent;
+typedef enum { HYCO_STAGE_FULL_ORDER, HYCO_STAGE_REDUCTION, HYCO_STAGE_ONLINE, HYCO_N_STAGES } HycoStage;
+PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin);
+PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin);
+/* PetscCall(call) within the event, or the stage; both end with an error too. */
+#define HycoLogged(event, call)                                                                                        \
+  do {                                                                                                                 \
+    PetscErrorCode logged_;                                                                                            \
+    PetscCall(HycoLogEvent((event), PETSC_TRUE));                                                                      \
+    logged_ = (call);                                                                                                  \
+    PetscCall(HycoLogEvent((event), PETSC_FALSE));                                                                     \
+    PetscCall(logged_);                                                                                                \
+  } while (0)
+#define HycoStaged(stage, call)                                                                                        \
+  do {                                                                                                                 \
+    PetscErrorCode logged_;                                                                                            \
+    PetscCall(HycoLogStage((stage), PETSC_TRUE));                                                                      \
+    logged_ = (call);                                                                                                  \
+    PetscCall(HycoLogStage((stage), PETSC_FALSE));                                                                     \
+    PetscCall(logged_);                                                                                                \
+  } while (0)
+
 /* Seconds since the first call, on this rank's clock. */
 PetscReal HycoNow(void);
 

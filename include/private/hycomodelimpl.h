@@ -17,6 +17,8 @@ typedef enum {
 
 typedef struct _n_HycoNorms *HycoNorms;
 typedef struct _n_HycoCondensed *HycoCondensed;
+typedef struct _n_HycoReconstruction *HycoReconstruction;
+typedef struct _n_HycoReduced *HycoReduced;
 
 /* The basis of the contact forces; fe: none, the true multipliers of the hybrid model. */
 typedef enum { HYCO_DUAL_FE, HYCO_DUAL_NNMF, HYCO_DUAL_SNAPSHOTS } HycoDual;
@@ -75,7 +77,8 @@ struct _p_HycoModel {
   PetscReal *V_whole, *U_whole;
   HycoNorms norms; /* made by the first comparison */
   /* online */
-  PetscInt reconstruct_solver; /* of (41), index in HycoReconstructSolvers */
+  PetscInt reconstruct_solver;       /* of (41), index in HycoReconstructSolvers */
+  HycoReconstruction reconstruction; /* what (41) keeps, made by the first */
   PetscBool ready, reconstruct, solved, whole_current;
   HycoFE fe;
   PetscInt n_free, n, m; /* modes that are unknowns, all unknowns, contacts of A_lambda */
@@ -83,6 +86,7 @@ struct _p_HycoModel {
   PetscInt *contact;     /* m: index in pairs */
   PetscInt *fe_at;       /* by dof of mesh: place in fe_dof, or -1 */
   PetscReal *Vp;         /* V, zero on full-order and fixed unknowns */
+  HycoReduced reduced;   /* how K goes into Kr, and what of it stays; made by the first */
   Mat K, Kr, Br, Btr;
   Vec F, Fr, Dr, x, L;
   PetscInt *row_start, *row_dof; /* rows of B over dofs of mesh, all contacts */
@@ -103,11 +107,21 @@ PetscErrorCode HycoModelSetRidge(HycoModel model, PetscReal ridge);
 /* Sets the full-order unknowns (dofs of mesh, any order). */
 PetscErrorCode HycoModelSetFE(HycoModel model, HycoHybrid hybrid, PetscInt n, const PetscInt dof[]);
 
+/* The reduced system (38) from K, F, the contacts' rows and gaps on the RID (reduced.c): a sparse Kr, without entries;
+   Kr; Br and Btr; Fr and Dr. HycoReducedDestroy() is NULL-safe. */
+PetscErrorCode HycoReducedCreateSparse(HycoModel model);
+PetscErrorCode HycoReducedFillStiffness(HycoModel model);
+PetscErrorCode HycoReducedFillContact(HycoModel model);
+PetscErrorCode HycoReducedFillVectors(HycoModel model);
+PetscErrorCode HycoReducedDestroy(HycoReduced *reduced);
+
 /* K and the reduced system at mu, without solving: Kr, Br, Btr and the vectors are current, the prediction is not. */
 PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);
 
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoModelReconstruct(HycoModel model);
+/* NULL-safe. */
+PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction);
 extern const char *const HycoReconstructSolvers[];
 
 /* (44), once the modes and the contacts' rows and gaps are there: V_lambda^T B V and its transpose; V_lambda^T D;

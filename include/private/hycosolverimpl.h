@@ -12,7 +12,14 @@ struct _p_HycoSystem {
   Vec F, D;     /* referenced */
   PetscBool symmetric;
   PetscInt n, m; /* unknowns, contacts */
+  /* work of the residuals, made by the first */
+  Vec work_x[2], work_L; /* as F, as D */
+  PetscReal size_B;      /* its largest row sum, while B is as seen */
+  HycoSeen seen_B;
 };
+
+/* The work vectors of a system whose vectors are set. */
+PetscErrorCode HycoSystemWork(HycoSystem system);
 
 struct _p_HycoSolver {
   MPI_Comm comm;
@@ -36,6 +43,7 @@ struct _p_HycoSolver {
   PetscReal bytes;   /* estimated for it, all ranks together */
   PetscReal *lu;     /* dense: LAPACK's factors, column major n x n */
   PetscBLASInt *ipiv, n_lu;
+  PetscReal *X; /* its work: K^-1 Bt, n x m */
   /* dual form, replicated on every rank: column-major m x m flexibility, gap without forces */
   PetscInt m, p; /* contacts; unknowns pinned because K is singular: they come before the contacts in S, g and L */
   PetscReal *S, *g, *L;

@@ -1,15 +1,57 @@
 /* HycoFE: the scene on a mesh at one parameter value: nodes moved, supports, materials. */
-#include <hycofe.h>
+#include "places.h"
 
 PetscErrorCode HycoFEDestroy(HycoFE *fe)
 {
   PetscFunctionBegin;
   if (!*fe) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoPlacesDestroy(&(*fe)->places));
+  for (PetscInt k = 0; k < (*fe)->n_loads; k++) {
+    PetscCall(PetscFree((*fe)->shares[k].node));
+    PetscCall(PetscFree((*fe)->shares[k].share));
+  }
+  PetscCall(PetscFree((*fe)->shares));
+  PetscCall(PetscFree((*fe)->constant));
   PetscCall(PetscFree((*fe)->X));
   PetscCall(PetscFree((*fe)->fixed));
   PetscCall(PetscFree((*fe)->u0));
   PetscCall(PetscFree((*fe)->lame));
   PetscCall(PetscFree(*fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cells and supports that no parameter reaches. */
+static PetscErrorCode FindConstant(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+  HycoScene s = fe->scene;
+  PetscBool every[HYCO_MAX_PARAMETERS], *moves, any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < HYCO_MAX_PARAMETERS; p++) every[p] = PETSC_TRUE;
+  PetscCall(PetscCalloc1(s->n_bodies, &moves));
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    for (PetscInt c = 0; c < 3; c++) moves[b] = (PetscBool)(moves[b] || HycoExprChanges(s->body[b].map[c], every));
+    any = (PetscBool)(any || moves[b]);
+  }
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const HycoBody *body = &s->body[m->cell_body[e]];
+
+    fe->constant[e] = (PetscBool) !(HycoExprChanges(body->young, every) || HycoExprChanges(body->poisson, every));
+    for (PetscInt a = 0; a < m->nv; a++) {
+      if (moves[m->node_body[m->cells[e * m->nv + a]]]) fe->constant[e] = PETSC_FALSE;
+    }
+    fe->n_constant += fe->constant[e];
+  }
+  fe->fixed_constant = PETSC_TRUE;
+  for (PetscInt k = 0; k < s->n_fixed; k++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      HycoExpr value = s->fixed[k].value[c];
+
+      if (HycoExprChanges(value, every) || (any && value && HycoExprInSpace(value))) fe->fixed_constant = PETSC_FALSE;
+    }
+  }
+  PetscCall(PetscFree(moves));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -29,6 +71,10 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscCalloc1(f->n_dof, &f->fixed));
   PetscCall(PetscCalloc1(f->n_dof, &f->u0));
   PetscCall(PetscMalloc1(mesh->n_cells * el->nq * 2, &f->lame));
+  PetscCall(PetscCalloc1(mesh->n_cells, &f->constant));
+  f->n_loads = scene->n_loads;
+  PetscCall(PetscCalloc1(f->n_loads, &f->shares));
+  PetscCall(FindConstant(f));
   *fe = f;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -66,6 +112,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(fe->fixed, fe->n_dof));
   PetscCall(PetscArrayzero(fe->u0, fe->n_dof));
+  fe->lifted = PETSC_FALSE;
   for (PetscInt k = 0; k < fe->scene->n_fixed; k++) {
     HycoFixed *fixed = &fe->scene->fixed[k];
     PetscInt g = 0;
@@ -83,14 +130,16 @@ static PetscErrorCode SetSupports(HycoFE fe)
                   (double)fe -> u0[dof], (double)value, HycoExprKey(fixed->value[c]));
         fe->fixed[dof] = PETSC_TRUE;
         fe->u0[dof] = value;
+        fe->lifted = (PetscBool)(fe->lifted || value != 0);
       }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lame's constants at the quadrature points from Young's modulus and Poisson's ratio. */
-static PetscErrorCode SetMaterial(HycoFE fe)
+/* Lame's constants at the quadrature points from Young's modulus and Poisson's ratio; `first`: of constant cells too.
+ */
+static PetscErrorCode SetMaterial(HycoFE fe, PetscBool first)
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
@@ -98,6 +147,8 @@ static PetscErrorCode SetMaterial(HycoFE fe)
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const HycoBody *body = &fe->scene->body[m->cell_body[e]];
+
+    if (fe->constant[e] && !first) continue;
 
     for (PetscInt q = 0; q < el->nq; q++) {
       PetscReal x[3] = {0, 0, 0}, young, poisson = 0;
@@ -129,20 +180,36 @@ static void FindChanges(HycoFE fe, const PetscBool changed[], PetscBool *moved)
     for (PetscInt c = 0; c < 3; c++) *moved = (PetscBool)(*moved || HycoExprChanges(s->body[b].map[c], changed));
   }
   fe->stiffness_changed = fe->contact_changed = *moved;
+  fe->gap_changed = (PetscBool)(*moved || !fe->fixed_constant);
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     if (HycoExprChanges(s->body[b].young, changed) || HycoExprChanges(s->body[b].poisson, changed))
       fe->stiffness_changed = PETSC_TRUE;
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) {
+    if (HycoExprChanges(s->contact[k].gap, changed)) fe->gap_changed = PETSC_TRUE;
     for (PetscInt c = 0; c < 3; c++) {
       if (HycoExprChanges(s->contact[k].normal[c], changed)) fe->contact_changed = PETSC_TRUE;
     }
   }
 }
 
+void HycoFEReaches(HycoFE fe, PetscBool reaches[])
+{
+  const struct _n_HycoFE kept = *fe;
+
+  for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {
+    PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moved;
+
+    changed[p] = PETSC_TRUE;
+    FindChanges(fe, changed, &moved);
+    reaches[p] = (PetscBool)(fe->stiffness_changed || fe->contact_changed);
+  }
+  *fe = kept;
+}
+
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
 {
-  PetscBool changed[HYCO_MAX_PARAMETERS], moved;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moved, first = (PetscBool)!fe->ready;
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {
@@ -150,11 +217,12 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
     fe->mu[p] = mu[p];
   }
   FindChanges(fe, changed, &moved);
-  if (!fe->ready) fe->stiffness_changed = fe->contact_changed = moved = PETSC_TRUE;
+  if (first) fe->gap_changed = fe->stiffness_changed = fe->contact_changed = moved = PETSC_TRUE;
   fe->ready = PETSC_FALSE; /* until all of it is done */
   if (moved) PetscCall(MoveNodes(fe));
-  PetscCall(SetSupports(fe));
-  if (fe->stiffness_changed) PetscCall(SetMaterial(fe));
+  for (PetscInt k = 0; k < fe->n_loads && moved; k++) fe->shares[k].ready = PETSC_FALSE;
+  if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
+  if (fe->stiffness_changed) PetscCall(SetMaterial(fe, first));
   fe->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

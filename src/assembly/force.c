@@ -60,6 +60,65 @@ static PetscErrorCode AddFacetLoad(HycoFE fe, const HycoLoad *load, PetscInt fac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sums of n dS and dS around each node that the load acts on. */
+static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGetFacet(m->type);
+  PetscReal *sum;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(4 * m->n_nodes, &sum));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (m->facet_group[f] != group || m->facet_cell[f] < 0) continue;
+    for (PetscInt q = 0; q < el->nq; q++) {
+      PetscReal v[4];
+
+      PetscCall(HycoFacetNormal(fe, el, f, q, v));
+      v[3] = PetscSqrtReal(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+      for (PetscInt a = 0; a < m->nf; a++) {
+        for (PetscInt c = 0; c < 4; c++) sum[4 * m->facets[f * m->nf + a] + c] += el->N[q][a] * v[c];
+      }
+    }
+  }
+  for (PetscInt i = 0; i < m->n_nodes; i++) n += sum[4 * i + 3] > 0;
+  if (n != s->n) {
+    PetscCall(PetscFree(s->node));
+    PetscCall(PetscFree(s->share));
+    PetscCall(PetscMalloc1(n, &s->node));
+    PetscCall(PetscMalloc1(4 * n, &s->share));
+    s->n = n;
+  }
+  for (PetscInt i = 0, k = 0; i < m->n_nodes; i++) {
+    if (!(sum[4 * i + 3] > 0)) continue;
+    s->node[k] = i;
+    PetscCall(PetscArraycpy(s->share + 4 * k++, sum + 4 * i, 4));
+  }
+  PetscCall(PetscFree(sum));
+  s->ready = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A load that is the same everywhere: its values times the nodes' shares of the surface. */
+static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt group, HycoLoadShares *s, Vec F)
+{
+  PetscReal p = 0, t[3] = {0, 0, 0};
+
+  PetscFunctionBegin;
+  if (!s->ready) PetscCall(SetShares(fe, group, s));
+  if (!s->n) PetscFunctionReturn(PETSC_SUCCESS);
+  if (load->pressure) PetscCall(HycoExprEval(load->pressure, fe->mu, 1, fe->X + 3 * s->node[0], &p));
+  for (PetscInt c = 0; c < 3 && c < fe->dim; c++) {
+    if (load->traction[c]) PetscCall(HycoExprEval(load->traction[c], fe->mu, 1, fe->X + 3 * s->node[0], &t[c]));
+  }
+  for (PetscInt k = 0; k < s->n; k++) {
+    for (PetscInt c = 0; c < fe->dim; c++)
+      PetscCall(AddNode(fe, s->node[k], c, t[c] * s->share[4 * k + 3] - p * s->share[4 * k + c], F));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Moves K u0 of one cell to the right-hand side. */
 static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Vec F)
 {
@@ -101,14 +160,18 @@ PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
     const HycoBody *body = &fe->scene->body[m->cell_body[e]];
 
     if (body->force[0] || body->force[1] || body->force[2]) PetscCall(AddBodyForces(fe, e, F));
-    PetscCall(AddLifting(fe, e, F));
+    if (fe->lifted) PetscCall(AddLifting(fe, e, F));
   }
   for (PetscInt k = 0; k < fe->scene->n_loads; k++) {
+    const HycoLoad *load = &fe->scene->load[k];
+    PetscBool in_space = HycoExprInSpace(load->pressure);
     PetscInt g = 0;
 
-    PetscCall(HycoMeshFindGroup(m, "load", fe->scene->load[k].group, &g));
-    for (PetscInt f = 0; f < m->n_facets; f++) {
-      if (m->facet_group[f] == g && m->facet_cell[f] >= 0) PetscCall(AddFacetLoad(fe, &fe->scene->load[k], f, F));
+    PetscCall(HycoMeshFindGroup(m, "load", load->group, &g));
+    for (PetscInt c = 0; c < m->dim; c++) in_space = (PetscBool)(in_space || HycoExprInSpace(load->traction[c]));
+    if (!in_space) PetscCall(AddUniformLoad(fe, load, g, &fe->shares[k], F));
+    for (PetscInt f = 0; f < m->n_facets && in_space; f++) {
+      if (m->facet_group[f] == g && m->facet_cell[f] >= 0) PetscCall(AddFacetLoad(fe, load, f, F));
     }
   }
   PetscCall(VecAssemblyBegin(F));

@@ -1,34 +1,62 @@
 /* K: the element loop of linear elasticity (plane strain in 2D), and the matrices it fills. */
 #include "kinematics.h"
+#include "places.h"
+
+/* P[r][s] += p[r] s[s] over the upper blocks of dim x dim. */
+static void AddProducts(PetscInt nv, PetscInt dim, const PetscReal p[], const PetscReal s[], PetscReal P[])
+{
+  const PetscInt n = nv * dim;
+
+  for (PetscInt r = 0; r < n; r++) {
+    for (PetscInt t = r / dim * dim; t < n; t++) P[r * n + t] += p[r] * s[t];
+  }
+}
+
+/* Ke += lambda P_cd + mu (P_dc + tr P) in each upper block, P = sum of w grad_a grad_b over points of one material. */
+static void AddMaterial(PetscInt nv, PetscInt dim, const PetscReal lame[2], const PetscReal P[], PetscReal Ke[])
+{
+  const PetscInt n = nv * dim;
+
+  for (PetscInt a = 0; a < nv; a++) {
+    for (PetscInt b = a; b < nv; b++) {
+      const PetscReal *p = P + a * dim * n + b * dim;
+      PetscReal *block = Ke + a * dim * n + b * dim, trace = 0;
+
+      for (PetscInt c = 0; c < dim; c++) trace += lame[1] * p[c * n + c];
+      for (PetscInt c = 0; c < dim; c++) {
+        for (PetscInt d = 0; d < dim && dim > 1; d++)
+          block[c * n + d] += lame[0] * p[c * n + d] + lame[1] * p[d * n + c];
+        block[c * n + c] += trace;
+      }
+    }
+  }
+}
 
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
+  const PetscReal *lame = fe->lame + 2 * cell * el->nq;
+  PetscReal P[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(Ke, n * n));
-  for (PetscInt q = 0; q < el->nq; q++) {
-    const PetscReal *lame = fe->lame + 2 * (cell * el->nq + q);
-    PetscReal g[8][3], w;
+  PetscCall(PetscArrayzero(P, n * n));
+  for (PetscInt q = 0; q < el->nq; q++, lame += 2) {
+    PetscReal g[8][3], w, p[HYCO_MAX_CELL_DOFS], s[HYCO_MAX_CELL_DOFS];
 
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
-    for (PetscInt a = 0; a < el->nv; a++) {
-      for (PetscInt b = 0; b < el->nv; b++) {
-        const PetscReal dot = w * lame[1] * (g[a][0] * g[b][0] + g[a][1] * g[b][1] + g[a][2] * g[b][2]);
-        PetscReal *block = Ke + a * dim * n + b * dim;
-
-        if (dim == 1) {
-          block[0] += dot;
-          continue;
-        }
-        for (PetscInt c = 0; c < dim; c++) {
-          for (PetscInt d = 0; d < dim; d++)
-            block[c * n + d] += w * (lame[0] * g[a][c] * g[b][d] + lame[1] * g[a][d] * g[b][c]);
-          block[c * n + c] += dot;
-        }
-      }
+    for (PetscInt r = 0; r < n; r++) {
+      s[r] = g[r / dim][r % dim];
+      p[r] = w * s[r];
     }
+    AddProducts(el->nv, dim, p, s, P);
+    if (q + 1 < el->nq && lame[0] == lame[2] && lame[1] == lame[3]) continue; /* the next point's material is this */
+    AddMaterial(el->nv, dim, lame, P, Ke);
+    PetscCall(PetscArrayzero(P, n * n));
+  }
+  for (PetscInt r = 0; r < n; r++) {
+    for (PetscInt t = 0; t < r / dim * dim; t++) Ke[r * n + t] = Ke[t * n + r];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -128,8 +156,11 @@ static PetscErrorCode Finish(Mat A)
 PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
 {
   PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+  PetscBool done;
 
   PetscFunctionBegin;
+  PetscCall(HycoPlacesAssemble(fe, K, &done));
+  if (done) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatZeroEntries(K));
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     PetscCall(HycoFEElementStiffness(fe, e, Ke));

@@ -13,6 +13,7 @@ static PetscErrorCode Resize(HycoSolver s, PetscInt p)
   PetscFunctionBegin;
   if (s->m == m && s->p == p && s->S) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(s->S));
+  PetscCall(PetscFree(s->X));
   PetscCall(PetscFree(s->g));
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
@@ -36,6 +37,7 @@ static PetscErrorCode FactorDense(HycoSolver s, PetscBool *singular)
   PetscFunctionBegin;
   PetscCall(MatGetSize(s->system->K, &n, NULL));
   if (s->n_lu != n) {
+    PetscCall(PetscFree(s->X));
     PetscCall(PetscFree(s->lu));
     PetscCall(PetscFree(s->ipiv));
     PetscCall(PetscMalloc1((size_t)n * (size_t)n, &s->lu));
@@ -77,7 +79,8 @@ static PetscErrorCode CondenseDense(HycoSolver s)
 
   PetscFunctionBegin;
   PetscCall(PetscBLASIntCast(s->m, &m));
-  PetscCall(PetscMalloc1((size_t)n * (size_t)m, &X));
+  if (!s->X) PetscCall(PetscMalloc1((size_t)n * (size_t)m, &s->X));
+  X = s->X;
   PetscCall(MatDenseGetArrayRead(s->system->Bt, &bt));
   PetscCall(PetscArraycpy(X, bt, (size_t)n * (size_t)m));
   PetscCall(MatDenseRestoreArrayRead(s->system->Bt, &bt));
@@ -85,7 +88,6 @@ static PetscErrorCode CondenseDense(HycoSolver s)
   PetscCall(MatDenseGetArrayRead(s->system->B, &b));
   BLASgemm_("N", "N", &m, &m, &n, &one, b, &m, X, &n, &zero, s->S, &m);
   PetscCall(MatDenseRestoreArrayRead(s->system->B, &b));
-  PetscCall(PetscFree(X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -120,13 +122,13 @@ static PetscErrorCode SetUpDual(HycoSolver s, PetscBool *singular)
   s->condensed.K = 0; /* until it is done */
   PetscCall(PetscObjectTypeCompare((PetscObject)y->K, MATSEQDENSE, &dense));
   if (!dense)
-    PetscCall(FactorSparse(s, singular));
+    HycoLogged(HYCO_EVENT_FACTOR, FactorSparse(s, singular));
   else {
     if (y->B) PetscCall(PetscObjectTypeCompare((PetscObject)y->B, MATSEQDENSE, &dense_B));
     PetscCheck(dense_B, PETSC_COMM_SELF, PETSC_ERR_SUP, "a dense K needs a dense B");
     PetscCall(Resize(s, 0));
-    PetscCall(FactorDense(s, singular));
-    if (y->m && !*singular) PetscCall(CondenseDense(s));
+    HycoLogged(HYCO_EVENT_FACTOR, FactorDense(s, singular));
+    if (y->m && !*singular) HycoLogged(HYCO_EVENT_FACTOR, CondenseDense(s));
   }
   if (!*singular) PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same));
   s->seconds_factor += HycoNow() - begin;
@@ -143,6 +145,13 @@ static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(comm, &size));
+  if (size == 1) {
+    PetscCall(VecGetLocalSize(v, &n));
+    PetscCall(VecGetArrayRead(v, &local));
+    PetscCall(PetscArraycpy(all, local, n));
+    PetscCall(VecRestoreArrayRead(v, &local));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(VecGetOwnershipRanges(v, &ranges));
   PetscCall(PetscMalloc2(size, &counts, size, &offsets));
   for (PetscMPIInt r = 0; r < size; r++) {
@@ -184,7 +193,8 @@ static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved
   HycoLCPStatus status;
 
   PetscFunctionBegin;
-  PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s dual", HycoSolverTypes[type]));
+  PetscCall(PetscStrncpy(s->method, HycoSolverTypes[type], sizeof(s->method)));
+  PetscCall(PetscStrlcat(s->method, " dual", sizeof(s->method)));
   if (type == HYCO_TYPE_TAO) {
     PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "tao %s dual", HycoTaoTypes[s->tao]));
     PetscCall(HycoTaoLCP(s->m, s->S, s->g, s->system->symmetric, s->tao, s->max_its, s->L, &s->its, solved));
@@ -209,7 +219,6 @@ static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved
 static PetscErrorCode FreeGap(HycoSolver s, Vec x)
 {
   HycoSystem y = s->system;
-  Vec gap;
 
   PetscFunctionBegin;
   if (!s->lu) {
@@ -218,11 +227,10 @@ static PetscErrorCode FreeGap(HycoSolver s, Vec x)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SolveK(s, y->F, x));
-  PetscCall(VecDuplicate(y->D, &gap));
-  PetscCall(MatMult(y->B, x, gap));
-  PetscCall(VecAYPX(gap, -1, y->D));
-  PetscCall(GatherVec(s->comm, gap, s->g));
-  PetscCall(VecDestroy(&gap));
+  PetscCall(HycoSystemWork(y));
+  PetscCall(MatMult(y->B, x, y->work_L));
+  PetscCall(VecAYPX(y->work_L, -1, y->D));
+  PetscCall(GatherVec(s->comm, y->work_L, s->g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -249,8 +257,9 @@ static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
   PetscReal size, residual;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(x, &r));
-  PetscCall(VecDuplicate(x, &work));
+  PetscCall(HycoSystemWork(y));
+  r = y->work_x[0];
+  work = y->work_x[1];
   if (y->m && !s->lu)
     PetscCall(HycoDirectExpand(s->direct, s->L, x));
   else {
@@ -264,8 +273,6 @@ static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
     PetscCall(SolveK(s, r, work));
     PetscCall(VecAXPY(x, 1, work));
   }
-  PetscCall(VecDestroy(&r));
-  PetscCall(VecDestroy(&work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -308,7 +315,7 @@ PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBoo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(FreeGap(s, x));
-  PetscCall(s->p ? SolveHeld(s, type, solved) : SolveForces(s, type, solved));
+  HycoLogged(HYCO_EVENT_FORCES, s->p ? SolveHeld(s, type, solved) : SolveForces(s, type, solved));
   PetscCall(SetForces(s, L));
   PetscCall(Recover(s, x, L));
   PetscFunctionReturn(PETSC_SUCCESS);

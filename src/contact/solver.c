@@ -33,6 +33,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscCall(MatDestroy(&s->Kg));
   PetscCall(MatDestroy(&s->Kw));
   PetscCall(PetscFree(s->lu));
+  PetscCall(PetscFree(s->X));
   PetscCall(PetscFree(s->ipiv));
   PetscCall(PetscFree(s->S));
   PetscCall(PetscFree(s->g));
@@ -190,7 +191,7 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
 static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool direct, PetscBool solved)
 {
   PetscFunctionBegin;
-  PetscCall(HycoSystemComputeKKT(s->system, x, L, &s->kkt));
+  HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(s->system, x, L, &s->kkt));
   if (HycoKKTMax(&s->kkt) <= s->rtol)
     s->reason = HYCO_CONVERGED;
   else if (direct && !(s->kkt.stationarity <= 1e-3))

@@ -9,6 +9,26 @@ PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode FreeWork(HycoSystem s)
+{
+  PetscFunctionBegin;
+  PetscCall(VecDestroy(&s->work_x[0]));
+  PetscCall(VecDestroy(&s->work_x[1]));
+  PetscCall(VecDestroy(&s->work_L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemWork(HycoSystem s)
+{
+  PetscFunctionBegin;
+  if (!s->work_x[0]) {
+    PetscCall(VecDuplicate(s->F, &s->work_x[0]));
+    PetscCall(VecDuplicate(s->F, &s->work_x[1]));
+  }
+  if (s->m && !s->work_L) PetscCall(VecDuplicate(s->D, &s->work_L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSystemDestroy(HycoSystem *system)
 {
   HycoSystem s;
@@ -21,6 +41,7 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system)
   PetscCall(MatDestroy(&s->B));
   PetscCall(VecDestroy(&s->F));
   PetscCall(VecDestroy(&s->D));
+  PetscCall(FreeWork(s));
   PetscCall(PetscFree(*system));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -71,6 +92,7 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
              "F has length %d and D %d where %d and %d are expected", (int)n, (int)m, (int)s->n, (int)s->m);
   PetscCall(PetscObjectReference((PetscObject)F));
   if (D) PetscCall(PetscObjectReference((PetscObject)D));
+  if (F != s->F || D != s->D) PetscCall(FreeWork(s));
   PetscCall(VecDestroy(&s->F));
   PetscCall(VecDestroy(&s->D));
   s->F = F;
@@ -90,16 +112,14 @@ static PetscReal Quotient(PetscReal a, PetscReal b)
 }
 
 /* Takes out of r what rounding x alone can make, entries of at most 16 eps (|K_ii x_i| + |F_i|); their norm. */
-static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, PetscReal *dropped)
+static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, PetscReal *dropped)
 {
   PetscInt n;
   PetscReal squares = 0, sum;
   PetscScalar *residual;
   const PetscScalar *K, *X, *F;
-  Vec diagonal;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(r, &diagonal));
   PetscCall(MatGetDiagonal(s->K, diagonal));
   PetscCall(VecGetLocalSize(r, &n));
   PetscCall(VecGetArray(r, &residual));
@@ -116,7 +136,6 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, PetscReal *droppe
   PetscCall(VecRestoreArrayRead(s->F, &F));
   PetscCall(VecRestoreArrayRead(diagonal, &K));
   PetscCall(VecRestoreArray(r, &residual));
-  PetscCall(VecDestroy(&diagonal));
   PetscCallMPI(MPI_Allreduce(&squares, &sum, 1, MPIU_REAL, MPI_SUM, s->comm));
   *dropped = PetscSqrtReal(sum);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -124,25 +143,21 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, PetscReal *droppe
 
 static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value, PetscReal *rounding)
 {
-  Vec Kx, BtL;
+  Vec Kx = s->work_x[0], BtL = s->work_x[1];
   PetscReal nK, nB = 0, nF, nr, dropped = 0;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(x, &Kx));
   PetscCall(MatMult(s->K, x, Kx));
   PetscCall(VecNorm(Kx, NORM_2, &nK));
   PetscCall(VecNorm(s->F, NORM_2, &nF));
   if (s->m) {
-    PetscCall(VecDuplicate(x, &BtL));
     PetscCall(MatMult(s->Bt, L, BtL));
     PetscCall(VecNorm(BtL, NORM_2, &nB));
     PetscCall(VecAXPY(Kx, 1, BtL));
-    PetscCall(VecDestroy(&BtL));
   }
   PetscCall(VecAXPY(Kx, -1, s->F));
-  PetscCall(DropRounding(s, x, Kx, &dropped));
+  PetscCall(DropRounding(s, x, Kx, BtL, &dropped));
   PetscCall(VecNorm(Kx, NORM_2, &nr));
-  PetscCall(VecDestroy(&Kx));
   *value = Quotient(nr, PetscMax(nK, PetscMax(nB, nF)));
   *rounding = Quotient(dropped, PetscMax(nK, PetscMax(nB, nF)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -151,25 +166,28 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value,
 PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
 {
   Vec gap;
+  PetscBool same;
   const PetscScalar *w, *l;
   PetscInt m;
-  PetscReal local[3] = {0, 0, 0}, worst[3], size_B, size_x, size_D, size_L, size_gap;
+  PetscReal local[3] = {0, 0, 0}, worst[3], size_x, size_D, size_L, size_gap;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSystemCreate()");
   PetscCheck(s->F, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
   PetscCall(PetscMemzero(kkt, sizeof(*kkt)));
+  PetscCall(HycoSystemWork(s));
   PetscCall(Stationarity(s, x, L, &kkt->stationarity, &kkt->rounding));
   if (PetscIsInfOrNanReal(kkt->stationarity)) kkt->stationarity = PETSC_MAX_REAL;
   if (!s->m) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(s->D, &gap));
+  gap = s->work_L;
   PetscCall(MatMult(s->B, x, gap));
   PetscCall(VecAYPX(gap, -1, s->D));
-  PetscCall(MatNorm(s->B, NORM_INFINITY, &size_B));
+  PetscCall(HycoSeenUpdate(&s->seen_B, s->B, NULL, &same));
+  if (!same) PetscCall(MatNorm(s->B, NORM_INFINITY, &s->size_B));
   PetscCall(VecNorm(x, NORM_INFINITY, &size_x));
   PetscCall(VecNorm(s->D, NORM_INFINITY, &size_D));
   PetscCall(VecNorm(L, NORM_INFINITY, &size_L));
-  size_gap = PetscMax(size_D, size_B * size_x);
+  size_gap = PetscMax(size_D, s->size_B * size_x);
   PetscCall(VecGetLocalSize(gap, &m));
   PetscCall(VecGetArrayRead(gap, &w));
   PetscCall(VecGetArrayRead(L, &l));
@@ -180,7 +198,6 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   }
   PetscCall(VecRestoreArrayRead(gap, &w));
   PetscCall(VecRestoreArrayRead(L, &l));
-  PetscCall(VecDestroy(&gap));
   PetscCallMPI(MPI_Allreduce(local, worst, 3, MPIU_REAL, MPI_MAX, s->comm));
   kkt->penetration = Quotient(worst[0], size_gap);
   kkt->adhesion = Quotient(worst[1], size_L);

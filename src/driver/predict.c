@@ -177,20 +177,23 @@ static PetscErrorCode PredictMine(HycoModel model, const Fallback *fallback, Pet
                                   const PetscReal mu[], PetscReal value[], PetscInt full[])
 {
   PetscMPIInt rank, size;
+  PetscInt first, count;
+  HycoPrediction *all;
   char why[DRIVER_LINE];
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  for (PetscInt k = (PetscInt)rank * n / size; k < ((PetscInt)rank + 1) * n / size; k++) {
-    HycoPrediction p;
-
-    PetscCall(HycoModelPredict(model, n_par, mu + k * n_par));
-    PetscCall(HycoModelGetPrediction(model, &p));
-    FillRow(&p, value + k * N_COLUMNS);
-    DriverWantsFullOrder(fallback, &p, why);
-    full[k] = why[0] != '\0';
+  first = (PetscInt)rank * n / size;
+  count = ((PetscInt)rank + 1) * n / size - first;
+  PetscCall(PetscMalloc1(count, &all));
+  PetscCall(HycoModelSolveMany(model, count, n_par, mu + first * n_par, all, NULL, NULL));
+  for (PetscInt k = 0; k < count; k++) {
+    FillRow(&all[k], value + (first + k) * N_COLUMNS);
+    DriverWantsFullOrder(fallback, &all[k], why);
+    full[first + k] = why[0] != '\0';
   }
+  PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -263,9 +266,9 @@ PetscErrorCode CommandPredict(void)
   if (set) {
     HycoCheck(!output[0], "-output is for one point (-mu); a set of points gives a -table");
     PetscCall(DriverGetSamples(scene, &samples, &set));
-    PetscCall(Many(model, scene, &fallback, samples));
+    HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples));
   } else {
-    PetscCall(One(model, scene, &fallback, output));
+    HycoStaged(HYCO_STAGE_ONLINE, One(model, scene, &fallback, output));
   }
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(DriverEndFallback(&fallback));

@@ -131,7 +131,7 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMGetSolver(fom, &solver));
   if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
-  PetscCall(set ? Many(fom, scene, samples, table) : One(fom, scene, mu, output));
+  HycoStaged(HYCO_STAGE_FULL_ORDER, set ? Many(fom, scene, samples, table) : One(fom, scene, mu, output));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));

@@ -131,7 +131,7 @@ static PetscErrorCode SetUp(HycoFOM f)
 {
   PetscFunctionBegin;
   f->summary.seconds.setup = -HycoNow();
-  PetscCall(ReadMesh(f));
+  HycoLogged(HYCO_EVENT_MESH, ReadMesh(f));
   PetscCall(HycoFECreateMatrix(f->fe, f->comm, f->n_owned, f->first, &f->K));
   PetscCall(MatCreateVecs(f->K, &f->U, &f->F));
   if (f->n_contacts) {
@@ -240,12 +240,16 @@ static PetscErrorCode Assemble(HycoFOM f, const PetscReal mu[])
   f->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
   if (!f->n_free) PetscCall(CountFree(f));
   if (f->fe->stiffness_changed) {
+    PetscCall(HycoLogEvent(HYCO_EVENT_ASSEMBLE, PETSC_TRUE));
     HycoOnEach(f->comm, HycoFEAssembleStiffness(f->fe, f->K));
+    PetscCall(HycoLogEvent(HYCO_EVENT_ASSEMBLE, PETSC_FALSE));
     PetscCall(MatSetOption(f->K, MAT_SPD, PETSC_TRUE));
     PetscCall(HycoFOMSetMotions(f));
   }
+  PetscCall(HycoLogEvent(HYCO_EVENT_FORCE, PETSC_TRUE));
   HycoOnEach(f->comm, HycoFEAssembleForce(f->fe, f->F));
-  PetscCall(AssembleContact(f, f->fe->contact_changed));
+  PetscCall(HycoLogEvent(HYCO_EVENT_FORCE, PETSC_FALSE));
+  HycoLogged(HYCO_EVENT_CONTACT, AssembleContact(f, f->fe->contact_changed));
   PetscCall(HycoSystemSetMatrices(f->system, f->K, f->Bt, f->B, PETSC_TRUE));
   PetscCall(HycoSystemSetVectors(f->system, f->F, f->D));
   f->fe->ready = PETSC_TRUE;
@@ -288,7 +292,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscCall(Assemble(f, mu));
   t->assemble = HycoNow() - begin;
   PetscCall(HycoSolverSetSystem(f->solver, f->system));
-  PetscCall(HycoSolverSolve(f->solver, f->U, f->Lambda));
+  HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(f->solver, f->U, f->Lambda));
   PetscCall(HycoSolverGetSeconds(f->solver, &t->factor, &t->solve));
   PetscCall(Gather(f));
   t->total = HycoNow() - begin;

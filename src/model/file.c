@@ -457,7 +457,9 @@ PetscErrorCode HycoModelLoad(const char path[], HycoModel *model)
   PetscCall(HycoH5Open(path, &h));
   PetscCall(HycoModelCreate(&m));
   PetscCall(PetscStrncpy(m->path, path, sizeof(m->path)));
+  PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_TRUE));
   ierr = LoadAll(h, m);
+  PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_FALSE));
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   if (ierr) (void)!HycoModelDestroy(&m);
   PetscCall(ierr);

@@ -17,6 +17,8 @@ PetscErrorCode HycoModelReset(HycoModel m)
 {
   PetscFunctionBegin;
   m->ready = m->solved = PETSC_FALSE;
+  PetscCall(HycoReconstructionDestroy(&m->reconstruction));
+  PetscCall(HycoReducedDestroy(&m->reduced));
   PetscCall(HycoSolverDestroy(&m->solver));
   PetscCall(HycoSystemDestroy(&m->system));
   PetscCall(MatDestroy(&m->K));

@@ -5,8 +5,7 @@
 
       U[A u I] = Vp gamma + E x_fe      test space: the same restricted to A      (39)-(40)
 
-  (hybrid all: every unknown of A is full order and gamma = G U[A] is no unknown.) Row i of K meets the reduced matrix
-  once: y = K[i,:] Vp gives its part on the modes, its entries on full-order unknowns the rest.
+  (hybrid all: every unknown of A is full order and gamma = G U[A] is no unknown.) reduced.c fills the system.
 */
 #include <hycomodelimpl.h>
 #include <hycoalgorithms.h>
@@ -106,29 +105,6 @@ static PetscErrorCode CreateReduced(HycoModel m, PetscInt rows, PetscInt cols, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Pattern of a sparse reduced stiffness: full rows of the modes, border and neighbours in the others. */
-static PetscErrorCode PreallocateReduced(HycoModel m)
-{
-  PetscInt *nnz;
-  const PetscInt *ia, *ja;
-  PetscInt n;
-  PetscBool done;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n, &nnz));
-  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  for (PetscInt k = 0; k < m->n_free; k++) nnz[k] = m->n;
-  for (PetscInt k = 0; k < m->n_fe; k++) nnz[m->n_free + k] = m->n_free + ia[m->fe_dof[k] + 1] - ia[m->fe_dof[k]];
-  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatCreate(PETSC_COMM_SELF, &m->Kr));
-  PetscCall(MatSetSizes(m->Kr, m->n, m->n, m->n, m->n));
-  PetscCall(MatSetType(m->Kr, MATSEQAIJ));
-  for (PetscInt k = 0; k < m->n; k++) nnz[k] = PetscMin(nnz[k], m->n);
-  PetscCall(MatSeqAIJSetPreallocation(m->Kr, 0, nnz));
-  PetscCall(PetscFree(nnz));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoModelSetUp(HycoModel m)
 {
   PetscBool dense, interface = PETSC_FALSE;
@@ -150,7 +126,7 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
   if (dense)
     PetscCall(CreateReduced(m, m->n, m->n, PETSC_TRUE, &m->Kr));
   else
-    PetscCall(PreallocateReduced(m));
+    PetscCall(HycoReducedCreateSparse(m));
   PetscCall(MatCreateVecs(m->Kr, &m->x, &m->Fr));
   if (m->n_L) {
     PetscCall(CreateReduced(m, m->n_L, m->n, dense, &m->Br));
@@ -182,167 +158,6 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = K[i,:] Vp over the modes. */
-static void RowTimesModes(HycoModel m, PetscInt n, const PetscInt col[], const PetscScalar val[], PetscReal y[])
-{
-  const PetscInt l = m->l;
-
-  for (PetscInt j = 0; j < l; j++) y[j] = 0;
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *v = m->Vp + (size_t)col[k] * (size_t)l;
-
-    for (PetscInt j = 0; j < l; j++) y[j] += val[k] * v[j];
-  }
-}
-
-/* The part of row i of A on each unknown: `index`, `value`; returns their number. Modes first, all of them. */
-static PetscInt ReducedRow(HycoModel m, PetscInt n, const PetscInt col[], const PetscScalar val[], PetscReal y[],
-                           PetscInt index[], PetscReal value[])
-{
-  PetscInt count = 0;
-
-  RowTimesModes(m, n, col, val, y);
-  if (m->G) {
-    for (PetscInt f = 0; f < m->n_fe; f++) {
-      PetscReal sum = 0;
-
-      for (PetscInt j = 0; j < m->l; j++) sum += y[j] * m->G[j * m->n_fe + f];
-      index[f] = f;
-      value[f] = sum;
-    }
-    for (PetscInt k = 0; k < n; k++) {
-      if (m->fe_at[col[k]] >= 0) value[m->fe_at[col[k]]] += val[k];
-    }
-    return m->n_fe;
-  }
-  for (; count < m->n_free; count++) {
-    index[count] = count;
-    value[count] = y[count];
-  }
-  for (PetscInt k = 0; k < n; k++) {
-    if (m->fe_at[col[k]] < 0) continue;
-    index[count] = m->n_free + m->fe_at[col[k]];
-    value[count++] = val[k];
-  }
-  return count;
-}
-
-/* Vbar[A,:]^T K[A, A u I] Vbar[A u I,:] */
-static PetscErrorCode FillStiffness(HycoModel m)
-{
-  const PetscInt *ia, *ja;
-  const PetscScalar *a;
-  PetscReal *y, *value, *modes;
-  PetscInt *index, *all, n, dim = m->fe->dim;
-  PetscBool done;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc5(m->l, &y, m->n + 100, &value, m->n + 100, &index, m->n, &all, m->n_free * m->n, &modes));
-  PetscCall(PetscArrayzero(modes, m->n_free * m->n));
-  for (PetscInt k = 0; k < m->n; k++) all[k] = k;
-  PetscCall(MatZeroEntries(m->Kr));
-  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatSeqAIJGetArrayRead(m->K, &a));
-  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
-    PetscInt count;
-
-    if (m->role[i / dim] != HYCO_ROLE_A || m->fe->fixed[i]) continue;
-    count = ReducedRow(m, ia[i + 1] - ia[i], ja + ia[i], a + ia[i], y, index, value);
-    if (m->fe_at[i] >= 0) {
-      const PetscInt row = m->n_free + m->fe_at[i];
-
-      PetscCall(MatSetValues(m->Kr, 1, &row, count, index, value, ADD_VALUES));
-    } else {
-      for (PetscInt j = 0; j < m->n_free; j++) {
-        const PetscReal v = m->Vp[(size_t)i * (size_t)m->l + (size_t)j];
-
-        for (PetscInt k = 0; v != 0 && k < count; k++) modes[j * m->n + index[k]] += v * value[k];
-      }
-    }
-  }
-  PetscCall(MatSeqAIJRestoreArrayRead(m->K, &a));
-  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  for (PetscInt j = 0; j < m->n_free; j++)
-    PetscCall(MatSetValues(m->Kr, 1, &j, m->n, all, modes + j * m->n, ADD_VALUES));
-  PetscCall(MatAssemblyBegin(m->Kr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(m->Kr, MAT_FINAL_ASSEMBLY));
-  PetscCall(PetscFree5(y, value, index, all, modes));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* B[A_lambda, A'_c] Vbar[A'_c,:] and Vbar[A_c,:]^T B[A_lambda, A_c]^T */
-static PetscErrorCode FillContact(HycoModel m)
-{
-  PetscReal *y, *value;
-  PetscInt *index, dim = m->fe->dim;
-
-  PetscFunctionBegin;
-  if (m->type == HYCO_MODEL_PROJECTION) {
-    PetscCall(HycoProjectionFillContact(m));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscMalloc3(m->l, &y, m->n + 100, &value, m->n + 100, &index));
-  PetscCall(MatZeroEntries(m->Br));
-  PetscCall(MatZeroEntries(m->Btr));
-  for (PetscInt k = 0; k < m->m; k++) {
-    const PetscInt lo = m->row_start[m->contact[k]], hi = m->row_start[m->contact[k] + 1];
-    PetscInt count = ReducedRow(m, hi - lo, m->row_dof + lo, m->row_value + lo, y, index, value);
-
-    PetscCall(MatSetValues(m->Br, 1, &k, count, index, value, INSERT_VALUES));
-    for (PetscInt j = 0; j < m->n_free; j++) {
-      value[j] = 0;
-      index[j] = j;
-    }
-    count = m->n_free;
-    for (PetscInt t = lo; t < hi; t++) {
-      const PetscInt i = m->row_dof[t];
-
-      if (m->role[i / dim] != HYCO_ROLE_A) continue;
-      for (PetscInt j = 0; j < m->n_free; j++)
-        value[j] += m->row_value[t] * m->Vp[(size_t)i * (size_t)m->l + (size_t)j];
-      if (m->fe_at[i] < 0) continue;
-      index[count] = m->n_free + m->fe_at[i];
-      value[count++] = m->row_value[t];
-    }
-    PetscCall(MatSetValues(m->Btr, count, index, 1, &k, value, INSERT_VALUES));
-  }
-  PetscCall(MatAssemblyBegin(m->Br, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(m->Br, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyBegin(m->Btr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(m->Btr, MAT_FINAL_ASSEMBLY));
-  PetscCall(PetscFree3(y, value, index));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Vbar[A,:]^T F[A] and D[A_lambda] */
-static PetscErrorCode FillVectors(HycoModel m)
-{
-  const PetscScalar *F;
-  PetscScalar *f, *d;
-  const PetscInt dim = m->fe->dim;
-
-  PetscFunctionBegin;
-  PetscCall(VecSet(m->Fr, 0));
-  PetscCall(VecGetArrayRead(m->F, &F));
-  PetscCall(VecGetArray(m->Fr, &f));
-  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
-    if (m->role[i / dim] != HYCO_ROLE_A || m->fe->fixed[i]) continue;
-    if (m->fe_at[i] >= 0) f[m->n_free + m->fe_at[i]] += F[i];
-    for (PetscInt j = 0; j < m->n_free; j++) f[j] += m->Vp[(size_t)i * (size_t)m->l + (size_t)j] * F[i];
-  }
-  PetscCall(VecRestoreArray(m->Fr, &f));
-  PetscCall(VecRestoreArrayRead(m->F, &F));
-  if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
-  if (m->type == HYCO_MODEL_PROJECTION) {
-    PetscCall(HycoProjectionFillGap(m));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(VecGetArray(m->Dr, &d));
-  for (PetscInt k = 0; k < m->m; k++) d[k] = m->gap[m->contact[k]];
-  PetscCall(VecRestoreArray(m->Dr, &d));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
 {
   PetscBool first = PETSC_FALSE;
@@ -352,13 +167,16 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   PetscCall(HycoFESetParameters(m->fe, mu));
   m->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
   if (m->fe->stiffness_changed) {
-    PetscCall(HycoFEAssembleStiffness(m->fe, m->K));
-    PetscCall(FillStiffness(m));
+    HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, m->K));
+    if (first && m->fe->n_constant) /* again in the order of all that come: the same sums to the last bit */
+      HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, m->K));
+    HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillStiffness(m));
   }
-  PetscCall(HycoFEAssembleForce(m->fe, m->F));
-  PetscCall(HycoContactRows(m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap));
-  if (m->n_L && m->fe->contact_changed) PetscCall(FillContact(m));
-  PetscCall(FillVectors(m));
+  HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, m->F));
+  if (m->fe->contact_changed || m->fe->gap_changed)
+    HycoLogged(HYCO_EVENT_CONTACT, HycoContactRows(m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap));
+  if (m->n_L && m->fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
+  HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
   m->fe->ready = PETSC_TRUE;
   if (first) {
     PetscCall(HycoSystemSetMatrices(m->system, m->Kr, m->Btr, m->Br, m->type == HYCO_MODEL_PROJECTION));
@@ -381,6 +199,8 @@ PetscErrorCode HycoModelAssemble(HycoModel m, const PetscReal mu[])
 static PetscErrorCode Unpack(HycoModel m)
 {
   const PetscScalar *x, *L;
+  const PetscReal one = 1;
+  PetscBLASInt l, n_dof, inc = 1;
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(m->x, &x));
@@ -388,14 +208,11 @@ static PetscErrorCode Unpack(HycoModel m)
     m->gamma[j] = m->n_free ? x[j] : 0;
     for (PetscInt f = 0; m->G && f < m->n_fe; f++) m->gamma[j] += m->G[j * m->n_fe + f] * x[f];
   }
-  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
-    m->U[i] = m->fe->u0[i];
-    if (m->fe_at[i] >= 0)
-      m->U[i] = x[m->n_free + m->fe_at[i]];
-    else {
-      for (PetscInt j = 0; j < m->l; j++) m->U[i] += m->Vp[(size_t)i * (size_t)m->l + (size_t)j] * m->gamma[j];
-    }
-  }
+  PetscCall(PetscArraycpy(m->U, m->fe->u0, m->fe->n_dof));
+  PetscCall(PetscBLASIntCast(m->l, &l));
+  PetscCall(PetscBLASIntCast(m->fe->n_dof, &n_dof));
+  if (l) BLASgemv_("T", &l, &n_dof, &one, m->Vp, &l, m->gamma, &inc, &one, m->U, &inc);
+  for (PetscInt f = 0; f < m->n_fe; f++) m->U[m->fe_dof[f]] = x[m->n_free + f];
   PetscCall(VecRestoreArrayRead(m->x, &x));
   PetscCall(PetscArrayzero(m->Lambda, m->pairs.n));
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
@@ -420,7 +237,7 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   p = &m->prediction;
   PetscCall(HycoSceneCheckParameters(m->scene, n, mu));
   m->solved = m->whole_current = PETSC_FALSE;
-  PetscCall(HycoModelSetUp(m));
+  HycoLogged(HYCO_EVENT_SETUP, HycoModelSetUp(m));
   p->seconds.setup = HycoNow() - begin;
   if (m->type == HYCO_MODEL_CONDENSED) {
     PetscCall(HycoCondensedPredict(m, mu));
@@ -430,7 +247,7 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   begin = HycoNow();
   PetscCall(Assemble(m, mu));
   p->seconds.assemble = HycoNow() - begin;
-  PetscCall(HycoSolverSolve(m->solver, m->x, m->L));
+  HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(m->solver, m->x, m->L));
   PetscCall(HycoSolverGetSeconds(m->solver, &p->seconds.factor, &p->seconds.solve));
   PetscCall(HycoSolverGetReason(m->solver, &p->reason));
   PetscCall(HycoSolverGetIterations(m->solver, &p->iterations));
@@ -438,7 +255,8 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   PetscCall(HycoSolverGetMethod(m->solver, &method));
   PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
   PetscCall(Unpack(m));
-  if (m->reconstruct && p->reason > 0 && m->type == HYCO_MODEL_HYBRID) PetscCall(HycoModelReconstruct(m));
+  if (m->reconstruct && p->reason > 0 && m->type == HYCO_MODEL_HYBRID)
+    HycoLogged(HYCO_EVENT_RECONSTRUCT, HycoModelReconstruct(m));
   p->seconds.total = HycoNow() - begin;
   m->solved = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

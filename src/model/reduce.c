@@ -138,14 +138,14 @@ static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store)
   PetscCall(ToRoot(t, S, PETSC_FALSE, &t->U));
   PetscCall(RemoveLifting(t, S));
   PetscCall(PetscMalloc1(t->n_s + 1, &t->sigma));
-  PetscCall(HycoPOD(S, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, t->max_modes, &V, &t->l, t->sigma));
+  HycoLogged(HYCO_EVENT_POD, HycoPOD(S, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, t->max_modes, &V, &t->l, t->sigma));
   PetscCheck(t->l || !(t->sigma[0] > 0), t->comm, PETSC_ERR_USER, "-hyco_pod_tol %g leaves no mode; give less",
              (double)t->tol[HYCO_SEED_DISPLACEMENT]);
   PetscCheck(t->l, t->comm, PETSC_ERR_USER, "every training solution has zero displacement; there is nothing to learn");
   t->counts[HYCO_SEED_DISPLACEMENT] = t->l;
   if (t->seed[HYCO_SEED_DISPLACEMENT]) {
     PetscCall(PetscMalloc1(t->l, &index));
-    PetscCall(Points(t, V, index));
+    HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
     PetscCall(AddSeeds(t->l, index, t->sizes[3], &t->n_seeds_node, &t->seeds_node));
     PetscCall(PetscFree(index));
   }
@@ -168,11 +168,11 @@ static PetscErrorCode SeedFrom(HycoTrainer t, HycoSnapshots store, const char fi
   if (!t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSnapshotsGetField(store, t->samples, field, &S));
   PetscCall(PetscMalloc1(t->n_s, &sigma));
-  PetscCall(HycoPOD(S, t->tol[kind], t->noise, 0, &V, &l, sigma));
+  HycoLogged(HYCO_EVENT_POD, HycoPOD(S, t->tol[kind], t->noise, 0, &V, &l, sigma));
   t->counts[kind] = l;
   if (l) {
     PetscCall(PetscMalloc1(l, &index));
-    PetscCall(Points(t, V, index));
+    HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
     PetscCall(AddSeeds(l, index, divide, n_seeds, seeds));
     PetscCall(PetscFree(index));
     PetscCall(MatDestroy(&V));
@@ -274,7 +274,7 @@ static PetscErrorCode DualSeeds(HycoTrainer t, PetscInt *n_nodes, PetscInt nodes
     }
     PetscCall(MatDenseRestoreArray(V, &v));
     PetscCall(PetscMalloc1(l, &index));
-    PetscCall(Points(t, V, index));
+    HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
     for (PetscInt k = 0; k < l; k++) {
       nodes[(*n_nodes)++] = t->pairs.slave[index[k]];
       for (PetscInt j = t->pairs.master_start[index[k]]; j < t->pairs.master_start[index[k] + 1]; j++)

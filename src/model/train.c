@@ -68,7 +68,7 @@ static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
                          whole->n_nodes, &index));
   PetscCall(PetscCalloc1(whole->n_nodes, &contact));
   HycoPairsMark(&t->pairs, contact);
-  PetscCall(HycoRIDBuild(t->scene, whole, &t->pairs, &recipe, in));
+  HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->scene, whole, &t->pairs, &recipe, in));
   for (PetscInt e = 0; t->grown && e < whole->n_cells; e++) t->grown[e] = in[e] = (PetscBool)(in[e] || t->grown[e]);
   PetscCall(PetscMalloc1(t->pairs.n, &m->in_rid));
   PetscCall(HycoRIDSets(whole, &t->pairs, in, role, m->in_rid));
@@ -226,9 +226,11 @@ PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(candidate, sizeof(candidate), "%s%s", path, scan ? ".candidate" : ""));
+  PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_TRUE));
   HycoOnRoot(t->comm, BuildAndSave(t, useful, candidate, report));
+  PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, t->comm));
-  if (scan) PetscCall(HycoTrainerScan(t, candidate, path, &report->scan));
+  if (scan) HycoLogged(HYCO_EVENT_SCAN, HycoTrainerScan(t, candidate, path, &report->scan));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -287,14 +289,14 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
   PetscCall(HycoTrainerOpen(t, samples, path, &store));
   if (condensed) PetscCall(HycoTrainerBeginCondensed(t));
   if (choose)
-    PetscCall(HycoTrainerChoosePoints(t, store, &chosen));
+    HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerChoosePoints(t, store, &chosen));
   else
-    PetscCall(HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
+    HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
   solved = HycoNow();
-  if (!choose) PetscCall(HycoTrainerReduce(t, store));
-  if (condensed) PetscCall(HycoTrainerFlexibility(t, store, PETSC_TRUE));
-  PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, &report));
-  PetscCall(HycoTrainerCalibrate(t, store, path, &report.n_held));
+  if (!choose) HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerReduce(t, store));
+  if (condensed) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFlexibility(t, store, PETSC_TRUE));
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerBuild(t, PETSC_TRUE, path, &report));
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerCalibrate(t, store, path, &report.n_held));
   PetscCall(HycoSnapshotsDestroy(&store));
   PetscCall(HycoSamplesDestroy(&chosen));
   report.seconds_snapshots = solved - begin;

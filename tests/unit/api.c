@@ -115,6 +115,57 @@ static PetscErrorCode TestFOMOrder(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A batch in a scrambled order, stiffnesses repeated: each answer is the one of a single call, to the last bit. */
+static PetscErrorCode TestMany(void)
+{
+  const PetscReal mu[6][2] = {{0.2, 0.3}, {0.07, 0.17}, {0.2, -0.02}, {0.11, 0.4}, {0.07, 0.45}, {0.2, 0.3}};
+  const PetscReal outside[2][2] = {{0.2, 0.3}, {0.2, 0.6}};
+  const PetscInt grid[2] = {5, 6};
+  char folder[PETSC_MAX_PATH_LEN];
+  HycoScene scene;
+  HycoSamples samples;
+  HycoTrainer trainer;
+  HycoModel model, single;
+  HycoPrediction all[6], one;
+  PetscInt n, n_nodes, dim;
+  const PetscReal *L, *u;
+  PetscReal *Lambda, *U;
+
+  PetscFunctionBegin;
+  snprintf(folder, sizeof(folder), "%s/examples/rope", getenv("HYCO_SOURCE"));
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, folder, &scene));
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_FALSE));
+  PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
+  PetscCall(HycoTrainerSetFromOptions(trainer));
+  PetscCall(HycoTrainerRun(trainer, samples, "many.h5", NULL));
+  PetscCall(HycoModelLoad("many.h5", &model));
+  PetscCall(HycoModelLoad("many.h5", &single));
+  PetscCall(HycoModelGetSizes(model, &n, &n_nodes, &dim));
+  CHECK(n == 98 && dim == 1, "%d contacts, %d components", (int)n, (int)dim);
+  PetscCall(PetscMalloc2(6 * n, &Lambda, 6 * n_nodes * dim, &U));
+  CHECK_FAILS(HycoModelSolveMany(model, 2, 2, outside[0], NULL, NULL, NULL), "mu2 = 0.6 lies outside its range");
+  PetscCall(HycoModelSolveMany(model, 6, 2, mu[0], all, Lambda, U));
+  CHECK_FAILS(HycoModelGetPrediction(model, &one), "call HycoModelPredict() before asking");
+  for (PetscInt k = 0; k < 6; k++) {
+    PetscCall(HycoModelPredict(single, 2, mu[k]));
+    PetscCall(HycoModelGetPrediction(single, &one));
+    PetscCall(HycoModelGetLambda(single, NULL, &L, NULL, NULL));
+    PetscCall(HycoModelGetRID(single, NULL, NULL, &u, NULL, NULL, NULL));
+    CHECK(all[k].reason > 0 && all[k].total_contact_force > 0, "point %d: no solution, or no contact", (int)k);
+    CHECK_NEAR(all[k].total_contact_force, one.total_contact_force, 0);
+    for (PetscInt i = 0; i < n; i++) CHECK_NEAR(Lambda[k * n + i], L[i], 0);
+    for (PetscInt i = 0; i < n_nodes * dim; i++) CHECK_NEAR(U[k * n_nodes * dim + i], u[i], 0);
+  }
+  PetscCall(PetscFree2(Lambda, U));
+  PetscCall(HycoModelDestroy(&single));
+  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
@@ -122,6 +173,7 @@ static PetscErrorCode Test(void)
   PetscCall(TestNull());
   PetscCall(TestSolverOrder());
   PetscCall(TestFOMOrder());
+  PetscCall(TestMany());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -165,9 +165,54 @@ static PetscErrorCode TestBound(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Weights on the rows of one S: the answers of the same problems written out, whatever was solved before. */
+static PetscErrorCode TestWeighted(void)
+{
+  const PetscInt N = 60, n = 100, m = N + n;
+  PetscReal *S, *A, *b, *d, *h, *x, *y, *first, residual;
+  unsigned long long state = 11;
+  HycoWeighted weighted;
+  PetscBool solved;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc4(N * n, &S, N, &d, N, &h, n, &first));
+  PetscCall(PetscCalloc4(m * n, &A, m, &b, n, &x, n, &y));
+  for (PetscInt j = 0; j < n; j++) {
+    const PetscReal centre = (1 + Draw(&state)) / 2, width = 0.15 + 0.1 * Draw(&state);
+
+    for (PetscInt i = 0; i < N; i++) S[j * N + i] = fmax(0, 1 - pow(((PetscReal)i / N - centre) / width, 2));
+  }
+  PetscCall(HycoWeightedCreate(N, n, S, 1e-6, &weighted));
+  for (PetscInt t = 0; t < 9; t++) {
+    unsigned long long problem = 1 + (unsigned long long)(t % 8); /* the ninth is the first again */
+    PetscReal largest = 0;
+
+    for (PetscInt i = 0; i < N; i++) {
+      d[i] = i % 3 ? pow(Draw(&problem), 2) : 1;
+      b[i] = i % 3 ? 0 : fmax(0, 1 - pow(((PetscReal)i / N - 0.5) / 0.2, 2)) + 0.1 * Draw(&problem);
+      h[i] = sqrt(d[i]) * b[i];
+      for (PetscInt j = 0; j < n; j++) A[j * m + i] = sqrt(d[i]) * S[j * N + i];
+    }
+    for (PetscInt j = 0; j < n; j++) A[j * m + N + j] = 1e-3;
+    PetscCall(HycoNNLS(m, n, A, b, x, &residual));
+    PetscCall(HycoWeightedNNLS(weighted, d, h, 1e-10, y, &solved));
+    CHECK(solved, "problem %d is not solved", (int)t);
+    for (PetscInt j = 0; j < n; j++) largest = fmax(largest, x[j]);
+    for (PetscInt j = 0; j < n; j++)
+      CHECK(fabs(x[j] - y[j]) <= 1e-9 * largest, "problem %d: x[%d] = %.12g for %.12g", (int)t, (int)j, y[j], x[j]);
+    if (t == 0) PetscCall(PetscArraycpy(first, y, n));
+    for (PetscInt j = 0; j < n && t == 8; j++) CHECK_NEAR(y[j], first[j], 0); /* no history */
+  }
+  PetscCall(HycoWeightedDestroy(&weighted));
+  PetscCall(PetscFree4(S, d, h, first));
+  PetscCall(PetscFree4(A, b, x, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
+  PetscCall(TestWeighted());
   PetscCall(TestRandom());
   PetscCall(TestByHand());
   PetscCall(TestTao());
