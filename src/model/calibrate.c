@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #define SHARE      0.95
+#define MARGIN     1.5  /* on top: held-out points come in few groups, as a load ramp at one radius, and err alike */
 #define SMALL      1e-2 /* of a feature's median: its floor */
 #define TRIALS     100  /* of a fold's search for full-order unknowns, where the user says nothing */
 #define NEGLIGIBLE 1e-3 /* of the errors' median: smaller ones count as that */
@@ -176,6 +177,7 @@ static PetscErrorCode FitError(const HycoTrust *trust, PetscInt n, const PetscRe
     held[i] = (PetscBool)(rows[i * N_ROW + HELD] > 0.5);
   }
   PetscCall(HycoUpperBound(n, p, X, y, held, SHARE, coefficient));
+  coefficient[p] += PetscLogReal(MARGIN);
   PetscCall(PetscFree3(X, y, held));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

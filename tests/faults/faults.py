@@ -21,7 +21,7 @@ CASES = [
     (['solve', *R, '-hyco_solver_typ', 'tao'], 'knows no option -hyco_solver_typ; did you mean -hyco_solver_type?'),
     (['solve', *R, '-zzz', '1'], 'knows no option -zzz'),
     (['solve', *R, '-model', 'm.h5'], 'hyco solve knows no option -model'),
-    (['predict', '-model', 'rope.h5', '-scene', ROPE, '-mu', '0.07,0.17'], 'hyco predict knows no option -scene'),
+    (['predict', '-model', 'rope.h5', '-scene', ROPE, '-mu', '0.07,0.17'], 'hyco predict needs no -scene but with -hyco_fallback'),
     (['solve', *R, 'stray'], '"stray" is no option'),
     (['solve', '-mu', '0.07,0.17'], '-scene is missing'),
     (['solve', *R, '-output'], '-output needs a value'),
