@@ -44,11 +44,11 @@ def rope(nodes, mesh, quick):
     points = [[draw.uniform(0.05, 0.25), draw.uniform(-0.05, 0.5)] for _ in range(20)]
     case = Case(f"rope, {nodes} nodes", ["-scene", "examples/rope", "-scene_mesh", mesh],
                 {"10 x 12": ["-grid", "10,12"], "12 x 12 Chebyshev": ["-grid", "12,12", "-grid_type", "chebyshev"],
-                 "16 x 6 Chebyshev": ["-grid", "16,6", "-grid_type", "chebyshev"]},
+                 "20 x 8 Chebyshev": ["-grid", "20,8", "-grid_type", "chebyshev"]},
                 ["-grid", "8,10" if quick or nodes > 1000 else "20,24"], ["mu1", "mu2"], points)
     if quick:
         case.settings = [*combine("hybrid", "10 x 12", pod_tol=["1e-7", "1e-11"], hybrid=["all"]),
-                         *combine("projection", "10 x 12", pod_tol=["1e-7"]), Setting("condensed", "16 x 6 Chebyshev")]
+                         *combine("projection", "10 x 12", pod_tol=["1e-7"]), Setting("condensed", "20 x 8 Chebyshev")]
         return case
     tolerances = ["1e-5", "1e-7", "1e-9", "1e-11", "1e-13"]
     deim, hybrid = ["deim", "qdeim"], ["all", "rank"] if nodes <= 1000 else ["all"]
@@ -56,7 +56,8 @@ def rope(nodes, mesh, quick):
                      *combine("projection", "10 x 12", pod_tol=tolerances),
                      *combine("projection", "10 x 12", pod_tol=tolerances, dual=["snapshots"])]
     if nodes <= 1000:
-        case.settings += [Setting("condensed", name) for name in list(case.training)[1:]]
+        case.settings += [*(Setting("condensed", name) for name in list(case.training)[1:]),
+                          *(Setting("condensed", name, (("pod_tol", "1e-13"),)) for name in list(case.training)[1:])]
     return case
 
 
@@ -69,26 +70,32 @@ def pellet(name, mesh, quick):
 
     def chebyshev(n):
         nodes = [4.06 - 0.04 * math.cos((2 * k + 1) * math.pi / (2 * n)) for k in range(n)]
-        return ["-values_radius", ",".join(f"{v:.17g}" for v in nodes), "-values_load", "0.4,0.7,1"]
+        return ["-values_radius", ",".join(f"{v:.17g}" for v in nodes), "-values_load", "0.2,0.4,0.5,0.6,0.7,0.8,0.9,1"]
 
     draw = random.Random(1)
-    points = [[draw.uniform(4.025, 4.095), draw.uniform(0.6, 1)] for _ in range(3 if quick else 10)]
+    points = [[draw.uniform(4.025, 4.095), draw.uniform(0.6, 1)] for _ in range(3 if quick or name == "C" else 10)]
     case = Case(f"pellet, mesh {name}", ["-scene", "examples/pellet", "-scene_mesh", mesh],
                 {"5 radii": radii(4.02, 4.04, 4.055, 4.075, 4.1),
                  "9 radii": radii(4.02, 4.03, 4.04, 4.05, 4.065, 4.07, 4.08, 4.09, 4.1),
-                 **{f"{n} Chebyshev radii": chebyshev(n) for n in (2, 3, 4, 6)}},
+                 **{f"{n} Chebyshev radii": chebyshev(n) for n in (2, 3, 4, 6, 8)}},
                 radii(*((4.06,) if name == "C" or quick else (4.06, 4.033))), ["radius", "load"], points)
     if quick:
         case.training["5 radii"] = ["-values_radius", "4.02,4.04,4.07,4.1", "-values_load", "0.2,0.5,0.7,0.85,1"]
         case.settings = [*combine("hybrid", "5 radii", pod_tol=["1e-7", "1e-10"]), Setting("condensed", "3 Chebyshev radii")]
         return case
+    condensed = [*(Setting("condensed", f"{n} Chebyshev radii") for n in (2, 3, 4)),
+                 *(Setting("condensed", f"{n} Chebyshev radii", (("pod_tol", "1e-14"),)) for n in (4, 6, 8))]
     tolerances = ["1e-5", "1e-7", "1e-8", "1e-9", "1e-10", "1e-12"]
+    if name == "C":
+        case.settings = [*combine("hybrid", "9 radii", pod_tol=tolerances[1:], rid_layers=[1]),
+                         *combine("hybrid", "9 radii", pod_tol=tolerances[3:], rid_layers=[2, 3]),
+                         *condensed[:4]]
+        return case
     case.settings = [
         *combine("hybrid", "9 radii", pod_tol=tolerances, rid_layers=[1, 2, 3], rid_contact_extension=["0.1", "0.3"]),
         *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], rid_layers=[1], rid_contact_extension=["0"]),
         *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], rid_layers=[1, 2], deim_type=["qdeim"]),
         *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], hybrid=["rank"]),
         *combine("hybrid", "5 radii", pod_tol=tolerances[1::2], rid_layers=[1, 2]),
-        *combine("projection", "9 radii", pod_tol=tolerances[1::2]),
-        *(Setting("condensed", f"{n} Chebyshev radii") for n in (2, 3, 4, 6))]
+        *combine("projection", "9 radii", pod_tol=tolerances[1::2]), *condensed]
     return case

@@ -69,10 +69,10 @@ class Bench:
         return {"batch_s": r["seconds_total"] / r["n_points"],
                 "single_s": statistics.median(float(row["seconds"]) for row in rows), "memory_mb": r["memory_mb"]}
 
-    def full(self, *options):
-        """The same of full order; a process that has read and paired its mesh."""
-        r, rows = self.hyco("solve", *self.case.scene, *self.case.test, *options)
-        _, single = self.hyco("solve", *self.case.scene, "-points", self.points, *options)
+    def full(self, *options, ramps=True):
+        """The same of full order; a process that has read and paired its mesh. Without ramps: of single points alone."""
+        r, rows = self.hyco("solve", *self.case.scene, *(self.case.test if ramps else ["-points", self.points]), *options)
+        _, single = self.hyco("solve", *self.case.scene, "-points", self.points, *options) if ramps else (r, rows)
         return {"batch_s": sum(float(row["seconds"]) for row in rows) / len(rows),
                 "single_s": statistics.median(float(row["seconds"]) for row in single), "memory_mb": r["memory_mb"]}
 
