@@ -1,15 +1,23 @@
-/* K: the element loop of linear elasticity (plane strain in 2D), and the matrices it fills. */
+/*
+  K: the element loop of linear elasticity (plane strain in 2D), and the matrices it fills. The element bbar takes the
+  dilatation's mean over the cell (T. J. R. Hughes, Int. J. Numer. Meth. Engng 15 (1980) 1413-1418):
+
+      sigma : eps = 2 mu (eps : eps - tr(eps)^2 / 3) + (lambda + 2 mu / 3) mean(tr eps)^2
+*/
 #include "kinematics.h"
 
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
+  const PetscBool bbar = fe->scene->body[fe->mesh->cell_body[cell]].bbar;
+  PetscReal mean[8][3];
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(Ke, n * n));
+  if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));
   for (PetscInt q = 0; q < el->nq; q++) {
-    const PetscReal *lame = fe->lame + 2 * (cell * el->nq + q);
+    const PetscReal *lame = fe->lame + 2 * (cell * el->nq + q), own = bbar ? -2 * lame[1] / 3 : lame[0];
     PetscReal g[8][3], w;
 
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
@@ -24,7 +32,8 @@ PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
         }
         for (PetscInt c = 0; c < dim; c++) {
           for (PetscInt d = 0; d < dim; d++)
-            block[c * n + d] += w * (lame[0] * g[a][c] * g[b][d] + lame[1] * g[a][d] * g[b][c]);
+            block[c * n + d] += w * (own * g[a][c] * g[b][d] + lame[1] * g[a][d] * g[b][c]);
+          for (PetscInt d = 0; bbar && d < dim; d++) block[c * n + d] += w * (lame[0] - own) * mean[a][c] * mean[b][d];
           block[c * n + c] += dot;
         }
       }
