@@ -148,7 +148,7 @@ PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEAssembleH1(HycoFE fe, Mat M)
+PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
@@ -165,8 +165,8 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, Mat M)
       PetscCall(HycoGradients(fe, el, e, q, g, &w));
       for (PetscInt a = 0; a < el->nv; a++) {
         for (PetscInt b = 0; b < el->nv; b++) {
-          const PetscReal value =
-              w * (el->N[q][a] * el->N[q][b] + g[a][0] * g[b][0] + g[a][1] * g[b][1] + g[a][2] * g[b][2]);
+          const PetscReal slopes = g[a][0] * g[b][0] + g[a][1] * g[b][1] + g[a][2] * g[b][2];
+          const PetscReal value = w * (el->N[q][a] * el->N[q][b] + length * length * slopes);
 
           for (PetscInt c = 0; c < dim; c++) Me[(a * dim + c) * n + b * dim + c] += value;
         }

@@ -130,7 +130,7 @@ static void TestShapes(HycoCellType type)
   CHECK_NEAR(weight, size[type], 1e-14);
 }
 
-/* A dilatation that varies in the cells: K, the energies and energies tell the same work. */
+/* A dilatation that varies in the cells: K and the energies tell the same work. */
 static PetscErrorCode TestEnergy(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
