@@ -73,7 +73,9 @@ class Gaps(Extreme):
             self.row(f'press = gap + {press - gap:.2g}', 'full order: error of the force over that of the press alone',
                      abs(r['total_contact_force'] - exact) / full, 1e-13)
         self.three('press = gap, trained around', scene, points((0.04, 0.06), (0.03, 0.05)), points((0.06,), (0.05,)),
-                   points((0.04,), (0.04,)))
+                   points((0.05,), (0.04,)))
+        p = self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,0.05')
+        self.row('press = gap', 'projection: force over that of the press alone', p['total_contact_force'] / full, 1e-6)
 
     def test_active(self):
         """All, none and one of the contacts active, at every training and test point."""
