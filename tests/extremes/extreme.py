@@ -91,24 +91,23 @@ class Extreme(Case):
 
     def three(self, case, scene, train, seen, unseen, bound=1e-8, refusal=None):
         """Full order by its KKT residuals and energies; the hybrid model with all displacements full order on the whole
-        mesh, which is full order; the projection onto the solutions and their forces, which returns a training point, or,
-        where `refusal` says so, may be refused by its training with these words."""
+        mesh, which is full order; the projection onto the solutions and their forces, which returns a training point. With
+        `refusal`, a training may refuse its model with these words."""
         report = self.fields(scene, '-mu', ','.join(unseen[1::2]))[0]
         self.row(case, 'full order: worst KKT residual', max(report['kkt'].values()), 1e-8)
-        common = ('-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-15')
-        self.train(scene, *train, '-hyco_rid_whole', 'true', '-hyco_hybrid', 'all', *common)
-        self.row(case, 'hybrid, whole domain: error', self.worst(self.compare(scene, *unseen)), bound)
-        projection = (*train, '-hyco_model_type', 'projection', '-hyco_dual', 'snapshots', *common)
-        if refusal:
-            run = self.run_raw('train', '-scene', scene, '-model', 'm.h5', *projection, '-hyco_snapshots',
-                               self.path(f's{self.written}'))
-            if run.returncode:
+        common = (*train, '-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-15')
+        for name, options, points_ in (
+                ('hybrid, whole domain', ('-hyco_rid_whole', 'true', '-hyco_hybrid', 'all'), unseen),
+                ('projection, at a training point', ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots'), seen)):
+            run = self.run_raw('train', '-scene', scene, '-model', 'm.h5', '-hyco_snapshots', self.path(f's{self.written}'),
+                               *common, *options)
+            if run.returncode and refusal:
                 self.assertIn(refusal, run.stderr)
-                self.say(case, 'projection: refused', run.stderr.strip().splitlines()[-1].removeprefix('hyco: '))
-                return report
-        else:
-            self.train(scene, *projection)
-        self.row(case, 'projection, at a training point: error', self.worst(self.compare(scene, *seen)), bound)
+                self.say(case, f'{name}: refused', run.stderr.strip().splitlines()[-1].removeprefix('hyco: error: '),
+                         verdict='limit')
+                continue
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.row(case, f'{name}: error', self.worst(self.compare(scene, *points_)), bound)
         return report
 
 

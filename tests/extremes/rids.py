@@ -49,7 +49,7 @@ class Rids(Extreme):
     def test_resonance(self):
         """A reduced stiffness whose determinant changes sign inside the ranges is refused; kept on demand."""
         train = ('train', '-scene', ROPE, '-grid', '10,12', '-model', 'r.h5', '-hyco_snapshots', self.path('rope'),
-                 *RESONANT)
+                 '-hyco_deim_type', 'qdeim', '-hyco_hybrid', 'all', '-hyco_scan', 51)
         self.refused('rope, singular inside the range', *train, says='the reduced stiffness is singular inside')
         self.hyco(*train, '-hyco_keep_singular', 'true')
         self.assertIn('SINGULAR inside the ranges', self.run_raw('view', '-model', 'r.h5').stdout)
