@@ -8,7 +8,7 @@ import numpy as np
 
 from extreme import Extreme, blocks, points
 
-SEED, COUNT = 20180701, 40
+SEED, COUNT = 20180701, 32
 
 
 class Battery(Extreme):
