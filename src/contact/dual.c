@@ -331,7 +331,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, Vec x, Vec L)
     a[k++] = i;
     open = PetscMax(open, PetscAbsReal(s->g[i]));
   }
-  if (open > 1e-12 * size) PetscCall(HycoLCPSolveOnSet(s->m, s->S, s->g, y->symmetric, &k, a, change, &singular));
+  if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(s->m, s->S, s->g, y->symmetric, &k, a, change, &singular));
   for (PetscInt i = 0; i < s->m && !singular; i++) change[i] = PetscMax(change[i], -s->L[i]);
   if (!singular) PetscCall(Shift(s, change, x, L));
   PetscCall(PetscFree2(a, change));

@@ -29,7 +29,7 @@ class Contrast(Extreme):
                     self.row(case, 'flat: force against the closed form', abs(r['total_contact_force'] / p - 1), 1e-9)
                     if ratio in (1e4, 1e10):
                         scene = self.scene(*blocks(kind, (4, 4), young=young, crown=0.1))
-                        r = self.three(case, scene, TRAIN, SEEN, UNSEEN, 1e-6, refusal='misses its own training')
+                        r = self.three(case, scene, TRAIN, SEEN, UNSEEN, 1e-6 if ratio < 1e8 else 1e-4)
                         self.assertTrue(0 < r['n_active'] < r['n_contacts'])
 
 

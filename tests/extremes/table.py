@@ -1,7 +1,7 @@
 """The tables of the numerical extremes: every test's rows, printed and written to extremes.md; fails when a row is out of
 its bound or a test left none. With --write-doc they go into docs/limits.md, between the markers of that section:
 
-    (cd build/tests && PYTHONPATH=../../tests/pipeline HYCO=../hyco HYCO_SOURCE=../.. python3 ../../tests/extremes/table.py --write-doc)
+    (cd build/tests && /usr/bin/python3 ../../tests/extremes/table.py --write-doc)
 """
 import csv
 import os
