@@ -85,8 +85,9 @@ PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, Pe
 PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K);
 /* F (12), with the lifting of the prescribed displacements: K u0 moved to the right, F_i = K_ii u0_i where fixed. */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
-/* The norm matrix of H1: mass plus gradient, fixed unknowns as in K. */
-PetscErrorCode HycoFEAssembleH1(HycoFE fe, Mat M);
+/* The norm matrix of H1: mass plus length^2 times gradient, fixed unknowns as in K. The length, of the whole mesh
+   (HycoMeshLength()), keeps the norm the same in any unit; it is 1 in the paper's section 6. */
+PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 
 /* Stress of u (n_dof, local order) averaged over each cell: sigma n_cells x n_sigma. */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);

@@ -58,6 +58,9 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene);
 PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
                                const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh *part);
 
+/* The largest extent of the mesh, as in the file, along an axis. */
+PetscReal HycoMeshLength(HycoMesh mesh);
+
 /* Cells around each node: CSR start[n_nodes + 1], cell[]. The caller frees both. */
 PetscErrorCode HycoMeshNodeCells(HycoMesh mesh, PetscInt **start, PetscInt **cell);
 

@@ -25,6 +25,7 @@ typedef struct {
   char *name;
   HycoExpr young,
       poisson;       /* Young's modulus (1D: the stiffness nu of a unit cross-section), Poisson's ratio (0 in 1D) */
+  PetscBool bbar;    /* mean dilatation (B-bar) instead of the displacements' own at each point */
   HycoExpr map[3];   /* moved coordinates; NULL: not moved */
   HycoExpr force[3]; /* body force per unit volume; NULL: none */
 } HycoBody;

@@ -61,6 +61,11 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   HycoFE f;
 
   PetscFunctionBegin;
+  for (PetscInt b = 0; b < scene->n_bodies; b++)
+    HycoCheck(!scene->body[b].bbar || mesh->type == HYCO_QUAD4 || mesh->type == HYCO_HEX8,
+              "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (line2, tri3 or tet4) the "
+              "dilatation is constant already and nothing would change",
+              scene->body[b].name);
   PetscCall(PetscNew(&f));
   f->scene = scene;
   f->mesh = mesh;

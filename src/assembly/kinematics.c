@@ -38,6 +38,25 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal mean[8][3])
+{
+  PetscReal g[8][3], w, volume = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(mean, 8 * sizeof(mean[0])));
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    volume += w;
+    for (PetscInt a = 0; a < el->nv; a++) {
+      for (PetscInt c = 0; c < 3; c++) mean[a][c] += w * g[a][c];
+    }
+  }
+  for (PetscInt a = 0; a < el->nv; a++) {
+    for (PetscInt c = 0; c < 3; c++) mean[a][c] /= volume;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3])
 {
   HycoMesh m = fe->mesh;

@@ -6,6 +6,8 @@
 /* Gradients dN/dX (nv x 3) of the shape functions at quadrature point q, and |det J| w. */
 PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal g[8][3],
                              PetscReal *weight);
+/* Their means over the cell, which make the dilatation of the element bbar. */
+PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[8][3]);
 /* Outward normal times area weight (n dS) at point q of a facet; in 1D the sign away from its cell. */
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);
 

@@ -1,4 +1,9 @@
-/* K: the element loop of linear elasticity (plane strain in 2D), and the matrices it fills. */
+/*
+  K: the element loop of linear elasticity (plane strain in 2D), and the matrices it fills. The element bbar takes the
+  dilatation's mean over the cell (T. J. R. Hughes, Int. J. Numer. Meth. Engng 15 (1980) 1413-1418):
+
+      sigma : eps = 2 mu (eps : eps - tr(eps)^2 / 3) + (lambda + 2 mu / 3) mean(tr eps)^2
+*/
 #include "kinematics.h"
 #include "places.h"
 
@@ -32,17 +37,34 @@ static void AddMaterial(PetscInt nv, PetscInt dim, const PetscReal lame[2], cons
   }
 }
 
+/* The bulk part of bbar: bulk times the products of the mean gradients, in the upper blocks. */
+static PetscErrorCode AddMean(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal bulk, PetscReal Ke[])
+{
+  const PetscInt n = el->nv * fe->dim;
+  PetscReal mean[8][3];
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeanGradients(fe, el, cell, mean));
+  for (PetscInt r = 0; r < n; r++) {
+    for (PetscInt t = r / fe->dim * fe->dim; t < n; t++)
+      Ke[r * n + t] += bulk * mean[r / fe->dim][r % fe->dim] * mean[t / fe->dim][t % fe->dim];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
+  const PetscBool bbar = fe->scene->body[fe->mesh->cell_body[cell]].bbar;
   const PetscReal *lame = fe->lame + 2 * cell * el->nq;
-  PetscReal P[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+  PetscReal P[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS], bulk = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(Ke, n * n));
   PetscCall(PetscArrayzero(P, n * n));
   for (PetscInt q = 0; q < el->nq; q++, lame += 2) {
+    const PetscReal own[2] = {bbar ? -2 * lame[1] / 3 : lame[0], lame[1]};
     PetscReal g[8][3], w, p[HYCO_MAX_CELL_DOFS], s[HYCO_MAX_CELL_DOFS];
 
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
@@ -50,11 +72,13 @@ PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
       s[r] = g[r / dim][r % dim];
       p[r] = w * s[r];
     }
+    bulk += w * (lame[0] - own[0]);
     AddProducts(el->nv, dim, p, s, P);
     if (q + 1 < el->nq && lame[0] == lame[2] && lame[1] == lame[3]) continue; /* the next point's material is this */
-    AddMaterial(el->nv, dim, lame, P, Ke);
+    AddMaterial(el->nv, dim, own, P, Ke);
     PetscCall(PetscArrayzero(P, n * n));
   }
+  if (bbar) PetscCall(AddMean(fe, el, cell, bulk, Ke));
   for (PetscInt r = 0; r < n; r++) {
     for (PetscInt t = 0; t < r / dim * dim; t++) Ke[r * n + t] = Ke[t * n + r];
   }
@@ -170,7 +194,7 @@ PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEAssembleH1(HycoFE fe, Mat M)
+PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
@@ -187,8 +211,8 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, Mat M)
       PetscCall(HycoGradients(fe, el, e, q, g, &w));
       for (PetscInt a = 0; a < el->nv; a++) {
         for (PetscInt b = 0; b < el->nv; b++) {
-          const PetscReal value =
-              w * (el->N[q][a] * el->N[q][b] + g[a][0] * g[b][0] + g[a][1] * g[b][1] + g[a][2] * g[b][2]);
+          const PetscReal slopes = g[a][0] * g[b][0] + g[a][1] * g[b][1] + g[a][2] * g[b][2];
+          const PetscReal value = w * (el->N[q][a] * el->N[q][b] + length * length * slopes);
 
           for (PetscInt c = 0; c < dim; c++) Me[(a * dim + c) * n + b * dim + c] += value;
         }

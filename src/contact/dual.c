@@ -290,6 +290,61 @@ static PetscErrorCode SetForces(HycoSolver s, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The forces change by dL (m), and x with them. */
+static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
+{
+  Vec change, force, move;
+  PetscInt lo, hi;
+  PetscScalar *c;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(L, &change));
+  PetscCall(VecDuplicate(x, &force));
+  PetscCall(VecDuplicate(x, &move));
+  PetscCall(VecGetOwnershipRange(L, &lo, &hi));
+  PetscCall(VecGetArray(change, &c));
+  PetscCall(PetscArraycpy(c, dL + lo, hi - lo));
+  PetscCall(VecRestoreArray(change, &c));
+  PetscCall(MatMult(s->system->Bt, change, force));
+  PetscCall(SolveK(s, force, move));
+  PetscCall(VecAXPY(x, -1, move));
+  PetscCall(VecAXPY(L, 1, change));
+  PetscCall(VecDestroy(&change));
+  PetscCall(VecDestroy(&force));
+  PetscCall(VecDestroy(&move));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where K is ill conditioned, x misses the gaps under the forces by more than S and g know: S dL = D - B x closes them.
+ */
+static PetscErrorCode CloseGaps(HycoSolver s, Vec x, Vec L)
+{
+  HycoSystem y = s->system;
+  PetscInt k = 0, *a;
+  PetscReal *change, open = 0, size;
+  PetscBool singular = PETSC_TRUE;
+  Vec gap;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(y->D, &gap));
+  PetscCall(MatMult(y->B, x, gap));
+  PetscCall(VecNorm(gap, NORM_INFINITY, &size));
+  PetscCall(VecAYPX(gap, -1, y->D));
+  PetscCall(GatherVec(s->comm, gap, s->g));
+  PetscCall(VecDestroy(&gap));
+  PetscCall(PetscMalloc2(s->m, &a, s->m, &change));
+  for (PetscInt i = 0; i < s->m; i++) {
+    if (s->L[i] <= 0) continue;
+    a[k++] = i;
+    open = PetscMax(open, PetscAbsReal(s->g[i]));
+  }
+  if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(s->m, s->S, s->g, y->symmetric, &k, a, change, &singular));
+  for (PetscInt i = 0; i < s->m && !singular; i++) change[i] = PetscMax(change[i], -s->L[i]);
+  if (!singular) PetscCall(Shift(s, change, x, L));
+  PetscCall(PetscFree2(a, change));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBool *solved)
 {
   PetscBool singular;
@@ -318,5 +373,6 @@ PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBoo
   HycoLogged(HYCO_EVENT_FORCES, s->p ? SolveHeld(s, type, solved) : SolveForces(s, type, solved));
   PetscCall(SetForces(s, L));
   PetscCall(Recover(s, x, L));
+  if (s->lu && !s->p && *solved && type != HYCO_TYPE_TAO) PetscCall(CloseGaps(s, x, L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -135,7 +135,8 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
   d->geometry = now;
   PetscCall(KSPDestroy(&d->norm));
   PetscCall(MatDestroy(&d->M_A));
-  PetscCall(HycoFEAssembleH1(m->fe, d->M));
+  if (!m->whole) PetscCall(HycoModelLoadWhole(m));
+  PetscCall(HycoFEAssembleH1(m->fe, HycoMeshLength(m->whole), d->M));
   PetscCall(MatCreateSubMatrix(d->M, d->is, d->is, MAT_INITIAL_MATRIX, &d->M_A));
   PetscCall(MatSetOption(d->M_A, MAT_SPD, PETSC_TRUE));
   PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", d->M_A, PETSC_TRUE, &d->norm));

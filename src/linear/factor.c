@@ -65,6 +65,31 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* PETSc takes pivots below 2.2e-14 as zero, whatever the unit: here, below that share of the least diagonal entry. */
+static PetscErrorCode ScaleZeroPivot(KSP ksp, PC pc)
+{
+  Mat K;
+  Vec diagonal;
+  PetscInt n;
+  PetscReal least = PETSC_MAX_REAL, all;
+  const PetscScalar *d;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetOperators(ksp, &K, NULL));
+  PetscCall(MatCreateVecs(K, &diagonal, NULL));
+  PetscCall(MatGetDiagonal(K, diagonal));
+  PetscCall(VecGetLocalSize(diagonal, &n));
+  PetscCall(VecGetArrayRead(diagonal, &d));
+  for (PetscInt i = 0; i < n; i++) {
+    if (d[i] != 0) least = PetscMin(least, PetscAbsScalar(d[i]));
+  }
+  PetscCall(VecRestoreArrayRead(diagonal, &d));
+  PetscCall(VecDestroy(&diagonal));
+  PetscCallMPI(MPI_Allreduce(&least, &all, 1, MPIU_REAL, MPI_MIN, PetscObjectComm((PetscObject)K)));
+  if (all < PETSC_MAX_REAL) PetscCall(PCFactorSetZeroPivot(pc, 100 * PETSC_MACHINE_EPSILON * all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular)
 {
   PC pc;
@@ -72,6 +97,7 @@ PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular)
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(ScaleZeroPivot(ksp, pc));
   PetscCall(KSPSetUp(ksp));
   PetscCall(PCGetFailedReason(pc, &failed));
   for (PetscInt room = 200; failed == PC_FACTOR_OUTMEMORY && room <= 3200;

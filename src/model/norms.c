@@ -1,8 +1,8 @@
 /*
-  The norms of the paper's section 3 on the whole mesh: |u|_H1^2 = u^T H u with H the mass plus the gradient's matrix,
-  and the norm of a force in the dual of H1 (test functions that vanish on the supports), sup r.v / |v|_H1 =
-  sqrt(r^T M^-1 r) with M the part of H on the free unknowns. On a mesh that the parameters move, both are those of the
-  middle of the ranges, so that one factor serves every point.
+  The norms of the paper's section 3 on the whole mesh: |u|_H1^2 = u^T H u with H the mass plus the gradient's matrix
+  (times the mesh's length squared, so that units do not matter), and the norm of a force in the dual of H1 (test
+  functions that vanish on the supports), sup r.v / |v|_H1 = sqrt(r^T M^-1 r) with M the part of H on the free unknowns.
+  On a mesh that the parameters move, both are those of the middle of the ranges, so that one factor serves every point.
 */
 #include <hycolinear.h>
 #include <hycomodelimpl.h>
@@ -19,7 +19,7 @@ static PetscErrorCode AssembleNorm(HycoFE fe, Mat *A)
 {
   PetscFunctionBegin;
   PetscCall(HycoFECreateMatrix(fe, PETSC_COMM_SELF, fe->mesh->n_nodes, 0, A));
-  PetscCall(HycoFEAssembleH1(fe, *A));
+  PetscCall(HycoFEAssembleH1(fe, HycoMeshLength(fe->mesh), *A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -211,7 +211,7 @@ PetscErrorCode HycoTrainerSupremizers(HycoTrainer t, Mat *forces, Mat *supremize
   }
   PetscCall(MatDenseRestoreArray(R, &r));
   PetscCall(HycoFECreateMatrix(t->fe, PETSC_COMM_SELF, t->sizes[0], 0, &M));
-  PetscCall(HycoFEAssembleH1(t->fe, M));
+  PetscCall(HycoFEAssembleH1(t->fe, HycoMeshLength(t->whole), M));
   PetscCall(MatSetOption(M, MAT_SPD, PETSC_TRUE));
   PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", M, PETSC_TRUE, &ksp));
   PetscCall(HycoFactor(ksp, &singular));

@@ -183,8 +183,25 @@ static void Report(HycoTrainer t, HycoModel m, HycoTraining *r)
   r->error_lambda = m->numbers[2];
 }
 
+/* A hybrid model without a contact gives no force, also where its training solutions press. */
+static PetscErrorCode CheckForces(HycoTrainer t, HycoModel m)
+{
+  PetscBool reconstruct = PETSC_TRUE, presses = PETSC_FALSE, kept = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(HycoOptionsBool(t->scene->options, "hyco_reconstruct", &reconstruct));
+  for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
+  for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
+  HycoCheck(
+      m->type != HYCO_MODEL_HYBRID || !reconstruct || kept || !presses,
+      "the RID has no contact, and the training solutions press: the model would give no force; let the RID reach "
+      "the contact (-hyco_rid_modes displacement,dual or -hyco_rid_groups GROUP), or take displacements alone by "
+      "-hyco_reconstruct false");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A model that misses its own training solutions by half is refused. */
-static PetscErrorCode CheckUseful(HycoModel m)
+static PetscErrorCode CheckUseful(HycoTrainer t, HycoModel m)
 {
   PetscFunctionBegin;
   HycoCheck(m->numbers[1] < 0.5,
@@ -192,6 +209,7 @@ static PetscErrorCode CheckUseful(HycoModel m)
             "condition %.0e): enlarge the RID (-hyco_rid_layers 1, "
             "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)",
             100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0]);
+  PetscCall(CheckForces(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -211,7 +229,7 @@ static PetscErrorCode BuildAndSave(HycoTrainer t, PetscBool useful, const char p
     ierr = t->type == HYCO_MODEL_PROJECTION  ? HycoTrainerProject(t, m)
            : t->type == HYCO_MODEL_CONDENSED ? HycoTrainerCondense(t, m)
                                              : HycoTrainerChooseHybrid(t, m);
-  if (!ierr && useful) ierr = CheckUseful(m);
+  if (!ierr && useful) ierr = CheckUseful(t, m);
   if (!ierr) ierr = HycoModelSave(m, t->whole, t->V_whole, path);
   if (!ierr) Report(t, m, report);
   PetscCall(HycoModelDestroy(&m));

@@ -96,6 +96,22 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscReal HycoMeshLength(HycoMesh m)
+{
+  PetscReal length = 0;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    PetscReal lo = PETSC_MAX_REAL, hi = PETSC_MIN_REAL;
+
+    for (PetscInt i = 0; i < m->n_nodes; i++) {
+      lo = PetscMin(lo, m->xyz[3 * i + c]);
+      hi = PetscMax(hi, m->xyz[3 * i + c]);
+    }
+    length = PetscMax(length, hi - lo);
+  }
+  return length;
+}
+
 PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
 {
   PetscInt *next;

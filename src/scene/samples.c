@@ -86,10 +86,10 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscB
   HycoCheckHandle(s, "HycoSamplesCreate()");
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     const PetscReal lo = s->scene->lo[p], hi = s->scene->hi[p];
-    const PetscInt n = counts[p];
+    const PetscInt n = counts[p], least = closed && lo < hi ? 2 : 1;
 
-    HycoCheck(n >= (closed ? 2 : 1) && n <= 100000000, "the grid has %d points for %s; at least %d are needed", (int)n,
-              s->scene->parameter[p], closed ? 2 : 1);
+    HycoCheck(n >= least && n <= 100000000, "the grid has %d points for %s; at least %d are needed", (int)n,
+              s->scene->parameter[p], (int)least);
     PetscCall(PetscMalloc1(n, &values[p]));
     for (PetscInt k = 0; k < n; k++) {
       values[p][k] = closed ? (k == n - 1 ? hi : lo + k * (hi - lo) / (n - 1)) : lo + (k + 0.5) * (hi - lo) / n;

@@ -6,7 +6,7 @@
 #include <string.h>
 
 /* Fields of a section's members; a member's name is what stands between the section and the field. */
-static const char *const body_fields[] = {"young", "poisson", "map_x", "map_y", "map_z", NULL};
+static const char *const body_fields[] = {"young", "poisson", "element", "map_x", "map_y", "map_z", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const contact_fields[] = {"type", "group",    "slave",    "master",   "tolerance",
                                              "gap",  "normal_x", "normal_y", "normal_z", NULL};
@@ -180,6 +180,17 @@ static PetscErrorCode ReadContactField(HycoScene s, PetscInt entry, HycoContact 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode ReadElement(HycoScene s, PetscInt entry, HycoBody *body)
+{
+  const char *value = s->value[entry];
+
+  PetscFunctionBegin;
+  body->bbar = (PetscBool)(strcmp(value, "bbar") == 0);
+  HycoCheck(body->bbar || strcmp(value, "standard") == 0, "%s is \"%s\"; it must be standard or bbar", s->key[entry],
+            value);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One entry of a section with members. */
 static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
 {
@@ -191,10 +202,13 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
   if (strncasecmp(key, "body_", 5) == 0) {
     if (!SplitKey(rest, body_fields, name, &field)) PetscCall(UnknownKey(key, "a body", body_fields));
     PetscCall(Member(name, sizeof(HycoBody), &s->n_bodies, (void **)&s->body, &k));
-    PetscCall(NewExpr(s, entry,
-                      field == 0   ? &s->body[k].young
-                      : field == 1 ? &s->body[k].poisson
-                                   : &s->body[k].map[field - 2]));
+    if (field == 2)
+      PetscCall(ReadElement(s, entry, &s->body[k]));
+    else
+      PetscCall(NewExpr(s, entry,
+                        field == 0   ? &s->body[k].young
+                        : field == 1 ? &s->body[k].poisson
+                                     : &s->body[k].map[field - 3]));
   } else if (strncasecmp(key, "force_", 6) == 0) {
     if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, "a body force", component_fields));
     PetscCall(Member(name, sizeof(HycoBody), &s->n_bodies, (void **)&s->body, &k));

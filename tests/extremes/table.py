@@ -1,0 +1,57 @@
+"""The tables of the numerical extremes: every test's rows, printed and written to extremes.md; fails when a row is out of
+its bound or a test left none. With --write-doc they go into docs/limits.md, between the markers of that section:
+
+    (cd build/tests && /usr/bin/python3 ../../tests/extremes/table.py --write-doc)
+"""
+import csv
+import os
+import sys
+
+FOLDER = 'extremes'
+TABLES = {
+    'contrast': 'Stiffness contrast between bodies',
+    'locking': "Poisson's ratio near 0.5",
+    'units': 'Units: nanometres to kilometres, Pa to TPa',
+    'shapes': 'Shapes of elements',
+    'gaps': 'Gaps, interference, contact that just begins, all or none',
+    'bases': 'Bases',
+    'rids': 'RIDs',
+    'parameters': 'Parameters',
+    'battery': 'Random scenes',
+}
+BEGIN, END = '<!-- numerical extremes: written by tests/extremes/table.py --write-doc -->\n', '<!-- end of numerical extremes -->\n'
+
+
+def tables():
+    text, problems = [], []
+    for name, title in TABLES.items():
+        path = os.path.join(FOLDER, name + '.csv')
+        rows = []
+        if os.path.exists(path):
+            with open(path, encoding='utf-8', newline='') as f:
+                rows = [[cell.replace('|', '/') for cell in row] for row in csv.reader(f)][1:]
+        if not rows:
+            problems.append(f'{name} left no rows: run it first (ctest -L extremes)')
+        problems += [f'{name}: {row[0]}, {row[1]} is out of its bound' for row in rows if row[-1] == 'OUT']
+        text += [f'### {title}', '', '| case | what | found | bound |', '|---|---|---|---|']
+        text += ['| ' + ' | '.join([*row[:3], 'limit' if row[4] == 'limit' else row[3]]) + ' |' for row in rows] + ['']
+    return '\n'.join(text), problems
+
+
+def main():
+    text, problems = tables()
+    with open('extremes.md', 'w', encoding='utf-8') as f:
+        f.write(text)
+    print(text)
+    if problems:
+        sys.exit('\n'.join(problems))
+    if '--write-doc' in sys.argv:
+        page = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'docs', 'limits.md')
+        with open(page, encoding='utf-8') as f:
+            before, rest = f.read().split(BEGIN)
+        with open(page, 'w', encoding='utf-8') as f:
+            f.write(before + BEGIN + '\n' + text + END + rest.split(END)[1])
+
+
+if __name__ == '__main__':
+    main()
