@@ -262,6 +262,15 @@ PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CheckFinite(HycoH5 f, const char name[], size_t n, const PetscReal data[])
+{
+  PetscFunctionBegin;
+  for (size_t k = 0; k < n; k++)
+    HycoCheck(!PetscIsInfOrNanReal(data[k]), "%s: %s holds a value that is not finite: the file is damaged", f->path,
+              name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, PetscReal *data)
 {
   hid_t set;
@@ -271,6 +280,7 @@ PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, Pet
   PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
   PetscCall(CheckSize(file, name, dims, rows, cols));
   PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, data));
+  PetscCall(CheckFinite(file, name, dims[0] * dims[1], data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -278,6 +288,7 @@ PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, Pe
 {
   hid_t set;
   hsize_t dims[2];
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
@@ -286,12 +297,9 @@ PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, Pe
   *cols = (PetscInt)dims[1];
   PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
   PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, *data));
-  for (size_t k = 0; k < dims[0] * dims[1]; k++) {
-    if (PetscIsInfOrNanReal((*data)[k])) {
-      PetscCall(PetscFree(*data));
-      HycoFail("%s: %s holds a value that is not finite: the file is damaged", file->path, name);
-    }
-  }
+  ierr = CheckFinite(file, name, dims[0] * dims[1], *data);
+  if (ierr) PetscCall(PetscFree(*data));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -135,6 +135,7 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
 
   PetscFunctionBegin;
   if (m->ready) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoModelReset(m)); /* what a refusal has left half made */
   PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
   PetscCall(SetUpBasis(m));
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++)

@@ -89,6 +89,23 @@ static int CompareEntries(const void *a, const void *b)
   return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
+/* Every entry has been asked for by its key, but those of no section and those whose name has a blank. */
+static PetscErrorCode RefuseOthers(PetscOptions options)
+{
+  PetscInt n;
+  char **names, **values, name[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsLeftGet(options, &n, &names, &values));
+  if (n) snprintf(name, sizeof(name), "%.200s", names[0]);
+  PetscCall(PetscOptionsLeftRestore(options, &n, &names, &values));
+  HycoCheck(!name[0],
+            "the scene's entry \"%s\" is unknown; an entry stands under scene, parameter, body, fixed, pressure, "
+            "traction, force, contact or hyco, and its name has no blank",
+            name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoEntriesList(HycoScene scene)
 {
   PetscInt n;
@@ -101,6 +118,7 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
   for (PetscInt k = 0; k < n; k++) PetscCall(GetLong(scene->options, keys[k], &scene->value[k]));
   scene->n_entries = n;
   scene->key = keys;
+  PetscCall(RefuseOthers(scene->options));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
