@@ -400,6 +400,8 @@ PetscErrorCode HycoModelLoad(const char path[], HycoModel *model)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  PetscCheck(path && model, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
+             "HycoModelLoad: the path or the handle's address is NULL");
   *model = NULL;
   PetscCall(HycoH5Open(path, &h));
   PetscCall(HycoModelCreate(&m));
