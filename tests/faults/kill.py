@@ -83,7 +83,7 @@ class Kill(Case):
             for name, stamp in times.items():
                 self.assertEqual(os.stat(name).st_mtime_ns, stamp, 'a complete solution was solved again')
             self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', '*.h5'))), 144)
-            self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f], [])
+            self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
             self.assertEqual(self.content(), right, f'the model differs after kill {k} on {ranks} ranks')
         self.assertGreaterEqual(interrupted, 2, 'the kills came too late to say anything')
         print(f'{ranks} ranks: {interrupted} of {KILLS} runs killed; each resumed to the same bytes')
@@ -110,7 +110,7 @@ class Kill(Case):
         said = [line for line in stderr.splitlines() if 'snapshots:' not in line and line]
         self.assertEqual(len(said), 1, stderr)
         self.assertIn(text, said[0])
-        self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f], [])
+        self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
 
     def test_full_disk(self):
         """Full while a snapshot is written, and while the model is: the previous model is untouched; then it goes on."""
@@ -118,7 +118,7 @@ class Kill(Case):
         right = self.content()
         for name in glob.glob(self.path('m.h5.snapshots', '*.h5'))[::2]:
             os.remove(name)
-        self.refused(self.limited(32), 'm.h5 could not be written to its end (File too large): is the disk full?')
+        self.refused(self.limited(32), 'm.h5.candidate could not be written to its end (File too large): is the disk full?')
         self.assertEqual(self.content(), right, 'the previous model was touched')
         shutil.rmtree(self.path('m.h5.snapshots'))
         self.refused(self.limited(4), '.h5 could not be written to its end (File too large): is the disk full?')
@@ -141,7 +141,7 @@ class Kill(Case):
                 self.assertNotEqual(run.returncode, 0)
                 self.assertIn(text, run.stderr)
                 self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
-                self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f], [])
+                self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
 
     def test_vanishing(self):
         """The snapshot folder goes while training runs: one line, no model."""
