@@ -9,7 +9,7 @@ typedef struct _n_HycoH5 *HycoH5;
 
 /* Creates PATH.partial; HycoH5Close(commit) renames it to `path`, HycoH5Close(no commit) removes it. */
 PetscErrorCode HycoH5Create(const char path[], HycoH5 *file);
-/* Opens for reading. */
+/* Opens for reading: refused where a seal does not match, or has been lost. */
 PetscErrorCode HycoH5Open(const char path[], HycoH5 *file);
 PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit);
 
@@ -22,7 +22,7 @@ PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[]
 PetscBool HycoH5Has(HycoH5 file, const char name[]);
 /* Size of a dataset. */
 PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols);
-/* Reads a dataset whose size must be rows x cols, into the caller's memory. */
+/* Reads a dataset whose size must be rows x cols, into the caller's memory; its values must be finite. */
 PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, PetscReal *data);
 /* The same into new memory; a size given as -1 is taken from the file. Integers must lie in [lo, hi]. */
 PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols, PetscReal **data);

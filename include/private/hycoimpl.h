@@ -115,6 +115,12 @@ PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin);
     PetscCall(logged_);                                                                                                \
   } while (0)
 
+/* The seal of a file with these bytes, to be appended to them. */
+#define HYCO_SEAL 24
+void HycoSealMake(const void *data, size_t bytes, unsigned char seal[HYCO_SEAL]);
+/* Size of a file, and whether it has a seal; fails when it has one and its bytes are not the sealed ones. */
+PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed);
+
 /* Seconds since the first call, on this rank's clock. */
 PetscReal HycoNow(void);
 

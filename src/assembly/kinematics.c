@@ -1,6 +1,21 @@
 /* Jacobians of cells and facets. */
 #include "kinematics.h"
 
+/* Of the map from the reference cell, at a quadrature point. */
+static PetscReal Determinant(HycoFE fe, const HycoElement *el, const PetscInt node[], PetscInt q)
+{
+  PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+  for (PetscInt c = 0; c < el->dim; c++) {
+    for (PetscInt d = 0; d < el->dim; d++) {
+      J[c][d] = 0;
+      for (PetscInt a = 0; a < el->nv; a++) J[c][d] += fe->X[3 * node[a] + c] * el->dN[q][a][d];
+    }
+  }
+  return J[0][0] * (J[1][1] * J[2][2] - J[1][2] * J[2][1]) - J[0][1] * (J[1][0] * J[2][2] - J[1][2] * J[2][0]) +
+         J[0][2] * (J[1][0] * J[2][1] - J[1][1] * J[2][0]);
+}
+
 PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal g[8][3],
                              PetscReal *weight)
 {
@@ -27,6 +42,10 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   }
   det = J[0][0] * inv[0][0] + J[0][1] * inv[1][0] + J[0][2] * inv[2][0];
   HycoCheck(PetscAbsReal(det) > 1e-14 * size, "cell %d is degenerate: its volume vanishes at a quadrature point",
+            (int)fe->mesh->cell_id[cell]);
+  /* either sign will do, as files number cells both ways round; but the same in all of the cell */
+  HycoCheck(!q || el->nv == dim + 1 || (det > 0) == (Determinant(fe, el, node, 0) > 0),
+            "cell %d is inverted: its volume has both signs; is its boundary folded, are its nodes in gmsh's order?",
             (int)fe->mesh->cell_id[cell]);
   for (PetscInt a = 0; a < el->nv; a++) {
     for (PetscInt c = 0; c < 3; c++) {

@@ -177,7 +177,7 @@ static PetscErrorCode Finish(Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
+static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
 {
   PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
   PetscBool done;
@@ -190,7 +190,18 @@ PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
     PetscCall(HycoFEElementStiffness(fe, e, Ke));
     PetscCall(AddElement(fe, e, Ke, K));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The end of an assembly is collective: a rank that found an error takes part in it, or the others would wait. */
+PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = AddStiffness(fe, K);
   PetscCall(Finish(K));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,63 +1,124 @@
-/* HDF5 on one process. */
+/*
+  HDF5 on one process. What is written is made in memory and goes to the disk in one piece, sealed: HDF5 itself, when a
+  disk is full, can neither finish a file nor close it.
+*/
 #include <hycoh5.h>
+#include <errno.h>
 #include <hdf5.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
 struct _n_HycoH5 {
-  hid_t id;
+  hid_t id, access; /* the file; how datasets are opened */
+  FILE *out;        /* PATH.partial while writing, else NULL */
+  size_t size;      /* of the file that is read */
   char path[PETSC_MAX_PATH_LEN], partial[PETSC_MAX_PATH_LEN + 16];
-  PetscBool writing;
 };
 
-/* The largest dataset that the library writes or believes: 2^40 items. */
-#define HYCO_H5_ITEMS ((hsize_t)1 << 40)
+/* A dataset that says that the file ends with a seal: one that has lost it is damaged, not old. */
+#define HYCO_H5_SEALED "sealed"
 
-PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
+/* A file may not send its reader to another one. */
+static herr_t RefuseLink(const char *parent_file, const char *parent_group, const char *child_file,
+                         const char *child_object, unsigned *flags, hid_t access, void *ctx)
+{
+  (void)parent_file, (void)parent_group, (void)child_file, (void)child_object, (void)flags, (void)access, (void)ctx;
+  return -1;
+}
+
+static PetscErrorCode New(const char path[], HycoH5 *file)
 {
   HycoH5 f;
 
   PetscFunctionBegin;
+  HycoCheck(strlen(path) < PETSC_MAX_PATH_LEN, "the file name %.40s... is too long", path);
   PetscCall(PetscNew(&f));
-  f->writing = PETSC_TRUE;
   PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
-  PetscCall(PetscSNPrintf(f->partial, sizeof(f->partial), "%s.partial", path));
+  snprintf(f->partial, sizeof(f->partial), "%s.partial", path);
   H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-  f->id = H5Fcreate(f->partial, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-  if (f->id < 0) {
-    PetscCall(PetscFree(f));
+  f->access = H5Pcreate(H5P_DATASET_ACCESS);
+  H5Pset_elink_cb(f->access, RefuseLink, NULL);
+  *file = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Free(HycoH5 *file)
+{
+  PetscFunctionBegin;
+  H5Pclose((*file)->access);
+  PetscCall(PetscFree(*file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
+{
+  const PetscInt yes = 1;
+  hid_t access;
+  HycoH5 f;
+
+  PetscFunctionBegin;
+  PetscCall(New(path, &f));
+  f->out = fopen(f->partial, "wb");
+  if (!f->out) {
+    PetscCall(Free(&f));
     HycoFail("%s cannot be written: is there such a folder, may you write there, is there room?", path);
   }
+  access = H5Pcreate(H5P_FILE_ACCESS);
+  H5Pset_fapl_core(access, (size_t)1 << 18, 0);
+  f->id = H5Fcreate(f->partial, H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  H5Pclose(access);
+  PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 does not make a file in memory");
   *file = f;
+  PetscCall(HycoH5WriteInt(f, HYCO_H5_SEALED, 1, 1, &yes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
 {
   HycoH5 f;
-  FILE *probe;
+  hid_t access;
+  size_t size;
+  PetscBool sealed;
 
   PetscFunctionBegin;
-  probe = fopen(path, "rb");
-  HycoCheck(probe, "%s cannot be opened: no such file, or not readable", path);
-  fclose(probe);
-  PetscCall(PetscNew(&f));
-  PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
-  H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-  {
-    hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-
-    H5Pset_fclose_degree(access, H5F_CLOSE_STRONG); /* closing the file closes what a refusal left open in it */
-    f->id = H5Fopen(path, H5F_ACC_RDONLY, access);
-    H5Pclose(access);
-  }
+  PetscCall(HycoSealCheck(path, &size, &sealed));
+  PetscCall(New(path, &f));
+  f->size = size;
+  access = H5Pcreate(H5P_FILE_ACCESS);
+  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG); /* closing the file closes what a refusal left open in it */
+  f->id = H5Fopen(path, H5F_ACC_RDONLY, access);
+  H5Pclose(access);
   if (f->id < 0) {
-    PetscCall(PetscFree(f));
+    PetscCall(Free(&f));
     HycoFail("%s is no HDF5 file, or it is damaged; if it is a snapshot, remove it and run again", path);
+  }
+  if (!sealed && HycoH5Has(f, HYCO_H5_SEALED)) {
+    PetscCall(HycoH5Close(&f, PETSC_FALSE));
+    HycoFail("%s is damaged: its end is missing; if it is a snapshot, remove it and run again", path);
   }
   *file = f;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The file in memory, its seal behind it, to the disk and under its name. Returns 0, or errno. */
+static int Commit(HycoH5 f)
+{
+  unsigned char seal[HYCO_SEAL], *image = NULL;
+  ssize_t bytes = H5Fflush(f->id, H5F_SCOPE_GLOBAL) < 0 ? -1 : H5Fget_file_image(f->id, NULL, 0);
+  int failed;
+
+  if (bytes < 0 || PetscMalloc1(bytes, &image)) return ENOMEM;
+  failed = H5Fget_file_image(f->id, image, (size_t)bytes) < 0 ? ENOMEM : 0;
+  if (!failed) {
+    HycoSealMake(image, (size_t)bytes, seal);
+    errno = 0;
+    if (fwrite(image, 1, (size_t)bytes, f->out) != (size_t)bytes || fwrite(seal, 1, HYCO_SEAL, f->out) != HYCO_SEAL ||
+        fflush(f->out) != 0 || fsync(fileno(f->out)) != 0 || rename(f->partial, f->path) != 0)
+      failed = errno ? errno : EIO;
+  }
+  (void)!PetscFree(image);
+  return failed;
 }
 
 PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
@@ -69,34 +130,37 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
   *file = NULL;
-  if (f->writing && H5Fflush(f->id, H5F_SCOPE_GLOBAL) < 0) failed = 1;
-  if (H5Fclose(f->id) < 0) failed = 1;
-  PetscCall(PetscStrncpy(path, f->path, sizeof(path)));
-  if (f->writing) {
-    if (commit && !failed && rename(f->partial, f->path) != 0) failed = 1;
+  if (f->out) {
+    if (commit) failed = Commit(f);
     if (!commit || failed) unlink(f->partial);
+    fclose(f->out);
   }
-  PetscCall(PetscFree(f));
-  HycoCheck(!failed || !commit, "%s could not be written to its end: is the disk full?", path);
+  H5Fclose(f->id);
+  PetscCall(PetscStrncpy(path, f->path, sizeof(path)));
+  PetscCall(Free(&f));
+  HycoCheck(!failed, "%s could not be written to its end (%s): is the disk full?", path, strerror(failed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, const void *data)
 {
   hsize_t dims[2] = {(hsize_t)rows, (hsize_t)cols};
-  hid_t space, links, set;
+  hid_t space, links, made, set;
   herr_t failed = 0;
 
   PetscFunctionBegin;
   space = H5Screate_simple(2, dims, NULL);
   links = H5Pcreate(H5P_LINK_CREATE);
   H5Pset_create_intermediate_group(links, 1);
-  set = H5Dcreate2(f->id, name, type, space, links, H5P_DEFAULT, H5P_DEFAULT);
+  made = H5Pcreate(H5P_DATASET_CREATE);
+  H5Pset_obj_track_times(made, 0); /* the same model is the same file, byte for byte */
+  set = H5Dcreate2(f->id, name, type, space, links, made, H5P_DEFAULT);
   if (set < 0 || (rows && cols && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)) failed = -1;
   if (set >= 0) H5Dclose(set);
+  H5Pclose(made);
   H5Pclose(links);
   H5Sclose(space);
-  HycoCheck(failed >= 0, "%s: writing %s failed: is the disk full?", f->path, name);
+  HycoCheck(failed >= 0, "%s: writing %s failed: is there memory?", f->path, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -121,15 +185,28 @@ PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the set's numbers stand in this very file, as they are: a filter would be code that the file names. */
+static PetscBool IsPlain(hid_t set)
+{
+  hid_t made = H5Dget_create_plist(set);
+  PetscBool plain;
+
+  plain = (PetscBool)(made >= 0 && H5Pget_external_count(made) == 0 && H5Pget_nfilters(made) == 0 &&
+                      H5Pget_layout(made) != H5D_VIRTUAL);
+  if (made >= 0) H5Pclose(made);
+  return plain;
+}
+
 /* Opens a two-dimensional dataset of the wanted class and gives its size. */
 static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, hid_t *set, hsize_t dims[2])
 {
+  const hsize_t most = PetscMin((hsize_t)PETSC_MAX_INT, (hsize_t)f->size);
   hid_t space, type;
   H5T_class_t class;
   int rank;
 
   PetscFunctionBegin;
-  *set = H5Dopen2(f->id, name, H5P_DEFAULT);
+  *set = H5Dopen2(f->id, name, f->access);
   HycoCheck(*set >= 0, "%s holds no %s: it was not written by this version of hyco, or is damaged", f->path, name);
   space = H5Dget_space(*set);
   type = H5Dget_type(*set);
@@ -139,8 +216,8 @@ static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, h
   if (space >= 0) H5Sclose(space);
   if (type >= 0) H5Tclose(type);
   /* What the set claims must lie in the file: a damaged size must not become a wild allocation. */
-  if (rank != 2 || class != wanted || dims[0] > HYCO_H5_ITEMS || dims[1] > HYCO_H5_ITEMS ||
-      dims[0] * dims[1] > (hsize_t)PETSC_MAX_INT ||
+  if (rank != 2 || class != wanted || !IsPlain(*set) || dims[0] > most || dims[1] > most ||
+      (dims[1] && dims[0] > most / dims[1]) ||
       H5Dget_storage_size(*set) < dims[0] * dims[1] * (wanted == H5T_FLOAT ? 8 : 1)) {
     H5Dclose(*set);
     HycoFail("%s: %s is damaged (its shape or type is not what hyco writes)", f->path, name);
@@ -169,7 +246,7 @@ static PetscErrorCode CheckSize(HycoH5 f, const char name[], const hsize_t dims[
 
 PetscBool HycoH5Has(HycoH5 file, const char name[])
 {
-  return (PetscBool)(H5Lexists(file->id, name, H5P_DEFAULT) > 0);
+  return (PetscBool)(H5Lexists(file->id, name, file->access) > 0);
 }
 
 PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols)
@@ -185,6 +262,15 @@ PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CheckFinite(HycoH5 f, const char name[], size_t n, const PetscReal data[])
+{
+  PetscFunctionBegin;
+  for (size_t k = 0; k < n; k++)
+    HycoCheck(!PetscIsInfOrNanReal(data[k]), "%s: %s holds a value that is not finite: the file is damaged", f->path,
+              name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, PetscReal *data)
 {
   hid_t set;
@@ -194,6 +280,7 @@ PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, Pet
   PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
   PetscCall(CheckSize(file, name, dims, rows, cols));
   PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, data));
+  PetscCall(CheckFinite(file, name, dims[0] * dims[1], data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -201,6 +288,7 @@ PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, Pe
 {
   hid_t set;
   hsize_t dims[2];
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
@@ -209,12 +297,9 @@ PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, Pe
   *cols = (PetscInt)dims[1];
   PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
   PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, *data));
-  for (size_t k = 0; k < dims[0] * dims[1]; k++) {
-    if (PetscIsInfOrNanReal((*data)[k])) {
-      PetscCall(PetscFree(*data));
-      HycoFail("%s: %s holds a value that is not finite: the file is damaged", file->path, name);
-    }
-  }
+  ierr = CheckFinite(file, name, dims[0] * dims[1], *data);
+  if (ierr) PetscCall(PetscFree(*data));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -129,12 +129,13 @@ int main(int argc, char **argv)
 
   if (answer >= 0) return answer;
   setenv("OPENBLAS_NUM_THREADS", "1", 0);
-  PetscPushErrorHandler(KeepMessage, NULL);
   if (HycoInitialize(&argc, &argv)) {
-    fprintf(stderr, "hyco: error: %s\n", message[0] ? message : "PETSc does not start");
+    fprintf(stderr, "hyco: error: PETSc does not start\n");
     return 1;
   }
-  signal(SIGPIPE, SIG_IGN); /* "hyco ... | head" is no error */
+  PetscPushErrorHandler(KeepMessage, NULL); /* after: PETSc's books of memory (-malloc_dump) begin with it */
+  signal(SIGPIPE, SIG_IGN);                 /* "hyco ... | head" is no error */
+  signal(SIGXFSZ, SIG_IGN);                 /* a file beyond the limit is a failed write, which is told */
   ierr = Run(FindCommand(argv[1]), argc, argv);
   PetscPopErrorHandler();
   if (ierr) Stop();

@@ -4,20 +4,33 @@
 */
 #include <hycofomimpl.h>
 
+static PetscErrorCode CheckHeld(HycoFOM f, const HycoMotions *motions)
+{
+  const PetscInt m = f->pairs.n;
+  const size_t entries = (size_t)HycoPairsWidth(&f->pairs) * (size_t)f->fe->dim * (size_t)m;
+  PetscInt *start, *dof;
+  PetscReal *value, *gap;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc4(m + 1, &start, entries, &dof, entries, &value, m, &gap));
+  ierr = HycoContactRows(f->fe_whole, &f->pairs, start, dof, value, gap);
+  if (!ierr) ierr = HycoFECheckHeld(f->fe_whole, motions, m, start, dof, value);
+  PetscCall(PetscFree4(start, dof, value, gap));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Fails when neither support nor contact holds a motion. Rank 0. */
 static PetscErrorCode FindFree(HycoFOM f, HycoMotions *motions)
 {
-  const PetscInt m = f->pairs.n, entries = HycoPairsWidth(&f->pairs) * f->fe->dim * m;
-  PetscInt *start, *dof;
-  PetscReal *value, *gap;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoFEFreeMotions(f->fe_whole, motions));
-  if (!motions->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc4(m + 1, &start, entries, &dof, entries, &value, m, &gap));
-  PetscCall(HycoContactRows(f->fe_whole, &f->pairs, start, dof, value, gap));
-  PetscCall(HycoFECheckHeld(f->fe_whole, motions, m, start, dof, value));
-  PetscCall(PetscFree4(start, dof, value, gap));
+  ierr = motions->n ? CheckHeld(f, motions) : 0;
+  if (ierr) PetscCall(HycoMotionsDestroy(motions));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

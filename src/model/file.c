@@ -82,13 +82,13 @@ static PetscErrorCode LoadGroups(HycoH5 h, const char prefix[], HycoMesh m)
   PetscCall(Name(prefix, "group_dim", at));
   PetscCall(HycoH5LoadInt(h, at, 0, 3, &n, &one, &m->group_dim));
   PetscCall(PetscCalloc1(n + 1, &m->group_name));
+  m->n_groups = n;
   PetscCall(Name(prefix, "group_name", at));
   PetscCall(HycoH5LoadText(h, at, &names));
   for (word = strtok_r(names, "\n", &rest); word && g < n; word = strtok_r(NULL, "\n", &rest))
     PetscCall(PetscStrallocpy(word, &m->group_name[g++]));
   PetscCall(PetscFree(names));
   HycoCheck(g == n, "the model's group names are damaged");
-  m->n_groups = n;
   n++;
   PetscCall(Name(prefix, "group_start", at));
   PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &n, &one, &m->group_start));
@@ -210,8 +210,7 @@ static PetscErrorCode LoadWord(HycoH5 h, const char path[], const char name[], c
 
 static PetscErrorCode LoadType(HycoH5 h, HycoModel m)
 {
-  PetscInt word, one = 1;
-  PetscReal *misfit;
+  PetscInt word;
 
   PetscFunctionBegin;
   if (!HycoH5Has(h, "problem/type")) PetscFunctionReturn(PETSC_SUCCESS);
@@ -224,9 +223,7 @@ static PetscErrorCode LoadType(HycoH5 h, HycoModel m)
   HycoCheck(m->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);
   m->l_lambda = -1;
   PetscCall(HycoH5LoadReal(h, "problem/V_lambda", &m->l_lambda, &m->pairs.n, &m->V_lambda));
-  PetscCall(HycoH5LoadReal(h, "training/dual_misfit", &one, &one, &misfit));
-  m->dual_misfit = *misfit;
-  PetscCall(PetscFree(misfit));
+  PetscCall(HycoH5ReadReal(h, "training/dual_misfit", 1, 1, &m->dual_misfit));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -366,42 +363,49 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
 
 static PetscErrorCode LoadScan(HycoH5 h, HycoModel m)
 {
-  PetscInt one = 1, two = 2, n = m->scene->n_parameters, *counts;
-  PetscReal *smallest, *at;
+  PetscInt one = 1, two = 2, *counts;
 
   PetscFunctionBegin;
   if (!HycoH5Has(h, "training/scan_counts")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5LoadInt(h, "training/scan_counts", 0, PETSC_MAX_INT, &two, &one, &counts));
-  PetscCall(HycoH5LoadReal(h, "training/scan_smallest", &one, &one, &smallest));
-  PetscCall(HycoH5LoadReal(h, "training/scan_at", &n, &one, &at));
   m->scan.n = counts[0];
   m->scan.n_singular = counts[1];
-  m->scan.smallest = *smallest;
-  PetscCall(PetscArraycpy(m->scan.at, at, n));
   PetscCall(PetscFree(counts));
-  PetscCall(PetscFree(smallest));
-  PetscCall(PetscFree(at));
+  PetscCall(HycoH5ReadReal(h, "training/scan_smallest", 1, 1, &m->scan.smallest));
+  PetscCall(HycoH5ReadReal(h, "training/scan_at", m->scene->n_parameters, 1, m->scan.at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadSizes(HycoH5 h, HycoModel m)
+{
+  PetscInt one = 1, six = 6, *sizes, hybrid;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadInt(h, "problem/sizes", 0, PETSC_MAX_INT, &six, &one, &sizes));
+  m->whole_nodes = sizes[0];
+  m->whole_cells = sizes[1];
+  hybrid = sizes[2];
+  for (PetscInt k = 0; k < 3; k++) m->counts[k] = sizes[3 + k];
+  PetscCall(PetscFree(sizes));
+  HycoCheck(hybrid <= HYCO_HYBRID_ALL && m->whole_nodes > 0 && m->whole_cells > 0, "%s: problem/sizes is damaged",
+            m->path);
+  m->hybrid = (HycoHybrid)hybrid;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
 {
-  PetscInt one = 1, six = 6, n_dof, *sizes, three = 3, n_par;
-  PetscReal *numbers;
+  PetscInt one = 1, n_dof, n_par;
   char *text;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoH5LoadText(h, "problem/scene", &text));
-  PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene));
+  ierr = HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene);
   PetscCall(PetscFree(text));
+  PetscCall(ierr);
   PetscCall(LoadMesh(h, "mesh", m->scene->n_bodies, &m->mesh));
-  PetscCall(HycoH5LoadInt(h, "problem/sizes", 0, PETSC_MAX_INT, &six, &one, &sizes));
-  m->whole_nodes = sizes[0];
-  m->whole_cells = sizes[1];
-  m->hybrid = (HycoHybrid)sizes[2];
-  for (PetscInt k = 0; k < 3; k++) m->counts[k] = sizes[3 + k];
-  HycoCheck(sizes[2] <= HYCO_HYBRID_ALL && sizes[0] > 0 && sizes[1] > 0, "%s: problem/sizes is damaged", m->path);
-  PetscCall(PetscFree(sizes));
+  PetscCall(LoadSizes(h, m));
   PetscCall(HycoH5LoadInt(h, "mesh/node_whole", 0, m->whole_nodes - 1, &m->mesh->n_nodes, &one, &m->mesh->node_whole));
   PetscCall(HycoH5LoadInt(h, "mesh/cell_whole", 0, m->whole_cells - 1, &m->mesh->n_cells, &one, &m->mesh->cell_whole));
   n_dof = m->mesh->n_nodes * m->mesh->dim;
@@ -415,20 +419,14 @@ static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
   for (PetscInt k = 1; k < m->n_fe; k++)
     HycoCheck(m->fe_dof[k] > m->fe_dof[k - 1], "%s: problem/fe_dof is damaged", m->path);
   if (HycoH5Has(h, "problem/G")) {
-    PetscReal *ridge;
-
     PetscCall(HycoH5LoadReal(h, "problem/G", &m->l, &m->n_fe, &m->G));
-    PetscCall(HycoH5LoadReal(h, "problem/ridge", &one, &one, &ridge));
-    m->ridge = *ridge;
-    PetscCall(PetscFree(ridge));
+    PetscCall(HycoH5ReadReal(h, "problem/ridge", 1, 1, &m->ridge));
   }
   PetscCall(LoadType(h, m));
   PetscCall(HycoH5LoadReal(h, "reconstruction/S_lambda", &m->n_dual, &m->pairs.n, &m->S_lambda));
   n_par = m->scene->n_parameters;
   PetscCall(HycoH5LoadReal(h, "training/points", &m->n_points, &n_par, &m->points));
-  PetscCall(HycoH5LoadReal(h, "training/numbers", &three, &one, &numbers));
-  PetscCall(PetscArraycpy(m->numbers, numbers, 3));
-  PetscCall(PetscFree(numbers));
+  PetscCall(HycoH5ReadReal(h, "training/numbers", 3, 1, m->numbers));
   PetscCall(LoadScan(h, m));
   PetscCall(LoadTrust(h, m));
   PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
@@ -453,6 +451,8 @@ PetscErrorCode HycoModelLoad(const char path[], HycoModel *model)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  PetscCheck(path && model, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
+             "HycoModelLoad: the path or the handle's address is NULL");
   *model = NULL;
   PetscCall(HycoH5Open(path, &h));
   PetscCall(HycoModelCreate(&m));
@@ -470,21 +470,31 @@ PetscErrorCode HycoModelLoad(const char path[], HycoModel *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoModelLoadWhole(HycoModel m)
+static PetscErrorCode ReadWhole(HycoH5 h, HycoModel m)
 {
-  HycoH5 h;
   PetscInt n_dof;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5Open(m->path, &h));
   PetscCall(LoadMesh(h, "whole", m->scene->n_bodies, &m->whole));
   n_dof = m->whole->n_nodes * m->whole->dim;
   PetscCall(HycoH5LoadReal(h, "whole/V", &n_dof, &m->l, &m->V_whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadWhole(HycoModel m)
+{
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Open(m->path, &h));
+  ierr = ReadWhole(h, m);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
   HycoCheck(m->whole->n_nodes == m->whole_nodes && m->whole->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
             m->path);
   PetscCall(HycoFECreate(m->scene, m->whole, &m->fe_whole));
-  PetscCall(PetscMalloc1(n_dof, &m->U_whole));
+  PetscCall(PetscMalloc1((size_t)m->whole->n_nodes * (size_t)m->whole->dim, &m->U_whole));
   /* the contacts again, in the whole mesh's numbers */
   PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -509,6 +519,24 @@ PetscErrorCode HycoModelNote(const char path[], const char text[])
   PetscCall(PetscStrallocpy(text, &m->search));
   ierr = HycoModelRewrite(m, path);
   PetscCall(HycoModelDestroy(&m));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All of the whole mesh's part, or nothing: the next try begins anew. */
+PetscErrorCode HycoModelLoadWhole(HycoModel m)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = LoadWhole(m);
+  if (ierr) {
+    PetscCall(HycoFEDestroy(&m->fe_whole));
+    PetscCall(HycoPairsDestroy(&m->whole_pairs));
+    if (m->whole) PetscCall(HycoMeshDestroy(&m->whole));
+    PetscCall(PetscFree(m->V_whole));
+    PetscCall(PetscFree(m->U_whole));
+  }
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -111,6 +111,7 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
 
   PetscFunctionBegin;
   if (m->ready) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoModelReset(m)); /* what a refusal has left half made */
   if (m->type == HYCO_MODEL_CONDENSED) {
     PetscCall(HycoCondensedSetUp(m));
     PetscFunctionReturn(PETSC_SUCCESS);

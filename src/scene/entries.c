@@ -4,6 +4,7 @@
 */
 #include <hycosceneimpl.h>
 #include "entries.h"
+#include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 
@@ -89,6 +90,23 @@ static int CompareEntries(const void *a, const void *b)
   return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
+/* Every entry has been asked for by its key, but those of no section and those whose name has a blank. */
+static PetscErrorCode RefuseOthers(PetscOptions options)
+{
+  PetscInt n;
+  char **names, **values, name[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsLeftGet(options, &n, &names, &values));
+  if (n) snprintf(name, sizeof(name), "%.200s", names[0]);
+  PetscCall(PetscOptionsLeftRestore(options, &n, &names, &values));
+  HycoCheck(!name[0],
+            "the scene's entry \"%s\" is unknown; an entry stands under scene, parameter, body, fixed, pressure, "
+            "traction, force, contact or hyco, and its name has no blank",
+            name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoEntriesList(HycoScene scene)
 {
   PetscInt n;
@@ -97,10 +115,15 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
   PetscFunctionBegin;
   PetscCall(ListKeys(scene->options, PETSC_FALSE, &n, &keys));
   qsort(keys, (size_t)n, sizeof(*keys), CompareEntries);
-  PetscCall(PetscMalloc1(n, &scene->value));
+  PetscCall(PetscCalloc1(n, &scene->value));
   for (PetscInt k = 0; k < n; k++) PetscCall(GetLong(scene->options, keys[k], &scene->value[k]));
   scene->n_entries = n;
   scene->key = keys;
+  for (PetscInt k = 0; k < n; k++) { /* a model file carries key, tab, value, end of line */
+    HycoCheck(!keys[k][strcspn(keys[k], "\t\r\n\f\v")], "the scene's entry \"%.200s\" has a blank in its name",
+              keys[k]);
+  }
+  PetscCall(RefuseOthers(scene->options));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,12 +151,26 @@ static PetscErrorCode FindFile(const char path[], char file[PETSC_MAX_PATH_LEN],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* libyaml and PETSc do not agree on what ends at a byte 0. */
+static PetscBool IsText(const char file[])
+{
+  FILE *f = fopen(file, "rb");
+  int byte;
+
+  if (!f) return PETSC_FALSE;
+  while ((byte = fgetc(f)) > 0)
+    ;
+  fclose(f);
+  return (PetscBool)(byte == EOF);
+}
+
 static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
 {
   char message[HYCO_LINE];
   PetscErrorCode caught;
 
   PetscFunctionBegin;
+  HycoCheck(IsText(file), "%s is not YAML that hyco reads: it has a byte 0, or cannot be read", file);
   PetscCall(HycoCatchBegin());
   caught = PetscOptionsInsertFileYAML(PETSC_COMM_SELF, options, file, PETSC_TRUE);
   PetscCall(HycoCatchEnd(caught, message));

@@ -3,6 +3,7 @@
   comes out has finite coordinates, cells of one type, each in one body, facets that bound exactly one cell.
 */
 #include <hycomesh.h>
+#include "msh.h"
 #include <gmshc.h>
 #include <stdio.h>
 #include <string.h>
@@ -28,7 +29,9 @@ typedef struct {
   Group *group;
   size_t *tag; /* ascending tags of the kept nodes */
   PetscInt n_tags;
-  PetscInt *last, *before; /* of each cell its last facet, of each facet the cell's one before, or -1 */
+  PetscInt *last, *before;  /* of each cell its last facet, of each facet the cell's one before, or -1 */
+  PetscInt *start, *around; /* the cells around each node */
+  size_t *node;             /* node tags of the cells */
 } Reader;
 
 static PetscErrorCode CheckGmsh(int ierr, const char path[])
@@ -45,15 +48,11 @@ static PetscErrorCode CheckGmsh(int ierr, const char path[])
   HycoFail("the mesh %s cannot be read: %s", path, line);
 }
 
-/* Appends the elements of one entity to its group. */
-static PetscErrorCode ReadEntity(const char path[], Group *g, int entity)
+/* Appends elements of the types to the group. */
+static PetscErrorCode AddElements(const char path[], Group *g, size_t n_types, const int types[], size_t *const ids[],
+                                  const size_t n_ids[], size_t *const nodes[], const size_t n_nodes[])
 {
-  int *types = NULL, ierr;
-  size_t n_types = 0, **ids = NULL, *n_ids = NULL, nn = 0, **nodes = NULL, *n_nodes = NULL, mm = 0;
-
   PetscFunctionBegin;
-  gmshModelMeshGetElements(&types, &n_types, &ids, &n_ids, &nn, &nodes, &n_nodes, &mm, g->dim, entity, &ierr);
-  PetscCall(CheckGmsh(ierr, path));
   for (size_t t = 0; t < n_types; t++) {
     PetscInt nv = n_ids[t] ? (PetscInt)(n_nodes[t] / n_ids[t]) : 0;
     int known = types[t] == 15;
@@ -67,12 +66,27 @@ static PetscErrorCode ReadEntity(const char path[], Group *g, int entity)
     HycoCheck(!g->n || g->nv == nv, "%s: group \"%s\" mixes elements of %d and %d nodes; hyco takes one type per mesh",
               path, g->name, (int)g->nv, (int)nv);
     g->nv = nv;
-    PetscCall(PetscRealloc((size_t)(g->n + (PetscInt)n_ids[t]) * sizeof(size_t), &g->id));
-    PetscCall(PetscRealloc((size_t)(g->n + (PetscInt)n_ids[t]) * (size_t)nv * sizeof(size_t), &g->node));
+    HycoCheck((size_t)g->n + n_ids[t] <= (size_t)PETSC_MAX_INT / 8, "%s: group \"%s\" has too many elements", path,
+              g->name);
+    PetscCall(PetscRealloc(((size_t)g->n + n_ids[t]) * sizeof(size_t), &g->id));
+    PetscCall(PetscRealloc(((size_t)g->n + n_ids[t]) * (size_t)nv * sizeof(size_t), &g->node));
     PetscCall(PetscArraycpy(g->id + g->n, ids[t], n_ids[t]));
-    PetscCall(PetscArraycpy(g->node + g->n * nv, nodes[t], n_nodes[t]));
+    PetscCall(PetscArraycpy(g->node + (size_t)g->n * (size_t)nv, nodes[t], n_nodes[t]));
     g->n += (PetscInt)n_ids[t];
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends the elements of one entity to its group. */
+static PetscErrorCode ReadEntity(const char path[], Group *g, int entity)
+{
+  int *types = NULL, ierr;
+  size_t n_types = 0, **ids = NULL, *n_ids = NULL, nn = 0, **nodes = NULL, *n_nodes = NULL, mm = 0;
+  PetscErrorCode refused = 0;
+
+  PetscFunctionBegin;
+  gmshModelMeshGetElements(&types, &n_types, &ids, &n_ids, &nn, &nodes, &n_nodes, &mm, g->dim, entity, &ierr);
+  if (!ierr) refused = AddElements(path, g, n_types, types, ids, n_ids, nodes, n_nodes);
   for (size_t t = 0; t < nn; t++) gmshFree(ids[t]);
   for (size_t t = 0; t < mm; t++) gmshFree(nodes[t]);
   gmshFree(ids);
@@ -80,6 +94,8 @@ static PetscErrorCode ReadEntity(const char path[], Group *g, int entity)
   gmshFree(nodes);
   gmshFree(n_nodes);
   gmshFree(types);
+  PetscCall(CheckGmsh(ierr, path));
+  PetscCall(refused);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,6 +104,7 @@ static PetscErrorCode ReadGroup(HycoScene scene, Group *g)
   char *name = NULL;
   int *entities = NULL, ierr;
   size_t n_entities = 0;
+  PetscErrorCode refused = 0;
 
   PetscFunctionBegin;
   gmshModelGetPhysicalName(g->dim, g->tag, &name, &ierr);
@@ -102,8 +119,9 @@ static PetscErrorCode ReadGroup(HycoScene scene, Group *g)
   }
   gmshModelGetEntitiesForPhysicalGroup(g->dim, g->tag, &entities, &n_entities, &ierr);
   PetscCall(CheckGmsh(ierr, scene->mesh_path));
-  for (size_t k = 0; k < n_entities; k++) PetscCall(ReadEntity(scene->mesh_path, g, entities[k]));
+  for (size_t k = 0; k < n_entities && !refused; k++) refused = ReadEntity(scene->mesh_path, g, entities[k]);
   gmshFree(entities);
+  PetscCall(refused);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -182,46 +200,49 @@ static PetscInt FindTag(const Reader *r, size_t tag)
   return lo < r->n_tags && r->tag[lo] == tag ? lo : -1;
 }
 
+/* The cells in the order of their tags. */
+static PetscErrorCode PlaceCells(HycoScene scene, HycoMesh m, const Tagged order[], size_t *const source[],
+                                 const PetscInt body[], size_t node[])
+{
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    HycoCheck(!e || order[e].tag != order[e - 1].tag, "%s: cell %ld lies in two bodies; each cell must lie in one",
+              scene->mesh_path, (long)order[e].tag);
+    HycoCheck(order[e].tag < PETSC_MAX_INT, "%s: the cell tag %ld is too large", scene->mesh_path, (long)order[e].tag);
+    m->cell_id[e] = (PetscInt)order[e].tag;
+    m->cell_body[e] = body[order[e].place];
+    PetscCall(PetscArraycpy(node + (size_t)e * (size_t)m->nv, source[order[e].place], m->nv));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Cells, ascending by tag, with node tags for now (in `node`). */
 static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m, size_t **node)
 {
   Tagged *order;
   size_t **source;
-  PetscInt n = 0;
+  PetscInt n = 0, *body;
+  PetscErrorCode refused;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(m->n_cells, &order, m->n_cells, &source));
-  PetscCall(PetscMalloc1(m->n_cells * m->nv, node));
+  PetscCall(PetscMalloc1((size_t)m->n_cells * (size_t)m->nv, node));
   PetscCall(PetscMalloc1(m->n_cells, &m->cell_id));
   PetscCall(PetscMalloc1(m->n_cells, &m->cell_body));
+  PetscCall(PetscMalloc3(m->n_cells, &order, m->n_cells, &source, m->n_cells, &body));
   for (PetscInt k = 0; k < r->n_groups; k++) {
     Group *g = &r->group[k];
 
     for (PetscInt e = 0; g->body >= 0 && e < g->n; e++) {
-      source[n] = g->node + e * m->nv;
+      source[n] = g->node + (size_t)e * (size_t)m->nv;
       order[n].tag = g->id[e];
       order[n].place = n;
-      m->cell_body[n] = g->body;
-      n++;
+      body[n++] = g->body;
     }
   }
-  {
-    PetscInt *body;
-
-    HycoDuplicate(n, m->cell_body, &body);
-    qsort(order, (size_t)n, sizeof(*order), CompareTagged);
-    for (PetscInt e = 0; e < n; e++) {
-      HycoCheck(!e || order[e].tag != order[e - 1].tag, "%s: cell %ld lies in two bodies; each cell must lie in one",
-                scene->mesh_path, (long)order[e].tag);
-      HycoCheck(order[e].tag < PETSC_MAX_INT, "%s: the cell tag %ld is too large", scene->mesh_path,
-                (long)order[e].tag);
-      m->cell_id[e] = (PetscInt)order[e].tag;
-      m->cell_body[e] = body[order[e].place];
-      PetscCall(PetscArraycpy(*node + e * m->nv, source[order[e].place], m->nv));
-    }
-    PetscCall(PetscFree(body));
-  }
-  PetscCall(PetscFree2(order, source));
+  qsort(order, (size_t)n, sizeof(*order), CompareTagged);
+  refused = PlaceCells(scene, m, order, source, body, *node);
+  PetscCall(PetscFree3(order, source, body));
+  PetscCall(refused);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -232,29 +253,15 @@ static int CompareSize(const void *a, const void *b)
   return (ta > tb) - (ta < tb);
 }
 
-/* Nodes of the cells, ascending by tag, and the cells' node indices. */
-static PetscErrorCode CollectNodes(HycoScene scene, Reader *r, HycoMesh m, const size_t node[])
+/* Takes the kept ones of the file's nodes. */
+static PetscErrorCode PlaceNodes(HycoScene scene, Reader *r, HycoMesh m, size_t n, const size_t tags[],
+                                 const double xyz[])
 {
-  const PetscInt total = m->n_cells * m->nv;
-  size_t *tags = NULL, n_file = 0, n_xyz = 0, n_par = 0;
-  double *xyz = NULL, *par = NULL;
-  int ierr;
   PetscInt found = 0;
 
   PetscFunctionBegin;
-  HycoDuplicate(total, node, &r->tag);
-  qsort(r->tag, (size_t)total, sizeof(size_t), CompareSize);
-  for (PetscInt k = 0; k < total; k++) {
-    if (!k || r->tag[k] != r->tag[k - 1]) r->tag[r->n_tags++] = r->tag[k];
-  }
-  m->n_nodes = r->n_tags;
-  PetscCall(PetscMalloc1(m->n_nodes * 3, &m->xyz));
-  PetscCall(PetscMalloc1(m->n_nodes, &m->node_id));
-  PetscCall(PetscMalloc1(total, &m->cells));
-  gmshModelMeshGetNodes(&tags, &n_file, &xyz, &n_xyz, &par, &n_par, -1, -1, 0, 0, &ierr);
-  PetscCall(CheckGmsh(ierr, scene->mesh_path));
   for (PetscInt i = 0; i < m->n_nodes; i++) m->node_id[i] = -1;
-  for (size_t k = 0; k < n_file; k++) {
+  for (size_t k = 0; k < n; k++) {
     const PetscInt i = FindTag(r, tags[k]);
 
     if (i < 0) continue;
@@ -268,12 +275,40 @@ static PetscErrorCode CollectNodes(HycoScene scene, Reader *r, HycoMesh m, const
                 scene->mesh_path, (long)tags[k]);
     }
   }
+  HycoCheck(found == m->n_nodes, "%s: its cells name %d nodes that the file does not define", scene->mesh_path,
+            (int)(m->n_nodes - found));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes of the cells, ascending by tag, and the cells' node indices. */
+static PetscErrorCode CollectNodes(HycoScene scene, Reader *r, HycoMesh m, const size_t node[])
+{
+  const size_t total = (size_t)m->n_cells * (size_t)m->nv;
+  size_t *tags = NULL, n_file = 0, n_xyz = 0, n_par = 0;
+  double *xyz = NULL, *par = NULL;
+  int ierr;
+  PetscErrorCode refused = 0;
+
+  PetscFunctionBegin;
+  HycoCheck(total <= (size_t)PETSC_MAX_INT, "%s: %ld nodes of cells are more than this PETSc's integers count",
+            scene->mesh_path, (long)total);
+  HycoDuplicate(total, node, &r->tag);
+  qsort(r->tag, total, sizeof(size_t), CompareSize);
+  for (size_t k = 0; k < total; k++) {
+    if (!k || r->tag[k] != r->tag[k - 1]) r->tag[r->n_tags++] = r->tag[k];
+  }
+  m->n_nodes = r->n_tags;
+  PetscCall(PetscMalloc1((size_t)m->n_nodes * 3, &m->xyz));
+  PetscCall(PetscMalloc1(m->n_nodes, &m->node_id));
+  PetscCall(PetscMalloc1(total, &m->cells));
+  gmshModelMeshGetNodes(&tags, &n_file, &xyz, &n_xyz, &par, &n_par, -1, -1, 0, 0, &ierr);
+  if (!ierr) refused = PlaceNodes(scene, r, m, n_file, tags, xyz);
   gmshFree(tags);
   gmshFree(xyz);
   gmshFree(par);
-  HycoCheck(found == m->n_nodes, "%s: its cells name %d nodes that the file does not define", scene->mesh_path,
-            (int)(m->n_nodes - found));
-  for (PetscInt k = 0; k < total; k++) m->cells[k] = FindTag(r, node[k]);
+  PetscCall(CheckGmsh(ierr, scene->mesh_path));
+  PetscCall(refused);
+  for (size_t k = 0; k < total; k++) m->cells[k] = FindTag(r, node[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -408,7 +443,7 @@ static PetscErrorCode AddMembers(Reader *r, HycoMesh m, Group *g, PetscInt group
 
 static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
 {
-  PetscInt *start, *around, n_facets = 0, n_members = 0, n_cells = 0, n_node = 0, n_cell = 0;
+  PetscInt n_facets = 0, n_members = 0, n_cells = 0, n_node = 0, n_cell = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < r->n_groups; k++) {
@@ -429,15 +464,12 @@ static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(PetscMalloc1(n_facets, &r->before));
   PetscCall(PetscMalloc1(m->n_cells, &r->last));
   for (PetscInt e = 0; e < m->n_cells; e++) r->last[e] = -1;
-  PetscCall(HycoMeshNodeCells(m, &start, &around));
   for (PetscInt k = 0; k < r->n_groups; k++) {
     PetscCall(PetscStrallocpy(r->group[k].name, &m->group_name[k]));
     m->group_dim[k] = r->group[k].dim;
-    PetscCall(AddFacets(scene, r, m, &r->group[k], k, start, around));
-    PetscCall(AddMembers(r, m, &r->group[k], k, start, around, &n_node, &n_cell));
+    PetscCall(AddFacets(scene, r, m, &r->group[k], k, r->start, r->around));
+    PetscCall(AddMembers(r, m, &r->group[k], k, r->start, r->around, &n_node, &n_cell));
   }
-  PetscCall(PetscFree(start));
-  PetscCall(PetscFree(around));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -456,12 +488,9 @@ static PetscErrorCode CheckLoads(HycoScene scene, Reader *r)
 }
 
 /* Two cells with the same nodes: a cell saved once per group, as format 2.2 does. */
-static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m)
+static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m, const PetscInt start[], const PetscInt around[])
 {
-  PetscInt *start, *around;
-
   PetscFunctionBegin;
-  PetscCall(HycoMeshNodeCells(m, &start, &around));
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt *cell = m->cells + e * m->nv;
 
@@ -472,8 +501,6 @@ static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m)
                 scene->mesh_path, (int)m->cell_id[around[k]], (int)m->cell_id[e]);
     }
   }
-  PetscCall(PetscFree(start));
-  PetscCall(PetscFree(around));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -525,17 +552,17 @@ static PetscErrorCode ReadGroups(HycoScene scene, Reader *r)
   PetscFunctionBegin;
   gmshModelGetPhysicalGroups(&dim_tags, &n, -1, &ierr);
   PetscCall(CheckGmsh(ierr, scene->mesh_path));
-  r->n_groups = (PetscInt)(n / 2);
-  HycoCheck(r->n_groups,
+  HycoCheck(n,
             "%s has no physical groups; name the bodies and surfaces in gmsh (Physical Volume, Physical Surface, ...)",
             scene->mesh_path);
+  r->n_groups = (PetscInt)(n / 2);
   PetscCall(PetscCalloc1(r->n_groups, &r->group));
   for (PetscInt k = 0; k < r->n_groups; k++) {
     r->group[k].dim = dim_tags[2 * k];
     r->group[k].tag = dim_tags[2 * k + 1];
-    PetscCall(ReadGroup(scene, &r->group[k]));
   }
   gmshFree(dim_tags);
+  for (PetscInt k = 0; k < r->n_groups; k++) PetscCall(ReadGroup(scene, &r->group[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -543,7 +570,6 @@ static PetscErrorCode ReadGroups(HycoScene scene, Reader *r)
 static PetscErrorCode ReadOpen(HycoScene scene, Reader *r, HycoMesh m)
 {
   int ierr;
-  size_t *node = NULL;
 
   PetscFunctionBegin;
   gmshOptionSetNumber("General.Terminal", 0, &ierr);
@@ -551,10 +577,10 @@ static PetscErrorCode ReadOpen(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(CheckGmsh(ierr, scene->mesh_path));
   PetscCall(ReadGroups(scene, r));
   PetscCall(CheckBodies(scene, r, m));
-  PetscCall(CollectCells(scene, r, m, &node));
-  PetscCall(CollectNodes(scene, r, m, node));
-  PetscCall(PetscFree(node));
-  PetscCall(CheckTwins(scene, m));
+  PetscCall(CollectCells(scene, r, m, &r->node));
+  PetscCall(CollectNodes(scene, r, m, r->node));
+  PetscCall(HycoMeshNodeCells(m, &r->start, &r->around));
+  PetscCall(CheckTwins(scene, m, r->start, r->around));
   PetscCall(CollectGroups(scene, r, m));
   PetscCall(CheckLoads(scene, r));
   PetscCall(SetNodeBodies(scene, m));
@@ -564,19 +590,9 @@ static PetscErrorCode ReadOpen(HycoScene scene, Reader *r, HycoMesh m)
 /* gmsh opens a path that does not exist without a word, and runs a .geo. */
 static PetscErrorCode CheckPath(HycoScene scene)
 {
-  const char *path = scene->mesh_path;
-  size_t n = strlen(path);
-  char head[12] = "";
-  FILE *file;
-
   PetscFunctionBegin;
-  HycoCheck(n, "the scene names no mesh; write scene: mesh: FILE.msh, or give -scene_mesh FILE.msh");
-  file = fopen(path, "rb");
-  HycoCheck(file, "the mesh %s cannot be opened; scripts/meshes makes the examples' meshes, gmsh -3 a .geo's", path);
-  n = fread(head, 1, 11, file);
-  fclose(file);
-  HycoCheck(n == 11 && strncmp(head, "$MeshFormat", 11) == 0, "%s is no gmsh mesh: it does not begin with $MeshFormat",
-            path);
+  HycoCheck(scene->mesh_path[0], "the scene names no mesh; write scene: mesh: FILE.msh, or give -scene_mesh FILE.msh");
+  PetscCall(HycoMshCheck(scene->mesh_path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -602,9 +618,12 @@ PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
   PetscCall(PetscFree(r.tag));
   PetscCall(PetscFree(r.last));
   PetscCall(PetscFree(r.before));
+  PetscCall(PetscFree(r.start));
+  PetscCall(PetscFree(r.around));
+  PetscCall(PetscFree(r.node));
+  if (!ierr) ierr = HycoMeshCheckGroups(m, scene);
   if (ierr) PetscCall(HycoMeshDestroy(&m));
   PetscCall(ierr);
-  PetscCall(HycoMeshCheckGroups(m, scene));
   *mesh = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

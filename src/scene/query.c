@@ -44,6 +44,7 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, "HycoSceneLoad()");
+  PetscCheck(mu || !n, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL, "the parameter values' address is NULL");
   if (n != scene->n_parameters) {
     char list[HYCO_LINE] = "none";
 

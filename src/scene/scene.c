@@ -85,22 +85,31 @@ static PetscErrorCode NewExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Two finite numbers with a comma between: PETSc's reader of arrays leaks where it refuses. */
+static PetscBool SplitRange(const char text[], PetscReal range[2])
+{
+  char *end;
+
+  range[0] = strtod(text, &end);
+  if (end == text) return PETSC_FALSE;
+  text = end + strspn(end, " ");
+  if (*text++ != ',') return PETSC_FALSE;
+  range[1] = strtod(text, &end);
+  if (end == text || end[strspn(end, " ")]) return PETSC_FALSE;
+  return (PetscBool)(!PetscIsInfOrNanReal(range[0]) && !PetscIsInfOrNanReal(range[1]) && range[0] <= range[1]);
+}
+
 static PetscErrorCode ReadRange(HycoScene s, PetscInt p)
 {
   char key[HYCO_LINE];
+  const char *text = NULL;
   PetscReal range[2];
-  PetscInt n = 2;
   PetscBool set;
-  PetscErrorCode caught;
-  char message[HYCO_LINE];
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(key, sizeof(key), "-parameter_%s_range", s->parameter[p]));
-  PetscCall(HycoCatchBegin());
-  caught = PetscOptionsGetRealArray(s->options, NULL, key, range, &n, &set);
-  PetscCall(HycoCatchEnd(caught, message));
-  HycoCheck(!caught && set && n == 2 && range[0] <= range[1] && !PetscIsInfOrNanReal(range[0]) &&
-                !PetscIsInfOrNanReal(range[1]),
+  PetscCall(PetscOptionsFindPair(s->options, NULL, key, &text, &set));
+  HycoCheck(set && text && SplitRange(text, range),
             "parameter %s: its range is missing or wrong; write parameter: %s: range: [lowest, highest]",
             s->parameter[p], s->parameter[p]);
   s->lo[p] = range[0];
@@ -413,16 +422,14 @@ PetscErrorCode HycoSceneToText(HycoScene scene, char **text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *scene)
+/* Cuts the text into keys and values. */
+static PetscErrorCode SplitText(char text[], PetscInt *lines, char *key[], char *value[])
 {
-  char *copy, *line, *rest, **key, **value;
-  PetscInt n = 0, lines = 1;
+  char *line, *rest;
+  PetscInt n = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscStrallocpy(text, &copy));
-  for (const char *c = text; *c; c++) lines += *c == '\n';
-  PetscCall(PetscMalloc2(lines, &key, lines, &value));
-  for (line = strtok_r(copy, "\n", &rest); line; line = strtok_r(NULL, "\n", &rest)) {
+  for (line = strtok_r(text, "\n", &rest); line; line = strtok_r(NULL, "\n", &rest)) {
     char *tab = strchr(line, '\t');
 
     HycoCheck(tab, "the model's scene text is damaged");
@@ -431,9 +438,26 @@ PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *sc
     value[n] = tab + 1;
     n++;
   }
-  PetscCall(HycoSceneFromEntries(comm, n, key, value, ".", scene));
+  *lines = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *scene)
+{
+  char *copy, **key, **value;
+  PetscInt lines = 1;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *scene = NULL;
+  PetscCall(PetscStrallocpy(text, &copy));
+  for (const char *c = text; *c; c++) lines += *c == '\n';
+  PetscCall(PetscMalloc2(lines, &key, lines, &value));
+  ierr = SplitText(copy, &lines, key, value);
+  if (!ierr) ierr = HycoSceneFromEntries(comm, lines, key, value, ".", scene);
   PetscCall(PetscFree2(key, value));
   PetscCall(PetscFree(copy));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,0 +1,246 @@
+/*
+  The C API used wrongly: every public call with NULL, after Destroy, with sizes that do not match; reused after an
+  error; two models at once; made and destroyed a thousand times without growth. Messages on every rank.
+*/
+#include "../unit/check.h"
+#include <hyco.h>
+#include <unistd.h>
+
+static char geo[PETSC_MAX_PATH_LEN], data[PETSC_MAX_PATH_LEN], rope[PETSC_MAX_PATH_LEN], hybrid[PETSC_MAX_PATH_LEN],
+    projection[PETSC_MAX_PATH_LEN];
+static const PetscReal inside[2] = {0.07, 0.17}, outside[2] = {0.04, 0.17};
+
+/* A handle that was destroyed is NULL, and NULL is refused by name. */
+static PetscErrorCode TestDestroyed(void)
+{
+  const char *title;
+  const PetscInt counts[2] = {2, 2};
+  HycoScene scene;
+  HycoSamples samples;
+  HycoFOM fom;
+  HycoModel model;
+  HycoSolver solver;
+  HycoSystem system;
+  HycoErrors errors;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
+  PetscCall(HycoModelLoad(hybrid, &model));
+  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSceneDestroy(&scene));
+  CHECK(!model && !fom && !samples && !scene, "Destroy must clear the handles");
+  PetscCall(HycoModelDestroy(&model)); /* twice */
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSceneDestroy(&scene));
+  CHECK_FAILS(HycoSceneGetTitle(scene, &title), "make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSceneView(scene, PETSC_VIEWER_STDOUT_SELF), "make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSamplesAddGrid(samples, counts, PETSC_FALSE), "make it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoSamplesAddPoint(samples, inside), "make it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoSamplesAddFile(samples, "p.csv"), "make it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoFOMGetSolver(fom, &solver), "make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMGetSystem(fom, &system), "make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMWrite(fom, "x.xdmf"), "make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMGetSolution(fom, NULL, NULL, NULL, NULL, NULL, NULL), "make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoModelGetScene(model, &scene), "make it by HycoModelLoad()");
+  CHECK_FAILS(HycoModelSetReconstruct(model, PETSC_TRUE), "make it by HycoModelLoad()");
+  CHECK_FAILS(HycoModelGetLambda(model, NULL, NULL, NULL, NULL), "make it by HycoModelLoad()");
+  CHECK_FAILS(HycoModelGetWholeU(model, NULL, NULL), "make it by HycoModelLoad()");
+  CHECK_FAILS(HycoModelWrite(model, "x.xdmf"), "make it by HycoModelLoad()");
+  CHECK_FAILS(HycoModelView(model, PETSC_VIEWER_STDOUT_SELF), "make it by HycoModelLoad()");
+  CHECK_FAILS(HycoModelCompare(model, fom, &errors), "make it by HycoFOMCreate()");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* NULL where an address is expected. */
+static PetscErrorCode TestNullPlaces(void)
+{
+  HycoScene scene = NULL;
+  HycoModel model = NULL;
+
+  PetscFunctionBegin;
+  CHECK_FAILS(HycoSceneLoad(PETSC_COMM_WORLD, NULL, &scene), "is NULL");
+  CHECK_FAILS(HycoSceneLoad(PETSC_COMM_WORLD, rope, NULL), "is NULL");
+  CHECK_FAILS(HycoModelLoad(NULL, &model), "is NULL");
+  CHECK_FAILS(HycoModelLoad(hybrid, NULL), "is NULL");
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
+  PetscCall(HycoModelLoad(hybrid, &model));
+  CHECK_FAILS(HycoModelPredict(model, 2, NULL), "is NULL");
+  CHECK_FAILS(HycoSceneCheckParameters(scene, 2, NULL), "is NULL");
+  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The wrong order, sizes that do not match, then the right call on the same handle gives the right numbers. */
+static PetscErrorCode TestAfterError(void)
+{
+  const PetscReal nan[2] = {NAN, 0.1};
+  HycoScene scene;
+  HycoFOM fom;
+  HycoModel model, other;
+  HycoSummary summary;
+  HycoPrediction p;
+  HycoErrors errors;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneLoad(PETSC_COMM_SELF, rope, &scene));
+  PetscCall(HycoFOMCreate(PETSC_COMM_SELF, scene, &fom));
+  PetscCall(HycoModelLoad(hybrid, &model));
+  CHECK_FAILS(HycoModelGetPrediction(model, &p), "call HycoModelPredict() before");
+  CHECK_FAILS(HycoModelWrite(model, "/tmp/x.xdmf"), "call HycoModelPredict() before");
+  CHECK_FAILS(HycoModelCompare(model, fom, &errors), "before");
+  for (int k = 0; k < 3; k++) {
+    CHECK_FAILS(HycoFOMSolve(fom, 1, inside), "1 parameter values were given; the scene has 2");
+    CHECK_FAILS(HycoFOMSolve(fom, 2, outside), "lies outside its range");
+    CHECK_FAILS(HycoFOMSolve(fom, 2, nan), "mu1");
+    CHECK_FAILS(HycoModelPredict(model, 3, inside), "3 parameter values were given; the scene has 2");
+    CHECK_FAILS(HycoModelPredict(model, 2, outside), "lies outside its range");
+    CHECK_FAILS(HycoModelPredict(model, 2, nan), "mu1");
+    CHECK_FAILS(HycoModelLoad("/no/such.h5", &other), "/no/such.h5");
+    PetscCall(HycoFOMSolve(fom, 2, inside));
+    PetscCall(HycoFOMGetSummary(fom, &summary));
+    CHECK_NEAR(summary.total_contact_force, 0.3502256293, 1e-9); /* an independent computation, tests/unit/api.c */
+    CHECK_FAILS(HycoFOMWrite(fom, "/no/such/folder/x.xdmf"), "cannot be written");
+    PetscCall(HycoModelPredict(model, 2, inside));
+    PetscCall(HycoModelGetPrediction(model, &p));
+    CHECK_NEAR(p.total_contact_force, 0.32557839822014933, 1e-12); /* what it gave when it was written */
+  }
+  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two models, asked in turn, do not disturb each other. */
+static PetscErrorCode TestTwo(void)
+{
+  HycoModel a, b;
+  HycoPrediction p, q;
+  const PetscReal elsewhere[2] = {0.2, 0.4};
+
+  PetscFunctionBegin;
+  PetscCall(HycoModelLoad(hybrid, &a));
+  PetscCall(HycoModelLoad(projection, &b));
+  for (int k = 0; k < 2; k++) {
+    PetscCall(HycoModelPredict(a, 2, inside));
+    PetscCall(HycoModelPredict(b, 2, k ? elsewhere : inside));
+    PetscCall(HycoModelGetPrediction(a, &p));
+    PetscCall(HycoModelGetPrediction(b, &q));
+    CHECK_NEAR(p.total_contact_force, 0.32557839822014933, 1e-12);
+    CHECK(p.type == HYCO_MODEL_HYBRID && q.type == HYCO_MODEL_PROJECTION, "types %d, %d", (int)p.type, (int)q.type);
+    if (!k) CHECK_NEAR(q.total_contact_force, 0.350993482, 1e-9); /* as printed when the file was written */
+  }
+  PetscCall(HycoModelDestroy(&a));
+  PetscCall(HycoModelPredict(b, 2, inside));
+  PetscCall(HycoModelGetPrediction(b, &q));
+  CHECK_NEAR(q.total_contact_force, 0.350993482, 1e-9);
+  PetscCall(HycoModelDestroy(&b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static long Resident(void)
+{
+  long pages = 0, resident = 0;
+  FILE *file = fopen("/proc/self/statm", "r");
+
+  if (!file || fscanf(file, "%ld %ld", &pages, &resident) != 2) return -1;
+  fclose(file);
+  return resident * (sysconf(_SC_PAGESIZE) / 1024);
+}
+
+static PetscErrorCode Once(void)
+{
+  HycoScene scene;
+  HycoSamples samples;
+  HycoTrainer trainer;
+  HycoModel model = NULL;
+  HycoSolver solver;
+  HycoSystem system;
+  char line[HYCO_LINE];
+  PetscErrorCode code;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneLoad(PETSC_COMM_SELF, rope, &scene));
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoSamplesAddPoint(samples, inside));
+  PetscCall(HycoTrainerCreate(PETSC_COMM_SELF, scene, &trainer));
+  PetscCall(HycoTrainerSetFromOptions(trainer));
+  PetscCall(HycoModelLoad(hybrid, &model));
+  PetscCall(HycoModelPredict(model, 2, inside));
+  PetscCall(HycoCatchBegin());
+  code = HycoModelPredict(model, 2, outside);
+  PetscCall(HycoCatchEnd(code, line));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
+  PetscCall(HycoSolverDestroy(&solver));
+  PetscCall(HycoSystemDestroy(&system));
+  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Refusals too must give back what they took: a file that is no model, a folder without a scene, 1000 times.
+   (A scene.yaml that libyaml refuses costs 64 kB in PETSc 3.18, which does not free its parser.) */
+static PetscErrorCode OnceRefused(void)
+{
+  HycoScene scene = NULL;
+  HycoModel model = NULL;
+  char line[HYCO_LINE];
+  PetscErrorCode code;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCatchBegin());
+  code = HycoModelLoad(geo, &model);
+  if (code) code = HycoSceneLoad(PETSC_COMM_SELF, data, &scene);
+  PetscCall(HycoCatchEnd(code, line));
+  CHECK(code, "rope.geo is read as a model or a scene");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestGrowth(const char what[], PetscErrorCode (*once)(void), long most)
+{
+  long before, after;
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 100; k++) PetscCall(once()); /* what libraries keep, they have by now */
+  before = Resident();
+  for (int k = 0; k < 1000; k++) PetscCall(once());
+  after = Resident();
+  printf("%s 1000 times: %ld kB to %ld kB resident\n", what, before, after);
+#if !defined(__SANITIZE_ADDRESS__)
+  CHECK(before > 0 && after - before < most, "%s grew from %ld to %ld kB", what, before, after);
+#endif
+  (void)most;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Test(void)
+{
+  const char *source = getenv("HYCO_SOURCE");
+  PetscMPIInt size;
+
+  PetscFunctionBegin;
+  PetscCheck(source, PETSC_COMM_SELF, PETSC_ERR_USER, "HYCO_SOURCE is not set");
+  snprintf(geo, sizeof(geo), "%s/examples/rope/rope.geo", source);
+  snprintf(data, sizeof(data), "%s/tests/data", source);
+  snprintf(rope, sizeof(rope), "%s/examples/rope", source);
+  snprintf(hybrid, sizeof(hybrid), "%s/tests/data/rope-hybrid-3.h5", source);
+  snprintf(projection, sizeof(projection), "%s/tests/data/rope-projection-3.h5", source);
+  PetscCall(TestDestroyed());
+  PetscCall(TestNullPlaces());
+  PetscCall(TestAfterError());
+  PetscCall(TestTwo());
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  if (size == 1) PetscCall(TestGrowth("create, use, destroy", Once, 1000));
+  if (size == 1) PetscCall(TestGrowth("refused", OnceRefused, 1000));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+TEST_MAIN

@@ -1,0 +1,162 @@
+/*
+  Files cut at many lengths and with seeded flipped bits, in one process whose address space is limited: what is sealed
+  is refused whatever bit changed; a file of format 3, which has no seal, is refused where cut, and where a bit flipped
+  is refused or read, without a crash and without wild memory. Prints the counts that docs/limits.md quotes.
+*/
+#include "../unit/check.h"
+#include <hyco.h>
+#include <hycoh5.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+static char path[128];
+
+typedef struct {
+  unsigned char *bytes;
+  size_t size;
+} Bytes;
+
+static PetscErrorCode ReadBytes(const char name[], Bytes *b)
+{
+  FILE *file = fopen(name, "rb");
+
+  PetscFunctionBegin;
+  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_USER, "%s cannot be opened", name);
+  fseek(file, 0, SEEK_END);
+  b->size = (size_t)ftell(file);
+  rewind(file);
+  PetscCall(PetscMalloc1(b->size, &b->bytes));
+  PetscCheck(fread(b->bytes, 1, b->size, file) == b->size, PETSC_COMM_SELF, PETSC_ERR_USER, "%s cannot be read", name);
+  fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void WriteBytes(const unsigned char *bytes, size_t size)
+{
+  FILE *file = fopen(path, "wb");
+
+  if (!file || fwrite(bytes, 1, size, file) != size || fclose(file)) abort();
+}
+
+/* Whether the model is refused; its prediction if not. A refusal must say which file. */
+static PetscErrorCode Try(PetscBool *refused, PetscReal *force)
+{
+  const PetscReal mu[2] = {0.07, 0.17};
+  HycoModel model = NULL;
+  HycoPrediction p = {0};
+  PetscErrorCode code;
+  char line[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoCatchBegin());
+  code = HycoModelLoad(path, &model);
+  if (!code) code = HycoModelPredict(model, 2, mu);
+  if (!code) code = HycoModelGetPrediction(model, &p);
+  PetscCall(HycoCatchEnd(code, line));
+  PetscCall(HycoModelDestroy(&model));
+  CHECK(!code || line[0], "a refusal without a word");
+  *refused = (PetscBool)(code != 0);
+  *force = p.total_contact_force;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestCuts(const char what[], const Bytes *b, size_t step)
+{
+  PetscInt n = 0, loaded = 0;
+
+  PetscFunctionBegin;
+  for (size_t length = 0; length < b->size; length += length + 40 < b->size ? step : 1) {
+    PetscBool refused;
+    PetscReal force;
+
+    WriteBytes(b->bytes, length);
+    PetscCall(Try(&refused, &force));
+    CHECK(refused, "%s cut to %ld of %ld bytes is read", what, (long)length, (long)b->size);
+    n++;
+    loaded += !refused;
+  }
+  printf("%s cut at %d lengths: %d read\n", what, (int)n, (int)loaded);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestFlips(const char what[], const Bytes *b, PetscInt n, PetscBool sealed)
+{
+  unsigned long long state = 6;
+  PetscInt loaded = 0, other = 0;
+  PetscBool refused;
+  PetscReal right, force;
+
+  PetscFunctionBegin;
+  WriteBytes(b->bytes, b->size);
+  PetscCall(Try(&refused, &right));
+  CHECK(!refused, "%s is refused as it is", what);
+  for (PetscInt k = 0; k < n; k++) {
+    const size_t bit = (size_t)((Draw(&state) + 1) / 2 * 8 * (double)b->size);
+
+    b->bytes[bit / 8] ^= (unsigned char)(1 << bit % 8);
+    WriteBytes(b->bytes, b->size);
+    b->bytes[bit / 8] ^= (unsigned char)(1 << bit % 8);
+    PetscCall(Try(&refused, &force));
+    CHECK(refused || !sealed, "%s with bit %ld flipped is read", what, (long)bit);
+    loaded += !refused;
+    other += !refused && force != right;
+  }
+  printf("%s with one of %d bits flipped: %d read, %d of them with another answer\n", what, (int)n, (int)loaded,
+         (int)other);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Trained in /tmp: today's format. */
+static PetscErrorCode Train(const char source[], const char model[])
+{
+  const PetscInt grid[] = {3, 3};
+  char folder[PETSC_MAX_PATH_LEN];
+  HycoScene scene;
+  HycoSamples samples;
+  HycoTrainer trainer;
+
+  PetscFunctionBegin;
+  snprintf(folder, sizeof(folder), "%s/examples/rope", source);
+  PetscCall(HycoSceneLoad(PETSC_COMM_SELF, folder, &scene));
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_FALSE));
+  PetscCall(HycoTrainerCreate(PETSC_COMM_SELF, scene, &trainer));
+  PetscCall(HycoTrainerSetFromOptions(trainer));
+  PetscCall(HycoTrainerRun(trainer, samples, model, NULL));
+  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Test(void)
+{
+  const struct rlimit limit = {(rlim_t)4 << 30, (rlim_t)4 << 30};
+  const char *source = getenv("HYCO_SOURCE");
+  char folder[] = "/tmp/hyco_damage_XXXXXX", name[PETSC_MAX_PATH_LEN], command[PETSC_MAX_PATH_LEN];
+  Bytes b;
+
+  PetscFunctionBegin;
+  PetscCheck(source && mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_USER, "HYCO_SOURCE is not set, or no /tmp");
+#if !defined(__SANITIZE_ADDRESS__)
+  setrlimit(RLIMIT_AS, &limit);
+#endif
+  (void)limit;
+  snprintf(path, sizeof(path), "%s/damaged.h5", folder);
+  snprintf(name, sizeof(name), "%s/model.h5", folder);
+  PetscCall(Train(source, name));
+  PetscCall(ReadBytes(name, &b));
+  PetscCall(TestCuts("a model", &b, 97));
+  PetscCall(TestFlips("a model", &b, 3000, PETSC_TRUE));
+  PetscCall(PetscFree(b.bytes));
+  snprintf(name, sizeof(name), "%s/tests/data/rope-hybrid-3.h5", source);
+  PetscCall(ReadBytes(name, &b));
+  PetscCall(TestCuts("a model of format 3", &b, 997));
+  PetscCall(TestFlips("a model of format 3", &b, 2000, PETSC_FALSE));
+  PetscCall(PetscFree(b.bytes));
+  snprintf(command, sizeof(command), "rm -r %s", folder);
+  CHECK(system(command) == 0, "%s is left", folder);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+TEST_MAIN

@@ -1,0 +1,162 @@
+"""Training that is killed at seeded moments, and disks that fill up: the same command goes on, and the model is the same."""
+import glob
+import os
+import random
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import time
+import unittest
+
+from common import HYCO, MPIEXEC, ROPE, Case
+
+TRAIN = ['train', '-scene', ROPE, '-grid', '12,12', '-model', 'm.h5']
+KILLS = 5
+
+
+def children(pid):
+    """The processes that `pid` started."""
+    found = []
+    for stat in glob.glob('/proc/[0-9]*/stat'):
+        try:
+            with open(stat, encoding='ascii', errors='replace') as f:
+                text = f.read()
+        except OSError:
+            continue
+        if int(text.rsplit(')', 1)[1].split()[1]) == pid:
+            found.append(int(text.split()[0]))
+    return found
+
+
+class Kill(Case):
+    def setUp(self):
+        for name in os.listdir(self.folder):
+            path = self.path(name)
+            shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
+
+    def command(self, ranks):
+        return ([MPIEXEC, '--oversubscribe', '-n', str(ranks)] if ranks > 1 else []) + [HYCO, *TRAIN]
+
+    def content(self, name='m.h5'):
+        with open(self.path(name), 'rb') as f:
+            return f.read()
+
+    def interrupt(self, ranks, seconds, draw):
+        """Kills one rank after `seconds`; what the run said, and whether it had ended by itself."""
+        log = self.path('log')
+        with open(log, 'wb') as out:
+            run = subprocess.Popen(self.command(ranks), cwd=self.folder, stdout=out, stderr=out)
+            try:
+                run.wait(seconds)
+            except subprocess.TimeoutExpired:
+                victims = children(run.pid) if ranks > 1 else [run.pid]
+                victim = draw.choice(victims) if victims else run.pid
+                try:
+                    os.kill(victim, signal.SIGKILL)
+                except ProcessLookupError:
+                    pass
+            status = run.wait(60)
+        with open(log, encoding='utf-8', errors='replace') as f:
+            said = f.read()
+        os.remove(log)
+        return said, status == 0
+
+    def check_kills(self, ranks):
+        begin = time.monotonic()
+        subprocess.run(self.command(ranks), cwd=self.folder, check=True, capture_output=True, timeout=100)
+        whole = time.monotonic() - begin
+        right = self.content()
+        draw = random.Random(6 + ranks)
+        interrupted = 0
+        for k in range(KILLS):
+            self.setUp()
+            said, ended = self.interrupt(ranks, whole * (0.15 + 0.75 * (k + draw.random()) / KILLS), draw)
+            interrupted += not ended
+            complete = [f for f in glob.glob(self.path('m.h5.snapshots', '*.h5'))]
+            told = max((int(n) for n in re.findall(r'snapshots: (\d+) of', said)), default=0)
+            # each group tells `groups` samples for one of its own: at most one sample a group is not there yet
+            self.assertGreaterEqual(len(complete), told - ranks, 'a solution that was told is lost')
+            times = {f: os.stat(f).st_mtime_ns for f in complete}
+            subprocess.run(self.command(ranks), cwd=self.folder, check=True, capture_output=True, timeout=100)
+            for name, stamp in times.items():
+                self.assertEqual(os.stat(name).st_mtime_ns, stamp, 'a complete solution was solved again')
+            self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', '*.h5'))), 144)
+            self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
+            self.assertEqual(self.content(), right, f'the model differs after kill {k} on {ranks} ranks')
+        self.assertGreaterEqual(interrupted, 2, 'the kills came too late to say anything')
+        print(f'{ranks} ranks: {interrupted} of {KILLS} runs killed; each resumed to the same bytes')
+
+    def test_one_rank(self):
+        self.check_kills(1)
+
+    def test_two_ranks(self):
+        self.check_kills(2)
+
+    def limited(self, kilobytes):
+        """The run in which, once it solves, no file can grow beyond a size: what a full disk does, without one."""
+        run = subprocess.Popen([HYCO, *TRAIN], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        before = len(glob.glob(self.path('m.h5.snapshots', '*.h5')))
+        while run.poll() is None and len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) == before:
+            time.sleep(0.001)
+        resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (kilobytes * 1024, kilobytes * 1024))
+        _, said = run.communicate(timeout=100)
+        return run.returncode, said
+
+    def refused(self, run, text):
+        status, stderr = run
+        self.assertEqual(status, 1, stderr)
+        said = [line for line in stderr.splitlines() if 'snapshots:' not in line and line]
+        self.assertEqual(len(said), 1, stderr)
+        self.assertIn(text, said[0])
+        self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
+
+    def test_full_disk(self):
+        """Full while a snapshot is written, and while the model is: the previous model is untouched; then it goes on."""
+        subprocess.run([HYCO, *TRAIN], cwd=self.folder, check=True, capture_output=True, timeout=100)
+        right = self.content()
+        for name in glob.glob(self.path('m.h5.snapshots', '*.h5'))[::2]:
+            os.remove(name)
+        self.refused(self.limited(32), 'm.h5.candidate could not be written to its end (File too large): is the disk full?')
+        self.assertEqual(self.content(), right, 'the previous model was touched')
+        shutil.rmtree(self.path('m.h5.snapshots'))
+        self.refused(self.limited(4), '.h5 could not be written to its end (File too large): is the disk full?')
+        self.assertEqual(self.content(), right, 'the previous model was touched')
+        subprocess.run([HYCO, *TRAIN], cwd=self.folder, check=True, capture_output=True, timeout=100)
+        self.assertEqual(self.content(), right)
+
+    def test_unwritable(self):
+        """A path that leads through a file (root may write in any folder): nothing is begun that could not end."""
+        with open(self.path('file'), 'w', encoding='ascii') as f:
+            f.write('x')
+        os.mkdir(self.path('folder.h5'))
+        for arguments, text in ((['-model', 'file/m.h5'], 'file/m.h5 cannot be written'),
+                                (['-model', 'folder.h5'], 'folder.h5'),
+                                (['-hyco_snapshots', 'file'], 'the snapshot folder file cannot be made'),
+                                (['-hyco_snapshots', 'file/s'], 'the snapshot folder file/s cannot be made'),
+                                (['-report', 'file/r.json'], 'file/r.json cannot be written')):
+            for ranks in (0, 2):
+                run = self.run_raw(*TRAIN, *arguments, ranks=ranks, timeout=60)
+                self.assertNotEqual(run.returncode, 0)
+                self.assertIn(text, run.stderr)
+                self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
+                self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
+
+    def test_vanishing(self):
+        """The snapshot folder goes while training runs: one line, no model."""
+        arguments = [a if a != '12,12' else '40,40' for a in TRAIN]
+        run = subprocess.Popen([HYCO, *arguments], cwd=self.folder, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+        while run.poll() is None and len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) < 5:
+            time.sleep(0.01)
+        os.rename(self.path('m.h5.snapshots'), self.path('gone'))
+        _, said = run.communicate(timeout=60)
+        self.assertEqual(run.returncode, 1, said)
+        self.assertEqual(said.count('hyco: error'), 1, said)
+        self.assertIn('m.h5.snapshots/', said)
+        self.assertFalse(os.path.exists(self.path('m.h5')))
+
+
+if __name__ == '__main__':
+    unittest.main()

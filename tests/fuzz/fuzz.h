@@ -1,0 +1,50 @@
+/* What the fuzz targets share. A target is LLVMFuzzerTestOneInput(): one input, which may be refused, but may not
+   crash, leak, hang or take wild memory. libFuzzer drives it (scripts/fuzz), or replay.c over the kept corpus (ctest).
+ */
+#ifndef FUZZ_H
+#define FUZZ_H
+
+#include <hycoimpl.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+int LLVMFuzzerInitialize(int *argc, char ***argv);
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static char fuzz_folder[64]; /* of this process: the input as a file, and what it needs beside it */
+
+/* A file in the process's folder. */
+static inline void FuzzPath(const char name[], char path[128])
+{
+  snprintf(path, 128, "%s/%s", fuzz_folder, name);
+}
+
+static inline void FuzzWrite(const char path[], const void *data, size_t size)
+{
+  FILE *file = fopen(path, "wb");
+
+  if (!file || fwrite(data, 1, size, file) != size || fclose(file)) abort();
+}
+
+static inline void FuzzStart(void)
+{
+  setenv("PETSC_OPTIONS", "-no_signal_handler", 1); /* signals are the fuzzer's */
+  setenv("OMPI_MCA_opal_signal", "", 1);
+  snprintf(fuzz_folder, sizeof(fuzz_folder), "/tmp/hyco-fuzz-XXXXXX");
+  if (!mkdtemp(fuzz_folder) || HycoInitialize(NULL, NULL)) abort();
+}
+
+/* Runs `call`, whose refusal is welcome; an error that is PETSc's own and no line of hyco's is not. */
+#define FUZZ_TRY(code, call)                                                                                           \
+  do {                                                                                                                 \
+    char line_[HYCO_LINE];                                                                                             \
+    if (HycoCatchBegin()) abort();                                                                                     \
+    (code) = (call);                                                                                                   \
+    if (HycoCatchEnd((code), line_)) abort();                                                                          \
+    if ((code) && getenv("HYCO_FUZZ_SHOW")) fprintf(stderr, "%s\n", line_);                                            \
+  } while (0)
+
+#endif
