@@ -1,0 +1,69 @@
+"""scripts/bench-tradeoff and bench-growth on little: their tables hold every setting, their pictures are there, documents that have
+no such section are not touched."""
+import csv
+import os
+import subprocess
+import sys
+import unittest
+
+from common import SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'scripts', 'tradeoff'))
+import page
+import report
+
+
+class Tradeoff(Case):
+    def bench(self, name, *arguments):
+        run = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'bench-' + name), *arguments, '--output', self.folder],
+                             cwd=SOURCE, capture_output=True, text=True, timeout=200)
+        self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
+        return run.stdout
+
+    def rows(self, name):
+        with open(self.path(name + '.csv'), encoding='utf-8', newline='') as file:
+            rows = list(csv.DictReader(file))
+        with open(self.path(name + '.png'), 'rb') as file:
+            self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
+        return rows
+
+    def test_rope(self):
+        words = self.bench('tradeoff', 'rope', '--quick', '--repeat', '1')
+        rows = self.rows('rope-100')
+        self.assertEqual([r['type'] for r in rows], ['hybrid', 'hybrid', 'projection', 'condensed', 'full', 'full'])
+        for row in rows[:4]:
+            self.assertEqual(row['status'], 'ok', row['label'])
+            self.assertGreater(float(row['offline_s']), 0)
+            self.assertGreater(float(row['single_s']), 0)
+        self.assertLess(float(rows[1]['u_mean']), float(rows[0]['u_mean']))
+        self.assertLess(float(rows[3]['lambda_max']), 1e-4)  # condensed: forces as full order's
+        self.assertIn('| all contact forces | largest |', words)
+
+    def test_growth(self):
+        self.bench('growth', '--rope', '100,1000', '--pellet', '')
+        rows = self.rows('growth')
+        self.assertEqual([(r['unknowns'], r['status']) for r in rows], [('98', 'ok'), ('998', 'ok')])
+
+    def test_choice(self):
+        """The cheapest that is accurate enough, and what nothing beats, of rows that are easy to see through."""
+        rows = [{'id': k, 'status': 'ok', 'batch_s': seconds, 'u_mean': error}
+                for k, (seconds, error) in enumerate([(3, 0.001), (1, 0.2), (2, 0.05), (2.5, 0.06)])]
+        rows.append({'id': 9, 'status': 'refused', 'label': 'no model'})
+        self.assertEqual([r['id'] for r in report.pareto(rows, 'u_mean')], [1, 2, 0])
+        self.assertEqual(report.cheapest(rows, 'u_mean', 0.06)['id'], 2)
+        self.assertIsNone(report.cheapest(rows, 'u_mean', 1e-4))
+
+    def test_page(self):
+        path = self.path('page.md')
+        text = 'before\n<!-- a: written by b -->\nold\n<!-- end a -->\nafter\n'
+        with open(path, 'w', encoding='utf-8') as file:
+            file.write(text)
+        with self.assertRaises(SystemExit):
+            page.write_section(path, 'c', ['new'])
+        page.write_section(path, 'a', ['new'])
+        with open(path, encoding='utf-8') as file:
+            self.assertEqual(file.read(), text.replace('old\n', '\nnew\n\n'))
+
+
+if __name__ == '__main__':
+    unittest.main()
