@@ -26,7 +26,7 @@ contact: {fit: {type: pair, slave: shaft, master: sleeve, tolerance: 1e-6, norma
 """
 # the pellet's mesh and groups without its pressures, and no displacement along the axis
 PLANE_PELLET = """
-scene: {{title: pellet with interference, plane strain, mesh: {mesh}}}
+scene: {{title: "pellet with interference, plane strain", mesh: {mesh}}}
 body: {{pellet: {{young: 1e5, poisson: 0.3}}, cladding: {{young: 1e5, poisson: 0.3}}}}
 fixed: {{sym_x0: {{x: 0}}, sym_y0: {{y: 0}}, pellet: {{z: 0}}, cladding: {{z: 0}}}}
 contact:
