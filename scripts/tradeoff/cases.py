@@ -29,8 +29,8 @@ class Case:
     test: list             # arguments of the unseen points, in runs that share a stiffness where the scene allows it
     names: list            # the parameters
     single: list           # points, each with a stiffness of its own
+    wanted: list = field(default_factory=list)      # (words, {error: bound}): what an engineer may ask for at once
     settings: list = field(default_factory=list)
-    unit: str = "solve"
 
 
 def combine(type_, training, **choices):
@@ -45,7 +45,8 @@ def rope(nodes, mesh, quick):
     case = Case(f"rope, {nodes} nodes", ["-scene", "examples/rope", "-scene_mesh", mesh],
                 {"10 x 12": ["-grid", "10,12"], "12 x 12 Chebyshev": ["-grid", "12,12", "-grid_type", "chebyshev"],
                  "20 x 8 Chebyshev": ["-grid", "20,8", "-grid_type", "chebyshev"]},
-                ["-grid", "8,10" if quick or nodes > 1000 else "20,24"], ["mu1", "mu2"], points)
+                ["-grid", "8,10" if quick or nodes > 1000 else "20,24"], ["mu1", "mu2"], points,
+                [("u 0.01 % and the RID's forces 1 %, means", {"u_mean": 1e-4, "lambda_rid_mean": 1e-2})])
     if quick:
         case.settings = [*combine("hybrid", "10 x 12", pod_tol=["1e-7", "1e-11"], hybrid=["all"]),
                          *combine("projection", "10 x 12", pod_tol=["1e-7"]), Setting("condensed", "20 x 8 Chebyshev")]
@@ -78,7 +79,10 @@ def pellet(name, mesh, quick):
                 {"5 radii": radii(4.02, 4.04, 4.055, 4.075, 4.1),
                  "9 radii": radii(4.02, 4.03, 4.04, 4.05, 4.065, 4.07, 4.08, 4.09, 4.1),
                  **{f"{n} Chebyshev radii": chebyshev(n) for n in (2, 3, 4, 6, 8)}},
-                radii(*((4.06,) if name == "C" or quick else (4.06, 4.033))), ["radius", "load"], points)
+                radii(*((4.06,) if name == "C" or quick else (4.06, 4.033))), ["radius", "load"], points,
+                [("on the RID u 1 % and sigma_11 5 %, largest", {"u_rid_max": 0.01, "sigma_11_max": 0.05}),
+                 ("on the RID u 0.15 % and sigma_11 0.25 %, largest", {"u_rid_max": 0.0015, "sigma_11_max": 0.0025}),
+                 ("all forces 1e-6, largest", {"lambda_max": 1e-6})])
     if quick:
         case.training["5 radii"] = ["-values_radius", "4.02,4.04,4.07,4.1", "-values_load", "0.2,0.5,0.7,0.85,1"]
         case.settings = [*combine("hybrid", "5 radii", pod_tol=["1e-7", "1e-10"]), Setting("condensed", "3 Chebyshev radii")]
@@ -87,9 +91,8 @@ def pellet(name, mesh, quick):
                  *(Setting("condensed", f"{n} Chebyshev radii", (("pod_tol", "1e-14"),)) for n in (4, 6, 8))]
     tolerances = ["1e-5", "1e-7", "1e-8", "1e-9", "1e-10", "1e-12"]
     if name == "C":
-        case.settings = [*combine("hybrid", "9 radii", pod_tol=tolerances[1:], rid_layers=[1]),
-                         *combine("hybrid", "9 radii", pod_tol=tolerances[3:], rid_layers=[2, 3]),
-                         *condensed[:4]]
+        case.settings = [*combine("hybrid", "9 radii", pod_tol=["1e-7", "1e-9", "1e-10", "1e-11", "1e-12"], rid_layers=[1]),
+                         *combine("hybrid", "9 radii", pod_tol=["1e-10", "1e-12"], rid_layers=[2]), *condensed[1:5]]
         return case
     case.settings = [
         *combine("hybrid", "9 radii", pod_tol=tolerances, rid_layers=[1, 2, 3], rid_contact_extension=["0.1", "0.3"]),
