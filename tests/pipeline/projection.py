@@ -182,12 +182,13 @@ class Rope(Case):
         new = self.hyco('predict', '-model', 'old.h5', '-mu', '0.07,0.17')
         with h5py.File(self.path('old.h5'), 'r+') as f:
             f['format'][...] = 2
-            del f['problem/type']
+            del f['problem/type'], f['sealed']
         old = self.hyco('predict', '-model', 'old.h5', '-mu', '0.07,0.17')
         self.assertEqual((old['model_type'], old['total_contact_force']), ('hybrid', new['total_contact_force']))
         self.train('bad.h5')
         with h5py.File(self.path('bad.h5'), 'r+') as f:
             f['problem/type'][0] = ord('P')
+            del f['sealed']
         run = self.run_raw('predict', '-model', 'bad.h5', '-mu', '0.07,0.17')
         self.assertNotEqual(run.returncode, 0)
         self.assertIn('problem/type is damaged', run.stderr)
