@@ -55,13 +55,13 @@ static PetscErrorCode PairNormal(HycoFE fe, const HycoContact *c, PetscInt slave
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal normal[], PetscReal gap[])
+/* vector: room for 3 reals a node of the mesh. */
+static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal vector[], PetscReal normal[],
+                               PetscReal gap[])
 {
-  PetscReal *vector = NULL;
   PetscInt last = -1;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(3 * fe->mesh->n_nodes, &vector));
   for (PetscInt k = 0; k < pairs->n; k++) {
     const HycoContact *c = &fe->scene->contact[pairs->contact[k]];
     const PetscBool given = (PetscBool)(c->normal[0] || c->normal[1] || c->normal[2]);
@@ -84,7 +84,19 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal 
       for (PetscInt d = 0; d < 3; d++) gap[k] += n[d] * (x[d] - fe->X[3 * s + d]);
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal normal[], PetscReal gap[])
+{
+  PetscReal *vector;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * fe->mesh->n_nodes, &vector));
+  ierr = Geometry(fe, pairs, vector, normal, gap);
   PetscCall(PetscFree(vector));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -105,15 +117,12 @@ static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal 
   }
 }
 
-PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
-                               PetscReal gap[])
+static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], PetscInt start[],
+                           PetscInt dof[], PetscReal value[], PetscReal gap[])
 {
-  PetscReal *normal;
   PetscInt n = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(3 * pairs->n, &normal));
-  PetscCall(HycoContactGeometry(fe, pairs, normal, gap));
   start[0] = 0;
   for (PetscInt k = 0; k < pairs->n; k++) {
     AddToRow(fe, pairs->slave[k], 1, normal + 3 * k, &n, dof, value, &gap[k]);
@@ -124,7 +133,21 @@ PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start
               "contact %s: node %d is fixed, and its prescribed displacement penetrates by %g",
               fe->scene->contact[pairs->contact[k]].name, (int)fe->mesh->node_id[pairs->slave[k]], (double)-gap[k]);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
+                               PetscReal gap[])
+{
+  PetscReal *normal;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * pairs->n, &normal));
+  ierr = HycoContactGeometry(fe, pairs, normal, gap);
+  if (!ierr) ierr = Rows(fe, pairs, normal, start, dof, value, gap);
   PetscCall(PetscFree(normal));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

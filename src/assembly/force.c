@@ -149,13 +149,11 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
+static PetscErrorCode AddForces(HycoFE fe, Vec F)
 {
   HycoMesh m = fe->mesh;
 
   PetscFunctionBegin;
-  PetscCall(VecSet(F, 0));
-  PetscCall(VecSetOption(F, VEC_IGNORE_OFF_PROC_ENTRIES, PETSC_TRUE));
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const HycoBody *body = &fe->scene->body[m->cell_body[e]];
 
@@ -174,7 +172,20 @@ PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
       if (m->facet_group[f] == g && m->facet_cell[f] >= 0) PetscCall(AddFacetLoad(fe, load, f, F));
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The end of an assembly is collective: a rank that found an error takes part in it, or the others would wait. */
+PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(VecSet(F, 0));
+  PetscCall(VecSetOption(F, VEC_IGNORE_OFF_PROC_ENTRIES, PETSC_TRUE));
+  ierr = AddForces(fe, F);
   PetscCall(VecAssemblyBegin(F));
   PetscCall(VecAssemblyEnd(F));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

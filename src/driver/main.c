@@ -122,6 +122,28 @@ static PetscErrorCode Run(const Command *command, int argc, char **argv)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode PrintNothing(const char format[], ...)
+{
+  (void)format;
+  return 0;
+}
+
+/* PETSc reads the option files and the options; what it refuses is one line here, in place of its trace. */
+static PetscErrorCode Start(int *argc, char ***argv)
+{
+  PetscErrorCode (*const printf_of_petsc)(const char[], ...) = PetscErrorPrintf;
+  PetscErrorCode ierr;
+  char *said = NULL;
+
+  PetscErrorPrintf = PrintNothing;
+  ierr = HycoInitialize(argc, argv);
+  if (PetscErrorPrintf == PrintNothing) PetscErrorPrintf = printf_of_petsc;
+  if (!ierr) return 0;
+  (void)!PetscErrorMessage(ierr, NULL, &said);
+  fprintf(stderr, "hyco: error: PETSc does not start%s%s\n", said && said[0] ? ": " : "", said ? said : "");
+  return ierr;
+}
+
 int main(int argc, char **argv)
 {
   const int answer = AnswerAtOnce(argc, argv);
@@ -129,10 +151,7 @@ int main(int argc, char **argv)
 
   if (answer >= 0) return answer;
   setenv("OPENBLAS_NUM_THREADS", "1", 0);
-  if (HycoInitialize(&argc, &argv)) {
-    fprintf(stderr, "hyco: error: PETSc does not start\n");
-    return 1;
-  }
+  if (Start(&argc, &argv)) return 1;
   PetscPushErrorHandler(KeepMessage, NULL); /* after: PETSc's books of memory (-malloc_dump) begin with it */
   signal(SIGPIPE, SIG_IGN);                 /* "hyco ... | head" is no error */
   signal(SIGXFSZ, SIG_IGN);                 /* a file beyond the limit is a failed write, which is told */

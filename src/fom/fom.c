@@ -73,11 +73,11 @@ static PetscErrorCode ReadMesh(HycoFOM f)
   PetscCall(HycoMeshDistribute(f->comm, f->whole, sizes[3], both, (HycoPartitioner)cut, &f->part, &f->n_owned,
                                &f->first, &f->global));
   PetscCall(PetscFree(both));
-  PetscCall(HycoFECreate(f->scene, f->part, &f->fe));
+  HycoOnEach(f->comm, HycoFECreate(f->scene, f->part, &f->fe));
   f->fe_whole = f->fe;
   if (f->size > 1) {
     f->fe_whole = NULL;
-    if (f->rank == 0) PetscCall(HycoFECreate(f->scene, f->whole, &f->fe_whole));
+    HycoOnRoot(f->comm, HycoFECreate(f->scene, f->whole, &f->fe_whole));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -181,14 +181,15 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
 /* B (if what it depends on changed) and D, from rank 0. */
 static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
 {
+  PetscErrorCode ierr;
   const PetscInt m = f->pairs.n, dim = f->part->dim, entries = f->width * dim * m;
   PetscInt *start, *dof;
   PetscReal *value;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(m + 1, &start, entries, &dof, entries, &value));
-  PetscCall(HycoContactRows(f->fe_whole, &f->pairs, start, dof, value, f->gap));
-  for (PetscInt k = 0; k < m; k++) {
+  ierr = HycoContactRows(f->fe_whole, &f->pairs, start, dof, value, f->gap);
+  for (PetscInt k = 0; !ierr && k < m; k++) {
     PetscCall(VecSetValue(f->D, k, f->gap[k], INSERT_VALUES));
     for (PetscInt j = start[k]; rows_changed && j < start[k + 1]; j++) {
       const PetscInt node = f->global ? f->global[dof[j] / dim] : dof[j] / dim;
@@ -197,6 +198,7 @@ static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
     }
   }
   PetscCall(PetscFree3(start, dof, value));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

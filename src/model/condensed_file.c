@@ -70,11 +70,9 @@ static PetscErrorCode LoadField(HycoH5 h, HycoCondensed c, PetscInt f)
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(path, sizeof(path), "condensed/degree_%s", HycoGridFieldNames[f]));
   PetscCall(HycoH5LoadInt(h, path, 0, PETSC_MAX_INT, &dim, &one, &degree));
-  for (PetscInt p = 0; p < c->dim; p++) {
-    HycoCheck(degree[p] < field->tensor.n[p], "%s is damaged", path);
-    field->tensor.degree[p] = degree[p];
-  }
+  PetscCall(PetscArraycpy(field->tensor.degree, degree, dim));
   PetscCall(PetscFree(degree));
+  for (PetscInt p = 0; p < dim; p++) HycoCheck(field->tensor.degree[p] < field->tensor.n[p], "%s is damaged", path);
   Dataset(HycoGridFieldNames[f], path);
   PetscCall(HycoH5LoadReal(h, path, &n, &rows, &field->data));
   for (size_t k = 0; k < (size_t)n * (size_t)rows; k++)

@@ -53,27 +53,38 @@ PetscErrorCode HycoModelGetSizes(HycoModel m, PetscInt *n_contacts, PetscInt *n_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The points in the order that they were sorted into; the answers in the order that they came in. */
+static PetscErrorCode SolveEach(HycoModel m, PetscInt n, const Point point[], HycoPrediction prediction[],
+                                PetscReal Lambda[], PetscReal U[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    const size_t at = (size_t)point[k].at, n_dof = (size_t)m->fe->n_dof;
+
+    PetscCall(HycoModelPredict(m, m->scene->n_parameters, point[k].mu));
+    if (prediction) PetscCall(HycoModelGetPrediction(m, &prediction[at]));
+    if (Lambda) PetscCall(PetscArraycpy(Lambda + at * (size_t)m->pairs.n, m->Lambda, m->pairs.n));
+    if (U) PetscCall(PetscArraycpy(U + at * n_dof, m->U, n_dof));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoModelSolveMany(HycoModel m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                   HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[])
 {
   PetscInt order[HYCO_MAX_PARAMETERS];
   Point *point;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, "HycoModelLoad()");
   for (PetscInt k = 0; k < n; k++) PetscCall(HycoSceneCheckParameters(m->scene, n_parameters, mu + k * n_parameters));
   PetscCall(HycoModelSetUp(m));
   PetscCall(PetscMalloc1(n, &point));
-  PetscCall(Sort(m, n, mu, order, point));
-  for (PetscInt k = 0; k < n; k++) {
-    const size_t at = (size_t)point[k].at, n_dof = (size_t)m->fe->n_dof;
-
-    PetscCall(HycoModelPredict(m, n_parameters, point[k].mu));
-    if (prediction) PetscCall(HycoModelGetPrediction(m, &prediction[at]));
-    if (Lambda) PetscCall(PetscArraycpy(Lambda + at * (size_t)m->pairs.n, m->Lambda, m->pairs.n));
-    if (U) PetscCall(PetscArraycpy(U + at * n_dof, m->U, n_dof));
-  }
+  ierr = Sort(m, n, mu, order, point);
+  if (!ierr) ierr = SolveEach(m, n, point, prediction, Lambda, U);
   m->solved = PETSC_FALSE; /* whose answer would it be? */
   PetscCall(PetscFree(point));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -192,7 +192,7 @@ static PetscErrorCode CheckNodes(Msh *m)
     PetscCall(CheckNodes4(m));
   else
     PetscCall(CheckNodes2(m));
-  qsort(m->node, m->n_nodes, sizeof(*m->node), CompareTags);
+  if (m->n_nodes) qsort(m->node, m->n_nodes, sizeof(*m->node), CompareTags);
   for (size_t k = 1; k < m->n_nodes; k++)
     HycoCheck(m->node[k] != m->node[k - 1], "%s: node %lld stands twice", m->path, (long long)m->node[k]);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -247,23 +247,34 @@ static PetscErrorCode WriteOne(HycoSnapshots store, const char path[], const cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReadOne(HycoSnapshots store, const char path[], const char name[], PetscInt rows, PetscInt cols,
-                              PetscReal data[])
+static PetscErrorCode ReadOpen(HycoSnapshots store, HycoH5 h, const char path[], const char name[], PetscInt rows,
+                               PetscInt cols, PetscReal data[])
 {
   char mine[32], *text;
-  HycoH5 h;
   PetscBool same;
 
   PetscFunctionBegin;
   snprintf(mine, sizeof(mine), "%016llx", store->fingerprint);
-  PetscCall(HycoH5Open(path, &h));
   PetscCall(HycoH5LoadText(h, "fingerprint", &text));
   same = (PetscBool)(strcmp(text, mine) == 0);
   PetscCall(PetscFree(text));
   HycoCheck(same, "%s is of another scene or mesh; remove the folder %s, or name another with -hyco_snapshots", path,
             store->folder);
   if (data) PetscCall(HycoH5ReadReal(h, name, rows, cols, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadOne(HycoSnapshots store, const char path[], const char name[], PetscInt rows, PetscInt cols,
+                              PetscReal data[])
+{
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Open(path, &h));
+  ierr = ReadOpen(store, h, path, name, rows, cols, data);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -299,24 +310,36 @@ static PetscErrorCode WriteBoth(HycoTrainer t, HycoSnapshots store, PetscInt k, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Factors at one node of G's grid, and writes. G, H: room for them. */
+static PetscErrorCode FactorOne(HycoTrainer t, HycoSnapshots store, MPI_Comm group, HycoFOM fom, PetscInt node,
+                                const PetscReal V[], PetscReal G[], PetscReal H[])
+{
+  PetscReal mu[HYCO_MAX_PARAMETERS], key[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  StiffPoint(t->condensed, node, mu, key);
+  PetscCall(HycoFOMFlexibility(fom, mu, t->condensed->l, V, G, H));
+  HycoOnRoot(group, WriteBoth(t, store, node, V, G, H));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* This rank's group factors at its run of the missing nodes. V on every rank. */
 static PetscErrorCode FactorGroup(HycoTrainer t, HycoSnapshots store, MPI_Comm group, PetscInt color, PetscInt groups,
                                   PetscInt n_missing, const PetscInt missing[], const PetscReal V[])
 {
   HycoCondensed c = t->condensed;
   HycoFOM fom;
-  PetscReal *G, *H, mu[HYCO_MAX_PARAMETERS], key[HYCO_MAX_PARAMETERS];
+  PetscReal *G, *H;
+  PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMCreate(group, t->scene, &fom));
   PetscCall(PetscMalloc2(c->field[HYCO_FIELD_G].rows, &G, c->l * c->m, &H));
-  for (PetscInt k = color * n_missing / groups; k < (color + 1) * n_missing / groups; k++) {
-    StiffPoint(c, missing[k], mu, key);
-    PetscCall(HycoFOMFlexibility(fom, mu, c->l, V, G, H));
-    HycoOnRoot(group, WriteBoth(t, store, missing[k], V, G, H));
-  }
+  for (PetscInt k = color * n_missing / groups; !ierr && k < (color + 1) * n_missing / groups; k++)
+    ierr = FactorOne(t, store, group, fom, missing[k], V, G, H);
   PetscCall(PetscFree2(G, H));
   PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,11 +6,13 @@ import time
 import unittest
 
 from common import PELLET, ROPE, Case
+from rows import Rows
 
 R = ['-scene', ROPE, '-mu', '0.07,0.17']
 P = ['-scene', PELLET, '-mu', '4.06,1']
 T = ['-scene', ROPE, '-model', 'out.h5']
 N = ['-grid', '2,2']
+ROWS = Rows('faults')
 OUT = ['-output', 'out.xdmf', '-report', 'out.json']
 
 # (arguments, expected text); solve writes its output and report, train its model: none of it may be left
@@ -23,6 +25,8 @@ CASES = [
     (['solve', *R, '-model', 'm.h5'], 'hyco solve knows no option -model'),
     (['predict', '-model', 'rope.h5', '-scene', ROPE, '-mu', '0.07,0.17'], 'hyco predict needs no -scene but with -hyco_fallback'),
     (['solve', *R, 'stray'], '"stray" is no option'),
+    (['solve', *R, '-options_file', 'none.opt'], 'PETSc does not start: Unable to open options file none.opt'),
+    (['solve', *R, '-options_file', 'text.h5'], 'PETSc does not start: Unknown first token in options file text.h5'),
     (['solve', '-mu', '0.07,0.17'], '-scene is missing'),
     (['solve', *R, '-output'], '-output needs a value'),
     (['train', '-scene', ROPE, *N], '-model is missing'),
@@ -182,6 +186,7 @@ class Faults(Case):
             if any(part in text or part in args for part in TWO):
                 with self.subTest(args=' '.join(args), text=text, ranks=2):
                     self.check(list(args), text, 2)
+        ROWS.add(f'wrong commands, options, values, meshes, files ({len(CASES)}), some on 2 ranks', 'one line, status not 0, nothing left')
 
 
 if __name__ == '__main__':

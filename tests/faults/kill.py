@@ -11,9 +11,12 @@ import time
 import unittest
 
 from common import HYCO, MPIEXEC, ROPE, Case
+from rows import Rows
 
 TRAIN = ['train', '-scene', ROPE, '-grid', '12,12', '-model', 'm.h5']
-KILLS = 5
+CONDENSED = ['train', '-scene', ROPE, '-grid', '20,4', '-hyco_model_type', 'condensed', '-model', 'm.h5']
+KILLS = {'hybrid': 5, 'condensed': 3}
+ROWS = Rows('kill')
 
 
 def children(pid):
@@ -36,18 +39,18 @@ class Kill(Case):
             path = self.path(name)
             shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
 
-    def command(self, ranks):
-        return ([MPIEXEC, '--oversubscribe', '-n', str(ranks)] if ranks > 1 else []) + [HYCO, *TRAIN]
+    def command(self, ranks, train):
+        return ([MPIEXEC, '--oversubscribe', '-n', str(ranks)] if ranks > 1 else []) + [HYCO, *train]
 
     def content(self, name='m.h5'):
         with open(self.path(name), 'rb') as f:
             return f.read()
 
-    def interrupt(self, ranks, seconds, draw):
+    def interrupt(self, command, ranks, seconds, draw):
         """Kills one rank after `seconds`; what the run said, and whether it had ended by itself."""
         log = self.path('log')
         with open(log, 'wb') as out:
-            run = subprocess.Popen(self.command(ranks), cwd=self.folder, stdout=out, stderr=out)
+            run = subprocess.Popen(command, cwd=self.folder, stdout=out, stderr=out)
             try:
                 run.wait(seconds)
             except subprocess.TimeoutExpired:
@@ -63,36 +66,48 @@ class Kill(Case):
         os.remove(log)
         return said, status == 0
 
-    def check_kills(self, ranks):
+    def check_kills(self, ranks, kind='hybrid', train=TRAIN):
+        command, kills = self.command(ranks, train), KILLS[kind]
         begin = time.monotonic()
-        subprocess.run(self.command(ranks), cwd=self.folder, check=True, capture_output=True, timeout=100)
+        subprocess.run(command, cwd=self.folder, check=True, capture_output=True, timeout=100)
         whole = time.monotonic() - begin
         right = self.content()
+        names = {os.path.basename(f) for f in glob.glob(self.path('m.h5.snapshots', '*.h5'))}
         draw = random.Random(6 + ranks)
         interrupted = 0
-        for k in range(KILLS):
+        for k in range(kills):
             self.setUp()
-            said, ended = self.interrupt(ranks, whole * (0.15 + 0.75 * (k + draw.random()) / KILLS), draw)
+            said, ended = self.interrupt(command, ranks, whole * (0.15 + 0.75 * (k + draw.random()) / kills), draw)
             interrupted += not ended
-            complete = [f for f in glob.glob(self.path('m.h5.snapshots', '*.h5'))]
+            complete = glob.glob(self.path('m.h5.snapshots', '*.h5'))
             told = max((int(n) for n in re.findall(r'snapshots: (\d+) of', said)), default=0)
             # each group tells `groups` samples for one of its own: at most one sample a group is not there yet
             self.assertGreaterEqual(len(complete), told - ranks, 'a solution that was told is lost')
             times = {f: os.stat(f).st_mtime_ns for f in complete}
-            subprocess.run(self.command(ranks), cwd=self.folder, check=True, capture_output=True, timeout=100)
+            subprocess.run(command, cwd=self.folder, check=True, capture_output=True, timeout=100)
             for name, stamp in times.items():
                 self.assertEqual(os.stat(name).st_mtime_ns, stamp, 'a complete solution was solved again')
-            self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', '*.h5'))), 144)
+            self.assertEqual({os.path.basename(f) for f in glob.glob(self.path('m.h5.snapshots', '*.h5'))}, names)
             self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
             self.assertEqual(self.content(), right, f'the model differs after kill {k} on {ranks} ranks')
-        self.assertGreaterEqual(interrupted, 2, 'the kills came too late to say anything')
-        print(f'{ranks} ranks: {interrupted} of {KILLS} runs killed; each resumed to the same bytes')
+        self.assertGreaterEqual(interrupted, kills // 2, 'the kills came too late to say anything')
+        ROWS.add(f'`kill -9` of a rank during `train`, {kind} model, {ranks} rank{"s" if ranks > 1 else ""}: {kills} seeded moments',
+                 f'{len(names)} files of solutions; {interrupted} runs were killed; the same command goes on, solves nothing again '
+                 'that was complete, and writes the same model, byte for byte')
 
     def test_one_rank(self):
         self.check_kills(1)
 
     def test_two_ranks(self):
         self.check_kills(2)
+
+    def test_condensed(self):
+        """Flexibilities are kept like solutions: one a value of the stiffness, and one of the modes."""
+        self.check_kills(1, 'condensed', CONDENSED)
+        self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', 'flexibility-*.h5'))), 20)
+        self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', 'modes-*.h5'))), 20)
+        self.setUp()
+        self.check_kills(2, 'condensed', CONDENSED)
 
     def limited(self, kilobytes):
         """The run in which, once it solves, no file can grow beyond a size: what a full disk does, without one."""
@@ -125,6 +140,7 @@ class Kill(Case):
         self.assertEqual(self.content(), right, 'the previous model was touched')
         subprocess.run([HYCO, *TRAIN], cwd=self.folder, check=True, capture_output=True, timeout=100)
         self.assertEqual(self.content(), right)
+        ROWS.add('disk full while a snapshot or the model is written', 'one line; the old model is untouched, nothing half written is left; then it goes on')
 
     def test_unwritable(self):
         """A path that leads through a file (root may write in any folder): nothing is begun that could not end."""
@@ -142,6 +158,7 @@ class Kill(Case):
                 self.assertIn(text, run.stderr)
                 self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
                 self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
+        ROWS.add('a path through a file, a folder in the place of the model, on 1 and 2 ranks', 'one line')
 
     def test_vanishing(self):
         """The snapshot folder goes while training runs: one line, no model."""
@@ -156,6 +173,7 @@ class Kill(Case):
         self.assertEqual(said.count('hyco: error'), 1, said)
         self.assertIn('m.h5.snapshots/', said)
         self.assertFalse(os.path.exists(self.path('m.h5')))
+        ROWS.add('a snapshot folder that vanishes', 'one line, no model')
 
 
 if __name__ == '__main__':

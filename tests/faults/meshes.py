@@ -2,11 +2,14 @@
 import os
 import subprocess
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 
 from common import Case, msh
+from rows import Rows
 
 # two squares of 2 x 2 cells, one over the other; groups by tag
 NAMES = {1: (2, 'low'), 2: (2, 'up'), 3: (1, 'floor'), 4: (1, 'top'), 5: (1, 'under'), 6: (1, 'over')}
+ROWS = Rows('meshes')
 MPI_NOISE = ('mpiexec', '-----', 'Primary job', 'a non-zero exit code', 'the job to be', 'Process name', 'Exit code')
 SCENE = '''scene:
   mesh: two.msh
@@ -113,6 +116,23 @@ SCENES = [
 ]
 
 
+# errors in the cells, facets or contacts of one rank alone, while the others have none: on 2 and 3 ranks
+ONE_RANK = [
+    (('body:\n', 'force:\n  up: {y: sqrt(x-0.9)}\nbody:\n'), 'is not finite'),
+    (('body:\n', 'force:\n  low: {x: 1/(load-load)}\nbody:\n'), 'is not finite'),
+    (('body:\n', 'pressure:\n  over: sqrt(x-0.9)\nbody:\n'), 'is not finite'),
+    (('body:\n', 'pressure:\n  over: 1/(load-load)\nbody:\n'), 'is not finite'),
+    (('body:\n', 'traction:\n  over: {x: sqrt(x-0.9)}\nbody:\n'), 'is not finite'),
+    (('young: 1,', 'young: sqrt(0.8-x),'), 'is not finite'),
+    (('young: 2,', 'young: sqrt(0.3-x),'), 'is not finite'),
+    (('young: 2,', 'young: 0.8-x,'), "Young's modulus must be positive"),
+    (('poisson: 0.3', 'poisson: x'), "Poisson's ratio must lie between -1 and 0.5"),
+    (('{x: 0, y: -load}', '{x: 0, y: sqrt(0.9-x)}'), 'is not finite'),
+    (('master: under}', 'master: under, gap: sqrt(0.9-x)}'), 'is not finite'),
+    (('master: under}', 'master: under, normal: {x: 0, y: "x < 0.6 ? -1 : 0"}}'), 'has no length'),
+]
+
+
 class Meshes(Case):
     def setUp(self):
         self.nodes, self.elements = sound()
@@ -128,17 +148,19 @@ class Meshes(Case):
         return self.run_raw('solve', '-scene', 'scene.yaml', '-mu', '0.05', '-report', 'r.json', '-output', 'o.xdmf',
                             *(['-scene_mesh', mesh] if mesh else []), ranks=ranks, timeout=30)
 
+    def one_line(self, run, text):
+        said = [line for line in run.stderr.splitlines() if line.strip() and not any(n in line for n in MPI_NOISE)]
+        self.assertEqual(run.returncode, 1, run.stderr)
+        self.assertEqual(len(said), 1, run.stderr)
+        self.assertTrue(said[0].startswith('hyco: error: '), said[0])
+        self.assertNotIn('internal error', said[0])
+        self.assertIn(text, said[0])
+
     def refused(self, text, mesh=None):
         """Alone; every other one on two ranks, then three, too: what is found on one rank goes one way to the others."""
         self.count += 1
         for ranks in (0, 2 + self.count // 2 % 2) if self.count % 2 else (0,):
-            run = self.run_ranks(ranks, mesh)
-            said = [line for line in run.stderr.splitlines() if line.strip() and not any(n in line for n in MPI_NOISE)]
-            self.assertEqual(run.returncode, 1, f'{ranks} ranks: {run.stderr}')
-            self.assertEqual(len(said), 1, f'{ranks} ranks: {run.stderr}')
-            self.assertTrue(said[0].startswith('hyco: error: '), said[0])
-            self.assertNotIn('internal error', said[0])
-            self.assertIn(text, said[0])
+            self.one_line(self.run_ranks(ranks, mesh), text)
         self.assertEqual({f for f in os.listdir(self.folder) if f in ('r.json', 'o.xdmf', 'o.h5') or 'partial' in f}, set(), 'a file is left')
 
     def test_meshes(self):
@@ -152,6 +174,7 @@ class Meshes(Case):
                     os.remove(self.path('o.h5'))
                 else:
                     self.refused(text, 'bad.msh')
+        ROWS.add(f'broken meshes ({len(MESHES)})', 'one line, status 1, no file left; every other one on 2 or 3 ranks too')
 
     def test_texts(self):
         with open(self.path('two.msh'), encoding='ascii') as f:
@@ -161,6 +184,7 @@ class Meshes(Case):
                 self.assertNotEqual(change(good), good)
                 self.write('bad.msh', change(good))
                 self.refused(text, 'bad.msh')
+        ROWS.add(f'broken mesh files ({len(TEXTS)})', 'one line, status 1, no file left; every other one on 2 or 3 ranks too')
 
     def test_scenes(self):
         for (old, new), text in SCENES:
@@ -168,6 +192,20 @@ class Meshes(Case):
                 self.assertIn(old, SCENE)
                 self.write('scene.yaml', SCENE.replace(old, new, 1))
                 self.refused(text)
+        ROWS.add(f'broken scenes ({len(SCENES)})', 'one line, status 1, no file left; every other one on 2 or 3 ranks too')
+
+    def test_one_rank_only(self):
+        with ThreadPoolExecutor(4) as pool:  # starting ranks is mostly waiting
+            runs = []
+            for k, ((old, new), text) in enumerate(ONE_RANK):
+                self.write(f'one{k}.yaml', SCENE.replace(old, new, 1))
+                for ranks in (2, 3):
+                    runs.append((new, ranks, text, pool.submit(self.run_raw, 'solve', '-scene', f'one{k}.yaml', '-mu', '0.05',
+                                                               ranks=ranks, timeout=60)))
+            for new, ranks, text, run in runs:
+                with self.subTest(new=new, ranks=ranks):
+                    self.one_line(run.result(), text)
+        ROWS.add(f'errors in the cells, facets or contacts of one rank alone ({len(ONE_RANK)}), on 2 and 3 ranks', 'one line, status 1, no rank left waiting')
 
     def test_same_in_every_format(self):
         """2.2 and 4.1, text and binary, lines that end as on Windows, a scene that does: the same answer."""

@@ -1,14 +1,14 @@
 /*
   Fuzz target: the bytes change what the datasets of a good model file hold. First byte: which of the models of
   tests/data; then records of 12 bytes: dataset (1), spare (1), item (2, modulo the dataset's length), value (8). The
-  file keeps its structure, so that the reader's checks of the values are met, not HDF5's of the structure. What loads
-  predicts, on the whole mesh too.
+  file keeps its structure, and gets a seal that fits, so that the reader's checks of the values are met, not HDF5's of
+  the structure. What loads predicts, on the whole mesh too.
 */
 #include "fuzz.h"
 #include <hdf5.h>
 #include <hycomodelimpl.h>
 
-#define N_MODELS 2
+#define N_MODELS 3
 #define RECORD   12
 
 typedef struct {
@@ -17,7 +17,8 @@ typedef struct {
 
 typedef struct {
   uint8_t *bytes;
-  size_t size, n;
+  size_t size, n; /* size without the seal */
+  int sealed;
   Set set[128];
 } Good;
 
@@ -57,6 +58,8 @@ static void ReadGood(const char name[], Good *g)
   g->bytes = malloc(g->size);
   if (!g->bytes || fread(g->bytes, 1, g->size, file) != g->size) abort();
   fclose(file);
+  g->sealed = g->size > HYCO_SEAL && !memcmp(g->bytes + g->size - HYCO_SEAL, "hyco-sum", 8);
+  if (g->sealed) g->size -= HYCO_SEAL;
   h = H5Fopen(file_name, H5F_ACC_RDONLY, H5P_DEFAULT);
   if (h < 0 || H5Ovisit2(h, H5_INDEX_NAME, H5_ITER_NATIVE, NoteSet, g, H5O_INFO_BASIC) < 0) abort();
   H5Fclose(h);
@@ -69,12 +72,13 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
   FuzzPath("model.h5", path);
   ReadGood("rope-hybrid-3.h5", &good[0]);
   ReadGood("rope-projection-3.h5", &good[1]);
+  ReadGood("rope-condensed-4.h5", &good[2]);
   return 0;
 }
 
 static void WriteChanged(const Good *g, const uint8_t *data, size_t size)
 {
-  uint8_t *bytes = malloc(g->size);
+  uint8_t *bytes = malloc(g->size + HYCO_SEAL);
 
   if (!bytes) abort();
   memcpy(bytes, g->bytes, g->size);
@@ -84,7 +88,8 @@ static void WriteChanged(const Good *g, const uint8_t *data, size_t size)
 
     memcpy(bytes + s->at + item * s->item, data + 4, s->item < 8 ? s->item : 8);
   }
-  FuzzWrite(path, bytes, g->size);
+  if (g->sealed) HycoSealMake(bytes, g->size, bytes + g->size);
+  FuzzWrite(path, bytes, g->size + (g->sealed ? HYCO_SEAL : 0));
   free(bytes);
 }
 

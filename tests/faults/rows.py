@@ -1,0 +1,19 @@
+"""Rows of the table in docs/limits.md: a test leaves faults/NAME.csv under the folder where it runs; table.py reads them."""
+import csv
+import os
+
+FOLDER = 'faults'
+
+
+class Rows:
+    """The rows of one test program, begun anew."""
+
+    def __init__(self, name):
+        os.makedirs(FOLDER, exist_ok=True)
+        self.path = os.path.abspath(os.path.join(FOLDER, name + '.csv'))
+        with open(self.path, 'w', encoding='utf-8'):
+            pass
+
+    def add(self, fault, what):
+        with open(self.path, 'a', encoding='utf-8', newline='') as f:
+            csv.writer(f).writerow((fault, what))

@@ -1,0 +1,58 @@
+"""The table of the faults: the rows that the tests left, printed and written to faults.md; fails when a test left none. With
+--write-doc it goes into docs/limits.md, between the markers of that section:
+
+    (cd build/tests && /usr/bin/python3 ../../tests/faults/table.py --write-doc)
+
+What scripts/fuzz left in build-fuzz/runs/ goes in too.
+"""
+import csv
+import glob
+import os
+import sys
+
+SOURCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..')
+TESTS = ('kill.py', 'damage.c', 'files.py', 'meshes.py', 'faults.py', 'api.c')
+BEGIN, END = '<!-- faults: written by tests/faults/table.py --write-doc -->\n', '<!-- end of faults -->\n'
+
+
+def rows():
+    found, problems = [], []
+    for test in TESTS:
+        path = os.path.join('faults', os.path.splitext(test)[0] + '.csv')
+        mine = []
+        if os.path.exists(path):
+            with open(path, encoding='utf-8', newline='') as f:
+                mine = [row + [f'`{test}`'] for row in csv.reader(f)]
+        if not mine:
+            problems.append(f'{test} left no rows: run it first (ctest -L faults)')
+        found += mine
+    for path in sorted(glob.glob(os.path.join(SOURCE, 'build-fuzz', 'runs', '*'))):
+        name = os.path.basename(path)
+        with open(path, encoding='ascii') as f:
+            runs, seconds = f.read().split()
+        crashes = os.listdir(os.path.join(SOURCE, 'build-fuzz', 'found', name))
+        kept = os.listdir(os.path.join(SOURCE, 'tests', 'fuzz', 'corpus', name))
+        found.append([f'fuzzing: {name}, {seconds} s, {runs} inputs',
+                      f'{len(crashes)} crashes, leaks or hangs; {len(kept)} inputs are kept and replayed', '`scripts/fuzz`'])
+    return found, problems
+
+
+def main():
+    found, problems = rows()
+    text = '| fault | what happens | test |\n|---|---|---|\n'
+    text += ''.join('| ' + ' | '.join(cell.replace('|', '/') for cell in row) + ' |\n' for row in found)
+    with open('faults.md', 'w', encoding='utf-8') as f:
+        f.write(text)
+    print(text)
+    if problems:
+        sys.exit('\n'.join(problems))
+    if '--write-doc' in sys.argv:
+        page = os.path.join(SOURCE, 'docs', 'limits.md')
+        with open(page, encoding='utf-8') as f:
+            before, rest = f.read().split(BEGIN)
+        with open(page, 'w', encoding='utf-8') as f:
+            f.write(before + BEGIN + text + END + rest.split(END)[1])
+
+
+if __name__ == '__main__':
+    main()
