@@ -5,6 +5,7 @@ import unittest
 from extreme import SEEN, TRAIN, UNSEEN, Extreme, blocks, points
 
 PROJECTION = ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots')
+AWAY = ('-hyco_rid_modes', 'displacement', '-hyco_pod_max_modes', 1)
 WHOLE = ('-hyco_rid_whole', 'true', '-hyco_hybrid', 'contact')
 ALL = ('-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-15')
 
@@ -44,18 +45,24 @@ class Bases(Extreme):
 
     def test_no_force(self):
         """No training solution presses: right where nothing presses; where it does, the hybrid model with its contacts full
-        order still keeps the gaps closed, the projection has no force to give."""
+        order still keeps the gaps closed, and a model that has no force to give says so."""
         scene = self.scene(*blocks(press=(0, 0.1), gaps=(0, 0.2)))
         train = points((0.02, 0.04), (0.1, 0.2))
         self.both('no force in any solution, none tested', scene, train, points((0.05,), (0.12,)), 1e-9, 1e-9)
+        self.row('no force in any solution, contact tested', 'condensed: error of the forces',
+                 self.condensed(scene, train, points((0.05,), (0.02,)), points((0.04,), (0.1,))), 1e-9)
         self.train(scene, *train, '-hyco_rid_whole', 'true', '-hyco_hybrid', 'all')
         self.row('no force in any solution, contact tested', 'hybrid, all displacements full order: error',
                  self.worst(self.compare(scene, *points((0.05,), (0.02,)))), 1e-9)
-        self.train(scene, *train, *PROJECTION)
-        c = self.compare(scene, *points((0.05,), (0.02,)))
-        self.say('no force in any solution, contact tested', 'projection: error of u, of the forces (says nothing of it)',
-                 f"{c['error_u']['max']:.2g}, {c['error_lambda']['max']:.2g}", verdict='limit')
-        self.assertEqual(c['error_lambda']['max'], 1)
+        touches = ('predict', '-model', 'm.h5', '-mu', '0.05,0.02')
+        for name, more in (('projection', PROJECTION), ('hybrid, no contact in the RID', AWAY)):
+            self.train(scene, *train, *more)
+            self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,0.12')
+            self.refused(f'no force in any solution, contact tested, {name}', *touches, says='has no contact force to give')
+            c = self.hyco('compare', '-scene', scene, '-model', 'm.h5', *points((0.05,), (0.02, 0.12)))
+            self.assertEqual(c['not_converged'], 1)
+            p = self.hyco(*touches, '-hyco_fallback', '-scene', scene)
+            self.assertTrue(p['full_order'])
 
     def test_too_many(self):
         """40 solutions' modes on an RID of few nodes: the training says that its model would be no good, or it is good."""
