@@ -118,6 +118,10 @@ PetscErrorCode HycoReducedDestroy(HycoReduced *reduced);
 /* K and the reduced system at mu, without solving: Kr, Br, Btr and the vectors are current, the prediction is not. */
 PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);
 
+/* A model without any contact force does not converge where its displacement penetrates; the prediction's U is current.
+ */
+PetscErrorCode HycoModelCheckForceless(HycoModel model);
+
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoModelReconstruct(HycoModel model);
 /* NULL-safe. */

@@ -220,10 +220,11 @@ static PetscErrorCode Attempt(HycoSolver s, PetscInt type, HycoForm form, Vec x,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next method after one that did not solve: TAO, the active set, Lemke's. */
+/* The next method after one that did not solve: TAO, the active set, Lemke's; this one wants the dual form, whose
+   factor an iterative solve is there to avoid. */
 static PetscBool NextAttempt(const HycoSolver s, PetscInt *type, HycoForm *form)
 {
-  const PetscBool dense = (PetscBool)(s->system->m && s->system->m <= HYCO_LEMKE_MAX);
+  const PetscBool dense = (PetscBool)(s->system->m && s->system->m <= HYCO_LEMKE_MAX && !s->iterative);
 
   if (!s->fallback || s->reason > 0 || s->reason == HYCO_DIVERGED_SINGULAR || s->p) return PETSC_FALSE;
   if (*type == HYCO_TYPE_LEMKE || (*type == HYCO_TYPE_ACTIVE_SET && !dense)) return PETSC_FALSE;
@@ -329,6 +330,9 @@ const char *HycoReasonName(HycoReason reason)
     return "not converged: a KKT residual is above the tolerance";
   case HYCO_DIVERGED_UNHELD:
     return "not converged: contact alone holds a body, and this load takes it away";
+  case HYCO_DIVERGED_FORCELESS:
+    return "not converged: the model has no contact force to give, and bodies penetrate here; train on solutions that "
+           "press";
   case HYCO_DIVERGED_ITERATIONS:
     return "not converged: the limit of iterations, or a cycle";
   default:

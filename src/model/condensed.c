@@ -289,14 +289,18 @@ static void ComputeKKT(HycoCondensed c, const PetscReal L[], HycoKKT *kkt)
   for (PetscInt i = 0; i < c->m; i++) {
     size = PetscMax(size, PetscMax(PetscAbsReal(c->g[i]), PetscAbsReal(c->w[i])));
     c->w[i] += c->g[i];
+    if (PetscIsInfOrNanReal(c->w[i]) || PetscIsInfOrNanReal(L[i])) worst[2] = PETSC_MAX_REAL;
+  }
+  for (PetscInt i = 0; i < c->m; i++) {
     worst[0] = PetscMax(worst[0], -c->w[i]);
     worst[1] = PetscMax(worst[1], -L[i]);
-    worst[2] = PetscMax(worst[2], PetscAbsReal(c->w[i] * L[i]));
+    if (L[i] != 0 && size > 0)
+      worst[2] = PetscMax(worst[2], PetscAbsReal(c->w[i] / size * (L[i] / most))); /* no overflow */
   }
   kkt->stationarity = kkt->rounding = 0;
   kkt->penetration = worst[0] > 0 ? worst[0] / size : 0;
   kkt->adhesion = worst[1] > 0 ? worst[1] / most : 0;
-  kkt->complementarity = worst[2] > 0 ? worst[2] / (size * most) : 0;
+  kkt->complementarity = worst[2];
 }
 
 /* One method; the forces are in model->Lambda. */

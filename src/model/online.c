@@ -256,6 +256,7 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   PetscCall(HycoSolverGetMethod(m->solver, &method));
   PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
   PetscCall(Unpack(m));
+  PetscCall(HycoModelCheckForceless(m));
   if (m->reconstruct && p->reason > 0 && m->type == HYCO_MODEL_HYBRID)
     HycoLogged(HYCO_EVENT_RECONSTRUCT, HycoModelReconstruct(m));
   p->seconds.total = HycoNow() - begin;

@@ -2,9 +2,10 @@
 RID holds. (Singular values down to 1e-12 of the first: tests/unit/pod.c.)"""
 import unittest
 
-from extreme import SEEN, TRAIN, UNSEEN, Extreme, blocks, points
+from extreme import CONDENSED, SEEN, TRAIN, UNSEEN, Extreme, blocks, points
 
 PROJECTION = ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots')
+AWAY = ('-hyco_rid_modes', 'displacement', '-hyco_pod_max_modes', 1, '-hyco_rid_region', 'y > 1.5 ? 1 : -1')
 WHOLE = ('-hyco_rid_whole', 'true', '-hyco_hybrid', 'contact')
 ALL = ('-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-15')
 
@@ -18,8 +19,15 @@ class Bases(Extreme):
             t = self.train(scene, *train, *more, *options)
             self.row(case, f"{model}: error with {t['n_modes']} modes", self.worst(self.compare(scene, *test)), bound)
 
+    def forces(self, case, scene, train, test, *options, bound=1e-9):
+        """The condensed model's forces, which no basis limits."""
+        self.train(scene, *train, '-hyco_model_type', 'condensed', *options)
+        self.row(case, 'condensed: error of the forces', self.compare(scene, *test)['error_lambda']['max'] or 0, bound)
+
     def test_tolerance(self):
         scene = self.scene(*blocks(crown=0.1, n=(6, 6)))
+        for tol in ('0.5', '1e-16'):
+            self.forces(f'POD tolerance {tol}, between training points', scene, TRAIN, UNSEEN, '-hyco_pod_tol', tol)
         self.refused('POD tolerance 1', 'train', '-scene', scene, '-model', 'm.h5', *TRAIN, '-hyco_pod_tol', 1,
                      says='leaves no mode')
         for tol, bound in (('0.5', 1), ('1e-2', 1), ('1e-4', 0.3), ('1e-8', 1e-2), ('1e-12', 1e-7), ('1e-16', 1e-7)):
@@ -31,6 +39,10 @@ class Bases(Extreme):
         for case, values in (('twice', (0.06, 0.06, 0.05)), ('apart by 1e-9', (0.06, 0.06 * (1 + 1e-9), 0.05)),
                              ('apart by 1e-13', (0.06, 0.06 * (1 + 1e-13), 0.05))):
             self.both(f'a solution {case}', scene, points(values, (0.02,)), SEEN, 1e-7, 1e-7, *ALL)
+        scene = self.scene(*blocks(crown=0.1, n=(6, 6), gaps=(0.02, 0.02)))
+        for case, values in (('twice', (0.06, 0.06, 0.05)), ('apart by 1e-9', (0.06, 0.06 * (1 + 1e-9), 0.05)),
+                             ('apart by 1e-13', (0.06, 0.06 * (1 + 1e-13), 0.05))):
+            self.forces(f'a solution {case}', scene, points(values, (0.02,)), points((0.055, 0.08), (0.02,)))
 
     def test_rank_one(self):
         """No gap, so that every solution is a multiple of one (the paper's S1): one mode, right at any press; and zeros."""
@@ -38,24 +50,35 @@ class Bases(Extreme):
         for case, train in (('no gap: solutions of rank one', (0.02, 0.04, 0.08)), ('a zero solution among them', (0, 0.04)),
                             ('one solution', (0.04,))):
             self.both(case, scene, points(train, (0,)), points((0.05,), (0,)), 1e-9, 1e-9)
+        self.refused('condensed, one solution', 'train', '-scene', scene, '-model', 'm.h5', *points((0.04,), (0,)),
+                     *CONDENSED, says='needs at least two')
         for model, more in (('hybrid', WHOLE), ('projection', PROJECTION)):
             self.refused(f'{model}, zero solutions alone', 'train', '-scene', scene, '-model', 'm.h5',
                          *points((0,), (0, 0.2)), *more, says='zero displacement')
+        scene = self.scene(*blocks(press=(0, 0.1), gaps=(0, 0)))
+        for case, train in (('no gap: solutions of rank one', (0.02, 0.04, 0.08)), ('a zero solution among them', (0, 0.04))):
+            self.forces(case, scene, points(train, (0,)), points((0.05,), (0,)))
 
     def test_no_force(self):
         """No training solution presses: right where nothing presses; where it does, the hybrid model with its contacts full
-        order still keeps the gaps closed, the projection has no force to give."""
+        order still keeps the gaps closed, and a model that has no force to give says so."""
         scene = self.scene(*blocks(press=(0, 0.1), gaps=(0, 0.2)))
         train = points((0.02, 0.04), (0.1, 0.2))
         self.both('no force in any solution, none tested', scene, train, points((0.05,), (0.12,)), 1e-9, 1e-9)
+        self.row('no force in any solution, contact tested', 'condensed: error of the forces',
+                 self.condensed(scene, train, points((0.04,), (0.1,)), points((0.05,), (0.02,))), 1e-9)
         self.train(scene, *train, '-hyco_rid_whole', 'true', '-hyco_hybrid', 'all')
         self.row('no force in any solution, contact tested', 'hybrid, all displacements full order: error',
                  self.worst(self.compare(scene, *points((0.05,), (0.02,)))), 1e-9)
-        self.train(scene, *train, *PROJECTION)
-        c = self.compare(scene, *points((0.05,), (0.02,)))
-        self.say('no force in any solution, contact tested', 'projection: error of u, of the forces (says nothing of it)',
-                 f"{c['error_u']['max']:.2g}, {c['error_lambda']['max']:.2g}", verdict='limit')
-        self.assertEqual(c['error_lambda']['max'], 1)
+        touches = ('predict', '-model', 'm.h5', '-mu', '0.05,0.02')
+        for name, more in (('projection', PROJECTION), ('hybrid, no contact in the RID', AWAY)):
+            self.train(scene, *train, *more)
+            self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,0.12')
+            self.refused(f'no force in any solution, contact tested, {name}', *touches, says='has no contact force to give')
+            self.refused(f'the same, {name}, compared', 'compare', '-scene', scene, '-model', 'm.h5',
+                         *points((0.05,), (0.02, 0.12)), says='1 of the 2 predictions did not converge')
+            p = self.hyco(*touches, '-hyco_fallback', '-scene', scene)
+            self.assertTrue(p['full_order'])
 
     def test_too_many(self):
         """40 solutions' modes on an RID of few nodes: the training says that its model would be no good, or it is good."""

@@ -1,4 +1,4 @@
-"""What the tests at the extremes share: two stacked blocks of any cell type, a scene written from a dictionary, the three
+"""What the tests at the extremes share: two stacked blocks of any cell type, a scene written from a dictionary, the
 models of one scene, and rows of tables.
 
 A row goes to extremes/TEST.csv under the folder where the test runs; table.py makes docs/limits.md's tables of them.
@@ -19,6 +19,7 @@ FOLDER = 'extremes'
 HEAD = ('case', 'what', 'found', 'bound', 'verdict')
 DIM = {'line2': 1, 'tri3': 2, 'quad4': 2, 'tet4': 3, 'hex8': 3}
 ERRORS = ('error_u', 'error_lambda')
+CONDENSED = ('-hyco_model_type', 'condensed', '-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-15')
 
 
 class Extreme(Case):
@@ -89,9 +90,10 @@ class Extreme(Case):
     def worst(self, c):
         return max(c[e]['max'] or 0 for e in ERRORS if e in c)
 
-    def three(self, case, scene, train, seen, unseen, bound=1e-8):
+    def models(self, case, scene, train, seen, unseen, bound=1e-8):
         """Full order by its KKT residuals and energies; the hybrid model with all displacements full order on the whole
-        mesh, which is full order; the projection onto the solutions and their forces, which returns a training point."""
+        mesh, which is full order; the projection onto the solutions and their forces, which returns a training point; the
+        condensed model, whose forces are exact where all parameters are loads and gaps, and which returns a training point."""
         report = self.fields(scene, '-mu', ','.join(unseen[1::2]))[0]
         self.row(case, 'full order: worst KKT residual', max(report['kkt'].values()), 1e-8)
         common = (*train, '-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-15')
@@ -100,7 +102,13 @@ class Extreme(Case):
                 ('projection, at a training point', ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots'), seen)):
             self.train(scene, *common, *options)
             self.row(case, f'{name}: error', self.worst(self.compare(scene, *points_)), bound)
+        self.row(case, 'condensed: error', self.condensed(scene, train, seen, unseen), bound)
         return report
+
+    def condensed(self, scene, train, seen, unseen):
+        """The worst of its forces at unseen points, and of all at training points."""
+        self.train(scene, *train, *CONDENSED)
+        return max(self.compare(scene, *unseen)['error_lambda']['max'] or 0, self.worst(self.compare(scene, *seen)))
 
 
 def blocks(kind='quad4', n=(4, 4), length=1, stress=1, young=(100, 40), poisson=(0.3, 0.2), contact='pair', gap='gap',

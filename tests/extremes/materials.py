@@ -18,7 +18,7 @@ class Contrast(Extreme):
     name = 'contrast'
 
     def test_contrast(self):
-        """Closed form where the blocks are flat; the three models where the gap is curved."""
+        """Closed form where the blocks are flat; the models where the gap is curved."""
         for kind, ratios in (('quad4', (1e2, 1e4, 1e6, 1e8, 1e10)), ('hex8', (1e10,))):
             for ratio in ratios:
                 for young in ((100, 100 * ratio), (100 * ratio, 100)):
@@ -29,7 +29,7 @@ class Contrast(Extreme):
                     self.row(case, 'flat: force against the closed form', abs(r['total_contact_force'] / p - 1), 1e-9)
                     if ratio in (1e4, 1e10):
                         scene = self.scene(*blocks(kind, (4, 4), young=young, crown=0.1))
-                        r = self.three(case, scene, TRAIN, SEEN, UNSEEN, 1e-6 if ratio < 1e8 else 1e-4)
+                        r = self.models(case, scene, TRAIN, SEEN, UNSEEN, 1e-6 if ratio < 1e8 else 1e-4)
                         self.assertTrue(0 < r['n_active'] < r['n_contacts'])
 
 
@@ -74,11 +74,11 @@ class Locking(Extreme):
                 self.assertGreater(found[case, 0], 0.97, case)
 
     def test_contact(self):
-        """The three models near the limit, standard and bbar."""
+        """The models near the limit, standard and bbar."""
         for kind, element in (('quad4', None), ('quad4', 'bbar'), ('hex8', 'bbar'), ('tri3', None)):
             case = f'{kind} {element or "standard"}, contact, 0.4999 in both blocks'
             scene = self.scene(*blocks(kind, (4, 4), poisson=(0.4999, 0.4999), crown=0.1, element=element))
-            self.three(case, scene, TRAIN, SEEN, UNSEEN)
+            self.models(case, scene, TRAIN, SEEN, UNSEEN)
 
     def test_refused(self):
         scene = self.scene(*blocks('tri3', (4, 4), element='bbar'))

@@ -19,7 +19,7 @@ class Shapes(Extreme):
                 p = uniaxial(kind, 0.05, 0.01, *MATERIAL) * aspect**(DIM[kind] - 1)
                 self.row(case, 'flat: force against the closed form', abs(r['total_contact_force'] / p - 1), 1e-6)
                 scene = self.scene(*blocks(kind, (4, 4), aspect=aspect, crown=0.1))
-                self.three(case, scene, TRAIN, SEEN, UNSEEN, 1e-6)
+                self.models(case, scene, TRAIN, SEEN, UNSEEN, 1e-6)
 
 
 class Gaps(Extreme):
@@ -60,7 +60,7 @@ class Gaps(Extreme):
                 del scene['contact']['seam']['gap']
                 scene['body']['b']['map'] = {'y': 'y + (gap + 0.1*x^2)*(2.5 - y)/1.5'}
             scene = self.scene(grid, scene)
-            self.three(f'overlap by {name}, in part', scene, points((0, 0.01), (-0.04, -0.02)), points((0.01,), (-0.02,)),
+            self.models(f'overlap by {name}, in part', scene, points((0, 0.01), (-0.04, -0.02)), points((0.01,), (-0.02,)),
                        points((0.005,), (-0.03,)))
 
     def test_grazing(self):
@@ -72,7 +72,7 @@ class Gaps(Extreme):
             exact = uniaxial('quad4', press, gap, *MATERIAL)
             self.row(f'press = gap + {press - gap:.2g}', 'full order: error of the force over that of the press alone',
                      abs(r['total_contact_force'] - exact) / full, 1e-13)
-        self.three('press = gap, trained around', scene, points((0.04, 0.06), (0.03, 0.05)), points((0.06,), (0.05,)),
+        self.models('press = gap, trained around', scene, points((0.04, 0.06), (0.03, 0.05)), points((0.06,), (0.05,)),
                    points((0.05,), (0.04,)))
         p = self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,0.05')
         self.row('press = gap', 'projection: force over that of the press alone', p['total_contact_force'] / full, 1e-6)
@@ -83,7 +83,7 @@ class Gaps(Extreme):
             for case, crown, gaps, active in (('all', 0, (0, 0.01), 'n'), ('none', 0, (0.09, 0.1), 0), ('one', 40, (0, 0.01), 1)):
                 scene = self.scene(*blocks(kind, (4, 4), gaps=gaps, crown=crown))
                 middle = sum(gaps) / 2
-                r = self.three(f'{kind}, {case} active', scene, points((0.04, 0.06, 0.08), gaps), points((0.06,), gaps[1:]),
+                r = self.models(f'{kind}, {case} active', scene, points((0.04, 0.06, 0.08), gaps), points((0.06,), gaps[1:]),
                                points((0.05,), (middle,)))
                 self.assertEqual(r['n_active'], r['n_contacts'] if active == 'n' else active)
 
@@ -93,13 +93,15 @@ class Gaps(Extreme):
         r, u, lam = self.fields(scene, '-mu', '0,0')
         self.say('no load', 'full order: largest displacement, force', f'{abs(u).max():g}, {abs(lam).max():g}')
         self.assertEqual((abs(u).max(), abs(lam).max()), (0, 0))
-        for model, options in (('hybrid', ()), ('projection', ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots'))):
+        for model, options in (('hybrid', ()), ('projection', ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots')),
+                               ('condensed', ('-hyco_model_type', 'condensed'))):
             self.train(scene, *points((0.02, 0.06, 0.1), (0, 0.02)), *options)
             p = self.hyco('predict', '-model', 'm.h5', '-mu', '0,0')
             self.say('no load', f'{model}: total force', f"{p['total_contact_force']:g}")
             self.assertEqual((p['converged'], p['total_contact_force']), (True, 0))
             self.refused(f'{model}, trained on no load alone', 'train', '-scene', scene, '-model', 'z.h5', '-values_press', 0,
-                         '-values_gap', 0, *options, says='zero')
+                         '-values_gap', 0, *options,
+                         says='needs at least two' if model == 'condensed' else 'zero')
 
     def test_fixed(self):
         """Slaves that are fixed too: in one component, in all; with masters fixed, with and without penetration."""
@@ -112,7 +114,7 @@ class Gaps(Extreme):
             scene['fixed'].update(fixed)
             scene = self.scene(grid, scene)
             if ok:
-                self.three(case, scene, TRAIN, SEEN, UNSEEN)
+                self.models(case, scene, TRAIN, SEEN, UNSEEN)
             else:
                 self.refused(case, 'solve', '-scene', scene, '-mu', '0.05,0.01', says='penetrates by')
 

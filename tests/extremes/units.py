@@ -28,8 +28,8 @@ class Units(Extreme):
     name = 'units'
 
     def answers(self, kind, length, stress):
-        """u over the length and forces over stress times area: of full order, of a hybrid model on an RID and of a
-        projection at an unseen point."""
+        """u over the length and forces over stress times area: of full order, of a hybrid model on an RID, of a
+        projection and of a condensed model at an unseen point."""
         if kind == 'line2':
             scene, press = self.scene(*string(length, stress)), stress / length
             train = ('-values_press', ','.join(repr(v * press) for v in (0.5, 1, 1.5, 2)), '-values_gap',
@@ -42,7 +42,8 @@ class Units(Extreme):
         force = stress * length**(DIM[kind] - 1)
         _, u, lam = self.fields(scene, '-mu', mu)
         out = {'full order': (u / length, lam / force)}
-        for model, options in (('hybrid', more), ('projection', ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots'))):
+        for model, options in (('hybrid', more), ('projection', ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots')),
+                               ('condensed', ('-hyco_model_type', 'condensed'))):
             t = self.train(scene, *train, *options)
             self.hyco('predict', '-model', 'm.h5', '-mu', mu, '-output', self.path('p.xdmf'))
             with h5py.File(self.path('p.h5')) as f:
@@ -57,7 +58,7 @@ class Units(Extreme):
                 for length, stress in factors if kind == 'quad4' else factors[::3]:
                     case = f'{kind}, lengths x {length:.3g}, stresses x {stress:.3g}'
                     out = self.answers(kind, length, stress)
-                    for model in ('full order', 'hybrid', 'projection'):
+                    for model in ('full order', 'hybrid', 'projection', 'condensed'):
                         if model != 'full order':
                             self.assertEqual(out[model + ' sizes'], base[model + ' sizes'], case)
                         apart = max(abs(a - b).max() / abs(b).max() for a, b in zip(out[model], base[model]))

@@ -182,9 +182,73 @@ static PetscErrorCode TestSeveral(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A string of 20 cells pulled onto an obstacle, cut to one iteration where the contact needs several: solves by a
+   factor go on with Lemke's method, iterative ones (as where a factor would not fit) end, for its dual form is made by
+   a factor. */
+#define NODES 19
+
+static PetscErrorCode BeginString(HycoLinear linear, Case *c)
+{
+  Mat K, B, Bt;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, NODES, NODES, 3, NULL, &K));
+  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, NODES, NODES, 1, NULL, &B));
+  for (PetscInt i = 0; i < NODES; i++) {
+    PetscCall(MatSetValue(K, i, i, 2, INSERT_VALUES));
+    if (i) PetscCall(MatSetValue(K, i, i - 1, -1, INSERT_VALUES));
+    if (i < NODES - 1) PetscCall(MatSetValue(K, i, i + 1, -1, INSERT_VALUES));
+    PetscCall(MatSetValue(B, i, i, 1, INSERT_VALUES));
+  }
+  PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(K, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyBegin(B, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(B, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatTranspose(B, MAT_INITIAL_MATRIX, &Bt));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &c->system));
+  PetscCall(HycoSystemSetMatrices(c->system, K, Bt, B, PETSC_TRUE));
+  PetscCall(MatCreateVecs(K, &c->x, &c->F));
+  PetscCall(MatCreateVecs(K, &c->L, &c->D));
+  PetscCall(VecSet(c->F, 1));
+  PetscCall(VecSet(c->D, 10));
+  PetscCall(HycoSystemSetVectors(c->system, c->F, c->D));
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &c->solver));
+  PetscCall(HycoSolverSetSystem(c->solver, c->system));
+  PetscCall(HycoSolverSetLinear(c->solver, linear, 0));
+  PetscCall(HycoSolverSetMultilevel(c->solver, PETSC_FALSE));
+  PetscCall(MatDestroy(&K));
+  PetscCall(MatDestroy(&B));
+  PetscCall(MatDestroy(&Bt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestIterative(void)
+{
+  const HycoLinear linear[2] = {HYCO_LINEAR_DIRECT, HYCO_LINEAR_ITERATIVE};
+  const char *method;
+  HycoReason reason;
+  Case c;
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 3; k++) {
+    const PetscBool lemke = (PetscBool)(k == 1); /* 0: iterative, not cut; 1: direct, cut; 2: iterative, cut */
+
+    PetscCall(BeginString(linear[k != 1], &c));
+    if (k) PetscCall(HycoSolverSetMaxIts(c.solver, 1));
+    PetscCall(HycoSolverSolve(c.solver, c.x, c.L));
+    PetscCall(HycoSolverGetMethod(c.solver, &method));
+    PetscCall(HycoSolverGetReason(c.solver, &reason));
+    CHECK((strstr(method, "lemke") != NULL) == lemke, "case %d: %s", k, method);
+    CHECK((reason > 0) == (k < 2), "case %d, %s: reason %d", k, method, (int)reason);
+    PetscCall(End(&c));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
+  PetscCall(TestIterative());
   PetscCall(TestActiveSet());
   PetscCall(TestTao());
   PetscCall(TestNone());

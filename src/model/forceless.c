@@ -1,0 +1,25 @@
+/*
+  A model without a contact force: no training solution pressed, so that it has no force vector (44), or none of its
+  contacts is in the RID. It is right where nothing presses; where its displacement penetrates, it has no answer.
+*/
+#include <hycomodelimpl.h>
+
+PetscErrorCode HycoModelCheckForceless(HycoModel m)
+{
+  HycoPrediction *p = &m->prediction;
+  PetscReal in = 0, size = 0;
+
+  PetscFunctionBegin;
+  if (m->n_L || p->reason <= 0 || (m->type == HYCO_MODEL_HYBRID && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    PetscReal bu = 0;
+
+    for (PetscInt j = m->row_start[k]; j < m->row_start[k + 1]; j++) bu += m->row_value[j] * m->U[m->row_dof[j]];
+    in = PetscMax(in, bu - m->gap[k]);
+    size = PetscMax(size, PetscMax(PetscAbsReal(bu), PetscAbsReal(m->gap[k])));
+  }
+  if (in <= m->solver->rtol * size) PetscFunctionReturn(PETSC_SUCCESS);
+  p->kkt.penetration = in / size;
+  p->reason = HYCO_DIVERGED_FORCELESS;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
