@@ -14,7 +14,7 @@ typedef struct _n_HycoMesh *HycoMesh;
 struct _n_HycoMesh {
   PetscInt dim, nv, nf; /* space dimension; nodes of a cell, of a facet */
   HycoCellType type;
-  /* nodes, ascending by tag */
+  /* nodes, ascending by tag; in a part those of its cells, then the others */
   PetscInt n_nodes;
   PetscReal *xyz;        /* n_nodes x 3, as in the file (not moved) */
   PetscInt *node_id;     /* tag in the mesh file */
@@ -51,7 +51,7 @@ PetscErrorCode HycoMeshFindGroup(HycoMesh mesh, const char key[], const char nam
 PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene);
 
 /*
-  The part of a whole mesh with the cells keep[0..n_keep) (ascending) and, besides their nodes, extra[0..n_extra).
+  The part of a whole mesh with the cells keep[0..n_keep) (ascending) and, after their nodes, extra[0..n_extra).
   Facets are kept if their cell is, or if their group is in all_facets[0..n_all) (their nodes must then be kept).
   node_whole and cell_whole lead back. The caller owns it.
 */

@@ -20,6 +20,12 @@ typedef struct _n_HycoCondensed *HycoCondensed;
 typedef struct _n_HycoReconstruction *HycoReconstruction;
 typedef struct _n_HycoReduced *HycoReduced;
 
+/* Rows of B in CSR over dofs of a mesh, and D: see HycoContactRows(). */
+typedef struct {
+  PetscInt *start, *dof;
+  PetscReal *value, *gap;
+} HycoRows;
+
 /* The basis of the contact forces; fe: none, the true multipliers of the hybrid model. */
 typedef enum { HYCO_DUAL_FE, HYCO_DUAL_NNMF, HYCO_DUAL_SNAPSHOTS } HycoDual;
 extern const char *const HycoDuals[]; /* their words, as options and files have them; NULL ends */
@@ -80,7 +86,7 @@ struct _p_HycoModel {
   PetscInt reconstruct_solver;       /* of (41), index in HycoReconstructSolvers */
   HycoReconstruction reconstruction; /* what (41) keeps, made by the first */
   PetscBool ready, reconstruct, solved, whole_current;
-  HycoFE fe;
+  HycoFE fe;             /* on the RID's own nodes, the first of mesh; condensed: on mesh */
   PetscInt n_free, n, m; /* modes that are unknowns, all unknowns, contacts of A_lambda */
   PetscInt n_L;          /* multipliers of the reduced system: m, or l_lambda */
   PetscInt *contact;     /* m: index in pairs */
@@ -89,7 +95,14 @@ struct _p_HycoModel {
   HycoReduced reduced;   /* how K goes into Kr, and what of it stays; made by the first */
   Mat K, Kr, Br, Btr;
   Vec F, Fr, Dr, x, L;
-  PetscInt *row_start, *row_dof; /* rows of B over dofs of mesh, all contacts */
+  HycoMesh own;                  /* the cells and the first nodes of mesh: all that the reduced problem touches */
+  HycoPairs own_pairs;           /* the m contacts of A_lambda */
+  HycoRows own_rows;             /* theirs, at fe's parameters */
+  HycoMesh beyond;               /* mesh without cells; NULL until somebody asks */
+  HycoFE fe_beyond;              /* on it */
+  PetscBool beyond_current;      /* U on all nodes of mesh, the rows of all contacts: HycoModelComplete() was called */
+  PetscBool spread;              /* Lambda is not 0 outside A_lambda */
+  PetscInt *row_start, *row_dof; /* rows of B over dofs of mesh, all contacts; current after HycoModelComplete() */
   PetscReal *row_value, *gap;
   HycoSystem system;
   HycoSolver solver;
@@ -121,6 +134,14 @@ PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);
 /* A model without any contact force does not converge where its displacement penetrates; the prediction's U is current.
  */
 PetscErrorCode HycoModelCheckForceless(HycoModel model);
+
+/* The part of the model's mesh that the reduced problem touches, and its contacts (own.c): the nodes of cells and of
+   A_lambda, and those that measured normals there ask for. Nothing else is evaluated by a prediction without
+   reconstruction. */
+PetscErrorCode HycoModelCreateOwn(HycoModel model);
+PetscErrorCode HycoModelDestroyOwn(HycoModel model);
+/* Brings row_start, row_dof, row_value, gap of all contacts and U of all nodes of mesh to the last prediction. */
+PetscErrorCode HycoModelComplete(HycoModel model);
 
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoModelReconstruct(HycoModel model);

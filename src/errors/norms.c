@@ -87,6 +87,7 @@ PetscErrorCode HycoNormDual(HycoNorms h, HycoModel m, PetscBool rid_only, const 
 
   PetscFunctionBegin;
   *norm = 0;
+  PetscCall(HycoModelComplete(m));
   PetscCall(VecSet(h->x, 0));
   PetscCall(VecGetArray(h->x, &r));
   for (PetscInt k = 0; k < m->pairs.n; k++) {

@@ -114,7 +114,7 @@ static PetscErrorCode SetUp(HycoIndicator d)
     PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->m, &d->L));
     PetscCall(VecDuplicate(d->L, &d->D));
   }
-  PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->mesh->n_nodes, 0, &d->M));
+  PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->fe->mesh->n_nodes, 0, &d->M));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &d->system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &d->solver));
   PetscCall(HycoSolverSetFromOptions(d->solver, m->scene->options));
@@ -127,7 +127,7 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
 {
   HycoModel m = d->model;
   const unsigned long long now =
-      HycoHash(HYCO_HASH_START, m->fe->X, (size_t)(3 * m->mesh->n_nodes) * sizeof(PetscReal));
+      HycoHash(HYCO_HASH_START, m->fe->X, (size_t)(3 * m->fe->mesh->n_nodes) * sizeof(PetscReal));
   PetscBool singular;
 
   PetscFunctionBegin;
@@ -167,15 +167,16 @@ static PetscErrorCode Interpolate(HycoIndicator d, const PetscReal mu[])
 static PetscErrorCode AssembleContact(HycoIndicator d)
 {
   HycoModel m = d->model;
+  const HycoRows *rows = &m->own_rows;
 
   PetscFunctionBegin;
   PetscCall(MatDestroy(&d->B));
   PetscCall(MatDestroy(&d->Bt));
   PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, m->m, d->n_A, HycoPairsWidth(&m->pairs) * m->mesh->dim, NULL, &d->B));
   for (PetscInt k = 0; k < m->m; k++) {
-    for (PetscInt j = m->row_start[m->contact[k]]; j < m->row_start[m->contact[k] + 1]; j++) {
-      if (d->place[m->row_dof[j]] < 0) continue;
-      PetscCall(MatSetValue(d->B, k, d->place[m->row_dof[j]], m->row_value[j], INSERT_VALUES));
+    for (PetscInt j = rows->start[k]; j < rows->start[k + 1]; j++) {
+      if (d->place[rows->dof[j]] < 0) continue;
+      PetscCall(MatSetValue(d->B, k, d->place[rows->dof[j]], rows->value[j], INSERT_VALUES));
     }
   }
   PetscCall(MatAssemblyBegin(d->B, MAT_FINAL_ASSEMBLY));
@@ -188,6 +189,7 @@ static PetscErrorCode AssembleContact(HycoIndicator d)
 static PetscErrorCode AssembleGap(HycoIndicator d)
 {
   HycoModel m = d->model;
+  const HycoRows *rows = &m->own_rows;
   const PetscScalar *u;
   PetscScalar *gap;
 
@@ -195,9 +197,8 @@ static PetscErrorCode AssembleGap(HycoIndicator d)
   PetscCall(VecGetArrayRead(d->interface, &u));
   PetscCall(VecGetArray(d->D, &gap));
   for (PetscInt k = 0; k < m->m; k++) {
-    gap[k] = m->gap[m->contact[k]];
-    for (PetscInt j = m->row_start[m->contact[k]]; j < m->row_start[m->contact[k] + 1]; j++)
-      gap[k] -= m->row_value[j] * u[m->row_dof[j]];
+    gap[k] = rows->gap[k];
+    for (PetscInt j = rows->start[k]; j < rows->start[k + 1]; j++) gap[k] -= rows->value[j] * u[rows->dof[j]];
   }
   PetscCall(VecRestoreArray(d->D, &gap));
   PetscCall(VecRestoreArrayRead(d->interface, &u));

@@ -416,6 +416,7 @@ PetscErrorCode HycoCondensedSetUp(HycoModel m)
   PetscCall(HycoCondensedPrepare(m->condensed));
   m->n = m->n_free = m->l;
   m->m = m->n_L = m->pairs.n;
+  m->spread = PETSC_TRUE;
   PetscCall(PetscMalloc1(m->m, &m->contact));
   PetscCall(PetscMalloc1(m->m, &m->slave_id));
   for (PetscInt k = 0; k < m->m; k++) {

@@ -11,6 +11,7 @@ PetscErrorCode HycoModelCheckForceless(HycoModel m)
 
   PetscFunctionBegin;
   if (m->n_L || p->reason <= 0 || (m->type == HYCO_MODEL_HYBRID && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoModelComplete(m));
   for (PetscInt k = 0; k < m->pairs.n; k++) {
     PetscReal bu = 0;
 

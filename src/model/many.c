@@ -59,11 +59,12 @@ static PetscErrorCode SolveEach(HycoModel m, PetscInt n, const Point point[], Hy
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
-    const size_t at = (size_t)point[k].at, n_dof = (size_t)m->fe->n_dof;
+    const size_t at = (size_t)point[k].at, n_dof = (size_t)(m->mesh->n_nodes * m->mesh->dim);
 
     PetscCall(HycoModelPredict(m, m->scene->n_parameters, point[k].mu));
     if (prediction) PetscCall(HycoModelGetPrediction(m, &prediction[at]));
     if (Lambda) PetscCall(PetscArraycpy(Lambda + at * (size_t)m->pairs.n, m->Lambda, m->pairs.n));
+    if (U) PetscCall(HycoModelComplete(m));
     if (U) PetscCall(PetscArraycpy(U + at * n_dof, m->U, n_dof));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -31,6 +31,7 @@ PetscErrorCode HycoModelReset(HycoModel m)
   PetscCall(VecDestroy(&m->x));
   PetscCall(VecDestroy(&m->L));
   PetscCall(HycoFEDestroy(&m->fe));
+  PetscCall(HycoModelDestroyOwn(m));
   PetscCall(PetscFree(m->contact));
   PetscCall(PetscFree(m->fe_at));
   PetscCall(PetscFree(m->Vp));
@@ -136,6 +137,27 @@ static PetscErrorCode CheckSolved(HycoModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sums over the contacts that may carry a force. */
+static void SumForces(HycoModel m, HycoPrediction *p)
+{
+  const PetscInt n = m->spread ? m->pairs.n : m->m;
+
+  p->n_active = 0;
+  p->total_contact_force = p->lambda_max = p->lambda_norm2 = p->covered_force = 0;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt k = m->spread ? i : m->contact[i];
+
+    p->total_contact_force += m->Lambda[k];
+    if (m->in_rid[k]) p->covered_force += m->Lambda[k];
+    p->lambda_max = PetscMax(p->lambda_max, m->Lambda[k]);
+    p->lambda_norm2 += m->Lambda[k] * m->Lambda[k];
+  }
+  for (PetscInt i = 0; i < n; i++) /* the reconstruction leaves round-off */
+    p->n_active += m->Lambda[m->spread ? i : m->contact[i]] > 1e-10 * p->lambda_max;
+  p->covered_force = p->total_contact_force > 0 ? p->covered_force / p->total_contact_force : 1;
+  p->lambda_norm2 = PetscSqrtReal(p->lambda_norm2);
+}
+
 /* Stresses of the RID's cells and the numbers that need them or the reconstruction. */
 PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
 {
@@ -153,22 +175,11 @@ PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
   p->n_modes = m->l;
   p->n_fe_dofs = m->n_fe;
   p->rid_nodes = 0;
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) p->rid_nodes += m->role[i] != HYCO_ROLE_OUTSIDE;
+  for (PetscInt i = 0; i < m->fe->mesh->n_nodes; i++) p->rid_nodes += m->role[i] != HYCO_ROLE_OUTSIDE;
   p->rid_elements = m->mesh->n_cells;
   p->rid_fraction = (PetscReal)m->mesh->n_cells / m->whole_cells;
   p->condition = m->numbers[0];
-  p->n_active = 0;
-  p->total_contact_force = p->lambda_max = p->lambda_norm2 = p->covered_force = 0;
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
-    p->total_contact_force += m->Lambda[k];
-    if (m->in_rid[k]) p->covered_force += m->Lambda[k];
-    p->lambda_max = PetscMax(p->lambda_max, m->Lambda[k]);
-    p->lambda_norm2 += m->Lambda[k] * m->Lambda[k];
-  }
-  for (PetscInt k = 0; k < m->pairs.n; k++)
-    p->n_active += m->Lambda[k] > 1e-10 * p->lambda_max; /* the reconstruction leaves round-off */
-  p->covered_force = p->total_contact_force > 0 ? p->covered_force / p->total_contact_force : 1;
-  p->lambda_norm2 = PetscSqrtReal(p->lambda_norm2);
+  SumForces(m, p);
   p->u_norm2 = 0;
   for (PetscInt c = 0; c < 3; c++) p->u_min[c] = p->u_max[c] = 0;
   for (PetscInt k = 0, first = 1; k < m->fe->n_dof; k++) {
@@ -199,6 +210,7 @@ PetscErrorCode HycoModelGetRID(HycoModel m, PetscInt *n_nodes, const PetscInt *n
   PetscCall(CheckSolved(m));
   if (n_nodes) *n_nodes = m->mesh->n_nodes;
   if (node_ids) *node_ids = m->mesh->node_id;
+  if (U) PetscCall(HycoModelComplete(m));
   if (U) *U = m->U;
   if (n_cells) *n_cells = m->mesh->n_cells;
   if (cell_ids) *cell_ids = m->mesh->cell_id;

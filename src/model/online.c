@@ -78,13 +78,8 @@ static PetscErrorCode SetUpBasis(HycoModel m)
   }
   m->n_free = m->hybrid == HYCO_HYBRID_ALL ? 0 : l;
   m->n = m->n_free + m->n_fe;
-  m->m = 0;
-  PetscCall(PetscMalloc1(m->pairs.n, &m->contact));
   PetscCall(PetscMalloc1(m->pairs.n, &m->slave_id));
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
-    m->slave_id[k] = m->mesh->node_id[m->pairs.slave[k]];
-    if (m->in_rid[k]) m->contact[m->m++] = k;
-  }
+  for (PetscInt k = 0; k < m->pairs.n; k++) m->slave_id[k] = m->mesh->node_id[m->pairs.slave[k]];
   m->n_L = m->type == HYCO_MODEL_PROJECTION ? m->l_lambda : m->m;
   HycoCheck(m->n > 0, "the model has no unknown: every training solution is zero");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -116,13 +111,14 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
     PetscCall(HycoCondensedSetUp(m));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
+  PetscCall(HycoModelCreateOwn(m));
+  PetscCall(HycoFECreate(m->scene, m->own, &m->fe));
   PetscCall(SetUpBasis(m));
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
+  for (PetscInt i = 0; i < m->own->n_nodes; i++)
     interface = (PetscBool)(interface || m->role[i] == HYCO_ROLE_INTERFACE);
   dense = (PetscBool)(m->n <= HYCO_DENSE_MAX || m->type == HYCO_MODEL_PROJECTION ||
                       (m->hybrid == HYCO_HYBRID_ALL && interface));
-  PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->mesh->n_nodes, 0, &m->K));
+  PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->own->n_nodes, 0, &m->K));
   PetscCall(MatCreateVecs(m->K, &m->F, NULL));
   if (dense)
     PetscCall(CreateReduced(m, m->n, m->n, PETSC_TRUE, &m->Kr));
@@ -135,12 +131,8 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
     PetscCall(MatCreateVecs(m->Br, NULL, &m->L));
     PetscCall(VecDuplicate(m->L, &m->Dr));
   }
-  PetscCall(PetscMalloc1(m->pairs.n + 1, &m->row_start));
-  PetscCall(PetscMalloc1(HycoPairsWidth(&m->pairs) * m->mesh->dim * m->pairs.n, &m->row_dof));
-  PetscCall(PetscMalloc1(HycoPairsWidth(&m->pairs) * m->mesh->dim * m->pairs.n, &m->row_value));
-  PetscCall(PetscMalloc1(m->pairs.n, &m->gap));
   PetscCall(PetscCalloc1(m->l, &m->gamma));
-  PetscCall(PetscCalloc1(m->fe->n_dof, &m->U));
+  PetscCall(PetscCalloc1(m->mesh->n_nodes * m->mesh->dim, &m->U));
   PetscCall(PetscCalloc1(m->pairs.n, &m->Lambda));
   PetscCall(PetscMalloc1(m->mesh->n_cells * m->fe->n_sigma, &m->stress));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &m->system));
@@ -162,8 +154,10 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
 static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
 {
   PetscBool first = PETSC_FALSE;
+  HycoRows *rows = &m->own_rows;
 
   PetscFunctionBegin;
+  m->beyond_current = PETSC_FALSE;
   first = (PetscBool)!m->system->K;
   PetscCall(HycoFESetParameters(m->fe, mu));
   m->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
@@ -175,7 +169,8 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   }
   HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, m->F));
   if (m->fe->contact_changed || m->fe->gap_changed)
-    HycoLogged(HYCO_EVENT_CONTACT, HycoContactRows(m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap));
+    HycoLogged(HYCO_EVENT_CONTACT,
+               HycoContactRows(m->fe, &m->own_pairs, rows->start, rows->dof, rows->value, rows->gap));
   if (m->n_L && m->fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
   HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
   m->fe->ready = PETSC_TRUE;
@@ -215,10 +210,12 @@ static PetscErrorCode Unpack(HycoModel m)
   if (l) BLASgemv_("T", &l, &n_dof, &one, m->Vp, &l, m->gamma, &inc, &one, m->U, &inc);
   for (PetscInt f = 0; f < m->n_fe; f++) m->U[m->fe_dof[f]] = x[m->n_free + f];
   PetscCall(VecRestoreArrayRead(m->x, &x));
-  PetscCall(PetscArrayzero(m->Lambda, m->pairs.n));
+  if (m->spread) PetscCall(PetscArrayzero(m->Lambda, m->pairs.n));
+  m->spread = PETSC_FALSE;
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
   if (m->type == HYCO_MODEL_PROJECTION) {
     PetscCall(HycoProjectionExpand(m));
+    m->spread = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecGetArrayRead(m->L, &L));

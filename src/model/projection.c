@@ -16,6 +16,7 @@ const char *const HycoDuals[] = {"fe", "nnmf", "snapshots", NULL};
 PetscErrorCode HycoProjectionFillContact(HycoModel m)
 {
   const PetscInt l = m->l, n = m->l_lambda;
+  const HycoRows *rows = &m->own_rows;
   PetscReal *BV;
   PetscScalar *b, *bt;
 
@@ -28,8 +29,8 @@ PetscErrorCode HycoProjectionFillContact(HycoModel m)
     const PetscInt k = m->contact[c];
 
     PetscCall(PetscArrayzero(BV, l));
-    for (PetscInt t = m->row_start[k]; t < m->row_start[k + 1]; t++) {
-      for (PetscInt j = 0; j < l; j++) BV[j] += m->row_value[t] * m->Vp[(size_t)m->row_dof[t] * (size_t)l + (size_t)j];
+    for (PetscInt t = rows->start[c]; t < rows->start[c + 1]; t++) {
+      for (PetscInt j = 0; j < l; j++) BV[j] += rows->value[t] * m->Vp[(size_t)rows->dof[t] * (size_t)l + (size_t)j];
     }
     for (PetscInt j = 0; j < l; j++) {
       for (PetscInt i = 0; i < n; i++) b[j * n + i] += m->V_lambda[(size_t)i * (size_t)m->pairs.n + (size_t)k] * BV[j];
@@ -54,7 +55,7 @@ PetscErrorCode HycoProjectionFillGap(HycoModel m)
     const PetscReal *v = m->V_lambda + (size_t)i * (size_t)m->pairs.n;
 
     d[i] = 0;
-    for (PetscInt c = 0; c < m->m; c++) d[i] += v[m->contact[c]] * m->gap[m->contact[c]];
+    for (PetscInt c = 0; c < m->m; c++) d[i] += v[m->contact[c]] * m->own_rows.gap[c];
   }
   PetscCall(VecRestoreArray(m->Dr, &d));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -126,6 +126,7 @@ PetscErrorCode HycoModelReconstruct(HycoModel m)
   for (PetscInt k = 0; k < m->m; k++) force += m->Lambda[m->contact[k]];
   if (m->m == N || !m->n_dual || !m->m || force == 0) PetscFunctionReturn(PETSC_SUCCESS);
   if (!m->reconstruction) PetscCall(SetUp(m));
+  PetscCall(HycoModelComplete(m));
   r = m->reconstruction;
   for (PetscInt i = 0; i < r->n; i++) {
     const PetscInt k = r->contact[i];
@@ -143,6 +144,7 @@ PetscErrorCode HycoModelReconstruct(HycoModel m)
     const PetscReal *s = r->S + (size_t)j * (size_t)r->n;
 
     if (r->c[j] == 0) continue;
+    m->spread = PETSC_TRUE;
     for (PetscInt i = 0; i < r->n; i++) {
       if (!m->in_rid[r->contact[i]]) m->Lambda[r->contact[i]] += r->c[j] * s[i];
     }

@@ -280,6 +280,7 @@ PetscErrorCode HycoReducedFillStiffness(HycoModel m)
 /* B[A_lambda, A'_c] Vbar[A'_c,:] and Vbar[A_c,:]^T B[A_lambda, A_c]^T */
 PetscErrorCode HycoReducedFillContact(HycoModel m)
 {
+  const HycoRows *rows = &m->own_rows;
   PetscReal *value;
   PetscInt *index, dim = m->fe->dim;
 
@@ -293,8 +294,8 @@ PetscErrorCode HycoReducedFillContact(HycoModel m)
   PetscCall(MatZeroEntries(m->Br));
   PetscCall(MatZeroEntries(m->Btr));
   for (PetscInt k = 0; k < m->m; k++) {
-    const PetscInt lo = m->row_start[m->contact[k]], hi = m->row_start[m->contact[k] + 1];
-    PetscInt count = ReducedRow(m, hi - lo, m->row_dof + lo, m->row_value + lo, m->reduced->y, index, value);
+    const PetscInt lo = rows->start[k], hi = rows->start[k + 1];
+    PetscInt count = ReducedRow(m, hi - lo, rows->dof + lo, rows->value + lo, m->reduced->y, index, value);
 
     PetscCall(MatSetValues(m->Br, 1, &k, count, index, value, INSERT_VALUES));
     for (PetscInt j = 0; j < m->n_free; j++) {
@@ -303,14 +304,13 @@ PetscErrorCode HycoReducedFillContact(HycoModel m)
     }
     count = m->n_free;
     for (PetscInt t = lo; t < hi; t++) {
-      const PetscInt i = m->row_dof[t];
+      const PetscInt i = rows->dof[t];
 
       if (m->role[i / dim] != HYCO_ROLE_A) continue;
-      for (PetscInt j = 0; j < m->n_free; j++)
-        value[j] += m->row_value[t] * m->Vp[(size_t)i * (size_t)m->l + (size_t)j];
+      for (PetscInt j = 0; j < m->n_free; j++) value[j] += rows->value[t] * m->Vp[(size_t)i * (size_t)m->l + (size_t)j];
       if (m->fe_at[i] < 0) continue;
       index[count] = m->n_free + m->fe_at[i];
-      value[count++] = m->row_value[t];
+      value[count++] = rows->value[t];
     }
     PetscCall(MatSetValues(m->Btr, count, index, 1, &k, value, INSERT_VALUES));
   }
@@ -346,7 +346,7 @@ PetscErrorCode HycoReducedFillVectors(HycoModel m)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecGetArray(m->Dr, &d));
-  for (PetscInt k = 0; k < m->m; k++) d[k] = m->gap[m->contact[k]];
+  for (PetscInt k = 0; k < m->m; k++) d[k] = m->own_rows.gap[k];
   PetscCall(VecRestoreArray(m->Dr, &d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

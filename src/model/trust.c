@@ -73,6 +73,7 @@ PetscErrorCode HycoTrustMeasure(HycoModel m, PetscReal feature[])
   const PetscInt n_par = m->scene->n_parameters;
 
   PetscFunctionBegin;
+  PetscCall(HycoModelComplete(m));
   feature[MISFIT] = Misfit(m);
   Contacts(m, &feature[PENETRATION], &feature[ADHESION]);
   feature[DISTANCE] = m->n_points && n_par ? PETSC_MAX_REAL : 0;

@@ -130,7 +130,8 @@ PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* index[i] = place of whole node i in the part, or -1; part->node_whole is filled. */
+/* index[i] = place of whole node i in the part, or -1; nodes of cells come before the others. part->node_whole is
+   filled. */
 static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
                                   const PetscInt extra[], HycoMesh part, PetscInt index[])
 {
@@ -139,10 +140,15 @@ static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscIn
   for (PetscInt k = 0; k < n_keep; k++) {
     for (PetscInt v = 0; v < whole->nv; v++) index[whole->cells[keep[k] * whole->nv + v]] = 0;
   }
-  for (PetscInt k = 0; k < n_extra; k++) index[extra[k]] = 0;
-  for (PetscInt i = 0; i < whole->n_nodes; i++) {
-    if (index[i] == 0) index[i] = part->n_nodes++;
+  for (PetscInt k = 0; k < n_extra; k++) {
+    if (index[extra[k]] < 0) index[extra[k]] = -2;
   }
+  for (PetscInt pass = 0; pass > -3; pass -= 2) {
+    for (PetscInt i = 0; i < whole->n_nodes; i++) {
+      if (index[i] == pass) index[i] = -3 - part->n_nodes++; /* a number that no pass looks for */
+    }
+  }
+  for (PetscInt i = 0; i < whole->n_nodes; i++) index[i] = index[i] < -2 ? -3 - index[i] : -1;
   PetscCall(PetscMalloc1(part->n_nodes, &part->node_whole));
   PetscCall(PetscMalloc1(part->n_nodes * 3, &part->xyz));
   PetscCall(PetscMalloc1(part->n_nodes, &part->node_id));
@@ -217,6 +223,7 @@ static PetscErrorCode SelectGroups(PetscInt n_groups, const PetscInt start[], co
     for (PetscInt k = start[g]; k < start[g + 1]; k++) {
       if (index[member[k]] >= 0) (*new_member)[n++] = index[member[k]];
     }
+    PetscCall(PetscSortInt(n - (*new_start)[g], *new_member + (*new_start)[g]));
     (*new_start)[g + 1] = n;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
