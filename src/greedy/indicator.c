@@ -310,6 +310,7 @@ PetscErrorCode HycoIndicatorEvaluate(HycoIndicator d, const PetscReal mu[], Hyco
   PetscFunctionBegin;
   PetscCall(HycoModelPredict(m, m->scene->n_parameters, mu));
   if (d->kind == HYCO_INDICATOR_PENETRATION) {
+    PetscCall(HycoModelComplete(m));
     v->eta = v->eta_u = v->size = Penetration(m);
     v->eta_lambda = 0;
   } else {

@@ -77,12 +77,12 @@ static PetscErrorCode Candidates(HycoModel m, PetscInt candidate[])
       PetscReal best = 0;
 
       if ((m->role[slave] == HYCO_ROLE_A) != (pass == 0)) continue;
-      for (PetscInt t = m->row_start[m->contact[k]]; t < m->row_start[m->contact[k] + 1]; t++) {
-        const PetscInt dof = m->row_dof[t];
+      for (PetscInt t = m->own_rows.start[k]; t < m->own_rows.start[k + 1]; t++) {
+        const PetscInt dof = m->own_rows.dof[t];
 
         if (taken[dof] || m->role[dof / dim] != HYCO_ROLE_A) continue;
-        if (PetscAbsReal(m->row_value[t]) <= best * (1 + 1e-12)) continue;
-        best = PetscAbsReal(m->row_value[t]);
+        if (PetscAbsReal(m->own_rows.value[t]) <= best * (1 + 1e-12)) continue;
+        best = PetscAbsReal(m->own_rows.value[t]);
         candidate[k] = dof;
       }
       if (candidate[k] >= 0) taken[candidate[k]] = PETSC_TRUE;
@@ -148,9 +148,9 @@ static PetscErrorCode ResolvedContacts(HycoModel m, const PetscInt candidate[], 
   PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
   PetscCall(MatSeqAIJGetArrayRead(m->K, &a));
   for (PetscInt k = 0; k < m->m; k++) {
-    for (PetscInt t = m->row_start[m->contact[k]]; t < m->row_start[m->contact[k] + 1]; t++) {
-      for (PetscInt j = 0; m->role[m->row_dof[t] / dim] == HYCO_ROLE_A && j < l; j++)
-        BV[k * l + j] += m->row_value[t] * m->V[m->row_dof[t] * l + j];
+    for (PetscInt t = m->own_rows.start[k]; t < m->own_rows.start[k + 1]; t++) {
+      for (PetscInt j = 0; m->role[m->own_rows.dof[t] / dim] == HYCO_ROLE_A && j < l; j++)
+        BV[k * l + j] += m->own_rows.value[t] * m->V[m->own_rows.dof[t] * l + j];
     }
     for (PetscInt t = ia[candidate[k]]; t < ia[candidate[k] + 1]; t++) {
       for (PetscInt j = 0; j < l; j++) KV[k * l + j] += a[t] * m->V[ja[t] * l + j];
