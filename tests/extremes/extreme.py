@@ -33,8 +33,13 @@ class Extreme(Case):
         cls.table = os.path.abspath(os.path.join(FOLDER, cls.name + '.csv'))
         if cls.name not in Extreme.begun:
             Extreme.begun.add(cls.name)
-            with open(cls.table, 'w', encoding='utf-8', newline='') as f:
-                csv.writer(f).writerow(HEAD)
+            cls.begin()
+
+    @classmethod
+    def begin(cls):
+        """An empty table."""
+        with open(cls.table, 'w', encoding='utf-8', newline='') as f:
+            csv.writer(f).writerow(HEAD)
 
     begun, written = set(), 0
 
