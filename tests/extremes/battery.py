@@ -1,6 +1,7 @@
 """Random scenes, seeds fixed: cells, sizes, materials, gaps, loads, units, kinds of contact, distorted meshes. Full order is
 judged by its KKT residuals, and the model with the whole mesh and all displacements full order must be full order at an
-unseen point, to 1e-8; so must the condensed model's forces be. `battery.py 20260101 500` runs 500 from that seed, a table of its own; without arguments some dozens."""
+unseen point, to 1e-8; so must the condensed model's forces be. `battery.py 20260101 500` runs 500 from that seed, a
+table of its own; without arguments some dozens."""
 import sys
 import unittest
 

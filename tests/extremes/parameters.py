@@ -97,7 +97,8 @@ class Parameters(Extreme):
         self.assertGreaterEqual(t['n_samples'], 64)
         at = [a for k, v in (('press', 0.06), ('gap', 0.005), ('soft', 50), ('stiff', 150), ('squash', 0.2), ('crown', 0.08))
               for a in (f'-values_{k}', v)]
-        self.row(f"six parameters, greedy: {t['n_samples']} solutions", 'hybrid, whole domain: error', self.worst(self.compare(scene, *at)), 1e-8)
+        self.row(f"six parameters, greedy: {t['n_samples']} solutions", 'hybrid, whole domain: error',
+                 self.worst(self.compare(scene, *at)), 1e-8)
 
 
 if __name__ == '__main__':
