@@ -1,6 +1,7 @@
 """Random scenes, seeds fixed: cells, sizes, materials, gaps, loads, units, kinds of contact, distorted meshes. Full order is
 judged by its KKT residuals, and the model with the whole mesh and all displacements full order must be full order at an
-unseen point, to 1e-8; so must the condensed model's forces be. `battery.py 20260101 500` runs 500 from that seed, a table of its own; without arguments some dozens."""
+unseen point, to 1e-8; so must the condensed model's forces be. `battery.py 20260101 500` runs 500 from that seed, a
+table of its own; without arguments some dozens."""
 import sys
 import unittest
 
@@ -37,7 +38,7 @@ class Battery(Extreme):
     def test_battery(self):
         worst = {'full order: worst KKT residual': 0, 'hybrid, whole domain: error': 0,
                  'condensed: error of the forces': 0, 'projection, at a training point: error': 0}
-        active = []
+        active, done = [], 0
         for seed in range(self.seed, self.seed + self.count):
             what, (grid, scene), train, test = self.draw(seed)
             folder = self.scene(grid, scene)
@@ -59,10 +60,16 @@ class Battery(Extreme):
                 for key, value in zip(worst, found):
                     worst[key] = max(worst[key], value)
                     self.assertLessEqual(value, 1e-8, key)
+                done += 1
+            self.tell(done, seed + 1 - self.seed, worst, active)
+
+    def tell(self, done, tried, worst, active):
+        """The table of the scenes so far: a run that is stopped leaves what it found."""
+        self.begin()
+        case = f'{done} random scenes from seed {self.seed}' + (f' right of {tried}' if done < tried else '')
         for key, value in worst.items():
-            self.row(f'{self.count} random scenes from seed {self.seed}', key, value, 1e-8)
-        self.say(f'{self.count} random scenes from seed {self.seed}', 'with no, some, all contacts active',
-                 ', '.join(str(active.count(k)) for k in range(3)))
+            self.row(case, key, value, 1e-8)
+        self.say(case, 'with no, some, all contacts active', ', '.join(str(active.count(k)) for k in range(3)))
 
 
 if __name__ == '__main__':
