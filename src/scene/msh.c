@@ -361,6 +361,43 @@ static const char *NextLine(Msh *m)
   return line;
 }
 
+/* Whether the rest of a line is one name in quotes that gmsh has room for. */
+static PetscBool IsQuoted(const char *text)
+{
+  const char *end;
+
+  text += strspn(text, " \t");
+  if (*text != '"') return PETSC_FALSE;
+  end = text + 1 + strcspn(text + 1, "\"\n");
+  if (*end != '"' || end - text > 127) return PETSC_FALSE;
+  end += 1 + strspn(end + 1, " \t\r");
+  return (PetscBool)(*end == '\n' || !*end);
+}
+
+/* A line each: dimension, tag, "name"; text in binary files too. */
+static PetscErrorCode CheckNames(Msh *m)
+{
+  const char *line = NextLine(m);
+  char *end;
+  const long long n = line ? strtoll(line, &end, 10) : -1;
+
+  PetscFunctionBegin;
+  HycoCheck(n >= 0 && n <= m->end - m->at, "the mesh %s speaks of %lld names, which it has no room for", m->path, n);
+  for (long long k = 0; k < n; k++) {
+    long long dim, tag;
+
+    line = NextLine(m);
+    HycoCheck(line, "the mesh %s is damaged: it ends among its names", m->path);
+    dim = strtoll(line, &end, 10);
+    tag = strtoll(end, &end, 10);
+    HycoCheck(dim >= 0 && dim <= 3 && tag > 0 && tag < PETSC_MAX_INT && IsQuoted(end),
+              "the mesh %s is damaged: a name of a group is \"%.*s\"; dimension (0 to 3), tag and a name in quotes "
+              "are expected",
+              m->path, (int)PetscMin(strcspn(line, "\r\n"), 40), line);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode CheckFormat(Msh *m)
 {
   const char *line = NextLine(m);
@@ -398,6 +435,8 @@ static PetscErrorCode CheckSections(Msh *m)
       PetscCall(CheckElements(m));
     else if (strncmp(line, "$Entities", 9) == 0)
       PetscCall(CheckEntities(m));
+    else if (strncmp(line, "$PhysicalNames", 14) == 0)
+      PetscCall(CheckNames(m));
     else
       HycoCheck(strncmp(line, "$MeshFormat", 11) && strncmp(line, "$Parti", 6) && strncmp(line, "$Ghost", 6),
                 "the mesh %s has a section %.18s that hyco does not take", m->path, line);

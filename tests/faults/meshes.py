@@ -73,6 +73,8 @@ TEXTS = [
     ('a negative count', lambda t: t.replace('$Elements\n16', '$Elements\n-1'), 'speaks of -1 elements'),
     ('a count too small', lambda t: t.replace('$Nodes\n18', '$Nodes\n17'), 'names node 18, which the file does not define'),
     ('a node twice', lambda t: t.replace('\n18 1 2', '\n17 1 2'), 'node 17 stands twice'),
+    ('a name of dimension 21', lambda t: t.replace('2 1 "low"', '21 1 "low"'), 'a name of a group is "21 1 "low""'),
+    ('a name without its quotes', lambda t: t.replace('2 1 "low"', '2 1 "low'), 'a name of a group is'),
     ('letters', lambda t: t.replace('\n5 0.5', '\n5 a.5'), 'is damaged'),
     ('another version', lambda t: t.replace('2.2 0 8', '3 0 8'), "has gmsh's format 3 (0, 8); hyco takes 2.2 and 4.1"),
     ('binary that is text', lambda t: t.replace('2.2 0 8', '2.2 1 8'), ''),
