@@ -296,8 +296,8 @@ PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, Pe
   *rows = (PetscInt)dims[0];
   *cols = (PetscInt)dims[1];
   PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
-  PetscCall(ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, *data));
-  ierr = CheckFinite(file, name, dims[0] * dims[1], *data);
+  ierr = ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, *data);
+  if (!ierr) ierr = CheckFinite(file, name, dims[0] * dims[1], *data);
   if (ierr) PetscCall(PetscFree(*data));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -308,6 +308,7 @@ PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscI
 {
   hid_t set;
   hsize_t dims[2];
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(OpenSet(file, name, H5T_INTEGER, &set, dims));
@@ -315,8 +316,9 @@ PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscI
   *rows = (PetscInt)dims[0];
   *cols = (PetscInt)dims[1];
   PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
-  PetscCall(
-      ReadSet(file, name, set, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, *data));
+  ierr = ReadSet(file, name, set, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, *data);
+  if (ierr) PetscCall(PetscFree(*data));
+  PetscCall(ierr);
   for (size_t k = 0; k < dims[0] * dims[1]; k++) {
     const PetscInt value = (*data)[k];
 
@@ -352,11 +354,14 @@ PetscErrorCode HycoH5LoadText(HycoH5 file, const char name[], char **text)
 {
   hid_t set;
   hsize_t dims[2];
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(OpenSet(file, name, H5T_INTEGER, &set, dims));
   HycoCheck(dims[1] == 1, "%s: %s is damaged", file->path, name);
   PetscCall(PetscCalloc1(dims[0] + 1, text));
-  PetscCall(ReadSet(file, name, set, H5T_NATIVE_CHAR, H5S_ALL, H5S_ALL, *text));
+  ierr = ReadSet(file, name, set, H5T_NATIVE_CHAR, H5S_ALL, H5S_ALL, *text);
+  if (ierr) PetscCall(PetscFree(*text));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

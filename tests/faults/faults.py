@@ -63,7 +63,7 @@ CASES = [
     # the mesh
     (['solve', *R, '-scene_mesh', 'none.msh'], 'the mesh none.msh cannot be opened'),
     (['solve', *R, '-scene_mesh', 'text.msh'], 'text.msh is no gmsh mesh'),
-    (['solve', *P, '-scene_mesh', 'cut.msh'], 'the mesh cut.msh cannot be read'),
+    (['solve', *P, '-scene_mesh', 'cut.msh'], 'the mesh cut.msh is damaged'),
     (['solve', *R, '-scene_mesh', os.path.join(PELLET, 'A.msh')], 'body "rope" has no cells'),
     (['solve', *P, '-contact_gap_master', 'clad_outer_low'], 'of the 189 nodes of contact_pellet have no node of'),
     (['solve', *P, '-contact_gap_master', 'contact_pellet'], 'the two surfaces must be apart'),
