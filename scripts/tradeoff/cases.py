@@ -89,16 +89,17 @@ def pellet(name, mesh, quick):
         return case
     condensed = [*(Setting("condensed", f"{n} Chebyshev radii") for n in (2, 3, 4)),
                  *(Setting("condensed", f"{n} Chebyshev radii", (("pod_tol", "1e-14"),)) for n in (4, 6, 8))]
-    tolerances = ["1e-5", "1e-7", "1e-8", "1e-9", "1e-10", "1e-12"]
+    tolerances = ["1e-5", "1e-7", "1e-9", "1e-10", "1e-12"]
     if name == "C":
-        case.settings = [*combine("hybrid", "9 radii", pod_tol=["1e-7", "1e-9", "1e-10", "1e-11", "1e-12"], rid_layers=[1]),
-                         *combine("hybrid", "9 radii", pod_tol=["1e-10", "1e-12"], rid_layers=[2]), *condensed[1:5]]
+        case.settings = [*combine("hybrid", "9 radii", pod_tol=["1e-9", "1e-10", "1e-11", "1e-12"], rid_layers=[1]),
+                         *combine("hybrid", "9 radii", pod_tol=["1e-10", "1e-12"], rid_layers=[2]), *condensed[1:4]]
         return case
     case.settings = [
-        *combine("hybrid", "9 radii", pod_tol=tolerances, rid_layers=[1, 2, 3], rid_contact_extension=["0.1", "0.3"]),
-        *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], rid_layers=[1], rid_contact_extension=["0"]),
-        *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], rid_layers=[1, 2], deim_type=["qdeim"]),
+        *combine("hybrid", "9 radii", pod_tol=tolerances, rid_layers=[1, 2]),
+        *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], rid_layers=[3]),
+        *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], rid_contact_extension=["0", "0.3"]),
+        *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], deim_type=["qdeim"]),
         *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], hybrid=["rank"]),
-        *combine("hybrid", "5 radii", pod_tol=tolerances[1::2], rid_layers=[1, 2]),
+        *combine("hybrid", "5 radii", pod_tol=tolerances[1::2]),
         *combine("projection", "9 radii", pod_tol=tolerances[1::2]), *condensed]
     return case
