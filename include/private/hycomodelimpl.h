@@ -60,6 +60,7 @@ struct _p_HycoModel {
   PetscReal *S_lambda;    /* N_lambda x n_dual column major */
   PetscInt n_points;
   PetscReal *points; /* training points, n_points x n_parameters */
+  PetscReal *reach;  /* least and largest value that training has seen of each parameter (trust.c); made when asked */
   char *provenance;
   char fingerprint[32]; /* of the scene and mesh that it was trained on */
   PetscInt whole_nodes, whole_cells;

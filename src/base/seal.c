@@ -61,7 +61,7 @@ PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed)
   HycoCheck(file, "%s cannot be opened: no such file, or not readable", path);
   if (fstat(fileno(file), &info) != 0 || !S_ISREG(info.st_mode)) {
     fclose(file);
-    HycoFail("%s is no file", path);
+    HycoFail("%s is no file; one that hyco has written is expected: a model of hyco train ends in .h5", path);
   }
   *size = (size_t)info.st_size;
   *sealed = ReadSeal(file, (long long)info.st_size, seal);

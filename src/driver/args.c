@@ -131,20 +131,26 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
   HycoFail("hyco %s knows no option -%s (hyco %s -help lists them)", command->name, name, command->name);
 }
 
-/* An option of the reduction given where nothing is reduced. */
-static PetscErrorCode CheckTraining(const Command *command, const char name[])
+/* Whether an option decides a model when that is trained. */
+static PetscBool DecidesModel(const char name[])
 {
   static const char *const training[] = {
       "hyco_model_type", "hyco_dual", "hyco_nnmf_",         "hyco_pod_",       "hyco_deim_",     "hyco_rid_",
       "hyco_hybrid",     "hyco_scan", "hyco_keep_singular", "hyco_condensed_", "hyco_snapshots", "hyco_greedy_",
       "hyco_trust_",     NULL};
 
-  PetscFunctionBegin;
-  if (command->run == CommandTrain) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; training[k]; k++) {
-    if (strncasecmp(name, training[k], strlen(training[k])) == 0)
-      HycoFail("hyco %s does not read -%s: it decides a model when that is trained", command->name, name);
+    if (strncasecmp(name, training[k], strlen(training[k])) == 0) return PETSC_TRUE;
   }
+  return PETSC_FALSE;
+}
+
+/* An option of the reduction given where nothing is reduced. */
+static PetscErrorCode CheckTraining(const Command *command, const char name[])
+{
+  PetscFunctionBegin;
+  HycoCheck(command->run == CommandTrain || !DecidesModel(name),
+            "hyco %s does not read -%s: it decides a model when that is trained", command->name, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -536,7 +542,10 @@ void DriverHelp(const char *command)
     if (taken) HelpLine(own[k].name, own[k].value, own[k].initial, own[k].meaning);
   }
   printf("\nOptions of the method (a scene may set them too, in its hyco: section without the prefix)\n");
-  for (PetscInt k = 0; k < n; k++) HelpLine(table[k].name, table[k].value, table[k].initial, table[k].meaning);
+  for (PetscInt k = 0; k < n; k++) {
+    if (command && strcmp(command, "train") && DecidesModel(table[k].name)) continue;
+    HelpLine(table[k].name, table[k].value, table[k].initial, table[k].meaning);
+  }
   printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "
          "-hyco_primal_..., -hyco_tao_type bntr.\n");
   printf("Under MPI: mpiexec -n 2 hyco ...; set OPENBLAS_NUM_THREADS=1.\n");

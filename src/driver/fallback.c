@@ -56,8 +56,9 @@ void DriverWantsFullOrder(const Fallback *f, const HycoPrediction *p, char why[D
     snprintf(why, DRIVER_LINE, "the reduced solve did not converge");
   else if (!(f->target_u > 0) && !(f->target_lambda > 0))
     return;
-  else if (p->estimated_error_u < 0)
-    snprintf(why, DRIVER_LINE, "the model does not estimate its errors");
+  else if ((f->target_u > 0 && p->estimated_error_u < 0) || (f->target_lambda > 0 && p->estimated_error_lambda < 0))
+    snprintf(why, DRIVER_LINE, "the model does not estimate its error of %s",
+             f->target_u > 0 && p->estimated_error_u < 0 ? "u" : "the contact forces");
   else if (f->target_u > 0 && p->estimated_error_u > f->target_u)
     snprintf(why, DRIVER_LINE, "the estimated error of u is %.2g, above %g", (double)p->estimated_error_u,
              (double)f->target_u);

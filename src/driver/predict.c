@@ -4,30 +4,38 @@
 #include <stdio.h>
 #include <string.h>
 
+static void Estimate(cJSON *json, const char name[], PetscReal estimate)
+{
+  if (estimate >= 0)
+    cJSON_AddNumberToObject(json, name, estimate);
+  else
+    cJSON_AddNullToObject(json, name);
+}
+
 /* The estimated errors (null: none), and how far outside the ranges the point lies. */
 static void ReportTrust(cJSON *json, const HycoPrediction *p)
 {
-  if (p->estimated_error_u >= 0) {
-    cJSON_AddNumberToObject(json, "estimated_error_u", p->estimated_error_u);
-    cJSON_AddNumberToObject(json, "estimated_error_lambda", p->estimated_error_lambda);
-  } else {
-    cJSON_AddNullToObject(json, "estimated_error_u");
-    cJSON_AddNullToObject(json, "estimated_error_lambda");
-  }
+  Estimate(json, "estimated_error_u", p->estimated_error_u);
+  Estimate(json, "estimated_error_lambda", p->estimated_error_lambda);
   cJSON_AddBoolToObject(json, "extrapolated", p->beyond > 0);
   cJSON_AddNumberToObject(json, "beyond", p->beyond);
 }
 
 static PetscErrorCode SayTrust(const HycoPrediction *p)
 {
+  const PetscReal estimate[2] = {p->estimated_error_u, p->estimated_error_lambda};
+  char words[2][32];
+
   PetscFunctionBegin;
-  if (p->estimated_error_u >= 0)
-    PetscCall(Say("estimated errors: u %.2g %%, contact forces %.2g %%\n", 100 * (double)p->estimated_error_u,
-                  100 * (double)p->estimated_error_lambda));
-  else
-    PetscCall(Say("estimated errors: none, this model was not calibrated\n"));
+  for (PetscInt k = 0; k < 2; k++) {
+    if (estimate[k] >= 0)
+      snprintf(words[k], sizeof(words[k]), "%.2g %%", 100 * (double)estimate[k]);
+    else
+      snprintf(words[k], sizeof(words[k]), "none");
+  }
+  PetscCall(Say("estimated errors: u %s, contact forces %s\n", words[0], words[1]));
   if (p->beyond > 0)
-    PetscCall(Say("EXTRAPOLATED: outside the trained ranges by %.3g %% of a range\n", 100 * (double)p->beyond));
+    PetscCall(Say("EXTRAPOLATED: outside the training points by %.3g %% of a range\n", 100 * (double)p->beyond));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,10 +62,10 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddNumberToObject(json, "total_contact_force", p->total_contact_force);
   cJSON_AddNumberToObject(json, "lambda_max", p->lambda_max);
   cJSON_AddNumberToObject(json, "lambda_norm2", p->lambda_norm2);
-  cJSON_AddNumberToObject(json, "u_norm2", p->u_norm2);
-  ReportVector(json, "u_min", p->dim, p->u_min);
-  ReportVector(json, "u_max", p->dim, p->u_max);
-  cJSON_AddNumberToObject(json, "strain_energy", p->strain_energy);
+  cJSON_AddNumberToObject(json, fallback[0] ? "u_norm2" : "rid_u_norm2", p->u_norm2);
+  ReportVector(json, fallback[0] ? "u_min" : "rid_u_min", p->dim, p->u_min);
+  ReportVector(json, fallback[0] ? "u_max" : "rid_u_max", p->dim, p->u_max);
+  cJSON_AddNumberToObject(json, fallback[0] ? "strain_energy" : "rid_strain_energy", p->strain_energy);
   ReportTrust(json, p);
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
@@ -146,7 +154,7 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "lambda_max",
                                                "covered_force",
                                                "n_active",
-                                               "u_norm2",
+                                               "rid_u_norm2",
                                                "kkt_max",
                                                "converged",
                                                "active_set_iterations",
@@ -209,9 +217,11 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
 
     if (!full[k]) continue;
     PetscCall(DriverSolveFullOrder(fallback, n_par, mu + k * n_par, &p));
-    p.estimated_error_u = p.estimated_error_lambda = 0;
+    p.estimated_error_u = value[k * N_COLUMNS + ESTIMATE_U]; /* the model's, which asked for full order */
+    p.estimated_error_lambda = value[k * N_COLUMNS + ESTIMATE_LAMBDA];
     p.beyond = value[k * N_COLUMNS + BEYOND];
     FillRow(&p, value + k * N_COLUMNS);
+    value[k * N_COLUMNS + U_NORM] = NAN; /* the whole mesh's, no RID's */
     value[k * N_COLUMNS + FULL_ORDER] = 1;
     count++;
   }

@@ -119,7 +119,8 @@ PetscErrorCode ReportSet(const char command[], const char table[], HycoScene sce
   PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
   for (PetscInt k = 0; k < n; k++) failed += value[k * n_columns + converged] < 0.5;
   if (table[0]) PetscCall(DriverWriteTable(table, scene, n, mu, n_columns, columns, value));
-  PetscCall(Say("%d points in %.3f s, %d not converged\n", (int)n, (double)seconds, (int)failed));
+  PetscCall(Say("%d points in %.3f s, %d not converged%s\n", (int)n, (double)seconds, (int)failed,
+                table[0] ? "" : "; -table FILE.csv writes their results"));
   PetscCall(ReportCreate(command, scene, NULL, &json));
   cJSON_AddNumberToObject(json, "n_points", n);
   cJSON_AddNumberToObject(json, "not_converged", failed);

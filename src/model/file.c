@@ -347,6 +347,8 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
   PetscInt one = 1, *format, version, same;
 
   PetscFunctionBegin;
+  HycoCheck(HycoH5Has(h, "kind"), "%s is no hyco model (fields, or a solution?); give the file that hyco train wrote",
+            path);
   PetscCall(HycoH5LoadText(h, "kind", &kind));
   same = strcmp(kind, HYCO_MODEL_KIND) == 0;
   PetscCall(PetscFree(kind));

@@ -74,6 +74,7 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
   PetscCall(PetscFree(m->S_lambda));
   PetscCall(PetscFree(m->V_lambda));
   PetscCall(PetscFree(m->points));
+  PetscCall(PetscFree(m->reach));
   PetscCall(PetscFree(m->provenance));
   PetscCall(PetscFree(m->search));
   PetscCall(PetscFree(*model));

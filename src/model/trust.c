@@ -7,7 +7,7 @@
     2  adhesion     forces reconstructed where the predicted displacement leaves a gap, over the size of the forces
     3  distance     to the nearest training point, each parameter scaled to its range
 
-  Outside the ranges the estimate is multiplied by (1 + b / d)^2, b the scaled distance from the ranges and d the
+  Outside what training has seen the estimate is multiplied by (1 + b / d)^2, b the scaled distance from it and d the
   training points' spacing. K's rows on the interface are cut off with the RID's elements, so that no residual can be
   formed there; the misfit says instead how far the two sides of the interface disagree.
 */
@@ -82,15 +82,42 @@ PetscErrorCode HycoTrustMeasure(HycoModel m, PetscReal feature[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nearest point of the ranges, and how far outside them mu is. */
-static PetscReal Beyond(HycoScene s, const PetscReal mu[], PetscReal nearest[])
+/* What training has seen of each parameter: from its least to its largest value, and half the widest step between two
+   more at either end, so that grids of cell centres reach the ends of the ranges; never past the ranges. */
+static PetscErrorCode FindReach(HycoModel m)
 {
+  const HycoScene s = m->scene;
+  const PetscInt n = m->n_points, n_par = s->n_parameters;
+  PetscReal *value;
+
+  PetscFunctionBegin;
+  if (m->reach) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(2 * n_par + 1, &m->reach));
+  PetscCall(PetscMalloc1(n + 1, &value));
+  for (PetscInt p = 0; p < n_par; p++) {
+    PetscReal step = 0;
+
+    for (PetscInt k = 0; k < n; k++) value[k] = m->points[k * n_par + p];
+    PetscCall(PetscSortReal(n, value));
+    for (PetscInt k = 1; k < n; k++) step = PetscMax(step, value[k] - value[k - 1]);
+    step = 0.5 * step * (1 + 1e-9);
+    m->reach[2 * p] = n ? PetscMax(s->lo[p], value[0] - step) : s->lo[p];
+    m->reach[2 * p + 1] = n ? PetscMin(s->hi[p], value[n - 1] + step) : s->hi[p];
+  }
+  PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nearest point of what training has seen, and how far outside it mu is. */
+static PetscReal Beyond(HycoModel m, const PetscReal mu[], PetscReal nearest[])
+{
+  const HycoScene s = m->scene;
   PetscReal most = 0;
 
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1;
 
-    nearest[p] = PetscMin(PetscMax(mu[p], s->lo[p]), s->hi[p]);
+    nearest[p] = PetscMin(PetscMax(mu[p], m->reach[2 * p]), m->reach[2 * p + 1]);
     most = PetscMax(most, PetscAbsReal(mu[p] - nearest[p]) / width);
   }
   return most > 1e-12 ? most : 0;
@@ -110,16 +137,17 @@ PetscErrorCode HycoTrustEstimate(HycoModel m, HycoPrediction *p)
 
   PetscFunctionBegin;
   p->estimated_error_u = p->estimated_error_lambda = -1;
-  p->beyond = Beyond(m->scene, m->fe->mu, nearest);
-  if (p->reason > 0 && m->type == HYCO_MODEL_CONDENSED) { /* its own estimate; displacements lose what the modes miss */
+  PetscCall(FindReach(m));
+  p->beyond = Beyond(m, m->fe->mu, nearest);
+  if (p->reason > 0 &&
+      m->type == HYCO_MODEL_CONDENSED) /* its own; what the modes miss of u between points, none knows */
     p->estimated_error_lambda = p->interpolation_error;
-    p->estimated_error_u = p->interpolation_error + m->numbers[1];
-  }
   if (!m->trust.n || p->reason <= 0 || !m->reconstruct) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTrustMeasure(m, feature));
   outside = 1 + (p->beyond > 0 ? HycoTrustDistance(m->scene, m->fe->mu, nearest) / m->trust.floor[DISTANCE] : 0);
   p->estimated_error_u = Estimate(&m->trust, m->trust.u, feature) * outside * outside;
-  p->estimated_error_lambda = Estimate(&m->trust, m->trust.lambda, feature) * outside * outside;
+  if (m->trust.force > 0) /* without a force in training there is nothing to be calibrated on */
+    p->estimated_error_lambda = Estimate(&m->trust, m->trust.lambda, feature) * outside * outside;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -129,6 +157,8 @@ PetscErrorCode HycoTrustView(HycoModel m, PetscViewer viewer)
   if (m->trust.n)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors, by %d predictions of held-out solutions\n",
                                      (int)m->trust.n));
+  else if (m->type == HYCO_MODEL_CONDENSED)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its forces' error by values left out, and none of u\n"));
   else
     PetscCall(PetscViewerASCIIPrintf(viewer, "  does not estimate its errors: not calibrated\n"));
   if (m->search) PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->search));

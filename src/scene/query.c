@@ -62,8 +62,9 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
 
     HycoCheck(!PetscIsInfOrNanReal(mu[p]), "%s is not a finite number", scene->parameter[p]);
     HycoCheck(scene->extrapolate || (mu[p] >= scene->lo[p] - slack && mu[p] <= scene->hi[p] + slack),
-              "%s = %.10g lies outside its range [%.10g, %.10g]", scene->parameter[p], (double)mu[p],
-              (double)scene->lo[p], (double)scene->hi[p]);
+              "%s = %.10g lies outside its range [%.10g, %.10g]; -parameter_%s_range LO,HI widens it in a scene, "
+              "-extrapolate goes past it in a model",
+              scene->parameter[p], (double)mu[p], (double)scene->lo[p], (double)scene->hi[p], scene->parameter[p]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

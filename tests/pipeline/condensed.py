@@ -108,7 +108,7 @@ class Condensed(Case):
         forces = []
         for model in ('one.h5', 'two.h5'):
             p = self.hyco('predict', '-model', model, '-mu', '4.07,0.9')
-            forces.append((p['total_contact_force'], p['u_norm2']))
+            forces.append((p['total_contact_force'], p['rid_u_norm2']))
         self.near(forces[0][0], forces[1][0], 1e-11)
         self.near(forces[0][1], forces[1][1], 1e-9)
         files = sorted(glob.glob(self.path('one', '*.h5')))

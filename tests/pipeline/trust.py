@@ -3,7 +3,7 @@ import csv
 import statistics
 import unittest
 
-from common import ROPE, Case
+from common import PELLET, ROPE, Case
 
 FINE = ('-hyco_pod_tol', '1e-11', '-hyco_deim_type', 'qdeim', '-hyco_rid_layers', 1, '-hyco_hybrid', 'all')
 ERRORS = (('estimated_error_u', 'error_u'), ('estimated_error_lambda', 'error_lambda'))
@@ -90,9 +90,23 @@ class Trust(Case):
             self.assertIsNone(p['estimated_error_u'])
             self.assertIsNone(p['estimated_error_lambda'])
             said = self.run_raw('predict', '-model', name, '-mu', '0.12,0.2').stdout
-            self.assertIn('estimated errors: none', said)
+            self.assertIn('estimated errors: u none, contact forces none', said)
             p = self.hyco('predict', '-model', name, '-mu', '0.12,0.2', '-scene', ROPE, '-hyco_fallback', '-target_u', 0.1)
             self.assertTrue(p['full_order'])
+
+    def test_unseen(self):
+        """Inside the scene's ranges but outside what training has seen: said, and the estimate of forces that training never saw
+        is none, which asks for full order."""
+        self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.03,4.04', '-values_load', '0.1,0.2,0.3,0.4', '-model', 'few.h5')
+        near = self.hyco('predict', '-model', 'few.h5', '-mu', '4.035,0.3')
+        self.assertFalse(near['extrapolated'])
+        p = self.hyco('predict', '-model', 'few.h5', '-mu', '4.1,1')
+        self.assertTrue(p['extrapolated'])
+        self.near(p['beyond'], (4.1 - 4.045) / 0.08, 1e-6)
+        self.assertGreater(p['estimated_error_u'], near['estimated_error_u'])
+        self.assertIsNone(p['estimated_error_lambda'])
+        p = self.hyco('predict', '-model', 'few.h5', '-mu', '4.1,1', '-hyco_fallback', '-scene', PELLET, '-target_lambda', 0.01)
+        self.assertTrue(p['full_order'])
 
     def test_complaints(self):
         for args, words in ((('-target_u', 0.1), 'give -hyco_fallback too'), (('-hyco_fallback',), 'give its -scene'),
