@@ -100,6 +100,20 @@ def wanted(case, rows, full):
                   "times faster than full order", f"than {PLAIN}"], lines)
 
 
+def headline(case, rows, full):
+    """One line for the README: what is asked for, and what each type takes for it."""
+    words, bounds = case.wanted[1]
+    parts = []
+    for kind in COLORS:
+        r = joint(rows, bounds, kind)
+        if r:
+            parts.append(f"{kind} {seconds(r['batch_s'])} a load step ({full['warm']['batch_s'] / r['batch_s']:.0f} times), "
+                         f"{seconds(r['single_s'])} for a new geometry ({full['warm']['single_s'] / r['single_s']:.0f} times)")
+    return (f"{case.name}, {words}: {'; '.join(parts)}. In brackets: faster than full order that keeps its factor and its active "
+            f"set; that takes {seconds(full['warm']['batch_s'])} and {seconds(full['warm']['single_s'])}, and "
+            f"{seconds(full[PLAIN]['single_s'])} with {PLAIN}, the paper's baseline.")
+
+
 def settings(rows):
     lines = []
     for r in sorted(rows, key=lambda r: r["batch_s"]):
