@@ -1,5 +1,6 @@
 /* hyco train: snapshots, reduction, model. */
 #include "driver.h"
+#include <string.h>
 
 /* "scan": how near the reduced stiffness comes to being singular inside the parameters' ranges; null: not scanned. */
 static void ReportScan(cJSON *json, const HycoScan *s, PetscInt n_par)
@@ -97,6 +98,35 @@ static PetscErrorCode CheckKind(PetscBool greedy, const Search *search, HycoSamp
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Refuses an option of the command line that this training does not read. */
+static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool greedy)
+{
+  static const struct {
+    const char *name, *type;
+  } meant[] = {{"-hyco_condensed_tol", "condensed"}, {"-hyco_condensed_max_values", "condensed"},
+               {"-hyco_nnmf_vectors", "projection"}, {"-hyco_nnmf_max_its", "projection"},
+               {"-hyco_greedy_indicator", NULL},     {"-hyco_greedy_keep", NULL}};
+  PetscInt type = HYCO_MODEL_HYBRID;
+  PetscOptions options;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetOptions(scene, &options));
+  PetscCall(HycoOptionsWord(options, "hyco_model_type", HycoModelTypes, &type));
+  for (size_t k = 0; k < sizeof(meant) / sizeof(meant[0]); k++) {
+    PetscBool set;
+
+    PetscCall(PetscOptionsHasName(NULL, NULL, meant[k].name, &set));
+    if (!set) continue;
+    HycoCheck(meant[k].type || greedy, "nothing reads %s here: it is for train -greedy", meant[k].name);
+    HycoCheck(!meant[k].type || strcmp(meant[k].type, HycoModelTypes[type]) == 0,
+              "nothing reads %s here: it is for -hyco_model_type %s, and the model is %s", meant[k].name, meant[k].type,
+              HycoModelTypes[type]);
+    HycoCheck(!given || !meant[k].type || strcmp(meant[k].type, HycoModelTypes[HYCO_MODEL_CONDENSED]),
+              "nothing reads %s here: it chooses points where none are given", meant[k].name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CommandTrain(void)
 {
   HycoScene scene;
@@ -122,6 +152,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(PetscStrncpy(search.model, model, sizeof(search.model)));
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
+  if (!search.on) PetscCall(CheckRead(scene, given, greedy));
   PetscCall(HycoTrainerChooses(trainer, &chooses));
   HycoCheck(given || greedy || (chooses && !search.on),
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
