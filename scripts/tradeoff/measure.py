@@ -64,7 +64,7 @@ class Bench:
 
     def online(self, model):
         """Seconds a solve: points that share their stiffness solved as a set, and points that do not, one by one."""
-        r, _ = self.hyco("predict", "-model", model, *self.case.test)
+        r, _ = self.hyco("predict", "-model", model, *(self.case.batch or self.case.test))
         _, rows = self.hyco("predict", "-model", model, "-points", self.points)
         return {"batch_s": r["seconds_total"] / r["n_points"],
                 "single_s": statistics.median(float(row["seconds"]) for row in rows), "memory_mb": r["memory_mb"]}
