@@ -44,7 +44,7 @@ class Targets(Case):
         self.assertIn('chosen by its errors on 72 held-out solutions', said)
         self.assertRegex(said, r'lambda +mean .*, largest .*, target 2.00e-01')
         p = self.hyco('predict', '-model', 'm.h5', '-mu', '0.12,0.2')
-        self.assertIsNotNone(p['estimated_error_u'])
+        self.assertIsNotNone(p['estimated_error_lambda'])
 
     def test_pellet(self):
         """Every fourth radius is held out; judged at two other radii and loads between the steps."""
