@@ -40,6 +40,8 @@ PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscRea
  * Not collective. */
 PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscReal x[],
                         PetscReal *residual);
+/* Moves the k passive entries x[p[j]] towards z[j] until one meets 0: its j, or -1 when z itself is reached. */
+PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], PetscReal x[]);
 
 /*
   c with y <= sum_j c_j X_j + c[p] for `share` of the rows that are held (the quantile number ceil(share (m + 1)) of m

@@ -143,6 +143,13 @@ PetscErrorCode HycoModelCreateOwn(HycoModel model);
 PetscErrorCode HycoModelDestroyOwn(HycoModel model);
 /* Brings row_start, row_dof, row_value, gap of all contacts and U of all nodes of mesh to the last prediction. */
 PetscErrorCode HycoModelComplete(HycoModel model);
+/* start + B[k,:] U, after it. */
+static inline PetscReal HycoModelAddRow(HycoModel model, PetscInt k, PetscReal start)
+{
+  for (PetscInt j = model->row_start[k]; j < model->row_start[k + 1]; j++)
+    start += model->row_value[j] * model->U[model->row_dof[j]];
+  return start;
+}
 
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoModelReconstruct(HycoModel model);

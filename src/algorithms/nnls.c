@@ -51,23 +51,30 @@ static void BackSolve(const Passive *f, PetscReal z[])
   }
 }
 
-/* Moves from x towards z until an entry meets 0, which leaves the set; true when z itself is reached. */
-static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[], const PetscReal z[], PetscReal x[],
-                             PetscBool passive[])
+PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], PetscReal x[])
 {
-  const PetscInt k = f->k;
   PetscReal alpha = 1;
   PetscInt blocking = -1;
 
   for (PetscInt j = 0; j < k; j++) {
-    const PetscReal step = z[j] < 0 ? x[f->p[j]] / (x[f->p[j]] - z[j]) : 0; /* z = 0: it is there already */
+    const PetscReal step = z[j] < 0 ? x[p[j]] / (x[p[j]] - z[j]) : 0; /* z = 0: it is there already */
 
     if (z[j] <= 0 && (blocking < 0 || step < alpha)) {
       alpha = step;
       blocking = j;
     }
   }
-  for (PetscInt j = 0; j < k; j++) x[f->p[j]] += alpha * (z[j] - x[f->p[j]]);
+  for (PetscInt j = 0; j < k; j++) x[p[j]] += alpha * (z[j] - x[p[j]]);
+  return blocking;
+}
+
+/* Moves from x towards z until an entry meets 0, which leaves the set; true when z itself is reached. */
+static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[], const PetscReal z[], PetscReal x[],
+                             PetscBool passive[])
+{
+  const PetscInt k = f->k;
+  const PetscInt blocking = HycoNNLSStep(k, f->p, z, x);
+
   if (blocking < 0) return PETSC_TRUE;
   x[f->p[blocking]] = 0;
   f->k = 0;

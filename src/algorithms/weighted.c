@@ -113,18 +113,8 @@ static void Solve(HycoWeighted f, const PetscReal y[], PetscReal z[])
 static PetscBool MoveTowards(HycoWeighted f, const PetscReal z[], PetscReal x[])
 {
   const PetscInt k = f->k;
-  PetscReal alpha = 1;
-  PetscInt blocking = -1;
+  const PetscInt blocking = HycoNNLSStep(k, f->p, z, x);
 
-  for (PetscInt j = 0; j < k; j++) {
-    const PetscReal step = z[j] < 0 ? x[f->p[j]] / (x[f->p[j]] - z[j]) : 0; /* z = 0: it is there already */
-
-    if (z[j] <= 0 && (blocking < 0 || step < alpha)) {
-      alpha = step;
-      blocking = j;
-    }
-  }
-  for (PetscInt j = 0; j < k; j++) x[f->p[j]] += alpha * (z[j] - x[f->p[j]]);
   if (blocking < 0) return PETSC_TRUE;
   x[f->p[blocking]] = 0;
   f->k = 0;

@@ -294,9 +294,8 @@ static PetscReal Penetration(HycoModel m)
   PetscReal sum = 0;
 
   for (PetscInt k = 0; k < m->pairs.n; k++) {
-    PetscReal deep = -m->gap[k];
+    const PetscReal deep = HycoModelAddRow(m, k, -m->gap[k]);
 
-    for (PetscInt j = m->row_start[k]; j < m->row_start[k + 1]; j++) deep += m->row_value[j] * m->U[m->row_dof[j]];
     if (deep > 0) sum += deep * deep;
   }
   return PetscSqrtReal(sum);

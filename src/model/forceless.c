@@ -13,9 +13,8 @@ PetscErrorCode HycoModelCheckForceless(HycoModel m)
   if (m->n_L || p->reason <= 0 || (m->type == HYCO_MODEL_HYBRID && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoModelComplete(m));
   for (PetscInt k = 0; k < m->pairs.n; k++) {
-    PetscReal bu = 0;
+    const PetscReal bu = HycoModelAddRow(m, k, 0);
 
-    for (PetscInt j = m->row_start[k]; j < m->row_start[k + 1]; j++) bu += m->row_value[j] * m->U[m->row_dof[j]];
     in = PetscMax(in, bu - m->gap[k]);
     size = PetscMax(size, PetscMax(PetscAbsReal(bu), PetscAbsReal(m->gap[k])));
   }

@@ -131,9 +131,7 @@ PetscErrorCode HycoModelReconstruct(HycoModel m)
   for (PetscInt i = 0; i < r->n; i++) {
     const PetscInt k = r->contact[i];
 
-    r->open[i] = -m->gap[k];
-    for (PetscInt j = m->row_start[k]; j < m->row_start[k + 1]; j++)
-      r->open[i] += m->row_value[j] * m->U[m->row_dof[j]];
+    r->open[i] = HycoModelAddRow(m, k, -m->gap[k]);
     r->d[i] = (m->in_rid[k] ? 1 : 0) + (r->open[i] < 0 ? r->open[i] * r->open[i] : 0);
     r->h[i] = m->in_rid[k] ? m->Lambda[k] : 0;
   }

@@ -41,9 +41,8 @@ static void Contacts(HycoModel m, PetscReal *penetration, PetscReal *adhesion)
   PetscReal in = 0, moved = 0, stuck = 0, force = 0;
 
   for (PetscInt k = 0; k < m->pairs.n; k++) {
-    PetscReal bu = 0;
+    const PetscReal bu = HycoModelAddRow(m, k, 0);
 
-    for (PetscInt j = m->row_start[k]; j < m->row_start[k + 1]; j++) bu += m->row_value[j] * m->U[m->row_dof[j]];
     moved += bu * bu;
     force += m->Lambda[k] * m->Lambda[k];
     if (m->in_rid[k]) continue;
