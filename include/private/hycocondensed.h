@@ -43,6 +43,7 @@ struct _n_HycoCondensed {
   PetscReal last[HYCO_MAX_PARAMETERS];
   PetscReal gap_size;                           /* largest |g| in training */
   PetscReal *packed, *M, *work, *g, *H, *a, *w; /* M: G, m x m */
+  HycoSetFactor set_factor;                     /* of M on the active contacts */
   PetscBool *active;
 };
 

@@ -17,6 +17,8 @@ static PetscErrorCode Resize(HycoSolver s, PetscInt p)
   PetscCall(PetscFree(s->g));
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
+  PetscCall(HycoSetFactorDestroy(&s->set_factor));
+  if (s->system->symmetric && !p) PetscCall(HycoSetFactorCreate(m, &s->set_factor));
   PetscCall(PetscMalloc1((size_t)n * (size_t)n + 1, &s->S));
   PetscCall(PetscCalloc1(n + 1, &s->g));
   PetscCall(PetscCalloc1(n + 1, &s->L));
@@ -120,6 +122,7 @@ static PetscErrorCode SetUpDual(HycoSolver s, PetscBool *singular)
   PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   s->condensed.K = 0; /* until it is done */
+  HycoSetFactorForget(s->set_factor);
   PetscCall(PetscObjectTypeCompare((PetscObject)y->K, MATSEQDENSE, &dense));
   if (!dense)
     HycoLogged(HYCO_EVENT_FACTOR, FactorSparse(s, singular));
@@ -203,8 +206,8 @@ static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved
     *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   } else {
     if (!s->warm || !s->started) PetscCall(PetscArrayzero(s->active, s->m));
-    PetscCall(HycoLCPActiveSet(s->m, s->S, s->g, s->system->symmetric, max_its, s->monitor, s->monitor_ctx, s->active,
-                               s->L, &s->its, &status));
+    PetscCall(HycoLCPActiveSet(s->m, s->S, s->g, s->set_factor, max_its, s->monitor, s->monitor_ctx, s->active, s->L,
+                               &s->its, &status));
     *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   }
   for (PetscInt i = 0; i < s->m; i++) {
@@ -338,7 +341,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, Vec x, Vec L)
     a[k++] = i;
     open = PetscMax(open, PetscAbsReal(s->g[i]));
   }
-  if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(s->m, s->S, s->g, y->symmetric, &k, a, change, &singular));
+  if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(s->m, s->S, s->g, s->set_factor, &k, a, change, &singular));
   for (PetscInt i = 0; i < s->m && !singular; i++) change[i] = PetscMax(change[i], -s->L[i]);
   if (!singular) PetscCall(Shift(s, change, x, L));
   PetscCall(PetscFree2(a, change));

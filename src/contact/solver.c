@@ -39,6 +39,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscCall(PetscFree(s->g));
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
+  PetscCall(HycoSetFactorDestroy(&s->set_factor));
   PetscCall(PetscFree(s->pivot));
   PetscCall(PetscFree(s->contact));
   PetscCall(PetscFree(*solver));

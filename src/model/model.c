@@ -167,11 +167,12 @@ static PetscErrorCode QuadraticForm(HycoModel m, PetscReal *energy, PetscReal *s
 
 /* Of the RID's cells: from K, or cell by cell where K lacks the supports' part or a rigid motion drowns it: beyond 1e-5
    round-off would leave fewer than ten digits. */
-static PetscErrorCode StrainEnergy(HycoModel m, PetscReal *energy)
+PetscErrorCode HycoModelGetStrainEnergy(HycoModel m, PetscReal *energy)
 {
   PetscReal *each, size = 0;
 
   PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
   *energy = 0;
   if (m->K && !m->fe->lifted) PetscCall(QuadraticForm(m, energy, &size));
   if (m->K && !m->fe->lifted && *energy >= 1e-5 * size) PetscFunctionReturn(PETSC_SUCCESS);
@@ -238,7 +239,6 @@ PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
     p->u_norm2 += m->U[k] * m->U[k];
   }
   p->u_norm2 = PetscSqrtReal(p->u_norm2);
-  PetscCall(StrainEnergy(m, &p->strain_energy));
   PetscCall(HycoTrustEstimate(m, p));
   *out = *p;
   PetscFunctionReturn(PETSC_SUCCESS);
