@@ -19,6 +19,7 @@ typedef struct _n_HycoNorms *HycoNorms;
 typedef struct _n_HycoCondensed *HycoCondensed;
 typedef struct _n_HycoReconstruction *HycoReconstruction;
 typedef struct _n_HycoReduced *HycoReduced;
+typedef struct _n_HycoLoads *HycoLoads;
 
 /* Rows of B in CSR over dofs of a mesh, and D: see HycoContactRows(). */
 typedef struct {
@@ -94,6 +95,7 @@ struct _p_HycoModel {
   PetscInt *fe_at;       /* by dof of mesh: place in fe_dof, or -1 */
   PetscReal *Vp;         /* V, zero on full-order and fixed unknowns */
   HycoReduced reduced;   /* how K goes into Kr, and what of it stays; made by the first */
+  HycoLoads loads;       /* solutions without contact that loads share; NULL: a dense Kr, or no such parameter */
   Mat K, Kr, Br, Btr;
   Vec F, Fr, Dr, x, L;
   HycoMesh own;                  /* the cells and the first nodes of mesh: all that the reduced problem touches */
@@ -128,6 +130,14 @@ PetscErrorCode HycoReducedFillStiffness(HycoModel model);
 PetscErrorCode HycoReducedFillContact(HycoModel model);
 PetscErrorCode HycoReducedFillVectors(HycoModel model);
 PetscErrorCode HycoReducedDestroy(HycoReduced *reduced);
+
+/* What loads share while the stiffness stays (loads.c). HycoLoadsCreate() needs Fr and x; HycoLoadsForget(): the
+   stiffness has changed (NULL-safe); HycoLoadsSetFree() gives the solver the solution without contact at mu, where the
+   system is current, if it is known by those of the ranges' ends. */
+PetscErrorCode HycoLoadsCreate(HycoModel model);
+PetscErrorCode HycoLoadsDestroy(HycoLoads *loads);
+void HycoLoadsForget(HycoLoads loads);
+PetscErrorCode HycoLoadsSetFree(HycoModel model, const PetscReal mu[]);
 
 /* K and the reduced system at mu, without solving: Kr, Br, Btr and the vectors are current, the prediction is not. */
 PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);

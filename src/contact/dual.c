@@ -5,6 +5,9 @@
 #include <hycosolverimpl.h>
 #include <petscblaslapack.h>
 
+/* A residual below this share of F needs no refinement: the residuals are judged by 1e-8. */
+#define REFINE 1e-10
+
 /* Makes room for m contacts and p pinned unknowns; a change forgets the last solution's set. */
 static PetscErrorCode Resize(HycoSolver s, PetscInt p)
 {
@@ -224,12 +227,15 @@ static PetscErrorCode FreeGap(HycoSolver s, Vec x)
   HycoSystem y = s->system;
 
   PetscFunctionBegin;
-  if (!s->lu) {
+  if (!s->lu && !s->free) {
     PetscCall(GatherVec(s->comm, y->D, s->L));
     PetscCall(HycoDirectReduce(s->direct, y->F, s->L, s->g));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SolveK(s, y->F, x));
+  if (s->free)
+    PetscCall(VecCopy(s->free, x));
+  else
+    PetscCall(SolveK(s, y->F, x));
   PetscCall(HycoSystemWork(y));
   PetscCall(MatMult(y->B, x, y->work_L));
   PetscCall(VecAYPX(y->work_L, -1, y->D));
@@ -252,6 +258,23 @@ static PetscErrorCode Residual(HycoSystem y, Vec x, Vec L, Vec work, Vec r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x = K^-1 F - K^-1 Bt L, the first of them known. */
+static PetscErrorCode AddForces(HycoSolver s, Vec x, Vec L)
+{
+  HycoSystem y = s->system;
+  PetscReal most;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(L, NORM_INFINITY, &most));
+  if (most > 0) {
+    PetscCall(MatMult(y->Bt, L, y->work_x[0]));
+    PetscCall(SolveK(s, y->work_x[0], x));
+    PetscCall(VecAYPX(x, -1, s->free));
+  } else
+    PetscCall(VecCopy(s->free, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* x = K^-1 (F - Bt L), with one step of refinement when round-off shows. */
 static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
 {
@@ -263,7 +286,9 @@ static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
   PetscCall(HycoSystemWork(y));
   r = y->work_x[0];
   work = y->work_x[1];
-  if (y->m && !s->lu)
+  if (s->free && y->m)
+    PetscCall(AddForces(s, x, L));
+  else if (y->m && !s->lu)
     PetscCall(HycoDirectExpand(s->direct, s->L, x));
   else {
     PetscCall(Residual(y, NULL, L, work, r));
@@ -272,7 +297,7 @@ static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
   PetscCall(VecNorm(y->F, NORM_2, &size));
   PetscCall(Residual(y, x, L, work, r));
   PetscCall(VecNorm(r, NORM_2, &residual));
-  if (residual > 1e-12 * size && !s->p) {
+  if (residual > REFINE * size && !s->p) {
     PetscCall(SolveK(s, r, work));
     PetscCall(VecAXPY(x, 1, work));
   }
@@ -345,6 +370,36 @@ static PetscErrorCode CloseGaps(HycoSolver s, Vec x, Vec L)
   for (PetscInt i = 0; i < s->m && !singular; i++) change[i] = PetscMax(change[i], -s->L[i]);
   if (!singular) PetscCall(Shift(s, change, x, L));
   PetscCall(PetscFree2(a, change));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular)
+{
+  PetscFunctionBegin;
+  s->seconds_factor = 0;
+  PetscCall(SetUpDual(s, singular));
+  s->seconds_before = s->seconds_factor;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x)
+{
+  HycoSystem y = s->system;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemWork(y));
+  PetscCall(SolveK(s, r, x));
+  PetscCall(MatMult(y->K, x, y->work_x[0]));
+  PetscCall(VecAYPX(y->work_x[0], -1, r));
+  PetscCall(SolveK(s, y->work_x[0], y->work_x[1]));
+  PetscCall(VecAXPY(x, 1, y->work_x[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x)
+{
+  PetscFunctionBegin;
+  s->free = x;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

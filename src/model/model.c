@@ -19,6 +19,7 @@ PetscErrorCode HycoModelReset(HycoModel m)
   m->ready = m->solved = PETSC_FALSE;
   PetscCall(HycoReconstructionDestroy(&m->reconstruction));
   PetscCall(HycoReducedDestroy(&m->reduced));
+  PetscCall(HycoLoadsDestroy(&m->loads));
   PetscCall(HycoSolverDestroy(&m->solver));
   PetscCall(HycoSystemDestroy(&m->system));
   PetscCall(MatDestroy(&m->K));

@@ -125,6 +125,7 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
   else
     PetscCall(HycoReducedCreateSparse(m));
   PetscCall(MatCreateVecs(m->Kr, &m->x, &m->Fr));
+  if (!dense) PetscCall(HycoLoadsCreate(m));
   if (m->n_L) {
     PetscCall(CreateReduced(m, m->n_L, m->n, dense, &m->Br));
     PetscCall(CreateReduced(m, m->n, m->n_L, dense, &m->Btr));
@@ -162,6 +163,7 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   PetscCall(HycoFESetParameters(m->fe, mu));
   m->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
   if (m->fe->stiffness_changed) {
+    HycoLoadsForget(m->loads);
     HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, m->K));
     if (first && m->fe->n_constant) /* again in the order of all that come: the same sums to the last bit */
       HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, m->K));
@@ -245,6 +247,7 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   begin = HycoNow();
   PetscCall(Assemble(m, mu));
   p->seconds.assemble = HycoNow() - begin;
+  HycoLogged(HYCO_EVENT_SOLVE, HycoLoadsSetFree(m, mu));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(m->solver, m->x, m->L));
   PetscCall(HycoSolverGetSeconds(m->solver, &p->seconds.factor, &p->seconds.solve));
   PetscCall(HycoSolverGetReason(m->solver, &p->reason));
