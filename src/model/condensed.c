@@ -95,26 +95,6 @@ PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *f, const PetscReal mu[], PetscInt axis, PetscInt skip,
-                                     PetscReal value[])
-{
-  const PetscInt n = HycoTensorSize(&f->tensor);
-  const PetscReal one = 1, zero = 0;
-  const PetscBLASInt step = 1;
-  PetscReal *w;
-  PetscBLASInt rows, nodes;
-
-  PetscFunctionBegin;
-  if (!f->rows) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscBLASIntCast(f->rows, &rows));
-  PetscCall(PetscBLASIntCast(n, &nodes));
-  PetscCall(PetscMalloc1(n, &w));
-  PetscCall(HycoTensorWeights(&f->tensor, mu, axis, skip, w));
-  BLASgemv_("N", &rows, &nodes, &one, f->data, &rows, w, &step, &zero, value, &step);
-  PetscCall(PetscFree(w));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 #define TILE 64
 
 /* Both triangles of M from the columns of the lower one, by tiles, so that the transposed entries stay near. */

@@ -1,6 +1,7 @@
 /* HycoModel: made, asked, destroyed. */
 #include <hycocondensed.h>
 #include <hycofields.h>
+#include <hycotable.h>
 #include <petscviewer.h>
 #include <stdio.h>
 #include <string.h>
@@ -58,6 +59,7 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
   PetscCall(HycoModelReset(m));
   PetscCall(HycoNormsDestroy(&m->norms));
   PetscCall(HycoCondensedDestroy(&m->condensed));
+  PetscCall(HycoTableDestroy(&m->table));
   PetscCall(HycoFEDestroy(&m->fe_whole));
   PetscCall(HycoPairsDestroy(&m->whole_pairs));
   PetscCall(HycoMeshDestroy(&m->whole));
@@ -175,8 +177,8 @@ PetscErrorCode HycoModelGetStrainEnergy(HycoModel m, PetscReal *energy)
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
   *energy = 0;
-  if (m->K && !m->fe->lifted) PetscCall(QuadraticForm(m, energy, &size));
-  if (m->K && !m->fe->lifted && *energy >= 1e-5 * size) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->K && !m->table && !m->fe->lifted) PetscCall(QuadraticForm(m, energy, &size));
+  if (m->K && !m->table && !m->fe->lifted && *energy >= 1e-5 * size) PetscFunctionReturn(PETSC_SUCCESS);
   *energy = 0;
   PetscCall(PetscMalloc1(m->mesh->n_cells, &each));
   PetscCall(HycoFEEnergy(m->fe, m->U, each));
