@@ -244,7 +244,7 @@ static PetscErrorCode Many(HycoModel model, HycoScene scene, Fallback *fallback,
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverGet("table", PETSC_FALSE, table));
-  PetscCall(fallback->on ? DriverCheckLeftEarly(scene) : DriverCheckLeft());
+  PetscCall(DriverCheckLeftEarly(scene)); /* what the solver alone knows is read by the first prediction */
   PetscCall(PetscCalloc2(n * N_COLUMNS, &value, n, &full));
   begin = HycoNow();
   HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, value, full));
