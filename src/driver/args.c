@@ -353,6 +353,7 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
     if (!text[0]) continue;
     PetscCall(ParseNumbers(key, text, &m, &values));
     HycoCheck(m == 1, "-%s has %d values; one is expected", key, (int)m);
+    HycoCheck(!whole, "-mu gives every parameter, and -%s gives one of them again; take one of the two away", key);
     mu[p] = values[0];
     given++;
     PetscCall(PetscFree(values));

@@ -60,6 +60,7 @@ CASES = [
     (['solve', '-scene', ROPE, '-mu', 'nan,0.1'], '-mu is "nan,0.1"'),
     (['solve', '-scene', ROPE, '-mu_mu1', '0.07'], 'give -mu with all of them, or -mu_NAME for each'),
     (['solve', *R, '-mu_mu3', '1'], '-mu_mu3 names no parameter'),
+    (['solve', *R, '-mu_mu1', '0.07'], '-mu gives every parameter, and -mu_mu1 gives one of them again'),
     # the mesh
     (['solve', *R, '-scene_mesh', 'none.msh'], 'the mesh none.msh cannot be opened'),
     (['solve', *R, '-scene_mesh', 'text.msh'], 'text.msh is no gmsh mesh'),
