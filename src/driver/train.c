@@ -127,6 +127,21 @@ static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool gree
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A point given twice would be learned twice. */
+static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
+{
+  PetscInt n = 0, dropped;
+
+  PetscFunctionBegin;
+  if (!samples) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesDropTwins(samples, &dropped));
+  PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
+  if (dropped)
+    PetscCall(Say("%d of the %d %s points repeat others; each of the %d is used once\n", (int)dropped,
+                  (int)(n + dropped), what, (int)n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CommandTrain(void)
 {
   HycoScene scene;
@@ -152,6 +167,8 @@ PetscErrorCode CommandTrain(void)
   PetscCall(PetscStrncpy(search.model, model, sizeof(search.model)));
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
+  PetscCall(TakeOnce(samples, "training"));
+  PetscCall(TakeOnce(validation, "validation"));
   if (!search.on) PetscCall(CheckRead(scene, given, greedy));
   PetscCall(HycoTrainerChooses(trainer, &chooses));
   HycoCheck(given || greedy || (chooses && !search.on),

@@ -98,6 +98,8 @@ CASES = [
     (['train', *T, '-grid', '2,1', '-grid_type', 'closed'], 'at least 2 are needed'),
     (['train', *T, '-values_mu1', '0.1'], '-values_mu2 is missing'),
     (['train', *T, '-points', 'none.csv'], 'none.csv cannot be opened'),
+    (['train', *T, '-points', 'header.csv'], 'header.csv holds no point; a header'),
+    (['predict', '-model', 'rope.h5', '-points', os.devnull], '/dev/null holds no point; a header'),
     (['train', *T, *N, '-points', 'p.csv'], 'give one set of points'),
     (['train', '-scene', ROPE, '-model', 'none/out.h5', *N], 'none/out.h5 cannot be written'),
     (['train', *T, *N, '-hyco_rid_modes', 'foo'], '-hyco_rid_modes has "foo"'),
@@ -128,7 +130,8 @@ class Faults(Case):
         cls.hyco('solve', *R, '-output', 'fields.xdmf')
         os.mkdir(cls.path('empty'))
         for name, text in (('broken.yaml', 'scene:\n  mesh: [a\nbody: {x\n'), ('text.msh', 'hello\n'),
-                           ('text.h5', 'hello\n'), ('p.csv', 'mu1,mu2\n0.1,0.1\n')):
+                           ('text.h5', 'hello\n'), ('p.csv', 'mu1,mu2\n0.1,0.1\n'),
+                           ('header.csv', 'mu1,mu2\n')):
             with open(cls.path(name), 'w', encoding='ascii') as f:
                 f.write(text)
         for source, name, size in ((cls.path('rope.h5'), 'cut.h5', 9000), (os.path.join(PELLET, 'A.msh'), 'cut.msh',
