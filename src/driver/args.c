@@ -1,9 +1,11 @@
 /* Options of the command line: checked, read, explained. */
 #include "driver.h"
+#include <hycofields.h>
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* The driver's own options, for -help; which command takes which stands in the table of commands. */
@@ -145,12 +147,24 @@ static PetscBool DecidesModel(const char name[])
   return PETSC_FALSE;
 }
 
-/* An option of the reduction given where nothing is reduced. */
-static PetscErrorCode CheckTraining(const Command *command, const char name[])
+/* Which commands read an option of a model's use; NULL: it is no such option. */
+static const char *ReadersOf(const char name[])
 {
+  if (strcasecmp(name, "hyco_fallback") == 0) return "predict";
+  if (strncasecmp(name, "hyco_reconstruct", 16) == 0) return "train, predict, compare";
+  return NULL;
+}
+
+/* An option of the reduction given where nothing is reduced, or of a model's use where none is used. */
+static PetscErrorCode CheckCommand(const Command *command, const char name[])
+{
+  const char *readers = ReadersOf(name);
+
   PetscFunctionBegin;
   HycoCheck(command->run == CommandTrain || !DecidesModel(name),
             "hyco %s does not read -%s: it decides a model when that is trained", command->name, name);
+  HycoCheck(!readers || strstr(readers, command->name), "hyco %s does not read -%s; what does: hyco %s", command->name,
+            name, readers);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -171,16 +185,32 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
         !(IsSceneEntry(name) && TakesOption(command, "scene"))) {
       PetscCall(Unknown(command, name));
     }
-    PetscCall(CheckTraining(command, name));
+    PetscCall(CheckCommand(command, name));
     if (k + 1 < argc && !IsKey(argv[k + 1])) k++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The folder of a file to be written is there and may be written: asked before the first is, so that none is left
- * alone. */
-static PetscErrorCode CheckFolder(const char name[], const char path[])
+/* The value of an option, "" if absent, without counting it as read. */
+static PetscErrorCode Peek(const char name[], char value[PETSC_MAX_PATH_LEN])
 {
+  PetscInt n;
+  char **names, **values;
+
+  PetscFunctionBegin;
+  value[0] = '\0';
+  PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
+  for (PetscInt k = 0; k < n; k++) {
+    if (strcasecmp(names[k], name) == 0 && values[k]) PetscCall(PetscStrncpy(value, values[k], PETSC_MAX_PATH_LEN));
+  }
+  PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A file can be written at `path`: its folder is there and may be written, no folder has its name. */
+static PetscErrorCode CheckPlace(const char name[], const char path[])
+{
+  struct stat info;
   char folder[PETSC_MAX_PATH_LEN];
   char *slash;
 
@@ -195,12 +225,30 @@ static PetscErrorCode CheckFolder(const char name[], const char path[])
     PetscCall(PetscStrncpy(folder, ".", sizeof(folder)));
   HycoCheck(access(folder, W_OK | X_OK) == 0, "-%s %s cannot be written: is there such a folder, may you write there?",
             name, path);
+  HycoCheck(stat(path, &info) || !S_ISDIR(info.st_mode), "-%s %s is a folder; give the name of a file", name, path);
+  if (strcmp(name, "output") == 0) PetscCall(HycoFieldsCheckPath(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverCheckOutputs(const Command *command)
+{
+  static const char *const files[] = {"model", "report", "table", "output"};
+  enum { N_FILES = sizeof(files) / sizeof(files[0]) };
+  char path[N_FILES][PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < N_FILES; k++) {
+    PetscCall(Peek(files[k], path[k]));
+    for (PetscInt j = 0; j < k; j++)
+      HycoCheck(!path[k][0] || strcmp(path[k], path[j]), "-%s and -%s are both %s; give each a file of its own",
+                files[j], files[k], path[k]);
+    if (path[k][0] && (k || command->run == CommandTrain)) HycoOnRoot(PETSC_COMM_WORLD, CheckPlace(files[k], path[k]));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
 {
-  static const char *const files[] = {"report", "table", "output"};
   PetscInt n;
   char **names, **values, first[DRIVER_LINE] = "";
 
@@ -216,12 +264,6 @@ static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
   }
   PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
   HycoCheck(!first[0], "nothing reads the option -%s here; take it away, or see hyco -help", first);
-  for (size_t k = 0; k < sizeof(files) / sizeof(files[0]); k++) {
-    char path[PETSC_MAX_PATH_LEN];
-
-    PetscCall(DriverGet(files[k], PETSC_FALSE, path));
-    if (path[0]) HycoOnRoot(PETSC_COMM_WORLD, CheckFolder(files[k], path));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -544,7 +586,10 @@ void DriverHelp(const char *command)
   }
   printf("\nOptions of the method (a scene may set them too, in its hyco: section without the prefix)\n");
   for (PetscInt k = 0; k < n; k++) {
+    const char *readers = ReadersOf(table[k].name);
+
     if (command && strcmp(command, "train") && DecidesModel(table[k].name)) continue;
+    if (command && readers && !strstr(readers, command)) continue;
     HelpLine(table[k].name, table[k].value, table[k].initial, table[k].meaning);
   }
   printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "

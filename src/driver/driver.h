@@ -23,6 +23,9 @@ extern const Command commands[];
 
 /* Every option on the command line is one that `command` knows, or PETSc's; no stray words. */
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
+/* The files that `command` is to write have names of their own, in folders that may be written. Before any work; counts
+   no option as read. Collective. */
+PetscErrorCode DriverCheckOutputs(const Command *command);
 /* Nothing was given that nobody read. To be called when all options have been read and before anything is written. */
 PetscErrorCode DriverCheckLeft(void);
 /* The same before the solvers have run: what is meant for them (-hyco_mumps_..., -hyco_tao_... with that type) passes.

@@ -118,6 +118,7 @@ static PetscErrorCode Run(const Command *command, int argc, char **argv)
 {
   PetscFunctionBegin;
   PetscCall(DriverCheckArguments(command, argc, argv));
+  PetscCall(DriverCheckOutputs(command));
   PetscCall(command->run());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

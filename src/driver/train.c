@@ -102,10 +102,28 @@ static PetscErrorCode CheckKind(PetscBool greedy, const Search *search, HycoSamp
 static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool greedy)
 {
   static const struct {
-    const char *name, *type;
-  } meant[] = {{"-hyco_condensed_tol", "condensed"}, {"-hyco_condensed_max_values", "condensed"},
-               {"-hyco_nnmf_vectors", "projection"}, {"-hyco_nnmf_max_its", "projection"},
-               {"-hyco_greedy_indicator", NULL},     {"-hyco_greedy_keep", NULL}};
+    const char *name, *types; /* NULL: for -greedy */
+  } meant[] = {{"-hyco_condensed_tol", "condensed"},
+               {"-hyco_condensed_max_values", "condensed"},
+               {"-hyco_nnmf_vectors", "projection"},
+               {"-hyco_nnmf_max_its", "projection"},
+               {"-hyco_rid_modes", "hybrid or condensed"},
+               {"-hyco_rid_dual_tol", "hybrid or condensed"},
+               {"-hyco_rid_stress_tol", "hybrid or condensed"},
+               {"-hyco_rid_force_tol", "hybrid or condensed"},
+               {"-hyco_rid_layers", "hybrid or condensed"},
+               {"-hyco_rid_contact_extension", "hybrid or condensed"},
+               {"-hyco_rid_groups", "hybrid or condensed"},
+               {"-hyco_rid_region", "hybrid or condensed"},
+               {"-hyco_rid_whole", "hybrid or condensed"},
+               {"-hyco_deim_type", "hybrid or condensed"},
+               {"-hyco_hybrid", "hybrid"},
+               {"-hyco_hybrid_trials", "hybrid"},
+               {"-hyco_hybrid_ridge", "hybrid"},
+               {"-hyco_scan", "hybrid or projection"},
+               {"-hyco_keep_singular", "hybrid or projection"},
+               {"-hyco_greedy_indicator", NULL},
+               {"-hyco_greedy_keep", NULL}};
   PetscInt type = HYCO_MODEL_HYBRID;
   PetscOptions options;
 
@@ -117,11 +135,12 @@ static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool gree
 
     PetscCall(PetscOptionsHasName(NULL, NULL, meant[k].name, &set));
     if (!set) continue;
-    HycoCheck(meant[k].type || greedy, "nothing reads %s here: it is for train -greedy", meant[k].name);
-    HycoCheck(!meant[k].type || strcmp(meant[k].type, HycoModelTypes[type]) == 0,
-              "nothing reads %s here: it is for -hyco_model_type %s, and the model is %s", meant[k].name, meant[k].type,
-              HycoModelTypes[type]);
-    HycoCheck(!given || !meant[k].type || strcmp(meant[k].type, HycoModelTypes[HYCO_MODEL_CONDENSED]),
+    HycoCheck(meant[k].types || greedy, "nothing reads %s here: it is for train -greedy", meant[k].name);
+    if (!meant[k].types) continue;
+    HycoCheck(strstr(meant[k].types, HycoModelTypes[type]),
+              "nothing reads %s here: it is for -hyco_model_type %s, and the model is %s", meant[k].name,
+              meant[k].types, HycoModelTypes[type]);
+    HycoCheck(!given || strcmp(meant[k].types, HycoModelTypes[HYCO_MODEL_CONDENSED]),
               "nothing reads %s here: it chooses points where none are given", meant[k].name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
