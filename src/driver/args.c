@@ -406,26 +406,36 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
+/* Whether -word, or a -prefixNAME of a parameter, was given. */
+static PetscErrorCode HasNamed(HycoScene scene, const char word[], const char prefix[], PetscBool *given)
 {
   PetscInt n;
   const char *const *names;
-  PetscBool set;
 
   PetscFunctionBegin;
-  *given = PETSC_FALSE;
   PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-grid", &set));
-  *given = (PetscBool)(*given || set);
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-points", &set));
-  *given = (PetscBool)(*given || set);
-  for (PetscInt p = 0; p < n; p++) {
+  PetscCall(PetscOptionsHasName(NULL, NULL, word, given));
+  for (PetscInt p = 0; p < n && !*given; p++) {
     char key[DRIVER_LINE];
 
-    PetscCall(PetscSNPrintf(key, sizeof(key), "-values_%s", names[p]));
-    PetscCall(PetscOptionsHasName(NULL, NULL, key, &set));
-    *given = (PetscBool)(*given || set);
+    PetscCall(PetscSNPrintf(key, sizeof(key), "%s%s", prefix, names[p]));
+    PetscCall(PetscOptionsHasName(NULL, NULL, key, given));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given)
+{
+  PetscFunctionBegin;
+  PetscCall(HasNamed(scene, "-mu", "-mu_", given));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
+{
+  PetscFunctionBegin;
+  PetscCall(HasNamed(scene, "-grid", "-values_", given));
+  if (!*given) PetscCall(PetscOptionsHasName(NULL, NULL, "-points", given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

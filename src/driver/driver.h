@@ -35,6 +35,8 @@ PetscErrorCode DriverCheckLeftEarly(HycoScene scene);
 PetscErrorCode DriverGet(const char name[], PetscBool required, char value[PETSC_MAX_PATH_LEN]);
 /* One point: -mu v,v,... or -mu_NAME v. */
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
+/* Whether -mu or a -mu_NAME was given. */
+PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given);
 /* A set of points: -grid (with -grid_type), -values_NAME, or -points. *given: whether any was. */
 PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given);
 /* The points among which a greedy training chooses: -training_grid, closed unless -grid_type says otherwise. */
@@ -69,6 +71,8 @@ PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, 
 
 /* Prints on rank 0. */
 PetscErrorCode Say(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
+/* A share in percent: "0.12 %", "120 %". */
+void DriverPercent(PetscReal share, char text[32]);
 /* A HycoProgress: a bar that moves on a terminal, a line now and then elsewhere. ctx: a word for what is done. */
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx);
 /* A HycoMonitor. */
@@ -87,6 +91,9 @@ typedef struct {
   char stop[16];
 } GreedyLog;
 
+/* A point (NULL: none) in words ("mu1 = 0.05, mu2 = 0.1") and as columns ("0.05,0.1,"; may be NULL). */
+PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char words[DRIVER_LINE],
+                                 char columns[DRIVER_LINE]);
 /* Reads the options of train -greedy, makes the training set and sets the trainer, which will fill `log`. */
 PetscErrorCode DriverReadGreedy(HycoScene scene, HycoTrainer trainer, HycoSamples *training, GreedyLog *log);
 void DriverReportGreedy(cJSON *json, const GreedyLog *log);

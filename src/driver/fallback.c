@@ -83,7 +83,10 @@ PetscErrorCode DriverSolveFullOrder(Fallback *f, PetscInt n, const PetscReal mu[
   p->reason = s.reason;
   p->kkt = s.kkt;
   p->iterations = s.iterations;
-  p->n_active = s.n_active;
+  p->n_active = p->n_rid_active = s.n_active;
+  p->n_dof = p->n_fe_dofs = s.n_dof;
+  p->n_multipliers = p->n_contacts = p->n_all_contacts = s.n_contacts;
+  p->n_modes = 0;
   p->total_contact_force = s.total_contact_force;
   p->lambda_max = s.lambda_max;
   p->lambda_norm2 = s.lambda_norm2;

@@ -105,6 +105,9 @@ CASES = [
     (['predict', '-model', 'rope.h5', '-mu', '0.07,0.1', '-output', 'out.vtk'], 'ends in .xdmf'),
     (['predict', '-model', 'rope.h5', '-mu', '0.07,0.1', '-output', 'none/out.xdmf'], 'cannot be written'),
     (['compare', '-scene', PELLET, '-model', 'rope.h5', *N], ''),
+    (['compare', '-scene', ROPE, '-model', 'rope.h5'], 'give the test points: -mu V,V,... for one, or -grid'),
+    (['compare', '-scene', ROPE, '-model', 'rope.h5', *N, *STOPPED], 'the full-order solution at mu1 = 0.1, mu2 = '),
+    (['predict', '-model', 'rope.h5', *N, *STOPPED], 'converged of a table (-table FILE.csv) says which'),
     (['view', '-model', 'text.h5'], 'text.h5 is no HDF5 file'),
     # training
     (['train', *T], 'give the training points'),
