@@ -135,6 +135,7 @@ typedef struct {
   PetscBool on;
   PetscReal target[HYCO_N_ERRORS]; /* 0: none */
   char scene[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], folder[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN];
+  PetscReal seconds_solutions, seconds_attempts; /* of all that was solved and tried, the chosen build among it */
   PetscInt n;
   Attempt *attempt; /* n of them; PetscFree() it */
   const Attempt *chosen;

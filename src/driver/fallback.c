@@ -1,18 +1,20 @@
 /* hyco predict -hyco_fallback: full order where the reduced model cannot be trusted as far as is asked. */
 #include "driver.h"
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 PetscErrorCode DriverReadTarget(const char name[], PetscReal *target)
 {
-  char text[PETSC_MAX_PATH_LEN];
+  char text[PETSC_MAX_PATH_LEN], *end;
 
   PetscFunctionBegin;
   *target = 0;
   PetscCall(DriverGet(name, PETSC_FALSE, text));
-  PetscCall(HycoOptionsReal(NULL, name, 0, 1, target));
-  HycoCheck(!text[0] || *target > 0, "-%s is %s; a relative error above 0 is expected: 1e-2 is one percent", name,
-            text);
+  if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  *target = strtod(text, &end);
+  HycoCheck(end != text && !*end && *target > 0 && *target <= 1,
+            "-%s is \"%s\"; it must be a relative error above 0 and at most 1: 1e-2 is one percent", name, text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -54,7 +54,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
   if (log->scene) DriverReportGreedy(json, log);
   if (search->on) DriverReportTargets(json, search);
   seconds = cJSON_AddObjectToObject(json, "seconds");
-  cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots);
+  cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots); /* of the model that is written */
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
   cJSON_AddNumberToObject(seconds, "total", t->seconds_snapshots + t->seconds_reduction);
   PetscCall(ReportWrite(&json));
@@ -190,7 +190,11 @@ PetscErrorCode CommandTrain(void)
   PetscCall(TakeOnce(validation, "validation"));
   if (!search.on) PetscCall(CheckRead(scene, given, greedy));
   PetscCall(HycoTrainerChooses(trainer, &chooses));
-  HycoCheck(given || greedy || (chooses && !search.on),
+  HycoCheck(
+      given || !chooses || !search.on,
+      "-target_... judges models by solutions that are held out of given points, and a condensed model's own points "
+      "are chosen by -hyco_condensed_tol: give -grid N,N,... (or -values_NAME, -points), or no -target_...");
+  HycoCheck(given || greedy || chooses,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
   if (greedy) PetscCall(DriverReadGreedy(scene, trainer, &training, &log));

@@ -115,8 +115,8 @@ class Trust(Case):
 
     def test_complaints(self):
         for args, words in ((('-target_u', 0.1), 'give -hyco_fallback too'), (('-hyco_fallback',), 'give its -scene'),
-                            (('-hyco_fallback', '-scene', ROPE, '-target_u', 0), 'above 0'),
-                            (('-hyco_fallback', '-scene', ROPE, '-target_lambda', 2), 'from 0 to 1'),
+                            (('-hyco_fallback', '-scene', ROPE, '-target_u', 0), 'a relative error above 0 and at most 1'),
+                            (('-hyco_fallback', '-scene', ROPE, '-target_lambda', 2), 'a relative error above 0 and at most 1'),
                             (('-hyco_fallback', '-scene', ROPE, '-body_rope_young', 1, '-target_u', 0.1), 'another scene')):
             run = self.run_raw('predict', '-model', 'fine.h5', '-mu', '0.1,0.2', *args)
             self.assertEqual(run.returncode, 1, args)
