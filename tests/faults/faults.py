@@ -84,7 +84,7 @@ CASES = [
     (['solve', *R, '-report', 'none/r.json'], 'none/r.json cannot be written'),
     # models
     (['predict', '-model', 'none.h5', '-mu', '0.07,0.17'], 'none.h5 cannot be opened'),
-    (['predict', '-model', 'cut.h5', '-mu', '0.07,0.17'], 'cut.h5 is no HDF5 file, or it is damaged'),
+    (['predict', '-model', 'cut.h5', '-mu', '0.07,0.17'], 'cut.h5 is no HDF5 file, or it is damaged; if it was a model, train it again'),
     (['predict', '-model', 'text.h5', '-mu', '0.07,0.17'], 'text.h5 is no HDF5 file, or it is damaged'),
     (['predict', '-model', 'fields.h5', '-mu', '0.07,0.17'], 'fields.h5'),
     (['predict', '-model', 'rope.h5', '-mu', '0.07'], '-mu has 1 values'),
