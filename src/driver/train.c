@@ -207,7 +207,10 @@ PetscErrorCode CommandTrain(void)
     PetscCall(HycoTrainerRun(trainer, given ? samples : NULL, model, &t));
   PetscCall(SayBases(&t));
   if (!given && t.type == HYCO_MODEL_CONDENSED && !t.target_met)
-    PetscCall(Say("-hyco_condensed_tol was not reached with -hyco_condensed_max_values\n"));
+    PetscCall(
+        Say("-hyco_condensed_tol was not reached: the forces' error, one value left out, is %.1e, and %.1e was asked; "
+            "raise -hyco_condensed_max_values, which is %d, or be content with more\n",
+            (double)t.left_out[2], (double)t.target, (int)t.most_values));
   PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u,
                 t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda));
   if (t.type != HYCO_MODEL_CONDENSED) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
