@@ -114,22 +114,40 @@ static PetscBool IsSceneEntry(const char name[])
   return PETSC_FALSE;
 }
 
+/* The commands that take an option which this one does not: "solve, predict"; "" if none does. */
+static void ListTakers(const char name[], char list[DRIVER_LINE])
+{
+  size_t at = 0;
+
+  list[0] = '\0';
+  for (PetscInt c = 0; commands[c].name; c++) {
+    if (TakesOption(&commands[c], name))
+      at += (size_t)snprintf(list + at, DRIVER_LINE - at, "%s%s", at ? ", " : "", commands[c].name);
+  }
+}
+
 static PetscErrorCode Unknown(const Command *command, const char name[])
 {
   const HycoOption *table;
   PetscInt n, m = 0;
   const char *names[96], *near;
-  char copy[DRIVER_LINE], *rest;
+  char copy[DRIVER_LINE], takers[DRIVER_LINE], *rest;
 
   PetscFunctionBegin;
+  ListTakers(name, takers);
+  HycoCheck(!takers[0], "hyco %s knows no option -%s; what does: hyco %s", command->name, name, takers);
   PetscCall(HycoGetOptionTable(&n, &table));
   for (PetscInt k = 0; k < n && m < 64; k++) names[m++] = table[k].name;
   PetscCall(PetscStrncpy(copy, command->options, sizeof(copy)));
   for (char *word = strtok_r(copy, " ", &rest); word && m < 96; word = strtok_r(NULL, " ", &rest)) names[m++] = word;
-  near = HycoNearest(name, m, names);
+  near = NULL;
+  for (PetscInt k = 0; k < m && !near; k++) {
+    if (strncasecmp(names[k], name, strlen(name)) == 0) near = names[k]; /* the beginning of one */
+  }
+  if (!near) near = HycoNearest(name, m, names);
   if (near)
-    HycoFail("hyco %s knows no option -%s; did you mean -%s? (hyco %s -help lists them)", command->name, name, near,
-             command->name);
+    HycoFail("hyco %s knows no option -%s; did you mean -%s%s? (hyco %s -help lists them)", command->name, name, near,
+             near[strlen(near) - 1] == '_' ? "NAME" : "", command->name);
   HycoFail("hyco %s knows no option -%s (hyco %s -help lists them)", command->name, name, command->name);
 }
 
@@ -180,7 +198,11 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
   for (int k = 2; k < argc; k++) {
     const char *name = argv[k] + (argv[k][1] == '-' ? 2 : 1);
 
-    if (!IsKey(argv[k])) HycoFail("\"%s\" is no option; options begin with a dash, and take one value each", argv[k]);
+    if (!IsKey(argv[k]))
+      HycoFail(
+          "\"%s\" is no option; options begin with a dash, and take one value each (values have commas between, and "
+          "no space)",
+          argv[k]);
     if (!TakesOption(command, name) && !HycoOptionKnown(name) && !IsForeign(name) &&
         !(IsSceneEntry(name) && TakesOption(command, "scene"))) {
       PetscCall(Unknown(command, name));
@@ -365,6 +387,23 @@ static PetscErrorCode CheckNamed(HycoScene scene, const char prefix[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* "radius from 4.02 to 4.1, load from 0 to 1" */
+static PetscErrorCode ListRanges(HycoScene scene, char list[DRIVER_LINE])
+{
+  PetscInt n;
+  const char *const *names;
+  const PetscReal *lo, *hi;
+  size_t at = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, &lo, &hi));
+  list[0] = '\0';
+  for (PetscInt p = 0; p < n && at < DRIVER_LINE; p++)
+    at += (size_t)snprintf(list + at, DRIVER_LINE - at, "%s%s from %g to %g", p ? ", " : "", names[p], (double)lo[p],
+                           (double)hi[p]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
 {
   PetscInt n, given = 0;
@@ -400,6 +439,7 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
     given++;
     PetscCall(PetscFree(values));
   }
+  PetscCall(ListRanges(scene, list));
   HycoCheck(whole || given == n, "the scene has %d parameters (%s); give -mu with all of them, or -mu_NAME for each",
             (int)n, list);
   PetscCall(HycoSceneCheckParameters(scene, n, mu));
