@@ -26,7 +26,6 @@ typedef struct {
   PetscReal covered_force; /* share of the total contact force that the RID's own multipliers carry; 1 without force */
   PetscReal total_contact_force;                                   /* reconstructed, whole contact surface */
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
-  PetscReal strain_energy;                                         /* of the RID */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
   /* An upper estimate of the relative errors of u (whole mesh, 2-norm) and of all contact forces (2-norm; a force below
      a tenth of the largest in training counts as that tenth), calibrated at training; < 0: the model has none, or the
@@ -71,11 +70,11 @@ PetscErrorCode HycoModelSetExtrapolate(HycoModel model, PetscBool extrapolate);
    output may be NULL. */
 PetscErrorCode HycoModelGetSizes(HycoModel model, PetscInt *n_contacts, PetscInt *n_nodes, PetscInt *dim);
 /*
-  HycoModelPredict() at n points, mu n x n_parameters, with the same answers to the last bit in the caller's order;
-  inside, points that share their stiffness share its factor. The caller's arrays, each of which may be NULL:
-  prediction (n), Lambda (n x n_contacts), U (n x n_nodes x dim, as HycoModelGetRID()'s). Not converging is no error:
-  see HycoPrediction.reason. Afterwards no prediction is held. Not collective. Fails before any solve when a point lies
-  outside the ranges.
+  HycoModelPredict() at n points, mu n x n_parameters, with the same answers to the last bit (of a condensed model:
+  to round-off) in the caller's order; inside, points that share their stiffness share its factor. The caller's arrays,
+  each of which may be NULL: prediction (n), Lambda (n x n_contacts), U (n x n_nodes x dim, as HycoModelGetRID()'s). Not
+  converging is no error: see HycoPrediction.reason. Afterwards no prediction is held. Not collective. Fails before any
+  solve when a point lies outside the ranges.
 */
 PetscErrorCode HycoModelSolveMany(HycoModel model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                   HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
@@ -83,7 +82,10 @@ PetscErrorCode HycoModelSolveMany(HycoModel model, PetscInt n, PetscInt n_parame
 PetscErrorCode HycoModelSetReconstruct(HycoModel model, PetscBool reconstruct);
 /* Called after each iteration of the active set. */
 PetscErrorCode HycoModelSetMonitor(HycoModel model, HycoMonitor monitor, void *ctx);
+/* What the last prediction amounts to, its errors estimated. Fails before the first. */
 PetscErrorCode HycoModelGetPrediction(HycoModel model, HycoPrediction *prediction);
+/* Strain energy of the last prediction on the RID's cells; it may cost as much as the prediction. */
+PetscErrorCode HycoModelGetStrainEnergy(HycoModel model, PetscReal *energy);
 
 /* Displacement of the RID's nodes (n_nodes x dim) and stress of its cells (n_cells x n_sigma, as HycoFOMGetSolution),
    with the mesh-file tags of the nodes and cells. Any output may be NULL. Borrowed until the next prediction. */

@@ -125,4 +125,14 @@ PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscIn
 PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                       PetscReal *error);
 
+/* Values on a grid, rows x nodes column major. Axes on which they do not depend have one node. */
+typedef struct {
+  HycoTensor tensor;
+  PetscInt rows;
+  PetscReal *data;
+} HycoGridField;
+/* All rows at `at`, the nodes with number `skip` along `axis` left out (-1, -1: none). */
+PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *field, const PetscReal at[], PetscInt axis, PetscInt skip,
+                                     PetscReal value[]);
+
 #endif

@@ -16,19 +16,12 @@
 enum { HYCO_FIELD_G, HYCO_FIELD_GAP, HYCO_FIELD_H, HYCO_FIELD_FREE, HYCO_N_FIELDS };
 extern const char *const HycoGridFieldNames[]; /* as in files */
 
-typedef struct {
-  HycoTensor tensor; /* axes on which it does not depend have one node, and node 0 stands for all */
-  PetscInt rows;
-  PetscReal
-      *data; /* rows x nodes column major; G: the columns of its lower triangle, m (m + 1) / 2; H: l x m row major */
-} HycoGridField;
-
 struct _n_HycoCondensed {
   PetscInt dim, m, l;                                               /* parameters, contacts, modes */
   PetscInt n[HYCO_MAX_PARAMETERS];                                  /* training values of each parameter */
   PetscReal *x[HYCO_MAX_PARAMETERS];                                /* ascending */
   PetscInt stiff[HYCO_MAX_PARAMETERS], affine[HYCO_MAX_PARAMETERS]; /* reaches K or B; F and D are affine in it */
-  HycoGridField field[HYCO_N_FIELDS];
+  HycoGridField field[HYCO_N_FIELDS]; /* G: the columns of its lower triangle, m (m + 1) / 2; H: l x m row major */
   PetscReal *bounds;   /* by node of G: lower and upper of it by the middle node's G; 0, 0: none are known */
   PetscReal *Lambda;   /* m x nodes of the whole grid: training forces */
   PetscReal errors[3]; /* one node left out: G, g, forces; relative */
@@ -43,6 +36,7 @@ struct _n_HycoCondensed {
   PetscReal last[HYCO_MAX_PARAMETERS];
   PetscReal gap_size;                           /* largest |g| in training */
   PetscReal *packed, *M, *work, *g, *H, *a, *w; /* M: G, m x m */
+  HycoSetFactor set_factor;                     /* of M on the active contacts */
   PetscBool *active;
 };
 
@@ -58,9 +52,6 @@ PetscErrorCode HycoCondensedSave(HycoModel model, HycoH5 file);
 PetscErrorCode HycoCondensedLoad(HycoModel model, HycoH5 file);
 /* The bounds of G at its nodes. */
 PetscErrorCode HycoCondensedBound(HycoCondensed condensed);
-/* A field at mu, the nodes with number `skip` along `axis` left out (-1, -1: none). */
-PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *field, const PetscReal mu[], PetscInt axis, PetscInt skip,
-                                     PetscReal value[]);
 /* M = G(mu), and whether it is positive definite beyond round-off (only semidefinite counts: contacts may repeat). */
 PetscErrorCode HycoCondensedFlexibility(HycoCondensed condensed, const PetscReal mu[], PetscInt axis, PetscInt skip,
                                         PetscBool *definite);

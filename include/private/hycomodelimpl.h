@@ -19,6 +19,8 @@ typedef struct _n_HycoNorms *HycoNorms;
 typedef struct _n_HycoCondensed *HycoCondensed;
 typedef struct _n_HycoReconstruction *HycoReconstruction;
 typedef struct _n_HycoReduced *HycoReduced;
+typedef struct _n_HycoLoads *HycoLoads;
+typedef struct _n_HycoTable *HycoTable;
 
 /* Rows of B in CSR over dofs of a mesh, and D: see HycoContactRows(). */
 typedef struct {
@@ -77,6 +79,7 @@ struct _p_HycoModel {
   PetscReal *V_lambda;     /* N_lambda x l_lambda column major, no entry negative, columns of unit 2-norm */
   PetscReal dual_misfit;   /* |S_lambda - V_lambda H|^2 / |S_lambda|^2, the best H >= 0 that training found */
   HycoCondensed condensed; /* else NULL */
+  HycoTable table;         /* Kr's entries as polynomials of the parameters; NULL: assembled */
   /* the whole mesh, on demand */
   HycoMesh whole;
   HycoFE fe_whole;
@@ -94,6 +97,7 @@ struct _p_HycoModel {
   PetscInt *fe_at;       /* by dof of mesh: place in fe_dof, or -1 */
   PetscReal *Vp;         /* V, zero on full-order and fixed unknowns */
   HycoReduced reduced;   /* how K goes into Kr, and what of it stays; made by the first */
+  HycoLoads loads;       /* solutions without contact that loads share; NULL: a dense Kr, or no such parameter */
   Mat K, Kr, Br, Btr;
   Vec F, Fr, Dr, x, L;
   HycoMesh own;                  /* the cells and the first nodes of mesh: all that the reduced problem touches */
@@ -128,6 +132,20 @@ PetscErrorCode HycoReducedFillStiffness(HycoModel model);
 PetscErrorCode HycoReducedFillContact(HycoModel model);
 PetscErrorCode HycoReducedFillVectors(HycoModel model);
 PetscErrorCode HycoReducedDestroy(HycoReduced *reduced);
+
+/* Kr's entries in the order in which it has them, borrowed while it lives; the row of each. */
+PetscErrorCode HycoReducedEntries(HycoModel model, PetscInt *n, PetscScalar *a[]);
+PetscErrorCode HycoReducedRows(HycoModel model, PetscInt row[]);
+/* m->reduced, and the pattern of a sparse Kr, before the first fill. */
+PetscErrorCode HycoReducedPrepare(HycoModel model);
+
+/* What loads share while the stiffness stays (loads.c). HycoLoadsCreate() needs Fr and x; HycoLoadsForget(): the
+   stiffness has changed (NULL-safe); HycoLoadsSetFree() gives the solver the solution without contact at mu, where the
+   system is current, if it is known by those of the ranges' ends. */
+PetscErrorCode HycoLoadsCreate(HycoModel model);
+PetscErrorCode HycoLoadsDestroy(HycoLoads *loads);
+void HycoLoadsForget(HycoLoads loads);
+PetscErrorCode HycoLoadsSetFree(HycoModel model, const PetscReal mu[]);
 
 /* K and the reduced system at mu, without solving: Kr, Br, Btr and the vectors are current, the prediction is not. */
 PetscErrorCode HycoModelAssemble(HycoModel model, const PetscReal mu[]);

@@ -47,6 +47,7 @@ struct _p_HycoSolver {
   /* dual form, replicated on every rank: column-major m x m flexibility, gap without forces */
   PetscInt m, p; /* contacts; unknowns pinned because K is singular: they come before the contacts in S, g and L */
   PetscReal *S, *g, *L;
+  HycoSetFactor set_factor; /* of S on the active contacts; NULL: not symmetric */
   PetscBool *active;
   PetscBool started; /* active holds a solution's set */
   HycoSeen condensed;
@@ -58,13 +59,14 @@ struct _p_HycoSolver {
   /* dual form without its matrix */
   HycoDirect direct_free;
   HycoSeen factored_free;
+  Vec free; /* K^-1 F of the next solve, if known; borrowed */
   /* the last solve */
   PetscInt tao; /* the type that serves its system */
   HycoReason reason;
   HycoKKT kkt;
   PetscInt its;
   char method[128];
-  PetscReal seconds_factor, seconds_solve;
+  PetscReal seconds_factor, seconds_solve, seconds_before; /* before: of a factor made ahead of the solve */
 };
 
 extern const char *const HycoSolverTypes[]; /* active_set, tao, lemke, NULL */
@@ -83,6 +85,13 @@ PetscErrorCode HycoChooseLinear(HycoSolver s, HycoForm *form);
 extern const char *const HycoLinearNames[];
 /* Attaches K's near-kernel (MatSetNearNullSpace()) to Kw, in gap coordinates. Collective. */
 PetscErrorCode HycoGapNearKernel(HycoSolver s, Mat Kw);
+/* Factors K and makes S unless K and B are as they were; dual form. Collective. */
+PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular);
+/* x = K^-1 r by that factor, refined once. Collective. */
+PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x);
+/* K^-1 F of the next solve, which takes it for granted if it uses the dual form and K is regular. Borrowed until then.
+ */
+PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x);
 /* The forms: fill x and L, set its and method; *solved says whether the method finished by its own account. */
 PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBool *solved);
 PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBool *solved);

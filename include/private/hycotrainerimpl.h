@@ -77,6 +77,8 @@ PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel model);
 /* Scans the ranges for a singular reduced stiffness, the points spread over the ranks: the model at `candidate`
    (removed) goes to `path` with what was found, or is refused. Collective. */
 PetscErrorCode HycoTrainerScan(HycoTrainer t, const char candidate[], const char path[], HycoScan *found);
+/* Gives the model a table of its reduced stiffness if that is a polynomial of the parameters that reach it. Rank 0. */
+PetscErrorCode HycoTrainerTabulate(HycoModel model, const PetscBool reaches[]);
 /* B^T of the dual snapshots, and M^-1 of it with the matrix M of the H1 norm: where each force works most. Both n_dof x
    n_s, dense, the caller's. Rank 0. */
 PetscErrorCode HycoTrainerSupremizers(HycoTrainer t, Mat *forces, Mat *supremizers);

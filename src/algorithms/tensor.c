@@ -5,6 +5,7 @@
   (2021) 405-415), which spans what Chebyshev polynomials span and stays well conditioned on any nodes.
 */
 #include <hycoalgorithms.h>
+#include <petscblaslapack.h>
 
 /* Errors no larger than this share of the data are round-off: the lowest such degree is taken. */
 #define ROUNDING 1e-12
@@ -177,5 +178,25 @@ PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt row
     *error = PetscMin(e, *error);
   }
   t->degree[axis] = best;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *f, const PetscReal at[], PetscInt axis, PetscInt skip,
+                                     PetscReal value[])
+{
+  const PetscInt n = HycoTensorSize(&f->tensor);
+  const PetscReal one = 1, zero = 0;
+  const PetscBLASInt step = 1;
+  PetscReal *w;
+  PetscBLASInt rows, nodes;
+
+  PetscFunctionBegin;
+  if (!f->rows) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscBLASIntCast(f->rows, &rows));
+  PetscCall(PetscBLASIntCast(n, &nodes));
+  PetscCall(PetscMalloc1(n, &w));
+  PetscCall(HycoTensorWeights(&f->tensor, at, axis, skip, w));
+  BLASgemv_("N", &rows, &nodes, &one, f->data, &rows, w, &step, &zero, value, &step);
+  PetscCall(PetscFree(w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

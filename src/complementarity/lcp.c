@@ -16,15 +16,24 @@ unsigned long long HycoSetHash(PetscInt n, const PetscBool active[])
   return hash;
 }
 
-/* w = q + M z, and the size against which its zeros are round-off. */
-static PetscReal Slack(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt k, const PetscInt a[],
-                       const PetscReal z[], PetscReal w[])
+/* w = q + M z of the contacts that are not active (if symmetric, else of all), and the size against which its zeros are
+   round-off. */
+static PetscReal Slack(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
+                       const PetscBool active[], PetscInt k, const PetscInt a[], const PetscReal z[], PetscReal w[])
 {
   PetscReal size = 0;
 
   for (PetscInt i = 0; i < n; i++) {
     w[i] = q[i];
     size = PetscMax(size, PetscAbsReal(q[i]));
+  }
+  if (symmetric && k > n - k) { /* few rows, which are columns */
+    for (PetscInt i = 0; i < n; i++) {
+      const PetscReal *row = M + (size_t)i * (size_t)n;
+
+      for (PetscInt j = 0; j < n && !active[i]; j++) w[i] += row[j] * z[j];
+    }
+    return size;
   }
   for (PetscInt j = 0; j < k; j++) {
     const PetscReal *column = M + (size_t)a[j] * (size_t)n;
@@ -77,7 +86,7 @@ static PetscBool Met(PetscInt n, const PetscBool active[], PetscInt its, unsigne
   return PETSC_FALSE;
 }
 
-PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
+PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal q[], HycoSetFactor factor,
                                 PetscInt max_its, HycoLCPMonitor monitor, void *ctx, PetscBool active[], PetscReal z[],
                                 PetscInt *its, HycoLCPStatus *status)
 {
@@ -101,13 +110,13 @@ PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal
       if (active[i]) a[k++] = i;
     }
     (*its)++;
-    PetscCall(HycoLCPSolveOnSet(n, M, q, symmetric, &k, a, z, &singular));
+    PetscCall(HycoLCPSolveOnSet(n, M, q, factor, &k, a, z, &singular));
     if (singular) {
       *status = HYCO_LCP_SINGULAR;
       break;
     }
     n_aside = SetAside(n, k, a, active, aside);
-    size = Slack(n, M, q, k, a, z, w);
+    size = Slack(n, M, q, (PetscBool)(factor != NULL), active, k, a, z, w);
     changes = Flip(n, size, z, w, aside, active);
     if (monitor) PetscCall(monitor(*its, k, changes, ctx));
     if (!changes) *status = HYCO_LCP_SOLVED;

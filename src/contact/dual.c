@@ -5,6 +5,9 @@
 #include <hycosolverimpl.h>
 #include <petscblaslapack.h>
 
+/* A residual below this share of F needs no refinement: the residuals are judged by 1e-8. */
+#define REFINE 1e-10
+
 /* Makes room for m contacts and p pinned unknowns; a change forgets the last solution's set. */
 static PetscErrorCode Resize(HycoSolver s, PetscInt p)
 {
@@ -17,6 +20,8 @@ static PetscErrorCode Resize(HycoSolver s, PetscInt p)
   PetscCall(PetscFree(s->g));
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
+  PetscCall(HycoSetFactorDestroy(&s->set_factor));
+  if (s->system->symmetric && !p) PetscCall(HycoSetFactorCreate(m, &s->set_factor));
   PetscCall(PetscMalloc1((size_t)n * (size_t)n + 1, &s->S));
   PetscCall(PetscCalloc1(n + 1, &s->g));
   PetscCall(PetscCalloc1(n + 1, &s->L));
@@ -120,6 +125,7 @@ static PetscErrorCode SetUpDual(HycoSolver s, PetscBool *singular)
   PetscCall(HycoSeenUpdate(&s->condensed, y->K, y->B, &same));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   s->condensed.K = 0; /* until it is done */
+  HycoSetFactorForget(s->set_factor);
   PetscCall(PetscObjectTypeCompare((PetscObject)y->K, MATSEQDENSE, &dense));
   if (!dense)
     HycoLogged(HYCO_EVENT_FACTOR, FactorSparse(s, singular));
@@ -203,8 +209,8 @@ static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved
     *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   } else {
     if (!s->warm || !s->started) PetscCall(PetscArrayzero(s->active, s->m));
-    PetscCall(HycoLCPActiveSet(s->m, s->S, s->g, s->system->symmetric, max_its, s->monitor, s->monitor_ctx, s->active,
-                               s->L, &s->its, &status));
+    PetscCall(HycoLCPActiveSet(s->m, s->S, s->g, s->set_factor, max_its, s->monitor, s->monitor_ctx, s->active, s->L,
+                               &s->its, &status));
     *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   }
   for (PetscInt i = 0; i < s->m; i++) {
@@ -221,12 +227,15 @@ static PetscErrorCode FreeGap(HycoSolver s, Vec x)
   HycoSystem y = s->system;
 
   PetscFunctionBegin;
-  if (!s->lu) {
+  if (!s->lu && !s->free) {
     PetscCall(GatherVec(s->comm, y->D, s->L));
     PetscCall(HycoDirectReduce(s->direct, y->F, s->L, s->g));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SolveK(s, y->F, x));
+  if (s->free)
+    PetscCall(VecCopy(s->free, x));
+  else
+    PetscCall(SolveK(s, y->F, x));
   PetscCall(HycoSystemWork(y));
   PetscCall(MatMult(y->B, x, y->work_L));
   PetscCall(VecAYPX(y->work_L, -1, y->D));
@@ -249,6 +258,23 @@ static PetscErrorCode Residual(HycoSystem y, Vec x, Vec L, Vec work, Vec r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x = K^-1 F - K^-1 Bt L, the first of them known. */
+static PetscErrorCode AddForces(HycoSolver s, Vec x, Vec L)
+{
+  HycoSystem y = s->system;
+  PetscReal most;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(L, NORM_INFINITY, &most));
+  if (most > 0) {
+    PetscCall(MatMult(y->Bt, L, y->work_x[0]));
+    PetscCall(SolveK(s, y->work_x[0], x));
+    PetscCall(VecAYPX(x, -1, s->free));
+  } else
+    PetscCall(VecCopy(s->free, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* x = K^-1 (F - Bt L), with one step of refinement when round-off shows. */
 static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
 {
@@ -260,7 +286,9 @@ static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
   PetscCall(HycoSystemWork(y));
   r = y->work_x[0];
   work = y->work_x[1];
-  if (y->m && !s->lu)
+  if (s->free && y->m)
+    PetscCall(AddForces(s, x, L));
+  else if (y->m && !s->lu)
     PetscCall(HycoDirectExpand(s->direct, s->L, x));
   else {
     PetscCall(Residual(y, NULL, L, work, r));
@@ -269,7 +297,7 @@ static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
   PetscCall(VecNorm(y->F, NORM_2, &size));
   PetscCall(Residual(y, x, L, work, r));
   PetscCall(VecNorm(r, NORM_2, &residual));
-  if (residual > 1e-12 * size && !s->p) {
+  if (residual > REFINE * size && !s->p) {
     PetscCall(SolveK(s, r, work));
     PetscCall(VecAXPY(x, 1, work));
   }
@@ -338,10 +366,40 @@ static PetscErrorCode CloseGaps(HycoSolver s, Vec x, Vec L)
     a[k++] = i;
     open = PetscMax(open, PetscAbsReal(s->g[i]));
   }
-  if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(s->m, s->S, s->g, y->symmetric, &k, a, change, &singular));
+  if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(s->m, s->S, s->g, s->set_factor, &k, a, change, &singular));
   for (PetscInt i = 0; i < s->m && !singular; i++) change[i] = PetscMax(change[i], -s->L[i]);
   if (!singular) PetscCall(Shift(s, change, x, L));
   PetscCall(PetscFree2(a, change));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular)
+{
+  PetscFunctionBegin;
+  s->seconds_factor = 0;
+  PetscCall(SetUpDual(s, singular));
+  s->seconds_before = s->seconds_factor;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x)
+{
+  HycoSystem y = s->system;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemWork(y));
+  PetscCall(SolveK(s, r, x));
+  PetscCall(MatMult(y->K, x, y->work_x[0]));
+  PetscCall(VecAYPX(y->work_x[0], -1, r));
+  PetscCall(SolveK(s, y->work_x[0], y->work_x[1]));
+  PetscCall(VecAXPY(x, 1, y->work_x[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x)
+{
+  PetscFunctionBegin;
+  s->free = x;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -39,6 +39,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscCall(PetscFree(s->g));
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
+  PetscCall(HycoSetFactorDestroy(&s->set_factor));
   PetscCall(PetscFree(s->pivot));
   PetscCall(PetscFree(s->contact));
   PetscCall(PetscFree(*solver));
@@ -245,7 +246,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   HycoCheckHandle(s, "HycoSolverCreate()");
   PetscCheck(s->system && s->system->F, PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
-  s->seconds_factor = 0;
+  s->seconds_factor = s->seconds_before;
   type = s->type;
   PetscCall(HycoChooseForm(s, &form));
   PetscCall(HycoChooseLinear(s, &form));
@@ -266,7 +267,9 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   if (s->reason < 0) PetscCall(HycoKernelSize(s->system->K, &n_free));
   if (n_free) s->reason = HYCO_DIVERGED_UNHELD;
   if (fell_back && s->reason == HYCO_CONVERGED) s->reason = HYCO_CONVERGED_FALLBACK;
-  s->seconds_solve = HycoNow() - begin - s->seconds_factor;
+  s->free = NULL;
+  s->seconds_solve = HycoNow() - begin - (s->seconds_factor - s->seconds_before);
+  s->seconds_before = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

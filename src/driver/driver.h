@@ -106,6 +106,7 @@ typedef struct {
   PetscReal target_u, target_lambda; /* 0: none */
   HycoScene scene;                   /* NULL unless on */
   HycoFOM fom;                       /* made by the first solve */
+  PetscReal strain_energy;           /* of the last */
 } Fallback;
 
 /* A relative error above 0 and at most 1; 0 when absent. */

@@ -93,7 +93,7 @@ PetscErrorCode DriverSolveFullOrder(Fallback *f, PetscInt n, const PetscReal mu[
   p->lambda_max = s.lambda_max;
   p->lambda_norm2 = s.lambda_norm2;
   p->u_norm2 = s.u_norm2;
-  p->strain_energy = s.strain_energy;
+  f->strain_energy = s.strain_energy;
   p->covered_force = 1;
   for (PetscInt c = 0; c < 3; c++) {
     p->u_min[c] = s.u_min[c];

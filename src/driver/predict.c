@@ -48,7 +48,8 @@ static void ReportRID(cJSON *json, const HycoPrediction *p)
   cJSON_AddNumberToObject(json, "rid_active", p->n_rid_active);
 }
 
-static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, const char fallback[])
+static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, PetscReal energy,
+                             const char fallback[])
 {
   cJSON *json;
 
@@ -72,7 +73,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddNumberToObject(json, fallback[0] ? "u_norm2" : "rid_u_norm2", p->u_norm2);
   ReportVector(json, fallback[0] ? "u_min" : "rid_u_min", p->dim, p->u_min);
   ReportVector(json, fallback[0] ? "u_max" : "rid_u_max", p->dim, p->u_max);
-  cJSON_AddNumberToObject(json, fallback[0] ? "strain_energy" : "rid_strain_energy", p->strain_energy);
+  cJSON_AddNumberToObject(json, fallback[0] ? "strain_energy" : "rid_strain_energy", energy);
   ReportTrust(json, p);
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
@@ -104,7 +105,7 @@ static PetscErrorCode One(HycoModel model, HycoScene scene, Fallback *fallback, 
 {
   HycoPrediction p = {0};
   PetscInt n;
-  PetscReal mu[64];
+  PetscReal mu[64], energy = 0;
   char why[DRIVER_LINE], covered[64] = "";
 
   PetscFunctionBegin;
@@ -137,7 +138,11 @@ static PetscErrorCode One(HycoModel model, HycoScene scene, Fallback *fallback, 
                 (double)p.kkt.complementarity));
   if (!why[0]) PetscCall(SayTrust(&p));
   PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
-  PetscCall(Report(scene, mu, &p, why));
+  if (why[0])
+    energy = fallback->strain_energy;
+  else
+    HycoOnRoot(PETSC_COMM_WORLD, HycoModelGetStrainEnergy(model, &energy));
+  PetscCall(Report(scene, mu, &p, energy, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

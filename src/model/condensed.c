@@ -47,6 +47,7 @@ PetscErrorCode HycoCondensedDestroy(HycoCondensed *condensed)
   PetscCall(PetscFree(c->a));
   PetscCall(PetscFree(c->w));
   PetscCall(PetscFree(c->active));
+  PetscCall(HycoSetFactorDestroy(&c->set_factor));
   PetscCall(PetscFree(*condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -90,26 +91,7 @@ PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
   PetscCall(PetscMalloc1(m + 1, &c->g));
   PetscCall(PetscMalloc1(m + 1, &c->w));
   PetscCall(PetscCalloc1(m + 1, &c->active));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *f, const PetscReal mu[], PetscInt axis, PetscInt skip,
-                                     PetscReal value[])
-{
-  const PetscInt n = HycoTensorSize(&f->tensor);
-  const PetscReal one = 1, zero = 0;
-  const PetscBLASInt step = 1;
-  PetscReal *w;
-  PetscBLASInt rows, nodes;
-
-  PetscFunctionBegin;
-  if (!f->rows) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscBLASIntCast(f->rows, &rows));
-  PetscCall(PetscBLASIntCast(n, &nodes));
-  PetscCall(PetscMalloc1(n, &w));
-  PetscCall(HycoTensorWeights(&f->tensor, mu, axis, skip, w));
-  BLASgemv_("N", &rows, &nodes, &one, f->data, &rows, w, &step, &zero, value, &step);
-  PetscCall(PetscFree(w));
+  PetscCall(HycoSetFactorCreate(c->m, &c->set_factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -227,6 +209,7 @@ PetscErrorCode HycoCondensedFlexibility(HycoCondensed c, const PetscReal mu[], P
   PetscFunctionBegin;
   PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_G], mu, axis, skip, c->packed));
   Unpack(c->m, c->packed, c->M);
+  HycoSetFactorForget(c->set_factor);
   PetscCall(KnownDefinite(c, mu, axis, skip, definite));
   if (!*definite) PetscCall(HasFactor(c, c->packed, SEMIDEFINITE, definite));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -322,8 +305,8 @@ static PetscErrorCode Attempt(HycoModel m, PetscInt type)
   } else if (type == HYCO_TYPE_LEMKE)
     PetscCall(HycoLCPLemke(c->m, c->M, c->g, 50 * (c->m + 10), m->Lambda, &its, &status));
   else
-    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, max_its, s->monitor, s->monitor_ctx, c->active, m->Lambda,
-                               &its, &status));
+    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, c->set_factor, max_its, s->monitor, s->monitor_ctx, c->active,
+                               m->Lambda, &its, &status));
   for (PetscInt i = 0; i < c->m; i++) m->Lambda[i] = PetscMax(m->Lambda[i], 0); /* round-off below zero */
   ComputeKKT(c, m->Lambda, &p->kkt);
   p->iterations += its;

@@ -3,7 +3,7 @@
   only when a field on the whole mesh is asked for). Every index is checked on load.
 */
 #include <hycocondensed.h>
-#include <hycoh5.h>
+#include <hycotable.h>
 #include <string.h>
 
 /* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters.
@@ -310,6 +310,7 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
     PetscCall(HycoH5WriteReal(h, "training/scan_at", m->scene->n_parameters, 1, m->scan.at));
   }
   PetscCall(SaveTrust(h, m));
+  if (m->table) PetscCall(HycoTableSave(m, h));
   PetscCall(HycoH5WriteText(h, "training/provenance", m->provenance));
   PetscCall(HycoH5WriteText(h, "training/fingerprint", m->fingerprint));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -431,6 +432,7 @@ static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
   PetscCall(HycoH5ReadReal(h, "training/numbers", 3, 1, m->numbers));
   PetscCall(LoadScan(h, m));
   PetscCall(LoadTrust(h, m));
+  if (HycoH5Has(h, "table")) PetscCall(HycoTableLoad(m, h));
   PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
   PetscCall(HycoH5LoadText(h, "training/fingerprint", &text));
   PetscCall(PetscStrncpy(m->fingerprint, text, sizeof(m->fingerprint)));

@@ -1,6 +1,7 @@
 /* HycoModel: made, asked, destroyed. */
 #include <hycocondensed.h>
 #include <hycofields.h>
+#include <hycotable.h>
 #include <petscviewer.h>
 #include <stdio.h>
 #include <string.h>
@@ -19,6 +20,7 @@ PetscErrorCode HycoModelReset(HycoModel m)
   m->ready = m->solved = PETSC_FALSE;
   PetscCall(HycoReconstructionDestroy(&m->reconstruction));
   PetscCall(HycoReducedDestroy(&m->reduced));
+  PetscCall(HycoLoadsDestroy(&m->loads));
   PetscCall(HycoSolverDestroy(&m->solver));
   PetscCall(HycoSystemDestroy(&m->system));
   PetscCall(MatDestroy(&m->K));
@@ -57,6 +59,7 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
   PetscCall(HycoModelReset(m));
   PetscCall(HycoNormsDestroy(&m->norms));
   PetscCall(HycoCondensedDestroy(&m->condensed));
+  PetscCall(HycoTableDestroy(&m->table));
   PetscCall(HycoFEDestroy(&m->fe_whole));
   PetscCall(HycoPairsDestroy(&m->whole_pairs));
   PetscCall(HycoMeshDestroy(&m->whole));
@@ -167,14 +170,15 @@ static PetscErrorCode QuadraticForm(HycoModel m, PetscReal *energy, PetscReal *s
 
 /* Of the RID's cells: from K, or cell by cell where K lacks the supports' part or a rigid motion drowns it: beyond 1e-5
    round-off would leave fewer than ten digits. */
-static PetscErrorCode StrainEnergy(HycoModel m, PetscReal *energy)
+PetscErrorCode HycoModelGetStrainEnergy(HycoModel m, PetscReal *energy)
 {
   PetscReal *each, size = 0;
 
   PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
   *energy = 0;
-  if (m->K && !m->fe->lifted) PetscCall(QuadraticForm(m, energy, &size));
-  if (m->K && !m->fe->lifted && *energy >= 1e-5 * size) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->K && !m->table && !m->fe->lifted) PetscCall(QuadraticForm(m, energy, &size));
+  if (m->K && !m->table && !m->fe->lifted && *energy >= 1e-5 * size) PetscFunctionReturn(PETSC_SUCCESS);
   *energy = 0;
   PetscCall(PetscMalloc1(m->mesh->n_cells, &each));
   PetscCall(HycoFEEnergy(m->fe, m->U, each));
@@ -243,7 +247,6 @@ PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
     p->u_norm2 += m->U[k] * m->U[k];
   }
   p->u_norm2 = PetscSqrtReal(p->u_norm2);
-  PetscCall(StrainEnergy(m, &p->strain_energy));
   PetscCall(HycoTrustEstimate(m, p));
   *out = *p;
   PetscFunctionReturn(PETSC_SUCCESS);

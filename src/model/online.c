@@ -7,8 +7,8 @@
 
   (hybrid all: every unknown of A is full order and gamma = G U[A] is no unknown.) reduced.c fills the system.
 */
-#include <hycomodelimpl.h>
 #include <hycoalgorithms.h>
+#include <hycotable.h>
 #include <petscblaslapack.h>
 
 /* Beyond this many unknowns the reduced matrix is stored sparse (a dense border of l modes). */
@@ -125,6 +125,7 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
   else
     PetscCall(HycoReducedCreateSparse(m));
   PetscCall(MatCreateVecs(m->Kr, &m->x, &m->Fr));
+  if (!dense) PetscCall(HycoLoadsCreate(m));
   if (m->n_L) {
     PetscCall(CreateReduced(m, m->n_L, m->n, dense, &m->Br));
     PetscCall(CreateReduced(m, m->n, m->n_L, dense, &m->Btr));
@@ -161,7 +162,11 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   first = (PetscBool)!m->system->K;
   PetscCall(HycoFESetParameters(m->fe, mu));
   m->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
-  if (m->fe->stiffness_changed) {
+  if (m->fe->stiffness_changed) HycoLoadsForget(m->loads);
+  if (m->fe->stiffness_changed && m->table) {
+    PetscCall(HycoReducedPrepare(m));
+    HycoLogged(HYCO_EVENT_REDUCE, HycoTableFill(m, mu));
+  } else if (m->fe->stiffness_changed) {
     HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, m->K));
     if (first && m->fe->n_constant) /* again in the order of all that come: the same sums to the last bit */
       HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, m->K));
@@ -245,6 +250,7 @@ PetscErrorCode HycoModelPredict(HycoModel m, PetscInt n, const PetscReal mu[])
   begin = HycoNow();
   PetscCall(Assemble(m, mu));
   p->seconds.assemble = HycoNow() - begin;
+  HycoLogged(HYCO_EVENT_SOLVE, HycoLoadsSetFree(m, mu));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(m->solver, m->x, m->L));
   PetscCall(HycoSolverGetSeconds(m->solver, &p->seconds.factor, &p->seconds.solve));
   PetscCall(HycoSolverGetReason(m->solver, &p->reason));

@@ -246,6 +246,75 @@ static PetscErrorCode FillRows(HycoModel m, const PetscInt ia[], const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoReducedEntries(HycoModel m, PetscInt *n, PetscScalar *a[])
+{
+  const PetscInt *start, *columns;
+  PetscScalar *all;
+  PetscInt rows;
+  PetscBool dense, done;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)m->Kr, MATSEQDENSE, &dense));
+  if (dense) {
+    *n = m->n * m->n;
+    PetscCall(MatDenseGetArray(m->Kr, &all));
+    *a = all;
+    PetscCall(MatDenseRestoreArray(m->Kr, &all)); /* they stay where they are */
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(MatGetRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &rows, &start, &columns, &done));
+  *n = start[m->n];
+  PetscCall(MatRestoreRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &rows, &start, &columns, &done));
+  PetscCall(MatSeqAIJGetArray(m->Kr, &all));
+  *a = all;
+  PetscCall(MatSeqAIJRestoreArray(m->Kr, &all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducedRows(HycoModel m, PetscInt row[])
+{
+  const PetscInt *start, *columns;
+  PetscInt n;
+  PetscBool dense, done;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)m->Kr, MATSEQDENSE, &dense));
+  if (dense) {
+    for (PetscInt k = 0; k < m->n * m->n; k++) row[k] = k % m->n;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(MatGetRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
+  for (PetscInt i = 0; i < m->n; i++) {
+    for (PetscInt k = start[i]; k < start[i + 1]; k++) row[k] = i;
+  }
+  PetscCall(MatRestoreRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A sparse Kr takes its pattern from K's, which an assembly gives. */
+PetscErrorCode HycoReducedPrepare(HycoModel m)
+{
+  const PetscInt *ia, *ja;
+  const PetscScalar *a;
+  PetscInt n;
+  PetscBool dense, done;
+
+  PetscFunctionBegin;
+  if (m->reduced) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompare((PetscObject)m->Kr, MATSEQDENSE, &dense));
+  if (dense) {
+    PetscCall(Create(m, NULL, NULL, NULL));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoFEAssembleStiffness(m->fe, m->K));
+  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatSeqAIJGetArrayRead(m->K, &a));
+  PetscCall(Create(m, ia, ja, a));
+  PetscCall(MatSeqAIJRestoreArrayRead(m->K, &a));
+  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducedFillStiffness(HycoModel m)
 {
   const PetscInt *ia, *ja, *start = NULL, *columns;

@@ -507,7 +507,8 @@ static PetscErrorCode LeaveOut(HycoCondensed c, PetscInt p, PetscInt i, PetscInt
   PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_GAP], mu, p, i, c->g));
   for (PetscInt j = 0; j < c->m; j++) c->active[j] = (PetscBool)(own[j] > 0);
   if (*definite)
-    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, 50 + 4 * c->m, NULL, NULL, c->active, L, &its, &status));
+    PetscCall(
+        HycoLCPActiveSet(c->m, c->M, c->g, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, L, &its, &status));
   for (PetscInt j = 0; j < c->m; j++) {
     lost += (L[j] - own[j]) * (L[j] - own[j]);
     size += own[j] * own[j];

@@ -123,9 +123,8 @@ static PetscErrorCode Conclude(HycoTrainer t, HycoModel m, const PetscBool reach
            here, there);
 }
 
-static PetscErrorCode Scan(HycoTrainer t, HycoModel m)
+static PetscErrorCode Scan(HycoTrainer t, HycoModel m, PetscBool reaches[])
 {
-  PetscBool reaches[HYCO_MAX_PARAMETERS];
   PetscInt each = 0;
   PetscReal *sign, *ratio;
   PetscMPIInt size;
@@ -148,13 +147,15 @@ static PetscErrorCode Scan(HycoTrainer t, HycoModel m)
 PetscErrorCode HycoTrainerScan(HycoTrainer t, const char candidate[], const char path[], HycoScan *found)
 {
   HycoModel m = NULL;
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
   PetscErrorCode ierr;
   char message[HYCO_LINE];
 
   PetscFunctionBegin;
   HycoOnEach(t->comm, HycoModelLoad(candidate, &m));
   PetscCall(HycoCatchBegin());
-  ierr = Scan(t, m);
+  ierr = Scan(t, m, reaches);
+  if (!ierr && t->rank == 0) ierr = HycoTrainerTabulate(m, reaches);
   if (!ierr && t->rank == 0) ierr = HycoModelRewrite(m, path);
   PetscCall(HycoCatchEnd(ierr, message));
   *found = m->scan;

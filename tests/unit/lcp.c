@@ -33,6 +33,20 @@ static PetscBool Symmetric(PetscInt n, const PetscReal M[])
   return PETSC_TRUE;
 }
 
+/* HycoLCPActiveSet() with a factor of its own where M is symmetric. */
+static PetscErrorCode ActiveSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
+                                PetscInt max_its, PetscBool active[], PetscReal z[], PetscInt *its,
+                                HycoLCPStatus *status)
+{
+  HycoSetFactor factor = NULL;
+
+  PetscFunctionBegin;
+  if (symmetric) PetscCall(HycoSetFactorCreate(n, &factor));
+  PetscCall(HycoLCPActiveSet(n, M, q, factor, max_its, NULL, NULL, active, z, its, status));
+  PetscCall(HycoSetFactorDestroy(&factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Both methods from the empty set; Lemke must solve; the active set must solve or say that it did not. */
 static PetscErrorCode Both(const char what[], PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool must,
                            PetscReal z_lemke[])
@@ -49,7 +63,7 @@ static PetscErrorCode Both(const char what[], PetscInt n, const PetscReal M[], c
   CHECK(status == HYCO_LCP_SOLVED, "Lemke, %s, n = %d: status %d", what, (int)n, (int)status);
   CHECK(Violation(n, M, q, z_lemke) < 1e-10, "Lemke, %s, n = %d: violation %g", what, (int)n,
         Violation(n, M, q, z_lemke));
-  PetscCall(HycoLCPActiveSet(n, M, q, Symmetric(n, M), 10 * n + 50, NULL, NULL, active, z, &its, &status));
+  PetscCall(ActiveSet(n, M, q, Symmetric(n, M), 10 * n + 50, active, z, &its, &status));
   CHECK(status == HYCO_LCP_SOLVED || !must, "active set, %s, n = %d: status %d", what, (int)n, (int)status);
   if (status == HYCO_LCP_SOLVED) {
     double size = 0, apart = 0;
@@ -134,7 +148,7 @@ static PetscErrorCode TestCycle(void)
   HycoLCPStatus status;
 
   PetscFunctionBegin;
-  PetscCall(HycoLCPActiveSet(3, M, q, PETSC_FALSE, 100, NULL, NULL, active, z, &its, &status));
+  PetscCall(ActiveSet(3, M, q, PETSC_FALSE, 100, active, z, &its, &status));
   CHECK(status == HYCO_LCP_CYCLE, "expected a cycle, found status %d", (int)status);
   CHECK(its == 4, "expected 4 iterations until a set comes back, found %d", (int)its);
   PetscCall(HycoLCPLemke(3, M, q, 100, z, &its, &status));
@@ -190,8 +204,65 @@ static PetscErrorCode TestNone(void)
   PetscFunctionBegin;
   PetscCall(HycoLCPLemke(2, M, q, 100, z, &its, &status));
   CHECK(status == HYCO_LCP_RAY, "expected a ray, found status %d", (int)status);
-  PetscCall(HycoLCPActiveSet(2, M, q, PETSC_TRUE, 100, NULL, NULL, active, z, &its, &status));
+  PetscCall(ActiveSet(2, M, q, PETSC_TRUE, 100, active, z, &its, &status));
   CHECK(status == HYCO_LCP_SINGULAR, "expected a singular set, found status %d", (int)status);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A factor taken from set to set, growing, shrinking and at random, solves as one that begins with each; a matrix that
+   is not definite on the set is noticed, and what comes after is right again. */
+static PetscErrorCode TestFactor(void)
+{
+  enum { n = 60 };
+  HycoSetFactor kept, fresh;
+  PetscReal C[n * n], M[n * n], q[n], z[n], other[n];
+  PetscInt a[n], seed = 7;
+  PetscBool regular;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < n * n; i++) C[i] = sin(1.3 * i) + cos(0.7 * i * i);
+  for (PetscInt i = 0; i < n; i++) {
+    q[i] = cos(2.1 * i);
+    for (PetscInt j = 0; j < n; j++) {
+      M[j * n + i] = i == j;
+      for (PetscInt k = 0; k < n; k++) M[j * n + i] += C[k * n + i] * C[k * n + j];
+    }
+  }
+  PetscCall(HycoSetFactorCreate(n, &kept));
+  PetscCall(HycoSetFactorCreate(n, &fresh));
+  for (PetscInt step = 0; step < 200; step++) {
+    PetscInt k = 0;
+    double size = 0, apart = 0;
+
+    for (PetscInt i = 0; i < n; i++) {
+      seed = (seed * 1103 + 12345) % 65536;
+      if (step < 50 ? i < step : step < 100 ? i < 100 - step : seed % 3 > 0) a[k++] = i;
+    }
+    HycoSetFactorForget(fresh);
+    PetscCall(HycoSetFactorSolve(kept, M, q, k, a, 1e-12, z, &regular));
+    CHECK(regular, "step %d: not regular", (int)step);
+    PetscCall(HycoSetFactorSolve(fresh, M, q, k, a, 1e-12, other, &regular));
+    for (PetscInt i = 0; i < n; i++) {
+      size = fmax(size, fabs(other[i]));
+      apart = fmax(apart, fabs(other[i] - z[i]));
+    }
+    CHECK(apart <= 1e-9 * size, "step %d, %d contacts: %g apart", (int)step, (int)k, apart);
+    for (PetscInt j = 0; j < k; j++) {
+      double w = q[a[j]];
+
+      for (PetscInt i = 0; i < n; i++) w += M[i * n + a[j]] * z[i];
+      CHECK(fabs(w) < 1e-9, "step %d: a gap of %g is left", (int)step, w);
+    }
+  }
+  M[5 * n + 5] = -M[5 * n + 5];
+  for (PetscInt i = 0; i < 10; i++) a[i] = i;
+  HycoSetFactorForget(kept);
+  PetscCall(HycoSetFactorSolve(kept, M, q, 10, a, 1e-12, z, &regular));
+  CHECK(!regular, "a negative diagonal entry was not noticed");
+  PetscCall(HycoSetFactorSolve(kept, M, q, 5, a, 1e-12, z, &regular));
+  CHECK(regular, "the contacts before it are regular");
+  PetscCall(HycoSetFactorDestroy(&kept));
+  PetscCall(HycoSetFactorDestroy(&fresh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -209,7 +280,7 @@ static PetscErrorCode TestTwice(void)
       PetscInt its;
       HycoLCPStatus status;
 
-      PetscCall(HycoLCPActiveSet(2, M, q[k], (PetscBool)symmetric, 100, NULL, NULL, active, z, &its, &status));
+      PetscCall(ActiveSet(2, M, q[k], (PetscBool)symmetric, 100, active, z, &its, &status));
       CHECK(status == HYCO_LCP_SOLVED, "case %d: status %d", k, (int)status);
       CHECK_NEAR(z[0] + z[1], force[k], 1e-14);
       CHECK(z[0] * z[1] == 0, "case %d: forces %g, %g: one of them must be zero", k, z[0], z[1]);
@@ -239,7 +310,7 @@ static PetscErrorCode TestThree(void)
     PetscCall(HycoLCPLemke(3, M, q[k], 100, z, &its, &status));
     CHECK(status == HYCO_LCP_SOLVED && Violation(3, M, q[k], z) < 1e-14, "Lemke, case %d: status %d, violation %g", k,
           (int)status, Violation(3, M, q[k], z));
-    PetscCall(HycoLCPActiveSet(3, M, q[k], PETSC_TRUE, 100, NULL, NULL, active, z, &its, &status));
+    PetscCall(ActiveSet(3, M, q[k], PETSC_TRUE, 100, active, z, &its, &status));
     CHECK(status == HYCO_LCP_SOLVED || status == HYCO_LCP_SINGULAR, "case %d: status %d", k, (int)status);
     CHECK(status != HYCO_LCP_SOLVED || Violation(3, M, q[k], z) < 1e-14, "case %d: violation %g", k,
           Violation(3, M, q[k], z));
@@ -251,6 +322,7 @@ static PetscErrorCode TestThree(void)
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
+  PetscCall(TestFactor());
   PetscCall(TestTwice());
   PetscCall(TestThree());
   PetscCall(TestRandom());

@@ -1,0 +1,27 @@
+/* The reduced stiffness at few parameter values, from which it is interpolated (table.c). All on one process. */
+#ifndef HYCOTABLE_H
+#define HYCOTABLE_H
+
+#include <hycoalgorithms.h>
+#include <hycoh5.h>
+#include <hycomodelimpl.h>
+
+/* At most so many combinations of values. */
+#define HYCO_TABLE_NODES 32
+
+struct _n_HycoTable {
+  PetscReal *x[HYCO_MAX_PARAMETERS]; /* ascending */
+  HycoGridField values;              /* Kr's entries, as HycoReducedEntries() has them */
+};
+
+/* n[p] values x[p] of each of the dim parameters, copied; values.data is for the caller to fill. */
+PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim, PetscInt entries, HycoTable *table);
+/* NULL-safe. */
+PetscErrorCode HycoTableDestroy(HycoTable *table);
+/* Kr at mu by the model's table. */
+PetscErrorCode HycoTableFill(HycoModel model, const PetscReal mu[]);
+PetscErrorCode HycoTableSave(HycoModel model, HycoH5 file);
+/* Fails when the file's table is damaged. */
+PetscErrorCode HycoTableLoad(HycoModel model, HycoH5 file);
+
+#endif

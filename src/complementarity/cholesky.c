@@ -1,0 +1,120 @@
+/*
+  The Cholesky factor of M_aa, kept from one active set to the next. Contacts stand in the order in which they joined:
+  what leaves is mostly what came last, and the rows before the first that left need no second look.
+*/
+#include <hycolcp.h>
+#include <petscblaslapack.h>
+
+struct _n_HycoSetFactor {
+  PetscInt n, k, *a;        /* contacts in all; those factored, in order */
+  PetscReal *L, *x;         /* column major, leading dimension n; n */
+  PetscBool *wanted, *kept; /* n */
+};
+
+PetscErrorCode HycoSetFactorCreate(PetscInt n, HycoSetFactor *factor)
+{
+  HycoSetFactor f;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&f));
+  f->n = n;
+  PetscCall(PetscMalloc1((size_t)n * (size_t)n, &f->L));
+  PetscCall(PetscMalloc4(n, &f->a, n, &f->x, n, &f->wanted, n, &f->kept));
+  *factor = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSetFactorDestroy(HycoSetFactor *factor)
+{
+  HycoSetFactor f = *factor;
+
+  PetscFunctionBegin;
+  if (!f) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(f->L));
+  PetscCall(PetscFree4(f->a, f->x, f->wanted, f->kept));
+  PetscCall(PetscFree(*factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoSetFactorForget(HycoSetFactor factor)
+{
+  if (factor) factor->k = 0;
+}
+
+/* Drops the first contact that is not in the set and all after it, and lists the others of the set behind the rest: how
+   many there are now; f->k of them are factored. */
+static PetscInt Rearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
+{
+  PetscInt stay = 0, count;
+
+  for (PetscInt i = 0; i < f->n; i++) f->wanted[i] = f->kept[i] = PETSC_FALSE;
+  for (PetscInt j = 0; j < k; j++) f->wanted[a[j]] = PETSC_TRUE;
+  while (stay < f->k && f->wanted[f->a[stay]]) f->kept[f->a[stay++]] = PETSC_TRUE;
+  count = stay;
+  for (PetscInt j = stay; j < f->k; j++) { /* in their old order */
+    const PetscInt i = f->a[j];
+
+    if (!f->wanted[i]) continue;
+    f->kept[i] = PETSC_TRUE;
+    f->a[count++] = i;
+  }
+  for (PetscInt j = 0; j < k; j++) {
+    if (!f->kept[a[j]]) f->a[count++] = a[j];
+  }
+  f->k = stay;
+  return count;
+}
+
+/* Rows f->k .. k - 1 of the factor; *regular: no pivot below `tol` of its diagonal entry. */
+static PetscErrorCode Append(HycoSetFactor f, const PetscReal M[], PetscInt k, PetscReal tol, PetscBool *regular)
+{
+  const PetscReal one = 1, minus = -1;
+  const size_t n = (size_t)f->n, done = (size_t)f->k;
+  PetscReal *rows = f->L + done, *corner = f->L + done * n + done;
+  PetscBLASInt ld, old, more, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(f->n, &ld));
+  PetscCall(PetscBLASIntCast(f->k, &old));
+  PetscCall(PetscBLASIntCast(k - f->k, &more));
+  for (PetscInt j = 0; j < k; j++) {
+    const PetscReal *column = M + (size_t)f->a[j] * n;
+
+    for (PetscInt i = PetscMax(j, f->k); i < k; i++) f->L[(size_t)j * n + (size_t)i] = column[f->a[i]];
+  }
+  if (old) {
+    BLAStrsm_("R", "L", "T", "N", &more, &old, &one, f->L, &ld, rows, &ld);
+    BLASsyrk_("L", "N", &more, &old, &minus, rows, &ld, &one, corner, &ld);
+  }
+  LAPACKpotrf_("L", &more, corner, &ld, &info);
+  *regular = (PetscBool)(info == 0);
+  for (PetscInt j = f->k; j < k && *regular; j++) {
+    const PetscReal pivot = f->L[(size_t)j * n + (size_t)j], diagonal = M[(size_t)f->a[j] * n + (size_t)f->a[j]];
+
+    *regular = (PetscBool)(pivot * pivot > tol * diagonal); /* false for NaN */
+  }
+  f->k = *regular ? k : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSetFactorSolve(HycoSetFactor f, const PetscReal M[], const PetscReal q[], PetscInt k,
+                                  const PetscInt a[], PetscReal tol, PetscReal z[], PetscBool *regular)
+{
+  const PetscInt count = Rearrange(f, k, a);
+  PetscBLASInt n, ld, one = 1, info;
+
+  PetscFunctionBegin;
+  *regular = PETSC_TRUE;
+  if (count > f->k) PetscCall(Append(f, M, count, tol, regular));
+  if (!*regular) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt j = 0; j < k; j++) f->x[j] = -q[f->a[j]];
+  PetscCall(PetscBLASIntCast(k, &n));
+  PetscCall(PetscBLASIntCast(f->n, &ld));
+  if (k) LAPACKpotrs_("L", &n, &one, f->L, &ld, f->x, &n, &info);
+  PetscCall(PetscArrayzero(z, f->n));
+  for (PetscInt j = 0; j < k; j++) {
+    z[f->a[j]] = f->x[j];
+    *regular = (PetscBool)(*regular && !PetscIsInfOrNanReal(f->x[j]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,116 @@
+/*
+  The reduced stiffness as a polynomial of the parameters that reach it. Moduli enter K linearly, and maps that stretch
+  a body along its axes quadratically; the reduced matrix, sums of K's entries with constant weights, is then a
+  polynomial too, and its values at few parameter values give it everywhere, without any cell of the RID. Training
+  finds the degrees, checks them, and keeps the values in the file (training/tabulate.c).
+*/
+#include <hycotable.h>
+#include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
+
+PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim, PetscInt entries, HycoTable *table)
+{
+  HycoTable t;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&t));
+  *table = t;
+  t->values.rows = entries;
+  t->values.tensor.dim = dim;
+  for (PetscInt p = 0; p < dim; p++) {
+    HycoDuplicate(n[p], x[p], &t->x[p]);
+    t->values.tensor.n[p] = n[p];
+    t->values.tensor.degree[p] = n[p] - 1;
+    t->values.tensor.x[p] = t->x[p];
+  }
+  PetscCall(PetscMalloc1((size_t)entries * (size_t)HycoTensorSize(&t->values.tensor), &t->values.data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableDestroy(HycoTable *table)
+{
+  HycoTable t = *table;
+
+  PetscFunctionBegin;
+  if (!t) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt p = 0; p < t->values.tensor.dim; p++) PetscCall(PetscFree(t->x[p]));
+  PetscCall(PetscFree(t->values.data));
+  PetscCall(PetscFree(*table));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableFill(HycoModel m, const PetscReal mu[])
+{
+  PetscInt n;
+  PetscScalar *a;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducedEntries(m, &n, &a));
+  HycoCheck(n == m->table->values.rows,
+            "%s: the table of the reduced stiffness has %d entries, the matrix %d: train the model again", m->path,
+            (int)m->table->values.rows, (int)n);
+  PetscCall(HycoGridFieldEvaluate(&m->table->values, mu, -1, -1, a));
+  PetscCall(PetscObjectStateIncrease((PetscObject)m->Kr));
+  PetscCall(MatAssemblyBegin(m->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(m->Kr, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableSave(HycoModel m, HycoH5 h)
+{
+  const HycoTable t = m->table;
+  const HycoTensor *tensor = &t->values.tensor;
+  PetscReal *x;
+  PetscInt all = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < tensor->dim; p++) all += tensor->n[p];
+  PetscCall(PetscMalloc1(all + 1, &x));
+  all = 0;
+  for (PetscInt p = 0; p < tensor->dim; p++) {
+    for (PetscInt k = 0; k < tensor->n[p]; k++) x[all++] = t->x[p][k];
+  }
+  PetscCall(HycoH5WriteInt(h, "table/counts", tensor->dim, 1, tensor->n));
+  PetscCall(HycoH5WriteReal(h, "table/parameters", all, 1, x));
+  PetscCall(HycoH5WriteReal(h, "table/stiffness", HycoTensorSize(tensor), t->values.rows, t->values.data));
+  PetscCall(PetscFree(x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Ascending and finite, as many as `count` says for each parameter. */
+static PetscErrorCode CheckParameters(HycoModel m, const PetscInt count[], const PetscReal x[])
+{
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < m->scene->n_parameters; p++) {
+    for (PetscInt k = 0; k < count[p]; k++, x++)
+      HycoCheck(!PetscIsInfOrNanReal(*x) && (!k || *x > x[-1]), "%s: table/parameters is damaged", m->path);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableLoad(HycoModel m, HycoH5 h)
+{
+  PetscInt dim = m->scene->n_parameters, one = 1, all = 0, nodes = 1, rows = -1, *count;
+  PetscReal *x, *data, *of[HYCO_MAX_PARAMETERS];
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadInt(h, "table/counts", 1, 16, &dim, &one, &count));
+  for (PetscInt p = 0; p < dim; p++) {
+    all += count[p];
+    nodes *= count[p];
+    HycoCheck(nodes <= HYCO_TABLE_NODES, "%s: table/counts is damaged", m->path);
+  }
+  PetscCall(HycoH5LoadReal(h, "table/parameters", &all, &one, &x));
+  PetscCall(CheckParameters(m, count, x));
+  PetscCall(HycoH5LoadReal(h, "table/stiffness", &nodes, &rows, &data));
+  for (size_t k = 0; k < (size_t)nodes * (size_t)rows; k++)
+    HycoCheck(!PetscIsInfOrNanReal(data[k]), "%s: table/stiffness is damaged: an entry is not finite", m->path);
+  for (PetscInt p = 0, at = 0; p < dim; at += count[p++]) of[p] = x + at;
+  ierr = HycoTableCreate(count, of, dim, rows, &m->table);
+  if (!ierr) ierr = PetscArraycpy(m->table->values.data, data, (size_t)nodes * (size_t)rows);
+  PetscCall(PetscFree(data));
+  PetscCall(PetscFree(x));
+  PetscCall(PetscFree(count));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
