@@ -4,6 +4,7 @@
 */
 #include <hyco.h>
 #include <petscviewer.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 static PetscErrorCode Run(const char *folder, const char *file, PetscInt n, const PetscReal mu[])
@@ -46,7 +47,11 @@ int main(int argc, char **argv)
 {
   PetscReal mu[2];
 
-  if (argc < 5) return 2;
+  if (argc < 5) {
+    fprintf(stderr,
+            "usage: embed SCENE MODEL.h5 MU1 MU2, a scene of two parameters: embed examples/rope m.h5 0.07 0.17\n");
+    return 2;
+  }
   mu[0] = atof(argv[3]);
   mu[1] = atof(argv[4]);
   PetscCall(HycoInitialize(&argc, &argv));

@@ -19,8 +19,9 @@ extern const char *const HycoModelTypes[]; /* their words; NULL ends */
 typedef struct {
   HycoModelType type;
   PetscInt n_multipliers; /* force unknowns: n_contacts, or the force vectors of a projection-based model */
-  PetscInt n_dof, n_contacts, n_modes, n_fe_dofs; /* reduced unknowns (modes + FE unknowns), contacts in the RID */
-  PetscInt n_active, iterations, rid_nodes, rid_elements, dim;
+  PetscInt n_dof, n_contacts, n_modes, n_fe_dofs;  /* reduced unknowns (modes + FE unknowns), contacts in the RID */
+  PetscInt n_all_contacts, n_active, n_rid_active; /* on the whole surface; those that press, there and in the RID */
+  PetscInt iterations, rid_nodes, rid_elements, dim;
   PetscReal rid_fraction;  /* share of the mesh's elements in the RID */
   PetscReal covered_force; /* share of the total contact force that the RID's own multipliers carry; 1 without force */
   PetscReal total_contact_force;                                   /* reconstructed, whole contact surface */

@@ -29,7 +29,7 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples samples, const PetscInt counts[
 /* Appends one point (length = number of parameters); fails outside the range. */
 PetscErrorCode HycoSamplesAddPoint(HycoSamples samples, const PetscReal mu[]);
 /* Appends the points of a CSV file: a header with the parameters' names in any order, then a point per line.
-   Collective on the scene's communicator. */
+   Fails for a file without a point. Collective on the scene's communicator. */
 PetscErrorCode HycoSamplesAddFile(HycoSamples samples, const char path[]);
 
 /*
@@ -40,6 +40,10 @@ PetscErrorCode HycoSamplesAddFile(HycoSamples samples, const char path[]);
 */
 PetscErrorCode HycoSamplesHoldOut(HycoSamples samples, PetscInt every, PetscInt offset, HycoSamples *kept,
                                   HycoSamples *held);
+
+/* Of points with the same values keeps the first; the order stays. n_dropped: how many went (may be NULL). Not
+   collective. */
+PetscErrorCode HycoSamplesDropTwins(HycoSamples samples, PetscInt *n_dropped);
 
 /* Number of points and their values, point by point (n_points x n_parameters, row major). Borrowed. */
 PetscErrorCode HycoSamplesGet(HycoSamples samples, PetscInt *n_points, PetscInt *n_parameters, const PetscReal *mu[]);

@@ -17,7 +17,9 @@ typedef struct _p_HycoTrainer *HycoTrainer;
 typedef struct {
   HycoModelType type;
   PetscReal dual_misfit;  /* projection: share of the dual snapshots' squares that their nonnegative basis leaves out */
-  PetscBool target_met;   /* condensed, points chosen: -hyco_condensed_tol was reached */
+  PetscBool target_met;   /* condensed, points chosen: -hyco_condensed_tol was reached, by left_out's forces */
+  PetscReal target;       /* the same: what it asked */
+  PetscInt most_values;   /* the same: -hyco_condensed_max_values */
   PetscInt n_supremizers; /* of n_modes, -hyco_dual snapshots */
   PetscInt n_flexibilities; /* condensed: points at which B K^-1 B^T was factored */
   PetscReal left_out[3];    /* condensed: relative errors of flexibility, gap and forces, one training value left out */

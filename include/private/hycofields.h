@@ -23,7 +23,7 @@ typedef struct {
 PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh mesh, const PetscReal X[], HycoScene scene,
                                const PetscReal mu[], PetscInt n, const HycoField field[],
                                const HycoContactTable *contact);
-/* Fails unless `path` ends in .xdmf. */
+/* Fails unless `path` ends in .xdmf, and where the .h5 beside it is a model or a snapshot. On this process alone. */
 PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /*

@@ -11,6 +11,8 @@ typedef struct _n_HycoH5 *HycoH5;
 PetscErrorCode HycoH5Create(const char path[], HycoH5 *file);
 /* Opens for reading: refused where a seal does not match, or has been lost. */
 PetscErrorCode HycoH5Open(const char path[], HycoH5 *file);
+/* The same; where the file is damaged, the complaint ends with the remedy. */
+PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file);
 PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit);
 
 /* Writes rows x cols (cols 1: a vector). Groups in the name ("mesh/cells") are made as needed. */

@@ -172,7 +172,7 @@ def table_1(found):
 
     def unknowns(r):
         p = r["point"][0]
-        return p["n_dof"] + p.get("n_multipliers", p["n_contacts"])
+        return p["n_dof"] + p["n_multipliers"]
 
     ours = {"unknowns": [unknowns(r) for r in columns],
             "speed": [f"{r['compare']['speedup']['median']:.2g}" for r in columns],

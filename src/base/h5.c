@@ -91,13 +91,27 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
   H5Pclose(access);
   if (f->id < 0) {
     PetscCall(Free(&f));
-    HycoFail("%s is no HDF5 file, or it is damaged; if it is a snapshot, remove it and run again", path);
+    HycoFail("%s is no HDF5 file, or it is damaged", path);
   }
   if (!sealed && HycoH5Has(f, HYCO_H5_SEALED)) {
     PetscCall(HycoH5Close(&f, PETSC_FALSE));
-    HycoFail("%s is damaged: its end is missing; if it is a snapshot, remove it and run again", path);
+    HycoFail("%s is damaged: its end is missing", path);
   }
   *file = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file)
+{
+  PetscErrorCode caught;
+  char message[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoCatchBegin());
+  caught = HycoH5Open(path, file);
+  PetscCall(HycoCatchEnd(caught, message));
+  HycoCheck(!message[0], "%s%s%s", message, strstr(message, "damaged") ? "; " : "",
+            strstr(message, "damaged") ? remedy : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

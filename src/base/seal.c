@@ -76,8 +76,6 @@ PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed)
   }
   fclose(file);
   if (*sealed && (LoadWord(seal + 8) != *size - HYCO_SEAL || LoadWord(seal + 16) != sum))
-    HycoFail("%s is damaged: its bytes are not those that were written (checksum); if it is a snapshot, remove it and "
-             "run again",
-             path);
+    HycoFail("%s is damaged: its bytes are not those that were written (checksum)", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

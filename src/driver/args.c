@@ -1,9 +1,11 @@
 /* Options of the command line: checked, read, explained. */
 #include "driver.h"
+#include <hycofields.h>
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* The driver's own options, for -help; which command takes which stands in the table of commands. */
@@ -112,22 +114,40 @@ static PetscBool IsSceneEntry(const char name[])
   return PETSC_FALSE;
 }
 
+/* The commands that take an option which this one does not: "solve, predict"; "" if none does. */
+static void ListTakers(const char name[], char list[DRIVER_LINE])
+{
+  size_t at = 0;
+
+  list[0] = '\0';
+  for (PetscInt c = 0; commands[c].name; c++) {
+    if (TakesOption(&commands[c], name))
+      at += (size_t)snprintf(list + at, DRIVER_LINE - at, "%s%s", at ? ", " : "", commands[c].name);
+  }
+}
+
 static PetscErrorCode Unknown(const Command *command, const char name[])
 {
   const HycoOption *table;
   PetscInt n, m = 0;
   const char *names[96], *near;
-  char copy[DRIVER_LINE], *rest;
+  char copy[DRIVER_LINE], takers[DRIVER_LINE], *rest;
 
   PetscFunctionBegin;
+  ListTakers(name, takers);
+  HycoCheck(!takers[0], "hyco %s knows no option -%s; what does: hyco %s", command->name, name, takers);
   PetscCall(HycoGetOptionTable(&n, &table));
   for (PetscInt k = 0; k < n && m < 64; k++) names[m++] = table[k].name;
   PetscCall(PetscStrncpy(copy, command->options, sizeof(copy)));
   for (char *word = strtok_r(copy, " ", &rest); word && m < 96; word = strtok_r(NULL, " ", &rest)) names[m++] = word;
-  near = HycoNearest(name, m, names);
+  near = NULL;
+  for (PetscInt k = 0; k < m && !near; k++) {
+    if (strncasecmp(names[k], name, strlen(name)) == 0) near = names[k]; /* the beginning of one */
+  }
+  if (!near) near = HycoNearest(name, m, names);
   if (near)
-    HycoFail("hyco %s knows no option -%s; did you mean -%s? (hyco %s -help lists them)", command->name, name, near,
-             command->name);
+    HycoFail("hyco %s knows no option -%s; did you mean -%s%s? (hyco %s -help lists them)", command->name, name, near,
+             near[strlen(near) - 1] == '_' ? "NAME" : "", command->name);
   HycoFail("hyco %s knows no option -%s (hyco %s -help lists them)", command->name, name, command->name);
 }
 
@@ -145,12 +165,24 @@ static PetscBool DecidesModel(const char name[])
   return PETSC_FALSE;
 }
 
-/* An option of the reduction given where nothing is reduced. */
-static PetscErrorCode CheckTraining(const Command *command, const char name[])
+/* Which commands read an option of a model's use; NULL: it is no such option. */
+static const char *ReadersOf(const char name[])
 {
+  if (strcasecmp(name, "hyco_fallback") == 0) return "predict";
+  if (strncasecmp(name, "hyco_reconstruct", 16) == 0) return "train, predict, compare";
+  return NULL;
+}
+
+/* An option of the reduction given where nothing is reduced, or of a model's use where none is used. */
+static PetscErrorCode CheckCommand(const Command *command, const char name[])
+{
+  const char *readers = ReadersOf(name);
+
   PetscFunctionBegin;
   HycoCheck(command->run == CommandTrain || !DecidesModel(name),
             "hyco %s does not read -%s: it decides a model when that is trained", command->name, name);
+  HycoCheck(!readers || strstr(readers, command->name), "hyco %s does not read -%s; what does: hyco %s", command->name,
+            name, readers);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -166,21 +198,41 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
   for (int k = 2; k < argc; k++) {
     const char *name = argv[k] + (argv[k][1] == '-' ? 2 : 1);
 
-    if (!IsKey(argv[k])) HycoFail("\"%s\" is no option; options begin with a dash, and take one value each", argv[k]);
+    if (!IsKey(argv[k]))
+      HycoFail(
+          "\"%s\" is no option; options begin with a dash, and take one value each (values have commas between, and "
+          "no space)",
+          argv[k]);
     if (!TakesOption(command, name) && !HycoOptionKnown(name) && !IsForeign(name) &&
         !(IsSceneEntry(name) && TakesOption(command, "scene"))) {
       PetscCall(Unknown(command, name));
     }
-    PetscCall(CheckTraining(command, name));
+    PetscCall(CheckCommand(command, name));
     if (k + 1 < argc && !IsKey(argv[k + 1])) k++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The folder of a file to be written is there and may be written: asked before the first is, so that none is left
- * alone. */
-static PetscErrorCode CheckFolder(const char name[], const char path[])
+/* The value of an option, "" if absent, without counting it as read. */
+static PetscErrorCode Peek(const char name[], char value[PETSC_MAX_PATH_LEN])
 {
+  PetscInt n;
+  char **names, **values;
+
+  PetscFunctionBegin;
+  value[0] = '\0';
+  PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
+  for (PetscInt k = 0; k < n; k++) {
+    if (strcasecmp(names[k], name) == 0 && values[k]) PetscCall(PetscStrncpy(value, values[k], PETSC_MAX_PATH_LEN));
+  }
+  PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A file can be written at `path`: its folder is there and may be written, no folder has its name. */
+static PetscErrorCode CheckPlace(const char name[], const char path[])
+{
+  struct stat info;
   char folder[PETSC_MAX_PATH_LEN];
   char *slash;
 
@@ -195,12 +247,30 @@ static PetscErrorCode CheckFolder(const char name[], const char path[])
     PetscCall(PetscStrncpy(folder, ".", sizeof(folder)));
   HycoCheck(access(folder, W_OK | X_OK) == 0, "-%s %s cannot be written: is there such a folder, may you write there?",
             name, path);
+  HycoCheck(stat(path, &info) || !S_ISDIR(info.st_mode), "-%s %s is a folder; give the name of a file", name, path);
+  if (strcmp(name, "output") == 0) PetscCall(HycoFieldsCheckPath(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverCheckOutputs(const Command *command)
+{
+  static const char *const files[] = {"model", "report", "table", "output"};
+  enum { N_FILES = sizeof(files) / sizeof(files[0]) };
+  char path[N_FILES][PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < N_FILES; k++) {
+    PetscCall(Peek(files[k], path[k]));
+    for (PetscInt j = 0; j < k; j++)
+      HycoCheck(!path[k][0] || strcmp(path[k], path[j]), "-%s and -%s are both %s; give each a file of its own",
+                files[j], files[k], path[k]);
+    if (path[k][0] && (k || command->run == CommandTrain)) HycoOnRoot(PETSC_COMM_WORLD, CheckPlace(files[k], path[k]));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
 {
-  static const char *const files[] = {"report", "table", "output"};
   PetscInt n;
   char **names, **values, first[DRIVER_LINE] = "";
 
@@ -216,12 +286,6 @@ static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
   }
   PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
   HycoCheck(!first[0], "nothing reads the option -%s here; take it away, or see hyco -help", first);
-  for (size_t k = 0; k < sizeof(files) / sizeof(files[0]); k++) {
-    char path[PETSC_MAX_PATH_LEN];
-
-    PetscCall(DriverGet(files[k], PETSC_FALSE, path));
-    if (path[0]) HycoOnRoot(PETSC_COMM_WORLD, CheckFolder(files[k], path));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -323,6 +387,23 @@ static PetscErrorCode CheckNamed(HycoScene scene, const char prefix[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* "radius from 4.02 to 4.1, load from 0 to 1" */
+static PetscErrorCode ListRanges(HycoScene scene, char list[DRIVER_LINE])
+{
+  PetscInt n;
+  const char *const *names;
+  const PetscReal *lo, *hi;
+  size_t at = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, &lo, &hi));
+  list[0] = '\0';
+  for (PetscInt p = 0; p < n && at < DRIVER_LINE; p++)
+    at += (size_t)snprintf(list + at, DRIVER_LINE - at, "%s%s from %g to %g", p ? ", " : "", names[p], (double)lo[p],
+                           (double)hi[p]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
 {
   PetscInt n, given = 0;
@@ -353,36 +434,48 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
     if (!text[0]) continue;
     PetscCall(ParseNumbers(key, text, &m, &values));
     HycoCheck(m == 1, "-%s has %d values; one is expected", key, (int)m);
+    HycoCheck(!whole, "-mu gives every parameter, and -%s gives one of them again; take one of the two away", key);
     mu[p] = values[0];
     given++;
     PetscCall(PetscFree(values));
   }
+  PetscCall(ListRanges(scene, list));
   HycoCheck(whole || given == n, "the scene has %d parameters (%s); give -mu with all of them, or -mu_NAME for each",
             (int)n, list);
   PetscCall(HycoSceneCheckParameters(scene, n, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
+/* Whether -word, or a -prefixNAME of a parameter, was given. */
+static PetscErrorCode HasNamed(HycoScene scene, const char word[], const char prefix[], PetscBool *given)
 {
   PetscInt n;
   const char *const *names;
-  PetscBool set;
 
   PetscFunctionBegin;
-  *given = PETSC_FALSE;
   PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-grid", &set));
-  *given = (PetscBool)(*given || set);
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-points", &set));
-  *given = (PetscBool)(*given || set);
-  for (PetscInt p = 0; p < n; p++) {
+  PetscCall(PetscOptionsHasName(NULL, NULL, word, given));
+  for (PetscInt p = 0; p < n && !*given; p++) {
     char key[DRIVER_LINE];
 
-    PetscCall(PetscSNPrintf(key, sizeof(key), "-values_%s", names[p]));
-    PetscCall(PetscOptionsHasName(NULL, NULL, key, &set));
-    *given = (PetscBool)(*given || set);
+    PetscCall(PetscSNPrintf(key, sizeof(key), "%s%s", prefix, names[p]));
+    PetscCall(PetscOptionsHasName(NULL, NULL, key, given));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given)
+{
+  PetscFunctionBegin;
+  PetscCall(HasNamed(scene, "-mu", "-mu_", given));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
+{
+  PetscFunctionBegin;
+  PetscCall(HasNamed(scene, "-grid", "-values_", given));
+  if (!*given) PetscCall(PetscOptionsHasName(NULL, NULL, "-points", given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -543,7 +636,10 @@ void DriverHelp(const char *command)
   }
   printf("\nOptions of the method (a scene may set them too, in its hyco: section without the prefix)\n");
   for (PetscInt k = 0; k < n; k++) {
+    const char *readers = ReadersOf(table[k].name);
+
     if (command && strcmp(command, "train") && DecidesModel(table[k].name)) continue;
+    if (command && readers && !strstr(readers, command)) continue;
     HelpLine(table[k].name, table[k].value, table[k].initial, table[k].meaning);
   }
   printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "

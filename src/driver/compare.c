@@ -21,17 +21,21 @@ static const char *const columns[N_COLUMNS] = {"error_u",
                                                "seconds_reduced"};
 
 /* One point on one group: both solutions, their difference. */
-static PetscErrorCode ComparePoint(HycoFOM fom, HycoModel model, PetscInt n_par, const PetscReal mu[], PetscReal v[])
+static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoModel model, PetscInt n_par, const PetscReal mu[],
+                                   PetscReal v[])
 {
   HycoSummary s;
   HycoPrediction p;
   HycoErrors e = {0};
+  char words[DRIVER_LINE];
 
   PetscFunctionBegin;
   PetscCall(HycoFOMSolve(fom, n_par, mu));
   PetscCall(HycoFOMGetSummary(fom, &s));
-  HycoCheck(s.reason > 0, "the full-order solution at the first parameter = %.10g: %s", n_par ? (double)mu[0] : 0.,
-            HycoReasonName(s.reason));
+  if (s.reason < 0) {
+    PetscCall(DriverFormatPoint(scene, mu, words, NULL));
+    HycoFail("the full-order solution at %s: %s; there is nothing to compare with", words, HycoReasonName(s.reason));
+  }
   PetscCall(HycoModelPredict(model, n_par, mu));
   PetscCall(HycoModelGetPrediction(model, &p));
   PetscCall(HycoModelCompare(model, fom, &e));
@@ -65,7 +69,7 @@ static PetscErrorCode CompareMine(HycoScene scene, HycoModel model, MPI_Comm gro
   PetscCall(HycoFOMCreate(group, scene, &fom));
   PetscCallMPI(MPI_Comm_rank(group, &rank));
   for (PetscInt k = first; k < last; k++) {
-    PetscCall(ComparePoint(fom, model, n_par, mu + k * n_par, rank == 0 ? value + k * N_COLUMNS : unused));
+    PetscCall(ComparePoint(scene, fom, model, n_par, mu + k * n_par, rank == 0 ? value + k * N_COLUMNS : unused));
     if (first == 0 && rank == 0) PetscCall(DriverProgress((k + 1 - first) * n / (last - first), n, word));
   }
   PetscCall(HycoFOMDestroy(&fom));
@@ -133,7 +137,7 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
   qsort(ratio, (size_t)n, sizeof(*ratio), CompareReal);
   PetscCall(ReportCreate("compare", scene, NULL, &json));
   cJSON_AddNumberToObject(json, "n_points", n);
-  PetscCall(Say("%d points\n", (int)n));
+  PetscCall(Say("%d point%s\n", (int)n, n == 1 ? "" : "s"));
   for (PetscInt k = 0; k < (contact ? N_ERRORS : E_LAMBDA_RID); k++) AddStatistics(json, n, value, k, &undefined);
   object = cJSON_AddObjectToObject(json, "speedup");
   cJSON_AddNumberToObject(object, "mean", mean);
@@ -155,6 +159,19 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
   PetscCall(PetscFree(ratio));
   PetscCall(ReportWrite(&json));
   HycoCheck(!failed, "%d of the %d predictions did not converge; the errors leave them out", (int)failed, (int)n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -mu, or -mu_NAME for each parameter: a set of one. */
+static PetscErrorCode AddOnePoint(HycoScene scene, HycoSamples samples, PetscBool *given)
+{
+  PetscReal mu[64];
+
+  PetscFunctionBegin;
+  PetscCall(DriverHasPoint(scene, given));
+  if (!*given) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DriverGetPoint(scene, mu));
+  PetscCall(HycoSamplesAddPoint(samples, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -180,8 +197,9 @@ PetscErrorCode CommandCompare(void)
   HycoOnEach(PETSC_COMM_WORLD, HycoModelLoad(file, &model));
   PetscCall(HycoModelCheckScene(model, scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
-  HycoCheck(given,
-            "give the test points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
+  if (!given) PetscCall(AddOnePoint(scene, samples, &given));
+  HycoCheck(given, "give the test points: -mu V,V,... for one, or -grid N,N,..., or -values_NAME V,V,... for each "
+                   "parameter, or -points FILE.csv");
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverCheckLeftEarly(scene));
   PetscCall(HycoSceneHasContact(scene, &contact));

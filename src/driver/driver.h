@@ -23,6 +23,9 @@ extern const Command commands[];
 
 /* Every option on the command line is one that `command` knows, or PETSc's; no stray words. */
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
+/* The files that `command` is to write have names of their own, in folders that may be written. Before any work; counts
+   no option as read. Collective. */
+PetscErrorCode DriverCheckOutputs(const Command *command);
 /* Nothing was given that nobody read. To be called when all options have been read and before anything is written. */
 PetscErrorCode DriverCheckLeft(void);
 /* The same before the solvers have run: what is meant for them (-hyco_mumps_..., -hyco_tao_... with that type) passes.
@@ -32,6 +35,8 @@ PetscErrorCode DriverCheckLeftEarly(HycoScene scene);
 PetscErrorCode DriverGet(const char name[], PetscBool required, char value[PETSC_MAX_PATH_LEN]);
 /* One point: -mu v,v,... or -mu_NAME v. */
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
+/* Whether -mu or a -mu_NAME was given. */
+PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given);
 /* A set of points: -grid (with -grid_type), -values_NAME, or -points. *given: whether any was. */
 PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given);
 /* The points among which a greedy training chooses: -training_grid, closed unless -grid_type says otherwise. */
@@ -66,6 +71,8 @@ PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, 
 
 /* Prints on rank 0. */
 PetscErrorCode Say(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
+/* A share in percent: "0.12 %", "120 %". */
+void DriverPercent(PetscReal share, char text[32]);
 /* A HycoProgress: a bar that moves on a terminal, a line now and then elsewhere. ctx: a word for what is done. */
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx);
 /* A HycoMonitor. */
@@ -84,6 +91,9 @@ typedef struct {
   char stop[16];
 } GreedyLog;
 
+/* A point (NULL: none) in words ("mu1 = 0.05, mu2 = 0.1") and as columns ("0.05,0.1,"; may be NULL). */
+PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char words[DRIVER_LINE],
+                                 char columns[DRIVER_LINE]);
 /* Reads the options of train -greedy, makes the training set and sets the trainer, which will fill `log`. */
 PetscErrorCode DriverReadGreedy(HycoScene scene, HycoTrainer trainer, HycoSamples *training, GreedyLog *log);
 void DriverReportGreedy(cJSON *json, const GreedyLog *log);
@@ -126,6 +136,7 @@ typedef struct {
   PetscBool on;
   PetscReal target[HYCO_N_ERRORS]; /* 0: none */
   char scene[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], folder[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN];
+  PetscReal seconds_solutions, seconds_attempts; /* of all that was solved and tried, the chosen build among it */
   PetscInt n;
   Attempt *attempt; /* n of them; PetscFree() it */
   const Attempt *chosen;

@@ -1,18 +1,20 @@
 /* hyco predict -hyco_fallback: full order where the reduced model cannot be trusted as far as is asked. */
 #include "driver.h"
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 PetscErrorCode DriverReadTarget(const char name[], PetscReal *target)
 {
-  char text[PETSC_MAX_PATH_LEN];
+  char text[PETSC_MAX_PATH_LEN], *end;
 
   PetscFunctionBegin;
   *target = 0;
   PetscCall(DriverGet(name, PETSC_FALSE, text));
-  PetscCall(HycoOptionsReal(NULL, name, 0, 1, target));
-  HycoCheck(!text[0] || *target > 0, "-%s is %s; a relative error above 0 is expected: 1e-2 is one percent", name,
-            text);
+  if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  *target = strtod(text, &end);
+  HycoCheck(end != text && !*end && *target > 0 && *target <= 1,
+            "-%s is \"%s\"; it must be a relative error above 0 and at most 1: 1e-2 is one percent", name, text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -83,7 +85,10 @@ PetscErrorCode DriverSolveFullOrder(Fallback *f, PetscInt n, const PetscReal mu[
   p->reason = s.reason;
   p->kkt = s.kkt;
   p->iterations = s.iterations;
-  p->n_active = s.n_active;
+  p->n_active = p->n_rid_active = s.n_active;
+  p->n_dof = p->n_fe_dofs = s.n_dof;
+  p->n_multipliers = p->n_contacts = p->n_all_contacts = s.n_contacts;
+  p->n_modes = 0;
   p->total_contact_force = s.total_contact_force;
   p->lambda_max = s.lambda_max;
   p->lambda_norm2 = s.lambda_norm2;

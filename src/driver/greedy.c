@@ -19,9 +19,8 @@ static PetscErrorCode Append(GreedyLog *log, const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The point in words ("mu1 = 0.05, mu2 = 0.1") and as columns ("0.05,0.1,"). */
-static PetscErrorCode FormatPoint(HycoScene scene, const PetscReal mu[], char words[DRIVER_LINE],
-                                  char columns[DRIVER_LINE])
+PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char words[DRIVER_LINE],
+                                 char columns[DRIVER_LINE])
 {
   PetscInt n;
   const char *const *names;
@@ -29,13 +28,14 @@ static PetscErrorCode FormatPoint(HycoScene scene, const PetscReal mu[], char wo
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
-  words[0] = columns[0] = '\0';
+  words[0] = '\0';
+  if (columns) columns[0] = '\0';
   for (PetscInt p = 0; p < n && w < DRIVER_LINE && c < DRIVER_LINE; p++) {
     if (mu) {
       w += (size_t)snprintf(words + w, DRIVER_LINE - w, "%s%s = %.6g", p ? ", " : "", names[p], (double)mu[p]);
-      c += (size_t)snprintf(columns + c, DRIVER_LINE - c, "%.12g", (double)mu[p]);
+      if (columns) c += (size_t)snprintf(columns + c, DRIVER_LINE - c, "%.12g", (double)mu[p]);
     }
-    if (c < DRIVER_LINE) c += (size_t)snprintf(columns + c, DRIVER_LINE - c, ",");
+    if (columns && c < DRIVER_LINE) c += (size_t)snprintf(columns + c, DRIVER_LINE - c, ",");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -63,7 +63,7 @@ static PetscErrorCode Monitor(const HycoGreedyStep *s, void *ctx)
   char words[DRIVER_LINE], columns[DRIVER_LINE], row[3 * DRIVER_LINE];
 
   PetscFunctionBegin;
-  PetscCall(FormatPoint(log->scene, s->worst, words, columns));
+  PetscCall(DriverFormatPoint(log->scene, s->worst, words, columns));
   PetscCall(Say("greedy %3d: %d snapshots, %d modes, RID %d nodes; eta %.2e (u %.2e, forces %.2e) at %s; largest %.2e, "
                 "infinite at %d of %d\n",
                 (int)s->iteration, (int)s->n_samples, (int)s->n_modes, (int)s->rid_nodes, (double)s->eta,

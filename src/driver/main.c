@@ -23,8 +23,8 @@ const Command commands[] = {
      "hyco predict -model M.h5 -mu V,V,... [-output F.xdmf] [-report R.json]",
      "solve the reduced model, for one point or a set (-table T.csv), and estimate its errors; reads only the model "
      "file, but with -hyco_fallback -scene FOLDER"},
-    {"compare", CommandCompare, "scene model grid grid_type values_ points report table",
-     "hyco compare -scene FOLDER -model M.h5 -grid N,N,... [-report R.json] [-table T.csv]",
+    {"compare", CommandCompare, "scene model mu mu_ grid grid_type values_ points report table",
+     "hyco compare -scene FOLDER -model M.h5 -mu V,V,... | -grid N,N,... [-report R.json] [-table T.csv]",
      "errors and speed-up of the reduced model against full order over a set of points"},
     {"view", CommandView, "scene model", "hyco view -model M.h5 | -scene FOLDER",
      "what is in a model or a scene, in words"},
@@ -118,6 +118,7 @@ static PetscErrorCode Run(const Command *command, int argc, char **argv)
 {
   PetscFunctionBegin;
   PetscCall(DriverCheckArguments(command, argc, argv));
+  PetscCall(DriverCheckOutputs(command));
   PetscCall(command->run());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -29,14 +29,23 @@ static PetscErrorCode SayTrust(const HycoPrediction *p)
   PetscFunctionBegin;
   for (PetscInt k = 0; k < 2; k++) {
     if (estimate[k] >= 0)
-      snprintf(words[k], sizeof(words[k]), "%.2g %%", 100 * (double)estimate[k]);
+      DriverPercent(estimate[k], words[k]);
     else
       snprintf(words[k], sizeof(words[k]), "none");
   }
   PetscCall(Say("estimated errors: u %s, contact forces %s\n", words[0], words[1]));
-  if (p->beyond > 0)
-    PetscCall(Say("EXTRAPOLATED: outside the training points by %.3g %% of a range\n", 100 * (double)p->beyond));
+  DriverPercent(p->beyond, words[0]);
+  if (p->beyond > 0) PetscCall(Say("EXTRAPOLATED: outside the training points by %s of a range\n", words[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void ReportRID(cJSON *json, const HycoPrediction *p)
+{
+  cJSON_AddNumberToObject(json, "rid_nodes", p->rid_nodes);
+  cJSON_AddNumberToObject(json, "rid_elements", p->rid_elements);
+  cJSON_AddNumberToObject(json, "rid_fraction", p->rid_fraction);
+  cJSON_AddNumberToObject(json, "rid_contacts", p->n_contacts);
+  cJSON_AddNumberToObject(json, "rid_active", p->n_rid_active);
 }
 
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, PetscReal energy,
@@ -49,16 +58,14 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddStringToObject(json, "model_type", HycoModelTypes[p->type]);
   cJSON_AddNumberToObject(json, "n_dof", p->n_dof);
   cJSON_AddNumberToObject(json, "n_multipliers", p->n_multipliers);
-  cJSON_AddNumberToObject(json, "n_contacts", p->n_contacts);
+  cJSON_AddNumberToObject(json, "n_contacts", p->n_all_contacts); /* as hyco solve counts them */
   cJSON_AddNumberToObject(json, "n_active", p->n_active);
   cJSON_AddNumberToObject(json, "active_set_iterations", p->iterations);
   cJSON_AddStringToObject(json, "solver", p->method);
   cJSON_AddBoolToObject(json, "converged", p->reason > 0);
   cJSON_AddNumberToObject(json, "n_modes", p->n_modes);
   cJSON_AddNumberToObject(json, "n_fe_dofs", p->n_fe_dofs);
-  cJSON_AddNumberToObject(json, "rid_nodes", p->rid_nodes);
-  cJSON_AddNumberToObject(json, "rid_elements", p->rid_elements);
-  cJSON_AddNumberToObject(json, "rid_fraction", p->rid_fraction);
+  if (!fallback[0]) ReportRID(json, p);
   cJSON_AddNumberToObject(json, "covered_force", p->covered_force);
   cJSON_AddNumberToObject(json, "total_contact_force", p->total_contact_force);
   cJSON_AddNumberToObject(json, "lambda_max", p->lambda_max);
@@ -99,7 +106,7 @@ static PetscErrorCode One(HycoModel model, HycoScene scene, Fallback *fallback, 
   HycoPrediction p = {0};
   PetscInt n;
   PetscReal mu[64], energy = 0;
-  char why[DRIVER_LINE];
+  char why[DRIVER_LINE], covered[64] = "";
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
@@ -122,9 +129,10 @@ static PetscErrorCode One(HycoModel model, HycoScene scene, Fallback *fallback, 
     PetscCall(HycoFOMWrite(fallback->fom, output));
   else if (output[0])
     HycoOnRoot(PETSC_COMM_WORLD, HycoModelWrite(model, output));
-  PetscCall(Say("total contact force %.10g (%.1f %% of it in the RID), %d active; %s after %d iterations\n",
-                (double)p.total_contact_force, 100 * (double)p.covered_force, (int)p.n_active, HycoReasonName(p.reason),
-                (int)p.iterations));
+  if (!why[0]) snprintf(covered, sizeof(covered), " (%.1f %% of it in the RID)", 100 * (double)p.covered_force);
+  PetscCall(Say("total contact force %.10g%s, %d of %d contacts active; %s after %d iterations\n",
+                (double)p.total_contact_force, covered, (int)p.n_active, (int)p.n_all_contacts,
+                HycoReasonName(p.reason), (int)p.iterations));
   PetscCall(Say("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
                 (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
                 (double)p.kkt.complementarity));

@@ -20,6 +20,13 @@ PetscErrorCode Say(const char format[], ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void DriverPercent(PetscReal share, char text[32])
+{
+  const double percent = 100 * (double)share;
+
+  snprintf(text, 32, percent >= 99.5 && percent < 1e6 ? "%.0f %%" : "%.2g %%", percent);
+}
+
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
 {
   static PetscReal begin = -1, last = -1;

@@ -126,8 +126,8 @@ PetscErrorCode ReportSet(const char command[], const char table[], HycoScene sce
   cJSON_AddNumberToObject(json, "not_converged", failed);
   cJSON_AddNumberToObject(json, "seconds_total", seconds);
   PetscCall(ReportWrite(&json));
-  HycoCheck(!failed, "%d of the %d points did not converge; the column converged of the table says which", (int)failed,
-            (int)n);
+  HycoCheck(!failed, "%d of the %d points did not converge; the column converged of %s says which", (int)failed, (int)n,
+            table[0] ? table : "a table (-table FILE.csv)");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -227,6 +227,14 @@ static PetscErrorCode Next(Work *w, const char type[], const char tolerance[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A condensed model that its points, scene or contacts forbid: no tolerance gives one. */
+static PetscBool Forbidden(const Search *s)
+{
+  const Attempt *last = &s->attempt[s->n - 1];
+
+  return (PetscBool)(last->failure[0] && strcmp(last->option[TYPE], HycoModelTypes[HYCO_MODEL_CONDENSED]) == 0);
+}
+
 /* The tolerances before number `most`, loosest first, until one meets (*most becomes its number) or the errors have
    grown twice in a row: more modes on a fixed RID do harm. */
 static PetscErrorCode Tighten(Work *w, const char type[], const char layers[], const char extension[], PetscInt *most)
@@ -247,6 +255,7 @@ static PetscErrorCode Tighten(Work *w, const char type[], const char layers[], c
     worse = ratio >= last ? worse + 1 : 0;
     last = ratio;
     if (ratio <= 1) *most = k;
+    if (Forbidden(w->out)) break;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -392,6 +401,7 @@ static PetscErrorCode FillStore(Work *w, HycoSamples samples, HycoSamples valida
 PetscErrorCode DriverTrainForTargets(Search *s, HycoScene scene, HycoSamples samples, HycoSamples validation,
                                      HycoTraining *t)
 {
+  const PetscReal begin = HycoNow();
   Work w = {0};
   HycoScene mine = NULL;
   HycoTrainer trainer = NULL;
@@ -406,12 +416,15 @@ PetscErrorCode DriverTrainForTargets(Search *s, HycoScene scene, HycoSamples sam
   for (PetscInt k = 0; k < N_SEARCHED; k++) PetscCall(PetscOptionsHasName(NULL, NULL, searched[k], &w.pinned[k]));
   PetscCall(PetscCalloc1(MAX_ATTEMPTS, &s->attempt));
   PetscCall(FillStore(&w, samples, validation));
+  s->seconds_solutions = HycoNow() - begin;
   PetscCall(SearchTypes(&w));
   PetscCall(Choose(s));
   PetscCall(SetOptions(&w, s->chosen));
   PetscCall(TrainOnce(&w, s->model, PETSC_TRUE, &mine, &trainer, t));
   HycoOnRoot(PETSC_COMM_WORLD, Note(s));
-  PetscCall(Say("chosen: attempt %d\n", (int)s->chosen->number));
+  s->seconds_attempts = HycoNow() - begin - s->seconds_solutions;
+  PetscCall(Say("chosen: attempt %d of %d; seconds of the search: %.2f solutions, %.2f attempts\n",
+                (int)s->chosen->number, (int)s->n, (double)s->seconds_solutions, (double)s->seconds_attempts));
   PetscCall(HycoTrainerDestroy(&trainer));
   PetscCall(HycoSceneDestroy(&mine));
   PetscCall(HycoSnapshotsDestroy(&w.store));
@@ -422,13 +435,17 @@ PetscErrorCode DriverTrainForTargets(Search *s, HycoScene scene, HycoSamples sam
 
 void DriverReportTargets(cJSON *json, const Search *s)
 {
-  cJSON *search = cJSON_AddObjectToObject(json, "search"), *errors;
+  cJSON *search = cJSON_AddObjectToObject(json, "search"), *errors, *seconds;
 
   cJSON_AddNumberToObject(search, "attempts", s->n);
   cJSON_AddNumberToObject(search, "chosen", s->chosen->number);
   for (PetscInt k = 0; k < N_SEARCHED; k++) cJSON_AddStringToObject(search, searched[k] + 6, s->chosen->option[k]);
   cJSON_AddNumberToObject(search, "validation_points", s->chosen->v.n);
   cJSON_AddNumberToObject(search, "online_seconds", s->chosen->v.seconds);
+  seconds = cJSON_AddObjectToObject(search, "seconds");
+  cJSON_AddNumberToObject(seconds, "solutions", s->seconds_solutions);
+  cJSON_AddNumberToObject(seconds, "attempts", s->seconds_attempts);
+  cJSON_AddNumberToObject(seconds, "total", s->seconds_solutions + s->seconds_attempts);
   errors = cJSON_AddObjectToObject(search, "largest_errors");
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     cJSON_AddNumberToObject(errors, HycoErrorKinds[j], s->chosen->v.largest[j]);

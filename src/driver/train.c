@@ -54,7 +54,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
   if (log->scene) DriverReportGreedy(json, log);
   if (search->on) DriverReportTargets(json, search);
   seconds = cJSON_AddObjectToObject(json, "seconds");
-  cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots);
+  cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots); /* of the model that is written */
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
   cJSON_AddNumberToObject(seconds, "total", t->seconds_snapshots + t->seconds_reduction);
   PetscCall(ReportWrite(&json));
@@ -102,10 +102,28 @@ static PetscErrorCode CheckKind(PetscBool greedy, const Search *search, HycoSamp
 static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool greedy)
 {
   static const struct {
-    const char *name, *type;
-  } meant[] = {{"-hyco_condensed_tol", "condensed"}, {"-hyco_condensed_max_values", "condensed"},
-               {"-hyco_nnmf_vectors", "projection"}, {"-hyco_nnmf_max_its", "projection"},
-               {"-hyco_greedy_indicator", NULL},     {"-hyco_greedy_keep", NULL}};
+    const char *name, *types; /* NULL: for -greedy */
+  } meant[] = {{"-hyco_condensed_tol", "condensed"},
+               {"-hyco_condensed_max_values", "condensed"},
+               {"-hyco_nnmf_vectors", "projection"},
+               {"-hyco_nnmf_max_its", "projection"},
+               {"-hyco_rid_modes", "hybrid or condensed"},
+               {"-hyco_rid_dual_tol", "hybrid or condensed"},
+               {"-hyco_rid_stress_tol", "hybrid or condensed"},
+               {"-hyco_rid_force_tol", "hybrid or condensed"},
+               {"-hyco_rid_layers", "hybrid or condensed"},
+               {"-hyco_rid_contact_extension", "hybrid or condensed"},
+               {"-hyco_rid_groups", "hybrid or condensed"},
+               {"-hyco_rid_region", "hybrid or condensed"},
+               {"-hyco_rid_whole", "hybrid or condensed"},
+               {"-hyco_deim_type", "hybrid or condensed"},
+               {"-hyco_hybrid", "hybrid"},
+               {"-hyco_hybrid_trials", "hybrid"},
+               {"-hyco_hybrid_ridge", "hybrid"},
+               {"-hyco_scan", "hybrid or projection"},
+               {"-hyco_keep_singular", "hybrid or projection"},
+               {"-hyco_greedy_indicator", NULL},
+               {"-hyco_greedy_keep", NULL}};
   PetscInt type = HYCO_MODEL_HYBRID;
   PetscOptions options;
 
@@ -117,13 +135,29 @@ static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool gree
 
     PetscCall(PetscOptionsHasName(NULL, NULL, meant[k].name, &set));
     if (!set) continue;
-    HycoCheck(meant[k].type || greedy, "nothing reads %s here: it is for train -greedy", meant[k].name);
-    HycoCheck(!meant[k].type || strcmp(meant[k].type, HycoModelTypes[type]) == 0,
-              "nothing reads %s here: it is for -hyco_model_type %s, and the model is %s", meant[k].name, meant[k].type,
-              HycoModelTypes[type]);
-    HycoCheck(!given || !meant[k].type || strcmp(meant[k].type, HycoModelTypes[HYCO_MODEL_CONDENSED]),
+    HycoCheck(meant[k].types || greedy, "nothing reads %s here: it is for train -greedy", meant[k].name);
+    if (!meant[k].types) continue;
+    HycoCheck(strstr(meant[k].types, HycoModelTypes[type]),
+              "nothing reads %s here: it is for -hyco_model_type %s, and the model is %s", meant[k].name,
+              meant[k].types, HycoModelTypes[type]);
+    HycoCheck(!given || strcmp(meant[k].types, HycoModelTypes[HYCO_MODEL_CONDENSED]),
               "nothing reads %s here: it chooses points where none are given", meant[k].name);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A point given twice would be learned twice. */
+static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
+{
+  PetscInt n = 0, dropped;
+
+  PetscFunctionBegin;
+  if (!samples) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesDropTwins(samples, &dropped));
+  PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
+  if (dropped)
+    PetscCall(Say("%d of the %d %s points repeat others; each of the %d is used once\n", (int)dropped,
+                  (int)(n + dropped), what, (int)n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -152,9 +186,15 @@ PetscErrorCode CommandTrain(void)
   PetscCall(PetscStrncpy(search.model, model, sizeof(search.model)));
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
+  PetscCall(TakeOnce(samples, "training"));
+  PetscCall(TakeOnce(validation, "validation"));
   if (!search.on) PetscCall(CheckRead(scene, given, greedy));
   PetscCall(HycoTrainerChooses(trainer, &chooses));
-  HycoCheck(given || greedy || (chooses && !search.on),
+  HycoCheck(
+      given || !chooses || !search.on,
+      "-target_... judges models by solutions that are held out of given points, and a condensed model's own points "
+      "are chosen by -hyco_condensed_tol: give -grid N,N,... (or -values_NAME, -points), or no -target_...");
+  HycoCheck(given || greedy || chooses,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
   if (greedy) PetscCall(DriverReadGreedy(scene, trainer, &training, &log));
@@ -167,7 +207,10 @@ PetscErrorCode CommandTrain(void)
     PetscCall(HycoTrainerRun(trainer, given ? samples : NULL, model, &t));
   PetscCall(SayBases(&t));
   if (!given && t.type == HYCO_MODEL_CONDENSED && !t.target_met)
-    PetscCall(Say("-hyco_condensed_tol was not reached with -hyco_condensed_max_values\n"));
+    PetscCall(
+        Say("-hyco_condensed_tol was not reached: the forces' error, one value left out, is %.1e, and %.1e was asked; "
+            "raise -hyco_condensed_max_values, which is %d, or be content with more\n",
+            (double)t.left_out[2], (double)t.target, (int)t.most_values));
   PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u,
                 t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda));
   if (t.type != HYCO_MODEL_CONDENSED) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));

@@ -60,7 +60,7 @@ static PetscErrorCode Start(HycoTrainer t, HycoSamples start, HycoSamples *sampl
 
 /* Before anything is solved: enough to start from, not more than asked for, and nothing that (42) cannot interpolate.
  */
-static PetscErrorCode CheckStart(HycoTrainer t, HycoSamples samples)
+static PetscErrorCode CheckStart(HycoTrainer t, PetscBool corners, HycoSamples samples)
 {
   PetscInt n, n_par;
   const PetscReal *mu;
@@ -68,10 +68,16 @@ static PetscErrorCode CheckStart(HycoTrainer t, HycoSamples samples)
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  HycoCheck(!t->greedy.max_snapshots || t->greedy.max_snapshots >= n,
-            "at most %d snapshots are asked for; the greedy training starts from %d already",
-            (int)t->greedy.max_snapshots, (int)n);
+  HycoCheck(
+      !t->greedy.max_snapshots || t->greedy.max_snapshots >= n,
+      "-max_snapshots is %d; at least %d are needed: a greedy training first solves at the %d %s, and adds to these",
+      (int)t->greedy.max_snapshots, (int)n, (int)n, corners ? "corners of the parameters' ranges" : "points given");
   if (t->greedy.indicator != HYCO_INDICATOR_LOCAL) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(
+      n > n_par || n == t->greedy.max_snapshots,
+      "the greedy training starts from %d point%s; its indicator interpolates over %d parameters and needs at least "
+      "%d: give more, or none (the corners)",
+      (int)n, n == 1 ? "" : "s", (int)n_par, (int)n_par + 1);
   PetscCall(HycoInterpolantCreate(n_par, n, mu, &interpolant));
   PetscCall(HycoInterpolantDestroy(&interpolant));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -258,7 +264,7 @@ PetscErrorCode HycoTrainerRunGreedy(HycoTrainer t, HycoSamples start, HycoSample
   loop.begin = HycoNow();
   PetscCall(TakeTraining(training, &loop));
   PetscCall(Start(t, start, &loop.samples));
-  PetscCall(CheckStart(t, loop.samples));
+  PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoTrainerOpen(t, loop.samples, path, &loop.store));
   PetscCall(PetscCalloc1(t->rank == 0 ? t->whole->n_cells : 0, &t->grown));
   for (PetscInt iteration = 0; !last; iteration++) PetscCall(Iterate(t, &loop, iteration, &report, &last));

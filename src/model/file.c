@@ -458,7 +458,7 @@ PetscErrorCode HycoModelLoad(const char path[], HycoModel *model)
   PetscCheck(path && model, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
              "HycoModelLoad: the path or the handle's address is NULL");
   *model = NULL;
-  PetscCall(HycoH5Open(path, &h));
+  PetscCall(HycoH5OpenOr(path, "if it was a model, train it again", &h));
   PetscCall(HycoModelCreate(&m));
   PetscCall(PetscStrncpy(m->path, path, sizeof(m->path)));
   PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_TRUE));
@@ -491,7 +491,7 @@ static PetscErrorCode LoadWhole(HycoModel m)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5Open(m->path, &h));
+  PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
   ierr = ReadWhole(h, m);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);

@@ -192,7 +192,7 @@ static void SumForces(HycoModel m, HycoPrediction *p)
 {
   const PetscInt n = m->spread ? m->pairs.n : m->m;
 
-  p->n_active = 0;
+  p->n_active = p->n_rid_active = 0;
   p->total_contact_force = p->lambda_max = p->lambda_norm2 = p->covered_force = 0;
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt k = m->spread ? i : m->contact[i];
@@ -202,8 +202,12 @@ static void SumForces(HycoModel m, HycoPrediction *p)
     p->lambda_max = PetscMax(p->lambda_max, m->Lambda[k]);
     p->lambda_norm2 += m->Lambda[k] * m->Lambda[k];
   }
-  for (PetscInt i = 0; i < n; i++) /* the reconstruction leaves round-off */
-    p->n_active += m->Lambda[m->spread ? i : m->contact[i]] > 1e-10 * p->lambda_max;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt k = m->spread ? i : m->contact[i], presses = m->Lambda[k] > 1e-10 * p->lambda_max; /* no round-off */
+
+    p->n_active += presses;
+    if (m->in_rid[k]) p->n_rid_active += presses;
+  }
   p->covered_force = p->total_contact_force > 0 ? p->covered_force / p->total_contact_force : 1;
   p->lambda_norm2 = PetscSqrtReal(p->lambda_norm2);
 }
@@ -221,6 +225,7 @@ PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
   p->type = m->type;
   p->n_multipliers = m->n_L;
   p->n_contacts = m->m;
+  p->n_all_contacts = m->pairs.n;
   p->n_modes = m->l;
   p->n_fe_dofs = m->n_fe;
   p->rid_nodes = 0;

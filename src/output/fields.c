@@ -7,16 +7,6 @@
 static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
                                                         "Hexahedron"};
 
-PetscErrorCode HycoFieldsCheckPath(const char path[])
-{
-  const size_t n = strlen(path);
-
-  PetscFunctionBegin;
-  HycoCheck(n > 5 && n < PETSC_MAX_PATH_LEN - 16 && strcmp(path + n - 5, ".xdmf") == 0,
-            "the output is named %s; give a name that ends in .xdmf (the numbers go to the .h5 beside it)", path);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode WriteNumbers(HycoH5 h, HycoMesh m, const PetscReal X[], HycoScene scene, const PetscReal mu[],
                                    PetscInt n, const HycoField field[], const HycoContactTable *contact)
 {
@@ -101,6 +91,19 @@ static PetscErrorCode CheckPlace(const char h5[], const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFieldsCheckPath(const char path[])
+{
+  const size_t n = strlen(path);
+  char h5[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  HycoCheck(n > 5 && n < PETSC_MAX_PATH_LEN - 16 && strcmp(path + n - 5, ".xdmf") == 0,
+            "the output is named %s; give a name that ends in .xdmf (the numbers go to the .h5 beside it)", path);
+  snprintf(h5, sizeof(h5), "%.*s.h5", (int)n - 5, path);
+  PetscCall(CheckPlace(h5, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[], HycoScene scene,
                                const PetscReal mu[], PetscInt n, const HycoField field[],
                                const HycoContactTable *contact)
@@ -114,7 +117,6 @@ PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[
   PetscFunctionBegin;
   PetscCall(HycoFieldsCheckPath(path));
   snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
-  PetscCall(CheckPlace(h5, path));
   snprintf(partial, sizeof(partial), "%s.partial", path);
   out = fopen(partial, "w");
   HycoCheck(out, "%s cannot be written: is there such a folder, may you write there?", path);

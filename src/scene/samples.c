@@ -139,7 +139,7 @@ static PetscErrorCode ReadHeader(HycoSamples s, const char path[], char *line, P
 
 static PetscErrorCode ReadLines(HycoSamples s, const char path[], FILE *file)
 {
-  const PetscInt P = s->scene->n_parameters;
+  const PetscInt P = s->scene->n_parameters, before = s->n;
   char line[4096];
   PetscInt column[HYCO_MAX_PARAMETERS], number = 0;
 
@@ -165,6 +165,10 @@ static PetscErrorCode ReadLines(HycoSamples s, const char path[], FILE *file)
     }
     PetscCall(HycoSamplesAddPoint(s, mu));
   }
+  HycoCheck(s->n > before,
+            "%s holds no point; a header with the parameters' names is expected, then a point per line: numbers with "
+            "commas between",
+            path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -186,6 +190,62 @@ PetscErrorCode HycoSamplesAddFile(HycoSamples s, const char path[])
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
   HycoOnEach(s->scene->comm, ReadFile(s, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+typedef struct {
+  unsigned long long hash;
+  PetscInt at;
+} Keyed;
+
+static int CompareKeyed(const void *a, const void *b)
+{
+  const Keyed *x = (const Keyed *)a, *y = (const Keyed *)b;
+
+  return x->hash != y->hash ? (x->hash > y->hash) - (x->hash < y->hash) : (x->at > y->at) - (x->at < y->at);
+}
+
+/* twin[k]: an earlier point has the values of point k. */
+static PetscErrorCode FindTwins(HycoSamples s, PetscBool twin[])
+{
+  const PetscInt P = s->scene->n_parameters;
+  Keyed *key;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(s->n, &key));
+  for (PetscInt k = 0; k < s->n; k++) {
+    key[k].hash = HycoHash(HYCO_HASH_START, s->mu + k * P, (size_t)P * sizeof(PetscReal));
+    key[k].at = k;
+  }
+  qsort(key, (size_t)s->n, sizeof(*key), CompareKeyed);
+  for (PetscInt k = 0; k < s->n; k++) {
+    PetscBool same = PETSC_FALSE;
+
+    for (PetscInt j = k - 1; j >= 0 && !same && key[j].hash == key[k].hash; j--)
+      PetscCall(PetscArraycmp(s->mu + key[j].at * P, s->mu + key[k].at * P, P, &same));
+    twin[key[k].at] = same;
+  }
+  PetscCall(PetscFree(key));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesDropTwins(HycoSamples s, PetscInt *n_dropped)
+{
+  PetscInt kept = 0;
+  PetscBool *twin;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSamplesCreate()");
+  PetscCall(PetscMalloc1(s->n, &twin));
+  PetscCall(FindTwins(s, twin));
+  for (PetscInt k = 0; k < s->n; k++) {
+    const PetscInt P = s->scene->n_parameters;
+
+    if (!twin[k]) PetscCall(PetscArraymove(s->mu + kept++ * P, s->mu + k * P, P));
+  }
+  if (n_dropped) *n_dropped = s->n - kept;
+  s->n = kept;
+  PetscCall(PetscFree(twin));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -91,7 +91,7 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
       if (!twin) missing[(*n_missing)++] = k;
       continue;
     }
-    PetscCall(HycoH5Open(path, &h));
+    PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
     PetscCall(CheckFingerprint(s, h, path));
     PetscCall(HycoH5Close(&h, PETSC_FALSE));
   }
@@ -236,7 +236,7 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, HycoSamples samples, const ch
     PetscInt size, one;
 
     PetscCall(SamplePath(s, mu + k * n_par, path));
-    PetscCall(HycoH5Open(path, &h));
+    PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
     PetscCall(CheckFingerprint(s, h, path));
     PetscCall(HycoH5GetSize(h, field, &size, &one));
     HycoCheck(size == total, "%s: %s has %d rows where other snapshots have %d; remove the folder", path, field,
@@ -257,7 +257,7 @@ static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
   PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5Open(path, &h));
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
   PetscCall(HycoH5GetSize(h, field, rows, &one));
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -292,7 +292,7 @@ PetscErrorCode HycoSnapshotsRead(HycoSnapshots s, const PetscReal mu[], const ch
 
   PetscFunctionBegin;
   PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5Open(path, &h));
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
   ierr = CheckFingerprint(s, h, path);
   if (!ierr) ierr = HycoH5ReadReal(h, field, n, 1, value);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));

@@ -271,7 +271,7 @@ static PetscErrorCode ReadOne(HycoSnapshots store, const char path[], const char
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5Open(path, &h));
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
   ierr = ReadOpen(store, h, path, name, rows, cols, data);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);

@@ -160,6 +160,8 @@ static void Report(HycoTrainer t, HycoModel m, HycoTraining *r)
   r->dual_misfit = m->dual_misfit;
   if (m->condensed) {
     r->target_met = m->condensed->target_met;
+    r->target = t->condensed_tol;
+    r->most_values = t->condensed_max_values;
     r->n_flexibilities = HycoTensorSize(&m->condensed->field[HYCO_FIELD_G].tensor);
     for (PetscInt k = 0; k < 3; k++) r->left_out[k] = m->condensed->errors[k];
   }

@@ -79,7 +79,7 @@ class Files(Case):
         with open(self.path('bad.h5'), 'r+b') as f:
             f.seek(-24, os.SEEK_END)
             f.write(bytes(24))
-        self.refused('bad.h5', 'is damaged: its end is missing')
+        self.refused('bad.h5', 'is damaged: its end is missing; if it was a model, train it again')
 
     def test_huge(self):
         """Sizes that the file cannot hold."""

@@ -49,6 +49,22 @@ class Choices(Case):
         self.train('r.h5', '-hyco_keep_singular', *options)
         return self.cells('r.h5')
 
+    def test_twins(self):
+        """Points given twice train once, and the run says so; a prediction keeps its rows."""
+        values = ('-values_mu1', '0.05,0.1,0.15,0.2,0.25', '-values_mu2', '0.1,0.2,0.3')
+        once = self.hyco('train', '-scene', ROPE, *values, '-model', 'once.h5')
+        with open(self.path('twins.csv'), 'w', encoding='ascii') as f:
+            f.write('mu1,mu2\n' + ''.join(f'{a},{b}\n' * (2 if a == 0.1 else 1) for a in (0.05, 0.1, 0.15, 0.2, 0.25)
+                                          for b in (0.1, 0.2, 0.3)))
+        twice = self.hyco('train', '-scene', ROPE, '-points', 'twins.csv', '-model', 'twice.h5')
+        self.assertEqual((once['n_samples'], twice['n_samples']), (15, 15))
+        with h5py.File(self.path('once.h5')) as a, h5py.File(self.path('twice.h5')) as b:
+            np.testing.assert_array_equal(a['problem/singular_values'], b['problem/singular_values'])
+        said = self.run_raw('train', '-scene', ROPE, '-points', 'twins.csv', '-model', 'twice.h5').stdout
+        self.assertIn('3 of the 18 training points repeat others; each of the 15 is used once', said)
+        p = self.hyco('predict', '-model', 'once.h5', '-points', 'twins.csv', '-table', 'p.csv')
+        self.assertEqual(p['n_points'], 18)
+
     def test_layers(self):
         """A layer: the cells that share a node with the RID."""
         with h5py.File(self.path('base.h5')) as f:

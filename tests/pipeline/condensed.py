@@ -97,7 +97,10 @@ class Condensed(Case):
         self.assertLess(c['error_lambda']['max'], 1e-7)
         run = self.run_raw('train', '-scene', PELLET, *TYPE, '-model', 'd.h5', '-hyco_condensed_max_values', 3)
         self.assertEqual(run.returncode, 0, run.stderr)
-        self.assertIn('-hyco_condensed_tol was not reached', run.stdout)
+        said = re.search(r"-hyco_condensed_tol was not reached: the forces' error, one value left out, is (\S+), and 1.0e-07 was "
+                         r'asked; raise -hyco_condensed_max_values, which is 3,', run.stdout)
+        self.assertIn(f'forces {said[1]};', run.stdout)  # the estimate that is reported
+        self.assertGreater(float(said[1]), 1e-7)
         self.refused('give the training points', 'train', '-scene', PELLET, '-model', 'h.h5')
 
     def test_ranks_and_resume(self):

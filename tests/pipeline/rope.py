@@ -1,4 +1,5 @@
 """The rope of section 6 reduced: sizes of the paper, errors no worse than an independent computation has with the same RID."""
+import csv
 import unittest
 
 import h5py
@@ -66,6 +67,40 @@ class Reduced(Case):
             for name, key in (('nodes/displacement', 'error_u'), ('contact/lambda', 'error_lambda')):
                 a, b = p5[name][:], s5[name][:]
                 self.near(np.linalg.norm(a - b) / np.linalg.norm(b), c[key]['max'], 1e-9, key)
+
+    def test_counts(self):
+        """n_contacts and n_active count the whole surface, as full order does; rid_ those of the RID alone, whose forces are all
+        that is left without the reconstruction."""
+        full = self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17')
+        p = self.hyco('predict', '-model', 'rope.h5', '-mu', '0.07,0.17')
+        alone = self.hyco('predict', '-model', 'rope.h5', '-mu', '0.07,0.17', '-hyco_reconstruct', 'false')
+        self.assertEqual((p['n_contacts'], p['rid_contacts']), (full['n_contacts'], self.training['rid_contacts']))
+        self.assertEqual(alone['n_active'], p['rid_active'])
+        self.assertTrue(0 < p['rid_active'] < p['n_active'] < p['n_contacts'])
+
+    def test_one_point(self):
+        """compare -mu is a set of one."""
+        one = self.hyco('compare', '-scene', ROPE, '-model', 'rope.h5', '-mu', '0.07,0.17')
+        named = self.hyco('compare', '-scene', ROPE, '-model', 'rope.h5', '-mu_mu2', '0.17', '-mu_mu1', '0.07')
+        listed = self.hyco('compare', '-scene', ROPE, '-model', 'rope.h5', '-values_mu1', '0.07', '-values_mu2', '0.17')
+        self.assertEqual([r['n_points'] for r in (one, named, listed)], [1, 1, 1])
+        self.assertEqual(one['error_u'], listed['error_u'])
+        self.assertEqual(named['error_u'], listed['error_u'])
+        self.assertGreater(one['error_u']['max'], 0)
+
+    def test_some_fail(self):
+        """Of a set some of which do not converge: the table has all, the last line says how many, and the status is not 0."""
+        for command, where, its in (('predict', ('-model', 'rope.h5'), 5), ('solve', ('-scene', ROPE), 1)):
+            run = self.run_raw(command, *where, '-grid', '8,8', '-table', 'some.csv', '-hyco_solver_max_its', its,
+                               '-hyco_solver_fallback', 'false')
+            self.assertEqual(run.returncode, 1)
+            with open(self.path('some.csv'), encoding='utf-8') as f:
+                rows = list(csv.DictReader(f))
+            failed = sum(row['converged'] == '0' for row in rows)
+            self.assertTrue(len(rows) == 64 and 0 < failed < 64, failed)
+            self.assertEqual(run.stderr, f'hyco: error: {failed} of the 64 points did not converge; the column converged of some.csv '
+                                         'says which\n')
+            self.assertIn(f'{failed} not converged', run.stdout.splitlines()[-1])
 
     def test_rank(self):
         """-hyco_hybrid rank: 14 contacts and 9 modes leave 5 full-order displacements, as in the paper."""

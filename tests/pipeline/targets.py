@@ -34,6 +34,9 @@ class Targets(Case):
                       't.csv', *args)
         self.assertEqual((t['n_samples'], t['search']['validation_points']), (120, 72))
         row = self.chosen(t, 't.csv')
+        spent = t['search']['seconds']  # of all attempts: more than of the one that is written
+        self.near(spent['total'], spent['solutions'] + spent['attempts'], 1e-9)
+        self.assertGreater(spent['attempts'], 2 * t['seconds']['total'])
         c = self.hyco('compare', '-scene', ROPE, '-model', 'm.h5', '-grid', '20,18')
         self.assertEqual((c['n_points'], c['not_converged']), (360, 0))
         for name, target in targets.items():
@@ -79,9 +82,22 @@ class Targets(Case):
         self.assertGreater(len(rows), 1)
         self.assertTrue(all(r['meets'] == '0' for r in rows))
 
+    def test_no_grid(self):
+        """Points that are no tensor grid: a condensed model is tried once, not with every tolerance."""
+        points = [(a, b) for a in (0.05, 0.1, 0.15, 0.2, 0.25) for b in (0.0, 0.1, 0.2, 0.3, 0.4)]
+        with open(self.path('line.csv'), 'w', encoding='ascii') as f:
+            f.write('mu1,mu2\n' + ''.join(f'{a},{b}\n' for a, b in points[:-1]))
+        run = self.run_raw('train', '-scene', ROPE, '-points', 'line.csv', '-validation_grid', '2,2', '-model', 'g.h5', '-target_u',
+                           1e-9, '-hyco_model_type', 'condensed', '-table', 'g.csv', '-grid_type', 'centred')
+        self.assertEqual(run.returncode, 1)
+        self.assertEqual([r['failure'][:25] for r in self.rows('g.csv')], ['the 24 training points ar'])
+        self.assertRegex(run.stderr, 'none of the 1 attempts gave a model; the last: the 24 training points are no tensor grid')
+        run = self.run_raw('train', '-scene', ROPE, '-model', 'g.h5', '-target_u', 0.1, '-hyco_model_type', 'condensed')
+        self.assertRegex(run.stderr, "^hyco: error: -target_... judges models .* give -grid N,N")
+
     def test_complaints(self):
-        for args, words in ((('-target_u', 0), 'above 0'), (('-target_sigma', -0.1), 'from 0 to 1'),
-                            (('-target_lambda', 1.5), 'from 0 to 1'), (('-target_u', 'small'), 'from 0 to 1'),
+        for args, words in ((('-target_u', 0), 'a relative error above 0 and at most 1'), (('-target_sigma', -0.1), 'a relative error above 0 and at most 1'),
+                            (('-target_lambda', 1.5), 'a relative error above 0 and at most 1'), (('-target_u', 'small'), 'a relative error above 0 and at most 1'),
                             (('-target_stress', 0.1), 'knows no option -target_stress'),
                             (('-target_u', 0.1, '-greedy', '-training_grid', '3,3'), 'stops by -target'),
                             (('-validation_grid', '3,3'), 'judge models against targets'),

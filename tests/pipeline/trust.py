@@ -56,6 +56,9 @@ class Trust(Case):
                 self.assertGreater(p[estimate], 1.5 * before[estimate])
             before = p
         self.assertGreater(before['estimated_error_u'], 100 * inside['estimated_error_u'])
+        said = self.run_raw('predict', '-model', 'rough.h5', '-mu', '0.9,0.2', '-extrapolate').stdout
+        self.assertRegex(said, r'estimated errors: u \d{3,} %, contact forces \d{3,} %\n')
+        self.assertIn('outside the training points by 325 % of a range', said)
 
     def test_fallback(self):
         """The points whose estimate is above the target are solved full order, exactly as hyco solve does; the others not."""
@@ -77,6 +80,8 @@ class Trust(Case):
         one = self.hyco('predict', '-model', 'rough.h5', '-mu', '0.12,0.2', '-scene', ROPE, '-hyco_fallback', '-target_u', 1e-6)
         true = self.hyco('solve', '-scene', ROPE, '-mu', '0.12,0.2')
         self.assertTrue(one['full_order'])
+        self.assertEqual([one[k] for k in ('n_dof', 'n_contacts', 'n_active', 'n_modes')], [98, 98, true['n_active'], 0])
+        self.assertNotIn('rid_nodes', one)
         self.near(one['u_norm2'], true['u_norm2'], 1e-9, 'u')
         kept = self.hyco('predict', '-model', 'rough.h5', '-mu', '0.12,0.2', '-scene', ROPE, '-hyco_fallback', '-target_u', 1)
         self.assertFalse(kept['full_order'])
@@ -110,8 +115,8 @@ class Trust(Case):
 
     def test_complaints(self):
         for args, words in ((('-target_u', 0.1), 'give -hyco_fallback too'), (('-hyco_fallback',), 'give its -scene'),
-                            (('-hyco_fallback', '-scene', ROPE, '-target_u', 0), 'above 0'),
-                            (('-hyco_fallback', '-scene', ROPE, '-target_lambda', 2), 'from 0 to 1'),
+                            (('-hyco_fallback', '-scene', ROPE, '-target_u', 0), 'a relative error above 0 and at most 1'),
+                            (('-hyco_fallback', '-scene', ROPE, '-target_lambda', 2), 'a relative error above 0 and at most 1'),
                             (('-hyco_fallback', '-scene', ROPE, '-body_rope_young', 1, '-target_u', 0.1), 'another scene')):
             run = self.run_raw('predict', '-model', 'fine.h5', '-mu', '0.1,0.2', *args)
             self.assertEqual(run.returncode, 1, args)

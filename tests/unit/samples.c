@@ -81,6 +81,8 @@ static PetscErrorCode TestFile(HycoScene scene)
   CHECK_FAILS(FromFile(scene, "a\n1\n", &n, first), "names 1 of the scene's 2 parameters");
   CHECK_FAILS(FromFile(scene, "a,a\n1,1\n", &n, first), "stands twice");
   CHECK_FAILS(FromFile(scene, "a,b\n1,1\n1;2\n", &n, first), "line 3: 2 numbers");
+  CHECK_FAILS(FromFile(scene, "", &n, first), ".csv holds no point");
+  CHECK_FAILS(FromFile(scene, "a,b\n\n", &n, first), ".csv holds no point");
   CHECK_FAILS(FromFile(scene, "a,b\n1,9\n", &n, first), "b = 9");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -109,6 +111,36 @@ static PetscErrorCode TestScene(HycoScene scene)
   PetscCall(PetscFree(text));
   PetscCall(PetscFree(twice));
   PetscCall(HycoSceneDestroy(&again));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* 3 x 2 points, given twice and one more between: each stays where it came first. */
+static PetscErrorCode TestTwins(HycoScene scene)
+{
+  const PetscInt counts[2] = {3, 2};
+  const PetscReal extra[2] = {0.5, 2.75};
+  HycoSamples samples;
+  PetscInt n, dropped;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_TRUE));
+  PetscCall(HycoSamplesAddPoint(samples, extra));
+  PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_TRUE));
+  PetscCall(HycoSamplesAddPoint(samples, extra));
+  PetscCall(HycoSamplesDropTwins(samples, &dropped));
+  PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
+  CHECK(n == 7 && dropped == 7, "expected 7 of 14 points, found %d, %d dropped", (int)n, (int)dropped);
+  for (PetscInt k = 0; k < 6; k++) {
+    CHECK_NEAR(mu[2 * k], 0.5 * (PetscReal)(k / 2), 0);
+    CHECK_NEAR(mu[2 * k + 1], k % 2 ? 3 : -1, 0);
+  }
+  CHECK_NEAR(mu[13], 2.75, 0);
+  PetscCall(HycoSamplesDropTwins(samples, NULL));
+  PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
+  CHECK(n == 7, "nothing is left to drop, %d points are", (int)n);
+  PetscCall(HycoSamplesDestroy(&samples));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -182,6 +214,7 @@ static PetscErrorCode Test(void)
   PetscCall(TestGrids(scene));
   PetscCall(TestFile(scene));
   PetscCall(TestScene(scene));
+  PetscCall(TestTwins(scene));
   PetscCall(TestHoldOut(scene));
   PetscCall(TestExtrapolate(scene));
   PetscCall(TestNearest());
