@@ -136,7 +136,7 @@ PetscErrorCode HycoReducedDestroy(HycoReduced *reduced);
 /* Kr's entries in the order in which it has them, borrowed while it lives; the row of each. */
 PetscErrorCode HycoReducedEntries(HycoModel model, PetscInt *n, PetscScalar *a[]);
 PetscErrorCode HycoReducedRows(HycoModel model, PetscInt row[]);
-/* m->reduced, and the pattern of a sparse Kr, before the first fill. */
+/* m->reduced, where a table fills Kr. */
 PetscErrorCode HycoReducedPrepare(HycoModel model);
 
 /* What loads share while the stiffness stays (loads.c). HycoLoadsCreate() needs Fr and x; HycoLoadsForget(): the

@@ -12,12 +12,16 @@
 struct _n_HycoTable {
   PetscReal *x[HYCO_MAX_PARAMETERS]; /* ascending */
   HycoGridField values;              /* Kr's entries, as HycoReducedEntries() has them */
+  PetscInt n, *start, *column;       /* a sparse Kr's rows: n + 1, entries; n -1: dense */
 };
 
 /* n[p] values x[p] of each of the dim parameters, copied; values.data is for the caller to fill. */
 PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim, PetscInt entries, HycoTable *table);
 /* NULL-safe. */
 PetscErrorCode HycoTableDestroy(HycoTable *table);
+/* The pattern of the model's Kr, if sparse; a sparse Kr with that pattern, its entries zero. */
+PetscErrorCode HycoTableKeepPattern(HycoModel model, HycoTable table);
+PetscErrorCode HycoTableCreateSparse(HycoModel model);
 /* Kr at mu by the model's table. */
 PetscErrorCode HycoTableFill(HycoModel model, const PetscReal mu[]);
 PetscErrorCode HycoTableSave(HycoModel model, HycoH5 file);

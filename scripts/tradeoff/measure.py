@@ -71,7 +71,7 @@ class Bench:
 
     def full(self, *options, ramps=True):
         """The same of full order; a process that has read and paired its mesh. Without ramps: of single points alone."""
-        r, rows = self.hyco("solve", *self.case.scene, *(self.case.test if ramps else ["-points", self.points]), *options)
+        r, rows = self.hyco("solve", *self.case.scene, *(self.case.batch or self.case.test if ramps else ["-points", self.points]), *options)
         _, single = self.hyco("solve", *self.case.scene, "-points", self.points, *options) if ramps else (r, rows)
         return {"batch_s": sum(float(row["seconds"]) for row in rows) / len(rows),
                 "single_s": statistics.median(float(row["seconds"]) for row in single), "memory_mb": r["memory_mb"]}

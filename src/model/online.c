@@ -118,12 +118,12 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
     interface = (PetscBool)(interface || m->role[i] == HYCO_ROLE_INTERFACE);
   dense = (PetscBool)(m->n <= HYCO_DENSE_MAX || m->type == HYCO_MODEL_PROJECTION ||
                       (m->hybrid == HYCO_HYBRID_ALL && interface));
-  PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->own->n_nodes, 0, &m->K));
-  PetscCall(MatCreateVecs(m->K, &m->F, NULL));
+  if (!m->table) PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->own->n_nodes, 0, &m->K));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->fe->n_dof, &m->F));
   if (dense)
     PetscCall(CreateReduced(m, m->n, m->n, PETSC_TRUE, &m->Kr));
   else
-    PetscCall(HycoReducedCreateSparse(m));
+    PetscCall(m->table ? HycoTableCreateSparse(m) : HycoReducedCreateSparse(m));
   PetscCall(MatCreateVecs(m->Kr, &m->x, &m->Fr));
   if (!dense) PetscCall(HycoLoadsCreate(m));
   if (m->n_L) {

@@ -218,7 +218,7 @@ static PetscErrorCode Create(HycoModel m, const PetscInt ia[], const PetscInt ja
   PetscCall(ListRows(m, r));
   PetscCall(PetscMalloc5(m->l, &r->y, m->n + 100, &r->value, m->n + 100, &r->index, m->n_free * m->n, &r->modes,
                          m->G ? m->n_fe * m->l : 0, &r->Y));
-  if (!r->dense) PetscCall(SetPattern(m, ia, ja, a));
+  if (!r->dense && ia) PetscCall(SetPattern(m, ia, ja, a)); /* else the table gave it */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -291,27 +291,10 @@ PetscErrorCode HycoReducedRows(HycoModel m, PetscInt row[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A sparse Kr takes its pattern from K's, which an assembly gives. */
 PetscErrorCode HycoReducedPrepare(HycoModel m)
 {
-  const PetscInt *ia, *ja;
-  const PetscScalar *a;
-  PetscInt n;
-  PetscBool dense, done;
-
   PetscFunctionBegin;
-  if (m->reduced) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectTypeCompare((PetscObject)m->Kr, MATSEQDENSE, &dense));
-  if (dense) {
-    PetscCall(Create(m, NULL, NULL, NULL));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(HycoFEAssembleStiffness(m->fe, m->K));
-  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatSeqAIJGetArrayRead(m->K, &a));
-  PetscCall(Create(m, ia, ja, a));
-  PetscCall(MatSeqAIJRestoreArrayRead(m->K, &a));
-  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  if (!m->reduced) PetscCall(Create(m, NULL, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

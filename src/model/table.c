@@ -14,6 +14,7 @@ PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim,
   PetscFunctionBegin;
   PetscCall(PetscNew(&t));
   *table = t;
+  t->n = -1;
   t->values.rows = entries;
   t->values.tensor.dim = dim;
   for (PetscInt p = 0; p < dim; p++) {
@@ -34,7 +35,40 @@ PetscErrorCode HycoTableDestroy(HycoTable *table)
   if (!t) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt p = 0; p < t->values.tensor.dim; p++) PetscCall(PetscFree(t->x[p]));
   PetscCall(PetscFree(t->values.data));
+  PetscCall(PetscFree(t->start));
+  PetscCall(PetscFree(t->column));
   PetscCall(PetscFree(*table));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableKeepPattern(HycoModel m, HycoTable t)
+{
+  const PetscInt *start, *column;
+  PetscInt n;
+  PetscBool dense, done;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)m->Kr, MATSEQDENSE, &dense));
+  if (dense) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &column, &done));
+  t->n = n;
+  HycoDuplicate(n + 1, start, &t->start);
+  HycoDuplicate(start[n], column, &t->column);
+  PetscCall(MatRestoreRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &column, &done));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableCreateSparse(HycoModel m)
+{
+  const HycoTable t = m->table;
+
+  PetscFunctionBegin;
+  HycoCheck(t->n == m->n, "%s: the table of the reduced stiffness has %d rows, the matrix %d: train the model again",
+            m->path, (int)t->n, (int)m->n);
+  PetscCall(MatCreate(PETSC_COMM_SELF, &m->Kr));
+  PetscCall(MatSetSizes(m->Kr, m->n, m->n, m->n, m->n));
+  PetscCall(MatSetType(m->Kr, MATSEQAIJ));
+  PetscCall(MatSeqAIJSetPreallocationCSR(m->Kr, t->start, t->column, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -70,6 +104,8 @@ PetscErrorCode HycoTableSave(HycoModel m, HycoH5 h)
     for (PetscInt k = 0; k < tensor->n[p]; k++) x[all++] = t->x[p][k];
   }
   PetscCall(HycoH5WriteInt(h, "table/counts", tensor->dim, 1, tensor->n));
+  if (t->n >= 0) PetscCall(HycoH5WriteInt(h, "table/start", t->n + 1, 1, t->start));
+  if (t->n >= 0) PetscCall(HycoH5WriteInt(h, "table/column", t->values.rows, 1, t->column));
   PetscCall(HycoH5WriteReal(h, "table/parameters", all, 1, x));
   PetscCall(HycoH5WriteReal(h, "table/stiffness", HycoTensorSize(tensor), t->values.rows, t->values.data));
   PetscCall(PetscFree(x));
@@ -84,6 +120,27 @@ static PetscErrorCode CheckParameters(HycoModel m, const PetscInt count[], const
     for (PetscInt k = 0; k < count[p]; k++, x++)
       HycoCheck(!PetscIsInfOrNanReal(*x) && (!k || *x > x[-1]), "%s: table/parameters is damaged", m->path);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of a sparse matrix: they lie one behind the other, their columns ascend. */
+static PetscErrorCode LoadPattern(HycoModel m, HycoH5 h)
+{
+  const HycoTable t = m->table;
+  PetscInt one = 1, n = -1, *entries = &t->values.rows;
+  PetscBool good;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadInt(h, "table/start", 0, *entries, &n, &one, &t->start));
+  t->n = n - 1;
+  PetscCall(HycoH5LoadInt(h, "table/column", 0, PetscMax(t->n - 1, 0), entries, &one, &t->column));
+  good = (PetscBool)(n > 1 && t->start[0] == 0 && t->start[n - 1] == *entries);
+  for (PetscInt i = 0; i < t->n && good; i++) {
+    good = (PetscBool)(t->start[i + 1] >= t->start[i]);
+    for (PetscInt k = t->start[i] + 1; k < t->start[i + 1] && good; k++)
+      good = (PetscBool)(t->column[k] > t->column[k - 1]);
+  }
+  HycoCheck(good, "%s: table/start is damaged", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -112,5 +169,6 @@ PetscErrorCode HycoTableLoad(HycoModel m, HycoH5 h)
   PetscCall(PetscFree(x));
   PetscCall(PetscFree(count));
   PetscCall(ierr);
+  if (HycoH5Has(h, "table/start")) PetscCall(LoadPattern(m, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -142,6 +142,7 @@ PetscErrorCode HycoTrainerTabulate(HycoModel m, const PetscBool reaches[])
   }
   if (!nodes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Try(m, n, entries, -1, &table, &holds)); /* while the model has none, it assembles */
+  if (holds) PetscCall(HycoTableKeepPattern(m, table));
   if (holds)
     m->table = table;
   else
