@@ -53,6 +53,7 @@ typedef struct {
 PetscErrorCode HycoModelLoad(const char path[], HycoModel *model);
 /* Frees; sets the handle to NULL; NULL-safe. */
 PetscErrorCode HycoModelDestroy(HycoModel *model);
+PetscErrorCode HycoModelGetType(HycoModel model, HycoModelType *type);
 /* The scene that the model carries. Borrowed. */
 PetscErrorCode HycoModelGetScene(HycoModel model, HycoScene *scene);
 

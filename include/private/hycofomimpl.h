@@ -29,9 +29,19 @@ struct _p_HycoFOM {
   /* the last solution on rank 0, in the file's order */
   PetscReal *u, *lambda, *sigma, *gap;
   PetscBool solved, sigma_ready;
+  /* U under given forces: its factor of K; residuals of the whole of (16); whether the last solution is one */
+  HycoSystem given_system;
+  HycoSolver given_solver;
+  Vec given_F;
+  HycoKKT given_kkt;
+  PetscBool given;
   HycoSummary summary;
 };
 
+/* K, F, B, D at mu, in the system. Collective. */
+PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);
+/* U and Lambda to rank 0, in the file's order. Collective. */
+PetscErrorCode HycoFOMGather(HycoFOM fom);
 /* Attaches the rigid motions to K; fails when nothing holds one of the free ones. Collective. */
 PetscErrorCode HycoFOMSetMotions(HycoFOM fom);
 /* Generalised forces F - B^T Lambda of the last solution (n_nodes x dim) on rank 0, zero on fixed unknowns. Collective.
