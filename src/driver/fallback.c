@@ -105,6 +105,7 @@ PetscErrorCode DriverSolveDisplacement(Fallback *f, HycoModel model, PetscInt n,
   PetscCall(HycoFOMSolveForces(f->fom, n, mu, Lambda));
   PetscCall(HycoFOMGetSummary(f->fom, &s));
   TakeDisplacement(&s, p);
+  p->estimated_error_u = p->estimated_error_u_full;
   if (s.reason > 0) p->reason = reason; /* the forces' */
   p->seconds.setup += s.seconds.setup;
   p->seconds.assemble += s.seconds.assemble;
