@@ -15,8 +15,8 @@ typedef struct {
   PetscInt r, n_columns, q; /* all modes above the noise; snapshots and responses, which they span; patterns */
   PetscReal *Q, *scale;     /* orthonormal patterns, m x q column major; column j of P is Q_j scale_j */
   PetscReal *C;             /* r x n_columns: V^T of the columns, the snapshots' first, then node by node */
-  PetscReal missed;         /* of sampled forces held out of the patterns, the largest part outside their span, by the
-                               displacement of the nearest snapshot */
+  PetscReal missed; /* of sampled forces held out of the patterns, what 95 % of them have outside the span, by the
+                       displacement of the nearest snapshot */
 } HycoResponses;
 
 struct _p_HycoTrainer {

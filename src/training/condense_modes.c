@@ -11,10 +11,12 @@
 #include <hycolcp.h>
 #include <hycotrainerimpl.h>
 
-#define SAMPLES        240 /* points where the forces are sampled */
+#define SAMPLES        480 /* points where the forces are sampled: half all over, half where contacts close or open */
+#define WAYS           16  /* on so many ways between points */
 #define LEAST_SAMPLES  16
 #define FREE_CONTACTS  500 /* beyond so many contacts fewer: the cost grows with their cube */
 #define HELD           4   /* one of so many samples is held out of the patterns, and judges them */
+#define SHARE          0.95
 #define MOST_RESPONSES 5e7 /* numbers of all responses: 400 MB */
 #define SMALL          1e-2
 
@@ -41,21 +43,34 @@ static PetscInt NextPrime(PetscInt n)
   }
 }
 
-/* Sample number `number` of what training has seen: half a step beyond its values, within the ranges. */
+static PetscInt Corners(HycoCondensed c)
+{
+  return 1 << PetscMin(c->dim, 5);
+}
+
+/* Sample number `number` of what training has seen, half a step beyond its values, within the ranges: the corners, then
+   points all over. */
 static void SamplePoint(HycoTrainer t, PetscInt number, PetscReal mu[])
 {
   const HycoCondensed c = t->condensed;
   PetscInt base = 1;
 
   for (PetscInt p = 0; p < c->dim; p++) {
-    PetscReal step = 0, lo = c->x[p][0], hi = c->x[p][c->n[p] - 1];
+    PetscReal step = 0, lo = c->x[p][0], hi = c->x[p][c->n[p] - 1], share = p < 5 ? number >> p & 1 : 0;
 
     base = NextPrime(base);
     for (PetscInt k = 1; k < c->n[p]; k++) step = PetscMax(step, c->x[p][k] - c->x[p][k - 1]);
     lo = PetscMin(lo, PetscMax(t->scene->lo[p], lo - step / 2));
     hi = PetscMax(hi, PetscMin(t->scene->hi[p], hi + step / 2));
-    mu[p] = lo + (hi - lo) * Halton(number, base);
+    if (number >= Corners(c)) share = Halton(number - Corners(c) + 1, base);
+    mu[p] = lo + (hi - lo) * share;
   }
+}
+
+/* Whether a sample stays out of the patterns, to judge them. */
+static PetscBool Held(HycoCondensed c, PetscInt number)
+{
+  return (PetscBool)(number >= Corners(c) && number % HELD == 0);
 }
 
 /* The node of the whole grid that is nearest. */
@@ -92,25 +107,60 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The samples to `used` (m x n_used, after the training forces) and `held` (m x n_held), and how far each of these
-   displaces (the nearest snapshot's norm, or a hundredth of the largest). */
-static PetscErrorCode SampleAll(HycoTrainer t, PetscInt n, PetscReal used[], PetscReal held[], PetscReal size[])
+/* The contacts that are active at one of two samples alone. */
+static PetscInt Differ(PetscInt m, const PetscReal a[], const PetscReal b[])
+{
+  PetscInt n = 0;
+
+  for (PetscInt i = 0; i < m; i++) n += (a[i] > 0) != (b[i] > 0);
+  return n;
+}
+
+/* The point of sample k: halfway between the two neighbours on a way whose active contacts differ most, and which are
+   then neighbours no more; where none differ, the next point all over. Forces are affine in the parameters of affine
+   kind as long as a set stays, so that sets are what the patterns need, and many may pass in a small part of a way. */
+static void PointBetween(HycoTrainer t, PetscInt k, PetscInt (*way)[3], PetscInt *n_ways, PetscReal mu[])
+{
+  const PetscInt dim = t->condensed->dim;
+  PetscInt best = 0;
+
+  for (PetscInt j = 1; j < *n_ways; j++) best = way[j][2] > way[best][2] ? j : best;
+  if (!*n_ways || !way[best][2]) {
+    SamplePoint(t, k, mu + k * dim);
+    return;
+  }
+  for (PetscInt p = 0; p < dim; p++) mu[k * dim + p] = (mu[way[best][0] * dim + p] + mu[way[best][1] * dim + p]) / 2;
+  way[*n_ways][0] = k;
+  way[(*n_ways)++][1] = way[best][1];
+  way[best][1] = k;
+  way[best][2] = 0; /* both are counted when the forces are there */
+}
+
+/* n samples: their points (n x dim) and forces (m x n). */
+static PetscErrorCode SampleAll(HycoTrainer t, PetscInt n, PetscReal mu[], PetscReal L[])
 {
   HycoCondensed c = t->condensed;
-  PetscReal mu[HYCO_MAX_PARAMETERS], largest = 0;
+  const PetscInt dim = c->dim, m = c->m;
+  PetscInt(*way)[3], n_ways = 0;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < t->n_s; k++) largest = PetscMax(largest, t->U_norm[k]);
-  PetscCall(PetscArraycpy(used, t->Lambda, (size_t)c->m * (size_t)t->n_s));
-  used += (size_t)c->m * (size_t)t->n_s;
-  for (PetscInt k = 1; k <= n; k++) {
-    PetscReal **to = k % HELD ? &used : &held;
-
-    SamplePoint(t, k, mu);
-    PetscCall(SampleForces(c, mu, *to));
-    *to += c->m;
-    if (k % HELD == 0) *size++ = PetscMax(t->U_norm[c->sample[NearestNode(c, mu)]], SMALL * largest);
+  PetscCall(PetscCalloc1(n + WAYS, &way));
+  for (PetscInt k = 0; k < n; k++) {
+    if (k < n / 2)
+      SamplePoint(t, k, mu + k * dim);
+    else
+      PointBetween(t, k, way, &n_ways, mu);
+    PetscCall(SampleForces(c, mu + k * dim, L + (size_t)k * (size_t)m));
+    if (k && k <= WAYS && k < n / 2) {
+      way[n_ways][0] = k - 1;
+      way[n_ways++][1] = k;
+    }
+    for (PetscInt j = 0; j < n_ways; j++) {
+      if (way[j][0] == k || way[j][1] == k)
+        way[j][2] = Differ(m, L + (size_t)way[j][0] * (size_t)m, L + (size_t)way[j][1] * (size_t)m);
+    }
   }
+  PetscCall(PetscFree(way));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -158,27 +208,49 @@ static PetscErrorCode Decompose(HycoTrainer t, PetscInt n, PetscReal L[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What the held samples miss of the patterns, over the displacement of the nearest snapshot or a hundredth of the
+   largest: no less than SHARE of them do. */
+static PetscErrorCode JudgePatterns(HycoTrainer t, PetscInt n, const PetscReal mu[], PetscReal L[])
+{
+  HycoCondensed c = t->condensed;
+  PetscReal largest = 0, *missed;
+  PetscInt n_held = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &missed));
+  for (PetscInt k = 0; k < t->n_s; k++) largest = PetscMax(largest, t->U_norm[k]);
+  for (PetscInt k = 0; largest > 0 && k < n; k++) {
+    const PetscReal near = t->U_norm[c->sample[NearestNode(c, mu + k * c->dim)]];
+
+    if (!Held(c, k)) continue;
+    missed[n_held++] = Missed(&t->responses, c->m, L + (size_t)k * (size_t)c->m) / PetscMax(near, SMALL * largest);
+  }
+  PetscCall(PetscSortReal(n_held, missed));
+  t->responses.missed = n_held ? missed[(PetscInt)(SHARE * (PetscReal)(n_held - 1))] : 0;
+  PetscCall(PetscFree(missed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode FindPatterns(HycoTrainer t)
 {
-  const PetscInt m = t->condensed->m;
+  HycoCondensed c = t->condensed;
+  const size_t m = (size_t)c->m;
   const PetscReal share = PetscPowReal((PetscReal)FREE_CONTACTS / (PetscReal)m, 3);
-  const PetscInt n = m <= FREE_CONTACTS ? SAMPLES : PetscMax(LEAST_SAMPLES, (PetscInt)(share * SAMPLES));
-  PetscReal *used, *held, *size;
+  const PetscInt n = c->m <= FREE_CONTACTS ? SAMPLES : PetscMax(LEAST_SAMPLES, (PetscInt)(share * SAMPLES));
+  PetscReal *mu, *L, *used;
+  PetscInt n_used = t->n_s;
 
   PetscFunctionBegin;
   PetscCall(HycoTrainerFillFields(t, PETSC_FALSE));
-  PetscCall(PetscMalloc1(n / HELD, &size));
-  PetscCall(PetscMalloc1((size_t)m * (size_t)(t->n_s + n - n / HELD), &used));
-  PetscCall(PetscMalloc1((size_t)m * (size_t)(n / HELD), &held));
-  PetscCall(SampleAll(t, n, used, held, size));
-  PetscCall(Decompose(t, t->n_s + n - n / HELD, used));
-  for (PetscInt k = 0; k < n / HELD; k++) {
-    if (size[k] > 0)
-      t->responses.missed = PetscMax(t->responses.missed, Missed(&t->responses, m, held + k * m) / size[k]);
+  PetscCall(PetscMalloc3(n * c->dim, &mu, m * (size_t)n, &L, m * (size_t)(t->n_s + n), &used));
+  PetscCall(SampleAll(t, n, mu, L));
+  PetscCall(PetscArraycpy(used, t->Lambda, m * (size_t)t->n_s));
+  for (PetscInt k = 0; k < n; k++) {
+    if (!Held(c, k)) PetscCall(PetscArraycpy(used + m * (size_t)(n_used++), L + m * (size_t)k, m));
   }
-  PetscCall(PetscFree(size));
-  PetscCall(PetscFree(used));
-  PetscCall(PetscFree(held));
+  PetscCall(Decompose(t, n_used, used));
+  PetscCall(JudgePatterns(t, n, mu, L));
+  PetscCall(PetscFree3(mu, L, used));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
