@@ -14,7 +14,7 @@
 #define SAMPLES        480 /* points where the forces are sampled: half all over, half where contacts close or open */
 #define WAYS           16  /* on so many ways between points */
 #define LEAST_SAMPLES  16
-#define FREE_CONTACTS  500 /* beyond so many contacts fewer: the cost grows with their cube */
+#define FREE_CONTACTS  700 /* beyond so many contacts fewer, by the square: a sample's cost grows with it, at least */
 #define HELD           4   /* one of so many samples is held out of the patterns, and judges them */
 #define SHARE          0.95
 #define MOST_RESPONSES 5e7 /* numbers of all responses: 400 MB */
@@ -107,12 +107,21 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts that are active at one of two samples alone. */
+static PetscReal Largest(PetscInt m, const PetscReal L[])
+{
+  PetscReal largest = 0;
+
+  for (PetscInt i = 0; i < m; i++) largest = PetscMax(largest, L[i]);
+  return largest;
+}
+
+/* The contacts that are active, beyond round-off, at one of two samples alone. */
 static PetscInt Differ(PetscInt m, const PetscReal a[], const PetscReal b[])
 {
+  const PetscReal least[2] = {1e-8 * Largest(m, a), 1e-8 * Largest(m, b)};
   PetscInt n = 0;
 
-  for (PetscInt i = 0; i < m; i++) n += (a[i] > 0) != (b[i] > 0);
+  for (PetscInt i = 0; i < m; i++) n += (a[i] > least[0]) != (b[i] > least[1]);
   return n;
 }
 
@@ -235,7 +244,7 @@ static PetscErrorCode FindPatterns(HycoTrainer t)
 {
   HycoCondensed c = t->condensed;
   const size_t m = (size_t)c->m;
-  const PetscReal share = PetscPowReal((PetscReal)FREE_CONTACTS / (PetscReal)m, 3);
+  const PetscReal share = PetscSqr((PetscReal)FREE_CONTACTS / (PetscReal)m);
   const PetscInt n = c->m <= FREE_CONTACTS ? SAMPLES : PetscMax(LEAST_SAMPLES, (PetscInt)(share * SAMPLES));
   PetscReal *mu, *L, *used;
   PetscInt n_used = t->n_s;
