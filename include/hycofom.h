@@ -43,6 +43,14 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM fom, HycoSolver *solver);
 /* Assembles what depends on the parameters that changed and solves (16) at mu (length n). Collective. Fails outside
    the ranges; not converging is no error: see HycoSummary.reason. */
 PetscErrorCode HycoFOMSolve(HycoFOM fom, PetscInt n, const PetscReal mu[]);
+/*
+  Solves K U = F - B^T Lambda at mu (length n) with the contact forces of somebody else: Lambda (n_contacts, read on
+  rank 0, in the order of HycoFOMGetSolution's), as a condensed model predicts them. One factor of K, kept while it is.
+  What is asked for afterwards is as after HycoFOMSolve(), with Lambda as given; the summary's residuals are those of
+  all of (16), penetration and complementarity as far as Lambda is off, its reason that of the linear solve alone.
+  Collective.
+*/
+PetscErrorCode HycoFOMSolveForces(HycoFOM fom, PetscInt n, const PetscReal mu[], const PetscReal Lambda[]);
 /* The system of the last solve (K with the fixed unknowns decoupled, F with their lifting). Borrowed. */
 PetscErrorCode HycoFOMGetSystem(HycoFOM fom, HycoSystem *system);
 /* What the last solution amounts to. Collective. */

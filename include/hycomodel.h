@@ -31,6 +31,7 @@ typedef struct {
      a tenth of the largest in training counts as that tenth), calibrated at training; < 0: the model has none, or the
      solve did not converge. */
   PetscReal estimated_error_u, estimated_error_lambda;
+  PetscReal estimated_error_u_full; /* condensed: of u by HycoFOMSolveForces() with these forces; else < 0 */
   PetscReal beyond; /* how far the parameters lie outside what training has seen: the most, as a share of the range */
   PetscReal interpolation_error; /* condensed: of the forces, relative, one training value left out, more outside
                                     the values; else 0 */
@@ -53,6 +54,7 @@ typedef struct {
 PetscErrorCode HycoModelLoad(const char path[], HycoModel *model);
 /* Frees; sets the handle to NULL; NULL-safe. */
 PetscErrorCode HycoModelDestroy(HycoModel *model);
+PetscErrorCode HycoModelGetType(HycoModel model, HycoModelType *type);
 /* The scene that the model carries. Borrowed. */
 PetscErrorCode HycoModelGetScene(HycoModel model, HycoScene *scene);
 

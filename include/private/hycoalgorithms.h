@@ -14,6 +14,9 @@
 PetscErrorCode HycoPOD(Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
                        PetscReal sigma[]);
 
+/* The l of k singular values that HycoPOD() takes: the tail is summed, so that tol can be tiny. */
+PetscInt HycoPODRank(PetscInt k, const PetscReal sigma[], PetscReal tol, PetscReal noise, PetscInt max_modes);
+
 /*
   POD from a Gram matrix G = S^T M S (n_s x n_s, column major, on every rank): coefficients W (n_s x l, column major,
   the caller frees) such that S W is orthonormal in M. Singular values below 1e-7 of the first are out of its reach. Not

@@ -24,7 +24,9 @@ struct _n_HycoCondensed {
   HycoGridField field[HYCO_N_FIELDS]; /* G: the columns of its lower triangle, m (m + 1) / 2; H: l x m row major */
   PetscReal *bounds;   /* by node of G: lower and upper of it by the middle node's G; 0, 0: none are known */
   PetscReal *Lambda;   /* m x nodes of the whole grid: training forces */
-  PetscReal errors[3]; /* one node left out: G, g, forces; relative */
+  PetscReal errors[3]; /* one value left out: G, g, forces; relative */
+  /* the same: the displacement by the modes, and what the forces' error alone makes of it; < 0: an older file */
+  PetscReal errors_u[2];
   /* training only: the error of the forces by parameter; the sample of each node of the whole grid */
   PetscReal by_parameter[HYCO_MAX_PARAMETERS];
   PetscBool target_met; /* the points were chosen, and the target was reached */
@@ -52,6 +54,8 @@ PetscErrorCode HycoCondensedSave(HycoModel model, HycoH5 file);
 PetscErrorCode HycoCondensedLoad(HycoModel model, HycoH5 file);
 /* The bounds of G at its nodes. */
 PetscErrorCode HycoCondensedBound(HycoCondensed condensed);
+/* The node of a field's grid that node k of the whole grid lies on. */
+PetscInt HycoCondensedNode(HycoCondensed condensed, const HycoGridField *field, PetscInt k);
 /* M = G(mu), and whether it is positive definite beyond round-off (only semidefinite counts: contacts may repeat). */
 PetscErrorCode HycoCondensedFlexibility(HycoCondensed condensed, const PetscReal mu[], PetscInt axis, PetscInt skip,
                                         PetscBool *definite);

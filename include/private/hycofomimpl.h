@@ -29,9 +29,19 @@ struct _p_HycoFOM {
   /* the last solution on rank 0, in the file's order */
   PetscReal *u, *lambda, *sigma, *gap;
   PetscBool solved, sigma_ready;
+  /* U under given forces: its factor of K; residuals of the whole of (16); whether the last solution is one */
+  HycoSystem given_system;
+  HycoSolver given_solver;
+  Vec given_F;
+  HycoKKT given_kkt;
+  PetscBool given;
   HycoSummary summary;
 };
 
+/* K, F, B, D at mu, in the system. Collective. */
+PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);
+/* U and Lambda to rank 0, in the file's order. Collective. */
+PetscErrorCode HycoFOMGather(HycoFOM fom);
 /* Attaches the rigid motions to K; fails when nothing holds one of the free ones. Collective. */
 PetscErrorCode HycoFOMSetMotions(HycoFOM fom);
 /* Generalised forces F - B^T Lambda of the last solution (n_nodes x dim) on rank 0, zero on fixed unknowns. Collective.
@@ -42,10 +52,11 @@ PetscErrorCode HycoFOMEnergy(HycoFOM fom, HycoSummary *summary);
 
 /*
   What condensing the model on its forces takes, at mu: on rank 0, G = B K^-1 B^T as the columns of its lower triangle
-  (m (m + 1) / 2, unless NULL) and H = V^T K^-1 B^T (l x m row major) for l modes V (n_nodes * dim x l row major in the
-  file's order, read on rank 0, zero on fixed unknowns). Solves at mu in the dual form on the way. Collective.
+  (m (m + 1) / 2). Solves at mu in the dual form on the way. Collective.
 */
-PetscErrorCode HycoFOMFlexibility(HycoFOM fom, const PetscReal mu[], PetscInt l, const PetscReal V[], PetscReal G[],
-                                  PetscReal H[]);
+PetscErrorCode HycoFOMFlexibility(HycoFOM fom, const PetscReal mu[], PetscReal G[]);
+/* How the displacement answers contact forces at mu: X = K^-1 B^T P for q patterns P (n_contacts x q column major, read
+   on rank 0), n_dof x q row major in the file's order, filled on rank 0. One factor of K alone. Collective. */
+PetscErrorCode HycoFOMResponses(HycoFOM fom, const PetscReal mu[], PetscInt q, const PetscReal P[], PetscReal X[]);
 
 #endif

@@ -31,6 +31,8 @@ PetscErrorCode HycoDirectFactor(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscRe
 PetscErrorCode HycoDirectReduce(HycoDirect direct, Vec F, const PetscReal D[], PetscReal g[]);
 /* x = K^-1 (F - Bt L) with the F of the last HycoDirectReduce(); L (length m) is read on rank 0. */
 PetscErrorCode HycoDirectExpand(HycoDirect direct, const PetscReal L[], Vec x);
+/* x[j] = K^-1 r[j] of k right-hand sides at once, which share the reading of the factor; a K without kernel. */
+PetscErrorCode HycoDirectSolveMany(HycoDirect direct, PetscInt k, Vec r[], Vec x[]);
 /* x = K^-1 r */
 PetscErrorCode HycoDirectSolve(HycoDirect direct, Vec r, Vec x);
 

@@ -101,8 +101,8 @@ PetscErrorCode HycoPrimalPossible(HycoSystem system, PetscBool *possible);
 /* S = B K^-1 Bt of the last solve, which was in the dual form with a factor of a regular K: m x m column major, the
    same on every rank. Borrowed until a matrix changes. Collective. */
 PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[]);
-/* x = K^-1 r by that factor. Collective. */
-PetscErrorCode HycoSolverApplyInverse(HycoSolver s, Vec r, Vec x);
+/* x[j] = K^-1 r[j] by the factor of the last solve, k of them. Collective. */
+PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[]);
 
 /* The dual form by TAO with S = B K^-1 Bt never formed (form dual_free). */
 PetscErrorCode HycoSolveDualFree(HycoSolver s, Vec x, Vec L, PetscBool *solved);

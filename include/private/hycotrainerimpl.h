@@ -9,6 +9,16 @@
 
 enum { HYCO_SEED_DISPLACEMENT, HYCO_SEED_STRESS, HYCO_SEED_FORCE, HYCO_SEED_DUAL, HYCO_N_SEEDS };
 
+/* What the modes of a condensed model are made of (condense_modes.c): snapshots, and responses K^-1 B^T P to patterns
+   of forces at each node of the stiffness. Rank 0, but for r, q, Q and scale. */
+typedef struct {
+  PetscInt r, n_columns, q; /* all modes above the noise; snapshots and responses, which they span; patterns */
+  PetscReal *Q, *scale;     /* orthonormal patterns, m x q column major; column j of P is Q_j scale_j */
+  PetscReal *C;             /* r x n_columns: V^T of the columns, the snapshots' first, then node by node */
+  PetscReal missed; /* of sampled forces held out of the patterns, what 95 % of them have outside the span, by the
+                       displacement of the nearest snapshot */
+} HycoResponses;
+
 struct _p_HycoTrainer {
   MPI_Comm comm;
   PetscMPIInt rank;
@@ -57,6 +67,7 @@ struct _p_HycoTrainer {
   PetscReal *U_norm;         /* n_s: of the whole snapshot */
   PetscInt n_s;
   unsigned long long fingerprint;
+  HycoResponses responses;
   HycoCondensed condensed; /* of a condensed model under training; the grid on every rank, the fields on rank 0 */
   PetscBool *grown;        /* rank 0, greedy: cells of the RIDs so far; else NULL */
 };
@@ -70,6 +81,11 @@ PetscErrorCode HycoTrainerOpen(HycoTrainer t, HycoSamples samples, const char pa
 /* From the bases: the RID, the model on it, its full-order displacements, the file; what it gave, on every rank.
    `useful`: refuse a model that misses its own training solutions. Collective. */
 PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path[], HycoTraining *report);
+/* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
+   rows, column major, on every rank; a dense matrix on rank 0, row or column major (the caller frees). Collective. */
+PetscErrorCode HycoTrainerGetDisplacements(HycoTrainer t, HycoSnapshots store, Mat *S);
+PetscErrorCode HycoTrainerMultiply(HycoTrainer t, Mat X, Mat Y, PetscReal product[]);
+PetscErrorCode HycoTrainerToRoot(HycoTrainer t, Mat S, PetscBool row_major, PetscReal **out);
 /* The bases of all snapshots in the store and the points that seed the RID. Collective. */
 PetscErrorCode HycoTrainerReduce(HycoTrainer t, HycoSnapshots store);
 /* Chooses the full-order displacements of a model under training; numbers[] of the model are filled. Rank 0. */
@@ -90,17 +106,24 @@ PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel model);
 /* Calibrates the estimated errors of the hybrid model at `path` and writes it once more: n_held held-out predictions
    (0: too few solutions, or a fold gave no model). The bases are a fold's afterwards. Collective. */
 PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const char path[], PetscInt *n_held);
-/* A condensed model: checks that scene and samples are fit for one, before hours of work; after the modes, G and H at
-   all their nodes (`modes` false: G alone), factoring where no file has them. Collective. */
+/* A condensed model: checks that scene and samples are fit for one, before hours of work; G at all its nodes, factoring
+   where no file has it; responses to q patterns P of forces (m x q column major, on every rank) at these nodes, into
+   the columns of S (n_dof x ..., dense) from `first` on. Collective. */
 PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t);
-PetscErrorCode HycoTrainerFlexibility(HycoTrainer t, HycoSnapshots store, PetscBool modes);
+PetscErrorCode HycoTrainerFlexibility(HycoTrainer t, HycoSnapshots store);
+PetscErrorCode HycoTrainerResponses(HycoTrainer t, HycoSnapshots store, PetscInt q, const PetscReal P[], Mat S,
+                                    PetscInt first);
+/* Its modes, once G is there: l, sigma, V_whole, VtU anew, and `responses`. Collective. */
+PetscErrorCode HycoTrainerFindModes(HycoTrainer t, HycoSnapshots store);
 /* The points of a condensed training that names none: two values of each parameter, to begin with; after
    HycoTrainerBeginCondensed(), solving and factoring on the way, those that meet -hyco_condensed_tol, in *samples (the
    caller's), the bases made. Collective. */
 PetscErrorCode HycoTrainerStartPoints(HycoTrainer t, HycoSamples *samples);
 PetscErrorCode HycoTrainerChoosePoints(HycoTrainer t, HycoSnapshots store, HycoSamples *samples);
-/* Its fields, degrees and errors; the same, handed to the model, with numbers[]. Rank 0. */
-PetscErrorCode HycoTrainerFillFields(HycoTrainer t);
+/* Its fields and degrees, of all modes or none; the errors where values are left out; all of it, handed to the model,
+   with numbers[]. Rank 0. */
+PetscErrorCode HycoTrainerFillFields(HycoTrainer t, PetscBool modes);
+PetscErrorCode HycoTrainerLeaveOut(HycoTrainer t);
 PetscErrorCode HycoTrainerCondense(HycoTrainer t, HycoModel model);
 /* Fills numbers[]: condition and mean training errors of the model as it stands. Rank 0. */
 PetscErrorCode HycoTrainerJudge(HycoTrainer t, HycoModel model);

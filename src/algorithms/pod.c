@@ -29,8 +29,7 @@ static PetscErrorCode ThinSVD(PetscInt m, PetscInt n, PetscReal A[], PetscReal s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (18): the smallest l with energy >= 1 - tol, above the noise floor. The tail is summed, so that tol can be tiny. */
-static PetscInt ChooseRank(PetscInt k, const PetscReal s[], PetscReal tol, PetscReal noise, PetscInt max_modes)
+PetscInt HycoPODRank(PetscInt k, const PetscReal s[], PetscReal tol, PetscReal noise, PetscInt max_modes)
 {
   PetscReal total = 0, tail = 0;
   PetscInt l = k;
@@ -74,7 +73,7 @@ static PetscErrorCode SmallPOD(Mat S, PetscReal tol, PetscReal noise, PetscInt m
   PetscCall(PetscMalloc2(N * n, &A, N * PetscMin(N, n), &U));
   PetscCall(GatherDense(S, A));
   PetscCall(ThinSVD(N, n, A, sigma, U));
-  *l = ChooseRank(PetscMin(N, n), sigma, tol, noise, max_modes);
+  *l = HycoPODRank(PetscMin(N, n), sigma, tol, noise, max_modes);
   if (*l) {
     PetscCall(MatGetOwnershipRange(S, &lo, &hi));
     PetscCall(MatCreateDense(PetscObjectComm((PetscObject)S), hi - lo, PETSC_DECIDE, N, *l, NULL, V));
@@ -112,7 +111,7 @@ static PetscErrorCode TallPOD(Mat S, PetscReal tol, PetscReal noise, PetscInt ma
   }
   PetscCall(MatDenseRestoreArray(R, &r));
   PetscCall(ThinSVD(n, n, A, sigma, U));
-  *l = ChooseRank(n, sigma, tol, noise, max_modes);
+  *l = HycoPODRank(n, sigma, tol, noise, max_modes);
   if (*l) {
     Mat W;
 
@@ -197,7 +196,7 @@ PetscErrorCode HycoPODGram(PetscInt n, const PetscReal G[], PetscReal tol, Petsc
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB,
              "the eigenvalues of the Gram matrix did not converge (LAPACK syev: %d)", (int)info);
   for (PetscInt j = 0; j < n; j++) sigma[j] = PetscSqrtReal(PetscMax(values[n - 1 - j], 0));
-  *l = ChooseRank(n, sigma, tol, PetscMax(noise, 1e-7), 0);
+  *l = HycoPODRank(n, sigma, tol, PetscMax(noise, 1e-7), 0);
   PetscCall(PetscMalloc1(n * *l, W));
   for (PetscInt j = 0; j < *l; j++) {
     for (PetscInt i = 0; i < n; i++) (*W)[j * n + i] = A[(n - 1 - j) * n + i] / sigma[j];

@@ -64,6 +64,8 @@ static const HycoOption option_table[] = {
     {"hyco_greedy_keep", "<bool>", "false", "train -greedy keeps each iteration's model beside the snapshots"},
     {"hyco_fallback", "<bool>", "false",
      "predict solves full order on -scene where the reduced solve fails or its estimated error is above a -target_..."},
+    {"hyco_full_displacement", "<bool>", "false",
+     "predict, condensed: displacements and stresses by one full solve on -scene with the predicted forces"},
     {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
     {"hyco_reconstruct_solver", "<auto|nnls|tao>", "auto",
      "of (41): Lawson and Hanson's active set, or TAO's bnls; auto: TAO where the active set stops short"},

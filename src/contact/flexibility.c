@@ -18,12 +18,16 @@ PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolverApplyInverse(HycoSolver s, Vec r, Vec x)
+PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[])
 {
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
+  PetscCheck(!s->iterative, s->comm, PETSC_ERR_USER,
+             "a condensed model needs a factor of the stiffness, and the solver chose iterations%s: give more memory "
+             "(-hyco_memory), or -hyco_linear direct",
+             s->why_iterative);
   PetscCheck(s->direct && s->condensed.K && !s->p, s->comm, PETSC_ERR_ORDER,
              "call HycoSolverSolve() in the dual form on a regular, sparse K first");
-  PetscCall(HycoDirectSolve(s->direct, r, x));
+  PetscCall(HycoDirectSolveMany(s->direct, k, r, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -98,13 +98,13 @@ PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char wor
 PetscErrorCode DriverReadGreedy(HycoScene scene, HycoTrainer trainer, HycoSamples *training, GreedyLog *log);
 void DriverReportGreedy(cJSON *json, const GreedyLog *log);
 
-/* -- fallback.c: predict -hyco_fallback -- */
+/* -- fallback.c: predict with the scene at hand -- */
 
-/* When predict solves full order instead, and with what. */
+/* When predict solves full order instead, whether it solves for the displacement alone, and with what. */
 typedef struct {
-  PetscBool on;
+  PetscBool on, displacement;
   PetscReal target_u, target_lambda; /* 0: none */
-  HycoScene scene;                   /* NULL unless on */
+  HycoScene scene;                   /* NULL unless on or displacement */
   HycoFOM fom;                       /* made by the first solve */
   PetscReal strain_energy;           /* of the last */
 } Fallback;
@@ -118,6 +118,11 @@ PetscErrorCode DriverEndFallback(Fallback *fallback);
 void DriverWantsFullOrder(const Fallback *fallback, const HycoPrediction *p, char why[DRIVER_LINE]);
 /* Solves at mu (length n); the results take the prediction's place, u over the whole mesh. Collective. */
 PetscErrorCode DriverSolveFullOrder(Fallback *fallback, PetscInt n, const PetscReal mu[], HycoPrediction *p);
+
+/* One full solve at mu (length n) with the forces of the condensed model's last prediction, held on rank 0: u over the
+   whole mesh takes the place of the prediction's, residuals of (16) that of its own. Collective. */
+PetscErrorCode DriverSolveDisplacement(Fallback *fallback, HycoModel model, PetscInt n, const PetscReal mu[],
+                                       HycoPrediction *p);
 
 /* -- targets.c: train -target_u ... -- */
 

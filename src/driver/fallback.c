@@ -1,4 +1,5 @@
-/* hyco predict -hyco_fallback: full order where the reduced model cannot be trusted as far as is asked. */
+/* hyco predict with the scene at hand: -hyco_fallback, full order where the reduced model cannot be trusted as far as
+   is asked; -hyco_full_displacement, one full solve with a condensed model's forces. */
 #include "driver.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,20 +23,31 @@ PetscErrorCode DriverReadFallback(HycoModel model, PetscBool extrapolate, Fallba
 {
   HycoScene scene;
   PetscOptions options;
+  HycoModelType type;
   char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
   PetscCall(HycoModelGetScene(model, &scene));
   PetscCall(HycoSceneGetOptions(scene, &options));
   PetscCall(HycoOptionsBool(options, "hyco_fallback", &f->on));
+  PetscCall(HycoOptionsBool(options, "hyco_full_displacement", &f->displacement));
+  PetscCall(HycoModelGetType(model, &type));
+  HycoCheck(!f->displacement || type == HYCO_MODEL_CONDENSED,
+            "-hyco_full_displacement takes the contact forces of a condensed model, and this one is %s: its forces are "
+            "not good enough for that; take -hyco_fallback",
+            HycoModelTypes[type]);
   PetscCall(DriverReadTarget("target_u", &f->target_u));
   PetscCall(DriverReadTarget("target_lambda", &f->target_lambda));
   PetscCall(DriverGet("scene", PETSC_FALSE, path));
   HycoCheck(f->on || (!(f->target_u > 0) && !(f->target_lambda > 0)),
             "-target_u and -target_lambda say when hyco predict solves full order instead: give -hyco_fallback too");
-  HycoCheck(f->on || !path[0], "hyco predict needs no -scene but with -hyco_fallback, which solves full order on it");
-  if (!f->on) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(path[0], "-hyco_fallback solves full order where the reduced model is not enough: give its -scene too");
+  HycoCheck(f->on || f->displacement || !path[0],
+            "hyco predict needs no -scene but with -hyco_fallback, which solves full order on it%s",
+            type == HYCO_MODEL_CONDENSED ? ", or -hyco_full_displacement" : "");
+  if (!f->on && !f->displacement) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(path[0], "%s: give its -scene too",
+            f->on ? "-hyco_fallback solves full order where the reduced model is not enough"
+                  : "-hyco_full_displacement solves on the whole mesh with the predicted forces");
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &f->scene));
   PetscCall(HycoModelCheckScene(model, f->scene));
   PetscCall(HycoSceneSetExtrapolate(f->scene, extrapolate));
@@ -69,6 +81,42 @@ void DriverWantsFullOrder(const Fallback *f, const HycoPrediction *p, char why[D
              (double)p->estimated_error_lambda, (double)f->target_lambda);
 }
 
+/* What the summary says of the displacement, over the whole mesh. */
+static void TakeDisplacement(Fallback *f, const HycoSummary *s, HycoPrediction *p)
+{
+  p->reason = s->reason;
+  p->kkt = s->kkt;
+  p->u_norm2 = s->u_norm2;
+  f->strain_energy = s->strain_energy;
+  for (PetscInt c = 0; c < 3; c++) {
+    p->u_min[c] = s->u_min[c];
+    p->u_max[c] = s->u_max[c];
+  }
+}
+
+PetscErrorCode DriverSolveDisplacement(Fallback *f, HycoModel model, PetscInt n, const PetscReal mu[],
+                                       HycoPrediction *p)
+{
+  const PetscReal *Lambda = NULL;
+  const HycoReason reason = p->reason;
+  HycoSummary s;
+
+  PetscFunctionBegin;
+  HycoOnRoot(PETSC_COMM_WORLD, HycoModelGetLambda(model, NULL, &Lambda, NULL, NULL));
+  if (!f->fom) PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, f->scene, &f->fom));
+  PetscCall(HycoFOMSolveForces(f->fom, n, mu, Lambda));
+  PetscCall(HycoFOMGetSummary(f->fom, &s));
+  TakeDisplacement(f, &s, p);
+  p->estimated_error_u = p->estimated_error_u_full;
+  if (s.reason > 0) p->reason = reason; /* the forces' */
+  p->seconds.setup += s.seconds.setup;
+  p->seconds.assemble += s.seconds.assemble;
+  p->seconds.factor += s.seconds.factor;
+  p->seconds.solve += s.seconds.solve;
+  p->seconds.total += s.seconds.total;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode DriverSolveFullOrder(Fallback *f, PetscInt n, const PetscReal mu[], HycoPrediction *p)
 {
   HycoSummary s;
@@ -82,8 +130,7 @@ PetscErrorCode DriverSolveFullOrder(Fallback *f, PetscInt n, const PetscReal mu[
   PetscCall(HycoFOMGetSolver(f->fom, &solver));
   PetscCall(HycoSolverGetMethod(solver, &method));
   PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
-  p->reason = s.reason;
-  p->kkt = s.kkt;
+  TakeDisplacement(f, &s, p);
   p->iterations = s.iterations;
   p->n_active = p->n_rid_active = s.n_active;
   p->n_dof = p->n_fe_dofs = s.n_dof;
@@ -92,13 +139,7 @@ PetscErrorCode DriverSolveFullOrder(Fallback *f, PetscInt n, const PetscReal mu[
   p->total_contact_force = s.total_contact_force;
   p->lambda_max = s.lambda_max;
   p->lambda_norm2 = s.lambda_norm2;
-  p->u_norm2 = s.u_norm2;
-  f->strain_energy = s.strain_energy;
   p->covered_force = 1;
-  for (PetscInt c = 0; c < 3; c++) {
-    p->u_min[c] = s.u_min[c];
-    p->u_max[c] = s.u_max[c];
-  }
   p->seconds = s.seconds;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

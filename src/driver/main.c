@@ -22,7 +22,7 @@ const Command commands[] = {
      "hyco_monitor",
      "hyco predict -model M.h5 -mu V,V,... [-output F.xdmf] [-report R.json]",
      "solve the reduced model, for one point or a set (-table T.csv), and estimate its errors; reads only the model "
-     "file, but with -hyco_fallback -scene FOLDER"},
+     "file, but with -hyco_fallback or -hyco_full_displacement, and -scene FOLDER"},
     {"compare", CommandCompare, "scene model mu mu_ grid grid_type values_ points report table",
      "hyco compare -scene FOLDER -model M.h5 -mu V,V,... | -grid N,N,... [-report R.json] [-table T.csv]",
      "errors and speed-up of the reduced model against full order over a set of points"},

@@ -48,8 +48,9 @@ static void ReportRID(cJSON *json, const HycoPrediction *p)
   cJSON_AddNumberToObject(json, "rid_active", p->n_rid_active);
 }
 
+/* fallback: why it was solved full order; "": it was not. whole: u is that of the whole mesh. */
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, PetscReal energy,
-                             const char fallback[])
+                             const char fallback[], PetscBool whole)
 {
   cJSON *json;
 
@@ -70,14 +71,17 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddNumberToObject(json, "total_contact_force", p->total_contact_force);
   cJSON_AddNumberToObject(json, "lambda_max", p->lambda_max);
   cJSON_AddNumberToObject(json, "lambda_norm2", p->lambda_norm2);
-  cJSON_AddNumberToObject(json, fallback[0] ? "u_norm2" : "rid_u_norm2", p->u_norm2);
-  ReportVector(json, fallback[0] ? "u_min" : "rid_u_min", p->dim, p->u_min);
-  ReportVector(json, fallback[0] ? "u_max" : "rid_u_max", p->dim, p->u_max);
-  cJSON_AddNumberToObject(json, fallback[0] ? "strain_energy" : "rid_strain_energy", energy);
+  cJSON_AddNumberToObject(json, whole ? "u_norm2" : "rid_u_norm2", p->u_norm2);
+  ReportVector(json, whole ? "u_min" : "rid_u_min", p->dim, p->u_min);
+  ReportVector(json, whole ? "u_max" : "rid_u_max", p->dim, p->u_max);
+  cJSON_AddNumberToObject(json, whole ? "strain_energy" : "rid_strain_energy", energy);
   ReportTrust(json, p);
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
-  if (p->type == HYCO_MODEL_CONDENSED) cJSON_AddNumberToObject(json, "interpolation_error", p->interpolation_error);
+  if (p->type == HYCO_MODEL_CONDENSED) {
+    cJSON_AddNumberToObject(json, "interpolation_error", p->interpolation_error);
+    cJSON_AddBoolToObject(json, "full_displacement", whole && !fallback[0]);
+  }
   ReportKKT(json, &p->kkt);
   ReportSeconds(json, &p->seconds);
   PetscCall(ReportWrite(&json));
@@ -100,7 +104,7 @@ static PetscErrorCode SayReduced(const HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One point: rank 0 predicts, the others wait; all solve full order where the fallback says so. */
+/* One point: rank 0 predicts, the others wait; all solve full order where the fallback says so, or with its forces. */
 static PetscErrorCode One(HycoModel model, HycoScene scene, Fallback *fallback, const char output[])
 {
   HycoPrediction p = {0};
@@ -119,13 +123,18 @@ static PetscErrorCode One(HycoModel model, HycoScene scene, Fallback *fallback, 
   if (why[0]) {
     PetscCall(DriverSolveFullOrder(fallback, n, mu, &p));
     PetscCall(Say("FULL ORDER instead of the reduced model: %s\n", why));
-  } else
+  } else {
     PetscCall(SayReduced(&p));
+    if (fallback->displacement) {
+      PetscCall(DriverSolveDisplacement(fallback, model, n, mu, &p));
+      PetscCall(Say("one full solve with these forces: displacement of the whole mesh, residuals of full order\n"));
+    }
+  }
   PetscCall(DriverCheckLeft());
   HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", HycoReasonName(p.reason),
             (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
             (double)p.kkt.complementarity);
-  if (output[0] && why[0])
+  if (output[0] && (why[0] || fallback->displacement))
     PetscCall(HycoFOMWrite(fallback->fom, output));
   else if (output[0])
     HycoOnRoot(PETSC_COMM_WORLD, HycoModelWrite(model, output));
@@ -138,11 +147,11 @@ static PetscErrorCode One(HycoModel model, HycoScene scene, Fallback *fallback, 
                 (double)p.kkt.complementarity));
   if (!why[0]) PetscCall(SayTrust(&p));
   PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
-  if (why[0])
+  if (why[0] || fallback->displacement)
     energy = fallback->strain_energy;
   else
     HycoOnRoot(PETSC_COMM_WORLD, HycoModelGetStrainEnergy(model, &energy));
-  PetscCall(Report(scene, mu, &p, energy, why));
+  PetscCall(Report(scene, mu, &p, energy, why, (PetscBool)(why[0] || fallback->displacement)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -288,6 +297,8 @@ PetscErrorCode CommandPredict(void)
   PetscCall(DriverHasSamples(scene, &set));
   if (set) {
     HycoCheck(!output[0], "-output is for one point (-mu); a set of points gives a -table");
+    HycoCheck(!fallback.displacement,
+              "-hyco_full_displacement is for one point (-mu); a set of points gives a -table, which has no fields");
     PetscCall(DriverGetSamples(scene, &samples, &set));
     HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples));
   } else {

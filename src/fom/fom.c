@@ -11,6 +11,9 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   f = *fom;
   PetscCall(HycoSolverDestroy(&f->solver));
   PetscCall(HycoSystemDestroy(&f->system));
+  PetscCall(HycoSolverDestroy(&f->given_solver));
+  PetscCall(HycoSystemDestroy(&f->given_system));
+  PetscCall(VecDestroy(&f->given_F));
   PetscCall(MatDestroy(&f->K));
   PetscCall(MatDestroy(&f->B));
   PetscCall(MatDestroy(&f->Bt));
@@ -233,10 +236,10 @@ static PetscErrorCode CountFree(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Assemble(HycoFOM f, const PetscReal mu[])
+PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
 {
   PetscFunctionBegin;
-  f->solved = f->sigma_ready = PETSC_FALSE;
+  f->solved = f->given = f->sigma_ready = PETSC_FALSE;
   HycoOnEach(f->comm, HycoFESetParameters(f->fe, mu));
   if (f->fe_whole != f->fe) HycoOnRoot(f->comm, HycoFESetParameters(f->fe_whole, mu));
   f->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
@@ -258,8 +261,7 @@ static PetscErrorCode Assemble(HycoFOM f, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U and Lambda to rank 0, in the file's order. */
-static PetscErrorCode Gather(HycoFOM f)
+PetscErrorCode HycoFOMGather(HycoFOM f)
 {
   const PetscScalar *v;
 
@@ -291,12 +293,12 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   HycoCheckHandle(f, "HycoFOMCreate()");
   t = &f->summary.seconds;
   PetscCall(HycoSceneCheckParameters(f->scene, n, mu));
-  PetscCall(Assemble(f, mu));
+  PetscCall(HycoFOMAssemble(f, mu));
   t->assemble = HycoNow() - begin;
   PetscCall(HycoSolverSetSystem(f->solver, f->system));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(f->solver, f->U, f->Lambda));
   PetscCall(HycoSolverGetSeconds(f->solver, &t->factor, &t->solve));
-  PetscCall(Gather(f));
+  PetscCall(HycoFOMGather(f));
   t->total = HycoNow() - begin;
   f->solved = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -321,9 +323,10 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   s->dim = f->fe->dim;
   s->n_dof = f->n_free;
   s->n_contacts = f->n_contacts;
-  PetscCall(HycoSolverGetIterations(f->solver, &s->iterations));
+  PetscCall(HycoSolverGetIterations(f->given ? f->given_solver : f->solver, &s->iterations));
   PetscCall(HycoSolverGetKKT(f->solver, &s->kkt));
-  PetscCall(HycoSolverGetReason(f->solver, &s->reason));
+  PetscCall(HycoSolverGetReason(f->given ? f->given_solver : f->solver, &s->reason));
+  if (f->given) s->kkt = f->given_kkt;
   PetscCall(HycoFOMEnergy(f, s));
   s->n_active = 0;
   s->total_contact_force = s->lambda_max = s->lambda_norm2 = s->u_norm2 = 0;

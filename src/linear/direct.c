@@ -437,6 +437,30 @@ PetscErrorCode HycoDirectExpand(HycoDirect d, const PetscReal z[], Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoDirectSolveMany(HycoDirect d, PetscInt k, Vec r[], Vec x[])
+{
+  const size_t rows = (size_t)(d->n + d->m);
+  PetscReal *all = NULL;
+
+  PetscFunctionBegin;
+  if (!k) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(!d->n_pinned, d->comm, PETSC_ERR_SUP, "many right-hand sides with a pinned kernel");
+  if (d->rank == 0) PetscCall(PetscCalloc1(rows * (size_t)k, &all));
+  for (PetscInt j = 0; j < k; j++) {
+    PetscCall(Fetch(d, r[j]));
+    if (d->rank == 0) PetscCall(PetscArraycpy(all + rows * (size_t)j, d->rhs, d->n));
+  }
+  d->id.rhs = all;
+  d->id.nrhs = (MUMPS_INT)k;
+  PetscCall(Run(d, 0));
+  for (PetscInt j = 0; j < k; j++) {
+    if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs, all + rows * (size_t)j, d->n));
+    PetscCall(Deliver(d, x[j]));
+  }
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoDirectSolve(HycoDirect d, Vec r, Vec x)
 {
   PetscFunctionBegin;

@@ -21,6 +21,7 @@ PetscErrorCode HycoCondensedSave(HycoModel m, HycoH5 h)
   PetscCall(HycoH5WriteInt(h, "condensed/stiff", c->dim, 1, c->stiff));
   PetscCall(HycoH5WriteInt(h, "condensed/affine", c->dim, 1, c->affine));
   PetscCall(HycoH5WriteReal(h, "condensed/left_out", 3, 1, c->errors));
+  PetscCall(HycoH5WriteReal(h, "condensed/left_out_u", 2, 1, c->errors_u));
   PetscCall(HycoH5WriteReal(h, "condensed/lambda", HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), c->m, c->Lambda));
   PetscCall(HycoH5WriteReal(h, "condensed/bounds", HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), 2, c->bounds));
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) {
@@ -96,6 +97,8 @@ PetscErrorCode HycoCondensedLoad(HycoModel m, HycoH5 h)
   PetscCall(HycoH5LoadReal(h, "condensed/left_out", &three, &one, &errors));
   PetscCall(PetscArraycpy(c->errors, errors, 3));
   PetscCall(PetscFree(errors));
+  c->errors_u[0] = c->errors_u[1] = -1; /* an older file */
+  if (HycoH5Has(h, "condensed/left_out_u")) PetscCall(HycoH5ReadReal(h, "condensed/left_out_u", 2, 1, c->errors_u));
   n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
   PetscCall(HycoH5LoadReal(h, "condensed/lambda", &n, &c->m, &c->Lambda));
   n = HycoTensorSize(&c->field[HYCO_FIELD_G].tensor);

@@ -84,6 +84,14 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoModelGetType(HycoModel m, HycoModelType *type)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
+  *type = m->type;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoModelGetScene(HycoModel m, HycoScene *scene)
 {
   PetscFunctionBegin;

@@ -11,6 +11,8 @@
   training points' spacing. K's rows on the interface are cut off with the RID's elements, so that no residual can be
   formed there; the misfit says instead how far the two sides of the interface disagree.
 */
+#include <hycoalgorithms.h>
+#include <hycocondensed.h>
 #include <hycomodelimpl.h>
 #include <petscviewer.h>
 
@@ -130,6 +132,21 @@ static PetscReal Estimate(const HycoTrust *t, const PetscReal coefficient[], con
   return PetscExpReal(PetscMin(sum, 200));
 }
 
+/* A condensed model's own estimates, by values left out in training; they grow as the polynomials' remainders do. */
+static void Condensed(HycoModel m, HycoPrediction *p)
+{
+  const HycoCondensed c = m->condensed;
+  PetscReal growth = 1;
+
+  for (PetscInt q = 0; q < c->dim; q++) {
+    if (!c->affine[q]) growth *= HycoPolynomialGrowth(c->n[q], c->x[q], m->fe->mu[q]);
+  }
+  p->estimated_error_lambda = p->interpolation_error;
+  if (c->errors_u[0] < 0) return; /* an older file */
+  p->estimated_error_u = c->errors_u[0] * growth;
+  p->estimated_error_u_full = c->errors_u[1] * growth;
+}
+
 PetscErrorCode HycoTrustEstimate(HycoModel m, HycoPrediction *p)
 {
   PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_TRUST_FEATURES], outside;
@@ -138,9 +155,8 @@ PetscErrorCode HycoTrustEstimate(HycoModel m, HycoPrediction *p)
   p->estimated_error_u = p->estimated_error_lambda = -1;
   PetscCall(FindReach(m));
   p->beyond = Beyond(m, m->fe->mu, nearest);
-  if (p->reason > 0 &&
-      m->type == HYCO_MODEL_CONDENSED) /* its own; what the modes miss of u between points, none knows */
-    p->estimated_error_lambda = p->interpolation_error;
+  p->estimated_error_u_full = -1;
+  if (m->condensed && p->reason > 0) Condensed(m, p);
   if (!m->trust.n || p->reason <= 0 || !m->reconstruct) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTrustMeasure(m, feature));
   outside = 1 + (p->beyond > 0 ? HycoTrustDistance(m->scene, m->fe->mu, nearest) / m->trust.floor[DISTANCE] : 0);
@@ -157,7 +173,8 @@ PetscErrorCode HycoTrustView(HycoModel m, PetscViewer viewer)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors, by %d predictions of held-out solutions\n",
                                      (int)m->trust.n));
   else if (m->type == HYCO_MODEL_CONDENSED)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its forces' error by values left out, and none of u\n"));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors by values left out%s\n",
+                                     m->condensed->errors_u[0] < 0 ? ", and none of u: an older file" : ""));
   else
     PetscCall(PetscViewerASCIIPrintf(viewer, "  does not estimate its errors: not calibrated\n"));
   if (m->search) PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->search));

@@ -1,13 +1,12 @@
 /*
-  Training of the condensed model. After the snapshots and the modes: at every combination of values of the parameters
-  that reach K or B, one more factorisation gives G = B K^-1 B^T and H = V^T K^-1 B^T (kept beside the snapshots). The
-  rest follows from the snapshots without a solve: their gaps D - B U = g + G L, and V^T U = a - H L.
+  Training of the condensed model. After the snapshots, at every combination of values of the parameters that reach K or
+  B: a factorisation for G = B K^-1 B^T, and one for the responses K^-1 B^T P that make the modes (condense_modes.c) and
+  with them H = V^T K^-1 B^T. The rest follows from the snapshots without a solve: their gaps D - B U = g + G L, and
+  V^T U = a - H L.
 */
 #include <hycocondensed.h>
 #include <hycoh5.h>
 #include <hycotrainerimpl.h>
-#include <string.h>
-#include <unistd.h>
 
 /* m^2 numbers a point, and m^3 operations an active set: beyond this it is no model for many predictions. */
 #define MOST_CONTACTS 4000
@@ -201,204 +200,7 @@ PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The parameters of node k of G's grid (the first training value where G does not depend on one), and of the file. */
-static void StiffPoint(HycoCondensed c, PetscInt k, PetscReal mu[], PetscReal key[])
-{
-  const HycoTensor *t = &c->field[HYCO_FIELD_G].tensor;
-
-  for (PetscInt p = c->dim - 1; p >= 0; p--) {
-    mu[p] = c->x[p][k % t->n[p]];
-    key[p] = c->stiff[p] ? mu[p] : 0;
-    k /= t->n[p];
-  }
-}
-
-/* Where G (of the stiffness) and H (of the modes too) of node k are kept. */
-static PetscErrorCode Paths(HycoTrainer t, HycoSnapshots store, PetscInt k, const PetscReal V[],
-                            char G[PETSC_MAX_PATH_LEN], char H[PETSC_MAX_PATH_LEN])
-{
-  HycoCondensed c = t->condensed;
-  PetscReal mu[HYCO_MAX_PARAMETERS], key[HYCO_MAX_PARAMETERS];
-  unsigned long long hash;
-
-  PetscFunctionBegin;
-  StiffPoint(c, k, mu, key);
-  hash = HycoHash(HYCO_HASH_START, key, (size_t)c->dim * sizeof(PetscReal));
-  PetscCall(PetscSNPrintf(G, PETSC_MAX_PATH_LEN, "%s/flexibility-%016llx.h5", store->folder, hash));
-  hash = HycoHash(hash, V, (size_t)(t->sizes[0] * t->sizes[3]) * (size_t)c->l * sizeof(PetscReal));
-  PetscCall(PetscSNPrintf(H, PETSC_MAX_PATH_LEN, "%s/modes-%016llx.h5", store->folder, hash));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode WriteOne(HycoSnapshots store, const char path[], const char name[], PetscInt rows, PetscInt cols,
-                               const PetscReal data[])
-{
-  char fingerprint[32];
-  HycoH5 h;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  snprintf(fingerprint, sizeof(fingerprint), "%016llx", store->fingerprint);
-  PetscCall(HycoH5Create(path, &h));
-  ierr = HycoH5WriteText(h, "fingerprint", fingerprint);
-  if (!ierr) ierr = HycoH5WriteReal(h, name, rows, cols, data);
-  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode ReadOpen(HycoSnapshots store, HycoH5 h, const char path[], const char name[], PetscInt rows,
-                               PetscInt cols, PetscReal data[])
-{
-  char mine[32], *text;
-  PetscBool same;
-
-  PetscFunctionBegin;
-  snprintf(mine, sizeof(mine), "%016llx", store->fingerprint);
-  PetscCall(HycoH5LoadText(h, "fingerprint", &text));
-  same = (PetscBool)(strcmp(text, mine) == 0);
-  PetscCall(PetscFree(text));
-  HycoCheck(same, "%s is of another scene or mesh; remove the folder %s, or name another with -hyco_snapshots", path,
-            store->folder);
-  if (data) PetscCall(HycoH5ReadReal(h, name, rows, cols, data));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode ReadOne(HycoSnapshots store, const char path[], const char name[], PetscInt rows, PetscInt cols,
-                              PetscReal data[])
-{
-  HycoH5 h;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  ierr = ReadOpen(store, h, path, name, rows, cols, data);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* missing[]: the nodes of G's grid without both files. Rank 0. */
-static PetscErrorCode FindMissing(HycoTrainer t, HycoSnapshots store, PetscInt *n_missing, PetscInt missing[])
-{
-  const PetscInt n = HycoTensorSize(&t->condensed->field[HYCO_FIELD_G].tensor);
-  char G[PETSC_MAX_PATH_LEN], H[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBegin;
-  *n_missing = 0;
-  for (PetscInt k = 0; k < n; k++) {
-    PetscCall(Paths(t, store, k, t->V_whole, G, H));
-    if (access(G, F_OK) || (t->condensed->l && access(H, F_OK))) {
-      missing[(*n_missing)++] = k;
-      continue;
-    }
-    PetscCall(ReadOne(store, G, "G", 0, 0, NULL));
-    if (t->condensed->l) PetscCall(ReadOne(store, H, "H", 0, 0, NULL));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode WriteBoth(HycoTrainer t, HycoSnapshots store, PetscInt k, const PetscReal V[],
-                                const PetscReal G[], const PetscReal H[])
-{
-  char path[2][PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBegin;
-  PetscCall(Paths(t, store, k, V, path[0], path[1]));
-  PetscCall(WriteOne(store, path[0], "G", t->condensed->field[HYCO_FIELD_G].rows, 1, G));
-  if (t->condensed->l) PetscCall(WriteOne(store, path[1], "H", t->condensed->l, t->condensed->m, H));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Factors at one node of G's grid, and writes. G, H: room for them. */
-static PetscErrorCode FactorOne(HycoTrainer t, HycoSnapshots store, MPI_Comm group, HycoFOM fom, PetscInt node,
-                                const PetscReal V[], PetscReal G[], PetscReal H[])
-{
-  PetscReal mu[HYCO_MAX_PARAMETERS], key[HYCO_MAX_PARAMETERS];
-
-  PetscFunctionBegin;
-  StiffPoint(t->condensed, node, mu, key);
-  PetscCall(HycoFOMFlexibility(fom, mu, t->condensed->l, V, G, H));
-  HycoOnRoot(group, WriteBoth(t, store, node, V, G, H));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* This rank's group factors at its run of the missing nodes. V on every rank. */
-static PetscErrorCode FactorGroup(HycoTrainer t, HycoSnapshots store, MPI_Comm group, PetscInt color, PetscInt groups,
-                                  PetscInt n_missing, const PetscInt missing[], const PetscReal V[])
-{
-  HycoCondensed c = t->condensed;
-  HycoFOM fom;
-  PetscReal *G, *H;
-  PetscErrorCode ierr = 0;
-
-  PetscFunctionBegin;
-  PetscCall(HycoFOMCreate(group, t->scene, &fom));
-  PetscCall(PetscMalloc2(c->field[HYCO_FIELD_G].rows, &G, c->l * c->m, &H));
-  for (PetscInt k = color * n_missing / groups; !ierr && k < (color + 1) * n_missing / groups; k++)
-    ierr = FactorOne(t, store, group, fom, missing[k], V, G, H);
-  PetscCall(PetscFree2(G, H));
-  PetscCall(HycoFOMDestroy(&fom));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* G and H at all nodes, from the files. Rank 0. */
-static PetscErrorCode ReadFields(HycoTrainer t, HycoSnapshots store)
-{
-  HycoGridField *G = &t->condensed->field[HYCO_FIELD_G], *H = &t->condensed->field[HYCO_FIELD_H];
-  const PetscInt n = HycoTensorSize(&G->tensor);
-  char path[2][PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBegin;
-  PetscCall(PetscFree(G->data));
-  PetscCall(PetscFree(H->data));
-  PetscCall(PetscMalloc1((size_t)G->rows * (size_t)n, &G->data));
-  PetscCall(PetscMalloc1((size_t)H->rows * (size_t)n, &H->data));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscCall(Paths(t, store, k, t->V_whole, path[0], path[1]));
-    PetscCall(ReadOne(store, path[0], "G", G->rows, 1, G->data + (size_t)k * (size_t)G->rows));
-    if (H->rows)
-      PetscCall(ReadOne(store, path[1], "H", t->condensed->l, t->condensed->m, H->data + (size_t)k * (size_t)H->rows));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoTrainerFlexibility(HycoTrainer t, HycoSnapshots store, PetscBool modes)
-{
-  HycoCondensed c = t->condensed;
-  const PetscInt l = modes ? t->l : 0, N = t->sizes[0] * t->sizes[3] * l;
-  PetscInt n_missing = 0, *missing, groups = 1, color;
-  PetscMPIInt size;
-  PetscReal *V;
-  MPI_Comm group;
-
-  PetscFunctionBegin;
-  c->l = l;
-  PetscCall(HycoCondensedAllocate(c));
-  PetscCallMPI(MPI_Comm_size(t->comm, &size));
-  PetscCall(PetscMalloc1(HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), &missing));
-  HycoOnRoot(t->comm, FindMissing(t, store, &n_missing, missing));
-  PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, t->comm));
-  PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, t->comm));
-  if (n_missing) {
-    PetscCall(PetscMalloc1(N, &V));
-    if (t->rank == 0) PetscCall(PetscArraycpy(V, t->V_whole, N)); /* l is t->l or 0 */
-    PetscCallMPI(MPI_Bcast(V, (PetscMPIInt)N, MPIU_REAL, 0, t->comm));
-    PetscCall(HycoSnapshotsChooseGroups(t->comm, t->scene, n_missing, &groups));
-    color = (PetscInt)t->rank * groups / size;
-    PetscCallMPI(MPI_Comm_split(t->comm, (PetscMPIInt)color, t->rank, &group));
-    HycoOnEach(t->comm, FactorGroup(t, store, group, color, groups, n_missing, missing, V));
-    PetscCallMPI(MPI_Comm_free(&group));
-    PetscCall(PetscFree(V));
-  }
-  PetscCall(PetscFree(missing));
-  HycoOnRoot(t->comm, ReadFields(t, store));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The node of a field's grid that node k of the whole grid lies on. */
-static PetscInt Restrict(HycoCondensed c, const HycoGridField *f, PetscInt k)
+PetscInt HycoCondensedNode(HycoCondensed c, const HycoGridField *f, PetscInt k)
 {
   PetscInt index[HYCO_MAX_PARAMETERS], node = 0;
 
@@ -437,11 +239,43 @@ static PetscErrorCode FreeGap(HycoTrainer t, const PetscReal mu[], const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* g, a and the training forces at the nodes of the whole grid. */
+/* H = V^T K^-1 B^T at the nodes of the stiffness, of all modes: the responses' coefficients, on the patterns' span. */
+static PetscErrorCode FromResponses(HycoTrainer t, HycoCondensed c)
+{
+  const HycoResponses *x = &t->responses;
+  const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_H].tensor), m = c->m, l = c->l;
+  HycoGridField *H = &c->field[HYCO_FIELD_H], *unloaded = &c->field[HYCO_FIELD_FREE];
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(H->data));
+  PetscCall(PetscCalloc1((size_t)H->rows * (size_t)n, &H->data));
+  for (PetscInt k = 0; l && k < n; k++) {
+    for (PetscInt j = 0; j < x->q; j++) {
+      const PetscReal *column = x->C + (size_t)(t->n_s + k * x->q + j) * (size_t)l, *Q = x->Q + (size_t)j * (size_t)m;
+
+      for (PetscInt i = 0; i < l; i++) {
+        PetscReal *h = H->data + (size_t)k * (size_t)H->rows + (size_t)i * (size_t)m;
+
+        for (PetscInt a = 0; a < m; a++) h[a] += column[i] / x->scale[j] * Q[a];
+      }
+    }
+  }
+  for (PetscInt k = 0; l && k < HycoTensorSize(&unloaded->tensor); k++) { /* a = V^T U + H L */
+    const PetscReal *h = H->data + (size_t)HycoCondensedNode(c, H, k) * (size_t)H->rows,
+                    *L = c->Lambda + (size_t)k * (size_t)m;
+
+    for (PetscInt i = 0; i < l; i++) {
+      for (PetscInt a = 0; a < m; a++) unloaded->data[k * l + i] += h[i * m + a] * L[a];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* g, V^T U and the training forces at the nodes of the whole grid. */
 static PetscErrorCode FromSnapshots(HycoTrainer t, HycoCondensed c)
 {
   HycoGridField *gap = &c->field[HYCO_FIELD_GAP], *unloaded = &c->field[HYCO_FIELD_FREE];
-  const HycoGridField *G = &c->field[HYCO_FIELD_G], *H = &c->field[HYCO_FIELD_H];
+  const HycoGridField *G = &c->field[HYCO_FIELD_G];
   const PetscInt n = HycoTensorSize(&gap->tensor), m = c->m, l = c->l;
   const size_t n_dof = (size_t)(t->sizes[0] * t->sizes[3]);
   const PetscReal *mu;
@@ -455,16 +289,13 @@ static PetscErrorCode FromSnapshots(HycoTrainer t, HycoCondensed c)
   PetscCall(PetscMalloc1(l * n, &unloaded->data));
   PetscCall(PetscMalloc1(m * n, &c->Lambda));
   for (PetscInt k = 0; k < n; k++) {
-    const PetscInt s = c->sample[k], node = Restrict(c, G, k);
-    const PetscReal *L = t->Lambda + (size_t)s * (size_t)m, *h = H->data + (size_t)node * (size_t)H->rows;
+    const PetscInt s = c->sample[k], node = HycoCondensedNode(c, G, k);
+    const PetscReal *L = t->Lambda + (size_t)s * (size_t)m;
 
     PetscCall(PetscArraycpy(c->Lambda + k * m, L, m));
     PetscCall(FreeGap(t, mu + s * c->dim, t->U + (size_t)s * n_dof, L, G->data + (size_t)node * (size_t)G->rows,
                       gap->data + k * m));
-    for (PetscInt j = 0; j < l; j++) {
-      unloaded->data[k * l + j] = t->VtU[s * t->l + j];
-      for (PetscInt i = 0; i < m; i++) unloaded->data[k * l + j] += h[j * m + i] * L[i];
-    }
+    if (l) PetscCall(PetscArraycpy(unloaded->data + k * l, t->responses.C + (size_t)s * (size_t)l, l));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -490,76 +321,38 @@ static PetscErrorCode ChooseDegrees(HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The forces at node k of the whole grid (value number i of parameter p) without the nodes with that value. */
-static PetscErrorCode LeaveOut(HycoCondensed c, PetscInt p, PetscInt i, PetscInt k, const PetscReal mu[],
-                               PetscReal largest, PetscInt *last, PetscBool *definite, PetscReal L[], PetscReal *error)
+PetscErrorCode HycoTrainerFillFields(HycoTrainer t, PetscBool modes)
 {
-  const PetscReal *own = c->Lambda + k * c->m;
-  const PetscInt node = Restrict(c, &c->field[HYCO_FIELD_G], k);
-  PetscReal lost = 0, size = 0;
-  PetscInt its;
-  HycoLCPStatus status = HYCO_LCP_RAY;
+  HycoCondensed c = t->condensed;
 
   PetscFunctionBegin;
-  if (node != *last || c->stiff[p])
-    PetscCall(HycoCondensedFlexibility(c, mu, c->stiff[p] ? p : -1, c->stiff[p] ? i : -1, definite));
-  *last = node;
-  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_GAP], mu, p, i, c->g));
-  for (PetscInt j = 0; j < c->m; j++) c->active[j] = (PetscBool)(own[j] > 0);
-  if (*definite)
-    PetscCall(
-        HycoLCPActiveSet(c->m, c->M, c->g, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, L, &its, &status));
-  for (PetscInt j = 0; j < c->m; j++) {
-    lost += (L[j] - own[j]) * (L[j] - own[j]);
-    size += own[j] * own[j];
-  }
-  *error = status == HYCO_LCP_SOLVED ? PetscSqrtReal(lost) / PetscMax(PetscSqrtReal(size), 1e-2 * largest) : 1;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Each value of each parameter that is not affine left out: the largest error of the forces there, added up over the
-   parameters; relative to the point's own force, or a hundredth of the largest. */
-static PetscErrorCode ForceError(HycoTrainer t, HycoCondensed c)
-{
-  const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
-  const PetscReal *mu;
-  PetscReal *L, largest = 0;
-
-  PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, NULL, &mu));
+  c->l = modes ? t->responses.r : 0;
+  PetscCall(HycoCondensedAllocate(c));
+  PetscCall(FromSnapshots(t, c));
+  PetscCall(FromResponses(t, c));
+  PetscCall(ChooseDegrees(c));
+  PetscCall(HycoCondensedBound(c));
   PetscCall(HycoCondensedPrepare(c));
-  PetscCall(PetscCalloc1(c->m, &L));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscReal size = 0;
-
-    for (PetscInt j = 0; j < c->m; j++) size += c->Lambda[k * c->m + j] * c->Lambda[k * c->m + j];
-    largest = PetscMax(largest, PetscSqrtReal(size));
-  }
-  for (PetscInt p = 0, stride = n; p < c->dim; p++) {
-    PetscReal worst = 0, error = 0;
-    PetscInt last = -1;
-    PetscBool definite = PETSC_FALSE;
-
-    stride /= c->n[p];
-    for (PetscInt k = 0; largest > 0 && !c->affine[p] && c->n[p] > 1 && k < n; k++) {
-      PetscCall(
-          LeaveOut(c, p, k / stride % c->n[p], k, mu + c->sample[k] * c->dim, largest, &last, &definite, L, &error));
-      worst = PetscMax(worst, error);
-    }
-    c->by_parameter[p] = worst;
-    c->errors[2] += worst;
-  }
-  PetscCall(PetscFree(L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTrainerFillFields(HycoTrainer t)
+/* Of all modes the first l, which the model has: the rows of H and the entries of a come mode by mode. */
+static PetscErrorCode CutModes(HycoCondensed c, PetscInt l)
 {
+  const PetscInt rows[2] = {l * c->m, l}, of[2] = {HYCO_FIELD_H, HYCO_FIELD_FREE};
+
   PetscFunctionBegin;
-  PetscCall(FromSnapshots(t, t->condensed));
-  PetscCall(ChooseDegrees(t->condensed));
-  PetscCall(HycoCondensedBound(t->condensed));
-  PetscCall(ForceError(t, t->condensed));
+  for (PetscInt f = 0; f < 2; f++) {
+    HycoGridField *field = &c->field[of[f]];
+    const PetscInt n = HycoTensorSize(&field->tensor);
+
+    for (PetscInt k = 1; k < n; k++)
+      PetscCall(PetscArraymove(field->data + (size_t)k * (size_t)rows[f], field->data + (size_t)k * (size_t)field->rows,
+                               rows[f]));
+    field->rows = rows[f];
+  }
+  c->l = l;
+  PetscCall(HycoCondensedPrepare(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -568,7 +361,9 @@ PetscErrorCode HycoTrainerCondense(HycoTrainer t, HycoModel m)
   HycoCondensed c = t->condensed;
 
   PetscFunctionBegin;
-  PetscCall(HycoTrainerFillFields(t));
+  PetscCall(HycoTrainerFillFields(t, PETSC_TRUE));
+  PetscCall(HycoTrainerLeaveOut(t));
+  PetscCall(CutModes(c, t->l));
   m->condensed = c;
   t->condensed = NULL;
   m->n_dual = 0; /* nothing is reconstructed */

@@ -1,8 +1,8 @@
 /*
   The condensed model's training points, chosen: Leja points of each range, which interpolate about as well as
   Chebyshev's and are nested, so that no solution is in vain. The parameter whose values, left out one by one, cost the
-  forces most gets another value until the sum over the parameters is below the target. The stiffness is factored once
-  more for the modes when the points stand.
+  forces most gets another value until the sum over the parameters is below the target. The modes come when the points
+  stand.
 */
 #include <hycocondensed.h>
 #include <hycotrainerimpl.h>
@@ -67,8 +67,9 @@ static PetscErrorCode Estimate(HycoTrainer t, HycoSnapshots store)
   PetscFunctionBegin;
   PetscCall(HycoSnapshotsFill(store, t->samples, t->progress, t->progress_ctx));
   PetscCall(HycoTrainerReduce(t, store));
-  PetscCall(HycoTrainerFlexibility(t, store, PETSC_FALSE));
-  HycoOnRoot(t->comm, HycoTrainerFillFields(t));
+  PetscCall(HycoTrainerFlexibility(t, store));
+  HycoOnRoot(t->comm, HycoTrainerFillFields(t, PETSC_FALSE));
+  HycoOnRoot(t->comm, HycoTrainerLeaveOut(t));
   PetscCallMPI(MPI_Bcast(c->by_parameter, HYCO_MAX_PARAMETERS, MPIU_REAL, 0, t->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

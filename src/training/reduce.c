@@ -38,8 +38,7 @@ static PetscErrorCode AddSeeds(PetscInt n, const PetscInt add[], PetscInt divide
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers a distributed dense matrix on rank 0, row major or column major. */
-static PetscErrorCode ToRoot(HycoTrainer t, Mat S, PetscBool row_major, PetscReal **out)
+PetscErrorCode HycoTrainerToRoot(HycoTrainer t, Mat S, PetscBool row_major, PetscReal **out)
 {
   PetscInt N, n, lo, hi, lda;
   PetscMPIInt size, *counts, *offsets;
@@ -88,35 +87,49 @@ static PetscErrorCode ToRoot(HycoTrainer t, Mat S, PetscBool row_major, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* V^T of the snapshots and their norms, which judge a model on the whole mesh at the cost of its modes. */
-static PetscErrorCode Project(HycoTrainer t, Mat S, Mat V)
+PetscErrorCode HycoTrainerMultiply(HycoTrainer t, Mat X, Mat Y, PetscReal product[])
 {
   Mat P, whole = NULL;
   const PetscScalar *p;
-  PetscInt lda;
+  PetscInt lda, rows, cols;
+  PetscMPIInt size;
 
+  PetscFunctionBegin;
+  PetscCall(MatTransposeMatMult(X, Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &P));
+  PetscCallMPI(MPI_Comm_size(t->comm, &size));
+  if (size > 1)
+    PetscCall(MatCreateRedundantMatrix(P, size, PETSC_COMM_SELF, MAT_INITIAL_MATRIX, &whole));
+  else {
+    PetscCall(PetscObjectReference((PetscObject)P));
+    whole = P;
+  }
+  PetscCall(MatGetSize(P, &rows, &cols));
+  PetscCall(MatDenseGetLDA(whole, &lda));
+  PetscCall(MatDenseGetArrayRead(whole, &p));
+  for (PetscInt k = 0; k < cols; k++)
+    PetscCall(PetscArraycpy(product + (size_t)k * (size_t)rows, p + (size_t)k * (size_t)lda, rows));
+  PetscCall(MatDenseRestoreArrayRead(whole, &p));
+  PetscCall(MatDestroy(&whole));
+  PetscCall(MatDestroy(&P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* V^T of the snapshots and their norms, which judge a model on the whole mesh at the cost of its modes. */
+static PetscErrorCode Project(HycoTrainer t, Mat S, Mat V)
+{
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
   PetscCall(PetscMalloc1(t->n_s, &t->U_norm));
   PetscCall(MatGetColumnNorms(S, NORM_2, t->U_norm));
-  PetscCall(MatTransposeMatMult(V, S, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &P));
-  {
-    PetscMPIInt size;
+  PetscCall(HycoTrainerMultiply(t, V, S, t->VtU));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    PetscCallMPI(MPI_Comm_size(t->comm, &size));
-    if (size > 1)
-      PetscCall(MatCreateRedundantMatrix(P, size, PETSC_COMM_SELF, MAT_INITIAL_MATRIX, &whole));
-    else {
-      PetscCall(PetscObjectReference((PetscObject)P));
-      whole = P;
-    }
-  }
-  PetscCall(MatDenseGetLDA(whole, &lda));
-  PetscCall(MatDenseGetArrayRead(whole, &p));
-  for (PetscInt k = 0; k < t->n_s; k++) PetscCall(PetscArraycpy(t->VtU + k * t->l, p + k * lda, t->l));
-  PetscCall(MatDenseRestoreArrayRead(whole, &p));
-  PetscCall(MatDestroy(&whole));
-  PetscCall(MatDestroy(&P));
+PetscErrorCode HycoTrainerGetDisplacements(HycoTrainer t, HycoSnapshots store, Mat *S)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", S));
+  PetscCall(RemoveLifting(t, *S));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -135,7 +148,7 @@ static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store)
 
   PetscFunctionBegin;
   PetscCall(HycoSnapshotsGetField(store, t->samples, "U", &S));
-  PetscCall(ToRoot(t, S, PETSC_FALSE, &t->U));
+  PetscCall(HycoTrainerToRoot(t, S, PETSC_FALSE, &t->U));
   PetscCall(RemoveLifting(t, S));
   PetscCall(PetscMalloc1(t->n_s + 1, &t->sigma));
   HycoLogged(HYCO_EVENT_POD, HycoPOD(S, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, t->max_modes, &V, &t->l, t->sigma));
@@ -150,7 +163,7 @@ static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store)
     PetscCall(PetscFree(index));
   }
   PetscCall(Project(t, S, V));
-  PetscCall(ToRoot(t, V, PETSC_TRUE, &t->V_whole));
+  PetscCall(HycoTrainerToRoot(t, V, PETSC_TRUE, &t->V_whole));
   PetscCall(MatDestroy(&V));
   PetscCall(MatDestroy(&S));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -295,7 +308,7 @@ static PetscErrorCode ReduceForces(HycoTrainer t, HycoSnapshots store)
 
   PetscFunctionBegin;
   PetscCall(HycoSnapshotsGetField(store, t->samples, "lambda", &S));
-  PetscCall(ToRoot(t, S, PETSC_FALSE, &t->Lambda));
+  PetscCall(HycoTrainerToRoot(t, S, PETSC_FALSE, &t->Lambda));
   PetscCall(MatDestroy(&S));
   if (!t->seed[HYCO_SEED_DUAL] || !t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(5 * t->n_s, &nodes));

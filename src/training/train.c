@@ -314,7 +314,8 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
     HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
   solved = HycoNow();
   if (!choose) HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerReduce(t, store));
-  if (condensed) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFlexibility(t, store, PETSC_TRUE));
+  if (condensed) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFlexibility(t, store));
+  if (condensed) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFindModes(t, store));
   HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerBuild(t, PETSC_TRUE, path, &report));
   HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerCalibrate(t, store, path, &report.n_held));
   PetscCall(HycoSnapshotsDestroy(&store));

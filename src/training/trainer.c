@@ -48,6 +48,10 @@ PetscErrorCode HycoTrainerResetBases(HycoTrainer t)
   PetscCall(PetscFree(t->Lambda));
   PetscCall(PetscFree(t->VtU));
   PetscCall(PetscFree(t->U_norm));
+  PetscCall(PetscFree(t->responses.Q));
+  PetscCall(PetscFree(t->responses.scale));
+  PetscCall(PetscFree(t->responses.C));
+  t->responses.missed = 0;
   t->n_seeds_node = t->n_seeds_cell = t->n_supremizers = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -105,7 +105,7 @@ class Kill(Case):
         """Flexibilities are kept like solutions: one a value of the stiffness, and one of the modes."""
         self.check_kills(1, 'condensed', CONDENSED)
         self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', 'flexibility-*.h5'))), 20)
-        self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', 'modes-*.h5'))), 20)
+        self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', 'responses-*.h5'))), 20)
         self.setUp()
         self.check_kills(2, 'condensed', CONDENSED)
 

@@ -39,6 +39,7 @@ static PetscErrorCode TestNull(void)
   CHECK_FAILS(HycoSamplesGet(samples, &n, NULL, &mu), "the handle is NULL; make it by HycoSamplesCreate()");
   CHECK_FAILS(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom), "the handle is NULL; make it by HycoSceneLoad()");
   CHECK_FAILS(HycoFOMSolve(fom, 2, point), "the handle is NULL; make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMSolveForces(fom, 2, point, point), "the handle is NULL; make it by HycoFOMCreate()");
   CHECK_FAILS(HycoFOMGetSummary(fom, &summary), "the handle is NULL; make it by HycoFOMCreate()");
   CHECK_FAILS(HycoModelPredict(model, 2, point), "the handle is NULL; make it by HycoModelLoad()");
   CHECK_FAILS(HycoModelGetPrediction(model, &prediction), "the handle is NULL; make it by HycoModelLoad()");
@@ -115,6 +116,48 @@ static PetscErrorCode TestFOMOrder(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The forces of a solution given back: its displacement, its residuals, on the rope; others give others, and say so. */
+static PetscErrorCode TestForces(void)
+{
+  const PetscReal mu[2] = {0.07, 0.17};
+  char folder[PETSC_MAX_PATH_LEN];
+  HycoScene scene;
+  HycoFOM fom;
+  HycoSummary one, summary;
+  PetscReal *forces;
+  PetscInt n;
+  const PetscReal *Lambda;
+
+  PetscFunctionBegin;
+  snprintf(folder, sizeof(folder), "%s/examples/rope", getenv("HYCO_SOURCE"));
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, folder, &scene));
+  PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
+  PetscCall(HycoFOMSolve(fom, 2, mu));
+  PetscCall(HycoFOMGetSummary(fom, &one));
+  PetscCall(HycoFOMGetSolution(fom, NULL, NULL, &n, &Lambda, NULL, NULL));
+  PetscCall(PetscMalloc1(n, &forces));
+  PetscCall(PetscArraycpy(forces, Lambda, n));
+  PetscCall(HycoFOMSolveForces(fom, 2, mu, forces));
+  PetscCall(HycoFOMGetSummary(fom, &summary));
+  CHECK(summary.reason == HYCO_CONVERGED && HycoKKTMax(&summary.kkt) < 1e-9, "reason %d", (int)summary.reason);
+  CHECK_NEAR(summary.u_norm2, one.u_norm2, 1e-10);
+  CHECK_NEAR(summary.total_contact_force, one.total_contact_force, 1e-15);
+  for (PetscInt k = 0; k < n; k++) forces[k] *= 0.9; /* equilibrium with them, and the rope in the obstacle */
+  PetscCall(HycoFOMSolveForces(fom, 2, mu, forces));
+  PetscCall(HycoFOMGetSummary(fom, &summary));
+  CHECK(summary.reason == HYCO_CONVERGED && summary.kkt.stationarity < 1e-9, "reason %d", (int)summary.reason);
+  CHECK(summary.kkt.penetration > 1e-3, "penetration %g", (double)summary.kkt.penetration);
+  CHECK_NEAR(summary.total_contact_force, 0.9 * one.total_contact_force, 1e-14);
+  PetscCall(HycoFOMSolve(fom, 2, mu)); /* and nothing of it stays */
+  PetscCall(HycoFOMGetSummary(fom, &summary));
+  CHECK_NEAR(summary.total_contact_force, one.total_contact_force, 1e-14);
+  CHECK(HycoKKTMax(&summary.kkt) < 1e-9, "residuals of another solve");
+  PetscCall(PetscFree(forces));
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A batch in a scrambled order, stiffnesses repeated: each answer is the one of a single call, to the last bit. */
 static PetscErrorCode TestMany(void)
 {
@@ -173,6 +216,7 @@ static PetscErrorCode Test(void)
   PetscCall(TestNull());
   PetscCall(TestSolverOrder());
   PetscCall(TestFOMOrder());
+  PetscCall(TestForces());
   PetscCall(TestMany());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

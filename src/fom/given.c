@@ -1,0 +1,114 @@
+/*
+  Displacements under contact forces that are given: K U = F - B^T Lambda, (16) without its inequalities, which is what
+  a model of the forces alone leaves to be solved; and K^-1 B^T of many forces at once. The factor is of K alone,
+  without the contacts, and is kept while K is.
+*/
+#include <hycofomimpl.h>
+
+#define BLOCK 32 /* right-hand sides that are solved at once */
+
+/* A solver of its own, for the contacts of the other are unknowns there. */
+static PetscErrorCode SetUp(HycoFOM f)
+{
+  PetscFunctionBegin;
+  if (f->given_solver) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSystemCreate(f->comm, &f->given_system));
+  PetscCall(HycoSolverCreate(f->comm, &f->given_solver));
+  PetscCall(HycoSolverSetFromOptions(f->given_solver, f->scene->options));
+  PetscCall(HycoSolverSetType(f->given_solver, HYCO_SOLVER_ACTIVE_SET)); /* none of its contacts */
+  PetscCall(HycoSolverSetForm(f->given_solver, HYCO_FORM_AUTO));
+  PetscCall(VecDuplicate(f->F, &f->given_F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lambda, from rank 0 in the file's order. */
+static PetscErrorCode PutForces(HycoFOM f, const PetscReal Lambda[])
+{
+  PetscScalar *root;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(f->lambda_root, &root));
+  if (f->rank == 0) PetscCall(PetscArraycpy(root, Lambda, f->n_contacts));
+  PetscCall(VecRestoreArray(f->lambda_root, &root));
+  PetscCall(VecScatterBegin(f->lambda_to_root, f->lambda_root, f->Lambda, INSERT_VALUES, SCATTER_REVERSE));
+  PetscCall(VecScatterEnd(f->lambda_to_root, f->lambda_root, f->Lambda, INSERT_VALUES, SCATTER_REVERSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* K U = given_F */
+static PetscErrorCode SolveGiven(HycoFOM f)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSystemSetMatrices(f->given_system, f->K, NULL, NULL, PETSC_TRUE));
+  PetscCall(HycoSystemSetVectors(f->given_system, f->given_F, NULL));
+  PetscCall(HycoSolverSetSystem(f->given_solver, f->given_system));
+  HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(f->given_solver, f->U, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], const PetscReal Lambda[])
+{
+  HycoSeconds *t;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  HycoCheckHandle(f, "HycoFOMCreate()");
+  t = &f->summary.seconds;
+  PetscCall(HycoSceneCheckParameters(f->scene, n, mu));
+  PetscCall(SetUp(f));
+  PetscCall(HycoFOMAssemble(f, mu));
+  PetscCall(VecCopy(f->F, f->given_F));
+  if (f->n_contacts) {
+    PetscCall(PutForces(f, Lambda));
+    PetscCall(MatMult(f->Bt, f->Lambda, f->given_F));
+    PetscCall(VecAYPX(f->given_F, -1, f->F));
+  }
+  t->assemble = HycoNow() - begin;
+  PetscCall(SolveGiven(f));
+  PetscCall(HycoSolverGetSeconds(f->given_solver, &t->factor, &t->solve));
+  HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(f->system, f->U, f->Lambda, &f->given_kkt));
+  PetscCall(HycoFOMGather(f));
+  t->total = HycoNow() - begin;
+  f->solved = f->given = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A block of n patterns, from P to their columns of X (stride q). */
+static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], PetscInt q, PetscReal X[])
+{
+  const PetscScalar *root;
+  Vec r[BLOCK], x[BLOCK];
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < n; j++) {
+    PetscCall(VecDuplicate(f->U, &r[j]));
+    PetscCall(VecDuplicate(f->U, &x[j]));
+    PetscCall(PutForces(f, P + (f->rank ? 0 : j * f->n_contacts)));
+    PetscCall(MatMult(f->Bt, f->Lambda, r[j]));
+  }
+  PetscCall(HycoSolverApplyInverse(f->given_solver, n, r, x));
+  for (PetscInt j = 0; j < n; j++) {
+    PetscCall(VecScatterBegin(f->to_root, x[j], f->U_root, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecScatterEnd(f->to_root, x[j], f->U_root, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGetArrayRead(f->U_root, &root));
+    for (PetscInt i = 0; f->rank == 0 && i < f->n_nodes * f->fe->dim; i++)
+      X[(size_t)i * (size_t)q + (size_t)j] = root[i];
+    PetscCall(VecRestoreArrayRead(f->U_root, &root));
+    PetscCall(VecDestroy(&r[j]));
+    PetscCall(VecDestroy(&x[j]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMResponses(HycoFOM f, const PetscReal mu[], PetscInt q, const PetscReal P[], PetscReal X[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(f, "HycoFOMCreate()");
+  PetscCall(SetUp(f));
+  PetscCall(HycoFOMAssemble(f, mu));
+  PetscCall(VecCopy(f->F, f->given_F));
+  PetscCall(SolveGiven(f)); /* for its factor */
+  for (PetscInt j = 0; j < q; j += BLOCK)
+    PetscCall(RespondBlock(f, PetscMin(BLOCK, q - j), P + (f->rank ? 0 : j * f->n_contacts), q, X + (f->rank ? 0 : j)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
