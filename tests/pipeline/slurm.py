@@ -7,7 +7,7 @@ import subprocess
 import time
 import unittest
 
-from common import MPIEXEC, PELLET, ROPE, SOURCE, Case
+from common import MPIEXEC, PATIENCE, PELLET, ROPE, SOURCE, Case
 
 SCRIPT = os.path.join(SOURCE, 'scripts', 'hyco.sbatch')
 LONG = ('-scene', PELLET, '-values_radius', '4.02,4.03,4.04,4.05,4.07,4.08,4.09,4.1', '-values_load', '0.2,0.4,0.6,0.8,1')
@@ -61,7 +61,7 @@ class Slurm(Case):
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
     def finish(self, process, status=0):
-        out, _ = process.communicate(timeout=60)
+        out, _ = process.communicate(timeout=60 * PATIENCE)
         self.assertEqual(process.returncode, status, out)
         return out
 
