@@ -48,9 +48,9 @@ static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function,
   return code;
 }
 
-#if defined(__SANITIZE_ADDRESS__)
-static int stopped;
+static int stopped; /* for LeakSanitizer alone */
 
+#if defined(__SANITIZE_ADDRESS__)
 /* LeakSanitizer asks at the end: a refused run ends with what it holds. */
 int __lsan_is_turned_off(void);
 int __lsan_is_turned_off(void)
@@ -67,9 +67,7 @@ static void Stop(void)
   MPI_Request request;
   int together = 0;
 
-#if defined(__SANITIZE_ADDRESS__)
   stopped = 1;
-#endif
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (rank == 0) {
     fprintf(stderr, "hyco: error: %s\n", message);
@@ -153,6 +151,7 @@ static PetscErrorCode Start(int *argc, char ***argv)
   ierr = HycoInitialize(argc, argv);
   if (PetscErrorPrintf == PrintNothing) PetscErrorPrintf = printf_of_petsc;
   if (!ierr) return 0;
+  stopped = 1;
   (void)!PetscErrorMessage(ierr, NULL, &said);
   fprintf(stderr, "hyco: error: PETSc does not start%s%s\n", said && said[0] ? ": " : "", said ? said : "");
   return ierr;
