@@ -67,7 +67,7 @@ class Slurm(Case):
 
     def interrupt(self, process):
         """As Slurm does before the time is over, once a few solutions are there."""
-        deadline = time.monotonic() + 50
+        deadline = time.monotonic() + 50 * PATIENCE
         while len(self.solutions()) < 3 and process.poll() is None and time.monotonic() < deadline:
             time.sleep(0.01)
         process.send_signal(signal.SIGUSR1)
