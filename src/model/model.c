@@ -319,13 +319,15 @@ PetscErrorCode HycoModelWrite(HycoModel m, const char path[])
 {
   const PetscReal *U;
   PetscReal *rid;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoModelGetWholeU(m, NULL, &U));
   PetscCall(PetscCalloc1(m->whole->n_cells, &rid));
   for (PetscInt e = 0; e < m->mesh->n_cells; e++) rid[m->mesh->cell_whole[e]] = 1;
-  PetscCall(HycoSolutionWrite(path, m->fe_whole, &m->whole_pairs, U, m->Lambda, rid));
+  ierr = HycoSolutionWrite(path, m->fe_whole, &m->whole_pairs, U, m->Lambda, rid);
   PetscCall(PetscFree(rid));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

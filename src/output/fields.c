@@ -150,6 +150,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, const HycoPairs *
   PetscReal *u3, *sigma, *tensor, *force, *pressure, *gap, *normal, *area, *gap_node;
   PetscInt *slave_id, n = 5;
   HycoContactTable table;
+  PetscErrorCode ierr; /* a place where nothing can be written is the caller's to mend: nothing is kept for it */
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc5(3 * m->n_nodes, &u3, m->n_cells * fe->n_sigma, &sigma, 6 * m->n_cells, &tensor, 3 * m->n_nodes,
@@ -187,9 +188,10 @@ PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, const HycoPairs *
         {"gap", PETSC_FALSE, 1, gap_node},        {"rid", PETSC_TRUE, 1, rid}};
 
     if (rid) n = 6;
-    PetscCall(HycoFieldsWrite(path, m, fe->X, fe->scene, fe->mu, n, field, &table));
+    ierr = HycoFieldsWrite(path, m, fe->X, fe->scene, fe->mu, n, field, &table);
   }
   PetscCall(PetscFree5(u3, sigma, tensor, force, pressure));
   PetscCall(PetscFree5(gap, normal, area, slave_id, gap_node));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

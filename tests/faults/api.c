@@ -111,6 +111,7 @@ static PetscErrorCode TestAfterError(void)
     PetscCall(HycoModelPredict(model, 2, inside));
     PetscCall(HycoModelGetPrediction(model, &p));
     CHECK_NEAR(p.total_contact_force, 0.32557839822014933, 1e-12); /* what it gave when it was written */
+    CHECK_FAILS(HycoModelWrite(model, "/no/such/folder/x.xdmf"), "cannot be written");
   }
   PetscCall(HycoModelDestroy(&model));
   PetscCall(HycoFOMDestroy(&fom));

@@ -11,7 +11,7 @@ import unittest
 import h5py
 import numpy as np
 
-from common import HYCO, PELLET, ROPE, SOURCE, Case
+from common import HYCO, PATIENCE, PELLET, ROPE, SANITIZED, SOURCE, Case
 from rows import Rows
 
 DATA = os.path.join(SOURCE, 'tests', 'data')
@@ -37,8 +37,8 @@ class Files(Case):
     def refused(self, name, text, command='predict', *more):
         """One line, status 1, in an address space of 2 GB (a size that a file claims must not be asked for)."""
         arguments = [command, '-model', name] + (['-mu', '0.07,0.17'] if command == 'predict' else []) + list(more)
-        run = subprocess.run([HYCO, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=60,
-                             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30)))
+        run = subprocess.run([HYCO, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=60 * PATIENCE,
+                             preexec_fn=None if SANITIZED else lambda: resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30)))
         self.assertEqual(run.returncode, 1, run.stderr)
         self.assertEqual(run.stderr.count('\n'), 1, run.stderr)
         self.assertRegex(run.stderr, text)
@@ -221,6 +221,8 @@ class Files(Case):
         os.makedirs(self.path('home'), exist_ok=True)
         os.makedirs(self.path('tmp'), exist_ok=True)
         environment = dict(os.environ, HOME=self.path('home'), TMPDIR=self.path('tmp'))
+        if SANITIZED:
+            environment['ASAN_OPTIONS'] += ':detect_leaks=0'  # which needs ptrace, as strace does
         named = ('w.h5', 'w.xdmf', 'w_.h5', 'w.json', 'w.csv')
         for arguments in (['train', '-scene', ROPE, '-grid', '3,3', '-model', 'w.h5', '-report', 'w.json'],
                           ['predict', '-model', 'w.h5', '-mu', '0.1,0.1', '-output', 'w_.xdmf', '-report', 'w.json'],
@@ -228,7 +230,7 @@ class Files(Case):
                           ['compare', '-scene', ROPE, '-model', 'w.h5', '-grid', '2,2', '-table', 'w.csv']):
             run = subprocess.run(['strace', '-f', '-qq', '-s', '300', '-e', 'trace=open,openat,creat,mkdir,mkdirat,rename,renameat,'
                                   'renameat2,link,symlink,execve', '-o', 'trace', HYCO, *arguments], cwd=self.folder,
-                                 env=environment, capture_output=True, text=True, timeout=100)
+                                 env=environment, capture_output=True, text=True, timeout=100 * PATIENCE)
             self.assertEqual(run.returncode, 0, run.stderr)
             with open(self.path('trace'), encoding='utf-8', errors='replace') as f:
                 lines = f.read().splitlines()

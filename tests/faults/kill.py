@@ -10,7 +10,7 @@ import subprocess
 import time
 import unittest
 
-from common import HYCO, MPIEXEC, ROPE, Case
+from common import HYCO, MPIEXEC, PATIENCE, ROPE, Case
 from rows import Rows
 
 TRAIN = ['train', '-scene', ROPE, '-grid', '12,12', '-model', 'm.h5']
@@ -60,7 +60,7 @@ class Kill(Case):
                     os.kill(victim, signal.SIGKILL)
                 except ProcessLookupError:
                     pass
-            status = run.wait(60)
+            status = run.wait(60 * PATIENCE)
         with open(log, encoding='utf-8', errors='replace') as f:
             said = f.read()
         os.remove(log)
@@ -69,7 +69,7 @@ class Kill(Case):
     def check_kills(self, ranks, kind='hybrid', train=TRAIN):
         command, kills = self.command(ranks, train), KILLS[kind]
         begin = time.monotonic()
-        subprocess.run(command, cwd=self.folder, check=True, capture_output=True, timeout=100)
+        subprocess.run(command, cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
         whole = time.monotonic() - begin
         right = self.content()
         names = {os.path.basename(f) for f in glob.glob(self.path('m.h5.snapshots', '*.h5'))}
@@ -84,7 +84,7 @@ class Kill(Case):
             # each group tells `groups` samples for one of its own: at most one sample a group is not there yet
             self.assertGreaterEqual(len(complete), told - ranks, 'a solution that was told is lost')
             times = {f: os.stat(f).st_mtime_ns for f in complete}
-            subprocess.run(command, cwd=self.folder, check=True, capture_output=True, timeout=100)
+            subprocess.run(command, cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
             for name, stamp in times.items():
                 self.assertEqual(os.stat(name).st_mtime_ns, stamp, 'a complete solution was solved again')
             self.assertEqual({os.path.basename(f) for f in glob.glob(self.path('m.h5.snapshots', '*.h5'))}, names)
@@ -116,7 +116,7 @@ class Kill(Case):
         while run.poll() is None and len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) == before:
             time.sleep(0.001)
         resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (kilobytes * 1024, kilobytes * 1024))
-        _, said = run.communicate(timeout=100)
+        _, said = run.communicate(timeout=100 * PATIENCE)
         return run.returncode, said
 
     def refused(self, run, text):
@@ -129,7 +129,7 @@ class Kill(Case):
 
     def test_full_disk(self):
         """Full while a snapshot is written, and while the model is: the previous model is untouched; then it goes on."""
-        subprocess.run([HYCO, *TRAIN], cwd=self.folder, check=True, capture_output=True, timeout=100)
+        subprocess.run([HYCO, *TRAIN], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
         right = self.content()
         for name in glob.glob(self.path('m.h5.snapshots', '*.h5'))[::2]:
             os.remove(name)
@@ -138,7 +138,7 @@ class Kill(Case):
         shutil.rmtree(self.path('m.h5.snapshots'))
         self.refused(self.limited(4), '.h5 could not be written to its end (File too large): is the disk full?')
         self.assertEqual(self.content(), right, 'the previous model was touched')
-        subprocess.run([HYCO, *TRAIN], cwd=self.folder, check=True, capture_output=True, timeout=100)
+        subprocess.run([HYCO, *TRAIN], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
         self.assertEqual(self.content(), right)
         ROWS.add('disk full while a snapshot or the model is written', 'one line; the old model is untouched, nothing half written is left; then it goes on')
 
@@ -168,7 +168,7 @@ class Kill(Case):
         while run.poll() is None and len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) < 5:
             time.sleep(0.01)
         os.rename(self.path('m.h5.snapshots'), self.path('gone'))
-        _, said = run.communicate(timeout=60)
+        _, said = run.communicate(timeout=60 * PATIENCE)
         self.assertEqual(run.returncode, 1, said)
         self.assertEqual(said.count('hyco: error'), 1, said)
         self.assertIn('m.h5.snapshots/', said)

@@ -3,7 +3,7 @@
 
     (cd build/tests && /usr/bin/python3 ../../tests/faults/table.py --write-doc)
 
-What scripts/fuzz left in build-fuzz/runs/ goes in too.
+What scripts/fuzz left in build-fuzz/runs/ goes in too, and scripts/sanitize in build-sanitize/summary.
 """
 import csv
 import glob
@@ -34,6 +34,12 @@ def rows():
         kept = os.listdir(os.path.join(SOURCE, 'tests', 'fuzz', 'corpus', name))
         found.append([f'fuzzing: {name}, {seconds} s, {runs} inputs',
                       f'{len(crashes)} crashes, leaks or hangs; {len(kept)} inputs are kept and replayed', '`scripts/fuzz`'])
+    path = os.path.join(SOURCE, 'build-sanitize', 'summary')
+    if os.path.exists(path):
+        with open(path, encoding='ascii') as f:
+            tests, verdict = f.read().strip().split(',')
+        found.append([f'all tests under AddressSanitizer, UndefinedBehaviorSanitizer, LeakSanitizer: {tests}', verdict,
+                      '`scripts/sanitize`'])
     return found, problems
 
 

@@ -10,7 +10,7 @@ import sys
 import time
 import unittest
 
-from common import PELLET, SOURCE, Case
+from common import PATIENCE, PELLET, SOURCE, Case
 
 SCRIPT = os.path.join(SOURCE, 'scripts', 'bench-full-order')
 FORCE = 1409.70532353  # as pellet.py has it
@@ -25,8 +25,8 @@ def load():
 
 class Bench(Case):
     def test_mesh_a(self):
-        run = subprocess.run([sys.executable, SCRIPT, '--meshes', 'A', '--rivals', 'A', '--repeat', '1', '--timeout', '60',
-                              '--output', self.folder], cwd=SOURCE, capture_output=True, text=True, timeout=180)
+        run = subprocess.run([sys.executable, SCRIPT, '--meshes', 'A', '--rivals', 'A', '--repeat', '1',
+                              '--timeout', str(60 * PATIENCE), '--output', self.folder], cwd=SOURCE, capture_output=True, text=True, timeout=180 * PATIENCE)
         self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
         with open(self.path('full-order.csv'), encoding='utf-8', newline='') as file:
             rows = {(r['solver'], int(r['ranks']), int(r['steps'])): r for r in csv.DictReader(file)}

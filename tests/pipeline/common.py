@@ -11,6 +11,8 @@ SOURCE = os.environ['HYCO_SOURCE']
 MPIEXEC = os.environ.get('MPIEXEC', 'mpiexec')
 ROPE = os.path.join(SOURCE, 'examples', 'rope')
 PELLET = os.path.join(SOURCE, 'examples', 'pellet')
+SANITIZED = os.environ.get('HYCO_SANITIZE') == '1'
+PATIENCE = 10 if SANITIZED else 1  # factor of a run's limit of time; tests/CMakeLists.txt has the same for a test
 
 
 class Case(unittest.TestCase):
@@ -34,7 +36,10 @@ class Case(unittest.TestCase):
         command = [HYCO, *(str(a) for a in args)]
         if ranks:
             command = [MPIEXEC, '--oversubscribe', '-n', str(ranks), *command]
-        return subprocess.run(command, cwd=cwd or cls.folder, timeout=timeout, capture_output=True, text=True)
+        run = subprocess.run(command, cwd=cwd or cls.folder, timeout=timeout * PATIENCE, capture_output=True, text=True)
+        if SANITIZED and ': runtime error: ' in run.stderr:
+            raise AssertionError(run.stderr)
+        return run
 
     @classmethod
     def hyco(cls, *args, **options):

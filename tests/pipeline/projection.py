@@ -8,7 +8,7 @@ import unittest
 import h5py
 import numpy as np
 
-from common import HYCO, PELLET, ROPE, Case
+from common import HYCO, PATIENCE, PELLET, ROPE, Case
 
 SAME = ('-hyco_snapshots', 'snapshots')
 TYPE = ('-hyco_model_type', 'projection')
@@ -157,7 +157,7 @@ class Rope(Case):
             self.assertEqual((t['model_type'], c['not_converged']), (p['model_type'], 0))
             self.assertEqual(self.run_raw('view', '-model', 'three.h5').returncode, 0)
             run = subprocess.run([os.path.join(os.path.dirname(HYCO), 'embed'), ROPE, self.path(f'{name}.c.h5'), '0.07',
-                                  '0.17', *options], cwd=self.folder, capture_output=True, text=True, timeout=60)
+                                  '0.17', *options], cwd=self.folder, capture_output=True, text=True, timeout=60 * PATIENCE)
             self.assertEqual(run.returncode, 0, run.stderr)
             by_call = float(re.search(r'reduced ([0-9.]+) \(converged', run.stdout)[1])
             by_command = self.hyco('predict', '-model', f'{name}.c.h5', '-mu', '0.07,0.17')

@@ -6,6 +6,8 @@ import subprocess
 import sys
 import tempfile
 
+from common import PATIENCE
+
 SOURCE = os.environ["HYCO_SOURCE"]
 BUILD = os.path.dirname(os.environ["HYCO"])
 
@@ -26,7 +28,7 @@ def main():
         os.symlink(f"{SOURCE}/examples", f"{folder}/examples")
         os.symlink(BUILD, f"{folder}/build")
         for command in listed:
-            run = subprocess.run(shlex.split(command), cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+            run = subprocess.run(shlex.split(command), cwd=folder, capture_output=True, text=True, timeout=120 * PATIENCE, check=False)
             print(f"{run.returncode}  {command}")
             if run.returncode:
                 sys.exit(run.stdout + run.stderr)

@@ -7,14 +7,14 @@ import subprocess
 import sys
 import unittest
 
-from common import HYCO, SOURCE, Case
+from common import HYCO, PATIENCE, SOURCE, Case
 
 SCRIPT = os.path.join(SOURCE, 'scripts', 'reproduce')
 
 
 def reproduce(*args, hyco=HYCO):
     return subprocess.run([sys.executable, SCRIPT, *args], env={**os.environ, 'HYCO': hyco}, capture_output=True, text=True,
-                          timeout=280)
+                          timeout=280 * PATIENCE)
 
 
 class Reproduce(Case):

@@ -7,7 +7,7 @@ import subprocess
 import time
 import unittest
 
-from common import MPIEXEC, PELLET, ROPE, SOURCE, Case
+from common import MPIEXEC, PATIENCE, PELLET, ROPE, SOURCE, Case
 
 SCRIPT = os.path.join(SOURCE, 'scripts', 'hyco.sbatch')
 LONG = ('-scene', PELLET, '-values_radius', '4.02,4.03,4.04,4.05,4.07,4.08,4.09,4.1', '-values_load', '0.2,0.4,0.6,0.8,1')
@@ -61,13 +61,13 @@ class Slurm(Case):
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
     def finish(self, process, status=0):
-        out, _ = process.communicate(timeout=60)
+        out, _ = process.communicate(timeout=60 * PATIENCE)
         self.assertEqual(process.returncode, status, out)
         return out
 
     def interrupt(self, process):
         """As Slurm does before the time is over, once a few solutions are there."""
-        deadline = time.monotonic() + 50
+        deadline = time.monotonic() + 50 * PATIENCE
         while len(self.solutions()) < 3 and process.poll() is None and time.monotonic() < deadline:
             time.sleep(0.01)
         process.send_signal(signal.SIGUSR1)

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import unittest
 
-from common import SOURCE, Case
+from common import PATIENCE, SOURCE, Case
 
 sys.path.insert(0, os.path.join(SOURCE, 'scripts', 'tradeoff'))
 import page
@@ -16,7 +16,7 @@ import report
 class Tradeoff(Case):
     def bench(self, name, *arguments):
         run = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'bench-' + name), *arguments, '--output', self.folder],
-                             cwd=SOURCE, capture_output=True, text=True, timeout=200)
+                             cwd=SOURCE, capture_output=True, text=True, timeout=200 * PATIENCE)
         self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
         return run.stdout
 

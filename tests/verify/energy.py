@@ -9,7 +9,7 @@ import unittest
 
 import numpy as np
 
-from common import HYCO, PELLET, SOURCE
+from common import HYCO, PATIENCE, PELLET, SOURCE
 from grids import Grid
 from verify import Verify
 
@@ -27,7 +27,7 @@ contact: {roof: {type: obstacle, group: head, normal: {y: 1}, gap: 0.01}}
 def ramp(scene, points, *options):
     """Rows of (active contacts, W, external work, gap work, defect)."""
     command = [PROGRAM, scene, *(','.join(map(str, p)) for p in points), *options]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    run = subprocess.run(command, capture_output=True, text=True, timeout=100 * PATIENCE, check=False)
     if run.returncode:
         raise AssertionError(f'{" ".join(command)} ended with {run.returncode}:\n{run.stderr}')
     return np.array([[float(v) for v in line.split()] for line in run.stdout.splitlines()])
