@@ -31,7 +31,8 @@ class Case:
     single: list           # points, each with a stiffness of its own
     wanted: list = field(default_factory=list)      # (words, {error: bound}): what an engineer may ask for at once
     settings: list = field(default_factory=list)
-    batch: list = None     # the set that predictions are timed on, where it would take full order too long; None: test
+    batch: list = None     # the set that is timed; None: test
+    ramp: tuple = ()       # a parameter and its value at which the set holds a ramp of the others, after another value
 
 
 def combine(type_, training, **choices):
@@ -84,7 +85,7 @@ def pellet(name, mesh, quick):
                 [("on the RID u 1 % and sigma_11 5 %, largest", {"u_rid_max": 0.01, "sigma_11_max": 0.05}),
                  ("on the RID u 0.15 % and sigma_11 0.25 %, largest", {"u_rid_max": 0.0015, "sigma_11_max": 0.0025}),
                  ("all forces 1e-6, largest", {"lambda_max": 1e-6})])
-    case.batch = radii(4.06, 4.033, 4.045, 4.087)
+    case.batch, case.ramp = radii(4.033, 4.06, 4.045, 4.087), ("radius", 4.06)
     if quick:
         case.training["5 radii"] = ["-values_radius", "4.02,4.04,4.07,4.1", "-values_load", "0.2,0.5,0.7,0.85,1"]
         case.settings = [*combine("hybrid", "5 radii", pod_tol=["1e-7", "1e-10"]), Setting("condensed", "4 Chebyshev radii")]

@@ -64,17 +64,26 @@ class Bench:
 
     def online(self, model):
         """Seconds a solve: points that share their stiffness solved as a set, and points that do not, one by one."""
-        r, _ = self.hyco("predict", "-model", model, *(self.case.batch or self.case.test))
+        r, batch = self.hyco("predict", "-model", model, *(self.case.batch or self.case.test))
         _, rows = self.hyco("predict", "-model", model, "-points", self.points)
         return {"batch_s": r["seconds_total"] / r["n_points"],
-                "single_s": statistics.median(float(row["seconds"]) for row in rows), "memory_mb": r["memory_mb"]}
+                "single_s": statistics.median(float(row["seconds"]) for row in rows), "memory_mb": r["memory_mb"],
+                **self.ramp(batch)}
+
+    def ramp(self, rows):
+        """Seconds of all solves at the ramp's value."""
+        if not self.case.ramp:
+            return {}
+        name, value = self.case.ramp
+        mine = [float(row["seconds"]) for row in rows if abs(float(row[name]) - value) < 1e-9]
+        return {"ramp_s": sum(mine), "ramp_n": len(mine)} if len(mine) > 1 else {}
 
     def full(self, *options, ramps=True):
         """The same of full order; a process that has read and paired its mesh. Without ramps: of single points alone."""
         r, rows = self.hyco("solve", *self.case.scene, *(self.case.batch or self.case.test if ramps else ["-points", self.points]), *options)
         _, single = self.hyco("solve", *self.case.scene, "-points", self.points, *options) if ramps else (r, rows)
         return {"batch_s": sum(float(row["seconds"]) for row in rows) / len(rows),
-                "single_s": statistics.median(float(row["seconds"]) for row in single), "memory_mb": r["memory_mb"]}
+                "single_s": statistics.median(float(row["seconds"]) for row in single), "memory_mb": r["memory_mb"], **self.ramp(rows)}
 
     def setting(self, setting, model):
         row = {"type": setting.type, "label": setting.label, "status": "ok"}

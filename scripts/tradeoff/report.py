@@ -93,11 +93,17 @@ def wanted(case, rows, full):
             if r:
                 lines.append([words, f"{r['id']}: {kind}", seconds(r["batch_s"]), f"{full['warm']['batch_s'] / r['batch_s']:.3g}",
                               seconds(r["single_s"]), f"{full['warm']['single_s'] / r['single_s']:.3g}",
-                              f"{full[PLAIN]['single_s'] / r['single_s']:.3g}"])
+                              f"{full[PLAIN]['single_s'] / r['single_s']:.3g}", *ramp(r, full)])
         if not joint(rows, bounds):
-            lines.append([words, "none", *[""] * 5])
+            lines.append([words, "none", *[""] * (7 if case.ramp else 5)])
     return table(["asked", "cheapest of its type", "a solve of the set", "times faster than warm full order", "a single solve",
-                  "times faster than full order", f"than {PLAIN}"], lines)
+                  "times faster than full order", f"than {PLAIN}",
+                  *([f"a ramp of {full['warm']['ramp_n']:.0f} solves at a new {case.ramp[0]}", "times faster"] if case.ramp else [])],
+                 lines)
+
+
+def ramp(row, full):
+    return [seconds(row["ramp_s"]), f"{full['warm']['ramp_s'] / row['ramp_s']:.3g}"] if "ramp_s" in row else []
 
 
 def headline(case, rows, full):
@@ -107,10 +113,11 @@ def headline(case, rows, full):
     for kind in COLORS:
         r = joint(rows, bounds, kind)
         if r:
-            parts.append(f"{kind} {seconds(r['batch_s'])} a load step ({full['warm']['batch_s'] / r['batch_s']:.0f} times), "
-                         f"{seconds(r['single_s'])} for a new geometry ({full['warm']['single_s'] / r['single_s']:.0f} times)")
+            whole = (f"{seconds(r['ramp_s'])} for a ramp of {r['ramp_n']:.0f} loads ({full['warm']['ramp_s'] / r['ramp_s']:.0f} times), "
+                     if "ramp_s" in r else "")
+            parts.append(f"{kind} {whole}{seconds(r['single_s'])} for a new geometry ({full['warm']['single_s'] / r['single_s']:.0f} times)")
     return (f"{case.name}, {words}: {'; '.join(parts)}. In brackets: faster than full order that keeps its factor and its active "
-            f"set; that takes {seconds(full['warm']['batch_s'])} and {seconds(full['warm']['single_s'])}, and "
+            f"set; that takes {seconds(full['warm'].get('ramp_s', full['warm']['batch_s']))} and {seconds(full['warm']['single_s'])}, and "
             f"{seconds(full[PLAIN]['single_s'])} with {PLAIN}, the paper's baseline.")
 
 
@@ -126,8 +133,10 @@ def settings(rows):
 
 
 def full_orders(full):
-    lines = [[name, seconds(r["batch_s"]), seconds(r["single_s"]), f"{r['memory_mb']:.0f}"] for name, r in full.items()]
-    return table(["full order", "a solve of the set", "a single solve", "MB"], lines)
+    ramps = "ramp_s" in full["warm"]
+    lines = [[name, seconds(r["batch_s"]), seconds(r["single_s"]), f"{r['memory_mb']:.0f}",
+              *([seconds(r["ramp_s"]) if "ramp_s" in r else ""] if ramps else [])] for name, r in full.items()]
+    return table(["full order", "a solve of the set", "a single solve", "MB", *(["the ramp"] if ramps else [])], lines)
 
 
 def plot(case, rows, full, path):
