@@ -16,6 +16,7 @@ PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
   PetscFunctionBegin;
   HycoCheckHandle(scene, "HycoSceneLoad()");
   PetscCall(PetscNew(samples));
+  PetscCall(HycoHandleOpen(*samples, "HycoSamplesCreate()"));
   (*samples)->scene = scene;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -24,6 +25,8 @@ PetscErrorCode HycoSamplesDestroy(HycoSamples *samples)
 {
   PetscFunctionBegin;
   if (!samples || !*samples) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*samples, "HycoSamplesCreate()");
+  HycoHandleClose(*samples);
   PetscCall(PetscFree((*samples)->mu));
   PetscCall(PetscFree(*samples));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -39,10 +42,11 @@ PetscErrorCode HycoSamplesGetScene(HycoSamples s, HycoScene *scene)
 
 PetscErrorCode HycoSamplesAddPoint(HycoSamples s, const PetscReal mu[])
 {
-  const PetscInt P = s ? s->scene->n_parameters : 0;
+  PetscInt P;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
+  P = s->scene->n_parameters;
   PetscCall(HycoSceneCheckParameters(s->scene, P, mu));
   if (s->n == s->room) {
     s->room = 2 * s->room + 16;

@@ -28,6 +28,7 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
   PetscFunctionBegin;
   HycoCheckHandle(scene, "HycoSceneLoad()");
   PetscCall(PetscNew(&s));
+  PetscCall(HycoHandleOpen(s, "HycoSnapshotsOpen()"));
   PetscCallMPI(MPI_Comm_dup(comm, &s->comm));
   s->scene = scene;
   PetscCall(PetscStrncpy(s->folder, folder, sizeof(s->folder)));
@@ -41,6 +42,8 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
 {
   PetscFunctionBegin;
   if (!snapshots || !*snapshots) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*snapshots, "HycoSnapshotsOpen()");
+  HycoHandleClose(*snapshots);
   PetscCallMPI(MPI_Comm_free(&(*snapshots)->comm));
   PetscCall(PetscFree(*snapshots));
   PetscFunctionReturn(PETSC_SUCCESS);
