@@ -353,6 +353,7 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
     if (!text[0]) continue;
     PetscCall(ParseNumbers(key, text, &m, &values));
     HycoCheck(m == 1, "-%s has %d values; one is expected", key, (int)m);
+    HycoCheck(!whole, "-mu and -%s are both given; give -mu with all of them, or -mu_NAME for each", key);
     mu[p] = values[0];
     given++;
     PetscCall(PetscFree(values));

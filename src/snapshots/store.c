@@ -21,9 +21,18 @@ static PetscErrorCode MakeFolder(const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode Begin(HycoSnapshots s)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(s->comm, MakeFolder(s->folder));
+  PetscCall(HycoSceneFingerprint(s->scene, &s->fingerprint));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char folder[], HycoSnapshots *snapshots)
 {
   HycoSnapshots s;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(scene, "HycoSceneLoad()");
@@ -32,8 +41,9 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
   PetscCallMPI(MPI_Comm_dup(comm, &s->comm));
   s->scene = scene;
   PetscCall(PetscStrncpy(s->folder, folder, sizeof(s->folder)));
-  HycoOnRoot(s->comm, MakeFolder(folder));
-  PetscCall(HycoSceneFingerprint(scene, &s->fingerprint));
+  ierr = Begin(s);
+  if (ierr) PetscCall(HycoSnapshotsDestroy(&s));
+  PetscCall(ierr);
   *snapshots = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -154,6 +154,34 @@ static PetscErrorCode TestNullPlaces(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sets of points that cannot be: no value, too many, a part of them that leaves nothing; then the set is as it was. */
+static PetscErrorCode TestSamples(void)
+{
+  const PetscReal value[1] = {0.1}, *const values[2] = {value, value};
+  const PetscInt none[2] = {1, 0}, many[2] = {100000, 100000}, one[2] = {1, 1};
+  PetscInt n;
+  HycoScene scene;
+  HycoSamples samples, kept = NULL, held = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  CHECK_FAILS(HycoSamplesAddProduct(samples, none, values), "parameter mu2 has 0 values; at least 1 is needed");
+  CHECK_FAILS(HycoSamplesAddProduct(samples, many, values), "more than 100 million points");
+  CHECK_FAILS(HycoSamplesAddGrid(samples, none, PETSC_FALSE), "the grid has 0 points for mu2; at least 1 are needed");
+  CHECK_FAILS(HycoSamplesAddGrid(samples, one, PETSC_TRUE), "the grid has 1 points for mu1; at least 2 are needed");
+  CHECK_FAILS(HycoSamplesAddChebyshev(samples, none), "the grid has 0 points for mu2; at least 1 is needed");
+  CHECK_FAILS(HycoSamplesAddPoint(samples, outside), "lies outside its range");
+  PetscCall(HycoSamplesAddPoint(samples, inside));
+  CHECK_FAILS(HycoSamplesHoldOut(samples, 1, 0, &kept, &held), "leaves nothing");
+  CHECK_FAILS(HycoSamplesHoldOut(samples, 3, 3, &kept, &held), "leaves nothing");
+  PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
+  CHECK(n == 1, "the set has %d points; the one that was good is expected", (int)n);
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The wrong order, sizes that do not match, then the right call on the same handle gives the right numbers. */
 static PetscErrorCode TestAfterError(void)
 {
@@ -315,6 +343,7 @@ static PetscErrorCode Test(void)
   PetscCall(TestDestroyed());
   PetscCall(TestStale());
   PetscCall(TestNullPlaces());
+  PetscCall(TestSamples());
   PetscCall(TestAfterError());
   PetscCall(TestTwo());
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
