@@ -154,7 +154,7 @@ CASES = [
     (['train', *T, *N, '-force_rope_x', '0'], 'there is nothing to learn'),
 ]
 # on two ranks: errors found by one rank, by all, or while files are written
-TWO = ('body_rope_young: "2*(x"', 'must be positive', 'none.msh cannot', 'mu1 = 0.04', 'cut.h5', 'contact_clad', 'not YAML',
+TWO = ('body_rope_young: "2*(x"', 'text.h5 is no HDF5 file', 'must be positive', 'none.msh cannot', 'mu1 = 0.04', 'cut.h5', 'contact_clad', 'not YAML',
        'knows no option -zzz', 'none/out.h5', '-hyco_rid_region', 'none/r.json', 'nothing to learn')
 MPI_NOISE = ('mpiexec', '-----', 'Primary job', 'a non-zero exit code', 'the job to be', 'Process name', 'Exit code')
 

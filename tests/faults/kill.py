@@ -193,9 +193,10 @@ class Kill(Case):
             for ranks in (0, 2):
                 with self.subTest(args=' '.join(args), ranks=ranks):
                     run = self.run_raw(*args, ranks=ranks, timeout=60)
-                    self.assertNotEqual(run.returncode, 0)
+                    self.assertEqual(run.returncode, 1)
                     self.assertIn(f'{args[-1]} ', run.stderr)
                     self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
+                    self.assertNotIn('MPI_ABORT', run.stderr)  # the other rank heard it, and was not left behind
                     self.assertEqual({f for f in os.listdir(self.folder) if f[1] == '.' and f[0] != 'm'}, {'a.xdmf', 'b.h5', 'c.json', 'd.csv'})
         ROWS.add(f'a folder in the place of an output or its .h5 ({len(tries)}), on 1 and 2 ranks', 'one line, nothing half written is left')
 
