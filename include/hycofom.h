@@ -40,8 +40,9 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom);
 /* The solver, to be configured. Borrowed. */
 PetscErrorCode HycoFOMGetSolver(HycoFOM fom, HycoSolver *solver);
 
-/* Assembles what depends on the parameters that changed and solves (16) at mu (length n). Collective. Fails outside
-   the ranges; not converging is no error: see HycoSummary.reason. */
+/* Assembles what depends on the parameters that changed and solves (16) at mu (length n). Collective. Fails, on
+   every rank, outside the ranges and where the ranks do not ask for one point; not converging is no error: see
+   HycoSummary.reason. */
 PetscErrorCode HycoFOMSolve(HycoFOM fom, PetscInt n, const PetscReal mu[]);
 /*
   Solves K U = F - B^T Lambda at mu (length n) with the contact forces of somebody else: Lambda (n_contacts, read on

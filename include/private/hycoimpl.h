@@ -64,10 +64,13 @@ void HycoFormat(char line[HYCO_LINE], const char format[], ...) PETSC_ATTRIBUTE_
     if (PetscUnlikely(!(condition))) HycoFail(__VA_ARGS__);                                                            \
   } while (0)
 
-/* A public handle that is NULL, with the call that makes it. */
-#define HycoCheckHandle(handle, maker)                                                                                 \
-  PetscCheck((handle) != NULL, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,                                                    \
-             "%s: the handle is NULL; make it by " maker " first", PETSC_FUNCTION_NAME)
+/* The public handles that live, each with the call that makes its kind: that text is the kind. A handle is opened when
+   its memory is, and closed when it goes. Check fails for NULL, for what was closed and for another kind; when the
+   memory of a destroyed handle has become another one of its kind, a copy of the old is the new. Not collective. */
+PetscErrorCode HycoHandleOpen(const void *handle, const char maker[]);
+void HycoHandleClose(const void *handle);
+PetscErrorCode HycoHandleCheck(const void *handle, const char maker[], const char function[]);
+#define HycoCheckHandle(handle, maker) PetscCall(HycoHandleCheck((handle), (maker), PETSC_FUNCTION_NAME))
 
 /* 64-bit FNV-1a hash, continued from `hash` (start with HYCO_HASH_START). */
 #define HYCO_HASH_START 14695981039346656037ULL

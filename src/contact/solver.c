@@ -10,6 +10,7 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
 {
   PetscFunctionBegin;
   PetscCall(PetscNew(solver));
+  PetscCall(HycoHandleOpen(*solver, "HycoSolverCreate()"));
   (*solver)->comm = comm;
   (*solver)->rtol = 1e-8;
   (*solver)->warm = PETSC_TRUE;
@@ -25,6 +26,8 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
 
   PetscFunctionBegin;
   if (!solver || !*solver) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*solver, "HycoSolverCreate()");
+  HycoHandleClose(*solver);
   s = *solver;
   PetscCall(HycoDirectDestroy(&s->direct));
   PetscCall(KSPDestroy(&s->ksp_gap));
@@ -244,6 +247,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
+  if (s->system) HycoCheckHandle(s->system, "HycoSystemCreate()");
   PetscCheck(s->system && s->system->F, PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
   s->seconds_factor = s->seconds_before;

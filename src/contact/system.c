@@ -5,6 +5,7 @@ PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
 {
   PetscFunctionBegin;
   PetscCall(PetscNew(system));
+  PetscCall(HycoHandleOpen(*system, "HycoSystemCreate()"));
   (*system)->comm = comm;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -35,6 +36,8 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system)
 
   PetscFunctionBegin;
   if (!system || !*system) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*system, "HycoSystemCreate()");
+  HycoHandleClose(*system);
   s = *system;
   PetscCall(MatDestroy(&s->K));
   PetscCall(MatDestroy(&s->Bt));

@@ -79,6 +79,7 @@ PetscErrorCode HycoModelCompareFields(HycoModel m, const PetscReal u_full[], con
 static PetscErrorCode Compare(HycoModel m, HycoFOM f, const PetscReal sigma[], HycoErrors *e)
 {
   PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoModelLoad()");
   HycoCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
             "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
             "training mesh",

@@ -96,6 +96,7 @@ PetscErrorCode HycoModelValidate(MPI_Comm comm, HycoModel m, HycoSnapshots store
 
   PetscFunctionBegin;
   HycoCheckHandle(m, "HycoModelLoad()");
+  HycoCheckHandle(store, "HycoSnapshotsOpen()");
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCheck(n > 0 && n_par == m->scene->n_parameters, comm, PETSC_ERR_USER,
              "the validation points are none, or of another scene than the model");

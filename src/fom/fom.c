@@ -8,6 +8,8 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
 
   PetscFunctionBegin;
   if (!fom || !*fom) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*fom, "HycoFOMCreate()");
+  HycoHandleClose(*fom);
   f = *fom;
   PetscCall(HycoSolverDestroy(&f->solver));
   PetscCall(HycoSystemDestroy(&f->system));
@@ -163,6 +165,7 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscFunctionBegin;
   HycoCheckHandle(scene, "HycoSceneLoad()");
   PetscCall(PetscNew(fom));
+  PetscCall(HycoHandleOpen(*fom, "HycoFOMCreate()"));
   PetscCallMPI(MPI_Comm_dup(comm, &(*fom)->comm));
   PetscCallMPI(MPI_Comm_rank((*fom)->comm, &(*fom)->rank));
   PetscCallMPI(MPI_Comm_size((*fom)->comm, &(*fom)->size));
@@ -284,6 +287,27 @@ PetscErrorCode HycoFOMGather(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The ranks ask for one point: with several, K would be of no scene, and a rank alone in its error would leave the
+   others waiting. */
+static PetscErrorCode CheckPoint(HycoFOM f, PetscInt n, const PetscReal mu[])
+{
+  PetscReal bounds[2 * HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  HycoOnEach(f->comm, HycoSceneCheckParameters(f->scene, n, mu));
+  if (f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt p = 0; p < n; p++) {
+    bounds[p] = mu[p];
+    bounds[n + p] = -mu[p];
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, bounds, (PetscMPIInt)(2 * n), MPIU_REAL, MPI_MAX, f->comm));
+  for (PetscInt p = 0; p < n; p++) {
+    HycoCheck(bounds[p] == -bounds[n + p], "%s is %.10g on one rank and %.10g on another; give all of them one point",
+              f->scene->parameter[p], (double)-bounds[n + p], (double)bounds[p]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
 {
   HycoSeconds *t;
@@ -292,7 +316,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscFunctionBegin;
   HycoCheckHandle(f, "HycoFOMCreate()");
   t = &f->summary.seconds;
-  PetscCall(HycoSceneCheckParameters(f->scene, n, mu));
+  PetscCall(CheckPoint(f, n, mu));
   PetscCall(HycoFOMAssemble(f, mu));
   t->assemble = HycoNow() - begin;
   PetscCall(HycoSolverSetSystem(f->solver, f->system));

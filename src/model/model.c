@@ -10,6 +10,7 @@ PetscErrorCode HycoModelCreate(HycoModel *model)
 {
   PetscFunctionBegin;
   PetscCall(PetscNew(model));
+  PetscCall(HycoHandleOpen(*model, "HycoModelLoad()"));
   (*model)->reconstruct = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -55,6 +56,8 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
 
   PetscFunctionBegin;
   if (!model || !*model) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*model, "HycoModelLoad()");
+  HycoHandleClose(*model);
   m = *model;
   PetscCall(HycoModelReset(m));
   PetscCall(HycoNormsDestroy(&m->norms));
@@ -107,6 +110,7 @@ PetscErrorCode HycoModelCheckScene(HycoModel m, HycoScene scene)
 
   PetscFunctionBegin;
   HycoCheckHandle(m, "HycoModelLoad()");
+  HycoCheckHandle(scene, "HycoSceneLoad()");
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
   HycoCheck(

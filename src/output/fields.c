@@ -123,10 +123,15 @@ PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[
   slash = strrchr(h5, '/');
   WriteXDMF(out, slash ? slash + 1 : h5, m, n, field);
   ierr = fclose(out) ? PETSC_ERR_FILE_WRITE : HycoH5Create(h5, &h);
-  if (!ierr) {
-    ierr = WriteNumbers(h, m, X, scene, mu, n, field, contact);
-    if (!ierr && rename(partial, path) != 0) ierr = PETSC_ERR_FILE_WRITE;
-    PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  if (!ierr) { /* the numbers first: without them the .xdmf would point at none, or at those of another run */
+    const PetscErrorCode failed = WriteNumbers(h, m, X, scene, mu, n, field, contact);
+
+    ierr = HycoH5Close(&h, (PetscBool)!failed);
+    if (!ierr) ierr = failed;
+    if (!ierr && rename(partial, path) != 0) {
+      remove(h5);
+      ierr = PETSC_ERR_FILE_WRITE;
+    }
   }
   if (ierr) remove(partial);
   HycoCheck(!ierr, "%s or its .h5 could not be written: is a folder in the way, is the disk full?", path);

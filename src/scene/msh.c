@@ -439,7 +439,8 @@ static PetscErrorCode CheckSections(Msh *m)
       PetscCall(CheckNames(m));
     else
       HycoCheck(strncmp(line, "$MeshFormat", 11) && strncmp(line, "$Parti", 6) && strncmp(line, "$Ghost", 6),
-                "the mesh %s has a section %.18s that hyco does not take", m->path, line);
+                "the mesh %s has a section %.*s that hyco does not take", m->path,
+                (int)PetscMin(strcspn(line, "\r\n"), 40), line);
     HycoCheck(!m->failed, "the mesh %s is damaged", m->path);
   }
   HycoCheck(m->has_elements, "the mesh %s cannot be read: it has no $Nodes and $Elements, or ends before them",

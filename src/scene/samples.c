@@ -16,6 +16,7 @@ PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
   PetscFunctionBegin;
   HycoCheckHandle(scene, "HycoSceneLoad()");
   PetscCall(PetscNew(samples));
+  PetscCall(HycoHandleOpen(*samples, "HycoSamplesCreate()"));
   (*samples)->scene = scene;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -24,6 +25,8 @@ PetscErrorCode HycoSamplesDestroy(HycoSamples *samples)
 {
   PetscFunctionBegin;
   if (!samples || !*samples) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*samples, "HycoSamplesCreate()");
+  HycoHandleClose(*samples);
   PetscCall(PetscFree((*samples)->mu));
   PetscCall(PetscFree(*samples));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -39,10 +42,11 @@ PetscErrorCode HycoSamplesGetScene(HycoSamples s, HycoScene *scene)
 
 PetscErrorCode HycoSamplesAddPoint(HycoSamples s, const PetscReal mu[])
 {
-  const PetscInt P = s ? s->scene->n_parameters : 0;
+  PetscInt P;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
+  P = s->scene->n_parameters;
   PetscCall(HycoSceneCheckParameters(s->scene, P, mu));
   if (s->n == s->room) {
     s->room = 2 * s->room + 16;
@@ -78,6 +82,17 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All combinations of the values, which are freed. */
+static PetscErrorCode TakeProduct(HycoSamples s, const PetscInt counts[], PetscReal *values[])
+{
+  const PetscErrorCode ierr = HycoSamplesAddProduct(s, counts, (const PetscReal *const *)values);
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < s->scene->n_parameters; p++) PetscCall(PetscFree(values[p]));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscBool closed)
 {
   PetscReal *values[HYCO_MAX_PARAMETERS];
@@ -85,18 +100,21 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscB
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
-    const PetscReal lo = s->scene->lo[p], hi = s->scene->hi[p];
-    const PetscInt n = counts[p], least = closed && lo < hi ? 2 : 1;
+    const PetscInt least = closed && s->scene->lo[p] < s->scene->hi[p] ? 2 : 1;
 
-    HycoCheck(n >= least && n <= 100000000, "the grid has %d points for %s; at least %d are needed", (int)n,
-              s->scene->parameter[p], (int)least);
+    HycoCheck(counts[p] >= least && counts[p] <= 100000000, "the grid has %d points for %s; at least %d are needed",
+              (int)counts[p], s->scene->parameter[p], (int)least);
+  }
+  for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
+    const PetscReal lo = s->scene->lo[p], hi = s->scene->hi[p];
+    const PetscInt n = counts[p];
+
     PetscCall(PetscMalloc1(n, &values[p]));
     for (PetscInt k = 0; k < n; k++) {
       values[p][k] = closed ? (k == n - 1 ? hi : lo + k * (hi - lo) / (n - 1)) : lo + (k + 0.5) * (hi - lo) / n;
     }
   }
-  PetscCall(HycoSamplesAddProduct(s, counts, (const PetscReal *const *)values));
-  for (PetscInt p = 0; p < s->scene->n_parameters; p++) PetscCall(PetscFree(values[p]));
+  PetscCall(TakeProduct(s, counts, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -109,11 +127,12 @@ PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     HycoCheck(counts[p] >= 1 && counts[p] <= 100000000, "the grid has %d points for %s; at least 1 is needed",
               (int)counts[p], s->scene->parameter[p]);
+  }
+  for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     PetscCall(PetscMalloc1(counts[p], &values[p]));
     PetscCall(HycoChebyshevNodes(counts[p], s->scene->lo[p], s->scene->hi[p], values[p]));
   }
-  PetscCall(HycoSamplesAddProduct(s, counts, (const PetscReal *const *)values));
-  for (PetscInt p = 0; p < s->scene->n_parameters; p++) PetscCall(PetscFree(values[p]));
+  PetscCall(TakeProduct(s, counts, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -367,6 +367,7 @@ PetscErrorCode HycoSceneLoad(MPI_Comm comm, const char path[], HycoScene *scene)
   PetscCheck(path && scene, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
              "HycoSceneLoad: the path or the handle's address is NULL");
   PetscCall(PetscNew(scene));
+  PetscCall(HycoHandleOpen(*scene, "HycoSceneLoad()"));
   PetscCallMPI(MPI_Comm_dup(comm, &(*scene)->comm));
   ierr = LoadInto(*scene, path);
   if (ierr) PetscCall(HycoSceneDestroy(scene));
@@ -398,6 +399,7 @@ PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[]
 
   PetscFunctionBegin;
   PetscCall(PetscNew(scene));
+  PetscCall(HycoHandleOpen(*scene, "HycoSceneLoad()"));
   PetscCallMPI(MPI_Comm_dup(comm, &(*scene)->comm));
   ierr = FillFromEntries(*scene, n, key, value, folder);
   if (ierr) PetscCall(HycoSceneDestroy(scene));
@@ -467,6 +469,8 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
 
   PetscFunctionBegin;
   if (!scene || !*scene) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*scene, "HycoSceneLoad()");
+  HycoHandleClose(*scene);
   s = *scene;
   *scene = NULL;
   for (PetscInt k = 0; k < s->n_bodies; k++) {

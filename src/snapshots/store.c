@@ -21,18 +21,29 @@ static PetscErrorCode MakeFolder(const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode Begin(HycoSnapshots s)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(s->comm, MakeFolder(s->folder));
+  PetscCall(HycoSceneFingerprint(s->scene, &s->fingerprint));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char folder[], HycoSnapshots *snapshots)
 {
   HycoSnapshots s;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(scene, "HycoSceneLoad()");
   PetscCall(PetscNew(&s));
+  PetscCall(HycoHandleOpen(s, "HycoSnapshotsOpen()"));
   PetscCallMPI(MPI_Comm_dup(comm, &s->comm));
   s->scene = scene;
   PetscCall(PetscStrncpy(s->folder, folder, sizeof(s->folder)));
-  HycoOnRoot(s->comm, MakeFolder(folder));
-  PetscCall(HycoSceneFingerprint(scene, &s->fingerprint));
+  ierr = Begin(s);
+  if (ierr) PetscCall(HycoSnapshotsDestroy(&s));
+  PetscCall(ierr);
   *snapshots = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -41,6 +52,8 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
 {
   PetscFunctionBegin;
   if (!snapshots || !*snapshots) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*snapshots, "HycoSnapshotsOpen()");
+  HycoHandleClose(*snapshots);
   PetscCallMPI(MPI_Comm_free(&(*snapshots)->comm));
   PetscCall(PetscFree(*snapshots));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -297,10 +297,12 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
   HycoSamples chosen = NULL;
   HycoTraining report = {0};
   PetscReal begin = HycoNow(), solved;
-  const PetscBool condensed = (PetscBool)(t && t->type == HYCO_MODEL_CONDENSED), choose = (PetscBool)!samples;
+  const PetscBool choose = (PetscBool)!samples;
+  PetscBool condensed;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
+  condensed = (PetscBool)(t->type == HYCO_MODEL_CONDENSED);
   HycoCheck(samples || condensed, "give the training points");
   if (choose) {
     PetscCall(HycoTrainerStartPoints(t, &chosen));

@@ -9,6 +9,7 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   PetscFunctionBegin;
   HycoCheckHandle(scene, "HycoSceneLoad()");
   PetscCall(PetscNew(&t));
+  PetscCall(HycoHandleOpen(t, "HycoTrainerCreate()"));
   PetscCallMPI(MPI_Comm_dup(comm, &t->comm));
   PetscCallMPI(MPI_Comm_rank(t->comm, &t->rank));
   t->scene = scene;
@@ -62,6 +63,8 @@ PetscErrorCode HycoTrainerDestroy(HycoTrainer *trainer)
 
   PetscFunctionBegin;
   if (!trainer || !*trainer) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*trainer, "HycoTrainerCreate()");
+  HycoHandleClose(*trainer);
   t = *trainer;
   PetscCall(HycoTrainerReset(t));
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));

@@ -58,6 +58,82 @@ static PetscErrorCode TestDestroyed(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A copy of a handle that was destroyed is refused, and so is one of another kind or of none: nothing is read there. */
+static PetscErrorCode TestStale(void)
+{
+  char none[64] = {0};
+  const PetscInt counts[2] = {2, 2};
+  HycoScene scene, scene_copy;
+  HycoSamples samples, samples_copy;
+  HycoTrainer trainer, trainer_copy;
+  HycoSnapshots store, store_copy;
+  HycoFOM fom, fom_copy;
+  HycoModel model, model_copy, models[100];
+  HycoSolver solver, solver_copy;
+  HycoSystem system, system_copy;
+  HycoErrors errors;
+  Vec F;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
+  PetscCall(HycoSnapshotsOpen(PETSC_COMM_WORLD, scene, "faults-api.snapshots", &store));
+  rmdir("faults-api.snapshots");
+  PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
+  PetscCall(HycoModelLoad(hybrid, &model));
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
+  scene_copy = scene;
+  samples_copy = samples;
+  trainer_copy = trainer;
+  store_copy = store;
+  fom_copy = fom;
+  model_copy = model;
+  solver_copy = solver;
+  system_copy = system;
+  CHECK_FAILS(HycoModelPredict((HycoModel)fom, 2, inside), "was destroyed, or never made; make it by HycoModelLoad()");
+  CHECK_FAILS(HycoModelPredict((HycoModel)none, 2, inside), "was destroyed, or never made; make it by HycoModelLoad()");
+  PetscCall(HycoSolverSetSystem(solver, system));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, 1, &F));
+  PetscCall(HycoSystemDestroy(&system));
+  CHECK_FAILS(HycoSolverSolve(solver, F, F), "was destroyed, or never made; make it by HycoSystemCreate()");
+  PetscCall(VecDestroy(&F));
+  PetscCall(HycoSceneDestroy(&scene)); /* before those that borrow it */
+  CHECK_FAILS(HycoFOMSolve(fom, 2, inside), "was destroyed, or never made; make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSamplesAddPoint(samples, inside), "was destroyed, or never made; make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoModelCheckScene(model, scene_copy), "was destroyed, or never made; make it by HycoSceneLoad()");
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoSnapshotsDestroy(&store));
+  PetscCall(HycoModelDestroy(&model));
+  CHECK_FAILS(HycoModelCompare(model_copy, fom, &errors), "HycoFOMSolve()");
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSolverDestroy(&solver));
+  CHECK_FAILS(HycoSceneDestroy(&scene_copy), "was destroyed, or never made; make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSamplesAddGrid(samples_copy, counts, PETSC_FALSE), "never made; make it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoSamplesAddPoint(samples_copy, inside), "never made; make it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoSamplesDestroy(&samples_copy), "never made; make it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoTrainerRun(trainer_copy, samples, "m.h5", NULL), "never made; make it by HycoTrainerCreate()");
+  CHECK_FAILS(HycoTrainerDestroy(&trainer_copy), "never made; make it by HycoTrainerCreate()");
+  CHECK_FAILS(HycoSnapshotsFill(store_copy, samples, NULL, NULL), "never made; make it by HycoSnapshotsOpen()");
+  CHECK_FAILS(HycoSnapshotsDestroy(&store_copy), "never made; make it by HycoSnapshotsOpen()");
+  CHECK_FAILS(HycoFOMSolve(fom_copy, 2, inside), "never made; make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMDestroy(&fom_copy), "never made; make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoModelPredict(model_copy, 2, inside), "never made; make it by HycoModelLoad()");
+  CHECK_FAILS(HycoModelDestroy(&model_copy), "never made; make it by HycoModelLoad()");
+  CHECK_FAILS(HycoSolverSetType(solver_copy, HYCO_SOLVER_TAO), "never made; make it by HycoSolverCreate()");
+  CHECK_FAILS(HycoSystemDestroy(&system_copy), "never made; make it by HycoSystemCreate()");
+  CHECK_FAILS(HycoSolverDestroy(&solver_copy), "never made; make it by HycoSolverCreate()");
+  for (int k = 0; k < 100; k++) PetscCall(HycoModelLoad(hybrid, &models[k])); /* the table grows, and closes its holes */
+  for (int k = 0; k < 100; k += 3) PetscCall(HycoModelDestroy(&models[k]));
+  for (int k = 0; k < 100; k++) {
+    if (models[k]) PetscCall(HycoModelPredict(models[k], 2, inside));
+  }
+  for (int k = 0; k < 100; k++) PetscCall(HycoModelDestroy(&models[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* NULL where an address is expected. */
 static PetscErrorCode TestNullPlaces(void)
 {
@@ -74,6 +150,34 @@ static PetscErrorCode TestNullPlaces(void)
   CHECK_FAILS(HycoModelPredict(model, 2, NULL), "is NULL");
   CHECK_FAILS(HycoSceneCheckParameters(scene, 2, NULL), "is NULL");
   PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sets of points that cannot be: no value, too many, a part of them that leaves nothing; then the set is as it was. */
+static PetscErrorCode TestSamples(void)
+{
+  const PetscReal value[1] = {0.1}, *const values[2] = {value, value};
+  const PetscInt none[2] = {1, 0}, many[2] = {100000, 100000}, one[2] = {1, 1};
+  PetscInt n;
+  HycoScene scene;
+  HycoSamples samples, kept = NULL, held = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  CHECK_FAILS(HycoSamplesAddProduct(samples, none, values), "parameter mu2 has 0 values; at least 1 is needed");
+  CHECK_FAILS(HycoSamplesAddProduct(samples, many, values), "more than 100 million points");
+  CHECK_FAILS(HycoSamplesAddGrid(samples, none, PETSC_FALSE), "the grid has 0 points for mu2; at least 1 are needed");
+  CHECK_FAILS(HycoSamplesAddGrid(samples, one, PETSC_TRUE), "the grid has 1 points for mu1; at least 2 are needed");
+  CHECK_FAILS(HycoSamplesAddChebyshev(samples, none), "the grid has 0 points for mu2; at least 1 is needed");
+  CHECK_FAILS(HycoSamplesAddPoint(samples, outside), "lies outside its range");
+  PetscCall(HycoSamplesAddPoint(samples, inside));
+  CHECK_FAILS(HycoSamplesHoldOut(samples, 1, 0, &kept, &held), "leaves nothing");
+  CHECK_FAILS(HycoSamplesHoldOut(samples, 3, 3, &kept, &held), "leaves nothing");
+  PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
+  CHECK(n == 1, "the set has %d points; the one that was good is expected", (int)n);
+  PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -238,7 +342,9 @@ static PetscErrorCode Test(void)
   snprintf(hybrid, sizeof(hybrid), "%s/tests/data/rope-hybrid-3.h5", source);
   snprintf(projection, sizeof(projection), "%s/tests/data/rope-projection-3.h5", source);
   PetscCall(TestDestroyed());
+  PetscCall(TestStale());
   PetscCall(TestNullPlaces());
+  PetscCall(TestSamples());
   PetscCall(TestAfterError());
   PetscCall(TestTwo());
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
@@ -247,7 +353,7 @@ static PetscErrorCode Test(void)
     rows = fopen("faults/api.csv", "w");
     PetscCheck(rows, PETSC_COMM_SELF, PETSC_ERR_USER, "faults/api.csv cannot be written");
     fprintf(rows,
-            "\"C API: NULL, destroyed, wrong order, wrong sizes, reuse after an error, two models at once\",\"refused "
+            "\"C API: NULL, destroyed, copies of destroyed handles, handles of another kind, wrong order, wrong sizes, reuse after an error, two models at once\",\"refused "
             "by name; then the right numbers\"\n");
     PetscCall(TestGrowth("create, use, destroy", Once, 1000));
     PetscCall(TestGrowth("refused", OnceRefused, 1000));

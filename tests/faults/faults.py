@@ -2,10 +2,11 @@
 import glob
 import os
 import shutil
+import subprocess
 import time
 import unittest
 
-from common import PATIENCE, PELLET, ROPE, Case
+from common import HYCO, MPIEXEC, PATIENCE, PELLET, ROPE, Case
 from rows import Rows
 
 R = ['-scene', ROPE, '-mu', '0.07,0.17']
@@ -31,14 +32,35 @@ CASES = [
     (['solve', '-scene', ROPE], 'the scene has 2 parameters (mu1 from 0.05 to 0.25, mu2 from -0.05 to 0.5); give -mu'),
     (['solve', *R, '-options_file', 'none.opt'], 'PETSc does not start: Unable to open options file none.opt'),
     (['solve', *R, '-options_file', 'text.h5'], 'PETSc does not start: Unknown first token in options file text.h5'),
+    (['solve', *R, '-options_file', 'unknown.opt'], 'nothing reads the option -hyco_solver_typ here'),
+    (['solve', *R, '-options_file', 'wrong.opt'], '-hyco_solver_type is "newton"; it must be one of'),
+    (['solve', *R, '-options_file', 'stray.opt'], 'Unknown first token in options file stray.opt line 2: stray'),
     (['solve', '-mu', '0.07,0.17'], '-scene is missing'),
     (['solve', *R, '-output'], '-output needs a value'),
     (['train', '-scene', ROPE, *N], '-model is missing'),
     (['solve', *R, '-hyco_solver_type', 'newton'], 'it must be one of: active_set, tao, lemke'),
     (['solve', *R, '-hyco_solver_rtol', '2'], '-hyco_solver_rtol is "2"; it must be a number from'),
     (['solve', *R, '-hyco_solver_max_its', '1.5'], 'it must be a whole number'),
+    (['solve', *R, '-hyco_solver_rtol', '1' * 2000], '-hyco_solver_rtol is longer than'),
+    (['solve', *R, '-hyco_solver_type', 'tao', '-hyco_tao_type', 'foo'], '-hyco_tao_type is "foo"; it must be one of: gpcg'),
     (['solve', *R, '-hyco_tao_gatol', '1e-9'], 'nothing reads the option -hyco_tao_gatol here'),
     (['solve', *P, '-hyco_mumps_icntl14', 'lu'], 'nothing reads the option -hyco_mumps_icntl14 here'),
+    # options that exclude each other
+    (['solve', *R, *N, '-table', 'out.csv'], 'nothing reads the option -mu here'),
+    (['solve', '-scene', ROPE, *N, '-table', 'out.csv', '-output', 'out.xdmf'], '-output is for one point (-mu)'),
+    (['predict', '-model', 'rope.h5', *N, '-table', 'out.csv', '-output', 'out.xdmf'], '-output is for one point (-mu)'),
+    (['solve', *R, '-hyco_tao_type', 'gpcg'], 'nothing reads the option -hyco_tao_type here: the type is active_set'),
+    (['train', *T, *N, '-validation_grid', '2,2', '-validation_points', 'p.csv', '-target_u', '1e-2'], 'give one set of points to validate by'),
+    (['train', *T, *N, '-validation_grid', '2,2'], '-validation_grid and -validation_points judge models against targets'),
+    (['train', *T, '-greedy', '-training_grid', '3,3', '-target_u', '1e-2'], 'train -greedy stops by -target'),
+    (['train', *T, '-greedy', '-training_grid', '3,3', '-hyco_model_type', 'condensed'], 'needs a tensor grid of training points'),
+    (['train', *T, *N, '-hyco_dual', 'nnmf'], '-hyco_dual nnmf is for -hyco_model_type projection'),
+    (['train', *T, *N, '-hyco_dual', 'fe', '-hyco_model_type', 'projection'], '-hyco_dual fe leaves a projection-based model'),
+    (['train', *T, *N, '-hyco_hybrid', 'contact'], '-hyco_hybrid contact leaves the modes without equation'),
+    (['predict', '-model', 'rope.h5', '-mu', '0.07,0.17', '-target_u', '1e-2'], 'give -hyco_fallback too'),
+    (['predict', '-model', 'rope.h5', '-mu', '0.07,0.17', '-hyco_fallback'], 'give its -scene too'),
+    (['view', '-scene', ROPE, '-model', 'rope.h5'], 'give -model FILE.h5 or -scene FOLDER'),
+    (['view'], 'give -model FILE.h5 or -scene FOLDER'),
     # the scene
     (['solve', '-scene', 'nowhere', '-mu', '1'], 'there is no scene nowhere'),
     (['solve', '-scene', 'empty', '-mu', '1'], 'the folder empty holds no scene.yaml'),
@@ -65,6 +87,8 @@ CASES = [
     (['solve', '-scene', ROPE, '-mu_mu1', '0.07'], 'give -mu with all of them, or -mu_NAME for each'),
     (['solve', *R, '-mu_mu3', '1'], '-mu_mu3 names no parameter'),
     (['solve', *R, '-mu_mu1', '0.07'], '-mu gives every parameter, and -mu_mu1 gives one of them again'),
+    (['solve', '-scene', ROPE, '-mu_mu1', '0.08,0.09', '-mu_mu2', '0.17'], '-mu_mu1 has 2 values; one is expected'),
+    (['solve', '-scene', ROPE, '-mu', ','.join(['0.1'] * 2000)], '-mu is longer than'),
     # the mesh
     (['solve', *R, '-scene_mesh', 'none.msh'], 'the mesh none.msh cannot be opened'),
     (['solve', *R, '-scene_mesh', 'text.msh'], 'text.msh is no gmsh mesh'),
@@ -75,7 +99,6 @@ CASES = [
     (['solve', *P, '-scene_mesh', 'shifted.msh', '-contact_gap_tolerance', '1e-12'], 'have no node of contact_clad'),
     # outputs
     (['solve', *R, '-output', 'rope.vtk'], 'give a name that ends in .xdmf'),
-    (['solve', *R, '-output', 'none/rope.xdmf'], 'cannot be written'),
     (['solve', *R, *STOPPED, '-output', 'rope.vtk'], 'give a name that ends in .xdmf'),  # before it stops
     (['solve', *R, *STOPPED, '-report', 'none/r.json'], 'none/r.json cannot be written'),
     (['solve', *R, *STOPPED, '-output', 'rope.xdmf'], 'rope.h5 is a model or a snapshot'),
@@ -84,7 +107,9 @@ CASES = [
     (['solve', '-scene', ROPE, *N, '-table', 'x', '-report', 'x'], '-report and -table are both x'),
     (['predict', '-model', 'rope.h5', '-mu', '0.07,0.17', '-report', 'rope.h5'], '-model and -report are both rope.h5'),
     (['predict', '-model', 'rope.h5', *N, '-table', 'none/t.csv'], 'none/t.csv cannot be written'),
-    (['solve', *R, '-report', 'none/r.json'], 'none/r.json cannot be written'),
+    (['solve', *R, '-output', 'none/rope.xdmf'], '-output none/rope.xdmf cannot be written'),
+    (['solve', *R, '-report', 'none/r.json'], '-report none/r.json cannot be written'),
+    (['solve', '-scene', ROPE, *N, '-output', 'none/r.xdmf', '-table', 'none/t.csv'], '-table none/t.csv cannot be written'),
     # models
     (['predict', '-model', 'none.h5', '-mu', '0.07,0.17'], 'none.h5 cannot be opened'),
     (['predict', '-model', 'cut.h5', '-mu', '0.07,0.17'], 'cut.h5 is no HDF5 file, or it is damaged; if it was a model, train it again'),
@@ -106,14 +131,25 @@ CASES = [
     (['solve', *R, '-hyco_fallback'], 'hyco solve does not read -hyco_fallback'),
     (['solve', *R, '-hyco_reconstruct', 'false'], 'what does: hyco train, predict, compare'),
     (['predict', '-model', 'rope.h5', '-mu', '0.07,0.1', '-output', 'out.vtk'], 'ends in .xdmf'),
-    (['predict', '-model', 'rope.h5', '-mu', '0.07,0.1', '-output', 'none/out.xdmf'], 'cannot be written'),
-    (['compare', '-scene', PELLET, '-model', 'rope.h5', *N], ''),
     (['compare', '-scene', ROPE, '-model', 'rope.h5'], 'give the test points: -mu V,V,... for one, or -grid'),
     (['compare', '-scene', ROPE, '-model', 'rope.h5', *N, *STOPPED], 'the full-order solution at mu1 = 0.1, mu2 = '),
     (['predict', '-model', 'rope.h5', *N, *STOPPED], 'converged of a table (-table FILE.csv) says which'),
+    (['predict', '-model', 'rope.h5', '-mu', '0.07,0.1', '-output', 'none/out.xdmf'], '-output none/out.xdmf cannot be written'),
+    (['predict', '-model', 'empty', '-mu', '0.07,0.1'], 'empty is no file; one that hyco has written is expected'),
+    (['compare', '-scene', PELLET, '-model', 'rope.h5', *N], 'was trained on another scene or mesh'),
     (['view', '-model', 'text.h5'], 'text.h5 is no HDF5 file'),
     # training
-    (['train', *T], 'give the training points'),
+    (['train', *T], 'give the training points: -grid N,N,...'),
+    (['train', *T, '-greedy'], 'give a greedy training the points to choose from'),
+    (['train', *T, '-greedy', '-training_grid', '3,3', '-target', '0'], '-target is 0'),
+    (['train', *T, '-grid', '20000,20000'], 'the set has more than 100 million points'),
+    (['train', *T, '-points', 'header.csv'], 'header.csv holds no point'),
+    (['train', *T, '-points', 'semicolon.csv'], 'semicolon.csv, line 2: 2 numbers with commas between'),
+    (['train', *T, '-points', 'outside.csv'], 'mu1 = 0.3 lies outside its range'),
+    (['train', *T, '-points', 'other.csv'], 'the column "mu3" is no parameter'),
+    (['train', *T, '-points', 'twice.csv'], 'the column mu1 stands twice'),
+    (['train', *T, *N, '-hyco_trust_folds', '1'], '1 folds cannot calibrate'),
+    (['train', *T, *N, '-hyco_snapshots', 's' * 4050], "the snapshot folder's name is too long"),
     (['train', *T, '-grid', '10'], '-grid has 1 numbers; the scene has 2 parameters'),
     (['train', *T, '-grid', '2,2,2'], '-grid has 3 numbers'),
     (['train', *T, '-grid', '2,0'], 'whole numbers, at least 1, are expected'),
@@ -139,7 +175,7 @@ CASES = [
     (['train', *T, *N, '-force_rope_x', '0'], 'there is nothing to learn'),
 ]
 # on two ranks: errors found by one rank, by all, or while files are written
-TWO = ('body_rope_young: "2*(x"', 'must be positive', 'none.msh cannot', 'mu1 = 0.04', 'cut.h5', 'contact_clad', 'not YAML',
+TWO = ('body_rope_young: "2*(x"', 'text.h5 is no HDF5 file', 'must be positive', 'none.msh cannot', 'mu1 = 0.04', 'cut.h5', 'contact_clad', 'not YAML',
        'knows no option -zzz', 'none/out.h5', '-hyco_rid_region', 'none/r.json', 'nothing to learn')
 MPI_NOISE = ('mpiexec', '-----', 'Primary job', 'a non-zero exit code', 'the job to be', 'Process name', 'Exit code')
 
@@ -152,8 +188,11 @@ class Faults(Case):
         cls.hyco('solve', *R, '-output', 'fields.xdmf')
         os.mkdir(cls.path('empty'))
         for name, text in (('broken.yaml', 'scene:\n  mesh: [a\nbody: {x\n'), ('text.msh', 'hello\n'),
-                           ('text.h5', 'hello\n'), ('p.csv', 'mu1,mu2\n0.1,0.1\n'),
-                           ('header.csv', 'mu1,mu2\n')):
+                           ('text.h5', 'hello\n'), ('p.csv', 'mu1,mu2\n0.1,0.1\n'), ('header.csv', 'mu1,mu2\n'),
+                           ('semicolon.csv', 'mu1,mu2\n0.1;0.2\n'), ('outside.csv', 'mu1,mu2\n0.1,0.2\n0.3,0.2\n'),
+                           ('other.csv', 'mu1,mu3\n0.1,0.2\n'), ('twice.csv', 'mu1,mu1\n0.1,0.2\n'),
+                           ('unknown.opt', '-hyco_solver_typ tao\n'), ('wrong.opt', '-hyco_solver_type newton\n'),
+                           ('stray.opt', '-mu 0.07,0.17\nstray words\n')):
             with open(cls.path(name), 'w', encoding='ascii') as f:
                 f.write(text)
         for source, name, size in ((cls.path('rope.h5'), 'cut.h5', 9000), (os.path.join(PELLET, 'A.msh'), 'cut.msh',
@@ -161,6 +200,7 @@ class Faults(Case):
             with open(source, 'rb') as f, open(cls.path(name), 'wb') as g:
                 g.write(f.read(size))
         cls.shift()
+        os.mkdir(cls.path('elsewhere'))
 
     @classmethod
     def shift(cls):
@@ -186,7 +226,7 @@ class Faults(Case):
 
     def check(self, args, text, ranks):
         names = set(os.listdir(self.folder))
-        if args and args[0] in ('solve', 'slve'):
+        if args and args[0] in ('solve', 'slve') and '-table' not in args:
             args = args + [a for k in (0, 2) if OUT[k] not in args for a in OUT[k:k + 2]]
         begin = time.monotonic()
         run = self.run_raw(*args, ranks=ranks, timeout=20)
@@ -218,6 +258,38 @@ class Faults(Case):
                 with self.subTest(args=' '.join(args), text=text, ranks=2):
                     self.check(list(args), text, 2)
         ROWS.add(f'wrong commands, options, values, meshes, files ({len(CASES)}), some on 2 ranks', 'one line, status not 0, nothing left')
+
+    def apart(self, text, *args, other=(), folder='.'):
+        """Rank 0 as it should be; ranks 1 and 2 stand in another folder or have other arguments: one line, status 1, soon."""
+        each = [HYCO, *args]
+        run = subprocess.run([MPIEXEC, '--oversubscribe', '-n', '1', *each, ':', '-n', '2', '-wdir', self.path(folder), *each, *other],
+                             cwd=self.folder, capture_output=True, text=True, timeout=30)
+        said = [line for line in run.stderr.splitlines() if line.strip() and not any(n in line for n in MPI_NOISE)]
+        self.assertEqual(run.returncode, 1, run.stderr)
+        self.assertEqual(len(said), 1, run.stderr)
+        self.assertTrue(said[0].startswith('hyco: error: '), said[0])
+        self.assertIn(text, said[0])
+
+    def test_other_ranks(self):
+        """Files that the other ranks do not see, or see damaged, and entries that they alone were given."""
+        for name in ('scene.yaml', 'rope.msh'):
+            shutil.copy(os.path.join(ROPE, name), self.path(name))
+        shutil.copy(self.path('cut.h5'), self.path('elsewhere', 'rope.h5'))
+        tries = (('there is no scene scene.yaml', ['solve', '-scene', 'scene.yaml', '-mu', '0.07,0.17'], (), 'elsewhere'),
+                 ('p.csv cannot be opened', ['train', *T, '-points', 'p.csv'], (), 'elsewhere'),
+                 ('rope.h5 is no HDF5 file, or it is damaged', ['predict', '-model', 'rope.h5', '-mu', '0.07,0.17'], (), 'elsewhere'),
+                 ('rope.h5 is no HDF5 file, or it is damaged', ['compare', '-scene', ROPE, '-model', 'rope.h5', *N], (), 'elsewhere'),
+                 ('"2*(x" is no expression', ['solve', *R], ('-body_rope_young', '2*(x'), '.'))
+        for text, args, other, folder in tries:
+            with self.subTest(args=' '.join(args), other=other):
+                self.apart(text, *args, other=other, folder=folder)
+        with open(self.path('elsewhere', 'scene.yaml'), 'w', encoding='ascii') as f:
+            f.write('scene: [\n')
+        self.apart('not YAML that hyco reads', 'solve', '-scene', 'scene.yaml', '-mu', '0.07,0.17', folder='elsewhere')
+        for name in ('scene.yaml', 'rope.msh', os.path.join('elsewhere', 'scene.yaml'), os.path.join('elsewhere', 'rope.h5')):
+            os.remove(self.path(name))
+        ROWS.add(f'files that some ranks do not see or see damaged, entries that they alone have ({len(tries) + 1}), on 3 ranks',
+                 'one line, status 1, no rank left waiting')
 
 
 if __name__ == '__main__':

@@ -142,6 +142,64 @@ class Kill(Case):
         self.assertEqual(self.content(), right)
         ROWS.add('disk full while a snapshot or the model is written', 'one line; the old model is untouched, nothing half written is left; then it goes on')
 
+    def full(self, kilobytes, *args):
+        """A run in which no file can grow beyond a size once it reads its options: from a pipe, which waits until that is so."""
+        run = subprocess.Popen([HYCO, *args, '-options_file', 'pipe'], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                               text=True)
+        while run.poll() is None:
+            try:
+                pipe = os.open(self.path('pipe'), os.O_WRONLY | os.O_NONBLOCK)
+            except OSError:  # nobody reads
+                time.sleep(0.005)
+                continue
+            resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (int(kilobytes * 1024),) * 2)
+            os.write(pipe, b'# no options\n')
+            os.close(pipe)
+            time.sleep(0.02)
+        return run.returncode, run.communicate(timeout=60)[1]
+
+    def test_full_disk_outputs(self):
+        """Full while the fields, the report or the table is written: what was there before stays as it was, or nothing is."""
+        os.mkfifo(self.path('pipe'))
+        self.hyco('train', '-scene', ROPE, '-grid', '3,3', '-model', 'm.h5')
+        point, many = ['-mu', '0.07,0.17'], ['-grid', '10,10']
+        solve, predict = ['solve', '-scene', ROPE], ['predict', '-model', 'm.h5']
+        # the .xdmf has 1.8 kB and its .h5 more than 6, the report 1.2 kB, the table of 100 points 11 kB
+        tries = [(size, command + point + ['-output', 'o.xdmf'], 'o.xdmf') for command in (solve, predict) for size in (0, 0.5, 4)]
+        tries += [(size, command + point + ['-report', 'o.json'], 'o.json') for command in (solve, predict) for size in (0, 0.5)]
+        tries += [(size, command + many + ['-table', 'o.csv'], 'o.csv') for command in (solve, predict) for size in (0, 5)]
+        for old in (False, True):
+            for size, args, name in tries:
+                with self.subTest(args=' '.join(args), size=size, old=old):
+                    before = {}
+                    if old:
+                        subprocess.run([HYCO, *args], cwd=self.folder, check=True, capture_output=True, timeout=60)
+                        before = {f: self.content(f) for f in os.listdir(self.folder) if f.startswith('o.')}
+                        self.assertTrue(before)
+                    self.refused(self.full(size, *args), f'{name} ')
+                    self.assertEqual({f: self.content(f) for f in os.listdir(self.folder) if f.startswith('o.')}, before)
+        ROWS.add(f'disk full while -output, -report or -table is written ({2 * len(tries)}), with an older file there and without',
+                 'one line; the older file is untouched, nothing half written is left')
+
+    def test_folders_in_the_way(self):
+        """Folders that have the names of outputs or of their .h5, on 1 and 2 ranks."""
+        for name in ('a.xdmf', 'b.h5', 'c.json', 'd.csv'):
+            os.mkdir(self.path(name))
+        self.hyco('train', '-scene', ROPE, '-grid', '3,3', '-model', 'm.h5')
+        point, many = ['-mu', '0.07,0.17'], ['-grid', '2,2']
+        tries = [command + rest for command in (['solve', '-scene', ROPE], ['predict', '-model', 'm.h5'])
+                 for rest in (point + ['-output', 'a.xdmf'], point + ['-output', 'b.xdmf'], point + ['-report', 'c.json'], many + ['-table', 'd.csv'])]
+        for args in tries:
+            for ranks in (0, 2):
+                with self.subTest(args=' '.join(args), ranks=ranks):
+                    run = self.run_raw(*args, ranks=ranks, timeout=60)
+                    self.assertEqual(run.returncode, 1)
+                    self.assertIn(f'{args[-1]} ', run.stderr)
+                    self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
+                    self.assertNotIn('MPI_ABORT', run.stderr)  # the other rank heard it, and was not left behind
+                    self.assertEqual({f for f in os.listdir(self.folder) if f[1] == '.' and f[0] != 'm'}, {'a.xdmf', 'b.h5', 'c.json', 'd.csv'})
+        ROWS.add(f'a folder in the place of an output or its .h5 ({len(tries)}), on 1 and 2 ranks', 'one line, nothing half written is left')
+
     def test_unwritable(self):
         """A path that leads through a file (root may write in any folder): nothing is begun that could not end."""
         with open(self.path('file'), 'w', encoding='ascii') as f:

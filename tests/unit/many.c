@@ -1,0 +1,147 @@
+/* Errors in the middle of many points, and points that differ between ranks: nothing is lost, no rank waits. */
+#include "check.h"
+#include <hyco.h>
+#include <unistd.h>
+
+/* Positive where training goes, to mu1 = 0.25; a point beyond 0.3 fails when the stiffness is assembled. */
+#define YOUNG "x <= 0.5 ? 0.3 - mu1 : 0.15"
+
+static char rope[PETSC_MAX_PATH_LEN];
+
+static PetscErrorCode Train(HycoModelType type, const char path[])
+{
+  const PetscInt counts[2] = {3, 3};
+  HycoScene scene;
+  HycoSamples samples;
+  HycoTrainer trainer;
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsSetValue(NULL, "-body_rope_young", YOUNG));
+  PetscCall(PetscOptionsSetValue(NULL, "-hyco_model_type", HycoModelTypes[type]));
+  PetscCall(HycoSceneLoad(PETSC_COMM_SELF, rope, &scene));
+  PetscCall(PetscOptionsClearValue(NULL, "-body_rope_young"));
+  PetscCall(PetscOptionsClearValue(NULL, "-hyco_model_type"));
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_FALSE));
+  PetscCall(HycoTrainerCreate(PETSC_COMM_SELF, scene, &trainer));
+  PetscCall(HycoTrainerSetFromOptions(trainer));
+  PetscCall(HycoTrainerRun(trainer, samples, path, NULL));
+  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* mu of n points fails at the third in the order of its work; what PETSc holds before and after is the same. */
+static PetscErrorCode FailInTheMiddle(HycoModel m, PetscInt n, const PetscReal mu[], const PetscReal expected[])
+{
+  HycoPrediction p[4];
+  PetscInt n_contacts, n_nodes, dim;
+  PetscReal *Lambda, *U, force = 0;
+  PetscLogDouble before, after;
+
+  PetscFunctionBegin;
+  PetscCall(HycoModelGetSizes(m, &n_contacts, &n_nodes, &dim));
+  PetscCall(PetscMalloc2(n * n_contacts, &Lambda, n * n_nodes * dim, &U));
+  CHECK_FAILS(HycoModelSolveMany(m, n, 2, mu, p, Lambda, U),
+              "Young's modulus must be positive"); /* makes what is lazy */
+  PetscCall(PetscMallocGetCurrentUsage(&before));
+  CHECK_FAILS(HycoModelSolveMany(m, n, 2, mu, p, Lambda, U), "Young's modulus must be positive");
+  PetscCall(PetscMallocGetCurrentUsage(&after));
+  CHECK(before > 0, "PETSc keeps no books of its memory");
+  CHECK(after == before, "%g bytes held before the error, %g after", before, after);
+  CHECK_FAILS(HycoModelGetPrediction(m, p), "call HycoModelPredict() before");
+  PetscCall(HycoModelSolveMany(m, 2, 2, mu, p, Lambda, NULL)); /* the two good ones: the model has not changed */
+  for (PetscInt k = 0; k < 2; k++) {
+    CHECK(p[k].total_contact_force == expected[k], "force %.17g, before the error %.17g",
+          (double)p[k].total_contact_force, (double)expected[k]);
+  }
+  for (PetscInt k = 0; k < n_contacts; k++) force += Lambda[k];
+  CHECK_NEAR(force, expected[0], 1e-12 * expected[0]);
+  PetscCall(PetscFree2(Lambda, U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestMany(HycoModelType type)
+{
+  const PetscReal mu[8] = {0.1, 0.1, 0.2, 0.3, 0.35, 0.1, 0.4, 0.1};
+  PetscReal expected[2];
+  char path[64];
+  HycoModel m;
+  HycoPrediction p[2];
+
+  PetscFunctionBegin;
+  snprintf(path, sizeof(path), "many-%s-%d.h5", HycoModelTypes[type], (int)getpid());
+  PetscCall(Train(type, path));
+  PetscCall(HycoModelLoad(path, &m));
+  PetscCall(HycoModelSetExtrapolate(m, PETSC_TRUE));
+  PetscCall(HycoModelSolveMany(m, 2, 2, mu, p, NULL, NULL));
+  for (int k = 0; k < 2; k++) expected[k] = p[k].total_contact_force;
+  CHECK(expected[0] > 0 && expected[1] > 0 && expected[0] != expected[1], "forces %g, %g", (double)expected[0],
+        (double)expected[1]);
+  for (int k = 0; k < 3; k++) PetscCall(FailInTheMiddle(m, 4, mu, expected));
+  PetscCall(HycoModelDestroy(&m));
+  unlink(path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A point for each rank, or one of them outside: every rank hears it, and then one point for all is solved. */
+static PetscErrorCode TestOnePoint(void)
+{
+  PetscReal here[2] = {0.07, 0.17};
+  PetscMPIInt rank, size;
+  HycoScene scene;
+  HycoFOM fom;
+  HycoSummary summary;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
+  PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
+  for (int last = 0; last < 2 && size > 1; last++) {
+    const PetscBool odd = (PetscBool)(rank == (last ? size - 1 : 0));
+
+    here[1] = odd ? 0.2 : 0.17;
+    CHECK_FAILS(HycoFOMSolve(fom, 2, here), "mu2 is 0.17 on one rank and 0.2 on another");
+    here[1] = odd ? 0.7 : 0.17;
+    CHECK_FAILS(HycoFOMSolve(fom, 2, here), "mu2 = 0.7 lies outside its range");
+    here[1] = 0.17;
+    CHECK_FAILS(HycoFOMSolve(fom, odd ? 1 : 2, here), "1 parameter values were given; the scene has 2");
+  }
+  PetscCall(HycoFOMSolve(fom, 2, here));
+  PetscCall(HycoFOMGetSummary(fom, &summary));
+  CHECK_NEAR(summary.total_contact_force, 0.3502256293, 1e-9); /* an independent computation, tests/unit/api.c */
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Test(void)
+{
+  PetscMPIInt size;
+
+  PetscFunctionBegin;
+  PetscCheck(getenv("HYCO_SOURCE"), PETSC_COMM_SELF, PETSC_ERR_USER, "HYCO_SOURCE is not set");
+  snprintf(rope, sizeof(rope), "%s/examples/rope", getenv("HYCO_SOURCE"));
+  PetscCall(TestOnePoint());
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  for (int type = 0; type < 3 && size == 1; type++) PetscCall(TestMany((HycoModelType)type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* PETSc keeps books of its memory only when it is asked to before it starts. */
+int main(int argc, char **argv)
+{
+  static char books[] = "-malloc_debug";
+  char *mine[3] = {argv[0], books, NULL}, **given = mine;
+  int n = 2;
+  PetscErrorCode code;
+
+  (void)argc;
+  if (HycoInitialize(&n, &given)) return 2;
+  code = Test();
+  if (code) fprintf(stderr, "the test itself ended with error %d\n", (int)code);
+  if (HycoFinalize()) return 2;
+  return code || check_failures ? 1 : 0;
+}
