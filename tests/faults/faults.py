@@ -176,7 +176,7 @@ CASES = [
 ]
 # on two ranks: errors found by one rank, by all, or while files are written
 TWO = ('body_rope_young: "2*(x"', 'text.h5 is no HDF5 file', 'must be positive', 'none.msh cannot', 'mu1 = 0.04', 'cut.h5', 'contact_clad', 'not YAML',
-       'knows no option -zzz', 'none/out.h5', '-hyco_rid_region', 'none/r.json', 'nothing to learn')
+       'knows no option -zzz', 'none/out.h5', '-hyco_rid_region', '-hyco_rid_groups', 'none/r.json', 'nothing to learn', 'leaves the modes without')
 MPI_NOISE = ('mpiexec', '-----', 'Primary job', 'a non-zero exit code', 'the job to be', 'Process name', 'Exit code')
 
 

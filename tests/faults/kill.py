@@ -215,6 +215,7 @@ class Kill(Case):
                 self.assertNotEqual(run.returncode, 0)
                 self.assertIn(text, run.stderr)
                 self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
+                self.assertNotIn('MPI_ABORT', run.stderr)
                 self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
         ROWS.add('a path through a file, a folder in the place of the model, on 1 and 2 ranks', 'one line')
 
