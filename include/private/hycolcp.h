@@ -12,13 +12,13 @@ typedef PetscErrorCode (*HycoLCPMonitor)(PetscInt iteration, PetscInt n_active, 
 typedef enum { HYCO_LCP_SOLVED, HYCO_LCP_CYCLE, HYCO_LCP_SINGULAR, HYCO_LCP_LIMIT, HYCO_LCP_RAY } HycoLCPStatus;
 
 /*
-  The Cholesky factor of M_aa, M symmetric n x n, kept from one set and one right-hand side to the next; forget it when
-  M changes (NULL-safe). HycoSetFactorSolve(): z_a = -M_aa^-1 q_a, 0 elsewhere; *regular: no pivot was below `tol` of
-  M's diagonal entry, and z is finite (if not, the factor is forgotten). The order of a set's contacts is that in which
-  they joined, so that z depends on the past by round-off.
+  The Cholesky factor of M_aa, M symmetric n x n. HycoSetFactorSolve(): z_a = -M_aa^-1 q_a, 0 elsewhere; *regular: no
+  pivot was below `tol` of M's diagonal entry, and z is finite. With `keep` the factor is kept from one set and one
+  right-hand side to the next, until M changes and it is forgotten (NULL-safe): the contacts stand in the order in which
+  they joined, so that z depends on the past by round-off. Without it every solve begins anew, in a's order.
 */
 typedef struct _n_HycoSetFactor *HycoSetFactor;
-PetscErrorCode HycoSetFactorCreate(PetscInt n, HycoSetFactor *factor);
+PetscErrorCode HycoSetFactorCreate(PetscInt n, PetscBool keep, HycoSetFactor *factor);
 PetscErrorCode HycoSetFactorDestroy(HycoSetFactor *factor);
 void HycoSetFactorForget(HycoSetFactor factor);
 PetscErrorCode HycoSetFactorSolve(HycoSetFactor factor, const PetscReal M[], const PetscReal q[], PetscInt k,

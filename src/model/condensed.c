@@ -91,7 +91,7 @@ PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
   PetscCall(PetscMalloc1(m + 1, &c->g));
   PetscCall(PetscMalloc1(m + 1, &c->w));
   PetscCall(PetscCalloc1(m + 1, &c->active));
-  PetscCall(HycoSetFactorCreate(c->m, &c->set_factor));
+  PetscCall(HycoSetFactorCreate(c->m, PETSC_TRUE, &c->set_factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

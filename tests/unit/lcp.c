@@ -41,7 +41,7 @@ static PetscErrorCode ActiveSet(PetscInt n, const PetscReal M[], const PetscReal
   HycoSetFactor factor = NULL;
 
   PetscFunctionBegin;
-  if (symmetric) PetscCall(HycoSetFactorCreate(n, &factor));
+  if (symmetric) PetscCall(HycoSetFactorCreate(n, PETSC_FALSE, &factor));
   PetscCall(HycoLCPActiveSet(n, M, q, factor, max_its, NULL, NULL, active, z, its, status));
   PetscCall(HycoSetFactorDestroy(&factor));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -228,8 +228,8 @@ static PetscErrorCode TestFactor(void)
       for (PetscInt k = 0; k < n; k++) M[j * n + i] += C[k * n + i] * C[k * n + j];
     }
   }
-  PetscCall(HycoSetFactorCreate(n, &kept));
-  PetscCall(HycoSetFactorCreate(n, &fresh));
+  PetscCall(HycoSetFactorCreate(n, PETSC_TRUE, &kept));
+  PetscCall(HycoSetFactorCreate(n, PETSC_FALSE, &fresh));
   for (PetscInt step = 0; step < 200; step++) {
     PetscInt k = 0;
     double size = 0, apart = 0;
@@ -238,7 +238,6 @@ static PetscErrorCode TestFactor(void)
       seed = (seed * 1103 + 12345) % 65536;
       if (step < 50 ? i < step : step < 100 ? i < 100 - step : seed % 3 > 0) a[k++] = i;
     }
-    HycoSetFactorForget(fresh);
     PetscCall(HycoSetFactorSolve(kept, M, q, k, a, 1e-12, z, &regular));
     CHECK(regular, "step %d: not regular", (int)step);
     PetscCall(HycoSetFactorSolve(fresh, M, q, k, a, 1e-12, other, &regular));
