@@ -187,13 +187,13 @@ class Files(Case):
                 f.write(good)
 
     def test_snapshots(self):
-        """Each byte of a snapshot, a flexibility and its modes counts."""
+        """Each byte of a snapshot, a flexibility and its responses counts."""
         draw = random.Random(6)
         rope = ['train', '-scene', ROPE, '-grid', '4,4', '-model', 'good.h5']
         self.damaged(sorted(glob.glob(self.path('good.h5.snapshots', '*.h5')))[2], 16, draw, rope)
-        for kind in ('flexibility', 'modes'):
+        for kind in ('flexibility', 'responses'):
             self.damaged(glob.glob(self.path('c.h5.snapshots', kind + '-*.h5'))[0], 10, draw, CONDENSED)
-        ROWS.add('a snapshot (16), a flexibility (10), its modes (10): one bit flipped, or cut', 'refused by its name')
+        ROWS.add('a snapshot (16), a flexibility (10), its responses (10): one bit flipped, or cut', 'refused by its name')
 
     def test_snapshots_of_another(self):
         """Solutions and flexibilities of other materials, under the names of these."""
