@@ -87,7 +87,8 @@ class Greedy(Case):
         n = t['greedy']['iterations']
         p = self.hyco('predict', '-model', f't.h5.snapshots/greedy-{n:03d}.h5', '-mu', '0.07,0.17')
         self.solved(p)
-        self.assertEqual(p['lambda_norm2'], self.hyco('predict', '-model', 't.h5', '-mu', '0.07,0.17')['lambda_norm2'])
+        # the last model has a table of its stiffness besides, the kept one assembles
+        self.near(self.hyco('predict', '-model', 't.h5', '-mu', '0.07,0.17')['lambda_norm2'], p['lambda_norm2'], 1e-9)
 
     def test_ends(self):
         """Points: every training point is solved. Seconds: after the first iteration. Starts from -values when given."""
