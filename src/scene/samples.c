@@ -46,6 +46,7 @@ PetscErrorCode HycoSamplesAddPoint(HycoSamples s, const PetscReal mu[])
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
+  HycoCheckHandle(s->scene, "HycoSceneLoad()");
   P = s->scene->n_parameters;
   PetscCall(HycoSceneCheckParameters(s->scene, P, mu));
   if (s->n == s->room) {
@@ -64,6 +65,7 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], con
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
+  HycoCheckHandle(s->scene, "HycoSceneLoad()");
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     HycoCheck(counts[p] >= 1, "parameter %s has %d values; at least 1 is needed", s->scene->parameter[p],
               (int)counts[p]);
@@ -99,6 +101,7 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscB
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
+  HycoCheckHandle(s->scene, "HycoSceneLoad()");
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     const PetscInt least = closed && s->scene->lo[p] < s->scene->hi[p] ? 2 : 1;
 
@@ -124,6 +127,7 @@ PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
+  HycoCheckHandle(s->scene, "HycoSceneLoad()");
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     HycoCheck(counts[p] >= 1 && counts[p] <= 100000000, "the grid has %d points for %s; at least 1 is needed",
               (int)counts[p], s->scene->parameter[p]);
@@ -208,6 +212,7 @@ PetscErrorCode HycoSamplesAddFile(HycoSamples s, const char path[])
 {
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
+  HycoCheckHandle(s->scene, "HycoSceneLoad()");
   HycoOnEach(s->scene->comm, ReadFile(s, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -255,6 +260,7 @@ PetscErrorCode HycoSamplesDropTwins(HycoSamples s, PetscInt *n_dropped)
 
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
+  HycoCheckHandle(s->scene, "HycoSceneLoad()");
   PetscCall(PetscMalloc1(s->n, &twin));
   PetscCall(FindTwins(s, twin));
   for (PetscInt k = 0; k < s->n; k++) {
@@ -272,6 +278,7 @@ PetscErrorCode HycoSamplesGet(HycoSamples s, PetscInt *n_points, PetscInt *n_par
 {
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSamplesCreate()");
+  HycoCheckHandle(s->scene, "HycoSceneLoad()");
   if (n_points) *n_points = s->n;
   if (n_parameters) *n_parameters = s->scene->n_parameters;
   if (mu) *mu = s->mu;
