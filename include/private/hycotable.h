@@ -24,6 +24,7 @@ PetscErrorCode HycoTableKeepPattern(HycoModel model, HycoTable table);
 PetscErrorCode HycoTableCreateSparse(HycoModel model);
 /* Kr at mu by the model's table. */
 PetscErrorCode HycoTableFill(HycoModel model, const PetscReal mu[]);
+PetscErrorCode HycoTableView(HycoModel model, PetscViewer viewer);
 PetscErrorCode HycoTableSave(HycoModel model, HycoH5 file);
 /* Fails when the file's table is damaged. */
 PetscErrorCode HycoTableLoad(HycoModel model, HycoH5 file);

@@ -213,7 +213,7 @@ PetscErrorCode CommandTrain(void)
             (double)t.left_out[2], (double)t.target, (int)t.most_values));
   PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u,
                 t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda));
-  if (t.type != HYCO_MODEL_CONDENSED) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
+  if (t.condition > 0) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
   PetscCall(Say("\n"));
   if (t.scan.n)
     PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,

@@ -400,8 +400,9 @@ PetscErrorCode HycoModelView(HycoModel m, PetscViewer viewer)
     PetscCall(ViewHybrid(m, viewer));
   else
     PetscCall(m->condensed ? HycoCondensedView(m, viewer) : HycoProjectionView(m, viewer));
-  if (!m->condensed)
+  if (m->numbers[0] > 0) /* else too large to be known */
     PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
+  if (m->table) PetscCall(HycoTableView(m, viewer));
   if (m->type == HYCO_MODEL_HYBRID) PetscCall(ViewScan(m, viewer));
   PetscCall(HycoTrustView(m, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->provenance));

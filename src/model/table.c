@@ -6,6 +6,7 @@
 */
 #include <hycotable.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
+#include <petscviewer.h>
 
 PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim, PetscInt entries, HycoTable *table)
 {
@@ -86,6 +87,21 @@ PetscErrorCode HycoTableFill(HycoModel m, const PetscReal mu[])
   PetscCall(PetscObjectStateIncrease((PetscObject)m->Kr));
   PetscCall(MatAssemblyBegin(m->Kr, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(m->Kr, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableView(HycoModel m, PetscViewer viewer)
+{
+  const HycoTensor *t = &m->table->values.tensor;
+
+  PetscFunctionBegin;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  the reduced stiffness is a polynomial, tabulated at"));
+  for (PetscInt p = 0, n = 0; p < t->dim; p++) {
+    if (t->n[p] > 1)
+      PetscCall(
+          PetscViewerASCIIPrintf(viewer, "%s %d values of %s", n++ ? " x" : "", (int)t->n[p], m->scene->parameter[p]));
+  }
+  PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -40,6 +40,7 @@ class Table(Case):
         """The pellet's radius stretches it in two directions: K is quadratic in it, and three values hold it."""
         self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.06,4.10', '-values_load', '0.4,0.7,1', '-model', 'p.h5')
         self.assertEqual(self.counts('p.h5'), [3, 1])
+        self.assertIn('tabulated at 3 values of radius\n', self.run_raw('view', '-model', 'p.h5').stdout)
         self.agree('p.h5', '-values_radius', '4.03,4.047,4.087', '-values_load', '0.3,0.6,0.95')
 
     def modulus(self, expression, model):
