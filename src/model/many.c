@@ -39,7 +39,7 @@ static PetscErrorCode Sort(HycoModel m, PetscInt n, const PetscReal mu[], PetscI
 
     point[k] = here;
   }
-  qsort(point, (size_t)n, sizeof(*point), Compare);
+  if (n) qsort(point, (size_t)n, sizeof(*point), Compare);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

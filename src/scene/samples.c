@@ -241,7 +241,7 @@ static PetscErrorCode FindTwins(HycoSamples s, PetscBool twin[])
     key[k].hash = HycoHash(HYCO_HASH_START, s->mu + k * P, (size_t)P * sizeof(PetscReal));
     key[k].at = k;
   }
-  qsort(key, (size_t)s->n, sizeof(*key), CompareKeyed);
+  if (s->n) qsort(key, (size_t)s->n, sizeof(*key), CompareKeyed);
   for (PetscInt k = 0; k < s->n; k++) {
     PetscBool same = PETSC_FALSE;
 
