@@ -125,7 +125,8 @@ static PetscErrorCode TestStale(void)
   CHECK_FAILS(HycoSolverSetType(solver_copy, HYCO_SOLVER_TAO), "never made; make it by HycoSolverCreate()");
   CHECK_FAILS(HycoSystemDestroy(&system_copy), "never made; make it by HycoSystemCreate()");
   CHECK_FAILS(HycoSolverDestroy(&solver_copy), "never made; make it by HycoSolverCreate()");
-  for (int k = 0; k < 100; k++) PetscCall(HycoModelLoad(hybrid, &models[k])); /* the table grows, and closes its holes */
+  for (int k = 0; k < 100; k++)
+    PetscCall(HycoModelLoad(hybrid, &models[k])); /* the table grows, and closes its holes */
   for (int k = 0; k < 100; k += 3) PetscCall(HycoModelDestroy(&models[k]));
   for (int k = 0; k < 100; k++) {
     if (models[k]) PetscCall(HycoModelPredict(models[k], 2, inside));
@@ -352,9 +353,9 @@ static PetscErrorCode Test(void)
     mkdir("faults", 0777);
     rows = fopen("faults/api.csv", "w");
     PetscCheck(rows, PETSC_COMM_SELF, PETSC_ERR_USER, "faults/api.csv cannot be written");
-    fprintf(rows,
-            "\"C API: NULL, destroyed, copies of destroyed handles, handles of another kind, wrong order, wrong sizes, reuse after an error, two models at once\",\"refused "
-            "by name; then the right numbers\"\n");
+    fprintf(rows, "\"C API: NULL, destroyed, copies of destroyed handles, handles of another kind, wrong order, wrong "
+                  "sizes, reuse after an error, two models at once\",\"refused "
+                  "by name; then the right numbers\"\n");
     PetscCall(TestGrowth("create, use, destroy", Once, 1000));
     PetscCall(TestGrowth("refused", OnceRefused, 1000));
     fclose(rows);
