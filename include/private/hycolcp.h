@@ -12,32 +12,32 @@ typedef PetscErrorCode (*HycoLCPMonitor)(PetscInt iteration, PetscInt n_active, 
 typedef enum { HYCO_LCP_SOLVED, HYCO_LCP_CYCLE, HYCO_LCP_SINGULAR, HYCO_LCP_LIMIT, HYCO_LCP_RAY } HycoLCPStatus;
 
 /*
-  The Cholesky factor of M_aa, M symmetric n x n. HycoSetFactorSolve(): z_a = -M_aa^-1 q_a, 0 elsewhere; *regular: no
-  pivot was below `tol` of M's diagonal entry, and z is finite. With `keep` the factor is kept from one set and one
-  right-hand side to the next, until M changes and it is forgotten (NULL-safe): the contacts stand in the order in which
-  they joined, so that z depends on the past by round-off. Without it every solve begins anew, in a's order.
+  The Cholesky factor of M_aa, M symmetric n x n, kept from one set and one right-hand side to the next until M changes
+  and it is forgotten (NULL-safe). HycoSetFactorSolve(): z_a = -M_aa^-1 q_a, 0 elsewhere; *regular: no pivot was below
+  `tol` of M's diagonal entry, and z is finite. The contacts stand in the order in which they joined, so that z depends
+  on the past by round-off.
 */
 typedef struct _n_HycoSetFactor *HycoSetFactor;
-PetscErrorCode HycoSetFactorCreate(PetscInt n, PetscBool keep, HycoSetFactor *factor);
+PetscErrorCode HycoSetFactorCreate(PetscInt n, HycoSetFactor *factor);
 PetscErrorCode HycoSetFactorDestroy(HycoSetFactor *factor);
 void HycoSetFactorForget(HycoSetFactor factor);
 PetscErrorCode HycoSetFactorSolve(HycoSetFactor factor, const PetscReal M[], const PetscReal q[], PetscInt k,
                                   const PetscInt a[], PetscReal tol, PetscReal z[], PetscBool *regular);
 /*
-  Primal-dual active set from `active`, which returns the last set. `factor`: NULL unless M is symmetric positive
-  semidefinite; then the factor of M's last set, or one that was forgotten.
+  Primal-dual active set from `active`, which returns the last set. `symmetric`: M is symmetric positive
+  semidefinite; then `factor` may be that of M's last set, or one that was forgotten; NULL: each set is factored anew.
   Contacts that repeat others carry no force and leave the set; when their gaps contradict each other and the choice of
   the smaller ones does not end it, the status is SINGULAR. The monitor may be NULL.
 */
-PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal q[], HycoSetFactor factor,
-                                PetscInt max_its, HycoLCPMonitor monitor, void *ctx, PetscBool active[], PetscReal z[],
-                                PetscInt *its, HycoLCPStatus *status);
+PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
+                                HycoSetFactor factor, PetscInt max_its, HycoLCPMonitor monitor, void *ctx,
+                                PetscBool active[], PetscReal z[], PetscInt *its, HycoLCPStatus *status);
 /*
   z with M_aa z_a = -q_a on the set a[0..*k), 0 elsewhere. Members that depend on others leave a (their z is 0), and *k
   becomes smaller. *singular: even the rest could not be solved. `factor` as HycoLCPActiveSet()'s.
 */
-PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscReal q[], HycoSetFactor factor,
-                                 PetscInt *k, PetscInt a[], PetscReal z[], PetscBool *singular);
+PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
+                                 HycoSetFactor factor, PetscInt *k, PetscInt a[], PetscReal z[], PetscBool *singular);
 /*
   The active set with p free unknowns before m contacts (bodies that contact alone holds): M and q as HycoDirectFactor()
   and HycoDirectReduce() give them, z = (x_pinned, L). SINGULAR: contact does not hold them under this load.

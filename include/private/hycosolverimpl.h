@@ -47,7 +47,6 @@ struct _p_HycoSolver {
   /* dual form, replicated on every rank: column-major m x m flexibility, gap without forces */
   PetscInt m, p; /* contacts; unknowns pinned because K is singular: they come before the contacts in S, g and L */
   PetscReal *S, *g, *L;
-  HycoSetFactor set_factor; /* of S on the active contacts; NULL: not symmetric */
   PetscBool *active;
   PetscBool started; /* active holds a solution's set */
   HycoSeen condensed;

@@ -6,19 +6,17 @@
 #include <petscblaslapack.h>
 
 struct _n_HycoSetFactor {
-  PetscBool keep;           /* else every solve begins anew */
   PetscInt n, k, *a;        /* contacts in all; those factored, in order */
   PetscReal *L, *x;         /* column major, leading dimension n; n */
   PetscBool *wanted, *kept; /* n */
 };
 
-PetscErrorCode HycoSetFactorCreate(PetscInt n, PetscBool keep, HycoSetFactor *factor)
+PetscErrorCode HycoSetFactorCreate(PetscInt n, HycoSetFactor *factor)
 {
   HycoSetFactor f;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&f));
-  f->keep = keep;
   f->n = n;
   PetscCall(PetscMalloc1((size_t)n * (size_t)n, &f->L));
   PetscCall(PetscMalloc4(n, &f->a, n, &f->x, n, &f->wanted, n, &f->kept));
@@ -102,12 +100,10 @@ static PetscErrorCode Append(HycoSetFactor f, const PetscReal M[], PetscInt k, P
 PetscErrorCode HycoSetFactorSolve(HycoSetFactor f, const PetscReal M[], const PetscReal q[], PetscInt k,
                                   const PetscInt a[], PetscReal tol, PetscReal z[], PetscBool *regular)
 {
-  PetscInt count;
+  const PetscInt count = Rearrange(f, k, a);
   PetscBLASInt n, ld, one = 1, info;
 
   PetscFunctionBegin;
-  if (!f->keep) HycoSetFactorForget(f);
-  count = Rearrange(f, k, a);
   *regular = PETSC_TRUE;
   if (count > f->k) PetscCall(Append(f, M, count, tol, regular));
   if (!*regular) PetscFunctionReturn(PETSC_SUCCESS);

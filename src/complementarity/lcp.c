@@ -86,9 +86,9 @@ static PetscBool Met(PetscInt n, const PetscBool active[], PetscInt its, unsigne
   return PETSC_FALSE;
 }
 
-PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal q[], HycoSetFactor factor,
-                                PetscInt max_its, HycoLCPMonitor monitor, void *ctx, PetscBool active[], PetscReal z[],
-                                PetscInt *its, HycoLCPStatus *status)
+PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
+                                HycoSetFactor factor, PetscInt max_its, HycoLCPMonitor monitor, void *ctx,
+                                PetscBool active[], PetscReal z[], PetscInt *its, HycoLCPStatus *status)
 {
   PetscInt *a, changes = 1, n_aside = 0;
   PetscReal *w, size;
@@ -110,13 +110,13 @@ PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal
       if (active[i]) a[k++] = i;
     }
     (*its)++;
-    PetscCall(HycoLCPSolveOnSet(n, M, q, factor, &k, a, z, &singular));
+    PetscCall(HycoLCPSolveOnSet(n, M, q, symmetric, factor, &k, a, z, &singular));
     if (singular) {
       *status = HYCO_LCP_SINGULAR;
       break;
     }
     n_aside = SetAside(n, k, a, active, aside);
-    size = Slack(n, M, q, (PetscBool)(factor != NULL), active, k, a, z, w);
+    size = Slack(n, M, q, symmetric, active, k, a, z, w);
     changes = Flip(n, size, z, w, aside, active);
     if (monitor) PetscCall(monitor(*its, k, changes, ctx));
     if (!changes) *status = HYCO_LCP_SOLVED;

@@ -262,7 +262,7 @@ static PetscErrorCode Unpack(const Dictionary *d, const PetscReal M[], const Pet
     z[i] = PetscMax(d->value[d->where[d->n + i]], 0) * scale;
     if (z[i] > 0) a[k++] = i;
   }
-  PetscCall(HycoLCPSolveOnSet(d->n, M, q, PETSC_FALSE, &k, a, fresh, &singular));
+  PetscCall(HycoLCPSolveOnSet(d->n, M, q, PETSC_FALSE, NULL, &k, a, fresh, &singular));
   if (!singular && Violation(d->n, M, q, fresh) < Violation(d->n, M, q, z)) {
     for (PetscInt i = 0; i < d->n; i++) z[i] = PetscMax(fresh[i], 0);
   }

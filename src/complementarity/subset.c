@@ -110,22 +110,21 @@ static PetscErrorCode TrySet(PetscInt n, const PetscReal M[], const PetscReal q[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscReal q[], HycoSetFactor factor,
-                                 PetscInt *k, PetscInt a[], PetscReal z[], PetscBool *singular)
+PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
+                                 HycoSetFactor factor, PetscInt *k, PetscInt a[], PetscReal z[], PetscBool *singular)
 {
   PetscReal *A, *d;
   PetscBool regular = PETSC_FALSE, *kept;
-  const PetscBool symmetric = (PetscBool)(factor != NULL);
   PetscInt n_kept = 0;
 
   PetscFunctionBegin;
   *singular = PETSC_FALSE;
   PetscCall(PetscArrayzero(z, n));
   if (!*k) PetscFunctionReturn(PETSC_SUCCESS);
-  if (symmetric) PetscCall(HycoSetFactorSolve(factor, M, q, *k, a, DEPENDENT, z, &regular));
+  if (factor) PetscCall(HycoSetFactorSolve(factor, M, q, *k, a, DEPENDENT, z, &regular));
   if (regular) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1((size_t)*k * (size_t)*k, &A));
-  if (!symmetric) PetscCall(TrySet(n, M, q, symmetric, 1e-15, *k, a, A, z, &regular));
+  if (!factor) PetscCall(TrySet(n, M, q, symmetric, symmetric ? DEPENDENT : 1e-15, *k, a, A, z, &regular));
   if (!regular) {
     PetscCall(PetscMalloc2(*k, &d, *k, &kept));
     CopyScaled(n, M, *k, a, A, d);

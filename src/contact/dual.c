@@ -20,7 +20,6 @@ static PetscErrorCode Resize(HycoSolver s, PetscInt p)
   PetscCall(PetscFree(s->g));
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
-  PetscCall(HycoSetFactorDestroy(&s->set_factor));
   PetscCall(PetscMalloc1((size_t)n * (size_t)n + 1, &s->S));
   PetscCall(PetscCalloc1(n + 1, &s->g));
   PetscCall(PetscCalloc1(n + 1, &s->L));
@@ -191,24 +190,12 @@ static PetscErrorCode SolveHeld(HycoSolver s, PetscInt type, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where S on a set is factored; NULL: not symmetric. Answers must not depend on earlier ones, not by a bit: a training
-   that was interrupted gives the same model. */
-static PetscErrorCode SetFactor(HycoSolver s, HycoSetFactor *factor)
-{
-  PetscFunctionBegin;
-  if (s->system->symmetric && !s->set_factor) PetscCall(HycoSetFactorCreate(s->m, PETSC_FALSE, &s->set_factor));
-  *factor = s->system->symmetric ? s->set_factor : NULL;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved)
 {
   const PetscInt max_its = s->max_its ? s->max_its : 50 + 4 * s->m;
-  HycoSetFactor factor = NULL;
   HycoLCPStatus status;
 
   PetscFunctionBegin;
-  PetscCall(SetFactor(s, &factor));
   PetscCall(PetscStrncpy(s->method, HycoSolverTypes[type], sizeof(s->method)));
   PetscCall(PetscStrlcat(s->method, " dual", sizeof(s->method)));
   if (type == HYCO_TYPE_TAO) {
@@ -219,8 +206,8 @@ static PetscErrorCode SolveForces(HycoSolver s, PetscInt type, PetscBool *solved
     *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   } else {
     if (!s->warm || !s->started) PetscCall(PetscArrayzero(s->active, s->m));
-    PetscCall(HycoLCPActiveSet(s->m, s->S, s->g, factor, max_its, s->monitor, s->monitor_ctx, s->active, s->L, &s->its,
-                               &status));
+    PetscCall(HycoLCPActiveSet(s->m, s->S, s->g, s->system->symmetric, NULL, max_its, s->monitor, s->monitor_ctx,
+                               s->active, s->L, &s->its, &status));
     *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   }
   for (PetscInt i = 0; i < s->m; i++) {
@@ -361,11 +348,9 @@ static PetscErrorCode CloseGaps(HycoSolver s, Vec x, Vec L)
   PetscInt k = 0, *a;
   PetscReal *change, open = 0, size;
   PetscBool singular = PETSC_TRUE;
-  HycoSetFactor factor = NULL;
   Vec gap;
 
   PetscFunctionBegin;
-  PetscCall(SetFactor(s, &factor));
   PetscCall(VecDuplicate(y->D, &gap));
   PetscCall(MatMult(y->B, x, gap));
   PetscCall(VecNorm(gap, NORM_INFINITY, &size));
@@ -378,7 +363,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, Vec x, Vec L)
     a[k++] = i;
     open = PetscMax(open, PetscAbsReal(s->g[i]));
   }
-  if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(s->m, s->S, s->g, factor, &k, a, change, &singular));
+  if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(s->m, s->S, s->g, y->symmetric, NULL, &k, a, change, &singular));
   for (PetscInt i = 0; i < s->m && !singular; i++) change[i] = PetscMax(change[i], -s->L[i]);
   if (!singular) PetscCall(Shift(s, change, x, L));
   PetscCall(PetscFree2(a, change));

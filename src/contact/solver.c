@@ -42,7 +42,6 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscCall(PetscFree(s->g));
   PetscCall(PetscFree(s->L));
   PetscCall(PetscFree(s->active));
-  PetscCall(HycoSetFactorDestroy(&s->set_factor));
   PetscCall(PetscFree(s->pivot));
   PetscCall(PetscFree(s->contact));
   PetscCall(PetscFree(*solver));

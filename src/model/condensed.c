@@ -91,7 +91,7 @@ PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
   PetscCall(PetscMalloc1(m + 1, &c->g));
   PetscCall(PetscMalloc1(m + 1, &c->w));
   PetscCall(PetscCalloc1(m + 1, &c->active));
-  PetscCall(HycoSetFactorCreate(c->m, PETSC_TRUE, &c->set_factor));
+  PetscCall(HycoSetFactorCreate(c->m, &c->set_factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -305,8 +305,8 @@ static PetscErrorCode Attempt(HycoModel m, PetscInt type)
   } else if (type == HYCO_TYPE_LEMKE)
     PetscCall(HycoLCPLemke(c->m, c->M, c->g, 50 * (c->m + 10), m->Lambda, &its, &status));
   else
-    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, c->set_factor, max_its, s->monitor, s->monitor_ctx, c->active,
-                               m->Lambda, &its, &status));
+    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, c->set_factor, max_its, s->monitor, s->monitor_ctx,
+                               c->active, m->Lambda, &its, &status));
   for (PetscInt i = 0; i < c->m; i++) m->Lambda[i] = PetscMax(m->Lambda[i], 0); /* round-off below zero */
   ComputeKKT(c, m->Lambda, &p->kkt);
   p->iterations += its;

@@ -55,8 +55,8 @@ static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal
   PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_GAP], mu, w->p, w->i, c->g));
   for (PetscInt j = 0; j < c->m; j++) c->active[j] = (PetscBool)(own[j] > 0);
   if (w->definite)
-    PetscCall(
-        HycoLCPActiveSet(c->m, c->M, c->g, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, w->L, &its, &status));
+    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, w->L,
+                               &its, &status));
   *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

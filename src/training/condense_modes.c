@@ -102,8 +102,8 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
   PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_GAP], mu, -1, -1, c->g));
   for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(nearest[i] > 0);
   if (definite)
-    PetscCall(
-        HycoLCPActiveSet(c->m, c->M, c->g, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, L, &its, &status));
+    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, L,
+                               &its, &status));
   for (PetscInt i = 0; i < c->m; i++) L[i] = status == HYCO_LCP_SOLVED ? PetscMax(L[i], 0) : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -41,8 +41,8 @@ static PetscErrorCode ActiveSet(PetscInt n, const PetscReal M[], const PetscReal
   HycoSetFactor factor = NULL;
 
   PetscFunctionBegin;
-  if (symmetric) PetscCall(HycoSetFactorCreate(n, PETSC_FALSE, &factor));
-  PetscCall(HycoLCPActiveSet(n, M, q, factor, max_its, NULL, NULL, active, z, its, status));
+  if (symmetric) PetscCall(HycoSetFactorCreate(n, &factor));
+  PetscCall(HycoLCPActiveSet(n, M, q, symmetric, factor, max_its, NULL, NULL, active, z, its, status));
   PetscCall(HycoSetFactorDestroy(&factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -228,8 +228,8 @@ static PetscErrorCode TestFactor(void)
       for (PetscInt k = 0; k < n; k++) M[j * n + i] += C[k * n + i] * C[k * n + j];
     }
   }
-  PetscCall(HycoSetFactorCreate(n, PETSC_TRUE, &kept));
-  PetscCall(HycoSetFactorCreate(n, PETSC_FALSE, &fresh));
+  PetscCall(HycoSetFactorCreate(n, &kept));
+  PetscCall(HycoSetFactorCreate(n, &fresh));
   for (PetscInt step = 0; step < 200; step++) {
     PetscInt k = 0;
     double size = 0, apart = 0;
@@ -240,6 +240,7 @@ static PetscErrorCode TestFactor(void)
     }
     PetscCall(HycoSetFactorSolve(kept, M, q, k, a, 1e-12, z, &regular));
     CHECK(regular, "step %d: not regular", (int)step);
+    HycoSetFactorForget(fresh);
     PetscCall(HycoSetFactorSolve(fresh, M, q, k, a, 1e-12, other, &regular));
     for (PetscInt i = 0; i < n; i++) {
       size = fmax(size, fabs(other[i]));
