@@ -54,6 +54,9 @@ PetscErrorCode HycoCondensedSave(HycoModel model, HycoH5 file);
 PetscErrorCode HycoCondensedLoad(HycoModel model, HycoH5 file);
 /* The bounds of G at its nodes. */
 PetscErrorCode HycoCondensedBound(HycoCondensed condensed);
+/* The node of the whole grid that is nearest to mu, and the square of its distance (may be NULL), each parameter
+   scaled to its values. */
+PetscInt HycoCondensedNearest(HycoCondensed condensed, const PetscReal mu[], PetscReal *distance2);
 /* The node of a field's grid that node k of the whole grid lies on. */
 PetscInt HycoCondensedNode(HycoCondensed condensed, const HycoGridField *field, PetscInt k);
 /* M = G(mu), and whether it is positive definite beyond round-off (only semidefinite counts: contacts may repeat). */

@@ -235,24 +235,37 @@ static PetscErrorCode BringStiffness(HycoCondensed c, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The active contacts of the nearest training point, or of the last prediction where that is nearer. The solution does
-   not depend on it: it is that of the last set's equations. */
-static void StartSet(HycoCondensed c, const PetscReal mu[])
+static PetscReal Width(HycoCondensed c, PetscInt p)
 {
+  return c->n[p] > 1 ? c->x[p][c->n[p] - 1] - c->x[p][0] : 1;
+}
+
+PetscInt HycoCondensedNearest(HycoCondensed c, const PetscReal mu[], PetscReal *distance2)
+{
+  PetscReal sum = 0;
   PetscInt node = 0;
-  PetscReal there = 0, back = 0;
 
   for (PetscInt p = 0; p < c->dim; p++) {
-    const PetscReal width = c->n[p] > 1 ? c->x[p][c->n[p] - 1] - c->x[p][0] : 1;
     PetscInt nearest = 0;
 
     for (PetscInt k = 1; k < c->n[p]; k++) {
       if (PetscAbsReal(c->x[p][k] - mu[p]) < PetscAbsReal(c->x[p][nearest] - mu[p])) nearest = k;
     }
     node = node * c->n[p] + nearest;
-    there += PetscSqr((c->x[p][nearest] - mu[p]) / width);
-    back += PetscSqr((c->last[p] - mu[p]) / width);
+    sum += PetscSqr((c->x[p][nearest] - mu[p]) / Width(c, p));
   }
+  if (distance2) *distance2 = sum;
+  return node;
+}
+
+/* The active contacts of the nearest training point, or of the last prediction where that is nearer. The solution does
+   not depend on it: it is that of the last set's equations. */
+static void StartSet(HycoCondensed c, const PetscReal mu[])
+{
+  PetscReal there, back = 0;
+  const PetscInt node = HycoCondensedNearest(c, mu, &there);
+
+  for (PetscInt p = 0; p < c->dim; p++) back += PetscSqr((c->last[p] - mu[p]) / Width(c, p));
   for (PetscInt i = 0; (!c->solved || there < back) && i < c->m; i++)
     c->active[i] = (PetscBool)(c->Lambda[(size_t)node * (size_t)c->m + (size_t)i] > 0);
 }

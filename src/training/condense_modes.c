@@ -73,26 +73,10 @@ static PetscBool Held(HycoCondensed c, PetscInt number)
   return (PetscBool)(number >= Corners(c) && number % HELD == 0);
 }
 
-/* The node of the whole grid that is nearest. */
-static PetscInt NearestNode(HycoCondensed c, const PetscReal mu[])
-{
-  PetscInt node = 0;
-
-  for (PetscInt p = 0; p < c->dim; p++) {
-    PetscInt nearest = 0;
-
-    for (PetscInt k = 1; k < c->n[p]; k++) {
-      if (PetscAbsReal(c->x[p][k] - mu[p]) < PetscAbsReal(c->x[p][nearest] - mu[p])) nearest = k;
-    }
-    node = node * c->n[p] + nearest;
-  }
-  return node;
-}
-
 /* The forces at mu by the interpolated problem; zero where it is not solved. */
 static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscReal L[])
 {
-  const PetscReal *nearest = c->Lambda + (size_t)NearestNode(c, mu) * (size_t)c->m;
+  const PetscReal *nearest = c->Lambda + (size_t)HycoCondensedNearest(c, mu, NULL) * (size_t)c->m;
   PetscBool definite;
   PetscInt its;
   HycoLCPStatus status = HYCO_LCP_RAY;
@@ -230,7 +214,7 @@ static PetscErrorCode JudgePatterns(HycoTrainer t, PetscInt n, const PetscReal m
   PetscCall(PetscMalloc1(n, &missed));
   for (PetscInt k = 0; k < t->n_s; k++) largest = PetscMax(largest, t->U_norm[k]);
   for (PetscInt k = 0; largest > 0 && k < n; k++) {
-    const PetscReal near = t->U_norm[c->sample[NearestNode(c, mu + k * c->dim)]];
+    const PetscReal near = t->U_norm[c->sample[HycoCondensedNearest(c, mu + k * c->dim, NULL)]];
 
     if (!Held(c, k)) continue;
     missed[n_held++] = Missed(&t->responses, c->m, L + (size_t)k * (size_t)c->m) / PetscMax(near, SMALL * largest);

@@ -25,13 +25,6 @@ static PetscErrorCode Sample(HycoModel m, const PetscReal mu[], PetscInt entries
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes on the range, its ends among them. */
-static void Nodes(PetscReal lo, PetscReal hi, PetscInt n, PetscReal x[])
-{
-  for (PetscInt k = 0; k < n; k++)
-    x[k] = n == 1 ? (lo + hi) / 2 : (lo + hi) / 2 - (hi - lo) / 2 * PetscCosReal(PETSC_PI * k / (PetscReal)(n - 1));
-}
-
 /* Whether the table gives the matrix at mu. */
 static PetscErrorCode Agrees(HycoModel m, HycoTable t, const PetscReal mu[], PetscBool *agrees)
 {
@@ -81,7 +74,7 @@ static PetscErrorCode Try(HycoModel m, const PetscInt n[], PetscInt entries, Pet
   PetscFunctionBegin;
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     PetscCall(PetscMalloc1(n[p], &x[p]));
-    Nodes(s->lo[p], s->hi[p], n[p], x[p]);
+    PetscCall(HycoChebyshevNodes(n[p], s->lo[p], s->hi[p], x[p]));
   }
   PetscCall(HycoTableCreate(n, x, s->n_parameters, entries, table));
   for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(PetscFree(x[p]));
