@@ -168,7 +168,7 @@ static PetscBool DecidesModel(const char name[])
 /* Which commands read an option of a model's use; NULL: it is no such option. */
 static const char *ReadersOf(const char name[])
 {
-  if (strcasecmp(name, "hyco_fallback") == 0) return "predict";
+  if (strcasecmp(name, "hyco_fallback") == 0 || strcasecmp(name, "hyco_full_displacement") == 0) return "predict";
   if (strncasecmp(name, "hyco_reconstruct", 16) == 0) return "train, predict, compare";
   return NULL;
 }
