@@ -11,7 +11,8 @@ extern "C" {
 
 typedef struct _p_HycoSnapshots *HycoSnapshots;
 
-/* Called on rank 0 of the store's communicator after each solution: done of n so far. */
+/* Called on rank 0 of the store's communicator after each solution of its group: done of n are stored, by all groups;
+   at the end once with n of n. */
 typedef PetscErrorCode (*HycoProgress)(PetscInt done, PetscInt n, void *ctx);
 
 /* Opens (creates if missing) the folder. Collective on `comm`. The scene must outlive it. The caller owns it. */

@@ -183,27 +183,54 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's group solves its run of the missing samples. */
+/* The missing samples that the groups have stored by now. Each takes its run in order: next[c] is where the last look
+   at that of group c ended. */
+static PetscErrorCode CountStored(HycoSnapshots s, PetscInt groups, PetscInt n_par, const PetscReal mu[],
+                                  PetscInt n_missing, const PetscInt missing[], PetscInt next[], PetscInt *n_stored)
+{
+  PetscFunctionBegin;
+  *n_stored = 0;
+  for (PetscInt c = 0; c < groups; c++) {
+    const PetscInt first = c * n_missing / groups, last = (c + 1) * n_missing / groups;
+
+    for (next[c] = PetscMax(next[c], first); next[c] < last; next[c]++) {
+      char path[PETSC_MAX_PATH_LEN];
+
+      PetscCall(SamplePath(s, mu + missing[next[c]] * n_par, path));
+      if (access(path, F_OK) != 0) break;
+    }
+    *n_stored += next[c] - first;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* This rank's group solves its run of the missing samples. Rank 0 tells how many are stored, while some are not. */
 static PetscErrorCode SolveGroup(HycoSnapshots s, MPI_Comm group, PetscInt color, PetscInt groups, PetscInt n_par,
                                  const PetscReal mu[], PetscInt n_all, PetscInt n_missing, const PetscInt missing[],
                                  HycoProgress progress, void *ctx)
 {
   const PetscInt first = color * n_missing / groups, last = (color + 1) * n_missing / groups;
+  PetscInt *next, n_stored = n_missing;
   PetscMPIInt rank;
   HycoFOM fom;
   PetscReal *force;
+  PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   PetscCall(HycoFOMCreate(group, s->scene, &fom));
   PetscCall(PetscMalloc1(fom->n_nodes * fom->fe->dim, &force));
-  for (PetscInt k = first; k < last; k++) {
-    PetscCall(SolveSample(s, fom, mu + missing[k] * n_par, force));
-    if (rank == 0 && progress)
-      PetscCall(progress(PetscMin(n_all, n_all - n_missing + (k - first + 1) * groups), n_all, ctx));
+  PetscCall(PetscCalloc1(groups, &next));
+  for (PetscInt k = first; !ierr && k < last; k++) {
+    ierr = SolveSample(s, fom, mu + missing[k] * n_par, force);
+    if (ierr || rank != 0 || !progress) continue;
+    ierr = CountStored(s, groups, n_par, mu, n_missing, missing, next, &n_stored);
+    if (!ierr && n_stored < n_missing) ierr = progress(n_all - n_missing + n_stored, n_all, ctx);
   }
+  PetscCall(PetscFree(next));
   PetscCall(PetscFree(force));
   PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -230,6 +257,7 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
     PetscCallMPI(MPI_Comm_split(s->comm, (PetscMPIInt)color, rank, &group));
     HycoOnEach(s->comm, SolveGroup(s, group, color, groups, n_par, mu, n, n_missing, missing, progress, ctx));
     PetscCallMPI(MPI_Comm_free(&group));
+    if (rank == 0 && progress) PetscCall(progress(n, n, ctx));
   }
   PetscCall(PetscFree(missing));
   PetscFunctionReturn(PETSC_SUCCESS);
