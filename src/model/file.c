@@ -252,15 +252,16 @@ static PetscErrorCode LoadTrust(HycoH5 h, HycoModel m)
   HycoTrust *t = &m->trust;
   PetscReal *numbers, *at;
   PetscInt n = TRUST_NUMBERS, one = 1;
-  PetscBool good = PETSC_TRUE;
+  PetscBool good;
 
   PetscFunctionBegin;
   if (HycoH5Has(h, "training/search")) PetscCall(HycoH5LoadText(h, "training/search", &m->search));
   if (!HycoH5Has(h, "training/trust")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5LoadReal(h, "training/trust", &n, &one, &numbers));
-  for (PetscInt k = 0; k < n; k++) good = (PetscBool)(good && !PetscIsInfOrNanReal(numbers[k]));
+  good = (PetscBool)(numbers[0] >= 1 && numbers[0] <= (PetscReal)PETSC_MAX_INT);
   at = numbers;
-  t->n = (PetscInt)*at++;
+  t->n = good ? (PetscInt)*at : 0;
+  at++;
   for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) {
     t->floor[j] = *at++;
     good = (PetscBool)(good && t->floor[j] > 0);
@@ -269,7 +270,7 @@ static PetscErrorCode LoadTrust(HycoH5 h, HycoModel m)
   for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) t->lambda[j] = *at++;
   t->force = *at;
   PetscCall(PetscFree(numbers));
-  HycoCheck(good && t->n > 0 && t->force >= 0, "%s: training/trust is damaged", m->path);
+  HycoCheck(good && t->force >= 0, "%s: training/trust is damaged", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -22,6 +22,8 @@ KEPT = {
     'rope-hybrid-4.h5': ('hybrid', 0.32557839822027457, 20),
     'rope-projection-4.h5': ('projection', 0.35099348195512448, 19),
     'rope-condensed-4.h5': ('condensed', 0.32059636509212763, 14),
+    'rope-hybrid-4-table.h5': ('hybrid', 0.3255783982202313, 20),
+    'rope-condensed-4-modes.h5': ('condensed', 0.3205963650921275, 14),
 }
 ROWS = Rows('files')
 CONDENSED = ['train', '-scene', ROPE, '-grid', '2,3', '-hyco_model_type', 'condensed', '-model', 'c.h5']
@@ -115,7 +117,7 @@ class Files(Case):
                   ('bounds', (0, 1), 0), ('bounds', (0, 0), np.nan))
         for name, at, value in values:
             with self.subTest(name=name, at=at, value=value):
-                self.refused(self.edited(put(name, at, value), 'c.h5'), 'condensed/.* is damaged')
+                self.refused(self.edited(put(name, at, value), 'c.h5'), f'bad.h5: condensed/({name} (is damaged|holds)|bounds is 2 x 2 where)')
         ROWS.add(f'numbers of a condensed model that no training writes ({len(values)})', "refused by the dataset's name")
 
     def test_elsewhere(self):
@@ -156,11 +158,23 @@ class Files(Case):
                                       ('problem/sizes', (2, 0), 9, 'problem/sizes is damaged'),
                                       ('problem/fe_dof', (1, 0), 0, 'fe_dof is damaged'), ('format', (0, 0), 99, 'has model format 99'),
                                       ('kind', (0, 0), 88, 'is no hyco model'), ('mesh/head', (0, 0), 77, 'outside'),
-                                      ('mesh/group_start', (1, 0), 10**6, 'damaged'))
+                                      ('mesh/group_start', (1, 0), 10**6, 'damaged'),
+                                      ('training/trust', (3, 0), np.nan, 'training/trust holds a value that is not finite'),
+                                      ('training/trust', (1, 0), 0, 'training/trust is damaged'),
+                                      ('training/trust', (0, 0), 1e300, 'training/trust is damaged'),
+                                      ('training/trust', (0, 0), 0, 'training/trust is damaged'),
+                                      ('training/trust', (15, 0), -1, 'training/trust is damaged'),
+                                      ('table/counts', (1, 0), 16, 'table/counts is damaged|table/parameters is'),
+                                      ('table/counts', slice(None), 16, 'table/counts is damaged'),
+                                      ('table/parameters', (0, 0), np.nan, 'table/parameters holds a value that is not finite'),
+                                      ('table/parameters', (1, 0), 0.05, 'table/parameters is damaged'),
+                                      ('table/stiffness', (1, 7), np.inf, 'table/stiffness holds a value that is not finite'))
         for name, at, value, text in values:
-            with self.subTest(name=name):
+            with self.subTest(name=name, at=at, value=value):
                 self.refused(self.edited(put(name, at, value)), text)
         ROWS.add(f'numbers of a hybrid model that no training writes ({len(values)}): NaN, out of range, other format', 'refused')
+        shutil.copy(os.path.join(DATA, 'rope-projection-4.h5'), self.path('p.h5'))
+        self.refused(self.edited(put('problem/sizes', (4, 0), 9), 'p.h5'), 'problem/dual is damaged')
 
     def test_other_scene(self):
         self.refused('good.h5', 'was trained on another scene', 'compare', '-scene', PELLET, '-grid', '2,2')
@@ -194,6 +208,31 @@ class Files(Case):
         for kind in ('flexibility', 'responses'):
             self.damaged(glob.glob(self.path('c.h5.snapshots', kind + '-*.h5'))[0], 10, draw, CONDENSED)
         ROWS.add('a snapshot (16), a flexibility (10), its responses (10): one bit flipped, or cut', 'refused by its name')
+
+    def test_snapshots_of_other_sizes(self):
+        """Sound files whose sizes do not go together: the same line on one rank and on two."""
+        first, second = sorted(glob.glob(self.path('good.h5.snapshots', '*.h5')))[:2]
+
+        def change(path, name, rows):
+            with h5py.File(path, 'r+') as f:
+                values = f[name][:]
+                del f['sealed'], f[name]
+                if rows:
+                    f[name] = values[:rows]
+
+        for path in (first, second):
+            for name, rows, text in (('U', 99, 'U has .* rows where other snapshots have'), ('lambda', 0, 'holds no lambda')):
+                with open(path, 'rb') as f:
+                    good = f.read()
+                change(path, name, rows)
+                for ranks in (0, 2):
+                    with self.subTest(path=path, name=name, ranks=ranks):
+                        run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-model', 'good.h5', ranks=ranks, timeout=60)
+                        self.assertEqual(run.returncode, 1)
+                        self.assertRegex(run.stderr, text)
+                with open(path, 'wb') as f:
+                    f.write(good)
+        ROWS.add('snapshots whose sizes do not go together (4), on 1 and 2 ranks', 'refused by their names')
 
     def test_snapshots_of_another(self):
         """Solutions and flexibilities of other materials, under the names of these."""
