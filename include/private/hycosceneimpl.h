@@ -14,6 +14,8 @@ typedef struct _n_HycoExpr *HycoExpr;
 PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, const char *const names[],
                               HycoExpr *expr);
 PetscErrorCode HycoExprDestroy(HycoExpr *expr);
+/* Where it was evaluated, for messages: the coordinates, and the parameters that it reads. */
+PetscErrorCode HycoExprPlace(HycoExpr expr, const PetscReal mu[], const PetscReal xyz[3], char place[HYCO_LINE]);
 /* Values at n points (n x 3 coordinates) and mu; fails on a value that is not finite. */
 PetscErrorCode HycoExprEval(HycoExpr expr, const PetscReal mu[], PetscInt n, const PetscReal xyz[], PetscReal value[]);
 /* Whether x, y or z appears; whether any parameter p with changed[p] does. NULL-safe (false). */

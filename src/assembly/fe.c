@@ -142,6 +142,24 @@ static PetscErrorCode SetSupports(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CheckElastic(HycoFE fe, const HycoBody *body, const PetscReal x[3], PetscReal young,
+                                   PetscReal poisson)
+{
+  char place[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (!(young > 0)) {
+    PetscCall(HycoExprPlace(body->young, fe->mu, x, place));
+    HycoFail("%s is %g at %s; Young's modulus must be positive", HycoExprKey(body->young), (double)young, place);
+  }
+  if (!(poisson > -1 && poisson < 0.5)) {
+    PetscCall(HycoExprPlace(body->poisson, fe->mu, x, place));
+    HycoFail("%s is %g at %s; Poisson's ratio must lie between -1 and 0.5", HycoExprKey(body->poisson), (double)poisson,
+             place);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Lame's constants at the quadrature points from Young's modulus and Poisson's ratio; `first`: of constant cells too.
  */
 static PetscErrorCode SetMaterial(HycoFE fe, PetscBool first)
@@ -164,10 +182,7 @@ static PetscErrorCode SetMaterial(HycoFE fe, PetscBool first)
       }
       PetscCall(HycoExprEval(body->young, fe->mu, 1, x, &young));
       if (body->poisson) PetscCall(HycoExprEval(body->poisson, fe->mu, 1, x, &poisson));
-      HycoCheck(young > 0, "%s is %g at x = %g, y = %g, z = %g; Young's modulus must be positive",
-                HycoExprKey(body->young), (double)young, (double)x[0], (double)x[1], (double)x[2]);
-      HycoCheck(poisson > -1 && poisson < 0.5, "%s is %g; Poisson's ratio must lie between -1 and 0.5",
-                HycoExprKey(body->poisson), (double)poisson);
+      PetscCall(CheckElastic(fe, body, x, young, poisson));
       lame[0] = m->dim == 1 ? 0 : young * poisson / ((1 + poisson) * (1 - 2 * poisson));
       lame[1] = m->dim == 1 ? young : young / (2 * (1 + poisson));
     }

@@ -593,12 +593,6 @@ PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool
     n_sets = 1;
   }
   HycoCheck(n_sets <= 1, "give one set of points: -grid, or -values_NAME, or -points");
-  {
-    PetscInt n_points;
-
-    PetscCall(HycoSamplesGet(*samples, &n_points, NULL, NULL));
-    HycoCheck(!n_sets || n_points > 0, "the set of points is empty; give at least one");
-  }
   *given = (PetscBool)(n_sets == 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,7 @@
 /* Expressions of a scene, parsed by muParser. */
 #include <hycosceneimpl.h>
 #include <muParserDLL.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -108,6 +109,24 @@ PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoExprPlace(HycoExpr e, const PetscReal mu[], const PetscReal xyz[3], char place[HYCO_LINE])
+{
+  size_t length;
+
+  PetscFunctionBegin;
+  HycoFormat(place, "x = %g, y = %g, z = %g", (double)xyz[0], (double)xyz[1], (double)xyz[2]);
+  for (int k = 0; e->parser && k < mupGetExprVarNum(e->parser); k++) {
+    const char *name = NULL;
+    double *address = NULL;
+
+    mupGetExprVar(e->parser, (unsigned)k, &name, &address);
+    if (address < e->mu || address >= e->mu + e->n_parameters) continue;
+    length = strlen(place);
+    snprintf(place + length, HYCO_LINE - length, ", %s = %.10g", name, (double)mu[address - e->mu]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoExprEval(HycoExpr e, const PetscReal mu[], PetscInt n, const PetscReal xyz[], PetscReal value[])
 {
   PetscFunctionBegin;
@@ -127,8 +146,10 @@ PetscErrorCode HycoExprEval(HycoExpr e, const PetscReal mu[], PetscInt n, const 
   }
   for (PetscInt k = 0; k < n; k++) {
     if (PetscIsInfOrNanReal(value[k])) {
-      HycoFail("%s: \"%s\" is not finite at x = %g, y = %g, z = %g", e->key, e->text, (double)xyz[3 * k],
-               (double)xyz[3 * k + 1], (double)xyz[3 * k + 2]);
+      char place[HYCO_LINE];
+
+      PetscCall(HycoExprPlace(e, mu, xyz + 3 * k, place));
+      HycoFail("%s: \"%s\" is not finite at %s", e->key, e->text, place);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

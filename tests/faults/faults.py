@@ -133,6 +133,7 @@ CASES = [
     (['predict', '-model', 'rope.h5', '-mu', '0.07,0.1', '-output', 'out.vtk'], 'ends in .xdmf'),
     (['compare', '-scene', ROPE, '-model', 'rope.h5'], 'give the test points: -mu V,V,... for one, or -grid'),
     (['compare', '-scene', ROPE, '-model', 'rope.h5', *N, *STOPPED], 'the full-order solution at mu1 = 0.1, mu2 = '),
+    (['predict', '-model', 'rope.h5', '-mu', '0.07,0.17', '-output', 'out.xdmf', *STOPPED], 'or a cycle (KKT residuals: '),
     (['predict', '-model', 'rope.h5', *N, *STOPPED], 'converged of a table (-table FILE.csv) says which'),
     (['predict', '-model', 'rope.h5', '-mu', '0.07,0.1', '-output', 'none/out.xdmf'], '-output none/out.xdmf cannot be written'),
     (['predict', '-model', 'empty', '-mu', '0.07,0.1'], 'empty is no file; one that hyco has written is expected'),
@@ -148,6 +149,11 @@ CASES = [
     (['train', *T, '-points', 'outside.csv'], 'mu1 = 0.3 lies outside its range'),
     (['train', *T, '-points', 'other.csv'], 'the column "mu3" is no parameter'),
     (['train', *T, '-points', 'twice.csv'], 'the column mu1 stands twice'),
+    (['train', *T, '-points', 'p.csv', '-target_u', '1e-2'], '1 points leave 1 to train on and 0 to validate by'),
+    (['train', *T, *N, '-scene_mesh', 'none.msh'], 'the mesh none.msh cannot be opened'),
+    (['train', '-scene', PELLET, '-model', 'out.h5', '-grid', '1,1', '-contact_gap_master', 'clad_outer_low'],
+     'of the 189 nodes of contact_pellet have no node of'),
+    (['train', *T, *N, '-body_rope_young', 'sqrt((mu1-0.15)^2-0.0004)+x'], 'y = 0, z = 0, mu1 = 0.1'),  # between the points
     (['train', *T, *N, '-hyco_trust_folds', '1'], '1 folds cannot calibrate'),
     (['train', *T, *N, '-hyco_snapshots', 's' * 4050], "the snapshot folder's name is too long"),
     (['train', *T, '-grid', '10'], '-grid has 1 numbers; the scene has 2 parameters'),
@@ -176,7 +182,7 @@ CASES = [
 ]
 # on two ranks: errors found by one rank, by all, or while files are written
 TWO = ('body_rope_young: "2*(x"', 'text.h5 is no HDF5 file', 'must be positive', 'none.msh cannot', 'mu1 = 0.04', 'cut.h5', 'contact_clad', 'not YAML',
-       'knows no option -zzz', 'none/out.h5', '-hyco_rid_region', '-hyco_rid_groups', 'none/r.json', 'nothing to learn', 'leaves the modes without')
+       'knows no option -zzz', 'none/out.h5', '-hyco_rid_region', '-hyco_rid_groups', 'none/r.json', 'nothing to learn', 'leaves the modes without', 'of the 189 nodes', 'z = 0, mu1 = 0.1', 'KKT residuals')
 MPI_NOISE = ('mpiexec', '-----', 'Primary job', 'a non-zero exit code', 'the job to be', 'Process name', 'Exit code')
 
 
@@ -258,6 +264,16 @@ class Faults(Case):
                 with self.subTest(args=' '.join(args), text=text, ranks=2):
                     self.check(list(args), text, 2)
         ROWS.add(f'wrong commands, options, values, meshes, files ({len(CASES)}), some on 2 ranks', 'one line, status not 0, nothing left')
+
+    def test_one_point_of_a_set(self):
+        """A point where the stiffness has no value, met by one rank: the others have predicted theirs, and don't wait."""
+        self.hyco('train', '-scene', ROPE, *N, '-body_rope_young', 'sqrt(0.3-mu1)+x', '-model', 'half.h5')
+        for values in ('0.05,0.1,0.35', '0.35,0.05,0.1', '0.05,0.35,0.1'):
+            for ranks in (2, 3):
+                with self.subTest(values=values, ranks=ranks):
+                    self.check(['predict', '-model', 'half.h5', '-extrapolate', '-values_mu1', values, '-values_mu2', '0.1',
+                                '-table', 'out.csv'], '"sqrt(0.3-mu1)+x" is not finite at', ranks)
+        ROWS.add('a point of a set where the scene has no value, met by one rank (3), on 2 and 3 ranks', 'one line, status 1, no rank left waiting')
 
     def apart(self, text, *args, other=(), folder='.'):
         """Rank 0 as it should be; ranks 1 and 2 stand in another folder or have other arguments: one line, status 1, soon."""

@@ -173,6 +173,19 @@ class Files(Case):
             with self.subTest(name=name, at=at, value=value):
                 self.refused(self.edited(put(name, at, value)), text)
         ROWS.add(f'numbers of a hybrid model that no training writes ({len(values)}): NaN, out of range, other format', 'refused')
+        for old, new, text in ((b'\t', b' ', "the model's scene text is damaged"), (b'body_', b'bo y_', 'is no entry of a scene')):
+            def rewrite(f, old=old, new=new):
+                text = f['problem/scene'][:]
+                f['problem/scene'][...] = np.frombuffer(text.tobytes().replace(old, new), text.dtype).reshape(text.shape)
+            self.refused(self.edited(rewrite), text)
+
+        def pair(f):
+            text = f['problem/scene'][:]
+            del f['problem/scene']
+            f['problem/scene'] = np.hstack([text, text])
+
+        self.refused(self.edited(pair), 'problem/scene is damaged')
+        self.refused(self.edited(put('problem/sizes', (0, 0), 101)), 'the whole mesh is damaged', 'predict', '-output', 'w.xdmf')
         shutil.copy(os.path.join(DATA, 'rope-projection-4.h5'), self.path('p.h5'))
         self.refused(self.edited(put('problem/sizes', (4, 0), 9), 'p.h5'), 'problem/dual is damaged')
 
