@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 static char geo[PETSC_MAX_PATH_LEN], data[PETSC_MAX_PATH_LEN], rope[PETSC_MAX_PATH_LEN], hybrid[PETSC_MAX_PATH_LEN],
-    projection[PETSC_MAX_PATH_LEN];
+    blocks[PETSC_MAX_PATH_LEN], projection[PETSC_MAX_PATH_LEN];
 static FILE *rows; /* faults/api.csv: what table.py puts into docs/limits.md */
 static const PetscReal inside[2] = {0.07, 0.17}, outside[2] = {0.04, 0.17};
 
@@ -224,6 +224,52 @@ static PetscErrorCode TestAfterError(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A training without points, with settings that cannot be; a full-order problem of another mesh. */
+static PetscErrorCode TestTraining(void)
+{
+  const PetscReal shift[2] = {0.05, 0.06};
+  HycoScene scene, other;
+  HycoSamples samples;
+  HycoTrainer trainer;
+  HycoSnapshots store;
+  HycoSolver solver;
+  HycoModel model;
+  HycoFOM fom;
+  HycoErrors errors;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
+  CHECK_FAILS(HycoTrainerSetGreedyStop(trainer, 0, 0, 0), "it must be positive, as 1e-3 is");
+  CHECK_FAILS(HycoTrainerSetGreedyStop(trainer, 1e-3, -1, 0), "neither can be negative");
+  CHECK_FAILS(HycoTrainerSetTrustFolds(trainer, 1), "1 folds cannot calibrate");
+  CHECK_FAILS(HycoTrainerRun(trainer, NULL, "none.h5", NULL), "give the training points");
+  CHECK_FAILS(HycoTrainerRun(trainer, samples, "none.h5", NULL), "the set of training points is empty");
+  CHECK(access("none.h5", F_OK) != 0, "a training that was refused has written a model");
+  PetscCall(HycoSnapshotsOpen(PETSC_COMM_WORLD, scene, "none.snapshots", &store));
+  CHECK_FAILS(HycoSnapshotsFill(store, samples, NULL, NULL), "the set of samples is empty");
+  PetscCall(HycoSnapshotsDestroy(&store));
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  rmdir("none.snapshots");
+  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
+  CHECK_FAILS(HycoSolverSetLinear(solver, HYCO_LINEAR_AUTO, -1), "it must be 0 (what is free) or more");
+  PetscCall(HycoSolverDestroy(&solver));
+  PetscCall(HycoSceneLoad(PETSC_COMM_SELF, blocks, &other));
+  PetscCall(HycoFOMCreate(PETSC_COMM_SELF, other, &fom));
+  PetscCall(HycoFOMSolve(fom, 2, shift));
+  PetscCall(HycoModelLoad(hybrid, &model));
+  PetscCall(HycoModelPredict(model, 2, inside));
+  CHECK_FAILS(HycoModelCompare(model, fom, &errors), "the model was trained on a mesh of 100 nodes and 99 cells");
+  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSceneDestroy(&other));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Two models, asked in turn, do not disturb each other. */
 static PetscErrorCode TestTwo(void)
 {
@@ -340,6 +386,7 @@ static PetscErrorCode Test(void)
   snprintf(geo, sizeof(geo), "%s/examples/rope/rope.geo", source);
   snprintf(data, sizeof(data), "%s/tests/data", source);
   snprintf(rope, sizeof(rope), "%s/examples/rope", source);
+  snprintf(blocks, sizeof(blocks), "%s/examples/blocks", source);
   snprintf(hybrid, sizeof(hybrid), "%s/tests/data/rope-hybrid-3.h5", source);
   snprintf(projection, sizeof(projection), "%s/tests/data/rope-projection-3.h5", source);
   PetscCall(TestDestroyed());
@@ -347,6 +394,7 @@ static PetscErrorCode Test(void)
   PetscCall(TestNullPlaces());
   PetscCall(TestSamples());
   PetscCall(TestAfterError());
+  PetscCall(TestTraining());
   PetscCall(TestTwo());
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   if (size == 1) {

@@ -119,7 +119,7 @@ static PetscErrorCode TestOutside(void)
   const PetscReal flat[6] = {0, 0, 1, 1, 2, 2}, twice[4] = {0, 1, 0, 3};
   const PetscReal above = 9, below[2] = {-1, 0.5}, away[2] = {0.5, -2}, corner[2] = {-1, -1}, quarter = 1.5;
   HycoInterpolant it = NULL;
-  PetscReal w[4];
+  PetscReal w[4], many[90];
 
   PetscFunctionBegin;
   PetscCall(HycoInterpolantCreate(1, 3, line, &it));
@@ -148,6 +148,12 @@ static PetscErrorCode TestOutside(void)
   CHECK_FAILS(HycoInterpolantCreate(2, 3, flat, &it), "lie on one line or plane");
   PetscCall(HycoInterpolantDestroy(&it));
   CHECK_FAILS(HycoInterpolantCreate(2, 2, flat, &it), "at least 3 are needed");
+  PetscCall(HycoInterpolantDestroy(&it));
+  CHECK_FAILS(HycoInterpolantCreate(0, 2, flat, &it), "2 points in 0 parameters cannot be interpolated");
+  for (PetscInt k = 0; k < 10; k++) { /* the origin and the unit vectors of 9 dimensions: no grid */
+    for (PetscInt p = 0; p < 9; p++) many[k * 9 + p] = k == p + 1;
+  }
+  CHECK_FAILS(HycoInterpolantCreate(9, 10, many, &it), "interpolated for up to 8 parameters; here are 9");
   PetscCall(HycoInterpolantDestroy(&it));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
