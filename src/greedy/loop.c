@@ -240,7 +240,6 @@ static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
 {
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(training, &loop->n_points, &loop->n_par, &loop->points));
-  HycoCheck(loop->n_par > 0, "the scene has no parameter: there is nothing to choose for a greedy training");
   HycoCheck(loop->n_points > 1,
             "the greedy training has %d training point; it chooses among at least two: "
             "-training_grid 20,24",

@@ -154,6 +154,11 @@ CASES = [
     (['train', '-scene', PELLET, '-model', 'out.h5', '-grid', '1,1', '-contact_gap_master', 'clad_outer_low'],
      'of the 189 nodes of contact_pellet have no node of'),
     (['train', *T, *N, '-body_rope_young', 'sqrt((mu1-0.15)^2-0.0004)+x'], 'y = 0, z = 0, mu1 = 0.1'),  # between the points
+    (['train', *T, *N, '-scene_mesh', 'fine.msh', '-hyco_model_type', 'condensed'], 'the scene has 4198 contacts: a condensed model stores'),
+    (['train', *T, '-scene_mesh', 'fewer.msh', '-hyco_model_type', 'condensed', '-values_mu2', '0,0.5', '-values_mu1',
+      ','.join(f'{0.05 + 0.001 * k:.3f}' for k in range(150))], 'the flexibility of 3998 contacts at 150 training points has more than'),
+    (['train', '-scene', 'none.yaml', '-model', 'out.h5', '-greedy', '-training_grid', '3'], '-training_grid has 1 numbers; the scene has 0 parameters'),
+    (['train', '-scene', 'nine.yaml', '-model', 'out.h5', '-greedy', '-training_grid', '2' + ',2' * 8], 'the parameters\' ranges have 2^9 corners'),
     (['train', *T, *N, '-hyco_trust_folds', '1'], '1 folds cannot calibrate'),
     (['train', *T, *N, '-hyco_snapshots', 's' * 4050], "the snapshot folder's name is too long"),
     (['train', *T, '-grid', '10'], '-grid has 1 numbers; the scene has 2 parameters'),
@@ -201,6 +206,15 @@ class Faults(Case):
                            ('stray.opt', '-mu 0.07,0.17\nstray words\n')):
             with open(cls.path(name), 'w', encoding='ascii') as f:
                 f.write(text)
+        for name, n in (('fine.msh', 4200), ('fewer.msh', 4000)):
+            subprocess.run(['gmsh', '-1', os.path.join(ROPE, 'rope.geo'), '-setnumber', 'n', str(n), '-format', 'msh41', '-bin', '1',
+                            '-v', '1', '-o', cls.path(name)], check=True, timeout=60 * PATIENCE, stdout=subprocess.DEVNULL)
+        for name, parameters in (('none.yaml', []), ('nine.yaml', [f'p{k}' for k in range(9)])):
+            with open(cls.path(name), 'w', encoding='ascii') as f:
+                f.write(f'scene: {{mesh: {os.path.join(ROPE, "rope.msh")}, parameters: [{", ".join(parameters)}]}}\n')
+                f.writelines(f'parameter_{p}: {{range: [1, 2]}}\n' for p in parameters)
+                f.write(f'body: {{rope: {{young: {"+".join(["1", *parameters])}}}}}\nfixed: {{ends: {{x: 0}}}}\nforce: {{rope: {{x: -1}}}}\n'
+                        'contact: {ground: {type: obstacle, group: rope, normal: {x: -1}, gap: 0.1}}\n')
         for source, name, size in ((cls.path('rope.h5'), 'cut.h5', 9000), (os.path.join(PELLET, 'A.msh'), 'cut.msh',
                                                                            60000)):
             with open(source, 'rb') as f, open(cls.path(name), 'wb') as g:

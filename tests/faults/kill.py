@@ -108,21 +108,23 @@ class Kill(Case):
         self.setUp()
         self.check_kills(2, 'condensed', CONDENSED)
 
-    def limited(self, kilobytes):
+    def limited(self, kilobytes, train=TRAIN, ranks=1):
         """The run in which, once it solves, no file can grow beyond a size: what a full disk does, without one."""
-        run = subprocess.Popen([HYCO, *TRAIN], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        run = subprocess.Popen(self.command(ranks, train), cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         before = len(glob.glob(self.path('m.h5.snapshots', '*.h5')))
         while run.poll() is None and len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) == before:
             time.sleep(0.001)
-        resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (kilobytes * 1024, kilobytes * 1024))
+        for process in children(run.pid) if ranks > 1 else [run.pid]:
+            resource.prlimit(process, resource.RLIMIT_FSIZE, (kilobytes * 1024, kilobytes * 1024))
         _, said = run.communicate(timeout=100 * PATIENCE)
         return run.returncode, said
 
     def refused(self, run, text):
         status, stderr = run
         self.assertEqual(status, 1, stderr)
-        said = [line for line in stderr.splitlines() if 'snapshots:' not in line and line]
+        said = [line for line in stderr.splitlines() if line.startswith('hyco: error')]
         self.assertEqual(len(said), 1, stderr)
+        self.assertNotIn('MPI_ABORT', stderr)
         self.assertIn(text, said[0])
         self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
 
@@ -140,6 +142,16 @@ class Kill(Case):
         subprocess.run([HYCO, *TRAIN], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
         self.assertEqual(self.content(), right)
         ROWS.add('disk full while a snapshot or the model is written', 'one line; the old model is untouched, nothing half written is left; then it goes on')
+
+    def test_full_disk_condensed(self):
+        """Full while flexibilities are written, which are larger than solutions, on 1 and 2 ranks."""
+        train = [a if a != '20,4' else '40,8' for a in CONDENSED]  # long enough to be caught in
+        for ranks in (1, 2):
+            self.refused(self.limited(16, train, ranks), 'flexibility-')
+            self.assertFalse(os.path.exists(self.path('m.h5')))
+            self.assertEqual(len([f for f in os.listdir(self.path('m.h5.snapshots')) if '-' not in f]), 320)
+            self.setUp()
+        ROWS.add('disk full while a flexibility is written, on 1 and 2 ranks', 'one line, no model; the solutions stay for the next run')
 
     def full(self, kilobytes, *args):
         """A run in which no file can grow beyond a size once it reads its options: from a pipe, which waits until that is so."""
