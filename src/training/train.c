@@ -21,8 +21,8 @@ static PetscErrorCode ReadMesh(HycoTrainer t)
   HycoOnRoot(t->comm, HycoPairsFind(t->scene, t->whole, &t->pairs));
   for (PetscInt k = 0; k < t->n_groups; k++)
     HycoOnRoot(t->comm, HycoMeshFindGroup(t->whole, "hyco_rid_groups", t->groups[k], &group));
+  HycoOnRoot(t->comm, HycoFECreate(t->scene, t->whole, &t->fe));
   if (t->rank == 0) {
-    PetscCall(HycoFECreate(t->scene, t->whole, &t->fe));
     t->sizes[0] = t->whole->n_nodes;
     t->sizes[1] = t->whole->n_cells;
     t->sizes[2] = t->pairs.n;

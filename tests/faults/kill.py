@@ -108,13 +108,14 @@ class Kill(Case):
         self.setUp()
         self.check_kills(2, 'condensed', CONDENSED)
 
-    def limited(self, kilobytes, train=TRAIN, ranks=1):
-        """The run in which, once it solves, no file can grow beyond a size: what a full disk does, without one."""
+    def limited(self, kilobytes, train=TRAIN, ranks=1, alone=0):
+        """The run in which, once it solves, no file can grow beyond a size: what a full disk does, without one.
+        `alone` of the ranks, or all."""
         run = subprocess.Popen(self.command(ranks, train), cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         before = len(glob.glob(self.path('m.h5.snapshots', '*.h5')))
         while run.poll() is None and len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) == before:
             time.sleep(0.001)
-        for process in children(run.pid) if ranks > 1 else [run.pid]:
+        for process in children(run.pid)[-alone:] if ranks > 1 else [run.pid]:
             resource.prlimit(process, resource.RLIMIT_FSIZE, (kilobytes * 1024, kilobytes * 1024))
         _, said = run.communicate(timeout=100 * PATIENCE)
         return run.returncode, said
@@ -146,8 +147,8 @@ class Kill(Case):
     def test_full_disk_condensed(self):
         """Full while flexibilities are written, which are larger than solutions, on 1 and 2 ranks."""
         train = [a if a != '20,4' else '40,8' for a in CONDENSED]  # long enough to be caught in
-        for ranks in (1, 2):
-            self.refused(self.limited(16, train, ranks), 'flexibility-')
+        for ranks, alone, more in ((1, 0, []), (2, 1, []), (2, 0, ['-hyco_groups', '1'])):
+            self.refused(self.limited(16, train + more, ranks, alone), 'flexibility-')
             self.assertFalse(os.path.exists(self.path('m.h5')))
             self.assertEqual(len([f for f in os.listdir(self.path('m.h5.snapshots')) if '-' not in f]), 320)
             self.setUp()

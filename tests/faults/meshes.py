@@ -288,6 +288,21 @@ class Meshes(Case):
                     self.refused(text, 'bad.msh')
         ROWS.add(f'broken meshes ({len(MESHES)})', 'one line, status 1, no file left; every third one on 2 or 3 ranks too')
 
+    def test_train(self):
+        """The same meshes given to train, which reads them on rank 0 for itself."""
+        broken = [(change, text) for _, change, text in MESHES if text]
+        with ThreadPoolExecutor(4) as pool:
+            runs = []
+            for k, (change, text) in enumerate(broken):
+                msh(self.path(f'train{k}.msh'), *change(self.nodes, self.elements, NAMES))
+                runs.append((text, pool.submit(self.run_raw, 'train', '-scene', 'scene.yaml', '-scene_mesh', f'train{k}.msh', '-model',
+                                               f'm{k}.h5', '-grid', '2', ranks=2, timeout=60)))
+            for text, run in runs:
+                with self.subTest(text=text):
+                    self.one_line(run.result(), text)
+        self.assertEqual([f for f in os.listdir(self.folder) if f.startswith('m') and f.endswith(('.h5', '.partial', '.candidate'))], [])
+        ROWS.add(f'the same meshes in training ({len(broken)}), on 2 ranks', 'one line, status 1, no model')
+
     def test_together(self):
         for what, mesh, scene, text in TOGETHER:
             with self.subTest(what=what):
