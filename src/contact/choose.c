@@ -133,7 +133,6 @@ PetscErrorCode HycoChooseForm(HycoSolver s, HycoForm *form)
 
   PetscFunctionBegin;
   *form = s->form;
-  if (s->type == HYCO_TYPE_LEMKE && *form == HYCO_FORM_PRIMAL) *form = HYCO_FORM_DUAL;
   if (*form != HYCO_FORM_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
   *form = HYCO_FORM_DUAL;
   if (s->type == HYCO_TYPE_LEMKE || (s->type == HYCO_TYPE_TAO && s->tao_type >= HYCO_TAO_SEMISMOOTH))
@@ -150,7 +149,8 @@ PetscErrorCode HycoChooseTao(HycoSolver s, HycoForm form)
 {
   PetscFunctionBegin;
   PetscCheck(
-      form != HYCO_FORM_DUAL_FREE || s->type == HYCO_TYPE_TAO, s->comm, PETSC_ERR_USER,
+      form == HYCO_FORM_DUAL || s->type == HYCO_TYPE_TAO || (form == HYCO_FORM_PRIMAL && s->type != HYCO_TYPE_LEMKE),
+      s->comm, PETSC_ERR_USER,
       "%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with dual_free",
       HycoSolverTypes[s->type]);
   s->tao = s->tao_type;
