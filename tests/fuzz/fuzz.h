@@ -4,6 +4,7 @@
 #ifndef FUZZ_H
 #define FUZZ_H
 
+#include <dirent.h>
 #include <hycoimpl.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -29,12 +30,26 @@ static inline void FuzzWrite(const char path[], const void *data, size_t size)
   if (!file || fwrite(data, 1, size, file) != size || fclose(file)) abort();
 }
 
+/* At the end of the process: its folder and the files in it. */
+static inline void FuzzRemove(void)
+{
+  DIR *folder = opendir(fuzz_folder);
+  char path[512];
+
+  for (struct dirent *e = folder ? readdir(folder) : NULL; e; e = readdir(folder)) {
+    snprintf(path, sizeof(path), "%s/%s", fuzz_folder, e->d_name);
+    if (e->d_name[0] != '.') unlink(path);
+  }
+  if (folder) closedir(folder);
+  rmdir(fuzz_folder);
+}
+
 static inline void FuzzStart(void)
 {
   setenv("PETSC_OPTIONS", "-no_signal_handler", 1); /* signals are the fuzzer's */
   setenv("OMPI_MCA_opal_signal", "", 1);
   snprintf(fuzz_folder, sizeof(fuzz_folder), "/tmp/hyco-fuzz-XXXXXX");
-  if (!mkdtemp(fuzz_folder) || HycoInitialize(NULL, NULL)) abort();
+  if (!mkdtemp(fuzz_folder) || atexit(FuzzRemove) || HycoInitialize(NULL, NULL)) abort();
 }
 
 /* Runs `call`, whose refusal is welcome; an error that is PETSc's own and no line of hyco's is not. */

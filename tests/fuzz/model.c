@@ -8,7 +8,7 @@
 #include <hdf5.h>
 #include <hycomodelimpl.h>
 
-#define N_MODELS 3
+#define N_MODELS 5
 #define RECORD   12
 
 typedef struct {
@@ -73,6 +73,8 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
   ReadGood("rope-hybrid-3.h5", &good[0]);
   ReadGood("rope-projection-3.h5", &good[1]);
   ReadGood("rope-condensed-4.h5", &good[2]);
+  ReadGood("rope-hybrid-4-table.h5", &good[3]);
+  ReadGood("rope-condensed-4-modes.h5", &good[4]);
   return 0;
 }
 

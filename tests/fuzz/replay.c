@@ -1,26 +1,120 @@
-/* Runs a fuzz target over files: replay FILE...; what the fuzzer found once stays found, without the fuzzer. */
+/*
+  Runs a fuzz target without the fuzzer: replay COUNT FILE...; first over the files, so that what was found once stays
+  found, then over COUNT inputs that are made from them by changing, cutting out, cutting off and joining bytes, by the
+  same pseudo-random numbers in every run. It says which input it is at, so that a crash names it.
+*/
 #include "fuzz.h"
+
+#define ROOM 65536 /* of an input that is made, in bytes */
+
+typedef struct {
+  uint8_t *data;
+  size_t size;
+} Input;
+
+/* xorshift64*, S. Vigna, ACM Trans. Math. Softw. 42 (2016) 30 */
+static size_t Draw(uint64_t *state, size_t below)
+{
+  *state ^= *state >> 12;
+  *state ^= *state << 25;
+  *state ^= *state >> 27;
+  return (size_t)((*state * 0x2545F4914F6CDD1DULL) >> 32) % below;
+}
+
+static Input Read(const char path[])
+{
+  FILE *file = fopen(path, "rb");
+  Input in = {NULL, 0};
+
+  if (!file) exit(2);
+  fseek(file, 0, SEEK_END);
+  in.size = (size_t)ftell(file);
+  rewind(file);
+  in.data = malloc(in.size + 1);
+  if (!in.data || fread(in.data, 1, in.size, file) != in.size) exit(2);
+  fclose(file);
+  return in;
+}
+
+/* Puts `size` bytes into `out` before its byte `at`, as far as there is room. */
+static void Insert(Input *out, size_t at, const uint8_t *data, size_t size)
+{
+  if (size > ROOM - out->size) size = ROOM - out->size;
+  memmove(out->data + at + size, out->data + at, out->size - at);
+  memcpy(out->data + at, data, size);
+  out->size += size;
+}
+
+static void CutOut(Input *out, size_t at, size_t size)
+{
+  if (size > out->size - at) size = out->size - at;
+  memmove(out->data + at, out->data + at + size, out->size - at - size);
+  out->size -= size;
+}
+
+/* One change of `out`; `other` is an input to take bytes from. */
+static void Change(Input *out, const Input *other, uint64_t *state)
+{
+  static const char telling[] = "\0\377\1 \n-.9e/\":{[$x";
+  const size_t at = Draw(state, out->size + 1), from = Draw(state, other->size + 1);
+
+  switch (Draw(state, 6)) {
+  case 0:
+    if (at < out->size) out->data[at] ^= (uint8_t)(1 << Draw(state, 8));
+    break;
+  case 1:
+    if (at < out->size) out->data[at] = (uint8_t)telling[Draw(state, sizeof(telling) - 1)];
+    break;
+  case 2:
+    CutOut(out, at, 1 + Draw(state, 40));
+    break;
+  case 3:
+    Insert(out, at, other->data + from, Draw(state, (other->size - from < 60 ? other->size - from : 60) + 1));
+    break;
+  case 4:
+    Insert(out, at, (const uint8_t *)telling + Draw(state, sizeof(telling) - 1), 1);
+    break;
+  default:
+    if (Draw(state, 8) == 0) out->size = at;
+  }
+}
+
+static void RunMade(size_t count, size_t n, const Input in[])
+{
+  uint64_t state = 20180701;
+  Input out = {malloc(ROOM), 0};
+
+  if (!out.data) exit(2);
+  for (size_t k = 0; k < count; k++) {
+    const Input *start = &in[Draw(&state, n)];
+    const size_t changes = 1 + Draw(&state, 6);
+
+    out.size = start->size < ROOM ? start->size : ROOM;
+    memcpy(out.data, start->data, out.size);
+    for (size_t c = 0; c < changes; c++) Change(&out, &in[Draw(&state, n)], &state);
+    fprintf(stderr, "made %zu\n", k);
+    LLVMFuzzerTestOneInput(out.data, out.size);
+  }
+  free(out.data);
+}
 
 int main(int argc, char **argv)
 {
-  if (argc < 2) return 2;
-  LLVMFuzzerInitialize(&argc, &argv);
-  for (int k = 1; k < argc; k++) {
-    FILE *file = fopen(argv[k], "rb");
-    uint8_t *data;
-    long size;
+  const size_t n = (size_t)(argc > 2 ? argc - 2 : 0);
+  Input *in = malloc((n + 1) * sizeof(*in));
+  size_t count;
 
-    if (!file) return 2;
-    fseek(file, 0, SEEK_END);
-    size = ftell(file);
-    rewind(file);
-    data = malloc((size_t)size + 1);
-    if (!data || fread(data, 1, (size_t)size, file) != (size_t)size) return 2;
-    fclose(file);
-    fprintf(stderr, "%s\n", argv[k]);
-    LLVMFuzzerTestOneInput(data, (size_t)size);
-    free(data);
+  if (!n || !in) return 2;
+  count = (size_t)strtoul(argv[1], NULL, 10);
+  LLVMFuzzerInitialize(&argc, &argv);
+  for (size_t k = 0; k < n; k++) {
+    in[k] = Read(argv[k + 2]);
+    fprintf(stderr, "%s\n", argv[k + 2]);
+    LLVMFuzzerTestOneInput(in[k].data, in[k].size);
   }
-  printf("%d inputs\n", argc - 1);
+  RunMade(count, n, in);
+  printf("%zu inputs kept, %zu made of them\n", n, count);
+  for (size_t k = 0; k < n; k++) free(in[k].data);
+  free(in);
   return HycoFinalize() ? 1 : 0;
 }
