@@ -107,9 +107,11 @@ static PetscErrorCode SelectPairs(HycoModel m)
 
     p->slave[i] = all->slave[k];
     p->contact[i] = all->contact[k];
+    p->master_start[i + 1] = masters + n;
+    if (!n) continue; /* an obstacle */
     PetscCall(PetscArraycpy(p->master + masters, all->master + lo, n));
     PetscCall(PetscArraycpy(p->weight + masters, all->weight + lo, n));
-    p->master_start[i + 1] = masters += n;
+    masters += n;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
