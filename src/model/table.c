@@ -160,25 +160,36 @@ static PetscErrorCode LoadPattern(HycoModel m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The table, without a sparse matrix's rows; the caller frees what was read, of a refused file too. */
+static PetscErrorCode LoadValues(HycoModel m, HycoH5 h, PetscInt **count, PetscReal **x, PetscReal **data)
+{
+  PetscInt dim = m->scene->n_parameters, one = 1, all = 0, nodes = 1, rows = -1;
+  PetscReal *of[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadInt(h, "table/counts", 1, 16, &dim, &one, count));
+  for (PetscInt p = 0; p < dim; p++) {
+    all += (*count)[p];
+    nodes *= (*count)[p];
+    HycoCheck(nodes <= HYCO_TABLE_NODES, "%s: table/counts is damaged", m->path);
+  }
+  PetscCall(HycoH5LoadReal(h, "table/parameters", &all, &one, x));
+  PetscCall(CheckParameters(m, *count, *x));
+  PetscCall(HycoH5LoadReal(h, "table/stiffness", &nodes, &rows, data));
+  for (PetscInt p = 0, at = 0; p < dim; at += (*count)[p++]) of[p] = *x + at;
+  PetscCall(HycoTableCreate(*count, of, dim, rows, &m->table));
+  PetscCall(PetscArraycpy(m->table->values.data, *data, (size_t)nodes * (size_t)rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoTableLoad(HycoModel m, HycoH5 h)
 {
-  PetscInt dim = m->scene->n_parameters, one = 1, all = 0, nodes = 1, rows = -1, *count;
-  PetscReal *x, *data, *of[HYCO_MAX_PARAMETERS];
+  PetscInt *count = NULL;
+  PetscReal *x = NULL, *data = NULL;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5LoadInt(h, "table/counts", 1, 16, &dim, &one, &count));
-  for (PetscInt p = 0; p < dim; p++) {
-    all += count[p];
-    nodes *= count[p];
-    HycoCheck(nodes <= HYCO_TABLE_NODES, "%s: table/counts is damaged", m->path);
-  }
-  PetscCall(HycoH5LoadReal(h, "table/parameters", &all, &one, &x));
-  PetscCall(CheckParameters(m, count, x));
-  PetscCall(HycoH5LoadReal(h, "table/stiffness", &nodes, &rows, &data));
-  for (PetscInt p = 0, at = 0; p < dim; at += count[p++]) of[p] = x + at;
-  ierr = HycoTableCreate(count, of, dim, rows, &m->table);
-  if (!ierr) ierr = PetscArraycpy(m->table->values.data, data, (size_t)nodes * (size_t)rows);
+  ierr = LoadValues(m, h, &count, &x, &data);
   PetscCall(PetscFree(data));
   PetscCall(PetscFree(x));
   PetscCall(PetscFree(count));

@@ -9,6 +9,7 @@ import csv
 import glob
 import os
 import sys
+import tarfile
 
 SOURCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..')
 TESTS = ('kill.py', 'damage.c', 'files.py', 'meshes.py', 'faults.py', 'api.c')
@@ -32,8 +33,11 @@ def rows():
             runs, seconds = f.read().split()
         crashes = os.listdir(os.path.join(SOURCE, 'build-fuzz', 'found', name))
         kept = os.listdir(os.path.join(SOURCE, 'tests', 'fuzz', 'corpus', name))
+        with tarfile.open(os.path.join(SOURCE, 'tests', 'fuzz', 'learned.tar.gz')) as f:
+            learned = sum(m.isfile() and m.name.startswith(f'corpus/{name}/') for m in f)
         found.append([f'fuzzing: {name}, {seconds} s, {runs} inputs',
-                      f'{len(crashes)} crashes, leaks or hangs; {len(kept)} inputs are kept and replayed', '`scripts/fuzz`'])
+                      f'{len(crashes)} crashes, leaks or hangs; {len(kept)} inputs are kept for every test run, which makes thousands of them; '
+                      f'{learned} for the next fuzzing', '`scripts/fuzz`'])
     path = os.path.join(SOURCE, 'build-sanitize', 'summary')
     if os.path.exists(path):
         with open(path, encoding='ascii') as f:
