@@ -165,6 +165,7 @@ int main(int argc, char **argv)
 
   if (answer >= 0) return answer;
   setenv("OPENBLAS_NUM_THREADS", "1", 0);
+  setenv("OMPI_MCA_ess_singleton_isolated", "1", 0); /* no daemon beside a run without mpiexec: it spawns nothing */
   if (Start(&argc, &argv)) return 1;
   PetscPushErrorHandler(KeepMessage, NULL); /* after: PETSc's books of memory (-malloc_dump) begin with it */
   signal(SIGPIPE, SIG_IGN);                 /* "hyco ... | head" is no error */
