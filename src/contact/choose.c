@@ -149,7 +149,8 @@ PetscErrorCode HycoChooseTao(HycoSolver s, HycoForm form)
 {
   PetscFunctionBegin;
   PetscCheck(
-      form == HYCO_FORM_DUAL || s->type == HYCO_TYPE_TAO || (form == HYCO_FORM_PRIMAL && s->type != HYCO_TYPE_LEMKE),
+      form == HYCO_FORM_DUAL || s->type == HYCO_TYPE_TAO ||
+          (form == HYCO_FORM_PRIMAL && s->type == HYCO_TYPE_ACTIVE_SET),
       s->comm, PETSC_ERR_USER,
       "%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with dual_free",
       HycoSolverTypes[s->type]);

@@ -210,7 +210,7 @@ static PetscErrorCode SolveGroup(HycoSnapshots s, MPI_Comm group, PetscInt color
                                  HycoProgress progress, void *ctx)
 {
   const PetscInt first = color * n_missing / groups, last = (color + 1) * n_missing / groups;
-  PetscInt *next, n_stored = n_missing;
+  PetscInt *next, n_stored;
   PetscMPIInt rank;
   HycoFOM fom;
   PetscReal *force;

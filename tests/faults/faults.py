@@ -219,8 +219,7 @@ class Faults(Case):
             with open(cls.path(name), 'w', encoding='ascii') as f:
                 f.write(text)
         for name, n in (('fine.msh', 4200), ('fewer.msh', 4000)):
-            subprocess.run(['gmsh', '-1', os.path.join(ROPE, 'rope.geo'), '-setnumber', 'n', str(n), '-format', 'msh41', '-bin', '1',
-                            '-v', '1', '-o', cls.path(name)], check=True, timeout=60 * PATIENCE, stdout=subprocess.DEVNULL)
+            cls.rope_mesh(name, n)
         for name, parameters in (('none.yaml', []), ('nine.yaml', [f'p{k}' for k in range(9)])):
             with open(cls.path(name), 'w', encoding='ascii') as f:
                 f.write(f'scene: {{mesh: {os.path.join(ROPE, "rope.msh")}, parameters: [{", ".join(parameters)}]}}\n')

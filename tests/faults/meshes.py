@@ -268,6 +268,14 @@ class Meshes(Case):
         self.assertNotIn('internal error', said[0])
         self.assertIn(text, said[0])
 
+    def all_one_line(self, runs):
+        """Runs of (what, ranks, arguments, expected text), some at a time: starting ranks is mostly waiting."""
+        with ThreadPoolExecutor(4) as pool:
+            started = [pool.submit(self.run_raw, *args, ranks=ranks, timeout=60) for _, ranks, args, _ in runs]
+            for (what, ranks, _, text), run in zip(runs, started, strict=True):
+                with self.subTest(what=what, ranks=ranks):
+                    self.one_line(run.result(), text)
+
     def refused(self, text, mesh=None, often=3):
         """Alone; every third one on two ranks, then three, too: what is found on one rank goes one way to the others."""
         self.count += 1
@@ -291,15 +299,11 @@ class Meshes(Case):
     def test_train(self):
         """The same meshes given to train, which reads them on rank 0 for itself."""
         broken = [(change, text) for _, change, text in MESHES if text]
-        with ThreadPoolExecutor(4) as pool:
-            runs = []
-            for k, (change, text) in enumerate(broken):
-                msh(self.path(f'train{k}.msh'), *change(self.nodes, self.elements, NAMES))
-                runs.append((text, pool.submit(self.run_raw, 'train', '-scene', 'scene.yaml', '-scene_mesh', f'train{k}.msh', '-model',
-                                               f'm{k}.h5', '-grid', '2', ranks=2, timeout=60)))
-            for text, run in runs:
-                with self.subTest(text=text):
-                    self.one_line(run.result(), text)
+        runs = []
+        for k, (change, text) in enumerate(broken):
+            msh(self.path(f'train{k}.msh'), *change(self.nodes, self.elements, NAMES))
+            runs.append((text, 2, ['train', '-scene', 'scene.yaml', '-scene_mesh', f'train{k}.msh', '-model', f'm{k}.h5', '-grid', '2'], text))
+        self.all_one_line(runs)
         self.assertEqual([f for f in os.listdir(self.folder) if f.startswith('m') and f.endswith(('.h5', '.partial', '.candidate'))], [])
         ROWS.add(f'the same meshes in training ({len(broken)}), on 2 ranks', 'one line, status 1, no model')
 
@@ -342,16 +346,11 @@ class Meshes(Case):
         ROWS.add(f'broken scenes ({len(SCENES)})', 'one line, status 1, no file left; every third one on 2 or 3 ranks too')
 
     def test_one_rank_only(self):
-        with ThreadPoolExecutor(4) as pool:  # starting ranks is mostly waiting
-            runs = []
-            for k, ((old, new), text) in enumerate(ONE_RANK):
-                self.write(f'one{k}.yaml', SCENE.replace(old, new, 1))
-                for ranks in (2, 3):
-                    runs.append((new, ranks, text, pool.submit(self.run_raw, 'solve', '-scene', f'one{k}.yaml', '-mu', '0.05',
-                                                               ranks=ranks, timeout=60)))
-            for new, ranks, text, run in runs:
-                with self.subTest(new=new, ranks=ranks):
-                    self.one_line(run.result(), text)
+        runs = []
+        for k, ((old, new), text) in enumerate(ONE_RANK):
+            self.write(f'one{k}.yaml', SCENE.replace(old, new, 1))
+            runs += [(new, ranks, ['solve', '-scene', f'one{k}.yaml', '-mu', '0.05'], text) for ranks in (2, 3)]
+        self.all_one_line(runs)
         ROWS.add(f'errors in the cells, facets or contacts of one rank alone ({len(ONE_RANK)}), on 2 and 3 ranks', 'one line, status 1, no rank left waiting')
 
     def test_same_in_every_format(self):

@@ -12,13 +12,9 @@ typedef struct {
   size_t size;
 } Input;
 
-/* xorshift64*, S. Vigna, ACM Trans. Math. Softw. 42 (2016) 30 */
-static size_t Draw(uint64_t *state, size_t below)
+static size_t Draw(unsigned short state[3], size_t below)
 {
-  *state ^= *state >> 12;
-  *state ^= *state << 25;
-  *state ^= *state >> 27;
-  return (size_t)((*state * 0x2545F4914F6CDD1DULL) >> 32) % below;
+  return (size_t)nrand48(state) % below;
 }
 
 static Input Read(const char path[])
@@ -53,7 +49,7 @@ static void CutOut(Input *out, size_t at, size_t size)
 }
 
 /* One change of `out`; `other` is an input to take bytes from. */
-static void Change(Input *out, const Input *other, uint64_t *state)
+static void Change(Input *out, const Input *other, unsigned short state[3])
 {
   static const char telling[] = "\0\377\1 \n-.9e/\":{[$x";
   const size_t at = Draw(state, out->size + 1), from = Draw(state, other->size + 1);
@@ -81,17 +77,17 @@ static void Change(Input *out, const Input *other, uint64_t *state)
 
 static void RunMade(size_t count, size_t n, const Input in[])
 {
-  uint64_t state = 20180701;
+  unsigned short state[3] = {2018, 7, 1};
   Input out = {malloc(ROOM), 0};
 
   if (!out.data) exit(2);
   for (size_t k = 0; k < count; k++) {
-    const Input *start = &in[Draw(&state, n)];
-    const size_t changes = 1 + Draw(&state, 6);
+    const Input *start = &in[Draw(state, n)];
+    const size_t changes = 1 + Draw(state, 6);
 
     out.size = start->size < ROOM ? start->size : ROOM;
     memcpy(out.data, start->data, out.size);
-    for (size_t c = 0; c < changes; c++) Change(&out, &in[Draw(&state, n)], &state);
+    for (size_t c = 0; c < changes; c++) Change(&out, &in[Draw(state, n)], state);
     fprintf(stderr, "made %zu\n", k);
     LLVMFuzzerTestOneInput(out.data, out.size);
   }

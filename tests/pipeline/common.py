@@ -53,6 +53,12 @@ class Case(unittest.TestCase):
         with open(report, encoding='utf-8') as file:
             return json.load(file)
 
+    @classmethod
+    def rope_mesh(cls, name, nodes):
+        """The rope's mesh of so many nodes, in the test's folder."""
+        subprocess.run(['gmsh', '-1', os.path.join(ROPE, 'rope.geo'), '-setnumber', 'n', str(nodes), '-format', 'msh41', '-bin', '1',
+                        '-v', '1', '-o', cls.path(name)], check=True, timeout=60 * PATIENCE, stdout=subprocess.DEVNULL)
+
     def near(self, found, expected, relative, what=''):
         self.assertLessEqual(abs(found - expected), relative * abs(expected), f'{what}: {found!r} for {expected!r}')
 

@@ -2,10 +2,9 @@
 import csv
 import os
 import statistics
-import subprocess
 import unittest
 
-from common import ROPE, SOURCE, Case
+from common import ROPE, Case
 
 FACTOR = 4  # of noise; the meshes differ by 50
 
@@ -15,8 +14,7 @@ class Flat(Case):
         """Median of some predictions, and the elements of the RID."""
         mesh, model, table = (self.path(f'{nodes}.{end}') for end in ('msh', 'h5', 'csv'))
         if not os.path.exists(model):
-            subprocess.run(['gmsh', '-1', os.path.join(SOURCE, 'examples', 'rope', 'rope.geo'), '-setnumber', 'n', str(nodes),
-                            '-format', 'msh41', '-bin', '1', '-v', '1', '-o', mesh], check=True, timeout=60)
+            self.rope_mesh(mesh, nodes)
             self.hyco('train', '-scene', ROPE, '-scene_mesh', mesh, '-grid', '4,5', '-hyco_pod_max_modes', '9', '-hyco_hybrid',
                       'all', '-model', model)
         self.hyco('predict', '-model', model, '-grid', '8,9', '-table', table, *options)

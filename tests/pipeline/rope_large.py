@@ -1,7 +1,5 @@
 """The rope on meshes of 1e2 to 1e5 nodes: the active set starts from coarser problems, and its iterations stay few."""
 import csv
-import os
-import subprocess
 import unittest
 
 import h5py
@@ -20,9 +18,7 @@ class RopeLarge(Case):
     def setUpClass(cls):
         super().setUpClass()
         for n in SIZES:
-            subprocess.run(['gmsh', '-1', os.path.join(ROPE, 'rope.geo'), '-setnumber', 'n', str(n), '-format', 'msh41',
-                            '-bin', '1', '-v', '1', '-o', cls.path(f'{n}.msh')], check=True, timeout=60,
-                           stdout=subprocess.DEVNULL)
+            cls.rope_mesh(f'{n}.msh', n)
 
     def rope(self, n, mu, *more, **options):
         report = self.hyco('solve', '-scene', ROPE, '-scene_mesh', self.path(f'{n}.msh'), '-mu', mu, *more, **options)
