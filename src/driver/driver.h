@@ -55,9 +55,10 @@ enum {
   DRIVER_MISSED = 3  /* what was asked for is written, but misses a target or the default bar */
 };
 
-/* What is written misses what was asked: one line on stderr from rank 0, beginning "hyco: missed:", an entry of "missed"
-   in the report, which must be written after this, and the exit status DRIVER_MISSED unless an error follows. The text
-   says what was reached, what was asked and what to do. To be called on every rank, for the ranks end with one status. */
+/* What is written misses what was asked: one line on stderr from rank 0, beginning "hyco: missed:", an entry of
+   "missed" in the report, which must be written after this, and the exit status DRIVER_MISSED unless an error follows.
+   The text says what was reached, what was asked and what to do. To be called on every rank, for the ranks end with one
+   status. */
 PetscErrorCode DriverMissed(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 void DriverReportMissed(cJSON *json);
 /* The exit status of a run that ended with `ierr`; to be called once, at the end. */
@@ -112,8 +113,8 @@ PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char wor
                                  char columns[DRIVER_LINE]);
 /* Reads the options of train -greedy, makes the training set and sets the trainer, which will fill `log`. */
 PetscErrorCode DriverReadGreedy(HycoScene scene, HycoTrainer trainer, HycoSamples *training, GreedyLog *log);
-/* Says that the loop ended short of what was asked: of -target, or, where that was left to its default, of the limits that
-   were given. Collective. */
+/* Says that the loop ended short of what was asked: of -target, or, where that was left to its default, of the limits
+   that were given. Collective. */
 PetscErrorCode DriverJudgeGreedy(const GreedyLog *log);
 void DriverReportGreedy(cJSON *json, const GreedyLog *log);
 

@@ -120,10 +120,11 @@ PetscErrorCode DriverJudgeGreedy(const GreedyLog *log)
   PetscCallMPI(MPI_Bcast(&end, sizeof(end), MPI_BYTE, 0, PETSC_COMM_WORLD));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-target", &asked));
   if (strcmp(end.stop, "target") == 0 || (!asked && strcmp(end.stop, "points"))) PetscFunctionReturn(PETSC_SUCCESS);
-  if (strcmp(end.stop, "snapshots") == 0) why = "-max_snapshots is reached: raise it, or give a recipe with more modes or layers";
+  if (strcmp(end.stop, "snapshots") == 0)
+    why = "-max_snapshots is reached: raise it, or give a recipe with more modes or layers";
   if (strcmp(end.stop, "seconds") == 0) why = "-max_seconds have passed: the same command with more goes on from here";
-  PetscCall(DriverMissed("the greedy training's indicator is %.2e at worst (infinite at %d points) where -target is %g; it "
-                         "stopped because %s",
+  PetscCall(DriverMissed("the greedy training's indicator is %.2e at worst (infinite at %d points) where -target is "
+                         "%g; it stopped because %s",
                          (double)end.max_eta, (int)end.infinite, (double)log->target, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
