@@ -15,6 +15,15 @@ typedef struct _p_HycoModel *HycoModel;
 typedef enum { HYCO_MODEL_HYBRID, HYCO_MODEL_PROJECTION, HYCO_MODEL_CONDENSED } HycoModelType; /* -hyco_model_type */
 extern const char *const HycoModelTypes[]; /* their words; NULL ends */
 
+/* Which displacements of a hybrid model are full order: -hyco_hybrid. */
+typedef enum {
+  HYCO_HYBRID_AUTO,    /* contact, or all where every unknown of A is a contact's */
+  HYCO_HYBRID_RANK,    /* as many as give full row rank (39)-(40) */
+  HYCO_HYBRID_CONTACT, /* every one on Gamma_A^C */
+  HYCO_HYBRID_ALL      /* all of A; the interface follows from them through V: gamma = G U[A] */
+} HycoHybrid;
+extern const char *const HycoHybrids[]; /* their words; NULL ends */
+
 /* What a prediction amounts to, in scene units. Of a projection-based model the RID is the whole mesh. */
 typedef struct {
   HycoModelType type;
@@ -27,10 +36,10 @@ typedef struct {
   PetscReal total_contact_force;                                   /* reconstructed, whole contact surface */
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
-  /* An upper estimate of the relative errors of u (whole mesh, 2-norm) and of all contact forces (2-norm; a force below
-     a tenth of the largest in training counts as that tenth), calibrated at training; < 0: the model has none, or the
-     solve did not converge. */
-  PetscReal estimated_error_u, estimated_error_lambda;
+  /* An upper estimate of the relative errors of u (whole mesh, 2-norm), of the stress (RID, 2-norm of the cells' values)
+     and of all contact forces (2-norm; a force below a tenth of the largest held out in training counts as that tenth),
+     calibrated at training on held-out solutions; < 0: the model has none, or the solve did not converge. */
+  PetscReal estimated_error_u, estimated_error_sigma, estimated_error_lambda;
   PetscReal estimated_error_u_full; /* condensed: of u by HycoFOMSolveForces() with these forces; else < 0 */
   PetscReal beyond; /* how far the parameters lie outside what training has seen: the most, as a share of the range */
   PetscReal interpolation_error; /* condensed: of the forces, relative, one training value left out, more outside
@@ -121,9 +130,6 @@ typedef struct {
 /* Collective on the full-order model's communicator; model on its rank 0 (NULL elsewhere), errors filled there. Both
    must have been solved at the same parameters, on the same mesh. */
 PetscErrorCode HycoModelCompare(HycoModel model, HycoFOM fom, HycoErrors *errors);
-
-/* Writes into the model's file, at `path`, how it was chosen: lines that HycoModelView() shows. Not collective. */
-PetscErrorCode HycoModelNote(const char path[], const char text[]);
 
 /* Prints what is in the model, in words, on an ASCII viewer. */
 PetscErrorCode HycoModelView(HycoModel model, PetscViewer viewer);

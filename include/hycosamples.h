@@ -33,13 +33,16 @@ PetscErrorCode HycoSamplesAddPoint(HycoSamples samples, const PetscReal mu[]);
 PetscErrorCode HycoSamplesAddFile(HycoSamples samples, const char path[]);
 
 /*
-  Splits a set into what is held out and the rest, both in the set's order: of the parameter with the fewest distinct
-  values (three or more, each shared by several points) the values number offset, offset + every, ... in ascending
-  order, with all their points; so that nothing that was kept lies next to what was held out, as a step of the same load
-  ramp would. Where no value is shared, every such point. The caller owns both new sets. Not collective.
+  `count` points spread evenly over what the set reaches (from its least to its largest value of each parameter, and half
+  the widest step between two more at either end, within the scene's range), none of them in it: points to judge by what
+  is learned from the set. They are the numbers first, first + 1, ... of one sequence, so that later calls continue it.
+  slow[p] (may be NULL): a new value of this parameter is expensive; as long as others are not, `together` >= 1
+  successive points share its value. Without parameters there is none. The caller owns *unseen. Not collective.
 */
-PetscErrorCode HycoSamplesHoldOut(HycoSamples samples, PetscInt every, PetscInt offset, HycoSamples *kept,
-                                  HycoSamples *held);
+PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,
+                                 const PetscBool slow[], HycoSamples *unseen);
+/* The points of `samples` that are not in `seen`, in their order. The caller owns *rest. Not collective. */
+PetscErrorCode HycoSamplesExcept(HycoSamples samples, HycoSamples seen, HycoSamples *rest);
 
 /* Of points with the same values keeps the first; the order stays. n_dropped: how many went (may be NULL). Not
    collective. */

@@ -13,6 +13,58 @@ extern "C" {
 
 typedef struct _p_HycoTrainer *HycoTrainer;
 
+/* -- what a model is worth -- */
+
+typedef enum {
+  HYCO_ERROR_U,
+  HYCO_ERROR_U_RID,
+  HYCO_ERROR_SIGMA,
+  HYCO_ERROR_SIGMA_11,
+  HYCO_ERROR_LAMBDA,
+  HYCO_ERROR_LAMBDA_RID,
+  HYCO_N_ERRORS
+} HycoErrorKind;                           /* of HycoErrors, those without H1 */
+extern const char *const HycoErrorKinds[]; /* their words: u, u_rid, sigma, ...; NULL ends */
+
+/* Errors over a set of points, as fractions. Of contact forces (HYCO_ERROR_LAMBDA and _RID), those smaller than a tenth
+   of the largest of the set count as that tenth. PETSC_INFINITY where a solve did not converge. */
+typedef struct {
+  PetscInt n, not_converged;
+  PetscReal largest[HYCO_N_ERRORS], median[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];
+  PetscInt worst[HYCO_N_ERRORS]; /* the point with the largest */
+  PetscReal
+      seconds; /* of an online solve, wall clock: the mean over the points, in their order, of each one's median */
+} HycoValidation;
+
+/* What decides a model beside its solutions; the options of the same names. */
+typedef struct {
+  HycoModelType type;
+  PetscReal pod_tol, contact_extension; /* energy left out of the displacement basis; a length */
+  PetscInt layers;
+  HycoHybrid hybrid;
+  PetscBool whole; /* the whole mesh as the RID */
+} HycoRecipe;
+
+/* In words: "hybrid, pod_tol 1e-10, hybrid contact, layers 1, contact extension 2.5". */
+void HycoRecipeDescribe(const HycoRecipe *recipe, size_t length, char text[]);
+
+/* A recipe that the search for one tried. Borrowed by the monitor. */
+typedef struct {
+  PetscInt number, of; /* from 1 on (0: nothing was searched); chosen: of how many */
+  HycoRecipe recipe;
+  PetscInt n_modes, n_fe_dofs, n_flexibilities, rid_nodes, rid_elements, rid_contacts;
+  PetscReal rid_fraction;
+  PetscReal cost;          /* operations of an online solve at a new stiffness, estimated */
+  PetscReal ratio;         /* the largest quotient of an error and its target: at most 1, they are met */
+  HycoErrorKind worst;     /* that error */
+  HycoValidation held_out; /* errors at the held-out points */
+  char failure[512];       /* why it gave no model; "": it did */
+} HycoAttempt;
+/* Called on rank 0 after each attempt. */
+typedef PetscErrorCode (*HycoAttemptMonitor)(const HycoAttempt *attempt, void *ctx);
+/* Called on rank 0 when n solutions are to be added; the parameter whose values lie too far apart, or -1. */
+typedef PetscErrorCode (*HycoAddedMonitor)(PetscInt n, PetscInt parameter, void *ctx);
+
 /* What a training gave. */
 typedef struct {
   HycoModelType type;
@@ -28,7 +80,10 @@ typedef struct {
   PetscReal rid_fraction;                                                 /* share of the elements */
   PetscReal condition;             /* of the reduced stiffness, worst of the judged snapshots */
   PetscReal error_u, error_lambda; /* mean relative training errors, 2-norm, displacement and RID contact forces */
+  HycoValidation held_out;         /* errors of the model that was written, at points that it was not trained on; n 0: none */
   PetscInt n_held;                 /* held-out predictions that calibrate the estimated errors; 0: none */
+  HycoAttempt chosen;              /* of the search for a recipe */
+  PetscInt n_added;                /* solutions that were added to meet the targets */
   HycoScan scan;                   /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
@@ -47,37 +102,27 @@ PetscErrorCode HycoTrainerChooses(HycoTrainer trainer, PetscBool *chooses);
 /* Called as snapshots are solved. */
 PetscErrorCode HycoTrainerSetProgress(HycoTrainer trainer, HycoProgress progress, void *ctx);
 /* Solves the samples that are missing, reduces, and writes the model to `path` (temporary name, then renamed).
-   Collective. `training` may be NULL; so may `samples` for a condensed model, which then chooses them until its
+   Collective. Beside them it solves the points that the model is judged by (HycoTrainerSetValidation()). `training` may
+   be NULL; so may `samples` for a condensed model, which then chooses them until its
    estimate of the forces' error is below -hyco_condensed_tol, or says in target_met that it is not. Fails for a model
    that misses its training solutions by half, and, unless -hyco_keep_singular, for one whose reduced stiffness is
    singular inside the parameters' ranges. */
 PetscErrorCode HycoTrainerRun(HycoTrainer trainer, HycoSamples samples, const char path[], HycoTraining *training);
 
-/* In how many parts the training solutions are held out, one after the other, to calibrate the estimated errors of a
-   hybrid model (-hyco_trust_folds; default 3; 0: none). */
-PetscErrorCode HycoTrainerSetTrustFolds(HycoTrainer trainer, PetscInt folds);
+/* Points to judge the model by, none of them a training point; must outlive the training. NULL (the default): drawn. */
+PetscErrorCode HycoTrainerSetValidation(HycoTrainer trainer, HycoSamples validation);
+/* How many are drawn, all over what the training points reach (-hyco_validation): < 0, the default: from the number of
+   training points; 0: none, so that neither errors are known nor a recipe is searched nor estimates are calibrated. */
+PetscErrorCode HycoTrainerSetValidationCount(HycoTrainer trainer, PetscInt n);
+/* Whether the recipe is searched by these points, as far as the options leave it open (-hyco_search; default: true). */
+PetscErrorCode HycoTrainerSetSearch(HycoTrainer trainer, PetscBool search);
+PetscErrorCode HycoTrainerSetAttemptMonitor(HycoTrainer trainer, HycoAttemptMonitor attempt, HycoAddedMonitor added,
+                                            void *ctx);
+/* What the errors at the held-out points may be (HYCO_N_ERRORS of them; 0: any). Where no recipe meets them, solutions
+   are added near the worst points, `budget` of them at most (< 0: as many as there were at first). */
+PetscErrorCode HycoTrainerSetTargets(HycoTrainer trainer, const PetscReal target[], PetscInt budget);
 
 /* -- judging a model by stored solutions -- */
-
-typedef enum {
-  HYCO_ERROR_U,
-  HYCO_ERROR_U_RID,
-  HYCO_ERROR_SIGMA,
-  HYCO_ERROR_SIGMA_11,
-  HYCO_ERROR_LAMBDA,
-  HYCO_ERROR_LAMBDA_RID,
-  HYCO_N_ERRORS
-} HycoErrorKind;                           /* of HycoErrors, those without H1 */
-extern const char *const HycoErrorKinds[]; /* their words: u, u_rid, sigma, ...; NULL ends */
-
-/* Errors over a set of points, as fractions. Of contact forces (HYCO_ERROR_LAMBDA and _RID), those smaller than a tenth
-   of the largest of the set count as that tenth. PETSC_INFINITY where a solve did not converge. */
-typedef struct {
-  PetscInt n, not_converged;
-  PetscReal largest[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];
-  PetscReal
-      seconds; /* of an online solve, wall clock: the mean over the points, in their order, of each one's median */
-} HycoValidation;
 
 /* Predicts at each sample and compares with its solution, which must be in the store. `model` on every rank; the ranks
    share the samples out. Collective on `comm`. */

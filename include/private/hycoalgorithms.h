@@ -47,12 +47,11 @@ PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Petsc
 PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], PetscReal x[]);
 
 /*
-  c with y <= sum_j c_j X_j + c[p] for `share` of the rows that are held (the quantile number ceil(share (m + 1)) of m
-  of them), c_j >= 0 by least squares over all n rows. X: n x p row major; c: p + 1. At least one row must be held. Not
-  collective.
+  c with y <= sum_j c_j X_j + c[p] for `share` of the n > 0 rows (the quantile number ceil(share (n + 1)), at most the
+  largest), c_j >= 0 by regularised least squares. X: n x p row major; c: p + 1. Not collective.
 */
-PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], const PetscBool held[],
-                              PetscReal share, PetscReal c[]);
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal share,
+                              PetscReal c[]);
 
 /*
   Many problems over one S (m x n column major, borrowed): min 1/2 sum_k d_k (S x)_k^2 - h^T S x + shift/2 |x|^2, x >=

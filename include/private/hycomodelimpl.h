@@ -7,14 +7,6 @@
 #include <hycomodel.h>
 #include <hycosolverimpl.h>
 
-/* Which displacements are full order; the order of -hyco_hybrid's words. */
-typedef enum {
-  HYCO_HYBRID_AUTO,
-  HYCO_HYBRID_RANK,    /* as many as give full row rank (39)-(40) */
-  HYCO_HYBRID_CONTACT, /* every one on Gamma_A^C */
-  HYCO_HYBRID_ALL      /* all of A; the interface follows from them through V: gamma = G U[A] */
-} HycoHybrid;
-
 typedef struct _n_HycoNorms *HycoNorms;
 typedef struct _n_HycoCondensed *HycoCondensed;
 typedef struct _n_HycoReconstruction *HycoReconstruction;
@@ -33,14 +25,19 @@ typedef enum { HYCO_DUAL_FE, HYCO_DUAL_NNMF, HYCO_DUAL_SNAPSHOTS } HycoDual;
 extern const char *const HycoDuals[]; /* their words, as options and files have them; NULL ends */
 
 /* What an estimate of the error is made of (trust.c): log(1 + feature / floor), a coefficient each, and a constant. */
-#define HYCO_TRUST_FEATURES 4
+#define HYCO_TRUST_FEATURES 5
+#define HYCO_TRUST_DISTANCE 3 /* which of them is the distance */
 /* Contact forces below this share of the largest of a set count as that much where errors are divided by them. */
 #define HYCO_SMALL_FORCE 0.1
+typedef enum { HYCO_TRUST_U, HYCO_TRUST_SIGMA, HYCO_TRUST_LAMBDA, HYCO_N_TRUST } HycoTrustKind;
 typedef struct {
-  PetscInt n; /* held-out predictions behind it; 0: not calibrated */
+  PetscInt n; /* held-out predictions behind the estimates; 0: not calibrated */
   PetscReal floor[HYCO_TRUST_FEATURES];
-  PetscReal u[HYCO_TRUST_FEATURES + 1], lambda[HYCO_TRUST_FEATURES + 1]; /* coefficients >= 0, then the constant */
-  PetscReal force; /* 2-norm of the largest contact forces in training: a tenth of it divides smaller ones' errors */
+  PetscBool has[HYCO_N_TRUST];                          /* whether there is an estimate of this error */
+  PetscReal law[HYCO_N_TRUST][HYCO_TRUST_FEATURES + 1]; /* coefficients >= 0, then the constant */
+  PetscReal force; /* 2-norm of the largest contact forces held out: a tenth of it divides smaller ones' errors */
+  PetscInt n_held; /* held-out predictions that the model was judged by; 0: none */
+  PetscReal median[HYCO_N_TRUST], largest[HYCO_N_TRUST]; /* their relative errors; huge: not converged, or x/0 */
 } HycoTrust;
 
 struct _p_HycoModel {
@@ -62,7 +59,7 @@ struct _p_HycoModel {
   PetscReal *S_lambda;    /* N_lambda x n_dual column major */
   PetscInt n_points;
   PetscReal *points; /* training points, n_points x n_parameters */
-  PetscReal *reach;  /* least and largest value that training has seen of each parameter (trust.c); made when asked */
+  PetscReal *reach; /* least, then largest values that training has seen of the parameters (trust.c); made when needed */
   char *provenance;
   char fingerprint[32]; /* of the scene and mesh that it was trained on */
   PetscInt whole_nodes, whole_cells;

@@ -19,6 +19,25 @@ typedef struct {
                        displacement of the nearest snapshot */
 } HycoResponses;
 
+/* The basis of one field of the snapshots, which a recipe takes the first modes of. Every rank. */
+typedef struct {
+  Mat V; /* l modes, rows spread */
+  PetscInt l, n_sigma;
+  PetscReal *sigma;        /* n_sigma singular values (room for n_s + 1) */
+  PetscReal *coefficients; /* displacements: l x n_s column major, V^T of the snapshots less their lifting; else NULL */
+} HycoBasis;
+
+/* What the search for a recipe (search.c) chooses, unless the options have it. */
+enum {
+  HYCO_CHOICE_TYPE,
+  HYCO_CHOICE_TOLERANCE,
+  HYCO_CHOICE_LAYERS,
+  HYCO_CHOICE_EXTENSION,
+  HYCO_CHOICE_HYBRID,
+  HYCO_CHOICE_WHOLE,
+  HYCO_N_CHOICES
+};
+
 struct _p_HycoTrainer {
   MPI_Comm comm;
   PetscMPIInt rank;
@@ -35,7 +54,14 @@ struct _p_HycoTrainer {
   PetscReal ridge; /* hybrid all; < 0: chosen */
   PetscInt scan;   /* points per parameter; 0: chosen */
   PetscBool keep_singular;
-  PetscInt folds; /* that calibrate the estimated errors; 0: none */
+  PetscInt n_validation; /* held-out solutions beside the training points; < 0: from their number */
+  PetscBool search;      /* for what nobody pinned of the recipe */
+  PetscBool pinned[HYCO_N_CHOICES];
+  HycoAttemptMonitor attempt;
+  HycoAddedMonitor added;
+  void *attempt_ctx;
+  PetscReal target[HYCO_N_ERRORS]; /* 0: none */
+  PetscInt budget;                 /* solutions that may be added to meet the targets */
   HycoModelType type;
   HycoDual dual;
   PetscInt nnmf_max_its, nnmf_vectors;
@@ -53,6 +79,11 @@ struct _p_HycoTrainer {
   } greedy;
   /* state of a run, rank 0 unless said */
   HycoSamples samples; /* borrowed, every rank */
+  HycoSamples validation, held, own_held; /* given by the user (borrowed; NULL: none); of this run (borrowed; NULL: none);
+                                             drawn for it. Every rank */
+  PetscInt drawn;                         /* unseen points drawn so far */
+  HycoBasis basis[HYCO_N_SEEDS];
+  PetscInt n_dual_seeds, *dual_seeds; /* nodes */
   HycoMesh whole;
   HycoPairs pairs;
   HycoFE fe;                                                     /* on the whole mesh */
@@ -74,8 +105,9 @@ struct _p_HycoTrainer {
 
 /* Frees what one run leaves behind. */
 PetscErrorCode HycoTrainerReset(HycoTrainer t);
-/* Frees the bases, seeds and snapshots, and keeps the mesh. */
+/* Frees the bases, seeds and snapshots, and keeps the mesh; what one recipe took of the bases alone. */
 PetscErrorCode HycoTrainerResetBases(HycoTrainer t);
+PetscErrorCode HycoTrainerDropBases(HycoTrainer t);
 /* Begins a run: checks, the mesh, the store of snapshots (the caller destroys it). Collective. */
 PetscErrorCode HycoTrainerOpen(HycoTrainer t, HycoSamples samples, const char path[], HycoSnapshots *store);
 /* From the bases: the RID, the model on it, its full-order displacements, the file; what it gave, on every rank.
@@ -86,8 +118,19 @@ PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path
 PetscErrorCode HycoTrainerGetDisplacements(HycoTrainer t, HycoSnapshots store, Mat *S);
 PetscErrorCode HycoTrainerMultiply(HycoTrainer t, Mat X, Mat Y, PetscReal product[]);
 PetscErrorCode HycoTrainerToRoot(HycoTrainer t, Mat S, PetscBool row_major, PetscReal **out);
-/* The bases of all snapshots in the store and the points that seed the RID. Collective. */
-PetscErrorCode HycoTrainerReduce(HycoTrainer t, HycoSnapshots store);
+/* The bases of all snapshots in the store and the points that seed the RID; all: every mode above the noise, so that
+   HycoTrainerTakeBases() can cut the bases again when the tolerances have changed. Collective. */
+PetscErrorCode HycoTrainerReduce(HycoTrainer t, HycoSnapshots store, PetscBool all);
+PetscErrorCode HycoTrainerTakeBases(HycoTrainer t);
+/* Draws or takes the points that the model is judged by, and solves them: t->held, NULL where there are none.
+   Collective. */
+PetscErrorCode HycoTrainerHoldOut(HycoTrainer t, HycoSnapshots store);
+/* From the solutions in the store to the model at `path`: bases, and of the recipes that the options leave open the one
+   with the least cost online whose errors at the held-out points meet the targets (usual ones where none are given), or
+   else with the least errors. Sets report->chosen, its number 0 where there was nothing to choose. *grown: the training
+   points with those that were added to meet the targets, or NULL; the caller destroys it. Collective. */
+PetscErrorCode HycoTrainerLearn(HycoTrainer t, HycoSnapshots store, const char path[], HycoSamples *grown,
+                                HycoTraining *report);
 /* Chooses the full-order displacements of a model under training; numbers[] of the model are filled. Rank 0. */
 PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel model);
 /* Scans the ranges for a singular reduced stiffness, the points spread over the ranks: the model at `candidate`
@@ -103,9 +146,25 @@ PetscErrorCode HycoTrainerSupremizers(HycoTrainer t, Mat *forces, Mat *supremize
 PetscErrorCode HycoTrainerEnrich(HycoTrainer t);
 /* The force basis of a projection-based model under training from its dual snapshots; fills numbers[]. Rank 0. */
 PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel model);
-/* Calibrates the estimated errors of the hybrid model at `path` and writes it once more: n_held held-out predictions
-   (0: too few solutions, or a fold gave no model). The bases are a fold's afterwards. Collective. */
-PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const char path[], PetscInt *n_held);
+/* Judges the model at `path` by the held-out solutions, calibrates the estimates of its errors on them and writes it
+   once more: report->held_out, and n_held, the predictions behind the estimates (0: none; too few). Collective. */
+PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const char path[], HycoTraining *report);
+
+/* What a model gave at one held-out point, all PetscReal: errors (those of forces before division), the forces' sizes,
+   whether it converged, the features of the estimates, the time of some repetitions. */
+#define HYCO_HELD_REPEATS 3
+typedef struct {
+  PetscReal error[HYCO_N_ERRORS], size, rid_size, converged, feature[HYCO_TRUST_FEATURES], seconds[HYCO_HELD_REPEATS];
+} HycoHeldOut;
+/* Predicts at each sample, whose solution must be in the store; rows[n] on every rank. Collective on `comm`. */
+PetscErrorCode HycoModelPredictHeldOut(MPI_Comm comm, HycoModel model, HycoSnapshots store, HycoSamples samples,
+                                       HycoHeldOut rows[]);
+/* The largest contact forces' 2-norm; a relative error, forces below a tenth of that one divided by the tenth
+   (PETSC_INFINITY: not converged, or x/0); all of it in short. */
+PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[]);
+PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force);
+PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], HycoValidation *validation);
+
 /* A condensed model: checks that scene and samples are fit for one, before hours of work; G at all its nodes, factoring
    where no file has it; responses to q patterns P of forces (m x q column major, on every rank) at these nodes, into
    the columns of S (n_dof x ..., dense) from `first` on. Collective. */

@@ -1,9 +1,9 @@
-/* An upper bound fitted to data: a log-linear law with nonnegative exponents, lifted above a share of what was held
- * out. */
+/* An upper bound fitted to data: a log-linear law with nonnegative exponents, lifted above a share of
+   them. */
 #include <hycoalgorithms.h>
 #include <petscsys.h>
 
-#define RIDGE 1e-2 /* of a column's own square sum: correlated features share the weight */
+#define RIDGE 1e-1 /* of a column's own square sum: correlated features share the weight */
 
 /* c >= 0 that minimises |X c - y|^2 about the means, regularised. */
 static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal c[])
@@ -30,25 +30,21 @@ static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], const PetscBool held[],
-                              PetscReal share, PetscReal c[])
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal share,
+                              PetscReal c[])
 {
   PetscReal *above;
-  PetscInt m = 0, at;
 
   PetscFunctionBegin;
+  PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is nothing to bound");
   PetscCall(Fit(n, p, X, y, c));
   PetscCall(PetscMalloc1(n, &above));
   for (PetscInt i = 0; i < n; i++) {
-    if (!held[i]) continue;
-    above[m] = y[i];
-    for (PetscInt j = 0; j < p; j++) above[m] -= c[j] * X[i * p + j];
-    m++;
+    above[i] = y[i];
+    for (PetscInt j = 0; j < p; j++) above[i] -= c[j] * X[i * p + j];
   }
-  PetscCheck(m, PETSC_COMM_SELF, PETSC_ERR_PLIB, "nothing is held out to lift the bound by");
-  PetscCall(PetscSortReal(m, above));
-  at = (PetscInt)PetscCeilReal(share * (PetscReal)(m + 1)) - 1;
-  c[p] = above[PetscMax(0, PetscMin(at, m - 1))];
+  PetscCall(PetscSortReal(n, above));
+  c[p] = above[PetscMin((PetscInt)PetscCeilReal(share * (PetscReal)(n + 1)), n) - 1];
   PetscCall(PetscFree(above));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -35,9 +35,11 @@ static const HycoOption own[] = {
     {"target_sigma_11", "<real>", "", "train: the same for its first component, max norm"},
     {"target_lambda", "<real>", "", "train, predict: the same for all contact forces"},
     {"target_lambda_rid", "<real>", "", "train: the same for the RID's own contact forces"},
+    {"target_max_added", "<int>", "",
+     "train -target_...: at most so many solutions are added to meet the targets (default: as many as were given)"},
     {"validation_grid", "<n,n,...>", "",
-     "train -target_...: solutions to judge by, closed unless -grid_type says centred (else every fourth value is held "
-     "out)"},
+     "train: the solutions to judge the model by, closed unless -grid_type says centred (else they are drawn: "
+     "-hyco_validation)"},
     {"validation_points", "<file.csv>", "", "the same, as a file of points"},
     {"output", "<file.xdmf>", "", "fields for ParaView; the numbers in the .h5 beside it"},
     {"report", "<file.json>", "", "the result as one JSON object"},
@@ -157,7 +159,7 @@ static PetscBool DecidesModel(const char name[])
   static const char *const training[] = {
       "hyco_model_type", "hyco_dual", "hyco_nnmf_",         "hyco_pod_",       "hyco_deim_",     "hyco_rid_",
       "hyco_hybrid",     "hyco_scan", "hyco_keep_singular", "hyco_condensed_", "hyco_snapshots", "hyco_greedy_",
-      "hyco_trust_",     NULL};
+      "hyco_validation", "hyco_search", NULL};
 
   for (PetscInt k = 0; training[k]; k++) {
     if (strncasecmp(name, training[k], strlen(training[k])) == 0) return PETSC_TRUE;

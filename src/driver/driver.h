@@ -144,37 +144,27 @@ PetscErrorCode DriverSolveFullOrder(Fallback *fallback, PetscInt n, const PetscR
 PetscErrorCode DriverSolveDisplacement(Fallback *fallback, HycoModel model, PetscInt n, const PetscReal mu[],
                                        HycoPrediction *p);
 
-/* -- targets.c: train -target_u ... -- */
-
-#define MAX_ATTEMPTS 256
+/* -- search.c: what train tried, and what the model is worth -- */
 
 typedef struct {
-  PetscInt number;
-  char option[4][64]; /* model type, POD tolerance, layers, contact extension; "": not set */
-  HycoTraining t;
-  HycoValidation v;
-  char failure[HYCO_LINE]; /* "": it gave a model */
-} Attempt;
-
-/* A search for the cheapest model that meets the targets. */
-typedef struct {
-  PetscBool on;
+  PetscBool on;                    /* a target was given */
   PetscReal target[HYCO_N_ERRORS]; /* 0: none */
-  char scene[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], folder[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN];
-  PetscReal seconds_solutions, seconds_attempts; /* of all that was solved and tried, the chosen build among it */
-  PetscInt n;
-  Attempt *attempt; /* n of them; PetscFree() it */
-  const Attempt *chosen;
+  PetscInt budget;                 /* of solutions added to meet them; < 0: the default */
+  HycoScene scene;                 /* borrowed */
+  PetscInt n_points, n;            /* training points, with what was added; attempts in all */
+  char table[PETSC_MAX_PATH_LEN];  /* "": none */
+  char *text;                      /* the table; PetscFree() it */
+  size_t length, room;
 } Search;
 
-/* The -target_ options; search->on: one was given. */
+/* The -target_ options. */
 PetscErrorCode DriverReadTargets(Search *search);
-/* Tries recipes on the training points, judged by `validation` (which it destroys; NULL: every fourth value of the
-   points is held out for it), and trains the cheapest that meets the targets. Fails, without a model, when none does.
-   Collective. */
-PetscErrorCode DriverTrainForTargets(Search *search, HycoScene scene, HycoSamples samples, HycoSamples validation,
-                                     HycoTraining *t);
-void DriverReportTargets(cJSON *json, const Search *search);
+/* Hands them to the trainer, which will tell `search` of its attempts. */
+PetscErrorCode DriverSetSearch(Search *search, HycoScene scene, HycoTrainer trainer, PetscInt n_points);
+/* Says what was chosen and the errors at held-out points; where they miss the targets, or the least that a model should
+   be good for, so loudly (DriverMissed()). Collective. */
+PetscErrorCode DriverJudgeModel(const Search *search, const HycoTraining *training);
+void DriverReportModel(cJSON *json, const Search *search, const HycoTraining *training);
 
 PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);

@@ -13,7 +13,7 @@ const Command commands[] = {
     {"train", CommandTrain,
      "scene model grid grid_type values_ points report greedy training_grid target max_snapshots max_seconds table "
      "target_u target_u_rid target_sigma target_sigma_11 target_lambda target_lambda_rid validation_grid "
-     "validation_points",
+     "validation_points target_max_added",
      "hyco train -scene FOLDER -grid N,N,... | -greedy -training_grid N,N,... -model M.h5 [-report R.json]",
      "solve a set of points full order (resumable), or choose them one by one; reduce, write the model; with -target_u "
      "1e-2 -target_lambda 5e-2 ... the cheapest that is so accurate"},

@@ -16,6 +16,7 @@ static void Estimate(cJSON *json, const char name[], PetscReal estimate)
 static void ReportTrust(cJSON *json, const HycoPrediction *p)
 {
   Estimate(json, "estimated_error_u", p->estimated_error_u);
+  Estimate(json, "estimated_error_sigma", p->estimated_error_sigma);
   Estimate(json, "estimated_error_lambda", p->estimated_error_lambda);
   cJSON_AddBoolToObject(json, "extrapolated", p->beyond > 0);
   cJSON_AddNumberToObject(json, "beyond", p->beyond);
@@ -23,17 +24,17 @@ static void ReportTrust(cJSON *json, const HycoPrediction *p)
 
 static PetscErrorCode SayTrust(const HycoPrediction *p)
 {
-  const PetscReal estimate[2] = {p->estimated_error_u, p->estimated_error_lambda};
-  char words[2][32];
+  const PetscReal estimate[3] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
+  char words[3][32];
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < 2; k++) {
+  for (PetscInt k = 0; k < 3; k++) {
     if (estimate[k] >= 0)
       DriverPercent(estimate[k], words[k]);
     else
       snprintf(words[k], sizeof(words[k]), "none");
   }
-  PetscCall(Say("estimated errors: u %s, contact forces %s\n", words[0], words[1]));
+  PetscCall(Say("estimated errors: u %s, stress %s, contact forces %s\n", words[0], words[1], words[2]));
   DriverPercent(p->beyond, words[0]);
   if (p->beyond > 0) PetscCall(Say("EXTRAPOLATED: outside the training points by %s of a range\n", words[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -167,6 +168,7 @@ enum {
   ITERATIONS,
   SECONDS,
   ESTIMATE_U,
+  ESTIMATE_SIGMA,
   ESTIMATE_LAMBDA,
   BEYOND,
   FULL_ORDER,
@@ -182,6 +184,7 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "active_set_iterations",
                                                "seconds",
                                                "estimated_error_u",
+                                               "estimated_error_sigma",
                                                "estimated_error_lambda",
                                                "beyond",
                                                "full_order"};
@@ -198,6 +201,7 @@ static void FillRow(const HycoPrediction *p, PetscReal v[])
   v[ITERATIONS] = p->iterations;
   v[SECONDS] = p->seconds.total;
   v[ESTIMATE_U] = p->estimated_error_u >= 0 ? p->estimated_error_u : NAN; /* a table's word for none */
+  v[ESTIMATE_SIGMA] = p->estimated_error_sigma >= 0 ? p->estimated_error_sigma : NAN;
   v[ESTIMATE_LAMBDA] = p->estimated_error_lambda >= 0 ? p->estimated_error_lambda : NAN;
   v[BEYOND] = p->beyond;
 }
@@ -240,6 +244,7 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
     if (!full[k]) continue;
     PetscCall(DriverSolveFullOrder(fallback, n_par, mu + k * n_par, &p));
     p.estimated_error_u = value[k * N_COLUMNS + ESTIMATE_U]; /* the model's, which asked for full order */
+    p.estimated_error_sigma = value[k * N_COLUMNS + ESTIMATE_SIGMA];
     p.estimated_error_lambda = value[k * N_COLUMNS + ESTIMATE_LAMBDA];
     p.beyond = value[k * N_COLUMNS + BEYOND];
     FillRow(&p, value + k * N_COLUMNS);

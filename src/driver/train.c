@@ -52,7 +52,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
     ReportVector(json, "left_out_flexibility_gap_forces", 3, t->left_out);
   }
   if (log->scene) DriverReportGreedy(json, log);
-  if (search->on) DriverReportTargets(json, search);
+  DriverReportModel(json, search, t);
   seconds = cJSON_AddObjectToObject(json, "seconds");
   cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots); /* of the model that is written */
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
@@ -86,15 +86,12 @@ static PetscErrorCode SayBases(const HycoTraining *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The kinds of training exclude each other, and each its own points. */
-static PetscErrorCode CheckKind(PetscBool greedy, const Search *search, HycoSamples validation)
+/* Targets choose a recipe for a given set of points; -greedy has a target of its own for choosing these. */
+static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
 {
   PetscFunctionBegin;
   HycoCheck(!greedy || !search->on,
             "-target_u and the like choose a model for a given set of points; train -greedy stops by -target");
-  HycoCheck(search->on || !validation,
-            "-validation_grid and -validation_points judge models against targets: give one, "
-            "as -target_u 1e-2");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -170,6 +167,7 @@ PetscErrorCode CommandTrain(void)
   GreedyLog log = {0};
   Search search = {0};
   PetscBool given, chooses, greedy = PETSC_FALSE;
+  PetscInt n;
   char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
 
   PetscFunctionBegin;
@@ -181,28 +179,24 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoOptionsBool(NULL, "greedy", &greedy));
   PetscCall(DriverReadTargets(&search));
   PetscCall(DriverGetValidation(scene, &validation));
-  PetscCall(CheckKind(greedy, &search, validation));
-  PetscCall(PetscStrncpy(search.scene, path, sizeof(search.scene)));
-  PetscCall(PetscStrncpy(search.model, model, sizeof(search.model)));
+  PetscCall(CheckKind(greedy, &search));
+  if (!greedy) PetscCall(DriverGet("table", PETSC_FALSE, search.table));
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
   PetscCall(TakeOnce(samples, "training"));
   PetscCall(TakeOnce(validation, "validation"));
-  if (!search.on) PetscCall(CheckRead(scene, given, greedy));
+  PetscCall(CheckRead(scene, given, greedy));
   PetscCall(HycoTrainerChooses(trainer, &chooses));
-  HycoCheck(
-      given || !chooses || !search.on,
-      "-target_... judges models by solutions that are held out of given points, and a condensed model's own points "
-      "are chosen by -hyco_condensed_tol: give -grid N,N,... (or -values_NAME, -points), or no -target_...");
   HycoCheck(given || greedy || chooses,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoTrainerSetProgress(trainer, DriverProgress, word));
+  PetscCall(HycoTrainerSetValidation(trainer, validation));
+  PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
+  PetscCall(DriverSetSearch(&search, scene, trainer, n));
   if (greedy) PetscCall(DriverReadGreedy(scene, trainer, &training, &log));
   PetscCall(DriverCheckLeftEarly(scene));
   if (greedy)
     PetscCall(HycoTrainerRunGreedy(trainer, given ? samples : NULL, training, model, &t));
-  else if (search.on)
-    PetscCall(DriverTrainForTargets(&search, scene, samples, validation, &t));
   else
     PetscCall(HycoTrainerRun(trainer, given ? samples : NULL, model, &t));
   PetscCall(SayBases(&t));
@@ -218,13 +212,15 @@ PetscErrorCode CommandTrain(void)
   if (t.scan.n)
     PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,
                   (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept as asked" : ""));
+  PetscCall(DriverJudgeModel(&search, &t));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));
   if (greedy) PetscCall(DriverJudgeGreedy(&log));
   PetscCall(Report(scene, &t, &log, &search));
-  PetscCall(PetscFree(search.attempt));
+  PetscCall(PetscFree(search.text));
   PetscCall(PetscFree(log.text));
   PetscCall(HycoSamplesDestroy(&training));
+  PetscCall(HycoSamplesDestroy(&validation));
   PetscCall(HycoTrainerDestroy(&trainer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));

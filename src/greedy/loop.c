@@ -11,6 +11,7 @@
 
 /* Of two indicators this close, neither is worse. */
 #define TIE 1e-9
+#define ACCURATE 1e-13 /* energy left out of the bases, where nobody says */
 
 typedef struct {
   HycoSnapshots store;
@@ -90,7 +91,7 @@ static PetscErrorCode BuildModel(HycoTrainer t, Loop *loop, PetscInt iteration, 
   PetscCall(HycoSamplesGet(loop->samples, &t->n_s, NULL, NULL));
   PetscCall(HycoSnapshotsFill(loop->store, loop->samples, iteration ? NULL : t->progress, t->progress_ctx));
   PetscCall(HycoTrainerResetBases(t));
-  PetscCall(HycoTrainerReduce(t, loop->store));
+  PetscCall(HycoTrainerReduce(t, loop->store, PETSC_FALSE));
   if (t->greedy.keep)
     PetscCall(PetscSNPrintf(loop->file, sizeof(loop->file), "%s/greedy-%03d.h5", loop->store->folder, (int)iteration));
   else
@@ -248,6 +249,32 @@ static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The loop needs a recipe that is accurate wherever it leads; the model's own is searched when the solutions are there. */
+static void SetRecipe(HycoTrainer t)
+{
+  if (!t->search || t->type != HYCO_MODEL_HYBRID) return;
+  if (!t->pinned[HYCO_CHOICE_TOLERANCE])
+    t->tol[HYCO_SEED_DISPLACEMENT] = t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = ACCURATE;
+  if (!t->pinned[HYCO_CHOICE_LAYERS]) t->layers = 1;
+}
+
+/* The model of the solutions that were chosen, judged by others. */
+static PetscErrorCode Conclude(HycoTrainer t, Loop *loop, const char path[], HycoTraining *report)
+{
+  HycoSamples none;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTrainerHoldOut(t, loop->store));
+  if (!t->held || !t->search) {
+    PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, report));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscFree(t->grown)); /* each recipe has an RID of its own */
+  PetscCall(HycoTrainerResetBases(t));
+  PetscCall(HycoTrainerLearn(t, loop->store, path, &none, report));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoTrainerRunGreedy(HycoTrainer t, HycoSamples start, HycoSamples training, const char path[],
                                     HycoTraining *training_report)
 {
@@ -261,14 +288,15 @@ PetscErrorCode HycoTrainerRunGreedy(HycoTrainer t, HycoSamples start, HycoSample
             "a condensed model needs a tensor grid of training points, which -greedy does not give: use -grid, or "
             "-values_NAME");
   loop.begin = HycoNow();
+  SetRecipe(t);
   PetscCall(TakeTraining(training, &loop));
   PetscCall(Start(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoTrainerOpen(t, loop.samples, path, &loop.store));
   PetscCall(PetscCalloc1(t->rank == 0 ? t->whole->n_cells : 0, &t->grown));
   for (PetscInt iteration = 0; !last; iteration++) PetscCall(Iterate(t, &loop, iteration, &report, &last));
-  PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, &report));
-  PetscCall(HycoTrainerCalibrate(t, loop.store, path, &report.n_held));
+  PetscCall(Conclude(t, &loop, path, &report));
+  PetscCall(HycoTrainerCalibrate(t, loop.store, path, &report));
   if (!t->greedy.keep && t->rank == 0) unlink(loop.file);
   report.seconds_reduction = HycoNow() - loop.begin;
   PetscCall(HycoTrainerReset(t));

@@ -227,8 +227,12 @@ static PetscErrorCode LoadType(HycoH5 h, HycoModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* training/trust: the count, the floors, the coefficients of u and of the forces, the largest force. */
-#define TRUST_NUMBERS (2 + HYCO_TRUST_FEATURES + 2 * (HYCO_TRUST_FEATURES + 1))
+/* training/held_out: the number of predictions, medians and largest errors. training/estimates: the number behind them,
+   the largest force, the floors, and for each error whether it has an estimate, the coefficients, the constant. */
+enum {
+  HELD_NUMBERS = 1 + 2 * HYCO_N_TRUST,
+  TRUST_NUMBERS = 2 + HYCO_TRUST_FEATURES + HYCO_N_TRUST * (2 + HYCO_TRUST_FEATURES)
+};
 
 static PetscErrorCode SaveTrust(HycoH5 h, HycoModel m)
 {
@@ -237,13 +241,84 @@ static PetscErrorCode SaveTrust(HycoH5 h, HycoModel m)
 
   PetscFunctionBegin;
   if (m->search) PetscCall(HycoH5WriteText(h, "training/search", m->search));
+  if (t->n_held) {
+    numbers[0] = (PetscReal)t->n_held;
+    for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+      numbers[1 + e] = PetscMin(t->median[e], PETSC_MAX_REAL);
+      numbers[1 + HYCO_N_TRUST + e] = PetscMin(t->largest[e], PETSC_MAX_REAL);
+    }
+    PetscCall(HycoH5WriteReal(h, "training/held_out", HELD_NUMBERS, 1, numbers));
+  }
   if (!t->n) PetscFunctionReturn(PETSC_SUCCESS);
   *at++ = (PetscReal)t->n;
+  *at++ = t->force;
   for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) *at++ = t->floor[j];
-  for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) *at++ = t->u[j];
-  for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) *at++ = t->lambda[j];
-  *at = t->force;
-  PetscCall(HycoH5WriteReal(h, "training/trust", TRUST_NUMBERS, 1, numbers));
+  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+    *at++ = t->has[e];
+    for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) *at++ = t->law[e][j];
+  }
+  PetscCall(HycoH5WriteReal(h, "training/estimates", TRUST_NUMBERS, 1, numbers));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool IsCount(PetscReal x)
+{
+  return (PetscBool)(x >= 1 && x <= (PetscReal)PETSC_MAX_INT);
+}
+
+static PetscErrorCode LoadHeldOut(HycoH5 h, HycoModel m)
+{
+  HycoTrust *t = &m->trust;
+  PetscReal *numbers;
+  PetscInt n = HELD_NUMBERS, one = 1;
+  PetscBool good;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "training/held_out")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "training/held_out", &n, &one, &numbers));
+  good = IsCount(numbers[0]);
+  t->n_held = good ? (PetscInt)numbers[0] : 0;
+  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+    t->median[e] = numbers[1 + e];
+    t->largest[e] = numbers[1 + HYCO_N_TRUST + e];
+    good = (PetscBool)(good && t->median[e] >= 0 && t->largest[e] >= t->median[e]);
+  }
+  PetscCall(PetscFree(numbers));
+  HycoCheck(good, "%s: training/held_out is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* training/trust of older files: no tail, no stress; count, floors, coefficients of u and of the forces, force. */
+static PetscErrorCode LoadOldTrust(HycoH5 h, HycoModel m)
+{
+  const PetscInt features = HYCO_TRUST_FEATURES - 1;
+  HycoTrust *t = &m->trust;
+  PetscReal *numbers, *at;
+  PetscInt n = 2 + features + 2 * (features + 1), one = 1;
+  PetscBool good;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadReal(h, "training/trust", &n, &one, &numbers));
+  at = numbers;
+  good = IsCount(*at);
+  t->n = good ? (PetscInt)*at : 0;
+  at++;
+  t->floor[features] = 1;
+  for (PetscInt j = 0; j < features; j++) {
+    t->floor[j] = *at++;
+    good = (PetscBool)(good && t->floor[j] > 0);
+  }
+  for (PetscInt k = 0; k < 2; k++) {
+    PetscReal *law = t->law[k ? HYCO_TRUST_LAMBDA : HYCO_TRUST_U];
+
+    for (PetscInt j = 0; j < features; j++) law[j] = *at++;
+    law[HYCO_TRUST_FEATURES] = *at++;
+  }
+  t->force = *at;
+  t->has[HYCO_TRUST_U] = PETSC_TRUE;
+  t->has[HYCO_TRUST_LAMBDA] = (PetscBool)(t->force > 0); /* without a force nothing was calibrated */
+  PetscCall(PetscFree(numbers));
+  HycoCheck(good && t->force >= 0, "%s: training/trust is damaged", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -256,21 +331,25 @@ static PetscErrorCode LoadTrust(HycoH5 h, HycoModel m)
 
   PetscFunctionBegin;
   if (HycoH5Has(h, "training/search")) PetscCall(HycoH5LoadText(h, "training/search", &m->search));
-  if (!HycoH5Has(h, "training/trust")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoH5LoadReal(h, "training/trust", &n, &one, &numbers));
-  good = (PetscBool)(numbers[0] >= 1 && numbers[0] <= (PetscReal)PETSC_MAX_INT);
+  PetscCall(LoadHeldOut(h, m));
+  if (HycoH5Has(h, "training/trust")) PetscCall(LoadOldTrust(h, m));
+  if (!HycoH5Has(h, "training/estimates")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "training/estimates", &n, &one, &numbers));
   at = numbers;
+  good = IsCount(*at);
   t->n = good ? (PetscInt)*at : 0;
   at++;
+  t->force = *at++;
   for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) {
     t->floor[j] = *at++;
     good = (PetscBool)(good && t->floor[j] > 0);
   }
-  for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) t->u[j] = *at++;
-  for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) t->lambda[j] = *at++;
-  t->force = *at;
+  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+    t->has[e] = (PetscBool)(*at++ > 0.5);
+    for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) t->law[e][j] = *at++;
+  }
   PetscCall(PetscFree(numbers));
-  HycoCheck(good && t->force >= 0, "%s: training/trust is damaged", m->path);
+  HycoCheck(good && t->force >= 0, "%s: training/estimates is damaged", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -510,21 +589,6 @@ PetscErrorCode HycoModelRewrite(HycoModel m, const char path[])
   PetscFunctionBegin;
   if (!m->whole) PetscCall(HycoModelLoadWhole(m));
   PetscCall(HycoModelSave(m, m->whole, m->V_whole, path));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoModelNote(const char path[], const char text[])
-{
-  HycoModel m;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  PetscCall(HycoModelLoad(path, &m));
-  PetscCall(PetscFree(m->search));
-  PetscCall(PetscStrallocpy(text, &m->search));
-  ierr = HycoModelRewrite(m, path);
-  PetscCall(HycoModelDestroy(&m));
-  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

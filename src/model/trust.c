@@ -1,11 +1,13 @@
 /*
-  How far a prediction can be trusted: an estimate of its error from what is known online, calibrated at training
-  (calibrate.c). log e = c_0 + sum_j c_j log(1 + f_j / floor_j), c_j >= 0, of four features:
+  How far a prediction can be trusted: an estimate of its error from what is known online, calibrated at training on
+  held-out solutions (calibrate.c). log e = c_0 + sum_j c_j log(1 + f_j / floor_j), c_j >= 0, of five features:
 
-    0  misfit       distance of the full-order displacements from what the modes alone give there, over their size
-    1  penetration  of the contacts outside A_lambda, which no equation of (38) hears of, over the size of B U
-    2  adhesion     forces reconstructed where the predicted displacement leaves a gap, over the size of the forces
+    0  misfit       distance of the full-order displacements from what the modes alone give there, over their size;
+                    condensed: the forces' error with one training value left out
+    1  penetration  of the contacts that (38) does not constrain, over the size of B U
+    2  adhesion     forces of these contacts where the predicted displacement leaves a gap, over the size of the forces
     3  distance     to the nearest training point, each parameter scaled to its range
+    4  tail         the last quarter of the modes' coefficients over all of them: what the modes cut off is of this kind
 
   Outside what training has seen the estimate is multiplied by (1 + b / d)^2, b the scaled distance from it and d the
   training points' spacing. K's rows on the interface are cut off with the RID's elements, so that no residual can be
@@ -15,8 +17,9 @@
 #include <hycocondensed.h>
 #include <hycomodelimpl.h>
 #include <petscviewer.h>
+#include <stdio.h>
 
-enum { MISFIT, PENETRATION, ADHESION, DISTANCE };
+enum { MISFIT, PENETRATION, ADHESION, DISTANCE = HYCO_TRUST_DISTANCE, TAIL };
 
 static PetscReal Quotient(PetscReal part2, PetscReal size2)
 {
@@ -47,7 +50,7 @@ static void Contacts(HycoModel m, PetscReal *penetration, PetscReal *adhesion)
 
     moved += bu * bu;
     force += m->Lambda[k] * m->Lambda[k];
-    if (m->in_rid[k]) continue;
+    if (m->in_rid[k] && m->type != HYCO_MODEL_PROJECTION) continue;
     if (bu > m->gap[k])
       in += (bu - m->gap[k]) * (bu - m->gap[k]);
     else if (bu < m->gap[k])
@@ -69,43 +72,44 @@ PetscReal HycoTrustDistance(HycoScene s, const PetscReal a[], const PetscReal b[
   return PetscSqrtReal(sum);
 }
 
+/* Of the POD modes: supremizers have no singular value. */
+static PetscReal Tail(HycoModel m)
+{
+  PetscReal last = 0, all = 0;
+  PetscInt l = m->l;
+
+  while (l > 0 && !(m->sigma[l - 1] > 0)) l--;
+  for (PetscInt j = 0; j < l; j++) {
+    all += m->gamma[j] * m->gamma[j];
+    if (j >= 3 * l / 4) last += m->gamma[j] * m->gamma[j];
+  }
+  return Quotient(last, all);
+}
+
 PetscErrorCode HycoTrustMeasure(HycoModel m, PetscReal feature[])
 {
   const PetscInt n_par = m->scene->n_parameters;
 
   PetscFunctionBegin;
   PetscCall(HycoModelComplete(m));
-  feature[MISFIT] = Misfit(m);
+  feature[MISFIT] = m->condensed ? m->prediction.interpolation_error : Misfit(m);
   Contacts(m, &feature[PENETRATION], &feature[ADHESION]);
+  feature[TAIL] = Tail(m);
   feature[DISTANCE] = m->n_points && n_par ? PETSC_MAX_REAL : 0;
   for (PetscInt k = 0; n_par && k < m->n_points; k++)
     feature[DISTANCE] = PetscMin(feature[DISTANCE], HycoTrustDistance(m->scene, m->fe->mu, m->points + k * n_par));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What training has seen of each parameter: from its least to its largest value, and half the widest step between two
-   more at either end, so that grids of cell centres reach the ends of the ranges; never past the ranges. */
+/* What training has seen of each parameter, least and largest. */
 static PetscErrorCode FindReach(HycoModel m)
 {
-  const HycoScene s = m->scene;
-  const PetscInt n = m->n_points, n_par = s->n_parameters;
-  PetscReal *value;
+  const PetscInt n_par = m->scene->n_parameters;
 
   PetscFunctionBegin;
   if (m->reach) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(2 * n_par + 1, &m->reach));
-  PetscCall(PetscMalloc1(n + 1, &value));
-  for (PetscInt p = 0; p < n_par; p++) {
-    PetscReal step = 0;
-
-    for (PetscInt k = 0; k < n; k++) value[k] = m->points[k * n_par + p];
-    PetscCall(PetscSortReal(n, value));
-    for (PetscInt k = 1; k < n; k++) step = PetscMax(step, value[k] - value[k - 1]);
-    step = 0.5 * step * (1 + 1e-9);
-    m->reach[2 * p] = n ? PetscMax(s->lo[p], value[0] - step) : s->lo[p];
-    m->reach[2 * p + 1] = n ? PetscMin(s->hi[p], value[n - 1] + step) : s->hi[p];
-  }
-  PetscCall(PetscFree(value));
+  PetscCall(HycoSamplesReach(m->scene, m->n_points, m->points, m->reach, m->reach + n_par));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -118,7 +122,7 @@ static PetscReal Beyond(HycoModel m, const PetscReal mu[], PetscReal nearest[])
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1;
 
-    nearest[p] = PetscMin(PetscMax(mu[p], m->reach[2 * p]), m->reach[2 * p + 1]);
+    nearest[p] = PetscMin(PetscMax(mu[p], m->reach[p]), m->reach[s->n_parameters + p]);
     most = PetscMax(most, PetscAbsReal(mu[p] - nearest[p]) / width);
   }
   return most > 1e-12 ? most : 0;
@@ -149,29 +153,48 @@ static void Condensed(HycoModel m, HycoPrediction *p)
 
 PetscErrorCode HycoTrustEstimate(HycoModel m, HycoPrediction *p)
 {
-  PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_TRUST_FEATURES], outside;
+  const HycoTrust *t = &m->trust;
+  PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_TRUST_FEATURES], outside, estimate[HYCO_N_TRUST];
 
   PetscFunctionBegin;
-  p->estimated_error_u = p->estimated_error_lambda = -1;
+  p->estimated_error_u = p->estimated_error_lambda = p->estimated_error_sigma = -1;
   PetscCall(FindReach(m));
   p->beyond = Beyond(m, m->fe->mu, nearest);
   p->estimated_error_u_full = -1;
   if (m->condensed && p->reason > 0) Condensed(m, p);
-  if (!m->trust.n || p->reason <= 0 || !m->reconstruct) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!t->n || p->reason <= 0 || (!m->condensed && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTrustMeasure(m, feature));
-  outside = 1 + (p->beyond > 0 ? HycoTrustDistance(m->scene, m->fe->mu, nearest) / m->trust.floor[DISTANCE] : 0);
-  p->estimated_error_u = Estimate(&m->trust, m->trust.u, feature) * outside * outside;
-  if (m->trust.force > 0) /* without a force in training there is nothing to be calibrated on */
-    p->estimated_error_lambda = Estimate(&m->trust, m->trust.lambda, feature) * outside * outside;
+  outside = 1 + (p->beyond > 0 ? HycoTrustDistance(m->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
+  for (PetscInt e = 0; e < HYCO_N_TRUST; e++)
+    estimate[e] = t->has[e] ? Estimate(t, t->law[e], feature) * outside * outside : -1;
+  p->estimated_error_u = estimate[HYCO_TRUST_U];
+  p->estimated_error_sigma = estimate[HYCO_TRUST_SIGMA];
+  p->estimated_error_lambda = estimate[HYCO_TRUST_LAMBDA];
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* "u 1.2e-04, stress 3e-03, contact forces 2e-02" */
+static void DescribeErrors(const PetscReal error[], char text[HYCO_LINE])
+{
+  snprintf(text, HYCO_LINE, "u %.2g, stress %.2g, contact forces %.2g", (double)error[HYCO_TRUST_U],
+           (double)error[HYCO_TRUST_SIGMA], (double)error[HYCO_TRUST_LAMBDA]);
 }
 
 PetscErrorCode HycoTrustView(HycoModel m, PetscViewer viewer)
 {
+  const HycoTrust *t = &m->trust;
+  char median[HYCO_LINE], largest[HYCO_LINE];
+
   PetscFunctionBegin;
-  if (m->trust.n)
+  if (t->n_held) {
+    DescribeErrors(t->median, median);
+    DescribeErrors(t->largest, largest);
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  errors at %d held-out points: median %s; largest %s\n", (int)t->n_held,
+                                     median, largest));
+  }
+  if (t->n)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors, by %d predictions of held-out solutions\n",
-                                     (int)m->trust.n));
+                                     (int)t->n));
   else if (m->type == HYCO_MODEL_CONDENSED)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors by values left out%s\n",
                                      m->condensed->errors_u[0] < 0 ? ", and none of u: an older file" : ""));

@@ -1,62 +1,97 @@
-/* HycoSamples: what is held out to judge by, and what is kept to learn from. */
+/*
+  HycoSamples: unseen points, to judge a model by. They spread over what a set of training points reaches, by an additive
+  recurrence: coordinate j of point k is the fractional part of 1/2 + k phi^-(j+1), with phi the root of
+  phi^(d+1) = phi + 1 (M. Roberts' generalisation of the golden ratio to d dimensions). Every part of the sequence is
+  evenly spread, and more points continue it.
+*/
 #include <hycosceneimpl.h>
 
-/* The distinct values of parameter p, ascending. */
-static PetscErrorCode Distinct(PetscInt n, PetscInt n_par, const PetscReal mu[], PetscInt p, PetscInt *count,
-                               PetscReal value[])
+PetscErrorCode HycoSamplesReach(HycoScene s, PetscInt n, const PetscReal mu[], PetscReal lo[], PetscReal hi[])
 {
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < n; k++) value[k] = mu[k * n_par + p];
-  PetscCall(PetscSortReal(n, value));
-  *count = n > 0;
-  for (PetscInt k = 1; k < n; k++) {
-    if (value[k] > value[*count - 1]) value[(*count)++] = value[k];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* number[k]: which value of the parameter that splits the set point k has; k itself where none does. */
-static PetscErrorCode Number(PetscInt n, PetscInt n_par, const PetscReal mu[], PetscInt number[])
-{
+  const PetscInt n_par = s->n_parameters;
   PetscReal *value;
-  PetscInt count, fewest = n / 2 + 1, by = -1;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n, &value));
+  PetscCall(PetscMalloc1(n + 1, &value));
   for (PetscInt p = 0; p < n_par; p++) {
-    PetscCall(Distinct(n, n_par, mu, p, &count, value));
-    if (count < 3 || count >= fewest) continue;
-    fewest = count;
-    by = p;
-  }
-  if (by >= 0) PetscCall(Distinct(n, n_par, mu, by, &count, value));
-  for (PetscInt k = 0; k < n; k++) {
-    number[k] = k;
-    if (by < 0) continue;
-    for (number[k] = 0; value[number[k]] < mu[k * n_par + by];) number[k]++;
+    PetscReal step = 0;
+
+    for (PetscInt k = 0; k < n; k++) value[k] = mu[k * n_par + p];
+    PetscCall(PetscSortReal(n, value));
+    for (PetscInt k = 1; k < n; k++) step = PetscMax(step, value[k] - value[k - 1]);
+    step = 0.5 * step * (1 + 1e-9);
+    lo[p] = n ? PetscMax(s->lo[p], value[0] - step) : s->lo[p];
+    hi[p] = n ? PetscMin(s->hi[p], value[n - 1] + step) : s->hi[p];
   }
   PetscCall(PetscFree(value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSamplesHoldOut(HycoSamples samples, PetscInt every, PetscInt offset, HycoSamples *kept,
-                                  HycoSamples *held)
+/* The root of x^(dim + 1) = x + 1 above 1. */
+static PetscReal Ratio(PetscInt dim)
 {
-  PetscInt n, n_par, *number;
+  PetscReal x = 2;
+
+  for (PetscInt k = 0; k < 60; k++) x = PetscPowReal(1 + x, 1 / (PetscReal)(dim + 1));
+  return x;
+}
+
+/* Coordinate j of point k, in dim dimensions. */
+static PetscReal Coordinate(PetscInt dim, PetscInt j, PetscInt k)
+{
+  const PetscReal x = 0.5 + (PetscReal)k * PetscPowReal(Ratio(dim), -(PetscReal)(j + 1));
+
+  return x - PetscFloorReal(x);
+}
+
+static PetscErrorCode Has(PetscInt n, PetscInt n_par, const PetscReal mu[], const PetscReal point[], PetscBool *has)
+{
+  PetscFunctionBegin;
+  *has = PETSC_FALSE;
+  for (PetscInt k = 0; k < n && !*has; k++) PetscCall(PetscArraycmp(mu + k * n_par, point, n_par, has));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,
+                                 const PetscBool slow[], HycoSamples *unseen)
+{
+  PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS], point[HYCO_MAX_PARAMETERS];
+  PetscInt n, n_par, n_slow = 0;
   const PetscReal *mu;
   HycoScene scene;
+  PetscBool seen;
 
   PetscFunctionBegin;
-  HycoCheck(every > 1 && offset >= 0 && offset < every, "HycoSamplesHoldOut: every %d-th from %d on leaves nothing",
-            (int)every, (int)offset);
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(HycoSamplesGetScene(samples, &scene));
-  PetscCall(HycoSamplesCreate(scene, kept));
-  PetscCall(HycoSamplesCreate(scene, held));
-  PetscCall(PetscMalloc1(n, &number));
-  PetscCall(Number(n, n_par, mu, number));
-  for (PetscInt k = 0; k < n; k++)
-    PetscCall(HycoSamplesAddPoint(number[k] % every == offset ? *held : *kept, mu + k * n_par));
-  PetscCall(PetscFree(number));
+  PetscCall(HycoSamplesReach(scene, n, mu, lo, hi));
+  PetscCall(HycoSamplesCreate(scene, unseen));
+  for (PetscInt p = 0; p < n_par; p++) n_slow += slow && slow[p];
+  if (!n_slow || n_slow == n_par) together = 1;
+  for (PetscInt k = first; n_par && k < first + count; k++) {
+    for (PetscInt p = 0; p < n_par; p++)
+      point[p] = lo[p] + (hi[p] - lo[p]) * Coordinate(n_par, p, 1 + (slow && slow[p] ? k / together : k));
+    PetscCall(Has(n, n_par, mu, point, &seen));
+    if (!seen) PetscCall(HycoSamplesAddPoint(*unseen, point));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesExcept(HycoSamples samples, HycoSamples seen, HycoSamples *rest)
+{
+  PetscInt n, m, n_par;
+  const PetscReal *mu, *other;
+  HycoScene scene;
+  PetscBool twin;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCall(HycoSamplesGet(seen, &m, NULL, &other));
+  PetscCall(HycoSamplesGetScene(samples, &scene));
+  PetscCall(HycoSamplesCreate(scene, rest));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(Has(m, n_par, other, mu + k * n_par, &twin));
+    if (!twin) PetscCall(HycoSamplesAddPoint(*rest, mu + k * n_par));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

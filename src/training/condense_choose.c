@@ -66,7 +66,7 @@ static PetscErrorCode Estimate(HycoTrainer t, HycoSnapshots store)
 
   PetscFunctionBegin;
   PetscCall(HycoSnapshotsFill(store, t->samples, t->progress, t->progress_ctx));
-  PetscCall(HycoTrainerReduce(t, store));
+  PetscCall(HycoTrainerReduce(t, store, PETSC_FALSE));
   PetscCall(HycoTrainerFlexibility(t, store));
   HycoOnRoot(t->comm, HycoTrainerFillFields(t, PETSC_FALSE));
   HycoOnRoot(t->comm, HycoTrainerLeaveOut(t));

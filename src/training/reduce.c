@@ -1,7 +1,7 @@
 /*
   Bases and interpolation points (sections 4.1, 4.2): POD of displacements, stresses, generalised forces and
   multipliers, DEIM on each. Snapshot matrices are spread over the ranks by rows; the multipliers' norm needs rank 0
-  alone.
+  alone. HycoTrainerReduce() reads the snapshots once; HycoTrainerTakeBases() cuts the bases by the tolerances.
 */
 #include <hycoalgorithms.h>
 #include <hycotrainerimpl.h>
@@ -114,17 +114,6 @@ PetscErrorCode HycoTrainerMultiply(HycoTrainer t, Mat X, Mat Y, PetscReal produc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* V^T of the snapshots and their norms, which judge a model on the whole mesh at the cost of its modes. */
-static PetscErrorCode Project(HycoTrainer t, Mat S, Mat V)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
-  PetscCall(PetscMalloc1(t->n_s, &t->U_norm));
-  PetscCall(MatGetColumnNorms(S, NORM_2, t->U_norm));
-  PetscCall(HycoTrainerMultiply(t, V, S, t->VtU));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoTrainerGetDisplacements(HycoTrainer t, HycoSnapshots store, Mat *S)
 {
   PetscFunctionBegin;
@@ -140,58 +129,121 @@ static PetscErrorCode Points(HycoTrainer t, Mat V, PetscInt index[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The primal basis V, and DEIM on it. */
-static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store)
+/* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. */
+static PetscErrorCode FindBasis(HycoTrainer t, Mat S, PetscInt kind, PetscBool all)
 {
-  Mat S, V;
-  PetscInt *index;
+  HycoBasis *basis = &t->basis[kind];
+  const PetscInt most = kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0;
+  PetscInt N;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(S, &N, NULL));
+  PetscCall(PetscCalloc1(t->n_s + 1, &basis->sigma));
+  basis->n_sigma = PetscMin(N, t->n_s);
+  HycoLogged(HYCO_EVENT_POD,
+             HycoPOD(S, all ? 0 : t->tol[kind], t->noise, most, &basis->V, &basis->l, basis->sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first modes of a basis, as many as the tolerance takes: V (NULL: none; the caller's), and how many. */
+static PetscErrorCode CutBasis(HycoTrainer t, PetscInt kind, Mat *V, PetscInt *l)
+{
+  const HycoBasis *basis = &t->basis[kind];
+  const PetscInt most = kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0;
+  Mat part;
+
+  PetscFunctionBegin;
+  *V = NULL;
+  *l = PetscMin(basis->l, HycoPODRank(basis->n_sigma, basis->sigma, t->tol[kind], t->noise, most));
+  t->counts[kind] = *l;
+  if (!*l) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatDenseGetSubMatrix(basis->V, PETSC_DECIDE, PETSC_DECIDE, 0, *l, &part));
+  PetscCall(MatDuplicate(part, MAT_COPY_VALUES, V));
+  PetscCall(MatDenseRestoreSubMatrix(basis->V, &part));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Displacements: U on rank 0, norms, and V^T of the snapshots less their lifting, which judge a model on the whole mesh at
+   the cost of its modes. */
+static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store, PetscBool all)
+{
+  HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
+  Mat S;
 
   PetscFunctionBegin;
   PetscCall(HycoSnapshotsGetField(store, t->samples, "U", &S));
   PetscCall(HycoTrainerToRoot(t, S, PETSC_FALSE, &t->U));
   PetscCall(RemoveLifting(t, S));
-  PetscCall(PetscMalloc1(t->n_s + 1, &t->sigma));
-  HycoLogged(HYCO_EVENT_POD, HycoPOD(S, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, t->max_modes, &V, &t->l, t->sigma));
-  HycoCheck(t->l || !(t->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",
+  PetscCall(FindBasis(t, S, HYCO_SEED_DISPLACEMENT, all));
+  HycoCheck(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",
             (double)t->tol[HYCO_SEED_DISPLACEMENT]);
-  HycoCheck(t->l, "every training solution has zero displacement; there is nothing to learn");
-  t->counts[HYCO_SEED_DISPLACEMENT] = t->l;
-  if (t->seed[HYCO_SEED_DISPLACEMENT]) {
-    PetscCall(PetscMalloc1(t->l, &index));
-    HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
-    PetscCall(AddSeeds(t->l, index, t->sizes[3], &t->n_seeds_node, &t->seeds_node));
-    PetscCall(PetscFree(index));
-  }
-  PetscCall(Project(t, S, V));
-  PetscCall(HycoTrainerToRoot(t, V, PETSC_TRUE, &t->V_whole));
-  PetscCall(MatDestroy(&V));
+  HycoCheck(basis->l, "every training solution has zero displacement; there is nothing to learn");
+  PetscCall(PetscMalloc1(t->n_s, &t->U_norm));
+  PetscCall(MatGetColumnNorms(S, NORM_2, t->U_norm));
+  PetscCall(PetscMalloc1(basis->l * t->n_s, &basis->coefficients));
+  PetscCall(HycoTrainerMultiply(t, basis->V, S, basis->coefficients));
   PetscCall(MatDestroy(&S));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* POD and DEIM of stresses (points are cells) or generalised forces (points are nodes). */
-static PetscErrorCode SeedFrom(HycoTrainer t, HycoSnapshots store, const char field[], PetscInt kind, PetscInt divide,
-                               PetscInt *n_seeds, PetscInt **seeds)
+/* Stresses (points are cells) or generalised forces (points are nodes), if they seed the RID. */
+static PetscErrorCode ReduceField(HycoTrainer t, HycoSnapshots store, const char field[], PetscInt kind, PetscBool all)
 {
-  Mat S, V;
-  PetscInt *index, l;
-  PetscReal *sigma;
+  Mat S;
 
   PetscFunctionBegin;
   if (!t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSnapshotsGetField(store, t->samples, field, &S));
-  PetscCall(PetscMalloc1(t->n_s, &sigma));
-  HycoLogged(HYCO_EVENT_POD, HycoPOD(S, t->tol[kind], t->noise, 0, &V, &l, sigma));
-  t->counts[kind] = l;
-  if (l) {
-    PetscCall(PetscMalloc1(l, &index));
-    HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
-    PetscCall(AddSeeds(l, index, divide, n_seeds, seeds));
-    PetscCall(PetscFree(index));
-    PetscCall(MatDestroy(&V));
-  }
-  PetscCall(PetscFree(sigma));
+  PetscCall(FindBasis(t, S, kind, all));
   PetscCall(MatDestroy(&S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* DEIM on the modes taken from a basis. */
+static PetscErrorCode SeedFrom(HycoTrainer t, Mat V, PetscInt l, PetscInt kind, PetscInt divide, PetscInt *n_seeds,
+                               PetscInt **seeds)
+{
+  PetscInt *index;
+
+  PetscFunctionBegin;
+  if (!l || !t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(l, &index));
+  HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
+  PetscCall(AddSeeds(l, index, divide, n_seeds, seeds));
+  PetscCall(PetscFree(index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes, on the whole mesh on rank 0, and the snapshots' coefficients. */
+static PetscErrorCode TakeDisplacements(HycoTrainer t)
+{
+  const HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
+  Mat V;
+
+  PetscFunctionBegin;
+  PetscCall(CutBasis(t, HYCO_SEED_DISPLACEMENT, &V, &t->l));
+  HycoCheck(t->l, "-hyco_pod_tol %g leaves no mode; give less", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+  PetscCall(PetscMalloc1(t->n_s + 1, &t->sigma));
+  PetscCall(PetscArraycpy(t->sigma, basis->sigma, t->n_s + 1));
+  PetscCall(SeedFrom(t, V, t->l, HYCO_SEED_DISPLACEMENT, t->sizes[3], &t->n_seeds_node, &t->seeds_node));
+  PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
+  for (PetscInt k = 0; k < t->n_s; k++)
+    PetscCall(PetscArraycpy(t->VtU + k * t->l, basis->coefficients + k * basis->l, t->l));
+  PetscCall(HycoTrainerToRoot(t, V, PETSC_TRUE, &t->V_whole));
+  PetscCall(MatDestroy(&V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TakeField(HycoTrainer t, PetscInt kind, PetscInt divide, PetscInt *n_seeds, PetscInt **seeds)
+{
+  Mat V;
+  PetscInt l;
+
+  PetscFunctionBegin;
+  if (!t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(CutBasis(t, kind, &V, &l));
+  PetscCall(SeedFrom(t, V, l, kind, divide, n_seeds, seeds));
+  PetscCall(MatDestroy(&V));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -301,31 +353,42 @@ static PetscErrorCode DualSeeds(HycoTrainer t, PetscInt *n_nodes, PetscInt nodes
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The dual snapshots on rank 0; their seeds, which only -hyco_rid_dual_tol decides. */
 static PetscErrorCode ReduceForces(HycoTrainer t, HycoSnapshots store)
 {
   Mat S;
-  PetscInt *nodes, n = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoSnapshotsGetField(store, t->samples, "lambda", &S));
   PetscCall(HycoTrainerToRoot(t, S, PETSC_FALSE, &t->Lambda));
   PetscCall(MatDestroy(&S));
   if (!t->seed[HYCO_SEED_DUAL] || !t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(5 * t->n_s, &nodes));
-  HycoOnRoot(t->comm, DualSeeds(t, &n, nodes));
-  if (t->rank == 0) PetscCall(AddSeeds(n, nodes, 1, &t->n_seeds_node, &t->seeds_node));
-  PetscCall(PetscFree(nodes));
+  PetscCall(PetscMalloc1(5 * t->n_s, &t->dual_seeds));
+  HycoOnRoot(t->comm, DualSeeds(t, &t->n_dual_seeds, t->dual_seeds));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTrainerReduce(HycoTrainer t, HycoSnapshots store)
+PetscErrorCode HycoTrainerTakeBases(HycoTrainer t)
 {
   const PetscInt dim = t->sizes[3], n_sigma = dim == 1 ? 1 : dim == 2 ? 4 : 6;
 
   PetscFunctionBegin;
-  PetscCall(ReduceDisplacements(t, store));
-  PetscCall(SeedFrom(t, store, "sigma", HYCO_SEED_STRESS, n_sigma, &t->n_seeds_cell, &t->seeds_cell));
-  PetscCall(SeedFrom(t, store, "force", HYCO_SEED_FORCE, dim, &t->n_seeds_node, &t->seeds_node));
+  PetscCall(HycoTrainerDropBases(t));
+  PetscCall(TakeDisplacements(t));
+  PetscCall(TakeField(t, HYCO_SEED_STRESS, n_sigma, &t->n_seeds_cell, &t->seeds_cell));
+  PetscCall(TakeField(t, HYCO_SEED_FORCE, dim, &t->n_seeds_node, &t->seeds_node));
+  if (t->rank == 0 && t->seed[HYCO_SEED_DUAL])
+    PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerReduce(HycoTrainer t, HycoSnapshots store, PetscBool all)
+{
+  PetscFunctionBegin;
+  PetscCall(ReduceDisplacements(t, store, all));
+  PetscCall(ReduceField(t, store, "sigma", HYCO_SEED_STRESS, all));
+  PetscCall(ReduceField(t, store, "force", HYCO_SEED_FORCE, all));
   PetscCall(ReduceForces(t, store));
+  PetscCall(HycoTrainerTakeBases(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -291,37 +291,94 @@ PetscErrorCode HycoTrainerOpen(HycoTrainer t, HycoSamples samples, const char pa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* How many points to judge by, when nobody says: enough for a bound of 95 % of the points to come where the training is
+   large enough to pay for them. */
+#define LEAST_HELD 10
+#define MOST_HELD  30
+#define TOGETHER   3 /* that share a stiffness, where loads or gaps are parameters too */
+
+static PetscErrorCode DrawHeld(HycoTrainer t, HycoSamples *held)
+{
+  PetscInt n, n_par, count = t->n_validation, slow[HYCO_MAX_PARAMETERS];
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, &n, &n_par, NULL));
+  if (count < 0) count = PetscMin(MOST_HELD, PetscMax(LEAST_HELD, n));
+  if (t->rank == 0) HycoFEReaches(t->fe, reaches);
+  for (PetscInt p = 0; p < n_par; p++) slow[p] = t->rank == 0 && reaches[p];
+  PetscCallMPI(MPI_Bcast(slow, (PetscMPIInt)n_par, MPIU_INT, 0, t->comm));
+  for (PetscInt p = 0; p < n_par; p++) reaches[p] = (PetscBool)slow[p];
+  PetscCall(HycoSamplesUnseen(t->samples, t->drawn, count, TOGETHER, reaches, held));
+  t->drawn += count;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerHoldOut(HycoTrainer t, HycoSnapshots store)
+{
+  PetscInt n, m, dropped;
+
+  PetscFunctionBegin;
+  t->held = NULL;
+  t->drawn = 0;
+  PetscCall(HycoSamplesDestroy(&t->own_held));
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  if (t->validation) {
+    PetscCall(HycoSamplesExcept(t->validation, t->samples, &t->own_held));
+    PetscCall(HycoSamplesGet(t->validation, &dropped, NULL, NULL));
+    PetscCall(HycoSamplesGet(t->own_held, &m, NULL, NULL));
+    HycoCheck(m, "each of the %d validation points is a training point too; a model is judged by others", (int)dropped);
+  } else if (t->n_validation && t->scene->n_parameters)
+    PetscCall(DrawHeld(t, &t->own_held));
+  else
+    PetscFunctionReturn(PETSC_SUCCESS);
+  t->held = t->own_held;
+  PetscCall(HycoSnapshotsFill(store, t->held, t->progress, t->progress_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A condensed model's own points are chosen with its fields; the modes come when the points stand. */
+static PetscErrorCode LearnChosen(HycoTrainer t, HycoSnapshots store, const char path[], HycoTraining *report)
+{
+  PetscFunctionBegin;
+  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFlexibility(t, store));
+  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFindModes(t, store));
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerBuild(t, PETSC_TRUE, path, report));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;
-  HycoSamples chosen = NULL;
+  HycoSamples chosen = NULL, grown = NULL;
   HycoTraining report = {0};
   PetscReal begin = HycoNow(), solved;
   const PetscBool choose = (PetscBool)!samples;
-  PetscBool condensed;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
-  condensed = (PetscBool)(t->type == HYCO_MODEL_CONDENSED);
-  HycoCheck(samples || condensed, "give the training points");
+  HycoCheck(samples || t->type == HYCO_MODEL_CONDENSED, "give the training points");
   if (choose) {
     PetscCall(HycoTrainerStartPoints(t, &chosen));
     samples = chosen;
   }
   PetscCall(HycoTrainerOpen(t, samples, path, &store));
-  if (condensed) PetscCall(HycoTrainerBeginCondensed(t));
+  if (t->type == HYCO_MODEL_CONDENSED) PetscCall(HycoTrainerBeginCondensed(t));
   if (choose)
     HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerChoosePoints(t, store, &chosen));
   else
     HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
+  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerHoldOut(t, store));
   solved = HycoNow();
-  if (!choose) HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerReduce(t, store));
-  if (condensed) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFlexibility(t, store));
-  if (condensed) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFindModes(t, store));
-  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerBuild(t, PETSC_TRUE, path, &report));
-  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerCalibrate(t, store, path, &report.n_held));
+  if (choose)
+    PetscCall(LearnChosen(t, store, path, &report));
+  else
+    HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerLearn(t, store, path, &grown, &report));
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerCalibrate(t, store, path, &report));
+  PetscCall(HycoTrainerReset(t));
   PetscCall(HycoSnapshotsDestroy(&store));
   PetscCall(HycoSamplesDestroy(&chosen));
+  PetscCall(HycoSamplesDestroy(&grown));
   report.seconds_snapshots = solved - begin;
   report.seconds_reduction = HycoNow() - solved;
   if (training) *training = report;

@@ -2,6 +2,8 @@
 #include <hycotrainerimpl.h>
 #include <string.h>
 
+const char *const HycoHybrids[] = {"auto", "rank", "contact", "all", NULL};
+
 PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *trainer)
 {
   HycoTrainer t;
@@ -19,7 +21,9 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   t->condensed_max_values = 24;
   t->greedy.target = 1e-3;
   t->ridge = -1;
-  t->folds = 3;
+  t->n_validation = -1;
+  t->search = PETSC_TRUE;
+  t->budget = -1;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *trainer = t;
@@ -34,26 +38,43 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t)
   PetscCall(HycoPairsDestroy(&t->pairs));
   PetscCall(HycoMeshDestroy(&t->whole));
   PetscCall(PetscFree(t->grown));
+  PetscCall(HycoSamplesDestroy(&t->own_held));
+  t->held = NULL;
   PetscCall(HycoCondensedDestroy(&t->condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTrainerResetBases(HycoTrainer t)
+PetscErrorCode HycoTrainerDropBases(HycoTrainer t)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree(t->seeds_node));
   PetscCall(PetscFree(t->seeds_cell));
   PetscCall(PetscFree(t->sigma));
   PetscCall(PetscFree(t->V_whole));
-  PetscCall(PetscFree(t->U));
-  PetscCall(PetscFree(t->Lambda));
   PetscCall(PetscFree(t->VtU));
-  PetscCall(PetscFree(t->U_norm));
   PetscCall(PetscFree(t->responses.Q));
   PetscCall(PetscFree(t->responses.scale));
   PetscCall(PetscFree(t->responses.C));
   t->responses.missed = 0;
   t->n_seeds_node = t->n_seeds_cell = t->n_supremizers = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerResetBases(HycoTrainer t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoTrainerDropBases(t));
+  for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) {
+    PetscCall(MatDestroy(&t->basis[k].V));
+    PetscCall(PetscFree(t->basis[k].sigma));
+    PetscCall(PetscFree(t->basis[k].coefficients));
+    t->basis[k].l = t->basis[k].n_sigma = 0;
+  }
+  PetscCall(PetscFree(t->U));
+  PetscCall(PetscFree(t->Lambda));
+  PetscCall(PetscFree(t->U_norm));
+  PetscCall(PetscFree(t->dual_seeds));
+  t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,13 +120,51 @@ PetscErrorCode HycoTrainerSetProgress(HycoTrainer t, HycoProgress progress, void
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTrainerSetTrustFolds(HycoTrainer t, PetscInt folds)
+PetscErrorCode HycoTrainerSetValidation(HycoTrainer t, HycoSamples validation)
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
-  HycoCheck(folds >= 0 && folds != 1, "%d folds cannot calibrate: give 2 or more, or 0 for no estimated errors",
-            (int)folds);
-  t->folds = folds;
+  t->validation = validation;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetValidationCount(HycoTrainer t, PetscInt n)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  t->n_validation = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetSearch(HycoTrainer t, PetscBool search)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  t->search = search;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetAttemptMonitor(HycoTrainer t, HycoAttemptMonitor attempt, HycoAddedMonitor added,
+                                            void *ctx)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  t->attempt = attempt;
+  t->added = added;
+  t->attempt_ctx = ctx;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerSetTargets(HycoTrainer t, const PetscReal target[], PetscInt budget)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoTrainerCreate()");
+  for (PetscInt e = 0; e < HYCO_N_ERRORS; e++) {
+    HycoCheck(target[e] >= 0, "the target of the error %s is %g; it must be positive (0: none)", HycoErrorKinds[e],
+              (double)target[e]);
+    t->target[e] = target[e];
+  }
+  t->budget = budget;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -196,8 +255,9 @@ static PetscErrorCode ReadType(HycoTrainer t)
 
 PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
 {
-  static const char *const hybrids[] = {"auto", "rank", "contact", "all", NULL}, *const deims[] = {"deim", "qdeim",
-                                                                                                   NULL};
+  static const char *const deims[] = {"deim", "qdeim", NULL};
+  static const char *const choices[HYCO_N_CHOICES] = {"-hyco_model_type", "-hyco_pod_tol", "-hyco_rid_layers",
+                                                      "-hyco_rid_contact_extension", "-hyco_hybrid", "-hyco_rid_whole"};
   static const char *const indicators[] = {"local", "penetration", NULL};
   PetscOptions o;
   PetscInt hybrid, indicator, n = 64;
@@ -220,14 +280,15 @@ PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
   PetscCall(HycoOptionsInt(o, "hyco_rid_layers", 0, PETSC_MAX_INT, &t->layers));
   PetscCall(HycoOptionsReal(o, "hyco_rid_contact_extension", 0, PETSC_MAX_REAL, &t->extension));
   PetscCall(HycoOptionsBool(o, "hyco_rid_whole", &t->whole_rid));
-  PetscCall(HycoOptionsWord(o, "hyco_hybrid", hybrids, &hybrid));
+  PetscCall(HycoOptionsWord(o, "hyco_hybrid", HycoHybrids, &hybrid));
   PetscCall(HycoOptionsInt(o, "hyco_hybrid_trials", 0, PETSC_MAX_INT / 8, &t->trials));
   t->hybrid = (HycoHybrid)hybrid;
   PetscCall(HycoOptionsReal(o, "hyco_hybrid_ridge", -1, 1, &t->ridge));
   PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
   PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
-  PetscCall(HycoOptionsInt(o, "hyco_trust_folds", 0, 1000, &t->folds));
-  PetscCall(HycoTrainerSetTrustFolds(t, t->folds));
+  PetscCall(HycoOptionsInt(o, "hyco_validation", -1, 100000, &t->n_validation));
+  PetscCall(HycoOptionsBool(o, "hyco_search", &t->search));
+  for (PetscInt k = 0; k < HYCO_N_CHOICES; k++) PetscCall(PetscOptionsHasName(o, NULL, choices[k], &t->pinned[k]));
   indicator = (PetscInt)t->greedy.indicator;
   PetscCall(HycoOptionsWord(o, "hyco_greedy_indicator", indicators, &indicator));
   t->greedy.indicator = (HycoIndicatorKind)indicator;

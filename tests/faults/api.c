@@ -162,7 +162,7 @@ static PetscErrorCode TestSamples(void)
   const PetscInt none[2] = {1, 0}, many[2] = {100000, 100000}, one[2] = {1, 1};
   PetscInt n;
   HycoScene scene;
-  HycoSamples samples, kept = NULL, held = NULL;
+  HycoSamples samples;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
@@ -174,8 +174,6 @@ static PetscErrorCode TestSamples(void)
   CHECK_FAILS(HycoSamplesAddChebyshev(samples, none), "the grid has 0 points for mu2; at least 1 is needed");
   CHECK_FAILS(HycoSamplesAddPoint(samples, outside), "lies outside its range");
   PetscCall(HycoSamplesAddPoint(samples, inside));
-  CHECK_FAILS(HycoSamplesHoldOut(samples, 1, 0, &kept, &held), "leaves nothing");
-  CHECK_FAILS(HycoSamplesHoldOut(samples, 3, 3, &kept, &held), "leaves nothing");
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
   CHECK(n == 1, "the set has %d points; the one that was good is expected", (int)n);
   PetscCall(HycoSamplesDestroy(&samples));
@@ -243,7 +241,7 @@ static PetscErrorCode TestTraining(void)
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   CHECK_FAILS(HycoTrainerSetGreedyStop(trainer, 0, 0, 0), "it must be positive, as 1e-3 is");
   CHECK_FAILS(HycoTrainerSetGreedyStop(trainer, 1e-3, -1, 0), "neither can be negative");
-  CHECK_FAILS(HycoTrainerSetTrustFolds(trainer, 1), "1 folds cannot calibrate");
+  CHECK_FAILS(HycoTrainerSetTargets(trainer, (const PetscReal[HYCO_N_ERRORS]){-1}, 0), "target of the error u is -1");
   CHECK_FAILS(HycoTrainerRun(trainer, NULL, "none.h5", NULL), "give the training points");
   CHECK_FAILS(HycoTrainerRun(trainer, samples, "none.h5", NULL), "the set of training points is empty");
   CHECK(access("none.h5", F_OK) != 0, "a training that was refused has written a model");

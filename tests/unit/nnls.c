@@ -135,13 +135,12 @@ static PetscErrorCode TestTao(void)
 }
 
 /* y = 2 x_0 + noise in [0, 1], x_1 without weight, x_2 with a negative one: c_0 near 2, the others 0, and nine tenths
-   of what is held below the bound, neither fewer nor many more. */
+   of the rows below the bound, neither fewer nor many more. */
 static PetscErrorCode TestBound(void)
 {
   enum { N = 400 };
   PetscReal X[3 * N], y[N], c[4];
-  PetscBool held[N];
-  PetscInt below = 0, n_held = 0;
+  PetscInt below = 0;
 
   PetscFunctionBegin;
   for (int i = 0; i < N; i++) {
@@ -151,17 +150,19 @@ static PetscErrorCode TestBound(void)
     X[3 * i + 1] = i % 2;
     X[3 * i + 2] = (i * 17 % 29) / 29.;
     y[i] = 2 * X[3 * i] - X[3 * i + 2] + noise;
-    held[i] = (PetscBool)(i % 4 == 0);
   }
-  PetscCall(HycoUpperBound(N, 3, X, y, held, 0.9, c));
-  CHECK_NEAR(c[0], 2, 0.05); /* the ridge of 1 % takes 2 % off */
+  PetscCall(HycoUpperBound(N, 3, X, y, 0.9, c));
+  CHECK_NEAR(c[0], 2 / 1.1, 0.05); /* the ridge is a tenth of the column's square */
   CHECK(c[1] >= 0 && c[1] < 0.1, "x_1 says nothing, its weight is %g", (double)c[1]);
   CHECK_NEAR(c[2], 0, 0);
-  for (int i = 0; i < N; i++) {
-    n_held += held[i];
-    below += held[i] && y[i] <= c[3] + c[0] * X[3 * i] + c[1] * X[3 * i + 1] + c[2] * X[3 * i + 2] + 1e-12;
-  }
-  CHECK(n_held == 100 && below == 91, "expected 91 of 100 below, the number ceil(0.9 * 101); found %d", (int)below);
+  for (int i = 0; i < N; i++)
+    below += y[i] <= c[3] + c[0] * X[3 * i] + c[1] * X[3 * i + 1] + c[2] * X[3 * i + 2] + 1e-12;
+  CHECK(below == 361, "expected 361 of 400 below, the number ceil(0.9 * 401); found %d", (int)below);
+  PetscCall(HycoUpperBound(5, 3, X, y, 0.95, c)); /* fewer rows than the quantile needs: the largest */
+  below = 0;
+  for (int i = 0; i < 5; i++)
+    below += y[i] <= c[3] + c[0] * X[3 * i] + c[1] * X[3 * i + 1] + c[2] * X[3 * i + 2] + 1e-12;
+  CHECK(below == 5, "expected all of 5 below, found %d", (int)below);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

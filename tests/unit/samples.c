@@ -144,36 +144,43 @@ static PetscErrorCode TestTwins(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of a 3 x 8 product the parameter with the fewest values splits: all points of its value number 1. */
-static PetscErrorCode TestHoldOut(HycoScene scene)
+/* Unseen points: in the reach of the set (cell centres of the ranges reach their ends), none of them in it, evenly spread
+   (each quarter of the box has its share), three together on one value of an expensive parameter; more points continue
+   the sequence. */
+static PetscErrorCode TestUnseen(HycoScene scene)
 {
-  const PetscInt counts[2] = {3, 8}, line[2] = {1, 7};
-  HycoSamples samples, kept, held;
-  PetscInt n;
-  const PetscReal *mu;
+  const PetscInt counts[2] = {3, 4};
+  const PetscBool slow[2] = {PETSC_TRUE, PETSC_FALSE};
+  HycoSamples samples, unseen, more, rest;
+  PetscInt n, m, quarter[4] = {0};
+  const PetscReal *mu, *nu;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesCreate(scene, &samples));
-  PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_TRUE));
-  PetscCall(HycoSamplesHoldOut(samples, 3, 1, &kept, &held));
-  PetscCall(HycoSamplesGet(held, &n, NULL, &mu));
-  CHECK(n == 8, "expected 8 points held out, found %d", (int)n);
-  for (PetscInt k = 0; k < n; k++) CHECK_NEAR(mu[2 * k], 0.5, 0);
-  PetscCall(HycoSamplesGet(kept, &n, NULL, &mu));
-  CHECK(n == 16, "expected 16 points kept, found %d", (int)n);
-  for (PetscInt k = 0; k < n; k++) CHECK_NEAR(mu[2 * k], k < 8 ? 0 : 1, 0);
-  PetscCall(HycoSamplesDestroy(&kept));
-  PetscCall(HycoSamplesDestroy(&held));
-  PetscCall(HycoSamplesDestroy(&samples));
-  PetscCall(HycoSamplesCreate(scene, &samples)); /* no value that points share: every third point */
-  PetscCall(HycoSamplesAddGrid(samples, line, PETSC_FALSE));
-  PetscCall(HycoSamplesHoldOut(samples, 3, 2, &kept, &held));
-  PetscCall(HycoSamplesGet(held, &n, NULL, &mu));
-  CHECK(n == 2, "expected points 2 and 5 of 7, found %d", (int)n);
-  CHECK_NEAR(mu[1], -1 + 2.5 * 4. / 7, 1e-15);
-  CHECK_NEAR(mu[3], -1 + 5.5 * 4. / 7, 1e-15);
-  PetscCall(HycoSamplesDestroy(&kept));
-  PetscCall(HycoSamplesDestroy(&held));
+  PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_FALSE));
+  PetscCall(HycoSamplesUnseen(samples, 0, 40, 3, NULL, &unseen));
+  PetscCall(HycoSamplesGet(unseen, &n, NULL, &mu));
+  CHECK(n == 40, "expected 40 unseen points, found %d", (int)n);
+  for (PetscInt k = 0; k < n; k++) {
+    CHECK(mu[2 * k] > 0 && mu[2 * k] < 1 && mu[2 * k + 1] > -1 && mu[2 * k + 1] < 3, "point %d lies outside", (int)k);
+    quarter[2 * (mu[2 * k] > 0.5) + (mu[2 * k + 1] > 1)]++;
+  }
+  for (int q = 0; q < 4; q++) CHECK(quarter[q] >= 8 && quarter[q] <= 12, "quarter %d has %d of 40", q, (int)quarter[q]);
+  PetscCall(HycoSamplesUnseen(samples, 30, 10, 3, NULL, &more));
+  PetscCall(HycoSamplesGet(more, &m, NULL, &nu));
+  CHECK(m == 10, "expected 10 more, found %d", (int)m);
+  for (PetscInt k = 0; k < 20; k++) CHECK_NEAR(nu[k], mu[60 + k], 0);
+  PetscCall(HycoSamplesExcept(unseen, more, &rest));
+  PetscCall(HycoSamplesGet(rest, &n, NULL, NULL));
+  CHECK(n == 30, "expected 30 that are not among the 10, found %d", (int)n);
+  PetscCall(HycoSamplesDestroy(&rest));
+  PetscCall(HycoSamplesDestroy(&more));
+  PetscCall(HycoSamplesDestroy(&unseen));
+  PetscCall(HycoSamplesUnseen(samples, 0, 12, 3, slow, &unseen));
+  PetscCall(HycoSamplesGet(unseen, &n, NULL, &mu));
+  for (PetscInt k = 0; k < n; k++) CHECK_NEAR(mu[2 * k], mu[2 * (k - k % 3)], 0);
+  CHECK(mu[0] != mu[6] && mu[1] != mu[3], "values that nothing shares are shared");
+  PetscCall(HycoSamplesDestroy(&unseen));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -215,7 +222,7 @@ static PetscErrorCode Test(void)
   PetscCall(TestFile(scene));
   PetscCall(TestScene(scene));
   PetscCall(TestTwins(scene));
-  PetscCall(TestHoldOut(scene));
+  PetscCall(TestUnseen(scene));
   PetscCall(TestExtrapolate(scene));
   PetscCall(TestNearest());
   PetscCall(HycoSceneDestroy(&scene));
