@@ -41,10 +41,12 @@ struct _n_HycoFE {
   HycoPlaces places;        /* of the entries of K; made by the second assembly into it */
   PetscInt n_loads;
   HycoLoadShares *shares; /* n_loads: by load of the scene */
+  signed char *drawn_sign; /* by cell: the sign of its volume in the mesh file's coordinates */
   /* at the current mu */
   PetscBool ready;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscReal *X;                                 /* n_nodes x 3, moved nodes */
+  PetscBool *mirrored;                          /* by body: its map is a mirror image */
   PetscBool *fixed;                             /* n_dof */
   PetscReal *u0;                                /* n_dof, prescribed displacement, 0 where free */
   PetscBool lifted;                             /* whether any of u0 is not 0 */
