@@ -129,6 +129,9 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal 
 */
 PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
                                PetscReal gap[]);
+/* How many contacts have no free unknown and no effect: empty rows, and the fixed nodes at obstacles that are no contacts;
+   fails when the prescribed displacements of one of these penetrate. start: of the rows. */
+PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n);
 /* Area (length in 2D, 1 in 1D) that each contact's slave node stands for; 0 when its group is no surface. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
 

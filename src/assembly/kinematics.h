@@ -16,5 +16,8 @@ PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet,
    body (some of its cells turned inside out) or mirrors one of two bodies that share nodes. */
 PetscErrorCode HycoMirrorCreate(HycoFE fe);
 PetscErrorCode HycoMirrorFind(HycoFE fe);
+/* Of contact k, which has no free unknown: fails when what its prescribed displacements leave of the gap is negative by
+   more than round-off; else *left >= 0. gap: as drawn. */
+PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal gap, PetscReal *left);
 
 #endif
