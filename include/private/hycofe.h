@@ -41,10 +41,12 @@ struct _n_HycoFE {
   HycoPlaces places;        /* of the entries of K; made by the second assembly into it */
   PetscInt n_loads;
   HycoLoadShares *shares; /* n_loads: by load of the scene */
+  signed char *drawn_sign; /* by cell: the sign of its volume in the mesh file's coordinates */
   /* at the current mu */
   PetscBool ready;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscReal *X;                                 /* n_nodes x 3, moved nodes */
+  PetscBool *mirrored;                          /* by body: its map is a mirror image */
   PetscBool *fixed;                             /* n_dof */
   PetscReal *u0;                                /* n_dof, prescribed displacement, 0 where free */
   PetscBool lifted;                             /* whether any of u0 is not 0 */
@@ -127,6 +129,9 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal 
 */
 PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
                                PetscReal gap[]);
+/* How many contacts have no free unknown and no effect: empty rows, and the fixed nodes at obstacles that are no contacts;
+   fails when the prescribed displacements of one of these penetrate. start: of the rows. */
+PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n);
 /* Area (length in 2D, 1 in 1D) that each contact's slave node stands for; 0 when its group is no surface. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
 

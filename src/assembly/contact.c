@@ -125,13 +125,13 @@ static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal no
   PetscFunctionBegin;
   start[0] = 0;
   for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscReal drawn = gap[k];
+
     AddToRow(fe, pairs->slave[k], 1, normal + 3 * k, &n, dof, value, &gap[k]);
     for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++)
       AddToRow(fe, pairs->master[j], -pairs->weight[j], normal + 3 * k, &n, dof, value, &gap[k]);
     start[k + 1] = n;
-    HycoCheck(start[k + 1] > start[k] || gap[k] >= 0,
-              "contact %s: node %d is fixed, and its prescribed displacement penetrates by %g",
-              fe->scene->contact[pairs->contact[k]].name, (int)fe->mesh->node_id[pairs->slave[k]], (double)-gap[k]);
+    if (start[k + 1] == start[k]) PetscCall(HycoContactCheckStill(fe, pairs, k, drawn, &gap[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

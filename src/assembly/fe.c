@@ -1,4 +1,5 @@
 /* HycoFE: the scene on a mesh at one parameter value: nodes moved, supports, materials. */
+#include "kinematics.h"
 #include "places.h"
 
 PetscErrorCode HycoFEDestroy(HycoFE *fe)
@@ -13,6 +14,8 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscCall(PetscFree((*fe)->shares));
   PetscCall(PetscFree((*fe)->constant));
   PetscCall(PetscFree((*fe)->X));
+  PetscCall(PetscFree((*fe)->mirrored));
+  PetscCall(PetscFree((*fe)->drawn_sign));
   PetscCall(PetscFree((*fe)->fixed));
   PetscCall(PetscFree((*fe)->u0));
   PetscCall(PetscFree((*fe)->lame));
@@ -80,6 +83,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   f->n_loads = scene->n_loads;
   PetscCall(PetscCalloc1(f->n_loads, &f->shares));
   PetscCall(FindConstant(f));
+  PetscCall(HycoMirrorCreate(f));
   *fe = f;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -240,6 +244,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   if (first) fe->gap_changed = fe->stiffness_changed = fe->contact_changed = moved = PETSC_TRUE;
   fe->ready = PETSC_FALSE; /* until all of it is done */
   if (moved) PetscCall(MoveNodes(fe));
+  if (moved) PetscCall(HycoMirrorFind(fe));
   for (PetscInt k = 0; k < fe->n_loads && moved; k++) fe->shares[k].ready = PETSC_FALSE;
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
   if (fe->stiffness_changed) PetscCall(SetMaterial(fe, first));

@@ -1,15 +1,14 @@
 /* Jacobians of cells and facets. */
 #include "kinematics.h"
 
-/* Of the map from the reference cell, at a quadrature point. */
-static PetscReal Determinant(HycoFE fe, const HycoElement *el, const PetscInt node[], PetscInt q)
+PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q)
 {
   PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
   for (PetscInt c = 0; c < el->dim; c++) {
     for (PetscInt d = 0; d < el->dim; d++) {
       J[c][d] = 0;
-      for (PetscInt a = 0; a < el->nv; a++) J[c][d] += fe->X[3 * node[a] + c] * el->dN[q][a][d];
+      for (PetscInt a = 0; a < el->nv; a++) J[c][d] += X[3 * node[a] + c] * el->dN[q][a][d];
     }
   }
   return J[0][0] * (J[1][1] * J[2][2] - J[1][2] * J[2][1]) - J[0][1] * (J[1][0] * J[2][2] - J[1][2] * J[2][0]) +
@@ -44,7 +43,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   HycoCheck(PetscAbsReal(det) > 1e-14 * size, "cell %d is degenerate: its volume vanishes at a quadrature point",
             (int)fe->mesh->cell_id[cell]);
   /* either sign will do, as files number cells both ways round; but the same in all of the cell */
-  HycoCheck(!q || el->nv == dim + 1 || (det > 0) == (Determinant(fe, el, node, 0) > 0),
+  HycoCheck(!q || el->nv == dim + 1 || (det > 0) == (HycoDeterminant(el, node, fe->X, 0) > 0),
             "cell %d is inverted: its volume has both signs; is its boundary folded, are its nodes in gmsh's order?",
             (int)fe->mesh->cell_id[cell]);
   for (PetscInt a = 0; a < el->nv; a++) {
@@ -80,6 +79,7 @@ PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet,
 {
   HycoMesh m = fe->mesh;
   const PetscInt *node = m->facets + facet * m->nf;
+  const PetscReal side = fe->mirrored[m->node_body[node[0]]] ? -1 : 1; /* facets are turned outwards as drawn */
   PetscReal t[2][3] = {{0, 0, 0}, {0, 0, 1}};
 
   PetscFunctionBegin;
@@ -102,7 +102,7 @@ PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet,
   for (PetscInt c = 0; c < 3; c++) {
     const PetscInt d = (c + 1) % 3, e = (c + 2) % 3;
 
-    n[c] = el->w[q] * (t[0][d] * t[1][e] - t[0][e] * t[1][d]);
+    n[c] = side * el->w[q] * (t[0][d] * t[1][e] - t[0][e] * t[1][d]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

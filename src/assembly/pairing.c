@@ -23,8 +23,8 @@ static PetscReal DefaultTolerance(HycoMesh m, PetscInt group)
 
   for (PetscInt f = 0; f < m->n_facets; f++) {
     if (m->facet_group[f] != group) continue;
-    for (PetscInt v = 0; v + 1 < m->nf; v++)
-      shortest = PetscMin(shortest, Distance(m, m->facets[f * m->nf + v], m->facets[f * m->nf + v + 1]));
+    for (PetscInt v = 0; v < m->nf && m->nf > 1; v++) /* the last edge leads back to the first node */
+      shortest = PetscMin(shortest, Distance(m, m->facets[f * m->nf + v], m->facets[f * m->nf + (v + 1) % m->nf]));
   }
   return shortest < PETSC_MAX_REAL ? shortest / 10 : 0;
 }

@@ -1,6 +1,15 @@
 /* hyco solve: full order, at one parameter value or over a set. */
 #include "driver.h"
 
+/* What a user should know beside the numbers. */
+static PetscErrorCode Remarks(const HycoSummary *s)
+{
+  PetscFunctionBegin;
+  if (s->n_still)
+    PetscCall(Say("%d contact%s between fixed displacements: without effect\n", (int)s->n_still, s->n_still > 1 ? "s lie" : " lies"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom, const HycoSummary *s)
 {
   cJSON *json;
@@ -15,6 +24,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   cJSON_AddNumberToObject(json, "n_dof", s->n_dof);
   cJSON_AddNumberToObject(json, "n_contacts", s->n_contacts);
   cJSON_AddNumberToObject(json, "n_active", s->n_active);
+  cJSON_AddNumberToObject(json, "n_without_effect", s->n_still);
   cJSON_AddNumberToObject(json, "active_set_iterations", s->iterations);
   cJSON_AddStringToObject(json, "solver", method);
   cJSON_AddStringToObject(json, "linear", linear);
@@ -34,6 +44,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   ReportSeconds(json, &s->seconds);
   PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
                 (int)s->n_active, (int)s->iterations, method));
+  PetscCall(Remarks(s));
   PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g, identity to %.1e\n",
                 (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
                 (double)s->energy_defect));
@@ -90,6 +101,7 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     PetscCall(HycoFOMSolve(fom, n_par, mu + k * n_par));
     PetscCall(HycoFOMGetSummary(fom, &s));
     if (k == 0) PetscCall(DriverCheckLeft());
+    if (k == 0) PetscCall(Remarks(&s));
     v[FORCE] = s.total_contact_force;
     v[LAMBDA_MAX] = s.lambda_max;
     v[ACTIVE] = s.n_active;

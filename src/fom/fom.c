@@ -195,6 +195,7 @@ static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(m + 1, &start, entries, &dof, entries, &value));
   ierr = HycoContactRows(f->fe_whole, &f->pairs, start, dof, value, f->gap);
+  if (!ierr) ierr = HycoContactCountStill(f->fe_whole, &f->pairs, start, &f->summary.n_still);
   for (PetscInt k = 0; !ierr && k < m; k++) {
     PetscCall(VecSetValue(f->D, k, f->gap[k], INSERT_VALUES));
     for (PetscInt j = start[k]; rows_changed && j < start[k + 1]; j++) {
@@ -211,7 +212,10 @@ static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
 static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 {
   PetscFunctionBegin;
-  if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!f->n_contacts) { /* perhaps obstacles whose nodes are all fixed */
+    HycoOnRoot(f->comm, HycoContactCountStill(f->fe_whole, &f->pairs, NULL, &f->summary.n_still));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (rows_changed && f->Bt) PetscCall(MatZeroEntries(f->B));
   HycoOnRoot(f->comm, FillContact(f, rows_changed));
   PetscCall(VecAssemblyBegin(f->D));
