@@ -133,6 +133,11 @@ PetscErrorCode HycoPairsDestroy(HycoPairs *pairs);
 PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *pairs);
 /* Gives pairs their search where a map moves surfaces, on a mesh that has all nodes of these; else leaves it out. */
 PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
+/* Whether contact k is on surfaces that a map moves. */
+static inline PetscBool HycoPairsMoved(const HycoPairs *pairs, PetscInt k)
+{
+  return (PetscBool)(pairs->room && pairs->search[pairs->contact[k]].moved);
+}
 /* Whether contact k is a slave node that faces no master. */
 static inline PetscBool HycoPairsAlone(HycoScene scene, const HycoPairs *pairs, PetscInt k)
 {

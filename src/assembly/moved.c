@@ -128,7 +128,7 @@ PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
     const PetscInt lo = p->master_start[k], n = p->master_start[k + 1] - lo;
 
     next = k + 1;
-    if (p->search[p->contact[k]].moved) {
+    if (HycoPairsMoved(p, k)) {
       while (next < p->n && p->contact[next] == p->contact[k]) next++;
       PetscCall(FindRun(fe, p, k, next, start, master, weight));
       continue;

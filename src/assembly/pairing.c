@@ -173,16 +173,29 @@ static PetscErrorCode Reserve(HycoPairs *p, PetscInt contacts, PetscInt width)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The two surfaces are apart, and a pair's master has one slave. */
+/* No node is on both surfaces. */
+static PetscErrorCode CheckApart(const HycoPartners *t, const HycoContact *c)
+{
+  HycoMesh m = t->fe->mesh;
+  PetscBool *master;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_nodes, &master));
+  for (PetscInt k = 0; k < t->n * t->nf; k++) master[t->node[k]] = PETSC_TRUE;
+  for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++)
+    HycoCheck(!master[m->group_node[k]], "contact %s: node %d is in both %s and %s; the two surfaces must be apart",
+              c->name, (int)m->node_id[m->group_node[k]], c->slave, c->master);
+  PetscCall(PetscFree(master));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A pair's master has one slave. */
 static PetscErrorCode CheckPartner(HycoMesh m, const HycoContact *c, PetscInt slave, const HycoProjection *at,
                                    PetscInt partner_of[])
 {
   const PetscInt j = at->node[0];
 
   PetscFunctionBegin;
-  for (PetscInt a = 0; a < at->n; a++)
-    HycoCheck(at->node[a] != slave, "contact %s: node %d is in both %s and %s; the two surfaces must be apart", c->name,
-              (int)m->node_id[slave], c->slave, c->master);
   if (c->type != HYCO_CONTACT_PAIR) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(partner_of[j] < 0,
             "contact %s: nodes %d and %d of %s are both nearest to node %d of %s; mesh both surfaces alike, or take "
@@ -289,22 +302,13 @@ static PetscErrorCode AppendPartners(HycoPartners *t, const HycoContact *c, Pets
 }
 
 /* Each node of a moved slave: its master is searched for where it is. */
-static PetscErrorCode AppendMoved(HycoPartners *t, const HycoContact *c, PetscInt index, HycoPairs *p)
+static PetscErrorCode AppendMoved(const HycoPartners *t, PetscInt index, HycoPairs *p)
 {
   HycoMesh m = t->fe->mesh;
-  PetscBool *master;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->n_nodes, &master));
-  for (PetscInt k = 0; k < t->n * t->nf; k++) master[t->node[k]] = PETSC_TRUE;
-  for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++) {
-    const PetscInt i = m->group_node[k];
-
-    HycoCheck(!master[i], "contact %s: node %d is in both %s and %s; the two surfaces must be apart", c->name,
-              (int)m->node_id[i], c->slave, c->master);
-    PetscCall(Append(p, index, i, NULL));
-  }
-  PetscCall(PetscFree(master));
+  for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++)
+    PetscCall(Append(p, index, m->group_node[k], NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -326,8 +330,10 @@ static PetscErrorCode FindPartners(HycoFE fe, PetscInt index, HycoPairs *p)
   HycoCheck(n && t.n, "contact %s: the group %s is empty", c->name, n ? c->master : c->slave);
   PetscCall(Reserve(p, n, t.nf));
   PetscCall(PetscMalloc3(n, &at, n, &why, n, &missed));
-  ierr = p->room && p->search[index].moved ? AppendMoved(&t, c, index, p)
-                                           : AppendPartners(&t, c, index, at, why, missed, p);
+  ierr = CheckApart(&t, c);
+  if (!ierr)
+    ierr = p->room && p->search[index].moved ? AppendMoved(&t, index, p)
+                                             : AppendPartners(&t, c, index, at, why, missed, p);
   PetscCall(PetscFree3(at, why, missed));
   PetscCall(HycoPartnersDestroy(&t));
   PetscCall(ierr);
