@@ -16,7 +16,28 @@ typedef struct {
   PetscBool whole;
 } HycoRIDRecipe;
 
-/* in[e] = whether cell e belongs to Omega_A. */
+/*
+  The contacts of surfaces that a map moves, with all that they meet over the parameters: a row for each set of masters
+  that a slave node has somewhere (nodes alone: the weights are not those of any place), none for one that meets nothing.
+  Contacts on surfaces that stay have their one row.
+*/
+typedef struct {
+  HycoPairs rows; /* on the whole mesh */
+  PetscInt *of;   /* the contact of each row, ascending */
+} HycoMet;
+
+/* How far from its slave a master point may be to matter (by contact of the scene): from the forces Lambda (n_contacts x
+   n column major) at n points; PETSC_MAX_REAL where none presses. pairs: of the whole mesh, with moved surfaces. */
+PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, PetscInt n, const PetscReal mu[],
+                            const PetscReal Lambda[], PetscReal reach[]);
+/* What is met within reach (NULL: at any distance) at n points and between them. The caller destroys it. */
+PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, PetscInt n, const PetscReal mu[],
+                           const PetscReal reach[], HycoMet *met);
+PetscErrorCode HycoMetDestroy(HycoMet *met);
+/* The groups of moved surfaces, slaves and masters (room for twice the scene's contacts). */
+PetscErrorCode HycoMovedGroups(HycoScene scene, HycoMesh mesh, const HycoPairs *pairs, PetscInt *n, PetscInt group[]);
+
+/* in[e] = whether cell e belongs to Omega_A. pairs: every contact; of moved surfaces all that they meet (HycoMet). */
 PetscErrorCode HycoRIDBuild(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, const HycoRIDRecipe *recipe,
                             PetscBool in[]);
 
@@ -27,7 +48,8 @@ enum {
   HYCO_ROLE_A          /* in Omega_A only: the set A, (33) */
 };
 
-/* role[i] of each whole node, and in_rid[k]: whether contact k belongs to A_lambda (36). */
+/* role[i] of each whole node, and in_rid[k]: whether contact k (of moved surfaces: in this place) belongs to A_lambda
+   (36). */
 PetscErrorCode HycoRIDSets(HycoMesh whole, const HycoPairs *pairs, const PetscBool in[], PetscInt role[],
                            PetscInt in_rid[]);
 

@@ -47,6 +47,7 @@ struct _n_HycoFE {
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscReal *X;                                 /* n_nodes x 3, moved nodes */
   PetscBool *mirrored;                          /* by body: its map is a mirror image */
+  PetscInt place;                               /* of the nodes: a number that no other place has, on this process */
   PetscBool *fixed;                             /* n_dof */
   PetscReal *u0;                                /* n_dof, prescribed displacement, 0 where free */
   PetscBool lifted;                             /* whether any of u0 is not 0 */
@@ -57,6 +58,8 @@ struct _n_HycoFE {
 
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
+/* Puts the nodes where the file has them; for geometry alone. */
+PetscErrorCode HycoFESetDrawn(HycoFE fe);
 /* Brings everything to mu (length scene->n_parameters), touching only what depends on what changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
 /* Which parameters (room for n_parameters) reach the stiffness or the contacts' rows. */
@@ -102,17 +105,47 @@ PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[]);
   N_lambda contacts in the order of the scene's contacts, then of the slave's tag. A contact's master point is the sum
   of weight[j] times node master[j], j in master_start[k] .. master_start[k+1] - 1: no node for an obstacle, one of
   weight 1 for a pair, up to four (of a facet, ascending, weights positive with sum 1) on a surface.
+
+  On surfaces that a map moves every slave node is a contact, and its master point is searched for where the nodes are:
+  HycoPairsMove(). There a slave node that faces no master has no node either: its row of B is empty.
 */
+typedef struct {
+  PetscBool moved; /* a map may move the surfaces of this contact */
+  PetscReal reach; /* then: how far from its slave a master point may be; PETSC_MAX_REAL: as far as it is */
+} HycoSearch;
+
 typedef struct {
   PetscInt n;
   PetscInt *slave;   /* node indices */
   PetscInt *contact; /* index in scene->contact */
   PetscInt *master_start, *master;
   PetscReal *weight;
+  PetscInt room;  /* most masters of a contact on moved surfaces; 0: none is moved, all were found once and for all */
+  PetscInt place; /* that of the nodes at the last search (HycoFE) */
+  PetscInt n_searches;
+  HycoSearch *search; /* by contact of the scene; NULL where room is 0 */
 } HycoPairs;
 
+/* Contacts on the nodes as drawn: where no map moves the surfaces they are final, and a slave node without a master is
+   an error. */
 PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
 PetscErrorCode HycoPairsDestroy(HycoPairs *pairs);
+/* Searches for the masters of moved surfaces on fe's nodes, if those have moved since; fe's mesh has the pairs' nodes
+   and the facets that may be masters. What works with the contacts at fe's parameters calls it itself. */
+PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *pairs);
+/* Gives pairs their search where a map moves surfaces, on a mesh that has all nodes of these; else leaves it out. */
+PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
+/* Whether contact k is on surfaces that a map moves. */
+static inline PetscBool HycoPairsMoved(const HycoPairs *pairs, PetscInt k)
+{
+  return (PetscBool)(pairs->room && pairs->search[pairs->contact[k]].moved);
+}
+/* Whether contact k is a slave node that faces no master. */
+static inline PetscBool HycoPairsAlone(HycoScene scene, const HycoPairs *pairs, PetscInt k)
+{
+  return (PetscBool)(pairs->master_start[k] == pairs->master_start[k + 1] &&
+                     scene->contact[pairs->contact[k]].type != HYCO_CONTACT_OBSTACLE);
+}
 /* The same contacts with node i called index[i]. The caller destroys it. */
 PetscErrorCode HycoPairsRenumber(const HycoPairs *pairs, const PetscInt index[], HycoPairs *out);
 /* Sets node[i] for every slave and master node; the others are left alone. */
@@ -121,13 +154,13 @@ void HycoPairsMark(const HycoPairs *pairs, PetscBool node[]);
 PetscInt HycoPairsWidth(const HycoPairs *pairs);
 /* Normals n (n x 3) and gaps D (n) at fe's mu: given ones are evaluated at the master point (obstacle: the slave), a
    measured gap is n . (master point - slave), on moved nodes. */
-PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal normal[], PetscReal gap[]);
+PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal[], PetscReal gap[]);
 /*
   The rows of B over the free unknowns, in CSR over local dofs (node * dim + component), and D less what the fixed
   unknowns contribute: start[n + 1], dof[], value[] (room for HycoPairsWidth() dim n entries). Fails when a row has no
   free unknown and the prescribed displacements penetrate.
 */
-PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
+PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
                                PetscReal gap[]);
 /* How many contacts have no free unknown and no effect: empty rows, and the fixed nodes at obstacles that are no contacts;
    fails when the prescribed displacements of one of these penetrate. start: of the rows. */

@@ -30,7 +30,7 @@ PetscErrorCode HycoFieldsCheckPath(const char path[]);
   The usual fields from a solution on a whole mesh, then HycoFieldsWrite: displacement, stress, contact force (vector on
   slaves, minus on masters), contact pressure, gap at the solution, RID marker (may be NULL: none written).
 */
-PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, const HycoPairs *pairs, const PetscReal u[],
+PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, HycoPairs *pairs, const PetscReal u[],
                                  const PetscReal lambda[], const PetscReal *rid);
 
 #endif

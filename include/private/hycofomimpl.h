@@ -23,6 +23,7 @@ struct _p_HycoFOM {
   PetscInt n_owned, first;                       /* nodes */
   PetscInt n_nodes, n_cells, n_contacts, n_free; /* of the whole mesh, on every rank */
   PetscInt width;                                /* most nodes of a contact, on every rank */
+  PetscBool searches;                            /* the masters of moved surfaces, anew where they are */
   PetscInt *global;                              /* rank 0: distributed number of each whole node; NULL on one rank */
   VecScatter to_local, to_root, lambda_to_root;
   Vec U_local, U_root, lambda_root;

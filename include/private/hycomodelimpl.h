@@ -48,6 +48,8 @@ struct _p_HycoModel {
   HycoPairs pairs;  /* all N_lambda contacts, node indices of mesh */
   PetscInt *role;   /* by node of mesh */
   PetscInt *in_rid; /* by contact: in A_lambda */
+  PetscReal *master_reach; /* moved surfaces: how far A_lambda's masters may be, by contact of the scene; NULL: none
+                              is moved, or the file is older than their search */
   PetscInt l;       /* POD modes */
   PetscReal *V;     /* (mesh n_nodes * dim) x l, row major: the modes on the nodes of mesh */
   PetscReal *sigma; /* l singular values */
@@ -156,6 +158,9 @@ PetscErrorCode HycoModelCheckForceless(HycoModel model);
    reconstruction. */
 PetscErrorCode HycoModelCreateOwn(HycoModel model);
 PetscErrorCode HycoModelDestroyOwn(HycoModel model);
+/* The rows of A_lambda's contacts at fe's parameters. On moved surfaces one that acts on no free unknown of A where it is
+   has an empty row: no equation of (38) would answer its force. */
+PetscErrorCode HycoModelOwnRows(HycoModel model);
 /* Brings row_start, row_dof, row_value, gap of all contacts and U of all nodes of mesh to the last prediction. */
 PetscErrorCode HycoModelComplete(HycoModel model);
 /* start + B[k,:] U, after it. */

@@ -86,6 +86,7 @@ struct _p_HycoTrainer {
   PetscInt n_dual_seeds, *dual_seeds; /* nodes */
   HycoMesh whole;
   HycoPairs pairs;
+  HycoMet met; /* moved surfaces: what they meet, as far as it matters */
   HycoFE fe;                                                     /* on the whole mesh */
   PetscInt sizes[4];                                             /* every rank: nodes, cells, contacts, dim */
   PetscInt n_seeds_node, n_seeds_cell, *seeds_node, *seeds_cell; /* every rank */

@@ -1,8 +1,8 @@
 /* B and D: normals, gaps and the rows of the potential contacts at the current parameters. */
+#include "facing.h"
 #include "kinematics.h"
 
-/* Sum of n dS over the facets of `group` around each node (n_nodes x 3). */
-static PetscErrorCode SurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
+PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGetFacet(m->type);
@@ -23,7 +23,8 @@ static PetscErrorCode SurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The master point of contact k on the moved mesh; an obstacle's is the slave itself. */
+/* The master point of contact k on the moved mesh; an obstacle's is the slave itself, as is that of a slave node that
+   faces no master. */
 static void MasterPoint(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal x[3])
 {
   const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
@@ -55,6 +56,12 @@ static PetscErrorCode PairNormal(HycoFE fe, const HycoContact *c, PetscInt slave
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The gap that stands for "no master": it says nothing, but is of the mesh's scale. */
+static PetscReal NoGap(HycoFE fe)
+{
+  return 1e-2 * HycoMeshLength(fe->mesh);
+}
+
 /* vector: room for 3 reals a node of the mesh. */
 static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal vector[], PetscReal normal[],
                                PetscReal gap[])
@@ -72,12 +79,14 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal vect
       PetscInt g = 0;
 
       PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
-      PetscCall(SurfaceVectors(fe, g, vector));
+      PetscCall(HycoSurfaceVectors(fe, g, vector));
     }
     last = pairs->contact[k];
     MasterPoint(fe, pairs, k, x);
     PetscCall(PairNormal(fe, c, s, x, given ? NULL : vector, n));
-    if (c->gap) {
+    if (HycoPairsAlone(fe->scene, pairs, k)) {
+      gap[k] = NoGap(fe);
+    } else if (c->gap) {
       PetscCall(HycoExprEval(c->gap, fe->mu, 1, x, &gap[k]));
     } else {
       gap[k] = 0;
@@ -87,12 +96,13 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal vect
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoContactGeometry(HycoFE fe, const HycoPairs *pairs, PetscReal normal[], PetscReal gap[])
+PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal[], PetscReal gap[])
 {
   PetscReal *vector;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  PetscCall(HycoPairsMove(fe, pairs));
   PetscCall(PetscMalloc1(3 * fe->mesh->n_nodes, &vector));
   ierr = Geometry(fe, pairs, vector, normal, gap);
   PetscCall(PetscFree(vector));
@@ -127,16 +137,18 @@ static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal no
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscReal drawn = gap[k];
 
-    AddToRow(fe, pairs->slave[k], 1, normal + 3 * k, &n, dof, value, &gap[k]);
+    if (!HycoPairsAlone(fe->scene, pairs, k))
+      AddToRow(fe, pairs->slave[k], 1, normal + 3 * k, &n, dof, value, &gap[k]);
     for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++)
       AddToRow(fe, pairs->master[j], -pairs->weight[j], normal + 3 * k, &n, dof, value, &gap[k]);
     start[k + 1] = n;
-    if (start[k + 1] == start[k]) PetscCall(HycoContactCheckStill(fe, pairs, k, drawn, &gap[k]));
+    if (start[k + 1] == start[k] && !HycoPairsAlone(fe->scene, pairs, k))
+      PetscCall(HycoContactCheckStill(fe, pairs, k, drawn, &gap[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoContactRows(HycoFE fe, const HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
+PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
                                PetscReal gap[])
 {
   PetscReal *normal;

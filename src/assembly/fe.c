@@ -88,13 +88,23 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFESetDrawn(HycoFE fe)
+{
+  static PetscInt places = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(fe->X, fe->mesh->xyz, 3 * fe->mesh->n_nodes));
+  fe->place = ++places;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* X = map(x, mu), body by body. */
 static PetscErrorCode MoveNodes(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
 
   PetscFunctionBegin;
-  PetscCall(PetscArraycpy(fe->X, m->xyz, 3 * m->n_nodes));
+  PetscCall(HycoFESetDrawn(fe));
   for (PetscInt b = 0; b < fe->scene->n_bodies; b++) {
     for (PetscInt c = 0; c < 3; c++) {
       HycoExpr map = fe->scene->body[b].map[c];

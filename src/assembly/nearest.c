@@ -19,7 +19,7 @@ typedef struct {
 } Box;
 
 struct _n_HycoPatches {
-  HycoMesh mesh; /* borrowed, like node */
+  const PetscReal *X, *normal; /* borrowed, like node */
   PetscInt n, nf;
   const PetscInt *node;
   Item *item; /* in the order of the tree's leaves */
@@ -63,7 +63,7 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
     b->lo[c] = PETSC_MAX_REAL;
     b->hi[c] = PETSC_MIN_REAL;
     for (PetscInt k = lo * s->nf; k < hi * s->nf; k++) {
-      const PetscReal x = s->mesh->xyz[3 * s->node[s->item[k / s->nf].patch * s->nf + k % s->nf] + c];
+      const PetscReal x = s->X[3 * s->node[s->item[k / s->nf].patch * s->nf + k % s->nf] + c];
 
       b->lo[c] = PetscMin(b->lo[c], x);
       b->hi[c] = PetscMax(b->hi[c], x);
@@ -76,14 +76,16 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
   Build(s, 2 * t + 2, (lo + hi) / 2, hi);
 }
 
-PetscErrorCode HycoPatchesCreate(HycoMesh mesh, PetscInt n, PetscInt nf, const PetscInt node[], HycoPatches *patches)
+PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, const PetscInt node[],
+                                 const PetscReal normal[], HycoPatches *patches)
 {
   HycoPatches s;
   PetscInt boxes = 1;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&s));
-  s->mesh = mesh;
+  s->X = X;
+  s->normal = normal;
   s->n = n;
   s->nf = nf;
   s->node = node;
@@ -94,7 +96,7 @@ PetscErrorCode HycoPatchesCreate(HycoMesh mesh, PetscInt n, PetscInt nf, const P
     s->item[k].patch = k;
     for (PetscInt c = 0; c < 3; c++) {
       s->item[k].centre[c] = 0;
-      for (PetscInt a = 0; a < nf; a++) s->item[k].centre[c] += mesh->xyz[3 * node[k * nf + a] + c] / nf;
+      for (PetscInt a = 0; a < nf; a++) s->item[k].centre[c] += X[3 * node[k * nf + a] + c] / nf;
     }
   }
   Build(s, 0, 0, n);
@@ -193,7 +195,7 @@ static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], Pe
   const PetscReal *X[4];
   PetscReal best = PETSC_MAX_REAL;
 
-  for (PetscInt a = 0; a < nf; a++) X[a] = s->mesh->xyz + 3 * s->node[patch * nf + a];
+  for (PetscInt a = 0; a < nf; a++) X[a] = s->X + 3 * s->node[patch * nf + a];
   if ((nf == 3 && InTriangle(X, x, w)) || (nf == 4 && InQuadrilateral(X, x, w))) best = Distance2(nf, X, w, x);
   for (PetscInt k = 0; k < edges; k++) {
     const PetscInt l = (k + 1) % nf;
@@ -227,9 +229,17 @@ static PetscReal BoxDistance2(const Box *b, const PetscReal x[3])
   return sum;
 }
 
+/* Whether a patch counts for who asks with a normal: those without one do. */
+static PetscBool Opposes(HycoPatches s, PetscInt patch, const PetscReal *against)
+{
+  const PetscReal *n = s->normal ? s->normal + 3 * patch : NULL;
+
+  return (PetscBool)(!against || !n || Dot(n, n) == 0 || Dot(n, against) <= HYCO_OPPOSED);
+}
+
 /* Brings (best, patch, w) down to the nearest of the items lo .. hi - 1 under box t, nearer child first. */
-static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const PetscReal x[3], PetscReal *best,
-                   PetscInt *patch, PetscReal w[4])
+static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const PetscReal x[3], const PetscReal *against,
+                   PetscReal *best, PetscInt *patch, PetscReal w[4])
 {
   const PetscInt mid = (lo + hi) / 2;
   PetscBool right;
@@ -238,13 +248,14 @@ static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const Pe
   if (hi - lo > LEAF) {
     right = (PetscBool)(BoxDistance2(&s->box[2 * t + 2], x) < BoxDistance2(&s->box[2 * t + 1], x));
     for (PetscInt child = 0; child < 2; child++, right = (PetscBool)!right)
-      Search(s, 2 * t + 1 + right, right ? mid : lo, right ? hi : mid, x, best, patch, w);
+      Search(s, 2 * t + 1 + right, right ? mid : lo, right ? hi : mid, x, against, best, patch, w);
     return;
   }
   for (PetscInt k = lo; k < hi; k++) {
-    PetscReal trial[4] = {0, 0, 0, 0};
-    const PetscReal d = OnPatch(s, s->item[k].patch, x, trial);
+    PetscReal trial[4] = {0, 0, 0, 0}, d;
 
+    if (!Opposes(s, s->item[k].patch, against)) continue;
+    d = OnPatch(s, s->item[k].patch, x, trial);
     if (d > *best || (d == *best && s->item[k].patch > *patch)) continue;
     *best = d;
     *patch = s->item[k].patch;
@@ -252,12 +263,13 @@ static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const Pe
   }
 }
 
-void HycoPatchesProject(HycoPatches s, const PetscReal x[3], HycoProjection *p)
+void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal against[3], HycoProjection *p)
 {
   PetscReal best = PETSC_MAX_REAL, w[4] = {0, 0, 0, 0}, sum = 0;
   PetscInt patch = 0;
 
-  Search(s, 0, 0, s->n, x, &best, &patch, w);
+  Search(s, 0, 0, s->n, x, against, &best, &patch, w);
+  p->patch = patch;
   p->distance = PetscSqrtReal(best);
   p->n = 0;
   for (PetscInt a = 0; a < s->nf; a++) {

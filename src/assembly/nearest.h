@@ -1,21 +1,28 @@
-/* The nearest point of a surface as drawn: private to assembly/. */
+/* The nearest point of a surface: private to assembly/. */
 #ifndef HYCO_NEAREST_H
 #define HYCO_NEAREST_H
 #include <hycomesh.h>
 
-/* A point of a patch: sum of weight[a] times node[a]. Weights are positive and sum to 1; nodes ascend. */
+/* A point of a patch: sum of weight[a] times node[a]. Weights are positive and sum to 1; nodes ascend. n = 0: there is
+   none. */
 typedef struct {
-  PetscInt n, node[4];
+  PetscInt n, node[4], patch;
   PetscReal weight[4], distance;
 } HycoProjection;
 
+/* Normals oppose within 60 degrees: their product is at most this. */
+#define HYCO_OPPOSED -0.5
+
 typedef struct _n_HycoPatches *HycoPatches;
 
-/* n patches of nf nodes each: 1 points, 2 segments, 3 triangles, 4 bilinear quadrilaterals. node (n x nf) is borrowed.
-   The caller destroys it. */
-PetscErrorCode HycoPatchesCreate(HycoMesh mesh, PetscInt n, PetscInt nf, const PetscInt node[], HycoPatches *patches);
+/* n patches of nf nodes each: 1 points, 2 segments, 3 triangles, 4 bilinear quadrilaterals; X: coordinates of nodes;
+   normal (n x 3, of unit length, or 0 where there is none) may be NULL. X, node (n x nf) and normal are borrowed. The
+   caller destroys it. */
+PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, const PetscInt node[],
+                                 const PetscReal normal[], HycoPatches *patches);
 PetscErrorCode HycoPatchesDestroy(HycoPatches *patches);
-/* The patches' point nearest to x; of equally near ones that of the first patch. */
-void HycoPatchesProject(HycoPatches patches, const PetscReal x[3], HycoProjection *p);
+/* The patches' point nearest to x; of equally near ones that of the first patch. against: a unit normal that the patch
+   must oppose, or NULL. */
+void HycoPatchesProject(HycoPatches patches, const PetscReal x[3], const PetscReal against[3], HycoProjection *p);
 
 #endif

@@ -1,9 +1,9 @@
 /*
   Potential contacts: the nodes of an obstacle's group, pairs of nodes by minimal distance between two surfaces (section
-  3), or a surface's nodes projected on the facets of another; found on the mesh as it stands in the file.
+  3), or a surface's nodes projected on the facets of another. They are found on the mesh as it stands in the file; on
+  surfaces that a map moves, anew wherever the nodes are.
 */
-#include "nearest.h"
-#include <hycofe.h>
+#include "partners.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -29,10 +29,14 @@ static PetscReal DefaultTolerance(HycoMesh m, PetscInt group)
   return shortest < PETSC_MAX_REAL ? shortest / 10 : 0;
 }
 
-/* A slave node too far from the master. */
+/* How a slave node lies to the master. */
+typedef enum { MET, FAR, TURNED, ASKEW } Verdict;
+
+/* A slave node without a master. */
 typedef struct {
   PetscReal distance;
   PetscInt node;
+  Verdict why;
 } Missed;
 
 static int FarthestFirst(const void *a, const void *b)
@@ -43,63 +47,102 @@ static int FarthestFirst(const void *a, const void *b)
   return (p->node > q->node) - (p->node < q->node);
 }
 
-/* What one contact's search needs: the master's patches, and for pairs the slave that each node has found. */
-typedef struct {
-  HycoPatches patches;
-  PetscInt n, nf, *node; /* patches' nodes, n x nf */
-  PetscInt *partner_of;  /* by node, or -1 */
-  Missed *missed;
-} Partners;
-
-/* Whether a point of a surface lies on its border: the edge that it is on, or an edge at the node that it is, has one
-   facet. */
-static PetscBool AtBorder(const Partners *t, const HycoProjection *p)
+/* The master of one slave node, at most `tolerance` away; farther than `small` it must lie along the slave's normal, as
+   steeply as normals must oppose. */
+static Verdict Judge(const HycoPartners *t, PetscInt slave, PetscReal tolerance, PetscReal small, HycoProjection *at)
 {
-  const PetscInt nf = t->nf;
+  const PetscReal *out = HycoPartnersOutward(t, slave);
+  PetscReal r[3];
 
-  if (nf == 1 || p->n > 2) return PETSC_FALSE;
-  for (PetscInt k = 0; k < t->n * nf; k++) { /* each edge of each facet (2D: each end) */
-    const PetscInt a = t->node[k], b = nf == 2 ? a : t->node[k / nf * nf + (k + 1) % nf];
-    PetscInt shared = 0;
-    PetscBool on = (PetscBool)(a == p->node[0] || b == p->node[0]);
-
-    if (p->n == 2) on = (PetscBool)(on && nf > 2 && (a == p->node[1] || b == p->node[1]));
-    for (PetscInt g = 0; on && g < t->n; g++) {
-      PetscInt has = 0;
-
-      for (PetscInt v = 0; v < nf; v++) has += t->node[g * nf + v] == a || t->node[g * nf + v] == b;
-      shared += has == (a == b ? 1 : 2);
-    }
-    if (on && shared == 1) return PETSC_TRUE;
-  }
-  return PETSC_FALSE;
+  HycoPartnersProject(t, slave, PETSC_FALSE, at);
+  if (!at->n) return TURNED;
+  if (at->distance > tolerance) return FAR;
+  if (!out || at->distance <= small) return MET;
+  HycoPartnersAcross(t, slave, at, r);
+  return PetscAbsReal(HycoDot(r, out)) < -HYCO_OPPOSED * at->distance ? ASKEW : MET;
 }
 
-/* Names the n slave nodes that are too far from the master, the farthest five of them. */
-static PetscErrorCode Complain(HycoMesh m, const HycoContact *c, const Partners *t, PetscInt n, PetscInt slaves,
-                               PetscReal tolerance)
+/* Degrees between a slave's normal and the way to its master point, or by which the normals miss each other. */
+static PetscReal Angle(const HycoPartners *t, PetscInt slave, Verdict why, const HycoProjection *at)
 {
-  const PetscBool pair = (PetscBool)(c->type == HYCO_CONTACT_PAIR);
-  char list[HYCO_LINE / 2] = "";
+  const PetscReal *out = HycoPartnersOutward(t, slave);
+  PetscReal r[3], cosine = -HycoDot(out, t->normal + 3 * at->patch);
+
+  HycoPartnersAcross(t, slave, at, r);
+  if (why == ASKEW) cosine = PetscAbsReal(HycoDot(out, r)) / at->distance;
+  return PetscAcosReal(PetscMax(PetscMin(cosine, 1), -1)) * 180 / PETSC_PI;
+}
+
+/* "12 (0.5 away, past its border)" */
+static PetscErrorCode Describe(HycoPartners *t, const Missed *missed, size_t room, char text[])
+{
+  HycoProjection at;
+  PetscBool border = PETSC_FALSE;
+  size_t used;
 
   PetscFunctionBegin;
-  qsort(t->missed, (size_t)n, sizeof(Missed), FarthestFirst);
-  for (PetscInt k = 0; k < PetscMin(n, 5); k++) {
-    const size_t used = strlen(list);
-    HycoProjection at;
-
-    HycoPatchesProject(t->patches, m->xyz + 3 * t->missed[k].node, &at);
-    snprintf(list + used, sizeof(list) - used, "%s%d (%.4g away%s)", k ? ", " : "", (int)m->node_id[t->missed[k].node],
-             (double)at.distance, AtBorder(t, &at) ? ", past its border" : "");
-  }
-  HycoFail("contact %s: %d of the %d nodes of %s have no %s of %s within %g: %snode%s %s; %s, or raise "
-           "contact_%s_tolerance",
-           c->name, (int)n, (int)slaves, c->slave, pair ? "node" : "point", c->master, (double)tolerance,
-           n > 5 ? "the farthest are " : "", n > 1 ? "s" : "", list,
-           pair ? "mesh both surfaces alike, take type: surface" : "draw the surfaces closer, extend the master",
-           c->name);
+  HycoPartnersProject(t, missed->node, (PetscBool)(missed->why == TURNED), &at);
+  PetscCall(HycoPartnersAtBorder(t, &at, &border));
+  snprintf(text, room, "%d (%.4g away%s", (int)t->fe->mesh->node_id[missed->node], (double)at.distance,
+           border ? ", past its border" : "");
+  used = strlen(text);
+  if (missed->why == TURNED || missed->why == ASKEW)
+    snprintf(text + used, room - used, ", %.0f degrees %s", (double)Angle(t, missed->node, missed->why, &at),
+             missed->why == TURNED ? "turned away from it" : "off the normal");
+  PetscCall(PetscStrlcat(text, ")", room));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What to do about nodes without a master: a larger tolerance where they face it, and only there. */
+static PetscErrorCode Remedy(HycoPartners *t, const HycoContact *c, PetscInt n, const Missed missed[], char text[HYCO_LINE])
+{
+  PetscBool facing = PETSC_TRUE;
+  PetscReal farthest = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    HycoProjection at;
+    PetscBool border;
+
+    facing = (PetscBool)(facing && missed[k].why == FAR);
+    if (!facing) break;
+    facing = (PetscBool)(Judge(t, missed[k].node, PETSC_MAX_REAL, 0, &at) == MET);
+    PetscCall(HycoPartnersAtBorder(t, &at, &border));
+    facing = (PetscBool)(facing && !border);
+    farthest = PetscMax(farthest, at.distance);
+  }
+  if (c->type == HYCO_CONTACT_PAIR)
+    snprintf(text, HYCO_LINE, "mesh both surfaces alike, or take type: surface");
+  else if (facing)
+    snprintf(text, HYCO_LINE, "draw the surfaces closer, or allow the distance by contact_%s_tolerance %.4g", c->name,
+             1.01 * (double)farthest);
+  else
+    snprintf(text, HYCO_LINE, "leave nodes that face no %s out of %s, or extend %s", c->master, c->slave, c->master);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Names the n slave nodes that have no master, the farthest five of them. */
+static PetscErrorCode Complain(HycoPartners *t, const HycoContact *c, PetscInt n, Missed missed[], PetscInt slaves,
+                               PetscReal tolerance)
+{
+  char list[HYCO_LINE / 2] = "", remedy[HYCO_LINE];
+
+  PetscFunctionBegin;
+  qsort(missed, (size_t)n, sizeof(Missed), FarthestFirst);
+  for (PetscInt k = 0; k < PetscMin(n, 5); k++) {
+    char one[HYCO_LINE / 2];
+
+    PetscCall(Describe(t, &missed[k], sizeof(one), one));
+    if (k) PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
+    PetscCall(PetscStrlcat(list, one, sizeof(list)));
+  }
+  PetscCall(Remedy(t, c, n, missed, remedy));
+  HycoFail("contact %s: %d of the %d nodes of %s have no %s of %s within %g and in front of them: %snode%s %s; %s",
+           c->name, (int)n, (int)slaves, c->slave, c->type == HYCO_CONTACT_PAIR ? "node" : "point", c->master,
+           (double)tolerance, n > 5 ? "the farthest are " : "", n > 1 ? "s" : "", list, remedy);
+}
+
+/* A contact; at: its master point, NULL: it has none. */
 static PetscErrorCode Append(HycoPairs *p, PetscInt contact, PetscInt slave, const HycoProjection *at)
 {
   PetscInt *end = p->master_start + p->n;
@@ -130,46 +173,29 @@ static PetscErrorCode Reserve(HycoPairs *p, PetscInt contacts, PetscInt width)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode PartnersCreate(HycoMesh m, const HycoContact *c, PetscInt gs, PetscInt gm, Partners *t)
+/* No node is on both surfaces. */
+static PetscErrorCode CheckApart(const HycoPartners *t, const HycoContact *c)
 {
+  HycoMesh m = t->fe->mesh;
+  PetscBool *master;
+
   PetscFunctionBegin;
-  t->n = 0;
-  t->nf = c->type == HYCO_CONTACT_PAIR ? 1 : m->nf;
-  PetscCall(PetscMalloc1(PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets * t->nf), &t->node));
-  if (c->type == HYCO_CONTACT_PAIR) {
-    for (PetscInt k = m->group_start[gm]; k < m->group_start[gm + 1]; k++) t->node[t->n++] = m->group_node[k];
-  } else {
-    for (PetscInt f = 0; f < m->n_facets; f++) {
-      if (m->facet_group[f] == gm) PetscCall(PetscArraycpy(t->node + t->nf * t->n++, m->facets + f * m->nf, t->nf));
-    }
-  }
-  PetscCall(HycoPatchesCreate(m, t->n, t->nf, t->node, &t->patches));
-  PetscCall(PetscMalloc1(m->group_start[gs + 1] - m->group_start[gs], &t->missed));
-  PetscCall(PetscMalloc1(m->n_nodes, &t->partner_of));
-  for (PetscInt i = 0; i < m->n_nodes; i++) t->partner_of[i] = -1;
+  PetscCall(PetscCalloc1(m->n_nodes, &master));
+  for (PetscInt k = 0; k < t->n * t->nf; k++) master[t->node[k]] = PETSC_TRUE;
+  for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++)
+    HycoCheck(!master[m->group_node[k]], "contact %s: node %d is in both %s and %s; the two surfaces must be apart",
+              c->name, (int)m->node_id[m->group_node[k]], c->slave, c->master);
+  PetscCall(PetscFree(master));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode PartnersDestroy(Partners *t)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoPatchesDestroy(&t->patches));
-  PetscCall(PetscFree(t->node));
-  PetscCall(PetscFree(t->missed));
-  PetscCall(PetscFree(t->partner_of));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The two surfaces are apart, and a pair's master has one slave. */
+/* A pair's master has one slave. */
 static PetscErrorCode CheckPartner(HycoMesh m, const HycoContact *c, PetscInt slave, const HycoProjection *at,
                                    PetscInt partner_of[])
 {
   const PetscInt j = at->node[0];
 
   PetscFunctionBegin;
-  for (PetscInt a = 0; a < at->n; a++)
-    HycoCheck(at->node[a] != slave, "contact %s: node %d is in both %s and %s; the two surfaces must be apart", c->name,
-              (int)m->node_id[slave], c->slave, c->master);
   if (c->type != HYCO_CONTACT_PAIR) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(partner_of[j] < 0,
             "contact %s: nodes %d and %d of %s are both nearest to node %d of %s; mesh both surfaces alike, or take "
@@ -179,30 +205,138 @@ static PetscErrorCode CheckPartner(HycoMesh m, const HycoContact *c, PetscInt sl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each node of group gs with its nearest master node (pair) or its projection on the master's facets (surface). */
-static PetscErrorCode FindPartners(HycoMesh m, const HycoContact *c, PetscInt index, PetscInt gs, Partners *t,
-                                   HycoPairs *p)
+/* Whether each slave node has a master of its own at most `far` away. */
+static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at[], PetscReal far, PetscBool *matched)
 {
-  const PetscInt *slave = m->group_node + m->group_start[gs], n_slave = m->group_start[gs + 1] - m->group_start[gs];
-  const PetscReal tolerance = c->tolerance >= 0 ? c->tolerance : DefaultTolerance(m, gs);
-  PetscInt missed = 0;
+  PetscBool *taken;
 
   PetscFunctionBegin;
-  HycoCheck(n_slave && t->n, "contact %s: the group %s is empty", c->name, n_slave ? c->master : c->slave);
-  PetscCall(Reserve(p, n_slave, t->nf));
-  for (PetscInt k = 0; k < n_slave; k++) {
-    HycoProjection at;
+  PetscCall(PetscCalloc1(m->n_nodes, &taken));
+  *matched = PETSC_TRUE;
+  for (PetscInt k = 0; k < n && *matched; k++) {
+    *matched = (PetscBool)(at[k].n == 1 && at[k].distance <= far && !taken[at[k].node[0]]);
+    if (*matched) taken[at[k].node[0]] = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(taken));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    HycoPatchesProject(t->patches, m->xyz + 3 * slave[k], &at);
-    if (at.distance > tolerance) {
-      t->missed[missed].distance = at.distance;
-      t->missed[missed++].node = slave[k];
+/* The master node that lies most along the mean of both normals from a slave node (mirrored surfaces match so, however
+   far apart they are); n = 0 where it misses that line by more than `small`. */
+static void ProjectAlong(const HycoPartners *t, PetscInt slave, PetscReal small, HycoProjection *at)
+{
+  const PetscReal *out = HycoPartnersOutward(t, slave);
+  PetscReal best = small * small;
+
+  at->n = 0;
+  for (PetscInt j = 0; out && j < t->n; j++) {
+    const PetscReal *n = t->normal + 3 * j;
+    const HycoProjection here = {1, {t->node[j]}, j, {1}, 0};
+    PetscReal r[3], mean[3], rr, off;
+
+    if (HycoDot(n, n) == 0 || HycoDot(out, n) > HYCO_OPPOSED) continue;
+    for (PetscInt c = 0; c < 3; c++) mean[c] = out[c] - n[c];
+    HycoPartnersAcross(t, slave, &here, r);
+    rr = HycoDot(r, r);
+    off = PetscMax(rr - HycoDot(r, mean) * HycoDot(r, mean) / HycoDot(mean, mean), 0);
+    if (off > best || (off == best && at->n && rr >= at->distance * at->distance)) continue;
+    best = off;
+    *at = here;
+    at->distance = PetscSqrtReal(rr);
+  }
+}
+
+/* The masters of all nodes of a contact's slave: the nearest points. Of a pair whose surfaces do not coincide as drawn,
+   the nodes along the normals, if those match the surfaces one by one. */
+static PetscErrorCode Project(const HycoPartners *t, const HycoContact *c, PetscInt n, const PetscInt slave[],
+                              PetscReal tolerance, PetscReal small, HycoProjection at[], Verdict why[])
+{
+  HycoProjection *along;
+  PetscBool matched;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) why[k] = Judge(t, slave[k], tolerance, small, &at[k]);
+  if (c->type != HYCO_CONTACT_PAIR) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(AreMatched(t->fe->mesh, n, at, PetscMin(small, tolerance), &matched));
+  if (matched) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(n, &along));
+  for (PetscInt k = 0; k < n; k++) ProjectAlong(t, slave[k], small, &along[k]);
+  PetscCall(AreMatched(t->fe->mesh, n, along, c->tolerance >= 0 ? tolerance : PETSC_MAX_REAL, &matched));
+  for (PetscInt k = 0; matched && k < n; k++) {
+    at[k] = along[k];
+    why[k] = MET;
+  }
+  PetscCall(PetscFree(along));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each node of a contact's slave with its master, or a complaint about those that have none. */
+static PetscErrorCode AppendPartners(HycoPartners *t, const HycoContact *c, PetscInt index, HycoProjection at[],
+                                     Verdict why[], Missed missed[], HycoPairs *p)
+{
+  HycoMesh m = t->fe->mesh;
+  const PetscInt *slave = m->group_node + m->group_start[t->slave],
+                 n = m->group_start[t->slave + 1] - m->group_start[t->slave];
+  const PetscReal small = DefaultTolerance(m, t->slave), tolerance = c->tolerance >= 0 ? c->tolerance : small;
+  PetscInt *partner_of, n_missed = 0;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(Project(t, c, n, slave, tolerance, small, at, why));
+  PetscCall(PetscMalloc1(m->n_nodes, &partner_of));
+  for (PetscInt i = 0; i < m->n_nodes; i++) partner_of[i] = -1;
+  for (PetscInt k = 0; k < n && !ierr; k++) {
+    if (why[k] != MET) {
+      const Missed here = {at[k].n ? at[k].distance : 0, slave[k], why[k]};
+
+      missed[n_missed++] = here;
       continue;
     }
-    PetscCall(CheckPartner(m, c, slave[k], &at, t->partner_of));
-    PetscCall(Append(p, index, slave[k], &at));
+    ierr = CheckPartner(m, c, slave[k], &at[k], partner_of);
+    if (!ierr) ierr = Append(p, index, slave[k], &at[k]);
   }
-  if (missed) PetscCall(Complain(m, c, t, missed, n_slave, tolerance));
+  PetscCall(PetscFree(partner_of));
+  PetscCall(ierr);
+  if (n_missed) PetscCall(Complain(t, c, n_missed, missed, n, tolerance));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each node of a moved slave: its master is searched for where it is. */
+static PetscErrorCode AppendMoved(const HycoPartners *t, PetscInt index, HycoPairs *p)
+{
+  HycoMesh m = t->fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++)
+    PetscCall(Append(p, index, m->group_node[k], NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The contacts of a pair or surface contact. */
+static PetscErrorCode FindPartners(HycoFE fe, PetscInt index, HycoPairs *p)
+{
+  const HycoContact *c = &fe->scene->contact[index];
+  HycoMesh m = fe->mesh;
+  HycoPartners t;
+  HycoProjection *at;
+  Verdict *why;
+  Missed *missed;
+  PetscInt n;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPartnersCreate(fe, c, &t));
+  n = m->group_start[t.slave + 1] - m->group_start[t.slave];
+  HycoCheck(n && t.n, "contact %s: the group %s is empty", c->name, n ? c->master : c->slave);
+  PetscCall(Reserve(p, n, t.nf));
+  PetscCall(PetscMalloc3(n, &at, n, &why, n, &missed));
+  ierr = CheckApart(&t, c);
+  if (!ierr)
+    ierr = p->room && p->search[index].moved ? AppendMoved(&t, index, p)
+                                             : AppendPartners(&t, c, index, at, why, missed, p);
+  PetscCall(PetscFree3(at, why, missed));
+  PetscCall(HycoPartnersDestroy(&t));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -262,41 +396,52 @@ static PetscErrorCode CountHeld(HycoScene scene, HycoMesh m, PetscInt held[])
 }
 
 /* The contacts of scene->contact[index]. */
-static PetscErrorCode FindContact(HycoScene scene, HycoMesh m, PetscInt index, const PetscInt held[], HycoPairs *pairs)
+static PetscErrorCode FindContact(HycoFE fe, PetscInt index, const PetscInt held[], HycoPairs *pairs)
 {
-  const HycoContact *c = &scene->contact[index];
-  PetscInt gs = 0, gm = 0;
-  Partners partners = {0};
-  PetscErrorCode ierr;
+  const HycoContact *c = &fe->scene->contact[index];
+  PetscInt g = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &gs));
   if (c->type == HYCO_CONTACT_OBSTACLE) {
-    PetscCall(FindObstacle(scene, m, index, gs, held, pairs));
-  } else {
-    PetscCall(HycoMeshFindGroup(m, "contact", c->master, &gm));
-    PetscCall(PartnersCreate(m, c, gs, gm, &partners));
-    ierr = FindPartners(m, c, index, gs, &partners, pairs);
-    PetscCall(PartnersDestroy(&partners));
-    PetscCall(ierr);
-  }
+    PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
+    PetscCall(FindObstacle(fe->scene, fe->mesh, index, g, held, pairs));
+  } else
+    PetscCall(FindPartners(fe, index, pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
+{
+  HycoScene scene = fe->scene;
+  PetscInt *held;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFESetDrawn(fe));
+  PetscCall(HycoPairsSetSearch(scene, fe->mesh, pairs));
+  PetscCall(PetscMalloc1(fe->mesh->n_nodes, &held));
+  PetscCall(CountHeld(scene, fe->mesh, held));
+  for (PetscInt k = 0; k < scene->n_contacts && !ierr; k++) ierr = FindContact(fe, k, held, pairs);
+  PetscCall(PetscFree(held));
+  PetscCall(ierr);
+  PetscCall(CheckSlaves(scene, fe->mesh, pairs));
+  PetscCall(HycoPairsMove(fe, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoPairs *pairs)
 {
-  PetscInt *held;
-  PetscErrorCode ierr = 0;
+  HycoFE fe;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
   PetscCall(Reserve(pairs, 0, 0));
-  PetscCall(PetscMalloc1(m->n_nodes, &held));
-  PetscCall(CountHeld(scene, m, held));
-  for (PetscInt k = 0; k < scene->n_contacts && !ierr; k++) ierr = FindContact(scene, m, k, held, pairs);
-  PetscCall(PetscFree(held));
+  if (!scene->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFECreate(scene, m, &fe));
+  ierr = FindAll(fe, pairs);
+  PetscCall(HycoFEDestroy(&fe));
   PetscCall(ierr);
-  PetscCall(CheckSlaves(scene, m, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -308,7 +453,8 @@ PetscErrorCode HycoPairsDestroy(HycoPairs *pairs)
   PetscCall(PetscFree(pairs->master_start));
   PetscCall(PetscFree(pairs->master));
   PetscCall(PetscFree(pairs->weight));
-  pairs->n = 0;
+  PetscCall(PetscFree(pairs->search));
+  pairs->n = pairs->room = pairs->place = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -323,6 +469,10 @@ PetscErrorCode HycoPairsRenumber(const HycoPairs *pairs, const PetscInt index[],
   HycoDuplicate(n + 1, pairs->master_start, &out->master_start);
   HycoDuplicate(entries, pairs->master, &out->master);
   HycoDuplicate(entries, pairs->weight, &out->weight);
+  out->room = pairs->room;
+  out->place = 0;
+  out->n_searches = pairs->n_searches;
+  if (pairs->search) HycoDuplicate(pairs->n_searches, pairs->search, &out->search);
   for (PetscInt k = 0; k < n; k++) out->slave[k] = index[out->slave[k]];
   for (PetscInt j = 0; j < entries; j++) out->master[j] = index[out->master[j]];
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -338,7 +488,7 @@ void HycoPairsMark(const HycoPairs *pairs, PetscBool node[])
 
 PetscInt HycoPairsWidth(const HycoPairs *pairs)
 {
-  PetscInt most = 0;
+  PetscInt most = pairs->n ? 1 + pairs->room : 0;
 
   for (PetscInt k = 0; k < pairs->n; k++)
     most = PetscMax(most, 1 + pairs->master_start[k + 1] - pairs->master_start[k]);

@@ -68,7 +68,7 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
 }
 
 /* Fails where the prescribed displacement of a fixed node passes its obstacle. */
-static PetscErrorCode CheckObstacles(HycoFE fe, const HycoPairs *still, PetscReal normal[], PetscReal gap[])
+static PetscErrorCode CheckObstacles(HycoFE fe, HycoPairs *still, PetscReal normal[], PetscReal gap[])
 {
   PetscFunctionBegin;
   PetscCall(HycoContactGeometry(fe, still, normal, gap));
@@ -90,7 +90,7 @@ PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const Pe
   PetscFunctionBegin;
   PetscCall(FixedAtObstacles(fe, pairs, &still));
   *n = still.n;
-  for (PetscInt k = 0; k < pairs->n; k++) *n += start[k + 1] == start[k];
+  for (PetscInt k = 0; k < pairs->n; k++) *n += start[k + 1] == start[k] && !HycoPairsAlone(fe->scene, pairs, k);
   PetscCall(PetscMalloc2(3 * still.n, &normal, still.n, &gap));
   ierr = CheckObstacles(fe, &still, normal, gap);
   PetscCall(PetscFree2(normal, gap));

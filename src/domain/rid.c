@@ -149,7 +149,7 @@ static PetscErrorCode CompleteSlaves(HycoMesh m, const HycoPairs *pairs, const P
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
 
-    if (hi - lo < 2 || !node[pairs->slave[k]]) continue;
+    if (hi - lo < (HycoPairsMoved(pairs, k) ? 1 : 2) || !node[pairs->slave[k]]) continue;
     for (PetscInt j = start[pairs->master[lo]]; j < start[pairs->master[lo] + 1]; j++) {
       PetscInt has = 0;
 

@@ -31,7 +31,7 @@ static void CloseIncomplete(const HycoPairs *pairs, PetscInt role[])
   B[A_lambda, A_c] needs full row rank (property 1). A contact whose slave is in A has that node for itself. One whose
   slave is on the interface acts on masters alone: it stays if it has one master that no other contact has. Of a facet's
   masters, shared by several contacts, its force would be badly determined (errors several times larger were measured):
-  they join the interface. *lost: nodes that left A.
+  they join the interface. So do all masters of such slaves on moved surfaces, which change. *lost: nodes that left A.
 */
 static PetscErrorCode CloseDependent(HycoMesh m, const HycoPairs *pairs, PetscInt role[], PetscInt *lost)
 {
@@ -47,7 +47,7 @@ static PetscErrorCode CloseDependent(HycoMesh m, const HycoPairs *pairs, PetscIn
     const PetscInt masters = CountMasters(pairs, k), *node = pairs->master + pairs->master_start[k];
 
     if (role[pairs->slave[k]] == HYCO_ROLE_A || !masters) continue;
-    if (masters == 1 && !taken[node[0]])
+    if (masters == 1 && !taken[node[0]] && !HycoPairsMoved(pairs, k))
       taken[node[0]] = PETSC_TRUE;
     else {
       for (PetscInt j = 0; j < masters; j++) close[node[j]] = (PetscBool)(role[node[j]] == HYCO_ROLE_A);

@@ -47,7 +47,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
 /* The mesh, its contacts and its parts. */
 static PetscErrorCode ReadMesh(HycoFOM f)
 {
-  PetscInt *both = NULL, sizes[5] = {0, 0, 0, 0, 0};
+  PetscInt *both = NULL, sizes[6] = {0, 0, 0, 0, 0, 0};
   PetscInt cut = HYCO_PARTITION_METIS;
 
   PetscFunctionBegin;
@@ -59,6 +59,7 @@ static PetscErrorCode ReadMesh(HycoFOM f)
     sizes[2] = f->pairs.n;
     sizes[3] = f->pairs.master_start[f->pairs.n];
     sizes[4] = HycoPairsWidth(&f->pairs);
+    sizes[5] = f->pairs.room > 0;
     PetscCall(PetscMalloc1(2 * sizes[3], &both));
     for (PetscInt k = 0; k < f->pairs.n; k++) {
       for (PetscInt j = f->pairs.master_start[k]; j < f->pairs.master_start[k + 1]; j++) {
@@ -67,11 +68,12 @@ static PetscErrorCode ReadMesh(HycoFOM f)
       }
     }
   }
-  PetscCallMPI(MPI_Bcast(sizes, 5, MPIU_INT, 0, f->comm));
+  PetscCallMPI(MPI_Bcast(sizes, 6, MPIU_INT, 0, f->comm));
   f->n_nodes = sizes[0];
   f->n_cells = sizes[1];
   f->n_contacts = sizes[2];
   f->width = sizes[4];
+  f->searches = (PetscBool)(sizes[5] != 0);
   PetscCheck(f->n_cells >= f->size, f->comm, PETSC_ERR_USER, "the mesh has %d cells; run it on at most as many ranks",
              (int)f->n_cells);
   PetscCall(HycoOptionsWord(f->scene->options, "hyco_partition", HycoPartitioners, &cut));
@@ -216,7 +218,11 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
     HycoOnRoot(f->comm, HycoContactCountStill(f->fe_whole, &f->pairs, NULL, &f->summary.n_still));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (rows_changed && f->Bt) PetscCall(MatZeroEntries(f->B));
+  if (rows_changed && f->Bt && f->searches) { /* entries of masters that are left behind must not stay */
+    PetscCall(MatDestroy(&f->B));
+    PetscCall(CreateB(f));
+  } else if (rows_changed && f->Bt)
+    PetscCall(MatZeroEntries(f->B));
   HycoOnRoot(f->comm, FillContact(f, rows_changed));
   PetscCall(VecAssemblyBegin(f->D));
   PetscCall(VecAssemblyEnd(f->D));

@@ -7,9 +7,11 @@
 #include <string.h>
 
 /* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters.
-   3: problem/type; what has none is hybrid. 4: the type may be condensed. The kind is every type's, so that an older
-   reader tells the format. */
-#define HYCO_MODEL_FORMAT 4
+   3: problem/type; what has none is hybrid. 4: the type may be condensed. 5: surfaces that a map moves are searched for
+   their masters; models without such are written as 4. The kind is every type's, so that an older reader tells the
+   format. */
+#define HYCO_MODEL_FORMAT 5
+#define HYCO_MODEL_STILL  4
 #define HYCO_MODEL_OLDEST 2
 #define HYCO_MODEL_KIND   "hyco hybrid model"
 
@@ -371,6 +373,7 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
   PetscCall(HycoH5WriteInt(h, "problem/role", m->mesh->n_nodes, 1, m->role));
   PetscCall(SavePairs(h, "problem/pairs", &m->pairs));
   PetscCall(HycoH5WriteInt(h, "problem/in_rid", m->pairs.n, 1, m->in_rid));
+  if (m->pairs.room) PetscCall(HycoH5WriteReal(h, "problem/reach", m->scene->n_contacts, 1, m->master_reach));
   PetscCall(HycoH5WriteReal(h, "problem/V", n_dof, m->l, m->V));
   PetscCall(HycoH5WriteReal(h, "problem/singular_values", m->l, 1, m->sigma));
   PetscCall(HycoH5WriteInt(h, "problem/fe_dof", m->n_fe, 1, m->fe_dof));
@@ -398,7 +401,7 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
 
 static PetscErrorCode SaveAll(HycoH5 h, HycoModel m, HycoMesh whole, const PetscReal V_whole[])
 {
-  const PetscInt format = HYCO_MODEL_FORMAT;
+  const PetscInt format = m->pairs.room ? HYCO_MODEL_FORMAT : HYCO_MODEL_STILL;
 
   PetscFunctionBegin;
   PetscCall(HycoH5WriteText(h, "kind", HYCO_MODEL_KIND));
@@ -476,6 +479,19 @@ static PetscErrorCode LoadSizes(HycoH5 h, HycoModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The search of moved surfaces; files before format 5 have none, and keep the masters as drawn. */
+static PetscErrorCode LoadReach(HycoH5 h, HycoModel m)
+{
+  PetscInt one = 1;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "problem/reach")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "problem/reach", &m->scene->n_contacts, &one, &m->master_reach));
+  PetscCall(HycoPairsSetSearch(m->scene, m->mesh, &m->pairs));
+  HycoCheck(m->pairs.room, "%s: problem/reach is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
 {
   PetscInt one = 1, n_dof, n_par;
@@ -495,6 +511,7 @@ static PetscErrorCode LoadProblem(HycoH5 h, HycoModel m)
   PetscCall(HycoH5LoadInt(h, "problem/role", 0, HYCO_ROLE_A, &m->mesh->n_nodes, &one, &m->role));
   PetscCall(LoadPairs(h, "problem/pairs", m->mesh->n_nodes, m->scene->n_contacts, &m->pairs));
   PetscCall(HycoH5LoadInt(h, "problem/in_rid", 0, 1, &m->pairs.n, &one, &m->in_rid));
+  PetscCall(LoadReach(h, m));
   m->l = m->n_fe = m->n_dual = m->n_points = -1;
   PetscCall(HycoH5LoadReal(h, "problem/V", &n_dof, &m->l, &m->V));
   PetscCall(HycoH5LoadReal(h, "problem/singular_values", &m->l, &one, &m->sigma));

@@ -81,6 +81,7 @@ PetscErrorCode HycoModelDestroy(HycoModel *model)
   PetscCall(PetscFree(m->V_lambda));
   PetscCall(PetscFree(m->points));
   PetscCall(PetscFree(m->reach));
+  PetscCall(PetscFree(m->master_reach));
   PetscCall(PetscFree(m->provenance));
   PetscCall(PetscFree(m->search));
   PetscCall(PetscFree(*model));

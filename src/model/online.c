@@ -155,7 +155,6 @@ PetscErrorCode HycoModelSetUp(HycoModel m)
 static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
 {
   PetscBool first = PETSC_FALSE;
-  HycoRows *rows = &m->own_rows;
 
   PetscFunctionBegin;
   m->beyond_current = PETSC_FALSE;
@@ -174,8 +173,7 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
   }
   HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, m->F));
   if (m->fe->contact_changed || m->fe->gap_changed)
-    HycoLogged(HYCO_EVENT_CONTACT,
-               HycoContactRows(m->fe, &m->own_pairs, rows->start, rows->dof, rows->value, rows->gap));
+    HycoLogged(HYCO_EVENT_CONTACT, HycoModelOwnRows(m));
   if (m->n_L && m->fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
   HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
   m->fe->ready = PETSC_TRUE;

@@ -101,6 +101,11 @@ static PetscErrorCode SelectPairs(HycoModel m)
   PetscCall(PetscMalloc1(p->n + 1, &p->master_start));
   PetscCall(PetscMalloc1(all->master_start[all->n], &p->master));
   PetscCall(PetscMalloc1(all->master_start[all->n], &p->weight));
+  p->room = all->room;
+  p->place = 0;
+  p->n_searches = all->n_searches;
+  if (all->search) HycoDuplicate(all->n_searches, all->search, &p->search);
+  for (PetscInt c = 0; all->search && c < all->n_searches; c++) p->search[c].reach = m->master_reach[c];
   p->master_start[0] = 0;
   for (PetscInt i = 0; i < p->n; i++) {
     const PetscInt k = m->contact[i], lo = all->master_start[k], n = all->master_start[k + 1] - lo;
@@ -108,7 +113,7 @@ static PetscErrorCode SelectPairs(HycoModel m)
     p->slave[i] = all->slave[k];
     p->contact[i] = all->contact[k];
     p->master_start[i + 1] = masters + n;
-    if (!n) continue; /* an obstacle */
+    if (!n) continue; /* an obstacle, or a slave node that faces no master */
     PetscCall(PetscArraycpy(p->master + masters, all->master + lo, n));
     PetscCall(PetscArraycpy(p->weight + masters, all->weight + lo, n));
     masters += n;
@@ -153,6 +158,31 @@ PetscErrorCode HycoModelDestroyOwn(HycoModel m)
   PetscCall(PetscFree(m->own_rows.dof));
   PetscCall(PetscFree(m->own_rows.value));
   PetscCall(PetscFree(m->own_rows.gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoModelOwnRows(HycoModel m)
+{
+  HycoRows *rows = &m->own_rows;
+  const PetscInt dim = m->mesh->dim;
+  PetscInt n = 0, lo = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoContactRows(m->fe, &m->own_pairs, rows->start, rows->dof, rows->value, rows->gap));
+  if (!m->own_pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < m->m; k++) {
+    const PetscInt hi = rows->start[k + 1];
+    PetscBool tested = (PetscBool)!HycoPairsMoved(&m->own_pairs, k);
+
+    for (PetscInt t = lo; t < hi; t++) tested = (PetscBool)(tested || m->role[rows->dof[t] / dim] == HYCO_ROLE_A);
+    for (PetscInt t = lo; tested && t < hi; t++, n++) {
+      rows->dof[n] = rows->dof[t];
+      rows->value[n] = rows->value[t];
+    }
+    if (!tested) rows->gap[k] = PetscMax(rows->gap[k], 0);
+    rows->start[k + 1] = n;
+    lo = hi;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -144,7 +144,8 @@ PetscErrorCode HycoModelReconstruct(HycoModel m)
     if (r->c[j] == 0) continue;
     m->spread = PETSC_TRUE;
     for (PetscInt i = 0; i < r->n; i++) {
-      if (!m->in_rid[r->contact[i]]) m->Lambda[r->contact[i]] += r->c[j] * s[i];
+      if (!m->in_rid[r->contact[i]] && !HycoPairsAlone(m->scene, &m->pairs, r->contact[i]))
+        m->Lambda[r->contact[i]] += r->c[j] * s[i];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -148,7 +148,7 @@ static void Tensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], Pets
   }
 }
 
-PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, const HycoPairs *pairs, const PetscReal u[],
+PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, HycoPairs *pairs, const PetscReal u[],
                                  const PetscReal lambda[], const PetscReal *rid)
 {
   HycoMesh m = fe->mesh;

@@ -90,6 +90,18 @@ static PetscErrorCode HashFile(HycoScene scene, unsigned long long *hash)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Scenes whose solutions are not those of before masters were searched for on moved surfaces. */
+static PetscBool MayMoveSurfaces(HycoScene scene)
+{
+  PetscBool surface = PETSC_FALSE, map = PETSC_FALSE;
+
+  for (PetscInt k = 0; k < scene->n_contacts; k++)
+    surface = (PetscBool)(surface || scene->contact[k].type == HYCO_CONTACT_SURFACE);
+  for (PetscInt b = 0; b < scene->n_bodies; b++)
+    map = (PetscBool)(map || scene->body[b].map[0] || scene->body[b].map[1] || scene->body[b].map[2]);
+  return (PetscBool)(surface && map);
+}
+
 PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
 {
   PetscFunctionBegin;
@@ -101,6 +113,7 @@ PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
     *hash = HycoHash(*hash, scene->key[k], strlen(scene->key[k]) + 1);
     *hash = HycoHash(*hash, scene->value[k], strlen(scene->value[k]) + 1);
   }
+  if (MayMoveSurfaces(scene)) *hash = HycoHash(*hash, "masters where they are", 22);
   HycoOnRoot(scene->comm, HashFile(scene, hash));
   PetscCallMPI(MPI_Bcast(hash, 1, MPI_UNSIGNED_LONG_LONG, 0, scene->comm));
   PetscFunctionReturn(PETSC_SUCCESS);

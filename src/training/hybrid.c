@@ -311,6 +311,23 @@ static PetscErrorCode ChooseRank(HycoTrainer t, HycoModel m, Verdict *best)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nodes of the model's mesh that a contact has, of moved surfaces in any place. */
+static PetscErrorCode MarkContact(HycoTrainer t, HycoModel m, PetscBool contact[])
+{
+  PetscBool *whole;
+
+  PetscFunctionBegin;
+  if (!t->pairs.room) {
+    HycoPairsMark(&m->pairs, contact);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscCalloc1(t->sizes[0], &whole));
+  HycoPairsMark(&t->met.rows, whole);
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) contact[i] = whole[m->mesh->node_whole[i]];
+  PetscCall(PetscFree(whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The free unknowns of the nodes of A: all, or those of contact nodes. */
 static PetscErrorCode FreeUnknowns(HycoTrainer t, HycoModel m, PetscBool contact_only, PetscInt *n, PetscInt dof[])
 {
@@ -319,7 +336,7 @@ static PetscErrorCode FreeUnknowns(HycoTrainer t, HycoModel m, PetscBool contact
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->mesh->n_nodes, &contact));
-  HycoPairsMark(&m->pairs, contact);
+  PetscCall(MarkContact(t, m, contact));
   *n = 0;
   for (PetscInt i = 0; i < m->mesh->n_nodes * dim; i++) {
     if (m->role[i / dim] != HYCO_ROLE_A || t->fe->fixed[m->mesh->node_whole[i / dim] * dim + i % dim]) continue;

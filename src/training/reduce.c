@@ -314,6 +314,24 @@ static PetscErrorCode DualGram(HycoTrainer t, PetscReal G[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Brings moved surfaces to the training point where contact k presses most. */
+static PetscErrorCode MoveWherePresses(HycoTrainer t, PetscInt k)
+{
+  const size_t m = (size_t)t->sizes[2];
+  PetscInt n_par, most = 0;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  if (!t->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  for (PetscInt q = 1; q < t->n_s; q++) {
+    if (t->Lambda[(size_t)q * m + (size_t)k] > t->Lambda[(size_t)most * m + (size_t)k]) most = q;
+  }
+  PetscCall(HycoFESetParameters(t->fe, mu + most * n_par));
+  PetscCall(HycoPairsMove(t->fe, &t->pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* POD of the multipliers in (H1)', DEIM on it: the nodes of each point's contact are seeds. On rank 0. */
 static PetscErrorCode DualSeeds(HycoTrainer t, PetscInt *n_nodes, PetscInt nodes[])
 {
@@ -341,6 +359,7 @@ static PetscErrorCode DualSeeds(HycoTrainer t, PetscInt *n_nodes, PetscInt nodes
     PetscCall(PetscMalloc1(l, &index));
     HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
     for (PetscInt k = 0; k < l; k++) {
+      PetscCall(MoveWherePresses(t, index[k]));
       nodes[(*n_nodes)++] = t->pairs.slave[index[k]];
       for (PetscInt j = t->pairs.master_start[index[k]]; j < t->pairs.master_start[index[k] + 1]; j++)
         nodes[(*n_nodes)++] = t->pairs.master[j];

@@ -54,33 +54,104 @@ static PetscErrorCode DropFixedContacts(HycoTrainer t, const PetscInt role[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What moved surfaces meet: every contact's masters at the training points and between, as far as contacts may close.
+   *rows, *of: of all contacts; those of the mesh as they are where nothing is moved (of: NULL). */
+static PetscErrorCode Meet(HycoTrainer t, HycoModel m, const HycoPairs **rows, const PetscInt **of)
+{
+  PetscInt n;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  *rows = &t->pairs;
+  *of = NULL;
+  if (!t->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, &mu));
+  PetscCall(HycoMetDestroy(&t->met));
+  PetscCall(PetscMalloc1(t->scene->n_contacts, &m->master_reach));
+  PetscCall(HycoMetReach(t->scene, t->whole, &t->pairs, n, mu, t->Lambda, m->master_reach));
+  PetscCall(HycoMetFind(t->scene, t->whole, &t->pairs, n, mu, m->master_reach, &t->met));
+  *rows = &t->met.rows;
+  *of = t->met.of;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The sets, and A_lambda by contact. */
+static PetscErrorCode FindSets(HycoTrainer t, const HycoPairs *rows, const PetscInt of[], const PetscBool in[],
+                               PetscInt role[], PetscInt in_rid[])
+{
+  const PetscInt dim = t->sizes[3];
+  PetscInt *row_in;
+
+  PetscFunctionBegin;
+  if (!of) {
+    PetscCall(HycoRIDSets(t->whole, rows, in, role, in_rid));
+    PetscCall(DropFixedContacts(t, role, in_rid));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscMalloc1(rows->n, &row_in));
+  PetscCall(HycoRIDSets(t->whole, rows, in, role, row_in));
+  PetscCall(PetscArrayzero(in_rid, t->pairs.n));
+  for (PetscInt r = 0; r < rows->n; r++) {
+    PetscBool free = PETSC_FALSE;
+
+    for (PetscInt j = rows->master_start[r] - 1; row_in[r] && j < rows->master_start[r + 1]; j++) {
+      const PetscInt i = j < rows->master_start[r] ? rows->slave[r] : rows->master[j];
+
+      for (PetscInt c = 0; c < dim && role[i] == HYCO_ROLE_A; c++)
+        free = (PetscBool)(free || !t->fe->fixed[i * dim + c]);
+    }
+    if (free) in_rid[of[r]] = 1;
+  }
+  PetscCall(PetscFree(row_in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nodes beside the RID that the model's mesh has: those of every contact, of moved surfaces all; and the groups
+   whose facets it has, wherever their cells are. */
+static PetscErrorCode SurfacesOf(HycoTrainer t, PetscBool contact[], PetscInt *n_all, PetscInt all[])
+{
+  HycoMesh whole = t->whole;
+
+  PetscFunctionBegin;
+  HycoPairsMark(&t->pairs, contact);
+  PetscCall(HycoMovedGroups(t->scene, whole, &t->pairs, n_all, all));
+  for (PetscInt g = 0; g < *n_all; g++) {
+    for (PetscInt k = whole->group_start[all[g]]; k < whole->group_start[all[g] + 1]; k++)
+      contact[whole->group_node[k]] = PETSC_TRUE;
+  }
+  for (PetscInt k = 0; k < t->scene->n_contacts; k++)
+    PetscCall(HycoMeshFindGroup(whole, "contact", t->scene->contact[k].slave, &all[(*n_all)++]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Omega_A and the reduced mesh: its cells, their nodes, the nodes and surfaces of every contact. */
 static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
 {
   HycoRIDRecipe recipe = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell, t->layers,
                           t->extension,    t->n_groups,     t->groups,     t->region,     t->whole_rid};
   HycoMesh whole = t->whole;
+  const HycoPairs *rows;
+  const PetscInt *of;
   PetscBool *in, *contact;
-  PetscInt *role, *keep, *extra, *index, n_keep = 0, n_extra = 0, n_all = 0, all[64];
+  PetscInt *role, *keep, *extra, *index, *all, n_keep = 0, n_extra = 0, n_all = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc5(whole->n_cells, &in, whole->n_nodes, &role, whole->n_cells, &keep, whole->n_nodes, &extra,
                          whole->n_nodes, &index));
   PetscCall(PetscCalloc1(whole->n_nodes, &contact));
-  HycoPairsMark(&t->pairs, contact);
-  HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->scene, whole, &t->pairs, &recipe, in));
+  PetscCall(PetscMalloc1(3 * t->scene->n_contacts, &all));
+  PetscCall(Meet(t, m, &rows, &of));
+  HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->scene, whole, rows, &recipe, in));
   for (PetscInt e = 0; t->grown && e < whole->n_cells; e++) t->grown[e] = in[e] = (PetscBool)(in[e] || t->grown[e]);
   PetscCall(PetscMalloc1(t->pairs.n, &m->in_rid));
-  PetscCall(HycoRIDSets(whole, &t->pairs, in, role, m->in_rid));
-  PetscCall(DropFixedContacts(t, role, m->in_rid));
+  PetscCall(FindSets(t, rows, of, in, role, m->in_rid));
+  PetscCall(SurfacesOf(t, contact, &n_all, all));
   for (PetscInt e = 0; e < whole->n_cells; e++) {
     if (in[e]) keep[n_keep++] = e;
   }
   for (PetscInt i = 0; i < whole->n_nodes; i++) {
     if (contact[i]) extra[n_extra++] = i;
   }
-  for (PetscInt k = 0; k < t->scene->n_contacts && n_all < 64; k++)
-    PetscCall(HycoMeshFindGroup(whole, "contact", t->scene->contact[k].slave, &all[n_all++]));
   PetscCall(HycoMeshExtract(whole, n_keep, keep, n_extra, extra, n_all, all, &m->mesh));
   PetscCall(PetscMalloc1(m->mesh->n_nodes, &m->role));
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
@@ -88,6 +159,7 @@ static PetscErrorCode CutDomain(HycoTrainer t, HycoModel m)
     index[m->mesh->node_whole[i]] = i;
   }
   PetscCall(HycoPairsRenumber(&t->pairs, index, &m->pairs));
+  PetscCall(PetscFree(all));
   PetscCall(PetscFree(contact));
   PetscCall(PetscFree5(in, role, keep, extra, index));
   PetscFunctionReturn(PETSC_SUCCESS);

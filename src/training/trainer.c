@@ -36,6 +36,7 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t)
   PetscCall(HycoTrainerResetBases(t));
   PetscCall(HycoFEDestroy(&t->fe));
   PetscCall(HycoPairsDestroy(&t->pairs));
+  PetscCall(HycoMetDestroy(&t->met));
   PetscCall(HycoMeshDestroy(&t->whole));
   PetscCall(PetscFree(t->grown));
   PetscCall(HycoSamplesDestroy(&t->own_held));

@@ -1,0 +1,15 @@
+/* Normals and sizes of surfaces on moved nodes: private to assembly/. */
+#ifndef HYCO_FACING_H
+#define HYCO_FACING_H
+#include <hycofe.h>
+
+/* Sum of n dS over the facets of `group` around each node (n_nodes x 3). */
+PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[]);
+/* The same, of unit length; 0 where a node has no facet. */
+PetscErrorCode HycoSurfaceNormals(HycoFE fe, PetscInt group, PetscReal normal[]);
+/* The mean unit normal of a facet. */
+PetscErrorCode HycoFacetDirection(HycoFE fe, PetscInt facet, PetscReal normal[3]);
+/* The longest edge around each node (n_nodes) of the facets of `group`; 0 where it has none. */
+void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
+
+#endif

@@ -1,0 +1,148 @@
+/*
+  The masters of surfaces that a map moves, searched for where the nodes are. A slave node has one if a facet opposes its
+  normal, and the nearest point of such facets is within reach and not past the master's border.
+*/
+#include "partners.h"
+
+/* How far past the border a slave node may be, as a share of the facet's shortest edge: it has the border's point. */
+#define HYCO_PAST_BORDER 0.1
+
+/* Whether a map moves a node of a group. */
+static PetscErrorCode IsMoved(HycoScene scene, HycoMesh m, const char group[], PetscBool *moved)
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, "contact", group, &g));
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1] && !*moved; k++) {
+    const HycoBody *body = &scene->body[m->node_body[m->group_node[k]]];
+
+    *moved = (PetscBool)(body->map[0] || body->map[1] || body->map[2]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
+{
+  PetscFunctionBegin;
+  pairs->room = 0;
+  pairs->n_searches = scene->n_contacts;
+  PetscCall(PetscFree(pairs->search));
+  PetscCall(PetscCalloc1(scene->n_contacts, &pairs->search));
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
+    const HycoContact *c = &scene->contact[k];
+    HycoSearch *search = &pairs->search[k];
+
+    search->reach = PETSC_MAX_REAL;
+    if (c->type != HYCO_CONTACT_SURFACE) continue;
+    PetscCall(IsMoved(scene, m, c->slave, &search->moved));
+    PetscCall(IsMoved(scene, m, c->master, &search->moved));
+    if (search->moved) pairs->room = m->nf;
+  }
+  if (!pairs->room) PetscCall(PetscFree(pairs->search));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The shortest edge of a patch. */
+static PetscReal ShortestEdge(const HycoPartners *t, PetscInt patch)
+{
+  const PetscInt *node = t->node + patch * t->nf;
+  PetscReal shortest = PETSC_MAX_REAL;
+
+  for (PetscInt a = 0; a < t->nf; a++) {
+    const PetscReal *x = t->fe->X + 3 * node[a], *y = t->fe->X + 3 * node[(a + 1) % t->nf];
+    PetscReal sum = 0;
+
+    for (PetscInt c = 0; c < 3; c++) sum += (x[c] - y[c]) * (x[c] - y[c]);
+    shortest = PetscMin(shortest, PetscSqrtReal(sum));
+  }
+  return shortest;
+}
+
+/* Whether a slave node lies past the master's border: what remains of the way to its master point on the facet's plane.
+ */
+static PetscErrorCode IsPast(HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscBool *past)
+{
+  const PetscReal *n = t->normal + 3 * at->patch;
+  PetscReal r[3], along = 0, height;
+
+  PetscFunctionBegin;
+  *past = PETSC_FALSE;
+  HycoPartnersAcross(t, slave, at, r);
+  height = HycoDot(r, n);
+  for (PetscInt c = 0; c < 3; c++) along += (r[c] - height * n[c]) * (r[c] - height * n[c]);
+  if (PetscSqrtReal(along) > HYCO_PAST_BORDER * ShortestEdge(t, at->patch)) PetscCall(HycoPartnersAtBorder(t, at, past));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The master point of one slave node; n = 0: it has none. */
+static PetscErrorCode Find(HycoPartners *t, PetscInt slave, PetscReal reach, HycoProjection *at)
+{
+  PetscBool past;
+
+  PetscFunctionBegin;
+  HycoPartnersProject(t, slave, PETSC_FALSE, at);
+  if (at->n && at->distance > reach) at->n = 0;
+  if (!at->n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(IsPast(t, slave, at, &past));
+  if (past) at->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The masters of contacts first .. last - 1, all of one moved contact of the scene, after those of `first`. */
+static PetscErrorCode FindRun(HycoFE fe, const HycoPairs *p, PetscInt first, PetscInt last, PetscInt start[],
+                              PetscInt master[], PetscReal weight[])
+{
+  const PetscInt index = p->contact[first];
+  HycoPartners t;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPartnersCreate(fe, &fe->scene->contact[index], &t));
+  for (PetscInt k = first; k < last; k++) {
+    HycoProjection at;
+
+    PetscCall(Find(&t, p->slave[k], p->search[index].reach, &at));
+    for (PetscInt a = 0; a < at.n; a++) {
+      master[start[k] + a] = at.node[a];
+      weight[start[k] + a] = at.weight[a];
+    }
+    start[k + 1] = start[k] + at.n;
+  }
+  PetscCall(HycoPartnersDestroy(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
+{
+  PetscInt *start, *master, kept;
+  PetscReal *weight;
+
+  PetscFunctionBegin;
+  if (!p->room || p->place == fe->place) PetscFunctionReturn(PETSC_SUCCESS);
+  kept = p->master_start[p->n];
+  PetscCall(PetscMalloc1(p->n + 1, &start));
+  PetscCall(PetscMalloc1(kept + p->n * p->room, &master));
+  PetscCall(PetscMalloc1(kept + p->n * p->room, &weight));
+  start[0] = 0;
+  for (PetscInt k = 0, next; k < p->n; k = next) {
+    const PetscInt lo = p->master_start[k], n = p->master_start[k + 1] - lo;
+
+    next = k + 1;
+    if (HycoPairsMoved(p, k)) {
+      while (next < p->n && p->contact[next] == p->contact[k]) next++;
+      PetscCall(FindRun(fe, p, k, next, start, master, weight));
+      continue;
+    }
+    if (n) PetscCall(PetscArraycpy(master + start[k], p->master + lo, n));
+    if (n) PetscCall(PetscArraycpy(weight + start[k], p->weight + lo, n));
+    start[k + 1] = start[k] + n;
+  }
+  PetscCall(PetscFree(p->master_start));
+  PetscCall(PetscFree(p->master));
+  PetscCall(PetscFree(p->weight));
+  p->master_start = start;
+  p->master = master;
+  p->weight = weight;
+  p->place = fe->place;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

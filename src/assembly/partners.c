@@ -1,0 +1,131 @@
+/* The surfaces of one contact where their nodes are: the master's patches in a tree, normals of both, the master's
+   border. */
+#include "facing.h"
+#include "partners.h"
+#include <stdlib.h>
+
+/* Patches and their normals: the master's nodes (pair) or facets (surface). */
+static PetscErrorCode FindPatches(HycoPartners *t, const HycoContact *c)
+{
+  HycoMesh m = t->fe->mesh;
+  const PetscInt gm = t->master;
+
+  PetscFunctionBegin;
+  t->nf = c->type == HYCO_CONTACT_PAIR ? 1 : m->nf;
+  PetscCall(PetscMalloc1(PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets * t->nf), &t->node));
+  PetscCall(PetscCalloc1(3 * PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets), &t->normal));
+  if (c->type == HYCO_CONTACT_PAIR) {
+    PetscReal *normal;
+
+    PetscCall(PetscMalloc1(3 * m->n_nodes, &normal));
+    if (m->dim > 1) PetscCall(HycoSurfaceNormals(t->fe, gm, normal));
+    for (PetscInt k = m->group_start[gm]; k < m->group_start[gm + 1]; k++) {
+      if (m->dim > 1) PetscCall(PetscArraycpy(t->normal + 3 * t->n, normal + 3 * m->group_node[k], 3));
+      t->node[t->n++] = m->group_node[k];
+    }
+    PetscCall(PetscFree(normal));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (m->facet_group[f] != gm) continue;
+    if (m->dim > 1) PetscCall(HycoFacetDirection(t->fe, f, t->normal + 3 * t->n));
+    PetscCall(PetscArraycpy(t->node + t->nf * t->n++, m->facets + f * m->nf, t->nf));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPartnersCreate(HycoFE fe, const HycoContact *c, HycoPartners *t)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(t, sizeof(*t)));
+  t->fe = fe;
+  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &t->slave));
+  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &t->master));
+  PetscCall(FindPatches(t, c));
+  PetscCall(HycoPatchesCreate(fe->X, t->n, t->nf, t->node, t->normal, &t->patches));
+  PetscCall(PetscCalloc1(3 * fe->mesh->n_nodes, &t->outward));
+  if (fe->dim > 1) PetscCall(HycoSurfaceNormals(fe, t->slave, t->outward));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPartnersDestroy(HycoPartners *t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoPatchesDestroy(&t->patches));
+  PetscCall(PetscFree(t->node));
+  PetscCall(PetscFree(t->normal));
+  PetscCall(PetscFree(t->outward));
+  PetscCall(PetscFree(t->border));
+  PetscCall(PetscFree(t->at_border));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const PetscReal *HycoPartnersOutward(const HycoPartners *t, PetscInt slave)
+{
+  const PetscReal *n = t->outward + 3 * slave;
+
+  return HycoDot(n, n) > 0 ? n : NULL;
+}
+
+void HycoPartnersProject(const HycoPartners *t, PetscInt slave, PetscBool any_side, HycoProjection *at)
+{
+  HycoPatchesProject(t->patches, t->fe->X + 3 * slave, any_side ? NULL : HycoPartnersOutward(t, slave), at);
+}
+
+void HycoPartnersAcross(const HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscReal r[3])
+{
+  for (PetscInt c = 0; c < 3; c++) {
+    r[c] = -t->fe->X[3 * slave + c];
+    for (PetscInt a = 0; a < at->n; a++) r[c] += at->weight[a] * t->fe->X[3 * at->node[a] + c];
+  }
+}
+
+static int CompareEdges(const void *a, const void *b)
+{
+  const PetscInt *p = (const PetscInt *)a, *q = (const PetscInt *)b;
+
+  if (p[0] != q[0]) return p[0] < q[0] ? -1 : 1;
+  return (p[1] > q[1]) - (p[1] < q[1]);
+}
+
+/* The edges (2D: ends) that one facet alone has, and their nodes. */
+static PetscErrorCode FindBorder(HycoPartners *t)
+{
+  const PetscInt nf = t->nf, edges = t->n * nf;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(2 * edges, &t->border));
+  PetscCall(PetscCalloc1(t->fe->mesh->n_nodes, &t->at_border));
+  for (PetscInt k = 0; k < edges; k++) {
+    const PetscInt a = t->node[k], b = nf == 2 ? a : t->node[k / nf * nf + (k + 1) % nf];
+
+    t->border[2 * k] = PetscMin(a, b);
+    t->border[2 * k + 1] = PetscMax(a, b);
+  }
+  if (edges) qsort(t->border, (size_t)edges, 2 * sizeof(PetscInt), CompareEdges);
+  for (PetscInt k = 0, next; k < edges; k = next) {
+    for (next = k + 1; next < edges && !CompareEdges(t->border + 2 * k, t->border + 2 * next);) next++;
+    if (next > k + 1) continue;
+    for (PetscInt j = 0; j < 2; j++) {
+      t->at_border[t->border[2 * k + j]] = PETSC_TRUE;
+      t->border[2 * t->n_border + j] = t->border[2 * k + j];
+    }
+    t->n_border++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPartnersAtBorder(HycoPartners *t, const HycoProjection *at, PetscBool *border)
+{
+  const PetscInt edge[2] = {at->node[0], at->n > 1 ? at->node[1] : at->node[0]};
+
+  PetscFunctionBegin;
+  *border = PETSC_FALSE;
+  if (t->nf == 1 || at->n > 2 || at->n < 1 || (t->nf == 2 && at->n == 2)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!t->at_border) PetscCall(FindBorder(t));
+  if (at->n == 1)
+    *border = t->at_border[at->node[0]];
+  else
+    *border = (PetscBool)(bsearch(edge, t->border, (size_t)t->n_border, 2 * sizeof(PetscInt), CompareEdges) != NULL);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

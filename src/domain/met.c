@@ -1,0 +1,325 @@
+/*
+  What slave nodes of moved surfaces meet over the parameters: at the training points, and at points between them until
+  these bring nothing new. It is geometry alone, on a mesh of the surfaces without cells.
+*/
+#include <hycodomain.h>
+
+#define MOST_POINTS 500 /* between the training points */
+#define FRUITLESS   50  /* one after the other: the search ends */
+/* A contact is followed as far as this multiple of the longest way that closed in training, and a share of a facet. */
+#define REACH_FACTOR 2
+#define REACH_FACET  0.5
+
+/* The slave nodes of moved surfaces on a mesh of these alone. */
+typedef struct {
+  HycoMesh mesh;
+  HycoFE fe;
+  HycoPairs pairs;
+  PetscInt *of; /* contact of each of pairs */
+} Surfaces;
+
+static PetscErrorCode SurfacesDestroy(Surfaces *s)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoPairsDestroy(&s->pairs));
+  PetscCall(HycoFEDestroy(&s->fe));
+  if (s->mesh) PetscCall(HycoMeshDestroy(&s->mesh));
+  PetscCall(PetscFree(s->of));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMovedGroups(HycoScene scene, HycoMesh m, const HycoPairs *pairs, PetscInt *n, PetscInt group[])
+{
+  PetscFunctionBegin;
+  *n = 0;
+  for (PetscInt k = 0; k < scene->n_contacts && pairs->room; k++) {
+    if (!pairs->search[k].moved) continue;
+    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k].slave, &group[(*n)++]));
+    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k].master, &group[(*n)++]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CutSurfaces(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, HycoMesh *mesh)
+{
+  PetscInt *group, *extra, n_groups, n_extra = 0;
+  PetscBool *on;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(2 * scene->n_contacts, &group, whole->n_nodes, &extra));
+  PetscCall(PetscCalloc1(whole->n_nodes, &on));
+  PetscCall(HycoMovedGroups(scene, whole, pairs, &n_groups, group));
+  for (PetscInt g = 0; g < n_groups; g++) {
+    for (PetscInt k = whole->group_start[group[g]]; k < whole->group_start[group[g] + 1]; k++)
+      on[whole->group_node[k]] = PETSC_TRUE;
+  }
+  for (PetscInt i = 0; i < whole->n_nodes; i++) {
+    if (on[i]) extra[n_extra++] = i;
+  }
+  PetscCall(HycoMeshExtract(whole, 0, NULL, n_extra, extra, n_groups, group, mesh));
+  PetscCall(PetscFree(on));
+  PetscCall(PetscFree2(group, extra));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const HycoPairs *all, Surfaces *s)
+{
+  HycoPairs *p = &s->pairs;
+  PetscInt *index;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(s, sizeof(*s)));
+  PetscCall(CutSurfaces(scene, whole, all, &s->mesh));
+  PetscCall(HycoFECreate(scene, s->mesh, &s->fe));
+  PetscCall(PetscMalloc1(whole->n_nodes, &index));
+  for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->mesh->node_whole[i]] = i;
+  PetscCall(PetscMalloc1(all->n, &s->of));
+  PetscCall(PetscMalloc1(all->n, &p->slave));
+  PetscCall(PetscMalloc1(all->n, &p->contact));
+  PetscCall(PetscCalloc1(all->n + 1, &p->master_start));
+  for (PetscInt k = 0; k < all->n; k++) {
+    if (!all->search[all->contact[k]].moved) continue;
+    s->of[p->n] = k;
+    p->slave[p->n] = index[all->slave[k]];
+    p->contact[p->n++] = all->contact[k];
+  }
+  PetscCall(PetscFree(index));
+  p->room = all->room;
+  p->n_searches = all->n_searches;
+  HycoDuplicate(all->n_searches, all->search, &p->search);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The way from slave k to its master point. */
+static PetscReal Way(const Surfaces *s, PetscInt k)
+{
+  const HycoPairs *p = &s->pairs;
+  PetscReal sum = 0;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    PetscReal r = -s->fe->X[3 * p->slave[k] + c];
+
+    for (PetscInt j = p->master_start[k]; j < p->master_start[k + 1]; j++)
+      r += p->weight[j] * s->fe->X[3 * p->master[j] + c];
+    sum += r * r;
+  }
+  return PetscSqrtReal(sum);
+}
+
+/* The longest edge of a group's facets, as drawn. */
+static PetscReal LongestEdge(HycoMesh m, PetscInt group)
+{
+  PetscReal longest = 0;
+
+  for (PetscInt k = 0; k < m->n_facets * m->nf; k++) {
+    const PetscReal *x = m->xyz + 3 * m->facets[k], *y = m->xyz + 3 * m->facets[k / m->nf * m->nf + (k + 1) % m->nf];
+    PetscReal sum = 0;
+
+    for (PetscInt c = 0; c < 3; c++) sum += (x[c] - y[c]) * (x[c] - y[c]);
+    if (m->facet_group[k / m->nf] == group) longest = PetscMax(longest, PetscSqrtReal(sum));
+  }
+  return longest;
+}
+
+PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, PetscInt n, const PetscReal mu[],
+                            const PetscReal Lambda[], PetscReal reach[])
+{
+  Surfaces s;
+
+  PetscFunctionBegin;
+  PetscCall(SurfacesCreate(scene, whole, pairs, &s));
+  for (PetscInt c = 0; c < scene->n_contacts; c++) reach[c] = -1;
+  for (PetscInt q = 0; q < n; q++) {
+    PetscCall(HycoFESetParameters(s.fe, mu + q * scene->n_parameters));
+    PetscCall(HycoPairsMove(s.fe, &s.pairs));
+    for (PetscInt k = 0; k < s.pairs.n; k++) {
+      const PetscInt c = s.pairs.contact[k];
+
+      if (Lambda[(size_t)q * (size_t)pairs->n + (size_t)s.of[k]] > 0 && !HycoPairsAlone(scene, &s.pairs, k))
+        reach[c] = PetscMax(reach[c], Way(&s, k));
+    }
+  }
+  for (PetscInt c = 0; c < scene->n_contacts; c++) {
+    PetscInt g = 0;
+
+    if (reach[c] < 0) {
+      reach[c] = PETSC_MAX_REAL;
+      continue;
+    }
+    PetscCall(HycoMeshFindGroup(whole, "contact", scene->contact[c].slave, &g));
+    reach[c] = REACH_FACTOR * reach[c] + REACH_FACET * LongestEdge(whole, g);
+  }
+  PetscCall(SurfacesDestroy(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The masters that slaves have met: lists of distinct sets of nodes, by slave. */
+typedef struct {
+  PetscInt n, room, *head; /* by contact of the surfaces: its last row, or -1 */
+  struct {
+    PetscInt n, node[4], next;
+  } *row;
+} Lists;
+
+/* Adds what the contacts have now; *grown counts it. */
+static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < p->n; k++) {
+    const PetscInt *node = p->master + p->master_start[k], n = p->master_start[k + 1] - p->master_start[k];
+    PetscInt r = l->head[k];
+    PetscBool same = PETSC_FALSE;
+
+    if (!n) continue;
+    for (; r >= 0 && !same; r = l->row[r].next) {
+      same = (PetscBool)(l->row[r].n == n);
+      for (PetscInt a = 0; a < n && same; a++) same = (PetscBool)(l->row[r].node[a] == node[a]);
+    }
+    if (same) continue;
+    if (l->n == l->room) {
+      l->room = 2 * l->room + 64;
+      PetscCall(PetscRealloc((size_t)l->room * sizeof(*l->row), &l->row));
+    }
+    l->row[l->n].n = n;
+    for (PetscInt a = 0; a < n; a++) l->row[l->n].node[a] = node[a];
+    l->row[l->n].next = l->head[k];
+    l->head[k] = l->n++;
+    (*grown)++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode NoteAt(Surfaces *s, const PetscReal mu[], Lists *l, PetscInt *grown)
+{
+  PetscFunctionBegin;
+  *grown = 0;
+  PetscCall(HycoFESetParameters(s->fe, mu));
+  PetscCall(HycoPairsMove(s->fe, &s->pairs));
+  PetscCall(Note(&s->pairs, l, grown));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The k-th number of van der Corput's sequence in a base. */
+static PetscReal Corput(PetscInt k, PetscInt base)
+{
+  PetscReal value = 0, digit = 1;
+
+  for (; k > 0; k /= base) {
+    digit /= (PetscReal)base;
+    value += digit * (PetscReal)(k % base);
+  }
+  return value;
+}
+
+/* Whether parameter p moves a body. */
+static PetscBool Moves(HycoScene scene, PetscInt p)
+{
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moves = PETSC_FALSE;
+
+  changed[p] = PETSC_TRUE;
+  for (PetscInt b = 0; b < scene->n_bodies; b++) {
+    for (PetscInt c = 0; c < 3; c++) moves = (PetscBool)(moves || HycoExprChanges(scene->body[b].map[c], changed));
+  }
+  return moves;
+}
+
+/* Points between the training points, in the parameters that move something. */
+static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, PetscInt n, const PetscReal mu[], Lists *l)
+{
+  static const PetscInt prime[] = {2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53};
+  const PetscInt n_par = scene->n_parameters, n_primes = (PetscInt)(sizeof(prime) / sizeof(prime[0]));
+  PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS], at[HYCO_MAX_PARAMETERS];
+  PetscInt fruitless = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < n_par; p++) {
+    lo[p] = hi[p] = mu[p];
+    for (PetscInt k = 1; k < n && Moves(scene, p); k++) {
+      lo[p] = PetscMin(lo[p], mu[k * n_par + p]);
+      hi[p] = PetscMax(hi[p], mu[k * n_par + p]);
+    }
+  }
+  for (PetscInt k = 1; k <= MOST_POINTS && fruitless < FRUITLESS; k++) {
+    PetscInt grown, moving = 0;
+
+    for (PetscInt p = 0; p < n_par; p++) {
+      at[p] = lo[p];
+      if (hi[p] > lo[p]) at[p] += (hi[p] - lo[p]) * Corput(k, prime[moving++ % n_primes]);
+    }
+    if (!moving) break;
+    PetscCall(NoteAt(s, at, l, &grown));
+    fruitless = grown ? 0 : fruitless + 1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The lists as contacts on the whole mesh, after those of surfaces that are not moved. */
+static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const Lists *l, HycoMet *met)
+{
+  HycoPairs *out = &met->rows;
+  const PetscInt most = pairs->n + l->n, entries = pairs->master_start[pairs->n] + l->n * pairs->room;
+  PetscInt at = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(most, &met->of));
+  PetscCall(PetscMalloc1(most, &out->slave));
+  PetscCall(PetscMalloc1(most, &out->contact));
+  PetscCall(PetscMalloc1(most + 1, &out->master_start));
+  PetscCall(PetscMalloc1(entries, &out->master));
+  PetscCall(PetscMalloc1(entries, &out->weight));
+  out->room = pairs->room;
+  out->n_searches = pairs->n_searches;
+  HycoDuplicate(pairs->n_searches, pairs->search, &out->search);
+  out->n = out->master_start[0] = 0;
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscBool moved = pairs->search[pairs->contact[k]].moved;
+    const PetscInt lo = pairs->master_start[k];
+    PetscInt r = moved ? l->head[at] : 0;
+
+    while (r >= 0) {
+      const PetscInt n = moved ? l->row[r].n : pairs->master_start[k + 1] - lo, end = out->master_start[out->n];
+
+      met->of[out->n] = k;
+      out->slave[out->n] = pairs->slave[k];
+      out->contact[out->n] = pairs->contact[k];
+      for (PetscInt a = 0; a < n; a++) {
+        out->master[end + a] = moved ? s->mesh->node_whole[l->row[r].node[a]] : pairs->master[lo + a];
+        out->weight[end + a] = moved ? 1 / (PetscReal)n : pairs->weight[lo + a];
+      }
+      out->master_start[++out->n] = end + n;
+      r = moved ? l->row[r].next : -1;
+    }
+    at += moved;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, PetscInt n, const PetscReal mu[],
+                           const PetscReal reach[], HycoMet *met)
+{
+  Surfaces s;
+  Lists l = {0, 0, NULL, NULL};
+  PetscInt grown;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(met, sizeof(*met)));
+  PetscCall(SurfacesCreate(scene, whole, pairs, &s));
+  for (PetscInt c = 0; reach && c < scene->n_contacts; c++) s.pairs.search[c].reach = reach[c];
+  PetscCall(PetscMalloc1(s.pairs.n, &l.head));
+  for (PetscInt k = 0; k < s.pairs.n; k++) l.head[k] = -1;
+  for (PetscInt k = 0; k < n; k++) PetscCall(NoteAt(&s, mu + k * scene->n_parameters, &l, &grown));
+  if (n) PetscCall(NoteBetween(&s, scene, n, mu, &l));
+  PetscCall(Collect(&s, pairs, &l, met));
+  PetscCall(PetscFree(l.head));
+  PetscCall(PetscFree(l.row));
+  PetscCall(SurfacesDestroy(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMetDestroy(HycoMet *met)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoPairsDestroy(&met->rows));
+  PetscCall(PetscFree(met->of));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
