@@ -69,11 +69,20 @@ struct _p_HycoTrainer {
   unsigned long long fingerprint;
   HycoResponses responses;
   HycoCondensed condensed; /* of a condensed model under training; the grid on every rank, the fields on rank 0 */
+  struct {
+    HycoMesh mesh;
+    HycoPairs pairs;
+    HycoFE fe;
+    PetscInt *start, *dof;
+    PetscReal *value, *gap;
+  } surfaces;              /* rank 0, condensed: the contacts' nodes and facets alone, where D is evaluated */
   PetscBool *grown;        /* rank 0, greedy: cells of the RIDs so far; else NULL */
 };
 
 /* Frees what one run leaves behind. */
 PetscErrorCode HycoTrainerReset(HycoTrainer t);
+/* Frees the contact surfaces that condensed training evaluates gaps on. */
+PetscErrorCode HycoTrainerResetSurfaces(HycoTrainer t);
 /* Frees the bases, seeds and snapshots, and keeps the mesh. */
 PetscErrorCode HycoTrainerResetBases(HycoTrainer t);
 /* Begins a run: checks, the mesh, the store of snapshots (the caller destroys it). Collective. */

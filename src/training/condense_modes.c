@@ -85,7 +85,7 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
 
   PetscFunctionBegin;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
-  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_GAP], mu, -1, -1, c->g));
+  PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
   for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(nearest[i] > 0);
   if (definite)
     PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, L,

@@ -30,6 +30,7 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t)
 {
   PetscFunctionBegin;
   PetscCall(HycoTrainerResetBases(t));
+  PetscCall(HycoTrainerResetSurfaces(t));
   PetscCall(HycoFEDestroy(&t->fe));
   PetscCall(HycoPairsDestroy(&t->pairs));
   PetscCall(HycoMeshDestroy(&t->whole));
