@@ -40,6 +40,7 @@ struct _p_HycoTrainer {
   HycoDual dual;
   PetscInt nnmf_max_its, nnmf_vectors;
   PetscReal condensed_tol; /* where the points are chosen */
+  PetscReal condensed_pod_tol; /* of its modes, unless tol[] is smaller */
   PetscInt condensed_max_values;
   HycoProgress progress;
   void *progress_ctx;
@@ -129,6 +130,8 @@ PetscErrorCode HycoTrainerFindModes(HycoTrainer t, HycoSnapshots store);
    caller's), the bases made. Collective. */
 PetscErrorCode HycoTrainerStartPoints(HycoTrainer t, HycoSamples *samples);
 PetscErrorCode HycoTrainerChoosePoints(HycoTrainer t, HycoSnapshots store, HycoSamples *samples);
+/* What its modes are chosen by: stresses lose the derivative's share of digits, and forces have many. */
+PetscReal HycoTrainerModesTolerance(HycoTrainer t);
 /* Its fields and degrees, of all modes or none; the errors where values are left out; all of it, handed to the model,
    with numbers[]. Rank 0. */
 PetscErrorCode HycoTrainerFillFields(HycoTrainer t, PetscBool modes);

@@ -125,7 +125,7 @@ static PetscErrorCode KeepModes(HycoTrainer t, HycoCondensed c, PetscInt p, Pets
   }
   PetscCall(PetscCalloc1(PetscMax(r, count) + 1, &sigma));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, r, count, columns, &S));
-  PetscCall(HycoPOD(S, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, t->max_modes, &V, &kept->l, sigma));
+  PetscCall(HycoPOD(S, HycoTrainerModesTolerance(t), t->noise, t->max_modes, &V, &kept->l, sigma));
   PetscCall(PetscMalloc1((size_t)r * (size_t)kept->l + 1, &kept->V));
   if (kept->l) {
     PetscCall(MatDenseGetArrayRead(V, &v));

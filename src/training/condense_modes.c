@@ -22,6 +22,11 @@
 #define MOST_RESPONSES 5e7 /* numbers of all responses: 400 MB */
 #define SMALL          1e-2
 
+PetscReal HycoTrainerModesTolerance(HycoTrainer t)
+{
+  return PetscMin(t->condensed_pod_tol, t->tol[HYCO_SEED_DISPLACEMENT]);
+}
+
 /* Halton's sequence in base b. */
 static PetscReal Halton(PetscInt i, PetscInt b)
 {
@@ -208,7 +213,7 @@ static PetscErrorCode Decompose(HycoTrainer t, PetscInt n, PetscReal L[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(PetscMax(m, n), &sigma));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, L, &F));
-  PetscCall(HycoPOD(F, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
+  PetscCall(HycoPOD(F, HycoTrainerModesTolerance(t), t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
                     sigma));
   PetscCall(MatDestroy(&F));
   PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &x->Q));
@@ -334,8 +339,8 @@ static PetscErrorCode TakeModes(HycoTrainer t, Mat V, PetscInt n_sigma, PetscRea
   const PetscInt N = t->sizes[0] * t->sizes[3];
 
   PetscFunctionBegin;
-  t->l = HycoPODRank(n_sigma, sigma, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, t->max_modes);
-  HycoCheck(t->l, "-hyco_pod_tol %g leaves no mode; give less", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+  t->l = HycoPODRank(n_sigma, sigma, HycoTrainerModesTolerance(t), t->noise, t->max_modes);
+  HycoCheck(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoTrainerModesTolerance(t));
   PetscCall(PetscFree(t->sigma));
   t->sigma = sigma;
   PetscCall(PetscFree(t->VtU));
