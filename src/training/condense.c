@@ -11,6 +11,7 @@
 /* m^2 numbers a point, and m^3 operations an active set: beyond this it is no model for many predictions. */
 #define MOST_CONTACTS 4000
 #define MOST_NUMBERS  1e9 /* of G at all nodes: 8 GB */
+#define NO_LOAD       1e-11 /* of the contacts' displacements: what is left of them without forces is round-off */
 
 /* The values of parameter p among the samples, ascending, each once. */
 static PetscErrorCode FindValues(HycoCondensed c, PetscInt p, PetscInt n_s, const PetscReal mu[])
@@ -309,13 +310,13 @@ PetscInt HycoCondensedNode(HycoCondensed c, const HycoGridField *f, PetscInt k)
   return node;
 }
 
-/* -B K^-1 F = -B U - G L of one snapshot. */
+/* -B K^-1 F = -B U - G L of one snapshot; 0 where it is the difference of what is much larger. */
 static PetscErrorCode FreeGap(HycoTrainer t, const PetscReal mu[], const PetscReal U[], const PetscReal L[],
                               const PetscReal packed[], PetscReal g[])
 {
   const PetscInt m = t->pairs.n, entries = HycoPairsWidth(&t->pairs) * t->fe->dim * m;
   PetscInt *start, *dof;
-  PetscReal *value;
+  PetscReal *value, moved = 0, left = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(m + 1, &start, entries, &dof, entries, &value));
@@ -324,6 +325,7 @@ static PetscErrorCode FreeGap(HycoTrainer t, const PetscReal mu[], const PetscRe
   for (PetscInt k = 0; k < m; k++) {
     g[k] = 0;
     for (PetscInt j = start[k]; j < start[k + 1]; j++) g[k] -= value[j] * U[dof[j]];
+    moved = PetscMax(moved, PetscAbsReal(g[k]));
   }
   for (PetscInt j = 0; j < m; j++) {
     g[j] -= packed[0] * L[j];
@@ -333,6 +335,8 @@ static PetscErrorCode FreeGap(HycoTrainer t, const PetscReal mu[], const PetscRe
     }
     packed += m - j;
   }
+  for (PetscInt k = 0; k < m; k++) left = PetscMax(left, PetscAbsReal(g[k]));
+  if (left <= NO_LOAD * moved) PetscCall(PetscArrayzero(g, m));
   PetscCall(PetscFree3(start, dof, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
