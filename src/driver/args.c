@@ -638,5 +638,6 @@ void DriverHelp(const char *command)
   }
   printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "
          "-hyco_primal_..., -hyco_tao_type bntr.\n");
+  printf("Exit status: 0 done; 1 an error, in one line; 3 a model is written, but it misses a target or the default bar.\n");
   printf("Under MPI: mpiexec -n 2 hyco ...; set OPENBLAS_NUM_THREADS=1.\n");
 }

@@ -47,6 +47,22 @@ PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples);
 PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given);
 void DriverHelp(const char *command);
 
+/* -- status.c: how the command ends -- */
+
+enum {
+  DRIVER_DONE = 0,
+  DRIVER_FAILED = 1, /* one line said why; nothing half-written */
+  DRIVER_MISSED = 3  /* what was asked for is written, but misses a target or the default bar */
+};
+
+/* What is written misses what was asked: one line on stderr from rank 0, beginning "hyco: missed:", an entry of "missed"
+   in the report, which must be written after this, and the exit status DRIVER_MISSED unless an error follows. The text
+   says what was reached, what was asked and what to do. To be called on every rank, for the ranks end with one status. */
+PetscErrorCode DriverMissed(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
+void DriverReportMissed(cJSON *json);
+/* The exit status of a run that ended with `ierr`; to be called once, at the end. */
+int DriverEndStatus(PetscErrorCode ierr);
+
 /* -- report.c: JSON -- */
 
 /* A report with command, scene title, mu (NULL: none) and ranks. */
@@ -54,7 +70,7 @@ PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscRe
 void ReportKKT(cJSON *json, const HycoKKT *kkt);
 void ReportSeconds(cJSON *json, const HycoSeconds *seconds);
 void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[]);
-/* Adds memory_mb, writes to -report (if given) on rank 0 and frees. */
+/* Adds memory_mb and what was missed, writes to -report (if given) on rank 0 and frees. */
 PetscErrorCode ReportWrite(cJSON **json);
 /* The report of a set of points, n rows of values by column (one named "converged"), and their CSV at `table` ("":
    none); fails when a point did not converge. */
@@ -87,7 +103,7 @@ typedef struct {
   char *text;                     /* the table; PetscFree() it */
   size_t length, room;
   PetscInt iterations, infinite;
-  PetscReal max_eta;
+  PetscReal max_eta, target;
   char stop[16];
 } GreedyLog;
 
@@ -96,6 +112,9 @@ PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char wor
                                  char columns[DRIVER_LINE]);
 /* Reads the options of train -greedy, makes the training set and sets the trainer, which will fill `log`. */
 PetscErrorCode DriverReadGreedy(HycoScene scene, HycoTrainer trainer, HycoSamples *training, GreedyLog *log);
+/* Says that the loop ended short of what was asked: of -target, or, where that was left to its default, of the limits that
+   were given. Collective. */
+PetscErrorCode DriverJudgeGreedy(const GreedyLog *log);
 void DriverReportGreedy(cJSON *json, const GreedyLog *log);
 
 /* -- fallback.c: predict with the scene at hand -- */

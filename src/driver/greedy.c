@@ -97,8 +97,34 @@ PetscErrorCode DriverReadGreedy(HycoScene scene, HycoTrainer trainer, HycoSample
   PetscCall(HycoOptionsInt(NULL, "max_snapshots", 0, PETSC_MAX_INT, &max_snapshots));
   HycoCheck(target > 0, "-target is 0; the indicator of a greedy training is asked to fall below a positive number, as "
                         "1e-3");
+  log->target = target;
   PetscCall(HycoTrainerSetGreedyStop(trainer, target, max_snapshots, max_seconds));
   PetscCall(HycoTrainerSetGreedyMonitor(trainer, Monitor, log));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverJudgeGreedy(const GreedyLog *log)
+{
+  PetscBool asked;
+  struct {
+    PetscReal max_eta;
+    PetscInt infinite;
+    char stop[16];
+  } end; /* known to rank 0 alone */
+  const char *why = "every point of -training_grid is solved: give a finer grid, or a recipe with more modes or layers";
+
+  PetscFunctionBegin;
+  end.max_eta = log->max_eta;
+  end.infinite = log->infinite;
+  PetscCall(PetscStrncpy(end.stop, log->stop, sizeof(end.stop)));
+  PetscCallMPI(MPI_Bcast(&end, sizeof(end), MPI_BYTE, 0, PETSC_COMM_WORLD));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-target", &asked));
+  if (strcmp(end.stop, "target") == 0 || (!asked && strcmp(end.stop, "points"))) PetscFunctionReturn(PETSC_SUCCESS);
+  if (strcmp(end.stop, "snapshots") == 0) why = "-max_snapshots is reached: raise it, or give a recipe with more modes or layers";
+  if (strcmp(end.stop, "seconds") == 0) why = "-max_seconds have passed: the same command with more goes on from here";
+  PetscCall(DriverMissed("the greedy training's indicator is %.2e at worst (infinite at %d points) where -target is %g; it "
+                         "stopped because %s",
+                         (double)end.max_eta, (int)end.infinite, (double)log->target, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -162,6 +162,7 @@ int main(int argc, char **argv)
 {
   const int answer = AnswerAtOnce(argc, argv);
   PetscErrorCode ierr;
+  int status;
 
   if (answer >= 0) return answer;
   setenv("OPENBLAS_NUM_THREADS", "1", 0);
@@ -174,6 +175,6 @@ int main(int argc, char **argv)
   PetscPopErrorHandler();
   if (ierr) Stop();
   PetscOptionsSetValue(NULL, "-options_left", "0"); /* what is left was checked where it matters */
-  if (HycoFinalize()) return 1;
-  return ierr ? 1 : 0;
+  status = DriverEndStatus(ierr);
+  return HycoFinalize() ? DRIVER_FAILED : status;
 }

@@ -142,6 +142,7 @@ PetscErrorCode ReportWrite(cJSON **json)
   mine = (PetscReal)usage.ru_maxrss / 1024;
   PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   cJSON_AddNumberToObject(*json, "memory_mb", all);
+  DriverReportMissed(*json);
   PetscCall(DriverGet("report", PETSC_FALSE, path));
   if (path[0]) {
     text = cJSON_Print(*json);

@@ -221,6 +221,7 @@ PetscErrorCode CommandTrain(void)
                   (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept as asked" : ""));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));
+  if (greedy) PetscCall(DriverJudgeGreedy(&log));
   PetscCall(Report(scene, &t, &log, &search));
   PetscCall(PetscFree(search.attempt));
   PetscCall(PetscFree(log.text));

@@ -33,7 +33,7 @@ class Greedy(Case):
         a smaller RID, 0.004/0.077, 0.34/10 and 1.3/18.
         """
         t = self.hyco('train', '-scene', ROPE, '-greedy', '-training_grid', '20,24', '-max_snapshots', 54, '-target',
-                      '1e-3', *FINE, '-model', 'paper.h5', '-table', 'paper.csv')
+                      '1e-3', *FINE, '-model', 'paper.h5', '-table', 'paper.csv', status=3)
         self.assertEqual((t['n_samples'], t['greedy']['iterations'], t['greedy']['stop']), (54, 50, 'snapshots'))
         self.assertLessEqual(t['n_modes'], t['rid_a_nodes'])
         c = self.hyco('compare', '-scene', ROPE, '-model', 'paper.h5', '-grid', '100,120')
@@ -52,8 +52,8 @@ class Greedy(Case):
 
     def test_ranks_and_kill(self):
         """Two ranks choose as one; a run killed half way ends with the table of one that was not, byte for byte."""
-        self.hyco(*SHORT, '-model', 'one.h5', '-table', 'one.csv')
-        self.hyco(*SHORT, '-model', 'two.h5', '-table', 'two.csv', ranks=2)
+        self.hyco(*SHORT, '-model', 'one.h5', '-table', 'one.csv', status=3)
+        self.hyco(*SHORT, '-model', 'two.h5', '-table', 'two.csv', ranks=2, status=3)
         self.assertEqual(self.choices('one.csv'), self.choices('two.csv'))
         command = [HYCO, *(str(a) for a in SHORT), '-model', 'killed.h5', '-table', 'killed.csv']
         with subprocess.Popen(command, cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
@@ -69,7 +69,7 @@ class Greedy(Case):
         stored = {name: os.stat(self.path('killed.h5.snapshots', name)).st_mtime_ns
                   for name in os.listdir(self.path('killed.h5.snapshots')) if 'greedy' not in name}
         self.assertGreater(len(stored), 6)
-        self.hyco(*SHORT, '-model', 'killed.h5', '-table', 'killed.csv')
+        self.hyco(*SHORT, '-model', 'killed.h5', '-table', 'killed.csv', status=3)
         self.assertEqual(self.rows('killed.csv'), self.rows('one.csv'))
         for name, when in stored.items():
             if not name.endswith('.partial'):
@@ -93,11 +93,11 @@ class Greedy(Case):
     def test_ends(self):
         """Points: every training point is solved. Seconds: after the first iteration. Starts from -values when given."""
         t = self.hyco('train', '-scene', ROPE, '-greedy', '-training_grid', '3,2', '-target', '1e-30', *FINE, '-model',
-                      'p.h5', '-table', 'p.csv')
+                      'p.h5', '-table', 'p.csv', status=3)
         self.assertEqual((t['greedy']['stop'], t['n_samples']), ('points', 6))
         self.assertEqual(self.rows('p.csv')[-1][5:7], ['', ''])
         t = self.hyco('train', '-scene', ROPE, '-greedy', '-training_grid', '8,8', '-target', '1e-30', '-max_seconds',
-                      '1e-9', '-values_mu1', '0.05,0.15,0.25', '-values_mu2', '-0.05,0.5', *FINE, '-model', 's.h5')
+                      '1e-9', '-values_mu1', '0.05,0.15,0.25', '-values_mu2', '-0.05,0.5', *FINE, '-model', 's.h5', status=3)
         self.assertEqual((t['greedy']['stop'], t['n_samples'], t['greedy']['iterations']), ('seconds', 6, 0))
 
     def rope(self, name, mu):
@@ -162,7 +162,7 @@ class Greedy(Case):
     def test_penetration(self):
         """(45) is the penetration of the prediction: of the first model's at the point it names, by the stored fields."""
         self.hyco('train', '-scene', ROPE, '-greedy', '-training_grid', '6,7', '-max_snapshots', 4, '-target', '1e-30',
-                  '-hyco_greedy_indicator', 'penetration', '-hyco_hybrid', 'all', '-model', 'i.h5', '-table', 'i.csv')
+                  '-hyco_greedy_indicator', 'penetration', '-hyco_hybrid', 'all', '-model', 'i.h5', '-table', 'i.csv', status=3)
         row = self.rows('i.csv')[1]
         self.hyco('predict', '-model', 'i.h5', '-mu', f'{row[5]},{row[6]}', '-output', 'fields.xdmf')
         with h5py.File(self.path('fields.h5')) as f:

@@ -1,0 +1,40 @@
+/* How the command ends: its exit status, and what it says when it misses what was asked. */
+#include "driver.h"
+#include <stdarg.h>
+#include <stdio.h>
+
+static cJSON *missed; /* what DriverMissed() said, an array; NULL: nothing */
+
+PetscErrorCode DriverMissed(const char format[], ...)
+{
+  char text[DRIVER_LINE];
+  PetscMPIInt rank;
+  va_list args;
+
+  PetscFunctionBegin;
+  va_start(args, format);
+  vsnprintf(text, sizeof(text), format, args);
+  va_end(args);
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (rank == 0) {
+    fprintf(stderr, "hyco: missed: %s\n", text);
+    fflush(stderr);
+  }
+  if (!missed) missed = cJSON_CreateArray();
+  cJSON_AddItemToArray(missed, cJSON_CreateString(text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void DriverReportMissed(cJSON *json)
+{
+  if (missed) cJSON_AddItemToObject(json, "missed", cJSON_Duplicate(missed, cJSON_True));
+}
+
+int DriverEndStatus(PetscErrorCode ierr)
+{
+  const int status = ierr ? DRIVER_FAILED : missed ? DRIVER_MISSED : DRIVER_DONE;
+
+  cJSON_Delete(missed);
+  missed = NULL;
+  return status;
+}
