@@ -79,6 +79,9 @@ PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt 
 /* Smallest and largest singular value of A (m x n column major, kept). Not collective. */
 PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal *smallest,
                                          PetscReal *largest);
+/* The pseudo-inverse P (n x m column major) of A (m x n column major, kept); singular values below tol times the first
+ * are taken as 0. Not collective. */
+PetscErrorCode HycoPseudoInverse(PetscInt m, PetscInt n, const PetscReal A[], PetscReal tol, PetscReal P[]);
 /* Sign of the determinant of A (n x n column major, kept; 0: singular), and its smallest singular value over the
  * largest, by power iterations to about 1e-3. Not collective. */
 PetscErrorCode HycoSingularity(PetscInt n, const PetscReal A[], PetscInt *sign, PetscReal *ratio);
@@ -133,6 +136,8 @@ typedef struct {
   PetscInt rows;
   PetscReal *data;
 } HycoGridField;
+/* The sum of the nodes' columns, each times its weight. */
+PetscErrorCode HycoGridFieldSum(const HycoGridField *field, const PetscReal weight[], PetscReal value[]);
 /* All rows at `at`, the nodes with number `skip` along `axis` left out (-1, -1: none). */
 PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *field, const PetscReal at[], PetscInt axis, PetscInt skip,
                                      PetscReal value[]);

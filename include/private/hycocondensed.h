@@ -4,7 +4,8 @@
       w = g + G L >= 0,  L >= 0,  w.L = 0        G = B K^-1 B^T,    g = D - B K^-1 F
       gamma = a - H L                            H = V^T K^-1 B^T,  a = V^T K^-1 F
 
-  each a polynomial on a tensor grid of training values. All on one process.
+  D comes from the scene itself, F as a sum of training loads; K^-1 is what is interpolated, by polynomials on a tensor
+  grid of training values (condensed_given.c). All on one process.
 */
 #ifndef HYCOCONDENSED_H
 #define HYCOCONDENSED_H
@@ -16,12 +17,28 @@
 enum { HYCO_FIELD_G, HYCO_FIELD_GAP, HYCO_FIELD_H, HYCO_FIELD_FREE, HYCO_N_FIELDS };
 extern const char *const HycoGridFieldNames[]; /* as in files */
 
+/* Where D is evaluated: a mesh with every contact node, and room for the rows. Borrowed. */
+typedef struct {
+  HycoFE fe;
+  HycoPairs *pairs;
+  PetscInt *start, *dof;
+  PetscReal *value, *gap;
+} HycoGapSource;
+
 struct _n_HycoCondensed {
   PetscInt dim, m, l;                                               /* parameters, contacts, modes */
   PetscInt n[HYCO_MAX_PARAMETERS];                                  /* training values of each parameter */
   PetscReal *x[HYCO_MAX_PARAMETERS];                                /* ascending */
-  PetscInt stiff[HYCO_MAX_PARAMETERS], affine[HYCO_MAX_PARAMETERS]; /* reaches K or B; F and D are affine in it */
+  PetscInt stiff[HYCO_MAX_PARAMETERS], affine[HYCO_MAX_PARAMETERS]; /* reaches K or B; what is interpolated is exact in it */
   HycoGridField field[HYCO_N_FIELDS]; /* G: the columns of its lower triangle, m (m + 1) / 2; H: l x m row major */
+  PetscInt exact_gap;   /* the field of the gap is -B K^-1 F, and D the scene's; 0, of older files: it is g */
+  PetscInt exact_loads; /* the fields of the gap and of a by what the load is of the training loads; 0: polynomials */
+  PetscInt n_probes, n_theta, n_load; /* points for values of loads in space, values, training loads per stiffness */
+  PetscReal *probe;                   /* n_probes x 3 */
+  PetscReal *inverse, *theta_scale;   /* by node of G: n_load x n_theta; n_theta */
+  PetscInt *node_stiff, *node_load;   /* by node of the whole grid: that of G, and its number among its loads */
+  HycoScene scene;                    /* borrowed */
+  HycoGapSource given;
   PetscReal *bounds;   /* by node of G: lower and upper of it by the middle node's G; 0, 0: none are known */
   PetscReal *Lambda;   /* m x nodes of the whole grid: training forces */
   PetscReal errors[3]; /* one value left out: G, g, forces; relative */
@@ -36,7 +53,7 @@ struct _n_HycoCondensed {
   PetscReal at[HYCO_MAX_PARAMETERS];
   PetscBool solved; /* active is the set of the solution at `last` */
   PetscReal last[HYCO_MAX_PARAMETERS];
-  PetscReal gap_size;                           /* largest |g| in training */
+  PetscReal gap_size;                           /* largest of the gap's field */
   PetscReal *packed, *M, *work, *g, *H, *a, *w; /* M: G, m x m */
   HycoSetFactor set_factor;                     /* of M on the active contacts */
   PetscBool *active;
@@ -49,6 +66,21 @@ PetscErrorCode HycoCondensedDestroy(HycoCondensed *condensed);
 PetscErrorCode HycoCondensedAllocate(HycoCondensed condensed);
 /* Room for what is online. */
 PetscErrorCode HycoCondensedPrepare(HycoCondensed condensed);
+/* A field at mu without the nodes with number `skip` along `axis` (-1, -1: all); g into c->g likewise, and D alone into
+   c->given.gap. */
+PetscErrorCode HycoCondensedEvaluate(HycoCondensed condensed, PetscInt field, const PetscReal mu[], PetscInt axis,
+                                     PetscInt skip, PetscReal value[]);
+PetscErrorCode HycoCondensedFreeGap(HycoCondensed condensed, const PetscReal mu[], PetscInt axis, PetscInt skip);
+PetscErrorCode HycoCondensedBringGap(HycoCondensed condensed, const PetscReal mu[]);
+/* The points where loads in space are evaluated, on a mesh whose nodes are at X; *fit: no shape follows the stiffness. */
+PetscErrorCode HycoCondensedSurveyLoads(HycoCondensed condensed, HycoMesh mesh, const PetscReal X[], PetscBool *fit);
+/* After it or with the file's points: what the weights of the training loads need. */
+PetscErrorCode HycoCondensedPrepareLoads(HycoCondensed condensed);
+/* The weights of the training loads (n_load) at node s of G whose sum is the load at mu; *span: it is one. */
+PetscErrorCode HycoCondensedLoadWeights(HycoCondensed condensed, const PetscReal mu[], PetscInt s, PetscReal weight[],
+                                        PetscBool *span);
+/* The parameters of node k of the whole grid. */
+void HycoCondensedPoint(HycoCondensed condensed, PetscInt k, PetscReal mu[]);
 /* To and from the model's file. */
 PetscErrorCode HycoCondensedSave(HycoModel model, HycoH5 file);
 PetscErrorCode HycoCondensedLoad(HycoModel model, HycoH5 file);

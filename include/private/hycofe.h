@@ -63,6 +63,7 @@ PetscErrorCode HycoFESetDrawn(HycoFE fe);
 /* Brings everything to mu (length scene->n_parameters), touching only what depends on what changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
 /* Which parameters (room for n_parameters) reach the stiffness or the contacts' rows. */
+void HycoSceneReaches(HycoScene scene, PetscBool reaches[]);
 void HycoFEReaches(HycoFE fe, PetscBool reaches[]);
 
 /* Rigid motions that the supports leave free, an orthonormal basis of the kernel of K. */

@@ -66,6 +66,7 @@ struct _p_HycoTrainer {
   HycoDual dual;
   PetscInt nnmf_max_its, nnmf_vectors;
   PetscReal condensed_tol; /* where the points are chosen */
+  PetscReal condensed_pod_tol; /* of its modes, unless tol[] is smaller */
   PetscInt condensed_max_values;
   HycoProgress progress;
   void *progress_ctx;
@@ -101,11 +102,20 @@ struct _p_HycoTrainer {
   unsigned long long fingerprint;
   HycoResponses responses;
   HycoCondensed condensed; /* of a condensed model under training; the grid on every rank, the fields on rank 0 */
+  struct {
+    HycoMesh mesh;
+    HycoPairs pairs;
+    HycoFE fe;
+    PetscInt *start, *dof;
+    PetscReal *value, *gap;
+  } surfaces;              /* rank 0, condensed: the contacts' nodes and facets alone, where D is evaluated */
   PetscBool *grown;        /* rank 0, greedy: cells of the RIDs so far; else NULL */
 };
 
 /* Frees what one run leaves behind. */
 PetscErrorCode HycoTrainerReset(HycoTrainer t);
+/* Frees the contact surfaces that condensed training evaluates gaps on. */
+PetscErrorCode HycoTrainerResetSurfaces(HycoTrainer t);
 /* Frees the bases, seeds and snapshots, and keeps the mesh; what one recipe took of the bases alone. */
 PetscErrorCode HycoTrainerResetBases(HycoTrainer t);
 PetscErrorCode HycoTrainerDropBases(HycoTrainer t);
@@ -180,6 +190,8 @@ PetscErrorCode HycoTrainerFindModes(HycoTrainer t, HycoSnapshots store);
    caller's), the bases made. Collective. */
 PetscErrorCode HycoTrainerStartPoints(HycoTrainer t, HycoSamples *samples);
 PetscErrorCode HycoTrainerChoosePoints(HycoTrainer t, HycoSnapshots store, HycoSamples *samples);
+/* What its modes are chosen by: stresses lose the derivative's share of digits, and forces have many. */
+PetscReal HycoTrainerModesTolerance(HycoTrainer t);
 /* Its fields and degrees, of all modes or none; the errors where values are left out; all of it, handed to the model,
    with numbers[]. Rank 0. */
 PetscErrorCode HycoTrainerFillFields(HycoTrainer t, PetscBool modes);

@@ -34,6 +34,33 @@ PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoPseudoInverse(PetscInt m, PetscInt n, const PetscReal A[], PetscReal tol, PetscReal P[])
+{
+  const PetscInt k = PetscMin(m, n);
+  PetscBLASInt mb, nb, kb, lwork, info;
+  PetscReal *copy, *s, *U, *Vt, *work;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(P, m * n));
+  if (!k) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscBLASIntCast(m, &mb));
+  PetscCall(PetscBLASIntCast(n, &nb));
+  PetscCall(PetscBLASIntCast(k, &kb));
+  PetscCall(PetscBLASIntCast(64 * (m + n), &lwork));
+  PetscCall(PetscMalloc5(m * n, &copy, k, &s, m * k, &U, k * n, &Vt, lwork, &work));
+  PetscCall(PetscArraycpy(copy, A, m * n));
+  LAPACKgesvd_("S", "S", &mb, &nb, copy, &mb, s, U, &mb, Vt, &kb, work, &lwork, &info);
+  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "singular values did not converge (LAPACK gesvd: %d)",
+             (int)info);
+  for (PetscInt r = 0; r < k && s[r] > tol * s[0]; r++) {
+    for (PetscInt j = 0; j < m; j++) {
+      for (PetscInt i = 0; i < n; i++) P[j * n + i] += Vt[i * k + r] * U[r * m + j] / s[r];
+    }
+  }
+  PetscCall(PetscFree5(copy, s, U, Vt, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal *smallest,
                                          PetscReal *largest)
 {

@@ -181,22 +181,30 @@ PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt row
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *f, const PetscReal at[], PetscInt axis, PetscInt skip,
-                                     PetscReal value[])
+PetscErrorCode HycoGridFieldSum(const HycoGridField *f, const PetscReal weight[], PetscReal value[])
 {
-  const PetscInt n = HycoTensorSize(&f->tensor);
   const PetscReal one = 1, zero = 0;
   const PetscBLASInt step = 1;
-  PetscReal *w;
   PetscBLASInt rows, nodes;
 
   PetscFunctionBegin;
   if (!f->rows) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscBLASIntCast(f->rows, &rows));
-  PetscCall(PetscBLASIntCast(n, &nodes));
-  PetscCall(PetscMalloc1(n, &w));
+  PetscCall(PetscBLASIntCast(HycoTensorSize(&f->tensor), &nodes));
+  BLASgemv_("N", &rows, &nodes, &one, f->data, &rows, weight, &step, &zero, value, &step);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *f, const PetscReal at[], PetscInt axis, PetscInt skip,
+                                     PetscReal value[])
+{
+  PetscReal *w;
+
+  PetscFunctionBegin;
+  if (!f->rows) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(HycoTensorSize(&f->tensor), &w));
   PetscCall(HycoTensorWeights(&f->tensor, at, axis, skip, w));
-  BLASgemv_("N", &rows, &nodes, &one, f->data, &rows, w, &step, &zero, value, &step);
+  PetscCall(HycoGridFieldSum(f, w, value));
   PetscCall(PetscFree(w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

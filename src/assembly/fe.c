@@ -227,18 +227,22 @@ static void FindChanges(HycoFE fe, const PetscBool changed[], PetscBool *moved)
   }
 }
 
-void HycoFEReaches(HycoFE fe, PetscBool reaches[])
+void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
 {
-  const struct _n_HycoFE kept = *fe;
+  struct _n_HycoFE fe = {.scene = scene}; /* only what FindChanges() says of it */
 
-  for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {
+  for (PetscInt p = 0; p < scene->n_parameters; p++) {
     PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moved;
 
     changed[p] = PETSC_TRUE;
-    FindChanges(fe, changed, &moved);
-    reaches[p] = (PetscBool)(fe->stiffness_changed || fe->contact_changed);
+    FindChanges(&fe, changed, &moved);
+    reaches[p] = (PetscBool)(fe.stiffness_changed || fe.contact_changed);
   }
-  *fe = kept;
+}
+
+void HycoFEReaches(HycoFE fe, PetscBool reaches[])
+{
+  HycoSceneReaches(fe->scene, reaches);
 }
 
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])

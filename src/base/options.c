@@ -31,6 +31,8 @@ static const HycoOption option_table[] = {
     {"hyco_nnmf_max_its", "<int>", "100", "alternations of the nonnegative factorisation"},
     {"hyco_condensed_tol", "<real>", "1e-7",
      "condensed, no points given: add values until the forces' error, one value left out, is no larger"},
+    {"hyco_condensed_pod_tol", "<real>", "1e-14",
+     "condensed: energy that its displacement modes may leave out, unless -hyco_pod_tol is smaller"},
     {"hyco_condensed_max_values", "<int>", "24", "condensed, no points given: at most so many values per parameter"},
     {"hyco_pod_tol", "<real>", "1e-7", "energy left out of the displacement basis, the epsilon of (18)"},
     {"hyco_pod_noise", "<real>", "1e-11", "singular values below this share of the first are noise"},

@@ -100,8 +100,9 @@ static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool gree
 {
   static const struct {
     const char *name, *types; /* NULL: for -greedy */
-  } meant[] = {{"-hyco_condensed_tol", "condensed"},
+  } meant[] = {{"-hyco_condensed_tol", "condensed"}, /* the first two choose points */
                {"-hyco_condensed_max_values", "condensed"},
+               {"-hyco_condensed_pod_tol", "condensed"},
                {"-hyco_nnmf_vectors", "projection"},
                {"-hyco_nnmf_max_its", "projection"},
                {"-hyco_rid_modes", "hybrid or condensed"},
@@ -137,7 +138,7 @@ static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool gree
     HycoCheck(strstr(meant[k].types, HycoModelTypes[type]),
               "nothing reads %s here: it is for -hyco_model_type %s, and the model is %s", meant[k].name,
               meant[k].types, HycoModelTypes[type]);
-    HycoCheck(!given || strcmp(meant[k].types, HycoModelTypes[HYCO_MODEL_CONDENSED]),
+    HycoCheck(!given || k >= 2,
               "nothing reads %s here: it chooses points where none are given", meant[k].name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -39,6 +39,11 @@ PetscErrorCode HycoCondensedDestroy(HycoCondensed *condensed)
   PetscCall(PetscFree(c->Lambda));
   PetscCall(PetscFree(c->bounds));
   PetscCall(PetscFree(c->sample));
+  PetscCall(PetscFree(c->probe));
+  PetscCall(PetscFree(c->inverse));
+  PetscCall(PetscFree(c->theta_scale));
+  PetscCall(PetscFree(c->node_stiff));
+  PetscCall(PetscFree(c->node_load));
   PetscCall(PetscFree(c->packed));
   PetscCall(PetscFree(c->M));
   PetscCall(PetscFree(c->work));
@@ -360,14 +365,12 @@ static PetscErrorCode Displacements(HycoModel m, const PetscReal mu[])
   const PetscInt l = m->l;
 
   PetscFunctionBegin;
-  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_FREE], mu, -1, -1, c->a));
+  PetscCall(HycoCondensedEvaluate(c, HYCO_FIELD_FREE, mu, -1, -1, c->a));
   for (PetscInt j = 0; j < l; j++) {
     m->gamma[j] = c->a[j];
     for (PetscInt i = 0; i < c->m; i++) m->gamma[j] -= c->H[j * c->m + i] * m->Lambda[i];
   }
-  PetscCall(HycoFESetParameters(m->fe, mu));
-  if (m->fe->contact_changed)
-    PetscCall(HycoContactRows(m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap));
+  if (!c->exact_gap) PetscCall(HycoCondensedBringGap(c, mu));
   for (PetscInt i = 0; i < m->fe->n_dof; i++) {
     m->U[i] = m->fe->u0[i];
     for (PetscInt j = 0; j < l; j++) m->U[i] += m->V[(size_t)i * (size_t)l + (size_t)j] * m->gamma[j];
@@ -383,10 +386,7 @@ PetscErrorCode HycoCondensedPredict(HycoModel m, const PetscReal mu[])
 
   PetscFunctionBegin;
   PetscCall(BringStiffness(c, mu));
-  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_GAP], mu, -1, -1, c->g));
-  for (PetscInt i = 0; i < c->m; i++) { /* a closed gap without load is 0, not round-off that presses or not */
-    if (PetscAbsReal(c->g[i]) <= 1e-14 * c->gap_size) c->g[i] = 0;
-  }
+  PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
   solve = HycoNow();
   p->seconds.factor = 0;
   p->seconds.assemble = solve - begin;
@@ -423,6 +423,9 @@ PetscErrorCode HycoCondensedSetUp(HycoModel m)
   PetscCall(PetscMalloc1(entries, &m->row_dof));
   PetscCall(PetscMalloc1(entries, &m->row_value));
   PetscCall(PetscMalloc1(m->m, &m->gap));
+  m->condensed->given = (HycoGapSource){m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap};
+  m->condensed->scene = m->scene;
+  if (m->condensed->exact_loads) PetscCall(HycoCondensedPrepareLoads(m->condensed));
   PetscCall(PetscCalloc1(m->l, &m->gamma));
   PetscCall(PetscCalloc1(m->fe->n_dof, &m->U));
   PetscCall(PetscCalloc1(m->m, &m->Lambda));
@@ -446,6 +449,8 @@ PetscErrorCode HycoCondensedView(HycoModel m, PetscViewer viewer)
                                      m->scene->parameter[p], (int)c->n[p], (int)c->field[HYCO_FIELD_G].tensor.degree[p],
                                      (int)c->field[HYCO_FIELD_GAP].tensor.degree[p],
                                      c->affine[p] ? " (affine: exact)" : ""));
+  if (c->exact_gap)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  from the scene itself: gaps%s\n", c->exact_loads ? ", loads" : ""));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  one value left out, relative: flexibility %.1e, gap %.1e, forces %.1e\n",
                                    (double)c->errors[0], (double)c->errors[1], (double)c->errors[2]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  fields and stresses on %d of %d elements, or the whole mesh\n",

@@ -3,9 +3,14 @@
 #include <hycoh5.h>
 #include <stdio.h>
 
-static void Dataset(const char name[], char path[64])
+#define SETTLED "condensed/settled" /* -B K^-1 F, which older files have in "condensed/g" with D */
+
+static void Dataset(HycoCondensed c, PetscInt f, char path[64])
 {
-  (void)snprintf(path, 64, "condensed/%s", name);
+  if (c->exact_gap && f == HYCO_FIELD_GAP)
+    (void)snprintf(path, 64, SETTLED);
+  else
+    (void)snprintf(path, 64, "condensed/%s", HycoGridFieldNames[f]);
 }
 
 PetscErrorCode HycoCondensedSave(HycoModel m, HycoH5 h)
@@ -20,6 +25,8 @@ PetscErrorCode HycoCondensedSave(HycoModel m, HycoH5 h)
   }
   PetscCall(HycoH5WriteInt(h, "condensed/stiff", c->dim, 1, c->stiff));
   PetscCall(HycoH5WriteInt(h, "condensed/affine", c->dim, 1, c->affine));
+  PetscCall(HycoH5WriteInt(h, "condensed/exact_loads", 1, 1, &c->exact_loads));
+  if (c->exact_loads && c->n_probes) PetscCall(HycoH5WriteReal(h, "condensed/probes", c->n_probes, 3, c->probe));
   PetscCall(HycoH5WriteReal(h, "condensed/left_out", 3, 1, c->errors));
   PetscCall(HycoH5WriteReal(h, "condensed/left_out_u", 2, 1, c->errors_u));
   PetscCall(HycoH5WriteReal(h, "condensed/lambda", HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), c->m, c->Lambda));
@@ -27,7 +34,7 @@ PetscErrorCode HycoCondensedSave(HycoModel m, HycoH5 h)
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) {
     const HycoGridField *field = &c->field[f];
 
-    Dataset(HycoGridFieldNames[f], path);
+    Dataset(c, f, path);
     PetscCall(HycoH5WriteReal(h, path, HycoTensorSize(&field->tensor), field->rows, field->data));
     PetscCall(PetscSNPrintf(path, sizeof(path), "condensed/degree_%s", HycoGridFieldNames[f]));
     PetscCall(HycoH5WriteInt(h, path, c->dim, 1, field->tensor.degree));
@@ -43,6 +50,23 @@ static PetscErrorCode LoadFlags(HycoH5 h, const char name[], PetscInt n, PetscIn
   PetscCall(HycoH5LoadInt(h, name, 0, 1, &n, &one, &read));
   PetscCall(PetscArraycpy(flags, read, n));
   PetscCall(PetscFree(read));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How gaps and loads come from the scene. */
+static PetscErrorCode LoadGiven(HycoH5 h, HycoCondensed c)
+{
+  PetscInt three = 3;
+
+  PetscFunctionBegin;
+  c->exact_gap = HycoH5Has(h, SETTLED);
+  if (!c->exact_gap) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LoadFlags(h, "condensed/exact_loads", 1, &c->exact_loads));
+  c->n_probes = -1;
+  if (c->exact_loads && HycoH5Has(h, "condensed/probes"))
+    PetscCall(HycoH5LoadReal(h, "condensed/probes", &c->n_probes, &three, &c->probe));
+  else
+    c->n_probes = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -76,7 +100,7 @@ static PetscErrorCode LoadField(HycoH5 h, HycoModel m, PetscInt f)
   PetscCall(PetscFree(degree));
   for (PetscInt p = 0; p < dim; p++)
     HycoCheck(field->tensor.degree[p] < field->tensor.n[p], "%s: %s is damaged", m->path, path);
-  Dataset(HycoGridFieldNames[f], path);
+  Dataset(c, f, path);
   PetscCall(HycoH5LoadReal(h, path, &n, &rows, &field->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -94,6 +118,7 @@ PetscErrorCode HycoCondensedLoad(HycoModel m, HycoH5 h)
   PetscCall(LoadFlags(h, "condensed/stiff", c->dim, c->stiff));
   PetscCall(LoadFlags(h, "condensed/affine", c->dim, c->affine));
   PetscCall(HycoCondensedAllocate(c));
+  PetscCall(LoadGiven(h, c));
   PetscCall(HycoH5LoadReal(h, "condensed/left_out", &three, &one, &errors));
   PetscCall(PetscArraycpy(c->errors, errors, 3));
   PetscCall(PetscFree(errors));

@@ -111,6 +111,36 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The samples that share a stiffness one after the other, in the order of the first of each, so that they share its
+   factor whatever the parameters' order. On rank 0. */
+static PetscErrorCode BringTogether(HycoSnapshots s, PetscInt n_par, const PetscReal mu[], PetscInt n, PetscInt list[])
+{
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+  PetscInt *kind, *first, *sorted, n_kinds = 0;
+
+  PetscFunctionBegin;
+  HycoSceneReaches(s->scene, reaches);
+  PetscCall(PetscMalloc3(n, &kind, n, &first, n, &sorted));
+  for (PetscInt i = 0; i < n; i++) {
+    for (kind[i] = 0; kind[i] < n_kinds; kind[i]++) {
+      const PetscReal *a = mu + first[kind[i]] * n_par, *b = mu + list[i] * n_par;
+      PetscInt p = 0;
+
+      while (p < n_par && (!reaches[p] || a[p] == b[p])) p++;
+      if (p == n_par) break;
+    }
+    if (kind[i] == n_kinds) first[n_kinds++] = list[i];
+  }
+  for (PetscInt k = 0, at = 0; k < n_kinds && n_kinds < n; k++) {
+    for (PetscInt i = 0; i < n; i++) {
+      if (kind[i] == k) sorted[at++] = list[i];
+    }
+  }
+  if (n_kinds < n) PetscCall(PetscArraycpy(list, sorted, n));
+  PetscCall(PetscFree3(kind, first, sorted));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups)
 {
   PetscMPIInt size;
@@ -249,6 +279,7 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
   PetscCall(PetscMalloc1(n, &missing));
   HycoOnRoot(s->comm, FindMissing(s, n, n_par, mu, &n_missing, missing));
+  HycoOnRoot(s->comm, BringTogether(s, n_par, mu, n_missing, missing));
   PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, s->comm));
   PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, s->comm));
   if (n_missing) {

@@ -11,6 +11,7 @@
 /* m^2 numbers a point, and m^3 operations an active set: beyond this it is no model for many predictions. */
 #define MOST_CONTACTS 4000
 #define MOST_NUMBERS  1e9 /* of G at all nodes: 8 GB */
+#define NO_LOAD       1e-11 /* of the contacts' displacements: what is left of them without forces is round-off */
 
 /* The values of parameter p among the samples, ascending, each once. */
 static PetscErrorCode FindValues(HycoCondensed c, PetscInt p, PetscInt n_s, const PetscReal mu[])
@@ -93,52 +94,144 @@ static PetscErrorCode FindStiff(HycoTrainer t, HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* F and D at mu, one after the other. Rank 0. */
-static PetscErrorCode LoadsAndGaps(HycoTrainer t, const PetscReal mu[], PetscReal data[])
+/* F at mu. Rank 0. */
+static PetscErrorCode Loads(HycoTrainer t, const PetscReal mu[], PetscReal data[])
 {
-  const PetscInt m = t->pairs.n, n = t->fe->n_dof, entries = HycoPairsWidth(&t->pairs) * t->fe->dim * m;
-  PetscInt *start, *dof;
-  PetscReal *value;
   Vec F;
 
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(t->fe, mu));
-  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, n, data, &F));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, t->fe->n_dof, data, &F));
   PetscCall(HycoFEAssembleForce(t->fe, F));
   PetscCall(VecDestroy(&F));
-  PetscCall(PetscMalloc3(m + 1, &start, entries, &dof, entries, &value));
-  PetscCall(HycoContactRows(t->fe, &t->pairs, start, dof, value, data + n));
-  PetscCall(PetscFree3(start, dof, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a third value of p gives what two others say of F and of D, the other parameters at a share of their ranges.
- */
+/* Whether a third value of p gives what two others say of F, the other parameters at a share of their ranges. */
 static PetscErrorCode AffineAt(HycoTrainer t, PetscInt p, PetscReal share, PetscBool *affine)
 {
   static const PetscReal at[3] = {0.06, 0.93, 0.47};
-  const PetscInt n = t->fe->n_dof, sizes[2] = {n, t->pairs.n};
+  const PetscInt n = t->fe->n_dof;
   const PetscReal a = (at[1] - at[2]) / (at[1] - at[0]);
   HycoScene s = t->scene;
-  PetscReal mu[HYCO_MAX_PARAMETERS], *v[3];
+  PetscReal mu[HYCO_MAX_PARAMETERS], *v[3], lost = 0, size = 0;
 
   PetscFunctionBegin;
   for (PetscInt q = 0; q < s->n_parameters; q++) mu[q] = s->lo[q] + share * (s->hi[q] - s->lo[q]);
   for (PetscInt k = 0; k < 3; k++) {
     mu[p] = s->lo[p] + at[k] * (s->hi[p] - s->lo[p]);
-    PetscCall(PetscMalloc1(n + t->pairs.n, &v[k]));
-    PetscCall(LoadsAndGaps(t, mu, v[k]));
+    PetscCall(PetscMalloc1(n, &v[k]));
+    PetscCall(Loads(t, mu, v[k]));
   }
-  for (PetscInt part = 0, i = 0; part < 2; part++) {
-    PetscReal lost = 0, size = 0;
-
-    for (PetscInt end = i + sizes[part]; i < end; i++) {
-      lost = PetscMax(lost, PetscAbsReal(a * v[0][i] + (1 - a) * v[1][i] - v[2][i]));
-      size = PetscMax(size, PetscMax(PetscAbsReal(v[0][i]), PetscAbsReal(v[1][i])));
-    }
-    *affine = (PetscBool)(*affine && lost <= 1e-12 * size);
+  for (PetscInt i = 0; i < n; i++) {
+    lost = PetscMax(lost, PetscAbsReal(a * v[0][i] + (1 - a) * v[1][i] - v[2][i]));
+    size = PetscMax(size, PetscMax(PetscAbsReal(v[0][i]), PetscAbsReal(v[1][i])));
   }
+  *affine = (PetscBool)(*affine && lost <= 1e-12 * size);
   for (PetscInt k = 0; k < 3; k++) PetscCall(PetscFree(v[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the load at mu, at node s of the stiffness, is the sum of its training loads that their values say. Rank 0. */
+static PetscErrorCode CheckSum(HycoTrainer t, HycoCondensed c, PetscInt s, const PetscReal mu[], PetscBool *exact)
+{
+  const PetscInt n = t->fe->n_dof, nodes = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
+  PetscReal *weight, *rest, *F, at[HYCO_MAX_PARAMETERS], size = 0, lost = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(c->n_load, &weight, n, &rest, n, &F));
+  PetscCall(HycoCondensedLoadWeights(c, mu, s, weight, exact));
+  PetscCall(Loads(t, mu, rest));
+  for (PetscInt i = 0; i < n; i++) size = PetscMax(size, PetscAbsReal(rest[i]));
+  for (PetscInt j = 0; *exact && j < nodes; j++) {
+    if (c->node_stiff[j] != s) continue;
+    HycoCondensedPoint(c, j, at);
+    PetscCall(Loads(t, at, F));
+    for (PetscInt i = 0; i < n; i++) {
+      size = PetscMax(size, PetscAbsReal(F[i]));
+      rest[i] -= weight[c->node_load[j]] * F[i];
+    }
+  }
+  for (PetscInt i = 0; i < n; i++) lost = PetscMax(lost, PetscAbsReal(rest[i]));
+  *exact = (PetscBool)(*exact && lost <= 1e-11 * size);
+  PetscCall(PetscFree3(weight, rest, F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether loads come as sums of training loads: at several points for the values of all, for the first and the last
+   stiffness assembled. Rank 0. */
+static PetscErrorCode FindExactLoads(HycoTrainer t, HycoCondensed c)
+{
+  static const PetscReal share[3] = {0.31, 0.77, 0.53};
+  const PetscInt nodes = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
+  const HycoScene s = t->scene;
+  PetscReal mu[HYCO_MAX_PARAMETERS], at[HYCO_MAX_PARAMETERS], *weight;
+  PetscBool exact;
+
+  PetscFunctionBegin;
+  HycoCondensedPoint(c, 0, mu);
+  PetscCall(HycoFESetParameters(t->fe, mu));
+  PetscCall(HycoCondensedSurveyLoads(c, t->whole, t->fe->X, &exact));
+  if (!exact) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoCondensedPrepareLoads(c));
+  PetscCall(PetscMalloc1(c->n_load, &weight));
+  for (PetscInt k = 0; exact && k < 3; k++) {
+    for (PetscInt p = 0; p < c->dim; p++) mu[p] = s->lo[p] + share[(k + p) % 3] * (s->hi[p] - s->lo[p]);
+    for (PetscInt n = 0; exact && n < nodes / c->n_load; n++)
+      PetscCall(HycoCondensedLoadWeights(c, mu, n, weight, &exact));
+    for (PetscInt end = 0; exact && end < 2; end++) {
+      HycoCondensedPoint(c, end ? nodes - 1 : 0, at);
+      for (PetscInt p = 0; p < c->dim; p++) at[p] = c->stiff[p] ? at[p] : mu[p];
+      PetscCall(CheckSum(t, c, c->node_stiff[end ? nodes - 1 : 0], at, &exact));
+    }
+  }
+  PetscCall(PetscFree(weight));
+  c->exact_loads = exact;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerResetSurfaces(HycoTrainer t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEDestroy(&t->surfaces.fe));
+  PetscCall(HycoPairsDestroy(&t->surfaces.pairs));
+  PetscCall(HycoMeshDestroy(&t->surfaces.mesh));
+  PetscCall(PetscFree(t->surfaces.start));
+  PetscCall(PetscFree(t->surfaces.dof));
+  PetscCall(PetscFree(t->surfaces.value));
+  PetscCall(PetscFree(t->surfaces.gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The contacts' nodes and slave facets, and the gaps' place in the condensed model under training. Rank 0. */
+static PetscErrorCode TakeSurfaces(HycoTrainer t, HycoCondensed c)
+{
+  const PetscInt n = t->whole->n_nodes, m = t->pairs.n, entries = HycoPairsWidth(&t->pairs) * t->whole->dim * m;
+  PetscBool *contact;
+  PetscInt *extra, *index, *all, n_extra = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTrainerResetSurfaces(t));
+  PetscCall(PetscCalloc1(n, &contact));
+  PetscCall(PetscMalloc3(n, &extra, n, &index, t->scene->n_contacts, &all));
+  HycoPairsMark(&t->pairs, contact);
+  for (PetscInt i = 0; i < n; i++) {
+    if (contact[i]) extra[n_extra++] = i;
+  }
+  for (PetscInt k = 0; k < t->scene->n_contacts; k++)
+    PetscCall(HycoMeshFindGroup(t->whole, "contact", t->scene->contact[k].slave, &all[k]));
+  PetscCall(HycoMeshExtract(t->whole, 0, NULL, n_extra, extra, t->scene->n_contacts, all, &t->surfaces.mesh));
+  for (PetscInt i = 0; i < t->surfaces.mesh->n_nodes; i++) index[t->surfaces.mesh->node_whole[i]] = i;
+  PetscCall(HycoPairsRenumber(&t->pairs, index, &t->surfaces.pairs));
+  PetscCall(HycoFECreate(t->scene, t->surfaces.mesh, &t->surfaces.fe));
+  PetscCall(PetscMalloc1(m + 1, &t->surfaces.start));
+  PetscCall(PetscMalloc1(entries, &t->surfaces.dof));
+  PetscCall(PetscMalloc1(entries, &t->surfaces.value));
+  PetscCall(PetscMalloc1(m, &t->surfaces.gap));
+  c->given = (HycoGapSource){t->surfaces.fe,  &t->surfaces.pairs, t->surfaces.start,
+                             t->surfaces.dof, t->surfaces.value,  t->surfaces.gap};
+  PetscCall(PetscFree3(extra, index, all));
+  PetscCall(PetscFree(contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -151,10 +244,14 @@ static PetscErrorCode Inspect(HycoTrainer t, HycoCondensed c)
 
   PetscFunctionBegin;
   PetscCall(FindStiff(t, c));
+  PetscCall(HycoCondensedAllocate(c));
+  c->exact_gap = 1;
+  PetscCall(TakeSurfaces(t, c));
+  PetscCall(FindExactLoads(t, c));
   for (PetscInt p = 0; p < c->dim; p++) {
     PetscBool affine = (PetscBool)!c->stiff[p];
 
-    for (PetscInt k = 0; affine && k < 2; k++) PetscCall(AffineAt(t, p, k ? 0.71 : 0.38, &affine));
+    for (PetscInt k = 0; affine && !c->exact_loads && k < 2; k++) PetscCall(AffineAt(t, p, k ? 0.71 : 0.38, &affine));
     c->affine[p] = affine;
   }
   PetscCall(HycoFEFreeMotions(t->fe, &motions));
@@ -187,6 +284,7 @@ PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t)
   PetscCall(HycoCondensedDestroy(&t->condensed));
   PetscCall(HycoCondensedCreate(t->scene->n_parameters, m, 0, &c));
   t->condensed = c;
+  c->scene = t->scene;
   PetscCall(FindGrid(t, c));
   HycoOnRoot(t->comm, Inspect(t, c));
   PetscCallMPI(MPI_Bcast(c->stiff, HYCO_MAX_PARAMETERS, MPIU_INT, 0, t->comm));
@@ -212,20 +310,22 @@ PetscInt HycoCondensedNode(HycoCondensed c, const HycoGridField *f, PetscInt k)
   return node;
 }
 
-/* g = D - B U - G L of one snapshot. */
+/* -B K^-1 F = -B U - G L of one snapshot; 0 where it is the difference of what is much larger. */
 static PetscErrorCode FreeGap(HycoTrainer t, const PetscReal mu[], const PetscReal U[], const PetscReal L[],
                               const PetscReal packed[], PetscReal g[])
 {
   const PetscInt m = t->pairs.n, entries = HycoPairsWidth(&t->pairs) * t->fe->dim * m;
   PetscInt *start, *dof;
-  PetscReal *value;
+  PetscReal *value, moved = 0, left = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(m + 1, &start, entries, &dof, entries, &value));
   PetscCall(HycoFESetParameters(t->fe, mu));
   PetscCall(HycoContactRows(t->fe, &t->pairs, start, dof, value, g));
   for (PetscInt k = 0; k < m; k++) {
+    g[k] = 0;
     for (PetscInt j = start[k]; j < start[k + 1]; j++) g[k] -= value[j] * U[dof[j]];
+    moved = PetscMax(moved, PetscAbsReal(g[k]));
   }
   for (PetscInt j = 0; j < m; j++) {
     g[j] -= packed[0] * L[j];
@@ -235,6 +335,8 @@ static PetscErrorCode FreeGap(HycoTrainer t, const PetscReal mu[], const PetscRe
     }
     packed += m - j;
   }
+  for (PetscInt k = 0; k < m; k++) left = PetscMax(left, PetscAbsReal(g[k]));
+  if (left <= NO_LOAD * moved) PetscCall(PetscArrayzero(g, m));
   PetscCall(PetscFree3(start, dof, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -11,6 +11,7 @@
 #define AFFINE_VALUES 5
 #define FIRST_VALUES  3
 #define LEJA_GRID     2000
+#define TIE           1e-6 /* relative: of parameters that cost nearly the same the first is refined, on any number of ranks */
 
 /* n Leja points of [lo, hi]: the ends, then each where the product of the distances to those before is largest. */
 static void LejaPoints(PetscInt n, PetscReal lo, PetscReal hi, PetscReal x[])
@@ -84,7 +85,7 @@ static PetscInt Choose(HycoTrainer t, PetscBool *met)
   for (PetscInt p = 0; p < c->dim; p++) {
     sum += c->by_parameter[p];
     if (c->n[p] >= t->condensed_max_values || c->affine[p] || c->n[p] == 1) continue;
-    if (worst < 0 || c->by_parameter[p] > c->by_parameter[worst]) worst = p;
+    if (worst < 0 || c->by_parameter[p] > (1 + TIE) * c->by_parameter[worst]) worst = p;
   }
   *met = (PetscBool)(sum <= t->condensed_tol);
   return *met ? -1 : worst;

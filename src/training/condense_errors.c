@@ -52,7 +52,7 @@ static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal
   if (node != w->last || c->stiff[w->p])
     PetscCall(HycoCondensedFlexibility(c, mu, c->stiff[w->p] ? w->p : -1, c->stiff[w->p] ? w->i : -1, &w->definite));
   w->last = node;
-  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_GAP], mu, w->p, w->i, c->g));
+  PetscCall(HycoCondensedFreeGap(c, mu, w->p, w->i));
   for (PetscInt j = 0; j < c->m; j++) c->active[j] = (PetscBool)(own[j] > 0);
   if (w->definite)
     PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, w->L,
@@ -77,7 +77,7 @@ static PetscErrorCode PredictDisplacement(HycoTrainer t, HycoCondensed c, PetscI
   }
   w->u_forces = Relative(Norm(r, w->d, NULL), t->U_norm[s], w->largest_u);
   PetscCall(HycoGridFieldEvaluate(H, mu, c->stiff[w->p] ? w->p : -1, c->stiff[w->p] ? w->i : -1, c->H));
-  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_FREE], mu, w->p, w->i, c->a));
+  PetscCall(HycoCondensedEvaluate(c, HYCO_FIELD_FREE, mu, w->p, w->i, c->a));
   for (PetscInt i = 0; i < r; i++) {
     for (PetscInt j = 0; j < m; j++) c->a[i] -= c->H[i * m + j] * w->L[j];
   }
@@ -125,7 +125,7 @@ static PetscErrorCode KeepModes(HycoTrainer t, HycoCondensed c, PetscInt p, Pets
   }
   PetscCall(PetscCalloc1(PetscMax(r, count) + 1, &sigma));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, r, count, columns, &S));
-  PetscCall(HycoPOD(S, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, t->max_modes, &V, &kept->l, sigma));
+  PetscCall(HycoPOD(S, HycoTrainerModesTolerance(t), t->noise, t->max_modes, &V, &kept->l, sigma));
   PetscCall(PetscMalloc1((size_t)r * (size_t)kept->l + 1, &kept->V));
   if (kept->l) {
     PetscCall(MatDenseGetArrayRead(V, &v));

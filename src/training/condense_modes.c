@@ -17,8 +17,15 @@
 #define FREE_CONTACTS  700 /* beyond so many contacts fewer, by the square: a sample's cost grows with it, at least */
 #define HELD           4   /* one of so many samples is held out of the patterns, and judges them */
 #define SHARE          0.95
+#define ACTIVE         1e-8   /* of the largest training force: contacts of a sample with less are open */
+#define LEAST_STEP     0x1p-11 /* of the training values' box: ways are not halved further */
 #define MOST_RESPONSES 5e7 /* numbers of all responses: 400 MB */
 #define SMALL          1e-2
+
+PetscReal HycoTrainerModesTolerance(HycoTrainer t)
+{
+  return PetscMin(t->condensed_pod_tol, t->tol[HYCO_SEED_DISPLACEMENT]);
+}
 
 /* Halton's sequence in base b. */
 static PetscReal Halton(PetscInt i, PetscInt b)
@@ -83,7 +90,7 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
 
   PetscFunctionBegin;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
-  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_GAP], mu, -1, -1, c->g));
+  PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
   for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(nearest[i] > 0);
   if (definite)
     PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, L,
@@ -92,42 +99,59 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscReal Largest(PetscInt m, const PetscReal L[])
+/* The contacts that are active at one of two samples alone. What counts as active has one measure for all samples: where
+   gaps and loads vanish together, the forces are round-off, which differs from one number of ranks to the next. */
+static PetscInt Differ(PetscInt m, const PetscReal a[], const PetscReal b[], PetscReal least)
 {
-  PetscReal largest = 0;
-
-  for (PetscInt i = 0; i < m; i++) largest = PetscMax(largest, L[i]);
-  return largest;
-}
-
-/* The contacts that are active, beyond round-off, at one of two samples alone. */
-static PetscInt Differ(PetscInt m, const PetscReal a[], const PetscReal b[])
-{
-  const PetscReal least[2] = {1e-8 * Largest(m, a), 1e-8 * Largest(m, b)};
   PetscInt n = 0;
 
-  for (PetscInt i = 0; i < m; i++) n += (a[i] > least[0]) != (b[i] > least[1]);
+  for (PetscInt i = 0; i < m; i++) n += (a[i] > least) != (b[i] > least);
   return n;
 }
+
+/* The distance of two samples, each parameter scaled to its training values. */
+static PetscReal Apart(HycoCondensed c, const PetscReal a[], const PetscReal b[])
+{
+  PetscReal most = 0;
+
+  for (PetscInt p = 0; p < c->dim; p++) {
+    if (c->n[p] > 1) most = PetscMax(most, PetscAbsReal(a[p] - b[p]) / (c->x[p][c->n[p] - 1] - c->x[p][0]));
+  }
+  return most;
+}
+
+/* A part of a way between two samples, and by how many active contacts these differ; 0: it is short enough. */
+typedef struct {
+  PetscInt from, to, differ;
+} Way;
 
 /* The point of sample k: halfway between the two neighbours on a way whose active contacts differ most, and which are
    then neighbours no more; where none differ, the next point all over. Forces are affine in the parameters of affine
    kind as long as a set stays, so that sets are what the patterns need, and many may pass in a small part of a way. */
-static void PointBetween(HycoTrainer t, PetscInt k, PetscInt (*way)[3], PetscInt *n_ways, PetscReal mu[])
+static void PointBetween(HycoTrainer t, PetscInt k, Way way[], PetscInt *n_ways, PetscReal mu[])
 {
   const PetscInt dim = t->condensed->dim;
   PetscInt best = 0;
 
-  for (PetscInt j = 1; j < *n_ways; j++) best = way[j][2] > way[best][2] ? j : best;
-  if (!*n_ways || !way[best][2]) {
+  for (PetscInt j = 1; j < *n_ways; j++) best = way[j].differ > way[best].differ ? j : best;
+  if (!*n_ways || !way[best].differ) {
     SamplePoint(t, k, mu + k * dim);
     return;
   }
-  for (PetscInt p = 0; p < dim; p++) mu[k * dim + p] = (mu[way[best][0] * dim + p] + mu[way[best][1] * dim + p]) / 2;
-  way[*n_ways][0] = k;
-  way[(*n_ways)++][1] = way[best][1];
-  way[best][1] = k;
-  way[best][2] = 0; /* both are counted when the forces are there */
+  for (PetscInt p = 0; p < dim; p++) mu[k * dim + p] = (mu[way[best].from * dim + p] + mu[way[best].to * dim + p]) / 2;
+  way[(*n_ways)++] = (Way){k, way[best].to, 0}; /* both are counted when the forces are there */
+  way[best].to = k;
+  way[best].differ = 0;
+}
+
+/* The largest training force. */
+static PetscReal Largest(HycoTrainer t)
+{
+  const size_t n = (size_t)t->n_s * (size_t)t->condensed->m;
+  PetscReal largest = 0;
+
+  for (size_t i = 0; i < n; i++) largest = PetscMax(largest, t->Lambda[i]);
+  return largest;
 }
 
 /* n samples: their points (n x dim) and forces (m x n). */
@@ -135,7 +159,9 @@ static PetscErrorCode SampleAll(HycoTrainer t, PetscInt n, PetscReal mu[], Petsc
 {
   HycoCondensed c = t->condensed;
   const PetscInt dim = c->dim, m = c->m;
-  PetscInt(*way)[3], n_ways = 0;
+  const PetscReal least = ACTIVE * Largest(t);
+  PetscInt n_ways = 0;
+  Way *way;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(n + WAYS, &way));
@@ -145,13 +171,14 @@ static PetscErrorCode SampleAll(HycoTrainer t, PetscInt n, PetscReal mu[], Petsc
     else
       PointBetween(t, k, way, &n_ways, mu);
     PetscCall(SampleForces(c, mu + k * dim, L + (size_t)k * (size_t)m));
-    if (k && k <= WAYS && k < n / 2) {
-      way[n_ways][0] = k - 1;
-      way[n_ways++][1] = k;
-    }
+    if (k && k <= WAYS && k < n / 2) way[n_ways++] = (Way){k - 1, k, 0};
     for (PetscInt j = 0; j < n_ways; j++) {
-      if (way[j][0] == k || way[j][1] == k)
-        way[j][2] = Differ(m, L + (size_t)way[j][0] * (size_t)m, L + (size_t)way[j][1] * (size_t)m);
+      const PetscInt from = way[j].from, to = way[j].to;
+
+      if (from != k && to != k) continue;
+      way[j].differ = Apart(c, mu + from * dim, mu + to * dim) < LEAST_STEP
+                          ? 0
+                          : Differ(m, L + (size_t)from * (size_t)m, L + (size_t)to * (size_t)m, least);
     }
   }
   PetscCall(PetscFree(way));
@@ -186,7 +213,7 @@ static PetscErrorCode Decompose(HycoTrainer t, PetscInt n, PetscReal L[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(PetscMax(m, n), &sigma));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, L, &F));
-  PetscCall(HycoPOD(F, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
+  PetscCall(HycoPOD(F, HycoTrainerModesTolerance(t), t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
                     sigma));
   PetscCall(MatDestroy(&F));
   PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &x->Q));
@@ -312,8 +339,8 @@ static PetscErrorCode TakeModes(HycoTrainer t, Mat V, PetscInt n_sigma, PetscRea
   const PetscInt N = t->sizes[0] * t->sizes[3];
 
   PetscFunctionBegin;
-  t->l = HycoPODRank(n_sigma, sigma, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, t->max_modes);
-  HycoCheck(t->l, "-hyco_pod_tol %g leaves no mode; give less", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+  t->l = HycoPODRank(n_sigma, sigma, HycoTrainerModesTolerance(t), t->noise, t->max_modes);
+  HycoCheck(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoTrainerModesTolerance(t));
   PetscCall(PetscFree(t->sigma));
   t->sigma = sigma;
   PetscCall(PetscFree(t->VtU));

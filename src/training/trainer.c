@@ -18,6 +18,7 @@ PetscErrorCode HycoTrainerCreate(MPI_Comm comm, HycoScene scene, HycoTrainer *tr
   t->noise = 1e-11;
   t->nnmf_max_its = 100;
   t->condensed_tol = 1e-7;
+  t->condensed_pod_tol = 1e-14;
   t->condensed_max_values = 24;
   t->greedy.target = 1e-3;
   t->ridge = -1;
@@ -34,6 +35,7 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t)
 {
   PetscFunctionBegin;
   PetscCall(HycoTrainerResetBases(t));
+  PetscCall(HycoTrainerResetSurfaces(t));
   PetscCall(HycoFEDestroy(&t->fe));
   PetscCall(HycoPairsDestroy(&t->pairs));
   PetscCall(HycoMetDestroy(&t->met));
@@ -235,6 +237,7 @@ static PetscErrorCode ReadType(HycoTrainer t)
   PetscCall(HycoOptionsInt(o, "hyco_nnmf_max_its", 1, PETSC_MAX_INT, &t->nnmf_max_its));
   PetscCall(HycoOptionsInt(o, "hyco_nnmf_vectors", 0, PETSC_MAX_INT, &t->nnmf_vectors));
   PetscCall(HycoOptionsReal(o, "hyco_condensed_tol", 0, 1, &t->condensed_tol));
+  PetscCall(HycoOptionsReal(o, "hyco_condensed_pod_tol", 0, 1, &t->condensed_pod_tol));
   PetscCall(HycoOptionsInt(o, "hyco_condensed_max_values", 3, 1000, &t->condensed_max_values));
   t->type = (HycoModelType)type;
   t->dual = (HycoDual)dual;
