@@ -88,7 +88,7 @@ PetscErrorCode HycoGapNearKernel(HycoSolver s, Mat Kw);
 /* Factors K and makes S unless K and B are as they were; dual form. Collective. */
 PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular);
 /* After a solve in the dual form with a small dense K: makes S again, refined, for one more solve; *done is false where
-   there is nothing to refine. HycoDualForget() ends it: each solve begins alike. */
+   that changes nothing. HycoDualForget() ends it: each solve begins alike. */
 PetscErrorCode HycoDualRefine(HycoSolver s, PetscBool *done);
 void HycoDualForget(HycoSolver s);
 /* x = K^-1 r by that factor, refined once. Collective. */

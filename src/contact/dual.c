@@ -454,16 +454,27 @@ static PetscErrorCode CloseGaps(HycoSolver s, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where refinement changes S by no more than this share of its largest entry, nothing was lost to round-off. */
+#define SAME_FLEXIBILITY 1e-12
+
 PetscErrorCode HycoDualRefine(HycoSolver s, PetscBool *done)
 {
-  PetscReal begin = HycoNow();
+  const size_t entries = (size_t)s->m * (size_t)s->m;
+  PetscReal *before, change = 0, size = 0, begin = HycoNow();
 
   PetscFunctionBegin;
-  *done = (PetscBool)(s->lu && s->condensed.K && !s->refined);
-  if (!*done) PetscFunctionReturn(PETSC_SUCCESS);
+  *done = PETSC_FALSE;
+  if (!s->lu || !s->condensed.K || !s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoDuplicate(entries, s->S, &before);
   s->refined = PETSC_TRUE;
-  s->started = PETSC_FALSE;
-  if (s->system->m) HycoLogged(HYCO_EVENT_FACTOR, CondenseDense(s));
+  HycoLogged(HYCO_EVENT_FACTOR, CondenseDense(s));
+  for (size_t k = 0; k < entries; k++) {
+    change = PetscMax(change, PetscAbsReal(s->S[k] - before[k]));
+    size = PetscMax(size, PetscAbsReal(s->S[k]));
+  }
+  s->refined = *done = (PetscBool)(change > SAME_FLEXIBILITY * size);
+  if (!*done) PetscCall(PetscArraycpy(s->S, before, entries));
+  PetscCall(PetscFree(before));
   s->seconds_factor += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
