@@ -2,15 +2,11 @@
 #ifndef HYCOIMPL_H
 #define HYCOIMPL_H
 
+#include <hycocompat.h>
 #include <hycosys.h>
 #include <petscmat.h>
 #include <stdio.h>
 #include <strings.h>
-
-/* The code reads as for the newest supported PETSc; what older ones lack is here. */
-#if PETSC_VERSION_LT(3, 19, 0)
-#define PETSC_SUCCESS ((PetscErrorCode)0)
-#endif
 
 /* Length of a message or a name that the library builds. */
 #define HYCO_LINE 1024

@@ -3,6 +3,7 @@
 #define HYCOLINEAR_H
 
 #include <hycoimpl.h>
+#include <petscblaslapack.h>
 #include <petscksp.h>
 
 /* What a form keeps between solves while K and B stay as they are. */
@@ -45,6 +46,15 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
 
 /* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);
+
+/* -- dense systems on one process, in twice the working precision -- */
+
+/* sum[0] + sum[1] += a b; sum[1] is what sum[0] cannot hold. */
+void HycoAddProduct(PetscReal a, PetscReal b, PetscReal sum[2]);
+/* Refines x, K x = b + low (low may be NULL: 0), K n x n column major with leading dimension lda, lu and ipiv its
+   factors by LAPACK's getrf, until x is right to round-off or no step helps. */
+PetscErrorCode HycoRefine(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda, const PetscReal lu[],
+                          const PetscBLASInt ipiv[], const PetscReal b[], const PetscReal low[], PetscReal x[]);
 
 /* -- PETSc's solvers -- */
 

@@ -43,7 +43,8 @@ struct _p_HycoSolver {
   PetscReal bytes;   /* estimated for it, all ranks together */
   PetscReal *lu;     /* dense: LAPACK's factors, column major n x n */
   PetscBLASInt *ipiv, n_lu;
-  PetscReal *X; /* its work: K^-1 Bt, n x m */
+  PetscReal *X;      /* its work: K^-1 Bt, n x m */
+  PetscBool refined; /* solves with it are refined in twice the working precision, S too */
   /* dual form, replicated on every rank: column-major m x m flexibility, gap without forces */
   PetscInt m, p; /* contacts; unknowns pinned because K is singular: they come before the contacts in S, g and L */
   PetscReal *S, *g, *L;
@@ -86,6 +87,10 @@ extern const char *const HycoLinearNames[];
 PetscErrorCode HycoGapNearKernel(HycoSolver s, Mat Kw);
 /* Factors K and makes S unless K and B are as they were; dual form. Collective. */
 PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular);
+/* After a solve in the dual form with a small dense K: makes S again, refined, for one more solve; *done is false where
+   that changes nothing. HycoDualForget() ends it: each solve begins alike. */
+PetscErrorCode HycoDualRefine(HycoSolver s, PetscBool *done);
+void HycoDualForget(HycoSolver s);
 /* x = K^-1 r by that factor, refined once. Collective. */
 PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x);
 /* K^-1 F of the next solve, which takes it for granted if it uses the dual form and K is regular. Borrowed until then.

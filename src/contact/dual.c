@@ -73,6 +73,42 @@ static PetscErrorCode FactorSparse(HycoSolver s, PetscBool *singular)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n right-hand sides b and their solutions x, refined; low: what b could not hold, NULL where that is nothing. */
+static PetscErrorCode RefineDense(HycoSolver s, PetscInt n, const PetscReal b[], const PetscReal low[], PetscReal x[])
+{
+  const PetscScalar *K;
+  PetscInt lda;
+  PetscBLASInt ld;
+
+  PetscFunctionBegin;
+  PetscCall(MatDenseGetLDA(s->system->K, &lda));
+  PetscCall(PetscBLASIntCast(lda, &ld));
+  PetscCall(MatDenseGetArrayRead(s->system->K, &K));
+  for (PetscInt j = 0; j < n; j++)
+    PetscCall(HycoRefine(s->n_lu, K, ld, s->lu, s->ipiv, b + (size_t)j * (size_t)s->n_lu, low,
+                         x + (size_t)j * (size_t)s->n_lu));
+  PetscCall(MatDenseRestoreArrayRead(s->system->K, &K));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* S = B X, each entry rounded once; symmetric where it should be. */
+static void RefineProduct(HycoSolver s, const PetscReal B[], const PetscReal X[])
+{
+  const size_t m = (size_t)s->m, n = (size_t)s->n_lu;
+
+  for (size_t j = 0; j < m; j++) {
+    for (size_t i = 0; i < m; i++) {
+      PetscReal sum[2] = {0, 0};
+
+      for (size_t k = 0; k < n; k++) HycoAddProduct(B[k * m + i], X[j * n + k], sum);
+      s->S[j * m + i] = sum[0] + sum[1];
+    }
+  }
+  for (size_t j = 0; j < m && s->system->symmetric; j++) {
+    for (size_t i = 0; i < j; i++) s->S[i * m + j] = s->S[j * m + i] = 0.5 * (s->S[i * m + j] + s->S[j * m + i]);
+  }
+}
+
 /* S = B K^-1 Bt with everything dense on one process. */
 static PetscErrorCode CondenseDense(HycoSolver s)
 {
@@ -88,8 +124,16 @@ static PetscErrorCode CondenseDense(HycoSolver s)
   PetscCall(PetscArraycpy(X, bt, (size_t)n * (size_t)m));
   PetscCall(MatDenseRestoreArrayRead(s->system->Bt, &bt));
   LAPACKgetrs_("N", &n, &m, s->lu, &n, s->ipiv, X, &n, &info);
+  if (s->refined) {
+    PetscCall(MatDenseGetArrayRead(s->system->Bt, &bt));
+    PetscCall(RefineDense(s, m, bt, NULL, X));
+    PetscCall(MatDenseRestoreArrayRead(s->system->Bt, &bt));
+  }
   PetscCall(MatDenseGetArrayRead(s->system->B, &b));
-  BLASgemm_("N", "N", &m, &m, &n, &one, b, &m, X, &n, &zero, s->S, &m);
+  if (s->refined)
+    RefineProduct(s, b, X);
+  else
+    BLASgemm_("N", "N", &m, &m, &n, &one, b, &m, X, &n, &zero, s->S, &m);
   PetscCall(MatDenseRestoreArrayRead(s->system->B, &b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -105,6 +149,13 @@ static PetscErrorCode SolveK(HycoSolver s, Vec r, Vec x)
     PetscCall(VecCopy(r, x));
     PetscCall(VecGetArray(x, &v));
     LAPACKgetrs_("N", &s->n_lu, &one, s->lu, &s->n_lu, s->ipiv, v, &s->n_lu, &info);
+    if (s->refined) {
+      const PetscScalar *b;
+
+      PetscCall(VecGetArrayRead(r, &b));
+      PetscCall(RefineDense(s, 1, b, NULL, v));
+      PetscCall(VecRestoreArrayRead(r, &b));
+    }
     PetscCall(VecRestoreArray(x, &v));
   } else
     PetscCall(HycoDirectSolve(s->direct, r, x));
@@ -272,6 +323,35 @@ static PetscErrorCode AddForces(HycoSolver s, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x is refined against F - Bt L, which double precision does not hold. */
+static PetscErrorCode RefineRecovered(HycoSolver s, Vec x)
+{
+  HycoSystem y = s->system;
+  const size_t n = (size_t)s->n_lu;
+  const PetscScalar *F, *bt = NULL;
+  PetscScalar *v;
+  PetscReal *b, *low;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n, &b, n, &low));
+  if (y->m) PetscCall(MatDenseGetArrayRead(y->Bt, &bt));
+  PetscCall(VecGetArrayRead(y->F, &F));
+  for (size_t i = 0; i < n; i++) {
+    PetscReal sum[2] = {F[i], 0};
+
+    for (size_t k = 0; k < (size_t)y->m; k++) HycoAddProduct(-bt[k * n + i], s->L[k], sum);
+    b[i] = sum[0];
+    low[i] = sum[1];
+  }
+  PetscCall(VecRestoreArrayRead(y->F, &F));
+  if (y->m) PetscCall(MatDenseRestoreArrayRead(y->Bt, &bt));
+  PetscCall(VecGetArray(x, &v));
+  PetscCall(RefineDense(s, 1, b, low, v));
+  PetscCall(VecRestoreArray(x, &v));
+  PetscCall(PetscFree2(b, low));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* x = K^-1 (F - Bt L), with one step of refinement when round-off shows. */
 static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
 {
@@ -290,6 +370,10 @@ static PetscErrorCode Recover(HycoSolver s, Vec x, Vec L)
   else {
     PetscCall(Residual(y, NULL, L, work, r));
     PetscCall(SolveK(s, r, x));
+  }
+  if (s->refined) {
+    PetscCall(RefineRecovered(s, x));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecNorm(y->F, NORM_2, &size));
   PetscCall(Residual(y, x, L, work, r));
@@ -368,6 +452,37 @@ static PetscErrorCode CloseGaps(HycoSolver s, Vec x, Vec L)
   if (!singular) PetscCall(Shift(s, change, x, L));
   PetscCall(PetscFree2(a, change));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where refinement changes S by no more than this share of its largest entry, nothing was lost to round-off. */
+#define SAME_FLEXIBILITY 1e-12
+
+PetscErrorCode HycoDualRefine(HycoSolver s, PetscBool *done)
+{
+  const size_t entries = (size_t)s->m * (size_t)s->m;
+  PetscReal *before, change = 0, size = 0, begin = HycoNow();
+
+  PetscFunctionBegin;
+  *done = PETSC_FALSE;
+  if (!s->lu || !s->condensed.K || !s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoDuplicate(entries, s->S, &before);
+  s->refined = PETSC_TRUE;
+  HycoLogged(HYCO_EVENT_FACTOR, CondenseDense(s));
+  for (size_t k = 0; k < entries; k++) {
+    change = PetscMax(change, PetscAbsReal(s->S[k] - before[k]));
+    size = PetscMax(size, PetscAbsReal(s->S[k]));
+  }
+  s->refined = *done = (PetscBool)(change > SAME_FLEXIBILITY * size);
+  if (!*done) PetscCall(PetscArraycpy(s->S, before, entries));
+  PetscCall(PetscFree(before));
+  s->seconds_factor += HycoNow() - begin;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoDualForget(HycoSolver s)
+{
+  if (s->refined) s->condensed.K = 0;
+  s->refined = PETSC_FALSE;
 }
 
 PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular)

@@ -241,7 +241,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
 {
   HycoForm form;
   PetscInt type, its, n_free = 0;
-  PetscBool fell_back = PETSC_FALSE;
+  PetscBool fell_back = PETSC_FALSE, refined = PETSC_FALSE;
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
@@ -256,6 +256,11 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   PetscCall(HycoChooseTao(s, form));
   PetscCall(Attempt(s, type, form, x, L));
   its = s->its;
+  if (s->reason < 0 && form == HYCO_FORM_DUAL) PetscCall(HycoDualRefine(s, &refined));
+  if (refined) {
+    PetscCall(Attempt(s, type, form, x, L));
+    its += s->its;
+  }
   while (NextAttempt(s, &type, &form)) {
     char before[sizeof(s->method)], next[32];
 
@@ -267,6 +272,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
     PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then %s", before, next));
   }
   s->its = its;
+  HycoDualForget(s);
   if (s->reason < 0) PetscCall(HycoKernelSize(s->system->K, &n_free));
   if (n_free) s->reason = HYCO_DIVERGED_UNHELD;
   if (fell_back && s->reason == HYCO_CONVERGED) s->reason = HYCO_CONVERGED_FALLBACK;

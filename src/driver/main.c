@@ -146,7 +146,7 @@ static PetscErrorCode Start(int *argc, char ***argv)
 {
   PetscErrorCode (*const printf_of_petsc)(const char[], ...) = PetscErrorPrintf;
   PetscErrorCode ierr;
-  char *said = NULL;
+  HycoErrorText said = NULL;
 
   PetscErrorPrintf = PrintNothing;
   ierr = HycoInitialize(argc, argv);

@@ -83,14 +83,43 @@ static PetscErrorCode SetKernel(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Modified Gram-Schmidt, twice; what depends on those before goes. */
+static PetscErrorCode Orthonormalize(PetscInt *n, Vec v[])
+{
+  PetscInt kept = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < *n; k++) {
+    PetscReal before, size;
+    Vec w = v[k];
+
+    PetscCall(VecNorm(w, NORM_2, &before));
+    for (PetscInt j = 0; j < 2 * kept; j++) {
+      PetscScalar dot;
+
+      PetscCall(VecDot(w, v[j % kept], &dot));
+      PetscCall(VecAXPY(w, -dot, v[j % kept]));
+    }
+    PetscCall(VecNorm(w, NORM_2, &size));
+    if (size > 1e-8 * before) {
+      PetscCall(VecScale(w, 1 / size));
+      v[k] = v[kept];
+      v[kept++] = w;
+    }
+  }
+  for (PetscInt k = kept; k < *n; k++) PetscCall(VecDestroy(&v[k]));
+  *n = kept;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Translations and rotations of the moved nodes, zero where fixed. */
 static PetscErrorCode SetNearKernel(HycoFOM f)
 {
   const PetscInt dim = f->fe->dim;
-  MatNullSpace near;
+  MatNullSpace rigid, near;
   PetscInt n;
   const Vec *v;
-  Vec x;
+  Vec x, *moves;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(f->U, &x));
@@ -103,20 +132,28 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
   }
   PetscCall(VecAssemblyBegin(x));
   PetscCall(VecAssemblyEnd(x));
-  PetscCall(MatNullSpaceCreateRigidBody(x, &near));
-  PetscCall(MatNullSpaceGetVecs(near, NULL, &n, &v));
+  PetscCall(MatNullSpaceCreateRigidBody(x, &rigid));
+  PetscCall(MatNullSpaceGetVecs(rigid, NULL, &n, &v)); /* lent for reading */
+  PetscCall(PetscMalloc1(n, &moves));
   for (PetscInt k = 0; k < n; k++) {
+    PetscCall(VecDuplicate(v[k], &moves[k]));
+    PetscCall(VecCopy(v[k], moves[k]));
     for (PetscInt i = 0; i < f->part->n_nodes * dim; i++) {
       const PetscInt node = f->part->node_global ? f->part->node_global[i / dim] : i / dim;
 
       if (f->fe->fixed[i] && node >= f->first && node < f->first + f->n_owned)
-        PetscCall(VecSetValue(v[k], node * dim + i % dim, 0, INSERT_VALUES));
+        PetscCall(VecSetValue(moves[k], node * dim + i % dim, 0, INSERT_VALUES));
     }
-    PetscCall(VecAssemblyBegin(v[k]));
-    PetscCall(VecAssemblyEnd(v[k]));
+    PetscCall(VecAssemblyBegin(moves[k]));
+    PetscCall(VecAssemblyEnd(moves[k]));
   }
+  PetscCall(Orthonormalize(&n, moves));
+  PetscCall(MatNullSpaceCreate(f->comm, PETSC_FALSE, n, moves, &near));
   PetscCall(MatSetNearNullSpace(f->K, near));
   PetscCall(MatNullSpaceDestroy(&near));
+  PetscCall(MatNullSpaceDestroy(&rigid));
+  for (PetscInt k = 0; k < n; k++) PetscCall(VecDestroy(&moves[k]));
+  PetscCall(PetscFree(moves));
   PetscCall(VecDestroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

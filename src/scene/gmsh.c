@@ -3,8 +3,8 @@
   comes out has finite coordinates, cells of one type, each in one body, facets that bound exactly one cell.
 */
 #include <hycomesh.h>
+#include "libgmsh.h"
 #include "msh.h"
-#include <gmshc.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -13,6 +13,8 @@ static const int gmsh_type[HYCO_N_CELL_TYPES] = {1, 2, 3, 4, 5};
 static const PetscInt cell_dim[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 3};
 static const PetscInt cell_nodes[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 8};
 static const PetscInt facet_nodes[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 4};
+
+static const HycoGmsh *gmsh;
 
 /* What one physical group holds, as read. */
 typedef struct {
@@ -42,9 +44,9 @@ static PetscErrorCode CheckGmsh(int ierr, const char path[])
 
   PetscFunctionBegin;
   if (!ierr) PetscFunctionReturn(PETSC_SUCCESS);
-  gmshLoggerGetLastError(&why, &ignore);
+  gmsh->gmshLoggerGetLastError(&why, &ignore);
   snprintf(line, sizeof(line), "%s", why ? why : "unknown");
-  gmshFree(why);
+  gmsh->gmshFree(why);
   HycoFail("the mesh %s cannot be read: %s", path, line);
 }
 
@@ -85,15 +87,15 @@ static PetscErrorCode ReadEntity(const char path[], Group *g, int entity)
   PetscErrorCode refused = 0;
 
   PetscFunctionBegin;
-  gmshModelMeshGetElements(&types, &n_types, &ids, &n_ids, &nn, &nodes, &n_nodes, &mm, g->dim, entity, &ierr);
+  gmsh->gmshModelMeshGetElements(&types, &n_types, &ids, &n_ids, &nn, &nodes, &n_nodes, &mm, g->dim, entity, &ierr);
   if (!ierr) refused = AddElements(path, g, n_types, types, ids, n_ids, nodes, n_nodes);
-  for (size_t t = 0; t < nn; t++) gmshFree(ids[t]);
-  for (size_t t = 0; t < mm; t++) gmshFree(nodes[t]);
-  gmshFree(ids);
-  gmshFree(n_ids);
-  gmshFree(nodes);
-  gmshFree(n_nodes);
-  gmshFree(types);
+  for (size_t t = 0; t < nn; t++) gmsh->gmshFree(ids[t]);
+  for (size_t t = 0; t < mm; t++) gmsh->gmshFree(nodes[t]);
+  gmsh->gmshFree(ids);
+  gmsh->gmshFree(n_ids);
+  gmsh->gmshFree(nodes);
+  gmsh->gmshFree(n_nodes);
+  gmsh->gmshFree(types);
   PetscCall(CheckGmsh(ierr, path));
   PetscCall(refused);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -107,20 +109,20 @@ static PetscErrorCode ReadGroup(HycoScene scene, Group *g)
   PetscErrorCode refused = 0;
 
   PetscFunctionBegin;
-  gmshModelGetPhysicalName(g->dim, g->tag, &name, &ierr);
+  gmsh->gmshModelGetPhysicalName(g->dim, g->tag, &name, &ierr);
   if (!ierr && name && name[0])
     snprintf(g->name, sizeof(g->name), "%s", name);
   else
     snprintf(g->name, sizeof(g->name), "group_%d_%d", g->dim, g->tag);
-  gmshFree(name);
+  gmsh->gmshFree(name);
   g->body = -1;
   for (PetscInt b = 0; b < scene->n_bodies; b++) {
     if (g->dim > 0 && strcmp(scene->body[b].name, g->name) == 0) g->body = b;
   }
-  gmshModelGetEntitiesForPhysicalGroup(g->dim, g->tag, &entities, &n_entities, &ierr);
+  gmsh->gmshModelGetEntitiesForPhysicalGroup(g->dim, g->tag, &entities, &n_entities, &ierr);
   PetscCall(CheckGmsh(ierr, scene->mesh_path));
   for (size_t k = 0; k < n_entities && !refused; k++) refused = ReadEntity(scene->mesh_path, g, entities[k]);
-  gmshFree(entities);
+  gmsh->gmshFree(entities);
   PetscCall(refused);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -301,11 +303,11 @@ static PetscErrorCode CollectNodes(HycoScene scene, Reader *r, HycoMesh m, const
   PetscCall(PetscMalloc1((size_t)m->n_nodes * 3, &m->xyz));
   PetscCall(PetscMalloc1(m->n_nodes, &m->node_id));
   PetscCall(PetscMalloc1(total, &m->cells));
-  gmshModelMeshGetNodes(&tags, &n_file, &xyz, &n_xyz, &par, &n_par, -1, -1, 0, 0, &ierr);
+  gmsh->gmshModelMeshGetNodes(&tags, &n_file, &xyz, &n_xyz, &par, &n_par, -1, -1, 0, 0, &ierr);
   if (!ierr) refused = PlaceNodes(scene, r, m, n_file, tags, xyz);
-  gmshFree(tags);
-  gmshFree(xyz);
-  gmshFree(par);
+  gmsh->gmshFree(tags);
+  gmsh->gmshFree(xyz);
+  gmsh->gmshFree(par);
   PetscCall(CheckGmsh(ierr, scene->mesh_path));
   PetscCall(refused);
   for (size_t k = 0; k < total; k++) m->cells[k] = FindTag(r, node[k]);
@@ -550,7 +552,7 @@ static PetscErrorCode ReadGroups(HycoScene scene, Reader *r)
   size_t n = 0;
 
   PetscFunctionBegin;
-  gmshModelGetPhysicalGroups(&dim_tags, &n, -1, &ierr);
+  gmsh->gmshModelGetPhysicalGroups(&dim_tags, &n, -1, &ierr);
   PetscCall(CheckGmsh(ierr, scene->mesh_path));
   HycoCheck(n,
             "%s has no physical groups; name the bodies and surfaces in gmsh (Physical Volume, Physical Surface, ...)",
@@ -561,7 +563,7 @@ static PetscErrorCode ReadGroups(HycoScene scene, Reader *r)
     r->group[k].dim = dim_tags[2 * k];
     r->group[k].tag = dim_tags[2 * k + 1];
   }
-  gmshFree(dim_tags);
+  gmsh->gmshFree(dim_tags);
   for (PetscInt k = 0; k < r->n_groups; k++) PetscCall(ReadGroup(scene, &r->group[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -572,8 +574,8 @@ static PetscErrorCode ReadOpen(HycoScene scene, Reader *r, HycoMesh m)
   int ierr;
 
   PetscFunctionBegin;
-  gmshOptionSetNumber("General.Terminal", 0, &ierr);
-  gmshOpen(scene->mesh_path, &ierr);
+  gmsh->gmshOptionSetNumber("General.Terminal", 0, &ierr);
+  gmsh->gmshOpen(scene->mesh_path, &ierr);
   PetscCall(CheckGmsh(ierr, scene->mesh_path));
   PetscCall(ReadGroups(scene, r));
   PetscCall(CheckBodies(scene, r, m));
@@ -605,11 +607,12 @@ PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
 
   PetscFunctionBegin;
   PetscCall(CheckPath(scene));
+  PetscCall(HycoGmshLoad(&gmsh));
   PetscCall(PetscNew(&m));
-  gmshInitialize(0, NULL, 0, &gerr);
+  HycoGmshInitialize(gmsh->gmshInitialize, &gerr);
   PetscCall(CheckGmsh(gerr, scene->mesh_path));
   ierr = ReadOpen(scene, &r, m);
-  gmshFinalize(&gerr);
+  gmsh->gmshFinalize(&gerr);
   for (PetscInt k = 0; k < r.n_groups; k++) {
     PetscCall(PetscFree(r.group[k].id));
     PetscCall(PetscFree(r.group[k].node));

@@ -104,8 +104,8 @@ static PetscErrorCode AddNode(Msh *m, size_t k, long long tag)
 {
   PetscFunctionBegin;
   HycoCheck(!m->failed, "the mesh %s is damaged: it ends among its nodes", m->path);
-  HycoCheck(tag > 0 && tag < PETSC_MAX_INT, "the mesh %s has a node of the tag %lld; tags run from 1 to %d", m->path,
-            tag, PETSC_MAX_INT - 1);
+  HycoCheck(tag > 0 && tag < PETSC_MAX_INT, "the mesh %s has a node of the tag %lld; tags run from 1 to %lld", m->path,
+            tag, (long long)PETSC_MAX_INT - 1);
   m->node[k] = (unsigned long long)tag;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -6,6 +6,7 @@
 */
 #include "fuzz.h"
 #include <hdf5.h>
+#include <hycocompat.h>
 #include <hycomodelimpl.h>
 
 #define N_MODELS 5
@@ -25,7 +26,7 @@ typedef struct {
 static Good good[N_MODELS];
 static char path[128];
 
-static herr_t NoteSet(hid_t file, const char name[], const H5O_info_t *info, void *ctx)
+static herr_t NoteSet(hid_t file, const char name[], const HycoH5Info *info, void *ctx)
 {
   Good *g = (Good *)ctx;
   hid_t set, type;
@@ -61,7 +62,7 @@ static void ReadGood(const char name[], Good *g)
   g->sealed = g->size > HYCO_SEAL && !memcmp(g->bytes + g->size - HYCO_SEAL, "hyco-sum", 8);
   if (g->sealed) g->size -= HYCO_SEAL;
   h = H5Fopen(file_name, H5F_ACC_RDONLY, H5P_DEFAULT);
-  if (h < 0 || H5Ovisit2(h, H5_INDEX_NAME, H5_ITER_NATIVE, NoteSet, g, H5O_INFO_BASIC) < 0) abort();
+  if (h < 0 || HycoH5Visit(h, NoteSet, g) < 0) abort();
   H5Fclose(h);
 }
 

@@ -1,0 +1,53 @@
+# What must be PETSc's own in a process that uses it: one MPI, one BLAS.
+
+# Stops where the MPI that CMake found is another one than PETSc's: petscsys.h compares them.
+function(hyco_check_mpi)
+  include(CheckCSourceCompiles)
+  set(CMAKE_REQUIRED_LIBRARIES PkgConfig::PETSC MPI::MPI_C)
+  set(CMAKE_REQUIRED_QUIET ON)
+  check_c_source_compiles("#include <petscsys.h>
+int main(int argc, char **argv) { return PetscInitialize(&argc, &argv, 0, 0); }" HYCO_MPI_IS_PETSCS)
+  if(NOT HYCO_MPI_IS_PETSCS)
+    unset(HYCO_MPI_IS_PETSCS CACHE) # to be looked at again, with another MPI
+    message(FATAL_ERROR "A program with PETSc ${PETSC_VERSION} (${PETSC_PREFIX}) and the MPI of ${MPI_C_COMPILER} does not compile or "
+            "link: is that MPI another one than PETSc's? Take PETSc's own: -DMPI_C_COMPILER=/path/to/its/mpicc "
+            "(CMakeFiles/CMakeError.log or CMakeConfigureLog.yaml in the build folder has the compiler's words.)")
+  endif()
+endfunction()
+
+# The BLAS and LAPACK that PETSc was linked with, by the names that its pkg-config file gives: two of them in one process
+# would share their symbols.
+function(hyco_find_blas out)
+  foreach(name ${PETSC_STATIC_LIBRARIES})
+    if(name MATCHES "^(lib)?(f2c|ref|sci|s|c)?(lapack|blas|lapacke|openblas.*|flexiblas|blis.*|mkl_.*|atlas|acml|essl|nvpl_.*)$")
+      find_library(HYCO_BLAS_${name} NAMES ${name} HINTS ${PETSC_STATIC_LIBRARY_DIRS} REQUIRED)
+      list(APPEND found ${HYCO_BLAS_${name}})
+    endif()
+  endforeach()
+  if(NOT found) # PETSc's file names none
+    find_package(LAPACK REQUIRED)
+    set(found ${LAPACK_LIBRARIES})
+  endif()
+  message(STATUS "BLAS and LAPACK, as PETSc's: ${found}")
+  set(${out} ${found} PARENT_SCOPE)
+endfunction()
+
+# HDF5 without what a shared one brings itself.
+function(hyco_own_hdf5 out)
+  set(found ${HDF5_C_LIBRARIES})
+  list(FILTER found INCLUDE REGEX "libhdf5[^/]*\\.(so|dylib)$")
+  if(NOT found)
+    set(found ${HDF5_C_LIBRARIES})
+  endif()
+  set(${out} ${found} PARENT_SCOPE)
+endfunction()
+
+# The path of a shared library by the name that a program linked with it would look for: libx.so -> libx.so.4.8
+function(hyco_soname library out)
+  if(IS_SYMLINK ${library})
+    file(READ_SYMLINK ${library} name)
+    get_filename_component(folder ${library} DIRECTORY)
+    get_filename_component(library ${name} ABSOLUTE BASE_DIR ${folder})
+  endif()
+  set(${out} ${library} PARENT_SCOPE)
+endfunction()

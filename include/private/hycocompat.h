@@ -1,0 +1,41 @@
+/*
+  What differs between versions of the libraries below: the code reads as for the newest supported one, and what older
+  ones lack or spell otherwise is here. The parts for HDF5 and gmsh are for those who include its header before.
+*/
+#ifndef HYCOCOMPAT_H
+#define HYCOCOMPAT_H
+
+#include <petscsys.h>
+
+#if PETSC_VERSION_LT(3, 19, 0)
+#define PETSC_SUCCESS ((PetscErrorCode)0)
+#endif
+
+/* What PetscErrorMessage() gives. */
+#if PETSC_VERSION_LT(3, 25, 0)
+typedef char *HycoErrorText;
+#else
+typedef const char *HycoErrorText;
+#endif
+
+#endif
+
+#if defined(H5_VERS_MAJOR) && !defined(HYCOCOMPAT_HDF5)
+#define HYCOCOMPAT_HDF5
+#if H5_VERSION_GE(1, 12, 0)
+typedef H5O_info2_t HycoH5Info;
+#define HycoH5Visit(file, op, ctx) H5Ovisit3(file, H5_INDEX_NAME, H5_ITER_NATIVE, op, ctx, H5O_INFO_BASIC)
+#else
+typedef H5O_info_t HycoH5Info;
+#define HycoH5Visit(file, op, ctx) H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_NATIVE, op, ctx, H5O_INFO_BASIC)
+#endif
+#endif
+
+#if defined(GMSH_API_VERSION_MAJOR) && !defined(HYCOCOMPAT_GMSH)
+#define HYCOCOMPAT_GMSH
+#if GMSH_API_VERSION_MAJOR * 100 + GMSH_API_VERSION_MINOR >= 409 /* may run the graphical interface */
+#define HycoGmshInitialize(initialize, ierr) initialize(0, NULL, 0, 0, ierr)
+#else
+#define HycoGmshInitialize(initialize, ierr) initialize(0, NULL, 0, ierr)
+#endif
+#endif

@@ -1,0 +1,56 @@
+/*
+  Iterative refinement with residuals in twice the working precision (N. J. Higham, Accuracy and Stability of Numerical
+  Algorithms (2002), chapter 12): x comes out right to round-off as long as the factors are good for anything at all,
+  condition up to some 1e15, and does not depend on the order in which a BLAS adds.
+*/
+#include <hycolinear.h>
+#include <math.h>
+#include <petscblaslapack.h>
+
+#define MAX_STEPS 20
+
+void HycoAddProduct(PetscReal a, PetscReal b, PetscReal sum[2])
+{
+  const PetscReal product = a * b, high = sum[0] + product, moved = high - sum[0];
+
+  sum[1] += ((sum[0] - (high - moved)) + (product - moved)) + fma(a, b, -product);
+  sum[0] = high;
+}
+
+/* r = b + low - K x */
+static void Residual(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda, const PetscReal b[], const PetscReal low[],
+                     const PetscReal x[], PetscReal r[])
+{
+  for (PetscBLASInt i = 0; i < n; i++) {
+    PetscReal sum[2] = {b[i], low ? low[i] : 0};
+
+    for (PetscBLASInt j = 0; j < n; j++) HycoAddProduct(-K[(size_t)j * (size_t)lda + (size_t)i], x[j], sum);
+    r[i] = sum[0] + sum[1];
+  }
+}
+
+PetscErrorCode HycoRefine(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda, const PetscReal lu[],
+                          const PetscBLASInt ipiv[], const PetscReal b[], const PetscReal low[], PetscReal x[])
+{
+  PetscReal *r, before = PETSC_MAX_REAL;
+  PetscBLASInt one = 1, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &r));
+  for (PetscInt step = 0; step < MAX_STEPS; step++) {
+    PetscReal change = 0, size = 0;
+
+    Residual(n, K, lda, b, low, x, r);
+    LAPACKgetrs_("N", &n, &one, lu, &n, ipiv, r, &n, &info);
+    for (PetscBLASInt i = 0; i < n; i++) {
+      change = PetscMax(change, PetscAbsReal(r[i]));
+      size = PetscMax(size, PetscAbsReal(x[i]));
+    }
+    if (!(change < before / 2)) break; /* also where it is no number */
+    for (PetscBLASInt i = 0; i < n; i++) x[i] += r[i];
+    if (change <= PETSC_MACHINE_EPSILON * size) break;
+    before = change;
+  }
+  PetscCall(PetscFree(r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

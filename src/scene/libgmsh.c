@@ -1,0 +1,37 @@
+/* Loads gmsh's library: the one that hyco was built against, by its path, or where the linker finds its name. */
+#include "libgmsh.h"
+#include <dlfcn.h>
+#include <hycoimpl.h>
+#include <string.h>
+
+static const char *const names[] = {
+#define HYCO_GMSH_NAME(name) #name,
+    HYCO_GMSH_CALLS(HYCO_GMSH_NAME)
+#undef HYCO_GMSH_NAME
+};
+#define N_CALLS (sizeof(names) / sizeof(names[0]))
+
+static union {
+  HycoGmsh calls;
+  void *address[N_CALLS];
+} gmsh;
+static PetscBool loaded = PETSC_FALSE;
+
+PetscErrorCode HycoGmshLoad(const HycoGmsh **calls)
+{
+  const char *name = strrchr(HYCO_GMSH_LIBRARY, '/');
+  void *library;
+
+  PetscFunctionBegin;
+  *calls = &gmsh.calls;
+  if (loaded) PetscFunctionReturn(PETSC_SUCCESS);
+  library = dlopen(HYCO_GMSH_LIBRARY, RTLD_NOW | RTLD_LOCAL);
+  if (!library && name) library = dlopen(name + 1, RTLD_NOW | RTLD_LOCAL);
+  HycoCheck(library, "gmsh's library, which reads meshes, cannot be loaded: %s", dlerror());
+  for (size_t k = 0; k < N_CALLS; k++) {
+    gmsh.address[k] = dlsym(library, names[k]);
+    HycoCheck(gmsh.address[k], "gmsh's library %s has no %s()", HYCO_GMSH_LIBRARY, names[k]);
+  }
+  loaded = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
