@@ -3,7 +3,8 @@
   held-out solutions (calibrate.c). log e = c_0 + sum_j c_j log(1 + f_j / floor_j), c_j >= 0, of five features:
 
     0  misfit       distance of the full-order displacements from what the modes alone give there, over their size;
-                    condensed: the forces' error with one training value left out
+                    condensed: the remainder of the interpolation, for each parameter the product of the distances from
+                    the training values over its largest inside, summed
     1  penetration  of the contacts that (38) does not constrain, over the size of B U
     2  adhesion     forces of these contacts where the predicted displacement leaves a gap, over the size of the forces
     3  distance     to the nearest training point, each parameter scaled to its range
@@ -86,13 +87,38 @@ static PetscReal Tail(HycoModel m)
   return Quotient(last, all);
 }
 
+static PetscReal Product(PetscInt n, const PetscReal x[], PetscReal at)
+{
+  PetscReal product = 1;
+
+  for (PetscInt k = 0; k < n; k++) product *= PetscAbsReal(at - x[k]) / (x[n - 1] - x[0]);
+  return product;
+}
+
+/* How far a condensed model's parameters are from where its fields are exact. */
+static PetscReal Remainder(HycoModel m)
+{
+  const HycoCondensed c = m->condensed;
+  PetscReal sum = 0;
+
+  for (PetscInt p = 0; p < c->dim; p++) {
+    PetscReal largest = 0;
+
+    if (c->affine[p] || c->n[p] < 2) continue;
+    for (PetscInt k = 1; k < c->n[p]; k++)
+      largest = PetscMax(largest, Product(c->n[p], c->x[p], (c->x[p][k - 1] + c->x[p][k]) / 2));
+    sum += Product(c->n[p], c->x[p], m->fe->mu[p]) / largest;
+  }
+  return sum;
+}
+
 PetscErrorCode HycoTrustMeasure(HycoModel m, PetscReal feature[])
 {
   const PetscInt n_par = m->scene->n_parameters;
 
   PetscFunctionBegin;
   PetscCall(HycoModelComplete(m));
-  feature[MISFIT] = m->condensed ? m->prediction.interpolation_error : Misfit(m);
+  feature[MISFIT] = m->condensed ? Remainder(m) : Misfit(m);
   Contacts(m, &feature[PENETRATION], &feature[ADHESION]);
   feature[TAIL] = Tail(m);
   feature[DISTANCE] = m->n_points && n_par ? PETSC_MAX_REAL : 0;

@@ -22,7 +22,9 @@ static const PetscReal usual[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 2e-3, [HYCO_ERRO
 #define LITTLE         1.25 /* a model that misses by so much more than the best is as good, if it is cheaper */
 #define EXTENSION      2.5  /* edges of the contact surface's facets */
 #define MANY_CONTACTS  600  /* beyond, a condensed model is tried only when it is asked for: its samples fill a disk */
-#define MANY_UNKNOWNS  2500 /* beyond, "all" is not tried by itself: its reduced matrix is dense */
+#define MANY_UNKNOWNS  600 /* of an RID; beyond, "all" is not tried by itself: its reduced matrix is dense */
+#define STALE          3 /* attempts without progress end a kind: larger RIDs do not mend a basis that lacks solutions */
+#define PROGRESS       0.95
 #define FEW_UNKNOWNS   300 /* a dense matrix of these is cheap */
 #define MAX_ATTEMPTS   64
 #define ROUND          4 /* of the training points, one in so many is added at a time */
@@ -199,8 +201,10 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
   SetRecipe(t, recipe);
   PetscCall(HycoCatchBegin());
   ierr = Build(t, s->store, s->file, &report);
+  if (!ierr) ierr = Judge(s, a); /* a model may refuse to predict */
   PetscCall(HycoCatchEnd(ierr, message));
   PetscCall(HycoCondensedDestroy(&t->condensed));
+  if (message[0]) a->ratio = PETSC_INFINITY;
   if (!message[0]) {
     a->n_modes = report.n_modes;
     a->n_fe_dofs = report.n_fe_dofs;
@@ -210,7 +214,6 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
     a->rid_contacts = report.rid_contacts;
     a->rid_fraction = report.rid_fraction;
     a->cost = Cost(t, a);
-    PetscCall(Judge(s, a));
   }
   PetscCall(PetscStrncpy(a->failure, message, sizeof(a->failure)));
   if (t->rank == 0) (void)unlink(s->file);
@@ -245,15 +248,28 @@ static PetscBool WholeIsSmall(HycoTrainer t, HycoHybrid hybrid)
   return (PetscBool)(!all || t->sizes[0] * t->sizes[3] <= FEW_UNKNOWNS);
 }
 
-/* The sizes in their order until one meets the targets (its cost; PETSC_INFINITY: none), of those that differ in what
+/* Whether the recipe's RID, which "auto" has tried, has too many unknowns for all of them to be full order. */
+static PetscBool IsLarge(const Search *s, HycoRecipe r)
+{
+  r.hybrid = HYCO_HYBRID_AUTO;
+  for (PetscInt k = 0; k < s->n; k++) {
+    const HycoAttempt *a = &s->attempt[k];
+
+    if (Same(&a->recipe, &r) && !a->failure[0]) return (PetscBool)(a->rid_nodes * s->t->sizes[3] > MANY_UNKNOWNS);
+  }
+  return PETSC_FALSE;
+}
+
+/* The sizes in their order until one meets the targets, of those that differ in what
    the type of model reads. */
 static PetscErrorCode TrySizes(Search *s, HycoModelType type, HycoHybrid hybrid, PetscBool *met)
 {
   const PetscInt first = s->n;
+  PetscReal least = PETSC_INFINITY;
 
   PetscFunctionBegin;
   *met = PETSC_FALSE;
-  for (PetscInt k = s->targets ? 0 : FIRST_USUAL; k < N_SIZES && !*met; k++) {
+  for (PetscInt k = s->targets ? 0 : FIRST_USUAL, stale = 0; k < N_SIZES && stale < STALE && !*met; k++) {
     HycoRecipe r = Recipe(s, &sizes[k]);
     PetscBool done = PETSC_FALSE;
 
@@ -265,10 +281,12 @@ static PetscErrorCode TrySizes(Search *s, HycoModelType type, HycoHybrid hybrid,
       r.whole = s->given.whole;
     }
     for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].recipe));
-    if (done) continue;
-    if (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid)) continue;
+    if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid))) continue;
+    if (hybrid == HYCO_HYBRID_ALL && IsLarge(s, r)) continue;
     PetscCall(Try(s, &r));
-    *met = (PetscBool)(s->attempt[s->n - 1].ratio <= 1);
+    stale = s->attempt[s->n - 1].ratio < PROGRESS * least ? 0 : stale + 1;
+    least = PetscMin(least, s->attempt[s->n - 1].ratio);
+    *met = (PetscBool)(least <= 1);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -276,17 +294,11 @@ static PetscErrorCode TrySizes(Search *s, HycoModelType type, HycoHybrid hybrid,
 /* All of A full order, where "auto" keeps the contacts' displacements and is not good enough. */
 static PetscErrorCode TryHybrid(Search *s)
 {
-  const PetscInt first = s->n;
-  PetscInt unknowns = PETSC_MAX_INT;
   PetscBool met;
 
   PetscFunctionBegin;
   PetscCall(TrySizes(s, HYCO_MODEL_HYBRID, HYCO_HYBRID_AUTO, &met));
-  if (met || s->t->pinned[HYCO_CHOICE_HYBRID] || !s->t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt k = first; k < s->n; k++) {
-    if (!s->attempt[k].failure[0]) unknowns = PetscMin(unknowns, s->attempt[k].rid_nodes * s->t->sizes[3]);
-  }
-  if (unknowns <= MANY_UNKNOWNS || unknowns == PETSC_MAX_INT)
+  if (!met && !s->t->pinned[HYCO_CHOICE_HYBRID] && s->t->sizes[2])
     PetscCall(TrySizes(s, HYCO_MODEL_HYBRID, HYCO_HYBRID_ALL, &met));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
