@@ -3,6 +3,7 @@
   3), or a surface's nodes projected on the facets of another. They are found on the mesh as it stands in the file; on
   surfaces that a map moves, anew wherever the nodes are.
 */
+#include "kinematics.h"
 #include "partners.h"
 #include <stdlib.h>
 #include <string.h>
@@ -121,6 +122,17 @@ static PetscErrorCode Remedy(HycoPartners *t, const HycoContact *c, PetscInt n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of cells without volume no facet has a side: they are the error. */
+static PetscErrorCode CheckVolumes(HycoFE fe)
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  PetscReal g[8][3], weight;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) PetscCall(HycoGradients(fe, el, e, 0, g, &weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Names the n slave nodes that have no master, the farthest five of them. */
 static PetscErrorCode Complain(HycoPartners *t, const HycoContact *c, PetscInt n, Missed missed[], PetscInt slaves,
                                PetscReal tolerance)
@@ -128,6 +140,7 @@ static PetscErrorCode Complain(HycoPartners *t, const HycoContact *c, PetscInt n
   char list[HYCO_LINE / 2] = "", remedy[HYCO_LINE];
 
   PetscFunctionBegin;
+  PetscCall(CheckVolumes(t->fe));
   qsort(missed, (size_t)n, sizeof(Missed), FarthestFirst);
   for (PetscInt k = 0; k < PetscMin(n, 5); k++) {
     char one[HYCO_LINE / 2];
@@ -246,6 +259,17 @@ static void ProjectAlong(const HycoPartners *t, PetscInt slave, PetscReal small,
   }
 }
 
+/* How far apart the nodes of a pair may lie along their normals: as said; else at any distance if the surfaces touch
+   somewhere. */
+static PetscReal Farthest(const HycoContact *c, PetscInt n, const HycoProjection at[], PetscReal small)
+{
+  if (c->tolerance >= 0) return c->tolerance;
+  for (PetscInt k = 0; k < n; k++) {
+    if (at[k].n && at[k].distance <= small) return PETSC_MAX_REAL;
+  }
+  return small;
+}
+
 /* The masters of all nodes of a contact's slave: the nearest points. Of a pair whose surfaces do not coincide as drawn,
    the nodes along the normals, if those match the surfaces one by one. */
 static PetscErrorCode Project(const HycoPartners *t, const HycoContact *c, PetscInt n, const PetscInt slave[],
@@ -261,7 +285,7 @@ static PetscErrorCode Project(const HycoPartners *t, const HycoContact *c, Petsc
   if (matched) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &along));
   for (PetscInt k = 0; k < n; k++) ProjectAlong(t, slave[k], small, &along[k]);
-  PetscCall(AreMatched(t->fe->mesh, n, along, c->tolerance >= 0 ? tolerance : PETSC_MAX_REAL, &matched));
+  PetscCall(AreMatched(t->fe->mesh, n, along, Farthest(c, n, at, small), &matched));
   for (PetscInt k = 0; matched && k < n; k++) {
     at[k] = along[k];
     why[k] = MET;
@@ -286,13 +310,13 @@ static PetscErrorCode AppendPartners(HycoPartners *t, const HycoContact *c, Pets
   PetscCall(PetscMalloc1(m->n_nodes, &partner_of));
   for (PetscInt i = 0; i < m->n_nodes; i++) partner_of[i] = -1;
   for (PetscInt k = 0; k < n && !ierr; k++) {
+    if (why[k] == MET || why[k] == ASKEW) ierr = CheckPartner(m, c, slave[k], &at[k], partner_of);
     if (why[k] != MET) {
       const Missed here = {at[k].n ? at[k].distance : 0, slave[k], why[k]};
 
       missed[n_missed++] = here;
       continue;
     }
-    ierr = CheckPartner(m, c, slave[k], &at[k], partner_of);
     if (!ierr) ierr = Append(p, index, slave[k], &at[k]);
   }
   PetscCall(PetscFree(partner_of));
