@@ -49,23 +49,37 @@ static PetscReal Along(const PetscReal r[3], const PetscReal n[3])
   return Length(t);
 }
 
-/* Surfaces whose gap is measured do not overlap more than is allowed. */
-static PetscErrorCode CheckOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, PetscReal gap, Sizes *sizes)
+/* How deep contact k may overlap before any load; its gap, where it is measured, is below -that: `too deep`. */
+static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, PetscReal gap, Sizes *sizes,
+                                     PetscReal *allowed, PetscBool *deep)
 {
   const HycoContact *c = &fe->scene->contact[p->contact[k]];
-  PetscReal size, allowed = c->overlap, r[3];
+  PetscReal size = 0;
 
   PetscFunctionBegin;
+  *deep = PETSC_FALSE;
   if (c->gap || gap >= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SizeAt(fe, c->slave, p->slave[k], sizes, &size));
-  if (allowed < 0) allowed = size > 0 ? HYCO_OVERLAP_SHARE * size : PETSC_MAX_REAL;
-  Across(p, k, fe->X, r);
-  HycoCheck(-gap <= allowed,
-            "contact %s: before any load node %d of %s lies %.4g deep in %s (its master point is %.4g away), and %.4g is "
-            "allowed%s; are the bodies where they should be? If they overlap by design, contact_%s_overlap %.4g allows it",
-            c->name, (int)fe->mesh->node_id[p->slave[k]], c->slave, -(double)gap, c->master, (double)Length(r),
-            (double)allowed, c->overlap < 0 ? ", half of its facet" : "", c->name, -1.01 * (double)gap);
+  *allowed = c->overlap;
+  if (c->overlap < 0) {
+    PetscCall(SizeAt(fe, c->slave, p->slave[k], sizes, &size));
+    *allowed = size > 0 ? HYCO_OVERLAP_SHARE * size : PETSC_MAX_REAL;
+  }
+  *deep = (PetscBool)(-gap > *allowed);
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Names the deepest contact k. */
+static PetscErrorCode RefuseOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, PetscReal gap, PetscReal allowed)
+{
+  const HycoContact *c = &fe->scene->contact[p->contact[k]];
+  PetscReal r[3];
+
+  PetscFunctionBegin;
+  Across(p, k, fe->X, r);
+  HycoFail("contact %s: before any load node %d of %s lies %.4g deep in %s (its master point is %.4g away), and %.4g is "
+           "allowed%s; are the bodies where they should be? If they overlap by design, contact_%s_overlap %.4g allows it",
+           c->name, (int)fe->mesh->node_id[p->slave[k]], c->slave, -(double)gap, c->master, (double)Length(r),
+           (double)allowed, c->overlap < 0 ? ", half of its facet" : "", c->name, -1.01 * (double)gap);
 }
 
 /* A pair's nodes still face each other where a map has moved them. */
@@ -92,16 +106,27 @@ static PetscErrorCode CheckPair(HycoFE fe, const HycoPairs *p, PetscInt k, const
 PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[])
 {
   Sizes sizes = {-1, NULL};
+  PetscReal allowed = 0, worst = 0;
+  PetscInt deepest = -1;
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < pairs->n && !ierr; k++) {
+    PetscReal here;
+    PetscBool deep;
+
     if (pairs->master_start[k] == pairs->master_start[k + 1]) continue;
-    ierr = CheckOverlap(fe, pairs, k, gap[k], &sizes);
+    ierr = AllowedOverlap(fe, pairs, k, gap[k], &sizes, &here, &deep);
+    if (!ierr && deep && (deepest < 0 || gap[k] < worst)) {
+      deepest = k;
+      worst = gap[k];
+      allowed = here;
+    }
     if (!ierr) ierr = CheckPair(fe, pairs, k, normal + 3 * k, &sizes);
   }
   PetscCall(PetscFree(sizes.size));
   PetscCall(ierr);
+  if (deepest >= 0) PetscCall(RefuseOverlap(fe, pairs, deepest, worst, allowed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -29,7 +29,7 @@ class Moved(Case):
     def centre(self, name):
         """Where the contact presses, from the fields: the slave nodes' mean x, weighted by their vertical force."""
         with h5py.File(self.path(name)) as f:
-            x, force = f['mesh/nodes'][:], f['nodes/contact_force'][:]
+            x, force = f['mesh/xyz'][:], f['nodes/contact_force'][:]
         down = np.maximum(force[:, 1], 0)
         return (x[:, 0] * down).sum() / down.sum()
 
@@ -130,10 +130,10 @@ class Reduced(Moved):
         self.hyco('train', '-scene', 'moved.yaml', '-values_place', places, '-values_press', '0.3,0.5,0.7,0.9', '-values_modulus', '10',
                   '-model', 'm.h5', '-hyco_rid_contact_extension', '2', '-hyco_rid_layers', '2', '-hyco_pod_tol', '1e-10', '-hyco_trust_folds', '0')
         for place in (-4, 0.1, 3.2):
-            p = self.hyco('predict', '-model', 'm.h5', '-mu', f'{place},0.6,10', '-output', 'p.xdmf')
-            r = self.hyco('solve', '-scene', 'moved.yaml', '-mu', f'{place},0.6,10', '-output', 's.xdmf')
+            p = self.hyco('predict', '-model', 'm.h5', '-mu', f'{place},0.6,10', '-output', 'predicted.xdmf')
+            r = self.hyco('solve', '-scene', 'moved.yaml', '-mu', f'{place},0.6,10', '-output', 'solved.xdmf')
             self.near(p['total_contact_force'], r['total_contact_force'], 0.01, f'force at {place}')
-            self.assertLess(abs(self.centre('p.h5') - self.centre('s.h5')), 0.05)
+            self.assertLess(abs(self.centre('predicted.h5') - self.centre('solved.h5')), 0.05)
             self.near(p['sliding'], r['sliding'], 0.2, 'sliding')
         c = self.hyco('compare', '-scene', 'moved.yaml', '-model', 'm.h5', '-values_place', '-4,0.1,3.2', '-values_press', '0.6', '-values_modulus', '10')
         self.assertLess(c['error_u']['max'], 0.005)
@@ -159,7 +159,7 @@ class Reduced(Moved):
         """The greedy loop chooses the same solutions on one rank and on three."""
         chosen = []
         for ranks in (0, 3):
-            self.hyco('train', '-scene', 'moved.yaml', '-greedy', '-training_grid', '4,2,1', '-max_snapshots', '10', '-model', f'g{ranks}.h5', '-hyco_pod_tol', '1e-12',
+            self.hyco('train', '-scene', 'moved.yaml', '-greedy', '-training_grid', '4,2,2', '-max_snapshots', '10', '-model', f'g{ranks}.h5', '-hyco_pod_tol', '1e-12',
                       '-hyco_rid_contact_extension', '2', '-hyco_rid_layers', '2', '-hyco_trust_folds', '0', ranks=ranks)
             chosen.append(self.hyco('predict', '-model', f'g{ranks}.h5', '-mu', '1.1,0.7,10')['total_contact_force'])
         self.near(chosen[1], chosen[0], 1e-8)
