@@ -7,21 +7,23 @@
 /* Of the mesh's length: an overlap no larger is round-off. */
 #define HYCO_ROUNDING 1e-12
 
-/* The size of facets around a node, of one group at a time. */
+/* The size of facets around a node, of one surface at a time: the slave's or the master's of a contact of the scene. */
 typedef struct {
-  PetscInt group;
+  const char *group;
   PetscReal *size;
 } Sizes;
 
-static PetscErrorCode SizeAt(HycoFE fe, const char name[], PetscInt node, Sizes *s, PetscReal *size)
+static PetscErrorCode SizeAt(HycoFE fe, const char group[], PetscInt node, Sizes *s, PetscReal *size)
 {
   PetscInt g = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", name, &g));
-  if (!s->size) PetscCall(PetscMalloc1(fe->mesh->n_nodes, &s->size));
-  if (s->group != g) HycoSurfaceSizes(fe, g, s->size);
-  s->group = g;
+  if (s->group != group) {
+    PetscCall(HycoMeshFindGroup(fe->mesh, "contact", group, &g));
+    if (!s->size) PetscCall(PetscMalloc1(fe->mesh->n_nodes, &s->size));
+    HycoSurfaceSizes(fe, g, s->size);
+    s->group = group;
+  }
   *size = s->size[node];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -49,7 +51,7 @@ static PetscReal Along(const PetscReal r[3], const PetscReal n[3])
   return Length(t);
 }
 
-/* How deep contact k may overlap before any load; its gap, where it is measured, is below -that: `too deep`. */
+/* How deep contact k may overlap before any load, and whether it does deeper; a gap that is not measured may. */
 static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, PetscReal gap, Sizes *sizes,
                                      PetscReal *allowed, PetscBool *deep)
 {
@@ -105,7 +107,7 @@ static PetscErrorCode CheckPair(HycoFE fe, const HycoPairs *p, PetscInt k, const
 
 PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[])
 {
-  Sizes sizes = {-1, NULL};
+  Sizes sizes = {NULL, NULL};
   PetscReal allowed = 0, worst = 0;
   PetscInt deepest = -1;
   PetscErrorCode ierr = 0;
@@ -152,7 +154,7 @@ static PetscErrorCode SlidingOf(HycoFE fe, const HycoPairs *p, PetscInt k, const
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
                                   const PetscInt index[], HycoContactState *state)
 {
-  Sizes sizes[2] = {{-1, NULL}, {-1, NULL}};
+  Sizes sizes[2] = {{NULL, NULL}, {NULL, NULL}};
   PetscReal *normal, *gap;
 
   PetscFunctionBegin;

@@ -129,7 +129,7 @@ class Reduced(Moved):
         places = ','.join(str(k - 4.5) for k in range(10))
         self.hyco('train', '-scene', 'moved.yaml', '-values_place', places, '-values_press', '0.3,0.5,0.7,0.9', '-values_modulus', '10',
                   '-model', 'm.h5', '-hyco_rid_contact_extension', '2', '-hyco_rid_layers', '2', '-hyco_pod_tol', '1e-10', '-hyco_trust_folds', '0')
-        for place in (-4, 0.1, 3.2):
+        for place in (-4, 0.1, 3.2, 4.9):
             p = self.hyco('predict', '-model', 'm.h5', '-mu', f'{place},0.6,10', '-output', 'predicted.xdmf')
             r = self.hyco('solve', '-scene', 'moved.yaml', '-mu', f'{place},0.6,10', '-output', 'solved.xdmf')
             self.near(p['total_contact_force'], r['total_contact_force'], 0.01, f'force at {place}')
