@@ -26,6 +26,9 @@ typedef struct {
   PetscInt n_still; /* contacts between fixed unknowns, which have no effect */
   PetscInt iterations, dim;
   PetscReal total_contact_force, lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3];
+  PetscInt n_facing;          /* contacts that may close: of moved surfaces the slave nodes that face a master */
+  PetscReal overlap, sliding; /* largest initial overlap (length); largest motion of a closed contact along its
+                                 surface, over the size of a facet: beyond 1 displacements are not small */
   PetscReal strain_energy, external_work, gap_work, energy_defect;
   HycoKKT kkt;
   HycoReason reason;

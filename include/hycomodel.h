@@ -29,6 +29,8 @@ typedef struct {
   HycoModelType type;
   PetscInt n_multipliers; /* force unknowns: n_contacts, or the force vectors of a projection-based model */
   PetscInt n_dof, n_contacts, n_modes, n_fe_dofs;  /* reduced unknowns (modes + FE unknowns), contacts in the RID */
+  PetscInt n_facing;          /* contacts of the RID that may close, as in HycoSummary */
+  PetscReal overlap, sliding; /* the same, of the RID's contacts */
   PetscInt n_all_contacts, n_active, n_rid_active; /* on the whole surface; those that press, there and in the RID */
   PetscInt iterations, rid_nodes, rid_elements, dim;
   PetscReal rid_fraction;  /* share of the mesh's elements in the RID */

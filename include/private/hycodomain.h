@@ -30,7 +30,7 @@ typedef struct {
    n column major) at n points; PETSC_MAX_REAL where none presses. pairs: of the whole mesh, with moved surfaces. */
 PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, PetscInt n, const PetscReal mu[],
                             const PetscReal Lambda[], PetscReal reach[]);
-/* What is met within reach (NULL: at any distance) at n points and between them. The caller destroys it. */
+/* What is met within reach (NULL: at any distance) at n points and over the ranges. The caller destroys it. */
 PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, PetscInt n, const PetscReal mu[],
                            const PetscReal reach[], HycoMet *met);
 PetscErrorCode HycoMetDestroy(HycoMet *met);

@@ -154,7 +154,8 @@ void HycoPairsMark(const HycoPairs *pairs, PetscBool node[]);
 /* The most nodes of one contact: a row of B has at most dim times as many entries. */
 PetscInt HycoPairsWidth(const HycoPairs *pairs);
 /* Normals n (n x 3) and gaps D (n) at fe's mu: given ones are evaluated at the master point (obstacle: the slave), a
-   measured gap is n . (master point - slave), on moved nodes. */
+   measured gap is n . (master point - slave), on moved nodes. Fails where surfaces overlap more than the scene allows,
+   and where a pair's nodes no longer face each other. */
 PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal[], PetscReal gap[]);
 /*
   The rows of B over the free unknowns, in CSR over local dofs (node * dim + component), and D less what the fixed
@@ -166,6 +167,14 @@ PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], Pe
 /* How many contacts have no free unknown and no effect: empty rows, and the fixed nodes at obstacles that are no contacts;
    fails when the prescribed displacements of one of these penetrate. start: of the rows. */
 PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n);
+/* What there is to know about the contacts of a solution u (n_dof), L (pairs->n, or where index leads). */
+typedef struct {
+  PetscInt n_facing; /* contacts that may close: slave nodes that face a master, and those of obstacles */
+  PetscReal overlap; /* largest initial overlap, the gap negative before any displacement */
+  PetscReal sliding; /* largest relative motion of a closed contact along its surface, over the size of a facet */
+} HycoContactState;
+PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
+                                  const PetscInt *index, HycoContactState *state);
 /* Area (length in 2D, 1 in 1D) that each contact's slave node stands for; 0 when its group is no surface. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
 

@@ -53,7 +53,9 @@ typedef struct {
   char *name;
   HycoContactType type;
   char *slave, *master; /* groups; an obstacle has only the slave ("group") */
-  PetscReal tolerance;  /* largest distance to the master in the mesh file; < 0: from the facets' size */
+  PetscReal tolerance;  /* largest distance to the master in the mesh file, where no map moves the surfaces; < 0: from
+                           the facets' size */
+  PetscReal overlap;    /* largest overlap before any load where the gap is measured; < 0: from the facets' size */
   HycoExpr normal[3];   /* all or none: outward normal of the slave side, at the master point (obstacle: slave) */
   HycoExpr gap;         /* NULL: measured along the normal between the moved nodes */
 } HycoContact;

@@ -107,6 +107,7 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
   ierr = Geometry(fe, pairs, vector, normal, gap);
   PetscCall(PetscFree(vector));
   PetscCall(ierr);
+  PetscCall(HycoContactCheck(fe, pairs, normal, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

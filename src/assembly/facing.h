@@ -9,6 +9,9 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
 PetscErrorCode HycoSurfaceNormals(HycoFE fe, PetscInt group, PetscReal normal[]);
 /* The mean unit normal of a facet. */
 PetscErrorCode HycoFacetDirection(HycoFE fe, PetscInt facet, PetscReal normal[3]);
+/* Fails where measured gaps overlap more than the scene allows, or a map has moved a pair's nodes apart along the
+   surface. normal and gap as HycoContactGeometry() gives them. */
+PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[]);
 /* The longest edge around each node (n_nodes) of the facets of `group`; 0 where it has none. */
 void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
 

@@ -4,9 +4,6 @@
 */
 #include "partners.h"
 
-/* How far past the border a slave node may be, as a share of the facet's shortest edge: it has the border's point. */
-#define HYCO_PAST_BORDER 0.1
-
 /* Whether a map moves a node of a group. */
 static PetscErrorCode IsMoved(HycoScene scene, HycoMesh m, const char group[], PetscBool *moved)
 {
@@ -43,38 +40,6 @@ PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The shortest edge of a patch. */
-static PetscReal ShortestEdge(const HycoPartners *t, PetscInt patch)
-{
-  const PetscInt *node = t->node + patch * t->nf;
-  PetscReal shortest = PETSC_MAX_REAL;
-
-  for (PetscInt a = 0; a < t->nf; a++) {
-    const PetscReal *x = t->fe->X + 3 * node[a], *y = t->fe->X + 3 * node[(a + 1) % t->nf];
-    PetscReal sum = 0;
-
-    for (PetscInt c = 0; c < 3; c++) sum += (x[c] - y[c]) * (x[c] - y[c]);
-    shortest = PetscMin(shortest, PetscSqrtReal(sum));
-  }
-  return shortest;
-}
-
-/* Whether a slave node lies past the master's border: what remains of the way to its master point on the facet's plane.
- */
-static PetscErrorCode IsPast(HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscBool *past)
-{
-  const PetscReal *n = t->normal + 3 * at->patch;
-  PetscReal r[3], along = 0, height;
-
-  PetscFunctionBegin;
-  *past = PETSC_FALSE;
-  HycoPartnersAcross(t, slave, at, r);
-  height = HycoDot(r, n);
-  for (PetscInt c = 0; c < 3; c++) along += (r[c] - height * n[c]) * (r[c] - height * n[c]);
-  if (PetscSqrtReal(along) > HYCO_PAST_BORDER * ShortestEdge(t, at->patch)) PetscCall(HycoPartnersAtBorder(t, at, past));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The master point of one slave node; n = 0: it has none. */
 static PetscErrorCode Find(HycoPartners *t, PetscInt slave, PetscReal reach, HycoProjection *at)
 {
@@ -84,7 +49,7 @@ static PetscErrorCode Find(HycoPartners *t, PetscInt slave, PetscReal reach, Hyc
   HycoPartnersProject(t, slave, PETSC_FALSE, at);
   if (at->n && at->distance > reach) at->n = 0;
   if (!at->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(IsPast(t, slave, at, &past));
+  PetscCall(HycoPartnersIsPast(t, slave, at, &past));
   if (past) at->n = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -10,8 +10,8 @@ typedef struct {
   PetscReal weight[4], distance;
 } HycoProjection;
 
-/* Normals oppose within 60 degrees: their product is at most this. */
-#define HYCO_OPPOSED -0.5
+/* Normals oppose: their product is at most this (within 72 degrees). */
+#define HYCO_OPPOSED -0.3
 
 typedef struct _n_HycoPatches *HycoPatches;
 

@@ -3,6 +3,7 @@
   3), or a surface's nodes projected on the facets of another. They are found on the mesh as it stands in the file; on
   surfaces that a map moves, anew wherever the nodes are.
 */
+#include "kinematics.h"
 #include "partners.h"
 #include <stdlib.h>
 #include <string.h>
@@ -29,8 +30,9 @@ static PetscReal DefaultTolerance(HycoMesh m, PetscInt group)
   return shortest < PETSC_MAX_REAL ? shortest / 10 : 0;
 }
 
-/* How a slave node lies to the master. */
-typedef enum { MET, FAR, TURNED, ASKEW } Verdict;
+/* How a slave node lies to the master: within reach and in front of it; too far; turned away from all of it; off to the
+   side, as of a pair that does not match; past the border. */
+typedef enum { MET, FAR, TURNED, ASKEW, PAST } Verdict;
 
 /* A slave node without a master. */
 typedef struct {
@@ -47,19 +49,29 @@ static int FarthestFirst(const void *a, const void *b)
   return (p->node > q->node) - (p->node < q->node);
 }
 
-/* The master of one slave node, at most `tolerance` away; farther than `small` it must lie along the slave's normal, as
-   steeply as normals must oppose. */
-static Verdict Judge(const HycoPartners *t, PetscInt slave, PetscReal tolerance, PetscReal small, HycoProjection *at)
+/* The master of one slave node, at most `tolerance` away. Farther than `small` the way to it must be as near to the
+   slave's normal as normals must oppose, and not lead past the border. */
+static PetscErrorCode Judge(HycoPartners *t, PetscInt slave, PetscReal tolerance, PetscReal small, HycoProjection *at,
+                            Verdict *why)
 {
   const PetscReal *out = HycoPartnersOutward(t, slave);
   PetscReal r[3];
+  PetscBool past = PETSC_FALSE;
 
+  PetscFunctionBegin;
+  *why = MET;
   HycoPartnersProject(t, slave, PETSC_FALSE, at);
-  if (!at->n) return TURNED;
-  if (at->distance > tolerance) return FAR;
-  if (!out || at->distance <= small) return MET;
+  if (!at->n) {
+    *why = TURNED;
+    HycoPartnersProject(t, slave, PETSC_TRUE, at);
+  }
+  if (at->distance > tolerance) *why = FAR;
+  if (*why != MET || !out || at->distance <= small) PetscFunctionReturn(PETSC_SUCCESS);
   HycoPartnersAcross(t, slave, at, r);
-  return PetscAbsReal(HycoDot(r, out)) < -HYCO_OPPOSED * at->distance ? ASKEW : MET;
+  if (PetscAbsReal(HycoDot(r, out)) < -HYCO_OPPOSED * at->distance) *why = ASKEW;
+  PetscCall(HycoPartnersIsPast(t, slave, at, &past));
+  if (past) *why = PAST;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Degrees between a slave's normal and the way to its master point, or by which the normals miss each other. */
@@ -81,7 +93,8 @@ static PetscErrorCode Describe(HycoPartners *t, const Missed *missed, size_t roo
   size_t used;
 
   PetscFunctionBegin;
-  HycoPartnersProject(t, missed->node, (PetscBool)(missed->why == TURNED), &at);
+  HycoPartnersProject(t, missed->node, PETSC_FALSE, &at);
+  if (!at.n) HycoPartnersProject(t, missed->node, PETSC_TRUE, &at);
   PetscCall(HycoPartnersAtBorder(t, &at, &border));
   snprintf(text, room, "%d (%.4g away%s", (int)t->fe->mesh->node_id[missed->node], (double)at.distance,
            border ? ", past its border" : "");
@@ -93,31 +106,42 @@ static PetscErrorCode Describe(HycoPartners *t, const Missed *missed, size_t roo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What to do about nodes without a master: a larger tolerance where they face it, and only there. */
-static PetscErrorCode Remedy(HycoPartners *t, const HycoContact *c, PetscInt n, const Missed missed[], char text[HYCO_LINE])
+/* What to do about nodes without a master. */
+static PetscErrorCode Remedy(HycoPartners *t, const HycoContact *c, PetscInt n, const Missed missed[],
+                             char text[HYCO_LINE])
 {
-  PetscBool facing = PETSC_TRUE;
+  PetscBool facing = PETSC_FALSE;
   PetscReal farthest = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
     HycoProjection at;
-    PetscBool border;
+    Verdict why;
 
-    facing = (PetscBool)(facing && missed[k].why == FAR);
-    if (!facing) break;
-    facing = (PetscBool)(Judge(t, missed[k].node, PETSC_MAX_REAL, 0, &at) == MET);
-    PetscCall(HycoPartnersAtBorder(t, &at, &border));
-    facing = (PetscBool)(facing && !border);
+    PetscCall(Judge(t, missed[k].node, PETSC_MAX_REAL, 0, &at, &why));
+    facing = (PetscBool)(facing || why == MET);
     farthest = PetscMax(farthest, at.distance);
   }
   if (c->type == HYCO_CONTACT_PAIR)
     snprintf(text, HYCO_LINE, "mesh both surfaces alike, or take type: surface");
   else if (facing)
-    snprintf(text, HYCO_LINE, "draw the surfaces closer, or allow the distance by contact_%s_tolerance %.4g", c->name,
-             1.01 * (double)farthest);
+    snprintf(text, HYCO_LINE,
+             "draw the surfaces closer, or allow the distance by contact_%s_tolerance %.4g: nodes that face no %s then "
+             "have no contact",
+             c->name, 1.01 * (double)farthest, c->master);
   else
     snprintf(text, HYCO_LINE, "leave nodes that face no %s out of %s, or extend %s", c->master, c->slave, c->master);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of cells without volume no facet has a side: they are the error. */
+static PetscErrorCode CheckVolumes(HycoFE fe)
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  PetscReal g[8][3], weight;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) PetscCall(HycoGradients(fe, el, e, 0, g, &weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,6 +152,7 @@ static PetscErrorCode Complain(HycoPartners *t, const HycoContact *c, PetscInt n
   char list[HYCO_LINE / 2] = "", remedy[HYCO_LINE];
 
   PetscFunctionBegin;
+  PetscCall(CheckVolumes(t->fe));
   qsort(missed, (size_t)n, sizeof(Missed), FarthestFirst);
   for (PetscInt k = 0; k < PetscMin(n, 5); k++) {
     char one[HYCO_LINE / 2];
@@ -205,8 +230,9 @@ static PetscErrorCode CheckPartner(HycoMesh m, const HycoContact *c, PetscInt sl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether each slave node has a master of its own at most `far` away. */
-static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at[], PetscReal far, PetscBool *matched)
+/* Whether each slave node (but those that need none) has a master of its own at most `far` away. */
+static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at[], const PetscBool *needs,
+                                 PetscReal far, PetscBool *matched)
 {
   PetscBool *taken;
 
@@ -214,6 +240,7 @@ static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at
   PetscCall(PetscCalloc1(m->n_nodes, &taken));
   *matched = PETSC_TRUE;
   for (PetscInt k = 0; k < n && *matched; k++) {
+    if (!at[k].n && needs && !needs[k]) continue;
     *matched = (PetscBool)(at[k].n == 1 && at[k].distance <= far && !taken[at[k].node[0]]);
     if (*matched) taken[at[k].node[0]] = PETSC_TRUE;
   }
@@ -221,8 +248,8 @@ static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The master node that lies most along the mean of both normals from a slave node (mirrored surfaces match so, however
-   far apart they are); n = 0 where it misses that line by more than `small`. */
+/* The master node that lies most along the mean of both normals from a slave node: mirrored surfaces match so, however
+   far apart they are. n = 0 where it misses that line by more than `small`. */
 static void ProjectAlong(const HycoPartners *t, PetscInt slave, PetscReal small, HycoProjection *at)
 {
   const PetscReal *out = HycoPartnersOutward(t, slave);
@@ -232,13 +259,14 @@ static void ProjectAlong(const HycoPartners *t, PetscInt slave, PetscReal small,
   for (PetscInt j = 0; out && j < t->n; j++) {
     const PetscReal *n = t->normal + 3 * j;
     const HycoProjection here = {1, {t->node[j]}, j, {1}, 0};
-    PetscReal r[3], mean[3], rr, off;
+    PetscReal r[3], mean[3], rr, mm, off;
 
-    if (HycoDot(n, n) == 0 || HycoDot(out, n) > HYCO_OPPOSED) continue;
     for (PetscInt c = 0; c < 3; c++) mean[c] = out[c] - n[c];
+    mm = HycoDot(mean, mean);
+    if (HycoDot(n, n) == 0 || mm < 1e-2) continue; /* of no direction */
     HycoPartnersAcross(t, slave, &here, r);
     rr = HycoDot(r, r);
-    off = PetscMax(rr - HycoDot(r, mean) * HycoDot(r, mean) / HycoDot(mean, mean), 0);
+    off = PetscMax(rr - HycoDot(r, mean) * HycoDot(r, mean) / mm, 0);
     if (off > best || (off == best && at->n && rr >= at->distance * at->distance)) continue;
     best = off;
     *at = here;
@@ -246,27 +274,65 @@ static void ProjectAlong(const HycoPartners *t, PetscInt slave, PetscReal small,
   }
 }
 
-/* The masters of all nodes of a contact's slave: the nearest points. Of a pair whose surfaces do not coincide as drawn,
-   the nodes along the normals, if those match the surfaces one by one. */
-static PetscErrorCode Project(const HycoPartners *t, const HycoContact *c, PetscInt n, const PetscInt slave[],
-                              PetscReal tolerance, PetscReal small, HycoProjection at[], Verdict why[])
+/* How far apart the nodes of a pair may lie along their normals: as said; else at any distance if the surfaces touch
+   somewhere. */
+static PetscReal Farthest(const HycoContact *c, PetscInt n, const HycoProjection at[], PetscReal small)
+{
+  if (c->tolerance >= 0) return c->tolerance;
+  for (PetscInt k = 0; k < n; k++) {
+    if (at[k].n && at[k].distance <= small) return PETSC_MAX_REAL;
+  }
+  return small;
+}
+
+/* The nodes of a pair whose surfaces do not coincide as drawn, along the normals, where those match all slave nodes that
+   face the master one by one; the others have no contact (n = 0). */
+static PetscErrorCode MatchAlong(HycoPartners *t, const HycoContact *c, PetscInt n, const PetscInt slave[],
+                                 PetscReal small, HycoProjection at[], Verdict why[], PetscBool *matched)
 {
   HycoProjection *along;
+  PetscBool *needs;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n, &along, n, &needs));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal *out = HycoPartnersOutward(t, slave[k]);
+    HycoProjection nearest;
+
+    ProjectAlong(t, slave[k], small, &along[k]);
+    HycoPartnersProject(t, slave[k], PETSC_TRUE, &nearest);
+    needs[k] = (PetscBool)(!out || HycoDot(out, t->normal + 3 * nearest.patch) <= HYCO_OPPOSED);
+  }
+  PetscCall(AreMatched(t->fe->mesh, n, along, needs, Farthest(c, n, at, small), matched));
+  for (PetscInt k = 0; *matched && k < n; k++) {
+    at[k] = along[k];
+    if (at[k].n && HycoDot(HycoPartnersOutward(t, slave[k]), t->normal + 3 * at[k].patch) > HYCO_OPPOSED) at[k].n = 0;
+    why[k] = MET;
+  }
+  PetscCall(PetscFree2(along, needs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The masters of all nodes of a contact's slave. n = 0: one that faces none and has no contact, where the scene states
+   how far masters may be. */
+static PetscErrorCode Project(HycoPartners *t, const HycoContact *c, PetscInt n, const PetscInt slave[],
+                              PetscReal tolerance, PetscReal small, HycoProjection at[], Verdict why[])
+{
   PetscBool matched;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < n; k++) why[k] = Judge(t, slave[k], tolerance, small, &at[k]);
-  if (c->type != HYCO_CONTACT_PAIR) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(AreMatched(t->fe->mesh, n, at, PetscMin(small, tolerance), &matched));
-  if (matched) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(n, &along));
-  for (PetscInt k = 0; k < n; k++) ProjectAlong(t, slave[k], small, &along[k]);
-  PetscCall(AreMatched(t->fe->mesh, n, along, c->tolerance >= 0 ? tolerance : PETSC_MAX_REAL, &matched));
-  for (PetscInt k = 0; matched && k < n; k++) {
-    at[k] = along[k];
+  for (PetscInt k = 0; k < n; k++) PetscCall(Judge(t, slave[k], tolerance, small, &at[k], &why[k]));
+  if (c->type == HYCO_CONTACT_PAIR) {
+    PetscCall(AreMatched(t->fe->mesh, n, at, NULL, PetscMin(small, tolerance), &matched));
+    for (PetscInt k = 0; k < n; k++) matched = (PetscBool)(matched && why[k] == MET);
+    if (!matched) PetscCall(MatchAlong(t, c, n, slave, small, at, why, &matched));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt k = 0; k < n && c->tolerance >= 0; k++) {
+    if (why[k] == MET || why[k] == FAR) continue;
+    at[k].n = 0;
     why[k] = MET;
   }
-  PetscCall(PetscFree(along));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -278,7 +344,7 @@ static PetscErrorCode AppendPartners(HycoPartners *t, const HycoContact *c, Pets
   const PetscInt *slave = m->group_node + m->group_start[t->slave],
                  n = m->group_start[t->slave + 1] - m->group_start[t->slave];
   const PetscReal small = DefaultTolerance(m, t->slave), tolerance = c->tolerance >= 0 ? c->tolerance : small;
-  PetscInt *partner_of, n_missed = 0;
+  PetscInt *partner_of, n_missed = 0, n_alone = 0;
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
@@ -286,18 +352,21 @@ static PetscErrorCode AppendPartners(HycoPartners *t, const HycoContact *c, Pets
   PetscCall(PetscMalloc1(m->n_nodes, &partner_of));
   for (PetscInt i = 0; i < m->n_nodes; i++) partner_of[i] = -1;
   for (PetscInt k = 0; k < n && !ierr; k++) {
+    if ((why[k] == MET || why[k] == ASKEW) && at[k].n) ierr = CheckPartner(m, c, slave[k], &at[k], partner_of);
     if (why[k] != MET) {
-      const Missed here = {at[k].n ? at[k].distance : 0, slave[k], why[k]};
+      const Missed here = {at[k].distance, slave[k], why[k]};
 
       missed[n_missed++] = here;
       continue;
     }
-    ierr = CheckPartner(m, c, slave[k], &at[k], partner_of);
+    n_alone += !at[k].n;
     if (!ierr) ierr = Append(p, index, slave[k], &at[k]);
   }
   PetscCall(PetscFree(partner_of));
   PetscCall(ierr);
   if (n_missed) PetscCall(Complain(t, c, n_missed, missed, n, tolerance));
+  HycoCheck(n_alone < n, "contact %s: no node of %s faces %s within %g: are the two surfaces those that meet?", c->name,
+            c->slave, c->master, (double)tolerance);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

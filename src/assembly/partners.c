@@ -4,6 +4,11 @@
 #include "partners.h"
 #include <stdlib.h>
 
+/* How far past the border a slave node may be, as a share of the facet's shortest edge: it has the border's point. */
+#define HYCO_PAST_BORDER 0.1
+/* Of the same edge: points no farther apart are one. */
+#define HYCO_SAME_POINT 1e-6
+
 /* Patches and their normals: the master's nodes (pair) or facets (surface). */
 static PetscErrorCode FindPatches(HycoPartners *t, const HycoContact *c)
 {
@@ -67,9 +72,32 @@ const PetscReal *HycoPartnersOutward(const HycoPartners *t, PetscInt slave)
   return HycoDot(n, n) > 0 ? n : NULL;
 }
 
+/* The shortest edge of a patch. */
+static PetscReal ShortestEdge(const HycoPartners *t, PetscInt patch)
+{
+  const PetscInt *node = t->node + patch * t->nf;
+  PetscReal shortest = PETSC_MAX_REAL;
+
+  for (PetscInt a = 0; a < t->nf; a++) {
+    const PetscReal *x = t->fe->X + 3 * node[a], *y = t->fe->X + 3 * node[(a + 1) % t->nf];
+    PetscReal sum = 0;
+
+    for (PetscInt c = 0; c < 3; c++) sum += (x[c] - y[c]) * (x[c] - y[c]);
+    shortest = PetscMin(shortest, PetscSqrtReal(sum));
+  }
+  return shortest;
+}
+
 void HycoPartnersProject(const HycoPartners *t, PetscInt slave, PetscBool any_side, HycoProjection *at)
 {
-  HycoPatchesProject(t->patches, t->fe->X + 3 * slave, any_side ? NULL : HycoPartnersOutward(t, slave), at);
+  const PetscReal *out = HycoPartnersOutward(t, slave), *x = t->fe->X + 3 * slave;
+  HycoProjection nearest;
+
+  HycoPatchesProject(t->patches, x, NULL, &nearest);
+  *at = nearest;
+  if (any_side || !out || !at->n || HycoDot(out, t->normal + 3 * at->patch) <= HYCO_OPPOSED) return;
+  HycoPatchesProject(t->patches, x, out, at); /* at a corner, of the facets that have the point */
+  if (at->n && at->distance > nearest.distance + HYCO_SAME_POINT * ShortestEdge(t, at->patch)) at->n = 0;
 }
 
 void HycoPartnersAcross(const HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscReal r[3])
@@ -127,5 +155,20 @@ PetscErrorCode HycoPartnersAtBorder(HycoPartners *t, const HycoProjection *at, P
     *border = t->at_border[at->node[0]];
   else
     *border = (PetscBool)(bsearch(edge, t->border, (size_t)t->n_border, 2 * sizeof(PetscInt), CompareEdges) != NULL);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What remains on the facet's plane of the way from a node past the border to its master point. */
+PetscErrorCode HycoPartnersIsPast(HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscBool *past)
+{
+  const PetscReal *n = t->normal + 3 * at->patch;
+  PetscReal r[3], along = 0, height;
+
+  PetscFunctionBegin;
+  *past = PETSC_FALSE;
+  HycoPartnersAcross(t, slave, at, r);
+  height = HycoDot(r, n);
+  for (PetscInt c = 0; c < 3; c++) along += (r[c] - height * n[c]) * (r[c] - height * n[c]);
+  if (PetscSqrtReal(along) > HYCO_PAST_BORDER * ShortestEdge(t, at->patch)) PetscCall(HycoPartnersAtBorder(t, at, past));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

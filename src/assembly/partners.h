@@ -20,12 +20,14 @@ PetscErrorCode HycoPartnersCreate(HycoFE fe, const HycoContact *contact, HycoPar
 PetscErrorCode HycoPartnersDestroy(HycoPartners *partners);
 /* The slave node's outward normal; NULL: unknown, as on a group that is no surface. */
 const PetscReal *HycoPartnersOutward(const HycoPartners *partners, PetscInt slave);
-/* The nearest point of the patches that oppose the slave's normal; any_side: of all. */
+/* The nearest point of the master; n = 0 where it does not oppose the slave's normal, unless any_side. */
 void HycoPartnersProject(const HycoPartners *partners, PetscInt slave, PetscBool any_side, HycoProjection *at);
 /* From the slave node to that point. */
 void HycoPartnersAcross(const HycoPartners *partners, PetscInt slave, const HycoProjection *at, PetscReal r[3]);
 /* Whether a point lies on the master's border: on an edge that has one facet, at a node of such an edge. */
 PetscErrorCode HycoPartnersAtBorder(HycoPartners *partners, const HycoProjection *at, PetscBool *border);
+/* Whether a slave node lies past the master's border, by more than a tenth of the facet's shortest edge along it. */
+PetscErrorCode HycoPartnersIsPast(HycoPartners *partners, PetscInt slave, const HycoProjection *at, PetscBool *past);
 
 static inline PetscReal HycoDot(const PetscReal a[3], const PetscReal b[3])
 {

@@ -1,10 +1,10 @@
 /*
-  What slave nodes of moved surfaces meet over the parameters: at the training points, and at points between them until
-  these bring nothing new. It is geometry alone, on a mesh of the surfaces without cells.
+  What slave nodes of moved surfaces meet over the parameters: at the training points, and at points spread over the
+  ranges until these bring nothing new. It is geometry alone, on a mesh of the surfaces without cells.
 */
 #include <hycodomain.h>
 
-#define MOST_POINTS 500 /* between the training points */
+#define MOST_POINTS 500 /* of the ranges */
 #define FRUITLESS   50  /* one after the other: the search ends */
 /* A contact is followed as far as this multiple of the longest way that closed in training, and a share of a facet. */
 #define REACH_FACTOR 2
@@ -223,28 +223,21 @@ static PetscBool Moves(HycoScene scene, PetscInt p)
   return moves;
 }
 
-/* Points between the training points, in the parameters that move something. */
-static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, PetscInt n, const PetscReal mu[], Lists *l)
+/* Points of the ranges, in the parameters that move something; the others as at mu. */
+static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal mu[], Lists *l)
 {
   static const PetscInt prime[] = {2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53};
   const PetscInt n_par = scene->n_parameters, n_primes = (PetscInt)(sizeof(prime) / sizeof(prime[0]));
-  PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS], at[HYCO_MAX_PARAMETERS];
+  PetscReal at[HYCO_MAX_PARAMETERS];
   PetscInt fruitless = 0;
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < n_par; p++) {
-    lo[p] = hi[p] = mu[p];
-    for (PetscInt k = 1; k < n && Moves(scene, p); k++) {
-      lo[p] = PetscMin(lo[p], mu[k * n_par + p]);
-      hi[p] = PetscMax(hi[p], mu[k * n_par + p]);
-    }
-  }
   for (PetscInt k = 1; k <= MOST_POINTS && fruitless < FRUITLESS; k++) {
     PetscInt grown, moving = 0;
 
     for (PetscInt p = 0; p < n_par; p++) {
-      at[p] = lo[p];
-      if (hi[p] > lo[p]) at[p] += (hi[p] - lo[p]) * Corput(k, prime[moving++ % n_primes]);
+      at[p] = mu[p];
+      if (Moves(scene, p)) at[p] = scene->lo[p] + (scene->hi[p] - scene->lo[p]) * Corput(k, prime[moving++ % n_primes]);
     }
     if (!moving) break;
     PetscCall(NoteAt(s, at, l, &grown));
@@ -308,7 +301,7 @@ PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pai
   PetscCall(PetscMalloc1(s.pairs.n, &l.head));
   for (PetscInt k = 0; k < s.pairs.n; k++) l.head[k] = -1;
   for (PetscInt k = 0; k < n; k++) PetscCall(NoteAt(&s, mu + k * scene->n_parameters, &l, &grown));
-  if (n) PetscCall(NoteBetween(&s, scene, n, mu, &l));
+  if (n) PetscCall(NoteBetween(&s, scene, mu, &l));
   PetscCall(Collect(&s, pairs, &l, met));
   PetscCall(PetscFree(l.head));
   PetscCall(PetscFree(l.row));

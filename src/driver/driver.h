@@ -68,6 +68,9 @@ int DriverEndStatus(PetscErrorCode ierr);
 
 /* A report with command, scene title, mu (NULL: none) and ranks. */
 PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscReal mu[], cJSON **json);
+/* Into the report, and, where they matter, on the terminal: the largest initial overlap, the sliding, and that nothing
+   faces anything. */
+PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap, PetscReal sliding);
 void ReportKKT(cJSON *json, const HycoKKT *kkt);
 void ReportSeconds(cJSON *json, const HycoSeconds *seconds);
 void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[]);

@@ -87,6 +87,9 @@ static void TakeDisplacement(Fallback *f, const HycoSummary *s, HycoPrediction *
   p->reason = s->reason;
   p->kkt = s->kkt;
   p->u_norm2 = s->u_norm2;
+  p->n_facing = s->n_facing;
+  p->overlap = s->overlap;
+  p->sliding = s->sliding;
   f->strain_energy = s->strain_energy;
   for (PetscInt c = 0; c < 3; c++) {
     p->u_min[c] = s->u_min[c];

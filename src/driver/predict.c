@@ -76,6 +76,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   ReportVector(json, whole ? "u_min" : "rid_u_min", p->dim, p->u_min);
   ReportVector(json, whole ? "u_max" : "rid_u_max", p->dim, p->u_max);
   cJSON_AddNumberToObject(json, whole ? "strain_energy" : "rid_strain_energy", energy);
+  PetscCall(ReportContacts(json, p->n_contacts, p->n_facing, p->overlap, p->sliding));
   ReportTrust(json, p);
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);

@@ -25,6 +25,22 @@ PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap, PetscReal sliding)
+{
+  PetscFunctionBegin;
+  cJSON_AddNumberToObject(json, "n_facing", n_facing);
+  cJSON_AddNumberToObject(json, "overlap", overlap);
+  cJSON_AddNumberToObject(json, "sliding", sliding);
+  if (n_contacts && !n_facing)
+    PetscCall(Say("NO CONTACT: no slave node faces a master where these parameters put the bodies\n"));
+  if (overlap > 0) PetscCall(Say("largest initial overlap %.4g\n", (double)overlap));
+  if (sliding > 1)
+    PetscCall(Say("LARGE SLIDING: a closed contact moves by %.2g facets along its surface; contact is searched for before "
+                  "displacement, and is good for less than one\n",
+                  (double)sliding));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 void ReportKKT(cJSON *json, const HycoKKT *kkt)
 {
   cJSON *object = cJSON_AddObjectToObject(json, "kkt");

@@ -52,6 +52,9 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
       Say("KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
           (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,
           (double)s->kkt.complementarity));
+  if (s->n_facing && s->n_facing < s->n_contacts)
+    PetscCall(Say("%d of the %d slave nodes face a master\n", (int)s->n_facing, (int)s->n_contacts));
+  PetscCall(ReportContacts(json, s->n_contacts, s->n_facing, s->overlap, s->sliding));
   PetscCall(Say("seconds: %.3f assemble, %.3f factor, %.3f solve (%s)\n", (double)s->seconds.assemble,
                 (double)s->seconds.factor, (double)s->seconds.solve, linear));
   PetscCall(ReportWrite(&json));

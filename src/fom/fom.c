@@ -346,6 +346,18 @@ PetscErrorCode HycoFOMGetSystem(HycoFOM f, HycoSystem *system)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
+{
+  HycoContactState state;
+
+  PetscFunctionBegin;
+  PetscCall(HycoContactMeasure(f->fe_whole, &f->pairs, f->u, f->lambda, NULL, &state));
+  s->n_facing = state.n_facing;
+  s->overlap = state.overlap;
+  s->sliding = state.sliding;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
 {
   HycoSummary *s;
@@ -362,6 +374,9 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(HycoSolverGetReason(f->given ? f->given_solver : f->solver, &s->reason));
   if (f->given) s->kkt = f->given_kkt;
   PetscCall(HycoFOMEnergy(f, s));
+  s->n_facing = 0;
+  s->overlap = s->sliding = 0;
+  HycoOnRoot(f->comm, MeasureContacts(f, s));
   s->n_active = 0;
   s->total_contact_force = s->lambda_max = s->lambda_norm2 = s->u_norm2 = 0;
   if (f->rank == 0) {

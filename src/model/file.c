@@ -8,7 +8,7 @@
 
 /* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters.
    3: problem/type; what has none is hybrid. 4: the type may be condensed. 5: surfaces that a map moves are searched for
-   their masters; models without such are written as 4. The kind is every type's, so that an older reader tells the
+   their masters, and a slave node may face none; models without such are written as 4. The kind is every type's, so that an older reader tells the
    format. */
 #define HYCO_MODEL_FORMAT 5
 #define HYCO_MODEL_STILL  4
@@ -401,9 +401,12 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoModel m)
 
 static PetscErrorCode SaveAll(HycoH5 h, HycoModel m, HycoMesh whole, const PetscReal V_whole[])
 {
-  const PetscInt format = m->pairs.room ? HYCO_MODEL_FORMAT : HYCO_MODEL_STILL;
+  PetscInt format = m->pairs.room ? HYCO_MODEL_FORMAT : HYCO_MODEL_STILL;
 
   PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    if (HycoPairsAlone(m->scene, &m->pairs, k)) format = HYCO_MODEL_FORMAT;
+  }
   PetscCall(HycoH5WriteText(h, "kind", HYCO_MODEL_KIND));
   PetscCall(HycoH5WriteInt(h, "format", 1, 1, &format));
   PetscCall(SaveProblem(h, m));

@@ -225,6 +225,18 @@ static void SumForces(HycoModel m, HycoPrediction *p)
   p->lambda_norm2 = PetscSqrtReal(p->lambda_norm2);
 }
 
+static PetscErrorCode MeasureContacts(HycoModel m, HycoPrediction *p)
+{
+  HycoContactState state;
+
+  PetscFunctionBegin;
+  PetscCall(HycoContactMeasure(m->fe, m->condensed ? &m->pairs : &m->own_pairs, m->U, m->Lambda, m->contact, &state));
+  p->n_facing = state.n_facing;
+  p->overlap = state.overlap;
+  p->sliding = state.sliding;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Stresses of the RID's cells and the numbers that need them or the reconstruction. */
 PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
 {
@@ -260,6 +272,7 @@ PetscErrorCode HycoModelGetPrediction(HycoModel m, HycoPrediction *out)
     p->u_norm2 += m->U[k] * m->U[k];
   }
   p->u_norm2 = PetscSqrtReal(p->u_norm2);
+  PetscCall(MeasureContacts(m, p));
   PetscCall(HycoTrustEstimate(m, p));
   *out = *p;
   PetscFunctionReturn(PETSC_SUCCESS);

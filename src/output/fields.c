@@ -171,7 +171,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, HycoPairs *pairs,
     const PetscInt s = pairs->slave[k];
 
     slave_id[k] = m->node_id[s];
-    for (PetscInt c = 0; c < fe->dim; c++) {
+    for (PetscInt c = 0; c < fe->dim && !HycoPairsAlone(fe->scene, pairs, k); c++) {
       force[3 * s + c] -= lambda[k] * normal[3 * k + c];
       gap[k] -= normal[3 * k + c] * u[s * fe->dim + c];
       for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++) {

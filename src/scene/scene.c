@@ -9,7 +9,8 @@
 static const char *const body_fields[] = {"young", "poisson", "element", "map_x", "map_y", "map_z", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const contact_fields[] = {"type", "group",    "slave",    "master",   "tolerance",
-                                             "gap",  "normal_x", "normal_y", "normal_z", NULL};
+                                             "gap",  "normal_x", "normal_y", "normal_z", "overlap",
+                                             NULL};
 static const char *const scene_fields[] = {"title", "mesh", "parameters", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
@@ -171,11 +172,13 @@ static PetscErrorCode ReadContactField(HycoScene s, PetscInt entry, HycoContact 
   case 3:
     PetscCall(PetscStrallocpy(value, &c->master));
     break;
-  case 4: {
+  case 4:
+  case 9: {
+    PetscReal *length = field == 4 ? &c->tolerance : &c->overlap;
     char *end;
 
-    c->tolerance = strtod(value, &end);
-    HycoCheck(*end == '\0' && end != value && c->tolerance >= 0, "%s is \"%s\"; it must be a length, 0 or more",
+    *length = strtod(value, &end);
+    HycoCheck(*end == '\0' && end != value && *length >= 0, "%s is \"%s\"; it must be a length, 0 or more",
               s->key[entry], value);
     break;
   }
@@ -344,6 +347,9 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
     PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-contact_%s_tolerance", s->contact[k].name));
     PetscCall(PetscOptionsHasName(s->options, NULL, dashed, &set));
     if (!set) s->contact[k].tolerance = -1;
+    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-contact_%s_overlap", s->contact[k].name));
+    PetscCall(PetscOptionsHasName(s->options, NULL, dashed, &set));
+    if (!set) s->contact[k].overlap = -1;
   }
   PetscCall(CheckScene(s));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -235,6 +235,30 @@ static PetscErrorCode TakeSurfaces(HycoTrainer t, HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where slaves slide from facet to facet B has kinks, and no polynomial follows it. Rank 0. */
+static PetscErrorCode CheckFacets(HycoTrainer t)
+{
+  PetscInt n;
+  const PetscReal *mu;
+  HycoMet met;
+
+  PetscFunctionBegin;
+  if (!t->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, &mu));
+  PetscCall(HycoMetFind(t->scene, t->whole, &t->pairs, n, mu, NULL, &met));
+  for (PetscInt r = 1; r < met.rows.n; r++) {
+    const HycoPairs *p = &met.rows;
+
+    HycoCheck(met.of[r] != met.of[r - 1],
+              "contact %s: node %d meets other facets of %s as the parameters move it; a condensed model interpolates "
+              "over the parameters what has kinks there: train a hybrid one",
+              t->scene->contact[p->contact[r]].name, (int)t->whole->node_id[p->slave[r]],
+              t->scene->contact[p->contact[r]].master);
+  }
+  PetscCall(HycoMetDestroy(&met));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Which parameters reach what; that the scene is one for this model. Rank 0. */
 static PetscErrorCode Inspect(HycoTrainer t, HycoCondensed c)
 {
@@ -243,6 +267,7 @@ static PetscErrorCode Inspect(HycoTrainer t, HycoCondensed c)
   char name[HYCO_LINE];
 
   PetscFunctionBegin;
+  PetscCall(CheckFacets(t));
   PetscCall(FindStiff(t, c));
   PetscCall(HycoCondensedAllocate(c));
   c->exact_gap = 1;

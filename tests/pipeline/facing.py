@@ -1,0 +1,108 @@
+"""Which nodes are paired: normals oppose, partners lie in front; what overlaps or no longer faces is refused by name."""
+import math
+import unittest
+
+from common import Case, msh
+from roller import grid, mesh, scene
+
+ARCS = """
+scene: {mesh: arcs.msh, parameters: [press]}
+parameter: {press: {range: [0, 1]}}
+body: {low: {young: 10, poisson: 0.3%s}, high: {young: 20, poisson: 0.3}}
+fixed: {base: {x: 0, y: 0}, top: {x: 0, y: -press}}
+contact: {c: {type: %s, slave: over, master: under%s}}
+"""
+
+
+def arcs(path, angle=60, m=36, gap=0.0):
+    """Two mirrored parts of discs of radius 10 that touch at the origin, nodes mirrored too."""
+    nodes, elements = [], []
+    for tag, sign in ((1, -1), (2, 1)):
+        def point(i, j, k, sign=sign):
+            t, r = math.radians(angle * (2 * i / m - 1)), 10 * (1 - 0.5 * j / 5)
+            return r * math.sin(t), sign * (10 - r * math.cos(t) + gap), 0
+
+        grid([m, 5], point, nodes, elements, tag, {(1, 0): 10 + tag, (1, 1): 20 + tag})
+    msh(path, nodes, elements, {1: (2, 'low'), 2: (2, 'high'), 11: (1, 'under'), 21: (1, 'base'), 12: (1, 'over'), 22: (1, 'top')})
+
+
+class Facing(Case):
+    def scene(self, kind, more='', low=''):
+        with open(self.path('arcs.yaml'), 'w', encoding='ascii') as file:
+            file.write(ARCS % (low, kind, more))
+
+    def force(self, *more):
+        r = self.hyco('solve', '-scene', 'arcs.yaml', '-mu', '0.3', *more)
+        self.solved(r)
+        return r
+
+    def refused(self, *texts, yaml='arcs.yaml', mu='0.3', more=()):
+        run = self.run_raw('solve', '-scene', yaml, '-mu', mu, *more)
+        self.assertEqual(run.returncode, 1, run.stdout)
+        self.assertEqual(len(run.stderr.splitlines()), 1, run.stderr)
+        for text in texts:
+            self.assertIn(text, run.stderr)
+
+    def test_mirrored_pair(self):
+        """Nodes pair along the normal, with and without a tolerance; the force is that of the surface contact."""
+        for angle in (20, 60, 90):
+            arcs(self.path('arcs.msh'), angle)
+            self.scene('surface', ', tolerance: 25')
+            surface = self.force()['total_contact_force']
+            for more in ('', ', tolerance: 25'):
+                with self.subTest(angle=angle, more=more):
+                    self.scene('pair', more)
+                    self.near(self.force()['total_contact_force'], surface, 0.01)
+
+    def test_tolerance(self):
+        """A tolerance, however large, pairs nothing that does not face; too small, the message says what is right."""
+        arcs(self.path('arcs.msh'), 90)
+        self.scene('surface', ', tolerance: 25')
+        right = self.force()
+        self.assertLess(right['n_facing'], right['n_contacts'])
+        self.scene('surface')
+        self.refused('have no point of under within', 'contact_c_tolerance')
+        self.scene('surface', ', tolerance: 1000')
+        self.near(self.force()['total_contact_force'], right['total_contact_force'], 1e-12)
+        arcs(self.path('arcs.msh'), 20, gap=2)
+        self.scene('pair')
+        self.refused('have no node of under within', 'mesh both surfaces alike, or take type: surface')
+        self.scene('pair', ', tolerance: 6')
+        self.assertEqual(self.force()['n_active'], 0)
+
+    def test_wrong_side(self):
+        """A surface that looks away meets nothing."""
+        arcs(self.path('arcs.msh'), 20)
+        self.scene('surface', ', tolerance: 25')
+        self.refused('no node of over faces base within 25', more=('-contact_c_master', 'base'))
+
+    def test_overlap(self):
+        """What overlaps by more than half of a facet is named, with the entry that allows it; the rest is reported."""
+        arcs(self.path('arcs.msh'), 20, gap=-0.03)
+        self.scene('surface', ', tolerance: 25')
+        self.near(self.force()['overlap'], 0.06, 1e-3)
+        self.near(self.hyco('predict', '-model', self.train(), '-mu', '0.3')['overlap'], 0.06, 1e-3)
+        arcs(self.path('arcs.msh'), 20, gap=-0.4)
+        self.refused('before any load node', 'deep in under (its master point is 0.8 away)', 'half of its facet', 'contact_c_overlap 0.80')
+        self.assertGreater(self.force('-contact_c_overlap', '0.808')['total_contact_force'], 1)
+        self.refused('0.3 is allowed;', more=('-contact_c_overlap', '0.3'))
+        self.refused('it must be a length, 0 or more', more=('-contact_c_overlap', 'deep'))
+
+    def train(self):
+        self.hyco('train', '-scene', 'arcs.yaml', '-values_press', '0.1,0.2,0.3,0.4', '-model', 'a.h5', '-hyco_rid_whole', 'true', '-hyco_trust_folds', '0')
+        return 'a.h5'
+
+    def test_pair_is_moved(self):
+        """A pair keeps its nodes: scaled together they face each other still, shifted by a facet they do not."""
+        arcs(self.path('arcs.msh'), 20)
+        self.scene('pair', low=', map: {x: 1.01*x}')
+        self.assertGreater(self.force()['total_contact_force'], 0)
+        self.scene('pair', low=', map: {x: x + press}')
+        self.refused('the map brings node', 'apart along the surface', 'take type: surface')
+        mesh(self.path('m.msh'))
+        scene(self.path('moved.yaml'), 'm.msh', kind='pair')
+        self.refused('have no node of upper', 'take type: surface', yaml='moved.yaml', mu='1,0.5,10')
+
+
+if __name__ == '__main__':
+    unittest.main()
