@@ -30,6 +30,7 @@ typedef struct {
   HycoKKT kkt;
   HycoReason reason;
   HycoSeconds seconds;
+  char regularised[512]; /* motions that nothing holds and -hyco_regularise took out, with "; " between */
   char free_motion[128]; /* one that contact alone prevents: "body block from moving along (0, 1, 0)"; "": none */
 } HycoSummary;
 
