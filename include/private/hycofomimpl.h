@@ -60,6 +60,9 @@ PetscErrorCode HycoFOMBalance(HycoFOM fom);
 PetscErrorCode HycoFOMCheckContactBalance(HycoFOM fom);
 /* Takes the released motions that the contacts' normals leave alone out of u. Rank 0. */
 void HycoFOMTakeOutReleased(HycoFOM fom);
+/* How many closed contacts of the last solution depend on the others, rows of B: with any, the contact forces are not
+   unique. Rank 0. */
+PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
 /* Attaches the rigid motions that contact alone holds to K. Collective. */
 PetscErrorCode HycoFOMSetMotions(HycoFOM fom);
 /* Generalised forces F - B^T Lambda of the last solution (n_nodes x dim) on rank 0, zero on fixed unknowns. Collective.

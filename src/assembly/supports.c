@@ -63,7 +63,7 @@ static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[H
 {
   const PetscReal *w = fe->dim == 3 ? r->rigid + 3 : NULL;
   PetscReal t[3] = {0, 0, 0}, omega[3] = {0, 0, fe->dim == 2 ? r->rigid[2] : 0}, at[3], move = 0, turn = 0, size = 0, d[3];
-  PetscReal sign = 1;
+  PetscReal first;
 
   for (PetscInt c = 0; c < 3; c++) {
     if (c < fe->dim) t[c] = r->rigid[c];
@@ -83,10 +83,8 @@ static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[H
     d[c] /= PetscSqrtReal(size);
     if (PetscAbsReal(d[c]) < 1e-8) d[c] = 0; /* round-off */
   }
-  for (PetscInt c = 2; c >= 0; c--) { /* the first component that is not 0 is positive */
-    if (d[c] != 0) sign = d[c] < 0 ? -1 : 1;
-  }
-  for (PetscInt c = 0; c < 3; c++) d[c] = d[c] == 0 ? 0 : sign * d[c];
+  first = d[0] != 0 ? d[0] : d[1] != 0 ? d[1] : d[2];
+  for (PetscInt c = 0; c < 3 && first < 0; c++) d[c] = d[c] == 0 ? 0 : -d[c]; /* an axis has no sign */
   if (move > 400 * turn)
     HycoFormat(name, "body %s%s from moving along (%.2g, %.2g, %.2g)", fe->scene->body[r->body].name, others,
                (double)d[0], (double)d[1], (double)d[2]);

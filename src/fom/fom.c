@@ -376,6 +376,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(HycoSolverGetReason(f->given ? f->given_solver : f->solver, &s->reason));
   if (f->given) s->kkt = f->given_kkt;
   PetscCall(HycoFOMEnergy(f, s));
+  if (s->reason > 0 && f->n_contacts) HycoOnRoot(f->comm, HycoFOMCountDependent(f, &s->n_dependent));
   s->n_active = 0;
   s->total_contact_force = s->lambda_max = s->lambda_norm2 = s->u_norm2 = 0;
   if (f->rank == 0) {
