@@ -24,6 +24,7 @@ typedef struct {
 typedef struct {
   PetscInt n_dof, n_contacts, n_active; /* free unknowns N, contacts N_lambda, contacts with L_i > 0 */
   PetscInt n_still; /* contacts between fixed unknowns, which have no effect */
+  PetscInt n_dependent; /* closed contacts whose rows depend on others': with any, Lambda is not unique (U is) */
   PetscInt iterations, dim;
   PetscReal total_contact_force, lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3];
   PetscInt n_facing;          /* contacts that may close: of moved surfaces the slave nodes that face a master */
@@ -33,6 +34,7 @@ typedef struct {
   HycoKKT kkt;
   HycoReason reason;
   HycoSeconds seconds;
+  char regularised[512]; /* motions that nothing holds and -hyco_regularise took out, with "; " between */
   char free_motion[128]; /* one that contact alone prevents: "body block from moving along (0, 1, 0)"; "": none */
 } HycoSummary;
 

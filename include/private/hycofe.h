@@ -42,6 +42,10 @@ struct _n_HycoFE {
   PetscInt n_loads;
   HycoLoadShares *shares; /* n_loads: by load of the scene */
   signed char *drawn_sign; /* by cell: the sign of its volume in the mesh file's coordinates */
+  /* -hyco_regularise: unknowns held beside the scene's supports, and the motions that these keep (n_released x n_dof,
+     orthonormal; on the whole mesh alone); the contacts' normals are turned to leave the first n_turned of them alone */
+  PetscInt n_pins, *pin, n_released, n_turned;
+  PetscReal *released;
   /* at the current mu */
   PetscBool ready;
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -66,19 +70,28 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[]);
 void HycoFEReaches(HycoFE fe, PetscBool reaches[]);
 
+/* A rigid motion of one connected part of the mesh: t + omega x (X - centre) / size. */
+typedef struct {
+  PetscInt part, body;
+  PetscReal centre[3], size, rigid[6]; /* translations (dim), then rotations (2D: 1, 3D: 3) */
+} HycoRigid;
+
 /* Rigid motions that the supports leave free, an orthonormal basis of the kernel of K. */
 typedef struct {
   PetscInt n;
   PetscReal *motion;       /* n x n_dof, zero where fixed */
-  char (*name)[HYCO_LINE]; /* "body pellet from moving along (0, 0, 1)" */
+  char (*name)[HYCO_LINE]; /* "body pellet from moving along (0, 0, 1)", "... from turning about (0, 0, 1) through (0, 10)" */
+  HycoRigid *rigid;        /* n */
 } HycoMotions;
 
+/* Holds the unknowns `component` of the nodes with these tags (those that this mesh has) beside the scene's supports, in
+   place of the last ones; n = 0: none. */
+PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const PetscInt component[]);
 /* Finds them on the whole mesh. */
 PetscErrorCode HycoFEFreeMotions(HycoFE fe, HycoMotions *motions);
 PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
-/* Fails, naming one, when the m contact rows (as of HycoContactRows()) leave a motion free too. */
-PetscErrorCode HycoFECheckHeld(HycoFE fe, const HycoMotions *motions, PetscInt m, const PetscInt start[],
-                               const PetscInt dof[], const PetscReal value[]);
+/* "body B from moving along ..." for the combination of motions with these coefficients. */
+void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);
 
 /* Element stiffness of a cell, row major, nv * dim square, nodes outer, components inner. */
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
@@ -175,6 +188,15 @@ typedef struct {
 } HycoContactState;
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
                                   const PetscInt *index, HycoContactState *state);
+/*
+  The combinations of `motions` that frictionless contact does not hold by the shape of the surfaces: at every contact
+  the motion is tangential, by more than faceting explains to no normal, to the slave's surface, to the master's, or to
+  the given normal's plane. unheld: coefficients (n x motions->n, orthonormal) of all of them; names by
+  HycoMotionsName() of each. alike: of the largest set that is tangential in one and the same sense, to be released by
+  turning normals. The caller frees both.
+*/
+PetscErrorCode HycoFEFindUnheld(HycoFE fe, const HycoPairs *pairs, const HycoMotions *motions, PetscInt *n_unheld,
+                                PetscReal **unheld, PetscInt *n_alike, PetscReal **alike);
 /* Area (length in 2D, 1 in 1D) that each contact's slave node stands for; 0 when its group is no surface. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
 

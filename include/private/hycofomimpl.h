@@ -6,6 +6,9 @@
 #include <hycofom.h>
 #include <hycosolverimpl.h>
 
+/* Most rigid motions that -hyco_regularise releases. */
+#define HYCO_MAX_PINS 12
+
 struct _p_HycoFOM {
   MPI_Comm comm;
   PetscMPIInt rank, size;
@@ -36,6 +39,11 @@ struct _p_HycoFOM {
   Vec given_F;
   HycoKKT given_kkt;
   PetscBool given;
+  /* -hyco_regularise: motions that nothing holds, orthonormal, and the unknowns pinned for them, by tag and component */
+  PetscBool regularise, pinned; /* pinned: the pins are chosen */
+  PetscReal regularise_tol;
+  PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
+  Vec *released;
   HycoSummary summary;
 };
 
@@ -43,7 +51,20 @@ struct _p_HycoFOM {
 PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);
 /* U and Lambda to rank 0, in the file's order. Collective. */
 PetscErrorCode HycoFOMGather(HycoFOM fom);
-/* Attaches the rigid motions to K; fails when nothing holds one of the free ones. Collective. */
+/* Looks for rigid motions that neither supports nor contact hold, at fe's parameters: fails with their names, or pins as
+   many unknowns, as supports of fe. Collective, before the assembly. */
+PetscErrorCode HycoFOMRelease(HycoFOM fom);
+/* Takes from F, assembled without the pins, what it does on the released motions; fails if that is not little.
+   Collective. */
+PetscErrorCode HycoFOMBalance(HycoFOM fom);
+/* After a solve: fails when the contact forces are not balanced on the released motions. Collective. */
+PetscErrorCode HycoFOMCheckContactBalance(HycoFOM fom);
+/* Takes the released motions that the contacts' normals leave alone out of u. Rank 0. */
+void HycoFOMTakeOutReleased(HycoFOM fom);
+/* How many closed contacts of the last solution depend on the others, rows of B: with any, the contact forces are not
+   unique. Rank 0. */
+PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
+/* Attaches the rigid motions that contact alone holds to K. Collective. */
 PetscErrorCode HycoFOMSetMotions(HycoFOM fom);
 /* Generalised forces F - B^T Lambda of the last solution (n_nodes x dim) on rank 0, zero on fixed unknowns. Collective.
  */

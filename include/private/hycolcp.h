@@ -38,6 +38,9 @@ PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal
 */
 PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
                                  HycoSetFactor factor, PetscInt *k, PetscInt a[], PetscReal z[], PetscBool *singular);
+/* The rank of a symmetric positive semidefinite matrix (k x k, overwritten), scaled to a unit
+   diagonal, to 1e-12. */
+PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
 /*
   The active set with p free unknowns before m contacts (bodies that contact alone holds): M and q as HycoDirectFactor()
   and HycoDirectReduce() give them, z = (x_pinned, L). SINGULAR: contact does not hold them under this load.

@@ -84,6 +84,7 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal vect
     last = pairs->contact[k];
     MasterPoint(fe, pairs, k, x);
     PetscCall(PairNormal(fe, c, s, x, given ? NULL : vector, n));
+    if (fe->n_turned) HycoTurnNormal(fe, pairs, k, n);
     if (HycoPairsAlone(fe->scene, pairs, k)) {
       gap[k] = NoGap(fe);
     } else if (c->gap) {

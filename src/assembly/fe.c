@@ -13,6 +13,8 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   }
   PetscCall(PetscFree((*fe)->shares));
   PetscCall(PetscFree((*fe)->constant));
+  PetscCall(PetscFree((*fe)->pin));
+  PetscCall(PetscFree((*fe)->released));
   PetscCall(PetscFree((*fe)->X));
   PetscCall(PetscFree((*fe)->mirrored));
   PetscCall(PetscFree((*fe)->drawn_sign));
@@ -153,6 +155,28 @@ static PetscErrorCode SetSupports(HycoFE fe)
       }
     }
   }
+  for (PetscInt k = 0; k < fe->n_pins; k++) fe->fixed[fe->pin[k]] = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const PetscInt component[])
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < fe->n_pins; k++) fe->fixed[fe->pin[k]] = PETSC_FALSE;
+  if (n != fe->n_pins) {
+    PetscCall(PetscFree(fe->pin));
+    PetscCall(PetscMalloc1(n, &fe->pin));
+  }
+  fe->n_pins = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt i = 0; i < m->n_nodes; i++) {
+      if (m->node_id[i] == tag[k]) fe->pin[fe->n_pins++] = i * m->dim + component[k];
+    }
+  }
+  for (PetscInt k = 0; k < fe->n_pins; k++) fe->fixed[fe->pin[k]] = PETSC_TRUE;
+  PetscCall(HycoPlacesDestroy(&fe->places)); /* what it has summed knows the fixed unknowns */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -4,6 +4,7 @@
 */
 #include <hycofe.h>
 #include <petscblaslapack.h>
+#include <string.h>
 
 /* The node that stands for all that i is connected to; part leads to it. */
 static PetscInt Root(PetscInt part[], PetscInt i)
@@ -56,45 +57,109 @@ static PetscInt RigidRow(PetscInt dim, const PetscReal x[3], PetscInt c, PetscRe
   return n;
 }
 
-/* "body pellet moving along (0, 0, 1)", from coefficients of translations and rotations. */
-static void Name(HycoFE fe, const Part *p, PetscInt n, const PetscReal v[], char name[HYCO_LINE])
+/* "body pellet from moving along (0, 0, 1)", or from turning about an axis through a point: of a motion whose axis is
+   twenty sizes away one sees the translation. `others`: what moves with it. */
+static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[HYCO_LINE])
 {
-  const char *body = fe->scene->body[p->body].name;
-  PetscReal move = 0, turn = 0, d[3] = {0, 0, 1}, size = 0;
+  const PetscReal *w = fe->dim == 3 ? r->rigid + 3 : NULL;
+  PetscReal t[3] = {0, 0, 0}, omega[3] = {0, 0, fe->dim == 2 ? r->rigid[2] : 0}, at[3], move = 0, turn = 0, size = 0, d[3];
+  PetscReal first;
 
-  for (PetscInt j = 0; j < n; j++) *(j < fe->dim ? &move : &turn) += v[j] * v[j];
   for (PetscInt c = 0; c < 3; c++) {
-    if (move >= turn) d[c] = c < fe->dim ? v[c] : 0;
-    if (move < turn && fe->dim == 3) d[c] = v[3 + c];
+    if (c < fe->dim) t[c] = r->rigid[c];
+    if (w) omega[c] = w[c];
+    move += t[c] * t[c];
+    turn += omega[c] * omega[c];
+  }
+  for (PetscInt c = 0; c < 3; c++) {
+    const PetscInt e = (c + 1) % 3, f = (c + 2) % 3;
+
+    d[c] = move > 400 * turn ? t[c] : omega[c];
     size += d[c] * d[c];
+    at[c] = turn > 0 ? r->centre[c] + r->size * (omega[e] * t[f] - omega[f] * t[e]) / turn : 0;
+    if (PetscAbsReal(at[c]) < 1e-6 * r->size) at[c] = 0; /* round-off */
   }
   for (PetscInt c = 0; c < 3; c++) {
     d[c] /= PetscSqrtReal(size);
     if (PetscAbsReal(d[c]) < 1e-8) d[c] = 0; /* round-off */
   }
-  HycoFormat(name, "body %s from %s (%.2g, %.2g, %.2g)", body, move >= turn ? "moving along" : "turning about",
-             (double)d[0], (double)d[1], (double)d[2]);
+  first = d[0] != 0 ? d[0] : d[1] != 0 ? d[1] : d[2];
+  for (PetscInt c = 0; c < 3 && first < 0; c++) d[c] = d[c] == 0 ? 0 : -d[c]; /* an axis has no sign */
+  if (move > 400 * turn)
+    HycoFormat(name, "body %s%s from moving along (%.2g, %.2g, %.2g)", fe->scene->body[r->body].name, others,
+               (double)d[0], (double)d[1], (double)d[2]);
+  else
+    HycoFormat(name, "body %s%s from turning about (%.2g, %.2g, %.2g) through (%.4g, %.4g, %.4g)",
+               fe->scene->body[r->body].name, others, (double)d[0], (double)d[1], (double)d[2], (double)at[0],
+               (double)at[1], (double)at[2]);
+}
+
+/* The combination's motion of the part that motion k belongs to; its share of the whole. */
+static PetscReal OfPart(const HycoMotions *motions, const PetscReal coefficient[], PetscInt k, HycoRigid *r)
+{
+  PetscReal share = 0;
+
+  *r = motions->rigid[k];
+  for (PetscInt i = 0; i < 6; i++) r->rigid[i] = 0;
+  for (PetscInt j = 0; j < motions->n; j++) {
+    if (motions->rigid[j].part != r->part) continue;
+    share += coefficient[j] * coefficient[j];
+    for (PetscInt i = 0; i < 6; i++) r->rigid[i] += coefficient[j] * motions->rigid[j].rigid[i];
+  }
+  return share;
+}
+
+void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE])
+{
+  HycoRigid best, r;
+  PetscReal most = -1;
+  char others[HYCO_LINE / 4] = "";
+
+  for (PetscInt k = 0; k < motions->n; k++) {
+    const PetscReal share = OfPart(motions, coefficient, k, &r);
+
+    if (share > most * (1 + 1e-8)) best = r;
+    most = PetscMax(most, share);
+  }
+  for (PetscInt k = 0; k < motions->n; k++) {
+    const PetscBool first = (PetscBool)(!k || motions->rigid[k].part != motions->rigid[k - 1].part);
+
+    if (!first || motions->rigid[k].part == best.part || OfPart(motions, coefficient, k, &r) < 1e-4) continue;
+    if (strlen(others) + strlen(fe->scene->body[r.body].name) + 8 > sizeof(others)) continue;
+    strcat(others, others[0] ? ", " : " (with ");
+    strcat(others, fe->scene->body[r.body].name);
+  }
+  if (others[0]) strcat(others, ")");
+  Name(fe, &best, others, name);
 }
 
 /* Adds a motion: its values on the part's nodes, made orthonormal to the part's motions from `first`. */
 static PetscErrorCode AddMotion(HycoFE fe, const PetscInt part[], PetscInt which, const Part *p, const PetscReal v[],
                                 PetscInt first, HycoMotions *motions)
 {
-  const PetscInt n = fe->n_dof, k = motions->n;
+  const PetscInt n = fe->n_dof, k = motions->n, n_rigid = fe->dim == 1 ? 1 : fe->dim == 2 ? 3 : 6;
   PetscReal *u, norm = 0;
+  HycoRigid *own;
 
   PetscFunctionBegin;
   PetscCall(PetscRealloc((size_t)(k + 1) * (size_t)n * sizeof(PetscReal), &motions->motion));
   PetscCall(PetscRealloc((size_t)(k + 1) * sizeof(*motions->name), &motions->name));
+  PetscCall(PetscRealloc((size_t)(k + 1) * sizeof(*motions->rigid), &motions->rigid));
+  own = &motions->rigid[k];
+  own->part = which;
+  own->body = p->body;
+  own->size = p->size;
+  PetscCall(PetscArraycpy(own->centre, p->centre, 3));
+  PetscCall(PetscArrayzero(own->rigid, 6));
+  for (PetscInt j = 0; j < n_rigid; j++) own->rigid[j] = v[j];
   u = motions->motion + (size_t)k * (size_t)n;
   PetscCall(PetscArrayzero(u, n));
   for (PetscInt i = 0; i < n; i++) {
     PetscReal x[3], row[6];
-    PetscInt n_rigid;
 
     if (part[i / fe->dim] != which) continue;
     for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * (i / fe->dim) + c] - p->centre[c]) / p->size;
-    n_rigid = RigidRow(fe->dim, x, i % fe->dim, row);
+    RigidRow(fe->dim, x, i % fe->dim, row);
     for (PetscInt j = 0; j < n_rigid && !fe->fixed[i]; j++) u[i] += row[j] * v[j];
   }
   for (PetscInt j = first; j < k; j++) {
@@ -103,10 +168,12 @@ static PetscErrorCode AddMotion(HycoFE fe, const PetscInt part[], PetscInt which
 
     for (PetscInt i = 0; i < n; i++) dot += u[i] * w[i];
     for (PetscInt i = 0; i < n; i++) u[i] -= dot * w[i];
+    for (PetscInt i = 0; i < 6; i++) own->rigid[i] -= dot * motions->rigid[j].rigid[i];
   }
   for (PetscInt i = 0; i < n; i++) norm += u[i] * u[i];
   for (PetscInt i = 0; i < n; i++) u[i] /= PetscSqrtReal(norm);
-  Name(fe, p, fe->dim == 1 ? 1 : fe->dim == 2 ? 3 : 6, v, motions->name[k]);
+  for (PetscInt i = 0; i < 6; i++) own->rigid[i] /= PetscSqrtReal(norm);
+  Name(fe, own, "", motions->name[k]);
   motions->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -168,6 +235,7 @@ PetscErrorCode HycoFEFreeMotions(HycoFE fe, HycoMotions *motions)
   motions->n = 0;
   motions->motion = NULL;
   motions->name = NULL;
+  motions->rigid = NULL;
   PetscCall(PetscMalloc1(m->n_nodes, &part));
   PetscCall(FindParts(m, part, &n_parts));
   PetscCall(PetscCalloc1(n_parts, &parts));
@@ -183,56 +251,7 @@ PetscErrorCode HycoMotionsDestroy(HycoMotions *motions)
   PetscFunctionBegin;
   PetscCall(PetscFree(motions->motion));
   PetscCall(PetscFree(motions->name));
+  PetscCall(PetscFree(motions->rigid));
   motions->n = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Gram matrix of B N, N the motions. */
-static PetscErrorCode GramOfRows(HycoFE fe, const HycoMotions *motions, PetscInt m, const PetscInt start[],
-                                 const PetscInt dof[], const PetscReal value[], PetscReal gram[])
-{
-  const PetscInt n = motions->n;
-  PetscReal *row;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n, &row));
-  for (PetscInt i = 0; i < m; i++) {
-    for (PetscInt a = 0; a < n; a++) {
-      row[a] = 0;
-      for (PetscInt j = start[i]; j < start[i + 1]; j++)
-        row[a] += value[j] * motions->motion[(size_t)a * (size_t)fe->n_dof + (size_t)dof[j]];
-    }
-    for (PetscInt a = 0; a < n; a++) {
-      for (PetscInt b = 0; b < n; b++) gram[a * n + b] += row[a] * row[b];
-    }
-  }
-  PetscCall(PetscFree(row));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFECheckHeld(HycoFE fe, const HycoMotions *motions, PetscInt m, const PetscInt start[],
-                               const PetscInt dof[], const PetscReal value[])
-{
-  PetscBLASInt n, lwork, info;
-  PetscInt worst = 0;
-  PetscReal *gram, *values, *work, least;
-
-  PetscFunctionBegin;
-  if (!motions->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscBLASIntCast(motions->n, &n));
-  lwork = 8 * n;
-  PetscCall(PetscCalloc1(n * n, &gram));
-  PetscCall(PetscMalloc2(n, &values, lwork, &work));
-  PetscCall(GramOfRows(fe, motions, m, start, dof, value, gram));
-  LAPACKsyev_("V", "U", &n, gram, &n, values, work, &lwork, &info);
-  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
-  for (PetscInt j = 0; j < n; j++) worst = PetscAbsReal(gram[j]) > PetscAbsReal(gram[worst]) ? j : worst;
-  least = values[0];
-  PetscCall(PetscFree(gram));
-  PetscCall(PetscFree2(values, work));
-  if (least <= 1e-12 * (m + 1) / fe->n_dof) {
-    HycoFail("no support%s keeps %s; fix a component on one of its groups", m ? " and no contact" : "",
-             motions->name[worst]);
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

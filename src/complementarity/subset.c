@@ -94,6 +94,29 @@ static PetscErrorCode Reveal(PetscInt k, PetscReal A[], const PetscReal gap[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank)
+{
+  PetscReal *d;
+  PetscBool *kept;
+
+  PetscFunctionBegin;
+  *rank = 0;
+  PetscCall(PetscCalloc2(k, &d, k, &kept));
+  for (PetscInt j = 0; j < k; j++) {
+    const PetscReal diagonal = A[(size_t)j * (size_t)k + (size_t)j];
+
+    d[j] = diagonal > 0 ? 1 / PetscSqrtReal(diagonal) : 0;
+  }
+  for (PetscInt j = 0; j < k; j++) {
+    for (PetscInt i = 0; i < k; i++) A[(size_t)j * (size_t)k + (size_t)i] *= d[i] * d[j];
+  }
+  PetscCall(PetscArrayzero(d, k));
+  PetscCall(Reveal(k, A, d, kept));
+  for (PetscInt j = 0; j < k; j++) *rank += kept[j];
+  PetscCall(PetscFree2(d, kept));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One solve on a set. */
 static PetscErrorCode TrySet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric, PetscReal tol,
                              PetscInt k, const PetscInt a[], PetscReal A[], PetscReal z[], PetscBool *regular)

@@ -5,8 +5,13 @@
 static PetscErrorCode Remarks(const HycoSummary *s)
 {
   PetscFunctionBegin;
+  if (s->regularised[0]) PetscCall(Say("regularised: neither supports nor contact keep %s\n", s->regularised));
   if (s->n_still)
     PetscCall(Say("%d contact%s between fixed displacements: without effect\n", (int)s->n_still, s->n_still > 1 ? "s lie" : " lies"));
+  if (s->n_dependent)
+    PetscCall(Say("contact forces are not unique: %d closed contact%s on the others (more slaves than their masters' unknowns); "
+                  "displacements and resultants are\n",
+                  (int)s->n_dependent, s->n_dependent > 1 ? "s depend" : " depends"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -25,6 +30,9 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   cJSON_AddNumberToObject(json, "n_contacts", s->n_contacts);
   cJSON_AddNumberToObject(json, "n_active", s->n_active);
   cJSON_AddNumberToObject(json, "n_without_effect", s->n_still);
+  cJSON_AddBoolToObject(json, "forces_unique", s->n_dependent == 0);
+  cJSON_AddNumberToObject(json, "n_dependent", s->n_dependent);
+  cJSON_AddStringToObject(json, "regularised", s->regularised);
   cJSON_AddNumberToObject(json, "active_set_iterations", s->iterations);
   cJSON_AddStringToObject(json, "solver", method);
   cJSON_AddStringToObject(json, "linear", linear);

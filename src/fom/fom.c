@@ -34,6 +34,8 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   if (f->part != f->whole) PetscCall(HycoMeshDestroy(&f->part));
   PetscCall(HycoMeshDestroy(&f->whole));
   PetscCall(HycoPairsDestroy(&f->pairs));
+  for (PetscInt k = 0; k < f->n_released; k++) PetscCall(VecDestroy(&f->released[k]));
+  PetscCall(PetscFree(f->released));
   PetscCall(PetscFree(f->global));
   PetscCall(PetscFree(f->u));
   PetscCall(PetscFree(f->lambda));
@@ -150,6 +152,9 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscCall(HycoSystemCreate(f->comm, &f->system));
   PetscCall(HycoSolverCreate(f->comm, &f->solver));
   PetscCall(HycoSolverSetFromOptions(f->solver, f->scene->options));
+  f->regularise_tol = 1e-2;
+  PetscCall(HycoOptionsBool(f->scene->options, "hyco_regularise", &f->regularise));
+  PetscCall(HycoOptionsReal(f->scene->options, "hyco_regularise_tol", 0, 1, &f->regularise_tol));
   if (f->rank == 0) {
     PetscCall(PetscMalloc1(f->n_nodes * f->part->dim, &f->u));
     PetscCall(PetscCalloc1(f->n_contacts + 1, &f->lambda));
@@ -249,6 +254,18 @@ static PetscErrorCode CountFree(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The loads at the pinned unknowns belong to the balance too. */
+static PetscErrorCode AssembleForce(HycoFOM f)
+{
+  PetscFunctionBegin;
+  if (f->n_pins) PetscCall(HycoFESetPins(f->fe, 0, NULL, NULL));
+  HycoOnEach(f->comm, HycoFEAssembleForce(f->fe, f->F));
+  if (!f->n_pins) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFESetPins(f->fe, f->n_pins, f->pin_tag, f->pin_component));
+  PetscCall(HycoFOMBalance(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -256,6 +273,7 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
   HycoOnEach(f->comm, HycoFESetParameters(f->fe, mu));
   if (f->fe_whole != f->fe) HycoOnRoot(f->comm, HycoFESetParameters(f->fe_whole, mu));
   f->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
+  if (f->fe->stiffness_changed || f->fe->contact_changed) PetscCall(HycoFOMRelease(f));
   if (!f->n_free) PetscCall(CountFree(f));
   if (f->fe->stiffness_changed) {
     PetscCall(HycoLogEvent(HYCO_EVENT_ASSEMBLE, PETSC_TRUE));
@@ -265,7 +283,7 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
     PetscCall(HycoFOMSetMotions(f));
   }
   PetscCall(HycoLogEvent(HYCO_EVENT_FORCE, PETSC_TRUE));
-  HycoOnEach(f->comm, HycoFEAssembleForce(f->fe, f->F));
+  PetscCall(AssembleForce(f));
   PetscCall(HycoLogEvent(HYCO_EVENT_FORCE, PETSC_FALSE));
   HycoLogged(HYCO_EVENT_CONTACT, AssembleContact(f, f->fe->contact_changed));
   PetscCall(HycoSystemSetMatrices(f->system, f->K, f->Bt, f->B, PETSC_TRUE));
@@ -294,6 +312,7 @@ PetscErrorCode HycoFOMGather(HycoFOM f)
   PetscCall(VecGetArrayRead(f->lambda_root, &v));
   PetscCall(PetscArraycpy(f->lambda, v, f->n_contacts));
   PetscCall(VecRestoreArrayRead(f->lambda_root, &v));
+  HycoFOMTakeOutReleased(f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -332,6 +351,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscCall(HycoSolverSetSystem(f->solver, f->system));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(f->solver, f->U, f->Lambda));
   PetscCall(HycoSolverGetSeconds(f->solver, &t->factor, &t->solve));
+  PetscCall(HycoFOMCheckContactBalance(f));
   PetscCall(HycoFOMGather(f));
   t->total = HycoNow() - begin;
   f->solved = PETSC_TRUE;
@@ -377,6 +397,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   s->n_facing = 0;
   s->overlap = s->sliding = 0;
   HycoOnRoot(f->comm, MeasureContacts(f, s));
+  if (s->reason > 0 && f->n_contacts) HycoOnRoot(f->comm, HycoFOMCountDependent(f, &s->n_dependent));
   s->n_active = 0;
   s->total_contact_force = s->lambda_max = s->lambda_norm2 = s->u_norm2 = 0;
   if (f->rank == 0) {

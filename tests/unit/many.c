@@ -62,6 +62,40 @@ static PetscErrorCode FailInTheMiddle(HycoModel m, PetscInt n, const PetscReal m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Points that come in another order than that of the work: each answer stands where its point does, and the work goes by
+   stiffness, so that both points before 0.35 are done when that one fails. */
+static PetscErrorCode Unsorted(HycoModel m)
+{
+  const PetscReal mu[8] = {0.2, 0.3, 0.1, 0.3, 0.2, 0.1, 0.1, 0.1}, failing[6] = {0.35, 0.1, 0.2, 0.3, 0.1, 0.1};
+  HycoPrediction p[4], single[4];
+  PetscInt n_contacts, n_nodes, dim;
+  PetscReal *Lambda;
+
+  PetscFunctionBegin;
+  PetscCall(HycoModelGetSizes(m, &n_contacts, &n_nodes, &dim));
+  PetscCall(PetscMalloc1(4 * n_contacts, &Lambda));
+  PetscCall(HycoModelSolveMany(m, 4, 2, mu, p, Lambda, NULL));
+  for (PetscInt k = 0; k < 4; k++) {
+    PetscReal force = 0;
+
+    PetscCall(HycoModelPredict(m, 2, mu + 2 * k));
+    PetscCall(HycoModelGetPrediction(m, &single[k]));
+    for (PetscInt i = 0; i < n_contacts; i++) force += Lambda[k * n_contacts + i];
+    CHECK_NEAR(p[k].total_contact_force, single[k].total_contact_force, 1e-12 * single[k].total_contact_force);
+    CHECK_NEAR(force, single[k].total_contact_force, 1e-12 * single[k].total_contact_force);
+    for (PetscInt j = 0; j < k; j++)
+      CHECK(PetscAbsReal(single[k].total_contact_force - single[j].total_contact_force) > 1e-6,
+            "points %d and %d cannot be told apart", (int)j, (int)k);
+  }
+  for (PetscInt k = 0; k < 3; k++) p[k].total_contact_force = -1;
+  CHECK_FAILS(HycoModelSolveMany(m, 3, 2, failing, p, NULL, NULL), "Young's modulus must be positive");
+  CHECK(p[0].total_contact_force == -1, "the point that fails has a force: %g", (double)p[0].total_contact_force);
+  CHECK_NEAR(p[1].total_contact_force, single[0].total_contact_force, 1e-12);
+  CHECK_NEAR(p[2].total_contact_force, single[3].total_contact_force, 1e-12);
+  PetscCall(PetscFree(Lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode TestMany(HycoModelType type)
 {
   const PetscReal mu[8] = {0.1, 0.1, 0.2, 0.3, 0.35, 0.1, 0.4, 0.1};
@@ -80,6 +114,7 @@ static PetscErrorCode TestMany(HycoModelType type)
   CHECK(expected[0] > 0 && expected[1] > 0 && expected[0] != expected[1], "forces %g, %g", (double)expected[0],
         (double)expected[1]);
   for (int k = 0; k < 3; k++) PetscCall(FailInTheMiddle(m, 4, mu, expected));
+  PetscCall(Unsorted(m));
   PetscCall(HycoModelDestroy(&m));
   unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
