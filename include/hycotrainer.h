@@ -29,6 +29,7 @@ typedef struct {
   PetscReal condition;             /* of the reduced stiffness, worst of the judged snapshots */
   PetscReal error_u, error_lambda; /* mean relative training errors, 2-norm, displacement and RID contact forces */
   PetscInt n_held;                 /* held-out predictions that calibrate the estimated errors; 0: none */
+  char no_estimate[1024];          /* why there is none where a calibration was begun; "" otherwise */
   HycoScan scan;                   /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;

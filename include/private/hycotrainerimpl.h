@@ -81,6 +81,9 @@ PetscErrorCode HycoTrainerOpen(HycoTrainer t, HycoSamples samples, const char pa
 /* From the bases: the RID, the model on it, its full-order displacements, the file; what it gave, on every rank.
    `useful`: refuse a model that misses its own training solutions. Collective. */
 PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path[], HycoTraining *report);
+/* The useful model and its estimates, made beside `path` and then put in its place: a run that fails leaves what was
+   there. Collective. */
+PetscErrorCode HycoTrainerFinish(HycoTrainer t, HycoSnapshots store, const char path[], HycoTraining *report);
 /* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
    rows, column major, on every rank; a dense matrix on rank 0, row or column major (the caller frees). Collective. */
 PetscErrorCode HycoTrainerGetDisplacements(HycoTrainer t, HycoSnapshots store, Mat *S);
@@ -103,9 +106,10 @@ PetscErrorCode HycoTrainerSupremizers(HycoTrainer t, Mat *forces, Mat *supremize
 PetscErrorCode HycoTrainerEnrich(HycoTrainer t);
 /* The force basis of a projection-based model under training from its dual snapshots; fills numbers[]. Rank 0. */
 PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel model);
-/* Calibrates the estimated errors of the hybrid model at `path` and writes it once more: n_held held-out predictions
-   (0: too few solutions, or a fold gave no model). The bases are a fold's afterwards. Collective. */
-PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const char path[], PetscInt *n_held);
+/* Calibrates the estimated errors of the hybrid model at `path` and writes it once more: report->n_held held-out
+   predictions, or 0 and why in report->no_estimate. The bases are a fold's afterwards. Fails where a fold does, unless
+   that says that it has no useful model. Collective. */
+PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const char path[], HycoTraining *report);
 /* A condensed model: checks that scene and samples are fit for one, before hours of work; G at all its nodes, factoring
    where no file has it; responses to q patterns P of forces (m x q column major, on every rank) at these nodes, into
    the columns of S (n_dof x ..., dense) from `first` on. Collective. */

@@ -7,6 +7,7 @@
   tolerances only.
 */
 #include "driver.h"
+#include <hycofile.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -174,23 +175,24 @@ static PetscErrorCode TrainOnce(const Work *w, const char path[], PetscBool cali
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Trains one recipe and judges it; what fails is an attempt that failed. Collective. */
+/* Trains one recipe and judges it; one that gives no useful model is an attempt that failed. Collective. */
 static PetscErrorCode Try(Work *w, Attempt *a)
 {
   HycoScene scene = NULL;
   HycoTrainer trainer = NULL;
   HycoModel model = NULL;
   PetscErrorCode ierr;
-  char file[PETSC_MAX_PATH_LEN + 16], message[HYCO_LINE];
+  char file[HYCO_FILE_NAME], message[HYCO_LINE];
   PetscMPIInt rank;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(PetscSNPrintf(file, sizeof(file), "%s.attempt", w->out->model));
+  PetscCall(HycoFileScratch(PETSC_COMM_WORLD, w->out->model, "attempt", file));
   PetscCall(SetOptions(w, a));
   PetscCall(HycoCatchBegin());
   ierr = TrainOnce(w, file, PETSC_FALSE, &scene, &trainer, &a->t);
   PetscCall(HycoCatchEnd(ierr, message));
+  PetscCall(HycoCatchNoModel(ierr, message));
   if (!message[0]) {
     HycoOnEach(PETSC_COMM_WORLD, HycoModelLoad(file, &model));
     PetscCall(HycoModelValidate(PETSC_COMM_WORLD, model, w->store, w->validation, &a->v));

@@ -43,6 +43,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
   cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
   cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
   cJSON_AddNumberToObject(json, "held_out_predictions", t->n_held);
+  if (t->no_estimate[0]) cJSON_AddStringToObject(json, "no_estimate", t->no_estimate);
   if (t->type == HYCO_MODEL_PROJECTION) {
     cJSON_AddNumberToObject(json, "n_supremizers", t->n_supremizers);
     cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);
@@ -177,6 +178,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverGet("model", PETSC_TRUE, model));
   PetscCall(DriverGet("report", PETSC_FALSE, report));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
+  PetscCall(DriverCheckMesh(scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
   PetscCall(HycoOptionsBool(NULL, "greedy", &greedy));
   PetscCall(DriverReadTargets(&search));
@@ -215,6 +217,7 @@ PetscErrorCode CommandTrain(void)
                 t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda));
   if (t.condition > 0) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
   PetscCall(Say("\n"));
+  if (t.no_estimate[0]) PetscCall(Say("no estimate of errors: %s\n", t.no_estimate));
   if (t.scan.n)
     PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,
                   (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept as asked" : ""));

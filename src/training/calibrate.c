@@ -5,6 +5,7 @@
   fold's model knows less than the final one and its points lie farther away: the bound leans to the safe side.
 */
 #include <hycoalgorithms.h>
+#include <hycofile.h>
 #include <hycotrainerimpl.h>
 #include <unistd.h>
 
@@ -239,10 +240,10 @@ static PetscErrorCode Conclude(HycoTrainer t, PetscInt n, PetscReal rows[], cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const char path[], PetscInt *n_held)
+PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const char path[], HycoTraining *report)
 {
   HycoSamples samples = t->samples;
-  char file[PETSC_MAX_PATH_LEN + 16], message[HYCO_LINE];
+  char file[HYCO_FILE_NAME + 16], message[HYCO_LINE];
   PetscBool seed[HYCO_N_SEEDS];
   const PetscInt trials = t->trials;
   PetscErrorCode ierr;
@@ -251,7 +252,7 @@ PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const ch
   PetscInt n;
 
   PetscFunctionBegin;
-  *n_held = 0;
+  report->n_held = 0;
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
   if (t->type != HYCO_MODEL_HYBRID || t->folds < 2 || n < 4 * t->folds) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMPIIntCast(t->folds * n * N_ROW, &count));
@@ -259,17 +260,21 @@ PetscErrorCode HycoTrainerCalibrate(HycoTrainer t, HycoSnapshots store, const ch
   PetscCall(PetscArraycpy(seed, t->seed, HYCO_N_SEEDS));
   PetscCall(PetscSNPrintf(file, sizeof(file), "%s.fold", path));
   if (!trials) t->trials = TRIALS;
-  PetscCall(HycoCatchBegin()); /* a fold without a model leaves the estimate out; every rank hears the same */
+  PetscCall(HycoCatchBegin()); /* a fold without a useful model leaves the estimate out; every rank hears the same */
   ierr = AllFolds(t, samples, store, file, rows);
   PetscCall(HycoCatchEnd(ierr, message));
   if (t->rank == 0) (void)unlink(file);
   t->trials = trials;
   t->samples = samples;
   PetscCall(PetscArraycpy(t->seed, seed, HYCO_N_SEEDS));
-  if (!message[0]) {
+  PetscCall(HycoCatchNoModel(ierr, message));
+  if (message[0]) {
+    snprintf(report->no_estimate, sizeof(report->no_estimate), "with a part of the solutions held out: %.900s",
+             message);
+  } else {
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, count, MPIU_REAL, MPI_SUM, t->comm));
-    HycoOnRoot(t->comm, Conclude(t, t->folds * n, rows, path, n_held));
-    PetscCallMPI(MPI_Bcast(n_held, 1, MPIU_INT, 0, t->comm));
+    HycoOnRoot(t->comm, Conclude(t, t->folds * n, rows, path, &report->n_held));
+    PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, t->comm));
   }
   PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);

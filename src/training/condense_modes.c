@@ -313,7 +313,7 @@ static PetscErrorCode TakeModes(HycoTrainer t, Mat V, PetscInt n_sigma, PetscRea
 
   PetscFunctionBegin;
   t->l = HycoPODRank(n_sigma, sigma, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, t->max_modes);
-  HycoCheck(t->l, "-hyco_pod_tol %g leaves no mode; give less", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+  HycoCheckModel(t->l, "-hyco_pod_tol %g leaves no mode; give less", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
   PetscCall(PetscFree(t->sigma));
   t->sigma = sigma;
   PetscCall(PetscFree(t->VtU));

@@ -152,9 +152,9 @@ static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store)
   PetscCall(RemoveLifting(t, S));
   PetscCall(PetscMalloc1(t->n_s + 1, &t->sigma));
   HycoLogged(HYCO_EVENT_POD, HycoPOD(S, t->tol[HYCO_SEED_DISPLACEMENT], t->noise, t->max_modes, &V, &t->l, t->sigma));
-  HycoCheck(t->l || !(t->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",
+  HycoCheckModel(t->l || !(t->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",
             (double)t->tol[HYCO_SEED_DISPLACEMENT]);
-  HycoCheck(t->l, "every training solution has zero displacement; there is nothing to learn");
+  HycoCheckModel(t->l, "every training solution has zero displacement; there is nothing to learn");
   t->counts[HYCO_SEED_DISPLACEMENT] = t->l;
   if (t->seed[HYCO_SEED_DISPLACEMENT]) {
     PetscCall(PetscMalloc1(t->l, &index));

@@ -3,10 +3,9 @@
   Matrices of snapshots are spread over the ranks; the mesh, the RID and the model live on rank 0.
 */
 #include <hycoalgorithms.h>
+#include <hycofile.h>
 #include <hycotrainerimpl.h>
-#include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 /* The whole mesh on rank 0, its sizes everywhere. */
@@ -194,7 +193,7 @@ static PetscErrorCode CheckForces(HycoTrainer t, HycoModel m)
   PetscCall(HycoOptionsBool(t->scene->options, "hyco_reconstruct", &reconstruct));
   for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
-  HycoCheck(
+  HycoCheckModel(
       m->type != HYCO_MODEL_HYBRID || !reconstruct || kept || !presses,
       "the RID has no contact, and the training solutions press: the model would give no force; let the RID reach "
       "the contact (-hyco_rid_modes displacement,dual or -hyco_rid_groups GROUP), or take displacements alone by "
@@ -206,7 +205,7 @@ static PetscErrorCode CheckForces(HycoTrainer t, HycoModel m)
 static PetscErrorCode CheckUseful(HycoTrainer t, HycoModel m)
 {
   PetscFunctionBegin;
-  HycoCheck(m->numbers[1] < 0.5,
+  HycoCheckModel(m->numbers[1] < 0.5,
             "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
             "condition %.0e): enlarge the RID (-hyco_rid_layers 1, "
             "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)",
@@ -241,7 +240,7 @@ static PetscErrorCode BuildAndSave(HycoTrainer t, PetscBool useful, const char p
 
 PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path[], HycoTraining *report)
 {
-  char candidate[PETSC_MAX_PATH_LEN + 16];
+  char candidate[HYCO_FILE_NAME + 16];
   const PetscBool scan = (PetscBool)(useful && t->type != HYCO_MODEL_CONDENSED); /* which has no reduced stiffness */
 
   PetscFunctionBegin;
@@ -254,20 +253,30 @@ PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoTrainerFinish(HycoTrainer t, HycoSnapshots store, const char path[], HycoTraining *report)
+{
+  char file[HYCO_FILE_NAME];
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFileScratch(t->comm, path, "candidate", file));
+  ierr = HycoTrainerBuild(t, PETSC_TRUE, file, report);
+  if (!ierr) ierr = HycoTrainerCalibrate(t, store, file, report);
+  if (ierr && t->rank == 0) (void)unlink(file);
+  PetscCall(ierr);
+  HycoOnRoot(t->comm, HycoFileKeep(file, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The model's place can be written before hours of work. */
 static PetscErrorCode CheckWritable(const char path[])
 {
-  struct stat info;
-  char probe[PETSC_MAX_PATH_LEN + 16];
-  FILE *file;
+  HycoFile probe;
 
   PetscFunctionBegin;
-  snprintf(probe, sizeof(probe), "%s.partial", path);
-  HycoCheck(stat(path, &info) || !S_ISDIR(info.st_mode), "the model %s is a folder; give the name of a file", path);
-  file = fopen(probe, "wb");
-  HycoCheck(file, "the model %s cannot be written: is there such a folder, may you write there?", path);
-  fclose(file);
-  unlink(probe);
+  PetscCall(HycoFileSweep(path));
+  PetscCall(HycoFileCreate(path, HYCO_FILE_NUMBERS, &probe));
+  PetscCall(HycoFileClose(&probe, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -318,8 +327,7 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
   if (!choose) HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerReduce(t, store));
   if (condensed) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFlexibility(t, store));
   if (condensed) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFindModes(t, store));
-  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerBuild(t, PETSC_TRUE, path, &report));
-  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerCalibrate(t, store, path, &report.n_held));
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerFinish(t, store, path, &report));
   PetscCall(HycoSnapshotsDestroy(&store));
   PetscCall(HycoSamplesDestroy(&chosen));
   report.seconds_snapshots = solved - begin;
