@@ -34,6 +34,9 @@ PetscErrorCode HycoSceneSetExtrapolate(HycoScene scene, PetscBool extrapolate);
 /* The scene's title (may be empty). Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[]);
 
+/* Where the scene's mesh file is. Not collective. Borrowed. */
+PetscErrorCode HycoSceneGetMesh(HycoScene scene, const char *path[]);
+
 /* Fails with a clear line when mu[i] (length n) is not finite or leaves its range. Not collective. */
 PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const PetscReal mu[]);
 

@@ -195,7 +195,7 @@ PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u
   HycoMotionsName() of each. alike: of the largest set that is tangential in one and the same sense, to be released by
   turning normals. The caller frees both.
 */
-PetscErrorCode HycoFEFindUnheld(HycoFE fe, const HycoPairs *pairs, const HycoMotions *motions, PetscInt *n_unheld,
+PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions, PetscInt *n_unheld,
                                 PetscReal **unheld, PetscInt *n_alike, PetscReal **alike);
 /* Area (length in 2D, 1 in 1D) that each contact's slave node stands for; 0 when its group is no surface. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);

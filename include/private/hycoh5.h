@@ -7,12 +7,15 @@
 
 typedef struct _n_HycoH5 *HycoH5;
 
-/* Creates PATH.partial; HycoH5Close(commit) renames it to `path`, HycoH5Close(no commit) removes it. */
+/* Begins a file in memory; HycoH5Close(commit) writes it and gives it its name (hycofile.h), HycoH5Close(no commit)
+   forgets it. */
 PetscErrorCode HycoH5Create(const char path[], HycoH5 *file);
 /* Opens for reading: refused where a seal does not match, or has been lost. */
 PetscErrorCode HycoH5Open(const char path[], HycoH5 *file);
 /* The same; where the file is damaged, the complaint ends with the remedy. */
 PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file);
+/* Whether a model or a snapshot is at `path`: it took hours, and nothing else may take its place. */
+PetscErrorCode HycoH5IsPrecious(const char path[], PetscBool *precious);
 PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit);
 
 /* Writes rows x cols (cols 1: a vector). Groups in the name ("mesh/cells") are made as needed. */

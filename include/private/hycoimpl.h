@@ -11,12 +11,19 @@
 /* Length of a message or a name that the library builds. */
 #define HYCO_LINE 1024
 
-/* Fails on every rank with the message of the lowest rank whose `message` is not empty. Collective. */
-PetscErrorCode HycoAgree(MPI_Comm comm, const char message[]);
+/* The error that says: from these solutions, with this recipe, there is no useful model. A search goes on with another
+   recipe, an estimate is left out; any other error (a disk, memory, a damaged file) ends a run. */
+#define HYCO_ERR_NO_MODEL ((PetscErrorCode)(PETSC_ERR_MAX_VALUE + 1))
+
+/* Fails on every rank with the message of the lowest rank whose `message` is not empty, and with the error `caught`
+   there if that is HYCO_ERR_NO_MODEL, else PETSC_ERR_USER. Collective. */
+PetscErrorCode HycoAgree(MPI_Comm comm, PetscErrorCode caught, const char message[]);
 
 /* Begin and end catching PETSc errors on this rank as text: between the two, errors print nothing. */
 PetscErrorCode HycoCatchBegin(void);
 PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE]);
+/* What was caught is raised again, unless it is HYCO_ERR_NO_MODEL. */
+PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
 
 /* Runs `call` on rank 0 of comm; its error becomes the error of every rank. Collective. */
 #define HycoOnRoot(comm, call)                                                                                         \
@@ -30,7 +37,7 @@ PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE]);
       caught_ = (call);                                                                                                \
       PetscCall(HycoCatchEnd(caught_, message_));                                                                      \
     }                                                                                                                  \
-    PetscCall(HycoAgree((comm), message_));                                                                            \
+    PetscCall(HycoAgree((comm), caught_, message_));                                                                            \
   } while (0)
 
 /* Runs `call`, which may differ from rank to rank, on every rank; an error on any becomes the error of all. Collective.
@@ -42,7 +49,7 @@ PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE]);
     PetscCall(HycoCatchBegin());                                                                                       \
     caught_ = (call);                                                                                                  \
     PetscCall(HycoCatchEnd(caught_, message_));                                                                        \
-    PetscCall(HycoAgree((comm), message_));                                                                            \
+    PetscCall(HycoAgree((comm), caught_, message_));                                                                            \
   } while (0)
 
 /* Text as C's printf makes it, cut at HYCO_LINE. */
@@ -54,6 +61,17 @@ void HycoFormat(char line[HYCO_LINE], const char format[], ...) PETSC_ATTRIBUTE_
     char line_[HYCO_LINE];                                                                                             \
     HycoFormat(line_, __VA_ARGS__);                                                                                    \
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s", line_);                                                             \
+  } while (0)
+/* The same, of kind HYCO_ERR_NO_MODEL. */
+#define HycoFailNoModel(...)                                                                                           \
+  do {                                                                                                                 \
+    char line_[HYCO_LINE];                                                                                             \
+    HycoFormat(line_, __VA_ARGS__);                                                                                    \
+    SETERRQ(PETSC_COMM_SELF, HYCO_ERR_NO_MODEL, "%s", line_);                                                          \
+  } while (0)
+#define HycoCheckModel(condition, ...)                                                                                 \
+  do {                                                                                                                 \
+    if (PetscUnlikely(!(condition))) HycoFailNoModel(__VA_ARGS__);                                                     \
   } while (0)
 #define HycoCheck(condition, ...)                                                                                      \
   do {                                                                                                                 \

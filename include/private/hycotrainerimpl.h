@@ -124,6 +124,10 @@ PetscErrorCode HycoTrainerOpen(HycoTrainer t, HycoSamples samples, const char pa
 /* From the bases: the RID, the model on it, its full-order displacements, the file; what it gave, on every rank.
    `useful`: refuse a model that misses its own training solutions. Collective. */
 PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path[], HycoTraining *report);
+/* The useful model and its estimates, made beside `path` and then put in its place: a run that fails leaves what was
+   there. Collective. */
+PetscErrorCode HycoTrainerFinish(HycoTrainer t, HycoSnapshots store, const char path[], PetscBool learn,
+                                 HycoTraining *report);
 /* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
    rows, column major, on every rank; a dense matrix on rank 0, row or column major (the caller frees). Collective. */
 PetscErrorCode HycoTrainerGetDisplacements(HycoTrainer t, HycoSnapshots store, Mat *S);

@@ -39,7 +39,7 @@ static PetscErrorCode Interpolate(PetscInt k, PetscInt l, const PetscReal rows[]
   PetscCall(PetscBLASIntCast(k, &kb));
   LAPACKgesv_(&kb, &one, A, &kb, ipiv, c, &kb, &info);
   PetscCall(PetscFree2(A, ipiv));
-  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "DEIM: the interpolation matrix of mode %d is singular",
+  HycoCheckModel(info == 0, "DEIM: the interpolation matrix of mode %d is singular",
              (int)k);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -126,7 +126,7 @@ PetscErrorCode HycoQDEIM(Mat V, PetscInt index[])
     PetscCall(LongestRow(R, length2, &index[k]));
     PetscCall(HycoGatherRows(R, 1, &index[k], pivot));
     for (PetscInt j = 0; j < l; j++) size2 += pivot[j] * pivot[j];
-    PetscCheck(size2 > 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "Q-DEIM: the basis has rank %d of %d", (int)k, (int)l);
+    HycoCheckModel(size2 > 0, "Q-DEIM: the basis has rank %d of %d", (int)k, (int)l);
     PetscCall(MatDenseGetArray(R, &r));
     for (PetscInt i = 0; i < hi - lo; i++) {
       PetscReal dot = 0;

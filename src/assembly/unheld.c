@@ -13,7 +13,7 @@ enum { GIVEN, SLAVE, MASTER, N_SENSES };
 
 typedef struct {
   HycoFE fe;
-  const HycoPairs *pairs;
+  HycoPairs *pairs;
   PetscInt k, m;                 /* motions, contacts */
   PetscReal *d;                  /* m x k x 3: relative displacement of slave and master */
   PetscReal *normal[N_SENSES];   /* m x 3; zero: not in this sense */
@@ -310,7 +310,7 @@ static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscRe
   }
 }
 
-PetscErrorCode HycoFEFindUnheld(HycoFE fe, const HycoPairs *pairs, const HycoMotions *motions, PetscInt *n_unheld,
+PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions, PetscInt *n_unheld,
                                 PetscReal **unheld, PetscInt *n_alike, PetscReal **alike)
 {
   Shapes s = {fe, pairs, motions->n, pairs->n, NULL, {NULL}, {NULL}, {NULL}};

@@ -45,10 +45,20 @@ PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoAgree(MPI_Comm comm, const char message[])
+PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[])
+{
+  PetscFunctionBegin;
+  if (!caught || caught == HYCO_ERR_NO_MODEL) PetscFunctionReturn(PETSC_SUCCESS);
+  SETERRQ(PETSC_COMM_SELF, caught, "%s", message);
+}
+
+PetscErrorCode HycoAgree(MPI_Comm comm, PetscErrorCode caught, const char message[])
 {
   PetscMPIInt rank, size, mine, first;
-  char line[HYCO_LINE];
+  struct {
+    PetscBool no_model;
+    char line[HYCO_LINE];
+  } said;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
@@ -57,9 +67,12 @@ PetscErrorCode HycoAgree(MPI_Comm comm, const char message[])
   first = mine;
   if (size > 1) PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm));
   if (first == size) PetscFunctionReturn(PETSC_SUCCESS);
-  if (rank == first) snprintf(line, sizeof(line), "%s", message);
-  if (size > 1) PetscCallMPI(MPI_Bcast(line, sizeof(line), MPI_CHAR, first, comm));
-  SETERRQ(comm, PETSC_ERR_USER, "%s", line);
+  if (rank == first) {
+    said.no_model = (PetscBool)(caught == HYCO_ERR_NO_MODEL);
+    snprintf(said.line, sizeof(said.line), "%s", message);
+  }
+  if (size > 1) PetscCallMPI(MPI_Bcast(&said, sizeof(said), MPI_BYTE, first, comm));
+  SETERRQ(comm, said.no_model ? HYCO_ERR_NO_MODEL : PETSC_ERR_USER, "%s", said.line);
 }
 
 unsigned long long HycoHash(unsigned long long hash, const void *data, size_t bytes)

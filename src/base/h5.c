@@ -2,18 +2,16 @@
   HDF5 on one process. What is written is made in memory and goes to the disk in one piece, sealed: HDF5 itself, when a
   disk is full, can neither finish a file nor close it.
 */
+#include <hycofile.h>
 #include <hycoh5.h>
-#include <errno.h>
 #include <hdf5.h>
-#include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 struct _n_HycoH5 {
   hid_t id, access; /* the file; how datasets are opened */
-  FILE *out;        /* PATH.partial while writing, else NULL */
+  HycoFile out;     /* while writing, else NULL */
   size_t size;      /* of the file that is read */
-  char path[PETSC_MAX_PATH_LEN], partial[PETSC_MAX_PATH_LEN + 16];
+  char path[PETSC_MAX_PATH_LEN];
 };
 
 /* A dataset that says that the file ends with a seal: one that has lost it is damaged, not old. */
@@ -35,7 +33,6 @@ static PetscErrorCode New(const char path[], HycoH5 *file)
   HycoCheck(strlen(path) < PETSC_MAX_PATH_LEN, "the file name %.40s... is too long", path);
   PetscCall(PetscNew(&f));
   PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
-  snprintf(f->partial, sizeof(f->partial), "%s.partial", path);
   H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
   f->access = H5Pcreate(H5P_DATASET_ACCESS);
   H5Pset_elink_cb(f->access, RefuseLink, NULL);
@@ -55,18 +52,16 @@ PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
 {
   const PetscInt yes = 1;
   hid_t access;
+  HycoFile out;
   HycoH5 f;
 
   PetscFunctionBegin;
+  PetscCall(HycoFileCreate(path, HYCO_FILE_NUMBERS, &out));
   PetscCall(New(path, &f));
-  f->out = fopen(f->partial, "wb");
-  if (!f->out) {
-    PetscCall(Free(&f));
-    HycoFail("%s cannot be written: is there such a folder, may you write there, is there room?", path);
-  }
+  f->out = out;
   access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_fapl_core(access, (size_t)1 << 18, 0);
-  f->id = H5Fcreate(f->partial, H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  f->id = H5Fcreate(f->path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
   H5Pclose(access);
   PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 does not make a file in memory");
   *file = f;
@@ -101,6 +96,23 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoH5IsPrecious(const char path[], PetscBool *precious)
+{
+  HycoH5 h = NULL;
+  PetscErrorCode caught;
+  char message[HYCO_LINE];
+
+  PetscFunctionBegin;
+  *precious = PETSC_FALSE;
+  PetscCall(HycoCatchBegin());
+  caught = HycoH5Open(path, &h);
+  PetscCall(HycoCatchEnd(caught, message));
+  if (caught) PetscFunctionReturn(PETSC_SUCCESS);
+  *precious = (PetscBool)(HycoH5Has(h, "kind") || HycoH5Has(h, "fingerprint"));
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file)
 {
   PetscErrorCode caught;
@@ -115,44 +127,44 @@ PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file in memory, its seal behind it, to the disk and under its name. Returns 0, or errno. */
-static int Commit(HycoH5 f)
+/* The file in memory, its seal behind it. Fails where there is no memory for a copy; a disk that is full is told when
+   the file is closed. */
+static PetscErrorCode WriteImage(HycoH5 f)
 {
   unsigned char seal[HYCO_SEAL], *image = NULL;
   ssize_t bytes = H5Fflush(f->id, H5F_SCOPE_GLOBAL) < 0 ? -1 : H5Fget_file_image(f->id, NULL, 0);
-  int failed;
+  PetscBool made;
 
-  if (bytes < 0 || PetscMalloc1(bytes, &image)) return ENOMEM;
-  failed = H5Fget_file_image(f->id, image, (size_t)bytes) < 0 ? ENOMEM : 0;
-  if (!failed) {
+  PetscFunctionBegin;
+  HycoCheck(bytes >= 0, "%s could not be written: HDF5 has no image of it in memory", f->path);
+  PetscCall(PetscMalloc1(bytes, &image));
+  made = (PetscBool)(H5Fget_file_image(f->id, image, (size_t)bytes) >= 0);
+  if (made) {
     HycoSealMake(image, (size_t)bytes, seal);
-    errno = 0;
-    if (fwrite(image, 1, (size_t)bytes, f->out) != (size_t)bytes || fwrite(seal, 1, HYCO_SEAL, f->out) != HYCO_SEAL ||
-        fflush(f->out) != 0 || fsync(fileno(f->out)) != 0 || rename(f->partial, f->path) != 0)
-      failed = errno ? errno : EIO;
+    (void)!fwrite(image, 1, (size_t)bytes, HycoFileStream(f->out));
+    (void)!fwrite(seal, 1, HYCO_SEAL, HycoFileStream(f->out));
   }
-  (void)!PetscFree(image);
-  return failed;
+  PetscCall(PetscFree(image));
+  HycoCheck(made, "%s could not be written: HDF5 has no image of it in memory", f->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
 {
   HycoH5 f = *file;
-  char path[PETSC_MAX_PATH_LEN];
-  int failed = 0;
+  HycoFile out;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
   *file = NULL;
-  if (f->out) {
-    if (commit) failed = Commit(f);
-    if (!commit || failed) unlink(f->partial);
-    fclose(f->out);
-  }
+  out = f->out;
+  ierr = out && commit ? WriteImage(f) : PETSC_SUCCESS;
   H5Fclose(f->id);
-  PetscCall(PetscStrncpy(path, f->path, sizeof(path)));
   PetscCall(Free(&f));
-  HycoCheck(!failed, "%s could not be written to its end (%s): is the disk full?", path, strerror(failed));
+  if (ierr) PetscCall(HycoFileClose(&out, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscCall(HycoFileClose(&out, commit));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -5,13 +5,13 @@ PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscRe
 {
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
-  PetscCheck(!s->iterative, s->comm, PETSC_ERR_USER,
+  PetscCheck(!s->iterative, s->comm, HYCO_ERR_NO_MODEL,
              "the flexibility B K^-1 B^T needs a factor of the stiffness, and the solver chose iterations%s: give more "
              "memory (-hyco_memory), or -hyco_linear direct",
              s->why_iterative);
-  PetscCheck(!s->p, s->comm, PETSC_ERR_USER,
+  PetscCheck(!s->p, s->comm, HYCO_ERR_NO_MODEL,
              "contact alone holds a body: K^-1 does not exist, and there is no flexibility B K^-1 B^T");
-  PetscCheck(s->S && s->condensed.K && s->reason != HYCO_DIVERGED_SINGULAR, s->comm, PETSC_ERR_USER,
+  PetscCheck(s->S && s->condensed.K && s->reason != HYCO_DIVERGED_SINGULAR, s->comm, HYCO_ERR_NO_MODEL,
              "the stiffness is singular (is a body held by nothing?): there is no flexibility B K^-1 B^T");
   *m = s->m;
   *S = s->S;
@@ -22,7 +22,7 @@ PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[]
 {
   PetscFunctionBegin;
   HycoCheckHandle(s, "HycoSolverCreate()");
-  PetscCheck(!s->iterative, s->comm, PETSC_ERR_USER,
+  PetscCheck(!s->iterative, s->comm, HYCO_ERR_NO_MODEL,
              "a condensed model needs a factor of the stiffness, and the solver chose iterations%s: give more memory "
              "(-hyco_memory), or -hyco_linear direct",
              s->why_iterative);

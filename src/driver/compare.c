@@ -194,6 +194,7 @@ PetscErrorCode CommandCompare(void)
   PetscCall(DriverGet("table", PETSC_FALSE, table));
   PetscCall(DriverGet("report", PETSC_FALSE, report));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
+  PetscCall(DriverCheckMesh(scene));
   HycoOnEach(PETSC_COMM_WORLD, HycoModelLoad(file, &model));
   PetscCall(HycoModelCheckScene(model, scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));

@@ -23,9 +23,11 @@ extern const Command commands[];
 
 /* Every option on the command line is one that `command` knows, or PETSc's; no stray words. */
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
-/* The files that `command` is to write have names of their own, in folders that may be written. Before any work; counts
-   no option as read. Collective. */
+/* The files that `command` is to write are files of their own, none of which it reads, whatever their names, in folders
+   that may be written; or devices. Before any work; counts no option as read. Collective. */
 PetscErrorCode DriverCheckOutputs(const Command *command);
+/* The scene's mesh is none of them. Collective. */
+PetscErrorCode DriverCheckMesh(HycoScene scene);
 /* Nothing was given that nobody read. To be called when all options have been read and before anything is written. */
 PetscErrorCode DriverCheckLeft(void);
 /* The same before the solvers have run: what is meant for them (-hyco_mumps_..., -hyco_tao_... with that type) passes.
@@ -80,7 +82,7 @@ PetscErrorCode ReportWrite(cJSON **json);
    none); fails when a point did not converge. */
 PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
                          PetscInt n_columns, const char *const columns[], const PetscReal value[], PetscReal seconds);
-/* Writes text to a file through a temporary name. */
+/* Writes text to a file, whole or not at all, or into a device. On this process alone. */
 PetscErrorCode DriverWriteText(const char path[], const char text[]);
 
 /* Writes a CSV: the parameters of each point, then its columns (n x n_columns row major). Collective. */

@@ -49,6 +49,7 @@ PetscErrorCode DriverReadFallback(HycoModel model, PetscBool extrapolate, Fallba
             f->on ? "-hyco_fallback solves full order where the reduced model is not enough"
                   : "-hyco_full_displacement solves on the whole mesh with the predicted forces");
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &f->scene));
+  PetscCall(DriverCheckMesh(f->scene));
   PetscCall(HycoModelCheckScene(model, f->scene));
   PetscCall(HycoSceneSetExtrapolate(f->scene, extrapolate));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -39,7 +39,7 @@ static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function,
 {
   (void)comm, (void)ctx;
   if (type == PETSC_ERROR_INITIAL) {
-    if (code == PETSC_ERR_USER || code == PETSC_ERR_ORDER)
+    if (code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL)
       snprintf(message, sizeof(message), "%s", text ? text : "");
     else
       snprintf(message, sizeof(message), "internal error %d in %s (%s:%d): %s", (int)code, function ? function : "?",

@@ -1,5 +1,6 @@
 /* The JSON report. */
 #include "driver.h"
+#include <hycofile.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/resource.h>
@@ -71,19 +72,12 @@ void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[
 
 PetscErrorCode DriverWriteText(const char path[], const char text[])
 {
-  char partial[PETSC_MAX_PATH_LEN + 16];
-  FILE *out;
-  int failed;
+  HycoFile out;
 
   PetscFunctionBegin;
-  snprintf(partial, sizeof(partial), "%s.partial", path);
-  out = fopen(partial, "w");
-  HycoCheck(out, "%s cannot be written: is there such a folder, may you write there?", path);
-  failed = fputs(text, out) < 0;
-  failed = fclose(out) != 0 || failed;
-  failed = failed || rename(partial, path) != 0;
-  if (failed) remove(partial);
-  HycoCheck(!failed, "%s could not be written to its end: is the disk full?", path);
+  PetscCall(HycoFileCreate(path, HYCO_FILE_TEXT, &out));
+  (void)!fputs(text, HycoFileStream(out)); /* what fails is told by Close */
+  PetscCall(HycoFileClose(&out, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -144,6 +144,7 @@ PetscErrorCode CommandSolve(void)
   PetscCall(DriverGet("report", PETSC_FALSE, report));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_monitor", &monitor));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
+  PetscCall(DriverCheckMesh(scene));
   PetscCall(DriverHasSamples(scene, &set));
   HycoCheck(!set || !output[0], "-output is for one point (-mu); a set of points gives a -table");
   if (set) {

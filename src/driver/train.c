@@ -176,6 +176,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverGet("model", PETSC_TRUE, model));
   PetscCall(DriverGet("report", PETSC_FALSE, report));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
+  PetscCall(DriverCheckMesh(scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
   PetscCall(HycoOptionsBool(NULL, "greedy", &greedy));
   PetscCall(DriverReadTargets(&search));

@@ -4,6 +4,7 @@
   them again.
 */
 #include <hycoalgorithms.h>
+#include <hycofile.h>
 #include <hycogreedy.h>
 #include <stdio.h>
 #include <string.h>
@@ -19,7 +20,7 @@ typedef struct {
   PetscInt n_par, n_points;      /* of the training set */
   const PetscReal *points;       /* borrowed */
   PetscReal *value;              /* n_points x 4: eta, eta_u, eta_lambda, size */
-  char file[PETSC_MAX_PATH_LEN]; /* the present iteration's model */
+  char file[HYCO_FILE_NAME];     /* the present iteration's model */
   PetscReal begin;
 } Loop;
 
@@ -92,10 +93,6 @@ static PetscErrorCode BuildModel(HycoTrainer t, Loop *loop, PetscInt iteration, 
   PetscCall(HycoSnapshotsFill(loop->store, loop->samples, iteration ? NULL : t->progress, t->progress_ctx));
   PetscCall(HycoTrainerResetBases(t));
   PetscCall(HycoTrainerReduce(t, loop->store, PETSC_FALSE));
-  if (t->greedy.keep)
-    PetscCall(PetscSNPrintf(loop->file, sizeof(loop->file), "%s/greedy-%03d.h5", loop->store->folder, (int)iteration));
-  else
-    PetscCall(PetscSNPrintf(loop->file, sizeof(loop->file), "%s/greedy.h5", loop->store->folder));
   PetscCall(HycoTrainerBuild(t, PETSC_FALSE, loop->file, report));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -212,6 +209,17 @@ static const char *WhyStop(HycoTrainer t, const HycoGreedyStep *step)
   return step->worst ? NULL : "points";
 }
 
+/* The iteration's model, which has been judged, goes to greedy-NNN.h5 beside the solutions. Rank 0. */
+static PetscErrorCode KeepModel(const Loop *loop, PetscInt iteration)
+{
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(path, sizeof(path), "%s/greedy-%03d.h5", loop->store->folder, (int)iteration));
+  PetscCall(HycoFileKeep(loop->file, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Iterate(HycoTrainer t, Loop *loop, PetscInt iteration, HycoTraining *report, PetscBool *last)
 {
   HycoGreedyStep step = {0};
@@ -220,6 +228,7 @@ static PetscErrorCode Iterate(HycoTrainer t, Loop *loop, PetscInt iteration, Hyc
   PetscFunctionBegin;
   PetscCall(BuildModel(t, loop, iteration, report));
   PetscCall(Evaluate(t, loop));
+  if (t->greedy.keep) HycoOnRoot(t->comm, KeepModel(loop, iteration));
   PetscCall(Choose(loop, &worst, &step));
   step.iteration = iteration;
   step.n_samples = t->n_s;
@@ -261,17 +270,31 @@ static void SetRecipe(HycoTrainer t)
 /* The model of the solutions that were chosen, judged by others. */
 static PetscErrorCode Conclude(HycoTrainer t, Loop *loop, const char path[], HycoTraining *report)
 {
-  HycoSamples none;
+  const PetscBool learn = (PetscBool)(t->search && t->n_validation && t->scene->n_parameters);
 
   PetscFunctionBegin;
   PetscCall(HycoTrainerHoldOut(t, loop->store));
-  if (!t->held || !t->search) {
-    PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, report));
-    PetscFunctionReturn(PETSC_SUCCESS);
+  if (learn) { /* each recipe has an RID and bases of its own */
+    PetscCall(PetscFree(t->grown));
+    PetscCall(HycoTrainerResetBases(t));
   }
-  PetscCall(PetscFree(t->grown)); /* each recipe has an RID of its own */
-  PetscCall(HycoTrainerResetBases(t));
-  PetscCall(HycoTrainerLearn(t, loop->store, path, &none, report));
+  PetscCall(HycoTrainerFinish(t, loop->store, path, learn, report));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Iterations until one is the last. */
+static PetscErrorCode RunLoop(HycoTrainer t, Loop *loop, HycoTraining *report)
+{
+  char place[PETSC_MAX_PATH_LEN];
+  PetscBool last = PETSC_FALSE;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(place, sizeof(place), "%s/greedy.h5", loop->store->folder));
+  PetscCall(HycoFileScratch(t->comm, place, "candidate", loop->file));
+  for (PetscInt iteration = 0; !last && !ierr; iteration++) ierr = Iterate(t, loop, iteration, report, &last);
+  if (t->rank == 0) (void)unlink(loop->file);
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -280,7 +303,6 @@ PetscErrorCode HycoTrainerRunGreedy(HycoTrainer t, HycoSamples start, HycoSample
 {
   Loop loop = {0};
   HycoTraining report = {0};
-  PetscBool last = PETSC_FALSE;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
@@ -294,10 +316,8 @@ PetscErrorCode HycoTrainerRunGreedy(HycoTrainer t, HycoSamples start, HycoSample
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoTrainerOpen(t, loop.samples, path, &loop.store));
   PetscCall(PetscCalloc1(t->rank == 0 ? t->whole->n_cells : 0, &t->grown));
-  for (PetscInt iteration = 0; !last; iteration++) PetscCall(Iterate(t, &loop, iteration, &report, &last));
+  PetscCall(RunLoop(t, &loop, &report));
   PetscCall(Conclude(t, &loop, path, &report));
-  PetscCall(HycoTrainerCalibrate(t, loop.store, path, &report));
-  if (!t->greedy.keep && t->rank == 0) unlink(loop.file);
   report.seconds_reduction = HycoNow() - loop.begin;
   PetscCall(HycoTrainerReset(t));
   PetscCall(HycoSnapshotsDestroy(&loop.store));

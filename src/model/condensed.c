@@ -230,7 +230,7 @@ static PetscErrorCode BringStiffness(HycoCondensed c, const PetscReal mu[])
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   c->current = PETSC_FALSE;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
-  HycoCheck(definite,
+  HycoCheckModel(definite,
             "the interpolated flexibility is not positive definite here (one value left out: error %.1e): train on "
             "more values of the parameters that reach the stiffness",
             (double)c->errors[0]);

@@ -53,7 +53,7 @@ PetscErrorCode HycoModelSetRidge(HycoModel m, PetscReal ridge)
   PetscCall(PetscBLASIntCast(l, &lb));
   PetscCall(PetscBLASIntCast(n, &nb));
   LAPACKpotrf_("U", &lb, N, &lb, &info);
-  HycoCheck(!info || ridge > 0,
+  HycoCheckModel(!info || ridge > 0,
             "-hyco_hybrid_ridge 0: the %d modes are not independent on the %d unknowns of A; take -1", (int)l, (int)n);
   if (!info) LAPACKpotrs_("U", &lb, &nb, N, &lb, X, &lb, &info);
   for (PetscInt k = 0; k < n; k++) {
@@ -81,7 +81,7 @@ static PetscErrorCode SetUpBasis(HycoModel m)
   PetscCall(PetscMalloc1(m->pairs.n, &m->slave_id));
   for (PetscInt k = 0; k < m->pairs.n; k++) m->slave_id[k] = m->mesh->node_id[m->pairs.slave[k]];
   m->n_L = m->type == HYCO_MODEL_PROJECTION ? m->l_lambda : m->m;
-  HycoCheck(m->n > 0, "the model has no unknown: every training solution is zero");
+  HycoCheckModel(m->n > 0, "the model has no unknown: every training solution is zero");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

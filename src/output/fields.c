@@ -1,8 +1,10 @@
 /* HDF5 for the numbers, XDMF for ParaView. */
 #include <hycofields.h>
+#include <hycofile.h>
 #include <hycoh5.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
                                                         "Hexahedron"};
@@ -67,24 +69,19 @@ static void WriteXDMF(FILE *out, const char h5[], HycoMesh m, PetscInt n, const 
   fprintf(out, "  </Grid>\n </Domain>\n</Xdmf>\n");
 }
 
-/* The numbers must not take the place of a model or a snapshot: those took hours. */
+/* The numbers must not take the place of a model or a snapshot, or of what is no file. */
 static PetscErrorCode CheckPlace(const char h5[], const char path[])
 {
-  HycoH5 h;
-  FILE *there = fopen(h5, "rb");
+  struct stat info;
   PetscBool precious;
-  PetscErrorCode caught;
-  char message[HYCO_LINE];
 
   PetscFunctionBegin;
-  if (!there) PetscFunctionReturn(PETSC_SUCCESS);
-  fclose(there);
-  PetscCall(HycoCatchBegin());
-  caught = HycoH5Open(h5, &h);
-  PetscCall(HycoCatchEnd(caught, message));
-  if (caught) PetscFunctionReturn(PETSC_SUCCESS);
-  precious = (PetscBool)(HycoH5Has(h, "kind") || HycoH5Has(h, "fingerprint"));
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  if (stat(h5, &info) != 0) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(S_ISREG(info.st_mode),
+            "%s is no file (a folder, a device, a pipe), and the numbers of %s would go there; give the output another "
+            "name",
+            h5, path);
+  PetscCall(HycoH5IsPrecious(h5, &precious));
   HycoCheck(!precious,
             "%s is a model or a snapshot, and the numbers of %s would go there; give the output another name", h5,
             path);
@@ -108,33 +105,28 @@ PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[
                                const PetscReal mu[], PetscInt n, const HycoField field[],
                                const HycoContactTable *contact)
 {
-  char h5[PETSC_MAX_PATH_LEN], partial[PETSC_MAX_PATH_LEN + 16];
+  char h5[PETSC_MAX_PATH_LEN];
   const char *slash;
   HycoH5 h;
-  FILE *out;
-  PetscErrorCode ierr;
+  HycoFile out;
+  PetscErrorCode ierr, failed;
 
   PetscFunctionBegin;
   PetscCall(HycoFieldsCheckPath(path));
   snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
-  snprintf(partial, sizeof(partial), "%s.partial", path);
-  out = fopen(partial, "w");
-  HycoCheck(out, "%s cannot be written: is there such a folder, may you write there?", path);
+  PetscCall(HycoFileCreate(path, HYCO_FILE_TEXT, &out));
   slash = strrchr(h5, '/');
-  WriteXDMF(out, slash ? slash + 1 : h5, m, n, field);
-  ierr = fclose(out) ? PETSC_ERR_FILE_WRITE : HycoH5Create(h5, &h);
+  WriteXDMF(HycoFileStream(out), slash ? slash + 1 : h5, m, n, field);
+  ierr = HycoFileFlush(out);
+  if (!ierr) ierr = HycoH5Create(h5, &h);
   if (!ierr) { /* the numbers first: without them the .xdmf would point at none, or at those of another run */
-    const PetscErrorCode failed = WriteNumbers(h, m, X, scene, mu, n, field, contact);
-
+    failed = WriteNumbers(h, m, X, scene, mu, n, field, contact);
     ierr = HycoH5Close(&h, (PetscBool)!failed);
-    if (!ierr) ierr = failed;
-    if (!ierr && rename(partial, path) != 0) {
-      remove(h5);
-      ierr = PETSC_ERR_FILE_WRITE;
-    }
+    if (failed) ierr = failed;
   }
-  if (ierr) remove(partial);
-  HycoCheck(!ierr, "%s or its .h5 could not be written: is a folder in the way, is the disk full?", path);
+  failed = HycoFileClose(&out, (PetscBool)!ierr);
+  if (failed && !ierr) (void)remove(h5);
+  PetscCall(ierr ? ierr : failed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

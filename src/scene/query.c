@@ -24,6 +24,14 @@ PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSceneGetMesh(HycoScene scene, const char *path[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, "HycoSceneLoad()");
+  *path = scene->mesh_path;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact)
 {
   PetscFunctionBegin;

@@ -1,5 +1,6 @@
 /* HycoSnapshots: a folder with one file per parameter value, each complete or absent. */
 #include <hycosnapshotsimpl.h>
+#include <hycofile.h>
 #include <hycoh5.h>
 #include <errno.h>
 #include <stdio.h>
@@ -10,6 +11,7 @@
 static PetscErrorCode MakeFolder(const char folder[])
 {
   struct stat info;
+  char all[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
   HycoCheck(strlen(folder) < PETSC_MAX_PATH_LEN - 64, "the snapshot folder's name is too long");
@@ -18,6 +20,8 @@ static PetscErrorCode MakeFolder(const char folder[])
               "the snapshot folder %s cannot be made: is there such a place, may you write there?", folder);
   }
   HycoCheck(access(folder, W_OK) == 0, "the snapshot folder %s cannot be written", folder);
+  snprintf(all, sizeof(all), "%s/", folder);
+  PetscCall(HycoFileSweep(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

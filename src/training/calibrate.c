@@ -7,6 +7,7 @@
   chosen by the same points, which MARGIN allows for.
 */
 #include <hycoalgorithms.h>
+#include <hycofile.h>
 #include <hycotrainerimpl.h>
 #include <stdio.h>
 

@@ -54,14 +54,14 @@ static PetscErrorCode FindGrid(HycoTrainer t, HycoCondensed c)
   PetscCall(HycoSamplesGet(t->samples, &n_s, NULL, &mu));
   for (PetscInt p = 0; p < c->dim; p++) {
     PetscCall(FindValues(c, p, n_s, mu));
-    HycoCheck(
+    HycoCheckModel(
         c->n[p] > 1 || t->scene->hi[p] == t->scene->lo[p],
         "the training points have one value of %s, and nothing to interpolate over its range between: a condensed "
         "model needs at least two",
         t->scene->parameter[p]);
     all *= (PetscReal)c->n[p];
   }
-  HycoCheck(all <= (PetscReal)n_s,
+  HycoCheckModel(all <= (PetscReal)n_s,
             "the %d training points are no tensor grid: a condensed model needs every combination of their values (%g "
             "points); give them by -grid or -values_NAME",
             (int)n_s, (double)all);
@@ -70,7 +70,7 @@ static PetscErrorCode FindGrid(HycoTrainer t, HycoCondensed c)
   for (PetscInt k = 0; k < nodes; k++) c->sample[k] = -1;
   for (PetscInt k = 0; k < n_s; k++) c->sample[NodeOf(c, mu + k * c->dim)] = k;
   for (PetscInt k = 0; k < nodes; k++)
-    HycoCheck(c->sample[k] >= 0,
+    HycoCheckModel(c->sample[k] >= 0,
               "the %d training points are no tensor grid: a condensed model needs every combination "
               "of their values; give them by -grid or -values_NAME",
               (int)n_s);
@@ -283,7 +283,7 @@ static PetscErrorCode Inspect(HycoTrainer t, HycoCondensed c)
   free = motions.n;
   if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
   PetscCall(HycoMotionsDestroy(&motions));
-  HycoCheck(!free,
+  HycoCheckModel(!free,
             "no support keeps %s: contact alone holds it, K^-1 does not exist and no condensed model with it; "
             "train a hybrid one",
             name);
@@ -298,11 +298,11 @@ PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t)
 
   PetscFunctionBegin;
   PetscCall(HycoOptionsWord(t->scene->options, "hyco_linear", HycoLinearNames, &linear));
-  HycoCheck(linear != HYCO_LINEAR_ITERATIVE,
+  HycoCheckModel(linear != HYCO_LINEAR_ITERATIVE,
             "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a hybrid "
             "model, or take -hyco_linear auto");
-  HycoCheck(m > 0, "the scene has no contact, and a condensed model is one of contact forces; train a hybrid model");
-  HycoCheck(m <= MOST_CONTACTS,
+  HycoCheckModel(m > 0, "the scene has no contact, and a condensed model is one of contact forces; train a hybrid model");
+  HycoCheckModel(m <= MOST_CONTACTS,
             "the scene has %d contacts: a condensed model stores the square of their number at every training point, "
             "and goes to %d; train a hybrid model",
             (int)m, MOST_CONTACTS);
@@ -315,7 +315,7 @@ PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t)
   PetscCallMPI(MPI_Bcast(c->stiff, HYCO_MAX_PARAMETERS, MPIU_INT, 0, t->comm));
   PetscCallMPI(MPI_Bcast(c->affine, HYCO_MAX_PARAMETERS, MPIU_INT, 0, t->comm));
   PetscCall(HycoCondensedAllocate(c));
-  HycoCheck((PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=
+  HycoCheckModel((PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=
                 MOST_NUMBERS,
             "the flexibility of %d contacts at %d training points has more than %g numbers; take fewer values of the "
             "parameters that reach the stiffness, or train a hybrid model",

@@ -340,7 +340,7 @@ static PetscErrorCode TakeModes(HycoTrainer t, Mat V, PetscInt n_sigma, PetscRea
 
   PetscFunctionBegin;
   t->l = HycoPODRank(n_sigma, sigma, HycoTrainerModesTolerance(t), t->noise, t->max_modes);
-  HycoCheck(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoTrainerModesTolerance(t));
+  HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoTrainerModesTolerance(t));
   PetscCall(PetscFree(t->sigma));
   t->sigma = sigma;
   PetscCall(PetscFree(t->VtU));

@@ -142,7 +142,7 @@ PetscErrorCode HycoTrainerProject(HycoTrainer t, HycoModel m)
   PetscCall(MakeBasis(t, m));
   PetscCall(HycoModelSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
   PetscCall(HycoTrainerJudge(t, m));
-  HycoCheck(
+  HycoCheckModel(
       m->numbers[1] < 0.5,
       "the projection-based model misses its own training displacements by %.0f %% on average (%d modes, %d force "
       "vectors, condition %.0e): take more modes (a smaller -hyco_pod_tol)",

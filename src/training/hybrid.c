@@ -90,7 +90,7 @@ static PetscErrorCode Candidates(HycoModel m, PetscInt candidate[])
   }
   PetscCall(PetscFree(taken));
   for (PetscInt k = 0; k < m->m; k++)
-    HycoCheck(candidate[k] >= 0,
+    HycoCheckModel(candidate[k] >= 0,
               "the contact of node %d has no displacement in A of its own to keep full order; use -hyco_hybrid contact",
               (int)m->slave_id[m->contact[k]]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -389,12 +389,12 @@ PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel m)
   PetscCall(PetscMalloc2(m->mesh->n_nodes * m->mesh->dim, &all, m->mesh->n_nodes * m->mesh->dim, &contact));
   PetscCall(FreeUnknowns(t, m, PETSC_FALSE, &n_all, all));
   PetscCall(FreeUnknowns(t, m, PETSC_TRUE, &n_contact, contact));
-  HycoCheck(n_all, "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
+  HycoCheckModel(n_all, "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
   if (!n_contact && kind != HYCO_HYBRID_ALL)
     kind = HYCO_HYBRID_CONTACT; /* no contact in the RID: plain hyper-reduction (31) */
   if (kind == HYCO_HYBRID_AUTO) kind = n_contact < n_all ? HYCO_HYBRID_CONTACT : HYCO_HYBRID_ALL;
   if (kind == HYCO_HYBRID_CONTACT && n_contact == n_all && n_contact) {
-    HycoFail("-hyco_hybrid contact leaves the modes without equation: every unknown of A is a contact's; use rank, all "
+    HycoFailNoModel("-hyco_hybrid contact leaves the modes without equation: every unknown of A is a contact's; use rank, all "
              "or auto");
   }
   if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));

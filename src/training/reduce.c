@@ -175,9 +175,9 @@ static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store, Pe
   PetscCall(HycoTrainerToRoot(t, S, PETSC_FALSE, &t->U));
   PetscCall(RemoveLifting(t, S));
   PetscCall(FindBasis(t, S, HYCO_SEED_DISPLACEMENT, all));
-  HycoCheck(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",
+  HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",
             (double)t->tol[HYCO_SEED_DISPLACEMENT]);
-  HycoCheck(basis->l, "every training solution has zero displacement; there is nothing to learn");
+  HycoCheckModel(basis->l, "every training solution has zero displacement; there is nothing to learn");
   PetscCall(PetscMalloc1(t->n_s, &t->U_norm));
   PetscCall(MatGetColumnNorms(S, NORM_2, t->U_norm));
   PetscCall(PetscMalloc1(basis->l * t->n_s, &basis->coefficients));

@@ -117,7 +117,7 @@ static PetscErrorCode Conclude(HycoTrainer t, HycoModel m, const PetscBool reach
   Say(m->scene, mu, here);
   GridPoint(m->scene, reaches, each, change, mu);
   Say(m->scene, mu, there);
-  HycoFail("the reduced stiffness is singular inside the parameters' ranges: between %s and %s its determinant changes "
+  HycoFailNoModel("the reduced stiffness is singular inside the parameters' ranges: between %s and %s its determinant changes "
            "sign, and predictions near there are arbitrary; enlarge the RID (-hyco_rid_layers 1), change the modes "
            "(-hyco_pod_tol), or keep the model: -hyco_keep_singular",
            here, there);
@@ -160,7 +160,7 @@ PetscErrorCode HycoTrainerScan(HycoTrainer t, const char candidate[], const char
   PetscCall(HycoCatchEnd(ierr, message));
   *found = m->scan;
   if (t->rank == 0) (void)unlink(candidate);
-  PetscCall(HycoAgree(t->comm, message));
+  PetscCall(HycoAgree(t->comm, ierr, message));
   PetscCall(HycoModelDestroy(&m));
   PetscCallMPI(MPI_Bcast(found, sizeof(*found), MPI_BYTE, 0, t->comm));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -10,6 +10,7 @@
   Where no recipe meets targets that were asked for, solutions are added where the best one errs most, and the search
   begins again.
 */
+#include <hycofile.h>
 #include <hycotrainerimpl.h>
 #include <stdio.h>
 #include <string.h>
@@ -46,7 +47,7 @@ enum { N_SIZES = sizeof(sizes) / sizeof(sizes[0]), FIRST_USUAL = 3 };
 typedef struct {
   HycoTrainer t;
   HycoSnapshots store;
-  char file[PETSC_MAX_PATH_LEN + 16];
+  char file[HYCO_FILE_NAME + 16];
   HycoRecipe given;    /* as the options have it */
   PetscReal extension; /* of the recipes that extend the contact */
   PetscBool targets;   /* given by the user */
@@ -203,6 +204,8 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
   ierr = Build(t, s->store, s->file, &report);
   if (!ierr) ierr = Judge(s, a); /* a model may refuse to predict */
   PetscCall(HycoCatchEnd(ierr, message));
+  if (ierr && t->rank == 0) (void)unlink(s->file);
+  PetscCall(HycoCatchNoModel(ierr, message));
   PetscCall(HycoCondensedDestroy(&t->condensed));
   if (message[0]) a->ratio = PETSC_INFINITY;
   if (!message[0]) {
@@ -509,6 +512,7 @@ static PetscErrorCode BuildBest(Search *s, const char path[], HycoTraining *repo
     PetscCall(HycoCatchBegin());
     ierr = HycoTrainerBuild(t, PETSC_TRUE, path, &built);
     PetscCall(HycoCatchEnd(ierr, message));
+    PetscCall(HycoCatchNoModel(ierr, message));
     if (message[0]) {
       PetscCall(PetscStrncpy(best->failure, message, sizeof(best->failure)));
       continue;

@@ -3,10 +3,9 @@
   Matrices of snapshots are spread over the ranks; the mesh, the RID and the model live on rank 0.
 */
 #include <hycoalgorithms.h>
+#include <hycofile.h>
 #include <hycotrainerimpl.h>
-#include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 /* The whole mesh on rank 0, its sizes everywhere. */
@@ -266,7 +265,7 @@ static PetscErrorCode CheckForces(HycoTrainer t, HycoModel m)
   PetscCall(HycoOptionsBool(t->scene->options, "hyco_reconstruct", &reconstruct));
   for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
-  HycoCheck(
+  HycoCheckModel(
       m->type != HYCO_MODEL_HYBRID || !reconstruct || kept || !presses,
       "the RID has no contact, and the training solutions press: the model would give no force; let the RID reach "
       "the contact (-hyco_rid_modes displacement,dual or -hyco_rid_groups GROUP), or take displacements alone by "
@@ -278,7 +277,7 @@ static PetscErrorCode CheckForces(HycoTrainer t, HycoModel m)
 static PetscErrorCode CheckUseful(HycoTrainer t, HycoModel m)
 {
   PetscFunctionBegin;
-  HycoCheck(m->numbers[1] < 0.5,
+  HycoCheckModel(m->numbers[1] < 0.5,
             "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
             "condition %.0e): enlarge the RID (-hyco_rid_layers 1, "
             "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)",
@@ -313,7 +312,7 @@ static PetscErrorCode BuildAndSave(HycoTrainer t, PetscBool useful, const char p
 
 PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path[], HycoTraining *report)
 {
-  char candidate[PETSC_MAX_PATH_LEN + 16];
+  char candidate[HYCO_FILE_NAME + 16];
   const PetscBool scan = (PetscBool)(useful && t->type != HYCO_MODEL_CONDENSED); /* which has no reduced stiffness */
 
   PetscFunctionBegin;
@@ -326,20 +325,36 @@ PetscErrorCode HycoTrainerBuild(HycoTrainer t, PetscBool useful, const char path
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoTrainerFinish(HycoTrainer t, HycoSnapshots store, const char path[], PetscBool learn,
+                                 HycoTraining *report)
+{
+  char file[HYCO_FILE_NAME];
+  HycoSamples grown = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFileScratch(t->comm, path, "candidate", file));
+  if (learn)
+    ierr = HycoTrainerLearn(t, store, file, &grown, report);
+  else
+    ierr = HycoTrainerBuild(t, PETSC_TRUE, file, report);
+  if (!ierr) ierr = HycoTrainerCalibrate(t, store, file, report);
+  PetscCall(HycoSamplesDestroy(&grown));
+  if (ierr && t->rank == 0) (void)unlink(file);
+  PetscCall(ierr);
+  HycoOnRoot(t->comm, HycoFileKeep(file, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The model's place can be written before hours of work. */
 static PetscErrorCode CheckWritable(const char path[])
 {
-  struct stat info;
-  char probe[PETSC_MAX_PATH_LEN + 16];
-  FILE *file;
+  HycoFile probe;
 
   PetscFunctionBegin;
-  snprintf(probe, sizeof(probe), "%s.partial", path);
-  HycoCheck(stat(path, &info) || !S_ISDIR(info.st_mode), "the model %s is a folder; give the name of a file", path);
-  file = fopen(probe, "wb");
-  HycoCheck(file, "the model %s cannot be written: is there such a folder, may you write there?", path);
-  fclose(file);
-  unlink(probe);
+  PetscCall(HycoFileSweep(path));
+  PetscCall(HycoFileCreate(path, HYCO_FILE_NUMBERS, &probe));
+  PetscCall(HycoFileClose(&probe, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -409,20 +424,10 @@ PetscErrorCode HycoTrainerHoldOut(HycoTrainer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A condensed model's own points are chosen with its fields; the modes come when the points stand. */
-static PetscErrorCode LearnChosen(HycoTrainer t, HycoSnapshots store, const char path[], HycoTraining *report)
-{
-  PetscFunctionBegin;
-  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFlexibility(t, store));
-  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFindModes(t, store));
-  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerBuild(t, PETSC_TRUE, path, report));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;
-  HycoSamples chosen = NULL, grown = NULL;
+  HycoSamples chosen = NULL;
   HycoTraining report = {0};
   PetscReal begin = HycoNow(), solved;
   const PetscBool choose = (PetscBool)!samples;
@@ -442,15 +447,12 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
     HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
   HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerHoldOut(t, store));
   solved = HycoNow();
-  if (choose)
-    PetscCall(LearnChosen(t, store, path, &report));
-  else
-    HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerLearn(t, store, path, &grown, &report));
-  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerCalibrate(t, store, path, &report));
+  if (choose) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFlexibility(t, store));
+  if (choose) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoTrainerFindModes(t, store));
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoTrainerFinish(t, store, path, (PetscBool)!choose, &report));
   PetscCall(HycoTrainerReset(t));
   PetscCall(HycoSnapshotsDestroy(&store));
   PetscCall(HycoSamplesDestroy(&chosen));
-  PetscCall(HycoSamplesDestroy(&grown));
   report.seconds_snapshots = solved - begin;
   report.seconds_reduction = HycoNow() - solved;
   if (training) *training = report;

@@ -241,7 +241,7 @@ static PetscErrorCode ReadType(HycoTrainer t)
   PetscCall(HycoOptionsInt(o, "hyco_condensed_max_values", 3, 1000, &t->condensed_max_values));
   t->type = (HycoModelType)type;
   t->dual = (HycoDual)dual;
-  HycoCheck(t->type == HYCO_MODEL_PROJECTION || t->dual == HYCO_DUAL_FE,
+  HycoCheckModel(t->type == HYCO_MODEL_PROJECTION || t->dual == HYCO_DUAL_FE,
             "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
             HycoDuals[dual]);
   if (t->type != HYCO_MODEL_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
@@ -249,7 +249,7 @@ static PetscErrorCode ReadType(HycoTrainer t)
     PetscBool set;
 
     PetscCall(PetscOptionsHasName(o, NULL, "-hyco_dual", &set));
-    HycoCheck(!set, "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
+    HycoCheckModel(!set, "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
     t->dual = HYCO_DUAL_NNMF;
   }
   t->whole_rid = PETSC_TRUE;

@@ -305,7 +305,7 @@ class Files(Case):
                     place = os.path.normpath(os.path.join(self.folder, path))
                     if place.startswith((self.path('tmp'), '/dev/', '/proc/', '/sys/', '/etc/fltk/', self.path('home', '.fltk'))):
                         continue
-                    name = os.path.relpath(place, self.folder).replace('.partial', '').replace('.candidate', '')
+                    name = re.sub(r'(\.hyco-[0-9a-f]{8}-\d+-\d+\.(partial|candidate))+(\.(candidate|fold))?', '', os.path.relpath(place, self.folder))
                     self.assertTrue(name in named or name == 'w_.xdmf' or name.startswith('w.h5.snapshots'), line)
         self.assertIn(os.listdir(self.path('home')), ([], ['.fltk']))
         os.remove(self.path('trace'))

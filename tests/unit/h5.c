@@ -1,9 +1,21 @@
 /* Files: what is written comes back, a commit is a rename, and damaged files are refused in one line. */
 #include "check.h"
 #include <hycoh5.h>
+#include <hycofile.h>
+#include <glob.h>
 #include <unistd.h>
 
 static char path[128], partial[160];
+
+/* Files with temporary names beside `path`. */
+static int CountPartial(void)
+{
+  glob_t found;
+  int n = glob(partial, 0, NULL, &found) == 0 ? (int)found.gl_pathc : 0;
+
+  globfree(&found);
+  return n;
+}
 
 static PetscErrorCode Write(PetscBool commit)
 {
@@ -13,14 +25,14 @@ static PetscErrorCode Write(PetscBool commit)
 
   PetscFunctionBegin;
   PetscCall(HycoH5Create(path, &file));
-  CHECK(access(partial, F_OK) == 0, "while writing, %s must exist", partial);
+  CHECK(CountPartial() == 1, "while writing, one of %s must exist", partial);
   PetscCall(HycoH5WriteReal(file, "real", 2, 3, real));
   PetscCall(HycoH5WriteInt(file, "group/deep/whole", 3, 1, whole));
   PetscCall(HycoH5WriteReal(file, "nothing", 0, 3, NULL));
   PetscCall(HycoH5WriteText(file, "text", "a line\nand \"another\": 7 %%"));
   PetscCall(HycoH5Close(&file, commit));
   CHECK(!file, "Close must clear the handle");
-  CHECK(access(partial, F_OK) != 0, "after closing, %s must be gone", partial);
+  CHECK(CountPartial() == 0, "after closing, %s must be gone", partial);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -120,14 +132,49 @@ static PetscErrorCode TestDamaged(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Temporary names: of this process alone, told from other files, swept when their process is dead. */
+static PetscErrorCode TestTemporary(void)
+{
+  char mine[HYCO_FILE_NAME], other[HYCO_FILE_NAME], owner[HYCO_FILE_NAME], dead[2 * HYCO_FILE_NAME];
+  const char *tag;
+  unsigned node;
+  FILE *f;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFileScratch(PETSC_COMM_SELF, path, "candidate", mine));
+  PetscCall(HycoFileScratch(PETSC_COMM_SELF, path, "candidate", other));
+  CHECK(strcmp(mine, other), "two temporary names are both %s", mine);
+  HycoFileOwner(mine, owner);
+  CHECK(strcmp(owner, path) == 0, "%s belongs to %s", mine, owner);
+  HycoFileOwner("a.hyco-b/c.hyco-h5", owner);
+  CHECK(strcmp(owner, "a.hyco-b/c.hyco-h5") == 0, "a name that is not temporary became %s", owner);
+  tag = strstr(mine, ".hyco-");
+  CHECK(sscanf(tag, ".hyco-%8x-", &node) == 1, "%s has no node", mine);
+  snprintf(dead, sizeof(dead), "%s.hyco-%08x-%d-0.partial.fold", path, node, 0x3fffffff); /* beyond any process id */
+  f = fopen(dead, "w");
+  fclose(f);
+  f = fopen(mine, "w");
+  fclose(f);
+  PetscCall(HycoFileSweep("/tmp/another"));
+  CHECK(access(dead, F_OK) == 0, "another file's sweep took %s", dead);
+  PetscCall(HycoFileSweep(path));
+  CHECK(access(dead, F_OK) != 0, "%s must be gone", dead);
+  CHECK(access(mine, F_OK) == 0, "%s, which lives, must stay", mine);
+  PetscCall(HycoFileKeep(mine, path));
+  CHECK(access(mine, F_OK) != 0 && access(path, F_OK) == 0, "%s must have become %s", mine, path);
+  unlink(path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
   snprintf(path, sizeof(path), "/tmp/hyco_test_%ld.h5", (long)getpid());
-  snprintf(partial, sizeof(partial), "%s.partial", path);
+  snprintf(partial, sizeof(partial), "%s.hyco-*.partial", path);
   PetscCall(TestRoundTrip());
   PetscCall(TestReleased());
   PetscCall(TestDamaged());
+  PetscCall(TestTemporary());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

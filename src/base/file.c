@@ -1,0 +1,243 @@
+/* Files that are written whole or not at all. */
+#include <hycofile.h>
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#define OLD (7 * 24 * 3600) /* seconds after which a temporary file of another machine is no longer in use */
+
+struct _n_HycoFile {
+  FILE *stream;
+  HycoFileKind kind;
+  PetscBool direct; /* written where it stands: a device, a pipe, an open descriptor */
+  char path[PETSC_MAX_PATH_LEN], shown[HYCO_FILE_NAME]; /* as given, and as messages name it */
+  char place[PETSC_MAX_PATH_LEN], temporary[HYCO_FILE_NAME];
+};
+
+/* Stands for the machine, since it was started, and the space in which its process ids count: containers have their
+   own. */
+static unsigned Node(void)
+{
+  static unsigned node;
+  char text[512] = "";
+  size_t n;
+  ssize_t m;
+  FILE *boot;
+
+  if (node) return node;
+  (void)!gethostname(text, 256);
+  n = strnlen(text, 256);
+  boot = fopen("/proc/sys/kernel/random/boot_id", "r");
+  if (boot) {
+    n += fread(text + n, 1, 64, boot);
+    fclose(boot);
+  }
+  m = readlink("/proc/self/ns/pid", text + n, sizeof(text) - n);
+  if (m > 0) n += (size_t)m;
+  node = (unsigned)HycoHash(HYCO_HASH_START, text, n) | 1u;
+  return node;
+}
+
+/* Where ".hyco-NODE-PID-NUMBER." begins in a file's name, and what it says; NULL: nowhere. */
+static const char *FindTag(const char name[], unsigned *node, long *pid)
+{
+  unsigned number;
+
+  for (const char *dot = strstr(name, ".hyco-"); dot; dot = strstr(dot + 1, ".hyco-")) {
+    int length = 0;
+
+    if (sscanf(dot, ".hyco-%8x-%ld-%u.%n", node, pid, &number, &length) == 3 && length > 0) return dot;
+  }
+  return NULL;
+}
+
+void HycoFileOwner(const char name[], char owner[HYCO_FILE_NAME])
+{
+  unsigned node;
+  long pid;
+  const char *base = strrchr(name, '/'), *tag = FindTag(base ? base : name, &node, &pid);
+
+  snprintf(owner, HYCO_FILE_NAME, "%.*s", (int)(tag ? (size_t)(tag - name) : strlen(name)), name);
+}
+
+static void Temporary(const char place[], const char kind[], char name[HYCO_FILE_NAME])
+{
+  static unsigned number;
+
+  snprintf(name, HYCO_FILE_NAME, "%s.hyco-%08x-%ld-%u.%s", place, Node(), (long)getpid(), number++, kind);
+}
+
+/* Whether the file of that name was left by a process that is dead. */
+static PetscBool IsLeft(const char path[], unsigned node, long pid)
+{
+  struct stat info;
+
+  if (node == Node()) return (PetscBool)(pid > 0 && kill((pid_t)pid, 0) != 0 && errno == ESRCH);
+  return (PetscBool)(stat(path, &info) == 0 && S_ISREG(info.st_mode) && time(NULL) - info.st_mtime > OLD);
+}
+
+PetscErrorCode HycoFileSweep(const char path[])
+{
+  char place[PETSC_MAX_PATH_LEN], file[2 * PETSC_MAX_PATH_LEN];
+  const char *base;
+  size_t n;
+  struct dirent *entry;
+  DIR *folder;
+
+  PetscFunctionBegin;
+  HycoFileFollow(path, place);
+  base = strrchr(place, '/');
+  base = base ? base + 1 : place;
+  n = strlen(base);
+  snprintf(file, sizeof(file), "%.*s", base > place ? (int)(base - place) : 1, base > place ? place : ".");
+  folder = opendir(file);
+  while (folder && (entry = readdir(folder))) {
+    unsigned node;
+    long pid;
+    const char *tag = FindTag(entry->d_name, &node, &pid);
+
+    if (!tag || (n && ((size_t)(tag - entry->d_name) != n || strncmp(entry->d_name, base, n)))) continue;
+    snprintf(file, sizeof(file), "%.*s%s", (int)(base - place), place, entry->d_name);
+    if (IsLeft(file, node, pid)) (void)unlink(file);
+  }
+  if (folder) closedir(folder);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind[], char scratch[HYCO_FILE_NAME])
+{
+  char place[PETSC_MAX_PATH_LEN];
+  PetscMPIInt rank;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (rank == 0) {
+    HycoFileFollow(path, place);
+    Temporary(place, kind, scratch);
+  }
+  PetscCallMPI(MPI_Bcast(scratch, HYCO_FILE_NAME, MPI_CHAR, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileKeep(const char scratch[], const char path[])
+{
+  char place[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  HycoFileFollow(path, place);
+  if (rename(scratch, place) != 0) {
+    const int failed = errno;
+
+    (void)unlink(scratch);
+    HycoFail("%s could not be written (%s)", path, strerror(failed));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFileKind kind, PetscBool *direct)
+{
+  const char *dash = option[0] ? "-" : "", *blank = option[0] ? " " : "";
+  char place[PETSC_MAX_PATH_LEN];
+  struct stat info;
+
+  PetscFunctionBegin;
+  *direct = PETSC_FALSE;
+  if (stat(path, &info) != 0) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(!S_ISDIR(info.st_mode), "%s%s%s%s is a folder; give the name of a file", dash, option, blank, path);
+  HycoCheck(S_ISREG(info.st_mode) || S_ISCHR(info.st_mode) || S_ISFIFO(info.st_mode),
+            "%s%s%s%s is no file, and nothing is written into it; give the name of a file", dash, option, blank, path);
+  HycoFileFollow(path, place);
+  *direct = (PetscBool)(!S_ISREG(info.st_mode) || strncmp(place, "/proc/", 6) == 0);
+  HycoCheck(!*direct || kind == HYCO_FILE_TEXT,
+            "%s%s%s%s is a device or a pipe, and HDF5 writes files; give the name of a file", dash, option, blank, path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode OpenPlace(HycoFile f)
+{
+  int fd;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFileCheckPlace("", f->path, f->kind, &f->direct));
+  if (!f->direct) Temporary(f->place, "partial", f->temporary);
+  fd = f->direct ? open(f->path, O_WRONLY | O_APPEND) : open(f->temporary, O_WRONLY | O_CREAT | O_EXCL, 0666);
+  f->stream = fd >= 0 ? fdopen(fd, "w") : NULL;
+  HycoCheck(f->stream, "%s cannot be written (%s): is there such a folder, may you write there, is there room?",
+            f->path, strerror(errno));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileCreate(const char path[], HycoFileKind kind, HycoFile *file)
+{
+  HycoFile f;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *file = NULL;
+  HycoCheck(strlen(path) < PETSC_MAX_PATH_LEN, "the file name %.40s... is too long", path);
+  PetscCall(PetscNew(&f));
+  f->kind = kind;
+  HycoFileOwner(path, f->shown);
+  PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
+  HycoFileFollow(path, f->place);
+  ierr = OpenPlace(f);
+  if (ierr) PetscCall(PetscFree(f));
+  PetscCall(ierr);
+  *file = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+FILE *HycoFileStream(HycoFile file)
+{
+  return file->stream;
+}
+
+/* All that was written has gone to the file. Returns 0, or errno. */
+static int Flush(HycoFile f)
+{
+  errno = 0;
+  if (fflush(f->stream) != 0 || ferror(f->stream) ||
+      (f->kind == HYCO_FILE_NUMBERS && fsync(fileno(f->stream)) != 0))
+    return errno ? errno : EIO;
+  return 0;
+}
+
+static PetscErrorCode Complain(const char shown[], int failed)
+{
+  PetscFunctionBegin;
+  HycoCheck(!failed, "%s could not be written to its end (%s): is the disk full?", shown, strerror(failed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileFlush(HycoFile file)
+{
+  PetscFunctionBegin;
+  PetscCall(Complain(file->shown, Flush(file)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileClose(HycoFile *file, PetscBool commit)
+{
+  HycoFile f = *file;
+  char shown[HYCO_FILE_NAME];
+  int failed;
+
+  PetscFunctionBegin;
+  if (!f) PetscFunctionReturn(PETSC_SUCCESS);
+  *file = NULL;
+  failed = commit ? Flush(f) : 0;
+  if (fclose(f->stream) != 0 && commit && !failed) failed = errno ? errno : EIO;
+  if (!f->direct) {
+    if (commit && !failed && rename(f->temporary, f->place) != 0) failed = errno;
+    if (!commit || failed) (void)unlink(f->temporary);
+  }
+  snprintf(shown, sizeof(shown), "%s", f->shown);
+  PetscCall(PetscFree(f));
+  PetscCall(Complain(shown, failed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,61 @@
+/* Where a path leads, whether or not a file is there. */
+#include <hycofile.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define LINKS 40 /* followed at most, as the system does */
+
+/* Where a link at `at` points, from where `at` stands; false: it is none. */
+static PetscBool ReadLink(const char at[], char end[PETSC_MAX_PATH_LEN])
+{
+  char target[PETSC_MAX_PATH_LEN];
+  const ssize_t n = readlink(at, target, sizeof(target) - 1);
+  const char *slash = strrchr(at, '/');
+  size_t before;
+
+  if (n < 0) return PETSC_FALSE;
+  target[n] = '\0';
+  before = target[0] == '/' || !slash ? 0 : (size_t)(slash - at) + 1;
+  if (before + (size_t)n >= PETSC_MAX_PATH_LEN) return PETSC_FALSE;
+  memmove(end, at, before);
+  memcpy(end + before, target, (size_t)n + 1);
+  return PETSC_TRUE;
+}
+
+void HycoFileFollow(const char path[], char end[PETSC_MAX_PATH_LEN])
+{
+  snprintf(end, PETSC_MAX_PATH_LEN, "%s", path);
+  for (int k = 0; k < LINKS && strncmp(end, "/proc/", 6); k++) {
+    if (!ReadLink(end, end)) return;
+  }
+}
+
+void HycoFileIdentify(const char path[], HycoFileIdentity *identity)
+{
+  char end[PETSC_MAX_PATH_LEN];
+  struct stat info;
+  char *slash;
+
+  memset(identity, 0, sizeof(*identity));
+  identity->exists = (PetscBool)(stat(path, &info) == 0);
+  identity->open_device = (PetscBool)(identity->exists && S_ISCHR(info.st_mode));
+  if (!identity->exists) {
+    HycoFileFollow(path, end);
+    slash = strrchr(end, '/');
+    snprintf(identity->name, sizeof(identity->name), "%s", slash ? slash + 1 : end);
+    if (slash) slash[slash == end] = '\0';
+    if (stat(slash ? end : ".", &info) != 0) {
+      snprintf(identity->name, sizeof(identity->name), "%s", path);
+      return;
+    }
+  }
+  identity->device = (unsigned long long)info.st_dev;
+  identity->inode = (unsigned long long)info.st_ino;
+}
+
+PetscBool HycoFileSame(const HycoFileIdentity *a, const HycoFileIdentity *b)
+{
+  return (PetscBool)(a->exists == b->exists && a->device == b->device && a->inode == b->inode && !a->open_device &&
+                     strcmp(a->name, b->name) == 0);
+}
