@@ -84,6 +84,16 @@ PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at)
   return PetscMax(1, there / inside);
 }
 
+PetscReal HycoPolynomialProduct(PetscInt n, const PetscReal x[], PetscInt skip, PetscReal at)
+{
+  PetscReal product = 1;
+
+  for (PetscInt k = 0; k < n; k++) {
+    if (k != skip) product *= 4 * PetscAbsReal(at - x[k]) / (x[n - 1] - x[0]);
+  }
+  return product;
+}
+
 PetscInt HycoTensorSize(const HycoTensor *t)
 {
   PetscInt size = 1;
@@ -154,6 +164,51 @@ PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscIn
   }
   PetscCall(PetscFree2(w, lost));
   *error = largest > 0 ? PetscSqrtReal(worst / largest) : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The size of the divided differences over nodes first .. first + n - 1 of all lines along an axis. */
+static PetscReal Difference(const HycoTensor *t, PetscInt axis, PetscInt first, PetscInt n, PetscInt rows,
+                            const PetscReal data[])
+{
+  const PetscInt all = t->n[axis], size = HycoTensorSize(t), stride = Stride(t, axis);
+  const PetscReal *x = t->x[axis], unit = (x[all - 1] - x[0]) / 4;
+  PetscReal square = 0;
+
+  for (PetscInt k = 0; k < size; k++) {
+    if (k / stride % all) continue;
+    for (PetscInt r = 0; r < rows; r++) {
+      PetscReal sum = 0;
+
+      for (PetscInt i = first; i < first + n; i++) {
+        PetscReal weight = 1;
+
+        for (PetscInt j = first; j < first + n; j++) weight *= j == i ? 1 : unit / (x[i] - x[j]);
+        sum += weight * data[(size_t)(k + i * stride) * (size_t)rows + (size_t)r];
+      }
+      square += sum * sum;
+    }
+  }
+  return PetscSqrtReal(square);
+}
+
+PetscErrorCode HycoTensorDecay(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
+                               PetscReal *decay)
+{
+  const PetscInt n = t->n[axis];
+  PetscReal whole = 0, d[3] = {0, 0, 0}; /* of orders n - 1, n - 2, n - 3 */
+
+  PetscFunctionBegin;
+  *decay = 1;
+  for (PetscInt order = 0; order < 3 && order < n; order++) {
+    for (PetscInt first = 0; first <= order; first++)
+      d[order] = PetscMax(d[order], Difference(t, axis, first, n - order, rows, data));
+  }
+  for (size_t k = 0; k < (size_t)HycoTensorSize(t) * (size_t)rows; k++) whole += data[k] * data[k];
+  if (n < 3 || d[0] <= ROUNDING * PetscSqrtReal(whole)) PetscFunctionReturn(PETSC_SUCCESS);
+  *decay = d[1] > 0 ? d[0] / d[1] : 1;
+  if (n > 3 && d[2] > 0) *decay = PetscMax(*decay, PetscSqrtReal(d[0] / d[2]));
+  *decay = PetscMin(*decay, 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -132,12 +132,20 @@ static PetscReal Estimate(const HycoTrust *t, const PetscReal coefficient[], con
   return PetscExpReal(PetscMin(sum, 200));
 }
 
-/* A condensed model's own estimates, by values left out in training; they grow as the polynomials' remainders do. */
+/* A condensed model's own estimates; those of older files by values left out in training. */
 static void Condensed(HycoModel m, HycoPrediction *p)
 {
   const HycoCondensed c = m->condensed;
-  PetscReal growth = 1;
+  PetscReal growth = 1, law[HYCO_N_LAWS];
 
+  if (c->law) {
+    HycoCondensedLaw(c, m->fe->mu, law);
+    for (PetscInt j = 0; j < HYCO_N_LAWS; j++) law[j] = law[j] < 0 || c->scale[j] < 0 ? -1 : PetscMax(HYCO_LAW_FLOOR, law[j] * c->scale[j]);
+    p->estimated_error_u = law[HYCO_LAW_U];
+    p->estimated_error_lambda = p->interpolation_error = law[HYCO_LAW_LAMBDA];
+    p->estimated_error_u_full = law[HYCO_LAW_U_FULL];
+    return;
+  }
   for (PetscInt q = 0; q < c->dim; q++) {
     if (!c->affine[q]) growth *= HycoPolynomialGrowth(c->n[q], c->x[q], m->fe->mu[q]);
   }
