@@ -143,7 +143,8 @@ PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], Pets
    the largest column. With interpolation this is the error of one degree less. */
 PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                      PetscReal *error);
-/* Sets degree[axis] to the one that this error favours, the highest unless a lower one halves it, and gives it. */
+/* Sets degree[axis] to the one that this error favours, of inner nodes where there are few, the highest unless a lower
+   one halves it; gives the error of all. */
 PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                       PetscReal *error);
 
