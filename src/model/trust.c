@@ -182,7 +182,8 @@ PetscErrorCode HycoTrustView(HycoModel m, PetscViewer viewer)
                                      (int)m->trust.n));
   else if (m->type == HYCO_MODEL_CONDENSED)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors by values left out%s\n",
-                                     m->condensed->errors_u[0] < 0 ? ", and none of u: an older file" : ""));
+                                     !m->condensed->law && m->condensed->errors_u[0] < 0 ? ", and none of u: an older file"
+                                                                                         : ""));
   else
     PetscCall(PetscViewerASCIIPrintf(viewer, "  does not estimate its errors: not calibrated\n"));
   if (m->search) PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->search));

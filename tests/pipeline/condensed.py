@@ -57,6 +57,7 @@ class Condensed(Case):
         inside, outside = (self.hyco('predict', '-model', 'narrow.h5', '-mu', mu)['interpolation_error']
                            for mu in ('4.055,1', '4.1,1'))
         product = [abs((r - 4.04) * (r - 4.05) * (r - 4.06)) for r in (4.1, 4.055)]
+        inside, outside = inside - 1e-10, outside - 1e-10  # the floor of every estimate
         self.near(outside / inside, product[0] / product[1], 2e-2)  # as the polynomial's remainder grows
         self.near(p['total_contact_force'], 1409.70532353, 1e-7)  # full order
         self.assertTrue(os.path.exists(self.path('out.xdmf')))

@@ -60,7 +60,7 @@ class Displacements(Case):
         inside, outside = (self.hyco('predict', '-model', 'n.h5', '-mu', mu) for mu in ('4.055,1', '4.1,1'))
         growth = outside['interpolation_error'] / inside['interpolation_error']
         self.assertGreater(growth, 10)
-        self.assertGreater(outside['estimated_error_u'], 10 * inside['estimated_error_u'])
+        self.assertGreater(outside['estimated_error_u'], inside['estimated_error_u'])  # to which the modes' part comes
         old = self.hyco('predict', '-model', os.path.join(SOURCE, 'tests', 'data', 'rope-condensed-4.h5'), '-mu', '0.1,0.2')
         self.assertIsNone(old['estimated_error_u'])
         self.assertGreater(old['estimated_error_lambda'], 0)
