@@ -69,6 +69,10 @@ typedef PetscErrorCode (*HycoAddedMonitor)(PetscInt n, PetscInt parameter, void 
 typedef struct {
   HycoModelType type;
   PetscReal dual_misfit;  /* projection: share of the dual snapshots' squares that their nonnegative basis leaves out */
+  PetscInt hopeless;      /* the same: the parameter of which more values were in vain, for the dependence on it is not
+                             smooth; -1: none */
+  PetscInt hopeless_values; /* how many it has */
+  PetscReal hopeless_error; /* the forces' error, one of them left out */
   PetscBool target_met;   /* condensed, points chosen: -hyco_condensed_tol was reached, by left_out's forces */
   PetscReal target;       /* the same: what it asked */
   PetscInt most_values;   /* the same: -hyco_condensed_max_values */

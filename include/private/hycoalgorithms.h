@@ -54,6 +54,15 @@ PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const
                               PetscReal c[]);
 
 /*
+  The scale by which a law is multiplied to be no smaller than the error at `share` of the points like the n it was held
+  against: the ratio error / law number ceil(share (n + 1)) from below (split conformal prediction; Lei, G'Sell, Rinaldo,
+  Tibshirani, Wasserman, JASA 113 (2018) 1094-1111). -1: n is too small for that, or a law is not positive. Not
+  collective.
+*/
+PetscErrorCode HycoConformalScale(PetscInt n, const PetscReal error[], const PetscReal law[], PetscReal share,
+                                  PetscReal *scale);
+
+/*
   Many problems over one S (m x n column major, borrowed): min 1/2 sum_k d_k (S x)_k^2 - h^T S x + shift/2 |x|^2, x >=
   0, that is |diag(sqrt(d)) S x - b|^2 / 2 with h = sqrt(d) b. d >= 0 and h: m each. shift > 0, so that there is one
   answer. Nothing is allocated after Create; an answer does not depend on the problems before. *solved: the optimality
@@ -118,6 +127,13 @@ PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt d
 /* By how much the remainder of interpolation grows from the nodes' interval to a point outside: the product of the
    distances to the nodes over its largest value inside; 1 inside. */
 PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at);
+/* Newton's form of that remainder, f[x_0 .. x_n-1, at] times a product: the product over the nodes but `skip` (-1: all)
+   of 4 |at - x| over their range, which neither grows nor falls with n where nodes are as Chebyshev's. */
+PetscReal HycoPolynomialProduct(PetscInt n, const PetscReal x[], PetscInt skip, PetscReal at);
+/* How much smaller the next divided difference along `axis` is than the last, in that scale: from differences of the
+   three highest orders, the slower of their falls, 2-norms over all data; 1 where they are round-off of the data. */
+PetscErrorCode HycoTensorDecay(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
+                               PetscReal *decay);
 PetscInt HycoTensorSize(const HycoTensor *t);
 /* The weights of all grid nodes; the nodes with number `skip` along `axis` left out (-1, -1: none). */
 PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscInt axis, PetscInt skip,
@@ -126,7 +142,8 @@ PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], Pets
    the largest column. With interpolation this is the error of one degree less. */
 PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                      PetscReal *error);
-/* Sets degree[axis] to the one that this error favours, the highest unless a lower one halves it, and gives it. */
+/* Sets degree[axis] to the one that this error favours, of inner nodes where there are few, the highest unless a lower
+   one halves it; gives the error of all. */
 PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                       PetscReal *error);
 

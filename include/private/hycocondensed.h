@@ -17,6 +17,10 @@
 enum { HYCO_FIELD_G, HYCO_FIELD_GAP, HYCO_FIELD_H, HYCO_FIELD_FREE, HYCO_N_FIELDS };
 extern const char *const HycoGridFieldNames[]; /* as in files */
 
+/* What is estimated: the displacement by the modes, the forces, the displacement that these forces make. */
+#define HYCO_LAW_FLOOR 1e-10 /* no error is said to be smaller: round-off of the solutions that it is of */
+enum { HYCO_LAW_U, HYCO_LAW_LAMBDA, HYCO_LAW_U_FULL, HYCO_N_LAWS };
+
 /* Where D is evaluated: a mesh with every contact node, and room for the rows. Borrowed. */
 typedef struct {
   HycoFE fe;
@@ -42,10 +46,15 @@ struct _n_HycoCondensed {
   PetscReal *bounds;   /* by node of G: lower and upper of it by the middle node's G; 0, 0: none are known */
   PetscReal *Lambda;   /* m x nodes of the whole grid: training forces */
   PetscReal errors[3]; /* one value left out: G, g, forces; relative */
-  /* the same: the displacement by the modes, and what the forces' error alone makes of it; < 0: an older file */
-  PetscReal errors_u[2];
+  PetscReal errors_u[2]; /* of older files: their estimates of u by the modes and of u with these forces; < 0: none */
+  /* the law of the estimated errors (condensed_estimate.c) */
+  PetscReal *law;    /* dim x HYCO_N_LAWS: of a parameter's remainder; NULL: an older file */
+  PetscInt *flat;    /* dim: the remainder has no nodes, for the polynomial does not interpolate */
+  PetscReal cut;     /* what the modes leave out of any displacement */
+  PetscReal scale[HYCO_N_LAWS]; /* by held-out points; 1 without any; < 0: no estimate */
   /* training only: the error of the forces by parameter; the sample of each node of the whole grid */
   PetscReal by_parameter[HYCO_MAX_PARAMETERS];
+  PetscInt hopeless;    /* the points were chosen: of this parameter more values were in vain; -1: none */
   PetscBool target_met; /* the points were chosen, and the target was reached */
   PetscInt *sample;
   /* online */
@@ -81,6 +90,12 @@ PetscErrorCode HycoCondensedLoadWeights(HycoCondensed condensed, const PetscReal
                                         PetscBool *span);
 /* The parameters of node k of the whole grid. */
 void HycoCondensedPoint(HycoCondensed condensed, PetscInt k, PetscReal mu[]);
+/* The laws of the errors at mu, to be multiplied by scale[]; < 0: too few values, or an older file. */
+void HycoCondensedLaw(HycoCondensed condensed, const PetscReal mu[], PetscReal law[]);
+/* Sets the scales of u and the forces by n held-out points: their true errors (n each) and laws (HYCO_N_LAWS each). Too
+   few points: no estimates. */
+PetscErrorCode HycoCondensedCalibrate(HycoCondensed condensed, PetscInt n, const PetscReal error_u[],
+                                      const PetscReal error_lambda[], const PetscReal law[]);
 /* To and from the model's file. */
 PetscErrorCode HycoCondensedSave(HycoModel model, HycoH5 file);
 PetscErrorCode HycoCondensedLoad(HycoModel model, HycoH5 file);

@@ -52,7 +52,7 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene);
 
 /*
   The part of a whole mesh with the cells keep[0..n_keep) (ascending) and, after their nodes, extra[0..n_extra).
-  Facets are kept if their cell is, or if their group is in all_facets[0..n_all) (their nodes must then be kept).
+  Facets are kept if their cell is, or if their group is in all_facets[0..n_all), with their nodes.
   node_whole and cell_whole lead back. The caller owns it.
 */
 PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,

@@ -9,6 +9,10 @@
 
 /* Errors no larger than this share of the data are round-off: the lowest such degree is taken. */
 #define ROUNDING 1e-12
+/* Between so many nodes inner ones choose the degree: to predict an end from within says little of smooth data, and
+   favours low degrees. Of more nodes the ends tell noise from data. */
+#define FEW  5
+#define MANY 12
 
 PetscErrorCode HycoChebyshevNodes(PetscInt n, PetscReal lo, PetscReal hi, PetscReal x[])
 {
@@ -84,6 +88,16 @@ PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at)
   return PetscMax(1, there / inside);
 }
 
+PetscReal HycoPolynomialProduct(PetscInt n, const PetscReal x[], PetscInt skip, PetscReal at)
+{
+  PetscReal product = 1;
+
+  for (PetscInt k = 0; k < n; k++) {
+    if (k != skip) product *= 4 * PetscAbsReal(at - x[k]) / (x[n - 1] - x[0]);
+  }
+  return product;
+}
+
 PetscInt HycoTensorSize(const HycoTensor *t)
 {
   PetscInt size = 1;
@@ -123,8 +137,9 @@ static PetscInt Stride(const HycoTensor *t, PetscInt axis)
   return stride;
 }
 
-PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
-                                     PetscReal *error)
+/* The same for nodes first .. last along the axis. */
+static PetscErrorCode LeaveOut(const HycoTensor *t, PetscInt axis, PetscInt first_out, PetscInt last_out, PetscInt rows,
+                               const PetscReal data[], PetscReal *error)
 {
   const PetscInt n = t->n[axis], size = HycoTensorSize(t), stride = Stride(t, axis);
   PetscReal *w, *lost, worst = 0, largest = 0;
@@ -138,6 +153,9 @@ PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscIn
     const PetscReal *own = data + (size_t)k * (size_t)rows;
     PetscReal square = 0, own_square = 0;
 
+    for (PetscInt r = 0; r < rows; r++) own_square += own[r] * own[r];
+    largest = PetscMax(largest, own_square);
+    if (i < first_out || i > last_out) continue;
     PetscCall(PetscArraycpy(lost, own, rows));
     for (PetscInt j = 0; j < n; j++) {
       const PetscReal *other = data + (size_t)(first + j * stride) * (size_t)rows, weight = w[i * n + j];
@@ -145,39 +163,89 @@ PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscIn
       if (j == i) continue;
       for (PetscInt r = 0; r < rows; r++) lost[r] -= weight * other[r];
     }
-    for (PetscInt r = 0; r < rows; r++) {
-      square += lost[r] * lost[r];
-      own_square += own[r] * own[r];
-    }
+    for (PetscInt r = 0; r < rows; r++) square += lost[r] * lost[r];
     worst = PetscMax(worst, square);
-    largest = PetscMax(largest, own_square);
   }
   PetscCall(PetscFree2(w, lost));
   *error = largest > 0 ? PetscSqrtReal(worst / largest) : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
+                                     PetscReal *error)
+{
+  PetscFunctionBegin;
+  PetscCall(LeaveOut(t, axis, 0, t->n[axis] - 1, rows, data, error));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The size of the divided differences over nodes first .. first + n - 1 of all lines along an axis. */
+static PetscReal Difference(const HycoTensor *t, PetscInt axis, PetscInt first, PetscInt n, PetscInt rows,
+                            const PetscReal data[])
+{
+  const PetscInt all = t->n[axis], size = HycoTensorSize(t), stride = Stride(t, axis);
+  const PetscReal *x = t->x[axis], unit = (x[all - 1] - x[0]) / 4;
+  PetscReal square = 0;
+
+  for (PetscInt k = 0; k < size; k++) {
+    if (k / stride % all) continue;
+    for (PetscInt r = 0; r < rows; r++) {
+      PetscReal sum = 0;
+
+      for (PetscInt i = first; i < first + n; i++) {
+        PetscReal weight = 1;
+
+        for (PetscInt j = first; j < first + n; j++) weight *= j == i ? 1 : unit / (x[i] - x[j]);
+        sum += weight * data[(size_t)(k + i * stride) * (size_t)rows + (size_t)r];
+      }
+      square += sum * sum;
+    }
+  }
+  return PetscSqrtReal(square);
+}
+
+PetscErrorCode HycoTensorDecay(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
+                               PetscReal *decay)
+{
+  const PetscInt n = t->n[axis];
+  PetscReal whole = 0, d[3] = {0, 0, 0}; /* of orders n - 1, n - 2, n - 3 */
+
+  PetscFunctionBegin;
+  *decay = 1;
+  for (PetscInt order = 0; order < 3 && order < n; order++) {
+    for (PetscInt first = 0; first <= order; first++)
+      d[order] = PetscMax(d[order], Difference(t, axis, first, n - order, rows, data));
+  }
+  for (size_t k = 0; k < (size_t)HycoTensorSize(t) * (size_t)rows; k++) whole += data[k] * data[k];
+  if (n < 3 || d[0] <= ROUNDING * PetscSqrtReal(whole)) PetscFunctionReturn(PETSC_SUCCESS);
+  *decay = d[1] > 0 ? d[0] / d[1] : 1;
+  if (n > 3 && d[2] > 0) *decay = PetscMax(*decay, PetscSqrtReal(d[0] / d[2]));
+  *decay = PetscMin(*decay, 1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                       PetscReal *error)
 {
-  const PetscInt n = t->n[axis];
+  const PetscInt n = t->n[axis], first = n >= FEW && n <= MANY, last = n - 1 - first;
   PetscInt best = n - 1;
 
   PetscFunctionBegin;
   t->degree[axis] = n - 1;
   *error = 0;
   if (n == 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoTensorLeaveOneOut(t, axis, rows, data, error));
+  PetscCall(LeaveOut(t, axis, first, last, rows, data, error));
   for (PetscInt d = n - 2; d >= 0; d--) { /* n - 2, one node left out, is n - 1 once more: taken when exact */
     PetscReal e;
 
     t->degree[axis] = d;
-    PetscCall(HycoTensorLeaveOneOut(t, axis, rows, data, &e));
+    PetscCall(LeaveOut(t, axis, first, last, rows, data, &e));
     if (e > ROUNDING && e > *error / 2) continue; /* the higher degree unless the lower one is clearly better */
     best = d;
     *error = PetscMin(e, *error);
   }
   t->degree[axis] = best;
+  PetscCall(HycoTensorLeaveOneOut(t, axis, rows, data, error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -81,7 +81,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
   if (p->type == HYCO_MODEL_CONDENSED) {
-    cJSON_AddNumberToObject(json, "interpolation_error", p->interpolation_error);
+    Estimate(json, "interpolation_error", p->interpolation_error);
     cJSON_AddBoolToObject(json, "full_displacement", whole && !fallback[0]);
   }
   ReportKKT(json, &p->kkt);
@@ -97,8 +97,7 @@ static PetscErrorCode SayReduced(const HycoPrediction *p)
     PetscCall(Say("projection-based: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n",
                   (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements));
   else if (p->type == HYCO_MODEL_CONDENSED)
-    PetscCall(Say("condensed: %d contacts, %d modes; forces within %.1e where one training value was left out\n",
-                  (int)p->n_contacts, (int)p->n_modes, (double)p->interpolation_error));
+    PetscCall(Say("condensed: %d contacts, %d modes\n", (int)p->n_contacts, (int)p->n_modes));
   else
     PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
                   (int)p->n_modes, (int)p->n_fe_dofs, (int)p->n_contacts, (int)p->rid_elements,

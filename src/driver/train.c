@@ -159,6 +159,29 @@ static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A condensed model's own points that miss -hyco_condensed_tol. */
+static PetscErrorCode JudgePoints(HycoScene scene, const HycoTraining *t)
+{
+  const char *const *names, *name;
+
+  PetscFunctionBegin;
+  if (t->target_met) PetscFunctionReturn(PETSC_SUCCESS);
+  if (t->hopeless < 0) {
+    PetscCall(DriverMissed("-hyco_condensed_tol was not reached: the forces' error, one value left out, is %.1e, and %.1e "
+                           "was asked; raise -hyco_condensed_max_values, which is %d, or -hyco_condensed_tol",
+                           (double)t->left_out[2], (double)t->target, (int)t->most_values));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoSceneGetParameters(scene, NULL, &names, NULL, NULL));
+  name = names[t->hopeless];
+  PetscCall(DriverMissed("-hyco_condensed_tol was not reached: with %d values of %s the forces' error, one of them left "
+                         "out, is %.1e, and hardly falls as values are added, where %.1e was asked: the stiffness or the "
+                         "contacts do not depend smoothly on %s (a kink, as of abs or max, a jump); train a hybrid model, "
+                         "or raise -hyco_condensed_tol",
+                         (int)t->hopeless_values, name, (double)t->hopeless_error, (double)t->target, name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CommandTrain(void)
 {
   HycoScene scene;
@@ -202,11 +225,7 @@ PetscErrorCode CommandTrain(void)
   else
     PetscCall(HycoTrainerRun(trainer, given ? samples : NULL, model, &t));
   PetscCall(SayBases(&t));
-  if (!given && t.type == HYCO_MODEL_CONDENSED && !t.target_met)
-    PetscCall(
-        Say("-hyco_condensed_tol was not reached: the forces' error, one value left out, is %.1e, and %.1e was asked; "
-            "raise -hyco_condensed_max_values, which is %d, or be content with more\n",
-            (double)t.left_out[2], (double)t.target, (int)t.most_values));
+  if (!given && t.type == HYCO_MODEL_CONDENSED) PetscCall(JudgePoints(scene, &t));
   PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u,
                 t.type == HYCO_MODEL_HYBRID ? "RID " : "", (double)t.error_lambda));
   if (t.condition > 0) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));

@@ -24,6 +24,7 @@ PetscErrorCode HycoCondensedCreate(PetscInt dim, PetscInt m, PetscInt l, HycoCon
   c->dim = dim;
   c->m = m;
   c->l = l;
+  c->hopeless = -1;
   *condensed = c;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -38,6 +39,8 @@ PetscErrorCode HycoCondensedDestroy(HycoCondensed *condensed)
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) PetscCall(PetscFree(c->field[f].data));
   PetscCall(PetscFree(c->Lambda));
   PetscCall(PetscFree(c->bounds));
+  PetscCall(PetscFree(c->law));
+  PetscCall(PetscFree(c->flat));
   PetscCall(PetscFree(c->sample));
   PetscCall(PetscFree(c->probe));
   PetscCall(PetscFree(c->inverse));
@@ -176,6 +179,8 @@ PetscErrorCode HycoCondensedBound(HycoCondensed c)
 
   PetscFunctionBegin;
   PetscCall(PetscFree(c->bounds));
+  PetscCall(PetscFree(c->law));
+  PetscCall(PetscFree(c->flat));
   PetscCall(PetscCalloc1(2 * n, &c->bounds));
   PetscCall(HasFactor(c, R, 0, &definite));
   for (PetscInt k = 0; definite && k < n; k++) {
@@ -395,7 +400,7 @@ PetscErrorCode HycoCondensedPredict(HycoModel m, const PetscReal mu[])
   PetscCall(PetscArraycpy(c->last, mu, c->dim));
   p->seconds.solve = HycoNow() - solve;
   PetscCall(Displacements(m, mu));
-  p->interpolation_error = c->errors[2];
+  p->interpolation_error = c->errors[2]; /* of an older file: HycoTrustEstimate() has newer ones' */
   for (PetscInt q = 0; q < c->dim; q++) {
     if (!c->affine[q]) p->interpolation_error *= HycoPolynomialGrowth(c->n[q], c->x[q], mu[q]);
   }

@@ -28,7 +28,10 @@ PetscErrorCode HycoCondensedSave(HycoModel m, HycoH5 h)
   PetscCall(HycoH5WriteInt(h, "condensed/exact_loads", 1, 1, &c->exact_loads));
   if (c->exact_loads && c->n_probes) PetscCall(HycoH5WriteReal(h, "condensed/probes", c->n_probes, 3, c->probe));
   PetscCall(HycoH5WriteReal(h, "condensed/left_out", 3, 1, c->errors));
-  PetscCall(HycoH5WriteReal(h, "condensed/left_out_u", 2, 1, c->errors_u));
+  PetscCall(HycoH5WriteReal(h, "condensed/law", c->dim, HYCO_N_LAWS, c->law));
+  PetscCall(HycoH5WriteInt(h, "condensed/law_flat", c->dim, 1, c->flat));
+  PetscCall(HycoH5WriteReal(h, "condensed/law_cut", 1, 1, &c->cut));
+  PetscCall(HycoH5WriteReal(h, "condensed/law_scale", HYCO_N_LAWS, 1, c->scale));
   PetscCall(HycoH5WriteReal(h, "condensed/lambda", HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), c->m, c->Lambda));
   PetscCall(HycoH5WriteReal(h, "condensed/bounds", HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), 2, c->bounds));
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) {
@@ -86,6 +89,21 @@ static PetscErrorCode LoadValues(HycoH5 h, HycoModel m, PetscInt p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The law of the estimated errors, which older files do not have. */
+static PetscErrorCode LoadLaw(HycoH5 h, HycoCondensed c)
+{
+  PetscInt laws = HYCO_N_LAWS;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "condensed/law")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "condensed/law", &c->dim, &laws, &c->law));
+  PetscCall(PetscMalloc1(c->dim + 1, &c->flat));
+  PetscCall(LoadFlags(h, "condensed/law_flat", c->dim, c->flat));
+  PetscCall(HycoH5ReadReal(h, "condensed/law_cut", 1, 1, &c->cut));
+  PetscCall(HycoH5ReadReal(h, "condensed/law_scale", HYCO_N_LAWS, 1, c->scale));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode LoadField(HycoH5 h, HycoModel m, PetscInt f)
 {
   HycoCondensed c = m->condensed;
@@ -122,7 +140,8 @@ PetscErrorCode HycoCondensedLoad(HycoModel m, HycoH5 h)
   PetscCall(HycoH5LoadReal(h, "condensed/left_out", &three, &one, &errors));
   PetscCall(PetscArraycpy(c->errors, errors, 3));
   PetscCall(PetscFree(errors));
-  c->errors_u[0] = c->errors_u[1] = -1; /* an older file */
+  PetscCall(LoadLaw(h, c));
+  c->errors_u[0] = c->errors_u[1] = -1;
   if (HycoH5Has(h, "condensed/left_out_u")) PetscCall(HycoH5ReadReal(h, "condensed/left_out_u", 2, 1, c->errors_u));
   n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
   PetscCall(HycoH5LoadReal(h, "condensed/lambda", &n, &c->m, &c->Lambda));

@@ -3,9 +3,8 @@
   held-out solutions (calibrate.c). log e = c_0 + sum_j c_j log(1 + f_j / floor_j), c_j >= 0, of five features:
 
     0  misfit       distance of the full-order displacements from what the modes alone give there, over their size;
-                    condensed: the remainder of the interpolation, for each parameter the product of the distances from
-                    the training values over its largest inside, summed
-    1  penetration  of the contacts that (38) does not constrain, over the size of B U
+                    condensed: the law of the forces' interpolation (condensed_estimate.c)
+    1  penetration  of the contacts that (38) does not constrain, over the size of B U; condensed: the law of u
     2  adhesion     forces of these contacts where the predicted displacement leaves a gap, over the size of the forces
     3  distance     to the nearest training point, each parameter scaled to its range
     4  tail         the last quarter of the modes' coefficients over all of them: what the modes cut off is of this kind
@@ -87,39 +86,23 @@ static PetscReal Tail(HycoModel m)
   return Quotient(last, all);
 }
 
-static PetscReal Product(PetscInt n, const PetscReal x[], PetscReal at)
-{
-  PetscReal product = 1;
-
-  for (PetscInt k = 0; k < n; k++) product *= PetscAbsReal(at - x[k]) / (x[n - 1] - x[0]);
-  return product;
-}
-
-/* How far a condensed model's parameters are from where its fields are exact. */
-static PetscReal Remainder(HycoModel m)
-{
-  const HycoCondensed c = m->condensed;
-  PetscReal sum = 0;
-
-  for (PetscInt p = 0; p < c->dim; p++) {
-    PetscReal largest = 0;
-
-    if (c->affine[p] || c->n[p] < 2) continue;
-    for (PetscInt k = 1; k < c->n[p]; k++)
-      largest = PetscMax(largest, Product(c->n[p], c->x[p], (c->x[p][k - 1] + c->x[p][k]) / 2));
-    sum += Product(c->n[p], c->x[p], m->fe->mu[p]) / largest;
-  }
-  return sum;
-}
-
 PetscErrorCode HycoTrustMeasure(HycoModel m, PetscReal feature[])
 {
   const PetscInt n_par = m->scene->n_parameters;
 
   PetscFunctionBegin;
   PetscCall(HycoModelComplete(m));
-  feature[MISFIT] = m->condensed ? Remainder(m) : Misfit(m);
-  Contacts(m, &feature[PENETRATION], &feature[ADHESION]);
+  feature[MISFIT] = feature[PENETRATION] = feature[ADHESION] = 0;
+  if (m->condensed) {
+    PetscReal law[HYCO_N_LAWS];
+
+    HycoCondensedLaw(m->condensed, m->fe->mu, law);
+    feature[MISFIT] = PetscMax(0, law[HYCO_LAW_LAMBDA]);
+    feature[PENETRATION] = PetscMax(0, law[HYCO_LAW_U]);
+  } else {
+    feature[MISFIT] = Misfit(m);
+    Contacts(m, &feature[PENETRATION], &feature[ADHESION]);
+  }
   feature[TAIL] = Tail(m);
   feature[DISTANCE] = m->n_points && n_par ? PETSC_MAX_REAL : 0;
   for (PetscInt k = 0; n_par && k < m->n_points; k++)
@@ -162,12 +145,20 @@ static PetscReal Estimate(const HycoTrust *t, const PetscReal coefficient[], con
   return PetscExpReal(PetscMin(sum, 200));
 }
 
-/* A condensed model's own estimates, by values left out in training; they grow as the polynomials' remainders do. */
+/* A condensed model's own estimates; those of older files by values left out in training. */
 static void Condensed(HycoModel m, HycoPrediction *p)
 {
   const HycoCondensed c = m->condensed;
-  PetscReal growth = 1;
+  PetscReal growth = 1, law[HYCO_N_LAWS];
 
+  if (c->law) {
+    HycoCondensedLaw(c, m->fe->mu, law);
+    for (PetscInt j = 0; j < HYCO_N_LAWS; j++) law[j] = law[j] < 0 || c->scale[j] < 0 ? -1 : PetscMax(HYCO_LAW_FLOOR, law[j] * c->scale[j]);
+    p->estimated_error_u = law[HYCO_LAW_U];
+    p->estimated_error_lambda = p->interpolation_error = law[HYCO_LAW_LAMBDA];
+    p->estimated_error_u_full = law[HYCO_LAW_U_FULL];
+    return;
+  }
   for (PetscInt q = 0; q < c->dim; q++) {
     if (!c->affine[q]) growth *= HycoPolynomialGrowth(c->n[q], c->x[q], m->fe->mu[q]);
   }
@@ -223,7 +214,8 @@ PetscErrorCode HycoTrustView(HycoModel m, PetscViewer viewer)
                                      (int)t->n));
   else if (m->type == HYCO_MODEL_CONDENSED)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors by values left out%s\n",
-                                     m->condensed->errors_u[0] < 0 ? ", and none of u: an older file" : ""));
+                                     !m->condensed->law && m->condensed->errors_u[0] < 0 ? ", and none of u: an older file"
+                                                                                         : ""));
   else
     PetscCall(PetscViewerASCIIPrintf(viewer, "  does not estimate its errors: not calibrated\n"));
   if (m->search) PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->search));

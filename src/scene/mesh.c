@@ -133,7 +133,8 @@ PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
 /* index[i] = place of whole node i in the part, or -1; nodes of cells come before the others. part->node_whole is
    filled. */
 static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
-                                  const PetscInt extra[], HycoMesh part, PetscInt index[])
+                                  const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh part,
+                                  PetscInt index[])
 {
   PetscFunctionBegin;
   for (PetscInt i = 0; i < whole->n_nodes; i++) index[i] = -1;
@@ -142,6 +143,12 @@ static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscIn
   }
   for (PetscInt k = 0; k < n_extra; k++) {
     if (index[extra[k]] < 0) index[extra[k]] = -2;
+  }
+  for (PetscInt f = 0; f < whole->n_facets * whole->nf; f++) { /* facets that are kept for their group */
+    PetscInt *node = &index[whole->facets[f]];
+
+    for (PetscInt k = 0; k < n_all && *node == -1; k++)
+      *node = whole->facet_group[f / whole->nf] == all_facets[k] ? -2 : -1;
   }
   for (PetscInt pass = 0; pass > -3; pass -= 2) {
     for (PetscInt i = 0; i < whole->n_nodes; i++) {
@@ -242,7 +249,7 @@ PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt k
   m->nf = whole->nf;
   m->type = whole->type;
   PetscCall(PetscMalloc2(whole->n_nodes, &index, whole->n_cells, &cell_index));
-  PetscCall(SelectNodes(whole, n_keep, keep, n_extra, extra, m, index));
+  PetscCall(SelectNodes(whole, n_keep, keep, n_extra, extra, n_all, all_facets, m, index));
   PetscCall(SelectCells(whole, n_keep, keep, index, m, cell_index));
   PetscCall(SelectFacets(whole, n_all, all_facets, index, cell_index, m));
   m->n_groups = whole->n_groups;

@@ -1,8 +1,9 @@
 /*
   The condensed model's training points, chosen: Leja points of each range, which interpolate about as well as
   Chebyshev's and are nested, so that no solution is in vain. The parameter whose values, left out one by one, cost the
-  forces most gets another value until the sum over the parameters is below the target. The modes come when the points
-  stand.
+  forces most gets another value until the sum over the parameters is below the target, or until its error falls so
+  slowly that values within the limit cannot bring it there: polynomials converge geometrically where the dependence is
+  smooth, and algebraically where it has a kink. The modes come when the points stand.
 */
 #include <hycocondensed.h>
 #include <hycotrainerimpl.h>
@@ -12,6 +13,10 @@
 #define FIRST_VALUES  3
 #define LEJA_GRID     2000
 #define TIE           1e-6 /* relative: of parameters that cost nearly the same the first is refined, on any number of ranks */
+
+#define LOOK_BACK     4   /* values over which an error's fall is measured, from twice as many on */
+#define SLOW          0.7 /* a fall per value that no smooth dependence has */
+#define BEYOND        1.5 /* of the most values: what a fall that stays would ask for */
 
 /* n Leja points of [lo, hi]: the ends, then each where the product of the distances to those before is largest. */
 static void LejaPoints(PetscInt n, PetscReal lo, PetscReal hi, PetscReal x[])
@@ -91,12 +96,36 @@ static PetscInt Choose(HycoTrainer t, PetscBool *met)
   return *met ? -1 : worst;
 }
 
+/* The parameter's error at so many values. */
+typedef struct {
+  PetscInt most;
+  PetscReal *error; /* dim x (most + 1) */
+} History;
+
+/* Whether more values of p are in vain: at the rate at which they have made its error fall the target is out of reach. */
+static PetscBool IsHopeless(HycoTrainer t, const History *h, PetscInt p)
+{
+  HycoCondensed c = t->condensed;
+  const PetscInt n = c->n[p];
+  const PetscReal *e = h->error + p * (h->most + 1);
+  PetscReal best = e[n], before = e[n - LOOK_BACK > 0 ? n - LOOK_BACK : 0], rate;
+
+  if (n < 2 * LOOK_BACK || !(before > 0)) return PETSC_FALSE;
+  for (PetscInt k = n - 1; k > n - 2; k--) best = PetscMin(best, e[k]); /* every second value may be a little worse */
+  rate = PetscPowReal(best / before, 1.0 / LOOK_BACK);
+  if (rate < SLOW) return PETSC_FALSE;
+  return (PetscBool)(rate >= 1 || (PetscReal)n + PetscLogReal(t->condensed_tol / best) / PetscLogReal(rate) >
+                                      BEYOND * (PetscReal)h->most);
+}
+
 PetscErrorCode HycoTrainerChoosePoints(HycoTrainer t, HycoSnapshots store, HycoSamples *samples)
 {
   HycoScene s = t->scene;
   PetscInt counts[HYCO_MAX_PARAMETERS], worst = 0;
+  History h = {t->condensed_max_values, NULL};
 
   PetscFunctionBegin;
+  PetscCall(PetscCalloc1(s->n_parameters * (h.most + 1) + 1, &h.error));
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     const PetscInt n = t->condensed->affine[p] ? AFFINE_VALUES : FIRST_VALUES;
 
@@ -106,8 +135,12 @@ PetscErrorCode HycoTrainerChoosePoints(HycoTrainer t, HycoSnapshots store, HycoS
     PetscCall(TakeSamples(t, counts, samples));
     PetscCall(Estimate(t, store));
     worst = Choose(t, &t->condensed->target_met);
+    for (PetscInt p = 0; p < s->n_parameters; p++) h.error[p * (h.most + 1) + counts[p]] = t->condensed->by_parameter[p];
+    t->condensed->hopeless = worst >= 0 && IsHopeless(t, &h, worst) ? worst : -1;
+    if (t->condensed->hopeless >= 0) break;
     if (worst >= 0) counts[worst]++;
   }
+  PetscCall(PetscFree(h.error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

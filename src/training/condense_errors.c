@@ -1,7 +1,9 @@
 /*
   What a condensed model estimates its errors by: each value of each parameter that is not affine is left out and its
-  training points are predicted from the others, forces and displacements. Largest errors, added up over the parameters;
-  relative to the point's own size, or a hundredth of the largest.
+  training points are predicted from the others, forces and displacements; relative to the point's own size, or a share
+  of the largest. The largest, added up over the parameters, are what training reports. An error at a value that was left
+  out is a divided difference times the product of the distances to the other values: the differences, and how they
+  decay from one order to the next, make the law of the errors between the values (condensed_estimate.c).
 */
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
@@ -9,13 +11,9 @@
 #include <hycotrainerimpl.h>
 
 #define SMALL  1e-2 /* of the largest: what smaller ones are divided by */
-#define MARGIN 1.5  /* on the displacement: the modes' part is no larger with one value less than with all */
-
-/* The modes that remain without a value, in all modes: r x l column major, orthonormal. */
-typedef struct {
-  PetscInt l;
-  PetscReal *V;
-} Kept;
+#define LAST   4    /* one of so many patterns of forces, the last, tells how those displace that are none */
+#define CUT    1.3  /* the modes' part on top of the largest in training */
+#define SHARE  0.9  /* of the divided differences along a parameter that the law's are no smaller than */
 
 typedef struct {
   PetscInt p, i;                /* parameter, number of the value that is left out */
@@ -23,7 +21,10 @@ typedef struct {
   PetscInt last;                /* node of the flexibility that M holds, and whether it is definite */
   PetscBool definite;
   PetscReal *L, *d;             /* work: forces, coefficients */
-  PetscReal force, u, u_forces; /* the errors of a point */
+  PetscReal force;              /* the error of a point's forces */
+  PetscReal law[HYCO_N_LAWS];   /* and those that make the law */
+  PetscInt n_differences;
+  PetscReal *difference[HYCO_N_LAWS]; /* along the parameter */
 } Work;
 
 static PetscReal Norm(PetscInt n, const PetscReal x[], const PetscReal minus[])
@@ -34,9 +35,9 @@ static PetscReal Norm(PetscInt n, const PetscReal x[], const PetscReal minus[])
   return PetscSqrtReal(sum);
 }
 
-static PetscReal Relative(PetscReal lost, PetscReal size, PetscReal largest)
+static PetscReal Relative(PetscReal lost, PetscReal size, PetscReal least)
 {
-  size = PetscMax(size, SMALL * largest);
+  size = PetscMax(size, least);
   return size > 0 ? lost / size : lost > 0 ? 1 : 0;
 }
 
@@ -61,9 +62,9 @@ static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The error of the displacement with these forces, by the modes and fields without that value; and H (L - own). */
-static PetscErrorCode PredictDisplacement(HycoTrainer t, HycoCondensed c, PetscInt k, const PetscReal mu[],
-                                          const Kept *kept, Work *w)
+/* The error of the displacement, of all modes, by the fields without that value; and that of H (L - own), of the forces'
+   error alone. */
+static PetscErrorCode PredictDisplacement(HycoTrainer t, HycoCondensed c, PetscInt k, const PetscReal mu[], Work *w)
 {
   const PetscInt s = c->sample[k], r = c->l, m = c->m;
   const PetscReal *own = c->Lambda + (size_t)k * (size_t)m, *u = t->responses.C + (size_t)s * (size_t)r;
@@ -75,21 +76,13 @@ static PetscErrorCode PredictDisplacement(HycoTrainer t, HycoCondensed c, PetscI
     w->d[i] = 0;
     for (PetscInt j = 0; j < m; j++) w->d[i] += h[i * m + j] * (w->L[j] - own[j]);
   }
-  w->u_forces = Relative(Norm(r, w->d, NULL), t->U_norm[s], w->largest_u);
+  w->law[HYCO_LAW_U_FULL] = Relative(Norm(r, w->d, NULL), t->U_norm[s], SMALL * w->largest_u);
   PetscCall(HycoGridFieldEvaluate(H, mu, c->stiff[w->p] ? w->p : -1, c->stiff[w->p] ? w->i : -1, c->H));
   PetscCall(HycoCondensedEvaluate(c, HYCO_FIELD_FREE, mu, w->p, w->i, c->a));
   for (PetscInt i = 0; i < r; i++) {
     for (PetscInt j = 0; j < m; j++) c->a[i] -= c->H[i * m + j] * w->L[j];
   }
-  PetscCall(PetscArrayzero(w->d, r));
-  for (PetscInt j = 0; j < kept->l; j++) {
-    const PetscReal *v = kept->V + (size_t)j * (size_t)r;
-    PetscReal dot = 0;
-
-    for (PetscInt i = 0; i < r; i++) dot += v[i] * c->a[i];
-    for (PetscInt i = 0; i < r; i++) w->d[i] += dot * v[i];
-  }
-  w->u = Relative(Norm(r, w->d, u), t->U_norm[s], w->largest_u);
+  w->law[HYCO_LAW_U] = Relative(Norm(r, c->a, u), t->U_norm[s], SMALL * w->largest_u);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -100,58 +93,52 @@ static PetscInt Along(PetscInt dim, const PetscInt n[], PetscInt p, PetscInt k)
   return k % n[p];
 }
 
-/* POD of the columns that do not stem from that value. */
-static PetscErrorCode KeepModes(HycoTrainer t, HycoCondensed c, PetscInt p, PetscInt i, Kept *kept)
-{
-  const HycoResponses *x = &t->responses;
-  const HycoTensor *G = &c->field[HYCO_FIELD_G].tensor;
-  const PetscInt r = x->r, n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), nodes = HycoTensorSize(G);
-  PetscReal *columns, *sigma;
-  const PetscScalar *v;
-  PetscInt count = 0;
-  Mat S, V;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1((size_t)r * (size_t)(n + nodes * x->q), &columns));
-  for (PetscInt k = 0; k < n; k++) {
-    if (Along(c->dim, c->n, p, k) == i) continue;
-    PetscCall(PetscArraycpy(columns + (size_t)(count++) * (size_t)r, x->C + (size_t)c->sample[k] * (size_t)r, r));
-  }
-  for (PetscInt k = 0; k < nodes; k++) {
-    if (c->stiff[p] && Along(c->dim, G->n, p, k) == i) continue;
-    PetscCall(PetscArraycpy(columns + (size_t)count * (size_t)r, x->C + (size_t)(t->n_s + k * x->q) * (size_t)r,
-                            (size_t)r * (size_t)x->q));
-    count += x->q;
-  }
-  PetscCall(PetscCalloc1(PetscMax(r, count) + 1, &sigma));
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, r, count, columns, &S));
-  PetscCall(HycoPOD(S, HycoTrainerModesTolerance(t), t->noise, t->max_modes, &V, &kept->l, sigma));
-  PetscCall(PetscMalloc1((size_t)r * (size_t)kept->l + 1, &kept->V));
-  if (kept->l) {
-    PetscCall(MatDenseGetArrayRead(V, &v));
-    PetscCall(PetscArraycpy(kept->V, v, (size_t)r * (size_t)kept->l));
-    PetscCall(MatDenseRestoreArrayRead(V, &v));
-    PetscCall(MatDestroy(&V));
-  }
-  PetscCall(MatDestroy(&S));
-  PetscCall(PetscFree(columns));
-  PetscCall(PetscFree(sigma));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Node k of the whole grid predicted without its value of parameter p. */
-static PetscErrorCode LeaveOutOne(HycoTrainer t, HycoCondensed c, PetscInt k, const PetscReal mu[], const Kept *kept,
-                                  Work *w)
+static PetscErrorCode LeaveOutOne(HycoTrainer t, HycoCondensed c, PetscInt k, const PetscReal mu[], Work *w)
 {
   const PetscReal *own = c->Lambda + (size_t)k * (size_t)c->m;
   PetscBool solved = PETSC_FALSE;
+  PetscReal lost, size;
 
   PetscFunctionBegin;
-  w->force = w->u = w->u_forces = 1;
+  w->force = 1;
+  for (PetscInt j = 0; j < HYCO_N_LAWS; j++) w->law[j] = 1;
   PetscCall(PredictForces(c, k, mu, w, &solved));
   if (!solved) PetscFunctionReturn(PETSC_SUCCESS);
-  w->force = Relative(Norm(c->m, w->L, own), Norm(c->m, own, NULL), w->largest);
-  if (c->l) PetscCall(PredictDisplacement(t, c, k, mu, kept, w));
+  lost = Norm(c->m, w->L, own);
+  size = Norm(c->m, own, NULL);
+  w->force = Relative(lost, size, SMALL * w->largest);
+  w->law[HYCO_LAW_LAMBDA] = Relative(lost, size, HYCO_SMALL_FORCE * w->largest);
+  if (c->l) PetscCall(PredictDisplacement(t, c, k, mu, w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the remainder along p vanishes at the nodes: the fields that it is of have the highest degree. */
+static PetscBool Interpolates(HycoCondensed c, PetscInt p)
+{
+  return (PetscBool)(c->field[c->stiff[p] ? HYCO_FIELD_G : HYCO_FIELD_GAP].tensor.degree[p] == c->n[p] - 1);
+}
+
+/* The law along p, from the divided differences that leaving out has found; less than three values tell no decay. */
+static PetscErrorCode FitLaw(HycoCondensed c, PetscInt p, Work *w)
+{
+  const HycoGridField *G = &c->field[HYCO_FIELD_G], *gap = &c->field[HYCO_FIELD_GAP];
+  static const PetscReal margin[HYCO_N_LAWS] = {2, 3, 3}; /* the differences between the values are not theirs */
+  PetscReal decay = 1, other = 0;
+
+  PetscFunctionBegin;
+  c->flat[p] = !Interpolates(c, p);
+  if (!c->flat[p]) {
+    PetscCall(HycoTensorDecay(&gap->tensor, p, gap->rows, gap->data, &decay));
+    if (c->stiff[p]) PetscCall(HycoTensorDecay(&G->tensor, p, G->rows, G->data, &other));
+    decay = c->stiff[p] ? other : decay;
+  }
+  for (PetscInt j = 0; j < HYCO_N_LAWS; j++) {
+    PetscReal *d = w->difference[j];
+
+    PetscCall(PetscSortReal(w->n_differences, d));
+    c->law[p * HYCO_N_LAWS + j] = c->n[p] < 3 ? -1 : margin[j] * decay * d[(PetscInt)(SHARE * (PetscReal)(w->n_differences - 1) + 0.5)];
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -160,70 +147,77 @@ static PetscErrorCode LeaveOutParameter(HycoTrainer t, HycoCondensed c, PetscInt
 {
   const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
   const PetscReal *mu;
-  PetscReal worst[3] = {0, 0, 0};
+  PetscReal worst = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, NULL, &mu));
   c->by_parameter[p] = 0;
+  for (PetscInt j = 0; j < HYCO_N_LAWS; j++) c->law[p * HYCO_N_LAWS + j] = 0;
   if (c->affine[p] || c->n[p] == 1) PetscFunctionReturn(PETSC_SUCCESS);
   w->p = p;
+  w->n_differences = 0;
   for (w->i = 0; w->i < c->n[p]; w->i++) {
-    Kept kept = {0};
+    const PetscReal product = Interpolates(c, p) ? HycoPolynomialProduct(c->n[p], c->x[p], w->i, c->x[p][w->i]) : 1;
 
     w->last = -1;
-    if (c->l) PetscCall(KeepModes(t, c, p, w->i, &kept));
     for (PetscInt k = 0; k < n; k++) {
       if (Along(c->dim, c->n, p, k) != w->i) continue;
-      PetscCall(LeaveOutOne(t, c, k, mu + c->sample[k] * c->dim, &kept, w));
-      worst[0] = PetscMax(worst[0], w->force);
-      worst[1] = PetscMax(worst[1], w->u);
-      worst[2] = PetscMax(worst[2], w->u_forces);
+      PetscCall(LeaveOutOne(t, c, k, mu + c->sample[k] * c->dim, w));
+      worst = PetscMax(worst, w->force);
+      for (PetscInt j = 0; j < HYCO_N_LAWS; j++) w->difference[j][w->n_differences] = w->law[j] / product;
+      w->n_differences++;
     }
-    PetscCall(PetscFree(kept.V));
   }
-  c->by_parameter[p] = worst[0];
-  c->errors[2] += worst[0];
-  for (PetscInt j = 0; j < 2; j++) c->errors_u[j] += worst[1 + j];
+  c->by_parameter[p] = worst;
+  c->errors[2] += worst;
+  PetscCall(FitLaw(c, p, w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What the first l modes miss of the training solutions, and the patterns of the forces between them: these displace by
-   no more than the training forces do, force by force. */
+   no more than the last patterns do, force by force. */
 static PetscReal ModesError(HycoTrainer t, HycoCondensed c, Work *w)
 {
-  const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), r = c->l, m = c->m;
-  const HycoGridField *H = &c->field[HYCO_FIELD_H];
+  const HycoResponses *x = &t->responses;
+  const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), r = c->l,
+                 nodes = HycoTensorSize(&c->field[HYCO_FIELD_G].tensor);
   PetscReal cut = 0, compliance = 0;
 
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt s = c->sample[k];
-    const PetscReal *L = c->Lambda + (size_t)k * (size_t)m, *u = t->responses.C + (size_t)s * (size_t)r,
-                    *h = H->data + (size_t)HycoCondensedNode(c, H, k) * (size_t)H->rows, force = Norm(m, L, NULL);
 
-    cut = PetscMax(cut, Relative(Norm(r - t->l, u + t->l, NULL), t->U_norm[s], w->largest_u));
-    for (PetscInt i = 0; i < r; i++) {
-      w->d[i] = 0;
-      for (PetscInt j = 0; j < m; j++) w->d[i] += h[i * m + j] * L[j];
-    }
-    if (force > 0) compliance = PetscMax(compliance, Norm(r, w->d, NULL) / force);
+    cut = PetscMax(cut, Relative(Norm(r - t->l, x->C + (size_t)s * (size_t)r + t->l, NULL), t->U_norm[s],
+                                 SMALL * w->largest_u));
   }
-  return cut + t->responses.missed * compliance;
+  for (PetscInt j = x->q - 1 - x->q / LAST; j >= 0 && j < x->q; j++) {
+    for (PetscInt k = 0; k < nodes; k++)
+      compliance = PetscMax(compliance, Norm(r, x->C + (size_t)(t->n_s + k * x->q + j) * (size_t)r, NULL) / x->scale[j]);
+  }
+  return CUT * (cut + x->missed * compliance);
 }
 
 PetscErrorCode HycoTrainerLeaveOut(HycoTrainer t)
 {
   HycoCondensed c = t->condensed;
+  const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
   Work w = {0};
 
   PetscFunctionBegin;
+  PetscCall(PetscFree(c->law));
+  PetscCall(PetscFree(c->flat));
+  PetscCall(PetscCalloc1(c->dim * HYCO_N_LAWS + 1, &c->law));
+  PetscCall(PetscCalloc1(c->dim + 1, &c->flat));
   PetscCall(PetscCalloc2(c->m, &w.L, c->l + 1, &w.d));
+  for (PetscInt j = 0; j < HYCO_N_LAWS; j++) PetscCall(PetscMalloc1(n, &w.difference[j]));
   for (PetscInt k = 0; k < t->n_s; k++) {
     w.largest = PetscMax(w.largest, Norm(c->m, t->Lambda + (size_t)k * (size_t)c->m, NULL));
     w.largest_u = PetscMax(w.largest_u, t->U_norm[k]);
   }
-  c->errors[2] = c->errors_u[0] = c->errors_u[1] = 0;
+  c->errors[2] = 0;
   for (PetscInt p = 0; p < c->dim; p++) PetscCall(LeaveOutParameter(t, c, p, &w));
-  if (c->l) c->errors_u[0] = MARGIN * (c->errors_u[0] + ModesError(t, c, &w));
+  c->cut = c->l ? ModesError(t, c, &w) : 0;
+  for (PetscInt j = 0; j < HYCO_N_LAWS; j++) c->scale[j] = 1;
+  for (PetscInt j = 0; j < HYCO_N_LAWS; j++) PetscCall(PetscFree(w.difference[j]));
   PetscCall(PetscFree2(w.L, w.d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

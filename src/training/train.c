@@ -231,6 +231,11 @@ static void Report(HycoTrainer t, HycoModel m, HycoTraining *r)
   r->dual_misfit = m->dual_misfit;
   if (m->condensed) {
     r->target_met = m->condensed->target_met;
+    r->hopeless = m->condensed->hopeless;
+    if (r->hopeless >= 0) {
+      r->hopeless_values = m->condensed->n[r->hopeless];
+      r->hopeless_error = m->condensed->by_parameter[r->hopeless];
+    }
     r->target = t->condensed_tol;
     r->most_values = t->condensed_max_values;
     r->n_flexibilities = HycoTensorSize(&m->condensed->field[HYCO_FIELD_G].tensor);

@@ -51,11 +51,13 @@ class Condensed(Case):
             last = estimate
         p = self.hyco('predict', '-model', 'p.h5', '-mu', '4.06,1', '-output', 'out.xdmf')
         self.solved(p)
-        self.assertEqual((p['interpolation_error'], p['covered_force']), (estimate, 1))
+        self.assertEqual((p['interpolation_error'], p['covered_force']), (p['estimated_error_lambda'], 1))
+        self.assertLess(p['interpolation_error'], estimate)  # of all values, and at this point
         self.train('-values_radius', '4.04,4.05,4.06', '-values_load', '0.4,1', '-model', 'narrow.h5', '-hyco_snapshots', 'p')
         inside, outside = (self.hyco('predict', '-model', 'narrow.h5', '-mu', mu)['interpolation_error']
                            for mu in ('4.055,1', '4.1,1'))
-        product = [abs((r - 4.04) * (r - 4.05) * (r - 4.06)) for r in (4.1, 4.05 + 0.01 / 3**0.5)]
+        product = [abs((r - 4.04) * (r - 4.05) * (r - 4.06)) for r in (4.1, 4.055)]
+        inside, outside = inside - 1e-10, outside - 1e-10  # the floor of every estimate
         self.near(outside / inside, product[0] / product[1], 2e-2)  # as the polynomial's remainder grows
         self.near(p['total_contact_force'], 1409.70532353, 1e-7)  # full order
         self.assertTrue(os.path.exists(self.path('out.xdmf')))
@@ -96,9 +98,9 @@ class Condensed(Case):
         c = self.hyco('compare', '-scene', PELLET, '-model', 'c.h5', '-values_radius', '4.031,4.07', '-values_load', '0.7,1')
         self.assertLess(c['error_lambda']['max'], 1e-7)
         run = self.run_raw('train', '-scene', PELLET, *TYPE, '-model', 'd.h5', '-hyco_condensed_max_values', 3)
-        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertEqual(run.returncode, 3, run.stderr)  # written, but it misses
         said = re.search(r"-hyco_condensed_tol was not reached: the forces' error, one value left out, is (\S+), and 1.0e-07 was "
-                         r'asked; raise -hyco_condensed_max_values, which is 3,', run.stdout)
+                         r'asked; raise -hyco_condensed_max_values, which is 3,', run.stderr)
         self.assertIn(f'forces {said[1]};', run.stdout)  # the estimate that is reported
         self.assertGreater(float(said[1]), 1e-7)
         self.refused('give the training points', 'train', '-scene', PELLET, '-model', 'h.h5')

@@ -20,7 +20,7 @@ class Displacements(Case):
     def setUpClass(cls):
         super().setUpClass()
         for model, tolerance in (('p.h5', 1e-10), ('fine.h5', 1e-14)):
-            cls.hyco('train', '-scene', PELLET, *TYPE, '-values_radius', RADII, '-values_load', '0.4,1', '-hyco_pod_tol', tolerance,
+            cls.hyco('train', '-scene', PELLET, *TYPE, '-values_radius', RADII, '-values_load', '0.4,1', '-hyco_condensed_pod_tol', tolerance,
                      '-model', model, '-hyco_snapshots', 'pellet')
         cls.hyco('train', '-scene', ROPE, *TYPE, '-grid', '12,12', '-grid_type', 'chebyshev', '-model', 'r.h5')
 
@@ -40,27 +40,27 @@ class Displacements(Case):
             self.assertLess(c['error_sigma_11']['mean'], 1e-4)
 
     def test_estimate(self):
-        """The estimate of u, of what was left out in training, bounds the error at 85 % of unseen points at least, as hybrid
-        models' does, and tells two models apart; of the pellet it is not larger by more than 100 in the median."""
+        """The estimate of u bounds the error at 85 % of unseen points at least, and tells two models apart; in the median it is
+        not larger by more than 10."""
         before = None
         for model, scene, points in (('p.h5', PELLET, POINTS), ('fine.h5', PELLET, POINTS), ('r.h5', ROPE, ('-grid', '17,15'))):
             self.hyco('predict', '-model', model, *points, '-table', 'e.csv')
             self.hyco('compare', '-scene', scene, '-model', model, *points, '-table', 'c.csv')
             pairs = [(e['estimated_error_u'], c['error_u']) for e, c in zip(self.table('e.csv'), self.table('c.csv'))]
             self.assertGreaterEqual(sum(e >= true for e, true in pairs) / len(pairs), 0.85, model)
+            self.assertTrue(1 <= statistics.median(e / true for e, true in pairs) <= 10, model)
             if scene == PELLET:
-                self.assertTrue(1 <= statistics.median(e / true for e, true in pairs) <= 100, model)
                 self.assertTrue(before is None or 10 * pairs[0][0] < before, 'the finer model says so')
                 before = pairs[0][0]
         self.assertIn('estimates its errors by values left out\n', self.run_raw('view', '-model', 'p.h5').stdout)
 
     def test_estimate_beyond(self):
-        """Outside the training values it grows as that of the forces does; an older file has none."""
+        """Outside the training values it grows with that of the forces; an older file has none."""
         self.hyco('train', '-scene', PELLET, *TYPE, '-values_radius', '4.04,4.05,4.06', '-values_load', '0.4,1', '-model', 'n.h5')
         inside, outside = (self.hyco('predict', '-model', 'n.h5', '-mu', mu) for mu in ('4.055,1', '4.1,1'))
         growth = outside['interpolation_error'] / inside['interpolation_error']
         self.assertGreater(growth, 10)
-        self.near(outside['estimated_error_u'], growth * inside['estimated_error_u'], 1e-9)
+        self.assertGreater(outside['estimated_error_u'], inside['estimated_error_u'])  # to which the modes' part comes
         old = self.hyco('predict', '-model', os.path.join(SOURCE, 'tests', 'data', 'rope-condensed-4.h5'), '-mu', '0.1,0.2')
         self.assertIsNone(old['estimated_error_u'])
         self.assertGreater(old['estimated_error_lambda'], 0)
