@@ -47,6 +47,15 @@ PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples);
 PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given);
 void DriverHelp(const char *command);
 
+/* -- launch.c: ranks and threads -- */
+
+/* Fails where a launcher of another MPI has started several processes, each of which would do all the work and write the
+   same files. Collective. */
+PetscErrorCode DriverCheckLaunch(void);
+/* One thread a rank for the BLAS, unless its variables, or OpenMP's, say how many. (A BLAS reads them when it is loaded,
+   before main().) */
+void DriverOneThread(void);
+
 /* -- report.c: JSON -- */
 
 /* A report with command, scene title, mu (NULL: none) and ranks. */

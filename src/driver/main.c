@@ -129,6 +129,7 @@ static int AnswerAtOnce(int argc, char **argv)
 static PetscErrorCode Run(const Command *command, int argc, char **argv)
 {
   PetscFunctionBegin;
+  PetscCall(DriverCheckLaunch());
   PetscCall(DriverCheckArguments(command, argc, argv));
   PetscCall(DriverCheckOutputs(command));
   PetscCall(command->run());
@@ -164,7 +165,7 @@ int main(int argc, char **argv)
   PetscErrorCode ierr;
 
   if (answer >= 0) return answer;
-  setenv("OPENBLAS_NUM_THREADS", "1", 0);
+  DriverOneThread();
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0); /* no daemon beside a run without mpiexec: it spawns nothing */
   if (Start(&argc, &argv)) return 1;
   PetscPushErrorHandler(KeepMessage, NULL); /* after: PETSc's books of memory (-malloc_dump) begin with it */
