@@ -81,7 +81,7 @@ static PetscErrorCode PredictDisplacement(HycoTrainer t, HycoCondensed c, PetscI
   for (PetscInt i = 0; i < r; i++) {
     for (PetscInt j = 0; j < m; j++) c->a[i] -= c->H[i * m + j] * w->L[j];
   }
-  PetscCall(PetscArrayzero(w->d, r));
+  for (PetscInt i = 0; i < r; i++) w->d[i] = 0;
   for (PetscInt j = 0; j < kept->l; j++) {
     const PetscReal *v = kept->V + (size_t)j * (size_t)r;
     PetscReal dot = 0;
