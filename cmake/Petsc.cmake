@@ -32,14 +32,24 @@ function(hyco_find_blas out)
   set(${out} ${found} PARENT_SCOPE)
 endfunction()
 
-# HDF5 without what a shared one brings itself.
-function(hyco_own_hdf5 out)
+# HDF5, by its compiler wrapper or (it takes no path with a blank) its pkg-config file; without what a shared one brings itself.
+function(hyco_find_hdf5 out includes)
+  set(HDF5_PREFER_PARALLEL ON) # PETSc's own
+  find_package(HDF5 QUIET COMPONENTS C)
+  if(NOT HDF5_FOUND)
+    pkg_search_module(HYCO_HDF5_PC REQUIRED hdf5-openmpi hdf5-mpich hdf5-mpi hdf5)
+    find_library(HYCO_HDF5_LIBRARY NAMES ${HYCO_HDF5_PC_LIBRARIES} HINTS ${HYCO_HDF5_PC_LIBRARY_DIRS} REQUIRED)
+    set(HDF5_C_LIBRARIES ${HYCO_HDF5_LIBRARY})
+    set(HDF5_INCLUDE_DIRS ${HYCO_HDF5_PC_INCLUDE_DIRS})
+  endif()
   set(found ${HDF5_C_LIBRARIES})
   list(FILTER found INCLUDE REGEX "libhdf5[^/]*\\.(so|dylib)$")
   if(NOT found)
     set(found ${HDF5_C_LIBRARIES})
   endif()
+  message(STATUS "HDF5: ${found}")
   set(${out} ${found} PARENT_SCOPE)
+  set(${includes} ${HDF5_INCLUDE_DIRS} PARENT_SCOPE)
 endfunction()
 
 # The path of a shared library by the name that a program linked with it would look for: libx.so -> libx.so.4.8

@@ -65,6 +65,14 @@ PetscErrorCode DriverMissed(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 
 void DriverReportMissed(cJSON *json);
 /* The exit status of a run that ended with `ierr`; to be called once, at the end. */
 int DriverEndStatus(PetscErrorCode ierr);
+/* -- launch.c: ranks and threads -- */
+
+/* Fails where a launcher of another MPI has started several processes, each of which would do all the work and write the
+   same files. Collective. */
+PetscErrorCode DriverCheckLaunch(void);
+/* One thread a rank for the BLAS, unless its variables, or OpenMP's, say how many. (A BLAS reads them when it is loaded,
+   before main().) */
+void DriverOneThread(void);
 
 /* -- report.c: JSON -- */
 

@@ -129,6 +129,7 @@ static int AnswerAtOnce(int argc, char **argv)
 static PetscErrorCode Run(const Command *command, int argc, char **argv)
 {
   PetscFunctionBegin;
+  PetscCall(DriverCheckLaunch());
   PetscCall(DriverCheckArguments(command, argc, argv));
   PetscCall(DriverCheckOutputs(command));
   PetscCall(command->run());
@@ -178,7 +179,7 @@ int main(int argc, char **argv)
   int status;
 
   if (answer >= 0) return answer;
-  setenv("OPENBLAS_NUM_THREADS", "1", 0);
+  DriverOneThread();
   StartAlone();
   if (Start(&argc, &argv)) return 1;
   PetscPushErrorHandler(KeepMessage, NULL); /* after: PETSc's books of memory (-malloc_dump) begin with it */

@@ -41,9 +41,9 @@ static PetscErrorCode UnknownKey(const char key[], const char what[], const char
   PetscInt n = 0;
 
   PetscFunctionBegin;
-  while (fields[n]) {
-    PetscCall(PetscStrlcat(list, n ? ", " : "", sizeof(list)));
-    PetscCall(PetscStrlcat(list, fields[n++], sizeof(list)));
+  for (size_t at = 0; fields[n]; n++) {
+    at = PetscMin(at, sizeof(list) - 1);
+    at += (size_t)snprintf(list + at, sizeof(list) - at, "%s%s", n ? ", " : "", fields[n]);
   }
   if (last) near = HycoNearest(last + 1, n, fields);
   if (near) HycoFail("the scene's entry %s is unknown; %s has: %s; did you mean %s?", key, what, list, near);

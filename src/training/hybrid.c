@@ -294,7 +294,7 @@ static PetscErrorCode SearchFrom(HycoTrainer t, HycoModel m, PetscInt start, Pet
 static PetscErrorCode ChooseRank(HycoTrainer t, HycoModel m, Verdict *best)
 {
   const PetscInt room = m->pairs.n, starts = (PetscReal)t->n_s * (PetscReal)m->l < 1e4 ? 5 : 1;
-  PetscInt n = 0, other, *dof, *rival;
+  PetscInt n = 0, other = 0, *dof, *rival;
   Verdict verdict;
 
   PetscFunctionBegin;

@@ -273,6 +273,7 @@ class Files(Case):
                 f.write(good)
         ROWS.add('snapshots or a flexibility of another scene in the folder; a model of another', 'refused')
 
+    @unittest.skipUnless(shutil.which('strace'), 'there is no strace (scripts/setup test)')
     def test_writes_only_what_is_named(self):
         """Every file that a run opens for writing is one that the user named, or Open MPI's own in TMPDIR; FLTK, the toolkit
         inside gmsh's library, makes a folder for preferences as well, ~/.fltk, and as root in /etc (docs/limits.md)."""

@@ -10,7 +10,7 @@ import subprocess
 import time
 import unittest
 
-from common import HYCO, MPIEXEC, PATIENCE, ROPE, Case
+from common import HYCO, MPIRUN, PATIENCE, ROPE, Case
 from rows import Rows
 
 TRAIN = ['train', '-scene', ROPE, '-grid', '12,12', '-model', 'm.h5']
@@ -40,7 +40,7 @@ class Kill(Case):
             shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
 
     def command(self, ranks, train):
-        return ([MPIEXEC, '--oversubscribe', '-n', str(ranks)] if ranks > 1 else []) + [HYCO, *train]
+        return ([*MPIRUN, str(ranks)] if ranks > 1 else []) + [HYCO, *train]
 
     def content(self, name='m.h5'):
         with open(self.path(name), 'rb') as f:

@@ -4,13 +4,12 @@ import subprocess
 import unittest
 from concurrent.futures import ThreadPoolExecutor
 
-from common import Case, msh
+from common import Case, msh, said
 from rows import Rows
 
 # two squares of 2 x 2 cells, one over the other; groups by tag
 NAMES = {1: (2, 'low'), 2: (2, 'up'), 3: (1, 'floor'), 4: (1, 'top'), 5: (1, 'under'), 6: (1, 'over')}
 ROWS = Rows('meshes')
-MPI_NOISE = ('mpiexec', '-----', 'Primary job', 'a non-zero exit code', 'the job to be', 'Process name', 'Exit code')
 SCENE = '''scene:
   mesh: two.msh
   parameters: [load]
@@ -261,12 +260,12 @@ class Meshes(Case):
                             *(['-scene_mesh', mesh] if mesh else []), ranks=ranks, timeout=30)
 
     def one_line(self, run, text):
-        said = [line for line in run.stderr.splitlines() if line.strip() and not any(n in line for n in MPI_NOISE)]
+        lines = said(run)
         self.assertEqual(run.returncode, 1, run.stderr)
-        self.assertEqual(len(said), 1, run.stderr)
-        self.assertTrue(said[0].startswith('hyco: error: '), said[0])
-        self.assertNotIn('internal error', said[0])
-        self.assertIn(text, said[0])
+        self.assertEqual(len(lines), 1, run.stderr)
+        self.assertTrue(lines[0].startswith('hyco: error: '), lines[0])
+        self.assertNotIn('internal error', lines[0])
+        self.assertIn(text, lines[0])
 
     def all_one_line(self, runs):
         """Runs of (what, ranks, arguments, expected text), some at a time: starting ranks is mostly waiting."""

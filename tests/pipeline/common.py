@@ -9,10 +9,16 @@ import unittest
 HYCO = os.environ['HYCO']
 SOURCE = os.environ['HYCO_SOURCE']
 MPIEXEC = os.environ.get('MPIEXEC', 'mpiexec')
+MPIRUN = [MPIEXEC, *os.environ.get('MPIEXEC_FLAGS', '--oversubscribe').split(), '-n']  # and the number of ranks
 ROPE = os.path.join(SOURCE, 'examples', 'rope')
 PELLET = os.path.join(SOURCE, 'examples', 'pellet')
 SANITIZED = os.environ.get('HYCO_SANITIZE') == '1'
 PATIENCE = 10 if SANITIZED else 1  # factor of a run's limit of time; tests/CMakeLists.txt has the same for a test
+
+
+def said(run):
+    """What hyco or PETSc said on stderr, by line, progress apart; launchers have words of their own, in each version others."""
+    return [line for line in run.stderr.splitlines() if line.startswith('hyco: ') or 'PETSC ERROR' in line]
 
 
 class Case(unittest.TestCase):
@@ -35,7 +41,7 @@ class Case(unittest.TestCase):
         """The finished process; ranks 0: without mpiexec."""
         command = [HYCO, *(str(a) for a in args)]
         if ranks:
-            command = [MPIEXEC, '--oversubscribe', '-n', str(ranks), *command]
+            command = [*MPIRUN, str(ranks), *command]
         run = subprocess.run(command, cwd=cwd or cls.folder, timeout=timeout * PATIENCE, capture_output=True, text=True)
         if SANITIZED and ': runtime error: ' in run.stderr:
             raise AssertionError(run.stderr)

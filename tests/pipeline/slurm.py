@@ -2,12 +2,13 @@
 import glob
 import json
 import os
+import shlex
 import signal
 import subprocess
 import time
 import unittest
 
-from common import MPIEXEC, PATIENCE, PELLET, ROPE, SOURCE, Case
+from common import MPIRUN, PATIENCE, PELLET, ROPE, SOURCE, Case
 
 SCRIPT = os.path.join(SOURCE, 'scripts', 'hyco.sbatch')
 LONG = ('-scene', PELLET, '-values_radius', '4.02,4.03,4.04,4.05,4.07,4.08,4.09,4.1', '-values_load', '0.2,0.4,0.6,0.8,1')
@@ -22,7 +23,8 @@ while :; do
     *) break ;;
   esac
 done
-exec {MPIEXEC} --oversubscribe -n "$n" "$@"
+for v in $(env | sed -n 's/^\(SLURM_[A-Z_]*\)=.*/\1/p'); do unset "$v"; done # Open MPI would ask Slurm
+exec {shlex.join(MPIRUN)} "$n" "$@"
 '''
 SCONTROL = '#!/bin/sh\necho "$*" >>"$NOTES/scontrol"\n'
 

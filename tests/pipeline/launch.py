@@ -1,0 +1,58 @@
+"""How ranks are started: a launcher of another MPI is refused; no library of gmsh's where a model is all there is."""
+import os
+import subprocess
+import unittest
+
+from common import HYCO, ROPE, SOURCE, Case, said
+
+MODEL = os.path.join(SOURCE, 'tests', 'data', 'rope-hybrid-4-table.h5')
+MU = ('-mu', '0.07,0.17')
+
+
+class Launch(Case):
+    def start(self, *args, **environment):
+        return subprocess.run([HYCO, *args], cwd=self.folder, env={**os.environ, **environment}, capture_output=True, text=True, timeout=60)
+
+    def test_another_mpi(self):
+        """Each of its processes would be alone and write the same files."""
+        for name, value in (('PMI_SIZE', '2'), ('PMIX_RANK', '1'), ('SLURM_STEP_NUM_TASKS', '4'), ('OMPI_COMM_WORLD_SIZE', '3')):
+            with self.subTest(name=name):
+                run = self.start('predict', '-model', MODEL, *MU, '-report', 'r.json', **{name: value})
+                lines = said(run)
+                self.assertEqual((run.returncode, len(lines)), (1, 1), run.stderr)
+                self.assertIn(name, lines[0])
+                self.assertEqual(os.listdir(self.folder), [])
+
+    def test_one_rank(self):
+        """A job of several ranks may start hyco alone: in a batch script of Slurm only SLURM_NTASKS says how many it has."""
+        for name, value in (('PMI_SIZE', '1'), ('SLURM_NTASKS', '8'), ('SLURM_STEP_NUM_TASKS', '1')):
+            with self.subTest(name=name):
+                self.assertEqual(self.start('view', '-model', MODEL, **{name: value}).returncode, 0)
+
+    def loaded(self, *args):
+        """The libraries that a run has loaded."""
+        run = self.start(*args, LD_DEBUG='files')
+        self.assertEqual(run.returncode, 0)
+        return {line.split('calling init:')[1].strip() for line in run.stderr.splitlines() if 'calling init:' in line}
+
+    @unittest.skipIf(os.environ.get('HYCO_SANITIZE') == '1', 'sanitizers come first')
+    def test_gmsh(self):
+        """libgmsh, with OpenCASCADE and FLTK, is loaded by what reads a mesh alone."""
+        for args, reads in ((('view', '-model', MODEL), False), (('predict', '-model', MODEL, *MU, '-output', 'p.xdmf'), False),
+                            (('solve', '-scene', ROPE, *MU), True)):
+            with self.subTest(command=args[0]):
+                names = self.loaded(*args)
+                self.assertEqual(any('libgmsh' in name for name in names), reads)
+                self.assertEqual(any('libTKernel' in name or 'libfltk' in name for name in names) and not reads, False)
+
+    @unittest.skipIf(os.environ.get('HYCO_SANITIZE') == '1', 'sanitizers come first')
+    def test_one_blas(self):
+        """PETSc's, and no second one."""
+        names = {os.path.basename(name).split('.so')[0] for name in self.loaded('view', '-model', MODEL)}
+        self.assertLessEqual(len(names & {'libopenblas', 'libmkl_rt', 'libflexiblas', 'libblis'}), 1)
+        paths = {name for name in self.loaded('view', '-model', MODEL) if 'openblas' in os.path.basename(name)}
+        self.assertLessEqual(len(paths), 1)
+
+
+if __name__ == '__main__':
+    unittest.main()

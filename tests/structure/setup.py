@@ -1,0 +1,50 @@
+"""scripts/setup without the right to install: it names what is missing and the line that installs it, and goes on where only
+tests or pictures want it. Debian's tools are stand-ins."""
+import os
+import subprocess
+import tempfile
+import unittest
+
+SETUP = os.path.join(os.environ['HYCO_SOURCE'], 'scripts', 'setup')
+TOOLS = {
+    'id': 'echo 1000',
+    'sudo': 'exit 1',
+    'apt-get': 'echo "apt-get $*" >>"$CALLED"',
+    'apt-cache': 'exit 1',
+    'update-alternatives': 'exit 1',
+    'dpkg-architecture': 'echo none',
+    'dpkg-query': 'for p; do :; done; case " $MISSING " in *" $p "*) echo "unknown ok not-installed" ;; *) echo "install ok installed" ;; esac',
+}
+
+
+class Setup(unittest.TestCase):
+    def run_setup(self, missing, *args):
+        """Status, what it said, whether apt-get was called."""
+        with tempfile.TemporaryDirectory() as folder:
+            for name, text in TOOLS.items():
+                path = os.path.join(folder, name)
+                with open(path, 'w', encoding='ascii') as file:
+                    file.write(f'#!/bin/sh\n{text}\n')
+                os.chmod(path, 0o755)
+            called = os.path.join(folder, 'called')
+            run = subprocess.run(['sh', SETUP, *args], capture_output=True, text=True, timeout=60, check=False, stdin=subprocess.DEVNULL,
+                                 env={**os.environ, 'PATH': folder + ':' + os.environ['PATH'], 'MISSING': missing, 'CALLED': called})
+            return run.returncode, run.stdout + run.stderr, os.path.exists(called)
+
+    def test_missing(self):
+        for missing, status in (('', 0), ('python3-matplotlib', 0), ('strace', 0), ('libpetsc-real-dev', 1), ('openmpi-bin strace', 1)):
+            with self.subTest(missing=missing):
+                code, text, called = self.run_setup(missing)
+                self.assertEqual((code, called), (status, False), text)
+                for name in missing.split():
+                    self.assertRegex(text, rf'apt-get install --no-install-recommends.* {name}\b')
+
+    def test_groups(self):
+        self.assertEqual(self.run_setup('strace python3-matplotlib', 'run', 'build'), (0, '', False))
+        code, text, _ = self.run_setup('', 'tests')
+        self.assertEqual(code, 2)
+        self.assertIn('"tests" is neither --blas nor a group', text)
+
+
+if __name__ == '__main__':
+    unittest.main()
