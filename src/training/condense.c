@@ -249,7 +249,7 @@ static PetscErrorCode CheckFacets(HycoTrainer t)
   for (PetscInt r = 1; r < met.rows.n; r++) {
     const HycoPairs *p = &met.rows;
 
-    HycoCheck(met.of[r] != met.of[r - 1],
+    HycoCheckModel(met.of[r] != met.of[r - 1],
               "contact %s: node %d meets other facets of %s as the parameters move it; a condensed model interpolates "
               "over the parameters what has kinks there: train a hybrid one",
               t->scene->contact[p->contact[r]].name, (int)t->whole->node_id[p->slave[r]],

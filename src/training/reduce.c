@@ -222,7 +222,7 @@ static PetscErrorCode TakeDisplacements(HycoTrainer t)
 
   PetscFunctionBegin;
   PetscCall(CutBasis(t, HYCO_SEED_DISPLACEMENT, &V, &t->l));
-  HycoCheck(t->l, "-hyco_pod_tol %g leaves no mode; give less", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+  HycoCheckModel(t->l, "-hyco_pod_tol %g leaves no mode; give less", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
   PetscCall(PetscMalloc1(t->n_s + 1, &t->sigma));
   PetscCall(PetscArraycpy(t->sigma, basis->sigma, t->n_s + 1));
   PetscCall(SeedFrom(t, V, t->l, HYCO_SEED_DISPLACEMENT, t->sizes[3], &t->n_seeds_node, &t->seeds_node));

@@ -199,6 +199,7 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
   a->number = ++s->n;
   a->recipe = *recipe;
   a->ratio = PETSC_INFINITY;
+  PetscCall(HycoSamplesGet(t->held, &a->held_out.n, NULL, NULL));
   SetRecipe(t, recipe);
   PetscCall(HycoCatchBegin());
   ierr = Build(t, s->store, s->file, &report);
