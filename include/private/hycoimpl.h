@@ -142,6 +142,15 @@ void HycoSealMake(const void *data, size_t bytes, unsigned char seal[HYCO_SEAL])
 /* Size of a file, and whether it has a seal; fails when it has one and its bytes are not the sealed ones. */
 PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed);
 
+/* A number with a decimal point, whatever the locale of the calling program; as strtod. */
+double HycoNumber(const char text[], char **end);
+/* Between the two, this thread reads and writes numbers with a decimal point. */
+void *HycoPointBegin(void);
+void HycoPointEnd(void *before);
+
+/* Makes BLAS take its memory once, or fails: where OpenBLAS finds none, it looks for ever. On this process alone. */
+PetscErrorCode HycoReserveBLAS(void);
+
 /* Seconds since the first call, on this rank's clock. */
 PetscReal HycoNow(void);
 

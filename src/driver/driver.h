@@ -66,6 +66,12 @@ void DriverReportMissed(cJSON *json);
 /* The exit status of a run that ended with `ierr`; to be called once, at the end. */
 int DriverEndStatus(PetscErrorCode ierr);
 
+/* -- sources.c -- */
+
+/* "options_from" in the report: what PETSC_OPTIONS, the files .petscrc and -options_file say, by name; nothing if none
+   says anything. On this process alone. */
+PetscErrorCode DriverReportSources(cJSON *json);
+
 /* -- report.c: JSON -- */
 
 /* A report with command, scene title, mu (NULL: none) and ranks. */

@@ -602,14 +602,17 @@ PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
   HycoMesh m;
   PetscErrorCode ierr;
   int gerr;
+  void *before;
 
   PetscFunctionBegin;
   PetscCall(CheckPath(scene));
   PetscCall(PetscNew(&m));
+  before = HycoPointBegin();
   gmshInitialize(0, NULL, 0, &gerr);
-  PetscCall(CheckGmsh(gerr, scene->mesh_path));
-  ierr = ReadOpen(scene, &r, m);
+  ierr = CheckGmsh(gerr, scene->mesh_path);
+  if (!ierr) ierr = ReadOpen(scene, &r, m);
   gmshFinalize(&gerr);
+  HycoPointEnd(before);
   for (PetscInt k = 0; k < r.n_groups; k++) {
     PetscCall(PetscFree(r.group[k].id));
     PetscCall(PetscFree(r.group[k].node));
