@@ -41,7 +41,7 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
       caught_ = (call);                                                                                                \
       PetscCall(HycoCatchEnd(caught_, message_));                                                                      \
     }                                                                                                                  \
-    PetscCall(HycoAgree((comm), caught_, message_));                                                                            \
+    PetscCall(HycoAgree((comm), caught_, message_));                                                                   \
   } while (0)
 
 /* Runs `call`, which may differ from rank to rank, on every rank; an error on any becomes the error of all. Collective.
@@ -53,7 +53,7 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
     PetscCall(HycoCatchBegin());                                                                                       \
     caught_ = (call);                                                                                                  \
     PetscCall(HycoCatchEnd(caught_, message_));                                                                        \
-    PetscCall(HycoAgree((comm), caught_, message_));                                                                            \
+    PetscCall(HycoAgree((comm), caught_, message_));                                                                   \
   } while (0)
 
 /* Text as C's printf makes it, cut at HYCO_LINE. */

@@ -5,6 +5,7 @@
 #include <hycomesh.h>
 #include "msh.h"
 #include <gmshc.h>
+#include <locale.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -602,17 +603,20 @@ PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
   HycoMesh m;
   PetscErrorCode ierr;
   int gerr;
+  char locale[HYCO_LINE];
   void *before;
 
   PetscFunctionBegin;
   PetscCall(CheckPath(scene));
   PetscCall(PetscNew(&m));
+  snprintf(locale, sizeof(locale), "%s", setlocale(LC_ALL, NULL)); /* gmsh sets one for the whole program */
   before = HycoPointBegin();
   gmshInitialize(0, NULL, 0, &gerr);
   ierr = CheckGmsh(gerr, scene->mesh_path);
   if (!ierr) ierr = ReadOpen(scene, &r, m);
   gmshFinalize(&gerr);
   HycoPointEnd(before);
+  (void)setlocale(LC_ALL, locale);
   for (PetscInt k = 0; k < r.n_groups; k++) {
     PetscCall(PetscFree(r.group[k].id));
     PetscCall(PetscFree(r.group[k].node));

@@ -1,6 +1,6 @@
 /*
-  A key that stands twice in a YAML file: PETSc takes the last in silence. The file has been read as YAML by then, so what
-  is scanned here is well formed: block and flow mappings, quoted and plain scalars, block scalars, lists, comments.
+  A key that stands twice in a YAML file: PETSc takes the last in silence. The file has been read as YAML by then,
+  so what is scanned here is well formed: block and flow mappings, scalars (quoted, plain, block), lists, comments.
 */
 #include "entries.h"
 #include <stdlib.h>
@@ -157,7 +157,7 @@ static PetscErrorCode ScanAll(Scan *s, const char file[])
 
     if (strchr(" \t\r\n,", *s->at))
       Advance(s);
-    else if (*s->at == '#' || (first && (*s->at == '%' || strncmp(s->at, "---", 3) == 0 || strncmp(s->at, "...", 3) == 0)))
+    else if (*s->at == '#' || (first && (*s->at == '%' || strncmp(s->at, "---", 3) == 0)))
       SkipLine(s);
     else if (strchr("{}[]", *s->at))
       PetscCall(TakeBrace(s));
