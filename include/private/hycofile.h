@@ -1,9 +1,9 @@
 /*
   Files that are written whole or not at all, and the temporary names that this takes.
 
-  A file is written beside its place under the name PATH.hyco-NODE-PID-NUMBER.KIND and renamed: NODE stands for the machine
-  and its space of process ids, so that no two processes share a name. What a killed process left is told by its name,
-  and removed by the next run that writes there.
+  A file is written beside its place under the name PATH.hyco-NODE-PID-NUMBER.KIND and renamed: NODE stands for the
+  machine and its space of process ids, so that no two processes share a name. What a killed process left is told by its
+  name, and removed by the next run that writes there.
 */
 #ifndef HYCOFILE_H
 #define HYCOFILE_H

@@ -37,7 +37,7 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
       caught_ = (call);                                                                                                \
       PetscCall(HycoCatchEnd(caught_, message_));                                                                      \
     }                                                                                                                  \
-    PetscCall(HycoAgree((comm), caught_, message_));                                                                            \
+    PetscCall(HycoAgree((comm), caught_, message_));                                                                   \
   } while (0)
 
 /* Runs `call`, which may differ from rank to rank, on every rank; an error on any becomes the error of all. Collective.
@@ -49,7 +49,7 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
     PetscCall(HycoCatchBegin());                                                                                       \
     caught_ = (call);                                                                                                  \
     PetscCall(HycoCatchEnd(caught_, message_));                                                                        \
-    PetscCall(HycoAgree((comm), caught_, message_));                                                                            \
+    PetscCall(HycoAgree((comm), caught_, message_));                                                                   \
   } while (0)
 
 /* Text as C's printf makes it, cut at HYCO_LINE. */
@@ -137,6 +137,15 @@ PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin);
 void HycoSealMake(const void *data, size_t bytes, unsigned char seal[HYCO_SEAL]);
 /* Size of a file, and whether it has a seal; fails when it has one and its bytes are not the sealed ones. */
 PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed);
+
+/* A number with a decimal point, whatever the locale of the calling program; as strtod. */
+double HycoNumber(const char text[], char **end);
+/* Between the two, this thread reads and writes numbers with a decimal point. */
+void *HycoPointBegin(void);
+void HycoPointEnd(void *before);
+
+/* Makes BLAS take its memory once, or fails: where OpenBLAS finds none, it looks for ever. On this process alone. */
+PetscErrorCode HycoReserveBLAS(void);
 
 /* Seconds since the first call, on this rank's clock. */
 PetscReal HycoNow(void);

@@ -21,11 +21,13 @@ static PetscErrorCode CatchHandler(MPI_Comm comm, int line, const char *function
 
 void HycoFormat(char line[HYCO_LINE], const char format[], ...)
 {
+  void *before = HycoPointBegin();
   va_list args;
 
   va_start(args, format);
   vsnprintf(line, HYCO_LINE, format, args);
   va_end(args);
+  HycoPointEnd(before);
 }
 
 PetscErrorCode HycoCatchBegin(void)

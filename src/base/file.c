@@ -154,7 +154,8 @@ PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFi
   HycoFileFollow(path, place);
   *direct = (PetscBool)(!S_ISREG(info.st_mode) || strncmp(place, "/proc/", 6) == 0);
   HycoCheck(!*direct || kind == HYCO_FILE_TEXT,
-            "%s%s%s%s is a device or a pipe, and HDF5 writes files; give the name of a file", dash, option, blank, path);
+            "%s%s%s%s is a device or a pipe, and HDF5 writes files; give the name of a file", dash, option, blank,
+            path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -154,7 +154,7 @@ PetscErrorCode HycoOptionsReal(PetscOptions options, const char name[], PetscRea
   PetscFunctionBegin;
   PetscCall(GetText(options, name, text, &set));
   if (!set) PetscFunctionReturn(PETSC_SUCCESS);
-  number = strtod(text, &end);
+  number = HycoNumber(text, &end);
   if (end == text || *end != '\0' || !(number >= lo && number <= hi)) {
     HycoFail("-%s is \"%s\"; it must be a number from %g to %g", name, text, (double)lo, (double)hi);
   }

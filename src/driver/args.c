@@ -209,6 +209,10 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
           argv[k]);
     if (!TakesOption(command, name) && !HycoOptionKnown(name) && !IsForeign(name) &&
         !(IsSceneEntry(name) && TakesOption(command, "scene"))) {
+      HycoCheck(k < 3 || !IsKey(argv[k - 1]) || !IsSceneEntry(argv[k - 1] + 1),
+                "%s stands where %s expects its value, and reads as an option: a value that begins with a dash and a "
+                "letter takes a blank first, %s \" %s\", or stands in scene.yaml",
+                argv[k], argv[k - 1], argv[k - 1], argv[k]);
       PetscCall(Unknown(command, name));
     }
     PetscCall(CheckCommand(command, name));

@@ -74,6 +74,12 @@ PetscErrorCode DriverCheckLaunch(void);
    before main().) */
 void DriverOneThread(void);
 
+/* -- sources.c -- */
+
+/* "options_from" in the report: what PETSC_OPTIONS, the files .petscrc and -options_file say, by name; nothing if none
+   says anything. On this process alone. */
+PetscErrorCode DriverReportSources(cJSON *json);
+
 /* -- report.c: JSON -- */
 
 /* A report with command, scene title, mu (NULL: none) and ranks. */

@@ -159,8 +159,9 @@ static PetscErrorCode Start(int *argc, char ***argv)
   return ierr;
 }
 
-/* A run without mpiexec needs no daemon beside it, for it spawns nothing, and no folder for that daemon's files: Open MPI 4
-   gives all such runs of a user the same one, and each removes it under the others. Other MPIs do not read these. */
+/* A run without mpiexec needs no daemon beside it, for it spawns nothing, and no folder for that daemon's files: Open
+   MPI 4 gives all such runs of a user the same one, and each removes it under the others. Other MPIs do not read these.
+ */
 static void StartAlone(void)
 {
   static const char *const launched[] = {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_ID"};

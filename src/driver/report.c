@@ -23,6 +23,7 @@ PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscRe
   point = cJSON_AddObjectToObject(*json, "mu");
   for (PetscInt p = 0; mu && p < n; p++) cJSON_AddNumberToObject(point, names[p], mu[p]);
   cJSON_AddNumberToObject(*json, "ranks", size);
+  PetscCall(DriverReportSources(*json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

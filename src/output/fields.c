@@ -42,8 +42,28 @@ static PetscErrorCode WriteNumbers(HycoH5 h, HycoMesh m, const PetscReal X[], Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void WriteXDMF(FILE *out, const char h5[], HycoMesh m, PetscInt n, const HycoField field[])
+/* A name as XML has it. */
+static void EscapeXML(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
 {
+  static const char special[] = "&<>\"'";
+  static const char *const entity[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&apos;"};
+
+  for (; *name; name++) {
+    const char *at = strchr(special, *name);
+
+    if (at)
+      out += sprintf(out, "%s", entity[at - special]);
+    else
+      *out++ = *name;
+  }
+  *out = '\0';
+}
+
+static void WriteXDMF(FILE *out, const char file[], HycoMesh m, PetscInt n, const HycoField field[])
+{
+  char h5[6 * PETSC_MAX_PATH_LEN];
+
+  EscapeXML(file, h5);
   fprintf(out, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n  <Grid Name=\"mesh\">\n");
   fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", topology[m->type], (long)m->n_cells,
           m->type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");

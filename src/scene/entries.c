@@ -164,6 +164,29 @@ static PetscBool IsText(const char file[])
   return (PetscBool)(byte == EOF);
 }
 
+static PetscErrorCode CheckTwice(const char file[])
+{
+  FILE *f = fopen(file, "rb");
+  long size = f && fseek(f, 0, SEEK_END) == 0 ? ftell(f) : 0;
+  char *text;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (size <= 0) {
+    if (f) fclose(f);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  rewind(f);
+  ierr = PetscCalloc1((size_t)size + 1, &text);
+  if (!ierr) text[fread(text, 1, (size_t)size, f)] = '\0';
+  fclose(f);
+  PetscCall(ierr);
+  ierr = HycoEntriesCheckTwice(text, file);
+  PetscCall(PetscFree(text));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
 {
   char message[HYCO_LINE];
@@ -174,7 +197,12 @@ static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
   PetscCall(HycoCatchBegin());
   caught = PetscOptionsInsertFileYAML(PETSC_COMM_SELF, options, file, PETSC_TRUE);
   PetscCall(HycoCatchEnd(caught, message));
+  HycoCheck(!caught || !strstr(message, "max number of options"),
+            "%s has more entries than the 512 that this PETSc (%d.%d) keeps; put what is alike into one expression, or "
+            "take a newer PETSc",
+            file, PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR);
   HycoCheck(!caught, "%s is not YAML that hyco reads: %s", file, message);
+  PetscCall(CheckTwice(file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -8,6 +8,8 @@ PetscBool HycoIsSceneKey(const char name[]);
 /* Reads the scene's file into `*options`, the command line's entries over it. Collective. */
 PetscErrorCode HycoEntriesRead(MPI_Comm comm, const char path[], PetscOptions *options,
                                char folder[PETSC_MAX_PATH_LEN]);
+/* Fails where a key stands twice in `text`, which is YAML; `file` names it in the message. */
+PetscErrorCode HycoEntriesCheckTwice(const char text[], const char file[]);
 /* Copies the global database's entries into `options`; method_only: those named hyco_ alone. */
 PetscErrorCode HycoEntriesOverride(PetscOptions options, PetscBool method_only);
 /* Fills scene->key, value from scene->options, sorted by key. */

@@ -31,14 +31,25 @@ static void Quiet(muParserHandle_t parser)
   (void)parser;
 }
 
+/* Of a long expression, its two ends: a message must have room for the reason. */
+#define SHORT 260
+static void Shorten(const char text[], char out[SHORT])
+{
+  const size_t n = strlen(text);
+
+  if (n < SHORT)
+    snprintf(out, SHORT, "%s", text);
+  else
+    snprintf(out, SHORT, "%.120s ... %s", text, text + n - 120);
+}
+
 static PetscErrorCode Raise(HycoExpr e)
 {
-  char line[HYCO_LINE];
+  char text[SHORT];
 
   PetscFunctionBegin;
-  PetscCall(
-      PetscSNPrintf(line, sizeof(line), "%s: \"%s\" is no expression: %s", e->key, e->text, mupGetErrorMsg(e->parser)));
-  HycoFail("%s", line);
+  Shorten(e->text, text);
+  HycoFail("%s: \"%s\" is no expression: %.300s", e->key, text, mupGetErrorMsg(e->parser));
 }
 
 static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const names[])
@@ -57,13 +68,14 @@ static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const na
     } else if (address >= e->mu && address < e->mu + n) {
       e->in_mu[address - e->mu] = PETSC_TRUE;
     } else {
-      char list[HYCO_LINE] = "x, y, z";
+      char list[HYCO_LINE] = "x, y, z", text[SHORT];
 
       for (PetscInt p = 0; p < n; p++) {
         PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
         PetscCall(PetscStrlcat(list, names[p], sizeof(list)));
       }
-      HycoFail("%s: \"%s\" names %s, which is unknown; known are %s, pi", e->key, e->text, name, list);
+      Shorten(e->text, text);
+      HycoFail("%s: \"%s\" names %.100s, which is unknown; known are %s, pi", e->key, text, name, list);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -76,7 +88,7 @@ static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
 
   PetscFunctionBegin;
   e->n_parameters = n;
-  e->constant = strtod(e->text, &end);
+  e->constant = HycoNumber(e->text, &end);
   while (*end == ' ') end++;
   if (end != e->text && *end == '\0' && strpbrk(e->text, "0123456789")) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(e->text[strspn(e->text, " \t")] != '\0', "%s is empty; give a number or an expression", e->key);
@@ -146,10 +158,11 @@ PetscErrorCode HycoExprEval(HycoExpr e, const PetscReal mu[], PetscInt n, const 
   }
   for (PetscInt k = 0; k < n; k++) {
     if (PetscIsInfOrNanReal(value[k])) {
-      char place[HYCO_LINE];
+      char place[HYCO_LINE], text[SHORT];
 
       PetscCall(HycoExprPlace(e, mu, xyz + 3 * k, place));
-      HycoFail("%s: \"%s\" is not finite at %s", e->key, e->text, place);
+      Shorten(e->text, text);
+      HycoFail("%s: \"%s\" is not finite at %s", e->key, text, place);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -5,6 +5,7 @@
 #include <hycomesh.h>
 #include "libgmsh.h"
 #include "msh.h"
+#include <locale.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -604,15 +605,21 @@ PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
   HycoMesh m;
   PetscErrorCode ierr;
   int gerr;
+  char locale[HYCO_LINE];
+  void *before;
 
   PetscFunctionBegin;
   PetscCall(CheckPath(scene));
   PetscCall(HycoGmshLoad(&gmsh));
   PetscCall(PetscNew(&m));
+  snprintf(locale, sizeof(locale), "%s", setlocale(LC_ALL, NULL)); /* gmsh sets one for the whole program */
+  before = HycoPointBegin();
   HycoGmshInitialize(gmsh->gmshInitialize, &gerr);
-  PetscCall(CheckGmsh(gerr, scene->mesh_path));
-  ierr = ReadOpen(scene, &r, m);
+  ierr = CheckGmsh(gerr, scene->mesh_path);
+  if (!ierr) ierr = ReadOpen(scene, &r, m);
   gmsh->gmshFinalize(&gerr);
+  HycoPointEnd(before);
+  (void)setlocale(LC_ALL, locale);
   for (PetscInt k = 0; k < r.n_groups; k++) {
     PetscCall(PetscFree(r.group[k].id));
     PetscCall(PetscFree(r.group[k].node));

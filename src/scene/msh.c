@@ -65,7 +65,7 @@ static double ReadDouble(Msh *m)
   } else {
     char *end;
 
-    value = strtod(m->at, &end);
+    value = HycoNumber(m->at, &end);
     m->failed = (PetscBool)(end == m->at);
     m->at = end;
   }
@@ -408,7 +408,7 @@ static PetscErrorCode CheckFormat(Msh *m)
   PetscFunctionBegin;
   line = line && strncmp(line, "$MeshFormat", 11) == 0 ? NextLine(m) : NULL;
   HycoCheck(line, "%s is no gmsh mesh: it does not begin with $MeshFormat", m->path);
-  version = strtod(line, &end);
+  version = HycoNumber(line, &end);
   binary = strtol(end, &end, 10);
   size = strtol(end, &end, 10);
   m->four = version > 4.05 && version < 4.15;

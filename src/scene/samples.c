@@ -180,7 +180,7 @@ static PetscErrorCode ReadLines(HycoSamples s, const char path[], FILE *file)
     for (PetscInt c = 0; c < P; c++) {
       char *end;
 
-      mu[column[c]] = strtod(next, &end);
+      mu[column[c]] = HycoNumber(next, &end);
       end += strspn(end, " \t\r\n");
       HycoCheck(end != next && (*end == (c == P - 1 ? '\0' : ',')),
                 "%s, line %d: %d numbers with commas between are expected", path, (int)number, (int)P);

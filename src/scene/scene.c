@@ -91,11 +91,11 @@ static PetscBool SplitRange(const char text[], PetscReal range[2])
 {
   char *end;
 
-  range[0] = strtod(text, &end);
+  range[0] = HycoNumber(text, &end);
   if (end == text) return PETSC_FALSE;
   text = end + strspn(end, " ");
   if (*text++ != ',') return PETSC_FALSE;
-  range[1] = strtod(text, &end);
+  range[1] = HycoNumber(text, &end);
   if (end == text || end[strspn(end, " ")]) return PETSC_FALSE;
   return (PetscBool)(!PetscIsInfOrNanReal(range[0]) && !PetscIsInfOrNanReal(range[1]) && range[0] <= range[1]);
 }
@@ -129,10 +129,15 @@ static PetscBool IsIdentifier(const char *word)
 
 static PetscErrorCode ReadParameters(HycoScene s)
 {
-  PetscInt n = HYCO_MAX_PARAMETERS;
+  PetscInt n = HYCO_MAX_PARAMETERS, commas = 0;
+  const char *list = NULL;
   PetscBool set;
 
   PetscFunctionBegin;
+  PetscCall(PetscOptionsFindPair(s->options, NULL, "-scene_parameters", &list, &set));
+  for (const char *c = set && list ? list : ""; *c; c++) commas += *c == ',';
+  HycoCheck(commas < HYCO_MAX_PARAMETERS, "scene_parameters lists %d parameters; a scene has at most %d",
+            (int)commas + 1, HYCO_MAX_PARAMETERS);
   PetscCall(PetscOptionsGetStringArray(s->options, NULL, "-scene_parameters", s->parameter, &n, &set));
   s->n_parameters = set ? n : 0;
   for (PetscInt p = 0; p < s->n_parameters; p++) {
@@ -177,7 +182,7 @@ static PetscErrorCode ReadContactField(HycoScene s, PetscInt entry, HycoContact 
     PetscReal *length = field == 4 ? &c->tolerance : &c->overlap;
     char *end;
 
-    *length = strtod(value, &end);
+    *length = HycoNumber(value, &end);
     HycoCheck(*end == '\0' && end != value && *length >= 0, "%s is \"%s\"; it must be a length, 0 or more",
               s->key[entry], value);
     break;
@@ -360,6 +365,7 @@ static PetscErrorCode LoadInto(HycoScene s, const char path[])
   char folder[PETSC_MAX_PATH_LEN] = "";
 
   PetscFunctionBegin;
+  HycoOnEach(s->comm, HycoReserveBLAS());
   PetscCall(HycoEntriesRead(s->comm, path, &s->options, folder));
   HycoOnEach(s->comm, Build(s, folder));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -385,6 +391,7 @@ static PetscErrorCode FillFromEntries(HycoScene s, PetscInt n, char *const key[]
                                       const char folder[])
 {
   PetscFunctionBegin;
+  PetscCall(HycoReserveBLAS());
   PetscCall(PetscOptionsCreate(&s->options));
   for (PetscInt k = 0; k < n; k++) {
     char dashed[HYCO_LINE];

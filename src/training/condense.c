@@ -301,7 +301,8 @@ PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t)
   HycoCheckModel(linear != HYCO_LINEAR_ITERATIVE,
             "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a hybrid "
             "model, or take -hyco_linear auto");
-  HycoCheckModel(m > 0, "the scene has no contact, and a condensed model is one of contact forces; train a hybrid model");
+  HycoCheckModel(m > 0,
+                 "the scene has no contact, and a condensed model is one of contact forces; train a hybrid model");
   HycoCheckModel(m <= MOST_CONTACTS,
             "the scene has %d contacts: a condensed model stores the square of their number at every training point, "
             "and goes to %d; train a hybrid model",

@@ -394,8 +394,8 @@ PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel m)
     kind = HYCO_HYBRID_CONTACT; /* no contact in the RID: plain hyper-reduction (31) */
   if (kind == HYCO_HYBRID_AUTO) kind = n_contact < n_all ? HYCO_HYBRID_CONTACT : HYCO_HYBRID_ALL;
   if (kind == HYCO_HYBRID_CONTACT && n_contact == n_all && n_contact) {
-    HycoFailNoModel("-hyco_hybrid contact leaves the modes without equation: every unknown of A is a contact's; use rank, all "
-             "or auto");
+    HycoFailNoModel("-hyco_hybrid contact leaves the modes without equation: every unknown of A is a contact's; use "
+                    "rank, all or auto");
   }
   if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
   if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all, &v));

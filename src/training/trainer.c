@@ -249,7 +249,8 @@ static PetscErrorCode ReadType(HycoTrainer t)
     PetscBool set;
 
     PetscCall(PetscOptionsHasName(o, NULL, "-hyco_dual", &set));
-    HycoCheckModel(!set, "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
+    HycoCheckModel(!set,
+                   "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
     t->dual = HYCO_DUAL_NNMF;
   }
   t->whole_rid = PETSC_TRUE;

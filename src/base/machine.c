@@ -1,0 +1,49 @@
+/* What the program around the library, or the machine, may withhold: a decimal point, memory for BLAS. */
+#include <hycoimpl.h>
+#include <locale.h>
+#include <petscblaslapack.h>
+#include <stdlib.h>
+
+/* OpenBLAS asks for this much address space at its first call, and asks for ever where there is none. */
+#define BLAS_BUFFER (((size_t)136) << 20)
+
+void *HycoPointBegin(void)
+{
+  static locale_t plain;
+
+  if (!plain) plain = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
+  return plain ? (void *)uselocale(plain) : NULL;
+}
+
+void HycoPointEnd(void *before)
+{
+  if (before) (void)uselocale((locale_t)before);
+}
+
+double HycoNumber(const char text[], char **end)
+{
+  void *before = HycoPointBegin();
+  const double number = strtod(text, end);
+
+  HycoPointEnd(before);
+  return number;
+}
+
+PetscErrorCode HycoReserveBLAS(void)
+{
+  static PetscBool done;
+  PetscScalar a[4] = {2, 1, 1, 2};
+  PetscBLASInt two = 2, pivot[2], info;
+  void *probe;
+
+  PetscFunctionBegin;
+  if (done) PetscFunctionReturn(PETSC_SUCCESS);
+  probe = malloc(BLAS_BUFFER);
+  HycoCheck(probe,
+            "there is no memory: BLAS takes %d MB of address space, and that is not left; raise the limit (ulimit -v)",
+            (int)(BLAS_BUFFER >> 20));
+  free(probe);
+  LAPACKgetrf_(&two, &two, a, &two, pivot, &info);
+  done = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

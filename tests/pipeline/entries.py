@@ -1,0 +1,124 @@
+"""What a scene may say, and how it is told where it cannot: keys twice, too many, long expressions, values with a dash; where options come from."""
+import json
+import os
+import resource
+import shutil
+import subprocess
+import unittest
+import xml.etree.ElementTree
+
+from common import HYCO, PATIENCE, ROPE, SOURCE, Case
+
+BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
+POINT = ('-mu', '0.05,0.06')
+
+
+class Entries(Case):
+    def setUp(self):
+        shutil.rmtree(self.path('scene'), ignore_errors=True)
+        shutil.copytree(BLOCKS, self.path('scene'))
+        with open(self.path('scene', 'scene.yaml'), encoding='utf-8') as f:
+            self.text = f.read()
+
+    def write(self, text):
+        with open(self.path('scene', 'scene.yaml'), 'w', encoding='utf-8') as f:
+            f.write(text)
+
+    def refused(self, *words, args=('view', '-scene', 'scene'), **options):
+        run = self.run_raw(*args, **options)
+        self.assertEqual(run.returncode, 1, run.stdout)
+        self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
+        for word in words:
+            self.assertIn(word, run.stderr)
+
+    def test_twice(self):
+        """In a mapping, in braces, over sections, in two spellings of one entry, in another letter case."""
+        for old, new, key, lines in (('    poisson: 0.3\n', '    poisson: 0.3\n    poisson: 0.4\n', 'body_block_poisson', (12, 13)),
+                                     ('{young: 1e5, poisson: 0.3}', '{young: 1e5, poisson: 0.3, young: 2e5}', 'body_foundation_young', (14, 14)),
+                                     ('  rid_layers: 1\n', '  rid_layers: 1\nbody:\n  block: {young: 3}\n', 'body', (9, 31)),
+                                     ('  foundation:', '  block_young: 7\n  foundation:', 'body_block_young', (11, 14)),
+                                     ('{young: 1e5, poisson: 0.3}', '{young: 1e5, "Young": 2}', 'body_foundation_Young', (14, 14))):
+            with self.subTest(new=new):
+                self.assertIn(old, self.text)
+                self.write(self.text.replace(old, new, 1))
+                self.refused('scene.yaml', f'{key} stands twice', f'in line {lines[0]} and in line {lines[1]}')
+                self.refused(f'{key} stands twice', args=('solve', '-scene', 'scene', *POINT), ranks=2)
+
+    def test_not_twice(self):
+        """Quotes, comments, block scalars, lists, and the same name in two places are no repetition."""
+        self.write(self.text.replace('scene:\n', '%YAML 1.1\n---\nscene:  # scene: {title: x}\n', 1).replace(
+            'title: block with a crowned underside on a foundation, right half',
+            'title: |\n    mesh: no\n    mesh: no\n\n    young: "\n').replace('parameters: [crown, press]', 'parameters:\n  - crown\n  - press'))
+        run = self.run_raw('view', '-scene', 'scene')
+        self.assertEqual(run.returncode, 0, run.stderr)
+        for example in ('rope', 'pellet', 'plate', 'blocks'):
+            self.assertEqual(self.run_raw('view', '-scene', os.path.join(SOURCE, 'examples', example)).returncode, 0)
+
+    def test_too_many(self):
+        names = [f'p{k}' for k in range(33)]
+        self.write(self.text.replace('[crown, press]', f'[{", ".join(names)}]'))
+        self.refused('lists 33 parameters; a scene has at most 32')
+        loads = ''.join(f'  group{k}: 1\n' for k in range(600))
+        self.write(self.text + 'pressure:\n' + loads)
+        run = self.run_raw('view', '-scene', 'scene')
+        if run.returncode:  # PETSc keeps 512 before it learned to grow
+            self.assertIn('more entries than the 512', run.stderr)
+
+    def test_long_expression(self):
+        """The reason stands in the message however long the expression is."""
+        long = ' + '.join(f'{k}*x' for k in range(400))
+        for value, words in ((long + ' + ) 1', 'is no expression: '), (long + ' + nosuch', 'names nosuch, which is unknown'),
+                             (long + ' + 1/(x - x)', 'is not finite at x =')):
+            self.write(self.text.replace('young: 2e5', f'young: "{value}"'))  # 4 kB
+            self.refused('body_block_young', words, args=('solve', '-scene', 'scene', *POINT))
+
+    def test_dash(self):
+        """A value that begins with a dash and a letter: in scene.yaml as it is, on the command line after a blank."""
+        expected = self.hyco('solve', '-scene', 'scene', *POINT)['total_contact_force']
+        self.near(self.hyco('solve', '-scene', 'scene', *POINT, '-fixed_block_top_y', ' -press')['total_contact_force'], expected, 1e-12)
+        self.refused('-press stands where -fixed_block_top_y expects its value', 'a blank first, -fixed_block_top_y " -press"',
+                     args=('solve', '-scene', 'scene', *POINT, '-fixed_block_top_y', '-press'))
+
+    def test_xml(self):
+        """The names of an output are XML, whatever is in them."""
+        name = 'a&b<c>"d\'.xdmf'
+        self.hyco('solve', '-scene', 'scene', *POINT, '-output', name)
+        items = xml.etree.ElementTree.parse(self.path(name)).iter('DataItem')
+        self.assertEqual({item.text.split(':/')[0] for item in items}, {'a&b<c>"d\'.h5'})
+
+    def test_options_from(self):
+        """What does not stand on the command line stands in the report, and nothing if there is nothing."""
+        def report(*args, **environment):
+            run = subprocess.run([HYCO, 'solve', '-scene', ROPE, '-mu', '0.07,0.17', '-report', 'r.json', *args], cwd=self.folder,
+                                 env={**os.environ, 'HOME': self.path('home'), **environment}, capture_output=True, text=True, check=False,
+                                 timeout=100 * PATIENCE)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            with open(self.path('r.json'), encoding='utf-8') as f:
+                return json.load(f).get('options_from')
+
+        os.makedirs(self.path('home'), exist_ok=True)
+        self.assertIsNone(report())
+        self.assertEqual(report(PETSC_OPTIONS='-hyco_solver_rtol 1e-9'), {'PETSC_OPTIONS': '-hyco_solver_rtol 1e-9'})
+        for name, args in (('.petscrc', ()), ('my.options', ('-options_file', 'my.options'))):
+            with open(self.path(name), 'w', encoding='ascii') as f:
+                f.write('-hyco_solver_rtol 1e-7\n')
+            try:
+                self.assertEqual(report(*args), {name: '-hyco_solver_rtol 1e-7\n'})
+                if name == '.petscrc':
+                    self.assertIsNone(report('-skip_petscrc'))
+            finally:
+                os.remove(self.path(name))
+
+    def test_little_memory(self):
+        """Address space that BLAS does not find: one line, where OpenBLAS looks for ever."""
+        def limit():
+            resource.setrlimit(resource.RLIMIT_AS, (400000 * 1024, 400000 * 1024))
+
+        run = subprocess.run([HYCO, 'solve', '-scene', ROPE, '-mu', '0.07,0.17'], cwd=self.folder, preexec_fn=limit, capture_output=True,
+                             text=True, timeout=60, check=False)
+        self.assertNotEqual(run.returncode, 0)
+        self.assertTrue(run.stderr.strip())
+
+
+if __name__ == '__main__':
+    unittest.main()
