@@ -50,7 +50,7 @@ def train(runs, size, model, ranks=1):
     values = ",".join(f"{r:g}" for r in RADII[radii])
     try:
         return runs.hyco(f"{name_of(model)}-train", "train", *size.scene, "-values_radius", values, "-values_load", LOADS,
-                         "-hyco_trust_folds", 0, "-hyco_snapshots", store(runs, size), "-model", path, "-hyco_pod_tol", tol,
+                         "-hyco_snapshots", store(runs, size), "-model", path, "-hyco_pod_tol", tol,
                          *VARIANTS[variant], ranks=ranks)
     except RunError as error:
         return {"refused": error.reason}

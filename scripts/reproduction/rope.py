@@ -41,7 +41,7 @@ class Size:
 
 
 def train_regular(runs, name):
-    return runs.hyco(f"{name}-train", "train", *SCENE, "-hyco_trust_folds", 0, "-grid", "10,12", "-hyco_snapshots", runs.path("grid.snapshots"),
+    return runs.hyco(f"{name}-train", "train", *SCENE, "-grid", "10,12", "-hyco_snapshots", runs.path("grid.snapshots"),
                      "-model", runs.path(f"{name}.h5"), *REGULAR[name])
 
 
@@ -105,7 +105,7 @@ def left_by_nnmf(runs, k, its):
 
 def greedy(runs, name, size):
     """A greedy training that keeps the model of each iteration, and the comparison of the last one."""
-    train = runs.hyco(f"{name}-train", "train", *SCENE, "-hyco_trust_folds", 0, "-greedy", "-training_grid", size.training_grid, "-max_snapshots",
+    train = runs.hyco(f"{name}-train", "train", *SCENE, "-greedy", "-training_grid", size.training_grid, "-max_snapshots",
                       4 + size.iterations, "-target", "1e-30", "-hyco_greedy_keep", "-model", runs.path(f"{name}.h5"),
                       "-table", runs.path(f"{name}-history.csv"), *GREEDY[name])
     return {"train": train, "compare": compare(runs, name, size.test_grid)}

@@ -49,7 +49,7 @@ class Bench:
         key = (setting.training, kind)
         folder = self.path("-".join(key).replace(" ", ""))
         r, _ = self.hyco("train", *self.case.scene, *self.case.training[setting.training], *setting.arguments(), "-model", model,
-                         "-hyco_snapshots", folder, "-hyco_trust_folds", "0", table=False)
+                         "-hyco_snapshots", folder, "-hyco_search", "false", "-hyco_validation", "0", table=False)
         self.paid.setdefault(key, r["seconds"]["snapshots"])
         return {"modes": r["n_modes"], "rid_fraction": r["rid_fraction"], "rid_nodes": r["rid_nodes"],
                 "snapshots": r["n_samples"], "offline_s": self.paid[key] + r["seconds"]["reduction"],

@@ -74,9 +74,10 @@ static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[])
     HycoExpr *map = fe->scene->body[b].map;
     const PetscInt sign = map[0] || map[1] || map[2] ? fe->drawn_sign[e] * Sign(m, el, e, fe->X) : 1;
 
+    HycoCheck(sign, "cell %d is degenerate: its volume vanishes", (int)m->cell_id[e]);
     if (!turn[b]) first[b] = e;
     if (!turn[b]) turn[b] = sign;
-    HycoCheck(!sign || sign == turn[b],
+    HycoCheck(sign == turn[b],
               "body %s: its map turns cell %d inside out and not cell %d; a map may mirror a whole body, not fold it",
               fe->scene->body[b].name, (int)m->cell_id[sign < 0 ? e : first[b]],
               (int)m->cell_id[sign < 0 ? first[b] : e]);

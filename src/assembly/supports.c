@@ -187,7 +187,7 @@ static PetscErrorCode PartMotions(HycoFE fe, const PetscInt part[], PetscInt whi
   PetscFunctionBegin;
   LAPACKsyev_("V", "U", &n, &p->gram[0][0], &ld, values, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
-  for (PetscInt j = 0; j < n && values[j] <= 1e-16 * PetscMax(values[n - 1], 1); j++)
+  for (PetscInt j = 0; j < n && values[j] <= 1e-13 * PetscMax(values[n - 1], 1); j++)
     PetscCall(AddMotion(fe, part, which, p, p->gram[j], first, motions));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

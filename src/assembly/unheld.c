@@ -283,7 +283,7 @@ static PetscReal Entry(const HycoMotions *motions, const PetscReal z[], PetscInt
 /* Another basis of the same combinations, to be named: with as many pure translations as there are. */
 static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscReal z[])
 {
-  const PetscInt k = motions->n, columns = k * (dim == 1 ? 1 : dim == 2 ? 3 : 6);
+  const PetscInt k = motions->n, columns = k * (dim == 1 ? 1 : dim == 2 ? 3 : 6), turns = columns - k * dim;
   PetscReal scale = 0;
 
   for (PetscInt c = 0; c < columns; c++) {
@@ -301,10 +301,10 @@ static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscRe
       z[done * k + a] = z[best * k + a];
       z[best * k + a] = swap;
     }
-    for (PetscInt r = done + 1; r < n; r++) {
+    for (PetscInt r = c < turns ? 0 : done + 1; r < n; r++) { /* a rotation's translation says where its axis is */
       const PetscReal share = Entry(motions, z + r * k, dim, c) / Entry(motions, z + done * k, dim, c);
 
-      for (PetscInt a = 0; a < k; a++) z[r * k + a] -= share * z[done * k + a];
+      for (PetscInt a = 0; a < k && r != done; a++) z[r * k + a] -= share * z[done * k + a];
     }
     done++;
   }

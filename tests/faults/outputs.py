@@ -16,7 +16,7 @@ class Outputs(Case):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.hyco('train', '-scene', ROPE, '-grid', '3,3', '-hyco_trust_folds', 0, '-model', 'model.h5')
+        cls.hyco('train', '-scene', ROPE, '-grid', '3,3', '-model', 'model.h5')
         shutil.copytree(ROPE, cls.path('rope'))
 
     def setUp(self):
@@ -119,7 +119,7 @@ class Outputs(Case):
         self.addCleanup(os.remove, self.path('link.h5'))
         for _ in range(2):
             self.assertEqual(self.predict('-report', 'link.json').returncode, 0)
-            run = self.run_raw('train', '-scene', ROPE, '-grid', '2,2', '-hyco_trust_folds', 0, '-model', 'link.h5', '-hyco_snapshots', 'there/s')
+            run = self.run_raw('train', '-scene', ROPE, '-grid', '2,2', '-model', 'link.h5', '-hyco_snapshots', 'there/s')
             self.assertEqual(run.returncode, 0, run.stderr)
             self.assertTrue(os.path.islink(self.path('link.json')) and os.path.islink(self.path('link.h5')))
             self.assertEqual(sorted(os.listdir(self.path('there'))), ['m.h5', 'r.json', 's'])

@@ -89,7 +89,7 @@ class Facing(Case):
         self.refused('it must be a length, 0 or more', more=('-contact_c_overlap', 'deep'))
 
     def train(self):
-        self.hyco('train', '-scene', 'arcs.yaml', '-values_press', '0.1,0.2,0.3,0.4', '-model', 'a.h5', '-hyco_rid_whole', 'true', '-hyco_trust_folds', '0')
+        self.hyco('train', '-scene', 'arcs.yaml', '-values_press', '0.1,0.2,0.3,0.4', '-model', 'a.h5', '-hyco_rid_whole', 'true')
         return 'a.h5'
 
     def test_pair_is_moved(self):

@@ -4,7 +4,7 @@ import unittest
 
 from common import ROPE, Case
 
-GREEDY = ('train', '-scene', ROPE, '-greedy', '-training_grid', '4,4', '-hyco_trust_folds', 0, '-model', 'm.h5')
+GREEDY = ('train', '-scene', ROPE, '-greedy', '-training_grid', '4,4', '-model', 'm.h5')
 
 
 class Missed(Case):

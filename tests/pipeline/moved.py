@@ -119,7 +119,7 @@ class Reduced(Moved):
         """All elements, all modes: the training solutions, whatever the contact meets there."""
         for yaml, train in (('moved.yaml', self.TRAIN), ('three.yaml', ('-values_place', '-2,1.3', '-values_press', '0.3,0.6', '-values_modulus', '10'))):
             with self.subTest(yaml=yaml):
-                self.hyco('train', '-scene', yaml, *train, '-model', 'all.h5', '-hyco_rid_whole', 'true', '-hyco_pod_tol', '1e-18', '-hyco_trust_folds', '0')
+                self.hyco('train', '-scene', yaml, *train, '-model', 'all.h5', '-hyco_rid_whole', 'true', '-hyco_pod_tol', '1e-18')
                 c = self.hyco('compare', '-scene', yaml, '-model', 'all.h5', *train)
                 for name in ('error_u', 'error_lambda', 'error_sigma'):
                     self.assertLess(c[name]['max'], 1e-8, name)
@@ -128,7 +128,7 @@ class Reduced(Moved):
         """An RID around the contact, trained a millimetre apart: between them the pressure is where the cylinder is."""
         places = ','.join(str(k - 4.5) for k in range(10))
         self.hyco('train', '-scene', 'moved.yaml', '-values_place', places, '-values_press', '0.3,0.5,0.7,0.9', '-values_modulus', '10',
-                  '-model', 'm.h5', '-hyco_rid_contact_extension', '2', '-hyco_rid_layers', '2', '-hyco_pod_tol', '1e-10', '-hyco_trust_folds', '0')
+                  '-model', 'm.h5', '-hyco_rid_contact_extension', '2', '-hyco_rid_layers', '2', '-hyco_pod_tol', '1e-10')
         for place in (-4, 0.1, 3.2, 4.9):
             p = self.hyco('predict', '-model', 'm.h5', '-mu', f'{place},0.6,10', '-output', 'predicted.xdmf')
             r = self.hyco('solve', '-scene', 'moved.yaml', '-mu', f'{place},0.6,10', '-output', 'solved.xdmf')
@@ -160,7 +160,7 @@ class Reduced(Moved):
         chosen = []
         for ranks in (0, 3):
             self.hyco('train', '-scene', 'moved.yaml', '-greedy', '-training_grid', '4,2,2', '-max_snapshots', '10', '-model', f'g{ranks}.h5', '-hyco_pod_tol', '1e-12',
-                      '-hyco_rid_contact_extension', '2', '-hyco_rid_layers', '2', '-hyco_trust_folds', '0', ranks=ranks)
+                      '-hyco_rid_contact_extension', '2', '-hyco_rid_layers', '2', ranks=ranks)
             chosen.append(self.hyco('predict', '-model', f'g{ranks}.h5', '-mu', '1.1,0.7,10')['total_contact_force'])
         self.near(chosen[1], chosen[0], 1e-8)
 

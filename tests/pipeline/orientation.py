@@ -61,7 +61,7 @@ class Orientation(Case):
                 for turned in ((), TURNED):
                     model = self.path(f'{kind}{len(turned)}.h5')
                     self.hyco('train', '-scene', BLOCKS, '-model', model, '-values_crown', '0.02,0.05,0.08', '-values_press',
-                              '0.02,0.05,0.08', '-hyco_model_type', kind, '-hyco_trust_folds', '0', *turned)
+                              '0.02,0.05,0.08', '-hyco_model_type', kind, *turned)
                     report = self.hyco('predict', '-model', model, '-mu', mu)
                     self.assertGreater(report['total_contact_force'], 1000)
                     found.append(report['total_contact_force'])
@@ -72,7 +72,7 @@ class Orientation(Case):
         for turned in ((), UPSIDE):
             model = self.path(f'pellet{len(turned)}.h5')
             self.hyco('train', '-scene', PELLET, '-model', model, '-values_radius', '4.02,4.06,4.1', '-values_load', '0.5,1',
-                      '-hyco_trust_folds', '0', *turned)
+                      *turned)
             found.append(self.hyco('predict', '-model', model, '-mu', '4.05,1')['total_contact_force'])
         self.assertGreater(found[0], 1000)
         self.near(found[1], found[0], 1e-7)

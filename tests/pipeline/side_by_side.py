@@ -13,7 +13,7 @@ class SideBySide(Case):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-hyco_trust_folds', 0, '-model', 'm.h5')
+        cls.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-model', 'm.h5')
 
     def ask(self, **environment):
         """A prediction under a changed environment (None: unset)."""
@@ -44,7 +44,7 @@ class SideBySide(Case):
 
     def test_launched(self):
         """Ranks of mpiexec keep Open MPI's folder: they share memory through it."""
-        run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-hyco_trust_folds', 0, '-model', 'two.h5', ranks=2)
+        run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-model', 'two.h5', ranks=2)
         self.assertEqual(run.returncode, 0, run.stderr)
 
 

@@ -45,7 +45,7 @@ static PetscErrorCode Run(const char scene_path[], PetscReal force[2])
   PetscCall(HycoSamplesAddGrid(grid, counts, PETSC_TRUE));
   PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
   PetscCall(HycoTrainerSetFromOptions(trainer));
-  PetscCall(HycoTrainerSetTrustFolds(trainer, 0));
+  PetscCall(HycoTrainerSetValidationCount(trainer, 0));
   PetscCall(HycoTrainerRun(trainer, grid, model_path, NULL));
   PetscCall(HycoModelLoad(model_path, &model));
   PetscCall(HycoModelPredict(model, 2, mu));
