@@ -162,7 +162,7 @@ static PetscErrorCode Complain(HycoPartners *t, const HycoContact *c, PetscInt n
     PetscCall(PetscStrlcat(list, one, sizeof(list)));
   }
   PetscCall(Remedy(t, c, n, missed, remedy));
-  HycoFail("contact %s: %d of the %d nodes of %s have no %s of %s within %g and in front of them: %snode%s %s; %s",
+  HycoFail("contact %s: %d of the %d nodes of %s have no %s of %s within %g: %snode%s %s; %s",
            c->name, (int)n, (int)slaves, c->slave, c->type == HYCO_CONTACT_PAIR ? "node" : "point", c->master,
            (double)tolerance, n > 5 ? "the farthest are " : "", n > 1 ? "s" : "", list, remedy);
 }
