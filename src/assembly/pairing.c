@@ -65,7 +65,7 @@ static PetscErrorCode Judge(HycoPartners *t, PetscInt slave, PetscReal tolerance
     *why = TURNED;
     HycoPartnersProject(t, slave, PETSC_TRUE, at);
   }
-  if (at->distance > tolerance) *why = FAR;
+  if (*why == MET && at->distance > tolerance) *why = FAR;
   if (*why != MET || !out || at->distance <= small) PetscFunctionReturn(PETSC_SUCCESS);
   HycoPartnersAcross(t, slave, at, r);
   if (PetscAbsReal(HycoDot(r, out)) < -HYCO_OPPOSED * at->distance) *why = ASKEW;
@@ -285,8 +285,8 @@ static PetscReal Farthest(const HycoContact *c, PetscInt n, const HycoProjection
   return small;
 }
 
-/* The nodes of a pair whose surfaces do not coincide as drawn, along the normals, where those match all slave nodes that
-   face the master one by one; the others have no contact (n = 0). */
+/* The nodes of a pair whose surfaces do not coincide as drawn, along the normals, where those match all slave nodes
+   that face the master one by one; the others have no contact (n = 0). */
 static PetscErrorCode MatchAlong(HycoPartners *t, const HycoContact *c, PetscInt n, const PetscInt slave[],
                                  PetscReal small, HycoProjection at[], Verdict why[], PetscBool *matched)
 {

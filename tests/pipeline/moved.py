@@ -155,6 +155,15 @@ class Reduced(Moved):
         self.assertIn('meets other facets of upper as the parameters move it', run.stderr)
         self.assertFalse(os.path.exists(self.path('c.h5')))
 
+    def test_older_model(self):
+        """A model from before the search opens, with the masters that it has."""
+        self.hyco('train', '-scene', 'moved.yaml', *self.TRAIN, '-model', 'old.h5', '-hyco_rid_whole', 'true', '-hyco_trust_folds', '0')
+        with h5py.File(self.path('old.h5'), 'r+') as f:
+            self.assertEqual(f['format'][0, 0], 5)
+            del f['problem/reach']
+            f['format'][...] = 4
+        self.assertTrue(self.hyco('predict', '-model', 'old.h5', '-mu', f'2.6,{POINT}')['converged'])
+
     def test_greedy_on_ranks(self):
         """The greedy loop chooses the same solutions on one rank and on three."""
         chosen = []
