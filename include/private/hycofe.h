@@ -161,6 +161,8 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
 */
 PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
                                PetscReal gap[]);
+/* The gap that stands for an empty row: it is positive and of the mesh's scale, and says nothing. */
+PetscReal HycoContactNoGap(HycoFE fe);
 /* What there is to know about the contacts of a solution u (n_dof), L (pairs->n, or where index leads). */
 typedef struct {
   PetscInt n_facing; /* contacts that may close: slave nodes that face a master, and those of obstacles */
