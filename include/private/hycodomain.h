@@ -18,16 +18,16 @@ typedef struct {
 
 /*
   The contacts of surfaces that a map moves, with all that they meet over the parameters: a row for each set of masters
-  that a slave node has somewhere (nodes alone: the weights are not those of any place), none for one that meets nothing.
-  Contacts on surfaces that stay have their one row.
+  that a slave node has somewhere (nodes alone: the weights are not those of any place), none for one that meets
+  nothing. Contacts on surfaces that stay have their one row.
 */
 typedef struct {
   HycoPairs rows; /* on the whole mesh */
   PetscInt *of;   /* the contact of each row, ascending */
 } HycoMet;
 
-/* How far from its slave a master point may be to matter (by contact of the scene): from the forces Lambda (n_contacts x
-   n column major) at n points; PETSC_MAX_REAL where none presses. pairs: of the whole mesh, with moved surfaces. */
+/* How far from its slave a master point may be to matter (by contact of the scene): from the forces Lambda (n_contacts
+   x n column major) at n points; PETSC_MAX_REAL where none presses. pairs: of the whole mesh, with moved surfaces. */
 PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, PetscInt n, const PetscReal mu[],
                             const PetscReal Lambda[], PetscReal reach[]);
 /* What is met within reach (NULL: at any distance) at n points and over the ranges. The caller destroys it. */

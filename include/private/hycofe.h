@@ -180,6 +180,8 @@ PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], Pe
 /* How many contacts have no free unknown and no effect: empty rows, and the fixed nodes at obstacles that are no contacts;
    fails when the prescribed displacements of one of these penetrate. start: of the rows. */
 PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n);
+/* The gap that stands for an empty row: it is positive and of the mesh's scale, and says nothing. */
+PetscReal HycoContactNoGap(HycoFE fe);
 /* What there is to know about the contacts of a solution u (n_dof), L (pairs->n, or where index leads). */
 typedef struct {
   PetscInt n_facing; /* contacts that may close: slave nodes that face a master, and those of obstacles */

@@ -56,8 +56,7 @@ static PetscErrorCode PairNormal(HycoFE fe, const HycoContact *c, PetscInt slave
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The gap that stands for "no master": it says nothing, but is of the mesh's scale. */
-static PetscReal NoGap(HycoFE fe)
+PetscReal HycoContactNoGap(HycoFE fe)
 {
   return 1e-2 * HycoMeshLength(fe->mesh);
 }
@@ -67,6 +66,7 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal vect
                                PetscReal gap[])
 {
   PetscInt last = -1;
+  PetscReal none = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < pairs->n; k++) {
@@ -86,7 +86,8 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal vect
     PetscCall(PairNormal(fe, c, s, x, given ? NULL : vector, n));
     if (fe->n_turned) HycoTurnNormal(fe, pairs, k, n);
     if (HycoPairsAlone(fe->scene, pairs, k)) {
-      gap[k] = NoGap(fe);
+      if (none == 0) none = HycoContactNoGap(fe);
+      gap[k] = none;
     } else if (c->gap) {
       PetscCall(HycoExprEval(c->gap, fe->mu, 1, x, &gap[k]));
     } else {

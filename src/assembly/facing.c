@@ -44,7 +44,8 @@ void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[])
     PetscReal sum = 0;
 
     if (m->facet_group[k / nf] != group) continue;
-    for (PetscInt c = 0; c < 3; c++) sum += (fe->X[3 * a + c] - fe->X[3 * b + c]) * (fe->X[3 * a + c] - fe->X[3 * b + c]);
+    for (PetscInt c = 0; c < 3; c++)
+      sum += (fe->X[3 * a + c] - fe->X[3 * b + c]) * (fe->X[3 * a + c] - fe->X[3 * b + c]);
     size[a] = PetscMax(size[a], PetscSqrtReal(sum));
     size[b] = PetscMax(size[b], PetscSqrtReal(sum));
   }

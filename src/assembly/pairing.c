@@ -65,7 +65,7 @@ static PetscErrorCode Judge(HycoPartners *t, PetscInt slave, PetscReal tolerance
     *why = TURNED;
     HycoPartnersProject(t, slave, PETSC_TRUE, at);
   }
-  if (at->distance > tolerance) *why = FAR;
+  if (*why == MET && at->distance > tolerance) *why = FAR;
   if (*why != MET || !out || at->distance <= small) PetscFunctionReturn(PETSC_SUCCESS);
   HycoPartnersAcross(t, slave, at, r);
   if (PetscAbsReal(HycoDot(r, out)) < -HYCO_OPPOSED * at->distance) *why = ASKEW;
@@ -162,7 +162,7 @@ static PetscErrorCode Complain(HycoPartners *t, const HycoContact *c, PetscInt n
     PetscCall(PetscStrlcat(list, one, sizeof(list)));
   }
   PetscCall(Remedy(t, c, n, missed, remedy));
-  HycoFail("contact %s: %d of the %d nodes of %s have no %s of %s within %g and in front of them: %snode%s %s; %s",
+  HycoFail("contact %s: %d of the %d nodes of %s have no %s of %s within %g: %snode%s %s; %s",
            c->name, (int)n, (int)slaves, c->slave, c->type == HYCO_CONTACT_PAIR ? "node" : "point", c->master,
            (double)tolerance, n > 5 ? "the farthest are " : "", n > 1 ? "s" : "", list, remedy);
 }
@@ -285,8 +285,8 @@ static PetscReal Farthest(const HycoContact *c, PetscInt n, const HycoProjection
   return small;
 }
 
-/* The nodes of a pair whose surfaces do not coincide as drawn, along the normals, where those match all slave nodes that
-   face the master one by one; the others have no contact (n = 0). */
+/* The nodes of a pair whose surfaces do not coincide as drawn, along the normals, where those match all slave nodes
+   that face the master one by one; the others have no contact (n = 0). */
 static PetscErrorCode MatchAlong(HycoPartners *t, const HycoContact *c, PetscInt n, const PetscInt slave[],
                                  PetscReal small, HycoProjection at[], Verdict why[], PetscBool *matched)
 {

@@ -169,6 +169,7 @@ PetscErrorCode HycoPartnersIsPast(HycoPartners *t, PetscInt slave, const HycoPro
   HycoPartnersAcross(t, slave, at, r);
   height = HycoDot(r, n);
   for (PetscInt c = 0; c < 3; c++) along += (r[c] - height * n[c]) * (r[c] - height * n[c]);
-  if (PetscSqrtReal(along) > HYCO_PAST_BORDER * ShortestEdge(t, at->patch)) PetscCall(HycoPartnersAtBorder(t, at, past));
+  if (PetscSqrtReal(along) > HYCO_PAST_BORDER * ShortestEdge(t, at->patch))
+    PetscCall(HycoPartnersAtBorder(t, at, past));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

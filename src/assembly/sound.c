@@ -33,7 +33,8 @@ static void Across(const HycoPairs *p, PetscInt k, const PetscReal X[], PetscRea
 {
   for (PetscInt c = 0; c < 3; c++) {
     r[c] = -X[3 * p->slave[k] + c];
-    for (PetscInt j = p->master_start[k]; j < p->master_start[k + 1]; j++) r[c] += p->weight[j] * X[3 * p->master[j] + c];
+    for (PetscInt j = p->master_start[k]; j < p->master_start[k + 1]; j++)
+      r[c] += p->weight[j] * X[3 * p->master[j] + c];
   }
 }
 
@@ -51,7 +52,7 @@ static PetscReal Along(const PetscReal r[3], const PetscReal n[3])
   return Length(t);
 }
 
-/* How deep contact k may overlap before any load, and whether it does deeper; a gap that is not measured may. */
+/* How deep contact k may overlap before any load, and whether its gap is deeper; a gap that the scene gives may be. */
 static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, PetscReal gap, Sizes *sizes,
                                      PetscReal *allowed, PetscBool *deep)
 {
@@ -78,8 +79,9 @@ static PetscErrorCode RefuseOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, P
 
   PetscFunctionBegin;
   Across(p, k, fe->X, r);
-  HycoFail("contact %s: before any load node %d of %s lies %.4g deep in %s (its master point is %.4g away), and %.4g is "
-           "allowed%s; are the bodies where they should be? If they overlap by design, contact_%s_overlap %.4g allows it",
+  HycoFail("contact %s: before any load node %d of %s lies %.4g deep in %s (its master point is %.4g away), and %.4g "
+           "is allowed%s; are the bodies where they should be? If they overlap by design, contact_%s_overlap %.4g "
+           "allows it",
            c->name, (int)fe->mesh->node_id[p->slave[k]], c->slave, -(double)gap, c->master, (double)Length(r),
            (double)allowed, c->overlap < 0 ? ", half of its facet" : "", c->name, -1.01 * (double)gap);
 }
@@ -98,8 +100,8 @@ static PetscErrorCode CheckPair(HycoFE fe, const HycoPairs *p, PetscInt k, const
   if (along <= Length(drawn)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SizeAt(fe, c->slave, p->slave[k], sizes, &size));
   HycoCheck(!(size > 0) || along <= Length(drawn) + HYCO_APART_SHARE * size,
-            "contact %s: the map brings node %d of %s and node %d of %s, which face each other as drawn, %.4g apart along "
-            "the surface, more than half of a facet (%.4g): a pair keeps its nodes; take type: surface",
+            "contact %s: the map brings node %d of %s and node %d of %s, which face each other as drawn, %.4g apart "
+            "along the surface, more than half of a facet (%.4g): a pair keeps its nodes; take type: surface",
             c->name, (int)fe->mesh->node_id[p->slave[k]], c->slave,
             (int)fe->mesh->node_id[p->master[p->master_start[k]]], c->master, (double)along, (double)size);
   PetscFunctionReturn(PETSC_SUCCESS);

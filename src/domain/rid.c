@@ -149,7 +149,7 @@ static PetscErrorCode CompleteSlaves(HycoMesh m, const HycoPairs *pairs, const P
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
 
-    if (hi - lo < (HycoPairsMoved(pairs, k) ? 1 : 2) || !node[pairs->slave[k]]) continue;
+    if (hi - lo < 2 || !node[pairs->slave[k]]) continue;
     for (PetscInt j = start[pairs->master[lo]]; j < start[pairs->master[lo] + 1]; j++) {
       PetscInt has = 0;
 
@@ -157,6 +157,38 @@ static PetscErrorCode CompleteSlaves(HycoMesh m, const HycoPairs *pairs, const P
         for (PetscInt i = lo; i < hi; i++) has += m->cells[around[j] * m->nv + v] == pairs->master[i];
       }
       if (has == hi - lo) in[around[j]] = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree(node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Moved surfaces: the cells around all nodes of contacts that have one in Omega_A. A slave outside would close, on its
+   way, the masters of all places to the interface, and leave no contact node of the master's body in A. */
+static PetscErrorCode CompleteMoved(HycoMesh m, const HycoPairs *pairs, const PetscInt start[], const PetscInt around[],
+                                    PetscBool in[])
+{
+  PetscBool *node, grown = (PetscBool)(pairs->room > 0);
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &node));
+  while (grown) {
+    grown = PETSC_FALSE;
+    PetscCall(MarkNodes(m, in, node));
+    for (PetscInt k = 0; k < pairs->n; k++) {
+      const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
+      PetscBool any = node[pairs->slave[k]];
+
+      if (!HycoPairsMoved(pairs, k)) continue;
+      for (PetscInt j = lo; j < hi; j++) any = (PetscBool)(any || node[pairs->master[j]]);
+      for (PetscInt j = lo - 1; any && j < hi; j++) {
+        const PetscInt i = j < lo ? pairs->slave[k] : pairs->master[j];
+
+        for (PetscInt e = start[i]; e < start[i + 1]; e++) {
+          grown = (PetscBool)(grown || !in[around[e]]);
+          in[around[e]] = PETSC_TRUE;
+        }
+      }
     }
   }
   PetscCall(PetscFree(node));
@@ -193,8 +225,10 @@ PetscErrorCode HycoRIDBuild(HycoScene scene, HycoMesh m, const HycoPairs *pairs,
   if (r->region) PetscCall(AddRegion(scene, m, r->region, start, around, in));
   if (r->extension > 0) PetscCall(ExtendContact(scene, m, pairs, r->extension, start, around, in));
   PetscCall(CompleteSlaves(m, pairs, start, around, in));
+  PetscCall(CompleteMoved(m, pairs, start, around, in));
   for (PetscInt k = 0; k < r->layers && added; k++) PetscCall(AddLayer(m, in, &added));
   PetscCall(CompleteSlaves(m, pairs, start, around, in));
+  PetscCall(CompleteMoved(m, pairs, start, around, in));
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(around));
   PetscFunctionReturn(PETSC_SUCCESS);

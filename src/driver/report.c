@@ -37,8 +37,8 @@ PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facin
     PetscCall(Say("NO CONTACT: no slave node faces a master where these parameters put the bodies\n"));
   if (overlap > 0) PetscCall(Say("largest initial overlap %.4g\n", (double)overlap));
   if (sliding > 1)
-    PetscCall(Say("LARGE SLIDING: a closed contact moves by %.2g facets along its surface; contact is searched for before "
-                  "displacement, and is good for less than one\n",
+    PetscCall(Say("LARGE SLIDING: a closed contact moves by %.2g facets along its surface; contact is searched for "
+                  "before displacement, and is good for less than one\n",
                   (double)sliding));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -491,7 +491,8 @@ static PetscErrorCode LoadReach(HycoH5 h, HycoModel m)
   if (!HycoH5Has(h, "problem/reach")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5LoadReal(h, "problem/reach", &m->scene->n_contacts, &one, &m->master_reach));
   PetscCall(HycoPairsSetSearch(m->scene, m->mesh, &m->pairs));
-  HycoCheck(m->pairs.room, "%s: problem/reach is damaged", m->path);
+  for (PetscInt c = 0; c < m->scene->n_contacts; c++)
+    HycoCheck(m->pairs.room && m->master_reach[c] >= 0, "%s: problem/reach is damaged", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -165,6 +165,7 @@ PetscErrorCode HycoModelOwnRows(HycoModel m)
 {
   HycoRows *rows = &m->own_rows;
   const PetscInt dim = m->mesh->dim;
+  const PetscReal none = m->own_pairs.room ? HycoContactNoGap(m->fe) : 0;
   PetscInt n = 0, lo = 0;
 
   PetscFunctionBegin;
@@ -179,7 +180,7 @@ PetscErrorCode HycoModelOwnRows(HycoModel m)
       rows->dof[n] = rows->dof[t];
       rows->value[n] = rows->value[t];
     }
-    if (!tested) rows->gap[k] = PetscMax(rows->gap[k], 0);
+    if (!tested) rows->gap[k] = none;
     rows->start[k + 1] = n;
     lo = hi;
   }

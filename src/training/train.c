@@ -53,8 +53,8 @@ static PetscErrorCode DropFixedContacts(HycoTrainer t, const PetscInt role[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What moved surfaces meet: every contact's masters at the training points and over the ranges, as far as contacts may close.
-   *rows, *of: of all contacts; those of the mesh as they are where nothing is moved (of: NULL). */
+/* What moved surfaces meet: every contact's masters at the training points and over the ranges, as far as contacts may
+   close. *rows, *of: of all contacts; those of the mesh as they are where nothing is moved (of: NULL). */
 static PetscErrorCode Meet(HycoTrainer t, HycoModel m, const HycoPairs **rows, const PetscInt **of)
 {
   PetscInt n;
