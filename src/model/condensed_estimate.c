@@ -1,9 +1,9 @@
 /*
-  The estimated errors of a condensed model. Along a parameter with n training values x_k the interpolation's remainder is
-  f[x_1 .. x_n, mu] times the product of mu - x_k: training finds the divided difference of the errors by leaving values
-  out, one order lower, and its decay (condense_errors.c); the product is known at any point. Summed over the parameters
-  that is the law, of the forces as of the displacement, to which comes what the modes cut off. Held-out solutions, where
-  there are any, give the scale by which the law is multiplied; without, it stands alone.
+  The estimated errors of a condensed model. Along a parameter with n training values x_k the interpolation's remainder
+  is f[x_1 .. x_n, mu] times the product of mu - x_k: training finds the divided difference of the errors by leaving
+  values out, one order lower, and its decay (condense_errors.c); the product is known at any point. Summed over the
+  parameters that is the law, of the forces as of the displacement, to which comes what the modes cut off. Held-out
+  solutions, where there are any, give the scale by which the law is multiplied; without, it stands alone.
 */
 #include <hycocondensed.h>
 

@@ -1,5 +1,5 @@
-/* The scale of a law by held-out points: its quantile, none of too few, its word at points not used for it; the scales of a
-   condensed model's estimates; how fast divided differences fall; a pseudo-inverse. */
+/* The scale of a law by held-out points: its quantile, none of too few, its word at points not used for it; the scales
+   of a condensed model's estimates; how fast divided differences fall; a pseudo-inverse. */
 #include "check.h"
 #include <hycocondensed.h>
 #include <math.h>
@@ -73,8 +73,8 @@ static PetscErrorCode Calibrates(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* 1/(x + 1.5): differences of order k are c (x0 + 1.5)^-1 ..., whose fall tends to 1 / (2 (1.5 + sqrt(1.25))) in units of a
-   quarter of the range; |x| has none that lasts. */
+/* 1/(x + 1.5): differences of order k are c (x0 + 1.5)^-1 ..., whose fall tends to 1 / (1.5 + sqrt(1.25)) in units of
+   a quarter of the range; |x| has none that lasts. */
 static PetscErrorCode Decays(void)
 {
   PetscReal x[9], smooth[9], kink[9], decay[2];
