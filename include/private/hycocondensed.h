@@ -93,7 +93,7 @@ void HycoCondensedPoint(HycoCondensed condensed, PetscInt k, PetscReal mu[]);
 /* The laws of the errors at mu, to be multiplied by scale[]; < 0: too few values, or an older file. */
 void HycoCondensedLaw(HycoCondensed condensed, const PetscReal mu[], PetscReal law[]);
 /* Sets the scales of u and the forces by n held-out points: their true errors (n each) and laws (HYCO_N_LAWS each). Too
-   few points: no estimates. */
+   few points for a quantile, but some: the law alone, or what is above all of them. */
 PetscErrorCode HycoCondensedCalibrate(HycoCondensed condensed, PetscInt n, const PetscReal error_u[],
                                       const PetscReal error_lambda[], const PetscReal law[]);
 /* To and from the model's file. */

@@ -30,6 +30,7 @@ PetscErrorCode HycoCondensedCalibrate(HycoCondensed c, PetscInt n, const PetscRe
 {
   const PetscReal *error[2] = {error_u, error_lambda};
   const PetscInt of[2] = {HYCO_LAW_U, HYCO_LAW_LAMBDA};
+  const PetscBool few = (PetscBool)(SHARE * (PetscReal)(n + 1) > (PetscReal)n); /* the law stands, above all of them */
   PetscReal *column;
 
   PetscFunctionBegin;
@@ -37,6 +38,10 @@ PetscErrorCode HycoCondensedCalibrate(HycoCondensed c, PetscInt n, const PetscRe
   for (PetscInt k = 0; k < 2; k++) {
     for (PetscInt i = 0; i < n; i++) column[i] = law[i * HYCO_N_LAWS + of[k]];
     PetscCall(HycoConformalScale(n, error[k], column, SHARE, &c->scale[of[k]]));
+    for (PetscInt i = 0; few && i < n; i++) {
+      c->scale[of[k]] = column[i] > 0 ? PetscMax(PetscMax(1, c->scale[of[k]]), error[k][i] / column[i]) : -1;
+      if (!(column[i] > 0)) break;
+    }
   }
   c->scale[HYCO_LAW_U_FULL] = c->scale[HYCO_LAW_LAMBDA];
   PetscCall(PetscFree(column));

@@ -68,7 +68,8 @@ static PetscErrorCode Calibrates(void)
   CHECK_NEAR(c->scale[HYCO_LAW_LAMBDA], 95, 1e-13);
   CHECK_NEAR(c->scale[HYCO_LAW_U_FULL], 95, 1e-13);
   PetscCall(HycoCondensedCalibrate(c, 5, u, lambda, law));
-  CHECK(c->scale[HYCO_LAW_U] < 0 && c->scale[HYCO_LAW_LAMBDA] < 0, "five points calibrate nothing");
+  CHECK_NEAR(c->scale[HYCO_LAW_U], 1, 0); /* errors of 0.1 to 0.5 by laws of 1 lower nothing: five are too few */
+  CHECK_NEAR(c->scale[HYCO_LAW_LAMBDA], 25, 1e-13); /* above 50 by 2 */
   PetscCall(HycoCondensedDestroy(&c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
