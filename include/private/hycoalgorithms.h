@@ -55,8 +55,8 @@ PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const
 
 /*
   The scale by which a law is multiplied to be no smaller than the error at `share` of the points like the n it was held
-  against: the ratio error / law number ceil(share (n + 1)) from below (split conformal prediction; Lei, G'Sell, Rinaldo,
-  Tibshirani, Wasserman, JASA 113 (2018) 1094-1111). -1: n is too small for that, or a law is not positive. Not
+  against: the ratio error / law number ceil(share (n + 1)) from below (split conformal prediction; Lei, G'Sell,
+  Rinaldo, Tibshirani, Wasserman, JASA 113 (2018) 1094-1111). -1: n is too small for that, or a law is not positive. Not
   collective.
 */
 PetscErrorCode HycoConformalScale(PetscInt n, const PetscReal error[], const PetscReal law[], PetscReal share,

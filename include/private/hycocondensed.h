@@ -33,7 +33,7 @@ struct _n_HycoCondensed {
   PetscInt dim, m, l;                                               /* parameters, contacts, modes */
   PetscInt n[HYCO_MAX_PARAMETERS];                                  /* training values of each parameter */
   PetscReal *x[HYCO_MAX_PARAMETERS];                                /* ascending */
-  PetscInt stiff[HYCO_MAX_PARAMETERS], affine[HYCO_MAX_PARAMETERS]; /* reaches K or B; what is interpolated is exact in it */
+  PetscInt stiff[HYCO_MAX_PARAMETERS], affine[HYCO_MAX_PARAMETERS]; /* reaches K or B; is exact in it */
   HycoGridField field[HYCO_N_FIELDS]; /* G: the columns of its lower triangle, m (m + 1) / 2; H: l x m row major */
   PetscInt exact_gap;   /* the field of the gap is -B K^-1 F, and D the scene's; 0, of older files: it is g */
   PetscInt exact_loads; /* the fields of the gap and of a by what the load is of the training loads; 0: polynomials */
@@ -81,7 +81,7 @@ PetscErrorCode HycoCondensedEvaluate(HycoCondensed condensed, PetscInt field, co
                                      PetscInt skip, PetscReal value[]);
 PetscErrorCode HycoCondensedFreeGap(HycoCondensed condensed, const PetscReal mu[], PetscInt axis, PetscInt skip);
 PetscErrorCode HycoCondensedBringGap(HycoCondensed condensed, const PetscReal mu[]);
-/* The points where loads in space are evaluated, on a mesh whose nodes are at X; *fit: no shape follows the stiffness. */
+/* Where loads in space are evaluated, on a mesh with its nodes at X; *fit: no shape follows the stiffness. */
 PetscErrorCode HycoCondensedSurveyLoads(HycoCondensed condensed, HycoMesh mesh, const PetscReal X[], PetscBool *fit);
 /* After it or with the file's points: what the weights of the training loads need. */
 PetscErrorCode HycoCondensedPrepareLoads(HycoCondensed condensed);
@@ -93,7 +93,7 @@ void HycoCondensedPoint(HycoCondensed condensed, PetscInt k, PetscReal mu[]);
 /* The laws of the errors at mu, to be multiplied by scale[]; < 0: too few values, or an older file. */
 void HycoCondensedLaw(HycoCondensed condensed, const PetscReal mu[], PetscReal law[]);
 /* Sets the scales of u and the forces by n held-out points: their true errors (n each) and laws (HYCO_N_LAWS each). Too
-   few points: no estimates. */
+   few points for a quantile, but some: the law alone, or what is above all of them. */
 PetscErrorCode HycoCondensedCalibrate(HycoCondensed condensed, PetscInt n, const PetscReal error_u[],
                                       const PetscReal error_lambda[], const PetscReal law[]);
 /* To and from the model's file. */

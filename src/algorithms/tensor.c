@@ -212,9 +212,9 @@ PetscErrorCode HycoTensorDecay(const HycoTensor *t, PetscInt axis, PetscInt rows
 
   PetscFunctionBegin;
   *decay = 1;
-  for (PetscInt order = 0; order < 3 && order < n; order++) {
-    for (PetscInt first = 0; first <= order; first++)
-      d[order] = PetscMax(d[order], Difference(t, axis, first, n - order, rows, data));
+  for (PetscInt order = 0; order < 3 && order < n; order++) { /* the mean of both ends: one may be larger */
+    d[order] = PetscSqrtReal(Difference(t, axis, 0, n - order, rows, data) *
+                             Difference(t, axis, order, n - order, rows, data));
   }
   for (size_t k = 0; k < (size_t)HycoTensorSize(t) * (size_t)rows; k++) whole += data[k] * data[k];
   if (n < 3 || d[0] <= ROUNDING * PetscSqrtReal(whole)) PetscFunctionReturn(PETSC_SUCCESS);

@@ -167,17 +167,17 @@ static PetscErrorCode JudgePoints(HycoScene scene, const HycoTraining *t)
   PetscFunctionBegin;
   if (t->target_met) PetscFunctionReturn(PETSC_SUCCESS);
   if (t->hopeless < 0) {
-    PetscCall(DriverMissed("-hyco_condensed_tol was not reached: the forces' error, one value left out, is %.1e, and %.1e "
-                           "was asked; raise -hyco_condensed_max_values, which is %d, or -hyco_condensed_tol",
+    PetscCall(DriverMissed("-hyco_condensed_tol was not reached: the forces' error, one value left out, is %.1e, and "
+                           "%.1e was asked; raise -hyco_condensed_max_values, which is %d, or -hyco_condensed_tol",
                            (double)t->left_out[2], (double)t->target, (int)t->most_values));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoSceneGetParameters(scene, NULL, &names, NULL, NULL));
   name = names[t->hopeless];
-  PetscCall(DriverMissed("-hyco_condensed_tol was not reached: with %d values of %s the forces' error, one of them left "
-                         "out, is %.1e, and hardly falls as values are added, where %.1e was asked: the stiffness or the "
-                         "contacts do not depend smoothly on %s (a kink, as of abs or max, a jump); train a hybrid model, "
-                         "or raise -hyco_condensed_tol",
+  PetscCall(DriverMissed("-hyco_condensed_tol was not reached: with %d values of %s the forces' error, one of them "
+                         "left out, is %.1e, and hardly falls as values are added, where %.1e was asked: the stiffness "
+                         "or the contacts do not depend smoothly on %s (a kink, as of abs or max, a jump); train a "
+                         "hybrid model, or raise -hyco_condensed_tol",
                          (int)t->hopeless_values, name, (double)t->hopeless_error, (double)t->target, name));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,9 +1,9 @@
 /*
-  The estimated errors of a condensed model. Along a parameter with n training values x_k the interpolation's remainder is
-  f[x_1 .. x_n, mu] times the product of mu - x_k: training finds the divided difference of the errors by leaving values
-  out, one order lower, and its decay (condense_errors.c); the product is known at any point. Summed over the parameters
-  that is the law, of the forces as of the displacement, to which comes what the modes cut off. Held-out solutions, where
-  there are any, give the scale by which the law is multiplied; without, it stands alone.
+  The estimated errors of a condensed model. Along a parameter with n training values x_k the interpolation's remainder
+  is f[x_1 .. x_n, mu] times the product of mu - x_k: training finds the divided difference of the errors by leaving
+  values out, one order lower, and its decay (condense_errors.c); the product is known at any point. Summed over the
+  parameters that is the law, of the forces as of the displacement, to which comes what the modes cut off. Held-out
+  solutions, where there are any, give the scale by which the law is multiplied; without, it stands alone.
 */
 #include <hycocondensed.h>
 
@@ -30,6 +30,7 @@ PetscErrorCode HycoCondensedCalibrate(HycoCondensed c, PetscInt n, const PetscRe
 {
   const PetscReal *error[2] = {error_u, error_lambda};
   const PetscInt of[2] = {HYCO_LAW_U, HYCO_LAW_LAMBDA};
+  const PetscBool few = (PetscBool)(SHARE * (PetscReal)(n + 1) > (PetscReal)n); /* the law stands, above all of them */
   PetscReal *column;
 
   PetscFunctionBegin;
@@ -37,6 +38,10 @@ PetscErrorCode HycoCondensedCalibrate(HycoCondensed c, PetscInt n, const PetscRe
   for (PetscInt k = 0; k < 2; k++) {
     for (PetscInt i = 0; i < n; i++) column[i] = law[i * HYCO_N_LAWS + of[k]];
     PetscCall(HycoConformalScale(n, error[k], column, SHARE, &c->scale[of[k]]));
+    for (PetscInt i = 0; few && i < n; i++) {
+      c->scale[of[k]] = column[i] > 0 ? PetscMax(PetscMax(1, c->scale[of[k]]), error[k][i] / column[i]) : -1;
+      if (!(column[i] > 0)) break;
+    }
   }
   c->scale[HYCO_LAW_U_FULL] = c->scale[HYCO_LAW_LAMBDA];
   PetscCall(PetscFree(column));

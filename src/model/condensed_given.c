@@ -133,7 +133,8 @@ void HycoCondensedPoint(HycoCondensed c, PetscInt k, PetscReal mu[])
 /* Each node's node of the stiffness, and its number among those that share it. */
 static PetscErrorCode NumberLoads(HycoCondensed c)
 {
-  const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), n_stiff = HycoTensorSize(&c->field[HYCO_FIELD_G].tensor);
+  const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor),
+                 n_stiff = HycoTensorSize(&c->field[HYCO_FIELD_G].tensor);
   PetscInt *count;
 
   PetscFunctionBegin;
@@ -235,7 +236,7 @@ PetscErrorCode HycoCondensedLoadWeights(HycoCondensed c, const PetscReal mu[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The weights of all nodes of the whole grid: those of the stiffness's nodes, times what the load is of each of theirs. */
+/* The weights of all nodes of the whole grid: those of G's nodes, times what the load is of each of theirs. */
 static PetscErrorCode Weights(HycoCondensed c, const PetscReal mu[], PetscInt axis, PetscInt skip,
                               const HycoTensor *degrees, PetscReal weight[])
 {

@@ -153,7 +153,8 @@ static void Condensed(HycoModel m, HycoPrediction *p)
 
   if (c->law) {
     HycoCondensedLaw(c, m->fe->mu, law);
-    for (PetscInt j = 0; j < HYCO_N_LAWS; j++) law[j] = law[j] < 0 || c->scale[j] < 0 ? -1 : PetscMax(HYCO_LAW_FLOOR, law[j] * c->scale[j]);
+    for (PetscInt j = 0; j < HYCO_N_LAWS; j++)
+      law[j] = law[j] < 0 || c->scale[j] < 0 ? -1 : PetscMax(HYCO_LAW_FLOOR, law[j] * c->scale[j]);
     p->estimated_error_u = law[HYCO_LAW_U];
     p->estimated_error_lambda = p->interpolation_error = law[HYCO_LAW_LAMBDA];
     p->estimated_error_u_full = law[HYCO_LAW_U_FULL];
@@ -213,9 +214,9 @@ PetscErrorCode HycoTrustView(HycoModel m, PetscViewer viewer)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors, by %d predictions of held-out solutions\n",
                                      (int)t->n));
   else if (m->type == HYCO_MODEL_CONDENSED)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors by values left out%s\n",
-                                     !m->condensed->law && m->condensed->errors_u[0] < 0 ? ", and none of u: an older file"
-                                                                                         : ""));
+    PetscCall(PetscViewerASCIIPrintf(
+        viewer, "  estimates its errors by values left out%s\n",
+        !m->condensed->law && m->condensed->errors_u[0] < 0 ? ", and none of u: an older file" : ""));
   else
     PetscCall(PetscViewerASCIIPrintf(viewer, "  does not estimate its errors: not calibrated\n"));
   if (m->search) PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->search));

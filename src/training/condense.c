@@ -132,7 +132,7 @@ static PetscErrorCode AffineAt(HycoTrainer t, PetscInt p, PetscReal share, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the load at mu, at node s of the stiffness, is the sum of its training loads that their values say. Rank 0. */
+/* Whether the load at mu, at node s of the stiffness, is the sum of its training loads that values say. Rank 0. */
 static PetscErrorCode CheckSum(HycoTrainer t, HycoCondensed c, PetscInt s, const PetscReal mu[], PetscBool *exact)
 {
   const PetscInt n = t->fe->n_dof, nodes = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);

@@ -12,7 +12,7 @@
 #define AFFINE_VALUES 5
 #define FIRST_VALUES  3
 #define LEJA_GRID     2000
-#define TIE           1e-6 /* relative: of parameters that cost nearly the same the first is refined, on any number of ranks */
+#define TIE           1e-6 /* relative: of parameters that cost nearly the same the first is refined */
 
 #define LOOK_BACK     4   /* values over which an error's fall is measured, from twice as many on */
 #define SLOW          0.7 /* a fall per value that no smooth dependence has */
@@ -102,7 +102,7 @@ typedef struct {
   PetscReal *error; /* dim x (most + 1) */
 } History;
 
-/* Whether more values of p are in vain: at the rate at which they have made its error fall the target is out of reach. */
+/* Whether more values of p are in vain: at the rate at which its error has fallen the target is out of reach. */
 static PetscBool IsHopeless(HycoTrainer t, const History *h, PetscInt p)
 {
   HycoCondensed c = t->condensed;
@@ -135,7 +135,8 @@ PetscErrorCode HycoTrainerChoosePoints(HycoTrainer t, HycoSnapshots store, HycoS
     PetscCall(TakeSamples(t, counts, samples));
     PetscCall(Estimate(t, store));
     worst = Choose(t, &t->condensed->target_met);
-    for (PetscInt p = 0; p < s->n_parameters; p++) h.error[p * (h.most + 1) + counts[p]] = t->condensed->by_parameter[p];
+    for (PetscInt p = 0; p < s->n_parameters; p++)
+      h.error[p * (h.most + 1) + counts[p]] = t->condensed->by_parameter[p];
     t->condensed->hopeless = worst >= 0 && IsHopeless(t, &h, worst) ? worst : -1;
     if (t->condensed->hopeless >= 0) break;
     if (worst >= 0) counts[worst]++;

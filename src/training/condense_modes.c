@@ -99,8 +99,8 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts that are active at one of two samples alone. What counts as active has one measure for all samples: where
-   gaps and loads vanish together, the forces are round-off, which differs from one number of ranks to the next. */
+/* The contacts that are active at one of two samples alone. What counts as active has one measure for all samples:
+   where gaps and loads vanish together, the forces are round-off, which differs from one number of ranks to the next. */
 static PetscInt Differ(PetscInt m, const PetscReal a[], const PetscReal b[], PetscReal least)
 {
   PetscInt n = 0;
