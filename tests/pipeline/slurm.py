@@ -23,7 +23,7 @@ while :; do
     *) break ;;
   esac
 done
-for v in $(env | sed -n 's/^\(SLURM_[A-Z_]*\)=.*/\1/p'); do unset "$v"; done # Open MPI would ask Slurm
+unset $(env | cut -d= -f1 | grep ^SLURM_) # Open MPI would ask Slurm
 exec {shlex.join(MPIRUN)} "$n" "$@"
 '''
 SCONTROL = '#!/bin/sh\necho "$*" >>"$NOTES/scontrol"\n'

@@ -1,4 +1,4 @@
-"""CMake refuses an MPI that is not PETSc's: here a wrapper whose mpi.h is another implementation's."""
+"""CMake refuses an MPI that is not PETSc's: here a wrapper whose mpi.h calls itself another implementation's."""
 import os
 import subprocess
 import tempfile
@@ -12,13 +12,18 @@ case ${{1:-}} in
   *) exec mpicc "$@" ;;
 esac
 """
+# compiles and links, and says that it is no Open MPI
+OTHER = """#include_next <mpi.h>
+#undef OMPI_MAJOR_VERSION
+#define MPICH_NUMVERSION 40000000
+"""
 
 
 class OtherMPI(unittest.TestCase):
     def test_refused(self):
         with tempfile.TemporaryDirectory(prefix='hyco-mpi-') as folder:
             wrapper = os.path.join(folder, 'mpicc')
-            for path, text in ((wrapper, WRAPPER.format(folder=folder)), (os.path.join(folder, 'mpi.h'), '#define MPICH_NUMVERSION 40000000\n')):
+            for path, text in ((wrapper, WRAPPER.format(folder=folder)), (os.path.join(folder, 'mpi.h'), OTHER)):
                 with open(path, 'w', encoding='ascii') as file:
                     file.write(text)
             os.chmod(wrapper, 0o755)
