@@ -54,15 +54,6 @@ PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const
                               PetscReal c[]);
 
 /*
-  The scale by which a law is multiplied to be no smaller than the error at `share` of the points like the n it was held
-  against: the ratio error / law number ceil(share (n + 1)) from below (split conformal prediction; Lei, G'Sell,
-  Rinaldo, Tibshirani, Wasserman, JASA 113 (2018) 1094-1111). -1: n is too small for that, or a law is not positive. Not
-  collective.
-*/
-PetscErrorCode HycoConformalScale(PetscInt n, const PetscReal error[], const PetscReal law[], PetscReal share,
-                                  PetscReal *scale);
-
-/*
   Many problems over one S (m x n column major, borrowed): min 1/2 sum_k d_k (S x)_k^2 - h^T S x + shift/2 |x|^2, x >=
   0, that is |diag(sqrt(d)) S x - b|^2 / 2 with h = sqrt(d) b. d >= 0 and h: m each. shift > 0, so that there is one
   answer. Nothing is allocated after Create; an answer does not depend on the problems before. *solved: the optimality

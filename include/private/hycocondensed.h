@@ -51,7 +51,6 @@ struct _n_HycoCondensed {
   PetscReal *law;    /* dim x HYCO_N_LAWS: of a parameter's remainder; NULL: an older file */
   PetscInt *flat;    /* dim: the remainder has no nodes, for the polynomial does not interpolate */
   PetscReal cut;     /* what the modes leave out of any displacement */
-  PetscReal scale[HYCO_N_LAWS]; /* by held-out points; 1 without any; < 0: no estimate */
   /* training only: the error of the forces by parameter; the sample of each node of the whole grid */
   PetscReal by_parameter[HYCO_MAX_PARAMETERS];
   PetscInt hopeless;    /* the points were chosen: of this parameter more values were in vain; -1: none */
@@ -90,12 +89,8 @@ PetscErrorCode HycoCondensedLoadWeights(HycoCondensed condensed, const PetscReal
                                         PetscBool *span);
 /* The parameters of node k of the whole grid. */
 void HycoCondensedPoint(HycoCondensed condensed, PetscInt k, PetscReal mu[]);
-/* The laws of the errors at mu, to be multiplied by scale[]; < 0: too few values, or an older file. */
+/* The laws of the errors at mu; < 0: too few values, or an older file. */
 void HycoCondensedLaw(HycoCondensed condensed, const PetscReal mu[], PetscReal law[]);
-/* Sets the scales of u and the forces by n held-out points: their true errors (n each) and laws (HYCO_N_LAWS each). Too
-   few points for a quantile, but some: the law alone, or what is above all of them. */
-PetscErrorCode HycoCondensedCalibrate(HycoCondensed condensed, PetscInt n, const PetscReal error_u[],
-                                      const PetscReal error_lambda[], const PetscReal law[]);
 /* To and from the model's file. */
 PetscErrorCode HycoCondensedSave(HycoModel model, HycoH5 file);
 PetscErrorCode HycoCondensedLoad(HycoModel model, HycoH5 file);

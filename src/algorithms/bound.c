@@ -30,25 +30,6 @@ static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoConformalScale(PetscInt n, const PetscReal error[], const PetscReal law[], PetscReal share,
-                                  PetscReal *scale)
-{
-  const PetscInt at = (PetscInt)PetscCeilReal(share * (PetscReal)(n + 1) * (1 - 1e-12)) - 1;
-  PetscReal *ratio;
-  PetscBool known = (PetscBool)(at < n);
-
-  PetscFunctionBegin;
-  *scale = -1;
-  for (PetscInt i = 0; i < n; i++) known = (PetscBool)(known && law[i] > 0);
-  if (!known) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(n, &ratio));
-  for (PetscInt i = 0; i < n; i++) ratio[i] = error[i] / law[i];
-  PetscCall(PetscSortReal(n, ratio));
-  *scale = ratio[PetscMax(at, 0)];
-  PetscCall(PetscFree(ratio));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal share,
                               PetscReal c[])
 {

@@ -7,8 +7,6 @@
 */
 #include <hycocondensed.h>
 
-#define SHARE 0.95  /* of unseen points that the scaled law bounds */
-
 void HycoCondensedLaw(HycoCondensed c, const PetscReal mu[], PetscReal law[])
 {
   for (PetscInt j = 0; j < HYCO_N_LAWS; j++) law[j] = c->law ? HYCO_LAW_FLOOR : -1;
@@ -23,27 +21,4 @@ void HycoCondensedLaw(HycoCondensed c, const PetscReal mu[], PetscReal law[])
     for (PetscInt j = 0; j < HYCO_N_LAWS; j++) law[j] = of[j] < 0 || law[j] < 0 ? -1 : law[j] + of[j] * shape;
   }
   if (law[HYCO_LAW_U] >= 0) law[HYCO_LAW_U] += c->cut;
-}
-
-PetscErrorCode HycoCondensedCalibrate(HycoCondensed c, PetscInt n, const PetscReal error_u[],
-                                      const PetscReal error_lambda[], const PetscReal law[])
-{
-  const PetscReal *error[2] = {error_u, error_lambda};
-  const PetscInt of[2] = {HYCO_LAW_U, HYCO_LAW_LAMBDA};
-  const PetscBool few = (PetscBool)(SHARE * (PetscReal)(n + 1) > (PetscReal)n); /* the law stands, above all of them */
-  PetscReal *column;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n + 1, &column));
-  for (PetscInt k = 0; k < 2; k++) {
-    for (PetscInt i = 0; i < n; i++) column[i] = law[i * HYCO_N_LAWS + of[k]];
-    PetscCall(HycoConformalScale(n, error[k], column, SHARE, &c->scale[of[k]]));
-    for (PetscInt i = 0; few && i < n; i++) {
-      c->scale[of[k]] = column[i] > 0 ? PetscMax(PetscMax(1, c->scale[of[k]]), error[k][i] / column[i]) : -1;
-      if (!(column[i] > 0)) break;
-    }
-  }
-  c->scale[HYCO_LAW_U_FULL] = c->scale[HYCO_LAW_LAMBDA];
-  PetscCall(PetscFree(column));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

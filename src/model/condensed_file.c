@@ -31,7 +31,6 @@ PetscErrorCode HycoCondensedSave(HycoModel m, HycoH5 h)
   PetscCall(HycoH5WriteReal(h, "condensed/law", c->dim, HYCO_N_LAWS, c->law));
   PetscCall(HycoH5WriteInt(h, "condensed/law_flat", c->dim, 1, c->flat));
   PetscCall(HycoH5WriteReal(h, "condensed/law_cut", 1, 1, &c->cut));
-  PetscCall(HycoH5WriteReal(h, "condensed/law_scale", HYCO_N_LAWS, 1, c->scale));
   PetscCall(HycoH5WriteReal(h, "condensed/lambda", HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), c->m, c->Lambda));
   PetscCall(HycoH5WriteReal(h, "condensed/bounds", HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), 2, c->bounds));
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) {
@@ -100,7 +99,6 @@ static PetscErrorCode LoadLaw(HycoH5 h, HycoCondensed c)
   PetscCall(PetscMalloc1(c->dim + 1, &c->flat));
   PetscCall(LoadFlags(h, "condensed/law_flat", c->dim, c->flat));
   PetscCall(HycoH5ReadReal(h, "condensed/law_cut", 1, 1, &c->cut));
-  PetscCall(HycoH5ReadReal(h, "condensed/law_scale", HYCO_N_LAWS, 1, c->scale));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -154,7 +154,7 @@ static void Condensed(HycoModel m, HycoPrediction *p)
   if (c->law) {
     HycoCondensedLaw(c, m->fe->mu, law);
     for (PetscInt j = 0; j < HYCO_N_LAWS; j++)
-      law[j] = law[j] < 0 || c->scale[j] < 0 ? -1 : PetscMax(HYCO_LAW_FLOOR, law[j] * c->scale[j]);
+      law[j] = law[j] < 0 ? -1 : PetscMax(HYCO_LAW_FLOOR, law[j]);
     p->estimated_error_u = law[HYCO_LAW_U];
     p->estimated_error_lambda = p->interpolation_error = law[HYCO_LAW_LAMBDA];
     p->estimated_error_u_full = law[HYCO_LAW_U_FULL];

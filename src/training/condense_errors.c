@@ -123,7 +123,7 @@ static PetscBool Interpolates(HycoCondensed c, PetscInt p)
 static PetscErrorCode FitLaw(HycoCondensed c, PetscInt p, Work *w)
 {
   const HycoGridField *G = &c->field[HYCO_FIELD_G], *gap = &c->field[HYCO_FIELD_GAP];
-  static const PetscReal margin[HYCO_N_LAWS] = {0.7, 1.5, 1.5}; /* by scenes in 2D and 3D: held-out points scale */
+  static const PetscReal margin[HYCO_N_LAWS] = {0.7, 1.5, 1.5}; /* by scenes in 2D and 3D */
   PetscReal decay = 1, other = 0;
 
   PetscFunctionBegin;
@@ -219,7 +219,6 @@ PetscErrorCode HycoTrainerLeaveOut(HycoTrainer t)
   c->errors[2] = 0;
   for (PetscInt p = 0; p < c->dim; p++) PetscCall(LeaveOutParameter(t, c, p, &w));
   c->cut = c->l ? ModesError(t, c, &w) : 0;
-  for (PetscInt j = 0; j < HYCO_N_LAWS; j++) c->scale[j] = 1;
   for (PetscInt j = 0; j < HYCO_N_LAWS; j++) PetscCall(PetscFree(w.difference[j]));
   PetscCall(PetscFree2(w.L, w.d));
   PetscFunctionReturn(PETSC_SUCCESS);
