@@ -48,10 +48,11 @@ PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], Petsc
 
 /*
   c with y <= sum_j c_j X_j + c[p] for `share` of the n > 0 rows (the quantile number ceil(share (n + 1)), at most the
-  largest), c_j >= 0 by regularised least squares. X: n x p row major; c: p + 1. Not collective.
+  largest), c_j >= 0 by regularised least squares over the first `telling` of them. X: n x p row major; c: p + 1. Not
+  collective.
 */
-PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal share,
-                              PetscReal c[]);
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, PetscInt p, const PetscReal X[], const PetscReal y[],
+                              PetscReal share, PetscReal c[]);
 
 /*
   Many problems over one S (m x n column major, borrowed): min 1/2 sum_k d_k (S x)_k^2 - h^T S x + shift/2 |x|^2, x >=

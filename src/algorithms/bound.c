@@ -30,14 +30,14 @@ static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoUpperBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal share,
-                              PetscReal c[])
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, PetscInt p, const PetscReal X[], const PetscReal y[],
+                              PetscReal share, PetscReal c[])
 {
   PetscReal *above;
 
   PetscFunctionBegin;
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is nothing to bound");
-  PetscCall(Fit(n, p, X, y, c));
+  PetscCall(Fit(telling, p, X, y, c));
   PetscCall(PetscMalloc1(n, &above));
   for (PetscInt i = 0; i < n; i++) {
     above[i] = y[i];

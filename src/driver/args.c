@@ -138,6 +138,9 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
   char copy[DRIVER_LINE], takers[DRIVER_LINE], *rest;
 
   PetscFunctionBegin;
+  HycoCheck(strcasecmp(name, "hyco_trust_folds"),
+            "hyco %s knows no option -%s: it is now -hyco_validation, the number of held-out points that the estimates of errors are "
+            "calibrated on", command->name, name);
   ListTakers(name, takers);
   HycoCheck(!takers[0], "hyco %s knows no option -%s; what does: hyco %s", command->name, name, takers);
   PetscCall(HycoGetOptionTable(&n, &table));

@@ -57,29 +57,35 @@ static PetscErrorCode Spacing(HycoTrainer t, PetscReal *spacing)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The law of one kind of error; none where an error is not finite. */
+/* The law of one kind of error; none where an error is not finite. Where there is no error, as of forces without
+   contact, the features tell nothing of its size: these rows come last, and only lift the law. */
 static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoTrustKind kind, HycoTrust *trust)
 {
   static const HycoErrorKind errors[HYCO_N_TRUST] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
   const PetscInt p = HYCO_TRUST_FEATURES;
-  PetscReal *X, *y, least;
+  PetscReal *X, *y, *error, least;
+  PetscInt filled = 0, telling = 0;
   PetscBool finite = PETSC_TRUE;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(n * p, &X, n, &y));
+  PetscCall(PetscMalloc3(n * p, &X, n, &y, n, &error));
   for (PetscInt i = 0; i < n; i++) {
-    y[i] = HycoHeldOutError(&rows[i], errors[kind], trust->force);
-    finite = (PetscBool)(finite && !PetscIsInfOrNanReal(y[i]));
+    error[i] = HycoHeldOutError(&rows[i], errors[kind], trust->force);
+    finite = (PetscBool)(finite && !PetscIsInfOrNanReal(error[i]));
   }
-  PetscCall(Median(n, y, 1, PETSC_SMALL, &least));
-  for (PetscInt i = 0; finite && i < n; i++) {
-    for (PetscInt j = 0; j < p; j++) X[i * p + j] = PetscLogReal(1 + rows[i].feature[j] / trust->floor[j]);
-    y[i] = PetscLogReal(PetscMax(y[i], NEGLIGIBLE * least));
+  PetscCall(Median(n, error, 1, PETSC_SMALL, &least));
+  for (PetscInt pass = 0; finite && pass < 2; pass++) {
+    for (PetscInt i = 0; i < n; i++) {
+      if ((error[i] > NEGLIGIBLE * least) != (pass == 0)) continue;
+      for (PetscInt j = 0; j < p; j++) X[filled * p + j] = PetscLogReal(1 + rows[i].feature[j] / trust->floor[j]);
+      y[filled++] = PetscLogReal(PetscMax(error[i], NEGLIGIBLE * least));
+      if (pass == 0) telling = filled;
+    }
   }
   trust->has[kind] = (PetscBool)(finite && (kind != HYCO_TRUST_LAMBDA || trust->force > 0));
-  if (trust->has[kind]) PetscCall(HycoUpperBound(n, p, X, y, SHARE, trust->law[kind]));
+  if (trust->has[kind]) PetscCall(HycoUpperBound(n, telling ? telling : n, p, X, y, SHARE, trust->law[kind]));
   trust->law[kind][p] += PetscLogReal(MARGIN);
-  PetscCall(PetscFree2(X, y));
+  PetscCall(PetscFree3(X, y, error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -440,6 +440,9 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
   PetscFunctionBegin;
   HycoCheckHandle(t, "HycoTrainerCreate()");
   HycoCheck(samples || t->type == HYCO_MODEL_CONDENSED, "give the training points");
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
+    HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
+              "-target_%s judges the model at held-out points, and -hyco_validation is 0: there are none", HycoErrorKinds[j]);
   if (choose) {
     PetscCall(HycoTrainerStartPoints(t, &chosen));
     samples = chosen;

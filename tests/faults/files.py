@@ -11,7 +11,7 @@ import unittest
 import h5py
 import numpy as np
 
-from common import HYCO, PATIENCE, PELLET, ROPE, SANITIZED, SOURCE, Case
+from common import HYCO, PATIENCE, PELLET, ROPE, SANITIZED, SOURCE, Case, settled
 from rows import Rows
 
 DATA = os.path.join(SOURCE, 'tests', 'data')
@@ -34,12 +34,13 @@ class Files(Case):
     def setUpClass(cls):
         super().setUpClass()
         cls.hyco('train', '-scene', ROPE, '-grid', '4,4', '-model', 'good.h5')
+        cls.hyco('train', '-scene', ROPE, '-grid', '4,4', '-model', 'held.h5', '-hyco_validation', 12, status=None)
         cls.hyco(*CONDENSED)
 
     def refused(self, name, text, command='predict', *more):
         """One line, status 1, in an address space of 2 GB (a size that a file claims must not be asked for)."""
         arguments = [command, '-model', name] + (['-mu', '0.07,0.17'] if command == 'predict' else []) + list(more)
-        run = subprocess.run([HYCO, *arguments], cwd=self.folder, capture_output=True, text=True, timeout=60 * PATIENCE,
+        run = subprocess.run([HYCO, *settled(arguments)], cwd=self.folder, capture_output=True, text=True, timeout=60 * PATIENCE,
                              preexec_fn=None if SANITIZED else lambda: resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30)))
         self.assertEqual(run.returncode, 1, run.stderr)
         self.assertEqual(run.stderr.count('\n'), 1, run.stderr)
@@ -97,7 +98,7 @@ class Files(Case):
                  ('mesh/node_id', (1 << 40, 1), 'i4'), ('problem/scene', (1 << 33, 1), 'i1'),
                  ('training/points', (1 << 30, 2), 'f8'), ('condensed/G', (1 << 20, 1 << 20), 'f8'),
                  ('condensed/values_0', (1 << 40, 1), 'f8'), ('condensed/values_1', (1 << 28, 1), 'f8'),
-                 ('condensed/g', (1 << 28, 98), 'f8'), ('condensed/lambda', (6, 1 << 40), 'f8'))
+                 ('condensed/settled', (1 << 28, 98), 'f8'), ('condensed/lambda', (6, 1 << 40), 'f8'))
         for name, shape, kind in sizes:
             with self.subTest(name=name, shape=shape):
                 self.refused(self.edited(put(name, shape, kind), 'c.h5' if 'condensed' in name else 'good.h5'), f'{name} is damaged')
@@ -112,7 +113,7 @@ class Files(Case):
             return change
 
         values = (('values_0', (0, 0), np.nan), ('values_0', (1, 0), 0.05), ('values_1', (2, 0), -np.inf), ('G', (1, 7), np.inf),
-                  ('g', (0, 0), np.nan), ('H', (0, 0), np.nan), ('a', (0, 0), np.nan), ('degree_G', (0, 0), 2),
+                  ('settled', (0, 0), np.nan), ('H', (0, 0), np.nan), ('a', (0, 0), np.nan), ('degree_G', (0, 0), 2),
                   ('degree_g', (1, 0), -1), ('stiff', (0, 0), 2), ('stiff', (0, 0), 0), ('affine', (1, 0), -1), ('bounds', (0, 0), -1),
                   ('bounds', (0, 1), 0), ('bounds', (0, 0), np.nan))
         for name, at, value in values:
@@ -159,11 +160,13 @@ class Files(Case):
                                       ('problem/fe_dof', (1, 0), 0, 'fe_dof is damaged'), ('format', (0, 0), 99, 'has model format 99'),
                                       ('kind', (0, 0), 88, 'is no hyco model'), ('mesh/head', (0, 0), 77, 'outside'),
                                       ('mesh/group_start', (1, 0), 10**6, 'damaged'),
-                                      ('training/trust', (3, 0), np.nan, 'training/trust holds a value that is not finite'),
-                                      ('training/trust', (1, 0), 0, 'training/trust is damaged'),
-                                      ('training/trust', (0, 0), 1e300, 'training/trust is damaged'),
-                                      ('training/trust', (0, 0), 0, 'training/trust is damaged'),
-                                      ('training/trust', (15, 0), -1, 'training/trust is damaged'),
+                                      ('training/estimates', (3, 0), np.nan, 'training/estimates holds a value that is not finite'),
+                                      ('training/estimates', (2, 0), 0, 'training/estimates is damaged'),
+                                      ('training/estimates', (0, 0), 1e300, 'training/estimates is damaged'),
+                                      ('training/estimates', (0, 0), 0, 'training/estimates is damaged'),
+                                      ('training/estimates', (1, 0), -1, 'training/estimates is damaged'),
+                                      ('training/held_out', (1, 0), -1, 'training/held_out is damaged'),
+                                      ('training/held_out', (0, 0), 0, 'training/held_out is damaged'),
                                       ('table/counts', (1, 0), 16, 'table/counts is damaged|table/parameters is'),
                                       ('table/counts', slice(None), 16, 'table/counts is damaged'),
                                       ('table/parameters', (0, 0), np.nan, 'table/parameters holds a value that is not finite'),
@@ -171,7 +174,7 @@ class Files(Case):
                                       ('table/stiffness', (1, 7), np.inf, 'table/stiffness holds a value that is not finite'))
         for name, at, value, text in values:
             with self.subTest(name=name, at=at, value=value):
-                self.refused(self.edited(put(name, at, value)), text)
+                self.refused(self.edited(put(name, at, value), 'held.h5' if name.startswith('training') else 'good.h5'), text)
         ROWS.add(f'numbers of a hybrid model that no training writes ({len(values)}): NaN, out of range, other format', 'refused')
         for old, new, text in ((b'\t', b' ', "the model's scene text is damaged"), (b'body_', b'bo y_', 'is no entry of a scene')):
             def rewrite(f, old=old, new=new):
@@ -288,7 +291,7 @@ class Files(Case):
                           ['solve', '-scene', PELLET, '-mu', '4.06,1', '-output', 'w_.xdmf'],
                           ['compare', '-scene', ROPE, '-model', 'w.h5', '-grid', '2,2', '-table', 'w.csv']):
             run = subprocess.run(['strace', '-f', '-qq', '-s', '300', '-e', 'trace=open,openat,creat,mkdir,mkdirat,rename,renameat,'
-                                  'renameat2,link,symlink,execve', '-o', 'trace', HYCO, *arguments], cwd=self.folder,
+                                  'renameat2,link,symlink,execve', '-o', 'trace', HYCO, *settled(arguments)], cwd=self.folder,
                                  env=environment, capture_output=True, text=True, timeout=100 * PATIENCE)
             self.assertEqual(run.returncode, 0, run.stderr)
             with open(self.path('trace'), encoding='utf-8', errors='replace') as f:

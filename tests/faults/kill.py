@@ -10,7 +10,7 @@ import subprocess
 import time
 import unittest
 
-from common import HYCO, MPIRUN, PATIENCE, ROPE, Case
+from common import HYCO, MPIRUN, PATIENCE, ROPE, Case, settled
 from rows import Rows
 
 TRAIN = ['train', '-scene', ROPE, '-grid', '12,12', '-model', 'm.h5']
@@ -40,7 +40,7 @@ class Kill(Case):
             shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
 
     def command(self, ranks, train):
-        return ([*MPIRUN, str(ranks)] if ranks > 1 else []) + [HYCO, *train]
+        return ([*MPIRUN, str(ranks)] if ranks > 1 else []) + [HYCO, *settled(train)]
 
     def content(self, name='m.h5'):
         with open(self.path(name), 'rb') as f:
@@ -131,7 +131,7 @@ class Kill(Case):
 
     def test_full_disk(self):
         """Full while a snapshot is written, and while the model is: the previous model is untouched; then it goes on."""
-        subprocess.run([HYCO, *TRAIN], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
+        subprocess.run([HYCO, *settled(TRAIN)], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
         right = self.content()
         for name in glob.glob(self.path('m.h5.snapshots', '*.h5'))[::2]:
             os.remove(name)
@@ -140,7 +140,7 @@ class Kill(Case):
         shutil.rmtree(self.path('m.h5.snapshots'))
         self.refused(self.limited(4), '.h5 could not be written to its end (File too large): is the disk full?')
         self.assertEqual(self.content(), right, 'the previous model was touched')
-        subprocess.run([HYCO, *TRAIN], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
+        subprocess.run([HYCO, *settled(TRAIN)], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
         self.assertEqual(self.content(), right)
         ROWS.add('disk full while a snapshot or the model is written', 'one line; the old model is untouched, nothing half written is left; then it goes on')
 
@@ -156,7 +156,7 @@ class Kill(Case):
 
     def full(self, kilobytes, *args):
         """A run in which no file can grow beyond a size once it reads its options: from a pipe, which waits until that is so."""
-        run = subprocess.Popen([HYCO, *args, '-options_file', 'pipe'], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        run = subprocess.Popen([HYCO, *settled(args), '-options_file', 'pipe'], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                text=True)
         while run.poll() is None:
             try:
@@ -185,7 +185,7 @@ class Kill(Case):
                 with self.subTest(args=' '.join(args), size=size, old=old):
                     before = {}
                     if old:
-                        subprocess.run([HYCO, *args], cwd=self.folder, check=True, capture_output=True, timeout=60)
+                        subprocess.run([HYCO, *settled(args)], cwd=self.folder, check=True, capture_output=True, timeout=60)
                         before = {f: self.content(f) for f in os.listdir(self.folder) if f.startswith('o.')}
                         self.assertTrue(before)
                     self.refused(self.full(size, *args), 'o.h5 ' if size == 4 else f'{name} ')
@@ -234,7 +234,7 @@ class Kill(Case):
     def test_vanishing(self):
         """The snapshot folder goes while training runs: one line, no model."""
         arguments = [a if a != '12,12' else '40,40' for a in TRAIN]
-        run = subprocess.Popen([HYCO, *arguments], cwd=self.folder, stdout=subprocess.PIPE,
+        run = subprocess.Popen([HYCO, *settled(arguments)], cwd=self.folder, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
         while run.poll() is None and len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) < 5:
             time.sleep(0.01)

@@ -50,7 +50,7 @@ MESHES = [
     ('infinite', lambda n, e, g: (moved(n, 4, (0, float('inf'), 0)), e, g), 'node 5 has a coordinate that is not finite'),
     ('inverted cell', lambda n, e, g: (moved(n, 4, (-1.0, -1.0, 0)), e, g), 'is inverted: its volume has both signs'),
     ('degenerate cell', lambda n, e, g: (n, [(3, 1, [1, 1, 1, 1])] + e[1:], g), 'facet 5 of group "floor" bounds no cell of a body'),
-    ('all nodes in one place', lambda n, e, g: ([(0, 0, 0)] * len(n), e, g), 'are both nearest to node 7 of under'),
+    ('all nodes in one place', lambda n, e, g: ([(0, 0, 0)] * len(n), e, g), 'cell 1 is degenerate: its volume vanishes'),
     ('flat cells', lambda n, e, g: ([(x, 0.0, 0) for x, y, z in n], e, g), 'is degenerate: its volume vanishes'),
     ('out of the plane', lambda n, e, g: (moved(n, 4, (0.5, 0.5, 1)), e, g), 'z coordinates run from 0 to 1'),
     ('huge coordinates', lambda n, e, g: (moved(n, 4, (1e308, -1e308, 0)), e, g), 'is degenerate: its volume vanishes'),

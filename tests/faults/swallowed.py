@@ -7,14 +7,14 @@ import subprocess
 import time
 import unittest
 
-from common import HYCO, PATIENCE, ROPE, Case
+from common import HYCO, PATIENCE, ROPE, Case, settled
 
 
 class Swallowed(Case):
     def full_after(self, ready, *args):
         """The run whose disk is full once ready() is true."""
         shutil.rmtree(self.path('m.h5.snapshots'), ignore_errors=True)
-        run = subprocess.Popen([HYCO, *args], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        run = subprocess.Popen([HYCO, *settled(args)], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         while run.poll() is None and not ready():
             time.sleep(0.0005)
         resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (4096, 4096))

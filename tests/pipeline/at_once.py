@@ -7,7 +7,7 @@ import subprocess
 import time
 import unittest
 
-from common import HYCO, PATIENCE, ROPE, Case
+from common import HYCO, PATIENCE, ROPE, Case, settled
 
 TRAIN = ('train', '-scene', ROPE, '-grid', '6,6')
 TARGETS = ('train', '-scene', ROPE, '-grid', '8,8', '-target_u', '0.3', '-hyco_model_type', 'hybrid')
@@ -21,7 +21,7 @@ class AtOnce(Case):
             shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
 
     def start(self, *args):
-        return subprocess.Popen([HYCO, *(str(a) for a in args)], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return subprocess.Popen([HYCO, *settled(args)], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     def content(self, name):
         with open(self.path(name), 'rb') as f:

@@ -9,7 +9,7 @@ import unittest
 import h5py
 import numpy as np
 
-from common import HYCO, ROPE, Case
+from common import HYCO, ROPE, Case, settled
 
 # the rope's recipe for small errors: nearly all energy, every displacement of A full order, a layer around the RID
 FINE = ('-hyco_pod_tol', '1e-14', '-hyco_hybrid', 'all', '-hyco_rid_dual_tol', '5e-2', '-hyco_rid_layers', 1)
@@ -55,7 +55,7 @@ class Greedy(Case):
         self.hyco(*SHORT, '-model', 'one.h5', '-table', 'one.csv', status=3)
         self.hyco(*SHORT, '-model', 'two.h5', '-table', 'two.csv', ranks=2, status=3)
         self.assertEqual(self.choices('one.csv'), self.choices('two.csv'))
-        command = [HYCO, *(str(a) for a in SHORT), '-model', 'killed.h5', '-table', 'killed.csv']
+        command = [HYCO, *settled(SHORT), '-model', 'killed.h5', '-table', 'killed.csv']
         with subprocess.Popen(command, cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
             for _ in range(6000):
                 if os.path.exists(self.path('killed.csv')) and len(self.rows('killed.csv')) > 4:

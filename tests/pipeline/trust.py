@@ -1,44 +1,73 @@
 """What a prediction says of its own error: against the truth at points it has not seen, outside the ranges, and what follows."""
 import csv
+import math
+import os
 import statistics
 import unittest
 
-from common import PELLET, ROPE, Case
+from common import PELLET, ROPE, SOURCE, Case
 
-FINE = ('-hyco_pod_tol', '1e-11', '-hyco_deim_type', 'qdeim', '-hyco_rid_layers', 1, '-hyco_hybrid', 'all')
+BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
+RECIPE = ('-hyco_model_type', 'hybrid', '-hyco_rid_contact_extension', 0)
+ROUGH = (*RECIPE, '-hyco_pod_tol', '1e-7', '-hyco_rid_layers', 0, '-hyco_hybrid', 'all')
+FINE = (*RECIPE, '-hyco_pod_tol', '1e-11', '-hyco_deim_type', 'qdeim', '-hyco_rid_layers', 1, '-hyco_hybrid', 'all')
 ERRORS = (('estimated_error_u', 'error_u'), ('estimated_error_lambda', 'error_lambda'))
 
 
 class Trust(Case):
+    newcomer = True
+
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        for name, recipe in (('rough.h5', ()), ('fine.h5', FINE)):
-            t = cls.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', name, *recipe)
-            assert t['held_out_predictions'] == 120, 'each training solution is held out once'
+        for name, recipe in (('rough.h5', ROUGH), ('fine.h5', FINE)):
+            t = cls.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', name, '-hyco_snapshots', 'rope.snapshots', *recipe,
+                         status=3 if name == 'rough.h5' else 0)
+            assert t['held_out_predictions'] == 30 == t['held_out']['n']
 
     def table(self, name):
         with open(self.path(name), encoding='utf-8') as f:
             return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(f)]
 
+    def bounds(self, scene, model, grid, share=0.9, ratio=8):
+        """The estimates at unseen points: no less than the error at nine of ten, and not many times as large in the median."""
+        self.hyco('predict', '-model', model, '-grid', grid, '-table', 'p.csv')
+        self.hyco('compare', '-scene', scene, '-model', model, '-grid', grid, '-table', 'c.csv')
+        self.hyco('solve', '-scene', scene, '-grid', grid, '-table', 's.csv')
+        force = [row['total_contact_force'] for row in self.table('s.csv')]
+        for estimate, error in (*ERRORS, ('estimated_error_sigma', 'error_sigma')):
+            pairs = []
+            for p, c, f in zip(self.table('p.csv'), self.table('c.csv'), force):
+                true = c[error] * (min(1, f / (0.1 * max(force))) if 'lambda' in error else 1)
+                pairs.append((p[estimate], true if math.isfinite(true) else 0))
+            bounded = sum(e >= true for e, true in pairs) / len(pairs)
+            self.assertGreaterEqual(bounded, share, (model, error))
+            if max(true for _, true in pairs) < 1e-8:
+                continue  # round-off
+            if 'projection' in model and 'lambda' in error:
+                continue  # its forces are right at some points and off by half at others: nothing online tells which
+            found = statistics.median(e / true for e, true in pairs if true > 0)
+            self.assertTrue(1 <= found <= ratio, (model, error, found))
+
     def test_bounds_the_error(self):
-        """Calibrated to bound 95 % of what was held out, with a margin: 85 % of 500 unseen points at least, not by more than 30 in the median."""
+        """On the rope, on blocks in 2D, on the pellet in 3D; every type of model."""
         for model in ('rough.h5', 'fine.h5'):
-            self.hyco('predict', '-model', model, '-grid', '25,20', '-table', 'p.csv')
-            self.hyco('compare', '-scene', ROPE, '-model', model, '-grid', '25,20', '-table', 'c.csv')
-            for estimate, error in ERRORS:
-                pairs = [(p[estimate], c[error]) for p, c in zip(self.table('p.csv'), self.table('c.csv'))]
-                self.assertEqual(len(pairs), 500)
-                bounded = sum(e >= true for e, true in pairs) / len(pairs)
-                self.assertGreaterEqual(bounded, 0.85, (model, error))
-                ratio = statistics.median(e / true for e, true in pairs)
-                self.assertTrue(1 <= ratio <= 30, (model, error, ratio))
+            self.bounds(ROPE, model, '13,12')
+        for kind, more in (('hybrid', ('-hyco_hybrid', 'contact', '-hyco_rid_layers', 1, '-hyco_rid_contact_extension', 2)), ('condensed', ()),
+                           ('projection', ('-hyco_pod_tol', '1e-10'))):
+            run = self.run_raw('train', '-scene', BLOCKS, '-grid', '5,5', '-grid_type', 'closed', '-hyco_model_type', kind, '-model', f'{kind}.h5',
+                               '-hyco_snapshots', 'blocks.snapshots', *more)
+            self.assertIn(run.returncode, (0, 3), run.stderr)  # a projection's forces are seldom right
+            self.bounds(BLOCKS, f'{kind}.h5', '9,8')
+        self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.04,4.06,4.08,4.1', '-values_load', '0.2,0.4,0.6,0.8,1', '-hyco_model_type', 'hybrid',
+                  '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', 1, '-hyco_rid_contact_extension', 1.4, '-hyco_hybrid', 'contact', '-model', 'pellet.h5')
+        self.bounds(PELLET, 'pellet.h5', '7,6')
 
     def test_tells_models_apart(self):
         """The fine model is some hundred times better, and says so."""
         rough, fine = (self.hyco('predict', '-model', m, '-mu', '0.12,0.2') for m in ('rough.h5', 'fine.h5'))
         for estimate, _ in ERRORS:
-            self.assertGreater(rough[estimate], 10 * fine[estimate])
+            self.assertGreater(rough[estimate], 5 * fine[estimate])
 
     def test_outside(self):
         """Refused; with -extrapolate the estimate grows with the distance, and the report says how far it is."""
@@ -57,7 +86,7 @@ class Trust(Case):
             before = p
         self.assertGreater(before['estimated_error_u'], 100 * inside['estimated_error_u'])
         said = self.run_raw('predict', '-model', 'rough.h5', '-mu', '0.9,0.2', '-extrapolate').stdout
-        self.assertRegex(said, r'estimated errors: u \d{3,} %, contact forces \d{3,} %\n')
+        self.assertRegex(said, r'estimated errors: u \d{2,} %, stress \d{2,} %, contact forces \d{2,} %\n')
         self.assertIn('outside the training points by 325 % of a range', said)
 
     def test_fallback(self):
@@ -87,22 +116,22 @@ class Trust(Case):
         self.assertFalse(kept['full_order'])
 
     def test_no_calibration(self):
-        """Without folds, and for a projection-based model: no estimate, and it says so; a target then means full order."""
-        for name, args in (('n.h5', ('-hyco_trust_folds', 0)), ('p.h5', ('-hyco_model_type', 'projection'))):
-            t = self.hyco('train', '-scene', ROPE, '-grid', '4,4', '-model', name, '-hyco_snapshots', 's', *args)
-            self.assertEqual(t['held_out_predictions'], 0)
+        """Without held-out points, or with too few: no estimate, and it says so; a target then means full order."""
+        for name, n in (('n.h5', 0), ('f.h5', 9)):
+            run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-model', name, '-hyco_snapshots', 's', '-hyco_validation', n, *ROUGH)
+            self.assertIn('are not known' if n == 0 else 'does not estimate its errors', run.stdout)
             p = self.hyco('predict', '-model', name, '-mu', '0.12,0.2')
-            self.assertIsNone(p['estimated_error_u'])
-            self.assertIsNone(p['estimated_error_lambda'])
+            self.assertEqual([p[f'estimated_error_{e}'] for e in ('u', 'sigma', 'lambda')], [None] * 3)
             said = self.run_raw('predict', '-model', name, '-mu', '0.12,0.2').stdout
-            self.assertIn('estimated errors: u none, contact forces none', said)
+            self.assertIn('estimated errors: u none, stress none, contact forces none', said)
             p = self.hyco('predict', '-model', name, '-mu', '0.12,0.2', '-scene', ROPE, '-hyco_fallback', '-target_u', 0.1)
             self.assertTrue(p['full_order'])
 
     def test_unseen(self):
         """Inside the scene's ranges but outside what training has seen: said, and the estimate of forces that training never saw
         is none, which asks for full order."""
-        self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.03,4.04', '-values_load', '0.1,0.2,0.3,0.4', '-model', 'few.h5')
+        self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.03,4.04', '-values_load', '0.1,0.2,0.3,0.4', '-model', 'few.h5', *RECIPE,
+                  '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', 1, '-hyco_hybrid', 'contact', '-hyco_rid_groups', 'pellet_top', '-hyco_rid_contact_extension', 0.1)
         near = self.hyco('predict', '-model', 'few.h5', '-mu', '4.035,0.3')
         self.assertFalse(near['extrapolated'])
         p = self.hyco('predict', '-model', 'few.h5', '-mu', '4.1,1')
