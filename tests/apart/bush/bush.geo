@@ -1,29 +1,31 @@
-// A hollow shaft in a bush, right half, triangles; the arcs of contact are meshed apart and do not match.
-// gmsh -2 bush.geo -setnumber h 0.4 -o bush.msh      h: edge on the bush's arc of contact; on the shaft's 1.37 h
+// A hollow shaft in a bush, both about (0, 0), triangles; the arcs of contact are meshed apart and do not match.
+// gmsh -2 bush.geo -setnumber h 0.48 -o bush.msh      h: edge on the bush's arc of contact; on the shaft's 1.37 h
 Geometry.AutoCoherence = 0;
-DefineConstant[ h = {0.4, Name "Size"}, radius = {9.9}, inner = {10}, outer = {14}, hole = {4} ];
-c = radius - inner;   // height of the shaft's centre: it sits on the bush's lowest point
-// bush: centre (0, 0)
+DefineConstant[ h = {0.45, Name "Size"}, radius = {9.9}, inner = {10}, outer = {14}, hole = {4} ];
 Point(1) = {0, 0, 0};
-Point(2) = {0, -inner, 0, h};    Point(3) = {inner, 0, 0, h};      Point(4) = {0, inner, 0, 4*h};
-Point(5) = {0, -outer, 0, 3*h};  Point(6) = {outer, 0, 0, 3*h};    Point(7) = {0, outer, 0, 4*h};
-Circle(1) = {2, 1, 3};  Circle(2) = {3, 1, 4};  Line(3) = {4, 7};
-Circle(4) = {7, 1, 6};  Circle(5) = {6, 1, 5};  Line(6) = {5, 2};
-Curve Loop(1) = {1, 2, 3, 4, 5, 6};  Plane Surface(1) = {1};
-Transfinite Curve {1} = Round(Pi/2*inner/h)+1;
-// shaft: centre (0, c)
-Point(11) = {0, c, 0};
-Point(12) = {0, c-radius, 0, 1.37*h};  Point(13) = {radius, c, 0, 1.37*h};  Point(14) = {0, c+radius, 0, 4*h};
-Point(15) = {0, c-hole, 0, 2.5*h};     Point(16) = {hole, c, 0, 2.5*h};     Point(17) = {0, c+hole, 0, 3*h};
-Circle(11) = {12, 11, 13};  Circle(12) = {13, 11, 14};  Line(13) = {14, 17};
-Circle(14) = {17, 11, 16};  Circle(15) = {16, 11, 15};  Line(16) = {15, 12};
-Curve Loop(2) = {11, 12, 13, 14, 15, 16};  Plane Surface(2) = {2};
-Transfinite Curve {11} = Round(Pi/2*radius/(1.37*h))+1;
+// bush, inside: from 80 degrees on the left of its lowest point to 140 degrees on the right, and round; outside: the lower half, and round
+angle[] = {-80, 30, 140, 210};
+For i In {0:3}
+  a = angle[i]*Pi/180;
+  Point(11+i) = {inner*Sin(a), -inner*Cos(a), 0, (i < 3 ? h : 4*h)};
+EndFor
+Circle(11) = {11, 1, 12};  Circle(12) = {12, 1, 13};  Circle(13) = {13, 1, 14};  Circle(14) = {14, 1, 11};
+Transfinite Curve {11, 12} = Round(110*Pi/180*inner/h)+1;
+// quarters, from the left by the lowest point: the bush's outside, the shaft's outside, its bore
+r[] = {outer, radius, hole};
+size[] = {2.5*h, 1.37*h, 2.5*h};
+For k In {0:2}
+  o = 20 + 10*k;
+  Point(o+1) = {-r[k], 0, 0, size[k]};  Point(o+2) = {0, -r[k], 0, size[k]};
+  Point(o+3) = {r[k], 0, 0, size[k]};   Point(o+4) = {0, r[k], 0, size[k]};
+  Circle(o+1) = {o+1, 1, o+2};  Circle(o+2) = {o+2, 1, o+3};  Circle(o+3) = {o+3, 1, o+4};  Circle(o+4) = {o+4, 1, o+1};
+EndFor
+Transfinite Curve {31:34} = Round(Pi/2*radius/(1.37*h))+1;
+Curve Loop(1) = {11:14};  Curve Loop(2) = {21:24};  Plane Surface(1) = {2, 1};
+Curve Loop(3) = {31:34};  Curve Loop(4) = {41:44};  Plane Surface(2) = {3, 4};
 Physical Surface("bush", 1) = {1};
 Physical Surface("shaft", 2) = {2};
-Physical Curve("bush_inside", 11) = {1};
-Physical Curve("bush_outside", 12) = {4, 5};
-Physical Curve("bush_sym", 13) = {3, 6};
-Physical Curve("shaft_outside", 14) = {11, 12};
-Physical Curve("shaft_core", 15) = {14, 15};
-Physical Curve("shaft_sym", 16) = {13, 16};
+Physical Curve("bush_inside", 11) = {11, 12};
+Physical Curve("bush_foot", 12) = {21, 22};
+Physical Curve("shaft_outside", 13) = {31:34};
+Physical Curve("shaft_bore", 14) = {41:44};
