@@ -29,7 +29,7 @@ class Size:
     def __init__(self, quick):
         self.mesh = "A" if quick else "C"
         self.models = [PAPER, (*PAPER[:2], "no extension"), FINE] if quick else MODELS
-        self.scene = ("-scene", os.path.join("examples", "pellet"), "-scene_mesh",
+        self.scene = ("-scene", os.path.join("examples", "pellet", "paper.yaml"), "-scene_mesh",
                       os.path.join("examples", "pellet", f"{self.mesh}.msh"))
 
 

@@ -5,7 +5,7 @@ import os
 import h5py
 import numpy as np
 
-SCENE = ("-scene", os.path.join("examples", "rope"))
+SCENE = ("-scene", os.path.join("examples", "rope", "paper.yaml"))
 POINT = (0.07, 0.17)
 # the paper's greedy thresholds (6.6.2); the paper does not say which displacements are full order there
 THRESHOLDS = ("-hyco_pod_tol", "1e-10", "-hyco_rid_dual_tol", "5e-2")

@@ -44,7 +44,7 @@ def combine(type_, training, **choices):
 def rope(nodes, mesh, quick):
     draw = random.Random(1)
     points = [[draw.uniform(0.05, 0.25), draw.uniform(-0.05, 0.5)] for _ in range(20)]
-    case = Case(f"rope, {nodes} nodes", ["-scene", "examples/rope", "-scene_mesh", mesh],
+    case = Case(f"rope, {nodes} nodes", ["-scene", "examples/rope/paper.yaml", "-scene_mesh", mesh],
                 {"10 x 12": ["-grid", "10,12"], "12 x 12 Chebyshev": ["-grid", "12,12", "-grid_type", "chebyshev"],
                  "20 x 8 Chebyshev": ["-grid", "20,8", "-grid_type", "chebyshev"]},
                 ["-grid", "8,10" if quick or nodes > 1000 else "20,24"], ["mu1", "mu2"], points,
@@ -77,7 +77,7 @@ def pellet(name, mesh, quick):
 
     draw = random.Random(1)
     points = [[draw.uniform(4.025, 4.095), draw.uniform(0.6, 1)] for _ in range(3 if quick or name == "C" else 10)]
-    case = Case(f"pellet, mesh {name}", ["-scene", "examples/pellet", "-scene_mesh", mesh],
+    case = Case(f"pellet, mesh {name}", ["-scene", "examples/pellet/paper.yaml", "-scene_mesh", mesh],
                 {"5 radii": radii(4.02, 4.04, 4.055, 4.075, 4.1),
                  "9 radii": radii(4.02, 4.03, 4.04, 4.05, 4.065, 4.07, 4.08, 4.09, 4.1),
                  **{f"{n} Chebyshev radii": chebyshev(n) for n in (2, 4, 6, 8)}},  # even: 4.06 is no node

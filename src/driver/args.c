@@ -138,7 +138,7 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
   char copy[DRIVER_LINE], takers[DRIVER_LINE], *rest;
 
   PetscFunctionBegin;
-  HycoCheck(strcasecmp(name, "hyco_trust_folds"),
+  HycoCheck(strncasecmp(name, "hyco_", 5) || strcasecmp(name + 5, "trust_folds"),
             "hyco %s knows no option -%s: it is now -hyco_validation, the number of held-out points that the estimates of errors are "
             "calibrated on", command->name, name);
   ListTakers(name, takers);
