@@ -157,13 +157,13 @@ class Reduced(Moved):
 
     def test_older_model(self):
         """A model from before the search opens, with the masters that it has; damage to what the search needs is seen."""
-        self.hyco('train', '-scene', 'moved.yaml', *self.TRAIN, '-model', 'old.h5', '-hyco_rid_whole', 'true', '-hyco_trust_folds', '0')
+        self.hyco('train', '-scene', 'moved.yaml', *self.TRAIN, '-model', 'old.h5', '-hyco_rid_whole', 'true')
         with h5py.File(self.path('old.h5'), 'r+') as f:
             self.assertEqual(f['format'][0, 0], 5)
             del f['problem/reach'], f['sealed']
             f['format'][...] = 4
         self.assertEqual(self.run_raw('view', '-model', 'old.h5').returncode, 0)
-        self.hyco('train', '-scene', 'moved.yaml', *self.TRAIN, '-model', 'old.h5', '-hyco_rid_whole', 'true', '-hyco_trust_folds', '0')
+        self.hyco('train', '-scene', 'moved.yaml', *self.TRAIN, '-model', 'old.h5', '-hyco_rid_whole', 'true')
         with h5py.File(self.path('old.h5'), 'r+') as f:
             f['problem/reach'][...] = -1
             del f['sealed']
