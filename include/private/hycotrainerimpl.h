@@ -51,6 +51,7 @@ struct _p_HycoTrainer {
   PetscInt n_groups;
   char *groups[64], *region;
   HycoHybrid hybrid;
+  PetscInt most_full_order; /* hybrid all: the most full-order displacements; 0: no limit */
   PetscReal ridge; /* hybrid all; < 0: chosen */
   PetscInt scan;   /* points per parameter; 0: chosen */
   PetscBool keep_singular;

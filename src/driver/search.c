@@ -8,7 +8,7 @@
 #include <string.h>
 
 /* The least that a model should be good for, where no target is given. */
-static const PetscReal bar[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 2e-2, [HYCO_ERROR_LAMBDA] = 0.1};
+static const PetscReal bar[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 5e-3, [HYCO_ERROR_LAMBDA] = 3e-2};
 
 PetscErrorCode DriverReadTargets(Search *s)
 {
@@ -159,9 +159,10 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
         "the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s",
         j == HYCO_ERROR_U ? "u" : j == HYCO_ERROR_LAMBDA ? "the contact forces" : HycoErrorKinds[j],
         t->held_out.largest[j] > PETSC_MAX_REAL / 8 ? "infinite" : reached, (int)t->held_out.n,
-        s->on ? "the target is" : "a usable model stays below", asked,
+        s->on ? "the target is" : "without a target it should stay below", asked,
         s->on ? "give more training points, a larger -target_max_added, or loosen the target"
-              : "give more training points, or let training add them: -target_u 5e-3 -target_lambda 3e-2"));
+              : "give more training points, let training add them (-target_u 5e-3 -target_lambda 3e-2), or say by such targets "
+                "what is enough"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

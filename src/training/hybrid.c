@@ -397,6 +397,8 @@ PetscErrorCode HycoTrainerChooseHybrid(HycoTrainer t, HycoModel m)
     HycoFailNoModel("-hyco_hybrid contact leaves the modes without equation: every unknown of A is a contact's; use "
                     "rank, all or auto");
   }
+  HycoCheckModel(kind != HYCO_HYBRID_ALL || !t->most_full_order || n_all <= t->most_full_order,
+                 "the RID has %d unknowns, too many to keep them all full order in a dense matrix", (int)n_all);
   if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
   if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all, &v));
   if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoModelSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));

@@ -201,10 +201,12 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
   a->ratio = PETSC_INFINITY;
   PetscCall(HycoSamplesGet(t->held, &a->held_out.n, NULL, NULL));
   SetRecipe(t, recipe);
+  t->most_full_order = t->pinned[HYCO_CHOICE_HYBRID] || recipe->hybrid != HYCO_HYBRID_ALL ? 0 : MANY_UNKNOWNS;
   PetscCall(HycoCatchBegin());
   ierr = Build(t, s->store, s->file, &report);
   if (!ierr) ierr = Judge(s, a); /* a model may refuse to predict */
   PetscCall(HycoCatchEnd(ierr, message));
+  t->most_full_order = 0;
   if (ierr && t->rank == 0) (void)unlink(s->file);
   PetscCall(HycoCatchNoModel(ierr, message));
   PetscCall(HycoCondensedDestroy(&t->condensed));
@@ -252,18 +254,6 @@ static PetscBool WholeIsSmall(HycoTrainer t, HycoHybrid hybrid)
   return (PetscBool)(!all || t->sizes[0] * t->sizes[3] <= FEW_UNKNOWNS);
 }
 
-/* Whether the recipe's RID, which "auto" has tried, has too many unknowns for all of them to be full order. */
-static PetscBool IsLarge(const Search *s, HycoRecipe r)
-{
-  r.hybrid = HYCO_HYBRID_AUTO;
-  for (PetscInt k = 0; k < s->n; k++) {
-    const HycoAttempt *a = &s->attempt[k];
-
-    if (Same(&a->recipe, &r) && !a->failure[0]) return (PetscBool)(a->rid_nodes * s->t->sizes[3] > MANY_UNKNOWNS);
-  }
-  return PETSC_FALSE;
-}
-
 /* The sizes in their order until one meets the targets, of those that differ in what
    the type of model reads. */
 static PetscErrorCode TrySizes(Search *s, HycoModelType type, HycoHybrid hybrid, PetscBool *met)
@@ -286,7 +276,6 @@ static PetscErrorCode TrySizes(Search *s, HycoModelType type, HycoHybrid hybrid,
     }
     for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].recipe));
     if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid))) continue;
-    if (hybrid == HYCO_HYBRID_ALL && IsLarge(s, r)) continue;
     PetscCall(Try(s, &r));
     stale = s->attempt[s->n - 1].ratio < PROGRESS * least ? 0 : stale + 1;
     least = PetscMin(least, s->attempt[s->n - 1].ratio);
