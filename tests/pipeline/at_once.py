@@ -10,7 +10,7 @@ import unittest
 from common import HYCO, PATIENCE, ROPE, Case, settled
 
 TRAIN = ('train', '-scene', ROPE, '-grid', '6,6')
-TARGETS = ('train', '-scene', ROPE, '-grid', '8,8', '-target_u', '0.3', '-hyco_model_type', 'hybrid')
+TARGETS = ('train', '-scene', ROPE, '-grid', '8,8', '-target_u', '0.3', '-hyco_model_type', 'hybrid', '-hyco_search', 'true', '-hyco_validation', '10')
 GREEDY = ('train', '-scene', ROPE, '-greedy', '-training_grid', '6,6', '-max_snapshots', 8, '-hyco_greedy_keep')
 
 
