@@ -67,6 +67,8 @@ void DriverReportMissed(cJSON *json);
 int DriverEndStatus(PetscErrorCode ierr);
 /* -- launch.c: ranks and threads -- */
 
+/* Reads the launcher's variables; to be called before MPI begins. */
+void DriverNoteLaunch(void);
 /* Fails where a launcher of another MPI has started several processes, each of which would do all the work and write the
    same files. Collective. */
 PetscErrorCode DriverCheckLaunch(void);

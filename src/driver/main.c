@@ -181,6 +181,7 @@ int main(int argc, char **argv)
 
   if (answer >= 0) return answer;
   DriverOneThread();
+  DriverNoteLaunch();
   StartAlone();
   if (Start(&argc, &argv)) return 1;
   PetscPushErrorHandler(KeepMessage, NULL); /* after: PETSc's books of memory (-malloc_dump) begin with it */

@@ -8,7 +8,7 @@ import subprocess
 import time
 import unittest
 
-from common import MPIRUN, PATIENCE, PELLET, ROPE, SOURCE, Case
+from common import MPIRUN, PATIENCE, PELLET, ROPE, SOURCE, Case, settled
 
 SCRIPT = os.path.join(SOURCE, 'scripts', 'hyco.sbatch')
 LONG = ('-scene', PELLET, '-values_radius', '4.02,4.03,4.04,4.05,4.07,4.08,4.09,4.1', '-values_load', '0.2,0.4,0.6,0.8,1')
@@ -59,7 +59,7 @@ class Slurm(Case):
         clean = {k: v for k, v in os.environ.items() if not k.startswith('SLURM_')}
         clean.update(environment, NOTES=self.notes, PATH=self.bin + ':' + os.environ['PATH'], HYCO_GROUPS='2')
         # pylint: disable=consider-using-with
-        return subprocess.Popen(['bash', SCRIPT, *args, '-model', self.model], env=clean, cwd=self.folder,
+        return subprocess.Popen(['bash', SCRIPT, *settled(['train', *args])[1:], '-model', self.model], env=clean, cwd=self.folder,
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
     def finish(self, process, status=0):
