@@ -27,18 +27,18 @@ class Swallowed(Case):
         self.assertEqual(glob.glob(self.path('*.hyco-*')), [])
 
     def test_calibration(self):
-        """The final model is there, and the first fold's is not yet."""
+        """The model is there, and its estimates are not yet."""
         def ready():
             return any(n.count('.candidate') == 1 and n.endswith('.candidate') for n in os.listdir(self.folder))
 
-        self.full_after(ready, 'train', '-scene', ROPE, '-grid', '14,14', '-model', 'm.h5')
+        self.full_after(ready, 'train', '-scene', ROPE, '-grid', '14,14', '-hyco_validation', 100, '-model', 'm.h5')
 
     def test_search(self):
         """All solutions are there, and no attempt has ended."""
         def ready():
-            return len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) == 48
+            return len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) == 48 + 30
 
-        self.full_after(ready, 'train', '-scene', ROPE, '-grid', '4,12', '-target_u', '1e-9', '-model', 'm.h5')
+        self.full_after(ready, 'train', '-scene', ROPE, '-grid', '4,12', '-target_u', '1e-9', '-hyco_search', 'true', '-hyco_validation', 30, '-model', 'm.h5')
 
 
 if __name__ == '__main__':
