@@ -277,7 +277,7 @@ static PetscErrorCode TrySizes(Search *s, HycoModelType type, HycoHybrid hybrid,
     for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].recipe));
     if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid))) continue;
     PetscCall(Try(s, &r));
-    stale = s->attempt[s->n - 1].ratio < PROGRESS * least ? 0 : stale + 1;
+    stale = least == PETSC_INFINITY || s->attempt[s->n - 1].ratio < PROGRESS * least ? 0 : stale + 1;
     least = PetscMin(least, s->attempt[s->n - 1].ratio);
     *met = (PetscBool)(least <= 1);
   }
@@ -513,7 +513,10 @@ static PetscErrorCode BuildBest(Search *s, const char path[], HycoTraining *repo
     report->chosen.of = s->n;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoFail("none of %d recipes gave a model; the last: %s", (int)s->n, s->attempt[s->n - 1].failure);
+  for (PetscInt k = s->n - 1; k > 0 && !best; k--) { /* one that is not refused for its cost */
+    if (s->attempt[k].recipe.hybrid != HYCO_HYBRID_ALL) best = &s->attempt[k];
+  }
+  HycoFail("none of %d recipes gave a model; one of them: %s", (int)s->n, (best ? best : &s->attempt[0])->failure);
 }
 
 static PetscErrorCode Learn(Search *s, const char path[], HycoSamples *grown, HycoTraining *report)

@@ -385,7 +385,7 @@ PetscErrorCode HycoTrainerOpen(HycoTrainer t, HycoSamples samples, const char pa
 
 /* How many points to judge by, when nobody says: enough for a bound of 95 % of the points to come where the training is
    large enough to pay for them. */
-#define LEAST_HELD 10
+#define LEAST_HELD 20
 #define MOST_HELD  30
 #define TOGETHER   3 /* that share a stiffness, where loads or gaps are parameters too */
 

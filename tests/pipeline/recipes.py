@@ -62,7 +62,7 @@ class Recipes(Case):
             trained = [tuple(row) for row in f['training/points'][()]]
             held = f['training/held_out'][()].ravel()
         unseen = [p for p in points if not any(max(abs(a - b) for a, b in zip(p, q)) < 1e-12 for q in trained)]
-        self.assertEqual((len(unseen), int(said[1]), int(held[0])), (16, 16, 16))
+        self.assertEqual((len(unseen), int(said[1]), int(held[0])), (20, 20, 20))
         with open(self.path('unseen.csv'), 'w', encoding='ascii') as f:
             f.write('mu1,mu2\n' + ''.join(f'{a!r},{b!r}\n' for a, b in ((float(x), float(y)) for x, y in unseen)))
         c = self.hyco('compare', '-scene', ROPE, '-model', 'j.h5', '-points', 'unseen.csv')
