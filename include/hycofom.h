@@ -23,7 +23,7 @@ typedef struct {
 */
 typedef struct {
   PetscInt n_dof, n_contacts, n_active; /* free unknowns N, contacts N_lambda, contacts with L_i > 0 */
-  PetscInt n_still; /* contacts between fixed unknowns, which have no effect */
+  PetscInt n_still;                     /* contacts between fixed unknowns, which have no effect */
   PetscInt n_dependent; /* closed contacts whose rows depend on others': with any, Lambda is not unique (U is) */
   PetscInt iterations, dim;
   PetscReal total_contact_force, lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3];

@@ -29,8 +29,8 @@ typedef struct {
   HycoModelType type;
   PetscInt n_multipliers; /* force unknowns: n_contacts, or the force vectors of a projection-based model */
   PetscInt n_dof, n_contacts, n_modes, n_fe_dofs;  /* reduced unknowns (modes + FE unknowns), contacts in the RID */
-  PetscInt n_facing;          /* contacts of the RID that may close, as in HycoSummary */
-  PetscReal overlap, sliding; /* the same, of the RID's contacts */
+  PetscInt n_facing;                               /* contacts of the RID that may close, as in HycoSummary */
+  PetscReal overlap, sliding;                      /* the same, of the RID's contacts */
   PetscInt n_all_contacts, n_active, n_rid_active; /* on the whole surface; those that press, there and in the RID */
   PetscInt iterations, rid_nodes, rid_elements, dim;
   PetscReal rid_fraction;  /* share of the mesh's elements in the RID */
@@ -38,9 +38,9 @@ typedef struct {
   PetscReal total_contact_force;                                   /* reconstructed, whole contact surface */
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
-  /* An upper estimate of the relative errors of u (whole mesh, 2-norm), of the stress (RID, 2-norm of the cells' values)
-     and of all contact forces (2-norm; a force below a tenth of the largest held out in training counts as that tenth),
-     calibrated at training on held-out solutions; < 0: the model has none, or the solve did not converge. */
+  /* An upper estimate of the relative errors of u (whole mesh, 2-norm), of the stress (RID, 2-norm of the cells'
+     values) and of all contact forces (2-norm; a force below a tenth of the largest held out in training counts as that
+     tenth), calibrated at training on held-out solutions; < 0: the model has none, or the solve did not converge. */
   PetscReal estimated_error_u, estimated_error_sigma, estimated_error_lambda;
   PetscReal estimated_error_u_full; /* condensed: of u by HycoFOMSolveForces() with these forces; else < 0 */
   PetscReal beyond; /* how far the parameters lie outside what training has seen: the most, as a share of the range */

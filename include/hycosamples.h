@@ -33,10 +33,10 @@ PetscErrorCode HycoSamplesAddPoint(HycoSamples samples, const PetscReal mu[]);
 PetscErrorCode HycoSamplesAddFile(HycoSamples samples, const char path[]);
 
 /*
-  `count` points spread evenly over what the set reaches (from its least to its largest value of each parameter, and half
-  the widest step between two more at either end, within the scene's range), none of them in it: points to judge by what
-  is learned from the set. They are the numbers first, first + 1, ... of one sequence, so that later calls continue it.
-  slow[p] (may be NULL): a new value of this parameter is expensive; as long as others are not, `together` >= 1
+  `count` points spread evenly over what the set reaches (from its least to its largest value of each parameter, and
+  half the widest step between two more at either end, within the scene's range), none of them in it: points to judge by
+  what is learned from the set. They are the numbers first, first + 1, ... of one sequence, so that later calls continue
+  it. slow[p] (may be NULL): a new value of this parameter is expensive; as long as others are not, `together` >= 1
   successive points share its value. Without parameters there is none. The caller owns *unseen. Not collective.
 */
 PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,

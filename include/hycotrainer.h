@@ -68,15 +68,15 @@ typedef PetscErrorCode (*HycoAddedMonitor)(PetscInt n, PetscInt parameter, void 
 /* What a training gave. */
 typedef struct {
   HycoModelType type;
-  PetscReal dual_misfit;  /* projection: share of the dual snapshots' squares that their nonnegative basis leaves out */
-  PetscInt hopeless;      /* the same: the parameter of which more values were in vain, for the dependence on it is not
-                             smooth; -1: none */
+  PetscReal dual_misfit; /* projection: share of the dual snapshots' squares that their nonnegative basis leaves out */
+  PetscInt hopeless;     /* the same: the parameter of which more values were in vain, for the dependence on it is not
+                            smooth; -1: none */
   PetscInt hopeless_values; /* how many it has */
   PetscReal hopeless_error; /* the forces' error, one of them left out */
-  PetscBool target_met;   /* condensed, points chosen: -hyco_condensed_tol was reached, by left_out's forces */
-  PetscReal target;       /* the same: what it asked */
-  PetscInt most_values;   /* the same: -hyco_condensed_max_values */
-  PetscInt n_supremizers; /* of n_modes, -hyco_dual snapshots */
+  PetscBool target_met;     /* condensed, points chosen: -hyco_condensed_tol was reached, by left_out's forces */
+  PetscReal target;         /* the same: what it asked */
+  PetscInt most_values;     /* the same: -hyco_condensed_max_values */
+  PetscInt n_supremizers;   /* of n_modes, -hyco_dual snapshots */
   PetscInt n_flexibilities; /* condensed: points at which B K^-1 B^T was factored */
   PetscReal left_out[3];    /* condensed: relative errors of flexibility, gap and forces, one training value left out */
   PetscInt n_samples, n_modes, n_dual_modes, n_stress_modes, n_force_modes; /* l_u and the sizes of the other bases */
@@ -84,11 +84,11 @@ typedef struct {
   PetscReal rid_fraction;                                                 /* share of the elements */
   PetscReal condition;             /* of the reduced stiffness, worst of the judged snapshots */
   PetscReal error_u, error_lambda; /* mean relative training errors, 2-norm, displacement and RID contact forces */
-  HycoValidation held_out;         /* errors of the model that was written, at points that it was not trained on; n 0: none */
-  PetscInt n_held;                 /* held-out predictions that calibrate the estimated errors; 0: none */
-  HycoAttempt chosen;              /* of the search for a recipe */
-  PetscInt n_added;                /* solutions that were added to meet the targets */
-  HycoScan scan;                   /* singularity inside the parameters' ranges */
+  HycoValidation held_out; /* errors of the model that was written, at points that it was not trained on; n 0: none */
+  PetscInt n_held;         /* held-out predictions that calibrate the estimated errors; 0: none */
+  HycoAttempt chosen;      /* of the search for a recipe */
+  PetscInt n_added;        /* solutions that were added to meet the targets */
+  HycoScan scan;           /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
 

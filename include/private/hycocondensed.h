@@ -43,14 +43,14 @@ struct _n_HycoCondensed {
   PetscInt *node_stiff, *node_load;   /* by node of the whole grid: that of G, and its number among its loads */
   HycoScene scene;                    /* borrowed */
   HycoGapSource given;
-  PetscReal *bounds;   /* by node of G: lower and upper of it by the middle node's G; 0, 0: none are known */
-  PetscReal *Lambda;   /* m x nodes of the whole grid: training forces */
-  PetscReal errors[3]; /* one value left out: G, g, forces; relative */
+  PetscReal *bounds;     /* by node of G: lower and upper of it by the middle node's G; 0, 0: none are known */
+  PetscReal *Lambda;     /* m x nodes of the whole grid: training forces */
+  PetscReal errors[3];   /* one value left out: G, g, forces; relative */
   PetscReal errors_u[2]; /* of older files: their estimates of u by the modes and of u with these forces; < 0: none */
   /* the law of the estimated errors (condensed_estimate.c) */
-  PetscReal *law;    /* dim x HYCO_N_LAWS: of a parameter's remainder; NULL: an older file */
-  PetscInt *flat;    /* dim: the remainder has no nodes, for the polynomial does not interpolate */
-  PetscReal cut;     /* what the modes leave out of any displacement */
+  PetscReal *law; /* dim x HYCO_N_LAWS: of a parameter's remainder; NULL: an older file */
+  PetscInt *flat; /* dim: the remainder has no nodes, for the polynomial does not interpolate */
+  PetscReal cut;  /* what the modes leave out of any displacement */
   /* training only: the error of the forces by parameter; the sample of each node of the whole grid */
   PetscReal by_parameter[HYCO_MAX_PARAMETERS];
   PetscInt hopeless;    /* the points were chosen: of this parameter more values were in vain; -1: none */

@@ -40,10 +40,11 @@ struct _n_HycoFE {
   PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
   HycoPlaces places;        /* of the entries of K; made by the second assembly into it */
   PetscInt n_loads;
-  HycoLoadShares *shares; /* n_loads: by load of the scene */
+  HycoLoadShares *shares;  /* n_loads: by load of the scene */
   signed char *drawn_sign; /* by cell: the sign of its volume in the mesh file's coordinates */
   /* -hyco_regularise: unknowns held beside the scene's supports, and the motions that these keep (n_released x n_dof,
-     orthonormal; on the whole mesh alone); the contacts' normals are turned to leave the first n_turned of them alone */
+     orthonormal; on the whole mesh alone); the contacts' normals are turned to leave the first n_turned of them alone
+   */
   PetscInt n_pins, *pin, n_released, n_turned;
   PetscReal *released;
   /* at the current mu */
@@ -80,12 +81,13 @@ typedef struct {
 typedef struct {
   PetscInt n;
   PetscReal *motion;       /* n x n_dof, zero where fixed */
-  char (*name)[HYCO_LINE]; /* "body pellet from moving along (0, 0, 1)", "... from turning about (0, 0, 1) through (0, 10)" */
+  char (*name)[HYCO_LINE]; /* "body pellet from moving along (0, 0, 1)", "... from turning about (0, 0, 1) through (0,
+                              10)" */
   HycoRigid *rigid;        /* n */
 } HycoMotions;
 
-/* Holds the unknowns `component` of the nodes with these tags (those that this mesh has) beside the scene's supports, in
-   place of the last ones; n = 0: none. */
+/* Holds the unknowns `component` of the nodes with these tags (those that this mesh has) beside the scene's supports,
+   in place of the last ones; n = 0: none. */
 PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const PetscInt component[]);
 /* Finds them on the whole mesh. */
 PetscErrorCode HycoFEFreeMotions(HycoFE fe, HycoMotions *motions);
@@ -177,8 +179,8 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
 */
 PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
                                PetscReal gap[]);
-/* How many contacts have no free unknown and no effect: empty rows, and the fixed nodes at obstacles that are no contacts;
-   fails when the prescribed displacements of one of these penetrate. start: of the rows. */
+/* How many contacts have no free unknown and no effect: empty rows, and the fixed nodes at obstacles that are no
+   contacts; fails when the prescribed displacements of one of these penetrate. start: of the rows. */
 PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n);
 /* The gap that stands for an empty row: it is positive and of the mesh's scale, and says nothing. */
 PetscReal HycoContactNoGap(HycoFE fe);

@@ -39,7 +39,8 @@ struct _p_HycoFOM {
   Vec given_F;
   HycoKKT given_kkt;
   PetscBool given;
-  /* -hyco_regularise: motions that nothing holds, orthonormal, and the unknowns pinned for them, by tag and component */
+  /* -hyco_regularise: motions that nothing holds, orthonormal, and the unknowns pinned for them, by tag and component
+   */
   PetscBool regularise, pinned; /* pinned: the pins are chosen */
   PetscReal regularise_tol;
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
@@ -51,8 +52,8 @@ struct _p_HycoFOM {
 PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);
 /* U and Lambda to rank 0, in the file's order. Collective. */
 PetscErrorCode HycoFOMGather(HycoFOM fom);
-/* Looks for rigid motions that neither supports nor contact hold, at fe's parameters: fails with their names, or pins as
-   many unknowns, as supports of fe. Collective, before the assembly. */
+/* Looks for rigid motions that neither supports nor contact hold, at fe's parameters: fails with their names, or pins
+   as many unknowns, as supports of fe. Collective, before the assembly. */
 PetscErrorCode HycoFOMRelease(HycoFOM fom);
 /* Takes from F, assembled without the pins, what it does on the released motions; fails if that is not little.
    Collective. */

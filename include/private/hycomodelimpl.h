@@ -44,15 +44,15 @@ struct _p_HycoModel {
   char path[PETSC_MAX_PATH_LEN]; /* "" while training */
   /* the reduced problem's description, as in the file */
   HycoScene scene;
-  HycoMesh mesh;    /* cells of Omega_A; its nodes and those of every contact */
-  HycoPairs pairs;  /* all N_lambda contacts, node indices of mesh */
-  PetscInt *role;   /* by node of mesh */
-  PetscInt *in_rid; /* by contact: in A_lambda */
+  HycoMesh mesh;           /* cells of Omega_A; its nodes and those of every contact */
+  HycoPairs pairs;         /* all N_lambda contacts, node indices of mesh */
+  PetscInt *role;          /* by node of mesh */
+  PetscInt *in_rid;        /* by contact: in A_lambda */
   PetscReal *master_reach; /* moved surfaces: how far A_lambda's masters may be, by contact of the scene; NULL: none
                               is moved, or the file is older than their search */
-  PetscInt l;       /* POD modes */
-  PetscReal *V;     /* (mesh n_nodes * dim) x l, row major: the modes on the nodes of mesh */
-  PetscReal *sigma; /* l singular values */
+  PetscInt l;              /* POD modes */
+  PetscReal *V;            /* (mesh n_nodes * dim) x l, row major: the modes on the nodes of mesh */
+  PetscReal *sigma;        /* l singular values */
   HycoHybrid hybrid;
   PetscReal ridge;        /* of G, relative to sigma_1^2 (hybrid all) */
   PetscInt n_fe, *fe_dof; /* full-order unknowns, dofs of mesh, ascending */
@@ -61,7 +61,8 @@ struct _p_HycoModel {
   PetscReal *S_lambda;    /* N_lambda x n_dual column major */
   PetscInt n_points;
   PetscReal *points; /* training points, n_points x n_parameters */
-  PetscReal *reach; /* least, then largest values that training has seen of the parameters (trust.c); made when needed */
+  PetscReal
+      *reach; /* least, then largest values that training has seen of the parameters (trust.c); made when needed */
   char *provenance;
   char fingerprint[32]; /* of the scene and mesh that it was trained on */
   PetscInt whole_nodes, whole_cells;
@@ -158,8 +159,8 @@ PetscErrorCode HycoModelCheckForceless(HycoModel model);
    reconstruction. */
 PetscErrorCode HycoModelCreateOwn(HycoModel model);
 PetscErrorCode HycoModelDestroyOwn(HycoModel model);
-/* The rows of A_lambda's contacts at fe's parameters. On moved surfaces one that acts on no free unknown of A where it is
-   has an empty row: no equation of (38) would answer its force. */
+/* The rows of A_lambda's contacts at fe's parameters. On moved surfaces one that acts on no free unknown of A where it
+   is has an empty row: no equation of (38) would answer its force. */
 PetscErrorCode HycoModelOwnRows(HycoModel model);
 /* Brings row_start, row_dof, row_value, gap of all contacts and U of all nodes of mesh to the last prediction. */
 PetscErrorCode HycoModelComplete(HycoModel model);

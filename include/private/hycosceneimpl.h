@@ -86,8 +86,9 @@ PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[]
 /* The entries as text, one "key\tvalue" per line, and back. The caller frees the text. */
 PetscErrorCode HycoSceneToText(HycoScene scene, char **text);
 PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *scene);
-/* What n points (n x n_parameters) reach of each parameter: from the least to the largest value, and half the widest step
-   between two more at either end, so that grids of cell centres reach the ends of the ranges; never past the ranges. */
+/* What n points (n x n_parameters) reach of each parameter: from the least to the largest value, and half the widest
+   step between two more at either end, so that grids of cell centres reach the ends of the ranges; never past the
+   ranges. */
 PetscErrorCode HycoSamplesReach(HycoScene scene, PetscInt n, const PetscReal mu[], PetscReal lo[], PetscReal hi[]);
 /* The scene of a set of points. Borrowed. */
 PetscErrorCode HycoSamplesGetScene(HycoSamples samples, HycoScene *scene);

@@ -52,8 +52,8 @@ struct _p_HycoTrainer {
   char *groups[64], *region;
   HycoHybrid hybrid;
   PetscInt most_full_order; /* hybrid all: the most full-order displacements; 0: no limit */
-  PetscReal ridge; /* hybrid all; < 0: chosen */
-  PetscInt scan;   /* points per parameter; 0: chosen */
+  PetscReal ridge;          /* hybrid all; < 0: chosen */
+  PetscInt scan;            /* points per parameter; 0: chosen */
   PetscBool keep_singular;
   PetscInt n_validation; /* held-out solutions beside the training points; < 0: from their number */
   PetscBool search;      /* for what nobody pinned of the recipe */
@@ -66,7 +66,7 @@ struct _p_HycoTrainer {
   HycoModelType type;
   HycoDual dual;
   PetscInt nnmf_max_its, nnmf_vectors;
-  PetscReal condensed_tol; /* where the points are chosen */
+  PetscReal condensed_tol;     /* where the points are chosen */
   PetscReal condensed_pod_tol; /* of its modes, unless tol[] is smaller */
   PetscInt condensed_max_values;
   HycoProgress progress;
@@ -80,17 +80,17 @@ struct _p_HycoTrainer {
     void *ctx;
   } greedy;
   /* state of a run, rank 0 unless said */
-  HycoSamples samples; /* borrowed, every rank */
-  HycoSamples validation, held, own_held; /* given by the user (borrowed; NULL: none); of this run (borrowed; NULL: none);
-                                             drawn for it. Every rank */
+  HycoSamples samples;                    /* borrowed, every rank */
+  HycoSamples validation, held, own_held; /* given by the user (borrowed; NULL: none); of this run (borrowed; NULL:
+                                             none); drawn for it. Every rank */
   PetscInt drawn;                         /* unseen points drawn so far */
   HycoBasis basis[HYCO_N_SEEDS];
   PetscInt n_dual_seeds, *dual_seeds; /* nodes */
   HycoMesh whole;
   HycoPairs pairs;
-  HycoMet met; /* moved surfaces: what they meet, as far as it matters */
-  HycoFE fe;                                                     /* on the whole mesh */
-  PetscInt sizes[4];                                             /* every rank: nodes, cells, contacts, dim */
+  HycoMet met;       /* moved surfaces: what they meet, as far as it matters */
+  HycoFE fe;         /* on the whole mesh */
+  PetscInt sizes[4]; /* every rank: nodes, cells, contacts, dim */
   PetscInt n_seeds_node, n_seeds_cell, *seeds_node, *seeds_cell; /* every rank */
   PetscInt counts[HYCO_N_SEEDS];
   PetscInt l, n_supremizers; /* modes, and how many of them (the last) Enrich added */
@@ -109,8 +109,8 @@ struct _p_HycoTrainer {
     HycoFE fe;
     PetscInt *start, *dof;
     PetscReal *value, *gap;
-  } surfaces;              /* rank 0, condensed: the contacts' nodes and facets alone, where D is evaluated */
-  PetscBool *grown;        /* rank 0, greedy: cells of the RIDs so far; else NULL */
+  } surfaces;       /* rank 0, condensed: the contacts' nodes and facets alone, where D is evaluated */
+  PetscBool *grown; /* rank 0, greedy: cells of the RIDs so far; else NULL */
 };
 
 /* Frees what one run leaves behind. */

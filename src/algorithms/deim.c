@@ -39,8 +39,7 @@ static PetscErrorCode Interpolate(PetscInt k, PetscInt l, const PetscReal rows[]
   PetscCall(PetscBLASIntCast(k, &kb));
   LAPACKgesv_(&kb, &one, A, &kb, ipiv, c, &kb, &info);
   PetscCall(PetscFree2(A, ipiv));
-  HycoCheckModel(info == 0, "DEIM: the interpolation matrix of mode %d is singular",
-             (int)k);
+  HycoCheckModel(info == 0, "DEIM: the interpolation matrix of mode %d is singular", (int)k);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

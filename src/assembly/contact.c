@@ -140,8 +140,7 @@ static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal no
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscReal drawn = gap[k];
 
-    if (!HycoPairsAlone(fe->scene, pairs, k))
-      AddToRow(fe, pairs->slave[k], 1, normal + 3 * k, &n, dof, value, &gap[k]);
+    if (!HycoPairsAlone(fe->scene, pairs, k)) AddToRow(fe, pairs->slave[k], 1, normal + 3 * k, &n, dof, value, &gap[k]);
     for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++)
       AddToRow(fe, pairs->master[j], -pairs->weight[j], normal + 3 * k, &n, dof, value, &gap[k]);
     start[k + 1] = n;

@@ -10,10 +10,11 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
                              PetscReal *weight);
 /* Their means over the cell, which make the dilatation of the element bbar. */
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[8][3]);
-/* Outward normal times area weight (n dS) at point q of a facet, of the moved body; in 1D the sign away from its cell. */
+/* Outward normal times area weight (n dS) at point q of a facet, of the moved body; in 1D the sign away from its cell.
+ */
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);
-/* The signs of the cells as drawn, and room for fe->mirrored; finds fe->mirrored at fe's nodes. Fails when a map folds a
-   body (some of its cells turned inside out) or mirrors one of two bodies that share nodes. */
+/* The signs of the cells as drawn, and room for fe->mirrored; finds fe->mirrored at fe's nodes. Fails when a map folds
+   a body (some of its cells turned inside out) or mirrors one of two bodies that share nodes. */
 PetscErrorCode HycoMirrorCreate(HycoFE fe);
 PetscErrorCode HycoMirrorFind(HycoFE fe);
 /* Of contact k, which has no free unknown: fails when what its prescribed displacements leave of the gap is negative by

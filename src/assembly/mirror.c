@@ -95,9 +95,10 @@ static PetscErrorCode CheckPieces(HycoFE fe)
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
     const PetscInt a = m->cell_body[k / m->nv], b = m->node_body[m->cells[k]];
 
-    HycoCheck(fe->mirrored[a] == fe->mirrored[b],
-              "the bodies %s and %s share node %d, and the map of one of them is a mirror image; mirror both or neither",
-              fe->scene->body[a].name, fe->scene->body[b].name, (int)m->node_id[m->cells[k]]);
+    HycoCheck(
+        fe->mirrored[a] == fe->mirrored[b],
+        "the bodies %s and %s share node %d, and the map of one of them is a mirror image; mirror both or neither",
+        fe->scene->body[a].name, fe->scene->body[b].name, (int)m->node_id[m->cells[k]]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,6 @@
 /*
-  The masters of surfaces that a map moves, searched for where the nodes are. A slave node has one if the master's nearest
-  point opposes its normal, is within reach, and the node is not past the master's border.
+  The masters of surfaces that a map moves, searched for where the nodes are. A slave node has one if the master's
+  nearest point opposes its normal, is within reach, and the node is not past the master's border.
 */
 #include "partners.h"
 

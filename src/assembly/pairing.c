@@ -162,9 +162,9 @@ static PetscErrorCode Complain(HycoPartners *t, const HycoContact *c, PetscInt n
     PetscCall(PetscStrlcat(list, one, sizeof(list)));
   }
   PetscCall(Remedy(t, c, n, missed, remedy));
-  HycoFail("contact %s: %d of the %d nodes of %s have no %s of %s within %g: %snode%s %s; %s",
-           c->name, (int)n, (int)slaves, c->slave, c->type == HYCO_CONTACT_PAIR ? "node" : "point", c->master,
-           (double)tolerance, n > 5 ? "the farthest are " : "", n > 1 ? "s" : "", list, remedy);
+  HycoFail("contact %s: %d of the %d nodes of %s have no %s of %s within %g: %snode%s %s; %s", c->name, (int)n,
+           (int)slaves, c->slave, c->type == HYCO_CONTACT_PAIR ? "node" : "point", c->master, (double)tolerance,
+           n > 5 ? "the farthest are " : "", n > 1 ? "s" : "", list, remedy);
 }
 
 /* A contact; at: its master point, NULL: it has none. */

@@ -5,14 +5,14 @@
 #include <hycofe.h>
 
 typedef struct {
-  HycoFE fe;                 /* borrowed; its nodes are where the search is */
-  PetscInt slave, master;    /* groups */
-  HycoPatches patches;       /* the master's */
-  PetscInt n, nf, *node;     /* patches' nodes, n x nf */
-  PetscReal *normal;         /* n x 3, of the patches (a pair's: of its nodes); 0: unknown */
-  PetscReal *outward;        /* by node of the mesh x 3, of the slave's surface; 0: unknown */
+  HycoFE fe;                  /* borrowed; its nodes are where the search is */
+  PetscInt slave, master;     /* groups */
+  HycoPatches patches;        /* the master's */
+  PetscInt n, nf, *node;      /* patches' nodes, n x nf */
+  PetscReal *normal;          /* n x 3, of the patches (a pair's: of its nodes); 0: unknown */
+  PetscReal *outward;         /* by node of the mesh x 3, of the slave's surface; 0: unknown */
   PetscInt n_border, *border; /* edges (2D: ends) of one facet alone, as sorted pairs of nodes; made when asked */
-  PetscBool *at_border;      /* by node of the mesh; NULL: not made */
+  PetscBool *at_border;       /* by node of the mesh; NULL: not made */
 } HycoPartners;
 
 /* The search of a pair or surface contact on fe's nodes. The caller destroys it. */

@@ -50,7 +50,8 @@ static PetscReal Weight(HycoFE fe, const PetscInt node[], PetscInt v)
 {
   const PetscInt nf = fe->mesh->nf, next = node[(v + 1) % nf], last = node[(v + nf - 1) % nf];
   const PetscReal *x = fe->X + 3 * node[v];
-  const PetscReal a = Apart(fe->X + 3 * next, x), b = Apart(fe->X + 3 * last, x), c = Apart(fe->X + 3 * next, fe->X + 3 * last);
+  const PetscReal a = Apart(fe->X + 3 * next, x), b = Apart(fe->X + 3 * last, x),
+                  c = Apart(fe->X + 3 * next, fe->X + 3 * last);
   const PetscReal cosine = nf > 2 ? (a * a + b * b - c * c) / (2 * a * b) : 0;
 
   return nf == 2 ? 1 / a : PetscSqrtReal(PetscMax(1 - cosine * cosine, 0)) / (a * b);
@@ -116,7 +117,8 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
 
       if (bend < EDGE) most = PetscMax(most, bend);
     }
-    for (PetscInt v = 0; v < m->nf; v++) wide[m->facets[f * m->nf + v]] = PetscMax(wide[m->facets[f * m->nf + v]], most);
+    for (PetscInt v = 0; v < m->nf; v++)
+      wide[m->facets[f * m->nf + v]] = PetscMax(wide[m->facets[f * m->nf + v]], most);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -31,8 +31,8 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes of the obstacles' groups that are wholly fixed and no contacts (HycoPairsFind() leaves them out), as contacts
-   without masters. The caller destroys it. */
+/* The nodes of the obstacles' groups that are wholly fixed and no contacts (HycoPairsFind() leaves them out), as
+   contacts without masters. The caller destroys it. */
 static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPairs *still)
 {
   HycoMesh m = fe->mesh;

@@ -62,7 +62,8 @@ static PetscInt RigidRow(PetscInt dim, const PetscReal x[3], PetscInt c, PetscRe
 static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[HYCO_LINE])
 {
   const PetscReal *w = fe->dim == 3 ? r->rigid + 3 : NULL;
-  PetscReal t[3] = {0, 0, 0}, omega[3] = {0, 0, fe->dim == 2 ? r->rigid[2] : 0}, at[3], move = 0, turn = 0, size = 0, d[3];
+  PetscReal t[3] = {0, 0, 0}, omega[3] = {0, 0, fe->dim == 2 ? r->rigid[2] : 0}, at[3], move = 0, turn = 0, size = 0,
+            d[3];
   PetscReal first;
 
   for (PetscInt c = 0; c < 3; c++) {

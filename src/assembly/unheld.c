@@ -14,9 +14,9 @@ enum { GIVEN, SLAVE, MASTER, N_SENSES };
 typedef struct {
   HycoFE fe;
   HycoPairs *pairs;
-  PetscInt k, m;                 /* motions, contacts */
-  PetscReal *d;                  /* m x k x 3: relative displacement of slave and master */
-  PetscReal *normal[N_SENSES];   /* m x 3; zero: not in this sense */
+  PetscInt k, m;                               /* motions, contacts */
+  PetscReal *d;                                /* m x k x 3: relative displacement of slave and master */
+  PetscReal *normal[N_SENSES];                 /* m x 3; zero: not in this sense */
   PetscReal *doubt[N_SENSES], *bend[N_SENSES]; /* m */
 } Shapes;
 
@@ -90,7 +90,8 @@ static PetscErrorCode FindSenses(Shapes *s)
     s->doubt[GIVEN][i] = PetscMax(s->doubt[SLAVE][i], 1e-6);
     s->bend[GIVEN][i] = PetscMax(s->bend[SLAVE][i], s->bend[MASTER][i]);
     /* averaged from the facets: the slave's surface says it better */
-    for (PetscInt d = 0; d < 3 && !given && n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0; d++) s->normal[GIVEN][3 * i + d] = 0;
+    for (PetscInt d = 0; d < 3 && !given && n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0; d++)
+      s->normal[GIVEN][3 * i + d] = 0;
   }
   PetscCall(PetscFree2(work, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -124,7 +125,8 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
   PetscCall(PetscMalloc1(lwork, &work));
   PetscCall(PetscArrayzero(A, k * k));
   PetscCall(PetscArrayzero(M, k * k));
-  for (PetscInt a = 0; a < k; a++) M[a * k + a] = 1e-3 * (PetscReal)(s->m + 1) / s->fe->n_dof; /* bodies that move together */
+  for (PetscInt a = 0; a < k; a++)
+    M[a * k + a] = 1e-3 * (PetscReal)(s->m + 1) / s->fe->n_dof; /* bodies that move together */
   for (PetscInt i = 0; i < s->m; i++) {
     const PetscInt t = sense[s->pairs->contact[i]];
     const PetscReal *d = s->d + (size_t)i * (size_t)k * 3;
@@ -234,7 +236,8 @@ static void Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *
   }
 }
 
-static PetscErrorCode Search(const Shapes *s, PetscInt *n_unheld, PetscReal unheld[], PetscInt *n_alike, PetscReal alike[])
+static PetscErrorCode Search(const Shapes *s, PetscInt *n_unheld, PetscReal unheld[], PetscInt *n_alike,
+                             PetscReal alike[])
 {
   const PetscInt n_contacts = s->fe->scene->n_contacts, k = s->k;
   PetscInt codes = 1, *sense;
@@ -321,7 +324,8 @@ PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *
   PetscCall(PetscCalloc1((s.k + 1) * s.k, unheld));
   PetscCall(PetscCalloc1((s.k + 1) * s.k, alike));
   PetscCall(PetscMalloc1((size_t)s.m * (size_t)s.k * 3, &s.d));
-  for (PetscInt t = 0; t < N_SENSES; t++) PetscCall(PetscCalloc3(3 * s.m, &s.normal[t], s.m, &s.doubt[t], s.m, &s.bend[t]));
+  for (PetscInt t = 0; t < N_SENSES; t++)
+    PetscCall(PetscCalloc3(3 * s.m, &s.normal[t], s.m, &s.doubt[t], s.m, &s.bend[t]));
   ierr = Relative(&s, motions);
   if (!ierr) ierr = FindSenses(&s);
   if (!ierr) ierr = Search(&s, n_unheld, *unheld, n_alike, *alike);

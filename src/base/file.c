@@ -202,8 +202,7 @@ FILE *HycoFileStream(HycoFile file)
 static int Flush(HycoFile f)
 {
   errno = 0;
-  if (fflush(f->stream) != 0 || ferror(f->stream) ||
-      (f->kind == HYCO_FILE_NUMBERS && fsync(fileno(f->stream)) != 0))
+  if (fflush(f->stream) != 0 || ferror(f->stream) || (f->kind == HYCO_FILE_NUMBERS && fsync(fileno(f->stream)) != 0))
     return errno ? errno : EIO;
   return 0;
 }

@@ -158,7 +158,7 @@ typedef struct {
   PetscInt n, room, *head; /* by contact of the surfaces: its last row, or -1 */
   struct {
     PetscInt n, node[4], next;
-  } *row;
+  } * row;
 } Lists;
 
 /* Adds what the contacts have now; *grown counts it. */

@@ -139,8 +139,10 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
 
   PetscFunctionBegin;
   HycoCheck(strncasecmp(name, "hyco_", 5) || strcasecmp(name + 5, "trust_folds"),
-            "hyco %s knows no option -%s: it is now -hyco_validation, the number of held-out points that the estimates of errors are "
-            "calibrated on", command->name, name);
+            "hyco %s knows no option -%s: it is now -hyco_validation, the number of held-out points that the estimates "
+            "of errors are "
+            "calibrated on",
+            command->name, name);
   ListTakers(name, takers);
   HycoCheck(!takers[0], "hyco %s knows no option -%s; what does: hyco %s", command->name, name, takers);
   PetscCall(HycoGetOptionTable(&n, &table));
@@ -162,9 +164,9 @@ static PetscErrorCode Unknown(const Command *command, const char name[])
 static PetscBool DecidesModel(const char name[])
 {
   static const char *const training[] = {
-      "hyco_model_type", "hyco_dual", "hyco_nnmf_",         "hyco_pod_",       "hyco_deim_",     "hyco_rid_",
-      "hyco_hybrid",     "hyco_scan", "hyco_keep_singular", "hyco_condensed_", "hyco_snapshots", "hyco_greedy_",
-      "hyco_validation", "hyco_search", NULL};
+      "hyco_model_type", "hyco_dual",    "hyco_nnmf_",      "hyco_pod_",          "hyco_deim_",
+      "hyco_rid_",       "hyco_hybrid",  "hyco_scan",       "hyco_keep_singular", "hyco_condensed_",
+      "hyco_snapshots",  "hyco_greedy_", "hyco_validation", "hyco_search",        NULL};
 
   for (PetscInt k = 0; training[k]; k++) {
     if (strncasecmp(name, training[k], strlen(training[k])) == 0) return PETSC_TRUE;

@@ -69,11 +69,11 @@ int DriverEndStatus(PetscErrorCode ierr);
 
 /* Reads the launcher's variables; to be called before MPI begins. */
 void DriverNoteLaunch(void);
-/* Fails where a launcher of another MPI has started several processes, each of which would do all the work and write the
-   same files. Collective. */
+/* Fails where a launcher of another MPI has started several processes, each of which would do all the work and write
+   the same files. Collective. */
 PetscErrorCode DriverCheckLaunch(void);
-/* One thread a rank for the BLAS, unless its variables, or OpenMP's, say how many. (A BLAS reads them when it is loaded,
-   before main().) */
+/* One thread a rank for the BLAS, unless its variables, or OpenMP's, say how many. (A BLAS reads them when it is
+   loaded, before main().) */
 void DriverOneThread(void);
 
 /* -- sources.c -- */
@@ -88,7 +88,8 @@ PetscErrorCode DriverReportSources(cJSON *json);
 PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscReal mu[], cJSON **json);
 /* Into the report, and, where they matter, on the terminal: the largest initial overlap, the sliding, and that nothing
    faces anything. */
-PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap, PetscReal sliding);
+PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap,
+                              PetscReal sliding);
 void ReportKKT(cJSON *json, const HycoKKT *kkt);
 void ReportSeconds(cJSON *json, const HycoSeconds *seconds);
 void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[]);

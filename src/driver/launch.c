@@ -5,7 +5,8 @@
 #include <stdlib.h>
 
 /* Variables by which launchers tell a process how many ranks they have started. */
-static const char *const sizes[] = {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS", NULL};
+static const char *const sizes[] = {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS",
+                                    NULL};
 
 /* What one of them said before MPI began, which sets some itself: "NAME=VALUE"; "": one rank, or no launcher. */
 static char launched[DRIVER_LINE];
@@ -37,8 +38,8 @@ PetscErrorCode DriverCheckLaunch(void)
 
 void DriverOneThread(void)
 {
-  static const char *const asked[] = {"OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS",
-                                      "OMP_NUM_THREADS", NULL};
+  static const char *const asked[] = {"OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "MKL_NUM_THREADS",
+                                      "BLIS_NUM_THREADS",     "OMP_NUM_THREADS",  NULL};
   static const char *const setters[] = {"openblas_set_num_threads", "MKL_Set_Num_Threads", NULL};
   union {
     void *address;

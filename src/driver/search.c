@@ -72,8 +72,9 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
 
   PetscFunctionBegin;
   if (!s->length) {
-    PetscCall(Append(s, "attempt,training_points,model_type,pod_tol,rid_layers,rid_contact_extension,hybrid,rid_whole,n_modes,"
-                        "rid_elements,rid_fraction"));
+    PetscCall(Append(
+        s, "attempt,training_points,model_type,pod_tol,rid_layers,rid_contact_extension,hybrid,rid_whole,n_modes,"
+           "rid_elements,rid_fraction"));
     for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
       snprintf(row, sizeof(row), ",error_%s,median_%s", HycoErrorKinds[j], HycoErrorKinds[j]);
       PetscCall(Append(s, row));
@@ -155,14 +156,17 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
     if (!(limit[j] > 0) || t->held_out.largest[j] <= limit[j]) continue;
     DriverPercent(t->held_out.largest[j], reached);
     DriverPercent(limit[j], asked);
-    PetscCall(DriverMissed(
-        "the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s",
-        j == HYCO_ERROR_U ? "u" : j == HYCO_ERROR_LAMBDA ? "the contact forces" : HycoErrorKinds[j],
-        t->held_out.largest[j] > PETSC_MAX_REAL / 8 ? "infinite" : reached, (int)t->held_out.n,
-        s->on ? "the target is" : "without a target it should stay below", asked,
-        s->on ? "give more training points, a larger -target_max_added, or loosen the target"
-              : "give more training points, let training add them (-target_u 5e-3 -target_lambda 3e-2), or say by such targets "
-                "what is enough"));
+    PetscCall(
+        DriverMissed("the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s",
+                     j == HYCO_ERROR_U        ? "u"
+                     : j == HYCO_ERROR_LAMBDA ? "the contact forces"
+                                              : HycoErrorKinds[j],
+                     t->held_out.largest[j] > PETSC_MAX_REAL / 8 ? "infinite" : reached, (int)t->held_out.n,
+                     s->on ? "the target is" : "without a target it should stay below", asked,
+                     s->on ? "give more training points, a larger -target_max_added, or loosen the target"
+                           : "give more training points, let training add them (-target_u 5e-3 -target_lambda 3e-2), "
+                             "or say by such targets "
+                             "what is enough"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -99,7 +99,7 @@ static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
 static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool greedy)
 {
   static const struct {
-    const char *name, *types; /* NULL: for -greedy */
+    const char *name, *types;                        /* NULL: for -greedy */
   } meant[] = {{"-hyco_condensed_tol", "condensed"}, /* the first two choose points */
                {"-hyco_condensed_max_values", "condensed"},
                {"-hyco_condensed_pod_tol", "condensed"},
@@ -138,8 +138,7 @@ static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool gree
     HycoCheck(strstr(meant[k].types, HycoModelTypes[type]),
               "nothing reads %s here: it is for -hyco_model_type %s, and the model is %s", meant[k].name,
               meant[k].types, HycoModelTypes[type]);
-    HycoCheck(!given || k >= 2,
-              "nothing reads %s here: it chooses points where none are given", meant[k].name);
+    HycoCheck(!given || k >= 2, "nothing reads %s here: it chooses points where none are given", meant[k].name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

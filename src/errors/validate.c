@@ -1,5 +1,5 @@
-/* A model against stored full-order solutions that it was not trained on: errors, what tells of them online, and what an
-   online solve takes. */
+/* A model against stored full-order solutions that it was not trained on: errors, what tells of them online, and what
+   an online solve takes. */
 #include <hycotrainerimpl.h>
 
 const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda", "lambda_rid", NULL};

@@ -69,9 +69,10 @@ static void AddReleased(HycoFE fe, const HycoMotions *free, const PetscReal z[])
   fe->n_released++;
 }
 
-/* All that nothing holds is released, first what is tangential in one sense: the normals can be turned for that alone. */
-static PetscErrorCode Release(HycoFE fe, const HycoMotions *free, PetscInt n_alike, const PetscReal alike[], PetscInt n_unheld,
-                              const PetscReal unheld[])
+/* All that nothing holds is released, first what is tangential in one sense: the normals can be turned for that alone.
+ */
+static PetscErrorCode Release(HycoFE fe, const HycoMotions *free, PetscInt n_alike, const PetscReal alike[],
+                              PetscInt n_unheld, const PetscReal unheld[])
 {
   PetscFunctionBegin;
   PetscCall(PetscMalloc1((size_t)(n_alike + n_unheld) * (size_t)fe->n_dof, &fe->released));
@@ -116,7 +117,8 @@ static PetscErrorCode ChoosePins(HycoFOM f, PetscInt tag[], PetscInt component[]
   HycoPairsMark(&f->pairs, contact);
   PetscCall(PetscMalloc1(n * fe->n_dof, &row));
   for (PetscInt i = 0; i < fe->n_dof; i++) {
-    for (PetscInt k = 0; k < n; k++) row[i * n + k] = contact[i / dim] ? 0 : fe->released[(size_t)k * (size_t)fe->n_dof + (size_t)i];
+    for (PetscInt k = 0; k < n; k++)
+      row[i * n + k] = contact[i / dim] ? 0 : fe->released[(size_t)k * (size_t)fe->n_dof + (size_t)i];
   }
   for (PetscInt p = 0; p < n; p++) {
     PetscReal best = 0;
@@ -144,7 +146,8 @@ static PetscErrorCode ChoosePins(HycoFOM f, PetscInt tag[], PetscInt component[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: what the supports leave free, and of it what contact does not hold; pins for that, the last ones if there are. */
+/* Rank 0: what the supports leave free, and of it what contact does not hold; pins for that, the last ones if there
+ * are. */
 static PetscErrorCode FindPins(HycoFOM f)
 {
   HycoFE fe = f->fe_whole;
@@ -207,7 +210,8 @@ static PetscErrorCode Work(Vec force, Vec motion, PetscReal *on, PetscReal *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The share of the forces' work on a released motion that is not balanced must be little: it would accelerate the body. */
+/* The share of the forces' work on a released motion that is not balanced must be little: it would accelerate the body.
+ */
 static PetscErrorCode CheckBalance(HycoFOM f, const char forces[], PetscReal share)
 {
   PetscFunctionBegin;

@@ -1,7 +1,7 @@
 /*
-  Whether the contact forces are unique: they are when the rows of B of the closed contacts are independent. Slaves whose
-  own unknowns are all fixed (a rigid tool) may outnumber what their masters' unknowns can tell apart: then forces can be
-  shifted among them and nothing else changes.
+  Whether the contact forces are unique: they are when the rows of B of the closed contacts are independent. Slaves
+  whose own unknowns are all fixed (a rigid tool) may outnumber what their masters' unknowns can tell apart: then forces
+  can be shifted among them and nothing else changes.
 */
 #include <hycofomimpl.h>
 #include <hycolcp.h>

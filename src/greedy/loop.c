@@ -11,16 +11,16 @@
 #include <unistd.h>
 
 /* Of two indicators this close, neither is worse. */
-#define TIE 1e-9
+#define TIE      1e-9
 #define ACCURATE 1e-13 /* energy left out of the bases, where nobody says */
 
 typedef struct {
   HycoSnapshots store;
-  HycoSamples samples;           /* solved so far, in the order of the choices */
-  PetscInt n_par, n_points;      /* of the training set */
-  const PetscReal *points;       /* borrowed */
-  PetscReal *value;              /* n_points x 4: eta, eta_u, eta_lambda, size */
-  char file[HYCO_FILE_NAME];     /* the present iteration's model */
+  HycoSamples samples;       /* solved so far, in the order of the choices */
+  PetscInt n_par, n_points;  /* of the training set */
+  const PetscReal *points;   /* borrowed */
+  PetscReal *value;          /* n_points x 4: eta, eta_u, eta_lambda, size */
+  char file[HYCO_FILE_NAME]; /* the present iteration's model */
   PetscReal begin;
 } Loop;
 
@@ -258,7 +258,8 @@ static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The loop needs a recipe that is accurate wherever it leads; the model's own is searched when the solutions are there. */
+/* The loop needs a recipe that is accurate wherever it leads; the model's own is searched when the solutions are there.
+ */
 static void SetRecipe(HycoTrainer t)
 {
   if (!t->search || t->type != HYCO_MODEL_HYBRID) return;

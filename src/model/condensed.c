@@ -235,10 +235,11 @@ static PetscErrorCode BringStiffness(HycoCondensed c, const PetscReal mu[])
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   c->current = PETSC_FALSE;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
-  HycoCheckModel(definite,
-            "the interpolated flexibility is not positive definite here (one value left out: error %.1e): train on "
-            "more values of the parameters that reach the stiffness",
-            (double)c->errors[0]);
+  HycoCheckModel(
+      definite,
+      "the interpolated flexibility is not positive definite here (one value left out: error %.1e): train on "
+      "more values of the parameters that reach the stiffness",
+      (double)c->errors[0]);
   PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_H], mu, -1, -1, c->H));
   PetscCall(PetscArraycpy(c->at, mu, c->dim));
   c->current = PETSC_TRUE;

@@ -16,8 +16,8 @@ void HycoCondensedLaw(HycoCondensed c, const PetscReal mu[], PetscReal law[])
     PetscReal shape = 1;
 
     if (c->affine[p] || c->n[p] == 1) continue;
-    shape = c->flat[p] ? HycoPolynomialGrowth(c->n[p], c->x[p], mu[p])
-                       : HycoPolynomialProduct(c->n[p], c->x[p], -1, mu[p]);
+    shape =
+        c->flat[p] ? HycoPolynomialGrowth(c->n[p], c->x[p], mu[p]) : HycoPolynomialProduct(c->n[p], c->x[p], -1, mu[p]);
     for (PetscInt j = 0; j < HYCO_N_LAWS; j++) law[j] = of[j] < 0 || law[j] < 0 ? -1 : law[j] + of[j] * shape;
   }
   if (law[HYCO_LAW_U] >= 0) law[HYCO_LAW_U] += c->cut;

@@ -8,8 +8,8 @@
 
 /* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters.
    3: problem/type; what has none is hybrid. 4: the type may be condensed. 5: surfaces that a map moves are searched for
-   their masters, and a slave node may face none; models without such are written as 4. The kind is every type's, so that an older reader tells the
-   format. */
+   their masters, and a slave node may face none; models without such are written as 4. The kind is every type's, so
+   that an older reader tells the format. */
 #define HYCO_MODEL_FORMAT 5
 #define HYCO_MODEL_STILL  4
 #define HYCO_MODEL_OLDEST 2

@@ -54,7 +54,8 @@ PetscErrorCode HycoModelSetRidge(HycoModel m, PetscReal ridge)
   PetscCall(PetscBLASIntCast(n, &nb));
   LAPACKpotrf_("U", &lb, N, &lb, &info);
   HycoCheckModel(!info || ridge > 0,
-            "-hyco_hybrid_ridge 0: the %d modes are not independent on the %d unknowns of A; take -1", (int)l, (int)n);
+                 "-hyco_hybrid_ridge 0: the %d modes are not independent on the %d unknowns of A; take -1", (int)l,
+                 (int)n);
   if (!info) LAPACKpotrs_("U", &lb, &nb, N, &lb, X, &lb, &info);
   for (PetscInt k = 0; k < n; k++) {
     for (PetscInt j = 0; j < l; j++) m->G[j * n + k] = info ? 0 : X[k * l + j] * weight[j];
@@ -172,8 +173,7 @@ static PetscErrorCode Assemble(HycoModel m, const PetscReal mu[])
     HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillStiffness(m));
   }
   HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, m->F));
-  if (m->fe->contact_changed || m->fe->gap_changed)
-    HycoLogged(HYCO_EVENT_CONTACT, HycoModelOwnRows(m));
+  if (m->fe->contact_changed || m->fe->gap_changed) HycoLogged(HYCO_EVENT_CONTACT, HycoModelOwnRows(m));
   if (m->n_L && m->fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
   HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
   m->fe->ready = PETSC_TRUE;

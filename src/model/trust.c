@@ -153,8 +153,7 @@ static void Condensed(HycoModel m, HycoPrediction *p)
 
   if (c->law) {
     HycoCondensedLaw(c, m->fe->mu, law);
-    for (PetscInt j = 0; j < HYCO_N_LAWS; j++)
-      law[j] = law[j] < 0 ? -1 : PetscMax(HYCO_LAW_FLOOR, law[j]);
+    for (PetscInt j = 0; j < HYCO_N_LAWS; j++) law[j] = law[j] < 0 ? -1 : PetscMax(HYCO_LAW_FLOOR, law[j]);
     p->estimated_error_u = law[HYCO_LAW_U];
     p->estimated_error_lambda = p->interpolation_error = law[HYCO_LAW_LAMBDA];
     p->estimated_error_u_full = law[HYCO_LAW_U_FULL];
@@ -211,8 +210,8 @@ PetscErrorCode HycoTrustView(HycoModel m, PetscViewer viewer)
                                      median, largest));
   }
   if (t->n)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors, by %d predictions of held-out solutions\n",
-                                     (int)t->n));
+    PetscCall(
+        PetscViewerASCIIPrintf(viewer, "  estimates its errors, by %d predictions of held-out solutions\n", (int)t->n));
   else if (m->type == HYCO_MODEL_CONDENSED)
     PetscCall(PetscViewerASCIIPrintf(
         viewer, "  estimates its errors by values left out%s\n",

@@ -1,6 +1,6 @@
 /*
-  HycoSamples: unseen points, to judge a model by. They spread over what a set of training points reaches, by an additive
-  recurrence: coordinate j of point k is the fractional part of 1/2 + k phi^-(j+1), with phi the root of
+  HycoSamples: unseen points, to judge a model by. They spread over what a set of training points reaches, by an
+  additive recurrence: coordinate j of point k is the fractional part of 1/2 + k phi^-(j+1), with phi the root of
   phi^(d+1) = phi + 1 (M. Roberts' generalisation of the golden ratio to d dimensions). Every part of the sequence is
   evenly spread, and more points continue it.
 */

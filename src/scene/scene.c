@@ -8,9 +8,8 @@
 /* Fields of a section's members; a member's name is what stands between the section and the field. */
 static const char *const body_fields[] = {"young", "poisson", "element", "map_x", "map_y", "map_z", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
-static const char *const contact_fields[] = {"type", "group",    "slave",    "master",   "tolerance",
-                                             "gap",  "normal_x", "normal_y", "normal_z", "overlap",
-                                             NULL};
+static const char *const contact_fields[] = {"type",     "group",    "slave",    "master",  "tolerance", "gap",
+                                             "normal_x", "normal_y", "normal_z", "overlap", NULL};
 static const char *const scene_fields[] = {"title", "mesh", "parameters", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 

@@ -61,13 +61,14 @@ static void ReadScalar(Scan *s)
 
   if (quote) Advance(s);
   while (*s->at) {
-    if (quote == '"' && *s->at == '\\' && s->at[1]) Advance(s);
+    if (quote == '"' && *s->at == '\\' && s->at[1])
+      Advance(s);
     else if (quote && *s->at == quote) {
       Advance(s);
       if (quote == '"' || *s->at != '\'') break;
-    } else if (!quote && (*s->at == '\n' || (*s->at == ':' && strchr(" \t\r\n", s->at[1])) ||
-                          (*s->at == '#' && s->at > s->text && strchr(" \t", s->at[-1])) ||
-                          (s->flow && strchr(",[]{}", *s->at))))
+    } else if (!quote &&
+               (*s->at == '\n' || (*s->at == ':' && strchr(" \t\r\n", s->at[1])) ||
+                (*s->at == '#' && s->at > s->text && strchr(" \t", s->at[-1])) || (s->flow && strchr(",[]{}", *s->at))))
       break;
     if (n + 1 < sizeof(s->token)) s->token[n++] = *s->at;
     Advance(s);

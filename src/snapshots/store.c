@@ -200,9 +200,10 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscFunctionBegin;
   PetscCall(HycoFOMSolve(fom, s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
-  HycoCheck(!summary.regularised[0],
-            "neither supports nor contact keep %s: full order can be regularised, a reduced model cannot; fix a component",
-            summary.regularised);
+  HycoCheck(
+      !summary.regularised[0],
+      "neither supports nor contact keep %s: full order can be regularised, a reduced model cannot; fix a component",
+      summary.regularised);
   if (summary.reason < 0) {
     char at[HYCO_LINE] = "";
 

@@ -10,7 +10,7 @@
 
 /* m^2 numbers a point, and m^3 operations an active set: beyond this it is no model for many predictions. */
 #define MOST_CONTACTS 4000
-#define MOST_NUMBERS  1e9 /* of G at all nodes: 8 GB */
+#define MOST_NUMBERS  1e9   /* of G at all nodes: 8 GB */
 #define NO_LOAD       1e-11 /* of the contacts' displacements: what is left of them without forces is round-off */
 
 /* The values of parameter p among the samples, ascending, each once. */
@@ -61,19 +61,20 @@ static PetscErrorCode FindGrid(HycoTrainer t, HycoCondensed c)
         t->scene->parameter[p]);
     all *= (PetscReal)c->n[p];
   }
-  HycoCheckModel(all <= (PetscReal)n_s,
-            "the %d training points are no tensor grid: a condensed model needs every combination of their values (%g "
-            "points); give them by -grid or -values_NAME",
-            (int)n_s, (double)all);
+  HycoCheckModel(
+      all <= (PetscReal)n_s,
+      "the %d training points are no tensor grid: a condensed model needs every combination of their values (%g "
+      "points); give them by -grid or -values_NAME",
+      (int)n_s, (double)all);
   for (PetscInt p = 0; p < c->dim; p++) nodes *= c->n[p];
   PetscCall(PetscMalloc1(nodes, &c->sample));
   for (PetscInt k = 0; k < nodes; k++) c->sample[k] = -1;
   for (PetscInt k = 0; k < n_s; k++) c->sample[NodeOf(c, mu + k * c->dim)] = k;
   for (PetscInt k = 0; k < nodes; k++)
     HycoCheckModel(c->sample[k] >= 0,
-              "the %d training points are no tensor grid: a condensed model needs every combination "
-              "of their values; give them by -grid or -values_NAME",
-              (int)n_s);
+                   "the %d training points are no tensor grid: a condensed model needs every combination "
+                   "of their values; give them by -grid or -values_NAME",
+                   (int)n_s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -249,11 +250,12 @@ static PetscErrorCode CheckFacets(HycoTrainer t)
   for (PetscInt r = 1; r < met.rows.n; r++) {
     const HycoPairs *p = &met.rows;
 
-    HycoCheckModel(met.of[r] != met.of[r - 1],
-              "contact %s: node %d meets other facets of %s as the parameters move it; a condensed model interpolates "
-              "over the parameters what has kinks there: train a hybrid one",
-              t->scene->contact[p->contact[r]].name, (int)t->whole->node_id[p->slave[r]],
-              t->scene->contact[p->contact[r]].master);
+    HycoCheckModel(
+        met.of[r] != met.of[r - 1],
+        "contact %s: node %d meets other facets of %s as the parameters move it; a condensed model interpolates "
+        "over the parameters what has kinks there: train a hybrid one",
+        t->scene->contact[p->contact[r]].name, (int)t->whole->node_id[p->slave[r]],
+        t->scene->contact[p->contact[r]].master);
   }
   PetscCall(HycoMetDestroy(&met));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -284,9 +286,9 @@ static PetscErrorCode Inspect(HycoTrainer t, HycoCondensed c)
   if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
   PetscCall(HycoMotionsDestroy(&motions));
   HycoCheckModel(!free,
-            "no support keeps %s: contact alone holds it, K^-1 does not exist and no condensed model with it; "
-            "train a hybrid one",
-            name);
+                 "no support keeps %s: contact alone holds it, K^-1 does not exist and no condensed model with it; "
+                 "train a hybrid one",
+                 name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -298,15 +300,17 @@ PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t)
 
   PetscFunctionBegin;
   PetscCall(HycoOptionsWord(t->scene->options, "hyco_linear", HycoLinearNames, &linear));
-  HycoCheckModel(linear != HYCO_LINEAR_ITERATIVE,
-            "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a hybrid "
-            "model, or take -hyco_linear auto");
+  HycoCheckModel(
+      linear != HYCO_LINEAR_ITERATIVE,
+      "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a hybrid "
+      "model, or take -hyco_linear auto");
   HycoCheckModel(m > 0,
                  "the scene has no contact, and a condensed model is one of contact forces; train a hybrid model");
-  HycoCheckModel(m <= MOST_CONTACTS,
-            "the scene has %d contacts: a condensed model stores the square of their number at every training point, "
-            "and goes to %d; train a hybrid model",
-            (int)m, MOST_CONTACTS);
+  HycoCheckModel(
+      m <= MOST_CONTACTS,
+      "the scene has %d contacts: a condensed model stores the square of their number at every training point, "
+      "and goes to %d; train a hybrid model",
+      (int)m, MOST_CONTACTS);
   PetscCall(HycoCondensedDestroy(&t->condensed));
   PetscCall(HycoCondensedCreate(t->scene->n_parameters, m, 0, &c));
   t->condensed = c;
@@ -316,11 +320,12 @@ PetscErrorCode HycoTrainerBeginCondensed(HycoTrainer t)
   PetscCallMPI(MPI_Bcast(c->stiff, HYCO_MAX_PARAMETERS, MPIU_INT, 0, t->comm));
   PetscCallMPI(MPI_Bcast(c->affine, HYCO_MAX_PARAMETERS, MPIU_INT, 0, t->comm));
   PetscCall(HycoCondensedAllocate(c));
-  HycoCheckModel((PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=
-                MOST_NUMBERS,
-            "the flexibility of %d contacts at %d training points has more than %g numbers; take fewer values of the "
-            "parameters that reach the stiffness, or train a hybrid model",
-            (int)m, (int)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), MOST_NUMBERS);
+  HycoCheckModel(
+      (PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=
+          MOST_NUMBERS,
+      "the flexibility of %d contacts at %d training points has more than %g numbers; take fewer values of the "
+      "parameters that reach the stiffness, or train a hybrid model",
+      (int)m, (int)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), MOST_NUMBERS);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

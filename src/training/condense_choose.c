@@ -14,9 +14,9 @@
 #define LEJA_GRID     2000
 #define TIE           1e-6 /* relative: of parameters that cost nearly the same the first is refined */
 
-#define LOOK_BACK     4   /* values over which an error's fall is measured, from twice as many on */
-#define SLOW          0.7 /* a fall per value that no smooth dependence has */
-#define BEYOND        1.5 /* of the most values: what a fall that stays would ask for */
+#define LOOK_BACK 4   /* values over which an error's fall is measured, from twice as many on */
+#define SLOW      0.7 /* a fall per value that no smooth dependence has */
+#define BEYOND    1.5 /* of the most values: what a fall that stays would ask for */
 
 /* n Leja points of [lo, hi]: the ends, then each where the product of the distances to those before is largest. */
 static void LejaPoints(PetscInt n, PetscReal lo, PetscReal hi, PetscReal x[])

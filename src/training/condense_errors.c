@@ -10,19 +10,19 @@
 #include <hycolcp.h>
 #include <hycotrainerimpl.h>
 
-#define SMALL  1e-2 /* of the largest: what smaller ones are divided by */
-#define LAST   4    /* one of so many patterns of forces, the last, tells how those displace that are none */
-#define CUT    1.3  /* the modes' part on top of the largest in training */
-#define SHARE  0.9  /* of the divided differences along a parameter that the law's are no smaller than */
+#define SMALL 1e-2 /* of the largest: what smaller ones are divided by */
+#define LAST  4    /* one of so many patterns of forces, the last, tells how those displace that are none */
+#define CUT   1.3  /* the modes' part on top of the largest in training */
+#define SHARE 0.9  /* of the divided differences along a parameter that the law's are no smaller than */
 
 typedef struct {
   PetscInt p, i;                /* parameter, number of the value that is left out */
   PetscReal largest, largest_u; /* forces, displacements in training */
   PetscInt last;                /* node of the flexibility that M holds, and whether it is definite */
   PetscBool definite;
-  PetscReal *L, *d;             /* work: forces, coefficients */
-  PetscReal force;              /* the error of a point's forces */
-  PetscReal law[HYCO_N_LAWS];   /* and those that make the law */
+  PetscReal *L, *d;           /* work: forces, coefficients */
+  PetscReal force;            /* the error of a point's forces */
+  PetscReal law[HYCO_N_LAWS]; /* and those that make the law */
   PetscInt n_differences;
   PetscReal *difference[HYCO_N_LAWS]; /* along the parameter */
 } Work;
@@ -186,8 +186,8 @@ static PetscReal ModesError(HycoTrainer t, HycoCondensed c, Work *w)
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt s = c->sample[k];
 
-    cut = PetscMax(cut, Relative(Norm(r - t->l, x->C + (size_t)s * (size_t)r + t->l, NULL), t->U_norm[s],
-                                 SMALL * w->largest_u));
+    cut = PetscMax(
+        cut, Relative(Norm(r - t->l, x->C + (size_t)s * (size_t)r + t->l, NULL), t->U_norm[s], SMALL * w->largest_u));
   }
   for (PetscInt j = x->q - 1 - x->q / LAST; j >= 0 && j < x->q; j++) {
     for (PetscInt k = 0; k < nodes; k++) {

@@ -17,9 +17,9 @@
 #define FREE_CONTACTS  700 /* beyond so many contacts fewer, by the square: a sample's cost grows with it, at least */
 #define HELD           4   /* one of so many samples is held out of the patterns, and judges them */
 #define SHARE          0.95
-#define ACTIVE         1e-8   /* of the largest training force: contacts of a sample with less are open */
+#define ACTIVE         1e-8    /* of the largest training force: contacts of a sample with less are open */
 #define LEAST_STEP     0x1p-11 /* of the training values' box: ways are not halved further */
-#define MOST_RESPONSES 5e7 /* numbers of all responses: 400 MB */
+#define MOST_RESPONSES 5e7     /* numbers of all responses: 400 MB */
 #define SMALL          1e-2
 
 PetscReal HycoTrainerModesTolerance(HycoTrainer t)
@@ -100,7 +100,8 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
 }
 
 /* The contacts that are active at one of two samples alone. What counts as active has one measure for all samples:
-   where gaps and loads vanish together, the forces are round-off, which differs from one number of ranks to the next. */
+   where gaps and loads vanish together, the forces are round-off, which differs from one number of ranks to the next.
+ */
 static PetscInt Differ(PetscInt m, const PetscReal a[], const PetscReal b[], PetscReal least)
 {
   PetscInt n = 0;
@@ -213,8 +214,8 @@ static PetscErrorCode Decompose(HycoTrainer t, PetscInt n, PetscReal L[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(PetscMax(m, n), &sigma));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, L, &F));
-  PetscCall(HycoPOD(F, HycoTrainerModesTolerance(t), t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
-                    sigma));
+  PetscCall(
+      HycoPOD(F, HycoTrainerModesTolerance(t), t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q, sigma));
   PetscCall(MatDestroy(&F));
   PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &x->Q));
   PetscCall(PetscMalloc1(x->q + 1, &x->scale));

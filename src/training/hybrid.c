@@ -90,9 +90,10 @@ static PetscErrorCode Candidates(HycoModel m, PetscInt candidate[])
   }
   PetscCall(PetscFree(taken));
   for (PetscInt k = 0; k < m->m; k++)
-    HycoCheckModel(candidate[k] >= 0,
-              "the contact of node %d has no displacement in A of its own to keep full order; use -hyco_hybrid contact",
-              (int)m->slave_id[m->contact[k]]);
+    HycoCheckModel(
+        candidate[k] >= 0,
+        "the contact of node %d has no displacement in A of its own to keep full order; use -hyco_hybrid contact",
+        (int)m->slave_id[m->contact[k]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -140,8 +140,7 @@ static PetscErrorCode FindBasis(HycoTrainer t, Mat S, PetscInt kind, PetscBool a
   PetscCall(MatGetSize(S, &N, NULL));
   PetscCall(PetscCalloc1(t->n_s + 1, &basis->sigma));
   basis->n_sigma = PetscMin(N, t->n_s);
-  HycoLogged(HYCO_EVENT_POD,
-             HycoPOD(S, all ? 0 : t->tol[kind], t->noise, most, &basis->V, &basis->l, basis->sigma));
+  HycoLogged(HYCO_EVENT_POD, HycoPOD(S, all ? 0 : t->tol[kind], t->noise, most, &basis->V, &basis->l, basis->sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -163,8 +162,8 @@ static PetscErrorCode CutBasis(HycoTrainer t, PetscInt kind, Mat *V, PetscInt *l
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacements: U on rank 0, norms, and V^T of the snapshots less their lifting, which judge a model on the whole mesh at
-   the cost of its modes. */
+/* Displacements: U on rank 0, norms, and V^T of the snapshots less their lifting, which judge a model on the whole mesh
+   at the cost of its modes. */
 static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store, PetscBool all)
 {
   HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
@@ -176,7 +175,7 @@ static PetscErrorCode ReduceDisplacements(HycoTrainer t, HycoSnapshots store, Pe
   PetscCall(RemoveLifting(t, S));
   PetscCall(FindBasis(t, S, HYCO_SEED_DISPLACEMENT, all));
   HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",
-            (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+                 (double)t->tol[HYCO_SEED_DISPLACEMENT]);
   HycoCheckModel(basis->l, "every training solution has zero displacement; there is nothing to learn");
   PetscCall(PetscMalloc1(t->n_s, &t->U_norm));
   PetscCall(MatGetColumnNorms(S, NORM_2, t->U_norm));

@@ -117,10 +117,11 @@ static PetscErrorCode Conclude(HycoTrainer t, HycoModel m, const PetscBool reach
   Say(m->scene, mu, here);
   GridPoint(m->scene, reaches, each, change, mu);
   Say(m->scene, mu, there);
-  HycoFailNoModel("the reduced stiffness is singular inside the parameters' ranges: between %s and %s its determinant "
-                  "changes sign, and predictions near there are arbitrary; enlarge the RID (-hyco_rid_layers 1), change "
-                  "the modes (-hyco_pod_tol), or keep the model: -hyco_keep_singular",
-                  here, there);
+  HycoFailNoModel(
+      "the reduced stiffness is singular inside the parameters' ranges: between %s and %s its determinant "
+      "changes sign, and predictions near there are arbitrary; enlarge the RID (-hyco_rid_layers 1), change "
+      "the modes (-hyco_pod_tol), or keep the model: -hyco_keep_singular",
+      here, there);
 }
 
 static PetscErrorCode Scan(HycoTrainer t, HycoModel m, PetscBool reaches[])

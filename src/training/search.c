@@ -17,20 +17,20 @@
 #include <unistd.h>
 
 /* Where no target is given: errors that most studies do not see. */
-static const PetscReal usual[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2,
-                                               [HYCO_ERROR_LAMBDA] = 1e-2};
+static const PetscReal usual[HYCO_N_ERRORS] = {
+    [HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2, [HYCO_ERROR_LAMBDA] = 1e-2};
 
-#define LITTLE         1.25 /* a model that misses by so much more than the best is as good, if it is cheaper */
-#define EXTENSION      2.5  /* edges of the contact surface's facets */
-#define MANY_CONTACTS  600  /* beyond, a condensed model is tried only when it is asked for: its samples fill a disk */
-#define MANY_UNKNOWNS  600 /* of an RID; beyond, "all" is not tried by itself: its reduced matrix is dense */
-#define STALE          3 /* attempts without progress end a kind: larger RIDs do not mend a basis that lacks solutions */
-#define PROGRESS       0.95
-#define FEW_UNKNOWNS   300 /* a dense matrix of these is cheap */
-#define MAX_ATTEMPTS   64
-#define ROUND          4 /* of the training points, one in so many is added at a time */
-#define TELLING        0.3 /* correlation above which a parameter explains the errors */
-#define WHOLE          -1
+#define LITTLE        1.25 /* a model that misses by so much more than the best is as good, if it is cheaper */
+#define EXTENSION     2.5  /* edges of the contact surface's facets */
+#define MANY_CONTACTS 600  /* beyond, a condensed model is tried only when it is asked for: its samples fill a disk */
+#define MANY_UNKNOWNS 600  /* of an RID; beyond, "all" is not tried by itself: its reduced matrix is dense */
+#define STALE         3 /* attempts without progress end a kind: larger RIDs do not mend a basis that lacks solutions */
+#define PROGRESS      0.95
+#define FEW_UNKNOWNS  300 /* a dense matrix of these is cheap */
+#define MAX_ATTEMPTS  64
+#define ROUND         4   /* of the training points, one in so many is added at a time */
+#define TELLING       0.3 /* correlation above which a parameter explains the errors */
+#define WHOLE         -1
 
 /* Sizes of RIDs and bases, from the cheapest on; layers WHOLE: the whole mesh. */
 typedef struct {
@@ -38,10 +38,10 @@ typedef struct {
   PetscInt layers;
   PetscBool extended;
 } Size;
-static const Size sizes[] = {
-    {1e-5, 0, PETSC_FALSE}, {1e-5, 1, PETSC_FALSE}, {1e-7, 1, PETSC_FALSE},  {1e-7, 1, PETSC_TRUE},
-    {1e-10, 1, PETSC_FALSE}, {1e-10, 1, PETSC_TRUE}, {1e-13, 1, PETSC_TRUE},  {1e-10, 2, PETSC_TRUE},
-    {1e-13, 2, PETSC_TRUE},  {1e-13, 3, PETSC_TRUE}, {1e-13, WHOLE, PETSC_FALSE}};
+static const Size sizes[] = {{1e-5, 0, PETSC_FALSE}, {1e-5, 1, PETSC_FALSE},     {1e-7, 1, PETSC_FALSE},
+                             {1e-7, 1, PETSC_TRUE},  {1e-10, 1, PETSC_FALSE},    {1e-10, 1, PETSC_TRUE},
+                             {1e-13, 1, PETSC_TRUE}, {1e-10, 2, PETSC_TRUE},     {1e-13, 2, PETSC_TRUE},
+                             {1e-13, 3, PETSC_TRUE}, {1e-13, WHOLE, PETSC_FALSE}};
 enum { N_SIZES = sizeof(sizes) / sizeof(sizes[0]), FIRST_USUAL = 3 };
 
 typedef struct {
@@ -66,8 +66,8 @@ void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
   else if (r->whole)
     snprintf(text, length, "%s, pod_tol %g, hybrid %s, the whole mesh as RID", type, (double)r->pod_tol, kind);
   else
-    snprintf(text, length, "%s, pod_tol %g, hybrid %s, layers %d, contact extension %.3g", type, (double)r->pod_tol, kind,
-             (int)r->layers, (double)r->contact_extension);
+    snprintf(text, length, "%s, pod_tol %g, hybrid %s, layers %d, contact extension %.3g", type, (double)r->pod_tol,
+             kind, (int)r->layers, (double)r->contact_extension);
 }
 
 static void GetRecipe(HycoTrainer t, HycoRecipe *r)

@@ -283,10 +283,10 @@ static PetscErrorCode CheckUseful(HycoTrainer t, HycoModel m)
 {
   PetscFunctionBegin;
   HycoCheckModel(m->numbers[1] < 0.5,
-            "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
-            "condition %.0e): enlarge the RID (-hyco_rid_layers 1, "
-            "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)",
-            100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0]);
+                 "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
+                 "condition %.0e): enlarge the RID (-hyco_rid_layers 1, "
+                 "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)",
+                 100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0]);
   PetscCall(CheckForces(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -442,7 +442,8 @@ PetscErrorCode HycoTrainerRun(HycoTrainer t, HycoSamples samples, const char pat
   HycoCheck(samples || t->type == HYCO_MODEL_CONDENSED, "give the training points");
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
-              "-target_%s judges the model at held-out points, and -hyco_validation is 0: there are none", HycoErrorKinds[j]);
+              "-target_%s judges the model at held-out points, and -hyco_validation is 0: there are none",
+              HycoErrorKinds[j]);
   if (choose) {
     PetscCall(HycoTrainerStartPoints(t, &chosen));
     samples = chosen;

@@ -242,8 +242,8 @@ static PetscErrorCode ReadType(HycoTrainer t)
   t->type = (HycoModelType)type;
   t->dual = (HycoDual)dual;
   HycoCheckModel(t->type == HYCO_MODEL_PROJECTION || t->dual == HYCO_DUAL_FE,
-            "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
-            HycoDuals[dual]);
+                 "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
+                 HycoDuals[dual]);
   if (t->type != HYCO_MODEL_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
   if (t->dual == HYCO_DUAL_FE) {
     PetscBool set;
@@ -261,8 +261,9 @@ static PetscErrorCode ReadType(HycoTrainer t)
 PetscErrorCode HycoTrainerSetFromOptions(HycoTrainer t)
 {
   static const char *const deims[] = {"deim", "qdeim", NULL};
-  static const char *const choices[HYCO_N_CHOICES] = {"-hyco_model_type", "-hyco_pod_tol", "-hyco_rid_layers",
-                                                      "-hyco_rid_contact_extension", "-hyco_hybrid", "-hyco_rid_whole"};
+  static const char *const choices[HYCO_N_CHOICES] = {"-hyco_model_type", "-hyco_pod_tol",
+                                                      "-hyco_rid_layers", "-hyco_rid_contact_extension",
+                                                      "-hyco_hybrid",     "-hyco_rid_whole"};
   static const char *const indicators[] = {"local", "penetration", NULL};
   PetscOptions o;
   PetscInt hybrid, indicator, n = 64;

@@ -449,7 +449,7 @@ static const Rule rules[] = {
     {"tao [sa]sils *", "murty", 200, ""},
     {"tao [sa]sfls *", "obstacle", 200, ""},
     {"tao [sa]s* *", "twice", 200, ""}, /* with 500, some processors' kernels end at residuals of 3e-8 */
-    {"tao [sa]s* *", "*", 500, ""}, /* beyond, a factor each iteration takes the test's time */
+    {"tao [sa]s* *", "*", 500, ""},     /* beyond, a factor each iteration takes the test's time */
     {"tao b[ln]* *", "halfspace", 500, ""},
     {"tao bn* primal", "obstacle", 500, ""},
     {"tao * dual_free", "halfspace", 500, ""},

@@ -9,7 +9,7 @@ static char model_path[128], points_path[128];
 /* A locale with a comma; false: this machine has none. */
 static PetscBool SetComma(void)
 {
-  static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "fr_FR.utf8", "es_ES.UTF-8",
+  static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8",  "fr_FR.UTF-8", "fr_FR.utf8", "es_ES.UTF-8",
                                       "it_IT.UTF-8", "pt_BR.UTF-8", "ru_RU.UTF-8", "de_DE",      "fr_FR"};
 
   for (size_t k = 0; k < sizeof(names) / sizeof(names[0]); k++) {

@@ -62,8 +62,8 @@ static PetscErrorCode FailInTheMiddle(HycoModel m, PetscInt n, const PetscReal m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points that come in another order than that of the work: each answer stands where its point does, and the work goes by
-   stiffness, so that both points before 0.35 are done when that one fails. */
+/* Points that come in another order than that of the work: each answer stands where its point does, and the work goes
+   by stiffness, so that both points before 0.35 are done when that one fails. */
 static PetscErrorCode Unsorted(HycoModel m)
 {
   const PetscReal mu[8] = {0.2, 0.3, 0.1, 0.3, 0.2, 0.1, 0.1, 0.1}, failing[6] = {0.35, 0.1, 0.2, 0.3, 0.1, 0.1};

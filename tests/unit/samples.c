@@ -144,9 +144,9 @@ static PetscErrorCode TestTwins(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Unseen points: in the reach of the set (cell centres of the ranges reach their ends), none of them in it, evenly spread
-   (each quarter of the box has its share), three together on one value of an expensive parameter; more points continue
-   the sequence. */
+/* Unseen points: in the reach of the set (cell centres of the ranges reach their ends), none of them in it, evenly
+   spread (each quarter of the box has its share), three together on one value of an expensive parameter; more points
+   continue the sequence. */
 static PetscErrorCode TestUnseen(HycoScene scene)
 {
   const PetscInt counts[2] = {3, 4};
