@@ -26,6 +26,7 @@ static const PetscReal usual[HYCO_N_ERRORS] = {
 #define MANY_UNKNOWNS 600  /* of an RID; beyond, "all" is not tried by itself: its reduced matrix is dense */
 #define STALE         3 /* attempts without progress end a kind: larger RIDs do not mend a basis that lacks solutions */
 #define PROGRESS      0.95
+#define WILD          50  /* times the target: no attempt so far is a model at all */
 #define FEW_UNKNOWNS  300 /* a dense matrix of these is cheap */
 #define MAX_ATTEMPTS  64
 #define ROUND         4   /* of the training points, one in so many is added at a time */
@@ -277,7 +278,7 @@ static PetscErrorCode TrySizes(Search *s, HycoModelType type, HycoHybrid hybrid,
     for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].recipe));
     if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid))) continue;
     PetscCall(Try(s, &r));
-    stale = least == PETSC_INFINITY || s->attempt[s->n - 1].ratio < PROGRESS * least ? 0 : stale + 1;
+    stale = least > WILD || s->attempt[s->n - 1].ratio < PROGRESS * least ? 0 : stale + 1;
     least = PetscMin(least, s->attempt[s->n - 1].ratio);
     *met = (PetscBool)(least <= 1);
   }
