@@ -80,10 +80,10 @@ struct _p_HycoTrainer {
     void *ctx;
   } greedy;
   /* state of a run, rank 0 unless said */
-  HycoSamples samples;                    /* borrowed, every rank */
-  HycoSamples validation, held, own_held; /* given by the user (borrowed; NULL: none); of this run (borrowed; NULL:
-                                             none); drawn for it. Every rank */
-  PetscInt drawn;                         /* unseen points drawn so far */
+  HycoSamples samples;    /* borrowed, every rank */
+  HycoSamples validation; /* given by the user (borrowed; NULL: none). Every rank */
+  HycoSamples held;       /* of this run; NULL: none. Every rank */
+  PetscInt drawn;         /* unseen points drawn so far */
   HycoBasis basis[HYCO_N_SEEDS];
   PetscInt n_dual_seeds, *dual_seeds; /* nodes */
   HycoMesh whole;

@@ -17,6 +17,9 @@
 #define SMALL      1e-2 /* of a feature's median: its floor */
 #define NEGLIGIBLE 1e-3 /* of the errors' median: smaller ones count as that */
 
+/* The errors that are estimated, in the order of HycoTrustKind. */
+static const HycoErrorKind errors[HYCO_N_TRUST] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
+
 /* Median of what is positive among value[0], value[stride], ..., or `otherwise`. */
 static PetscErrorCode Median(PetscInt n, const PetscReal value[], PetscInt stride, PetscReal otherwise,
                              PetscReal *median)
@@ -61,7 +64,6 @@ static PetscErrorCode Spacing(HycoTrainer t, PetscReal *spacing)
    contact, the features tell nothing of its size: these rows come last, and only lift the law. */
 static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoTrustKind kind, HycoTrust *trust)
 {
-  static const HycoErrorKind errors[HYCO_N_TRUST] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
   const PetscInt p = HYCO_TRUST_FEATURES;
   PetscReal *X, *y, *error, least;
   PetscInt filled = 0, telling = 0;
@@ -114,7 +116,6 @@ static PetscErrorCode FitAll(HycoTrainer t, PetscInt n, HycoHeldOut rows[], Hyco
 /* Fits, and writes the model at `path` once more with it. Rank 0. */
 static PetscErrorCode Conclude(HycoTrainer t, HycoHeldOut rows[], const char path[], HycoTraining *report)
 {
-  static const HycoErrorKind errors[HYCO_N_TRUST] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
   const HycoValidation *v = &report->held_out;
   const HycoAttempt *chosen = &report->chosen;
   HycoModel m;

@@ -546,7 +546,6 @@ PetscErrorCode HycoTrainerLearn(HycoTrainer t, HycoSnapshots store, const char p
   PetscFunctionBegin;
   *grown = NULL;
   if (Settled(t)) {
-    GetRecipe(t, &report->chosen.recipe);
     PetscCall(HycoTrainerReduce(t, store, PETSC_FALSE));
     PetscCall(Build(t, store, NULL, NULL));
     PetscCall(HycoTrainerBuild(t, PETSC_TRUE, path, report));

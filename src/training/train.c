@@ -408,23 +408,20 @@ static PetscErrorCode DrawHeld(HycoTrainer t, HycoSamples *held)
 
 PetscErrorCode HycoTrainerHoldOut(HycoTrainer t, HycoSnapshots store)
 {
-  PetscInt n, m, dropped;
+  PetscInt n, m;
 
   PetscFunctionBegin;
-  t->held = NULL;
   t->drawn = 0;
-  PetscCall(HycoSamplesDestroy(&t->own_held));
-  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  PetscCall(HycoSamplesDestroy(&t->held));
   if (t->validation) {
-    PetscCall(HycoSamplesExcept(t->validation, t->samples, &t->own_held));
-    PetscCall(HycoSamplesGet(t->validation, &dropped, NULL, NULL));
-    PetscCall(HycoSamplesGet(t->own_held, &m, NULL, NULL));
-    HycoCheck(m, "each of the %d validation points is a training point too; a model is judged by others", (int)dropped);
+    PetscCall(HycoSamplesExcept(t->validation, t->samples, &t->held));
+    PetscCall(HycoSamplesGet(t->validation, &n, NULL, NULL));
+    PetscCall(HycoSamplesGet(t->held, &m, NULL, NULL));
+    HycoCheck(m, "each of the %d validation points is a training point too; a model is judged by others", (int)n);
   } else if (t->n_validation && t->scene->n_parameters)
-    PetscCall(DrawHeld(t, &t->own_held));
+    PetscCall(DrawHeld(t, &t->held));
   else
     PetscFunctionReturn(PETSC_SUCCESS);
-  t->held = t->own_held;
   PetscCall(HycoSnapshotsFill(store, t->held, t->progress, t->progress_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -41,8 +41,7 @@ PetscErrorCode HycoTrainerReset(HycoTrainer t)
   PetscCall(HycoMetDestroy(&t->met));
   PetscCall(HycoMeshDestroy(&t->whole));
   PetscCall(PetscFree(t->grown));
-  PetscCall(HycoSamplesDestroy(&t->own_held));
-  t->held = NULL;
+  PetscCall(HycoSamplesDestroy(&t->held));
   PetscCall(HycoCondensedDestroy(&t->condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
