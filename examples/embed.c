@@ -13,8 +13,8 @@ static PetscErrorCode Run(const char *folder, const char *file, PetscInt n, cons
   HycoFOM fom;
   HycoSummary full;
   HycoSamples samples;
-  HycoTrainer trainer;
-  HycoModel model;
+  HycoReducer reducer;
+  HycoROM model;
   HycoPrediction reduced;
   const PetscInt grid[] = {6, 6};
 
@@ -25,18 +25,18 @@ static PetscErrorCode Run(const char *folder, const char *file, PetscInt n, cons
   PetscCall(HycoFOMGetSummary(fom, &full));
   PetscCall(HycoSamplesCreate(scene, &samples)); /* learn from 36 solutions */
   PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_FALSE));
-  PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
-  PetscCall(HycoTrainerSetFromOptions(trainer));
-  PetscCall(HycoTrainerRun(trainer, samples, file, NULL));
-  PetscCall(HycoModelLoad(file, &model)); /* predict; needs the model file alone */
-  PetscCall(HycoModelPredict(model, n, mu));
-  PetscCall(HycoModelGetPrediction(model, &reduced));
+  PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
+  PetscCall(HycoReducerSetFromOptions(reducer));
+  PetscCall(HycoReducerRun(reducer, samples, file, NULL));
+  PetscCall(HycoROMLoad(file, &model)); /* predict; needs the model file alone */
+  PetscCall(HycoROMPredict(model, n, mu));
+  PetscCall(HycoROMGetPrediction(model, &reduced));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "contact force: full order %.6f (%s), reduced %.6f (%s, %.0f us)\n",
                         (double)full.total_contact_force, HycoReasonName(full.reason),
                         (double)reduced.total_contact_force, HycoReasonName(reduced.reason),
                         1e6 * (double)reduced.seconds.total));
-  PetscCall(HycoModelDestroy(&model));
-  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoROMDestroy(&model));
+  PetscCall(HycoReducerDestroy(&reducer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSceneDestroy(&scene));

@@ -25,7 +25,7 @@
 #include <hycosolver.h>
 #include <hycofom.h>
 #include <hycosnapshots.h>
-#include <hycotrainer.h>
-#include <hycomodel.h>
+#include <hycoreducer.h>
+#include <hycorom.h>
 
 #endif

@@ -12,7 +12,7 @@
 
 #include <hycoalgorithms.h>
 #include <hycoh5.h>
-#include <hycomodelimpl.h>
+#include <hycoromimpl.h>
 
 enum { HYCO_FIELD_G, HYCO_FIELD_GAP, HYCO_FIELD_H, HYCO_FIELD_FREE, HYCO_N_FIELDS };
 extern const char *const HycoGridFieldNames[]; /* as in files */
@@ -92,8 +92,8 @@ void HycoCondensedPoint(HycoCondensed condensed, PetscInt k, PetscReal mu[]);
 /* The laws of the errors at mu; < 0: too few values, or an older file. */
 void HycoCondensedLaw(HycoCondensed condensed, const PetscReal mu[], PetscReal law[]);
 /* To and from the model's file. */
-PetscErrorCode HycoCondensedSave(HycoModel model, HycoH5 file);
-PetscErrorCode HycoCondensedLoad(HycoModel model, HycoH5 file);
+PetscErrorCode HycoCondensedSave(HycoROM model, HycoH5 file);
+PetscErrorCode HycoCondensedLoad(HycoROM model, HycoH5 file);
 /* The bounds of G at its nodes. */
 PetscErrorCode HycoCondensedBound(HycoCondensed condensed);
 /* The node of the whole grid that is nearest to mu, and the square of its distance (may be NULL), each parameter

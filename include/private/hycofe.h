@@ -21,7 +21,7 @@ const HycoElement *HycoElementGetFacet(HycoCellType type);
 #define HYCO_MAX_CELL_DOFS 24
 
 typedef struct _n_HycoFE *HycoFE;
-typedef struct _n_HycoPlaces *HycoPlaces;
+typedef struct _n_HycoAssemblyMap *HycoAssemblyMap;
 
 /* What a uniform load gives to the nodes that carry it. */
 typedef struct {
@@ -38,7 +38,7 @@ struct _n_HycoFE {
   PetscBool *constant; /* by cell: neither its nodes nor its material */
   PetscInt n_constant;
   PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
-  HycoPlaces places;        /* of the entries of K; made by the second assembly into it */
+  HycoAssemblyMap places;   /* of the entries of K; made by the second assembly into it */
   PetscInt n_loads;
   HycoLoadShares *shares;  /* n_loads: by load of the scene */
   signed char *drawn_sign; /* by cell: the sign of its volume in the mesh file's coordinates */

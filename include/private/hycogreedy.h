@@ -2,7 +2,7 @@
 #ifndef HYCOGREEDY_H
 #define HYCOGREEDY_H
 
-#include <hycotrainerimpl.h>
+#include <hycoreducerimpl.h>
 
 typedef struct {
   PetscReal eta; /* what is to fall: eta_u + eta_lambda (43), or I (45); infinite: x/0 or not solved */
@@ -17,7 +17,7 @@ typedef struct _n_HycoIndicator *HycoIndicator;
   The indicator of `model` (borrowed). U_at: snapshots on the unknowns of the model's mesh (n_dof x n row major) at the
   n points (n x n_parameters); read by (43) alone, borrowed. Not collective.
 */
-PetscErrorCode HycoIndicatorCreate(HycoModel model, HycoIndicatorKind kind, PetscInt n, const PetscReal points[],
+PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscInt n, const PetscReal points[],
                                    const PetscReal U_at[], HycoIndicator *indicator);
 PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator);
 /* Predicts at mu and judges the prediction. What it gives does not depend on what was asked before. */

@@ -17,7 +17,7 @@
 
 /* Fails on every rank with the message of the lowest rank whose `message` is not empty, and with the error `caught`
    there if that is HYCO_ERR_NO_MODEL, else PETSC_ERR_USER. Collective. */
-PetscErrorCode HycoAgree(MPI_Comm comm, PetscErrorCode caught, const char message[]);
+PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char message[]);
 
 /* Begin and end catching PETSc errors on this rank as text: between the two, errors print nothing. */
 PetscErrorCode HycoCatchBegin(void);
@@ -37,7 +37,7 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
       caught_ = (call);                                                                                                \
       PetscCall(HycoCatchEnd(caught_, message_));                                                                      \
     }                                                                                                                  \
-    PetscCall(HycoAgree((comm), caught_, message_));                                                                   \
+    PetscCall(HycoErrorSync((comm), caught_, message_));                                                               \
   } while (0)
 
 /* Runs `call`, which may differ from rank to rank, on every rank; an error on any becomes the error of all. Collective.
@@ -49,7 +49,7 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
     PetscCall(HycoCatchBegin());                                                                                       \
     caught_ = (call);                                                                                                  \
     PetscCall(HycoCatchEnd(caught_, message_));                                                                        \
-    PetscCall(HycoAgree((comm), caught_, message_));                                                                   \
+    PetscCall(HycoErrorSync((comm), caught_, message_));                                                               \
   } while (0)
 
 /* Text as C's printf makes it, cut at HYCO_LINE. */

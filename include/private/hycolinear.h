@@ -10,10 +10,10 @@
 typedef struct {
   PetscObjectId K, B; /* 0: none */
   PetscObjectState K_state, B_state;
-} HycoSeen;
+} HycoOperatorState;
 
 /* Whether K and B are those last seen, unchanged; then remember them. */
-PetscErrorCode HycoSeenUpdate(HycoSeen *seen, Mat K, Mat B, PetscBool *same);
+PetscErrorCode HycoOperatorStateUpdate(HycoOperatorState *seen, Mat K, Mat B, PetscBool *same);
 /* -- MUMPS on the saddle point of K and B; all calls collective on its communicator -- */
 
 typedef struct _n_HycoDirect *HycoDirect;
@@ -64,9 +64,9 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
 
 /* Whether K has so short an envelope in reverse Cuthill-McKee order that its factor hardly fills; on several ranks only
    a line's has. Collective. */
-PetscErrorCode HycoThin(Mat K, PetscBool *thin);
+PetscErrorCode HycoBanded(Mat K, PetscBool *thin);
 /* Sets up a PCCHOLESKY for such a K. Collective. */
-PetscErrorCode HycoThinSolver(PC pc);
+PetscErrorCode HycoBandedSolver(PC pc);
 /* Factors the operators of such a solver, with more workspace when MUMPS asks for it. */
 PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular);
 

@@ -15,7 +15,7 @@ struct _p_HycoSystem {
   /* work of the residuals, made by the first */
   Vec work_x[2], work_L; /* as F, as D */
   PetscReal size_B;      /* its largest row sum, while B is as seen */
-  HycoSeen seen_B;
+  HycoOperatorState seen_B;
 };
 
 /* The work vectors of a system whose vectors are set. */
@@ -50,15 +50,15 @@ struct _p_HycoSolver {
   PetscReal *S, *g, *L;
   PetscBool *active;
   PetscBool started; /* active holds a solution's set */
-  HycoSeen condensed;
+  HycoOperatorState condensed;
   /* primal form in gap coordinates */
   Mat T, Kg, Kw;
   KSP ksp_gap;
   PetscInt *pivot, *contact, n_pivots; /* this rank's contacts' pivot unknowns, the contacts' numbers on this rank */
-  HycoSeen transformed;
+  HycoOperatorState transformed;
   /* dual form without its matrix */
   HycoDirect direct_free;
-  HycoSeen factored_free;
+  HycoOperatorState factored_free;
   Vec free; /* K^-1 F of the next solve, if known; borrowed */
   /* the last solve */
   PetscInt tao; /* the type that serves its system */

@@ -4,7 +4,7 @@
 
 #include <hycoalgorithms.h>
 #include <hycoh5.h>
-#include <hycomodelimpl.h>
+#include <hycoromimpl.h>
 
 /* At most so many combinations of values. */
 #define HYCO_TABLE_NODES 32
@@ -20,13 +20,13 @@ PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim,
 /* NULL-safe. */
 PetscErrorCode HycoTableDestroy(HycoTable *table);
 /* The pattern of the model's Kr, if sparse; a sparse Kr with that pattern, its entries zero. */
-PetscErrorCode HycoTableKeepPattern(HycoModel model, HycoTable table);
-PetscErrorCode HycoTableCreateSparse(HycoModel model);
+PetscErrorCode HycoTableKeepPattern(HycoROM model, HycoTable table);
+PetscErrorCode HycoTableCreateSparse(HycoROM model);
 /* Kr at mu by the model's table. */
-PetscErrorCode HycoTableFill(HycoModel model, const PetscReal mu[]);
-PetscErrorCode HycoTableView(HycoModel model, PetscViewer viewer);
-PetscErrorCode HycoTableSave(HycoModel model, HycoH5 file);
+PetscErrorCode HycoTableFill(HycoROM model, const PetscReal mu[]);
+PetscErrorCode HycoTableView(HycoROM model, PetscViewer viewer);
+PetscErrorCode HycoTableSave(HycoROM model, HycoH5 file);
 /* Fails when the file's table is damaged. */
-PetscErrorCode HycoTableLoad(HycoModel model, HycoH5 file);
+PetscErrorCode HycoTableLoad(HycoROM model, HycoH5 file);
 
 #endif

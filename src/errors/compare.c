@@ -1,6 +1,6 @@
 /* Errors of a prediction against the full-order solution. */
 #include <hycofomimpl.h>
-#include <hycomodelimpl.h>
+#include <hycoromimpl.h>
 
 /* Sums and maxima of one quantity, and the quotient they end in. */
 typedef struct {
@@ -21,7 +21,7 @@ static PetscReal Quotient(PetscReal lost, PetscReal size)
 }
 
 /* The errors in H1 and its dual. */
-static PetscErrorCode CompareH1(HycoModel m, const PetscReal U[], const PetscReal u[], const PetscReal lambda[],
+static PetscErrorCode CompareH1(HycoROM m, const PetscReal U[], const PetscReal u[], const PetscReal lambda[],
                                 HycoErrors *e)
 {
   PetscReal lost, size;
@@ -39,21 +39,21 @@ static PetscErrorCode CompareH1(HycoModel m, const PetscReal U[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoModelCompareFields(HycoModel m, const PetscReal u_full[], const PetscReal sigma[],
-                                      const PetscReal lambda[], HycoErrors *e, HycoForceErrors *forces)
+PetscErrorCode HycoROMCompareFields(HycoROM m, const PetscReal u_full[], const PetscReal sigma[],
+                                    const PetscReal lambda[], HycoErrors *e, HycoForceErrors *forces)
 {
   const PetscReal *U, *stress;
   const PetscInt dim = m->mesh->dim, ns = m->fe->n_sigma;
   Norms u = {0}, rid = {0}, s = {0}, s11 = {0}, lr = {0}, l = {0};
 
   PetscFunctionBegin;
-  PetscCall(HycoModelGetWholeU(m, NULL, &U));
+  PetscCall(HycoROMGetWholeU(m, NULL, &U));
   for (PetscInt k = 0; k < m->whole_nodes * dim; k++) Add(&u, U[k], u_full[k]);
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
     for (PetscInt c = 0; m->role[i] != HYCO_ROLE_OUTSIDE && c < dim; c++)
       Add(&rid, m->U[i * dim + c], u_full[m->mesh->node_whole[i] * dim + c]);
   }
-  PetscCall(HycoModelGetRID(m, NULL, NULL, NULL, NULL, NULL, &stress));
+  PetscCall(HycoROMGetRID(m, NULL, NULL, NULL, NULL, NULL, &stress));
   for (PetscInt k = 0; sigma && k < m->mesh->n_cells * ns; k++) {
     const PetscReal reference = sigma[m->mesh->cell_whole[k / ns] * ns + k % ns];
 
@@ -76,20 +76,20 @@ PetscErrorCode HycoModelCompareFields(HycoModel m, const PetscReal u_full[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Compare(HycoModel m, HycoFOM f, const PetscReal sigma[], HycoErrors *e)
+static PetscErrorCode Compare(HycoROM m, HycoFOM f, const PetscReal sigma[], HycoErrors *e)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoModelLoad()");
+  HycoCheckHandle(m, "HycoROMLoad()");
   HycoCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
             "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
             "training mesh",
             (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
-  PetscCall(HycoModelCompareFields(m, f->u, sigma, f->lambda, e, NULL));
+  PetscCall(HycoROMCompareFields(m, f->u, sigma, f->lambda, e, NULL));
   PetscCall(CompareH1(m, m->U_whole, f->u, f->lambda, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoModelCompare(HycoModel m, HycoFOM f, HycoErrors *e)
+PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
 {
   const PetscReal *sigma;
 

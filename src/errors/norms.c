@@ -5,7 +5,7 @@
   On a mesh that the parameters move, both are those of the middle of the ranges, so that one factor serves every point.
 */
 #include <hycolinear.h>
-#include <hycomodelimpl.h>
+#include <hycoromimpl.h>
 
 struct _n_HycoNorms {
   PetscInt dim;
@@ -79,7 +79,7 @@ PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoNormDual(HycoNorms h, HycoModel m, PetscBool rid_only, const PetscReal L[], const PetscReal minus[],
+PetscErrorCode HycoNormDual(HycoNorms h, HycoROM m, PetscBool rid_only, const PetscReal L[], const PetscReal minus[],
                             PetscReal *norm)
 {
   PetscScalar *r, square;
@@ -87,7 +87,7 @@ PetscErrorCode HycoNormDual(HycoNorms h, HycoModel m, PetscBool rid_only, const 
 
   PetscFunctionBegin;
   *norm = 0;
-  PetscCall(HycoModelComplete(m));
+  PetscCall(HycoROMComplete(m));
   PetscCall(VecSet(h->x, 0));
   PetscCall(VecGetArray(h->x, &r));
   for (PetscInt k = 0; k < m->pairs.n; k++) {

@@ -1,10 +1,10 @@
 /* A model against stored full-order solutions that it was not trained on: errors, what tells of them online, and what
    an online solve takes. */
-#include <hycotrainerimpl.h>
+#include <hycoreducerimpl.h>
 
 const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda", "lambda_rid", NULL};
 
-static PetscErrorCode Compare(HycoModel m, HycoSnapshots store, const PetscReal mu[], HycoHeldOut *row)
+static PetscErrorCode Compare(HycoROM m, HycoSnapshots store, const PetscReal mu[], HycoHeldOut *row)
 {
   const PetscInt n_dof = m->whole_nodes * m->mesh->dim, n_sigma = m->whole_cells * m->fe->n_sigma;
   PetscReal *u, *sigma, *lambda;
@@ -16,7 +16,7 @@ static PetscErrorCode Compare(HycoModel m, HycoSnapshots store, const PetscReal 
   PetscCall(HycoSnapshotsRead(store, mu, "U", n_dof, u));
   PetscCall(HycoSnapshotsRead(store, mu, "sigma", n_sigma, sigma));
   PetscCall(HycoSnapshotsRead(store, mu, "lambda", m->pairs.n, lambda));
-  PetscCall(HycoModelCompareFields(m, u, sigma, lambda, &e, &f));
+  PetscCall(HycoROMCompareFields(m, u, sigma, lambda, &e, &f));
   row->error[HYCO_ERROR_U] = e.u;
   row->error[HYCO_ERROR_U_RID] = e.u_rid;
   row->error[HYCO_ERROR_SIGMA] = e.sigma;
@@ -31,15 +31,15 @@ static PetscErrorCode Compare(HycoModel m, HycoSnapshots store, const PetscReal 
 }
 
 /* Points first .. last-1 in their order, several times: what a load ramp keeps from one step to the next is kept. */
-static PetscErrorCode PredictShare(HycoModel m, HycoSnapshots store, PetscInt first, PetscInt last,
-                                   const PetscReal mu[], HycoHeldOut rows[])
+static PetscErrorCode PredictShare(HycoROM m, HycoSnapshots store, PetscInt first, PetscInt last, const PetscReal mu[],
+                                   HycoHeldOut rows[])
 {
   const PetscInt n_par = m->scene->n_parameters;
 
   PetscFunctionBegin;
   for (PetscInt r = 0; r < HYCO_HELD_REPEATS; r++) {
     for (PetscInt k = first; k < last; k++) {
-      PetscCall(HycoModelPredict(m, n_par, mu + k * n_par));
+      PetscCall(HycoROMPredict(m, n_par, mu + k * n_par));
       rows[k].seconds[r] = m->prediction.seconds.total;
       if (r) continue;
       rows[k].converged = m->prediction.reason > 0;
@@ -49,8 +49,8 @@ static PetscErrorCode PredictShare(HycoModel m, HycoSnapshots store, PetscInt fi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoModelPredictHeldOut(MPI_Comm comm, HycoModel m, HycoSnapshots store, HycoSamples samples,
-                                       HycoHeldOut rows[])
+PetscErrorCode HycoROMPredictHeldOut(MPI_Comm comm, HycoROM m, HycoSnapshots store, HycoSamples samples,
+                                     HycoHeldOut rows[])
 {
   PetscInt n, n_par;
   const PetscReal *mu;
@@ -118,20 +118,20 @@ PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], HycoVa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoModelValidate(MPI_Comm comm, HycoModel m, HycoSnapshots store, HycoSamples samples,
-                                 HycoValidation *validation)
+PetscErrorCode HycoROMValidate(MPI_Comm comm, HycoROM m, HycoSnapshots store, HycoSamples samples,
+                               HycoValidation *validation)
 {
   PetscInt n, n_par;
   HycoHeldOut *rows;
 
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoModelLoad()");
+  HycoCheckHandle(m, "HycoROMLoad()");
   HycoCheckHandle(store, "HycoSnapshotsOpen()");
   PetscCall(HycoSamplesGet(samples, &n, &n_par, NULL));
   PetscCheck(n > 0 && n_par == m->scene->n_parameters, comm, PETSC_ERR_USER,
              "the validation points are none, or of another scene than the model");
   PetscCall(PetscMalloc1(n, &rows));
-  PetscCall(HycoModelPredictHeldOut(comm, m, store, samples, rows));
+  PetscCall(HycoROMPredictHeldOut(comm, m, store, samples, rows));
   PetscCall(HycoHeldOutSummarise(n, rows, validation));
   PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);

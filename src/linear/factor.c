@@ -2,7 +2,7 @@
 #include <hycolinear.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateGet() */
 
-PetscErrorCode HycoSeenUpdate(HycoSeen *seen, Mat K, Mat B, PetscBool *same)
+PetscErrorCode HycoOperatorStateUpdate(HycoOperatorState *seen, Mat K, Mat B, PetscBool *same)
 {
   PetscObjectState k, b = 0;
   PetscObjectId K_id, B_id = 0;
@@ -51,9 +51,9 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
   PetscCall(KSPSetType(*ksp, KSPPREONLY));
   PetscCall(KSPGetPC(*ksp, &pc));
   PetscCall(PCSetType(pc, symmetric ? PCCHOLESKY : PCLU));
-  if (symmetric && n > 3000) PetscCall(HycoThin(K, &thin));
+  if (symmetric && n > 3000) PetscCall(HycoBanded(K, &thin));
   if (thin)
-    PetscCall(HycoThinSolver(pc));
+    PetscCall(HycoBandedSolver(pc));
   else if (size > 1 || n > 3000)
     PetscCall(PrepareMumps(pc, K, prefix));
   else {

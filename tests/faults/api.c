@@ -20,7 +20,7 @@ static PetscErrorCode TestDestroyed(void)
   HycoScene scene;
   HycoSamples samples;
   HycoFOM fom;
-  HycoModel model;
+  HycoROM model;
   HycoSolver solver;
   HycoSystem system;
   HycoErrors errors;
@@ -29,13 +29,13 @@ static PetscErrorCode TestDestroyed(void)
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
   PetscCall(HycoSamplesCreate(scene, &samples));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
-  PetscCall(HycoModelLoad(hybrid, &model));
-  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoROMLoad(hybrid, &model));
+  PetscCall(HycoROMDestroy(&model));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
   CHECK(!model && !fom && !samples && !scene, "Destroy must clear the handles");
-  PetscCall(HycoModelDestroy(&model)); /* twice */
+  PetscCall(HycoROMDestroy(&model)); /* twice */
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
@@ -48,13 +48,13 @@ static PetscErrorCode TestDestroyed(void)
   CHECK_FAILS(HycoFOMGetSystem(fom, &system), "make it by HycoFOMCreate()");
   CHECK_FAILS(HycoFOMWrite(fom, "x.xdmf"), "make it by HycoFOMCreate()");
   CHECK_FAILS(HycoFOMGetSolution(fom, NULL, NULL, NULL, NULL, NULL, NULL), "make it by HycoFOMCreate()");
-  CHECK_FAILS(HycoModelGetScene(model, &scene), "make it by HycoModelLoad()");
-  CHECK_FAILS(HycoModelSetReconstruct(model, PETSC_TRUE), "make it by HycoModelLoad()");
-  CHECK_FAILS(HycoModelGetLambda(model, NULL, NULL, NULL, NULL), "make it by HycoModelLoad()");
-  CHECK_FAILS(HycoModelGetWholeU(model, NULL, NULL), "make it by HycoModelLoad()");
-  CHECK_FAILS(HycoModelWrite(model, "x.xdmf"), "make it by HycoModelLoad()");
-  CHECK_FAILS(HycoModelView(model, PETSC_VIEWER_STDOUT_SELF), "make it by HycoModelLoad()");
-  CHECK_FAILS(HycoModelCompare(model, fom, &errors), "make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoROMGetScene(model, &scene), "make it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMSetReconstruct(model, PETSC_TRUE), "make it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMGetLambda(model, NULL, NULL, NULL, NULL), "make it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMGetWholeU(model, NULL, NULL), "make it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMWrite(model, "x.xdmf"), "make it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMView(model, PETSC_VIEWER_STDOUT_SELF), "make it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMCompare(model, fom, &errors), "make it by HycoFOMCreate()");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -65,10 +65,10 @@ static PetscErrorCode TestStale(void)
   const PetscInt counts[2] = {2, 2};
   HycoScene scene, scene_copy;
   HycoSamples samples, samples_copy;
-  HycoTrainer trainer, trainer_copy;
+  HycoReducer reducer, trainer_copy;
   HycoSnapshots store, store_copy;
   HycoFOM fom, fom_copy;
-  HycoModel model, model_copy, models[100];
+  HycoROM model, model_copy, models[100];
   HycoSolver solver, solver_copy;
   HycoSystem system, system_copy;
   HycoErrors errors;
@@ -77,23 +77,23 @@ static PetscErrorCode TestStale(void)
   PetscFunctionBegin;
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
   PetscCall(HycoSamplesCreate(scene, &samples));
-  PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
+  PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoSnapshotsOpen(PETSC_COMM_WORLD, scene, "faults-api.snapshots", &store));
   rmdir("faults-api.snapshots");
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
-  PetscCall(HycoModelLoad(hybrid, &model));
+  PetscCall(HycoROMLoad(hybrid, &model));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
   scene_copy = scene;
   samples_copy = samples;
-  trainer_copy = trainer;
+  trainer_copy = reducer;
   store_copy = store;
   fom_copy = fom;
   model_copy = model;
   solver_copy = solver;
   system_copy = system;
-  CHECK_FAILS(HycoModelPredict((HycoModel)fom, 2, inside), "was destroyed, or never made; make it by HycoModelLoad()");
-  CHECK_FAILS(HycoModelPredict((HycoModel)none, 2, inside), "was destroyed, or never made; make it by HycoModelLoad()");
+  CHECK_FAILS(HycoROMPredict((HycoROM)fom, 2, inside), "was destroyed, or never made; make it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMPredict((HycoROM)none, 2, inside), "was destroyed, or never made; make it by HycoROMLoad()");
   PetscCall(HycoSolverSetSystem(solver, system));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, 1, &F));
   PetscCall(HycoSystemDestroy(&system));
@@ -102,36 +102,35 @@ static PetscErrorCode TestStale(void)
   PetscCall(HycoSceneDestroy(&scene)); /* before those that borrow it */
   CHECK_FAILS(HycoFOMSolve(fom, 2, inside), "was destroyed, or never made; make it by HycoSceneLoad()");
   CHECK_FAILS(HycoSamplesAddPoint(samples, inside), "was destroyed, or never made; make it by HycoSceneLoad()");
-  CHECK_FAILS(HycoModelCheckScene(model, scene_copy), "was destroyed, or never made; make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoROMCheckScene(model, scene_copy), "was destroyed, or never made; make it by HycoSceneLoad()");
   PetscCall(HycoSamplesDestroy(&samples));
-  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoReducerDestroy(&reducer));
   PetscCall(HycoSnapshotsDestroy(&store));
-  PetscCall(HycoModelDestroy(&model));
-  CHECK_FAILS(HycoModelCompare(model_copy, fom, &errors), "HycoFOMSolve()");
+  PetscCall(HycoROMDestroy(&model));
+  CHECK_FAILS(HycoROMCompare(model_copy, fom, &errors), "HycoFOMSolve()");
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSolverDestroy(&solver));
   CHECK_FAILS(HycoSceneDestroy(&scene_copy), "was destroyed, or never made; make it by HycoSceneLoad()");
   CHECK_FAILS(HycoSamplesAddGrid(samples_copy, counts, PETSC_FALSE), "never made; make it by HycoSamplesCreate()");
   CHECK_FAILS(HycoSamplesAddPoint(samples_copy, inside), "never made; make it by HycoSamplesCreate()");
   CHECK_FAILS(HycoSamplesDestroy(&samples_copy), "never made; make it by HycoSamplesCreate()");
-  CHECK_FAILS(HycoTrainerRun(trainer_copy, samples, "m.h5", NULL), "never made; make it by HycoTrainerCreate()");
-  CHECK_FAILS(HycoTrainerDestroy(&trainer_copy), "never made; make it by HycoTrainerCreate()");
+  CHECK_FAILS(HycoReducerRun(trainer_copy, samples, "m.h5", NULL), "never made; make it by HycoReducerCreate()");
+  CHECK_FAILS(HycoReducerDestroy(&trainer_copy), "never made; make it by HycoReducerCreate()");
   CHECK_FAILS(HycoSnapshotsFill(store_copy, samples, NULL, NULL), "never made; make it by HycoSnapshotsOpen()");
   CHECK_FAILS(HycoSnapshotsDestroy(&store_copy), "never made; make it by HycoSnapshotsOpen()");
   CHECK_FAILS(HycoFOMSolve(fom_copy, 2, inside), "never made; make it by HycoFOMCreate()");
   CHECK_FAILS(HycoFOMDestroy(&fom_copy), "never made; make it by HycoFOMCreate()");
-  CHECK_FAILS(HycoModelPredict(model_copy, 2, inside), "never made; make it by HycoModelLoad()");
-  CHECK_FAILS(HycoModelDestroy(&model_copy), "never made; make it by HycoModelLoad()");
+  CHECK_FAILS(HycoROMPredict(model_copy, 2, inside), "never made; make it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMDestroy(&model_copy), "never made; make it by HycoROMLoad()");
   CHECK_FAILS(HycoSolverSetType(solver_copy, HYCO_SOLVER_TAO), "never made; make it by HycoSolverCreate()");
   CHECK_FAILS(HycoSystemDestroy(&system_copy), "never made; make it by HycoSystemCreate()");
   CHECK_FAILS(HycoSolverDestroy(&solver_copy), "never made; make it by HycoSolverCreate()");
-  for (int k = 0; k < 100; k++)
-    PetscCall(HycoModelLoad(hybrid, &models[k])); /* the table grows, and closes its holes */
-  for (int k = 0; k < 100; k += 3) PetscCall(HycoModelDestroy(&models[k]));
+  for (int k = 0; k < 100; k++) PetscCall(HycoROMLoad(hybrid, &models[k])); /* the table grows, and closes its holes */
+  for (int k = 0; k < 100; k += 3) PetscCall(HycoROMDestroy(&models[k]));
   for (int k = 0; k < 100; k++) {
-    if (models[k]) PetscCall(HycoModelPredict(models[k], 2, inside));
+    if (models[k]) PetscCall(HycoROMPredict(models[k], 2, inside));
   }
-  for (int k = 0; k < 100; k++) PetscCall(HycoModelDestroy(&models[k]));
+  for (int k = 0; k < 100; k++) PetscCall(HycoROMDestroy(&models[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -139,18 +138,18 @@ static PetscErrorCode TestStale(void)
 static PetscErrorCode TestNullPlaces(void)
 {
   HycoScene scene = NULL;
-  HycoModel model = NULL;
+  HycoROM model = NULL;
 
   PetscFunctionBegin;
   CHECK_FAILS(HycoSceneLoad(PETSC_COMM_WORLD, NULL, &scene), "is NULL");
   CHECK_FAILS(HycoSceneLoad(PETSC_COMM_WORLD, rope, NULL), "is NULL");
-  CHECK_FAILS(HycoModelLoad(NULL, &model), "is NULL");
-  CHECK_FAILS(HycoModelLoad(hybrid, NULL), "is NULL");
+  CHECK_FAILS(HycoROMLoad(NULL, &model), "is NULL");
+  CHECK_FAILS(HycoROMLoad(hybrid, NULL), "is NULL");
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
-  PetscCall(HycoModelLoad(hybrid, &model));
-  CHECK_FAILS(HycoModelPredict(model, 2, NULL), "is NULL");
+  PetscCall(HycoROMLoad(hybrid, &model));
+  CHECK_FAILS(HycoROMPredict(model, 2, NULL), "is NULL");
   CHECK_FAILS(HycoSceneCheckParameters(scene, 2, NULL), "is NULL");
-  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoROMDestroy(&model));
   PetscCall(HycoSceneDestroy(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -187,7 +186,7 @@ static PetscErrorCode TestAfterError(void)
   const PetscReal nan[2] = {NAN, 0.1};
   HycoScene scene;
   HycoFOM fom;
-  HycoModel model, other;
+  HycoROM model, other;
   HycoSummary summary;
   HycoPrediction p;
   HycoErrors errors;
@@ -195,28 +194,28 @@ static PetscErrorCode TestAfterError(void)
   PetscFunctionBegin;
   PetscCall(HycoSceneLoad(PETSC_COMM_SELF, rope, &scene));
   PetscCall(HycoFOMCreate(PETSC_COMM_SELF, scene, &fom));
-  PetscCall(HycoModelLoad(hybrid, &model));
-  CHECK_FAILS(HycoModelGetPrediction(model, &p), "call HycoModelPredict() before");
-  CHECK_FAILS(HycoModelWrite(model, "/tmp/x.xdmf"), "call HycoModelPredict() before");
-  CHECK_FAILS(HycoModelCompare(model, fom, &errors), "before");
+  PetscCall(HycoROMLoad(hybrid, &model));
+  CHECK_FAILS(HycoROMGetPrediction(model, &p), "call HycoROMPredict() before");
+  CHECK_FAILS(HycoROMWrite(model, "/tmp/x.xdmf"), "call HycoROMPredict() before");
+  CHECK_FAILS(HycoROMCompare(model, fom, &errors), "before");
   for (int k = 0; k < 3; k++) {
     CHECK_FAILS(HycoFOMSolve(fom, 1, inside), "1 parameter values were given; the scene has 2");
     CHECK_FAILS(HycoFOMSolve(fom, 2, outside), "lies outside its range");
     CHECK_FAILS(HycoFOMSolve(fom, 2, nan), "mu1");
-    CHECK_FAILS(HycoModelPredict(model, 3, inside), "3 parameter values were given; the scene has 2");
-    CHECK_FAILS(HycoModelPredict(model, 2, outside), "lies outside its range");
-    CHECK_FAILS(HycoModelPredict(model, 2, nan), "mu1");
-    CHECK_FAILS(HycoModelLoad("/no/such.h5", &other), "/no/such.h5");
+    CHECK_FAILS(HycoROMPredict(model, 3, inside), "3 parameter values were given; the scene has 2");
+    CHECK_FAILS(HycoROMPredict(model, 2, outside), "lies outside its range");
+    CHECK_FAILS(HycoROMPredict(model, 2, nan), "mu1");
+    CHECK_FAILS(HycoROMLoad("/no/such.h5", &other), "/no/such.h5");
     PetscCall(HycoFOMSolve(fom, 2, inside));
     PetscCall(HycoFOMGetSummary(fom, &summary));
     CHECK_NEAR(summary.total_contact_force, 0.3502256293, 1e-9); /* an independent computation, tests/unit/api.c */
     CHECK_FAILS(HycoFOMWrite(fom, "/no/such/folder/x.xdmf"), "cannot be written");
-    PetscCall(HycoModelPredict(model, 2, inside));
-    PetscCall(HycoModelGetPrediction(model, &p));
+    PetscCall(HycoROMPredict(model, 2, inside));
+    PetscCall(HycoROMGetPrediction(model, &p));
     CHECK_NEAR(p.total_contact_force, 0.32557839822014933, 1e-12); /* what it gave when it was written */
-    CHECK_FAILS(HycoModelWrite(model, "/no/such/folder/x.xdmf"), "cannot be written");
+    CHECK_FAILS(HycoROMWrite(model, "/no/such/folder/x.xdmf"), "cannot be written");
   }
-  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoROMDestroy(&model));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSceneDestroy(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -228,29 +227,29 @@ static PetscErrorCode TestTraining(void)
   const PetscReal shift[2] = {0.05, 0.06};
   HycoScene scene, other;
   HycoSamples samples;
-  HycoTrainer trainer;
+  HycoReducer reducer;
   HycoSnapshots store;
   HycoSolver solver;
-  HycoModel model;
+  HycoROM model;
   HycoFOM fom;
   HycoErrors errors;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
   PetscCall(HycoSamplesCreate(scene, &samples));
-  PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
-  CHECK_FAILS(HycoTrainerSetGreedyStop(trainer, 0, 0, 0), "it must be positive, as 1e-3 is");
-  CHECK_FAILS(HycoTrainerSetGreedyStop(trainer, 1e-3, -1, 0), "neither can be negative");
-  CHECK_FAILS(HycoTrainerSetTargets(trainer, (const PetscReal[HYCO_N_ERRORS]){-1}, 0), "target of the error u is -1");
-  CHECK_FAILS(HycoTrainerRun(trainer, NULL, "none.h5", NULL), "give the training points");
-  CHECK_FAILS(HycoTrainerRun(trainer, samples, "none.h5", NULL), "the set of training points is empty");
+  PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
+  CHECK_FAILS(HycoReducerSetGreedyStop(reducer, 0, 0, 0), "it must be positive, as 1e-3 is");
+  CHECK_FAILS(HycoReducerSetGreedyStop(reducer, 1e-3, -1, 0), "neither can be negative");
+  CHECK_FAILS(HycoReducerSetTargets(reducer, (const PetscReal[HYCO_N_ERRORS]){-1}, 0), "target of the error u is -1");
+  CHECK_FAILS(HycoReducerRun(reducer, NULL, "none.h5", NULL), "give the training points");
+  CHECK_FAILS(HycoReducerRun(reducer, samples, "none.h5", NULL), "the set of training points is empty");
   CHECK(access("none.h5", F_OK) != 0, "a training that was refused has written a model");
   PetscCall(HycoSnapshotsOpen(PETSC_COMM_WORLD, scene, "none.snapshots", &store));
   CHECK_FAILS(HycoSnapshotsFill(store, samples, NULL, NULL), "the set of samples is empty");
   PetscCall(HycoSnapshotsDestroy(&store));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   rmdir("none.snapshots");
-  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoReducerDestroy(&reducer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
   CHECK_FAILS(HycoSolverSetLinear(solver, HYCO_LINEAR_AUTO, -1), "it must be 0 (what is free) or more");
@@ -258,10 +257,10 @@ static PetscErrorCode TestTraining(void)
   PetscCall(HycoSceneLoad(PETSC_COMM_SELF, blocks, &other));
   PetscCall(HycoFOMCreate(PETSC_COMM_SELF, other, &fom));
   PetscCall(HycoFOMSolve(fom, 2, shift));
-  PetscCall(HycoModelLoad(hybrid, &model));
-  PetscCall(HycoModelPredict(model, 2, inside));
-  CHECK_FAILS(HycoModelCompare(model, fom, &errors), "the model was trained on a mesh of 100 nodes and 99 cells");
-  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoROMLoad(hybrid, &model));
+  PetscCall(HycoROMPredict(model, 2, inside));
+  CHECK_FAILS(HycoROMCompare(model, fom, &errors), "the model was trained on a mesh of 100 nodes and 99 cells");
+  PetscCall(HycoROMDestroy(&model));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSceneDestroy(&other));
   PetscCall(HycoSceneDestroy(&scene));
@@ -271,27 +270,27 @@ static PetscErrorCode TestTraining(void)
 /* Two models, asked in turn, do not disturb each other. */
 static PetscErrorCode TestTwo(void)
 {
-  HycoModel a, b;
+  HycoROM a, b;
   HycoPrediction p, q;
   const PetscReal elsewhere[2] = {0.2, 0.4};
 
   PetscFunctionBegin;
-  PetscCall(HycoModelLoad(hybrid, &a));
-  PetscCall(HycoModelLoad(projection, &b));
+  PetscCall(HycoROMLoad(hybrid, &a));
+  PetscCall(HycoROMLoad(projection, &b));
   for (int k = 0; k < 2; k++) {
-    PetscCall(HycoModelPredict(a, 2, inside));
-    PetscCall(HycoModelPredict(b, 2, k ? elsewhere : inside));
-    PetscCall(HycoModelGetPrediction(a, &p));
-    PetscCall(HycoModelGetPrediction(b, &q));
+    PetscCall(HycoROMPredict(a, 2, inside));
+    PetscCall(HycoROMPredict(b, 2, k ? elsewhere : inside));
+    PetscCall(HycoROMGetPrediction(a, &p));
+    PetscCall(HycoROMGetPrediction(b, &q));
     CHECK_NEAR(p.total_contact_force, 0.32557839822014933, 1e-12);
-    CHECK(p.type == HYCO_MODEL_HYBRID && q.type == HYCO_MODEL_PROJECTION, "types %d, %d", (int)p.type, (int)q.type);
+    CHECK(p.type == HYCO_ROM_HYBRID && q.type == HYCO_ROM_PROJECTION, "types %d, %d", (int)p.type, (int)q.type);
     if (!k) CHECK_NEAR(q.total_contact_force, 0.350993482, 1e-9); /* as printed when the file was written */
   }
-  PetscCall(HycoModelDestroy(&a));
-  PetscCall(HycoModelPredict(b, 2, inside));
-  PetscCall(HycoModelGetPrediction(b, &q));
+  PetscCall(HycoROMDestroy(&a));
+  PetscCall(HycoROMPredict(b, 2, inside));
+  PetscCall(HycoROMGetPrediction(b, &q));
   CHECK_NEAR(q.total_contact_force, 0.350993482, 1e-9);
-  PetscCall(HycoModelDestroy(&b));
+  PetscCall(HycoROMDestroy(&b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -309,8 +308,8 @@ static PetscErrorCode Once(void)
 {
   HycoScene scene;
   HycoSamples samples;
-  HycoTrainer trainer;
-  HycoModel model = NULL;
+  HycoReducer reducer;
+  HycoROM model = NULL;
   HycoSolver solver;
   HycoSystem system;
   char line[HYCO_LINE];
@@ -320,19 +319,19 @@ static PetscErrorCode Once(void)
   PetscCall(HycoSceneLoad(PETSC_COMM_SELF, rope, &scene));
   PetscCall(HycoSamplesCreate(scene, &samples));
   PetscCall(HycoSamplesAddPoint(samples, inside));
-  PetscCall(HycoTrainerCreate(PETSC_COMM_SELF, scene, &trainer));
-  PetscCall(HycoTrainerSetFromOptions(trainer));
-  PetscCall(HycoModelLoad(hybrid, &model));
-  PetscCall(HycoModelPredict(model, 2, inside));
+  PetscCall(HycoReducerCreate(PETSC_COMM_SELF, scene, &reducer));
+  PetscCall(HycoReducerSetFromOptions(reducer));
+  PetscCall(HycoROMLoad(hybrid, &model));
+  PetscCall(HycoROMPredict(model, 2, inside));
   PetscCall(HycoCatchBegin());
-  code = HycoModelPredict(model, 2, outside);
+  code = HycoROMPredict(model, 2, outside);
   PetscCall(HycoCatchEnd(code, line));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
   PetscCall(HycoSolverDestroy(&solver));
   PetscCall(HycoSystemDestroy(&system));
-  PetscCall(HycoModelDestroy(&model));
-  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoROMDestroy(&model));
+  PetscCall(HycoReducerDestroy(&reducer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -343,13 +342,13 @@ static PetscErrorCode Once(void)
 static PetscErrorCode OnceRefused(void)
 {
   HycoScene scene = NULL;
-  HycoModel model = NULL;
+  HycoROM model = NULL;
   char line[HYCO_LINE];
   PetscErrorCode code;
 
   PetscFunctionBegin;
   PetscCall(HycoCatchBegin());
-  code = HycoModelLoad(geo, &model);
+  code = HycoROMLoad(geo, &model);
   if (code) code = HycoSceneLoad(PETSC_COMM_SELF, data, &scene);
   PetscCall(HycoCatchEnd(code, line));
   CHECK(code, "rope.geo is read as a model or a scene");

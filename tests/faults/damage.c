@@ -45,18 +45,18 @@ static void WriteBytes(const unsigned char *bytes, size_t size)
 static PetscErrorCode Try(PetscBool *refused, PetscReal *force)
 {
   const PetscReal mu[2] = {0.07, 0.17};
-  HycoModel model = NULL;
+  HycoROM model = NULL;
   HycoPrediction p = {0};
   PetscErrorCode code;
   char line[HYCO_LINE];
 
   PetscFunctionBegin;
   PetscCall(HycoCatchBegin());
-  code = HycoModelLoad(path, &model);
-  if (!code) code = HycoModelPredict(model, 2, mu);
-  if (!code) code = HycoModelGetPrediction(model, &p);
+  code = HycoROMLoad(path, &model);
+  if (!code) code = HycoROMPredict(model, 2, mu);
+  if (!code) code = HycoROMGetPrediction(model, &p);
   PetscCall(HycoCatchEnd(code, line));
-  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoROMDestroy(&model));
   CHECK(!code || line[0], "a refusal without a word");
   *refused = (PetscBool)(code != 0);
   *force = p.total_contact_force;
@@ -167,17 +167,17 @@ static PetscErrorCode Train(const char source[], const char model[])
   char folder[PETSC_MAX_PATH_LEN];
   HycoScene scene;
   HycoSamples samples;
-  HycoTrainer trainer;
+  HycoReducer reducer;
 
   PetscFunctionBegin;
   snprintf(folder, sizeof(folder), "%s/examples/rope", source);
   PetscCall(HycoSceneLoad(PETSC_COMM_SELF, folder, &scene));
   PetscCall(HycoSamplesCreate(scene, &samples));
   PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_FALSE));
-  PetscCall(HycoTrainerCreate(PETSC_COMM_SELF, scene, &trainer));
-  PetscCall(HycoTrainerSetFromOptions(trainer));
-  PetscCall(HycoTrainerRun(trainer, samples, model, NULL));
-  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoReducerCreate(PETSC_COMM_SELF, scene, &reducer));
+  PetscCall(HycoReducerSetFromOptions(reducer));
+  PetscCall(HycoReducerRun(reducer, samples, model, NULL));
+  PetscCall(HycoReducerDestroy(&reducer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);

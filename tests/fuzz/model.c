@@ -7,7 +7,7 @@
 #include "fuzz.h"
 #include <hdf5.h>
 #include <hycocompat.h>
-#include <hycomodelimpl.h>
+#include <hycoromimpl.h>
 
 #define N_MODELS 5
 #define RECORD   12
@@ -96,30 +96,30 @@ static void WriteChanged(const Good *g, const uint8_t *data, size_t size)
   free(bytes);
 }
 
-static PetscErrorCode Predict(HycoModel model)
+static PetscErrorCode Predict(HycoROM model)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
   HycoPrediction prediction;
   HycoScene scene;
 
   PetscFunctionBegin;
-  PetscCall(HycoModelGetScene(model, &scene));
+  PetscCall(HycoROMGetScene(model, &scene));
   for (PetscInt p = 0; p < scene->n_parameters; p++) mu[p] = scene->lo[p] / 2 + scene->hi[p] / 2;
-  PetscCall(HycoModelPredict(model, scene->n_parameters, mu));
-  PetscCall(HycoModelGetPrediction(model, &prediction));
-  PetscCall(HycoModelGetWholeU(model, NULL, NULL));
+  PetscCall(HycoROMPredict(model, scene->n_parameters, mu));
+  PetscCall(HycoROMGetPrediction(model, &prediction));
+  PetscCall(HycoROMGetWholeU(model, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-  HycoModel model = NULL;
+  HycoROM model = NULL;
   PetscErrorCode code;
 
   if (!size) return 0;
   WriteChanged(&good[data[0] % N_MODELS], data + 1, size - 1);
-  FUZZ_TRY(code, HycoModelLoad(path, &model));
+  FUZZ_TRY(code, HycoROMLoad(path, &model));
   if (!code) FUZZ_TRY(code, Predict(model));
-  if (HycoModelDestroy(&model)) abort();
+  if (HycoROMDestroy(&model)) abort();
   return 0;
 }

@@ -35,20 +35,20 @@ class Sources(unittest.TestCase):
             for path in sources(folder):
                 self.assertNotRegex(text(path), r'#include\s*[<"](hycosystem|hycosolver|hycosolverimpl)\.h', path)
         for path in sources():
-            if os.sep + 'driver' + os.sep in path or path.endswith(os.path.join('base', 'init.c')):
+            if os.sep + 'app' + os.sep in path or path.endswith(os.path.join('sys', 'init.c')):
                 continue
             self.assertEqual(word.findall(code(path)), [], path)
 
     def test_layers(self):
         """Algorithms, linear solves, complementarity and contact know no scene, mesh or cells; nothing but the driver includes driver.h."""
-        above = ('hycoscene', 'hycosceneimpl', 'hycomesh', 'hycofe', 'hycofom', 'hycodomain', 'hycomodel', 'hycotrainer',
+        above = ('hycoscene', 'hycosceneimpl', 'hycomesh', 'hycofe', 'hycofom', 'hycodomain', 'hycorom', 'hycoreducer',
                  'hycosnapshots', 'hycosamples', 'hycofields', 'hyco')
-        for folder in ('algorithms', 'contact', 'linear', 'complementarity'):
+        for folder in ('algorithms', 'solver', 'linear', 'complementarity'):
             for path in sources(folder):
                 names = re.findall(r'#include\s*[<"](\w+)\.h[>"]', text(path))
                 self.assertEqual([n for n in names if n in above], [], path)
         for path in sources():
-            if os.sep + 'driver' + os.sep not in path:
+            if os.sep + 'app' + os.sep not in path:
                 self.assertNotIn('driver.h', text(path), path)
         for name in ('hycoalgorithms.h', 'hycosolverimpl.h', 'hycolinear.h', 'hycolcp.h'):
             path = os.path.join(SOURCE, 'include', 'private', name)
@@ -57,7 +57,7 @@ class Sources(unittest.TestCase):
 
     def test_options(self):
         """Each option that is read stands in the table, and each of the table is read."""
-        table_path = os.path.join(SOURCE, 'src', 'base', 'options.c')
+        table_path = os.path.join(SOURCE, 'src', 'sys', 'options.c')
         table = set(re.findall(r'^\s*\{"(hyco_\w+)",', text(table_path), flags=re.M))
         self.assertGreater(len(table), 15)
         read = set()

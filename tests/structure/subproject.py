@@ -15,11 +15,11 @@ PROGRAM = """#include <hyco.h>
 #include <stdio.h>
 int main(int argc, char **argv)
 {
-  HycoModel model;
+  HycoROM model;
   const PetscReal mu[2] = {0.07, 0.17};
-  if (HycoInitialize(&argc, &argv) || HycoModelLoad(argv[1], &model) || HycoModelPredict(model, 2, mu)) return 1;
+  if (HycoInitialize(&argc, &argv) || HycoROMLoad(argv[1], &model) || HycoROMPredict(model, 2, mu)) return 1;
   printf("%s\\n", HycoVersion());
-  return HycoModelDestroy(&model) || HycoFinalize();
+  return HycoROMDestroy(&model) || HycoFinalize();
 }
 """
 

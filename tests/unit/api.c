@@ -9,10 +9,10 @@ static PetscErrorCode TestNull(void)
   HycoSolver solver = NULL;
   HycoScene scene = NULL;
   HycoFOM fom = NULL;
-  HycoModel model = NULL;
+  HycoROM model = NULL;
   HycoSamples samples = NULL;
   HycoSnapshots snapshots = NULL;
-  HycoTrainer trainer = NULL;
+  HycoReducer reducer = NULL;
   HycoPrediction prediction;
   HycoReason reason;
   HycoKKT kkt;
@@ -24,10 +24,10 @@ static PetscErrorCode TestNull(void)
   PetscCall(HycoSolverDestroy(&solver));
   PetscCall(HycoSceneDestroy(&scene));
   PetscCall(HycoFOMDestroy(&fom));
-  PetscCall(HycoModelDestroy(&model));
+  PetscCall(HycoROMDestroy(&model));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSnapshotsDestroy(&snapshots));
-  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoReducerDestroy(&reducer));
   CHECK_FAILS(HycoSystemComputeKKT(system, NULL, NULL, &kkt), "the handle is NULL; make it by HycoSystemCreate()");
   CHECK_FAILS(HycoSystemSetVectors(system, NULL, NULL), "the handle is NULL; make it by HycoSystemCreate()");
   CHECK_FAILS(HycoSolverSolve(solver, NULL, NULL), "the handle is NULL; make it by HycoSolverCreate()");
@@ -41,10 +41,10 @@ static PetscErrorCode TestNull(void)
   CHECK_FAILS(HycoFOMSolve(fom, 2, point), "the handle is NULL; make it by HycoFOMCreate()");
   CHECK_FAILS(HycoFOMSolveForces(fom, 2, point, point), "the handle is NULL; make it by HycoFOMCreate()");
   CHECK_FAILS(HycoFOMGetSummary(fom, &summary), "the handle is NULL; make it by HycoFOMCreate()");
-  CHECK_FAILS(HycoModelPredict(model, 2, point), "the handle is NULL; make it by HycoModelLoad()");
-  CHECK_FAILS(HycoModelGetPrediction(model, &prediction), "the handle is NULL; make it by HycoModelLoad()");
-  CHECK_FAILS(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer), "the handle is NULL; make it by HycoSceneLoad()");
-  CHECK_FAILS(HycoTrainerSetFromOptions(trainer), "the handle is NULL; make it by HycoTrainerCreate()");
+  CHECK_FAILS(HycoROMPredict(model, 2, point), "the handle is NULL; make it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMGetPrediction(model, &prediction), "the handle is NULL; make it by HycoROMLoad()");
+  CHECK_FAILS(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer), "the handle is NULL; make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoReducerSetFromOptions(reducer), "the handle is NULL; make it by HycoReducerCreate()");
   CHECK_FAILS(HycoSnapshotsFill(snapshots, samples, NULL, NULL), "the handle is NULL; make it by HycoSnapshotsOpen()");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -93,7 +93,7 @@ static PetscErrorCode TestFOMOrder(void)
   HycoScene scene;
   HycoFOM fom;
   HycoSummary summary;
-  HycoModel model;
+  HycoROM model;
 
   PetscFunctionBegin;
   PetscCheck(getenv("HYCO_SOURCE"), PETSC_COMM_SELF, PETSC_ERR_USER, "HYCO_SOURCE is not set");
@@ -106,7 +106,7 @@ static PetscErrorCode TestFOMOrder(void)
   CHECK_FAILS(HycoFOMWrite(fom, "/tmp/x.xdmf"), "call HycoFOMSolve() before HycoFOMWrite()");
   CHECK_FAILS(HycoFOMSolve(fom, 2, outside), "mu1 = 0.04 lies outside its range [0.05, 0.25]");
   CHECK_FAILS(HycoFOMSolve(fom, 1, inside), "1 parameter values were given; the scene has 2: mu1");
-  CHECK_FAILS(HycoModelLoad("/no/such.h5", &model), "/no/such.h5");
+  CHECK_FAILS(HycoROMLoad("/no/such.h5", &model), "/no/such.h5");
   PetscCall(HycoFOMSolve(fom, 2, inside));
   PetscCall(HycoFOMGetSummary(fom, &summary));
   CHECK(summary.n_active == 17, "expected 17 active, found %d", (int)summary.n_active);
@@ -167,8 +167,8 @@ static PetscErrorCode TestMany(void)
   char folder[PETSC_MAX_PATH_LEN];
   HycoScene scene;
   HycoSamples samples;
-  HycoTrainer trainer;
-  HycoModel model, single;
+  HycoReducer reducer;
+  HycoROM model, single;
   HycoPrediction all[6], one;
   PetscInt n, n_nodes, dim;
   const PetscReal *L, *u;
@@ -179,31 +179,31 @@ static PetscErrorCode TestMany(void)
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, folder, &scene));
   PetscCall(HycoSamplesCreate(scene, &samples));
   PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_FALSE));
-  PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
-  PetscCall(HycoTrainerSetFromOptions(trainer));
-  PetscCall(HycoTrainerRun(trainer, samples, "many.h5", NULL));
-  PetscCall(HycoModelLoad("many.h5", &model));
-  PetscCall(HycoModelLoad("many.h5", &single));
-  PetscCall(HycoModelGetSizes(model, &n, &n_nodes, &dim));
+  PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
+  PetscCall(HycoReducerSetFromOptions(reducer));
+  PetscCall(HycoReducerRun(reducer, samples, "many.h5", NULL));
+  PetscCall(HycoROMLoad("many.h5", &model));
+  PetscCall(HycoROMLoad("many.h5", &single));
+  PetscCall(HycoROMGetSizes(model, &n, &n_nodes, &dim));
   CHECK(n == 98 && dim == 1, "%d contacts, %d components", (int)n, (int)dim);
   PetscCall(PetscMalloc2(6 * n, &Lambda, 6 * n_nodes * dim, &U));
-  CHECK_FAILS(HycoModelSolveMany(model, 2, 2, outside[0], NULL, NULL, NULL), "mu2 = 0.6 lies outside its range");
-  PetscCall(HycoModelSolveMany(model, 6, 2, mu[0], all, Lambda, U));
-  CHECK_FAILS(HycoModelGetPrediction(model, &one), "call HycoModelPredict() before asking");
+  CHECK_FAILS(HycoROMSolveMany(model, 2, 2, outside[0], NULL, NULL, NULL), "mu2 = 0.6 lies outside its range");
+  PetscCall(HycoROMSolveMany(model, 6, 2, mu[0], all, Lambda, U));
+  CHECK_FAILS(HycoROMGetPrediction(model, &one), "call HycoROMPredict() before asking");
   for (PetscInt k = 0; k < 6; k++) {
-    PetscCall(HycoModelPredict(single, 2, mu[k]));
-    PetscCall(HycoModelGetPrediction(single, &one));
-    PetscCall(HycoModelGetLambda(single, NULL, &L, NULL, NULL));
-    PetscCall(HycoModelGetRID(single, NULL, NULL, &u, NULL, NULL, NULL));
+    PetscCall(HycoROMPredict(single, 2, mu[k]));
+    PetscCall(HycoROMGetPrediction(single, &one));
+    PetscCall(HycoROMGetLambda(single, NULL, &L, NULL, NULL));
+    PetscCall(HycoROMGetRID(single, NULL, NULL, &u, NULL, NULL, NULL));
     CHECK(all[k].reason > 0 && all[k].total_contact_force > 0, "point %d: no solution, or no contact", (int)k);
     CHECK_NEAR(all[k].total_contact_force, one.total_contact_force, 0);
     for (PetscInt i = 0; i < n; i++) CHECK_NEAR(Lambda[k * n + i], L[i], 0);
     for (PetscInt i = 0; i < n_nodes * dim; i++) CHECK_NEAR(U[k * n_nodes * dim + i], u[i], 0);
   }
   PetscCall(PetscFree2(Lambda, U));
-  PetscCall(HycoModelDestroy(&single));
-  PetscCall(HycoModelDestroy(&model));
-  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoROMDestroy(&single));
+  PetscCall(HycoROMDestroy(&model));
+  PetscCall(HycoReducerDestroy(&reducer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -28,8 +28,8 @@ static PetscErrorCode Run(const char scene_path[], PetscReal force[2])
   HycoSamples point, grid;
   HycoFOM fom;
   HycoSummary summary;
-  HycoTrainer trainer;
-  HycoModel model;
+  HycoReducer reducer;
+  HycoROM model;
   HycoPrediction p;
 
   PetscFunctionBegin;
@@ -43,16 +43,16 @@ static PetscErrorCode Run(const char scene_path[], PetscReal force[2])
   force[0] = summary.total_contact_force;
   PetscCall(HycoSamplesCreate(scene, &grid));
   PetscCall(HycoSamplesAddGrid(grid, counts, PETSC_TRUE));
-  PetscCall(HycoTrainerCreate(PETSC_COMM_WORLD, scene, &trainer));
-  PetscCall(HycoTrainerSetFromOptions(trainer));
-  PetscCall(HycoTrainerSetValidationCount(trainer, 0));
-  PetscCall(HycoTrainerRun(trainer, grid, model_path, NULL));
-  PetscCall(HycoModelLoad(model_path, &model));
-  PetscCall(HycoModelPredict(model, 2, mu));
-  PetscCall(HycoModelGetPrediction(model, &p));
+  PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
+  PetscCall(HycoReducerSetFromOptions(reducer));
+  PetscCall(HycoReducerSetValidationCount(reducer, 0));
+  PetscCall(HycoReducerRun(reducer, grid, model_path, NULL));
+  PetscCall(HycoROMLoad(model_path, &model));
+  PetscCall(HycoROMPredict(model, 2, mu));
+  PetscCall(HycoROMGetPrediction(model, &p));
   force[1] = p.total_contact_force;
-  PetscCall(HycoModelDestroy(&model));
-  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoROMDestroy(&model));
+  PetscCall(HycoReducerDestroy(&reducer));
   PetscCall(HycoSamplesDestroy(&grid));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&point));

@@ -8,32 +8,32 @@
 
 static char rope[PETSC_MAX_PATH_LEN];
 
-static PetscErrorCode Train(HycoModelType type, const char path[])
+static PetscErrorCode Train(HycoROMType type, const char path[])
 {
   const PetscInt counts[2] = {3, 3};
   HycoScene scene;
   HycoSamples samples;
-  HycoTrainer trainer;
+  HycoReducer reducer;
 
   PetscFunctionBegin;
   PetscCall(PetscOptionsSetValue(NULL, "-body_rope_young", YOUNG));
-  PetscCall(PetscOptionsSetValue(NULL, "-hyco_model_type", HycoModelTypes[type]));
+  PetscCall(PetscOptionsSetValue(NULL, "-hyco_model_type", HycoROMTypes[type]));
   PetscCall(HycoSceneLoad(PETSC_COMM_SELF, rope, &scene));
   PetscCall(PetscOptionsClearValue(NULL, "-body_rope_young"));
   PetscCall(PetscOptionsClearValue(NULL, "-hyco_model_type"));
   PetscCall(HycoSamplesCreate(scene, &samples));
   PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_FALSE));
-  PetscCall(HycoTrainerCreate(PETSC_COMM_SELF, scene, &trainer));
-  PetscCall(HycoTrainerSetFromOptions(trainer));
-  PetscCall(HycoTrainerRun(trainer, samples, path, NULL));
-  PetscCall(HycoTrainerDestroy(&trainer));
+  PetscCall(HycoReducerCreate(PETSC_COMM_SELF, scene, &reducer));
+  PetscCall(HycoReducerSetFromOptions(reducer));
+  PetscCall(HycoReducerRun(reducer, samples, path, NULL));
+  PetscCall(HycoReducerDestroy(&reducer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* mu of n points fails at the third in the order of its work; what PETSc holds before and after is the same. */
-static PetscErrorCode FailInTheMiddle(HycoModel m, PetscInt n, const PetscReal mu[], const PetscReal expected[])
+static PetscErrorCode FailInTheMiddle(HycoROM m, PetscInt n, const PetscReal mu[], const PetscReal expected[])
 {
   HycoPrediction p[4];
   PetscInt n_contacts, n_nodes, dim;
@@ -41,17 +41,16 @@ static PetscErrorCode FailInTheMiddle(HycoModel m, PetscInt n, const PetscReal m
   PetscLogDouble before, after;
 
   PetscFunctionBegin;
-  PetscCall(HycoModelGetSizes(m, &n_contacts, &n_nodes, &dim));
+  PetscCall(HycoROMGetSizes(m, &n_contacts, &n_nodes, &dim));
   PetscCall(PetscMalloc2(n * n_contacts, &Lambda, n * n_nodes * dim, &U));
-  CHECK_FAILS(HycoModelSolveMany(m, n, 2, mu, p, Lambda, U),
-              "Young's modulus must be positive"); /* makes what is lazy */
+  CHECK_FAILS(HycoROMSolveMany(m, n, 2, mu, p, Lambda, U), "Young's modulus must be positive"); /* makes what is lazy */
   PetscCall(PetscMallocGetCurrentUsage(&before));
-  CHECK_FAILS(HycoModelSolveMany(m, n, 2, mu, p, Lambda, U), "Young's modulus must be positive");
+  CHECK_FAILS(HycoROMSolveMany(m, n, 2, mu, p, Lambda, U), "Young's modulus must be positive");
   PetscCall(PetscMallocGetCurrentUsage(&after));
   CHECK(before > 0, "PETSc keeps no books of its memory");
   CHECK(after == before, "%g bytes held before the error, %g after", before, after);
-  CHECK_FAILS(HycoModelGetPrediction(m, p), "call HycoModelPredict() before");
-  PetscCall(HycoModelSolveMany(m, 2, 2, mu, p, Lambda, NULL)); /* the two good ones: the model has not changed */
+  CHECK_FAILS(HycoROMGetPrediction(m, p), "call HycoROMPredict() before");
+  PetscCall(HycoROMSolveMany(m, 2, 2, mu, p, Lambda, NULL)); /* the two good ones: the model has not changed */
   for (PetscInt k = 0; k < 2; k++) {
     CHECK(p[k].total_contact_force == expected[k], "force %.17g, before the error %.17g",
           (double)p[k].total_contact_force, (double)expected[k]);
@@ -64,7 +63,7 @@ static PetscErrorCode FailInTheMiddle(HycoModel m, PetscInt n, const PetscReal m
 
 /* Points that come in another order than that of the work: each answer stands where its point does, and the work goes
    by stiffness, so that both points before 0.35 are done when that one fails. */
-static PetscErrorCode Unsorted(HycoModel m)
+static PetscErrorCode Unsorted(HycoROM m)
 {
   const PetscReal mu[8] = {0.2, 0.3, 0.1, 0.3, 0.2, 0.1, 0.1, 0.1}, failing[6] = {0.35, 0.1, 0.2, 0.3, 0.1, 0.1};
   HycoPrediction p[4], single[4];
@@ -72,14 +71,14 @@ static PetscErrorCode Unsorted(HycoModel m)
   PetscReal *Lambda;
 
   PetscFunctionBegin;
-  PetscCall(HycoModelGetSizes(m, &n_contacts, &n_nodes, &dim));
+  PetscCall(HycoROMGetSizes(m, &n_contacts, &n_nodes, &dim));
   PetscCall(PetscMalloc1(4 * n_contacts, &Lambda));
-  PetscCall(HycoModelSolveMany(m, 4, 2, mu, p, Lambda, NULL));
+  PetscCall(HycoROMSolveMany(m, 4, 2, mu, p, Lambda, NULL));
   for (PetscInt k = 0; k < 4; k++) {
     PetscReal force = 0;
 
-    PetscCall(HycoModelPredict(m, 2, mu + 2 * k));
-    PetscCall(HycoModelGetPrediction(m, &single[k]));
+    PetscCall(HycoROMPredict(m, 2, mu + 2 * k));
+    PetscCall(HycoROMGetPrediction(m, &single[k]));
     for (PetscInt i = 0; i < n_contacts; i++) force += Lambda[k * n_contacts + i];
     CHECK_NEAR(p[k].total_contact_force, single[k].total_contact_force, 1e-12 * single[k].total_contact_force);
     CHECK_NEAR(force, single[k].total_contact_force, 1e-12 * single[k].total_contact_force);
@@ -88,7 +87,7 @@ static PetscErrorCode Unsorted(HycoModel m)
             "points %d and %d cannot be told apart", (int)j, (int)k);
   }
   for (PetscInt k = 0; k < 3; k++) p[k].total_contact_force = -1;
-  CHECK_FAILS(HycoModelSolveMany(m, 3, 2, failing, p, NULL, NULL), "Young's modulus must be positive");
+  CHECK_FAILS(HycoROMSolveMany(m, 3, 2, failing, p, NULL, NULL), "Young's modulus must be positive");
   CHECK(p[0].total_contact_force == -1, "the point that fails has a force: %g", (double)p[0].total_contact_force);
   CHECK_NEAR(p[1].total_contact_force, single[0].total_contact_force, 1e-12);
   CHECK_NEAR(p[2].total_contact_force, single[3].total_contact_force, 1e-12);
@@ -96,26 +95,26 @@ static PetscErrorCode Unsorted(HycoModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode TestMany(HycoModelType type)
+static PetscErrorCode TestMany(HycoROMType type)
 {
   const PetscReal mu[8] = {0.1, 0.1, 0.2, 0.3, 0.35, 0.1, 0.4, 0.1};
   PetscReal expected[2];
   char path[64];
-  HycoModel m;
+  HycoROM m;
   HycoPrediction p[2];
 
   PetscFunctionBegin;
-  snprintf(path, sizeof(path), "many-%s-%d.h5", HycoModelTypes[type], (int)getpid());
+  snprintf(path, sizeof(path), "many-%s-%d.h5", HycoROMTypes[type], (int)getpid());
   PetscCall(Train(type, path));
-  PetscCall(HycoModelLoad(path, &m));
-  PetscCall(HycoModelSetExtrapolate(m, PETSC_TRUE));
-  PetscCall(HycoModelSolveMany(m, 2, 2, mu, p, NULL, NULL));
+  PetscCall(HycoROMLoad(path, &m));
+  PetscCall(HycoROMSetExtrapolate(m, PETSC_TRUE));
+  PetscCall(HycoROMSolveMany(m, 2, 2, mu, p, NULL, NULL));
   for (int k = 0; k < 2; k++) expected[k] = p[k].total_contact_force;
   CHECK(expected[0] > 0 && expected[1] > 0 && expected[0] != expected[1], "forces %g, %g", (double)expected[0],
         (double)expected[1]);
   for (int k = 0; k < 3; k++) PetscCall(FailInTheMiddle(m, 4, mu, expected));
   PetscCall(Unsorted(m));
-  PetscCall(HycoModelDestroy(&m));
+  PetscCall(HycoROMDestroy(&m));
   unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -161,7 +160,7 @@ static PetscErrorCode Test(void)
   snprintf(rope, sizeof(rope), "%s/examples/rope", getenv("HYCO_SOURCE"));
   PetscCall(TestOnePoint());
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  for (int type = 0; type < 3 && size == 1; type++) PetscCall(TestMany((HycoModelType)type));
+  for (int type = 0; type < 3 && size == 1; type++) PetscCall(TestMany((HycoROMType)type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

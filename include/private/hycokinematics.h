@@ -1,0 +1,29 @@
+/* The map from the reference cell to the moved one: for fe/ and contact/. */
+#ifndef HYCO_KINEMATICS_H
+#define HYCO_KINEMATICS_H
+#include <hycofe.h>
+
+/* Determinant of the map from the reference cell to the nodes at X (3 a node of the mesh), at quadrature point q. */
+PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q);
+/* Gradients dN/dX (nv x 3) of the shape functions at quadrature point q, and |det J| w. */
+PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal g[8][3],
+                             PetscReal *weight);
+/* Their means over the cell, which make the dilatation of the element bbar. */
+PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[8][3]);
+/* Outward normal times area weight (n dS) at point q of a facet, of the moved body; in 1D the sign away from its cell.
+ */
+PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);
+/* The signs of the cells as drawn, and room for fe->mirrored; finds fe->mirrored at fe's nodes. Fails when a map folds
+   a body (some of its cells turned inside out) or mirrors one of two bodies that share nodes. */
+PetscErrorCode HycoMirrorCreate(HycoFE fe);
+PetscErrorCode HycoMirrorFind(HycoFE fe);
+/* Of contact k, which has no free unknown: fails when what its prescribed displacements leave of the gap is negative by
+   more than round-off; else *left >= 0. gap: as drawn. */
+PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal gap, PetscReal *left);
+/* Unit normals (n_nodes x 3; zero off the group) of the smooth surface behind a group's facets on fe's moved nodes, the
+   angle by which faceting leaves each in doubt, and the largest angle between facets nearby (n_nodes both). 2D, 3D. */
+PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], PetscReal doubt[], PetscReal bend[]);
+/* Turns the normal of contact k so that the first n_turned motions of fe->released are tangential there. */
+void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3]);
+
+#endif

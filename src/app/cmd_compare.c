@@ -1,0 +1,224 @@
+/* hyco compare: the reduced model against full order over a set of points. */
+#include "driver.h"
+#include <stdlib.h>
+
+enum { E_U, E_U_H1, E_U_RID, E_SIGMA, E_SIGMA_11, E_LAMBDA_RID, E_LAMBDA_RID_DUAL, E_LAMBDA, E_LAMBDA_DUAL, N_ERRORS };
+enum { CONVERGED = N_ERRORS, FALLBACK, KKT, COVERED, SECONDS_FOM, SECONDS_ROM, N_COLUMNS };
+static const char *const columns[N_COLUMNS] = {"error_u",
+                                               "error_u_h1",
+                                               "error_u_rid",
+                                               "error_sigma",
+                                               "error_sigma_11",
+                                               "error_lambda_rid",
+                                               "error_lambda_rid_dual",
+                                               "error_lambda",
+                                               "error_lambda_dual",
+                                               "converged",
+                                               "fallback",
+                                               "kkt_max",
+                                               "covered_force",
+                                               "seconds_full_order",
+                                               "seconds_reduced"};
+
+/* One point on one group: both solutions, their difference. */
+static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[],
+                                   PetscReal v[])
+{
+  HycoSummary s;
+  HycoPrediction p;
+  HycoErrors e = {0};
+  char words[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMSolve(fom, n_par, mu));
+  PetscCall(HycoFOMGetSummary(fom, &s));
+  if (s.reason < 0) {
+    PetscCall(DriverFormatPoint(scene, mu, words, NULL));
+    HycoFail("the full-order solution at %s: %s; there is nothing to compare with", words, HycoReasonName(s.reason));
+  }
+  PetscCall(HycoROMPredict(model, n_par, mu));
+  PetscCall(HycoROMGetPrediction(model, &p));
+  PetscCall(HycoROMCompare(model, fom, &e));
+  v[E_U] = e.u;
+  v[E_U_H1] = e.u_h1;
+  v[E_U_RID] = e.u_rid;
+  v[E_SIGMA] = e.sigma;
+  v[E_SIGMA_11] = e.sigma_11;
+  v[E_LAMBDA_RID] = e.lambda_rid;
+  v[E_LAMBDA_RID_DUAL] = e.lambda_rid_dual;
+  v[E_LAMBDA] = e.lambda;
+  v[E_LAMBDA_DUAL] = e.lambda_dual;
+  v[CONVERGED] = p.reason > 0;
+  v[FALLBACK] = p.reason == HYCO_CONVERGED_FALLBACK;
+  v[KKT] = HycoKKTMax(&p.kkt);
+  v[COVERED] = p.covered_force;
+  v[SECONDS_FOM] = s.seconds.total;
+  v[SECONDS_ROM] = p.seconds.total;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CompareMine(HycoScene scene, HycoROM model, MPI_Comm group, PetscInt first, PetscInt last,
+                                  PetscInt n, PetscInt n_par, const PetscReal mu[], PetscReal value[])
+{
+  HycoFOM fom;
+  PetscMPIInt rank;
+  PetscReal unused[N_COLUMNS];
+  char word[] = "points:";
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMCreate(group, scene, &fom));
+  PetscCallMPI(MPI_Comm_rank(group, &rank));
+  for (PetscInt k = first; k < last; k++) {
+    PetscCall(ComparePoint(scene, fom, model, n_par, mu + k * n_par, rank == 0 ? value + k * N_COLUMNS : unused));
+    if (first == 0 && rank == 0) PetscCall(DriverProgress((k + 1 - first) * n / (last - first), n, word));
+  }
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int CompareReal(const void *a, const void *b)
+{
+  const PetscReal x = *(const PetscReal *)a, y = *(const PetscReal *)b;
+
+  return (x > y) - (x < y);
+}
+
+/* Mean and worst over the points where the error is defined, and how many there are where it is not (x/0). */
+static void AddStatistics(cJSON *json, PetscInt n, const PetscReal value[], PetscInt column, PetscInt *all_undefined)
+{
+  const char *name = columns[column];
+  cJSON *object = cJSON_AddObjectToObject(json, name);
+  PetscReal sum = 0, worst = 0;
+  PetscInt used = 0, undefined = 0;
+
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal e = value[k * N_COLUMNS + column];
+
+    if (e > PETSC_MAX_REAL / 8 || value[k * N_COLUMNS + CONVERGED] < 0.5) {
+      undefined += value[k * N_COLUMNS + CONVERGED] > 0.5;
+      continue;
+    }
+    sum += e;
+    worst = PetscMax(worst, e);
+    used++;
+  }
+  *all_undefined += undefined;
+  cJSON_AddNumberToObject(object, "undefined", undefined);
+  if (used) {
+    cJSON_AddNumberToObject(object, "mean", sum / used);
+    cJSON_AddNumberToObject(object, "max", worst);
+    (void)!Say("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(sum / used), 100 * (double)worst);
+  } else { /* no point where it is defined */
+    cJSON_AddNullToObject(object, "mean");
+    cJSON_AddNullToObject(object, "max");
+    (void)!Say("  %-21s undefined at every point\n", name);
+  }
+}
+
+static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal value[])
+{
+  cJSON *json, *object;
+  PetscReal *ratio, mean = 0, kkt = 0, covered[2] = {0, 1};
+  PetscInt undefined = 0, failed = 0, fallback = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &ratio));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal *v = value + k * N_COLUMNS;
+
+    ratio[k] = v[SECONDS_FOM] / PetscMax(v[SECONDS_ROM], 1e-9);
+    mean += ratio[k] / n;
+    kkt = PetscMax(kkt, v[KKT]);
+    failed += v[CONVERGED] < 0.5;
+    fallback += v[FALLBACK] > 0.5;
+    covered[0] += v[COVERED] / n;
+    covered[1] = PetscMin(covered[1], v[COVERED]);
+  }
+  qsort(ratio, (size_t)n, sizeof(*ratio), CompareReal);
+  PetscCall(ReportCreate("compare", scene, NULL, &json));
+  cJSON_AddNumberToObject(json, "n_points", n);
+  PetscCall(Say("%d point%s\n", (int)n, n == 1 ? "" : "s"));
+  for (PetscInt k = 0; k < (contact ? N_ERRORS : E_LAMBDA_RID); k++) AddStatistics(json, n, value, k, &undefined);
+  object = cJSON_AddObjectToObject(json, "speedup");
+  cJSON_AddNumberToObject(object, "mean", mean);
+  cJSON_AddNumberToObject(object, "median", ratio[n / 2]);
+  PetscCall(Say("speed-up: mean %.3g, median %.3g\n", (double)mean, (double)ratio[n / 2]));
+  if (contact) {
+    object = cJSON_AddObjectToObject(json, "covered_force");
+    cJSON_AddNumberToObject(object, "mean", covered[0]);
+    cJSON_AddNumberToObject(object, "min", covered[1]);
+    PetscCall(Say("contact force in the RID: mean %.1f %%, least %.1f %%\n", 100 * (double)covered[0],
+                  100 * (double)covered[1]));
+  }
+  cJSON_AddNumberToObject(json, "undefined", undefined);
+  cJSON_AddNumberToObject(json, "not_converged", failed);
+  cJSON_AddNumberToObject(json, "fallback", fallback);
+  cJSON_AddNumberToObject(json, "kkt_max", kkt);
+  PetscCall(Say("%d not converged, %d by the fallback solver, %d errors undefined (x/0); largest KKT residual %.1e\n",
+                (int)failed, (int)fallback, (int)undefined, (double)kkt));
+  PetscCall(PetscFree(ratio));
+  PetscCall(ReportWrite(&json));
+  HycoCheck(!failed, "%d of the %d predictions did not converge; the errors leave them out", (int)failed, (int)n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -mu, or -mu_NAME for each parameter: a set of one. */
+static PetscErrorCode AddOnePoint(HycoScene scene, HycoSamples samples, PetscBool *given)
+{
+  PetscReal mu[64];
+
+  PetscFunctionBegin;
+  PetscCall(DriverHasPoint(scene, given));
+  if (!*given) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DriverGetPoint(scene, mu));
+  PetscCall(HycoSamplesAddPoint(samples, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CommandCompare(void)
+{
+  HycoScene scene;
+  HycoROM model = NULL;
+  HycoSamples samples;
+  PetscInt n, n_par, groups = 0, color;
+  const PetscReal *mu;
+  PetscReal *value;
+  PetscBool given, contact;
+  PetscMPIInt rank, size;
+  MPI_Comm group;
+  char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(DriverGet("scene", PETSC_TRUE, path));
+  PetscCall(DriverGet("model", PETSC_TRUE, file));
+  PetscCall(DriverGet("table", PETSC_FALSE, table));
+  PetscCall(DriverGet("report", PETSC_FALSE, report));
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
+  PetscCall(DriverCheckMesh(scene));
+  HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(file, &model));
+  PetscCall(HycoROMCheckScene(model, scene));
+  PetscCall(DriverGetSamples(scene, &samples, &given));
+  if (!given) PetscCall(AddOnePoint(scene, samples, &given));
+  HycoCheck(given, "give the test points: -mu V,V,... for one, or -grid N,N,..., or -values_NAME V,V,... for each "
+                   "parameter, or -points FILE.csv");
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCall(DriverCheckLeftEarly(scene));
+  PetscCall(HycoSceneHasContact(scene, &contact));
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCall(HycoSnapshotsChooseGroups(PETSC_COMM_WORLD, scene, n, &groups));
+  color = (PetscInt)rank * groups / size;
+  PetscCallMPI(MPI_Comm_split(PETSC_COMM_WORLD, (PetscMPIInt)color, rank, &group));
+  PetscCall(PetscCalloc1(n * N_COLUMNS, &value));
+  HycoOnEach(PETSC_COMM_WORLD,
+             CompareMine(scene, model, group, color * n / groups, (color + 1) * n / groups, n, n_par, mu, value));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)(n * N_COLUMNS), MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  if (table[0]) PetscCall(DriverWriteTable(table, scene, n, mu, N_COLUMNS, columns, value));
+  PetscCall(Report(scene, contact, n, value));
+  PetscCall(PetscFree(value));
+  PetscCallMPI(MPI_Comm_free(&group));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoROMDestroy(&model));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

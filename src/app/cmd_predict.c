@@ -1,0 +1,316 @@
+/* hyco predict: the reduced model at one point, or over a set. */
+#include "driver.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static void Estimate(cJSON *json, const char name[], PetscReal estimate)
+{
+  if (estimate >= 0)
+    cJSON_AddNumberToObject(json, name, estimate);
+  else
+    cJSON_AddNullToObject(json, name);
+}
+
+/* The estimated errors (null: none), and how far outside the ranges the point lies. */
+static void ReportTrust(cJSON *json, const HycoPrediction *p)
+{
+  Estimate(json, "estimated_error_u", p->estimated_error_u);
+  Estimate(json, "estimated_error_sigma", p->estimated_error_sigma);
+  Estimate(json, "estimated_error_lambda", p->estimated_error_lambda);
+  cJSON_AddBoolToObject(json, "extrapolated", p->beyond > 0);
+  cJSON_AddNumberToObject(json, "beyond", p->beyond);
+}
+
+static PetscErrorCode SayTrust(const HycoPrediction *p)
+{
+  const PetscReal estimate[3] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
+  char words[3][32];
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < 3; k++) {
+    if (estimate[k] >= 0)
+      DriverPercent(estimate[k], words[k]);
+    else
+      snprintf(words[k], sizeof(words[k]), "none");
+  }
+  PetscCall(Say("estimated errors: u %s, stress %s, contact forces %s\n", words[0], words[1], words[2]));
+  DriverPercent(p->beyond, words[0]);
+  if (p->beyond > 0) PetscCall(Say("EXTRAPOLATED: outside the training points by %s of a range\n", words[0]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void ReportRID(cJSON *json, const HycoPrediction *p)
+{
+  cJSON_AddNumberToObject(json, "rid_nodes", p->rid_nodes);
+  cJSON_AddNumberToObject(json, "rid_elements", p->rid_elements);
+  cJSON_AddNumberToObject(json, "rid_fraction", p->rid_fraction);
+  cJSON_AddNumberToObject(json, "rid_contacts", p->n_contacts);
+  cJSON_AddNumberToObject(json, "rid_active", p->n_rid_active);
+}
+
+/* fallback: why it was solved full order; "": it was not. whole: u is that of the whole mesh. */
+static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, PetscReal energy,
+                             const char fallback[], PetscBool whole)
+{
+  cJSON *json;
+
+  PetscFunctionBegin;
+  PetscCall(ReportCreate("predict", scene, mu, &json));
+  cJSON_AddStringToObject(json, "model_type", HycoROMTypes[p->type]);
+  cJSON_AddNumberToObject(json, "n_dof", p->n_dof);
+  cJSON_AddNumberToObject(json, "n_multipliers", p->n_multipliers);
+  cJSON_AddNumberToObject(json, "n_contacts", p->n_all_contacts); /* as hyco solve counts them */
+  cJSON_AddNumberToObject(json, "n_active", p->n_active);
+  cJSON_AddNumberToObject(json, "active_set_iterations", p->iterations);
+  cJSON_AddStringToObject(json, "solver", p->method);
+  cJSON_AddBoolToObject(json, "converged", p->reason > 0);
+  cJSON_AddNumberToObject(json, "n_modes", p->n_modes);
+  cJSON_AddNumberToObject(json, "n_fe_dofs", p->n_fe_dofs);
+  if (!fallback[0]) ReportRID(json, p);
+  cJSON_AddNumberToObject(json, "covered_force", p->covered_force);
+  cJSON_AddNumberToObject(json, "total_contact_force", p->total_contact_force);
+  cJSON_AddNumberToObject(json, "lambda_max", p->lambda_max);
+  cJSON_AddNumberToObject(json, "lambda_norm2", p->lambda_norm2);
+  cJSON_AddNumberToObject(json, whole ? "u_norm2" : "rid_u_norm2", p->u_norm2);
+  ReportVector(json, whole ? "u_min" : "rid_u_min", p->dim, p->u_min);
+  ReportVector(json, whole ? "u_max" : "rid_u_max", p->dim, p->u_max);
+  cJSON_AddNumberToObject(json, whole ? "strain_energy" : "rid_strain_energy", energy);
+  PetscCall(ReportContacts(json, p->n_contacts, p->n_facing, p->overlap, p->sliding));
+  ReportTrust(json, p);
+  cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
+  if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
+  if (p->type == HYCO_ROM_CONDENSED) {
+    Estimate(json, "interpolation_error", p->interpolation_error);
+    cJSON_AddBoolToObject(json, "full_displacement", whole && !fallback[0]);
+  }
+  ReportKKT(json, &p->kkt);
+  ReportSeconds(json, &p->seconds);
+  PetscCall(ReportWrite(&json));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SayReduced(const HycoPrediction *p)
+{
+  PetscFunctionBegin;
+  if (p->type == HYCO_ROM_PROJECTION)
+    PetscCall(Say("projection-based: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n",
+                  (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements));
+  else if (p->type == HYCO_ROM_CONDENSED)
+    PetscCall(Say("condensed: %d contacts, %d modes\n", (int)p->n_contacts, (int)p->n_modes));
+  else
+    PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
+                  (int)p->n_modes, (int)p->n_fe_dofs, (int)p->n_contacts, (int)p->rid_elements,
+                  100 * (double)p->rid_fraction));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One point: rank 0 predicts, the others wait; all solve full order where the fallback says so, or with its forces. */
+static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, const char output[])
+{
+  HycoPrediction p = {0};
+  PetscInt n;
+  PetscReal mu[64], energy = 0;
+  char why[DRIVER_LINE], covered[64] = "";
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  PetscCall(DriverGetPoint(scene, mu));
+  HycoOnRoot(PETSC_COMM_WORLD, HycoROMPredict(model, n, mu));
+  HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetPrediction(model, &p));
+  PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
+  PetscCall(DriverCheckLeftEarly(scene));
+  DriverWantsFullOrder(fallback, &p, why);
+  if (why[0]) {
+    PetscCall(DriverSolveFullOrder(fallback, n, mu, &p));
+    PetscCall(Say("FULL ORDER instead of the reduced model: %s\n", why));
+  } else {
+    PetscCall(SayReduced(&p));
+    if (fallback->displacement) {
+      PetscCall(DriverSolveDisplacement(fallback, model, n, mu, &p));
+      PetscCall(Say("one full solve with these forces: displacement of the whole mesh, residuals of full order\n"));
+    }
+  }
+  PetscCall(DriverCheckLeft());
+  HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", HycoReasonName(p.reason),
+            (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
+            (double)p.kkt.complementarity);
+  if (output[0] && (why[0] || fallback->displacement))
+    PetscCall(HycoFOMWrite(fallback->fom, output));
+  else if (output[0])
+    HycoOnRoot(PETSC_COMM_WORLD, HycoROMWrite(model, output));
+  if (!why[0]) snprintf(covered, sizeof(covered), " (%.1f %% of it in the RID)", 100 * (double)p.covered_force);
+  PetscCall(Say("total contact force %.10g%s, %d of %d contacts active; %s after %d iterations\n",
+                (double)p.total_contact_force, covered, (int)p.n_active, (int)p.n_all_contacts,
+                HycoReasonName(p.reason), (int)p.iterations));
+  PetscCall(Say("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
+                (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
+                (double)p.kkt.complementarity));
+  if (!why[0]) PetscCall(SayTrust(&p));
+  PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
+  if (why[0] || fallback->displacement)
+    energy = fallback->strain_energy;
+  else
+    HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
+  PetscCall(Report(scene, mu, &p, energy, why, (PetscBool)(why[0] || fallback->displacement)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What a set's table holds of each point. */
+enum {
+  FORCE,
+  LAMBDA_MAX,
+  COVERED,
+  ACTIVE,
+  U_NORM,
+  KKT,
+  CONVERGED,
+  ITERATIONS,
+  SECONDS,
+  ESTIMATE_U,
+  ESTIMATE_SIGMA,
+  ESTIMATE_LAMBDA,
+  BEYOND,
+  FULL_ORDER,
+  N_COLUMNS
+};
+static const char *const columns[N_COLUMNS] = {"total_contact_force",
+                                               "lambda_max",
+                                               "covered_force",
+                                               "n_active",
+                                               "rid_u_norm2",
+                                               "kkt_max",
+                                               "converged",
+                                               "active_set_iterations",
+                                               "seconds",
+                                               "estimated_error_u",
+                                               "estimated_error_sigma",
+                                               "estimated_error_lambda",
+                                               "beyond",
+                                               "full_order"};
+
+static void FillRow(const HycoPrediction *p, PetscReal v[])
+{
+  v[FORCE] = p->total_contact_force;
+  v[LAMBDA_MAX] = p->lambda_max;
+  v[COVERED] = p->covered_force;
+  v[ACTIVE] = p->n_active;
+  v[U_NORM] = p->u_norm2;
+  v[KKT] = HycoKKTMax(&p->kkt);
+  v[CONVERGED] = p->reason > 0;
+  v[ITERATIONS] = p->iterations;
+  v[SECONDS] = p->seconds.total;
+  v[ESTIMATE_U] = p->estimated_error_u >= 0 ? p->estimated_error_u : NAN; /* a table's word for none */
+  v[ESTIMATE_SIGMA] = p->estimated_error_sigma >= 0 ? p->estimated_error_sigma : NAN;
+  v[ESTIMATE_LAMBDA] = p->estimated_error_lambda >= 0 ? p->estimated_error_lambda : NAN;
+  v[BEYOND] = p->beyond;
+}
+
+/* This rank's points. full[k]: point k is to be solved full order. */
+static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, PetscInt n, PetscInt n_par,
+                                  const PetscReal mu[], PetscReal value[], PetscInt full[])
+{
+  PetscMPIInt rank, size;
+  PetscInt first, count;
+  HycoPrediction *all;
+  char why[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  first = (PetscInt)rank * n / size;
+  count = ((PetscInt)rank + 1) * n / size - first;
+  PetscCall(PetscMalloc1(count, &all));
+  PetscCall(HycoROMSolveMany(model, count, n_par, mu + first * n_par, all, NULL, NULL));
+  for (PetscInt k = 0; k < count; k++) {
+    FillRow(&all[k], value + (first + k) * N_COLUMNS);
+    DriverWantsFullOrder(fallback, &all[k], why);
+    full[first + k] = why[0] != '\0';
+  }
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All ranks together, the points where the reduced model was not enough. */
+static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, const PetscReal mu[],
+                                const PetscInt full[], PetscReal value[])
+{
+  PetscInt count = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    HycoPrediction p = {0};
+
+    if (!full[k]) continue;
+    PetscCall(DriverSolveFullOrder(fallback, n_par, mu + k * n_par, &p));
+    p.estimated_error_u = value[k * N_COLUMNS + ESTIMATE_U]; /* the model's, which asked for full order */
+    p.estimated_error_sigma = value[k * N_COLUMNS + ESTIMATE_SIGMA];
+    p.estimated_error_lambda = value[k * N_COLUMNS + ESTIMATE_LAMBDA];
+    p.beyond = value[k * N_COLUMNS + BEYOND];
+    FillRow(&p, value + k * N_COLUMNS);
+    value[k * N_COLUMNS + U_NORM] = NAN; /* the whole mesh's, no RID's */
+    value[k * N_COLUMNS + FULL_ORDER] = 1;
+    count++;
+  }
+  if (fallback->on) PetscCall(Say("%d of the %d points were solved full order\n", (int)count, (int)n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples)
+{
+  PetscInt n, n_par, *full;
+  const PetscReal *mu;
+  PetscReal *value, begin;
+  char table[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCall(DriverGet("table", PETSC_FALSE, table));
+  PetscCall(DriverCheckLeftEarly(scene)); /* what the solver alone knows is read by the first prediction */
+  PetscCall(PetscCalloc2(n * N_COLUMNS, &value, n, &full));
+  begin = HycoNow();
+  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, value, full));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)(n * N_COLUMNS), MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, full, (PetscMPIInt)n, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCall(SolveRest(fallback, n, n_par, mu, full, value));
+  begin = HycoNow() - begin;
+  PetscCall(ReportSet("predict", table, scene, samples, N_COLUMNS, columns, value, begin));
+  PetscCall(PetscFree2(value, full));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CommandPredict(void)
+{
+  HycoROM model = NULL;
+  HycoScene scene;
+  HycoSamples samples = NULL;
+  Fallback fallback = {0};
+  PetscBool set, monitor, extrapolate = PETSC_FALSE;
+  char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(DriverGet("model", PETSC_TRUE, path));
+  PetscCall(DriverGet("output", PETSC_FALSE, output));
+  PetscCall(DriverGet("report", PETSC_FALSE, report));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_monitor", &monitor));
+  PetscCall(HycoOptionsBool(NULL, "extrapolate", &extrapolate));
+  HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(path, &model));
+  PetscCall(HycoROMSetExtrapolate(model, extrapolate));
+  PetscCall(HycoROMGetScene(model, &scene));
+  PetscCall(DriverReadFallback(model, extrapolate, &fallback));
+  if (monitor) PetscCall(HycoROMSetMonitor(model, DriverMonitor, NULL));
+  PetscCall(DriverHasSamples(scene, &set));
+  if (set) {
+    HycoCheck(!output[0], "-output is for one point (-mu); a set of points gives a -table");
+    HycoCheck(!fallback.displacement,
+              "-hyco_full_displacement is for one point (-mu); a set of points gives a -table, which has no fields");
+    PetscCall(DriverGetSamples(scene, &samples, &set));
+    HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples));
+  } else {
+    HycoStaged(HYCO_STAGE_ONLINE, One(model, scene, &fallback, output));
+  }
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(DriverEndFallback(&fallback));
+  PetscCall(HycoROMDestroy(&model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,197 @@
+/* The command line: what the commands share. */
+#ifndef HYCO_DRIVER_H
+#define HYCO_DRIVER_H
+
+#include <hyco.h>
+#include <cjson/cJSON.h>
+
+/* What compat the driver needs of the library's own. */
+#include <hycoimpl.h>
+
+#define DRIVER_LINE 1024
+
+typedef struct {
+  const char *name;
+  PetscErrorCode (*run)(void);
+  const char *options; /* names of its own options, separated by spaces */
+  const char *usage, *meaning;
+} Command;
+
+extern const Command commands[];
+
+/* -- args.c: options -- */
+
+/* Every option on the command line is one that `command` knows, or PETSc's; no stray words. */
+PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
+/* The files that `command` is to write are files of their own, none of which it reads, whatever their names, in folders
+   that may be written; or devices. Before any work; counts no option as read. Collective. */
+PetscErrorCode DriverCheckOutputs(const Command *command);
+/* The scene's mesh is none of them. Collective. */
+PetscErrorCode DriverCheckMesh(HycoScene scene);
+/* Nothing was given that nobody read. To be called when all options have been read and before anything is written. */
+PetscErrorCode DriverCheckLeft(void);
+/* The same before the solvers have run: what is meant for them (-hyco_mumps_..., -hyco_tao_... with that type) passes.
+ */
+PetscErrorCode DriverCheckLeftEarly(HycoScene scene);
+/* The value of -name; fails when it is required and missing. `value` is "" when absent. */
+PetscErrorCode DriverGet(const char name[], PetscBool required, char value[PETSC_MAX_PATH_LEN]);
+/* One point: -mu v,v,... or -mu_NAME v. */
+PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
+/* Whether -mu or a -mu_NAME was given. */
+PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given);
+/* A set of points: -grid (with -grid_type), -values_NAME, or -points. *given: whether any was. */
+PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given);
+/* The points among which a greedy training chooses: -training_grid, closed unless -grid_type says otherwise. */
+PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples);
+/* The points that models are judged by: -validation_grid or -validation_points; NULL when neither is given. */
+PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples);
+/* Whether any point-set option was given. */
+PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given);
+void DriverHelp(const char *command);
+
+/* -- status.c: how the command ends -- */
+
+enum {
+  DRIVER_DONE = 0,
+  DRIVER_FAILED = 1, /* one line said why; nothing half-written */
+  DRIVER_MISSED = 3  /* what was asked for is written, but misses a target or the default bar */
+};
+
+/* What is written misses what was asked: one line on stderr from rank 0, beginning "hyco: missed:", an entry of
+   "missed" in the report, which must be written after this, and the exit status DRIVER_MISSED unless an error follows.
+   The text says what was reached, what was asked and what to do. To be called on every rank, for the ranks end with one
+   status. */
+PetscErrorCode DriverMissed(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
+void DriverReportMissed(cJSON *json);
+/* The exit status of a run that ended with `ierr`; to be called once, at the end. */
+int DriverEndStatus(PetscErrorCode ierr);
+/* -- launch.c: ranks and threads -- */
+
+/* Reads the launcher's variables; to be called before MPI begins. */
+void DriverNoteLaunch(void);
+/* Fails where a launcher of another MPI has started several processes, each of which would do all the work and write
+   the same files. Collective. */
+PetscErrorCode DriverCheckLaunch(void);
+/* One thread a rank for the BLAS, unless its variables, or OpenMP's, say how many. (A BLAS reads them when it is
+   loaded, before main().) */
+void DriverOneThread(void);
+
+/* -- sources.c -- */
+
+/* "options_from" in the report: what PETSC_OPTIONS, the files .petscrc and -options_file say, by name; nothing if none
+   says anything. On this process alone. */
+PetscErrorCode DriverReportSources(cJSON *json);
+
+/* -- report.c: JSON -- */
+
+/* A report with command, scene title, mu (NULL: none) and ranks. */
+PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscReal mu[], cJSON **json);
+/* Into the report, and, where they matter, on the terminal: the largest initial overlap, the sliding, and that nothing
+   faces anything. */
+PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap,
+                              PetscReal sliding);
+void ReportKKT(cJSON *json, const HycoKKT *kkt);
+void ReportSeconds(cJSON *json, const HycoSeconds *seconds);
+void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[]);
+/* Adds memory_mb and what was missed, writes to -report (if given) on rank 0 and frees. */
+PetscErrorCode ReportWrite(cJSON **json);
+/* The report of a set of points, n rows of values by column (one named "converged"), and their CSV at `table` ("":
+   none); fails when a point did not converge. */
+PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
+                         PetscInt n_columns, const char *const columns[], const PetscReal value[], PetscReal seconds);
+/* Writes text to a file, whole or not at all, or into a device. On this process alone. */
+PetscErrorCode DriverWriteText(const char path[], const char text[]);
+
+/* Writes a CSV: the parameters of each point, then its columns (n x n_columns row major). Collective. */
+PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, const PetscReal mu[],
+                                PetscInt n_columns, const char *const names[], const PetscReal value[]);
+
+/* -- progress.c -- */
+
+/* Prints on rank 0. */
+PetscErrorCode Say(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
+/* A share in percent: "0.12 %", "120 %". */
+void DriverPercent(PetscReal share, char text[32]);
+/* A HycoProgress: a bar that moves on a terminal, a line now and then elsewhere. ctx: a word for what is done. */
+PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx);
+/* A HycoMonitor. */
+PetscErrorCode DriverMonitor(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx);
+
+/* -- greedy.c -- */
+
+/* What a greedy training said, on rank 0: its table, and how it ended. */
+typedef struct {
+  HycoScene scene;                /* borrowed */
+  char table[PETSC_MAX_PATH_LEN]; /* "": none */
+  char *text;                     /* the table; PetscFree() it */
+  size_t length, room;
+  PetscInt iterations, infinite;
+  PetscReal max_eta, target;
+  char stop[16];
+} GreedyLog;
+
+/* A point (NULL: none) in words ("mu1 = 0.05, mu2 = 0.1") and as columns ("0.05,0.1,"; may be NULL). */
+PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char words[DRIVER_LINE],
+                                 char columns[DRIVER_LINE]);
+/* Reads the options of train -greedy, makes the training set and sets the reducer, which will fill `log`. */
+PetscErrorCode DriverReadGreedy(HycoScene scene, HycoReducer reducer, HycoSamples *training, GreedyLog *log);
+/* Says that the loop ended short of what was asked: of -target, or, where that was left to its default, of the limits
+   that were given. Collective. */
+PetscErrorCode DriverJudgeGreedy(const GreedyLog *log);
+void DriverReportGreedy(cJSON *json, const GreedyLog *log);
+
+/* -- fallback.c: predict with the scene at hand -- */
+
+/* When predict solves full order instead, whether it solves for the displacement alone, and with what. */
+typedef struct {
+  PetscBool on, displacement;
+  PetscReal target_u, target_lambda; /* 0: none */
+  HycoScene scene;                   /* NULL unless on or displacement */
+  HycoFOM fom;                       /* made by the first solve */
+  PetscReal strain_energy;           /* of the last */
+} Fallback;
+
+/* A relative error above 0 and at most 1; 0 when absent. */
+PetscErrorCode DriverReadTarget(const char name[], PetscReal *target);
+/* Reads the options and the scene, which must be the model's. Collective. */
+PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback *fallback);
+PetscErrorCode DriverEndFallback(Fallback *fallback);
+/* Why this prediction is not enough; "": it is. */
+void DriverWantsFullOrder(const Fallback *fallback, const HycoPrediction *p, char why[DRIVER_LINE]);
+/* Solves at mu (length n); the results take the prediction's place, u over the whole mesh. Collective. */
+PetscErrorCode DriverSolveFullOrder(Fallback *fallback, PetscInt n, const PetscReal mu[], HycoPrediction *p);
+
+/* One full solve at mu (length n) with the forces of the condensed model's last prediction, held on rank 0: u over the
+   whole mesh takes the place of the prediction's, residuals of (16) that of its own. Collective. */
+PetscErrorCode DriverSolveDisplacement(Fallback *fallback, HycoROM model, PetscInt n, const PetscReal mu[],
+                                       HycoPrediction *p);
+
+/* -- search.c: what train tried, and what the model is worth -- */
+
+typedef struct {
+  PetscBool on;                    /* a target was given */
+  PetscReal target[HYCO_N_ERRORS]; /* 0: none */
+  PetscInt budget;                 /* of solutions added to meet them; < 0: the default */
+  HycoScene scene;                 /* borrowed */
+  PetscInt n_points, n;            /* training points, with what was added; attempts in all */
+  char table[PETSC_MAX_PATH_LEN];  /* "": none */
+  char *text;                      /* the table; PetscFree() it */
+  size_t length, room;
+} Search;
+
+/* The -target_ options. */
+PetscErrorCode DriverReadTargets(Search *search);
+/* Hands them to the reducer, which will tell `search` of its attempts. */
+PetscErrorCode DriverSetSearch(Search *search, HycoScene scene, HycoReducer reducer, PetscInt n_points);
+/* Says what was chosen and the errors at held-out points; where they miss the targets, or the least that a model should
+   be good for, so loudly (DriverMissed()). Collective. */
+PetscErrorCode DriverJudgeModel(const Search *search, const HycoTraining *training);
+void DriverReportModel(cJSON *json, const Search *search, const HycoTraining *training);
+
+PetscErrorCode CommandSolve(void);
+PetscErrorCode CommandTrain(void);
+PetscErrorCode CommandPredict(void);
+PetscErrorCode CommandCompare(void);
+PetscErrorCode CommandView(void);
+
+#endif

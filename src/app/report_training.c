@@ -1,0 +1,238 @@
+/*
+  hyco train: what it tried, what the model is worth, and whether that is enough. The recipes are tried by the library
+  (HycoReducerRun()); a line each, and a row in -table. Errors are those at held-out points, as in hyco compare.
+*/
+#include "driver.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* The least that a model should be good for, where no target is given. */
+static const PetscReal bar[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 5e-3, [HYCO_ERROR_LAMBDA] = 3e-2};
+
+PetscErrorCode DriverReadTargets(Search *s)
+{
+  char name[64];
+
+  PetscFunctionBegin;
+  s->budget = -1;
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    PetscCall(PetscSNPrintf(name, sizeof(name), "target_%s", HycoErrorKinds[j]));
+    PetscCall(DriverReadTarget(name, &s->target[j]));
+    s->on = (PetscBool)(s->on || s->target[j] > 0);
+  }
+  if (s->on) PetscCall(HycoOptionsInt(NULL, "target_max_added", 0, 1000000, &s->budget));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* "1.2e-03", or "inf": a solve did not converge, or x/0. */
+static void Number(PetscReal value, char text[32])
+{
+  if (value > PETSC_MAX_REAL / 8)
+    snprintf(text, 32, "inf");
+  else
+    snprintf(text, 32, "%.3g", (double)value);
+}
+
+/* "u 0.12 %, stress 3.4 %, forces 5 %" of one number per kind of error. */
+static void DescribeErrors(const PetscReal error[], char text[DRIVER_LINE])
+{
+  static const HycoErrorKind kinds[] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
+  static const char *const words[] = {"u", "stress", "forces"};
+  size_t at = 0;
+
+  for (size_t j = 0; j < 3; j++) {
+    char percent[32];
+
+    DriverPercent(error[kinds[j]], percent);
+    at += (size_t)snprintf(text + at, DRIVER_LINE - at, "%s%s %s", j ? ", " : "", words[j],
+                           error[kinds[j]] > PETSC_MAX_REAL / 8 ? "infinite" : percent);
+  }
+}
+
+static PetscErrorCode Append(Search *s, const char text[])
+{
+  const size_t n = strlen(text);
+
+  PetscFunctionBegin;
+  if (s->length + n + 1 > s->room) {
+    s->room = 2 * (s->length + n + 1);
+    PetscCall(PetscRealloc(s->room, &s->text));
+  }
+  memcpy(s->text + s->length, text, n + 1);
+  s->length += n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
+{
+  char row[4 * DRIVER_LINE], number[32];
+  const HycoRecipe *r = &a->recipe;
+  size_t at;
+
+  PetscFunctionBegin;
+  if (!s->length) {
+    PetscCall(Append(
+        s, "attempt,training_points,model_type,pod_tol,rid_layers,rid_contact_extension,hybrid,rid_whole,n_modes,"
+           "rid_elements,rid_fraction"));
+    for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+      snprintf(row, sizeof(row), ",error_%s,median_%s", HycoErrorKinds[j], HycoErrorKinds[j]);
+      PetscCall(Append(s, row));
+    }
+    PetscCall(Append(s, ",not_converged,seconds,operations,meets,failure\n"));
+  }
+  at = (size_t)snprintf(row, sizeof(row), "%d,%d,%s,%g,%d,%g,%s,%d,%d,%d,%.6g", (int)++s->n, (int)s->n_points,
+                        HycoROMTypes[r->type], (double)r->pod_tol, (int)r->layers, (double)r->contact_extension,
+                        HycoHybrids[r->hybrid], (int)r->whole, (int)a->n_modes, (int)a->rid_elements,
+                        (double)a->rid_fraction);
+  for (PetscInt j = 0; j < 2 * HYCO_N_ERRORS; j++) {
+    Number(a->failure[0] ? (PetscReal)NAN : (j % 2 ? a->held_out.median : a->held_out.largest)[j / 2], number);
+    at += (size_t)snprintf(row + at, sizeof(row) - at, ",%s", number);
+  }
+  at += (size_t)snprintf(row + at, sizeof(row) - at, ",%d,%.6g,%.6g,%d,\"", (int)a->held_out.not_converged,
+                         a->failure[0] ? NAN : (double)a->held_out.seconds, (double)a->cost, a->ratio <= 1);
+  for (const char *c = a->failure; *c && at + 4 < sizeof(row); c++) row[at++] = *c == '"' ? '\'' : *c;
+  snprintf(row + at, sizeof(row) - at, "\"\n");
+  PetscCall(Append(s, row));
+  if (s->table[0]) PetscCall(DriverWriteText(s->table, s->text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A HycoAttemptMonitor. */
+static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
+{
+  Search *s = (Search *)ctx;
+  char what[DRIVER_LINE], errors[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  if (a->number == 1)
+    PetscCall(Say("recipes, each judged at %d held-out points (largest errors):\n", (int)a->held_out.n));
+  HycoRecipeDescribe(&a->recipe, sizeof(what), what);
+  DescribeErrors(a->held_out.largest, errors);
+  if (a->failure[0])
+    PetscCall(Say("  %2d %s: no model: %s\n", (int)a->number, what, a->failure));
+  else
+    PetscCall(Say("  %2d %s: %d modes, RID %.1f %%; %s; %.3g ms%s\n", (int)a->number, what, (int)a->n_modes,
+                  100 * (double)a->rid_fraction, errors, 1e3 * (double)a->held_out.seconds,
+                  a->ratio <= 1 ? "; meets the targets" : ""));
+  PetscCall(AppendRow(s, a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A HycoAddedMonitor. */
+static PetscErrorCode Added(PetscInt n, PetscInt parameter, void *ctx)
+{
+  Search *s = (Search *)ctx;
+  const char *const *names;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(s->scene, NULL, &names, NULL, NULL));
+  s->n_points += n;
+  PetscCall(Say("no recipe meets the targets: %d solutions are added where the errors are largest%s%s\n", (int)n,
+                parameter < 0 ? "" : "; the training values lie too far apart in ",
+                parameter < 0 ? "" : names[parameter]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverSetSearch(Search *s, HycoScene scene, HycoReducer reducer, PetscInt n_points)
+{
+  PetscFunctionBegin;
+  s->scene = scene;
+  s->n_points = n_points;
+  PetscCall(HycoReducerSetTargets(reducer, s->target, s->budget));
+  PetscCall(HycoReducerSetAttemptMonitor(reducer, Attempted, Added, s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What was asked and is not met, a line and the exit status of a miss. */
+static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
+{
+  const PetscReal *limit = s->on ? s->target : bar;
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    char reached[32], asked[32];
+
+    if (!(limit[j] > 0) || t->held_out.largest[j] <= limit[j]) continue;
+    DriverPercent(t->held_out.largest[j], reached);
+    DriverPercent(limit[j], asked);
+    PetscCall(
+        DriverMissed("the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s",
+                     j == HYCO_ERROR_U        ? "u"
+                     : j == HYCO_ERROR_LAMBDA ? "the contact forces"
+                                              : HycoErrorKinds[j],
+                     t->held_out.largest[j] > PETSC_MAX_REAL / 8 ? "infinite" : reached, (int)t->held_out.n,
+                     s->on ? "the target is" : "without a target it should stay below", asked,
+                     s->on ? "give more training points, a larger -target_max_added, or loosen the target"
+                           : "give more training points, let training add them (-target_u 5e-3 -target_lambda 3e-2), "
+                             "or say by such targets "
+                             "what is enough"));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
+{
+  char what[DRIVER_LINE], median[DRIVER_LINE], largest[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  if (t->chosen.number) {
+    HycoRecipeDescribe(&t->chosen.recipe, sizeof(what), what);
+    PetscCall(Say("chosen: recipe %d of %d: %s\n", (int)t->chosen.number, (int)t->chosen.of, what));
+  }
+  if (!t->held_out.n) {
+    PetscCall(Say("no held-out points: the errors of this model are not known, and it does not estimate them\n"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  DescribeErrors(t->held_out.median, median);
+  DescribeErrors(t->held_out.largest, largest);
+  PetscCall(Say("errors at %d held-out points: median %s; largest %s\n", (int)t->held_out.n, median, largest));
+  if (!t->n_held)
+    PetscCall(Say("the model does not estimate its errors: fewer than 10 predictions of held-out solutions\n"));
+  PetscCall(Misses(s, t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A number, or null where it is infinite. */
+static void AddFinite(cJSON *object, const char name[], PetscReal value)
+{
+  if (value > PETSC_MAX_REAL / 8)
+    cJSON_AddNullToObject(object, name);
+  else
+    cJSON_AddNumberToObject(object, name, value);
+}
+
+void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
+{
+  const HycoAttempt *a = &t->chosen;
+  cJSON *held;
+
+  if (t->held_out.n) {
+    held = cJSON_AddObjectToObject(json, "held_out");
+    cJSON_AddNumberToObject(held, "n", t->held_out.n);
+    cJSON_AddNumberToObject(held, "not_converged", t->held_out.not_converged);
+    cJSON_AddNumberToObject(held, "online_seconds", t->held_out.seconds);
+    for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+      cJSON *error = cJSON_AddObjectToObject(held, HycoErrorKinds[j]);
+
+      AddFinite(error, "median", t->held_out.median[j]);
+      AddFinite(error, "mean", t->held_out.mean[j]);
+      AddFinite(error, "largest", t->held_out.largest[j]);
+      if (s->target[j] > 0) cJSON_AddNumberToObject(error, "target", s->target[j]);
+    }
+  } else
+    cJSON_AddNullToObject(json, "held_out");
+  if (a->number) {
+    cJSON *search = cJSON_AddObjectToObject(json, "search");
+
+    cJSON_AddNumberToObject(search, "attempts", s->n);
+    cJSON_AddNumberToObject(search, "chosen", s->n - a->of + a->number);
+    cJSON_AddNumberToObject(search, "added", t->n_added);
+    cJSON_AddStringToObject(search, "model_type", HycoROMTypes[a->recipe.type]);
+    cJSON_AddNumberToObject(search, "pod_tol", a->recipe.pod_tol);
+    cJSON_AddNumberToObject(search, "rid_layers", a->recipe.layers);
+    cJSON_AddNumberToObject(search, "rid_contact_extension", a->recipe.contact_extension);
+    cJSON_AddStringToObject(search, "hybrid", HycoHybrids[a->recipe.hybrid]);
+    cJSON_AddBoolToObject(search, "rid_whole", a->recipe.whole);
+  }
+}

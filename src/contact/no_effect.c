@@ -1,0 +1,100 @@
+/*
+  Contacts without a free unknown: all that they touch is fixed. They have no effect, but the prescribed displacements
+  may violate them, and then no solution exists.
+*/
+#include <hycokinematics.h>
+
+static PetscReal Largest(const PetscReal v[], PetscInt n)
+{
+  PetscReal largest = 0;
+
+  for (PetscInt c = 0; c < n; c++) largest = PetscMax(largest, PetscAbsReal(v[c]));
+  return largest;
+}
+
+PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal gap, PetscReal *left)
+{
+  const PetscInt slave = pairs->slave[k], dim = fe->dim;
+  PetscReal size = PetscAbsReal(gap) + Largest(fe->X + 3 * slave, 3) + Largest(fe->u0 + slave * dim, dim);
+
+  PetscFunctionBegin;
+  for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++) {
+    const PetscInt i = pairs->master[j];
+
+    size = PetscMax(size, Largest(fe->X + 3 * i, 3) + Largest(fe->u0 + i * dim, dim));
+  }
+  HycoCheck(*left >= -1e-12 * size,
+            "contact %s: node %d is fixed%s, and its prescribed displacement penetrates by %g: no solution exists",
+            fe->scene->contact[pairs->contact[k]].name, (int)fe->mesh->node_id[slave],
+            pairs->master_start[k + 1] > pairs->master_start[k] ? " and so is what it meets" : "", (double)-*left);
+  *left = PetscMax(*left, 0); /* round-off */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nodes of the obstacles' groups that are wholly fixed and no contacts (HycoPairsFind() leaves them out), as
+   contacts without masters. The caller destroys it. */
+static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPairs *still)
+{
+  HycoMesh m = fe->mesh;
+  HycoScene s = fe->scene;
+  PetscBool *is_slave;
+  PetscInt room = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(still, sizeof(*still)));
+  PetscCall(PetscCalloc1(m->n_nodes, &is_slave));
+  for (PetscInt k = 0; k < pairs->n; k++) is_slave[pairs->slave[k]] = PETSC_TRUE;
+  for (PetscInt k = 0; k < s->n_contacts; k++) room += s->contact[k].type == HYCO_CONTACT_OBSTACLE ? m->n_nodes : 0;
+  PetscCall(PetscMalloc1(room, &still->slave));
+  PetscCall(PetscMalloc1(room, &still->contact));
+  PetscCall(PetscCalloc1(room + 1, &still->master_start));
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    PetscInt g = 0;
+
+    if (s->contact[k].type != HYCO_CONTACT_OBSTACLE) continue;
+    PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k].slave, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
+      const PetscInt i = m->group_node[j];
+      PetscBool fixed = (PetscBool)!is_slave[i];
+
+      for (PetscInt c = 0; c < fe->dim; c++) fixed = (PetscBool)(fixed && fe->fixed[i * fe->dim + c]);
+      if (!fixed) continue;
+      still->slave[still->n] = i;
+      still->contact[still->n++] = k;
+    }
+  }
+  PetscCall(PetscFree(is_slave));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fails where the prescribed displacement of a fixed node passes its obstacle. */
+static PetscErrorCode CheckObstacles(HycoFE fe, HycoPairs *still, PetscReal normal[], PetscReal gap[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoContactGeometry(fe, still, normal, gap));
+  for (PetscInt k = 0; k < still->n; k++) {
+    PetscReal left = gap[k];
+
+    for (PetscInt c = 0; c < fe->dim; c++) left -= normal[3 * k + c] * fe->u0[still->slave[k] * fe->dim + c];
+    PetscCall(HycoContactCheckStill(fe, still, k, gap[k], &left));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n)
+{
+  HycoPairs still;
+  PetscReal *normal, *gap;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(FixedAtObstacles(fe, pairs, &still));
+  *n = still.n;
+  for (PetscInt k = 0; k < pairs->n; k++) *n += start[k + 1] == start[k] && !HycoPairsAlone(fe->scene, pairs, k);
+  PetscCall(PetscMalloc2(3 * still.n, &normal, still.n, &gap));
+  ierr = CheckObstacles(fe, &still, normal, gap);
+  PetscCall(PetscFree2(normal, gap));
+  PetscCall(HycoPairsDestroy(&still));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

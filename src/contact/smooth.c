@@ -1,0 +1,148 @@
+/*
+  Normals of the smooth surface behind a group's facets. A node's facets are weighted as on a circle or a sphere through
+  it and its neighbours, where the normal is then exact (N. Max, J. Graphics Tools 4 (1999) 1-6): a body of revolution
+  that turns in its seat shows no normal motion, however uneven its facets are.
+*/
+#include <hycokinematics.h>
+
+/* Facets that meet at more than this angle (40 degrees) are an edge of the body, not a curved surface. */
+#define EDGE 0.7
+/* What the coordinates of a mesh file leave of a plane. */
+#define FLAT 1e-6
+
+static PetscReal Length(const PetscReal v[3])
+{
+  return PetscSqrtReal(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+static void Unit(PetscReal v[3])
+{
+  const PetscReal length = Length(v);
+
+  for (PetscInt c = 0; c < 3 && length > 0; c++) v[c] /= length;
+}
+
+static PetscReal Apart(const PetscReal a[3], const PetscReal b[3])
+{
+  const PetscReal d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+
+  return Length(d);
+}
+
+/* n dS of a facet. */
+static PetscErrorCode Area(HycoFE fe, PetscInt facet, PetscReal n[3])
+{
+  const HycoElement *el = HycoElementGetFacet(fe->mesh->type);
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < 3; c++) n[c] = 0;
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal part[3];
+
+    PetscCall(HycoFacetNormal(fe, el, facet, q, part));
+    for (PetscInt c = 0; c < 3; c++) n[c] += part[c];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The weight of a facet's normal at its corner v, with the next and the last corner. */
+static PetscReal Weight(HycoFE fe, const PetscInt node[], PetscInt v)
+{
+  const PetscInt nf = fe->mesh->nf, next = node[(v + 1) % nf], last = node[(v + nf - 1) % nf];
+  const PetscReal *x = fe->X + 3 * node[v];
+  const PetscReal a = Apart(fe->X + 3 * next, x), b = Apart(fe->X + 3 * last, x),
+                  c = Apart(fe->X + 3 * next, fe->X + 3 * last);
+  const PetscReal cosine = nf > 2 ? (a * a + b * b - c * c) / (2 * a * b) : 0;
+
+  return nf == 2 ? 1 / a : PetscSqrtReal(PetscMax(1 - cosine * cosine, 0)) / (a * b);
+}
+
+typedef struct {
+  PetscReal *exact, *mean; /* n_nodes x 3: by Max's weights, by areas */
+  PetscReal *bend;         /* n_nodes: the largest angle between facets around the node */
+  PetscInt *fan;           /* n_nodes: 0 where the facets close around the node */
+} Surface;
+
+static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    const PetscInt *node = m->facets + f * m->nf;
+    PetscReal n[3], unit[3];
+
+    if (m->facet_group[f] != group) continue;
+    PetscCall(Area(fe, f, n));
+    for (PetscInt c = 0; c < 3; c++) unit[c] = n[c];
+    Unit(unit);
+    for (PetscInt v = 0; v < m->nf; v++) {
+      const PetscReal weight = Weight(fe, node, v);
+
+      for (PetscInt c = 0; c < 3; c++) {
+        s->exact[3 * node[v] + c] += weight * unit[c];
+        s->mean[3 * node[v] + c] += n[c];
+      }
+      /* each neighbour comes once as the next and once as the last, except at a border */
+      s->fan[node[v]] += m->nf == 2 ? (v ? 1 : -1) : node[(v + 1) % m->nf] - node[(v + m->nf - 1) % m->nf];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* bend[], from the facets' normals and their means; then for each node the largest of its facets' nodes in wide[]. */
+static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal wide[])
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    PetscReal n[3];
+
+    if (m->facet_group[f] != group) continue;
+    PetscCall(Area(fe, f, n));
+    Unit(n);
+    for (PetscInt v = 0; v < m->nf; v++) {
+      const PetscInt i = m->facets[f * m->nf + v];
+
+      s->bend[i] = PetscMax(s->bend[i], 2 * Apart(n, s->mean + 3 * i));
+    }
+  }
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    PetscReal most = 0;
+
+    if (m->facet_group[f] != group) continue;
+    for (PetscInt v = 0; v < m->nf; v++) {
+      const PetscReal bend = s->bend[m->facets[f * m->nf + v]];
+
+      if (bend < EDGE) most = PetscMax(most, bend);
+    }
+    for (PetscInt v = 0; v < m->nf; v++)
+      wide[m->facets[f * m->nf + v]] = PetscMax(wide[m->facets[f * m->nf + v]], most);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], PetscReal doubt[], PetscReal bend[])
+{
+  HycoMesh m = fe->mesh;
+  Surface s = {normal, NULL, NULL, NULL};
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(normal, 3 * m->n_nodes));
+  PetscCall(PetscArrayzero(bend, m->n_nodes));
+  PetscCall(PetscCalloc3(3 * m->n_nodes, &s.mean, m->n_nodes, &s.bend, m->n_nodes, &s.fan));
+  PetscCall(AddFacets(fe, group, &s));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    Unit(s.exact + 3 * i);
+    Unit(s.mean + 3 * i);
+  }
+  PetscCall(FindBends(fe, group, &s, bend));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    doubt[i] = FLAT;
+    if (s.bend[i] >= EDGE) continue;
+    doubt[i] += s.fan[i] ? bend[i] : 2 * Apart(s.exact + 3 * i, s.mean + 3 * i) + bend[i] * bend[i] / 2;
+  }
+  PetscCall(PetscFree3(s.mean, s.bend, s.fan));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

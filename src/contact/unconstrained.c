@@ -1,0 +1,371 @@
+/*
+  Rigid motions that neither supports nor frictionless contact hold. A motion that is tangential to a contact's surface
+  everywhere meets no resistance there: a disk that turns about its centre, a body that slides along a plane. On a mesh
+  the surface is in facets, whose normals resist by accident: what counts is the smooth surface (HycoSmoothNormals()),
+  within what faceting leaves in doubt, so that all meshes of one geometry give one answer.
+*/
+#include <hycokinematics.h>
+#include <petscblaslapack.h>
+
+/* In which sense a contact may be slid along: its own (given) normals', the slave's surface's, the master's. */
+enum { GIVEN, SLAVE, MASTER, N_SENSES };
+#define MOST_CONTACTS 3 /* that choose their senses apart; more choose together */
+
+typedef struct {
+  HycoFE fe;
+  HycoPairs *pairs;
+  PetscInt k, m;                               /* motions, contacts */
+  PetscReal *d;                                /* m x k x 3: relative displacement of slave and master */
+  PetscReal *normal[N_SENSES];                 /* m x 3; zero: not in this sense */
+  PetscReal *doubt[N_SENSES], *bend[N_SENSES]; /* m */
+} Shapes;
+
+static PetscErrorCode Relative(Shapes *s, const HycoMotions *motions)
+{
+  const HycoPairs *p = s->pairs;
+  const PetscInt dim = s->fe->dim;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < s->m; i++) {
+    for (PetscInt a = 0; a < s->k; a++) {
+      const PetscReal *u = motions->motion + (size_t)a * (size_t)s->fe->n_dof;
+      PetscReal *d = s->d + ((size_t)i * (size_t)s->k + (size_t)a) * 3;
+
+      for (PetscInt c = 0; c < 3; c++) {
+        d[c] = c < dim ? u[p->slave[i] * dim + c] : 0;
+        for (PetscInt j = p->master_start[i]; c < dim && j < p->master_start[i + 1]; j++)
+          d[c] -= p->weight[j] * u[p->master[j] * dim + c];
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Normals of the slave's and of the master's surface at one contact's pairs; work: room for 5 reals a node. */
+static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[])
+{
+  const HycoContact *c = &s->fe->scene->contact[contact];
+  const HycoPairs *p = s->pairs;
+  PetscReal *normal = work, *doubt = work + 3 * s->fe->mesh->n_nodes, *bend = work + 4 * s->fe->mesh->n_nodes;
+
+  PetscFunctionBegin;
+  for (PetscInt side = SLAVE; side <= MASTER; side++) {
+    const char *group = side == SLAVE ? c->slave : c->master;
+    PetscInt g = 0;
+
+    if (side == MASTER && c->type == HYCO_CONTACT_OBSTACLE) continue;
+    PetscCall(HycoMeshFindGroup(s->fe->mesh, "contact", group, &g));
+    PetscCall(HycoSmoothNormals(s->fe, g, normal, doubt, bend));
+    for (PetscInt i = 0; i < s->m; i++) {
+      const PetscInt lo = side == SLAVE ? 0 : p->master_start[i], hi = side == SLAVE ? 1 : p->master_start[i + 1];
+
+      if (p->contact[i] != contact) continue;
+      for (PetscInt j = lo; j < hi; j++) {
+        const PetscInt node = side == SLAVE ? p->slave[i] : p->master[j];
+
+        for (PetscInt d = 0; d < 3; d++)
+          s->normal[side][3 * i + d] += side == SLAVE ? normal[3 * node + d] : -p->weight[j] * normal[3 * node + d];
+        s->doubt[side][i] = PetscMax(s->doubt[side][i], doubt[node]);
+        s->bend[side][i] = PetscMax(s->bend[side][i], bend[node]);
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FindSenses(Shapes *s)
+{
+  HycoScene scene = s->fe->scene;
+  PetscReal *work, *gap;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(5 * s->fe->mesh->n_nodes, &work, s->m, &gap));
+  PetscCall(HycoContactGeometry(s->fe, s->pairs, s->normal[GIVEN], gap));
+  for (PetscInt c = 0; c < scene->n_contacts && s->fe->dim > 1; c++) PetscCall(SurfaceSenses(s, c, work));
+  for (PetscInt i = 0; i < s->m; i++) {
+    const HycoContact *c = &scene->contact[s->pairs->contact[i]];
+    const PetscReal *n = s->normal[SLAVE] + 3 * i;
+    const PetscBool given = (PetscBool)(c->normal[0] || c->normal[1] || c->normal[2]);
+
+    s->doubt[GIVEN][i] = PetscMax(s->doubt[SLAVE][i], 1e-6);
+    s->bend[GIVEN][i] = PetscMax(s->bend[SLAVE][i], s->bend[MASTER][i]);
+    /* averaged from the facets: the slave's surface says it better */
+    for (PetscInt d = 0; d < 3 && !given && n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0; d++)
+      s->normal[GIVEN][3 * i + d] = 0;
+  }
+  PetscCall(PetscFree2(work, gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal Dot(const PetscReal a[3], const PetscReal b[3])
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The displacement at contact i under the combination z. */
+static void Combine(const Shapes *s, PetscInt i, const PetscReal z[], PetscReal d[3])
+{
+  for (PetscInt c = 0; c < 3; c++) {
+    d[c] = 0;
+    for (PetscInt a = 0; a < s->k; a++) d[c] += z[a] * s->d[((size_t)i * (size_t)s->k + (size_t)a) * 3 + (size_t)c];
+  }
+}
+
+/* The eigenvectors of sum of (n.d / doubt)^2 against sum of |d|^2, in A (k x k), values ascending. */
+static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const PetscReal weight[], PetscReal A[],
+                               PetscReal M[], PetscReal values[])
+{
+  const PetscInt k = s->k;
+  PetscBLASInt n, one = 1, lwork, info;
+  PetscReal *work;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(k, &n));
+  lwork = 8 * n;
+  PetscCall(PetscMalloc1(lwork, &work));
+  PetscCall(PetscArrayzero(A, k * k));
+  PetscCall(PetscArrayzero(M, k * k));
+  for (PetscInt a = 0; a < k; a++)
+    M[a * k + a] = 1e-3 * (PetscReal)(s->m + 1) / s->fe->n_dof; /* bodies that move together */
+  for (PetscInt i = 0; i < s->m; i++) {
+    const PetscInt t = sense[s->pairs->contact[i]];
+    const PetscReal *d = s->d + (size_t)i * (size_t)k * 3;
+
+    for (PetscInt a = 0; a < k; a++) {
+      for (PetscInt b = 0; b < k; b++) {
+        A[a * k + b] += weight[i] * Dot(s->normal[t] + 3 * i, d + 3 * a) * Dot(s->normal[t] + 3 * i, d + 3 * b) /
+                        (s->doubt[t][i] * s->doubt[t][i]);
+        M[a * k + b] += Dot(d + 3 * a, d + 3 * b);
+      }
+    }
+  }
+  LAPACKsygv_(&one, "V", "U", &n, A, &n, M, &n, values, work, &lwork, &info);
+  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK sygv: %d", (int)info);
+  PetscCall(PetscFree(work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the combination z is tangential at every contact; the weights of those where it is not are raised. */
+static PetscBool Tangential(const Shapes *s, const PetscInt sense[], const PetscReal z[], PetscReal weight[])
+{
+  const PetscReal noise = 1e-9 / PetscSqrtReal((PetscReal)s->fe->n_dof);
+  PetscReal norm = 0;
+  PetscBool all = PETSC_TRUE;
+
+  for (PetscInt a = 0; a < s->k; a++) norm += z[a] * z[a];
+  for (PetscInt i = 0; i < s->m; i++) {
+    const PetscInt t = sense[s->pairs->contact[i]];
+    PetscReal d[3];
+
+    Combine(s, i, z, d);
+    if (PetscAbsReal(Dot(s->normal[t] + 3 * i, d)) <=
+        PetscMax(2 * s->doubt[t][i], s->bend[t][i]) * PetscSqrtReal(Dot(d, d)) + noise * PetscSqrtReal(norm))
+      continue;
+    weight[i] *= 100;
+    all = PETSC_FALSE;
+  }
+  return all;
+}
+
+/* The combinations that are tangential in these senses: z (room k x k, rows of length 1), *n of them. */
+static PetscErrorCode Null(const Shapes *s, const PetscInt sense[], PetscReal z[], PetscInt *n)
+{
+  const PetscInt k = s->k;
+  PetscReal *A, *M, *values, *weight;
+  PetscBool all = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc4(k * k, &A, k * k, &M, k, &values, s->m, &weight));
+  for (PetscInt i = 0; i < s->m; i++) weight[i] = 1;
+  for (PetscInt round = 0; round < 8 && !all; round++) {
+    PetscCall(Spectrum(s, sense, weight, A, M, values));
+    all = PETSC_TRUE;
+    *n = 0;
+    for (PetscInt a = 0; a < k && values[a] <= 1; a++) {
+      const PetscBool good = Tangential(s, sense, A + a * k, weight);
+      PetscReal norm = 0;
+
+      all = (PetscBool)(all && good);
+      if (!good) continue;
+      for (PetscInt b = 0; b < k; b++) norm += A[a * k + b] * A[a * k + b];
+      for (PetscInt b = 0; b < k; b++) z[*n * k + b] = A[a * k + b] / PetscSqrtReal(norm);
+      (*n)++;
+    }
+  }
+  PetscCall(PetscFree4(A, M, values, weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds to the orthonormal rows of `basis` what the row z brings that is new. */
+static void Join(PetscInt k, const PetscReal z[], PetscReal basis[], PetscInt *n)
+{
+  PetscReal *v = basis + *n * k, norm = 0;
+
+  if (*n == k) return;
+  for (PetscInt a = 0; a < k; a++) v[a] = z[a];
+  for (PetscInt b = 0; b < 2 * *n; b++) { /* twice: round-off */
+    const PetscReal *w = basis + b % *n * k;
+    PetscReal dot = 0;
+
+    for (PetscInt a = 0; a < k; a++) dot += v[a] * w[a];
+    for (PetscInt a = 0; a < k; a++) v[a] -= dot * w[a];
+  }
+  for (PetscInt a = 0; a < k; a++) norm += v[a] * v[a];
+  if (norm < 0.04) return; /* the same motion, but for what faceting leaves in doubt */
+  for (PetscInt a = 0; a < k; a++) v[a] /= PetscSqrtReal(norm);
+  (*n)++;
+}
+
+/* The senses of combination number `code`; *possible: each has normals. */
+static void Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *possible)
+{
+  *possible = PETSC_TRUE;
+  for (PetscInt c = 0, rest = code; c < s->fe->scene->n_contacts; c++) {
+    sense[c] = s->fe->scene->n_contacts > MOST_CONTACTS ? code : rest % N_SENSES;
+    rest /= N_SENSES;
+  }
+  for (PetscInt i = 0; i < s->m && *possible; i++) {
+    PetscInt *t = &sense[s->pairs->contact[i]];
+    const PetscReal *n = s->normal[*t] + 3 * i;
+
+    if (Dot(n, n) > 0) continue;
+    if (s->fe->scene->n_contacts <= MOST_CONTACTS)
+      *possible = PETSC_FALSE;
+    else
+      *t = *t == GIVEN ? SLAVE : GIVEN; /* together, but each as it can */
+  }
+}
+
+static PetscErrorCode Search(const Shapes *s, PetscInt *n_unheld, PetscReal unheld[], PetscInt *n_alike,
+                             PetscReal alike[])
+{
+  const PetscInt n_contacts = s->fe->scene->n_contacts, k = s->k;
+  PetscInt codes = 1, *sense;
+  PetscReal *z;
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < PetscMin(n_contacts, n_contacts > MOST_CONTACTS ? 1 : n_contacts); c++) codes *= N_SENSES;
+  PetscCall(PetscMalloc2(n_contacts, &sense, k * k, &z));
+  for (PetscInt code = 0; code < codes; code++) {
+    PetscBool possible;
+    PetscInt n = 0, before = 0;
+
+    Senses(s, code, sense, &possible);
+    if (!possible) continue;
+    PetscCall(Null(s, sense, z, &n));
+    if (n > *n_alike) {
+      *n_alike = 0;
+      for (PetscInt a = 0; a < n; a++) Join(k, z + a * k, alike, n_alike);
+    }
+    before = *n_unheld;
+    for (PetscInt a = 0; a < n; a++) Join(k, z + a * k, unheld, n_unheld);
+    if (before == k) break;
+  }
+  PetscCall(PetscFree2(sense, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Entry of a combination's rigid motions: of the rotations of each part, then of the translations. */
+static PetscReal Entry(const HycoMotions *motions, const PetscReal z[], PetscInt dim, PetscInt column)
+{
+  const PetscInt k = motions->n, turns = dim == 1 ? 0 : dim == 2 ? 1 : 3;
+  const PetscBool turn = (PetscBool)(column < k * turns);
+  const PetscInt first = turn ? column / turns : (column - k * turns) / dim; /* the part, by one of its motions */
+  const PetscInt at = turn ? dim + column % turns : (column - k * turns) % dim;
+  PetscReal sum = 0;
+
+  for (PetscInt a = 0; a < first; a++) {
+    if (motions->rigid[a].part == motions->rigid[first].part) return 0; /* that motion's column has it */
+  }
+  for (PetscInt a = first; a < k; a++) {
+    if (motions->rigid[a].part == motions->rigid[first].part) sum += z[a] * motions->rigid[a].rigid[at];
+  }
+  return sum;
+}
+
+/* Another basis of the same combinations, to be named: with as many pure translations as there are. */
+static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscReal z[])
+{
+  const PetscInt k = motions->n, columns = k * (dim == 1 ? 1 : dim == 2 ? 3 : 6), turns = columns - k * dim;
+  PetscReal scale = 0;
+
+  for (PetscInt c = 0; c < columns; c++) {
+    for (PetscInt r = 0; r < n; r++) scale = PetscMax(scale, PetscAbsReal(Entry(motions, z + r * k, dim, c)));
+  }
+  for (PetscInt c = 0, done = 0; c < columns && done < n; c++) {
+    PetscInt best = done;
+
+    /* the first that will do, as it was found */
+    while (best < n && PetscAbsReal(Entry(motions, z + best * k, dim, c)) < 1e-3 * scale) best++;
+    if (best == n) continue;
+    for (PetscInt a = 0; a < k; a++) {
+      const PetscReal swap = z[done * k + a];
+
+      z[done * k + a] = z[best * k + a];
+      z[best * k + a] = swap;
+    }
+    for (PetscInt r = c < turns ? 0 : done + 1; r < n; r++) { /* a rotation's translation says where its axis is */
+      const PetscReal share = Entry(motions, z + r * k, dim, c) / Entry(motions, z + done * k, dim, c);
+
+      for (PetscInt a = 0; a < k && r != done; a++) z[r * k + a] -= share * z[done * k + a];
+    }
+    done++;
+  }
+}
+
+PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions, PetscInt *n_unheld,
+                                PetscReal **unheld, PetscInt *n_alike, PetscReal **alike)
+{
+  Shapes s = {fe, pairs, motions->n, pairs->n, NULL, {NULL}, {NULL}, {NULL}};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *n_unheld = *n_alike = 0;
+  PetscCall(PetscCalloc1((s.k + 1) * s.k, unheld));
+  PetscCall(PetscCalloc1((s.k + 1) * s.k, alike));
+  PetscCall(PetscMalloc1((size_t)s.m * (size_t)s.k * 3, &s.d));
+  for (PetscInt t = 0; t < N_SENSES; t++)
+    PetscCall(PetscCalloc3(3 * s.m, &s.normal[t], s.m, &s.doubt[t], s.m, &s.bend[t]));
+  ierr = Relative(&s, motions);
+  if (!ierr) ierr = FindSenses(&s);
+  if (!ierr) ierr = Search(&s, n_unheld, *unheld, n_alike, *alike);
+  if (!ierr) Reduce(motions, fe->dim, *n_unheld, *unheld);
+  for (PetscInt t = 0; t < N_SENSES; t++) PetscCall(PetscFree3(s.normal[t], s.doubt[t], s.bend[t]));
+  PetscCall(PetscFree(s.d));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3])
+{
+  PetscReal unit[3][3], length;
+  PetscInt n_units = 0;
+
+  for (PetscInt a = 0; a < fe->n_turned && n_units + 1 < fe->dim; a++) {
+    const PetscReal *u = fe->released + (size_t)a * (size_t)fe->n_dof;
+    PetscReal *d = unit[n_units], before;
+
+    for (PetscInt c = 0; c < 3; c++) {
+      d[c] = c < fe->dim ? u[pairs->slave[k] * fe->dim + c] : 0;
+      for (PetscInt j = pairs->master_start[k]; c < fe->dim && j < pairs->master_start[k + 1]; j++)
+        d[c] -= pairs->weight[j] * u[pairs->master[j] * fe->dim + c];
+    }
+    before = Dot(d, d);
+    for (PetscInt b = 0; b < n_units; b++) {
+      const PetscReal dot = Dot(d, unit[b]);
+
+      for (PetscInt c = 0; c < 3; c++) d[c] -= dot * unit[b][c];
+    }
+    length = PetscSqrtReal(Dot(d, d));
+    if (length <= 1e-9 / PetscSqrtReal((PetscReal)fe->n_dof) || length * length < 0.01 * before) continue;
+    for (PetscInt c = 0; c < 3; c++) d[c] /= length;
+    n_units++;
+  }
+  for (PetscInt b = 0; b < n_units; b++) {
+    const PetscReal dot = Dot(n, unit[b]);
+
+    for (PetscInt c = 0; c < 3; c++) n[c] -= dot * unit[b][c];
+  }
+  length = PetscSqrtReal(Dot(n, n));
+  for (PetscInt c = 0; c < 3 && length > 0; c++) n[c] /= length;
+}

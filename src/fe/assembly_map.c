@@ -1,0 +1,147 @@
+/*
+  Assembly into a sequential matrix whose pattern is there: each cell knows where its entries stand, so that they are
+  plain additions; cells that no parameter reaches are added up once and kept.
+*/
+#include "assembly_map.h"
+#include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
+
+struct _n_HycoAssemblyMap {
+  PetscObjectId matrix;
+  PetscObjectState pattern;
+  PetscInt *offset;      /* n_cells x nv x nv: of the first free unknown of node b in the rows of a's free unknowns */
+  PetscScalar *constant; /* values of the cells that no parameter reaches; NULL: there is none */
+};
+
+PetscErrorCode HycoAssemblyMapDestroy(HycoAssemblyMap *places)
+{
+  PetscFunctionBegin;
+  if (!*places) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*places)->offset));
+  PetscCall(PetscFree((*places)->constant));
+  PetscCall(PetscFree(*places));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first free unknown of a node, -1: none. */
+static PetscInt FirstFree(HycoFE fe, PetscInt node)
+{
+  for (PetscInt c = 0; c < fe->dim; c++) {
+    if (!fe->fixed[node * fe->dim + c]) return node * fe->dim + c;
+  }
+  return -1;
+}
+
+/* False where a row lacks an entry: the matrix was not made by cells of this mesh. */
+static PetscBool FindOffsets(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt offset[])
+{
+  const PetscInt nv = fe->mesh->nv;
+
+  for (PetscInt k = 0; k < fe->mesh->n_cells * nv * nv; k++) {
+    const PetscInt *node = fe->mesh->cells + k / (nv * nv) * nv;
+    const PetscInt row = FirstFree(fe, node[k / nv % nv]), col = FirstFree(fe, node[k % nv]);
+    PetscInt at = 0;
+
+    offset[k] = 0;
+    if (row < 0 || col < 0) continue;
+    while (ia[row] + at < ia[row + 1] && ja[ia[row] + at] != col) at++;
+    if (ia[row] + at == ia[row + 1]) return PETSC_FALSE;
+    offset[k] = at;
+  }
+  return PETSC_TRUE;
+}
+
+/* Adds an element matrix, fixed unknowns reduced to their own diagonal. */
+static void Add(HycoFE fe, const PetscInt offset[], PetscInt cell, const PetscReal Ae[], const PetscInt ia[],
+                PetscScalar a[])
+{
+  const PetscInt nv = fe->mesh->nv, dim = fe->dim, n = nv * dim, *node = fe->mesh->cells + cell * nv;
+
+  offset += cell * nv * nv;
+  for (PetscInt r = 0; r < n; r++) {
+    const PetscInt row = node[r / dim] * dim + r % dim;
+
+    if (fe->fixed[row]) {
+      a[ia[row]] += Ae[r * n + r];
+      continue;
+    }
+    for (PetscInt b = 0; b < nv; b++) {
+      PetscScalar *to = a + ia[row] + offset[r / dim * nv + b];
+      const PetscBool *fixed = fe->fixed + node[b] * dim;
+      const PetscReal *from = Ae + r * n + b * dim;
+
+      for (PetscInt d = 0; d < dim; d++) {
+        if (!fixed[d]) *to++ += from[d];
+      }
+    }
+  }
+}
+
+/* Adds the cells that parameters reach, or the others. */
+static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant, const PetscInt ia[], PetscScalar a[])
+{
+  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    if (fe->constant[e] != constant) continue;
+    PetscCall(HycoFEElementStiffness(fe, e, Ke));
+    Add(fe, p->offset, e, Ke, ia, a);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Create(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt n, HycoAssemblyMap *places)
+{
+  HycoAssemblyMap p;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(places));
+  p = *places;
+  PetscCall(PetscMalloc1(fe->mesh->n_cells * fe->mesh->nv * fe->mesh->nv, &p->offset));
+  if (!FindOffsets(fe, ia, ja, p->offset)) {
+    PetscCall(HycoAssemblyMapDestroy(places));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (fe->n_constant) {
+    PetscCall(PetscCalloc1(ia[n], &p->constant));
+    PetscCall(AddCells(fe, p, PETSC_TRUE, ia, p->constant));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoAssemblyMapAssemble(HycoFE fe, Mat K, PetscBool *done)
+{
+  const PetscInt *ia, *ja;
+  PetscInt n;
+  PetscObjectId id;
+  PetscObjectState pattern;
+  PetscScalar *a;
+  PetscBool rows, assembled, sequential;
+
+  PetscFunctionBegin;
+  *done = PETSC_FALSE;
+  PetscCall(MatAssembled(K, &assembled));
+  PetscCall(PetscObjectTypeCompare((PetscObject)K, MATSEQAIJ, &sequential));
+  if (!assembled || !sequential || fe->mesh->node_global) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectGetId((PetscObject)K, &id));
+  PetscCall(MatGetNonzeroState(K, &pattern));
+  PetscCall(MatGetRowIJ(K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &rows));
+  if (fe->places && (fe->places->matrix != id || fe->places->pattern != pattern))
+    PetscCall(HycoAssemblyMapDestroy(&fe->places));
+  if (!fe->places) PetscCall(Create(fe, ia, ja, n, &fe->places));
+  if (fe->places) {
+    fe->places->matrix = id;
+    fe->places->pattern = pattern;
+    PetscCall(MatSeqAIJGetArrayWrite(K, &a));
+    if (fe->places->constant)
+      PetscCall(PetscArraycpy(a, fe->places->constant, ia[n]));
+    else
+      PetscCall(PetscArrayzero(a, ia[n]));
+    PetscCall(AddCells(fe, fe->places, PETSC_FALSE, ia, a));
+    PetscCall(MatSeqAIJRestoreArrayWrite(K, &a));
+    PetscCall(PetscObjectStateIncrease((PetscObject)K));
+    *done = PETSC_TRUE;
+  }
+  PetscCall(MatRestoreRowIJ(K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,291 @@
+/* HycoFE: the scene on a mesh at one parameter value: nodes moved, supports, materials. */
+#include <hycokinematics.h>
+#include "assembly_map.h"
+
+PetscErrorCode HycoFEDestroy(HycoFE *fe)
+{
+  PetscFunctionBegin;
+  if (!*fe) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoAssemblyMapDestroy(&(*fe)->places));
+  for (PetscInt k = 0; k < (*fe)->n_loads; k++) {
+    PetscCall(PetscFree((*fe)->shares[k].node));
+    PetscCall(PetscFree((*fe)->shares[k].share));
+  }
+  PetscCall(PetscFree((*fe)->shares));
+  PetscCall(PetscFree((*fe)->constant));
+  PetscCall(PetscFree((*fe)->pin));
+  PetscCall(PetscFree((*fe)->released));
+  PetscCall(PetscFree((*fe)->X));
+  PetscCall(PetscFree((*fe)->mirrored));
+  PetscCall(PetscFree((*fe)->drawn_sign));
+  PetscCall(PetscFree((*fe)->fixed));
+  PetscCall(PetscFree((*fe)->u0));
+  PetscCall(PetscFree((*fe)->lame));
+  PetscCall(PetscFree(*fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cells and supports that no parameter reaches. */
+static PetscErrorCode FindConstant(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+  HycoScene s = fe->scene;
+  PetscBool every[HYCO_MAX_PARAMETERS], *moves, any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < HYCO_MAX_PARAMETERS; p++) every[p] = PETSC_TRUE;
+  PetscCall(PetscCalloc1(s->n_bodies, &moves));
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    for (PetscInt c = 0; c < 3; c++) moves[b] = (PetscBool)(moves[b] || HycoExprChanges(s->body[b].map[c], every));
+    any = (PetscBool)(any || moves[b]);
+  }
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const HycoBody *body = &s->body[m->cell_body[e]];
+
+    fe->constant[e] = (PetscBool) !(HycoExprChanges(body->young, every) || HycoExprChanges(body->poisson, every));
+    for (PetscInt a = 0; a < m->nv; a++) {
+      if (moves[m->node_body[m->cells[e * m->nv + a]]]) fe->constant[e] = PETSC_FALSE;
+    }
+    fe->n_constant += fe->constant[e];
+  }
+  fe->fixed_constant = PETSC_TRUE;
+  for (PetscInt k = 0; k < s->n_fixed; k++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      HycoExpr value = s->fixed[k].value[c];
+
+      if (HycoExprChanges(value, every) || (any && value && HycoExprInSpace(value))) fe->fixed_constant = PETSC_FALSE;
+    }
+  }
+  PetscCall(PetscFree(moves));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
+{
+  const HycoElement *el = HycoElementGet(mesh->type);
+  HycoFE f;
+
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < scene->n_bodies; b++)
+    HycoCheck(!scene->body[b].bbar || mesh->type == HYCO_QUAD4 || mesh->type == HYCO_HEX8,
+              "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (line2, tri3 or tet4) the "
+              "dilatation is constant already and nothing would change",
+              scene->body[b].name);
+  PetscCall(PetscNew(&f));
+  f->scene = scene;
+  f->mesh = mesh;
+  f->dim = mesh->dim;
+  f->n_dof = mesh->n_nodes * mesh->dim;
+  f->n_sigma = mesh->dim == 1 ? 1 : mesh->dim == 2 ? 4 : 6;
+  PetscCall(PetscMalloc1(3 * mesh->n_nodes, &f->X));
+  PetscCall(PetscCalloc1(f->n_dof, &f->fixed));
+  PetscCall(PetscCalloc1(f->n_dof, &f->u0));
+  PetscCall(PetscMalloc1(mesh->n_cells * el->nq * 2, &f->lame));
+  PetscCall(PetscCalloc1(mesh->n_cells, &f->constant));
+  f->n_loads = scene->n_loads;
+  PetscCall(PetscCalloc1(f->n_loads, &f->shares));
+  PetscCall(FindConstant(f));
+  PetscCall(HycoMirrorCreate(f));
+  *fe = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFESetDrawn(HycoFE fe)
+{
+  static PetscInt places = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(fe->X, fe->mesh->xyz, 3 * fe->mesh->n_nodes));
+  fe->place = ++places;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X = map(x, mu), body by body. */
+static PetscErrorCode MoveNodes(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFESetDrawn(fe));
+  for (PetscInt b = 0; b < fe->scene->n_bodies; b++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      HycoExpr map = fe->scene->body[b].map[c];
+
+      if (!map) continue;
+      HycoCheck(c<m->dim, "%s: the mesh has %d space dimension%s; there is no component %c", HycoExprKey(map),
+                    (int)m->dim, m->dim> 1
+                    ? "s"
+                    : "",
+                "xyz"[c]);
+      for (PetscInt i = 0; i < m->n_nodes; i++) {
+        if (m->node_body[i] == b) PetscCall(HycoExprEval(map, fe->mu, 1, m->xyz + 3 * i, fe->X + 3 * i + c));
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fixed components and their values, evaluated at the moved nodes. */
+static PetscErrorCode SetSupports(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(fe->fixed, fe->n_dof));
+  PetscCall(PetscArrayzero(fe->u0, fe->n_dof));
+  fe->lifted = PETSC_FALSE;
+  for (PetscInt k = 0; k < fe->scene->n_fixed; k++) {
+    HycoFixed *fixed = &fe->scene->fixed[k];
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "fixed", fixed->group, &g));
+    for (PetscInt c = 0; c < m->dim; c++) {
+      for (PetscInt j = m->group_start[g]; fixed->value[c] && j < m->group_start[g + 1]; j++) {
+        const PetscInt i = m->group_node[j], dof = i * m->dim + c;
+        PetscReal value;
+
+        PetscCall(HycoExprEval(fixed->value[c], fe->mu, 1, fe->X + 3 * i, &value));
+        HycoCheck(!fe->fixed[dof] ||
+                      PetscAbsReal(value - fe->u0[dof]) <= 1e-12 * (PetscAbsReal(value) + PetscAbsReal(fe->u0[dof])),
+                  "node %d is fixed twice in %c, to %g and to %g (by %s)", (int)m->node_id[i], "xyz"[c],
+                  (double)fe -> u0[dof], (double)value, HycoExprKey(fixed->value[c]));
+        fe->fixed[dof] = PETSC_TRUE;
+        fe->u0[dof] = value;
+        fe->lifted = (PetscBool)(fe->lifted || value != 0);
+      }
+    }
+  }
+  for (PetscInt k = 0; k < fe->n_pins; k++) fe->fixed[fe->pin[k]] = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const PetscInt component[])
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < fe->n_pins; k++) fe->fixed[fe->pin[k]] = PETSC_FALSE;
+  if (n != fe->n_pins) {
+    PetscCall(PetscFree(fe->pin));
+    PetscCall(PetscMalloc1(n, &fe->pin));
+  }
+  fe->n_pins = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt i = 0; i < m->n_nodes; i++) {
+      if (m->node_id[i] == tag[k]) fe->pin[fe->n_pins++] = i * m->dim + component[k];
+    }
+  }
+  for (PetscInt k = 0; k < fe->n_pins; k++) fe->fixed[fe->pin[k]] = PETSC_TRUE;
+  PetscCall(HycoAssemblyMapDestroy(&fe->places)); /* what it has summed knows the fixed unknowns */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckElastic(HycoFE fe, const HycoBody *body, const PetscReal x[3], PetscReal young,
+                                   PetscReal poisson)
+{
+  char place[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (!(young > 0)) {
+    PetscCall(HycoExprPlace(body->young, fe->mu, x, place));
+    HycoFail("%s is %g at %s; Young's modulus must be positive", HycoExprKey(body->young), (double)young, place);
+  }
+  if (!(poisson > -1 && poisson < 0.5)) {
+    PetscCall(HycoExprPlace(body->poisson, fe->mu, x, place));
+    HycoFail("%s is %g at %s; Poisson's ratio must lie between -1 and 0.5", HycoExprKey(body->poisson), (double)poisson,
+             place);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lame's constants at the quadrature points from Young's modulus and Poisson's ratio; `first`: of constant cells too.
+ */
+static PetscErrorCode SetMaterial(HycoFE fe, PetscBool first)
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGet(m->type);
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const HycoBody *body = &fe->scene->body[m->cell_body[e]];
+
+    if (fe->constant[e] && !first) continue;
+
+    for (PetscInt q = 0; q < el->nq; q++) {
+      PetscReal x[3] = {0, 0, 0}, young, poisson = 0;
+      PetscReal *lame = fe->lame + 2 * (e * el->nq + q);
+
+      for (PetscInt a = 0; a < m->nv; a++) {
+        for (PetscInt c = 0; c < 3; c++) x[c] += el->N[q][a] * fe->X[3 * m->cells[e * m->nv + a] + c];
+      }
+      PetscCall(HycoExprEval(body->young, fe->mu, 1, x, &young));
+      if (body->poisson) PetscCall(HycoExprEval(body->poisson, fe->mu, 1, x, &poisson));
+      PetscCall(CheckElastic(fe, body, x, young, poisson));
+      lame[0] = m->dim == 1 ? 0 : young * poisson / ((1 + poisson) * (1 - 2 * poisson));
+      lame[1] = m->dim == 1 ? young : young / (2 * (1 + poisson));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the changed parameters reach: the map, the stiffness, the contact rows. */
+static void FindChanges(HycoFE fe, const PetscBool changed[], PetscBool *moved)
+{
+  HycoScene s = fe->scene;
+
+  *moved = PETSC_FALSE;
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    for (PetscInt c = 0; c < 3; c++) *moved = (PetscBool)(*moved || HycoExprChanges(s->body[b].map[c], changed));
+  }
+  fe->stiffness_changed = fe->contact_changed = *moved;
+  fe->gap_changed = (PetscBool)(*moved || !fe->fixed_constant);
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    if (HycoExprChanges(s->body[b].young, changed) || HycoExprChanges(s->body[b].poisson, changed))
+      fe->stiffness_changed = PETSC_TRUE;
+  }
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    if (HycoExprChanges(s->contact[k].gap, changed)) fe->gap_changed = PETSC_TRUE;
+    for (PetscInt c = 0; c < 3; c++) {
+      if (HycoExprChanges(s->contact[k].normal[c], changed)) fe->contact_changed = PETSC_TRUE;
+    }
+  }
+}
+
+void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
+{
+  struct _n_HycoFE fe = {.scene = scene}; /* only what FindChanges() says of it */
+
+  for (PetscInt p = 0; p < scene->n_parameters; p++) {
+    PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moved;
+
+    changed[p] = PETSC_TRUE;
+    FindChanges(&fe, changed, &moved);
+    reaches[p] = (PetscBool)(fe.stiffness_changed || fe.contact_changed);
+  }
+}
+
+void HycoFEReaches(HycoFE fe, PetscBool reaches[])
+{
+  HycoSceneReaches(fe->scene, reaches);
+}
+
+PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
+{
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moved, first = (PetscBool)!fe->ready;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {
+    changed[p] = (PetscBool)(!fe->ready || mu[p] != fe->mu[p]);
+    fe->mu[p] = mu[p];
+  }
+  FindChanges(fe, changed, &moved);
+  if (first) fe->gap_changed = fe->stiffness_changed = fe->contact_changed = moved = PETSC_TRUE;
+  fe->ready = PETSC_FALSE; /* until all of it is done */
+  if (moved) PetscCall(MoveNodes(fe));
+  if (moved) PetscCall(HycoMirrorFind(fe));
+  for (PetscInt k = 0; k < fe->n_loads && moved; k++) fe->shares[k].ready = PETSC_FALSE;
+  if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
+  if (fe->stiffness_changed) PetscCall(SetMaterial(fe, first));
+  fe->ready = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,191 @@
+/* F: body forces, pressures, tractions, and the lifting of prescribed displacements. */
+#include <hycokinematics.h>
+
+static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal value, Vec F)
+{
+  const PetscInt global = fe->mesh->node_global ? fe->mesh->node_global[node] : node;
+
+  PetscFunctionBegin;
+  if (!fe->fixed[node * fe->dim + c]) PetscCall(VecSetValue(F, global * fe->dim + c, value, ADD_VALUES));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddBodyForces(HycoFE fe, PetscInt cell, Vec F)
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGet(m->type);
+  const HycoBody *body = &fe->scene->body[m->cell_body[cell]];
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal x[3] = {0, 0, 0}, g[8][3], w, f;
+
+    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    for (PetscInt a = 0; a < m->nv; a++) {
+      for (PetscInt c = 0; c < 3; c++) x[c] += el->N[q][a] * fe->X[3 * m->cells[cell * m->nv + a] + c];
+    }
+    for (PetscInt c = 0; c < m->dim; c++) {
+      if (!body->force[c]) continue;
+      PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
+      for (PetscInt a = 0; a < m->nv; a++)
+        PetscCall(AddNode(fe, m->cells[cell * m->nv + a], c, w * f * el->N[q][a], F));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddFacetLoad(HycoFE fe, const HycoLoad *load, PetscInt facet, Vec F)
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGetFacet(m->type);
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal n[3], x[3] = {0, 0, 0}, p = 0, area;
+
+    PetscCall(HycoFacetNormal(fe, el, facet, q, n));
+    area = PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (PetscInt a = 0; a < m->nf; a++) {
+      for (PetscInt c = 0; c < 3; c++) x[c] += el->N[q][a] * fe->X[3 * m->facets[facet * m->nf + a] + c];
+    }
+    if (load->pressure) PetscCall(HycoExprEval(load->pressure, fe->mu, 1, x, &p));
+    for (PetscInt c = 0; c < m->dim; c++) {
+      PetscReal t = 0;
+
+      if (load->traction[c]) PetscCall(HycoExprEval(load->traction[c], fe->mu, 1, x, &t));
+      for (PetscInt a = 0; a < m->nf; a++)
+        PetscCall(AddNode(fe, m->facets[facet * m->nf + a], c, (t * area - p * n[c]) * el->N[q][a], F));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sums of n dS and dS around each node that the load acts on. */
+static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGetFacet(m->type);
+  PetscReal *sum;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(4 * m->n_nodes, &sum));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (m->facet_group[f] != group || m->facet_cell[f] < 0) continue;
+    for (PetscInt q = 0; q < el->nq; q++) {
+      PetscReal v[4];
+
+      PetscCall(HycoFacetNormal(fe, el, f, q, v));
+      v[3] = PetscSqrtReal(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+      for (PetscInt a = 0; a < m->nf; a++) {
+        for (PetscInt c = 0; c < 4; c++) sum[4 * m->facets[f * m->nf + a] + c] += el->N[q][a] * v[c];
+      }
+    }
+  }
+  for (PetscInt i = 0; i < m->n_nodes; i++) n += sum[4 * i + 3] > 0;
+  if (n != s->n) {
+    PetscCall(PetscFree(s->node));
+    PetscCall(PetscFree(s->share));
+    PetscCall(PetscMalloc1(n, &s->node));
+    PetscCall(PetscMalloc1(4 * n, &s->share));
+    s->n = n;
+  }
+  for (PetscInt i = 0, k = 0; i < m->n_nodes; i++) {
+    if (!(sum[4 * i + 3] > 0)) continue;
+    s->node[k] = i;
+    PetscCall(PetscArraycpy(s->share + 4 * k++, sum + 4 * i, 4));
+  }
+  PetscCall(PetscFree(sum));
+  s->ready = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A load that is the same everywhere: its values times the nodes' shares of the surface. */
+static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt group, HycoLoadShares *s, Vec F)
+{
+  PetscReal p = 0, t[3] = {0, 0, 0};
+
+  PetscFunctionBegin;
+  if (!s->ready) PetscCall(SetShares(fe, group, s));
+  if (!s->n) PetscFunctionReturn(PETSC_SUCCESS);
+  if (load->pressure) PetscCall(HycoExprEval(load->pressure, fe->mu, 1, fe->X + 3 * s->node[0], &p));
+  for (PetscInt c = 0; c < 3 && c < fe->dim; c++) {
+    if (load->traction[c]) PetscCall(HycoExprEval(load->traction[c], fe->mu, 1, fe->X + 3 * s->node[0], &t[c]));
+  }
+  for (PetscInt k = 0; k < s->n; k++) {
+    for (PetscInt c = 0; c < fe->dim; c++)
+      PetscCall(AddNode(fe, s->node[k], c, t[c] * s->share[4 * k + 3] - p * s->share[4 * k + c], F));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Moves K u0 of one cell to the right-hand side. */
+static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Vec F)
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt *node = m->cells + cell * m->nv, n = m->nv * m->dim;
+  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS], u0[HYCO_MAX_CELL_DOFS];
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    u0[k] = fe->u0[node[k / m->dim] * m->dim + k % m->dim];
+    any = (PetscBool)(any || u0[k] != 0);
+  }
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFEElementStiffness(fe, cell, Ke));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = node[k / m->dim], c = k % m->dim, global = m->node_global ? m->node_global[i] : i;
+
+    if (fe->fixed[i * m->dim + c]) {
+      PetscCall(VecSetValue(F, global * m->dim + c, Ke[k * n + k] * u0[k], ADD_VALUES));
+    } else {
+      PetscReal sum = 0;
+
+      for (PetscInt j = 0; j < n; j++) sum += Ke[k * n + j] * u0[j];
+      PetscCall(AddNode(fe, i, c, -sum, F));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddForces(HycoFE fe, Vec F)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const HycoBody *body = &fe->scene->body[m->cell_body[e]];
+
+    if (body->force[0] || body->force[1] || body->force[2]) PetscCall(AddBodyForces(fe, e, F));
+    if (fe->lifted) PetscCall(AddLifting(fe, e, F));
+  }
+  for (PetscInt k = 0; k < fe->scene->n_loads; k++) {
+    const HycoLoad *load = &fe->scene->load[k];
+    PetscBool in_space = HycoExprInSpace(load->pressure);
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "load", load->group, &g));
+    for (PetscInt c = 0; c < m->dim; c++) in_space = (PetscBool)(in_space || HycoExprInSpace(load->traction[c]));
+    if (!in_space) PetscCall(AddUniformLoad(fe, load, g, &fe->shares[k], F));
+    for (PetscInt f = 0; f < m->n_facets && in_space; f++) {
+      if (m->facet_group[f] == g && m->facet_cell[f] >= 0) PetscCall(AddFacetLoad(fe, load, f, F));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The end of an assembly is collective: a rank that found an error takes part in it, or the others would wait. */
+PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(VecSet(F, 0));
+  PetscCall(VecSetOption(F, VEC_IGNORE_OFF_PROC_ENTRIES, PETSC_TRUE));
+  ierr = AddForces(fe, F);
+  PetscCall(VecAssemblyBegin(F));
+  PetscCall(VecAssemblyEnd(F));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

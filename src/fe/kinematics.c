@@ -1,0 +1,108 @@
+/* Jacobians of cells and facets. */
+#include <hycokinematics.h>
+
+PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q)
+{
+  PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+  for (PetscInt c = 0; c < el->dim; c++) {
+    for (PetscInt d = 0; d < el->dim; d++) {
+      J[c][d] = 0;
+      for (PetscInt a = 0; a < el->nv; a++) J[c][d] += X[3 * node[a] + c] * el->dN[q][a][d];
+    }
+  }
+  return J[0][0] * (J[1][1] * J[2][2] - J[1][2] * J[2][1]) - J[0][1] * (J[1][0] * J[2][2] - J[1][2] * J[2][0]) +
+         J[0][2] * (J[1][0] * J[2][1] - J[1][1] * J[2][0]);
+}
+
+PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal g[8][3],
+                             PetscReal *weight)
+{
+  const PetscInt *node = fe->mesh->cells + cell * fe->mesh->nv, dim = el->dim;
+  PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, inv[3][3], det, size = 1;
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < dim; c++) {
+    PetscReal row = 0;
+
+    for (PetscInt d = 0; d < dim; d++) {
+      J[c][d] = 0;
+      for (PetscInt a = 0; a < el->nv; a++) J[c][d] += fe->X[3 * node[a] + c] * el->dN[q][a][d];
+      row += J[c][d] * J[c][d];
+    }
+    size *= PetscSqrtReal(row);
+  }
+  for (PetscInt c = 0; c < 3; c++) {
+    for (PetscInt d = 0; d < 3; d++) {
+      const PetscInt c1 = (c + 1) % 3, c2 = (c + 2) % 3, d1 = (d + 1) % 3, d2 = (d + 2) % 3;
+
+      inv[d][c] = J[c1][d1] * J[c2][d2] - J[c1][d2] * J[c2][d1];
+    }
+  }
+  det = J[0][0] * inv[0][0] + J[0][1] * inv[1][0] + J[0][2] * inv[2][0];
+  HycoCheck(PetscAbsReal(det) > 1e-14 * size, "cell %d is degenerate: its volume vanishes at a quadrature point",
+            (int)fe->mesh->cell_id[cell]);
+  /* either sign will do, as files number cells both ways round; but the same in all of the cell */
+  HycoCheck(!q || el->nv == dim + 1 || (det > 0) == (HycoDeterminant(el, node, fe->X, 0) > 0),
+            "cell %d is inverted: its volume has both signs; is its boundary folded, are its nodes in gmsh's order?",
+            (int)fe->mesh->cell_id[cell]);
+  for (PetscInt a = 0; a < el->nv; a++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      g[a][c] = 0;
+      for (PetscInt d = 0; c < dim && d < dim; d++) g[a][c] += el->dN[q][a][d] * inv[d][c] / det;
+    }
+  }
+  *weight = PetscAbsReal(det) * el->w[q];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal mean[8][3])
+{
+  PetscReal g[8][3], w, volume = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(mean, 8 * sizeof(mean[0])));
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    volume += w;
+    for (PetscInt a = 0; a < el->nv; a++) {
+      for (PetscInt c = 0; c < 3; c++) mean[a][c] += w * g[a][c];
+    }
+  }
+  for (PetscInt a = 0; a < el->nv; a++) {
+    for (PetscInt c = 0; c < 3; c++) mean[a][c] /= volume;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3])
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt *node = m->facets + facet * m->nf;
+  const PetscReal side = fe->mirrored[m->node_body[node[0]]] ? -1 : 1; /* facets are turned outwards as drawn */
+  PetscReal t[2][3] = {{0, 0, 0}, {0, 0, 1}};
+
+  PetscFunctionBegin;
+  if (m->dim == 1) {
+    const PetscInt cell = m->facet_cell[facet];
+    PetscReal middle;
+
+    PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a point facet without its cell");
+    middle = (fe->X[3 * m->cells[2 * cell]] + fe->X[3 * m->cells[2 * cell + 1]]) / 2;
+    n[0] = fe->X[3 * node[0]] > middle ? 1 : -1;
+    n[1] = n[2] = 0;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt d = 0; d < el->dim; d++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      t[d][c] = 0;
+      for (PetscInt a = 0; a < el->nv; a++) t[d][c] += fe->X[3 * node[a] + c] * el->dN[q][a][d];
+    }
+  }
+  for (PetscInt c = 0; c < 3; c++) {
+    const PetscInt d = (c + 1) % 3, e = (c + 2) % 3;
+
+    n[c] = side * el->w[q] * (t[0][d] * t[1][e] - t[0][e] * t[1][d]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,124 @@
+/*
+  Mirrored bodies: a map whose Jacobian is negative turns a body's cells and facets inside out. Facets are oriented as
+  drawn, so the normals of such a body change sign; volumes are taken as |det J| and need nothing.
+*/
+#include <hycokinematics.h>
+
+/* The sign of a cell's volume with its nodes at X: the sum over its quadrature points. */
+static PetscInt Sign(HycoMesh m, const HycoElement *el, PetscInt cell, const PetscReal X[])
+{
+  PetscReal volume = 0;
+
+  for (PetscInt q = 0; q < (el->nv == el->dim + 1 ? 1 : el->nq); q++)
+    volume += HycoDeterminant(el, m->cells + cell * m->nv, X, q);
+  return (volume > 0) - (volume < 0);
+}
+
+PetscErrorCode HycoMirrorCreate(HycoFE fe)
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(fe->scene->n_bodies, &fe->mirrored));
+  PetscCall(PetscMalloc1(fe->mesh->n_cells, &fe->drawn_sign));
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++)
+    fe->drawn_sign[e] = (signed char)Sign(fe->mesh, el, e, fe->mesh->xyz);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* For a body without cells in this mesh (a model's contact surface outside its RID): det dX/dx by central differences,
+   summed over some of its nodes. */
+static PetscErrorCode MapTurns(HycoFE fe, PetscInt body, PetscBool *turns)
+{
+  HycoMesh m = fe->mesh;
+  const PetscReal step = 1e-5 * HycoMeshLength(m);
+  PetscReal sum = 0;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->n_nodes && n < 16; i++) {
+    PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+    if (m->node_body[i] != body) continue;
+    n++;
+    for (PetscInt c = 0; c < m->dim; c++) {
+      for (PetscInt d = 0; d < m->dim && fe->scene->body[body].map[c]; d++) {
+        PetscReal x[3], side[2];
+
+        for (PetscInt s = 0; s < 2; s++) {
+          PetscCall(PetscArraycpy(x, m->xyz + 3 * i, 3));
+          x[d] += s ? step : -step;
+          PetscCall(HycoExprEval(fe->scene->body[body].map[c], fe->mu, 1, x, &side[s]));
+        }
+        J[c][d] = (side[1] - side[0]) / (2 * step);
+      }
+    }
+    sum += J[0][0] * (J[1][1] * J[2][2] - J[1][2] * J[2][1]) - J[0][1] * (J[1][0] * J[2][2] - J[1][2] * J[2][0]) +
+           J[0][2] * (J[1][0] * J[2][1] - J[1][1] * J[2][0]);
+  }
+  *turns = (PetscBool)(sum < 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the cells of bodies with a map say: turn[b] = +-1, or 0 without a cell; fails when they disagree. */
+static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[])
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGet(m->type);
+  PetscInt *first;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(fe->scene->n_bodies, &first));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const PetscInt b = m->cell_body[e];
+    HycoExpr *map = fe->scene->body[b].map;
+    const PetscInt sign = map[0] || map[1] || map[2] ? fe->drawn_sign[e] * Sign(m, el, e, fe->X) : 1;
+
+    HycoCheck(sign, "cell %d is degenerate: its volume vanishes", (int)m->cell_id[e]);
+    if (!turn[b]) first[b] = e;
+    if (!turn[b]) turn[b] = sign;
+    HycoCheck(sign == turn[b],
+              "body %s: its map turns cell %d inside out and not cell %d; a map may mirror a whole body, not fold it",
+              fe->scene->body[b].name, (int)m->cell_id[sign < 0 ? e : first[b]],
+              (int)m->cell_id[sign < 0 ? first[b] : e]);
+  }
+  PetscCall(PetscFree(first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bodies that share nodes are one piece: a facet's nodes may be another's. */
+static PetscErrorCode CheckPieces(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
+    const PetscInt a = m->cell_body[k / m->nv], b = m->node_body[m->cells[k]];
+
+    HycoCheck(
+        fe->mirrored[a] == fe->mirrored[b],
+        "the bodies %s and %s share node %d, and the map of one of them is a mirror image; mirror both or neither",
+        fe->scene->body[a].name, fe->scene->body[b].name, (int)m->node_id[m->cells[k]]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMirrorFind(HycoFE fe)
+{
+  PetscInt *turn;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(fe->scene->n_bodies, &turn));
+  ierr = CellsTurn(fe, turn);
+  for (PetscInt b = 0; b < fe->scene->n_bodies && !ierr; b++) {
+    HycoExpr *map = fe->scene->body[b].map;
+
+    fe->mirrored[b] = (PetscBool)(turn[b] < 0);
+    if (!turn[b] && (map[0] || map[1] || map[2])) ierr = MapTurns(fe, b, &fe->mirrored[b]);
+  }
+  PetscCall(PetscFree(turn));
+  PetscCall(ierr);
+  PetscCall(CheckPieces(fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,236 @@
+/*
+  K: the element loop of linear elasticity (plane strain in 2D), and the matrices it fills. The element bbar takes the
+  dilatation's mean over the cell (T. J. R. Hughes, Int. J. Numer. Meth. Engng 15 (1980) 1413-1418):
+
+      sigma : eps = 2 mu (eps : eps - tr(eps)^2 / 3) + (lambda + 2 mu / 3) mean(tr eps)^2
+*/
+#include <hycokinematics.h>
+#include "assembly_map.h"
+
+/* P[r][s] += p[r] s[s] over the upper blocks of dim x dim. */
+static void AddProducts(PetscInt nv, PetscInt dim, const PetscReal p[], const PetscReal s[], PetscReal P[])
+{
+  const PetscInt n = nv * dim;
+
+  for (PetscInt r = 0; r < n; r++) {
+    for (PetscInt t = r / dim * dim; t < n; t++) P[r * n + t] += p[r] * s[t];
+  }
+}
+
+/* Ke += lambda P_cd + mu (P_dc + tr P) in each upper block, P = sum of w grad_a grad_b over points of one material. */
+static void AddMaterial(PetscInt nv, PetscInt dim, const PetscReal lame[2], const PetscReal P[], PetscReal Ke[])
+{
+  const PetscInt n = nv * dim;
+
+  for (PetscInt a = 0; a < nv; a++) {
+    for (PetscInt b = a; b < nv; b++) {
+      const PetscReal *p = P + a * dim * n + b * dim;
+      PetscReal *block = Ke + a * dim * n + b * dim, trace = 0;
+
+      for (PetscInt c = 0; c < dim; c++) trace += lame[1] * p[c * n + c];
+      for (PetscInt c = 0; c < dim; c++) {
+        for (PetscInt d = 0; d < dim && dim > 1; d++)
+          block[c * n + d] += lame[0] * p[c * n + d] + lame[1] * p[d * n + c];
+        block[c * n + c] += trace;
+      }
+    }
+  }
+}
+
+/* The bulk part of bbar: bulk times the products of the mean gradients, in the upper blocks. */
+static PetscErrorCode AddMean(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal bulk, PetscReal Ke[])
+{
+  const PetscInt n = el->nv * fe->dim;
+  PetscReal mean[8][3];
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeanGradients(fe, el, cell, mean));
+  for (PetscInt r = 0; r < n; r++) {
+    for (PetscInt t = r / fe->dim * fe->dim; t < n; t++)
+      Ke[r * n + t] += bulk * mean[r / fe->dim][r % fe->dim] * mean[t / fe->dim][t % fe->dim];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscInt dim = fe->dim, n = el->nv * dim;
+  const PetscBool bbar = fe->scene->body[fe->mesh->cell_body[cell]].bbar;
+  const PetscReal *lame = fe->lame + 2 * cell * el->nq;
+  PetscReal P[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS], bulk = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(Ke, n * n));
+  PetscCall(PetscArrayzero(P, n * n));
+  for (PetscInt q = 0; q < el->nq; q++, lame += 2) {
+    const PetscReal own[2] = {bbar ? -2 * lame[1] / 3 : lame[0], lame[1]};
+    PetscReal g[8][3], w, p[HYCO_MAX_CELL_DOFS], s[HYCO_MAX_CELL_DOFS];
+
+    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    for (PetscInt r = 0; r < n; r++) {
+      s[r] = g[r / dim][r % dim];
+      p[r] = w * s[r];
+    }
+    bulk += w * (lame[0] - own[0]);
+    AddProducts(el->nv, dim, p, s, P);
+    if (q + 1 < el->nq && lame[0] == lame[2] && lame[1] == lame[3]) continue; /* the next point's material is this */
+    AddMaterial(el->nv, dim, own, P, Ke);
+    PetscCall(PetscArrayzero(P, n * n));
+  }
+  if (bbar) PetscCall(AddMean(fe, el, cell, bulk, Ke));
+  for (PetscInt r = 0; r < n; r++) {
+    for (PetscInt t = 0; t < r / dim * dim; t++) Ke[r * n + t] = Ke[t * n + r];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt Global(HycoMesh m, PetscInt node)
+{
+  return m->node_global ? m->node_global[node] : node;
+}
+
+/* Distinct neighbours of each owned node, on this rank's columns and off them. */
+static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt first, PetscInt on[], PetscInt off[])
+{
+  PetscInt *start, *around, *seen;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshNodeCells(m, &start, &around));
+  PetscCall(PetscMalloc1(m->n_nodes, &seen));
+  for (PetscInt i = 0; i < m->n_nodes; i++) seen[i] = -1;
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    const PetscInt row = Global(m, i) - first;
+
+    if (row < 0 || row >= n_owned) continue;
+    on[row] = 1; /* its own diagonal, even of a node without cells */
+    seen[i] = i;
+    for (PetscInt k = start[i]; k < start[i + 1]; k++) {
+      for (PetscInt v = 0; v < m->nv; v++) {
+        const PetscInt j = m->cells[around[k] * m->nv + v], col = Global(m, j) - first;
+
+        if (seen[j] == i) continue;
+        seen[j] = i;
+        if (col >= 0 && col < n_owned)
+          on[row]++;
+        else
+          off[row]++;
+      }
+    }
+  }
+  PetscCall(PetscFree(seen));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(around));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, PetscInt first, Mat *A)
+{
+  PetscInt *on, *off;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(n_owned, &on, n_owned, &off));
+  PetscCall(CountNeighbours(fe->mesh, n_owned, first, on, off));
+  PetscCall(MatCreate(comm, A));
+  PetscCall(MatSetSizes(*A, n_owned * fe->dim, n_owned * fe->dim, PETSC_DETERMINE, PETSC_DETERMINE));
+  PetscCall(MatSetBlockSize(*A, fe->dim));
+  PetscCall(MatSetType(*A, MATAIJ));
+  PetscCall(MatXAIJSetPreallocation(*A, fe->dim, on, off, NULL, NULL));
+  PetscCall(MatSetOption(*A, MAT_IGNORE_OFF_PROC_ENTRIES, PETSC_TRUE)); /* each rank has all cells of its rows */
+  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(*A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  PetscCall(PetscFree2(on, off));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds an element matrix, fixed unknowns reduced to their own diagonal. */
+static PetscErrorCode AddElement(HycoFE fe, PetscInt cell, const PetscReal Ae[], Mat A)
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt n = m->nv * m->dim;
+  PetscInt index[HYCO_MAX_CELL_DOFS];
+
+  PetscFunctionBegin;
+  for (PetscInt v = 0; v < m->nv; v++) {
+    const PetscInt i = m->cells[cell * m->nv + v];
+
+    for (PetscInt c = 0; c < m->dim; c++) {
+      const PetscInt row = Global(m, i) * m->dim + c, k = v * m->dim + c;
+
+      index[k] = row;
+      if (fe->fixed[i * m->dim + c]) {
+        PetscCall(MatSetValue(A, row, row, Ae[k * n + k], ADD_VALUES));
+        index[k] = -1;
+      }
+    }
+  }
+  PetscCall(MatSetValues(A, n, index, n, index, Ae, ADD_VALUES));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes without cells (contact nodes outside an RID) keep a zero on the diagonal so that the matrix is square. */
+static PetscErrorCode Finish(Mat A)
+{
+  PetscFunctionBegin;
+  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
+{
+  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+  PetscBool done;
+
+  PetscFunctionBegin;
+  PetscCall(HycoAssemblyMapAssemble(fe, K, &done));
+  if (done) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatZeroEntries(K));
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    PetscCall(HycoFEElementStiffness(fe, e, Ke));
+    PetscCall(AddElement(fe, e, Ke, K));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The end of an assembly is collective: a rank that found an error takes part in it, or the others would wait. */
+PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = AddStiffness(fe, K);
+  PetscCall(Finish(K));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscInt dim = fe->dim, n = el->nv * dim;
+  PetscReal Me[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+
+  PetscFunctionBegin;
+  PetscCall(MatSetOption(M, MAT_IGNORE_ZERO_ENTRIES, PETSC_TRUE)); /* components do not couple */
+  PetscCall(MatZeroEntries(M));
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    PetscCall(PetscArrayzero(Me, n * n));
+    for (PetscInt q = 0; q < el->nq; q++) {
+      PetscReal g[8][3], w;
+
+      PetscCall(HycoGradients(fe, el, e, q, g, &w));
+      for (PetscInt a = 0; a < el->nv; a++) {
+        for (PetscInt b = 0; b < el->nv; b++) {
+          const PetscReal slopes = g[a][0] * g[b][0] + g[a][1] * g[b][1] + g[a][2] * g[b][2];
+          const PetscReal value = w * (el->N[q][a] * el->N[q][b] + length * length * slopes);
+
+          for (PetscInt c = 0; c < dim; c++) Me[(a * dim + c) * n + b * dim + c] += value;
+        }
+      }
+    }
+    PetscCall(AddElement(fe, e, Me, M));
+  }
+  PetscCall(Finish(M));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

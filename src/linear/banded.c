@@ -1,0 +1,96 @@
+/* Matrices of thin bodies (ropes, strips): little fill in an order by breadth first, so that a plain factor is best. */
+#include <hycolinear.h>
+
+/* More entries in a row than a strip of quadrilaterals has: not worth ordering. */
+#define HYCO_THIN_ROW 20
+/* Mean length of the rows of an envelope up to which PETSc's own factor beats a multifrontal one. */
+#define HYCO_THIN_ENVELOPE 32
+
+/* Entries between the first nonzero of each row and its diagonal, in the order of `order`. */
+static PetscErrorCode Envelope(Mat K, IS order, PetscReal *sum)
+{
+  PetscInt n;
+  const PetscInt *ia, *ja, *old, *new_of;
+  PetscBool done;
+  IS inverse;
+
+  PetscFunctionBegin;
+  *sum = 0;
+  PetscCall(ISInvertPermutation(order, PETSC_DECIDE, &inverse));
+  PetscCall(ISGetIndices(order, &old));
+  PetscCall(ISGetIndices(inverse, &new_of));
+  PetscCall(MatGetRowIJ(K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_SUP, "the matrix shows no rows");
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt first = i;
+
+    for (PetscInt k = ia[old[i]]; k < ia[old[i] + 1]; k++) first = PetscMin(first, new_of[ja[k]]);
+    *sum += i - first;
+  }
+  PetscCall(MatRestoreRowIJ(K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(ISRestoreIndices(order, &old));
+  PetscCall(ISRestoreIndices(inverse, &new_of));
+  PetscCall(ISDestroy(&inverse));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On several ranks, without looking at an order: at most two neighbours in the mean, a mesh of lines. */
+static PetscErrorCode IsLine(Mat K, PetscBool *line)
+{
+  PetscInt n;
+  MatInfo info;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(K, &n, NULL));
+  PetscCall(MatGetInfo(K, MAT_GLOBAL_SUM, &info));
+  *line = (PetscBool)(info.nz_used <= 3 * (PetscReal)n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBandedSolver(PC pc)
+{
+  MPI_Comm comm = PetscObjectComm((PetscObject)pc);
+  PetscMPIInt size;
+  KSP each;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  if (size > 1) { /* every rank factors all of it: less work than agreeing on a part */
+    PetscCall(PCSetType(pc, PCREDUNDANT));
+    PetscCall(PCRedundantSetNumber(pc, size));
+    PetscCall(PCRedundantGetKSP(pc, &each));
+    PetscCall(KSPSetType(each, KSPPREONLY));
+    PetscCall(KSPGetPC(each, &pc));
+    PetscCall(PCSetType(pc, PCCHOLESKY));
+  }
+  PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERPETSC));
+  PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGRCM));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBanded(Mat K, PetscBool *thin)
+{
+  PetscInt n;
+  MatInfo info;
+  PetscBool aij;
+  PetscReal sum;
+  IS row, col;
+
+  PetscFunctionBegin;
+  *thin = PETSC_FALSE;
+  PetscCall(PetscObjectTypeCompare((PetscObject)K, MATSEQAIJ, &aij));
+  if (!aij) {
+    PetscCall(PetscObjectTypeCompare((PetscObject)K, MATMPIAIJ, &aij));
+    if (aij) PetscCall(IsLine(K, thin));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(MatGetSize(K, &n, NULL));
+  PetscCall(MatGetInfo(K, MAT_LOCAL, &info));
+  if (info.nz_used > HYCO_THIN_ROW * (PetscReal)n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetOrdering(K, MATORDERINGRCM, &row, &col));
+  PetscCall(Envelope(K, row, &sum));
+  PetscCall(ISDestroy(&row));
+  PetscCall(ISDestroy(&col));
+  *thin = (PetscBool)(sum <= HYCO_THIN_ENVELOPE * (PetscReal)n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,165 @@
+/*
+  What a model is worth: its predictions at held-out points beside their full-order solutions, and from these the
+  estimates of its errors online (trust.c). A law is fitted to the errors and lifted above SHARE of them. Held-out
+  points are drawn as a user's points may be, all over what training reaches, so that the quantile number ceil(SHARE (n
+  + 1)) of the ratios is a bound for SHARE of the points to come (split conformal prediction: Vovk, Gammerman, Shafer,
+  Algorithmic Learning in a Random World, 2005), whatever the law is worth; a good law only makes the bound tight. The
+  recipe was chosen by the same points, which MARGIN allows for.
+*/
+#include <hycoalgorithms.h>
+#include <hycofile.h>
+#include <hycoreducerimpl.h>
+#include <stdio.h>
+
+#define SHARE      0.95
+#define MARGIN     1.25
+#define LEAST      10   /* predictions: with fewer there is no estimate */
+#define SMALL      1e-2 /* of a feature's median: its floor */
+#define NEGLIGIBLE 1e-3 /* of the errors' median: smaller ones count as that */
+
+/* The errors that are estimated, in the order of HycoTrustKind. */
+static const HycoErrorKind errors[HYCO_N_TRUST] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
+
+/* Median of what is positive among value[0], value[stride], ..., or `otherwise`. */
+static PetscErrorCode Median(PetscInt n, const PetscReal value[], PetscInt stride, PetscReal otherwise,
+                             PetscReal *median)
+{
+  PetscReal *positive;
+  PetscInt m = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &positive));
+  for (PetscInt i = 0; i < n; i++) {
+    if (value[i * stride] > 0) positive[m++] = value[i * stride];
+  }
+  PetscCall(PetscSortReal(m, positive));
+  *median = m ? positive[m / 2] : otherwise;
+  PetscCall(PetscFree(positive));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The median distance of a training point from the nearest other: the floor of the feature "distance". */
+static PetscErrorCode Spacing(HycoReducer t, PetscReal *spacing)
+{
+  PetscInt n, n_par;
+  const PetscReal *mu;
+  PetscReal *nearest;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, &n, &n_par, &mu));
+  PetscCall(PetscCalloc1(n, &nearest));
+  for (PetscInt k = 0; n_par && k < n; k++) {
+    for (PetscInt j = 0; j < n; j++) {
+      const PetscReal d = HycoTrustDistance(t->scene, mu + k * n_par, mu + j * n_par);
+
+      if (d > 0 && (nearest[k] == 0 || d < nearest[k])) nearest[k] = d;
+    }
+  }
+  PetscCall(Median(n, nearest, 1, 1, spacing));
+  PetscCall(PetscFree(nearest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The law of one kind of error; none where an error is not finite. Where there is no error, as of forces without
+   contact, the features tell nothing of its size: these rows come last, and only lift the law. */
+static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoTrustKind kind, HycoTrust *trust)
+{
+  const PetscInt p = HYCO_TRUST_FEATURES;
+  PetscReal *X, *y, *error, least;
+  PetscInt filled = 0, telling = 0;
+  PetscBool finite = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(n * p, &X, n, &y, n, &error));
+  for (PetscInt i = 0; i < n; i++) {
+    error[i] = HycoHeldOutError(&rows[i], errors[kind], trust->force);
+    finite = (PetscBool)(finite && !PetscIsInfOrNanReal(error[i]));
+  }
+  PetscCall(Median(n, error, 1, PETSC_SMALL, &least));
+  for (PetscInt pass = 0; finite && pass < 2; pass++) {
+    for (PetscInt i = 0; i < n; i++) {
+      if ((error[i] > NEGLIGIBLE * least) != (pass == 0)) continue;
+      for (PetscInt j = 0; j < p; j++) X[filled * p + j] = PetscLogReal(1 + rows[i].feature[j] / trust->floor[j]);
+      y[filled++] = PetscLogReal(PetscMax(error[i], NEGLIGIBLE * least));
+      if (pass == 0) telling = filled;
+    }
+  }
+  trust->has[kind] = (PetscBool)(finite && (kind != HYCO_TRUST_LAMBDA || trust->force > 0));
+  if (trust->has[kind]) PetscCall(HycoUpperBound(n, telling ? telling : n, p, X, y, SHARE, trust->law[kind]));
+  trust->law[kind][p] += PetscLogReal(MARGIN);
+  PetscCall(PetscFree3(X, y, error));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Predictions that did not converge have no features; online they say so themselves. */
+static PetscErrorCode FitAll(HycoReducer t, PetscInt n, HycoHeldOut rows[], HycoTrust *trust)
+{
+  PetscInt converged = 0;
+
+  PetscFunctionBegin;
+  trust->force = HycoHeldOutForce(n, rows);
+  for (PetscInt i = 0; i < n; i++) {
+    if (rows[i].converged > 0.5) rows[converged++] = rows[i];
+  }
+  if (converged < LEAST) PetscFunctionReturn(PETSC_SUCCESS);
+  trust->n = converged;
+  for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) {
+    PetscCall(Median(converged, rows[0].feature + j, (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), 1 / SMALL,
+                     &trust->floor[j]));
+    trust->floor[j] *= SMALL;
+  }
+  PetscCall(Spacing(t, &trust->floor[HYCO_TRUST_DISTANCE]));
+  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) PetscCall(FitError(converged, rows, (HycoTrustKind)e, trust));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fits, and writes the model at `path` once more with it. Rank 0. */
+static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], const char path[], HycoTraining *report)
+{
+  const HycoValidation *v = &report->held_out;
+  const HycoAttempt *chosen = &report->chosen;
+  HycoROM m;
+  HycoTrust trust = {0};
+  char recipe[HYCO_LINE], text[2 * HYCO_LINE];
+
+  PetscFunctionBegin;
+  trust.n_held = v->n;
+  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+    trust.median[e] = v->median[errors[e]];
+    trust.largest[e] = v->largest[errors[e]];
+  }
+  PetscCall(FitAll(t, v->n, rows, &trust));
+  report->n_held = trust.n;
+  PetscCall(HycoROMLoad(path, &m));
+  m->trust = trust;
+  if (chosen->number) {
+    HycoRecipeDescribe(&chosen->recipe, sizeof(recipe), recipe);
+    snprintf(text, sizeof(text), "  recipe number %d of the %d that were tried: %s\n", (int)chosen->number,
+             (int)chosen->of, recipe);
+    PetscCall(PetscFree(m->search));
+    PetscCall(PetscStrallocpy(text, &m->search));
+  }
+  PetscCall(HycoROMRewrite(m, path));
+  PetscCall(HycoROMDestroy(&m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, const char path[], HycoTraining *report)
+{
+  HycoROM m = NULL;
+  HycoHeldOut *rows;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(n, &rows));
+  HycoOnEach(t->comm, HycoROMLoad(path, &m));
+  PetscCall(HycoROMPredictHeldOut(t->comm, m, store, t->held, rows));
+  PetscCall(HycoROMDestroy(&m));
+  PetscCall(HycoHeldOutSummarise(n, rows, &report->held_out));
+  HycoOnRoot(t->comm, Conclude(t, rows, path, report));
+  PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, t->comm));
+  PetscCall(PetscFree(rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,329 @@
+/*
+  The greedy loop of section 5.4: a model from the solutions so far, the indicator at every training point, the worst
+  point's full-order solution added. All choices follow from the stored solutions alone, so a run that was killed makes
+  them again.
+*/
+#include <hycoalgorithms.h>
+#include <hycofile.h>
+#include <hycogreedy.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+/* Of two indicators this close, neither is worse. */
+#define TIE      1e-9
+#define ACCURATE 1e-13 /* energy left out of the bases, where nobody says */
+
+typedef struct {
+  HycoSnapshots store;
+  HycoSamples samples;       /* solved so far, in the order of the choices */
+  PetscInt n_par, n_points;  /* of the training set */
+  const PetscReal *points;   /* borrowed */
+  PetscReal *value;          /* n_points x 4: eta, eta_u, eta_lambda, size */
+  char file[HYCO_FILE_NAME]; /* the present iteration's model */
+  PetscReal begin;
+} Loop;
+
+/* The corners of the parameters' ranges, the last running fastest. */
+static PetscErrorCode AddCorners(HycoReducer t, HycoSamples samples)
+{
+  const PetscInt n_par = t->scene->n_parameters;
+  PetscInt counts[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  HycoCheck(n_par <= 8, "the parameters' ranges have 2^%d corners; give the greedy training points to start from",
+            (int)n_par);
+  for (PetscInt p = 0; p < n_par; p++) counts[p] = 2;
+  PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The loop's own set of samples, which will grow: each point once. */
+static PetscErrorCode Start(HycoReducer t, HycoSamples start, HycoSamples *samples)
+{
+  PetscInt n, n_par;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(t->scene, samples));
+  if (!start) {
+    PetscCall(AddCorners(t, *samples));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoSamplesGet(start, &n, &n_par, &mu));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscBool twin = PETSC_FALSE;
+
+    for (PetscInt j = 0; j < k && !twin; j++) PetscCall(PetscArraycmp(mu + j * n_par, mu + k * n_par, n_par, &twin));
+    if (!twin) PetscCall(HycoSamplesAddPoint(*samples, mu + k * n_par));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Before anything is solved: enough to start from, not more than asked for, and nothing that (42) cannot interpolate.
+ */
+static PetscErrorCode CheckStart(HycoReducer t, PetscBool corners, HycoSamples samples)
+{
+  PetscInt n, n_par;
+  const PetscReal *mu;
+  HycoInterpolant interpolant = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  HycoCheck(
+      !t->greedy.max_snapshots || t->greedy.max_snapshots >= n,
+      "-max_snapshots is %d; at least %d are needed: a greedy training first solves at the %d %s, and adds to these",
+      (int)t->greedy.max_snapshots, (int)n, (int)n, corners ? "corners of the parameters' ranges" : "points given");
+  if (t->greedy.indicator != HYCO_INDICATOR_LOCAL) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(
+      n > n_par || n == t->greedy.max_snapshots,
+      "the greedy training starts from %d point%s; its indicator interpolates over %d parameters and needs at least "
+      "%d: give more, or none (the corners)",
+      (int)n, n == 1 ? "" : "s", (int)n_par, (int)n_par + 1);
+  PetscCall(HycoInterpolantCreate(n_par, n, mu, &interpolant));
+  PetscCall(HycoInterpolantDestroy(&interpolant));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solves what is missing, makes the bases and the model. The mesh stays from one iteration to the next. */
+static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(loop->samples, &t->n_s, NULL, NULL));
+  PetscCall(HycoSnapshotsFill(loop->store, loop->samples, iteration ? NULL : t->progress, t->progress_ctx));
+  PetscCall(HycoReducerResetBases(t));
+  PetscCall(HycoReducerReduce(t, loop->store, PETSC_FALSE));
+  PetscCall(HycoReducerBuild(t, PETSC_FALSE, loop->file, report));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The solutions on the unknowns of the model's mesh, n_dof x n_s row major, on every rank. Collective. */
+static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at)
+{
+  const PetscInt dim = t->sizes[3], n_dof = m->mesh->n_nodes * dim, whole = t->sizes[0] * dim;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1((size_t)n_dof * (size_t)t->n_s, U_at));
+  for (PetscInt i = 0; t->rank == 0 && i < n_dof; i++) {
+    const PetscInt from = m->mesh->node_whole[i / dim] * dim + i % dim;
+
+    for (PetscInt k = 0; k < t->n_s; k++)
+      (*U_at)[(size_t)i * (size_t)t->n_s + (size_t)k] = t->U[(size_t)k * (size_t)whole + (size_t)from];
+  }
+  for (PetscInt i = 0; i < n_dof; i++) /* by rows: a message's length is an int */
+    PetscCallMPI(MPI_Bcast(*U_at + (size_t)i * (size_t)t->n_s, (PetscMPIInt)t->n_s, MPIU_REAL, 0, t->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* This rank's share of the training points. */
+static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const PetscReal U_at[])
+{
+  const PetscReal *solved;
+  PetscMPIInt size;
+  HycoIndicator indicator;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(t->comm, &size));
+  PetscCall(HycoSamplesGet(loop->samples, NULL, NULL, &solved));
+  PetscCall(HycoIndicatorCreate(m, t->greedy.indicator, t->n_s, solved, U_at, &indicator));
+  for (PetscInt k = t->rank; k < loop->n_points; k += size) {
+    HycoIndication v;
+
+    PetscCall(HycoIndicatorEvaluate(indicator, loop->points + k * loop->n_par, &v));
+    loop->value[4 * k] = v.eta;
+    loop->value[4 * k + 1] = v.eta_u;
+    loop->value[4 * k + 2] = v.eta_lambda;
+    loop->value[4 * k + 3] = v.size;
+  }
+  PetscCall(HycoIndicatorDestroy(&indicator));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The indicator at every training point, on every rank. */
+static PetscErrorCode Evaluate(HycoReducer t, Loop *loop)
+{
+  HycoROM m = NULL;
+  PetscReal *U_at;
+  PetscMPIInt count;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMPIIntCast(4 * loop->n_points, &count));
+  HycoOnEach(t->comm, HycoROMLoad(loop->file, &m));
+  PetscCall(SpreadSnapshots(t, m, &U_at));
+  PetscCall(PetscArrayzero(loop->value, 4 * loop->n_points));
+  HycoOnEach(t->comm, EvaluateShare(t, loop, m, U_at));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, loop->value, count, MPIU_REAL, MPI_SUM, t->comm));
+  PetscCall(PetscFree(U_at));
+  PetscCall(HycoROMDestroy(&m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of what is infinite, the larger numerator is worse; of equals, neither. */
+static PetscBool Worse(const PetscReal a[], const PetscReal b[])
+{
+  const PetscInt by = PetscIsInfReal(a[0]) && PetscIsInfReal(b[0]) ? 3 : 0;
+
+  return (PetscBool)(PetscIsInfReal(b[by]) ? PETSC_FALSE : a[by] > b[by] * (1 + TIE));
+}
+
+/* The worst point that is not solved yet (-1: none is left), and what the monitor hears. */
+static PetscErrorCode Choose(Loop *loop, PetscInt *worst, HycoGreedyStep *step)
+{
+  const PetscReal *solved;
+  PetscInt n_solved, n_finite = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(loop->samples, &n_solved, NULL, &solved));
+  *worst = -1;
+  for (PetscInt k = 0; k < loop->n_points; k++) {
+    const PetscReal *value = loop->value + 4 * k;
+    PetscBool known = PETSC_FALSE;
+
+    step->max_eta = PetscMax(step->max_eta, value[0]);
+    if (!PetscIsInfReal(value[0])) {
+      step->mean_eta_u += value[1];
+      step->mean_eta_lambda += value[2];
+      n_finite++;
+    }
+    for (PetscInt j = 0; j < n_solved && !known; j++)
+      PetscCall(PetscArraycmp(solved + j * loop->n_par, loop->points + k * loop->n_par, loop->n_par, &known));
+    if (!known && (*worst < 0 || Worse(value, loop->value + 4 * *worst))) *worst = k;
+  }
+  step->n_points = loop->n_points;
+  step->n_infinite = loop->n_points - n_finite;
+  step->mean_eta_u /= PetscMax(n_finite, 1);
+  step->mean_eta_lambda /= PetscMax(n_finite, 1);
+  if (*worst < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  step->worst = loop->points + *worst * loop->n_par;
+  step->eta = loop->value[4 * *worst];
+  step->eta_u = loop->value[4 * *worst + 1];
+  step->eta_lambda = loop->value[4 * *worst + 2];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const char *WhyStop(HycoReducer t, const HycoGreedyStep *step)
+{
+  if (step->max_eta <= t->greedy.target) return "target";
+  if (t->greedy.max_snapshots && step->n_samples >= t->greedy.max_snapshots) return "snapshots";
+  if (t->greedy.max_seconds > 0 && step->seconds >= t->greedy.max_seconds) return "seconds";
+  return step->worst ? NULL : "points";
+}
+
+/* The iteration's model, which has been judged, goes to greedy-NNN.h5 beside the solutions. Rank 0. */
+static PetscErrorCode KeepModel(const Loop *loop, PetscInt iteration)
+{
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(path, sizeof(path), "%s/greedy-%03d.h5", loop->store->folder, (int)iteration));
+  PetscCall(HycoFileKeep(loop->file, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report, PetscBool *last)
+{
+  HycoGreedyStep step = {0};
+  PetscInt worst;
+
+  PetscFunctionBegin;
+  PetscCall(BuildModel(t, loop, iteration, report));
+  PetscCall(Evaluate(t, loop));
+  if (t->greedy.keep) HycoOnRoot(t->comm, KeepModel(loop, iteration));
+  PetscCall(Choose(loop, &worst, &step));
+  step.iteration = iteration;
+  step.n_samples = t->n_s;
+  step.n_modes = report->n_modes;
+  step.rid_nodes = report->rid_nodes;
+  step.rid_elements = report->rid_elements;
+  step.seconds = HycoNow() - loop->begin;
+  PetscCallMPI(
+      MPI_Bcast(&step.seconds, 1, MPIU_REAL, 0, t->comm)); /* the ranks' clocks differ, their verdict must not */
+  step.stop = WhyStop(t, &step);
+  *last = (PetscBool)(step.stop != NULL);
+  if (t->greedy.monitor) HycoOnRoot(t->comm, t->greedy.monitor(&step, t->greedy.ctx));
+  if (!*last) PetscCall(HycoSamplesAddPoint(loop->samples, step.worst));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The set that is searched, checked. */
+static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(training, &loop->n_points, &loop->n_par, &loop->points));
+  HycoCheck(loop->n_points > 1,
+            "the greedy training has %d training point; it chooses among at least two: "
+            "-training_grid 20,24",
+            (int)loop->n_points);
+  PetscCall(PetscMalloc1(4 * loop->n_points, &loop->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The loop needs a recipe that is accurate wherever it leads; the model's own is searched when the solutions are there.
+ */
+static void SetRecipe(HycoReducer t)
+{
+  if (!t->search || t->type != HYCO_ROM_HYBRID) return;
+  if (!t->pinned[HYCO_CHOICE_TOLERANCE])
+    t->tol[HYCO_SEED_DISPLACEMENT] = t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = ACCURATE;
+  if (!t->pinned[HYCO_CHOICE_LAYERS]) t->layers = 1;
+}
+
+/* The model of the solutions that were chosen, judged by others. */
+static PetscErrorCode Conclude(HycoReducer t, Loop *loop, const char path[], HycoTraining *report)
+{
+  const PetscBool learn = (PetscBool)(t->search && t->n_validation && t->scene->n_parameters);
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerHoldOut(t, loop->store));
+  if (learn) { /* each recipe has an RID and bases of its own */
+    PetscCall(PetscFree(t->grown));
+    PetscCall(HycoReducerResetBases(t));
+  }
+  PetscCall(HycoReducerFinish(t, loop->store, path, learn, report));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Iterations until one is the last. */
+static PetscErrorCode RunLoop(HycoReducer t, Loop *loop, HycoTraining *report)
+{
+  char place[PETSC_MAX_PATH_LEN];
+  PetscBool last = PETSC_FALSE;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(place, sizeof(place), "%s/greedy.h5", loop->store->folder));
+  PetscCall(HycoFileScratch(t->comm, place, "candidate", loop->file));
+  for (PetscInt iteration = 0; !last && !ierr; iteration++) ierr = Iterate(t, loop, iteration, report, &last);
+  if (t->rank == 0) (void)unlink(loop->file);
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSamples training, const char path[],
+                                    HycoTraining *training_report)
+{
+  Loop loop = {0};
+  HycoTraining report = {0};
+
+  PetscFunctionBegin;
+  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheck(t->type != HYCO_ROM_CONDENSED,
+            "a condensed model needs a tensor grid of training points, which -greedy does not give: use -grid, or "
+            "-values_NAME");
+  loop.begin = HycoNow();
+  SetRecipe(t);
+  PetscCall(TakeTraining(training, &loop));
+  PetscCall(Start(t, start, &loop.samples));
+  PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
+  PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
+  PetscCall(PetscCalloc1(t->rank == 0 ? t->whole->n_cells : 0, &t->grown));
+  PetscCall(RunLoop(t, &loop, &report));
+  PetscCall(Conclude(t, &loop, path, &report));
+  report.seconds_reduction = HycoNow() - loop.begin;
+  PetscCall(HycoReducerReset(t));
+  PetscCall(HycoSnapshotsDestroy(&loop.store));
+  PetscCall(HycoSamplesDestroy(&loop.samples));
+  PetscCall(PetscFree(loop.value));
+  if (training_report) *training_report = report;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

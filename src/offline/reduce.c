@@ -1,0 +1,412 @@
+/*
+  Bases and interpolation points (sections 4.1, 4.2): POD of displacements, stresses, generalised forces and
+  multipliers, DEIM on each. Snapshot matrices are spread over the ranks by rows; the multipliers' norm needs rank 0
+  alone. HycoReducerReduce() reads the snapshots once; HycoReducerTakeBases() cuts the bases by the tolerances.
+*/
+#include <hycoalgorithms.h>
+#include <hycoreducerimpl.h>
+
+/* Snapshots less their lifting r(u0): zero on the fixed unknowns. */
+static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
+{
+  const PetscInt n_dof = t->sizes[0] * t->sizes[3];
+  PetscBool *fixed;
+  PetscInt lo, hi, lda, n;
+  PetscScalar *s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n_dof, &fixed));
+  if (t->rank == 0) PetscCall(PetscArraycpy(fixed, t->fe->fixed, n_dof));
+  PetscCallMPI(MPI_Bcast(fixed, (PetscMPIInt)(n_dof * (PetscInt)sizeof(PetscBool)), MPI_BYTE, 0, t->comm));
+  PetscCall(MatGetOwnershipRange(S, &lo, &hi));
+  PetscCall(MatGetSize(S, NULL, &n));
+  PetscCall(MatDenseGetLDA(S, &lda));
+  PetscCall(MatDenseGetArray(S, &s));
+  for (PetscInt i = lo; i < hi; i++) {
+    for (PetscInt j = 0; fixed[i] && j < n; j++) s[(size_t)j * (size_t)lda + (size_t)(i - lo)] = 0;
+  }
+  PetscCall(MatDenseRestoreArray(S, &s));
+  PetscCall(PetscFree(fixed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddSeeds(PetscInt n, const PetscInt add[], PetscInt divide, PetscInt *n_seeds, PetscInt **seeds)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscRealloc((size_t)(*n_seeds + n + 1) * sizeof(PetscInt), seeds));
+  for (PetscInt k = 0; k < n; k++) (*seeds)[(*n_seeds)++] = add[k] / divide;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerToRoot(HycoReducer t, Mat S, PetscBool row_major, PetscReal **out)
+{
+  PetscInt N, n, lo, hi, lda;
+  PetscMPIInt size, *counts, *offsets;
+  const PetscInt *ranges;
+  const PetscScalar *s;
+  PetscReal *mine, *all = NULL;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(t->comm, &size));
+  PetscCall(MatGetSize(S, &N, &n));
+  PetscCall(MatGetOwnershipRange(S, &lo, &hi));
+  PetscCall(MatGetOwnershipRanges(S, &ranges));
+  PetscCall(MatDenseGetLDA(S, &lda));
+  PetscCall(PetscMalloc3(size, &counts, size, &offsets, (size_t)(hi - lo) * (size_t)n, &mine));
+  if (t->rank == 0) PetscCall(PetscMalloc1((size_t)N * (size_t)n + 1, &all));
+  PetscCall(MatDenseGetArrayRead(S, &s));
+  for (PetscInt i = 0; i < hi - lo; i++) {
+    for (PetscInt j = 0; j < n; j++) mine[(size_t)i * (size_t)n + (size_t)j] = s[(size_t)j * (size_t)lda + (size_t)i];
+  }
+  PetscCall(MatDenseRestoreArrayRead(S, &s));
+  {
+    MPI_Datatype row;
+
+    PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)n, MPIU_REAL, &row));
+    PetscCallMPI(MPI_Type_commit(&row));
+    for (PetscMPIInt r = 0; r < size; r++) {
+      counts[r] = (PetscMPIInt)(ranges[r + 1] - ranges[r]);
+      offsets[r] = (PetscMPIInt)ranges[r];
+    }
+    PetscCallMPI(MPI_Gatherv(mine, (PetscMPIInt)(hi - lo), row, all, counts, offsets, row, 0, t->comm));
+    PetscCallMPI(MPI_Type_free(&row));
+  }
+  PetscCall(PetscFree3(counts, offsets, mine));
+  if (t->rank == 0 && !row_major) {
+    PetscReal *columns;
+
+    PetscCall(PetscMalloc1((size_t)N * (size_t)n + 1, &columns));
+    for (PetscInt i = 0; i < N; i++) {
+      for (PetscInt j = 0; j < n; j++)
+        columns[(size_t)j * (size_t)N + (size_t)i] = all[(size_t)i * (size_t)n + (size_t)j];
+    }
+    PetscCall(PetscFree(all));
+    all = columns;
+  }
+  *out = all;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal product[])
+{
+  Mat P, whole = NULL;
+  const PetscScalar *p;
+  PetscInt lda, rows, cols;
+  PetscMPIInt size;
+
+  PetscFunctionBegin;
+  PetscCall(MatTransposeMatMult(X, Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &P));
+  PetscCallMPI(MPI_Comm_size(t->comm, &size));
+  if (size > 1)
+    PetscCall(MatCreateRedundantMatrix(P, size, PETSC_COMM_SELF, MAT_INITIAL_MATRIX, &whole));
+  else {
+    PetscCall(PetscObjectReference((PetscObject)P));
+    whole = P;
+  }
+  PetscCall(MatGetSize(P, &rows, &cols));
+  PetscCall(MatDenseGetLDA(whole, &lda));
+  PetscCall(MatDenseGetArrayRead(whole, &p));
+  for (PetscInt k = 0; k < cols; k++)
+    PetscCall(PetscArraycpy(product + (size_t)k * (size_t)rows, p + (size_t)k * (size_t)lda, rows));
+  PetscCall(MatDenseRestoreArrayRead(whole, &p));
+  PetscCall(MatDestroy(&whole));
+  PetscCall(MatDestroy(&P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, Mat *S)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", S));
+  PetscCall(RemoveLifting(t, *S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Points(HycoReducer t, Mat V, PetscInt index[])
+{
+  PetscFunctionBegin;
+  PetscCall(t->deim ? HycoQDEIM(V, index) : HycoDEIM(V, index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. */
+static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool all)
+{
+  HycoBasis *basis = &t->basis[kind];
+  const PetscInt most = kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0;
+  PetscInt N;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(S, &N, NULL));
+  PetscCall(PetscCalloc1(t->n_s + 1, &basis->sigma));
+  basis->n_sigma = PetscMin(N, t->n_s);
+  HycoLogged(HYCO_EVENT_POD, HycoPOD(S, all ? 0 : t->tol[kind], t->noise, most, &basis->V, &basis->l, basis->sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first modes of a basis, as many as the tolerance takes: V (NULL: none; the caller's), and how many. */
+static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l)
+{
+  const HycoBasis *basis = &t->basis[kind];
+  const PetscInt most = kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0;
+  Mat part;
+
+  PetscFunctionBegin;
+  *V = NULL;
+  *l = PetscMin(basis->l, HycoPODRank(basis->n_sigma, basis->sigma, t->tol[kind], t->noise, most));
+  t->counts[kind] = *l;
+  if (!*l) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatDenseGetSubMatrix(basis->V, PETSC_DECIDE, PETSC_DECIDE, 0, *l, &part));
+  PetscCall(MatDuplicate(part, MAT_COPY_VALUES, V));
+  PetscCall(MatDenseRestoreSubMatrix(basis->V, &part));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Displacements: U on rank 0, norms, and V^T of the snapshots less their lifting, which judge a model on the whole mesh
+   at the cost of its modes. */
+static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, PetscBool all)
+{
+  HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
+  Mat S;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", &S));
+  PetscCall(HycoReducerToRoot(t, S, PETSC_FALSE, &t->U));
+  PetscCall(RemoveLifting(t, S));
+  PetscCall(FindBasis(t, S, HYCO_SEED_DISPLACEMENT, all));
+  HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",
+                 (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+  HycoCheckModel(basis->l, "every training solution has zero displacement; there is nothing to learn");
+  PetscCall(PetscMalloc1(t->n_s, &t->U_norm));
+  PetscCall(MatGetColumnNorms(S, NORM_2, t->U_norm));
+  PetscCall(PetscMalloc1(basis->l * t->n_s, &basis->coefficients));
+  PetscCall(HycoReducerMultiply(t, basis->V, S, basis->coefficients));
+  PetscCall(MatDestroy(&S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Stresses (points are cells) or generalised forces (points are nodes), if they seed the RID. */
+static PetscErrorCode ReduceField(HycoReducer t, HycoSnapshots store, const char field[], PetscInt kind, PetscBool all)
+{
+  Mat S;
+
+  PetscFunctionBegin;
+  if (!t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSnapshotsGetField(store, t->samples, field, &S));
+  PetscCall(FindBasis(t, S, kind, all));
+  PetscCall(MatDestroy(&S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* DEIM on the modes taken from a basis. */
+static PetscErrorCode SeedFrom(HycoReducer t, Mat V, PetscInt l, PetscInt kind, PetscInt divide, PetscInt *n_seeds,
+                               PetscInt **seeds)
+{
+  PetscInt *index;
+
+  PetscFunctionBegin;
+  if (!l || !t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(l, &index));
+  HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
+  PetscCall(AddSeeds(l, index, divide, n_seeds, seeds));
+  PetscCall(PetscFree(index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes, on the whole mesh on rank 0, and the snapshots' coefficients. */
+static PetscErrorCode TakeDisplacements(HycoReducer t)
+{
+  const HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
+  Mat V;
+
+  PetscFunctionBegin;
+  PetscCall(CutBasis(t, HYCO_SEED_DISPLACEMENT, &V, &t->l));
+  HycoCheckModel(t->l, "-hyco_pod_tol %g leaves no mode; give less", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+  PetscCall(PetscMalloc1(t->n_s + 1, &t->sigma));
+  PetscCall(PetscArraycpy(t->sigma, basis->sigma, t->n_s + 1));
+  PetscCall(SeedFrom(t, V, t->l, HYCO_SEED_DISPLACEMENT, t->sizes[3], &t->n_seeds_node, &t->seeds_node));
+  PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
+  for (PetscInt k = 0; k < t->n_s; k++)
+    PetscCall(PetscArraycpy(t->VtU + k * t->l, basis->coefficients + k * basis->l, t->l));
+  PetscCall(HycoReducerToRoot(t, V, PETSC_TRUE, &t->V_whole));
+  PetscCall(MatDestroy(&V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TakeField(HycoReducer t, PetscInt kind, PetscInt divide, PetscInt *n_seeds, PetscInt **seeds)
+{
+  Mat V;
+  PetscInt l;
+
+  PetscFunctionBegin;
+  if (!t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(CutBasis(t, kind, &V, &l));
+  PetscCall(SeedFrom(t, V, l, kind, divide, n_seeds, seeds));
+  PetscCall(MatDestroy(&V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers)
+{
+  const PetscInt m = t->sizes[2], n = t->n_s, dim = t->sizes[3], entries = HycoPairsWidth(&t->pairs) * dim * m;
+  PetscInt *start, *dof, n_par;
+  PetscReal *value, *gap;
+  const PetscReal *mu;
+  Mat M, R, X;
+  PetscScalar *r;
+  KSP ksp;
+  PetscBool singular;
+  PC pc;
+  Mat factor;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  PetscCall(PetscMalloc4(m + 1, &start, entries, &dof, entries, &value, m, &gap));
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, t->sizes[0] * dim, n, NULL, &R));
+  PetscCall(MatDenseGetArray(R, &r));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(HycoFESetParameters(t->fe, mu + k * n_par));
+    PetscCall(HycoContactRows(t->fe, &t->pairs, start, dof, value, gap));
+    for (PetscInt i = 0; i < m; i++) {
+      for (PetscInt j = start[i]; j < start[i + 1]; j++)
+        r[(size_t)k * (size_t)(t->sizes[0] * dim) + (size_t)dof[j]] +=
+            value[j] * t->Lambda[(size_t)k * (size_t)m + (size_t)i];
+    }
+  }
+  PetscCall(MatDenseRestoreArray(R, &r));
+  PetscCall(HycoFECreateMatrix(t->fe, PETSC_COMM_SELF, t->sizes[0], 0, &M));
+  PetscCall(HycoFEAssembleH1(t->fe, HycoMeshLength(t->whole), M));
+  PetscCall(MatSetOption(M, MAT_SPD, PETSC_TRUE));
+  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", M, PETSC_TRUE, &ksp));
+  PetscCall(HycoFactor(ksp, &singular));
+  PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the H1 norm's matrix is singular");
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCFactorGetMatrix(pc, &factor));
+  PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, &X));
+  PetscCall(MatMatSolve(factor, R, X));
+  PetscCall(MatDestroy(&M));
+  PetscCall(KSPDestroy(&ksp));
+  PetscCall(PetscFree4(start, dof, value, gap));
+  *forces = R;
+  *supremizers = X;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Gram matrix of the dual snapshots in the norm of the dual of H1: (B^T L)^T M^-1 (B^T L). On rank 0. */
+static PetscErrorCode DualGram(HycoReducer t, PetscReal G[])
+{
+  const PetscInt n = t->n_s;
+  Mat R, X, GX;
+  PetscScalar *r;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerSupremizers(t, &R, &X));
+  PetscCall(MatTransposeMatMult(R, X, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &GX));
+  PetscCall(MatDenseGetArray(GX, &r));
+  for (PetscInt j = 0; j < n; j++) {
+    for (PetscInt i = 0; i < n; i++) G[j * n + i] = (r[j * n + i] + r[i * n + j]) / 2;
+  }
+  PetscCall(MatDenseRestoreArray(GX, &r));
+  PetscCall(MatDestroy(&GX));
+  PetscCall(MatDestroy(&X));
+  PetscCall(MatDestroy(&R));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Brings moved surfaces to the training point where contact k presses most. */
+static PetscErrorCode MoveWherePresses(HycoReducer t, PetscInt k)
+{
+  const size_t m = (size_t)t->sizes[2];
+  PetscInt n_par, most = 0;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  if (!t->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  for (PetscInt q = 1; q < t->n_s; q++) {
+    if (t->Lambda[(size_t)q * m + (size_t)k] > t->Lambda[(size_t)most * m + (size_t)k]) most = q;
+  }
+  PetscCall(HycoFESetParameters(t->fe, mu + most * n_par));
+  PetscCall(HycoPairsMove(t->fe, &t->pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* POD of the multipliers in (H1)', DEIM on it: the nodes of each point's contact are seeds. On rank 0. */
+static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes[])
+{
+  const PetscInt m = t->sizes[2], n = t->n_s;
+  PetscReal *G, *W, *sigma;
+  PetscInt l, *index;
+  Mat V;
+  PetscScalar *v;
+
+  PetscFunctionBegin;
+  *n_nodes = 0;
+  PetscCall(PetscMalloc2(n * n, &G, n, &sigma));
+  PetscCall(DualGram(t, G));
+  PetscCall(HycoPODGram(n, G, t->tol[HYCO_SEED_DUAL], t->noise, &W, &l, sigma));
+  t->counts[HYCO_SEED_DUAL] = l;
+  if (l) {
+    PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, l, NULL, &V));
+    PetscCall(MatDenseGetArray(V, &v));
+    for (PetscInt j = 0; j < l; j++) {
+      for (PetscInt k = 0; k < n; k++) {
+        for (PetscInt i = 0; i < m; i++) v[j * m + i] += t->Lambda[(size_t)k * (size_t)m + (size_t)i] * W[j * n + k];
+      }
+    }
+    PetscCall(MatDenseRestoreArray(V, &v));
+    PetscCall(PetscMalloc1(l, &index));
+    HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
+    for (PetscInt k = 0; k < l; k++) {
+      PetscCall(MoveWherePresses(t, index[k]));
+      nodes[(*n_nodes)++] = t->pairs.slave[index[k]];
+      for (PetscInt j = t->pairs.master_start[index[k]]; j < t->pairs.master_start[index[k] + 1]; j++)
+        nodes[(*n_nodes)++] = t->pairs.master[j];
+    }
+    PetscCall(PetscFree(index));
+    PetscCall(MatDestroy(&V));
+  }
+  PetscCall(PetscFree(W));
+  PetscCall(PetscFree2(G, sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The dual snapshots on rank 0; their seeds, which only -hyco_rid_dual_tol decides. */
+static PetscErrorCode ReduceForces(HycoReducer t, HycoSnapshots store)
+{
+  Mat S;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsGetField(store, t->samples, "lambda", &S));
+  PetscCall(HycoReducerToRoot(t, S, PETSC_FALSE, &t->Lambda));
+  PetscCall(MatDestroy(&S));
+  if (!t->seed[HYCO_SEED_DUAL] || !t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(5 * t->n_s, &t->dual_seeds));
+  HycoOnRoot(t->comm, DualSeeds(t, &t->n_dual_seeds, t->dual_seeds));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerTakeBases(HycoReducer t)
+{
+  const PetscInt dim = t->sizes[3], n_sigma = dim == 1 ? 1 : dim == 2 ? 4 : 6;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerDropBases(t));
+  PetscCall(TakeDisplacements(t));
+  PetscCall(TakeField(t, HYCO_SEED_STRESS, n_sigma, &t->n_seeds_cell, &t->seeds_cell));
+  PetscCall(TakeField(t, HYCO_SEED_FORCE, dim, &t->n_seeds_node, &t->seeds_node));
+  if (t->rank == 0 && t->seed[HYCO_SEED_DUAL])
+    PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool all)
+{
+  PetscFunctionBegin;
+  PetscCall(ReduceDisplacements(t, store, all));
+  PetscCall(ReduceField(t, store, "sigma", HYCO_SEED_STRESS, all));
+  PetscCall(ReduceField(t, store, "force", HYCO_SEED_FORCE, all));
+  PetscCall(ReduceForces(t, store));
+  PetscCall(HycoReducerTakeBases(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,564 @@
+/*
+  The search for a recipe: which of the reduction's settings give the cheapest model online whose errors at the held-out
+  points are small enough. The snapshots are read and their bases made once; an attempt cuts the bases, builds the RID
+  and the model on it and predicts the held-out points.
+
+  A recipe is tried only as far as it is open: what the options say stays. Recipes of a kind come in the order of their
+  cost, and the first that meets the targets ends its kind. The cost is a count of operations, not a time, so that the
+  choice repeats on any machine and number of ranks.
+
+  Where no recipe meets targets that were asked for, solutions are added where the best one errs most, and the search
+  begins again.
+*/
+#include <hycofile.h>
+#include <hycoreducerimpl.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+/* Where no target is given: errors that most studies do not see. */
+static const PetscReal usual[HYCO_N_ERRORS] = {
+    [HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2, [HYCO_ERROR_LAMBDA] = 1e-2};
+
+#define LITTLE        1.25 /* a model that misses by so much more than the best is as good, if it is cheaper */
+#define EXTENSION     2.5  /* edges of the contact surface's facets */
+#define MANY_CONTACTS 600  /* beyond, a condensed model is tried only when it is asked for: its samples fill a disk */
+#define MANY_UNKNOWNS 600  /* of an RID; beyond, "all" is not tried by itself: its reduced matrix is dense */
+#define STALE         3 /* attempts without progress end a kind: larger RIDs do not mend a basis that lacks solutions */
+#define PROGRESS      0.95
+#define WILD          50  /* times the target: no attempt so far is a model at all */
+#define FEW_UNKNOWNS  300 /* a dense matrix of these is cheap */
+#define MAX_ATTEMPTS  64
+#define ROUND         4   /* of the training points, one in so many is added at a time */
+#define TELLING       0.3 /* correlation above which a parameter explains the errors */
+#define WHOLE         -1
+
+/* Sizes of RIDs and bases, from the cheapest on; layers WHOLE: the whole mesh. */
+typedef struct {
+  PetscReal tol;
+  PetscInt layers;
+  PetscBool extended;
+} Size;
+static const Size sizes[] = {{1e-5, 0, PETSC_FALSE}, {1e-5, 1, PETSC_FALSE},     {1e-7, 1, PETSC_FALSE},
+                             {1e-7, 1, PETSC_TRUE},  {1e-10, 1, PETSC_FALSE},    {1e-10, 1, PETSC_TRUE},
+                             {1e-13, 1, PETSC_TRUE}, {1e-10, 2, PETSC_TRUE},     {1e-13, 2, PETSC_TRUE},
+                             {1e-13, 3, PETSC_TRUE}, {1e-13, WHOLE, PETSC_FALSE}};
+enum { N_SIZES = sizeof(sizes) / sizeof(sizes[0]), FIRST_USUAL = 3 };
+
+typedef struct {
+  HycoReducer t;
+  HycoSnapshots store;
+  char file[HYCO_FILE_NAME + 16];
+  HycoRecipe given;    /* as the options have it */
+  PetscReal extension; /* of the recipes that extend the contact */
+  PetscBool targets;   /* given by the user */
+  PetscReal target[HYCO_N_ERRORS];
+  PetscInt n;
+  HycoAttempt attempt[MAX_ATTEMPTS];
+  PetscReal least, *ratio; /* of the best so far, and of its held-out points */
+} Search;
+
+void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
+{
+  const char *type = HycoROMTypes[r->type], *kind = HycoHybrids[r->hybrid];
+
+  if (r->type != HYCO_ROM_HYBRID)
+    snprintf(text, length, "%s, pod_tol %g", type, (double)r->pod_tol);
+  else if (r->whole)
+    snprintf(text, length, "%s, pod_tol %g, hybrid %s, the whole mesh as RID", type, (double)r->pod_tol, kind);
+  else
+    snprintf(text, length, "%s, pod_tol %g, hybrid %s, layers %d, contact extension %.3g", type, (double)r->pod_tol,
+             kind, (int)r->layers, (double)r->contact_extension);
+}
+
+static void GetRecipe(HycoReducer t, HycoRecipe *r)
+{
+  *r = (HycoRecipe){t->type, t->tol[HYCO_SEED_DISPLACEMENT], t->extension, t->layers, t->hybrid, t->whole_rid};
+}
+
+/* The stress and force tolerances follow that of the displacement where they were the same. */
+static void SetRecipe(HycoReducer t, const HycoRecipe *r)
+{
+  for (PetscInt k = HYCO_SEED_STRESS; k <= HYCO_SEED_FORCE; k++) {
+    if (t->tol[k] == t->tol[HYCO_SEED_DISPLACEMENT]) t->tol[k] = r->pod_tol;
+  }
+  t->tol[HYCO_SEED_DISPLACEMENT] = r->pod_tol;
+  t->type = r->type;
+  t->dual = r->type != HYCO_ROM_PROJECTION ? HYCO_DUAL_FE : t->dual == HYCO_DUAL_FE ? HYCO_DUAL_NNMF : t->dual;
+  t->extension = r->contact_extension;
+  t->layers = r->layers;
+  t->hybrid = r->hybrid;
+  t->whole_rid = (PetscBool)(r->whole || r->type == HYCO_ROM_PROJECTION);
+}
+
+static PetscReal EdgeLength(HycoMesh m, PetscInt a, PetscInt b)
+{
+  PetscReal sum = 0;
+
+  for (PetscInt c = 0; c < 3; c++)
+    sum += (m->xyz[3 * a + c] - m->xyz[3 * b + c]) * (m->xyz[3 * a + c] - m->xyz[3 * b + c]);
+  return PetscSqrtReal(sum);
+}
+
+/* Mean length of an edge of the slave surfaces' facets; 0 without any. Rank 0. */
+static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
+{
+  const HycoMesh m = t->whole;
+  PetscReal sum = 0;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < t->scene->n_contacts; k++) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k].slave, &g));
+    for (PetscInt f = 0; f < m->n_facets; f++) {
+      const PetscInt *node = m->facets + f * m->nf;
+
+      if (m->facet_group[f] != g || m->nf < 2) continue;
+      for (PetscInt j = 0; j < m->nf; j++) sum += EdgeLength(m, node[j], node[(j + 1) % m->nf]);
+      n += m->nf;
+    }
+  }
+  *mean = n ? sum / n : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Operations of an online solve at a new stiffness. */
+static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
+{
+  const PetscReal dim = t->sizes[3], l = a->n_modes, m = a->rid_contacts, cell = dim == 1 ? 2 : dim == 2 ? 8 : 24;
+  PetscReal n = l + a->n_fe_dofs;
+
+  if (a->recipe.type == HYCO_ROM_CONDENSED)
+    return t->sizes[2] * (PetscReal)t->sizes[2] * (PetscReal)(a->n_flexibilities + t->sizes[2] / 6.0) + 2 * l * m;
+  if (a->recipe.type == HYCO_ROM_PROJECTION) n = l;
+  return n * n * n * 2 / 3 + 20 * a->rid_elements * cell * cell + 2 * a->rid_nodes * dim * l * (l + 10);
+}
+
+/* The largest quotient of an error and its target, of all held-out points and, for the best so far, of each. */
+static PetscErrorCode Judge(Search *s, HycoAttempt *a)
+{
+  HycoReducer t = s->t;
+  HycoROM model = NULL;
+  HycoHeldOut *rows;
+  PetscReal force;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
+  PetscCall(PetscMalloc1(n, &rows));
+  HycoOnEach(t->comm, HycoROMLoad(s->file, &model));
+  PetscCall(HycoROMPredictHeldOut(t->comm, model, s->store, t->held, rows));
+  PetscCall(HycoROMDestroy(&model));
+  PetscCall(HycoHeldOutSummarise(n, rows, &a->held_out));
+  a->ratio = 0;
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    if (!(s->target[j] > 0) || a->held_out.largest[j] / s->target[j] <= a->ratio) continue;
+    a->ratio = a->held_out.largest[j] / s->target[j];
+    a->worst = (HycoErrorKind)j;
+  }
+  force = HycoHeldOutForce(n, rows);
+  for (PetscInt k = 0; k < n && a->ratio < s->least; k++) {
+    s->ratio[k] = 0;
+    for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+      if (s->target[j] > 0)
+        s->ratio[k] = PetscMax(s->ratio[k], HycoHeldOutError(&rows[k], (HycoErrorKind)j, force) / s->target[j]);
+    }
+  }
+  s->least = PetscMin(s->least, a->ratio);
+  PetscCall(PetscFree(rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bases, RID and model of the recipe that is set. */
+static PetscErrorCode Build(HycoReducer t, HycoSnapshots store, const char file[], HycoTraining *report)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoReducerTakeBases(t));
+  if (t->type == HYCO_ROM_CONDENSED) {
+    PetscCall(HycoReducerBeginCondensed(t));
+    HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerFlexibility(t, store));
+    HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerFindModes(t, store));
+  }
+  if (file) PetscCall(HycoReducerBuild(t, PETSC_FALSE, file, report));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Builds the recipe's model and judges it; what fails is an attempt that failed. Collective. */
+static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
+{
+  HycoReducer t = s->t;
+  HycoAttempt *a = &s->attempt[s->n];
+  HycoTraining report = {0};
+  PetscErrorCode ierr;
+  char message[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (s->n == MAX_ATTEMPTS) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMemzero(a, sizeof(*a)));
+  a->number = ++s->n;
+  a->recipe = *recipe;
+  a->ratio = PETSC_INFINITY;
+  PetscCall(HycoSamplesGet(t->held, &a->held_out.n, NULL, NULL));
+  SetRecipe(t, recipe);
+  t->most_full_order = t->pinned[HYCO_CHOICE_HYBRID] || recipe->hybrid != HYCO_HYBRID_ALL ? 0 : MANY_UNKNOWNS;
+  PetscCall(HycoCatchBegin());
+  ierr = Build(t, s->store, s->file, &report);
+  if (!ierr) ierr = Judge(s, a); /* a model may refuse to predict */
+  PetscCall(HycoCatchEnd(ierr, message));
+  t->most_full_order = 0;
+  if (ierr && t->rank == 0) (void)unlink(s->file);
+  PetscCall(HycoCatchNoModel(ierr, message));
+  PetscCall(HycoCondensedDestroy(&t->condensed));
+  if (message[0]) a->ratio = PETSC_INFINITY;
+  if (!message[0]) {
+    a->n_modes = report.n_modes;
+    a->n_fe_dofs = report.n_fe_dofs;
+    a->n_flexibilities = report.n_flexibilities;
+    a->rid_nodes = report.rid_nodes;
+    a->rid_elements = report.rid_elements;
+    a->rid_contacts = report.rid_contacts;
+    a->rid_fraction = report.rid_fraction;
+    a->cost = Cost(t, a);
+  }
+  PetscCall(PetscStrncpy(a->failure, message, sizeof(a->failure)));
+  if (t->rank == 0) (void)unlink(s->file);
+  if (t->attempt) HycoOnRoot(t->comm, t->attempt(a, t->attempt_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What is open of a size, the rest as the options have it. */
+static HycoRecipe Recipe(const Search *s, const Size *size)
+{
+  const PetscBool *pinned = s->t->pinned;
+  HycoRecipe r = s->given;
+
+  if (!pinned[HYCO_CHOICE_TOLERANCE]) r.pod_tol = size->tol;
+  if (!pinned[HYCO_CHOICE_LAYERS]) r.layers = PetscMax(size->layers, 0);
+  if (!pinned[HYCO_CHOICE_EXTENSION]) r.contact_extension = size->extended ? s->extension : 0;
+  if (!pinned[HYCO_CHOICE_WHOLE]) r.whole = (PetscBool)(size->layers == WHOLE);
+  return r;
+}
+
+static PetscBool Same(const HycoRecipe *a, const HycoRecipe *b)
+{
+  return (PetscBool)(a->type == b->type && a->pod_tol == b->pod_tol && a->layers == b->layers && a->whole == b->whole &&
+                     a->contact_extension == b->contact_extension && a->hybrid == b->hybrid);
+}
+
+/* Whether the whole mesh as RID is a model: not where every unknown would be full order, but for a few. */
+static PetscBool WholeIsSmall(HycoReducer t, HycoHybrid hybrid)
+{
+  const PetscBool all = (PetscBool)(hybrid == HYCO_HYBRID_ALL || 2 * t->sizes[2] > t->sizes[0]);
+
+  return (PetscBool)(!all || t->sizes[0] * t->sizes[3] <= FEW_UNKNOWNS);
+}
+
+/* The sizes in their order until one meets the targets, of those that differ in what
+   the type of model reads. */
+static PetscErrorCode TrySizes(Search *s, HycoROMType type, HycoHybrid hybrid, PetscBool *met)
+{
+  const PetscInt first = s->n;
+  PetscReal least = PETSC_INFINITY;
+
+  PetscFunctionBegin;
+  *met = PETSC_FALSE;
+  for (PetscInt k = s->targets ? 0 : FIRST_USUAL, stale = 0; k < N_SIZES && stale < STALE && !*met; k++) {
+    HycoRecipe r = Recipe(s, &sizes[k]);
+    PetscBool done = PETSC_FALSE;
+
+    r.type = type;
+    r.hybrid = s->t->pinned[HYCO_CHOICE_HYBRID] ? s->given.hybrid : hybrid;
+    if (type == HYCO_ROM_PROJECTION) {
+      r.layers = s->given.layers;
+      r.contact_extension = s->given.contact_extension;
+      r.whole = s->given.whole;
+    }
+    for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].recipe));
+    if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid))) continue;
+    PetscCall(Try(s, &r));
+    stale = least > WILD || s->attempt[s->n - 1].ratio < PROGRESS * least ? 0 : stale + 1;
+    least = PetscMin(least, s->attempt[s->n - 1].ratio);
+    *met = (PetscBool)(least <= 1);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All of A full order, where "auto" keeps the contacts' displacements and is not good enough. */
+static PetscErrorCode TryHybrid(Search *s)
+{
+  PetscBool met;
+
+  PetscFunctionBegin;
+  PetscCall(TrySizes(s, HYCO_ROM_HYBRID, HYCO_HYBRID_AUTO, &met));
+  if (!met && !s->t->pinned[HYCO_CHOICE_HYBRID] && s->t->sizes[2])
+    PetscCall(TrySizes(s, HYCO_ROM_HYBRID, HYCO_HYBRID_ALL, &met));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Its modes cost next to nothing online. */
+static PetscErrorCode TryCondensed(Search *s)
+{
+  const Size size = {1e-12, 1, PETSC_FALSE};
+  HycoRecipe r = Recipe(s, &size);
+
+  PetscFunctionBegin;
+  r.type = HYCO_ROM_CONDENSED;
+  PetscCall(Try(s, &r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TryAll(Search *s)
+{
+  const PetscBool pinned = s->t->pinned[HYCO_CHOICE_TYPE];
+  const HycoROMType type = s->given.type;
+  PetscBool met;
+
+  PetscFunctionBegin;
+  if (pinned ? type == HYCO_ROM_CONDENSED : s->t->sizes[2] > 0 && s->t->sizes[2] <= MANY_CONTACTS)
+    PetscCall(TryCondensed(s));
+  if (!pinned || type == HYCO_ROM_HYBRID) PetscCall(TryHybrid(s));
+  if (pinned ? type == HYCO_ROM_PROJECTION : s->targets)
+    PetscCall(TrySizes(s, HYCO_ROM_PROJECTION, HYCO_HYBRID_AUTO, &met));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cheapest of those that meet the targets, or of those that miss them by little more than the best; NULL: no recipe
+   gave a model. */
+static HycoAttempt *Choose(Search *s)
+{
+  HycoAttempt *chosen = NULL;
+  PetscReal least = PETSC_INFINITY;
+
+  for (PetscInt k = 0; k < s->n; k++) {
+    if (!s->attempt[k].failure[0]) least = PetscMin(least, s->attempt[k].ratio);
+  }
+  for (PetscInt k = 0; k < s->n; k++) {
+    HycoAttempt *a = &s->attempt[k];
+
+    if (a->failure[0] || a->ratio > PetscMax(1, LITTLE * least)) continue;
+    if (!chosen || a->cost < chosen->cost) chosen = a;
+  }
+  return chosen;
+}
+
+/* Nothing is open, or there is nothing to judge by. */
+static PetscBool Settled(HycoReducer t)
+{
+  PetscBool open = PETSC_FALSE;
+
+  for (PetscInt k = 0; k < HYCO_CHOICE_WHOLE; k++) open = (PetscBool)(open || !t->pinned[k]);
+  if (t->pinned[HYCO_CHOICE_TYPE] && t->type == HYCO_ROM_CONDENSED) open = PETSC_FALSE;
+  return (PetscBool)(!t->search || !t->held || !open);
+}
+
+/* Correlation of the held-out points' errors with their distance from the nearest training value of parameter p. */
+static PetscReal Correlation(const Search *s, PetscInt n, const PetscReal held[], PetscInt n_train,
+                             const PetscReal train[], PetscInt p)
+{
+  const PetscInt n_par = s->t->scene->n_parameters;
+  PetscReal mean[2] = {0, 0}, square[2] = {0, 0}, both = 0;
+
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt k = 0; k < n; k++) {
+      PetscReal x = PETSC_MAX_REAL;
+      const PetscReal y = PetscLogReal(PetscMin(PetscMax(s->ratio[k], 1e-6), 1e6));
+
+      for (PetscInt i = 0; i < n_train; i++) x = PetscMin(x, PetscAbsReal(train[i * n_par + p] - held[k * n_par + p]));
+      if (!pass) {
+        mean[0] += x / n;
+        mean[1] += y / n;
+      } else {
+        square[0] += (x - mean[0]) * (x - mean[0]);
+        square[1] += (y - mean[1]) * (y - mean[1]);
+        both += (x - mean[0]) * (y - mean[1]);
+      }
+    }
+  }
+  return square[0] > 0 && square[1] > 0 ? both / PetscSqrtReal(square[0] * square[1]) : 0;
+}
+
+/* Unseen points, each near one of the held-out points with the largest errors, which themselves stay unseen; and the
+   parameter whose training values lie too far apart (-1: none in particular). */
+static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, PetscInt *by)
+{
+  HycoReducer t = s->t;
+  const PetscInt n_par = t->scene->n_parameters, among = 8 * n_add;
+  PetscInt n, n_train, m, *order;
+  const PetscReal *held, *train, *mu;
+  PetscReal *key, largest = TELLING;
+  PetscBool *used;
+  HycoSamples unseen;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->held, &n, NULL, &held));
+  PetscCall(HycoSamplesGet(samples, &n_train, NULL, &train));
+  *by = -1;
+  for (PetscInt p = 0; p < n_par; p++) {
+    const PetscReal c = Correlation(s, n, held, n_train, train, p);
+
+    if (c > largest) {
+      largest = c;
+      *by = p;
+    }
+  }
+  PetscCall(HycoSamplesUnseen(samples, t->drawn, among, 1, NULL, &unseen));
+  t->drawn += among;
+  PetscCall(HycoSamplesGet(unseen, &m, NULL, &mu));
+  PetscCall(PetscMalloc2(n, &key, n, &order));
+  PetscCall(PetscCalloc1(m, &used));
+  for (PetscInt k = 0; k < n; k++) {
+    key[k] = -s->ratio[k];
+    order[k] = k;
+  }
+  PetscCall(PetscSortRealWithArrayInt(n, key, order));
+  for (PetscInt k = 0; k < PetscMin(n, n_add); k++) {
+    PetscReal least = PETSC_MAX_REAL;
+    PetscInt at = -1;
+
+    for (PetscInt j = 0; j < m; j++) {
+      const PetscReal d = HycoTrustDistance(t->scene, held + order[k] * n_par, mu + j * n_par);
+
+      if (used[j] || d == 0 || d >= least) continue;
+      least = d;
+      at = j;
+    }
+    if (at < 0) break;
+    used[at] = PETSC_TRUE;
+    PetscCall(HycoSamplesAddPoint(samples, mu + at * n_par));
+  }
+  PetscCall(PetscFree2(key, order));
+  PetscCall(PetscFree(used));
+  PetscCall(HycoSamplesDestroy(&unseen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every open recipe on the bases that are there. */
+static PetscErrorCode Attempts(Search *s)
+{
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(s->t->held, &n, NULL, NULL));
+  PetscCall(PetscFree(s->ratio));
+  PetscCall(PetscMalloc1(n, &s->ratio));
+  s->least = PETSC_INFINITY;
+  s->n = 0;
+  PetscCall(TryAll(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Attempts, and solutions added until the targets are met or the budget is spent: in *grown, with the first ones (NULL:
+   none was added; the caller's). */
+static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report)
+{
+  HycoReducer t = s->t;
+  PetscInt first, by = -1, budget;
+
+  PetscFunctionBegin;
+  *grown = NULL;
+  PetscCall(HycoSamplesGet(t->samples, &first, NULL, NULL));
+  budget = t->budget < 0 ? first : t->budget;
+  for (;;) {
+    const PetscInt n_add = PetscMin(PetscMax(2, first / ROUND), budget - report->n_added);
+
+    PetscCall(HycoReducerReduce(t, s->store, PETSC_TRUE));
+    PetscCall(Attempts(s));
+    if (!s->targets || s->least <= 1 || n_add < 1 || !t->scene->n_parameters) break;
+    if (!*grown) {
+      PetscInt n_par;
+      const PetscReal *mu;
+
+      PetscCall(HycoSamplesCreate(t->scene, grown));
+      PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+      for (PetscInt k = 0; k < first; k++) PetscCall(HycoSamplesAddPoint(*grown, mu + k * n_par));
+    }
+    PetscCall(AddPoints(s, *grown, n_add, &by));
+    report->n_added += n_add;
+    if (t->added) HycoOnRoot(t->comm, t->added(n_add, by, t->attempt_ctx));
+    t->samples = *grown;
+    PetscCall(HycoSamplesGet(*grown, &t->n_s, NULL, NULL));
+    PetscCall(HycoReducerResetBases(t));
+    HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(s->store, *grown, t->progress, t->progress_ctx));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The best recipe's model, at `path`; of those that the scan of the ranges or its own training solutions refuse, the
+   next. */
+static PetscErrorCode BuildBest(Search *s, const char path[], HycoTraining *report)
+{
+  HycoReducer t = s->t;
+  HycoAttempt *best;
+  PetscErrorCode ierr;
+  char message[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  while ((best = Choose(s))) {
+    HycoTraining built = {0};
+
+    SetRecipe(t, &best->recipe);
+    PetscCall(Build(t, s->store, NULL, NULL));
+    PetscCall(HycoCatchBegin());
+    ierr = HycoReducerBuild(t, PETSC_TRUE, path, &built);
+    PetscCall(HycoCatchEnd(ierr, message));
+    PetscCall(HycoCatchNoModel(ierr, message));
+    if (message[0]) {
+      PetscCall(PetscStrncpy(best->failure, message, sizeof(best->failure)));
+      continue;
+    }
+    built.n_added = report->n_added;
+    *report = built;
+    report->chosen = *best;
+    report->chosen.of = s->n;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt k = s->n - 1; k > 0 && !best; k--) { /* one that is not refused for its cost */
+    if (s->attempt[k].recipe.hybrid != HYCO_HYBRID_ALL) best = &s->attempt[k];
+  }
+  HycoFail("none of %d recipes gave a model; one of them: %s", (int)s->n, (best ? best : &s->attempt[0])->failure);
+}
+
+static PetscErrorCode Learn(Search *s, const char path[], HycoSamples *grown, HycoTraining *report)
+{
+  HycoReducer t = s->t;
+  PetscReal edge = 0;
+
+  PetscFunctionBegin;
+  GetRecipe(t, &s->given);
+  HycoOnRoot(t->comm, SurfaceEdge(t, &edge));
+  PetscCallMPI(MPI_Bcast(&edge, 1, MPIU_REAL, 0, t->comm));
+  s->extension = EXTENSION * edge;
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) s->targets = (PetscBool)(s->targets || t->target[j] > 0);
+  PetscCall(PetscArraycpy(s->target, s->targets ? t->target : usual, HYCO_N_ERRORS));
+  PetscCall(Rounds(s, grown, report));
+  PetscCall(BuildBest(s, path, report));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, const char path[], HycoSamples *grown,
+                                HycoTraining *report)
+{
+  Search *s;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *grown = NULL;
+  if (Settled(t)) {
+    PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
+    PetscCall(Build(t, store, NULL, NULL));
+    PetscCall(HycoReducerBuild(t, PETSC_TRUE, path, report));
+    GetRecipe(t, &report->chosen.recipe);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscNew(&s));
+  s->t = t;
+  s->store = store;
+  PetscCall(PetscSNPrintf(s->file, sizeof(s->file), "%s.attempt", path));
+  ierr = Learn(s, path, grown, report);
+  PetscCall(PetscFree(s->ratio));
+  PetscCall(PetscFree(s));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,91 @@
+/* Many predictions in one call: points with the same reduced stiffness follow each other, so that each is filled and
+ * factored once. */
+#include <hycoromimpl.h>
+#include <stdlib.h>
+
+typedef struct {
+  const PetscReal *mu;
+  const PetscInt *order; /* of the parameters: those that reach the stiffness or the contact rows first */
+  PetscInt n, at;
+} Point;
+
+static int Compare(const void *a, const void *b)
+{
+  const Point *p = a, *q = b;
+
+  for (PetscInt k = 0; k < p->n; k++) {
+    const PetscReal x = p->mu[p->order[k]], y = q->mu[p->order[k]];
+
+    if (x != y) return x < y ? -1 : 1;
+  }
+  return p->at < q->at ? -1 : p->at > q->at;
+}
+
+static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt order[], Point point[])
+{
+  const PetscInt n_par = m->scene->n_parameters;
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+  PetscInt count = 0;
+
+  PetscFunctionBegin;
+  HycoFEReaches(m->fe, reaches);
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt p = 0; p < n_par; p++) {
+      if (reaches[p] == (pass ? PETSC_FALSE : PETSC_TRUE)) order[count++] = p;
+    }
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    const Point here = {mu + k * n_par, order, n_par, k};
+
+    point[k] = here;
+  }
+  if (n) qsort(point, (size_t)n, sizeof(*point), Compare);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetSizes(HycoROM m, PetscInt *n_contacts, PetscInt *n_nodes, PetscInt *dim)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoROMLoad()");
+  if (n_contacts) *n_contacts = m->pairs.n;
+  if (n_nodes) *n_nodes = m->mesh->n_nodes;
+  if (dim) *dim = m->mesh->dim;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points in the order that they were sorted into; the answers in the order that they came in. */
+static PetscErrorCode SolveEach(HycoROM m, PetscInt n, const Point point[], HycoPrediction prediction[],
+                                PetscReal Lambda[], PetscReal U[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    const size_t at = (size_t)point[k].at, n_dof = (size_t)(m->mesh->n_nodes * m->mesh->dim);
+
+    PetscCall(HycoROMPredict(m, m->scene->n_parameters, point[k].mu));
+    if (prediction) PetscCall(HycoROMGetPrediction(m, &prediction[at]));
+    if (Lambda) PetscCall(PetscArraycpy(Lambda + at * (size_t)m->pairs.n, m->Lambda, m->pairs.n));
+    if (U) PetscCall(HycoROMComplete(m));
+    if (U) PetscCall(PetscArraycpy(U + at * n_dof, m->U, n_dof));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
+                                HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[])
+{
+  PetscInt order[HYCO_MAX_PARAMETERS];
+  Point *point;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, "HycoROMLoad()");
+  for (PetscInt k = 0; k < n; k++) PetscCall(HycoSceneCheckParameters(m->scene, n_parameters, mu + k * n_parameters));
+  PetscCall(HycoROMSetUp(m));
+  PetscCall(PetscMalloc1(n, &point));
+  ierr = Sort(m, n, mu, order, point);
+  if (!ierr) ierr = SolveEach(m, n, point, prediction, Lambda, U);
+  m->solved = PETSC_FALSE; /* whose answer would it be? */
+  PetscCall(PetscFree(point));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,465 @@
+/*
+  The condensed model, online: the exact dual problem of linear elasticity, small and dense in the forces, with its
+  matrix and vector interpolated over the parameters (hycocondensed.h). Interpolated entry by entry, G may lose its
+  definiteness between nodes: bounds of the nodes' matrices by one of them, found in training, show that it does not, or
+  else a Cholesky factorisation looks; a point where it does is refused. A definite G gives one solution, so the start
+  of the active set, the forces of the nearest training point, decides nothing but the time.
+*/
+#include <hycocondensed.h>
+#include <hycoromimpl.h>
+#include <petscblaslapack.h>
+#include <petscviewer.h>
+
+const char *const HycoGridFieldNames[] = {"G", "g", "H", "a"};
+
+/* An eigenvalue of G that is less negative than this share of its largest diagonal entry is round-off. */
+#define SEMIDEFINITE 1e-12
+
+PetscErrorCode HycoCondensedCreate(PetscInt dim, PetscInt m, PetscInt l, HycoCondensed *condensed)
+{
+  HycoCondensed c;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&c));
+  c->dim = dim;
+  c->m = m;
+  c->l = l;
+  c->hopeless = -1;
+  *condensed = c;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedDestroy(HycoCondensed *condensed)
+{
+  HycoCondensed c = *condensed;
+
+  PetscFunctionBegin;
+  if (!c) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt p = 0; p < c->dim; p++) PetscCall(PetscFree(c->x[p]));
+  for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) PetscCall(PetscFree(c->field[f].data));
+  PetscCall(PetscFree(c->Lambda));
+  PetscCall(PetscFree(c->bounds));
+  PetscCall(PetscFree(c->law));
+  PetscCall(PetscFree(c->flat));
+  PetscCall(PetscFree(c->sample));
+  PetscCall(PetscFree(c->probe));
+  PetscCall(PetscFree(c->inverse));
+  PetscCall(PetscFree(c->theta_scale));
+  PetscCall(PetscFree(c->node_stiff));
+  PetscCall(PetscFree(c->node_load));
+  PetscCall(PetscFree(c->packed));
+  PetscCall(PetscFree(c->M));
+  PetscCall(PetscFree(c->work));
+  PetscCall(PetscFree(c->g));
+  PetscCall(PetscFree(c->H));
+  PetscCall(PetscFree(c->a));
+  PetscCall(PetscFree(c->w));
+  PetscCall(PetscFree(c->active));
+  PetscCall(HycoSetFactorDestroy(&c->set_factor));
+  PetscCall(PetscFree(*condensed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedAllocate(HycoCondensed c)
+{
+  const PetscInt rows[HYCO_N_FIELDS] = {c->m * (c->m + 1) / 2, c->m, c->l * c->m, c->l};
+
+  PetscFunctionBegin;
+  for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) {
+    HycoGridField *field = &c->field[f];
+    const PetscBool all = (PetscBool)(f == HYCO_FIELD_GAP || f == HYCO_FIELD_FREE);
+
+    field->rows = rows[f];
+    field->tensor.dim = c->dim;
+    for (PetscInt p = 0; p < c->dim; p++) {
+      field->tensor.n[p] = all || c->stiff[p] ? c->n[p] : 1;
+      field->tensor.x[p] = c->x[p];
+      field->tensor.degree[p] = field->tensor.n[p] - 1;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
+{
+  const HycoGridField *gap = &c->field[HYCO_FIELD_GAP];
+  const size_t m = (size_t)c->m;
+
+  PetscFunctionBegin;
+  c->gap_size = 0;
+  for (size_t k = 0; k < (size_t)HycoTensorSize(&gap->tensor) * m; k++)
+    c->gap_size = PetscMax(c->gap_size, PetscAbsReal(gap->data[k]));
+  PetscCall(PetscFree(c->H));
+  PetscCall(PetscFree(c->a));
+  PetscCall(PetscMalloc1(c->l * c->m + 1, &c->H));
+  PetscCall(PetscMalloc1(c->l + 1, &c->a));
+  if (c->M) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(m * (m + 1) / 2 + 1, &c->packed));
+  PetscCall(PetscMalloc1(m * m + 1, &c->M));
+  PetscCall(PetscMalloc1(m + 1, &c->g));
+  PetscCall(PetscMalloc1(m + 1, &c->w));
+  PetscCall(PetscCalloc1(m + 1, &c->active));
+  PetscCall(HycoSetFactorCreate(c->m, &c->set_factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define TILE 64
+
+/* Both triangles of M from the columns of the lower one, by tiles, so that the transposed entries stay near. */
+static void Unpack(PetscInt m, const PetscReal packed[], PetscReal M[])
+{
+  for (PetscInt jb = 0; jb < m; jb += TILE) {
+    for (PetscInt ib = jb; ib < m; ib += TILE) {
+      for (PetscInt j = jb; j < PetscMin(jb + TILE, m); j++) {
+        const PetscReal *column = packed + (size_t)j * (size_t)(2 * m - j + 1) / 2;
+
+        for (PetscInt i = PetscMax(ib, j); i < PetscMin(ib + TILE, m); i++) {
+          M[(size_t)j * (size_t)m + (size_t)i] = column[i - j];
+          M[(size_t)i * (size_t)m + (size_t)j] = column[i - j];
+        }
+      }
+    }
+  }
+}
+
+/* Whether a packed matrix, shifted by a share of its largest diagonal entry, has a Cholesky factor. */
+static PetscErrorCode HasFactor(HycoCondensed c, const PetscReal packed[], PetscReal share, PetscBool *definite)
+{
+  PetscReal largest = 0;
+  PetscBLASInt m, info;
+
+  PetscFunctionBegin;
+  if (!c->work) PetscCall(PetscMalloc1((size_t)c->m * (size_t)c->m, &c->work));
+  Unpack(c->m, packed, c->work);
+  for (PetscInt i = 0; i < c->m; i++) largest = PetscMax(largest, c->work[(size_t)i * (size_t)(c->m + 1)]);
+  for (PetscInt i = 0; i < c->m; i++) c->work[(size_t)i * (size_t)(c->m + 1)] += share * largest;
+  PetscCall(PetscBLASIntCast(c->m, &m));
+  LAPACKpotrf_("L", &m, c->work, &m, &info);
+  *definite = (PetscBool)(info == 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The narrowest of some intervals about the ratio of the traces with lower R <= G_k <= upper R, R the middle node's. */
+static PetscErrorCode BoundNode(HycoCondensed c, const PetscReal R[], const PetscReal G[], PetscReal bound[2])
+{
+  static const PetscReal widths[] = {0.01, 0.05, 0.2, 0.5};
+  const PetscInt rows = c->field[HYCO_FIELD_G].rows;
+  PetscReal *difference, trace[2] = {0, 0};
+  PetscBool definite = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  bound[0] = bound[1] = 0; /* none */
+  PetscCall(PetscMalloc1(rows, &difference));
+  for (PetscInt j = 0, at = 0; j < c->m; at += c->m - j++) {
+    trace[0] += R[at];
+    trace[1] += G[at];
+  }
+  for (int k = 0; k < 4 && !definite; k++) {
+    const PetscReal low = (1 - widths[k]) * trace[1] / trace[0], high = (1 + widths[k]) * trace[1] / trace[0];
+
+    for (PetscInt r = 0; r < rows; r++) difference[r] = G[r] - low * R[r];
+    PetscCall(HasFactor(c, difference, 0, &definite));
+    if (!definite) continue;
+    for (PetscInt r = 0; r < rows; r++) difference[r] = high * R[r] - G[r];
+    PetscCall(HasFactor(c, difference, 0, &definite));
+    if (!definite) continue;
+    bound[0] = low;
+    bound[1] = high;
+  }
+  PetscCall(PetscFree(difference));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedBound(HycoCondensed c)
+{
+  const HycoGridField *G = &c->field[HYCO_FIELD_G];
+  const PetscInt n = HycoTensorSize(&G->tensor);
+  const PetscReal *R = G->data + (size_t)(n / 2) * (size_t)G->rows;
+  PetscBool definite;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(c->bounds));
+  PetscCall(PetscFree(c->law));
+  PetscCall(PetscFree(c->flat));
+  PetscCall(PetscCalloc1(2 * n, &c->bounds));
+  PetscCall(HasFactor(c, R, 0, &definite));
+  for (PetscInt k = 0; definite && k < n; k++) {
+    if (k == n / 2)
+      c->bounds[2 * k] = c->bounds[2 * k + 1] = 1;
+    else
+      PetscCall(BoundNode(c, R, G->data + (size_t)k * (size_t)G->rows, c->bounds + 2 * k));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether sum of w_k G_k >= (sum of w_k times its lower or, where w_k < 0, upper bound) R is definite by that alone. */
+static PetscErrorCode KnownDefinite(HycoCondensed c, const PetscReal mu[], PetscInt axis, PetscInt skip,
+                                    PetscBool *known)
+{
+  const HycoTensor *t = &c->field[HYCO_FIELD_G].tensor;
+  const PetscInt n = HycoTensorSize(t);
+  PetscReal *w, sum = 0;
+
+  PetscFunctionBegin;
+  *known = PETSC_TRUE;
+  PetscCall(PetscMalloc1(n, &w));
+  PetscCall(HycoTensorWeights(t, mu, axis, skip, w));
+  for (PetscInt k = 0; k < n; k++) {
+    sum += w[k] * c->bounds[2 * k + (w[k] < 0)];
+    if (c->bounds[2 * k] <= 0 && w[k] < 0) *known = PETSC_FALSE;
+  }
+  *known = (PetscBool)(*known && sum > 1e-3);
+  PetscCall(PetscFree(w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedFlexibility(HycoCondensed c, const PetscReal mu[], PetscInt axis, PetscInt skip,
+                                        PetscBool *definite)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_G], mu, axis, skip, c->packed));
+  Unpack(c->m, c->packed, c->M);
+  HycoSetFactorForget(c->set_factor);
+  PetscCall(KnownDefinite(c, mu, axis, skip, definite));
+  if (!*definite) PetscCall(HasFactor(c, c->packed, SEMIDEFINITE, definite));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* G and H, unless their parameters are as they were. */
+static PetscErrorCode BringStiffness(HycoCondensed c, const PetscReal mu[])
+{
+  PetscBool same = c->current, definite;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < c->dim; p++) same = (PetscBool)(same && (!c->stiff[p] || c->at[p] == mu[p]));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  c->current = PETSC_FALSE;
+  PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
+  HycoCheckModel(
+      definite,
+      "the interpolated flexibility is not positive definite here (one value left out: error %.1e): train on "
+      "more values of the parameters that reach the stiffness",
+      (double)c->errors[0]);
+  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_H], mu, -1, -1, c->H));
+  PetscCall(PetscArraycpy(c->at, mu, c->dim));
+  c->current = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal Width(HycoCondensed c, PetscInt p)
+{
+  return c->n[p] > 1 ? c->x[p][c->n[p] - 1] - c->x[p][0] : 1;
+}
+
+PetscInt HycoCondensedNearest(HycoCondensed c, const PetscReal mu[], PetscReal *distance2)
+{
+  PetscReal sum = 0;
+  PetscInt node = 0;
+
+  for (PetscInt p = 0; p < c->dim; p++) {
+    PetscInt nearest = 0;
+
+    for (PetscInt k = 1; k < c->n[p]; k++) {
+      if (PetscAbsReal(c->x[p][k] - mu[p]) < PetscAbsReal(c->x[p][nearest] - mu[p])) nearest = k;
+    }
+    node = node * c->n[p] + nearest;
+    sum += PetscSqr((c->x[p][nearest] - mu[p]) / Width(c, p));
+  }
+  if (distance2) *distance2 = sum;
+  return node;
+}
+
+/* The active contacts of the nearest training point, or of the last prediction where that is nearer. The solution does
+   not depend on it: it is that of the last set's equations. */
+static void StartSet(HycoCondensed c, const PetscReal mu[])
+{
+  PetscReal there, back = 0;
+  const PetscInt node = HycoCondensedNearest(c, mu, &there);
+
+  for (PetscInt p = 0; p < c->dim; p++) back += PetscSqr((c->last[p] - mu[p]) / Width(c, p));
+  for (PetscInt i = 0; (!c->solved || there < back) && i < c->m; i++)
+    c->active[i] = (PetscBool)(c->Lambda[(size_t)node * (size_t)c->m + (size_t)i] > 0);
+}
+
+/* The residuals of w = g + G L, recomputed. Equilibrium is no unknown here: it holds by what G and H are. */
+static void ComputeKKT(HycoCondensed c, const PetscReal L[], HycoKKT *kkt)
+{
+  PetscReal size = 0, most = 0, worst[3] = {0, 0, 0};
+
+  for (PetscInt i = 0; i < c->m; i++) c->w[i] = 0;
+  for (PetscInt j = 0; j < c->m; j++) {
+    const PetscReal *column = c->M + (size_t)j * (size_t)c->m;
+
+    most = PetscMax(most, PetscAbsReal(L[j]));
+    for (PetscInt i = 0; L[j] != 0 && i < c->m; i++) c->w[i] += column[i] * L[j];
+  }
+  for (PetscInt i = 0; i < c->m; i++) {
+    size = PetscMax(size, PetscMax(PetscAbsReal(c->g[i]), PetscAbsReal(c->w[i])));
+    c->w[i] += c->g[i];
+    if (PetscIsInfOrNanReal(c->w[i]) || PetscIsInfOrNanReal(L[i])) worst[2] = PETSC_MAX_REAL;
+  }
+  for (PetscInt i = 0; i < c->m; i++) {
+    worst[0] = PetscMax(worst[0], -c->w[i]);
+    worst[1] = PetscMax(worst[1], -L[i]);
+    if (L[i] != 0 && size > 0)
+      worst[2] = PetscMax(worst[2], PetscAbsReal(c->w[i] / size * (L[i] / most))); /* no overflow */
+  }
+  kkt->stationarity = kkt->rounding = 0;
+  kkt->penetration = worst[0] > 0 ? worst[0] / size : 0;
+  kkt->adhesion = worst[1] > 0 ? worst[1] / most : 0;
+  kkt->complementarity = worst[2];
+}
+
+/* One method; the forces are in model->Lambda. */
+static PetscErrorCode Attempt(HycoROM m, PetscInt type)
+{
+  HycoCondensed c = m->condensed;
+  HycoSolver s = m->solver;
+  HycoPrediction *p = &m->prediction;
+  const PetscInt max_its = s->max_its ? s->max_its : 50 + 4 * c->m;
+  HycoLCPStatus status = HYCO_LCP_SOLVED;
+  PetscBool solved = PETSC_TRUE;
+  PetscInt its = 0;
+
+  PetscFunctionBegin;
+  if (type == HYCO_TYPE_TAO) {
+    const PetscInt tao = s->tao_type == HYCO_TAO_AUTO ? HYCO_TAO_GPCG : s->tao_type;
+
+    PetscCall(HycoTaoLCP(c->m, c->M, c->g, PETSC_TRUE, tao, s->max_its, m->Lambda, &its, &solved));
+  } else if (type == HYCO_TYPE_LEMKE)
+    PetscCall(HycoLCPLemke(c->m, c->M, c->g, 50 * (c->m + 10), m->Lambda, &its, &status));
+  else
+    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, c->set_factor, max_its, s->monitor, s->monitor_ctx,
+                               c->active, m->Lambda, &its, &status));
+  for (PetscInt i = 0; i < c->m; i++) m->Lambda[i] = PetscMax(m->Lambda[i], 0); /* round-off below zero */
+  ComputeKKT(c, m->Lambda, &p->kkt);
+  p->iterations += its;
+  p->reason = HycoKKTMax(&p->kkt) <= s->rtol                                         ? HYCO_CONVERGED
+              : solved && (status == HYCO_LCP_SOLVED || status == HYCO_LCP_SINGULAR) ? HYCO_DIVERGED_RESIDUAL
+                                                                                     : HYCO_DIVERGED_ITERATIONS;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The chosen method, then the active set, then Lemke's, until the residuals are small. */
+static PetscErrorCode SolveForces(HycoROM m, const PetscReal mu[])
+{
+  static const PetscInt order[] = {HYCO_TYPE_TAO, HYCO_TYPE_ACTIVE_SET, HYCO_TYPE_LEMKE};
+  HycoPrediction *p = &m->prediction;
+  PetscInt k = 0;
+
+  PetscFunctionBegin;
+  p->iterations = 0;
+  while (order[k] != m->solver->type) k++;
+  StartSet(m->condensed, mu);
+  PetscCall(PetscSNPrintf(p->method, sizeof(p->method), "%s condensed", HycoSolverTypes[order[k]]));
+  PetscCall(Attempt(m, order[k]));
+  while (p->reason < 0 && m->solver->fallback && k < 2) {
+    char before[sizeof(p->method)];
+
+    PetscCall(PetscStrncpy(before, p->method, sizeof(before)));
+    PetscCall(Attempt(m, order[++k]));
+    PetscCall(PetscSNPrintf(p->method, sizeof(p->method), "%s, then %s", before, HycoSolverTypes[order[k]]));
+    if (p->reason == HYCO_CONVERGED) p->reason = HYCO_CONVERGED_FALLBACK;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* gamma = a - H L, and U = u0 + V gamma on the nodes of the reduced mesh. */
+static PetscErrorCode Displacements(HycoROM m, const PetscReal mu[])
+{
+  HycoCondensed c = m->condensed;
+  const PetscInt l = m->l;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedEvaluate(c, HYCO_FIELD_FREE, mu, -1, -1, c->a));
+  for (PetscInt j = 0; j < l; j++) {
+    m->gamma[j] = c->a[j];
+    for (PetscInt i = 0; i < c->m; i++) m->gamma[j] -= c->H[j * c->m + i] * m->Lambda[i];
+  }
+  if (!c->exact_gap) PetscCall(HycoCondensedBringGap(c, mu));
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    m->U[i] = m->fe->u0[i];
+    for (PetscInt j = 0; j < l; j++) m->U[i] += m->V[(size_t)i * (size_t)l + (size_t)j] * m->gamma[j];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedPredict(HycoROM m, const PetscReal mu[])
+{
+  HycoCondensed c = m->condensed;
+  HycoPrediction *p = &m->prediction;
+  PetscReal begin = HycoNow(), solve;
+
+  PetscFunctionBegin;
+  PetscCall(BringStiffness(c, mu));
+  PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
+  solve = HycoNow();
+  p->seconds.factor = 0;
+  p->seconds.assemble = solve - begin;
+  PetscCall(SolveForces(m, mu));
+  c->solved = (PetscBool)(p->reason == HYCO_CONVERGED && m->solver->type == HYCO_TYPE_ACTIVE_SET);
+  PetscCall(PetscArraycpy(c->last, mu, c->dim));
+  p->seconds.solve = HycoNow() - solve;
+  PetscCall(Displacements(m, mu));
+  p->interpolation_error = c->errors[2]; /* of an older file: HycoTrustEstimate() has newer ones' */
+  for (PetscInt q = 0; q < c->dim; q++) {
+    if (!c->affine[q]) p->interpolation_error *= HycoPolynomialGrowth(c->n[q], c->x[q], mu[q]);
+  }
+  p->seconds.total = HycoNow() - begin;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedSetUp(HycoROM m)
+{
+  const PetscInt entries = HycoPairsWidth(&m->pairs) * m->mesh->dim * m->pairs.n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
+  PetscCall(HycoCondensedPrepare(m->condensed));
+  m->n = m->n_free = m->l;
+  m->m = m->n_L = m->pairs.n;
+  m->spread = PETSC_TRUE;
+  PetscCall(PetscMalloc1(m->m, &m->contact));
+  PetscCall(PetscMalloc1(m->m, &m->slave_id));
+  for (PetscInt k = 0; k < m->m; k++) {
+    m->contact[k] = k;
+    m->slave_id[k] = m->mesh->node_id[m->pairs.slave[k]];
+  }
+  PetscCall(PetscMalloc1(m->m + 1, &m->row_start));
+  PetscCall(PetscMalloc1(entries, &m->row_dof));
+  PetscCall(PetscMalloc1(entries, &m->row_value));
+  PetscCall(PetscMalloc1(m->m, &m->gap));
+  m->condensed->given = (HycoGapSource){m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap};
+  m->condensed->scene = m->scene;
+  if (m->condensed->exact_loads) PetscCall(HycoCondensedPrepareLoads(m->condensed));
+  PetscCall(PetscCalloc1(m->l, &m->gamma));
+  PetscCall(PetscCalloc1(m->fe->n_dof, &m->U));
+  PetscCall(PetscCalloc1(m->m, &m->Lambda));
+  PetscCall(PetscMalloc1(m->mesh->n_cells * m->fe->n_sigma, &m->stress));
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver)); /* it holds the options alone */
+  PetscCall(HycoSolverSetFromOptions(m->solver, m->scene->options));
+  m->ready = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedView(HycoROM m, PetscViewer viewer)
+{
+  HycoCondensed c = m->condensed;
+
+  PetscFunctionBegin;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  contacts: %d; flexibility at %d points, gap without forces at %d\n",
+                                   (int)c->m, (int)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor),
+                                   (int)HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor)));
+  for (PetscInt p = 0; p < c->dim; p++)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %d values; degree %d of the flexibility, %d of the gap%s\n",
+                                     m->scene->parameter[p], (int)c->n[p], (int)c->field[HYCO_FIELD_G].tensor.degree[p],
+                                     (int)c->field[HYCO_FIELD_GAP].tensor.degree[p],
+                                     c->affine[p] ? " (affine: exact)" : ""));
+  if (c->exact_gap)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  from the scene itself: gaps%s\n", c->exact_loads ? ", loads" : ""));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  one value left out, relative: flexibility %.1e, gap %.1e, forces %.1e\n",
+                                   (double)c->errors[0], (double)c->errors[1], (double)c->errors[2]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  fields and stresses on %d of %d elements, or the whole mesh\n",
+                                   (int)m->mesh->n_cells, (int)m->whole_cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

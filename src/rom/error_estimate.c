@@ -1,0 +1,223 @@
+/*
+  How far a prediction can be trusted: an estimate of its error from what is known online, calibrated at training on
+  held-out solutions (calibrate.c). log e = c_0 + sum_j c_j log(1 + f_j / floor_j), c_j >= 0, of five features:
+
+    0  misfit       distance of the full-order displacements from what the modes alone give there, over their size;
+                    condensed: the law of the forces' interpolation (condensed_estimate.c)
+    1  penetration  of the contacts that (38) does not constrain, over the size of B U; condensed: the law of u
+    2  adhesion     forces of these contacts where the predicted displacement leaves a gap, over the size of the forces
+    3  distance     to the nearest training point, each parameter scaled to its range
+    4  tail         the last quarter of the modes' coefficients over all of them: what the modes cut off is of this kind
+
+  Outside what training has seen the estimate is multiplied by (1 + b / d)^2, b the scaled distance from it and d the
+  training points' spacing. K's rows on the interface are cut off with the RID's elements, so that no residual can be
+  formed there; the misfit says instead how far the two sides of the interface disagree.
+*/
+#include <hycoalgorithms.h>
+#include <hycocondensed.h>
+#include <hycoromimpl.h>
+#include <petscviewer.h>
+#include <stdio.h>
+
+enum { MISFIT, PENETRATION, ADHESION, DISTANCE = HYCO_TRUST_DISTANCE, TAIL };
+
+static PetscReal Quotient(PetscReal part2, PetscReal size2)
+{
+  return size2 > 0 ? PetscSqrtReal(part2 / size2) : part2 > 0 ? 1 : 0;
+}
+
+static PetscReal Misfit(HycoROM m)
+{
+  PetscReal lost = 0, size = 0;
+
+  for (PetscInt f = 0; f < m->n_fe; f++) {
+    const PetscInt dof = m->fe_dof[f];
+    PetscReal by_modes = m->fe->u0[dof];
+
+    for (PetscInt j = 0; j < m->l; j++) by_modes += m->V[(size_t)dof * (size_t)m->l + (size_t)j] * m->gamma[j];
+    lost += (m->U[dof] - by_modes) * (m->U[dof] - by_modes);
+    size += m->U[dof] * m->U[dof];
+  }
+  return Quotient(lost, size);
+}
+
+static void Contacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
+{
+  PetscReal in = 0, moved = 0, stuck = 0, force = 0;
+
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    const PetscReal bu = HycoROMAddRow(m, k, 0);
+
+    moved += bu * bu;
+    force += m->Lambda[k] * m->Lambda[k];
+    if (m->in_rid[k] && m->type != HYCO_ROM_PROJECTION) continue;
+    if (bu > m->gap[k])
+      in += (bu - m->gap[k]) * (bu - m->gap[k]);
+    else if (bu < m->gap[k])
+      stuck += m->Lambda[k] * m->Lambda[k];
+  }
+  *penetration = Quotient(in, moved);
+  *adhesion = Quotient(stuck, force);
+}
+
+PetscReal HycoTrustDistance(HycoScene s, const PetscReal a[], const PetscReal b[])
+{
+  PetscReal sum = 0;
+
+  for (PetscInt p = 0; p < s->n_parameters; p++) {
+    const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1, step = (a[p] - b[p]) / width;
+
+    sum += step * step;
+  }
+  return PetscSqrtReal(sum);
+}
+
+/* Of the POD modes: supremizers have no singular value. */
+static PetscReal Tail(HycoROM m)
+{
+  PetscReal last = 0, all = 0;
+  PetscInt l = m->l;
+
+  while (l > 0 && !(m->sigma[l - 1] > 0)) l--;
+  for (PetscInt j = 0; j < l; j++) {
+    all += m->gamma[j] * m->gamma[j];
+    if (j >= 3 * l / 4) last += m->gamma[j] * m->gamma[j];
+  }
+  return Quotient(last, all);
+}
+
+PetscErrorCode HycoTrustMeasure(HycoROM m, PetscReal feature[])
+{
+  const PetscInt n_par = m->scene->n_parameters;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMComplete(m));
+  feature[MISFIT] = feature[PENETRATION] = feature[ADHESION] = 0;
+  if (m->condensed) {
+    PetscReal law[HYCO_N_LAWS];
+
+    HycoCondensedLaw(m->condensed, m->fe->mu, law);
+    feature[MISFIT] = PetscMax(0, law[HYCO_LAW_LAMBDA]);
+    feature[PENETRATION] = PetscMax(0, law[HYCO_LAW_U]);
+  } else {
+    feature[MISFIT] = Misfit(m);
+    Contacts(m, &feature[PENETRATION], &feature[ADHESION]);
+  }
+  feature[TAIL] = Tail(m);
+  feature[DISTANCE] = m->n_points && n_par ? PETSC_MAX_REAL : 0;
+  for (PetscInt k = 0; n_par && k < m->n_points; k++)
+    feature[DISTANCE] = PetscMin(feature[DISTANCE], HycoTrustDistance(m->scene, m->fe->mu, m->points + k * n_par));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What training has seen of each parameter, least and largest. */
+static PetscErrorCode FindReach(HycoROM m)
+{
+  const PetscInt n_par = m->scene->n_parameters;
+
+  PetscFunctionBegin;
+  if (m->reach) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(2 * n_par + 1, &m->reach));
+  PetscCall(HycoSamplesReach(m->scene, m->n_points, m->points, m->reach, m->reach + n_par));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nearest point of what training has seen, and how far outside it mu is. */
+static PetscReal Beyond(HycoROM m, const PetscReal mu[], PetscReal nearest[])
+{
+  const HycoScene s = m->scene;
+  PetscReal most = 0;
+
+  for (PetscInt p = 0; p < s->n_parameters; p++) {
+    const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1;
+
+    nearest[p] = PetscMin(PetscMax(mu[p], m->reach[p]), m->reach[s->n_parameters + p]);
+    most = PetscMax(most, PetscAbsReal(mu[p] - nearest[p]) / width);
+  }
+  return most > 1e-12 ? most : 0;
+}
+
+static PetscReal Estimate(const HycoTrust *t, const PetscReal coefficient[], const PetscReal feature[])
+{
+  PetscReal sum = coefficient[HYCO_TRUST_FEATURES];
+
+  for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) sum += coefficient[j] * PetscLogReal(1 + feature[j] / t->floor[j]);
+  return PetscExpReal(PetscMin(sum, 200));
+}
+
+/* A condensed model's own estimates; those of older files by values left out in training. */
+static void Condensed(HycoROM m, HycoPrediction *p)
+{
+  const HycoCondensed c = m->condensed;
+  PetscReal growth = 1, law[HYCO_N_LAWS];
+
+  if (c->law) {
+    HycoCondensedLaw(c, m->fe->mu, law);
+    for (PetscInt j = 0; j < HYCO_N_LAWS; j++) law[j] = law[j] < 0 ? -1 : PetscMax(HYCO_LAW_FLOOR, law[j]);
+    p->estimated_error_u = law[HYCO_LAW_U];
+    p->estimated_error_lambda = p->interpolation_error = law[HYCO_LAW_LAMBDA];
+    p->estimated_error_u_full = law[HYCO_LAW_U_FULL];
+    return;
+  }
+  for (PetscInt q = 0; q < c->dim; q++) {
+    if (!c->affine[q]) growth *= HycoPolynomialGrowth(c->n[q], c->x[q], m->fe->mu[q]);
+  }
+  p->estimated_error_lambda = p->interpolation_error;
+  if (c->errors_u[0] < 0) return; /* an older file */
+  p->estimated_error_u = c->errors_u[0] * growth;
+  p->estimated_error_u_full = c->errors_u[1] * growth;
+}
+
+PetscErrorCode HycoTrustEstimate(HycoROM m, HycoPrediction *p)
+{
+  const HycoTrust *t = &m->trust;
+  PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_TRUST_FEATURES], outside, estimate[HYCO_N_TRUST];
+
+  PetscFunctionBegin;
+  p->estimated_error_u = p->estimated_error_lambda = p->estimated_error_sigma = -1;
+  PetscCall(FindReach(m));
+  p->beyond = Beyond(m, m->fe->mu, nearest);
+  p->estimated_error_u_full = -1;
+  if (m->condensed && p->reason > 0) Condensed(m, p);
+  if (!t->n || p->reason <= 0 || (!m->condensed && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoTrustMeasure(m, feature));
+  outside = 1 + (p->beyond > 0 ? HycoTrustDistance(m->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
+  for (PetscInt e = 0; e < HYCO_N_TRUST; e++)
+    estimate[e] = t->has[e] ? Estimate(t, t->law[e], feature) * outside * outside : -1;
+  p->estimated_error_u = estimate[HYCO_TRUST_U];
+  p->estimated_error_sigma = estimate[HYCO_TRUST_SIGMA];
+  p->estimated_error_lambda = estimate[HYCO_TRUST_LAMBDA];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* "u 1.2e-04, stress 3e-03, contact forces 2e-02" */
+static void DescribeErrors(const PetscReal error[], char text[HYCO_LINE])
+{
+  snprintf(text, HYCO_LINE, "u %.2g, stress %.2g, contact forces %.2g", (double)error[HYCO_TRUST_U],
+           (double)error[HYCO_TRUST_SIGMA], (double)error[HYCO_TRUST_LAMBDA]);
+}
+
+PetscErrorCode HycoTrustView(HycoROM m, PetscViewer viewer)
+{
+  const HycoTrust *t = &m->trust;
+  char median[HYCO_LINE], largest[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (t->n_held) {
+    DescribeErrors(t->median, median);
+    DescribeErrors(t->largest, largest);
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  errors at %d held-out points: median %s; largest %s\n", (int)t->n_held,
+                                     median, largest));
+  }
+  if (t->n)
+    PetscCall(
+        PetscViewerASCIIPrintf(viewer, "  estimates its errors, by %d predictions of held-out solutions\n", (int)t->n));
+  else if (m->type == HYCO_ROM_CONDENSED)
+    PetscCall(PetscViewerASCIIPrintf(
+        viewer, "  estimates its errors by values left out%s\n",
+        !m->condensed->law && m->condensed->errors_u[0] < 0 ? ", and none of u: an older file" : ""));
+  else
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  does not estimate its errors: not calibrated\n"));
+  if (m->search) PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->search));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

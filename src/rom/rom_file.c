@@ -1,0 +1,632 @@
+/*
+  The model file. Groups: /mesh and /problem (what the online phase opens), /reconstruction, /training, /whole (read
+  only when a field on the whole mesh is asked for). Every index is checked on load.
+*/
+#include <hycocondensed.h>
+#include <hycotable.h>
+#include <string.h>
+
+/* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters.
+   3: problem/type; what has none is hybrid. 4: the type may be condensed. 5: surfaces that a map moves are searched for
+   their masters, and a slave node may face none; models without such are written as 4. The kind is every type's, so
+   that an older reader tells the format. */
+#define HYCO_ROM_FORMAT 5
+#define HYCO_ROM_STILL  4
+#define HYCO_ROM_OLDEST 2
+#define HYCO_ROM_KIND   "hyco hybrid model"
+
+static PetscErrorCode Name(const char prefix[], const char name[], char out[128])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(out, 128, "%s/%s", prefix, name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PutInt(HycoH5 h, const char prefix[], const char name[], PetscInt rows, PetscInt cols,
+                             const PetscInt *data)
+{
+  char at[128];
+
+  PetscFunctionBegin;
+  PetscCall(Name(prefix, name, at));
+  PetscCall(HycoH5WriteInt(h, at, rows, cols, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SaveGroups(HycoH5 h, const char prefix[], HycoMesh m)
+{
+  char *names, at[128];
+  size_t length = 1;
+
+  PetscFunctionBegin;
+  for (PetscInt g = 0; g < m->n_groups; g++) length += strlen(m->group_name[g]) + 1;
+  PetscCall(PetscCalloc1(length, &names));
+  for (PetscInt g = 0; g < m->n_groups; g++) {
+    PetscCall(PetscStrlcat(names, m->group_name[g], length));
+    PetscCall(PetscStrlcat(names, "\n", length));
+  }
+  PetscCall(Name(prefix, "group_name", at));
+  PetscCall(HycoH5WriteText(h, at, names));
+  PetscCall(PetscFree(names));
+  PetscCall(PutInt(h, prefix, "group_dim", m->n_groups, 1, m->group_dim));
+  PetscCall(PutInt(h, prefix, "group_start", m->n_groups + 1, 1, m->group_start));
+  PetscCall(PutInt(h, prefix, "group_node", m->group_start[m->n_groups], 1, m->group_node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SaveMesh(HycoH5 h, const char prefix[], HycoMesh m)
+{
+  const PetscInt head[2] = {(PetscInt)m->type, m->dim};
+  char at[128];
+
+  PetscFunctionBegin;
+  PetscCall(PutInt(h, prefix, "head", 2, 1, head));
+  PetscCall(Name(prefix, "xyz", at));
+  PetscCall(HycoH5WriteReal(h, at, m->n_nodes, 3, m->xyz));
+  PetscCall(PutInt(h, prefix, "node_id", m->n_nodes, 1, m->node_id));
+  PetscCall(PutInt(h, prefix, "node_body", m->n_nodes, 1, m->node_body));
+  PetscCall(PutInt(h, prefix, "cells", m->n_cells, m->nv, m->cells));
+  PetscCall(PutInt(h, prefix, "cell_id", m->n_cells, 1, m->cell_id));
+  PetscCall(PutInt(h, prefix, "cell_body", m->n_cells, 1, m->cell_body));
+  PetscCall(PutInt(h, prefix, "facets", m->n_facets, m->nf, m->facets));
+  PetscCall(PutInt(h, prefix, "facet_group", m->n_facets, 1, m->facet_group));
+  PetscCall(PutInt(h, prefix, "facet_cell", m->n_facets, 1, m->facet_cell));
+  PetscCall(SaveGroups(h, prefix, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadGroups(HycoH5 h, const char prefix[], HycoMesh m)
+{
+  char *names, *word, *rest, at[128];
+  PetscInt n = -1, one = 1, g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(Name(prefix, "group_dim", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, 3, &n, &one, &m->group_dim));
+  PetscCall(PetscCalloc1(n + 1, &m->group_name));
+  m->n_groups = n;
+  PetscCall(Name(prefix, "group_name", at));
+  PetscCall(HycoH5LoadText(h, at, &names));
+  for (word = strtok_r(names, "\n", &rest); word && g < n; word = strtok_r(NULL, "\n", &rest))
+    PetscCall(PetscStrallocpy(word, &m->group_name[g++]));
+  PetscCall(PetscFree(names));
+  HycoCheck(g == n, "the model's group names are damaged");
+  n++;
+  PetscCall(Name(prefix, "group_start", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &n, &one, &m->group_start));
+  for (g = 0; g < m->n_groups; g++)
+    HycoCheck(m->group_start[0] == 0 && m->group_start[g] <= m->group_start[g + 1], "the model's groups are damaged");
+  n = m->group_start[m->n_groups];
+  PetscCall(Name(prefix, "group_node", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, m->n_nodes - 1, &n, &one, &m->group_node));
+  PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_cell_start));
+  PetscCall(PetscMalloc1(1, &m->group_cell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadMesh(HycoH5 h, const char prefix[], PetscInt n_bodies, HycoMesh *mesh)
+{
+  HycoMesh m;
+  PetscInt *head, two = 2, one = 1, three = 3;
+  char at[128];
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&m));
+  *mesh = m;
+  PetscCall(Name(prefix, "head", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, HYCO_N_CELL_TYPES - 1, &two, &one, &head));
+  m->type = (HycoCellType)head[0];
+  m->dim = HycoElementGet(m->type)->dim;
+  m->nv = HycoElementGet(m->type)->nv;
+  m->nf = HycoElementGetFacet(m->type)->nv;
+  PetscCall(PetscFree(head));
+  m->n_nodes = m->n_cells = m->n_facets = -1;
+  PetscCall(Name(prefix, "xyz", at));
+  PetscCall(HycoH5LoadReal(h, at, &m->n_nodes, &three, &m->xyz));
+  PetscCall(Name(prefix, "node_id", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &m->n_nodes, &one, &m->node_id));
+  PetscCall(Name(prefix, "node_body", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, n_bodies - 1, &m->n_nodes, &one, &m->node_body));
+  PetscCall(Name(prefix, "cells", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, m->n_nodes - 1, &m->n_cells, &m->nv, &m->cells));
+  PetscCall(Name(prefix, "cell_id", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &m->n_cells, &one, &m->cell_id));
+  PetscCall(Name(prefix, "cell_body", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, n_bodies - 1, &m->n_cells, &one, &m->cell_body));
+  PetscCall(Name(prefix, "facets", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, m->n_nodes - 1, &m->n_facets, &m->nf, &m->facets));
+  PetscCall(LoadGroups(h, prefix, m));
+  PetscCall(Name(prefix, "facet_group", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, m->n_groups - 1, &m->n_facets, &one, &m->facet_group));
+  PetscCall(Name(prefix, "facet_cell", at));
+  PetscCall(HycoH5LoadInt(h, at, -1, m->n_cells - 1, &m->n_facets, &one, &m->facet_cell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SavePairs(HycoH5 h, const char prefix[], const HycoPairs *p)
+{
+  const PetscInt entries = p->master_start[p->n];
+  char at[128];
+
+  PetscFunctionBegin;
+  PetscCall(PutInt(h, prefix, "slave", p->n, 1, p->slave));
+  PetscCall(PutInt(h, prefix, "contact", p->n, 1, p->contact));
+  PetscCall(PutInt(h, prefix, "master_start", p->n + 1, 1, p->master_start));
+  PetscCall(PutInt(h, prefix, "master", entries, 1, p->master));
+  PetscCall(Name(prefix, "weight", at));
+  PetscCall(HycoH5WriteReal(h, at, entries, 1, p->weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadPairs(HycoH5 h, const char prefix[], PetscInt n_nodes, PetscInt n_contacts, HycoPairs *p)
+{
+  PetscInt one = 1, starts, entries;
+  char at[128];
+
+  PetscFunctionBegin;
+  p->n = -1;
+  PetscCall(Name(prefix, "slave", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, n_nodes - 1, &p->n, &one, &p->slave));
+  PetscCall(Name(prefix, "contact", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, n_contacts - 1, &p->n, &one, &p->contact));
+  starts = p->n + 1;
+  PetscCall(Name(prefix, "master_start", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &starts, &one, &p->master_start));
+  for (PetscInt k = 0; k < p->n; k++)
+    HycoCheck(p->master_start[0] == 0 && p->master_start[k] <= p->master_start[k + 1],
+              "the model's contacts are damaged");
+  entries = p->master_start[p->n];
+  PetscCall(Name(prefix, "master", at));
+  PetscCall(HycoH5LoadInt(h, at, 0, n_nodes - 1, &entries, &one, &p->master));
+  PetscCall(Name(prefix, "weight", at));
+  PetscCall(HycoH5LoadReal(h, at, &entries, &one, &p->weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SaveType(HycoH5 h, HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoH5WriteText(h, "problem/type", HycoROMTypes[m->type]));
+  if (m->condensed) PetscCall(HycoCondensedSave(m, h));
+  if (m->type != HYCO_ROM_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5WriteText(h, "problem/dual", HycoDuals[m->dual]));
+  PetscCall(HycoH5WriteReal(h, "problem/V_lambda", m->l_lambda, m->pairs.n, m->V_lambda));
+  PetscCall(HycoH5WriteReal(h, "training/dual_misfit", 1, 1, &m->dual_misfit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The place of a dataset's text among the words. */
+static PetscErrorCode LoadWord(HycoH5 h, const char path[], const char name[], const char *const words[],
+                               PetscInt *index)
+{
+  char *text;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadText(h, name, &text));
+  for (*index = 0; words[*index] && strcmp(text, words[*index]); (*index)++)
+    ;
+  PetscCall(PetscFree(text));
+  HycoCheck(words[*index], "%s: %s is damaged", path, name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadType(HycoH5 h, HycoROM m)
+{
+  PetscInt word;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "problem/type")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LoadWord(h, m->path, "problem/type", HycoROMTypes, &word));
+  m->type = (HycoROMType)word;
+  if (m->type == HYCO_ROM_CONDENSED) PetscCall(HycoCondensedLoad(m, h));
+  if (m->type != HYCO_ROM_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LoadWord(h, m->path, "problem/dual", HycoDuals, &word));
+  m->dual = (HycoDual)word;
+  HycoCheck(m->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);
+  m->l_lambda = -1;
+  PetscCall(HycoH5LoadReal(h, "problem/V_lambda", &m->l_lambda, &m->pairs.n, &m->V_lambda));
+  PetscCall(HycoH5ReadReal(h, "training/dual_misfit", 1, 1, &m->dual_misfit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* training/held_out: the number of predictions, medians and largest errors. training/estimates: the number behind them,
+   the largest force, the floors, and for each error whether it has an estimate, the coefficients, the constant. */
+enum {
+  HELD_NUMBERS = 1 + 2 * HYCO_N_TRUST,
+  TRUST_NUMBERS = 2 + HYCO_TRUST_FEATURES + HYCO_N_TRUST * (2 + HYCO_TRUST_FEATURES)
+};
+
+static PetscErrorCode SaveTrust(HycoH5 h, HycoROM m)
+{
+  const HycoTrust *t = &m->trust;
+  PetscReal numbers[TRUST_NUMBERS], *at = numbers;
+
+  PetscFunctionBegin;
+  if (m->search) PetscCall(HycoH5WriteText(h, "training/search", m->search));
+  if (t->n_held) {
+    numbers[0] = (PetscReal)t->n_held;
+    for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+      numbers[1 + e] = PetscMin(t->median[e], PETSC_MAX_REAL);
+      numbers[1 + HYCO_N_TRUST + e] = PetscMin(t->largest[e], PETSC_MAX_REAL);
+    }
+    PetscCall(HycoH5WriteReal(h, "training/held_out", HELD_NUMBERS, 1, numbers));
+  }
+  if (!t->n) PetscFunctionReturn(PETSC_SUCCESS);
+  *at++ = (PetscReal)t->n;
+  *at++ = t->force;
+  for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) *at++ = t->floor[j];
+  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+    *at++ = t->has[e];
+    for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) *at++ = t->law[e][j];
+  }
+  PetscCall(HycoH5WriteReal(h, "training/estimates", TRUST_NUMBERS, 1, numbers));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool IsCount(PetscReal x)
+{
+  return (PetscBool)(x >= 1 && x <= (PetscReal)PETSC_MAX_INT);
+}
+
+static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
+{
+  HycoTrust *t = &m->trust;
+  PetscReal *numbers;
+  PetscInt n = HELD_NUMBERS, one = 1;
+  PetscBool good;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "training/held_out")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "training/held_out", &n, &one, &numbers));
+  good = IsCount(numbers[0]);
+  t->n_held = good ? (PetscInt)numbers[0] : 0;
+  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+    t->median[e] = numbers[1 + e];
+    t->largest[e] = numbers[1 + HYCO_N_TRUST + e];
+    good = (PetscBool)(good && t->median[e] >= 0 && t->largest[e] >= t->median[e]);
+  }
+  PetscCall(PetscFree(numbers));
+  HycoCheck(good, "%s: training/held_out is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* training/trust of older files: no tail, no stress; count, floors, coefficients of u and of the forces, force. */
+static PetscErrorCode LoadOldTrust(HycoH5 h, HycoROM m)
+{
+  const PetscInt features = HYCO_TRUST_FEATURES - 1;
+  HycoTrust *t = &m->trust;
+  PetscReal *numbers, *at;
+  PetscInt n = 2 + features + 2 * (features + 1), one = 1;
+  PetscBool good;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadReal(h, "training/trust", &n, &one, &numbers));
+  at = numbers;
+  good = IsCount(*at);
+  t->n = good ? (PetscInt)*at : 0;
+  at++;
+  t->floor[features] = 1;
+  for (PetscInt j = 0; j < features; j++) {
+    t->floor[j] = *at++;
+    good = (PetscBool)(good && t->floor[j] > 0);
+  }
+  for (PetscInt k = 0; k < 2; k++) {
+    PetscReal *law = t->law[k ? HYCO_TRUST_LAMBDA : HYCO_TRUST_U];
+
+    for (PetscInt j = 0; j < features; j++) law[j] = *at++;
+    law[HYCO_TRUST_FEATURES] = *at++;
+  }
+  t->force = *at;
+  t->has[HYCO_TRUST_U] = PETSC_TRUE;
+  t->has[HYCO_TRUST_LAMBDA] = (PetscBool)(t->force > 0); /* without a force nothing was calibrated */
+  PetscCall(PetscFree(numbers));
+  HycoCheck(good && t->force >= 0, "%s: training/trust is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadTrust(HycoH5 h, HycoROM m)
+{
+  HycoTrust *t = &m->trust;
+  PetscReal *numbers, *at;
+  PetscInt n = TRUST_NUMBERS, one = 1;
+  PetscBool good;
+
+  PetscFunctionBegin;
+  if (HycoH5Has(h, "training/search")) PetscCall(HycoH5LoadText(h, "training/search", &m->search));
+  PetscCall(LoadHeldOut(h, m));
+  if (HycoH5Has(h, "training/trust")) PetscCall(LoadOldTrust(h, m));
+  if (!HycoH5Has(h, "training/estimates")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "training/estimates", &n, &one, &numbers));
+  at = numbers;
+  good = IsCount(*at);
+  t->n = good ? (PetscInt)*at : 0;
+  at++;
+  t->force = *at++;
+  for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) {
+    t->floor[j] = *at++;
+    good = (PetscBool)(good && t->floor[j] > 0);
+  }
+  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+    t->has[e] = (PetscBool)(*at++ > 0.5);
+    for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) t->law[e][j] = *at++;
+  }
+  PetscCall(PetscFree(numbers));
+  HycoCheck(good && t->force >= 0, "%s: training/estimates is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
+{
+  const PetscInt n_dof = m->mesh->n_nodes * m->mesh->dim,
+                 sizes[6] = {m->whole_nodes, m->whole_cells, (PetscInt)m->hybrid,
+                             m->counts[0],   m->counts[1],   m->counts[2]};
+  char *text;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneToText(m->scene, &text));
+  PetscCall(HycoH5WriteText(h, "problem/scene", text));
+  PetscCall(PetscFree(text));
+  PetscCall(SaveMesh(h, "mesh", m->mesh));
+  PetscCall(HycoH5WriteInt(h, "mesh/node_whole", m->mesh->n_nodes, 1, m->mesh->node_whole));
+  PetscCall(HycoH5WriteInt(h, "mesh/cell_whole", m->mesh->n_cells, 1, m->mesh->cell_whole));
+  PetscCall(HycoH5WriteInt(h, "problem/sizes", 6, 1, sizes));
+  PetscCall(HycoH5WriteInt(h, "problem/role", m->mesh->n_nodes, 1, m->role));
+  PetscCall(SavePairs(h, "problem/pairs", &m->pairs));
+  PetscCall(HycoH5WriteInt(h, "problem/in_rid", m->pairs.n, 1, m->in_rid));
+  if (m->pairs.room) PetscCall(HycoH5WriteReal(h, "problem/reach", m->scene->n_contacts, 1, m->master_reach));
+  PetscCall(HycoH5WriteReal(h, "problem/V", n_dof, m->l, m->V));
+  PetscCall(HycoH5WriteReal(h, "problem/singular_values", m->l, 1, m->sigma));
+  PetscCall(HycoH5WriteInt(h, "problem/fe_dof", m->n_fe, 1, m->fe_dof));
+  if (m->G) {
+    PetscCall(HycoH5WriteReal(h, "problem/G", m->l, m->n_fe, m->G));
+    PetscCall(HycoH5WriteReal(h, "problem/ridge", 1, 1, &m->ridge));
+  }
+  PetscCall(SaveType(h, m));
+  PetscCall(HycoH5WriteReal(h, "reconstruction/S_lambda", m->n_dual, m->pairs.n, m->S_lambda));
+  PetscCall(HycoH5WriteReal(h, "training/points", m->n_points, m->scene->n_parameters, m->points));
+  PetscCall(HycoH5WriteReal(h, "training/numbers", 3, 1, m->numbers));
+  if (m->scan.n) {
+    const PetscInt counts[2] = {m->scan.n, m->scan.n_singular};
+
+    PetscCall(HycoH5WriteInt(h, "training/scan_counts", 2, 1, counts));
+    PetscCall(HycoH5WriteReal(h, "training/scan_smallest", 1, 1, &m->scan.smallest));
+    PetscCall(HycoH5WriteReal(h, "training/scan_at", m->scene->n_parameters, 1, m->scan.at));
+  }
+  PetscCall(SaveTrust(h, m));
+  if (m->table) PetscCall(HycoTableSave(m, h));
+  PetscCall(HycoH5WriteText(h, "training/provenance", m->provenance));
+  PetscCall(HycoH5WriteText(h, "training/fingerprint", m->fingerprint));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SaveAll(HycoH5 h, HycoROM m, HycoMesh whole, const PetscReal V_whole[])
+{
+  PetscInt format = m->pairs.room ? HYCO_ROM_FORMAT : HYCO_ROM_STILL;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    if (HycoPairsAlone(m->scene, &m->pairs, k)) format = HYCO_ROM_FORMAT;
+  }
+  PetscCall(HycoH5WriteText(h, "kind", HYCO_ROM_KIND));
+  PetscCall(HycoH5WriteInt(h, "format", 1, 1, &format));
+  PetscCall(SaveProblem(h, m));
+  PetscCall(SaveMesh(h, "whole", whole));
+  PetscCall(HycoH5WriteReal(h, "whole/V", whole->n_nodes * whole->dim, m->l, V_whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSave(HycoROM m, HycoMesh whole, const PetscReal V_whole[], const char path[])
+{
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Create(path, &h));
+  ierr = SaveAll(h, m, whole, V_whole);
+  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckKind(HycoH5 h, const char path[])
+{
+  char *kind;
+  PetscInt one = 1, *format, version, same;
+
+  PetscFunctionBegin;
+  HycoCheck(HycoH5Has(h, "kind"), "%s is no hyco model (fields, or a solution?); give the file that hyco train wrote",
+            path);
+  PetscCall(HycoH5LoadText(h, "kind", &kind));
+  same = strcmp(kind, HYCO_ROM_KIND) == 0;
+  PetscCall(PetscFree(kind));
+  HycoCheck(same, "%s is no hyco model", path);
+  PetscCall(HycoH5LoadInt(h, "format", 0, PETSC_MAX_INT, &one, &one, &format));
+  version = *format;
+  PetscCall(PetscFree(format));
+  HycoCheck(
+      version >= HYCO_ROM_OLDEST && version <= HYCO_ROM_FORMAT,
+      "%s has model format %d; this hyco (%s) reads formats %d to %d: train it again, or use the hyco that wrote it",
+      path, (int)version, HycoVersion(), HYCO_ROM_OLDEST, HYCO_ROM_FORMAT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadScan(HycoH5 h, HycoROM m)
+{
+  PetscInt one = 1, two = 2, *counts;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "training/scan_counts")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadInt(h, "training/scan_counts", 0, PETSC_MAX_INT, &two, &one, &counts));
+  m->scan.n = counts[0];
+  m->scan.n_singular = counts[1];
+  PetscCall(PetscFree(counts));
+  PetscCall(HycoH5ReadReal(h, "training/scan_smallest", 1, 1, &m->scan.smallest));
+  PetscCall(HycoH5ReadReal(h, "training/scan_at", m->scene->n_parameters, 1, m->scan.at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadSizes(HycoH5 h, HycoROM m)
+{
+  PetscInt one = 1, six = 6, *sizes, hybrid;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadInt(h, "problem/sizes", 0, PETSC_MAX_INT, &six, &one, &sizes));
+  m->whole_nodes = sizes[0];
+  m->whole_cells = sizes[1];
+  hybrid = sizes[2];
+  for (PetscInt k = 0; k < 3; k++) m->counts[k] = sizes[3 + k];
+  PetscCall(PetscFree(sizes));
+  HycoCheck(hybrid <= HYCO_HYBRID_ALL && m->whole_nodes > 0 && m->whole_cells > 0, "%s: problem/sizes is damaged",
+            m->path);
+  m->hybrid = (HycoHybrid)hybrid;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The search of moved surfaces; files before format 5 have none, and keep the masters as drawn. */
+static PetscErrorCode LoadReach(HycoH5 h, HycoROM m)
+{
+  PetscInt one = 1;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "problem/reach")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "problem/reach", &m->scene->n_contacts, &one, &m->master_reach));
+  PetscCall(HycoPairsSetSearch(m->scene, m->mesh, &m->pairs));
+  for (PetscInt c = 0; c < m->scene->n_contacts; c++)
+    HycoCheck(m->pairs.room && m->master_reach[c] >= 0, "%s: problem/reach is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadProblem(HycoH5 h, HycoROM m)
+{
+  PetscInt one = 1, n_dof, n_par;
+  char *text;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadText(h, "problem/scene", &text));
+  ierr = HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene);
+  PetscCall(PetscFree(text));
+  PetscCall(ierr);
+  PetscCall(LoadMesh(h, "mesh", m->scene->n_bodies, &m->mesh));
+  PetscCall(LoadSizes(h, m));
+  PetscCall(HycoH5LoadInt(h, "mesh/node_whole", 0, m->whole_nodes - 1, &m->mesh->n_nodes, &one, &m->mesh->node_whole));
+  PetscCall(HycoH5LoadInt(h, "mesh/cell_whole", 0, m->whole_cells - 1, &m->mesh->n_cells, &one, &m->mesh->cell_whole));
+  n_dof = m->mesh->n_nodes * m->mesh->dim;
+  PetscCall(HycoH5LoadInt(h, "problem/role", 0, HYCO_ROLE_A, &m->mesh->n_nodes, &one, &m->role));
+  PetscCall(LoadPairs(h, "problem/pairs", m->mesh->n_nodes, m->scene->n_contacts, &m->pairs));
+  PetscCall(HycoH5LoadInt(h, "problem/in_rid", 0, 1, &m->pairs.n, &one, &m->in_rid));
+  PetscCall(LoadReach(h, m));
+  m->l = m->n_fe = m->n_dual = m->n_points = -1;
+  PetscCall(HycoH5LoadReal(h, "problem/V", &n_dof, &m->l, &m->V));
+  PetscCall(HycoH5LoadReal(h, "problem/singular_values", &m->l, &one, &m->sigma));
+  PetscCall(HycoH5LoadInt(h, "problem/fe_dof", 0, n_dof - 1, &m->n_fe, &one, &m->fe_dof));
+  for (PetscInt k = 1; k < m->n_fe; k++)
+    HycoCheck(m->fe_dof[k] > m->fe_dof[k - 1], "%s: problem/fe_dof is damaged", m->path);
+  if (HycoH5Has(h, "problem/G")) {
+    PetscCall(HycoH5LoadReal(h, "problem/G", &m->l, &m->n_fe, &m->G));
+    PetscCall(HycoH5ReadReal(h, "problem/ridge", 1, 1, &m->ridge));
+  }
+  PetscCall(LoadType(h, m));
+  PetscCall(HycoH5LoadReal(h, "reconstruction/S_lambda", &m->n_dual, &m->pairs.n, &m->S_lambda));
+  n_par = m->scene->n_parameters;
+  PetscCall(HycoH5LoadReal(h, "training/points", &m->n_points, &n_par, &m->points));
+  PetscCall(HycoH5ReadReal(h, "training/numbers", 3, 1, m->numbers));
+  PetscCall(LoadScan(h, m));
+  PetscCall(LoadTrust(h, m));
+  if (HycoH5Has(h, "table")) PetscCall(HycoTableLoad(m, h));
+  PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
+  PetscCall(HycoH5LoadText(h, "training/fingerprint", &text));
+  PetscCall(PetscStrncpy(m->fingerprint, text, sizeof(m->fingerprint)));
+  PetscCall(PetscFree(text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadAll(HycoH5 h, HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(CheckKind(h, m->path));
+  PetscCall(LoadProblem(h, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMLoad(const char path[], HycoROM *model)
+{
+  HycoROM m;
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCheck(path && model, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
+             "HycoROMLoad: the path or the handle's address is NULL");
+  *model = NULL;
+  PetscCall(HycoH5OpenOr(path, "if it was a model, train it again", &h));
+  PetscCall(HycoROMCreate(&m));
+  PetscCall(PetscStrncpy(m->path, path, sizeof(m->path)));
+  PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_TRUE));
+  ierr = LoadAll(h, m);
+  PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_FALSE));
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  if (ierr) (void)!HycoROMDestroy(&m);
+  PetscCall(ierr);
+  PetscCall(HycoOptionsBool(m->scene->options, "hyco_reconstruct", &m->reconstruct));
+  PetscCall(
+      HycoOptionsWord(m->scene->options, "hyco_reconstruct_solver", HycoReconstructSolvers, &m->reconstruct_solver));
+  *model = m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadWhole(HycoH5 h, HycoROM m)
+{
+  PetscInt n_dof;
+
+  PetscFunctionBegin;
+  PetscCall(LoadMesh(h, "whole", m->scene->n_bodies, &m->whole));
+  n_dof = m->whole->n_nodes * m->whole->dim;
+  PetscCall(HycoH5LoadReal(h, "whole/V", &n_dof, &m->l, &m->V_whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadWhole(HycoROM m)
+{
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
+  ierr = ReadWhole(h, m);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
+  HycoCheck(m->whole->n_nodes == m->whole_nodes && m->whole->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
+            m->path);
+  PetscCall(HycoFECreate(m->scene, m->whole, &m->fe_whole));
+  PetscCall(PetscMalloc1((size_t)m->whole->n_nodes * (size_t)m->whole->dim, &m->U_whole));
+  /* the contacts again, in the whole mesh's numbers */
+  PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMRewrite(HycoROM m, const char path[])
+{
+  PetscFunctionBegin;
+  if (!m->whole) PetscCall(HycoROMLoadWhole(m));
+  PetscCall(HycoROMSave(m, m->whole, m->V_whole, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All of the whole mesh's part, or nothing: the next try begins anew. */
+PetscErrorCode HycoROMLoadWhole(HycoROM m)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = LoadWhole(m);
+  if (ierr) {
+    PetscCall(HycoFEDestroy(&m->fe_whole));
+    PetscCall(HycoPairsDestroy(&m->whole_pairs));
+    if (m->whole) PetscCall(HycoMeshDestroy(&m->whole));
+    PetscCall(PetscFree(m->V_whole));
+    PetscCall(PetscFree(m->U_whole));
+  }
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

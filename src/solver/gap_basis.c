@@ -1,0 +1,324 @@
+/*
+  Gap coordinates: of each contact row one unknown (its pivot) is replaced by the row's value, so that B x <= D becomes
+  the bound y_p <= D_i. x = T y, Kg = T^T K T.
+*/
+#include <hycosolverimpl.h>
+
+enum { HYCO_NO_PIVOT = -1, HYCO_IDLE = -2 };
+
+/* Pivot (global unknown) of each of this rank's rows: the largest entry whose unknown no other row has; HYCO_NO_PIVOT:
+   none; HYCO_IDLE: the row is empty, of a contact between fixed unknowns. *all: no rank has a row of the former. */
+static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
+{
+  PetscMPIInt bad = 0, any;
+  PetscInt lo, hi;
+  Mat Bt = y->Bt;
+  Vec count, mine;
+  PetscInt first, last;
+  PetscScalar *c;
+  VecScatter scatter;
+  IS is;
+  PetscInt *need, n_need = 0, at = 0;
+  const PetscScalar *shared;
+
+  PetscFunctionBegin;
+  /* the number of contacts of each unknown, fetched for the unknowns of this rank's rows */
+  PetscCall(MatCreateVecs(Bt, NULL, &count));
+  PetscCall(MatGetOwnershipRange(Bt, &first, &last));
+  PetscCall(VecGetArray(count, &c));
+  for (PetscInt r = first; r < last; r++) {
+    PetscInt n;
+
+    PetscCall(MatGetRow(Bt, r, &n, NULL, NULL));
+    c[r - first] = n;
+    PetscCall(MatRestoreRow(Bt, r, &n, NULL, NULL));
+  }
+  PetscCall(VecRestoreArray(count, &c));
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    if (pass) PetscCall(PetscMalloc1(n_need, &need));
+    n_need = 0;
+    for (PetscInt r = lo; r < hi; r++) {
+      PetscInt n;
+      const PetscInt *cols;
+
+      PetscCall(MatGetRow(y->B, r, &n, &cols, NULL));
+      for (PetscInt k = 0; k < n; k++, n_need++) {
+        if (pass) need[n_need] = cols[k];
+      }
+      PetscCall(MatRestoreRow(y->B, r, &n, &cols, NULL));
+    }
+  }
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n_need, need, PETSC_OWN_POINTER, &is));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, n_need, &mine));
+  PetscCall(VecScatterCreate(count, is, mine, NULL, &scatter));
+  PetscCall(VecScatterBegin(scatter, count, mine, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(scatter, count, mine, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArrayRead(mine, &shared));
+  for (PetscInt r = lo; r < hi; r++) {
+    PetscInt n;
+    const PetscInt *cols;
+    const PetscScalar *vals;
+    PetscReal best = 0;
+
+    PetscCall(MatGetRow(y->B, r, &n, &cols, &vals));
+    pivot[r - lo] = n ? HYCO_NO_PIVOT : HYCO_IDLE;
+    for (PetscInt k = 0; k < n; k++, at++) {
+      if (shared[at] < 1.5 && PetscAbsScalar(vals[k]) > best * (1 + 1e-12)) {
+        best = PetscAbsScalar(vals[k]);
+        pivot[r - lo] = cols[k];
+      }
+    }
+    PetscCall(MatRestoreRow(y->B, r, &n, &cols, &vals));
+    bad = bad || pivot[r - lo] == HYCO_NO_PIVOT;
+  }
+  PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, y->comm));
+  *all = (PetscBool)!any;
+  PetscCall(VecRestoreArrayRead(mine, &shared));
+  PetscCall(VecScatterDestroy(&scatter));
+  PetscCall(ISDestroy(&is));
+  PetscCall(VecDestroy(&mine));
+  PetscCall(VecDestroy(&count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPrimalPossible(HycoSystem y, PetscBool *possible)
+{
+  PetscInt lo, hi, *pivot;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  PetscCall(PetscMalloc1(hi - lo, &pivot));
+  PetscCall(FindPivots(y, pivot, possible));
+  PetscCall(PetscFree(pivot));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether every contact row has one entry: T is then diagonal. */
+static PetscErrorCode OneEach(Mat B, PetscBool *diagonal)
+{
+  PetscInt lo, hi;
+  PetscMPIInt more = 0, any;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(B, &lo, &hi));
+  for (PetscInt r = lo; r < hi && !more; r++) {
+    PetscInt n;
+
+    PetscCall(MatGetRow(B, r, &n, NULL, NULL));
+    more = n > 1;
+    PetscCall(MatRestoreRow(B, r, &n, NULL, NULL));
+  }
+  PetscCallMPI(MPI_Allreduce(&more, &any, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)B)));
+  *diagonal = (PetscBool)!any;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Kg = T^T K T for contacts that are each on one unknown: no product of matrices. */
+static PetscErrorCode ScaleOnly(HycoSolver s)
+{
+  HycoSystem y = s->system;
+  PetscInt lo, hi, n;
+  Vec t;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateVecs(y->K, &t, NULL));
+  PetscCall(VecSet(t, 1));
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  for (PetscInt r = lo; r < hi; r++) {
+    const PetscScalar *vals;
+
+    if (s->pivot[r - lo] == HYCO_IDLE) continue;
+    PetscCall(MatGetRow(y->B, r, &n, NULL, &vals));
+    PetscCall(VecSetValue(t, s->pivot[r - lo], 1 / vals[0], INSERT_VALUES));
+    PetscCall(MatRestoreRow(y->B, r, &n, NULL, &vals));
+  }
+  PetscCall(VecAssemblyBegin(t));
+  PetscCall(VecAssemblyEnd(t));
+  PetscCall(VecGetLocalSize(t, &n));
+  PetscCall(MatDestroy(&s->T));
+  PetscCall(MatCreateAIJ(s->comm, n, n, y->n, y->n, 1, NULL, 0, NULL, &s->T));
+  PetscCall(MatDiagonalSet(s->T, t, INSERT_VALUES));
+  PetscCall(MatDuplicate(y->K, MAT_COPY_VALUES, &s->Kg));
+  PetscCall(MatDiagonalScale(s->Kg, t, t));
+  PetscCall(VecDestroy(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* T = I, but in a pivot's row: x_p = (y_p - sum_j B_ij y_j) / B_ip. */
+static PetscErrorCode BuildT(HycoSolver s)
+{
+  HycoSystem y = s->system;
+  PetscInt lo, hi, first, last, bs;
+  Mat shape;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(y->K, &first, &last));
+  PetscCall(MatGetBlockSize(y->K, &bs));
+  PetscCall(MatCreate(s->comm, &shape));
+  PetscCall(MatSetSizes(shape, last - first, last - first, y->n, y->n));
+  PetscCall(MatSetBlockSize(shape, bs)); /* multigrid coarsens by node */
+  PetscCall(MatSetType(shape, MATPREALLOCATOR));
+  PetscCall(MatSetUp(shape));
+  PetscCall(MatDestroy(&s->T));
+  PetscCall(MatCreate(s->comm, &s->T));
+  PetscCall(MatSetSizes(s->T, last - first, last - first, y->n, y->n));
+  PetscCall(MatSetBlockSize(s->T, bs));
+  PetscCall(MatSetType(s->T, MATAIJ));
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    Mat A = pass ? s->T : shape;
+
+    if (pass) PetscCall(MatPreallocatorPreallocate(shape, PETSC_TRUE, A));
+    for (PetscInt r = first; r < last; r++) PetscCall(MatSetValue(A, r, r, 1, INSERT_VALUES));
+    PetscCall(MatAssemblyBegin(A, MAT_FLUSH_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(A, MAT_FLUSH_ASSEMBLY));
+    for (PetscInt r = lo; r < hi; r++) {
+      const PetscInt p = s->pivot[r - lo];
+      PetscInt n;
+      const PetscInt *cols;
+      const PetscScalar *vals;
+      PetscScalar Bp = 1;
+
+      PetscCall(MatGetRow(y->B, r, &n, &cols, &vals));
+      for (PetscInt k = 0; k < n; k++) {
+        if (cols[k] == p) Bp = vals[k];
+      }
+      for (PetscInt k = 0; k < n; k++)
+        PetscCall(MatSetValue(A, p, cols[k], cols[k] == p ? 1 / Bp : -vals[k] / Bp, INSERT_VALUES));
+      PetscCall(MatRestoreRow(y->B, r, &n, &cols, &vals));
+    }
+    PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  }
+  PetscCall(MatDestroy(&shape));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Leaves out the idle contacts: pivot and contact then hold the others, and so does the active set. */
+static PetscErrorCode DropIdle(HycoSolver s, PetscInt n)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(s->contact));
+  PetscCall(PetscMalloc1(n, &s->contact));
+  s->n_pivots = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    if (s->pivot[k] == HYCO_IDLE) continue;
+    s->contact[s->n_pivots] = k;
+    s->pivot[s->n_pivots++] = s->pivot[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGapSetUp(HycoSolver s)
+{
+  HycoSystem y = s->system;
+  PetscBool same, possible = PETSC_FALSE, diagonal = PETSC_FALSE;
+  PetscInt lo, hi;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  PetscCall(HycoOperatorStateUpdate(&s->transformed, y->K, y->B, &same));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  PetscCall(PetscFree(s->pivot));
+  PetscCall(PetscMalloc1(hi - lo, &s->pivot));
+  PetscCall(FindPivots(y, s->pivot, &possible));
+  if (!possible) s->transformed.K = 0;
+  PetscCheck(possible, s->comm, PETSC_ERR_USER,
+             "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
+  PetscCall(MatDestroy(&s->Kg));
+  PetscCall(MatDestroy(&s->Kw));
+  PetscCall(OneEach(y->B, &diagonal));
+  if (diagonal)
+    PetscCall(ScaleOnly(s));
+  else {
+    PetscCall(BuildT(s));
+    PetscCall(MatPtAP(y->K, s->T, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &s->Kg));
+  }
+  PetscCall(DropIdle(s, hi - lo));
+  PetscCall(MatSetOption(s->Kg, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatDuplicate(s->Kg, MAT_COPY_VALUES, &s->Kw));
+  PetscCall(HycoGapWork(s->Kw));
+  if (s->ksp_gap) {
+    PetscInt n_old, n_new;
+    Mat old;
+
+    PetscCall(KSPGetOperators(s->ksp_gap, &old, NULL));
+    PetscCall(MatGetSize(old, &n_old, NULL));
+    PetscCall(MatGetSize(s->Kw, &n_new, NULL));
+    if (n_old != n_new)
+      PetscCall(KSPDestroy(&s->ksp_gap));
+    else
+      PetscCall(KSPReset(s->ksp_gap));
+  }
+  if (s->iterative) PetscCall(HycoGapNearKernel(s, s->Kw));
+  if (!s->ksp_gap)
+    PetscCall(s->iterative ? HycoIterativeSolver(s->comm, "hyco_primal_", s->Kw, &s->ksp_gap)
+                           : HycoDirectSolver(s->comm, "hyco_primal_", s->Kw, PETSC_TRUE, &s->ksp_gap));
+  PetscCall(KSPSetOperators(s->ksp_gap, s->Kw, s->Kw));
+  if (s->m != y->m) {
+    PetscCall(PetscFree(s->active));
+    PetscCall(PetscFree(s->S));
+    PetscCall(PetscFree(s->g));
+    PetscCall(PetscFree(s->L));
+    PetscCall(PetscCalloc1(y->m + 1, &s->active));
+    s->m = y->m;
+    s->started = PETSC_FALSE;
+  }
+  s->seconds_factor += HycoNow() - begin;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGapWork(Mat Kw)
+{
+  PetscFunctionBegin;
+  PetscCall(MatSetOption(Kw, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(Kw, MAT_SPD, PETSC_TRUE));
+  PetscCall(MatSetOption(Kw, MAT_KEEP_NONZERO_PATTERN, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One step of refinement makes the residual small entry by entry (R. D. Skeel, Math. Comp. 35, 1980). */
+static PetscErrorCode SolveRefined(Mat Kw, KSP ksp, Vec rhs, Vec y)
+{
+  Vec r, dy;
+  PetscBool iterative;
+
+  PetscFunctionBegin;
+  PetscCall(KSPSolve(ksp, rhs, y));
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &iterative)); /* of its own accuracy */
+  if (iterative) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(y, &r));
+  PetscCall(VecDuplicate(y, &dy));
+  PetscCall(MatMult(Kw, y, r));
+  PetscCall(VecAYPX(r, -1, rhs));
+  PetscCall(KSPSolve(ksp, r, dy));
+  PetscCall(VecAXPY(y, 1, dy));
+  PetscCall(VecDestroy(&r));
+  PetscCall(VecDestroy(&dy));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolveOnSet(Mat Kg, Mat Kw, KSP ksp, Vec f, PetscInt n, const PetscInt a[], const PetscReal d[],
+                              Vec rhs, Vec y, PetscBool *singular)
+{
+  PetscScalar mean;
+  PetscInt size;
+
+  PetscFunctionBegin;
+  PetscCall(MatCopy(Kg, Kw, SAME_NONZERO_PATTERN));
+  PetscCall(MatGetSize(Kg, &size, NULL));
+  PetscCall(MatGetDiagonal(Kg, rhs));
+  PetscCall(VecSum(rhs, &mean));
+  mean /= size;
+  for (PetscInt k = 0; k < n; k++) PetscCall(VecSetValue(y, a[k], d[k], INSERT_VALUES));
+  PetscCall(VecAssemblyBegin(y));
+  PetscCall(VecAssemblyEnd(y));
+  PetscCall(VecCopy(f, rhs));
+  PetscCall(MatZeroRowsColumns(Kw, n, a, mean, y, rhs));
+  PetscCall(KSPSetOperators(ksp, Kw, Kw));
+  PetscCall(HycoFactor(ksp, singular));
+  if (!*singular) PetscCall(SolveRefined(Kw, ksp, rhs, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

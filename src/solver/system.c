@@ -1,0 +1,209 @@
+/* HycoSystem: holds K, Bt, B, F, D; recomputes the KKT residuals. */
+#include <hycosolverimpl.h>
+
+PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscNew(system));
+  PetscCall(HycoHandleOpen(*system, "HycoSystemCreate()"));
+  (*system)->comm = comm;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FreeWork(HycoSystem s)
+{
+  PetscFunctionBegin;
+  PetscCall(VecDestroy(&s->work_x[0]));
+  PetscCall(VecDestroy(&s->work_x[1]));
+  PetscCall(VecDestroy(&s->work_L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemWork(HycoSystem s)
+{
+  PetscFunctionBegin;
+  if (!s->work_x[0]) {
+    PetscCall(VecDuplicate(s->F, &s->work_x[0]));
+    PetscCall(VecDuplicate(s->F, &s->work_x[1]));
+  }
+  if (s->m && !s->work_L) PetscCall(VecDuplicate(s->D, &s->work_L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemDestroy(HycoSystem *system)
+{
+  HycoSystem s;
+
+  PetscFunctionBegin;
+  if (!system || !*system) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*system, "HycoSystemCreate()");
+  HycoHandleClose(*system);
+  s = *system;
+  PetscCall(MatDestroy(&s->K));
+  PetscCall(MatDestroy(&s->Bt));
+  PetscCall(MatDestroy(&s->B));
+  PetscCall(VecDestroy(&s->F));
+  PetscCall(VecDestroy(&s->D));
+  PetscCall(FreeWork(s));
+  PetscCall(PetscFree(*system));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBool symmetric)
+{
+  PetscInt rows, cols;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSystemCreate()");
+  PetscCall(MatGetSize(K, &rows, &cols));
+  PetscCheck(rows == cols, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "K is %d x %d; it must be square", (int)rows, (int)cols);
+  PetscCheck(!B == !Bt, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "B and Bt must both be given, or neither");
+  s->n = rows;
+  s->m = 0;
+  if (B) {
+    PetscInt tr, tc;
+
+    PetscCall(MatGetSize(B, &s->m, &cols));
+    PetscCall(MatGetSize(Bt, &tr, &tc));
+    PetscCheck(cols == s->n && tr == s->n && tc == s->m, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
+               "B is %d x %d and Bt %d x %d with K of size %d: they do not match", (int)s->m, (int)cols, (int)tr,
+               (int)tc, (int)s->n);
+    PetscCall(PetscObjectReference((PetscObject)B));
+    PetscCall(PetscObjectReference((PetscObject)Bt));
+  }
+  PetscCall(PetscObjectReference((PetscObject)K));
+  PetscCall(MatDestroy(&s->K));
+  PetscCall(MatDestroy(&s->B));
+  PetscCall(MatDestroy(&s->Bt));
+  s->K = K;
+  s->B = B;
+  s->Bt = Bt;
+  s->symmetric = symmetric;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
+{
+  PetscInt n, m = 0;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSystemCreate()");
+  PetscCall(VecGetSize(F, &n));
+  if (D) PetscCall(VecGetSize(D, &m));
+  PetscCheck(s->K, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetMatrices() before HycoSystemSetVectors()");
+  PetscCheck(n == s->n && m == s->m, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
+             "F has length %d and D %d where %d and %d are expected", (int)n, (int)m, (int)s->n, (int)s->m);
+  PetscCall(PetscObjectReference((PetscObject)F));
+  if (D) PetscCall(PetscObjectReference((PetscObject)D));
+  if (F != s->F || D != s->D) PetscCall(FreeWork(s));
+  PetscCall(VecDestroy(&s->F));
+  PetscCall(VecDestroy(&s->D));
+  s->F = F;
+  s->D = D;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal HycoKKTMax(const HycoKKT *kkt)
+{
+  return PetscMax(PetscMax(kkt->stationarity, kkt->penetration), PetscMax(kkt->adhesion, kkt->complementarity));
+}
+
+static PetscReal Quotient(PetscReal a, PetscReal b)
+{
+  if (PetscIsInfOrNanReal(a) || PetscIsInfOrNanReal(b)) return PETSC_MAX_REAL;
+  return a == 0 ? 0 : b > 0 ? a / b : PETSC_MAX_REAL;
+}
+
+/* Takes out of r what rounding x alone can make, entries of at most 16 eps (|K_ii x_i| + |F_i|); their norm. */
+static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, PetscReal *dropped)
+{
+  PetscInt n;
+  PetscReal squares = 0, sum;
+  PetscScalar *residual;
+  const PetscScalar *K, *X, *F;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetDiagonal(s->K, diagonal));
+  PetscCall(VecGetLocalSize(r, &n));
+  PetscCall(VecGetArray(r, &residual));
+  PetscCall(VecGetArrayRead(diagonal, &K));
+  PetscCall(VecGetArrayRead(x, &X));
+  PetscCall(VecGetArrayRead(s->F, &F));
+  for (PetscInt i = 0; i < n; i++) {
+    if (!(PetscAbsReal(residual[i]) <= 16 * PETSC_MACHINE_EPSILON * (PetscAbsReal(K[i] * X[i]) + PetscAbsReal(F[i]))))
+      continue;
+    squares += residual[i] * residual[i];
+    residual[i] = 0;
+  }
+  PetscCall(VecRestoreArrayRead(x, &X));
+  PetscCall(VecRestoreArrayRead(s->F, &F));
+  PetscCall(VecRestoreArrayRead(diagonal, &K));
+  PetscCall(VecRestoreArray(r, &residual));
+  PetscCallMPI(MPI_Allreduce(&squares, &sum, 1, MPIU_REAL, MPI_SUM, s->comm));
+  *dropped = PetscSqrtReal(sum);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value, PetscReal *rounding)
+{
+  Vec Kx = s->work_x[0], BtL = s->work_x[1];
+  PetscReal nK, nB = 0, nF, nr, dropped = 0;
+
+  PetscFunctionBegin;
+  PetscCall(MatMult(s->K, x, Kx));
+  PetscCall(VecNorm(Kx, NORM_2, &nK));
+  PetscCall(VecNorm(s->F, NORM_2, &nF));
+  if (s->m) {
+    PetscCall(MatMult(s->Bt, L, BtL));
+    PetscCall(VecNorm(BtL, NORM_2, &nB));
+    PetscCall(VecAXPY(Kx, 1, BtL));
+  }
+  PetscCall(VecAXPY(Kx, -1, s->F));
+  PetscCall(DropRounding(s, x, Kx, BtL, &dropped));
+  PetscCall(VecNorm(Kx, NORM_2, &nr));
+  *value = Quotient(nr, PetscMax(nK, PetscMax(nB, nF)));
+  *rounding = Quotient(dropped, PetscMax(nK, PetscMax(nB, nF)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
+{
+  Vec gap;
+  PetscBool same;
+  const PetscScalar *w, *l;
+  PetscInt m;
+  PetscReal local[3] = {0, 0, 0}, worst[3], size_x, size_D, size_L, size_gap;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, "HycoSystemCreate()");
+  PetscCheck(s->F, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
+  PetscCall(PetscMemzero(kkt, sizeof(*kkt)));
+  PetscCall(HycoSystemWork(s));
+  PetscCall(Stationarity(s, x, L, &kkt->stationarity, &kkt->rounding));
+  if (PetscIsInfOrNanReal(kkt->stationarity)) kkt->stationarity = PETSC_MAX_REAL;
+  if (!s->m) PetscFunctionReturn(PETSC_SUCCESS);
+  gap = s->work_L;
+  PetscCall(MatMult(s->B, x, gap));
+  PetscCall(VecAYPX(gap, -1, s->D));
+  PetscCall(HycoOperatorStateUpdate(&s->seen_B, s->B, NULL, &same));
+  if (!same) PetscCall(MatNorm(s->B, NORM_INFINITY, &s->size_B));
+  PetscCall(VecNorm(x, NORM_INFINITY, &size_x));
+  PetscCall(VecNorm(s->D, NORM_INFINITY, &size_D));
+  PetscCall(VecNorm(L, NORM_INFINITY, &size_L));
+  size_gap = PetscMax(size_D, s->size_B * size_x);
+  PetscCall(VecGetLocalSize(gap, &m));
+  PetscCall(VecGetArrayRead(gap, &w));
+  PetscCall(VecGetArrayRead(L, &l));
+  for (PetscInt i = 0; i < m; i++) {
+    local[0] = PetscMax(local[0], -w[i]);
+    local[1] = PetscMax(local[1], -l[i]);
+    local[2] = PetscMax(local[2], PetscAbsReal(w[i] * l[i]));
+  }
+  PetscCall(VecRestoreArrayRead(gap, &w));
+  PetscCall(VecRestoreArrayRead(L, &l));
+  PetscCallMPI(MPI_Allreduce(local, worst, 3, MPIU_REAL, MPI_MAX, s->comm));
+  kkt->penetration = Quotient(worst[0], size_gap);
+  kkt->adhesion = Quotient(worst[1], size_L);
+  kkt->complementarity = Quotient(worst[2], size_gap * size_L);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,94 @@
+/* Errors: caught as one line of text, and agreed on by all ranks so that none is left waiting. */
+#include <hycoimpl.h>
+#include <stdarg.h>
+#include <time.h>
+
+static char caught_line[HYCO_LINE];
+
+static PetscErrorCode CatchHandler(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
+                                   PetscErrorType type, const char *message, void *ctx)
+{
+  (void)comm, (void)line, (void)function, (void)file, (void)ctx;
+  if (type == PETSC_ERROR_INITIAL) {
+    if (message && message[0]) {
+      snprintf(caught_line, sizeof(caught_line), "%s", message);
+    } else {
+      snprintf(caught_line, sizeof(caught_line), "PETSc error %d in %s()", (int)code, function ? function : "?");
+    }
+  }
+  return code;
+}
+
+void HycoFormat(char line[HYCO_LINE], const char format[], ...)
+{
+  void *before = HycoPointBegin();
+  va_list args;
+
+  va_start(args, format);
+  vsnprintf(line, HYCO_LINE, format, args);
+  va_end(args);
+  HycoPointEnd(before);
+}
+
+PetscErrorCode HycoCatchBegin(void)
+{
+  PetscFunctionBegin;
+  caught_line[0] = '\0';
+  PetscCall(PetscPushErrorHandler(CatchHandler, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscPopErrorHandler());
+  message[0] = '\0';
+  if (caught) snprintf(message, HYCO_LINE, "%s", caught_line[0] ? caught_line : "unknown error");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[])
+{
+  PetscFunctionBegin;
+  if (!caught || caught == HYCO_ERR_NO_MODEL) PetscFunctionReturn(PETSC_SUCCESS);
+  SETERRQ(PETSC_COMM_SELF, caught, "%s", message);
+}
+
+PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char message[])
+{
+  PetscMPIInt rank, size, mine, first;
+  struct {
+    PetscBool no_model;
+    char line[HYCO_LINE];
+  } said;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  mine = message[0] ? rank : size;
+  first = mine;
+  if (size > 1) PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm));
+  if (first == size) PetscFunctionReturn(PETSC_SUCCESS);
+  if (rank == first) {
+    said.no_model = (PetscBool)(caught == HYCO_ERR_NO_MODEL);
+    snprintf(said.line, sizeof(said.line), "%s", message);
+  }
+  if (size > 1) PetscCallMPI(MPI_Bcast(&said, sizeof(said), MPI_BYTE, first, comm));
+  SETERRQ(comm, said.no_model ? HYCO_ERR_NO_MODEL : PETSC_ERR_USER, "%s", said.line);
+}
+
+unsigned long long HycoHash(unsigned long long hash, const void *data, size_t bytes)
+{
+  const unsigned char *byte = (const unsigned char *)data;
+
+  for (size_t k = 0; k < bytes; k++) hash = (hash ^ byte[k]) * 1099511628211ULL;
+  return hash;
+}
+
+PetscReal HycoNow(void)
+{
+  struct timespec now;
+
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (PetscReal)now.tv_sec + 1e-9 * (PetscReal)now.tv_nsec;
+}

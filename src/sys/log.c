@@ -1,0 +1,46 @@
+/* Stages and events of -log_view, registered by the first that is asked for. */
+#include <hycoimpl.h>
+
+static const char *const event_names[HYCO_N_EVENTS] = {
+    "HycoMesh",   "HycoAssemble", "HycoForce", "HycoContact", "HycoReduce",  "HycoFactor",
+    "HycoForces", "HycoKKT",      "HycoPOD",   "HycoDEIM",    "HycoRID",     "HycoROM",
+    "HycoScan",   "HycoLoad",     "HycoSetUp", "HycoSolve",   "HycoReconstr"};
+static const char *const stage_names[HYCO_N_STAGES] = {"hyco full order", "hyco reduction", "hyco online"};
+static PetscLogEvent events[HYCO_N_EVENTS];
+static PetscLogStage stages[HYCO_N_STAGES];
+static PetscBool registered = PETSC_FALSE;
+
+/* A name that cannot be registered leaves its time to what contains it. */
+static PetscErrorCode Register(void)
+{
+  PetscClassId id;
+
+  PetscFunctionBegin;
+  registered = PETSC_TRUE;
+  PetscCall(PetscClassIdRegister("hyco", &id));
+  for (int k = 0; k < HYCO_N_EVENTS; k++) PetscCall(PetscLogEventRegister(event_names[k], id, &events[k]));
+  for (int k = 0; k < HYCO_N_STAGES; k++) PetscCall(PetscLogStageRegister(stage_names[k], &stages[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin)
+{
+  PetscFunctionBegin;
+  if (!registered) PetscCall(Register());
+  if (begin)
+    PetscCall(PetscLogEventBegin(events[event], 0, 0, 0, 0));
+  else
+    PetscCall(PetscLogEventEnd(events[event], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin)
+{
+  PetscFunctionBegin;
+  if (!registered) PetscCall(Register());
+  if (begin)
+    PetscCall(PetscLogStagePush(stages[stage]));
+  else
+    PetscCall(PetscLogStagePop());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
