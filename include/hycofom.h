@@ -75,6 +75,11 @@ PetscErrorCode HycoFOMGetSolution(HycoFOM fom, PetscInt *n_nodes, const PetscRea
 /* Writes the last solution to PATH.h5 and PATH.xdmf (`path` names the latter). Collective. */
 PetscErrorCode HycoFOMWrite(HycoFOM fom, const char path[]);
 
+/* Prints it, in words, on an ASCII viewer (NULL: stdout). Collective. */
+PetscErrorCode HycoFOMView(HycoFOM object, PetscViewer viewer);
+/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+PetscErrorCode HycoFOMViewFromOptions(HycoFOM object, PetscObject owner, const char option[]);
+
 #if defined(__cplusplus)
 }
 #endif

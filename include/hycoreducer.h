@@ -92,7 +92,7 @@ typedef struct {
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
 
-/* A reducer for a scene, which must outlive it. Collective on `comm`. The caller owns it. */
+/* A reducer for a scene, which is referenced. Collective on `comm`. The caller owns it. */
 PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *reducer);
 /* Frees; sets the handle to NULL; NULL-safe. Collective. */
 PetscErrorCode HycoReducerDestroy(HycoReducer *reducer);
@@ -172,6 +172,11 @@ PetscErrorCode HycoReducerSetGreedyStop(HycoReducer reducer, PetscReal target, P
 */
 PetscErrorCode HycoReducerRunGreedy(HycoReducer reducer, HycoSamples start, HycoSamples training, const char path[],
                                     HycoTraining *training_report);
+
+/* Prints it, in words, on an ASCII viewer (NULL: stdout). Collective. */
+PetscErrorCode HycoReducerView(HycoReducer object, PetscViewer viewer);
+/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+PetscErrorCode HycoReducerViewFromOptions(HycoReducer object, PetscObject owner, const char option[]);
 
 #if defined(__cplusplus)
 }

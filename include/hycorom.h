@@ -136,6 +136,9 @@ PetscErrorCode HycoROMCompare(HycoROM model, HycoFOM fom, HycoErrors *errors);
 /* Prints what is in the model, in words, on an ASCII viewer. */
 PetscErrorCode HycoROMView(HycoROM model, PetscViewer viewer);
 
+/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+PetscErrorCode HycoROMViewFromOptions(HycoROM object, PetscObject owner, const char option[]);
+
 #if defined(__cplusplus)
 }
 #endif

@@ -51,6 +51,11 @@ PetscErrorCode HycoSamplesDropTwins(HycoSamples samples, PetscInt *n_dropped);
 /* Number of points and their values, point by point (n_points x n_parameters, row major). Borrowed. */
 PetscErrorCode HycoSamplesGet(HycoSamples samples, PetscInt *n_points, PetscInt *n_parameters, const PetscReal *mu[]);
 
+/* Prints it, in words, on an ASCII viewer (NULL: stdout). Collective. */
+PetscErrorCode HycoSamplesView(HycoSamples object, PetscViewer viewer);
+/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+PetscErrorCode HycoSamplesViewFromOptions(HycoSamples object, PetscObject owner, const char option[]);
+
 #if defined(__cplusplus)
 }
 #endif

@@ -49,6 +49,9 @@ PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options);
 /* Prints what the scene says, in words, on an ASCII viewer. Collective. */
 PetscErrorCode HycoSceneView(HycoScene scene, PetscViewer viewer);
 
+/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+PetscErrorCode HycoSceneViewFromOptions(HycoScene object, PetscObject owner, const char option[]);
+
 #if defined(__cplusplus)
 }
 #endif

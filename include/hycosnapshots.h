@@ -30,6 +30,11 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots snapshots, HycoSamples samples, H
    factors the stiffness of its own mesh. Collective. */
 PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups);
 
+/* Prints it, in words, on an ASCII viewer (NULL: stdout). Collective. */
+PetscErrorCode HycoSnapshotsView(HycoSnapshots object, PetscViewer viewer);
+/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+PetscErrorCode HycoSnapshotsViewFromOptions(HycoSnapshots object, PetscObject owner, const char option[]);
+
 #if defined(__cplusplus)
 }
 #endif

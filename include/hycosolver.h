@@ -45,7 +45,7 @@ typedef enum {
 PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver);
 /* Frees; sets the handle to NULL; NULL-safe. Collective. */
 PetscErrorCode HycoSolverDestroy(HycoSolver *solver);
-/* Sets the system, which must outlive the solver (borrowed). */
+/* Sets (references) the system. */
 PetscErrorCode HycoSolverSetSystem(HycoSolver solver, HycoSystem system);
 /* -hyco_solver_type */
 PetscErrorCode HycoSolverSetType(HycoSolver solver, HycoSolverType type);
@@ -99,6 +99,11 @@ PetscErrorCode HycoSolverGetLinear(HycoSolver solver, const char *linear[]);
 PetscErrorCode HycoSolverGetSeconds(HycoSolver solver, PetscReal *factor, PetscReal *solve);
 /* A word for the reason, for messages. Not collective. Borrowed. */
 const char *HycoReasonName(HycoReason reason);
+
+/* Prints it, in words, on an ASCII viewer (NULL: stdout). Collective. */
+PetscErrorCode HycoSolverView(HycoSolver object, PetscViewer viewer);
+/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+PetscErrorCode HycoSolverViewFromOptions(HycoSolver object, PetscObject owner, const char option[]);
 
 #if defined(__cplusplus)
 }

@@ -2,7 +2,7 @@
 #ifndef HYCOSYS_H
 #define HYCOSYS_H
 
-#include <petscsys.h>
+#include <petscviewer.h>
 
 #if !defined(PETSC_USE_REAL_DOUBLE) || defined(PETSC_USE_COMPLEX)
 #error "hyco needs PETSc configured with real scalars in double precision"
@@ -19,6 +19,13 @@ typedef struct {
   const char *initial; /* the default, as text */
   const char *meaning; /* one line */
 } HycoOption;
+
+/* hyco's classes are PETSc's objects: reference counts, names, options prefixes, composed data, PetscObjectView(). */
+PETSC_EXTERN PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_CLASSID, HYCO_SOLVER_CLASSID,
+    HYCO_FOM_CLASSID, HYCO_SNAPSHOTS_CLASSID, HYCO_REDUCER_CLASSID, HYCO_ROM_CLASSID;
+
+/* Registers the classes; whatever makes an object calls it. Not collective. */
+PetscErrorCode HycoInitializePackage(void);
 
 /* Starts PETSc (if needed) and SLEPc for hyco. Collective on all processes. `argc`, `argv` may be NULL. */
 PetscErrorCode HycoInitialize(int *argc, char ***argv);

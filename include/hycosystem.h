@@ -50,6 +50,11 @@ PetscReal HycoKKTMax(const HycoKKT *kkt);
 /* Recomputes the residuals at x (length n), L (length m, or NULL without contact). Collective. */
 PetscErrorCode HycoSystemComputeKKT(HycoSystem system, Vec x, Vec L, HycoKKT *kkt);
 
+/* Prints it, in words, on an ASCII viewer (NULL: stdout). Collective. */
+PetscErrorCode HycoSystemView(HycoSystem object, PetscViewer viewer);
+/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+PetscErrorCode HycoSystemViewFromOptions(HycoSystem object, PetscObject owner, const char option[]);
+
 #if defined(__cplusplus)
 }
 #endif

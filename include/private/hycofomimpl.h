@@ -10,9 +10,9 @@
 #define HYCO_MAX_PINS 12
 
 struct _p_HycoFOM {
-  MPI_Comm comm;
+  PETSCHEADER(int);
   PetscMPIInt rank, size;
-  HycoScene scene; /* borrowed */
+  HycoScene scene; /* referenced */
   /* owned */
   HycoMesh whole;  /* rank 0 */
   HycoMesh part;   /* each rank's cells; the whole mesh on one rank */

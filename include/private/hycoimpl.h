@@ -4,6 +4,7 @@
 
 #include <hycocompat.h>
 #include <hycosys.h>
+#include <petsc/private/petscimpl.h>
 #include <petscmat.h>
 #include <stdio.h>
 #include <strings.h>
@@ -78,13 +79,21 @@ void HycoFormat(char line[HYCO_LINE], const char format[], ...) PETSC_ATTRIBUTE_
     if (PetscUnlikely(!(condition))) HycoFail(__VA_ARGS__);                                                            \
   } while (0)
 
-/* The public handles that live, each with the call that makes its kind: that text is the kind. A handle is opened when
-   its memory is, and closed when it goes. Check fails for NULL, for what was closed and for another kind; when the
-   memory of a destroyed handle has become another one of its kind, a copy of the old is the new. Not collective. */
-PetscErrorCode HycoHandleOpen(const void *handle, const char maker[]);
-void HycoHandleClose(const void *handle);
-PetscErrorCode HycoHandleCheck(const void *handle, const char maker[], const char function[]);
-#define HycoCheckHandle(handle, maker) PetscCall(HycoHandleCheck((handle), (maker), PETSC_FUNCTION_NAME))
+/* Fails for NULL and for an object of another class. Not collective. `classid` is one of HYCO_..._CLASSID. */
+PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, const char function[]);
+#define HycoCheckHandle(handle, classid) PetscCall(HycoHandleCheck((handle), &(classid), PETSC_FUNCTION_NAME))
+/* Begins a View: stdout where *viewer is NULL; on an ASCII viewer the object's class and name, and a tab to pop. */
+PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool *ascii);
+/* The communicator of an object of any class. */
+#define HycoComm(object) PetscObjectComm((PetscObject)(object))
+/* Takes one reference from `*object` and clears it; returns unless that was the last. */
+#define HycoDereference(object)                                                                                        \
+  do {                                                                                                                 \
+    if (--((PetscObject) * (object))->refct > 0) {                                                                     \
+      *(object) = NULL;                                                                                                \
+      PetscFunctionReturn(PETSC_SUCCESS);                                                                              \
+    }                                                                                                                  \
+  } while (0)
 
 /* 64-bit FNV-1a hash, continued from `hash` (start with HYCO_HASH_START). */
 #define HYCO_HASH_START 14695981039346656037ULL

@@ -39,9 +39,9 @@ enum {
 };
 
 struct _p_HycoReducer {
-  MPI_Comm comm;
+  PETSCHEADER(int);
   PetscMPIInt rank;
-  HycoScene scene; /* borrowed */
+  HycoScene scene; /* referenced */
   /* user parameters */
   char folder[PETSC_MAX_PATH_LEN]; /* of snapshots; "": from the model's name */
   PetscReal tol[HYCO_N_SEEDS], noise, extension;

@@ -41,6 +41,7 @@ typedef struct {
 } HycoTrust;
 
 struct _p_HycoROM {
+  PETSCHEADER(int);
   char path[PETSC_MAX_PATH_LEN]; /* "" while training */
   /* the reduced problem's description, as in the file */
   HycoScene scene;

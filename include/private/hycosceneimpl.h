@@ -61,7 +61,7 @@ typedef struct {
 } HycoContact;
 
 struct _p_HycoScene {
-  MPI_Comm comm;
+  PETSCHEADER(int);
   PetscOptions options; /* every entry, the command line's already in */
   char *title, *mesh_path;
   /* parameters */

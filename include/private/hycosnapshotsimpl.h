@@ -6,8 +6,8 @@
 #include <hycosnapshots.h>
 
 struct _p_HycoSnapshots {
-  MPI_Comm comm;
-  HycoScene scene; /* borrowed */
+  PETSCHEADER(int);
+  HycoScene scene; /* referenced */
   char folder[PETSC_MAX_PATH_LEN];
   unsigned long long fingerprint;
 };

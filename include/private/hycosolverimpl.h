@@ -7,7 +7,7 @@
 #include <hycosolver.h>
 
 struct _p_HycoSystem {
-  MPI_Comm comm;
+  PETSCHEADER(int);
   Mat K, Bt, B; /* referenced */
   Vec F, D;     /* referenced */
   PetscBool symmetric;
@@ -22,9 +22,9 @@ struct _p_HycoSystem {
 PetscErrorCode HycoSystemWork(HycoSystem system);
 
 struct _p_HycoSolver {
-  MPI_Comm comm;
+  PETSCHEADER(int);
   /* user parameters */
-  HycoSystem system; /* borrowed */
+  HycoSystem system; /* referenced */
   PetscInt type;     /* index in HycoSolverTypes */
   HycoForm form;
   PetscReal rtol;

@@ -79,7 +79,7 @@ PetscErrorCode HycoROMCompareFields(HycoROM m, const PetscReal u_full[], const P
 static PetscErrorCode Compare(HycoROM m, HycoFOM f, const PetscReal sigma[], HycoErrors *e)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
             "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
             "training mesh",
@@ -94,8 +94,8 @@ PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
   const PetscReal *sigma;
 
   PetscFunctionBegin;
-  HycoCheckHandle(f, "HycoFOMCreate()");
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCall(HycoFOMGetSolution(f, NULL, NULL, NULL, NULL, NULL, &sigma));
-  HycoOnRoot(f->comm, Compare(m, f, sigma, e));
+  HycoOnRoot(HycoComm(f), Compare(m, f, sigma, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

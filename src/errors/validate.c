@@ -125,8 +125,8 @@ PetscErrorCode HycoROMValidate(MPI_Comm comm, HycoROM m, HycoSnapshots store, Hy
   HycoHeldOut *rows;
 
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
-  HycoCheckHandle(store, "HycoSnapshotsOpen()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckHandle(store, HYCO_SNAPSHOTS_CLASSID);
   PetscCall(HycoSamplesGet(samples, &n, &n_par, NULL));
   PetscCheck(n > 0 && n_par == m->scene->n_parameters, comm, PETSC_ERR_USER,
              "the validation points are none, or of another scene than the model");

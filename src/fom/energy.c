@@ -125,7 +125,7 @@ PetscErrorCode HycoFOMEnergy(HycoFOM f, HycoSummary *s)
   PetscCall(CellSums(f, &mine[0], &lifting));
   if (f->rank == 0) PetscCall(ContactSums(f, &mine[2], &mine[3]));
   mine[1] = free_work + lifting;
-  PetscCallMPI(MPI_Allreduce(mine, all, 4, MPIU_REAL, MPI_SUM, f->comm));
+  PetscCallMPI(MPI_Allreduce(mine, all, 4, MPIU_REAL, MPI_SUM, HycoComm(f)));
   s->strain_energy = all[0];
   s->external_work = all[1] + all[3];
   s->gap_work = all[2];

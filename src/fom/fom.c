@@ -8,8 +8,8 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
 
   PetscFunctionBegin;
   if (!fom || !*fom) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*fom, "HycoFOMCreate()");
-  HycoHandleClose(*fom);
+  HycoCheckHandle(*fom, HYCO_FOM_CLASSID);
+  HycoDereference(fom);
   f = *fom;
   PetscCall(HycoSolverDestroy(&f->solver));
   PetscCall(HycoSystemDestroy(&f->system));
@@ -41,8 +41,8 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscCall(PetscFree(f->lambda));
   PetscCall(PetscFree(f->sigma));
   PetscCall(PetscFree(f->gap));
-  PetscCallMPI(MPI_Comm_free(&f->comm));
-  PetscCall(PetscFree(*fom));
+  PetscCall(HycoSceneDestroy(&f->scene));
+  PetscCall(PetscHeaderDestroy(fom));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -53,8 +53,8 @@ static PetscErrorCode ReadMesh(HycoFOM f)
   PetscInt cut = HYCO_PARTITION_METIS;
 
   PetscFunctionBegin;
-  HycoOnRoot(f->comm, HycoMeshRead(f->scene, &f->whole));
-  HycoOnRoot(f->comm, HycoPairsFind(f->scene, f->whole, &f->pairs));
+  HycoOnRoot(HycoComm(f), HycoMeshRead(f->scene, &f->whole));
+  HycoOnRoot(HycoComm(f), HycoPairsFind(f->scene, f->whole, &f->pairs));
   if (f->rank == 0) {
     sizes[0] = f->whole->n_nodes;
     sizes[1] = f->whole->n_cells;
@@ -70,23 +70,23 @@ static PetscErrorCode ReadMesh(HycoFOM f)
       }
     }
   }
-  PetscCallMPI(MPI_Bcast(sizes, 6, MPIU_INT, 0, f->comm));
+  PetscCallMPI(MPI_Bcast(sizes, 6, MPIU_INT, 0, HycoComm(f)));
   f->n_nodes = sizes[0];
   f->n_cells = sizes[1];
   f->n_contacts = sizes[2];
   f->width = sizes[4];
   f->searches = (PetscBool)(sizes[5] != 0);
-  PetscCheck(f->n_cells >= f->size, f->comm, PETSC_ERR_USER, "the mesh has %d cells; run it on at most as many ranks",
-             (int)f->n_cells);
+  PetscCheck(f->n_cells >= f->size, HycoComm(f), PETSC_ERR_USER,
+             "the mesh has %d cells; run it on at most as many ranks", (int)f->n_cells);
   PetscCall(HycoOptionsWord(f->scene->options, "hyco_partition", HycoPartitioners, &cut));
-  PetscCall(HycoMeshDistribute(f->comm, f->whole, sizes[3], both, (HycoPartitioner)cut, &f->part, &f->n_owned,
+  PetscCall(HycoMeshDistribute(HycoComm(f), f->whole, sizes[3], both, (HycoPartitioner)cut, &f->part, &f->n_owned,
                                &f->first, &f->global));
   PetscCall(PetscFree(both));
-  HycoOnEach(f->comm, HycoFECreate(f->scene, f->part, &f->fe));
+  HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part, &f->fe));
   f->fe_whole = f->fe;
   if (f->size > 1) {
     f->fe_whole = NULL;
-    HycoOnRoot(f->comm, HycoFECreate(f->scene, f->whole, &f->fe_whole));
+    HycoOnRoot(HycoComm(f), HycoFECreate(f->scene, f->whole, &f->fe_whole));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -127,7 +127,7 @@ static PetscErrorCode CreateB(HycoFOM f)
   const PetscInt dim = f->part->dim, entries = f->width * dim;
 
   PetscFunctionBegin;
-  PetscCall(MatCreate(f->comm, &f->B));
+  PetscCall(MatCreate(HycoComm(f), &f->B));
   PetscCall(MatSetSizes(f->B, PETSC_DECIDE, f->n_owned * dim, f->n_contacts, f->n_nodes * dim));
   PetscCall(MatSetType(f->B, MATAIJ));
   PetscCall(MatSeqAIJSetPreallocation(f->B, entries, NULL));
@@ -141,7 +141,7 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscFunctionBegin;
   f->summary.seconds.setup = -HycoNow();
   HycoLogged(HYCO_EVENT_MESH, ReadMesh(f));
-  PetscCall(HycoFECreateMatrix(f->fe, f->comm, f->n_owned, f->first, &f->K));
+  PetscCall(HycoFECreateMatrix(f->fe, HycoComm(f), f->n_owned, f->first, &f->K));
   PetscCall(MatCreateVecs(f->K, &f->U, &f->F));
   if (f->n_contacts) {
     PetscCall(CreateB(f));
@@ -149,8 +149,8 @@ static PetscErrorCode SetUp(HycoFOM f)
     PetscCall(VecDuplicate(f->Lambda, &f->D));
   }
   PetscCall(CreateScatters(f));
-  PetscCall(HycoSystemCreate(f->comm, &f->system));
-  PetscCall(HycoSolverCreate(f->comm, &f->solver));
+  PetscCall(HycoSystemCreate(HycoComm(f), &f->system));
+  PetscCall(HycoSolverCreate(HycoComm(f), &f->solver));
   PetscCall(HycoSolverSetFromOptions(f->solver, f->scene->options));
   f->regularise_tol = 1e-2;
   PetscCall(HycoOptionsBool(f->scene->options, "hyco_regularise", &f->regularise));
@@ -170,12 +170,12 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
-  PetscCall(PetscNew(fom));
-  PetscCall(HycoHandleOpen(*fom, "HycoFOMCreate()"));
-  PetscCallMPI(MPI_Comm_dup(comm, &(*fom)->comm));
-  PetscCallMPI(MPI_Comm_rank((*fom)->comm, &(*fom)->rank));
-  PetscCallMPI(MPI_Comm_size((*fom)->comm, &(*fom)->size));
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(PetscHeaderCreate(*fom, HYCO_FOM_CLASSID, "HycoFOM", "Full-order model", "Hyco", comm, HycoFOMDestroy,
+                              HycoFOMView));
+  PetscCallMPI(MPI_Comm_rank(HycoComm(*fom), &(*fom)->rank));
+  PetscCallMPI(MPI_Comm_size(HycoComm(*fom), &(*fom)->size));
+  PetscCall(PetscObjectReference((PetscObject)scene));
   (*fom)->scene = scene;
   ierr = SetUp(*fom);
   if (ierr) PetscCall(HycoFOMDestroy(fom));
@@ -186,7 +186,7 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
 PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(f, "HycoFOMCreate()");
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
   *solver = f->solver;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -220,7 +220,7 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 {
   PetscFunctionBegin;
   if (!f->n_contacts) { /* perhaps obstacles whose nodes are all fixed */
-    HycoOnRoot(f->comm, HycoContactCountStill(f->fe_whole, &f->pairs, NULL, &f->summary.n_still));
+    HycoOnRoot(HycoComm(f), HycoContactCountStill(f->fe_whole, &f->pairs, NULL, &f->summary.n_still));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (rows_changed && f->Bt && f->searches) { /* entries of masters that are left behind must not stay */
@@ -228,7 +228,7 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
     PetscCall(CreateB(f));
   } else if (rows_changed && f->Bt)
     PetscCall(MatZeroEntries(f->B));
-  HycoOnRoot(f->comm, FillContact(f, rows_changed));
+  HycoOnRoot(HycoComm(f), FillContact(f, rows_changed));
   PetscCall(VecAssemblyBegin(f->D));
   PetscCall(VecAssemblyEnd(f->D));
   if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
@@ -249,8 +249,9 @@ static PetscErrorCode CountFree(HycoFOM f)
 
     for (PetscInt c = 0; row >= 0 && row < f->n_owned && c < f->fe->dim; c++) mine += !f->fe->fixed[i * f->fe->dim + c];
   }
-  PetscCallMPI(MPI_Allreduce(&mine, &f->n_free, 1, MPIU_INT, MPI_SUM, f->comm));
-  PetscCheck(f->n_free, f->comm, PETSC_ERR_USER, "every displacement of the scene is fixed; there is nothing to solve");
+  PetscCallMPI(MPI_Allreduce(&mine, &f->n_free, 1, MPIU_INT, MPI_SUM, HycoComm(f)));
+  PetscCheck(f->n_free, HycoComm(f), PETSC_ERR_USER,
+             "every displacement of the scene is fixed; there is nothing to solve");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,7 +260,7 @@ static PetscErrorCode AssembleForce(HycoFOM f)
 {
   PetscFunctionBegin;
   if (f->n_pins) PetscCall(HycoFESetPins(f->fe, 0, NULL, NULL));
-  HycoOnEach(f->comm, HycoFEAssembleForce(f->fe, f->F));
+  HycoOnEach(HycoComm(f), HycoFEAssembleForce(f->fe, f->F));
   if (!f->n_pins) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFESetPins(f->fe, f->n_pins, f->pin_tag, f->pin_component));
   PetscCall(HycoFOMBalance(f));
@@ -270,14 +271,14 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
 {
   PetscFunctionBegin;
   f->solved = f->given = f->sigma_ready = PETSC_FALSE;
-  HycoOnEach(f->comm, HycoFESetParameters(f->fe, mu));
-  if (f->fe_whole != f->fe) HycoOnRoot(f->comm, HycoFESetParameters(f->fe_whole, mu));
+  HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
+  if (f->fe_whole != f->fe) HycoOnRoot(HycoComm(f), HycoFESetParameters(f->fe_whole, mu));
   f->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
   if (f->fe->stiffness_changed || f->fe->contact_changed) PetscCall(HycoFOMRelease(f));
   if (!f->n_free) PetscCall(CountFree(f));
   if (f->fe->stiffness_changed) {
     PetscCall(HycoLogEvent(HYCO_EVENT_ASSEMBLE, PETSC_TRUE));
-    HycoOnEach(f->comm, HycoFEAssembleStiffness(f->fe, f->K));
+    HycoOnEach(HycoComm(f), HycoFEAssembleStiffness(f->fe, f->K));
     PetscCall(HycoLogEvent(HYCO_EVENT_ASSEMBLE, PETSC_FALSE));
     PetscCall(MatSetOption(f->K, MAT_SPD, PETSC_TRUE));
     PetscCall(HycoFOMSetMotions(f));
@@ -323,13 +324,13 @@ static PetscErrorCode CheckPoint(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscReal bounds[2 * HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  HycoOnEach(f->comm, HycoSceneCheckParameters(f->scene, n, mu));
+  HycoOnEach(HycoComm(f), HycoSceneCheckParameters(f->scene, n, mu));
   if (f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt p = 0; p < n; p++) {
     bounds[p] = mu[p];
     bounds[n + p] = -mu[p];
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, bounds, (PetscMPIInt)(2 * n), MPIU_REAL, MPI_MAX, f->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, bounds, (PetscMPIInt)(2 * n), MPIU_REAL, MPI_MAX, HycoComm(f)));
   for (PetscInt p = 0; p < n; p++) {
     HycoCheck(bounds[p] == -bounds[n + p], "%s is %.10g on one rank and %.10g on another; give all of them one point",
               f->scene->parameter[p], (double)-bounds[n + p], (double)bounds[p]);
@@ -343,7 +344,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
-  HycoCheckHandle(f, "HycoFOMCreate()");
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
   t = &f->summary.seconds;
   PetscCall(CheckPoint(f, n, mu));
   PetscCall(HycoFOMAssemble(f, mu));
@@ -361,7 +362,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
 PetscErrorCode HycoFOMGetSystem(HycoFOM f, HycoSystem *system)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(f, "HycoFOMCreate()");
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
   *system = f->system;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -383,7 +384,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   HycoSummary *s;
 
   PetscFunctionBegin;
-  HycoCheckHandle(f, "HycoFOMCreate()");
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
   s = &f->summary;
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetSummary()");
   s->dim = f->fe->dim;
@@ -396,8 +397,8 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(HycoFOMEnergy(f, s));
   s->n_facing = 0;
   s->overlap = s->sliding = 0;
-  HycoOnRoot(f->comm, MeasureContacts(f, s));
-  if (s->reason > 0 && f->n_contacts) HycoOnRoot(f->comm, HycoFOMCountDependent(f, &s->n_dependent));
+  HycoOnRoot(HycoComm(f), MeasureContacts(f, s));
+  if (s->reason > 0 && f->n_contacts) HycoOnRoot(HycoComm(f), HycoFOMCountDependent(f, &s->n_dependent));
   s->n_active = 0;
   s->total_contact_force = s->lambda_max = s->lambda_norm2 = s->u_norm2 = 0;
   if (f->rank == 0) {
@@ -416,7 +417,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
     s->lambda_norm2 = PetscSqrtReal(s->lambda_norm2);
     s->u_norm2 = PetscSqrtReal(s->u_norm2);
   }
-  PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, f->comm));
+  PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, HycoComm(f)));
   *out = *s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -441,7 +442,7 @@ static PetscErrorCode GatherStress(HycoFOM f)
     PetscCall(PetscFree(sigma));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(VecCreateMPI(f->comm, PETSC_DECIDE, f->n_cells * ns, &all));
+  PetscCall(VecCreateMPI(HycoComm(f), PETSC_DECIDE, f->n_cells * ns, &all));
   for (PetscInt e = 0; e < f->part->n_cells; e++) {
     for (PetscInt k = 0; k < ns; k++)
       PetscCall(VecSetValue(all, f->part->cell_whole[e] * ns + k, sigma[e * ns + k], INSERT_VALUES));
@@ -468,7 +469,7 @@ PetscErrorCode HycoFOMGetSolution(HycoFOM f, PetscInt *n_nodes, const PetscReal 
                                   const PetscReal *Lambda[], PetscInt *n_cells, const PetscReal *sigma[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(f, "HycoFOMCreate()");
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetSolution()");
   if (!f->sigma_ready) PetscCall(GatherStress(f));
   f->sigma_ready = PETSC_TRUE;
@@ -507,8 +508,30 @@ PetscErrorCode HycoFOMGetForces(HycoFOM f, PetscReal forces[])
 PetscErrorCode HycoFOMWrite(HycoFOM f, const char path[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(f, "HycoFOMCreate()");
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMWrite()");
-  HycoOnRoot(f->comm, HycoSolutionWrite(path, f->fe_whole, &f->pairs, f->u, f->lambda, NULL));
+  HycoOnRoot(HycoComm(f), HycoSolutionWrite(path, f->fe_whole, &f->pairs, f->u, f->lambda, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
+{
+  PetscBool ascii;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  PetscCall(HycoViewBegin((PetscObject)f, &viewer, &ascii));
+  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSystemView(f->system, viewer));
+  PetscCall(HycoSolverView(f->solver, viewer));
+  PetscCall(PetscViewerASCIIPopTab(viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMViewFromOptions(HycoFOM object, PetscObject owner, const char option[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(object, HYCO_FOM_CLASSID);
+  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

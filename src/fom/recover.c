@@ -12,8 +12,8 @@ static PetscErrorCode SetUp(HycoFOM f)
 {
   PetscFunctionBegin;
   if (f->given_solver) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSystemCreate(f->comm, &f->given_system));
-  PetscCall(HycoSolverCreate(f->comm, &f->given_solver));
+  PetscCall(HycoSystemCreate(HycoComm(f), &f->given_system));
+  PetscCall(HycoSolverCreate(HycoComm(f), &f->given_solver));
   PetscCall(HycoSolverSetFromOptions(f->given_solver, f->scene->options));
   PetscCall(HycoSolverSetType(f->given_solver, HYCO_SOLVER_ACTIVE_SET)); /* none of its contacts */
   PetscCall(HycoSolverSetForm(f->given_solver, HYCO_FORM_AUTO));
@@ -52,7 +52,7 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
-  HycoCheckHandle(f, "HycoFOMCreate()");
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
   t = &f->summary.seconds;
   PetscCall(HycoSceneCheckParameters(f->scene, n, mu));
   PetscCall(SetUp(f));
@@ -103,7 +103,7 @@ static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], P
 PetscErrorCode HycoFOMResponses(HycoFOM f, const PetscReal mu[], PetscInt q, const PetscReal P[], PetscReal X[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(f, "HycoFOMCreate()");
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCall(SetUp(f));
   PetscCall(HycoFOMAssemble(f, mu));
   PetscCall(VecCopy(f->F, f->given_F));

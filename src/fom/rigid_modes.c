@@ -178,10 +178,10 @@ PetscErrorCode HycoFOMRelease(HycoFOM f)
   PetscInt n;
 
   PetscFunctionBegin;
-  HycoOnRoot(f->comm, FindPins(f));
-  PetscCallMPI(MPI_Bcast(&f->n_pins, 1, MPIU_INT, 0, f->comm));
-  PetscCallMPI(MPI_Bcast(f->pin_tag, HYCO_MAX_PINS, MPIU_INT, 0, f->comm));
-  PetscCallMPI(MPI_Bcast(f->pin_component, HYCO_MAX_PINS, MPIU_INT, 0, f->comm));
+  HycoOnRoot(HycoComm(f), FindPins(f));
+  PetscCallMPI(MPI_Bcast(&f->n_pins, 1, MPIU_INT, 0, HycoComm(f)));
+  PetscCallMPI(MPI_Bcast(f->pin_tag, HYCO_MAX_PINS, MPIU_INT, 0, HycoComm(f)));
+  PetscCallMPI(MPI_Bcast(f->pin_component, HYCO_MAX_PINS, MPIU_INT, 0, HycoComm(f)));
   n = f->n_pins;
   if (n || f->fe->n_pins) PetscCall(HycoFESetPins(f->fe, n, f->pin_tag, f->pin_component));
   if (f->fe_whole != f->fe && f->rank == 0) PetscCall(HycoFESetPins(f->fe_whole, n, f->pin_tag, f->pin_component));
@@ -215,8 +215,8 @@ static PetscErrorCode Work(Vec force, Vec motion, PetscReal *on, PetscReal *all)
 static PetscErrorCode CheckBalance(HycoFOM f, const char forces[], PetscReal share)
 {
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Bcast(f->summary.regularised, sizeof(f->summary.regularised), MPI_CHAR, 0, f->comm));
-  PetscCheck(share <= f->regularise_tol, f->comm, PETSC_ERR_USER,
+  PetscCallMPI(MPI_Bcast(f->summary.regularised, sizeof(f->summary.regularised), MPI_CHAR, 0, HycoComm(f)));
+  PetscCheck(share <= f->regularise_tol, HycoComm(f), PETSC_ERR_USER,
              "no equilibrium: nothing keeps %s, and of what the %s do there %.2g is not balanced "
              "(-hyco_regularise_tol %g)",
              f->summary.regularised, forces, (double)share, (double)f->regularise_tol);
@@ -289,9 +289,9 @@ static PetscErrorCode SetKernel(HycoFOM f)
   Vec *v;
 
   PetscFunctionBegin;
-  HycoOnRoot(f->comm, HycoFEFreeMotions(f->fe_whole, &motions));
+  HycoOnRoot(HycoComm(f), HycoFEFreeMotions(f->fe_whole, &motions));
   n = motions.n;
-  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, f->comm));
+  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(f)));
   f->summary.free_motion[0] = '\0'; /* rank 0 spreads the summary */
   if (f->rank == 0 && n)
     PetscCall(PetscStrncpy(f->summary.free_motion, motions.name[0], sizeof(f->summary.free_motion)));
@@ -301,7 +301,7 @@ static PetscErrorCode SetKernel(HycoFOM f)
   }
   PetscCall(PetscMalloc1(n, &v));
   PetscCall(Spread(f, motions.motion, n, v));
-  PetscCall(MatNullSpaceCreate(f->comm, PETSC_FALSE, n, v, &kernel));
+  PetscCall(MatNullSpaceCreate(HycoComm(f), PETSC_FALSE, n, v, &kernel));
   PetscCall(MatSetNullSpace(f->K, kernel));
   PetscCall(MatNullSpaceDestroy(&kernel));
   for (PetscInt k = 0; k < n; k++) PetscCall(VecDestroy(&v[k]));
@@ -375,7 +375,7 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
     PetscCall(VecAssemblyEnd(moves[k]));
   }
   PetscCall(Orthonormalize(&n, moves));
-  PetscCall(MatNullSpaceCreate(f->comm, PETSC_FALSE, n, moves, &near));
+  PetscCall(MatNullSpaceCreate(HycoComm(f), PETSC_FALSE, n, moves, &near));
   PetscCall(MatSetNearNullSpace(f->K, near));
   PetscCall(MatNullSpaceDestroy(&near));
   PetscCall(MatNullSpaceDestroy(&rigid));

@@ -16,19 +16,19 @@ static PetscErrorCode ReadMesh(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  HycoOnRoot(t->comm, HycoMeshRead(t->scene, &t->whole));
-  HycoOnRoot(t->comm, HycoPairsFind(t->scene, t->whole, &t->pairs));
+  HycoOnRoot(HycoComm(t), HycoMeshRead(t->scene, &t->whole));
+  HycoOnRoot(HycoComm(t), HycoPairsFind(t->scene, t->whole, &t->pairs));
   for (PetscInt k = 0; k < t->n_groups; k++)
-    HycoOnRoot(t->comm, HycoMeshFindGroup(t->whole, "hyco_rid_groups", t->groups[k], &group));
-  HycoOnRoot(t->comm, HycoFECreate(t->scene, t->whole, &t->fe));
+    HycoOnRoot(HycoComm(t), HycoMeshFindGroup(t->whole, "hyco_rid_groups", t->groups[k], &group));
+  HycoOnRoot(HycoComm(t), HycoFECreate(t->scene, t->whole, &t->fe));
   if (t->rank == 0) {
     t->sizes[0] = t->whole->n_nodes;
     t->sizes[1] = t->whole->n_cells;
     t->sizes[2] = t->pairs.n;
     t->sizes[3] = t->whole->dim;
   }
-  HycoOnRoot(t->comm, HycoFESetParameters(t->fe, mu));
-  PetscCallMPI(MPI_Bcast(t->sizes, 4, MPIU_INT, 0, t->comm));
+  HycoOnRoot(HycoComm(t), HycoFESetParameters(t->fe, mu));
+  PetscCallMPI(MPI_Bcast(t->sizes, 4, MPIU_INT, 0, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -323,9 +323,9 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, const char path
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(candidate, sizeof(candidate), "%s%s", path, scan ? ".candidate" : ""));
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_TRUE));
-  HycoOnRoot(t->comm, BuildAndSave(t, useful, candidate, report));
+  HycoOnRoot(HycoComm(t), BuildAndSave(t, useful, candidate, report));
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
-  PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, t->comm));
+  PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
   if (scan) HycoLogged(HYCO_EVENT_SCAN, HycoReducerScan(t, candidate, path, &report->scan));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -338,7 +338,7 @@ PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char 
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoFileScratch(t->comm, path, "candidate", file));
+  PetscCall(HycoFileScratch(HycoComm(t), path, "candidate", file));
   if (learn)
     ierr = HycoReducerLearn(t, store, file, &grown, report);
   else
@@ -347,7 +347,7 @@ PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char 
   PetscCall(HycoSamplesDestroy(&grown));
   if (ierr && t->rank == 0) (void)unlink(file);
   PetscCall(ierr);
-  HycoOnRoot(t->comm, HycoFileKeep(file, path));
+  HycoOnRoot(HycoComm(t), HycoFileKeep(file, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -371,14 +371,14 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
   PetscCall(HycoReducerReset(t));
   t->samples = samples;
   PetscCall(HycoSamplesGet(samples, &t->n_s, NULL, NULL));
-  PetscCheck(t->n_s > 0, t->comm, PETSC_ERR_USER, "the set of training points is empty");
-  HycoOnRoot(t->comm, CheckWritable(path));
+  PetscCheck(t->n_s > 0, HycoComm(t), PETSC_ERR_USER, "the set of training points is empty");
+  HycoOnRoot(HycoComm(t), CheckWritable(path));
   PetscCall(ReadMesh(t));
   if (t->folder[0])
     PetscCall(PetscStrncpy(folder, t->folder, sizeof(folder)));
   else
     PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s.snapshots", path));
-  PetscCall(HycoSnapshotsOpen(t->comm, t->scene, folder, store));
+  PetscCall(HycoSnapshotsOpen(HycoComm(t), t->scene, folder, store));
   t->fingerprint = (*store)->fingerprint;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -399,7 +399,7 @@ static PetscErrorCode DrawHeld(HycoReducer t, HycoSamples *held)
   if (count < 0) count = PetscMin(MOST_HELD, PetscMax(LEAST_HELD, n));
   if (t->rank == 0) HycoFEReaches(t->fe, reaches);
   for (PetscInt p = 0; p < n_par; p++) slow[p] = t->rank == 0 && reaches[p];
-  PetscCallMPI(MPI_Bcast(slow, (PetscMPIInt)n_par, MPIU_INT, 0, t->comm));
+  PetscCallMPI(MPI_Bcast(slow, (PetscMPIInt)n_par, MPIU_INT, 0, HycoComm(t)));
   for (PetscInt p = 0; p < n_par; p++) reaches[p] = (PetscBool)slow[p];
   PetscCall(HycoSamplesUnseen(t->samples, t->drawn, count, TOGETHER, reaches, held));
   t->drawn += count;
@@ -435,7 +435,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   const PetscBool choose = (PetscBool)!samples;
 
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   HycoCheck(samples || t->type == HYCO_ROM_CONDENSED, "give the training points");
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,

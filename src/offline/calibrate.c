@@ -154,12 +154,12 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, const ch
   if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &rows));
-  HycoOnEach(t->comm, HycoROMLoad(path, &m));
-  PetscCall(HycoROMPredictHeldOut(t->comm, m, store, t->held, rows));
+  HycoOnEach(HycoComm(t), HycoROMLoad(path, &m));
+  PetscCall(HycoROMPredictHeldOut(HycoComm(t), m, store, t->held, rows));
   PetscCall(HycoROMDestroy(&m));
   PetscCall(HycoHeldOutSummarise(n, rows, &report->held_out));
-  HycoOnRoot(t->comm, Conclude(t, rows, path, report));
-  PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, t->comm));
+  HycoOnRoot(HycoComm(t), Conclude(t, rows, path, report));
+  PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, HycoComm(t)));
   PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -316,9 +316,9 @@ PetscErrorCode HycoReducerBeginCondensed(HycoReducer t)
   t->condensed = c;
   c->scene = t->scene;
   PetscCall(FindGrid(t, c));
-  HycoOnRoot(t->comm, Inspect(t, c));
-  PetscCallMPI(MPI_Bcast(c->stiff, HYCO_MAX_PARAMETERS, MPIU_INT, 0, t->comm));
-  PetscCallMPI(MPI_Bcast(c->affine, HYCO_MAX_PARAMETERS, MPIU_INT, 0, t->comm));
+  HycoOnRoot(HycoComm(t), Inspect(t, c));
+  PetscCallMPI(MPI_Bcast(c->stiff, HYCO_MAX_PARAMETERS, MPIU_INT, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(c->affine, HYCO_MAX_PARAMETERS, MPIU_INT, 0, HycoComm(t)));
   PetscCall(HycoCondensedAllocate(c));
   HycoCheckModel(
       (PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=

@@ -74,9 +74,9 @@ static PetscErrorCode Estimate(HycoReducer t, HycoSnapshots store)
   PetscCall(HycoSnapshotsFill(store, t->samples, t->progress, t->progress_ctx));
   PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
   PetscCall(HycoReducerFlexibility(t, store));
-  HycoOnRoot(t->comm, HycoReducerFillFields(t, PETSC_FALSE));
-  HycoOnRoot(t->comm, HycoReducerLeaveOut(t));
-  PetscCallMPI(MPI_Bcast(c->by_parameter, HYCO_MAX_PARAMETERS, MPIU_REAL, 0, t->comm));
+  HycoOnRoot(HycoComm(t), HycoReducerFillFields(t, PETSC_FALSE));
+  HycoOnRoot(HycoComm(t), HycoReducerLeaveOut(t));
+  PetscCallMPI(MPI_Bcast(c->by_parameter, HYCO_MAX_PARAMETERS, MPIU_REAL, 0, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -284,15 +284,15 @@ static PetscErrorCode SpreadPatterns(HycoReducer t)
   PetscMPIInt size;
 
   PetscFunctionBegin;
-  HycoOnRoot(t->comm, FindPatterns(t));
-  PetscCallMPI(MPI_Bcast(&x->q, 1, MPIU_INT, 0, t->comm));
+  HycoOnRoot(HycoComm(t), FindPatterns(t));
+  PetscCallMPI(MPI_Bcast(&x->q, 1, MPIU_INT, 0, HycoComm(t)));
   PetscCall(PetscMPIIntCast(m * x->q, &size));
   if (t->rank) {
     PetscCall(PetscMalloc1(m * x->q + 1, &x->Q));
     PetscCall(PetscMalloc1(x->q + 1, &x->scale));
   }
-  PetscCallMPI(MPI_Bcast(x->Q, size, MPIU_REAL, 0, t->comm));
-  PetscCallMPI(MPI_Bcast(x->scale, (PetscMPIInt)x->q, MPIU_REAL, 0, t->comm));
+  PetscCallMPI(MPI_Bcast(x->Q, size, MPIU_REAL, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(x->scale, (PetscMPIInt)x->q, MPIU_REAL, 0, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -311,7 +311,7 @@ static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
   x->n_columns = t->n_s + nodes * x->q;
   PetscCall(HycoReducerGetDisplacements(t, store, &S));
   PetscCall(
-      MatCreateDense(t->comm, PETSC_DECIDE, PETSC_DECIDE, t->sizes[0] * t->sizes[3], x->n_columns, NULL, columns));
+      MatCreateDense(HycoComm(t), PETSC_DECIDE, PETSC_DECIDE, t->sizes[0] * t->sizes[3], x->n_columns, NULL, columns));
   PetscCall(MatGetOwnershipRange(S, &lo, &hi));
   PetscCall(MatDenseGetLDA(S, &lda[0]));
   PetscCall(MatDenseGetLDA(*columns, &lda[1]));

@@ -160,16 +160,16 @@ static PetscErrorCode SolveMissing(HycoReducer t, HycoSnapshots store, const Tas
   MPI_Comm group;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(t->comm, &size));
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(PetscMalloc1(HycoTensorSize(&t->condensed->field[HYCO_FIELD_G].tensor), &missing));
-  HycoOnRoot(t->comm, FindMissing(t, store, task, &n_missing, missing));
-  PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, t->comm));
-  PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, t->comm));
+  HycoOnRoot(HycoComm(t), FindMissing(t, store, task, &n_missing, missing));
+  PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, HycoComm(t)));
   if (n_missing) {
-    PetscCall(HycoSnapshotsChooseGroups(t->comm, t->scene, n_missing, &groups));
+    PetscCall(HycoSnapshotsChooseGroups(HycoComm(t), t->scene, n_missing, &groups));
     color = (PetscInt)t->rank * groups / size;
-    PetscCallMPI(MPI_Comm_split(t->comm, (PetscMPIInt)color, t->rank, &group));
-    HycoOnEach(t->comm, SolveGroup(t, store, group, color, groups, n_missing, missing, task));
+    PetscCallMPI(MPI_Comm_split(HycoComm(t), (PetscMPIInt)color, t->rank, &group));
+    HycoOnEach(HycoComm(t), SolveGroup(t, store, group, color, groups, n_missing, missing, task));
     PetscCallMPI(MPI_Comm_free(&group));
   }
   PetscCall(PetscFree(missing));
@@ -199,7 +199,7 @@ PetscErrorCode HycoReducerFlexibility(HycoReducer t, HycoSnapshots store)
 
   PetscFunctionBegin;
   PetscCall(SolveMissing(t, store, &task));
-  HycoOnRoot(t->comm, ReadFlexibilities(t, store, &task));
+  HycoOnRoot(HycoComm(t), ReadFlexibilities(t, store, &task));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -239,6 +239,6 @@ PetscErrorCode HycoReducerResponses(HycoReducer t, HycoSnapshots store, PetscInt
   PetscFunctionBegin;
   if (!q) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SolveMissing(t, store, &task));
-  HycoOnEach(t->comm, ReadResponses(t, store, &task, S, first));
+  HycoOnEach(HycoComm(t), ReadResponses(t, store, &task, S, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

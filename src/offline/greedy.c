@@ -111,7 +111,7 @@ static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at
       (*U_at)[(size_t)i * (size_t)t->n_s + (size_t)k] = t->U[(size_t)k * (size_t)whole + (size_t)from];
   }
   for (PetscInt i = 0; i < n_dof; i++) /* by rows: a message's length is an int */
-    PetscCallMPI(MPI_Bcast(*U_at + (size_t)i * (size_t)t->n_s, (PetscMPIInt)t->n_s, MPIU_REAL, 0, t->comm));
+    PetscCallMPI(MPI_Bcast(*U_at + (size_t)i * (size_t)t->n_s, (PetscMPIInt)t->n_s, MPIU_REAL, 0, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -123,7 +123,7 @@ static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const 
   HycoIndicator indicator;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(t->comm, &size));
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(HycoSamplesGet(loop->samples, NULL, NULL, &solved));
   PetscCall(HycoIndicatorCreate(m, t->greedy.indicator, t->n_s, solved, U_at, &indicator));
   for (PetscInt k = t->rank; k < loop->n_points; k += size) {
@@ -148,11 +148,11 @@ static PetscErrorCode Evaluate(HycoReducer t, Loop *loop)
 
   PetscFunctionBegin;
   PetscCall(PetscMPIIntCast(4 * loop->n_points, &count));
-  HycoOnEach(t->comm, HycoROMLoad(loop->file, &m));
+  HycoOnEach(HycoComm(t), HycoROMLoad(loop->file, &m));
   PetscCall(SpreadSnapshots(t, m, &U_at));
   PetscCall(PetscArrayzero(loop->value, 4 * loop->n_points));
-  HycoOnEach(t->comm, EvaluateShare(t, loop, m, U_at));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, loop->value, count, MPIU_REAL, MPI_SUM, t->comm));
+  HycoOnEach(HycoComm(t), EvaluateShare(t, loop, m, U_at));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, loop->value, count, MPIU_REAL, MPI_SUM, HycoComm(t)));
   PetscCall(PetscFree(U_at));
   PetscCall(HycoROMDestroy(&m));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -228,7 +228,7 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   PetscFunctionBegin;
   PetscCall(BuildModel(t, loop, iteration, report));
   PetscCall(Evaluate(t, loop));
-  if (t->greedy.keep) HycoOnRoot(t->comm, KeepModel(loop, iteration));
+  if (t->greedy.keep) HycoOnRoot(HycoComm(t), KeepModel(loop, iteration));
   PetscCall(Choose(loop, &worst, &step));
   step.iteration = iteration;
   step.n_samples = t->n_s;
@@ -237,10 +237,10 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   step.rid_elements = report->rid_elements;
   step.seconds = HycoNow() - loop->begin;
   PetscCallMPI(
-      MPI_Bcast(&step.seconds, 1, MPIU_REAL, 0, t->comm)); /* the ranks' clocks differ, their verdict must not */
+      MPI_Bcast(&step.seconds, 1, MPIU_REAL, 0, HycoComm(t))); /* the ranks' clocks differ, their verdict must not */
   step.stop = WhyStop(t, &step);
   *last = (PetscBool)(step.stop != NULL);
-  if (t->greedy.monitor) HycoOnRoot(t->comm, t->greedy.monitor(&step, t->greedy.ctx));
+  if (t->greedy.monitor) HycoOnRoot(HycoComm(t), t->greedy.monitor(&step, t->greedy.ctx));
   if (!*last) PetscCall(HycoSamplesAddPoint(loop->samples, step.worst));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -292,7 +292,7 @@ static PetscErrorCode RunLoop(HycoReducer t, Loop *loop, HycoTraining *report)
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(place, sizeof(place), "%s/greedy.h5", loop->store->folder));
-  PetscCall(HycoFileScratch(t->comm, place, "candidate", loop->file));
+  PetscCall(HycoFileScratch(HycoComm(t), place, "candidate", loop->file));
   for (PetscInt iteration = 0; !last && !ierr; iteration++) ierr = Iterate(t, loop, iteration, report, &last);
   if (t->rank == 0) (void)unlink(loop->file);
   PetscCall(ierr);
@@ -306,7 +306,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   HycoTraining report = {0};
 
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   HycoCheck(t->type != HYCO_ROM_CONDENSED,
             "a condensed model needs a tensor grid of training points, which -greedy does not give: use -grid, or "
             "-values_NAME");

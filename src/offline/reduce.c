@@ -17,7 +17,7 @@ static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n_dof, &fixed));
   if (t->rank == 0) PetscCall(PetscArraycpy(fixed, t->fe->fixed, n_dof));
-  PetscCallMPI(MPI_Bcast(fixed, (PetscMPIInt)(n_dof * (PetscInt)sizeof(PetscBool)), MPI_BYTE, 0, t->comm));
+  PetscCallMPI(MPI_Bcast(fixed, (PetscMPIInt)(n_dof * (PetscInt)sizeof(PetscBool)), MPI_BYTE, 0, HycoComm(t)));
   PetscCall(MatGetOwnershipRange(S, &lo, &hi));
   PetscCall(MatGetSize(S, NULL, &n));
   PetscCall(MatDenseGetLDA(S, &lda));
@@ -47,7 +47,7 @@ PetscErrorCode HycoReducerToRoot(HycoReducer t, Mat S, PetscBool row_major, Pets
   PetscReal *mine, *all = NULL;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(t->comm, &size));
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(MatGetSize(S, &N, &n));
   PetscCall(MatGetOwnershipRange(S, &lo, &hi));
   PetscCall(MatGetOwnershipRanges(S, &ranges));
@@ -68,7 +68,7 @@ PetscErrorCode HycoReducerToRoot(HycoReducer t, Mat S, PetscBool row_major, Pets
       counts[r] = (PetscMPIInt)(ranges[r + 1] - ranges[r]);
       offsets[r] = (PetscMPIInt)ranges[r];
     }
-    PetscCallMPI(MPI_Gatherv(mine, (PetscMPIInt)(hi - lo), row, all, counts, offsets, row, 0, t->comm));
+    PetscCallMPI(MPI_Gatherv(mine, (PetscMPIInt)(hi - lo), row, all, counts, offsets, row, 0, HycoComm(t)));
     PetscCallMPI(MPI_Type_free(&row));
   }
   PetscCall(PetscFree3(counts, offsets, mine));
@@ -96,7 +96,7 @@ PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal produc
 
   PetscFunctionBegin;
   PetscCall(MatTransposeMatMult(X, Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &P));
-  PetscCallMPI(MPI_Comm_size(t->comm, &size));
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   if (size > 1)
     PetscCall(MatCreateRedundantMatrix(P, size, PETSC_COMM_SELF, MAT_INITIAL_MATRIX, &whole));
   else {
@@ -382,7 +382,7 @@ static PetscErrorCode ReduceForces(HycoReducer t, HycoSnapshots store)
   PetscCall(MatDestroy(&S));
   if (!t->seed[HYCO_SEED_DUAL] || !t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(5 * t->n_s, &t->dual_seeds));
-  HycoOnRoot(t->comm, DualSeeds(t, &t->n_dual_seeds, t->dual_seeds));
+  HycoOnRoot(HycoComm(t), DualSeeds(t, &t->n_dual_seeds, t->dual_seeds));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

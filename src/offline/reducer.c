@@ -9,11 +9,11 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   HycoReducer t;
 
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
-  PetscCall(PetscNew(&t));
-  PetscCall(HycoHandleOpen(t, "HycoReducerCreate()"));
-  PetscCallMPI(MPI_Comm_dup(comm, &t->comm));
-  PetscCallMPI(MPI_Comm_rank(t->comm, &t->rank));
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(PetscHeaderCreate(t, HYCO_REDUCER_CLASSID, "HycoReducer", "Training of reduced models", "Hyco", comm,
+                              HycoReducerDestroy, HycoReducerView));
+  PetscCallMPI(MPI_Comm_rank(HycoComm(t), &t->rank));
+  PetscCall(PetscObjectReference((PetscObject)scene));
   t->scene = scene;
   t->noise = 1e-11;
   t->nnmf_max_its = 100;
@@ -86,21 +86,21 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
 
   PetscFunctionBegin;
   if (!reducer || !*reducer) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*reducer, "HycoReducerCreate()");
-  HycoHandleClose(*reducer);
+  HycoCheckHandle(*reducer, HYCO_REDUCER_CLASSID);
+  HycoDereference(reducer);
   t = *reducer;
   PetscCall(HycoReducerReset(t));
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
   PetscCall(PetscFree(t->region));
-  PetscCallMPI(MPI_Comm_free(&t->comm));
-  PetscCall(PetscFree(*reducer));
+  PetscCall(HycoSceneDestroy(&t->scene));
+  PetscCall(PetscHeaderDestroy(reducer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoReducerSetSnapshotFolder(HycoReducer t, const char folder[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -108,7 +108,7 @@ PetscErrorCode HycoReducerSetSnapshotFolder(HycoReducer t, const char folder[])
 PetscErrorCode HycoReducerChooses(HycoReducer t, PetscBool *chooses)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   *chooses = (PetscBool)(t->type == HYCO_ROM_CONDENSED);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -116,7 +116,7 @@ PetscErrorCode HycoReducerChooses(HycoReducer t, PetscBool *chooses)
 PetscErrorCode HycoReducerSetProgress(HycoReducer t, HycoProgress progress, void *ctx)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   t->progress = progress;
   t->progress_ctx = ctx;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -125,7 +125,7 @@ PetscErrorCode HycoReducerSetProgress(HycoReducer t, HycoProgress progress, void
 PetscErrorCode HycoReducerSetValidation(HycoReducer t, HycoSamples validation)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   t->validation = validation;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -133,7 +133,7 @@ PetscErrorCode HycoReducerSetValidation(HycoReducer t, HycoSamples validation)
 PetscErrorCode HycoReducerSetValidationCount(HycoReducer t, PetscInt n)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   t->n_validation = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -141,7 +141,7 @@ PetscErrorCode HycoReducerSetValidationCount(HycoReducer t, PetscInt n)
 PetscErrorCode HycoReducerSetSearch(HycoReducer t, PetscBool search)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   t->search = search;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -150,7 +150,7 @@ PetscErrorCode HycoReducerSetAttemptMonitor(HycoReducer t, HycoAttemptMonitor at
                                             void *ctx)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   t->attempt = attempt;
   t->added = added;
   t->attempt_ctx = ctx;
@@ -160,7 +160,7 @@ PetscErrorCode HycoReducerSetAttemptMonitor(HycoReducer t, HycoAttemptMonitor at
 PetscErrorCode HycoReducerSetTargets(HycoReducer t, const PetscReal target[], PetscInt budget)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   for (PetscInt e = 0; e < HYCO_N_ERRORS; e++) {
     HycoCheck(target[e] >= 0, "the target of the error %s is %g; it must be positive (0: none)", HycoErrorKinds[e],
               (double)target[e]);
@@ -173,7 +173,7 @@ PetscErrorCode HycoReducerSetTargets(HycoReducer t, const PetscReal target[], Pe
 PetscErrorCode HycoReducerSetGreedyMonitor(HycoReducer t, HycoGreedyMonitor monitor, void *ctx)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   t->greedy.monitor = monitor;
   t->greedy.ctx = ctx;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -182,7 +182,7 @@ PetscErrorCode HycoReducerSetGreedyMonitor(HycoReducer t, HycoGreedyMonitor moni
 PetscErrorCode HycoReducerSetGreedyIndicator(HycoReducer t, HycoIndicatorKind kind)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   t->greedy.indicator = kind;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -190,7 +190,7 @@ PetscErrorCode HycoReducerSetGreedyIndicator(HycoReducer t, HycoIndicatorKind ki
 PetscErrorCode HycoReducerSetGreedyStop(HycoReducer t, PetscReal target, PetscInt max_snapshots, PetscReal max_seconds)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   HycoCheck(target > 0, "the target of the greedy training is %g; it must be positive, as 1e-3 is", (double)target);
   HycoCheck(max_snapshots >= 0 && max_seconds >= 0,
             "the greedy training may take %d snapshots and %g seconds; neither can be negative (0: no limit)",
@@ -270,7 +270,7 @@ PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
   char text[4 * HYCO_LINE];
 
   PetscFunctionBegin;
-  HycoCheckHandle(t, "HycoReducerCreate()");
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   o = t->scene->options;
   hybrid = (PetscInt)t->hybrid;
   PetscCall(PetscOptionsGetString(o, NULL, "-hyco_snapshots", t->folder, sizeof(t->folder), NULL));
@@ -316,5 +316,29 @@ PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
     PetscCall(HycoExprDestroy(&region));
     PetscCall(PetscStrallocpy(text, &t->region));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
+{
+  PetscBool ascii;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  PetscCall(HycoViewBegin((PetscObject)t, &viewer, &ascii));
+  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "model type: %s\n", HycoROMTypes[t->type]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "energy left out of the displacement basis: %g\n",
+                                   (double)t->tol[HYCO_SEED_DISPLACEMENT]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "search for settings: %s\n", t->search ? "yes" : "no"));
+  PetscCall(PetscViewerASCIIPopTab(viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerViewFromOptions(HycoReducer object, PetscObject owner, const char option[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(object, HYCO_REDUCER_CLASSID);
+  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

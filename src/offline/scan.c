@@ -131,16 +131,16 @@ static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
   PetscMPIInt size;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(t->comm, &size));
-  HycoOnEach(t->comm, FindParameters(m, reaches));
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
+  HycoOnEach(HycoComm(t), FindParameters(m, reaches));
   if (m->n > LARGEST) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ChooseGrid(t->scan, m->n, m->scene->n_parameters, reaches, &each, &m->scan.n));
   PetscCall(PetscCalloc2(m->scan.n, &sign, m->scan.n, &ratio));
-  HycoOnEach(t->comm,
+  HycoOnEach(HycoComm(t),
              ScanMine(m, reaches, each, t->rank * m->scan.n / size, (t->rank + 1) * m->scan.n / size, sign, ratio));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sign, (PetscMPIInt)m->scan.n, MPIU_REAL, MPI_SUM, t->comm));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ratio, (PetscMPIInt)m->scan.n, MPIU_REAL, MPI_SUM, t->comm));
-  HycoOnRoot(t->comm, Conclude(t, m, reaches, each, sign, ratio));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sign, (PetscMPIInt)m->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ratio, (PetscMPIInt)m->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t)));
+  HycoOnRoot(HycoComm(t), Conclude(t, m, reaches, each, sign, ratio));
   PetscCall(PetscFree2(sign, ratio));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -153,7 +153,7 @@ PetscErrorCode HycoReducerScan(HycoReducer t, const char candidate[], const char
   char message[HYCO_LINE];
 
   PetscFunctionBegin;
-  HycoOnEach(t->comm, HycoROMLoad(candidate, &m));
+  HycoOnEach(HycoComm(t), HycoROMLoad(candidate, &m));
   PetscCall(HycoCatchBegin());
   ierr = Scan(t, m, reaches);
   if (!ierr && t->rank == 0) ierr = HycoReducerTabulate(m, reaches);
@@ -161,8 +161,8 @@ PetscErrorCode HycoReducerScan(HycoReducer t, const char candidate[], const char
   PetscCall(HycoCatchEnd(ierr, message));
   *found = m->scan;
   if (t->rank == 0) (void)unlink(candidate);
-  PetscCall(HycoErrorSync(t->comm, ierr, message));
+  PetscCall(HycoErrorSync(HycoComm(t), ierr, message));
   PetscCall(HycoROMDestroy(&m));
-  PetscCallMPI(MPI_Bcast(found, sizeof(*found), MPI_BYTE, 0, t->comm));
+  PetscCallMPI(MPI_Bcast(found, sizeof(*found), MPI_BYTE, 0, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -148,8 +148,8 @@ static PetscErrorCode Judge(Search *s, HycoAttempt *a)
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   PetscCall(PetscMalloc1(n, &rows));
-  HycoOnEach(t->comm, HycoROMLoad(s->file, &model));
-  PetscCall(HycoROMPredictHeldOut(t->comm, model, s->store, t->held, rows));
+  HycoOnEach(HycoComm(t), HycoROMLoad(s->file, &model));
+  PetscCall(HycoROMPredictHeldOut(HycoComm(t), model, s->store, t->held, rows));
   PetscCall(HycoROMDestroy(&model));
   PetscCall(HycoHeldOutSummarise(n, rows, &a->held_out));
   a->ratio = 0;
@@ -224,7 +224,7 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
   }
   PetscCall(PetscStrncpy(a->failure, message, sizeof(a->failure)));
   if (t->rank == 0) (void)unlink(s->file);
-  if (t->attempt) HycoOnRoot(t->comm, t->attempt(a, t->attempt_ctx));
+  if (t->attempt) HycoOnRoot(HycoComm(t), t->attempt(a, t->attempt_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -476,7 +476,7 @@ static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report
     }
     PetscCall(AddPoints(s, *grown, n_add, &by));
     report->n_added += n_add;
-    if (t->added) HycoOnRoot(t->comm, t->added(n_add, by, t->attempt_ctx));
+    if (t->added) HycoOnRoot(HycoComm(t), t->added(n_add, by, t->attempt_ctx));
     t->samples = *grown;
     PetscCall(HycoSamplesGet(*grown, &t->n_s, NULL, NULL));
     PetscCall(HycoReducerResetBases(t));
@@ -527,8 +527,8 @@ static PetscErrorCode Learn(Search *s, const char path[], HycoSamples *grown, Hy
 
   PetscFunctionBegin;
   GetRecipe(t, &s->given);
-  HycoOnRoot(t->comm, SurfaceEdge(t, &edge));
-  PetscCallMPI(MPI_Bcast(&edge, 1, MPIU_REAL, 0, t->comm));
+  HycoOnRoot(HycoComm(t), SurfaceEdge(t, &edge));
+  PetscCallMPI(MPI_Bcast(&edge, 1, MPIU_REAL, 0, HycoComm(t)));
   s->extension = EXTENSION * edge;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) s->targets = (PetscBool)(s->targets || t->target[j] > 0);
   PetscCall(PetscArraycpy(s->target, s->targets ? t->target : usual, HYCO_N_ERRORS));

@@ -28,7 +28,7 @@ static PetscErrorCode MakeFolder(const char folder[])
 static PetscErrorCode Begin(HycoSnapshots s)
 {
   PetscFunctionBegin;
-  HycoOnRoot(s->comm, MakeFolder(s->folder));
+  HycoOnRoot(HycoComm(s), MakeFolder(s->folder));
   PetscCall(HycoSceneFingerprint(s->scene, &s->fingerprint));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -39,10 +39,10 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
-  PetscCall(PetscNew(&s));
-  PetscCall(HycoHandleOpen(s, "HycoSnapshotsOpen()"));
-  PetscCallMPI(MPI_Comm_dup(comm, &s->comm));
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(PetscHeaderCreate(s, HYCO_SNAPSHOTS_CLASSID, "HycoSnapshots", "Store of full-order solutions", "Hyco", comm,
+                              HycoSnapshotsDestroy, HycoSnapshotsView));
+  PetscCall(PetscObjectReference((PetscObject)scene));
   s->scene = scene;
   PetscCall(PetscStrncpy(s->folder, folder, sizeof(s->folder)));
   ierr = Begin(s);
@@ -56,10 +56,10 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
 {
   PetscFunctionBegin;
   if (!snapshots || !*snapshots) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*snapshots, "HycoSnapshotsOpen()");
-  HycoHandleClose(*snapshots);
-  PetscCallMPI(MPI_Comm_free(&(*snapshots)->comm));
-  PetscCall(PetscFree(*snapshots));
+  HycoCheckHandle(*snapshots, HYCO_SNAPSHOTS_CLASSID);
+  HycoDereference(snapshots);
+  PetscCall(HycoSceneDestroy(&(*snapshots)->scene));
+  PetscCall(PetscHeaderDestroy(snapshots));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -151,7 +151,7 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   struct stat info;
 
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   *groups = 0;
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(HycoOptionsInt(scene->options, "hyco_groups", 0, PETSC_MAX_INT, groups));
@@ -212,12 +212,12 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
 
       snprintf(at + length, sizeof(at) - length, "%s%s = %.10g", p ? ", " : "", s->scene->parameter[p], (double)mu[p]);
     }
-    SETERRQ(fom->comm, PETSC_ERR_USER, "the snapshot at %s: %s%s%s", at, HycoReasonName(summary.reason),
+    SETERRQ(HycoComm(fom), PETSC_ERR_USER, "the snapshot at %s: %s%s%s", at, HycoReasonName(summary.reason),
             summary.free_motion[0] ? "; no support keeps " : "", summary.free_motion);
   }
   PetscCall(HycoFOMGetSolution(fom, NULL, NULL, NULL, NULL, NULL, NULL));
   PetscCall(HycoFOMGetForces(fom, force));
-  HycoOnRoot(fom->comm, WriteSample(s, fom, mu, force));
+  HycoOnRoot(HycoComm(fom), WriteSample(s, fom, mu, force));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -255,7 +255,7 @@ static PetscErrorCode SolveGroup(HycoSnapshots s, MPI_Comm group, PetscInt color
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
+  PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
   PetscCall(HycoFOMCreate(group, s->scene, &fom));
   PetscCall(PetscMalloc1(fom->n_nodes * fom->fe->dim, &force));
   PetscCall(PetscCalloc1(groups, &next));
@@ -280,21 +280,21 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
   MPI_Comm group;
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSnapshotsOpen()");
+  HycoCheckHandle(s, HYCO_SNAPSHOTS_CLASSID);
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   HycoCheck(n > 0, "the set of samples is empty");
-  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
+  PetscCallMPI(MPI_Comm_size(HycoComm(s), &size));
   PetscCall(PetscMalloc1(n, &missing));
-  HycoOnRoot(s->comm, FindMissing(s, n, n_par, mu, &n_missing, missing));
-  HycoOnRoot(s->comm, BringTogether(s, n_par, mu, n_missing, missing));
-  PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, s->comm));
-  PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, s->comm));
+  HycoOnRoot(HycoComm(s), FindMissing(s, n, n_par, mu, &n_missing, missing));
+  HycoOnRoot(HycoComm(s), BringTogether(s, n_par, mu, n_missing, missing));
+  PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, HycoComm(s)));
+  PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, HycoComm(s)));
   if (n_missing) {
-    PetscCall(HycoSnapshotsChooseGroups(s->comm, s->scene, n_missing, &groups));
+    PetscCall(HycoSnapshotsChooseGroups(HycoComm(s), s->scene, n_missing, &groups));
     color = (PetscInt)rank * groups / size;
-    PetscCallMPI(MPI_Comm_split(s->comm, (PetscMPIInt)color, rank, &group));
-    HycoOnEach(s->comm, SolveGroup(s, group, color, groups, n_par, mu, n, n_missing, missing, progress, ctx));
+    PetscCallMPI(MPI_Comm_split(HycoComm(s), (PetscMPIInt)color, rank, &group));
+    HycoOnEach(HycoComm(s), SolveGroup(s, group, color, groups, n_par, mu, n, n_missing, missing, progress, ctx));
     PetscCallMPI(MPI_Comm_free(&group));
     if (rank == 0 && progress) PetscCall(progress(n, n, ctx));
   }
@@ -350,13 +350,13 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
-  HycoOnRoot(s->comm, FirstSize(s, samples, field, &total));
-  PetscCallMPI(MPI_Bcast(&total, 1, MPIU_INT, 0, s->comm));
-  PetscCall(MatCreateDense(s->comm, PETSC_DECIDE, PETSC_DECIDE, total, n, NULL, S));
+  HycoOnRoot(HycoComm(s), FirstSize(s, samples, field, &total));
+  PetscCallMPI(MPI_Bcast(&total, 1, MPIU_INT, 0, HycoComm(s)));
+  PetscCall(MatCreateDense(HycoComm(s), PETSC_DECIDE, PETSC_DECIDE, total, n, NULL, S));
   PetscCall(MatGetOwnershipRange(*S, &lo, &hi));
   PetscCall(MatDenseGetLDA(*S, &lda));
   PetscCall(MatDenseGetArray(*S, &data));
-  HycoOnEach(s->comm, ReadColumns(s, samples, field, lo, hi - lo, total, data, lda));
+  HycoOnEach(HycoComm(s), ReadColumns(s, samples, field, lo, hi - lo, total, data, lda));
   PetscCall(MatDenseRestoreArray(*S, &data));
   PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
@@ -377,5 +377,26 @@ PetscErrorCode HycoSnapshotsRead(HycoSnapshots s, const PetscReal mu[], const ch
   if (!ierr) ierr = HycoH5ReadReal(h, field, n, 1, value);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsView(HycoSnapshots s, PetscViewer viewer)
+{
+  PetscBool ascii;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SNAPSHOTS_CLASSID);
+  PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
+  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "folder: %s\n", s->folder));
+  PetscCall(PetscViewerASCIIPopTab(viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsViewFromOptions(HycoSnapshots object, PetscObject owner, const char option[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(object, HYCO_SNAPSHOTS_CLASSID);
+  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

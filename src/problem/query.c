@@ -8,7 +8,7 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
                                       const PetscReal *hi[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   if (n) *n = scene->n_parameters;
   if (names) *names = (const char *const *)scene->parameter;
   if (lo) *lo = scene->lo;
@@ -19,7 +19,7 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
 PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   *title = scene->title;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -27,7 +27,7 @@ PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[])
 PetscErrorCode HycoSceneGetMesh(HycoScene scene, const char *path[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   *path = scene->mesh_path;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -35,7 +35,7 @@ PetscErrorCode HycoSceneGetMesh(HycoScene scene, const char *path[])
 PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   *contact = (PetscBool)(scene->n_contacts > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -43,7 +43,7 @@ PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact)
 PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   *options = scene->options;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -51,7 +51,7 @@ PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options)
 PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const PetscReal mu[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCheck(mu || !n, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL, "the parameter values' address is NULL");
   if (n != scene->n_parameters) {
     char list[HYCO_LINE] = "none";
@@ -80,7 +80,7 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
 PetscErrorCode HycoSceneSetExtrapolate(HycoScene scene, PetscBool extrapolate)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   scene->extrapolate = extrapolate;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -122,15 +122,15 @@ PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
     *hash = HycoHash(*hash, scene->value[k], strlen(scene->value[k]) + 1);
   }
   if (MayMoveSurfaces(scene)) *hash = HycoHash(*hash, "masters where they are", 22);
-  HycoOnRoot(scene->comm, HashFile(scene, hash));
-  PetscCallMPI(MPI_Bcast(hash, 1, MPI_UNSIGNED_LONG_LONG, 0, scene->comm));
+  HycoOnRoot(HycoComm(scene), HashFile(scene, hash));
+  PetscCallMPI(MPI_Bcast(hash, 1, MPI_UNSIGNED_LONG_LONG, 0, HycoComm(scene)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSceneView(HycoScene scene, PetscViewer viewer)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCall(PetscViewerASCIIPrintf(viewer, "scene: %s\n", scene->title[0] ? scene->title : "(no title)"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  mesh: %s\n", scene->mesh_path[0] ? scene->mesh_path : "(none)"));
   for (PetscInt p = 0; p < scene->n_parameters; p++) {

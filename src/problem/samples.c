@@ -6,7 +6,8 @@
 #include <string.h>
 
 struct _p_HycoSamples {
-  HycoScene scene; /* borrowed */
+  PETSCHEADER(int);
+  HycoScene scene; /* referenced */
   PetscInt n, room;
   PetscReal *mu; /* n x n_parameters */
 };
@@ -14,9 +15,11 @@ struct _p_HycoSamples {
 PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(scene, "HycoSceneLoad()");
-  PetscCall(PetscNew(samples));
-  PetscCall(HycoHandleOpen(*samples, "HycoSamplesCreate()"));
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(HycoInitializePackage());
+  PetscCall(PetscHeaderCreate(*samples, HYCO_SAMPLES_CLASSID, "HycoSamples", "Points of the parameter space", "Hyco",
+                              HycoComm(scene), HycoSamplesDestroy, HycoSamplesView));
+  PetscCall(PetscObjectReference((PetscObject)scene));
   (*samples)->scene = scene;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -25,17 +28,18 @@ PetscErrorCode HycoSamplesDestroy(HycoSamples *samples)
 {
   PetscFunctionBegin;
   if (!samples || !*samples) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*samples, "HycoSamplesCreate()");
-  HycoHandleClose(*samples);
+  HycoCheckHandle(*samples, HYCO_SAMPLES_CLASSID);
+  HycoDereference(samples);
+  PetscCall(HycoSceneDestroy(&(*samples)->scene));
   PetscCall(PetscFree((*samples)->mu));
-  PetscCall(PetscFree(*samples));
+  PetscCall(PetscHeaderDestroy(samples));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSamplesGetScene(HycoSamples s, HycoScene *scene)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSamplesCreate()");
+  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
   *scene = s->scene;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -45,8 +49,8 @@ PetscErrorCode HycoSamplesAddPoint(HycoSamples s, const PetscReal mu[])
   PetscInt P;
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSamplesCreate()");
-  HycoCheckHandle(s->scene, "HycoSceneLoad()");
+  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
+  HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   P = s->scene->n_parameters;
   PetscCall(HycoSceneCheckParameters(s->scene, P, mu));
   if (s->n == s->room) {
@@ -64,8 +68,8 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], con
   PetscInt total = 1;
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSamplesCreate()");
-  HycoCheckHandle(s->scene, "HycoSceneLoad()");
+  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
+  HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     HycoCheck(counts[p] >= 1, "parameter %s has %d values; at least 1 is needed", s->scene->parameter[p],
               (int)counts[p]);
@@ -100,8 +104,8 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscB
   PetscReal *values[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSamplesCreate()");
-  HycoCheckHandle(s->scene, "HycoSceneLoad()");
+  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
+  HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     const PetscInt least = closed && s->scene->lo[p] < s->scene->hi[p] ? 2 : 1;
 
@@ -126,8 +130,8 @@ PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
   PetscReal *values[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSamplesCreate()");
-  HycoCheckHandle(s->scene, "HycoSceneLoad()");
+  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
+  HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     HycoCheck(counts[p] >= 1 && counts[p] <= 100000000, "the grid has %d points for %s; at least 1 is needed",
               (int)counts[p], s->scene->parameter[p]);
@@ -211,9 +215,9 @@ static PetscErrorCode ReadFile(HycoSamples s, const char path[])
 PetscErrorCode HycoSamplesAddFile(HycoSamples s, const char path[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSamplesCreate()");
-  HycoCheckHandle(s->scene, "HycoSceneLoad()");
-  HycoOnEach(s->scene->comm, ReadFile(s, path));
+  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
+  HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
+  HycoOnEach(HycoComm(s->scene), ReadFile(s, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,8 +263,8 @@ PetscErrorCode HycoSamplesDropTwins(HycoSamples s, PetscInt *n_dropped)
   PetscBool *twin;
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSamplesCreate()");
-  HycoCheckHandle(s->scene, "HycoSceneLoad()");
+  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
+  HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   PetscCall(PetscMalloc1(s->n, &twin));
   PetscCall(FindTwins(s, twin));
   for (PetscInt k = 0; k < s->n; k++) {
@@ -277,10 +281,31 @@ PetscErrorCode HycoSamplesDropTwins(HycoSamples s, PetscInt *n_dropped)
 PetscErrorCode HycoSamplesGet(HycoSamples s, PetscInt *n_points, PetscInt *n_parameters, const PetscReal *mu[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSamplesCreate()");
-  HycoCheckHandle(s->scene, "HycoSceneLoad()");
+  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
+  HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   if (n_points) *n_points = s->n;
   if (n_parameters) *n_parameters = s->scene->n_parameters;
   if (mu) *mu = s->mu;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesView(HycoSamples s, PetscViewer viewer)
+{
+  PetscBool ascii;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
+  PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
+  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%d points of %d parameters\n", (int)s->n, (int)s->scene->n_parameters));
+  PetscCall(PetscViewerASCIIPopTab(viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesViewFromOptions(HycoSamples object, PetscObject owner, const char option[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(object, HYCO_SAMPLES_CLASSID);
+  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -364,9 +364,9 @@ static PetscErrorCode LoadInto(HycoScene s, const char path[])
   char folder[PETSC_MAX_PATH_LEN] = "";
 
   PetscFunctionBegin;
-  HycoOnEach(s->comm, HycoReserveBLAS());
-  PetscCall(HycoEntriesRead(s->comm, path, &s->options, folder));
-  HycoOnEach(s->comm, Build(s, folder));
+  HycoOnEach(HycoComm(s), HycoReserveBLAS());
+  PetscCall(HycoEntriesRead(HycoComm(s), path, &s->options, folder));
+  HycoOnEach(HycoComm(s), Build(s, folder));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -377,9 +377,9 @@ PetscErrorCode HycoSceneLoad(MPI_Comm comm, const char path[], HycoScene *scene)
   PetscFunctionBegin;
   PetscCheck(path && scene, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
              "HycoSceneLoad: the path or the handle's address is NULL");
-  PetscCall(PetscNew(scene));
-  PetscCall(HycoHandleOpen(*scene, "HycoSceneLoad()"));
-  PetscCallMPI(MPI_Comm_dup(comm, &(*scene)->comm));
+  PetscCall(HycoInitializePackage());
+  PetscCall(PetscHeaderCreate(*scene, HYCO_SCENE_CLASSID, "HycoScene", "Scene of bodies in contact", "Hyco", comm,
+                              HycoSceneDestroy, HycoSceneView));
   ierr = LoadInto(*scene, path);
   if (ierr) PetscCall(HycoSceneDestroy(scene));
   PetscCall(ierr);
@@ -410,9 +410,9 @@ PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[]
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscNew(scene));
-  PetscCall(HycoHandleOpen(*scene, "HycoSceneLoad()"));
-  PetscCallMPI(MPI_Comm_dup(comm, &(*scene)->comm));
+  PetscCall(HycoInitializePackage());
+  PetscCall(PetscHeaderCreate(*scene, HYCO_SCENE_CLASSID, "HycoScene", "Scene of bodies in contact", "Hyco", comm,
+                              HycoSceneDestroy, HycoSceneView));
   ierr = FillFromEntries(*scene, n, key, value, folder);
   if (ierr) PetscCall(HycoSceneDestroy(scene));
   PetscCall(ierr);
@@ -481,8 +481,8 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
 
   PetscFunctionBegin;
   if (!scene || !*scene) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*scene, "HycoSceneLoad()");
-  HycoHandleClose(*scene);
+  HycoCheckHandle(*scene, HYCO_SCENE_CLASSID);
+  HycoDereference(scene);
   s = *scene;
   *scene = NULL;
   for (PetscInt k = 0; k < s->n_bodies; k++) {
@@ -524,7 +524,14 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   PetscCall(PetscFree(s->title));
   PetscCall(PetscFree(s->mesh_path));
   PetscCall(PetscOptionsDestroy(&s->options));
-  PetscCallMPI(MPI_Comm_free(&s->comm));
-  PetscCall(PetscFree(s));
+  PetscCall(PetscHeaderDestroy(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneViewFromOptions(HycoScene object, PetscObject owner, const char option[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(object, HYCO_SCENE_CLASSID);
+  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

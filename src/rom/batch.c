@@ -46,7 +46,7 @@ static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt
 PetscErrorCode HycoROMGetSizes(HycoROM m, PetscInt *n_contacts, PetscInt *n_nodes, PetscInt *dim)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   if (n_contacts) *n_contacts = m->pairs.n;
   if (n_nodes) *n_nodes = m->mesh->n_nodes;
   if (dim) *dim = m->mesh->dim;
@@ -78,7 +78,7 @@ PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   for (PetscInt k = 0; k < n; k++) PetscCall(HycoSceneCheckParameters(m->scene, n_parameters, mu + k * n_parameters));
   PetscCall(HycoROMSetUp(m));
   PetscCall(PetscMalloc1(n, &point));

@@ -234,7 +234,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   p = &m->prediction;
   PetscCall(HycoSceneCheckParameters(m->scene, n, mu));
   m->solved = m->whole_current = PETSC_FALSE;

@@ -9,8 +9,9 @@
 PetscErrorCode HycoROMCreate(HycoROM *model)
 {
   PetscFunctionBegin;
-  PetscCall(PetscNew(model));
-  PetscCall(HycoHandleOpen(*model, "HycoROMLoad()"));
+  PetscCall(HycoInitializePackage());
+  PetscCall(PetscHeaderCreate(*model, HYCO_ROM_CLASSID, "HycoROM", "Reduced model", "Hyco", PETSC_COMM_SELF,
+                              HycoROMDestroy, HycoROMView));
   (*model)->reconstruct = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -56,8 +57,8 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
 
   PetscFunctionBegin;
   if (!model || !*model) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*model, "HycoROMLoad()");
-  HycoHandleClose(*model);
+  HycoCheckHandle(*model, HYCO_ROM_CLASSID);
+  HycoDereference(model);
   m = *model;
   PetscCall(HycoROMReset(m));
   PetscCall(HycoNormsDestroy(&m->norms));
@@ -84,14 +85,14 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
   PetscCall(PetscFree(m->master_reach));
   PetscCall(PetscFree(m->provenance));
   PetscCall(PetscFree(m->search));
-  PetscCall(PetscFree(*model));
+  PetscCall(PetscHeaderDestroy(model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoROMGetType(HycoROM m, HycoROMType *type)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   *type = m->type;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -99,7 +100,7 @@ PetscErrorCode HycoROMGetType(HycoROM m, HycoROMType *type)
 PetscErrorCode HycoROMGetScene(HycoROM m, HycoScene *scene)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   *scene = m->scene;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -110,8 +111,8 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
   char text[32];
 
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
-  HycoCheckHandle(scene, "HycoSceneLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
   HycoCheck(
@@ -124,7 +125,7 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
 PetscErrorCode HycoROMSetReconstruct(HycoROM m, PetscBool reconstruct)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   m->reconstruct = reconstruct;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -132,7 +133,7 @@ PetscErrorCode HycoROMSetReconstruct(HycoROM m, PetscBool reconstruct)
 PetscErrorCode HycoROMSetExtrapolate(HycoROM m, PetscBool extrapolate)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCall(HycoSceneSetExtrapolate(m->scene, extrapolate));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -140,7 +141,7 @@ PetscErrorCode HycoROMSetExtrapolate(HycoROM m, PetscBool extrapolate)
 PetscErrorCode HycoROMSetMonitor(HycoROM m, HycoMonitor monitor, void *ctx)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCall(HycoROMSetUp(m));
   PetscCall(HycoSolverSetMonitor(m->solver, monitor, ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -149,7 +150,7 @@ PetscErrorCode HycoROMSetMonitor(HycoROM m, HycoMonitor monitor, void *ctx)
 static PetscErrorCode CheckSolved(HycoROM m)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before asking for its results");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -402,7 +403,7 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
   PetscInt pod;
 
   PetscFunctionBegin;
-  HycoCheckHandle(m, "HycoROMLoad()");
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
   pod = m->type == HYCO_ROM_PROJECTION ? m->l - m->counts[1] : m->l;
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n", words[m->type]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, %sforces %.2e\n",
@@ -421,5 +422,13 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
   PetscCall(HycoTrustView(m, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->provenance));
   PetscCall(HycoSceneView(m->scene, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMViewFromOptions(HycoROM object, PetscObject owner, const char option[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(object, HYCO_ROM_CLASSID);
+  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -33,10 +33,10 @@ static PetscErrorCode Limit(HycoSolver s, PetscReal *bytes)
   PetscFunctionBegin;
   *bytes = s->memory;
   if (*bytes > 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Comm_split_type(s->comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node));
+  PetscCallMPI(MPI_Comm_split_type(HycoComm(s), MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node));
   PetscCallMPI(MPI_Comm_rank(node, &rank));
   mine = rank == 0 ? 0.8 * Available() : 0;
-  PetscCallMPI(MPI_Allreduce(&mine, bytes, 1, MPIU_REAL, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(&mine, bytes, 1, MPIU_REAL, MPI_SUM, HycoComm(s)));
   PetscCallMPI(MPI_Comm_free(&node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -50,12 +50,12 @@ static PetscErrorCode Estimate(HycoSolver s, HycoForm form, PetscReal *bytes)
 
   PetscFunctionBegin;
   if (form == HYCO_FORM_DUAL) {
-    if (!s->direct) PetscCall(HycoDirectCreate(s->comm, &s->direct));
+    if (!s->direct) PetscCall(HycoDirectCreate(HycoComm(s), &s->direct));
     PetscCall(HycoDirectPinKernel(s->direct, y->K));
     PetscCall(
         HycoDirectAnalyse(s->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation goes on from it */
   } else {
-    PetscCall(HycoDirectCreate(s->comm, &probe));
+    PetscCall(HycoDirectCreate(HycoComm(s), &probe));
     PetscCall(HycoDirectPinKernel(probe, y->K));
     PetscCall(HycoDirectAnalyse(probe, y->K, NULL, NULL, y->symmetric, bytes));
     PetscCall(HycoDirectDestroy(&probe));
@@ -73,9 +73,9 @@ static PetscErrorCode TakeIterative(HycoSolver s, HycoForm *form)
   if (s->system->symmetric && s->system->m && s->type != HYCO_TYPE_LEMKE)
     PetscCall(HycoPrimalPossible(s->system, &possible));
   if (s->linear == HYCO_LINEAR_ITERATIVE) {
-    PetscCheck(s->form == HYCO_FORM_AUTO || s->form == HYCO_FORM_PRIMAL, s->comm, PETSC_ERR_USER,
+    PetscCheck(s->form == HYCO_FORM_AUTO || s->form == HYCO_FORM_PRIMAL, HycoComm(s), PETSC_ERR_USER,
                "-hyco_linear iterative solves the primal form; take away -hyco_solver_form, or say primal");
-    PetscCheck(possible || !s->system->m, s->comm, PETSC_ERR_USER,
+    PetscCheck(possible || !s->system->m, HycoComm(s), PETSC_ERR_USER,
                "-hyco_linear iterative needs a symmetric system, the types active_set or tao, and for each contact an "
                "unknown of its own; use -hyco_linear direct");
   }
@@ -151,20 +151,20 @@ PetscErrorCode HycoChooseTao(HycoSolver s, HycoForm form)
   PetscCheck(
       form == HYCO_FORM_DUAL || s->type == HYCO_TYPE_TAO ||
           (form == HYCO_FORM_PRIMAL && s->type == HYCO_TYPE_ACTIVE_SET),
-      s->comm, PETSC_ERR_USER,
+      HycoComm(s), PETSC_ERR_USER,
       "%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with dual_free",
       HycoSolverTypes[s->type]);
   s->tao = s->tao_type;
   if (s->tao == HYCO_TAO_AUTO) s->tao = s->system->symmetric ? HYCO_TAO_GPCG : HYCO_TAO_SEMISMOOTH;
   if (s->type != HYCO_TYPE_TAO || !s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(s->system->symmetric || HycoTaoSemismooth(s->tao), s->comm, PETSC_ERR_USER,
+  PetscCheck(s->system->symmetric || HycoTaoSemismooth(s->tao), HycoComm(s), PETSC_ERR_USER,
              "TAO's %s needs a symmetric system and this one is not; use -hyco_tao_type ssils, asils, ssfls or asfls",
              HycoTaoTypes[s->tao]);
-  PetscCheck(form == HYCO_FORM_DUAL || !HycoTaoSemismooth(s->tao), s->comm, PETSC_ERR_USER,
+  PetscCheck(form == HYCO_FORM_DUAL || !HycoTaoSemismooth(s->tao), HycoComm(s), PETSC_ERR_USER,
              "TAO's %s needs the matrix of the dual form; use -hyco_solver_form dual", HycoTaoTypes[s->tao]);
-  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->tao != HYCO_TAO_BQPIP, s->comm, PETSC_ERR_USER,
+  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->tao != HYCO_TAO_BQPIP, HycoComm(s), PETSC_ERR_USER,
              "TAO's bqpip reads the matrix of the dual form; use -hyco_solver_form dual");
-  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->system->symmetric, s->comm, PETSC_ERR_USER,
+  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->system->symmetric, HycoComm(s), PETSC_ERR_USER,
              "the form dual_free needs a symmetric system; use -hyco_solver_form dual");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -63,7 +63,7 @@ static PetscErrorCode FactorSparse(HycoSolver s, PetscBool *singular)
   PetscInt p;
 
   PetscFunctionBegin;
-  if (!s->direct) PetscCall(HycoDirectCreate(s->comm, &s->direct));
+  if (!s->direct) PetscCall(HycoDirectCreate(HycoComm(s), &s->direct));
   PetscCall(HycoKernelSize(y->K, &p));
   PetscCall(Resize(s, p));
   PetscCall(HycoDirectPinKernel(s->direct, y->K));
@@ -227,7 +227,7 @@ static PetscErrorCode SolveHeld(HycoSolver s, PetscInt type, PetscBool *solved)
   HycoLCPStatus status;
 
   PetscFunctionBegin;
-  PetscCheck(type == HYCO_TYPE_ACTIVE_SET, s->comm, PETSC_ERR_USER,
+  PetscCheck(type == HYCO_TYPE_ACTIVE_SET, HycoComm(s), PETSC_ERR_USER,
              "contact alone holds a body, and %s cannot solve that; use -hyco_solver_type active_set",
              HycoSolverTypes[type]);
   for (PetscInt i = 0; i < s->m && (!s->warm || !s->started); i++) s->active[i] = PETSC_TRUE;
@@ -276,7 +276,7 @@ static PetscErrorCode FreeGap(HycoSolver s, Vec x)
 
   PetscFunctionBegin;
   if (!s->lu && !s->free) {
-    PetscCall(GatherVec(s->comm, y->D, s->L));
+    PetscCall(GatherVec(HycoComm(s), y->D, s->L));
     PetscCall(HycoDirectReduce(s->direct, y->F, s->L, s->g));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -287,7 +287,7 @@ static PetscErrorCode FreeGap(HycoSolver s, Vec x)
   PetscCall(HycoSystemWork(y));
   PetscCall(MatMult(y->B, x, y->work_L));
   PetscCall(VecAYPX(y->work_L, -1, y->D));
-  PetscCall(GatherVec(s->comm, y->work_L, s->g));
+  PetscCall(GatherVec(HycoComm(s), y->work_L, s->g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -439,7 +439,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, Vec x, Vec L)
   PetscCall(MatMult(y->B, x, gap));
   PetscCall(VecNorm(gap, NORM_INFINITY, &size));
   PetscCall(VecAYPX(gap, -1, y->D));
-  PetscCall(GatherVec(s->comm, gap, s->g));
+  PetscCall(GatherVec(HycoComm(s), gap, s->g));
   PetscCall(VecDestroy(&gap));
   PetscCall(PetscMalloc2(s->m, &a, s->m, &change));
   for (PetscInt i = 0; i < s->m; i++) {

@@ -102,7 +102,7 @@ static PetscErrorCode Factor(HycoSolver s, PetscBool *singular)
   *singular = PETSC_FALSE;
   PetscCall(HycoOperatorStateUpdate(&s->factored_free, K, NULL, &same));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!s->direct_free) PetscCall(HycoDirectCreate(s->comm, &s->direct_free));
+  if (!s->direct_free) PetscCall(HycoDirectCreate(HycoComm(s), &s->direct_free));
   PetscCall(HycoDirectAnalyse(s->direct_free, K, NULL, NULL, s->system->symmetric, &s->bytes));
   PetscCall(HycoDirectFactor(s->direct_free, K, NULL, NULL, NULL, singular));
   if (*singular) s->factored_free.K = 0;
@@ -164,7 +164,7 @@ PetscErrorCode HycoSolveDualFree(HycoSolver s, Vec x, Vec L, PetscBool *solved)
 
   PetscFunctionBegin;
   PetscCall(HycoKernelSize(y->K, &n_free));
-  PetscCheck(!n_free, s->comm, PETSC_ERR_USER,
+  PetscCheck(!n_free, HycoComm(s), PETSC_ERR_USER,
              "contact alone holds a body, and the form dual_free cannot solve that; use -hyco_solver_type active_set");
   PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "tao %s dual_free", HycoTaoTypes[s->tao]));
   PetscCall(Factor(s, &singular));
@@ -176,7 +176,7 @@ PetscErrorCode HycoSolveDualFree(HycoSolver s, Vec x, Vec L, PetscBool *solved)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecGetLocalSize(L, &m));
-  PetscCall(MatCreateShell(s->comm, m, m, y->m, y->m, &f, &S));
+  PetscCall(MatCreateShell(HycoComm(s), m, m, y->m, y->m, &f, &S));
   PetscCall(MatShellSetOperation(S, MATOP_MULT, (void (*)(void))MultS));
   PetscCall(MatShellSetOperation(S, MATOP_MULT_TRANSPOSE, (void (*)(void))MultS)); /* symmetric */
   PetscCall(MatShellSetOperation(S, MATOP_GET_DIAGONAL, (void (*)(void))DiagonalS));

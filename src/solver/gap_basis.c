@@ -72,7 +72,7 @@ static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
     PetscCall(MatRestoreRow(y->B, r, &n, &cols, &vals));
     bad = bad || pivot[r - lo] == HYCO_NO_PIVOT;
   }
-  PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, y->comm));
+  PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, HycoComm(y)));
   *all = (PetscBool)!any;
   PetscCall(VecRestoreArrayRead(mine, &shared));
   PetscCall(VecScatterDestroy(&scatter));
@@ -137,7 +137,7 @@ static PetscErrorCode ScaleOnly(HycoSolver s)
   PetscCall(VecAssemblyEnd(t));
   PetscCall(VecGetLocalSize(t, &n));
   PetscCall(MatDestroy(&s->T));
-  PetscCall(MatCreateAIJ(s->comm, n, n, y->n, y->n, 1, NULL, 0, NULL, &s->T));
+  PetscCall(MatCreateAIJ(HycoComm(s), n, n, y->n, y->n, 1, NULL, 0, NULL, &s->T));
   PetscCall(MatDiagonalSet(s->T, t, INSERT_VALUES));
   PetscCall(MatDuplicate(y->K, MAT_COPY_VALUES, &s->Kg));
   PetscCall(MatDiagonalScale(s->Kg, t, t));
@@ -155,13 +155,13 @@ static PetscErrorCode BuildT(HycoSolver s)
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(y->K, &first, &last));
   PetscCall(MatGetBlockSize(y->K, &bs));
-  PetscCall(MatCreate(s->comm, &shape));
+  PetscCall(MatCreate(HycoComm(s), &shape));
   PetscCall(MatSetSizes(shape, last - first, last - first, y->n, y->n));
   PetscCall(MatSetBlockSize(shape, bs)); /* multigrid coarsens by node */
   PetscCall(MatSetType(shape, MATPREALLOCATOR));
   PetscCall(MatSetUp(shape));
   PetscCall(MatDestroy(&s->T));
-  PetscCall(MatCreate(s->comm, &s->T));
+  PetscCall(MatCreate(HycoComm(s), &s->T));
   PetscCall(MatSetSizes(s->T, last - first, last - first, y->n, y->n));
   PetscCall(MatSetBlockSize(s->T, bs));
   PetscCall(MatSetType(s->T, MATAIJ));
@@ -225,7 +225,7 @@ PetscErrorCode HycoGapSetUp(HycoSolver s)
   PetscCall(PetscMalloc1(hi - lo, &s->pivot));
   PetscCall(FindPivots(y, s->pivot, &possible));
   if (!possible) s->transformed.K = 0;
-  PetscCheck(possible, s->comm, PETSC_ERR_USER,
+  PetscCheck(possible, HycoComm(s), PETSC_ERR_USER,
              "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
   PetscCall(MatDestroy(&s->Kg));
   PetscCall(MatDestroy(&s->Kw));
@@ -254,8 +254,8 @@ PetscErrorCode HycoGapSetUp(HycoSolver s)
   }
   if (s->iterative) PetscCall(HycoGapNearKernel(s, s->Kw));
   if (!s->ksp_gap)
-    PetscCall(s->iterative ? HycoIterativeSolver(s->comm, "hyco_primal_", s->Kw, &s->ksp_gap)
-                           : HycoDirectSolver(s->comm, "hyco_primal_", s->Kw, PETSC_TRUE, &s->ksp_gap));
+    PetscCall(s->iterative ? HycoIterativeSolver(HycoComm(s), "hyco_primal_", s->Kw, &s->ksp_gap)
+                           : HycoDirectSolver(HycoComm(s), "hyco_primal_", s->Kw, PETSC_TRUE, &s->ksp_gap));
   PetscCall(KSPSetOperators(s->ksp_gap, s->Kw, s->Kw));
   if (s->m != y->m) {
     PetscCall(PetscFree(s->active));

@@ -58,7 +58,7 @@ static PetscErrorCode Step(HycoSolver s, Primal *p, Vec y, PetscBool one, PetscI
     size[0] = PetscMax(size[0], PetscMax(PetscAbsReal(p->gap[k]), PetscAbsReal(p->value[k])));
     if (s->active[p->lo + k]) size[1] = PetscMax(size[1], PetscAbsReal(p->force[k]));
   }
-  PetscCallMPI(MPI_Allreduce(size, sizes, 2, MPIU_REAL, MPI_MAX, s->comm));
+  PetscCallMPI(MPI_Allreduce(size, sizes, 2, MPIU_REAL, MPI_MAX, HycoComm(s)));
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt k = 0; k < p->n; k++) {
       const PetscInt i = p->lo + k;
@@ -75,9 +75,9 @@ static PetscErrorCode Step(HycoSolver s, Primal *p, Vec y, PetscBool one, PetscI
         local++;
       }
     }
-    if (pass == 0) PetscCallMPI(MPI_Allreduce(&last, &last_all, 1, MPIU_INT, MPI_MAX, s->comm));
+    if (pass == 0) PetscCallMPI(MPI_Allreduce(&last, &last_all, 1, MPIU_INT, MPI_MAX, HycoComm(s)));
   }
-  PetscCallMPI(MPI_Allreduce(&local, changes, 1, MPIU_INT, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(&local, changes, 1, MPIU_INT, MPI_SUM, HycoComm(s)));
   s->its++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -88,7 +88,7 @@ static PetscErrorCode SharedHash(HycoSolver s, const Primal *p, unsigned long lo
   unsigned long long mine = HycoHash(HycoSetHash(p->n, s->active + p->lo), &p->lo, sizeof(p->lo));
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Allreduce(&mine, hash, 1, MPI_UNSIGNED_LONG_LONG, MPI_BXOR, s->comm));
+  PetscCallMPI(MPI_Allreduce(&mine, hash, 1, MPI_UNSIGNED_LONG_LONG, MPI_BXOR, HycoComm(s)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -98,7 +98,7 @@ static PetscErrorCode Report(HycoSolver s, const Primal *p, PetscInt changes)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < p->n; k++) mine += s->active[p->lo + k];
-  PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_INT, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_INT, MPI_SUM, HycoComm(s)));
   PetscCall(s->monitor(s->its, all, changes, s->monitor_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -269,8 +269,8 @@ PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscB
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompareAny((PetscObject)s->system->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
-  PetscCheck(aij, s->comm, PETSC_ERR_USER, "the primal form needs a sparse K (AIJ); use -hyco_solver_form dual");
-  PetscCheck(s->system->symmetric && s->system->m, s->comm, PETSC_ERR_USER,
+  PetscCheck(aij, HycoComm(s), PETSC_ERR_USER, "the primal form needs a sparse K (AIJ); use -hyco_solver_form dual");
+  PetscCheck(s->system->symmetric && s->system->m, HycoComm(s), PETSC_ERR_USER,
              "the primal form needs a symmetric system with contacts; use -hyco_solver_form dual");
   PetscCall(HycoGapSetUp(s));
   PetscCall(PrimalCreate(s, x, &p));

@@ -9,9 +9,9 @@ const char *const HycoSolverTypes[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, 
 PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
 {
   PetscFunctionBegin;
-  PetscCall(PetscNew(solver));
-  PetscCall(HycoHandleOpen(*solver, "HycoSolverCreate()"));
-  (*solver)->comm = comm;
+  PetscCall(HycoInitializePackage());
+  PetscCall(PetscHeaderCreate(*solver, HYCO_SOLVER_CLASSID, "HycoSolver", "Solver of contact systems", "Hyco", comm,
+                              HycoSolverDestroy, HycoSolverView));
   (*solver)->rtol = 1e-8;
   (*solver)->warm = PETSC_TRUE;
   (*solver)->fallback = PETSC_TRUE;
@@ -26,9 +26,10 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
 
   PetscFunctionBegin;
   if (!solver || !*solver) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*solver, "HycoSolverCreate()");
-  HycoHandleClose(*solver);
+  HycoCheckHandle(*solver, HYCO_SOLVER_CLASSID);
+  HycoDereference(solver);
   s = *solver;
+  PetscCall(HycoSystemDestroy(&s->system));
   PetscCall(HycoDirectDestroy(&s->direct));
   PetscCall(KSPDestroy(&s->ksp_gap));
   PetscCall(HycoDirectDestroy(&s->direct_free));
@@ -44,22 +45,25 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscCall(PetscFree(s->active));
   PetscCall(PetscFree(s->pivot));
   PetscCall(PetscFree(s->contact));
-  PetscCall(PetscFree(*solver));
+  PetscCall(PetscHeaderDestroy(solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSolverSetSystem(HycoSolver s, HycoSystem system)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
-  s->system = system; /* borrowed: the owner of both destroys it after the solver */
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  HycoCheckHandle(system, HYCO_SYSTEM_CLASSID);
+  PetscCall(PetscObjectReference((PetscObject)system));
+  PetscCall(HycoSystemDestroy(&s->system));
+  s->system = system;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSolverSetType(HycoSolver s, HycoSolverType type)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   for (PetscInt k = 0; HycoSolverTypes[k]; k++) {
     PetscBool same;
 
@@ -75,7 +79,7 @@ PetscErrorCode HycoSolverSetType(HycoSolver s, HycoSolverType type)
 PetscErrorCode HycoSolverSetTaoType(HycoSolver s, const char type[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   s->tao_type = HYCO_TAO_AUTO;
   if (!type) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; HycoTaoTypes[k] && s->tao_type == HYCO_TAO_AUTO; k++) {
@@ -92,7 +96,7 @@ PetscErrorCode HycoSolverSetTaoType(HycoSolver s, const char type[])
 PetscErrorCode HycoSolverSetForm(HycoSolver s, HycoForm form)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   s->form = form;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -100,7 +104,7 @@ PetscErrorCode HycoSolverSetForm(HycoSolver s, HycoForm form)
 PetscErrorCode HycoSolverSetLinear(HycoSolver s, HycoLinear linear, PetscReal gigabytes)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   HycoCheck(gigabytes >= 0, "the memory is %g GB; it must be 0 (what is free) or more", (double)gigabytes);
   s->linear = linear;
   s->memory = 1e9 * gigabytes;
@@ -111,7 +115,7 @@ PetscErrorCode HycoSolverSetLinear(HycoSolver s, HycoLinear linear, PetscReal gi
 PetscErrorCode HycoSolverSetTolerance(HycoSolver s, PetscReal rtol)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   HycoCheck(rtol > 0 && rtol < 1, "the tolerance is %g; it must lie between 0 and 1", (double)rtol);
   s->rtol = rtol;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -120,7 +124,7 @@ PetscErrorCode HycoSolverSetTolerance(HycoSolver s, PetscReal rtol)
 PetscErrorCode HycoSolverSetMaxIts(HycoSolver s, PetscInt max_its)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   s->max_its = max_its;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -128,7 +132,7 @@ PetscErrorCode HycoSolverSetMaxIts(HycoSolver s, PetscInt max_its)
 PetscErrorCode HycoSolverSetWarmStart(HycoSolver s, PetscBool warm)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   s->warm = warm;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -136,7 +140,7 @@ PetscErrorCode HycoSolverSetWarmStart(HycoSolver s, PetscBool warm)
 PetscErrorCode HycoSolverSetMultilevel(HycoSolver s, PetscBool multilevel)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   s->multilevel = multilevel;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -144,7 +148,7 @@ PetscErrorCode HycoSolverSetMultilevel(HycoSolver s, PetscBool multilevel)
 PetscErrorCode HycoSolverSetFallback(HycoSolver s, PetscBool fallback)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   s->fallback = fallback;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -152,7 +156,7 @@ PetscErrorCode HycoSolverSetFallback(HycoSolver s, PetscBool fallback)
 PetscErrorCode HycoSolverSetMonitor(HycoSolver s, HycoMonitor monitor, void *ctx)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   s->monitor = monitor;
   s->monitor_ctx = ctx;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -166,7 +170,7 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
   PetscBool tao;
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   form = (PetscInt)s->form;
   linear = (PetscInt)s->linear;
   gigabytes = 1e-9 * s->memory;
@@ -245,8 +249,8 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
-  if (s->system) HycoCheckHandle(s->system, "HycoSystemCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  if (s->system) HycoCheckHandle(s->system, HYCO_SYSTEM_CLASSID);
   PetscCheck(s->system && s->system->F, PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
   s->seconds_factor = s->seconds_before;
@@ -285,7 +289,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
 PetscErrorCode HycoSolverGetReason(HycoSolver s, HycoReason *reason)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   *reason = s->reason;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -293,7 +297,7 @@ PetscErrorCode HycoSolverGetReason(HycoSolver s, HycoReason *reason)
 PetscErrorCode HycoSolverGetIterations(HycoSolver s, PetscInt *its)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   *its = s->its;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -301,7 +305,7 @@ PetscErrorCode HycoSolverGetIterations(HycoSolver s, PetscInt *its)
 PetscErrorCode HycoSolverGetKKT(HycoSolver s, HycoKKT *kkt)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   *kkt = s->kkt;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -309,7 +313,7 @@ PetscErrorCode HycoSolverGetKKT(HycoSolver s, HycoKKT *kkt)
 PetscErrorCode HycoSolverGetMethod(HycoSolver s, const char *method[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   *method = s->method;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -317,7 +321,7 @@ PetscErrorCode HycoSolverGetMethod(HycoSolver s, const char *method[])
 PetscErrorCode HycoSolverGetLinear(HycoSolver s, const char *linear[])
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   *linear = s->linear_method;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -325,7 +329,7 @@ PetscErrorCode HycoSolverGetLinear(HycoSolver s, const char *linear[])
 PetscErrorCode HycoSolverGetSeconds(HycoSolver s, PetscReal *factor, PetscReal *solve)
 {
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSolverCreate()");
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   if (factor) *factor = s->seconds_factor;
   if (solve) *solve = s->seconds_solve;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -350,4 +354,31 @@ const char *HycoReasonName(HycoReason reason)
   default:
     return "not converged: the stiffness is singular (is a body held by nothing?)";
   }
+}
+
+PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
+{
+  PetscBool ascii;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
+  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s\n", HycoSolverTypes[s->type]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g\n", (double)s->rtol));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "solves with K: %s\n", HycoLinearNames[s->linear]));
+  if (s->reason) {
+    PetscCall(PetscViewerASCIIPrintf(viewer, "last solve: %s, %s, %d iterations, largest residual %.1e\n",
+                                     HycoReasonName(s->reason), s->method, (int)s->its, (double)HycoKKTMax(&s->kkt)));
+  }
+  PetscCall(PetscViewerASCIIPopTab(viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverViewFromOptions(HycoSolver object, PetscObject owner, const char option[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(object, HYCO_SOLVER_CLASSID);
+  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -44,7 +44,7 @@ PetscErrorCode HycoGapNearKernel(HycoSolver s, Mat Kw)
     }
     PetscCall(VecNormalize(y[k], NULL));
   }
-  PetscCall(MatNullSpaceCreate(s->comm, PETSC_FALSE, n, y, &mine));
+  PetscCall(MatNullSpaceCreate(HycoComm(s), PETSC_FALSE, n, y, &mine));
   PetscCall(MatSetNearNullSpace(Kw, mine));
   PetscCall(MatNullSpaceDestroy(&mine));
   PetscCall(VecDestroyVecs(n, &y));
@@ -86,7 +86,7 @@ PetscErrorCode HycoSolveIterative(HycoSolver s, Vec x, PetscBool *solved)
   PetscCall(HycoOperatorStateUpdate(&s->transformed, s->system->K, NULL, &same));
   if (!same) {
     PetscCall(KSPDestroy(&s->ksp_gap));
-    PetscCall(HycoIterativeSolver(s->comm, "hyco_primal_", s->system->K, &s->ksp_gap));
+    PetscCall(HycoIterativeSolver(HycoComm(s), "hyco_primal_", s->system->K, &s->ksp_gap));
   }
   PetscCall(VecSet(x, 0));
   PetscCall(KSPSolve(s->ksp_gap, s->system->F, x));

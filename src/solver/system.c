@@ -4,9 +4,9 @@
 PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
 {
   PetscFunctionBegin;
-  PetscCall(PetscNew(system));
-  PetscCall(HycoHandleOpen(*system, "HycoSystemCreate()"));
-  (*system)->comm = comm;
+  PetscCall(HycoInitializePackage());
+  PetscCall(PetscHeaderCreate(*system, HYCO_SYSTEM_CLASSID, "HycoSystem", "Contact system", "Hyco", comm,
+                              HycoSystemDestroy, HycoSystemView));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -36,8 +36,8 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system)
 
   PetscFunctionBegin;
   if (!system || !*system) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*system, "HycoSystemCreate()");
-  HycoHandleClose(*system);
+  HycoCheckHandle(*system, HYCO_SYSTEM_CLASSID);
+  HycoDereference(system);
   s = *system;
   PetscCall(MatDestroy(&s->K));
   PetscCall(MatDestroy(&s->Bt));
@@ -45,7 +45,7 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system)
   PetscCall(VecDestroy(&s->F));
   PetscCall(VecDestroy(&s->D));
   PetscCall(FreeWork(s));
-  PetscCall(PetscFree(*system));
+  PetscCall(PetscHeaderDestroy(system));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,7 +54,7 @@ PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBo
   PetscInt rows, cols;
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSystemCreate()");
+  HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
   PetscCall(MatGetSize(K, &rows, &cols));
   PetscCheck(rows == cols, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "K is %d x %d; it must be square", (int)rows, (int)cols);
   PetscCheck(!B == !Bt, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "B and Bt must both be given, or neither");
@@ -87,7 +87,7 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
   PetscInt n, m = 0;
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSystemCreate()");
+  HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
   PetscCall(VecGetSize(F, &n));
   if (D) PetscCall(VecGetSize(D, &m));
   PetscCheck(s->K, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetMatrices() before HycoSystemSetVectors()");
@@ -139,7 +139,7 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, Pet
   PetscCall(VecRestoreArrayRead(s->F, &F));
   PetscCall(VecRestoreArrayRead(diagonal, &K));
   PetscCall(VecRestoreArray(r, &residual));
-  PetscCallMPI(MPI_Allreduce(&squares, &sum, 1, MPIU_REAL, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(&squares, &sum, 1, MPIU_REAL, MPI_SUM, HycoComm(s)));
   *dropped = PetscSqrtReal(sum);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -175,7 +175,7 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   PetscReal local[3] = {0, 0, 0}, worst[3], size_x, size_D, size_L, size_gap;
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, "HycoSystemCreate()");
+  HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
   PetscCheck(s->F, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
   PetscCall(PetscMemzero(kkt, sizeof(*kkt)));
   PetscCall(HycoSystemWork(s));
@@ -201,9 +201,31 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   }
   PetscCall(VecRestoreArrayRead(gap, &w));
   PetscCall(VecRestoreArrayRead(L, &l));
-  PetscCallMPI(MPI_Allreduce(local, worst, 3, MPIU_REAL, MPI_MAX, s->comm));
+  PetscCallMPI(MPI_Allreduce(local, worst, 3, MPIU_REAL, MPI_MAX, HycoComm(s)));
   kkt->penetration = Quotient(worst[0], size_gap);
   kkt->adhesion = Quotient(worst[1], size_L);
   kkt->complementarity = Quotient(worst[2], size_gap * size_L);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemView(HycoSystem s, PetscViewer viewer)
+{
+  PetscBool ascii;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
+  PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
+  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%d unknowns, %d contacts, %s\n", (int)s->n, (int)s->m,
+                                   s->symmetric ? "symmetric" : "not symmetric"));
+  PetscCall(PetscViewerASCIIPopTab(viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemViewFromOptions(HycoSystem object, PetscObject owner, const char option[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(object, HYCO_SYSTEM_CLASSID);
+  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,0 +1,67 @@
+/* The package: its classes, registered by whatever comes first, and the check of what a caller hands over. */
+#include <hycoimpl.h>
+#include <string.h>
+
+PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_CLASSID, HYCO_SOLVER_CLASSID, HYCO_FOM_CLASSID,
+    HYCO_SNAPSHOTS_CLASSID, HYCO_REDUCER_CLASSID, HYCO_ROM_CLASSID;
+
+/* Each class with the call that makes its objects, for messages. */
+static const struct {
+  PetscClassId *id;
+  const char *name, *maker;
+} classes[] = {
+    {&HYCO_SCENE_CLASSID, "HycoScene", "HycoSceneLoad()"},
+    {&HYCO_SAMPLES_CLASSID, "HycoSamples", "HycoSamplesCreate()"},
+    {&HYCO_SYSTEM_CLASSID, "HycoSystem", "HycoSystemCreate()"},
+    {&HYCO_SOLVER_CLASSID, "HycoSolver", "HycoSolverCreate()"},
+    {&HYCO_FOM_CLASSID, "HycoFOM", "HycoFOMCreate()"},
+    {&HYCO_SNAPSHOTS_CLASSID, "HycoSnapshots", "HycoSnapshotsOpen()"},
+    {&HYCO_REDUCER_CLASSID, "HycoReducer", "HycoReducerCreate()"},
+    {&HYCO_ROM_CLASSID, "HycoROM", "HycoROMLoad()"},
+};
+static PetscBool initialized = PETSC_FALSE;
+
+/* PETSc numbers classes anew after PetscFinalize(). */
+static PetscErrorCode Forget(void)
+{
+  PetscFunctionBegin;
+  for (size_t k = 0; k < sizeof(classes) / sizeof(classes[0]); k++) *classes[k].id = 0;
+  initialized = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoInitializePackage(void)
+{
+  PetscFunctionBegin;
+  if (initialized) PetscFunctionReturn(PETSC_SUCCESS);
+  initialized = PETSC_TRUE;
+  for (size_t k = 0; k < sizeof(classes) / sizeof(classes[0]); k++)
+    PetscCall(PetscClassIdRegister(classes[k].name, classes[k].id));
+  PetscCall(PetscRegisterFinalize(Forget));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, const char function[])
+{
+  size_t k = 0;
+
+  PetscFunctionBegin;
+  while (classes[k].id != classid) k++;
+  PetscCheck(handle, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL, "%s: the handle is NULL; make it by %s first", function,
+             classes[k].maker);
+  PetscCheck(*classid && ((const struct _p_PetscObject *)handle)->classid == *classid, PETSC_COMM_SELF,
+             PETSC_ERR_ARG_WRONG, "%s: the handle is no %s, or was destroyed; make it by %s first", function,
+             classes[k].name, classes[k].maker);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool *ascii)
+{
+  PetscFunctionBegin;
+  if (!*viewer) PetscCall(PetscViewerASCIIGetStdout(HycoComm(object), viewer));
+  PetscCall(PetscObjectTypeCompare((PetscObject)*viewer, PETSCVIEWERASCII, ascii));
+  if (!*ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectPrintClassNamePrefixType(object, *viewer));
+  PetscCall(PetscViewerASCIIPushTab(*viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
