@@ -8,9 +8,8 @@
 
   Conventions, everywhere unless a docstring says otherwise:
   - Create and Load own what they return; Set references or copies; Get borrows.
-  - Destroy sets the handle to NULL. A copy that the caller kept of it is refused by name, as NULL is, and so is an
-  owner that was destroyed before what it must outlive; only a new object of the same kind, if it got the old one's
-  memory, takes the copy for itself.
+  - Handles are PETSc objects: PetscObjectReference() and Destroy count references, an object keeps those that it refers
+  to, and Destroy sets the handle to NULL. NULL and objects of another class are refused by name.
   - Every function returns a PetscErrorCode; 0 is success. Messages are one line.
   - Functions on an object are collective on the object's communicator.
   - Lengths, forces and stresses are in the scene's own consistent units.

@@ -39,7 +39,7 @@ typedef struct {
 } HycoSummary;
 
 /* Reads and distributes the scene's mesh over `comm` (which may be smaller than the scene's communicator).
-   Collective on `comm`. The scene must outlive it. The caller owns it. */
+   Collective on `comm`. It keeps a reference to the scene. The caller owns it. */
 PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom);
 /* Frees; sets the handle to NULL; NULL-safe. Collective. */
 PetscErrorCode HycoFOMDestroy(HycoFOM *fom);

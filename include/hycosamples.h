@@ -10,7 +10,7 @@ extern "C" {
 
 typedef struct _p_HycoSamples *HycoSamples;
 
-/* An empty set over the scene's parameters. The scene must outlive it. Not collective. The caller owns it. */
+/* An empty set over the scene's parameters. It keeps a reference to the scene. Not collective. The caller owns it. */
 PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples);
 /* Frees; sets the handle to NULL; NULL-safe. */
 PetscErrorCode HycoSamplesDestroy(HycoSamples *samples);
