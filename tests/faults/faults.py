@@ -307,7 +307,7 @@ class Faults(Case):
 
     def apart(self, text, *args, other=(), folder='.'):
         """Rank 0 as it should be; ranks 1 and 2 stand in another folder or have other arguments: one line, status 1, soon."""
-        run = subprocess.run([*MPIRUN, '3', 'sh', '-c', APART, 'sh', HYCO, *settled(args)], cwd=self.folder, capture_output=True, text=True, timeout=30,
+        run = subprocess.run([*MPIRUN, '3', 'sh', '-c', APART, 'sh', HYCO, *settled(args)], cwd=self.folder, capture_output=True, text=True, timeout=30 * PATIENCE,
                              env=dict(os.environ, OTHER_FOLDER=self.path(folder), OTHER_ARGUMENTS=shlex.join(other)))
         lines = said(run)
         self.assertEqual(run.returncode, 1, run.stderr)

@@ -5,7 +5,7 @@ import subprocess
 import tempfile
 import unittest
 
-from common import HYCO, ROPE, SOURCE, Case, said
+from common import HYCO, PATIENCE, ROPE, SOURCE, Case, said
 
 MODEL = os.path.join(SOURCE, 'tests', 'data', 'rope-hybrid-4-table.h5')
 MU = ('-mu', '0.07,0.17')
@@ -13,7 +13,7 @@ MU = ('-mu', '0.07,0.17')
 
 class Launch(Case):
     def start(self, *args, **environment):
-        return subprocess.run([HYCO, *args], cwd=self.folder, env={**os.environ, **environment}, capture_output=True, text=True, timeout=60)
+        return subprocess.run([HYCO, *args], cwd=self.folder, env={**os.environ, **environment}, capture_output=True, text=True, timeout=60 * PATIENCE)
 
     def test_another_mpi(self):
         """Each of its processes would be alone and write the same files."""
@@ -36,7 +36,7 @@ class Launch(Case):
     def noise(self, *before, command=COMMANDS[0], **environment):
         """What one rank says on stderr, numbers apart; a variable that is None is not set."""
         environment = {name: value for name, value in {**os.environ, 'HWLOC_HIDE_ERRORS': None, **environment}.items() if value is not None}
-        run = subprocess.run([*before, HYCO, *command], cwd=self.folder, env=environment, capture_output=True, text=True, timeout=60)
+        run = subprocess.run([*before, HYCO, *command], cwd=self.folder, env=environment, capture_output=True, text=True, timeout=60 * PATIENCE)
         self.assertEqual(run.returncode, 0, run.stderr)
         return {re.sub(r'\d+', '0', line) for line in run.stderr.splitlines()}
 
