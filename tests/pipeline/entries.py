@@ -121,7 +121,7 @@ class Entries(Case):
             resource.setrlimit(resource.RLIMIT_AS, (400000 * 1024, 400000 * 1024))
 
         run = subprocess.run([HYCO, 'solve', '-scene', ROPE, '-mu', '0.07,0.17'], cwd=self.folder, preexec_fn=limit, capture_output=True,
-                             text=True, timeout=60, check=False)
+                             text=True, timeout=60 * PATIENCE, check=False)
         self.assertNotEqual(run.returncode, 0)
         self.assertTrue(run.stderr.strip())
 
