@@ -4,9 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <time.h>
-#include <unistd.h>
 
 const Command commands[] = {
     {"solve", CommandSolve, "scene mu mu_ grid grid_type values_ points output report table hyco_monitor",
@@ -161,22 +159,6 @@ static PetscErrorCode Start(int *argc, char ***argv)
   return ierr;
 }
 
-/* Open MPI 5 and 6 make a folder for each run where these say, and all of the path that is missing; where that cannot
-   be done they end. A run needs nothing of it: the system's own folder then. */
-static void AvoidBadFolder(void)
-{
-  static const char *const names[] = {"TMPDIR", "TEMP", "TMP"};
-  struct stat info;
-
-  for (size_t k = 0; k < sizeof(names) / sizeof(names[0]); k++) {
-    const char *folder = getenv(names[k]);
-
-    if (!folder) continue;
-    if (stat(folder, &info) || !S_ISDIR(info.st_mode) || access(folder, W_OK | X_OK)) setenv("TMPDIR", "/tmp", 1);
-    return;
-  }
-}
-
 /* A run without mpiexec needs no daemon beside it, for it spawns nothing, and no folder for that daemon's files: Open
    MPI 4 gives all such runs of a user the same one, and each removes it under the others. Other MPIs do not read these.
  */
@@ -187,7 +169,6 @@ static void StartAlone(void)
   for (size_t k = 0; k < sizeof(launched) / sizeof(launched[0]); k++) {
     if (getenv(launched[k])) return;
   }
-  AvoidBadFolder();
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
   setenv("OMPI_MCA_orte_create_session_dirs", "0", 0);
 }
