@@ -19,6 +19,7 @@
 
 #include <hycosys.h>
 #include <hycoscene.h>
+#include <hycomaterial.h>
 #include <hycosamples.h>
 #include <hycosystem.h>
 #include <hycosolver.h>

@@ -31,35 +31,48 @@ typedef struct {
 } HycoLoadShares;
 
 struct _n_HycoFE {
-  HycoScene scene;              /* borrowed */
-  HycoMesh mesh;                /* borrowed */
-  PetscInt dim, n_dof, n_sigma; /* space dimension, n_nodes * dim, stress components */
+  /* borrowed */
+  HycoScene scene;
+  HycoMesh mesh;
+  /* sizes: space dimension, n_nodes * dim, stress components */
+  PetscInt dim, n_dof, n_sigma;
   /* what no parameter reaches */
   PetscBool *constant; /* by cell: neither its nodes nor its material */
   PetscInt n_constant;
   PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
-  HycoAssemblyMap places;   /* of the entries of K; made by the second assembly into it */
+  signed char *drawn_sign;  /* by cell: the sign of its volume in the mesh file's coordinates */
+  /* kept from one parameter value to the next */
+  HycoAssemblyMap places; /* of the entries of K; made by the second assembly into it */
   PetscInt n_loads;
-  HycoLoadShares *shares;  /* n_loads: by load of the scene */
-  signed char *drawn_sign; /* by cell: the sign of its volume in the mesh file's coordinates */
+  HycoLoadShares *shares; /* n_loads: by load of the scene */
   /* -hyco_regularise: unknowns held beside the scene's supports, and the motions that these keep (n_released x n_dof,
      orthonormal; on the whole mesh alone); the contacts' normals are turned to leave the first n_turned of them alone
    */
   PetscInt n_pins, *pin, n_released, n_turned;
   PetscReal *released;
-  /* at the current mu */
+  /* the parameters, and what the last HycoFESetParameters changed */
   PetscBool ready;
   PetscReal mu[HYCO_MAX_PARAMETERS];
-  PetscReal *X;                                 /* n_nodes x 3, moved nodes */
-  PetscBool *mirrored;                          /* by body: its map is a mirror image */
-  PetscInt place;                               /* of the nodes: a number that no other place has, on this process */
-  PetscBool *fixed;                             /* n_dof */
-  PetscReal *u0;                                /* n_dof, prescribed displacement, 0 where free */
-  PetscBool lifted;                             /* whether any of u0 is not 0 */
-  PetscReal *lame;                              /* n_cells x nq x 2: lambda and mu of Lame (1D: 0 and nu) */
-  PetscBool stiffness_changed, contact_changed; /* by the last HycoFESetParameters */
-  PetscBool gap_changed;                        /* the same: the contacts' gaps, or what the supports take from them */
+  PetscBool stiffness_changed, contact_changed;
+  PetscBool gap_changed; /* the contacts' gaps, or what the supports take from them */
+  /* geometry at mu */
+  PetscReal *X;        /* n_nodes x 3, moved nodes */
+  PetscBool *mirrored; /* by body: its map is a mirror image */
+  PetscInt place;      /* of the nodes: a number that no other place has, on this process */
+  /* supports at mu */
+  PetscBool *fixed; /* n_dof */
+  PetscReal *u0;    /* n_dof, prescribed displacement, 0 where free */
+  PetscBool lifted; /* whether any of u0 is not 0 */
+  /* tangents at mu: those of cell e from tangent_start[e], tangent_size[body] reals for each of its points */
+  PetscReal *tangent;
+  PetscInt *tangent_start, *tangent_size;
 };
+
+/* Of a body's cells: whether their tangents are Lame's lambda and mu, or else n_sigma x n_sigma. */
+static inline PetscBool HycoFEIsIsotropic(HycoFE fe, PetscInt cell)
+{
+  return (PetscBool)(fe->tangent_size[fe->mesh->cell_body[cell]] == 2);
+}
 
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);

@@ -10,6 +10,10 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
                              PetscReal *weight);
 /* Their means over the cell, which make the dilatation of the element bbar. */
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[8][3]);
+/* Room for the tangents; fails for a law that the library does not solve with. */
+PetscErrorCode HycoTangentsCreate(HycoFE fe);
+/* The tangents at fe's nodes and mu; all: of cells that no parameter reaches too. */
+PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all);
 /* Outward normal times area weight (n dS) at point q of a facet, of the moved body; in 1D the sign away from its cell.
  */
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);
