@@ -65,7 +65,8 @@ PetscErrorCode HycoMaterialSetType(HycoMaterial material, HycoMaterialType type)
     char list[HYCO_LINE];
 
     PetscCall(HycoListTypes(laws, type, list));
-    HycoFail("the law \"%s\" is not registered; it must be %s", type, list);
+    HycoFail("body %s: the law \"%s\" is not registered; it must be %s",
+             ((PetscObject)material)->name ? ((PetscObject)material)->name : "(none)", type, list);
   }
   PetscCall(PetscObjectChangeTypeName((PetscObject)material, type));
   PetscCall((*create)(material));
@@ -238,7 +239,7 @@ static PetscErrorCode CheckConstant(const HycoEntry *e, const PetscReal mu[], Pe
 
     if (value[i] > e->lo && value[i] < e->hi) continue;
     PetscCall(HycoExprPlace(e->expr, mu, x + 3 * i, place));
-    if (e->lo == 0 && PetscIsInfReal(e->hi))
+    if (e->lo == 0 && e->hi >= PETSC_INFINITY)
       HycoFail("%s is %g at %s; %s must be positive", HycoExprKey(e->expr), (double)value[i], place, e->title);
     HycoFail("%s is %g at %s; %s must lie between %g and %g", HycoExprKey(e->expr), (double)value[i], place, e->title,
              (double)e->lo, (double)e->hi);

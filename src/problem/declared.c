@@ -87,6 +87,7 @@ PetscErrorCode HycoListTypes(PetscFunctionList types, const char type[], char li
 
   PetscFunctionBegin;
   PetscCall(PetscFunctionListGet(types, &names, &n));
+  if (n && !names[n - 1]) n--; /* PETSc 3.18 counts the NULL at the end */
   qsort(names, (size_t)n, sizeof(*names), CompareNames);
   list[0] = '\0';
   for (int k = 0; k < n; k++) {
