@@ -1,7 +1,7 @@
 /* The map from the reference cell to the moved one: for fe/ and contact/. */
 #ifndef HYCO_KINEMATICS_H
 #define HYCO_KINEMATICS_H
-#include <hycofe.h>
+#include <hycocontactimpl.h>
 
 /* Determinant of the map from the reference cell to the nodes at X (3 a node of the mesh), at quadrature point q. */
 PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q);

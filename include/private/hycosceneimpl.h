@@ -2,6 +2,7 @@
 #ifndef HYCOSCENEIMPL_H
 #define HYCOSCENEIMPL_H
 
+#include <hycocontact.h>
 #include <hycoimpl.h>
 #include <hycomaterial.h>
 #include <hycoscene.h>
@@ -70,23 +71,6 @@ typedef struct {
   HycoExpr pressure;    /* positive pushes against the outward normal; NULL: none */
   HycoExpr traction[3]; /* force per unit surface; NULL: none */
 } HycoLoad;
-
-typedef enum {
-  HYCO_CONTACT_OBSTACLE, /* n . u <= gap on the nodes of a group */
-  HYCO_CONTACT_PAIR,     /* n . (u_slave - u_master) <= gap on node pairs */
-  HYCO_CONTACT_SURFACE   /* the same at a slave node's projection on the master's facets */
-} HycoContactType;
-
-typedef struct {
-  char *name;
-  HycoContactType type;
-  char *slave, *master; /* groups; an obstacle has only the slave ("group") */
-  PetscReal tolerance;  /* largest distance to the master in the mesh file, where no map moves the surfaces; < 0: from
-                           the facets' size */
-  PetscReal overlap;    /* largest overlap before any load where the gap is measured; < 0: from the facets' size */
-  HycoExpr normal[3];   /* all or none: outward normal of the slave side, at the master point (obstacle: slave) */
-  HycoExpr gap;         /* NULL: measured along the normal between the moved nodes */
-} HycoContact;
 
 struct _p_HycoScene {
   PETSCHEADER(int);

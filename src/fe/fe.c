@@ -194,12 +194,8 @@ static void FindChanges(HycoFE fe, const PetscBool changed[], PetscBool *moved)
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     if (HycoMaterialChanges(s->body[b].law, changed)) fe->stiffness_changed = PETSC_TRUE;
   }
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
-    if (HycoExprChanges(s->contact[k].gap, changed)) fe->gap_changed = PETSC_TRUE;
-    for (PetscInt c = 0; c < 3; c++) {
-      if (HycoExprChanges(s->contact[k].normal[c], changed)) fe->contact_changed = PETSC_TRUE;
-    }
-  }
+  for (PetscInt k = 0; k < s->n_contacts; k++)
+    HycoContactChanges(s->contact[k], changed, &fe->contact_changed, &fe->gap_changed);
 }
 
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
@@ -213,11 +209,6 @@ void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
     FindChanges(&fe, changed, &moved);
     reaches[p] = (PetscBool)(fe.stiffness_changed || fe.contact_changed);
   }
-}
-
-void HycoFEReaches(HycoFE fe, PetscBool reaches[])
-{
-  HycoSceneReaches(fe->scene, reaches);
 }
 
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])

@@ -1,5 +1,6 @@
 /* HycoScene: from entries to bodies, supports, loads, contacts and parameters. */
 #include "entries.h"
+#include <hycocontactimpl.h>
 #include <hycomaterialimpl.h>
 #include <ctype.h>
 #include <stdio.h>
@@ -9,8 +10,7 @@
 /* Fields of a section's members; a member's name is what stands between the section and the field. */
 static const char *const body_fields[] = {"element", "map_x", "map_y", "map_z", "law", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
-static const char *const contact_fields[] = {"type",     "group",    "slave",    "master",  "tolerance", "gap",
-                                             "normal_x", "normal_y", "normal_z", "overlap", NULL};
+static const char *const contact_fields[] = {"type", NULL};
 static const char *const scene_fields[] = {"title", "mesh", "parameters", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
@@ -157,50 +157,6 @@ static PetscErrorCode ReadParameters(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReadContactField(HycoScene s, PetscInt entry, HycoContact *c, PetscInt field)
-{
-  const char *value = s->value[entry];
-
-  PetscFunctionBegin;
-  switch (field) {
-  case 0:
-    if (strcmp(value, "obstacle") == 0)
-      c->type = HYCO_CONTACT_OBSTACLE;
-    else if (strcmp(value, "pair") == 0)
-      c->type = HYCO_CONTACT_PAIR;
-    else if (strcmp(value, "surface") == 0)
-      c->type = HYCO_CONTACT_SURFACE;
-    else
-      HycoFail("%s is \"%s\"; it must be obstacle, pair or surface", s->key[entry], value);
-    break;
-  case 1:
-  case 2:
-    PetscCall(PetscFree(c->slave));
-    PetscCall(PetscStrallocpy(value, &c->slave));
-    break;
-  case 3:
-    PetscCall(PetscStrallocpy(value, &c->master));
-    break;
-  case 4:
-  case 9: {
-    PetscReal *length = field == 4 ? &c->tolerance : &c->overlap;
-    char *end;
-
-    *length = HycoNumber(value, &end);
-    HycoCheck(*end == '\0' && end != value && *length >= 0, "%s is \"%s\"; it must be a length, 0 or more",
-              s->key[entry], value);
-    break;
-  }
-  case 5:
-    PetscCall(NewExpr(s, entry, &c->gap));
-    break;
-  default:
-    PetscCall(NewExpr(s, entry, &c->normal[field - 6]));
-    break;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode ReadElement(HycoScene s, PetscInt entry, HycoBody *body)
 {
   const char *value = s->value[entry];
@@ -215,7 +171,8 @@ static PetscErrorCode ReadElement(HycoScene s, PetscInt entry, HycoBody *body)
 /* A section whose members have a type that declares entries: bodies with their laws, contacts. */
 typedef struct {
   const char *what, *const *others; /* for messages; entries beside the declared ones */
-  PetscErrorCode (*create)(HycoScene, const char name[], PetscObject *object, HycoDeclared **declared, PetscBool *given);
+  PetscErrorCode (*create)(HycoScene, const char name[], PetscObject *object, HycoDeclared **declared,
+                           PetscBool *given);
 } Section;
 
 /* The type's name that the scene gives to a member. */
@@ -250,6 +207,27 @@ static PetscErrorCode CreateLaw(HycoScene s, const char name[], PetscObject *obj
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same of the contact `name`; an obstacle where the scene gives no type. */
+static PetscErrorCode CreateContact(HycoScene s, const char name[], PetscObject *object, HycoDeclared **declared,
+                                    PetscBool *given)
+{
+  const char *type = NULL;
+  HycoContact contact;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(GetType(s, "contact", name, "type", &type, given));
+  PetscCall(HycoContactCreate(PETSC_COMM_SELF, &contact));
+  PetscCall(PetscObjectSetName((PetscObject)contact, name));
+  ierr = HycoContactSetType(contact, *given ? type : HYCO_CONTACT_OBSTACLE);
+  if (ierr) PetscCall(HycoContactDestroy(&contact));
+  PetscCall(ierr);
+  *declared = &contact->entries;
+  *object = (PetscObject)contact;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const Section contacts = {"a contact", contact_fields, CreateContact};
 static const Section bodies = {"a body", body_fields, CreateLaw};
 
 /* "a_b_young" is b_young of a if the type of a declares it, else young of a_b: name and field; fails where neither. */
@@ -317,6 +295,40 @@ static PetscErrorCode ReadBody(HycoScene s, PetscInt entry, const char rest[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode FindContact(HycoScene s, const char name[], HycoContact *contact)
+{
+  HycoDeclared *declared;
+  PetscBool given;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    *contact = s->contact[k];
+    if (strcmp(((PetscObject)*contact)->name, name) == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscRealloc((size_t)(s->n_contacts + 1) * sizeof(*s->contact), &s->contact));
+  PetscCall(CreateContact(s, name, (PetscObject *)contact, &declared, &given));
+  s->contact[s->n_contacts++] = *contact;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadContact(HycoScene s, PetscInt entry, const char rest[])
+{
+  const char *key = s->key[entry], *field;
+  char name[HYCO_LINE];
+  PetscInt type;
+  HycoContact contact;
+
+  PetscFunctionBegin;
+  if (SplitKey(rest, contact_fields, name, &type)) {
+    PetscCall(FindContact(s, name, &contact)); /* which reads it */
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SplitDeclared(s, &contacts, key, rest, name, &field));
+  PetscCall(FindContact(s, name, &contact));
+  PetscCall(HycoDeclaredRead(s, key, s->value[entry], HycoDeclaredFind(&contact->entries, field)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One entry of a section with members. */
 static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
 {
@@ -329,24 +341,25 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
   if (strncasecmp(key, "body_", 5) == 0) {
     PetscCall(ReadBody(s, entry, rest));
   } else if (strncasecmp(key, "force_", 6) == 0) {
-    if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, "a body force", NULL, component_fields));
+    if (!SplitKey(rest, component_fields, name, &field))
+      PetscCall(UnknownKey(key, "a body force", NULL, component_fields));
     PetscCall(FindBody(s, name, &body));
     PetscCall(NewExpr(s, entry, &body->force[field]));
   } else if (strncasecmp(key, "fixed_", 6) == 0) {
-    if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, "a fixed group", NULL, component_fields));
+    if (!SplitKey(rest, component_fields, name, &field))
+      PetscCall(UnknownKey(key, "a fixed group", NULL, component_fields));
     PetscCall(Member(name, sizeof(HycoFixed), &s->n_fixed, (void **)&s->fixed, &k));
     PetscCall(NewExpr(s, entry, &s->fixed[k].value[field]));
   } else if (strncasecmp(key, "pressure_", 9) == 0) {
     PetscCall(Member(rest, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
     PetscCall(NewExpr(s, entry, &s->load[k].pressure));
   } else if (strncasecmp(key, "traction_", 9) == 0) {
-    if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, "a traction", NULL, component_fields));
+    if (!SplitKey(rest, component_fields, name, &field))
+      PetscCall(UnknownKey(key, "a traction", NULL, component_fields));
     PetscCall(Member(name, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
     PetscCall(NewExpr(s, entry, &s->load[k].traction[field]));
   } else {
-    if (!SplitKey(rest, contact_fields, name, &field)) PetscCall(UnknownKey(key, "a contact", NULL, contact_fields));
-    PetscCall(Member(name, sizeof(HycoContact), &s->n_contacts, (void **)&s->contact, &k));
-    PetscCall(ReadContactField(s, entry, &s->contact[k], field));
+    PetscCall(ReadContact(s, entry, rest));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -393,15 +406,7 @@ static PetscErrorCode CheckScene(HycoScene s)
       HycoCheck(!d->entry[j].required || d->entry[j].expr, "body %s has no %s (%s)", s->body[k].name, d->entry[j].name,
                 d->entry[j].title);
   }
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
-    HycoContact *c = &s->contact[k];
-
-    HycoCheck(c->slave, "contact %s names no %s", c->name, c->type == HYCO_CONTACT_OBSTACLE ? "group" : "slave group");
-    HycoCheck(c->type == HYCO_CONTACT_OBSTACLE || c->master, "contact %s is a %s and names no master group", c->name,
-              c->type == HYCO_CONTACT_PAIR ? "pair" : "surface contact");
-    HycoCheck(c->type != HYCO_CONTACT_OBSTACLE || (c->gap && !c->master),
-              "contact %s is an obstacle: it needs a gap, and no master", c->name);
-  }
+  for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactComplete(s->contact[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -450,17 +455,6 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
       PetscCall(CheckPlainEntry(s, k));
     else
       PetscCall(ReadMember(s, k));
-  }
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
-    char dashed[HYCO_LINE];
-    PetscBool set;
-
-    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-contact_%s_tolerance", s->contact[k].name));
-    PetscCall(PetscOptionsHasName(s->options, NULL, dashed, &set));
-    if (!set) s->contact[k].tolerance = -1;
-    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-contact_%s_overlap", s->contact[k].name));
-    PetscCall(PetscOptionsHasName(s->options, NULL, dashed, &set));
-    if (!set) s->contact[k].overlap = -1;
   }
   PetscCall(CheckScene(s));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -609,13 +603,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
     for (PetscInt c = 0; c < 3; c++) PetscCall(HycoExprDestroy(&s->load[k].traction[c]));
     PetscCall(PetscFree(s->load[k].group));
   }
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
-    PetscCall(HycoExprDestroy(&s->contact[k].gap));
-    for (PetscInt c = 0; c < 3; c++) PetscCall(HycoExprDestroy(&s->contact[k].normal[c]));
-    PetscCall(PetscFree(s->contact[k].slave));
-    PetscCall(PetscFree(s->contact[k].master));
-    PetscCall(PetscFree(s->contact[k].name));
-  }
+  for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactDestroy(&s->contact[k]));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     PetscCall(PetscFree(s->key[k]));
     PetscCall(PetscFree(s->value[k]));
