@@ -437,7 +437,8 @@ PetscErrorCode HycoCondensedSetUp(HycoROM m)
   PetscCall(PetscCalloc1(m->m, &m->Lambda));
   PetscCall(PetscMalloc1(m->mesh->n_cells * m->fe->n_sigma, &m->stress));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver)); /* it holds the options alone */
-  PetscCall(HycoSolverSetFromOptions(m->solver, m->scene->options));
+  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->scene->options));
+  PetscCall(HycoSolverSetFromOptions(m->solver));
   m->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

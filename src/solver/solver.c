@@ -6,6 +6,8 @@ const char *const HycoSolverTypes[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, 
 /* Lemke's dictionary has m^2 entries, and each of its some m pivots changes them all: beyond this it is no fallback. */
 #define HYCO_LEMKE_MAX 3000
 
+static const char *const forms[] = {"auto", "dual", "primal", "dual_free", NULL}; /* of HycoForm */
+
 PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
 {
   PetscFunctionBegin;
@@ -162,9 +164,16 @@ PetscErrorCode HycoSolverSetMonitor(HycoSolver s, HycoMonitor monitor, void *ctx
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
+PetscErrorCode HycoSolverSetOptionsPrefix(HycoSolver s, const char prefix[])
 {
-  static const char *const forms[] = {"auto", "dual", "primal", "dual_free", NULL};
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  PetscCall(PetscObjectSetOptionsPrefix((PetscObject)s, prefix));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
+{
   PetscInt form, linear;
   PetscReal gigabytes;
   PetscBool tao;
@@ -174,23 +183,55 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
   form = (PetscInt)s->form;
   linear = (PetscInt)s->linear;
   gigabytes = 1e-9 * s->memory;
-  PetscCall(HycoOptionsWord(options, "hyco_solver_type", HycoSolverTypes, &s->type));
-  PetscCall(PetscOptionsHasName(options, NULL, "-hyco_tao_type", &tao));
+  PetscObjectOptionsBegin((PetscObject)s);
+  PetscCall(
+      HycoOptionsWord("-hyco_solver_type",
+                      "method for every contact problem (a model's takes active_set where a TAO type needs symmetry)",
+                      HycoSolverTypes, &s->type, NULL));
+  PetscCall(HycoOptionsWord("-hyco_tao_type",
+                            "<gpcg|tron|...|ssils|...> with the type tao: its solver; docs/solvers.md says which for "
+                            "what (-hyco_tao_... sets its own options) [gpcg; ssils if nonsymmetric]",
+                            HycoTaoTypes, &s->tao_type, &tao));
+  PetscCall(
+      HycoOptionsWord("-hyco_solver_form",
+                      "full order: pose it in the forces (few contacts; _free: no matrix) or in the gaps (as many "
+                      "as unknowns)",
+                      forms, &form, NULL));
+  PetscCall(HycoOptionsWord("-hyco_linear",
+                            "solve with the stiffness by a factor (MUMPS), or by conjugate gradients with multigrid",
+                            HycoLinearNames, &linear, NULL));
+  PetscCall(HycoOptionsReal("-hyco_memory",
+                            "<GB> what a factor may take before iterations do (0: most of what is free)", 0, 1e9,
+                            &gigabytes, NULL));
+  PetscCall(HycoOptionsReal("-hyco_solver_rtol", "largest relative KKT residual that counts as solved", 1e-15, 0.1,
+                            &s->rtol, NULL));
+  PetscCall(HycoOptionsInt("-hyco_solver_max_its",
+                           "iterations of the active set or TAO (0: from the number of contacts; 2000)", 0,
+                           PETSC_MAX_INT, &s->max_its, NULL));
+  PetscCall(HycoOptionsBool("-hyco_solver_fallback",
+                            "what is not solved is tried again: tao, then active_set, then lemke", &s->fallback, NULL));
+  PetscCall(HycoOptionsBool("-hyco_solver_warm_start", "full order: start from the last solution's active contacts",
+                            &s->warm, NULL));
+  PetscCall(HycoOptionsBool("-hyco_solver_multilevel",
+                            "full order, every unknown a contact: start from coarser problems", &s->multilevel, NULL));
+  PetscCall(HycoOptionsName("-hyco_solver_view", "after each solve: form, method, tolerances, residuals"));
+  PetscOptionsEnd();
   HycoCheck(!tao || s->type == HYCO_TYPE_TAO,
             "nothing reads the option -hyco_tao_type here: the type is %s; give -hyco_solver_type tao",
             HycoSolverTypes[s->type]);
-  PetscCall(HycoOptionsWord(options, "hyco_tao_type", HycoTaoTypes, &s->tao_type));
-  PetscCall(HycoOptionsWord(options, "hyco_solver_form", forms, &form));
   s->form = (HycoForm)form;
-  PetscCall(HycoOptionsWord(options, "hyco_linear", HycoLinearNames, &linear));
-  PetscCall(HycoOptionsReal(options, "hyco_memory", 0, 1e9, &gigabytes));
   s->linear = (HycoLinear)linear;
   s->memory = 1e9 * gigabytes;
-  PetscCall(HycoOptionsReal(options, "hyco_solver_rtol", 1e-15, 0.1, &s->rtol));
-  PetscCall(HycoOptionsInt(options, "hyco_solver_max_its", 0, PETSC_MAX_INT, &s->max_its));
-  PetscCall(HycoOptionsBool(options, "hyco_solver_warm_start", &s->warm));
-  PetscCall(HycoOptionsBool(options, "hyco_solver_fallback", &s->fallback));
-  PetscCall(HycoOptionsBool(options, "hyco_solver_multilevel", &s->multilevel));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverDeclare(PetscOptions options)
+{
+  HycoSolver s;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &s));
+  HycoDeclare(s, options, HycoSolverSetFromOptions, HycoSolverDestroy);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
