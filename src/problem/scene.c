@@ -227,8 +227,8 @@ static PetscErrorCode CreateContact(HycoScene s, const char name[], PetscObject 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static const Section contacts = {"a contact", contact_fields, CreateContact};
-static const Section bodies = {"a body", body_fields, CreateLaw};
+static const Section contacts = {"a contact of type", contact_fields, CreateContact};
+static const Section bodies = {"a body of law", body_fields, CreateLaw};
 
 /* "a_b_young" is b_young of a if the type of a declares it, else young of a_b: name and field; fails where neither. */
 static PetscErrorCode SplitDeclared(HycoScene s, const Section *section, const char key[], const char rest[],
@@ -236,6 +236,7 @@ static PetscErrorCode SplitDeclared(HycoScene s, const Section *section, const c
 {
   PetscObject object = NULL, typed = NULL;
   HycoDeclared *declared, *of_typed = NULL;
+  char what[HYCO_LINE];
 
   PetscFunctionBegin;
   *field = NULL;
@@ -254,7 +255,10 @@ static PetscErrorCode SplitDeclared(HycoScene s, const Section *section, const c
     } else
       PetscCall(PetscObjectDestroy(&object));
   }
-  if (!*field) PetscCall(UnknownKey(key, section->what, of_typed, section->others));
+  if (!*field) {
+    HycoFormat(what, "%s %s", section->what, typed ? typed->type_name : "...");
+    PetscCall(UnknownKey(key, what, of_typed, section->others));
+  }
   PetscCall(PetscObjectDestroy(&typed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
