@@ -267,7 +267,7 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
   PetscBool reconstruct = PETSC_TRUE, presses = PETSC_FALSE, kept = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(HycoOptionsBool(t->scene->options, "hyco_reconstruct", &reconstruct));
+  PetscCall(PetscOptionsGetBool(t->scene->options, NULL, "-hyco_reconstruct", &reconstruct, NULL));
   for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
   HycoCheckModel(

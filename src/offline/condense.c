@@ -296,12 +296,12 @@ PetscErrorCode HycoReducerBeginCondensed(HycoReducer t)
 {
   HycoCondensed c;
   const PetscInt m = t->sizes[2];
-  PetscInt linear = HYCO_LINEAR_AUTO;
+  char linear[32] = "";
 
   PetscFunctionBegin;
-  PetscCall(HycoOptionsWord(t->scene->options, "hyco_linear", HycoLinearNames, &linear));
+  PetscCall(PetscOptionsGetString(t->scene->options, NULL, "-hyco_linear", linear, sizeof(linear), NULL));
   HycoCheckModel(
-      linear != HYCO_LINEAR_ITERATIVE,
+      strcasecmp(linear, HycoLinearNames[HYCO_LINEAR_ITERATIVE]),
       "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a hybrid "
       "model, or take -hyco_linear auto");
   HycoCheckModel(m > 0,

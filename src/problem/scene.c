@@ -385,14 +385,11 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
       PetscCall(UnknownKey(key, "a parameter", NULL, parameter_fields));
     for (PetscInt p = 0; p < s->n_parameters; p++) known = (PetscBool)(known || strcasecmp(s->parameter[p], name) == 0);
     HycoCheck(known, "the scene's entry %s is about a parameter that scene: parameters: does not list", key);
-  } else if (!HycoOptionKnown(key)) {
-    const HycoOption *table;
-    const char *names[64];
+  } else if (!HycoOptionFind(key)) {
+    const char *near = HycoOptionNearest(key, NULL);
 
-    PetscCall(HycoGetOptionTable(&n, &table));
-    for (PetscInt k = 0; k < n && k < 64; k++) names[k] = table[k].name;
-    if (HycoNearest(key, n, names))
-      HycoFail("the option %s is unknown; did you mean %s?", key, HycoNearest(key, n, names));
+    PetscCall(HycoOptionsCheckName(key));
+    HycoCheck(!near, "the option %s is unknown; did you mean %s?", key, near);
     HycoFail("the option %s is unknown; hyco -help lists them", key);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

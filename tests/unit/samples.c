@@ -208,7 +208,7 @@ static PetscErrorCode TestNearest(void)
   CHECK(HycoNearest("yung", 3, names) == names[0], "yung is nearest to young");
   CHECK(HycoNearest("Poison", 3, names) == names[1], "Poison is nearest to poisson");
   CHECK(!HycoNearest("gravity", 3, names), "gravity is near to none");
-  CHECK(HycoOptionKnown("hyco_pod_tol") && !HycoOptionKnown("hyco_pod_tl"), "the table of options is wrong");
+  CHECK(HycoOptionFind("hyco_pod_tol") && !HycoOptionFind("hyco_pod_tl"), "the table of options is wrong");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
