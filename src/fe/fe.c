@@ -71,6 +71,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
               "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (line2, tri3 or tet4) the "
               "dilatation is constant already and nothing would change",
               scene->body[b].name);
+  for (PetscInt b = 0; b < scene->n_bodies; b++) PetscCall(HycoMaterialSetUp(scene->body[b].law, mesh->dim));
   PetscCall(PetscNew(&f));
   f->scene = scene;
   f->mesh = mesh;
