@@ -112,8 +112,9 @@ PetscErrorCode HycoTaoRegisterAll(void);
 
 /* A Tao with the options prefix hyco_, kept between problems. */
 typedef struct _n_HycoTao *HycoTao;
-/* Collective, as all that follows. */
-PetscErrorCode HycoTaoCreate(MPI_Comm comm, HycoTao *tao);
+/* Collective, as all that follows. Of a problem that each of `ranks` solves alone (comm: PETSC_COMM_SELF) the first one
+   prints what -hyco_tao_monitor and its like ask for. */
+PetscErrorCode HycoTaoCreate(MPI_Comm comm, MPI_Comm ranks, HycoTao *tao);
 /* NULL-safe. */
 PetscErrorCode HycoTaoDestroy(HycoTao *tao);
 /* max_its 0: 2000, or of hyco's types by the number of contacts. */

@@ -8,6 +8,7 @@
 
 struct _n_HycoTao {
   MPI_Comm comm;
+  PetscBool quiet; /* another rank's Tao prints for the same problem */
   char type[HYCO_TAO_NAME];
   int traits;
   PetscInt max_its;

@@ -414,7 +414,7 @@ PetscErrorCode DriverCheckMesh(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
+static PetscErrorCode CheckLeft(PetscBool early)
 {
   PetscInt n;
   char **names, **values, first[DRIVER_LINE] = "";
@@ -423,9 +423,8 @@ static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
   PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
   for (PetscInt k = 0; k < n && !first[0]; k++) {
     if (early && (strncasecmp(names[k], "hyco_mumps_", 11) == 0 || strncasecmp(names[k], "hyco_primal_", 12) == 0 ||
-                  strncasecmp(names[k], "hyco_norm_", 10) == 0))
+                  strncasecmp(names[k], "hyco_norm_", 10) == 0 || strncasecmp(names[k], "hyco_tao_", 9) == 0))
       continue;
-    if (tao && strncasecmp(names[k], "hyco_tao_", 9) == 0) continue;
     if (strncmp(names[k], "options_left", 12) && strncmp(names[k], "skip_petscrc", 12) && strcmp(names[k], "nox"))
       PetscCall(PetscStrncpy(first, names[k], sizeof(first)));
   }
@@ -437,20 +436,15 @@ static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
 PetscErrorCode DriverCheckLeft(void)
 {
   PetscFunctionBegin;
-  PetscCall(CheckLeft(PETSC_FALSE, PETSC_FALSE));
+  PetscCall(CheckLeft(PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode DriverCheckLeftEarly(HycoScene scene)
 {
-  static const char *const types[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, HYCO_SOLVER_LEMKE, NULL};
-  PetscOptions options;
-  PetscInt type = 0;
-
   PetscFunctionBegin;
-  PetscCall(HycoSceneGetOptions(scene, &options));
-  PetscCall(HycoOptionsWord(options, "hyco_solver_type", types, &type));
-  PetscCall(CheckLeft(PETSC_TRUE, (PetscBool)(type == 1)));
+  (void)scene;
+  PetscCall(CheckLeft(PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -59,12 +59,17 @@ PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTaoCreate(MPI_Comm comm, HycoTao *t)
+PetscErrorCode HycoTaoCreate(MPI_Comm comm, MPI_Comm ranks, HycoTao *t)
 {
+  PetscMPIInt rank, size;
+
   PetscFunctionBegin;
   PetscCall(HycoTaoRegisterAll());
   PetscCall(PetscNew(t));
   (*t)->comm = comm;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCallMPI(MPI_Comm_rank(ranks, &rank));
+  (*t)->quiet = (PetscBool)(size == 1 && rank > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -145,6 +150,11 @@ static PetscErrorCode ReadOptions(HycoTao t)
   if (given) PetscCall(PetscOptionsSetValue(NULL, "-hyco_tao_type", t->type));
   PetscCall(TaoSetFromOptions(t->tao));
   if (given) PetscCall(PetscOptionsSetValue(NULL, "-hyco_tao_type", named));
+  if (!t->quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TaoMonitorCancel(t->tao));
+  t->tao->printreason = PETSC_FALSE;
+  PetscCall(PetscOptionsHasName(NULL, "hyco_", "-tao_view", &given)); /* read here too: the check of options is on every rank */
+  PetscCall(PetscObjectSetOptionsPrefix((PetscObject)t->tao, "hyco_quiet_"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -420,6 +430,7 @@ static PetscErrorCode SolveOwn(HycoTao t, Vec y, PetscInt max_its)
   PetscFunctionBegin;
   PetscCall(Prepare(t, y, max_its, &made));
   if (made) PetscCall(ReadOptions(t));
+  PetscCall(TaoSetMaximumIterations(t->tao, max_its)); /* -hyco_tao_max_it is for TAO's own, which this may replace */
   PetscCall(TaoSetSolution(t->tao, y));
   PetscCall(TaoSolve(t->tao));
   PetscFunctionReturn(PETSC_SUCCESS);
