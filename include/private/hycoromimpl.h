@@ -3,7 +3,7 @@
 #define HYCOROMIMPL_H
 
 #include <hycodomain.h>
-#include <hycofe.h>
+#include <hycocontactimpl.h>
 #include <hycorom.h>
 #include <hycosolverimpl.h>
 
@@ -88,6 +88,7 @@ struct _p_HycoROM {
   PetscReal *V_whole, *U_whole;
   HycoNorms norms; /* made by the first comparison */
   /* online */
+  PetscBool full_order, full_displacement; /* what its user, who has the scene, is to do: HycoROMGetFallback() */
   PetscInt reconstruct_solver;       /* of (41), index in HycoReconstructSolvers */
   HycoReconstruction reconstruction; /* what (41) keeps, made by the first */
   PetscBool ready, reconstruct, solved, whole_current;

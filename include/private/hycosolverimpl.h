@@ -41,7 +41,7 @@ struct _HycoSolverFormOps {
   /* May be NULL. Ends a refinement: each solve begins alike. */
   PetscErrorCode (*reset)(HycoSolver s, HycoSolverForm form);
   /* May be NULL. The options of this form alone. */
-  PetscErrorCode (*setfromoptions)(HycoSolver s, HycoSolverForm form, PetscOptions options);
+  PetscErrorCode (*setfromoptions)(HycoSolver s, HycoSolverForm form, HycoOptionItems PetscOptionsObject);
   PetscErrorCode (*destroy)(HycoSolverForm form);
 };
 struct _n_HycoSolverForm {

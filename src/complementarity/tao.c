@@ -6,9 +6,9 @@
   and its semismooth types solve the complementarity problem w = q + M z >= 0, z >= 0, w.z = 0, symmetric or not, by the
   Fischer-Burmeister function (T. S. Munson et al., INFORMS J. Comput. 13 (2001) 294-311). Both stop on absolute sizes,
   so the problem is scaled first: unit diagonal, right-hand side of size one. A type that a program registers sees the
-  same: solution, bounds, Hessian, objective and its gradient H y - f. hyco's own types (tao_types.c) take the problem as
-  it is. What TAO says is not evidence: the caller recomputes the residuals. A PETSC error inside TAO is caught: it means
-  not solved, like a limit of iterations.
+  same: solution, bounds, Hessian, objective and its gradient H y - f. hyco's own types (tao_types.c) take the problem
+  as it is. What TAO says is not evidence: the caller recomputes the residuals. A PETSC error inside TAO is caught: it
+  means not solved, like a limit of iterations.
 */
 #include <hycotao.h>
 
@@ -138,8 +138,8 @@ static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *mad
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The user's -hyco_tao_... options. -hyco_tao_type among them is HycoSolver's: it must not change the type of a fallback,
-   or of another problem. */
+/* The user's -hyco_tao_... options. -hyco_tao_type among them is HycoSolver's: it must not change the type of a
+   fallback, or of another problem. */
 static PetscErrorCode ReadOptions(HycoTao t)
 {
   char named[HYCO_TAO_NAME];

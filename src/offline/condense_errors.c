@@ -56,8 +56,7 @@ static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal
   w->last = node;
   PetscCall(HycoCondensedFreeGap(c, mu, w->p, w->i));
   for (PetscInt j = 0; j < c->m; j++) c->active[j] = (PetscBool)(own[j] > 0);
-  if (w->definite)
-    PetscCall(HycoLCPActiveSet(&lcp, c->active, w->L, &its, &status));
+  if (w->definite) PetscCall(HycoLCPActiveSet(&lcp, c->active, w->L, &its, &status));
   *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

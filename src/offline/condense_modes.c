@@ -93,8 +93,7 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
   PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
   for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(nearest[i] > 0);
-  if (definite)
-    PetscCall(HycoLCPActiveSet(&lcp, c->active, L, &its, &status));
+  if (definite) PetscCall(HycoLCPActiveSet(&lcp, c->active, L, &its, &status));
   for (PetscInt i = 0; i < c->m; i++) L[i] = status == HYCO_LCP_SOLVED ? PetscMax(L[i], 0) : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

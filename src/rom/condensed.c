@@ -359,7 +359,8 @@ static PetscErrorCode CreateSystem(HycoROM m)
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &m->system));
   PetscCall(HycoSystemSetFlexibility(m->system, m->Kr, g));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver));
-  PetscCall(HycoSolverSetFromOptions(m->solver, m->scene->options));
+  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->scene->options));
+  PetscCall(HycoSolverSetFromOptions(m->solver));
   PetscCall(HycoSolverSetSystem(m->solver, m->system));
   PetscCall(VecDestroy(&g));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -141,7 +141,8 @@ PetscErrorCode HycoROMSetUp(HycoROM m)
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver));
   PetscCall(HycoSolverSetWarmStart(m->solver,
                                    PETSC_FALSE)); /* the nonsymmetric problem may have several solutions: no history */
-  PetscCall(HycoSolverSetFromOptions(m->solver, m->scene->options));
+  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->scene->options));
+  PetscCall(HycoSolverSetFromOptions(m->solver));
   /* the reduced problem is not symmetric and may have several solutions: the dual form, no history; a TAO type that
      needs symmetry is meant for the full order */
   PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));

@@ -568,9 +568,8 @@ PetscErrorCode HycoROMLoad(const char path[], HycoROM *model)
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   if (ierr) (void)!HycoROMDestroy(&m);
   PetscCall(ierr);
-  PetscCall(HycoOptionsBool(m->scene->options, "hyco_reconstruct", &m->reconstruct));
-  PetscCall(
-      HycoOptionsWord(m->scene->options, "hyco_reconstruct_solver", HycoReconstructSolvers, &m->reconstruct_solver));
+  PetscCall(PetscObjectSetOptions((PetscObject)m, m->scene->options));
+  PetscCall(HycoROMSetFromOptions(m));
   *model = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -5,8 +5,8 @@
 #include <hycosolverimpl.h>
 #include <string.h>
 
-/* Lemke's dictionary has m^2 entries, and each of its some m pivots changes them all: beyond this it is no fallback, nor
-   is S where another form was chosen. */
+/* Lemke's dictionary has m^2 entries, and each of its some m pivots changes them all: beyond this it is no fallback,
+   nor is S where another form was chosen. */
 #define HYCO_FALLBACK_MAX 3000
 
 typedef struct {
@@ -47,7 +47,8 @@ static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscRea
   (void)form;
   if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
   PetscCall(HycoDirectPinKernel(f->direct, y->K));
-  PetscCall(HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation goes on from it */
+  PetscCall(
+      HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation goes on from it */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

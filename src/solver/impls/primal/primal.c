@@ -283,8 +283,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
     HycoFormat(why,
                "%s%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with "
                "dual_free",
-               s->now.traits & HYCO_TAO_OWN ? "" : "TAO's ",
-               s->now.traits & HYCO_TAO_OWN ? s->now.word : s->now.type);
+               s->now.traits & HYCO_TAO_OWN ? "" : "TAO's ", s->now.traits & HYCO_TAO_OWN ? s->now.word : s->now.type);
   else if (!aij)
     HycoFormat(why, "the primal form needs a sparse K (AIJ); use -hyco_solver_form dual");
   else if (!y->symmetric)
@@ -353,11 +352,12 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, PetscOptions options)
+static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, HycoOptionItems PetscOptionsObject)
 {
   PetscFunctionBegin;
   (void)form;
-  PetscCall(HycoOptionsBool(options, "hyco_solver_multilevel", &s->multilevel));
+  PetscCall(HycoOptionsBool("-hyco_solver_multilevel",
+                            "full order, every unknown a contact: start from coarser problems", &s->multilevel, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -369,10 +369,7 @@ PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form)
   PetscCall(PetscNew(&g));
   PetscCall(HycoTaoCreate(HycoComm(s), HycoComm(s), &g->tao));
   form->data = g;
-  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts,
-                                           .setup = SetUp,
-                                           .solve = Solve,
-                                           .setfromoptions = SetFromOptions,
-                                           .destroy = Destroy};
+  *form->ops = (struct _HycoSolverFormOps){
+      .accepts = Accepts, .setup = SetUp, .solve = Solve, .setfromoptions = SetFromOptions, .destroy = Destroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
