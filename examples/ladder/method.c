@@ -118,7 +118,7 @@ int main(int argc, char **argv)
   PetscCall(HycoSolverSetSystem(solver, system));
   PetscCall(HycoSolverSetType(solver, HYCO_SOLVER_TAO));
   PetscCall(HycoSolverSetTaoType(solver, "projected"));
-  PetscCall(HycoSolverSetFromOptions(solver, NULL));
+  PetscCall(HycoSolverSetFromOptions(solver));
   PetscCall(VecDuplicate(F, &u));
   PetscCall(VecDuplicate(D, &L));
   PetscCall(HycoSolverSolve(solver, u, L));

@@ -177,10 +177,9 @@ PetscErrorCode DriverCheckLeft(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverCheckLeftEarly(HycoScene scene)
+PetscErrorCode DriverCheckLeftEarly(void)
 {
   PetscFunctionBegin;
-  (void)scene;
   PetscCall(CheckLeft(PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

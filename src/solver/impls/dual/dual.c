@@ -354,7 +354,7 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&d));
-  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, HycoComm(s), &d->tao));
+  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, (PetscObject)s, &d->tao));
   form->data = d;
   *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts,
                                            .estimate = EstimateFactor,

@@ -90,7 +90,7 @@ PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm for
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&f));
-  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, HycoComm(s), &f->tao));
+  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, (PetscObject)s, &f->tao));
   form->data = f;
   *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -367,7 +367,7 @@ PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form)
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&g));
-  PetscCall(HycoTaoCreate(HycoComm(s), HycoComm(s), &g->tao));
+  PetscCall(HycoTaoCreate(HycoComm(s), (PetscObject)s, &g->tao));
   form->data = g;
   *form->ops = (struct _HycoSolverFormOps){
       .accepts = Accepts, .setup = SetUp, .solve = Solve, .setfromoptions = SetFromOptions, .destroy = Destroy};
