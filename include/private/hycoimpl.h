@@ -56,6 +56,9 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
 /* Text as C's printf makes it, cut at HYCO_LINE. */
 void HycoFormat(char line[HYCO_LINE], const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
+/* Appends `name` to a list of names, with `between` before all but the first; cut at HYCO_LINE. */
+PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const char name[]);
+
 /* A user's error on this rank: one line, its numbers as C prints them (PETSc would write 2 as "2."). */
 #define HycoFail(...)                                                                                                  \
   do {                                                                                                                 \
@@ -84,6 +87,15 @@ PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, 
 #define HycoCheckHandle(handle, classid) PetscCall(HycoHandleCheck((handle), &(classid), PETSC_FUNCTION_NAME))
 /* Begins a View: stdout where *viewer is NULL; on an ASCII viewer the object's class and name, and a tab to pop. */
 PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool *ascii);
+/* XViewFromOptions() of a class. */
+#define HycoDefineViewFromOptions(Class, classid)                                                                      \
+  PetscErrorCode Class##ViewFromOptions(Class object, PetscObject owner, const char option[])                         \
+  {                                                                                                                    \
+    PetscFunctionBegin;                                                                                                \
+    HycoCheckHandle(object, classid);                                                                                  \
+    PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));                                         \
+    PetscFunctionReturn(PETSC_SUCCESS);                                                                                \
+  }
 /* The communicator of an object of any class. */
 #define HycoComm(object) PetscObjectComm((PetscObject)(object))
 /* Takes one reference from `*object` and clears it; returns unless that was the last. */

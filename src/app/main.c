@@ -158,20 +158,6 @@ static PetscErrorCode Start(int *argc, char ***argv)
   return ierr;
 }
 
-/* A run without mpiexec needs no daemon beside it, for it spawns nothing, and no folder for that daemon's files: Open
-   MPI 4 gives all such runs of a user the same one, and each removes it under the others. Other MPIs do not read these.
- */
-static void StartAlone(void)
-{
-  static const char *const launched[] = {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_ID"};
-
-  for (size_t k = 0; k < sizeof(launched) / sizeof(launched[0]); k++) {
-    if (getenv(launched[k])) return;
-  }
-  setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
-  setenv("OMPI_MCA_orte_create_session_dirs", "0", 0);
-}
-
 /* hyco help, hyco COMMAND -help: what the classes and the commands declare, which PETSc is needed for. */
 static int Help(char **argv)
 {
@@ -180,7 +166,7 @@ static int Help(char **argv)
   PetscErrorCode ierr = 0;
   int argc = 1;
 
-  StartAlone();
+  DriverStartAlone();
   if (Start(&argc, &argv)) return DRIVER_FAILED;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (rank == 0) {
@@ -200,7 +186,7 @@ int main(int argc, char **argv)
   if (status >= 0) return status;
   DriverOneThread();
   DriverNoteLaunch();
-  StartAlone();
+  DriverStartAlone();
   if (Start(&argc, &argv)) return 1;
   PetscPushErrorHandler(KeepMessage, NULL); /* after: PETSc's books of memory (-malloc_dump) begin with it */
   signal(SIGPIPE, SIG_IGN);                 /* "hyco ... | head" is no error */

@@ -43,8 +43,7 @@ PetscErrorCode HycoMeshFindGroup(HycoMesh mesh, const char key[], const char nam
       *group = g;
       PetscFunctionReturn(PETSC_SUCCESS);
     }
-    PetscCall(PetscStrlcat(list, g ? ", " : "", sizeof(list)));
-    PetscCall(PetscStrlcat(list, mesh->group_name[g], sizeof(list)));
+    PetscCall(HycoListAdd(list, ", ", mesh->group_name[g]));
   }
   near = HycoNearest(name, mesh->n_groups, (const char *const *)mesh->group_name);
   if (near) HycoFail("%s: the mesh has no group \"%s\"; its groups are: %s; did you mean %s?", key, name, list, near);

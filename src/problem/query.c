@@ -54,16 +54,11 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCheck(mu || !n, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL, "the parameter values' address is NULL");
   if (n != scene->n_parameters) {
-    char list[HYCO_LINE] = "none";
+    char list[HYCO_LINE] = "";
 
-    for (PetscInt p = 0; p < scene->n_parameters; p++) {
-      if (p == 0)
-        list[0] = '\0';
-      else
-        PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
-      PetscCall(PetscStrlcat(list, scene->parameter[p], sizeof(list)));
-    }
-    HycoFail("%d parameter values were given; the scene has %d: %s", (int)n, (int)scene->n_parameters, list);
+    for (PetscInt p = 0; p < scene->n_parameters; p++) PetscCall(HycoListAdd(list, ", ", scene->parameter[p]));
+    HycoFail("%d parameter values were given; the scene has %d: %s", (int)n, (int)scene->n_parameters,
+             list[0] ? list : "none");
   }
   for (PetscInt p = 0; p < n; p++) {
     const PetscReal slack = 1e-12 * PetscMax(PetscAbsReal(scene->lo[p]), PetscAbsReal(scene->hi[p]));

@@ -19,6 +19,7 @@ static const struct {
 };
 
 static HycoOptionList table;      /* the library's, once recorded */
+static HycoOptionList told;       /* what -help has printed */
 static HycoOptionList *recording; /* where declarations go instead of being read; NULL: they are read */
 static const char *readers = "";  /* HycoOptionsFor() */
 
@@ -26,6 +27,7 @@ static PetscErrorCode ForgetTable(void)
 {
   PetscFunctionBegin;
   PetscCall(HycoOptionListDestroy(&table));
+  PetscCall(HycoOptionListDestroy(&told));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -225,22 +227,22 @@ static PetscErrorCode Find(HycoOptionItems items, const char name[], const char 
                            const char initial[], size_t room, const char **value, PetscBool *set)
 {
   const char *owner = items->object ? items->object->class_name : items->title;
+  PetscBool help = PETSC_FALSE;
+  HycoOption option;
 
   PetscFunctionBegin;
   *set = PETSC_FALSE;
   *value = NULL;
-  if (recording || (items->printhelp && items->count == 1 && !items->alreadyprinted)) {
-    HycoOption option;
-
+  if (!recording) PetscCall(PetscOptionsHasHelp(NULL, &help)); /* a scene's options know of no -help */
+  if (recording || (help && items->count == 1 && (items->prefix || !HycoOptionListFind(&told, name + 1)))) {
     PetscCall(MakeOption(name, text, form, initial, owner, &option));
-    if (recording) {
-      PetscCall(Append(recording, &option));
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
-    PetscCall((*PetscHelpPrintf)(items->comm, "  -%s%s %s: %s [%s]\n", items->prefix ? items->prefix : "", option.name,
-                                 option.value, option.meaning, option.initial));
-    PetscCall(PetscFree(option.name));
+    if (help && !told.n) PetscCall(PetscRegisterFinalize(ForgetTable));
+    if (help)
+      PetscCall((*PetscHelpPrintf)(items->comm, "  -%s%s %s: %s [%s]\n", items->prefix ? items->prefix : "",
+                                   option.name, option.value, option.meaning, option.initial));
+    PetscCall(Append(recording ? recording : &told, &option));
   }
+  if (recording) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscOptionsFindPair(items->options, items->prefix, name, value, set));
   if (!*set && items->options && items->prefix) PetscCall(PetscOptionsFindPair(NULL, items->prefix, name, value, set));
   if (*set && !*value) *value = "";
@@ -305,8 +307,7 @@ static PetscErrorCode FindWord(HycoOptionItems items, const char name[], const c
   PetscFunctionBegin;
   for (*index = 0; words[*index]; ++*index) {
     if (strcasecmp(word, words[*index]) == 0) PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCall(PetscStrlcat(list, *index ? ", " : "", sizeof(list)));
-    PetscCall(PetscStrlcat(list, words[*index], sizeof(list)));
+    PetscCall(HycoListAdd(list, ", ", words[*index]));
   }
   HycoFail("-%s%s is \"%.200s\"; it must be one of: %s", NAMED(items, name), word, list);
 }

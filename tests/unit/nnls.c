@@ -10,9 +10,9 @@ static PetscErrorCode CheckKKT(PetscInt m, PetscInt n, const PetscReal A[], cons
   PetscReal *x, *r, residual, size = 0, scale = 0;
 
   PetscFunctionBegin;
+  *norm = 0;
   PetscCall(PetscMalloc2(n, &x, m, &r));
   PetscCall(HycoNNLS(m, n, A, b, x, &residual));
-  *norm = 0;
   for (PetscInt i = 0; i < m; i++) {
     r[i] = b[i];
     for (PetscInt j = 0; j < n; j++) r[i] -= A[j * m + i] * x[j];
