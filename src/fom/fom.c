@@ -394,6 +394,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscCall(HycoFOMGather(f));
   t->total = HycoNow() - begin;
   f->solved = PETSC_TRUE;
+  PetscCall(HycoFOMViewFromOptions(f, NULL, "-hyco_fom_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -560,16 +561,12 @@ PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)f, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%d nodes, %d cells, %d contacts, on %d ranks\n", (int)f->n_nodes,
+                                   (int)f->n_cells, (int)f->n_contacts, (int)f->size));
   PetscCall(HycoSystemView(f->system, viewer));
   PetscCall(HycoSolverView(f->solver, viewer));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFOMViewFromOptions(HycoFOM object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_FOM_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoFOM, HYCO_FOM_CLASSID)
