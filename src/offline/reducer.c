@@ -16,18 +16,43 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   PetscCall(PetscObjectReference((PetscObject)scene));
   t->scene = scene;
   t->noise = 1e-11;
-  t->nnmf_max_its = 100;
-  t->condensed_tol = 1e-7;
-  t->condensed_pod_tol = 1e-14;
-  t->condensed_max_values = 24;
   t->greedy.target = 1e-3;
-  t->ridge = -1;
   t->n_validation = -1;
   t->search = PETSC_TRUE;
   t->budget = -1;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
+  PetscCall(HycoReducerSetType(t, HYCO_ROM_HYBRID));
   *reducer = t;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Its options and all that it has made. */
+static PetscErrorCode EndTraining(HycoReducer t)
+{
+  PetscFunctionBegin;
+  if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
+  PetscCall(PetscFree(t->training));
+  PetscCall(HycoROMDestroy(&t->prototype));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
+{
+  PetscBool same = PETSC_FALSE;
+  HycoROM type;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (t->prototype) PetscCall(PetscObjectTypeCompare((PetscObject)t->prototype, name, &same));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMCreate(&type));
+  ierr = HycoROMSetType(type, name);
+  if (ierr) (void)!HycoROMDestroy(&type);
+  PetscCall(ierr);
+  PetscCall(EndTraining(t));
+  t->prototype = type;
+  if (type->ops->setfromoptions) PetscCall((*type->ops->setfromoptions)(t, t->scene->options));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -35,14 +60,13 @@ PetscErrorCode HycoReducerReset(HycoReducer t)
 {
   PetscFunctionBegin;
   PetscCall(HycoReducerResetBases(t));
-  PetscCall(HycoReducerResetSurfaces(t));
+  if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
   PetscCall(HycoFEDestroy(&t->fe));
   PetscCall(HycoPairsDestroy(&t->pairs));
   PetscCall(HycoMetDestroy(&t->met));
   PetscCall(HycoMeshDestroy(&t->whole));
   PetscCall(PetscFree(t->grown));
   PetscCall(HycoSamplesDestroy(&t->held));
-  PetscCall(HycoCondensedDestroy(&t->condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,11 +78,7 @@ PetscErrorCode HycoReducerDropBases(HycoReducer t)
   PetscCall(PetscFree(t->sigma));
   PetscCall(PetscFree(t->V_whole));
   PetscCall(PetscFree(t->VtU));
-  PetscCall(PetscFree(t->responses.Q));
-  PetscCall(PetscFree(t->responses.scale));
-  PetscCall(PetscFree(t->responses.C));
-  t->responses.missed = 0;
-  t->n_seeds_node = t->n_seeds_cell = t->n_supremizers = 0;
+  t->n_seeds_node = t->n_seeds_cell = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -90,6 +110,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   HycoDereference(reducer);
   t = *reducer;
   PetscCall(HycoReducerReset(t));
+  PetscCall(EndTraining(t));
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
   PetscCall(PetscFree(t->region));
   PetscCall(HycoSceneDestroy(&t->scene));
@@ -109,7 +130,7 @@ PetscErrorCode HycoReducerChooses(HycoReducer t, PetscBool *chooses)
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  *chooses = (PetscBool)(t->type == HYCO_ROM_CONDENSED);
+  *chooses = (PetscBool)(t->prototype->ops->choosepoints != NULL);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -224,34 +245,27 @@ static PetscErrorCode ReadSeedKinds(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A projection-based model takes the whole mesh, so nothing seeds an RID. */
+/* The type, with its own options; one whose RID is the whole mesh has nothing that seeds it. */
 static PetscErrorCode ReadType(HycoReducer t)
 {
-  PetscOptions o = t->scene->options;
-  PetscInt type = (PetscInt)t->type, dual = 0;
+  const char **names;
+  char text[64] = "fe";
+  PetscInt type = 0;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoOptionsWord(o, "hyco_model_type", HycoROMTypes, &type));
-  PetscCall(HycoOptionsWord(o, "hyco_dual", HycoDuals, &dual));
-  PetscCall(HycoOptionsInt(o, "hyco_nnmf_max_its", 1, PETSC_MAX_INT, &t->nnmf_max_its));
-  PetscCall(HycoOptionsInt(o, "hyco_nnmf_vectors", 0, PETSC_MAX_INT, &t->nnmf_vectors));
-  PetscCall(HycoOptionsReal(o, "hyco_condensed_tol", 0, 1, &t->condensed_tol));
-  PetscCall(HycoOptionsReal(o, "hyco_condensed_pod_tol", 0, 1, &t->condensed_pod_tol));
-  PetscCall(HycoOptionsInt(o, "hyco_condensed_max_values", 3, 1000, &t->condensed_max_values));
-  t->type = (HycoROMType)type;
-  t->dual = (HycoDual)dual;
-  HycoCheckModel(t->type == HYCO_ROM_PROJECTION || t->dual == HYCO_DUAL_FE,
+  PetscCall(HycoROMTypeNames(&names));
+  while (names[type] && strcmp(names[type], t->prototype->type)) type++;
+  ierr = HycoOptionsWord(t->scene->options, "hyco_model_type", names, &type);
+  if (!ierr) ierr = EndTraining(t); /* the options may have changed */
+  if (!ierr) ierr = HycoReducerSetType(t, names[type]);
+  PetscCall(PetscFree(names));
+  PetscCall(ierr);
+  PetscCall(PetscOptionsGetString(t->scene->options, NULL, "-hyco_dual", text, sizeof(text), NULL));
+  HycoCheckModel(t->prototype->traits.force_basis || strcmp(text, "fe") == 0,
                  "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
-                 HycoDuals[dual]);
-  if (t->type != HYCO_ROM_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
-  if (t->dual == HYCO_DUAL_FE) {
-    PetscBool set;
-
-    PetscCall(PetscOptionsHasName(o, NULL, "-hyco_dual", &set));
-    HycoCheckModel(!set,
-                   "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
-    t->dual = HYCO_DUAL_NNMF;
-  }
+                 text);
+  if (!t->prototype->traits.whole) PetscFunctionReturn(PETSC_SUCCESS);
   t->whole_rid = PETSC_TRUE;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -286,9 +300,7 @@ PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
   PetscCall(HycoOptionsReal(o, "hyco_rid_contact_extension", 0, PETSC_MAX_REAL, &t->extension));
   PetscCall(HycoOptionsBool(o, "hyco_rid_whole", &t->whole_rid));
   PetscCall(HycoOptionsWord(o, "hyco_hybrid", HycoHybrids, &hybrid));
-  PetscCall(HycoOptionsInt(o, "hyco_hybrid_trials", 0, PETSC_MAX_INT / 8, &t->trials));
   t->hybrid = (HycoHybrid)hybrid;
-  PetscCall(HycoOptionsReal(o, "hyco_hybrid_ridge", -1, 1, &t->ridge));
   PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
   PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
   PetscCall(HycoOptionsInt(o, "hyco_validation", -1, 100000, &t->n_validation));
@@ -327,7 +339,7 @@ PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)t, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscViewerASCIIPrintf(viewer, "model type: %s\n", HycoROMTypes[t->type]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "model type: %s\n", t->prototype->type));
   PetscCall(PetscViewerASCIIPrintf(viewer, "energy left out of the displacement basis: %g\n",
                                    (double)t->tol[HYCO_SEED_DISPLACEMENT]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "search for settings: %s\n", t->search ? "yes" : "no"));
