@@ -100,9 +100,10 @@ typedef struct {
 PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *reducer);
 /* Frees; sets the handle to NULL; NULL-safe. Collective. */
 PetscErrorCode HycoReducerDestroy(HycoReducer *reducer);
-/* Reads the -hyco_model_type, -hyco_dual, -hyco_nnmf_, -hyco_pod_, -hyco_deim_, -hyco_rid_, -hyco_hybrid, -hyco_scan
-   options from the scene's options. Collective. */
+/* Reads what decides a model and its training (hyco train -help), from the scene's options. Collective. */
 PetscErrorCode HycoReducerSetFromOptions(HycoReducer reducer);
+/* The type of model that the options ask for (-hyco_model_type); a search may take another. */
+PetscErrorCode HycoReducerGetType(HycoReducer reducer, HycoROMType *type);
 /* Where the snapshots live (default: the model's name with .snapshots appended). */
 PetscErrorCode HycoReducerSetSnapshotFolder(HycoReducer reducer, const char folder[]);
 /* Whether HycoReducerRun() chooses the points itself when it is given none: for a condensed model. */

@@ -99,6 +99,11 @@ PetscErrorCode HycoROMGetSizes(HycoROM model, PetscInt *n_contacts, PetscInt *n_
 */
 PetscErrorCode HycoROMSolveMany(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
+/* Reads -hyco_reconstruct, -hyco_reconstruct_solver, -hyco_fallback, -hyco_full_displacement; HycoROMLoad() does. */
+PetscErrorCode HycoROMSetFromOptions(HycoROM model);
+/* -hyco_fallback and -hyco_full_displacement: whether who has the scene is to solve full order where a prediction is
+   not enough, and to solve once on the whole mesh with the predicted forces. */
+PetscErrorCode HycoROMGetFallback(HycoROM model, PetscBool *full_order, PetscBool *displacement);
 /* Whether Predict reconstructs the forces outside the RID (default: yes). */
 PetscErrorCode HycoROMSetReconstruct(HycoROM model, PetscBool reconstruct);
 /* Called after each iteration of the active set. */

@@ -41,9 +41,9 @@ typedef struct {
 /* NULL for what a type does not do. Not collective, unless said. */
 typedef struct _HycoROMOps {
   /* -- training; the reducer's state is on rank 0 -- */
-  PetscErrorCode (*setfromoptions)(HycoReducer, PetscOptions); /* its options of the training, on every rank */
-  PetscErrorCode (*resettraining)(HycoReducer);                /* frees what they and a run have made, on every rank */
-  PetscErrorCode (*begin)(HycoReducer); /* before any solve: refuses what it is not for. Collective */
+  PetscErrorCode (*setfromoptions)(HycoReducer); /* its options of the training, on every rank */
+  PetscErrorCode (*resettraining)(HycoReducer);  /* frees what they and a run have made, on every rank */
+  PetscErrorCode (*begin)(HycoReducer);          /* before any solve: refuses what it is not for. Collective */
   PetscErrorCode (*startpoints)(HycoReducer, HycoSamples *);                 /* chooses its own training points: */
   PetscErrorCode (*choosepoints)(HycoReducer, HycoSnapshots, HycoSamples *); /* first ones; those. Collective */
   PetscErrorCode (*modes)(HycoReducer, HycoSnapshots); /* modes beside or instead of the solutions' POD. Collective */
@@ -54,6 +54,7 @@ typedef struct _HycoROMOps {
   PetscReal (*cost)(HycoReducer, const HycoAttempt *);            /* operations of an online solve at a new stiffness */
   PetscBool (*offers)(HycoReducer, PetscBool targets); /* whether a search tries it unasked, -target_... given or not */
   /* -- online -- */
+  PetscErrorCode (*options)(HycoROM);                               /* its options of a model */
   PetscErrorCode (*setup)(HycoROM);                                 /* default: every contact the model's own */
   PetscErrorCode (*reset)(HycoROM);                                 /* frees what setup and solve have made */
   PetscErrorCode (*solve)(HycoROM, const PetscReal mu[]);           /* ends with HycoROMSetSolution() */

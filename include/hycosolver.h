@@ -23,6 +23,15 @@ typedef enum {
   HYCO_FORM_DUAL_FREE /* the dual with B K^-1 Bt applied, never formed: TAO's bound-constrained types, symmetric */
 } HycoForm;
 
+/*
+  Makes a form available to solvers that are created from then on: by -hyco_solver_form name, or left to itself where it
+  is the cheapest that accepts a system. `create` fills in the form's operations and data (private headers). A
+  complementarity method is added by TaoRegister() instead, and chosen by HycoSolverSetTaoType(). Not collective.
+*/
+typedef struct _n_HycoSolverForm *HycoSolverForm;
+typedef PetscErrorCode (*HycoSolverFormCreate)(HycoSolver solver, HycoSolverForm form);
+PetscErrorCode HycoSolverRegister(const char name[], HycoSolverFormCreate create);
+
 /* Solves with the stiffness K. */
 typedef enum {
   HYCO_LINEAR_AUTO,     /* direct, unless the factor is estimated to take more memory than there is */
@@ -51,8 +60,10 @@ PetscErrorCode HycoSolverSetSystem(HycoSolver solver, HycoSystem system);
 PetscErrorCode HycoSolverSetType(HycoSolver solver, HycoSolverType type);
 /*
   -hyco_tao_type: for the type tao. Bound-constrained (symmetric systems): gpcg, tron, bntr, bnls, bntl, blmvm, bncg,
-  bqnls, bqnkls, bqnktr, bqnktl, bqpip; semismooth (any, dual form): ssils, asils, ssfls, asfls. NULL (default): gpcg
-  for a symmetric system, ssils for another. A solve refuses a bound-constrained type for a nonsymmetric system.
+  bqnls, bqnkls, bqnktr, bqnktl, bqpip; semismooth (any, dual form): ssils, asils, ssfls, asfls; or what the program
+  has registered by TaoRegister(), which sees a scaled problem: bounds, Hessian H, gradient H y - f (also where H is not
+  symmetric). NULL (default): gpcg for a symmetric system, ssils for another. A solve refuses a bound-constrained type
+  for a nonsymmetric system.
   docs/solvers.md says which suits which problem.
 */
 PetscErrorCode HycoSolverSetTaoType(HycoSolver solver, const char type[]);
@@ -74,8 +85,10 @@ PetscErrorCode HycoSolverSetMultilevel(HycoSolver solver, PetscBool multilevel);
   Lemke's method on the dense dual (default). Without it, such a solve ends not converged.
 */
 PetscErrorCode HycoSolverSetFallback(HycoSolver solver, PetscBool fallback);
-/* Reads the options above from `options` (NULL: the global database). Collective. */
-PetscErrorCode HycoSolverSetFromOptions(HycoSolver solver, PetscOptions options);
+/* What begins the names of its options: with "other_", -other_hyco_solver_rtol. */
+PetscErrorCode HycoSolverSetOptionsPrefix(HycoSolver solver, const char prefix[]);
+/* Reads the options above, from the database of PetscObjectSetOptions() (default: the global one). Collective. */
+PetscErrorCode HycoSolverSetFromOptions(HycoSolver solver);
 
 /* Called after each iteration of the active set, on every rank: its number, active contacts, changes made. */
 typedef PetscErrorCode (*HycoMonitor)(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx);

@@ -59,10 +59,13 @@ typedef struct _n_HycoCondensed {
   PetscReal at[HYCO_MAX_PARAMETERS];
   PetscBool solved; /* active is the set of the solution at `last` */
   PetscReal last[HYCO_MAX_PARAMETERS];
-  PetscReal gap_size;                           /* largest of the gap's field */
-  PetscReal *packed, *M, *work, *g, *H, *a, *w; /* M: G, m x m */
-  HycoSetFactor set_factor;                     /* of M on the active contacts */
+  PetscReal gap_size;                       /* largest of the gap's field */
+  PetscReal *packed, *M, *work, *g, *H, *a; /* M: G, m x m */
+  HycoSetFactor set_factor;                 /* of M on the active contacts */
   PetscBool *active;
+  Mat flexibility; /* M; forces: the model's Lambda; the system that both make */
+  Vec forces;
+  HycoSystem system;
 } * HycoCondensed;
 
 /* What the modes are made of (condense_modes.c): snapshots, and responses K^-1 B^T P to patterns of forces at each node
@@ -102,7 +105,7 @@ static inline HycoCondensing Condensing(HycoReducer t)
    parameter, to begin with; solving and factoring on the way, the points that meet -hyco_condensed_tol, in *samples
    (the caller's); G at all its nodes, factoring where no file has it, and the modes l, sigma, V_whole, VtU anew, with
    `responses`; the fields and their errors, handed to the model with numbers[]. */
-PetscErrorCode HycoCondensedSetFromOptions(HycoReducer reducer, PetscOptions options);
+PetscErrorCode HycoCondensedSetFromOptions(HycoReducer reducer);
 PetscErrorCode HycoCondensedResetTraining(HycoReducer reducer);
 PetscErrorCode HycoCondensedBegin(HycoReducer reducer);
 PetscErrorCode HycoCondensedStartPoints(HycoReducer reducer, HycoSamples *samples);

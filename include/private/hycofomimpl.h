@@ -2,7 +2,7 @@
 #ifndef HYCOFOMIMPL_H
 #define HYCOFOMIMPL_H
 
-#include <hycofe.h>
+#include <hycocontactimpl.h>
 #include <hycofom.h>
 #include <hycosolverimpl.h>
 
@@ -43,6 +43,7 @@ struct _p_HycoFOM {
    */
   PetscBool regularise, pinned; /* pinned: the pins are chosen */
   PetscReal regularise_tol;
+  PetscInt partition; /* index in HycoPartitioners */
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
   Vec *released;
   HycoSummary summary;

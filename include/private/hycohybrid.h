@@ -21,7 +21,7 @@ PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction);
 extern const char *const HycoReconstructSolvers[];
 
 /* The training's part of the ops (full_order_unknowns.c): the full-order displacements are chosen. */
-PetscErrorCode HycoHybridSetFromOptions(HycoReducer reducer, PetscOptions options);
+PetscErrorCode HycoHybridSetFromOptions(HycoReducer reducer);
 PetscErrorCode HycoHybridBuild(HycoROM model, HycoReducer reducer);
 
 #endif

@@ -18,7 +18,7 @@ typedef struct {
 } * HycoProjectionROM;
 
 /* The training's part of the ops (force_basis.c). */
-PetscErrorCode HycoProjectionSetFromOptions(HycoReducer reducer, PetscOptions options);
+PetscErrorCode HycoProjectionSetFromOptions(HycoReducer reducer);
 PetscErrorCode HycoProjectionModes(HycoReducer reducer, HycoSnapshots store);
 PetscErrorCode HycoProjectionBuild(HycoROM model, HycoReducer reducer);
 PetscErrorCode HycoProjectionReport(HycoReducer reducer, HycoROM model, HycoTraining *report);

@@ -3,7 +3,7 @@
 #define HYCOROMIMPL_H
 
 #include <hycodomain.h>
-#include <hycofe.h>
+#include <hycocontactimpl.h>
 #include <hycoromtype.h>
 #include <hycosolverimpl.h>
 
@@ -73,6 +73,7 @@ struct _p_HycoROM {
   HycoPairs whole_pairs;
   HycoNorms norms; /* made by the first comparison */
   /* online */
+  PetscBool full_order, full_displacement; /* what its user, who has the scene, is to do: HycoROMGetFallback() */
   PetscBool ready, reconstruct, solved, whole_current;
   HycoFE fe;                /* on mesh, or on its first nodes (galerkin) */
   PetscInt n, n_L;          /* unknowns and multipliers of the reduced problem */

@@ -265,7 +265,7 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCall(DriverGet("table", PETSC_FALSE, table));
+  PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(DriverCheckLeftEarly(scene)); /* what the solver alone knows is read by the first prediction */
   PetscCall(PetscCalloc2(n * N_COLUMNS, &value, n, &full));
   begin = HycoNow();
@@ -279,21 +279,49 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode ReadExtrapolate(PetscBool *extrapolate)
+{
+  PetscFunctionBegin;
+  *extrapolate = PETSC_FALSE;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(HycoOptionsFlag("-extrapolate",
+                            "predict outside the trained ranges too, where nothing has tested the model", extrapolate));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DeclarePredict(PetscOptions options)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool flag;
+  PetscReal target;
+
+  PetscFunctionBegin;
+  (void)options;
+  PetscCall(DriverReadFiles(path, path, path, path, path));
+  PetscCall(DriverDeclarePoint());
+  PetscCall(DriverDeclareSamples());
+  PetscCall(ReadExtrapolate(&flag));
+  PetscCall(DriverReadTarget(HYCO_ERROR_U, &target));
+  PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &target));
+  PetscCall(DriverReadMonitor(&flag));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CommandPredict(void)
 {
   HycoROM model = NULL;
   HycoScene scene;
   HycoSamples samples = NULL;
   Fallback fallback = {0};
-  PetscBool set, monitor, extrapolate = PETSC_FALSE;
+  PetscBool set, monitor, extrapolate;
   char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
-  PetscCall(DriverGet("model", PETSC_TRUE, path));
-  PetscCall(DriverGet("output", PETSC_FALSE, output));
-  PetscCall(DriverGet("report", PETSC_FALSE, report));
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_monitor", &monitor));
-  PetscCall(HycoOptionsBool(NULL, "extrapolate", &extrapolate));
+  PetscCall(DriverReadFiles(NULL, path, output, report, NULL));
+  PetscCall(DriverRequire("model", path));
+  PetscCall(DriverReadMonitor(&monitor));
+  PetscCall(ReadExtrapolate(&extrapolate));
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(path, &model));
   PetscCall(HycoROMSetExtrapolate(model, extrapolate));
   PetscCall(HycoROMGetScene(model, &scene));

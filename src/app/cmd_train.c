@@ -68,49 +68,32 @@ static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses an option of the command line that this training does not read. */
-static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool greedy)
+/* Refuses an option of the command line that this training does not read, by what the reducer declares of it. */
+static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool greedy)
 {
-  static const struct {
-    const char *name, *types;                        /* NULL: for -greedy */
-  } meant[] = {{"-hyco_condensed_tol", "condensed"}, /* the first two choose points */
-               {"-hyco_condensed_max_values", "condensed"},
-               {"-hyco_condensed_pod_tol", "condensed"},
-               {"-hyco_nnmf_vectors", "projection"},
-               {"-hyco_nnmf_max_its", "projection"},
-               {"-hyco_rid_modes", "hybrid or condensed"},
-               {"-hyco_rid_dual_tol", "hybrid or condensed"},
-               {"-hyco_rid_stress_tol", "hybrid or condensed"},
-               {"-hyco_rid_force_tol", "hybrid or condensed"},
-               {"-hyco_rid_layers", "hybrid or condensed"},
-               {"-hyco_rid_contact_extension", "hybrid or condensed"},
-               {"-hyco_rid_groups", "hybrid or condensed"},
-               {"-hyco_rid_region", "hybrid or condensed"},
-               {"-hyco_rid_whole", "hybrid or condensed"},
-               {"-hyco_deim_type", "hybrid or condensed"},
-               {"-hyco_hybrid", "hybrid"},
-               {"-hyco_hybrid_trials", "hybrid"},
-               {"-hyco_hybrid_ridge", "hybrid"},
-               {"-hyco_scan", "hybrid or projection"},
-               {"-hyco_keep_singular", "hybrid or projection"},
-               {"-hyco_greedy_indicator", NULL},
-               {"-hyco_greedy_keep", NULL}};
-  char type[64] = HYCO_ROM_HYBRID;
-  PetscOptions options;
+  const HycoOption *table;
+  PetscInt n;
+  HycoROMType type;
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneGetOptions(scene, &options));
-  PetscCall(PetscOptionsGetString(options, NULL, "-hyco_model_type", type, sizeof(type), NULL));
-  for (size_t k = 0; k < sizeof(meant) / sizeof(meant[0]); k++) {
+  PetscCall(HycoReducerGetType(reducer, &type));
+  PetscCall(HycoGetOptionTable(&n, &table));
+  for (PetscInt k = 0; k < n; k++) {
+    const char *only = table[k].only, *where = strstr(only, " where");
+    char dashed[DRIVER_LINE];
     PetscBool set;
 
-    PetscCall(PetscOptionsHasName(NULL, NULL, meant[k].name, &set));
+    if (!only[0] || strcmp(table[k].owner, "HycoReducer")) continue;
+    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", table[k].name));
+    PetscCall(PetscOptionsHasName(NULL, NULL, dashed, &set));
     if (!set) continue;
-    HycoCheck(meant[k].types || greedy, "nothing reads %s here: it is for train -greedy", meant[k].name);
-    if (!meant[k].types) continue;
-    HycoCheck(strstr(meant[k].types, type), "nothing reads %s here: it is for -hyco_model_type %s, and the model is %s",
-              meant[k].name, meant[k].types, type);
-    HycoCheck(!given || k >= 2, "nothing reads %s here: it chooses points where none are given", meant[k].name);
+    if (strcmp(only, "greedy") == 0) {
+      HycoCheck(greedy, "nothing reads %s here: it is for train -greedy", dashed);
+      continue;
+    }
+    HycoCheck(strstr(only, type), "nothing reads %s here: it is for -hyco_model_type %.*s, and the model is %s", dashed,
+              where ? (int)(where - only) : (int)strlen(only), only, type);
+    HycoCheck(!given || !where, "nothing reads %s here: it chooses points where none are given", dashed);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -130,6 +113,38 @@ static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode ReadGreedy(PetscBool *greedy)
+{
+  PetscFunctionBegin;
+  *greedy = PETSC_FALSE;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(HycoOptionsFlag(
+      "-greedy", "add solutions where an error indicator is worst, from the corners of the ranges or -grid ...",
+      greedy));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DeclareTrain(PetscOptions options)
+{
+  GreedyLog log = {0};
+  Search search = {0};
+  HycoSamples none;
+  PetscBool greedy;
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  (void)options;
+  PetscCall(DriverReadFiles(path, path, NULL, path, path));
+  PetscCall(DriverDeclareSamples());
+  PetscCall(ReadGreedy(&greedy));
+  PetscCall(DriverReadGreedy(NULL, NULL, &none, &log));
+  PetscCall(DriverReadTargets(&search));
+  PetscCall(DriverReadBudget(&search.budget));
+  PetscCall(DriverGetValidation(NULL, &none));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CommandTrain(void)
 {
   HycoScene scene;
@@ -138,27 +153,27 @@ PetscErrorCode CommandTrain(void)
   HycoTraining t;
   GreedyLog log = {0};
   Search search = {0};
-  PetscBool given, chooses, greedy = PETSC_FALSE;
+  PetscBool given, chooses, greedy;
   PetscInt n;
   char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
 
   PetscFunctionBegin;
-  PetscCall(DriverGet("scene", PETSC_TRUE, path));
-  PetscCall(DriverGet("model", PETSC_TRUE, model));
-  PetscCall(DriverGet("report", PETSC_FALSE, report));
+  PetscCall(DriverReadFiles(path, model, NULL, report, NULL));
+  PetscCall(DriverRequire("scene", path));
+  PetscCall(DriverRequire("model", model));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverCheckMesh(scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
-  PetscCall(HycoOptionsBool(NULL, "greedy", &greedy));
+  PetscCall(ReadGreedy(&greedy));
   PetscCall(DriverReadTargets(&search));
   PetscCall(DriverGetValidation(scene, &validation));
   PetscCall(CheckKind(greedy, &search));
-  if (!greedy) PetscCall(DriverGet("table", PETSC_FALSE, search.table));
+  if (!greedy) PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, search.table));
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoReducerSetFromOptions(reducer));
   PetscCall(TakeOnce(samples, "training"));
   PetscCall(TakeOnce(validation, "validation"));
-  PetscCall(CheckRead(scene, given, greedy));
+  PetscCall(CheckRead(reducer, given, greedy));
   PetscCall(HycoReducerChooses(reducer, &chooses));
   HycoCheck(given || greedy || chooses,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");

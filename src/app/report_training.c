@@ -10,18 +10,28 @@
 /* The least that a model should be good for, where no target is given. */
 static const PetscReal bar[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 5e-3, [HYCO_ERROR_LAMBDA] = 3e-2};
 
+PetscErrorCode DriverReadBudget(PetscInt *budget)
+{
+  PetscFunctionBegin;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(
+      HycoOptionsInt("-target_max_added",
+                     "train -target_...: at most so many solutions are added to meet the targets (default: as many "
+                     "as were given) []",
+                     0, 1000000, budget, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode DriverReadTargets(Search *s)
 {
-  char name[64];
-
   PetscFunctionBegin;
-  s->budget = -1;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
-    PetscCall(PetscSNPrintf(name, sizeof(name), "target_%s", HycoErrorKinds[j]));
-    PetscCall(DriverReadTarget(name, &s->target[j]));
+    PetscCall(DriverReadTarget((HycoErrorKind)j, &s->target[j]));
     s->on = (PetscBool)(s->on || s->target[j] > 0);
   }
-  if (s->on) PetscCall(HycoOptionsInt(NULL, "target_max_added", 0, 1000000, &s->budget));
+  s->budget = -1;
+  if (s->on) PetscCall(DriverReadBudget(&s->budget));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

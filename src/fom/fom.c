@@ -50,7 +50,6 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
 static PetscErrorCode ReadMesh(HycoFOM f)
 {
   PetscInt *both = NULL, sizes[6] = {0, 0, 0, 0, 0, 0};
-  PetscInt cut = HYCO_PARTITION_METIS;
 
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(f), HycoMeshRead(f->scene, &f->whole));
@@ -78,9 +77,8 @@ static PetscErrorCode ReadMesh(HycoFOM f)
   f->searches = (PetscBool)(sizes[5] != 0);
   PetscCheck(f->n_cells >= f->size, HycoComm(f), PETSC_ERR_USER,
              "the mesh has %d cells; run it on at most as many ranks", (int)f->n_cells);
-  PetscCall(HycoOptionsWord(f->scene->options, "hyco_partition", HycoPartitioners, &cut));
-  PetscCall(HycoMeshDistribute(HycoComm(f), f->whole, sizes[3], both, (HycoPartitioner)cut, &f->part, &f->n_owned,
-                               &f->first, &f->global));
+  PetscCall(HycoMeshDistribute(HycoComm(f), f->whole, sizes[3], both, (HycoPartitioner)f->partition, &f->part,
+                               &f->n_owned, &f->first, &f->global));
   PetscCall(PetscFree(both));
   HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part, &f->fe));
   f->fe_whole = f->fe;
@@ -136,9 +134,50 @@ static PetscErrorCode CreateB(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode SetFromOptions(HycoFOM f)
+{
+  PetscFunctionBegin;
+  PetscObjectOptionsBegin((PetscObject)f);
+  PetscCall(HycoOptionsBool(
+      "-hyco_regularise", "full order: rigid motions that neither supports nor contact hold are taken out, not refused",
+      &f->regularise, NULL));
+  PetscCall(HycoOptionsReal("-hyco_regularise_tol",
+                            "of such a motion: the share of the loads on it that may be unbalanced", 0, 1,
+                            &f->regularise_tol, NULL));
+  PetscCall(HycoOptionsWord("-hyco_partition", "cuts the mesh for the ranks; PT-Scotch also where METIS fails",
+                            HycoPartitioners, &f->partition, NULL));
+  PetscCall(HycoOptionsName("-hyco_fom_view", "after each full-order solve: sizes, system, solver"));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Create(MPI_Comm comm, HycoFOM *fom)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscHeaderCreate(*fom, HYCO_FOM_CLASSID, "HycoFOM", "Full-order model", "Hyco", comm, HycoFOMDestroy,
+                              HycoFOMView));
+  PetscCallMPI(MPI_Comm_rank(HycoComm(*fom), &(*fom)->rank));
+  PetscCallMPI(MPI_Comm_size(HycoComm(*fom), &(*fom)->size));
+  (*fom)->regularise_tol = 1e-2;
+  (*fom)->partition = HYCO_PARTITION_METIS;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMDeclare(PetscOptions options)
+{
+  HycoFOM f;
+
+  PetscFunctionBegin;
+  PetscCall(Create(PETSC_COMM_SELF, &f));
+  HycoDeclare(f, options, SetFromOptions, HycoFOMDestroy);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SetUp(HycoFOM f)
 {
   PetscFunctionBegin;
+  PetscCall(PetscObjectSetOptions((PetscObject)f, f->scene->options));
+  PetscCall(SetFromOptions(f));
   f->summary.seconds.setup = -HycoNow();
   HycoLogged(HYCO_EVENT_MESH, ReadMesh(f));
   PetscCall(HycoFECreateMatrix(f->fe, HycoComm(f), f->n_owned, f->first, &f->K));
@@ -151,10 +190,8 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscCall(CreateScatters(f));
   PetscCall(HycoSystemCreate(HycoComm(f), &f->system));
   PetscCall(HycoSolverCreate(HycoComm(f), &f->solver));
-  PetscCall(HycoSolverSetFromOptions(f->solver, f->scene->options));
-  f->regularise_tol = 1e-2;
-  PetscCall(HycoOptionsBool(f->scene->options, "hyco_regularise", &f->regularise));
-  PetscCall(HycoOptionsReal(f->scene->options, "hyco_regularise_tol", 0, 1, &f->regularise_tol));
+  PetscCall(PetscObjectSetOptions((PetscObject)f->solver, f->scene->options));
+  PetscCall(HycoSolverSetFromOptions(f->solver));
   if (f->rank == 0) {
     PetscCall(PetscMalloc1(f->n_nodes * f->part->dim, &f->u));
     PetscCall(PetscCalloc1(f->n_contacts + 1, &f->lambda));
@@ -171,10 +208,7 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
 
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  PetscCall(PetscHeaderCreate(*fom, HYCO_FOM_CLASSID, "HycoFOM", "Full-order model", "Hyco", comm, HycoFOMDestroy,
-                              HycoFOMView));
-  PetscCallMPI(MPI_Comm_rank(HycoComm(*fom), &(*fom)->rank));
-  PetscCallMPI(MPI_Comm_size(HycoComm(*fom), &(*fom)->size));
+  PetscCall(Create(comm, fom));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*fom)->scene = scene;
   ierr = SetUp(*fom);

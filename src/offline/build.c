@@ -66,7 +66,7 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
       contact[whole->group_node[k]] = PETSC_TRUE;
   }
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
-    PetscCall(HycoMeshFindGroup(whole, "contact", t->scene->contact[k].slave, &all[(*n_all)++]));
+    PetscCall(HycoMeshFindGroup(whole, "contact", t->scene->contact[k]->slave, &all[(*n_all)++]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -237,7 +237,7 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
   PetscBool reconstruct = PETSC_TRUE, presses = PETSC_FALSE, kept = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(HycoOptionsBool(t->scene->options, "hyco_reconstruct", &reconstruct));
+  PetscCall(PetscOptionsGetBool(t->scene->options, NULL, "-hyco_reconstruct", &reconstruct, NULL));
   for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
   HycoCheckModel(
@@ -273,7 +273,8 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   if (useful) PetscCall(CheckUseful(t, m));
   PetscCall(Report(t, m, report));
   PetscCall(HycoROMReset(m));
-  PetscCall(HycoOptionsBool(m->scene->options, "hyco_reconstruct", &m->reconstruct));
+  PetscCall(PetscObjectSetOptions((PetscObject)m, m->scene->options));
+  PetscCall(HycoROMSetFromOptions(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -378,7 +379,7 @@ static PetscErrorCode DrawHeld(HycoReducer t, HycoSamples *held)
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, &n, &n_par, NULL));
   if (count < 0) count = PetscMin(MOST_HELD, PetscMax(LEAST_HELD, n));
-  if (t->rank == 0) HycoFEReaches(t->fe, reaches);
+  if (t->rank == 0) HycoSceneReaches(t->fe->scene, reaches);
   for (PetscInt p = 0; p < n_par; p++) slow[p] = t->rank == 0 && reaches[p];
   PetscCallMPI(MPI_Bcast(slow, (PetscMPIInt)n_par, MPIU_INT, 0, HycoComm(t)));
   for (PetscInt p = 0; p < n_par; p++) reaches[p] = (PetscBool)slow[p];

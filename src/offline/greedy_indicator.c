@@ -107,7 +107,8 @@ static PetscErrorCode SetUp(HycoIndicator d)
   PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->fe->mesh->n_nodes, 0, &d->M));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &d->system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &d->solver));
-  PetscCall(HycoSolverSetFromOptions(d->solver, m->scene->options));
+  PetscCall(PetscObjectSetOptions((PetscObject)d->solver, m->scene->options));
+  PetscCall(HycoSolverSetFromOptions(d->solver));
   PetscCall(HycoSolverSetWarmStart(d->solver, PETSC_FALSE)); /* no history: ranks share the points out */
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -36,7 +36,7 @@ static PetscErrorCode ListKeys(PetscOptions options, PetscBool method_only, Pets
 
     if (word[0] != '-' || !HycoIsSceneKey(word + 1)) continue;
     /* an unknown -hyco_ option on the command line is the caller's: it may be meant for the solvers (-hyco_tao_type) */
-    if (!options && strncasecmp(word + 1, "hyco_", 5) == 0 && !HycoOptionKnown(word + 1)) continue;
+    if (!options && strncasecmp(word + 1, "hyco_", 5) == 0 && !HycoOptionFind(word + 1)) continue;
     if (method_only && strncasecmp(word + 1, "hyco_", 5)) continue;
     PetscCall(PetscOptionsHasName(options, NULL, word, &set));
     for (PetscInt k = 0; k < *n; k++) seen = (PetscBool)(seen || strcasecmp((*keys)[k], word + 1) == 0);

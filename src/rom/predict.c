@@ -11,7 +11,8 @@ PetscErrorCode HycoROMSetUpFields(HycoROM m)
   PetscCall(PetscCalloc1(m->pairs.n, &m->Lambda));
   PetscCall(PetscMalloc1(m->mesh->n_cells * m->fe->n_sigma, &m->stress));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver));
-  PetscCall(HycoSolverSetFromOptions(m->solver, m->scene->options));
+  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->scene->options));
+  PetscCall(HycoSolverSetFromOptions(m->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -16,6 +16,71 @@ PetscErrorCode HycoROMCreate(HycoROM *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoROMSetFromOptions(HycoROM m)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  PetscObjectOptionsBegin((PetscObject)m);
+  PetscCall(HycoOptionsFor("predict"));
+  PetscCall(
+      HycoOptionsBool("-hyco_fallback",
+                      "predict solves full order on -scene where the reduced solve fails or its estimated error is "
+                      "above a -target_...",
+                      &m->full_order, NULL));
+  PetscCall(HycoOptionsBool("-hyco_full_displacement",
+                            "predict, condensed: displacements and stresses by one full solve on -scene with the "
+                            "predicted forces",
+                            &m->full_displacement, NULL));
+  PetscCall(HycoOptionsFor(""));
+  PetscCall(HycoOptionsBool("-hyco_reconstruct", "reconstruct the contact forces outside the RID by (41)",
+                            &m->reconstruct, NULL));
+  PetscCall(HycoOptionsName("-hyco_rom_view", "what is in a model, when it is set up"));
+  PetscOptionsEnd();
+  PetscTryTypeMethod(m, options);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Its options and those of all types. */
+static PetscErrorCode DeclareAll(HycoROM m)
+{
+  const char **types;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetFromOptions(m));
+  PetscCall(HycoROMTypeNames(&types));
+  for (PetscInt k = 0; types[k]; k++) {
+    HycoROM each;
+    PetscErrorCode ierr;
+
+    PetscCall(HycoROMCreate(&each));
+    PetscCall(HycoROMSetType(each, types[k]));
+    ierr = each->ops->options ? (*each->ops->options)(each) : PETSC_SUCCESS;
+    PetscCall(HycoROMDestroy(&each));
+    PetscCall(ierr);
+  }
+  PetscCall(PetscFree(types));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMDeclare(PetscOptions options)
+{
+  HycoROM m;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMCreate(&m));
+  HycoDeclare(m, options, DeclareAll, HycoROMDestroy);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetFallback(HycoROM m, PetscBool *full_order, PetscBool *displacement)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  *full_order = m->full_order;
+  *displacement = m->full_displacement;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoROMReset(HycoROM m)
 {
   PetscFunctionBegin;

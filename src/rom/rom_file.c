@@ -549,7 +549,8 @@ static PetscErrorCode Load(HycoH5 *h, const char path[], HycoROM *model)
   ierr = LoadAll(*h, m);
   PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_FALSE));
   PetscCall(HycoH5Close(h, PETSC_FALSE));
-  if (!ierr) ierr = HycoOptionsBool(m->scene->options, "hyco_reconstruct", &m->reconstruct);
+  if (!ierr) ierr = PetscObjectSetOptions((PetscObject)m, m->scene->options);
+  if (!ierr) ierr = HycoROMSetFromOptions(m);
   if (ierr) (void)!HycoROMDestroy(&m);
   PetscCall(ierr);
   *model = m;

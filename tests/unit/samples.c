@@ -1,6 +1,6 @@
 /* Sets of parameter points, the scene's ranges and its text, the table of options. */
 #include "check.h"
-#include <hycosceneimpl.h>
+#include <hycomaterialimpl.h>
 #include <unistd.h>
 
 static char *const keys[] = {"scene_parameters", "parameter_a_range", "parameter_b_range", "body_rope_young",
@@ -106,7 +106,7 @@ static PetscErrorCode TestScene(HycoScene scene)
   PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &again));
   PetscCall(HycoSceneToText(again, &twice));
   CHECK(strcmp(text, twice) == 0, "the text changed from\n%s\nto\n%s", text, twice);
-  PetscCall(HycoExprEval(again->body[0].young, mu, 1, at, &young));
+  PetscCall(HycoExprEval(HycoDeclaredFind(&again->body[0].law->constants, "young")->expr, mu, 1, at, &young));
   CHECK_NEAR(young, 5, 0);
   PetscCall(PetscFree(text));
   PetscCall(PetscFree(twice));
@@ -208,7 +208,7 @@ static PetscErrorCode TestNearest(void)
   CHECK(HycoNearest("yung", 3, names) == names[0], "yung is nearest to young");
   CHECK(HycoNearest("Poison", 3, names) == names[1], "Poison is nearest to poisson");
   CHECK(!HycoNearest("gravity", 3, names), "gravity is near to none");
-  CHECK(HycoOptionKnown("hyco_pod_tol") && !HycoOptionKnown("hyco_pod_tl"), "the table of options is wrong");
+  CHECK(HycoOptionFind("hyco_pod_tol") && !HycoOptionFind("hyco_pod_tl"), "the table of options is wrong");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -194,7 +194,7 @@ static PetscErrorCode ResetResponses(HycoResponses *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoCondensedSetFromOptions(HycoReducer t, PetscOptions o)
+PetscErrorCode HycoCondensedSetFromOptions(HycoReducer t)
 {
   HycoCondensing s;
 
@@ -204,9 +204,21 @@ PetscErrorCode HycoCondensedSetFromOptions(HycoReducer t, PetscOptions o)
   s->tol = 1e-7;
   s->pod_tol = 1e-14;
   s->max_values = 24;
-  PetscCall(HycoOptionsReal(o, "hyco_condensed_tol", 0, 1, &s->tol));
-  PetscCall(HycoOptionsReal(o, "hyco_condensed_pod_tol", 0, 1, &s->pod_tol));
-  PetscCall(HycoOptionsInt(o, "hyco_condensed_max_values", 3, 1000, &s->max_values));
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("condensed"));
+  PetscCall(HycoOptionsReal("-hyco_condensed_pod_tol",
+                            "condensed: energy that its displacement modes may leave out, unless -hyco_pod_tol is "
+                            "smaller",
+                            0, 1, &s->pod_tol, NULL));
+  PetscCall(HycoOptionsFor("condensed where no points are given"));
+  PetscCall(HycoOptionsReal("-hyco_condensed_tol",
+                            "condensed, no points given: add values until the forces' error, one value left out, is no "
+                            "larger",
+                            0, 1, &s->tol, NULL));
+  PetscCall(HycoOptionsInt("-hyco_condensed_max_values",
+                           "condensed, no points given: at most so many values per parameter", 3, 1000, &s->max_values,
+                           NULL));
+  PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -236,7 +248,7 @@ static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
     if (contact[i]) extra[n_extra++] = i;
   }
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
-    PetscCall(HycoMeshFindGroup(t->whole, "contact", t->scene->contact[k].slave, &all[k]));
+    PetscCall(HycoMeshFindGroup(t->whole, "contact", t->scene->contact[k]->slave, &all[k]));
   PetscCall(HycoMeshExtract(t->whole, 0, NULL, n_extra, extra, t->scene->n_contacts, all, &s->mesh));
   for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->mesh->node_whole[i]] = i;
   PetscCall(HycoPairsRenumber(&t->pairs, index, &s->pairs));
@@ -266,8 +278,8 @@ static PetscErrorCode CheckFacets(HycoReducer t)
         met.of[r] != met.of[r - 1],
         "contact %s: node %d meets other facets of %s as the parameters move it; a condensed model interpolates "
         "over the parameters what has kinks there: train a hybrid one",
-        t->scene->contact[p->contact[r]].name, (int)t->whole->node_id[p->slave[r]],
-        t->scene->contact[p->contact[r]].master);
+        t->scene->contact[p->contact[r]]->name, (int)t->whole->node_id[p->slave[r]],
+        t->scene->contact[p->contact[r]]->master);
   }
   PetscCall(HycoMetDestroy(&met));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -310,12 +322,12 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
 {
   HycoCondensed c;
   const PetscInt m = t->sizes[2];
-  PetscInt linear = HYCO_LINEAR_AUTO;
+  char linear[32] = "";
 
   PetscFunctionBegin;
-  PetscCall(HycoOptionsWord(t->scene->options, "hyco_linear", HycoLinearNames, &linear));
+  PetscCall(PetscOptionsGetString(t->scene->options, NULL, "-hyco_linear", linear, sizeof(linear), NULL));
   HycoCheckModel(
-      linear != HYCO_LINEAR_ITERATIVE,
+      strcasecmp(linear, HycoLinearNames[HYCO_LINEAR_ITERATIVE]),
       "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a hybrid "
       "model, or take -hyco_linear auto");
   HycoCheckModel(m > 0,

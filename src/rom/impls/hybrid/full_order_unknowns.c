@@ -18,7 +18,7 @@ typedef struct {
   PetscReal ridge; /* all; < 0: chosen */
 } * Training;
 
-PetscErrorCode HycoHybridSetFromOptions(HycoReducer t, PetscOptions o)
+PetscErrorCode HycoHybridSetFromOptions(HycoReducer t)
 {
   Training s;
 
@@ -26,8 +26,17 @@ PetscErrorCode HycoHybridSetFromOptions(HycoReducer t, PetscOptions o)
   PetscCall(PetscNew(&s));
   t->training = s;
   s->ridge = -1;
-  PetscCall(HycoOptionsInt(o, "hyco_hybrid_trials", 0, PETSC_MAX_INT / 8, &s->trials));
-  PetscCall(HycoOptionsReal(o, "hyco_hybrid_ridge", -1, 1, &s->ridge));
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("hybrid"));
+  PetscCall(HycoOptionsInt("-hyco_hybrid_trials",
+                           "candidate sets judged by their training error when hybrid is rank (0: from the size)", 0,
+                           PETSC_MAX_INT / 8, &s->trials, NULL));
+  PetscCall(
+      HycoOptionsReal("-hyco_hybrid_ridge",
+                      "of the interface's regression when hybrid is all (-1: by the training error; 0: plain least "
+                      "squares)",
+                      -1, 1, &s->ridge, NULL));
+  PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

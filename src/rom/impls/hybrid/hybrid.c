@@ -23,14 +23,18 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SetUp(HycoROM m)
+static PetscErrorCode SetFromOptions(HycoROM m)
 {
   HycoHybridROM h = (HycoHybridROM)m->data;
 
   PetscFunctionBegin;
-  PetscCall(
-      HycoOptionsWord(m->scene->options, "hyco_reconstruct_solver", HycoReconstructSolvers, &h->reconstruct_solver));
-  PetscCall(HycoGalerkinSetUp(m));
+  PetscObjectOptionsBegin((PetscObject)m);
+  PetscCall(HycoOptionsFor(""));
+  PetscCall(HycoOptionsWord("-hyco_reconstruct_solver",
+                            "of (41): Lawson and Hanson's active set, or TAO's bnls; auto: TAO where the active set "
+                            "stops short",
+                            HycoReconstructSolvers, &h->reconstruct_solver, NULL));
+  PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -91,8 +95,6 @@ static PetscErrorCode Load(HycoROM m, HycoH5 file)
   PetscCall(HycoGalerkinLoad(m, file));
   h->n_dual = -1;
   PetscCall(HycoH5LoadReal(file, "reconstruction/S_lambda", &h->n_dual, &m->pairs.n, &h->S_lambda));
-  PetscCall(HycoOptionsWord(m->scene->options, "hyco_reconstruct_solver", HycoReconstructSolvers,
-                            &h->reconstruct_solver)); /* refused now, not by the first prediction */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -119,7 +121,8 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
                                  .report = Report,
                                  .cost = HycoGalerkinCost,
                                  .offers = Offers,
-                                 .setup = SetUp,
+                                 .options = SetFromOptions,
+                                 .setup = HycoGalerkinSetUp,
                                  .reset = Reset,
                                  .solve = HycoGalerkinSolve,
                                  .reconstruct = HycoHybridReconstruct,

@@ -16,7 +16,7 @@ typedef struct {
   PetscInt n_supremizers;    /* of the modes, the last */
 } * Training;
 
-PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t, PetscOptions o)
+PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t)
 {
   Training s;
   PetscInt dual = HYCO_DUAL_NNMF;
@@ -25,9 +25,19 @@ PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t, PetscOptions o)
   PetscCall(PetscNew(&s));
   t->training = s;
   s->max_its = 100;
-  PetscCall(HycoOptionsWord(o, "hyco_dual", HycoDuals, &dual));
-  PetscCall(HycoOptionsInt(o, "hyco_nnmf_max_its", 1, PETSC_MAX_INT, &s->max_its));
-  PetscCall(HycoOptionsInt(o, "hyco_nnmf_vectors", 0, PETSC_MAX_INT, &s->vectors));
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor(""));
+  PetscCall(HycoOptionsWord("-hyco_dual",
+                            "forces: of the finite elements (hybrid); factorised dual snapshots, or they themselves "
+                            "(projection) [fe; nnmf if projection]",
+                            HycoDuals, &dual, NULL));
+  PetscCall(HycoOptionsFor("projection"));
+  PetscCall(HycoOptionsInt("-hyco_nnmf_vectors",
+                           "vectors of the nonnegative factorisation (0: as many as displacement modes)", 0,
+                           PETSC_MAX_INT, &s->vectors, NULL));
+  PetscCall(HycoOptionsInt("-hyco_nnmf_max_its", "alternations of the nonnegative factorisation", 1, PETSC_MAX_INT,
+                           &s->max_its, NULL));
+  PetscOptionsEnd();
   s->dual = (HycoDual)dual;
   HycoCheckModel(s->dual != HYCO_DUAL_FE,
                  "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
