@@ -64,6 +64,7 @@ struct _p_HycoScene {
   PETSCHEADER(int);
   PetscOptions options; /* every entry, the command line's already in */
   char *title, *mesh_path;
+  PetscInt refine; /* times that the mesh's cells are halved */
   /* parameters */
   PetscInt n_parameters;
   char *parameter[HYCO_MAX_PARAMETERS];

@@ -143,38 +143,6 @@ static PetscBool CellHas(HycoMesh m, PetscInt cell, PetscInt n, const PetscInt n
   return PETSC_TRUE;
 }
 
-/* Reverses the facet if its normal points into the cell. In 1D there is nothing to reverse. */
-static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
-{
-  PetscReal inside[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, out = 0;
-
-  if (m->dim == 1) return;
-  for (PetscInt c = 0; c < 3; c++) {
-    for (PetscInt v = 0; v < m->nv; v++) inside[c] += m->xyz[3 * m->cells[cell * m->nv + v] + c] / m->nv;
-  }
-  {
-    const PetscReal *p = m->xyz + 3 * facet[0], *q = m->xyz + 3 * facet[1], *s = m->xyz + 3 * facet[m->nf - 1];
-
-    if (m->dim == 2) {
-      normal[0] = q[1] - p[1];
-      normal[1] = p[0] - q[0];
-    } else {
-      for (PetscInt c = 0; c < 3; c++) {
-        const PetscInt d = (c + 1) % 3, e = (c + 2) % 3;
-
-        normal[c] = (q[d] - p[d]) * (s[e] - p[e]) - (q[e] - p[e]) * (s[d] - p[d]);
-      }
-    }
-    for (PetscInt c = 0; c < 3; c++) out += normal[c] * (p[c] - inside[c]);
-  }
-  if (out < 0) {
-    const PetscInt first = m->dim == 2 ? 0 : 1, last = m->nf - 1, keep = facet[first];
-
-    facet[first] = facet[last];
-    facet[last] = keep;
-  }
-}
-
 /* A file may have a facet of a group several times: one counts. */
 static PetscBool HasTwin(const Reader *r, HycoMesh m, PetscInt cell, PetscInt group, const PetscInt facet[])
 {
@@ -218,7 +186,6 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
       continue;
     }
     if (HasTwin(r, m, cell, group, facet)) continue;
-    TurnOutward(m, cell, facet);
     r->before[m->n_facets] = r->last[cell];
     r->last[cell] = m->n_facets;
     m->facet_group[m->n_facets] = group;
@@ -323,46 +290,6 @@ static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m, const PetscInt sta
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether two bodies move a node differently. */
-static PetscBool SameMap(const HycoBody *a, const HycoBody *b)
-{
-  for (PetscInt c = 0; c < 3; c++) {
-    if (a->map[c] || b->map[c]) return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
-}
-
-static PetscErrorCode SetNodeBodies(HycoScene scene, HycoMesh m)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_nodes, &m->node_body));
-  for (PetscInt i = 0; i < m->n_nodes; i++) m->node_body[i] = -1;
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
-    PetscInt *body = &m->node_body[m->cells[k]], b = m->cell_body[k / m->nv];
-
-    if (*body >= 0 && *body != b) {
-      HycoCheck(SameMap(&scene->body[*body], &scene->body[b]),
-                "%s: the bodies %s and %s share node %d, and a map moves one of them", scene->mesh_path,
-                scene->body[*body].name, scene->body[b].name, (int)m->node_id[m->cells[k]]);
-      *body = PetscMin(*body, b);
-    } else
-      *body = b;
-  }
-  /* A mesh of the line or the plane must lie in it. */
-  for (PetscInt c = m->dim; c < 3; c++) {
-    PetscReal lo = PETSC_MAX_REAL, hi = PETSC_MIN_REAL, size = 0;
-
-    for (PetscInt i = 0; i < m->n_nodes; i++) {
-      lo = PetscMin(lo, m->xyz[3 * i + c]);
-      hi = PetscMax(hi, m->xyz[3 * i + c]);
-      size = PetscMax(size, PetscAbsReal(m->xyz[3 * i] - m->xyz[0]));
-    }
-    HycoCheck(hi - lo <= 1e-9 * size, "%s has cells of dimension %d, but its %c coordinates run from %g to %g",
-              scene->mesh_path, (int)m->dim, "xyz"[c], (double)lo, (double)hi);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode MakeTables(HycoScene scene, Reader *r, HycoMesh m)
 {
   PetscFunctionBegin;
@@ -376,7 +303,7 @@ static PetscErrorCode MakeTables(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(CheckTwins(scene, m, r->start, r->around));
   PetscCall(CollectGroups(scene, r, m));
   PetscCall(CheckLoads(scene, r));
-  PetscCall(SetNodeBodies(scene, m));
+  PetscCall(HycoMeshSetNodeBodies(scene, m));
   PetscCall(HycoMeshCheckGroups(m, scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

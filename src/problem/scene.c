@@ -10,7 +10,7 @@ static const char *const body_fields[] = {"young", "poisson", "element", "map_x"
 static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const contact_fields[] = {"type",     "group",    "slave",    "master",  "tolerance", "gap",
                                              "normal_x", "normal_y", "normal_z", "overlap", NULL};
-static const char *const scene_fields[] = {"title", "mesh", "parameters", NULL};
+static const char *const scene_fields[] = {"title", "mesh", "parameters", "refine", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
 /* Splits "body_pellet_young" after "body_" into "pellet" and the index of "young"; false if no field ends it. */
@@ -334,6 +334,7 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscCall(HycoEntriesList(s));
   PetscCall(GetString(s, "scene_title", &s->title));
   PetscCall(FindMesh(s, folder));
+  PetscCall(HycoOptionsInt(s->options, "scene_refine", 0, 12, &s->refine));
   PetscCall(ReadParameters(s));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     const char *key = s->key[k];
