@@ -56,6 +56,9 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
 /* Text as C's printf makes it, cut at HYCO_LINE. */
 void HycoFormat(char line[HYCO_LINE], const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
+/* Appends `name` to a list of names, with `between` before all but the first; cut at HYCO_LINE. */
+PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const char name[]);
+
 /* A user's error on this rank: one line, its numbers as C prints them (PETSc would write 2 as "2."). */
 #define HycoFail(...)                                                                                                  \
   do {                                                                                                                 \

@@ -494,7 +494,7 @@ static PetscErrorCode ParseNumbers(const char name[], const char text[], PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ListNames(HycoScene scene, char list[DRIVER_LINE])
+static PetscErrorCode ListNames(HycoScene scene, char list[HYCO_LINE])
 {
   PetscInt n;
   const char *const *names;
@@ -502,10 +502,7 @@ static PetscErrorCode ListNames(HycoScene scene, char list[DRIVER_LINE])
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
   list[0] = '\0';
-  for (PetscInt p = 0; p < n; p++) {
-    PetscCall(PetscStrlcat(list, p ? "," : "", DRIVER_LINE));
-    PetscCall(PetscStrlcat(list, names[p], DRIVER_LINE));
-  }
+  for (PetscInt p = 0; p < n; p++) PetscCall(HycoListAdd(list, ",", names[p]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

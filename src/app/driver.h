@@ -69,6 +69,9 @@ int DriverEndStatus(PetscErrorCode ierr);
 
 /* Reads the launcher's variables; to be called before MPI begins. */
 void DriverNoteLaunch(void);
+/* Settings of MPI for a process that no launcher has started; to be called before MPI begins. What the environment sets
+   already stays. */
+void DriverStartAlone(void);
 /* Fails where a launcher of another MPI has started several processes, each of which would do all the work and write
    the same files. Collective. */
 PetscErrorCode DriverCheckLaunch(void);

@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 /* Variables by which launchers tell a process how many ranks they have started. */
 static const char *const sizes[] = {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS",
@@ -21,6 +22,54 @@ void DriverNoteLaunch(void)
     if (value && atol(value) > 1) snprintf(launched, sizeof(launched), "%s=%s", sizes[k], value);
   }
   if (!launched[0] && rank && atol(rank) > 0) snprintf(launched, sizeof(launched), "PMIX_RANK=%s", rank);
+}
+
+/* Can a folder be made in this one? */
+static int HoldsFolders(const char *folder)
+{
+  char path[DRIVER_LINE];
+  const int length = snprintf(path, sizeof(path), "%s/hyco-XXXXXX", folder);
+
+  return length > 0 && length < (int)sizeof(path) && mkdtemp(path) && !rmdir(path);
+}
+
+/* Open MPI 5 makes a folder of its own for every process, in the first of these variables that is set, and crashes
+   where it cannot. */
+static void ChooseTemporary(void)
+{
+  static const char *const asked[] = {"TMPDIR", "TEMP", "TMP", NULL};
+  static const char *const others[] = {"/tmp", "/var/tmp", "/dev/shm", ".", NULL};
+  const char *folder = NULL;
+
+  for (int k = 0; asked[k] && !folder; k++) folder = getenv(asked[k]);
+  if (HoldsFolders(folder ? folder : others[0])) return;
+  for (int k = 0; others[k]; k++) {
+    if (!HoldsFolders(others[k])) continue;
+    setenv("TMPDIR", others[k], 1);
+    return;
+  }
+}
+
+void DriverStartAlone(void)
+{
+  static const char *const launched_by[] = {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_ID", NULL};
+  static const char *const settings[][2] = {
+      /* no daemon, for nothing is spawned, and no folder for that daemon's files: Open MPI 4 gives all such runs of a
+         user the same one, and each removes it under the others */
+      {"OMPI_MCA_ess_singleton_isolated", "1"},
+      {"OMPI_MCA_orte_create_session_dirs", "0"},
+      /* nobody to talk to: no shared memory, no network; where there is none of these, Open MPI would say so */
+      {"OMPI_MCA_btl", "self"},
+      {"OMPI_MCA_if", "^posix_ipv4"},
+      {"PMIX_MCA_pif", "^posix_ipv4"},
+      {"HWLOC_HIDE_ERRORS", "2"}, /* a chroot without /sys */
+  };
+
+  for (int k = 0; launched_by[k]; k++) {
+    if (getenv(launched_by[k])) return;
+  }
+  for (size_t k = 0; k < sizeof(settings) / sizeof(settings[0]); k++) setenv(settings[k][0], settings[k][1], 0);
+  ChooseTemporary();
 }
 
 PetscErrorCode DriverCheckLaunch(void)

@@ -159,20 +159,6 @@ static PetscErrorCode Start(int *argc, char ***argv)
   return ierr;
 }
 
-/* A run without mpiexec needs no daemon beside it, for it spawns nothing, and no folder for that daemon's files: Open
-   MPI 4 gives all such runs of a user the same one, and each removes it under the others. Other MPIs do not read these.
- */
-static void StartAlone(void)
-{
-  static const char *const launched[] = {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_ID"};
-
-  for (size_t k = 0; k < sizeof(launched) / sizeof(launched[0]); k++) {
-    if (getenv(launched[k])) return;
-  }
-  setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
-  setenv("OMPI_MCA_orte_create_session_dirs", "0", 0);
-}
-
 int main(int argc, char **argv)
 {
   const int answer = AnswerAtOnce(argc, argv);
@@ -182,7 +168,7 @@ int main(int argc, char **argv)
   if (answer >= 0) return answer;
   DriverOneThread();
   DriverNoteLaunch();
-  StartAlone();
+  DriverStartAlone();
   if (Start(&argc, &argv)) return 1;
   PetscPushErrorHandler(KeepMessage, NULL); /* after: PETSc's books of memory (-malloc_dump) begin with it */
   signal(SIGPIPE, SIG_IGN);                 /* "hyco ... | head" is no error */

@@ -51,10 +51,7 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
                   scene->mesh_path, (int)nv, (int)r->group[k].nv);
         nv = r->group[k].nv;
       }
-      if (!m->dim || r->group[k].dim == m->dim) {
-        PetscCall(PetscStrlcat(list, list[0] ? ", " : "", sizeof(list)));
-        PetscCall(PetscStrlcat(list, r->group[k].name, sizeof(list)));
-      }
+      if (!m->dim || r->group[k].dim == m->dim) PetscCall(HycoListAdd(list, ", ", r->group[k].name));
     }
     HycoCheck(n, "body \"%s\" has no cells in %s; its cell groups are: %s", scene->body[b].name, scene->mesh_path,
               list[0] ? list : "(none)");

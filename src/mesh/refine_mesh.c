@@ -3,6 +3,7 @@
   cells with their closure, and DMPlex hands labels on to what the points become.
 */
 #include "plex.h"
+#include <hycocontactimpl.h>
 #include <petscdmplextransform.h>
 #include <string.h>
 
@@ -73,7 +74,7 @@ static PetscBool IsNamed(HycoScene scene, const char group[])
     if (!strcmp(scene->fixed[k].group, group)) return PETSC_TRUE;
   }
   for (PetscInt k = 0; k < scene->n_contacts; k++) {
-    const HycoContact *c = &scene->contact[k];
+    const HycoContact c = scene->contact[k];
 
     if (!strcmp(c->slave, group) || (c->master && !strcmp(c->master, group))) return PETSC_TRUE;
   }

@@ -81,6 +81,7 @@ static void ReadScalar(Scan *s)
 static PetscErrorCode TakeKey(Scan *s, PetscInt column, PetscInt line, const char file[])
 {
   size_t length;
+  int end;
 
   PetscFunctionBegin;
   if (s->flow) {
@@ -89,7 +90,10 @@ static PetscErrorCode TakeKey(Scan *s, PetscInt column, PetscInt line, const cha
     while (s->depth && s->level[s->depth - 1].column >= column) Pop(s);
   }
   length = strlen(s->path);
-  snprintf(s->path + length, sizeof(s->path) - length, "%s%s", length ? "_" : "", s->token);
+  end = snprintf(s->path + length, sizeof(s->path) - length, "%s%s", length ? "_" : "", s->token);
+  /* a scalar is cut at its room: a longer one fills it */
+  HycoCheck(end >= 0 && length + (size_t)end + 1 < sizeof(s->path),
+            "%s: the key in line %d is longer than %d characters", file, (int)line, HYCO_LINE - 2);
   for (PetscInt k = 0; k < s->n; k++)
     HycoCheck(strcasecmp(s->key[k], s->path), "%s: %s stands twice, in line %d and in line %d; an entry has one value",
               file, s->path, (int)s->line_of[k], (int)line);

@@ -70,10 +70,7 @@ static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const na
     } else {
       char list[HYCO_LINE] = "x, y, z", text[SHORT];
 
-      for (PetscInt p = 0; p < n; p++) {
-        PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
-        PetscCall(PetscStrlcat(list, names[p], sizeof(list)));
-      }
+      for (PetscInt p = 0; p < n; p++) PetscCall(HycoListAdd(list, ", ", names[p]));
       Shorten(e->text, text);
       HycoFail("%s: \"%s\" names %.100s, which is unknown; known are %s, pi", e->key, text, name, list);
     }

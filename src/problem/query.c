@@ -1,5 +1,5 @@
 /* What a scene answers: its parameters, its options, its words, its fingerprint. */
-#include <hycosceneimpl.h>
+#include <hycocontactimpl.h>
 #include <stdio.h>
 #include <string.h>
 #include <petscviewer.h>
@@ -54,16 +54,11 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCheck(mu || !n, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL, "the parameter values' address is NULL");
   if (n != scene->n_parameters) {
-    char list[HYCO_LINE] = "none";
+    char list[HYCO_LINE] = "";
 
-    for (PetscInt p = 0; p < scene->n_parameters; p++) {
-      if (p == 0)
-        list[0] = '\0';
-      else
-        PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
-      PetscCall(PetscStrlcat(list, scene->parameter[p], sizeof(list)));
-    }
-    HycoFail("%d parameter values were given; the scene has %d: %s", (int)n, (int)scene->n_parameters, list);
+    for (PetscInt p = 0; p < scene->n_parameters; p++) PetscCall(HycoListAdd(list, ", ", scene->parameter[p]));
+    HycoFail("%d parameter values were given; the scene has %d: %s", (int)n, (int)scene->n_parameters,
+             list[0] ? list : "none");
   }
   for (PetscInt p = 0; p < n; p++) {
     const PetscReal slack = 1e-12 * PetscMax(PetscAbsReal(scene->lo[p]), PetscAbsReal(scene->hi[p]));
@@ -104,7 +99,7 @@ static PetscBool MayMoveSurfaces(HycoScene scene)
   PetscBool surface = PETSC_FALSE, map = PETSC_FALSE;
 
   for (PetscInt k = 0; k < scene->n_contacts; k++)
-    surface = (PetscBool)(surface || scene->contact[k].type == HYCO_CONTACT_SURFACE);
+    surface = (PetscBool)(surface || scene->contact[k]->ops->find != NULL);
   for (PetscInt b = 0; b < scene->n_bodies; b++)
     map = (PetscBool)(map || scene->body[b].map[0] || scene->body[b].map[1] || scene->body[b].map[2]);
   return (PetscBool)(surface && map);

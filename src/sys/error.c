@@ -30,6 +30,14 @@ void HycoFormat(char line[HYCO_LINE], const char format[], ...)
   HycoPointEnd(before);
 }
 
+PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const char name[])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscStrlcat(list, list[0] ? between : "", HYCO_LINE));
+  PetscCall(PetscStrlcat(list, name, HYCO_LINE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoCatchBegin(void)
 {
   PetscFunctionBegin;

@@ -214,8 +214,7 @@ PetscErrorCode HycoOptionsWord(PetscOptions options, const char name[], const ch
       *index = k;
       PetscFunctionReturn(PETSC_SUCCESS);
     }
-    PetscCall(PetscStrlcat(list, k ? ", " : "", sizeof(list)));
-    PetscCall(PetscStrlcat(list, words[k], sizeof(list)));
+    PetscCall(HycoListAdd(list, ", ", words[k]));
   }
   HycoFail("-%s is \"%s\"; it must be one of: %s", name, text, list);
 }

@@ -4,7 +4,7 @@ import subprocess
 import unittest
 from concurrent.futures import ThreadPoolExecutor
 
-from common import Case, msh, said
+from common import PATIENCE, Case, msh, said
 from rows import Rows
 
 # two squares of 2 x 2 cells, one over the other; groups by tag
@@ -316,7 +316,7 @@ class Meshes(Case):
 
     def test_texts_41(self):
         subprocess.run(['gmsh', '-save', '-format', 'msh41', self.path('two.msh'), '-o', self.path('good.msh'), '-v', '1'], check=True,
-                       timeout=30)
+                       timeout=30 * PATIENCE)
         with open(self.path('good.msh'), encoding='ascii') as f:
             good = f.read()
         for what, change, text in TEXTS_41:
@@ -359,7 +359,7 @@ class Meshes(Case):
         for kind in ('msh22', 'msh41'):
             for binary in ([], ['-bin']):
                 subprocess.run(['gmsh', '-save', '-format', kind, *binary, self.path('two.msh'), '-o', self.path('b.msh'), '-v', '1'],
-                               check=True, timeout=30)
+                               check=True, timeout=30 * PATIENCE)
                 forms = ['b.msh']
                 if not binary:
                     with open(self.path('b.msh'), encoding='ascii', newline='') as f:

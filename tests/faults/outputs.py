@@ -7,7 +7,7 @@ import subprocess
 import threading
 import unittest
 
-from common import HYCO, ROPE, Case
+from common import HYCO, PATIENCE, ROPE, Case
 
 POINT = ('-mu', '0.07,0.17')
 
@@ -103,7 +103,7 @@ class Outputs(Case):
         with open(self.path('out'), 'w', encoding='utf-8') as out:
             self.addCleanup(os.remove, self.path('out'))
             subprocess.run([HYCO, 'predict', '-model', 'model.h5', *POINT, '-report', '/dev/stdout'], cwd=self.folder, stdout=out,
-                           check=True, timeout=100)
+                           check=True, timeout=100 * PATIENCE)
         with open(self.path('out'), encoding='utf-8') as out:
             text = out.read()
         self.assertIn('KKT residuals', text)

@@ -13,7 +13,7 @@ MPIRUN = [MPIEXEC, *os.environ.get('MPIEXEC_FLAGS', '--oversubscribe').split(), 
 ROPE = os.path.join(SOURCE, 'examples', 'rope')
 PELLET = os.path.join(SOURCE, 'examples', 'pellet')
 SANITIZED = os.environ.get('HYCO_SANITIZE') == '1'
-PATIENCE = 10 if SANITIZED else 1  # factor of a run's limit of time; tests/CMakeLists.txt has the same for a test
+PATIENCE = int(os.environ.get('HYCO_PATIENCE', '6'))  # factor of a run's limit of time: tests/CMakeLists.txt
 
 
 def said(run):

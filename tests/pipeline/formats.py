@@ -3,7 +3,7 @@ import os
 import subprocess
 import unittest
 
-from common import PELLET, ROPE, Case
+from common import PATIENCE, PELLET, ROPE, Case
 
 
 class Formats(Case):
@@ -14,7 +14,7 @@ class Formats(Case):
                 with self.subTest(version=version, binary=binary):
                     out = self.path(f'{version}{binary}.msh')
                     subprocess.run(['gmsh', mesh, '-save', '-format', version, '-o', out, '-v', '1'] +
-                                   (['-bin'] if binary else []), check=True, timeout=60)
+                                   (['-bin'] if binary else []), check=True, timeout=60 * PATIENCE)
                     with open(out, 'rb') as f:
                         head = f.read(60).split(b'\n')[1].split()
                     self.assertEqual((head[0][:3], head[1]), ({'msh22': b'2.2', 'msh41': b'4.1'}[version],
@@ -38,7 +38,7 @@ class Formats(Case):
         for version in ('msh22', 'msh41'):
             with self.subTest(version=version):
                 subprocess.run(['gmsh', '-2', self.path('square.geo'), '-format', version, '-v', '1', '-o',
-                                self.path('square.msh')], check=True, timeout=60)
+                                self.path('square.msh')], check=True, timeout=60 * PATIENCE)
                 r = self.hyco('solve', '-scene', self.folder)
                 self.near(r['u_min'][0], -0.05, 1e-12)
                 self.near(r['u_min'][1], -0.15, 1e-12)

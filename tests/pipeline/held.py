@@ -6,7 +6,7 @@ import unittest
 import h5py
 import numpy as np
 
-from common import PELLET, SOURCE, Case
+from common import PATIENCE, PELLET, SOURCE, Case
 
 BLOCK = """
 scene: {title: block on a foundation, mesh: %s, parameters: [crown, press]}
@@ -82,7 +82,7 @@ class Pellet(Case):
             file.write(text + '\nPhysical Surface("pellet_z0", 31) = {1,2,3};\nPhysical Surface("clad_z0", 32) = {4,5};\n')
         settings = [w for pair in (('m', 4), ('nr', 4), ('nc', 2), ('nzl', 6), ('nzh', 14)) for w in
                     ('-setnumber', pair[0], str(pair[1]))]
-        subprocess.run(['gmsh', '-3', geo, *settings, '-format', 'msh41', '-o', mesh, '-v', '1'], check=True, timeout=60)
+        subprocess.run(['gmsh', '-3', geo, *settings, '-format', 'msh41', '-o', mesh, '-v', '1'], check=True, timeout=60 * PATIENCE)
         with open(os.path.join(PELLET, 'scene.yaml'), encoding='ascii') as file:
             scene = file.read().replace('mesh: A.msh', f'mesh: {mesh}').replace('sym_z0: {z: 0}', 'clad_z0: {z: 0}')
         scene = scene.replace('contact:\n', 'contact:\n  table: {type: obstacle, group: pellet_z0, normal: {z: -1}, gap: 0}\n')

@@ -2,9 +2,10 @@
 import os
 import re
 import subprocess
+import tempfile
 import unittest
 
-from common import HYCO, ROPE, SOURCE, Case, said
+from common import HYCO, PATIENCE, ROPE, SOURCE, Case, said
 
 MODEL = os.path.join(SOURCE, 'tests', 'data', 'rope-hybrid-4-table.h5')
 MU = ('-mu', '0.07,0.17')
@@ -12,7 +13,7 @@ MU = ('-mu', '0.07,0.17')
 
 class Launch(Case):
     def start(self, *args, **environment):
-        return subprocess.run([HYCO, *args], cwd=self.folder, env={**os.environ, **environment}, capture_output=True, text=True, timeout=60)
+        return subprocess.run([HYCO, *args], cwd=self.folder, env={**os.environ, **environment}, capture_output=True, text=True, timeout=60 * PATIENCE)
 
     def test_another_mpi(self):
         """Each of its processes would be alone and write the same files."""
@@ -29,6 +30,39 @@ class Launch(Case):
         for name, value in (('PMI_SIZE', '1'), ('SLURM_NTASKS', '8'), ('SLURM_STEP_NUM_TASKS', '1')):
             with self.subTest(name=name):
                 self.assertEqual(self.start('view', '-model', MODEL, **{name: value}).returncode, 0)
+
+    COMMANDS = (('view', '-model', MODEL), ('predict', '-model', MODEL, *MU), ('solve', '-scene', ROPE, *MU))
+
+    def noise(self, *before, command=COMMANDS[0], **environment):
+        """What one rank says on stderr, numbers apart; a variable that is None is not set."""
+        environment = {name: value for name, value in {**os.environ, 'HWLOC_HIDE_ERRORS': None, **environment}.items() if value is not None}
+        run = subprocess.run([*before, HYCO, *command], cwd=self.folder, env=environment, capture_output=True, text=True, timeout=60 * PATIENCE)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        return {re.sub(r'\d+', '0', line) for line in run.stderr.splitlines()}
+
+    def test_temporary_folder(self):
+        """No folder for temporary files, or one that cannot be used: Open MPI 5 wants one, crashes without it, and makes one that is missing."""
+        usual = self.noise()
+        gone, shut, file = (self.path(name) for name in ('gone', 'shut', 'file'))
+        os.mkdir(shut, 0o500)
+        with open(file, 'w', encoding='ascii'):
+            pass
+        for folder in (None, '', gone, os.path.join(gone, 'deep'), shut, file, 'x' * 5000):
+            for command in self.COMMANDS if folder == file else self.COMMANDS[:1]:
+                with self.subTest(folder=folder and folder[:80], command=command[0]):
+                    self.assertLessEqual(self.noise(command=command, TMPDIR=folder), usual)
+        self.assertFalse(os.path.exists(gone))
+
+    def test_bare_machine(self):
+        """Without a network, with next to no shared memory, with nowhere for temporary files: all that one rank says is its own."""
+        alone = ('unshare', '--map-root-user', '--mount', '--net')
+        if subprocess.run([*alone, 'mount', '-t', 'tmpfs', 'tmpfs', '/dev/shm'], capture_output=True, check=False).returncode:
+            self.skipTest('no right to unshare')
+        usual = self.noise()
+        for state in ('true', 'mount -t tmpfs -o size=64k tmpfs /dev/shm', 'mount -t tmpfs -o ro tmpfs /dev/shm',
+                      'mount -t tmpfs -o nr_inodes=1 tmpfs "$TMPDIR"'):
+            with self.subTest(state=state), tempfile.TemporaryDirectory() as folder:
+                self.assertLessEqual(self.noise(*alone, 'sh', '-c', f'{state} && exec "$@"', 'sh', TMPDIR=folder), usual)
 
     def loaded(self, *args):
         """The libraries that a run has loaded."""

@@ -164,7 +164,7 @@ class Rope(Case):
             self.assertEqual(by_command['model_type'], t['model_type'])
             self.near(by_call, by_command['total_contact_force'], 1e-5, name)
             found.add(by_call)
-        alone = subprocess.run([os.path.join(os.path.dirname(HYCO), 'embed')], capture_output=True, text=True, timeout=60)
+        alone = subprocess.run([os.path.join(os.path.dirname(HYCO), 'embed')], capture_output=True, text=True, timeout=60 * PATIENCE)
         self.assertEqual(alone.returncode, 2)
         self.assertTrue(alone.stderr.startswith('usage: embed SCENE MODEL.h5 MU1 MU2'), alone.stderr)
         self.assertEqual(len(found), 3, 'three models, three answers')

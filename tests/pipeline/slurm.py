@@ -121,7 +121,7 @@ class Slurm(Case):
         self.assertEqual(self.noted('scontrol'), '')
 
     def test_model_missing(self):
-        run = subprocess.run(['bash', SCRIPT, '-scene', ROPE], capture_output=True, text=True, timeout=20)
+        run = subprocess.run(['bash', SCRIPT, '-scene', ROPE], capture_output=True, text=True, timeout=20 * PATIENCE)
         self.assertEqual(run.returncode, 2)
         self.assertIn('-model', run.stderr)
 

@@ -4,6 +4,8 @@ import subprocess
 import tempfile
 import unittest
 
+from common import PATIENCE
+
 SOURCE = os.path.dirname(os.path.realpath(os.path.join(os.environ['HYCO_SOURCE'], 'CMakeLists.txt')))
 WRAPPER = """#!/bin/sh
 case ${{1:-}} in
@@ -28,7 +30,7 @@ class OtherMPI(unittest.TestCase):
                     file.write(text)
             os.chmod(wrapper, 0o755)
             run = subprocess.run(['cmake', '-S', SOURCE, '-B', os.path.join(folder, 'build'), f'-DMPI_C_COMPILER={wrapper}', '-DHYCO_TESTS=OFF'],
-                                 capture_output=True, text=True, timeout=100, check=False)
+                                 capture_output=True, text=True, timeout=100 * PATIENCE, check=False)
             self.assertNotEqual(run.returncode, 0, run.stdout)
             text = ' '.join(run.stderr.split())
             self.assertIn(wrapper, text)

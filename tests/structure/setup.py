@@ -5,6 +5,8 @@ import subprocess
 import tempfile
 import unittest
 
+from common import PATIENCE
+
 SETUP = os.path.join(os.environ['HYCO_SOURCE'], 'scripts', 'setup')
 TOOLS = {
     'id': 'echo 1000',
@@ -27,7 +29,7 @@ class Setup(unittest.TestCase):
                     file.write(f'#!/bin/sh\n{text}\n')
                 os.chmod(path, 0o755)
             called = os.path.join(folder, 'called')
-            run = subprocess.run(['sh', SETUP, *args], capture_output=True, text=True, timeout=60, check=False, stdin=subprocess.DEVNULL,
+            run = subprocess.run(['sh', SETUP, *args], capture_output=True, text=True, timeout=60 * PATIENCE, check=False, stdin=subprocess.DEVNULL,
                                  env={**os.environ, 'PATH': folder + ':' + os.environ['PATH'], 'MISSING': missing, 'CALLED': called})
             return run.returncode, run.stdout + run.stderr, os.path.exists(called)
 

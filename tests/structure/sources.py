@@ -6,6 +6,8 @@ import shutil
 import subprocess
 import unittest
 
+from common import PATIENCE
+
 SOURCE = os.environ['HYCO_SOURCE']
 
 
@@ -21,7 +23,8 @@ def code(path):
 
 
 def sources(folder='*'):
-    found = sorted(glob.glob(os.path.join(SOURCE, 'src', folder, '*.[ch]')))
+    found = sorted(glob.glob(os.path.join(SOURCE, 'src', folder, '*.[ch]')) +
+                   glob.glob(os.path.join(SOURCE, 'src', folder, 'impls', '*', '*.[ch]')))
     assert found, folder
     return found
 
@@ -73,15 +76,15 @@ class Sources(unittest.TestCase):
     def test_public_header(self):
         """include/hyco.h compiles alone, in C and in C++, without the private headers."""
         flags = subprocess.run(['pkg-config', '--cflags', 'petsc', 'slepc'], capture_output=True, text=True, check=True,
-                               timeout=20).stdout.split()
-        mpi = subprocess.run(['mpicc', '--showme:compile'], capture_output=True, text=True, timeout=20).stdout.split()
+                               timeout=20 * PATIENCE).stdout.split()
+        mpi = subprocess.run(['mpicc', '--showme:compile'], capture_output=True, text=True, timeout=20 * PATIENCE).stdout.split()
         for compiler in (['gcc', '-std=c11', '-x', 'c'], ['g++', '-x', 'c++']):
             if not shutil.which(compiler[0]):
                 print(f'{compiler[0]} is not there: the header is not compiled with it')
                 continue
             run = subprocess.run([*compiler, '-fsyntax-only', '-Wall', '-Werror', *flags, *mpi, '-I',
                                   os.path.join(SOURCE, 'include'), '-'], input='#include <hyco.h>\n', text=True,
-                                 capture_output=True, timeout=50)
+                                 capture_output=True, timeout=50 * PATIENCE)
             self.assertEqual(run.returncode, 0, f'{compiler[0]}: {run.stderr}')
 
     def test_public_headers_hide(self):

@@ -4,6 +4,8 @@ import subprocess
 import tempfile
 import unittest
 
+from common import PATIENCE
+
 SOURCE = os.path.realpath(os.path.join(os.environ['HYCO_SOURCE'], 'CMakeLists.txt'))
 PROJECT = """cmake_minimum_required(VERSION 3.20)
 project(other LANGUAGES C)
@@ -35,7 +37,7 @@ class Subproject(unittest.TestCase):
             for command in (['cmake', '-S', folder, '-B', build, '-DBUILD_SHARED_LIBS=OFF', '-DCMAKE_BUILD_TYPE=Debug', '-DCMAKE_C_FLAGS=-O0 -g0'],
                             ['cmake', '--build', build, '-j', '2', '--target', 'other'],
                             [os.path.join(build, 'other'), os.path.join(os.path.dirname(SOURCE), 'tests', 'data', 'rope-hybrid-4-table.h5')]):
-                run = subprocess.run(command, capture_output=True, text=True, timeout=500, check=False)
+                run = subprocess.run(command, capture_output=True, text=True, timeout=500 * PATIENCE, check=False)
                 self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
             self.assertFalse([name for _, _, names in os.walk(build) for name in names if name.startswith('libhyco.so')])
 
