@@ -75,10 +75,12 @@ static PetscErrorCode Distribute(HycoFOM f)
 {
   PetscInt cut = HYCO_PARTITION_METIS, n_owned, first, n_ties = 0, *ties = NULL;
   HycoMesh mesh;
+  PetscBool done;
 
   PetscFunctionBegin;
   PetscCall(HycoOptionsWord(f->scene->options, "hyco_partition", HycoPartitioners, &cut));
-  if (f->size == 1) {
+  PetscCall(DMPlexIsDistributed(f->dm, &done));
+  if (f->size == 1 || done) {
     PetscCall(HycoMeshDistribute(&f->dm, f->scene, NULL, 0, NULL, (HycoPartitioner)cut));
     PetscFunctionReturn(PETSC_SUCCESS);
   }

@@ -35,18 +35,82 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
                                   HycoPartitioner by)
 {
   PetscPartitioner partitioner;
+  PetscBool done;
+  PetscInt overlap;
   PetscSF sf;
   DM next;
 
   PetscFunctionBegin;
-  PetscCall(DMPlexGetPartitioner(*dm, &partitioner));
-  PetscCall(HycoPartitionerSetMesh(partitioner, whole, n_pairs, pairs, by));
-  PetscCall(DMPlexDistribute(*dm, 0, &sf, &next));
-  PetscCall(Replace(dm, sf, next));
+  PetscCall(DMPlexIsDistributed(*dm, &done));
+  PetscCall(DMPlexGetOverlap(*dm, &overlap));
+  HycoCheck(!overlap || !scene->refine, "scene_refine: the DM has an overlap; refine it before that is added");
+  if (!done) {
+    PetscCall(DMPlexGetPartitioner(*dm, &partitioner));
+    PetscCall(HycoPartitionerSetMesh(partitioner, whole, n_pairs, pairs, by));
+    PetscCall(DMPlexDistribute(*dm, 0, &sf, &next));
+    PetscCall(Replace(dm, sf, next));
+  }
   PetscCall(HycoPlexRefine(dm, scene, scene->refine));
+  if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(DMSetBasicAdjacency(*dm, PETSC_FALSE, PETSC_TRUE)); /* cells that share a vertex are neighbours */
   PetscCall(DMPlexDistributeOverlap(*dm, 1, &sf, &next));
   PetscCall(Replace(dm, sf, next));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Tags of a DM that came without: its own numbers of cells and vertices, from 1. */
+static PetscErrorCode NumberPoints(DM dm)
+{
+  PetscInt start[2], end[2], last, *tag;
+  IS numbers[2];
+
+  PetscFunctionBegin;
+  PetscCall(DMPlexGetChart(dm, NULL, &last));
+  PetscCall(PetscCalloc1(last, &tag));
+  PetscCall(DMPlexGetHeightStratum(dm, 0, &start[0], &end[0]));
+  PetscCall(DMPlexGetDepthStratum(dm, 0, &start[1], &end[1]));
+  PetscCall(DMPlexGetCellNumbering(dm, &numbers[0]));
+  PetscCall(DMPlexGetVertexNumbering(dm, &numbers[1]));
+  for (PetscInt k = 0; k < 2; k++) {
+    const PetscInt *number;
+
+    PetscCall(ISGetIndices(numbers[k], &number));
+    for (PetscInt p = start[k]; p < end[k]; p++) { /* -1 - number where another process owns the point */
+      const PetscInt n = number[p - start[k]];
+
+      tag[p] = 1 + (n < 0 ? -1 - n : n);
+    }
+    PetscCall(ISRestoreIndices(numbers[k], &number));
+  }
+  PetscCall(HycoPlexSetTags(dm, tag));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A DM that was not made from a mesh file: tags, and labels with the closure of their points on every process. */
+static PetscErrorCode Complete(DM dm)
+{
+  PetscInt n, dim, depth;
+  PetscObject tags;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectQuery((PetscObject)dm, HYCO_TAGS, &tags));
+  if (!tags) PetscCall(NumberPoints(dm));
+  PetscCall(DMGetDimension(dm, &dim));
+  PetscCall(DMPlexGetDepth(dm, &depth));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &depth, 1, MPIU_INT, MPI_MAX, HycoComm(dm)));
+  HycoCheck(depth == dim,
+            "the DM has cells of dimension %d and points of %d depths; interpolate it (DMPlexInterpolate)", (int)dim,
+            (int)depth + 1);
+  PetscCall(DMGetNumLabels(dm, &n));
+  for (PetscInt k = 0; k < n; k++) {
+    const char *name;
+    DMLabel label;
+
+    PetscCall(DMGetLabelName(dm, k, &name));
+    if (HycoPlexOwnLabel(name)) continue;
+    PetscCall(DMGetLabel(dm, name, &label));
+    PetscCall(DMPlexLabelComplete(dm, label));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -55,6 +119,16 @@ PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
   HycoMesh mesh = NULL;
 
   PetscFunctionBegin;
+  if (scene->dm) {
+    int same;
+
+    PetscCallMPI(MPI_Comm_compare(comm, HycoComm(scene->dm), &same));
+    HycoCheck(same == MPI_IDENT || same == MPI_CONGRUENT,
+              "the scene's DM lives on other processes than the model; for training give -hyco_groups 1");
+    PetscCall(DMClone(scene->dm, dm));
+    PetscCall(Complete(*dm));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   HycoOnRoot(comm, HycoMeshRead(scene, &mesh));
   PetscCall(HycoPlexFromMesh(comm, mesh, dm));
   if (mesh) PetscCall(HycoMeshDestroy(&mesh));

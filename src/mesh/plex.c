@@ -682,6 +682,27 @@ static PetscErrorCode AgreeOnGroups(MPI_Comm comm, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The closure of a group of cells has facets: they are none of the group's. */
+static void DropInnerFacets(HycoMesh m)
+{
+  PetscInt n = 0;
+
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (m->group_dim[m->facet_group[f]] == m->dim) continue;
+    memmove(m->facets + n * m->nf, m->facets + f * m->nf, (size_t)m->nf * sizeof(PetscInt));
+    m->facet_group[n] = m->facet_group[f];
+    m->facet_cell[n++] = m->facet_cell[f];
+  }
+  m->n_facets = n;
+}
+
+static PetscErrorCode CheckGroups(MPI_Comm comm, HycoMesh m, HycoScene scene)
+{
+  PetscFunctionBegin;
+  HycoOnEach(comm, HycoMeshCheckGroups(m, scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *n_owned, PetscInt *first)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
@@ -696,7 +717,9 @@ PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *
   *n_owned = b.m->n_nodes;
   *first = 0;
   if (size > 1) PetscCall(AgreeOnGroups(comm, b.m));
-  if (size > 1) ierr = Number(&b, n_owned, first);
+  DropInnerFacets(b.m);
+  if (scene->dm) ierr = CheckGroups(comm, b.m, scene);
+  if (size > 1 && !ierr) ierr = Number(&b, n_owned, first);
   PetscCall(PetscFree(b.owned));
   PetscCall(PetscFree(b.node));
   PetscCall(PetscFree(b.vertex));

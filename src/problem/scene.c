@@ -618,6 +618,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   PetscCall(PetscFree(s->contact));
   PetscCall(PetscFree(s->title));
   PetscCall(PetscFree(s->mesh_path));
+  PetscCall(DMDestroy(&s->dm));
   PetscCall(PetscOptionsDestroy(&s->options));
   PetscCall(PetscHeaderDestroy(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
