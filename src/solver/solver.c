@@ -560,11 +560,11 @@ PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
   PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s%s%s; form: %s\n", HycoSolverTypes[s->type],
-                                   s->type == HYCO_TYPE_TAO ? ", " : "",
-                                   s->type != HYCO_TYPE_TAO ? ""
-                                   : s->tao_type < 0        ? "by the system"
-                                                            : HycoTaoTypes[s->tao_type],
-                                   forms[s->form]));
+                                   methods[s->type][0] ? "" : ", ",
+                                   methods[s->type][0] ? ""
+                                   : s->tao_type[0]    ? s->tao_type
+                                                       : "by the system",
+                                   s->form_name[0] ? s->form_name : "auto"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g; iterations: at most %d%s\n",
                                    (double)s->rtol, (int)s->max_its, s->max_its ? "" : " (by the number of contacts)"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "solves with K: %s\n",
