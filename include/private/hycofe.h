@@ -80,6 +80,11 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe);
 PetscErrorCode HycoFESetDrawn(HycoFE fe);
 /* Brings everything to mu (length scene->n_parameters), touching only what depends on what changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
+/* What the parameters p with changed[p] reach: the bodies' maps, K, the rows of B, the gaps. */
+typedef struct {
+  PetscBool nodes, stiffness, rows, gaps;
+} HycoChanges;
+HycoChanges HycoSceneChanges(HycoScene scene, const PetscBool changed[]);
 /* Which parameters (room for n_parameters) reach the stiffness or the contacts' rows. */
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[]);
 

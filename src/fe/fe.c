@@ -178,52 +178,52 @@ PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the changed parameters reach: the map, the stiffness, the contact rows. */
-static void FindChanges(HycoFE fe, const PetscBool changed[], PetscBool *moved)
+HycoChanges HycoSceneChanges(HycoScene s, const PetscBool changed[])
 {
-  HycoScene s = fe->scene;
+  HycoChanges c = {PETSC_FALSE, PETSC_FALSE, PETSC_FALSE, PETSC_FALSE};
 
-  *moved = PETSC_FALSE;
   for (PetscInt b = 0; b < s->n_bodies; b++) {
-    for (PetscInt c = 0; c < 3; c++) *moved = (PetscBool)(*moved || HycoExprChanges(s->body[b].map[c], changed));
+    for (PetscInt d = 0; d < 3; d++) c.nodes = (PetscBool)(c.nodes || HycoExprChanges(s->body[b].map[d], changed));
   }
-  fe->stiffness_changed = fe->contact_changed = *moved;
-  fe->gap_changed = (PetscBool)(*moved || !fe->fixed_constant);
-  for (PetscInt b = 0; b < s->n_bodies; b++) {
-    if (HycoMaterialChanges(s->body[b].law, changed)) fe->stiffness_changed = PETSC_TRUE;
-  }
-  for (PetscInt k = 0; k < s->n_contacts; k++)
-    HycoContactChanges(s->contact[k], changed, &fe->contact_changed, &fe->gap_changed);
+  c.stiffness = c.rows = c.gaps = c.nodes;
+  for (PetscInt b = 0; b < s->n_bodies; b++)
+    c.stiffness = (PetscBool)(c.stiffness || HycoMaterialChanges(s->body[b].law, changed));
+  for (PetscInt k = 0; k < s->n_contacts; k++) HycoContactChanges(s->contact[k], changed, &c.rows, &c.gaps);
+  return c;
 }
 
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
 {
-  struct _n_HycoFE fe = {.scene = scene}; /* only what FindChanges() says of it */
-
   for (PetscInt p = 0; p < scene->n_parameters; p++) {
-    PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moved;
+    PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+    HycoChanges c;
 
     changed[p] = PETSC_TRUE;
-    FindChanges(&fe, changed, &moved);
-    reaches[p] = (PetscBool)(fe.stiffness_changed || fe.contact_changed);
+    c = HycoSceneChanges(scene, changed);
+    reaches[p] = (PetscBool)(c.stiffness || c.rows);
   }
 }
 
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
 {
-  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, moved, first = (PetscBool)!fe->ready;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, first = (PetscBool)!fe->ready;
+  HycoChanges c;
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {
     changed[p] = (PetscBool)(!fe->ready || mu[p] != fe->mu[p]);
     fe->mu[p] = mu[p];
   }
-  FindChanges(fe, changed, &moved);
-  if (first) fe->gap_changed = fe->stiffness_changed = fe->contact_changed = moved = PETSC_TRUE;
+  c = HycoSceneChanges(fe->scene, changed);
+  fe->stiffness_changed = (PetscBool)(first || c.stiffness);
+  fe->contact_changed = (PetscBool)(first || c.rows);
+  fe->gap_changed = (PetscBool)(first || c.gaps || !fe->fixed_constant);
   fe->ready = PETSC_FALSE; /* until all of it is done */
-  if (moved) PetscCall(MoveNodes(fe));
-  if (moved) PetscCall(HycoMirrorFind(fe));
-  for (PetscInt k = 0; k < fe->n_loads && moved; k++) fe->shares[k].ready = PETSC_FALSE;
+  if (first || c.nodes) {
+    PetscCall(MoveNodes(fe));
+    PetscCall(HycoMirrorFind(fe));
+    for (PetscInt k = 0; k < fe->n_loads; k++) fe->shares[k].ready = PETSC_FALSE;
+  }
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
   if (fe->stiffness_changed) PetscCall(HycoFESetTangents(fe, first));
   fe->ready = PETSC_TRUE;
