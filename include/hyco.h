@@ -19,6 +19,8 @@
 
 #include <hycosys.h>
 #include <hycoscene.h>
+#include <hycomaterial.h>
+#include <hycocontact.h>
 #include <hycosamples.h>
 #include <hycosystem.h>
 #include <hycosolver.h>

@@ -23,6 +23,15 @@ typedef enum {
   HYCO_FORM_DUAL_FREE /* the dual with B K^-1 Bt applied, never formed: TAO's bound-constrained types, symmetric */
 } HycoForm;
 
+/*
+  Makes a form available to solvers that are created from then on: by -hyco_solver_form name, or left to itself where it
+  is the cheapest that accepts a system. `create` fills in the form's operations and data (private headers). A complementarity
+  method is added by TaoRegister() instead, and chosen by HycoSolverSetTaoType(). Not collective.
+*/
+typedef struct _n_HycoSolverForm *HycoSolverForm;
+typedef PetscErrorCode (*HycoSolverFormCreate)(HycoSolver solver, HycoSolverForm form);
+PetscErrorCode HycoSolverRegister(const char name[], HycoSolverFormCreate create);
+
 /* Solves with the stiffness K. */
 typedef enum {
   HYCO_LINEAR_AUTO,     /* direct, unless the factor is estimated to take more memory than there is */
@@ -51,8 +60,10 @@ PetscErrorCode HycoSolverSetSystem(HycoSolver solver, HycoSystem system);
 PetscErrorCode HycoSolverSetType(HycoSolver solver, HycoSolverType type);
 /*
   -hyco_tao_type: for the type tao. Bound-constrained (symmetric systems): gpcg, tron, bntr, bnls, bntl, blmvm, bncg,
-  bqnls, bqnkls, bqnktr, bqnktl, bqpip; semismooth (any, dual form): ssils, asils, ssfls, asfls. NULL (default): gpcg
-  for a symmetric system, ssils for another. A solve refuses a bound-constrained type for a nonsymmetric system.
+  bqnls, bqnkls, bqnktr, bqnktl, bqpip; semismooth (any, dual form): ssils, asils, ssfls, asfls; or what the program
+  has registered by TaoRegister(), which sees a scaled problem: bounds, Hessian H, gradient H y - f (also where H is not
+  symmetric). NULL (default): gpcg for a symmetric system, ssils for another. A solve refuses a bound-constrained type
+  for a nonsymmetric system.
   docs/solvers.md says which suits which problem.
 */
 PetscErrorCode HycoSolverSetTaoType(HycoSolver solver, const char type[]);

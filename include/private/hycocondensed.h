@@ -62,7 +62,7 @@ struct _n_HycoCondensed {
   PetscBool solved; /* active is the set of the solution at `last` */
   PetscReal last[HYCO_MAX_PARAMETERS];
   PetscReal gap_size;                           /* largest of the gap's field */
-  PetscReal *packed, *M, *work, *g, *H, *a, *w; /* M: G, m x m */
+  PetscReal *packed, *M, *work, *g, *H, *a;     /* M: G, m x m */
   HycoSetFactor set_factor;                     /* of M on the active contacts */
   PetscBool *active;
 };

@@ -2,7 +2,7 @@
 #ifndef HYCODOMAIN_H
 #define HYCODOMAIN_H
 
-#include <hycofe.h>
+#include <hycocontactimpl.h>
 
 /* What an RID grows from, and how. */
 typedef struct {

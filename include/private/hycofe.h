@@ -31,35 +31,48 @@ typedef struct {
 } HycoLoadShares;
 
 struct _n_HycoFE {
-  HycoScene scene;              /* borrowed */
-  HycoMesh mesh;                /* borrowed */
-  PetscInt dim, n_dof, n_sigma; /* space dimension, n_nodes * dim, stress components */
+  /* borrowed */
+  HycoScene scene;
+  HycoMesh mesh;
+  /* sizes: space dimension, n_nodes * dim, stress components */
+  PetscInt dim, n_dof, n_sigma;
   /* what no parameter reaches */
   PetscBool *constant; /* by cell: neither its nodes nor its material */
   PetscInt n_constant;
   PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
-  HycoAssemblyMap places;   /* of the entries of K; made by the second assembly into it */
+  signed char *drawn_sign;  /* by cell: the sign of its volume in the mesh file's coordinates */
+  /* kept from one parameter value to the next */
+  HycoAssemblyMap places; /* of the entries of K; made by the second assembly into it */
   PetscInt n_loads;
-  HycoLoadShares *shares;  /* n_loads: by load of the scene */
-  signed char *drawn_sign; /* by cell: the sign of its volume in the mesh file's coordinates */
+  HycoLoadShares *shares; /* n_loads: by load of the scene */
   /* -hyco_regularise: unknowns held beside the scene's supports, and the motions that these keep (n_released x n_dof,
      orthonormal; on the whole mesh alone); the contacts' normals are turned to leave the first n_turned of them alone
    */
   PetscInt n_pins, *pin, n_released, n_turned;
   PetscReal *released;
-  /* at the current mu */
+  /* the parameters, and what the last HycoFESetParameters changed */
   PetscBool ready;
   PetscReal mu[HYCO_MAX_PARAMETERS];
-  PetscReal *X;                                 /* n_nodes x 3, moved nodes */
-  PetscBool *mirrored;                          /* by body: its map is a mirror image */
-  PetscInt place;                               /* of the nodes: a number that no other place has, on this process */
-  PetscBool *fixed;                             /* n_dof */
-  PetscReal *u0;                                /* n_dof, prescribed displacement, 0 where free */
-  PetscBool lifted;                             /* whether any of u0 is not 0 */
-  PetscReal *lame;                              /* n_cells x nq x 2: lambda and mu of Lame (1D: 0 and nu) */
-  PetscBool stiffness_changed, contact_changed; /* by the last HycoFESetParameters */
-  PetscBool gap_changed;                        /* the same: the contacts' gaps, or what the supports take from them */
+  PetscBool stiffness_changed, contact_changed;
+  PetscBool gap_changed; /* the contacts' gaps, or what the supports take from them */
+  /* geometry at mu */
+  PetscReal *X;        /* n_nodes x 3, moved nodes */
+  PetscBool *mirrored; /* by body: its map is a mirror image */
+  PetscInt place;      /* of the nodes: a number that no other place has, on this process */
+  /* supports at mu */
+  PetscBool *fixed; /* n_dof */
+  PetscReal *u0;    /* n_dof, prescribed displacement, 0 where free */
+  PetscBool lifted; /* whether any of u0 is not 0 */
+  /* tangents at mu: those of cell e from tangent_start[e], tangent_size[body] reals for each of its points */
+  PetscReal *tangent;
+  PetscInt *tangent_start, *tangent_size;
 };
+
+/* Of a body's cells: whether their tangents are Lame's lambda and mu, or else n_sigma x n_sigma. */
+static inline PetscBool HycoFEIsIsotropic(HycoFE fe, PetscInt cell)
+{
+  return (PetscBool)(fe->tangent_size[fe->mesh->cell_body[cell]] == 2);
+}
 
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
@@ -69,7 +82,6 @@ PetscErrorCode HycoFESetDrawn(HycoFE fe);
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
 /* Which parameters (room for n_parameters) reach the stiffness or the contacts' rows. */
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[]);
-void HycoFEReaches(HycoFE fe, PetscBool reaches[]);
 
 /* A rigid motion of one connected part of the mesh: t + omega x (X - centre) / size. */
 typedef struct {
@@ -114,94 +126,5 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
 /* Strain energy 1/2 u^T K u of each cell. */
 PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[]);
-
-/* -- contact: all on one process, over a mesh that has every contact node -- */
-
-/*
-  N_lambda contacts in the order of the scene's contacts, then of the slave's tag. A contact's master point is the sum
-  of weight[j] times node master[j], j in master_start[k] .. master_start[k+1] - 1: no node for an obstacle, one of
-  weight 1 for a pair, up to four (of a facet, ascending, weights positive with sum 1) on a surface.
-
-  On surfaces that a map moves every slave node is a contact, and its master point is searched for where the nodes are:
-  HycoPairsMove(). There a slave node that faces no master has no node either: its row of B is empty.
-*/
-typedef struct {
-  PetscBool moved; /* a map may move the surfaces of this contact */
-  PetscReal reach; /* then: how far from its slave a master point may be; PETSC_MAX_REAL: as far as it is */
-} HycoSearch;
-
-typedef struct {
-  PetscInt n;
-  PetscInt *slave;   /* node indices */
-  PetscInt *contact; /* index in scene->contact */
-  PetscInt *master_start, *master;
-  PetscReal *weight;
-  PetscInt room;  /* most masters of a contact on moved surfaces; 0: none is moved, all were found once and for all */
-  PetscInt place; /* that of the nodes at the last search (HycoFE) */
-  PetscInt n_searches;
-  HycoSearch *search; /* by contact of the scene; NULL where room is 0 */
-} HycoPairs;
-
-/* Contacts on the nodes as drawn: where no map moves the surfaces they are final, and a slave node without a master is
-   an error. */
-PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
-PetscErrorCode HycoPairsDestroy(HycoPairs *pairs);
-/* Searches for the masters of moved surfaces on fe's nodes, if those have moved since; fe's mesh has the pairs' nodes
-   and the facets that may be masters. What works with the contacts at fe's parameters calls it itself. */
-PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *pairs);
-/* Gives pairs their search where a map moves surfaces, on a mesh that has all nodes of these; else leaves it out. */
-PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
-/* Whether contact k is on surfaces that a map moves. */
-static inline PetscBool HycoPairsMoved(const HycoPairs *pairs, PetscInt k)
-{
-  return (PetscBool)(pairs->room && pairs->search[pairs->contact[k]].moved);
-}
-/* Whether contact k is a slave node that faces no master. */
-static inline PetscBool HycoPairsAlone(HycoScene scene, const HycoPairs *pairs, PetscInt k)
-{
-  return (PetscBool)(pairs->master_start[k] == pairs->master_start[k + 1] &&
-                     scene->contact[pairs->contact[k]].type != HYCO_CONTACT_OBSTACLE);
-}
-/* The same contacts with node i called index[i]. The caller destroys it. */
-PetscErrorCode HycoPairsRenumber(const HycoPairs *pairs, const PetscInt index[], HycoPairs *out);
-/* Sets node[i] for every slave and master node; the others are left alone. */
-void HycoPairsMark(const HycoPairs *pairs, PetscBool node[]);
-/* The most nodes of one contact: a row of B has at most dim times as many entries. */
-PetscInt HycoPairsWidth(const HycoPairs *pairs);
-/* Normals n (n x 3) and gaps D (n) at fe's mu: given ones are evaluated at the master point (obstacle: the slave), a
-   measured gap is n . (master point - slave), on moved nodes. Fails where surfaces overlap more than the scene allows,
-   and where a pair's nodes no longer face each other. */
-PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal[], PetscReal gap[]);
-/*
-  The rows of B over the free unknowns, in CSR over local dofs (node * dim + component), and D less what the fixed
-  unknowns contribute: start[n + 1], dof[], value[] (room for HycoPairsWidth() dim n entries). Fails when a row has no
-  free unknown and the prescribed displacements penetrate.
-*/
-PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
-                               PetscReal gap[]);
-/* How many contacts have no free unknown and no effect: empty rows, and the fixed nodes at obstacles that are no
-   contacts; fails when the prescribed displacements of one of these penetrate. start: of the rows. */
-PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n);
-/* The gap that stands for an empty row: it is positive and of the mesh's scale, and says nothing. */
-PetscReal HycoContactNoGap(HycoFE fe);
-/* What there is to know about the contacts of a solution u (n_dof), L (pairs->n, or where index leads). */
-typedef struct {
-  PetscInt n_facing; /* contacts that may close: slave nodes that face a master, and those of obstacles */
-  PetscReal overlap; /* largest initial overlap, the gap negative before any displacement */
-  PetscReal sliding; /* largest relative motion of a closed contact along its surface, over the size of a facet */
-} HycoContactState;
-PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
-                                  const PetscInt *index, HycoContactState *state);
-/*
-  The combinations of `motions` that frictionless contact does not hold by the shape of the surfaces: at every contact
-  the motion is tangential, by more than faceting explains to no normal, to the slave's surface, to the master's, or to
-  the given normal's plane. unheld: coefficients (n x motions->n, orthonormal) of all of them; names by
-  HycoMotionsName() of each. alike: of the largest set that is tangential in one and the same sense, to be released by
-  turning normals. The caller frees both.
-*/
-PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions, PetscInt *n_unheld,
-                                PetscReal **unheld, PetscInt *n_alike, PetscReal **alike);
-/* Area (length in 2D, 1 in 1D) that each contact's slave node stands for; 0 when its group is no surface. */
-PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
 
 #endif

@@ -2,7 +2,7 @@
 #ifndef HYCOFIELDS_H
 #define HYCOFIELDS_H
 
-#include <hycofe.h>
+#include <hycocontactimpl.h>
 
 typedef struct {
   const char *name;

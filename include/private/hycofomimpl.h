@@ -2,7 +2,7 @@
 #ifndef HYCOFOMIMPL_H
 #define HYCOFOMIMPL_H
 
-#include <hycofe.h>
+#include <hycocontactimpl.h>
 #include <hycofom.h>
 #include <hycosolverimpl.h>
 

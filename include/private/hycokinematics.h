@@ -1,7 +1,7 @@
 /* The map from the reference cell to the moved one: for fe/ and contact/. */
 #ifndef HYCO_KINEMATICS_H
 #define HYCO_KINEMATICS_H
-#include <hycofe.h>
+#include <hycocontactimpl.h>
 
 /* Determinant of the map from the reference cell to the nodes at X (3 a node of the mesh), at quadrature point q. */
 PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q);
@@ -10,6 +10,10 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
                              PetscReal *weight);
 /* Their means over the cell, which make the dilatation of the element bbar. */
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[8][3]);
+/* Room for the tangents; fails for a law that the library does not solve with. */
+PetscErrorCode HycoTangentsCreate(HycoFE fe);
+/* The tangents at fe's nodes and mu; all: of cells that no parameter reaches too. */
+PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all);
 /* Outward normal times area weight (n dS) at point q of a facet, of the moved body; in 1D the sign away from its cell.
  */
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);

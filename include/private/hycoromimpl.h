@@ -3,7 +3,7 @@
 #define HYCOROMIMPL_H
 
 #include <hycodomain.h>
-#include <hycofe.h>
+#include <hycocontactimpl.h>
 #include <hycorom.h>
 #include <hycosolverimpl.h>
 

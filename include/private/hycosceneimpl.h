@@ -2,7 +2,9 @@
 #ifndef HYCOSCENEIMPL_H
 #define HYCOSCENEIMPL_H
 
+#include <hycocontact.h>
 #include <hycoimpl.h>
+#include <hycomaterial.h>
 #include <hycoscene.h>
 #include <hycosamples.h>
 
@@ -23,10 +25,37 @@ PetscBool HycoExprInSpace(HycoExpr expr);
 PetscBool HycoExprChanges(HycoExpr expr, const PetscBool changed[]);
 const char *HycoExprKey(HycoExpr expr);
 
+/* Entries of the scene that a law or a contact type declares. */
+#define HYCO_MAX_DECLARED 32
+typedef struct {
+  char *name, *title; /* "young", "Young's modulus" */
+  HycoEntryKind kind;
+  PetscBool required;
+  HycoExpr expr;    /* of an expression that the scene gives */
+  char *text;       /* of a group */
+  PetscReal value;  /* of a length, and where the scene gives no expression */
+  PetscReal lo, hi; /* of a law's constant: open interval */
+} HycoEntry;
+typedef struct {
+  PetscInt n;
+  HycoEntry entry[HYCO_MAX_DECLARED];
+} HycoDeclared;
+
+/* The next entry; `declared` holds it. */
+PetscErrorCode HycoDeclaredAdd(HycoDeclared *declared, const char name[], const char title[], HycoEntryKind kind,
+                               PetscBool required, HycoEntry **entry);
+/* In any letter case; NULL: there is none. */
+HycoEntry *HycoDeclaredFind(HycoDeclared *declared, const char name[]);
+/* What the scene's entry `key` says. */
+PetscErrorCode HycoDeclaredRead(HycoScene scene, const char key[], const char text[], HycoEntry *entry);
+PetscErrorCode HycoDeclaredView(const HycoDeclared *declared, PetscViewer viewer);
+PetscErrorCode HycoDeclaredDestroy(HycoDeclared *declared);
+/* "obstacle, pair or surface; did you mean pair?": the registered types, for one that is not. */
+PetscErrorCode HycoListTypes(PetscFunctionList types, const char type[], char list[HYCO_LINE]);
+
 typedef struct {
   char *name;
-  HycoExpr young,
-      poisson;       /* Young's modulus (1D: the stiffness nu of a unit cross-section), Poisson's ratio (0 in 1D) */
+  HycoMaterial law;
   PetscBool bbar;    /* mean dilatation (B-bar) instead of the displacements' own at each point */
   HycoExpr map[3];   /* moved coordinates; NULL: not moved */
   HycoExpr force[3]; /* body force per unit volume; NULL: none */
@@ -42,23 +71,6 @@ typedef struct {
   HycoExpr pressure;    /* positive pushes against the outward normal; NULL: none */
   HycoExpr traction[3]; /* force per unit surface; NULL: none */
 } HycoLoad;
-
-typedef enum {
-  HYCO_CONTACT_OBSTACLE, /* n . u <= gap on the nodes of a group */
-  HYCO_CONTACT_PAIR,     /* n . (u_slave - u_master) <= gap on node pairs */
-  HYCO_CONTACT_SURFACE   /* the same at a slave node's projection on the master's facets */
-} HycoContactType;
-
-typedef struct {
-  char *name;
-  HycoContactType type;
-  char *slave, *master; /* groups; an obstacle has only the slave ("group") */
-  PetscReal tolerance;  /* largest distance to the master in the mesh file, where no map moves the surfaces; < 0: from
-                           the facets' size */
-  PetscReal overlap;    /* largest overlap before any load where the gap is measured; < 0: from the facets' size */
-  HycoExpr normal[3];   /* all or none: outward normal of the slave side, at the master point (obstacle: slave) */
-  HycoExpr gap;         /* NULL: measured along the normal between the moved nodes */
-} HycoContact;
 
 struct _p_HycoScene {
   PETSCHEADER(int);

@@ -8,8 +8,9 @@
 
 struct _p_HycoSystem {
   PETSCHEADER(int);
-  Mat K, Bt, B; /* referenced */
-  Vec F, D;     /* referenced */
+  Mat K, Bt, B; /* referenced; NULL where the flexibility is given */
+  Mat G;        /* referenced: the flexibility B K^-1 Bt, dense; NULL where K is given */
+  Vec F, D;     /* referenced; D: with G the gap without forces */
   PetscBool symmetric;
   PetscInt n, m; /* unknowns, contacts */
   /* work of the residuals, made by the first */
@@ -21,47 +22,82 @@ struct _p_HycoSystem {
 /* The work vectors of a system whose vectors are set. */
 PetscErrorCode HycoSystemWork(HycoSystem system);
 
+/*
+  A form: the unknowns in which the complementarity problem is posed, one file in impls/ each. Every solver has one of
+  each registered form; s->now is the method that it is asked for.
+*/
+struct _HycoSolverFormOps {
+  /* *cost >= 0: it accepts system and method; the cheapest is taken. Else `why` says what to use instead. `asked`: the
+     user named the form. */
+  PetscErrorCode (*accepts)(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE]);
+  /* Bytes that its factor would take on all ranks together; NULL: what a factor of K takes. */
+  PetscErrorCode (*estimate)(HycoSolver s, HycoSolverForm form, PetscReal *bytes);
+  /* What K and B alone decide, unless they are as they were. */
+  PetscErrorCode (*setup)(HycoSolver s, HycoSolverForm form, PetscBool *singular);
+  /* Fills x and L, sets s->its; *solved: the method finished by its own account. */
+  PetscErrorCode (*solve)(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved);
+  /* May be NULL. After a solve that failed: *better where another one now has less round-off. */
+  PetscErrorCode (*refine)(HycoSolver s, HycoSolverForm form, PetscBool *better);
+  /* May be NULL. Ends a refinement: each solve begins alike. */
+  PetscErrorCode (*reset)(HycoSolver s, HycoSolverForm form);
+  /* May be NULL. The options of this form alone. */
+  PetscErrorCode (*setfromoptions)(HycoSolver s, HycoSolverForm form, HycoOptionItems PetscOptionsObject);
+  PetscErrorCode (*destroy)(HycoSolverForm form);
+};
+struct _n_HycoSolverForm {
+  char name[32];
+  struct _HycoSolverFormOps ops[1];
+  void *data;
+};
+
+/* How a form's complementarity problem is solved: by a type of Tao. */
+typedef struct {
+  const char *word; /* of -hyco_solver_type and the reports */
+  char type[HYCO_TAO_NAME];
+  int traits; /* HYCO_TAO_... */
+} HycoMethod;
+
+/* A factor of K: LAPACK's where it is dense, else MUMPS's with the Schur complement. */
+typedef struct {
+  HycoDirect direct;
+  PetscReal bytes; /* estimated for it, all ranks together */
+  PetscReal *lu;   /* column major n x n */
+  PetscBLASInt *ipiv, n;
+  PetscReal *X;      /* its work: K^-1 Bt, n x room */
+  size_t room;
+  PetscBool refined; /* solves with it are refined in twice the working precision, S too */
+  HycoOperatorState of;
+} HycoStiffness;
+
 struct _p_HycoSolver {
   PETSCHEADER(int);
   /* user parameters */
   HycoSystem system; /* referenced */
   PetscInt type;     /* index in HycoSolverTypes */
-  HycoForm form;
+  char form_name[32], tao_type[HYCO_TAO_NAME]; /* empty: by the problem */
   PetscReal rtol;
   PetscInt max_its;
   PetscBool warm, fallback, multilevel;
   HycoLinear linear;
-  PetscReal memory;         /* bytes that factors may take, all ranks together; 0: most of what is free */
-  PetscBool iterative;      /* chosen: solve with K iteratively */
-  PetscObjectId chosen_for; /* the K that it was chosen for */
-  char linear_method[128], why_iterative[96];
-  PetscInt tao_type; /* index in HycoTaoTypes; HYCO_TAO_AUTO: by the problem */
+  PetscReal memory; /* bytes that factors may take, all ranks together; 0: most of what is free */
   HycoMonitor monitor;
   void *monitor_ctx;
-  /* factor of K (dual) */
-  HycoDirect direct; /* sparse */
-  PetscReal bytes;   /* estimated for it, all ranks together */
-  PetscReal *lu;     /* dense: LAPACK's factors, column major n x n */
-  PetscBLASInt *ipiv, n_lu;
-  PetscReal *X;      /* its work: K^-1 Bt, n x m */
-  PetscBool refined; /* solves with it are refined in twice the working precision, S too */
-  /* dual form, replicated on every rank: column-major m x m flexibility, gap without forces */
-  PetscInt m, p; /* contacts; unknowns pinned because K is singular: they come before the contacts in S, g and L */
-  PetscReal *S, *g, *L;
-  PetscBool *active;
-  PetscBool started; /* active holds a solution's set */
-  HycoOperatorState condensed;
-  /* primal form in gap coordinates */
-  Mat T, Kg, Kw;
-  KSP ksp_gap;
-  PetscInt *pivot, *contact, n_pivots; /* this rank's contacts' pivot unknowns, the contacts' numbers on this rank */
-  HycoOperatorState transformed;
-  /* dual form without its matrix */
-  HycoDirect direct_free;
-  HycoOperatorState factored_free;
-  Vec free; /* K^-1 F of the next solve, if known; borrowed */
+  /* children */
+  PetscInt n_forms;
+  HycoSolverForm *forms;
+  HycoStiffness stiffness; /* shared by the forms that factor K */
+  /* direct or iterative, chosen for one K */
+  PetscBool iterative;
+  PetscObjectId chosen_for;
+  char linear_method[128], why_iterative[96];
+  Vec free;                   /* K^-1 F of the next solve, if known; borrowed */
+  const PetscBool *start_set; /* of the next solve, if given; borrowed */
+  /* the attempt under way, or the last one */
+  HycoSolverForm form;
+  HycoMethod now;
+  PetscBool falling_back;
+  PetscBool by_factor; /* its x came from a solve with K */
   /* the last solve */
-  PetscInt tao; /* the type that serves its system */
   HycoReason reason;
   HycoKKT kkt;
   PetscInt its;
@@ -70,70 +106,60 @@ struct _p_HycoSolver {
 };
 
 extern const char *const HycoSolverTypes[]; /* active_set, tao, lemke, NULL */
-enum { HYCO_TYPE_ACTIVE_SET, HYCO_TYPE_TAO, HYCO_TYPE_LEMKE };
+extern const char *const HycoLinearNames[];
 
-/* K x = F without contact. */
-PetscErrorCode HycoSolveIterative(HycoSolver s, Vec x, PetscBool *solved);
+/* One of each registered form. */
+PetscErrorCode HycoSolverCreateForms(HycoSolver s);
+PetscErrorCode HycoSolverFormCreate_Linear(HycoSolver s, HycoSolverForm form);
+PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form);
+PetscErrorCode HycoSolverFormCreate_Shell(HycoSolver s, HycoSolverForm form);
+PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form);
+PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm form);
+/* The form of that name; NULL: there is none. */
+HycoSolverForm HycoSolverFindForm(HycoSolver s, const char name[]);
+/* The cheapest form that accepts the system by the method now; `stay` is taken if it does. NULL: none, and why. */
+PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSolverForm *form, char why[HYCO_LINE]);
+/* Writes into s->method what solves: "active_set dual", "tao gpcg dual". */
+PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[]);
+/* x = 0, L = 0, and the reason, for a K that has no factor. */
+PetscErrorCode HycoSolverGiveUp(HycoSolver s, Vec x, Vec L);
+/* Whether the chosen type of Tao serves symmetric systems alone. */
+PetscBool HycoSolverNeedsSymmetry(HycoSolver s);
+
+/* Chooses between a factor and iterations (s->iterative), which may change the form. */
+PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form);
 /* Says in linear_method what solves with K: `ksp`, or (NULL) the factor of a HycoDirect. */
 PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp);
-/* Few contacts: dual. About as many as unknowns: primal. */
-PetscErrorCode HycoChooseForm(HycoSolver s, HycoForm *form);
-/* The TAO type for the system; fails when type, form and system do not go together. */
-PetscErrorCode HycoChooseTao(HycoSolver s, HycoForm form);
-/* Chooses between a factor and iterations (s->iterative), which need the primal form. */
-PetscErrorCode HycoChooseLinear(HycoSolver s, HycoForm *form);
-extern const char *const HycoLinearNames[];
-/* Attaches K's near-kernel (MatSetNearNullSpace()) to Kw, in gap coordinates. Collective. */
-PetscErrorCode HycoGapNearKernel(HycoSolver s, Mat Kw);
+
+/* -- a factor of K, with s->stiffness -- */
+
+/* Factors K, and makes S = B K^-1 Bt (as HycoDirectFactor() where K has a kernel; NULL without B) unless K and B are as
+   they were. Collective, as all that follow. */
+PetscErrorCode HycoStiffnessFactor(HycoSolver s, Mat Bt, Mat B, PetscReal S[], PetscBool *singular);
+PetscErrorCode HycoStiffnessDestroy(HycoStiffness *factor);
+/* x = K^-1 r */
+PetscErrorCode HycoStiffnessSolve(HycoSolver s, Vec r, Vec x);
+/* S = B K^-1 Bt again, of a dense K, refined where factor->refined says so. */
+PetscErrorCode HycoStiffnessCondense(HycoSolver s, Mat Bt, Mat B, PetscReal S[]);
+/* Refines x, K x = F - Bt L of a dense K, against what double precision does not hold. */
+PetscErrorCode HycoStiffnessRefine(HycoSolver s, const PetscReal L[], Vec x);
+/* One step of refinement of x, K x = F - Bt L (L may be NULL), when round-off shows. */
+PetscErrorCode HycoStiffnessCorrect(HycoSolver s, Vec L, Vec x);
+
 /* Factors K and makes S unless K and B are as they were; dual form. Collective. */
 PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular);
-/* After a solve in the dual form with a small dense K: makes S again, refined, for one more solve; *done is false where
-   that changes nothing. HycoDualForget() ends it: each solve begins alike. */
-PetscErrorCode HycoDualRefine(HycoSolver s, PetscBool *done);
-void HycoDualForget(HycoSolver s);
 /* x = K^-1 r by that factor, refined once. Collective. */
 PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x);
 /* K^-1 F of the next solve, which takes it for granted if it uses the dual form and K is regular. Borrowed until then.
  */
 PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x);
-/* The forms: fill x and L, set its and method; *solved says whether the method finished by its own account. */
-PetscErrorCode HycoSolveDual(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBool *solved);
-PetscErrorCode HycoSolvePrimal(HycoSolver s, PetscInt type, Vec x, Vec L, PetscBool *solved);
-/* Whether gap coordinates exist: each contact row has an unknown that no other row has. Collective. */
-PetscErrorCode HycoPrimalPossible(HycoSystem system, PetscBool *possible);
-
+/* The contacts from which the active set of the next solve begins, m of them, with a given flexibility. Borrowed until
+   then. */
+PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);
 /* S = B K^-1 Bt of the last solve, which was in the dual form with a factor of a regular K: m x m column major, the
    same on every rank. Borrowed until a matrix changes. Collective. */
 PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[]);
 /* x[j] = K^-1 r[j] by the factor of the last solve, k of them. Collective. */
 PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[]);
-
-/* The dual form by TAO with S = B K^-1 Bt never formed (form dual_free). */
-PetscErrorCode HycoSolveDualFree(HycoSolver s, Vec x, Vec L, PetscBool *solved);
-
-/*
-  Gap coordinates. HycoGapSetUp() makes T, Kg, Kw, the pivots and the solver unless K and B are as they were;
-  HycoGapWork() prepares Kw, a copy of Kg that keeps its pattern; HycoSolveOnSet() solves Kg y = f with y = d at this
-  rank's n rows a[], through Kw, its solver and rhs. Collective.
-*/
-PetscErrorCode HycoGapSetUp(HycoSolver s);
-PetscErrorCode HycoGapWork(Mat Kw);
-PetscErrorCode HycoSolveOnSet(Mat Kg, Mat Kw, KSP ksp, Vec f, PetscInt n, const PetscInt a[], const PetscReal d[],
-                              Vec rhs, Vec y, PetscBool *singular);
-/*
-  Where the active set of min 1/2 y^T K y - f^T y, y <= bound (PETSC_INFINITY: none) starts: set is 1 at its bound, else
-  0; *made says whether K has what the coarser problems need, else set is not touched. Collective.
-*/
-PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *made);
-/* Whether a held unknown pulls at its bound, or a free one is past it, beyond round-off. `largest` is the largest
-   force, `size` the largest gap or displacement, `diagonal` the unknown's own stiffness. */
-static inline PetscBool HycoPulls(PetscReal force, PetscReal largest, PetscReal diagonal, PetscReal bound)
-{
-  return (PetscBool)(force < -1e-12 * largest - 16 * PETSC_MACHINE_EPSILON * diagonal * PetscAbsReal(bound));
-}
-static inline PetscBool HycoPenetrates(PetscReal value, PetscReal bound, PetscReal size)
-{
-  return (PetscBool)(value > bound + 1e-14 * size);
-}
 
 #endif

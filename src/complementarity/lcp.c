@@ -1,126 +1,103 @@
-/*
-  The active set for dense linear complementarity, w = q + M z >= 0, z >= 0, w.z = 0: the paper's section 6.2
-  (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002) 865-888, for its convergence).
-*/
+/* The active set on dense linear complementarity, w = q + M z >= 0, z >= 0, w.z = 0. */
 #include <hycolcp.h>
 
-unsigned long long HycoSetHash(PetscInt n, const PetscBool active[])
-{
-  unsigned long long hash = HYCO_HASH_START;
-
-  for (PetscInt i = 0; i < n; i++) {
-    const unsigned char bit = active[i] ? 1 : 0;
-
-    hash = HycoHash(hash, &bit, 1);
-  }
-  return hash;
-}
+/* What the iterations share. */
+typedef struct {
+  const HycoLCP *lcp;
+  PetscReal *z, *w;
+  PetscInt k, *a, n_aside; /* the set; contacts set aside as dependent */
+  PetscBool *aside;
+} Dense;
 
 /* w = q + M z of the contacts that are not active (if symmetric, else of all), and the size against which its zeros are
    round-off. */
-static PetscReal Slack(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
-                       const PetscBool active[], PetscInt k, const PetscInt a[], const PetscReal z[], PetscReal w[])
+static PetscReal Slack(const Dense *d, const PetscBool active[])
 {
+  const PetscInt n = d->lcp->n;
+  const PetscReal *M = d->lcp->M, *q = d->lcp->q;
   PetscReal size = 0;
 
   for (PetscInt i = 0; i < n; i++) {
-    w[i] = q[i];
+    d->w[i] = q[i];
     size = PetscMax(size, PetscAbsReal(q[i]));
   }
-  if (symmetric && k > n - k) { /* few rows, which are columns */
+  if (d->lcp->symmetric && d->k > n - d->k) { /* few rows, which are columns */
     for (PetscInt i = 0; i < n; i++) {
       const PetscReal *row = M + (size_t)i * (size_t)n;
 
-      for (PetscInt j = 0; j < n && !active[i]; j++) w[i] += row[j] * z[j];
+      for (PetscInt j = 0; j < n && !active[i]; j++) d->w[i] += row[j] * d->z[j];
     }
     return size;
   }
-  for (PetscInt j = 0; j < k; j++) {
-    const PetscReal *column = M + (size_t)a[j] * (size_t)n;
+  for (PetscInt j = 0; j < d->k; j++) {
+    const PetscReal *column = M + (size_t)d->a[j] * (size_t)n;
 
-    for (PetscInt i = 0; i < n; i++) w[i] += column[i] * z[a[j]];
+    for (PetscInt i = 0; i < n; i++) d->w[i] += column[i] * d->z[d->a[j]];
   }
   return size;
 }
 
-/* Changes the contacts that violate. A contact set aside as dependent counts only beyond what dependence leaves over.
- */
-static PetscInt Flip(PetscInt n, PetscReal size_w, const PetscReal z[], const PetscReal w[], const PetscBool aside[],
-                     PetscBool active[])
+/* A contact set aside as dependent violates only beyond what dependence leaves over. */
+static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
-  PetscInt changes = 0;
+  const Dense *d = (const Dense *)ctx;
+  const PetscReal size_w = Slack(d, active);
   PetscReal size_z = 0;
 
-  for (PetscInt i = 0; i < n; i++) size_z = PetscMax(size_z, PetscAbsReal(z[i]));
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscReal tol = aside[i] ? 1e-9 : 1e-13;
-    const PetscBool flip = (PetscBool)(active[i] ? z[i] < -tol * size_z : w[i] < -tol * size_w);
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < d->lcp->n; i++) size_z = PetscMax(size_z, PetscAbsReal(d->z[i]));
+  for (PetscInt i = 0; i < d->lcp->n; i++) {
+    const PetscReal tol = d->aside[i] ? 1e-9 : 1e-13;
 
-    if (flip) active[i] = (PetscBool)!active[i];
-    changes += flip;
+    violates[i] = (PetscBool)(active[i] ? d->z[i] < -tol * size_z : d->w[i] < -tol * size_w);
   }
-  return changes;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contacts active but not in a[0..k): dependent on those, they are set aside and carry no force. */
-static PetscInt SetAside(PetscInt n, PetscInt k, const PetscInt a[], PetscBool active[], PetscBool aside[])
+/* Contacts that depend on others of the set are set aside: they leave it, and carry no force. */
+static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
 {
-  PetscInt count = 0;
-
-  for (PetscInt i = 0; i < n; i++) aside[i] = active[i];
-  for (PetscInt j = 0; j < k; j++) aside[a[j]] = PETSC_FALSE;
-  for (PetscInt i = 0; i < n; i++) {
-    if (aside[i]) active[i] = PETSC_FALSE;
-    count += aside[i];
-  }
-  return count;
-}
-
-/* Whether the set was met before; remembers it. */
-static PetscBool Met(PetscInt n, const PetscBool active[], PetscInt its, unsigned long long past[])
-{
-  past[its] = HycoSetHash(n, active);
-  for (PetscInt t = 0; t < its; t++) {
-    if (past[t] == past[its]) return PETSC_TRUE;
-  }
-  return PETSC_FALSE;
-}
-
-PetscErrorCode HycoLCPActiveSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
-                                HycoSetFactor factor, PetscInt max_its, HycoLCPMonitor monitor, void *ctx,
-                                PetscBool active[], PetscReal z[], PetscInt *its, HycoLCPStatus *status)
-{
-  PetscInt *a, changes = 1, n_aside = 0;
-  PetscReal *w, size;
-  PetscBool *aside;
-  unsigned long long *past;
+  Dense *d = (Dense *)ctx;
+  const HycoLCP *lcp = d->lcp;
 
   PetscFunctionBegin;
-  *status = HYCO_LCP_LIMIT;
-  PetscCall(PetscMalloc4(n, &a, n, &w, n, &aside, max_its + 1, &past));
-  for (*its = 0; *its < max_its && changes;) {
-    PetscInt k = 0;
-    PetscBool singular;
-
-    if (Met(n, active, *its, past)) { /* with dependent contacts: their gaps contradict each other */
-      *status = n_aside ? HYCO_LCP_SINGULAR : HYCO_LCP_CYCLE;
-      break;
-    }
-    for (PetscInt i = 0; i < n; i++) {
-      if (active[i]) a[k++] = i;
-    }
-    (*its)++;
-    PetscCall(HycoLCPSolveOnSet(n, M, q, symmetric, factor, &k, a, z, &singular));
-    if (singular) {
-      *status = HYCO_LCP_SINGULAR;
-      break;
-    }
-    n_aside = SetAside(n, k, a, active, aside);
-    size = Slack(n, M, q, symmetric, active, k, a, z, w);
-    changes = Flip(n, size, z, w, aside, active);
-    if (monitor) PetscCall(monitor(*its, k, changes, ctx));
-    if (!changes) *status = HYCO_LCP_SOLVED;
+  d->k = d->n_aside = 0;
+  for (PetscInt i = 0; i < lcp->n; i++) {
+    if (active[i]) d->a[d->k++] = i;
   }
-  PetscCall(PetscFree4(a, w, aside, past));
+  PetscCall(HycoLCPSolveOnSet(lcp->n, lcp->M, lcp->q, lcp->symmetric, lcp->factor, &d->k, d->a, d->z, singular));
+  if (*singular) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < lcp->n; i++) d->aside[i] = active[i];
+  for (PetscInt j = 0; j < d->k; j++) d->aside[d->a[j]] = PETSC_FALSE;
+  for (PetscInt i = 0; i < lcp->n; i++) {
+    if (d->aside[i]) active[i] = PETSC_FALSE;
+    d->n_aside += d->aside[i];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
+                                HycoLCPStatus *status)
+{
+  Dense d = {lcp, z, NULL, 0, NULL, 0, NULL};
+  HycoActiveSet e = {.comm = MPI_COMM_NULL,
+                     .n = lcp->n,
+                     .max_its = lcp->max_its ? lcp->max_its : 50 + 4 * lcp->n,
+                     .ctx = &d,
+                     .solve = SolveOnSet,
+                     .violations = Violations,
+                     .monitor = lcp->monitor,
+                     .monitor_ctx = lcp->monitor_ctx};
+
+  PetscFunctionBegin;
+  if (lcp->p) {
+    PetscCall(HycoLCPSemidefinite(lcp, active, z, its, status));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscMalloc3(lcp->n, &d.w, lcp->n, &d.a, lcp->n, &d.aside));
+  PetscCall(HycoActiveSetRun(&e, active, its, status));
+  if (*status == HYCO_LCP_CYCLE && d.n_aside)
+    *status = HYCO_LCP_SINGULAR; /* dependent contacts whose gaps contradict */
+  PetscCall(PetscFree3(d.w, d.a, d.aside));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

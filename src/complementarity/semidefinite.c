@@ -1,5 +1,5 @@
 /*
-  Bodies that contact alone holds: the dense problem in z = (x_pinned, L),
+  Floating bodies, supported only by contact: the dense problem in z = (x_pinned, L),
 
       [ K'    A ] [x_p]   [-f']   [0]
       [ -A^T  S ] [ L ] + [ g ] = [w],     0 <= w complementary to L >= 0
@@ -13,43 +13,50 @@ typedef struct {
   PetscInt p, m, n; /* pinned, contacts, both */
   const PetscReal *M, *q;
   PetscReal flexibility; /* a typical S_ii: L = L' / flexibility and K' flexibility are of order one like A */
-  PetscInt *a;           /* the set: the pinned, then the active */
+  PetscInt k, *a;        /* the set: the pinned, then the active */
   PetscReal *z, *w;
-} Held;
+} Floating;
 
-static PetscErrorCode SolveOnSet(Held *h, PetscInt k, PetscBool *singular)
+static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
 {
+  Floating *h = (Floating *)ctx;
   PetscReal *A, *x, least = PETSC_MAX_REAL, most = 0;
   PetscBLASInt n, one = 1, info, *ipiv;
+  size_t k;
 
   PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(k, &n));
-  PetscCall(PetscMalloc3((size_t)k * (size_t)k, &A, k, &x, k, &ipiv));
-  for (PetscInt j = 0; j < k; j++) {
+  for (h->k = 0; h->k < h->p; h->k++) h->a[h->k] = h->k;
+  for (PetscInt i = 0; i < h->m; i++) {
+    if (active[i]) h->a[h->k++] = h->p + i;
+  }
+  k = (size_t)h->k;
+  PetscCall(PetscBLASIntCast(h->k, &n));
+  PetscCall(PetscMalloc3(k * k, &A, k, &x, k, &ipiv));
+  for (size_t j = 0; j < k; j++) {
     const PetscReal column = h->a[j] < h->p ? 1 : 1 / h->flexibility;
 
-    for (PetscInt i = 0; i < k; i++)
-      A[(size_t)j * (size_t)k + (size_t)i] =
+    for (size_t i = 0; i < k; i++)
+      A[j * k + i] =
           (h->a[i] < h->p ? h->flexibility : 1) * column * h->M[(size_t)h->a[j] * (size_t)h->n + (size_t)h->a[i]];
     x[j] = -h->q[h->a[j]] * (h->a[j] < h->p ? h->flexibility : 1);
   }
   LAPACKgetrf_(&n, &n, A, &n, ipiv, &info);
-  for (PetscInt j = 0; j < k; j++) {
-    least = PetscMin(least, PetscAbsReal(A[(size_t)j * (size_t)k + (size_t)j]));
-    most = PetscMax(most, PetscAbsReal(A[(size_t)j * (size_t)k + (size_t)j]));
+  for (size_t j = 0; j < k; j++) {
+    least = PetscMin(least, PetscAbsReal(A[j * k + j]));
+    most = PetscMax(most, PetscAbsReal(A[j * k + j]));
   }
   *singular = (PetscBool)(info != 0 || !(least > 1e-13 * most));
   PetscCall(PetscArrayzero(h->z, h->n));
   if (!*singular) {
     LAPACKgetrs_("N", &n, &one, A, &n, ipiv, x, &n, &info);
-    for (PetscInt j = 0; j < k; j++) h->z[h->a[j]] = x[j] / (h->a[j] < h->p ? 1 : h->flexibility);
+    for (size_t j = 0; j < k; j++) h->z[h->a[j]] = x[j] / (h->a[j] < h->p ? 1 : h->flexibility);
   }
   PetscCall(PetscFree3(A, x, ipiv));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* w, and what its round-off is measured against. */
-static PetscReal Slack(Held *h, PetscInt k)
+static PetscReal Slack(const Floating *h)
 {
   PetscReal size = 0;
 
@@ -57,7 +64,7 @@ static PetscReal Slack(Held *h, PetscInt k)
     h->w[i] = h->q[i];
     if (i >= h->p) size = PetscMax(size, PetscAbsReal(h->q[i]));
   }
-  for (PetscInt j = 0; j < k; j++) {
+  for (PetscInt j = 0; j < h->k; j++) {
     const PetscReal *column = h->M + (size_t)h->a[j] * (size_t)h->n;
 
     for (PetscInt i = h->p; i < h->n; i++) h->w[i] += column[i] * h->z[h->a[j]];
@@ -66,63 +73,40 @@ static PetscReal Slack(Held *h, PetscInt k)
   return size;
 }
 
-/* Changes the contacts that violate; only the last of them after a cycle. */
-static PetscInt Flip(Held *h, PetscReal size_w, PetscBool one, PetscBool active[])
+static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
-  PetscInt changes = 0, last = -1;
+  const Floating *h = (const Floating *)ctx;
+  const PetscReal size_w = Slack(h);
   PetscReal size_z = 0;
 
-  for (PetscInt i = 0; i < h->m; i++) size_z = PetscMax(size_z, PetscAbsReal(h->z[h->p + i]));
-  for (PetscInt i = 0; i < h->m; i++) {
-    const PetscBool flip = (PetscBool)(active[i] ? h->z[h->p + i] < -1e-12 * size_z : h->w[h->p + i] < -1e-12 * size_w);
-
-    if (!flip) continue;
-    if (!one) active[i] = (PetscBool)!active[i];
-    last = i;
-    changes++;
-  }
-  if (one && changes) active[last] = (PetscBool)!active[last];
-  return changes;
+  PetscFunctionBegin;
+  for (PetscInt i = h->p; i < h->n; i++) size_z = PetscMax(size_z, PetscAbsReal(h->z[i]));
+  for (PetscInt i = 0; i < h->m; i++)
+    violates[i] = (PetscBool)(active[i] ? h->z[h->p + i] < -1e-12 * size_z : h->w[h->p + i] < -1e-12 * size_w);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolveHeld(PetscInt p, PetscInt m, const PetscReal M[], const PetscReal q[], PetscInt max_its,
-                             HycoLCPMonitor monitor, void *ctx, PetscBool active[], PetscReal z[], PetscInt *its,
-                             HycoLCPStatus *status)
+PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
+                                   HycoLCPStatus *status)
 {
-  Held h = {p, m, p + m, M, q, 0, NULL, z, NULL};
-  unsigned long long *past;
-  PetscBool one = PETSC_FALSE;
-  PetscInt changes = 1;
+  const PetscInt n = lcp->p + lcp->n;
+  Floating h = {lcp->p, lcp->n, n, lcp->M, lcp->q, 0, 0, NULL, z, NULL};
+  const HycoActiveSet e = {.comm = MPI_COMM_NULL,
+                           .n = lcp->n,
+                           .max_its = lcp->max_its ? lcp->max_its : 50 + 4 * lcp->n,
+                           .one_by_one = PETSC_TRUE,
+                           .ctx = &h,
+                           .solve = SolveOnSet,
+                           .violations = Violations,
+                           .monitor = lcp->monitor,
+                           .monitor_ctx = lcp->monitor_ctx};
 
   PetscFunctionBegin;
-  *status = HYCO_LCP_LIMIT;
-  PetscCall(PetscMalloc3(h.n, &h.a, h.n, &h.w, max_its + 1, &past));
-  for (PetscInt i = p; i < h.n; i++)
-    h.flexibility = PetscMax(h.flexibility, PetscAbsReal(M[(size_t)i * (size_t)h.n + (size_t)i]));
+  PetscCall(PetscMalloc2(n, &h.a, n, &h.w));
+  for (PetscInt i = lcp->p; i < n; i++)
+    h.flexibility = PetscMax(h.flexibility, PetscAbsReal(lcp->M[(size_t)i * (size_t)n + (size_t)i]));
   if (h.flexibility == 0) h.flexibility = 1;
-  for (*its = 0; *its < max_its && changes;) {
-    PetscInt k = 0;
-    PetscBool singular = PETSC_FALSE;
-
-    past[*its] = HycoSetHash(m, active);
-    for (PetscInt t = 0; t < *its; t++) one = (PetscBool)(one || past[t] == past[*its]);
-    while (k < p) {
-      h.a[k] = k;
-      k++;
-    }
-    for (PetscInt i = 0; i < m; i++) {
-      if (active[i]) h.a[k++] = p + i;
-    }
-    (*its)++;
-    PetscCall(SolveOnSet(&h, k, &singular));
-    if (singular) {
-      *status = HYCO_LCP_SINGULAR;
-      break;
-    }
-    changes = Flip(&h, Slack(&h, k), one, active);
-    if (monitor) PetscCall(monitor(*its, k - p, changes, ctx));
-    if (!changes) *status = HYCO_LCP_SOLVED;
-  }
-  PetscCall(PetscFree3(h.a, h.w, past));
+  PetscCall(HycoActiveSetRun(&e, active, its, status));
+  PetscCall(PetscFree2(h.a, h.w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,51 +1,172 @@
 /*
-  TAO on the contact problem. Its bound-constrained types minimise the quadratic
+  Complementarity problems posed to a Tao, which is kept from one to the next. TAO's bound-constrained types minimise
 
       min 1/2 y^T H y - f^T y,  lo <= y <= hi            H symmetric positive (semi)definite
 
   and its semismooth types solve the complementarity problem w = q + M z >= 0, z >= 0, w.z = 0, symmetric or not, by the
   Fischer-Burmeister function (T. S. Munson et al., INFORMS J. Comput. 13 (2001) 294-311). Both stop on absolute sizes,
-  so the problem is scaled first: unit diagonal, right-hand side of size one. What TAO says is not evidence: the caller
-  recomputes the residuals. A PETSC error inside TAO is caught: it means not solved, like a limit of iterations.
+  so the problem is scaled first: unit diagonal, right-hand side of size one. A type that a program registers sees the
+  same: solution, bounds, Hessian, objective and its gradient H y - f. hyco's own types (tao_types.c) take the problem
+  as it is. What TAO says is not evidence: the caller recomputes the residuals. A PETSC error inside TAO is caught: it
+  means not solved, like a limit of iterations.
 */
-#include <hycolcp.h>
-#include <petsctao.h>
+#include <hycotao.h>
 
-const char *const HycoTaoTypes[] = {"gpcg",   "tron",   "bntr",  "bnls",  "bntl",  "blmvm", "bncg",  "bqnls", "bqnkls",
-                                    "bqnktr", "bqnktl", "bqpip", "ssils", "asils", "ssfls", "asfls", NULL};
+static const struct {
+  const char *name;
+  int traits;
+} known[] = {{"gpcg", HYCO_TAO_SYMMETRIC | HYCO_TAO_NEWTON | HYCO_TAO_RESTARTS},
+             {"tron", HYCO_TAO_SYMMETRIC | HYCO_TAO_NEWTON | HYCO_TAO_RESTARTS},
+             {"bntr", HYCO_TAO_SYMMETRIC | HYCO_TAO_NEWTON | HYCO_TAO_RESTARTS},
+             {"bnls", HYCO_TAO_SYMMETRIC | HYCO_TAO_NEWTON | HYCO_TAO_RESTARTS},
+             {"bntl", HYCO_TAO_SYMMETRIC | HYCO_TAO_NEWTON | HYCO_TAO_RESTARTS},
+             {"blmvm", HYCO_TAO_SYMMETRIC},
+             {"bncg", HYCO_TAO_SYMMETRIC},
+             {"bqnls", HYCO_TAO_SYMMETRIC},
+             {"bqnkls", HYCO_TAO_SYMMETRIC},
+             {"bqnktr", HYCO_TAO_SYMMETRIC},
+             {"bqnktl", HYCO_TAO_SYMMETRIC},
+             {"bqpip", HYCO_TAO_SYMMETRIC | HYCO_TAO_ENTRIES},
+             {"ssils", HYCO_TAO_DENSE | HYCO_TAO_SEMISMOOTH | HYCO_TAO_NEWTON},
+             {"asils", HYCO_TAO_DENSE | HYCO_TAO_SEMISMOOTH | HYCO_TAO_NEWTON},
+             {"ssfls", HYCO_TAO_DENSE | HYCO_TAO_SEMISMOOTH | HYCO_TAO_NEWTON},
+             {"asfls", HYCO_TAO_DENSE | HYCO_TAO_SEMISMOOTH | HYCO_TAO_NEWTON},
+             {HYCO_TAO_ACTIVE_SET, HYCO_TAO_OWN},
+             {HYCO_TAO_LEMKE, HYCO_TAO_OWN | HYCO_TAO_DENSE}};
 
-PetscBool HycoTaoSemismooth(PetscInt type)
+int HycoTaoTraits(const char type[])
 {
-  return (PetscBool)(type >= HYCO_TAO_SEMISMOOTH);
+  for (size_t k = 0; k < sizeof(known) / sizeof(known[0]); k++) {
+    if (strcasecmp(known[k].name, type) == 0) return known[k].traits;
+  }
+  return 0;
 }
 
-typedef struct {
-  Mat H;
-  Vec f;
-  PetscBool newton;
-  PetscReal best; /* least residual so far, and its iteration */
-  PetscInt best_at;
-} Quadratic;
+PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char list[HYCO_LINE])
+{
+  PetscErrorCode (*create)(Tao);
+
+  PetscFunctionBegin;
+  list[0] = name[0] = '\0';
+  for (size_t k = 0; k < sizeof(known) / sizeof(known[0]); k++) {
+    if (known[k].traits & HYCO_TAO_OWN) continue;
+    if (strcasecmp(known[k].name, type) == 0) PetscCall(PetscStrncpy(name, known[k].name, HYCO_TAO_NAME));
+    PetscCall(PetscStrlcat(list, k ? ", " : "", HYCO_LINE));
+    PetscCall(PetscStrlcat(list, known[k].name, HYCO_LINE));
+  }
+  PetscCall(PetscFunctionListFind(TaoList, type, &create));
+  if (!name[0] && create) PetscCall(PetscStrncpy(name, type, HYCO_TAO_NAME));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTaoCreate(MPI_Comm comm, HycoTao *t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoTaoRegisterAll());
+  PetscCall(PetscNew(t));
+  (*t)->comm = comm;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What belongs to one type and one size. */
+static PetscErrorCode Reset(HycoTao t)
+{
+  PetscFunctionBegin;
+  PetscCall(TaoDestroy(&t->tao));
+  PetscCall(MatDestroy(&t->J));
+  PetscCall(VecDestroy(&t->w));
+  PetscCall(VecDestroy(&t->d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The copies of a dense problem. */
+static PetscErrorCode ResetDense(HycoTao t)
+{
+  PetscFunctionBegin;
+  PetscCall(MatDestroy(&t->dense));
+  PetscCall(VecDestroy(&t->f));
+  PetscCall(VecDestroy(&t->lo));
+  PetscCall(VecDestroy(&t->hi));
+  PetscCall(VecDestroy(&t->y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTaoDestroy(HycoTao *t)
+{
+  PetscFunctionBegin;
+  if (!*t) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Reset(*t));
+  PetscCall(ResetDense(*t));
+  PetscCall(VecDestroy(&(*t)->placed));
+  PetscCall(PetscFree(*t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTaoSetType(HycoTao t, const char type[], PetscInt max_its)
+{
+  PetscFunctionBegin;
+  if (t->tao && (strcmp(t->type, type) || t->max_its != max_its)) PetscCall(Reset(t));
+  PetscCall(PetscStrncpy(t->type, type, sizeof(t->type)));
+  t->traits = HycoTaoTraits(type);
+  t->max_its = max_its;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The Tao for a problem of y's size, with the user's options; *made: it is new. */
+static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *made)
+{
+  PetscInt n, N;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(y, &n));
+  PetscCall(VecGetSize(y, &N));
+  if (t->tao && (n != t->n || N != t->N)) PetscCall(Reset(t));
+  *made = (PetscBool)!t->tao;
+  if (!*made) PetscFunctionReturn(PETSC_SUCCESS);
+  t->n = n;
+  t->N = N;
+  PetscCall(TaoCreate(t->comm, &t->tao));
+  PetscCall(TaoSetType(t->tao, t->type));
+  PetscCall(TaoSetOptionsPrefix(t->tao, "hyco_"));
+  PetscCall(TaoSetApplicationContext(t->tao, t));
+  PetscCall(TaoSetMaximumIterations(t->tao, max_its));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The user's -hyco_tao_... options. -hyco_tao_type among them is HycoSolver's: it must not change the type of a
+   fallback, or of another problem. */
+static PetscErrorCode ReadOptions(HycoTao t)
+{
+  char named[HYCO_TAO_NAME];
+  PetscBool given;
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsGetString(NULL, "hyco_", "-tao_type", named, sizeof(named), &given));
+  if (given) PetscCall(PetscOptionsSetValue(NULL, "-hyco_tao_type", t->type));
+  PetscCall(TaoSetFromOptions(t->tao));
+  if (given) PetscCall(PetscOptionsSetValue(NULL, "-hyco_tao_type", named));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* So many iterations without halving the residual end a run: few once it is small, where round-off rules; many above,
    and for first-order types, which may stand still for a while. */
-static PetscInt Patience(const Quadratic *q)
+static PetscInt Patience(const HycoTao t)
 {
-  if (q->best <= 1e-10) return 5;
-  return q->newton && q->best <= 1e-8 ? 20 : 300;
+  if (t->best <= 1e-10) return 5;
+  return t->traits & HYCO_TAO_NEWTON && t->best <= 1e-8 ? 20 : 300;
 }
 
 static PetscErrorCode Objective(Tao tao, Vec y, PetscReal *value, Vec gradient, void *ctx)
 {
-  Quadratic *q = (Quadratic *)ctx;
+  HycoTao t = (HycoTao)ctx;
   PetscScalar yHy, fy;
 
   PetscFunctionBegin;
   (void)tao;
-  PetscCall(MatMult(q->H, y, gradient));
+  PetscCall(MatMult(t->H, y, gradient));
   PetscCall(VecDot(y, gradient, &yHy));
-  PetscCall(VecDot(y, q->f, &fy));
-  PetscCall(VecAXPY(gradient, -1, q->f));
+  PetscCall(VecDot(y, t->F, &fy));
+  PetscCall(VecAXPY(gradient, -1, t->F));
   *value = yHy / 2 - fy;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -60,30 +181,30 @@ static PetscErrorCode Hessian(Tao tao, Vec y, Mat H, Mat P, void *ctx)
 /* w = M z - f */
 static PetscErrorCode Slack(Tao tao, Vec z, Vec w, void *ctx)
 {
-  Quadratic *q = (Quadratic *)ctx;
+  HycoTao t = (HycoTao)ctx;
 
   PetscFunctionBegin;
   (void)tao;
-  PetscCall(MatMult(q->H, z, w));
-  PetscCall(VecAXPY(w, -1, q->f));
+  PetscCall(MatMult(t->H, z, w));
+  PetscCall(VecAXPY(w, -1, t->F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The types overwrite J by their own Newton matrix: M again at each call. */
 static PetscErrorCode Jacobian(Tao tao, Vec z, Mat J, Mat P, void *ctx)
 {
-  Quadratic *q = (Quadratic *)ctx;
+  HycoTao t = (HycoTao)ctx;
 
   PetscFunctionBegin;
   (void)tao, (void)z, (void)P;
-  PetscCall(MatCopy(q->H, J, SAME_NONZERO_PATTERN));
+  PetscCall(MatCopy(t->H, J, SAME_NONZERO_PATTERN));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* TAO's own test; and an end to iterations that round-off or stagnation makes useless. */
 static PetscErrorCode Converged(Tao tao, void *ctx)
 {
-  Quadratic *q = (Quadratic *)ctx;
+  HycoTao t = (HycoTao)ctx;
   TaoConvergedReason why;
   PetscInt it;
   PetscReal residual;
@@ -92,26 +213,26 @@ static PetscErrorCode Converged(Tao tao, void *ctx)
   PetscCall(TaoDefaultConvergenceTest(tao, NULL));
   PetscCall(TaoGetSolutionStatus(tao, &it, NULL, &residual, NULL, NULL, &why));
   if (why != TAO_CONTINUE_ITERATING) PetscFunctionReturn(PETSC_SUCCESS);
-  if (residual <= q->best / 2) {
-    q->best = residual;
-    q->best_at = it;
-  } else if (it - q->best_at >= Patience(q))
-    PetscCall(TaoSetConvergedReason(tao, q->best <= 1e-10 ? TAO_CONVERGED_USER : TAO_DIVERGED_USER));
+  if (residual <= t->best / 2) {
+    t->best = residual;
+    t->best_at = it;
+  } else if (it - t->best_at >= Patience(t))
+    PetscCall(TaoSetConvergedReason(tao, t->best <= 1e-10 ? TAO_CONVERGED_USER : TAO_DIVERGED_USER));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* `krylov`: without a factor, which a singular H (dependent contacts) does not have. */
-static PetscErrorCode SetBoundProblem(Tao tao, Quadratic *q, PetscBool krylov)
+static PetscErrorCode SetBoundProblem(HycoTao t, PetscBool krylov)
 {
   PetscBool shell;
   KSP ksp;
 
   PetscFunctionBegin;
-  PetscCall(TaoSetObjectiveAndGradient(tao, NULL, Objective, q));
-  PetscCall(TaoSetHessian(tao, q->H, q->H, Hessian, NULL));
-  PetscCall(TaoSetTolerances(tao, 1e-13, 1e-14, 0));
-  PetscCall(PetscObjectTypeCompare((PetscObject)q->H, MATSHELL, &shell));
-  PetscCall(TaoGetKSP(tao, &ksp));
+  PetscCall(TaoSetObjectiveAndGradient(t->tao, NULL, Objective, t));
+  PetscCall(TaoSetHessian(t->tao, t->H, t->H, Hessian, NULL));
+  PetscCall(TaoSetTolerances(t->tao, 1e-13, 1e-14, 0));
+  PetscCall(PetscObjectTypeCompare((PetscObject)t->H, MATSHELL, &shell));
+  PetscCall(TaoGetKSP(t->tao, &ksp));
   if ((shell || krylov) && ksp) { /* a shell has no entries to precondition with */
     PC pc;
 
@@ -121,48 +242,50 @@ static PetscErrorCode SetBoundProblem(Tao tao, Quadratic *q, PetscBool krylov)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SetComplementarity(Tao tao, Quadratic *q, Mat J, Vec w, PetscBool krylov)
+static PetscErrorCode SetComplementarity(HycoTao t, PetscBool krylov)
 {
   KSP ksp;
   PC pc;
-  PetscInt n;
 
   PetscFunctionBegin;
-  PetscCall(TaoSetConstraintsRoutine(tao, w, Slack, q));
-  PetscCall(TaoSetJacobianRoutine(tao, J, J, Jacobian, q));
-  PetscCall(TaoSetTolerances(tao, 0, 0, 0));
-  PetscCall(TaoSetFunctionLowerBound(tao, 1e-12)); /* 1e-8, its default, is too coarse; 1e-20 never stops */
-  PetscCall(TaoGetKSP(tao, &ksp));
+  if (!t->w) PetscCall(VecDuplicate(t->F, &t->w));
+  if (!t->J) PetscCall(MatDuplicate(t->H, MAT_COPY_VALUES, &t->J));
+  PetscCall(TaoSetConstraintsRoutine(t->tao, t->w, Slack, t));
+  PetscCall(TaoSetJacobianRoutine(t->tao, t->J, t->J, Jacobian, t));
+  PetscCall(TaoSetTolerances(t->tao, 0, 0, 0));
+  PetscCall(TaoSetFunctionLowerBound(t->tao, 1e-12)); /* 1e-8, its default, is too coarse; 1e-20 never stops */
+  PetscCall(TaoGetKSP(t->tao, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCSetType(pc, krylov ? PCNONE : PCLU));
   PetscCall(KSPSetType(ksp, krylov ? KSPGMRES : KSPPREONLY));
-  PetscCall(VecGetSize(w, &n));
-  if (krylov) PetscCall(KSPGMRESSetRestart(ksp, PetscMin(n, 200)));
-  if (krylov) PetscCall(KSPSetTolerances(ksp, 1e-12, PETSC_DEFAULT, PETSC_DEFAULT, 2 * n));
+  if (krylov) PetscCall(KSPGMRESSetRestart(ksp, PetscMin(t->N, 200)));
+  if (krylov) PetscCall(KSPSetTolerances(ksp, 1e-12, PETSC_DEFAULT, PETSC_DEFAULT, 2 * t->N));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What may fail inside TAO. */
-static PetscErrorCode Run(Tao tao, PetscInt type, PetscInt max_its, Quadratic *q, Vec lo, Vec hi, Vec y, Mat J, Vec w,
-                          PetscBool krylov, PetscInt *its, PetscBool *solved)
+static PetscErrorCode Run(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved)
 {
   TaoConvergedReason why;
+  PetscBool made;
 
   PetscFunctionBegin;
-  PetscCall(TaoSetType(tao, HycoTaoTypes[type]));
-  PetscCall(TaoSetOptionsPrefix(tao, "hyco_"));
-  PetscCall(TaoSetSolution(tao, y));
-  PetscCall(TaoSetVariableBounds(tao, lo, hi));
-  PetscCall(TaoSetMaximumIterations(tao, max_its ? max_its : 2000));
-  PetscCall(TaoSetConvergenceTest(tao, Converged, q));
-  if (HycoTaoSemismooth(type))
-    PetscCall(SetComplementarity(tao, q, J, w, krylov));
+  PetscCall(Prepare(t, y, t->max_its ? t->max_its : 2000, &made));
+  PetscCall(TaoSetSolution(t->tao, y));
+  PetscCall(TaoSetVariableBounds(t->tao, lo, hi));
+  if (made) PetscCall(TaoSetConvergenceTest(t->tao, Converged, t));
+  if (t->traits & HYCO_TAO_SEMISMOOTH) {
+    if (made) PetscCall(SetComplementarity(t, krylov));
+  } else if (made)
+    PetscCall(SetBoundProblem(t, krylov));
   else
-    PetscCall(SetBoundProblem(tao, q, krylov));
-  PetscCall(TaoSetFromOptions(tao));
-  PetscCall(TaoSolve(tao));
-  PetscCall(TaoGetConvergedReason(tao, &why));
-  PetscCall(TaoGetIterationNumber(tao, its));
+    PetscCall(TaoSetHessian(t->tao, t->H, t->H, Hessian, NULL));
+  if (made) PetscCall(ReadOptions(t));
+  t->best = PETSC_MAX_REAL;
+  t->best_at = 0;
+  PetscCall(TaoSolve(t->tao));
+  PetscCall(TaoGetConvergedReason(t->tao, &why));
+  PetscCall(TaoGetIterationNumber(t->tao, its));
   *solved = (PetscBool)(why > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -200,14 +323,10 @@ static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One run of TAO from y; an error inside it is told by *failed. y ends finite. */
-static PetscErrorCode CatchRun(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscBool krylov,
-                               PetscInt *its, PetscBool *solved, PetscBool *failed)
+/* One run of TAO from y; an error inside it is told by *failed, and its Tao given up. y ends finite. */
+static PetscErrorCode CatchRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved,
+                               PetscBool *failed)
 {
-  Quadratic q = {H, f, (PetscBool)(type < HYCO_TAO_BLMVM || HycoTaoSemismooth(type)), PETSC_MAX_REAL, 0};
-  Tao tao;
-  Vec w;
-  Mat J = NULL;
   PetscReal norm;
   PetscErrorCode caught;
   char message[HYCO_LINE];
@@ -215,36 +334,33 @@ static PetscErrorCode CatchRun(PetscInt type, PetscInt max_its, Mat H, Vec f, Ve
   PetscFunctionBegin;
   *its = 0;
   *solved = PETSC_FALSE;
-  PetscCall(VecDuplicate(y, &w));
-  if (HycoTaoSemismooth(type)) PetscCall(MatDuplicate(H, MAT_COPY_VALUES, &J));
-  PetscCall(TaoCreate(PetscObjectComm((PetscObject)y), &tao));
   PetscCall(HycoCatchBegin());
-  caught = Run(tao, type, max_its, &q, lo, hi, y, J, w, krylov, its, solved);
-  if (caught)
-    (void)TaoDestroy(&tao);
-  else
-    caught = TaoDestroy(&tao);
+  caught = Run(t, lo, hi, y, krylov, its, solved);
+  if (caught || !*solved || krylov) {
+    const PetscErrorCode more = TaoDestroy(&t->tao);
+
+    if (caught) t->tao = NULL;
+    if (!caught) caught = more;
+  }
   PetscCall(HycoCatchEnd(caught, message));
-  if (caught) PetscCall(PetscInfo(NULL, "TAO %s failed: %s\n", HycoTaoTypes[type], message));
+  if (caught) PetscCall(PetscInfo(NULL, "TAO %s failed: %s\n", t->type, message));
   if (caught) *solved = PETSC_FALSE;
   *failed = (PetscBool)(caught != 0);
   PetscCall(VecNorm(y, NORM_2, &norm));
   if (PetscIsInfOrNanReal(norm)) PetscCall(VecSet(y, 0));
   PetscCall(VecMedian(lo, y, hi, y));
-  PetscCall(MatDestroy(&J));
-  PetscCall(VecDestroy(&w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* | y - median(lo, y - (H y - f), hi) |, 0 at the solution. */
-static PetscErrorCode Projected(Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscReal *size)
+static PetscErrorCode Projected(const HycoTao t, Vec lo, Vec hi, Vec y, PetscReal *size)
 {
   Vec step;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(y, &step));
-  PetscCall(MatMult(H, y, step));
-  PetscCall(VecAXPY(step, -1, f));
+  PetscCall(MatMult(t->H, y, step));
+  PetscCall(VecAXPY(step, -1, t->F));
   PetscCall(VecAYPX(step, -1, y));
   PetscCall(VecMedian(lo, step, hi, step));
   PetscCall(VecAXPY(step, -1, y));
@@ -254,8 +370,7 @@ static PetscErrorCode Projected(Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscReal *
 }
 
 /* Newton types that stood still come through from elsewhere; the better of the two is kept. */
-static PetscErrorCode SecondStart(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec lo, Vec hi, Vec y,
-                                  PetscBool krylov, PetscInt *its, PetscBool *solved)
+static PetscErrorCode SecondStart(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved)
 {
   const PetscInt first_its = *its;
   Vec first;
@@ -263,90 +378,160 @@ static PetscErrorCode SecondStart(PetscInt type, PetscInt max_its, Mat H, Vec f,
   PetscBool failed;
 
   PetscFunctionBegin;
-  PetscCall(Projected(H, f, lo, hi, y, &before));
+  PetscCall(Projected(t, lo, hi, y, &before));
   if (before < 1e-10) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(y, &first));
   PetscCall(VecCopy(y, first));
   PetscCall(VecSet(y, 1));
   PetscCall(VecMedian(lo, y, hi, y));
-  PetscCall(CatchRun(type, max_its, H, f, lo, hi, y, krylov, its, solved, &failed));
+  PetscCall(CatchRun(t, lo, hi, y, krylov, its, solved, &failed));
   *its += first_its;
-  PetscCall(Projected(H, f, lo, hi, y, &after));
+  PetscCall(Projected(t, lo, hi, y, &after));
   if (!*solved && !(after < before)) PetscCall(VecCopy(first, y));
   PetscCall(VecDestroy(&first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTaoSolve(PetscInt type, PetscInt max_its, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscInt *its,
-                            PetscBool *solved)
+PetscErrorCode HycoTaoSolve(HycoTao t, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscInt *its, PetscBool *solved)
 {
-  Vec d;
   PetscReal size = 1;
   PetscBool failed;
+  Vec d;
 
   PetscFunctionBegin;
+  t->H = H;
+  t->F = f;
   PetscCall(VecDuplicate(y, &d));
   PetscCall(Scale(H, f, lo, hi, y, d, &size));
-  PetscCall(CatchRun(type, max_its, H, f, lo, hi, y, PETSC_FALSE, its, solved, &failed));
-  if (failed) PetscCall(CatchRun(type, max_its, H, f, lo, hi, y, PETSC_TRUE, its, solved, &failed));
-  if (!*solved && type < HYCO_TAO_BLMVM) PetscCall(SecondStart(type, max_its, H, f, lo, hi, y, failed, its, solved));
+  PetscCall(CatchRun(t, lo, hi, y, PETSC_FALSE, its, solved, &failed));
+  if (failed) PetscCall(CatchRun(t, lo, hi, y, PETSC_TRUE, its, solved, &failed));
+  if (!*solved && t->traits & HYCO_TAO_RESTARTS) PetscCall(SecondStart(t, lo, hi, y, failed, its, solved));
   PetscCall(VecPointwiseMult(y, y, d));
   PetscCall(VecScale(y, size));
   PetscCall(VecDestroy(&d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of each pair (z_i, w_i) the smaller is 0: a force that an interior or first-order type left where the gap is open. */
-static void Clean(PetscInt n, const PetscReal M[], const PetscReal q[], PetscReal z[])
+/* Poses what hyco's own types take as it is; y: the Tao's solution. */
+static PetscErrorCode SolveOwn(HycoTao t, Vec y, PetscInt max_its)
 {
+  PetscBool made;
+
+  PetscFunctionBegin;
+  PetscCall(Prepare(t, y, max_its, &made));
+  if (made) PetscCall(ReadOptions(t));
+  PetscCall(TaoSetSolution(t->tao, y));
+  PetscCall(TaoSolve(t->tao));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool active[], Vec y, PetscInt *its,
+                               HycoLCPStatus *status)
+{
+  PetscFunctionBegin;
+  t->lcp = NULL;
+  t->set = set;
+  t->active = active;
+  t->monitor = set->monitor;
+  t->monitor_ctx = set->monitor_ctx;
+  PetscCall(SolveOwn(t, y, set->max_its));
+  *its = t->its;
+  *status = t->status;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of each pair (z_i, w_i) the smaller is 0: a force that an interior or first-order type left where the gap is open. */
+static void Clean(const HycoLCP *lcp, PetscReal z[])
+{
+  const PetscInt n = lcp->n;
   PetscReal size_z = 0, size_q = 0;
 
   for (PetscInt i = 0; i < n; i++) {
     size_z = PetscMax(size_z, PetscAbsReal(z[i]));
-    size_q = PetscMax(size_q, PetscAbsReal(q[i]));
+    size_q = PetscMax(size_q, PetscAbsReal(lcp->q[i]));
   }
   for (PetscInt i = 0; i < n; i++) {
-    PetscReal w = q[i];
+    PetscReal w = lcp->q[i];
 
     if (z[i] == 0 || z[i] > 1e-9 * size_z) continue;
-    for (PetscInt j = 0; j < n; j++) w += M[(size_t)j * (size_t)n + (size_t)i] * z[j];
+    for (PetscInt j = 0; j < n; j++) w += lcp->M[(size_t)j * (size_t)n + (size_t)i] * z[j];
     if (w * size_z > z[i] * size_q) z[i] = 0;
   }
 }
 
-PetscErrorCode HycoTaoLCP(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric, PetscInt type,
-                          PetscInt max_its, PetscReal z[], PetscInt *its, PetscBool *solved)
+/* Scaled copies of M, -q and the bounds, for TAO's types. */
+static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
 {
-  Mat H;
-  Vec f, lo, hi, y;
   PetscScalar *h;
+  PetscInt n = -1;
 
   PetscFunctionBegin;
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, n, n, NULL, &H));
-  PetscCall(MatDenseGetArray(H, &h));
-  PetscCall(PetscArraycpy(h, M, (size_t)n * (size_t)n));
-  PetscCall(MatDenseRestoreArray(H, &h));
-  PetscCall(MatAssemblyBegin(H, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(H, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatSetOption(H, MAT_SYMMETRIC, symmetric));
-  PetscCall(MatCreateVecs(H, &y, &f));
-  PetscCall(VecDuplicate(y, &lo));
-  PetscCall(VecDuplicate(y, &hi));
-  PetscCall(VecSet(y, 0));
-  PetscCall(VecSet(lo, 0));
-  PetscCall(VecSet(hi, PETSC_INFINITY));
-  PetscCall(VecGetArray(f, &h));
-  for (PetscInt i = 0; i < n; i++) h[i] = -q[i];
-  PetscCall(VecRestoreArray(f, &h));
-  PetscCall(HycoTaoSolve(type, max_its, H, f, lo, hi, y, its, solved));
-  PetscCall(VecGetArray(y, &h));
-  PetscCall(PetscArraycpy(z, h, n));
-  PetscCall(VecRestoreArray(y, &h));
-  Clean(n, M, q, z);
-  PetscCall(VecDestroy(&y));
-  PetscCall(VecDestroy(&f));
-  PetscCall(VecDestroy(&lo));
-  PetscCall(VecDestroy(&hi));
-  PetscCall(MatDestroy(&H));
+  if (t->dense) PetscCall(MatGetSize(t->dense, &n, NULL));
+  if (n != lcp->n) {
+    PetscCall(Reset(t));
+    PetscCall(ResetDense(t));
+    PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, lcp->n, lcp->n, NULL, &t->dense));
+    PetscCall(MatCreateVecs(t->dense, &t->y, &t->f));
+    PetscCall(VecDuplicate(t->y, &t->lo));
+    PetscCall(VecDuplicate(t->y, &t->hi));
+  }
+  PetscCall(MatDenseGetArray(t->dense, &h));
+  PetscCall(PetscArraycpy(h, lcp->M, (size_t)lcp->n * (size_t)lcp->n));
+  PetscCall(MatDenseRestoreArray(t->dense, &h));
+  PetscCall(MatAssemblyBegin(t->dense, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(t->dense, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatSetOption(t->dense, MAT_SYMMETRIC, lcp->symmetric));
+  PetscCall(VecSet(t->y, 0));
+  PetscCall(VecSet(t->lo, 0));
+  PetscCall(VecSet(t->hi, PETSC_INFINITY));
+  PetscCall(VecGetArray(t->f, &h));
+  for (PetscInt i = 0; i < lcp->n; i++) h[i] = -lcp->q[i];
+  PetscCall(VecRestoreArray(t->f, &h));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The solution vector of hyco's own types, on z itself. */
+static PetscErrorCode PlaceSolution(HycoTao t, PetscInt n, PetscReal z[])
+{
+  PetscInt old = -1;
+
+  PetscFunctionBegin;
+  if (t->placed) PetscCall(VecGetSize(t->placed, &old));
+  if (old != n) {
+    PetscCall(Reset(t));
+    PetscCall(VecDestroy(&t->placed));
+    PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, n, NULL, &t->placed));
+  }
+  PetscCall(VecPlaceArray(t->placed, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
+                               PetscBool *solved)
+{
+  const PetscInt limit = t->max_its ? t->max_its : 50 + 4 * lcp->n;
+  const PetscScalar *y;
+
+  PetscFunctionBegin;
+  if (t->traits & HYCO_TAO_OWN) {
+    t->lcp = lcp;
+    t->set = NULL;
+    t->z = z;
+    t->active = active;
+    t->monitor = lcp->monitor;
+    t->monitor_ctx = lcp->monitor_ctx;
+    PetscCall(PlaceSolution(t, lcp->p + lcp->n, z));
+    PetscCall(SolveOwn(t, t->placed, t->traits & HYCO_TAO_DENSE ? 50 * (lcp->n + 10) : limit));
+    PetscCall(VecResetArray(t->placed));
+    *its = t->its;
+    *solved = (PetscBool)(t->status == HYCO_LCP_SOLVED);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(CopyDense(t, lcp));
+  PetscCall(HycoTaoSolve(t, t->dense, t->f, t->lo, t->hi, t->y, its, solved));
+  PetscCall(VecGetArrayRead(t->y, &y));
+  PetscCall(PetscArraycpy(z, y, lcp->n));
+  PetscCall(VecRestoreArrayRead(t->y, &y));
+  Clean(lcp, z);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -39,7 +39,7 @@ PetscErrorCode HycoNNLSCheck(PetscInt m, PetscInt n, const PetscReal A[], const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTaoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscInt type,
+PetscErrorCode HycoTaoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], const char type[],
                            PetscReal rtol, PetscReal x[], PetscReal *residual, PetscBool *solved)
 {
   const PetscBLASInt one = 1;
@@ -47,6 +47,8 @@ PetscErrorCode HycoTaoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Pe
   PetscBLASInt mb, nb;
   PetscReal *M, *q;
   PetscInt its;
+  HycoLCP lcp = {.n = n, .symmetric = PETSC_TRUE};
+  HycoTao tao;
 
   PetscFunctionBegin;
   PetscCall(PetscBLASIntCast(m, &mb));
@@ -54,7 +56,12 @@ PetscErrorCode HycoTaoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Pe
   PetscCall(PetscMalloc2((size_t)n * (size_t)n, &M, n, &q));
   BLASgemm_("T", "N", &nb, &nb, &mb, &unit, A, &mb, A, &mb, &zero, M, &nb);
   BLASgemv_("T", &mb, &nb, &minus, A, &mb, b, &one, &zero, q, &one);
-  PetscCall(HycoTaoLCP(n, M, q, PETSC_TRUE, type, 0, x, &its, solved));
+  lcp.M = M;
+  lcp.q = q;
+  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, &tao));
+  PetscCall(HycoTaoSetType(tao, type, 0));
+  PetscCall(HycoTaoSolveLCP(tao, &lcp, NULL, x, &its, solved));
+  PetscCall(HycoTaoDestroy(&tao));
   PetscCall(HycoNNLSCheck(m, n, A, b, x, rtol, residual, solved));
   PetscCall(PetscFree2(M, q));
   PetscFunctionReturn(PETSC_SUCCESS);

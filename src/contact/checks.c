@@ -1,9 +1,9 @@
 /* Whether a contact's geometry is one that small displacements may start from, and whether they stayed small. */
 #include "facing.h"
+#include <hycovector.h>
 
-/* Of a slave's facet: how deep surfaces may overlap before any load; how far a map may move partners along them. */
+/* Of a slave's facet: how deep surfaces may overlap before any load. */
 #define HYCO_OVERLAP_SHARE 0.5
-#define HYCO_APART_SHARE   0.5
 /* Of the mesh's length: an overlap no larger is round-off. */
 #define HYCO_ROUNDING 1e-12
 
@@ -28,42 +28,18 @@ static PetscErrorCode SizeAt(HycoFE fe, const char group[], PetscInt node, Sizes
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the slave to the master point of contact k, on moved or drawn nodes. */
-static void Across(const HycoPairs *p, PetscInt k, const PetscReal X[], PetscReal r[3])
-{
-  for (PetscInt c = 0; c < 3; c++) {
-    r[c] = -X[3 * p->slave[k] + c];
-    for (PetscInt j = p->master_start[k]; j < p->master_start[k + 1]; j++)
-      r[c] += p->weight[j] * X[3 * p->master[j] + c];
-  }
-}
-
-static PetscReal Length(const PetscReal r[3])
-{
-  return PetscSqrtReal(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
-}
-
-/* The part of r along the surface with normal n. */
-static PetscReal Along(const PetscReal r[3], const PetscReal n[3])
-{
-  const PetscReal height = r[0] * n[0] + r[1] * n[1] + r[2] * n[2];
-  const PetscReal t[3] = {r[0] - height * n[0], r[1] - height * n[1], r[2] - height * n[2]};
-
-  return Length(t);
-}
-
 /* How deep contact k may overlap before any load, and whether its gap is deeper; a gap that the scene gives may be. */
 static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, PetscReal gap, Sizes *sizes,
                                      PetscReal *allowed, PetscBool *deep)
 {
-  const HycoContact *c = &fe->scene->contact[p->contact[k]];
+  HycoContact c = fe->scene->contact[p->contact[k]];
   PetscReal size = 0;
 
   PetscFunctionBegin;
   *deep = PETSC_FALSE;
-  if (c->gap || gap >= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  *allowed = c->overlap;
-  if (c->overlap < 0) {
+  if (c->gap || c->ops->gap || gap >= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoContactGetLength(c, "overlap", allowed));
+  if (*allowed < 0) {
     PetscCall(SizeAt(fe, c->slave, p->slave[k], sizes, &size));
     *allowed = size > 0 ? HYCO_OVERLAP_SHARE * size : PETSC_MAX_REAL;
   }
@@ -74,37 +50,17 @@ static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, 
 /* Names the deepest contact k. */
 static PetscErrorCode RefuseOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, PetscReal gap, PetscReal allowed)
 {
-  const HycoContact *c = &fe->scene->contact[p->contact[k]];
-  PetscReal r[3];
+  HycoContact c = fe->scene->contact[p->contact[k]];
+  PetscReal r[3], stated;
 
   PetscFunctionBegin;
-  Across(p, k, fe->X, r);
+  PetscCall(HycoContactGetLength(c, "overlap", &stated));
+  HycoPairsJump(p, k, 3, fe->X, r);
   HycoFail("contact %s: before any load node %d of %s lies %.4g deep in %s (its master point is %.4g away), and %.4g "
            "is allowed%s; are the bodies where they should be? If they overlap by design, contact_%s_overlap %.4g "
            "allows it",
-           c->name, (int)fe->mesh->node_id[p->slave[k]], c->slave, -(double)gap, c->master, (double)Length(r),
-           (double)allowed, c->overlap < 0 ? ", half of its facet" : "", c->name, -1.01 * (double)gap);
-}
-
-/* A pair's nodes still face each other where a map has moved them. */
-static PetscErrorCode CheckPair(HycoFE fe, const HycoPairs *p, PetscInt k, const PetscReal normal[3], Sizes *sizes)
-{
-  const HycoContact *c = &fe->scene->contact[p->contact[k]];
-  PetscReal now[3], drawn[3], along, size;
-
-  PetscFunctionBegin;
-  if (c->type != HYCO_CONTACT_PAIR) PetscFunctionReturn(PETSC_SUCCESS);
-  Across(p, k, fe->X, now);
-  Across(p, k, fe->mesh->xyz, drawn);
-  along = Along(now, normal);
-  if (along <= Length(drawn)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SizeAt(fe, c->slave, p->slave[k], sizes, &size));
-  HycoCheck(!(size > 0) || along <= Length(drawn) + HYCO_APART_SHARE * size,
-            "contact %s: the map brings node %d of %s and node %d of %s, which face each other as drawn, %.4g apart "
-            "along the surface, more than half of a facet (%.4g): a pair keeps its nodes; take type: surface",
-            c->name, (int)fe->mesh->node_id[p->slave[k]], c->slave,
-            (int)fe->mesh->node_id[p->master[p->master_start[k]]], c->master, (double)along, (double)size);
-  PetscFunctionReturn(PETSC_SUCCESS);
+           c->name, (int)fe->mesh->node_id[p->slave[k]], c->slave, -(double)gap, c->master, (double)HycoLength(r),
+           (double)allowed, stated < 0 ? ", half of its facet" : "", c->name, -1.01 * (double)gap);
 }
 
 PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[])
@@ -126,10 +82,15 @@ PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscRe
       worst = gap[k];
       allowed = here;
     }
-    if (!ierr) ierr = CheckPair(fe, pairs, k, normal + 3 * k, &sizes);
   }
   PetscCall(PetscFree(sizes.size));
   PetscCall(ierr);
+  for (PetscInt k = 0, next; k < pairs->n; k = next) {
+    HycoContact c = fe->scene->contact[pairs->contact[k]];
+
+    next = HycoPairsRun(pairs, k);
+    if (c->ops->verify) PetscCall((*c->ops->verify)(c, fe, pairs, k, next, normal));
+  }
   if (deepest >= 0) PetscCall(RefuseOverlap(fe, pairs, deepest, worst, allowed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -138,18 +99,14 @@ PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscRe
 static PetscErrorCode SlidingOf(HycoFE fe, const HycoPairs *p, PetscInt k, const PetscReal normal[3],
                                 const PetscReal u[], Sizes sizes[2], PetscReal *sliding)
 {
-  const HycoContact *c = &fe->scene->contact[p->contact[k]];
-  const PetscInt lo = p->master_start[k], hi = p->master_start[k + 1];
-  PetscReal r[3] = {0, 0, 0}, size;
+  HycoContact c = fe->scene->contact[p->contact[k]];
+  PetscReal r[3], size;
 
   PetscFunctionBegin;
-  for (PetscInt d = 0; d < fe->dim; d++) {
-    r[d] = u[p->slave[k] * fe->dim + d];
-    for (PetscInt j = lo; j < hi; j++) r[d] -= p->weight[j] * u[p->master[j] * fe->dim + d];
-  }
-  PetscCall(SizeAt(fe, c->master, p->master[lo], &sizes[0], &size));
+  HycoPairsJump(p, k, fe->dim, u, r);
+  PetscCall(SizeAt(fe, c->master, p->master[p->master_start[k]], &sizes[0], &size));
   if (!(size > 0)) PetscCall(SizeAt(fe, c->slave, p->slave[k], &sizes[1], &size));
-  *sliding = size > 0 ? Along(r, normal) / size : 0;
+  *sliding = size > 0 ? HycoTangentialLength(r, normal) / size : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

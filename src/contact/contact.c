@@ -1,198 +1,223 @@
-/* B and D: normals, gaps and the rows of the potential contacts at the current parameters. */
-#include "facing.h"
-#include <hycokinematics.h>
+/* HycoContact: the class of contacts, its registry, and what the scene's entries say of one. */
+#include <hycocontactimpl.h>
+#include <string.h>
 
-PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
+static PetscFunctionList types = NULL;
+static PetscBool registered = PETSC_FALSE;
+
+static PetscErrorCode Forget(void)
 {
-  HycoMesh m = fe->mesh;
-  const HycoElement *el = HycoElementGetFacet(m->type);
-
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(vector, 3 * m->n_nodes));
-  for (PetscInt f = 0; f < m->n_facets; f++) {
-    if (m->facet_group[f] != group) continue;
-    for (PetscInt q = 0; q < el->nq; q++) {
-      PetscReal n[3];
-
-      PetscCall(HycoFacetNormal(fe, el, f, q, n));
-      for (PetscInt a = 0; a < m->nf; a++) {
-        for (PetscInt c = 0; c < 3; c++) vector[3 * m->facets[f * m->nf + a] + c] += el->N[q][a] * n[c];
-      }
-    }
-  }
+  PetscCall(PetscFunctionListDestroy(&types));
+  registered = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The master point of contact k on the moved mesh; an obstacle's is the slave itself, as is that of a slave node that
-   faces no master. */
-static void MasterPoint(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal x[3])
+/* The library's own types come with the first use of the class. */
+static PetscErrorCode RegisterAll(void)
 {
-  const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
-
-  for (PetscInt c = 0; c < 3; c++) {
-    x[c] = lo == hi ? fe->X[3 * pairs->slave[k] + c] : 0;
-    for (PetscInt j = lo; j < hi; j++) x[c] += pairs->weight[j] * fe->X[3 * pairs->master[j] + c];
-  }
+  PetscFunctionBegin;
+  if (registered) PetscFunctionReturn(PETSC_SUCCESS);
+  registered = PETSC_TRUE;
+  PetscCall(HycoInitializePackage());
+  PetscCall(PetscFunctionListAdd(&types, HYCO_CONTACT_OBSTACLE, HycoContactCreate_Obstacle));
+  PetscCall(PetscFunctionListAdd(&types, HYCO_CONTACT_PAIR, HycoContactCreate_Pair));
+  PetscCall(PetscFunctionListAdd(&types, HYCO_CONTACT_SURFACE, HycoContactCreate_Surface));
+  PetscCall(PetscRegisterFinalize(Forget));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The normal of one contact: given, at the master point x, or from the slave's surface. */
-static PetscErrorCode PairNormal(HycoFE fe, const HycoContact *c, PetscInt slave, const PetscReal x[3],
-                                 const PetscReal *vector, PetscReal n[3])
+PetscErrorCode HycoContactRegister(const char name[], PetscErrorCode (*create)(HycoContact))
 {
-  PetscReal length = 0;
+  PetscFunctionBegin;
+  PetscCall(RegisterAll());
+  PetscCall(PetscFunctionListAdd(&types, name, create));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactCreate(MPI_Comm comm, HycoContact *contact)
+{
+  PetscFunctionBegin;
+  PetscCall(RegisterAll());
+  PetscCall(PetscHeaderCreate(*contact, HYCO_CONTACT_CLASSID, "HycoContact", "Contact discretisation", "Hyco", comm,
+                              HycoContactDestroy, HycoContactView));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactDestroy(HycoContact *contact)
+{
+  PetscFunctionBegin;
+  if (!contact || !*contact) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheckHandle(*contact, HYCO_CONTACT_CLASSID);
+  HycoDereference(contact);
+  if ((*contact)->ops->destroy) PetscCall((*(*contact)->ops->destroy)(*contact));
+  PetscCall(HycoDeclaredDestroy(&(*contact)->entries));
+  PetscCall(PetscHeaderDestroy(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactSetType(HycoContact contact, HycoContactType type)
+{
+  PetscErrorCode (*create)(HycoContact);
 
   PetscFunctionBegin;
+  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  PetscCall(PetscFunctionListFind(types, type, &create));
+  if (!create) {
+    char list[HYCO_LINE];
+
+    PetscCall(HycoListTypes(types, type, list));
+    HycoFail("contact %s: the type \"%s\" is not registered; it must be %s",
+             ((PetscObject)contact)->name ? ((PetscObject)contact)->name : "(none)", type, list);
+  }
+  PetscCall(PetscObjectChangeTypeName((PetscObject)contact, type));
+  PetscCall((*create)(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactGetType(HycoContact contact, HycoContactType *type)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  *type = ((PetscObject)contact)->type_name;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactView(HycoContact contact, PetscViewer viewer)
+{
+  PetscBool ascii;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  PetscCall(HycoViewBegin((PetscObject)contact, &viewer, &ascii));
+  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoDeclaredView(&contact->entries, viewer));
+  if (contact->ops->view) PetscCall((*contact->ops->view)(contact, viewer));
+  PetscCall(PetscViewerASCIIPopTab(viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactDeclare(HycoContact contact, const char name[], const char title[], HycoEntryKind kind,
+                                  PetscBool required)
+{
+  HycoEntry *entry;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  PetscCall(HycoDeclaredAdd(&contact->entries, name, title, kind, required, &entry));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactDeclareNormal(HycoContact contact)
+{
+  static const char *const names[] = {"normal_x", "normal_y", "normal_z"};
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < 3; c++)
+    PetscCall(HycoContactDeclare(contact, names[c], "component of the normal", HYCO_ENTRY_EXPRESSION, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactSetOps(HycoContact contact, const struct _HycoContactOps *ops)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  *contact->ops = *ops;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactSetData(HycoContact contact, void *data)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  contact->data = data;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactGetData(HycoContact contact, void *data)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  *(void **)data = contact->data;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactEvaluate(HycoContact contact, const char name[], const PetscReal mu[], PetscInt n,
+                                   const PetscReal x[], PetscReal value[])
+{
+  const HycoEntry *entry;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  entry = HycoDeclaredFind(&contact->entries, name);
+  HycoCheck(entry && entry->expr, "contact %s has no expression %s", contact->name, name);
+  PetscCall(HycoExprEval(entry->expr, mu, n, x, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactGetLength(HycoContact contact, const char name[], PetscReal *length)
+{
+  const HycoEntry *entry;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
+  entry = HycoDeclaredFind(&contact->entries, name);
+  *length = entry && entry->kind == HYCO_ENTRY_LENGTH ? entry->value : -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactComplete(HycoContact contact)
+{
+  static const char *const groups[] = {"group", "slave", "master"}, *const normals[] = {"normal_x", "normal_y",
+                                                                                        "normal_z"};
+  HycoDeclared *d = &contact->entries;
+  HycoEntry *e;
+
+  PetscFunctionBegin;
+  contact->name = ((PetscObject)contact)->name;
+  for (PetscInt j = 0; j < d->n; j++)
+    HycoCheck(!d->entry[j].required || d->entry[j].expr || d->entry[j].text || d->entry[j].value >= 0,
+              "contact %s, type %s, has no %s (%s)", contact->name, ((PetscObject)contact)->type_name, d->entry[j].name,
+              d->entry[j].title);
   for (PetscInt k = 0; k < 3; k++) {
-    n[k] = 0;
-    if (vector)
-      n[k] = vector[3 * slave + k];
-    else if (c->normal[k])
-      PetscCall(HycoExprEval(c->normal[k], fe->mu, 1, x, &n[k]));
-    if (k < fe->dim) length += n[k] * n[k];
+    if ((e = HycoDeclaredFind(d, groups[k])) && e->text) *(k < 2 ? &contact->slave : &contact->master) = e->text;
+    if ((e = HycoDeclaredFind(d, normals[k]))) contact->normal[k] = e->expr;
   }
-  length = PetscSqrtReal(length);
-  HycoCheck(length > 0, "contact %s: the normal at node %d has no length", c->name, (int)fe->mesh->node_id[slave]);
-  for (PetscInt k = 0; k < 3; k++) n[k] /= length;
+  if ((e = HycoDeclaredFind(d, "gap"))) contact->gap = e->expr;
+  PetscCheck(contact->slave, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
+             "the contact type %s declares neither group nor slave as required", ((PetscObject)contact)->type_name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscReal HycoContactNoGap(HycoFE fe)
+PetscBool HycoContactAverages(HycoContact contact)
 {
-  return 1e-2 * HycoMeshLength(fe->mesh);
+  return (PetscBool)(!contact->ops->normal && !contact->normal[0] && !contact->normal[1] && !contact->normal[2]);
 }
 
-/* vector: room for 3 reals a node of the mesh. */
-static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal vector[], PetscReal normal[],
-                               PetscReal gap[])
+void HycoContactChanges(HycoContact contact, const PetscBool changed[], PetscBool *rows, PetscBool *gaps)
 {
-  PetscInt last = -1;
-  PetscReal none = 0;
+  for (PetscInt j = 0; j < contact->entries.n; j++) {
+    const HycoEntry *e = &contact->entries.entry[j];
 
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    const HycoContact *c = &fe->scene->contact[pairs->contact[k]];
-    const PetscBool given = (PetscBool)(c->normal[0] || c->normal[1] || c->normal[2]);
-    const PetscInt s = pairs->slave[k];
-    PetscReal *n = normal + 3 * k, x[3];
-
-    if (!given && last != pairs->contact[k]) {
-      PetscInt g = 0;
-
-      PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
-      PetscCall(HycoSurfaceVectors(fe, g, vector));
-    }
-    last = pairs->contact[k];
-    MasterPoint(fe, pairs, k, x);
-    PetscCall(PairNormal(fe, c, s, x, given ? NULL : vector, n));
-    if (fe->n_turned) HycoTurnNormal(fe, pairs, k, n);
-    if (HycoPairsAlone(fe->scene, pairs, k)) {
-      if (none == 0) none = HycoContactNoGap(fe);
-      gap[k] = none;
-    } else if (c->gap) {
-      PetscCall(HycoExprEval(c->gap, fe->mu, 1, x, &gap[k]));
-    } else {
-      gap[k] = 0;
-      for (PetscInt d = 0; d < 3; d++) gap[k] += n[d] * (x[d] - fe->X[3 * s + d]);
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal[], PetscReal gap[])
-{
-  PetscReal *vector;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  PetscCall(HycoPairsMove(fe, pairs));
-  PetscCall(PetscMalloc1(3 * fe->mesh->n_nodes, &vector));
-  ierr = Geometry(fe, pairs, vector, normal, gap);
-  PetscCall(PetscFree(vector));
-  PetscCall(ierr);
-  PetscCall(HycoContactCheck(fe, pairs, normal, gap));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Adds `scale` times the normal at a node to a row: to its free unknowns as entries, to its fixed ones in the gap. */
-static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal normal[3], PetscInt *n, PetscInt dof[],
-                     PetscReal value[], PetscReal *gap)
-{
-  for (PetscInt c = 0; c < fe->dim; c++) {
-    const PetscReal entry = scale * normal[c];
-    const PetscInt i = node * fe->dim + c;
-
-    if (fe->fixed[i]) {
-      *gap -= entry * fe->u0[i];
-    } else if (PetscAbsReal(entry) > 1e-14) {
-      dof[*n] = i;
-      value[(*n)++] = entry;
-    }
+    if (!HycoExprChanges(e->expr, changed)) continue;
+    if (strcmp(e->name, "gap")) *rows = PETSC_TRUE;
+    *gaps = PETSC_TRUE;
   }
 }
 
-static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], PetscInt start[],
-                           PetscInt dof[], PetscReal value[], PetscReal gap[])
+PetscErrorCode HycoContactCheckGroups(HycoContact contact, HycoMesh mesh)
 {
-  PetscInt n = 0;
+  PetscInt group;
 
   PetscFunctionBegin;
-  start[0] = 0;
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscReal drawn = gap[k];
-
-    if (!HycoPairsAlone(fe->scene, pairs, k)) AddToRow(fe, pairs->slave[k], 1, normal + 3 * k, &n, dof, value, &gap[k]);
-    for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++)
-      AddToRow(fe, pairs->master[j], -pairs->weight[j], normal + 3 * k, &n, dof, value, &gap[k]);
-    start[k + 1] = n;
-    if (start[k + 1] == start[k] && !HycoPairsAlone(fe->scene, pairs, k))
-      PetscCall(HycoContactCheckStill(fe, pairs, k, drawn, &gap[k]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
-                               PetscReal gap[])
-{
-  PetscReal *normal;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(3 * pairs->n, &normal));
-  ierr = HycoContactGeometry(fe, pairs, normal, gap);
-  if (!ierr) ierr = Rows(fe, pairs, normal, start, dof, value, gap);
-  PetscCall(PetscFree(normal));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
-{
-  HycoMesh m = fe->mesh;
-  const HycoElement *el = HycoElementGetFacet(m->type);
-  PetscReal *share;
-  PetscInt last = -1;
-
-  PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->n_nodes, &share));
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    if (last != pairs->contact[k]) {
-      PetscInt g = 0;
-
-      last = pairs->contact[k];
-      PetscCall(HycoMeshFindGroup(m, "contact", fe->scene->contact[last].slave, &g));
-      PetscCall(PetscArrayzero(share, m->n_nodes));
-      for (PetscInt f = 0; f < m->n_facets; f++) {
-        for (PetscInt q = 0; m->facet_group[f] == g && q < el->nq; q++) {
-          PetscReal n[3];
-
-          PetscCall(HycoFacetNormal(fe, el, f, q, n));
-          for (PetscInt a = 0; a < m->nf; a++)
-            share[m->facets[f * m->nf + a]] += el->N[q][a] * PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        }
-      }
-    }
-    area[k] = share[pairs->slave[k]];
-  }
-  PetscCall(PetscFree(share));
+  PetscCall(HycoMeshFindGroup(mesh, "contact", contact->slave, &group));
+  HycoCheck(!HycoContactAverages(contact) || mesh->group_dim[group] == mesh->dim - 1,
+            "contact %s takes its normal from the group %s, which is no surface; give normal: {x: ..., ...}",
+            contact->name, contact->slave);
+  if (!contact->master) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoMeshFindGroup(mesh, "contact", contact->master, &group));
+  HycoCheck(!contact->ops->find || mesh->group_dim[group] == mesh->dim - 1,
+            "contact %s projects nodes on the group %s, which has dimension %d; a group of dimension %d is needed",
+            contact->name, contact->master, (int)mesh->group_dim[group], (int)mesh->dim - 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

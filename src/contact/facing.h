@@ -1,14 +1,14 @@
-/* Normals and sizes of surfaces on moved nodes: private to assembly/. */
+/* Normals and sizes of surfaces on moved nodes: private to contact/. */
 #ifndef HYCO_FACING_H
 #define HYCO_FACING_H
-#include <hycofe.h>
+#include <hycocontactimpl.h>
 
 /* Sum of n dS over the facets of `group` around each node (n_nodes x 3). */
 PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[]);
 /* The same, of unit length; 0 where a node has no facet. */
 PetscErrorCode HycoSurfaceNormals(HycoFE fe, PetscInt group, PetscReal normal[]);
-/* The mean unit normal of a facet. */
-PetscErrorCode HycoFacetDirection(HycoFE fe, PetscInt facet, PetscReal normal[3]);
+/* The integral of n dS over a facet. */
+PetscErrorCode HycoFacetVector(HycoFE fe, PetscInt facet, PetscReal vector[3]);
 /* Fails where measured gaps overlap more than the scene allows, or a map has moved a pair's nodes apart along the
    surface. normal and gap as HycoContactGeometry() gives them. */
 PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[]);

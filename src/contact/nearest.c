@@ -3,6 +3,7 @@
   n points find their nearest patch in about n log n steps, whatever the sizes of the patches.
 */
 #include "nearest.h"
+#include <hycovector.h>
 #include <stdlib.h>
 
 #define LEAF 4
@@ -25,11 +26,6 @@ struct _n_HycoPatches {
   Item *item; /* in the order of the tree's leaves */
   Box *box;   /* of tree node t; its children are 2 t + 1 and 2 t + 2 */
 };
-
-static PetscReal Dot(const PetscReal a[3], const PetscReal b[3])
-{
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static int Compare(const Item *p, const Item *q, PetscInt axis)
 {
@@ -138,13 +134,13 @@ static PetscBool InTriangle(const PetscReal *const X[], const PetscReal x[3], Pe
     b[c] = X[2][c] - X[0][c];
     r[c] = x[c] - X[0][c];
   }
-  aa = Dot(a, a);
-  ab = Dot(a, b);
-  bb = Dot(b, b);
+  aa = HycoDot(a, a);
+  ab = HycoDot(a, b);
+  bb = HycoDot(b, b);
   det = aa * bb - ab * ab;
   if (!(det > 1e-28 * aa * bb)) return PETSC_FALSE;
-  w[1] = (bb * Dot(a, r) - ab * Dot(b, r)) / det;
-  w[2] = (aa * Dot(b, r) - ab * Dot(a, r)) / det;
+  w[1] = (bb * HycoDot(a, r) - ab * HycoDot(b, r)) / det;
+  w[2] = (aa * HycoDot(b, r) - ab * HycoDot(a, r)) / det;
   w[0] = 1 - w[1] - w[2];
   return (PetscBool)(w[0] >= 0 && w[1] >= 0 && w[2] >= 0);
 }
@@ -165,14 +161,14 @@ static PetscBool InQuadrilateral(const PetscReal *const X[], const PetscReal x[3
       r[c] = (m0 * m1 * X[0][c] + p0 * m1 * X[1][c] + p0 * p1 * X[2][c] + m0 * p1 * X[3][c]) / 4 - x[c];
       twist[c] = (X[0][c] - X[1][c] + X[2][c] - X[3][c]) / 4;
     }
-    a = Dot(t[0], t[0]);
-    b = Dot(t[0], t[1]) + Dot(r, twist);
-    d = Dot(t[1], t[1]);
-    if (!(a * d - b * b > 1e-3 * a * d)) b = Dot(t[0], t[1]);
+    a = HycoDot(t[0], t[0]);
+    b = HycoDot(t[0], t[1]) + HycoDot(r, twist);
+    d = HycoDot(t[1], t[1]);
+    if (!(a * d - b * b > 1e-3 * a * d)) b = HycoDot(t[0], t[1]);
     det = a * d - b * b;
     if (!(det > 1e-28 * a * d)) return PETSC_FALSE;
-    g[0] = Dot(t[0], r);
-    g[1] = Dot(t[1], r);
+    g[0] = HycoDot(t[0], r);
+    g[1] = HycoDot(t[1], r);
     step[0] = (b * g[1] - d * g[0]) / det;
     step[1] = (b * g[0] - a * g[1]) / det;
     size = PetscMax(PetscAbsReal(step[0]), PetscAbsReal(step[1]));
@@ -205,8 +201,8 @@ static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], Pe
       e[c] = X[l][c] - X[k][c];
       r[c] = x[c] - X[k][c];
     }
-    length = Dot(e, e);
-    at = length > 0 ? PetscMin(PetscMax(Dot(e, r) / length, 0), 1) : 0;
+    length = HycoDot(e, e);
+    at = length > 0 ? PetscMin(PetscMax(HycoDot(e, r) / length, 0), 1) : 0;
     along[l] = at;
     along[k] = nf > 1 ? 1 - at : 1;
     d = Distance2(nf, X, along, x);
@@ -234,7 +230,7 @@ static PetscBool Opposes(HycoPatches s, PetscInt patch, const PetscReal *against
 {
   const PetscReal *n = s->normal ? s->normal + 3 * patch : NULL;
 
-  return (PetscBool)(!against || !n || Dot(n, n) == 0 || Dot(n, against) <= HYCO_OPPOSED);
+  return (PetscBool)(!against || !n || HycoDot(n, n) == 0 || HycoDot(n, against) <= HYCO_OPPOSED);
 }
 
 /* Brings (best, patch, w) down to the nearest of the items lo .. hi - 1 under box t, nearer child first. */

@@ -1,4 +1,4 @@
-/* The nearest point of a surface: private to assembly/. */
+/* The nearest point of a surface: private to contact/. */
 #ifndef HYCO_NEAREST_H
 #define HYCO_NEAREST_H
 #include <hycomesh.h>

@@ -25,13 +25,13 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
   }
   HycoCheck(*left >= -1e-12 * size,
             "contact %s: node %d is fixed%s, and its prescribed displacement penetrates by %g: no solution exists",
-            fe->scene->contact[pairs->contact[k]].name, (int)fe->mesh->node_id[slave],
+            fe->scene->contact[pairs->contact[k]]->name, (int)fe->mesh->node_id[slave],
             pairs->master_start[k + 1] > pairs->master_start[k] ? " and so is what it meets" : "", (double)-*left);
   *left = PetscMax(*left, 0); /* round-off */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes of the obstacles' groups that are wholly fixed and no contacts (HycoPairsFind() leaves them out), as
+/* The nodes of groups without masters that are wholly fixed and no contacts (HycoPairsFind() leaves them out), as
    contacts without masters. The caller destroys it. */
 static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPairs *still)
 {
@@ -44,15 +44,15 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
   PetscCall(PetscMemzero(still, sizeof(*still)));
   PetscCall(PetscCalloc1(m->n_nodes, &is_slave));
   for (PetscInt k = 0; k < pairs->n; k++) is_slave[pairs->slave[k]] = PETSC_TRUE;
-  for (PetscInt k = 0; k < s->n_contacts; k++) room += s->contact[k].type == HYCO_CONTACT_OBSTACLE ? m->n_nodes : 0;
+  for (PetscInt k = 0; k < s->n_contacts; k++) room += s->contact[k]->master ? 0 : m->n_nodes;
   PetscCall(PetscMalloc1(room, &still->slave));
   PetscCall(PetscMalloc1(room, &still->contact));
   PetscCall(PetscCalloc1(room + 1, &still->master_start));
   for (PetscInt k = 0; k < s->n_contacts; k++) {
     PetscInt g = 0;
 
-    if (s->contact[k].type != HYCO_CONTACT_OBSTACLE) continue;
-    PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k].slave, &g));
+    if (s->contact[k]->master) continue;
+    PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k]->slave, &g));
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
       const PetscInt i = m->group_node[j];
       PetscBool fixed = (PetscBool)!is_slave[i];

@@ -10,16 +10,16 @@
 #define HYCO_SAME_POINT 1e-6
 
 /* Patches and their normals: the master's nodes (pair) or facets (surface). */
-static PetscErrorCode FindPatches(HycoPartners *t, const HycoContact *c)
+static PetscErrorCode FindPatches(HycoPartners *t)
 {
   HycoMesh m = t->fe->mesh;
   const PetscInt gm = t->master;
 
   PetscFunctionBegin;
-  t->nf = c->type == HYCO_CONTACT_PAIR ? 1 : m->nf;
+  t->nf = t->nodes ? 1 : m->nf;
   PetscCall(PetscMalloc1(PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets * t->nf), &t->node));
   PetscCall(PetscCalloc1(3 * PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets), &t->normal));
-  if (c->type == HYCO_CONTACT_PAIR) {
+  if (t->nodes) {
     PetscReal *normal;
 
     PetscCall(PetscMalloc1(3 * m->n_nodes, &normal));
@@ -33,20 +33,22 @@ static PetscErrorCode FindPatches(HycoPartners *t, const HycoContact *c)
   }
   for (PetscInt f = 0; f < m->n_facets; f++) {
     if (m->facet_group[f] != gm) continue;
-    if (m->dim > 1) PetscCall(HycoFacetDirection(t->fe, f, t->normal + 3 * t->n));
+    if (m->dim > 1) PetscCall(HycoFacetVector(t->fe, f, t->normal + 3 * t->n));
+    HycoNormalise(t->normal + 3 * t->n);
     PetscCall(PetscArraycpy(t->node + t->nf * t->n++, m->facets + f * m->nf, t->nf));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPartnersCreate(HycoFE fe, const HycoContact *c, HycoPartners *t)
+PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact c, PetscBool nodes, HycoPartners *t)
 {
   PetscFunctionBegin;
   PetscCall(PetscMemzero(t, sizeof(*t)));
   t->fe = fe;
+  t->nodes = nodes;
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &t->slave));
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &t->master));
-  PetscCall(FindPatches(t, c));
+  PetscCall(FindPatches(t));
   PetscCall(HycoPatchesCreate(fe->X, t->n, t->nf, t->node, t->normal, &t->patches));
   PetscCall(PetscCalloc1(3 * fe->mesh->n_nodes, &t->outward));
   if (fe->dim > 1) PetscCall(HycoSurfaceNormals(fe, t->slave, t->outward));
@@ -78,13 +80,8 @@ static PetscReal ShortestEdge(const HycoPartners *t, PetscInt patch)
   const PetscInt *node = t->node + patch * t->nf;
   PetscReal shortest = PETSC_MAX_REAL;
 
-  for (PetscInt a = 0; a < t->nf; a++) {
-    const PetscReal *x = t->fe->X + 3 * node[a], *y = t->fe->X + 3 * node[(a + 1) % t->nf];
-    PetscReal sum = 0;
-
-    for (PetscInt c = 0; c < 3; c++) sum += (x[c] - y[c]) * (x[c] - y[c]);
-    shortest = PetscMin(shortest, PetscSqrtReal(sum));
-  }
+  for (PetscInt a = 0; a < t->nf; a++)
+    shortest = PetscMin(shortest, HycoDistance(t->fe->X + 3 * node[a], t->fe->X + 3 * node[(a + 1) % t->nf]));
   return shortest;
 }
 
@@ -162,14 +159,12 @@ PetscErrorCode HycoPartnersAtBorder(HycoPartners *t, const HycoProjection *at, P
 PetscErrorCode HycoPartnersIsPast(HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscBool *past)
 {
   const PetscReal *n = t->normal + 3 * at->patch;
-  PetscReal r[3], along = 0, height;
+  PetscReal r[3];
 
   PetscFunctionBegin;
   *past = PETSC_FALSE;
   HycoPartnersAcross(t, slave, at, r);
-  height = HycoDot(r, n);
-  for (PetscInt c = 0; c < 3; c++) along += (r[c] - height * n[c]) * (r[c] - height * n[c]);
-  if (PetscSqrtReal(along) > HYCO_PAST_BORDER * ShortestEdge(t, at->patch))
+  if (HycoTangentialLength(r, n) > HYCO_PAST_BORDER * ShortestEdge(t, at->patch))
     PetscCall(HycoPartnersAtBorder(t, at, past));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

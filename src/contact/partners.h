@@ -1,12 +1,14 @@
-/* What one contact's search needs: private to assembly/. */
+/* The search for one contact's masters: private to contact/. */
 #ifndef HYCO_PARTNERS_H
 #define HYCO_PARTNERS_H
 #include "nearest.h"
-#include <hycofe.h>
+#include <hycocontactimpl.h>
+#include <hycovector.h>
 
 typedef struct {
   HycoFE fe;                  /* borrowed; its nodes are where the search is */
   PetscInt slave, master;     /* groups */
+  PetscBool nodes;            /* whether patches are the master's nodes, or its facets */
   HycoPatches patches;        /* the master's */
   PetscInt n, nf, *node;      /* patches' nodes, n x nf */
   PetscReal *normal;          /* n x 3, of the patches (a pair's: of its nodes); 0: unknown */
@@ -15,8 +17,8 @@ typedef struct {
   PetscBool *at_border;       /* by node of the mesh; NULL: not made */
 } HycoPartners;
 
-/* The search of a pair or surface contact on fe's nodes. The caller destroys it. */
-PetscErrorCode HycoPartnersCreate(HycoFE fe, const HycoContact *contact, HycoPartners *partners);
+/* The search on fe's nodes. The caller destroys it. */
+PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact contact, PetscBool nodes, HycoPartners *partners);
 PetscErrorCode HycoPartnersDestroy(HycoPartners *partners);
 /* The slave node's outward normal; NULL: unknown, as on a group that is no surface. */
 const PetscReal *HycoPartnersOutward(const HycoPartners *partners, PetscInt slave);
@@ -29,9 +31,34 @@ PetscErrorCode HycoPartnersAtBorder(HycoPartners *partners, const HycoProjection
 /* Whether a slave node lies past the master's border, by more than a tenth of the facet's shortest edge along it. */
 PetscErrorCode HycoPartnersIsPast(HycoPartners *partners, PetscInt slave, const HycoProjection *at, PetscBool *past);
 
-static inline PetscReal HycoDot(const PetscReal a[3], const PetscReal b[3])
-{
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+/* How a slave node lies to the master: within reach and in front of it; too far; turned away from all of it; off to the
+   side, as of a pair that does not match; past the border. */
+typedef enum { HYCO_MET, HYCO_FAR, HYCO_TURNED, HYCO_ASKEW, HYCO_PAST } HycoVerdict;
+
+/* The n slave nodes with their masters (at[k].n = 0: none), as far as `tolerance` away; closer than `small`: a tenth of
+   the slave's shortest edge: they touch. */
+typedef struct {
+  PetscInt n;
+  const PetscInt *slave;
+  PetscReal tolerance, small;
+  HycoProjection *at;
+  HycoVerdict *why;
+} HycoMatch;
+
+/* What a type makes of the nearest points. */
+typedef PetscErrorCode (*HycoSettle)(HycoPartners *partners, HycoContact contact, HycoMatch *match);
+/* What to do about n slave nodes without a master, as the end of a message. */
+typedef PetscErrorCode (*HycoRemedy)(HycoPartners *partners, HycoContact contact, PetscInt n, const PetscInt node[],
+                                     char text[HYCO_LINE]);
+
+/* The master of one slave node, at most `tolerance` away. Farther than `small` the way to it must be as near to the
+   slave's normal as normals must oppose, and not lead past the border. */
+PetscErrorCode HycoPartnersJudge(HycoPartners *partners, PetscInt slave, PetscReal tolerance, PetscReal small,
+                                 HycoProjection *at, HycoVerdict *why);
+/* Puts all slave nodes with their masters into pairs; settle NULL: without, they are searched for elsewhere. */
+PetscErrorCode HycoPartnersMatch(HycoContact contact, HycoFE fe, PetscInt index, PetscBool nodes, HycoSettle settle,
+                                 HycoRemedy remedy, HycoPairs *pairs);
+/* The entries of a type with slave and master. */
+PetscErrorCode HycoPartnersDeclare(HycoContact contact);
 
 #endif

@@ -3,55 +3,22 @@
   it and its neighbours, where the normal is then exact (N. Max, J. Graphics Tools 4 (1999) 1-6): a body of revolution
   that turns in its seat shows no normal motion, however uneven its facets are.
 */
+#include "facing.h"
 #include <hycokinematics.h>
+#include <hycovector.h>
 
 /* Facets that meet at more than this angle (40 degrees) are an edge of the body, not a curved surface. */
 #define EDGE 0.7
 /* What the coordinates of a mesh file leave of a plane. */
 #define FLAT 1e-6
 
-static PetscReal Length(const PetscReal v[3])
-{
-  return PetscSqrtReal(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
-static void Unit(PetscReal v[3])
-{
-  const PetscReal length = Length(v);
-
-  for (PetscInt c = 0; c < 3 && length > 0; c++) v[c] /= length;
-}
-
-static PetscReal Apart(const PetscReal a[3], const PetscReal b[3])
-{
-  const PetscReal d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-
-  return Length(d);
-}
-
-/* n dS of a facet. */
-static PetscErrorCode Area(HycoFE fe, PetscInt facet, PetscReal n[3])
-{
-  const HycoElement *el = HycoElementGetFacet(fe->mesh->type);
-
-  PetscFunctionBegin;
-  for (PetscInt c = 0; c < 3; c++) n[c] = 0;
-  for (PetscInt q = 0; q < el->nq; q++) {
-    PetscReal part[3];
-
-    PetscCall(HycoFacetNormal(fe, el, facet, q, part));
-    for (PetscInt c = 0; c < 3; c++) n[c] += part[c];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The weight of a facet's normal at its corner v, with the next and the last corner. */
 static PetscReal Weight(HycoFE fe, const PetscInt node[], PetscInt v)
 {
   const PetscInt nf = fe->mesh->nf, next = node[(v + 1) % nf], last = node[(v + nf - 1) % nf];
   const PetscReal *x = fe->X + 3 * node[v];
-  const PetscReal a = Apart(fe->X + 3 * next, x), b = Apart(fe->X + 3 * last, x),
-                  c = Apart(fe->X + 3 * next, fe->X + 3 * last);
+  const PetscReal a = HycoDistance(fe->X + 3 * next, x), b = HycoDistance(fe->X + 3 * last, x),
+                  c = HycoDistance(fe->X + 3 * next, fe->X + 3 * last);
   const PetscReal cosine = nf > 2 ? (a * a + b * b - c * c) / (2 * a * b) : 0;
 
   return nf == 2 ? 1 / a : PetscSqrtReal(PetscMax(1 - cosine * cosine, 0)) / (a * b);
@@ -73,9 +40,9 @@ static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
     PetscReal n[3], unit[3];
 
     if (m->facet_group[f] != group) continue;
-    PetscCall(Area(fe, f, n));
+    PetscCall(HycoFacetVector(fe, f, n));
     for (PetscInt c = 0; c < 3; c++) unit[c] = n[c];
-    Unit(unit);
+    HycoNormalise(unit);
     for (PetscInt v = 0; v < m->nf; v++) {
       const PetscReal weight = Weight(fe, node, v);
 
@@ -100,12 +67,12 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
     PetscReal n[3];
 
     if (m->facet_group[f] != group) continue;
-    PetscCall(Area(fe, f, n));
-    Unit(n);
+    PetscCall(HycoFacetVector(fe, f, n));
+    HycoNormalise(n);
     for (PetscInt v = 0; v < m->nf; v++) {
       const PetscInt i = m->facets[f * m->nf + v];
 
-      s->bend[i] = PetscMax(s->bend[i], 2 * Apart(n, s->mean + 3 * i));
+      s->bend[i] = PetscMax(s->bend[i], 2 * HycoDistance(n, s->mean + 3 * i));
     }
   }
   for (PetscInt f = 0; f < m->n_facets; f++) {
@@ -134,14 +101,14 @@ PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], 
   PetscCall(PetscCalloc3(3 * m->n_nodes, &s.mean, m->n_nodes, &s.bend, m->n_nodes, &s.fan));
   PetscCall(AddFacets(fe, group, &s));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
-    Unit(s.exact + 3 * i);
-    Unit(s.mean + 3 * i);
+    HycoNormalise(s.exact + 3 * i);
+    HycoNormalise(s.mean + 3 * i);
   }
   PetscCall(FindBends(fe, group, &s, bend));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     doubt[i] = FLAT;
     if (s.bend[i] >= EDGE) continue;
-    doubt[i] += s.fan[i] ? bend[i] : 2 * Apart(s.exact + 3 * i, s.mean + 3 * i) + bend[i] * bend[i] / 2;
+    doubt[i] += s.fan[i] ? bend[i] : 2 * HycoDistance(s.exact + 3 * i, s.mean + 3 * i) + bend[i] * bend[i] / 2;
   }
   PetscCall(PetscFree3(s.mean, s.bend, s.fan));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -5,6 +5,7 @@
   within what faceting leaves in doubt, so that all meshes of one geometry give one answer.
 */
 #include <hycokinematics.h>
+#include <hycovector.h>
 #include <petscblaslapack.h>
 
 /* In which sense a contact may be slid along: its own (given) normals', the slave's surface's, the master's. */
@@ -20,31 +21,19 @@ typedef struct {
   PetscReal *doubt[N_SENSES], *bend[N_SENSES]; /* m */
 } Shapes;
 
-static PetscErrorCode Relative(Shapes *s, const HycoMotions *motions)
+static void Relative(Shapes *s, const HycoMotions *motions)
 {
-  const HycoPairs *p = s->pairs;
-  const PetscInt dim = s->fe->dim;
-
-  PetscFunctionBegin;
   for (PetscInt i = 0; i < s->m; i++) {
-    for (PetscInt a = 0; a < s->k; a++) {
-      const PetscReal *u = motions->motion + (size_t)a * (size_t)s->fe->n_dof;
-      PetscReal *d = s->d + ((size_t)i * (size_t)s->k + (size_t)a) * 3;
-
-      for (PetscInt c = 0; c < 3; c++) {
-        d[c] = c < dim ? u[p->slave[i] * dim + c] : 0;
-        for (PetscInt j = p->master_start[i]; c < dim && j < p->master_start[i + 1]; j++)
-          d[c] -= p->weight[j] * u[p->master[j] * dim + c];
-      }
-    }
+    for (PetscInt a = 0; a < s->k; a++)
+      HycoPairsJump(s->pairs, i, s->fe->dim, motions->motion + (size_t)a * (size_t)s->fe->n_dof,
+                    s->d + ((size_t)i * (size_t)s->k + (size_t)a) * 3);
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Normals of the slave's and of the master's surface at one contact's pairs; work: room for 5 reals a node. */
 static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[])
 {
-  const HycoContact *c = &s->fe->scene->contact[contact];
+  HycoContact c = s->fe->scene->contact[contact];
   const HycoPairs *p = s->pairs;
   PetscReal *normal = work, *doubt = work + 3 * s->fe->mesh->n_nodes, *bend = work + 4 * s->fe->mesh->n_nodes;
 
@@ -53,7 +42,7 @@ static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[
     const char *group = side == SLAVE ? c->slave : c->master;
     PetscInt g = 0;
 
-    if (side == MASTER && c->type == HYCO_CONTACT_OBSTACLE) continue;
+    if (!group) continue;
     PetscCall(HycoMeshFindGroup(s->fe->mesh, "contact", group, &g));
     PetscCall(HycoSmoothNormals(s->fe, g, normal, doubt, bend));
     for (PetscInt i = 0; i < s->m; i++) {
@@ -83,9 +72,8 @@ static PetscErrorCode FindSenses(Shapes *s)
   PetscCall(HycoContactGeometry(s->fe, s->pairs, s->normal[GIVEN], gap));
   for (PetscInt c = 0; c < scene->n_contacts && s->fe->dim > 1; c++) PetscCall(SurfaceSenses(s, c, work));
   for (PetscInt i = 0; i < s->m; i++) {
-    const HycoContact *c = &scene->contact[s->pairs->contact[i]];
     const PetscReal *n = s->normal[SLAVE] + 3 * i;
-    const PetscBool given = (PetscBool)(c->normal[0] || c->normal[1] || c->normal[2]);
+    const PetscBool given = (PetscBool)!HycoContactAverages(scene->contact[s->pairs->contact[i]]);
 
     s->doubt[GIVEN][i] = PetscMax(s->doubt[SLAVE][i], 1e-6);
     s->bend[GIVEN][i] = PetscMax(s->bend[SLAVE][i], s->bend[MASTER][i]);
@@ -95,11 +83,6 @@ static PetscErrorCode FindSenses(Shapes *s)
   }
   PetscCall(PetscFree2(work, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscReal Dot(const PetscReal a[3], const PetscReal b[3])
-{
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /* The displacement at contact i under the combination z. */
@@ -133,9 +116,9 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
 
     for (PetscInt a = 0; a < k; a++) {
       for (PetscInt b = 0; b < k; b++) {
-        A[a * k + b] += weight[i] * Dot(s->normal[t] + 3 * i, d + 3 * a) * Dot(s->normal[t] + 3 * i, d + 3 * b) /
-                        (s->doubt[t][i] * s->doubt[t][i]);
-        M[a * k + b] += Dot(d + 3 * a, d + 3 * b);
+        A[a * k + b] += weight[i] * HycoDot(s->normal[t] + 3 * i, d + 3 * a) *
+                        HycoDot(s->normal[t] + 3 * i, d + 3 * b) / (s->doubt[t][i] * s->doubt[t][i]);
+        M[a * k + b] += HycoDot(d + 3 * a, d + 3 * b);
       }
     }
   }
@@ -158,8 +141,8 @@ static PetscBool Tangential(const Shapes *s, const PetscInt sense[], const Petsc
     PetscReal d[3];
 
     Combine(s, i, z, d);
-    if (PetscAbsReal(Dot(s->normal[t] + 3 * i, d)) <=
-        PetscMax(2 * s->doubt[t][i], s->bend[t][i]) * PetscSqrtReal(Dot(d, d)) + noise * PetscSqrtReal(norm))
+    if (PetscAbsReal(HycoDot(s->normal[t] + 3 * i, d)) <=
+        PetscMax(2 * s->doubt[t][i], s->bend[t][i]) * PetscSqrtReal(HycoDot(d, d)) + noise * PetscSqrtReal(norm))
       continue;
     weight[i] *= 100;
     all = PETSC_FALSE;
@@ -228,7 +211,7 @@ static void Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *
     PetscInt *t = &sense[s->pairs->contact[i]];
     const PetscReal *n = s->normal[*t] + 3 * i;
 
-    if (Dot(n, n) > 0) continue;
+    if (HycoDot(n, n) > 0) continue;
     if (s->fe->scene->n_contacts <= MOST_CONTACTS)
       *possible = PETSC_FALSE;
     else
@@ -326,8 +309,8 @@ PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *
   PetscCall(PetscMalloc1((size_t)s.m * (size_t)s.k * 3, &s.d));
   for (PetscInt t = 0; t < N_SENSES; t++)
     PetscCall(PetscCalloc3(3 * s.m, &s.normal[t], s.m, &s.doubt[t], s.m, &s.bend[t]));
-  ierr = Relative(&s, motions);
-  if (!ierr) ierr = FindSenses(&s);
+  Relative(&s, motions);
+  ierr = FindSenses(&s);
   if (!ierr) ierr = Search(&s, n_unheld, *unheld, n_alike, *alike);
   if (!ierr) Reduce(motions, fe->dim, *n_unheld, *unheld);
   for (PetscInt t = 0; t < N_SENSES; t++) PetscCall(PetscFree3(s.normal[t], s.doubt[t], s.bend[t]));
@@ -342,30 +325,25 @@ void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3
   PetscInt n_units = 0;
 
   for (PetscInt a = 0; a < fe->n_turned && n_units + 1 < fe->dim; a++) {
-    const PetscReal *u = fe->released + (size_t)a * (size_t)fe->n_dof;
     PetscReal *d = unit[n_units], before;
 
-    for (PetscInt c = 0; c < 3; c++) {
-      d[c] = c < fe->dim ? u[pairs->slave[k] * fe->dim + c] : 0;
-      for (PetscInt j = pairs->master_start[k]; c < fe->dim && j < pairs->master_start[k + 1]; j++)
-        d[c] -= pairs->weight[j] * u[pairs->master[j] * fe->dim + c];
-    }
-    before = Dot(d, d);
+    HycoPairsJump(pairs, k, fe->dim, fe->released + (size_t)a * (size_t)fe->n_dof, d);
+    before = HycoDot(d, d);
     for (PetscInt b = 0; b < n_units; b++) {
-      const PetscReal dot = Dot(d, unit[b]);
+      const PetscReal dot = HycoDot(d, unit[b]);
 
       for (PetscInt c = 0; c < 3; c++) d[c] -= dot * unit[b][c];
     }
-    length = PetscSqrtReal(Dot(d, d));
+    length = PetscSqrtReal(HycoDot(d, d));
     if (length <= 1e-9 / PetscSqrtReal((PetscReal)fe->n_dof) || length * length < 0.01 * before) continue;
     for (PetscInt c = 0; c < 3; c++) d[c] /= length;
     n_units++;
   }
   for (PetscInt b = 0; b < n_units; b++) {
-    const PetscReal dot = Dot(n, unit[b]);
+    const PetscReal dot = HycoDot(n, unit[b]);
 
     for (PetscInt c = 0; c < 3; c++) n[c] -= dot * unit[b][c];
   }
-  length = PetscSqrtReal(Dot(n, n));
+  length = PetscSqrtReal(HycoDot(n, n));
   for (PetscInt c = 0; c < 3 && length > 0; c++) n[c] /= length;
 }

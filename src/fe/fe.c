@@ -1,5 +1,6 @@
 /* HycoFE: the scene on a mesh at one parameter value: nodes moved, supports, materials. */
 #include <hycokinematics.h>
+#include <hycomaterialimpl.h>
 #include "assembly_map.h"
 
 PetscErrorCode HycoFEDestroy(HycoFE *fe)
@@ -20,7 +21,9 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscCall(PetscFree((*fe)->drawn_sign));
   PetscCall(PetscFree((*fe)->fixed));
   PetscCall(PetscFree((*fe)->u0));
-  PetscCall(PetscFree((*fe)->lame));
+  PetscCall(PetscFree((*fe)->tangent));
+  PetscCall(PetscFree((*fe)->tangent_start));
+  PetscCall(PetscFree((*fe)->tangent_size));
   PetscCall(PetscFree(*fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -40,9 +43,7 @@ static PetscErrorCode FindConstant(HycoFE fe)
     any = (PetscBool)(any || moves[b]);
   }
   for (PetscInt e = 0; e < m->n_cells; e++) {
-    const HycoBody *body = &s->body[m->cell_body[e]];
-
-    fe->constant[e] = (PetscBool) !(HycoExprChanges(body->young, every) || HycoExprChanges(body->poisson, every));
+    fe->constant[e] = (PetscBool)!HycoMaterialChanges(s->body[m->cell_body[e]].law, every);
     for (PetscInt a = 0; a < m->nv; a++) {
       if (moves[m->node_body[m->cells[e * m->nv + a]]]) fe->constant[e] = PETSC_FALSE;
     }
@@ -62,7 +63,6 @@ static PetscErrorCode FindConstant(HycoFE fe)
 
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
 {
-  const HycoElement *el = HycoElementGet(mesh->type);
   HycoFE f;
 
   PetscFunctionBegin;
@@ -76,11 +76,11 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   f->mesh = mesh;
   f->dim = mesh->dim;
   f->n_dof = mesh->n_nodes * mesh->dim;
-  f->n_sigma = mesh->dim == 1 ? 1 : mesh->dim == 2 ? 4 : 6;
+  f->n_sigma = HycoStrainSize(mesh->dim);
   PetscCall(PetscMalloc1(3 * mesh->n_nodes, &f->X));
   PetscCall(PetscCalloc1(f->n_dof, &f->fixed));
   PetscCall(PetscCalloc1(f->n_dof, &f->u0));
-  PetscCall(PetscMalloc1(mesh->n_cells * el->nq * 2, &f->lame));
+  PetscCall(HycoTangentsCreate(f));
   PetscCall(PetscCalloc1(mesh->n_cells, &f->constant));
   f->n_loads = scene->n_loads;
   PetscCall(PetscCalloc1(f->n_loads, &f->shares));
@@ -180,54 +180,6 @@ PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckElastic(HycoFE fe, const HycoBody *body, const PetscReal x[3], PetscReal young,
-                                   PetscReal poisson)
-{
-  char place[HYCO_LINE];
-
-  PetscFunctionBegin;
-  if (!(young > 0)) {
-    PetscCall(HycoExprPlace(body->young, fe->mu, x, place));
-    HycoFail("%s is %g at %s; Young's modulus must be positive", HycoExprKey(body->young), (double)young, place);
-  }
-  if (!(poisson > -1 && poisson < 0.5)) {
-    PetscCall(HycoExprPlace(body->poisson, fe->mu, x, place));
-    HycoFail("%s is %g at %s; Poisson's ratio must lie between -1 and 0.5", HycoExprKey(body->poisson), (double)poisson,
-             place);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Lame's constants at the quadrature points from Young's modulus and Poisson's ratio; `first`: of constant cells too.
- */
-static PetscErrorCode SetMaterial(HycoFE fe, PetscBool first)
-{
-  HycoMesh m = fe->mesh;
-  const HycoElement *el = HycoElementGet(m->type);
-
-  PetscFunctionBegin;
-  for (PetscInt e = 0; e < m->n_cells; e++) {
-    const HycoBody *body = &fe->scene->body[m->cell_body[e]];
-
-    if (fe->constant[e] && !first) continue;
-
-    for (PetscInt q = 0; q < el->nq; q++) {
-      PetscReal x[3] = {0, 0, 0}, young, poisson = 0;
-      PetscReal *lame = fe->lame + 2 * (e * el->nq + q);
-
-      for (PetscInt a = 0; a < m->nv; a++) {
-        for (PetscInt c = 0; c < 3; c++) x[c] += el->N[q][a] * fe->X[3 * m->cells[e * m->nv + a] + c];
-      }
-      PetscCall(HycoExprEval(body->young, fe->mu, 1, x, &young));
-      if (body->poisson) PetscCall(HycoExprEval(body->poisson, fe->mu, 1, x, &poisson));
-      PetscCall(CheckElastic(fe, body, x, young, poisson));
-      lame[0] = m->dim == 1 ? 0 : young * poisson / ((1 + poisson) * (1 - 2 * poisson));
-      lame[1] = m->dim == 1 ? young : young / (2 * (1 + poisson));
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What the changed parameters reach: the map, the stiffness, the contact rows. */
 static void FindChanges(HycoFE fe, const PetscBool changed[], PetscBool *moved)
 {
@@ -240,15 +192,10 @@ static void FindChanges(HycoFE fe, const PetscBool changed[], PetscBool *moved)
   fe->stiffness_changed = fe->contact_changed = *moved;
   fe->gap_changed = (PetscBool)(*moved || !fe->fixed_constant);
   for (PetscInt b = 0; b < s->n_bodies; b++) {
-    if (HycoExprChanges(s->body[b].young, changed) || HycoExprChanges(s->body[b].poisson, changed))
-      fe->stiffness_changed = PETSC_TRUE;
+    if (HycoMaterialChanges(s->body[b].law, changed)) fe->stiffness_changed = PETSC_TRUE;
   }
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
-    if (HycoExprChanges(s->contact[k].gap, changed)) fe->gap_changed = PETSC_TRUE;
-    for (PetscInt c = 0; c < 3; c++) {
-      if (HycoExprChanges(s->contact[k].normal[c], changed)) fe->contact_changed = PETSC_TRUE;
-    }
-  }
+  for (PetscInt k = 0; k < s->n_contacts; k++)
+    HycoContactChanges(s->contact[k], changed, &fe->contact_changed, &fe->gap_changed);
 }
 
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
@@ -262,11 +209,6 @@ void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
     FindChanges(&fe, changed, &moved);
     reaches[p] = (PetscBool)(fe.stiffness_changed || fe.contact_changed);
   }
-}
-
-void HycoFEReaches(HycoFE fe, PetscBool reaches[])
-{
-  HycoSceneReaches(fe->scene, reaches);
 }
 
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
@@ -285,7 +227,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   if (moved) PetscCall(HycoMirrorFind(fe));
   for (PetscInt k = 0; k < fe->n_loads && moved; k++) fe->shares[k].ready = PETSC_FALSE;
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
-  if (fe->stiffness_changed) PetscCall(SetMaterial(fe, first));
+  if (fe->stiffness_changed) PetscCall(HycoFESetTangents(fe, first));
   fe->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

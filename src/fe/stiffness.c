@@ -1,6 +1,7 @@
 /*
-  K: the element loop of linear elasticity (plane strain in 2D), and the matrices it fills. The element bbar takes the
-  dilatation's mean over the cell (T. J. R. Hughes, Int. J. Numer. Meth. Engng 15 (1980) 1413-1418):
+  K: the element loop over the laws' tangents C (plane strain in 2D), and the matrices it fills: the sum of w B^T C B
+  over a cell's points, or for isotropic tangents products of gradients that need no B. The element bbar takes the
+  dilatation's mean over the cell (T. J. R. Hughes, Int. J. Numer. Meth. Engng 15 (1980) 1413-1418); isotropic:
 
       sigma : eps = 2 mu (eps : eps - tr(eps)^2 / 3) + (lambda + 2 mu / 3) mean(tr eps)^2
 */
@@ -52,16 +53,15 @@ static PetscErrorCode AddMean(HycoFE fe, const HycoElement *el, PetscInt cell, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+/* The upper blocks where the tangents are isotropic. */
+static PetscErrorCode AddIsotropic(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal Ke[])
 {
-  const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
   const PetscBool bbar = fe->scene->body[fe->mesh->cell_body[cell]].bbar;
-  const PetscReal *lame = fe->lame + 2 * cell * el->nq;
+  const PetscReal *lame = fe->tangent + fe->tangent_start[cell];
   PetscReal P[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS], bulk = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(Ke, n * n));
   PetscCall(PetscArrayzero(P, n * n));
   for (PetscInt q = 0; q < el->nq; q++, lame += 2) {
     const PetscReal own[2] = {bbar ? -2 * lame[1] / 3 : lame[0], lame[1]};
@@ -79,6 +79,66 @@ PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
     PetscCall(PetscArrayzero(P, n * n));
   }
   if (bbar) PetscCall(AddMean(fe, el, cell, bulk, Ke));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Strain components of unit displacements at a point, B (n_sigma x n); mean: gradients that make the dilatation. */
+static void StrainRows(HycoFE fe, const HycoElement *el, PetscReal g[8][3], PetscReal mean[8][3], PetscReal B[])
+{
+  static const PetscInt shear[3][3] = {{-1, 3, 5}, {3, -1, 4}, {5, 4, -1}}; /* component of h_cd + h_dc */
+  const PetscInt dim = fe->dim, n = el->nv * dim;
+
+  for (PetscInt k = 0; k < fe->n_sigma * n; k++) B[k] = 0;
+  for (PetscInt r = 0; r < n; r++) {
+    const PetscInt a = r / dim, c = r % dim;
+
+    B[c * n + r] = g[a][c];
+    for (PetscInt d = 0; d < dim; d++) {
+      if (d != c) B[shear[c][d] * n + r] = g[a][d];
+    }
+    for (PetscInt k = 0; mean && k < 3; k++) B[k * n + r] += (mean[a][c] - g[a][c]) / 3;
+  }
+}
+
+/* The upper blocks of the sum of w B^T C B. */
+static PetscErrorCode AddGeneral(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal Ke[])
+{
+  const PetscInt ns = fe->n_sigma, n = el->nv * fe->dim;
+  const PetscBool bbar = fe->scene->body[fe->mesh->cell_body[cell]].bbar;
+  PetscReal mean[8][3];
+
+  PetscFunctionBegin;
+  if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));
+  for (PetscInt q = 0; q < el->nq; q++) {
+    const PetscReal *C = fe->tangent + fe->tangent_start[cell] + q * ns * ns;
+    PetscReal g[8][3], w, B[6 * HYCO_MAX_CELL_DOFS], CB[HYCO_MAX_CELL_DOFS];
+
+    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    StrainRows(fe, el, g, bbar ? mean : NULL, B);
+    for (PetscInt k = 0; k < ns; k++) {
+      for (PetscInt t = 0; t < n; t++) {
+        CB[t] = 0;
+        for (PetscInt l = 0; l < ns; l++) CB[t] += w * C[k * ns + l] * B[l * n + t];
+      }
+      for (PetscInt r = 0; r < n; r++) {
+        for (PetscInt t = r / fe->dim * fe->dim; t < n; t++) Ke[r * n + t] += B[k * n + r] * CB[t];
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscInt dim = fe->dim, n = el->nv * dim;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(Ke, n * n));
+  if (HycoFEIsIsotropic(fe, cell))
+    PetscCall(AddIsotropic(fe, el, cell, Ke));
+  else
+    PetscCall(AddGeneral(fe, el, cell, Ke));
   for (PetscInt r = 0; r < n; r++) {
     for (PetscInt t = 0; t < r / dim * dim; t++) Ke[r * n + t] = Ke[t * n + r];
   }

@@ -1,26 +1,12 @@
 /* Stresses and energies of a displacement field, cell by cell. */
 #include <hycokinematics.h>
+#include <hycomaterialimpl.h>
 
 /* The shape functions' mean gradients in a cell, where its dilatation is made of them. */
 typedef struct {
   PetscBool used;
   PetscReal g[8][3];
 } Mean;
-
-/* sigma = lambda tr(eps) I + 2 mu eps at a point from the displacement gradient h[c][d] = du_c/dX_d. */
-static void Stress(PetscInt dim, const PetscReal lame[2], PetscReal h[3][3], PetscReal s[6])
-{
-  const PetscReal volume = lame[0] * (h[0][0] + h[1][1] + h[2][2]);
-
-  if (dim == 1) {
-    s[0] = lame[1] * h[0][0];
-    return;
-  }
-  for (PetscInt c = 0; c < 3; c++) s[c] = volume + 2 * lame[1] * h[c][c];
-  s[3] = lame[1] * (h[0][1] + h[1][0]);
-  s[4] = lame[1] * (h[1][2] + h[2][1]);
-  s[5] = lame[1] * (h[0][2] + h[2][0]);
-}
 
 /* h from the shape functions' gradients; with the cell's mean ones, the dilatation becomes theirs (the element bbar).
  */
@@ -53,27 +39,43 @@ static PetscErrorCode GetMean(HycoFE fe, const HycoElement *el, PetscInt cell, M
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Strain and stress at point q of a cell (components that are not n_sigma's are 0), and its volume. */
+static PetscErrorCode AtPoint(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, const PetscReal u[],
+                              const Mean *mean, PetscReal e[6], PetscReal s[6], PetscReal *w)
+{
+  const PetscInt size = fe->tangent_size[fe->mesh->cell_body[cell]];
+  PetscReal g[8][3], h[3][3];
+
+  PetscFunctionBegin;
+  PetscCall(HycoGradients(fe, el, cell, q, g, w));
+  Gradient(fe, cell, u, g, mean, h);
+  for (PetscInt k = 0; k < 6; k++) {
+    e[k] = k < 3 ? h[k][k] : h[k == 4 ? 1 : 0][k == 3 ? 1 : 2] + h[k == 3 ? 1 : 2][k == 4 ? 1 : 0];
+    s[k] = 0;
+  }
+  HycoTangentApply(HycoFEIsIsotropic(fe, cell), fe->dim, fe->tangent + fe->tangent_start[cell] + q * size, e, s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(sigma, fe->mesh->n_cells * fe->n_sigma));
-  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+  for (PetscInt cell = 0; cell < fe->mesh->n_cells; cell++) {
     PetscReal volume = 0;
     Mean mean;
 
-    PetscCall(GetMean(fe, el, e, &mean));
+    PetscCall(GetMean(fe, el, cell, &mean));
     for (PetscInt q = 0; q < el->nq; q++) {
-      PetscReal g[8][3], h[3][3], s[6], w;
+      PetscReal e[6], s[6], w;
 
-      PetscCall(HycoGradients(fe, el, e, q, g, &w));
-      Gradient(fe, e, u, g, &mean, h);
-      Stress(fe->dim, fe->lame + 2 * (e * el->nq + q), h, s);
-      for (PetscInt k = 0; k < fe->n_sigma; k++) sigma[e * fe->n_sigma + k] += w * s[k];
+      PetscCall(AtPoint(fe, el, cell, q, u, &mean, e, s, &w));
+      for (PetscInt k = 0; k < fe->n_sigma; k++) sigma[cell * fe->n_sigma + k] += w * s[k];
       volume += w;
     }
-    for (PetscInt k = 0; k < fe->n_sigma; k++) sigma[e * fe->n_sigma + k] /= volume;
+    for (PetscInt k = 0; k < fe->n_sigma; k++) sigma[cell * fe->n_sigma + k] /= volume;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -83,20 +85,17 @@ PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[])
   const HycoElement *el = HycoElementGet(fe->mesh->type);
 
   PetscFunctionBegin;
-  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+  for (PetscInt cell = 0; cell < fe->mesh->n_cells; cell++) {
     Mean mean;
 
-    energy[e] = 0;
-    PetscCall(GetMean(fe, el, e, &mean));
+    energy[cell] = 0;
+    PetscCall(GetMean(fe, el, cell, &mean));
     for (PetscInt q = 0; q < el->nq; q++) {
-      PetscReal g[8][3], h[3][3], s[6] = {0, 0, 0, 0, 0, 0}, w;
+      PetscReal e[6], s[6], w, density = 0;
 
-      PetscCall(HycoGradients(fe, el, e, q, g, &w));
-      Gradient(fe, e, u, g, &mean, h);
-      Stress(fe->dim, fe->lame + 2 * (e * el->nq + q), h, s);
-      energy[e] += w / 2 *
-                   (s[0] * h[0][0] + s[1] * h[1][1] + s[2] * h[2][2] + s[3] * (h[0][1] + h[1][0]) +
-                    s[4] * (h[1][2] + h[2][1]) + s[5] * (h[0][2] + h[2][0]));
+      PetscCall(AtPoint(fe, el, cell, q, u, &mean, e, s, &w));
+      for (PetscInt k = 0; k < 6; k++) density += s[k] * e[k];
+      energy[cell] += w / 2 * density;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

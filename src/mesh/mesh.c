@@ -1,5 +1,5 @@
 /* HycoMesh: groups, extraction of parts, adjacency. */
-#include <hycomesh.h>
+#include <hycocontactimpl.h>
 #include <string.h>
 
 PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
@@ -71,27 +71,14 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   for (PetscInt k = 0; k < scene->n_fixed; k++) PetscCall(CheckComponents(mesh, scene->fixed[k].value));
   for (PetscInt k = 0; k < scene->n_bodies; k++) PetscCall(CheckComponents(mesh, scene->body[k].force));
   for (PetscInt k = 0; k < scene->n_loads; k++) PetscCall(CheckComponents(mesh, scene->load[k].traction));
-  for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(CheckComponents(mesh, scene->contact[k].normal));
+  for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(CheckComponents(mesh, scene->contact[k]->normal));
   for (PetscInt k = 0; k < scene->n_loads; k++) {
     PetscCall(HycoMeshFindGroup(mesh, scene->load[k].pressure ? "pressure" : "traction", scene->load[k].group, &group));
     HycoCheck(mesh->group_dim[group] == mesh->dim - 1,
               "the load on %s needs a group of dimension %d; that group has dimension %d", scene->load[k].group,
               (int)mesh->dim - 1, (int)mesh->group_dim[group]);
   }
-  for (PetscInt k = 0; k < scene->n_contacts; k++) {
-    HycoContact *c = &scene->contact[k];
-
-    PetscCall(HycoMeshFindGroup(mesh, "contact", c->slave, &group));
-    if (!c->normal[0] && !c->normal[1] && !c->normal[2]) {
-      HycoCheck(mesh->group_dim[group] == mesh->dim - 1,
-                "contact %s takes its normal from the group %s, which is no surface; give normal: {x: ..., ...}",
-                c->name, c->slave);
-    }
-    if (c->master) PetscCall(HycoMeshFindGroup(mesh, "contact", c->master, &group));
-    HycoCheck(c->type != HYCO_CONTACT_SURFACE || mesh->group_dim[group] == mesh->dim - 1,
-              "contact %s projects nodes on the group %s, which has dimension %d; a group of dimension %d is needed",
-              c->name, c->master, (int)mesh->group_dim[group], (int)mesh->dim - 1);
-  }
+  for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(HycoContactCheckGroups(scene->contact[k], mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

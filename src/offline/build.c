@@ -119,7 +119,7 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
       contact[whole->group_node[k]] = PETSC_TRUE;
   }
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
-    PetscCall(HycoMeshFindGroup(whole, "contact", t->scene->contact[k].slave, &all[(*n_all)++]));
+    PetscCall(HycoMeshFindGroup(whole, "contact", t->scene->contact[k]->slave, &all[(*n_all)++]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -398,7 +398,7 @@ static PetscErrorCode DrawHeld(HycoReducer t, HycoSamples *held)
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, &n, &n_par, NULL));
   if (count < 0) count = PetscMin(MOST_HELD, PetscMax(LEAST_HELD, n));
-  if (t->rank == 0) HycoFEReaches(t->fe, reaches);
+  if (t->rank == 0) HycoSceneReaches(t->fe->scene, reaches);
   for (PetscInt p = 0; p < n_par; p++) slow[p] = t->rank == 0 && reaches[p];
   PetscCallMPI(MPI_Bcast(slow, (PetscMPIInt)n_par, MPIU_INT, 0, HycoComm(t)));
   for (PetscInt p = 0; p < n_par; p++) reaches[p] = (PetscBool)slow[p];

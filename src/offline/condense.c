@@ -220,7 +220,7 @@ static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
     if (contact[i]) extra[n_extra++] = i;
   }
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
-    PetscCall(HycoMeshFindGroup(t->whole, "contact", t->scene->contact[k].slave, &all[k]));
+    PetscCall(HycoMeshFindGroup(t->whole, "contact", t->scene->contact[k]->slave, &all[k]));
   PetscCall(HycoMeshExtract(t->whole, 0, NULL, n_extra, extra, t->scene->n_contacts, all, &t->surfaces.mesh));
   for (PetscInt i = 0; i < t->surfaces.mesh->n_nodes; i++) index[t->surfaces.mesh->node_whole[i]] = i;
   PetscCall(HycoPairsRenumber(&t->pairs, index, &t->surfaces.pairs));
@@ -254,8 +254,8 @@ static PetscErrorCode CheckFacets(HycoReducer t)
         met.of[r] != met.of[r - 1],
         "contact %s: node %d meets other facets of %s as the parameters move it; a condensed model interpolates "
         "over the parameters what has kinks there: train a hybrid one",
-        t->scene->contact[p->contact[r]].name, (int)t->whole->node_id[p->slave[r]],
-        t->scene->contact[p->contact[r]].master);
+        t->scene->contact[p->contact[r]]->name, (int)t->whole->node_id[p->slave[r]],
+        t->scene->contact[p->contact[r]]->master);
   }
   PetscCall(HycoMetDestroy(&met));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -48,6 +48,7 @@ static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal
   const PetscInt node = HycoCondensedNode(c, &c->field[HYCO_FIELD_G], k);
   PetscInt its;
   HycoLCPStatus status = HYCO_LCP_RAY;
+  const HycoLCP lcp = {.n = c->m, .M = c->M, .q = c->g, .symmetric = PETSC_TRUE, .factor = c->set_factor};
 
   PetscFunctionBegin;
   if (node != w->last || c->stiff[w->p])
@@ -55,9 +56,7 @@ static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal
   w->last = node;
   PetscCall(HycoCondensedFreeGap(c, mu, w->p, w->i));
   for (PetscInt j = 0; j < c->m; j++) c->active[j] = (PetscBool)(own[j] > 0);
-  if (w->definite)
-    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, w->L,
-                               &its, &status));
+  if (w->definite) PetscCall(HycoLCPActiveSet(&lcp, c->active, w->L, &its, &status));
   *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

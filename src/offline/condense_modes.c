@@ -87,14 +87,13 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
   PetscBool definite;
   PetscInt its;
   HycoLCPStatus status = HYCO_LCP_RAY;
+  const HycoLCP lcp = {.n = c->m, .M = c->M, .q = c->g, .symmetric = PETSC_TRUE, .factor = c->set_factor};
 
   PetscFunctionBegin;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
   PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
   for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(nearest[i] > 0);
-  if (definite)
-    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, c->set_factor, 50 + 4 * c->m, NULL, NULL, c->active, L,
-                               &its, &status));
+  if (definite) PetscCall(HycoLCPActiveSet(&lcp, c->active, L, &its, &status));
   for (PetscInt i = 0; i < c->m; i++) L[i] = status == HYCO_LCP_SOLVED ? PetscMax(L[i], 0) : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -3,6 +3,7 @@
   ranges until these bring nothing new. It is geometry alone, on a mesh of the surfaces without cells.
 */
 #include <hycodomain.h>
+#include <hycovector.h>
 
 #define MOST_POINTS 500 /* of the ranges */
 #define FRUITLESS   50  /* one after the other: the search ends */
@@ -34,8 +35,8 @@ PetscErrorCode HycoMovedGroups(HycoScene scene, HycoMesh m, const HycoPairs *pai
   *n = 0;
   for (PetscInt k = 0; k < scene->n_contacts && pairs->room; k++) {
     if (!pairs->search[k].moved) continue;
-    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k].slave, &group[(*n)++]));
-    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k].master, &group[(*n)++]));
+    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k]->slave, &group[(*n)++]));
+    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k]->master, &group[(*n)++]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -64,8 +65,7 @@ static PetscErrorCode CutSurfaces(HycoScene scene, HycoMesh whole, const HycoPai
 
 static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const HycoPairs *all, Surfaces *s)
 {
-  HycoPairs *p = &s->pairs;
-  PetscInt *index;
+  PetscInt *index, n = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(s, sizeof(*s)));
@@ -74,36 +74,21 @@ static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const Hyco
   PetscCall(PetscMalloc1(whole->n_nodes, &index));
   for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->mesh->node_whole[i]] = i;
   PetscCall(PetscMalloc1(all->n, &s->of));
-  PetscCall(PetscMalloc1(all->n, &p->slave));
-  PetscCall(PetscMalloc1(all->n, &p->contact));
-  PetscCall(PetscCalloc1(all->n + 1, &p->master_start));
   for (PetscInt k = 0; k < all->n; k++) {
-    if (!all->search[all->contact[k]].moved) continue;
-    s->of[p->n] = k;
-    p->slave[p->n] = index[all->slave[k]];
-    p->contact[p->n++] = all->contact[k];
+    if (all->search[all->contact[k]].moved) s->of[n++] = k;
   }
+  PetscCall(HycoPairsSelect(all, n, s->of, index, &s->pairs));
   PetscCall(PetscFree(index));
-  p->room = all->room;
-  p->n_searches = all->n_searches;
-  HycoDuplicate(all->n_searches, all->search, &p->search);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The way from slave k to its master point. */
 static PetscReal Way(const Surfaces *s, PetscInt k)
 {
-  const HycoPairs *p = &s->pairs;
-  PetscReal sum = 0;
+  PetscReal r[3];
 
-  for (PetscInt c = 0; c < 3; c++) {
-    PetscReal r = -s->fe->X[3 * p->slave[k] + c];
-
-    for (PetscInt j = p->master_start[k]; j < p->master_start[k + 1]; j++)
-      r += p->weight[j] * s->fe->X[3 * p->master[j] + c];
-    sum += r * r;
-  }
-  return PetscSqrtReal(sum);
+  HycoPairsJump(&s->pairs, k, 3, s->fe->X, r);
+  return HycoLength(r);
 }
 
 /* The longest edge of a group's facets, as drawn. */
@@ -113,10 +98,8 @@ static PetscReal LongestEdge(HycoMesh m, PetscInt group)
 
   for (PetscInt k = 0; k < m->n_facets * m->nf; k++) {
     const PetscReal *x = m->xyz + 3 * m->facets[k], *y = m->xyz + 3 * m->facets[k / m->nf * m->nf + (k + 1) % m->nf];
-    PetscReal sum = 0;
 
-    for (PetscInt c = 0; c < 3; c++) sum += (x[c] - y[c]) * (x[c] - y[c]);
-    if (m->facet_group[k / m->nf] == group) longest = PetscMax(longest, PetscSqrtReal(sum));
+    if (m->facet_group[k / m->nf] == group) longest = PetscMax(longest, HycoDistance(x, y));
   }
   return longest;
 }
@@ -146,7 +129,7 @@ PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pa
       reach[c] = PETSC_MAX_REAL;
       continue;
     }
-    PetscCall(HycoMeshFindGroup(whole, "contact", scene->contact[c].slave, &g));
+    PetscCall(HycoMeshFindGroup(whole, "contact", scene->contact[c]->slave, &g));
     reach[c] = REACH_FACTOR * reach[c] + REACH_FACET * LongestEdge(whole, g);
   }
   PetscCall(SurfacesDestroy(&s));
@@ -250,36 +233,29 @@ static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal 
 static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const Lists *l, HycoMet *met)
 {
   HycoPairs *out = &met->rows;
-  const PetscInt most = pairs->n + l->n, entries = pairs->master_start[pairs->n] + l->n * pairs->room;
+  const PetscInt most = pairs->n + l->n;
   PetscInt at = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(most, &met->of));
-  PetscCall(PetscMalloc1(most, &out->slave));
-  PetscCall(PetscMalloc1(most, &out->contact));
-  PetscCall(PetscMalloc1(most + 1, &out->master_start));
-  PetscCall(PetscMalloc1(entries, &out->master));
-  PetscCall(PetscMalloc1(entries, &out->weight));
-  out->room = pairs->room;
-  out->n_searches = pairs->n_searches;
-  HycoDuplicate(pairs->n_searches, pairs->search, &out->search);
-  out->n = out->master_start[0] = 0;
+  PetscCall(HycoPairsSelect(pairs, 0, NULL, NULL, out));
+  PetscCall(HycoPairsReserve(out, most, 4));
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscBool moved = pairs->search[pairs->contact[k]].moved;
     const PetscInt lo = pairs->master_start[k];
     PetscInt r = moved ? l->head[at] : 0;
 
     while (r >= 0) {
-      const PetscInt n = moved ? l->row[r].n : pairs->master_start[k + 1] - lo, end = out->master_start[out->n];
+      PetscInt n = pairs->master_start[k + 1] - lo, node[4];
+      PetscReal weight[4];
 
-      met->of[out->n] = k;
-      out->slave[out->n] = pairs->slave[k];
-      out->contact[out->n] = pairs->contact[k];
-      for (PetscInt a = 0; a < n; a++) {
-        out->master[end + a] = moved ? s->mesh->node_whole[l->row[r].node[a]] : pairs->master[lo + a];
-        out->weight[end + a] = moved ? 1 / (PetscReal)n : pairs->weight[lo + a];
+      if (moved) n = l->row[r].n;
+      for (PetscInt a = 0; a < n && a < 4; a++) {
+        node[a] = moved ? s->mesh->node_whole[l->row[r].node[a]] : pairs->master[lo + a];
+        weight[a] = moved ? 1 / (PetscReal)n : pairs->weight[lo + a];
       }
-      out->master_start[++out->n] = end + n;
+      met->of[out->n] = k;
+      HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], n, node, weight);
       r = moved ? l->row[r].next : -1;
     }
     at += moved;

@@ -79,21 +79,6 @@ static PetscErrorCode MarkNodes(HycoMesh m, const PetscBool in[], PetscBool node
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gamma^C: the nodes of the contacts and, of surfaces that do not match, the master nodes between them. */
-static PetscErrorCode MarkContact(HycoScene scene, HycoMesh m, const HycoPairs *pairs, PetscBool node[])
-{
-  PetscFunctionBegin;
-  HycoPairsMark(pairs, node);
-  for (PetscInt k = 0; k < scene->n_contacts; k++) {
-    PetscInt g = 0;
-
-    if (scene->contact[k].type != HYCO_CONTACT_SURFACE) continue;
-    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k].master, &g));
-    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) node[m->group_node[j]] = PETSC_TRUE;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Section 7.2: cells on Gamma^C with a node closer than d to a node of Gamma^C that Omega_A has. */
 static PetscErrorCode ExtendContact(HycoScene scene, HycoMesh m, const HycoPairs *pairs, PetscReal d,
                                     const PetscInt start[], const PetscInt around[], PetscBool in[])
@@ -105,7 +90,7 @@ static PetscErrorCode ExtendContact(HycoScene scene, HycoMesh m, const HycoPairs
   PetscCall(PetscMalloc1(m->n_nodes, &node));
   PetscCall(PetscCalloc2(m->n_nodes, &contact, m->n_nodes, &list));
   PetscCall(MarkNodes(m, in, node));
-  PetscCall(MarkContact(scene, m, pairs, contact));
+  PetscCall(HycoPairsMarkSurfaces(scene, m, pairs, contact));
   for (PetscInt pass = 0; pass < 2; pass++) { /* those in Omega_A first */
     for (PetscInt i = 0; i < m->n_nodes; i++) {
       if (contact[i] && node[i] == (pass == 0)) list[n++] = i;

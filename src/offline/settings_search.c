@@ -111,7 +111,7 @@ static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
   for (PetscInt k = 0; k < t->scene->n_contacts; k++) {
     PetscInt g = 0;
 
-    PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k].slave, &g));
+    PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->slave, &g));
     for (PetscInt f = 0; f < m->n_facets; f++) {
       const PetscInt *node = m->facets + f * m->nf;
 

@@ -1,5 +1,5 @@
 /* What a scene answers: its parameters, its options, its words, its fingerprint. */
-#include <hycosceneimpl.h>
+#include <hycocontactimpl.h>
 #include <stdio.h>
 #include <string.h>
 #include <petscviewer.h>
@@ -99,7 +99,7 @@ static PetscBool MayMoveSurfaces(HycoScene scene)
   PetscBool surface = PETSC_FALSE, map = PETSC_FALSE;
 
   for (PetscInt k = 0; k < scene->n_contacts; k++)
-    surface = (PetscBool)(surface || scene->contact[k].type == HYCO_CONTACT_SURFACE);
+    surface = (PetscBool)(surface || scene->contact[k]->ops->find != NULL);
   for (PetscInt b = 0; b < scene->n_bodies; b++)
     map = (PetscBool)(map || scene->body[b].map[0] || scene->body[b].map[1] || scene->body[b].map[2]);
   return (PetscBool)(surface && map);

@@ -1,15 +1,16 @@
 /* HycoScene: from entries to bodies, supports, loads, contacts and parameters. */
 #include "entries.h"
+#include <hycocontactimpl.h>
+#include <hycomaterialimpl.h>
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Fields of a section's members; a member's name is what stands between the section and the field. */
-static const char *const body_fields[] = {"young", "poisson", "element", "map_x", "map_y", "map_z", NULL};
+static const char *const body_fields[] = {"element", "map_x", "map_y", "map_z", "law", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
-static const char *const contact_fields[] = {"type",     "group",    "slave",    "master",  "tolerance", "gap",
-                                             "normal_x", "normal_y", "normal_z", "overlap", NULL};
+static const char *const contact_fields[] = {"type", NULL};
 static const char *const scene_fields[] = {"title", "mesh", "parameters", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
@@ -33,16 +34,20 @@ static PetscBool SplitKey(const char *rest, const char *const fields[], char nam
   return PETSC_TRUE;
 }
 
-static PetscErrorCode UnknownKey(const char key[], const char what[], const char *const fields[])
+/* declared: more fields, those of a law or a contact type; or NULL. */
+static PetscErrorCode UnknownKey(const char key[], const char what[], const HycoDeclared *declared,
+                                 const char *const others[])
 {
   char list[HYCO_LINE] = "";
-  const char *last = strrchr(key, '_'), *near = NULL;
+  const char *last = strrchr(key, '_'), *near = NULL, *fields[HYCO_MAX_DECLARED + 16];
   PetscInt n = 0;
 
   PetscFunctionBegin;
-  for (size_t at = 0; fields[n]; n++) {
-    at = PetscMin(at, sizeof(list) - 1);
-    at += (size_t)snprintf(list + at, sizeof(list) - at, "%s%s", n ? ", " : "", fields[n]);
+  for (PetscInt j = 0; declared && j < declared->n; j++) fields[n++] = declared->entry[j].name;
+  for (PetscInt j = 0; others[j]; j++) fields[n++] = others[j];
+  for (PetscInt j = 0; j < n; j++) {
+    if (j) PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
+    PetscCall(PetscStrlcat(list, fields[j], sizeof(list)));
   }
   if (last) near = HycoNearest(last + 1, n, fields);
   if (near) HycoFail("the scene's entry %s is unknown; %s has: %s; did you mean %s?", key, what, list, near);
@@ -152,50 +157,6 @@ static PetscErrorCode ReadParameters(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReadContactField(HycoScene s, PetscInt entry, HycoContact *c, PetscInt field)
-{
-  const char *value = s->value[entry];
-
-  PetscFunctionBegin;
-  switch (field) {
-  case 0:
-    if (strcmp(value, "obstacle") == 0)
-      c->type = HYCO_CONTACT_OBSTACLE;
-    else if (strcmp(value, "pair") == 0)
-      c->type = HYCO_CONTACT_PAIR;
-    else if (strcmp(value, "surface") == 0)
-      c->type = HYCO_CONTACT_SURFACE;
-    else
-      HycoFail("%s is \"%s\"; it must be obstacle, pair or surface", s->key[entry], value);
-    break;
-  case 1:
-  case 2:
-    PetscCall(PetscFree(c->slave));
-    PetscCall(PetscStrallocpy(value, &c->slave));
-    break;
-  case 3:
-    PetscCall(PetscStrallocpy(value, &c->master));
-    break;
-  case 4:
-  case 9: {
-    PetscReal *length = field == 4 ? &c->tolerance : &c->overlap;
-    char *end;
-
-    *length = HycoNumber(value, &end);
-    HycoCheck(*end == '\0' && end != value && *length >= 0, "%s is \"%s\"; it must be a length, 0 or more",
-              s->key[entry], value);
-    break;
-  }
-  case 5:
-    PetscCall(NewExpr(s, entry, &c->gap));
-    break;
-  default:
-    PetscCall(NewExpr(s, entry, &c->normal[field - 6]));
-    break;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode ReadElement(HycoScene s, PetscInt entry, HycoBody *body)
 {
   const char *value = s->value[entry];
@@ -207,43 +168,198 @@ static PetscErrorCode ReadElement(HycoScene s, PetscInt entry, HycoBody *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A section whose members have a type that declares entries: bodies with their laws, contacts. */
+typedef struct {
+  const char *what, *const *others; /* for messages; entries beside the declared ones */
+  PetscErrorCode (*create)(HycoScene, const char name[], PetscObject *object, HycoDeclared **declared,
+                           PetscBool *given);
+} Section;
+
+/* The type's name that the scene gives to a member. */
+static PetscErrorCode GetType(HycoScene s, const char section[], const char name[], const char field[],
+                              const char **type, PetscBool *given)
+{
+  char dashed[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s_%s_%s", section, name, field));
+  PetscCall(PetscOptionsFindPair(s->options, NULL, dashed, type, given));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The law that the scene gives to the body `name`. The caller owns it. */
+static PetscErrorCode CreateLaw(HycoScene s, const char name[], PetscObject *object, HycoDeclared **declared,
+                                PetscBool *given)
+{
+  const char *type = NULL;
+  HycoMaterial law;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(GetType(s, "body", name, "law", &type, given));
+  PetscCall(HycoMaterialCreate(PETSC_COMM_SELF, &law));
+  PetscCall(PetscObjectSetName((PetscObject)law, name));
+  ierr = HycoMaterialSetType(law, *given ? type : HYCO_MATERIAL_ELASTIC);
+  if (ierr) PetscCall(HycoMaterialDestroy(&law));
+  PetscCall(ierr);
+  *declared = &law->constants;
+  *object = (PetscObject)law;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same of the contact `name`; an obstacle where the scene gives no type. */
+static PetscErrorCode CreateContact(HycoScene s, const char name[], PetscObject *object, HycoDeclared **declared,
+                                    PetscBool *given)
+{
+  const char *type = NULL;
+  HycoContact contact;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(GetType(s, "contact", name, "type", &type, given));
+  PetscCall(HycoContactCreate(PETSC_COMM_SELF, &contact));
+  PetscCall(PetscObjectSetName((PetscObject)contact, name));
+  ierr = HycoContactSetType(contact, *given ? type : HYCO_CONTACT_OBSTACLE);
+  if (ierr) PetscCall(HycoContactDestroy(&contact));
+  PetscCall(ierr);
+  *declared = &contact->entries;
+  *object = (PetscObject)contact;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const Section contacts = {"a contact", contact_fields, CreateContact};
+static const Section bodies = {"a body", body_fields, CreateLaw};
+
+/* "a_b_young" is b_young of a if the type of a declares it, else young of a_b: name and field; fails where neither. */
+static PetscErrorCode SplitDeclared(HycoScene s, const Section *section, const char key[], const char rest[],
+                                    char name[HYCO_LINE], const char **field)
+{
+  PetscObject object = NULL, typed = NULL;
+  HycoDeclared *declared, *of_typed = NULL;
+
+  PetscFunctionBegin;
+  *field = NULL;
+  for (const char *bar = strchr(rest, '_'); bar && !*field; bar = strchr(bar + 1, '_')) {
+    PetscBool given;
+
+    if (bar == rest || bar - rest >= HYCO_LINE) continue;
+    memcpy(name, rest, (size_t)(bar - rest));
+    name[bar - rest] = '\0';
+    PetscCall((*section->create)(s, name, &object, &declared, &given));
+    if (HycoDeclaredFind(declared, bar + 1)) *field = bar + 1;
+    if (given || !typed) { /* the likeliest member, for the message */
+      PetscCall(PetscObjectDestroy(&typed));
+      typed = object;
+      of_typed = declared;
+    } else
+      PetscCall(PetscObjectDestroy(&object));
+  }
+  if (!*field) PetscCall(UnknownKey(key, section->what, of_typed, section->others));
+  PetscCall(PetscObjectDestroy(&typed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FindBody(HycoScene s, const char name[], HycoBody **body)
+{
+  PetscInt k = 0;
+
+  PetscFunctionBegin;
+  PetscCall(Member(name, sizeof(HycoBody), &s->n_bodies, (void **)&s->body, &k));
+  *body = &s->body[k];
+  if (!(*body)->law) {
+    HycoDeclared *declared;
+    PetscBool given;
+
+    PetscCall(CreateLaw(s, name, (PetscObject *)&(*body)->law, &declared, &given));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadBody(HycoScene s, PetscInt entry, const char rest[])
+{
+  const char *key = s->key[entry], *constant;
+  char name[HYCO_LINE];
+  PetscInt field = 0;
+  HycoBody *body;
+
+  PetscFunctionBegin;
+  if (!SplitKey(rest, body_fields, name, &field)) {
+    PetscCall(SplitDeclared(s, &bodies, key, rest, name, &constant));
+    PetscCall(FindBody(s, name, &body));
+    PetscCall(HycoDeclaredRead(s, key, s->value[entry], HycoDeclaredFind(&body->law->constants, constant)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(FindBody(s, name, &body)); /* which reads `law` */
+  if (field == 0) PetscCall(ReadElement(s, entry, body));
+  if (field > 0 && field < 4) PetscCall(NewExpr(s, entry, &body->map[field - 1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FindContact(HycoScene s, const char name[], HycoContact *contact)
+{
+  HycoDeclared *declared;
+  PetscBool given;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    *contact = s->contact[k];
+    if (strcmp(((PetscObject)*contact)->name, name) == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscRealloc((size_t)(s->n_contacts + 1) * sizeof(*s->contact), &s->contact));
+  PetscCall(CreateContact(s, name, (PetscObject *)contact, &declared, &given));
+  s->contact[s->n_contacts++] = *contact;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadContact(HycoScene s, PetscInt entry, const char rest[])
+{
+  const char *key = s->key[entry], *field;
+  char name[HYCO_LINE];
+  PetscInt type;
+  HycoContact contact;
+
+  PetscFunctionBegin;
+  if (SplitKey(rest, contact_fields, name, &type)) {
+    PetscCall(FindContact(s, name, &contact)); /* which reads it */
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SplitDeclared(s, &contacts, key, rest, name, &field));
+  PetscCall(FindContact(s, name, &contact));
+  PetscCall(HycoDeclaredRead(s, key, s->value[entry], HycoDeclaredFind(&contact->entries, field)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One entry of a section with members. */
 static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
 {
   const char *key = s->key[entry], *rest = strchr(key, '_') + 1;
   char name[HYCO_LINE];
   PetscInt field = 0, k = 0;
+  HycoBody *body;
 
   PetscFunctionBegin;
   if (strncasecmp(key, "body_", 5) == 0) {
-    if (!SplitKey(rest, body_fields, name, &field)) PetscCall(UnknownKey(key, "a body", body_fields));
-    PetscCall(Member(name, sizeof(HycoBody), &s->n_bodies, (void **)&s->body, &k));
-    if (field == 2)
-      PetscCall(ReadElement(s, entry, &s->body[k]));
-    else
-      PetscCall(NewExpr(s, entry,
-                        field == 0   ? &s->body[k].young
-                        : field == 1 ? &s->body[k].poisson
-                                     : &s->body[k].map[field - 3]));
+    PetscCall(ReadBody(s, entry, rest));
   } else if (strncasecmp(key, "force_", 6) == 0) {
-    if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, "a body force", component_fields));
-    PetscCall(Member(name, sizeof(HycoBody), &s->n_bodies, (void **)&s->body, &k));
-    PetscCall(NewExpr(s, entry, &s->body[k].force[field]));
+    if (!SplitKey(rest, component_fields, name, &field))
+      PetscCall(UnknownKey(key, "a body force", NULL, component_fields));
+    PetscCall(FindBody(s, name, &body));
+    PetscCall(NewExpr(s, entry, &body->force[field]));
   } else if (strncasecmp(key, "fixed_", 6) == 0) {
-    if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, "a fixed group", component_fields));
+    if (!SplitKey(rest, component_fields, name, &field))
+      PetscCall(UnknownKey(key, "a fixed group", NULL, component_fields));
     PetscCall(Member(name, sizeof(HycoFixed), &s->n_fixed, (void **)&s->fixed, &k));
     PetscCall(NewExpr(s, entry, &s->fixed[k].value[field]));
   } else if (strncasecmp(key, "pressure_", 9) == 0) {
     PetscCall(Member(rest, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
     PetscCall(NewExpr(s, entry, &s->load[k].pressure));
   } else if (strncasecmp(key, "traction_", 9) == 0) {
-    if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, "a traction", component_fields));
+    if (!SplitKey(rest, component_fields, name, &field))
+      PetscCall(UnknownKey(key, "a traction", NULL, component_fields));
     PetscCall(Member(name, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
     PetscCall(NewExpr(s, entry, &s->load[k].traction[field]));
   } else {
-    if (!SplitKey(rest, contact_fields, name, &field)) PetscCall(UnknownKey(key, "a contact", contact_fields));
-    PetscCall(Member(name, sizeof(HycoContact), &s->n_contacts, (void **)&s->contact, &k));
-    PetscCall(ReadContactField(s, entry, &s->contact[k], field));
+    PetscCall(ReadContact(s, entry, rest));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -259,10 +375,10 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
   PetscFunctionBegin;
   if (strncasecmp(key, "scene_", 6) == 0) {
     for (; scene_fields[n]; n++) known = (PetscBool)(known || strcasecmp(key + 6, scene_fields[n]) == 0);
-    if (!known) PetscCall(UnknownKey(key, "scene", scene_fields));
+    if (!known) PetscCall(UnknownKey(key, "scene", NULL, scene_fields));
   } else if (strncasecmp(key, "parameter_", 10) == 0) {
     if (!SplitKey(key + 10, parameter_fields, name, &field))
-      PetscCall(UnknownKey(key, "a parameter", parameter_fields));
+      PetscCall(UnknownKey(key, "a parameter", NULL, parameter_fields));
     for (PetscInt p = 0; p < s->n_parameters; p++) known = (PetscBool)(known || strcasecmp(s->parameter[p], name) == 0);
     HycoCheck(known, "the scene's entry %s is about a parameter that scene: parameters: does not list", key);
   } else if (!HycoOptionFind(key)) {
@@ -281,17 +397,13 @@ static PetscErrorCode CheckScene(HycoScene s)
   PetscFunctionBegin;
   HycoCheck(s->n_bodies, "the scene has no body; write body: NAME: {young: ..., poisson: ...}");
   for (PetscInt k = 0; k < s->n_bodies; k++) {
-    HycoCheck(s->body[k].young, "body %s has no young (Young's modulus)", s->body[k].name);
-  }
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
-    HycoContact *c = &s->contact[k];
+    const HycoDeclared *d = &s->body[k].law->constants;
 
-    HycoCheck(c->slave, "contact %s names no %s", c->name, c->type == HYCO_CONTACT_OBSTACLE ? "group" : "slave group");
-    HycoCheck(c->type == HYCO_CONTACT_OBSTACLE || c->master, "contact %s is a %s and names no master group", c->name,
-              c->type == HYCO_CONTACT_PAIR ? "pair" : "surface contact");
-    HycoCheck(c->type != HYCO_CONTACT_OBSTACLE || (c->gap && !c->master),
-              "contact %s is an obstacle: it needs a gap, and no master", c->name);
+    for (PetscInt j = 0; j < d->n; j++)
+      HycoCheck(!d->entry[j].required || d->entry[j].expr, "body %s has no %s (%s)", s->body[k].name, d->entry[j].name,
+                d->entry[j].title);
   }
+  for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactComplete(s->contact[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -340,17 +452,6 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
       PetscCall(CheckPlainEntry(s, k));
     else
       PetscCall(ReadMember(s, k));
-  }
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
-    char dashed[HYCO_LINE];
-    PetscBool set;
-
-    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-contact_%s_tolerance", s->contact[k].name));
-    PetscCall(PetscOptionsHasName(s->options, NULL, dashed, &set));
-    if (!set) s->contact[k].tolerance = -1;
-    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-contact_%s_overlap", s->contact[k].name));
-    PetscCall(PetscOptionsHasName(s->options, NULL, dashed, &set));
-    if (!set) s->contact[k].overlap = -1;
   }
   PetscCall(CheckScene(s));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -483,8 +584,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   s = *scene;
   *scene = NULL;
   for (PetscInt k = 0; k < s->n_bodies; k++) {
-    PetscCall(HycoExprDestroy(&s->body[k].young));
-    PetscCall(HycoExprDestroy(&s->body[k].poisson));
+    PetscCall(HycoMaterialDestroy(&s->body[k].law));
     for (PetscInt c = 0; c < 3; c++) {
       PetscCall(HycoExprDestroy(&s->body[k].map[c]));
       PetscCall(HycoExprDestroy(&s->body[k].force[c]));
@@ -500,13 +600,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
     for (PetscInt c = 0; c < 3; c++) PetscCall(HycoExprDestroy(&s->load[k].traction[c]));
     PetscCall(PetscFree(s->load[k].group));
   }
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
-    PetscCall(HycoExprDestroy(&s->contact[k].gap));
-    for (PetscInt c = 0; c < 3; c++) PetscCall(HycoExprDestroy(&s->contact[k].normal[c]));
-    PetscCall(PetscFree(s->contact[k].slave));
-    PetscCall(PetscFree(s->contact[k].master));
-    PetscCall(PetscFree(s->contact[k].name));
-  }
+  for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactDestroy(&s->contact[k]));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     PetscCall(PetscFree(s->key[k]));
     PetscCall(PetscFree(s->value[k]));

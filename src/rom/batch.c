@@ -28,7 +28,7 @@ static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt
   PetscInt count = 0;
 
   PetscFunctionBegin;
-  HycoFEReaches(m->fe, reaches);
+  HycoSceneReaches(m->fe->scene, reaches);
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt p = 0; p < n_par; p++) {
       if (reaches[p] == (pass ? PETSC_FALSE : PETSC_TRUE)) order[count++] = p;

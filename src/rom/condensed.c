@@ -53,7 +53,6 @@ PetscErrorCode HycoCondensedDestroy(HycoCondensed *condensed)
   PetscCall(PetscFree(c->g));
   PetscCall(PetscFree(c->H));
   PetscCall(PetscFree(c->a));
-  PetscCall(PetscFree(c->w));
   PetscCall(PetscFree(c->active));
   PetscCall(HycoSetFactorDestroy(&c->set_factor));
   PetscCall(PetscFree(*condensed));
@@ -97,7 +96,6 @@ PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
   PetscCall(PetscMalloc1(m * (m + 1) / 2 + 1, &c->packed));
   PetscCall(PetscMalloc1(m * m + 1, &c->M));
   PetscCall(PetscMalloc1(m + 1, &c->g));
-  PetscCall(PetscMalloc1(m + 1, &c->w));
   PetscCall(PetscCalloc1(m + 1, &c->active));
   PetscCall(HycoSetFactorCreate(c->m, &c->set_factor));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -226,8 +224,9 @@ PetscErrorCode HycoCondensedFlexibility(HycoCondensed c, const PetscReal mu[], P
 }
 
 /* G and H, unless their parameters are as they were. */
-static PetscErrorCode BringStiffness(HycoCondensed c, const PetscReal mu[])
+static PetscErrorCode BringStiffness(HycoROM m, const PetscReal mu[])
 {
+  HycoCondensed c = m->condensed;
   PetscBool same = c->current, definite;
 
   PetscFunctionBegin;
@@ -235,6 +234,7 @@ static PetscErrorCode BringStiffness(HycoCondensed c, const PetscReal mu[])
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   c->current = PETSC_FALSE;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
+  PetscCall(PetscObjectStateIncrease((PetscObject)m->Kr));
   HycoCheckModel(
       definite,
       "the interpolated flexibility is not positive definite here (one value left out: error %.1e): train on "
@@ -281,86 +281,24 @@ static void StartSet(HycoCondensed c, const PetscReal mu[])
     c->active[i] = (PetscBool)(c->Lambda[(size_t)node * (size_t)c->m + (size_t)i] > 0);
 }
 
-/* The residuals of w = g + G L, recomputed. Equilibrium is no unknown here: it holds by what G and H are. */
-static void ComputeKKT(HycoCondensed c, const PetscReal L[], HycoKKT *kkt)
-{
-  PetscReal size = 0, most = 0, worst[3] = {0, 0, 0};
-
-  for (PetscInt i = 0; i < c->m; i++) c->w[i] = 0;
-  for (PetscInt j = 0; j < c->m; j++) {
-    const PetscReal *column = c->M + (size_t)j * (size_t)c->m;
-
-    most = PetscMax(most, PetscAbsReal(L[j]));
-    for (PetscInt i = 0; L[j] != 0 && i < c->m; i++) c->w[i] += column[i] * L[j];
-  }
-  for (PetscInt i = 0; i < c->m; i++) {
-    size = PetscMax(size, PetscMax(PetscAbsReal(c->g[i]), PetscAbsReal(c->w[i])));
-    c->w[i] += c->g[i];
-    if (PetscIsInfOrNanReal(c->w[i]) || PetscIsInfOrNanReal(L[i])) worst[2] = PETSC_MAX_REAL;
-  }
-  for (PetscInt i = 0; i < c->m; i++) {
-    worst[0] = PetscMax(worst[0], -c->w[i]);
-    worst[1] = PetscMax(worst[1], -L[i]);
-    if (L[i] != 0 && size > 0)
-      worst[2] = PetscMax(worst[2], PetscAbsReal(c->w[i] / size * (L[i] / most))); /* no overflow */
-  }
-  kkt->stationarity = kkt->rounding = 0;
-  kkt->penetration = worst[0] > 0 ? worst[0] / size : 0;
-  kkt->adhesion = worst[1] > 0 ? worst[1] / most : 0;
-  kkt->complementarity = worst[2];
-}
-
-/* One method; the forces are in model->Lambda. */
-static PetscErrorCode Attempt(HycoROM m, PetscInt type)
-{
-  HycoCondensed c = m->condensed;
-  HycoSolver s = m->solver;
-  HycoPrediction *p = &m->prediction;
-  const PetscInt max_its = s->max_its ? s->max_its : 50 + 4 * c->m;
-  HycoLCPStatus status = HYCO_LCP_SOLVED;
-  PetscBool solved = PETSC_TRUE;
-  PetscInt its = 0;
-
-  PetscFunctionBegin;
-  if (type == HYCO_TYPE_TAO) {
-    const PetscInt tao = s->tao_type == HYCO_TAO_AUTO ? HYCO_TAO_GPCG : s->tao_type;
-
-    PetscCall(HycoTaoLCP(c->m, c->M, c->g, PETSC_TRUE, tao, s->max_its, m->Lambda, &its, &solved));
-  } else if (type == HYCO_TYPE_LEMKE)
-    PetscCall(HycoLCPLemke(c->m, c->M, c->g, 50 * (c->m + 10), m->Lambda, &its, &status));
-  else
-    PetscCall(HycoLCPActiveSet(c->m, c->M, c->g, PETSC_TRUE, c->set_factor, max_its, s->monitor, s->monitor_ctx,
-                               c->active, m->Lambda, &its, &status));
-  for (PetscInt i = 0; i < c->m; i++) m->Lambda[i] = PetscMax(m->Lambda[i], 0); /* round-off below zero */
-  ComputeKKT(c, m->Lambda, &p->kkt);
-  p->iterations += its;
-  p->reason = HycoKKTMax(&p->kkt) <= s->rtol                                         ? HYCO_CONVERGED
-              : solved && (status == HYCO_LCP_SOLVED || status == HYCO_LCP_SINGULAR) ? HYCO_DIVERGED_RESIDUAL
-                                                                                     : HYCO_DIVERGED_ITERATIONS;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The chosen method, then the active set, then Lemke's, until the residuals are small. */
+/* The forces are in model->Lambda. */
 static PetscErrorCode SolveForces(HycoROM m, const PetscReal mu[])
 {
-  static const PetscInt order[] = {HYCO_TYPE_TAO, HYCO_TYPE_ACTIVE_SET, HYCO_TYPE_LEMKE};
+  HycoCondensed c = m->condensed;
   HycoPrediction *p = &m->prediction;
-  PetscInt k = 0;
+  const char *method;
 
   PetscFunctionBegin;
-  p->iterations = 0;
-  while (order[k] != m->solver->type) k++;
-  StartSet(m->condensed, mu);
-  PetscCall(PetscSNPrintf(p->method, sizeof(p->method), "%s condensed", HycoSolverTypes[order[k]]));
-  PetscCall(Attempt(m, order[k]));
-  while (p->reason < 0 && m->solver->fallback && k < 2) {
-    char before[sizeof(p->method)];
-
-    PetscCall(PetscStrncpy(before, p->method, sizeof(before)));
-    PetscCall(Attempt(m, order[++k]));
-    PetscCall(PetscSNPrintf(p->method, sizeof(p->method), "%s, then %s", before, HycoSolverTypes[order[k]]));
-    if (p->reason == HYCO_CONVERGED) p->reason = HYCO_CONVERGED_FALLBACK;
-  }
+  StartSet(c, mu);
+  PetscCall(HycoSolverSetStartSet(m->solver, c->active));
+  PetscCall(HycoSolverSolve(m->solver, NULL, m->L));
+  PetscCall(HycoSolverGetReason(m->solver, &p->reason));
+  PetscCall(HycoSolverGetIterations(m->solver, &p->iterations));
+  PetscCall(HycoSolverGetKKT(m->solver, &p->kkt));
+  PetscCall(HycoSolverGetMethod(m->solver, &method));
+  PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
+  c->solved = (PetscBool)(p->reason == HYCO_CONVERGED);
+  for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(m->Lambda[i] > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -391,13 +329,12 @@ PetscErrorCode HycoCondensedPredict(HycoROM m, const PetscReal mu[])
   PetscReal begin = HycoNow(), solve;
 
   PetscFunctionBegin;
-  PetscCall(BringStiffness(c, mu));
+  PetscCall(BringStiffness(m, mu));
   PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
   solve = HycoNow();
   p->seconds.factor = 0;
   p->seconds.assemble = solve - begin;
   PetscCall(SolveForces(m, mu));
-  c->solved = (PetscBool)(p->reason == HYCO_CONVERGED && m->solver->type == HYCO_TYPE_ACTIVE_SET);
   PetscCall(PetscArraycpy(c->last, mu, c->dim));
   p->seconds.solve = HycoNow() - solve;
   PetscCall(Displacements(m, mu));
@@ -406,6 +343,26 @@ PetscErrorCode HycoCondensedPredict(HycoROM m, const PetscReal mu[])
     if (!c->affine[q]) p->interpolation_error *= HycoPolynomialGrowth(c->n[q], c->x[q], mu[q]);
   }
   p->seconds.total = HycoNow() - begin;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* w = g + G L on the arrays of the condensed model. */
+static PetscErrorCode CreateSystem(HycoROM m)
+{
+  HycoCondensed c = m->condensed;
+  Vec g;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, c->m, c->m, c->M, &m->Kr));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, c->m, c->g, &g));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, c->m, m->Lambda, &m->L));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &m->system));
+  PetscCall(HycoSystemSetFlexibility(m->system, m->Kr, g));
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver));
+  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->scene->options));
+  PetscCall(HycoSolverSetFromOptions(m->solver));
+  PetscCall(HycoSolverSetSystem(m->solver, m->system));
+  PetscCall(VecDestroy(&g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -436,9 +393,7 @@ PetscErrorCode HycoCondensedSetUp(HycoROM m)
   PetscCall(PetscCalloc1(m->fe->n_dof, &m->U));
   PetscCall(PetscCalloc1(m->m, &m->Lambda));
   PetscCall(PetscMalloc1(m->mesh->n_cells * m->fe->n_sigma, &m->stress));
-  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver)); /* it holds the options alone */
-  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->scene->options));
-  PetscCall(HycoSolverSetFromOptions(m->solver));
+  PetscCall(CreateSystem(m));
   m->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -44,7 +44,7 @@ PetscErrorCode HycoLoadsCreate(HycoROM m)
   HycoLoads p;
 
   PetscFunctionBegin;
-  HycoFEReaches(m->fe, reaches);
+  HycoSceneReaches(m->fe->scene, reaches);
   for (PetscInt j = 0; j < s->n_parameters; j++) {
     if (!reaches[j] && s->hi[j] > s->lo[j]) parameter[n++] = j;
   }

@@ -147,9 +147,7 @@ PetscErrorCode HycoROMSetUp(HycoROM m)
      needs symmetry is meant for the full order */
   PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
   PetscCall(HycoSolverSetWarmStart(m->solver, PETSC_FALSE));
-  if (m->solver->type == HYCO_TYPE_TAO && m->solver->tao_type != HYCO_TAO_AUTO &&
-      !HycoTaoSemismooth(m->solver->tao_type))
-    PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
+  if (HycoSolverNeedsSymmetry(m->solver)) PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
   m->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

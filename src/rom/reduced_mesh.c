@@ -28,13 +28,11 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
   for (PetscInt k = 0; k < mesh->n_cells * mesh->nv; k++) *n = PetscMax(*n, mesh->cells[k] + 1);
   PetscCall(PetscCalloc1(mesh->n_nodes, &slave)); /* with a measured normal */
   for (PetscInt k = 0; k < m->pairs.n; k++) {
-    const HycoContact *c = &m->scene->contact[m->pairs.contact[k]];
-
     if (!m->in_rid[k]) continue;
     *n = PetscMax(*n, m->pairs.slave[k] + 1);
     for (PetscInt j = m->pairs.master_start[k]; j < m->pairs.master_start[k + 1]; j++)
       *n = PetscMax(*n, m->pairs.master[j] + 1);
-    if (!c->normal[0] && !c->normal[1] && !c->normal[2]) slave[m->pairs.slave[k]] = PETSC_TRUE;
+    if (HycoContactAverages(m->scene->contact[m->pairs.contact[k]])) slave[m->pairs.slave[k]] = PETSC_TRUE;
   }
   for (PetscInt f = 0; f < mesh->n_facets; f++) {
     PetscBool any = PETSC_FALSE;
@@ -86,8 +84,6 @@ static PetscErrorCode ViewMesh(HycoMesh mesh, PetscInt n, HycoMesh *own)
 static PetscErrorCode SelectPairs(HycoROM m)
 {
   const HycoPairs *all = &m->pairs;
-  HycoPairs *p = &m->own_pairs;
-  PetscInt masters = 0;
 
   PetscFunctionBegin;
   m->m = 0;
@@ -95,29 +91,8 @@ static PetscErrorCode SelectPairs(HycoROM m)
   for (PetscInt k = 0; k < all->n; k++) {
     if (m->in_rid[k]) m->contact[m->m++] = k;
   }
-  p->n = m->m;
-  PetscCall(PetscMalloc1(p->n, &p->slave));
-  PetscCall(PetscMalloc1(p->n, &p->contact));
-  PetscCall(PetscMalloc1(p->n + 1, &p->master_start));
-  PetscCall(PetscMalloc1(all->master_start[all->n], &p->master));
-  PetscCall(PetscMalloc1(all->master_start[all->n], &p->weight));
-  p->room = all->room;
-  p->place = 0;
-  p->n_searches = all->n_searches;
-  if (all->search) HycoDuplicate(all->n_searches, all->search, &p->search);
-  for (PetscInt c = 0; all->search && c < all->n_searches; c++) p->search[c].reach = m->master_reach[c];
-  p->master_start[0] = 0;
-  for (PetscInt i = 0; i < p->n; i++) {
-    const PetscInt k = m->contact[i], lo = all->master_start[k], n = all->master_start[k + 1] - lo;
-
-    p->slave[i] = all->slave[k];
-    p->contact[i] = all->contact[k];
-    p->master_start[i + 1] = masters + n;
-    if (!n) continue; /* an obstacle, or a slave node that faces no master */
-    PetscCall(PetscArraycpy(p->master + masters, all->master + lo, n));
-    PetscCall(PetscArraycpy(p->weight + masters, all->weight + lo, n));
-    masters += n;
-  }
+  PetscCall(HycoPairsSelect(all, m->m, m->contact, NULL, &m->own_pairs));
+  for (PetscInt c = 0; all->search && c < all->n_searches; c++) m->own_pairs.search[c].reach = m->master_reach[c];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,7 +1,7 @@
-/* What is left to hyco: the form by the contacts, direct or iterative by the memory that a factor of K is estimated to
- * take. */
+/* Direct or iterative, by the memory that a factor of K is estimated to take. */
 #include <hycosolverimpl.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 
 const char *const HycoLinearNames[] = {"auto", "direct", "iterative", NULL};
@@ -41,51 +41,51 @@ static PetscErrorCode Limit(HycoSolver s, PetscReal *bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a factor of K (with the contacts, in the dual form) would take. */
-static PetscErrorCode Estimate(HycoSolver s, HycoForm form, PetscReal *bytes)
+/* What the form's factor would take: its own word, or that of a factor of K. */
+static PetscErrorCode Estimate(HycoSolver s, HycoSolverForm form, PetscReal *bytes)
 {
-  HycoSystem y = s->system;
   HycoDirect probe = NULL;
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
-  if (form == HYCO_FORM_DUAL) {
-    if (!s->direct) PetscCall(HycoDirectCreate(HycoComm(s), &s->direct));
-    PetscCall(HycoDirectPinKernel(s->direct, y->K));
-    PetscCall(
-        HycoDirectAnalyse(s->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation goes on from it */
-  } else {
+  if (form->ops->estimate)
+    PetscCall(form->ops->estimate(s, form, bytes));
+  else {
     PetscCall(HycoDirectCreate(HycoComm(s), &probe));
-    PetscCall(HycoDirectPinKernel(probe, y->K));
-    PetscCall(HycoDirectAnalyse(probe, y->K, NULL, NULL, y->symmetric, bytes));
+    PetscCall(HycoDirectPinKernel(probe, s->system->K));
+    PetscCall(HycoDirectAnalyse(probe, s->system->K, NULL, NULL, s->system->symmetric, bytes));
     PetscCall(HycoDirectDestroy(&probe));
   }
-  s->bytes = *bytes;
+  s->stiffness.bytes = *bytes;
   s->seconds_factor += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode TakeIterative(HycoSolver s, HycoForm *form)
+/* Iterations need a form that accepts them: of the built-in ones, linear without contact, else primal. */
+static PetscErrorCode TakeIterative(HycoSolver s, HycoSolverForm *form)
 {
-  PetscBool possible = PETSC_FALSE;
+  char why[HYCO_LINE], asked[sizeof(s->form_name)];
+  HycoSolverForm other;
 
   PetscFunctionBegin;
-  if (s->system->symmetric && s->system->m && s->type != HYCO_TYPE_LEMKE)
-    PetscCall(HycoPrimalPossible(s->system, &possible));
-  if (s->linear == HYCO_LINEAR_ITERATIVE) {
-    PetscCheck(s->form == HYCO_FORM_AUTO || s->form == HYCO_FORM_PRIMAL, HycoComm(s), PETSC_ERR_USER,
-               "-hyco_linear iterative solves the primal form; take away -hyco_solver_form, or say primal");
-    PetscCheck(possible || !s->system->m, HycoComm(s), PETSC_ERR_USER,
-               "-hyco_linear iterative needs a symmetric system, the types active_set or tao, and for each contact an "
-               "unknown of its own; use -hyco_linear direct");
-  }
-  s->iterative = (PetscBool)(possible || (s->linear == HYCO_LINEAR_ITERATIVE && !s->system->m));
-  if (possible) *form = HYCO_FORM_PRIMAL;
+  s->iterative = PETSC_TRUE;
+  PetscCall(PetscStrncpy(asked, s->form_name, sizeof(asked)));
+  if (s->linear == HYCO_LINEAR_AUTO) s->form_name[0] = '\0';
+  PetscCall(HycoSolverAcceptingForm(s, NULL, &other, why));
+  PetscCall(PetscStrncpy(s->form_name, asked, sizeof(s->form_name)));
+  s->iterative = (PetscBool)(other != NULL);
+  if (other) *form = other;
+  PetscCheck(other || s->linear != HYCO_LINEAR_ITERATIVE || !asked[0] || strcmp(asked, "primal") == 0, HycoComm(s),
+             PETSC_ERR_USER,
+             "-hyco_linear iterative solves the primal form; take away -hyco_solver_form, or say primal");
+  PetscCheck(other || s->linear != HYCO_LINEAR_ITERATIVE, HycoComm(s), PETSC_ERR_USER,
+             "-hyco_linear iterative needs a symmetric system, the types active_set or tao, and for each contact an "
+             "unknown of its own; use -hyco_linear direct");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether an automatic choice is iterative. Estimates of free memory change as it fills: each K is asked about once. */
-static PetscErrorCode DecideByMemory(HycoSolver s, HycoForm *form)
+static PetscErrorCode DecideByMemory(HycoSolver s, HycoSolverForm *form)
 {
   PetscReal bytes, limit;
   MatInfo info;
@@ -103,21 +103,20 @@ static PetscErrorCode DecideByMemory(HycoSolver s, HycoForm *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoChooseLinear(HycoSolver s, HycoForm *form)
+PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form)
 {
   PetscBool aij, same;
   PetscObjectId id;
 
   PetscFunctionBegin;
   s->linear_method[0] = '\0';
+  if (!s->system->K) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectTypeCompareAny((PetscObject)s->system->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
   PetscCall(PetscObjectGetId((PetscObject)s->system->K, &id));
   same = (PetscBool)(s->chosen_for == id && s->linear == HYCO_LINEAR_AUTO);
   s->chosen_for = id;
-  if (same) {
-    if (s->iterative && s->system->m) *form = HYCO_FORM_PRIMAL;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
+  if (same && s->iterative) PetscCall(TakeIterative(s, form));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
   s->iterative = PETSC_FALSE;
   s->why_iterative[0] = '\0';
   if (!aij) PetscFunctionReturn(PETSC_SUCCESS);
@@ -126,45 +125,27 @@ PetscErrorCode HycoChooseLinear(HycoSolver s, HycoForm *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Few contacts: the dual, with its dense flexibility. About as many as unknowns: the primal. */
-PetscErrorCode HycoChooseForm(HycoSolver s, HycoForm *form)
+PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
 {
-  PetscBool aij, possible = PETSC_FALSE;
+  KSPType method;
+  PCType pc;
+  MatSolverType package = NULL;
+  PC handle;
 
   PetscFunctionBegin;
-  *form = s->form;
-  if (*form != HYCO_FORM_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
-  *form = HYCO_FORM_DUAL;
-  if (s->type == HYCO_TYPE_LEMKE || (s->type == HYCO_TYPE_TAO && s->tao_type >= HYCO_TAO_SEMISMOOTH))
+  if (!ksp) {
+    PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: mumps, %.3g GB estimated",
+                            (double)(1e-9 * s->stiffness.bytes)));
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)s->system->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
-  if (aij && s->system->symmetric && (4 * s->system->m > s->system->n || s->system->m > 6000))
-    PetscCall(HycoPrimalPossible(s->system, &possible));
-  if (possible) *form = HYCO_FORM_PRIMAL;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The TAO type for the system, and whether type, form and system go together. */
-PetscErrorCode HycoChooseTao(HycoSolver s, HycoForm form)
-{
-  PetscFunctionBegin;
-  PetscCheck(
-      form == HYCO_FORM_DUAL || s->type == HYCO_TYPE_TAO ||
-          (form == HYCO_FORM_PRIMAL && s->type == HYCO_TYPE_ACTIVE_SET),
-      HycoComm(s), PETSC_ERR_USER,
-      "%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with dual_free",
-      HycoSolverTypes[s->type]);
-  s->tao = s->tao_type;
-  if (s->tao == HYCO_TAO_AUTO) s->tao = s->system->symmetric ? HYCO_TAO_GPCG : HYCO_TAO_SEMISMOOTH;
-  if (s->type != HYCO_TYPE_TAO || !s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(s->system->symmetric || HycoTaoSemismooth(s->tao), HycoComm(s), PETSC_ERR_USER,
-             "TAO's %s needs a symmetric system and this one is not; use -hyco_tao_type ssils, asils, ssfls or asfls",
-             HycoTaoTypes[s->tao]);
-  PetscCheck(form == HYCO_FORM_DUAL || !HycoTaoSemismooth(s->tao), HycoComm(s), PETSC_ERR_USER,
-             "TAO's %s needs the matrix of the dual form; use -hyco_solver_form dual", HycoTaoTypes[s->tao]);
-  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->tao != HYCO_TAO_BQPIP, HycoComm(s), PETSC_ERR_USER,
-             "TAO's bqpip reads the matrix of the dual form; use -hyco_solver_form dual");
-  PetscCheck(form != HYCO_FORM_DUAL_FREE || s->system->symmetric, HycoComm(s), PETSC_ERR_USER,
-             "the form dual_free needs a symmetric system; use -hyco_solver_form dual");
+  }
+  PetscCall(KSPGetType(ksp, &method));
+  PetscCall(KSPGetPC(ksp, &handle));
+  PetscCall(PCGetType(handle, &pc));
+  if (!s->iterative) PetscCall(PCFactorGetMatSolverType(handle, &package));
+  if (package)
+    PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: %s by %s", pc, package));
+  else
+    PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "iterative: %s with %s%s", method, pc,
+                            s->why_iterative));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,12 +1,16 @@
-/* HycoSolver: chooses the form, runs the method, judges it by the recomputed residuals, falls back when it failed. */
+/* HycoSolver: tries forms and methods in order, and judges each by the recomputed residuals. */
 #include <hycosolverimpl.h>
+#include <string.h>
 
+/* By their place in `methods`, where the type of Tao is empty for the user's. */
 const char *const HycoSolverTypes[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, HYCO_SOLVER_LEMKE, NULL};
+static const char *const methods[] = {HYCO_TAO_ACTIVE_SET, "", HYCO_TAO_LEMKE};
+/* What failed is followed by what comes next here. */
+static const PetscInt order[] = {1, 0, 2};
+#define N_METHODS ((PetscInt)(sizeof(order) / sizeof(order[0])))
 
-/* Lemke's dictionary has m^2 entries, and each of its some m pivots changes them all: beyond this it is no fallback. */
-#define HYCO_LEMKE_MAX 3000
-
-static const char *const forms[] = {"auto", "dual", "primal", "dual_free", NULL}; /* of HycoForm */
+/* The forms, by the values of HycoForm. */
+static const char *const form_names[] = {"", "dual", "primal", "dual_free"};
 
 PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
 {
@@ -17,8 +21,8 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
   (*solver)->rtol = 1e-8;
   (*solver)->warm = PETSC_TRUE;
   (*solver)->fallback = PETSC_TRUE;
-  (*solver)->tao_type = HYCO_TAO_AUTO;
   (*solver)->multilevel = PETSC_TRUE;
+  PetscCall(HycoSolverCreateForms(*solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -32,21 +36,12 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   HycoDereference(solver);
   s = *solver;
   PetscCall(HycoSystemDestroy(&s->system));
-  PetscCall(HycoDirectDestroy(&s->direct));
-  PetscCall(KSPDestroy(&s->ksp_gap));
-  PetscCall(HycoDirectDestroy(&s->direct_free));
-  PetscCall(MatDestroy(&s->T));
-  PetscCall(MatDestroy(&s->Kg));
-  PetscCall(MatDestroy(&s->Kw));
-  PetscCall(PetscFree(s->lu));
-  PetscCall(PetscFree(s->X));
-  PetscCall(PetscFree(s->ipiv));
-  PetscCall(PetscFree(s->S));
-  PetscCall(PetscFree(s->g));
-  PetscCall(PetscFree(s->L));
-  PetscCall(PetscFree(s->active));
-  PetscCall(PetscFree(s->pivot));
-  PetscCall(PetscFree(s->contact));
+  for (PetscInt k = 0; k < s->n_forms; k++) {
+    if (s->forms[k]->ops->destroy) PetscCall(s->forms[k]->ops->destroy(s->forms[k]));
+    PetscCall(PetscFree(s->forms[k]));
+  }
+  PetscCall(PetscFree(s->forms));
+  PetscCall(HycoStiffnessDestroy(&s->stiffness));
   PetscCall(PetscHeaderDestroy(solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -80,18 +75,15 @@ PetscErrorCode HycoSolverSetType(HycoSolver s, HycoSolverType type)
 
 PetscErrorCode HycoSolverSetTaoType(HycoSolver s, const char type[])
 {
+  char list[HYCO_LINE];
+
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  s->tao_type = HYCO_TAO_AUTO;
+  s->tao_type[0] = '\0';
   if (!type) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt k = 0; HycoTaoTypes[k] && s->tao_type == HYCO_TAO_AUTO; k++) {
-    PetscBool same;
-
-    PetscCall(PetscStrcasecmp(type, HycoTaoTypes[k], &same));
-    if (same) s->tao_type = k;
-  }
-  HycoCheck(s->tao_type != HYCO_TAO_AUTO,
-            "the TAO type \"%s\" is unknown here; hyco -help lists those of -hyco_tao_type", type);
+  PetscCall(HycoTaoFindType(type, s->tao_type, list));
+  HycoCheck(s->tao_type[0], "the TAO type \"%s\" is unknown; it must be one of: %s, or one that the program registers",
+            type, list);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,7 +91,7 @@ PetscErrorCode HycoSolverSetForm(HycoSolver s, HycoForm form)
 {
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  s->form = form;
+  PetscCall(PetscStrncpy(s->form_name, form_names[form], sizeof(s->form_name)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -164,6 +156,50 @@ PetscErrorCode HycoSolverSetMonitor(HycoSolver s, HycoMonitor monitor, void *ctx
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -hyco_solver_form: auto, or a registered form's name. */
+static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
+{
+  const char **words;
+  PetscInt form = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(s->n_forms + 2, &words));
+  words[0] = "auto";
+  for (PetscInt k = 0; k < s->n_forms; k++) {
+    words[k + 1] = s->forms[k]->name;
+    if (strcmp(s->form_name, s->forms[k]->name) == 0) form = k + 1;
+  }
+  PetscCall(
+      HycoOptionsWord("-hyco_solver_form",
+                      "full order: pose it in the forces (few contacts; _free: no matrix) or in the gaps (as many "
+                      "as unknowns)",
+                      words, &form, NULL));
+  PetscCall(PetscStrncpy(s->form_name, form ? words[form] : "", sizeof(s->form_name)));
+  PetscCall(PetscFree(words));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -hyco_tao_type: one of TAO's that suit contact, or one that the program registers. */
+static PetscErrorCode ReadTaoType(HycoSolver s, HycoOptionItems PetscOptionsObject)
+{
+  char type[HYCO_TAO_NAME] = "", list[HYCO_LINE];
+  PetscBool given;
+
+  PetscFunctionBegin;
+  PetscCall(HycoOptionsString("-hyco_tao_type",
+                              "<gpcg|tron|...|ssils|...> with the type tao: its solver; docs/solvers.md says which for "
+                              "what (-hyco_tao_... sets its own options) [gpcg; ssils if nonsymmetric]",
+                              type, sizeof(type), &given));
+  if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(!methods[s->type][0],
+            "nothing reads the option -hyco_tao_type here: the type is %s; give -hyco_solver_type tao",
+            HycoSolverTypes[s->type]);
+  PetscCall(HycoTaoFindType(type, s->tao_type, list));
+  HycoCheck(s->tao_type[0], "-hyco_tao_type is \"%s\"; it must be one of: %s, or one that the program registers", type,
+            list);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSolverSetOptionsPrefix(HycoSolver s, const char prefix[])
 {
   PetscFunctionBegin;
@@ -174,13 +210,11 @@ PetscErrorCode HycoSolverSetOptionsPrefix(HycoSolver s, const char prefix[])
 
 PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
 {
-  PetscInt form, linear;
+  PetscInt linear;
   PetscReal gigabytes;
-  PetscBool tao;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  form = (PetscInt)s->form;
   linear = (PetscInt)s->linear;
   gigabytes = 1e-9 * s->memory;
   PetscObjectOptionsBegin((PetscObject)s);
@@ -188,15 +222,8 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
       HycoOptionsWord("-hyco_solver_type",
                       "method for every contact problem (a model's takes active_set where a TAO type needs symmetry)",
                       HycoSolverTypes, &s->type, NULL));
-  PetscCall(HycoOptionsWord("-hyco_tao_type",
-                            "<gpcg|tron|...|ssils|...> with the type tao: its solver; docs/solvers.md says which for "
-                            "what (-hyco_tao_... sets its own options) [gpcg; ssils if nonsymmetric]",
-                            HycoTaoTypes, &s->tao_type, &tao));
-  PetscCall(
-      HycoOptionsWord("-hyco_solver_form",
-                      "full order: pose it in the forces (few contacts; _free: no matrix) or in the gaps (as many "
-                      "as unknowns)",
-                      forms, &form, NULL));
+  PetscCall(ReadTaoType(s, PetscOptionsObject));
+  PetscCall(ReadForm(s, PetscOptionsObject));
   PetscCall(HycoOptionsWord("-hyco_linear",
                             "solve with the stiffness by a factor (MUMPS), or by conjugate gradients with multigrid",
                             HycoLinearNames, &linear, NULL));
@@ -212,14 +239,12 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
                             "what is not solved is tried again: tao, then active_set, then lemke", &s->fallback, NULL));
   PetscCall(HycoOptionsBool("-hyco_solver_warm_start", "full order: start from the last solution's active contacts",
                             &s->warm, NULL));
-  PetscCall(HycoOptionsBool("-hyco_solver_multilevel",
-                            "full order, every unknown a contact: start from coarser problems", &s->multilevel, NULL));
+  for (PetscInt k = 0; k < s->n_forms; k++) {
+    if (s->forms[k]->ops->setfromoptions)
+      PetscCall(s->forms[k]->ops->setfromoptions(s, s->forms[k], PetscOptionsObject));
+  }
   PetscCall(HycoOptionsName("-hyco_solver_view", "after each solve: form, method, tolerances, residuals"));
   PetscOptionsEnd();
-  HycoCheck(!tao || s->type == HYCO_TYPE_TAO,
-            "nothing reads the option -hyco_tao_type here: the type is %s; give -hyco_solver_type tao",
-            HycoSolverTypes[s->type]);
-  s->form = (HycoForm)form;
   s->linear = (HycoLinear)linear;
   s->memory = 1e9 * gigabytes;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -235,96 +260,222 @@ PetscErrorCode HycoSolverDeclare(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* `direct`: x came from a solve with K, so that no equilibrium means no good solve. */
-static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool direct, PetscBool solved)
+PetscBool HycoSolverNeedsSymmetry(HycoSolver s)
+{
+  return (PetscBool)(!methods[s->type][0] && HycoTaoTraits(s->tao_type) & HYCO_TAO_SYMMETRIC);
+}
+
+PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[])
+{
+  PetscFunctionBegin;
+  if (s->now.traits & HYCO_TAO_OWN)
+    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s %s", s->now.word, form));
+  else
+    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s %s %s", s->now.word, s->now.type, form));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverGiveUp(HycoSolver s, Vec x, Vec L)
+{
+  PetscFunctionBegin;
+  s->reason = HYCO_DIVERGED_SINGULAR;
+  PetscCall(VecSet(x, 0));
+  if (L) PetscCall(VecSet(L, 0));
+  PetscCall(HycoSolverNameMethod(s, s->form->name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The method of that number, for this system. */
+static PetscErrorCode SetMethod(HycoSolver s, PetscInt type)
+{
+  const char *tao = methods[type];
+
+  PetscFunctionBegin;
+  if (!tao[0]) tao = s->tao_type[0] ? s->tao_type : s->system->symmetric ? "gpcg" : "ssils";
+  s->now.word = HycoSolverTypes[type];
+  PetscCall(PetscStrncpy(s->now.type, tao, sizeof(s->now.type)));
+  s->now.traits = HycoTaoTraits(tao);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscReal *cost, char why[HYCO_LINE])
+{
+  PetscFunctionBegin;
+  PetscCall(form->ops->accepts(s, form, (PetscBool)(strcmp(form->name, s->form_name) == 0), cost, why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSolverForm *form, char why[HYCO_LINE])
+{
+  const PetscBool posed = (PetscBool)(s->system->K && s->system->m); /* there is a choice */
+  PetscReal cost = -1, least = PETSC_MAX_REAL;
+
+  PetscFunctionBegin;
+  *form = NULL;
+  why[0] = '\0';
+  if (!stay && s->form_name[0] && posed && !s->falling_back) {
+    stay = HycoSolverFindForm(s, s->form_name);
+    PetscCall(Accepts(s, stay, &cost, why));
+    if (cost >= 0) *form = stay;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (stay) PetscCall(Accepts(s, stay, &cost, why));
+  if (cost >= 0) {
+    *form = stay;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt k = 0; k < s->n_forms; k++) {
+    PetscCall(Accepts(s, s->forms[k], &cost, why));
+    if (cost < 0 || cost >= least) continue;
+    least = cost;
+    *form = s->forms[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The form of the first attempt: what the user named, or the cheapest; then direct or iterative. */
+static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
+{
+  const PetscBool iterative = s->iterative;
+  char why[HYCO_LINE];
+
+  PetscFunctionBegin;
+  HycoCheck(s->system->symmetric || !s->system->m || !(s->now.traits & HYCO_TAO_SYMMETRIC),
+            "TAO's %s needs a symmetric system and this one is not; use -hyco_tao_type ssils, asils, ssfls or asfls",
+            s->now.type);
+  s->iterative = PETSC_FALSE;
+  PetscCall(HycoSolverAcceptingForm(s, NULL, form, why));
+  s->iterative = iterative;
+  PetscCheck(*form, HycoComm(s), PETSC_ERR_USER, "%s", why);
+  PetscCall(HycoChooseLinear(s, form));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
 {
   PetscFunctionBegin;
   HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(s->system, x, L, &s->kkt));
   if (HycoKKTMax(&s->kkt) <= s->rtol)
     s->reason = HYCO_CONVERGED;
-  else if (direct && !(s->kkt.stationarity <= 1e-3))
+  else if (s->by_factor && !(s->kkt.stationarity <= 1e-3))
     s->reason = HYCO_DIVERGED_SINGULAR; /* K x = r was not even nearly solved */
   else if (s->reason != HYCO_DIVERGED_SINGULAR)
     s->reason = solved || s->kkt.stationarity > s->rtol ? HYCO_DIVERGED_RESIDUAL : HYCO_DIVERGED_ITERATIONS;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One method on one form, judged. */
-static PetscErrorCode Attempt(HycoSolver s, PetscInt type, HycoForm form, Vec x, Vec L)
+/* The method now on that form, judged; its iterations are added. */
+static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
 {
-  const PetscBool direct = (PetscBool)(form != HYCO_FORM_PRIMAL || type != HYCO_TYPE_TAO);
+  const PetscInt its = s->its;
   PetscBool solved = PETSC_FALSE;
 
   PetscFunctionBegin;
+  s->form = form;
   s->its = 0;
   s->reason = HYCO_DIVERGED_RESIDUAL;
-  if (form == HYCO_FORM_PRIMAL)
-    PetscCall(HycoSolvePrimal(s, type, x, L, &solved));
-  else if (form == HYCO_FORM_DUAL_FREE && s->system->m)
-    PetscCall(HycoSolveDualFree(s, x, L, &solved));
-  else
-    PetscCall(HycoSolveDual(s, type, x, L, &solved));
-  PetscCall(Judge(s, x, L, direct, solved));
+  s->by_factor = PETSC_TRUE;
+  PetscCall(form->ops->solve(s, form, x, L, &solved));
+  PetscCall(Judge(s, x, L, solved));
+  s->its += its;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next method after one that did not solve: TAO, the active set, Lemke's; this one wants the dual form, whose
-   factor an iterative solve is there to avoid. */
-static PetscBool NextAttempt(const HycoSolver s, PetscInt *type, HycoForm *form)
+/* Attempts in order, from the chosen method on, until one has solved. */
+static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
 {
-  const PetscBool dense = (PetscBool)(s->system->m && s->system->m <= HYCO_LEMKE_MAX && !s->iterative);
+  PetscInt k = 0;
+  PetscBool fell_back = PETSC_FALSE, better = PETSC_FALSE;
 
-  if (!s->fallback || s->reason > 0 || s->reason == HYCO_DIVERGED_SINGULAR || s->p) return PETSC_FALSE;
-  if (*type == HYCO_TYPE_LEMKE || (*type == HYCO_TYPE_ACTIVE_SET && !dense)) return PETSC_FALSE;
-  if (*form == HYCO_FORM_DUAL_FREE && !dense) return PETSC_FALSE;
-  *type = *type == HYCO_TYPE_TAO ? HYCO_TYPE_ACTIVE_SET : HYCO_TYPE_LEMKE;
-  if (*type == HYCO_TYPE_LEMKE || *form == HYCO_FORM_DUAL_FREE) *form = HYCO_FORM_DUAL;
-  return PETSC_TRUE;
+  PetscFunctionBegin;
+  while (order[k] != s->type) k++;
+  for (; k < N_METHODS; k++) {
+    char why[HYCO_LINE], before[sizeof(s->method)];
+    HycoSolverForm form;
+
+    PetscCall(SetMethod(s, order[k]));
+    if (s->falling_back)
+      PetscCall(HycoSolverAcceptingForm(s, s->form, &form, why));
+    else
+      PetscCall(FirstForm(s, &form));
+    if (!form) continue;
+    PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
+    PetscCall(Attempt(s, form, x, L));
+    if (s->reason < 0 && form->ops->refine) PetscCall(form->ops->refine(s, form, &better));
+    if (s->reason < 0 && better) PetscCall(Attempt(s, form, x, L));
+    better = PETSC_FALSE;
+    fell_back = s->falling_back;
+    if (fell_back) PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then %s", before, s->now.word));
+    if (s->reason > 0 || s->reason == HYCO_DIVERGED_SINGULAR || !s->fallback || !s->system->m) break;
+    s->falling_back = PETSC_TRUE;
+  }
+  if (fell_back && s->reason == HYCO_CONVERGED) s->reason = HYCO_CONVERGED_FALLBACK;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
 {
-  HycoForm form;
-  PetscInt type, its, n_free = 0;
-  PetscBool fell_back = PETSC_FALSE, refined = PETSC_FALSE;
+  PetscInt n_free = 0;
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   if (s->system) HycoCheckHandle(s->system, HYCO_SYSTEM_CLASSID);
-  PetscCheck(s->system && s->system->F, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+  PetscCheck(s->system && (s->system->F || s->system->G), PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
   s->seconds_factor = s->seconds_before;
-  type = s->type;
-  PetscCall(HycoChooseForm(s, &form));
-  PetscCall(HycoChooseLinear(s, &form));
-  PetscCall(HycoChooseTao(s, form));
-  PetscCall(Attempt(s, type, form, x, L));
-  its = s->its;
-  if (s->reason < 0 && form == HYCO_FORM_DUAL) PetscCall(HycoDualRefine(s, &refined));
-  if (refined) {
-    PetscCall(Attempt(s, type, form, x, L));
-    its += s->its;
+  s->its = 0;
+  s->falling_back = PETSC_FALSE;
+  PetscCall(Attempts(s, x, L));
+  for (PetscInt k = 0; k < s->n_forms; k++) {
+    if (s->forms[k]->ops->reset) PetscCall(s->forms[k]->ops->reset(s, s->forms[k]));
   }
-  while (NextAttempt(s, &type, &form)) {
-    char before[sizeof(s->method)], next[32];
-
-    PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
-    PetscCall(Attempt(s, type, form, x, L));
-    its += s->its;
-    fell_back = PETSC_TRUE;
-    PetscCall(PetscStrncpy(next, HycoSolverTypes[type], sizeof(next)));
-    PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then %s", before, next));
-  }
-  s->its = its;
-  HycoDualForget(s);
-  if (s->reason < 0) PetscCall(HycoKernelSize(s->system->K, &n_free));
+  if (s->reason < 0 && s->system->K) PetscCall(HycoKernelSize(s->system->K, &n_free));
   if (n_free) s->reason = HYCO_DIVERGED_FLOATING;
-  if (fell_back && s->reason == HYCO_CONVERGED) s->reason = HYCO_CONVERGED_FALLBACK;
   s->free = NULL;
+  s->start_set = NULL;
   s->seconds_solve = HycoNow() - begin - (s->seconds_factor - s->seconds_before);
   s->seconds_before = 0;
   PetscCall(HycoSolverViewFromOptions(s, NULL, "-hyco_solver_view"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular)
+{
+  HycoSolverForm form = HycoSolverFindForm(s, s->system->m ? "dual" : "linear");
+
+  PetscFunctionBegin;
+  s->seconds_factor = 0;
+  PetscCall(form->ops->setup(s, form, singular));
+  s->seconds_before = s->seconds_factor;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x)
+{
+  HycoSystem y = s->system;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemWork(y));
+  PetscCall(HycoStiffnessSolve(s, r, x));
+  PetscCall(MatMult(y->K, x, y->work_x[0]));
+  PetscCall(VecAYPX(y->work_x[0], -1, r));
+  PetscCall(HycoStiffnessSolve(s, y->work_x[0], y->work_x[1]));
+  PetscCall(VecAXPY(x, 1, y->work_x[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x)
+{
+  PetscFunctionBegin;
+  s->free = x;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[])
+{
+  PetscFunctionBegin;
+  s->start_set = active;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -407,11 +558,7 @@ PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
   PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s%s%s; form: %s\n", HycoSolverTypes[s->type],
-                                   s->type == HYCO_TYPE_TAO ? ", " : "",
-                                   s->type != HYCO_TYPE_TAO ? ""
-                                   : s->tao_type < 0        ? "by the system"
-                                                            : HycoTaoTypes[s->tao_type],
-                                   forms[s->form]));
+                                   s->tao_type[0] ? ", " : "", s->tao_type, s->form_name[0] ? s->form_name : "auto"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g; iterations: at most %d%s\n",
                                    (double)s->rtol, (int)s->max_its, s->max_its ? "" : " (by the number of contacts)"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "solves with K: %s\n",

@@ -42,6 +42,7 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system)
   PetscCall(MatDestroy(&s->K));
   PetscCall(MatDestroy(&s->Bt));
   PetscCall(MatDestroy(&s->B));
+  PetscCall(MatDestroy(&s->G));
   PetscCall(VecDestroy(&s->F));
   PetscCall(VecDestroy(&s->D));
   PetscCall(FreeWork(s));
@@ -75,6 +76,7 @@ PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBo
   PetscCall(MatDestroy(&s->K));
   PetscCall(MatDestroy(&s->B));
   PetscCall(MatDestroy(&s->Bt));
+  PetscCall(MatDestroy(&s->G));
   s->K = K;
   s->B = B;
   s->Bt = Bt;
@@ -110,6 +112,37 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
   PetscCall(VecDestroy(&s->D));
   s->F = F;
   s->D = D;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemSetFlexibility(HycoSystem s, Mat G, Vec g)
+{
+  PetscInt rows, cols, m, lda = 0;
+  PetscBool dense;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
+  PetscCall(PetscObjectTypeCompare((PetscObject)G, MATSEQDENSE, &dense));
+  PetscCall(MatGetSize(G, &rows, &cols));
+  PetscCall(VecGetSize(g, &m));
+  if (dense) PetscCall(MatDenseGetLDA(G, &lda));
+  PetscCheck(dense && lda == rows && rows == cols && m == rows, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
+             "G is %d x %d and g has length %d; G must be dense on one process, square, and g as long", (int)rows,
+             (int)cols, (int)m);
+  PetscCall(PetscObjectReference((PetscObject)G));
+  PetscCall(PetscObjectReference((PetscObject)g));
+  PetscCall(MatDestroy(&s->K));
+  PetscCall(MatDestroy(&s->B));
+  PetscCall(MatDestroy(&s->Bt));
+  PetscCall(MatDestroy(&s->G));
+  PetscCall(VecDestroy(&s->F));
+  PetscCall(VecDestroy(&s->D));
+  PetscCall(FreeWork(s));
+  s->G = G;
+  s->D = g;
+  s->symmetric = PETSC_TRUE;
+  s->n = 0;
+  s->m = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -176,6 +209,48 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The residuals of w = g + G L. Equilibrium is no unknown there: it holds by what G is. */
+static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
+{
+  const PetscInt m = s->m;
+  PetscReal size = 0, most = 0, worst[3] = {0, 0, 0};
+  const PetscScalar *G, *g, *l;
+  PetscScalar *w;
+
+  PetscFunctionBegin;
+  if (!s->work_L) PetscCall(VecDuplicate(s->D, &s->work_L));
+  PetscCall(VecSet(s->work_L, 0));
+  PetscCall(MatDenseGetArrayRead(s->G, &G));
+  PetscCall(VecGetArrayRead(s->D, &g));
+  PetscCall(VecGetArrayRead(L, &l));
+  PetscCall(VecGetArray(s->work_L, &w));
+  for (PetscInt j = 0; j < m; j++) { /* few forces are not zero */
+    const PetscScalar *column = G + (size_t)j * (size_t)m;
+
+    most = PetscMax(most, PetscAbsReal(l[j]));
+    for (PetscInt i = 0; l[j] != 0 && i < m; i++) w[i] += column[i] * l[j];
+  }
+  for (PetscInt i = 0; i < m; i++) {
+    size = PetscMax(size, PetscMax(PetscAbsReal(g[i]), PetscAbsReal(w[i])));
+    w[i] += g[i];
+    if (PetscIsInfOrNanReal(w[i]) || PetscIsInfOrNanReal(l[i])) worst[2] = PETSC_MAX_REAL;
+  }
+  for (PetscInt i = 0; i < m; i++) {
+    worst[0] = PetscMax(worst[0], -w[i]);
+    worst[1] = PetscMax(worst[1], -l[i]);
+    if (l[i] != 0 && size > 0)
+      worst[2] = PetscMax(worst[2], PetscAbsReal(w[i] / size * (l[i] / most))); /* no overflow */
+  }
+  PetscCall(VecRestoreArray(s->work_L, &w));
+  PetscCall(VecRestoreArrayRead(L, &l));
+  PetscCall(VecRestoreArrayRead(s->D, &g));
+  PetscCall(MatDenseRestoreArrayRead(s->G, &G));
+  kkt->penetration = worst[0] > 0 ? worst[0] / size : 0;
+  kkt->adhesion = worst[1] > 0 ? worst[1] / most : 0;
+  kkt->complementarity = worst[2];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
 {
   Vec gap;
@@ -186,8 +261,12 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
-  PetscCheck(s->F, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
   PetscCall(PetscMemzero(kkt, sizeof(*kkt)));
+  if (s->G) {
+    PetscCall(FlexibilityKKT(s, L, kkt));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCheck(s->F, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoSystemSetVectors() before HycoSystemComputeKKT()");
   PetscCall(HycoSystemWork(s));
   PetscCall(Stationarity(s, x, L, &kkt->stationarity, &kkt->rounding));
   if (PetscIsInfOrNanReal(kkt->stationarity)) kkt->stationarity = PETSC_MAX_REAL;

@@ -61,6 +61,9 @@ PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
   f->out = out;
   access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_fapl_core(access, (size_t)1 << 18, 0);
+  /* one format whatever the library: HDF5 2's own default puts the time into each group, and no two files would be
+   * alike */
+  H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_LATEST);
   f->id = H5Fcreate(f->path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
   H5Pclose(access);
   PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 does not make a file in memory");

@@ -3,7 +3,7 @@
 #include <string.h>
 
 PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_CLASSID, HYCO_SOLVER_CLASSID, HYCO_FOM_CLASSID,
-    HYCO_SNAPSHOTS_CLASSID, HYCO_REDUCER_CLASSID, HYCO_ROM_CLASSID;
+    HYCO_SNAPSHOTS_CLASSID, HYCO_REDUCER_CLASSID, HYCO_ROM_CLASSID, HYCO_MATERIAL_CLASSID, HYCO_CONTACT_CLASSID;
 
 /* Each class with the call that makes its objects, for messages. */
 static const struct {
@@ -18,6 +18,8 @@ static const struct {
     {&HYCO_SNAPSHOTS_CLASSID, "HycoSnapshots", "HycoSnapshotsOpen()"},
     {&HYCO_REDUCER_CLASSID, "HycoReducer", "HycoReducerCreate()"},
     {&HYCO_ROM_CLASSID, "HycoROM", "HycoROMLoad()"},
+    {&HYCO_MATERIAL_CLASSID, "HycoMaterial", "HycoMaterialCreate()"},
+    {&HYCO_CONTACT_CLASSID, "HycoContact", "HycoContactCreate()"},
 };
 static PetscBool initialized = PETSC_FALSE;
 

@@ -58,7 +58,7 @@ class Ranks(Case):
                     self.assertTrue(np.array_equal(array[name], arrays[0][name]), name)
 
     def test_train_rope(self):
-        self.same_training(ROPE, ('-grid', '10,12'), '0.07,0.17', [(1, 0), (2, 0), (3, 0), (4, 0), (2, 1), (4, 2)])
+        self.same_training(ROPE, ('-grid', '6,8'), '0.07,0.17', [(1, 0), (2, 0), (3, 0), (4, 0), (2, 1), (4, 2)])
 
     def test_train_pellet(self):
         self.same_training(PELLET, ('-values_radius', '4.03,4.05,4.08', '-values_load', '0.4,0.7,1'), '4.06,1',

@@ -27,7 +27,11 @@ FORMS = ('dual', 'primal', 'dual_free')
 METHODS = OURS + tao(NEWTON + FIRST_ORDER, FORMS) + tao(SEMISMOOTH, ('dual',))
 ON_TWO_RANKS = OURS + tao(['gpcg', 'tron', 'bnls'], FORMS) + tao(['ssils'], ('dual',))
 QUICK = OURS + tao(['gpcg', 'tron'], ('dual', 'primal'))
-ALL = 'HYCO_ALL_SOLVERS' in os.environ  # scripts/solver-tables: minutes more
+# on the large scenes, unless HYCO_ALL_SOLVERS (scripts/solver-tables: minutes more); the rest are seen on the small ones
+FEW = {('rope 2000', 1): QUICK, ('rope 2000', 2): QUICK,
+       ('pellet A', 1): ON_TWO_RANKS + tao(['bntr', 'bntl', *FIRST_ORDER, 'asils', 'ssfls', 'asfls'], ('dual',)), ('pellet A', 2): QUICK}
+if 'HYCO_ALL_SOLVERS' in os.environ:
+    FEW = {}
 
 # (scene, form, TAO types): why they do not solve alone. Whether they do on some machine is not promised.
 UNFIT = [
@@ -98,8 +102,7 @@ class Solvers(Case):
     def every(self, scene, base, further=(), without=()):
         expected = self.hyco('solve', *base)['total_contact_force']
         for ranks in (1, 2):
-            for method in (QUICK if scene == 'rope 2000' and not ALL else ON_TWO_RANKS if ranks == 2 else
-                           [*METHODS, *further]):
+            for method in FEW.get((scene, ranks), ON_TWO_RANKS if ranks == 2 else [*METHODS, *further]):
                 # thousands of solves, each of two ranks' messages and little else
                 slow = ranks == 2 and (method[1:] == ('dual_free', 'gpcg') or scene == 'rope 2000' and
                                        (method[1] == 'dual_free' or method[1:] == ('primal', 'bnls')))

@@ -23,7 +23,8 @@ def code(path):
 
 
 def sources(folder='*'):
-    found = sorted(glob.glob(os.path.join(SOURCE, 'src', folder, '*.[ch]')))
+    found = sorted(glob.glob(os.path.join(SOURCE, 'src', folder, '*.[ch]')) +
+                   glob.glob(os.path.join(SOURCE, 'src', folder, 'impls', '*', '*.[ch]')))
     assert found, folder
     return found
 

@@ -38,12 +38,12 @@ static PetscErrorCode ActiveSet(PetscInt n, const PetscReal M[], const PetscReal
                                 PetscInt max_its, PetscBool active[], PetscReal z[], PetscInt *its,
                                 HycoLCPStatus *status)
 {
-  HycoSetFactor factor = NULL;
+  HycoLCP lcp = {.n = n, .M = M, .q = q, .symmetric = symmetric, .max_its = max_its};
 
   PetscFunctionBegin;
-  if (symmetric) PetscCall(HycoSetFactorCreate(n, &factor));
-  PetscCall(HycoLCPActiveSet(n, M, q, symmetric, factor, max_its, NULL, NULL, active, z, its, status));
-  PetscCall(HycoSetFactorDestroy(&factor));
+  if (symmetric) PetscCall(HycoSetFactorCreate(n, &lcp.factor));
+  PetscCall(HycoLCPActiveSet(&lcp, active, z, its, status));
+  PetscCall(HycoSetFactorDestroy(&lcp.factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

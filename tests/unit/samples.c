@@ -1,6 +1,6 @@
 /* Sets of parameter points, the scene's ranges and its text, names of options. */
 #include "check.h"
-#include <hycosceneimpl.h>
+#include <hycomaterialimpl.h>
 #include <unistd.h>
 
 static char *const keys[] = {"scene_parameters", "parameter_a_range", "parameter_b_range", "body_rope_young",
@@ -106,7 +106,7 @@ static PetscErrorCode TestScene(HycoScene scene)
   PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &again));
   PetscCall(HycoSceneToText(again, &twice));
   CHECK(strcmp(text, twice) == 0, "the text changed from\n%s\nto\n%s", text, twice);
-  PetscCall(HycoExprEval(again->body[0].young, mu, 1, at, &young));
+  PetscCall(HycoExprEval(HycoDeclaredFind(&again->body[0].law->constants, "young")->expr, mu, 1, at, &young));
   CHECK_NEAR(young, 5, 0);
   PetscCall(PetscFree(text));
   PetscCall(PetscFree(twice));

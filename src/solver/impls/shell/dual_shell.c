@@ -8,23 +8,51 @@ typedef struct {
   HycoSolver s;
   Vec force, motion; /* of K's unknowns */
   Vec diagonal;      /* an estimate of S's */
-} Free;
+  HycoTao tao;
+} Shell;
+
+static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+{
+  const int traits = s->now.traits;
+  PetscInt p = 0;
+
+  PetscFunctionBegin;
+  (void)form;
+  *cost = -1;
+  if (!asked || !s->system->K || !s->system->m || s->iterative) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoKernelSize(s->system->K, &p));
+  if (traits & (HYCO_TAO_OWN | HYCO_TAO_DENSE))
+    HycoFormat(why,
+               "%s%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with "
+               "dual_free",
+               traits & HYCO_TAO_OWN ? "" : "TAO's ", traits & HYCO_TAO_OWN ? s->now.word : s->now.type);
+  else if (traits & HYCO_TAO_ENTRIES)
+    HycoFormat(why, "TAO's %s reads the matrix of the dual form; use -hyco_solver_form dual", s->now.type);
+  else if (!s->system->symmetric)
+    HycoFormat(why, "the form dual_free needs a symmetric system; use -hyco_solver_form dual");
+  else if (p)
+    HycoFormat(why, "contact alone holds a body, and the form dual_free cannot solve that; use -hyco_solver_type "
+                    "active_set");
+  else
+    *cost = 4;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 static PetscErrorCode MultS(Mat S, Vec v, Vec Sv)
 {
-  Free *f;
+  Shell *f;
 
   PetscFunctionBegin;
   PetscCall(MatShellGetContext(S, &f));
   PetscCall(MatMult(f->s->system->Bt, v, f->force));
-  PetscCall(HycoDirectSolve(f->s->direct_free, f->force, f->motion));
+  PetscCall(HycoStiffnessSolve(f->s, f->force, f->motion));
   PetscCall(MatMult(f->s->system->B, f->motion, Sv));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode DiagonalS(Mat S, Vec d)
 {
-  Free *f;
+  Shell *f;
 
   PetscFunctionBegin;
   PetscCall(MatShellGetContext(S, &f));
@@ -66,7 +94,7 @@ static PetscErrorCode LocalDiagonal(HycoSystem y, Vec d)
 }
 
 /* That diagonal d times the mean of v_i (S v)_i / d_i over v_i = +-1, about trace(S) / trace(d): one product. */
-static PetscErrorCode EstimateDiagonal(Mat S, Free *f)
+static PetscErrorCode EstimateDiagonal(Mat S, Shell *f)
 {
   Vec v, Sv;
   PetscScalar *p;
@@ -92,28 +120,18 @@ static PetscErrorCode EstimateDiagonal(Mat S, Free *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Factor(HycoSolver s, PetscBool *singular)
+static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
 {
-  Mat K = s->system->K;
-  PetscBool same;
-  PetscReal begin = HycoNow();
-
   PetscFunctionBegin;
-  *singular = PETSC_FALSE;
-  PetscCall(HycoOperatorStateUpdate(&s->factored_free, K, NULL, &same));
-  if (same) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!s->direct_free) PetscCall(HycoDirectCreate(HycoComm(s), &s->direct_free));
-  PetscCall(HycoDirectAnalyse(s->direct_free, K, NULL, NULL, s->system->symmetric, &s->bytes));
-  PetscCall(HycoDirectFactor(s->direct_free, K, NULL, NULL, NULL, singular));
-  if (*singular) s->factored_free.K = 0;
-  PetscCall(HycoNameLinear(s, NULL));
-  s->seconds_factor += HycoNow() - begin;
+  (void)form;
+  PetscCall(HycoStiffnessFactor(s, NULL, NULL, NULL, singular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* L from min 1/2 L^T S L + g^T L, L >= 0, with g = D - B K^-1 F. */
-static PetscErrorCode Forces(HycoSolver s, Mat S, Vec x, Vec L, PetscBool *solved)
+static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *solved)
 {
+  HycoSolver s = p->s;
   HycoSystem y = s->system;
   Vec f, lo, hi;
 
@@ -121,13 +139,14 @@ static PetscErrorCode Forces(HycoSolver s, Mat S, Vec x, Vec L, PetscBool *solve
   PetscCall(VecDuplicate(L, &f));
   PetscCall(VecDuplicate(L, &lo));
   PetscCall(VecDuplicate(L, &hi));
-  PetscCall(HycoDirectSolve(s->direct_free, y->F, x));
+  PetscCall(HycoStiffnessSolve(s, y->F, x));
   PetscCall(MatMult(y->B, x, f));
   PetscCall(VecAXPY(f, -1, y->D));
   PetscCall(VecSet(lo, 0));
   PetscCall(VecSet(hi, PETSC_INFINITY));
   PetscCall(VecSet(L, 0));
-  PetscCall(HycoTaoSolve(s->tao, s->max_its, S, f, lo, hi, L, &s->its, solved));
+  PetscCall(HycoTaoSetType(p->tao, s->now.type, s->max_its));
+  PetscCall(HycoTaoSolve(p->tao, S, f, lo, hi, L, &s->its, solved));
   PetscCall(VecPointwiseMax(L, L, lo)); /* lo is 0 in any scale */
   PetscCall(VecDestroy(&f));
   PetscCall(VecDestroy(&lo));
@@ -136,7 +155,7 @@ static PetscErrorCode Forces(HycoSolver s, Mat S, Vec x, Vec L, PetscBool *solve
 }
 
 /* x = K^-1 (F - Bt L), refined once. */
-static PetscErrorCode Displacements(HycoSolver s, Free *f, Vec x, Vec L)
+static PetscErrorCode Displacements(HycoSolver s, Shell *f, Vec x, Vec L)
 {
   HycoSystem y = s->system;
 
@@ -148,48 +167,63 @@ static PetscErrorCode Displacements(HycoSolver s, Free *f, Vec x, Vec L)
     PetscCall(MatMult(y->Bt, L, r));
     PetscCall(MatMultAdd(y->K, x, r, r));
     PetscCall(VecAYPX(r, -1, y->F));
-    PetscCall(HycoDirectSolve(s->direct_free, r, dx));
+    PetscCall(HycoStiffnessSolve(s, r, dx));
     PetscCall(VecAXPY(x, 1, dx));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolveDualFree(HycoSolver s, Vec x, Vec L, PetscBool *solved)
+static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
+  Shell *f = (Shell *)form->data;
   HycoSystem y = s->system;
-  Free f = {s, NULL, NULL, NULL};
   Mat S;
-  PetscInt m, n_free;
+  PetscInt m;
   PetscBool singular;
 
   PetscFunctionBegin;
-  PetscCall(HycoKernelSize(y->K, &n_free));
-  PetscCheck(!n_free, HycoComm(s), PETSC_ERR_USER,
-             "contact alone holds a body, and the form dual_free cannot solve that; use -hyco_solver_type active_set");
-  PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "tao %s dual_free", HycoTaoTypes[s->tao]));
-  PetscCall(Factor(s, &singular));
+  PetscCall(HycoSolverNameMethod(s, "dual_free"));
+  PetscCall(SetUp(s, form, &singular));
   if (singular) {
-    s->reason = HYCO_DIVERGED_SINGULAR;
-    *solved = PETSC_FALSE;
-    PetscCall(VecSet(x, 0));
-    PetscCall(VecSet(L, 0));
+    PetscCall(HycoSolverGiveUp(s, x, L));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecGetLocalSize(L, &m));
-  PetscCall(MatCreateShell(HycoComm(s), m, m, y->m, y->m, &f, &S));
+  PetscCall(MatCreateShell(HycoComm(s), m, m, y->m, y->m, f, &S));
   PetscCall(MatShellSetOperation(S, MATOP_MULT, (void (*)(void))MultS));
   PetscCall(MatShellSetOperation(S, MATOP_MULT_TRANSPOSE, (void (*)(void))MultS)); /* symmetric */
   PetscCall(MatShellSetOperation(S, MATOP_GET_DIAGONAL, (void (*)(void))DiagonalS));
   PetscCall(MatSetOption(S, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(VecDuplicate(y->F, &f.force));
-  PetscCall(VecDuplicate(y->F, &f.motion));
-  PetscCall(VecDuplicate(y->D, &f.diagonal));
-  PetscCall(EstimateDiagonal(S, &f));
-  PetscCall(Forces(s, S, x, L, solved));
-  PetscCall(Displacements(s, &f, x, L));
-  PetscCall(VecDestroy(&f.force));
-  PetscCall(VecDestroy(&f.motion));
-  PetscCall(VecDestroy(&f.diagonal));
+  PetscCall(VecDuplicate(y->F, &f->force));
+  PetscCall(VecDuplicate(y->F, &f->motion));
+  PetscCall(VecDuplicate(y->D, &f->diagonal));
+  PetscCall(EstimateDiagonal(S, f));
+  PetscCall(Forces(f, S, x, L, solved));
+  PetscCall(Displacements(s, f, x, L));
+  PetscCall(VecDestroy(&f->force));
+  PetscCall(VecDestroy(&f->motion));
+  PetscCall(VecDestroy(&f->diagonal));
   PetscCall(MatDestroy(&S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoSolverForm form)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoTaoDestroy(&((Shell *)form->data)->tao));
+  PetscCall(PetscFree(form->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverFormCreate_Shell(HycoSolver s, HycoSolverForm form)
+{
+  Shell *f;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&f));
+  f->s = s;
+  PetscCall(HycoTaoCreate(HycoComm(s), &f->tao));
+  form->data = f;
+  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

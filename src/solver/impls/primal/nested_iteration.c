@@ -11,7 +11,7 @@
 
   The levels live on rank 0: together they take as much room as the finest one.
 */
-#include <hycosolverimpl.h>
+#include "gap.h"
 
 /* The coarsest problem is solved from no contact at all. */
 #define HYCO_COARSEST   24
@@ -232,73 +232,91 @@ static PetscErrorCode Coarsen(Level *fine, Level *coarse, PetscBool *made)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Changes what violates; returns the number of changes. */
-static PetscErrorCode Flip(Level *l, Vec y, Vec residual, Vec diagonal, PetscInt *changes)
+/* What the iterations on a level share. */
+typedef struct {
+  const Level *level;
+  Vec y, rhs, residual, diagonal;
+  Mat work;
+  KSP ksp;
+  PetscInt *at;
+  PetscReal *at_bound;
+} Solve;
+
+static PetscErrorCode SolveOnLevel(void *ctx, PetscBool active[], PetscBool *singular)
 {
+  const Solve *p = (const Solve *)ctx;
+  const Level *l = p->level;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < l->n; i++) {
+    if (!active[i]) continue;
+    p->at[n] = i;
+    p->at_bound[n++] = l->bound[i];
+  }
+  PetscCall(HycoSolveOnSet(l->K, p->work, p->ksp, l->f, n, p->at, p->at_bound, p->rhs, p->y, singular));
+  if (*singular) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatMult(l->K, p->y, p->residual));
+  PetscCall(VecAYPX(p->residual, -1, l->f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
+{
+  const Solve *p = (const Solve *)ctx;
+  const Level *l = p->level;
   const PetscScalar *value, *force, *d;
   PetscReal size = 0, largest = 0;
 
   PetscFunctionBegin;
-  *changes = 0;
-  PetscCall(VecGetArrayRead(y, &value));
-  PetscCall(VecGetArrayRead(residual, &force));
-  PetscCall(VecGetArrayRead(diagonal, &d));
+  PetscCall(VecGetArrayRead(p->y, &value));
+  PetscCall(VecGetArrayRead(p->residual, &force));
+  PetscCall(VecGetArrayRead(p->diagonal, &d));
   for (PetscInt i = 0; i < l->n; i++) {
     size = PetscMax(size, PetscAbsReal(value[i]));
-    if (l->active[i]) largest = PetscMax(largest, PetscAbsReal(force[i]));
+    if (active[i]) largest = PetscMax(largest, PetscAbsReal(force[i]));
   }
   for (PetscInt i = 0; i < l->n; i++) {
-    if (l->bound[i] >= PETSC_INFINITY) continue;
-    if (l->active[i] ? HycoPulls(force[i], largest, d[i], l->bound[i]) : HycoPenetrates(value[i], l->bound[i], size)) {
-      l->active[i] = (PetscBool)!l->active[i];
-      (*changes)++;
-    }
+    violates[i] = PETSC_FALSE;
+    if (l->bound[i] < PETSC_INFINITY)
+      violates[i] =
+          active[i] ? HycoPulls(force[i], largest, d[i], l->bound[i]) : HycoPenetrates(value[i], l->bound[i], size);
   }
-  PetscCall(VecRestoreArrayRead(y, &value));
-  PetscCall(VecRestoreArrayRead(residual, &force));
-  PetscCall(VecRestoreArrayRead(diagonal, &d));
+  PetscCall(VecRestoreArrayRead(p->y, &value));
+  PetscCall(VecRestoreArrayRead(p->residual, &force));
+  PetscCall(VecRestoreArrayRead(p->diagonal, &d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The active set from l->active; y is the last solution. */
+/* The active set from l->active; y is the last solution. It is a start only: how it ends does not matter. */
 static PetscErrorCode SolveLevel(Level *l, Vec y)
 {
-  PetscInt *at, changes = 1;
-  PetscReal *at_bound;
-  PetscBool singular = PETSC_FALSE;
-  Vec rhs, residual, diagonal;
-  Mat work;
-  KSP ksp;
+  Solve p = {.level = l, .y = y};
+  const HycoActiveSet set = {.comm = MPI_COMM_NULL,
+                             .n = l->n,
+                             .max_its = HYCO_LEVEL_ITS,
+                             .ctx = &p,
+                             .solve = SolveOnLevel,
+                             .violations = Violations};
+  PetscInt its;
+  HycoLCPStatus status;
 
   PetscFunctionBegin;
-  PetscCall(MatDuplicate(l->K, MAT_COPY_VALUES, &work));
-  PetscCall(HycoGapWork(work));
-  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_primal_", work, PETSC_TRUE, &ksp));
-  PetscCall(VecDuplicate(y, &rhs));
-  PetscCall(VecDuplicate(y, &residual));
-  PetscCall(VecDuplicate(y, &diagonal));
-  PetscCall(MatGetDiagonal(l->K, diagonal));
-  PetscCall(PetscMalloc2(l->n, &at, l->n, &at_bound));
-  for (PetscInt its = 0; its < HYCO_LEVEL_ITS && changes && !singular; its++) {
-    PetscInt n = 0;
-
-    for (PetscInt i = 0; i < l->n; i++) {
-      if (!l->active[i]) continue;
-      at[n] = i;
-      at_bound[n++] = l->bound[i];
-    }
-    PetscCall(HycoSolveOnSet(l->K, work, ksp, l->f, n, at, at_bound, rhs, y, &singular));
-    if (singular) break;
-    PetscCall(MatMult(l->K, y, residual));
-    PetscCall(VecAYPX(residual, -1, l->f));
-    PetscCall(Flip(l, y, residual, diagonal, &changes));
-  }
-  PetscCall(PetscFree2(at, at_bound));
-  PetscCall(VecDestroy(&rhs));
-  PetscCall(VecDestroy(&residual));
-  PetscCall(VecDestroy(&diagonal));
-  PetscCall(MatDestroy(&work));
-  PetscCall(KSPDestroy(&ksp));
+  PetscCall(MatDuplicate(l->K, MAT_COPY_VALUES, &p.work));
+  PetscCall(HycoGapWork(p.work));
+  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_primal_", p.work, PETSC_TRUE, &p.ksp));
+  PetscCall(VecDuplicate(y, &p.rhs));
+  PetscCall(VecDuplicate(y, &p.residual));
+  PetscCall(VecDuplicate(y, &p.diagonal));
+  PetscCall(MatGetDiagonal(l->K, p.diagonal));
+  PetscCall(PetscMalloc2(l->n, &p.at, l->n, &p.at_bound));
+  PetscCall(HycoActiveSetRun(&set, l->active, &its, &status));
+  PetscCall(PetscFree2(p.at, p.at_bound));
+  PetscCall(VecDestroy(&p.rhs));
+  PetscCall(VecDestroy(&p.residual));
+  PetscCall(VecDestroy(&p.diagonal));
+  PetscCall(MatDestroy(&p.work));
+  PetscCall(KSPDestroy(&p.ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

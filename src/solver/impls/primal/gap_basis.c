@@ -2,7 +2,7 @@
   Gap coordinates: of each contact row one unknown (its pivot) is replaced by the row's value, so that B x <= D becomes
   the bound y_p <= D_i. x = T y, Kg = T^T K T.
 */
-#include <hycosolverimpl.h>
+#include "gap.h"
 
 enum { HYCO_NO_PIVOT = -1, HYCO_IDLE = -2 };
 
@@ -82,7 +82,7 @@ static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPrimalPossible(HycoSystem y, PetscBool *possible)
+PetscErrorCode HycoGapPossible(HycoSystem y, PetscBool *possible)
 {
   PetscInt lo, hi, *pivot;
 
@@ -115,9 +115,8 @@ static PetscErrorCode OneEach(Mat B, PetscBool *diagonal)
 }
 
 /* Kg = T^T K T for contacts that are each on one unknown: no product of matrices. */
-static PetscErrorCode ScaleOnly(HycoSolver s)
+static PetscErrorCode ScaleOnly(HycoSystem y, Gap *s)
 {
-  HycoSystem y = s->system;
   PetscInt lo, hi, n;
   Vec t;
 
@@ -137,7 +136,7 @@ static PetscErrorCode ScaleOnly(HycoSolver s)
   PetscCall(VecAssemblyEnd(t));
   PetscCall(VecGetLocalSize(t, &n));
   PetscCall(MatDestroy(&s->T));
-  PetscCall(MatCreateAIJ(HycoComm(s), n, n, y->n, y->n, 1, NULL, 0, NULL, &s->T));
+  PetscCall(MatCreateAIJ(HycoComm(y), n, n, y->n, y->n, 1, NULL, 0, NULL, &s->T));
   PetscCall(MatDiagonalSet(s->T, t, INSERT_VALUES));
   PetscCall(MatDuplicate(y->K, MAT_COPY_VALUES, &s->Kg));
   PetscCall(MatDiagonalScale(s->Kg, t, t));
@@ -146,22 +145,21 @@ static PetscErrorCode ScaleOnly(HycoSolver s)
 }
 
 /* T = I, but in a pivot's row: x_p = (y_p - sum_j B_ij y_j) / B_ip. */
-static PetscErrorCode BuildT(HycoSolver s)
+static PetscErrorCode BuildT(HycoSystem y, Gap *s)
 {
-  HycoSystem y = s->system;
   PetscInt lo, hi, first, last, bs;
   Mat shape;
 
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(y->K, &first, &last));
   PetscCall(MatGetBlockSize(y->K, &bs));
-  PetscCall(MatCreate(HycoComm(s), &shape));
+  PetscCall(MatCreate(HycoComm(y), &shape));
   PetscCall(MatSetSizes(shape, last - first, last - first, y->n, y->n));
   PetscCall(MatSetBlockSize(shape, bs)); /* multigrid coarsens by node */
   PetscCall(MatSetType(shape, MATPREALLOCATOR));
   PetscCall(MatSetUp(shape));
   PetscCall(MatDestroy(&s->T));
-  PetscCall(MatCreate(HycoComm(s), &s->T));
+  PetscCall(MatCreate(HycoComm(y), &s->T));
   PetscCall(MatSetSizes(s->T, last - first, last - first, y->n, y->n));
   PetscCall(MatSetBlockSize(s->T, bs));
   PetscCall(MatSetType(s->T, MATAIJ));
@@ -196,75 +194,133 @@ static PetscErrorCode BuildT(HycoSolver s)
 }
 
 /* Leaves out the idle contacts: pivot and contact then hold the others, and so does the active set. */
-static PetscErrorCode DropIdle(HycoSolver s, PetscInt n)
+static PetscErrorCode DropIdle(Gap *s, PetscInt n)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree(s->contact));
   PetscCall(PetscMalloc1(n, &s->contact));
-  s->n_pivots = 0;
+  s->n = 0;
   for (PetscInt k = 0; k < n; k++) {
     if (s->pivot[k] == HYCO_IDLE) continue;
-    s->contact[s->n_pivots] = k;
-    s->pivot[s->n_pivots++] = s->pivot[k];
+    s->contact[s->n] = k;
+    s->pivot[s->n++] = s->pivot[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoGapSetUp(HycoSolver s)
+/* y = T^-1 x: each pivot holds its contact's B x. */
+static PetscErrorCode ToGaps(HycoSystem s, const Gap *q, Vec x, Vec y)
+{
+  Vec gap;
+  const PetscScalar *g;
+
+  PetscFunctionBegin;
+  PetscCall(VecCopy(x, y));
+  PetscCall(MatCreateVecs(s->B, NULL, &gap));
+  PetscCall(MatMult(s->B, x, gap));
+  PetscCall(VecGetArrayRead(gap, &g));
+  for (PetscInt k = 0; k < q->n; k++) PetscCall(VecSetValue(y, q->pivot[k], g[q->contact[k]], INSERT_VALUES));
+  PetscCall(VecRestoreArrayRead(gap, &g));
+  PetscCall(VecAssemblyBegin(y));
+  PetscCall(VecAssemblyEnd(y));
+  PetscCall(VecDestroy(&gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Attaches K's near-kernel to Kw, in gap coordinates, for multigrid. */
+static PetscErrorCode NearKernel(HycoSystem s, const Gap *g)
+{
+  MatNullSpace near = NULL, mine;
+  PetscBool constant;
+  PetscInt n;
+  const Vec *x;
+  Vec *y;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetNearNullSpace(s->K, &near));
+  if (!near) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatNullSpaceGetVecs(near, &constant, &n, &x));
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicateVecs(x[0], n, &y));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(ToGaps(s, g, x[k], y[k]));
+    for (PetscInt j = 0; j < k; j++) {
+      PetscScalar dot;
+
+      PetscCall(VecDot(y[k], y[j], &dot));
+      PetscCall(VecAXPY(y[k], -dot, y[j]));
+    }
+    PetscCall(VecNormalize(y[k], NULL));
+  }
+  PetscCall(MatNullSpaceCreate(HycoComm(s), PETSC_FALSE, n, y, &mine));
+  PetscCall(MatSetNearNullSpace(g->Kw, mine));
+  PetscCall(MatNullSpaceDestroy(&mine));
+  PetscCall(VecDestroyVecs(n, &y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The solver of Kw, which was made anew: with what it has learned where sizes stay. */
+static PetscErrorCode RenewSolver(HycoSolver s, Gap *g)
+{
+  PetscInt n_old = -1;
+  Mat old;
+
+  PetscFunctionBegin;
+  if (g->ksp) {
+    PetscCall(KSPGetOperators(g->ksp, &old, NULL));
+    PetscCall(MatGetSize(old, &n_old, NULL));
+    if (n_old != s->system->n)
+      PetscCall(KSPDestroy(&g->ksp));
+    else
+      PetscCall(KSPReset(g->ksp));
+  }
+  if (s->iterative) PetscCall(NearKernel(s->system, g));
+  if (!g->ksp)
+    PetscCall(s->iterative ? HycoIterativeSolver(HycoComm(s), "hyco_primal_", g->Kw, &g->ksp)
+                           : HycoDirectSolver(HycoComm(s), "hyco_primal_", g->Kw, PETSC_TRUE, &g->ksp));
+  PetscCall(KSPSetOperators(g->ksp, g->Kw, g->Kw));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGapSetUp(HycoSolver s, Gap *g)
 {
   HycoSystem y = s->system;
   PetscBool same, possible = PETSC_FALSE, diagonal = PETSC_FALSE;
-  PetscInt lo, hi;
+  PetscInt lo, hi, before = g->n;
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
-  PetscCall(HycoOperatorStateUpdate(&s->transformed, y->K, y->B, &same));
+  PetscCall(HycoOperatorStateUpdate(&g->transformed, y->K, y->B, &same));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
-  PetscCall(PetscFree(s->pivot));
-  PetscCall(PetscMalloc1(hi - lo, &s->pivot));
-  PetscCall(FindPivots(y, s->pivot, &possible));
-  if (!possible) s->transformed.K = 0;
+  PetscCall(PetscFree(g->pivot));
+  PetscCall(PetscMalloc1(hi - lo, &g->pivot));
+  PetscCall(FindPivots(y, g->pivot, &possible));
+  if (!possible) g->transformed.K = 0;
   PetscCheck(possible, HycoComm(s), PETSC_ERR_USER,
              "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
-  PetscCall(MatDestroy(&s->Kg));
-  PetscCall(MatDestroy(&s->Kw));
+  PetscCall(MatDestroy(&g->Kg));
+  PetscCall(MatDestroy(&g->Kw));
+  PetscCall(MatDestroy(&g->H));
   PetscCall(OneEach(y->B, &diagonal));
   if (diagonal)
-    PetscCall(ScaleOnly(s));
+    PetscCall(ScaleOnly(y, g));
   else {
-    PetscCall(BuildT(s));
-    PetscCall(MatPtAP(y->K, s->T, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &s->Kg));
+    PetscCall(BuildT(y, g));
+    PetscCall(MatPtAP(y->K, g->T, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &g->Kg));
   }
-  PetscCall(DropIdle(s, hi - lo));
-  PetscCall(MatSetOption(s->Kg, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(MatDuplicate(s->Kg, MAT_COPY_VALUES, &s->Kw));
-  PetscCall(HycoGapWork(s->Kw));
-  if (s->ksp_gap) {
-    PetscInt n_old, n_new;
-    Mat old;
-
-    PetscCall(KSPGetOperators(s->ksp_gap, &old, NULL));
-    PetscCall(MatGetSize(old, &n_old, NULL));
-    PetscCall(MatGetSize(s->Kw, &n_new, NULL));
-    if (n_old != n_new)
-      PetscCall(KSPDestroy(&s->ksp_gap));
-    else
-      PetscCall(KSPReset(s->ksp_gap));
-  }
-  if (s->iterative) PetscCall(HycoGapNearKernel(s, s->Kw));
-  if (!s->ksp_gap)
-    PetscCall(s->iterative ? HycoIterativeSolver(HycoComm(s), "hyco_primal_", s->Kw, &s->ksp_gap)
-                           : HycoDirectSolver(HycoComm(s), "hyco_primal_", s->Kw, PETSC_TRUE, &s->ksp_gap));
-  PetscCall(KSPSetOperators(s->ksp_gap, s->Kw, s->Kw));
-  if (s->m != y->m) {
-    PetscCall(PetscFree(s->active));
-    PetscCall(PetscFree(s->S));
-    PetscCall(PetscFree(s->g));
-    PetscCall(PetscFree(s->L));
-    PetscCall(PetscCalloc1(y->m + 1, &s->active));
-    s->m = y->m;
-    s->started = PETSC_FALSE;
+  PetscCall(DropIdle(g, hi - lo));
+  PetscCall(MatSetOption(g->Kg, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatDuplicate(g->Kg, MAT_COPY_VALUES, &g->Kw));
+  PetscCall(HycoGapWork(g->Kw));
+  PetscCall(RenewSolver(s, g));
+  before = (PetscInt)(!g->active || g->m != y->m || before != g->n);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &before, 1, MPIU_INT, MPI_MAX, HycoComm(s)));
+  if (before) {
+    PetscCall(PetscFree(g->active));
+    PetscCall(PetscCalloc1(g->n + 1, &g->active));
+    g->m = y->m;
+    g->started = PETSC_FALSE;
   }
   s->seconds_factor += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,0 +1,84 @@
+/* HycoMaterial: a material law. A body of the scene names its type (`law:`, by default elastic) and gives its
+ * constants. */
+#ifndef HYCOMATERIAL_H
+#define HYCOMATERIAL_H
+
+#include <hycosys.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+typedef struct _p_HycoMaterial *HycoMaterial;
+typedef const char *HycoMaterialType;
+#define HYCO_MATERIAL_ELASTIC "elastic" /* isotropic linear elasticity: young, poisson; in 1D sigma = young eps */
+
+/* As a constant's value for `initial`: the scene must give it. */
+#define HYCO_REQUIRED PETSC_INFINITY
+
+/*
+  n integration points of one law. Strain and stress have n_strain components a point: 1D (xx), 2D plane strain
+  (xx, yy, zz, xy), 3D (xx, yy, zz, xy, yz, xz), shear strains as angles (gamma = 2 eps), so that stress . strain is
+  twice the energy. What a caller does not have or does not ask for is NULL: a linear law is asked for its tangent
+  alone, without strains.
+*/
+typedef struct {
+  PetscInt n, dim, n_strain;
+  const PetscReal *const *constant; /* [j][i]: value of the j-th declared constant at point i */
+  PetscReal dt;
+  const PetscReal *strain0, *strain;           /* n x n_strain: at the step's begin and end */
+  const PetscReal *temperature0, *temperature; /* n */
+  const PetscReal *state0;                     /* n x n_state */
+  PetscReal *state;                            /* out: at the step's end */
+  PetscReal *stress;                           /* out: n x n_strain */
+  PetscReal *tangent;  /* out: n x n_strain x n_strain, d stress / d strain of the step, row major, symmetric */
+  PetscReal dt_factor; /* out: what the law would multiply the step by; 1 unless it sets it */
+  PetscInt failed;     /* out: a point where the law has no answer; -1 unless it sets it */
+  const char *why;     /* out: the reason, "the yield stress is negative" */
+} HycoMaterialPoints;
+
+typedef struct _HycoMaterialOps *HycoMaterialOps;
+struct _HycoMaterialOps {
+  /* Optional: refuses a space dimension, sets the number of state variables. */
+  PetscErrorCode (*setup)(HycoMaterial, PetscInt dim);
+  /* The law: fills what is asked for at all points; one of update and isotropic is required. */
+  PetscErrorCode (*update)(HycoMaterial, HycoMaterialPoints *points);
+  /* A linear law with an isotropic tangent: Lame's lambda and mu, lame[n x 2], which make the element kernels faster.
+     stress = lambda tr(eps) I + 2 mu eps; in 1D stress = mu eps. */
+  PetscErrorCode (*isotropic)(HycoMaterial, HycoMaterialPoints *points, PetscReal lame[]);
+  /* Whether the tangent changes where the constants j with changed[j] do; NULL: with any. */
+  PetscBool (*depends)(HycoMaterial, const PetscBool changed[]);
+  PetscErrorCode (*destroy)(HycoMaterial);
+};
+
+/* Adds a law, which scenes then name: create() declares its constants and sets its operations. Not collective. */
+PetscErrorCode HycoMaterialRegister(const char name[], PetscErrorCode (*create)(HycoMaterial));
+
+/* A law without type. The caller owns it. Collective. */
+PetscErrorCode HycoMaterialCreate(MPI_Comm comm, HycoMaterial *material);
+PetscErrorCode HycoMaterialDestroy(HycoMaterial *material);
+/* Fails with the list of those that are registered. */
+PetscErrorCode HycoMaterialSetType(HycoMaterial material, HycoMaterialType type);
+PetscErrorCode HycoMaterialGetType(HycoMaterial material, HycoMaterialType *type);
+PetscErrorCode HycoMaterialView(HycoMaterial material, PetscViewer viewer);
+
+/* In create(): the next constant, `title` for messages ("Young's modulus"), its value where the scene gives none
+   (HYCO_REQUIRED: it must), and the open interval lo < value < hi. */
+PetscErrorCode HycoMaterialDeclare(HycoMaterial material, const char name[], const char title[], PetscReal initial,
+                                   PetscReal lo, PetscReal hi);
+PetscErrorCode HycoMaterialSetOps(HycoMaterial material, const struct _HycoMaterialOps *ops);
+/* State variables of an integration point; 0 unless set. */
+PetscErrorCode HycoMaterialSetStateSize(HycoMaterial material, PetscInt n_state);
+/* Whether stress = tangent . strain with a tangent that depends on the constants alone; true unless set. */
+PetscErrorCode HycoMaterialSetLinear(HycoMaterial material, PetscBool linear);
+PetscErrorCode HycoMaterialSetData(HycoMaterial material, void *data);
+PetscErrorCode HycoMaterialGetData(HycoMaterial material, void *data);
+
+/* The law at points whose constants are given. Of a linear law the library makes the stress from the tangent, which
+   then has room too, and the tangent from isotropic(). Not collective. */
+PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *points);
+
+#if defined(__cplusplus)
+}
+#endif
+#endif

@@ -1,0 +1,36 @@
+/* Vectors of three components. */
+#ifndef HYCOVECTOR_H
+#define HYCOVECTOR_H
+#include <petscmath.h>
+
+static inline PetscReal HycoDot(const PetscReal a[3], const PetscReal b[3])
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+static inline PetscReal HycoLength(const PetscReal a[3])
+{
+  return PetscSqrtReal(HycoDot(a, a));
+}
+static inline PetscReal HycoDistance(const PetscReal a[3], const PetscReal b[3])
+{
+  const PetscReal d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+
+  return HycoLength(d);
+}
+/* To unit length; 0 stays 0. */
+static inline void HycoNormalise(PetscReal v[3])
+{
+  const PetscReal length = HycoLength(v);
+
+  for (PetscInt c = 0; c < 3 && length > 0; c++) v[c] /= length;
+}
+/* The length of the part of r along the surface with normal n. */
+static inline PetscReal HycoTangentialLength(const PetscReal r[3], const PetscReal n[3])
+{
+  const PetscReal height = HycoDot(r, n);
+  const PetscReal t[3] = {r[0] - height * n[0], r[1] - height * n[1], r[2] - height * n[2]};
+
+  return HycoLength(t);
+}
+
+#endif

@@ -1,0 +1,141 @@
+/*
+  The primal-dual active set, the paper's section 6.2 (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002) 865-888,
+  for its convergence): solve as if the contacts of the set were closed and the others open, let contacts that pull
+  leave the set and those that penetrate join it, until none does. The one loop; who uses it says how to solve on a set
+  and what counts as a violation: a dense flexibility, one with free unknowns, gap coordinates, a coarser level of
+  these.
+*/
+#include <hycolcp.h>
+
+/* What the loop keeps. */
+typedef struct {
+  unsigned long long *past; /* hashes of the sets so far */
+  PetscInt room, since;     /* of past; where the search for a repeated set begins */
+  PetscBool one;            /* a set came back: one contact at a time */
+  PetscBool *violates;
+} History;
+
+unsigned long long HycoSetHash(PetscInt n, const PetscBool active[])
+{
+  unsigned long long hash = HYCO_HASH_START;
+
+  for (PetscInt i = 0; i < n; i++) {
+    const unsigned char bit = active[i] ? 1 : 0;
+
+    hash = HycoHash(hash, &bit, 1);
+  }
+  return hash;
+}
+
+/* Hash of the distributed set, the same on every rank. */
+static PetscErrorCode SetHash(const HycoActiveSet *e, const PetscBool active[], unsigned long long *hash)
+{
+  unsigned long long mine;
+
+  PetscFunctionBegin;
+  mine = *hash = HycoSetHash(e->n, active);
+  if (e->comm == MPI_COMM_NULL) PetscFunctionReturn(PETSC_SUCCESS);
+  mine = HycoHash(mine, &e->first, sizeof(e->first));
+  PetscCallMPI(MPI_Allreduce(&mine, hash, 1, MPI_UNSIGNED_LONG_LONG, MPI_BXOR, e->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the set was met before; remembers it as that of iteration `its`. */
+static PetscErrorCode Met(const HycoActiveSet *e, const PetscBool active[], PetscInt its, History *h, PetscBool *met)
+{
+  PetscFunctionBegin;
+  if (its == h->room) {
+    h->room = 2 * h->room + 64;
+    PetscCall(PetscRealloc((size_t)h->room * sizeof(*h->past), &h->past));
+  }
+  PetscCall(SetHash(e, active, &h->past[its]));
+  *met = PETSC_FALSE;
+  for (PetscInt t = h->since; t < its; t++) *met = (PetscBool)(*met || h->past[t] == h->past[its]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Over the ranks that share the contacts. */
+static PetscErrorCode Reduce(const HycoActiveSet *e, MPI_Op op, PetscInt *value)
+{
+  PetscFunctionBegin;
+  if (e->comm != MPI_COMM_NULL) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 1, MPIU_INT, op, e->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Changes every contact that violates; after a cycle only the last of them, which ends in exact arithmetic (K. G.
+   Murty's least index rule). */
+static PetscErrorCode Change(const HycoActiveSet *e, const History *h, PetscBool active[], PetscInt *changes)
+{
+  PetscInt last = -1;
+
+  PetscFunctionBegin;
+  *changes = 0;
+  if (h->one) {
+    for (PetscInt i = 0; i < e->n; i++) last = h->violates[i] ? e->first + i : last;
+    PetscCall(Reduce(e, MPI_MAX, &last));
+  }
+  for (PetscInt i = 0; i < e->n; i++) {
+    if (!h->violates[i] || (h->one && e->first + i != last)) continue;
+    active[i] = (PetscBool)!active[i];
+    (*changes)++;
+  }
+  PetscCall(Reduce(e, MPI_SUM, changes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One iteration. */
+static PetscErrorCode Step(const HycoActiveSet *e, PetscInt its, History *h, PetscBool active[], PetscInt *changes,
+                           PetscBool *singular)
+{
+  PetscInt n_active = 0;
+
+  PetscFunctionBegin;
+  PetscCall(e->solve(e->ctx, active, singular));
+  if (*singular) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(e->violations(e->ctx, active, h->violates));
+  for (PetscInt i = 0; e->monitor && i < e->n; i++) n_active += active[i];
+  if (e->monitor) PetscCall(Reduce(e, MPI_SUM, &n_active));
+  PetscCall(Change(e, h, active, changes));
+  if (e->monitor) PetscCall(e->monitor(its, n_active, *changes, e->monitor_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoActiveSetRun(const HycoActiveSet *e, PetscBool active[], PetscInt *its, HycoLCPStatus *status)
+{
+  History h = {NULL, 0, 0, PETSC_FALSE, NULL};
+  PetscBool last = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *status = HYCO_LCP_LIMIT;
+  PetscCall(PetscMalloc1(e->n, &h.violates));
+  for (*its = 0; *its < e->max_its && *status == HYCO_LCP_LIMIT && !last;) {
+    PetscBool met = PETSC_FALSE, singular = PETSC_FALSE, more = PETSC_FALSE;
+    PetscInt changes;
+
+    if (e->restart) PetscCall(e->restart(e->ctx, *its, active, &more));
+    if (more) h.since = *its;
+    PetscCall(Met(e, active, *its, &h, &met));
+    if (met && !e->one_by_one) {
+      *status = HYCO_LCP_CYCLE;
+      break;
+    }
+    if (met) { /* again in spite of single changes: round-off decides, and the residuals judge */
+      last = h.one;
+      h.one = PETSC_TRUE;
+      h.since = *its;
+    }
+    (*its)++;
+    PetscCall(Step(e, *its, &h, active, &changes, &singular));
+    if (singular) *status = HYCO_LCP_SINGULAR;
+    if (singular || changes) continue;
+    more = PETSC_FALSE;
+    if (e->settled) PetscCall(e->settled(e->ctx, &more));
+    if (more)
+      h.since = *its;
+    else
+      *status = HYCO_LCP_SOLVED;
+  }
+  PetscCall(PetscFree(h.violates));
+  PetscCall(PetscFree(h.past));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

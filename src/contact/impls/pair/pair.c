@@ -1,0 +1,195 @@
+/* Pairs: a slave node's master is one node of the other surface, and stays it. */
+#include "../../facing.h"
+#include "../../partners.h"
+
+/* Of a slave's facet: how far a map may move partners along it. */
+#define HYCO_APART_SHARE 0.5
+
+/* Whether each slave node (but those that need none) has a master of its own at most `far` away. */
+static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at[], const PetscBool *needs,
+                                 PetscReal far, PetscBool *matched)
+{
+  PetscBool *taken;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_nodes, &taken));
+  *matched = PETSC_TRUE;
+  for (PetscInt k = 0; k < n && *matched; k++) {
+    if (!at[k].n && needs && !needs[k]) continue;
+    *matched = (PetscBool)(at[k].n == 1 && at[k].distance <= far && !taken[at[k].node[0]]);
+    if (*matched) taken[at[k].node[0]] = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(taken));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The master node that lies most along the mean of both normals from a slave node: mirrored surfaces match so, however
+   far apart they are. n = 0 where it misses that line by more than `small`. */
+static void ProjectAlong(const HycoPartners *t, PetscInt slave, PetscReal small, HycoProjection *at)
+{
+  const PetscReal *out = HycoPartnersOutward(t, slave);
+  PetscReal best = small * small;
+
+  at->n = 0;
+  for (PetscInt j = 0; out && j < t->n; j++) {
+    const PetscReal *n = t->normal + 3 * j;
+    const HycoProjection here = {1, {t->node[j]}, j, {1}, 0};
+    PetscReal r[3], mean[3], rr, mm, off;
+
+    for (PetscInt c = 0; c < 3; c++) mean[c] = out[c] - n[c];
+    mm = HycoDot(mean, mean);
+    if (HycoDot(n, n) == 0 || mm < 1e-2) continue; /* of no direction */
+    HycoPartnersAcross(t, slave, &here, r);
+    rr = HycoDot(r, r);
+    off = PetscMax(rr - HycoDot(r, mean) * HycoDot(r, mean) / mm, 0);
+    if (off > best || (off == best && at->n && rr >= at->distance * at->distance)) continue;
+    best = off;
+    *at = here;
+    at->distance = PetscSqrtReal(rr);
+  }
+}
+
+/* How far apart the nodes of a pair may lie along their normals: as said; else at any distance if the surfaces touch
+   somewhere. */
+static PetscReal Farthest(PetscReal stated, const HycoMatch *m)
+{
+  if (stated >= 0) return stated;
+  for (PetscInt k = 0; k < m->n; k++) {
+    if (m->at[k].n && m->at[k].distance <= m->small) return PETSC_MAX_REAL;
+  }
+  return m->small;
+}
+
+/* The nodes of surfaces that do not coincide as drawn, along the normals, where those match all slave nodes that face
+   the master one by one; the others have no contact (n = 0). */
+static PetscErrorCode MatchAlong(HycoPartners *t, HycoContact c, HycoMatch *m)
+{
+  HycoProjection *along;
+  PetscBool *needs, matched;
+  PetscReal stated;
+
+  PetscFunctionBegin;
+  PetscCall(HycoContactGetLength(c, "tolerance", &stated));
+  PetscCall(PetscMalloc2(m->n, &along, m->n, &needs));
+  for (PetscInt k = 0; k < m->n; k++) {
+    const PetscReal *out = HycoPartnersOutward(t, m->slave[k]);
+    HycoProjection nearest;
+
+    ProjectAlong(t, m->slave[k], m->small, &along[k]);
+    HycoPartnersProject(t, m->slave[k], PETSC_TRUE, &nearest);
+    needs[k] = (PetscBool)(!out || HycoDot(out, t->normal + 3 * nearest.patch) <= HYCO_OPPOSED);
+  }
+  PetscCall(AreMatched(t->fe->mesh, m->n, along, needs, Farthest(stated, m), &matched));
+  for (PetscInt k = 0; matched && k < m->n; k++) {
+    const PetscReal *out = HycoPartnersOutward(t, m->slave[k]);
+
+    m->at[k] = along[k];
+    if (m->at[k].n && HycoDot(out, t->normal + 3 * m->at[k].patch) > HYCO_OPPOSED) m->at[k].n = 0;
+    m->why[k] = HYCO_MET;
+  }
+  PetscCall(PetscFree2(along, needs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A master has one slave. */
+static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *match)
+{
+  PetscInt *partner_of;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &partner_of));
+  for (PetscInt i = 0; i < m->n_nodes; i++) partner_of[i] = -1;
+  for (PetscInt k = 0; k < match->n; k++) {
+    const PetscInt j = match->at[k].node[0];
+
+    if ((match->why[k] != HYCO_MET && match->why[k] != HYCO_ASKEW) || !match->at[k].n) continue;
+    if (partner_of[j] >= 0) {
+      const PetscInt other = partner_of[j];
+
+      PetscCall(PetscFree(partner_of));
+      HycoFail("contact %s: nodes %d and %d of %s are both nearest to node %d of %s; mesh both surfaces alike, or take "
+               "type: surface",
+               c->name, (int)m->node_id[other], (int)m->node_id[match->slave[k]], c->slave, (int)m->node_id[j],
+               c->master);
+    }
+    partner_of[j] = match->slave[k];
+  }
+  PetscCall(PetscFree(partner_of));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nearest nodes, where those match one by one; else the nodes along the normals, where those do. */
+static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
+{
+  PetscBool matched;
+
+  PetscFunctionBegin;
+  PetscCall(AreMatched(t->fe->mesh, m->n, m->at, NULL, PetscMin(m->small, m->tolerance), &matched));
+  for (PetscInt k = 0; k < m->n; k++) matched = (PetscBool)(matched && m->why[k] == HYCO_MET);
+  if (!matched) PetscCall(MatchAlong(t, c, m));
+  PetscCall(CheckMasters(t->fe->mesh, c, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const PetscInt missed[], char text[HYCO_LINE])
+{
+  PetscFunctionBegin;
+  (void)t;
+  (void)c;
+  (void)n;
+  (void)missed;
+  HycoFormat(text, "mesh both surfaces alike, or take type: surface");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoPartnersMatch(c, fe, index, PETSC_TRUE, Settle, Remedy, pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes still face each other where a map has moved them. */
+static PetscErrorCode Verify(HycoContact c, HycoFE fe, const HycoPairs *p, PetscInt first, PetscInt last,
+                             const PetscReal normal[])
+{
+  HycoMesh m = fe->mesh;
+  PetscReal *size = NULL;
+
+  PetscFunctionBegin;
+  for (PetscInt k = first; k < last; k++) {
+    PetscReal now[3], drawn[3], along, limit;
+
+    if (p->master_start[k] == p->master_start[k + 1]) continue;
+    HycoPairsJump(p, k, 3, fe->X, now);
+    HycoPairsJump(p, k, 3, m->xyz, drawn);
+    along = HycoTangentialLength(now, normal + 3 * k);
+    if (along <= HycoLength(drawn)) continue;
+    if (!size) {
+      PetscInt g = 0;
+
+      PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
+      PetscCall(PetscMalloc1(m->n_nodes, &size));
+      HycoSurfaceSizes(fe, g, size);
+    }
+    limit = size[p->slave[k]];
+    if (!(limit > 0) || along <= HycoLength(drawn) + HYCO_APART_SHARE * limit) continue;
+    PetscCall(PetscFree(size));
+    HycoFail("contact %s: the map brings node %d of %s and node %d of %s, which face each other as drawn, %.4g apart "
+             "along the surface, more than half of a facet (%.4g): a pair keeps its nodes; take type: surface",
+             c->name, (int)m->node_id[p->slave[k]], c->slave, (int)m->node_id[p->master[p->master_start[k]]], c->master,
+             (double)along, (double)limit);
+  }
+  PetscCall(PetscFree(size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactCreate_Pair(HycoContact contact)
+{
+  static const struct _HycoContactOps ops = {.setup = SetUp, .verify = Verify};
+
+  PetscFunctionBegin;
+  PetscCall(HycoPartnersDeclare(contact));
+  PetscCall(HycoContactSetOps(contact, &ops));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,99 @@
+/*
+  Surface contacts: a slave node's master is its projection on the master's facets. On surfaces that a map moves it is
+  searched for where the nodes are: a slave node has one if the master's nearest point opposes its normal, is within
+  reach, and the node is not past the master's border.
+*/
+#include "../../partners.h"
+
+/* Where the scene states how far masters may be, a node that faces none has no contact. */
+static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
+{
+  PetscReal stated;
+
+  PetscFunctionBegin;
+  (void)t;
+  PetscCall(HycoContactGetLength(c, "tolerance", &stated));
+  for (PetscInt k = 0; k < m->n && stated >= 0; k++) {
+    if (m->why[k] == HYCO_MET || m->why[k] == HYCO_FAR) continue;
+    m->at[k].n = 0;
+    m->why[k] = HYCO_MET;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What to do about nodes without a master. */
+static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const PetscInt missed[], char text[HYCO_LINE])
+{
+  PetscBool facing = PETSC_FALSE;
+  PetscReal farthest = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    HycoProjection at;
+    HycoVerdict why;
+
+    PetscCall(HycoPartnersJudge(t, missed[k], PETSC_MAX_REAL, 0, &at, &why));
+    facing = (PetscBool)(facing || why == HYCO_MET);
+    farthest = PetscMax(farthest, at.distance);
+  }
+  if (facing)
+    HycoFormat(text,
+               "draw the surfaces closer, or allow the distance by contact_%s_tolerance %.4g: nodes that face no %s "
+               "then have no contact",
+               c->name, 1.01 * (double)farthest, c->master);
+  else
+    HycoFormat(text, "leave nodes that face no %s out of %s, or extend %s", c->master, c->slave, c->master);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
+{
+  const PetscBool moved = (PetscBool)(pairs->room && pairs->search[index].moved);
+
+  PetscFunctionBegin;
+  PetscCall(HycoPartnersMatch(c, fe, index, PETSC_FALSE, moved ? NULL : Settle, Remedy, pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The master point of one slave node; n = 0: it has none. */
+static PetscErrorCode FindOne(HycoPartners *t, PetscInt slave, PetscReal reach, HycoProjection *at)
+{
+  PetscBool past;
+
+  PetscFunctionBegin;
+  HycoPartnersProject(t, slave, PETSC_FALSE, at);
+  if (at->n && at->distance > reach) at->n = 0;
+  if (!at->n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoPartnersIsPast(t, slave, at, &past));
+  if (past) at->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscReal reach, PetscInt n, const PetscInt slave[],
+                           PetscInt start[], PetscInt master[], PetscReal weight[])
+{
+  HycoPartners t;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPartnersCreate(fe, c, PETSC_FALSE, &t));
+  for (PetscInt k = 0; k < n; k++) {
+    HycoProjection at;
+
+    PetscCall(FindOne(&t, slave[k], reach, &at));
+    PetscCall(PetscArraycpy(master + start[k], at.node, at.n));
+    PetscCall(PetscArraycpy(weight + start[k], at.weight, at.n));
+    start[k + 1] = start[k] + at.n;
+  }
+  PetscCall(HycoPartnersDestroy(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactCreate_Surface(HycoContact contact)
+{
+  static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};
+
+  PetscFunctionBegin;
+  PetscCall(HycoPartnersDeclare(contact));
+  PetscCall(HycoContactSetOps(contact, &ops));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

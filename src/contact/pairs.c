@@ -1,0 +1,308 @@
+/*
+  Potential contacts: each of the scene's contacts puts in its slave nodes with their masters, on the mesh as it stands
+  in the file; on surfaces that a map moves masters are found anew wherever the nodes are.
+*/
+#include <hycokinematics.h>
+
+PetscErrorCode HycoPairsReserve(HycoPairs *p, PetscInt contacts, PetscInt width)
+{
+  const PetscInt n = p->n + contacts;
+
+  PetscFunctionBegin;
+  PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->slave));
+  PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->contact));
+  PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->master_start));
+  if (!p->n) p->master_start[0] = 0;
+  PetscCall(PetscRealloc((size_t)(p->master_start[p->n] + contacts * width + 1) * sizeof(PetscInt), &p->master));
+  PetscCall(PetscRealloc((size_t)(p->master_start[p->n] + contacts * width + 1) * sizeof(PetscReal), &p->weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoPairsAppend(HycoPairs *p, PetscInt contact, PetscInt slave, PetscInt n, const PetscInt node[],
+                     const PetscReal weight[])
+{
+  PetscInt *end = p->master_start + p->n;
+
+  p->slave[p->n] = slave;
+  p->contact[p->n++] = contact;
+  end[1] = end[0];
+  for (PetscInt a = 0; a < n; a++) {
+    p->master[end[1]] = node[a];
+    p->weight[end[1]++] = weight[a];
+  }
+}
+
+/* Whether a map moves a node of a group. */
+static PetscErrorCode IsMoved(HycoScene scene, HycoMesh m, const char group[], PetscBool *moved)
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, "contact", group, &g));
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1] && !*moved; k++) {
+    const HycoBody *body = &scene->body[m->node_body[m->group_node[k]]];
+
+    *moved = (PetscBool)(body->map[0] || body->map[1] || body->map[2]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
+{
+  PetscFunctionBegin;
+  pairs->room = 0;
+  pairs->n_searches = scene->n_contacts;
+  PetscCall(PetscFree(pairs->search));
+  PetscCall(PetscCalloc1(scene->n_contacts, &pairs->search));
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
+    HycoContact c = scene->contact[k];
+    HycoSearch *search = &pairs->search[k];
+
+    search->reach = PETSC_MAX_REAL;
+    if (!c->ops->find) continue;
+    PetscCall(IsMoved(scene, m, c->slave, &search->moved));
+    PetscCall(IsMoved(scene, m, c->master, &search->moved));
+    if (search->moved) pairs->room = m->nf;
+  }
+  if (!pairs->room) PetscCall(PetscFree(pairs->search));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
+{
+  PetscInt *start, *master, kept;
+  PetscReal *weight;
+
+  PetscFunctionBegin;
+  if (!p->room || p->place == fe->place) PetscFunctionReturn(PETSC_SUCCESS);
+  kept = p->master_start[p->n];
+  PetscCall(PetscMalloc1(p->n + 1, &start));
+  PetscCall(PetscMalloc1(kept + p->n * p->room, &master));
+  PetscCall(PetscMalloc1(kept + p->n * p->room, &weight));
+  start[0] = 0;
+  for (PetscInt k = 0, next; k < p->n; k = next) {
+    const PetscInt lo = p->master_start[k], n = p->master_start[k + 1] - lo;
+
+    next = k + 1;
+    if (HycoPairsMoved(p, k)) {
+      next = HycoPairsRun(p, k);
+      PetscCall((*fe->scene->contact[p->contact[k]]->ops->find)(fe->scene->contact[p->contact[k]], fe,
+                                                                p->search[p->contact[k]].reach, next - k, p->slave + k,
+                                                                start + k, master, weight));
+      continue;
+    }
+    if (n) PetscCall(PetscArraycpy(master + start[k], p->master + lo, n));
+    if (n) PetscCall(PetscArraycpy(weight + start[k], p->weight + lo, n));
+    start[k + 1] = start[k] + n;
+  }
+  PetscCall(PetscFree(p->master_start));
+  PetscCall(PetscFree(p->master));
+  PetscCall(PetscFree(p->weight));
+  p->master_start = start;
+  p->master = master;
+  p->weight = weight;
+  p->place = fe->place;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A node's row pivot in gap coordinates is its own: no node may be the slave of two contacts. */
+static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const HycoPairs *p)
+{
+  PetscInt *seen;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &seen));
+  for (PetscInt i = 0; i < m->n_nodes; i++) seen[i] = -1;
+  for (PetscInt k = 0; k < p->n; k++) {
+    HycoCheck(seen[p->slave[k]] < 0, "node %d is a slave of the contacts %s and %s; a node may be the slave of one",
+              (int)m->node_id[p->slave[k]], scene->contact[seen[p->slave[k]]]->name,
+              scene->contact[p->contact[k]]->name);
+    seen[p->slave[k]] = p->contact[k];
+  }
+  PetscCall(PetscFree(seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Number of fixed components of each node. */
+static PetscErrorCode CountHeld(HycoScene scene, HycoMesh m, PetscInt held[])
+{
+  PetscBool *fixed;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_nodes * m->dim, &fixed));
+  for (PetscInt k = 0; k < scene->n_fixed; k++) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "fixed", scene->fixed[k].group, &g));
+    for (PetscInt c = 0; c < m->dim; c++) {
+      for (PetscInt j = m->group_start[g]; scene->fixed[k].value[c] && j < m->group_start[g + 1]; j++)
+        fixed[m->group_node[j] * m->dim + c] = PETSC_TRUE;
+    }
+  }
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    held[i] = 0;
+    for (PetscInt c = 0; c < m->dim; c++) held[i] += fixed[i * m->dim + c];
+  }
+  PetscCall(PetscFree(fixed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nodes of a contact without masters, but those that are wholly fixed: they cannot meet anything. */
+static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held[], HycoPairs *p)
+{
+  HycoMesh m = fe->mesh;
+  HycoContact c = fe->scene->contact[index];
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
+  HycoCheck(m->group_start[g + 1] > m->group_start[g], "contact %s: the group %s is empty", c->name, m->group_name[g]);
+  PetscCall(HycoPairsReserve(p, m->group_start[g + 1] - m->group_start[g], 0));
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
+    if (held[m->group_node[k]] < m->dim) HycoPairsAppend(p, index, m->group_node[k], 0, NULL, NULL);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fails for a cell without volume. */
+static PetscErrorCode CheckCells(HycoFE fe)
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  PetscReal g[8][3], weight;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    for (PetscInt q = 0; q < el->nq; q++) PetscCall(HycoGradients(fe, el, e, q, g, &weight));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
+{
+  HycoScene scene = fe->scene;
+  PetscInt *held;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFESetDrawn(fe));
+  PetscCall(CheckCells(fe)); /* a broken cell explains what its facets seem to do */
+  PetscCall(HycoPairsSetSearch(scene, fe->mesh, pairs));
+  PetscCall(PetscMalloc1(fe->mesh->n_nodes, &held));
+  PetscCall(CountHeld(scene, fe->mesh, held));
+  for (PetscInt k = 0; k < scene->n_contacts && !ierr; k++) {
+    HycoContact c = scene->contact[k];
+
+    ierr = c->ops->setup ? (*c->ops->setup)(c, fe, k, pairs) : AppendNodes(fe, k, held, pairs);
+  }
+  PetscCall(PetscFree(held));
+  PetscCall(ierr);
+  PetscCall(CheckSlaves(scene, fe->mesh, pairs));
+  PetscCall(HycoPairsMove(fe, pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoPairs *pairs)
+{
+  HycoFE fe;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
+  PetscCall(HycoPairsReserve(pairs, 0, 0));
+  if (!scene->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFECreate(scene, m, &fe));
+  ierr = FindAll(fe, pairs);
+  PetscCall(HycoFEDestroy(&fe));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsDestroy(HycoPairs *pairs)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(pairs->slave));
+  PetscCall(PetscFree(pairs->contact));
+  PetscCall(PetscFree(pairs->master_start));
+  PetscCall(PetscFree(pairs->master));
+  PetscCall(PetscFree(pairs->weight));
+  PetscCall(PetscFree(pairs->search));
+  pairs->n = pairs->room = pairs->place = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsSelect(const HycoPairs *all, PetscInt n, const PetscInt which[], const PetscInt index[],
+                               HycoPairs *out)
+{
+  PetscInt masters = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(out, sizeof(*out)));
+  for (PetscInt i = 0; i < n; i++) masters += all->master_start[which[i] + 1] - all->master_start[which[i]];
+  PetscCall(HycoPairsReserve(out, n, 0));
+  PetscCall(PetscRealloc((size_t)(masters + 1) * sizeof(PetscInt), &out->master));
+  PetscCall(PetscRealloc((size_t)(masters + 1) * sizeof(PetscReal), &out->weight));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt k = which[i], lo = all->master_start[k];
+
+    HycoPairsAppend(out, all->contact[k], all->slave[k], all->master_start[k + 1] - lo, all->master + lo,
+                    all->weight + lo);
+  }
+  for (PetscInt i = 0; index && i < n; i++) out->slave[i] = index[out->slave[i]];
+  for (PetscInt j = 0; index && j < masters; j++) out->master[j] = index[out->master[j]];
+  out->room = all->room;
+  out->n_searches = all->n_searches;
+  if (all->search) HycoDuplicate(all->n_searches, all->search, &out->search);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsRenumber(const HycoPairs *pairs, const PetscInt index[], HycoPairs *out)
+{
+  PetscInt *which;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(pairs->n, &which));
+  for (PetscInt k = 0; k < pairs->n; k++) which[k] = k;
+  PetscCall(HycoPairsSelect(pairs, pairs->n, which, index, out));
+  PetscCall(PetscFree(which));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoPairsJump(const HycoPairs *p, PetscInt k, PetscInt dim, const PetscReal value[], PetscReal d[3])
+{
+  for (PetscInt c = 0; c < 3; c++) {
+    d[c] = c < dim ? value[p->slave[k] * dim + c] : 0;
+    for (PetscInt j = p->master_start[k]; c < dim && j < p->master_start[k + 1]; j++)
+      d[c] -= p->weight[j] * value[p->master[j] * dim + c];
+  }
+}
+
+void HycoPairsMark(const HycoPairs *pairs, PetscBool node[])
+{
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    node[pairs->slave[k]] = PETSC_TRUE;
+    for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++) node[pairs->master[j]] = PETSC_TRUE;
+  }
+}
+
+PetscInt HycoPairsWidth(const HycoPairs *pairs)
+{
+  PetscInt most = pairs->n ? 1 + pairs->room : 0;
+
+  for (PetscInt k = 0; k < pairs->n; k++)
+    most = PetscMax(most, 1 + pairs->master_start[k + 1] - pairs->master_start[k]);
+  return most;
+}
+
+PetscErrorCode HycoPairsMarkSurfaces(HycoScene scene, HycoMesh m, const HycoPairs *pairs, PetscBool node[])
+{
+  PetscFunctionBegin;
+  HycoPairsMark(pairs, node);
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
+    PetscInt g = 0;
+
+    if (!scene->contact[k]->ops->find) continue;
+    PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k]->master, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) node[m->group_node[j]] = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,217 @@
+/* B and D: normals, gaps and the rows of the potential contacts at the current parameters. */
+#include "facing.h"
+#include <hycokinematics.h>
+
+PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGetFacet(m->type);
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(vector, 3 * m->n_nodes));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (m->facet_group[f] != group) continue;
+    for (PetscInt q = 0; q < el->nq; q++) {
+      PetscReal n[3];
+
+      PetscCall(HycoFacetNormal(fe, el, f, q, n));
+      for (PetscInt a = 0; a < m->nf; a++) {
+        for (PetscInt c = 0; c < 3; c++) vector[3 * m->facets[f * m->nf + a] + c] += el->N[q][a] * n[c];
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The master point of contact k on the moved mesh; an obstacle's is the slave itself, as is that of a slave node that
+   faces no master. */
+static void MasterPoint(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal x[3])
+{
+  const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
+
+  for (PetscInt c = 0; c < 3; c++) {
+    x[c] = lo == hi ? fe->X[3 * pairs->slave[k] + c] : 0;
+    for (PetscInt j = lo; j < hi; j++) x[c] += pairs->weight[j] * fe->X[3 * pairs->master[j] + c];
+  }
+}
+
+/* Unit normals of the contacts first .. last - 1, all of c, at their master points; vector: room for 3 reals a node. */
+static PetscErrorCode Normals(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first, PetscInt last,
+                              const HycoContactPoints *points, PetscReal vector[], PetscReal normal[])
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(normal, 3 * points->n));
+  if (c->ops->normal) {
+    PetscCall((*c->ops->normal)(c, points, normal));
+  } else if (HycoContactAverages(c)) {
+    PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
+    PetscCall(HycoSurfaceVectors(fe, g, vector));
+    for (PetscInt k = first; k < last; k++)
+      PetscCall(PetscArraycpy(normal + 3 * (k - first), vector + 3 * pairs->slave[k], 3));
+  } else {
+    for (PetscInt i = 0; i < 3 * points->n; i++) {
+      if (c->normal[i % 3])
+        PetscCall(HycoExprEval(c->normal[i % 3], fe->mu, 1, points->master + i - i % 3, &normal[i]));
+    }
+  }
+  for (PetscInt i = 0; i < points->n; i++) {
+    PetscReal *n = normal + 3 * i, length = 0;
+
+    for (PetscInt d = 0; d < fe->dim; d++) length += n[d] * n[d];
+    length = PetscSqrtReal(length);
+    HycoCheck(length > 0, "contact %s: the normal at node %d has no length", c->name,
+              (int)fe->mesh->node_id[pairs->slave[first + i]]);
+    for (PetscInt d = 0; d < 3; d++) n[d] /= length;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal HycoContactNoGap(HycoFE fe)
+{
+  return 1e-2 * HycoMeshLength(fe->mesh);
+}
+
+/* Their gaps at these normals; the gap of one that faces no master says nothing. */
+static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first,
+                           const HycoContactPoints *points, const PetscReal normal[], PetscReal gap[])
+{
+  PetscFunctionBegin;
+  if (c->ops->gap) PetscCall((*c->ops->gap)(c, points, normal, gap));
+  for (PetscInt i = 0; i < points->n; i++) {
+    const PetscReal *n = normal + 3 * i, *x = points->master + 3 * i;
+
+    if (HycoPairsAlone(fe->scene, pairs, first + i)) {
+      gap[i] = HycoContactNoGap(fe);
+    } else if (!c->ops->gap && c->gap) {
+      PetscCall(HycoExprEval(c->gap, fe->mu, 1, x, &gap[i]));
+    } else if (!c->ops->gap) {
+      gap[i] = 0;
+      for (PetscInt d = 0; d < 3; d++) gap[i] += n[d] * (x[d] - points->slave[3 * i + d]);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* work: room for 3 reals a node of the mesh and 6 a contact. */
+static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal work[], PetscReal normal[], PetscReal gap[])
+{
+  PetscReal *slave = work + 3 * fe->mesh->n_nodes, *master = slave + 3 * pairs->n;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    PetscCall(PetscArraycpy(slave + 3 * k, fe->X + 3 * pairs->slave[k], 3));
+    MasterPoint(fe, pairs, k, master + 3 * k);
+  }
+  for (PetscInt k = 0, next; k < pairs->n; k = next) {
+    HycoContact c = fe->scene->contact[pairs->contact[k]];
+    HycoContactPoints points = {.mu = fe->mu, .slave = slave + 3 * k, .master = master + 3 * k};
+
+    next = HycoPairsRun(pairs, k);
+    points.n = next - k;
+    PetscCall(Normals(fe, c, pairs, k, next, &points, work, normal + 3 * k));
+    for (PetscInt i = k; i < next && fe->n_turned; i++) HycoTurnNormal(fe, pairs, i, normal + 3 * i);
+    PetscCall(Gaps(fe, c, pairs, k, &points, normal + 3 * k, gap + k));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal[], PetscReal gap[])
+{
+  PetscReal *work;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPairsMove(fe, pairs));
+  PetscCall(PetscMalloc1(3 * fe->mesh->n_nodes + 6 * pairs->n, &work));
+  ierr = Geometry(fe, pairs, work, normal, gap);
+  PetscCall(PetscFree(work));
+  PetscCall(ierr);
+  PetscCall(HycoContactCheck(fe, pairs, normal, gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds `scale` times the normal at a node to a row: to its free unknowns as entries, to its fixed ones in the gap. */
+static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal normal[3], PetscInt *n, PetscInt dof[],
+                     PetscReal value[], PetscReal *gap)
+{
+  for (PetscInt c = 0; c < fe->dim; c++) {
+    const PetscReal entry = scale * normal[c];
+    const PetscInt i = node * fe->dim + c;
+
+    if (fe->fixed[i]) {
+      *gap -= entry * fe->u0[i];
+    } else if (PetscAbsReal(entry) > 1e-14) {
+      dof[*n] = i;
+      value[(*n)++] = entry;
+    }
+  }
+}
+
+static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], PetscInt start[],
+                           PetscInt dof[], PetscReal value[], PetscReal gap[])
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  start[0] = 0;
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscReal drawn = gap[k];
+
+    if (!HycoPairsAlone(fe->scene, pairs, k)) AddToRow(fe, pairs->slave[k], 1, normal + 3 * k, &n, dof, value, &gap[k]);
+    for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++)
+      AddToRow(fe, pairs->master[j], -pairs->weight[j], normal + 3 * k, &n, dof, value, &gap[k]);
+    start[k + 1] = n;
+    if (start[k + 1] == start[k] && !HycoPairsAlone(fe->scene, pairs, k))
+      PetscCall(HycoContactCheckStill(fe, pairs, k, drawn, &gap[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
+                               PetscReal gap[])
+{
+  PetscReal *normal;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * pairs->n, &normal));
+  ierr = HycoContactGeometry(fe, pairs, normal, gap);
+  if (!ierr) ierr = Rows(fe, pairs, normal, start, dof, value, gap);
+  PetscCall(PetscFree(normal));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGetFacet(m->type);
+  PetscReal *share;
+  PetscInt last = -1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_nodes, &share));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    if (last != pairs->contact[k]) {
+      PetscInt g = 0;
+
+      last = pairs->contact[k];
+      PetscCall(HycoMeshFindGroup(m, "contact", fe->scene->contact[last]->slave, &g));
+      PetscCall(PetscArrayzero(share, m->n_nodes));
+      for (PetscInt f = 0; f < m->n_facets; f++) {
+        for (PetscInt q = 0; m->facet_group[f] == g && q < el->nq; q++) {
+          PetscReal n[3];
+
+          PetscCall(HycoFacetNormal(fe, el, f, q, n));
+          for (PetscInt a = 0; a < m->nf; a++)
+            share[m->facets[f * m->nf + a]] += el->N[q][a] * PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        }
+      }
+    }
+    area[k] = share[pairs->slave[k]];
+  }
+  PetscCall(PetscFree(share));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,103 @@
+/* Entries that laws and contact types declare, and what the scene says of them. */
+#include <hycosceneimpl.h>
+#include <petscviewer.h>
+#include <stdlib.h>
+#include <string.h>
+
+PetscErrorCode HycoDeclaredAdd(HycoDeclared *d, const char name[], const char title[], HycoEntryKind kind,
+                               PetscBool required, HycoEntry **entry)
+{
+  HycoEntry *e = &d->entry[d->n];
+
+  PetscFunctionBegin;
+  PetscCheck(d->n < HYCO_MAX_DECLARED, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "%s: a type has at most %d entries",
+             name, HYCO_MAX_DECLARED);
+  PetscCheck(!HycoDeclaredFind(d, name), PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "the entry %s is declared twice", name);
+  PetscCall(PetscStrallocpy(name, &e->name));
+  PetscCall(PetscStrallocpy(title, &e->title));
+  e->kind = kind;
+  e->required = required;
+  e->value = -1;
+  d->n++;
+  *entry = e;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+HycoEntry *HycoDeclaredFind(HycoDeclared *d, const char name[])
+{
+  for (PetscInt j = 0; j < d->n; j++) {
+    if (strcasecmp(d->entry[j].name, name) == 0) return &d->entry[j];
+  }
+  return NULL;
+}
+
+PetscErrorCode HycoDeclaredRead(HycoScene s, const char key[], const char text[], HycoEntry *e)
+{
+  char *end;
+
+  PetscFunctionBegin;
+  switch (e->kind) {
+  case HYCO_ENTRY_EXPRESSION:
+    PetscCall(HycoExprDestroy(&e->expr)); /* the same entry in another letter case */
+    PetscCall(HycoExprCreate(key, text, s->n_parameters, (const char *const *)s->parameter, &e->expr));
+    break;
+  case HYCO_ENTRY_GROUP:
+    PetscCall(PetscFree(e->text));
+    PetscCall(PetscStrallocpy(text, &e->text));
+    break;
+  case HYCO_ENTRY_LENGTH:
+    e->value = HycoNumber(text, &end);
+    HycoCheck(*end == '\0' && end != text && e->value >= 0, "%s is \"%s\"; it must be a length, 0 or more", key, text);
+    break;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDeclaredView(const HycoDeclared *d, PetscViewer viewer)
+{
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < d->n; j++)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "%s: %s%s\n", d->entry[j].name, d->entry[j].title,
+                                     d->entry[j].required ? " (required)" : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDeclaredDestroy(HycoDeclared *d)
+{
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < d->n; j++) {
+    PetscCall(PetscFree(d->entry[j].name));
+    PetscCall(PetscFree(d->entry[j].title));
+    PetscCall(PetscFree(d->entry[j].text));
+    PetscCall(HycoExprDestroy(&d->entry[j].expr));
+  }
+  d->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int CompareNames(const void *a, const void *b)
+{
+  return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+PetscErrorCode HycoListTypes(PetscFunctionList types, const char type[], char list[HYCO_LINE])
+{
+  const char **names, *near;
+  int n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFunctionListGet(types, &names, &n));
+  if (n && !names[n - 1]) n--; /* PETSc 3.18 counts the NULL at the end */
+  qsort(names, (size_t)n, sizeof(*names), CompareNames);
+  list[0] = '\0';
+  for (int k = 0; k < n; k++) {
+    PetscCall(PetscStrlcat(list, names[k], HYCO_LINE));
+    if (k + 1 < n) PetscCall(PetscStrlcat(list, k + 2 < n ? ", " : " or ", HYCO_LINE));
+  }
+  near = HycoNearest(type, n, names);
+  if (near) PetscCall(PetscStrlcat(list, "; did you mean ", HYCO_LINE));
+  if (near) PetscCall(PetscStrlcat(list, near, HYCO_LINE));
+  if (near) PetscCall(PetscStrlcat(list, "?", HYCO_LINE));
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

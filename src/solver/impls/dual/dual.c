@@ -1,0 +1,391 @@
+/*
+  The dual form: the flexibility S = B K^-1 Bt and the gap without forces g = D - B K^-1 F, from one factorisation, and
+  the complementarity problem w = g + S L in the contact forces alone, small and dense on every rank.
+*/
+#include <hycosolverimpl.h>
+#include <string.h>
+
+/* Lemke's dictionary has m^2 entries, and each of its some m pivots changes them all: beyond this it is no fallback,
+   nor is S where another form was chosen. */
+#define HYCO_FALLBACK_MAX 3000
+
+typedef struct {
+  PetscInt m, p; /* contacts; unknowns pinned because K is singular: they come before the contacts in S, g and L */
+  PetscReal *S, *g, *L;
+  PetscBool *active;
+  PetscBool started; /* active holds a solution's set */
+  HycoTao tao;       /* of each rank alone: the problem is replicated */
+} Dual;
+
+static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+{
+  HycoSystem y = s->system;
+  PetscInt p;
+
+  PetscFunctionBegin;
+  (void)asked;
+  *cost = -1;
+  if (!y->K || !y->m || s->iterative) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoKernelSize(y->K, &p));
+  if (p && strcmp(s->now.type, HYCO_TAO_ACTIVE_SET)) {
+    HycoFormat(why, "contact alone holds a body, and %s cannot solve that; use -hyco_solver_type active_set",
+               s->now.word);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (s->falling_back && y->m > HYCO_FALLBACK_MAX && (s->form != form || s->now.traits & HYCO_TAO_DENSE))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  *cost = 2;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscReal *bytes)
+{
+  HycoStiffness *f = &s->stiffness;
+  HycoSystem y = s->system;
+
+  PetscFunctionBegin;
+  (void)form;
+  if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
+  PetscCall(HycoDirectPinKernel(f->direct, y->K));
+  PetscCall(
+      HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation goes on from it */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Makes room for m contacts and p pinned unknowns; a change forgets the last solution's set. */
+static PetscErrorCode Resize(Dual *d, PetscInt m, PetscInt p)
+{
+  const PetscInt n = m + p;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(d->S));
+  PetscCall(PetscFree(d->g));
+  PetscCall(PetscFree(d->L));
+  PetscCall(PetscFree(d->active));
+  PetscCall(PetscMalloc1((size_t)n * (size_t)n + 1, &d->S));
+  PetscCall(PetscCalloc1(n + 1, &d->g));
+  PetscCall(PetscCalloc1(n + 1, &d->L));
+  PetscCall(PetscCalloc1(m + 1, &d->active));
+  d->m = m;
+  d->p = p;
+  d->started = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
+{
+  Dual *d = (Dual *)form->data;
+  HycoSystem y = s->system;
+  PetscInt p;
+
+  PetscFunctionBegin;
+  PetscCall(HycoKernelSize(y->K, &p));
+  if (!d->S || d->m != y->m || d->p != p) {
+    PetscCall(Resize(d, y->m, p));
+    s->stiffness.of.K = 0;
+  }
+  PetscCall(HycoStiffnessFactor(s, y->Bt, y->B, d->S, singular));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A distributed vector, whole on every rank. */
+static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
+{
+  PetscMPIInt size, *counts, *offsets;
+  const PetscInt *ranges;
+  const PetscScalar *local;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  if (size == 1) {
+    PetscCall(VecGetLocalSize(v, &n));
+    PetscCall(VecGetArrayRead(v, &local));
+    PetscCall(PetscArraycpy(all, local, n));
+    PetscCall(VecRestoreArrayRead(v, &local));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecGetOwnershipRanges(v, &ranges));
+  PetscCall(PetscMalloc2(size, &counts, size, &offsets));
+  for (PetscMPIInt r = 0; r < size; r++) {
+    counts[r] = (PetscMPIInt)(ranges[r + 1] - ranges[r]);
+    offsets[r] = (PetscMPIInt)ranges[r];
+  }
+  PetscCall(VecGetLocalSize(v, &n));
+  PetscCall(VecGetArrayRead(v, &local));
+  PetscCallMPI(MPI_Allgatherv(local, (PetscMPIInt)n, MPIU_REAL, all, counts, offsets, MPIU_REAL, comm));
+  PetscCall(VecRestoreArrayRead(v, &local));
+  PetscCall(PetscFree2(counts, offsets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* g = D - B K^-1 F, on every rank. */
+static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
+{
+  HycoSystem y = s->system;
+
+  PetscFunctionBegin;
+  if (!s->stiffness.lu && !s->free) {
+    PetscCall(GatherVec(HycoComm(s), y->D, d->L));
+    PetscCall(HycoDirectReduce(s->stiffness.direct, y->F, d->L, d->g));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (s->free)
+    PetscCall(VecCopy(s->free, x));
+  else
+    PetscCall(HycoStiffnessSolve(s, y->F, x));
+  PetscCall(HycoSystemWork(y));
+  PetscCall(MatMult(y->B, x, y->work_L));
+  PetscCall(VecAYPX(y->work_L, -1, y->D));
+  PetscCall(GatherVec(HycoComm(s), y->work_L, d->g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The dense problem by the method now. Floating bodies begin with every contact closed. */
+static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
+{
+  const HycoLCP lcp = {.n = d->m,
+                       .p = d->p,
+                       .M = d->S,
+                       .q = d->g,
+                       .symmetric = s->system->symmetric,
+                       .monitor = s->monitor,
+                       .monitor_ctx = s->monitor_ctx};
+  char name[HYCO_LINE] = "dual";
+
+  PetscFunctionBegin;
+  if (d->p) HycoFormat(name, "dual, %d rigid motions held by contact", (int)d->p);
+  PetscCall(HycoSolverNameMethod(s, name));
+  for (PetscInt i = 0; i < d->m && (!s->warm || !d->started); i++) d->active[i] = (PetscBool)(d->p > 0);
+  PetscCall(HycoTaoSetType(d->tao, s->now.type, s->max_its));
+  PetscCall(HycoTaoSolveLCP(d->tao, &lcp, d->active, d->L, &s->its, solved));
+  for (PetscInt i = 0; i < d->m; i++) { /* round-off below zero; the residuals are recomputed */
+    PetscReal *L = d->L + d->p + i;
+
+    *L = d->p && !d->active[i] ? 0 : PetscMax(*L, 0);
+    if (!d->p) d->active[i] = (PetscBool)(*L > 0);
+  }
+  d->started = *solved;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* This rank's part of the forces that every rank has. */
+static PetscErrorCode SetForces(const Dual *d, Vec L)
+{
+  PetscInt lo, hi;
+  PetscScalar *l;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(L, &lo, &hi));
+  PetscCall(VecGetArray(L, &l));
+  PetscCall(PetscArraycpy(l, d->L + d->p + lo, hi - lo));
+  PetscCall(VecRestoreArray(L, &l));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x = K^-1 F - K^-1 Bt L, the first of them known. */
+static PetscErrorCode AddForces(HycoSolver s, Vec x, Vec L)
+{
+  HycoSystem y = s->system;
+  PetscReal most;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(L, NORM_INFINITY, &most));
+  if (most > 0) {
+    PetscCall(MatMult(y->Bt, L, y->work_x[0]));
+    PetscCall(HycoStiffnessSolve(s, y->work_x[0], x));
+    PetscCall(VecAYPX(x, -1, s->free));
+  } else
+    PetscCall(VecCopy(s->free, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x = K^-1 (F - Bt L) */
+static PetscErrorCode Recover(HycoSolver s, const Dual *d, Vec x, Vec L)
+{
+  HycoSystem y = s->system;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemWork(y));
+  if (s->free)
+    PetscCall(AddForces(s, x, L));
+  else if (!s->stiffness.lu)
+    PetscCall(HycoDirectExpand(s->stiffness.direct, d->L, x));
+  else {
+    PetscCall(MatMult(y->Bt, L, y->work_x[0]));
+    PetscCall(VecAYPX(y->work_x[0], -1, y->F));
+    PetscCall(HycoStiffnessSolve(s, y->work_x[0], x));
+  }
+  if (s->stiffness.refined)
+    PetscCall(HycoStiffnessRefine(s, d->L, x));
+  else if (!d->p)
+    PetscCall(HycoStiffnessCorrect(s, L, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The forces change by dL (m), and x with them. */
+static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
+{
+  Vec change, force, move;
+  PetscInt lo, hi;
+  PetscScalar *c;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(L, &change));
+  PetscCall(VecDuplicate(x, &force));
+  PetscCall(VecDuplicate(x, &move));
+  PetscCall(VecGetOwnershipRange(L, &lo, &hi));
+  PetscCall(VecGetArray(change, &c));
+  PetscCall(PetscArraycpy(c, dL + lo, hi - lo));
+  PetscCall(VecRestoreArray(change, &c));
+  PetscCall(MatMult(s->system->Bt, change, force));
+  PetscCall(HycoStiffnessSolve(s, force, move));
+  PetscCall(VecAXPY(x, -1, move));
+  PetscCall(VecAXPY(L, 1, change));
+  PetscCall(VecDestroy(&change));
+  PetscCall(VecDestroy(&force));
+  PetscCall(VecDestroy(&move));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where K is ill conditioned, x misses the gaps under the forces by more than S and g know: S dL = D - B x closes them.
+ */
+static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
+{
+  HycoSystem y = s->system;
+  PetscInt k = 0, *a;
+  PetscReal *change, open = 0, size;
+  PetscBool singular = PETSC_TRUE;
+  Vec gap;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(y->D, &gap));
+  PetscCall(MatMult(y->B, x, gap));
+  PetscCall(VecNorm(gap, NORM_INFINITY, &size));
+  PetscCall(VecAYPX(gap, -1, y->D));
+  PetscCall(GatherVec(HycoComm(s), gap, d->g));
+  PetscCall(VecDestroy(&gap));
+  PetscCall(PetscMalloc2(d->m, &a, d->m, &change));
+  for (PetscInt i = 0; i < d->m; i++) {
+    if (d->L[i] <= 0) continue;
+    a[k++] = i;
+    open = PetscMax(open, PetscAbsReal(d->g[i]));
+  }
+  if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(d->m, d->S, d->g, y->symmetric, NULL, &k, a, change, &singular));
+  for (PetscInt i = 0; i < d->m && !singular; i++) change[i] = PetscMax(change[i], -d->L[i]);
+  if (!singular) PetscCall(Shift(s, change, x, L));
+  PetscCall(PetscFree2(a, change));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where refinement changes S by no more than this share of its largest entry, nothing was lost to round-off. */
+#define SAME_FLEXIBILITY 1e-12
+
+/* A small dense K: S again, by solves refined in twice the working precision. */
+static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *better)
+{
+  Dual *d = (Dual *)form->data;
+  HycoStiffness *f = &s->stiffness;
+  const size_t entries = (size_t)d->m * (size_t)d->m;
+  PetscReal *before, change = 0, size = 0, begin = HycoNow();
+
+  PetscFunctionBegin;
+  *better = PETSC_FALSE;
+  if (!f->lu || !f->of.K || f->refined) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoDuplicate(entries, d->S, &before);
+  f->refined = PETSC_TRUE;
+  HycoLogged(HYCO_EVENT_FACTOR, HycoStiffnessCondense(s, s->system->Bt, s->system->B, d->S));
+  for (size_t k = 0; k < entries; k++) {
+    change = PetscMax(change, PetscAbsReal(d->S[k] - before[k]));
+    size = PetscMax(size, PetscAbsReal(d->S[k]));
+  }
+  f->refined = *better = (PetscBool)(change > SAME_FLEXIBILITY * size);
+  if (!*better) PetscCall(PetscArraycpy(d->S, before, entries));
+  PetscCall(PetscFree(before));
+  s->seconds_factor += HycoNow() - begin;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Reset(HycoSolver s, HycoSolverForm form)
+{
+  PetscFunctionBegin;
+  (void)form;
+  if (s->stiffness.refined) s->stiffness.of.K = 0;
+  s->stiffness.refined = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+{
+  Dual *d = (Dual *)form->data;
+  PetscBool singular;
+
+  PetscFunctionBegin;
+  PetscCall(SetUp(s, form, &singular));
+  if (singular) {
+    PetscCall(HycoSolverGiveUp(s, x, L));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(FreeGap(s, d, x));
+  HycoLogged(HYCO_EVENT_FORCES, SolveForces(s, d, solved));
+  PetscCall(SetForces(d, L));
+  PetscCall(Recover(s, d, x, L));
+  if (s->stiffness.lu && !d->p && *solved && s->now.traits & HYCO_TAO_OWN) PetscCall(CloseGaps(s, d, x, L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoSolverForm form)
+{
+  Dual *d = (Dual *)form->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTaoDestroy(&d->tao));
+  PetscCall(PetscFree(d->S));
+  PetscCall(PetscFree(d->g));
+  PetscCall(PetscFree(d->L));
+  PetscCall(PetscFree(d->active));
+  PetscCall(PetscFree(form->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
+{
+  Dual *d;
+
+  PetscFunctionBegin;
+  (void)s;
+  PetscCall(PetscNew(&d));
+  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, &d->tao));
+  form->data = d;
+  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts,
+                                           .estimate = EstimateFactor,
+                                           .setup = SetUp,
+                                           .solve = Solve,
+                                           .refine = Refine,
+                                           .reset = Reset,
+                                           .destroy = Destroy};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[])
+{
+  HycoSolverForm form;
+  const Dual *d;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  PetscCheck(!s->iterative, HycoComm(s), HYCO_ERR_NO_MODEL,
+             "the flexibility B K^-1 B^T needs a factor of the stiffness, and the solver chose iterations%s: give more "
+             "memory (-hyco_memory), or -hyco_linear direct",
+             s->why_iterative);
+  form = HycoSolverFindForm(s, "dual");
+  d = (const Dual *)form->data;
+  PetscCheck(!d->p, HycoComm(s), HYCO_ERR_NO_MODEL,
+             "contact alone holds a body: K^-1 does not exist, and there is no flexibility B K^-1 B^T");
+  PetscCheck(d->S && s->stiffness.of.K && s->stiffness.of.B && s->reason != HYCO_DIVERGED_SINGULAR, HycoComm(s),
+             HYCO_ERR_NO_MODEL,
+             "the stiffness is singular (is a body held by nothing?): there is no flexibility B K^-1 B^T");
+  *m = d->m;
+  *S = d->S;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,98 @@
+/*
+  Systems whose flexibility is given: w = g + G L, dense on one process, without displacements. The factor of G on the
+  active contacts is kept from one solve to the next while G stays.
+*/
+#include <hycosolverimpl.h>
+
+typedef struct {
+  PetscInt m;
+  PetscBool *active;
+  PetscBool started; /* active holds a solution's set */
+  HycoSetFactor factor;
+  HycoOperatorState of;
+  HycoTao tao;
+} Flexibility;
+
+static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+{
+  PetscFunctionBegin;
+  (void)form, (void)asked, (void)why;
+  *cost = s->system->G ? 0 : -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
+{
+  Flexibility *f = (Flexibility *)form->data;
+  HycoSystem y = s->system;
+  PetscBool same;
+
+  PetscFunctionBegin;
+  *singular = PETSC_FALSE;
+  if (f->m != y->m || !f->active) {
+    PetscCall(PetscFree(f->active));
+    PetscCall(HycoSetFactorDestroy(&f->factor));
+    PetscCall(PetscCalloc1(y->m + 1, &f->active));
+    PetscCall(HycoSetFactorCreate(y->m, &f->factor));
+    f->m = y->m;
+    f->started = PETSC_FALSE;
+  }
+  PetscCall(HycoOperatorStateUpdate(&f->of, y->G, NULL, &same));
+  if (!same) HycoSetFactorForget(f->factor);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+{
+  Flexibility *f = (Flexibility *)form->data;
+  HycoSystem y = s->system;
+  HycoLCP lcp = {.n = y->m, .symmetric = PETSC_TRUE, .monitor = s->monitor, .monitor_ctx = s->monitor_ctx};
+  PetscScalar *l;
+  PetscBool singular;
+
+  PetscFunctionBegin;
+  (void)x;
+  PetscCall(SetUp(s, form, &singular));
+  PetscCall(HycoSolverNameMethod(s, "condensed"));
+  if (s->start_set && !s->falling_back)
+    PetscCall(PetscArraycpy(f->active, s->start_set, f->m));
+  else if (!s->start_set && (!s->warm || !f->started))
+    PetscCall(PetscArrayzero(f->active, f->m));
+  lcp.factor = f->factor;
+  PetscCall(MatDenseGetArrayRead(y->G, &lcp.M));
+  PetscCall(VecGetArrayRead(y->D, &lcp.q));
+  PetscCall(VecGetArray(L, &l));
+  PetscCall(HycoTaoSetType(f->tao, s->now.type, s->max_its));
+  PetscCall(HycoTaoSolveLCP(f->tao, &lcp, f->active, l, &s->its, solved));
+  for (PetscInt i = 0; i < f->m; i++) l[i] = PetscMax(l[i], 0); /* round-off below zero; the residuals are recomputed */
+  PetscCall(VecRestoreArray(L, &l));
+  PetscCall(VecRestoreArrayRead(y->D, &lcp.q));
+  PetscCall(MatDenseRestoreArrayRead(y->G, &lcp.M));
+  f->started = *solved;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoSolverForm form)
+{
+  Flexibility *f = (Flexibility *)form->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTaoDestroy(&f->tao));
+  PetscCall(HycoSetFactorDestroy(&f->factor));
+  PetscCall(PetscFree(f->active));
+  PetscCall(PetscFree(form->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm form)
+{
+  Flexibility *f;
+
+  PetscFunctionBegin;
+  (void)s;
+  PetscCall(PetscNew(&f));
+  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, &f->tao));
+  form->data = f;
+  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

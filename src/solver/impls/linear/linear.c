@@ -1,0 +1,103 @@
+/* K x = F without contact: by the factor of K, or by conjugate gradients with multigrid. */
+#include <hycosolverimpl.h>
+
+typedef struct {
+  KSP ksp; /* iterative */
+  HycoOperatorState of;
+} Linear;
+
+static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+{
+  PetscFunctionBegin;
+  (void)form, (void)asked, (void)why;
+  *cost = s->system->K && !s->system->m ? 0 : -1;
+  if (s->iterative && s->linear != HYCO_LINEAR_ITERATIVE) *cost = -1; /* iterations are to be asked for */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
+{
+  PetscFunctionBegin;
+  (void)form;
+  PetscCall(HycoStiffnessFactor(s, NULL, NULL, NULL, singular));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *solved)
+{
+  KSPConvergedReason why;
+  PetscBool same;
+
+  PetscFunctionBegin;
+  PetscCall(HycoOperatorStateUpdate(&l->of, s->system->K, NULL, &same));
+  if (!same) {
+    PetscCall(KSPDestroy(&l->ksp));
+    PetscCall(HycoIterativeSolver(HycoComm(s), "hyco_primal_", s->system->K, &l->ksp));
+  }
+  PetscCall(VecSet(x, 0));
+  PetscCall(KSPSolve(l->ksp, s->system->F, x));
+  PetscCall(KSPGetConvergedReason(l->ksp, &why));
+  PetscCall(HycoNameLinear(s, l->ksp));
+  *solved = (PetscBool)(why > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+{
+  PetscBool singular;
+
+  PetscFunctionBegin;
+  PetscCall(PetscStrncpy(s->method, "linear", sizeof(s->method)));
+  if (s->iterative) {
+    PetscCall(SolveIterative(s, (Linear *)form->data, x, solved));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SetUp(s, form, &singular));
+  if (singular) {
+    PetscCall(HycoSolverGiveUp(s, x, L));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoStiffnessSolve(s, s->system->F, x));
+  PetscCall(HycoStiffnessCorrect(s, NULL, x));
+  *solved = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoSolverForm form)
+{
+  Linear *l = (Linear *)form->data;
+
+  PetscFunctionBegin;
+  PetscCall(KSPDestroy(&l->ksp));
+  PetscCall(PetscFree(form->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverFormCreate_Linear(HycoSolver s, HycoSolverForm form)
+{
+  Linear *l;
+
+  PetscFunctionBegin;
+  (void)s;
+  PetscCall(PetscNew(&l));
+  form->data = l;
+  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[])
+{
+  PetscInt p;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  PetscCheck(!s->iterative, HycoComm(s), HYCO_ERR_NO_MODEL,
+             "a condensed model needs a factor of the stiffness, and the solver chose iterations%s: give more memory "
+             "(-hyco_memory), or -hyco_linear direct",
+             s->why_iterative);
+  PetscCall(HycoKernelSize(s->system->K, &p));
+  PetscCheck(s->stiffness.direct && s->stiffness.of.K && !p, HycoComm(s), PETSC_ERR_ORDER,
+             "call HycoSolverSolve() in the dual form on a regular, sparse K first");
+  PetscCall(HycoDirectSolveMany(s->stiffness.direct, k, r, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,374 @@
+/*
+  The primal form, in gap coordinates: of each contact row one unknown (its pivot) is replaced by the row's value, so
+  that B x <= D becomes the bound y_p <= D_i. With x = T y: Kg = T^T K T, f = T^T F, and the force of a contact is the
+  residual at its pivot, L_i = (f - Kg y)_p. No dense matrix appears, whatever the number of contacts.
+*/
+#include "gap.h"
+#include <string.h>
+
+/* Contacts are many where they are more than this share of the unknowns, or so many that S would not fit. */
+#define HYCO_MANY_SHARE 0.25
+#define HYCO_MANY       6000
+/* A warm start that is not over by then began too far off: coarser problems give a better one. */
+#define HYCO_WARM_ITS 4
+/* Noise of iterative solves while the set changes, and in the last. */
+#define HYCO_NOISE_FIRST 1e-5
+#define HYCO_NOISE       1e-9
+
+/* The value of a distributed vector at this rank's pivots. */
+static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, PetscReal out[])
+{
+  const PetscScalar *w;
+
+  PetscFunctionBegin;
+  PetscCall(VecScatterBegin(scatter, v, work, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(scatter, v, work, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArrayRead(work, &w));
+  PetscCall(PetscArraycpy(out, w, n));
+  PetscCall(VecRestoreArrayRead(work, &w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the iterations share. */
+typedef struct {
+  HycoSolver s;
+  const Gap *gap;
+  PetscInt n; /* this rank's contacts, without the idle ones */
+  PetscReal *bound, *value, *force, *diagonal, *at_d;
+  PetscReal noise; /* share of the largest force and gap that iterative solves leave */
+  PetscInt *at;
+  Vec y, f, rhs, residual, work;
+  VecScatter scatter;
+  PetscBool cold;
+} Primal;
+
+/* The values at the pivots, and the forces. */
+static PetscErrorCode Evaluate(const Primal *p)
+{
+  PetscFunctionBegin;
+  PetscCall(MatMult(p->gap->Kg, p->y, p->residual));
+  PetscCall(VecAYPX(p->residual, -1, p->f));
+  PetscCall(AtPivots(p->y, p->scatter, p->work, p->n, p->value));
+  PetscCall(AtPivots(p->residual, p->scatter, p->work, p->n, p->force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
+{
+  const Primal *p = (const Primal *)ctx;
+  const Gap *g = p->gap;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < p->n; k++) {
+    if (!active[k]) continue;
+    p->at[n] = g->pivot[k];
+    p->at_d[n++] = p->bound[k];
+  }
+  PetscCall(HycoSolveOnSet(g->Kg, g->Kw, g->ksp, p->f, n, p->at, p->at_d, p->rhs, p->y, singular));
+  if (!*singular) PetscCall(Evaluate(p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
+{
+  const Primal *p = (const Primal *)ctx;
+  PetscReal size[2] = {0, 0}, sizes[2];
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < p->n; k++) {
+    size[0] = PetscMax(size[0], PetscMax(PetscAbsReal(p->bound[k]), PetscAbsReal(p->value[k])));
+    if (active[k]) size[1] = PetscMax(size[1], PetscAbsReal(p->force[k]));
+  }
+  PetscCallMPI(MPI_Allreduce(size, sizes, 2, MPIU_REAL, MPI_MAX, HycoComm(p->s)));
+  for (PetscInt k = 0; k < p->n; k++)
+    violates[k] = (PetscBool)(active[k] ? p->force[k] < -p->noise * sizes[1] &&
+                                              HycoPulls(p->force[k], sizes[1], p->diagonal[k], p->bound[k])
+                                        : p->value[k] > p->bound[k] + p->noise * sizes[0] &&
+                                              HycoPenetrates(p->value[k], p->bound[k], sizes[0]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The set from coarser problems, where they exist: most unknowns are contacts, coupled with one sign. */
+static PetscErrorCode StartFromCoarse(const Primal *p, PetscBool active[], PetscBool *made)
+{
+  HycoSolver s = p->s;
+  const Gap *g = p->gap;
+  Vec bound, set;
+
+  PetscFunctionBegin;
+  *made = PETSC_FALSE;
+  if (!s->multilevel || 4 * s->system->m <= s->system->n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(p->f, &bound));
+  PetscCall(VecDuplicate(p->f, &set));
+  PetscCall(VecSet(bound, PETSC_INFINITY));
+  for (PetscInt k = 0; k < p->n; k++) PetscCall(VecSetValue(bound, g->pivot[k], p->bound[k], INSERT_VALUES));
+  PetscCall(VecAssemblyBegin(bound));
+  PetscCall(VecAssemblyEnd(bound));
+  PetscCall(HycoMultilevelStart(g->Kg, p->f, bound, set, made));
+  if (*made) {
+    PetscCall(AtPivots(set, p->scatter, p->work, p->n, p->value));
+    for (PetscInt k = 0; k < p->n; k++) active[k] = (PetscBool)(p->value[k] > 0.5);
+  }
+  PetscCall(VecDestroy(&bound));
+  PetscCall(VecDestroy(&set));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Iterative solves leave residuals of 1 % of `noise`; changes of the set below it are not to be believed. */
+static PetscErrorCode SetAccuracy(Primal *p, PetscReal noise)
+{
+  PetscFunctionBegin;
+  p->noise = noise;
+  PetscCall(KSPSetTolerances(p->gap->ksp, noise / 100, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The set settled under loose solves: now in earnest. */
+static PetscErrorCode Settled(void *ctx, PetscBool *more)
+{
+  Primal *p = (Primal *)ctx;
+
+  PetscFunctionBegin;
+  *more = (PetscBool)(p->noise > HYCO_NOISE);
+  if (*more) PetscCall(SetAccuracy(p, HYCO_NOISE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last solution's set was far off. */
+static PetscErrorCode Restart(void *ctx, PetscInt its, PetscBool active[], PetscBool *fresh)
+{
+  const Primal *p = (const Primal *)ctx;
+
+  PetscFunctionBegin;
+  *fresh = PETSC_FALSE;
+  if (!p->cold && its == HYCO_WARM_ITS) PetscCall(StartFromCoarse(p, active, fresh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The set of a cold start: floating bodies begin closed. */
+static PetscErrorCode StartCold(Primal *p, PetscBool active[])
+{
+  HycoSolver s = p->s;
+  PetscInt n_free;
+  PetscBool coarse = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(HycoKernelSize(s->system->K, &n_free));
+  for (PetscInt k = 0; k < p->n; k++) active[k] = (PetscBool)(n_free > 0);
+  if (!n_free) PetscCall(StartFromCoarse(p, active, &coarse));
+  if (coarse) PetscCall(PetscStrlcat(s->method, ", multilevel start", sizeof(s->method)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ActiveSet(Primal *p, Gap *g, PetscBool *solved)
+{
+  HycoSolver s = p->s;
+  HycoActiveSet set = {.comm = HycoComm(s),
+                       .n = p->n,
+                       .max_its = s->max_its ? s->max_its : 100 + s->system->m,
+                       .one_by_one = PETSC_TRUE,
+                       .ctx = p,
+                       .solve = SolveOnSet,
+                       .violations = Violations,
+                       .restart = Restart,
+                       .settled = Settled,
+                       .monitor = s->monitor,
+                       .monitor_ctx = s->monitor_ctx};
+  HycoLCPStatus status;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(s->system->D, &set.first, NULL));
+  if (s->iterative) PetscCall(SetAccuracy(p, HYCO_NOISE_FIRST));
+  p->cold = (PetscBool)(!s->warm || !g->started);
+  if (p->cold) PetscCall(StartCold(p, g->active));
+  PetscCall(HycoTaoSetType(g->tao, s->now.type, set.max_its));
+  PetscCall(HycoTaoSolveSet(g->tao, &set, g->active, p->y, &s->its, &status));
+  if (status == HYCO_LCP_SINGULAR) s->reason = HYCO_DIVERGED_SINGULAR;
+  g->started = *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A type of TAO on the same bounds. */
+static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
+{
+  HycoSolver s = p->s;
+  Vec lo, hi;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(p->y, &lo));
+  PetscCall(VecDuplicate(p->y, &hi));
+  PetscCall(VecSet(lo, PETSC_NINFINITY));
+  PetscCall(VecSet(hi, PETSC_INFINITY));
+  for (PetscInt k = 0; k < p->n; k++) PetscCall(VecSetValue(hi, g->pivot[k], p->bound[k], INSERT_VALUES));
+  PetscCall(VecAssemblyBegin(hi));
+  PetscCall(VecAssemblyEnd(hi));
+  PetscCall(VecPointwiseMin(p->y, p->y, hi));
+  PetscCall(VecCopy(p->f, p->rhs));
+  if (g->H)
+    PetscCall(MatCopy(g->Kg, g->H, SAME_NONZERO_PATTERN));
+  else
+    PetscCall(MatDuplicate(g->Kg, MAT_COPY_VALUES, &g->H));
+  PetscCall(MatSetOption(g->H, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(HycoTaoSetType(g->tao, s->now.type, s->max_its));
+  PetscCall(HycoTaoSolve(g->tao, g->H, p->rhs, lo, hi, p->y, &s->its, solved));
+  PetscCall(Evaluate(p));
+  for (PetscInt k = 0; k < p->n; k++) { /* a value on its bound has gone through a scale and back */
+    const PetscReal ulps = 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(p->bound[k]);
+
+    g->active[k] = (PetscBool)(p->value[k] >= p->bound[k] - ulps);
+  }
+  PetscCall(VecDestroy(&lo));
+  PetscCall(VecDestroy(&hi));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
+{
+  HycoSystem y = s->system;
+  IS is;
+  const PetscScalar *d;
+
+  PetscFunctionBegin;
+  p->s = s;
+  p->gap = g;
+  p->n = g->n;
+  PetscCall(PetscCalloc6(p->n, &p->bound, p->n, &p->value, p->n, &p->force, p->n, &p->diagonal, p->n, &p->at_d, p->n,
+                         &p->at));
+  PetscCall(VecGetArrayRead(y->D, &d));
+  for (PetscInt k = 0; k < p->n; k++) p->bound[k] = d[g->contact[k]];
+  PetscCall(VecRestoreArrayRead(y->D, &d));
+  PetscCall(VecDuplicate(x, &p->y));
+  PetscCall(VecSet(p->y, 0));
+  PetscCall(VecDuplicate(x, &p->f));
+  PetscCall(VecDuplicate(x, &p->rhs));
+  PetscCall(VecDuplicate(x, &p->residual));
+  PetscCall(MatMultTranspose(g->T, y->F, p->f));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, p->n, g->pivot, PETSC_COPY_VALUES, &is));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, p->n, &p->work));
+  PetscCall(VecScatterCreate(x, is, p->work, NULL, &p->scatter));
+  PetscCall(ISDestroy(&is));
+  PetscCall(MatGetDiagonal(g->Kg, p->rhs));
+  PetscCall(AtPivots(p->rhs, p->scatter, p->work, p->n, p->diagonal));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PrimalDestroy(Primal *p)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree6(p->bound, p->value, p->force, p->diagonal, p->at_d, p->at));
+  PetscCall(VecDestroy(&p->y));
+  PetscCall(VecDestroy(&p->f));
+  PetscCall(VecDestroy(&p->rhs));
+  PetscCall(VecDestroy(&p->residual));
+  PetscCall(VecDestroy(&p->work));
+  PetscCall(VecScatterDestroy(&p->scatter));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Left to itself where contacts are many, or where K is solved with iteratively. */
+static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+{
+  Gap *g = (Gap *)form->data;
+  HycoSystem y = s->system;
+  const PetscBool many = (PetscBool)(y->m > HYCO_MANY_SHARE * (PetscReal)y->n || y->m > HYCO_MANY);
+  PetscBool aij, same;
+
+  PetscFunctionBegin;
+  *cost = -1;
+  if (!y->K || !y->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)y->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
+  if (s->now.traits & HYCO_TAO_DENSE)
+    HycoFormat(why,
+               "%s%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with "
+               "dual_free",
+               s->now.traits & HYCO_TAO_OWN ? "" : "TAO's ", s->now.traits & HYCO_TAO_OWN ? s->now.word : s->now.type);
+  else if (!aij)
+    HycoFormat(why, "the primal form needs a sparse K (AIJ); use -hyco_solver_form dual");
+  else if (!y->symmetric)
+    HycoFormat(why, "the primal form needs a symmetric system with contacts; use -hyco_solver_form dual");
+  else if (asked && !s->iterative)
+    *cost = 1;
+  else if (many || s->iterative) {
+    PetscCall(HycoOperatorStateUpdate(&g->seen, y->B, NULL, &same));
+    if (!same) PetscCall(HycoGapPossible(y, &g->possible));
+    if (g->possible) *cost = 1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
+{
+  PetscFunctionBegin;
+  *singular = PETSC_FALSE;
+  PetscCall(HycoGapSetUp(s, (Gap *)form->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+{
+  Gap *g = (Gap *)form->data;
+  const PetscBool own = (PetscBool)(s->now.traits & HYCO_TAO_OWN);
+  Primal p = {.noise = 0};
+  PetscScalar *l;
+
+  PetscFunctionBegin;
+  s->by_factor = own;
+  PetscCall(HycoGapSetUp(s, g));
+  PetscCall(PrimalCreate(s, g, x, &p));
+  PetscCall(HycoSolverNameMethod(s, "primal"));
+  PetscCall(own ? ActiveSet(&p, g, solved) : BoundQP(&p, g, solved));
+  PetscCall(HycoNameLinear(s, g->ksp));
+  PetscCall(MatMult(g->T, p.y, x));
+  PetscCall(VecSet(L, 0));
+  PetscCall(VecGetArray(L, &l));
+  for (PetscInt k = 0; k < p.n; k++) {
+    if (!*solved && own) /* the set has changed since: show what the residuals say of it */
+      l[g->contact[k]] = p.force[k];
+    else if (g->active[k])
+      l[g->contact[k]] = PetscMax(p.force[k], 0);
+  }
+  PetscCall(VecRestoreArray(L, &l));
+  PetscCall(PrimalDestroy(&p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoSolverForm form)
+{
+  Gap *g = (Gap *)form->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTaoDestroy(&g->tao));
+  PetscCall(KSPDestroy(&g->ksp));
+  PetscCall(MatDestroy(&g->T));
+  PetscCall(MatDestroy(&g->Kg));
+  PetscCall(MatDestroy(&g->Kw));
+  PetscCall(MatDestroy(&g->H));
+  PetscCall(PetscFree(g->pivot));
+  PetscCall(PetscFree(g->contact));
+  PetscCall(PetscFree(g->active));
+  PetscCall(PetscFree(form->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, HycoOptionItems PetscOptionsObject)
+{
+  PetscFunctionBegin;
+  (void)form;
+  PetscCall(HycoOptionsBool("-hyco_solver_multilevel",
+                            "full order, every unknown a contact: start from coarser problems", &s->multilevel, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form)
+{
+  Gap *g;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&g));
+  PetscCall(HycoTaoCreate(HycoComm(s), &g->tao));
+  form->data = g;
+  *form->ops = (struct _HycoSolverFormOps){
+      .accepts = Accepts, .setup = SetUp, .solve = Solve, .setfromoptions = SetFromOptions, .destroy = Destroy};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,229 @@
+/* A factor of K for the forms: LAPACK's where K is dense, with refinement in twice the working precision where
+ * round-off is lost, or MUMPS's, which brings the flexibility along. */
+#include <hycosolverimpl.h>
+
+/* A residual below this share of F needs no refinement: the residuals are judged by 1e-8. */
+#define REFINE 1e-10
+
+PetscErrorCode HycoStiffnessDestroy(HycoStiffness *f)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoDirectDestroy(&f->direct));
+  PetscCall(PetscFree(f->lu));
+  PetscCall(PetscFree(f->ipiv));
+  PetscCall(PetscFree(f->X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A zero pivot is singular, not an error. */
+static PetscErrorCode FactorDense(HycoStiffness *f, Mat K, PetscBool *singular)
+{
+  const PetscScalar *k;
+  PetscInt n, lda;
+  PetscBLASInt info;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(K, &n, NULL));
+  if (f->n != n) {
+    PetscCall(PetscFree(f->lu));
+    PetscCall(PetscFree(f->ipiv));
+    PetscCall(PetscMalloc1((size_t)n * (size_t)n, &f->lu));
+    PetscCall(PetscMalloc1(n, &f->ipiv));
+    PetscCall(PetscBLASIntCast(n, &f->n));
+  }
+  PetscCall(MatDenseGetLDA(K, &lda));
+  PetscCall(MatDenseGetArrayRead(K, &k));
+  for (PetscInt j = 0; j < n; j++)
+    PetscCall(PetscArraycpy(f->lu + (size_t)j * (size_t)n, k + (size_t)j * (size_t)lda, n));
+  PetscCall(MatDenseRestoreArrayRead(K, &k));
+  LAPACKgetrf_(&f->n, &f->n, f->lu, &f->n, f->ipiv, &info);
+  *singular = (PetscBool)(info != 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FactorSparse(HycoSolver s, Mat Bt, Mat B, PetscReal S[], PetscBool *singular)
+{
+  HycoStiffness *f = &s->stiffness;
+  HycoSystem y = s->system;
+  PetscReal *unused = NULL; /* a kernel's Schur complement, where nobody asks for it */
+  PetscInt p;
+
+  PetscFunctionBegin;
+  if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
+  PetscCall(HycoDirectPinKernel(f->direct, y->K));
+  PetscCall(HycoDirectAnalyse(f->direct, y->K, Bt, B, y->symmetric, &f->bytes));
+  PetscCall(HycoKernelSize(y->K, &p));
+  if (!S) PetscCall(PetscMalloc1(p * p + 1, &unused));
+  PetscCall(HycoDirectFactor(f->direct, y->K, Bt, B, S ? S : unused, singular));
+  PetscCall(PetscFree(unused));
+  PetscCall(HycoNameLinear(s, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* n right-hand sides b and their solutions x, refined; low: what b could not hold, NULL where that is nothing. */
+static PetscErrorCode RefineDense(HycoSolver s, PetscInt n, const PetscReal b[], const PetscReal low[], PetscReal x[])
+{
+  const HycoStiffness *f = &s->stiffness;
+  const PetscScalar *K;
+  PetscInt lda;
+  PetscBLASInt ld;
+
+  PetscFunctionBegin;
+  PetscCall(MatDenseGetLDA(s->system->K, &lda));
+  PetscCall(PetscBLASIntCast(lda, &ld));
+  PetscCall(MatDenseGetArrayRead(s->system->K, &K));
+  for (PetscInt j = 0; j < n; j++)
+    PetscCall(HycoRefine(f->n, K, ld, f->lu, f->ipiv, b + (size_t)j * (size_t)f->n, low, x + (size_t)j * (size_t)f->n));
+  PetscCall(MatDenseRestoreArrayRead(s->system->K, &K));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* S = B X, each entry rounded once; symmetric where it should be. */
+static void RefineProduct(HycoSolver s, const PetscReal B[], const PetscReal X[], PetscReal S[])
+{
+  const size_t m = (size_t)s->system->m, n = (size_t)s->stiffness.n;
+
+  for (size_t j = 0; j < m; j++) {
+    for (size_t i = 0; i < m; i++) {
+      PetscReal sum[2] = {0, 0};
+
+      for (size_t k = 0; k < n; k++) HycoAddProduct(B[k * m + i], X[j * n + k], sum);
+      S[j * m + i] = sum[0] + sum[1];
+    }
+  }
+  for (size_t j = 0; j < m && s->system->symmetric; j++) {
+    for (size_t i = 0; i < j; i++) S[i * m + j] = S[j * m + i] = 0.5 * (S[i * m + j] + S[j * m + i]);
+  }
+}
+
+PetscErrorCode HycoStiffnessCondense(HycoSolver s, Mat Bt, Mat B, PetscReal S[])
+{
+  HycoStiffness *f = &s->stiffness;
+  const size_t entries = (size_t)f->n * (size_t)s->system->m;
+  const PetscScalar *b, *bt;
+  const PetscReal one = 1, zero = 0;
+  PetscBLASInt m, n = f->n, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(s->system->m, &m));
+  if (f->room < entries) {
+    PetscCall(PetscFree(f->X));
+    PetscCall(PetscMalloc1(entries, &f->X));
+    f->room = entries;
+  }
+  PetscCall(MatDenseGetArrayRead(Bt, &bt));
+  PetscCall(PetscArraycpy(f->X, bt, entries));
+  LAPACKgetrs_("N", &n, &m, f->lu, &n, f->ipiv, f->X, &n, &info);
+  if (f->refined) PetscCall(RefineDense(s, m, bt, NULL, f->X));
+  PetscCall(MatDenseRestoreArrayRead(Bt, &bt));
+  PetscCall(MatDenseGetArrayRead(B, &b));
+  if (f->refined)
+    RefineProduct(s, b, f->X, S);
+  else
+    BLASgemm_("N", "N", &m, &m, &n, &one, b, &m, f->X, &n, &zero, S, &m);
+  PetscCall(MatDenseRestoreArrayRead(B, &b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoStiffnessSolve(HycoSolver s, Vec r, Vec x)
+{
+  HycoStiffness *f = &s->stiffness;
+  const PetscScalar *b;
+  PetscScalar *v;
+  PetscBLASInt one = 1, info;
+
+  PetscFunctionBegin;
+  if (!f->lu) {
+    PetscCall(HycoDirectSolve(f->direct, r, x));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecCopy(r, x));
+  PetscCall(VecGetArray(x, &v));
+  LAPACKgetrs_("N", &f->n, &one, f->lu, &f->n, f->ipiv, v, &f->n, &info);
+  if (f->refined) {
+    PetscCall(VecGetArrayRead(r, &b));
+    PetscCall(RefineDense(s, 1, b, NULL, v));
+    PetscCall(VecRestoreArrayRead(r, &b));
+  }
+  PetscCall(VecRestoreArray(x, &v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoStiffnessRefine(HycoSolver s, const PetscReal L[], Vec x)
+{
+  HycoSystem y = s->system;
+  const size_t n = (size_t)s->stiffness.n;
+  const PetscScalar *F, *bt = NULL;
+  PetscScalar *v;
+  PetscReal *b, *low;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n, &b, n, &low));
+  PetscCall(MatDenseGetArrayRead(y->Bt, &bt));
+  PetscCall(VecGetArrayRead(y->F, &F));
+  for (size_t i = 0; i < n; i++) {
+    PetscReal sum[2] = {F[i], 0};
+
+    for (size_t k = 0; k < (size_t)y->m; k++) HycoAddProduct(-bt[k * n + i], L[k], sum);
+    b[i] = sum[0];
+    low[i] = sum[1];
+  }
+  PetscCall(VecRestoreArrayRead(y->F, &F));
+  PetscCall(MatDenseRestoreArrayRead(y->Bt, &bt));
+  PetscCall(VecGetArray(x, &v));
+  PetscCall(RefineDense(s, 1, b, low, v));
+  PetscCall(VecRestoreArray(x, &v));
+  PetscCall(PetscFree2(b, low));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoStiffnessCorrect(HycoSolver s, Vec L, Vec x)
+{
+  HycoSystem y = s->system;
+  Vec r, Kx;
+  PetscReal size, residual;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemWork(y));
+  r = y->work_x[0];
+  Kx = y->work_x[1];
+  PetscCall(VecNorm(y->F, NORM_2, &size));
+  if (L) {
+    PetscCall(MatMult(y->Bt, L, r));
+    PetscCall(VecAYPX(r, -1, y->F));
+  } else
+    PetscCall(VecCopy(y->F, r));
+  PetscCall(MatMult(y->K, x, Kx));
+  PetscCall(VecAXPY(r, -1, Kx));
+  PetscCall(VecNorm(r, NORM_2, &residual));
+  if (residual <= REFINE * size) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoStiffnessSolve(s, r, Kx));
+  PetscCall(VecAXPY(x, 1, Kx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoStiffnessFactor(HycoSolver s, Mat Bt, Mat B, PetscReal S[], PetscBool *singular)
+{
+  HycoStiffness *f = &s->stiffness;
+  Mat K = s->system->K;
+  PetscBool same, dense, dense_B = PETSC_TRUE;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  *singular = PETSC_FALSE;
+  PetscCall(HycoOperatorStateUpdate(&f->of, K, B, &same));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  f->of.K = 0; /* until it is done */
+  PetscCall(PetscObjectTypeCompare((PetscObject)K, MATSEQDENSE, &dense));
+  if (!dense)
+    HycoLogged(HYCO_EVENT_FACTOR, FactorSparse(s, Bt, B, S, singular));
+  else {
+    if (B) PetscCall(PetscObjectTypeCompare((PetscObject)B, MATSEQDENSE, &dense_B));
+    PetscCheck(dense_B, PETSC_COMM_SELF, PETSC_ERR_SUP, "a dense K needs a dense B");
+    HycoLogged(HYCO_EVENT_FACTOR, FactorDense(f, K, singular));
+    if (B && !*singular) HycoLogged(HYCO_EVENT_FACTOR, HycoStiffnessCondense(s, Bt, B, S));
+  }
+  if (!*singular) PetscCall(HycoOperatorStateUpdate(&f->of, K, B, &same));
+  s->seconds_factor += HycoNow() - begin;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
