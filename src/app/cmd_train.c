@@ -233,7 +233,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
   PetscCall(DriverSetSearch(&search, scene, reducer, n));
   if (greedy) PetscCall(DriverReadGreedy(scene, reducer, &training, &log));
-  PetscCall(DriverCheckLeftEarly(scene));
+  PetscCall(DriverCheckLeftEarly());
   if (greedy)
     PetscCall(HycoReducerRunGreedy(reducer, given ? samples : NULL, training, model, &t));
   else

@@ -28,7 +28,7 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
 PetscErrorCode DriverCheckLeft(void);
 /* The same before the solvers have run: what is meant for them (-hyco_mumps_..., -hyco_tao_... with that type) passes.
  */
-PetscErrorCode DriverCheckLeftEarly(HycoScene scene);
+PetscErrorCode DriverCheckLeftEarly(void);
 /* Declares -name and reads its value, "" when absent; the text is one of HycoOptionsString(). */
 PetscErrorCode DriverGet(const char name[], const char text[], char value[PETSC_MAX_PATH_LEN]);
 /* -scene, -model, -output, -report, -table, which several commands take; NULL: not read. */

@@ -58,14 +58,18 @@ static PetscErrorCode ReadMesh(HycoFOM f)
     sizes[0] = f->whole->n_nodes;
     sizes[1] = f->whole->n_cells;
     sizes[2] = f->pairs.n;
-    sizes[3] = f->pairs.master_start[f->pairs.n];
     sizes[4] = HycoPairsWidth(&f->pairs);
     sizes[5] = f->pairs.room > 0;
-    PetscCall(PetscMalloc1(2 * sizes[3], &both));
+    PetscCall(PetscMalloc1(2 * f->pairs.n * sizes[4], &both));
     for (PetscInt k = 0; k < f->pairs.n; k++) {
-      for (PetscInt j = f->pairs.master_start[k]; j < f->pairs.master_start[k + 1]; j++) {
-        both[2 * j] = f->pairs.slave[k];
-        both[2 * j + 1] = f->pairs.master[j];
+      const PetscInt *master;
+      const PetscReal *weight;
+      PetscInt n;
+
+      HycoPairsMasters(&f->pairs, k, &n, &master, &weight);
+      for (PetscInt j = 0; j < n; j++) {
+        both[2 * sizes[3]] = HycoPairsSlave(&f->pairs, k);
+        both[2 * sizes[3]++ + 1] = master[j];
       }
     }
   }

@@ -346,6 +346,8 @@ static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
   s->iterative = PETSC_FALSE;
   PetscCall(HycoSolverAcceptingForm(s, NULL, form, why));
   s->iterative = iterative;
+  if (!*form && !why[0])
+    HycoFormat(why, "the form %s does not serve this system; use -hyco_solver_form auto", s->form_name);
   PetscCheck(*form, HycoComm(s), PETSC_ERR_USER, "%s", why);
   PetscCall(HycoChooseLinear(s, form));
   PetscFunctionReturn(PETSC_SUCCESS);

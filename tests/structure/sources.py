@@ -58,6 +58,14 @@ class Sources(unittest.TestCase):
             names = re.findall(r'#include\s*[<"](\w+)\.h[>"]', text(path))
             self.assertEqual([n for n in names if n in above], [], name)
 
+    def test_types(self):
+        """Laws and discretisations of contact are known in their own folders alone; a scene knows the default one."""
+        for path in sources():
+            if os.sep + 'material' + os.sep not in path:
+                self.assertNotRegex(code(path), r'\b(young|poisson)\b', path)
+            if os.sep + 'contact' + os.sep not in path:
+                self.assertNotRegex(code(path), r'\bHYCO_CONTACT_(PAIR|SURFACE)\b', path)
+
     def test_options(self):
         """hyco -help lists what the code declares, once each; what is asked by name elsewhere is declared."""
         declared, asked = [], set()
