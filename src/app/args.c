@@ -62,10 +62,7 @@ static PetscErrorCode ListTakers(const char name[], char list[DRIVER_LINE])
     HycoOptionList own = {0};
 
     PetscCall(HycoOptionsRecord(&own, commands[c].declare));
-    if (HycoOptionListFind(&own, name)) {
-      PetscCall(PetscStrlcat(list, list[0] ? ", " : "", DRIVER_LINE));
-      PetscCall(PetscStrlcat(list, commands[c].name, DRIVER_LINE));
-    }
+    if (HycoOptionListFind(&own, name)) PetscCall(HycoListAdd(list, ", ", commands[c].name));
     PetscCall(HycoOptionListDestroy(&own));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -182,8 +182,8 @@ PetscErrorCode DeclareCompare(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, path, NULL, path, path));
-  PetscCall(DriverDeclarePoint());
-  PetscCall(DriverDeclareSamples());
+  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

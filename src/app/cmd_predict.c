@@ -299,8 +299,8 @@ PetscErrorCode DeclarePredict(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, path, path, path, path));
-  PetscCall(DriverDeclarePoint());
-  PetscCall(DriverDeclareSamples());
+  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
   PetscCall(ReadExtrapolate(&flag));
   PetscCall(DriverReadTarget(HYCO_ERROR_U, &target));
   PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &target));

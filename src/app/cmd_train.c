@@ -187,7 +187,7 @@ PetscErrorCode DeclareTrain(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, path, NULL, path, path));
-  PetscCall(DriverDeclareSamples());
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
   PetscCall(ReadGreedy(&greedy));
   PetscCall(DriverReadGreedy(NULL, NULL, &none, &log));
   PetscCall(DriverReadTargets(&search));

@@ -58,14 +58,18 @@ static PetscErrorCode ReadMesh(HycoFOM f)
     sizes[0] = f->whole->n_nodes;
     sizes[1] = f->whole->n_cells;
     sizes[2] = f->pairs.n;
-    sizes[3] = f->pairs.master_start[f->pairs.n];
     sizes[4] = HycoPairsWidth(&f->pairs);
     sizes[5] = f->pairs.room > 0;
-    PetscCall(PetscMalloc1(2 * sizes[3], &both));
+    PetscCall(PetscMalloc1(2 * f->pairs.n * sizes[4], &both));
     for (PetscInt k = 0; k < f->pairs.n; k++) {
-      for (PetscInt j = f->pairs.master_start[k]; j < f->pairs.master_start[k + 1]; j++) {
-        both[2 * j] = f->pairs.slave[k];
-        both[2 * j + 1] = f->pairs.master[j];
+      const PetscInt *master;
+      const PetscReal *weight;
+      PetscInt n;
+
+      HycoPairsMasters(&f->pairs, k, &n, &master, &weight);
+      for (PetscInt j = 0; j < n; j++) {
+        both[2 * sizes[3]] = HycoPairsSlave(&f->pairs, k);
+        both[2 * sizes[3]++ + 1] = master[j];
       }
     }
   }
@@ -390,6 +394,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscCall(HycoFOMGather(f));
   t->total = HycoNow() - begin;
   f->solved = PETSC_TRUE;
+  PetscCall(HycoFOMViewFromOptions(f, NULL, "-hyco_fom_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -556,16 +561,12 @@ PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)f, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%d nodes, %d cells, %d contacts, on %d ranks\n", (int)f->n_nodes,
+                                   (int)f->n_cells, (int)f->n_contacts, (int)f->size));
   PetscCall(HycoSystemView(f->system, viewer));
   PetscCall(HycoSolverView(f->solver, viewer));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFOMViewFromOptions(HycoFOM object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_FOM_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoFOM, HYCO_FOM_CLASSID)

@@ -380,6 +380,7 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
     PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s.snapshots", path));
   PetscCall(HycoSnapshotsOpen(HycoComm(t), t->scene, folder, store));
   t->fingerprint = (*store)->fingerprint;
+  PetscCall(HycoReducerViewFromOptions(t, NULL, "-hyco_reducer_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

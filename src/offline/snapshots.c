@@ -410,14 +410,9 @@ PetscErrorCode HycoSnapshotsView(HycoSnapshots s, PetscViewer viewer)
   PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscViewerASCIIPrintf(viewer, "folder: %s\n", s->folder));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "of the scene and mesh with fingerprint %016llx\n", s->fingerprint));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSnapshotsViewFromOptions(HycoSnapshots object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_SNAPSHOTS_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoSnapshots, HYCO_SNAPSHOTS_CLASSID)

@@ -38,7 +38,7 @@ PetscErrorCode HycoROMSetFromOptions(HycoROM m)
                             "of (41): Lawson and Hanson's active set, or TAO's bnls; auto: TAO where the active set "
                             "stops short",
                             HycoReconstructSolvers, &m->reconstruct_solver, NULL));
-  PetscCall(HycoOptionsName("-hyco_rom_view", "what is in a model, when it is set up"));
+  PetscCall(HycoOptionsName("-hyco_rom_view", "what is in a model, when it is loaded"));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -471,10 +471,4 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMViewFromOptions(HycoROM object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_ROM_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoROM, HYCO_ROM_CLASSID)

@@ -570,6 +570,7 @@ PetscErrorCode HycoROMLoad(const char path[], HycoROM *model)
   PetscCall(ierr);
   PetscCall(PetscObjectSetOptions((PetscObject)m, m->scene->options));
   PetscCall(HycoROMSetFromOptions(m));
+  PetscCall(HycoROMViewFromOptions(m, NULL, "-hyco_rom_view"));
   *model = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -438,6 +438,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   s->start_set = NULL;
   s->seconds_solve = HycoNow() - begin - (s->seconds_factor - s->seconds_before);
   s->seconds_before = 0;
+  PetscCall(HycoSolverViewFromOptions(s, NULL, "-hyco_solver_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -558,9 +559,18 @@ PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s\n", HycoSolverTypes[s->type]));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g\n", (double)s->rtol));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "solves with K: %s\n", HycoLinearNames[s->linear]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s%s%s; form: %s\n", HycoSolverTypes[s->type],
+                                   s->type == HYCO_TYPE_TAO ? ", " : "",
+                                   s->type != HYCO_TYPE_TAO ? ""
+                                   : s->tao_type < 0        ? "by the system"
+                                                            : HycoTaoTypes[s->tao_type],
+                                   forms[s->form]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g; iterations: at most %d%s\n",
+                                   (double)s->rtol, (int)s->max_its, s->max_its ? "" : " (by the number of contacts)"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "solves with K: %s\n",
+                                   s->linear_method[0] ? s->linear_method : HycoLinearNames[s->linear]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "fallback: %s; warm start: %s; start from coarser problems: %s\n",
+                                   s->fallback ? "yes" : "no", s->warm ? "yes" : "no", s->multilevel ? "yes" : "no"));
   if (s->reason) {
     PetscCall(PetscViewerASCIIPrintf(viewer, "last solve: %s, %s, %d iterations, largest residual %.1e\n",
                                      HycoReasonName(s->reason), s->method, (int)s->its, (double)HycoKKTMax(&s->kkt)));
@@ -569,10 +579,4 @@ PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolverViewFromOptions(HycoSolver object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_SOLVER_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoSolver, HYCO_SOLVER_CLASSID)
