@@ -25,8 +25,8 @@ typedef enum {
 
 /*
   Makes a form available to solvers that are created from then on: by -hyco_solver_form name, or left to itself where it
-  is the cheapest that accepts a system. `create` fills in the form's operations and data (private headers). A complementarity
-  method is added by TaoRegister() instead, and chosen by HycoSolverSetTaoType(). Not collective.
+  is the cheapest that accepts a system. `create` fills in the form's operations and data (private headers). A
+  complementarity method is added by TaoRegister() instead, and chosen by HycoSolverSetTaoType(). Not collective.
 */
 typedef struct _n_HycoSolverForm *HycoSolverForm;
 typedef PetscErrorCode (*HycoSolverFormCreate)(HycoSolver solver, HycoSolverForm form);

@@ -24,7 +24,8 @@ typedef struct {
 
 /* hyco's classes are PETSc's objects: reference counts, names, options prefixes, composed data, PetscObjectView(). */
 PETSC_EXTERN PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_CLASSID, HYCO_SOLVER_CLASSID,
-    HYCO_FOM_CLASSID, HYCO_SNAPSHOTS_CLASSID, HYCO_REDUCER_CLASSID, HYCO_ROM_CLASSID, HYCO_MATERIAL_CLASSID, HYCO_CONTACT_CLASSID;
+    HYCO_FOM_CLASSID, HYCO_SNAPSHOTS_CLASSID, HYCO_REDUCER_CLASSID, HYCO_ROM_CLASSID, HYCO_MATERIAL_CLASSID,
+    HYCO_CONTACT_CLASSID;
 
 /* Registers the classes; whatever makes an object calls it. Not collective. */
 PetscErrorCode HycoInitializePackage(void);

@@ -168,6 +168,12 @@ void HycoPointEnd(void *before);
 /* Makes BLAS take its memory once, or fails: where OpenBLAS finds none, it looks for ever. On this process alone. */
 PetscErrorCode HycoReserveBLAS(void);
 
+/* lost / size; 0/0 counts as 0, x/0 is PETSC_INFINITY. */
+static inline PetscReal HycoRelative(PetscReal lost, PetscReal size)
+{
+  return size > 0 ? lost / size : lost > 0 ? PETSC_INFINITY : 0;
+}
+
 /* Seconds since the first call, on this rank's clock. */
 PetscReal HycoNow(void);
 

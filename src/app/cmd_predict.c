@@ -57,7 +57,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
 
   PetscFunctionBegin;
   PetscCall(ReportCreate("predict", scene, mu, &json));
-  cJSON_AddStringToObject(json, "model_type", HycoROMTypes[p->type]);
+  cJSON_AddStringToObject(json, "model_type", p->type);
   cJSON_AddNumberToObject(json, "n_dof", p->n_dof);
   cJSON_AddNumberToObject(json, "n_multipliers", p->n_multipliers);
   cJSON_AddNumberToObject(json, "n_contacts", p->n_all_contacts); /* as hyco solve counts them */
@@ -80,7 +80,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   ReportTrust(json, p);
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
-  if (p->type == HYCO_ROM_CONDENSED) {
+  if (p->gives_forces) {
     Estimate(json, "interpolation_error", p->interpolation_error);
     cJSON_AddBoolToObject(json, "full_displacement", whole && !fallback[0]);
   }
@@ -93,15 +93,15 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
 static PetscErrorCode SayReduced(const HycoPrediction *p)
 {
   PetscFunctionBegin;
-  if (p->type == HYCO_ROM_PROJECTION)
-    PetscCall(Say("projection-based: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n",
-                  (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements));
-  else if (p->type == HYCO_ROM_CONDENSED)
-    PetscCall(Say("condensed: %d contacts, %d modes\n", (int)p->n_contacts, (int)p->n_modes));
-  else
+  if (p->gives_forces)
+    PetscCall(Say("%s: %d contacts, %d modes\n", p->title, (int)p->n_contacts, (int)p->n_modes));
+  else if (p->n_fe_dofs || p->rid_fraction < 1)
     PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
                   (int)p->n_modes, (int)p->n_fe_dofs, (int)p->n_contacts, (int)p->rid_elements,
                   100 * (double)p->rid_fraction));
+  else
+    PetscCall(Say("%s: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n", p->title,
+                  (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

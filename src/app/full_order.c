@@ -32,15 +32,17 @@ PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target)
 PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback *f)
 {
   HycoROMType type;
+  PetscBool forces;
   char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
   PetscCall(HycoROMGetFallback(model, &f->on, &f->displacement));
   PetscCall(HycoROMGetType(model, &type));
-  HycoCheck(!f->displacement || type == HYCO_ROM_CONDENSED,
+  PetscCall(HycoROMGivesForces(model, &forces));
+  HycoCheck(!f->displacement || forces,
             "-hyco_full_displacement takes the contact forces of a condensed model, and this one is %s: its forces are "
             "not good enough for that; take -hyco_fallback",
-            HycoROMTypes[type]);
+            type);
   PetscCall(DriverReadTarget(HYCO_ERROR_U, &f->target_u));
   PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &f->target_lambda));
   PetscCall(DriverReadFiles(path, NULL, NULL, NULL, NULL));
@@ -48,7 +50,7 @@ PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback
             "-target_u and -target_lambda say when hyco predict solves full order instead: give -hyco_fallback too");
   HycoCheck(f->on || f->displacement || !path[0],
             "hyco predict needs no -scene but with -hyco_fallback, which solves full order on it%s",
-            type == HYCO_ROM_CONDENSED ? ", or -hyco_full_displacement" : "");
+            forces ? ", or -hyco_full_displacement" : "");
   if (!f->on && !f->displacement) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(path[0], "%s: give its -scene too",
             f->on ? "-hyco_fallback solves full order where the reduced model is not enough"

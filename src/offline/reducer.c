@@ -1,5 +1,5 @@
 /* HycoReducer: made, configured, destroyed. */
-#include <hycoreducerimpl.h>
+#include <hycoprojection.h>
 #include <string.h>
 
 const char *const HycoHybrids[] = {"auto", "rank", "contact", "all", NULL};
@@ -13,18 +13,42 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
                               HycoReducerDestroy, HycoReducerView));
   PetscCallMPI(MPI_Comm_rank(HycoComm(t), &t->rank));
   t->noise = 1e-11;
-  t->nnmf_max_its = 100;
-  t->condensed_tol = 1e-7;
-  t->condensed_pod_tol = 1e-14;
-  t->condensed_max_values = 24;
   t->greedy.target = 1e-3;
-  t->ridge = -1;
   t->n_validation = -1;
   t->search = PETSC_TRUE;
   t->budget = -1;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *reducer = t;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Its options and all that it has made. */
+static PetscErrorCode EndTraining(HycoReducer t)
+{
+  PetscFunctionBegin;
+  if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
+  PetscCall(PetscFree(t->training));
+  PetscCall(HycoROMDestroy(&t->prototype));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
+{
+  PetscBool same = PETSC_FALSE;
+  HycoROM type;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (t->prototype) PetscCall(PetscObjectTypeCompare((PetscObject)t->prototype, name, &same));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMCreate(&type));
+  ierr = HycoROMSetType(type, name);
+  if (ierr) (void)!HycoROMDestroy(&type);
+  PetscCall(ierr);
+  PetscCall(EndTraining(t));
+  t->prototype = type;
+  if (type->ops->setfromoptions) PetscCall((*type->ops->setfromoptions)(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -36,6 +60,7 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
   PetscCall(PetscObjectSetOptions((PetscObject)*reducer, scene->options));
+  PetscCall(HycoReducerSetType(*reducer, HYCO_ROM_HYBRID));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -43,14 +68,13 @@ PetscErrorCode HycoReducerReset(HycoReducer t)
 {
   PetscFunctionBegin;
   PetscCall(HycoReducerResetBases(t));
-  PetscCall(HycoReducerResetSurfaces(t));
+  if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
   PetscCall(HycoFEDestroy(&t->fe));
   PetscCall(HycoPairsDestroy(&t->pairs));
   PetscCall(HycoMetDestroy(&t->met));
   PetscCall(HycoMeshDestroy(&t->whole));
   PetscCall(PetscFree(t->grown));
   PetscCall(HycoSamplesDestroy(&t->held));
-  PetscCall(HycoCondensedDestroy(&t->condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -62,11 +86,7 @@ PetscErrorCode HycoReducerDropBases(HycoReducer t)
   PetscCall(PetscFree(t->sigma));
   PetscCall(PetscFree(t->V_whole));
   PetscCall(PetscFree(t->VtU));
-  PetscCall(PetscFree(t->responses.Q));
-  PetscCall(PetscFree(t->responses.scale));
-  PetscCall(PetscFree(t->responses.C));
-  t->responses.missed = 0;
-  t->n_seeds_node = t->n_seeds_cell = t->n_supremizers = 0;
+  t->n_seeds_node = t->n_seeds_cell = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -98,6 +118,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   HycoDereference(reducer);
   t = *reducer;
   PetscCall(HycoReducerReset(t));
+  PetscCall(EndTraining(t));
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
   PetscCall(PetscFree(t->region));
   PetscCall(HycoSceneDestroy(&t->scene));
@@ -117,7 +138,7 @@ PetscErrorCode HycoReducerChooses(HycoReducer t, PetscBool *chooses)
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  *chooses = (PetscBool)(t->type == HYCO_ROM_CONDENSED);
+  *chooses = (PetscBool)(t->prototype->ops->choosepoints != NULL);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -213,9 +234,12 @@ PetscErrorCode HycoReducerSetGreedyStop(HycoReducer t, PetscReal target, PetscIn
 static PetscErrorCode ReadTraining(HycoReducer t)
 {
   static const char *const indicators[] = {"local", "penetration", NULL};
-  PetscInt type = (PetscInt)t->type, indicator = (PetscInt)t->greedy.indicator;
+  PetscInt type = 0, indicator = (PetscInt)t->greedy.indicator;
+  const char **types;
 
   PetscFunctionBegin;
+  PetscCall(HycoROMTypeNames(&types));
+  while (types[type] && strcmp(types[type], t->prototype ? t->prototype->type : HYCO_ROM_HYBRID)) type++;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor(""));
   PetscCall(HycoOptionsString("-hyco_snapshots", "<folder> where full-order solutions are stored [MODEL.snapshots]",
@@ -224,7 +248,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
       HycoOptionsWord("-hyco_model_type",
                       "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh; condensed on "
                       "the contact forces",
-                      HycoROMTypes, &type, &t->pinned[HYCO_CHOICE_TYPE]));
+                      types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
   PetscCall(HycoOptionsReal("-hyco_pod_tol", "energy left out of the displacement basis, the epsilon of (18)", 0, 1,
                             &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));
   PetscCall(HycoOptionsReal("-hyco_pod_noise", "singular values below this share of the first are noise", 0, 1,
@@ -256,7 +280,9 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscCall(HycoOptionsBool("-hyco_keep_singular", "keep a model whose reduced stiffness is singular inside the ranges",
                             &t->keep_singular, NULL));
   PetscOptionsEnd();
-  t->type = (HycoROMType)type;
+  PetscCall(EndTraining(t)); /* its options may have changed */
+  PetscCall(HycoReducerSetType(t, types[type]));
+  PetscCall(PetscFree(types));
   t->greedy.indicator = (HycoIndicatorKind)indicator;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -338,26 +364,17 @@ static PetscErrorCode ReadRID(HycoReducer t)
   PetscCall(HycoOptionsWord("-hyco_hybrid",
                             "displacements kept full order: fewest for full row rank, all contact ones, all",
                             HycoHybrids, &hybrid, &t->pinned[HYCO_CHOICE_HYBRID]));
-  PetscCall(HycoOptionsInt("-hyco_hybrid_trials",
-                           "candidate sets judged by their training error when hybrid is rank (0: from the size)", 0,
-                           PETSC_MAX_INT / 8, &t->trials, NULL));
-  PetscCall(
-      HycoOptionsReal("-hyco_hybrid_ridge",
-                      "of the interface's regression when hybrid is all (-1: by the training error; 0: plain least "
-                      "squares)",
-                      -1, 1, &t->ridge, NULL));
   PetscOptionsEnd();
   t->hybrid = (HycoHybrid)hybrid;
   PetscCall(TakeRegion(t, region));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The baseline models: their force bases and interpolation. A projection-based model takes the whole mesh, so nothing
-   seeds an RID. */
-static PetscErrorCode ReadBaselines(HycoReducer t)
+/* What the type decides: one without a basis of forces of its own has no other; one whose RID is the whole mesh has
+   nothing that seeds it. */
+static PetscErrorCode CheckType(HycoReducer t)
 {
   PetscInt dual = 0;
-  PetscBool set;
 
   PetscFunctionBegin;
   PetscObjectOptionsBegin((PetscObject)t);
@@ -365,35 +382,12 @@ static PetscErrorCode ReadBaselines(HycoReducer t)
   PetscCall(HycoOptionsWord("-hyco_dual",
                             "forces: of the finite elements (hybrid); factorised dual snapshots, or they themselves "
                             "(projection) [fe; nnmf if projection]",
-                            HycoDuals, &dual, &set));
-  PetscCall(HycoOptionsFor("projection"));
-  PetscCall(HycoOptionsInt("-hyco_nnmf_vectors",
-                           "vectors of the nonnegative factorisation (0: as many as displacement modes)", 0,
-                           PETSC_MAX_INT, &t->nnmf_vectors, NULL));
-  PetscCall(HycoOptionsInt("-hyco_nnmf_max_its", "alternations of the nonnegative factorisation", 1, PETSC_MAX_INT,
-                           &t->nnmf_max_its, NULL));
-  PetscCall(HycoOptionsFor("condensed"));
-  PetscCall(HycoOptionsReal("-hyco_condensed_pod_tol",
-                            "condensed: energy that its displacement modes may leave out, unless -hyco_pod_tol is "
-                            "smaller",
-                            0, 1, &t->condensed_pod_tol, NULL));
-  PetscCall(HycoOptionsFor("condensed where no points are given"));
-  PetscCall(HycoOptionsReal("-hyco_condensed_tol",
-                            "condensed, no points given: add values until the forces' error, one value left out, is no "
-                            "larger",
-                            0, 1, &t->condensed_tol, NULL));
-  PetscCall(HycoOptionsInt("-hyco_condensed_max_values",
-                           "condensed, no points given: at most so many values per parameter", 3, 1000,
-                           &t->condensed_max_values, NULL));
+                            HycoDuals, &dual, NULL));
   PetscOptionsEnd();
-  t->dual = (HycoDual)dual;
-  HycoCheckModel(t->type == HYCO_ROM_PROJECTION || t->dual == HYCO_DUAL_FE,
+  HycoCheckModel(t->prototype->traits.force_basis || dual == HYCO_DUAL_FE,
                  "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
                  HycoDuals[dual]);
-  if (t->type != HYCO_ROM_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckModel(t->dual != HYCO_DUAL_FE || !set,
-                 "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
-  if (t->dual == HYCO_DUAL_FE) t->dual = HYCO_DUAL_NNMF;
+  if (!t->prototype->traits.whole) PetscFunctionReturn(PETSC_SUCCESS);
   t->whole_rid = PETSC_TRUE;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -405,7 +399,20 @@ PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(ReadTraining(t));
   PetscCall(ReadRID(t));
-  PetscCall(ReadBaselines(t));
+  PetscCall(CheckType(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Its options and those of all types. */
+static PetscErrorCode DeclareAll(HycoReducer t)
+{
+  const char **types;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerSetFromOptions(t));
+  PetscCall(HycoROMTypeNames(&types));
+  for (PetscInt k = 0; types[k]; k++) PetscCall(HycoReducerSetType(t, types[k]));
+  PetscCall(PetscFree(types));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -415,7 +422,7 @@ PetscErrorCode HycoReducerDeclare(PetscOptions options)
 
   PetscFunctionBegin;
   PetscCall(Create(PETSC_COMM_SELF, &t));
-  HycoDeclare(t, options, HycoReducerSetFromOptions, HycoReducerDestroy);
+  HycoDeclare(t, options, DeclareAll, HycoReducerDestroy);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -423,7 +430,7 @@ PetscErrorCode HycoReducerGetType(HycoReducer t, HycoROMType *type)
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  *type = t->type;
+  *type = t->prototype->type;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -437,7 +444,7 @@ PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)t, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  recipe = (HycoRecipe){t->type, t->tol[HYCO_SEED_DISPLACEMENT], t->extension, t->layers, t->hybrid, t->whole_rid};
+  HycoReducerGetRecipe(t, &recipe);
   HycoRecipeDescribe(&recipe, sizeof(text), text);
   PetscCall(PetscViewerASCIIPrintf(viewer, "settings: %s%s\n", text, t->search ? "; searched where not given" : ""));
   PetscCall(PetscViewerASCIIPrintf(viewer, "snapshots: %s\n", t->folder[0] ? t->folder : "beside the model"));

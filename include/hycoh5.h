@@ -3,13 +3,22 @@
 #ifndef HYCOH5_H
 #define HYCOH5_H
 
-#include <hycoimpl.h>
+#include <hycosys.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
 
 typedef struct _n_HycoH5 *HycoH5;
 
 /* Begins a file in memory; HycoH5Close(commit) writes it and gives it its name (hycofile.h), HycoH5Close(no commit)
    forgets it. */
 PetscErrorCode HycoH5Create(const char path[], HycoH5 *file);
+/* The same without a file: HycoH5GetImage() gives its bytes (the caller frees them by PetscFree()), HycoH5OpenImage()
+   opens such bytes, which must outlive it. `name`: what messages call it. */
+PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file);
+PetscErrorCode HycoH5GetImage(HycoH5 file, void **image, size_t *size);
+PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, HycoH5 *file);
 /* Opens for reading: refused where a seal does not match, or has been lost. */
 PetscErrorCode HycoH5Open(const char path[], HycoH5 *file);
 /* The same; where the file is damaged, the complaint ends with the remedy. */
@@ -38,4 +47,7 @@ PetscErrorCode HycoH5ReadRows(HycoH5 file, const char name[], PetscInt start, Pe
                               PetscReal *data);
 PetscErrorCode HycoH5LoadText(HycoH5 file, const char name[], char **text);
 
+#if defined(__cplusplus)
+}
+#endif
 #endif

@@ -9,7 +9,6 @@
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
 #include <hycolcp.h>
-#include <hycoreducerimpl.h>
 
 #define SAMPLES        480 /* points where the forces are sampled: half all over, half where contacts close or open */
 #define WAYS           16  /* on so many ways between points */
@@ -22,9 +21,9 @@
 #define MOST_RESPONSES 5e7     /* numbers of all responses: 400 MB */
 #define SMALL          1e-2
 
-PetscReal HycoReducerModesTolerance(HycoReducer t)
+PetscReal HycoCondensedModesTolerance(HycoReducer t)
 {
-  return PetscMin(t->condensed_pod_tol, t->tol[HYCO_SEED_DISPLACEMENT]);
+  return PetscMin(Condensing(t)->pod_tol, t->tol[HYCO_SEED_DISPLACEMENT]);
 }
 
 /* Halton's sequence in base b. */
@@ -59,7 +58,7 @@ static PetscInt Corners(HycoCondensed c)
    points all over. */
 static void SamplePoint(HycoReducer t, PetscInt number, PetscReal mu[])
 {
-  const HycoCondensed c = t->condensed;
+  const HycoCondensed c = Condensing(t)->condensed;
   PetscInt base = 1;
 
   for (PetscInt p = 0; p < c->dim; p++) {
@@ -130,7 +129,7 @@ typedef struct {
    kind as long as a set stays, so that sets are what the patterns need, and many may pass in a small part of a way. */
 static void PointBetween(HycoReducer t, PetscInt k, Way way[], PetscInt *n_ways, PetscReal mu[])
 {
-  const PetscInt dim = t->condensed->dim;
+  const PetscInt dim = Condensing(t)->condensed->dim;
   PetscInt best = 0;
 
   for (PetscInt j = 1; j < *n_ways; j++) best = way[j].differ > way[best].differ ? j : best;
@@ -147,7 +146,7 @@ static void PointBetween(HycoReducer t, PetscInt k, Way way[], PetscInt *n_ways,
 /* The largest training force. */
 static PetscReal Largest(HycoReducer t)
 {
-  const size_t n = (size_t)t->n_s * (size_t)t->condensed->m;
+  const size_t n = (size_t)t->n_s * (size_t)Condensing(t)->condensed->m;
   PetscReal largest = 0;
 
   for (size_t i = 0; i < n; i++) largest = PetscMax(largest, t->Lambda[i]);
@@ -157,7 +156,7 @@ static PetscReal Largest(HycoReducer t)
 /* n samples: their points (n x dim) and forces (m x n). */
 static PetscErrorCode SampleAll(HycoReducer t, PetscInt n, PetscReal mu[], PetscReal L[])
 {
-  HycoCondensed c = t->condensed;
+  HycoCondensed c = Condensing(t)->condensed;
   const PetscInt dim = c->dim, m = c->m;
   const PetscReal least = ACTIVE * Largest(t);
   PetscInt n_ways = 0;
@@ -203,8 +202,9 @@ static PetscReal Missed(const HycoResponses *x, PetscInt m, PetscReal L[])
 /* Patterns of n forces (m x n), scaled so that all the samples count as the snapshots do. Rank 0. */
 static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
 {
-  HycoResponses *x = &t->responses;
-  const PetscInt m = t->condensed->m, nodes = HycoTensorSize(&t->condensed->field[HYCO_FIELD_G].tensor);
+  HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt m = Condensing(t)->condensed->m,
+                 nodes = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
   const PetscReal most = MOST_RESPONSES / ((PetscReal)(t->sizes[0] * t->sizes[3]) * (PetscReal)nodes);
   PetscReal *sigma;
   const PetscScalar *v;
@@ -213,8 +213,8 @@ static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(PetscMax(m, n), &sigma));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, L, &F));
-  PetscCall(
-      HycoPOD(F, HycoReducerModesTolerance(t), t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q, sigma));
+  PetscCall(HycoPOD(F, HycoCondensedModesTolerance(t), t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
+                    sigma));
   PetscCall(MatDestroy(&F));
   PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &x->Q));
   PetscCall(PetscMalloc1(x->q + 1, &x->scale));
@@ -233,7 +233,7 @@ static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
    largest: no less than SHARE of them do. */
 static PetscErrorCode JudgePatterns(HycoReducer t, PetscInt n, const PetscReal mu[], PetscReal L[])
 {
-  HycoCondensed c = t->condensed;
+  HycoCondensed c = Condensing(t)->condensed;
   PetscReal largest = 0, *missed;
   PetscInt n_held = 0;
 
@@ -244,17 +244,18 @@ static PetscErrorCode JudgePatterns(HycoReducer t, PetscInt n, const PetscReal m
     const PetscReal near = t->U_norm[c->sample[HycoCondensedNearest(c, mu + k * c->dim, NULL)]];
 
     if (!Held(c, k)) continue;
-    missed[n_held++] = Missed(&t->responses, c->m, L + (size_t)k * (size_t)c->m) / PetscMax(near, SMALL * largest);
+    missed[n_held++] =
+        Missed(&Condensing(t)->responses, c->m, L + (size_t)k * (size_t)c->m) / PetscMax(near, SMALL * largest);
   }
   PetscCall(PetscSortReal(n_held, missed));
-  t->responses.missed = n_held ? missed[(PetscInt)(SHARE * (PetscReal)(n_held - 1))] : 0;
+  Condensing(t)->responses.missed = n_held ? missed[(PetscInt)(SHARE * (PetscReal)(n_held - 1))] : 0;
   PetscCall(PetscFree(missed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode FindPatterns(HycoReducer t)
 {
-  HycoCondensed c = t->condensed;
+  HycoCondensed c = Condensing(t)->condensed;
   const size_t m = (size_t)c->m;
   const PetscReal share = PetscSqr((PetscReal)FREE_CONTACTS / (PetscReal)m);
   const PetscInt n = c->m <= FREE_CONTACTS ? SAMPLES : PetscMax(LEAST_SAMPLES, (PetscInt)(share * SAMPLES));
@@ -262,7 +263,7 @@ static PetscErrorCode FindPatterns(HycoReducer t)
   PetscInt n_used = t->n_s;
 
   PetscFunctionBegin;
-  PetscCall(HycoReducerFillFields(t, PETSC_FALSE));
+  PetscCall(HycoCondensedFillFields(t, PETSC_FALSE));
   PetscCall(PetscMalloc3(n * c->dim, &mu, m * (size_t)n, &L, m * (size_t)(t->n_s + n), &used));
   PetscCall(SampleAll(t, n, mu, L));
   PetscCall(PetscArraycpy(used, t->Lambda, m * (size_t)t->n_s));
@@ -278,8 +279,8 @@ static PetscErrorCode FindPatterns(HycoReducer t)
 /* The patterns on every rank. */
 static PetscErrorCode SpreadPatterns(HycoReducer t)
 {
-  HycoResponses *x = &t->responses;
-  const PetscInt m = t->condensed->m;
+  HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt m = Condensing(t)->condensed->m;
   PetscMPIInt size;
 
   PetscFunctionBegin;
@@ -298,8 +299,9 @@ static PetscErrorCode SpreadPatterns(HycoReducer t)
 /* Snapshots and responses, side by side. */
 static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
 {
-  HycoResponses *x = &t->responses;
-  const PetscInt m = t->condensed->m, nodes = HycoTensorSize(&t->condensed->field[HYCO_FIELD_G].tensor);
+  HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt m = Condensing(t)->condensed->m,
+                 nodes = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
   PetscInt lo, hi, lda[2];
   PetscReal *P;
   const PetscScalar *from;
@@ -325,7 +327,7 @@ static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
   for (PetscInt j = 0; j < x->q; j++) {
     for (PetscInt i = 0; i < m; i++) P[j * m + i] = x->scale[j] * x->Q[j * m + i];
   }
-  PetscCall(HycoReducerResponses(t, store, x->q, P, *columns, t->n_s));
+  PetscCall(HycoCondensedResponses(t, store, x->q, P, *columns, t->n_s));
   PetscCall(PetscFree(P));
   PetscCall(MatAssemblyBegin(*columns, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(*columns, MAT_FINAL_ASSEMBLY));
@@ -335,12 +337,12 @@ static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
 /* l, sigma, V_whole and VtU from all r modes V. */
 static PetscErrorCode TakeModes(HycoReducer t, Mat V, PetscInt n_sigma, PetscReal sigma[])
 {
-  HycoResponses *x = &t->responses;
+  HycoResponses *x = &Condensing(t)->responses;
   const PetscInt N = t->sizes[0] * t->sizes[3];
 
   PetscFunctionBegin;
-  t->l = HycoPODRank(n_sigma, sigma, HycoReducerModesTolerance(t), t->noise, t->max_modes);
-  HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoReducerModesTolerance(t));
+  t->l = HycoPODRank(n_sigma, sigma, HycoCondensedModesTolerance(t), t->noise, t->max_modes);
+  HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoCondensedModesTolerance(t));
   PetscCall(PetscFree(t->sigma));
   t->sigma = sigma;
   PetscCall(PetscFree(t->VtU));
@@ -354,13 +356,14 @@ static PetscErrorCode TakeModes(HycoReducer t, Mat V, PetscInt n_sigma, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerFindModes(HycoReducer t, HycoSnapshots store)
+PetscErrorCode HycoCondensedFindModes(HycoReducer t, HycoSnapshots store)
 {
-  HycoResponses *x = &t->responses;
+  HycoResponses *x = &Condensing(t)->responses;
   PetscReal *sigma;
   Mat S, V;
 
   PetscFunctionBegin;
+  PetscCall(HycoCondensedFlexibilities(t, store));
   PetscCall(SpreadPatterns(t));
   PetscCall(Columns(t, store, &S));
   PetscCall(PetscMalloc1(x->n_columns + 1, &sigma));

@@ -4,7 +4,6 @@
   or there is no table and predictions assemble.
 */
 #include <hycotable.h>
-#include <hycoreducerimpl.h>
 
 #define MOST     5       /* values of one parameter */
 #define ENTRIES  5000000 /* numbers in the table: 40 MB */
@@ -18,7 +17,7 @@ static PetscErrorCode Sample(HycoROM m, const PetscReal mu[], PetscInt entries, 
   PetscInt n;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMAssemble(m, mu));
+  PetscCall(HycoGalerkinAssemble(m, mu));
   PetscCall(HycoReducedEntries(m, &n, &a));
   PetscCheck(n == entries, PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d entries instead of %d", (int)n, (int)entries);
   PetscCall(PetscArraycpy(value, a, n));
@@ -110,8 +109,9 @@ static PetscErrorCode CountValues(HycoROM m, PetscInt p, PetscInt entries, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerTabulate(HycoROM m, const PetscBool reaches[])
+PetscErrorCode HycoGalerkinTabulate(HycoROM m, const PetscBool reaches[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const HycoScene s = m->scene;
   PetscInt n[HYCO_MAX_PARAMETERS], nodes = 1, entries, varying = 0;
   PetscScalar *a;
@@ -126,7 +126,7 @@ PetscErrorCode HycoReducerTabulate(HycoROM m, const PetscBool reaches[])
     mu[p] = (s->lo[p] + s->hi[p]) / 2;
   }
   if (!varying || PetscPowInt(2, (int)varying) > HYCO_TABLE_NODES) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoROMAssemble(m, mu));
+  PetscCall(HycoGalerkinAssemble(m, mu));
   PetscCall(HycoReducedEntries(m, &entries, &a));
   for (PetscInt p = 0; p < s->n_parameters && nodes; p++) {
     if (reaches[p]) PetscCall(CountValues(m, p, entries, &n[p]));
@@ -137,7 +137,7 @@ PetscErrorCode HycoReducerTabulate(HycoROM m, const PetscBool reaches[])
   PetscCall(Try(m, n, entries, -1, &table, &holds)); /* while the model has none, it assembles */
   if (holds) PetscCall(HycoTableKeepPattern(m, table));
   if (holds)
-    m->table = table;
+    g->table = table;
   else
     PetscCall(HycoTableDestroy(&table));
   PetscFunctionReturn(PETSC_SUCCESS);

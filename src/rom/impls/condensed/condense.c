@@ -5,8 +5,6 @@
   V^T U = a - H L.
 */
 #include <hycocondensed.h>
-#include <hycoh5.h>
-#include <hycoreducerimpl.h>
 
 /* m^2 numbers a point, and m^3 operations an active set: beyond this it is no model for many predictions. */
 #define MOST_CONTACTS 4000
@@ -75,23 +73,6 @@ static PetscErrorCode FindGrid(HycoReducer t, HycoCondensed c)
                    "the %d training points are no tensor grid: a condensed model needs every combination "
                    "of their values; give them by -grid or -values_NAME",
                    (int)n_s);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Which parameters reach K or B. Rank 0. */
-static PetscErrorCode FindStiff(HycoReducer t, HycoCondensed c)
-{
-  HycoScene s = t->scene;
-  PetscReal mu[HYCO_MAX_PARAMETERS];
-
-  PetscFunctionBegin;
-  for (PetscInt p = 0; p < c->dim; p++) mu[p] = s->lo[p];
-  PetscCall(HycoFESetParameters(t->fe, mu));
-  for (PetscInt p = 0; p < c->dim; p++) {
-    mu[p] = s->hi[p];
-    PetscCall(HycoFESetParameters(t->fe, mu));
-    c->stiff[p] = s->hi[p] > s->lo[p] && (t->fe->stiffness_changed || t->fe->contact_changed);
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -191,28 +172,75 @@ static PetscErrorCode FindExactLoads(HycoReducer t, HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerResetSurfaces(HycoReducer t)
+static PetscErrorCode ResetSurfaces(HycoReducer t)
+{
+  HycoSurfaces *s = &Condensing(t)->surfaces;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEDestroy(&s->fe));
+  PetscCall(HycoPairsDestroy(&s->pairs));
+  PetscCall(HycoMeshDestroy(&s->mesh));
+  PetscCall(HycoRowsDestroy(&s->rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ResetResponses(HycoResponses *x)
 {
   PetscFunctionBegin;
-  PetscCall(HycoFEDestroy(&t->surfaces.fe));
-  PetscCall(HycoPairsDestroy(&t->surfaces.pairs));
-  PetscCall(HycoMeshDestroy(&t->surfaces.mesh));
-  PetscCall(PetscFree(t->surfaces.start));
-  PetscCall(PetscFree(t->surfaces.dof));
-  PetscCall(PetscFree(t->surfaces.value));
-  PetscCall(PetscFree(t->surfaces.gap));
+  PetscCall(PetscFree(x->Q));
+  PetscCall(PetscFree(x->scale));
+  PetscCall(PetscFree(x->C));
+  PetscCall(PetscMemzero(x, sizeof(*x)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedSetFromOptions(HycoReducer t)
+{
+  HycoCondensing s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s));
+  t->training = s;
+  s->tol = 1e-7;
+  s->pod_tol = 1e-14;
+  s->max_values = 24;
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("condensed"));
+  PetscCall(HycoOptionsReal("-hyco_condensed_pod_tol",
+                            "condensed: energy that its displacement modes may leave out, unless -hyco_pod_tol is "
+                            "smaller",
+                            0, 1, &s->pod_tol, NULL));
+  PetscCall(HycoOptionsFor("condensed where no points are given"));
+  PetscCall(HycoOptionsReal("-hyco_condensed_tol",
+                            "condensed, no points given: add values until the forces' error, one value left out, is no "
+                            "larger",
+                            0, 1, &s->tol, NULL));
+  PetscCall(HycoOptionsInt("-hyco_condensed_max_values",
+                           "condensed, no points given: at most so many values per parameter", 3, 1000, &s->max_values,
+                           NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedResetTraining(HycoReducer t)
+{
+  PetscFunctionBegin;
+  PetscCall(ResetSurfaces(t));
+  PetscCall(ResetResponses(&Condensing(t)->responses));
+  PetscCall(HycoCondensedFree(&Condensing(t)->condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The contacts' nodes and slave facets, and the gaps' place in the condensed model under training. Rank 0. */
 static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
 {
-  const PetscInt n = t->whole->n_nodes, m = t->pairs.n, entries = HycoPairsWidth(&t->pairs) * t->whole->dim * m;
+  const PetscInt n = t->whole->n_nodes;
+  HycoSurfaces *s = &Condensing(t)->surfaces;
   PetscBool *contact;
   PetscInt *extra, *index, *all, n_extra = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoReducerResetSurfaces(t));
+  PetscCall(ResetSurfaces(t));
   PetscCall(PetscCalloc1(n, &contact));
   PetscCall(PetscMalloc3(n, &extra, n, &index, t->scene->n_contacts, &all));
   HycoPairsMark(&t->pairs, contact);
@@ -221,16 +249,12 @@ static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
   }
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
     PetscCall(HycoMeshFindGroup(t->whole, "contact", t->scene->contact[k]->slave, &all[k]));
-  PetscCall(HycoMeshExtract(t->whole, 0, NULL, n_extra, extra, t->scene->n_contacts, all, &t->surfaces.mesh));
-  for (PetscInt i = 0; i < t->surfaces.mesh->n_nodes; i++) index[t->surfaces.mesh->node_whole[i]] = i;
-  PetscCall(HycoPairsRenumber(&t->pairs, index, &t->surfaces.pairs));
-  PetscCall(HycoFECreate(t->scene, t->surfaces.mesh, &t->surfaces.fe));
-  PetscCall(PetscMalloc1(m + 1, &t->surfaces.start));
-  PetscCall(PetscMalloc1(entries, &t->surfaces.dof));
-  PetscCall(PetscMalloc1(entries, &t->surfaces.value));
-  PetscCall(PetscMalloc1(m, &t->surfaces.gap));
-  c->given = (HycoGapSource){t->surfaces.fe,  &t->surfaces.pairs, t->surfaces.start,
-                             t->surfaces.dof, t->surfaces.value,  t->surfaces.gap};
+  PetscCall(HycoMeshExtract(t->whole, 0, NULL, n_extra, extra, t->scene->n_contacts, all, &s->mesh));
+  for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->mesh->node_whole[i]] = i;
+  PetscCall(HycoPairsRenumber(&t->pairs, index, &s->pairs));
+  PetscCall(HycoFECreate(t->scene, s->mesh, &s->fe));
+  PetscCall(HycoRowsCreate(&t->pairs, t->whole->dim, &s->rows));
+  c->given = (HycoGapSource){s->fe, &s->pairs, s->rows};
   PetscCall(PetscFree3(extra, index, all));
   PetscCall(PetscFree(contact));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -265,12 +289,14 @@ static PetscErrorCode CheckFacets(HycoReducer t)
 static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
 {
   HycoMotions motions;
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
   PetscInt free;
   char name[HYCO_LINE];
 
   PetscFunctionBegin;
   PetscCall(CheckFacets(t));
-  PetscCall(FindStiff(t, c));
+  HycoSceneReaches(t->scene, reaches);
+  for (PetscInt p = 0; p < c->dim; p++) c->stiff[p] = reaches[p] && t->scene->hi[p] > t->scene->lo[p];
   PetscCall(HycoCondensedAllocate(c));
   c->exact_gap = 1;
   PetscCall(TakeSurfaces(t, c));
@@ -292,7 +318,7 @@ static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerBeginCondensed(HycoReducer t)
+PetscErrorCode HycoCondensedBegin(HycoReducer t)
 {
   HycoCondensed c;
   const PetscInt m = t->sizes[2];
@@ -311,9 +337,10 @@ PetscErrorCode HycoReducerBeginCondensed(HycoReducer t)
       "the scene has %d contacts: a condensed model stores the square of their number at every training point, "
       "and goes to %d; train a hybrid model",
       (int)m, MOST_CONTACTS);
-  PetscCall(HycoCondensedDestroy(&t->condensed));
+  PetscCall(HycoCondensedFree(&Condensing(t)->condensed));
+  PetscCall(ResetResponses(&Condensing(t)->responses));
   PetscCall(HycoCondensedCreate(t->scene->n_parameters, m, 0, &c));
-  t->condensed = c;
+  Condensing(t)->condensed = c;
   c->scene = t->scene;
   PetscCall(FindGrid(t, c));
   HycoOnRoot(HycoComm(t), Inspect(t, c));
@@ -375,7 +402,7 @@ static PetscErrorCode FreeGap(HycoReducer t, const PetscReal mu[], const PetscRe
 /* H = V^T K^-1 B^T at the nodes of the stiffness, of all modes: the responses' coefficients, on the patterns' span. */
 static PetscErrorCode FromResponses(HycoReducer t, HycoCondensed c)
 {
-  const HycoResponses *x = &t->responses;
+  const HycoResponses *x = &Condensing(t)->responses;
   const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_H].tensor), m = c->m, l = c->l;
   HycoGridField *H = &c->field[HYCO_FIELD_H], *unloaded = &c->field[HYCO_FIELD_FREE];
 
@@ -428,7 +455,7 @@ static PetscErrorCode FromSnapshots(HycoReducer t, HycoCondensed c)
     PetscCall(PetscArraycpy(c->Lambda + k * m, L, m));
     PetscCall(FreeGap(t, mu + s * c->dim, t->U + (size_t)s * n_dof, L, G->data + (size_t)node * (size_t)G->rows,
                       gap->data + k * m));
-    if (l) PetscCall(PetscArraycpy(unloaded->data + k * l, t->responses.C + (size_t)s * (size_t)l, l));
+    if (l) PetscCall(PetscArraycpy(unloaded->data + k * l, Condensing(t)->responses.C + (size_t)s * (size_t)l, l));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -454,12 +481,12 @@ static PetscErrorCode ChooseDegrees(HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerFillFields(HycoReducer t, PetscBool modes)
+PetscErrorCode HycoCondensedFillFields(HycoReducer t, PetscBool modes)
 {
-  HycoCondensed c = t->condensed;
+  HycoCondensed c = Condensing(t)->condensed;
 
   PetscFunctionBegin;
-  c->l = modes ? t->responses.r : 0;
+  c->l = modes ? Condensing(t)->responses.r : 0;
   PetscCall(HycoCondensedAllocate(c));
   PetscCall(FromSnapshots(t, c));
   PetscCall(FromResponses(t, c));
@@ -489,17 +516,17 @@ static PetscErrorCode CutModes(HycoCondensed c, PetscInt l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerCondense(HycoReducer t, HycoROM m)
+PetscErrorCode HycoCondensedBuild(HycoROM m, HycoReducer t)
 {
-  HycoCondensed c = t->condensed;
+  HycoCondensed c = Condensing(t)->condensed, none = (HycoCondensed)m->data;
 
   PetscFunctionBegin;
-  PetscCall(HycoReducerFillFields(t, PETSC_TRUE));
-  PetscCall(HycoReducerLeaveOut(t));
+  PetscCall(HycoCondensedFillFields(t, PETSC_TRUE));
+  PetscCall(HycoCondensedLeaveOut(t));
   PetscCall(CutModes(c, t->l));
-  m->condensed = c;
-  t->condensed = NULL;
-  m->n_dual = 0; /* nothing is reconstructed */
+  PetscCall(HycoCondensedFree(&none));
+  m->data = c;
+  Condensing(t)->condensed = NULL;
   for (PetscInt k = 0; k < m->pairs.n; k++) m->in_rid[k] = 1;
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
   PetscCall(HycoReducerJudge(t, m));

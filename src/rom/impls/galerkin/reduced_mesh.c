@@ -3,19 +3,7 @@
   for. The mesh has the nodes of every contact, the reduced problem only those of its cells and of A_lambda: they come
   first in the mesh, and a prediction costs the same whatever lies beyond.
 */
-#include <hycoromimpl.h>
-
-static PetscErrorCode CreateRows(const HycoPairs *pairs, PetscInt dim, HycoRows *rows)
-{
-  const PetscInt entries = HycoPairsWidth(pairs) * dim * pairs->n;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(pairs->n + 1, &rows->start));
-  PetscCall(PetscMalloc1(entries, &rows->dof));
-  PetscCall(PetscMalloc1(entries, &rows->value));
-  PetscCall(PetscMalloc1(pairs->n, &rows->gap));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+#include <hycogalerkin.h>
 
 /* One past the last node that matters: of a cell, of a contact of A_lambda, of a facet whose normal counts there. */
 static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
@@ -83,6 +71,7 @@ static PetscErrorCode ViewMesh(HycoMesh mesh, PetscInt n, HycoMesh *own)
 /* The contacts of A_lambda, in the order of all. */
 static PetscErrorCode SelectPairs(HycoROM m)
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const HycoPairs *all = &m->pairs;
 
   PetscFunctionBegin;
@@ -91,21 +80,90 @@ static PetscErrorCode SelectPairs(HycoROM m)
   for (PetscInt k = 0; k < all->n; k++) {
     if (m->in_rid[k]) m->contact[m->m++] = k;
   }
-  PetscCall(HycoPairsSelect(all, m->m, m->contact, NULL, &m->own_pairs));
-  HycoPairsSetReach(&m->own_pairs, m->master_reach);
+  PetscCall(HycoPairsSelect(all, m->m, m->contact, NULL, &g->own_pairs));
+  HycoPairsSetReach(&g->own_pairs, m->master_reach);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMCreateOwn(HycoROM m)
+PetscErrorCode HycoGalerkinCreateOwn(HycoROM m)
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscInt n;
 
   PetscFunctionBegin;
   PetscCall(CountNodes(m, &n));
-  PetscCall(ViewMesh(m->mesh, n, &m->own));
+  PetscCall(ViewMesh(m->mesh, n, &g->own));
   PetscCall(SelectPairs(m));
-  PetscCall(CreateRows(&m->own_pairs, m->mesh->dim, &m->own_rows));
+  PetscCall(HycoRowsCreate(&g->own_pairs, m->mesh->dim, &g->own_rows));
+  m->of_fe = &g->own_pairs;
   m->spread = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Unknowns of fe's mesh that are free and have a role. */
+static PetscErrorCode CreateUnknowns(HycoROM m, PetscInt role, IS *is)
+{
+  PetscInt n = 0, *dof;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->fe->n_dof, &dof));
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    if (m->role[i / m->mesh->dim] == role && !m->fe->fixed[i]) dof[n++] = i;
+  }
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, dof, PETSC_COPY_VALUES, is));
+  PetscCall(PetscFree(dof));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinCreateSets(HycoROM m)
+{
+  HycoIndexSets *s = &((HycoGalerkin)m->data)->sets;
+
+  PetscFunctionBegin;
+  PetscCall(CreateUnknowns(m, HYCO_ROLE_A, &s->is_A));
+  PetscCall(CreateUnknowns(m, HYCO_ROLE_INTERFACE, &s->is_I));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, m->contact, PETSC_COPY_VALUES, &s->is_A_lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A'_c, the unknowns that the rows act on, and A_c, those of them in A. */
+static PetscErrorCode CreateContactSets(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscInt n = 0, *dof;
+  PetscBool *acts;
+
+  PetscFunctionBegin;
+  PetscCall(ISDestroy(&g->sets.is_Ac));
+  PetscCall(ISDestroy(&g->sets.is_Ac_all));
+  PetscCall(PetscCalloc1(m->fe->n_dof, &acts));
+  PetscCall(PetscMalloc1(m->fe->n_dof, &dof));
+  for (PetscInt t = 0; t < g->own_rows.start[m->m]; t++) acts[g->own_rows.dof[t]] = PETSC_TRUE;
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    if (acts[i]) dof[n++] = i;
+  }
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, dof, PETSC_COPY_VALUES, &g->sets.is_Ac_all));
+  PetscCall(ISIntersect(g->sets.is_Ac_all, g->sets.is_A, &g->sets.is_Ac));
+  PetscCall(PetscFree(dof));
+  PetscCall(PetscFree(acts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinContactMatrix(HycoROM m, Mat *B)
+{
+  const HycoRows *rows = &((HycoGalerkin)m->data)->own_rows;
+
+  PetscFunctionBegin;
+  PetscCall(CreateContactSets(m));
+  PetscCall(MatCreate(PETSC_COMM_SELF, B));
+  PetscCall(MatSetSizes(*B, m->m, m->fe->n_dof, m->m, m->fe->n_dof));
+  PetscCall(MatSetType(*B, MATSEQAIJ));
+  PetscCall(MatSeqAIJSetPreallocation(*B, HycoPairsWidth(&m->pairs) * m->mesh->dim, NULL));
+  for (PetscInt k = 0; k < m->m; k++)
+    PetscCall(MatSetValues(*B, 1, &k, rows->start[k + 1] - rows->start[k], rows->dof + rows->start[k],
+                           rows->value + rows->start[k], INSERT_VALUES));
+  PetscCall(MatAssemblyBegin(*B, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*B, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -122,33 +180,34 @@ static PetscErrorCode DestroyView(HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMDestroyOwn(HycoROM m)
+PetscErrorCode HycoGalerkinDestroyOwn(HycoGalerkin g)
 {
   PetscFunctionBegin;
-  PetscCall(HycoFEDestroy(&m->fe_beyond));
-  PetscCall(PetscFree(m->beyond));
-  PetscCall(DestroyView(&m->own));
-  PetscCall(HycoPairsDestroy(&m->own_pairs));
-  PetscCall(PetscFree(m->own_rows.start));
-  PetscCall(PetscFree(m->own_rows.dof));
-  PetscCall(PetscFree(m->own_rows.value));
-  PetscCall(PetscFree(m->own_rows.gap));
+  PetscCall(ISDestroy(&g->sets.is_A));
+  PetscCall(ISDestroy(&g->sets.is_I));
+  PetscCall(ISDestroy(&g->sets.is_Ac));
+  PetscCall(ISDestroy(&g->sets.is_Ac_all));
+  PetscCall(ISDestroy(&g->sets.is_A_lambda));
+  PetscCall(DestroyView(&g->own));
+  PetscCall(HycoPairsDestroy(&g->own_pairs));
+  PetscCall(HycoRowsDestroy(&g->own_rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMOwnRows(HycoROM m)
+PetscErrorCode HycoGalerkinOwnRows(HycoROM m)
 {
-  HycoRows *rows = &m->own_rows;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoRows *rows = &g->own_rows;
   const PetscInt dim = m->mesh->dim;
-  const PetscReal none = m->own_pairs.room ? HycoContactNoGap(m->fe) : 0;
+  const PetscReal none = g->own_pairs.room ? HycoContactNoGap(m->fe) : 0;
   PetscInt n = 0, lo = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoContactRows(m->fe, &m->own_pairs, rows->start, rows->dof, rows->value, rows->gap));
-  if (!m->own_pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoContactRows(m->fe, &g->own_pairs, rows->start, rows->dof, rows->value, rows->gap));
+  if (!g->own_pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < m->m; k++) {
     const PetscInt hi = rows->start[k + 1];
-    PetscBool tested = (PetscBool)!HycoPairsMoved(&m->own_pairs, k);
+    PetscBool tested = (PetscBool)!HycoPairsMoved(&g->own_pairs, k);
 
     for (PetscInt t = lo; t < hi; t++) tested = (PetscBool)(tested || m->role[rows->dof[t] / dim] == HYCO_ROLE_A);
     for (PetscInt t = lo; tested && t < hi; t++, n++) {
@@ -159,48 +218,5 @@ PetscErrorCode HycoROMOwnRows(HycoROM m)
     rows->start[k + 1] = n;
     lo = hi;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The whole of mesh as nodes and surfaces alone: nobody asks for its cells' materials. */
-static PetscErrorCode CreateBeyond(HycoROM m)
-{
-  HycoRows rows;
-
-  PetscFunctionBegin;
-  PetscCall(PetscNew(&m->beyond));
-  *m->beyond = *m->mesh;
-  m->beyond->n_cells = 0;
-  PetscCall(HycoFECreate(m->scene, m->beyond, &m->fe_beyond));
-  PetscCall(CreateRows(&m->pairs, m->mesh->dim, &rows));
-  m->row_start = rows.start;
-  m->row_dof = rows.dof;
-  m->row_value = rows.value;
-  m->gap = rows.gap;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMComplete(HycoROM m)
-{
-  const PetscInt l = m->l;
-  HycoFE fe;
-
-  PetscFunctionBegin;
-  if (m->condensed || m->beyond_current) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!m->beyond) PetscCall(CreateBeyond(m));
-  fe = m->fe_beyond;
-  PetscCall(HycoFESetParameters(fe, m->fe->mu));
-  if (fe->contact_changed || fe->gap_changed) {
-    fe->ready = PETSC_FALSE; /* until its rows are there */
-    PetscCall(HycoContactRows(fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap));
-    fe->ready = PETSC_TRUE;
-  }
-  for (PetscInt i = m->fe->n_dof; i < fe->n_dof; i++) {
-    const PetscReal *v = m->V + (size_t)i * (size_t)l;
-
-    m->U[i] = fe->u0[i];
-    for (PetscInt j = 0; j < l; j++) m->U[i] += v[j] * m->gamma[j];
-  }
-  m->beyond_current = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -8,7 +8,7 @@
   They are chosen by the ranges, not by what came before, so that answers do not depend on the order of the questions.
   F itself is assembled at each mu: where it is not that sum, its system is solved.
 */
-#include <hycoromimpl.h>
+#include <hycogalerkin.h>
 
 /* More parameters would cost a single prediction more than a ramp gains. */
 #define MAX_LOADS 3
@@ -38,6 +38,7 @@ PetscErrorCode HycoLoadsDestroy(HycoLoads *loads)
 
 PetscErrorCode HycoLoadsCreate(HycoROM m)
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const HycoScene s = m->scene;
   PetscBool reaches[HYCO_MAX_PARAMETERS];
   PetscInt n = 0, parameter[HYCO_MAX_PARAMETERS];
@@ -50,14 +51,14 @@ PetscErrorCode HycoLoadsCreate(HycoROM m)
   }
   if (!n || n > MAX_LOADS) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&p));
-  m->loads = p;
+  g->loads = p;
   p->n = n;
   PetscCall(PetscArraycpy(p->parameter, parameter, n));
   for (PetscInt j = 0; j <= n; j++) {
-    PetscCall(VecDuplicate(m->Fr, &p->F[j]));
-    PetscCall(VecDuplicate(m->x, &p->X[j]));
+    PetscCall(VecDuplicate(g->Fr, &p->F[j]));
+    PetscCall(VecDuplicate(g->x, &p->X[j]));
   }
-  PetscCall(VecDuplicate(m->Fr, &p->sum));
+  PetscCall(VecDuplicate(g->Fr, &p->sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,7 +80,8 @@ static PetscErrorCode Sum(HycoLoads p, const Vec v[], const PetscReal t[], Vec y
 
 static void Coordinates(HycoROM m, const PetscReal mu[], PetscReal t[])
 {
-  const HycoLoads p = m->loads;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoLoads p = g->loads;
 
   t[0] = 1;
   for (PetscInt j = 0; j < p->n; j++) {
@@ -92,13 +94,14 @@ static void Coordinates(HycoROM m, const PetscReal mu[], PetscReal t[])
 /* Whether m->Fr, assembled at mu, is the sum. */
 static PetscErrorCode IsSum(HycoROM m, const PetscReal t[], PetscBool *is)
 {
-  const HycoLoads p = m->loads;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoLoads p = g->loads;
   PetscReal size, apart;
 
   PetscFunctionBegin;
-  PetscCall(VecNorm(m->Fr, NORM_INFINITY, &size));
+  PetscCall(VecNorm(g->Fr, NORM_INFINITY, &size));
   PetscCall(Sum(p, p->F, t, p->sum));
-  PetscCall(VecAXPY(p->sum, -1, m->Fr));
+  PetscCall(VecAXPY(p->sum, -1, g->Fr));
   PetscCall(VecNorm(p->sum, NORM_INFINITY, &apart));
   *is = (PetscBool)(apart <= AFFINE * size);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -107,9 +110,10 @@ static PetscErrorCode IsSum(HycoROM m, const PetscReal t[], PetscBool *is)
 /* m->Fr at the parameters mu, which differ from the current ones in loads alone. */
 static PetscErrorCode ForceAt(HycoROM m, const PetscReal mu[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(m->fe, mu));
-  PetscCall(HycoFEAssembleForce(m->fe, m->F));
+  PetscCall(HycoFEAssembleForce(m->fe, g->F));
   PetscCall(HycoReducedFillVectors(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -117,7 +121,8 @@ static PetscErrorCode ForceAt(HycoROM m, const PetscReal mu[])
 /* The vectors F, and whether the middle of the ranges is their sum. */
 static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
 {
-  const HycoLoads p = m->loads;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoLoads p = g->loads;
   PetscReal at[HYCO_MAX_PARAMETERS], t[1 + MAX_LOADS];
 
   PetscFunctionBegin;
@@ -129,7 +134,7 @@ static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
     if (j) at[p->parameter[j - 1]] = m->scene->hi[p->parameter[j - 1]];
     PetscCall(ForceAt(m, at));
     if (j) at[p->parameter[j - 1]] = m->scene->lo[p->parameter[j - 1]];
-    PetscCall(VecCopy(m->Fr, p->F[j]));
+    PetscCall(VecCopy(g->Fr, p->F[j]));
     if (j) PetscCall(VecAXPY(p->F[j], -1, p->F[0]));
     PetscCall(VecNorm(p->F[j], NORM_INFINITY, &size));
     p->given[j] = (PetscBool)(size > 0);
@@ -145,7 +150,8 @@ static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
 
 static PetscErrorCode Renew(HycoROM m, const PetscReal mu[])
 {
-  const HycoLoads p = m->loads;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoLoads p = g->loads;
   PetscBool singular;
   PetscErrorCode ierr;
 
@@ -167,7 +173,8 @@ static PetscErrorCode Renew(HycoROM m, const PetscReal mu[])
 
 PetscErrorCode HycoLoadsSetFree(HycoROM m, const PetscReal mu[])
 {
-  const HycoLoads p = m->loads;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoLoads p = g->loads;
   PetscReal t[1 + MAX_LOADS];
   PetscBool is;
 

@@ -286,7 +286,7 @@ PetscErrorCode HycoCondensedBringGap(HycoCondensed c, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(d->fe, mu));
   if (d->fe->contact_changed || d->fe->gap_changed)
-    PetscCall(HycoContactRows(d->fe, d->pairs, d->start, d->dof, d->value, d->gap));
+    PetscCall(HycoContactRows(d->fe, d->pairs, d->rows.start, d->rows.dof, d->rows.value, d->rows.gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -299,8 +299,8 @@ PetscErrorCode HycoCondensedFreeGap(HycoCondensed c, const PetscReal mu[], Petsc
   if (c->exact_gap) {
     PetscCall(HycoCondensedBringGap(c, mu));
     for (PetscInt i = 0; i < c->m; i++) {
-      size = PetscMax(size, PetscAbsReal(c->given.gap[i]));
-      c->g[i] += c->given.gap[i];
+      size = PetscMax(size, PetscAbsReal(c->given.rows.gap[i]));
+      c->g[i] += c->given.rows.gap[i];
     }
   }
   for (PetscInt i = 0; i < c->m; i++) { /* a closed gap without load is 0, not round-off that presses or not */

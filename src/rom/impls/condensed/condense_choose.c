@@ -6,7 +6,6 @@
   smooth, and algebraically where it has a kink. The modes come when the points stand.
 */
 #include <hycocondensed.h>
-#include <hycoreducerimpl.h>
 
 /* Of a parameter in which everything is affine two values are exact; the modes need solutions in between. */
 #define AFFINE_VALUES 5
@@ -61,21 +60,21 @@ static PetscErrorCode TakeSamples(HycoReducer t, const PetscInt counts[], HycoSa
   PetscCall(MakeSamples(t->scene, counts, samples));
   t->samples = *samples;
   PetscCall(HycoSamplesGet(*samples, &t->n_s, NULL, NULL));
-  PetscCall(HycoReducerBeginCondensed(t));
+  PetscCall(HycoCondensedBegin(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Solutions, flexibilities and what leaving values out costs, by parameter. */
 static PetscErrorCode Estimate(HycoReducer t, HycoSnapshots store)
 {
-  HycoCondensed c = t->condensed;
+  HycoCondensed c = Condensing(t)->condensed;
 
   PetscFunctionBegin;
   PetscCall(HycoSnapshotsFill(store, t->samples, t->progress, t->progress_ctx));
   PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
-  PetscCall(HycoReducerFlexibility(t, store));
-  HycoOnRoot(HycoComm(t), HycoReducerFillFields(t, PETSC_FALSE));
-  HycoOnRoot(HycoComm(t), HycoReducerLeaveOut(t));
+  PetscCall(HycoCondensedFlexibilities(t, store));
+  HycoOnRoot(HycoComm(t), HycoCondensedFillFields(t, PETSC_FALSE));
+  HycoOnRoot(HycoComm(t), HycoCondensedLeaveOut(t));
   PetscCallMPI(MPI_Bcast(c->by_parameter, HYCO_MAX_PARAMETERS, MPIU_REAL, 0, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -83,16 +82,16 @@ static PetscErrorCode Estimate(HycoReducer t, HycoSnapshots store)
 /* The parameter to refine; -1: the target is met, or (*met is false) none may have more values. */
 static PetscInt Choose(HycoReducer t, PetscBool *met)
 {
-  HycoCondensed c = t->condensed;
+  HycoCondensed c = Condensing(t)->condensed;
   PetscReal sum = 0;
   PetscInt worst = -1;
 
   for (PetscInt p = 0; p < c->dim; p++) {
     sum += c->by_parameter[p];
-    if (c->n[p] >= t->condensed_max_values || c->affine[p] || c->n[p] == 1) continue;
+    if (c->n[p] >= Condensing(t)->max_values || c->affine[p] || c->n[p] == 1) continue;
     if (worst < 0 || c->by_parameter[p] > (1 + TIE) * c->by_parameter[worst]) worst = p;
   }
-  *met = (PetscBool)(sum <= t->condensed_tol);
+  *met = (PetscBool)(sum <= Condensing(t)->tol);
   return *met ? -1 : worst;
 }
 
@@ -105,7 +104,7 @@ typedef struct {
 /* Whether more values of p are in vain: at the rate at which its error has fallen the target is out of reach. */
 static PetscBool IsHopeless(HycoReducer t, const History *h, PetscInt p)
 {
-  HycoCondensed c = t->condensed;
+  HycoCondensed c = Condensing(t)->condensed;
   const PetscInt n = c->n[p];
   const PetscReal *e = h->error + p * (h->most + 1);
   PetscReal best = e[n], before = e[n - LOOK_BACK > 0 ? n - LOOK_BACK : 0], rate;
@@ -114,38 +113,39 @@ static PetscBool IsHopeless(HycoReducer t, const History *h, PetscInt p)
   for (PetscInt k = n - 1; k > n - 2; k--) best = PetscMin(best, e[k]); /* every second value may be a little worse */
   rate = PetscPowReal(best / before, 1.0 / LOOK_BACK);
   if (rate < SLOW) return PETSC_FALSE;
-  return (PetscBool)(rate >= 1 || (PetscReal)n + PetscLogReal(t->condensed_tol / best) / PetscLogReal(rate) >
+  return (PetscBool)(rate >= 1 || (PetscReal)n + PetscLogReal(Condensing(t)->tol / best) / PetscLogReal(rate) >
                                       BEYOND * (PetscReal)h->most);
 }
 
-PetscErrorCode HycoReducerChoosePoints(HycoReducer t, HycoSnapshots store, HycoSamples *samples)
+PetscErrorCode HycoCondensedChoosePoints(HycoReducer t, HycoSnapshots store, HycoSamples *samples)
 {
   HycoScene s = t->scene;
   PetscInt counts[HYCO_MAX_PARAMETERS], worst = 0;
-  History h = {t->condensed_max_values, NULL};
+  History h = {Condensing(t)->max_values, NULL};
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(s->n_parameters * (h.most + 1) + 1, &h.error));
   for (PetscInt p = 0; p < s->n_parameters; p++) {
-    const PetscInt n = t->condensed->affine[p] ? AFFINE_VALUES : FIRST_VALUES;
+    const PetscInt n = Condensing(t)->condensed->affine[p] ? AFFINE_VALUES : FIRST_VALUES;
 
-    counts[p] = s->hi[p] > s->lo[p] ? PetscMin(n, t->condensed_max_values) : 1;
+    counts[p] = s->hi[p] > s->lo[p] ? PetscMin(n, Condensing(t)->max_values) : 1;
   }
   while (worst >= 0) {
     PetscCall(TakeSamples(t, counts, samples));
     PetscCall(Estimate(t, store));
-    worst = Choose(t, &t->condensed->target_met);
+    worst = Choose(t, &Condensing(t)->condensed->target_met);
     for (PetscInt p = 0; p < s->n_parameters; p++)
-      h.error[p * (h.most + 1) + counts[p]] = t->condensed->by_parameter[p];
-    t->condensed->hopeless = worst >= 0 && IsHopeless(t, &h, worst) ? worst : -1;
-    if (t->condensed->hopeless >= 0) break;
+      h.error[p * (h.most + 1) + counts[p]] = Condensing(t)->condensed->by_parameter[p];
+    Condensing(t)->condensed->hopeless = worst >= 0 && IsHopeless(t, &h, worst) ? worst : -1;
+    if (Condensing(t)->condensed->hopeless >= 0) break;
     if (worst >= 0) counts[worst]++;
   }
+  Condensing(t)->condensed->chosen = PETSC_TRUE;
   PetscCall(PetscFree(h.error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerStartPoints(HycoReducer t, HycoSamples *samples)
+PetscErrorCode HycoCondensedStartPoints(HycoReducer t, HycoSamples *samples)
 {
   PetscInt counts[HYCO_MAX_PARAMETERS];
 

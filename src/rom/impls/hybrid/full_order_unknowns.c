@@ -8,63 +8,42 @@
   coefficients follow from U[A] by ridge regression, its strength chosen by the same error.
 */
 #include <hycoalgorithms.h>
-#include <hycoreducerimpl.h>
+#include <hycohybrid.h>
 
-#define WORST 10.0 /* what an unsolved or wild prediction counts */
+#define WORST HYCO_JUDGED_WORST
 
-/* Relative error of the last prediction against snapshot k: u on the whole mesh (by the coefficients: V is
- * orthonormal), forces on A_lambda. */
-static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, PetscReal *lambda)
+/* What the options of this type say. */
+typedef struct {
+  PetscInt trials; /* rank: the most choices that are judged; 0: chosen */
+  PetscReal ridge; /* all; < 0: chosen */
+} * Training;
+
+PetscErrorCode HycoHybridSetFromOptions(HycoReducer t)
 {
-  const PetscInt dim = t->sizes[3];
-  const PetscReal *U = t->U + (size_t)k * (size_t)(t->sizes[0] * dim), *L = t->Lambda + (size_t)k * (size_t)t->sizes[2],
-                  *c = t->VtU + k * t->l;
-  PetscReal sum, lost = 0, size = 0;
-
-  sum = t->U_norm[k] * t->U_norm[k];
-  for (PetscInt j = 0; j < t->l; j++) sum += (m->gamma[j] - c[j]) * (m->gamma[j] - c[j]) - c[j] * c[j];
-  for (PetscInt f = 0; f < m->n_fe; f++) {
-    const PetscInt dof = m->fe_dof[f], whole = m->mesh->node_whole[dof / dim] * dim + dof % dim;
-    PetscReal by_modes = 0;
-
-    for (PetscInt j = 0; j < m->l; j++) by_modes += m->V[dof * m->l + j] * m->gamma[j];
-    sum += (m->U[dof] - U[whole]) * (m->U[dof] - U[whole]) - (by_modes - U[whole]) * (by_modes - U[whole]);
-  }
-  *u = t->U_norm[k] > 0 ? PetscSqrtReal(PetscMax(sum, 0)) / t->U_norm[k] : 0;
-  for (PetscInt j = 0; j < m->m; j++) {
-    lost += (m->Lambda[m->contact[j]] - L[m->contact[j]]) * (m->Lambda[m->contact[j]] - L[m->contact[j]]);
-    size += L[m->contact[j]] * L[m->contact[j]];
-  }
-  *lambda = size > 0 ? PetscSqrtReal(lost / size) : lost > 0 ? WORST : 0;
-}
-
-/* Mean training errors of the model as it stands. */
-static PetscErrorCode Judge(HycoReducer t, HycoROM m, PetscReal *u, PetscReal *lambda)
-{
-  PetscInt n_par;
-  const PetscReal *mu;
+  Training s;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  m->reconstruct = PETSC_FALSE;
-  *u = *lambda = 0;
-  for (PetscInt k = 0; k < t->n_s; k++) {
-    PetscReal eu, el;
-
-    PetscCall(HycoROMPredict(m, n_par, mu + k * n_par));
-    SnapshotErrors(t, m, k, &eu, &el);
-    if (m->prediction.reason < 0 || !(eu < WORST)) eu = WORST;
-    if (m->prediction.reason < 0 || !(el < WORST)) el = WORST;
-    *u += eu / t->n_s;
-    *lambda += el / t->n_s;
-  }
-  m->reconstruct = PETSC_TRUE;
+  PetscCall(PetscNew(&s));
+  t->training = s;
+  s->ridge = -1;
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("hybrid"));
+  PetscCall(HycoOptionsInt("-hyco_hybrid_trials",
+                           "candidate sets judged by their training error when hybrid is rank (0: from the size)", 0,
+                           PETSC_MAX_INT / 8, &s->trials, NULL));
+  PetscCall(
+      HycoOptionsReal("-hyco_hybrid_ridge",
+                      "of the interface's regression when hybrid is all (-1: by the training error; 0: plain least "
+                      "squares)",
+                      -1, 1, &s->ridge, NULL));
+  PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The unknown of each contact of A_lambda that could be full order: its largest entry in A that no other has taken. */
 static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const PetscInt dim = m->mesh->dim;
   PetscBool *taken;
 
@@ -77,12 +56,12 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
       PetscReal best = 0;
 
       if ((m->role[slave] == HYCO_ROLE_A) != (pass == 0)) continue;
-      for (PetscInt t = m->own_rows.start[k]; t < m->own_rows.start[k + 1]; t++) {
-        const PetscInt dof = m->own_rows.dof[t];
+      for (PetscInt t = g->own_rows.start[k]; t < g->own_rows.start[k + 1]; t++) {
+        const PetscInt dof = g->own_rows.dof[t];
 
         if (taken[dof] || m->role[dof / dim] != HYCO_ROLE_A) continue;
-        if (PetscAbsReal(m->own_rows.value[t]) <= best * (1 + 1e-12)) continue;
-        best = PetscAbsReal(m->own_rows.value[t]);
+        if (PetscAbsReal(g->own_rows.value[t]) <= best * (1 + 1e-12)) continue;
+        best = PetscAbsReal(g->own_rows.value[t]);
         candidate[k] = dof;
       }
       if (candidate[k] >= 0) taken[candidate[k]] = PETSC_TRUE;
@@ -100,6 +79,7 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
 /* Smallest singular value of B[A_lambda, A_c] Vbar[A_c,:] over its largest, for the model's present choice. */
 static PetscErrorCode RowRank(HycoROM m, PetscReal *ratio)
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   Mat dense;
   PetscScalar *b;
   PetscReal smallest, largest;
@@ -107,7 +87,7 @@ static PetscErrorCode RowRank(HycoROM m, PetscReal *ratio)
   PetscFunctionBegin;
   *ratio = 1;
   if (!m->m) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatConvert(m->Br, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
+  PetscCall(MatConvert(g->Br, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
   PetscCall(MatDenseGetArray(dense, &b));
   PetscCall(HycoExtremeSingularValues(m->m, m->n, b, &smallest, &largest));
   PetscCall(MatDenseRestoreArray(dense, &b));
@@ -137,6 +117,7 @@ static PetscErrorCode Assembled(HycoReducer t, HycoROM m)
 static PetscErrorCode ResolvedContacts(HycoROM m, const PetscInt candidate[], PetscBool balance, PetscInt *rank,
                                        PetscInt pivot[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const PetscInt l = m->l, dim = m->mesh->dim;
   const PetscInt *ia, *ja;
   const PetscScalar *a;
@@ -146,19 +127,19 @@ static PetscErrorCode ResolvedContacts(HycoROM m, const PetscInt candidate[], Pe
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc2(l * m->m, &BV, l * m->m, &KV));
-  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatSeqAIJGetArrayRead(m->K, &a));
+  PetscCall(MatGetRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatSeqAIJGetArrayRead(g->K, &a));
   for (PetscInt k = 0; k < m->m; k++) {
-    for (PetscInt t = m->own_rows.start[k]; t < m->own_rows.start[k + 1]; t++) {
-      for (PetscInt j = 0; m->role[m->own_rows.dof[t] / dim] == HYCO_ROLE_A && j < l; j++)
-        BV[k * l + j] += m->own_rows.value[t] * m->V[m->own_rows.dof[t] * l + j];
+    for (PetscInt t = g->own_rows.start[k]; t < g->own_rows.start[k + 1]; t++) {
+      for (PetscInt j = 0; m->role[g->own_rows.dof[t] / dim] == HYCO_ROLE_A && j < l; j++)
+        BV[k * l + j] += g->own_rows.value[t] * m->V[g->own_rows.dof[t] * l + j];
     }
     for (PetscInt t = ia[candidate[k]]; t < ia[candidate[k] + 1]; t++) {
       for (PetscInt j = 0; j < l; j++) KV[k * l + j] += a[t] * m->V[ja[t] * l + j];
     }
   }
-  PetscCall(MatSeqAIJRestoreArrayRead(m->K, &a));
-  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatSeqAIJRestoreArrayRead(g->K, &a));
+  PetscCall(MatRestoreRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
   *rank = 0;
   {
     PetscReal smallest = 0, largest = 1;
@@ -192,7 +173,7 @@ static PetscErrorCode JudgeSet(HycoReducer t, HycoROM m, PetscInt n, const Petsc
   PetscCall(Assembled(t, m));
   PetscCall(RowRank(m, &v->rank));
   v->u = v->lambda = WORST;
-  if (v->rank > 1e-10) PetscCall(Judge(t, m, &v->u, &v->lambda));
+  if (v->rank > 1e-10) PetscCall(HycoReducerJudgeMeans(t, m, &v->u, &v->lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -209,7 +190,8 @@ static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt n, const Petsc
 {
   const PetscInt N = m->m;
   /* a trial solves every snapshot: bounded by the work, so that a large model is not judged for hours */
-  const PetscInt limit = t->trials ? t->trials : 1 + (PetscInt)(1e6 / ((PetscReal)t->n_s * (PetscReal)m->n));
+  const PetscInt limit = ((Training)t->training)->trials ? ((Training)t->training)->trials
+                                                         : 1 + (PetscInt)(1e6 / ((PetscReal)t->n_s * (PetscReal)m->n));
   PetscInt trials = 1, n_seen = 0, *dof;
   unsigned long long *seen;
   PetscBool improved = PETSC_TRUE;
@@ -360,27 +342,29 @@ static PetscErrorCode ChooseAll(HycoReducer t, HycoROM m, PetscInt n, const Pets
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_ALL, n, dof));
   best->u = best->lambda = PETSC_MAX_REAL;
   best->rank = 1;
-  if (interface && t->ridge >= 0) PetscCall(HycoROMSetRidge(m, t->ridge));
-  if (!interface || t->ridge >= 0) {
-    PetscCall(Judge(t, m, &best->u, &best->lambda));
+  if (interface && ((Training)t->training)->ridge >= 0)
+    PetscCall(HycoGalerkinSetRidge(m, ((Training)t->training)->ridge));
+  if (!interface || ((Training)t->training)->ridge >= 0) {
+    PetscCall(HycoReducerJudgeMeans(t, m, &best->u, &best->lambda));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscReal ridge = 1e-14; ridge < 1e-5; ridge *= 10) {
     Verdict v;
 
-    PetscCall(HycoROMSetRidge(m, ridge));
-    PetscCall(Judge(t, m, &v.u, &v.lambda));
+    PetscCall(HycoGalerkinSetRidge(m, ridge));
+    PetscCall(HycoReducerJudgeMeans(t, m, &v.u, &v.lambda));
     if (v.u < best->u) {
       *best = v;
       best->rank = 1;
       strength = ridge;
     }
   }
-  PetscCall(HycoROMSetRidge(m, strength));
+  PetscCall(HycoGalerkinSetRidge(m, strength));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerChooseHybrid(HycoReducer t, HycoROM m)
+/* The full-order displacements, and the training errors that come with them. */
+static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
 {
   PetscInt n_all, n_contact, *all, *contact;
   HycoHybrid kind = t->hybrid;
@@ -403,18 +387,17 @@ PetscErrorCode HycoReducerChooseHybrid(HycoReducer t, HycoROM m)
   if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
   if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all, &v));
   if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));
-  PetscCall(Judge(t, m, &v.u, &v.lambda));
-  m->numbers[1] = v.u;
-  m->numbers[2] = v.lambda;
-  PetscCall(HycoROMCondition(m, &m->numbers[0]));
+  PetscCall(HycoReducerJudge(t, m));
   PetscCall(PetscFree2(all, contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
+PetscErrorCode HycoHybridBuild(HycoROM m, HycoReducer t)
 {
+  HycoHybridROM h = (HycoHybridROM)m->data;
+
   PetscFunctionBegin;
-  PetscCall(Judge(t, m, &m->numbers[1], &m->numbers[2]));
-  PetscCall(HycoROMCondition(m, &m->numbers[0]));
+  PetscCall(HycoReducerDualSnapshots(t, &h->n_dual, &h->S_lambda));
+  PetscCall(ChooseUnknowns(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -4,8 +4,6 @@
   that was killed solves what is missing.
 */
 #include <hycocondensed.h>
-#include <hycoh5.h>
-#include <hycoreducerimpl.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -30,7 +28,7 @@ static void StiffPoint(HycoCondensed c, PetscInt k, PetscReal mu[], PetscReal ke
 static PetscErrorCode Path(HycoReducer t, HycoSnapshots store, PetscInt k, const Task *task,
                            char path[PETSC_MAX_PATH_LEN])
 {
-  HycoCondensed c = t->condensed;
+  HycoCondensed c = Condensing(t)->condensed;
   PetscReal mu[HYCO_MAX_PARAMETERS], key[HYCO_MAX_PARAMETERS];
   unsigned long long hash;
 
@@ -96,7 +94,7 @@ static PetscErrorCode ReadOne(HycoSnapshots store, const char path[], const char
 static PetscErrorCode FindMissing(HycoReducer t, HycoSnapshots store, const Task *task, PetscInt *n_missing,
                                   PetscInt missing[])
 {
-  const PetscInt n = HycoTensorSize(&t->condensed->field[HYCO_FIELD_G].tensor);
+  const PetscInt n = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
   char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
@@ -119,14 +117,14 @@ static PetscErrorCode SolveOne(HycoReducer t, HycoSnapshots store, MPI_Comm grou
   char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
-  StiffPoint(t->condensed, node, mu, key);
+  StiffPoint(Condensing(t)->condensed, node, mu, key);
   PetscCall(Path(t, store, node, task, path));
   if (task->q) {
     PetscCall(HycoFOMResponses(fom, mu, task->q, task->P, data));
     HycoOnRoot(group, WriteOne(store, path, "X", t->sizes[0] * t->sizes[3], task->q, data));
   } else {
     PetscCall(HycoFOMFlexibility(fom, mu, data));
-    HycoOnRoot(group, WriteOne(store, path, "G", t->condensed->field[HYCO_FIELD_G].rows, 1, data));
+    HycoOnRoot(group, WriteOne(store, path, "G", Condensing(t)->condensed->field[HYCO_FIELD_G].rows, 1, data));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -135,8 +133,8 @@ static PetscErrorCode SolveOne(HycoReducer t, HycoSnapshots store, MPI_Comm grou
 static PetscErrorCode SolveGroup(HycoReducer t, HycoSnapshots store, MPI_Comm group, PetscInt color, PetscInt groups,
                                  PetscInt n_missing, const PetscInt missing[], const Task *task)
 {
-  const size_t size =
-      task->q ? (size_t)(t->sizes[0] * t->sizes[3]) * (size_t)task->q : (size_t)t->condensed->field[HYCO_FIELD_G].rows;
+  const size_t size = task->q ? (size_t)(t->sizes[0] * t->sizes[3]) * (size_t)task->q
+                              : (size_t)Condensing(t)->condensed->field[HYCO_FIELD_G].rows;
   HycoFOM fom;
   PetscReal *data;
   PetscErrorCode ierr = 0;
@@ -161,7 +159,7 @@ static PetscErrorCode SolveMissing(HycoReducer t, HycoSnapshots store, const Tas
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
-  PetscCall(PetscMalloc1(HycoTensorSize(&t->condensed->field[HYCO_FIELD_G].tensor), &missing));
+  PetscCall(PetscMalloc1(HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor), &missing));
   HycoOnRoot(HycoComm(t), FindMissing(t, store, task, &n_missing, missing));
   PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, HycoComm(t)));
   PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, HycoComm(t)));
@@ -179,7 +177,7 @@ static PetscErrorCode SolveMissing(HycoReducer t, HycoSnapshots store, const Tas
 /* G at all nodes, from the files. Rank 0. */
 static PetscErrorCode ReadFlexibilities(HycoReducer t, HycoSnapshots store, const Task *task)
 {
-  HycoGridField *G = &t->condensed->field[HYCO_FIELD_G];
+  HycoGridField *G = &Condensing(t)->condensed->field[HYCO_FIELD_G];
   const PetscInt n = HycoTensorSize(&G->tensor);
   char path[PETSC_MAX_PATH_LEN];
 
@@ -193,7 +191,7 @@ static PetscErrorCode ReadFlexibilities(HycoReducer t, HycoSnapshots store, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerFlexibility(HycoReducer t, HycoSnapshots store)
+PetscErrorCode HycoCondensedFlexibilities(HycoReducer t, HycoSnapshots store)
 {
   const Task task = {0, NULL};
 
@@ -206,7 +204,7 @@ PetscErrorCode HycoReducerFlexibility(HycoReducer t, HycoSnapshots store)
 /* The columns of S from `first` on, this rank's rows: those of each node's file. */
 static PetscErrorCode ReadResponses(HycoReducer t, HycoSnapshots store, const Task *task, Mat S, PetscInt first)
 {
-  const PetscInt n = HycoTensorSize(&t->condensed->field[HYCO_FIELD_G].tensor), q = task->q;
+  const PetscInt n = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor), q = task->q;
   PetscInt lo, hi, lda;
   PetscScalar *s;
   PetscReal *rows;
@@ -231,8 +229,8 @@ static PetscErrorCode ReadResponses(HycoReducer t, HycoSnapshots store, const Ta
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerResponses(HycoReducer t, HycoSnapshots store, PetscInt q, const PetscReal P[], Mat S,
-                                    PetscInt first)
+PetscErrorCode HycoCondensedResponses(HycoReducer t, HycoSnapshots store, PetscInt q, const PetscReal P[], Mat S,
+                                      PetscInt first)
 {
   const Task task = {q, P};
 

@@ -3,8 +3,7 @@
   y = K[i,:] Vp gives its part on the modes, its entries on full-order unknowns the rest. Rows that no parameter reaches
   are summed once and kept.
 */
-#include <hycodomain.h>
-#include <hycoromimpl.h>
+#include <hycogalerkin.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
 #include <petscblaslapack.h>
 
@@ -18,6 +17,7 @@ struct _n_HycoReduced {
 
 PetscErrorCode HycoReducedCreateSparse(HycoROM m)
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscInt *nnz;
   const PetscInt *ia, *ja;
   PetscInt n;
@@ -25,15 +25,15 @@ PetscErrorCode HycoReducedCreateSparse(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n, &nnz));
-  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  for (PetscInt k = 0; k < m->n_free; k++) nnz[k] = m->n;
-  for (PetscInt k = 0; k < m->n_fe; k++) nnz[m->n_free + k] = m->n_free + ia[m->fe_dof[k] + 1] - ia[m->fe_dof[k]];
-  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatCreate(PETSC_COMM_SELF, &m->Kr));
-  PetscCall(MatSetSizes(m->Kr, m->n, m->n, m->n, m->n));
-  PetscCall(MatSetType(m->Kr, MATSEQAIJ));
+  PetscCall(MatGetRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  for (PetscInt k = 0; k < g->n_free; k++) nnz[k] = m->n;
+  for (PetscInt k = 0; k < m->n_fe; k++) nnz[g->n_free + k] = g->n_free + ia[m->fe_dof[k] + 1] - ia[m->fe_dof[k]];
+  PetscCall(MatRestoreRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatCreate(PETSC_COMM_SELF, &g->Kr));
+  PetscCall(MatSetSizes(g->Kr, m->n, m->n, m->n, m->n));
+  PetscCall(MatSetType(g->Kr, MATSEQAIJ));
   for (PetscInt k = 0; k < m->n; k++) nnz[k] = PetscMin(nnz[k], m->n);
-  PetscCall(MatSeqAIJSetPreallocation(m->Kr, 0, nnz));
+  PetscCall(MatSeqAIJSetPreallocation(g->Kr, 0, nnz));
   PetscCall(PetscFree(nnz));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -77,11 +77,12 @@ static PetscErrorCode ListRows(HycoROM m, HycoReduced r)
 /* y = K[i,:] Vp over the modes. */
 static void RowTimesModes(HycoROM m, PetscInt n, const PetscInt col[], const PetscScalar val[], PetscReal y[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const PetscInt l = m->l;
 
   for (PetscInt j = 0; j < l; j++) y[j] = 0;
   for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *v = m->Vp + (size_t)col[k] * (size_t)l;
+    const PetscReal *v = g->Vp + (size_t)col[k] * (size_t)l;
 
     for (PetscInt j = 0; j < l; j++) y[j] += val[k] * v[j];
   }
@@ -91,29 +92,30 @@ static void RowTimesModes(HycoROM m, PetscInt n, const PetscInt col[], const Pet
 static PetscInt ReducedRow(HycoROM m, PetscInt n, const PetscInt col[], const PetscScalar val[], PetscReal y[],
                            PetscInt index[], PetscReal value[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscInt count = 0;
 
   RowTimesModes(m, n, col, val, y);
-  if (m->G) {
+  if (g->G) {
     for (PetscInt f = 0; f < m->n_fe; f++) {
       PetscReal sum = 0;
 
-      for (PetscInt j = 0; j < m->l; j++) sum += y[j] * m->G[j * m->n_fe + f];
+      for (PetscInt j = 0; j < m->l; j++) sum += y[j] * g->G[j * m->n_fe + f];
       index[f] = f;
       value[f] = sum;
     }
     for (PetscInt k = 0; k < n; k++) {
-      if (m->fe_at[col[k]] >= 0) value[m->fe_at[col[k]]] += val[k];
+      if (g->fe_at[col[k]] >= 0) value[g->fe_at[col[k]]] += val[k];
     }
     return m->n_fe;
   }
-  for (; count < m->n_free; count++) {
+  for (; count < g->n_free; count++) {
     index[count] = count;
     value[count] = y[count];
   }
   for (PetscInt k = 0; k < n; k++) {
-    if (m->fe_at[col[k]] < 0) continue;
-    index[count] = m->n_free + m->fe_at[col[k]];
+    if (g->fe_at[col[k]] < 0) continue;
+    index[count] = g->n_free + g->fe_at[col[k]];
     value[count++] = val[k];
   }
   return count;
@@ -122,25 +124,26 @@ static PetscInt ReducedRow(HycoROM m, PetscInt n, const PetscInt col[], const Pe
 /* The pattern of a sparse Kr: full rows of the modes, the modes and the neighbours in the others. */
 static PetscErrorCode SetPattern(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[])
 {
-  HycoReduced r = m->reduced;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoReduced r = g->reduced;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m->n; k++) {
     r->index[k] = k;
     r->value[k] = 0;
   }
-  for (PetscInt j = 0; j < m->n_free; j++)
-    PetscCall(MatSetValues(m->Kr, 1, &j, m->n, r->index, r->value, INSERT_VALUES));
+  for (PetscInt j = 0; j < g->n_free; j++)
+    PetscCall(MatSetValues(g->Kr, 1, &j, m->n, r->index, r->value, INSERT_VALUES));
   for (PetscInt k = 0; k < r->n_rows; k++) {
-    const PetscInt i = r->row[k], row = m->n_free + m->fe_at[i];
+    const PetscInt i = r->row[k], row = g->n_free + g->fe_at[i];
     PetscInt count;
 
-    if (m->fe_at[i] < 0) continue;
+    if (g->fe_at[i] < 0) continue;
     count = ReducedRow(m, ia[i + 1] - ia[i], ja + ia[i], a + ia[i], r->y, r->index, r->value);
-    PetscCall(MatSetValues(m->Kr, 1, &row, count, r->index, r->value, INSERT_VALUES));
+    PetscCall(MatSetValues(g->Kr, 1, &row, count, r->index, r->value, INSERT_VALUES));
   }
-  PetscCall(MatAssemblyBegin(m->Kr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(m->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -149,19 +152,20 @@ static PetscErrorCode SetPattern(HycoROM m, const PetscInt ia[], const PetscInt 
 static void AddRows(HycoROM m, PetscInt first, PetscInt last, const PetscInt ia[], const PetscInt ja[],
                     const PetscScalar a[], const PetscInt start[], PetscScalar kr[])
 {
-  HycoReduced r = m->reduced;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoReduced r = g->reduced;
 
   for (PetscInt t = first; t < last; t++) {
-    const PetscInt i = r->row[t], row = m->n_free + m->fe_at[i];
+    const PetscInt i = r->row[t], row = g->n_free + g->fe_at[i];
     const PetscInt count = ReducedRow(m, ia[i + 1] - ia[i], ja + ia[i], a + ia[i], r->y, r->index, r->value);
-    const PetscReal *v = m->Vp + (size_t)i * (size_t)m->l;
+    const PetscReal *v = g->Vp + (size_t)i * (size_t)m->l;
 
-    if (m->fe_at[i] < 0) {
-      for (PetscInt j = 0; j < m->n_free; j++) {
+    if (g->fe_at[i] < 0) {
+      for (PetscInt j = 0; j < g->n_free; j++) {
         PetscReal *to = r->modes + (size_t)j * (size_t)m->n;
 
-        for (PetscInt k = 0; k < m->n_free; k++) to[k] += v[j] * r->value[k];
-        for (PetscInt k = m->n_free; k < count; k++) to[r->index[k]] += v[j] * r->value[k];
+        for (PetscInt k = 0; k < g->n_free; k++) to[k] += v[j] * r->value[k];
+        for (PetscInt k = g->n_free; k < count; k++) to[r->index[k]] += v[j] * r->value[k];
       }
     } else if (start)
       for (PetscInt k = 0; k < count; k++) kr[start[row] + k] = r->value[k];
@@ -173,10 +177,11 @@ static void AddRows(HycoROM m, PetscInt first, PetscInt last, const PetscInt ia[
 /* The rows of the modes, which lie before the others. */
 static void PutModes(HycoROM m, const PetscInt start[], PetscScalar kr[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const size_t n = (size_t)m->n;
 
-  for (size_t j = 0; j < (size_t)m->n_free; j++) {
-    for (size_t k = 0; k < n; k++) kr[start ? (size_t)start[j] + k : k * n + j] += m->reduced->modes[j * n + k];
+  for (size_t j = 0; j < (size_t)g->n_free; j++) {
+    for (size_t k = 0; k < n; k++) kr[start ? (size_t)start[j] + k : k * n + j] += g->reduced->modes[j * n + k];
   }
 }
 
@@ -184,7 +189,8 @@ static void PutModes(HycoROM m, const PetscInt start[], PetscScalar kr[])
 static PetscErrorCode FillAll(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[],
                               PetscScalar kr[])
 {
-  HycoReduced r = m->reduced;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoReduced r = g->reduced;
   PetscBLASInt n, l;
   const PetscReal one = 1, zero = 0;
 
@@ -194,14 +200,14 @@ static PetscErrorCode FillAll(HycoROM m, const PetscInt ia[], const PetscInt ja[
   for (PetscInt t = 0; t < r->n_rows; t++) {
     const PetscInt i = r->row[t];
 
-    RowTimesModes(m, ia[i + 1] - ia[i], ja + ia[i], a + ia[i], r->Y + (size_t)m->fe_at[i] * (size_t)m->l);
+    RowTimesModes(m, ia[i + 1] - ia[i], ja + ia[i], a + ia[i], r->Y + (size_t)g->fe_at[i] * (size_t)m->l);
   }
-  BLASgemm_("T", "T", &n, &n, &l, &one, r->Y, &l, m->G, &n, &zero, kr, &n);
+  BLASgemm_("T", "T", &n, &n, &l, &one, r->Y, &l, g->G, &n, &zero, kr, &n);
   for (PetscInt t = 0; t < r->n_rows; t++) {
     const PetscInt i = r->row[t];
 
     for (PetscInt k = ia[i]; k < ia[i + 1]; k++) {
-      if (m->fe_at[ja[k]] >= 0) kr[(size_t)m->fe_at[ja[k]] * (size_t)m->n + (size_t)m->fe_at[i]] += a[k];
+      if (g->fe_at[ja[k]] >= 0) kr[(size_t)g->fe_at[ja[k]] * (size_t)m->n + (size_t)g->fe_at[i]] += a[k];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -209,15 +215,16 @@ static PetscErrorCode FillAll(HycoROM m, const PetscInt ia[], const PetscInt ja[
 
 static PetscErrorCode Create(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   HycoReduced r;
 
   PetscFunctionBegin;
-  PetscCall(PetscNew(&m->reduced));
-  r = m->reduced;
-  PetscCall(PetscObjectTypeCompare((PetscObject)m->Kr, MATSEQDENSE, &r->dense));
+  PetscCall(PetscNew(&g->reduced));
+  r = g->reduced;
+  PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &r->dense));
   PetscCall(ListRows(m, r));
-  PetscCall(PetscMalloc5(m->l, &r->y, m->n + 100, &r->value, m->n + 100, &r->index, m->n_free * m->n, &r->modes,
-                         m->G ? m->n_fe * m->l : 0, &r->Y));
+  PetscCall(PetscMalloc5(m->l, &r->y, m->n + 100, &r->value, m->n + 100, &r->index, g->n_free * m->n, &r->modes,
+                         g->G ? m->n_fe * m->l : 0, &r->Y));
   if (!r->dense && ia) PetscCall(SetPattern(m, ia, ja, a)); /* else the table gave it */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -226,13 +233,14 @@ static PetscErrorCode Create(HycoROM m, const PetscInt ia[], const PetscInt ja[]
 static PetscErrorCode FillRows(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[],
                                const PetscInt start[], PetscScalar kr[])
 {
-  HycoReduced r = m->reduced;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoReduced r = g->reduced;
   const size_t n = start ? (size_t)start[m->n] : (size_t)m->n * (size_t)m->n;
 
   PetscFunctionBegin;
   if (!r->constant && r->n_constant) {
     PetscCall(PetscCalloc1(n, &r->constant));
-    PetscCall(PetscArrayzero(r->modes, m->n_free * m->n));
+    PetscCall(PetscArrayzero(r->modes, g->n_free * m->n));
     AddRows(m, 0, r->n_constant, ia, ja, a, start, r->constant);
     PutModes(m, start, r->constant);
   }
@@ -240,7 +248,7 @@ static PetscErrorCode FillRows(HycoROM m, const PetscInt ia[], const PetscInt ja
     PetscCall(PetscArraycpy(kr, r->constant, n));
   else
     PetscCall(PetscArrayzero(kr, n));
-  PetscCall(PetscArrayzero(r->modes, m->n_free * m->n));
+  PetscCall(PetscArrayzero(r->modes, g->n_free * m->n));
   AddRows(m, r->n_constant, r->n_rows, ia, ja, a, start, kr);
   PutModes(m, start, kr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -248,58 +256,62 @@ static PetscErrorCode FillRows(HycoROM m, const PetscInt ia[], const PetscInt ja
 
 PetscErrorCode HycoReducedEntries(HycoROM m, PetscInt *n, PetscScalar *a[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const PetscInt *start, *columns;
   PetscScalar *all;
   PetscInt rows;
   PetscBool dense, done;
 
   PetscFunctionBegin;
-  PetscCall(PetscObjectTypeCompare((PetscObject)m->Kr, MATSEQDENSE, &dense));
+  PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &dense));
   if (dense) {
     *n = m->n * m->n;
-    PetscCall(MatDenseGetArray(m->Kr, &all));
+    PetscCall(MatDenseGetArray(g->Kr, &all));
     *a = all;
-    PetscCall(MatDenseRestoreArray(m->Kr, &all)); /* they stay where they are */
+    PetscCall(MatDenseRestoreArray(g->Kr, &all)); /* they stay where they are */
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(MatGetRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &rows, &start, &columns, &done));
+  PetscCall(MatGetRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &rows, &start, &columns, &done));
   *n = start[m->n];
-  PetscCall(MatRestoreRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &rows, &start, &columns, &done));
-  PetscCall(MatSeqAIJGetArray(m->Kr, &all));
+  PetscCall(MatRestoreRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &rows, &start, &columns, &done));
+  PetscCall(MatSeqAIJGetArray(g->Kr, &all));
   *a = all;
-  PetscCall(MatSeqAIJRestoreArray(m->Kr, &all));
+  PetscCall(MatSeqAIJRestoreArray(g->Kr, &all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoReducedRows(HycoROM m, PetscInt row[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const PetscInt *start, *columns;
   PetscInt n;
   PetscBool dense, done;
 
   PetscFunctionBegin;
-  PetscCall(PetscObjectTypeCompare((PetscObject)m->Kr, MATSEQDENSE, &dense));
+  PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &dense));
   if (dense) {
     for (PetscInt k = 0; k < m->n * m->n; k++) row[k] = k % m->n;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(MatGetRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
+  PetscCall(MatGetRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
   for (PetscInt i = 0; i < m->n; i++) {
     for (PetscInt k = start[i]; k < start[i + 1]; k++) row[k] = i;
   }
-  PetscCall(MatRestoreRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
+  PetscCall(MatRestoreRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoReducedPrepare(HycoROM m)
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscFunctionBegin;
-  if (!m->reduced) PetscCall(Create(m, NULL, NULL, NULL));
+  if (!g->reduced) PetscCall(Create(m, NULL, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoReducedFillStiffness(HycoROM m)
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const PetscInt *ia, *ja, *start = NULL, *columns;
   const PetscScalar *a;
   PetscScalar *kr;
@@ -307,98 +319,100 @@ PetscErrorCode HycoReducedFillStiffness(HycoROM m)
   PetscBool done;
 
   PetscFunctionBegin;
-  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatSeqAIJGetArrayRead(m->K, &a));
-  if (!m->reduced) PetscCall(Create(m, ia, ja, a));
-  if (m->reduced->dense) {
-    PetscCall(MatDenseGetArrayWrite(m->Kr, &kr));
-    PetscCall(m->G ? FillAll(m, ia, ja, a, kr) : FillRows(m, ia, ja, a, NULL, kr));
-    PetscCall(MatDenseRestoreArrayWrite(m->Kr, &kr));
+  PetscCall(MatGetRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatSeqAIJGetArrayRead(g->K, &a));
+  if (!g->reduced) PetscCall(Create(m, ia, ja, a));
+  if (g->reduced->dense) {
+    PetscCall(MatDenseGetArrayWrite(g->Kr, &kr));
+    PetscCall(g->G ? FillAll(m, ia, ja, a, kr) : FillRows(m, ia, ja, a, NULL, kr));
+    PetscCall(MatDenseRestoreArrayWrite(g->Kr, &kr));
   } else {
-    PetscCall(MatGetRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
-    PetscCall(MatSeqAIJGetArrayWrite(m->Kr, &kr));
+    PetscCall(MatGetRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
+    PetscCall(MatSeqAIJGetArrayWrite(g->Kr, &kr));
     PetscCall(FillRows(m, ia, ja, a, start, kr));
-    PetscCall(MatSeqAIJRestoreArrayWrite(m->Kr, &kr));
-    PetscCall(MatRestoreRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
+    PetscCall(MatSeqAIJRestoreArrayWrite(g->Kr, &kr));
+    PetscCall(MatRestoreRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
   }
-  PetscCall(PetscObjectStateIncrease((PetscObject)m->Kr));
-  PetscCall(MatAssemblyBegin(m->Kr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(m->Kr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatSeqAIJRestoreArrayRead(m->K, &a));
-  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(PetscObjectStateIncrease((PetscObject)g->Kr));
+  PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatSeqAIJRestoreArrayRead(g->K, &a));
+  PetscCall(MatRestoreRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* B[A_lambda, A'_c] Vbar[A'_c,:] and Vbar[A_c,:]^T B[A_lambda, A_c]^T */
 PetscErrorCode HycoReducedFillContact(HycoROM m)
 {
-  const HycoRows *rows = &m->own_rows;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoRows *rows = &g->own_rows;
   PetscReal *value;
   PetscInt *index, dim = m->fe->dim;
 
   PetscFunctionBegin;
-  if (m->type == HYCO_ROM_PROJECTION) {
-    PetscCall(HycoProjectionFillContact(m));
+  if (g->contact) {
+    PetscCall(g->contact(m));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  value = m->reduced->value;
-  index = m->reduced->index;
-  PetscCall(MatZeroEntries(m->Br));
-  PetscCall(MatZeroEntries(m->Btr));
+  value = g->reduced->value;
+  index = g->reduced->index;
+  PetscCall(MatZeroEntries(g->Br));
+  PetscCall(MatZeroEntries(g->Btr));
   for (PetscInt k = 0; k < m->m; k++) {
     const PetscInt lo = rows->start[k], hi = rows->start[k + 1];
-    PetscInt count = ReducedRow(m, hi - lo, rows->dof + lo, rows->value + lo, m->reduced->y, index, value);
+    PetscInt count = ReducedRow(m, hi - lo, rows->dof + lo, rows->value + lo, g->reduced->y, index, value);
 
-    PetscCall(MatSetValues(m->Br, 1, &k, count, index, value, INSERT_VALUES));
-    for (PetscInt j = 0; j < m->n_free; j++) {
+    PetscCall(MatSetValues(g->Br, 1, &k, count, index, value, INSERT_VALUES));
+    for (PetscInt j = 0; j < g->n_free; j++) {
       value[j] = 0;
       index[j] = j;
     }
-    count = m->n_free;
+    count = g->n_free;
     for (PetscInt t = lo; t < hi; t++) {
       const PetscInt i = rows->dof[t];
 
       if (m->role[i / dim] != HYCO_ROLE_A) continue;
-      for (PetscInt j = 0; j < m->n_free; j++) value[j] += rows->value[t] * m->Vp[(size_t)i * (size_t)m->l + (size_t)j];
-      if (m->fe_at[i] < 0) continue;
-      index[count] = m->n_free + m->fe_at[i];
+      for (PetscInt j = 0; j < g->n_free; j++) value[j] += rows->value[t] * g->Vp[(size_t)i * (size_t)m->l + (size_t)j];
+      if (g->fe_at[i] < 0) continue;
+      index[count] = g->n_free + g->fe_at[i];
       value[count++] = rows->value[t];
     }
-    PetscCall(MatSetValues(m->Btr, count, index, 1, &k, value, INSERT_VALUES));
+    PetscCall(MatSetValues(g->Btr, count, index, 1, &k, value, INSERT_VALUES));
   }
-  PetscCall(MatAssemblyBegin(m->Br, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(m->Br, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyBegin(m->Btr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(m->Btr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyBegin(g->Br, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(g->Br, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyBegin(g->Btr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(g->Btr, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Vbar[A,:]^T F[A] and D[A_lambda] */
 PetscErrorCode HycoReducedFillVectors(HycoROM m)
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const PetscScalar *F;
   PetscScalar *f, *d;
 
   PetscFunctionBegin;
-  PetscCall(VecSet(m->Fr, 0));
-  PetscCall(VecGetArrayRead(m->F, &F));
-  PetscCall(VecGetArray(m->Fr, &f));
-  for (PetscInt r = 0; r < m->reduced->n_rows; r++) {
-    const PetscInt i = m->reduced->row[r];
+  PetscCall(VecSet(g->Fr, 0));
+  PetscCall(VecGetArrayRead(g->F, &F));
+  PetscCall(VecGetArray(g->Fr, &f));
+  for (PetscInt r = 0; r < g->reduced->n_rows; r++) {
+    const PetscInt i = g->reduced->row[r];
 
     if (F[i] == 0) continue;
-    if (m->fe_at[i] >= 0) f[m->n_free + m->fe_at[i]] += F[i];
-    for (PetscInt j = 0; j < m->n_free; j++) f[j] += m->Vp[(size_t)i * (size_t)m->l + (size_t)j] * F[i];
+    if (g->fe_at[i] >= 0) f[g->n_free + g->fe_at[i]] += F[i];
+    for (PetscInt j = 0; j < g->n_free; j++) f[j] += g->Vp[(size_t)i * (size_t)m->l + (size_t)j] * F[i];
   }
-  PetscCall(VecRestoreArray(m->Fr, &f));
-  PetscCall(VecRestoreArrayRead(m->F, &F));
+  PetscCall(VecRestoreArray(g->Fr, &f));
+  PetscCall(VecRestoreArrayRead(g->F, &F));
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
-  if (m->type == HYCO_ROM_PROJECTION) {
-    PetscCall(HycoProjectionFillGap(m));
+  if (g->gap) {
+    PetscCall(g->gap(m));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(VecGetArray(m->Dr, &d));
-  for (PetscInt k = 0; k < m->m; k++) d[k] = m->own_rows.gap[k];
-  PetscCall(VecRestoreArray(m->Dr, &d));
+  PetscCall(VecGetArray(g->Dr, &d));
+  for (PetscInt k = 0; k < m->m; k++) d[k] = g->own_rows.gap[k];
+  PetscCall(VecRestoreArray(g->Dr, &d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

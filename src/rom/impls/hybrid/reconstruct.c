@@ -5,7 +5,7 @@
   picks the one near the least norm.
 */
 #include <hycoalgorithms.h>
-#include <hycoromimpl.h>
+#include <hycohybrid.h>
 
 const char *const HycoReconstructSolvers[] = {"auto", "nnls", "tao", NULL};
 enum { SOLVER_AUTO, SOLVER_NNLS, SOLVER_TAO };
@@ -42,31 +42,32 @@ struct _n_HycoReconstruction {
 
 static PetscErrorCode SetUp(HycoROM m)
 {
+  HycoHybridROM h = (HycoHybridROM)m->data;
   const PetscInt N = m->pairs.n;
   HycoReconstruction r;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&r));
-  m->reconstruction = r;
+  h->reconstruction = r;
   PetscCall(PetscMalloc1(N, &r->contact));
   for (PetscInt k = 0; k < N; k++) {
     PetscBool any = PETSC_FALSE;
 
-    for (PetscInt j = 0; j < m->n_dual; j++) {
-      const PetscReal force = m->S_lambda[(size_t)j * (size_t)N + (size_t)k];
+    for (PetscInt j = 0; j < h->n_dual; j++) {
+      const PetscReal force = h->S_lambda[(size_t)j * (size_t)N + (size_t)k];
 
       any = (PetscBool)(any || force != 0);
       if (m->in_rid[k]) r->scale = PetscMax(r->scale, force);
     }
     if (any) r->contact[r->n++] = k;
   }
-  PetscCall(PetscMalloc1((size_t)r->n * (size_t)m->n_dual, &r->S));
-  for (PetscInt j = 0; j < m->n_dual; j++) {
+  PetscCall(PetscMalloc1((size_t)r->n * (size_t)h->n_dual, &r->S));
+  for (PetscInt j = 0; j < h->n_dual; j++) {
     for (PetscInt k = 0; k < r->n; k++)
-      r->S[(size_t)j * (size_t)r->n + (size_t)k] = m->S_lambda[(size_t)j * (size_t)N + (size_t)r->contact[k]];
+      r->S[(size_t)j * (size_t)r->n + (size_t)k] = h->S_lambda[(size_t)j * (size_t)N + (size_t)r->contact[k]];
   }
-  PetscCall(PetscMalloc4(r->n, &r->open, r->n, &r->d, r->n, &r->h, m->n_dual, &r->c));
-  PetscCall(HycoWeightedCreate(r->n, m->n_dual, r->S, SMALL * SMALL * r->scale * r->scale, &r->weighted));
+  PetscCall(PetscMalloc4(r->n, &r->open, r->n, &r->d, r->n, &r->h, h->n_dual, &r->c));
+  PetscCall(HycoWeightedCreate(r->n, h->n_dual, r->S, SMALL * SMALL * r->scale * r->scale, &r->weighted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,8 +89,9 @@ PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction)
  */
 static PetscErrorCode SolveWrittenOut(HycoROM m)
 {
-  HycoReconstruction r = m->reconstruction;
-  const PetscInt n = m->n_dual;
+  HycoHybridROM h = (HycoHybridROM)m->data;
+  HycoReconstruction r = h->reconstruction;
+  const PetscInt n = h->n_dual;
   PetscInt rows = n;
   PetscReal *A, *b;
 
@@ -110,13 +112,14 @@ static PetscErrorCode SolveWrittenOut(HycoROM m)
     }
     a[row + j] = SMALL * r->scale;
   }
-  PetscCall(Solve(m->reconstruct_solver, rows, n, A, b, r->c));
+  PetscCall(Solve(h->reconstruct_solver, rows, n, A, b, r->c));
   PetscCall(PetscFree2(A, b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMReconstruct(HycoROM m)
+PetscErrorCode HycoHybridReconstruct(HycoROM m)
 {
+  HycoHybridROM h = (HycoHybridROM)m->data;
   const PetscInt N = m->pairs.n;
   HycoReconstruction r;
   PetscReal force = 0;
@@ -124,21 +127,21 @@ PetscErrorCode HycoROMReconstruct(HycoROM m)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m->m; k++) force += m->Lambda[m->contact[k]];
-  if (m->m == N || !m->n_dual || !m->m || force == 0) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!m->reconstruction) PetscCall(SetUp(m));
+  if (m->m == N || !h->n_dual || !m->m || force == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!h->reconstruction) PetscCall(SetUp(m));
   PetscCall(HycoROMComplete(m));
-  r = m->reconstruction;
+  r = h->reconstruction;
   for (PetscInt i = 0; i < r->n; i++) {
     const PetscInt k = r->contact[i];
 
-    r->open[i] = HycoROMAddRow(m, k, -m->gap[k]);
+    r->open[i] = HycoROMAddRow(m, k, -m->rows.gap[k]);
     r->d[i] = (m->in_rid[k] ? 1 : 0) + (r->open[i] < 0 ? r->open[i] * r->open[i] : 0);
     r->h[i] = m->in_rid[k] ? m->Lambda[k] : 0;
   }
-  if (m->reconstruct_solver != SOLVER_TAO && r->scale > 0)
+  if (h->reconstruct_solver != SOLVER_TAO && r->scale > 0)
     PetscCall(HycoWeightedNNLS(r->weighted, r->d, r->h, RTOL, r->c, &solved));
   if (!solved) PetscCall(SolveWrittenOut(m));
-  for (PetscInt j = 0; j < m->n_dual; j++) {
+  for (PetscInt j = 0; j < h->n_dual; j++) {
     const PetscReal *s = r->S + (size_t)j * (size_t)r->n;
 
     if (r->c[j] == 0) continue;

@@ -8,7 +8,6 @@
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
 #include <hycolcp.h>
-#include <hycoreducerimpl.h>
 
 #define SMALL 1e-2 /* of the largest: what smaller ones are divided by */
 #define LAST  4    /* one of so many patterns of forces, the last, tells how those displace that are none */
@@ -66,7 +65,7 @@ static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal
 static PetscErrorCode PredictDisplacement(HycoReducer t, HycoCondensed c, PetscInt k, const PetscReal mu[], Work *w)
 {
   const PetscInt s = c->sample[k], r = c->l, m = c->m;
-  const PetscReal *own = c->Lambda + (size_t)k * (size_t)m, *u = t->responses.C + (size_t)s * (size_t)r;
+  const PetscReal *own = c->Lambda + (size_t)k * (size_t)m, *u = Condensing(t)->responses.C + (size_t)s * (size_t)r;
   const HycoGridField *H = &c->field[HYCO_FIELD_H];
   const PetscReal *h = H->data + (size_t)HycoCondensedNode(c, H, k) * (size_t)H->rows;
 
@@ -177,7 +176,7 @@ static PetscErrorCode LeaveOutParameter(HycoReducer t, HycoCondensed c, PetscInt
    no more than the last patterns do, force by force. */
 static PetscReal ModesError(HycoReducer t, HycoCondensed c, Work *w)
 {
-  const HycoResponses *x = &t->responses;
+  const HycoResponses *x = &Condensing(t)->responses;
   const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), r = c->l,
                  nodes = HycoTensorSize(&c->field[HYCO_FIELD_G].tensor);
   PetscReal cut = 0, compliance = 0;
@@ -198,9 +197,9 @@ static PetscReal ModesError(HycoReducer t, HycoCondensed c, Work *w)
   return CUT * (cut + x->missed * compliance);
 }
 
-PetscErrorCode HycoReducerLeaveOut(HycoReducer t)
+PetscErrorCode HycoCondensedLeaveOut(HycoReducer t)
 {
-  HycoCondensed c = t->condensed;
+  HycoCondensed c = Condensing(t)->condensed;
   const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
   Work w = {0};
 

@@ -44,55 +44,59 @@ PetscErrorCode HycoTableDestroy(HycoTable *table)
 
 PetscErrorCode HycoTableKeepPattern(HycoROM m, HycoTable t)
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   const PetscInt *start, *column;
   PetscInt n;
   PetscBool dense, done;
 
   PetscFunctionBegin;
-  PetscCall(PetscObjectTypeCompare((PetscObject)m->Kr, MATSEQDENSE, &dense));
+  PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &dense));
   if (dense) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatGetRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &column, &done));
+  PetscCall(MatGetRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &column, &done));
   t->n = n;
   HycoDuplicate(n + 1, start, &t->start);
   HycoDuplicate(start[n], column, &t->column);
-  PetscCall(MatRestoreRowIJ(m->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &column, &done));
+  PetscCall(MatRestoreRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &column, &done));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoTableCreateSparse(HycoROM m)
 {
-  const HycoTable t = m->table;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoTable t = g->table;
 
   PetscFunctionBegin;
   HycoCheck(t->n == m->n, "%s: the table of the reduced stiffness has %d rows, the matrix %d: train the model again",
             m->path, (int)t->n, (int)m->n);
-  PetscCall(MatCreate(PETSC_COMM_SELF, &m->Kr));
-  PetscCall(MatSetSizes(m->Kr, m->n, m->n, m->n, m->n));
-  PetscCall(MatSetType(m->Kr, MATSEQAIJ));
-  PetscCall(MatSeqAIJSetPreallocationCSR(m->Kr, t->start, t->column, NULL));
+  PetscCall(MatCreate(PETSC_COMM_SELF, &g->Kr));
+  PetscCall(MatSetSizes(g->Kr, m->n, m->n, m->n, m->n));
+  PetscCall(MatSetType(g->Kr, MATSEQAIJ));
+  PetscCall(MatSeqAIJSetPreallocationCSR(g->Kr, t->start, t->column, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscInt n;
   PetscScalar *a;
 
   PetscFunctionBegin;
   PetscCall(HycoReducedEntries(m, &n, &a));
-  HycoCheck(n == m->table->values.rows,
+  HycoCheck(n == g->table->values.rows,
             "%s: the table of the reduced stiffness has %d entries, the matrix %d: train the model again", m->path,
-            (int)m->table->values.rows, (int)n);
-  PetscCall(HycoGridFieldEvaluate(&m->table->values, mu, -1, -1, a));
-  PetscCall(PetscObjectStateIncrease((PetscObject)m->Kr));
-  PetscCall(MatAssemblyBegin(m->Kr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(m->Kr, MAT_FINAL_ASSEMBLY));
+            (int)g->table->values.rows, (int)n);
+  PetscCall(HycoGridFieldEvaluate(&g->table->values, mu, -1, -1, a));
+  PetscCall(PetscObjectStateIncrease((PetscObject)g->Kr));
+  PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
 {
-  const HycoTensor *t = &m->table->values.tensor;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoTensor *t = &g->table->values.tensor;
 
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer, "  the reduced stiffness is a polynomial, tabulated at"));
@@ -107,7 +111,8 @@ PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
 
 PetscErrorCode HycoTableSave(HycoROM m, HycoH5 h)
 {
-  const HycoTable t = m->table;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoTable t = g->table;
   const HycoTensor *tensor = &t->values.tensor;
   PetscReal *x;
   PetscInt all = 0;
@@ -142,7 +147,8 @@ static PetscErrorCode CheckParameters(HycoROM m, const PetscInt count[], const P
 /* The rows of a sparse matrix: they lie one behind the other, their columns ascend. */
 static PetscErrorCode LoadPattern(HycoROM m, HycoH5 h)
 {
-  const HycoTable t = m->table;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoTable t = g->table;
   PetscInt one = 1, n = -1, *entries = &t->values.rows;
   PetscBool good;
 
@@ -163,6 +169,7 @@ static PetscErrorCode LoadPattern(HycoROM m, HycoH5 h)
 /* The table, without a sparse matrix's rows; the caller frees what was read, of a refused file too. */
 static PetscErrorCode LoadValues(HycoROM m, HycoH5 h, PetscInt **count, PetscReal **x, PetscReal **data)
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscInt dim = m->scene->n_parameters, one = 1, all = 0, nodes = 1, rows = -1;
   PetscReal *of[HYCO_MAX_PARAMETERS];
 
@@ -177,8 +184,8 @@ static PetscErrorCode LoadValues(HycoROM m, HycoH5 h, PetscInt **count, PetscRea
   PetscCall(CheckParameters(m, *count, *x));
   PetscCall(HycoH5LoadReal(h, "table/stiffness", &nodes, &rows, data));
   for (PetscInt p = 0, at = 0; p < dim; at += (*count)[p++]) of[p] = *x + at;
-  PetscCall(HycoTableCreate(*count, of, dim, rows, &m->table));
-  PetscCall(PetscArraycpy(m->table->values.data, *data, (size_t)nodes * (size_t)rows));
+  PetscCall(HycoTableCreate(*count, of, dim, rows, &g->table));
+  PetscCall(PetscArraycpy(g->table->values.data, *data, (size_t)nodes * (size_t)rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,8 +6,50 @@
   the forces to determine.
 */
 #include <hycoalgorithms.h>
-#include <hycoreducerimpl.h>
+#include <hycoprojection.h>
 #include <petscblaslapack.h>
+
+/* What the options of this type say, and what a run makes of them. */
+typedef struct {
+  HycoDual dual;
+  PetscInt max_its, vectors; /* of the factorisation; 0: as many as there are modes */
+  PetscInt n_supremizers;    /* of the modes, the last */
+} * Training;
+
+PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t)
+{
+  Training s;
+  PetscInt dual = HYCO_DUAL_NNMF;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s));
+  t->training = s;
+  s->max_its = 100;
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor(""));
+  PetscCall(HycoOptionsWord("-hyco_dual",
+                            "forces: of the finite elements (hybrid); factorised dual snapshots, or they themselves "
+                            "(projection) [fe; nnmf if projection]",
+                            HycoDuals, &dual, NULL));
+  PetscCall(HycoOptionsFor("projection"));
+  PetscCall(HycoOptionsInt("-hyco_nnmf_vectors",
+                           "vectors of the nonnegative factorisation (0: as many as displacement modes)", 0,
+                           PETSC_MAX_INT, &s->vectors, NULL));
+  PetscCall(HycoOptionsInt("-hyco_nnmf_max_its", "alternations of the nonnegative factorisation", 1, PETSC_MAX_INT,
+                           &s->max_its, NULL));
+  PetscOptionsEnd();
+  s->dual = (HycoDual)dual;
+  HycoCheckModel(s->dual != HYCO_DUAL_FE,
+                 "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where targets are given, with which it is the last resort. */
+PetscBool HycoProjectionOffers(HycoReducer t, PetscBool targets)
+{
+  (void)t;
+  return targets;
+}
 
 /* Supremizers of unit length: this share of them beyond the modes is round-off. */
 #define NEW 1e-8
@@ -60,11 +102,13 @@ static PetscErrorCode Append(HycoReducer t, PetscInt N, PetscInt q, const PetscR
   HycoDuplicate(both, sigma, &t->sigma);
   PetscCall(PetscFree3(V, VtU, sigma));
   t->l = both;
-  t->n_supremizers = q;
+  ((Training)t->training)->n_supremizers = q;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerEnrich(HycoReducer t)
+/* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V_whole, sigma (0 for these)
+   and VtU have more columns. Rank 0. */
+static PetscErrorCode Enrich(HycoReducer t)
 {
   const PetscInt N = t->sizes[0] * t->sizes[3], n = t->n_s;
   Mat R, X, Q;
@@ -99,46 +143,64 @@ PetscErrorCode HycoReducerEnrich(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each snapshot scaled to unit 2-norm. */
-static PetscErrorCode FromSnapshots(HycoROM m, const PetscReal S[])
+PetscErrorCode HycoProjectionModes(HycoReducer t, HycoSnapshots store)
 {
+  Training s = (Training)t->training;
+
+  PetscFunctionBegin;
+  (void)store;
+  s->n_supremizers = 0;
+  if (s->dual == HYCO_DUAL_SNAPSHOTS) HycoOnRoot(HycoComm(t), Enrich(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The n snapshots S, each scaled to unit 2-norm. */
+static PetscErrorCode FromSnapshots(HycoROM m, PetscInt n, const PetscReal S[])
+{
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
   const PetscInt N = m->pairs.n;
 
   PetscFunctionBegin;
-  m->l_lambda = m->n_dual;
-  for (PetscInt j = 0; j < m->n_dual; j++) {
+  p->l_lambda = n;
+  for (PetscInt j = 0; j < n; j++) {
     PetscReal length = 0;
 
     for (PetscInt i = 0; i < N; i++) length += S[j * N + i] * S[j * N + i];
-    for (PetscInt i = 0; i < N; i++) m->V_lambda[j * N + i] = S[j * N + i] / PetscSqrtReal(length);
+    for (PetscInt i = 0; i < N; i++) p->V_lambda[j * N + i] = S[j * N + i] / PetscSqrtReal(length);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* V_lambda from the model's dual snapshots, which it needs no more. */
+/* V_lambda from the dual snapshots. */
 static PetscErrorCode MakeBasis(HycoReducer t, HycoROM m)
 {
-  const PetscInt N = m->pairs.n, n = m->n_dual, k = t->nnmf_vectors ? PetscMin(t->nnmf_vectors, PetscMin(N, n)) : m->l;
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  const Training s = (Training)t->training;
+  const PetscInt N = m->pairs.n;
+  PetscInt n, k;
   PetscReal *S;
 
   PetscFunctionBegin;
-  HycoDuplicate(N * n, m->S_lambda, &S);
+  PetscCall(HycoReducerDualSnapshots(t, &n, &S));
+  k = s->vectors ? PetscMin(s->vectors, PetscMin(N, n)) : m->l;
   for (PetscInt i = 0; i < N * n; i++) S[i] = PetscMax(S[i], 0); /* round-off of iterative solves */
-  PetscCall(PetscMalloc1(N * PetscMax(n, k) + 1, &m->V_lambda));
-  if (m->dual == HYCO_DUAL_SNAPSHOTS)
-    PetscCall(FromSnapshots(m, S));
+  PetscCall(PetscMalloc1(N * PetscMax(n, k) + 1, &p->V_lambda));
+  if (p->dual == HYCO_DUAL_SNAPSHOTS)
+    PetscCall(FromSnapshots(m, n, S));
   else if (n)
-    PetscCall(HycoNNMF(N, n, S, k, t->nnmf_max_its, m->V_lambda, &m->l_lambda, &m->dual_misfit));
+    PetscCall(HycoNNMF(N, n, S, k, s->max_its, p->V_lambda, &p->l_lambda, &p->dual_misfit));
   PetscCall(PetscFree(S));
-  m->n_dual = 0;
-  m->counts[1] = t->n_supremizers;
-  m->counts[0] = t->counts[HYCO_SEED_DUAL] = m->l_lambda;
+  m->counts[1] = s->n_supremizers;
+  m->counts[0] = t->counts[HYCO_SEED_DUAL] = p->l_lambda;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerProject(HycoReducer t, HycoROM m)
+PetscErrorCode HycoProjectionBuild(HycoROM m, HycoReducer t)
 {
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
+
   PetscFunctionBegin;
+  p->dual = ((Training)t->training)->dual;
   PetscCall(MakeBasis(t, m));
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
   PetscCall(HycoReducerJudge(t, m));
@@ -146,6 +208,22 @@ PetscErrorCode HycoReducerProject(HycoReducer t, HycoROM m)
       m->numbers[1] < 0.5,
       "the projection-based model misses its own training displacements by %.0f %% on average (%d modes, %d force "
       "vectors, condition %.0e): take more modes (a smaller -hyco_pod_tol)",
-      100 * (double)m->numbers[1], (int)m->l, (int)m->l_lambda, (double)m->numbers[0]);
+      100 * (double)m->numbers[1], (int)m->l, (int)p->l_lambda, (double)m->numbers[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoProjectionReport(HycoReducer t, HycoROM m, HycoTraining *r)
+{
+  const HycoProjectionROM p = (HycoProjectionROM)m->data;
+  const PetscInt n = ((Training)t->training)->n_supremizers;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTrainingAddFact(r, "n_supremizers", (PetscReal)n));
+  PetscCall(HycoTrainingAddFact(r, "dual_misfit", p->dual_misfit));
+  snprintf(
+      r->summary, sizeof(r->summary),
+      "projection-based: %d snapshots; %d displacement modes, %d of them supremizers; %d force vectors, which leave "
+      "out %.2e of the dual snapshots' energy\n",
+      (int)r->n_samples, (int)r->n_modes, (int)n, (int)p->l_lambda, (double)p->dual_misfit);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

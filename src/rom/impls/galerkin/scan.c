@@ -5,27 +5,19 @@
   and the smallest singular value. Two crossings between neighbouring points go unseen: a finer grid sees them.
 */
 #include <hycoalgorithms.h>
-#include <hycoreducerimpl.h>
-#include <unistd.h>
+#include <hycotable.h>
 
 #define LARGEST 2500 /* unknowns: beyond, a dense factor at every point takes minutes */
 
-/* Which parameters reach the stiffness. */
+/* The parameters over whose ranges the reduced stiffness is looked at. */
 static PetscErrorCode FindParameters(HycoROM m, PetscBool reaches[])
 {
-  HycoScene s = m->scene;
-  PetscReal mu[HYCO_MAX_PARAMETERS];
+  const HycoScene s = m->scene;
 
   PetscFunctionBegin;
   PetscCall(HycoROMSetUp(m));
-  for (PetscInt p = 0; p < s->n_parameters; p++) mu[p] = s->lo[p];
-  PetscCall(HycoFESetParameters(m->fe, mu));
-  for (PetscInt p = 0; p < s->n_parameters; p++) {
-    mu[p] = s->hi[p];
-    PetscCall(HycoFESetParameters(m->fe, mu));
-    reaches[p] = (PetscBool)(s->hi[p] > s->lo[p] && m->fe->stiffness_changed);
-  }
-  m->fe->ready = PETSC_FALSE; /* nothing is assembled at these values */
+  HycoSceneReaches(s, reaches);
+  for (PetscInt p = 0; p < s->n_parameters; p++) reaches[p] = (PetscBool)(reaches[p] && s->hi[p] > s->lo[p]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -64,6 +56,7 @@ static void GridPoint(HycoScene s, const PetscBool reaches[], PetscInt each, Pet
 static PetscErrorCode ScanMine(HycoROM m, const PetscBool reaches[], PetscInt each, PetscInt first, PetscInt last,
                                PetscReal sign[], PetscReal ratio[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscReal mu[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
@@ -73,8 +66,8 @@ static PetscErrorCode ScanMine(HycoROM m, const PetscBool reaches[], PetscInt ea
     PetscInt s;
 
     GridPoint(m->scene, reaches, each, k, mu);
-    PetscCall(HycoROMAssemble(m, mu));
-    PetscCall(MatConvert(m->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
+    PetscCall(HycoGalerkinAssemble(m, mu));
+    PetscCall(MatConvert(g->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
     PetscCall(MatDenseGetArray(dense, &a));
     PetscCall(HycoSingularity(m->n, a, &s, &ratio[k]));
     PetscCall(MatDenseRestoreArray(dense, &a));
@@ -98,7 +91,8 @@ static void Say(HycoScene s, const PetscReal mu[], char text[HYCO_LINE])
 static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches[], PetscInt each,
                                const PetscReal sign[], const PetscReal ratio[])
 {
-  HycoScan *s = &m->scan;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoScan *s = &g->scan;
   PetscInt positive = 0, worst = 0, change = 0;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   char here[HYCO_LINE], there[HYCO_LINE];
@@ -126,6 +120,7 @@ static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches
 
 static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
 {
+  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscInt each = 0;
   PetscReal *sign, *ratio;
   PetscMPIInt size;
@@ -134,35 +129,37 @@ static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   HycoOnEach(HycoComm(t), FindParameters(m, reaches));
   if (m->n > LARGEST) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ChooseGrid(t->scan, m->n, m->scene->n_parameters, reaches, &each, &m->scan.n));
-  PetscCall(PetscCalloc2(m->scan.n, &sign, m->scan.n, &ratio));
+  PetscCall(ChooseGrid(t->scan, m->n, m->scene->n_parameters, reaches, &each, &g->scan.n));
+  PetscCall(PetscCalloc2(g->scan.n, &sign, g->scan.n, &ratio));
   HycoOnEach(HycoComm(t),
-             ScanMine(m, reaches, each, t->rank * m->scan.n / size, (t->rank + 1) * m->scan.n / size, sign, ratio));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sign, (PetscMPIInt)m->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ratio, (PetscMPIInt)m->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t)));
+             ScanMine(m, reaches, each, t->rank * g->scan.n / size, (t->rank + 1) * g->scan.n / size, sign, ratio));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sign, (PetscMPIInt)g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ratio, (PetscMPIInt)g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t)));
   HycoOnRoot(HycoComm(t), Conclude(t, m, reaches, each, sign, ratio));
   PetscCall(PetscFree2(sign, ratio));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerScan(HycoReducer t, const char candidate[], const char path[], HycoScan *found)
+PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report)
 {
-  HycoROM m = NULL;
   PetscBool reaches[HYCO_MAX_PARAMETERS];
-  PetscErrorCode ierr;
-  char message[HYCO_LINE];
 
   PetscFunctionBegin;
-  HycoOnEach(HycoComm(t), HycoROMLoad(candidate, &m));
-  PetscCall(HycoCatchBegin());
-  ierr = Scan(t, m, reaches);
-  if (!ierr && t->rank == 0) ierr = HycoReducerTabulate(m, reaches);
-  if (!ierr && t->rank == 0) ierr = HycoROMRewrite(m, path);
-  PetscCall(HycoCatchEnd(ierr, message));
-  *found = m->scan;
-  if (t->rank == 0) (void)unlink(candidate);
-  PetscCall(HycoErrorSync(HycoComm(t), ierr, message));
-  PetscCall(HycoROMDestroy(&m));
-  PetscCallMPI(MPI_Bcast(found, sizeof(*found), MPI_BYTE, 0, HycoComm(t)));
+  PetscCall(Scan(t, m, reaches));
+  HycoOnRoot(HycoComm(t), HycoGalerkinTabulate(m, reaches));
+  report->scan = ((HycoGalerkin)m->data)->scan;
+  PetscCallMPI(MPI_Bcast(&report->scan, sizeof(report->scan), MPI_BYTE, 0, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal HycoGalerkinCost(HycoReducer t, const HycoAttempt *a)
+{
+  const PetscReal dim = t->sizes[3],
+                  cell = dim == 1   ? 2
+                         : dim == 2 ? 8
+                                    : 24,
+                  l = a->n_modes, n = l + (PetscReal)a->n_fe_dofs;
+
+  return n * n * n * 2 / 3 + 20 * (PetscReal)a->rid_elements * cell * cell +
+         2 * (PetscReal)a->rid_nodes * dim * l * (l + 10);
 }

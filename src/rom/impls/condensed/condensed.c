@@ -6,14 +6,15 @@
   of the active set, the forces of the nearest training point, decides nothing but the time.
 */
 #include <hycocondensed.h>
-#include <hycoromimpl.h>
+#include <hycoromtypes.h>
 #include <petscblaslapack.h>
 #include <petscviewer.h>
 
 const char *const HycoGridFieldNames[] = {"G", "g", "H", "a"};
 
 /* An eigenvalue of G that is less negative than this share of its largest diagonal entry is round-off. */
-#define SEMIDEFINITE 1e-12
+#define SEMIDEFINITE  1e-12
+#define MANY_CONTACTS 600
 
 PetscErrorCode HycoCondensedCreate(PetscInt dim, PetscInt m, PetscInt l, HycoCondensed *condensed)
 {
@@ -29,7 +30,7 @@ PetscErrorCode HycoCondensedCreate(PetscInt dim, PetscInt m, PetscInt l, HycoCon
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoCondensedDestroy(HycoCondensed *condensed)
+PetscErrorCode HycoCondensedFree(HycoCondensed *condensed)
 {
   HycoCondensed c = *condensed;
 
@@ -226,7 +227,7 @@ PetscErrorCode HycoCondensedFlexibility(HycoCondensed c, const PetscReal mu[], P
 /* G and H, unless their parameters are as they were. */
 static PetscErrorCode BringStiffness(HycoROM m, const PetscReal mu[])
 {
-  HycoCondensed c = m->condensed;
+  HycoCondensed c = (HycoCondensed)m->data;
   PetscBool same = c->current, definite;
 
   PetscFunctionBegin;
@@ -234,7 +235,7 @@ static PetscErrorCode BringStiffness(HycoROM m, const PetscReal mu[])
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   c->current = PETSC_FALSE;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
-  PetscCall(PetscObjectStateIncrease((PetscObject)m->Kr));
+  PetscCall(PetscObjectStateIncrease((PetscObject)c->flexibility));
   HycoCheckModel(
       definite,
       "the interpolated flexibility is not positive definite here (one value left out: error %.1e): train on "
@@ -284,14 +285,14 @@ static void StartSet(HycoCondensed c, const PetscReal mu[])
 /* The forces are in model->Lambda. */
 static PetscErrorCode SolveForces(HycoROM m, const PetscReal mu[])
 {
-  HycoCondensed c = m->condensed;
+  HycoCondensed c = (HycoCondensed)m->data;
   HycoPrediction *p = &m->prediction;
   const char *method;
 
   PetscFunctionBegin;
   StartSet(c, mu);
   PetscCall(HycoSolverSetStartSet(m->solver, c->active));
-  PetscCall(HycoSolverSolve(m->solver, NULL, m->L));
+  PetscCall(HycoSolverSolve(m->solver, NULL, c->forces));
   PetscCall(HycoSolverGetReason(m->solver, &p->reason));
   PetscCall(HycoSolverGetIterations(m->solver, &p->iterations));
   PetscCall(HycoSolverGetKKT(m->solver, &p->kkt));
@@ -305,7 +306,7 @@ static PetscErrorCode SolveForces(HycoROM m, const PetscReal mu[])
 /* gamma = a - H L, and U = u0 + V gamma on the nodes of the reduced mesh. */
 static PetscErrorCode Displacements(HycoROM m, const PetscReal mu[])
 {
-  HycoCondensed c = m->condensed;
+  HycoCondensed c = (HycoCondensed)m->data;
   const PetscInt l = m->l;
 
   PetscFunctionBegin;
@@ -315,16 +316,13 @@ static PetscErrorCode Displacements(HycoROM m, const PetscReal mu[])
     for (PetscInt i = 0; i < c->m; i++) m->gamma[j] -= c->H[j * c->m + i] * m->Lambda[i];
   }
   if (!c->exact_gap) PetscCall(HycoCondensedBringGap(c, mu));
-  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
-    m->U[i] = m->fe->u0[i];
-    for (PetscInt j = 0; j < l; j++) m->U[i] += m->V[(size_t)i * (size_t)l + (size_t)j] * m->gamma[j];
-  }
+  PetscCall(HycoROMExpand(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoCondensedPredict(HycoROM m, const PetscReal mu[])
+static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
-  HycoCondensed c = m->condensed;
+  HycoCondensed c = (HycoCondensed)m->data;
   HycoPrediction *p = &m->prediction;
   PetscReal begin = HycoNow(), solve;
 
@@ -342,65 +340,43 @@ PetscErrorCode HycoCondensedPredict(HycoROM m, const PetscReal mu[])
   for (PetscInt q = 0; q < c->dim; q++) {
     if (!c->affine[q]) p->interpolation_error *= HycoPolynomialGrowth(c->n[q], c->x[q], mu[q]);
   }
-  p->seconds.total = HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* w = g + G L on the arrays of the condensed model. */
 static PetscErrorCode CreateSystem(HycoROM m)
 {
-  HycoCondensed c = m->condensed;
+  HycoCondensed c = (HycoCondensed)m->data;
   Vec g;
 
   PetscFunctionBegin;
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, c->m, c->m, c->M, &m->Kr));
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, c->m, c->m, c->M, &c->flexibility));
   PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, c->m, c->g, &g));
-  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, c->m, m->Lambda, &m->L));
-  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &m->system));
-  PetscCall(HycoSystemSetFlexibility(m->system, m->Kr, g));
-  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver));
-  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->scene->options));
-  PetscCall(HycoSolverSetFromOptions(m->solver));
-  PetscCall(HycoSolverSetSystem(m->solver, m->system));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, c->m, m->Lambda, &c->forces));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &c->system));
+  PetscCall(HycoSystemSetFlexibility(c->system, c->flexibility, g));
+  PetscCall(HycoSolverSetSystem(m->solver, c->system));
   PetscCall(VecDestroy(&g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoCondensedSetUp(HycoROM m)
+static PetscErrorCode SetUp(HycoROM m)
 {
-  const PetscInt entries = HycoPairsWidth(&m->pairs) * m->mesh->dim * m->pairs.n;
+  HycoCondensed c = (HycoCondensed)m->data;
 
   PetscFunctionBegin;
-  PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
-  PetscCall(HycoCondensedPrepare(m->condensed));
-  m->n = m->n_free = m->l;
-  m->m = m->n_L = m->pairs.n;
-  m->spread = PETSC_TRUE;
-  PetscCall(PetscMalloc1(m->m, &m->contact));
-  PetscCall(PetscMalloc1(m->m, &m->slave_id));
-  for (PetscInt k = 0; k < m->m; k++) {
-    m->contact[k] = k;
-    m->slave_id[k] = m->mesh->node_id[m->pairs.slave[k]];
-  }
-  PetscCall(PetscMalloc1(m->m + 1, &m->row_start));
-  PetscCall(PetscMalloc1(entries, &m->row_dof));
-  PetscCall(PetscMalloc1(entries, &m->row_value));
-  PetscCall(PetscMalloc1(m->m, &m->gap));
-  m->condensed->given = (HycoGapSource){m->fe, &m->pairs, m->row_start, m->row_dof, m->row_value, m->gap};
-  m->condensed->scene = m->scene;
-  if (m->condensed->exact_loads) PetscCall(HycoCondensedPrepareLoads(m->condensed));
-  PetscCall(PetscCalloc1(m->l, &m->gamma));
-  PetscCall(PetscCalloc1(m->fe->n_dof, &m->U));
-  PetscCall(PetscCalloc1(m->m, &m->Lambda));
-  PetscCall(PetscMalloc1(m->mesh->n_cells * m->fe->n_sigma, &m->stress));
+  PetscCall(HycoROMSetUpAll(m));
+  PetscCall(HycoCondensedPrepare(c));
+  c->given = (HycoGapSource){m->fe, &m->pairs, m->rows};
+  c->scene = m->scene;
+  if (c->exact_loads) PetscCall(HycoCondensedPrepareLoads(c));
   PetscCall(CreateSystem(m));
-  m->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoCondensedView(HycoROM m, PetscViewer viewer)
+static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
-  HycoCondensed c = m->condensed;
+  HycoCondensed c = (HycoCondensed)m->data;
 
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer, "  contacts: %d; flexibility at %d points, gap without forces at %d\n",
@@ -417,5 +393,114 @@ PetscErrorCode HycoCondensedView(HycoROM m, PetscViewer viewer)
                                    (double)c->errors[0], (double)c->errors[1], (double)c->errors[2]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  fields and stresses on %d of %d elements, or the whole mesh\n",
                                    (int)m->mesh->n_cells, (int)m->whole_cells));
+  if (!m->trust.n)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors by values left out%s\n",
+                                     !c->law && c->errors_u[0] < 0 ? ", and none of u: an older file" : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Reset(HycoROM m)
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemDestroy(&c->system));
+  PetscCall(MatDestroy(&c->flexibility));
+  PetscCall(VecDestroy(&c->forces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoROM m)
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedFree(&c));
+  m->data = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points of training are chosen where none are given: they are reported. */
+static void ReportPoints(HycoReducer t, HycoCondensed c, HycoTraining *r)
+{
+  const char *name = c->hopeless < 0 ? "" : t->scene->parameter[c->hopeless];
+
+  if (!c->chosen || c->target_met) return;
+  if (c->hopeless < 0)
+    snprintf(r->missed, sizeof(r->missed),
+             "-hyco_condensed_tol was not reached: the forces' error, one value left out, is %.1e, and %.1e was asked; "
+             "raise -hyco_condensed_max_values, which is %d, or -hyco_condensed_tol",
+             (double)c->errors[2], (double)Condensing(t)->tol, (int)Condensing(t)->max_values);
+  else
+    snprintf(r->missed, sizeof(r->missed),
+             "-hyco_condensed_tol was not reached: with %d values of %s the forces' error, one of them left out, is "
+             "%.1e, and hardly falls as values are added, where %.1e was asked: the stiffness or the contacts do not "
+             "depend smoothly on %s (a kink, as of abs or max, a jump); train a hybrid model, or raise "
+             "-hyco_condensed_tol",
+             (int)c->n[c->hopeless], name, (double)c->by_parameter[c->hopeless], (double)Condensing(t)->tol, name);
+}
+
+static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+  const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_G].tensor);
+
+  PetscFunctionBegin;
+  r->n_flexibilities = n;
+  PetscCall(HycoTrainingAddFact(r, "n_flexibilities", (PetscReal)n));
+  PetscCall(HycoTrainingAddFact(r, "left_out_flexibility_gap_forces", 0));
+  r->fact[r->n_facts - 1].n = 3;
+  PetscCall(PetscArraycpy(r->fact[r->n_facts - 1].value, c->errors, 3));
+  snprintf(
+      r->summary, sizeof(r->summary),
+      "condensed: %d snapshots, flexibility at %d points; one training value left out, relative: flexibility %.1e, "
+      "gap %.1e, forces %.1e; %d displacement modes\n",
+      (int)r->n_samples, (int)n, (double)c->errors[0], (double)c->errors[1], (double)c->errors[2], (int)r->n_modes);
+  ReportPoints(t, c, r);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
+{
+  const PetscReal m = t->sizes[2];
+
+  return m * m * ((PetscReal)a->n_flexibilities + m / 6.0) + 2 * (PetscReal)a->n_modes * (PetscReal)a->rid_contacts;
+}
+
+/* Its samples fill a disk where the contacts are many: then only when it is asked for. */
+static PetscBool Offers(HycoReducer t, PetscBool targets)
+{
+  (void)targets;
+  return (PetscBool)(t->sizes[2] > 0 && t->sizes[2] <= MANY_CONTACTS);
+}
+
+PetscErrorCode HycoROMCreate_Condensed(HycoROM m)
+{
+  static const HycoROMTraits traits = {
+      .title = "condensed", .settings = HYCO_SETTINGS_NONE, .constrains = PETSC_TRUE, .forces = PETSC_TRUE};
+  static const HycoROMOps ops = {.setfromoptions = HycoCondensedSetFromOptions,
+                                 .resettraining = HycoCondensedResetTraining,
+                                 .begin = HycoCondensedBegin,
+                                 .startpoints = HycoCondensedStartPoints,
+                                 .choosepoints = HycoCondensedChoosePoints,
+                                 .modes = HycoCondensedFindModes,
+                                 .build = HycoCondensedBuild,
+                                 .report = Report,
+                                 .cost = Cost,
+                                 .offers = Offers,
+                                 .setup = SetUp,
+                                 .reset = Reset,
+                                 .solve = Solve,
+                                 .features = HycoCondensedFeatures,
+                                 .estimate = HycoCondensedEstimate,
+                                 .view = View,
+                                 .save = HycoCondensedSave,
+                                 .load = HycoCondensedLoad,
+                                 .destroy = Destroy};
+  HycoCondensed c;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedCreate(0, 0, 0, &c));
+  PetscCall(HycoROMSetOps(m, &ops, &traits, c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

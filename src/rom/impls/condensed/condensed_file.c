@@ -1,6 +1,5 @@
 /* The condensed model's part of the model file: the grid's values, each field's degrees and data. */
 #include <hycocondensed.h>
-#include <hycoh5.h>
 #include <stdio.h>
 
 #define SETTLED "condensed/settled" /* -B K^-1 F, which older files have in "condensed/g" with D */
@@ -15,7 +14,7 @@ static void Dataset(HycoCondensed c, PetscInt f, char path[64])
 
 PetscErrorCode HycoCondensedSave(HycoROM m, HycoH5 h)
 {
-  HycoCondensed c = m->condensed;
+  HycoCondensed c = (HycoCondensed)m->data;
   char path[64];
 
   PetscFunctionBegin;
@@ -75,7 +74,7 @@ static PetscErrorCode LoadGiven(HycoH5 h, HycoCondensed c)
 /* The values of parameter p: ascending. */
 static PetscErrorCode LoadValues(HycoH5 h, HycoROM m, PetscInt p)
 {
-  HycoCondensed c = m->condensed;
+  HycoCondensed c = (HycoCondensed)m->data;
   char path[64];
   PetscInt one = 1;
 
@@ -104,7 +103,7 @@ static PetscErrorCode LoadLaw(HycoH5 h, HycoCondensed c)
 
 static PetscErrorCode LoadField(HycoH5 h, HycoROM m, PetscInt f)
 {
-  HycoCondensed c = m->condensed;
+  HycoCondensed c = (HycoCondensed)m->data;
   HycoGridField *field = &c->field[f];
   PetscInt n = HycoTensorSize(&field->tensor), rows = field->rows, dim = c->dim, one = 1, *degree;
   char path[64];
@@ -123,13 +122,14 @@ static PetscErrorCode LoadField(HycoH5 h, HycoROM m, PetscInt f)
 
 PetscErrorCode HycoCondensedLoad(HycoROM m, HycoH5 h)
 {
-  HycoCondensed c;
+  HycoCondensed c = (HycoCondensed)m->data;
   PetscInt n, three = 3, two = 2, one = 1;
   PetscReal *errors;
 
   PetscFunctionBegin;
-  PetscCall(HycoCondensedCreate(m->scene->n_parameters, m->pairs.n, m->l, &c));
-  m->condensed = c;
+  c->dim = m->scene->n_parameters;
+  c->m = m->pairs.n;
+  c->l = m->l;
   for (PetscInt p = 0; p < c->dim; p++) PetscCall(LoadValues(h, m, p));
   PetscCall(LoadFlags(h, "condensed/stiff", c->dim, c->stiff));
   PetscCall(LoadFlags(h, "condensed/affine", c->dim, c->affine));
