@@ -43,7 +43,7 @@ class Method(Case):
                            ('hyco_active_set', []), ('hyco_lemke', ['-hyco_solver_type', 'lemke'])):
             with self.subTest(name):
                 out = self.step('method', *watch, *args, ranks=2 if name == 'hyco_active_set' else 0)
-                self.assertEqual(len(re.findall(rf'type: {name}\b', out)), 1, out)
+                self.assertEqual(len(re.findall(rf'Tao Object:[^\n]*\n +type: {name}\b', out)), 1, out)
                 self.assertEqual(out.count('solve converged'), 1, out)
                 if name != 'hyco_lemke':  # it has pivots, no iterates
                     self.assertRegex(out, r'Residual: ')
