@@ -233,7 +233,8 @@ static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
   for (PetscInt i = 0; i < m; i++) {
     size = PetscMax(size, PetscMax(PetscAbsReal(g[i]), PetscAbsReal(w[i])));
     w[i] += g[i];
-    if (PetscIsInfOrNanReal(w[i]) || PetscIsInfOrNanReal(l[i])) worst[2] = PETSC_MAX_REAL;
+    if (!(PetscAbsReal(w[i]) <= PETSC_MAX_REAL) || !(PetscAbsReal(l[i]) <= PETSC_MAX_REAL)) /* or NaN */
+      worst[2] = PETSC_MAX_REAL;
   }
   for (PetscInt i = 0; i < m; i++) {
     worst[0] = PetscMax(worst[0], -w[i]);
