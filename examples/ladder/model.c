@@ -1,6 +1,6 @@
 /* A type of reduced model of your own: the training solutions' mean, weighted by the inverse squared distance to the
-   parameters. Means of nonnegative forces are nonnegative; nothing keeps them from penetrating, which the residuals
-   say. It is trained, saved, loaded, predicted and compared by the calls that any other type has.
+   parameters. Means of nonnegative forces are nonnegative; nothing makes them complementary to the gaps, which the
+   residuals say. It is trained, saved, loaded, predicted and compared by the calls that any other type has.
 
      build/ladder/model SCENE MODEL.h5 MU1 [MU2 ...] [-hyco_... options]
 */
@@ -191,9 +191,9 @@ static PetscErrorCode Run(const char *folder, const char *file, PetscInt n, cons
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(HycoROMCompare(model, fom, &e));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "%s: contact force %.8g, penetration %.3g, adhesion %.3g; errors: u %.4g, sigma %.4g, "
+                        "%s: contact force %.8g, complementarity %.3g, adhesion %.3g; errors: u %.4g, sigma %.4g, "
                         "lambda %.4g; estimated: u %.4g\n",
-                        p.title, (double)p.total_contact_force, (double)p.kkt.penetration, (double)p.kkt.adhesion,
+                        p.title, (double)p.total_contact_force, (double)p.kkt.complementarity, (double)p.kkt.adhesion,
                         (double)e.u, (double)e.sigma, (double)e.lambda, (double)p.estimated_error_u));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoROMDestroy(&model));

@@ -9,7 +9,7 @@ from common import HYCO, MPIRUN, PATIENCE, SOURCE, Case
 
 PROGRAM = os.path.join(os.path.dirname(HYCO), 'ladder', 'model')
 ROPE = os.path.join(SOURCE, 'examples', 'rope')
-OUT = re.compile(r'nearest solutions: contact force (\S+), penetration (\S+), adhesion (\S+); errors: u (\S+), sigma (\S+), lambda (\S+); '
+OUT = re.compile(r'nearest solutions: contact force (\S+), complementarity (\S+), adhesion (\S+); errors: u (\S+), sigma (\S+), lambda (\S+); '
                  r'estimated: u (\S+)')
 
 
@@ -24,10 +24,10 @@ class Model(Case):
 
     def test_model(self):
         first = self.run_program(0.07, 0.17)
-        force, penetration, adhesion, u, sigma, forces, estimated = first
+        force, complementarity, adhesion, u, sigma, forces, estimated = first
         self.assertGreater(force, 0)
         self.assertEqual(adhesion, 0)
-        self.assertGreater(penetration, 0)  # and the residuals tell
+        self.assertGreater(complementarity, 0)  # and the residuals tell
         for error in (u, sigma, forces):
             self.assertGreater(error, 1e-6)
             self.assertLess(error, 1)
@@ -35,7 +35,8 @@ class Model(Case):
         for a, b in zip(first, self.run_program(0.07, 0.17, ranks=3)):
             self.near(b, a, 1e-6)
         at = self.run_program(0.25, 0.5)  # the corners of the ranges are training points
-        self.assertLess(max(at[3:6]), 1e-6)
+        self.assertLess(at[5], 1e-6)  # of the forces; the displacement lacks what the modes cut off
+        self.assertLess(at[3], u)
 
     def test_refused(self):
         self.run_program(0.07, 0.17)
