@@ -63,7 +63,7 @@ typedef PetscOptionItems HycoOptionItems;
 #define HycoOptionsInt(name, text, lo, hi, value, set)                                                                 \
   HycoOptionsInt_Private(PetscOptionsObject, name, text, lo, hi, value, set)
 #define HycoOptionsBool(name, text, value, set) HycoOptionsBool_Private(PetscOptionsObject, name, text, value, set)
-#define HycoOptionsFlag(name, text, value)      HycoOptionsFlag_Private(PetscOptionsObject, name, text, value)
+#define HycoOptionsFlag(name, text, value)      HycoOptionsBool(name, "<> " text " []", value, NULL)
 #define HycoOptionsWord(name, text, words, index, set)                                                                 \
   HycoOptionsWord_Private(PetscOptionsObject, name, text, words, index, set)
 #define HycoOptionsString(name, text, value, length, set)                                                              \
@@ -76,7 +76,6 @@ PetscErrorCode HycoOptionsInt_Private(HycoOptionItems items, const char name[], 
                                       PetscInt hi, PetscInt *value, PetscBool *set);
 PetscErrorCode HycoOptionsBool_Private(HycoOptionItems items, const char name[], const char text[], PetscBool *value,
                                        PetscBool *set);
-PetscErrorCode HycoOptionsFlag_Private(HycoOptionItems items, const char name[], const char text[], PetscBool *value);
 PetscErrorCode HycoOptionsWord_Private(HycoOptionItems items, const char name[], const char text[],
                                        const char *const words[], PetscInt *index, PetscBool *set);
 PetscErrorCode HycoOptionsString_Private(HycoOptionItems items, const char name[], const char text[], char value[],

@@ -43,6 +43,8 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system);
   its kernel, an orthonormal basis, by MatSetNullSpace(). Changing a matrix in place is noticed through its state.
 */
 PetscErrorCode HycoSystemSetMatrices(HycoSystem system, Mat K, Mat Bt, Mat B, PetscBool symmetric);
+/* The matrices; each output may be NULL. Not collective. Borrowed. */
+PetscErrorCode HycoSystemGetMatrices(HycoSystem system, Mat *K, Mat *Bt, Mat *B);
 /* Sets (references) F of length n and D of length m (NULL without contact). */
 PetscErrorCode HycoSystemSetVectors(HycoSystem system, Vec F, Vec D);
 /*

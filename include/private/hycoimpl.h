@@ -87,6 +87,15 @@ PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, 
 #define HycoCheckHandle(handle, classid) PetscCall(HycoHandleCheck((handle), &(classid), PETSC_FUNCTION_NAME))
 /* Begins a View: stdout where *viewer is NULL; on an ASCII viewer the object's class and name, and a tab to pop. */
 PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool *ascii);
+/* XViewFromOptions() of a class. */
+#define HycoDefineViewFromOptions(Class, classid)                                                                      \
+  PetscErrorCode Class##ViewFromOptions(Class object, PetscObject owner, const char option[])                         \
+  {                                                                                                                    \
+    PetscFunctionBegin;                                                                                                \
+    HycoCheckHandle(object, classid);                                                                                  \
+    PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));                                         \
+    PetscFunctionReturn(PETSC_SUCCESS);                                                                                \
+  }
 /* The communicator of an object of any class. */
 #define HycoComm(object) PetscObjectComm((PetscObject)(object))
 /* Takes one reference from `*object` and clears it; returns unless that was the last. */

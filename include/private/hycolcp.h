@@ -110,10 +110,11 @@ PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char
 /* Registers hyco's types beside TAO's. */
 PetscErrorCode HycoTaoRegisterAll(void);
 
-/* A Tao with the options prefix hyco_, kept between problems. */
+/* A Tao, kept between problems; its options are -hyco_tao_..., behind the prefix of its owner. */
 typedef struct _n_HycoTao *HycoTao;
-/* Collective, as all that follows. */
-PetscErrorCode HycoTaoCreate(MPI_Comm comm, HycoTao *tao);
+/* Collective, as all that follows. `owner` (borrowed, may be NULL): of a problem that each of its ranks solves alone (comm:
+   PETSC_COMM_SELF) the first one prints what -hyco_tao_monitor and its like ask for. */
+PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *tao);
 /* NULL-safe. */
 PetscErrorCode HycoTaoDestroy(HycoTao *tao);
 /* max_its 0: 2000, or of hyco's types by the number of contacts. */

@@ -155,4 +155,7 @@ PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], HycoVa
 PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM model);
 PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM model, PetscReal *u, PetscReal *lambda);
 
+/* The settings as they stand. */
+void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *recipe);
+
 #endif

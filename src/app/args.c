@@ -62,10 +62,7 @@ static PetscErrorCode ListTakers(const char name[], char list[DRIVER_LINE])
     HycoOptionList own = {0};
 
     PetscCall(HycoOptionsRecord(&own, commands[c].declare));
-    if (HycoOptionListFind(&own, name)) {
-      PetscCall(PetscStrlcat(list, list[0] ? ", " : "", DRIVER_LINE));
-      PetscCall(PetscStrlcat(list, commands[c].name, DRIVER_LINE));
-    }
+    if (HycoOptionListFind(&own, name)) PetscCall(HycoListAdd(list, ", ", commands[c].name));
     PetscCall(HycoOptionListDestroy(&own));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -151,7 +148,7 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
+static PetscErrorCode CheckLeft(PetscBool early)
 {
   PetscInt n;
   char **names, **values, first[DRIVER_LINE] = "";
@@ -160,9 +157,8 @@ static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
   PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
   for (PetscInt k = 0; k < n && !first[0]; k++) {
     if (early && (strncasecmp(names[k], "hyco_mumps_", 11) == 0 || strncasecmp(names[k], "hyco_primal_", 12) == 0 ||
-                  strncasecmp(names[k], "hyco_norm_", 10) == 0))
+                  strncasecmp(names[k], "hyco_norm_", 10) == 0 || strncasecmp(names[k], "hyco_tao_", 9) == 0))
       continue;
-    if (tao && strncasecmp(names[k], "hyco_tao_", 9) == 0) continue;
     if (strncmp(names[k], "options_left", 12) && strncmp(names[k], "skip_petscrc", 12) && strcmp(names[k], "nox"))
       PetscCall(PetscStrncpy(first, names[k], sizeof(first)));
   }
@@ -174,19 +170,14 @@ static PetscErrorCode CheckLeft(PetscBool early, PetscBool tao)
 PetscErrorCode DriverCheckLeft(void)
 {
   PetscFunctionBegin;
-  PetscCall(CheckLeft(PETSC_FALSE, PETSC_FALSE));
+  PetscCall(CheckLeft(PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverCheckLeftEarly(HycoScene scene)
+PetscErrorCode DriverCheckLeftEarly(void)
 {
-  PetscOptions options;
-  char type[32] = "";
-
   PetscFunctionBegin;
-  PetscCall(HycoSceneGetOptions(scene, &options));
-  PetscCall(PetscOptionsGetString(options, NULL, "-hyco_solver_type", type, sizeof(type), NULL));
-  PetscCall(CheckLeft(PETSC_TRUE, (PetscBool)(strcasecmp(type, HYCO_SOLVER_TAO) == 0)));
+  PetscCall(CheckLeft(PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

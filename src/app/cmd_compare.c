@@ -182,8 +182,8 @@ PetscErrorCode DeclareCompare(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, path, NULL, path, path));
-  PetscCall(DriverDeclarePoint());
-  PetscCall(DriverDeclareSamples());
+  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -213,7 +213,7 @@ PetscErrorCode CommandCompare(void)
   HycoCheck(given, "give the test points: -mu V,V,... for one, or -grid N,N,..., or -values_NAME V,V,... for each "
                    "parameter, or -points FILE.csv");
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCall(DriverCheckLeftEarly(scene));
+  PetscCall(DriverCheckLeftEarly());
   PetscCall(HycoSceneHasContact(scene, &contact));
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));

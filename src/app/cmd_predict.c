@@ -119,7 +119,7 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMPredict(model, n, mu));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetPrediction(model, &p));
   PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
-  PetscCall(DriverCheckLeftEarly(scene));
+  PetscCall(DriverCheckLeftEarly());
   DriverWantsFullOrder(fallback, &p, why);
   if (why[0]) {
     PetscCall(DriverSolveFullOrder(fallback, n, mu, &p));
@@ -266,7 +266,7 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
-  PetscCall(DriverCheckLeftEarly(scene)); /* what the solver alone knows is read by the first prediction */
+  PetscCall(DriverCheckLeftEarly()); /* what the solver alone knows is read by the first prediction */
   PetscCall(PetscCalloc2(n * N_COLUMNS, &value, n, &full));
   begin = HycoNow();
   HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, value, full));
@@ -299,8 +299,8 @@ PetscErrorCode DeclarePredict(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, path, path, path, path));
-  PetscCall(DriverDeclarePoint());
-  PetscCall(DriverDeclareSamples());
+  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
   PetscCall(ReadExtrapolate(&flag));
   PetscCall(DriverReadTarget(HYCO_ERROR_U, &target));
   PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &target));

@@ -138,8 +138,8 @@ PetscErrorCode DeclareSolve(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, NULL, path, path, path));
-  PetscCall(DriverDeclarePoint());
-  PetscCall(DriverDeclareSamples());
+  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
   PetscCall(DriverReadMonitor(&monitor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -136,7 +136,7 @@ PetscErrorCode DeclareTrain(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, path, NULL, path, path));
-  PetscCall(DriverDeclareSamples());
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
   PetscCall(ReadGreedy(&greedy));
   PetscCall(DriverReadGreedy(NULL, NULL, &none, &log));
   PetscCall(DriverReadTargets(&search));
@@ -182,7 +182,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
   PetscCall(DriverSetSearch(&search, scene, reducer, n));
   if (greedy) PetscCall(DriverReadGreedy(scene, reducer, &training, &log));
-  PetscCall(DriverCheckLeftEarly(scene));
+  PetscCall(DriverCheckLeftEarly());
   if (greedy)
     PetscCall(HycoReducerRunGreedy(reducer, given ? samples : NULL, training, model, &t));
   else

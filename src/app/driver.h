@@ -28,7 +28,7 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
 PetscErrorCode DriverCheckLeft(void);
 /* The same before the solvers have run: what is meant for them (-hyco_mumps_..., -hyco_tao_... with that type) passes.
  */
-PetscErrorCode DriverCheckLeftEarly(HycoScene scene);
+PetscErrorCode DriverCheckLeftEarly(void);
 /* Declares -name and reads its value, "" when absent; the text is one of HycoOptionsString(). */
 PetscErrorCode DriverGet(const char name[], const char text[], char value[PETSC_MAX_PATH_LEN]);
 /* -scene, -model, -output, -report, -table, which several commands take; NULL: not read. */
@@ -46,11 +46,8 @@ PetscErrorCode DriverCheckOutputs(const Command *command);
 /* The scene's mesh is none of them. Collective. */
 PetscErrorCode DriverCheckMesh(HycoScene scene);
 
-/* -- points.c: points in the space of parameters -- */
+/* -- points.c: points in the space of parameters; without a scene, what gets some only declares its options -- */
 
-/* Declares the options of the next four. */
-PetscErrorCode DriverDeclarePoint(void);
-PetscErrorCode DriverDeclareSamples(void);
 /* One point: -mu v,v,... or -mu_NAME v. */
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
 /* Whether -mu or a -mu_NAME was given. */
@@ -59,8 +56,7 @@ PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given);
 PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given);
 /* Whether any point-set option was given. */
 PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given);
-/* The points among which a greedy training chooses: -training_grid, closed unless -grid_type says otherwise. Without a
-   scene only declared, as with the next. */
+/* The points among which a greedy training chooses: -training_grid, closed unless -grid_type says otherwise. */
 PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples);
 /* The points that models are judged by: -validation_grid or -validation_points; NULL when neither is given. */
 PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples);

@@ -30,44 +30,28 @@ typedef struct {
   HycoFileIdentity identity;
 } Named;
 
-static Named outputs[8];
+static Named outputs[8]; /* with room for the one that is compared */
 static PetscInt n_outputs;
 
-static PetscErrorCode Identify(const char what[], const char path[], Named *named)
+/* A file that is to be written, or (else) to be read, is none of those that are to be written, whatever its name. */
+static PetscErrorCode Take(const char what[], const char path[], PetscBool output)
 {
-  PetscFunctionBegin;
-  named->what = what;
-  PetscCall(PetscStrncpy(named->path, path, sizeof(named->path)));
-  HycoFileIdentify(path, &named->identity);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Two names of one file, of which one is to be written. */
-static PetscErrorCode CheckApart(const Named *a, const Named *b)
-{
-  PetscFunctionBegin;
-  if (!HycoFileSame(&a->identity, &b->identity)) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(strcmp(a->path, b->path), "%s and %s are both %s; give each a file of its own", a->what, b->what, b->path);
-  HycoFail("%s %s and %s %s are one file; give each a file of its own", a->what, a->path, b->what, b->path);
-}
-
-static PetscErrorCode AddOutput(const char what[], const char path[])
-{
-  PetscFunctionBegin;
-  PetscCall(Identify(what, path, &outputs[n_outputs]));
-  for (PetscInt k = 0; k < n_outputs; k++) PetscCall(CheckApart(&outputs[k], &outputs[n_outputs]));
-  n_outputs++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode CheckInput(const char what[], const char path[])
-{
-  Named named;
+  Named *taken = &outputs[n_outputs];
 
   PetscFunctionBegin;
   if (!path[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Identify(what, path, &named));
-  for (PetscInt k = 0; k < n_outputs; k++) PetscCall(CheckApart(&named, &outputs[k]));
+  taken->what = what;
+  PetscCall(PetscStrncpy(taken->path, path, sizeof(taken->path)));
+  HycoFileIdentify(path, &taken->identity);
+  for (const Named *other = outputs; other < taken; other++) {
+    const Named *a = output ? other : taken, *b = output ? taken : other;
+
+    if (!HycoFileSame(&a->identity, &b->identity)) continue;
+    HycoCheck(strcmp(a->path, b->path), "%s and %s are both %s; give each a file of its own", a->what, b->what,
+              b->path);
+    HycoFail("%s %s and %s %s are one file; give each a file of its own", a->what, a->path, b->what, b->path);
+  }
+  n_outputs += output;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,8 +63,8 @@ static PetscErrorCode AddFields(const char path[])
   PetscFunctionBegin;
   PetscCall(HycoFieldsCheckPath(path));
   snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
-  PetscCall(AddOutput("-output", path));
-  PetscCall(AddOutput("the numbers of -output", h5));
+  PetscCall(Take("-output", path, PETSC_TRUE));
+  PetscCall(Take("the numbers of -output", h5, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,7 +76,7 @@ static PetscErrorCode AddSnapshots(const char model[])
   PetscFunctionBegin;
   PetscCall(Peek("hyco_snapshots", folder));
   if (!folder[0]) snprintf(folder, sizeof(folder), "%.*s.snapshots", PETSC_MAX_PATH_LEN - 16, model);
-  PetscCall(AddOutput("the snapshot folder", folder));
+  PetscCall(Take("the snapshot folder", folder, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -105,7 +89,7 @@ static PetscErrorCode CheckSceneFile(void)
   PetscFunctionBegin;
   PetscCall(Peek("scene", path));
   snprintf(file, sizeof(file), "%s%s", path, stat(path, &info) == 0 && S_ISDIR(info.st_mode) ? "/scene.yaml" : "");
-  PetscCall(CheckInput("-scene", file));
+  PetscCall(Take("-scene", file, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -121,21 +105,21 @@ static PetscErrorCode CheckNames(PetscBool trains)
   PetscFunctionBegin;
   n_outputs = 0;
   PetscCall(Peek("model", model));
-  if (trains && model[0]) PetscCall(AddOutput("-model", model));
+  if (trains) PetscCall(Take("-model", model, PETSC_TRUE));
   for (PetscInt k = 0; written[k]; k++) {
     PetscCall(Peek(written[k] + 1, path));
-    if (path[0]) PetscCall(strcmp(written[k], "-output") ? AddOutput(written[k], path) : AddFields(path));
+    if (path[0]) PetscCall(strcmp(written[k], "-output") ? Take(written[k], path, PETSC_TRUE) : AddFields(path));
   }
   if (trains && model[0]) PetscCall(AddSnapshots(model));
-  if (!trains) PetscCall(CheckInput("-model", model));
+  if (!trains) PetscCall(Take("-model", model, PETSC_FALSE));
   PetscCall(CheckSceneFile());
   for (size_t k = 0; k < sizeof(read) / sizeof(read[0]); k++) {
     PetscCall(Peek(read[k] + 1, path));
-    PetscCall(CheckInput(read[k], path));
+    PetscCall(Take(read[k], path, PETSC_FALSE));
   }
   PetscCall(PetscGetArgs(&argc, &argv));
   for (int k = 2; k < argc - 1; k++) { /* PETSc keeps no option of that name */
-    if (strncmp(argv[k], "-options_file", 13) == 0) PetscCall(CheckInput(argv[k], argv[k + 1]));
+    if (strncmp(argv[k], "-options_file", 13) == 0) PetscCall(Take(argv[k], argv[k + 1], PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -191,6 +175,6 @@ PetscErrorCode DriverCheckMesh(HycoScene scene)
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetMesh(scene, &mesh));
-  HycoOnRoot(PETSC_COMM_WORLD, CheckInput("the mesh", mesh));
+  HycoOnRoot(PETSC_COMM_WORLD, Take("the mesh", mesh, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -24,7 +24,7 @@ static PetscErrorCode ParseNumbers(const char name[], const char text[], PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ListNames(HycoScene scene, char list[DRIVER_LINE])
+static PetscErrorCode ListNames(HycoScene scene, char list[HYCO_LINE])
 {
   PetscInt n;
   const char *const *names;
@@ -32,10 +32,7 @@ static PetscErrorCode ListNames(HycoScene scene, char list[DRIVER_LINE])
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
   list[0] = '\0';
-  for (PetscInt p = 0; p < n; p++) {
-    PetscCall(PetscStrlcat(list, p ? "," : "", DRIVER_LINE));
-    PetscCall(PetscStrlcat(list, names[p], DRIVER_LINE));
-  }
+  for (PetscInt p = 0; p < n; p++) PetscCall(HycoListAdd(list, ",", names[p]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,30 +76,6 @@ static PetscErrorCode ListRanges(HycoScene scene, char list[DRIVER_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -mu */
-static PetscErrorCode ReadPoint(char text[PETSC_MAX_PATH_LEN])
-{
-  PetscFunctionBegin;
-  PetscCall(DriverGet("mu", "<v,v,...> parameter values in declared order; or one by one: -mu_NAME v", text));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* -grid */
-static PetscErrorCode ReadGrid(char text[PETSC_MAX_PATH_LEN])
-{
-  PetscFunctionBegin;
-  PetscCall(DriverGet("grid", "<n,n,...> a set of points: n per parameter", text));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* -points */
-static PetscErrorCode ReadPoints(char text[PETSC_MAX_PATH_LEN])
-{
-  PetscFunctionBegin;
-  PetscCall(DriverGet("points", "<file.csv> a set of points: a header with the names, then a point per line", text));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* -grid_type: 0 centred, 1 closed, 2 Chebyshev. */
 static PetscErrorCode ReadGridType(PetscInt *type)
 {
@@ -118,66 +91,65 @@ static PetscErrorCode ReadGridType(PetscInt *type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverDeclarePoint(void)
+/* The numbers of -prefixNAME for each parameter, new memory or NULL; how many are given, and a name without. */
+static PetscErrorCode GetNamed(HycoScene scene, const char prefix[], const char meaning[], PetscInt count[],
+                               PetscReal *values[], PetscInt *given, const char **missing)
 {
-  char text[PETSC_MAX_PATH_LEN];
+  PetscInt n;
+  const char *const *names;
+  char text[PETSC_MAX_PATH_LEN], key[DRIVER_LINE];
 
   PetscFunctionBegin;
-  PetscCall(ReadPoint(text));
-  PetscCall(DriverGet("mu_", "<v> the parameter NAME: -mu_radius 4.06", text));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode DriverDeclareSamples(void)
-{
-  PetscInt type = 0;
-  char text[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBegin;
-  PetscCall(ReadGrid(text));
-  PetscCall(ReadGridType(&type));
-  PetscCall(DriverGet("values_", "<v,v,...> a set of points: values of the parameter NAME, all combined", text));
-  PetscCall(ReadPoints(text));
+  *given = 0;
+  if (!scene) {
+    PetscCall(DriverGet(prefix, meaning, text));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(CheckNamed(scene, prefix));
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  for (PetscInt p = 0; p < n; p++) {
+    values[p] = NULL;
+    PetscCall(PetscSNPrintf(key, sizeof(key), "%s%s", prefix, names[p]));
+    PetscCall(DriverGet(key, "", text));
+    if (!text[0])
+      *missing = names[p];
+    else {
+      PetscCall(ParseNumbers(key, text, &count[p], &values[p]));
+      ++*given;
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
 {
-  PetscInt n, given = 0;
-  const char *const *names;
-  char text[PETSC_MAX_PATH_LEN], list[DRIVER_LINE], key[DRIVER_LINE];
-  PetscBool whole;
-  PetscReal *values;
+  PetscInt n, m, count[64], given;
+  const char *const *names, *missing;
+  char text[PETSC_MAX_PATH_LEN], list[DRIVER_LINE];
+  PetscReal *values[64], *all;
 
   PetscFunctionBegin;
+  PetscCall(DriverGet("mu", "<v,v,...> parameter values in declared order; or one by one: -mu_NAME v", text));
+  PetscCall(GetNamed(scene, "mu_", "<v> the parameter NAME: -mu_radius 4.06", count, values, &given, &missing));
+  if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
   PetscCall(ListNames(scene, list));
-  PetscCall(CheckNamed(scene, "mu_"));
-  PetscCall(ReadPoint(text));
-  whole = (PetscBool)(text[0] != '\0');
-  if (whole) {
-    PetscInt m;
-
-    PetscCall(ParseNumbers("mu", text, &m, &values));
+  if (text[0]) {
+    PetscCall(ParseNumbers("mu", text, &m, &all));
     HycoCheck(m == n, "-mu has %d values; the scene has %d parameters: %s", (int)m, (int)n, n ? list : "(none)");
-    PetscCall(PetscArraycpy(mu, values, n));
-    PetscCall(PetscFree(values));
+    PetscCall(PetscArraycpy(mu, all, n));
+    PetscCall(PetscFree(all));
   }
   for (PetscInt p = 0; p < n; p++) {
-    PetscInt m;
-
-    PetscCall(PetscSNPrintf(key, sizeof(key), "mu_%s", names[p]));
-    PetscCall(DriverGet(key, "", text));
-    if (!text[0]) continue;
-    PetscCall(ParseNumbers(key, text, &m, &values));
-    HycoCheck(m == 1, "-%s has %d values; one is expected", key, (int)m);
-    HycoCheck(!whole, "-mu gives every parameter, and -%s gives one of them again; take one of the two away", key);
-    mu[p] = values[0];
-    given++;
-    PetscCall(PetscFree(values));
+    if (!values[p]) continue;
+    HycoCheck(count[p] == 1, "-mu_%s has %d values; one is expected", names[p], (int)count[p]);
+    HycoCheck(!text[0], "-mu gives every parameter, and -mu_%s gives one of them again; take one of the two away",
+              names[p]);
+    mu[p] = values[p][0];
+    PetscCall(PetscFree(values[p]));
   }
   PetscCall(ListRanges(scene, list));
-  HycoCheck(whole || given == n, "the scene has %d parameters (%s); give -mu with all of them, or -mu_NAME for each",
+  HycoCheck(text[0] || given == n, "the scene has %d parameters (%s); give -mu with all of them, or -mu_NAME for each",
             (int)n, list);
   PetscCall(HycoSceneCheckParameters(scene, n, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -225,9 +197,9 @@ static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char n
   char list[DRIVER_LINE];
 
   PetscFunctionBegin;
+  PetscCall(ReadGridType(&type));
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   PetscCall(ListNames(scene, list));
-  PetscCall(ReadGridType(&type));
   PetscCall(ParseNumbers(name, text, &m, &values));
   HycoCheck(m == n && n > 0, "-%s has %d numbers; the scene has %d parameters: %s", name, (int)m, (int)n,
             n ? list : "(none)");
@@ -282,60 +254,46 @@ PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples)
 }
 
 /* -values_NAME for every parameter, combined. */
-static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscBool *any)
+static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscInt *n_sets)
 {
-  PetscInt n, counts[64], given = 0;
-  const char *const *names;
+  PetscInt n, count[64], given;
+  const char *missing = "";
   PetscReal *values[64];
-  char text[PETSC_MAX_PATH_LEN], key[DRIVER_LINE], missing[DRIVER_LINE] = "";
 
   PetscFunctionBegin;
-  PetscCall(CheckNamed(scene, "values_"));
-  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
-  for (PetscInt p = 0; p < n; p++) {
-    values[p] = NULL;
-    PetscCall(PetscSNPrintf(key, sizeof(key), "values_%s", names[p]));
-    PetscCall(DriverGet(key, "", text));
-    if (text[0]) {
-      PetscCall(ParseNumbers(key, text, &counts[p], &values[p]));
-      given++;
-    } else
-      PetscCall(PetscStrncpy(missing, names[p], sizeof(missing)));
-  }
-  *any = (PetscBool)(given > 0);
-  HycoCheck(!given || given == n, "-values_ are given for %d of the %d parameters; -values_%s is missing", (int)given,
-            (int)n, missing);
-  if (given) PetscCall(HycoSamplesAddProduct(samples, counts, (const PetscReal *const *)values));
+  PetscCall(GetNamed(scene, "values_", "<v,v,...> a set of points: values of the parameter NAME, all combined", count,
+                     values, &given, &missing));
+  if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  HycoCheck(given == n, "-values_ are given for %d of the %d parameters; -values_%s is missing", (int)given, (int)n,
+            missing);
+  PetscCall(HycoSamplesAddProduct(samples, count, (const PetscReal *const *)values));
   for (PetscInt p = 0; p < n; p++) PetscCall(PetscFree(values[p]));
+  ++*n_sets;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given)
 {
-  char text[PETSC_MAX_PATH_LEN];
-  PetscInt n_sets = 0, n;
-  PetscBool any = PETSC_FALSE;
+  char grid[PETSC_MAX_PATH_LEN], points[PETSC_MAX_PATH_LEN];
+  PetscInt n_sets = 0, n, type = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesCreate(scene, samples));
-  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
-  PetscCall(ReadGrid(text));
-  if (text[0]) {
-    PetscCall(AddGrid(scene, *samples, "grid", 0, text));
-    n_sets++;
-  }
-  PetscCall(AddValues(scene, *samples, &any));
-  n_sets += any;
-  PetscCall(ReadPoints(text));
-  if (text[0]) {
-    PetscCall(HycoSamplesAddFile(*samples, text));
-    n_sets++;
-  }
-  if (!n_sets && !n) { /* a scene without parameters has one point */
-    PetscCall(HycoSamplesAddPoint(*samples, NULL));
-    n_sets = 1;
-  }
+  PetscCall(DriverGet("grid", "<n,n,...> a set of points: n per parameter", grid));
+  if (!scene) PetscCall(ReadGridType(&type));
+  if (scene) PetscCall(HycoSamplesCreate(scene, samples));
+  PetscCall(AddValues(scene, scene ? *samples : NULL, &n_sets));
+  PetscCall(DriverGet("points", "<file.csv> a set of points: a header with the names, then a point per line", points));
+  if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
+  n_sets += (grid[0] != '\0') + (points[0] != '\0');
   HycoCheck(n_sets <= 1, "give one set of points: -grid, or -values_NAME, or -points");
-  *given = (PetscBool)(n_sets == 1);
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  if (grid[0])
+    PetscCall(AddGrid(scene, *samples, "grid", 0, grid));
+  else if (points[0])
+    PetscCall(HycoSamplesAddFile(*samples, points));
+  else if (!n) /* a scene without parameters has one point */
+    PetscCall(HycoSamplesAddPoint(*samples, NULL));
+  *given = (PetscBool)(n_sets || !n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -15,7 +15,7 @@ static PetscErrorCode ReadMesh(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  HycoOnRoot(HycoComm(t), HycoMeshRead(t->scene, &t->whole));
+  PetscCall(HycoMeshCreateWhole(HycoComm(t), t->scene, &t->whole));
   HycoOnRoot(HycoComm(t), HycoPairsFind(t->scene, t->whole, &t->pairs));
   for (PetscInt k = 0; k < t->n_groups; k++)
     HycoOnRoot(HycoComm(t), HycoMeshFindGroup(t->whole, "hyco_rid_groups", t->groups[k], &group));
@@ -362,6 +362,7 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
     PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s.snapshots", path));
   PetscCall(HycoSnapshotsOpen(HycoComm(t), t->scene, folder, store));
   t->fingerprint = (*store)->fingerprint;
+  PetscCall(HycoReducerViewFromOptions(t, NULL, "-hyco_reducer_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -436,24 +436,20 @@ PetscErrorCode HycoReducerGetType(HycoReducer t, HycoROMType *type)
 
 PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 {
+  HycoRecipe recipe;
+  char text[HYCO_LINE];
   PetscBool ascii;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)t, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscViewerASCIIPrintf(viewer, "model type: %s\n", t->prototype->type));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "energy left out of the displacement basis: %g\n",
-                                   (double)t->tol[HYCO_SEED_DISPLACEMENT]));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "search for settings: %s\n", t->search ? "yes" : "no"));
+  HycoReducerGetRecipe(t, &recipe);
+  HycoRecipeDescribe(&recipe, sizeof(text), text);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "settings: %s%s\n", text, t->search ? "; searched where not given" : ""));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "snapshots: %s\n", t->folder[0] ? t->folder : "beside the model"));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerViewFromOptions(HycoReducer object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_REDUCER_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoReducer, HYCO_REDUCER_CLASSID)

@@ -68,7 +68,7 @@ void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
              kind, (int)r->layers, (double)r->contact_extension);
 }
 
-static void GetRecipe(HycoReducer t, HycoRecipe *r)
+void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *r)
 {
   *r = (HycoRecipe){.type = t->prototype->type,
                     .rid = (PetscBool)(t->prototype->traits.settings == HYCO_SETTINGS_RID),
@@ -536,7 +536,7 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   PetscReal edge = 0;
 
   PetscFunctionBegin;
-  GetRecipe(t, &s->given);
+  HycoReducerGetRecipe(t, &s->given);
   HycoOnRoot(HycoComm(t), SurfaceEdge(t, &edge));
   PetscCallMPI(MPI_Bcast(&edge, 1, MPIU_REAL, 0, HycoComm(t)));
   s->extension = EXTENSION * edge;
@@ -559,7 +559,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
     PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
     PetscCall(TakeModes(t, store));
     PetscCall(HycoReducerBuild(t, PETSC_TRUE, model, report));
-    GetRecipe(t, &report->chosen.recipe);
+    HycoReducerGetRecipe(t, &report->chosen.recipe);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscNew(&s));

@@ -181,7 +181,7 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   if (*groups) PetscFunctionReturn(PETSC_SUCCESS);
   *groups = PetscMax(1, PetscMin((PetscInt)size, n));
   if (stat(scene->mesh_path, &info) == 0) {
-    const double factor = 400.0 * (double)info.st_size,
+    const double factor = 400.0 * (double)info.st_size * (double)((size_t)1 << 3 * scene->refine),
                  memory = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGE_SIZE);
 
     while (*groups > 1 && *groups * factor > memory / 2) (*groups)--;
@@ -410,14 +410,9 @@ PetscErrorCode HycoSnapshotsView(HycoSnapshots s, PetscViewer viewer)
   PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscViewerASCIIPrintf(viewer, "folder: %s\n", s->folder));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "of the scene and mesh with fingerprint %016llx\n", s->fingerprint));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSnapshotsViewFromOptions(HycoSnapshots object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_SNAPSHOTS_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoSnapshots, HYCO_SNAPSHOTS_CLASSID)

@@ -116,12 +116,20 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
   PetscCall(ListKeys(scene->options, PETSC_FALSE, &n, &keys));
   qsort(keys, (size_t)n, sizeof(*keys), CompareEntries);
   PetscCall(PetscCalloc1(n, &scene->value));
-  for (PetscInt k = 0; k < n; k++) PetscCall(GetLong(scene->options, keys[k], &scene->value[k]));
-  scene->n_entries = n;
   scene->key = keys;
   for (PetscInt k = 0; k < n; k++) { /* a model file carries key, tab, value, end of line */
+    char **value = &scene->value[scene->n_entries];
+
     HycoCheck(!keys[k][strcspn(keys[k], "\t\r\n\f\v")], "the scene's entry \"%.200s\" has a blank in its name",
               keys[k]);
+    PetscCall(GetLong(scene->options, keys[k], value));
+    keys[scene->n_entries] = keys[k];
+    if (strlen(keys[k]) > 5 && strcmp(keys[k] + strlen(keys[k]) - 5, "_view") == 0 &&
+        HycoOptionFind(keys[k])) { /* of this run alone: no description of the scene */
+      PetscCall(PetscFree(*value));
+      PetscCall(PetscFree(keys[scene->n_entries]));
+    } else
+      scene->n_entries++;
   }
   PetscCall(RefuseOthers(scene->options));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -34,7 +34,7 @@ PetscErrorCode HycoROMSetFromOptions(HycoROM m)
   PetscCall(HycoOptionsFor(""));
   PetscCall(HycoOptionsBool("-hyco_reconstruct", "reconstruct the contact forces outside the RID by (41)",
                             &m->reconstruct, NULL));
-  PetscCall(HycoOptionsName("-hyco_rom_view", "what is in a model, when it is set up"));
+  PetscCall(HycoOptionsName("-hyco_rom_view", "what is in a model, when it is loaded"));
   PetscOptionsEnd();
   PetscTryTypeMethod(m, options);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -423,10 +423,4 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMViewFromOptions(HycoROM object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_ROM_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoROM, HYCO_ROM_CLASSID)

@@ -567,6 +567,7 @@ PetscErrorCode HycoROMLoad(const char path[], HycoROM *model)
   *model = NULL;
   PetscCall(HycoH5OpenOr(path, "if it was a model, train it again", &h));
   PetscCall(Load(&h, path, model));
+  PetscCall(HycoROMViewFromOptions(*model, NULL, "-hyco_rom_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

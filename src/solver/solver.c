@@ -346,6 +346,8 @@ static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
   s->iterative = PETSC_FALSE;
   PetscCall(HycoSolverAcceptingForm(s, NULL, form, why));
   s->iterative = iterative;
+  if (!*form && !why[0])
+    HycoFormat(why, "the form %s does not serve this system; use -hyco_solver_form auto", s->form_name);
   PetscCheck(*form, HycoComm(s), PETSC_ERR_USER, "%s", why);
   PetscCall(HycoChooseLinear(s, form));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -436,6 +438,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   s->start_set = NULL;
   s->seconds_solve = HycoNow() - begin - (s->seconds_factor - s->seconds_before);
   s->seconds_before = 0;
+  PetscCall(HycoSolverViewFromOptions(s, NULL, "-hyco_solver_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -556,9 +559,18 @@ PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s\n", HycoSolverTypes[s->type]));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g\n", (double)s->rtol));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "solves with K: %s\n", HycoLinearNames[s->linear]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s%s%s; form: %s\n", HycoSolverTypes[s->type],
+                                   methods[s->type][0] ? "" : ", ",
+                                   methods[s->type][0] ? ""
+                                   : s->tao_type[0]    ? s->tao_type
+                                                       : "by the system",
+                                   s->form_name[0] ? s->form_name : "auto"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g; iterations: at most %d%s\n",
+                                   (double)s->rtol, (int)s->max_its, s->max_its ? "" : " (by the number of contacts)"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "solves with K: %s\n",
+                                   s->linear_method[0] ? s->linear_method : HycoLinearNames[s->linear]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "fallback: %s; warm start: %s; start from coarser problems: %s\n",
+                                   s->fallback ? "yes" : "no", s->warm ? "yes" : "no", s->multilevel ? "yes" : "no"));
   if (s->reason) {
     PetscCall(PetscViewerASCIIPrintf(viewer, "last solve: %s, %s, %d iterations, largest residual %.1e\n",
                                      HycoReasonName(s->reason), s->method, (int)s->its, (double)HycoKKTMax(&s->kkt)));
@@ -567,10 +579,4 @@ PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolverViewFromOptions(HycoSolver object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_SOLVER_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoSolver, HYCO_SOLVER_CLASSID)

@@ -19,6 +19,7 @@ static const struct {
 };
 
 static HycoOptionList table;      /* the library's, once recorded */
+static HycoOptionList told;       /* what -help has printed */
 static HycoOptionList *recording; /* where declarations go instead of being read; NULL: they are read */
 static const char *readers = "";  /* HycoOptionsFor() */
 
@@ -26,6 +27,7 @@ static PetscErrorCode ForgetTable(void)
 {
   PetscFunctionBegin;
   PetscCall(HycoOptionListDestroy(&table));
+  PetscCall(HycoOptionListDestroy(&told));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -116,47 +118,36 @@ static PetscInt EditDistance(const char *a, const char *b)
   return row[n];
 }
 
-/* The nearest to `word` that is nearer than *best. */
-static void TryNearest(const char *word, const char *name, PetscInt *best, const char **nearest)
-{
-  const PetscInt distance = EditDistance(word, name);
-
-  if (distance >= *best) return;
-  *best = distance;
-  *nearest = name;
-}
-
-/* A name at this distance from the word is none that was meant. */
-static PetscInt TooFar(const char *word)
-{
-  return PetscMax(2, (PetscInt)strlen(word) / 3) + 1;
-}
-
 const char *HycoNearest(const char *word, PetscInt n, const char *const names[])
 {
   const char *nearest = NULL;
-  PetscInt best = TooFar(word);
+  PetscInt best = PetscMax(2, (PetscInt)strlen(word) / 3) + 1;
 
-  for (PetscInt k = 0; k < n; k++) TryNearest(word, names[k], &best, &nearest);
+  for (PetscInt k = 0; k < n; k++) {
+    PetscInt distance = EditDistance(word, names[k]);
+
+    if (distance < best) {
+      best = distance;
+      nearest = names[k];
+    }
+  }
   return nearest;
 }
 
 const char *HycoOptionNearest(const char word[], const HycoOptionList *more)
 {
   const HycoOptionList *lists[] = {&table, more};
-  const char *nearest = NULL;
-  PetscInt best = TooFar(word);
+  const char *names[256];
+  PetscInt n = 0;
 
   (void)!HycoGetOptionTable(NULL, NULL);
   for (int l = 0; l < 2; l++) {
-    for (PetscInt k = 0; lists[l] && k < lists[l]->n; k++) {
-      const char *name = lists[l]->option[k].name;
-
-      if (strncasecmp(name, word, strlen(word)) == 0) return name;
-      TryNearest(word, name, &best, &nearest);
+    for (PetscInt k = 0; lists[l] && k < lists[l]->n && n < 256; k++) {
+      names[n] = lists[l]->option[k].name;
+      if (strncasecmp(names[n++], word, strlen(word)) == 0) return names[n - 1]; /* its beginning */
     }
   }
-  return nearest;
+  return HycoNearest(word, n, names);
 }
 
 PetscErrorCode HycoOptionsFor(const char only[])
@@ -183,7 +174,7 @@ static PetscErrorCode MakeOption(const char name[], const char text[], const cha
   Put(name, "%s", name[0] == '-' ? name + 1 : name);
   while (*meaning == ' ') meaning++;
   if (close)
-    Put(value, "%.*s", (int)(close + 1 - text), text);
+    Put(value, "%.*s", close == text + 1 ? 0 : (int)(close + 1 - text), text); /* <>: a flag */
   else
     Put(value, "%s", form);
   if (open) {
@@ -225,22 +216,22 @@ static PetscErrorCode Find(HycoOptionItems items, const char name[], const char 
                            const char initial[], size_t room, const char **value, PetscBool *set)
 {
   const char *owner = items->object ? items->object->class_name : items->title;
+  PetscBool help = PETSC_FALSE;
+  HycoOption option;
 
   PetscFunctionBegin;
   *set = PETSC_FALSE;
   *value = NULL;
-  if (recording || (items->printhelp && items->count == 1 && !items->alreadyprinted)) {
-    HycoOption option;
-
+  if (!recording) PetscCall(PetscOptionsHasHelp(NULL, &help)); /* a scene's options know of no -help */
+  if (recording || (help && items->count == 1 && (items->prefix || !HycoOptionListFind(&told, name + 1)))) {
     PetscCall(MakeOption(name, text, form, initial, owner, &option));
-    if (recording) {
-      PetscCall(Append(recording, &option));
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
-    PetscCall((*PetscHelpPrintf)(items->comm, "  -%s%s %s: %s [%s]\n", items->prefix ? items->prefix : "", option.name,
-                                 option.value, option.meaning, option.initial));
-    PetscCall(PetscFree(option.name));
+    if (help && !told.n) PetscCall(PetscRegisterFinalize(ForgetTable));
+    if (help)
+      PetscCall((*PetscHelpPrintf)(items->comm, "  -%s%s %s: %s [%s]\n", items->prefix ? items->prefix : "",
+                                   option.name, option.value, option.meaning, option.initial));
+    PetscCall(Append(recording ? recording : &told, &option));
   }
+  if (recording) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscOptionsFindPair(items->options, items->prefix, name, value, set));
   if (!*set && items->options && items->prefix) PetscCall(PetscOptionsFindPair(NULL, items->prefix, name, value, set));
   if (*set && !*value) *value = "";
@@ -305,14 +296,13 @@ static PetscErrorCode FindWord(HycoOptionItems items, const char name[], const c
   PetscFunctionBegin;
   for (*index = 0; words[*index]; ++*index) {
     if (strcasecmp(word, words[*index]) == 0) PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCall(PetscStrlcat(list, *index ? ", " : "", sizeof(list)));
-    PetscCall(PetscStrlcat(list, words[*index], sizeof(list)));
+    PetscCall(HycoListAdd(list, ", ", words[*index]));
   }
   HycoFail("-%s%s is \"%.200s\"; it must be one of: %s", NAMED(items, name), word, list);
 }
 
-static PetscErrorCode ReadBool(HycoOptionItems items, const char name[], const char text[], const char form[],
-                               const char initial[], PetscBool *value, PetscBool *set)
+PetscErrorCode HycoOptionsBool_Private(HycoOptionItems items, const char name[], const char text[], PetscBool *value,
+                                       PetscBool *set)
 {
   static const char *const words[] = {"false", "no", "off", "0", "true", "yes", "on", "1", NULL};
   const char *word;
@@ -320,26 +310,11 @@ static PetscErrorCode ReadBool(HycoOptionItems items, const char name[], const c
   PetscBool given;
 
   PetscFunctionBegin;
-  PetscCall(Find(items, name, text, form, initial, HYCO_LINE, &word, &given));
+  PetscCall(Find(items, name, text, "<bool>", *value ? "true" : "false", HYCO_LINE, &word, &given));
   if (set) *set = given;
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   if (word[0]) PetscCall(FindWord(items, name, word, words, &index));
   *value = (PetscBool)(index >= 4);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoOptionsBool_Private(HycoOptionItems items, const char name[], const char text[], PetscBool *value,
-                                       PetscBool *set)
-{
-  PetscFunctionBegin;
-  PetscCall(ReadBool(items, name, text, "<bool>", *value ? "true" : "false", value, set));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoOptionsFlag_Private(HycoOptionItems items, const char name[], const char text[], PetscBool *value)
-{
-  PetscFunctionBegin;
-  PetscCall(ReadBool(items, name, text, "", "", value, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,4 +1,4 @@
-/* Sets of parameter points, the scene's ranges and its text, the table of options. */
+/* Sets of parameter points, the scene's ranges and its text, names of options. */
 #include "check.h"
 #include <hycomaterialimpl.h>
 #include <unistd.h>

@@ -81,7 +81,7 @@ static PetscErrorCode SelectPairs(HycoROM m)
     if (m->in_rid[k]) m->contact[m->m++] = k;
   }
   PetscCall(HycoPairsSelect(all, m->m, m->contact, NULL, &g->own_pairs));
-  for (PetscInt c = 0; all->search && c < all->n_searches; c++) g->own_pairs.search[c].reach = m->master_reach[c];
+  HycoPairsSetReach(&g->own_pairs, m->master_reach);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

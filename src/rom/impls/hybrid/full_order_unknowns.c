@@ -52,7 +52,7 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
   for (PetscInt k = 0; k < m->m; k++) candidate[k] = -1;
   for (PetscInt pass = 0; pass < 2; pass++) { /* those whose slave is in A first: the others have shared masters only */
     for (PetscInt k = 0; k < m->m; k++) {
-      const PetscInt slave = m->pairs.slave[m->contact[k]];
+      const PetscInt slave = HycoPairsSlave(&m->pairs, m->contact[k]);
       PetscReal best = 0;
 
       if ((m->role[slave] == HYCO_ROLE_A) != (pass == 0)) continue;

@@ -353,9 +353,8 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
   Dual *d;
 
   PetscFunctionBegin;
-  (void)s;
   PetscCall(PetscNew(&d));
-  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, &d->tao));
+  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, (PetscObject)s, &d->tao));
   form->data = d;
   *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts,
                                            .estimate = EstimateFactor,

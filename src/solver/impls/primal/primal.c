@@ -278,6 +278,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   *cost = -1;
   if (!y->K || !y->m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectTypeCompareAny((PetscObject)y->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
+  if (!asked && (s->now.traits & HYCO_TAO_DENSE || !aij || !y->symmetric)) PetscFunctionReturn(PETSC_SUCCESS);
   if (s->now.traits & HYCO_TAO_DENSE)
     HycoFormat(why,
                "%s%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with "
@@ -366,7 +367,7 @@ PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form)
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&g));
-  PetscCall(HycoTaoCreate(HycoComm(s), &g->tao));
+  PetscCall(HycoTaoCreate(HycoComm(s), (PetscObject)s, &g->tao));
   form->data = g;
   *form->ops = (struct _HycoSolverFormOps){
       .accepts = Accepts, .setup = SetUp, .solve = Solve, .setfromoptions = SetFromOptions, .destroy = Destroy};
