@@ -55,7 +55,7 @@ typedef struct _HycoROMOps {
   PetscBool (*offers)(HycoReducer, PetscBool targets); /* whether a search tries it unasked, -target_... given or not */
   /* -- online -- */
   PetscErrorCode (*options)(HycoROM);                               /* its options of a model */
-  PetscErrorCode (*setup)(HycoROM);                                 /* default: every contact the model's own */
+  PetscErrorCode (*setup)(HycoROM);                                 /* default: HycoROMSetUpDefault() */
   PetscErrorCode (*reset)(HycoROM);                                 /* frees what setup and solve have made */
   PetscErrorCode (*solve)(HycoROM, const PetscReal mu[]);           /* ends with HycoROMSetSolution() */
   PetscErrorCode (*reconstruct)(HycoROM);                           /* forces outside A_lambda */
@@ -79,6 +79,8 @@ PetscErrorCode HycoROMGetData(HycoROM model, void *data);
 PetscErrorCode HycoROMSetType(HycoROM model, HycoROMType type);
 /* Modes and contacts of a model under training or loaded. Any output may be NULL. */
 PetscErrorCode HycoROMGetDimensions(HycoROM model, PetscInt *n_modes, PetscInt *n_contacts);
+/* In setup: every contact the model's own, on all of its mesh; what a type without setup has. */
+PetscErrorCode HycoROMSetUpDefault(HycoROM model);
 /* The end of a solve at mu: coefficients of the modes and forces of all contacts, copied (NULL: as they are in the
    model); the residuals of (16) that they leave at the contacts are measured. */
 PetscErrorCode HycoROMSetSolution(HycoROM model, const PetscReal mu[], const PetscReal gamma[],

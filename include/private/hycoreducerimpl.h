@@ -16,7 +16,7 @@ typedef struct {
   PetscReal *coefficients; /* displacements: l x n_s column major, V^T of the snapshots less their lifting; else NULL */
 } HycoBasis;
 
-/* What the search for a recipe (search.c) chooses, unless the options have it. */
+/* What the search for a recipe (settings_search.c) chooses, unless the options have it. */
 enum {
   HYCO_CHOICE_TYPE,
   HYCO_CHOICE_TOLERANCE,

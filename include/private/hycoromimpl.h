@@ -15,7 +15,7 @@ typedef struct {
   PetscReal *value, *gap;
 } HycoRows;
 
-/* What an estimate of the error is made of (trust.c): log(1 + feature / floor), a coefficient each, and a constant. */
+/* What an estimate of the error is made of (error_estimate.c): log(1 + feature / floor), a coefficient each, and a constant. */
 #define HYCO_TRUST_FEATURES 5
 #define HYCO_TRUST_DISTANCE 3 /* which of them is the distance */
 /* Contact forces below this share of the largest of a set count as that much where errors are divided by them. */
@@ -98,11 +98,9 @@ PetscErrorCode HycoROMSetUp(HycoROM model);
 PetscErrorCode HycoROMReset(HycoROM model);
 /* The names of the registered types, in the alphabet's order; NULL ends. The caller frees the array. */
 PetscErrorCode HycoROMTypeNames(const char ***names);
-/* In a type's setup: gamma, U, Lambda, stress, slave tags and the solver, once fe is there; all of this with fe on mesh
-   and every contact the model's own. */
+/* In a type's setup: gamma, U, Lambda, stress, slave tags and the solver, once fe is there. */
 PetscErrorCode HycoROMSetUpFields(HycoROM model);
-PetscErrorCode HycoROMSetUpAll(HycoROM model);
-/* In a type's solve, after HycoROMSetUpAll(): rows and gaps at mu, as far as they have changed; U = u0 + V gamma. */
+/* In a type's solve, after HycoROMSetUpDefault(): rows and gaps at mu, as far as they have changed; U = u0 + V gamma. */
 PetscErrorCode HycoROMBringRows(HycoROM model, const PetscReal mu[]);
 PetscErrorCode HycoROMExpand(HycoROM model);
 /* Modes with a singular value: those of a POD. */

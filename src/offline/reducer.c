@@ -1,5 +1,5 @@
 /* HycoReducer: made, configured, destroyed. */
-#include <hycoprojection.h>
+#include <hycoreducerimpl.h>
 #include <string.h>
 
 const char *const HycoHybrids[] = {"auto", "rank", "contact", "all", NULL};
@@ -374,19 +374,13 @@ static PetscErrorCode ReadRID(HycoReducer t)
    nothing that seeds it. */
 static PetscErrorCode CheckType(HycoReducer t)
 {
-  PetscInt dual = 0;
+  char dual[32] = "fe";
 
   PetscFunctionBegin;
-  PetscObjectOptionsBegin((PetscObject)t);
-  PetscCall(HycoOptionsFor(""));
-  PetscCall(HycoOptionsWord("-hyco_dual",
-                            "forces: of the finite elements (hybrid); factorised dual snapshots, or they themselves "
-                            "(projection) [fe; nnmf if projection]",
-                            HycoDuals, &dual, NULL));
-  PetscOptionsEnd();
-  HycoCheckModel(t->prototype->traits.force_basis || dual == HYCO_DUAL_FE,
+  PetscCall(PetscOptionsGetString(((PetscObject)t)->options, NULL, "-hyco_dual", dual, sizeof(dual), NULL));
+  HycoCheckModel(t->prototype->traits.force_basis || strcmp(dual, "fe") == 0,
                  "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
-                 HycoDuals[dual]);
+                 dual);
   if (!t->prototype->traits.whole) PetscFunctionReturn(PETSC_SUCCESS);
   t->whole_rid = PETSC_TRUE;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;

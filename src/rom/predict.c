@@ -16,7 +16,7 @@ PetscErrorCode HycoROMSetUpFields(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMSetUpAll(HycoROM m)
+PetscErrorCode HycoROMSetUpDefault(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
@@ -39,7 +39,7 @@ PetscErrorCode HycoROMSetUp(HycoROM m)
   if (m->ops->setup)
     PetscUseTypeMethod(m, setup);
   else
-    PetscCall(HycoROMSetUpAll(m));
+    PetscCall(HycoROMSetUpDefault(m));
   m->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

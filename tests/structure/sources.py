@@ -66,6 +66,15 @@ class Sources(unittest.TestCase):
             if os.sep + 'contact' + os.sep not in path:
                 self.assertNotRegex(code(path), r'\bHYCO_CONTACT_(PAIR|SURFACE)\b', path)
 
+    def test_model_types(self):
+        """What a type of reduced model has is known in its own folder alone, and nobody asks for a type by name."""
+        own = re.compile(r'#include\s*[<"](hycohybrid|hycoprojection|hycocondensed|hycogalerkin|hycotable)\.h')
+        for path in sources():
+            if os.sep + 'impls' + os.sep in path:
+                continue
+            self.assertNotRegex(text(path), own, path)
+            self.assertNotRegex(code(path), r'[=!]=\s*HYCO_ROM_(HYBRID|PROJECTION|CONDENSED)|strcmp\([^;]*HYCO_ROM_(PROJECTION|CONDENSED)', path)
+
     def test_options(self):
         """hyco -help lists what the code declares, once each; what is asked by name elsewhere is declared."""
         declared, asked = [], set()

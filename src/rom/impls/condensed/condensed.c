@@ -365,7 +365,7 @@ static PetscErrorCode SetUp(HycoROM m)
   HycoCondensed c = (HycoCondensed)m->data;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMSetUpAll(m));
+  PetscCall(HycoROMSetUpDefault(m));
   PetscCall(HycoCondensedPrepare(c));
   c->given = (HycoGapSource){m->fe, &m->pairs, m->rows};
   c->scene = m->scene;

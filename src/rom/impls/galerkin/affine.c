@@ -2,7 +2,7 @@
   The reduced stiffness as a polynomial of the parameters that reach it. Moduli enter K linearly, and maps that stretch
   a body along its axes quadratically; the reduced matrix, sums of K's entries with constant weights, is then a
   polynomial too, and its values at few parameter values give it everywhere, without any cell of the RID. Training
-  finds the degrees, checks them, and keeps the values in the file (training/tabulate.c).
+  finds the degrees, checks them, and keeps the values in the file (affine_fit.c).
 */
 #include <hycotable.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */

@@ -5,7 +5,7 @@
 
       U[A u I] = Vp gamma + E x_fe      test space: the same restricted to A      (39)-(40)
 
-  (hybrid all: every unknown of A is full order and gamma = G U[A] is no unknown.) reduced.c fills the system.
+  (hybrid all: every unknown of A is full order and gamma = G U[A] is no unknown.) reduced_system.c fills the system.
 */
 #include <hycoalgorithms.h>
 #include <hycotable.h>

@@ -112,34 +112,68 @@ static PetscErrorCode Assembled(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A V on some rows and columns of A: P[k * l + j] of row k and mode j. */
+static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscReal P[])
+{
+  Mat Vt, V, part, modes, product;
+  IS all;
+  const PetscScalar *p;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m->l, m->fe->n_dof, m->V, &Vt));
+  PetscCall(MatTranspose(Vt, MAT_INITIAL_MATRIX, &V));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, m->l, 0, 1, &all));
+  PetscCall(MatCreateSubMatrix(A, rows, columns, MAT_INITIAL_MATRIX, &part));
+  PetscCall(MatCreateSubMatrix(V, columns, all, MAT_INITIAL_MATRIX, &modes));
+  PetscCall(MatMatMult(part, modes, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
+  PetscCall(ISGetLocalSize(rows, &n));
+  PetscCall(MatDenseGetArrayRead(product, &p));
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt j = 0; j < m->l; j++) P[k * m->l + j] = p[j * n + k];
+  }
+  PetscCall(MatDenseRestoreArrayRead(product, &p));
+  PetscCall(MatDestroy(&product));
+  PetscCall(MatDestroy(&modes));
+  PetscCall(MatDestroy(&part));
+  PetscCall(ISDestroy(&all));
+  PetscCall(MatDestroy(&V));
+  PetscCall(MatDestroy(&Vt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* B[A_lambda, A_c] V[A_c,:], and the candidates' rows of K V. */
+static PetscErrorCode ContactRows(HycoROM m, const PetscInt candidate[], PetscReal BV[], PetscReal KV[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  Mat B;
+  IS contacts, candidates, unknowns;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinContactMatrix(m, &B));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, m->m, 0, 1, &contacts));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, m->fe->n_dof, 0, 1, &unknowns));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, candidate, PETSC_COPY_VALUES, &candidates));
+  PetscCall(TimesModes(m, B, contacts, g->sets.is_Ac, BV));
+  PetscCall(TimesModes(m, g->K, candidates, unknowns, KV));
+  PetscCall(ISDestroy(&candidates));
+  PetscCall(ISDestroy(&unknowns));
+  PetscCall(ISDestroy(&contacts));
+  PetscCall(MatDestroy(&B));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Numerical rank of B[A_lambda, A_c] V[A_c,:] and the contacts that the modes resolve best (first `rank` of pivot), by
    their balance rows K V or by their rows B V weighted with the singular values. */
 static PetscErrorCode ResolvedContacts(HycoROM m, const PetscInt candidate[], PetscBool balance, PetscInt *rank,
                                        PetscInt pivot[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const PetscInt l = m->l, dim = m->mesh->dim;
-  const PetscInt *ia, *ja;
-  const PetscScalar *a;
+  const PetscInt l = m->l;
   PetscReal *BV, *KV;
-  PetscInt n;
-  PetscBool done;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc2(l * m->m, &BV, l * m->m, &KV));
-  PetscCall(MatGetRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatSeqAIJGetArrayRead(g->K, &a));
-  for (PetscInt k = 0; k < m->m; k++) {
-    for (PetscInt t = g->own_rows.start[k]; t < g->own_rows.start[k + 1]; t++) {
-      for (PetscInt j = 0; m->role[g->own_rows.dof[t] / dim] == HYCO_ROLE_A && j < l; j++)
-        BV[k * l + j] += g->own_rows.value[t] * m->V[g->own_rows.dof[t] * l + j];
-    }
-    for (PetscInt t = ia[candidate[k]]; t < ia[candidate[k] + 1]; t++) {
-      for (PetscInt j = 0; j < l; j++) KV[k * l + j] += a[t] * m->V[ja[t] * l + j];
-    }
-  }
-  PetscCall(MatSeqAIJRestoreArrayRead(g->K, &a));
-  PetscCall(MatRestoreRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(ContactRows(m, candidate, BV, KV));
   *rank = 0;
   {
     PetscReal smallest = 0, largest = 1;
