@@ -61,6 +61,9 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene);
 PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
                                const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh *part);
 
+/* Sorts a[0..*n), unless it is, and keeps one of each. */
+PetscErrorCode HycoSortUnique(PetscInt *n, PetscInt a[]);
+
 /* The largest extent of the mesh, as in the file, along an axis. */
 PetscReal HycoMeshLength(HycoMesh mesh);
 

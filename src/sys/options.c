@@ -23,6 +23,8 @@ static const HycoOption option_table[] = {
     {"hyco_regularise_tol", "<real>", "1e-2", "of such a motion: the share of the loads on it that may be unbalanced"},
     {"hyco_solver_warm_start", "<bool>", "true", "full order: start from the last solution's active contacts"},
     {"hyco_solver_multilevel", "<bool>", "true", "full order, every unknown a contact: start from coarser problems"},
+    {"hyco_mesh_write", "<file.h5>", "",
+     "writes the mesh, refined as the scene says, in the HDF5 format of PETSc's DMPlex"},
     {"hyco_partition", "<metis|ptscotch>", "metis", "cuts the mesh for the ranks; PT-Scotch also where METIS fails"},
     {"hyco_groups", "<int>", "0", "groups of ranks that solve snapshots side by side (0: from the mesh's size)"},
     {"hyco_snapshots", "<folder>", "MODEL.snapshots", "where full-order solutions are stored"},
