@@ -10,43 +10,69 @@
 
 #define TOPOLOGY "mesh" /* the name under which hyco writes */
 
-PetscErrorCode HycoPlexWrite(DM dm, const char path[])
+/* The tags in the order of the points' global numbers, which go by depth first. */
+static PetscErrorCode OrderTags(DM dm, IS *ordered)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
-  PetscViewer viewer;
-  PetscInt n = 0, first, last, *mine;
+  PetscInt n = 0, all, first, last, *leaf, *to, *root;
   const PetscInt *tag, *number;
-  IS tags, numbers, own;
+  PetscLayout layout;
+  PetscSF sf;
+  IS tags, numbers;
 
   PetscFunctionBegin;
+  PetscCall(PetscObjectQuery((PetscObject)dm, HYCO_TAGS, (PetscObject *)&tags));
+  PetscCall(DMPlexCreatePointNumbering(dm, &numbers));
+  PetscCall(DMPlexGetChart(dm, &first, &last));
+  PetscCall(PetscMalloc2(last - first, &leaf, last - first, &to));
+  PetscCall(ISGetIndices(tags, &tag));
+  PetscCall(ISGetIndices(numbers, &number));
+  for (PetscInt p = 0; p < last - first; p++) {
+    if (number[p] < 0) continue; /* another process's */
+    leaf[n] = p;
+    to[n++] = number[p];
+  }
+  PetscCallMPI(MPI_Allreduce(&n, &all, 1, MPIU_INT, MPI_SUM, comm));
+  PetscCall(PetscLayoutCreateFromSizes(comm, PETSC_DECIDE, all, 1, &layout));
+  PetscCall(PetscSFCreate(comm, &sf));
+  PetscCall(PetscSFSetGraphLayout(sf, layout, n, leaf, PETSC_COPY_VALUES, to));
+  PetscCall(PetscLayoutGetLocalSize(layout, &n));
+  PetscCall(PetscMalloc1(n, &root));
+  PetscCall(PetscSFReduceBegin(sf, MPIU_INT, tag, root, MPI_REPLACE));
+  PetscCall(PetscSFReduceEnd(sf, MPIU_INT, tag, root, MPI_REPLACE));
+  PetscCall(ISRestoreIndices(numbers, &number));
+  PetscCall(ISRestoreIndices(tags, &tag));
+  PetscCall(ISCreateGeneral(comm, n, root, PETSC_OWN_POINTER, ordered));
+  PetscCall(PetscObjectSetName((PetscObject)*ordered, HYCO_TAGS));
+  PetscCall(PetscFree2(leaf, to));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscLayoutDestroy(&layout));
+  PetscCall(ISDestroy(&numbers));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPlexWrite(DM dm, const char path[])
+{
+  PetscViewer viewer;
+  IS tags;
+
+  PetscFunctionBegin;
+  PetscCall(OrderTags(dm, &tags));
   PetscCall(PetscObjectSetName((PetscObject)dm, TOPOLOGY));
-  PetscCall(PetscViewerHDF5Open(comm, path, FILE_MODE_WRITE, &viewer));
+  PetscCall(PetscViewerHDF5Open(PetscObjectComm((PetscObject)dm), path, FILE_MODE_WRITE, &viewer));
   PetscCall(PetscViewerPushFormat(viewer, PETSC_VIEWER_HDF5_PETSC));
   PetscCall(DMPlexTopologyView(dm, viewer));
   PetscCall(DMPlexLabelsView(dm, viewer));
   PetscCall(DMPlexCoordinatesView(dm, viewer));
-  PetscCall(PetscObjectQuery((PetscObject)dm, HYCO_TAGS, (PetscObject *)&tags));
-  PetscCall(DMPlexCreatePointNumbering(dm, &numbers));
-  PetscCall(DMPlexGetChart(dm, &first, &last));
-  PetscCall(PetscMalloc1(last - first, &mine));
-  PetscCall(ISGetIndices(tags, &tag));
-  PetscCall(ISGetIndices(numbers, &number));
-  for (PetscInt p = 0; p < last - first; p++) {
-    if (number[p] >= 0) mine[n++] = tag[p];
-  }
-  PetscCall(ISRestoreIndices(numbers, &number));
-  PetscCall(ISRestoreIndices(tags, &tag));
-  PetscCall(ISDestroy(&numbers));
-  PetscCall(ISCreateGeneral(comm, n, mine, PETSC_OWN_POINTER, &own));
-  PetscCall(PetscObjectSetName((PetscObject)own, HYCO_TAGS));
-  PetscCall(ISView(own, viewer));
-  PetscCall(ISDestroy(&own));
+  PetscCall(ISView(tags, viewer));
+  PetscCall(ISDestroy(&tags));
   PetscCall(PetscViewerPopFormat(viewer));
   PetscCall(PetscViewerDestroy(&viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the file is HDF5's, and the name of its first topology. One process. */
+/* Whether the file has a DMPlex, and the name of its topology: the first of those there, none in the format's first
+   version. One process. */
 static PetscErrorCode FindTopology(const char path[], size_t room, char name[])
 {
   FILE *file = fopen(path, "rb");
@@ -62,6 +88,7 @@ static PetscErrorCode FindTopology(const char path[], size_t room, char name[])
     group = h < 0 ? -1 : H5Gopen2(h, "/topologies", H5P_DEFAULT);
     if (group >= 0) length = H5Lget_name_by_idx(group, ".", H5_INDEX_NAME, H5_ITER_INC, 0, name, room, H5P_DEFAULT);
     if (group >= 0) H5Gclose(group);
+    if (group < 0 && h >= 0 && H5Lexists(h, "topology", H5P_DEFAULT) > 0) length = snprintf(name, room, "%s", TOPOLOGY);
     if (h >= 0) H5Fclose(h);
   }
   H5E_END_TRY
