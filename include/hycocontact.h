@@ -23,7 +23,7 @@ typedef struct {
   const PetscReal *master; /* n x 3: their master points; the slave nodes themselves where there is none */
 } HycoContactPoints;
 
-/* Private to the library and to types that have masters (private/hycocontactimpl.h). */
+/* The mesh at a parameter value and its contacts: for the library, and for types that have masters. */
 struct _n_HycoFE;
 struct _n_HycoPairs;
 

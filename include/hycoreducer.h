@@ -38,7 +38,8 @@ typedef struct {
 
 /* What decides a model beside its solutions; the options of the same names. */
 typedef struct {
-  HycoROMType type;
+  HycoROMType type;                     /* borrowed from the library */
+  PetscBool rid;                        /* layers, extension, hybrid and whole mean something to this type */
   PetscReal pod_tol, contact_extension; /* energy left out of the displacement basis; a length */
   PetscInt layers;
   HycoHybrid hybrid;
@@ -65,20 +66,23 @@ typedef PetscErrorCode (*HycoAttemptMonitor)(const HycoAttempt *attempt, void *c
 /* Called on rank 0 when n solutions are to be added; the parameter whose values lie too far apart, or -1. */
 typedef PetscErrorCode (*HycoAddedMonitor)(PetscInt n, PetscInt parameter, void *ctx);
 
+/* A number that a type of model reports of its training, by the name that reports have. */
+typedef struct {
+  char name[48];
+  PetscInt n;
+  PetscReal value[3];
+} HycoFact;
+#define HYCO_MAX_FACTS 4
+
 /* What a training gave. */
 typedef struct {
-  HycoROMType type;
-  PetscReal dual_misfit; /* projection: share of the dual snapshots' squares that their nonnegative basis leaves out */
-  PetscInt hopeless;     /* the same: the parameter of which more values were in vain, for the dependence on it is not
-                            smooth; -1: none */
-  PetscInt hopeless_values; /* how many it has */
-  PetscReal hopeless_error; /* the forces' error, one of them left out */
-  PetscBool target_met;     /* condensed, points chosen: -hyco_condensed_tol was reached, by left_out's forces */
-  PetscReal target;         /* the same: what it asked */
-  PetscInt most_values;     /* the same: -hyco_condensed_max_values */
-  PetscInt n_supremizers;   /* of n_modes, -hyco_dual snapshots */
+  HycoROMType type;              /* borrowed from the library */
+  char summary[512];             /* the type's own words on bases and RID; "": none */
+  HycoFact fact[HYCO_MAX_FACTS]; /* and numbers */
+  PetscInt n_facts;
+  PetscBool stiffness;      /* it has a reduced stiffness, with a condition */
+  char missed[1024];        /* points chosen: what was not reached, and what to do; "": nothing */
   PetscInt n_flexibilities; /* condensed: points at which B K^-1 B^T was factored */
-  PetscReal left_out[3];    /* condensed: relative errors of flexibility, gap and forces, one training value left out */
   PetscInt n_samples, n_modes, n_dual_modes, n_stress_modes, n_force_modes; /* l_u and the sizes of the other bases */
   PetscInt n_fe_dofs, rid_nodes, rid_elements, rid_a_nodes, rid_contacts; /* FE unknowns, RID, nodes of A, |A_lambda| */
   PetscReal rid_fraction;                                                 /* share of the elements */
@@ -96,9 +100,10 @@ typedef struct {
 PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *reducer);
 /* Frees; sets the handle to NULL; NULL-safe. Collective. */
 PetscErrorCode HycoReducerDestroy(HycoReducer *reducer);
-/* Reads the -hyco_model_type, -hyco_dual, -hyco_nnmf_, -hyco_pod_, -hyco_deim_, -hyco_rid_, -hyco_hybrid, -hyco_scan
-   options from the scene's options. Collective. */
+/* Reads what decides a model and its training (hyco train -help), from the scene's options. Collective. */
 PetscErrorCode HycoReducerSetFromOptions(HycoReducer reducer);
+/* The type of model that the options ask for (-hyco_model_type); a search may take another. */
+PetscErrorCode HycoReducerGetType(HycoReducer reducer, HycoROMType *type);
 /* Where the snapshots live (default: the model's name with .snapshots appended). */
 PetscErrorCode HycoReducerSetSnapshotFolder(HycoReducer reducer, const char folder[]);
 /* Whether HycoReducerRun() chooses the points itself when it is given none: for a condensed model. */

@@ -12,8 +12,11 @@ extern "C" {
 
 typedef struct _p_HycoROM *HycoROM;
 
-typedef enum { HYCO_ROM_HYBRID, HYCO_ROM_PROJECTION, HYCO_ROM_CONDENSED } HycoROMType; /* -hyco_model_type */
-extern const char *const HycoROMTypes[];                                               /* their words; NULL ends */
+/* -hyco_model_type; a program may register others (hycoromtype.h). */
+typedef const char *HycoROMType;
+#define HYCO_ROM_HYBRID     "hybrid"
+#define HYCO_ROM_PROJECTION "projection"
+#define HYCO_ROM_CONDENSED  "condensed"
 
 /* Which displacements of a hybrid model are full order: -hyco_hybrid. */
 typedef enum {
@@ -26,7 +29,8 @@ extern const char *const HycoHybrids[]; /* their words; NULL ends */
 
 /* What a prediction amounts to, in scene units. Of a projection-based model the RID is the whole mesh. */
 typedef struct {
-  HycoROMType type;
+  HycoROMType type;       /* borrowed from the library */
+  const char *title;      /* the type in words; borrowed too */
   PetscInt n_multipliers; /* force unknowns: n_contacts, or the force vectors of a projection-based model */
   PetscInt n_dof, n_contacts, n_modes, n_fe_dofs;  /* reduced unknowns (modes + FE unknowns), contacts in the RID */
   PetscInt n_facing;                               /* contacts of the RID that may close, as in HycoSummary */
@@ -44,6 +48,7 @@ typedef struct {
   PetscReal estimated_error_u, estimated_error_sigma, estimated_error_lambda;
   PetscReal estimated_error_u_full; /* condensed: of u by HycoFOMSolveForces() with these forces; else < 0 */
   PetscReal beyond; /* how far the parameters lie outside what training has seen: the most, as a share of the range */
+  PetscBool gives_forces;        /* HycoROMGivesForces() */
   PetscReal interpolation_error; /* condensed: of the forces, relative, one training value left out, more outside
                                     the values; else 0 */
   HycoKKT kkt; /* of the reduced system (38) or (44); condensed: of w = g + G L, equilibrium (0) holding by its form */
@@ -65,7 +70,10 @@ typedef struct {
 PetscErrorCode HycoROMLoad(const char path[], HycoROM *model);
 /* Frees; sets the handle to NULL; NULL-safe. */
 PetscErrorCode HycoROMDestroy(HycoROM *model);
+/* Borrowed from the library. */
 PetscErrorCode HycoROMGetType(HycoROM model, HycoROMType *type);
+/* Whether the model gives the forces of all contacts as those of the full order, as HycoFOMSolveForces() takes them. */
+PetscErrorCode HycoROMGivesForces(HycoROM model, PetscBool *gives);
 /* The scene that the model carries. Borrowed. */
 PetscErrorCode HycoROMGetScene(HycoROM model, HycoScene *scene);
 
@@ -91,6 +99,11 @@ PetscErrorCode HycoROMGetSizes(HycoROM model, PetscInt *n_contacts, PetscInt *n_
 */
 PetscErrorCode HycoROMSolveMany(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
+/* Reads -hyco_reconstruct, -hyco_reconstruct_solver, -hyco_fallback, -hyco_full_displacement; HycoROMLoad() does. */
+PetscErrorCode HycoROMSetFromOptions(HycoROM model);
+/* -hyco_fallback and -hyco_full_displacement: whether who has the scene is to solve full order where a prediction is
+   not enough, and to solve once on the whole mesh with the predicted forces. */
+PetscErrorCode HycoROMGetFallback(HycoROM model, PetscBool *full_order, PetscBool *displacement);
 /* Whether Predict reconstructs the forces outside the RID (default: yes). */
 PetscErrorCode HycoROMSetReconstruct(HycoROM model, PetscBool reconstruct);
 /* Called after each iteration of the active set. */

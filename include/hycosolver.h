@@ -25,8 +25,8 @@ typedef enum {
 
 /*
   Makes a form available to solvers that are created from then on: by -hyco_solver_form name, or left to itself where it
-  is the cheapest that accepts a system. `create` fills in the form's operations and data (private headers). A complementarity
-  method is added by TaoRegister() instead, and chosen by HycoSolverSetTaoType(). Not collective.
+  is the cheapest that accepts a system. `create` fills in the form's operations and data (private headers). A
+  complementarity method is added by TaoRegister() instead, and chosen by HycoSolverSetTaoType(). Not collective.
 */
 typedef struct _n_HycoSolverForm *HycoSolverForm;
 typedef PetscErrorCode (*HycoSolverFormCreate)(HycoSolver solver, HycoSolverForm form);
@@ -85,8 +85,10 @@ PetscErrorCode HycoSolverSetMultilevel(HycoSolver solver, PetscBool multilevel);
   Lemke's method on the dense dual (default). Without it, such a solve ends not converged.
 */
 PetscErrorCode HycoSolverSetFallback(HycoSolver solver, PetscBool fallback);
-/* Reads the options above from `options` (NULL: the global database). Collective. */
-PetscErrorCode HycoSolverSetFromOptions(HycoSolver solver, PetscOptions options);
+/* What begins the names of its options: with "other_", -other_hyco_solver_rtol. */
+PetscErrorCode HycoSolverSetOptionsPrefix(HycoSolver solver, const char prefix[]);
+/* Reads the options above, from the database of PetscObjectSetOptions() (default: the global one). Collective. */
+PetscErrorCode HycoSolverSetFromOptions(HycoSolver solver);
 
 /* Called after each iteration of the active set, on every rank: its number, active contacts, changes made. */
 typedef PetscErrorCode (*HycoMonitor)(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx);

@@ -43,12 +43,14 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system);
   its kernel, an orthonormal basis, by MatSetNullSpace(). Changing a matrix in place is noticed through its state.
 */
 PetscErrorCode HycoSystemSetMatrices(HycoSystem system, Mat K, Mat Bt, Mat B, PetscBool symmetric);
+/* The matrices; each output may be NULL. Not collective. Borrowed. */
+PetscErrorCode HycoSystemGetMatrices(HycoSystem system, Mat *K, Mat *Bt, Mat *B);
 /* Sets (references) F of length n and D of length m (NULL without contact). */
 PetscErrorCode HycoSystemSetVectors(HycoSystem system, Vec F, Vec D);
 /*
-  Sets (references) a system whose flexibility is given instead of K: w = g + G L >= 0 complementary to L >= 0, G = B K^-1 Bt
-  m x m, dense, on one process, symmetric positive semidefinite, g = D - B K^-1 F. It has no displacements: x is NULL
-  where it is solved, and no stationarity. Replaces what was set, and is replaced by HycoSystemSetMatrices().
+  Sets (references) a system whose flexibility is given instead of K: w = g + G L >= 0 complementary to L >= 0, G = B
+  K^-1 Bt m x m, dense, on one process, symmetric positive semidefinite, g = D - B K^-1 F. It has no displacements: x is
+  NULL where it is solved, and no stationarity. Replaces what was set, and is replaced by HycoSystemSetMatrices().
 */
 PetscErrorCode HycoSystemSetFlexibility(HycoSystem system, Mat G, Vec g);
 /* The largest of the four residuals of `kkt`. Not collective. */

@@ -7,6 +7,9 @@
 
 #include <petscsys.h>
 
+#if PETSC_VERSION_LT(3, 21, 0)
+#define TaoMonitorCancel TaoCancelMonitors
+#endif
 #if PETSC_VERSION_LT(3, 19, 0)
 #define PETSC_SUCCESS ((PetscErrorCode)0)
 #endif

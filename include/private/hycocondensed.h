@@ -11,8 +11,7 @@
 #define HYCOCONDENSED_H
 
 #include <hycoalgorithms.h>
-#include <hycoh5.h>
-#include <hycoromimpl.h>
+#include <hycoreducerimpl.h>
 
 enum { HYCO_FIELD_G, HYCO_FIELD_GAP, HYCO_FIELD_H, HYCO_FIELD_FREE, HYCO_N_FIELDS };
 extern const char *const HycoGridFieldNames[]; /* as in files */
@@ -25,11 +24,10 @@ enum { HYCO_LAW_U, HYCO_LAW_LAMBDA, HYCO_LAW_U_FULL, HYCO_N_LAWS };
 typedef struct {
   HycoFE fe;
   HycoPairs *pairs;
-  PetscInt *start, *dof;
-  PetscReal *value, *gap;
+  HycoRows rows;
 } HycoGapSource;
 
-struct _n_HycoCondensed {
+typedef struct _n_HycoCondensed {
   PetscInt dim, m, l;                                               /* parameters, contacts, modes */
   PetscInt n[HYCO_MAX_PARAMETERS];                                  /* training values of each parameter */
   PetscReal *x[HYCO_MAX_PARAMETERS];                                /* ascending */
@@ -53,23 +51,83 @@ struct _n_HycoCondensed {
   PetscReal cut;  /* what the modes leave out of any displacement */
   /* training only: the error of the forces by parameter; the sample of each node of the whole grid */
   PetscReal by_parameter[HYCO_MAX_PARAMETERS];
-  PetscInt hopeless;    /* the points were chosen: of this parameter more values were in vain; -1: none */
-  PetscBool target_met; /* the points were chosen, and the target was reached */
+  PetscInt hopeless;            /* the points were chosen: of this parameter more values were in vain; -1: none */
+  PetscBool chosen, target_met; /* the points were chosen, and the target was reached */
   PetscInt *sample;
   /* online */
   PetscBool current; /* M and H hold the stiffness's parameters `at` */
   PetscReal at[HYCO_MAX_PARAMETERS];
   PetscBool solved; /* active is the set of the solution at `last` */
   PetscReal last[HYCO_MAX_PARAMETERS];
-  PetscReal gap_size;                           /* largest of the gap's field */
-  PetscReal *packed, *M, *work, *g, *H, *a;     /* M: G, m x m */
-  HycoSetFactor set_factor;                     /* of M on the active contacts */
+  PetscReal gap_size;                       /* largest of the gap's field */
+  PetscReal *packed, *M, *work, *g, *H, *a; /* M: G, m x m */
+  HycoSetFactor set_factor;                 /* of M on the active contacts */
   PetscBool *active;
-};
+  Mat flexibility; /* M; forces: the model's Lambda; the system that both make */
+  Vec forces;
+  HycoSystem system;
+} * HycoCondensed;
+
+/* What the modes are made of (condense_modes.c): snapshots, and responses K^-1 B^T P to patterns of forces at each node
+   of the stiffness. Rank 0, but for r, q, Q and scale. */
+typedef struct {
+  PetscInt r, n_columns, q; /* all modes above the noise; snapshots and responses, which they span; patterns */
+  PetscReal *Q, *scale;     /* orthonormal patterns, m x q column major; column j of P is Q_j scale_j */
+  PetscReal *C;             /* r x n_columns: V^T of the columns, the snapshots' first, then node by node */
+  PetscReal missed; /* of sampled forces held out of the patterns, what 95 % of them have outside the span, by the
+                       displacement of the nearest snapshot */
+} HycoResponses;
+
+/* The contacts' nodes and facets alone, where D is evaluated. */
+typedef struct {
+  HycoMesh mesh;
+  HycoPairs pairs;
+  HycoFE fe;
+  HycoRows rows;
+} HycoSurfaces;
+
+/* Its training: options, and what a run has made. */
+typedef struct {
+  PetscReal tol;     /* where the points are chosen */
+  PetscReal pod_tol; /* of its modes, unless the reducer's is smaller */
+  PetscInt max_values;
+  HycoResponses responses;
+  HycoCondensed condensed; /* under training; the grid on every rank, the fields on rank 0 */
+  HycoSurfaces surfaces;   /* rank 0 */
+} * HycoCondensing;
+
+static inline HycoCondensing Condensing(HycoReducer t)
+{
+  return (HycoCondensing)t->training;
+}
+
+/* The training's part of the ops: checks that scene and samples are fit, before hours of work; two values of each
+   parameter, to begin with; solving and factoring on the way, the points that meet -hyco_condensed_tol, in *samples
+   (the caller's); G at all its nodes, factoring where no file has it, and the modes l, sigma, V_whole, VtU anew, with
+   `responses`; the fields and their errors, handed to the model with numbers[]. */
+PetscErrorCode HycoCondensedSetFromOptions(HycoReducer reducer);
+PetscErrorCode HycoCondensedResetTraining(HycoReducer reducer);
+PetscErrorCode HycoCondensedBegin(HycoReducer reducer);
+PetscErrorCode HycoCondensedStartPoints(HycoReducer reducer, HycoSamples *samples);
+PetscErrorCode HycoCondensedChoosePoints(HycoReducer reducer, HycoSnapshots store, HycoSamples *samples);
+PetscErrorCode HycoCondensedFindModes(HycoReducer reducer, HycoSnapshots store);
+PetscErrorCode HycoCondensedBuild(HycoROM model, HycoReducer reducer);
+/* G at all its nodes. Collective. */
+PetscErrorCode HycoCondensedFlexibilities(HycoReducer reducer, HycoSnapshots store);
+/* Responses to q patterns P of forces (m x q column major, on every rank) at these nodes, into the columns of S (n_dof
+   x
+   ..., dense) from `first` on. Collective. */
+PetscErrorCode HycoCondensedResponses(HycoReducer reducer, HycoSnapshots store, PetscInt q, const PetscReal P[], Mat S,
+                                      PetscInt first);
+/* What its modes are chosen by: stresses lose the derivative's share of digits, and forces have many. */
+PetscReal HycoCondensedModesTolerance(HycoReducer reducer);
+/* Its fields and degrees, of all modes or none; the errors where values are left out. Rank 0. */
+PetscErrorCode HycoCondensedFillFields(HycoReducer reducer, PetscBool modes);
+PetscErrorCode HycoCondensedLeaveOut(HycoReducer reducer);
 
 PetscErrorCode HycoCondensedCreate(PetscInt dim, PetscInt m, PetscInt l, HycoCondensed *condensed);
 /* NULL-safe. */
-PetscErrorCode HycoCondensedDestroy(HycoCondensed *condensed);
+PetscErrorCode HycoCondensedFree(HycoCondensed *condensed);
 /* The fields' tensors, sizes and memory once n, x, stiff and l are there; degrees: as many as there are nodes. */
 PetscErrorCode HycoCondensedAllocate(HycoCondensed condensed);
 /* Room for what is online. */
@@ -89,8 +147,9 @@ PetscErrorCode HycoCondensedLoadWeights(HycoCondensed condensed, const PetscReal
                                         PetscBool *span);
 /* The parameters of node k of the whole grid. */
 void HycoCondensedPoint(HycoCondensed condensed, PetscInt k, PetscReal mu[]);
-/* The laws of the errors at mu; < 0: too few values, or an older file. */
-void HycoCondensedLaw(HycoCondensed condensed, const PetscReal mu[], PetscReal law[]);
+/* The laws of the errors as features, and as estimates (condensed_estimate.c). */
+PetscErrorCode HycoCondensedFeatures(HycoROM model, PetscReal misfit[2]);
+PetscErrorCode HycoCondensedEstimate(HycoROM model, HycoPrediction *prediction);
 /* To and from the model's file. */
 PetscErrorCode HycoCondensedSave(HycoROM model, HycoH5 file);
 PetscErrorCode HycoCondensedLoad(HycoROM model, HycoH5 file);

@@ -64,10 +64,21 @@ PetscErrorCode HycoPairsDestroy(HycoPairs *pairs);
 PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *pairs);
 /* Gives pairs their search where a map moves surfaces, on a mesh that has all nodes of these; else leaves it out. */
 PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
-/* Whether contact k is on surfaces that a map moves. */
+/* Whether a map moves the surfaces of the scene's contact number `contact`; whether contact k is on such. */
+static inline PetscBool HycoPairsFollows(const HycoPairs *pairs, PetscInt contact)
+{
+  return (PetscBool)(pairs->room && pairs->search[contact].moved);
+}
 static inline PetscBool HycoPairsMoved(const HycoPairs *pairs, PetscInt k)
 {
-  return (PetscBool)(pairs->room && pairs->search[pairs->contact[k]].moved);
+  return HycoPairsFollows(pairs, pairs->contact[k]);
+}
+/* How far from its slave a master point on moved surfaces may be, by contact of the scene; NULL: no change. */
+void HycoPairsSetReach(HycoPairs *pairs, const PetscReal reach[]);
+/* The slave node of contact k. */
+static inline PetscInt HycoPairsSlave(const HycoPairs *pairs, PetscInt k)
+{
+  return pairs->slave[k];
 }
 /* Whether contact k is a slave node that faces no master. */
 static inline PetscBool HycoPairsAlone(HycoScene scene, const HycoPairs *pairs, PetscInt k)

@@ -48,9 +48,10 @@ enum {
   HYCO_ROLE_A          /* in Omega_A only: the set A, (33) */
 };
 
-/* role[i] of each whole node, and in_rid[k]: whether contact k (of moved surfaces: in this place) belongs to A_lambda
-   (36). */
-PetscErrorCode HycoRIDSets(HycoMesh whole, const HycoPairs *pairs, const PetscBool in[], PetscInt role[],
-                           PetscInt in_rid[]);
+/* role[i] of each node of fe's mesh, the whole one, and in_rid[k]: whether contact k of pairs belongs to A_lambda (36).
+   rows: what the contacts meet, and `of` which contact each is (HycoMet); pairs themselves and NULL where nothing is
+   moved. */
+PetscErrorCode HycoRIDSets(HycoFE fe, HycoPairs *pairs, const HycoPairs *rows, const PetscInt of[],
+                           const PetscBool in[], PetscInt role[], PetscInt in_rid[]);
 
 #endif

@@ -15,6 +15,7 @@ struct _p_HycoFOM {
   HycoScene scene; /* referenced */
   /* owned */
   DM dm;           /* over the ranks */
+  char mesh_write[PETSC_MAX_PATH_LEN];
   HycoMesh whole;  /* rank 0 */
   HycoMesh part;   /* each rank's cells; the whole mesh on one rank */
   HycoFE fe;       /* on the part */
@@ -44,6 +45,7 @@ struct _p_HycoFOM {
    */
   PetscBool regularise, pinned; /* pinned: the pins are chosen */
   PetscReal regularise_tol;
+  PetscInt partition; /* index in HycoPartitioners */
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
   Vec *released;
   HycoSummary summary;

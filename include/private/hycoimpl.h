@@ -87,6 +87,15 @@ PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, 
 #define HycoCheckHandle(handle, classid) PetscCall(HycoHandleCheck((handle), &(classid), PETSC_FUNCTION_NAME))
 /* Begins a View: stdout where *viewer is NULL; on an ASCII viewer the object's class and name, and a tab to pop. */
 PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool *ascii);
+/* XViewFromOptions() of a class. */
+#define HycoDefineViewFromOptions(Class, classid)                                                                      \
+  PetscErrorCode Class##ViewFromOptions(Class object, PetscObject owner, const char option[])                         \
+  {                                                                                                                    \
+    PetscFunctionBegin;                                                                                                \
+    HycoCheckHandle(object, classid);                                                                                  \
+    PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));                                         \
+    PetscFunctionReturn(PETSC_SUCCESS);                                                                                \
+  }
 /* The communicator of an object of any class. */
 #define HycoComm(object) PetscObjectComm((PetscObject)(object))
 /* Takes one reference from `*object` and clears it; returns unless that was the last. */
@@ -159,18 +168,50 @@ void HycoPointEnd(void *before);
 /* Makes BLAS take its memory once, or fails: where OpenBLAS finds none, it looks for ever. On this process alone. */
 PetscErrorCode HycoReserveBLAS(void);
 
+/* lost / size; 0/0 counts as 0, x/0 is PETSC_INFINITY. */
+static inline PetscReal HycoRelative(PetscReal lost, PetscReal size)
+{
+  return size > 0 ? lost / size : lost > 0 ? PETSC_INFINITY : 0;
+}
+
 /* Seconds since the first call, on this rank's clock. */
 PetscReal HycoNow(void);
 
-/* Option look-up with the library's own checks: a value that does not parse is one clear line. */
-PetscErrorCode HycoOptionsReal(PetscOptions options, const char name[], PetscReal lo, PetscReal hi, PetscReal *value);
-PetscErrorCode HycoOptionsInt(PetscOptions options, const char name[], PetscInt lo, PetscInt hi, PetscInt *value);
-PetscErrorCode HycoOptionsBool(PetscOptions options, const char name[], PetscBool *value);
-/* One word of `words` (NULL-terminated); `*index` is left alone when the option is absent. */
-PetscErrorCode HycoOptionsWord(PetscOptions options, const char name[], const char *const words[], PetscInt *index);
+/* Recorded declarations; the strings of an option are one block, at its name. */
+typedef struct {
+  PetscInt n, room;
+  HycoOption *option;
+} HycoOptionList;
+/* Runs `declare` with an empty database, its declarations going to the list and reading nothing. */
+PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)(PetscOptions));
+PetscErrorCode HycoOptionListDestroy(HycoOptionList *list);
+/* The option of this name (without dash; mu_ is that of mu_radius), or NULL. Borrowed. */
+const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name[]);
+/* Makes an object of each class, which sets itself from `options`. */
+PetscErrorCode HycoDeclareClasses(PetscOptions options);
+PetscErrorCode HycoSolverDeclare(PetscOptions options);
+PetscErrorCode HycoFOMDeclare(PetscOptions options);
+PetscErrorCode HycoSnapshotsDeclare(PetscOptions options);
+PetscErrorCode HycoReducerDeclare(PetscOptions options);
+PetscErrorCode HycoROMDeclare(PetscOptions options);
+/* Makes `object` set itself from `options`, then destroys it: what the above do. */
+#define HycoDeclare(object, options, set, destroy)                                                                     \
+  do {                                                                                                                 \
+    PetscErrorCode declared_;                                                                                          \
+    PetscCall(PetscObjectSetOptions((PetscObject)(object), (options)));                                                \
+    declared_ = set(object);                                                                                           \
+    PetscCall(destroy(&(object)));                                                                                     \
+    PetscCall(declared_);                                                                                              \
+  } while (0)
 
-/* Whether an option is in the library's table; name without the dash. */
-PetscBool HycoOptionKnown(const char name[]);
+/* What a class declares of the option (name without the dash), or NULL. Borrowed. */
+const HycoOption *HycoOptionFind(const char name[]);
+/* The name that was meant, of those that the classes declare and (if not NULL) `more`; NULL: none is near. Borrowed. */
+const char *HycoOptionNearest(const char word[], const HycoOptionList *more);
+/* Fails for a name that an option had, with the one that it has. */
+PetscErrorCode HycoOptionsCheckName(const char name[]);
+/* Whether an option's name (without dash) begins as a scene's entry does. */
+PetscBool HycoIsSceneKey(const char name[]);
 
 /* A copy of `n` items of type `type`: *to = copy of from. */
 #define HycoDuplicate(n, from, to)                                                                                     \

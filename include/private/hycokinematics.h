@@ -10,7 +10,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
                              PetscReal *weight);
 /* Their means over the cell, which make the dilatation of the element bbar. */
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[8][3]);
-/* Room for the tangents; fails for a law that the library does not solve with. */
+/* Room for the tangents. */
 PetscErrorCode HycoTangentsCreate(HycoFE fe);
 /* The tangents at fe's nodes and mu; all: of cells that no parameter reaches too. */
 PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all);

@@ -51,9 +51,9 @@ void HycoSetFactorForget(HycoSetFactor factor);
 PetscErrorCode HycoSetFactorSolve(HycoSetFactor factor, const PetscReal M[], const PetscReal q[], PetscInt k,
                                   const PetscInt a[], PetscReal tol, PetscReal z[], PetscBool *regular);
 /*
-  A dense problem: M column major, n x n. `symmetric`: it is positive semidefinite; then `factor` may be that of M's last
-  set, or one that was forgotten; NULL: each set is factored anew. With p free unknowns before the n contacts (floating
-  bodies) z = (x_pinned, L), M and q as HycoDirectFactor() and HycoDirectReduce() give them. All is borrowed.
+  A dense problem: M column major, n x n. `symmetric`: it is positive semidefinite; then `factor` may be that of M's
+  last set, or one that was forgotten; NULL: each set is factored anew. With p free unknowns before the n contacts
+  (floating bodies) z = (x_pinned, L), M and q as HycoDirectFactor() and HycoDirectReduce() give them. All is borrowed.
 */
 typedef struct {
   PetscInt n, p;
@@ -65,9 +65,9 @@ typedef struct {
   void *monitor_ctx;
 } HycoLCP;
 /*
-  The active set from `active`, which returns the last set. Contacts that repeat others carry no force and leave the set;
-  when their gaps contradict each other and the choice of the smaller ones does not end it, the status is SINGULAR. So it
-  is where contact does not hold floating bodies under this load.
+  The active set from `active`, which returns the last set. Contacts that repeat others carry no force and leave the
+  set; when their gaps contradict each other and the choice of the smaller ones does not end it, the status is SINGULAR.
+  So it is where contact does not hold floating bodies under this load.
 */
 PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                 HycoLCPStatus *status);
@@ -96,13 +96,13 @@ PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[]
 
 /* What a type of Tao is and needs; 0: one that a program has registered. */
 enum {
-  HYCO_TAO_SYMMETRIC = 1,   /* bound-constrained: H symmetric */
-  HYCO_TAO_DENSE = 2,       /* the dense matrix of the dual form */
-  HYCO_TAO_ENTRIES = 4,     /* reads H's entries */
-  HYCO_TAO_SEMISMOOTH = 8,  /* poses it as complementarity of z and w */
-  HYCO_TAO_NEWTON = 16,     /* converges quadratically */
-  HYCO_TAO_RESTARTS = 32,   /* comes through from a second start where it stood still */
-  HYCO_TAO_OWN = 64         /* hyco's: takes the problem as it is, unscaled */
+  HYCO_TAO_SYMMETRIC = 1,  /* bound-constrained: H symmetric */
+  HYCO_TAO_DENSE = 2,      /* the dense matrix of the dual form */
+  HYCO_TAO_ENTRIES = 4,    /* reads H's entries */
+  HYCO_TAO_SEMISMOOTH = 8, /* poses it as complementarity of z and w */
+  HYCO_TAO_NEWTON = 16,    /* converges quadratically */
+  HYCO_TAO_RESTARTS = 32,  /* comes through from a second start where it stood still */
+  HYCO_TAO_OWN = 64        /* hyco's: takes the problem as it is, unscaled */
 };
 int HycoTaoTraits(const char type[]);
 /* The type's name as registered, empty for an unknown one; list: TAO's types that suit contact. */
@@ -110,10 +110,11 @@ PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char
 /* Registers hyco's types beside TAO's. */
 PetscErrorCode HycoTaoRegisterAll(void);
 
-/* A Tao with the options prefix hyco_, kept between problems. */
+/* A Tao, kept between problems; its options are -hyco_tao_..., behind the prefix of its owner. */
 typedef struct _n_HycoTao *HycoTao;
-/* Collective, as all that follows. */
-PetscErrorCode HycoTaoCreate(MPI_Comm comm, HycoTao *tao);
+/* Collective, as all that follows. `owner` (borrowed, may be NULL): of a problem that each of its ranks solves alone (comm:
+   PETSC_COMM_SELF) the first one prints what -hyco_tao_monitor and its like ask for. */
+PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *tao);
 /* NULL-safe. */
 PetscErrorCode HycoTaoDestroy(HycoTao *tao);
 /* max_its 0: 2000, or of hyco's types by the number of contacts. */

@@ -77,12 +77,12 @@ extern const char *const HycoPartitioners[];
 /*
   The scene's mesh as a DMPlex (src/mesh/plex.c), read on rank 0. Collective.
   HycoMeshDistribute() spreads it: the cells by METIS, those on the two sides of a contact on one rank where they can be
-  (pairs: n_pairs x 2 node indices of rank 0's tables `whole`); refines it as the scene says; and adds to each rank the
-  cells that touch its own.
+  (pairs: n_pairs x 2 node indices of rank 0's tables `whole`); refines it as the scene says; writes it to `write`
+  in PETSc's HDF5 format, unless that is empty; and adds to each rank the cells that touch its own.
 */
 PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm);
 PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
-                                  HycoPartitioner by);
+                                  HycoPartitioner by, const char write[]);
 /* Tables of each process's part: the cells that touch a node of its own. n_owned, first: its own nodes' rows in the
    distributed numbering. On one process node_global, node_whole and cell_whole stay NULL. Collective. */
 PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *n_owned, PetscInt *first);

@@ -2,22 +2,11 @@
 #ifndef HYCOREDUCERIMPL_H
 #define HYCOREDUCERIMPL_H
 
-#include <hycocondensed.h>
 #include <hycoromimpl.h>
 #include <hycosnapshotsimpl.h>
 #include <hycoreducer.h>
 
 enum { HYCO_SEED_DISPLACEMENT, HYCO_SEED_STRESS, HYCO_SEED_FORCE, HYCO_SEED_DUAL, HYCO_N_SEEDS };
-
-/* What the modes of a condensed model are made of (condense_modes.c): snapshots, and responses K^-1 B^T P to patterns
-   of forces at each node of the stiffness. Rank 0, but for r, q, Q and scale. */
-typedef struct {
-  PetscInt r, n_columns, q; /* all modes above the noise; snapshots and responses, which they span; patterns */
-  PetscReal *Q, *scale;     /* orthonormal patterns, m x q column major; column j of P is Q_j scale_j */
-  PetscReal *C;             /* r x n_columns: V^T of the columns, the snapshots' first, then node by node */
-  PetscReal missed; /* of sampled forces held out of the patterns, what 95 % of them have outside the span, by the
-                       displacement of the nearest snapshot */
-} HycoResponses;
 
 /* The basis of one field of the snapshots, which a recipe takes the first modes of. Every rank. */
 typedef struct {
@@ -45,14 +34,13 @@ struct _p_HycoReducer {
   /* user parameters */
   char folder[PETSC_MAX_PATH_LEN]; /* of snapshots; "": from the model's name */
   PetscReal tol[HYCO_N_SEEDS], noise, extension;
-  PetscInt max_modes, layers, trials;
+  PetscInt max_modes, layers;
   PetscBool seed[HYCO_N_SEEDS], whole_rid;
   PetscInt deim; /* of each basis that seeds the RID: 0 DEIM, 1 Q-DEIM */
   PetscInt n_groups;
   char *groups[64], *region;
   HycoHybrid hybrid;
   PetscInt most_full_order; /* hybrid all: the most full-order displacements; 0: no limit */
-  PetscReal ridge;          /* hybrid all; < 0: chosen */
   PetscInt scan;            /* points per parameter; 0: chosen */
   PetscBool keep_singular;
   PetscInt n_validation; /* held-out solutions beside the training points; < 0: from their number */
@@ -63,12 +51,8 @@ struct _p_HycoReducer {
   void *attempt_ctx;
   PetscReal target[HYCO_N_ERRORS]; /* 0: none */
   PetscInt budget;                 /* solutions that may be added to meet the targets */
-  HycoROMType type;
-  HycoDual dual;
-  PetscInt nnmf_max_its, nnmf_vectors;
-  PetscReal condensed_tol;     /* where the points are chosen */
-  PetscReal condensed_pod_tol; /* of its modes, unless tol[] is smaller */
-  PetscInt condensed_max_values;
+  HycoROM prototype;               /* a model of the type to be trained, without anything in it: its ops. Every rank */
+  void *training;                  /* the type's options, and what a run has made */
   HycoProgress progress;
   void *progress_ctx;
   struct {
@@ -93,40 +77,36 @@ struct _p_HycoReducer {
   PetscInt sizes[4]; /* every rank: nodes, cells, contacts, dim */
   PetscInt n_seeds_node, n_seeds_cell, *seeds_node, *seeds_cell; /* every rank */
   PetscInt counts[HYCO_N_SEEDS];
-  PetscInt l, n_supremizers; /* modes, and how many of them (the last) Enrich added */
-  PetscReal *sigma;          /* every rank: l */
-  PetscReal *V_whole;        /* (n_nodes * dim) x l row major */
-  PetscReal *U, *Lambda;     /* snapshots, column major: n_dof x n_s, n_contacts x n_s */
-  PetscReal *VtU;            /* l x n_s column major: V^T of the snapshots less their lifting */
-  PetscReal *U_norm;         /* n_s: of the whole snapshot */
+  PetscInt l;            /* modes */
+  PetscReal *sigma;      /* every rank: l */
+  PetscReal *V_whole;    /* (n_nodes * dim) x l row major */
+  PetscReal *U, *Lambda; /* snapshots, column major: n_dof x n_s, n_contacts x n_s */
+  PetscReal *VtU;        /* l x n_s column major: V^T of the snapshots less their lifting */
+  PetscReal *U_norm;     /* n_s: of the whole snapshot */
   PetscInt n_s;
   unsigned long long fingerprint;
-  HycoResponses responses;
-  HycoCondensed condensed; /* of a condensed model under training; the grid on every rank, the fields on rank 0 */
-  struct {
-    HycoMesh mesh;
-    HycoPairs pairs;
-    HycoFE fe;
-    PetscInt *start, *dof;
-    PetscReal *value, *gap;
-  } surfaces;       /* rank 0, condensed: the contacts' nodes and facets alone, where D is evaluated */
   PetscBool *grown; /* rank 0, greedy: cells of the RIDs so far; else NULL */
 };
 
 /* Frees what one run leaves behind. */
 PetscErrorCode HycoReducerReset(HycoReducer t);
-/* Frees the contact surfaces that condensed training evaluates gaps on. */
-PetscErrorCode HycoReducerResetSurfaces(HycoReducer t);
+/* Takes a registered type, with its options; the present one stays as it is. */
+PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType type);
+/* The dual snapshots that are not zero (n_contacts x n column major, the caller's). Rank 0. */
+PetscErrorCode HycoReducerDualSnapshots(HycoReducer t, PetscInt *n, PetscReal **S);
+/* A number that the type reports. */
+PetscErrorCode HycoTrainingAddFact(HycoTraining *report, const char name[], PetscReal value);
 /* Frees the bases, seeds and snapshots, and keeps the mesh; what one recipe took of the bases alone. */
 PetscErrorCode HycoReducerResetBases(HycoReducer t);
 PetscErrorCode HycoReducerDropBases(HycoReducer t);
 /* Begins a run: checks, the mesh, the store of snapshots (the caller destroys it). Collective. */
 PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char path[], HycoSnapshots *store);
-/* From the bases: the RID, the model on it, its full-order displacements, the file; what it gave, on every rank.
-   `useful`: refuse a model that misses its own training solutions. Collective. */
-PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, const char path[], HycoTraining *report);
-/* The useful model and its estimates, made beside `path` and then put in its place: a run that fails leaves what was
-   there. Collective. */
+/* From the bases: the RID, the model on it, in *model on every rank (the caller's, before the run ends: its whole-mesh
+   part is the reducer's on rank 0), and what it gave. `useful`: refuse a model that misses its own training solutions
+   or is singular in the ranges. Collective. */
+PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report);
+/* The useful model with its estimates, then its file, written once: a run that fails leaves what was there. Collective.
+ */
 PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char path[], PetscBool learn,
                                  HycoTraining *report);
 /* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
@@ -141,30 +121,18 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t);
 /* Draws or takes the points that the model is judged by, and solves them: t->held, NULL where there are none.
    Collective. */
 PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store);
-/* From the solutions in the store to the model at `path`: bases, and of the recipes that the options leave open the one
-   with the least cost online whose errors at the held-out points meet the targets (usual ones where none are given), or
-   else with the least errors. Sets report->chosen, its number 0 where there was nothing to choose. *grown: the training
+/* From the solutions in the store to a model: bases, and of the recipes that the options leave open the one with the
+   least cost online whose errors at the held-out points meet the targets (usual ones where none are given), or else
+   with the least errors. Sets report->chosen, its number 0 where there was nothing to choose. *grown: the training
    points with those that were added to meet the targets, or NULL; the caller destroys it. Collective. */
-PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, const char path[], HycoSamples *grown,
+PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *model, HycoSamples *grown,
                                 HycoTraining *report);
-/* Chooses the full-order displacements of a model under training; numbers[] of the model are filled. Rank 0. */
-PetscErrorCode HycoReducerChooseHybrid(HycoReducer t, HycoROM model);
-/* Scans the ranges for a singular reduced stiffness, the points spread over the ranks: the model at `candidate`
-   (removed) goes to `path` with what was found, or is refused. Collective. */
-PetscErrorCode HycoReducerScan(HycoReducer t, const char candidate[], const char path[], HycoScan *found);
-/* Gives the model a table of its reduced stiffness if that is a polynomial of the parameters that reach it. Rank 0. */
-PetscErrorCode HycoReducerTabulate(HycoROM model, const PetscBool reaches[]);
 /* B^T of the dual snapshots, and M^-1 of it with the matrix M of the H1 norm: where each force works most. Both n_dof x
    n_s, dense, the caller's. Rank 0. */
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers);
-/* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V_whole, sigma (0 for these)
-   and VtU have more columns. Rank 0. */
-PetscErrorCode HycoReducerEnrich(HycoReducer t);
-/* The force basis of a projection-based model under training from its dual snapshots; fills numbers[]. Rank 0. */
-PetscErrorCode HycoReducerProject(HycoReducer t, HycoROM model);
-/* Judges the model at `path` by the held-out solutions, calibrates the estimates of its errors on them and writes it
-   once more: report->held_out, and n_held, the predictions behind the estimates (0: none; too few). Collective. */
-PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, const char path[], HycoTraining *report);
+/* Judges the model by the held-out solutions, calibrates the estimates of its errors on them and notes both in it (rank
+   0): report->held_out, and n_held, the predictions behind the estimates (0: none; too few). Collective. */
+PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report);
 
 /* What a model gave at one held-out point, all PetscReal: errors (those of forces before division), the forces' sizes,
    whether it converged, the features of the estimates, the time of some repetitions. */
@@ -181,28 +149,13 @@ PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[]);
 PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force);
 PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], HycoValidation *validation);
 
-/* A condensed model: checks that scene and samples are fit for one, before hours of work; G at all its nodes, factoring
-   where no file has it; responses to q patterns P of forces (m x q column major, on every rank) at these nodes, into
-   the columns of S (n_dof x ..., dense) from `first` on. Collective. */
-PetscErrorCode HycoReducerBeginCondensed(HycoReducer t);
-PetscErrorCode HycoReducerFlexibility(HycoReducer t, HycoSnapshots store);
-PetscErrorCode HycoReducerResponses(HycoReducer t, HycoSnapshots store, PetscInt q, const PetscReal P[], Mat S,
-                                    PetscInt first);
-/* Its modes, once G is there: l, sigma, V_whole, VtU anew, and `responses`. Collective. */
-PetscErrorCode HycoReducerFindModes(HycoReducer t, HycoSnapshots store);
-/* The points of a condensed training that names none: two values of each parameter, to begin with; after
-   HycoReducerBeginCondensed(), solving and factoring on the way, those that meet -hyco_condensed_tol, in *samples (the
-   caller's), the bases made. Collective. */
-PetscErrorCode HycoReducerStartPoints(HycoReducer t, HycoSamples *samples);
-PetscErrorCode HycoReducerChoosePoints(HycoReducer t, HycoSnapshots store, HycoSamples *samples);
-/* What its modes are chosen by: stresses lose the derivative's share of digits, and forces have many. */
-PetscReal HycoReducerModesTolerance(HycoReducer t);
-/* Its fields and degrees, of all modes or none; the errors where values are left out; all of it, handed to the model,
-   with numbers[]. Rank 0. */
-PetscErrorCode HycoReducerFillFields(HycoReducer t, PetscBool modes);
-PetscErrorCode HycoReducerLeaveOut(HycoReducer t);
-PetscErrorCode HycoReducerCondense(HycoReducer t, HycoROM model);
-/* Fills numbers[]: condition and mean training errors of the model as it stands. Rank 0. */
+/* Fills numbers[] of a model as it stands: condition and mean training errors; these alone, an unsolved or wild
+   prediction counting as HYCO_JUDGED_WORST. Rank 0. */
+#define HYCO_JUDGED_WORST 10.0
 PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM model);
+PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM model, PetscReal *u, PetscReal *lambda);
+
+/* The settings as they stand. */
+void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *recipe);
 
 #endif

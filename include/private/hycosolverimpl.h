@@ -41,7 +41,7 @@ struct _HycoSolverFormOps {
   /* May be NULL. Ends a refinement: each solve begins alike. */
   PetscErrorCode (*reset)(HycoSolver s, HycoSolverForm form);
   /* May be NULL. The options of this form alone. */
-  PetscErrorCode (*setfromoptions)(HycoSolver s, HycoSolverForm form, PetscOptions options);
+  PetscErrorCode (*setfromoptions)(HycoSolver s, HycoSolverForm form, HycoOptionItems PetscOptionsObject);
   PetscErrorCode (*destroy)(HycoSolverForm form);
 };
 struct _n_HycoSolverForm {
@@ -63,7 +63,7 @@ typedef struct {
   PetscReal bytes; /* estimated for it, all ranks together */
   PetscReal *lu;   /* column major n x n */
   PetscBLASInt *ipiv, n;
-  PetscReal *X;      /* its work: K^-1 Bt, n x room */
+  PetscReal *X; /* its work: K^-1 Bt, n x room */
   size_t room;
   PetscBool refined; /* solves with it are refined in twice the working precision, S too */
   HycoOperatorState of;
@@ -72,8 +72,8 @@ typedef struct {
 struct _p_HycoSolver {
   PETSCHEADER(int);
   /* user parameters */
-  HycoSystem system; /* referenced */
-  PetscInt type;     /* index in HycoSolverTypes */
+  HycoSystem system;                           /* referenced */
+  PetscInt type;                               /* index in HycoSolverTypes */
   char form_name[32], tao_type[HYCO_TAO_NAME]; /* empty: by the problem */
   PetscReal rtol;
   PetscInt max_its;

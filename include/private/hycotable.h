@@ -3,8 +3,7 @@
 #define HYCOTABLE_H
 
 #include <hycoalgorithms.h>
-#include <hycoh5.h>
-#include <hycoromimpl.h>
+#include <hycogalerkin.h>
 
 /* At most so many combinations of values. */
 #define HYCO_TABLE_NODES 32

@@ -175,6 +175,18 @@ static PetscErrorCode AddOnePoint(HycoScene scene, HycoSamples samples, PetscBoo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode DeclareCompare(PetscOptions options)
+{
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  (void)options;
+  PetscCall(DriverReadFiles(path, path, NULL, path, path));
+  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CommandCompare(void)
 {
   HycoScene scene;
@@ -189,10 +201,9 @@ PetscErrorCode CommandCompare(void)
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
-  PetscCall(DriverGet("scene", PETSC_TRUE, path));
-  PetscCall(DriverGet("model", PETSC_TRUE, file));
-  PetscCall(DriverGet("table", PETSC_FALSE, table));
-  PetscCall(DriverGet("report", PETSC_FALSE, report));
+  PetscCall(DriverReadFiles(path, file, NULL, report, table));
+  PetscCall(DriverRequire("scene", path));
+  PetscCall(DriverRequire("model", file));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverCheckMesh(scene));
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(file, &model));
@@ -202,7 +213,7 @@ PetscErrorCode CommandCompare(void)
   HycoCheck(given, "give the test points: -mu V,V,... for one, or -grid N,N,..., or -values_NAME V,V,... for each "
                    "parameter, or -points FILE.csv");
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCall(DriverCheckLeftEarly(scene));
+  PetscCall(DriverCheckLeftEarly());
   PetscCall(HycoSceneHasContact(scene, &contact));
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));

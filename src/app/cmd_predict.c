@@ -57,7 +57,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
 
   PetscFunctionBegin;
   PetscCall(ReportCreate("predict", scene, mu, &json));
-  cJSON_AddStringToObject(json, "model_type", HycoROMTypes[p->type]);
+  cJSON_AddStringToObject(json, "model_type", p->type);
   cJSON_AddNumberToObject(json, "n_dof", p->n_dof);
   cJSON_AddNumberToObject(json, "n_multipliers", p->n_multipliers);
   cJSON_AddNumberToObject(json, "n_contacts", p->n_all_contacts); /* as hyco solve counts them */
@@ -80,7 +80,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   ReportTrust(json, p);
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
-  if (p->type == HYCO_ROM_CONDENSED) {
+  if (p->gives_forces) {
     Estimate(json, "interpolation_error", p->interpolation_error);
     cJSON_AddBoolToObject(json, "full_displacement", whole && !fallback[0]);
   }
@@ -93,15 +93,15 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
 static PetscErrorCode SayReduced(const HycoPrediction *p)
 {
   PetscFunctionBegin;
-  if (p->type == HYCO_ROM_PROJECTION)
-    PetscCall(Say("projection-based: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n",
-                  (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements));
-  else if (p->type == HYCO_ROM_CONDENSED)
-    PetscCall(Say("condensed: %d contacts, %d modes\n", (int)p->n_contacts, (int)p->n_modes));
-  else
+  if (p->gives_forces)
+    PetscCall(Say("%s: %d contacts, %d modes\n", p->title, (int)p->n_contacts, (int)p->n_modes));
+  else if (p->n_fe_dofs || p->rid_fraction < 1)
     PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
                   (int)p->n_modes, (int)p->n_fe_dofs, (int)p->n_contacts, (int)p->rid_elements,
                   100 * (double)p->rid_fraction));
+  else
+    PetscCall(Say("%s: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n", p->title,
+                  (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -119,7 +119,7 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMPredict(model, n, mu));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetPrediction(model, &p));
   PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
-  PetscCall(DriverCheckLeftEarly(scene));
+  PetscCall(DriverCheckLeftEarly());
   DriverWantsFullOrder(fallback, &p, why);
   if (why[0]) {
     PetscCall(DriverSolveFullOrder(fallback, n, mu, &p));
@@ -265,8 +265,8 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCall(DriverGet("table", PETSC_FALSE, table));
-  PetscCall(DriverCheckLeftEarly(scene)); /* what the solver alone knows is read by the first prediction */
+  PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
+  PetscCall(DriverCheckLeftEarly()); /* what the solver alone knows is read by the first prediction */
   PetscCall(PetscCalloc2(n * N_COLUMNS, &value, n, &full));
   begin = HycoNow();
   HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, value, full));
@@ -279,21 +279,49 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode ReadExtrapolate(PetscBool *extrapolate)
+{
+  PetscFunctionBegin;
+  *extrapolate = PETSC_FALSE;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(HycoOptionsFlag("-extrapolate",
+                            "predict outside the trained ranges too, where nothing has tested the model", extrapolate));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DeclarePredict(PetscOptions options)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool flag;
+  PetscReal target;
+
+  PetscFunctionBegin;
+  (void)options;
+  PetscCall(DriverReadFiles(path, path, path, path, path));
+  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
+  PetscCall(ReadExtrapolate(&flag));
+  PetscCall(DriverReadTarget(HYCO_ERROR_U, &target));
+  PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &target));
+  PetscCall(DriverReadMonitor(&flag));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CommandPredict(void)
 {
   HycoROM model = NULL;
   HycoScene scene;
   HycoSamples samples = NULL;
   Fallback fallback = {0};
-  PetscBool set, monitor, extrapolate = PETSC_FALSE;
+  PetscBool set, monitor, extrapolate;
   char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
-  PetscCall(DriverGet("model", PETSC_TRUE, path));
-  PetscCall(DriverGet("output", PETSC_FALSE, output));
-  PetscCall(DriverGet("report", PETSC_FALSE, report));
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_monitor", &monitor));
-  PetscCall(HycoOptionsBool(NULL, "extrapolate", &extrapolate));
+  PetscCall(DriverReadFiles(NULL, path, output, report, NULL));
+  PetscCall(DriverRequire("model", path));
+  PetscCall(DriverReadMonitor(&monitor));
+  PetscCall(ReadExtrapolate(&extrapolate));
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(path, &model));
   PetscCall(HycoROMSetExtrapolate(model, extrapolate));
   PetscCall(HycoROMGetScene(model, &scene));

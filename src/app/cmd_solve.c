@@ -130,6 +130,20 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode DeclareSolve(PetscOptions options)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool monitor;
+
+  PetscFunctionBegin;
+  (void)options;
+  PetscCall(DriverReadFiles(path, NULL, path, path, path));
+  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
+  PetscCall(DriverReadMonitor(&monitor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CommandSolve(void)
 {
   HycoScene scene;
@@ -141,17 +155,16 @@ PetscErrorCode CommandSolve(void)
   char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN] = "";
 
   PetscFunctionBegin;
-  PetscCall(DriverGet("scene", PETSC_TRUE, path));
-  PetscCall(DriverGet("output", PETSC_FALSE, output));
-  PetscCall(DriverGet("report", PETSC_FALSE, report));
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-hyco_monitor", &monitor));
+  PetscCall(DriverReadFiles(path, NULL, output, report, NULL));
+  PetscCall(DriverRequire("scene", path));
+  PetscCall(DriverReadMonitor(&monitor));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverCheckMesh(scene));
   PetscCall(DriverHasSamples(scene, &set));
   HycoCheck(!set || !output[0], "-output is for one point (-mu); a set of points gives a -table");
   if (set) {
     PetscCall(DriverGetSamples(scene, &samples, &set));
-    PetscCall(DriverGet("table", PETSC_FALSE, table));
+    PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   } else
     PetscCall(DriverGetPoint(scene, mu));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));

@@ -25,7 +25,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
 
   PetscFunctionBegin;
   PetscCall(ReportCreate("train", scene, NULL, &json));
-  cJSON_AddStringToObject(json, "model_type", HycoROMTypes[t->type]);
+  cJSON_AddStringToObject(json, "model_type", t->type);
   cJSON_AddNumberToObject(json, "n_samples", t->n_samples);
   cJSON_AddNumberToObject(json, "n_modes", t->n_modes);
   cJSON_AddNumberToObject(json, "n_dual_modes", t->n_dual_modes);
@@ -37,19 +37,17 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
   cJSON_AddNumberToObject(json, "rid_elements", t->rid_elements);
   cJSON_AddNumberToObject(json, "rid_contacts", t->rid_contacts);
   cJSON_AddNumberToObject(json, "rid_fraction", t->rid_fraction);
-  if (t->type != HYCO_ROM_CONDENSED) cJSON_AddNumberToObject(json, "condition", t->condition);
+  if (t->stiffness) cJSON_AddNumberToObject(json, "condition", t->condition);
   PetscCall(HycoSceneGetParameters(scene, &n_par, NULL, NULL, NULL));
   ReportScan(json, &t->scan, n_par);
   cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
   cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
   cJSON_AddNumberToObject(json, "held_out_predictions", t->n_held);
-  if (t->type == HYCO_ROM_PROJECTION) {
-    cJSON_AddNumberToObject(json, "n_supremizers", t->n_supremizers);
-    cJSON_AddNumberToObject(json, "dual_misfit", t->dual_misfit);
-  }
-  if (t->type == HYCO_ROM_CONDENSED) {
-    cJSON_AddNumberToObject(json, "n_flexibilities", t->n_flexibilities);
-    ReportVector(json, "left_out_flexibility_gap_forces", 3, t->left_out);
+  for (PetscInt k = 0; k < t->n_facts; k++) {
+    if (t->fact[k].n > 1)
+      ReportVector(json, t->fact[k].name, t->fact[k].n, t->fact[k].value);
+    else
+      cJSON_AddNumberToObject(json, t->fact[k].name, t->fact[k].value[0]);
   }
   if (log->scene) DriverReportGreedy(json, log);
   DriverReportModel(json, search, t);
@@ -58,31 +56,6 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
   cJSON_AddNumberToObject(seconds, "total", t->seconds_snapshots + t->seconds_reduction);
   PetscCall(ReportWrite(&json));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode SayBases(const HycoTraining *t)
-{
-  PetscFunctionBegin;
-  if (t->type == HYCO_ROM_PROJECTION) {
-    PetscCall(
-        Say("projection-based: %d snapshots; %d displacement modes, %d of them supremizers; %d force vectors, which "
-            "leave out %.2e of the dual snapshots' energy\n",
-            (int)t->n_samples, (int)t->n_modes, (int)t->n_supremizers, (int)t->n_dual_modes, (double)t->dual_misfit));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  if (t->type == HYCO_ROM_CONDENSED) {
-    PetscCall(Say("condensed: %d snapshots, flexibility at %d points; one training value left out, relative: "
-                  "flexibility %.1e, gap %.1e, forces %.1e; %d displacement modes\n",
-                  (int)t->n_samples, (int)t->n_flexibilities, (double)t->left_out[0], (double)t->left_out[1],
-                  (double)t->left_out[2], (int)t->n_modes));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(Say("%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n", (int)t->n_samples,
-                (int)t->n_modes, (int)t->n_stress_modes, (int)t->n_force_modes, (int)t->n_dual_modes));
-  PetscCall(Say("RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
-                (int)t->rid_elements, 100 * (double)t->rid_fraction, (int)t->rid_nodes, (int)t->rid_a_nodes,
-                (int)t->rid_contacts, (int)t->n_fe_dofs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -95,50 +68,32 @@ static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses an option of the command line that this training does not read. */
-static PetscErrorCode CheckRead(HycoScene scene, PetscBool given, PetscBool greedy)
+/* Refuses an option of the command line that this training does not read, by what the reducer declares of it. */
+static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool greedy)
 {
-  static const struct {
-    const char *name, *types;                        /* NULL: for -greedy */
-  } meant[] = {{"-hyco_condensed_tol", "condensed"}, /* the first two choose points */
-               {"-hyco_condensed_max_values", "condensed"},
-               {"-hyco_condensed_pod_tol", "condensed"},
-               {"-hyco_nnmf_vectors", "projection"},
-               {"-hyco_nnmf_max_its", "projection"},
-               {"-hyco_rid_modes", "hybrid or condensed"},
-               {"-hyco_rid_dual_tol", "hybrid or condensed"},
-               {"-hyco_rid_stress_tol", "hybrid or condensed"},
-               {"-hyco_rid_force_tol", "hybrid or condensed"},
-               {"-hyco_rid_layers", "hybrid or condensed"},
-               {"-hyco_rid_contact_extension", "hybrid or condensed"},
-               {"-hyco_rid_groups", "hybrid or condensed"},
-               {"-hyco_rid_region", "hybrid or condensed"},
-               {"-hyco_rid_whole", "hybrid or condensed"},
-               {"-hyco_deim_type", "hybrid or condensed"},
-               {"-hyco_hybrid", "hybrid"},
-               {"-hyco_hybrid_trials", "hybrid"},
-               {"-hyco_hybrid_ridge", "hybrid"},
-               {"-hyco_scan", "hybrid or projection"},
-               {"-hyco_keep_singular", "hybrid or projection"},
-               {"-hyco_greedy_indicator", NULL},
-               {"-hyco_greedy_keep", NULL}};
-  PetscInt type = HYCO_ROM_HYBRID;
-  PetscOptions options;
+  const HycoOption *table;
+  PetscInt n;
+  HycoROMType type;
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneGetOptions(scene, &options));
-  PetscCall(HycoOptionsWord(options, "hyco_model_type", HycoROMTypes, &type));
-  for (size_t k = 0; k < sizeof(meant) / sizeof(meant[0]); k++) {
+  PetscCall(HycoReducerGetType(reducer, &type));
+  PetscCall(HycoGetOptionTable(&n, &table));
+  for (PetscInt k = 0; k < n; k++) {
+    const char *only = table[k].only, *where = strstr(only, " where");
+    char dashed[DRIVER_LINE];
     PetscBool set;
 
-    PetscCall(PetscOptionsHasName(NULL, NULL, meant[k].name, &set));
+    if (!only[0] || strcmp(table[k].owner, "HycoReducer")) continue;
+    PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", table[k].name));
+    PetscCall(PetscOptionsHasName(NULL, NULL, dashed, &set));
     if (!set) continue;
-    HycoCheck(meant[k].types || greedy, "nothing reads %s here: it is for train -greedy", meant[k].name);
-    if (!meant[k].types) continue;
-    HycoCheck(strstr(meant[k].types, HycoROMTypes[type]),
-              "nothing reads %s here: it is for -hyco_model_type %s, and the model is %s", meant[k].name,
-              meant[k].types, HycoROMTypes[type]);
-    HycoCheck(!given || k >= 2, "nothing reads %s here: it chooses points where none are given", meant[k].name);
+    if (strcmp(only, "greedy") == 0) {
+      HycoCheck(greedy, "nothing reads %s here: it is for train -greedy", dashed);
+      continue;
+    }
+    HycoCheck(strstr(only, type), "nothing reads %s here: it is for -hyco_model_type %.*s, and the model is %s", dashed,
+              where ? (int)(where - only) : (int)strlen(only), only, type);
+    HycoCheck(!given || !where, "nothing reads %s here: it chooses points where none are given", dashed);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -158,26 +113,35 @@ static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A condensed model's own points that miss -hyco_condensed_tol. */
-static PetscErrorCode JudgePoints(HycoScene scene, const HycoTraining *t)
+static PetscErrorCode ReadGreedy(PetscBool *greedy)
 {
-  const char *const *names, *name;
+  PetscFunctionBegin;
+  *greedy = PETSC_FALSE;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(HycoOptionsFlag(
+      "-greedy", "add solutions where an error indicator is worst, from the corners of the ranges or -grid ...",
+      greedy));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DeclareTrain(PetscOptions options)
+{
+  GreedyLog log = {0};
+  Search search = {0};
+  HycoSamples none;
+  PetscBool greedy;
+  char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
-  if (t->target_met) PetscFunctionReturn(PETSC_SUCCESS);
-  if (t->hopeless < 0) {
-    PetscCall(DriverMissed("-hyco_condensed_tol was not reached: the forces' error, one value left out, is %.1e, and "
-                           "%.1e was asked; raise -hyco_condensed_max_values, which is %d, or -hyco_condensed_tol",
-                           (double)t->left_out[2], (double)t->target, (int)t->most_values));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(HycoSceneGetParameters(scene, NULL, &names, NULL, NULL));
-  name = names[t->hopeless];
-  PetscCall(DriverMissed("-hyco_condensed_tol was not reached: with %d values of %s the forces' error, one of them "
-                         "left out, is %.1e, and hardly falls as values are added, where %.1e was asked: the stiffness "
-                         "or the contacts do not depend smoothly on %s (a kink, as of abs or max, a jump); train a "
-                         "hybrid model, or raise -hyco_condensed_tol",
-                         (int)t->hopeless_values, name, (double)t->hopeless_error, (double)t->target, name));
+  (void)options;
+  PetscCall(DriverReadFiles(path, path, NULL, path, path));
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
+  PetscCall(ReadGreedy(&greedy));
+  PetscCall(DriverReadGreedy(NULL, NULL, &none, &log));
+  PetscCall(DriverReadTargets(&search));
+  PetscCall(DriverReadBudget(&search.budget));
+  PetscCall(DriverGetValidation(NULL, &none));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -189,27 +153,27 @@ PetscErrorCode CommandTrain(void)
   HycoTraining t;
   GreedyLog log = {0};
   Search search = {0};
-  PetscBool given, chooses, greedy = PETSC_FALSE;
+  PetscBool given, chooses, greedy;
   PetscInt n;
   char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
 
   PetscFunctionBegin;
-  PetscCall(DriverGet("scene", PETSC_TRUE, path));
-  PetscCall(DriverGet("model", PETSC_TRUE, model));
-  PetscCall(DriverGet("report", PETSC_FALSE, report));
+  PetscCall(DriverReadFiles(path, model, NULL, report, NULL));
+  PetscCall(DriverRequire("scene", path));
+  PetscCall(DriverRequire("model", model));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverCheckMesh(scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
-  PetscCall(HycoOptionsBool(NULL, "greedy", &greedy));
+  PetscCall(ReadGreedy(&greedy));
   PetscCall(DriverReadTargets(&search));
   PetscCall(DriverGetValidation(scene, &validation));
   PetscCall(CheckKind(greedy, &search));
-  if (!greedy) PetscCall(DriverGet("table", PETSC_FALSE, search.table));
+  if (!greedy) PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, search.table));
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoReducerSetFromOptions(reducer));
   PetscCall(TakeOnce(samples, "training"));
   PetscCall(TakeOnce(validation, "validation"));
-  PetscCall(CheckRead(scene, given, greedy));
+  PetscCall(CheckRead(reducer, given, greedy));
   PetscCall(HycoReducerChooses(reducer, &chooses));
   HycoCheck(given || greedy || chooses,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
@@ -218,15 +182,15 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
   PetscCall(DriverSetSearch(&search, scene, reducer, n));
   if (greedy) PetscCall(DriverReadGreedy(scene, reducer, &training, &log));
-  PetscCall(DriverCheckLeftEarly(scene));
+  PetscCall(DriverCheckLeftEarly());
   if (greedy)
     PetscCall(HycoReducerRunGreedy(reducer, given ? samples : NULL, training, model, &t));
   else
     PetscCall(HycoReducerRun(reducer, given ? samples : NULL, model, &t));
-  PetscCall(SayBases(&t));
-  if (!given && t.type == HYCO_ROM_CONDENSED) PetscCall(JudgePoints(scene, &t));
-  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u,
-                t.type == HYCO_ROM_HYBRID ? "RID " : "", (double)t.error_lambda));
+  PetscCall(Say("%s", t.summary));
+  if (t.missed[0]) PetscCall(DriverMissed("%s", t.missed));
+  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u, t.chosen.recipe.rid ? "RID " : "",
+                (double)t.error_lambda));
   if (t.condition > 0) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
   PetscCall(Say("\n"));
   if (t.scan.n)

@@ -2,6 +2,16 @@
 #include "driver.h"
 #include <petscviewer.h>
 
+PetscErrorCode DeclareView(PetscOptions options)
+{
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  (void)options;
+  PetscCall(DriverReadFiles(path, path, NULL, NULL, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CommandView(void)
 {
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
@@ -10,8 +20,7 @@ PetscErrorCode CommandView(void)
   PetscMPIInt rank;
 
   PetscFunctionBegin;
-  PetscCall(DriverGet("scene", PETSC_FALSE, path));
-  PetscCall(DriverGet("model", PETSC_FALSE, file));
+  PetscCall(DriverReadFiles(path, file, NULL, NULL, NULL));
   HycoCheck(!path[0] != !file[0], "give -model FILE.h5 or -scene FOLDER");
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   if (file[0]) {

@@ -13,41 +13,53 @@
 typedef struct {
   const char *name;
   PetscErrorCode (*run)(void);
-  const char *options; /* names of its own options, separated by spaces */
+  PetscErrorCode (*declare)(
+      PetscOptions); /* declares its own options: calls all that read some (HycoOptionsRecord()) */
   const char *usage, *meaning;
 } Command;
 
-extern const Command commands[];
+extern const Command commands[]; /* ends with name NULL */
 
 /* -- args.c: options -- */
 
 /* Every option on the command line is one that `command` knows, or PETSc's; no stray words. */
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv);
+/* Nothing was given that nobody read. To be called when all options have been read and before anything is written. */
+PetscErrorCode DriverCheckLeft(void);
+/* The same before the solvers have run: what is meant for them (-hyco_mumps_..., -hyco_tao_... with that type) passes.
+ */
+PetscErrorCode DriverCheckLeftEarly(void);
+/* Declares -name and reads its value, "" when absent; the text is one of HycoOptionsString(). */
+PetscErrorCode DriverGet(const char name[], const char text[], char value[PETSC_MAX_PATH_LEN]);
+/* -scene, -model, -output, -report, -table, which several commands take; NULL: not read. */
+PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char report[], char table[]);
+/* Fails for a value that is "". */
+PetscErrorCode DriverRequire(const char name[], const char value[]);
+/* Prints the options of a command (NULL: all). On this process alone. */
+PetscErrorCode DriverHelp(const Command *command);
+
+/* -- outputs.c: files -- */
+
 /* The files that `command` is to write are files of their own, none of which it reads, whatever their names, in folders
    that may be written; or devices. Before any work; counts no option as read. Collective. */
 PetscErrorCode DriverCheckOutputs(const Command *command);
 /* The scene's mesh is none of them. Collective. */
 PetscErrorCode DriverCheckMesh(HycoScene scene);
-/* Nothing was given that nobody read. To be called when all options have been read and before anything is written. */
-PetscErrorCode DriverCheckLeft(void);
-/* The same before the solvers have run: what is meant for them (-hyco_mumps_..., -hyco_tao_... with that type) passes.
- */
-PetscErrorCode DriverCheckLeftEarly(HycoScene scene);
-/* The value of -name; fails when it is required and missing. `value` is "" when absent. */
-PetscErrorCode DriverGet(const char name[], PetscBool required, char value[PETSC_MAX_PATH_LEN]);
+
+/* -- points.c: points in the space of parameters; without a scene, what gets some only declares its options -- */
+
 /* One point: -mu v,v,... or -mu_NAME v. */
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
 /* Whether -mu or a -mu_NAME was given. */
 PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given);
 /* A set of points: -grid (with -grid_type), -values_NAME, or -points. *given: whether any was. */
 PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given);
+/* Whether any point-set option was given. */
+PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given);
 /* The points among which a greedy training chooses: -training_grid, closed unless -grid_type says otherwise. */
 PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples);
 /* The points that models are judged by: -validation_grid or -validation_points; NULL when neither is given. */
 PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples);
-/* Whether any point-set option was given. */
-PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given);
-void DriverHelp(const char *command);
 
 /* -- status.c: how the command ends -- */
 
@@ -117,6 +129,8 @@ PetscErrorCode Say(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 void DriverPercent(PetscReal share, char text[32]);
 /* A HycoProgress: a bar that moves on a terminal, a line now and then elsewhere. ctx: a word for what is done. */
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx);
+/* -hyco_monitor */
+PetscErrorCode DriverReadMonitor(PetscBool *monitor);
 /* A HycoMonitor. */
 PetscErrorCode DriverMonitor(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx);
 
@@ -136,7 +150,8 @@ typedef struct {
 /* A point (NULL: none) in words ("mu1 = 0.05, mu2 = 0.1") and as columns ("0.05,0.1,"; may be NULL). */
 PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char words[DRIVER_LINE],
                                  char columns[DRIVER_LINE]);
-/* Reads the options of train -greedy, makes the training set and sets the reducer, which will fill `log`. */
+/* Reads the options of train -greedy, makes the training set and sets the reducer, which will fill `log`; without a
+   scene, declares them. */
 PetscErrorCode DriverReadGreedy(HycoScene scene, HycoReducer reducer, HycoSamples *training, GreedyLog *log);
 /* Says that the loop ended short of what was asked: of -target, or, where that was left to its default, of the limits
    that were given. Collective. */
@@ -154,8 +169,8 @@ typedef struct {
   PetscReal strain_energy;           /* of the last */
 } Fallback;
 
-/* A relative error above 0 and at most 1; 0 when absent. */
-PetscErrorCode DriverReadTarget(const char name[], PetscReal *target);
+/* -target_KIND: a relative error above 0 and at most 1; 0 when absent. */
+PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target);
 /* Reads the options and the scene, which must be the model's. Collective. */
 PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback *fallback);
 PetscErrorCode DriverEndFallback(Fallback *fallback);
@@ -182,6 +197,8 @@ typedef struct {
   size_t length, room;
 } Search;
 
+/* -target_max_added. */
+PetscErrorCode DriverReadBudget(PetscInt *budget);
 /* The -target_ options. */
 PetscErrorCode DriverReadTargets(Search *search);
 /* Hands them to the reducer, which will tell `search` of its attempts. */
@@ -196,5 +213,10 @@ PetscErrorCode CommandTrain(void);
 PetscErrorCode CommandPredict(void);
 PetscErrorCode CommandCompare(void);
 PetscErrorCode CommandView(void);
+PetscErrorCode DeclareSolve(PetscOptions options);
+PetscErrorCode DeclareTrain(PetscOptions options);
+PetscErrorCode DeclarePredict(PetscOptions options);
+PetscErrorCode DeclareCompare(PetscOptions options);
+PetscErrorCode DeclareView(PetscOptions options);
 
 #endif

@@ -5,13 +5,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-PetscErrorCode DriverReadTarget(const char name[], PetscReal *target)
+PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target)
 {
-  char text[PETSC_MAX_PATH_LEN], *end;
+  static const char *const texts[HYCO_N_ERRORS] = {
+      [HYCO_ERROR_U] =
+          "<real> train: choose the cheapest model whose errors on held-out solutions are no larger; predict "
+          "-hyco_fallback: solve full order where the estimated error is",
+      [HYCO_ERROR_U_RID] = "<real> train: the same for the displacement over the RID, max norm",
+      [HYCO_ERROR_SIGMA] = "<real> train: the same for the stress over the RID",
+      [HYCO_ERROR_SIGMA_11] = "<real> train: the same for its first component, max norm",
+      [HYCO_ERROR_LAMBDA] = "<real> train, predict: the same for all contact forces",
+      [HYCO_ERROR_LAMBDA_RID] = "<real> train: the same for the RID's own contact forces"};
+  char name[64], text[PETSC_MAX_PATH_LEN], *end;
 
   PetscFunctionBegin;
   *target = 0;
-  PetscCall(DriverGet(name, PETSC_FALSE, text));
+  snprintf(name, sizeof(name), "target_%s", HycoErrorKinds[kind]);
+  PetscCall(DriverGet(name, texts[kind], text));
   if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *target = strtod(text, &end);
   HycoCheck(end != text && !*end && *target > 0 && *target <= 1,
@@ -21,29 +31,26 @@ PetscErrorCode DriverReadTarget(const char name[], PetscReal *target)
 
 PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback *f)
 {
-  HycoScene scene;
-  PetscOptions options;
   HycoROMType type;
+  PetscBool forces;
   char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
-  PetscCall(HycoROMGetScene(model, &scene));
-  PetscCall(HycoSceneGetOptions(scene, &options));
-  PetscCall(HycoOptionsBool(options, "hyco_fallback", &f->on));
-  PetscCall(HycoOptionsBool(options, "hyco_full_displacement", &f->displacement));
+  PetscCall(HycoROMGetFallback(model, &f->on, &f->displacement));
   PetscCall(HycoROMGetType(model, &type));
-  HycoCheck(!f->displacement || type == HYCO_ROM_CONDENSED,
+  PetscCall(HycoROMGivesForces(model, &forces));
+  HycoCheck(!f->displacement || forces,
             "-hyco_full_displacement takes the contact forces of a condensed model, and this one is %s: its forces are "
             "not good enough for that; take -hyco_fallback",
-            HycoROMTypes[type]);
-  PetscCall(DriverReadTarget("target_u", &f->target_u));
-  PetscCall(DriverReadTarget("target_lambda", &f->target_lambda));
-  PetscCall(DriverGet("scene", PETSC_FALSE, path));
+            type);
+  PetscCall(DriverReadTarget(HYCO_ERROR_U, &f->target_u));
+  PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &f->target_lambda));
+  PetscCall(DriverReadFiles(path, NULL, NULL, NULL, NULL));
   HycoCheck(f->on || (!(f->target_u > 0) && !(f->target_lambda > 0)),
             "-target_u and -target_lambda say when hyco predict solves full order instead: give -hyco_fallback too");
   HycoCheck(f->on || f->displacement || !path[0],
             "hyco predict needs no -scene but with -hyco_fallback, which solves full order on it%s",
-            type == HYCO_ROM_CONDENSED ? ", or -hyco_full_displacement" : "");
+            forces ? ", or -hyco_full_displacement" : "");
   if (!f->on && !f->displacement) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(path[0], "%s: give its -scene too",
             f->on ? "-hyco_fallback solves full order where the reduced model is not enough"

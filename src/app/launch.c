@@ -30,7 +30,7 @@ static int HoldsFolders(const char *folder)
   char path[DRIVER_LINE];
   const int length = snprintf(path, sizeof(path), "%s/hyco-XXXXXX", folder);
 
-  return length > 0 && length < (int)sizeof(path) && mkdtemp(path) && !rmdir(path);
+  return folder[0] && length > 0 && length < (int)sizeof(path) && mkdtemp(path) && !rmdir(path);
 }
 
 /* Open MPI 5 makes a folder of its own for every process, in the first of these variables that is set, and crashes

@@ -7,26 +7,20 @@
 #include <time.h>
 
 const Command commands[] = {
-    {"solve", CommandSolve, "scene mu mu_ grid grid_type values_ points output report table hyco_monitor",
-     "hyco solve -scene FOLDER -mu V,V,... [-output F.xdmf] [-report R.json]",
+    {"solve", CommandSolve, DeclareSolve, "hyco solve -scene FOLDER -mu V,V,... [-output F.xdmf] [-report R.json]",
      "solve full order, for one point or a set (-table T.csv)"},
-    {"train", CommandTrain,
-     "scene model grid grid_type values_ points report greedy training_grid target max_snapshots max_seconds table "
-     "target_u target_u_rid target_sigma target_sigma_11 target_lambda target_lambda_rid validation_grid "
-     "validation_points target_max_added",
+    {"train", CommandTrain, DeclareTrain,
      "hyco train -scene FOLDER -grid N,N,... | -greedy -training_grid N,N,... -model M.h5 [-report R.json]",
      "solve a set of points full order (resumable), or choose them one by one; reduce, write the model; with -target_u "
      "1e-2 -target_lambda 5e-2 ... the cheapest that is so accurate"},
-    {"predict", CommandPredict,
-     "model mu mu_ grid grid_type values_ points output report table extrapolate scene target_u target_lambda "
-     "hyco_monitor",
+    {"predict", CommandPredict, DeclarePredict,
      "hyco predict -model M.h5 -mu V,V,... [-output F.xdmf] [-report R.json]",
      "solve the reduced model, for one point or a set (-table T.csv), and estimate its errors; reads only the model "
      "file, but with -hyco_fallback or -hyco_full_displacement, and -scene FOLDER"},
-    {"compare", CommandCompare, "scene model mu mu_ grid grid_type values_ points report table",
+    {"compare", CommandCompare, DeclareCompare,
      "hyco compare -scene FOLDER -model M.h5 -mu V,V,... | -grid N,N,... [-report R.json] [-table T.csv]",
      "errors and speed-up of the reduced model against full order over a set of points"},
-    {"view", CommandView, "scene model", "hyco view -model M.h5 | -scene FOLDER",
+    {"view", CommandView, DeclareView, "hyco view -model M.h5 | -scene FOLDER",
      "what is in a model or a scene, in words"},
     {NULL, NULL, NULL, NULL, NULL},
 };
@@ -95,17 +89,22 @@ static const Command *FindCommand(const char name[])
   return NULL;
 }
 
-/* Answers that need no PETSc: no command, an unknown one, -help, -version. Returns -1 to go on. */
+static PetscBool AsksHelp(int argc, char **argv)
+{
+  for (int k = 1; k < argc; k++) {
+    if (strcmp(argv[k], "-help") == 0 || strcmp(argv[k], "--help") == 0 || strcmp(argv[k], "-h") == 0 ||
+        (k == 1 && strcmp(argv[k], "help") == 0))
+      return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Answers that need no PETSc: no command, an unknown one, -version. Returns -1 to go on. */
 static int AnswerAtOnce(int argc, char **argv)
 {
   const Command *command = argc > 1 ? FindCommand(argv[1]) : NULL;
 
   for (int k = 1; k < argc; k++) {
-    if (strcmp(argv[k], "-help") == 0 || strcmp(argv[k], "--help") == 0 || strcmp(argv[k], "-h") == 0 ||
-        (k == 1 && strcmp(argv[k], "help") == 0)) {
-      DriverHelp(command ? command->name : NULL);
-      return 0;
-    }
     if (strcmp(argv[k], "-version") == 0 || strcmp(argv[k], "--version") == 0) {
       printf("hyco %s\n", HycoVersion());
       return 0;
@@ -159,13 +158,32 @@ static PetscErrorCode Start(int *argc, char ***argv)
   return ierr;
 }
 
+/* hyco help, hyco COMMAND -help: what the classes and the commands declare, which PETSc is needed for. */
+static int Help(char **argv)
+{
+  const Command *command = argv[1] ? FindCommand(argv[1]) : NULL;
+  PetscMPIInt rank;
+  PetscErrorCode ierr = 0;
+  int argc = 1;
+
+  DriverStartAlone();
+  if (Start(&argc, &argv)) return DRIVER_FAILED;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (rank == 0) {
+    if (!command && argv[1] && argv[2]) command = FindCommand(argv[2]); /* hyco help COMMAND */
+    ierr = DriverHelp(command);
+  }
+  return HycoFinalize() || ierr ? DRIVER_FAILED : DRIVER_DONE;
+}
+
 int main(int argc, char **argv)
 {
-  const int answer = AnswerAtOnce(argc, argv);
   PetscErrorCode ierr;
   int status;
 
-  if (answer >= 0) return answer;
+  if (AsksHelp(argc, argv)) return Help(argv);
+  status = AnswerAtOnce(argc, argv);
+  if (status >= 0) return status;
   DriverOneThread();
   DriverNoteLaunch();
   DriverStartAlone();

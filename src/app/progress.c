@@ -51,6 +51,16 @@ PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode DriverReadMonitor(PetscBool *monitor)
+{
+  PetscFunctionBegin;
+  *monitor = PETSC_FALSE;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(HycoOptionsFlag("-hyco_monitor", "a line per iteration of the active set", monitor));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode DriverMonitor(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx)
 {
   PetscFunctionBegin;

@@ -154,7 +154,7 @@ PetscErrorCode ReportWrite(cJSON **json)
   PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   cJSON_AddNumberToObject(*json, "memory_mb", all);
   DriverReportMissed(*json);
-  PetscCall(DriverGet("report", PETSC_FALSE, path));
+  PetscCall(DriverReadFiles(NULL, NULL, NULL, path, NULL));
   if (path[0]) {
     text = cJSON_Print(*json);
     HycoOnRoot(PETSC_COMM_WORLD, DriverWriteText(path, text));

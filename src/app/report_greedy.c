@@ -91,10 +91,16 @@ PetscErrorCode DriverReadGreedy(HycoScene scene, HycoReducer reducer, HycoSample
   PetscFunctionBegin;
   log->scene = scene;
   PetscCall(DriverGetTrainingGrid(scene, training));
-  PetscCall(DriverGet("table", PETSC_FALSE, log->table));
-  PetscCall(HycoOptionsReal(NULL, "target", 0, PETSC_MAX_REAL, &target));
-  PetscCall(HycoOptionsReal(NULL, "max_seconds", 0, PETSC_MAX_REAL, &max_seconds));
-  PetscCall(HycoOptionsInt(NULL, "max_snapshots", 0, PETSC_MAX_INT, &max_snapshots));
+  PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, log->table));
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(HycoOptionsReal("-target", "greedy: stop when the indicator is no larger anywhere on that grid", 0,
+                            PETSC_MAX_REAL, &target, NULL));
+  PetscCall(HycoOptionsInt("-max_snapshots", "greedy: stop with so many solutions (0: no limit)", 0, PETSC_MAX_INT,
+                           &max_snapshots, NULL));
+  PetscCall(HycoOptionsReal("-max_seconds", "greedy: stop after the iteration in which this has passed (0: no limit)",
+                            0, PETSC_MAX_REAL, &max_seconds, NULL));
+  PetscOptionsEnd();
+  if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(target > 0, "-target is 0; the indicator of a greedy training is asked to fall below a positive number, as "
                         "1e-3");
   log->target = target;

@@ -10,18 +10,28 @@
 /* The least that a model should be good for, where no target is given. */
 static const PetscReal bar[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 5e-3, [HYCO_ERROR_LAMBDA] = 3e-2};
 
+PetscErrorCode DriverReadBudget(PetscInt *budget)
+{
+  PetscFunctionBegin;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(
+      HycoOptionsInt("-target_max_added",
+                     "train -target_...: at most so many solutions are added to meet the targets (default: as many "
+                     "as were given) []",
+                     0, 1000000, budget, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode DriverReadTargets(Search *s)
 {
-  char name[64];
-
   PetscFunctionBegin;
-  s->budget = -1;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
-    PetscCall(PetscSNPrintf(name, sizeof(name), "target_%s", HycoErrorKinds[j]));
-    PetscCall(DriverReadTarget(name, &s->target[j]));
+    PetscCall(DriverReadTarget((HycoErrorKind)j, &s->target[j]));
     s->on = (PetscBool)(s->on || s->target[j] > 0);
   }
-  if (s->on) PetscCall(HycoOptionsInt(NULL, "target_max_added", 0, 1000000, &s->budget));
+  s->budget = -1;
+  if (s->on) PetscCall(DriverReadBudget(&s->budget));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -81,10 +91,9 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
     }
     PetscCall(Append(s, ",not_converged,seconds,operations,meets,failure\n"));
   }
-  at = (size_t)snprintf(row, sizeof(row), "%d,%d,%s,%g,%d,%g,%s,%d,%d,%d,%.6g", (int)++s->n, (int)s->n_points,
-                        HycoROMTypes[r->type], (double)r->pod_tol, (int)r->layers, (double)r->contact_extension,
-                        HycoHybrids[r->hybrid], (int)r->whole, (int)a->n_modes, (int)a->rid_elements,
-                        (double)a->rid_fraction);
+  at = (size_t)snprintf(row, sizeof(row), "%d,%d,%s,%g,%d,%g,%s,%d,%d,%d,%.6g", (int)++s->n, (int)s->n_points, r->type,
+                        (double)r->pod_tol, (int)r->layers, (double)r->contact_extension, HycoHybrids[r->hybrid],
+                        (int)r->whole, (int)a->n_modes, (int)a->rid_elements, (double)a->rid_fraction);
   for (PetscInt j = 0; j < 2 * HYCO_N_ERRORS; j++) {
     Number(a->failure[0] ? (PetscReal)NAN : (j % 2 ? a->held_out.median : a->held_out.largest)[j / 2], number);
     at += (size_t)snprintf(row + at, sizeof(row) - at, ",%s", number);
@@ -228,7 +237,7 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
     cJSON_AddNumberToObject(search, "attempts", s->n);
     cJSON_AddNumberToObject(search, "chosen", s->n - a->of + a->number);
     cJSON_AddNumberToObject(search, "added", t->n_added);
-    cJSON_AddStringToObject(search, "model_type", HycoROMTypes[a->recipe.type]);
+    cJSON_AddStringToObject(search, "model_type", a->recipe.type);
     cJSON_AddNumberToObject(search, "pod_tol", a->recipe.pod_tol);
     cJSON_AddNumberToObject(search, "rid_layers", a->recipe.layers);
     cJSON_AddNumberToObject(search, "rid_contact_extension", a->recipe.contact_extension);

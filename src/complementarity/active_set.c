@@ -1,8 +1,9 @@
 /*
-  The primal-dual active set, the paper's section 6.2 (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002) 865-888, for
-  its convergence): solve as if the contacts of the set were closed and the others open, let contacts that pull leave
-  the set and those that penetrate join it, until none does. The one loop; who uses it says how to solve on a set and
-  what counts as a violation: a dense flexibility, one with free unknowns, gap coordinates, a coarser level of these.
+  The primal-dual active set, the paper's section 6.2 (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002) 865-888,
+  for its convergence): solve as if the contacts of the set were closed and the others open, let contacts that pull
+  leave the set and those that penetrate join it, until none does. The one loop; who uses it says how to solve on a set
+  and what counts as a violation: a dense flexibility, one with free unknowns, gap coordinates, a coarser level of
+  these.
 */
 #include <hycolcp.h>
 

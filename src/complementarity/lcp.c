@@ -96,7 +96,8 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
   }
   PetscCall(PetscMalloc3(lcp->n, &d.w, lcp->n, &d.a, lcp->n, &d.aside));
   PetscCall(HycoActiveSetRun(&e, active, its, status));
-  if (*status == HYCO_LCP_CYCLE && d.n_aside) *status = HYCO_LCP_SINGULAR; /* dependent contacts whose gaps contradict */
+  if (*status == HYCO_LCP_CYCLE && d.n_aside)
+    *status = HYCO_LCP_SINGULAR; /* dependent contacts whose gaps contradict */
   PetscCall(PetscFree3(d.w, d.a, d.aside));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

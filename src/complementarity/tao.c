@@ -6,9 +6,9 @@
   and its semismooth types solve the complementarity problem w = q + M z >= 0, z >= 0, w.z = 0, symmetric or not, by the
   Fischer-Burmeister function (T. S. Munson et al., INFORMS J. Comput. 13 (2001) 294-311). Both stop on absolute sizes,
   so the problem is scaled first: unit diagonal, right-hand side of size one. A type that a program registers sees the
-  same: solution, bounds, Hessian, objective and its gradient H y - f. hyco's own types (tao_types.c) take the problem as
-  it is. What TAO says is not evidence: the caller recomputes the residuals. A PETSC error inside TAO is caught: it means
-  not solved, like a limit of iterations.
+  same: solution, bounds, Hessian, objective and its gradient H y - f. hyco's own types (tao_types.c) take the problem
+  as it is. What TAO says is not evidence: the caller recomputes the residuals. A PETSC error inside TAO is caught: it
+  means not solved, like a limit of iterations.
 */
 #include <hycotao.h>
 
@@ -59,12 +59,18 @@ PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTaoCreate(MPI_Comm comm, HycoTao *t)
+PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *t)
 {
+  PetscMPIInt rank = 0, size;
+
   PetscFunctionBegin;
   PetscCall(HycoTaoRegisterAll());
   PetscCall(PetscNew(t));
   (*t)->comm = comm;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  if (owner) PetscCallMPI(MPI_Comm_rank(PetscObjectComm(owner), &rank));
+  (*t)->owner = owner;
+  (*t)->quiet = (PetscBool)(size == 1 && rank > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -116,6 +122,7 @@ PetscErrorCode HycoTaoSetType(HycoTao t, const char type[], PetscInt max_its)
 static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *made)
 {
   PetscInt n, N;
+  const char *prefix = NULL;
 
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(y, &n));
@@ -127,24 +134,32 @@ static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *mad
   t->N = N;
   PetscCall(TaoCreate(t->comm, &t->tao));
   PetscCall(TaoSetType(t->tao, t->type));
-  PetscCall(TaoSetOptionsPrefix(t->tao, "hyco_"));
+  if (t->owner) PetscCall(PetscObjectGetOptionsPrefix(t->owner, &prefix));
+  PetscCall(PetscSNPrintf(t->prefix, sizeof(t->prefix), "%shyco_", prefix ? prefix : ""));
+  PetscCall(TaoSetOptionsPrefix(t->tao, t->prefix));
   PetscCall(TaoSetApplicationContext(t->tao, t));
   PetscCall(TaoSetMaximumIterations(t->tao, max_its));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The user's -hyco_tao_... options. -hyco_tao_type among them is HycoSolver's: it must not change the type of a fallback,
-   or of another problem. */
+/* The user's -hyco_tao_... options. -hyco_tao_type among them is HycoSolver's: it must not change the type of a
+   fallback, or of another problem. */
 static PetscErrorCode ReadOptions(HycoTao t)
 {
-  char named[HYCO_TAO_NAME];
+  char named[HYCO_TAO_NAME], option[2 * HYCO_TAO_NAME];
   PetscBool given;
 
   PetscFunctionBegin;
-  PetscCall(PetscOptionsGetString(NULL, "hyco_", "-tao_type", named, sizeof(named), &given));
-  if (given) PetscCall(PetscOptionsSetValue(NULL, "-hyco_tao_type", t->type));
+  PetscCall(PetscSNPrintf(option, sizeof(option), "-%stao_type", t->prefix));
+  PetscCall(PetscOptionsGetString(NULL, t->prefix, "-tao_type", named, sizeof(named), &given));
+  if (given) PetscCall(PetscOptionsSetValue(NULL, option, t->type));
   PetscCall(TaoSetFromOptions(t->tao));
-  if (given) PetscCall(PetscOptionsSetValue(NULL, "-hyco_tao_type", named));
+  if (given) PetscCall(PetscOptionsSetValue(NULL, option, named));
+  if (!t->quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TaoMonitorCancel(t->tao));
+  t->tao->printreason = PETSC_FALSE;
+  PetscCall(PetscOptionsHasName(NULL, t->prefix, "-tao_view", &given)); /* read here too, for the check of options */
+  PetscCall(PetscObjectSetOptionsPrefix((PetscObject)t->tao, "hyco_quiet_"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -420,6 +435,7 @@ static PetscErrorCode SolveOwn(HycoTao t, Vec y, PetscInt max_its)
   PetscFunctionBegin;
   PetscCall(Prepare(t, y, max_its, &made));
   if (made) PetscCall(ReadOptions(t));
+  PetscCall(TaoSetMaximumIterations(t->tao, max_its)); /* -hyco_tao_max_it is for TAO's own, which this may replace */
   PetscCall(TaoSetSolution(t->tao, y));
   PetscCall(TaoSolve(t->tao));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -58,7 +58,7 @@ PetscErrorCode HycoTaoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Pe
   BLASgemv_("T", &mb, &nb, &minus, A, &mb, b, &one, &zero, q, &one);
   lcp.M = M;
   lcp.q = q;
-  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, &tao));
+  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, NULL, &tao));
   PetscCall(HycoTaoSetType(tao, type, 0));
   PetscCall(HycoTaoSolveLCP(tao, &lcp, NULL, x, &its, solved));
   PetscCall(HycoTaoDestroy(&tao));

@@ -1,7 +1,7 @@
 /*
-  hyco's own complementarity methods as types of Tao, beside TAO's: HYCO_TAO_ACTIVE_SET and HYCO_TAO_LEMKE. They take the
-  problem as it was handed to the HycoTao behind the Tao. Their monitor shows the active contacts as the function value
-  and the contacts that change as the residual.
+  hyco's own complementarity methods as types of Tao, beside TAO's: HYCO_TAO_ACTIVE_SET and HYCO_TAO_LEMKE. They take
+  the problem as it was handed to the HycoTao behind the Tao. Their monitor shows the active contacts as the function
+  value and the contacts that change as the residual.
 */
 #include <hycotao.h>
 

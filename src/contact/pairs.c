@@ -68,6 +68,11 @@ PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoPairsSetReach(HycoPairs *pairs, const PetscReal reach[])
+{
+  for (PetscInt c = 0; reach && pairs->search && c < pairs->n_searches; c++) pairs->search[c].reach = reach[c];
+}
+
 PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
 {
   PetscInt *start, *master, kept;

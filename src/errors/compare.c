@@ -15,11 +15,6 @@ static void Add(Norms *n, PetscReal value, PetscReal reference)
   n->size = PetscMax(n->size, PetscAbsReal(reference));
 }
 
-static PetscReal Quotient(PetscReal lost, PetscReal size)
-{
-  return size > 0 ? lost / size : lost > 0 ? PETSC_INFINITY : 0;
-}
-
 /* The errors in H1 and its dual. */
 static PetscErrorCode CompareH1(HycoROM m, const PetscReal U[], const PetscReal u[], const PetscReal lambda[],
                                 HycoErrors *e)
@@ -30,11 +25,11 @@ static PetscErrorCode CompareH1(HycoROM m, const PetscReal U[], const PetscReal 
   if (!m->norms) PetscCall(HycoNormsCreate(m->scene, m->whole, &m->norms));
   PetscCall(HycoNormH1(m->norms, U, u, &lost));
   PetscCall(HycoNormH1(m->norms, u, NULL, &size));
-  e->u_h1 = Quotient(lost, size);
+  e->u_h1 = HycoRelative(lost, size);
   for (int rid = 0; rid < 2; rid++) {
     PetscCall(HycoNormDual(m->norms, m, (PetscBool)rid, m->Lambda, lambda, &lost));
     PetscCall(HycoNormDual(m->norms, m, (PetscBool)rid, lambda, NULL, &size));
-    *(rid ? &e->lambda_rid_dual : &e->lambda_dual) = Quotient(lost, size);
+    *(rid ? &e->lambda_rid_dual : &e->lambda_dual) = HycoRelative(lost, size);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -64,12 +59,12 @@ PetscErrorCode HycoROMCompareFields(HycoROM m, const PetscReal u_full[], const P
     Add(&l, m->Lambda[k], lambda[k]);
     if (m->in_rid[k]) Add(&lr, m->Lambda[k], lambda[k]);
   }
-  e->u = Quotient(PetscSqrtReal(u.lost2), PetscSqrtReal(u.size2));
-  e->u_rid = Quotient(rid.lost, rid.size);
-  e->sigma = Quotient(PetscSqrtReal(s.lost2), PetscSqrtReal(s.size2));
-  e->sigma_11 = Quotient(s11.lost, s11.size);
-  e->lambda_rid = Quotient(PetscSqrtReal(lr.lost2), PetscSqrtReal(lr.size2));
-  e->lambda = Quotient(PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2));
+  e->u = HycoRelative(PetscSqrtReal(u.lost2), PetscSqrtReal(u.size2));
+  e->u_rid = HycoRelative(rid.lost, rid.size);
+  e->sigma = HycoRelative(PetscSqrtReal(s.lost2), PetscSqrtReal(s.size2));
+  e->sigma_11 = HycoRelative(s11.lost, s11.size);
+  e->lambda_rid = HycoRelative(PetscSqrtReal(lr.lost2), PetscSqrtReal(lr.size2));
+  e->lambda = HycoRelative(PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2));
   if (forces)
     *forces = (HycoForceErrors){PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2), PetscSqrtReal(lr.lost2),
                                 PetscSqrtReal(lr.size2)};

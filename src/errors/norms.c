@@ -95,10 +95,10 @@ PetscErrorCode HycoNormDual(HycoNorms h, HycoROM m, PetscBool rid_only, const Pe
 
     if (force == 0 || (rid_only && !m->in_rid[k])) continue;
     any = PETSC_TRUE;
-    for (PetscInt j = m->row_start[k]; j < m->row_start[k + 1]; j++) {
-      const PetscInt dof = m->row_dof[j];
+    for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++) {
+      const PetscInt dof = m->rows.dof[j];
 
-      r[m->mesh->node_whole[dof / h->dim] * h->dim + dof % h->dim] += m->row_value[j] * force;
+      r[m->mesh->node_whole[dof / h->dim] * h->dim + dof % h->dim] += m->rows.value[j] * force;
     }
   }
   PetscCall(VecRestoreArray(h->x, &r));

@@ -1,4 +1,4 @@
-/* Assembly by known places: private to assembly/. */
+/* Assembly by known places: private to fe/. */
 #ifndef HYCO_PLACES_H
 #define HYCO_PLACES_H
 #include <hycofe.h>

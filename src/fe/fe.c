@@ -71,6 +71,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
               "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (line2, tri3 or tet4) the "
               "dilatation is constant already and nothing would change",
               scene->body[b].name);
+  for (PetscInt b = 0; b < scene->n_bodies; b++) PetscCall(HycoMaterialSetUp(scene->body[b].law, mesh->dim));
   PetscCall(PetscNew(&f));
   f->scene = scene;
   f->mesh = mesh;
@@ -112,11 +113,8 @@ static PetscErrorCode MoveNodes(HycoFE fe)
       HycoExpr map = fe->scene->body[b].map[c];
 
       if (!map) continue;
-      HycoCheck(c<m->dim, "%s: the mesh has %d space dimension%s; there is no component %c", HycoExprKey(map),
-                    (int)m->dim, m->dim> 1
-                    ? "s"
-                    : "",
-                "xyz"[c]);
+      HycoCheck(m->dim > c, "%s: the mesh has %d space dimension%s; there is no component %c", HycoExprKey(map),
+                (int)m->dim, m->dim == 1 ? "" : "s", "xyz"[c]);
       for (PetscInt i = 0; i < m->n_nodes; i++) {
         if (m->node_body[i] == b) PetscCall(HycoExprEval(map, fe->mu, 1, m->xyz + 3 * i, fe->X + 3 * i + c));
       }
@@ -148,7 +146,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
         HycoCheck(!fe->fixed[dof] ||
                       PetscAbsReal(value - fe->u0[dof]) <= 1e-12 * (PetscAbsReal(value) + PetscAbsReal(fe->u0[dof])),
                   "node %d is fixed twice in %c, to %g and to %g (by %s)", (int)m->node_id[i], "xyz"[c],
-                  (double)fe -> u0[dof], (double)value, HycoExprKey(fixed->value[c]));
+                  (double)fe->u0[dof], (double)value, HycoExprKey(fixed->value[c]));
         fe->fixed[dof] = PETSC_TRUE;
         fe->u0[dof] = value;
         fe->lifted = (PetscBool)(fe->lifted || value != 0);

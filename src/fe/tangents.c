@@ -13,10 +13,8 @@ PetscErrorCode HycoTangentsCreate(HycoFE fe)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(fe->scene->n_bodies, &fe->tangent_size));
   PetscCall(PetscMalloc1(m->n_cells, &fe->tangent_start));
-  for (PetscInt b = 0; b < fe->scene->n_bodies; b++) {
-    PetscCall(HycoMaterialSetUp(fe->scene->body[b].law, fe->dim));
+  for (PetscInt b = 0; b < fe->scene->n_bodies; b++)
     fe->tangent_size[b] = HycoMaterialTangentSize(fe->scene->body[b].law, fe->dim);
-  }
   for (PetscInt e = 0; e < m->n_cells; e++) {
     fe->tangent_start[e] = n;
     n += el->nq * fe->tangent_size[m->cell_body[e]];

@@ -54,14 +54,19 @@ static PetscErrorCode FindTies(HycoFOM f, HycoMesh mesh, PetscInt *n, PetscInt *
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  *n = 0;
   ierr = HycoPairsFind(f->scene, mesh, &p);
   if (!ierr) {
-    *n = p.master_start[p.n];
-    PetscCall(PetscMalloc1(2 * *n, ties));
+    PetscCall(PetscMalloc1(2 * p.n * HycoPairsWidth(&p), ties));
     for (PetscInt k = 0; k < p.n; k++) {
-      for (PetscInt j = p.master_start[k]; j < p.master_start[k + 1]; j++) {
-        (*ties)[2 * j] = p.slave[k];
-        (*ties)[2 * j + 1] = p.master[j];
+      const PetscInt *master;
+      const PetscReal *weight;
+      PetscInt masters;
+
+      HycoPairsMasters(&p, k, &masters, &master, &weight);
+      for (PetscInt j = 0; j < masters; j++, (*n)++) {
+        (*ties)[2 * *n] = HycoPairsSlave(&p, k);
+        (*ties)[2 * *n + 1] = master[j];
       }
     }
   }
@@ -73,15 +78,15 @@ static PetscErrorCode FindTies(HycoFOM f, HycoMesh mesh, PetscInt *n, PetscInt *
 /* Cuts the DM for the ranks. */
 static PetscErrorCode Distribute(HycoFOM f)
 {
-  PetscInt cut = HYCO_PARTITION_METIS, n_owned, first, n_ties = 0, *ties = NULL;
+  const HycoPartitioner cut = (HycoPartitioner)f->partition;
+  PetscInt n_owned, first, n_ties = 0, *ties = NULL;
   HycoMesh mesh;
   PetscBool done;
 
   PetscFunctionBegin;
-  PetscCall(HycoOptionsWord(f->scene->options, "hyco_partition", HycoPartitioners, &cut));
   PetscCall(DMPlexIsDistributed(f->dm, &done));
   if (f->size == 1 || done) {
-    PetscCall(HycoMeshDistribute(&f->dm, f->scene, NULL, 0, NULL, (HycoPartitioner)cut));
+    PetscCall(HycoMeshDistribute(&f->dm, f->scene, NULL, 0, NULL, cut, f->mesh_write));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoPlexToMesh(f->dm, f->scene, &mesh, &n_owned, &first));
@@ -89,7 +94,7 @@ static PetscErrorCode Distribute(HycoFOM f)
   PetscCheck(f->n_cells >= f->size, HycoComm(f), PETSC_ERR_USER,
              "the mesh has %d cells; run it on at most as many ranks", (int)f->n_cells);
   if (!f->scene->refine) HycoOnRoot(HycoComm(f), FindTies(f, mesh, &n_ties, &ties)); /* else they are yet to be found */
-  PetscCall(HycoMeshDistribute(&f->dm, f->scene, mesh, n_ties, ties, (HycoPartitioner)cut));
+  PetscCall(HycoMeshDistribute(&f->dm, f->scene, mesh, n_ties, ties, cut, f->mesh_write));
   PetscCall(PetscFree(ties));
   PetscCall(HycoMeshDestroy(&mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -176,9 +181,53 @@ static PetscErrorCode CreateB(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode SetFromOptions(HycoFOM f)
+{
+  PetscFunctionBegin;
+  PetscObjectOptionsBegin((PetscObject)f);
+  PetscCall(HycoOptionsBool(
+      "-hyco_regularise", "full order: rigid motions that neither supports nor contact hold are taken out, not refused",
+      &f->regularise, NULL));
+  PetscCall(HycoOptionsReal("-hyco_regularise_tol",
+                            "of such a motion: the share of the loads on it that may be unbalanced", 0, 1,
+                            &f->regularise_tol, NULL));
+  PetscCall(HycoOptionsWord("-hyco_partition", "cuts the mesh for the ranks; PT-Scotch also where METIS fails",
+                            HycoPartitioners, &f->partition, NULL));
+  PetscCall(HycoOptionsString(
+      "-hyco_mesh_write", "<file.h5>: writes the mesh, refined as the scene says, in PETSc's HDF5 format of a DMPlex",
+      f->mesh_write, sizeof(f->mesh_write), NULL));
+  PetscCall(HycoOptionsName("-hyco_fom_view", "after each full-order solve: sizes, system, solver"));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Create(MPI_Comm comm, HycoFOM *fom)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscHeaderCreate(*fom, HYCO_FOM_CLASSID, "HycoFOM", "Full-order model", "Hyco", comm, HycoFOMDestroy,
+                              HycoFOMView));
+  PetscCallMPI(MPI_Comm_rank(HycoComm(*fom), &(*fom)->rank));
+  PetscCallMPI(MPI_Comm_size(HycoComm(*fom), &(*fom)->size));
+  (*fom)->regularise_tol = 1e-2;
+  (*fom)->partition = HYCO_PARTITION_METIS;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMDeclare(PetscOptions options)
+{
+  HycoFOM f;
+
+  PetscFunctionBegin;
+  PetscCall(Create(PETSC_COMM_SELF, &f));
+  HycoDeclare(f, options, SetFromOptions, HycoFOMDestroy);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SetUp(HycoFOM f)
 {
   PetscFunctionBegin;
+  PetscCall(PetscObjectSetOptions((PetscObject)f, f->scene->options));
+  PetscCall(SetFromOptions(f));
   f->summary.seconds.setup = -HycoNow();
   HycoLogged(HYCO_EVENT_MESH, ReadMesh(f));
   PetscCall(HycoFECreateMatrix(f->fe, HycoComm(f), f->n_owned, f->first, &f->K));
@@ -191,10 +240,8 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscCall(CreateScatters(f));
   PetscCall(HycoSystemCreate(HycoComm(f), &f->system));
   PetscCall(HycoSolverCreate(HycoComm(f), &f->solver));
-  PetscCall(HycoSolverSetFromOptions(f->solver, f->scene->options));
-  f->regularise_tol = 1e-2;
-  PetscCall(HycoOptionsBool(f->scene->options, "hyco_regularise", &f->regularise));
-  PetscCall(HycoOptionsReal(f->scene->options, "hyco_regularise_tol", 0, 1, &f->regularise_tol));
+  PetscCall(PetscObjectSetOptions((PetscObject)f->solver, f->scene->options));
+  PetscCall(HycoSolverSetFromOptions(f->solver));
   if (f->rank == 0) {
     PetscCall(PetscMalloc1(f->n_nodes * f->part->dim, &f->u));
     PetscCall(PetscCalloc1(f->n_contacts + 1, &f->lambda));
@@ -211,10 +258,7 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
 
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  PetscCall(PetscHeaderCreate(*fom, HYCO_FOM_CLASSID, "HycoFOM", "Full-order model", "Hyco", comm, HycoFOMDestroy,
-                              HycoFOMView));
-  PetscCallMPI(MPI_Comm_rank(HycoComm(*fom), &(*fom)->rank));
-  PetscCallMPI(MPI_Comm_size(HycoComm(*fom), &(*fom)->size));
+  PetscCall(Create(comm, fom));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*fom)->scene = scene;
   ierr = SetUp(*fom);
@@ -396,6 +440,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscCall(HycoFOMGather(f));
   t->total = HycoNow() - begin;
   f->solved = PETSC_TRUE;
+  PetscCall(HycoFOMViewFromOptions(f, NULL, "-hyco_fom_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -562,16 +607,12 @@ PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)f, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%d nodes, %d cells, %d contacts, on %d ranks\n", (int)f->n_nodes,
+                                   (int)f->n_cells, (int)f->n_contacts, (int)f->size));
   PetscCall(HycoSystemView(f->system, viewer));
   PetscCall(HycoSolverView(f->solver, viewer));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFOMViewFromOptions(HycoFOM object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_FOM_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoFOM, HYCO_FOM_CLASSID)

@@ -14,7 +14,8 @@ static PetscErrorCode SetUp(HycoFOM f)
   if (f->given_solver) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSystemCreate(HycoComm(f), &f->given_system));
   PetscCall(HycoSolverCreate(HycoComm(f), &f->given_solver));
-  PetscCall(HycoSolverSetFromOptions(f->given_solver, f->scene->options));
+  PetscCall(PetscObjectSetOptions((PetscObject)f->given_solver, f->scene->options));
+  PetscCall(HycoSolverSetFromOptions(f->given_solver));
   PetscCall(HycoSolverSetType(f->given_solver, HYCO_SOLVER_ACTIVE_SET)); /* none of its contacts */
   PetscCall(HycoSolverSetForm(f->given_solver, HYCO_FORM_AUTO));
   PetscCall(VecDuplicate(f->F, &f->given_F));

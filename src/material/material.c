@@ -202,6 +202,7 @@ PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
 {
   const PetscInt ns = p->n_strain;
   PetscReal *lame;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
@@ -214,8 +215,8 @@ PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscMalloc1(2 * p->n, &lame));
-  PetscCall((*material->ops->isotropic)(material, p, lame));
-  for (PetscInt i = 0; i < p->n; i++) {
+  ierr = (*material->ops->isotropic)(material, p, lame);
+  for (PetscInt i = 0; i < p->n && !ierr; i++) {
     if (p->stress) HycoTangentApply(PETSC_TRUE, p->dim, lame + 2 * i, p->strain + i * ns, p->stress + i * ns);
     for (PetscInt c = 0; p->tangent && c < ns; c++) { /* its columns: stresses of unit strains */
       PetscReal unit[6] = {0, 0, 0, 0, 0, 0}, column[6];
@@ -226,6 +227,7 @@ PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
     }
   }
   PetscCall(PetscFree(lame));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -33,11 +33,10 @@ static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
 }
 
 PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
-                                  HycoPartitioner by)
+                                  HycoPartitioner by, const char write[])
 {
   PetscPartitioner partitioner;
-  PetscBool done, write;
-  char path[PETSC_MAX_PATH_LEN];
+  PetscBool done;
   PetscInt overlap;
   PetscSF sf;
   DM next;
@@ -54,8 +53,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   }
   PetscCall(HycoPlexRefine(dm, scene, scene->refine));
   if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscOptionsGetString(scene->options, NULL, "-hyco_mesh_write", path, sizeof(path), &write));
-  if (write) PetscCall(HycoPlexWrite(*dm, path));
+  if (write[0]) PetscCall(HycoPlexWrite(*dm, write));
   PetscCall(DMSetBasicAdjacency(*dm, PETSC_FALSE, PETSC_TRUE)); /* cells that share a vertex are neighbours */
   PetscCall(DMPlexDistributeOverlap(*dm, 1, &sf, &next));
   PetscCall(Replace(dm, sf, next));

@@ -6,7 +6,6 @@
 #include <hycofile.h>
 #include <hycoreducerimpl.h>
 #include <string.h>
-#include <unistd.h>
 
 /* The whole mesh on rank 0, its sizes everywhere. */
 static PetscErrorCode ReadMesh(HycoReducer t)
@@ -32,27 +31,6 @@ static PetscErrorCode ReadMesh(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (35)-(36): a contact without a free unknown in A_c is not in A_lambda. */
-static PetscErrorCode DropFixedContacts(HycoReducer t, const PetscInt role[], PetscInt in_rid[])
-{
-  const PetscInt n = t->pairs.n, entries = HycoPairsWidth(&t->pairs) * t->sizes[3] * n;
-  PetscInt *start, *dof;
-  PetscReal *value, *gap;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc4(n + 1, &start, entries, &dof, entries, &value, n, &gap));
-  PetscCall(HycoContactRows(t->fe, &t->pairs, start, dof, value, gap));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscBool free = PETSC_FALSE;
-
-    for (PetscInt j = start[k]; j < start[k + 1]; j++)
-      free = (PetscBool)(free || role[dof[j] / t->sizes[3]] == HYCO_ROLE_A);
-    if (!free) in_rid[k] = 0;
-  }
-  PetscCall(PetscFree4(start, dof, value, gap));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What moved surfaces meet: every contact's masters at the training points and over the ranges, as far as contacts may
    close. *rows, *of: of all contacts; those of the mesh as they are where nothing is moved (of: NULL). */
 static PetscErrorCode Meet(HycoReducer t, HycoROM m, const HycoPairs **rows, const PetscInt **of)
@@ -71,37 +49,6 @@ static PetscErrorCode Meet(HycoReducer t, HycoROM m, const HycoPairs **rows, con
   PetscCall(HycoMetFind(t->scene, t->whole, &t->pairs, n, mu, m->master_reach, &t->met));
   *rows = &t->met.rows;
   *of = t->met.of;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The sets, and A_lambda by contact. */
-static PetscErrorCode FindSets(HycoReducer t, const HycoPairs *rows, const PetscInt of[], const PetscBool in[],
-                               PetscInt role[], PetscInt in_rid[])
-{
-  const PetscInt dim = t->sizes[3];
-  PetscInt *row_in;
-
-  PetscFunctionBegin;
-  if (!of) {
-    PetscCall(HycoRIDSets(t->whole, rows, in, role, in_rid));
-    PetscCall(DropFixedContacts(t, role, in_rid));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscMalloc1(rows->n, &row_in));
-  PetscCall(HycoRIDSets(t->whole, rows, in, role, row_in));
-  PetscCall(PetscArrayzero(in_rid, t->pairs.n));
-  for (PetscInt r = 0; r < rows->n; r++) {
-    PetscBool free = PETSC_FALSE;
-
-    for (PetscInt j = rows->master_start[r] - 1; row_in[r] && j < rows->master_start[r + 1]; j++) {
-      const PetscInt i = j < rows->master_start[r] ? rows->slave[r] : rows->master[j];
-
-      for (PetscInt c = 0; c < dim && role[i] == HYCO_ROLE_A; c++)
-        free = (PetscBool)(free || !t->fe->fixed[i * dim + c]);
-    }
-    if (free) in_rid[of[r]] = 1;
-  }
-  PetscCall(PetscFree(row_in));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -143,7 +90,7 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
   HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->scene, whole, rows, &recipe, in));
   for (PetscInt e = 0; t->grown && e < whole->n_cells; e++) t->grown[e] = in[e] = (PetscBool)(in[e] || t->grown[e]);
   PetscCall(PetscMalloc1(t->pairs.n, &m->in_rid));
-  PetscCall(FindSets(t, rows, of, in, role, m->in_rid));
+  PetscCall(HycoRIDSets(t->fe, &t->pairs, rows, of, in, role, m->in_rid));
   PetscCall(SurfacesOf(t, contact, &n_all, all));
   for (PetscInt e = 0; e < whole->n_cells; e++) {
     if (in[e]) keep[n_keep++] = e;
@@ -161,6 +108,46 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
   PetscCall(PetscFree(all));
   PetscCall(PetscFree(contact));
   PetscCall(PetscFree5(in, role, keep, extra, index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerDualSnapshots(HycoReducer t, PetscInt *n, PetscReal **S)
+{
+  const size_t N = (size_t)t->sizes[2];
+
+  PetscFunctionBegin;
+  *n = 0;
+  PetscCall(PetscMalloc1(N * (size_t)t->n_s + 1, S));
+  for (PetscInt k = 0; k < t->n_s; k++) {
+    const PetscReal *L = t->Lambda + (size_t)k * N;
+    PetscReal size = 0;
+
+    for (size_t i = 0; i < N; i++) size += L[i];
+    if (size > 0) PetscCall(PetscArraycpy(*S + (size_t)(*n)++ * N, L, N));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerGetSolutions(HycoReducer t, PetscInt *n, const PetscReal *mu[], const PetscReal *Lambda[],
+                                       const PetscReal *gamma[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  PetscCall(HycoSamplesGet(t->samples, n, NULL, mu));
+  if (Lambda) *Lambda = t->Lambda;
+  if (gamma) *gamma = t->VtU;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainingAddFact(HycoTraining *r, const char name[], PetscReal value)
+{
+  HycoFact *fact = &r->fact[r->n_facts++];
+
+  PetscFunctionBegin;
+  PetscCheck(r->n_facts <= HYCO_MAX_FACTS, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a type of model reports too many numbers");
+  PetscCall(PetscStrncpy(fact->name, name, sizeof(fact->name)));
+  fact->n = 1;
+  fact->value[0] = value;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -182,10 +169,10 @@ static PetscErrorCode LimitModes(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes on the reduced mesh, the dual snapshots that are not zero, the training points, where it all came from. */
+/* The modes on the reduced mesh and the whole, the training points, where it all came from. */
 static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
 {
-  const PetscInt dim = t->sizes[3], N = t->sizes[2];
+  const PetscInt dim = t->sizes[3];
   PetscInt n_par;
   const PetscReal *mu;
   char *text;
@@ -193,21 +180,11 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, &m->n_points, &n_par, &mu));
-  m->type = t->type;
-  m->dual = t->dual;
   m->l = t->l;
   HycoDuplicate(t->l, t->sigma, &m->sigma);
   PetscCall(PetscMalloc1(m->mesh->n_nodes * dim * m->l, &m->V));
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
     PetscCall(PetscArraycpy(m->V + i * dim * m->l, t->V_whole + m->mesh->node_whole[i] * dim * m->l, dim * m->l));
-  PetscCall(PetscMalloc1((size_t)N * (size_t)t->n_s + 1, &m->S_lambda));
-  for (PetscInt k = 0; k < t->n_s; k++) {
-    PetscReal size = 0;
-
-    for (PetscInt i = 0; i < N; i++) size += t->Lambda[(size_t)k * (size_t)N + (size_t)i];
-    if (size > 0)
-      PetscCall(PetscArraycpy(m->S_lambda + (size_t)(m->n_dual++) * (size_t)N, t->Lambda + (size_t)k * (size_t)N, N));
-  }
   HycoDuplicate(m->n_points * n_par, mu, &m->points);
   m->whole_nodes = t->sizes[0];
   m->whole_cells = t->sizes[1];
@@ -218,6 +195,9 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
            PETSC_VERSION_MINOR, PETSC_VERSION_SUBMINOR);
   PetscCall(PetscStrallocpy(line, &m->provenance));
   snprintf(m->fingerprint, sizeof(m->fingerprint), "%016llx", t->fingerprint);
+  m->whole = t->whole;
+  m->V_whole = t->V_whole;
+  m->lent = PETSC_TRUE;
   /* the model has a scene of its own, read from the text it will carry */
   PetscCall(HycoSceneToText(t->scene, &text));
   PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene));
@@ -225,23 +205,11 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void Report(HycoReducer t, HycoROM m, HycoTraining *r)
+static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
-  r->type = m->type;
-  r->dual_misfit = m->dual_misfit;
-  if (m->condensed) {
-    r->target_met = m->condensed->target_met;
-    r->hopeless = m->condensed->hopeless;
-    if (r->hopeless >= 0) {
-      r->hopeless_values = m->condensed->n[r->hopeless];
-      r->hopeless_error = m->condensed->by_parameter[r->hopeless];
-    }
-    r->target = t->condensed_tol;
-    r->most_values = t->condensed_max_values;
-    r->n_flexibilities = HycoTensorSize(&m->condensed->field[HYCO_FIELD_G].tensor);
-    for (PetscInt k = 0; k < 3; k++) r->left_out[k] = m->condensed->errors[k];
-  }
-  r->n_supremizers = t->n_supremizers;
+  PetscFunctionBegin;
+  r->stiffness = m->traits.stiffness;
+  r->chosen.recipe.rid = (PetscBool)(m->traits.settings == HYCO_SETTINGS_RID);
   r->n_samples = t->n_s;
   r->n_modes = t->l;
   r->n_dual_modes = t->counts[HYCO_SEED_DUAL];
@@ -259,19 +227,21 @@ static void Report(HycoReducer t, HycoROM m, HycoTraining *r)
   r->condition = m->numbers[0];
   r->error_u = m->numbers[1];
   r->error_lambda = m->numbers[2];
+  if (m->ops->report) PetscCall((*m->ops->report)(t, m, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A hybrid model without a contact gives no force, also where its training solutions press. */
+/* A model that reconstructs forces from its own has none without a contact, also where its training solutions press. */
 static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
 {
   PetscBool reconstruct = PETSC_TRUE, presses = PETSC_FALSE, kept = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(HycoOptionsBool(t->scene->options, "hyco_reconstruct", &reconstruct));
+  PetscCall(PetscOptionsGetBool(t->scene->options, NULL, "-hyco_reconstruct", &reconstruct, NULL));
   for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
   HycoCheckModel(
-      m->type != HYCO_ROM_HYBRID || !reconstruct || kept || !presses,
+      !m->ops->reconstruct || !reconstruct || kept || !presses,
       "the RID has no contact, and the training solutions press: the model would give no force; let the RID reach "
       "the contact (-hyco_rid_modes displacement,dual or -hyco_rid_groups GROUP), or take displacements alone by "
       "-hyco_reconstruct false");
@@ -291,63 +261,75 @@ static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: the RID, the model on it, its full-order displacements, the file. */
-static PetscErrorCode BuildAndSave(HycoReducer t, PetscBool useful, const char path[], HycoTraining *report)
+/* Rank 0: the RID, the model on it; nothing that is online. */
+static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, HycoTraining *report)
 {
-  HycoROM m;
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetType(m, t->prototype->type));
+  PetscCall(CutDomain(t, m));
+  PetscCall(LimitModes(t, m));
+  PetscCall(FillModel(t, m));
+  PetscCall((*m->ops->build)(m, t));
+  if (useful) PetscCall(CheckUseful(t, m));
+  PetscCall(Report(t, m, report));
+  PetscCall(HycoROMReset(m));
+  PetscCall(PetscObjectSetOptions((PetscObject)m, m->scene->options));
+  PetscCall(HycoROMSetFromOptions(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report)
+{
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMCreate(&m));
-  ierr = t->dual == HYCO_DUAL_SNAPSHOTS ? HycoReducerEnrich(t) : PETSC_SUCCESS;
-  if (!ierr) ierr = CutDomain(t, m);
-  if (!ierr) ierr = LimitModes(t, m);
-  if (!ierr) ierr = FillModel(t, m);
-  if (!ierr)
-    ierr = t->type == HYCO_ROM_PROJECTION  ? HycoReducerProject(t, m)
-           : t->type == HYCO_ROM_CONDENSED ? HycoReducerCondense(t, m)
-                                           : HycoReducerChooseHybrid(t, m);
-  if (!ierr && useful) ierr = CheckUseful(t, m);
-  if (!ierr) ierr = HycoROMSave(m, t->whole, t->V_whole, path);
-  if (!ierr) Report(t, m, report);
-  PetscCall(HycoROMDestroy(&m));
+  PetscCall(HycoROMCreate(model));
+  ierr = BuildModel(t, useful, *model, report);
+  if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, const char path[], HycoTraining *report)
+PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report)
 {
-  char candidate[HYCO_FILE_NAME + 16];
-  const PetscBool scan = (PetscBool)(useful && t->type != HYCO_ROM_CONDENSED); /* which has no reduced stiffness */
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscSNPrintf(candidate, sizeof(candidate), "%s%s", path, scan ? ".candidate" : ""));
+  *model = NULL;
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_TRUE));
-  HycoOnRoot(HycoComm(t), BuildAndSave(t, useful, candidate, report));
+  HycoOnRoot(HycoComm(t), BuildOnRoot(t, useful, model, report));
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
-  if (scan) HycoLogged(HYCO_EVENT_SCAN, HycoReducerScan(t, candidate, path, &report->scan));
+  report->type = t->prototype->type; /* each rank's own */
+  PetscCall(HycoROMBroadcast(HycoComm(t), model));
+  if (!useful || !t->prototype->ops->finish) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_TRUE));
+  ierr = (*t->prototype->ops->finish)(t, *model, report);
+  PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_FALSE));
+  if (ierr) (void)!HycoROMDestroy(model);
+  PetscCall(ierr);
+  PetscCall(HycoROMReset(*model));
+  PetscCall(HycoROMBroadcast(HycoComm(t), model)); /* with what was found */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char path[], PetscBool learn,
                                  HycoTraining *report)
 {
-  char file[HYCO_FILE_NAME];
+  HycoROM model = NULL;
   HycoSamples grown = NULL;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoFileScratch(HycoComm(t), path, "candidate", file));
   if (learn)
-    ierr = HycoReducerLearn(t, store, file, &grown, report);
+    ierr = HycoReducerLearn(t, store, &model, &grown, report);
   else
-    ierr = HycoReducerBuild(t, PETSC_TRUE, file, report);
-  if (!ierr) ierr = HycoReducerCalibrate(t, store, file, report);
+    ierr = HycoReducerBuild(t, PETSC_TRUE, &model, report);
+  if (!ierr) ierr = HycoReducerCalibrate(t, store, model, report);
   PetscCall(HycoSamplesDestroy(&grown));
-  if (ierr && t->rank == 0) (void)unlink(file);
+  if (!ierr) HycoOnRoot(HycoComm(t), HycoROMSave(model, path));
+  PetscCall(HycoROMDestroy(&model));
   PetscCall(ierr);
-  HycoOnRoot(HycoComm(t), HycoFileKeep(file, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -380,6 +362,7 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
     PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s.snapshots", path));
   PetscCall(HycoSnapshotsOpen(HycoComm(t), t->scene, folder, store));
   t->fingerprint = (*store)->fingerprint;
+  PetscCall(HycoReducerViewFromOptions(t, NULL, "-hyco_reducer_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -436,25 +419,24 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  HycoCheck(samples || t->type == HYCO_ROM_CONDENSED, "give the training points");
+  HycoCheck(samples || t->prototype->ops->choosepoints, "give the training points");
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
               "-target_%s judges the model at held-out points, and -hyco_validation is 0: there are none",
               HycoErrorKinds[j]);
   if (choose) {
-    PetscCall(HycoReducerStartPoints(t, &chosen));
+    PetscCall((*t->prototype->ops->startpoints)(t, &chosen));
     samples = chosen;
   }
   PetscCall(HycoReducerOpen(t, samples, path, &store));
-  if (t->type == HYCO_ROM_CONDENSED) PetscCall(HycoReducerBeginCondensed(t));
+  if (t->prototype->ops->begin) PetscCall((*t->prototype->ops->begin)(t));
   if (choose)
-    HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerChoosePoints(t, store, &chosen));
+    HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->choosepoints)(t, store, &chosen));
   else
     HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
   HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerHoldOut(t, store));
   solved = HycoNow();
-  if (choose) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerFlexibility(t, store));
-  if (choose) HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerFindModes(t, store));
+  if (choose && t->prototype->ops->modes) HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->modes)(t, store));
   HycoStaged(HYCO_STAGE_REDUCTION, HycoReducerFinish(t, store, path, (PetscBool)!choose, &report));
   PetscCall(HycoReducerReset(t));
   PetscCall(HycoSnapshotsDestroy(&store));

@@ -7,7 +7,6 @@
   recipe was chosen by the same points, which MARGIN allows for.
 */
 #include <hycoalgorithms.h>
-#include <hycofile.h>
 #include <hycoreducerimpl.h>
 #include <stdio.h>
 
@@ -113,12 +112,11 @@ static PetscErrorCode FitAll(HycoReducer t, PetscInt n, HycoHeldOut rows[], Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fits, and writes the model at `path` once more with it. Rank 0. */
-static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], const char path[], HycoTraining *report)
+/* Fits, and notes in the model what it is worth. Rank 0. */
+static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, HycoTraining *report)
 {
   const HycoValidation *v = &report->held_out;
   const HycoAttempt *chosen = &report->chosen;
-  HycoROM m;
   HycoTrust trust = {0};
   char recipe[HYCO_LINE], text[2 * HYCO_LINE];
 
@@ -130,23 +128,18 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], const char pat
   }
   PetscCall(FitAll(t, v->n, rows, &trust));
   report->n_held = trust.n;
-  PetscCall(HycoROMLoad(path, &m));
   m->trust = trust;
-  if (chosen->number) {
-    HycoRecipeDescribe(&chosen->recipe, sizeof(recipe), recipe);
-    snprintf(text, sizeof(text), "  recipe number %d of the %d that were tried: %s\n", (int)chosen->number,
-             (int)chosen->of, recipe);
-    PetscCall(PetscFree(m->search));
-    PetscCall(PetscStrallocpy(text, &m->search));
-  }
-  PetscCall(HycoROMRewrite(m, path));
-  PetscCall(HycoROMDestroy(&m));
+  if (!chosen->number) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoRecipeDescribe(&chosen->recipe, sizeof(recipe), recipe);
+  snprintf(text, sizeof(text), "  recipe number %d of the %d that were tried: %s\n", (int)chosen->number,
+           (int)chosen->of, recipe);
+  PetscCall(PetscFree(m->search));
+  PetscCall(PetscStrallocpy(text, &m->search));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, const char path[], HycoTraining *report)
+PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report)
 {
-  HycoROM m = NULL;
   HycoHeldOut *rows;
   PetscInt n = 0;
 
@@ -154,11 +147,9 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, const ch
   if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &rows));
-  HycoOnEach(HycoComm(t), HycoROMLoad(path, &m));
-  PetscCall(HycoROMPredictHeldOut(HycoComm(t), m, store, t->held, rows));
-  PetscCall(HycoROMDestroy(&m));
+  PetscCall(HycoROMPredictHeldOut(HycoComm(t), model, store, t->held, rows));
   PetscCall(HycoHeldOutSummarise(n, rows, &report->held_out));
-  HycoOnRoot(HycoComm(t), Conclude(t, rows, path, report));
+  HycoOnRoot(HycoComm(t), Conclude(t, rows, model, report));
   PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, HycoComm(t)));
   PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);

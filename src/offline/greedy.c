@@ -4,11 +4,8 @@
   them again.
 */
 #include <hycoalgorithms.h>
-#include <hycofile.h>
 #include <hycogreedy.h>
 #include <stdio.h>
-#include <string.h>
-#include <unistd.h>
 
 /* Of two indicators this close, neither is worse. */
 #define TIE      1e-9
@@ -16,11 +13,11 @@
 
 typedef struct {
   HycoSnapshots store;
-  HycoSamples samples;       /* solved so far, in the order of the choices */
-  PetscInt n_par, n_points;  /* of the training set */
-  const PetscReal *points;   /* borrowed */
-  PetscReal *value;          /* n_points x 4: eta, eta_u, eta_lambda, size */
-  char file[HYCO_FILE_NAME]; /* the present iteration's model */
+  HycoSamples samples;      /* solved so far, in the order of the choices */
+  PetscInt n_par, n_points; /* of the training set */
+  const PetscReal *points;  /* borrowed */
+  PetscReal *value;         /* n_points x 4: eta, eta_u, eta_lambda, size */
+  HycoROM model;            /* the present iteration's, on every rank */
   PetscReal begin;
 } Loop;
 
@@ -51,12 +48,8 @@ static PetscErrorCode Start(HycoReducer t, HycoSamples start, HycoSamples *sampl
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoSamplesGet(start, &n, &n_par, &mu));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscBool twin = PETSC_FALSE;
-
-    for (PetscInt j = 0; j < k && !twin; j++) PetscCall(PetscArraycmp(mu + j * n_par, mu + k * n_par, n_par, &twin));
-    if (!twin) PetscCall(HycoSamplesAddPoint(*samples, mu + k * n_par));
-  }
+  for (PetscInt k = 0; k < n; k++) PetscCall(HycoSamplesAddPoint(*samples, mu + k * n_par));
+  PetscCall(HycoSamplesDropTwins(*samples, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -93,7 +86,8 @@ static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, 
   PetscCall(HycoSnapshotsFill(loop->store, loop->samples, iteration ? NULL : t->progress, t->progress_ctx));
   PetscCall(HycoReducerResetBases(t));
   PetscCall(HycoReducerReduce(t, loop->store, PETSC_FALSE));
-  PetscCall(HycoReducerBuild(t, PETSC_FALSE, loop->file, report));
+  if (t->prototype->ops->modes) PetscCall((*t->prototype->ops->modes)(t, loop->store));
+  PetscCall(HycoReducerBuild(t, PETSC_FALSE, &loop->model, report));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -142,19 +136,17 @@ static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const 
 /* The indicator at every training point, on every rank. */
 static PetscErrorCode Evaluate(HycoReducer t, Loop *loop)
 {
-  HycoROM m = NULL;
+  HycoROM m = loop->model;
   PetscReal *U_at;
   PetscMPIInt count;
 
   PetscFunctionBegin;
   PetscCall(PetscMPIIntCast(4 * loop->n_points, &count));
-  HycoOnEach(HycoComm(t), HycoROMLoad(loop->file, &m));
   PetscCall(SpreadSnapshots(t, m, &U_at));
   PetscCall(PetscArrayzero(loop->value, 4 * loop->n_points));
   HycoOnEach(HycoComm(t), EvaluateShare(t, loop, m, U_at));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, loop->value, count, MPIU_REAL, MPI_SUM, HycoComm(t)));
   PetscCall(PetscFree(U_at));
-  PetscCall(HycoROMDestroy(&m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -216,7 +208,7 @@ static PetscErrorCode KeepModel(const Loop *loop, PetscInt iteration)
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(path, sizeof(path), "%s/greedy-%03d.h5", loop->store->folder, (int)iteration));
-  PetscCall(HycoFileKeep(loop->file, path));
+  PetscCall(HycoROMSave(loop->model, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -226,6 +218,7 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   PetscInt worst;
 
   PetscFunctionBegin;
+  PetscCall(HycoROMDestroy(&loop->model));
   PetscCall(BuildModel(t, loop, iteration, report));
   PetscCall(Evaluate(t, loop));
   if (t->greedy.keep) HycoOnRoot(HycoComm(t), KeepModel(loop, iteration));
@@ -262,7 +255,7 @@ static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
  */
 static void SetRecipe(HycoReducer t)
 {
-  if (!t->search || t->type != HYCO_ROM_HYBRID) return;
+  if (!t->search || t->prototype->traits.settings != HYCO_SETTINGS_RID) return;
   if (!t->pinned[HYCO_CHOICE_TOLERANCE])
     t->tol[HYCO_SEED_DISPLACEMENT] = t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = ACCURATE;
   if (!t->pinned[HYCO_CHOICE_LAYERS]) t->layers = 1;
@@ -286,15 +279,12 @@ static PetscErrorCode Conclude(HycoReducer t, Loop *loop, const char path[], Hyc
 /* Iterations until one is the last. */
 static PetscErrorCode RunLoop(HycoReducer t, Loop *loop, HycoTraining *report)
 {
-  char place[PETSC_MAX_PATH_LEN];
   PetscBool last = PETSC_FALSE;
   PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
-  PetscCall(PetscSNPrintf(place, sizeof(place), "%s/greedy.h5", loop->store->folder));
-  PetscCall(HycoFileScratch(HycoComm(t), place, "candidate", loop->file));
   for (PetscInt iteration = 0; !last && !ierr; iteration++) ierr = Iterate(t, loop, iteration, report, &last);
-  if (t->rank == 0) (void)unlink(loop->file);
+  PetscCall(HycoROMDestroy(&loop->model));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -307,7 +297,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  HycoCheck(t->type != HYCO_ROM_CONDENSED,
+  HycoCheck(!t->prototype->ops->choosepoints,
             "a condensed model needs a tensor grid of training points, which -greedy does not give: use -grid, or "
             "-values_NAME");
   loop.begin = HycoNow();

@@ -15,7 +15,6 @@
 #include <hycoalgorithms.h>
 #include <hycogreedy.h>
 #include <hycolinear.h>
-#include <math.h>
 
 struct _n_HycoIndicator {
   HycoROM model; /* borrowed */
@@ -25,9 +24,9 @@ struct _n_HycoIndicator {
   HycoInterpolant interpolant;
   PetscReal *weight; /* n */
   /* the local problem, from the first evaluation */
-  PetscInt n_A, *dof; /* free unknowns of A: dofs of the model's mesh, ascending */
-  PetscInt *place;    /* by dof: place in dof, or -1 */
-  IS is;
+  HycoLocal local;        /* the model's, as it predicted last */
+  IS contacts;            /* its rows of B, all */
+  HycoOperatorState seen; /* what K and B below are made from */
   Mat K, B, Bt, M, M_A;
   Vec interface, F_A, D, x, L, work, solution;
   Vec whole; /* n_dof */
@@ -65,16 +64,14 @@ PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator)
   d = *indicator;
   PetscCall(HycoInterpolantDestroy(&d->interpolant));
   PetscCall(PetscFree(d->weight));
-  PetscCall(PetscFree(d->dof));
-  PetscCall(PetscFree(d->place));
   PetscCall(HycoSolverDestroy(&d->solver));
   PetscCall(HycoSystemDestroy(&d->system));
-  PetscCall(ISDestroy(&d->is));
   PetscCall(MatDestroy(&d->K));
   PetscCall(MatDestroy(&d->B));
   PetscCall(MatDestroy(&d->Bt));
   PetscCall(MatDestroy(&d->M));
   PetscCall(MatDestroy(&d->M_A));
+  PetscCall(ISDestroy(&d->contacts));
   PetscCall(VecDestroy(&d->interface));
   PetscCall(VecDestroy(&d->whole));
   PetscCall(VecDestroy(&d->F_A));
@@ -88,36 +85,30 @@ PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknowns of A and what is sized by them, once the model stands at a parameter value. */
+/* What is sized by the unknowns of A, once the model stands at a parameter value. */
 static PetscErrorCode SetUp(HycoIndicator d)
 {
   HycoROM m = d->model;
-  const PetscInt dim = m->mesh->dim;
+  PetscInt n_A;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->fe->n_dof, &d->dof));
-  PetscCall(PetscMalloc1(m->fe->n_dof, &d->place));
-  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
-    d->place[i] = -1;
-    if (m->role[i / dim] != HYCO_ROLE_A || m->fe->fixed[i]) continue;
-    d->place[i] = d->n_A;
-    d->dof[d->n_A++] = i;
-  }
-  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, d->n_A, d->dof, PETSC_COPY_VALUES, &d->is));
-  PetscCall(VecDuplicate(m->F, &d->interface));
-  PetscCall(VecDuplicate(m->F, &d->whole));
-  PetscCall(VecCreateSeq(PETSC_COMM_SELF, d->n_A, &d->x));
+  PetscCall(ISGetLocalSize(d->local.is_A, &n_A));
+  PetscCall(VecDuplicate(d->local.F, &d->interface));
+  PetscCall(VecDuplicate(d->local.F, &d->whole));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, n_A, &d->x));
   PetscCall(VecDuplicate(d->x, &d->F_A));
   PetscCall(VecDuplicate(d->x, &d->work));
   PetscCall(VecDuplicate(d->x, &d->solution));
   if (m->m) {
     PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->m, &d->L));
     PetscCall(VecDuplicate(d->L, &d->D));
+    PetscCall(ISCreateStride(PETSC_COMM_SELF, m->m, 0, 1, &d->contacts));
   }
   PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->fe->mesh->n_nodes, 0, &d->M));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &d->system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &d->solver));
-  PetscCall(HycoSolverSetFromOptions(d->solver, m->scene->options));
+  PetscCall(PetscObjectSetOptions((PetscObject)d->solver, m->scene->options));
+  PetscCall(HycoSolverSetFromOptions(d->solver));
   PetscCall(HycoSolverSetWarmStart(d->solver, PETSC_FALSE)); /* no history: ranks share the points out */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -135,9 +126,9 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
   d->geometry = now;
   PetscCall(KSPDestroy(&d->norm));
   PetscCall(MatDestroy(&d->M_A));
-  if (!m->whole) PetscCall(HycoROMLoadWhole(m));
+  PetscCall(HycoROMLoadWhole(m));
   PetscCall(HycoFEAssembleH1(m->fe, HycoMeshLength(m->whole), d->M));
-  PetscCall(MatCreateSubMatrix(d->M, d->is, d->is, MAT_INITIAL_MATRIX, &d->M_A));
+  PetscCall(MatCreateSubMatrix(d->M, d->local.is_A, d->local.is_A, MAT_INITIAL_MATRIX, &d->M_A));
   PetscCall(MatSetOption(d->M_A, MAT_SPD, PETSC_TRUE));
   PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", d->M_A, PETSC_TRUE, &d->norm));
   PetscCall(HycoFactor(d->norm, &singular));
@@ -148,79 +139,51 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
 /* (42) on the interface, zero elsewhere. */
 static PetscErrorCode Interpolate(HycoIndicator d, const PetscReal mu[])
 {
-  HycoROM m = d->model;
+  const PetscInt *dof;
   PetscScalar *u;
+  PetscInt n_I;
 
   PetscFunctionBegin;
   PetscCall(HycoInterpolantGetWeights(d->interpolant, mu, d->weight));
   PetscCall(VecSet(d->interface, 0));
   PetscCall(VecGetArray(d->interface, &u));
-  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
-    if (m->role[i / m->mesh->dim] != HYCO_ROLE_INTERFACE || m->fe->fixed[i]) continue;
-    for (PetscInt k = 0; k < d->n; k++) u[i] += d->weight[k] * d->U_at[(size_t)i * (size_t)d->n + (size_t)k];
+  PetscCall(ISGetLocalSize(d->local.is_I, &n_I));
+  PetscCall(ISGetIndices(d->local.is_I, &dof));
+  for (PetscInt i = 0; i < n_I; i++) {
+    for (PetscInt k = 0; k < d->n; k++) u[dof[i]] += d->weight[k] * d->U_at[(size_t)dof[i] * (size_t)d->n + (size_t)k];
   }
+  PetscCall(ISRestoreIndices(d->local.is_I, &dof));
   PetscCall(VecRestoreArray(d->interface, &u));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* B[A_lambda, A] and its transpose. */
-static PetscErrorCode AssembleContact(HycoIndicator d)
-{
-  HycoROM m = d->model;
-  const HycoRows *rows = &m->own_rows;
-
-  PetscFunctionBegin;
-  PetscCall(MatDestroy(&d->B));
-  PetscCall(MatDestroy(&d->Bt));
-  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, m->m, d->n_A, HycoPairsWidth(&m->pairs) * m->mesh->dim, NULL, &d->B));
-  for (PetscInt k = 0; k < m->m; k++) {
-    for (PetscInt j = rows->start[k]; j < rows->start[k + 1]; j++) {
-      if (d->place[rows->dof[j]] < 0) continue;
-      PetscCall(MatSetValue(d->B, k, d->place[rows->dof[j]], rows->value[j], INSERT_VALUES));
-    }
-  }
-  PetscCall(MatAssemblyBegin(d->B, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(d->B, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatTranspose(d->B, MAT_INITIAL_MATRIX, &d->Bt));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* D[A_lambda] less what the interface takes of it. */
-static PetscErrorCode AssembleGap(HycoIndicator d)
-{
-  HycoROM m = d->model;
-  const HycoRows *rows = &m->own_rows;
-  const PetscScalar *u;
-  PetscScalar *gap;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(d->interface, &u));
-  PetscCall(VecGetArray(d->D, &gap));
-  for (PetscInt k = 0; k < m->m; k++) {
-    gap[k] = rows->gap[k];
-    for (PetscInt j = rows->start[k]; j < rows->start[k + 1]; j++) gap[k] -= rows->value[j] * u[rows->dof[j]];
-  }
-  PetscCall(VecRestoreArray(d->D, &gap));
-  PetscCall(VecRestoreArrayRead(d->interface, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The local problem at the model's present parameters. Its K and B are made again when the model's were. */
 static PetscErrorCode SolveLocal(HycoIndicator d, HycoReason *reason)
 {
+  const HycoLocal *y = &d->local;
   HycoROM m = d->model;
+  PetscBool same;
 
   PetscFunctionBegin;
-  if (!d->K || m->fe->stiffness_changed) {
+  PetscCall(HycoOperatorStateUpdate(&d->seen, y->K, y->B, &same));
+  if (!same) {
     PetscCall(MatDestroy(&d->K));
-    PetscCall(MatCreateSubMatrix(m->K, d->is, d->is, MAT_INITIAL_MATRIX, &d->K));
+    PetscCall(MatDestroy(&d->B));
+    PetscCall(MatDestroy(&d->Bt));
+    PetscCall(MatCreateSubMatrix(y->K, y->is_A, y->is_A, MAT_INITIAL_MATRIX, &d->K));
     PetscCall(MatSetOption(d->K, MAT_SPD, PETSC_TRUE));
   }
-  if (m->m && (!d->B || m->fe->contact_changed)) PetscCall(AssembleContact(d));
-  PetscCall(MatMult(m->K, d->interface, d->whole));
-  PetscCall(VecAYPX(d->whole, -1, m->F));
-  PetscCall(VecISCopy(d->whole, d->is, SCATTER_REVERSE, d->F_A));
-  if (m->m) PetscCall(AssembleGap(d));
+  if (m->m && !same) {
+    PetscCall(MatCreateSubMatrix(y->B, d->contacts, y->is_A, MAT_INITIAL_MATRIX, &d->B));
+    PetscCall(MatTranspose(d->B, MAT_INITIAL_MATRIX, &d->Bt));
+  }
+  PetscCall(MatMult(y->K, d->interface, d->whole)); /* F[A] - K[A,I] U_I, D - B[:,I] U_I */
+  PetscCall(VecAYPX(d->whole, -1, y->F));
+  PetscCall(VecISCopy(d->whole, y->is_A, SCATTER_REVERSE, d->F_A));
+  if (m->m) {
+    PetscCall(MatMult(y->B, d->interface, d->D));
+    PetscCall(VecAYPX(d->D, -1, y->D));
+  }
   PetscCall(HycoSystemSetMatrices(d->system, d->K, d->Bt, d->B, PETSC_TRUE));
   PetscCall(HycoSystemSetVectors(d->system, d->F_A, d->D));
   PetscCall(HycoSolverSetSystem(d->solver, d->system));
@@ -254,25 +217,25 @@ static PetscErrorCode NormOfForce(HycoIndicator d, Vec L, PetscReal *norm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscReal Quotient(PetscReal lost, PetscReal size)
-{
-  return size > 0 ? lost / size : lost > 0 ? INFINITY : 0;
-}
-
 /* (43), with the local solution in x and L, which are spent. */
 static PetscErrorCode Distances(HycoIndicator d, HycoIndication *v)
 {
   HycoROM m = d->model;
   PetscReal size, lost;
   PetscScalar *a;
+  const PetscInt *dof;
+  PetscInt n_A;
 
   PetscFunctionBegin;
   PetscCall(NormOfDisplacement(d, d->x, &size));
   PetscCall(VecGetArray(d->x, &a));
-  for (PetscInt i = 0; i < d->n_A; i++) a[i] -= m->U[d->dof[i]];
+  PetscCall(ISGetLocalSize(d->local.is_A, &n_A));
+  PetscCall(ISGetIndices(d->local.is_A, &dof));
+  for (PetscInt i = 0; i < n_A; i++) a[i] -= m->U[dof[i]];
+  PetscCall(ISRestoreIndices(d->local.is_A, &dof));
   PetscCall(VecRestoreArray(d->x, &a));
   PetscCall(NormOfDisplacement(d, d->x, &lost));
-  v->eta_u = Quotient(lost, size);
+  v->eta_u = HycoRelative(lost, size);
   v->size = lost;
   v->eta_lambda = 0;
   if (m->m) {
@@ -281,7 +244,7 @@ static PetscErrorCode Distances(HycoIndicator d, HycoIndication *v)
     for (PetscInt k = 0; k < m->m; k++) a[k] -= m->Lambda[m->contact[k]];
     PetscCall(VecRestoreArray(d->L, &a));
     PetscCall(NormOfForce(d, d->L, &lost));
-    v->eta_lambda = Quotient(lost, size);
+    v->eta_lambda = HycoRelative(lost, size);
     v->size += lost;
   }
   v->eta = v->eta_u + v->eta_lambda;
@@ -294,7 +257,7 @@ static PetscReal Penetration(HycoROM m)
   PetscReal sum = 0;
 
   for (PetscInt k = 0; k < m->pairs.n; k++) {
-    const PetscReal deep = HycoROMAddRow(m, k, -m->gap[k]);
+    const PetscReal deep = HycoROMAddRow(m, k, -m->rows.gap[k]);
 
     if (deep > 0) sum += deep * deep;
   }
@@ -313,13 +276,18 @@ PetscErrorCode HycoIndicatorEvaluate(HycoIndicator d, const PetscReal mu[], Hyco
     v->eta = v->eta_u = v->size = Penetration(m);
     v->eta_lambda = 0;
   } else {
-    if (!d->dof) PetscCall(SetUp(d));
+    HycoCheck(
+        m->ops->local,
+        "-hyco_greedy_indicator local needs the system on the RID, which a %s model does not have; take penetration",
+        m->type);
+    PetscUseTypeMethod(m, local, &d->local);
+    if (!d->system) PetscCall(SetUp(d));
     PetscCall(AssembleNorm(d));
     PetscCall(Interpolate(d, mu));
     PetscCall(SolveLocal(d, &reason));
     PetscCall(Distances(d, v));
   }
   v->solved = (PetscBool)(m->prediction.reason > 0 && reason > 0 && !PetscIsNanReal(v->eta));
-  if (!v->solved) v->eta = v->eta_u = v->eta_lambda = v->size = INFINITY;
+  if (!v->solved) v->eta = v->eta_u = v->eta_lambda = v->size = PETSC_INFINITY;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -62,7 +62,8 @@ static PetscErrorCode CloseDependent(HycoMesh m, const HycoPairs *pairs, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoRIDSets(HycoMesh m, const HycoPairs *pairs, const PetscBool in[], PetscInt role[], PetscInt in_rid[])
+/* The roles of the nodes. */
+static PetscErrorCode SetRoles(HycoMesh m, const HycoPairs *pairs, const PetscBool in[], PetscInt role[])
 {
   PetscInt lost = 1;
 
@@ -76,10 +77,50 @@ PetscErrorCode HycoRIDSets(HycoMesh m, const HycoPairs *pairs, const PetscBool i
   }
   CloseIncomplete(pairs, role);
   while (lost) PetscCall(CloseDependent(m, pairs, role, &lost));
-  for (PetscInt k = 0; k < pairs->n; k++) {
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* (35)-(36): a contact is in A_lambda if its row acts on a free unknown of A_c. */
+static PetscErrorCode FindContacts(HycoFE fe, HycoPairs *pairs, const PetscInt role[], PetscInt in_rid[])
+{
+  const PetscInt n = pairs->n, dim = fe->dim, entries = HycoPairsWidth(pairs) * dim * n;
+  PetscInt *start, *dof;
+  PetscReal *value, *gap;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc4(n + 1, &start, entries, &dof, entries, &value, n, &gap));
+  PetscCall(HycoContactRows(fe, pairs, start, dof, value, gap));
+  for (PetscInt k = 0; k < n; k++) {
     in_rid[k] = 0;
-    for (PetscInt j = -1; j < CountMasters(pairs, k); j++)
-      in_rid[k] = in_rid[k] || role[ContactNode(pairs, k, j)] == HYCO_ROLE_A;
+    for (PetscInt j = start[k]; j < start[k + 1]; j++) in_rid[k] = in_rid[k] || role[dof[j] / dim] == HYCO_ROLE_A;
   }
+  PetscCall(PetscFree4(start, dof, value, gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of moved surfaces, whose rows are those of one place: if any node that it meets is in A and not fixed. */
+static void FindMovedContacts(HycoFE fe, const HycoPairs *rows, const PetscInt of[], const PetscInt role[],
+                              PetscInt in_rid[])
+{
+  for (PetscInt r = 0; r < rows->n; r++) {
+    for (PetscInt j = -1; j < CountMasters(rows, r); j++) {
+      const PetscInt i = ContactNode(rows, r, j);
+
+      for (PetscInt c = 0; c < fe->dim && role[i] == HYCO_ROLE_A; c++)
+        in_rid[of[r]] = in_rid[of[r]] || !fe->fixed[i * fe->dim + c];
+    }
+  }
+}
+
+PetscErrorCode HycoRIDSets(HycoFE fe, HycoPairs *pairs, const HycoPairs *rows, const PetscInt of[],
+                           const PetscBool in[], PetscInt role[], PetscInt in_rid[])
+{
+  PetscFunctionBegin;
+  PetscCall(SetRoles(fe->mesh, rows, in, role));
+  PetscCall(PetscArrayzero(in_rid, pairs->n));
+  if (of)
+    FindMovedContacts(fe, rows, of, role, in_rid);
+  else
+    PetscCall(FindContacts(fe, pairs, role, in_rid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

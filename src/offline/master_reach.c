@@ -34,7 +34,7 @@ PetscErrorCode HycoMovedGroups(HycoScene scene, HycoMesh m, const HycoPairs *pai
   PetscFunctionBegin;
   *n = 0;
   for (PetscInt k = 0; k < scene->n_contacts && pairs->room; k++) {
-    if (!pairs->search[k].moved) continue;
+    if (!HycoPairsFollows(pairs, k)) continue;
     PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k]->slave, &group[(*n)++]));
     PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k]->master, &group[(*n)++]));
   }
@@ -75,7 +75,7 @@ static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const Hyco
   for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->mesh->node_whole[i]] = i;
   PetscCall(PetscMalloc1(all->n, &s->of));
   for (PetscInt k = 0; k < all->n; k++) {
-    if (all->search[all->contact[k]].moved) s->of[n++] = k;
+    if (HycoPairsMoved(all, k)) s->of[n++] = k;
   }
   PetscCall(HycoPairsSelect(all, n, s->of, index, &s->pairs));
   PetscCall(PetscFree(index));
@@ -149,10 +149,12 @@ static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < p->n; k++) {
-    const PetscInt *node = p->master + p->master_start[k], n = p->master_start[k + 1] - p->master_start[k];
-    PetscInt r = l->head[k];
+    const PetscInt *node;
+    const PetscReal *weight;
+    PetscInt r = l->head[k], n;
     PetscBool same = PETSC_FALSE;
 
+    HycoPairsMasters(p, k, &n, &node, &weight);
     if (!n) continue;
     for (; r >= 0 && !same; r = l->row[r].next) {
       same = (PetscBool)(l->row[r].n == n);
@@ -241,22 +243,21 @@ static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const L
   PetscCall(HycoPairsSelect(pairs, 0, NULL, NULL, out));
   PetscCall(HycoPairsReserve(out, most, 4));
   for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscBool moved = pairs->search[pairs->contact[k]].moved;
-    const PetscInt lo = pairs->master_start[k];
-    PetscInt r = moved ? l->head[at] : 0;
+    const PetscBool moved = HycoPairsMoved(pairs, k);
+    const PetscInt *master;
+    const PetscReal *weight;
+    PetscInt n;
 
-    while (r >= 0) {
-      PetscInt n = pairs->master_start[k + 1] - lo, node[4];
-      PetscReal weight[4];
+    HycoPairsMasters(pairs, k, &n, &master, &weight);
+    if (!moved) met->of[out->n] = k;
+    if (!moved) HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], n, master, weight);
+    for (PetscInt r = moved ? l->head[at] : -1; r >= 0; r = l->row[r].next) {
+      const PetscReal share = 1 / (PetscReal)l->row[r].n, shares[4] = {share, share, share, share};
+      PetscInt node[4];
 
-      if (moved) n = l->row[r].n;
-      for (PetscInt a = 0; a < n && a < 4; a++) {
-        node[a] = moved ? s->mesh->node_whole[l->row[r].node[a]] : pairs->master[lo + a];
-        weight[a] = moved ? 1 / (PetscReal)n : pairs->weight[lo + a];
-      }
+      for (PetscInt a = 0; a < l->row[r].n; a++) node[a] = s->mesh->node_whole[l->row[r].node[a]];
       met->of[out->n] = k;
-      HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], n, node, weight);
-      r = moved ? l->row[r].next : -1;
+      HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], l->row[r].n, node, shares);
     }
     at += moved;
   }
@@ -273,7 +274,7 @@ PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pai
   PetscFunctionBegin;
   PetscCall(PetscMemzero(met, sizeof(*met)));
   PetscCall(SurfacesCreate(scene, whole, pairs, &s));
-  for (PetscInt c = 0; reach && c < scene->n_contacts; c++) s.pairs.search[c].reach = reach[c];
+  HycoPairsSetReach(&s.pairs, reach);
   PetscCall(PetscMalloc1(s.pairs.n, &l.head));
   for (PetscInt k = 0; k < s.pairs.n; k++) l.head[k] = -1;
   for (PetscInt k = 0; k < n; k++) PetscCall(NoteAt(&s, mu + k * scene->n_parameters, &l, &grown));

@@ -358,10 +358,14 @@ static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes
     PetscCall(PetscMalloc1(l, &index));
     HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
     for (PetscInt k = 0; k < l; k++) {
+      const PetscInt *master;
+      const PetscReal *weight;
+      PetscInt masters;
+
       PetscCall(MoveWherePresses(t, index[k]));
-      nodes[(*n_nodes)++] = t->pairs.slave[index[k]];
-      for (PetscInt j = t->pairs.master_start[index[k]]; j < t->pairs.master_start[index[k] + 1]; j++)
-        nodes[(*n_nodes)++] = t->pairs.master[j];
+      HycoPairsMasters(&t->pairs, index[k], &masters, &master, &weight);
+      nodes[(*n_nodes)++] = HycoPairsSlave(&t->pairs, index[k]);
+      for (PetscInt j = 0; j < masters; j++) nodes[(*n_nodes)++] = master[j];
     }
     PetscCall(PetscFree(index));
     PetscCall(MatDestroy(&V));

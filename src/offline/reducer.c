@@ -1,27 +1,19 @@
 /* HycoReducer: made, configured, destroyed. */
-#include <hycoreducerimpl.h>
+#include <hycoprojection.h>
 #include <string.h>
 
 const char *const HycoHybrids[] = {"auto", "rank", "contact", "all", NULL};
 
-PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *reducer)
+static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
 {
   HycoReducer t;
 
   PetscFunctionBegin;
-  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCall(PetscHeaderCreate(t, HYCO_REDUCER_CLASSID, "HycoReducer", "Training of reduced models", "Hyco", comm,
                               HycoReducerDestroy, HycoReducerView));
   PetscCallMPI(MPI_Comm_rank(HycoComm(t), &t->rank));
-  PetscCall(PetscObjectReference((PetscObject)scene));
-  t->scene = scene;
   t->noise = 1e-11;
-  t->nnmf_max_its = 100;
-  t->condensed_tol = 1e-7;
-  t->condensed_pod_tol = 1e-14;
-  t->condensed_max_values = 24;
   t->greedy.target = 1e-3;
-  t->ridge = -1;
   t->n_validation = -1;
   t->search = PETSC_TRUE;
   t->budget = -1;
@@ -31,18 +23,58 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Its options and all that it has made. */
+static PetscErrorCode EndTraining(HycoReducer t)
+{
+  PetscFunctionBegin;
+  if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
+  PetscCall(PetscFree(t->training));
+  PetscCall(HycoROMDestroy(&t->prototype));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
+{
+  PetscBool same = PETSC_FALSE;
+  HycoROM type;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (t->prototype) PetscCall(PetscObjectTypeCompare((PetscObject)t->prototype, name, &same));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMCreate(&type));
+  ierr = HycoROMSetType(type, name);
+  if (ierr) (void)!HycoROMDestroy(&type);
+  PetscCall(ierr);
+  PetscCall(EndTraining(t));
+  t->prototype = type;
+  if (type->ops->setfromoptions) PetscCall((*type->ops->setfromoptions)(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *reducer)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(Create(comm, reducer));
+  PetscCall(PetscObjectReference((PetscObject)scene));
+  (*reducer)->scene = scene;
+  PetscCall(PetscObjectSetOptions((PetscObject)*reducer, scene->options));
+  PetscCall(HycoReducerSetType(*reducer, HYCO_ROM_HYBRID));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerReset(HycoReducer t)
 {
   PetscFunctionBegin;
   PetscCall(HycoReducerResetBases(t));
-  PetscCall(HycoReducerResetSurfaces(t));
+  if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
   PetscCall(HycoFEDestroy(&t->fe));
   PetscCall(HycoPairsDestroy(&t->pairs));
   PetscCall(HycoMetDestroy(&t->met));
   PetscCall(HycoMeshDestroy(&t->whole));
   PetscCall(PetscFree(t->grown));
   PetscCall(HycoSamplesDestroy(&t->held));
-  PetscCall(HycoCondensedDestroy(&t->condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,11 +86,7 @@ PetscErrorCode HycoReducerDropBases(HycoReducer t)
   PetscCall(PetscFree(t->sigma));
   PetscCall(PetscFree(t->V_whole));
   PetscCall(PetscFree(t->VtU));
-  PetscCall(PetscFree(t->responses.Q));
-  PetscCall(PetscFree(t->responses.scale));
-  PetscCall(PetscFree(t->responses.C));
-  t->responses.missed = 0;
-  t->n_seeds_node = t->n_seeds_cell = t->n_supremizers = 0;
+  t->n_seeds_node = t->n_seeds_cell = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -90,6 +118,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   HycoDereference(reducer);
   t = *reducer;
   PetscCall(HycoReducerReset(t));
+  PetscCall(EndTraining(t));
   for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
   PetscCall(PetscFree(t->region));
   PetscCall(HycoSceneDestroy(&t->scene));
@@ -109,7 +138,7 @@ PetscErrorCode HycoReducerChooses(HycoReducer t, PetscBool *chooses)
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  *chooses = (PetscBool)(t->type == HYCO_ROM_CONDENSED);
+  *chooses = (PetscBool)(t->prototype->ops->choosepoints != NULL);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -201,16 +230,69 @@ PetscErrorCode HycoReducerSetGreedyStop(HycoReducer t, PetscReal target, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReadSeedKinds(HycoReducer t)
+/* What train is asked for, whatever the model. */
+static PetscErrorCode ReadTraining(HycoReducer t)
 {
-  static const char *const words[HYCO_N_SEEDS] = {"displacement", "stress", "force", "dual"};
-  char *list[16];
-  PetscInt n = 16;
-  PetscBool set;
+  static const char *const indicators[] = {"local", "penetration", NULL};
+  PetscInt type = 0, indicator = (PetscInt)t->greedy.indicator;
+  const char **types;
 
   PetscFunctionBegin;
-  PetscCall(PetscOptionsGetStringArray(t->scene->options, NULL, "-hyco_rid_modes", list, &n, &set));
-  if (!set) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMTypeNames(&types));
+  while (types[type] && strcmp(types[type], t->prototype ? t->prototype->type : HYCO_ROM_HYBRID)) type++;
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor(""));
+  PetscCall(HycoOptionsString("-hyco_snapshots", "<folder> where full-order solutions are stored [MODEL.snapshots]",
+                              t->folder, sizeof(t->folder), NULL));
+  PetscCall(
+      HycoOptionsWord("-hyco_model_type",
+                      "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh; condensed on "
+                      "the contact forces",
+                      types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
+  PetscCall(HycoOptionsReal("-hyco_pod_tol", "energy left out of the displacement basis, the epsilon of (18)", 0, 1,
+                            &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));
+  PetscCall(HycoOptionsReal("-hyco_pod_noise", "singular values below this share of the first are noise", 0, 1,
+                            &t->noise, NULL));
+  PetscCall(HycoOptionsInt("-hyco_pod_max_modes", "at most so many displacement modes (0: no limit)", 0, PETSC_MAX_INT,
+                           &t->max_modes, NULL));
+  PetscCall(
+      HycoOptionsInt("-hyco_validation",
+                     "held-out solutions beside the training points, by which the model is judged (-1: from their "
+                     "number; 0: none)",
+                     -1, 100000, &t->n_validation, NULL));
+  PetscCall(HycoOptionsBool("-hyco_search",
+                            "search model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by held-out "
+                            "errors, unless given",
+                            &t->search, NULL));
+  PetscCall(HycoOptionsName("-hyco_reducer_view", "the settings of the training, before it begins"));
+  PetscCall(HycoOptionsFor("greedy"));
+  PetscCall(HycoOptionsWord("-hyco_greedy_indicator",
+                            "what train -greedy judges by: distance from a full-order problem on the RID (43), or "
+                            "penetration (45)",
+                            indicators, &indicator, NULL));
+  PetscCall(HycoOptionsBool("-hyco_greedy_keep", "train -greedy keeps each iteration's model beside the snapshots",
+                            &t->greedy.keep, NULL));
+  PetscCall(HycoOptionsFor("hybrid or projection"));
+  PetscCall(HycoOptionsInt("-hyco_scan",
+                           "points per parameter that look for a singular reduced stiffness (0: up to some hundred in "
+                           "all)",
+                           0, 1000000, &t->scan, NULL));
+  PetscCall(HycoOptionsBool("-hyco_keep_singular", "keep a model whose reduced stiffness is singular inside the ranges",
+                            &t->keep_singular, NULL));
+  PetscOptionsEnd();
+  PetscCall(EndTraining(t)); /* its options may have changed */
+  PetscCall(HycoReducerSetType(t, types[type]));
+  PetscCall(PetscFree(types));
+  t->greedy.indicator = (HycoIndicatorKind)indicator;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -hyco_rid_modes */
+static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char *list[])
+{
+  static const char *const words[HYCO_N_SEEDS] = {"displacement", "stress", "force", "dual"};
+
+  PetscFunctionBegin;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;
   for (PetscInt i = 0; i < n; i++) {
     PetscInt k = 0;
@@ -224,34 +306,88 @@ static PetscErrorCode ReadSeedKinds(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A projection-based model takes the whole mesh, so nothing seeds an RID. */
-static PetscErrorCode ReadType(HycoReducer t)
+/* -hyco_rid_region, parsed now, so that a slip does not show after hours */
+static PetscErrorCode TakeRegion(HycoReducer t, const char text[])
 {
-  PetscOptions o = t->scene->options;
-  PetscInt type = (PetscInt)t->type, dual = 0;
+  HycoExpr region = NULL;
 
   PetscFunctionBegin;
-  PetscCall(HycoOptionsWord(o, "hyco_model_type", HycoROMTypes, &type));
-  PetscCall(HycoOptionsWord(o, "hyco_dual", HycoDuals, &dual));
-  PetscCall(HycoOptionsInt(o, "hyco_nnmf_max_its", 1, PETSC_MAX_INT, &t->nnmf_max_its));
-  PetscCall(HycoOptionsInt(o, "hyco_nnmf_vectors", 0, PETSC_MAX_INT, &t->nnmf_vectors));
-  PetscCall(HycoOptionsReal(o, "hyco_condensed_tol", 0, 1, &t->condensed_tol));
-  PetscCall(HycoOptionsReal(o, "hyco_condensed_pod_tol", 0, 1, &t->condensed_pod_tol));
-  PetscCall(HycoOptionsInt(o, "hyco_condensed_max_values", 3, 1000, &t->condensed_max_values));
-  t->type = (HycoROMType)type;
-  t->dual = (HycoDual)dual;
-  HycoCheckModel(t->type == HYCO_ROM_PROJECTION || t->dual == HYCO_DUAL_FE,
+  PetscCall(PetscFree(t->region));
+  if (!text[0] || strcmp(text, "none") == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoExprCreate("hyco_rid_region", text, 0, NULL, &region));
+  PetscCall(HycoExprDestroy(&region));
+  PetscCall(PetscStrallocpy(text, &t->region));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The RID, and what is full order in it. */
+static PetscErrorCode ReadRID(HycoReducer t)
+{
+  static const char *const deims[] = {"deim", "qdeim", NULL};
+  char region[4 * HYCO_LINE] = "", *kinds[16];
+  PetscInt hybrid = (PetscInt)t->hybrid, n_kinds = 16;
+  PetscBool set;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
+  t->n_groups = (PetscInt)(sizeof(t->groups) / sizeof(t->groups[0]));
+  t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_DISPLACEMENT];
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("hybrid or condensed"));
+  PetscCall(HycoOptionsList("-hyco_rid_modes",
+                            "bases whose DEIM points seed the RID: displacement, stress, force, dual "
+                            "[displacement,stress,force]",
+                            &n_kinds, kinds, &set));
+  if (set) PetscCall(TakeSeedKinds(t, n_kinds, kinds));
+  PetscCall(
+      HycoOptionsReal("-hyco_rid_dual_tol", "epsilon of (18) for the dual basis", 0, 1, &t->tol[HYCO_SEED_DUAL], NULL));
+  PetscCall(HycoOptionsReal("-hyco_rid_stress_tol", "epsilon of (18) for the stress basis [hyco_pod_tol]", 0, 1,
+                            &t->tol[HYCO_SEED_STRESS], NULL));
+  PetscCall(HycoOptionsReal("-hyco_rid_force_tol", "epsilon of (18) for the basis of generalised forces [hyco_pod_tol]",
+                            0, 1, &t->tol[HYCO_SEED_FORCE], NULL));
+  PetscCall(HycoOptionsWord("-hyco_deim_type",
+                            "how a basis chooses the points that seed the RID: greedily, or by pivoted QR", deims,
+                            &t->deim, NULL));
+  PetscCall(HycoOptionsInt("-hyco_rid_layers", "layers of elements added around the RID", 0, PETSC_MAX_INT, &t->layers,
+                           &t->pinned[HYCO_CHOICE_LAYERS]));
+  PetscCall(HycoOptionsReal("-hyco_rid_contact_extension",
+                            "<length> contact nodes this close to the RID's join it with their elements", 0,
+                            PETSC_MAX_REAL, &t->extension, &t->pinned[HYCO_CHOICE_EXTENSION]));
+  PetscCall(HycoOptionsList("-hyco_rid_groups", "mesh groups whose elements join the RID (region of interest)",
+                            &t->n_groups, t->groups, NULL));
+  PetscCall(HycoOptionsString("-hyco_rid_region",
+                              "<expression> elements with a node where this is positive join the RID [none]", region,
+                              sizeof(region), NULL));
+  PetscCall(HycoOptionsBool("-hyco_rid_whole", "take the whole mesh as the RID", &t->whole_rid,
+                            &t->pinned[HYCO_CHOICE_WHOLE]));
+  PetscCall(HycoOptionsFor("hybrid"));
+  PetscCall(HycoOptionsWord("-hyco_hybrid",
+                            "displacements kept full order: fewest for full row rank, all contact ones, all",
+                            HycoHybrids, &hybrid, &t->pinned[HYCO_CHOICE_HYBRID]));
+  PetscOptionsEnd();
+  t->hybrid = (HycoHybrid)hybrid;
+  PetscCall(TakeRegion(t, region));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the type decides: one without a basis of forces of its own has no other; one whose RID is the whole mesh has
+   nothing that seeds it. */
+static PetscErrorCode CheckType(HycoReducer t)
+{
+  PetscInt dual = 0;
+
+  PetscFunctionBegin;
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor(""));
+  PetscCall(HycoOptionsWord("-hyco_dual",
+                            "forces: of the finite elements (hybrid); factorised dual snapshots, or they themselves "
+                            "(projection) [fe; nnmf if projection]",
+                            HycoDuals, &dual, NULL));
+  PetscOptionsEnd();
+  HycoCheckModel(t->prototype->traits.force_basis || dual == HYCO_DUAL_FE,
                  "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
                  HycoDuals[dual]);
-  if (t->type != HYCO_ROM_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
-  if (t->dual == HYCO_DUAL_FE) {
-    PetscBool set;
-
-    PetscCall(PetscOptionsHasName(o, NULL, "-hyco_dual", &set));
-    HycoCheckModel(!set,
-                   "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
-    t->dual = HYCO_DUAL_NNMF;
-  }
+  if (!t->prototype->traits.whole) PetscFunctionReturn(PETSC_SUCCESS);
   t->whole_rid = PETSC_TRUE;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -259,86 +395,61 @@ static PetscErrorCode ReadType(HycoReducer t)
 
 PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
 {
-  static const char *const deims[] = {"deim", "qdeim", NULL};
-  static const char *const choices[HYCO_N_CHOICES] = {"-hyco_model_type", "-hyco_pod_tol",
-                                                      "-hyco_rid_layers", "-hyco_rid_contact_extension",
-                                                      "-hyco_hybrid",     "-hyco_rid_whole"};
-  static const char *const indicators[] = {"local", "penetration", NULL};
-  PetscOptions o;
-  PetscInt hybrid, indicator, n = 64;
-  PetscBool set;
-  char text[4 * HYCO_LINE];
-
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  o = t->scene->options;
-  hybrid = (PetscInt)t->hybrid;
-  PetscCall(PetscOptionsGetString(o, NULL, "-hyco_snapshots", t->folder, sizeof(t->folder), NULL));
-  PetscCall(HycoOptionsReal(o, "hyco_pod_tol", 0, 1, &t->tol[HYCO_SEED_DISPLACEMENT]));
-  t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_DISPLACEMENT];
-  PetscCall(HycoOptionsReal(o, "hyco_rid_stress_tol", 0, 1, &t->tol[HYCO_SEED_STRESS]));
-  PetscCall(HycoOptionsReal(o, "hyco_rid_force_tol", 0, 1, &t->tol[HYCO_SEED_FORCE]));
-  PetscCall(HycoOptionsReal(o, "hyco_rid_dual_tol", 0, 1, &t->tol[HYCO_SEED_DUAL]));
-  PetscCall(HycoOptionsReal(o, "hyco_pod_noise", 0, 1, &t->noise));
-  PetscCall(HycoOptionsInt(o, "hyco_pod_max_modes", 0, PETSC_MAX_INT, &t->max_modes));
-  PetscCall(HycoOptionsWord(o, "hyco_deim_type", deims, &t->deim));
-  PetscCall(HycoOptionsInt(o, "hyco_rid_layers", 0, PETSC_MAX_INT, &t->layers));
-  PetscCall(HycoOptionsReal(o, "hyco_rid_contact_extension", 0, PETSC_MAX_REAL, &t->extension));
-  PetscCall(HycoOptionsBool(o, "hyco_rid_whole", &t->whole_rid));
-  PetscCall(HycoOptionsWord(o, "hyco_hybrid", HycoHybrids, &hybrid));
-  PetscCall(HycoOptionsInt(o, "hyco_hybrid_trials", 0, PETSC_MAX_INT / 8, &t->trials));
-  t->hybrid = (HycoHybrid)hybrid;
-  PetscCall(HycoOptionsReal(o, "hyco_hybrid_ridge", -1, 1, &t->ridge));
-  PetscCall(HycoOptionsInt(o, "hyco_scan", 0, 1000000, &t->scan));
-  PetscCall(HycoOptionsBool(o, "hyco_keep_singular", &t->keep_singular));
-  PetscCall(HycoOptionsInt(o, "hyco_validation", -1, 100000, &t->n_validation));
-  PetscCall(HycoOptionsBool(o, "hyco_search", &t->search));
-  for (PetscInt k = 0; k < HYCO_N_CHOICES; k++) PetscCall(PetscOptionsHasName(o, NULL, choices[k], &t->pinned[k]));
-  indicator = (PetscInt)t->greedy.indicator;
-  PetscCall(HycoOptionsWord(o, "hyco_greedy_indicator", indicators, &indicator));
-  t->greedy.indicator = (HycoIndicatorKind)indicator;
-  PetscCall(HycoOptionsBool(o, "hyco_greedy_keep", &t->greedy.keep));
-  PetscCall(ReadSeedKinds(t));
-  PetscCall(ReadType(t));
-  for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
-  PetscCall(PetscOptionsGetStringArray(o, NULL, "-hyco_rid_groups", t->groups, &n, &set));
-  t->n_groups = set ? n : 0;
-  if (set && n == 1 && strcmp(t->groups[0], "none") == 0) {
-    PetscCall(PetscFree(t->groups[0]));
-    t->n_groups = 0;
-  }
-  PetscCall(PetscOptionsGetString(o, NULL, "-hyco_rid_region", text, sizeof(text), &set));
-  PetscCall(PetscFree(t->region));
-  if (set && strcmp(text, "none")) {
-    HycoExpr region = NULL; /* parsed now, so that a slip does not show after hours */
+  PetscCall(ReadTraining(t));
+  PetscCall(ReadRID(t));
+  PetscCall(CheckType(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    PetscCall(HycoExprCreate("hyco_rid_region", text, 0, NULL, &region));
-    PetscCall(HycoExprDestroy(&region));
-    PetscCall(PetscStrallocpy(text, &t->region));
-  }
+/* Its options and those of all types. */
+static PetscErrorCode DeclareAll(HycoReducer t)
+{
+  const char **types;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerSetFromOptions(t));
+  PetscCall(HycoROMTypeNames(&types));
+  for (PetscInt k = 0; types[k]; k++) PetscCall(HycoReducerSetType(t, types[k]));
+  PetscCall(PetscFree(types));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerDeclare(PetscOptions options)
+{
+  HycoReducer t;
+
+  PetscFunctionBegin;
+  PetscCall(Create(PETSC_COMM_SELF, &t));
+  HycoDeclare(t, options, DeclareAll, HycoReducerDestroy);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerGetType(HycoReducer t, HycoROMType *type)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  *type = t->prototype->type;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 {
+  HycoRecipe recipe;
+  char text[HYCO_LINE];
   PetscBool ascii;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)t, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscViewerASCIIPrintf(viewer, "model type: %s\n", HycoROMTypes[t->type]));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "energy left out of the displacement basis: %g\n",
-                                   (double)t->tol[HYCO_SEED_DISPLACEMENT]));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "search for settings: %s\n", t->search ? "yes" : "no"));
+  HycoReducerGetRecipe(t, &recipe);
+  HycoRecipeDescribe(&recipe, sizeof(text), text);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "settings: %s%s\n", text, t->search ? "; searched where not given" : ""));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "snapshots: %s\n", t->folder[0] ? t->folder : "beside the model"));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerViewFromOptions(HycoReducer object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_REDUCER_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoReducer, HYCO_REDUCER_CLASSID)

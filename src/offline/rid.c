@@ -132,16 +132,19 @@ static PetscErrorCode CompleteSlaves(HycoMesh m, const HycoPairs *pairs, const P
   PetscCall(PetscMalloc1(m->n_nodes, &node));
   PetscCall(MarkNodes(m, in, node));
   for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
+    const PetscInt *master;
+    const PetscReal *weight;
+    PetscInt n;
 
-    if (hi - lo < 2 || !node[pairs->slave[k]]) continue;
-    for (PetscInt j = start[pairs->master[lo]]; j < start[pairs->master[lo] + 1]; j++) {
+    HycoPairsMasters(pairs, k, &n, &master, &weight);
+    if (n < 2 || !node[HycoPairsSlave(pairs, k)]) continue;
+    for (PetscInt j = start[master[0]]; j < start[master[0] + 1]; j++) {
       PetscInt has = 0;
 
       for (PetscInt v = 0; v < m->nv; v++) {
-        for (PetscInt i = lo; i < hi; i++) has += m->cells[around[j] * m->nv + v] == pairs->master[i];
+        for (PetscInt i = 0; i < n; i++) has += m->cells[around[j] * m->nv + v] == master[i];
       }
-      if (has == hi - lo) in[around[j]] = PETSC_TRUE;
+      if (has == n) in[around[j]] = PETSC_TRUE;
     }
   }
   PetscCall(PetscFree(node));
@@ -161,13 +164,16 @@ static PetscErrorCode CompleteMoved(HycoMesh m, const HycoPairs *pairs, const Pe
     grown = PETSC_FALSE;
     PetscCall(MarkNodes(m, in, node));
     for (PetscInt k = 0; k < pairs->n; k++) {
-      const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
-      PetscBool any = node[pairs->slave[k]];
+      const PetscInt slave = HycoPairsSlave(pairs, k), *master;
+      const PetscReal *weight;
+      PetscBool any = node[slave];
+      PetscInt n;
 
       if (!HycoPairsMoved(pairs, k)) continue;
-      for (PetscInt j = lo; j < hi; j++) any = (PetscBool)(any || node[pairs->master[j]]);
-      for (PetscInt j = lo - 1; any && j < hi; j++) {
-        const PetscInt i = j < lo ? pairs->slave[k] : pairs->master[j];
+      HycoPairsMasters(pairs, k, &n, &master, &weight);
+      for (PetscInt j = 0; j < n; j++) any = (PetscBool)(any || node[master[j]]);
+      for (PetscInt j = -1; any && j < n; j++) {
+        const PetscInt i = j < 0 ? slave : master[j];
 
         for (PetscInt e = start[i]; e < start[i + 1]; e++) {
           grown = (PetscBool)(grown || !in[around[e]]);

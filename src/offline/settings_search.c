@@ -10,11 +10,9 @@
   Where no recipe meets targets that were asked for, solutions are added where the best one errs most, and the search
   begins again.
 */
-#include <hycofile.h>
 #include <hycoreducerimpl.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 /* Where no target is given: errors that most studies do not see. */
 static const PetscReal usual[HYCO_N_ERRORS] = {
@@ -22,7 +20,6 @@ static const PetscReal usual[HYCO_N_ERRORS] = {
 
 #define LITTLE        1.25 /* a model that misses by so much more than the best is as good, if it is cheaper */
 #define EXTENSION     2.5  /* edges of the contact surface's facets */
-#define MANY_CONTACTS 600  /* beyond, a condensed model is tried only when it is asked for: its samples fill a disk */
 #define MANY_UNKNOWNS 600  /* of an RID; beyond, "all" is not tried by itself: its reduced matrix is dense */
 #define STALE         3 /* attempts without progress end a kind: larger RIDs do not mend a basis that lacks solutions */
 #define PROGRESS      0.95
@@ -48,7 +45,7 @@ enum { N_SIZES = sizeof(sizes) / sizeof(sizes[0]), FIRST_USUAL = 3 };
 typedef struct {
   HycoReducer t;
   HycoSnapshots store;
-  char file[HYCO_FILE_NAME + 16];
+  const char **types;  /* the registered ones */
   HycoRecipe given;    /* as the options have it */
   PetscReal extension; /* of the recipes that extend the contact */
   PetscBool targets;   /* given by the user */
@@ -60,35 +57,42 @@ typedef struct {
 
 void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
 {
-  const char *type = HycoROMTypes[r->type], *kind = HycoHybrids[r->hybrid];
+  const char *kind = HycoHybrids[r->hybrid];
 
-  if (r->type != HYCO_ROM_HYBRID)
-    snprintf(text, length, "%s, pod_tol %g", type, (double)r->pod_tol);
+  if (!r->rid)
+    snprintf(text, length, "%s, pod_tol %g", r->type, (double)r->pod_tol);
   else if (r->whole)
-    snprintf(text, length, "%s, pod_tol %g, hybrid %s, the whole mesh as RID", type, (double)r->pod_tol, kind);
+    snprintf(text, length, "%s, pod_tol %g, hybrid %s, the whole mesh as RID", r->type, (double)r->pod_tol, kind);
   else
-    snprintf(text, length, "%s, pod_tol %g, hybrid %s, layers %d, contact extension %.3g", type, (double)r->pod_tol,
+    snprintf(text, length, "%s, pod_tol %g, hybrid %s, layers %d, contact extension %.3g", r->type, (double)r->pod_tol,
              kind, (int)r->layers, (double)r->contact_extension);
 }
 
-static void GetRecipe(HycoReducer t, HycoRecipe *r)
+void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *r)
 {
-  *r = (HycoRecipe){t->type, t->tol[HYCO_SEED_DISPLACEMENT], t->extension, t->layers, t->hybrid, t->whole_rid};
+  *r = (HycoRecipe){.type = t->prototype->type,
+                    .rid = (PetscBool)(t->prototype->traits.settings == HYCO_SETTINGS_RID),
+                    .pod_tol = t->tol[HYCO_SEED_DISPLACEMENT],
+                    .contact_extension = t->extension,
+                    .layers = t->layers,
+                    .hybrid = t->hybrid,
+                    .whole = t->whole_rid};
 }
 
 /* The stress and force tolerances follow that of the displacement where they were the same. */
-static void SetRecipe(HycoReducer t, const HycoRecipe *r)
+static PetscErrorCode SetRecipe(HycoReducer t, const HycoRecipe *r)
 {
+  PetscFunctionBegin;
+  PetscCall(HycoReducerSetType(t, r->type));
   for (PetscInt k = HYCO_SEED_STRESS; k <= HYCO_SEED_FORCE; k++) {
     if (t->tol[k] == t->tol[HYCO_SEED_DISPLACEMENT]) t->tol[k] = r->pod_tol;
   }
   t->tol[HYCO_SEED_DISPLACEMENT] = r->pod_tol;
-  t->type = r->type;
-  t->dual = r->type != HYCO_ROM_PROJECTION ? HYCO_DUAL_FE : t->dual == HYCO_DUAL_FE ? HYCO_DUAL_NNMF : t->dual;
   t->extension = r->contact_extension;
   t->layers = r->layers;
   t->hybrid = r->hybrid;
-  t->whole_rid = (PetscBool)(r->whole || r->type == HYCO_ROM_PROJECTION);
+  t->whole_rid = (PetscBool)(r->whole || t->prototype->traits.whole);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscReal EdgeLength(HycoMesh m, PetscInt a, PetscInt b)
@@ -124,23 +128,10 @@ static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Operations of an online solve at a new stiffness. */
-static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
-{
-  const PetscReal dim = t->sizes[3], l = a->n_modes, m = a->rid_contacts, cell = dim == 1 ? 2 : dim == 2 ? 8 : 24;
-  PetscReal n = l + a->n_fe_dofs;
-
-  if (a->recipe.type == HYCO_ROM_CONDENSED)
-    return t->sizes[2] * (PetscReal)t->sizes[2] * (PetscReal)(a->n_flexibilities + t->sizes[2] / 6.0) + 2 * l * m;
-  if (a->recipe.type == HYCO_ROM_PROJECTION) n = l;
-  return n * n * n * 2 / 3 + 20 * a->rid_elements * cell * cell + 2 * a->rid_nodes * dim * l * (l + 10);
-}
-
 /* The largest quotient of an error and its target, of all held-out points and, for the best so far, of each. */
-static PetscErrorCode Judge(Search *s, HycoAttempt *a)
+static PetscErrorCode Judge(Search *s, HycoROM model, HycoAttempt *a)
 {
   HycoReducer t = s->t;
-  HycoROM model = NULL;
   HycoHeldOut *rows;
   PetscReal force;
   PetscInt n;
@@ -148,9 +139,7 @@ static PetscErrorCode Judge(Search *s, HycoAttempt *a)
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   PetscCall(PetscMalloc1(n, &rows));
-  HycoOnEach(HycoComm(t), HycoROMLoad(s->file, &model));
   PetscCall(HycoROMPredictHeldOut(HycoComm(t), model, s->store, t->held, rows));
-  PetscCall(HycoROMDestroy(&model));
   PetscCall(HycoHeldOutSummarise(n, rows, &a->held_out));
   a->ratio = 0;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
@@ -171,17 +160,28 @@ static PetscErrorCode Judge(Search *s, HycoAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bases, RID and model of the recipe that is set. */
-static PetscErrorCode Build(HycoReducer t, HycoSnapshots store, const char file[], HycoTraining *report)
+/* The bases of the recipe that is set, and the type's own modes. */
+static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store)
 {
   PetscFunctionBegin;
   PetscCall(HycoReducerTakeBases(t));
-  if (t->type == HYCO_ROM_CONDENSED) {
-    PetscCall(HycoReducerBeginCondensed(t));
-    HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerFlexibility(t, store));
-    HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerFindModes(t, store));
-  }
-  if (file) PetscCall(HycoReducerBuild(t, PETSC_FALSE, file, report));
+  if (t->prototype->ops->begin) PetscCall((*t->prototype->ops->begin)(t));
+  if (t->prototype->ops->modes) HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->modes)(t, store));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bases, RID and model of the recipe that is set, and what it is worth. */
+static PetscErrorCode BuildAndJudge(Search *s, HycoAttempt *a, HycoTraining *report)
+{
+  HycoROM model;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(TakeModes(s->t, s->store));
+  PetscCall(HycoReducerBuild(s->t, PETSC_FALSE, &model, report));
+  ierr = Judge(s, model, a); /* a model may refuse to predict */
+  PetscCall(HycoROMDestroy(&model));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -201,16 +201,13 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
   a->recipe = *recipe;
   a->ratio = PETSC_INFINITY;
   PetscCall(HycoSamplesGet(t->held, &a->held_out.n, NULL, NULL));
-  SetRecipe(t, recipe);
   t->most_full_order = t->pinned[HYCO_CHOICE_HYBRID] || recipe->hybrid != HYCO_HYBRID_ALL ? 0 : MANY_UNKNOWNS;
+  PetscCall(SetRecipe(t, recipe));
   PetscCall(HycoCatchBegin());
-  ierr = Build(t, s->store, s->file, &report);
-  if (!ierr) ierr = Judge(s, a); /* a model may refuse to predict */
+  ierr = BuildAndJudge(s, a, &report);
   PetscCall(HycoCatchEnd(ierr, message));
   t->most_full_order = 0;
-  if (ierr && t->rank == 0) (void)unlink(s->file);
   PetscCall(HycoCatchNoModel(ierr, message));
-  PetscCall(HycoCondensedDestroy(&t->condensed));
   if (message[0]) a->ratio = PETSC_INFINITY;
   if (!message[0]) {
     a->n_modes = report.n_modes;
@@ -220,10 +217,9 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
     a->rid_elements = report.rid_elements;
     a->rid_contacts = report.rid_contacts;
     a->rid_fraction = report.rid_fraction;
-    a->cost = Cost(t, a);
+    a->cost = t->prototype->ops->cost ? (*t->prototype->ops->cost)(t, a) : 0;
   }
   PetscCall(PetscStrncpy(a->failure, message, sizeof(a->failure)));
-  if (t->rank == 0) (void)unlink(s->file);
   if (t->attempt) HycoOnRoot(HycoComm(t), t->attempt(a, t->attempt_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -243,8 +239,8 @@ static HycoRecipe Recipe(const Search *s, const Size *size)
 
 static PetscBool Same(const HycoRecipe *a, const HycoRecipe *b)
 {
-  return (PetscBool)(a->type == b->type && a->pod_tol == b->pod_tol && a->layers == b->layers && a->whole == b->whole &&
-                     a->contact_extension == b->contact_extension && a->hybrid == b->hybrid);
+  return (PetscBool)(strcmp(a->type, b->type) == 0 && a->pod_tol == b->pod_tol && a->layers == b->layers &&
+                     a->whole == b->whole && a->contact_extension == b->contact_extension && a->hybrid == b->hybrid);
 }
 
 /* Whether the whole mesh as RID is a model: not where every unknown would be full order, but for a few. */
@@ -257,7 +253,7 @@ static PetscBool WholeIsSmall(HycoReducer t, HycoHybrid hybrid)
 
 /* The sizes in their order until one meets the targets, of those that differ in what
    the type of model reads. */
-static PetscErrorCode TrySizes(Search *s, HycoROMType type, HycoHybrid hybrid, PetscBool *met)
+static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid, PetscBool *met)
 {
   const PetscInt first = s->n;
   PetscReal least = PETSC_INFINITY;
@@ -268,9 +264,10 @@ static PetscErrorCode TrySizes(Search *s, HycoROMType type, HycoHybrid hybrid, P
     HycoRecipe r = Recipe(s, &sizes[k]);
     PetscBool done = PETSC_FALSE;
 
-    r.type = type;
+    r.type = type->type;
+    r.rid = (PetscBool)(type->traits.settings == HYCO_SETTINGS_RID);
     r.hybrid = s->t->pinned[HYCO_CHOICE_HYBRID] ? s->given.hybrid : hybrid;
-    if (type == HYCO_ROM_PROJECTION) {
+    if (!r.rid) {
       r.layers = s->given.layers;
       r.contact_extension = s->given.contact_extension;
       r.whole = s->given.whole;
@@ -286,41 +283,54 @@ static PetscErrorCode TrySizes(Search *s, HycoROMType type, HycoHybrid hybrid, P
 }
 
 /* All of A full order, where "auto" keeps the contacts' displacements and is not good enough. */
-static PetscErrorCode TryHybrid(Search *s)
+static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
 {
   PetscBool met;
 
   PetscFunctionBegin;
-  PetscCall(TrySizes(s, HYCO_ROM_HYBRID, HYCO_HYBRID_AUTO, &met));
-  if (!met && !s->t->pinned[HYCO_CHOICE_HYBRID] && s->t->sizes[2])
-    PetscCall(TrySizes(s, HYCO_ROM_HYBRID, HYCO_HYBRID_ALL, &met));
+  PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
+  if (!met && !s->t->pinned[HYCO_CHOICE_HYBRID] && s->t->sizes[2]) PetscCall(TrySizes(s, type, HYCO_HYBRID_ALL, &met));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Its modes cost next to nothing online. */
-static PetscErrorCode TryCondensed(Search *s)
+/* The recipes of a type whose modes cost next to nothing online: one. */
+static PetscErrorCode TryOne(Search *s, const HycoROM type)
 {
   const Size size = {1e-12, 1, PETSC_FALSE};
   HycoRecipe r = Recipe(s, &size);
 
   PetscFunctionBegin;
-  r.type = HYCO_ROM_CONDENSED;
+  r.type = type->type;
+  r.rid = PETSC_FALSE;
   PetscCall(Try(s, &r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode TryAll(Search *s)
+static PetscErrorCode TryType(Search *s, const char name[])
 {
-  const PetscBool pinned = s->t->pinned[HYCO_CHOICE_TYPE];
-  const HycoROMType type = s->given.type;
-  PetscBool met;
+  HycoReducer t = s->t;
+  HycoROM type;
+  PetscBool met, wanted;
 
   PetscFunctionBegin;
-  if (pinned ? type == HYCO_ROM_CONDENSED : s->t->sizes[2] > 0 && s->t->sizes[2] <= MANY_CONTACTS)
-    PetscCall(TryCondensed(s));
-  if (!pinned || type == HYCO_ROM_HYBRID) PetscCall(TryHybrid(s));
-  if (pinned ? type == HYCO_ROM_PROJECTION : s->targets)
-    PetscCall(TrySizes(s, HYCO_ROM_PROJECTION, HYCO_HYBRID_AUTO, &met));
+  PetscCall(HycoROMCreate(&type));
+  PetscCall(HycoROMSetType(type, name));
+  if (t->pinned[HYCO_CHOICE_TYPE])
+    wanted = (PetscBool)(strcmp(name, s->given.type) == 0);
+  else
+    wanted = type->ops->offers ? (*type->ops->offers)(t, s->targets) : PETSC_FALSE;
+  if (wanted && type->traits.settings == HYCO_SETTINGS_NONE) PetscCall(TryOne(s, type));
+  if (wanted && type->traits.settings == HYCO_SETTINGS_RID) PetscCall(TryHybrids(s, type));
+  if (wanted && type->traits.settings == HYCO_SETTINGS_MODES) PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
+  PetscCall(HycoROMDestroy(&type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* In the order of their names. */
+static PetscErrorCode TryAll(Search *s)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; s->types[k]; k++) PetscCall(TryType(s, s->types[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -349,7 +359,7 @@ static PetscBool Settled(HycoReducer t)
   PetscBool open = PETSC_FALSE;
 
   for (PetscInt k = 0; k < HYCO_CHOICE_WHOLE; k++) open = (PetscBool)(open || !t->pinned[k]);
-  if (t->pinned[HYCO_CHOICE_TYPE] && t->type == HYCO_ROM_CONDENSED) open = PETSC_FALSE;
+  if (t->pinned[HYCO_CHOICE_TYPE] && t->prototype->traits.settings == HYCO_SETTINGS_NONE) open = PETSC_FALSE;
   return (PetscBool)(!t->search || !t->held || !open);
 }
 
@@ -485,9 +495,9 @@ static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The best recipe's model, at `path`; of those that the scan of the ranges or its own training solutions refuse, the
+/* The best recipe's model; of those that the scan of the ranges or its own training solutions refuse, the
    next. */
-static PetscErrorCode BuildBest(Search *s, const char path[], HycoTraining *report)
+static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
 {
   HycoReducer t = s->t;
   HycoAttempt *best;
@@ -498,10 +508,10 @@ static PetscErrorCode BuildBest(Search *s, const char path[], HycoTraining *repo
   while ((best = Choose(s))) {
     HycoTraining built = {0};
 
-    SetRecipe(t, &best->recipe);
-    PetscCall(Build(t, s->store, NULL, NULL));
+    PetscCall(SetRecipe(t, &best->recipe));
+    PetscCall(TakeModes(t, s->store));
     PetscCall(HycoCatchBegin());
-    ierr = HycoReducerBuild(t, PETSC_TRUE, path, &built);
+    ierr = HycoReducerBuild(t, PETSC_TRUE, model, &built);
     PetscCall(HycoCatchEnd(ierr, message));
     PetscCall(HycoCatchNoModel(ierr, message));
     if (message[0]) {
@@ -520,24 +530,24 @@ static PetscErrorCode BuildBest(Search *s, const char path[], HycoTraining *repo
   HycoFail("none of %d recipes gave a model; one of them: %s", (int)s->n, (best ? best : &s->attempt[0])->failure);
 }
 
-static PetscErrorCode Learn(Search *s, const char path[], HycoSamples *grown, HycoTraining *report)
+static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report)
 {
   HycoReducer t = s->t;
   PetscReal edge = 0;
 
   PetscFunctionBegin;
-  GetRecipe(t, &s->given);
+  HycoReducerGetRecipe(t, &s->given);
   HycoOnRoot(HycoComm(t), SurfaceEdge(t, &edge));
   PetscCallMPI(MPI_Bcast(&edge, 1, MPIU_REAL, 0, HycoComm(t)));
   s->extension = EXTENSION * edge;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) s->targets = (PetscBool)(s->targets || t->target[j] > 0);
   PetscCall(PetscArraycpy(s->target, s->targets ? t->target : usual, HYCO_N_ERRORS));
   PetscCall(Rounds(s, grown, report));
-  PetscCall(BuildBest(s, path, report));
+  PetscCall(BuildBest(s, model, report));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, const char path[], HycoSamples *grown,
+PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *model, HycoSamples *grown,
                                 HycoTraining *report)
 {
   Search *s;
@@ -547,16 +557,17 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, const char p
   *grown = NULL;
   if (Settled(t)) {
     PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
-    PetscCall(Build(t, store, NULL, NULL));
-    PetscCall(HycoReducerBuild(t, PETSC_TRUE, path, report));
-    GetRecipe(t, &report->chosen.recipe);
+    PetscCall(TakeModes(t, store));
+    PetscCall(HycoReducerBuild(t, PETSC_TRUE, model, report));
+    HycoReducerGetRecipe(t, &report->chosen.recipe);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscNew(&s));
   s->t = t;
   s->store = store;
-  PetscCall(PetscSNPrintf(s->file, sizeof(s->file), "%s.attempt", path));
-  ierr = Learn(s, path, grown, report);
+  PetscCall(HycoROMTypeNames(&s->types));
+  ierr = Learn(s, model, grown, report);
+  PetscCall(PetscFree(s->types));
   PetscCall(PetscFree(s->ratio));
   PetscCall(PetscFree(s));
   PetscCall(ierr);

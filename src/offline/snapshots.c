@@ -145,6 +145,27 @@ static PetscErrorCode BringTogether(HycoSnapshots s, PetscInt n_par, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *groups)
+{
+  PetscFunctionBegin;
+  PetscOptionsBegin(comm, NULL, "HycoSnapshots", NULL);
+  PetscOptionsObject->options = options;
+  PetscCall(HycoOptionsInt("-hyco_groups",
+                           "groups of ranks that solve snapshots side by side (0: from the mesh's size)", 0,
+                           PETSC_MAX_INT, groups, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsDeclare(PetscOptions options)
+{
+  PetscInt groups = 0;
+
+  PetscFunctionBegin;
+  PetscCall(ReadGroups(PETSC_COMM_SELF, options, &groups));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups)
 {
   PetscMPIInt size;
@@ -154,7 +175,7 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   *groups = 0;
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(HycoOptionsInt(scene->options, "hyco_groups", 0, PETSC_MAX_INT, groups));
+  PetscCall(ReadGroups(comm, scene->options, groups));
   HycoCheck(*groups <= size, "-hyco_groups is %d on %d ranks; it can be at most the number of ranks", (int)*groups,
             (int)size);
   if (*groups) PetscFunctionReturn(PETSC_SUCCESS);
@@ -389,14 +410,9 @@ PetscErrorCode HycoSnapshotsView(HycoSnapshots s, PetscViewer viewer)
   PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscViewerASCIIPrintf(viewer, "folder: %s\n", s->folder));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "of the scene and mesh with fingerprint %016llx\n", s->fingerprint));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSnapshotsViewFromOptions(HycoSnapshots object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_SNAPSHOTS_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoSnapshots, HYCO_SNAPSHOTS_CLASSID)

@@ -180,15 +180,18 @@ PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, HycoPairs *pairs,
   PetscCall(HycoContactGeometry(fe, pairs, normal, gap));
   PetscCall(HycoContactAreas(fe, pairs, area));
   for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscInt s = pairs->slave[k];
+    const PetscInt s = HycoPairsSlave(pairs, k), *master;
+    const PetscReal *weight;
+    PetscInt masters;
 
+    HycoPairsMasters(pairs, k, &masters, &master, &weight);
     slave_id[k] = m->node_id[s];
     for (PetscInt c = 0; c < fe->dim && !HycoPairsAlone(fe->scene, pairs, k); c++) {
       force[3 * s + c] -= lambda[k] * normal[3 * k + c];
       gap[k] -= normal[3 * k + c] * u[s * fe->dim + c];
-      for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++) {
-        force[3 * pairs->master[j] + c] += pairs->weight[j] * lambda[k] * normal[3 * k + c];
-        gap[k] += pairs->weight[j] * normal[3 * k + c] * u[pairs->master[j] * fe->dim + c];
+      for (PetscInt j = 0; j < masters; j++) {
+        force[3 * master[j] + c] += weight[j] * lambda[k] * normal[3 * k + c];
+        gap[k] += weight[j] * normal[3 * k + c] * u[master[j] * fe->dim + c];
       }
     }
     pressure[s] = area[k] > 0 ? lambda[k] / area[k] : 0;

@@ -36,7 +36,7 @@ static PetscErrorCode ListKeys(PetscOptions options, PetscBool method_only, Pets
 
     if (word[0] != '-' || !HycoIsSceneKey(word + 1)) continue;
     /* an unknown -hyco_ option on the command line is the caller's: it may be meant for the solvers (-hyco_tao_type) */
-    if (!options && strncasecmp(word + 1, "hyco_", 5) == 0 && !HycoOptionKnown(word + 1)) continue;
+    if (!options && strncasecmp(word + 1, "hyco_", 5) == 0 && !HycoOptionFind(word + 1)) continue;
     if (method_only && strncasecmp(word + 1, "hyco_", 5)) continue;
     PetscCall(PetscOptionsHasName(options, NULL, word, &set));
     for (PetscInt k = 0; k < *n; k++) seen = (PetscBool)(seen || strcasecmp((*keys)[k], word + 1) == 0);
@@ -116,12 +116,20 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
   PetscCall(ListKeys(scene->options, PETSC_FALSE, &n, &keys));
   qsort(keys, (size_t)n, sizeof(*keys), CompareEntries);
   PetscCall(PetscCalloc1(n, &scene->value));
-  for (PetscInt k = 0; k < n; k++) PetscCall(GetLong(scene->options, keys[k], &scene->value[k]));
-  scene->n_entries = n;
   scene->key = keys;
   for (PetscInt k = 0; k < n; k++) { /* a model file carries key, tab, value, end of line */
+    char **value = &scene->value[scene->n_entries];
+
     HycoCheck(!keys[k][strcspn(keys[k], "\t\r\n\f\v")], "the scene's entry \"%.200s\" has a blank in its name",
               keys[k]);
+    PetscCall(GetLong(scene->options, keys[k], value));
+    keys[scene->n_entries] = keys[k];
+    if (strlen(keys[k]) > 5 && strcmp(keys[k] + strlen(keys[k]) - 5, "_view") == 0 &&
+        HycoOptionFind(keys[k])) { /* of this run alone: no description of the scene */
+      PetscCall(PetscFree(*value));
+      PetscCall(PetscFree(keys[scene->n_entries]));
+    } else
+      scene->n_entries++;
   }
   PetscCall(RefuseOthers(scene->options));
   PetscFunctionReturn(PETSC_SUCCESS);

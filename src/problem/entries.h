@@ -3,8 +3,6 @@
 #define HYCO_ENTRIES_H
 #include <hycosceneimpl.h>
 
-/* Whether an option's name (without dash) begins as a scene entry does. */
-PetscBool HycoIsSceneKey(const char name[]);
 /* Reads the scene's file into `*options`, the command line's entries over it. Collective. */
 PetscErrorCode HycoEntriesRead(MPI_Comm comm, const char path[], PetscOptions *options,
                                char folder[PETSC_MAX_PATH_LEN]);

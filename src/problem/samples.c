@@ -298,14 +298,18 @@ PetscErrorCode HycoSamplesView(HycoSamples s, PetscViewer viewer)
   PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscViewerASCIIPrintf(viewer, "%d points of %d parameters\n", (int)s->n, (int)s->scene->n_parameters));
+  for (PetscInt k = 0; k < s->n; k++) {
+    char line[HYCO_LINE] = "", value[64];
+
+    for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
+      snprintf(value, sizeof(value), "%.40s = %g", s->scene->parameter[p],
+               (double)s->mu[k * s->scene->n_parameters + p]);
+      PetscCall(HycoListAdd(line, ", ", value));
+    }
+    PetscCall(PetscViewerASCIIPrintf(viewer, "%s\n", line));
+  }
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSamplesViewFromOptions(HycoSamples object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_SAMPLES_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoSamples, HYCO_SAMPLES_CLASSID)

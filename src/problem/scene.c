@@ -227,35 +227,51 @@ static PetscErrorCode CreateContact(HycoScene s, const char name[], PetscObject 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static const Section contacts = {"a contact", contact_fields, CreateContact};
-static const Section bodies = {"a body", body_fields, CreateLaw};
+static const Section contacts = {"a contact of type", contact_fields, CreateContact};
+static const Section bodies = {"a body of law", body_fields, CreateLaw};
 
-/* "a_b_young" is b_young of a if the type of a declares it, else young of a_b: name and field; fails where neither. */
-static PetscErrorCode SplitDeclared(HycoScene s, const Section *section, const char key[], const char rest[],
-                                    char name[HYCO_LINE], const char **field)
+/* "a_b_young" is b_young of a if the type of a declares it, else young of a_b: name and field; NULL where neither.
+   likely: the member that was meant, with its type, for the message; the caller destroys it. */
+static PetscErrorCode SplitDeclared(HycoScene s, const Section *section, const char rest[], char name[HYCO_LINE],
+                                    const char **field, PetscObject *likely, HycoDeclared **declared)
 {
-  PetscObject object = NULL, typed = NULL;
-  HycoDeclared *declared, *of_typed = NULL;
-
   PetscFunctionBegin;
   *field = NULL;
   for (const char *bar = strchr(rest, '_'); bar && !*field; bar = strchr(bar + 1, '_')) {
+    PetscObject object;
+    HycoDeclared *of_object;
     PetscBool given;
 
     if (bar == rest || bar - rest >= HYCO_LINE) continue;
     memcpy(name, rest, (size_t)(bar - rest));
     name[bar - rest] = '\0';
-    PetscCall((*section->create)(s, name, &object, &declared, &given));
-    if (HycoDeclaredFind(declared, bar + 1)) *field = bar + 1;
-    if (given || !typed) { /* the likeliest member, for the message */
-      PetscCall(PetscObjectDestroy(&typed));
-      typed = object;
-      of_typed = declared;
+    PetscCall((*section->create)(s, name, &object, &of_object, &given));
+    if (HycoDeclaredFind(of_object, bar + 1)) *field = bar + 1;
+    if (given || !*likely) {
+      PetscCall(PetscObjectDestroy(likely));
+      *likely = object;
+      *declared = of_object;
     } else
       PetscCall(PetscObjectDestroy(&object));
   }
-  if (!*field) PetscCall(UnknownKey(key, section->what, of_typed, section->others));
-  PetscCall(PetscObjectDestroy(&typed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The member and the field of an entry that a type declares; fails where none does. */
+static PetscErrorCode FindDeclared(HycoScene s, const Section *section, const char key[], const char rest[],
+                                   char name[HYCO_LINE], const char **field)
+{
+  PetscObject likely = NULL;
+  HycoDeclared *declared = NULL;
+  char what[HYCO_LINE];
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = SplitDeclared(s, section, rest, name, field, &likely, &declared);
+  HycoFormat(what, "%s %s", section->what, likely ? likely->type_name : "...");
+  if (!ierr && !*field) ierr = UnknownKey(key, what, declared, section->others);
+  PetscCall(PetscObjectDestroy(&likely));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -284,7 +300,7 @@ static PetscErrorCode ReadBody(HycoScene s, PetscInt entry, const char rest[])
 
   PetscFunctionBegin;
   if (!SplitKey(rest, body_fields, name, &field)) {
-    PetscCall(SplitDeclared(s, &bodies, key, rest, name, &constant));
+    PetscCall(FindDeclared(s, &bodies, key, rest, name, &constant));
     PetscCall(FindBody(s, name, &body));
     PetscCall(HycoDeclaredRead(s, key, s->value[entry], HycoDeclaredFind(&body->law->constants, constant)));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -323,7 +339,7 @@ static PetscErrorCode ReadContact(HycoScene s, PetscInt entry, const char rest[]
     PetscCall(FindContact(s, name, &contact)); /* which reads it */
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SplitDeclared(s, &contacts, key, rest, name, &field));
+  PetscCall(FindDeclared(s, &contacts, key, rest, name, &field));
   PetscCall(FindContact(s, name, &contact));
   PetscCall(HycoDeclaredRead(s, key, s->value[entry], HycoDeclaredFind(&contact->entries, field)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -381,14 +397,11 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
       PetscCall(UnknownKey(key, "a parameter", NULL, parameter_fields));
     for (PetscInt p = 0; p < s->n_parameters; p++) known = (PetscBool)(known || strcasecmp(s->parameter[p], name) == 0);
     HycoCheck(known, "the scene's entry %s is about a parameter that scene: parameters: does not list", key);
-  } else if (!HycoOptionKnown(key)) {
-    const HycoOption *table;
-    const char *names[64];
+  } else if (!HycoOptionFind(key)) {
+    const char *near = HycoOptionNearest(key, NULL);
 
-    PetscCall(HycoGetOptionTable(&n, &table));
-    for (PetscInt k = 0; k < n && k < 64; k++) names[k] = table[k].name;
-    if (HycoNearest(key, n, names))
-      HycoFail("the option %s is unknown; did you mean %s?", key, HycoNearest(key, n, names));
+    PetscCall(HycoOptionsCheckName(key));
+    HycoCheck(!near, "the option %s is unknown; did you mean %s?", key, near);
     HycoFail("the option %s is unknown; hyco -help lists them", key);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -446,7 +459,10 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscCall(HycoEntriesList(s));
   PetscCall(GetString(s, "scene_title", &s->title));
   PetscCall(FindMesh(s, folder));
-  PetscCall(HycoOptionsInt(s->options, "scene_refine", 0, 12, &s->refine));
+  PetscCall(PetscObjectSetOptions((PetscObject)s, s->options));
+  PetscObjectOptionsBegin((PetscObject)s);
+  PetscCall(HycoOptionsInt("-scene_refine", "uniform refinements of the mesh", 0, 12, &s->refine, NULL));
+  PetscOptionsEnd();
   PetscCall(ReadParameters(s));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     const char *key = s->key[k];
@@ -624,10 +640,4 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSceneViewFromOptions(HycoScene object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_SCENE_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoScene, HYCO_SCENE_CLASSID)

@@ -14,7 +14,6 @@
   formed there; the misfit says instead how far the two sides of the interface disagree.
 */
 #include <hycoalgorithms.h>
-#include <hycocondensed.h>
 #include <hycoromimpl.h>
 #include <petscviewer.h>
 #include <stdio.h>
@@ -50,10 +49,10 @@ static void Contacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
 
     moved += bu * bu;
     force += m->Lambda[k] * m->Lambda[k];
-    if (m->in_rid[k] && m->type != HYCO_ROM_PROJECTION) continue;
-    if (bu > m->gap[k])
-      in += (bu - m->gap[k]) * (bu - m->gap[k]);
-    else if (bu < m->gap[k])
+    if (m->in_rid[k] && m->traits.constrains) continue;
+    if (bu > m->rows.gap[k])
+      in += (bu - m->rows.gap[k]) * (bu - m->rows.gap[k]);
+    else if (bu < m->rows.gap[k])
       stuck += m->Lambda[k] * m->Lambda[k];
   }
   *penetration = Quotient(in, moved);
@@ -76,9 +75,8 @@ PetscReal HycoTrustDistance(HycoScene s, const PetscReal a[], const PetscReal b[
 static PetscReal Tail(HycoROM m)
 {
   PetscReal last = 0, all = 0;
-  PetscInt l = m->l;
+  const PetscInt l = HycoROMCountPOD(m);
 
-  while (l > 0 && !(m->sigma[l - 1] > 0)) l--;
   for (PetscInt j = 0; j < l; j++) {
     all += m->gamma[j] * m->gamma[j];
     if (j >= 3 * l / 4) last += m->gamma[j] * m->gamma[j];
@@ -93,13 +91,9 @@ PetscErrorCode HycoTrustMeasure(HycoROM m, PetscReal feature[])
   PetscFunctionBegin;
   PetscCall(HycoROMComplete(m));
   feature[MISFIT] = feature[PENETRATION] = feature[ADHESION] = 0;
-  if (m->condensed) {
-    PetscReal law[HYCO_N_LAWS];
-
-    HycoCondensedLaw(m->condensed, m->fe->mu, law);
-    feature[MISFIT] = PetscMax(0, law[HYCO_LAW_LAMBDA]);
-    feature[PENETRATION] = PetscMax(0, law[HYCO_LAW_U]);
-  } else {
+  if (m->ops->features)
+    PetscUseTypeMethod(m, features, feature); /* the first two */
+  else {
     feature[MISFIT] = Misfit(m);
     Contacts(m, &feature[PENETRATION], &feature[ADHESION]);
   }
@@ -145,29 +139,6 @@ static PetscReal Estimate(const HycoTrust *t, const PetscReal coefficient[], con
   return PetscExpReal(PetscMin(sum, 200));
 }
 
-/* A condensed model's own estimates; those of older files by values left out in training. */
-static void Condensed(HycoROM m, HycoPrediction *p)
-{
-  const HycoCondensed c = m->condensed;
-  PetscReal growth = 1, law[HYCO_N_LAWS];
-
-  if (c->law) {
-    HycoCondensedLaw(c, m->fe->mu, law);
-    for (PetscInt j = 0; j < HYCO_N_LAWS; j++) law[j] = law[j] < 0 ? -1 : PetscMax(HYCO_LAW_FLOOR, law[j]);
-    p->estimated_error_u = law[HYCO_LAW_U];
-    p->estimated_error_lambda = p->interpolation_error = law[HYCO_LAW_LAMBDA];
-    p->estimated_error_u_full = law[HYCO_LAW_U_FULL];
-    return;
-  }
-  for (PetscInt q = 0; q < c->dim; q++) {
-    if (!c->affine[q]) growth *= HycoPolynomialGrowth(c->n[q], c->x[q], m->fe->mu[q]);
-  }
-  p->estimated_error_lambda = p->interpolation_error;
-  if (c->errors_u[0] < 0) return; /* an older file */
-  p->estimated_error_u = c->errors_u[0] * growth;
-  p->estimated_error_u_full = c->errors_u[1] * growth;
-}
-
 PetscErrorCode HycoTrustEstimate(HycoROM m, HycoPrediction *p)
 {
   const HycoTrust *t = &m->trust;
@@ -178,8 +149,8 @@ PetscErrorCode HycoTrustEstimate(HycoROM m, HycoPrediction *p)
   PetscCall(FindReach(m));
   p->beyond = Beyond(m, m->fe->mu, nearest);
   p->estimated_error_u_full = -1;
-  if (m->condensed && p->reason > 0) Condensed(m, p);
-  if (!t->n || p->reason <= 0 || (!m->condensed && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
+  if (!t->n || p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTrustMeasure(m, feature));
   outside = 1 + (p->beyond > 0 ? HycoTrustDistance(m->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
   for (PetscInt e = 0; e < HYCO_N_TRUST; e++)
@@ -212,11 +183,7 @@ PetscErrorCode HycoTrustView(HycoROM m, PetscViewer viewer)
   if (t->n)
     PetscCall(
         PetscViewerASCIIPrintf(viewer, "  estimates its errors, by %d predictions of held-out solutions\n", (int)t->n));
-  else if (m->type == HYCO_ROM_CONDENSED)
-    PetscCall(PetscViewerASCIIPrintf(
-        viewer, "  estimates its errors by values left out%s\n",
-        !m->condensed->law && m->condensed->errors_u[0] < 0 ? ", and none of u: an older file" : ""));
-  else
+  else if (!m->ops->estimate)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  does not estimate its errors: not calibrated\n"));
   if (m->search) PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->search));
   PetscFunctionReturn(PETSC_SUCCESS);

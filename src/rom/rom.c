@@ -1,7 +1,7 @@
 /* HycoROM: made, asked, destroyed. */
-#include <hycocondensed.h>
 #include <hycofields.h>
-#include <hycotable.h>
+#include <hycoromimpl.h>
+#include <hycoromtypes.h>
 #include <petscviewer.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,40 +9,90 @@
 PetscErrorCode HycoROMCreate(HycoROM *model)
 {
   PetscFunctionBegin;
-  PetscCall(HycoInitializePackage());
+  PetscCall(HycoROMRegisterAll());
   PetscCall(PetscHeaderCreate(*model, HYCO_ROM_CLASSID, "HycoROM", "Reduced model", "Hyco", PETSC_COMM_SELF,
                               HycoROMDestroy, HycoROMView));
   (*model)->reconstruct = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoROMSetFromOptions(HycoROM m)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  PetscObjectOptionsBegin((PetscObject)m);
+  PetscCall(HycoOptionsFor("predict"));
+  PetscCall(
+      HycoOptionsBool("-hyco_fallback",
+                      "predict solves full order on -scene where the reduced solve fails or its estimated error is "
+                      "above a -target_...",
+                      &m->full_order, NULL));
+  PetscCall(HycoOptionsBool("-hyco_full_displacement",
+                            "predict, condensed: displacements and stresses by one full solve on -scene with the "
+                            "predicted forces",
+                            &m->full_displacement, NULL));
+  PetscCall(HycoOptionsFor(""));
+  PetscCall(HycoOptionsBool("-hyco_reconstruct", "reconstruct the contact forces outside the RID by (41)",
+                            &m->reconstruct, NULL));
+  PetscCall(HycoOptionsName("-hyco_rom_view", "what is in a model, when it is loaded"));
+  PetscOptionsEnd();
+  PetscTryTypeMethod(m, options);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Its options and those of all types. */
+static PetscErrorCode DeclareAll(HycoROM m)
+{
+  const char **types;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetFromOptions(m));
+  PetscCall(HycoROMTypeNames(&types));
+  for (PetscInt k = 0; types[k]; k++) {
+    HycoROM each;
+    PetscErrorCode ierr;
+
+    PetscCall(HycoROMCreate(&each));
+    PetscCall(HycoROMSetType(each, types[k]));
+    ierr = each->ops->options ? (*each->ops->options)(each) : PETSC_SUCCESS;
+    PetscCall(HycoROMDestroy(&each));
+    PetscCall(ierr);
+  }
+  PetscCall(PetscFree(types));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMDeclare(PetscOptions options)
+{
+  HycoROM m;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMCreate(&m));
+  HycoDeclare(m, options, DeclareAll, HycoROMDestroy);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetFallback(HycoROM m, PetscBool *full_order, PetscBool *displacement)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  *full_order = m->full_order;
+  *displacement = m->full_displacement;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoROMReset(HycoROM m)
 {
   PetscFunctionBegin;
-  m->ready = m->solved = PETSC_FALSE;
-  PetscCall(HycoReconstructionDestroy(&m->reconstruction));
-  PetscCall(HycoReducedDestroy(&m->reduced));
-  PetscCall(HycoLoadsDestroy(&m->loads));
+  m->ready = m->solved = m->whole_current = m->beyond_current = PETSC_FALSE;
+  PetscTryTypeMethod(m, reset);
   PetscCall(HycoSolverDestroy(&m->solver));
-  PetscCall(HycoSystemDestroy(&m->system));
-  PetscCall(MatDestroy(&m->K));
-  PetscCall(MatDestroy(&m->Kr));
-  PetscCall(MatDestroy(&m->Br));
-  PetscCall(MatDestroy(&m->Btr));
-  PetscCall(VecDestroy(&m->F));
-  PetscCall(VecDestroy(&m->Fr));
-  PetscCall(VecDestroy(&m->Dr));
-  PetscCall(VecDestroy(&m->x));
-  PetscCall(VecDestroy(&m->L));
+  PetscCall(HycoFEDestroy(&m->fe_beyond));
+  PetscCall(PetscFree(m->beyond));
+  PetscCall(HycoRowsDestroy(&m->rows));
   PetscCall(HycoFEDestroy(&m->fe));
-  PetscCall(HycoROMDestroyOwn(m));
+  m->of_fe = NULL;
   PetscCall(PetscFree(m->contact));
-  PetscCall(PetscFree(m->fe_at));
-  PetscCall(PetscFree(m->Vp));
-  PetscCall(PetscFree(m->row_start));
-  PetscCall(PetscFree(m->row_dof));
-  PetscCall(PetscFree(m->row_value));
-  PetscCall(PetscFree(m->gap));
   PetscCall(PetscFree(m->gamma));
   PetscCall(PetscFree(m->U));
   PetscCall(PetscFree(m->Lambda));
@@ -61,28 +111,21 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
   HycoDereference(model);
   m = *model;
   PetscCall(HycoROMReset(m));
+  PetscTryTypeMethod(m, destroy);
   PetscCall(HycoNormsDestroy(&m->norms));
-  PetscCall(HycoCondensedDestroy(&m->condensed));
-  PetscCall(HycoTableDestroy(&m->table));
-  PetscCall(HycoFEDestroy(&m->fe_whole));
-  PetscCall(HycoPairsDestroy(&m->whole_pairs));
-  PetscCall(HycoMeshDestroy(&m->whole));
-  PetscCall(PetscFree(m->V_whole));
-  PetscCall(PetscFree(m->U_whole));
+  PetscCall(HycoROMFreeWhole(m));
+  PetscCall(PetscFree(m->image));
   PetscCall(HycoPairsDestroy(&m->pairs));
   PetscCall(HycoMeshDestroy(&m->mesh));
   PetscCall(HycoSceneDestroy(&m->scene));
   PetscCall(PetscFree(m->role));
+  PetscCall(PetscFree(m->master_reach));
   PetscCall(PetscFree(m->in_rid));
   PetscCall(PetscFree(m->V));
   PetscCall(PetscFree(m->sigma));
   PetscCall(PetscFree(m->fe_dof));
-  PetscCall(PetscFree(m->G));
-  PetscCall(PetscFree(m->S_lambda));
-  PetscCall(PetscFree(m->V_lambda));
   PetscCall(PetscFree(m->points));
   PetscCall(PetscFree(m->reach));
-  PetscCall(PetscFree(m->master_reach));
   PetscCall(PetscFree(m->provenance));
   PetscCall(PetscFree(m->search));
   PetscCall(PetscHeaderDestroy(model));
@@ -94,6 +137,35 @@ PetscErrorCode HycoROMGetType(HycoROM m, HycoROMType *type)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   *type = m->type;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGivesForces(HycoROM m, PetscBool *gives)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  *gives = m->traits.forces;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetDimensions(HycoROM m, PetscInt *n_modes, PetscInt *n_contacts)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  if (n_modes) *n_modes = m->l;
+  if (n_contacts) *n_contacts = m->pairs.n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSetFE(HycoROM m, HycoHybrid hybrid, PetscInt n, const PetscInt dof[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoROMReset(m));
+  PetscCall(PetscFree(m->fe_dof));
+  HycoDuplicate(n, dof, &m->fe_dof);
+  PetscCall(PetscSortInt(n, m->fe_dof));
+  m->n_fe = n;
+  m->hybrid = hybrid;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -155,44 +227,15 @@ static PetscErrorCode CheckSolved(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of U's free unknowns u^T K u / 2, and the same without K's couplings: what round-off is relative to. */
-static PetscErrorCode QuadraticForm(HycoROM m, PetscReal *energy, PetscReal *size)
-{
-  const PetscInt *ia, *ja;
-  const PetscScalar *a;
-  PetscInt n;
-  PetscBool done;
-
-  PetscFunctionBegin;
-  *energy = *size = 0;
-  PetscCall(MatGetRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatSeqAIJGetArrayRead(m->K, &a));
-  for (PetscInt i = 0; i < n; i++) {
-    PetscReal sum = 0;
-
-    if (m->U[i] == 0) continue;
-    for (PetscInt k = ia[i]; k < ia[i + 1]; k++) {
-      sum += a[k] * m->U[ja[k]];
-      if (ja[k] == i) *size += a[k] * m->U[i] * m->U[i] / 2;
-    }
-    *energy += m->U[i] * sum / 2;
-  }
-  PetscCall(MatSeqAIJRestoreArrayRead(m->K, &a));
-  PetscCall(MatRestoreRowIJ(m->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Of the RID's cells: from K, or cell by cell where K lacks the supports' part or a rigid motion drowns it: beyond 1e-5
-   round-off would leave fewer than ten digits. */
 PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
 {
-  PetscReal *each, size = 0;
+  PetscReal *each;
+  PetscBool known = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
-  *energy = 0;
-  if (m->K && !m->table && !m->fe->lifted) PetscCall(QuadraticForm(m, energy, &size));
-  if (m->K && !m->table && !m->fe->lifted && *energy >= 1e-5 * size) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscTryTypeMethod(m, energy, energy, &known);
+  if (known) PetscFunctionReturn(PETSC_SUCCESS);
   *energy = 0;
   PetscCall(PetscMalloc1(m->mesh->n_cells, &each));
   PetscCall(HycoFEEnergy(m->fe, m->U, each));
@@ -231,7 +274,7 @@ static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
   HycoContactState state;
 
   PetscFunctionBegin;
-  PetscCall(HycoContactMeasure(m->fe, m->condensed ? &m->pairs : &m->own_pairs, m->U, m->Lambda, m->contact, &state));
+  PetscCall(HycoContactMeasure(m->fe, m->of_fe, m->U, m->Lambda, m->contact, &state));
   p->n_facing = state.n_facing;
   p->overlap = state.overlap;
   p->sliding = state.sliding;
@@ -249,6 +292,8 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   p->dim = m->fe->dim;
   p->n_dof = m->n;
   p->type = m->type;
+  p->title = m->traits.title;
+  p->gives_forces = m->traits.forces;
   p->n_multipliers = m->n_L;
   p->n_contacts = m->m;
   p->n_all_contacts = m->pairs.n;
@@ -314,7 +359,7 @@ PetscErrorCode HycoROMGetWholeU(HycoROM m, PetscInt *n_nodes, const PetscReal *U
 {
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
-  if (!m->whole) PetscCall(HycoROMLoadWhole(m));
+  PetscCall(HycoROMLoadWhole(m));
   if (!m->whole_current) {
     const PetscInt dim = m->fe->dim;
 
@@ -350,85 +395,32 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ViewScan(HycoROM m, PetscViewer viewer)
+PetscInt HycoROMCountPOD(HycoROM m)
 {
-  PetscFunctionBegin;
-  if (!m->scan.n) {
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  not scanned for a singular reduced stiffness\n"));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  scanned at %d points: smallest singular value %.2e of the largest",
-                                   (int)m->scan.n, (double)m->scan.smallest));
-  for (PetscInt p = 0; p < m->scene->n_parameters; p++)
-    PetscCall(
-        PetscViewerASCIIPrintf(viewer, "%s %s = %.6g", p ? "," : " at", m->scene->parameter[p], (double)m->scan.at[p]));
-  if (m->scan.n_singular)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "; SINGULAR inside the ranges: the determinant has the other sign at %d",
-                                     (int)m->scan.n_singular));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  PetscInt l = m->l;
 
-/* The RID, what is full order in it, what the reconstruction has. */
-static PetscErrorCode ViewHybrid(HycoROM m, PetscViewer viewer)
-{
-  static const char *const words[] = {"auto", "rank: the fewest that give full row rank",
-                                      "contact: all on the contact surfaces of the RID",
-                                      "all of A, interface by ridge regression on the modes"};
-  PetscInt nodes = 0, a = 0, in = 0;
-
-  PetscFunctionBegin;
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
-    nodes += m->role[i] != HYCO_ROLE_OUTSIDE;
-    a += m->role[i] == HYCO_ROLE_A;
-  }
-  for (PetscInt k = 0; k < m->pairs.n; k++) in += m->in_rid[k];
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  modes that seeded the RID besides: %d dual, %d stress, %d force\n",
-                                   (int)m->counts[0], (int)m->counts[1], (int)m->counts[2]));
-  PetscCall(PetscViewerASCIIPrintf(
-      viewer, "  RID: %d of %d elements (%.1f %%), %d of %d nodes, %d in A; %d of %d contacts\n", (int)m->mesh->n_cells,
-      (int)m->whole_cells, 100. * (double)m->mesh->n_cells / (double)m->whole_cells, (int)nodes, (int)m->whole_nodes,
-      (int)a, (int)in, (int)m->pairs.n));
-  if (m->pairs.n)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  full-order displacements: %d (%s)\n", (int)m->n_fe, words[m->hybrid]));
-  if (m->hybrid == HYCO_HYBRID_ALL && m->G)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  ridge: %.0e of the first squared singular value\n", (double)m->ridge));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  dual snapshots for the reconstruction: %d\n", (int)m->n_dual));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  while (l > 0 && !(m->sigma[l - 1] > 0)) l--;
+  return l;
 }
 
 PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
 {
-  static const char *const words[] = {"hybrid hyper-reduced", "projection-based", "condensed"};
   PetscInt pod;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  pod = m->type == HYCO_ROM_PROJECTION ? m->l - m->counts[1] : m->l;
-  PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n", words[m->type]));
+  pod = HycoROMCountPOD(m);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n", m->traits.title));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, %sforces %.2e\n",
-                                   (int)m->n_points, (double)m->numbers[1], m->type == HYCO_ROM_HYBRID ? "RID " : "",
-                                   (double)m->numbers[2]));
+                                   (int)m->n_points, (double)m->numbers[1],
+                                   m->traits.settings == HYCO_SETTINGS_RID ? "RID " : "", (double)m->numbers[2]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
                                    (int)pod, pod ? (double)m->sigma[0] : 0., pod ? (double)m->sigma[pod - 1] : 0.));
-  if (m->type == HYCO_ROM_HYBRID)
-    PetscCall(ViewHybrid(m, viewer));
-  else
-    PetscCall(m->condensed ? HycoCondensedView(m, viewer) : HycoProjectionView(m, viewer));
-  if (m->numbers[0] > 0) /* else too large to be known */
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
-  if (m->table) PetscCall(HycoTableView(m, viewer));
-  if (m->type == HYCO_ROM_HYBRID) PetscCall(ViewScan(m, viewer));
+  PetscTryTypeMethod(m, view, viewer);
   PetscCall(HycoTrustView(m, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->provenance));
   PetscCall(HycoSceneView(m->scene, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMViewFromOptions(HycoROM object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_ROM_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoROM, HYCO_ROM_CLASSID)

@@ -1,9 +1,9 @@
 /*
-  The model file. Groups: /mesh and /problem (what the online phase opens), /reconstruction, /training, /whole (read
-  only when a field on the whole mesh is asked for). Every index is checked on load.
+  The model file, and the same bytes in memory, by which a model goes from rank 0 to the others. Groups: /mesh and
+  /problem (what the online phase opens), /reconstruction, /training, /whole (read only when a field on the whole mesh
+  is asked for). Every index is checked on load.
 */
-#include <hycocondensed.h>
-#include <hycotable.h>
+#include <hycoromimpl.h>
 #include <string.h>
 
 /* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters.
@@ -183,21 +183,7 @@ static PetscErrorCode LoadPairs(HycoH5 h, const char prefix[], PetscInt n_nodes,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SaveType(HycoH5 h, HycoROM m)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoH5WriteText(h, "problem/type", HycoROMTypes[m->type]));
-  if (m->condensed) PetscCall(HycoCondensedSave(m, h));
-  if (m->type != HYCO_ROM_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoH5WriteText(h, "problem/dual", HycoDuals[m->dual]));
-  PetscCall(HycoH5WriteReal(h, "problem/V_lambda", m->l_lambda, m->pairs.n, m->V_lambda));
-  PetscCall(HycoH5WriteReal(h, "training/dual_misfit", 1, 1, &m->dual_misfit));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The place of a dataset's text among the words. */
-static PetscErrorCode LoadWord(HycoH5 h, const char path[], const char name[], const char *const words[],
-                               PetscInt *index)
+PetscErrorCode HycoROMLoadWord(HycoROM m, HycoH5 h, const char name[], const char *const words[], PetscInt *index)
 {
   char *text;
 
@@ -206,26 +192,25 @@ static PetscErrorCode LoadWord(HycoH5 h, const char path[], const char name[], c
   for (*index = 0; words[*index] && strcmp(text, words[*index]); (*index)++)
     ;
   PetscCall(PetscFree(text));
-  HycoCheck(words[*index], "%s: %s is damaged", path, name);
+  HycoCheck(words[*index], "%s: %s is damaged", m->path, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The first files have no type: they are hybrid. */
 static PetscErrorCode LoadType(HycoH5 h, HycoROM m)
 {
-  PetscInt word;
+  char *type = NULL;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (!HycoH5Has(h, "problem/type")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(LoadWord(h, m->path, "problem/type", HycoROMTypes, &word));
-  m->type = (HycoROMType)word;
-  if (m->type == HYCO_ROM_CONDENSED) PetscCall(HycoCondensedLoad(m, h));
-  if (m->type != HYCO_ROM_PROJECTION) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(LoadWord(h, m->path, "problem/dual", HycoDuals, &word));
-  m->dual = (HycoDual)word;
-  HycoCheck(m->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);
-  m->l_lambda = -1;
-  PetscCall(HycoH5LoadReal(h, "problem/V_lambda", &m->l_lambda, &m->pairs.n, &m->V_lambda));
-  PetscCall(HycoH5ReadReal(h, "training/dual_misfit", 1, 1, &m->dual_misfit));
+  if (HycoH5Has(h, "problem/type"))
+    PetscCall(HycoH5LoadText(h, "problem/type", &type));
+  else
+    PetscCall(PetscStrallocpy(HYCO_ROM_HYBRID, &type));
+  ierr = HycoROMSetType(m, type);
+  PetscCall(PetscFree(type));
+  PetscCall(ierr);
+  PetscTryTypeMethod(m, load, h);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -377,29 +362,51 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
   PetscCall(HycoH5WriteReal(h, "problem/V", n_dof, m->l, m->V));
   PetscCall(HycoH5WriteReal(h, "problem/singular_values", m->l, 1, m->sigma));
   PetscCall(HycoH5WriteInt(h, "problem/fe_dof", m->n_fe, 1, m->fe_dof));
-  if (m->G) {
-    PetscCall(HycoH5WriteReal(h, "problem/G", m->l, m->n_fe, m->G));
-    PetscCall(HycoH5WriteReal(h, "problem/ridge", 1, 1, &m->ridge));
-  }
-  PetscCall(SaveType(h, m));
-  PetscCall(HycoH5WriteReal(h, "reconstruction/S_lambda", m->n_dual, m->pairs.n, m->S_lambda));
+  PetscCall(HycoH5WriteText(h, "problem/type", m->type));
+  PetscTryTypeMethod(m, save, h);
+  if (!HycoH5Has(h, "reconstruction")) /* older readers ask every type for it */
+    PetscCall(HycoH5WriteReal(h, "reconstruction/S_lambda", 0, m->pairs.n, NULL));
   PetscCall(HycoH5WriteReal(h, "training/points", m->n_points, m->scene->n_parameters, m->points));
   PetscCall(HycoH5WriteReal(h, "training/numbers", 3, 1, m->numbers));
-  if (m->scan.n) {
-    const PetscInt counts[2] = {m->scan.n, m->scan.n_singular};
-
-    PetscCall(HycoH5WriteInt(h, "training/scan_counts", 2, 1, counts));
-    PetscCall(HycoH5WriteReal(h, "training/scan_smallest", 1, 1, &m->scan.smallest));
-    PetscCall(HycoH5WriteReal(h, "training/scan_at", m->scene->n_parameters, 1, m->scan.at));
-  }
   PetscCall(SaveTrust(h, m));
-  if (m->table) PetscCall(HycoTableSave(m, h));
   PetscCall(HycoH5WriteText(h, "training/provenance", m->provenance));
   PetscCall(HycoH5WriteText(h, "training/fingerprint", m->fingerprint));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SaveAll(HycoH5 h, HycoROM m, HycoMesh whole, const PetscReal V_whole[])
+static PetscErrorCode ReadWhole(HycoH5 h, HycoROM m)
+{
+  PetscInt n_dof;
+
+  PetscFunctionBegin;
+  PetscCall(LoadMesh(h, "whole", m->scene->n_bodies, &m->whole));
+  n_dof = m->whole->n_nodes * m->whole->dim;
+  PetscCall(HycoH5LoadReal(h, "whole/V", &n_dof, &m->l, &m->V_whole));
+  HycoCheck(m->whole->n_nodes == m->whole_nodes && m->whole->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
+            m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The whole-mesh part, from where the model came from. */
+static PetscErrorCode OpenWhole(HycoROM m)
+{
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (m->whole) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->image)
+    PetscCall(HycoH5OpenImage("the model", m->image, m->image_size, &h));
+  else
+    PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
+  ierr = ReadWhole(h, m);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  if (!ierr) PetscCall(PetscFree(m->image)); /* nothing is left in it to read */
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SaveAll(HycoH5 h, HycoROM m)
 {
   PetscInt format = m->pairs.room ? HYCO_ROM_FORMAT : HYCO_ROM_STILL;
 
@@ -407,22 +414,23 @@ static PetscErrorCode SaveAll(HycoH5 h, HycoROM m, HycoMesh whole, const PetscRe
   for (PetscInt k = 0; k < m->pairs.n; k++) {
     if (HycoPairsAlone(m->scene, &m->pairs, k)) format = HYCO_ROM_FORMAT;
   }
+  PetscCall(OpenWhole(m));
   PetscCall(HycoH5WriteText(h, "kind", HYCO_ROM_KIND));
   PetscCall(HycoH5WriteInt(h, "format", 1, 1, &format));
   PetscCall(SaveProblem(h, m));
-  PetscCall(SaveMesh(h, "whole", whole));
-  PetscCall(HycoH5WriteReal(h, "whole/V", whole->n_nodes * whole->dim, m->l, V_whole));
+  PetscCall(SaveMesh(h, "whole", m->whole));
+  PetscCall(HycoH5WriteReal(h, "whole/V", m->whole->n_nodes * m->whole->dim, m->l, m->V_whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMSave(HycoROM m, HycoMesh whole, const PetscReal V_whole[], const char path[])
+PetscErrorCode HycoROMSave(HycoROM m, const char path[])
 {
   HycoH5 h;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoH5Create(path, &h));
-  ierr = SaveAll(h, m, whole, V_whole);
+  ierr = SaveAll(h, m);
   PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -447,21 +455,6 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
       version >= HYCO_ROM_OLDEST && version <= HYCO_ROM_FORMAT,
       "%s has model format %d; this hyco (%s) reads formats %d to %d: train it again, or use the hyco that wrote it",
       path, (int)version, HycoVersion(), HYCO_ROM_OLDEST, HYCO_ROM_FORMAT);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode LoadScan(HycoH5 h, HycoROM m)
-{
-  PetscInt one = 1, two = 2, *counts;
-
-  PetscFunctionBegin;
-  if (!HycoH5Has(h, "training/scan_counts")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoH5LoadInt(h, "training/scan_counts", 0, PETSC_MAX_INT, &two, &one, &counts));
-  m->scan.n = counts[0];
-  m->scan.n_singular = counts[1];
-  PetscCall(PetscFree(counts));
-  PetscCall(HycoH5ReadReal(h, "training/scan_smallest", 1, 1, &m->scan.smallest));
-  PetscCall(HycoH5ReadReal(h, "training/scan_at", m->scene->n_parameters, 1, m->scan.at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -516,24 +509,17 @@ static PetscErrorCode LoadProblem(HycoH5 h, HycoROM m)
   PetscCall(LoadPairs(h, "problem/pairs", m->mesh->n_nodes, m->scene->n_contacts, &m->pairs));
   PetscCall(HycoH5LoadInt(h, "problem/in_rid", 0, 1, &m->pairs.n, &one, &m->in_rid));
   PetscCall(LoadReach(h, m));
-  m->l = m->n_fe = m->n_dual = m->n_points = -1;
+  m->l = m->n_fe = m->n_points = -1;
   PetscCall(HycoH5LoadReal(h, "problem/V", &n_dof, &m->l, &m->V));
   PetscCall(HycoH5LoadReal(h, "problem/singular_values", &m->l, &one, &m->sigma));
   PetscCall(HycoH5LoadInt(h, "problem/fe_dof", 0, n_dof - 1, &m->n_fe, &one, &m->fe_dof));
   for (PetscInt k = 1; k < m->n_fe; k++)
     HycoCheck(m->fe_dof[k] > m->fe_dof[k - 1], "%s: problem/fe_dof is damaged", m->path);
-  if (HycoH5Has(h, "problem/G")) {
-    PetscCall(HycoH5LoadReal(h, "problem/G", &m->l, &m->n_fe, &m->G));
-    PetscCall(HycoH5ReadReal(h, "problem/ridge", 1, 1, &m->ridge));
-  }
   PetscCall(LoadType(h, m));
-  PetscCall(HycoH5LoadReal(h, "reconstruction/S_lambda", &m->n_dual, &m->pairs.n, &m->S_lambda));
   n_par = m->scene->n_parameters;
   PetscCall(HycoH5LoadReal(h, "training/points", &m->n_points, &n_par, &m->points));
   PetscCall(HycoH5ReadReal(h, "training/numbers", 3, 1, m->numbers));
-  PetscCall(LoadScan(h, m));
   PetscCall(LoadTrust(h, m));
-  if (HycoH5Has(h, "table")) PetscCall(HycoTableLoad(m, h));
   PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
   PetscCall(HycoH5LoadText(h, "training/fingerprint", &text));
   PetscCall(PetscStrncpy(m->fingerprint, text, sizeof(m->fingerprint)));
@@ -549,67 +535,121 @@ static PetscErrorCode LoadAll(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMLoad(const char path[], HycoROM *model)
+/* From an open file, which is closed; no model is left of one that is refused. `path`: what messages call it. */
+static PetscErrorCode Load(HycoH5 *h, const char path[], HycoROM *model)
 {
   HycoROM m;
-  HycoH5 h;
   PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *model = NULL;
+  PetscCall(HycoROMCreate(&m));
+  PetscCall(PetscStrncpy(m->path, path, sizeof(m->path)));
+  PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_TRUE));
+  ierr = LoadAll(*h, m);
+  PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_FALSE));
+  PetscCall(HycoH5Close(h, PETSC_FALSE));
+  if (!ierr) ierr = PetscObjectSetOptions((PetscObject)m, m->scene->options);
+  if (!ierr) ierr = HycoROMSetFromOptions(m);
+  if (ierr) (void)!HycoROMDestroy(&m);
+  PetscCall(ierr);
+  *model = m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMLoad(const char path[], HycoROM *model)
+{
+  HycoH5 h;
 
   PetscFunctionBegin;
   PetscCheck(path && model, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
              "HycoROMLoad: the path or the handle's address is NULL");
   *model = NULL;
   PetscCall(HycoH5OpenOr(path, "if it was a model, train it again", &h));
-  PetscCall(HycoROMCreate(&m));
-  PetscCall(PetscStrncpy(m->path, path, sizeof(m->path)));
-  PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_TRUE));
-  ierr = LoadAll(h, m);
-  PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_FALSE));
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  if (ierr) (void)!HycoROMDestroy(&m);
-  PetscCall(ierr);
-  PetscCall(HycoOptionsBool(m->scene->options, "hyco_reconstruct", &m->reconstruct));
-  PetscCall(
-      HycoOptionsWord(m->scene->options, "hyco_reconstruct_solver", HycoReconstructSolvers, &m->reconstruct_solver));
-  *model = m;
+  PetscCall(Load(&h, path, model));
+  PetscCall(HycoROMViewFromOptions(*model, NULL, "-hyco_rom_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReadWhole(HycoH5 h, HycoROM m)
-{
-  PetscInt n_dof;
-
-  PetscFunctionBegin;
-  PetscCall(LoadMesh(h, "whole", m->scene->n_bodies, &m->whole));
-  n_dof = m->whole->n_nodes * m->whole->dim;
-  PetscCall(HycoH5LoadReal(h, "whole/V", &n_dof, &m->l, &m->V_whole));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode LoadWhole(HycoROM m)
+static PetscErrorCode MakeImage(HycoROM m, void **image, size_t *size)
 {
   HycoH5 h;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
-  ierr = ReadWhole(h, m);
+  PetscCall(HycoH5CreateImage("the model", &h));
+  ierr = SaveAll(h, m);
+  if (!ierr) ierr = HycoH5GetImage(h, image, size);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);
-  HycoCheck(m->whole->n_nodes == m->whole_nodes && m->whole->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
-            m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A model of these bytes, which it keeps for the whole-mesh part. */
+static PetscErrorCode FromImage(void *image, size_t size, HycoROM *model)
+{
+  HycoH5 h;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5OpenImage("the model", image, size, &h));
+  PetscCall(Load(&h, "", model));
+  (*model)->image = image;
+  (*model)->image_size = size;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A message's length is an int. */
+#define MOST_BYTES ((size_t)1 << 30)
+
+PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model)
+{
+  PetscMPIInt rank, ranks;
+  void *image = NULL;
+  size_t size = 0;
+  PetscInt64 bytes;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+  char message[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &ranks));
+  if (ranks == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoOnRoot(comm, MakeImage(*model, &image, &size));
+  bytes = (PetscInt64)size;
+  PetscCallMPI(MPI_Bcast(&bytes, 1, MPIU_INT64, 0, comm));
+  if (rank) PetscCall(PetscMalloc((size_t)bytes, &image));
+  for (size_t at = 0; at < (size_t)bytes; at += MOST_BYTES)
+    PetscCallMPI(
+        MPI_Bcast((char *)image + at, (PetscMPIInt)PetscMin(MOST_BYTES, (size_t)bytes - at), MPI_BYTE, 0, comm));
+  if (rank) PetscCall(HycoROMDestroy(model));
+  PetscCall(HycoCatchBegin());
+  if (rank) ierr = FromImage(image, (size_t)bytes, model);
+  PetscCall(HycoCatchEnd(ierr, message));
+  if (!rank || ierr) PetscCall(PetscFree(image));
+  PetscCall(HycoErrorSync(comm, ierr, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMFreeWhole(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEDestroy(&m->fe_whole));
+  PetscCall(HycoPairsDestroy(&m->whole_pairs));
+  PetscCall(PetscFree(m->U_whole));
+  if (m->lent) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->whole) PetscCall(HycoMeshDestroy(&m->whole));
+  PetscCall(PetscFree(m->V_whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadWhole(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(OpenWhole(m));
   PetscCall(HycoFECreate(m->scene, m->whole, &m->fe_whole));
   PetscCall(PetscMalloc1((size_t)m->whole->n_nodes * (size_t)m->whole->dim, &m->U_whole));
   /* the contacts again, in the whole mesh's numbers */
   PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMRewrite(HycoROM m, const char path[])
-{
-  PetscFunctionBegin;
-  if (!m->whole) PetscCall(HycoROMLoadWhole(m));
-  PetscCall(HycoROMSave(m, m->whole, m->V_whole, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -619,14 +659,9 @@ PetscErrorCode HycoROMLoadWhole(HycoROM m)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  if (m->U_whole) PetscFunctionReturn(PETSC_SUCCESS);
   ierr = LoadWhole(m);
-  if (ierr) {
-    PetscCall(HycoFEDestroy(&m->fe_whole));
-    PetscCall(HycoPairsDestroy(&m->whole_pairs));
-    if (m->whole) PetscCall(HycoMeshDestroy(&m->whole));
-    PetscCall(PetscFree(m->V_whole));
-    PetscCall(PetscFree(m->U_whole));
-  }
+  if (ierr) PetscCall(HycoROMFreeWhole(m));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

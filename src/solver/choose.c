@@ -149,4 +149,3 @@ PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
                             s->why_iterative));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-

@@ -157,7 +157,7 @@ PetscErrorCode HycoSolverSetMonitor(HycoSolver s, HycoMonitor monitor, void *ctx
 }
 
 /* -hyco_solver_form: auto, or a registered form's name. */
-static PetscErrorCode ReadForm(HycoSolver s, PetscOptions options)
+static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
 {
   const char **words;
   PetscInt form = 0;
@@ -169,20 +169,27 @@ static PetscErrorCode ReadForm(HycoSolver s, PetscOptions options)
     words[k + 1] = s->forms[k]->name;
     if (strcmp(s->form_name, s->forms[k]->name) == 0) form = k + 1;
   }
-  PetscCall(HycoOptionsWord(options, "hyco_solver_form", words, &form));
+  PetscCall(
+      HycoOptionsWord("-hyco_solver_form",
+                      "full order: pose it in the forces (few contacts; _free: no matrix) or in the gaps (as many "
+                      "as unknowns)",
+                      words, &form, NULL));
   PetscCall(PetscStrncpy(s->form_name, form ? words[form] : "", sizeof(s->form_name)));
   PetscCall(PetscFree(words));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -hyco_tao_type: one of TAO's that suit contact, or one that the program registers. */
-static PetscErrorCode ReadTaoType(HycoSolver s, PetscOptions options)
+static PetscErrorCode ReadTaoType(HycoSolver s, HycoOptionItems PetscOptionsObject)
 {
-  char type[HYCO_TAO_NAME], list[HYCO_LINE];
+  char type[HYCO_TAO_NAME] = "", list[HYCO_LINE];
   PetscBool given;
 
   PetscFunctionBegin;
-  PetscCall(PetscOptionsGetString(options, NULL, "-hyco_tao_type", type, sizeof(type), &given));
+  PetscCall(HycoOptionsString("-hyco_tao_type",
+                              "<gpcg|tron|...|ssils|...> with the type tao: its solver; docs/solvers.md says which for "
+                              "what (-hyco_tao_... sets its own options) [gpcg; ssils if nonsymmetric]",
+                              type, sizeof(type), &given));
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!methods[s->type][0],
             "nothing reads the option -hyco_tao_type here: the type is %s; give -hyco_solver_type tao",
@@ -193,7 +200,15 @@ static PetscErrorCode ReadTaoType(HycoSolver s, PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
+PetscErrorCode HycoSolverSetOptionsPrefix(HycoSolver s, const char prefix[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  PetscCall(PetscObjectSetOptionsPrefix((PetscObject)s, prefix));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
 {
   PetscInt linear;
   PetscReal gigabytes;
@@ -202,20 +217,46 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s, PetscOptions options)
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   linear = (PetscInt)s->linear;
   gigabytes = 1e-9 * s->memory;
-  PetscCall(HycoOptionsWord(options, "hyco_solver_type", HycoSolverTypes, &s->type));
-  PetscCall(ReadTaoType(s, options));
-  PetscCall(ReadForm(s, options));
-  PetscCall(HycoOptionsWord(options, "hyco_linear", HycoLinearNames, &linear));
-  PetscCall(HycoOptionsReal(options, "hyco_memory", 0, 1e9, &gigabytes));
+  PetscObjectOptionsBegin((PetscObject)s);
+  PetscCall(
+      HycoOptionsWord("-hyco_solver_type",
+                      "method for every contact problem (a model's takes active_set where a TAO type needs symmetry)",
+                      HycoSolverTypes, &s->type, NULL));
+  PetscCall(ReadTaoType(s, PetscOptionsObject));
+  PetscCall(ReadForm(s, PetscOptionsObject));
+  PetscCall(HycoOptionsWord("-hyco_linear",
+                            "solve with the stiffness by a factor (MUMPS), or by conjugate gradients with multigrid",
+                            HycoLinearNames, &linear, NULL));
+  PetscCall(HycoOptionsReal("-hyco_memory",
+                            "<GB> what a factor may take before iterations do (0: most of what is free)", 0, 1e9,
+                            &gigabytes, NULL));
+  PetscCall(HycoOptionsReal("-hyco_solver_rtol", "largest relative KKT residual that counts as solved", 1e-15, 0.1,
+                            &s->rtol, NULL));
+  PetscCall(HycoOptionsInt("-hyco_solver_max_its",
+                           "iterations of the active set or TAO (0: from the number of contacts; 2000)", 0,
+                           PETSC_MAX_INT, &s->max_its, NULL));
+  PetscCall(HycoOptionsBool("-hyco_solver_fallback",
+                            "what is not solved is tried again: tao, then active_set, then lemke", &s->fallback, NULL));
+  PetscCall(HycoOptionsBool("-hyco_solver_warm_start", "full order: start from the last solution's active contacts",
+                            &s->warm, NULL));
+  for (PetscInt k = 0; k < s->n_forms; k++) {
+    if (s->forms[k]->ops->setfromoptions)
+      PetscCall(s->forms[k]->ops->setfromoptions(s, s->forms[k], PetscOptionsObject));
+  }
+  PetscCall(HycoOptionsName("-hyco_solver_view", "after each solve: form, method, tolerances, residuals"));
+  PetscOptionsEnd();
   s->linear = (HycoLinear)linear;
   s->memory = 1e9 * gigabytes;
-  PetscCall(HycoOptionsReal(options, "hyco_solver_rtol", 1e-15, 0.1, &s->rtol));
-  PetscCall(HycoOptionsInt(options, "hyco_solver_max_its", 0, PETSC_MAX_INT, &s->max_its));
-  PetscCall(HycoOptionsBool(options, "hyco_solver_warm_start", &s->warm));
-  PetscCall(HycoOptionsBool(options, "hyco_solver_fallback", &s->fallback));
-  for (PetscInt k = 0; k < s->n_forms; k++) {
-    if (s->forms[k]->ops->setfromoptions) PetscCall(s->forms[k]->ops->setfromoptions(s, s->forms[k], options));
-  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverDeclare(PetscOptions options)
+{
+  HycoSolver s;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &s));
+  HycoDeclare(s, options, HycoSolverSetFromOptions, HycoSolverDestroy);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -305,6 +346,8 @@ static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
   s->iterative = PETSC_FALSE;
   PetscCall(HycoSolverAcceptingForm(s, NULL, form, why));
   s->iterative = iterative;
+  if (!*form && !why[0])
+    HycoFormat(why, "the form %s does not serve this system; use -hyco_solver_form auto", s->form_name);
   PetscCheck(*form, HycoComm(s), PETSC_ERR_USER, "%s", why);
   PetscCall(HycoChooseLinear(s, form));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -395,6 +438,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   s->start_set = NULL;
   s->seconds_solve = HycoNow() - begin - (s->seconds_factor - s->seconds_before);
   s->seconds_before = 0;
+  PetscCall(HycoSolverViewFromOptions(s, NULL, "-hyco_solver_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -515,9 +559,18 @@ PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s\n", HycoSolverTypes[s->type]));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g\n", (double)s->rtol));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "solves with K: %s\n", HycoLinearNames[s->linear]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s%s%s; form: %s\n", HycoSolverTypes[s->type],
+                                   methods[s->type][0] ? "" : ", ",
+                                   methods[s->type][0] ? ""
+                                   : s->tao_type[0]    ? s->tao_type
+                                                       : "by the system",
+                                   s->form_name[0] ? s->form_name : "auto"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g; iterations: at most %d%s\n",
+                                   (double)s->rtol, (int)s->max_its, s->max_its ? "" : " (by the number of contacts)"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "solves with K: %s\n",
+                                   s->linear_method[0] ? s->linear_method : HycoLinearNames[s->linear]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "fallback: %s; warm start: %s; start from coarser problems: %s\n",
+                                   s->fallback ? "yes" : "no", s->warm ? "yes" : "no", s->multilevel ? "yes" : "no"));
   if (s->reason) {
     PetscCall(PetscViewerASCIIPrintf(viewer, "last solve: %s, %s, %d iterations, largest residual %.1e\n",
                                      HycoReasonName(s->reason), s->method, (int)s->its, (double)HycoKKTMax(&s->kkt)));
@@ -526,10 +579,4 @@ PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolverViewFromOptions(HycoSolver object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_SOLVER_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoSolver, HYCO_SOLVER_CLASSID)

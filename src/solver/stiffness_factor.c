@@ -1,5 +1,5 @@
-/* A factor of K for the forms: LAPACK's where K is dense, with refinement in twice the working precision where round-off
- * is lost, or MUMPS's, which brings the flexibility along. */
+/* A factor of K for the forms: LAPACK's where K is dense, with refinement in twice the working precision where
+ * round-off is lost, or MUMPS's, which brings the flexibility along. */
 #include <hycosolverimpl.h>
 
 /* A residual below this share of F needs no refinement: the residuals are judged by 1e-8. */
@@ -73,8 +73,7 @@ static PetscErrorCode RefineDense(HycoSolver s, PetscInt n, const PetscReal b[],
   PetscCall(PetscBLASIntCast(lda, &ld));
   PetscCall(MatDenseGetArrayRead(s->system->K, &K));
   for (PetscInt j = 0; j < n; j++)
-    PetscCall(HycoRefine(f->n, K, ld, f->lu, f->ipiv, b + (size_t)j * (size_t)f->n, low,
-                         x + (size_t)j * (size_t)f->n));
+    PetscCall(HycoRefine(f->n, K, ld, f->lu, f->ipiv, b + (size_t)j * (size_t)f->n, low, x + (size_t)j * (size_t)f->n));
   PetscCall(MatDenseRestoreArrayRead(s->system->K, &K));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

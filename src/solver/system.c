@@ -84,6 +84,16 @@ PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSystemGetMatrices(HycoSystem s, Mat *K, Mat *Bt, Mat *B)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
+  if (K) *K = s->K;
+  if (Bt) *Bt = s->Bt;
+  if (B) *B = s->B;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
 {
   PetscInt n, m = 0;
@@ -297,14 +307,12 @@ PetscErrorCode HycoSystemView(HycoSystem s, PetscViewer viewer)
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscViewerASCIIPrintf(viewer, "%d unknowns, %d contacts, %s\n", (int)s->n, (int)s->m,
                                    s->symmetric ? "symmetric" : "not symmetric"));
+  PetscCall(PetscViewerPushFormat(viewer, PETSC_VIEWER_ASCII_INFO));
+  if (s->K) PetscCall(MatView(s->K, viewer));
+  if (s->B && s->m) PetscCall(MatView(s->B, viewer));
+  PetscCall(PetscViewerPopFormat(viewer));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSystemViewFromOptions(HycoSystem object, PetscObject owner, const char option[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(object, HYCO_SYSTEM_CLASSID);
-  PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineViewFromOptions(HycoSystem, HYCO_SYSTEM_CLASSID)

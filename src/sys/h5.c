@@ -48,27 +48,60 @@ static PetscErrorCode Free(HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
+/* How the bytes of a file in memory are held; they go nowhere by themselves. */
+static hid_t InMemory(void)
+{
+  hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+
+  H5Pset_fapl_core(access, (size_t)1 << 18, 0);
+  /* one format whatever the library: HDF5 2's own default puts the time into each group, and no two files would be
+     alike */
+  H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_LATEST);
+  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG); /* closing the file closes what a refusal left open in it */
+  return access;
+}
+
+PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file)
 {
   const PetscInt yes = 1;
   hid_t access;
-  HycoFile out;
   HycoH5 f;
 
   PetscFunctionBegin;
-  PetscCall(HycoFileCreate(path, HYCO_FILE_NUMBERS, &out));
-  PetscCall(New(path, &f));
-  f->out = out;
-  access = H5Pcreate(H5P_FILE_ACCESS);
-  H5Pset_fapl_core(access, (size_t)1 << 18, 0);
-  /* one format whatever the library: HDF5 2's own default puts the time into each group, and no two files would be
-   * alike */
-  H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_LATEST);
+  PetscCall(New(name, &f));
+  access = InMemory();
   f->id = H5Fcreate(f->path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
   H5Pclose(access);
   PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 does not make a file in memory");
   *file = f;
   PetscCall(HycoH5WriteInt(f, HYCO_H5_SEALED, 1, 1, &yes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
+{
+  HycoFile out;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFileCreate(path, HYCO_FILE_NUMBERS, &out));
+  PetscCall(HycoH5CreateImage(path, file));
+  (*file)->out = out;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, HycoH5 *file)
+{
+  hid_t access = InMemory();
+  HycoH5 f;
+
+  PetscFunctionBegin;
+  PetscCall(New(name, &f));
+  f->size = size;
+  H5Pset_file_image(access, image, size);
+  f->id = H5Fopen(f->path, H5F_ACC_RDONLY, access);
+  H5Pclose(access);
+  PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 does not open a file in memory");
+  *file = f;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -130,25 +163,35 @@ PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file in memory, its seal behind it. Fails where there is no memory for a copy; a disk that is full is told when
-   the file is closed. */
-static PetscErrorCode WriteImage(HycoH5 f)
+PetscErrorCode HycoH5GetImage(HycoH5 f, void **image, size_t *size)
 {
-  unsigned char seal[HYCO_SEAL], *image = NULL;
   ssize_t bytes = H5Fflush(f->id, H5F_SCOPE_GLOBAL) < 0 ? -1 : H5Fget_file_image(f->id, NULL, 0);
   PetscBool made;
 
   PetscFunctionBegin;
   HycoCheck(bytes >= 0, "%s could not be written: HDF5 has no image of it in memory", f->path);
-  PetscCall(PetscMalloc1(bytes, &image));
-  made = (PetscBool)(H5Fget_file_image(f->id, image, (size_t)bytes) >= 0);
-  if (made) {
-    HycoSealMake(image, (size_t)bytes, seal);
-    (void)!fwrite(image, 1, (size_t)bytes, HycoFileStream(f->out));
-    (void)!fwrite(seal, 1, HYCO_SEAL, HycoFileStream(f->out));
-  }
-  PetscCall(PetscFree(image));
+  PetscCall(PetscMalloc((size_t)bytes, image));
+  made = (PetscBool)(H5Fget_file_image(f->id, *image, (size_t)bytes) >= 0);
+  if (!made) PetscCall(PetscFree(*image));
   HycoCheck(made, "%s could not be written: HDF5 has no image of it in memory", f->path);
+  *size = (size_t)bytes;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The file in memory, its seal behind it. Fails where there is no memory for a copy; a disk that is full is told when
+   the file is closed. */
+static PetscErrorCode WriteImage(HycoH5 f)
+{
+  unsigned char seal[HYCO_SEAL];
+  void *image;
+  size_t bytes;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5GetImage(f, &image, &bytes));
+  HycoSealMake(image, bytes, seal);
+  (void)!fwrite(image, 1, bytes, HycoFileStream(f->out));
+  (void)!fwrite(seal, 1, HYCO_SEAL, HycoFileStream(f->out));
+  PetscCall(PetscFree(image));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,99 +1,99 @@
-/* The table of options, and look-ups whose complaints are one clear line. */
+/*
+  Options. The code that reads an option declares it, between PetscObjectOptionsBegin() and PetscOptionsEnd(), by the
+  calls below: its name, the form of its value, its meaning, its default (what the object has before), its range. A
+  declaration pass makes an object of each class, has it declare what it reads, and records that: the table of
+  HycoGetOptionTable(), from which come hyco -help, the check of what a user types and of the scene's hyco: section.
+*/
 #include <hycoimpl.h>
 #include <ctype.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const HycoOption option_table[] = {
-    {"hyco_solver_type", "<active_set|tao|lemke>", "active_set",
-     "method for every contact problem (a model's takes active_set where a TAO type needs symmetry)"},
-    {"hyco_tao_type", "<gpcg|tron|...|ssils|...>", "gpcg; ssils if nonsymmetric",
-     "with the type tao: its solver; docs/solvers.md says which for what (-hyco_tao_... sets its own options)"},
-    {"hyco_solver_form", "<auto|dual|primal|dual_free>", "auto",
-     "full order: pose it in the forces (few contacts; _free: no matrix) or in the gaps (as many as unknowns)"},
-    {"hyco_linear", "<auto|direct|iterative>", "auto",
-     "solve with the stiffness by a factor (MUMPS), or by conjugate gradients with multigrid"},
-    {"hyco_memory", "<GB>", "0", "what a factor may take before iterations do (0: most of what is free)"},
-    {"hyco_solver_rtol", "<real>", "1e-8", "largest relative KKT residual that counts as solved"},
-    {"hyco_solver_max_its", "<int>", "0", "iterations of the active set or TAO (0: from the number of contacts; 2000)"},
-    {"hyco_solver_fallback", "<bool>", "true", "what is not solved is tried again: tao, then active_set, then lemke"},
-    {"hyco_regularise", "<bool>", "false",
-     "full order: rigid motions that neither supports nor contact hold are taken out, not refused"},
-    {"hyco_regularise_tol", "<real>", "1e-2", "of such a motion: the share of the loads on it that may be unbalanced"},
-    {"hyco_solver_warm_start", "<bool>", "true", "full order: start from the last solution's active contacts"},
-    {"hyco_solver_multilevel", "<bool>", "true", "full order, every unknown a contact: start from coarser problems"},
-    {"hyco_mesh_write", "<file.h5>", "",
-     "writes the mesh, refined as the scene says, in the HDF5 format of PETSc's DMPlex"},
-    {"hyco_partition", "<metis|ptscotch>", "metis", "cuts the mesh for the ranks; PT-Scotch also where METIS fails"},
-    {"hyco_groups", "<int>", "0", "groups of ranks that solve snapshots side by side (0: from the mesh's size)"},
-    {"hyco_snapshots", "<folder>", "MODEL.snapshots", "where full-order solutions are stored"},
-    {"hyco_model_type", "<hybrid|projection|condensed>", "hybrid",
-     "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh; condensed on the contact forces"},
-    {"hyco_dual", "<fe|nnmf|snapshots>", "fe; nnmf if projection",
-     "forces: of the finite elements (hybrid); factorised dual snapshots, or they themselves (projection)"},
-    {"hyco_nnmf_vectors", "<int>", "0", "vectors of the nonnegative factorisation (0: as many as displacement modes)"},
-    {"hyco_nnmf_max_its", "<int>", "100", "alternations of the nonnegative factorisation"},
-    {"hyco_condensed_tol", "<real>", "1e-7",
-     "condensed, no points given: add values until the forces' error, one value left out, is no larger"},
-    {"hyco_condensed_pod_tol", "<real>", "1e-14",
-     "condensed: energy that its displacement modes may leave out, unless -hyco_pod_tol is smaller"},
-    {"hyco_condensed_max_values", "<int>", "24", "condensed, no points given: at most so many values per parameter"},
-    {"hyco_pod_tol", "<real>", "1e-7", "energy left out of the displacement basis, the epsilon of (18)"},
-    {"hyco_pod_noise", "<real>", "1e-11", "singular values below this share of the first are noise"},
-    {"hyco_pod_max_modes", "<int>", "0", "at most so many displacement modes (0: no limit)"},
-    {"hyco_rid_modes", "<list>", "displacement,stress,force",
-     "bases whose DEIM points seed the RID: displacement, stress, force, dual"},
-    {"hyco_rid_dual_tol", "<real>", "1e-1", "epsilon of (18) for the dual basis"},
-    {"hyco_rid_stress_tol", "<real>", "hyco_pod_tol", "epsilon of (18) for the stress basis"},
-    {"hyco_rid_force_tol", "<real>", "hyco_pod_tol", "epsilon of (18) for the basis of generalised forces"},
-    {"hyco_deim_type", "<deim|qdeim>", "deim",
-     "how a basis chooses the points that seed the RID: greedily, or by pivoted QR"},
-    {"hyco_rid_layers", "<int>", "0", "layers of elements added around the RID"},
-    {"hyco_rid_contact_extension", "<length>", "0",
-     "contact nodes this close to the RID's join it with their elements"},
-    {"hyco_rid_groups", "<list>", "none", "mesh groups whose elements join the RID (region of interest)"},
-    {"hyco_rid_region", "<expression>", "none", "elements with a node where this is positive join the RID"},
-    {"hyco_rid_whole", "<bool>", "false", "take the whole mesh as the RID"},
-    {"hyco_hybrid", "<auto|rank|contact|all>", "auto",
-     "displacements kept full order: fewest for full row rank, all contact ones, all"},
-    {"hyco_hybrid_trials", "<int>", "0",
-     "candidate sets judged by their training error when hybrid is rank (0: from the size)"},
-    {"hyco_hybrid_ridge", "<real>", "-1",
-     "of the interface's regression when hybrid is all (-1: by the training error; 0: plain least squares)"},
-    {"hyco_scan", "<int>", "0",
-     "points per parameter that look for a singular reduced stiffness (0: up to some hundred in all)"},
-    {"hyco_keep_singular", "<bool>", "false", "keep a model whose reduced stiffness is singular inside the ranges"},
-    {"hyco_validation", "<int>", "-1",
-     "held-out solutions beside the training points, by which the model is judged (-1: from their number; 0: none)"},
-    {"hyco_search", "<bool>", "true",
-     "search model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by held-out errors, unless given"},
-    {"hyco_greedy_indicator", "<local|penetration>", "local",
-     "what train -greedy judges by: distance from a full-order problem on the RID (43), or penetration (45)"},
-    {"hyco_greedy_keep", "<bool>", "false", "train -greedy keeps each iteration's model beside the snapshots"},
-    {"hyco_fallback", "<bool>", "false",
-     "predict solves full order on -scene where the reduced solve fails or its estimated error is above a -target_..."},
-    {"hyco_full_displacement", "<bool>", "false",
-     "predict, condensed: displacements and stresses by one full solve on -scene with the predicted forces"},
-    {"hyco_reconstruct", "<bool>", "true", "reconstruct the contact forces outside the RID by (41)"},
-    {"hyco_reconstruct_solver", "<auto|nnls|tao>", "auto",
-     "of (41): Lawson and Hanson's active set, or TAO's bnls; auto: TAO where the active set stops short"},
+/* Names that options had. */
+static const struct {
+  const char *before, *now;
+} renamed[] = {
+    {"hyco_trust_folds",
+     "-hyco_validation, the number of held-out points that the estimates of errors are calibrated on"},
 };
 
-PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *table[])
+static HycoOptionList table;      /* the library's, once recorded */
+static HycoOptionList told;       /* what -help has printed */
+static HycoOptionList *recording; /* where declarations go instead of being read; NULL: they are read */
+static const char *readers = "";  /* HycoOptionsFor() */
+
+static PetscErrorCode ForgetTable(void)
 {
   PetscFunctionBegin;
-  if (n) *n = (PetscInt)(sizeof(option_table) / sizeof(option_table[0]));
-  if (table) *table = option_table;
+  PetscCall(HycoOptionListDestroy(&table));
+  PetscCall(HycoOptionListDestroy(&told));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool HycoOptionKnown(const char name[])
+PetscErrorCode HycoOptionListDestroy(HycoOptionList *list)
 {
-  for (size_t k = 0; k < sizeof(option_table) / sizeof(option_table[0]); k++) {
-    if (strcasecmp(option_table[k].name, name) == 0) return PETSC_TRUE;
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < list->n; k++) PetscCall(PetscFree(list->option[k].name)); /* one block with the others */
+  PetscCall(PetscFree(list->option));
+  list->n = list->room = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)(PetscOptions))
+{
+  PetscErrorCode ierr;
+  PetscOptions none;
+  HycoOptionList *before = recording;
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsCreate(&none));
+  recording = list;
+  ierr = declare(none);
+  recording = before;
+  readers = "";
+  PetscCall(PetscOptionsDestroy(&none));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *options[])
+{
+  PetscFunctionBegin;
+  if (!table.n) {
+    PetscCall(HycoOptionsRecord(&table, HycoDeclareClasses));
+    PetscCall(PetscRegisterFinalize(ForgetTable));
   }
-  return PETSC_FALSE;
+  if (n) *n = table.n;
+  if (options) *options = table.option;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name[])
+{
+  for (PetscInt k = 0; k < list->n; k++) {
+    const char *entry = list->option[k].name;
+    const size_t length = strlen(entry);
+
+    if (strcasecmp(entry, name) == 0) return &list->option[k];
+    if (entry[length - 1] == '_' && strlen(name) > length && strncasecmp(entry, name, length) == 0)
+      return &list->option[k];
+  }
+  return NULL;
+}
+
+const HycoOption *HycoOptionFind(const char name[])
+{
+  (void)!HycoGetOptionTable(NULL, NULL);
+  return HycoOptionListFind(&table, name);
+}
+
+PetscErrorCode HycoOptionsCheckName(const char name[])
+{
+  PetscFunctionBegin;
+  for (size_t k = 0; k < sizeof(renamed) / sizeof(renamed[0]); k++)
+    HycoCheck(strcasecmp(name, renamed[k].before), "there is no option -%s: it is now %s", name, renamed[k].now);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Levenshtein distance of two words of fewer than 128 letters, letter case ignored. */
@@ -134,89 +134,259 @@ const char *HycoNearest(const char *word, PetscInt n, const char *const names[])
   return nearest;
 }
 
-static PetscErrorCode GetText(PetscOptions options, const char name[], char text[HYCO_LINE], PetscBool *set)
+const char *HycoOptionNearest(const char word[], const HycoOptionList *more)
 {
-  char dashed[HYCO_LINE];
-  const char *value = NULL;
+  const HycoOptionList *lists[] = {&table, more};
+  const char *names[256];
+  PetscInt n = 0;
 
+  (void)!HycoGetOptionTable(NULL, NULL);
+  for (int l = 0; l < 2; l++) {
+    for (PetscInt k = 0; lists[l] && k < lists[l]->n && n < 256; k++) {
+      names[n] = lists[l]->option[k].name;
+      if (strncasecmp(names[n++], word, strlen(word)) == 0) return names[n - 1]; /* its beginning */
+    }
+  }
+  return HycoNearest(word, n, names);
+}
+
+PetscErrorCode HycoOptionsFor(const char only[])
+{
   PetscFunctionBegin;
-  PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", name));
-  PetscCall(PetscOptionsFindPair(options, NULL, dashed, &value, set));
-  HycoCheck(!*set || !value || strlen(value) < HYCO_LINE, "-%s is longer than %d characters", name, HYCO_LINE - 1);
-  if (*set) PetscCall(PetscStrncpy(text, value ? value : "", HYCO_LINE));
+  readers = only;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoOptionsReal(PetscOptions options, const char name[], PetscReal lo, PetscReal hi, PetscReal *value)
+/* A text "<form> meaning [default]" taken apart; what it leaves out is as given. All in one block. */
+static PetscErrorCode MakeOption(const char name[], const char text[], const char form[], const char initial[],
+                                 const char owner[], HycoOption *o)
 {
-  char text[HYCO_LINE], *end;
-  PetscBool set;
+  const size_t end = strlen(text);
+  const char *close = text[0] == '<' ? strchr(text, '>') : NULL, *meaning = close ? close + 1 : text,
+             *open = end && text[end - 1] == ']' ? strrchr(text, '[') : NULL;
+  const size_t size = end + strlen(name) + strlen(form) + strlen(initial) + strlen(owner) + strlen(readers) + 16;
+  char *block, *at;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(size, &block));
+  at = block;
+#define Put(field, ...) o->field = at, at += snprintf(at, size - (size_t)(at - block), __VA_ARGS__) + 1
+  Put(name, "%s", name[0] == '-' ? name + 1 : name);
+  while (*meaning == ' ') meaning++;
+  if (close)
+    Put(value, "%.*s", close == text + 1 ? 0 : (int)(close + 1 - text), text); /* <>: a flag */
+  else
+    Put(value, "%s", form);
+  if (open) {
+    Put(initial, "%.*s", (int)(text + end - 2 - open), open + 1);
+    Put(meaning, "%.*s", (int)(open - meaning - (open > meaning && open[-1] == ' ')), meaning);
+  } else {
+    Put(initial, "%s", initial);
+    Put(meaning, "%s", meaning);
+  }
+  Put(owner, "%s", owner);
+  Put(only, "%s", readers);
+#undef Put
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Declared twice, as by two types of a class, an option stands in the list once. */
+static PetscErrorCode Append(HycoOptionList *list, HycoOption *option)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < list->n; k++) {
+    if (strcasecmp(list->option[k].name, option->name)) continue;
+    PetscCall(PetscFree(option->name));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (list->n == list->room) {
+    list->room = 2 * list->room + 32;
+    PetscCall(PetscRealloc((size_t)list->room * sizeof(*list->option), &list->option));
+  }
+  list->option[list->n++] = *option;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The option with the object's prefix, for messages; without the dash. */
+#define NAMED(items, name) (items)->prefix ? (items)->prefix : "", (name) + 1
+
+/* Records or prints the declaration, or finds the value's text: with the object's prefix, in its own options or, if it
+   has a prefix, in the global ones. */
+static PetscErrorCode Find(HycoOptionItems items, const char name[], const char text[], const char form[],
+                           const char initial[], size_t room, const char **value, PetscBool *set)
+{
+  const char *owner = items->object ? items->object->class_name : items->title;
+  PetscBool help = PETSC_FALSE;
+  HycoOption option;
+
+  PetscFunctionBegin;
+  *set = PETSC_FALSE;
+  *value = NULL;
+  if (!recording) PetscCall(PetscOptionsHasHelp(NULL, &help)); /* a scene's options know of no -help */
+  if (recording || (help && items->count == 1 && (items->prefix || !HycoOptionListFind(&told, name + 1)))) {
+    PetscCall(MakeOption(name, text, form, initial, owner, &option));
+    if (help && !told.n) PetscCall(PetscRegisterFinalize(ForgetTable));
+    if (help)
+      PetscCall((*PetscHelpPrintf)(items->comm, "  -%s%s %s: %s [%s]\n", items->prefix ? items->prefix : "",
+                                   option.name, option.value, option.meaning, option.initial));
+    PetscCall(Append(recording ? recording : &told, &option));
+  }
+  if (recording) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscOptionsFindPair(items->options, items->prefix, name, value, set));
+  if (!*set && items->options && items->prefix) PetscCall(PetscOptionsFindPair(NULL, items->prefix, name, value, set));
+  if (*set && !*value) *value = "";
+  HycoCheck(!*set || strlen(*value) < room, "-%s%s is longer than %d characters", NAMED(items, name), (int)room - 1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoOptionsReal_Private(HycoOptionItems items, const char name[], const char text[], PetscReal lo,
+                                       PetscReal hi, PetscReal *value, PetscBool *set)
+{
+  char initial[32], *end, *zero;
+  const char *word;
+  PetscBool given;
   double number;
 
   PetscFunctionBegin;
-  PetscCall(GetText(options, name, text, &set));
-  if (!set) PetscFunctionReturn(PETSC_SUCCESS);
-  number = HycoNumber(text, &end);
-  if (end == text || *end != '\0' || !(number >= lo && number <= hi)) {
-    HycoFail("-%s is \"%s\"; it must be a number from %g to %g", name, text, (double)lo, (double)hi);
-  }
+  snprintf(initial, sizeof(initial), "%g", (double)*value);
+  zero = strstr(initial, "e-0");
+  if (zero) memmove(zero + 2, zero + 3, strlen(zero + 3) + 1); /* 1e-8, not 1e-08 */
+  PetscCall(Find(items, name, text, "<real>", initial, HYCO_LINE, &word, &given));
+  if (set) *set = given;
+  if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  number = HycoNumber(word, &end);
+  if (end == word || *end != '\0' || !(number >= lo && number <= hi))
+    HycoFail("-%s%s is \"%.500s\"; it must be a number from %g to %g", NAMED(items, name), word, (double)lo,
+             (double)hi);
   *value = number;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoOptionsInt(PetscOptions options, const char name[], PetscInt lo, PetscInt hi, PetscInt *value)
+PetscErrorCode HycoOptionsInt_Private(HycoOptionItems items, const char name[], const char text[], PetscInt lo,
+                                      PetscInt hi, PetscInt *value, PetscBool *set)
 {
-  char text[HYCO_LINE], *end;
-  PetscBool set;
+  char initial[32], *end;
+  const char *word;
+  PetscBool given;
   long number;
 
   PetscFunctionBegin;
-  PetscCall(GetText(options, name, text, &set));
-  if (!set) PetscFunctionReturn(PETSC_SUCCESS);
+  snprintf(initial, sizeof(initial), "%ld", (long)*value);
+  PetscCall(Find(items, name, text, "<int>", initial, HYCO_LINE, &word, &given));
+  if (set) *set = given;
+  if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   errno = 0;
-  number = strtol(text, &end, 10);
-  if (end == text || *end != '\0' || errno || number < lo || number > hi) {
-    if (hi == PETSC_MAX_INT) HycoFail("-%s is \"%s\"; it must be a whole number, at least %d", name, text, (int)lo);
-    HycoFail("-%s is \"%s\"; it must be a whole number from %d to %d", name, text, (int)lo, (int)hi);
+  number = strtol(word, &end, 10);
+  if (end == word || *end != '\0' || errno || number < lo || number > hi) {
+    if (hi == PETSC_MAX_INT)
+      HycoFail("-%s%s is \"%.500s\"; it must be a whole number, at least %d", NAMED(items, name), word, (int)lo);
+    HycoFail("-%s%s is \"%.500s\"; it must be a whole number from %d to %d", NAMED(items, name), word, (int)lo,
+             (int)hi);
   }
   *value = (PetscInt)number;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoOptionsBool(PetscOptions options, const char name[], PetscBool *value)
+/* The place of `word` in `words`, which ends with NULL. */
+static PetscErrorCode FindWord(HycoOptionItems items, const char name[], const char word[], const char *const words[],
+                               PetscInt *index)
 {
-  static const char *const words[] = {"false", "no", "off", "0", "true", "yes", "on", "1", NULL};
-  char text[HYCO_LINE];
-  PetscBool set;
+  char list[HYCO_LINE] = "";
 
   PetscFunctionBegin;
-  PetscCall(GetText(options, name, text, &set));
-  if (!set) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!text[0])
-    *value = PETSC_TRUE;
-  else {
-    PetscInt index = -1;
+  for (*index = 0; words[*index]; ++*index) {
+    if (strcasecmp(word, words[*index]) == 0) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(HycoListAdd(list, ", ", words[*index]));
+  }
+  HycoFail("-%s%s is \"%.200s\"; it must be one of: %s", NAMED(items, name), word, list);
+}
 
-    PetscCall(HycoOptionsWord(options, name, words, &index));
-    *value = (PetscBool)(index >= 4);
+PetscErrorCode HycoOptionsBool_Private(HycoOptionItems items, const char name[], const char text[], PetscBool *value,
+                                       PetscBool *set)
+{
+  static const char *const words[] = {"false", "no", "off", "0", "true", "yes", "on", "1", NULL};
+  const char *word;
+  PetscInt index = 4;
+  PetscBool given;
+
+  PetscFunctionBegin;
+  PetscCall(Find(items, name, text, "<bool>", *value ? "true" : "false", HYCO_LINE, &word, &given));
+  if (set) *set = given;
+  if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  if (word[0]) PetscCall(FindWord(items, name, word, words, &index));
+  *value = (PetscBool)(index >= 4);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoOptionsWord_Private(HycoOptionItems items, const char name[], const char text[],
+                                       const char *const words[], PetscInt *index, PetscBool *set)
+{
+  char form[HYCO_LINE] = "<";
+  const char *word, *initial = "";
+  PetscBool given;
+  PetscInt found;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; words[k]; k++) {
+    PetscCall(PetscStrlcat(form, k ? "|" : "", sizeof(form)));
+    PetscCall(PetscStrlcat(form, words[k], sizeof(form)));
+    if (k == *index) initial = words[k];
+  }
+  PetscCall(PetscStrlcat(form, ">", sizeof(form)));
+  PetscCall(Find(items, name, text, form, initial, HYCO_LINE, &word, &given));
+  if (set) *set = given;
+  if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(FindWord(items, name, word, words, &found));
+  *index = found;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoOptionsString_Private(HycoOptionItems items, const char name[], const char text[], char value[],
+                                         size_t length, PetscBool *set)
+{
+  const char *word;
+  PetscBool given;
+
+  PetscFunctionBegin;
+  PetscCall(Find(items, name, text, "<text>", value, length, &word, &given));
+  if (set) *set = given;
+  if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(word[0], "-%s%s needs a value", NAMED(items, name));
+  PetscCall(PetscStrncpy(value, word, length));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoOptionsList_Private(HycoOptionItems items, const char name[], const char text[], PetscInt *n,
+                                       char *list[], PetscBool *set)
+{
+  const char *word;
+  PetscInt room;
+  PetscBool given;
+
+  PetscFunctionBegin;
+  PetscCall(Find(items, name, text, "<list>", "none", 4 * HYCO_LINE, &word, &given));
+  if (set) *set = given;
+  room = *n;
+  *n = 0;
+  if (!given || strcasecmp(word, "none") == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  for (;;) {
+    const size_t length = strcspn(word, ",");
+
+    HycoCheck(*n < room, "-%s%s has more than %d words", NAMED(items, name), (int)room);
+    PetscCall(PetscMalloc1(length + 1, &list[*n]));
+    PetscCall(PetscStrncpy(list[(*n)++], word, length + 1));
+    if (!word[length]) break;
+    word += length + 1;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoOptionsWord(PetscOptions options, const char name[], const char *const words[], PetscInt *index)
+PetscErrorCode HycoOptionsName_Private(HycoOptionItems items, const char name[], const char text[])
 {
-  char text[HYCO_LINE], list[HYCO_LINE] = "";
-  PetscBool set;
+  const char *word;
+  PetscBool given;
 
   PetscFunctionBegin;
-  PetscCall(GetText(options, name, text, &set));
-  if (!set) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt k = 0; words[k]; k++) {
-    if (strcasecmp(text, words[k]) == 0) {
-      *index = k;
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
-    PetscCall(HycoListAdd(list, ", ", words[k]));
-  }
-  HycoFail("-%s is \"%s\"; it must be one of: %s", name, text, list);
+  PetscCall(Find(items, name, text, "<viewer>", "", 4 * HYCO_LINE, &word, &given));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

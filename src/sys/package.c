@@ -43,6 +43,18 @@ PetscErrorCode HycoInitializePackage(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoDeclareClasses(PetscOptions options)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoInitializePackage());
+  PetscCall(HycoSolverDeclare(options));
+  PetscCall(HycoFOMDeclare(options));
+  PetscCall(HycoSnapshotsDeclare(options));
+  PetscCall(HycoReducerDeclare(options));
+  PetscCall(HycoROMDeclare(options));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, const char function[])
 {
   size_t k = 0;

@@ -141,7 +141,7 @@ def blocks(kind='quad4', n=(4, 4), length=1, stress=1, young=(100, 40), poisson=
 
         grid.box(kind, axes, bend, body, {f'{"xyz"[d]}{e}': f'{body}_{"xyz"[d]}{e}' for d in range(dim) for e in '01'})
     shift = {c: 0 for c in 'xyz'[:dim - 1]}
-    gap += f' + {crown * length!r}*(' + ' + '.join(f'({c}/{wide!r})^2' for c in shift) + ')' if crown else ''
+    gap += f' + {float(crown * length)!r}*(' + ' + '.join(f'({c}/{float(wide)!r})^2' for c in shift) + ')' if crown else ''
     scene = {
         'scene': {'parameters': ['press', 'gap']},
         'parameter': {'press': {'range': [press[0] * length, press[1] * length]},
@@ -156,8 +156,8 @@ def blocks(kind='quad4', n=(4, 4), length=1, stress=1, young=(100, 40), poisson=
 
 
 def points(press, gap, length=1):
-    return ('-values_press', ','.join(repr(v * length) for v in press), '-values_gap',
-            ','.join(repr(v * length) for v in gap))
+    return ('-values_press', ','.join(repr(float(v * length)) for v in press), '-values_gap',  # (NumPy 2's repr is no number)
+            ','.join(repr(float(v * length)) for v in gap))
 
 
 TRAIN, SEEN, UNSEEN = points((0.04, 0.06, 0.08), (0, 0.02)), points((0.06,), (0.02,)), points((0.05,), (0.01,))

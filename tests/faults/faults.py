@@ -44,7 +44,7 @@ CASES = [
     (['solve', *R, '-hyco_solver_max_its', '1.5'], 'it must be a whole number'),
     (['solve', *R, '-hyco_solver_rtol', '1' * 2000], '-hyco_solver_rtol is longer than'),
     (['solve', *R, '-hyco_solver_type', 'tao', '-hyco_tao_type', 'foo'], '-hyco_tao_type is "foo"; it must be one of: gpcg'),
-    (['solve', *R, '-hyco_tao_gatol', '1e-9'], 'nothing reads the option -hyco_tao_gatol here'),
+    (['solve', *R, '-hyco_tao_gatl', '1e-9'], 'nothing reads the option -hyco_tao_gatl here'),
     (['solve', *P, '-hyco_mumps_icntl14', 'lu'], 'nothing reads the option -hyco_mumps_icntl14 here'),
     # options that exclude each other
     (['solve', *P, '-hyco_linear', 'iterative', '-hyco_solver_form', 'dual'], '-hyco_linear iterative solves the primal form'),

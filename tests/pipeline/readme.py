@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Every command of the README works as written: the indented lines that call build/hyco or build/embed, in order."""
+"""Every command of the README works as written: the indented lines that call what is built, in order."""
 import os
 import shlex
 import subprocess
@@ -16,7 +16,7 @@ def commands():
     with open(f"{SOURCE}/README.md", encoding="utf-8") as file:
         for line in file:
             words = line.split()
-            if line.startswith("    ") and any(w in ("build/hyco", "build/embed") for w in words[:5]) and "..." not in words:
+            if line.startswith("    ") and any(w in ("build/hyco", "build/embed") or w.startswith("build/ladder/") for w in words[:5]) and "..." not in words:
                 yield line.strip()
 
 

@@ -1,4 +1,4 @@
-"""Rules that the sources keep: who prints, who knows whom, the table of options, the public header alone."""
+"""Rules that the sources keep: who prints, who knows whom, who declares options, the public header alone."""
 import glob
 import os
 import re
@@ -58,20 +58,30 @@ class Sources(unittest.TestCase):
             names = re.findall(r'#include\s*[<"](\w+)\.h[>"]', text(path))
             self.assertEqual([n for n in names if n in above], [], name)
 
-    def test_options(self):
-        """Each option that is read stands in the table, and each of the table is read."""
-        table_path = os.path.join(SOURCE, 'src', 'sys', 'options.c')
-        table = set(re.findall(r'^\s*\{"(hyco_\w+)",', text(table_path), flags=re.M))
-        self.assertGreater(len(table), 15)
-        read = set()
+    def test_types(self):
+        """Laws and discretisations of contact are known in their own folders alone; a scene knows the default one."""
         for path in sources():
-            if path == table_path:
-                continue
+            if os.sep + 'material' + os.sep not in path:
+                self.assertNotRegex(code(path), r'\b(young|poisson)\b', path)
+            if os.sep + 'contact' + os.sep not in path:
+                self.assertNotRegex(code(path), r'\bHYCO_CONTACT_(PAIR|SURFACE)\b', path)
+
+    def test_options(self):
+        """hyco -help lists what the code declares, once each; what is asked by name elsewhere is declared."""
+        declared, asked = [], set()
+        for path in sources():
             body = re.sub(r'/\*.*?\*/', ' ', text(path), flags=re.S)
-            read |= set(re.findall(r'"-?(hyco_[a-z_]*[a-z])"', body))
-        read -= {'hyco_monitor'}  # the driver's own, in args.c
-        self.assertEqual(read - table, set(), 'read, but not in the table')
-        self.assertEqual(table - read, set(), 'in the table, but not read')
+            declared += re.findall(r'\bHycoOptions(?:Real|Int|Bool|Flag|Word|String|List|Name)\(\s*"-(\w+)"', body)
+            asked |= set(re.findall(r'\bPetscOptions\w+\([^;"]*"-(hyco_\w*[a-z])"', body))
+        help_text = subprocess.run([os.environ['HYCO'], '-help'], capture_output=True, text=True, check=True,
+                                   timeout=20 * PATIENCE).stdout
+        listed = re.findall(r'^  -(\w+?)(?:NAME)? ', help_text, flags=re.M)
+        self.assertGreater(len(declared), 50)
+        self.assertEqual(len(set(listed)), len(listed), 'listed twice')
+        self.assertEqual(len(set(declared)), len(declared), 'declared twice')
+        self.assertEqual(set(declared) - set(listed), set(), 'declared, but not in -help')
+        self.assertEqual({n for n in listed if n.startswith('hyco_')} - set(declared), set(), 'in -help, but not declared')
+        self.assertEqual(asked - set(declared), set(), 'asked, but not declared')
 
     def test_public_header(self):
         """include/hyco.h compiles alone, in C and in C++, without the private headers."""

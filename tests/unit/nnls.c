@@ -123,8 +123,7 @@ static PetscErrorCode TestTao(void)
       CHECK(solved, "n = %d: %s did not solve it", (int)n, types[t]);
       CHECK_NEAR(other, one, 1e-10);
       for (PetscInt j = 0; j < n; j++)
-        CHECK(fabs(x[j] - y[j]) <= 1e-5 * largest, "n = %d, %s: x[%d] %g for %g", (int)n, types[t],
-              (int)j, y[j], x[j]);
+        CHECK(fabs(x[j] - y[j]) <= 1e-5 * largest, "n = %d, %s: x[%d] %g for %g", (int)n, types[t], (int)j, y[j], x[j]);
     }
     for (PetscInt j = 0; j < n; j++) y[j] = 1.01 * x[j];
     PetscCall(HycoNNLSCheck(m, n, A, b, y, 1e-9, NULL, &solved));

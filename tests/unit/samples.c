@@ -1,4 +1,4 @@
-/* Sets of parameter points, the scene's ranges and its text, the table of options. */
+/* Sets of parameter points, the scene's ranges and its text, names of options. */
 #include "check.h"
 #include <hycomaterialimpl.h>
 #include <unistd.h>
@@ -208,7 +208,7 @@ static PetscErrorCode TestNearest(void)
   CHECK(HycoNearest("yung", 3, names) == names[0], "yung is nearest to young");
   CHECK(HycoNearest("Poison", 3, names) == names[1], "Poison is nearest to poisson");
   CHECK(!HycoNearest("gravity", 3, names), "gravity is near to none");
-  CHECK(HycoOptionKnown("hyco_pod_tol") && !HycoOptionKnown("hyco_pod_tl"), "the table of options is wrong");
+  CHECK(HycoOptionFind("hyco_pod_tol") && !HycoOptionFind("hyco_pod_tl"), "the table of options is wrong");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -5,8 +5,8 @@
 #include <hycosolverimpl.h>
 #include <string.h>
 
-/* Lemke's dictionary has m^2 entries, and each of its some m pivots changes them all: beyond this it is no fallback, nor
-   is S where another form was chosen. */
+/* Lemke's dictionary has m^2 entries, and each of its some m pivots changes them all: beyond this it is no fallback,
+   nor is S where another form was chosen. */
 #define HYCO_FALLBACK_MAX 3000
 
 typedef struct {
@@ -47,7 +47,8 @@ static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscRea
   (void)form;
   if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
   PetscCall(HycoDirectPinKernel(f->direct, y->K));
-  PetscCall(HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation goes on from it */
+  PetscCall(
+      HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation goes on from it */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -352,9 +353,8 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
   Dual *d;
 
   PetscFunctionBegin;
-  (void)s;
   PetscCall(PetscNew(&d));
-  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, &d->tao));
+  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, (PetscObject)s, &d->tao));
   form->data = d;
   *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts,
                                            .estimate = EstimateFactor,

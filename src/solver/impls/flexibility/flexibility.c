@@ -89,9 +89,8 @@ PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm for
   Flexibility *f;
 
   PetscFunctionBegin;
-  (void)s;
   PetscCall(PetscNew(&f));
-  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, &f->tao));
+  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, (PetscObject)s, &f->tao));
   form->data = f;
   *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
   PetscFunctionReturn(PETSC_SUCCESS);

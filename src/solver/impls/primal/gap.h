@@ -8,11 +8,11 @@
 typedef struct {
   Mat T, Kg, Kw, H; /* H: the copy that TAO's types scale */
   KSP ksp;
-  PetscInt *pivot, *contact, n, m;    /* this rank's contacts' pivot unknowns, the contacts' numbers on it; of all ranks */
+  PetscInt *pivot, *contact, n, m; /* this rank's contacts' pivot unknowns, the contacts' numbers on it; of all ranks */
   HycoOperatorState transformed, seen; /* of which T is; about which `possible` was found */
-  PetscBool possible;                 /* each contact row has an unknown that no other row has */
-  PetscBool *active;                  /* of this rank's n */
-  PetscBool started;                  /* active holds a solution's set */
+  PetscBool possible;                  /* each contact row has an unknown that no other row has */
+  PetscBool *active;                   /* of this rank's n */
+  PetscBool started;                   /* active holds a solution's set */
   HycoTao tao;
 } Gap;
 

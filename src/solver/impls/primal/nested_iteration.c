@@ -279,8 +279,8 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   for (PetscInt i = 0; i < l->n; i++) {
     violates[i] = PETSC_FALSE;
     if (l->bound[i] < PETSC_INFINITY)
-      violates[i] = active[i] ? HycoPulls(force[i], largest, d[i], l->bound[i])
-                              : HycoPenetrates(value[i], l->bound[i], size);
+      violates[i] =
+          active[i] ? HycoPulls(force[i], largest, d[i], l->bound[i]) : HycoPenetrates(value[i], l->bound[i], size);
   }
   PetscCall(VecRestoreArrayRead(p->y, &value));
   PetscCall(VecRestoreArrayRead(p->residual, &force));

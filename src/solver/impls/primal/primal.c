@@ -278,12 +278,12 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   *cost = -1;
   if (!y->K || !y->m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectTypeCompareAny((PetscObject)y->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
+  if (!asked && (s->now.traits & HYCO_TAO_DENSE || !aij || !y->symmetric)) PetscFunctionReturn(PETSC_SUCCESS);
   if (s->now.traits & HYCO_TAO_DENSE)
     HycoFormat(why,
                "%s%s needs the matrix of the dual form; use -hyco_solver_form dual, or -hyco_solver_type tao with "
                "dual_free",
-               s->now.traits & HYCO_TAO_OWN ? "" : "TAO's ",
-               s->now.traits & HYCO_TAO_OWN ? s->now.word : s->now.type);
+               s->now.traits & HYCO_TAO_OWN ? "" : "TAO's ", s->now.traits & HYCO_TAO_OWN ? s->now.word : s->now.type);
   else if (!aij)
     HycoFormat(why, "the primal form needs a sparse K (AIJ); use -hyco_solver_form dual");
   else if (!y->symmetric)
@@ -352,11 +352,12 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, PetscOptions options)
+static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, HycoOptionItems PetscOptionsObject)
 {
   PetscFunctionBegin;
   (void)form;
-  PetscCall(HycoOptionsBool(options, "hyco_solver_multilevel", &s->multilevel));
+  PetscCall(HycoOptionsBool("-hyco_solver_multilevel",
+                            "full order, every unknown a contact: start from coarser problems", &s->multilevel, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -366,12 +367,9 @@ PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form)
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&g));
-  PetscCall(HycoTaoCreate(HycoComm(s), &g->tao));
+  PetscCall(HycoTaoCreate(HycoComm(s), (PetscObject)s, &g->tao));
   form->data = g;
-  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts,
-                                           .setup = SetUp,
-                                           .solve = Solve,
-                                           .setfromoptions = SetFromOptions,
-                                           .destroy = Destroy};
+  *form->ops = (struct _HycoSolverFormOps){
+      .accepts = Accepts, .setup = SetUp, .solve = Solve, .setfromoptions = SetFromOptions, .destroy = Destroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -222,7 +222,7 @@ PetscErrorCode HycoSolverFormCreate_Shell(HycoSolver s, HycoSolverForm form)
   PetscFunctionBegin;
   PetscCall(PetscNew(&f));
   f->s = s;
-  PetscCall(HycoTaoCreate(HycoComm(s), &f->tao));
+  PetscCall(HycoTaoCreate(HycoComm(s), (PetscObject)s, &f->tao));
   form->data = f;
   *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
   PetscFunctionReturn(PETSC_SUCCESS);

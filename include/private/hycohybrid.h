@@ -1,0 +1,27 @@
+/* The hybrid hyper-reduced model (38)-(41): its data and its training. */
+#ifndef HYCOHYBRID_H
+#define HYCOHYBRID_H
+
+#include <hycogalerkin.h>
+
+typedef struct _n_HycoReconstruction *HycoReconstruction;
+
+typedef struct {
+  struct _n_HycoGalerkin galerkin;
+  PetscInt n_dual;                   /* dual snapshots that are not zero */
+  PetscReal *S_lambda;               /* N_lambda x n_dual column major */
+  PetscInt reconstruct_solver;       /* of (41), index in HycoReconstructSolvers */
+  HycoReconstruction reconstruction; /* what (41) keeps, made by the first */
+} * HycoHybridROM;
+
+/* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
+PetscErrorCode HycoHybridReconstruct(HycoROM model);
+/* NULL-safe. */
+PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction);
+extern const char *const HycoReconstructSolvers[];
+
+/* The training's part of the ops (full_order_unknowns.c): the full-order displacements are chosen. */
+PetscErrorCode HycoHybridSetFromOptions(HycoReducer reducer);
+PetscErrorCode HycoHybridBuild(HycoROM model, HycoReducer reducer);
+
+#endif

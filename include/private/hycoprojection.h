@@ -1,0 +1,27 @@
+/* The projection-based model (44): its data and its training. */
+#ifndef HYCOPROJECTION_H
+#define HYCOPROJECTION_H
+
+#include <hycogalerkin.h>
+
+/* The basis of the contact forces; fe: none, the true multipliers of the other models. */
+typedef enum { HYCO_DUAL_FE, HYCO_DUAL_NNMF, HYCO_DUAL_SNAPSHOTS } HycoDual;
+extern const char *const HycoDuals[]; /* their words, as options and files have them; NULL ends */
+
+/* The whole mesh is the RID; no full-order unknown, no dual snapshot. */
+typedef struct {
+  struct _n_HycoGalerkin galerkin;
+  HycoDual dual;
+  PetscInt l_lambda;
+  PetscReal *V_lambda;   /* N_lambda x l_lambda column major, no entry negative, columns of unit 2-norm */
+  PetscReal dual_misfit; /* |S_lambda - V_lambda H|^2 / |S_lambda|^2, the best H >= 0 that training found */
+} * HycoProjectionROM;
+
+/* The training's part of the ops (force_basis.c). */
+PetscErrorCode HycoProjectionSetFromOptions(HycoReducer reducer);
+PetscErrorCode HycoProjectionModes(HycoReducer reducer, HycoSnapshots store);
+PetscErrorCode HycoProjectionBuild(HycoROM model, HycoReducer reducer);
+PetscErrorCode HycoProjectionReport(HycoReducer reducer, HycoROM model, HycoTraining *report);
+PetscBool HycoProjectionOffers(HycoReducer reducer, PetscBool targets);
+
+#endif

@@ -1,0 +1,13 @@
+/* The library's own types of reduced model, each in src/rom/impls. */
+#ifndef HYCOROMTYPES_H
+#define HYCOROMTYPES_H
+
+#include <hycoromtype.h>
+
+/* Registers them; called by whatever comes first. */
+PetscErrorCode HycoROMRegisterAll(void);
+PetscErrorCode HycoROMCreate_Hybrid(HycoROM model);
+PetscErrorCode HycoROMCreate_Projection(HycoROM model);
+PetscErrorCode HycoROMCreate_Condensed(HycoROM model);
+
+#endif

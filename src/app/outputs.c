@@ -1,0 +1,180 @@
+/* The files that a command writes and reads are told apart before any work. */
+#include "driver.h"
+#include <hycofields.h>
+#include <hycofile.h>
+#include <hycoh5.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* The value of an option, "" if absent, without counting it as read. */
+static PetscErrorCode Peek(const char name[], char value[PETSC_MAX_PATH_LEN])
+{
+  PetscInt n;
+  char **names, **values;
+
+  PetscFunctionBegin;
+  value[0] = '\0';
+  PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
+  for (PetscInt k = 0; k < n; k++) {
+    if (strcasecmp(names[k], name) == 0 && values[k]) PetscCall(PetscStrncpy(value, values[k], PETSC_MAX_PATH_LEN));
+  }
+  PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A file that the command line names, or the scene. */
+typedef struct {
+  const char *what; /* "-report" */
+  char path[PETSC_MAX_PATH_LEN];
+  HycoFileIdentity identity;
+} Named;
+
+static Named outputs[8]; /* with room for the one that is compared */
+static PetscInt n_outputs;
+
+/* A file that is to be written, or (else) to be read, is none of those that are to be written, whatever its name. */
+static PetscErrorCode Take(const char what[], const char path[], PetscBool output)
+{
+  Named *taken = &outputs[n_outputs];
+
+  PetscFunctionBegin;
+  if (!path[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  taken->what = what;
+  PetscCall(PetscStrncpy(taken->path, path, sizeof(taken->path)));
+  HycoFileIdentify(path, &taken->identity);
+  for (const Named *other = outputs; other < taken; other++) {
+    const Named *a = output ? other : taken, *b = output ? taken : other;
+
+    if (!HycoFileSame(&a->identity, &b->identity)) continue;
+    HycoCheck(strcmp(a->path, b->path), "%s and %s are both %s; give each a file of its own", a->what, b->what,
+              b->path);
+    HycoFail("%s %s and %s %s are one file; give each a file of its own", a->what, a->path, b->what, b->path);
+  }
+  n_outputs += output;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -output: the fields, and the numbers beside them. */
+static PetscErrorCode AddFields(const char path[])
+{
+  char h5[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(HycoFieldsCheckPath(path));
+  snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
+  PetscCall(Take("-output", path, PETSC_TRUE));
+  PetscCall(Take("the numbers of -output", h5, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where train keeps its solutions: no file may have that name. */
+static PetscErrorCode AddSnapshots(const char model[])
+{
+  char folder[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(Peek("hyco_snapshots", folder));
+  if (!folder[0]) snprintf(folder, sizeof(folder), "%.*s.snapshots", PETSC_MAX_PATH_LEN - 16, model);
+  PetscCall(Take("the snapshot folder", folder, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* scene.yaml of -scene, a folder or the file. */
+static PetscErrorCode CheckSceneFile(void)
+{
+  char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN + 16];
+  struct stat info;
+
+  PetscFunctionBegin;
+  PetscCall(Peek("scene", path));
+  snprintf(file, sizeof(file), "%s%s", path, stat(path, &info) == 0 && S_ISDIR(info.st_mode) ? "/scene.yaml" : "");
+  PetscCall(Take("-scene", file, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const char *const written[] = {"-report", "-table", "-output", NULL};
+
+/* What is written is told from what is read, whatever the names. */
+static PetscErrorCode CheckNames(PetscBool trains)
+{
+  static const char *const read[] = {"-points", "-validation_points"};
+  char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], **argv;
+  int argc;
+
+  PetscFunctionBegin;
+  n_outputs = 0;
+  PetscCall(Peek("model", model));
+  if (trains) PetscCall(Take("-model", model, PETSC_TRUE));
+  for (PetscInt k = 0; written[k]; k++) {
+    PetscCall(Peek(written[k] + 1, path));
+    if (path[0]) PetscCall(strcmp(written[k], "-output") ? Take(written[k], path, PETSC_TRUE) : AddFields(path));
+  }
+  if (trains && model[0]) PetscCall(AddSnapshots(model));
+  if (!trains) PetscCall(Take("-model", model, PETSC_FALSE));
+  PetscCall(CheckSceneFile());
+  for (size_t k = 0; k < sizeof(read) / sizeof(read[0]); k++) {
+    PetscCall(Peek(read[k] + 1, path));
+    PetscCall(Take(read[k], path, PETSC_FALSE));
+  }
+  PetscCall(PetscGetArgs(&argc, &argv));
+  for (int k = 2; k < argc - 1; k++) { /* PETSc keeps no option of that name */
+    if (strncmp(argv[k], "-options_file", 13) == 0) PetscCall(Take(argv[k], argv[k + 1], PETSC_FALSE));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A file can be written at `path`: its folder is there and may be written, or it is a device. */
+static PetscErrorCode CheckPlace(const char name[], const char path[], HycoFileKind kind)
+{
+  char folder[PETSC_MAX_PATH_LEN];
+  char *slash;
+  PetscBool direct, precious = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFileCheckPlace(name, path, kind, &direct));
+  HycoFileFollow(path, folder);
+  slash = strrchr(folder, '/');
+  if (slash)
+    slash[slash == folder] = '\0';
+  else
+    PetscCall(PetscStrncpy(folder, ".", sizeof(folder)));
+  HycoCheck(direct ? access(path, W_OK) == 0 : access(folder, W_OK | X_OK) == 0,
+            "-%s %s cannot be written: is there such a folder, may you write there?", name, path);
+  if (!direct && kind == HYCO_FILE_TEXT) PetscCall(HycoH5IsPrecious(path, &precious));
+  HycoCheck(!precious, "-%s %s is a model or a snapshot, and stays one; give the %s another name", name, path, name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckFiles(PetscBool trains)
+{
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(CheckNames(trains));
+  PetscCall(Peek("model", path));
+  if (trains && path[0]) PetscCall(CheckPlace("model", path, HYCO_FILE_NUMBERS));
+  for (PetscInt k = 0; k < n_outputs; k++) PetscCall(HycoFileSweep(outputs[k].path)); /* what killed runs left */
+  for (PetscInt k = 0; written[k]; k++) {
+    PetscCall(Peek(written[k] + 1, path));
+    if (path[0]) PetscCall(CheckPlace(written[k] + 1, path, HYCO_FILE_TEXT));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverCheckOutputs(const Command *command)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(PETSC_COMM_WORLD, CheckFiles((PetscBool)(command->run == CommandTrain)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverCheckMesh(HycoScene scene)
+{
+  const char *mesh;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetMesh(scene, &mesh));
+  HycoOnRoot(PETSC_COMM_WORLD, Take("the mesh", mesh, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,299 @@
+/* Points in the space of parameters, from the command line. */
+#include "driver.h"
+#include <stdlib.h>
+#include <string.h>
+
+/* Numbers with commas between, into new memory. */
+static PetscErrorCode ParseNumbers(const char name[], const char text[], PetscInt *n, PetscReal **values)
+{
+  const char *at = text;
+
+  PetscFunctionBegin;
+  *n = 0;
+  PetscCall(PetscMalloc1(strlen(text) / 2 + 2, values));
+  for (;;) {
+    char *end;
+
+    (*values)[*n] = strtod(at, &end);
+    HycoCheck(end != at && (*end == ',' || *end == '\0') && !PetscIsInfOrNanReal((*values)[*n]),
+              "-%s is \"%s\"; numbers with commas between are expected", name, text);
+    (*n)++;
+    if (*end == '\0') break;
+    at = end + 1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ListNames(HycoScene scene, char list[HYCO_LINE])
+{
+  PetscInt n;
+  const char *const *names;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  list[0] = '\0';
+  for (PetscInt p = 0; p < n; p++) PetscCall(HycoListAdd(list, ",", names[p]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -mu_foo where foo is no parameter. `prefix` is "mu_" or "values_". */
+static PetscErrorCode CheckNamed(HycoScene scene, const char prefix[])
+{
+  PetscInt n, left;
+  const char *const *names;
+  char **keys, **values, bad[DRIVER_LINE] = "", list[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  PetscCall(PetscOptionsLeftGet(NULL, &left, &keys, &values));
+  for (PetscInt k = 0; k < left; k++) {
+    PetscBool known = PETSC_FALSE;
+
+    if (strncasecmp(keys[k], prefix, strlen(prefix))) continue;
+    for (PetscInt p = 0; p < n; p++) known = (PetscBool)(known || strcasecmp(keys[k] + strlen(prefix), names[p]) == 0);
+    if (!known) PetscCall(PetscStrncpy(bad, keys[k], sizeof(bad)));
+  }
+  PetscCall(PetscOptionsLeftRestore(NULL, &left, &keys, &values));
+  PetscCall(ListNames(scene, list));
+  HycoCheck(!bad[0], "-%s names no parameter; the scene's are: %s", bad, list[0] ? list : "(none)");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* "radius from 4.02 to 4.1, load from 0 to 1" */
+static PetscErrorCode ListRanges(HycoScene scene, char list[DRIVER_LINE])
+{
+  PetscInt n;
+  const char *const *names;
+  const PetscReal *lo, *hi;
+  size_t at = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, &lo, &hi));
+  list[0] = '\0';
+  for (PetscInt p = 0; p < n && at < DRIVER_LINE; p++)
+    at += (size_t)snprintf(list + at, DRIVER_LINE - at, "%s%s from %g to %g", p ? ", " : "", names[p], (double)lo[p],
+                           (double)hi[p]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -grid_type: 0 centred, 1 closed, 2 Chebyshev. */
+static PetscErrorCode ReadGridType(PetscInt *type)
+{
+  static const char *const types[] = {"centred", "closed", "chebyshev", NULL};
+
+  PetscFunctionBegin;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(HycoOptionsWord("-grid_type",
+                            "cell centres; with both ends of the ranges; or the roots of Chebyshev polynomials (for a "
+                            "condensed model)",
+                            types, type, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The numbers of -prefixNAME for each parameter, new memory or NULL; how many are given, and a name without. */
+static PetscErrorCode GetNamed(HycoScene scene, const char prefix[], const char meaning[], PetscInt count[],
+                               PetscReal *values[], PetscInt *given, const char **missing)
+{
+  PetscInt n;
+  const char *const *names;
+  char text[PETSC_MAX_PATH_LEN], key[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  *given = 0;
+  if (!scene) {
+    PetscCall(DriverGet(prefix, meaning, text));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(CheckNamed(scene, prefix));
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  for (PetscInt p = 0; p < n; p++) {
+    values[p] = NULL;
+    PetscCall(PetscSNPrintf(key, sizeof(key), "%s%s", prefix, names[p]));
+    PetscCall(DriverGet(key, "", text));
+    if (!text[0])
+      *missing = names[p];
+    else {
+      PetscCall(ParseNumbers(key, text, &count[p], &values[p]));
+      ++*given;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
+{
+  PetscInt n, m, count[64], given;
+  const char *const *names, *missing;
+  char text[PETSC_MAX_PATH_LEN], list[DRIVER_LINE];
+  PetscReal *values[64], *all;
+
+  PetscFunctionBegin;
+  PetscCall(DriverGet("mu", "<v,v,...> parameter values in declared order; or one by one: -mu_NAME v", text));
+  PetscCall(GetNamed(scene, "mu_", "<v> the parameter NAME: -mu_radius 4.06", count, values, &given, &missing));
+  if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  PetscCall(ListNames(scene, list));
+  if (text[0]) {
+    PetscCall(ParseNumbers("mu", text, &m, &all));
+    HycoCheck(m == n, "-mu has %d values; the scene has %d parameters: %s", (int)m, (int)n, n ? list : "(none)");
+    PetscCall(PetscArraycpy(mu, all, n));
+    PetscCall(PetscFree(all));
+  }
+  for (PetscInt p = 0; p < n; p++) {
+    if (!values[p]) continue;
+    HycoCheck(count[p] == 1, "-mu_%s has %d values; one is expected", names[p], (int)count[p]);
+    HycoCheck(!text[0], "-mu gives every parameter, and -mu_%s gives one of them again; take one of the two away",
+              names[p]);
+    mu[p] = values[p][0];
+    PetscCall(PetscFree(values[p]));
+  }
+  PetscCall(ListRanges(scene, list));
+  HycoCheck(text[0] || given == n, "the scene has %d parameters (%s); give -mu with all of them, or -mu_NAME for each",
+            (int)n, list);
+  PetscCall(HycoSceneCheckParameters(scene, n, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether -word, or a -prefixNAME of a parameter, was given. */
+static PetscErrorCode HasNamed(HycoScene scene, const char word[], const char prefix[], PetscBool *given)
+{
+  PetscInt n;
+  const char *const *names;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  PetscCall(PetscOptionsHasName(NULL, NULL, word, given));
+  for (PetscInt p = 0; p < n && !*given; p++) {
+    char key[DRIVER_LINE];
+
+    PetscCall(PetscSNPrintf(key, sizeof(key), "%s%s", prefix, names[p]));
+    PetscCall(PetscOptionsHasName(NULL, NULL, key, given));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given)
+{
+  PetscFunctionBegin;
+  PetscCall(HasNamed(scene, "-mu", "-mu_", given));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
+{
+  PetscFunctionBegin;
+  PetscCall(HasNamed(scene, "-grid", "-values_", given));
+  if (!*given) PetscCall(PetscOptionsHasName(NULL, NULL, "-points", given));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The grid that the option `name` gives as `text`; its type unless -grid_type says otherwise: 0 centred, 1 closed, 2
+ * Chebyshev. */
+static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char name[], PetscInt type, const char text[])
+{
+  PetscInt n, m, counts[64];
+  PetscReal *values;
+  char list[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(ReadGridType(&type));
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  PetscCall(ListNames(scene, list));
+  PetscCall(ParseNumbers(name, text, &m, &values));
+  HycoCheck(m == n && n > 0, "-%s has %d numbers; the scene has %d parameters: %s", name, (int)m, (int)n,
+            n ? list : "(none)");
+  for (PetscInt p = 0; p < n; p++) {
+    HycoCheck(values[p] >= 1 && values[p] <= 1e8 && values[p] == PetscFloorReal(values[p]),
+              "-%s is \"%s\"; whole numbers, at least 1, are expected", name, text);
+    counts[p] = (PetscInt)values[p];
+  }
+  PetscCall(PetscFree(values));
+  if (type == 2)
+    PetscCall(HycoSamplesAddChebyshev(samples, counts));
+  else
+    PetscCall(HycoSamplesAddGrid(samples, counts, (PetscBool)(type == 1)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples)
+{
+  char text[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(DriverGet("training_grid",
+                      "<n,n,...> greedy: the grid of points to choose from, closed unless -grid_type says centred",
+                      text));
+  if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(text[0], "give a greedy training the points to choose from: -training_grid N,N,...");
+  PetscCall(HycoSamplesCreate(scene, samples));
+  PetscCall(AddGrid(scene, *samples, "training_grid", 1, text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples)
+{
+  char grid[PETSC_MAX_PATH_LEN], points[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  *samples = NULL;
+  PetscCall(
+      DriverGet("validation_grid",
+                "<n,n,...> train: the solutions to judge the model by, closed unless -grid_type says centred (else "
+                "they are drawn: -hyco_validation)",
+                grid));
+  PetscCall(DriverGet("validation_points", "<file.csv> the same, as a file of points", points));
+  HycoCheck(!grid[0] || !points[0], "give one set of points to validate by: -validation_grid or -validation_points");
+  if (!grid[0] && !points[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesCreate(scene, samples));
+  if (grid[0])
+    PetscCall(AddGrid(scene, *samples, "validation_grid", 1, grid));
+  else
+    PetscCall(HycoSamplesAddFile(*samples, points));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -values_NAME for every parameter, combined. */
+static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscInt *n_sets)
+{
+  PetscInt n, count[64], given;
+  const char *missing = "";
+  PetscReal *values[64];
+
+  PetscFunctionBegin;
+  PetscCall(GetNamed(scene, "values_", "<v,v,...> a set of points: values of the parameter NAME, all combined", count,
+                     values, &given, &missing));
+  if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  HycoCheck(given == n, "-values_ are given for %d of the %d parameters; -values_%s is missing", (int)given, (int)n,
+            missing);
+  PetscCall(HycoSamplesAddProduct(samples, count, (const PetscReal *const *)values));
+  for (PetscInt p = 0; p < n; p++) PetscCall(PetscFree(values[p]));
+  ++*n_sets;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given)
+{
+  char grid[PETSC_MAX_PATH_LEN], points[PETSC_MAX_PATH_LEN];
+  PetscInt n_sets = 0, n, type = 0;
+
+  PetscFunctionBegin;
+  PetscCall(DriverGet("grid", "<n,n,...> a set of points: n per parameter", grid));
+  if (!scene) PetscCall(ReadGridType(&type));
+  if (scene) PetscCall(HycoSamplesCreate(scene, samples));
+  PetscCall(AddValues(scene, scene ? *samples : NULL, &n_sets));
+  PetscCall(DriverGet("points", "<file.csv> a set of points: a header with the names, then a point per line", points));
+  if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
+  n_sets += (grid[0] != '\0') + (points[0] != '\0');
+  HycoCheck(n_sets <= 1, "give one set of points: -grid, or -values_NAME, or -points");
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  if (grid[0])
+    PetscCall(AddGrid(scene, *samples, "grid", 0, grid));
+  else if (points[0])
+    PetscCall(HycoSamplesAddFile(*samples, points));
+  else if (!n) /* a scene without parameters has one point */
+    PetscCall(HycoSamplesAddPoint(*samples, NULL));
+  *given = (PetscBool)(n_sets || !n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

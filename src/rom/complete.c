@@ -1,0 +1,87 @@
+/* What a prediction leaves out: the rows of contacts and the displacements beyond the part that the reduced problem
+   touches, when somebody asks. */
+#include <hycoromimpl.h>
+
+PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows)
+{
+  const PetscInt entries = HycoPairsWidth(pairs) * dim * pairs->n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(pairs->n + 1, &rows->start));
+  PetscCall(PetscMalloc1(entries, &rows->dof));
+  PetscCall(PetscMalloc1(entries, &rows->value));
+  PetscCall(PetscMalloc1(pairs->n, &rows->gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoRowsDestroy(HycoRows *rows)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(rows->start));
+  PetscCall(PetscFree(rows->dof));
+  PetscCall(PetscFree(rows->value));
+  PetscCall(PetscFree(rows->gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The whole of mesh as nodes and surfaces alone: nobody asks for its cells' materials. */
+static PetscErrorCode CreateBeyond(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&m->beyond));
+  *m->beyond = *m->mesh;
+  m->beyond->n_cells = 0;
+  PetscCall(HycoFECreate(m->scene, m->beyond, &m->fe_beyond));
+  PetscCall(HycoRowsCreate(&m->pairs, m->mesh->dim, &m->rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of all contacts at mu on fe, which lives on mesh or on mesh without cells. */
+static PetscErrorCode BringRows(HycoROM m, HycoFE fe, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFESetParameters(fe, mu));
+  if (!fe->contact_changed && !fe->gap_changed) PetscFunctionReturn(PETSC_SUCCESS);
+  fe->ready = PETSC_FALSE; /* until its rows are there */
+  PetscCall(HycoContactRows(fe, &m->pairs, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap));
+  fe->ready = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMBringRows(HycoROM m, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  PetscCall(BringRows(m, m->fe, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U = u0 + V gamma on the nodes of fe from the first unknown on. */
+static void Expand(HycoROM m, HycoFE fe, PetscInt first)
+{
+  const PetscInt l = m->l;
+
+  for (PetscInt i = first; i < fe->n_dof; i++) {
+    const PetscReal *v = m->V + (size_t)i * (size_t)l;
+
+    m->U[i] = fe->u0[i];
+    for (PetscInt j = 0; j < l; j++) m->U[i] += v[j] * m->gamma[j];
+  }
+}
+
+PetscErrorCode HycoROMExpand(HycoROM m)
+{
+  PetscFunctionBegin;
+  Expand(m, m->fe, 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMComplete(HycoROM m)
+{
+  PetscFunctionBegin;
+  if (m->fe->mesh == m->mesh || m->beyond_current) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->beyond) PetscCall(CreateBeyond(m));
+  PetscCall(BringRows(m, m->fe_beyond, m->fe->mu));
+  Expand(m, m->fe_beyond, m->fe->n_dof);
+  m->beyond_current = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,534 @@
+/*
+  Training of the condensed model. After the snapshots, at every combination of values of the parameters that reach K or
+  B: a factorisation for G = B K^-1 B^T, and one for the responses K^-1 B^T P that make the modes (condense_modes.c) and
+  with them H = V^T K^-1 B^T. The rest follows from the snapshots without a solve: their gaps D - B U = g + G L, and
+  V^T U = a - H L.
+*/
+#include <hycocondensed.h>
+
+/* m^2 numbers a point, and m^3 operations an active set: beyond this it is no model for many predictions. */
+#define MOST_CONTACTS 4000
+#define MOST_NUMBERS  1e9   /* of G at all nodes: 8 GB */
+#define NO_LOAD       1e-11 /* of the contacts' displacements: what is left of them without forces is round-off */
+
+/* The values of parameter p among the samples, ascending, each once. */
+static PetscErrorCode FindValues(HycoCondensed c, PetscInt p, PetscInt n_s, const PetscReal mu[])
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n_s, &c->x[p]));
+  for (PetscInt k = 0; k < n_s; k++) c->x[p][k] = mu[k * c->dim + p];
+  PetscCall(PetscSortReal(n_s, c->x[p]));
+  for (PetscInt k = 0; k < n_s; k++) {
+    if (!n || c->x[p][k] > c->x[p][n - 1]) c->x[p][n++] = c->x[p][k];
+  }
+  c->n[p] = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The number of a point on the whole grid. */
+static PetscInt NodeOf(HycoCondensed c, const PetscReal mu[])
+{
+  PetscInt node = 0;
+
+  for (PetscInt p = 0; p < c->dim; p++) {
+    PetscInt k = 0;
+
+    while (c->x[p][k] != mu[p]) k++;
+    node = node * c->n[p] + k;
+  }
+  return node;
+}
+
+/* The samples as a tensor grid: each combination of their values stands among them. */
+static PetscErrorCode FindGrid(HycoReducer t, HycoCondensed c)
+{
+  const PetscReal *mu;
+  PetscInt n_s, nodes = 1;
+  PetscReal all = 1;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, &n_s, NULL, &mu));
+  for (PetscInt p = 0; p < c->dim; p++) {
+    PetscCall(FindValues(c, p, n_s, mu));
+    HycoCheckModel(
+        c->n[p] > 1 || t->scene->hi[p] == t->scene->lo[p],
+        "the training points have one value of %s, and nothing to interpolate over its range between: a condensed "
+        "model needs at least two",
+        t->scene->parameter[p]);
+    all *= (PetscReal)c->n[p];
+  }
+  HycoCheckModel(
+      all <= (PetscReal)n_s,
+      "the %d training points are no tensor grid: a condensed model needs every combination of their values (%g "
+      "points); give them by -grid or -values_NAME",
+      (int)n_s, (double)all);
+  for (PetscInt p = 0; p < c->dim; p++) nodes *= c->n[p];
+  PetscCall(PetscMalloc1(nodes, &c->sample));
+  for (PetscInt k = 0; k < nodes; k++) c->sample[k] = -1;
+  for (PetscInt k = 0; k < n_s; k++) c->sample[NodeOf(c, mu + k * c->dim)] = k;
+  for (PetscInt k = 0; k < nodes; k++)
+    HycoCheckModel(c->sample[k] >= 0,
+                   "the %d training points are no tensor grid: a condensed model needs every combination "
+                   "of their values; give them by -grid or -values_NAME",
+                   (int)n_s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* F at mu. Rank 0. */
+static PetscErrorCode Loads(HycoReducer t, const PetscReal mu[], PetscReal data[])
+{
+  Vec F;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFESetParameters(t->fe, mu));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, t->fe->n_dof, data, &F));
+  PetscCall(HycoFEAssembleForce(t->fe, F));
+  PetscCall(VecDestroy(&F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a third value of p gives what two others say of F, the other parameters at a share of their ranges. */
+static PetscErrorCode AffineAt(HycoReducer t, PetscInt p, PetscReal share, PetscBool *affine)
+{
+  static const PetscReal at[3] = {0.06, 0.93, 0.47};
+  const PetscInt n = t->fe->n_dof;
+  const PetscReal a = (at[1] - at[2]) / (at[1] - at[0]);
+  HycoScene s = t->scene;
+  PetscReal mu[HYCO_MAX_PARAMETERS], *v[3], lost = 0, size = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; q < s->n_parameters; q++) mu[q] = s->lo[q] + share * (s->hi[q] - s->lo[q]);
+  for (PetscInt k = 0; k < 3; k++) {
+    mu[p] = s->lo[p] + at[k] * (s->hi[p] - s->lo[p]);
+    PetscCall(PetscMalloc1(n, &v[k]));
+    PetscCall(Loads(t, mu, v[k]));
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    lost = PetscMax(lost, PetscAbsReal(a * v[0][i] + (1 - a) * v[1][i] - v[2][i]));
+    size = PetscMax(size, PetscMax(PetscAbsReal(v[0][i]), PetscAbsReal(v[1][i])));
+  }
+  *affine = (PetscBool)(*affine && lost <= 1e-12 * size);
+  for (PetscInt k = 0; k < 3; k++) PetscCall(PetscFree(v[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the load at mu, at node s of the stiffness, is the sum of its training loads that values say. Rank 0. */
+static PetscErrorCode CheckSum(HycoReducer t, HycoCondensed c, PetscInt s, const PetscReal mu[], PetscBool *exact)
+{
+  const PetscInt n = t->fe->n_dof, nodes = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
+  PetscReal *weight, *rest, *F, at[HYCO_MAX_PARAMETERS], size = 0, lost = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(c->n_load, &weight, n, &rest, n, &F));
+  PetscCall(HycoCondensedLoadWeights(c, mu, s, weight, exact));
+  PetscCall(Loads(t, mu, rest));
+  for (PetscInt i = 0; i < n; i++) size = PetscMax(size, PetscAbsReal(rest[i]));
+  for (PetscInt j = 0; *exact && j < nodes; j++) {
+    if (c->node_stiff[j] != s) continue;
+    HycoCondensedPoint(c, j, at);
+    PetscCall(Loads(t, at, F));
+    for (PetscInt i = 0; i < n; i++) {
+      size = PetscMax(size, PetscAbsReal(F[i]));
+      rest[i] -= weight[c->node_load[j]] * F[i];
+    }
+  }
+  for (PetscInt i = 0; i < n; i++) lost = PetscMax(lost, PetscAbsReal(rest[i]));
+  *exact = (PetscBool)(*exact && lost <= 1e-11 * size);
+  PetscCall(PetscFree3(weight, rest, F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether loads come as sums of training loads: at several points for the values of all, for the first and the last
+   stiffness assembled. Rank 0. */
+static PetscErrorCode FindExactLoads(HycoReducer t, HycoCondensed c)
+{
+  static const PetscReal share[3] = {0.31, 0.77, 0.53};
+  const PetscInt nodes = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
+  const HycoScene s = t->scene;
+  PetscReal mu[HYCO_MAX_PARAMETERS], at[HYCO_MAX_PARAMETERS], *weight;
+  PetscBool exact;
+
+  PetscFunctionBegin;
+  HycoCondensedPoint(c, 0, mu);
+  PetscCall(HycoFESetParameters(t->fe, mu));
+  PetscCall(HycoCondensedSurveyLoads(c, t->whole, t->fe->X, &exact));
+  if (!exact) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoCondensedPrepareLoads(c));
+  PetscCall(PetscMalloc1(c->n_load, &weight));
+  for (PetscInt k = 0; exact && k < 3; k++) {
+    for (PetscInt p = 0; p < c->dim; p++) mu[p] = s->lo[p] + share[(k + p) % 3] * (s->hi[p] - s->lo[p]);
+    for (PetscInt n = 0; exact && n < nodes / c->n_load; n++)
+      PetscCall(HycoCondensedLoadWeights(c, mu, n, weight, &exact));
+    for (PetscInt end = 0; exact && end < 2; end++) {
+      HycoCondensedPoint(c, end ? nodes - 1 : 0, at);
+      for (PetscInt p = 0; p < c->dim; p++) at[p] = c->stiff[p] ? at[p] : mu[p];
+      PetscCall(CheckSum(t, c, c->node_stiff[end ? nodes - 1 : 0], at, &exact));
+    }
+  }
+  PetscCall(PetscFree(weight));
+  c->exact_loads = exact;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ResetSurfaces(HycoReducer t)
+{
+  HycoSurfaces *s = &Condensing(t)->surfaces;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEDestroy(&s->fe));
+  PetscCall(HycoPairsDestroy(&s->pairs));
+  PetscCall(HycoMeshDestroy(&s->mesh));
+  PetscCall(HycoRowsDestroy(&s->rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ResetResponses(HycoResponses *x)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(x->Q));
+  PetscCall(PetscFree(x->scale));
+  PetscCall(PetscFree(x->C));
+  PetscCall(PetscMemzero(x, sizeof(*x)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedSetFromOptions(HycoReducer t)
+{
+  HycoCondensing s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s));
+  t->training = s;
+  s->tol = 1e-7;
+  s->pod_tol = 1e-14;
+  s->max_values = 24;
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("condensed"));
+  PetscCall(HycoOptionsReal("-hyco_condensed_pod_tol",
+                            "condensed: energy that its displacement modes may leave out, unless -hyco_pod_tol is "
+                            "smaller",
+                            0, 1, &s->pod_tol, NULL));
+  PetscCall(HycoOptionsFor("condensed where no points are given"));
+  PetscCall(HycoOptionsReal("-hyco_condensed_tol",
+                            "condensed, no points given: add values until the forces' error, one value left out, is no "
+                            "larger",
+                            0, 1, &s->tol, NULL));
+  PetscCall(HycoOptionsInt("-hyco_condensed_max_values",
+                           "condensed, no points given: at most so many values per parameter", 3, 1000, &s->max_values,
+                           NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedResetTraining(HycoReducer t)
+{
+  PetscFunctionBegin;
+  PetscCall(ResetSurfaces(t));
+  PetscCall(ResetResponses(&Condensing(t)->responses));
+  PetscCall(HycoCondensedFree(&Condensing(t)->condensed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The contacts' nodes and slave facets, and the gaps' place in the condensed model under training. Rank 0. */
+static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
+{
+  const PetscInt n = t->whole->n_nodes;
+  HycoSurfaces *s = &Condensing(t)->surfaces;
+  PetscBool *contact;
+  PetscInt *extra, *index, *all, n_extra = 0;
+
+  PetscFunctionBegin;
+  PetscCall(ResetSurfaces(t));
+  PetscCall(PetscCalloc1(n, &contact));
+  PetscCall(PetscMalloc3(n, &extra, n, &index, t->scene->n_contacts, &all));
+  HycoPairsMark(&t->pairs, contact);
+  for (PetscInt i = 0; i < n; i++) {
+    if (contact[i]) extra[n_extra++] = i;
+  }
+  for (PetscInt k = 0; k < t->scene->n_contacts; k++)
+    PetscCall(HycoMeshFindGroup(t->whole, "contact", t->scene->contact[k]->slave, &all[k]));
+  PetscCall(HycoMeshExtract(t->whole, 0, NULL, n_extra, extra, t->scene->n_contacts, all, &s->mesh));
+  for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->mesh->node_whole[i]] = i;
+  PetscCall(HycoPairsRenumber(&t->pairs, index, &s->pairs));
+  PetscCall(HycoFECreate(t->scene, s->mesh, &s->fe));
+  PetscCall(HycoRowsCreate(&t->pairs, t->whole->dim, &s->rows));
+  c->given = (HycoGapSource){s->fe, &s->pairs, s->rows};
+  PetscCall(PetscFree3(extra, index, all));
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where slaves slide from facet to facet B has kinks, and no polynomial follows it. Rank 0. */
+static PetscErrorCode CheckFacets(HycoReducer t)
+{
+  PetscInt n;
+  const PetscReal *mu;
+  HycoMet met;
+
+  PetscFunctionBegin;
+  if (!t->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, &mu));
+  PetscCall(HycoMetFind(t->scene, t->whole, &t->pairs, n, mu, NULL, &met));
+  for (PetscInt r = 1; r < met.rows.n; r++) {
+    const HycoPairs *p = &met.rows;
+
+    HycoCheckModel(
+        met.of[r] != met.of[r - 1],
+        "contact %s: node %d meets other facets of %s as the parameters move it; a condensed model interpolates "
+        "over the parameters what has kinks there: train a hybrid one",
+        t->scene->contact[p->contact[r]]->name, (int)t->whole->node_id[p->slave[r]],
+        t->scene->contact[p->contact[r]]->master);
+  }
+  PetscCall(HycoMetDestroy(&met));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which parameters reach what; that the scene is one for this model. Rank 0. */
+static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
+{
+  HycoMotions motions;
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+  PetscInt free;
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(CheckFacets(t));
+  HycoSceneReaches(t->scene, reaches);
+  for (PetscInt p = 0; p < c->dim; p++) c->stiff[p] = reaches[p] && t->scene->hi[p] > t->scene->lo[p];
+  PetscCall(HycoCondensedAllocate(c));
+  c->exact_gap = 1;
+  PetscCall(TakeSurfaces(t, c));
+  PetscCall(FindExactLoads(t, c));
+  for (PetscInt p = 0; p < c->dim; p++) {
+    PetscBool affine = (PetscBool)!c->stiff[p];
+
+    for (PetscInt k = 0; affine && !c->exact_loads && k < 2; k++) PetscCall(AffineAt(t, p, k ? 0.71 : 0.38, &affine));
+    c->affine[p] = affine;
+  }
+  PetscCall(HycoFEFreeMotions(t->fe, &motions));
+  free = motions.n;
+  if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
+  PetscCall(HycoMotionsDestroy(&motions));
+  HycoCheckModel(!free,
+                 "no support keeps %s: contact alone holds it, K^-1 does not exist and no condensed model with it; "
+                 "train a hybrid one",
+                 name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedBegin(HycoReducer t)
+{
+  HycoCondensed c;
+  const PetscInt m = t->sizes[2];
+  char linear[32] = "";
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsGetString(t->scene->options, NULL, "-hyco_linear", linear, sizeof(linear), NULL));
+  HycoCheckModel(
+      strcasecmp(linear, HycoLinearNames[HYCO_LINEAR_ITERATIVE]),
+      "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a hybrid "
+      "model, or take -hyco_linear auto");
+  HycoCheckModel(m > 0,
+                 "the scene has no contact, and a condensed model is one of contact forces; train a hybrid model");
+  HycoCheckModel(
+      m <= MOST_CONTACTS,
+      "the scene has %d contacts: a condensed model stores the square of their number at every training point, "
+      "and goes to %d; train a hybrid model",
+      (int)m, MOST_CONTACTS);
+  PetscCall(HycoCondensedFree(&Condensing(t)->condensed));
+  PetscCall(ResetResponses(&Condensing(t)->responses));
+  PetscCall(HycoCondensedCreate(t->scene->n_parameters, m, 0, &c));
+  Condensing(t)->condensed = c;
+  c->scene = t->scene;
+  PetscCall(FindGrid(t, c));
+  HycoOnRoot(HycoComm(t), Inspect(t, c));
+  PetscCallMPI(MPI_Bcast(c->stiff, HYCO_MAX_PARAMETERS, MPIU_INT, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(c->affine, HYCO_MAX_PARAMETERS, MPIU_INT, 0, HycoComm(t)));
+  PetscCall(HycoCondensedAllocate(c));
+  HycoCheckModel(
+      (PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=
+          MOST_NUMBERS,
+      "the flexibility of %d contacts at %d training points has more than %g numbers; take fewer values of the "
+      "parameters that reach the stiffness, or train a hybrid model",
+      (int)m, (int)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), MOST_NUMBERS);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt HycoCondensedNode(HycoCondensed c, const HycoGridField *f, PetscInt k)
+{
+  PetscInt index[HYCO_MAX_PARAMETERS], node = 0;
+
+  for (PetscInt p = c->dim - 1; p >= 0; p--) {
+    index[p] = k % c->n[p];
+    k /= c->n[p];
+  }
+  for (PetscInt p = 0; p < c->dim; p++) node = node * f->tensor.n[p] + (f->tensor.n[p] > 1 ? index[p] : 0);
+  return node;
+}
+
+/* -B K^-1 F = -B U - G L of one snapshot; 0 where it is the difference of what is much larger. */
+static PetscErrorCode FreeGap(HycoReducer t, const PetscReal mu[], const PetscReal U[], const PetscReal L[],
+                              const PetscReal packed[], PetscReal g[])
+{
+  const PetscInt m = t->pairs.n, entries = HycoPairsWidth(&t->pairs) * t->fe->dim * m;
+  PetscInt *start, *dof;
+  PetscReal *value, moved = 0, left = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(m + 1, &start, entries, &dof, entries, &value));
+  PetscCall(HycoFESetParameters(t->fe, mu));
+  PetscCall(HycoContactRows(t->fe, &t->pairs, start, dof, value, g));
+  for (PetscInt k = 0; k < m; k++) {
+    g[k] = 0;
+    for (PetscInt j = start[k]; j < start[k + 1]; j++) g[k] -= value[j] * U[dof[j]];
+    moved = PetscMax(moved, PetscAbsReal(g[k]));
+  }
+  for (PetscInt j = 0; j < m; j++) {
+    g[j] -= packed[0] * L[j];
+    for (PetscInt i = j + 1; i < m; i++) {
+      g[i] -= packed[i - j] * L[j];
+      g[j] -= packed[i - j] * L[i];
+    }
+    packed += m - j;
+  }
+  for (PetscInt k = 0; k < m; k++) left = PetscMax(left, PetscAbsReal(g[k]));
+  if (left <= NO_LOAD * moved) PetscCall(PetscArrayzero(g, m));
+  PetscCall(PetscFree3(start, dof, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* H = V^T K^-1 B^T at the nodes of the stiffness, of all modes: the responses' coefficients, on the patterns' span. */
+static PetscErrorCode FromResponses(HycoReducer t, HycoCondensed c)
+{
+  const HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_H].tensor), m = c->m, l = c->l;
+  HycoGridField *H = &c->field[HYCO_FIELD_H], *unloaded = &c->field[HYCO_FIELD_FREE];
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(H->data));
+  PetscCall(PetscCalloc1((size_t)H->rows * (size_t)n, &H->data));
+  for (PetscInt k = 0; l && k < n; k++) {
+    for (PetscInt j = 0; j < x->q; j++) {
+      const PetscReal *column = x->C + (size_t)(t->n_s + k * x->q + j) * (size_t)l, *Q = x->Q + (size_t)j * (size_t)m;
+
+      for (PetscInt i = 0; i < l; i++) {
+        PetscReal *h = H->data + (size_t)k * (size_t)H->rows + (size_t)i * (size_t)m;
+
+        for (PetscInt a = 0; a < m; a++) h[a] += column[i] / x->scale[j] * Q[a];
+      }
+    }
+  }
+  for (PetscInt k = 0; l && k < HycoTensorSize(&unloaded->tensor); k++) { /* a = V^T U + H L */
+    const PetscReal *h = H->data + (size_t)HycoCondensedNode(c, H, k) * (size_t)H->rows,
+                    *L = c->Lambda + (size_t)k * (size_t)m;
+
+    for (PetscInt i = 0; i < l; i++) {
+      for (PetscInt a = 0; a < m; a++) unloaded->data[k * l + i] += h[i * m + a] * L[a];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* g, V^T U and the training forces at the nodes of the whole grid. */
+static PetscErrorCode FromSnapshots(HycoReducer t, HycoCondensed c)
+{
+  HycoGridField *gap = &c->field[HYCO_FIELD_GAP], *unloaded = &c->field[HYCO_FIELD_FREE];
+  const HycoGridField *G = &c->field[HYCO_FIELD_G];
+  const PetscInt n = HycoTensorSize(&gap->tensor), m = c->m, l = c->l;
+  const size_t n_dof = (size_t)(t->sizes[0] * t->sizes[3]);
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, NULL, &mu));
+  PetscCall(PetscFree(gap->data));
+  PetscCall(PetscFree(unloaded->data));
+  PetscCall(PetscFree(c->Lambda));
+  PetscCall(PetscMalloc1(m * n, &gap->data));
+  PetscCall(PetscMalloc1(l * n, &unloaded->data));
+  PetscCall(PetscMalloc1(m * n, &c->Lambda));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt s = c->sample[k], node = HycoCondensedNode(c, G, k);
+    const PetscReal *L = t->Lambda + (size_t)s * (size_t)m;
+
+    PetscCall(PetscArraycpy(c->Lambda + k * m, L, m));
+    PetscCall(FreeGap(t, mu + s * c->dim, t->U + (size_t)s * n_dof, L, G->data + (size_t)node * (size_t)G->rows,
+                      gap->data + k * m));
+    if (l) PetscCall(PetscArraycpy(unloaded->data + k * l, Condensing(t)->responses.C + (size_t)s * (size_t)l, l));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Degrees by leaving values out, one where the data are affine; errors of G and g, added up over the parameters. */
+static PetscErrorCode ChooseDegrees(HycoCondensed c)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(c->errors, 3));
+  for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) {
+    HycoGridField *field = &c->field[f];
+
+    for (PetscInt p = 0; p < c->dim; p++) {
+      PetscReal error = 0;
+
+      if (c->affine[p])
+        field->tensor.degree[p] = PetscMin(1, field->tensor.n[p] - 1);
+      else
+        PetscCall(HycoTensorChooseDegree(&field->tensor, p, field->rows, field->data, &error));
+      if (f <= HYCO_FIELD_GAP) c->errors[f] += error;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedFillFields(HycoReducer t, PetscBool modes)
+{
+  HycoCondensed c = Condensing(t)->condensed;
+
+  PetscFunctionBegin;
+  c->l = modes ? Condensing(t)->responses.r : 0;
+  PetscCall(HycoCondensedAllocate(c));
+  PetscCall(FromSnapshots(t, c));
+  PetscCall(FromResponses(t, c));
+  PetscCall(ChooseDegrees(c));
+  PetscCall(HycoCondensedBound(c));
+  PetscCall(HycoCondensedPrepare(c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of all modes the first l, which the model has: the rows of H and the entries of a come mode by mode. */
+static PetscErrorCode CutModes(HycoCondensed c, PetscInt l)
+{
+  const PetscInt rows[2] = {l * c->m, l}, of[2] = {HYCO_FIELD_H, HYCO_FIELD_FREE};
+
+  PetscFunctionBegin;
+  for (PetscInt f = 0; f < 2; f++) {
+    HycoGridField *field = &c->field[of[f]];
+    const PetscInt n = HycoTensorSize(&field->tensor);
+
+    for (PetscInt k = 1; k < n; k++)
+      PetscCall(PetscArraymove(field->data + (size_t)k * (size_t)rows[f], field->data + (size_t)k * (size_t)field->rows,
+                               rows[f]));
+    field->rows = rows[f];
+  }
+  c->l = l;
+  PetscCall(HycoCondensedPrepare(c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedBuild(HycoROM m, HycoReducer t)
+{
+  HycoCondensed c = Condensing(t)->condensed, none = (HycoCondensed)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedFillFields(t, PETSC_TRUE));
+  PetscCall(HycoCondensedLeaveOut(t));
+  PetscCall(CutModes(c, t->l));
+  PetscCall(HycoCondensedFree(&none));
+  m->data = c;
+  Condensing(t)->condensed = NULL;
+  for (PetscInt k = 0; k < m->pairs.n; k++) m->in_rid[k] = 1;
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
+  PetscCall(HycoReducerJudge(t, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,377 @@
+/*
+  The modes of a condensed model. u(mu) = K^-1 (F - B^T L) is nearly a polynomial in the parameters that reach K and B
+  for forces L that stay, so that the solutions at the nodes of the stiffness span what lies between, if each node has
+  answered the forces of all others too. Solutions of training alone do not: POD of them misses what a force of one node
+  does at the next. So the forces are sampled over what training has seen, where a complementarity problem of their size
+  is all that they cost; POD leaves some patterns; each node answers these; and the modes are a POD of snapshots and
+  answers together.
+*/
+#include <hycoalgorithms.h>
+#include <hycocondensed.h>
+#include <hycolcp.h>
+
+#define SAMPLES        480 /* points where the forces are sampled: half all over, half where contacts close or open */
+#define WAYS           16  /* on so many ways between points */
+#define LEAST_SAMPLES  16
+#define FREE_CONTACTS  700 /* beyond so many contacts fewer, by the square: a sample's cost grows with it, at least */
+#define HELD           4   /* one of so many samples is held out of the patterns, and judges them */
+#define SHARE          0.95
+#define ACTIVE         1e-8    /* of the largest training force: contacts of a sample with less are open */
+#define LEAST_STEP     0x1p-11 /* of the training values' box: ways are not halved further */
+#define MOST_RESPONSES 5e7     /* numbers of all responses: 400 MB */
+#define SMALL          1e-2
+
+PetscReal HycoCondensedModesTolerance(HycoReducer t)
+{
+  return PetscMin(Condensing(t)->pod_tol, t->tol[HYCO_SEED_DISPLACEMENT]);
+}
+
+/* Halton's sequence in base b. */
+static PetscReal Halton(PetscInt i, PetscInt b)
+{
+  PetscReal value = 0, share = 1;
+
+  for (; i > 0; i /= b) {
+    share /= (PetscReal)b;
+    value += share * (PetscReal)(i % b);
+  }
+  return value;
+}
+
+static PetscInt NextPrime(PetscInt n)
+{
+  for (;;) {
+    PetscInt d = 2;
+
+    n++;
+    while (d * d <= n && n % d) d++;
+    if (d * d > n) return n;
+  }
+}
+
+static PetscInt Corners(HycoCondensed c)
+{
+  return 1 << PetscMin(c->dim, 5);
+}
+
+/* Sample number `number` of what training has seen, half a step beyond its values, within the ranges: the corners, then
+   points all over. */
+static void SamplePoint(HycoReducer t, PetscInt number, PetscReal mu[])
+{
+  const HycoCondensed c = Condensing(t)->condensed;
+  PetscInt base = 1;
+
+  for (PetscInt p = 0; p < c->dim; p++) {
+    PetscReal step = 0, lo = c->x[p][0], hi = c->x[p][c->n[p] - 1], share = p < 5 ? number >> p & 1 : 0;
+
+    base = NextPrime(base);
+    for (PetscInt k = 1; k < c->n[p]; k++) step = PetscMax(step, c->x[p][k] - c->x[p][k - 1]);
+    lo = PetscMin(lo, PetscMax(t->scene->lo[p], lo - step / 2));
+    hi = PetscMax(hi, PetscMin(t->scene->hi[p], hi + step / 2));
+    if (number >= Corners(c)) share = Halton(number - Corners(c) + 1, base);
+    mu[p] = lo + (hi - lo) * share;
+  }
+}
+
+/* Whether a sample stays out of the patterns, to judge them. */
+static PetscBool Held(HycoCondensed c, PetscInt number)
+{
+  return (PetscBool)(number >= Corners(c) && number % HELD == 0);
+}
+
+/* The forces at mu by the interpolated problem; zero where it is not solved. */
+static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscReal L[])
+{
+  const PetscReal *nearest = c->Lambda + (size_t)HycoCondensedNearest(c, mu, NULL) * (size_t)c->m;
+  PetscBool definite;
+  PetscInt its;
+  HycoLCPStatus status = HYCO_LCP_RAY;
+  const HycoLCP lcp = {.n = c->m, .M = c->M, .q = c->g, .symmetric = PETSC_TRUE, .factor = c->set_factor};
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
+  PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
+  for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(nearest[i] > 0);
+  if (definite) PetscCall(HycoLCPActiveSet(&lcp, c->active, L, &its, &status));
+  for (PetscInt i = 0; i < c->m; i++) L[i] = status == HYCO_LCP_SOLVED ? PetscMax(L[i], 0) : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The contacts that are active at one of two samples alone. What counts as active has one measure for all samples:
+   where gaps and loads vanish together, the forces are round-off, which differs from one number of ranks to the next.
+ */
+static PetscInt Differ(PetscInt m, const PetscReal a[], const PetscReal b[], PetscReal least)
+{
+  PetscInt n = 0;
+
+  for (PetscInt i = 0; i < m; i++) n += (a[i] > least) != (b[i] > least);
+  return n;
+}
+
+/* The distance of two samples, each parameter scaled to its training values. */
+static PetscReal Apart(HycoCondensed c, const PetscReal a[], const PetscReal b[])
+{
+  PetscReal most = 0;
+
+  for (PetscInt p = 0; p < c->dim; p++) {
+    if (c->n[p] > 1) most = PetscMax(most, PetscAbsReal(a[p] - b[p]) / (c->x[p][c->n[p] - 1] - c->x[p][0]));
+  }
+  return most;
+}
+
+/* A part of a way between two samples, and by how many active contacts these differ; 0: it is short enough. */
+typedef struct {
+  PetscInt from, to, differ;
+} Way;
+
+/* The point of sample k: halfway between the two neighbours on a way whose active contacts differ most, and which are
+   then neighbours no more; where none differ, the next point all over. Forces are affine in the parameters of affine
+   kind as long as a set stays, so that sets are what the patterns need, and many may pass in a small part of a way. */
+static void PointBetween(HycoReducer t, PetscInt k, Way way[], PetscInt *n_ways, PetscReal mu[])
+{
+  const PetscInt dim = Condensing(t)->condensed->dim;
+  PetscInt best = 0;
+
+  for (PetscInt j = 1; j < *n_ways; j++) best = way[j].differ > way[best].differ ? j : best;
+  if (!*n_ways || !way[best].differ) {
+    SamplePoint(t, k, mu + k * dim);
+    return;
+  }
+  for (PetscInt p = 0; p < dim; p++) mu[k * dim + p] = (mu[way[best].from * dim + p] + mu[way[best].to * dim + p]) / 2;
+  way[(*n_ways)++] = (Way){k, way[best].to, 0}; /* both are counted when the forces are there */
+  way[best].to = k;
+  way[best].differ = 0;
+}
+
+/* The largest training force. */
+static PetscReal Largest(HycoReducer t)
+{
+  const size_t n = (size_t)t->n_s * (size_t)Condensing(t)->condensed->m;
+  PetscReal largest = 0;
+
+  for (size_t i = 0; i < n; i++) largest = PetscMax(largest, t->Lambda[i]);
+  return largest;
+}
+
+/* n samples: their points (n x dim) and forces (m x n). */
+static PetscErrorCode SampleAll(HycoReducer t, PetscInt n, PetscReal mu[], PetscReal L[])
+{
+  HycoCondensed c = Condensing(t)->condensed;
+  const PetscInt dim = c->dim, m = c->m;
+  const PetscReal least = ACTIVE * Largest(t);
+  PetscInt n_ways = 0;
+  Way *way;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n + WAYS, &way));
+  for (PetscInt k = 0; k < n; k++) {
+    if (k < n / 2)
+      SamplePoint(t, k, mu + k * dim);
+    else
+      PointBetween(t, k, way, &n_ways, mu);
+    PetscCall(SampleForces(c, mu + k * dim, L + (size_t)k * (size_t)m));
+    if (k && k <= WAYS && k < n / 2) way[n_ways++] = (Way){k - 1, k, 0};
+    for (PetscInt j = 0; j < n_ways; j++) {
+      const PetscInt from = way[j].from, to = way[j].to;
+
+      if (from != k && to != k) continue;
+      way[j].differ = Apart(c, mu + from * dim, mu + to * dim) < LEAST_STEP
+                          ? 0
+                          : Differ(m, L + (size_t)from * (size_t)m, L + (size_t)to * (size_t)m, least);
+    }
+  }
+  PetscCall(PetscFree(way));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The part of a force outside the patterns' span. */
+static PetscReal Missed(const HycoResponses *x, PetscInt m, PetscReal L[])
+{
+  PetscReal rest = 0;
+
+  for (PetscInt j = 0; j < x->q; j++) {
+    PetscReal dot = 0;
+
+    for (PetscInt i = 0; i < m; i++) dot += x->Q[j * m + i] * L[i];
+    for (PetscInt i = 0; i < m; i++) L[i] -= dot * x->Q[j * m + i];
+  }
+  for (PetscInt i = 0; i < m; i++) rest += L[i] * L[i];
+  return PetscSqrtReal(rest);
+}
+
+/* Patterns of n forces (m x n), scaled so that all the samples count as the snapshots do. Rank 0. */
+static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
+{
+  HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt m = Condensing(t)->condensed->m,
+                 nodes = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
+  const PetscReal most = MOST_RESPONSES / ((PetscReal)(t->sizes[0] * t->sizes[3]) * (PetscReal)nodes);
+  PetscReal *sigma;
+  const PetscScalar *v;
+  Mat F, Q;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(PetscMax(m, n), &sigma));
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, L, &F));
+  PetscCall(HycoPOD(F, HycoCondensedModesTolerance(t), t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
+                    sigma));
+  PetscCall(MatDestroy(&F));
+  PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &x->Q));
+  PetscCall(PetscMalloc1(x->q + 1, &x->scale));
+  for (PetscInt j = 0; j < x->q; j++) x->scale[j] = sigma[j] * PetscSqrtReal((PetscReal)t->n_s / (PetscReal)n);
+  if (x->q) {
+    PetscCall(MatDenseGetArrayRead(Q, &v));
+    PetscCall(PetscArraycpy(x->Q, v, (size_t)m * (size_t)x->q));
+    PetscCall(MatDenseRestoreArrayRead(Q, &v));
+    PetscCall(MatDestroy(&Q));
+  }
+  PetscCall(PetscFree(sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the held samples miss of the patterns, over the displacement of the nearest snapshot or a hundredth of the
+   largest: no less than SHARE of them do. */
+static PetscErrorCode JudgePatterns(HycoReducer t, PetscInt n, const PetscReal mu[], PetscReal L[])
+{
+  HycoCondensed c = Condensing(t)->condensed;
+  PetscReal largest = 0, *missed;
+  PetscInt n_held = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &missed));
+  for (PetscInt k = 0; k < t->n_s; k++) largest = PetscMax(largest, t->U_norm[k]);
+  for (PetscInt k = 0; largest > 0 && k < n; k++) {
+    const PetscReal near = t->U_norm[c->sample[HycoCondensedNearest(c, mu + k * c->dim, NULL)]];
+
+    if (!Held(c, k)) continue;
+    missed[n_held++] =
+        Missed(&Condensing(t)->responses, c->m, L + (size_t)k * (size_t)c->m) / PetscMax(near, SMALL * largest);
+  }
+  PetscCall(PetscSortReal(n_held, missed));
+  Condensing(t)->responses.missed = n_held ? missed[(PetscInt)(SHARE * (PetscReal)(n_held - 1))] : 0;
+  PetscCall(PetscFree(missed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FindPatterns(HycoReducer t)
+{
+  HycoCondensed c = Condensing(t)->condensed;
+  const size_t m = (size_t)c->m;
+  const PetscReal share = PetscSqr((PetscReal)FREE_CONTACTS / (PetscReal)m);
+  const PetscInt n = c->m <= FREE_CONTACTS ? SAMPLES : PetscMax(LEAST_SAMPLES, (PetscInt)(share * SAMPLES));
+  PetscReal *mu, *L, *used;
+  PetscInt n_used = t->n_s;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedFillFields(t, PETSC_FALSE));
+  PetscCall(PetscMalloc3(n * c->dim, &mu, m * (size_t)n, &L, m * (size_t)(t->n_s + n), &used));
+  PetscCall(SampleAll(t, n, mu, L));
+  PetscCall(PetscArraycpy(used, t->Lambda, m * (size_t)t->n_s));
+  for (PetscInt k = 0; k < n; k++) {
+    if (!Held(c, k)) PetscCall(PetscArraycpy(used + m * (size_t)(n_used++), L + m * (size_t)k, m));
+  }
+  PetscCall(Decompose(t, n_used, used));
+  PetscCall(JudgePatterns(t, n, mu, L));
+  PetscCall(PetscFree3(mu, L, used));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The patterns on every rank. */
+static PetscErrorCode SpreadPatterns(HycoReducer t)
+{
+  HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt m = Condensing(t)->condensed->m;
+  PetscMPIInt size;
+
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(t), FindPatterns(t));
+  PetscCallMPI(MPI_Bcast(&x->q, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCall(PetscMPIIntCast(m * x->q, &size));
+  if (t->rank) {
+    PetscCall(PetscMalloc1(m * x->q + 1, &x->Q));
+    PetscCall(PetscMalloc1(x->q + 1, &x->scale));
+  }
+  PetscCallMPI(MPI_Bcast(x->Q, size, MPIU_REAL, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(x->scale, (PetscMPIInt)x->q, MPIU_REAL, 0, HycoComm(t)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Snapshots and responses, side by side. */
+static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
+{
+  HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt m = Condensing(t)->condensed->m,
+                 nodes = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
+  PetscInt lo, hi, lda[2];
+  PetscReal *P;
+  const PetscScalar *from;
+  PetscScalar *to;
+  Mat S;
+
+  PetscFunctionBegin;
+  x->n_columns = t->n_s + nodes * x->q;
+  PetscCall(HycoReducerGetDisplacements(t, store, &S));
+  PetscCall(
+      MatCreateDense(HycoComm(t), PETSC_DECIDE, PETSC_DECIDE, t->sizes[0] * t->sizes[3], x->n_columns, NULL, columns));
+  PetscCall(MatGetOwnershipRange(S, &lo, &hi));
+  PetscCall(MatDenseGetLDA(S, &lda[0]));
+  PetscCall(MatDenseGetLDA(*columns, &lda[1]));
+  PetscCall(MatDenseGetArrayRead(S, &from));
+  PetscCall(MatDenseGetArray(*columns, &to));
+  for (PetscInt k = 0; k < t->n_s; k++)
+    PetscCall(PetscArraycpy(to + (size_t)k * (size_t)lda[1], from + (size_t)k * (size_t)lda[0], hi - lo));
+  PetscCall(MatDenseRestoreArray(*columns, &to));
+  PetscCall(MatDenseRestoreArrayRead(S, &from));
+  PetscCall(MatDestroy(&S));
+  PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &P));
+  for (PetscInt j = 0; j < x->q; j++) {
+    for (PetscInt i = 0; i < m; i++) P[j * m + i] = x->scale[j] * x->Q[j * m + i];
+  }
+  PetscCall(HycoCondensedResponses(t, store, x->q, P, *columns, t->n_s));
+  PetscCall(PetscFree(P));
+  PetscCall(MatAssemblyBegin(*columns, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*columns, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* l, sigma, V_whole and VtU from all r modes V. */
+static PetscErrorCode TakeModes(HycoReducer t, Mat V, PetscInt n_sigma, PetscReal sigma[])
+{
+  HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt N = t->sizes[0] * t->sizes[3];
+
+  PetscFunctionBegin;
+  t->l = HycoPODRank(n_sigma, sigma, HycoCondensedModesTolerance(t), t->noise, t->max_modes);
+  HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoCondensedModesTolerance(t));
+  PetscCall(PetscFree(t->sigma));
+  t->sigma = sigma;
+  PetscCall(PetscFree(t->VtU));
+  PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
+  for (PetscInt k = 0; k < t->n_s; k++)
+    PetscCall(PetscArraycpy(t->VtU + k * t->l, x->C + (size_t)k * (size_t)x->r, t->l));
+  PetscCall(PetscFree(t->V_whole));
+  PetscCall(HycoReducerToRoot(t, V, PETSC_TRUE, &t->V_whole));
+  for (PetscInt i = 1; t->rank == 0 && i < N; i++)
+    PetscCall(PetscArraymove(t->V_whole + (size_t)i * (size_t)t->l, t->V_whole + (size_t)i * (size_t)x->r, t->l));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedFindModes(HycoReducer t, HycoSnapshots store)
+{
+  HycoResponses *x = &Condensing(t)->responses;
+  PetscReal *sigma;
+  Mat S, V;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedFlexibilities(t, store));
+  PetscCall(SpreadPatterns(t));
+  PetscCall(Columns(t, store, &S));
+  PetscCall(PetscMalloc1(x->n_columns + 1, &sigma));
+  HycoLogged(HYCO_EVENT_POD, HycoPOD(S, 0, t->noise, 0, &V, &x->r, sigma));
+  PetscCall(PetscMalloc1((size_t)x->r * (size_t)x->n_columns, &x->C));
+  PetscCall(HycoReducerMultiply(t, V, S, x->C));
+  PetscCall(TakeModes(t, V, PetscMin(t->sizes[0] * t->sizes[3], x->n_columns), sigma));
+  PetscCall(MatDestroy(&V));
+  PetscCall(MatDestroy(&S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

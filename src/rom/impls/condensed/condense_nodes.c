@@ -1,0 +1,242 @@
+/*
+  What a condensed training solves at the nodes of its stiffness: G = B K^-1 B^T, and later X = K^-1 B^T P for patterns
+  P of forces. Each is a file beside the snapshots, named by the node's parameters (and the patterns), so that a run
+  that was killed solves what is missing.
+*/
+#include <hycocondensed.h>
+#include <string.h>
+#include <unistd.h>
+
+/* What is solved: G (q = 0), or the responses to q patterns (m x q, on every rank). */
+typedef struct {
+  PetscInt q;
+  const PetscReal *P;
+} Task;
+
+/* The parameters of node k of G's grid (the first training value where G does not depend on one), and of the file. */
+static void StiffPoint(HycoCondensed c, PetscInt k, PetscReal mu[], PetscReal key[])
+{
+  const HycoTensor *t = &c->field[HYCO_FIELD_G].tensor;
+
+  for (PetscInt p = c->dim - 1; p >= 0; p--) {
+    mu[p] = c->x[p][k % t->n[p]];
+    key[p] = c->stiff[p] ? mu[p] : 0;
+    k /= t->n[p];
+  }
+}
+
+static PetscErrorCode Path(HycoReducer t, HycoSnapshots store, PetscInt k, const Task *task,
+                           char path[PETSC_MAX_PATH_LEN])
+{
+  HycoCondensed c = Condensing(t)->condensed;
+  PetscReal mu[HYCO_MAX_PARAMETERS], key[HYCO_MAX_PARAMETERS];
+  unsigned long long hash;
+
+  PetscFunctionBegin;
+  StiffPoint(c, k, mu, key);
+  hash = HycoHash(HYCO_HASH_START, key, (size_t)c->dim * sizeof(PetscReal));
+  hash = HycoHash(hash, task->P, (size_t)c->m * (size_t)task->q * sizeof(PetscReal));
+  PetscCall(PetscSNPrintf(path, PETSC_MAX_PATH_LEN, "%s/%s-%016llx.h5", store->folder,
+                          task->q ? "responses" : "flexibility", hash));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteOne(HycoSnapshots store, const char path[], const char name[], PetscInt rows, PetscInt cols,
+                               const PetscReal data[])
+{
+  char fingerprint[32];
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  snprintf(fingerprint, sizeof(fingerprint), "%016llx", store->fingerprint);
+  PetscCall(HycoH5Create(path, &h));
+  ierr = HycoH5WriteText(h, "fingerprint", fingerprint);
+  if (!ierr) ierr = HycoH5WriteReal(h, name, rows, cols, data);
+  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* n rows from `start`; data NULL: only that it is of this scene. */
+static PetscErrorCode ReadOpen(HycoSnapshots store, HycoH5 h, const char path[], const char name[], PetscInt start,
+                               PetscInt n, PetscInt cols, PetscReal data[])
+{
+  char mine[32], *text;
+  PetscBool same;
+
+  PetscFunctionBegin;
+  snprintf(mine, sizeof(mine), "%016llx", store->fingerprint);
+  PetscCall(HycoH5LoadText(h, "fingerprint", &text));
+  same = (PetscBool)(strcmp(text, mine) == 0);
+  PetscCall(PetscFree(text));
+  HycoCheck(same, "%s is of another scene or mesh; remove the folder %s, or name another with -hyco_snapshots", path,
+            store->folder);
+  if (data) PetscCall(HycoH5ReadRows(h, name, start, n, cols, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadOne(HycoSnapshots store, const char path[], const char name[], PetscInt start, PetscInt n,
+                              PetscInt cols, PetscReal data[])
+{
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  ierr = ReadOpen(store, h, path, name, start, n, cols, data);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* missing[]: the nodes of G's grid without a file. Rank 0. */
+static PetscErrorCode FindMissing(HycoReducer t, HycoSnapshots store, const Task *task, PetscInt *n_missing,
+                                  PetscInt missing[])
+{
+  const PetscInt n = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  *n_missing = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(Path(t, store, k, task, path));
+    if (access(path, F_OK))
+      missing[(*n_missing)++] = k;
+    else
+      PetscCall(ReadOne(store, path, "", 0, 0, 0, NULL));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One node of G's grid, solved and written. data: room for it. */
+static PetscErrorCode SolveOne(HycoReducer t, HycoSnapshots store, MPI_Comm group, HycoFOM fom, PetscInt node,
+                               const Task *task, PetscReal data[])
+{
+  PetscReal mu[HYCO_MAX_PARAMETERS], key[HYCO_MAX_PARAMETERS];
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  StiffPoint(Condensing(t)->condensed, node, mu, key);
+  PetscCall(Path(t, store, node, task, path));
+  if (task->q) {
+    PetscCall(HycoFOMResponses(fom, mu, task->q, task->P, data));
+    HycoOnRoot(group, WriteOne(store, path, "X", t->sizes[0] * t->sizes[3], task->q, data));
+  } else {
+    PetscCall(HycoFOMFlexibility(fom, mu, data));
+    HycoOnRoot(group, WriteOne(store, path, "G", Condensing(t)->condensed->field[HYCO_FIELD_G].rows, 1, data));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* This rank's group's run of the missing nodes. */
+static PetscErrorCode SolveGroup(HycoReducer t, HycoSnapshots store, MPI_Comm group, PetscInt color, PetscInt groups,
+                                 PetscInt n_missing, const PetscInt missing[], const Task *task)
+{
+  const size_t size = task->q ? (size_t)(t->sizes[0] * t->sizes[3]) * (size_t)task->q
+                              : (size_t)Condensing(t)->condensed->field[HYCO_FIELD_G].rows;
+  HycoFOM fom;
+  PetscReal *data;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMCreate(group, t->scene, &fom));
+  PetscCall(PetscMalloc1(size, &data));
+  for (PetscInt k = color * n_missing / groups; !ierr && k < (color + 1) * n_missing / groups; k++)
+    ierr = SolveOne(t, store, group, fom, missing[k], task, data);
+  PetscCall(PetscFree(data));
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All nodes of G's grid have a file. Collective. */
+static PetscErrorCode SolveMissing(HycoReducer t, HycoSnapshots store, const Task *task)
+{
+  PetscInt n_missing = 0, *missing, groups = 1, color;
+  PetscMPIInt size;
+  MPI_Comm group;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
+  PetscCall(PetscMalloc1(HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor), &missing));
+  HycoOnRoot(HycoComm(t), FindMissing(t, store, task, &n_missing, missing));
+  PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, HycoComm(t)));
+  if (n_missing) {
+    PetscCall(HycoSnapshotsChooseGroups(HycoComm(t), t->scene, n_missing, &groups));
+    color = (PetscInt)t->rank * groups / size;
+    PetscCallMPI(MPI_Comm_split(HycoComm(t), (PetscMPIInt)color, t->rank, &group));
+    HycoOnEach(HycoComm(t), SolveGroup(t, store, group, color, groups, n_missing, missing, task));
+    PetscCallMPI(MPI_Comm_free(&group));
+  }
+  PetscCall(PetscFree(missing));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* G at all nodes, from the files. Rank 0. */
+static PetscErrorCode ReadFlexibilities(HycoReducer t, HycoSnapshots store, const Task *task)
+{
+  HycoGridField *G = &Condensing(t)->condensed->field[HYCO_FIELD_G];
+  const PetscInt n = HycoTensorSize(&G->tensor);
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(G->data));
+  PetscCall(PetscMalloc1((size_t)G->rows * (size_t)n, &G->data));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(Path(t, store, k, task, path));
+    PetscCall(ReadOne(store, path, "G", 0, G->rows, 1, G->data + (size_t)k * (size_t)G->rows));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedFlexibilities(HycoReducer t, HycoSnapshots store)
+{
+  const Task task = {0, NULL};
+
+  PetscFunctionBegin;
+  PetscCall(SolveMissing(t, store, &task));
+  HycoOnRoot(HycoComm(t), ReadFlexibilities(t, store, &task));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The columns of S from `first` on, this rank's rows: those of each node's file. */
+static PetscErrorCode ReadResponses(HycoReducer t, HycoSnapshots store, const Task *task, Mat S, PetscInt first)
+{
+  const PetscInt n = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor), q = task->q;
+  PetscInt lo, hi, lda;
+  PetscScalar *s;
+  PetscReal *rows;
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(S, &lo, &hi));
+  PetscCall(MatDenseGetLDA(S, &lda));
+  PetscCall(PetscMalloc1((size_t)(hi - lo) * (size_t)q + 1, &rows));
+  PetscCall(MatDenseGetArray(S, &s));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(Path(t, store, k, task, path));
+    PetscCall(ReadOne(store, path, "X", lo, hi - lo, q, rows));
+    for (PetscInt j = 0; j < q; j++) {
+      PetscScalar *column = s + (size_t)(first + k * q + j) * (size_t)lda;
+
+      for (PetscInt i = 0; i < hi - lo; i++) column[i] = rows[(size_t)i * (size_t)q + (size_t)j];
+    }
+  }
+  PetscCall(MatDenseRestoreArray(S, &s));
+  PetscCall(PetscFree(rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedResponses(HycoReducer t, HycoSnapshots store, PetscInt q, const PetscReal P[], Mat S,
+                                      PetscInt first)
+{
+  const Task task = {q, P};
+
+  PetscFunctionBegin;
+  if (!q) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SolveMissing(t, store, &task));
+  HycoOnEach(HycoComm(t), ReadResponses(t, store, &task, S, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,506 @@
+/*
+  The condensed model, online: the exact dual problem of linear elasticity, small and dense in the forces, with its
+  matrix and vector interpolated over the parameters (hycocondensed.h). Interpolated entry by entry, G may lose its
+  definiteness between nodes: bounds of the nodes' matrices by one of them, found in training, show that it does not, or
+  else a Cholesky factorisation looks; a point where it does is refused. A definite G gives one solution, so the start
+  of the active set, the forces of the nearest training point, decides nothing but the time.
+*/
+#include <hycocondensed.h>
+#include <hycoromtypes.h>
+#include <petscblaslapack.h>
+#include <petscviewer.h>
+
+const char *const HycoGridFieldNames[] = {"G", "g", "H", "a"};
+
+/* An eigenvalue of G that is less negative than this share of its largest diagonal entry is round-off. */
+#define SEMIDEFINITE  1e-12
+#define MANY_CONTACTS 600
+
+PetscErrorCode HycoCondensedCreate(PetscInt dim, PetscInt m, PetscInt l, HycoCondensed *condensed)
+{
+  HycoCondensed c;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&c));
+  c->dim = dim;
+  c->m = m;
+  c->l = l;
+  c->hopeless = -1;
+  *condensed = c;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedFree(HycoCondensed *condensed)
+{
+  HycoCondensed c = *condensed;
+
+  PetscFunctionBegin;
+  if (!c) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt p = 0; p < c->dim; p++) PetscCall(PetscFree(c->x[p]));
+  for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) PetscCall(PetscFree(c->field[f].data));
+  PetscCall(PetscFree(c->Lambda));
+  PetscCall(PetscFree(c->bounds));
+  PetscCall(PetscFree(c->law));
+  PetscCall(PetscFree(c->flat));
+  PetscCall(PetscFree(c->sample));
+  PetscCall(PetscFree(c->probe));
+  PetscCall(PetscFree(c->inverse));
+  PetscCall(PetscFree(c->theta_scale));
+  PetscCall(PetscFree(c->node_stiff));
+  PetscCall(PetscFree(c->node_load));
+  PetscCall(PetscFree(c->packed));
+  PetscCall(PetscFree(c->M));
+  PetscCall(PetscFree(c->work));
+  PetscCall(PetscFree(c->g));
+  PetscCall(PetscFree(c->H));
+  PetscCall(PetscFree(c->a));
+  PetscCall(PetscFree(c->active));
+  PetscCall(HycoSetFactorDestroy(&c->set_factor));
+  PetscCall(PetscFree(*condensed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedAllocate(HycoCondensed c)
+{
+  const PetscInt rows[HYCO_N_FIELDS] = {c->m * (c->m + 1) / 2, c->m, c->l * c->m, c->l};
+
+  PetscFunctionBegin;
+  for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) {
+    HycoGridField *field = &c->field[f];
+    const PetscBool all = (PetscBool)(f == HYCO_FIELD_GAP || f == HYCO_FIELD_FREE);
+
+    field->rows = rows[f];
+    field->tensor.dim = c->dim;
+    for (PetscInt p = 0; p < c->dim; p++) {
+      field->tensor.n[p] = all || c->stiff[p] ? c->n[p] : 1;
+      field->tensor.x[p] = c->x[p];
+      field->tensor.degree[p] = field->tensor.n[p] - 1;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
+{
+  const HycoGridField *gap = &c->field[HYCO_FIELD_GAP];
+  const size_t m = (size_t)c->m;
+
+  PetscFunctionBegin;
+  c->gap_size = 0;
+  for (size_t k = 0; k < (size_t)HycoTensorSize(&gap->tensor) * m; k++)
+    c->gap_size = PetscMax(c->gap_size, PetscAbsReal(gap->data[k]));
+  PetscCall(PetscFree(c->H));
+  PetscCall(PetscFree(c->a));
+  PetscCall(PetscMalloc1(c->l * c->m + 1, &c->H));
+  PetscCall(PetscMalloc1(c->l + 1, &c->a));
+  if (c->M) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(m * (m + 1) / 2 + 1, &c->packed));
+  PetscCall(PetscMalloc1(m * m + 1, &c->M));
+  PetscCall(PetscMalloc1(m + 1, &c->g));
+  PetscCall(PetscCalloc1(m + 1, &c->active));
+  PetscCall(HycoSetFactorCreate(c->m, &c->set_factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define TILE 64
+
+/* Both triangles of M from the columns of the lower one, by tiles, so that the transposed entries stay near. */
+static void Unpack(PetscInt m, const PetscReal packed[], PetscReal M[])
+{
+  for (PetscInt jb = 0; jb < m; jb += TILE) {
+    for (PetscInt ib = jb; ib < m; ib += TILE) {
+      for (PetscInt j = jb; j < PetscMin(jb + TILE, m); j++) {
+        const PetscReal *column = packed + (size_t)j * (size_t)(2 * m - j + 1) / 2;
+
+        for (PetscInt i = PetscMax(ib, j); i < PetscMin(ib + TILE, m); i++) {
+          M[(size_t)j * (size_t)m + (size_t)i] = column[i - j];
+          M[(size_t)i * (size_t)m + (size_t)j] = column[i - j];
+        }
+      }
+    }
+  }
+}
+
+/* Whether a packed matrix, shifted by a share of its largest diagonal entry, has a Cholesky factor. */
+static PetscErrorCode HasFactor(HycoCondensed c, const PetscReal packed[], PetscReal share, PetscBool *definite)
+{
+  PetscReal largest = 0;
+  PetscBLASInt m, info;
+
+  PetscFunctionBegin;
+  if (!c->work) PetscCall(PetscMalloc1((size_t)c->m * (size_t)c->m, &c->work));
+  Unpack(c->m, packed, c->work);
+  for (PetscInt i = 0; i < c->m; i++) largest = PetscMax(largest, c->work[(size_t)i * (size_t)(c->m + 1)]);
+  for (PetscInt i = 0; i < c->m; i++) c->work[(size_t)i * (size_t)(c->m + 1)] += share * largest;
+  PetscCall(PetscBLASIntCast(c->m, &m));
+  LAPACKpotrf_("L", &m, c->work, &m, &info);
+  *definite = (PetscBool)(info == 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The narrowest of some intervals about the ratio of the traces with lower R <= G_k <= upper R, R the middle node's. */
+static PetscErrorCode BoundNode(HycoCondensed c, const PetscReal R[], const PetscReal G[], PetscReal bound[2])
+{
+  static const PetscReal widths[] = {0.01, 0.05, 0.2, 0.5};
+  const PetscInt rows = c->field[HYCO_FIELD_G].rows;
+  PetscReal *difference, trace[2] = {0, 0};
+  PetscBool definite = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  bound[0] = bound[1] = 0; /* none */
+  PetscCall(PetscMalloc1(rows, &difference));
+  for (PetscInt j = 0, at = 0; j < c->m; at += c->m - j++) {
+    trace[0] += R[at];
+    trace[1] += G[at];
+  }
+  for (int k = 0; k < 4 && !definite; k++) {
+    const PetscReal low = (1 - widths[k]) * trace[1] / trace[0], high = (1 + widths[k]) * trace[1] / trace[0];
+
+    for (PetscInt r = 0; r < rows; r++) difference[r] = G[r] - low * R[r];
+    PetscCall(HasFactor(c, difference, 0, &definite));
+    if (!definite) continue;
+    for (PetscInt r = 0; r < rows; r++) difference[r] = high * R[r] - G[r];
+    PetscCall(HasFactor(c, difference, 0, &definite));
+    if (!definite) continue;
+    bound[0] = low;
+    bound[1] = high;
+  }
+  PetscCall(PetscFree(difference));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedBound(HycoCondensed c)
+{
+  const HycoGridField *G = &c->field[HYCO_FIELD_G];
+  const PetscInt n = HycoTensorSize(&G->tensor);
+  const PetscReal *R = G->data + (size_t)(n / 2) * (size_t)G->rows;
+  PetscBool definite;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(c->bounds));
+  PetscCall(PetscFree(c->law));
+  PetscCall(PetscFree(c->flat));
+  PetscCall(PetscCalloc1(2 * n, &c->bounds));
+  PetscCall(HasFactor(c, R, 0, &definite));
+  for (PetscInt k = 0; definite && k < n; k++) {
+    if (k == n / 2)
+      c->bounds[2 * k] = c->bounds[2 * k + 1] = 1;
+    else
+      PetscCall(BoundNode(c, R, G->data + (size_t)k * (size_t)G->rows, c->bounds + 2 * k));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether sum of w_k G_k >= (sum of w_k times its lower or, where w_k < 0, upper bound) R is definite by that alone. */
+static PetscErrorCode KnownDefinite(HycoCondensed c, const PetscReal mu[], PetscInt axis, PetscInt skip,
+                                    PetscBool *known)
+{
+  const HycoTensor *t = &c->field[HYCO_FIELD_G].tensor;
+  const PetscInt n = HycoTensorSize(t);
+  PetscReal *w, sum = 0;
+
+  PetscFunctionBegin;
+  *known = PETSC_TRUE;
+  PetscCall(PetscMalloc1(n, &w));
+  PetscCall(HycoTensorWeights(t, mu, axis, skip, w));
+  for (PetscInt k = 0; k < n; k++) {
+    sum += w[k] * c->bounds[2 * k + (w[k] < 0)];
+    if (c->bounds[2 * k] <= 0 && w[k] < 0) *known = PETSC_FALSE;
+  }
+  *known = (PetscBool)(*known && sum > 1e-3);
+  PetscCall(PetscFree(w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedFlexibility(HycoCondensed c, const PetscReal mu[], PetscInt axis, PetscInt skip,
+                                        PetscBool *definite)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_G], mu, axis, skip, c->packed));
+  Unpack(c->m, c->packed, c->M);
+  HycoSetFactorForget(c->set_factor);
+  PetscCall(KnownDefinite(c, mu, axis, skip, definite));
+  if (!*definite) PetscCall(HasFactor(c, c->packed, SEMIDEFINITE, definite));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* G and H, unless their parameters are as they were. */
+static PetscErrorCode BringStiffness(HycoROM m, const PetscReal mu[])
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+  PetscBool same = c->current, definite;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < c->dim; p++) same = (PetscBool)(same && (!c->stiff[p] || c->at[p] == mu[p]));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  c->current = PETSC_FALSE;
+  PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
+  PetscCall(PetscObjectStateIncrease((PetscObject)c->flexibility));
+  HycoCheckModel(
+      definite,
+      "the interpolated flexibility is not positive definite here (one value left out: error %.1e): train on "
+      "more values of the parameters that reach the stiffness",
+      (double)c->errors[0]);
+  PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_H], mu, -1, -1, c->H));
+  PetscCall(PetscArraycpy(c->at, mu, c->dim));
+  c->current = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal Width(HycoCondensed c, PetscInt p)
+{
+  return c->n[p] > 1 ? c->x[p][c->n[p] - 1] - c->x[p][0] : 1;
+}
+
+PetscInt HycoCondensedNearest(HycoCondensed c, const PetscReal mu[], PetscReal *distance2)
+{
+  PetscReal sum = 0;
+  PetscInt node = 0;
+
+  for (PetscInt p = 0; p < c->dim; p++) {
+    PetscInt nearest = 0;
+
+    for (PetscInt k = 1; k < c->n[p]; k++) {
+      if (PetscAbsReal(c->x[p][k] - mu[p]) < PetscAbsReal(c->x[p][nearest] - mu[p])) nearest = k;
+    }
+    node = node * c->n[p] + nearest;
+    sum += PetscSqr((c->x[p][nearest] - mu[p]) / Width(c, p));
+  }
+  if (distance2) *distance2 = sum;
+  return node;
+}
+
+/* The active contacts of the nearest training point, or of the last prediction where that is nearer. The solution does
+   not depend on it: it is that of the last set's equations. */
+static void StartSet(HycoCondensed c, const PetscReal mu[])
+{
+  PetscReal there, back = 0;
+  const PetscInt node = HycoCondensedNearest(c, mu, &there);
+
+  for (PetscInt p = 0; p < c->dim; p++) back += PetscSqr((c->last[p] - mu[p]) / Width(c, p));
+  for (PetscInt i = 0; (!c->solved || there < back) && i < c->m; i++)
+    c->active[i] = (PetscBool)(c->Lambda[(size_t)node * (size_t)c->m + (size_t)i] > 0);
+}
+
+/* The forces are in model->Lambda. */
+static PetscErrorCode SolveForces(HycoROM m, const PetscReal mu[])
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+  HycoPrediction *p = &m->prediction;
+  const char *method;
+
+  PetscFunctionBegin;
+  StartSet(c, mu);
+  PetscCall(HycoSolverSetStartSet(m->solver, c->active));
+  PetscCall(HycoSolverSolve(m->solver, NULL, c->forces));
+  PetscCall(HycoSolverGetReason(m->solver, &p->reason));
+  PetscCall(HycoSolverGetIterations(m->solver, &p->iterations));
+  PetscCall(HycoSolverGetKKT(m->solver, &p->kkt));
+  PetscCall(HycoSolverGetMethod(m->solver, &method));
+  PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
+  c->solved = (PetscBool)(p->reason == HYCO_CONVERGED);
+  for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(m->Lambda[i] > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* gamma = a - H L, and U = u0 + V gamma on the nodes of the reduced mesh. */
+static PetscErrorCode Displacements(HycoROM m, const PetscReal mu[])
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+  const PetscInt l = m->l;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedEvaluate(c, HYCO_FIELD_FREE, mu, -1, -1, c->a));
+  for (PetscInt j = 0; j < l; j++) {
+    m->gamma[j] = c->a[j];
+    for (PetscInt i = 0; i < c->m; i++) m->gamma[j] -= c->H[j * c->m + i] * m->Lambda[i];
+  }
+  if (!c->exact_gap) PetscCall(HycoCondensedBringGap(c, mu));
+  PetscCall(HycoROMExpand(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+  HycoPrediction *p = &m->prediction;
+  PetscReal begin = HycoNow(), solve;
+
+  PetscFunctionBegin;
+  PetscCall(BringStiffness(m, mu));
+  PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
+  solve = HycoNow();
+  p->seconds.factor = 0;
+  p->seconds.assemble = solve - begin;
+  PetscCall(SolveForces(m, mu));
+  PetscCall(PetscArraycpy(c->last, mu, c->dim));
+  p->seconds.solve = HycoNow() - solve;
+  PetscCall(Displacements(m, mu));
+  p->interpolation_error = c->errors[2]; /* of an older file: HycoTrustEstimate() has newer ones' */
+  for (PetscInt q = 0; q < c->dim; q++) {
+    if (!c->affine[q]) p->interpolation_error *= HycoPolynomialGrowth(c->n[q], c->x[q], mu[q]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* w = g + G L on the arrays of the condensed model. */
+static PetscErrorCode CreateSystem(HycoROM m)
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+  Vec g;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, c->m, c->m, c->M, &c->flexibility));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, c->m, c->g, &g));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, c->m, m->Lambda, &c->forces));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &c->system));
+  PetscCall(HycoSystemSetFlexibility(c->system, c->flexibility, g));
+  PetscCall(HycoSolverSetSystem(m->solver, c->system));
+  PetscCall(VecDestroy(&g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoROM m)
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetUpAll(m));
+  PetscCall(HycoCondensedPrepare(c));
+  c->given = (HycoGapSource){m->fe, &m->pairs, m->rows};
+  c->scene = m->scene;
+  if (c->exact_loads) PetscCall(HycoCondensedPrepareLoads(c));
+  PetscCall(CreateSystem(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  contacts: %d; flexibility at %d points, gap without forces at %d\n",
+                                   (int)c->m, (int)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor),
+                                   (int)HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor)));
+  for (PetscInt p = 0; p < c->dim; p++)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %d values; degree %d of the flexibility, %d of the gap%s\n",
+                                     m->scene->parameter[p], (int)c->n[p], (int)c->field[HYCO_FIELD_G].tensor.degree[p],
+                                     (int)c->field[HYCO_FIELD_GAP].tensor.degree[p],
+                                     c->affine[p] ? " (affine: exact)" : ""));
+  if (c->exact_gap)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  from the scene itself: gaps%s\n", c->exact_loads ? ", loads" : ""));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  one value left out, relative: flexibility %.1e, gap %.1e, forces %.1e\n",
+                                   (double)c->errors[0], (double)c->errors[1], (double)c->errors[2]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  fields and stresses on %d of %d elements, or the whole mesh\n",
+                                   (int)m->mesh->n_cells, (int)m->whole_cells));
+  if (!m->trust.n)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors by values left out%s\n",
+                                     !c->law && c->errors_u[0] < 0 ? ", and none of u: an older file" : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Reset(HycoROM m)
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemDestroy(&c->system));
+  PetscCall(MatDestroy(&c->flexibility));
+  PetscCall(VecDestroy(&c->forces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoROM m)
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedFree(&c));
+  m->data = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points of training are chosen where none are given: they are reported. */
+static void ReportPoints(HycoReducer t, HycoCondensed c, HycoTraining *r)
+{
+  const char *name = c->hopeless < 0 ? "" : t->scene->parameter[c->hopeless];
+
+  if (!c->chosen || c->target_met) return;
+  if (c->hopeless < 0)
+    snprintf(r->missed, sizeof(r->missed),
+             "-hyco_condensed_tol was not reached: the forces' error, one value left out, is %.1e, and %.1e was asked; "
+             "raise -hyco_condensed_max_values, which is %d, or -hyco_condensed_tol",
+             (double)c->errors[2], (double)Condensing(t)->tol, (int)Condensing(t)->max_values);
+  else
+    snprintf(r->missed, sizeof(r->missed),
+             "-hyco_condensed_tol was not reached: with %d values of %s the forces' error, one of them left out, is "
+             "%.1e, and hardly falls as values are added, where %.1e was asked: the stiffness or the contacts do not "
+             "depend smoothly on %s (a kink, as of abs or max, a jump); train a hybrid model, or raise "
+             "-hyco_condensed_tol",
+             (int)c->n[c->hopeless], name, (double)c->by_parameter[c->hopeless], (double)Condensing(t)->tol, name);
+}
+
+static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+{
+  HycoCondensed c = (HycoCondensed)m->data;
+  const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_G].tensor);
+
+  PetscFunctionBegin;
+  r->n_flexibilities = n;
+  PetscCall(HycoTrainingAddFact(r, "n_flexibilities", (PetscReal)n));
+  PetscCall(HycoTrainingAddFact(r, "left_out_flexibility_gap_forces", 0));
+  r->fact[r->n_facts - 1].n = 3;
+  PetscCall(PetscArraycpy(r->fact[r->n_facts - 1].value, c->errors, 3));
+  snprintf(
+      r->summary, sizeof(r->summary),
+      "condensed: %d snapshots, flexibility at %d points; one training value left out, relative: flexibility %.1e, "
+      "gap %.1e, forces %.1e; %d displacement modes\n",
+      (int)r->n_samples, (int)n, (double)c->errors[0], (double)c->errors[1], (double)c->errors[2], (int)r->n_modes);
+  ReportPoints(t, c, r);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
+{
+  const PetscReal m = t->sizes[2];
+
+  return m * m * ((PetscReal)a->n_flexibilities + m / 6.0) + 2 * (PetscReal)a->n_modes * (PetscReal)a->rid_contacts;
+}
+
+/* Its samples fill a disk where the contacts are many: then only when it is asked for. */
+static PetscBool Offers(HycoReducer t, PetscBool targets)
+{
+  (void)targets;
+  return (PetscBool)(t->sizes[2] > 0 && t->sizes[2] <= MANY_CONTACTS);
+}
+
+PetscErrorCode HycoROMCreate_Condensed(HycoROM m)
+{
+  static const HycoROMTraits traits = {
+      .title = "condensed", .settings = HYCO_SETTINGS_NONE, .constrains = PETSC_TRUE, .forces = PETSC_TRUE};
+  static const HycoROMOps ops = {.setfromoptions = HycoCondensedSetFromOptions,
+                                 .resettraining = HycoCondensedResetTraining,
+                                 .begin = HycoCondensedBegin,
+                                 .startpoints = HycoCondensedStartPoints,
+                                 .choosepoints = HycoCondensedChoosePoints,
+                                 .modes = HycoCondensedFindModes,
+                                 .build = HycoCondensedBuild,
+                                 .report = Report,
+                                 .cost = Cost,
+                                 .offers = Offers,
+                                 .setup = SetUp,
+                                 .reset = Reset,
+                                 .solve = Solve,
+                                 .features = HycoCondensedFeatures,
+                                 .estimate = HycoCondensedEstimate,
+                                 .view = View,
+                                 .save = HycoCondensedSave,
+                                 .load = HycoCondensedLoad,
+                                 .destroy = Destroy};
+  HycoCondensed c;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCondensedCreate(0, 0, 0, &c));
+  PetscCall(HycoROMSetOps(m, &ops, &traits, c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,206 @@
+/*
+  The reduced stiffness as a polynomial of the parameters that reach it. Moduli enter K linearly, and maps that stretch
+  a body along its axes quadratically; the reduced matrix, sums of K's entries with constant weights, is then a
+  polynomial too, and its values at few parameter values give it everywhere, without any cell of the RID. Training
+  finds the degrees, checks them, and keeps the values in the file (training/tabulate.c).
+*/
+#include <hycotable.h>
+#include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
+#include <petscviewer.h>
+
+PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim, PetscInt entries, HycoTable *table)
+{
+  HycoTable t;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&t));
+  *table = t;
+  t->n = -1;
+  t->values.rows = entries;
+  t->values.tensor.dim = dim;
+  for (PetscInt p = 0; p < dim; p++) {
+    HycoDuplicate(n[p], x[p], &t->x[p]);
+    t->values.tensor.n[p] = n[p];
+    t->values.tensor.degree[p] = n[p] - 1;
+    t->values.tensor.x[p] = t->x[p];
+  }
+  PetscCall(PetscMalloc1((size_t)entries * (size_t)HycoTensorSize(&t->values.tensor), &t->values.data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableDestroy(HycoTable *table)
+{
+  HycoTable t = *table;
+
+  PetscFunctionBegin;
+  if (!t) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt p = 0; p < t->values.tensor.dim; p++) PetscCall(PetscFree(t->x[p]));
+  PetscCall(PetscFree(t->values.data));
+  PetscCall(PetscFree(t->start));
+  PetscCall(PetscFree(t->column));
+  PetscCall(PetscFree(*table));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableKeepPattern(HycoROM m, HycoTable t)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscInt *start, *column;
+  PetscInt n;
+  PetscBool dense, done;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &dense));
+  if (dense) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &column, &done));
+  t->n = n;
+  HycoDuplicate(n + 1, start, &t->start);
+  HycoDuplicate(start[n], column, &t->column);
+  PetscCall(MatRestoreRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &column, &done));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableCreateSparse(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoTable t = g->table;
+
+  PetscFunctionBegin;
+  HycoCheck(t->n == m->n, "%s: the table of the reduced stiffness has %d rows, the matrix %d: train the model again",
+            m->path, (int)t->n, (int)m->n);
+  PetscCall(MatCreate(PETSC_COMM_SELF, &g->Kr));
+  PetscCall(MatSetSizes(g->Kr, m->n, m->n, m->n, m->n));
+  PetscCall(MatSetType(g->Kr, MATSEQAIJ));
+  PetscCall(MatSeqAIJSetPreallocationCSR(g->Kr, t->start, t->column, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscInt n;
+  PetscScalar *a;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducedEntries(m, &n, &a));
+  HycoCheck(n == g->table->values.rows,
+            "%s: the table of the reduced stiffness has %d entries, the matrix %d: train the model again", m->path,
+            (int)g->table->values.rows, (int)n);
+  PetscCall(HycoGridFieldEvaluate(&g->table->values, mu, -1, -1, a));
+  PetscCall(PetscObjectStateIncrease((PetscObject)g->Kr));
+  PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoTensor *t = &g->table->values.tensor;
+
+  PetscFunctionBegin;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  the reduced stiffness is a polynomial, tabulated at"));
+  for (PetscInt p = 0, n = 0; p < t->dim; p++) {
+    if (t->n[p] > 1)
+      PetscCall(
+          PetscViewerASCIIPrintf(viewer, "%s %d values of %s", n++ ? " x" : "", (int)t->n[p], m->scene->parameter[p]));
+  }
+  PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableSave(HycoROM m, HycoH5 h)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoTable t = g->table;
+  const HycoTensor *tensor = &t->values.tensor;
+  PetscReal *x;
+  PetscInt all = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < tensor->dim; p++) all += tensor->n[p];
+  PetscCall(PetscMalloc1(all + 1, &x));
+  all = 0;
+  for (PetscInt p = 0; p < tensor->dim; p++) {
+    for (PetscInt k = 0; k < tensor->n[p]; k++) x[all++] = t->x[p][k];
+  }
+  PetscCall(HycoH5WriteInt(h, "table/counts", tensor->dim, 1, tensor->n));
+  if (t->n >= 0) PetscCall(HycoH5WriteInt(h, "table/start", t->n + 1, 1, t->start));
+  if (t->n >= 0) PetscCall(HycoH5WriteInt(h, "table/column", t->values.rows, 1, t->column));
+  PetscCall(HycoH5WriteReal(h, "table/parameters", all, 1, x));
+  PetscCall(HycoH5WriteReal(h, "table/stiffness", HycoTensorSize(tensor), t->values.rows, t->values.data));
+  PetscCall(PetscFree(x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Ascending, as many as `count` says for each parameter. */
+static PetscErrorCode CheckParameters(HycoROM m, const PetscInt count[], const PetscReal x[])
+{
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < m->scene->n_parameters; p++) {
+    for (PetscInt k = 0; k < count[p]; k++, x++)
+      HycoCheck(!k || *x > x[-1], "%s: table/parameters is damaged", m->path);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of a sparse matrix: they lie one behind the other, their columns ascend. */
+static PetscErrorCode LoadPattern(HycoROM m, HycoH5 h)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoTable t = g->table;
+  PetscInt one = 1, n = -1, *entries = &t->values.rows;
+  PetscBool good;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadInt(h, "table/start", 0, *entries, &n, &one, &t->start));
+  t->n = n - 1;
+  PetscCall(HycoH5LoadInt(h, "table/column", 0, PetscMax(t->n - 1, 0), entries, &one, &t->column));
+  good = (PetscBool)(n > 1 && t->start[0] == 0 && t->start[n - 1] == *entries);
+  for (PetscInt i = 0; i < t->n && good; i++) {
+    good = (PetscBool)(t->start[i + 1] >= t->start[i]);
+    for (PetscInt k = t->start[i] + 1; k < t->start[i + 1] && good; k++)
+      good = (PetscBool)(t->column[k] > t->column[k - 1]);
+  }
+  HycoCheck(good, "%s: table/start is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The table, without a sparse matrix's rows; the caller frees what was read, of a refused file too. */
+static PetscErrorCode LoadValues(HycoROM m, HycoH5 h, PetscInt **count, PetscReal **x, PetscReal **data)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscInt dim = m->scene->n_parameters, one = 1, all = 0, nodes = 1, rows = -1;
+  PetscReal *of[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadInt(h, "table/counts", 1, 16, &dim, &one, count));
+  for (PetscInt p = 0; p < dim; p++) {
+    all += (*count)[p];
+    nodes *= (*count)[p];
+    HycoCheck(nodes <= HYCO_TABLE_NODES, "%s: table/counts is damaged", m->path);
+  }
+  PetscCall(HycoH5LoadReal(h, "table/parameters", &all, &one, x));
+  PetscCall(CheckParameters(m, *count, *x));
+  PetscCall(HycoH5LoadReal(h, "table/stiffness", &nodes, &rows, data));
+  for (PetscInt p = 0, at = 0; p < dim; at += (*count)[p++]) of[p] = *x + at;
+  PetscCall(HycoTableCreate(*count, of, dim, rows, &g->table));
+  PetscCall(PetscArraycpy(g->table->values.data, *data, (size_t)nodes * (size_t)rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTableLoad(HycoROM m, HycoH5 h)
+{
+  PetscInt *count = NULL;
+  PetscReal *x = NULL, *data = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = LoadValues(m, h, &count, &x, &data);
+  PetscCall(PetscFree(data));
+  PetscCall(PetscFree(x));
+  PetscCall(PetscFree(count));
+  PetscCall(ierr);
+  if (HycoH5Has(h, "table/start")) PetscCall(LoadPattern(m, h));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,339 @@
+/*
+  The online phase: the hybrid system (38) assembled on the RID alone and solved.
+
+  x = (gamma, U_fe): POD coefficients and full-order unknowns. With the modes zeroed on the full-order unknowns,
+
+      U[A u I] = Vp gamma + E x_fe      test space: the same restricted to A      (39)-(40)
+
+  (hybrid all: every unknown of A is full order and gamma = G U[A] is no unknown.) reduced.c fills the system.
+*/
+#include <hycoalgorithms.h>
+#include <hycotable.h>
+#include <petscblaslapack.h>
+
+/* Beyond this many unknowns the reduced matrix is stored sparse (a dense border of l modes). */
+#define HYCO_DENSE_MAX 700
+
+PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscInt l = m->l, n = m->n_fe;
+  PetscReal *X, *N, *weight;
+  PetscBLASInt lb, nb, info;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMReset(m));
+  PetscCall(PetscFree(g->G));
+  g->ridge = ridge;
+  PetscCall(
+      PetscMalloc1(l * n, &g->G)); /* row major l x n is column major n x l: solve N Z = X^T, l x n column major */
+  PetscCall(PetscMalloc3(l * n, &X, l * l, &N, l, &weight));
+  for (PetscInt j = 0; j < l; j++) weight[j] = ridge > 0 ? m->sigma[j] / m->sigma[0] : 1;
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt j = 0; j < l; j++) X[k * l + j] = m->V[m->fe_dof[k] * l + j] * weight[j];
+  }
+  for (PetscInt i = 0; i < l; i++) {
+    for (PetscInt j = 0; j < l; j++) {
+      N[j * l + i] = i == j ? ridge : 0;
+      for (PetscInt k = 0; k < n; k++) N[j * l + i] += X[k * l + i] * X[k * l + j];
+    }
+  }
+  PetscCall(PetscBLASIntCast(l, &lb));
+  PetscCall(PetscBLASIntCast(n, &nb));
+  LAPACKpotrf_("U", &lb, N, &lb, &info);
+  HycoCheckModel(!info || ridge > 0,
+                 "-hyco_hybrid_ridge 0: the %d modes are not independent on the %d unknowns of A; take -1", (int)l,
+                 (int)n);
+  if (!info) LAPACKpotrs_("U", &lb, &nb, N, &lb, X, &lb, &info);
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt j = 0; j < l; j++) g->G[j * n + k] = info ? 0 : X[k * l + j] * weight[j];
+  }
+  PetscCall(PetscFree3(X, N, weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Places of the full-order unknowns, modes zeroed on them. */
+static PetscErrorCode SetUpBasis(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscInt n_dof = m->fe->n_dof, l = m->l;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n_dof, &g->fe_at));
+  HycoDuplicate(n_dof * l, m->V, &g->Vp);
+  for (PetscInt k = 0; k < n_dof; k++) g->fe_at[k] = -1;
+  for (PetscInt k = 0; k < m->n_fe; k++) {
+    g->fe_at[m->fe_dof[k]] = k;
+    PetscCall(PetscArrayzero(g->Vp + m->fe_dof[k] * l, l));
+  }
+  g->n_free = m->hybrid == HYCO_HYBRID_ALL ? 0 : l;
+  m->n = g->n_free + m->n_fe;
+  if (!g->contact) m->n_L = m->m; /* else the type has said it */
+  HycoCheckModel(m->n > 0, "the model has no unknown: every training solution is zero");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CreateReduced(HycoROM m, PetscInt rows, PetscInt cols, PetscBool dense, Mat *A)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscFunctionBegin;
+  if (dense)
+    PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, rows, cols, NULL, A));
+  else {
+    PetscCall(MatCreate(PETSC_COMM_SELF, A));
+    PetscCall(MatSetSizes(*A, rows, cols, rows, cols));
+    PetscCall(MatSetType(*A, MATSEQAIJ));
+    PetscCall(MatSeqAIJSetPreallocation(*A, g->n_free + 15, NULL));
+    PetscCall(MatSetOption(*A, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinSetUp(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscBool dense;
+  PetscInt n_I;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinCreateOwn(m));
+  PetscCall(HycoFECreate(m->scene, g->own, &m->fe));
+  PetscCall(SetUpBasis(m));
+  PetscCall(HycoGalerkinCreateSets(m));
+  PetscCall(ISGetLocalSize(g->sets.is_I, &n_I));
+  dense = (PetscBool)(m->n <= HYCO_DENSE_MAX || g->symmetric || (m->hybrid == HYCO_HYBRID_ALL && n_I));
+  if (!g->table) PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, g->own->n_nodes, 0, &g->K));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->fe->n_dof, &g->F));
+  if (dense)
+    PetscCall(CreateReduced(m, m->n, m->n, PETSC_TRUE, &g->Kr));
+  else
+    PetscCall(g->table ? HycoTableCreateSparse(m) : HycoReducedCreateSparse(m));
+  PetscCall(MatCreateVecs(g->Kr, &g->x, &g->Fr));
+  if (!dense) PetscCall(HycoLoadsCreate(m));
+  if (m->n_L) {
+    PetscCall(CreateReduced(m, m->n_L, m->n, dense, &g->Br));
+    PetscCall(CreateReduced(m, m->n, m->n_L, dense, &g->Btr));
+    PetscCall(MatCreateVecs(g->Br, NULL, &g->L));
+    PetscCall(VecDuplicate(g->L, &g->Dr));
+  }
+  PetscCall(HycoROMSetUpFields(m));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &g->system));
+  /* the reduced problem is not symmetric and may have several solutions: the dual form, no history; a TAO type that
+     needs symmetry is meant for the full order */
+  PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
+  PetscCall(HycoSolverSetWarmStart(m->solver, PETSC_FALSE));
+  if (HycoSolverNeedsSymmetry(m->solver)) PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinReset(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducedDestroy(&g->reduced));
+  PetscCall(HycoLoadsDestroy(&g->loads));
+  PetscCall(HycoSystemDestroy(&g->system));
+  PetscCall(MatDestroy(&g->K));
+  PetscCall(MatDestroy(&g->B));
+  PetscCall(MatDestroy(&g->Kr));
+  PetscCall(MatDestroy(&g->Br));
+  PetscCall(MatDestroy(&g->Btr));
+  PetscCall(VecDestroy(&g->F));
+  PetscCall(VecDestroy(&g->D));
+  PetscCall(VecDestroy(&g->Fr));
+  PetscCall(VecDestroy(&g->Dr));
+  PetscCall(VecDestroy(&g->x));
+  PetscCall(VecDestroy(&g->L));
+  PetscCall(HycoGalerkinDestroyOwn(g));
+  PetscCall(PetscFree(g->fe_at));
+  PetscCall(PetscFree(g->Vp));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinDestroy(HycoGalerkin g)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoTableDestroy(&g->table));
+  PetscCall(PetscFree(g->G));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Assemble(HycoROM m, const PetscReal mu[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscBool first = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  m->beyond_current = PETSC_FALSE;
+  first = (PetscBool)!g->system->K;
+  PetscCall(HycoFESetParameters(m->fe, mu));
+  m->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
+  if (m->fe->stiffness_changed) HycoLoadsForget(g->loads);
+  if (m->fe->stiffness_changed && g->table) {
+    PetscCall(HycoReducedPrepare(m));
+    HycoLogged(HYCO_EVENT_REDUCE, HycoTableFill(m, mu));
+  } else if (m->fe->stiffness_changed) {
+    HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, g->K));
+    if (first && m->fe->n_constant) /* again in the order of all that come: the same sums to the last bit */
+      HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, g->K));
+    HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillStiffness(m));
+  }
+  HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, g->F));
+  if (m->fe->contact_changed) PetscCall(MatDestroy(&g->B));
+  if (m->fe->contact_changed || m->fe->gap_changed) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
+  if (m->n_L && m->fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
+  HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
+  m->fe->ready = PETSC_TRUE;
+  if (first) {
+    PetscCall(HycoSystemSetMatrices(g->system, g->Kr, g->Btr, g->Br, g->symmetric));
+    PetscCall(HycoSystemSetVectors(g->system, g->Fr, g->Dr));
+    PetscCall(HycoSolverSetSystem(m->solver, g->system));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinAssemble(HycoROM m, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetUp(m));
+  m->solved = m->whole_current = PETSC_FALSE;
+  PetscCall(Assemble(m, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* gamma, U on the nodes of mesh, Lambda on A_lambda. */
+static PetscErrorCode Unpack(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscScalar *x, *L;
+  const PetscReal one = 1;
+  PetscBLASInt l, n_dof, inc = 1;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(g->x, &x));
+  for (PetscInt j = 0; j < m->l; j++) {
+    m->gamma[j] = g->n_free ? x[j] : 0;
+    for (PetscInt f = 0; g->G && f < m->n_fe; f++) m->gamma[j] += g->G[j * m->n_fe + f] * x[f];
+  }
+  PetscCall(PetscArraycpy(m->U, m->fe->u0, m->fe->n_dof));
+  PetscCall(PetscBLASIntCast(m->l, &l));
+  PetscCall(PetscBLASIntCast(m->fe->n_dof, &n_dof));
+  if (l) BLASgemv_("T", &l, &n_dof, &one, g->Vp, &l, m->gamma, &inc, &one, m->U, &inc);
+  for (PetscInt f = 0; f < m->n_fe; f++) m->U[m->fe_dof[f]] = x[g->n_free + f];
+  PetscCall(VecRestoreArrayRead(g->x, &x));
+  if (m->spread) PetscCall(PetscArrayzero(m->Lambda, m->pairs.n));
+  m->spread = PETSC_FALSE;
+  if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
+  if (g->expand) {
+    PetscCall(g->expand(m));
+    m->spread = PETSC_TRUE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecGetArrayRead(g->L, &L));
+  for (PetscInt k = 0; k < m->m; k++) m->Lambda[m->contact[k]] = L[k];
+  PetscCall(VecRestoreArrayRead(g->L, &L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoPrediction *p = &m->prediction;
+  const char *method;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  PetscCall(Assemble(m, mu));
+  p->seconds.assemble = HycoNow() - begin;
+  HycoLogged(HYCO_EVENT_SOLVE, HycoLoadsSetFree(m, mu));
+  HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(m->solver, g->x, g->L));
+  PetscCall(HycoSolverGetSeconds(m->solver, &p->seconds.factor, &p->seconds.solve));
+  PetscCall(HycoSolverGetReason(m->solver, &p->reason));
+  PetscCall(HycoSolverGetIterations(m->solver, &p->iterations));
+  PetscCall(HycoSolverGetKKT(m->solver, &p->kkt));
+  PetscCall(HycoSolverGetMethod(m->solver, &method));
+  PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
+  PetscCall(Unpack(m));
+  PetscCall(HycoGalerkinCheckForceless(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinCondition(HycoROM m, PetscReal *condition)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  Mat dense;
+  PetscScalar *a;
+  PetscReal smallest, largest;
+
+  PetscFunctionBegin;
+  *condition = 0;
+  if (m->n > 2500) PetscFunctionReturn(PETSC_SUCCESS); /* an SVD would take minutes */
+  PetscCall(MatConvert(g->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
+  PetscCall(MatDenseGetArray(dense, &a));
+  PetscCall(HycoExtremeSingularValues(m->n, m->n, a, &smallest, &largest));
+  PetscCall(MatDenseRestoreArray(dense, &a));
+  PetscCall(MatDestroy(&dense));
+  *condition = smallest > 0 ? largest / smallest : PETSC_MAX_REAL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of U's free unknowns u^T K u / 2, and the same without K's couplings: what round-off is relative to. */
+static PetscErrorCode QuadraticForm(HycoROM m, PetscReal *energy, PetscReal *size)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscInt *ia, *ja;
+  const PetscScalar *a;
+  PetscInt n;
+  PetscBool done;
+
+  PetscFunctionBegin;
+  *energy = *size = 0;
+  PetscCall(MatGetRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatSeqAIJGetArrayRead(g->K, &a));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscReal sum = 0;
+
+    if (m->U[i] == 0) continue;
+    for (PetscInt k = ia[i]; k < ia[i + 1]; k++) {
+      sum += a[k] * m->U[ja[k]];
+      if (ja[k] == i) *size += a[k] * m->U[i] * m->U[i] / 2;
+    }
+    *energy += m->U[i] * sum / 2;
+  }
+  PetscCall(MatSeqAIJRestoreArrayRead(g->K, &a));
+  PetscCall(MatRestoreRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of the RID's cells: from K, unless it lacks the supports' part or a rigid motion drowns it: beyond 1e-5 round-off
+   would leave fewer than ten digits. */
+PetscErrorCode HycoGalerkinEnergy(HycoROM m, PetscReal *energy, PetscBool *known)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscReal size = 0;
+
+  PetscFunctionBegin;
+  *known = PETSC_FALSE;
+  if (!g->K || g->table || m->fe->lifted) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(QuadraticForm(m, energy, &size));
+  *known = (PetscBool)(*energy >= 1e-5 * size);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinLocal(HycoROM m, HycoLocal *local)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscScalar *gap;
+
+  PetscFunctionBegin;
+  if (m->m && !g->B) PetscCall(HycoGalerkinContactMatrix(m, &g->B));
+  if (m->m && !g->D) PetscCall(MatCreateVecs(g->B, NULL, &g->D));
+  if (m->m) {
+    PetscCall(VecGetArrayWrite(g->D, &gap));
+    PetscCall(PetscArraycpy(gap, g->own_rows.gap, m->m));
+    PetscCall(VecRestoreArrayWrite(g->D, &gap));
+  }
+  *local = (HycoLocal){g->K, g->B, g->F, g->D, g->sets.is_A, g->sets.is_I};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

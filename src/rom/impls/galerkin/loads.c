@@ -1,0 +1,192 @@
+/*
+  Loads and supports enter F affinely in most scenes. The solutions without contact under F at the least values of the
+  parameters that no stiffness and no contact row depends on, and under what each one's range adds to it, then give that
+  of any load by a sum, once for each stiffness:
+
+      K^-1 F(mu) = X_0 + sum_j t_j X_j,    t_j = (mu_j - lo_j) / (hi_j - lo_j)
+
+  They are chosen by the ranges, not by what came before, so that answers do not depend on the order of the questions.
+  F itself is assembled at each mu: where it is not that sum, its system is solved.
+*/
+#include <hycogalerkin.h>
+
+/* More parameters would cost a single prediction more than a ramp gains. */
+#define MAX_LOADS 3
+/* F is the sum if nothing is left beyond this share of its largest entry. */
+#define AFFINE 1e-13
+
+struct _n_HycoLoads {
+  PetscInt n, parameter[MAX_LOADS];
+  PetscBool current, affine, given[1 + MAX_LOADS]; /* given: the vector is not zero */
+  Vec F[1 + MAX_LOADS], X[1 + MAX_LOADS], sum;
+};
+
+PetscErrorCode HycoLoadsDestroy(HycoLoads *loads)
+{
+  HycoLoads p = *loads;
+
+  PetscFunctionBegin;
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt j = 0; j <= p->n; j++) {
+    PetscCall(VecDestroy(&p->F[j]));
+    PetscCall(VecDestroy(&p->X[j]));
+  }
+  PetscCall(VecDestroy(&p->sum));
+  PetscCall(PetscFree(*loads));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoLoadsCreate(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoScene s = m->scene;
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+  PetscInt n = 0, parameter[HYCO_MAX_PARAMETERS];
+  HycoLoads p;
+
+  PetscFunctionBegin;
+  HycoSceneReaches(m->fe->scene, reaches);
+  for (PetscInt j = 0; j < s->n_parameters; j++) {
+    if (!reaches[j] && s->hi[j] > s->lo[j]) parameter[n++] = j;
+  }
+  if (!n || n > MAX_LOADS) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&p));
+  g->loads = p;
+  p->n = n;
+  PetscCall(PetscArraycpy(p->parameter, parameter, n));
+  for (PetscInt j = 0; j <= n; j++) {
+    PetscCall(VecDuplicate(g->Fr, &p->F[j]));
+    PetscCall(VecDuplicate(g->x, &p->X[j]));
+  }
+  PetscCall(VecDuplicate(g->Fr, &p->sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoLoadsForget(HycoLoads loads)
+{
+  if (loads) loads->current = PETSC_FALSE;
+}
+
+/* y = v_0 + sum_j t_j v_j */
+static PetscErrorCode Sum(HycoLoads p, const Vec v[], const PetscReal t[], Vec y)
+{
+  PetscFunctionBegin;
+  PetscCall(VecCopy(v[0], y));
+  for (PetscInt j = 1; j <= p->n; j++) {
+    if (p->given[j] && t[j] != 0) PetscCall(VecAXPY(y, t[j], v[j]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void Coordinates(HycoROM m, const PetscReal mu[], PetscReal t[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoLoads p = g->loads;
+
+  t[0] = 1;
+  for (PetscInt j = 0; j < p->n; j++) {
+    const PetscInt q = p->parameter[j];
+
+    t[j + 1] = (mu[q] - m->scene->lo[q]) / (m->scene->hi[q] - m->scene->lo[q]);
+  }
+}
+
+/* Whether m->Fr, assembled at mu, is the sum. */
+static PetscErrorCode IsSum(HycoROM m, const PetscReal t[], PetscBool *is)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoLoads p = g->loads;
+  PetscReal size, apart;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(g->Fr, NORM_INFINITY, &size));
+  PetscCall(Sum(p, p->F, t, p->sum));
+  PetscCall(VecAXPY(p->sum, -1, g->Fr));
+  PetscCall(VecNorm(p->sum, NORM_INFINITY, &apart));
+  *is = (PetscBool)(apart <= AFFINE * size);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* m->Fr at the parameters mu, which differ from the current ones in loads alone. */
+static PetscErrorCode ForceAt(HycoROM m, const PetscReal mu[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscFunctionBegin;
+  PetscCall(HycoFESetParameters(m->fe, mu));
+  PetscCall(HycoFEAssembleForce(m->fe, g->F));
+  PetscCall(HycoReducedFillVectors(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The vectors F, and whether the middle of the ranges is their sum. */
+static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoLoads p = g->loads;
+  PetscReal at[HYCO_MAX_PARAMETERS], t[1 + MAX_LOADS];
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(at, mu, m->scene->n_parameters));
+  for (PetscInt j = 0; j < p->n; j++) at[p->parameter[j]] = m->scene->lo[p->parameter[j]];
+  for (PetscInt j = 0; j <= p->n; j++) {
+    PetscReal size;
+
+    if (j) at[p->parameter[j - 1]] = m->scene->hi[p->parameter[j - 1]];
+    PetscCall(ForceAt(m, at));
+    if (j) at[p->parameter[j - 1]] = m->scene->lo[p->parameter[j - 1]];
+    PetscCall(VecCopy(g->Fr, p->F[j]));
+    if (j) PetscCall(VecAXPY(p->F[j], -1, p->F[0]));
+    PetscCall(VecNorm(p->F[j], NORM_INFINITY, &size));
+    p->given[j] = (PetscBool)(size > 0);
+  }
+  for (PetscInt j = 0; j < p->n; j++)
+    at[p->parameter[j]] = 0.5 * m->scene->lo[p->parameter[j]] + 0.5 * m->scene->hi[p->parameter[j]];
+  PetscCall(ForceAt(m, at));
+  Coordinates(m, at, t);
+  PetscCall(IsSum(m, t, &p->affine));
+  PetscCall(ForceAt(m, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Renew(HycoROM m, const PetscReal mu[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoLoads p = g->loads;
+  PetscBool singular;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSolverFactor(m->solver, &singular));
+  ierr = SampleForces(m, mu);
+  if (ierr) m->fe->ready = PETSC_FALSE; /* its parameters are others */
+  PetscCall(ierr);
+  p->affine = (PetscBool)(p->affine && !singular);
+  for (PetscInt j = 0; j <= p->n && p->affine; j++) {
+    if (p->given[j])
+      PetscCall(HycoSolverSolveLinear(m->solver, p->F[j], p->X[j]));
+    else
+      PetscCall(VecSet(p->X[j], 0));
+  }
+  p->current = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoLoadsSetFree(HycoROM m, const PetscReal mu[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const HycoLoads p = g->loads;
+  PetscReal t[1 + MAX_LOADS];
+  PetscBool is;
+
+  PetscFunctionBegin;
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSolverSetFree(m->solver, NULL));
+  if (!p->current) PetscCall(Renew(m, mu));
+  if (!p->affine) PetscFunctionReturn(PETSC_SUCCESS);
+  Coordinates(m, mu, t);
+  PetscCall(IsSum(m, t, &is));
+  if (!is) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Sum(p, p->X, t, p->sum));
+  PetscCall(HycoSolverSetFree(m->solver, p->sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,25 @@
+/*
+  A model without a contact force: no training solution pressed, so that it has no force vector (44), or none of its
+  contacts is in the RID. It is right where nothing presses; where its displacement penetrates, it has no answer.
+*/
+#include <hycogalerkin.h>
+
+PetscErrorCode HycoGalerkinCheckForceless(HycoROM m)
+{
+  HycoPrediction *p = &m->prediction;
+  PetscReal in = 0, size = 0;
+
+  PetscFunctionBegin;
+  if (m->n_L || p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMComplete(m));
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    const PetscReal bu = HycoROMAddRow(m, k, 0);
+
+    in = PetscMax(in, bu - m->rows.gap[k]);
+    size = PetscMax(size, PetscMax(PetscAbsReal(bu), PetscAbsReal(m->rows.gap[k])));
+  }
+  if (in <= m->solver->rtol * size) PetscFunctionReturn(PETSC_SUCCESS);
+  p->kkt.penetration = in / size;
+  p->reason = HYCO_DIVERGED_NO_CONTACT_BASIS;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,165 @@
+/*
+  Resonance inside the parameters' ranges. The reduced stiffness Vbar[A]^T K[A, A u I] Vbar[A u I] is not symmetric: its
+  determinant may change sign between two training points where the model looks good, and between them predictions are
+  arbitrary. A grid over the ranges of the parameters that reach the stiffness, spread over the ranks, shows the sign
+  and the smallest singular value. Two crossings between neighbouring points go unseen: a finer grid sees them.
+*/
+#include <hycoalgorithms.h>
+#include <hycotable.h>
+
+#define LARGEST 2500 /* unknowns: beyond, a dense factor at every point takes minutes */
+
+/* The parameters over whose ranges the reduced stiffness is looked at. */
+static PetscErrorCode FindParameters(HycoROM m, PetscBool reaches[])
+{
+  const HycoScene s = m->scene;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetUp(m));
+  HycoSceneReaches(s, reaches);
+  for (PetscInt p = 0; p < s->n_parameters; p++) reaches[p] = (PetscBool)(reaches[p] && s->hi[p] > s->lo[p]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* So many points for each parameter that reaches the stiffness: as asked; else some hundred in all, fewer where the
+   factors of that many unknowns would take more than seconds. */
+static PetscErrorCode ChooseGrid(PetscInt asked, PetscInt unknowns, PetscInt n_par, const PetscBool reaches[],
+                                 PetscInt *each, PetscInt *n)
+{
+  const PetscReal most = PetscMin(401, 5e10 / PetscPowReal((PetscReal)unknowns, 3));
+  PetscInt q = 0;
+  PetscReal all;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < n_par; p++) q += reaches[p];
+  *each = asked;
+  if (!asked) *each = q > 12 || !q ? 1 : PetscMax(2, PetscMin(101, (PetscInt)PetscPowReal(most, 1 / (PetscReal)q)));
+  all = PetscPowReal((PetscReal)*each, (PetscReal)q);
+  HycoCheck(all <= 1e6, "-hyco_scan %d gives %.0e points for %d parameters; give less", (int)asked, (double)all,
+            (int)q);
+  *n = (PetscInt)(all + 0.5);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Point k of the closed grid; the middle of the range for what does not matter, and for a grid of one point. */
+static void GridPoint(HycoScene s, const PetscBool reaches[], PetscInt each, PetscInt k, PetscReal mu[])
+{
+  for (PetscInt p = s->n_parameters - 1; p >= 0; p--) {
+    mu[p] = (s->lo[p] + s->hi[p]) / 2;
+    if (!reaches[p] || each == 1) continue;
+    mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (PetscReal)(k % each) / (PetscReal)(each - 1);
+    k /= each;
+  }
+}
+
+/* Points first .. last-1: sign of the determinant, smallest singular value over the largest. */
+static PetscErrorCode ScanMine(HycoROM m, const PetscBool reaches[], PetscInt each, PetscInt first, PetscInt last,
+                               PetscReal sign[], PetscReal ratio[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  for (PetscInt k = first; k < last; k++) {
+    Mat dense;
+    PetscScalar *a;
+    PetscInt s;
+
+    GridPoint(m->scene, reaches, each, k, mu);
+    PetscCall(HycoGalerkinAssemble(m, mu));
+    PetscCall(MatConvert(g->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
+    PetscCall(MatDenseGetArray(dense, &a));
+    PetscCall(HycoSingularity(m->n, a, &s, &ratio[k]));
+    PetscCall(MatDenseRestoreArray(dense, &a));
+    PetscCall(MatDestroy(&dense));
+    sign[k] = s;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* "(0.05, 0.17)" */
+static void Say(HycoScene s, const PetscReal mu[], char text[HYCO_LINE])
+{
+  size_t at = 0;
+
+  for (PetscInt p = 0; p < s->n_parameters && at + 32 < HYCO_LINE; p++)
+    at += (size_t)snprintf(text + at, HYCO_LINE - at, "%s%.6g", p ? ", " : "(", (double)mu[p]);
+  snprintf(text + at, HYCO_LINE - at, s->n_parameters ? ")" : "()");
+}
+
+/* Keeps what the scan found in the model; fails where the determinant changes sign. */
+static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches[], PetscInt each,
+                               const PetscReal sign[], const PetscReal ratio[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoScan *s = &g->scan;
+  PetscInt positive = 0, worst = 0, change = 0;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  char here[HYCO_LINE], there[HYCO_LINE];
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n; k++) {
+    positive += sign[k] > 0;
+    if (ratio[k] < ratio[worst]) worst = k;
+    if (k && !change && sign[k] != sign[0]) change = k;
+  }
+  s->n_singular = PetscMin(positive, s->n - positive);
+  s->smallest = ratio[worst];
+  GridPoint(m->scene, reaches, each, worst, s->at);
+  if (t->keep_singular || (!change && ratio[worst] > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  GridPoint(m->scene, reaches, each, PetscMax(change - 1, 0), mu);
+  Say(m->scene, mu, here);
+  GridPoint(m->scene, reaches, each, change, mu);
+  Say(m->scene, mu, there);
+  HycoFailNoModel(
+      "the reduced stiffness is singular inside the parameters' ranges: between %s and %s its determinant "
+      "changes sign, and predictions near there are arbitrary; enlarge the RID (-hyco_rid_layers 1), change "
+      "the modes (-hyco_pod_tol), or keep the model: -hyco_keep_singular",
+      here, there);
+}
+
+static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscInt each = 0;
+  PetscReal *sign, *ratio;
+  PetscMPIInt size;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
+  HycoOnEach(HycoComm(t), FindParameters(m, reaches));
+  if (m->n > LARGEST) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ChooseGrid(t->scan, m->n, m->scene->n_parameters, reaches, &each, &g->scan.n));
+  PetscCall(PetscCalloc2(g->scan.n, &sign, g->scan.n, &ratio));
+  HycoOnEach(HycoComm(t),
+             ScanMine(m, reaches, each, t->rank * g->scan.n / size, (t->rank + 1) * g->scan.n / size, sign, ratio));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sign, (PetscMPIInt)g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ratio, (PetscMPIInt)g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t)));
+  HycoOnRoot(HycoComm(t), Conclude(t, m, reaches, each, sign, ratio));
+  PetscCall(PetscFree2(sign, ratio));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report)
+{
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(Scan(t, m, reaches));
+  HycoOnRoot(HycoComm(t), HycoGalerkinTabulate(m, reaches));
+  report->scan = ((HycoGalerkin)m->data)->scan;
+  PetscCallMPI(MPI_Bcast(&report->scan, sizeof(report->scan), MPI_BYTE, 0, HycoComm(t)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal HycoGalerkinCost(HycoReducer t, const HycoAttempt *a)
+{
+  const PetscReal dim = t->sizes[3],
+                  cell = dim == 1   ? 2
+                         : dim == 2 ? 8
+                                    : 24,
+                  l = a->n_modes, n = l + (PetscReal)a->n_fe_dofs;
+
+  return n * n * n * 2 / 3 + 20 * (PetscReal)a->rid_elements * cell * cell +
+         2 * (PetscReal)a->rid_nodes * dim * l * (l + 10);
+}

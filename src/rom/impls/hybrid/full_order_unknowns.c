@@ -1,0 +1,403 @@
+/*
+  Which displacements are full order (section 5.2). A full row rank alone is not enough: choices that have it differ a
+  hundredfold in error. A choice is judged by the conditioning of its basis and by the error of the model it gives on
+  the training snapshots.
+
+  rank: the fewest that give B[A_lambda, A_c] Vbar[A_c,:] full row rank. Start: the contacts whose balance rows K V
+  depend on those of others; then exchange one for one while the mean training error of u falls. all: the modes'
+  coefficients follow from U[A] by ridge regression, its strength chosen by the same error.
+*/
+#include <hycoalgorithms.h>
+#include <hycohybrid.h>
+
+#define WORST HYCO_JUDGED_WORST
+
+/* What the options of this type say. */
+typedef struct {
+  PetscInt trials; /* rank: the most choices that are judged; 0: chosen */
+  PetscReal ridge; /* all; < 0: chosen */
+} * Training;
+
+PetscErrorCode HycoHybridSetFromOptions(HycoReducer t)
+{
+  Training s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s));
+  t->training = s;
+  s->ridge = -1;
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("hybrid"));
+  PetscCall(HycoOptionsInt("-hyco_hybrid_trials",
+                           "candidate sets judged by their training error when hybrid is rank (0: from the size)", 0,
+                           PETSC_MAX_INT / 8, &s->trials, NULL));
+  PetscCall(
+      HycoOptionsReal("-hyco_hybrid_ridge",
+                      "of the interface's regression when hybrid is all (-1: by the training error; 0: plain least "
+                      "squares)",
+                      -1, 1, &s->ridge, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The unknown of each contact of A_lambda that could be full order: its largest entry in A that no other has taken. */
+static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscInt dim = m->mesh->dim;
+  PetscBool *taken;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->mesh->n_nodes * dim, &taken));
+  for (PetscInt k = 0; k < m->m; k++) candidate[k] = -1;
+  for (PetscInt pass = 0; pass < 2; pass++) { /* those whose slave is in A first: the others have shared masters only */
+    for (PetscInt k = 0; k < m->m; k++) {
+      const PetscInt slave = HycoPairsSlave(&m->pairs, m->contact[k]);
+      PetscReal best = 0;
+
+      if ((m->role[slave] == HYCO_ROLE_A) != (pass == 0)) continue;
+      for (PetscInt t = g->own_rows.start[k]; t < g->own_rows.start[k + 1]; t++) {
+        const PetscInt dof = g->own_rows.dof[t];
+
+        if (taken[dof] || m->role[dof / dim] != HYCO_ROLE_A) continue;
+        if (PetscAbsReal(g->own_rows.value[t]) <= best * (1 + 1e-12)) continue;
+        best = PetscAbsReal(g->own_rows.value[t]);
+        candidate[k] = dof;
+      }
+      if (candidate[k] >= 0) taken[candidate[k]] = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree(taken));
+  for (PetscInt k = 0; k < m->m; k++)
+    HycoCheckModel(
+        candidate[k] >= 0,
+        "the contact of node %d has no displacement in A of its own to keep full order; use -hyco_hybrid contact",
+        (int)m->slave_id[m->contact[k]]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Smallest singular value of B[A_lambda, A_c] Vbar[A_c,:] over its largest, for the model's present choice. */
+static PetscErrorCode RowRank(HycoROM m, PetscReal *ratio)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  Mat dense;
+  PetscScalar *b;
+  PetscReal smallest, largest;
+
+  PetscFunctionBegin;
+  *ratio = 1;
+  if (!m->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatConvert(g->Br, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
+  PetscCall(MatDenseGetArray(dense, &b));
+  PetscCall(HycoExtremeSingularValues(m->m, m->n, b, &smallest, &largest));
+  PetscCall(MatDenseRestoreArray(dense, &b));
+  PetscCall(MatDestroy(&dense));
+  *ratio = m->m > m->n || largest == 0 ? 0 : smallest / largest;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The model at the middle of the parameters' ranges, with no full-order unknown, so that rows can be looked at. */
+static PetscErrorCode Assembled(HycoReducer t, HycoROM m)
+{
+  PetscInt n_par;
+  const PetscReal *mu;
+  PetscReal middle[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  for (PetscInt p = 0; p < n_par; p++) middle[p] = (t->scene->lo[p] + t->scene->hi[p]) / 2;
+  m->reconstruct = PETSC_FALSE;
+  PetscCall(HycoROMPredict(m, n_par, middle));
+  m->reconstruct = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numerical rank of B[A_lambda, A_c] V[A_c,:] and the contacts that the modes resolve best (first `rank` of pivot), by
+   their balance rows K V or by their rows B V weighted with the singular values. */
+static PetscErrorCode ResolvedContacts(HycoROM m, const PetscInt candidate[], PetscBool balance, PetscInt *rank,
+                                       PetscInt pivot[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscInt l = m->l, dim = m->mesh->dim;
+  const PetscInt *ia, *ja;
+  const PetscScalar *a;
+  PetscReal *BV, *KV;
+  PetscInt n;
+  PetscBool done;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(l * m->m, &BV, l * m->m, &KV));
+  PetscCall(MatGetRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatSeqAIJGetArrayRead(g->K, &a));
+  for (PetscInt k = 0; k < m->m; k++) {
+    for (PetscInt t = g->own_rows.start[k]; t < g->own_rows.start[k + 1]; t++) {
+      for (PetscInt j = 0; m->role[g->own_rows.dof[t] / dim] == HYCO_ROLE_A && j < l; j++)
+        BV[k * l + j] += g->own_rows.value[t] * m->V[g->own_rows.dof[t] * l + j];
+    }
+    for (PetscInt t = ia[candidate[k]]; t < ia[candidate[k] + 1]; t++) {
+      for (PetscInt j = 0; j < l; j++) KV[k * l + j] += a[t] * m->V[ja[t] * l + j];
+    }
+  }
+  PetscCall(MatSeqAIJRestoreArrayRead(g->K, &a));
+  PetscCall(MatRestoreRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  *rank = 0;
+  {
+    PetscReal smallest = 0, largest = 1;
+
+    for (PetscInt r = PetscMin(l, m->m); r > 0 && !*rank;
+         r--) { /* the first r modes that are independent on the contacts */
+      PetscReal *first;
+
+      PetscCall(PetscMalloc1(r * m->m, &first));
+      for (PetscInt k = 0; k < m->m; k++) PetscCall(PetscArraycpy(first + k * r, BV + k * l, r));
+      PetscCall(HycoExtremeSingularValues(r, m->m, first, &smallest, &largest));
+      if (smallest > 1e-10 * largest) *rank = r;
+      PetscCall(PetscFree(first));
+    }
+  }
+  for (PetscInt k = 0; k < m->m * l; k++) BV[k] *= m->sigma[k % l] / m->sigma[0];
+  PetscCall(HycoPivotColumns(l, m->m, balance ? KV : BV, *rank, pivot));
+  PetscCall(PetscFree2(BV, KV));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One candidate set, judged; remembered by its hash so that none is judged twice. */
+typedef struct {
+  PetscReal u, lambda, rank;
+} Verdict;
+
+static PetscErrorCode JudgeSet(HycoReducer t, HycoROM m, PetscInt n, const PetscInt dof[], Verdict *v)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, n, dof));
+  PetscCall(Assembled(t, m));
+  PetscCall(RowRank(m, &v->rank));
+  v->u = v->lambda = WORST;
+  if (v->rank > 1e-10) PetscCall(HycoReducerJudgeMeans(t, m, &v->u, &v->lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool Better(const Verdict *a, const Verdict *b)
+{
+  if (a->u < b->u * (1 - 1e-6)) return PETSC_TRUE;
+  return (PetscBool)(a->u <= b->u * (1 + 1e-6) && a->rank > b->rank * (1 + 1e-6));
+}
+
+/* Exchanges one full-order unknown for one candidate outside while that helps. chosen[k]: whether candidate k is full
+ * order. */
+static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt n, const PetscInt candidate[], PetscBool chosen[],
+                               Verdict *best)
+{
+  const PetscInt N = m->m;
+  /* a trial solves every snapshot: bounded by the work, so that a large model is not judged for hours */
+  const PetscInt limit = ((Training)t->training)->trials ? ((Training)t->training)->trials
+                                                         : 1 + (PetscInt)(1e6 / ((PetscReal)t->n_s * (PetscReal)m->n));
+  PetscInt trials = 1, n_seen = 0, *dof;
+  unsigned long long *seen;
+  PetscBool improved = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n, &dof, limit + 1, &seen));
+  while (improved && trials < limit) {
+    PetscInt out = -1, in = -1;
+    Verdict verdict, round = *best;
+
+    improved = PETSC_FALSE;
+    for (PetscInt i = 0; i < N; i++) {
+      for (PetscInt j = 0; j < N && trials < limit; j++) {
+        PetscInt k = 0;
+        PetscBool past = PETSC_FALSE;
+        unsigned long long hash;
+
+        if (!chosen[i] || chosen[j]) continue;
+        chosen[i] = PETSC_FALSE;
+        chosen[j] = PETSC_TRUE;
+        hash = HycoSetHash(N, chosen);
+        for (PetscInt s = 0; s < n_seen; s++) past = (PetscBool)(past || seen[s] == hash);
+        for (PetscInt c = 0; c < N; c++) {
+          if (chosen[c]) dof[k++] = candidate[c];
+        }
+        if (!past) {
+          seen[n_seen++] = hash;
+          trials++;
+          PetscCall(JudgeSet(t, m, n, dof, &verdict));
+          if (Better(&verdict, &round)) {
+            round = verdict;
+            out = i;
+            in = j;
+          }
+        }
+        chosen[i] = PETSC_TRUE;
+        chosen[j] = PETSC_FALSE;
+      }
+    }
+    if (out >= 0) {
+      chosen[out] = PETSC_FALSE;
+      chosen[in] = PETSC_TRUE;
+      *best = round;
+      improved = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree2(dof, seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One start, then exchanges. Starts 0 and 1: the contacts that the modes do not resolve, by balance rows and by contact
+   rows; later ones: as many, spread evenly. */
+static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, PetscInt *n, PetscInt dof[],
+                                 Verdict *verdict)
+{
+  PetscInt rank = 0, N, *candidate, *pivot;
+  PetscBool *chosen;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, 0, NULL));
+  PetscCall(Assembled(t, m));
+  N = m->m;
+  PetscCall(PetscMalloc3(N, &candidate, N, &pivot, N, &chosen));
+  PetscCall(Candidates(m, candidate));
+  PetscCall(ResolvedContacts(m, candidate, (PetscBool)(start == 0), &rank, pivot));
+  for (PetscInt k = 0; k < N; k++) chosen[k] = (PetscBool)(start < 2);
+  for (PetscInt k = 0; k < rank && start < 2; k++) chosen[pivot[k]] = PETSC_FALSE;
+  for (PetscInt k = 0; k < N - rank && start >= 2; k++) chosen[(k * N / (N - rank) + start - 2) % N] = PETSC_TRUE;
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    *n = 0;
+    for (PetscInt k = 0; k < N; k++) {
+      if (chosen[k]) dof[(*n)++] = candidate[k];
+    }
+    if (pass) break;
+    PetscCall(JudgeSet(t, m, *n, dof, verdict));
+    if (*n && *n < N) PetscCall(Exchange(t, m, *n, candidate, chosen, verdict));
+  }
+  PetscCall(PetscFree3(candidate, pivot, chosen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The best end of several starts; of the first alone when a trial is expensive. */
+static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
+{
+  const PetscInt room = m->pairs.n, starts = (PetscReal)t->n_s * (PetscReal)m->l < 1e4 ? 5 : 1;
+  PetscInt n = 0, other = 0, *dof, *rival;
+  Verdict verdict;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(room, &dof, room, &rival));
+  for (PetscInt start = 0; start < starts; start++) {
+    PetscCall(SearchFrom(t, m, start, &other, rival, &verdict));
+    if (start && !Better(&verdict, best)) continue;
+    *best = verdict;
+    n = other;
+    PetscCall(PetscArraycpy(dof, rival, n));
+  }
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, n, dof));
+  PetscCall(PetscFree2(dof, rival));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes of the model's mesh that a contact has, of moved surfaces in any place. */
+static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
+{
+  PetscBool *whole;
+
+  PetscFunctionBegin;
+  if (!t->pairs.room) {
+    HycoPairsMark(&m->pairs, contact);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscCalloc1(t->sizes[0], &whole));
+  HycoPairsMark(&t->met.rows, whole);
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) contact[i] = whole[m->mesh->node_whole[i]];
+  PetscCall(PetscFree(whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The free unknowns of the nodes of A: all, or those of contact nodes. */
+static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_only, PetscInt *n, PetscInt dof[])
+{
+  const PetscInt dim = m->mesh->dim;
+  PetscBool *contact;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->mesh->n_nodes, &contact));
+  PetscCall(MarkContact(t, m, contact));
+  *n = 0;
+  for (PetscInt i = 0; i < m->mesh->n_nodes * dim; i++) {
+    if (m->role[i / dim] != HYCO_ROLE_A || t->fe->fixed[m->mesh->node_whole[i / dim] * dim + i % dim]) continue;
+    if (contact[i / dim] || !contact_only) dof[(*n)++] = i;
+  }
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All of A, with the strength of the ridge that gives the least training error. Without an interface there is nothing
+ * to regress. */
+static PetscErrorCode ChooseAll(HycoReducer t, HycoROM m, PetscInt n, const PetscInt dof[], Verdict *best)
+{
+  PetscBool interface = PETSC_FALSE;
+  PetscReal strength = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
+    interface = (PetscBool)(interface || m->role[i] == HYCO_ROLE_INTERFACE);
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_ALL, n, dof));
+  best->u = best->lambda = PETSC_MAX_REAL;
+  best->rank = 1;
+  if (interface && ((Training)t->training)->ridge >= 0)
+    PetscCall(HycoGalerkinSetRidge(m, ((Training)t->training)->ridge));
+  if (!interface || ((Training)t->training)->ridge >= 0) {
+    PetscCall(HycoReducerJudgeMeans(t, m, &best->u, &best->lambda));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscReal ridge = 1e-14; ridge < 1e-5; ridge *= 10) {
+    Verdict v;
+
+    PetscCall(HycoGalerkinSetRidge(m, ridge));
+    PetscCall(HycoReducerJudgeMeans(t, m, &v.u, &v.lambda));
+    if (v.u < best->u) {
+      *best = v;
+      best->rank = 1;
+      strength = ridge;
+    }
+  }
+  PetscCall(HycoGalerkinSetRidge(m, strength));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The full-order displacements, and the training errors that come with them. */
+static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
+{
+  PetscInt n_all, n_contact, *all, *contact;
+  HycoHybrid kind = t->hybrid;
+  Verdict v = {0, 0, 1};
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(m->mesh->n_nodes * m->mesh->dim, &all, m->mesh->n_nodes * m->mesh->dim, &contact));
+  PetscCall(FreeUnknowns(t, m, PETSC_FALSE, &n_all, all));
+  PetscCall(FreeUnknowns(t, m, PETSC_TRUE, &n_contact, contact));
+  HycoCheckModel(n_all, "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
+  if (!n_contact && kind != HYCO_HYBRID_ALL)
+    kind = HYCO_HYBRID_CONTACT; /* no contact in the RID: plain hyper-reduction (31) */
+  if (kind == HYCO_HYBRID_AUTO) kind = n_contact < n_all ? HYCO_HYBRID_CONTACT : HYCO_HYBRID_ALL;
+  if (kind == HYCO_HYBRID_CONTACT && n_contact == n_all && n_contact) {
+    HycoFailNoModel("-hyco_hybrid contact leaves the modes without equation: every unknown of A is a contact's; use "
+                    "rank, all or auto");
+  }
+  HycoCheckModel(kind != HYCO_HYBRID_ALL || !t->most_full_order || n_all <= t->most_full_order,
+                 "the RID has %d unknowns, too many to keep them all full order in a dense matrix", (int)n_all);
+  if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
+  if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all, &v));
+  if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));
+  PetscCall(HycoReducerJudge(t, m));
+  PetscCall(PetscFree2(all, contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoHybridBuild(HycoROM m, HycoReducer t)
+{
+  HycoHybridROM h = (HycoHybridROM)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerDualSnapshots(t, &h->n_dual, &h->S_lambda));
+  PetscCall(ChooseUnknowns(t, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

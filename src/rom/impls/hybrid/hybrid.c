@@ -1,0 +1,142 @@
+/* The hybrid hyper-reduced model (38)-(41): the reduced system with the true multipliers of the RID's contacts. */
+#include <hycohybrid.h>
+#include <hycoromtypes.h>
+#include <petscviewer.h>
+
+/* Where nothing else is said. */
+static PetscBool Offers(HycoReducer t, PetscBool targets)
+{
+  (void)t, (void)targets;
+  return PETSC_TRUE;
+}
+
+static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+{
+  PetscFunctionBegin;
+  (void)t, (void)m;
+  snprintf(r->summary, sizeof(r->summary),
+           "%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n"
+           "RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
+           (int)r->n_samples, (int)r->n_modes, (int)r->n_stress_modes, (int)r->n_force_modes, (int)r->n_dual_modes,
+           (int)r->rid_elements, 100 * (double)r->rid_fraction, (int)r->rid_nodes, (int)r->rid_a_nodes,
+           (int)r->rid_contacts, (int)r->n_fe_dofs);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetFromOptions(HycoROM m)
+{
+  HycoHybridROM h = (HycoHybridROM)m->data;
+
+  PetscFunctionBegin;
+  PetscObjectOptionsBegin((PetscObject)m);
+  PetscCall(HycoOptionsFor(""));
+  PetscCall(HycoOptionsWord("-hyco_reconstruct_solver",
+                            "of (41): Lawson and Hanson's active set, or TAO's bnls; auto: TAO where the active set "
+                            "stops short",
+                            HycoReconstructSolvers, &h->reconstruct_solver, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Reset(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoReconstructionDestroy(&((HycoHybridROM)m->data)->reconstruction));
+  PetscCall(HycoGalerkinReset(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The RID, what is full order in it, what the reconstruction has. */
+static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+{
+  static const char *const words[] = {"auto", "rank: the fewest that give full row rank",
+                                      "contact: all on the contact surfaces of the RID",
+                                      "all of A, interface by ridge regression on the modes"};
+  const HycoHybridROM h = (HycoHybridROM)m->data;
+  PetscInt nodes = 0, a = 0, in = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
+    nodes += m->role[i] != HYCO_ROLE_OUTSIDE;
+    a += m->role[i] == HYCO_ROLE_A;
+  }
+  for (PetscInt k = 0; k < m->pairs.n; k++) in += m->in_rid[k];
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  modes that seeded the RID besides: %d dual, %d stress, %d force\n",
+                                   (int)m->counts[0], (int)m->counts[1], (int)m->counts[2]));
+  PetscCall(PetscViewerASCIIPrintf(
+      viewer, "  RID: %d of %d elements (%.1f %%), %d of %d nodes, %d in A; %d of %d contacts\n", (int)m->mesh->n_cells,
+      (int)m->whole_cells, 100. * (double)m->mesh->n_cells / (double)m->whole_cells, (int)nodes, (int)m->whole_nodes,
+      (int)a, (int)in, (int)m->pairs.n));
+  if (m->pairs.n)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  full-order displacements: %d (%s)\n", (int)m->n_fe, words[m->hybrid]));
+  if (m->hybrid == HYCO_HYBRID_ALL && h->galerkin.G)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  ridge: %.0e of the first squared singular value\n",
+                                     (double)h->galerkin.ridge));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  dual snapshots for the reconstruction: %d\n", (int)h->n_dual));
+  PetscCall(HycoGalerkinView(m, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Save(HycoROM m, HycoH5 file)
+{
+  const HycoHybridROM h = (HycoHybridROM)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinSave(m, file));
+  PetscCall(HycoH5WriteReal(file, "reconstruction/S_lambda", h->n_dual, m->pairs.n, h->S_lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Load(HycoROM m, HycoH5 file)
+{
+  HycoHybridROM h = (HycoHybridROM)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinLoad(m, file));
+  h->n_dual = -1;
+  PetscCall(HycoH5LoadReal(file, "reconstruction/S_lambda", &h->n_dual, &m->pairs.n, &h->S_lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoROM m)
+{
+  HycoHybridROM h = (HycoHybridROM)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinDestroy(&h->galerkin));
+  PetscCall(PetscFree(h->S_lambda));
+  PetscCall(PetscFree(m->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
+{
+  static const HycoROMTraits traits = {.title = "hybrid hyper-reduced",
+                                       .settings = HYCO_SETTINGS_RID,
+                                       .stiffness = PETSC_TRUE,
+                                       .constrains = PETSC_TRUE};
+  static const HycoROMOps ops = {.setfromoptions = HycoHybridSetFromOptions,
+                                 .build = HycoHybridBuild,
+                                 .finish = HycoGalerkinFinish,
+                                 .report = Report,
+                                 .cost = HycoGalerkinCost,
+                                 .offers = Offers,
+                                 .options = SetFromOptions,
+                                 .setup = HycoGalerkinSetUp,
+                                 .reset = Reset,
+                                 .solve = HycoGalerkinSolve,
+                                 .reconstruct = HycoHybridReconstruct,
+                                 .energy = HycoGalerkinEnergy,
+                                 .condition = HycoGalerkinCondition,
+                                 .local = HycoGalerkinLocal,
+                                 .view = View,
+                                 .save = Save,
+                                 .load = Load,
+                                 .destroy = Destroy};
+  HycoHybridROM h;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&h));
+  PetscCall(HycoROMSetOps(m, &ops, &traits, h));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,155 @@
+/*
+  Contact forces outside the RID, (41): the nonnegative combination of dual snapshots that agrees with the RID's forces
+  and vanishes where the predicted displacement leaves a gap. ([B D - D]_- in the paper's print is [B U - D]_-.)
+  With many snapshots (41) has many minimisers that round-off would choose among: a small weight on the coefficients
+  picks the one near the least norm.
+*/
+#include <hycoalgorithms.h>
+#include <hycohybrid.h>
+
+const char *const HycoReconstructSolvers[] = {"auto", "nnls", "tao", NULL};
+enum { SOLVER_AUTO, SOLVER_NNLS, SOLVER_TAO };
+#define RTOL 1e-8 /* of the optimality conditions, recomputed */
+
+/* Least squares written out: Lawson and Hanson's active set, or TAO; with auto or tao the other one where the first
+ * stops short. */
+static PetscErrorCode Solve(PetscInt solver, PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[],
+                            PetscReal c[])
+{
+  PetscBool solved = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (solver == SOLVER_TAO) PetscCall(HycoTaoNNLS(m, n, A, b, HYCO_TAO_BNLS, RTOL, c, NULL, &solved));
+  if (solved) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoNNLS(m, n, A, b, c, NULL));
+  if (solver != SOLVER_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoNNLSCheck(m, n, A, b, c, RTOL, NULL, &solved));
+  if (!solved) PetscCall(HycoTaoNNLS(m, n, A, b, HYCO_TAO_BNLS, RTOL, c, NULL, &solved));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The weight, relative to the largest snapshot force in the RID. */
+#define SMALL 1e-3
+
+/* What does not change from one prediction to the next. Contacts without force in every snapshot have no say. */
+struct _n_HycoReconstruction {
+  PetscInt n, *contact; /* contacts with a say, indices in pairs */
+  PetscReal *S;         /* n x n_dual column major: their rows of S_lambda */
+  PetscReal scale;      /* the largest snapshot force in the RID */
+  PetscReal *open, *d, *h, *c;
+  HycoWeighted weighted;
+};
+
+static PetscErrorCode SetUp(HycoROM m)
+{
+  HycoHybridROM h = (HycoHybridROM)m->data;
+  const PetscInt N = m->pairs.n;
+  HycoReconstruction r;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&r));
+  h->reconstruction = r;
+  PetscCall(PetscMalloc1(N, &r->contact));
+  for (PetscInt k = 0; k < N; k++) {
+    PetscBool any = PETSC_FALSE;
+
+    for (PetscInt j = 0; j < h->n_dual; j++) {
+      const PetscReal force = h->S_lambda[(size_t)j * (size_t)N + (size_t)k];
+
+      any = (PetscBool)(any || force != 0);
+      if (m->in_rid[k]) r->scale = PetscMax(r->scale, force);
+    }
+    if (any) r->contact[r->n++] = k;
+  }
+  PetscCall(PetscMalloc1((size_t)r->n * (size_t)h->n_dual, &r->S));
+  for (PetscInt j = 0; j < h->n_dual; j++) {
+    for (PetscInt k = 0; k < r->n; k++)
+      r->S[(size_t)j * (size_t)r->n + (size_t)k] = h->S_lambda[(size_t)j * (size_t)N + (size_t)r->contact[k]];
+  }
+  PetscCall(PetscMalloc4(r->n, &r->open, r->n, &r->d, r->n, &r->h, h->n_dual, &r->c));
+  PetscCall(HycoWeightedCreate(r->n, h->n_dual, r->S, SMALL * SMALL * r->scale * r->scale, &r->weighted));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction)
+{
+  HycoReconstruction r = *reconstruction;
+
+  PetscFunctionBegin;
+  if (!r) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoWeightedDestroy(&r->weighted));
+  PetscCall(PetscFree(r->contact));
+  PetscCall(PetscFree(r->S));
+  PetscCall(PetscFree4(r->open, r->d, r->h, r->c));
+  PetscCall(PetscFree(*reconstruction));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* (41) as least squares written out: A has a row for each contact of the RID, each open contact and each coefficient.
+ */
+static PetscErrorCode SolveWrittenOut(HycoROM m)
+{
+  HycoHybridROM h = (HycoHybridROM)m->data;
+  HycoReconstruction r = h->reconstruction;
+  const PetscInt n = h->n_dual;
+  PetscInt rows = n;
+  PetscReal *A, *b;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < r->n; k++) rows += m->in_rid[r->contact[k]] + (r->open[k] < 0);
+  PetscCall(PetscCalloc2((size_t)rows * (size_t)n, &A, rows, &b));
+  for (PetscInt j = 0; j < n; j++) {
+    const PetscReal *s = r->S + (size_t)j * (size_t)r->n;
+    PetscReal *a = A + (size_t)j * (size_t)rows;
+    PetscInt row = 0;
+
+    for (PetscInt k = 0; k < r->n; k++) {
+      if (m->in_rid[r->contact[k]]) {
+        b[row] = m->Lambda[r->contact[k]];
+        a[row++] = s[k];
+      }
+      if (r->open[k] < 0) a[row++] = r->open[k] * s[k];
+    }
+    a[row + j] = SMALL * r->scale;
+  }
+  PetscCall(Solve(h->reconstruct_solver, rows, n, A, b, r->c));
+  PetscCall(PetscFree2(A, b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoHybridReconstruct(HycoROM m)
+{
+  HycoHybridROM h = (HycoHybridROM)m->data;
+  const PetscInt N = m->pairs.n;
+  HycoReconstruction r;
+  PetscReal force = 0;
+  PetscBool solved = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->m; k++) force += m->Lambda[m->contact[k]];
+  if (m->m == N || !h->n_dual || !m->m || force == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!h->reconstruction) PetscCall(SetUp(m));
+  PetscCall(HycoROMComplete(m));
+  r = h->reconstruction;
+  for (PetscInt i = 0; i < r->n; i++) {
+    const PetscInt k = r->contact[i];
+
+    r->open[i] = HycoROMAddRow(m, k, -m->rows.gap[k]);
+    r->d[i] = (m->in_rid[k] ? 1 : 0) + (r->open[i] < 0 ? r->open[i] * r->open[i] : 0);
+    r->h[i] = m->in_rid[k] ? m->Lambda[k] : 0;
+  }
+  if (h->reconstruct_solver != SOLVER_TAO && r->scale > 0)
+    PetscCall(HycoWeightedNNLS(r->weighted, r->d, r->h, RTOL, r->c, &solved));
+  if (!solved) PetscCall(SolveWrittenOut(m));
+  for (PetscInt j = 0; j < h->n_dual; j++) {
+    const PetscReal *s = r->S + (size_t)j * (size_t)r->n;
+
+    if (r->c[j] == 0) continue;
+    m->spread = PETSC_TRUE;
+    for (PetscInt i = 0; i < r->n; i++) {
+      if (!m->in_rid[r->contact[i]] && !HycoPairsAlone(m->scene, &m->pairs, r->contact[i]))
+        m->Lambda[r->contact[i]] += r->c[j] * s[i];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

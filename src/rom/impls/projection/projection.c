@@ -1,0 +1,187 @@
+/*
+  The projection-based model (44), online: modes for the displacements, nonnegative vectors for the contact forces, on
+  the whole mesh (Balajewicz, Amsallem, Farhat, Int. J. Numer. Meth. Engng 106 (2016) 644-663; the paper's 6.3):
+
+      V^T K V gamma + (V_lambda^T B V)^T Lambda_r = V^T F,   0 <= Lambda_r  complementary to  V_lambda^T (D - B V gamma)
+  >= 0
+
+  Its stiffness is the hybrid model's with every node in A and no full-order unknown; this file adds the forces. Only
+  V_lambda^T of the gaps is held nonnegative: contacts may penetrate one by one.
+*/
+#include <hycoprojection.h>
+#include <hycoromtypes.h>
+#include <petscviewer.h>
+
+const char *const HycoDuals[] = {"fe", "nnmf", "snapshots", NULL};
+
+/* V_lambda^T B V and its transpose. */
+static PetscErrorCode FillContact(HycoROM m)
+{
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscInt l = m->l, n = p->l_lambda;
+  const HycoRows *rows = &g->own_rows;
+  PetscReal *BV;
+  PetscScalar *b, *bt;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(l, &BV));
+  PetscCall(MatZeroEntries(g->Br));
+  PetscCall(MatDenseGetArray(g->Br, &b));
+  PetscCall(MatDenseGetArray(g->Btr, &bt));
+  for (PetscInt c = 0; c < m->m; c++) {
+    const PetscInt k = m->contact[c];
+
+    PetscCall(PetscArrayzero(BV, l));
+    for (PetscInt t = rows->start[c]; t < rows->start[c + 1]; t++) {
+      for (PetscInt j = 0; j < l; j++) BV[j] += rows->value[t] * g->Vp[(size_t)rows->dof[t] * (size_t)l + (size_t)j];
+    }
+    for (PetscInt j = 0; j < l; j++) {
+      for (PetscInt i = 0; i < n; i++) b[j * n + i] += p->V_lambda[(size_t)i * (size_t)m->pairs.n + (size_t)k] * BV[j];
+    }
+  }
+  for (PetscInt j = 0; j < l; j++) {
+    for (PetscInt i = 0; i < n; i++) bt[i * l + j] = b[j * n + i];
+  }
+  PetscCall(MatDenseRestoreArray(g->Btr, &bt));
+  PetscCall(MatDenseRestoreArray(g->Br, &b));
+  PetscCall(PetscFree(BV));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* V_lambda^T D */
+static PetscErrorCode FillGap(HycoROM m)
+{
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscScalar *d;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(g->Dr, &d));
+  for (PetscInt i = 0; i < p->l_lambda; i++) {
+    const PetscReal *v = p->V_lambda + (size_t)i * (size_t)m->pairs.n;
+
+    d[i] = 0;
+    for (PetscInt c = 0; c < m->m; c++) d[i] += v[m->contact[c]] * g->own_rows.gap[c];
+  }
+  PetscCall(VecRestoreArray(g->Dr, &d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lambda = V_lambda Lambda_r */
+static PetscErrorCode Expand(HycoROM m)
+{
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscScalar *L;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(g->L, &L));
+  for (PetscInt i = 0; i < p->l_lambda; i++) {
+    const PetscReal *v = p->V_lambda + (size_t)i * (size_t)m->pairs.n;
+
+    for (PetscInt c = 0; c < m->m; c++) m->Lambda[m->contact[c]] += L[i] * v[m->contact[c]];
+  }
+  PetscCall(VecRestoreArrayRead(g->L, &L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+{
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  PetscFunctionBegin;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  on the whole mesh: %d elements, %d nodes, %d contacts\n",
+                                   (int)m->whole_cells, (int)m->whole_nodes, (int)m->pairs.n));
+  if (m->counts[1])
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  supremizers of the dual snapshots, which join the modes: %d\n",
+                                     (int)m->counts[1]));
+  PetscCall(PetscViewerASCIIPrintf(
+      viewer, "  force vectors: %d (%s); energy of the training forces that they leave out: %.2e\n", (int)p->l_lambda,
+      p->dual == HYCO_DUAL_NNMF ? "nonnegative factorisation of the dual snapshots" : "the dual snapshots",
+      (double)p->dual_misfit));
+  PetscCall(HycoGalerkinView(m, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoROM m)
+{
+  PetscFunctionBegin;
+  m->n_L = ((HycoProjectionROM)m->data)->l_lambda;
+  PetscCall(HycoGalerkinSetUp(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Save(HycoROM m, HycoH5 h)
+{
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinSave(m, h));
+  PetscCall(HycoH5WriteText(h, "problem/dual", HycoDuals[p->dual]));
+  PetscCall(HycoH5WriteReal(h, "problem/V_lambda", p->l_lambda, m->pairs.n, p->V_lambda));
+  PetscCall(HycoH5WriteReal(h, "training/dual_misfit", 1, 1, &p->dual_misfit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Load(HycoROM m, HycoH5 h)
+{
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  PetscInt word;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinLoad(m, h));
+  PetscCall(HycoROMLoadWord(m, h, "problem/dual", HycoDuals, &word));
+  p->dual = (HycoDual)word;
+  HycoCheck(p->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);
+  p->l_lambda = -1;
+  PetscCall(HycoH5LoadReal(h, "problem/V_lambda", &p->l_lambda, &m->pairs.n, &p->V_lambda));
+  PetscCall(HycoH5ReadReal(h, "training/dual_misfit", 1, 1, &p->dual_misfit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoROM m)
+{
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinDestroy(&p->galerkin));
+  PetscCall(PetscFree(p->V_lambda));
+  PetscCall(PetscFree(m->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMCreate_Projection(HycoROM m)
+{
+  static const HycoROMTraits traits = {.title = "projection-based",
+                                       .settings = HYCO_SETTINGS_MODES,
+                                       .whole = PETSC_TRUE,
+                                       .stiffness = PETSC_TRUE,
+                                       .force_basis = PETSC_TRUE};
+  static const HycoROMOps ops = {.setfromoptions = HycoProjectionSetFromOptions,
+                                 .modes = HycoProjectionModes,
+                                 .build = HycoProjectionBuild,
+                                 .finish = HycoGalerkinFinish,
+                                 .report = HycoProjectionReport,
+                                 .cost = HycoGalerkinCost,
+                                 .offers = HycoProjectionOffers,
+                                 .setup = SetUp,
+                                 .reset = HycoGalerkinReset,
+                                 .solve = HycoGalerkinSolve,
+                                 .energy = HycoGalerkinEnergy,
+                                 .condition = HycoGalerkinCondition,
+                                 .local = HycoGalerkinLocal,
+                                 .view = View,
+                                 .save = Save,
+                                 .load = Load,
+                                 .destroy = Destroy};
+  HycoProjectionROM p;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&p));
+  p->galerkin.contact = FillContact;
+  p->galerkin.gap = FillGap;
+  p->galerkin.expand = Expand;
+  p->galerkin.symmetric = PETSC_TRUE;
+  PetscCall(HycoROMSetOps(m, &ops, &traits, p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

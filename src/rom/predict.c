@@ -1,0 +1,105 @@
+/* A prediction: the parameters checked, the type's solve, what it has not reconstructed. And what types share. */
+#include <hycoromimpl.h>
+
+PetscErrorCode HycoROMSetUpFields(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->pairs.n, &m->slave_id));
+  for (PetscInt k = 0; k < m->pairs.n; k++) m->slave_id[k] = m->mesh->node_id[m->pairs.slave[k]];
+  PetscCall(PetscCalloc1(m->l, &m->gamma));
+  PetscCall(PetscCalloc1(m->mesh->n_nodes * m->mesh->dim, &m->U));
+  PetscCall(PetscCalloc1(m->pairs.n, &m->Lambda));
+  PetscCall(PetscMalloc1(m->mesh->n_cells * m->fe->n_sigma, &m->stress));
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver));
+  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->scene->options));
+  PetscCall(HycoSolverSetFromOptions(m->solver));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSetUpAll(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
+  m->n = m->l;
+  m->m = m->n_L = m->pairs.n;
+  m->spread = PETSC_TRUE;
+  m->of_fe = &m->pairs;
+  PetscCall(PetscMalloc1(m->m, &m->contact));
+  for (PetscInt k = 0; k < m->m; k++) m->contact[k] = k;
+  PetscCall(HycoRowsCreate(&m->pairs, m->mesh->dim, &m->rows));
+  PetscCall(HycoROMSetUpFields(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSetUp(HycoROM m)
+{
+  PetscFunctionBegin;
+  if (m->ready) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMReset(m)); /* what a refusal has left half made */
+  if (m->ops->setup)
+    PetscUseTypeMethod(m, setup);
+  else
+    PetscCall(HycoROMSetUpAll(m));
+  m->ready = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
+{
+  HycoPrediction *p;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  p = &m->prediction;
+  PetscCall(HycoSceneCheckParameters(m->scene, n, mu));
+  m->solved = m->whole_current = PETSC_FALSE;
+  HycoLogged(HYCO_EVENT_SETUP, HycoROMSetUp(m));
+  p->seconds.setup = HycoNow() - begin;
+  begin = HycoNow();
+  PetscUseTypeMethod(m, solve, mu);
+  if (m->ops->reconstruct && m->reconstruct && p->reason > 0)
+    HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
+  p->seconds.total = HycoNow() - begin;
+  m->solved = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residuals at the contacts, recomputed, of a model that solves no system; equilibrium is what it stands for. */
+static void MeasureContacts(HycoROM m, HycoKKT *kkt)
+{
+  PetscReal size = 0, most = 0, in = 0, pulls = 0, both = 0;
+
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    const PetscReal bu = HycoROMAddRow(m, k, 0);
+
+    most = PetscMax(most, PetscAbsReal(m->Lambda[k]));
+    size = PetscMax(size, PetscMax(PetscAbsReal(bu), PetscAbsReal(m->rows.gap[k])));
+    in = PetscMax(in, bu - m->rows.gap[k]);
+    pulls = PetscMax(pulls, -m->Lambda[k]);
+    both = PetscMax(both, PetscAbsReal((m->rows.gap[k] - bu) * m->Lambda[k]));
+  }
+  kkt->stationarity = kkt->rounding = 0;
+  kkt->penetration = size > 0 ? in / size : 0;
+  kkt->adhesion = most > 0 ? pulls / most : 0;
+  kkt->complementarity = size > 0 && most > 0 ? both / (size * most) : 0;
+}
+
+PetscErrorCode HycoROMSetSolution(HycoROM m, const PetscReal mu[], const PetscReal gamma[], const PetscReal Lambda[])
+{
+  HycoPrediction *p = &m->prediction;
+  PetscReal sum = 0;
+
+  PetscFunctionBegin;
+  if (gamma) PetscCall(PetscArraycpy(m->gamma, gamma, m->l));
+  if (Lambda) PetscCall(PetscArraycpy(m->Lambda, Lambda, m->pairs.n));
+  PetscCall(HycoROMBringRows(m, mu));
+  PetscCall(HycoROMExpand(m));
+  for (PetscInt j = 0; j < m->l; j++) sum += m->gamma[j];
+  for (PetscInt k = 0; k < m->pairs.n; k++) sum += m->Lambda[k];
+  MeasureContacts(m, &p->kkt);
+  p->iterations = 0;
+  p->reason = PetscIsInfOrNanReal(sum) ? HYCO_DIVERGED_RESIDUAL : HYCO_CONVERGED;
+  PetscCall(PetscStrncpy(p->method, m->type, sizeof(p->method)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

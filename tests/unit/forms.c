@@ -1,0 +1,153 @@
+/* Forms of HycoSolver: a system whose flexibility is given, and a form that the program registers. */
+#include "check.h"
+#include <hycosolverimpl.h>
+
+/* w = g + G L with G = (2 1; 1 2) scale, g = (-1, 1): L = (1/2, 0) / scale, w = (0, 3/2). */
+static PetscErrorCode TestFlexibility(void)
+{
+  const char *const types[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, HYCO_SOLVER_LEMKE};
+  const char *const words[] = {"active_set condensed", "tao gpcg condensed", "lemke condensed"};
+  PetscScalar G[] = {2, 1, 1, 2}, g[] = {-1, 1}, L[2];
+  Mat matrix;
+  Vec free_gap, forces;
+  HycoSystem system;
+  HycoSolver solver;
+  HycoKKT kkt;
+  HycoReason reason;
+  const char *method;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, 2, 2, G, &matrix));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, 2, g, &free_gap));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, 2, L, &forces));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
+  PetscCall(HycoSystemSetFlexibility(system, matrix, free_gap));
+  L[0] = 0.25; /* w = (-1/2, 5/4): half of the size of g too deep, and pressed there */
+  L[1] = 0;
+  PetscCall(HycoSystemComputeKKT(system, NULL, forces, &kkt));
+  CHECK_NEAR(kkt.stationarity, 0, 0);
+  CHECK_NEAR(kkt.penetration, 0.5, 1e-15);
+  CHECK_NEAR(kkt.adhesion, 0, 0);
+  CHECK_NEAR(kkt.complementarity, 0.5, 1e-15);
+  for (int t = 0; t < 3; t++) {
+    PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
+    PetscCall(HycoSolverSetSystem(solver, system));
+    PetscCall(HycoSolverSetType(solver, types[t]));
+    for (int scale = 1; scale <= 2; scale++) { /* a factor that is kept must not outlive G */
+      PetscCall(MatScale(matrix, scale));
+      PetscCall(HycoSolverSolve(solver, NULL, forces));
+      PetscCall(HycoSolverGetReason(solver, &reason));
+      PetscCall(HycoSolverGetMethod(solver, &method));
+      CHECK(reason == HYCO_CONVERGED && strcmp(method, words[t]) == 0, "%s: %s", method, HycoReasonName(reason));
+      CHECK_NEAR(L[0], 0.5 / scale, 1e-12);
+      CHECK_NEAR(L[1], 0, 0);
+    }
+    PetscCall(MatScale(matrix, 0.5));
+    PetscCall(HycoSolverDestroy(&solver));
+  }
+  PetscCall(HycoSystemDestroy(&system));
+  PetscCall(VecDestroy(&free_gap));
+  PetscCall(VecDestroy(&forces));
+  PetscCall(MatDestroy(&matrix));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Its answer to everything: data[0] is x and L. */
+static PetscErrorCode SolveMine(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+{
+  PetscFunctionBegin;
+  PetscCall(VecSet(x, *(PetscReal *)form->data));
+  PetscCall(VecSet(L, *(PetscReal *)form->data));
+  s->its = 1;
+  s->by_factor = PETSC_FALSE; /* a wrong answer does not mean that K is singular */
+  *solved = PETSC_TRUE;
+  PetscCall(HycoSolverNameMethod(s, form->name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AcceptsMine(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost,
+                                  char why[HYCO_LINE])
+{
+  PetscFunctionBegin;
+  (void)form, (void)asked;
+  *cost = s->system->K && !(s->now.traits & HYCO_TAO_DENSE) ? 0.5 : -1;
+  if (*cost < 0) HycoFormat(why, "mine takes no dense matrix");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal answer = 1;
+
+static PetscErrorCode CreateMine(HycoSolver s, HycoSolverForm form)
+{
+  PetscFunctionBegin;
+  (void)s;
+  form->data = &answer;
+  form->ops->accepts = AcceptsMine;
+  form->ops->solve = SolveMine;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x + L = 2, x <= 1: x = L = 1. The cheapest form is taken; what it gets wrong goes on to the next method, and to another
+   form where it does not accept that. */
+static PetscErrorCode TestRegistered(void)
+{
+  static const struct {
+    PetscReal answer;
+    HycoForm form;
+    HycoReason reason;
+    const char *method;
+  } cases[] = {{1, HYCO_FORM_AUTO, HYCO_CONVERGED, "active_set mine"},
+               {3, HYCO_FORM_AUTO, HYCO_CONVERGED_FALLBACK, "active_set mine, then lemke"},
+               {3, HYCO_FORM_DUAL, HYCO_CONVERGED, "active_set dual"}};
+  Mat K;
+  Vec F, D, x, L;
+  HycoSystem system;
+  HycoReason reason;
+  const char *method;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSolverRegister("mine", CreateMine));
+  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, 1, 1, 1, NULL, &K));
+  PetscCall(MatSetValue(K, 0, 0, 1, INSERT_VALUES));
+  PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(K, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatCreateVecs(K, &F, &D));
+  PetscCall(VecDuplicate(F, &x));
+  PetscCall(VecDuplicate(D, &L));
+  PetscCall(VecSet(F, 2));
+  PetscCall(VecSet(D, 1));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
+  PetscCall(HycoSystemSetMatrices(system, K, K, K, PETSC_TRUE));
+  PetscCall(HycoSystemSetVectors(system, F, D));
+  for (size_t k = 0; k < sizeof(cases) / sizeof(cases[0]); k++) {
+    HycoSolver solver;
+
+    answer = cases[k].answer;
+    PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
+    PetscCall(HycoSolverSetSystem(solver, system));
+    PetscCall(HycoSolverSetForm(solver, cases[k].form));
+    PetscCall(HycoSolverSolve(solver, x, L));
+    PetscCall(HycoSolverGetReason(solver, &reason));
+    PetscCall(HycoSolverGetMethod(solver, &method));
+    CHECK(reason == cases[k].reason && strcmp(method, cases[k].method) == 0, "case %d: %s, %s", (int)k, method,
+          HycoReasonName(reason));
+    PetscCall(HycoSolverDestroy(&solver));
+  }
+  PetscCall(HycoSystemDestroy(&system));
+  PetscCall(MatDestroy(&K));
+  PetscCall(VecDestroy(&F));
+  PetscCall(VecDestroy(&D));
+  PetscCall(VecDestroy(&x));
+  PetscCall(VecDestroy(&L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Test(void)
+{
+  PetscFunctionBegin;
+  PetscCall(TestFlexibility());
+  PetscCall(TestRegistered());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+TEST_MAIN
