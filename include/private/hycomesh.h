@@ -61,6 +61,9 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene);
 PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
                                const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh *part);
 
+/* Sorts a[0..*n), unless it is, and keeps one of each. */
+PetscErrorCode HycoSortUnique(PetscInt *n, PetscInt a[]);
+
 /* The largest extent of the mesh, as in the file, along an axis. */
 PetscReal HycoMeshLength(HycoMesh mesh);
 
@@ -74,12 +77,12 @@ extern const char *const HycoPartitioners[];
 /*
   The scene's mesh as a DMPlex (src/mesh/plex.c), read on rank 0. Collective.
   HycoMeshDistribute() spreads it: the cells by METIS, those on the two sides of a contact on one rank where they can be
-  (pairs: n_pairs x 2 node indices of rank 0's tables `whole`); refines it as the scene says; and adds to each rank the
-  cells that touch its own.
+  (pairs: n_pairs x 2 node indices of rank 0's tables `whole`); refines it as the scene says; writes it to `write`
+  in PETSc's HDF5 format, unless that is empty; and adds to each rank the cells that touch its own.
 */
 PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm);
 PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
-                                  HycoPartitioner by);
+                                  HycoPartitioner by, const char write[]);
 /* Tables of each process's part: the cells that touch a node of its own. n_owned, first: its own nodes' rows in the
    distributed numbering. On one process node_global, node_whole and cell_whole stay NULL. Collective. */
 PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *n_owned, PetscInt *first);

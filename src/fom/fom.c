@@ -86,7 +86,7 @@ static PetscErrorCode Distribute(HycoFOM f)
   PetscFunctionBegin;
   PetscCall(DMPlexIsDistributed(f->dm, &done));
   if (f->size == 1 || done) {
-    PetscCall(HycoMeshDistribute(&f->dm, f->scene, NULL, 0, NULL, cut));
+    PetscCall(HycoMeshDistribute(&f->dm, f->scene, NULL, 0, NULL, cut, f->mesh_write));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoPlexToMesh(f->dm, f->scene, &mesh, &n_owned, &first));
@@ -94,7 +94,7 @@ static PetscErrorCode Distribute(HycoFOM f)
   PetscCheck(f->n_cells >= f->size, HycoComm(f), PETSC_ERR_USER,
              "the mesh has %d cells; run it on at most as many ranks", (int)f->n_cells);
   if (!f->scene->refine) HycoOnRoot(HycoComm(f), FindTies(f, mesh, &n_ties, &ties)); /* else they are yet to be found */
-  PetscCall(HycoMeshDistribute(&f->dm, f->scene, mesh, n_ties, ties, cut));
+  PetscCall(HycoMeshDistribute(&f->dm, f->scene, mesh, n_ties, ties, cut, f->mesh_write));
   PetscCall(PetscFree(ties));
   PetscCall(HycoMeshDestroy(&mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -193,6 +193,9 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
                             &f->regularise_tol, NULL));
   PetscCall(HycoOptionsWord("-hyco_partition", "cuts the mesh for the ranks; PT-Scotch also where METIS fails",
                             HycoPartitioners, &f->partition, NULL));
+  PetscCall(HycoOptionsString(
+      "-hyco_mesh_write", "<file.h5>: writes the mesh, refined as the scene says, in PETSc's HDF5 format of a DMPlex",
+      f->mesh_write, sizeof(f->mesh_write), NULL));
   PetscCall(HycoOptionsName("-hyco_fom_view", "after each full-order solve: sizes, system, solver"));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,5 +1,6 @@
 /* The mesh over the ranks: DMPlexDistribute() with this library's partitioner, and the tags sent after it. */
 #include "plex.h"
+#include <string.h>
 
 PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to)
 {
@@ -32,7 +33,7 @@ static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
 }
 
 PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
-                                  HycoPartitioner by)
+                                  HycoPartitioner by, const char write[])
 {
   PetscPartitioner partitioner;
   PetscBool done;
@@ -52,6 +53,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   }
   PetscCall(HycoPlexRefine(dm, scene, scene->refine));
   if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
+  if (write[0]) PetscCall(HycoPlexWrite(*dm, write));
   PetscCall(DMSetBasicAdjacency(*dm, PETSC_FALSE, PETSC_TRUE)); /* cells that share a vertex are neighbours */
   PetscCall(DMPlexDistributeOverlap(*dm, 1, &sf, &next));
   PetscCall(Replace(dm, sf, next));
@@ -94,7 +96,8 @@ static PetscErrorCode Complete(DM dm)
 
   PetscFunctionBegin;
   PetscCall(PetscObjectQuery((PetscObject)dm, HYCO_TAGS, &tags));
-  if (!tags) PetscCall(NumberPoints(dm));
+  if (tags) PetscFunctionReturn(PETSC_SUCCESS); /* written by hyco, complete */
+  PetscCall(NumberPoints(dm));
   PetscCall(DMGetDimension(dm, &dim));
   PetscCall(DMPlexGetDepth(dm, &depth));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &depth, 1, MPIU_INT, MPI_MAX, HycoComm(dm)));
@@ -117,6 +120,7 @@ static PetscErrorCode Complete(DM dm)
 PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
 {
   HycoMesh mesh = NULL;
+  size_t length;
 
   PetscFunctionBegin;
   if (scene->dm) {
@@ -126,6 +130,12 @@ PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
     HycoCheck(same == MPI_IDENT || same == MPI_CONGRUENT,
               "the scene's DM lives on other processes than the model; for training give -hyco_groups 1");
     PetscCall(DMClone(scene->dm, dm));
+    PetscCall(Complete(*dm));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscStrlen(scene->mesh_path, &length));
+  if (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0) {
+    PetscCall(HycoPlexRead(comm, scene->mesh_path, dm));
     PetscCall(Complete(*dm));
     PetscFunctionReturn(PETSC_SUCCESS);
   }

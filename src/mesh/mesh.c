@@ -122,6 +122,19 @@ PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSortUnique(PetscInt *n, PetscInt a[])
+{
+  PetscBool sorted;
+
+  PetscFunctionBegin;
+  PetscCall(PetscSortedInt(*n, a, &sorted));
+  if (sorted)
+    PetscCall(PetscSortedRemoveDupsInt(n, a));
+  else
+    PetscCall(PetscSortRemoveDupsInt(n, a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscReal HycoMeshLength(HycoMesh m)
 {
   PetscReal length = 0;

@@ -56,15 +56,18 @@ static PetscErrorCode CellType(DM dm, PetscInt *type)
   static const DMPolytopeType plex_type[HYCO_N_CELL_TYPES] = {DM_POLYTOPE_SEGMENT, DM_POLYTOPE_TRIANGLE,
                                                               DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_TETRAHEDRON,
                                                               DM_POLYTOPE_HEXAHEDRON};
-  PetscInt c0, c1;
+  PetscInt c0, c1, last = -1;
 
   PetscFunctionBegin;
   *type = -1;
   PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
   for (PetscInt c = c0; c < c1; c++) {
     DMPolytopeType of;
-    PetscInt t = 0;
+    PetscInt t = 0, size;
 
+    PetscCall(DMPlexGetConeSize(dm, c, &size)); /* of these types each has its own in a dimension */
+    if (size == last) continue;
+    last = size;
     PetscCall(DMPlexGetCellType(dm, c, &of));
     while (t < HYCO_N_CELL_TYPES && plex_type[t] != of) t++;
     HycoCheck(t < HYCO_N_CELL_TYPES && (c == c0 || t == *type),
@@ -232,7 +235,7 @@ typedef struct {
   PetscInt c0, c1, v0, v1;        /* cells, vertices */
   PetscBool facets_are_points;    /* the DM is interpolated */
   const PetscInt *tag;            /* by point */
-  PetscBool *owned;               /* by vertex */
+  PetscBool *owned, all_owned;    /* by vertex */
   PetscInt *node, *vertex, *cell; /* node of each vertex (or -1), vertex of each node, cell of each DM's cell (or -1) */
   PetscInt *point;                /* the DM's cell of each cell */
   PetscInt n_facets, room, node_room, cell_room;
@@ -277,6 +280,7 @@ static PetscErrorCode FindOwned(Builder *b)
   for (PetscInt v = b->v0; v < b->v1; v++) b->owned[v - b->v0] = PETSC_TRUE;
   PetscCall(DMGetPointSF(b->dm, &sf));
   PetscCall(PetscSFGetGraph(sf, NULL, &n, &leaf, NULL));
+  b->all_owned = (PetscBool)(n <= 0);
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt p = leaf ? leaf[k] : k;
 
@@ -296,10 +300,10 @@ static PetscErrorCode TakeCells(Builder *b)
   PetscCall(PetscMalloc3(b->c1 - b->c0, &keep, b->c1 - b->c0, &key, b->c1 - b->c0, &place));
   for (PetscInt c = b->c0; c < b->c1; c++) {
     PetscInt vertex[8];
-    PetscBool mine = PETSC_FALSE;
+    PetscBool mine = b->all_owned;
 
-    PetscCall(HycoPlexVertices(b->dm, b->facets_are_points, m->type, c, m->nv, vertex));
-    for (PetscInt v = 0; v < m->nv; v++) mine = (PetscBool)(mine || b->owned[vertex[v] - b->v0]);
+    if (!mine) PetscCall(HycoPlexVertices(b->dm, b->facets_are_points, m->type, c, m->nv, vertex));
+    for (PetscInt v = 0; v < m->nv && !mine; v++) mine = (PetscBool)(mine || b->owned[vertex[v] - b->v0]);
     b->cell[c - b->c0] = -1;
     if (!mine) continue;
     key[n] = b->tag[c];
@@ -436,7 +440,6 @@ static PetscErrorCode AddCell(Builder *b, PetscInt group, PetscInt cell)
     PetscCall(PetscRealloc((size_t)b->cell_room * sizeof(*m->group_cell), &m->group_cell));
   }
   m->group_cell[(*n)++] = cell;
-  for (PetscInt v = 0; v < m->nv && b->facets_are_points; v++) PetscCall(AddNode(b, group, m->cells[cell * m->nv + v]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -463,11 +466,11 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A point of a label: its nodes to the group, itself as a cell or a facet. */
+/* A point of a label, which has the closure of its points: to the group as a node, a cell or a facet. */
 static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, PetscInt p)
 {
   HycoMesh m = b->m;
-  PetscInt n = 1, vertex[8] = {p}, node[8], depth, of = 0;
+  PetscInt vertex[4], node[4], depth = 0, of = 0;
 
   PetscFunctionBegin;
   if (p >= b->c0 && p < b->c1) {
@@ -481,15 +484,16 @@ static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, Petsc
       PetscCall(AddFacet(b, e, value - HYCO_FACET, node));
     }
   } else {
-    PetscCall(DMPlexGetPointDepth(b->dm, p, &depth));
+    if (p < b->v0 || p >= b->v1)
+      PetscCall(DMPlexGetPointDepth(b->dm, p, &depth));
+    else if (b->node[p - b->v0] >= 0)
+      PetscCall(AddNode(b, group, b->node[p - b->v0]));
     of = b->facets_are_points ? depth : value - 1;
-    n = depth == 0 ? 1 : depth == 1 ? 2 : m->nf;
-    if (depth) PetscCall(HycoPlexVertices(b->dm, PETSC_TRUE, HYCO_N_CELL_TYPES, p, n, vertex));
-    for (PetscInt k = 0; k < n; k++) {
-      node[k] = b->node[vertex[k] - b->v0];
-      if (node[k] >= 0) PetscCall(AddNode(b, group, node[k]));
+    if (b->facets_are_points && depth == m->dim - 1) {
+      PetscCall(HycoPlexVertices(b->dm, PETSC_TRUE, HYCO_N_CELL_TYPES, p, m->nf, vertex));
+      for (PetscInt k = 0; k < m->nf; k++) node[k] = b->node[vertex[k] - b->v0];
+      PetscCall(AddFacetPoint(b, group, p, node));
     }
-    if (b->facets_are_points && depth == m->dim - 1) PetscCall(AddFacetPoint(b, group, p, node));
   }
   m->group_dim[group] = PetscMax(m->group_dim[group], of);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -551,10 +555,10 @@ static PetscErrorCode TakeGroup(Builder *b, PetscInt group, DMLabel label)
   PetscCall(ISRestoreIndices(values, &value));
   PetscCall(ISDestroy(&values));
   n = m->group_start[group + 1] - m->group_start[group];
-  PetscCall(PetscSortRemoveDupsInt(&n, m->group_node ? m->group_node + m->group_start[group] : NULL));
+  PetscCall(HycoSortUnique(&n, m->group_node ? m->group_node + m->group_start[group] : NULL));
   m->group_start[group + 1] = m->group_start[group] + n;
   n = m->group_cell_start[group + 1] - m->group_cell_start[group];
-  PetscCall(PetscSortRemoveDupsInt(&n, m->group_cell ? m->group_cell + m->group_cell_start[group] : NULL));
+  PetscCall(HycoSortUnique(&n, m->group_cell ? m->group_cell + m->group_cell_start[group] : NULL));
   m->group_cell_start[group + 1] = m->group_cell_start[group] + n;
   PetscCall(PlaceFacets(b, group));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -718,7 +722,7 @@ PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *
   *first = 0;
   if (size > 1) PetscCall(AgreeOnGroups(comm, b.m));
   DropInnerFacets(b.m);
-  if (scene->dm) ierr = CheckGroups(comm, b.m, scene);
+  ierr = CheckGroups(comm, b.m, scene);
   if (size > 1 && !ierr) ierr = Number(&b, n_owned, first);
   PetscCall(PetscFree(b.owned));
   PetscCall(PetscFree(b.node));

@@ -39,6 +39,10 @@ const signed char *HycoFacetNodes(HycoCellType type, PetscInt number);
 PetscErrorCode HycoPartitionerSetMesh(PetscPartitioner partitioner, HycoMesh mesh, PetscInt n_pairs,
                                       const PetscInt pairs[], HycoPartitioner by);
 
+/* PETSc's own HDF5 format, with the tags. A DM that has an overlap is not for writing. Collective. */
+PetscErrorCode HycoPlexWrite(DM dm, const char path[]);
+PetscErrorCode HycoPlexRead(MPI_Comm comm, const char path[], DM *dm);
+
 /* place[k]: how many different keys of all processes are smaller than key[k] >= 0. Collective. */
 PetscErrorCode HycoRankInts(MPI_Comm comm, PetscInt n, const PetscInt key[], PetscInt place[]);
 PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *total);

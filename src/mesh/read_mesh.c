@@ -207,7 +207,7 @@ static PetscErrorCode AddMembers(Reader *r, HycoMesh m, Group *g, PetscInt group
   {
     PetscInt n = *n_node - first;
 
-    PetscCall(PetscSortRemoveDupsInt(&n, m->group_node + first));
+    PetscCall(HycoSortUnique(&n, m->group_node + first));
     *n_node = first + n;
   }
   m->group_start[group + 1] = *n_node;
@@ -301,7 +301,6 @@ static PetscErrorCode MakeTables(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(CollectGroups(scene, r, m));
   PetscCall(CheckLoads(scene, r));
   PetscCall(HycoMeshSetNodeBodies(scene, m));
-  PetscCall(HycoMeshCheckGroups(m, scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
