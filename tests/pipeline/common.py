@@ -13,7 +13,7 @@ MPIRUN = [MPIEXEC, *os.environ.get('MPIEXEC_FLAGS', '--oversubscribe').split(), 
 ROPE = os.path.join(SOURCE, 'examples', 'rope')
 PELLET = os.path.join(SOURCE, 'examples', 'pellet')
 SANITIZED = os.environ.get('HYCO_SANITIZE') == '1'
-PATIENCE = int(os.environ.get('HYCO_PATIENCE', '6'))  # factor of a run's limit of time: tests/CMakeLists.txt
+PATIENCE = int(os.environ.get('HYCO_PATIENCE', '15'))  # factor of a run's limit of time: tests/CMakeLists.txt
 
 
 def said(run):
