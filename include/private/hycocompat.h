@@ -14,6 +14,13 @@
 #define PETSC_SUCCESS ((PetscErrorCode)0)
 #endif
 
+/* MPI's type of a PetscBool. */
+#if PETSC_VERSION_LT(3, 24, 0)
+#define HYCO_MPI_BOOL MPIU_BOOL
+#else
+#define HYCO_MPI_BOOL MPI_C_BOOL
+#endif
+
 /* What PetscErrorMessage() gives. */
 #if PETSC_VERSION_LT(3, 25, 0)
 typedef char *HycoErrorText;

@@ -468,7 +468,7 @@ PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *
   PetscCall(VecScatterEnd(scatter, bound, bound_root, INSERT_VALUES, SCATTER_FORWARD));
   *made = PETSC_FALSE;
   HycoOnRoot(comm, StartOnRoot(whole, f_root, bound_root, set_root, made));
-  PetscCallMPI(MPI_Bcast(made, 1, MPIU_BOOL, 0, comm));
+  PetscCallMPI(MPI_Bcast(made, 1, HYCO_MPI_BOOL, 0, comm));
   if (*made) {
     PetscCall(VecScatterBegin(scatter, set_root, set, INSERT_VALUES, SCATTER_REVERSE));
     PetscCall(VecScatterEnd(scatter, set_root, set, INSERT_VALUES, SCATTER_REVERSE));
