@@ -208,6 +208,7 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   PetscFunctionBegin;
+  r->n_facts = 0; /* of the iteration before */
   r->stiffness = m->traits.stiffness;
   r->chosen.recipe.rid = (PetscBool)(m->traits.settings == HYCO_SETTINGS_RID);
   r->n_samples = t->n_s;

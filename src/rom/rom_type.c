@@ -70,7 +70,7 @@ PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
   HycoCheck(create,
             "%s%sthere is no type of reduced model \"%s\" here; a program that has its own registers it by "
             "HycoROMRegister()",
-            m->path, m->path[0] ? ": " : "", type);
+            m->path, m->path[0] ? ": problem/type is damaged, or another program's: " : "", type);
   PetscCheck(!m->data, PETSC_COMM_SELF, PETSC_ERR_ORDER, "HycoROMSetType: the model has a type");
   PetscCall(create(m));
   PetscCall(PetscObjectChangeTypeName((PetscObject)m, type));
