@@ -51,13 +51,3 @@ function(hyco_find_hdf5 out includes)
   set(${out} ${found} PARENT_SCOPE)
   set(${includes} ${HDF5_INCLUDE_DIRS} PARENT_SCOPE)
 endfunction()
-
-# The path of a shared library by the name that a program linked with it would look for: libx.so -> libx.so.4.8
-function(hyco_soname library out)
-  if(IS_SYMLINK ${library})
-    file(READ_SYMLINK ${library} name)
-    get_filename_component(folder ${library} DIRECTORY)
-    get_filename_component(library ${name} ABSOLUTE BASE_DIR ${folder})
-  endif()
-  set(${out} ${library} PARENT_SCOPE)
-endfunction()

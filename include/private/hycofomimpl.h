@@ -14,6 +14,7 @@ struct _p_HycoFOM {
   PetscMPIInt rank, size;
   HycoScene scene; /* referenced */
   /* owned */
+  DM dm;           /* over the ranks */
   HycoMesh whole;  /* rank 0 */
   HycoMesh part;   /* each rank's cells; the whole mesh on one rank */
   HycoFE fe;       /* on the part */

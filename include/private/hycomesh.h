@@ -1,11 +1,12 @@
 /*
-  HycoMesh: cells, nodes and groups as plain arrays on one process. The same struct is the whole mesh on rank 0, each
-  rank's part of it, and the reduced mesh of a model; the element loop runs on any of them.
+  HycoMesh: cells, nodes and groups as plain arrays on one process, made once from the process's part of a DMPlex, so
+  that no element loop asks the DM. The same struct is the reduced mesh of a model; the element loop runs on any.
 */
 #ifndef HYCOMESH_H
 #define HYCOMESH_H
 
 #include <hycosceneimpl.h>
+#include <petscdmplex.h>
 
 typedef enum { HYCO_LINE2, HYCO_TRI3, HYCO_QUAD4, HYCO_TET4, HYCO_HEX8, HYCO_N_CELL_TYPES } HycoCellType;
 
@@ -47,6 +48,8 @@ PetscErrorCode HycoMeshDestroy(HycoMesh *mesh);
 PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh);
 /* Index of a group; fails with the list of those that exist. `key` says who asks. */
 PetscErrorCode HycoMeshFindGroup(HycoMesh mesh, const char key[], const char name[], PetscInt *group);
+/* The body that moves each node; fails where maps disagree, and where a mesh of the line or the plane leaves it. */
+PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh mesh);
 /* Whether every group that the scene names is in the mesh. */
 PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene);
 
@@ -68,15 +71,23 @@ PetscErrorCode HycoMeshNodeCells(HycoMesh mesh, PetscInt **start, PetscInt **cel
 typedef enum { HYCO_PARTITION_METIS, HYCO_PARTITION_PTSCOTCH } HycoPartitioner;
 extern const char *const HycoPartitioners[];
 
-/* part[e] in 0..n_parts-1 for each cell; the cells of a pair (n_pairs x 2 node indices) tied. On one process. */
-PetscErrorCode HycoMeshPartition(HycoMesh mesh, PetscInt n_pairs, const PetscInt pairs[], HycoPartitioner partitioner,
-                                 PetscInt n_parts, PetscInt part[]);
-
-/* Spreads rank 0's whole mesh over comm: each rank receives its part. Pairs (n_pairs x 2 node indices slave, master,
-   rank 0) stay on one rank where they can: always, when no master has two slaves. n_owned, first: this rank's rows of
-   nodes in the distributed numbering. On one rank *part = whole. Collective. */
-PetscErrorCode HycoMeshDistribute(MPI_Comm comm, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
-                                  HycoPartitioner partitioner, HycoMesh *part, PetscInt *n_owned, PetscInt *first,
-                                  PetscInt **global_of_whole);
+/*
+  The scene's mesh as a DMPlex (src/mesh/plex.c), read on rank 0. Collective.
+  HycoMeshDistribute() spreads it: the cells by METIS, those on the two sides of a contact on one rank where they can be
+  (pairs: n_pairs x 2 node indices of rank 0's tables `whole`); refines it as the scene says; and adds to each rank the
+  cells that touch its own.
+*/
+PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm);
+PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
+                                  HycoPartitioner by);
+/* Tables of each process's part: the cells that touch a node of its own. n_owned, first: its own nodes' rows in the
+   distributed numbering. On one process node_global, node_whole and cell_whole stay NULL. Collective. */
+PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *n_owned, PetscInt *first);
+/* On rank 0 (elsewhere NULL) all of the parts, or with `in` (by group) the nodes and the facets of these groups, without
+   cells; `global`: the numbers of its nodes in the distributed vectors. The caller owns both. Collective. */
+PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, PetscInt n_owned, PetscInt first, const PetscBool in[],
+                              HycoMesh *mesh, PetscInt **global);
+/* The scene's whole mesh on rank 0 (elsewhere NULL). Collective. */
+PetscErrorCode HycoMeshCreateWhole(MPI_Comm comm, HycoScene scene, HycoMesh *mesh);
 
 #endif

@@ -76,6 +76,8 @@ struct _p_HycoScene {
   PETSCHEADER(int);
   PetscOptions options; /* every entry, the command line's already in */
   char *title, *mesh_path;
+  DM dm;           /* the program's own mesh; NULL: mesh_path */
+  PetscInt refine; /* times that the mesh's cells are halved */
   /* parameters */
   PetscInt n_parameters;
   char *parameter[HYCO_MAX_PARAMETERS];

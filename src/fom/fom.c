@@ -33,6 +33,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscCall(HycoFEDestroy(&f->fe));
   if (f->part != f->whole) PetscCall(HycoMeshDestroy(&f->part));
   PetscCall(HycoMeshDestroy(&f->whole));
+  PetscCall(DMDestroy(&f->dm));
   PetscCall(HycoPairsDestroy(&f->pairs));
   for (PetscInt k = 0; k < f->n_released; k++) PetscCall(VecDestroy(&f->released[k]));
   PetscCall(PetscFree(f->released));
@@ -46,44 +47,86 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The mesh, its contacts and its parts. */
-static PetscErrorCode ReadMesh(HycoFOM f)
+/* Pairs of nodes that the contacts on the undistributed mesh tie. Rank 0. */
+static PetscErrorCode FindTies(HycoFOM f, HycoMesh mesh, PetscInt *n, PetscInt **ties)
 {
-  PetscInt *both = NULL, sizes[6] = {0, 0, 0, 0, 0, 0};
+  HycoPairs p;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  HycoOnRoot(HycoComm(f), HycoMeshRead(f->scene, &f->whole));
+  *n = 0;
+  ierr = HycoPairsFind(f->scene, mesh, &p);
+  if (!ierr) {
+    PetscCall(PetscMalloc1(2 * p.n * HycoPairsWidth(&p), ties));
+    for (PetscInt k = 0; k < p.n; k++) {
+      const PetscInt *master;
+      const PetscReal *weight;
+      PetscInt masters;
+
+      HycoPairsMasters(&p, k, &masters, &master, &weight);
+      for (PetscInt j = 0; j < masters; j++, (*n)++) {
+        (*ties)[2 * *n] = HycoPairsSlave(&p, k);
+        (*ties)[2 * *n + 1] = master[j];
+      }
+    }
+  }
+  PetscCall(HycoPairsDestroy(&p));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cuts the DM for the ranks. */
+static PetscErrorCode Distribute(HycoFOM f)
+{
+  const HycoPartitioner cut = (HycoPartitioner)f->partition;
+  PetscInt n_owned, first, n_ties = 0, *ties = NULL;
+  HycoMesh mesh;
+  PetscBool done;
+
+  PetscFunctionBegin;
+  PetscCall(DMPlexIsDistributed(f->dm, &done));
+  if (f->size == 1 || done) {
+    PetscCall(HycoMeshDistribute(&f->dm, f->scene, NULL, 0, NULL, cut));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoPlexToMesh(f->dm, f->scene, &mesh, &n_owned, &first));
+  PetscCallMPI(MPI_Allreduce(&mesh->n_cells, &f->n_cells, 1, MPIU_INT, MPI_SUM, HycoComm(f)));
+  PetscCheck(f->n_cells >= f->size, HycoComm(f), PETSC_ERR_USER,
+             "the mesh has %d cells; run it on at most as many ranks", (int)f->n_cells);
+  if (!f->scene->refine) HycoOnRoot(HycoComm(f), FindTies(f, mesh, &n_ties, &ties)); /* else they are yet to be found */
+  PetscCall(HycoMeshDistribute(&f->dm, f->scene, mesh, n_ties, ties, cut));
+  PetscCall(PetscFree(ties));
+  PetscCall(HycoMeshDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The mesh, its parts and its contacts. */
+static PetscErrorCode ReadMesh(HycoFOM f)
+{
+  PetscInt sizes[5] = {0, 0, 0, 0, 0};
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshLoad(HycoComm(f), f->scene, &f->dm));
+  PetscCall(Distribute(f));
+  PetscCall(HycoPlexToMesh(f->dm, f->scene, &f->part, &f->n_owned, &f->first));
+  if (f->size == 1)
+    f->whole = f->part;
+  else
+    PetscCall(HycoMeshGather(HycoComm(f), f->part, f->n_owned, f->first, NULL, &f->whole, &f->global));
   HycoOnRoot(HycoComm(f), HycoPairsFind(f->scene, f->whole, &f->pairs));
   if (f->rank == 0) {
     sizes[0] = f->whole->n_nodes;
     sizes[1] = f->whole->n_cells;
     sizes[2] = f->pairs.n;
-    sizes[4] = HycoPairsWidth(&f->pairs);
-    sizes[5] = f->pairs.room > 0;
-    PetscCall(PetscMalloc1(2 * f->pairs.n * sizes[4], &both));
-    for (PetscInt k = 0; k < f->pairs.n; k++) {
-      const PetscInt *master;
-      const PetscReal *weight;
-      PetscInt n;
-
-      HycoPairsMasters(&f->pairs, k, &n, &master, &weight);
-      for (PetscInt j = 0; j < n; j++) {
-        both[2 * sizes[3]] = HycoPairsSlave(&f->pairs, k);
-        both[2 * sizes[3]++ + 1] = master[j];
-      }
-    }
+    sizes[3] = HycoPairsWidth(&f->pairs);
+    sizes[4] = f->pairs.room > 0;
   }
-  PetscCallMPI(MPI_Bcast(sizes, 6, MPIU_INT, 0, HycoComm(f)));
+  PetscCallMPI(MPI_Bcast(sizes, 5, MPIU_INT, 0, HycoComm(f)));
   f->n_nodes = sizes[0];
   f->n_cells = sizes[1];
   f->n_contacts = sizes[2];
-  f->width = sizes[4];
-  f->searches = (PetscBool)(sizes[5] != 0);
-  PetscCheck(f->n_cells >= f->size, HycoComm(f), PETSC_ERR_USER,
-             "the mesh has %d cells; run it on at most as many ranks", (int)f->n_cells);
-  PetscCall(HycoMeshDistribute(HycoComm(f), f->whole, sizes[3], both, (HycoPartitioner)f->partition, &f->part,
-                               &f->n_owned, &f->first, &f->global));
-  PetscCall(PetscFree(both));
+  f->width = sizes[3];
+  f->searches = (PetscBool)(sizes[4] != 0);
   HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part, &f->fe));
   f->fe_whole = f->fe;
   if (f->size > 1) {

@@ -1,181 +1,157 @@
-/*
-  The mesh over the ranks: rank 0 cuts the cell graph with METIS, paired contact cells tied by heavy edges, and sends
-  each rank the cells that touch the nodes it owns. Each rank can then assemble its rows without its neighbours.
-*/
-#include <hycomesh.h>
+/* The mesh over the ranks: DMPlexDistribute() with this library's partitioner, and the tags sent after it. */
+#include "plex.h"
 
-/* owner[i] = rank of node i: the lowest rank among its cells'; a master follows its slave (of several the last). */
-static PetscErrorCode OwnNodes(PetscMPIInt size, HycoMesh m, PetscInt n_pairs, const PetscInt pairs[],
-                               HycoPartitioner partitioner, PetscInt owner[])
+PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to)
 {
-  PetscInt *part;
+  PetscInt first, last, *tag;
+  const PetscInt *sent;
+  IS tags;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_cells, &part));
-  PetscCall(HycoMeshPartition(m, n_pairs, pairs, partitioner, size, part));
-  for (PetscInt i = 0; i < m->n_nodes; i++) owner[i] = size;
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) owner[m->cells[k]] = PetscMin(owner[m->cells[k]], part[k / m->nv]);
-  for (PetscInt k = 0; k < n_pairs; k++) owner[pairs[2 * k + 1]] = owner[pairs[2 * k]];
-  PetscCall(PetscFree(part));
+  PetscCall(PetscObjectQuery((PetscObject)from, HYCO_TAGS, (PetscObject *)&tags));
+  PetscCall(DMPlexGetChart(to, &first, &last));
+  PetscCall(PetscCalloc1(last, &tag));
+  PetscCall(ISGetIndices(tags, &sent));
+  PetscCall(PetscSFBcastBegin(sf, MPIU_INT, sent, tag, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, MPIU_INT, sent, tag, MPI_REPLACE));
+  PetscCall(ISRestoreIndices(tags, &sent));
+  PetscCall(HycoPlexSetTags(to, tag));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SendInts(MPI_Comm comm, PetscMPIInt to, PetscInt n, const PetscInt data[])
+/* Puts what a distribution made (NULL: nothing) in a DM's place. */
+static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
 {
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Send(&n, 1, MPIU_INT, to, 1, comm));
-  PetscCallMPI(MPI_Send(data, (PetscMPIInt)n, MPIU_INT, to, 2, comm));
+  if (!by) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoPlexSendTags(*dm, sf, by));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(DMDestroy(dm));
+  *dm = by;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReceiveInts(MPI_Comm comm, PetscInt *n, PetscInt **data)
+PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
+                                  HycoPartitioner by)
 {
+  PetscPartitioner partitioner;
+  PetscBool done;
+  PetscInt overlap;
+  PetscSF sf;
+  DM next;
+
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Recv(n, 1, MPIU_INT, 0, 1, comm, MPI_STATUS_IGNORE));
-  PetscCall(PetscMalloc1(*n, data));
-  PetscCallMPI(MPI_Recv(*data, (PetscMPIInt)*n, MPIU_INT, 0, 2, comm, MPI_STATUS_IGNORE));
+  PetscCall(DMPlexIsDistributed(*dm, &done));
+  PetscCall(DMPlexGetOverlap(*dm, &overlap));
+  HycoCheck(!overlap || !scene->refine, "scene_refine: the DM has an overlap; refine it before that is added");
+  if (!done) {
+    PetscCall(DMPlexGetPartitioner(*dm, &partitioner));
+    PetscCall(HycoPartitionerSetMesh(partitioner, whole, n_pairs, pairs, by));
+    PetscCall(DMPlexDistribute(*dm, 0, &sf, &next));
+    PetscCall(Replace(dm, sf, next));
+  }
+  PetscCall(HycoPlexRefine(dm, scene, scene->refine));
+  if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DMSetBasicAdjacency(*dm, PETSC_FALSE, PETSC_TRUE)); /* cells that share a vertex are neighbours */
+  PetscCall(DMPlexDistributeOverlap(*dm, 1, &sf, &next));
+  PetscCall(Replace(dm, sf, next));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SendMesh(MPI_Comm comm, PetscMPIInt to, HycoMesh m)
+/* Tags of a DM that came without: its own numbers of cells and vertices, from 1. */
+static PetscErrorCode NumberPoints(DM dm)
 {
-  const PetscInt head[5] = {m->dim, m->nv, m->nf, (PetscInt)m->type, m->n_groups};
+  PetscInt start[2], end[2], last, *tag;
+  IS numbers[2];
 
   PetscFunctionBegin;
-  PetscCall(SendInts(comm, to, 5, head));
-  PetscCall(SendInts(comm, to, m->n_nodes, m->node_id));
-  PetscCall(SendInts(comm, to, m->n_nodes, m->node_body));
-  PetscCall(SendInts(comm, to, m->n_nodes, m->node_global));
-  PetscCall(SendInts(comm, to, m->n_nodes, m->node_whole));
-  PetscCallMPI(MPI_Send(m->xyz, (PetscMPIInt)(3 * m->n_nodes), MPIU_REAL, to, 3, comm));
-  PetscCall(SendInts(comm, to, m->n_cells * m->nv, m->cells));
-  PetscCall(SendInts(comm, to, m->n_cells, m->cell_id));
-  PetscCall(SendInts(comm, to, m->n_cells, m->cell_body));
-  PetscCall(SendInts(comm, to, m->n_cells, m->cell_whole));
-  PetscCall(SendInts(comm, to, m->n_groups, m->group_dim));
-  PetscCall(SendInts(comm, to, m->n_groups + 1, m->group_start));
-  PetscCall(SendInts(comm, to, m->group_start[m->n_groups], m->group_node));
-  PetscCall(SendInts(comm, to, m->n_groups + 1, m->group_cell_start));
-  PetscCall(SendInts(comm, to, m->group_cell_start[m->n_groups], m->group_cell));
-  PetscCall(SendInts(comm, to, m->n_facets * m->nf, m->facets));
-  PetscCall(SendInts(comm, to, m->n_facets, m->facet_group));
-  PetscCall(SendInts(comm, to, m->n_facets, m->facet_cell));
-  for (PetscInt g = 0; g < m->n_groups; g++) {
-    char name[256];
+  PetscCall(DMPlexGetChart(dm, NULL, &last));
+  PetscCall(PetscCalloc1(last, &tag));
+  PetscCall(DMPlexGetHeightStratum(dm, 0, &start[0], &end[0]));
+  PetscCall(DMPlexGetDepthStratum(dm, 0, &start[1], &end[1]));
+  PetscCall(DMPlexGetCellNumbering(dm, &numbers[0]));
+  PetscCall(DMPlexGetVertexNumbering(dm, &numbers[1]));
+  for (PetscInt k = 0; k < 2; k++) {
+    const PetscInt *number;
 
-    PetscCall(PetscStrncpy(name, m->group_name[g], sizeof(name)));
-    PetscCallMPI(MPI_Send(name, sizeof(name), MPI_CHAR, to, 4, comm));
+    PetscCall(ISGetIndices(numbers[k], &number));
+    for (PetscInt p = start[k]; p < end[k]; p++) { /* -1 - number where another process owns the point */
+      const PetscInt n = number[p - start[k]];
+
+      tag[p] = 1 + (n < 0 ? -1 - n : n);
+    }
+    PetscCall(ISRestoreIndices(numbers[k], &number));
+  }
+  PetscCall(HycoPlexSetTags(dm, tag));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A DM that was not made from a mesh file: tags, and labels with the closure of their points on every process. */
+static PetscErrorCode Complete(DM dm)
+{
+  PetscInt n, dim, depth;
+  PetscObject tags;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectQuery((PetscObject)dm, HYCO_TAGS, &tags));
+  if (!tags) PetscCall(NumberPoints(dm));
+  PetscCall(DMGetDimension(dm, &dim));
+  PetscCall(DMPlexGetDepth(dm, &depth));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &depth, 1, MPIU_INT, MPI_MAX, HycoComm(dm)));
+  HycoCheck(depth == dim,
+            "the DM has cells of dimension %d and points of %d depths; interpolate it (DMPlexInterpolate)", (int)dim,
+            (int)depth + 1);
+  PetscCall(DMGetNumLabels(dm, &n));
+  for (PetscInt k = 0; k < n; k++) {
+    const char *name;
+    DMLabel label;
+
+    PetscCall(DMGetLabelName(dm, k, &name));
+    if (HycoPlexOwnLabel(name)) continue;
+    PetscCall(DMGetLabel(dm, name, &label));
+    PetscCall(DMPlexLabelComplete(dm, label));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReceiveMesh(MPI_Comm comm, HycoMesh *mesh)
+PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
 {
-  HycoMesh m;
-  PetscInt n, *head;
+  HycoMesh mesh = NULL;
 
   PetscFunctionBegin;
-  PetscCall(PetscNew(&m));
-  PetscCall(ReceiveInts(comm, &n, &head));
-  m->dim = head[0];
-  m->nv = head[1];
-  m->nf = head[2];
-  m->type = (HycoCellType)head[3];
-  m->n_groups = head[4];
-  PetscCall(PetscFree(head));
-  PetscCall(ReceiveInts(comm, &m->n_nodes, &m->node_id));
-  PetscCall(ReceiveInts(comm, &n, &m->node_body));
-  PetscCall(ReceiveInts(comm, &n, &m->node_global));
-  PetscCall(ReceiveInts(comm, &n, &m->node_whole));
-  PetscCall(PetscMalloc1(3 * m->n_nodes, &m->xyz));
-  PetscCallMPI(MPI_Recv(m->xyz, (PetscMPIInt)(3 * m->n_nodes), MPIU_REAL, 0, 3, comm, MPI_STATUS_IGNORE));
-  PetscCall(ReceiveInts(comm, &n, &m->cells));
-  PetscCall(ReceiveInts(comm, &m->n_cells, &m->cell_id));
-  PetscCall(ReceiveInts(comm, &n, &m->cell_body));
-  PetscCall(ReceiveInts(comm, &n, &m->cell_whole));
-  PetscCall(ReceiveInts(comm, &n, &m->group_dim));
-  PetscCall(ReceiveInts(comm, &n, &m->group_start));
-  PetscCall(ReceiveInts(comm, &n, &m->group_node));
-  PetscCall(ReceiveInts(comm, &n, &m->group_cell_start));
-  PetscCall(ReceiveInts(comm, &n, &m->group_cell));
-  PetscCall(ReceiveInts(comm, &n, &m->facets));
-  PetscCall(ReceiveInts(comm, &m->n_facets, &m->facet_group));
-  PetscCall(ReceiveInts(comm, &n, &m->facet_cell));
-  PetscCall(PetscMalloc1(m->n_groups, &m->group_name));
-  for (PetscInt g = 0; g < m->n_groups; g++) {
-    char name[256];
+  if (scene->dm) {
+    int same;
 
-    PetscCallMPI(MPI_Recv(name, sizeof(name), MPI_CHAR, 0, 4, comm, MPI_STATUS_IGNORE));
-    PetscCall(PetscStrallocpy(name, &m->group_name[g]));
-  }
-  *mesh = m;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The part of rank r: the cells that touch a node of r. */
-static PetscErrorCode CutPart(HycoMesh whole, PetscInt r, const PetscInt owner[], const PetscInt global[],
-                              HycoMesh *part)
-{
-  PetscInt *keep, n = 0;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(whole->n_cells, &keep));
-  for (PetscInt e = 0; e < whole->n_cells; e++) {
-    PetscBool mine = PETSC_FALSE;
-
-    for (PetscInt v = 0; v < whole->nv; v++) mine = (PetscBool)(mine || owner[whole->cells[e * whole->nv + v]] == r);
-    if (mine) keep[n++] = e;
-  }
-  PetscCall(HycoMeshExtract(whole, n, keep, 0, NULL, 0, NULL, part));
-  PetscCall(PetscMalloc1((*part)->n_nodes, &(*part)->node_global));
-  for (PetscInt i = 0; i < (*part)->n_nodes; i++) (*part)->node_global[i] = global[(*part)->node_whole[i]];
-  PetscCall(PetscFree(keep));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoMeshDistribute(MPI_Comm comm, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
-                                  HycoPartitioner partitioner, HycoMesh *part, PetscInt *n_owned, PetscInt *first,
-                                  PetscInt **global_of_whole)
-{
-  PetscMPIInt rank, size;
-  PetscInt *owner = NULL, *counts, *global = NULL;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  *global_of_whole = NULL;
-  if (size == 1) {
-    *part = whole;
-    *n_owned = whole->n_nodes;
-    *first = 0;
+    PetscCallMPI(MPI_Comm_compare(comm, HycoComm(scene->dm), &same));
+    HycoCheck(same == MPI_IDENT || same == MPI_CONGRUENT,
+              "the scene's DM lives on other processes than the model; for training give -hyco_groups 1");
+    PetscCall(DMClone(scene->dm, dm));
+    PetscCall(Complete(*dm));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscCalloc1(size + 1, &counts));
-  if (rank == 0) PetscCall(PetscMalloc2(whole->n_nodes, &owner, whole->n_nodes, &global));
-  HycoOnRoot(comm, OwnNodes(size, whole, n_pairs, pairs, partitioner, owner));
-  if (rank == 0) {
-    for (PetscInt i = 0; i < whole->n_nodes; i++) counts[owner[i] + 1]++;
-    for (PetscInt r = 0; r < size; r++) counts[r + 1] += counts[r];
-  }
-  PetscCallMPI(MPI_Bcast(counts, size + 1, MPIU_INT, 0, comm));
-  *first = counts[rank];
-  *n_owned = counts[rank + 1] - counts[rank];
-  if (rank == 0) {
-    for (PetscInt i = 0; i < whole->n_nodes; i++) global[i] = counts[owner[i]]++;
-    for (PetscMPIInt r = size - 1; r >= 0; r--) {
-      HycoMesh cut;
+  HycoOnRoot(comm, HycoMeshRead(scene, &mesh));
+  PetscCall(HycoPlexFromMesh(comm, mesh, dm));
+  if (mesh) PetscCall(HycoMeshDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-      PetscCall(CutPart(whole, r, owner, global, &cut));
-      if (r) {
-        PetscCall(SendMesh(comm, r, cut));
-        PetscCall(HycoMeshDestroy(&cut));
-      } else
-        *part = cut;
-    }
-    HycoDuplicate(whole->n_nodes, global, global_of_whole);
-    PetscCall(PetscFree2(owner, global));
-  } else
-    PetscCall(ReceiveMesh(comm, part));
-  PetscCall(PetscFree(counts));
+PetscErrorCode HycoMeshCreateWhole(MPI_Comm comm, HycoScene scene, HycoMesh *whole)
+{
+  PetscMPIInt size;
+  PetscInt n_owned, first, *global;
+  HycoMesh part;
+  DM dm;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(HycoMeshLoad(comm, scene, &dm));
+  PetscCall(HycoPlexRefine(&dm, scene, scene->refine));
+  PetscCall(HycoPlexToMesh(dm, scene, &part, &n_owned, &first));
+  PetscCall(DMDestroy(&dm));
+  *whole = part;
+  if (size == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoMeshGather(comm, part, n_owned, first, NULL, whole, &global));
+  PetscCall(PetscFree(global));
+  PetscCall(HycoMeshDestroy(&part));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -82,6 +82,46 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether two bodies move a node differently. */
+static PetscBool SameMap(const HycoBody *a, const HycoBody *b)
+{
+  for (PetscInt c = 0; c < 3; c++) {
+    if (a->map[c] || b->map[c]) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh m)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &m->node_body));
+  for (PetscInt i = 0; i < m->n_nodes; i++) m->node_body[i] = -1;
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
+    PetscInt *body = &m->node_body[m->cells[k]], b = m->cell_body[k / m->nv];
+
+    if (*body >= 0 && *body != b) {
+      HycoCheck(SameMap(&scene->body[*body], &scene->body[b]),
+                "%s: the bodies %s and %s share node %d, and a map moves one of them", scene->mesh_path,
+                scene->body[*body].name, scene->body[b].name, (int)m->node_id[m->cells[k]]);
+      *body = PetscMin(*body, b);
+    } else
+      *body = b;
+  }
+  /* A mesh of the line or the plane must lie in it. */
+  for (PetscInt c = m->dim; c < 3; c++) {
+    PetscReal lo = PETSC_MAX_REAL, hi = PETSC_MIN_REAL, size = 0;
+
+    for (PetscInt i = 0; i < m->n_nodes; i++) {
+      lo = PetscMin(lo, m->xyz[3 * i + c]);
+      hi = PetscMax(hi, m->xyz[3 * i + c]);
+      size = PetscMax(size, PetscAbsReal(m->xyz[3 * i] - m->xyz[0]));
+    }
+    HycoCheck(hi - lo <= 1e-9 * size, "%s has cells of dimension %d, but its %c coordinates run from %g to %g",
+              scene->mesh_path, (int)m->dim, "xyz"[c], (double)lo, (double)hi);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscReal HycoMeshLength(HycoMesh m)
 {
   PetscReal length = 0;

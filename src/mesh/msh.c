@@ -1,7 +1,7 @@
 /*
-  The mesh file's form, looked over before gmsh's library reads it: gmsh believes what a file says of itself, and ends
-  in a crash, a hang or all of the memory where that is wrong. Formats 2.2 and 4.1, text and binary, the sections that
-  hyco needs: their counts, tags, types and nodes. (gmsh 4.11 manual, chapter "Gmsh file formats".)
+  The strict reader of gmsh's mesh files: formats 2.2 and 4.1, text and binary, in one pass. Every count is compared
+  with what the file has room for; every tag, type and node with what it may be. (gmsh 4.11 manual, "Gmsh file
+  formats".)
 */
 #include "msh.h"
 #include <stdio.h>
@@ -14,13 +14,26 @@ static const signed char type_nodes[32] = {0, 2,  3,  4,  4, 8,  6,  5,  3,  6, 
 static const signed char type_dim[32] = {0, 1, 2, 2, 3, 3, 3, 3, 1, 2, 2, 3, 3, 3, 3, 0,
                                          2, 3, 3, 3, 2, 2, 2, 2, 2, 2, 1, 1, 1, 3, 3, 3};
 
+/* A name of $PhysicalNames. */
+typedef struct {
+  int dim, tag;
+  char text[128];
+} Name;
+
+/* A group of an entity of $Entities (4.1). */
+typedef struct {
+  int dim, entity, group;
+} Member;
+
 typedef struct {
   const char *path;
   char *text, *at, *end; /* all of the file, a 0 behind it */
   int four, binary;
-  size_t n_nodes;
-  unsigned long long *node; /* their tags, ascending */
   PetscBool has_nodes, has_elements, failed;
+  size_t n_names, n_members, room;
+  Name *name;
+  Member *member;
+  HycoMsh *mesh;
 } Msh;
 
 /* What is read where the file has ended or holds no number is 0, and `failed` says so. */
@@ -80,6 +93,8 @@ static PetscErrorCode ReadCount(Msh *m, size_t bytes, const char what[], size_t 
   PetscFunctionBegin;
   HycoCheck(!m->failed && value >= 0 && (unsigned long long)value <= (size_t)(m->end - m->at) / bytes,
             "the mesh %s is damaged: it speaks of %lld %s, which it has no room for", m->path, value, what);
+  HycoCheck(value <= PETSC_MAX_INT / 8, "the mesh %s has %lld %s: more than this PETSc's integers count", m->path,
+            value, what);
   *n = (size_t)value;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -100,36 +115,52 @@ static PetscErrorCode ReadCountLine(Msh *m, size_t bytes, const char what[], siz
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -- nodes -- */
+
+static PetscErrorCode MakeNodes(Msh *m, size_t n)
+{
+  PetscFunctionBegin;
+  m->mesh->n_nodes = (PetscInt)n;
+  PetscCall(PetscMalloc1(n, &m->mesh->tag));
+  PetscCall(PetscMalloc1(3 * n, &m->mesh->xyz));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode AddNode(Msh *m, size_t k, long long tag)
 {
   PetscFunctionBegin;
   HycoCheck(!m->failed, "the mesh %s is damaged: it ends among its nodes", m->path);
   HycoCheck(tag > 0 && tag < PETSC_MAX_INT, "the mesh %s has a node of the tag %lld; tags run from 1 to %lld", m->path,
             tag, (long long)PETSC_MAX_INT - 1);
-  m->node[k] = (unsigned long long)tag;
+  m->mesh->tag[k] = (PetscInt)tag;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckCoordinates(Msh *m, long long tag)
+static PetscErrorCode AddCoordinates(Msh *m, size_t k)
 {
   PetscFunctionBegin;
-  for (int c = 0; c < 3; c++) {
+  for (size_t c = 0; c < 3; c++) {
     const double x = ReadDouble(m);
 
-    HycoCheck(m->failed || !PetscIsInfOrNanReal(x), "%s: node %lld has a coordinate that is not finite", m->path, tag);
+    HycoCheck(m->failed || !PetscIsInfOrNanReal(x), "%s: node %lld has a coordinate that is not finite", m->path,
+              (long long)m->mesh->tag[k]);
+    m->mesh->xyz[3 * k + c] = x;
   }
-  HycoCheck(!m->failed, "the mesh %s is damaged: the coordinates of node %lld are no numbers", m->path, tag);
+  HycoCheck(!m->failed, "the mesh %s is damaged: the coordinates of node %lld are no numbers", m->path,
+            (long long)m->mesh->tag[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckNodes2(Msh *m)
+static PetscErrorCode ReadNodes2(Msh *m)
 {
+  size_t n;
+
   PetscFunctionBegin;
-  PetscCall(ReadCountLine(m, m->binary ? 28 : 8, "nodes", &m->n_nodes));
-  PetscCall(PetscMalloc1(m->n_nodes, &m->node));
-  for (size_t k = 0; k < m->n_nodes; k++) {
+  PetscCall(ReadCountLine(m, m->binary ? 28 : 8, "nodes", &n));
+  PetscCall(MakeNodes(m, n));
+  for (size_t k = 0; k < n; k++) {
     PetscCall(AddNode(m, k, ReadInt(m, 4)));
-    PetscCall(CheckCoordinates(m, (long long)m->node[k]));
+    PetscCall(AddCoordinates(m, k));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -143,73 +174,163 @@ static PetscErrorCode CheckEntity(Msh *m, long long dim, long long tag)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckNodes4(Msh *m)
+static PetscErrorCode ReadNodes4(Msh *m)
 {
-  size_t blocks, n, done = 0;
+  size_t blocks, n, all, done = 0;
   long long least, most;
 
   PetscFunctionBegin;
   PetscCall(ReadCount(m, 4, "blocks of nodes", &blocks));
-  PetscCall(ReadCount(m, m->binary ? 32 : 8, "nodes", &m->n_nodes));
+  PetscCall(ReadCount(m, m->binary ? 32 : 8, "nodes", &all));
   least = ReadInt(m, 8);
   most = ReadInt(m, 8);
-  PetscCall(PetscMalloc1(m->n_nodes, &m->node));
+  PetscCall(MakeNodes(m, all));
   for (size_t b = 0; b < blocks; b++, done += n) {
     const long long dim = ReadInt(m, 4), tag = ReadInt(m, 4), parametric = ReadInt(m, 4);
 
     PetscCall(CheckEntity(m, dim, tag));
     PetscCall(ReadCount(m, m->binary ? 32 : 8, "nodes of a block", &n));
     HycoCheck(parametric == 0 || parametric == 1, "the mesh %s is damaged: a block of nodes", m->path);
-    HycoCheck(done + n <= m->n_nodes, "the mesh %s is damaged: its blocks hold more nodes than it counts", m->path);
+    HycoCheck(done + n <= all, "the mesh %s is damaged: its blocks hold more nodes than it counts", m->path);
     for (size_t k = 0; k < n; k++) {
-      PetscCall(AddNode(m, done + k, ReadInt(m, 8)));
-      HycoCheck((long long)m->node[done + k] >= least && (long long)m->node[done + k] <= most,
-                "the mesh %s is damaged: node %lld lies outside its tags, %lld to %lld", m->path,
-                (long long)m->node[done + k], least, most);
+      const long long node = ReadInt(m, 8);
+
+      PetscCall(AddNode(m, done + k, node));
+      HycoCheck(node >= least && node <= most, "the mesh %s is damaged: node %lld lies outside its tags, %lld to %lld",
+                m->path, node, least, most);
     }
     for (size_t k = 0; k < n; k++) {
-      PetscCall(CheckCoordinates(m, (long long)m->node[done + k]));
+      PetscCall(AddCoordinates(m, done + k));
       for (long long p = 0; parametric && p < dim; p++) (void)ReadDouble(m);
     }
   }
-  HycoCheck(done == m->n_nodes, "the mesh %s is damaged: its blocks hold fewer nodes than it counts", m->path);
+  HycoCheck(done == all, "the mesh %s is damaged: its blocks hold fewer nodes than it counts", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int CompareTags(const void *a, const void *b)
+/* Nodes in the order of their tags. */
+static PetscErrorCode SortNodes(HycoMsh *mesh)
 {
-  const unsigned long long ta = *(const unsigned long long *)a, tb = *(const unsigned long long *)b;
+  const PetscInt n = mesh->n_nodes;
+  PetscInt *order, *tag;
+  PetscReal *xyz;
+  PetscBool sorted;
 
-  return (ta > tb) - (ta < tb);
+  PetscFunctionBegin;
+  PetscCall(PetscSortedInt(n, mesh->tag, &sorted));
+  if (sorted) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(n, &order));
+  for (PetscInt k = 0; k < n; k++) order[k] = k;
+  PetscCall(PetscSortIntWithPermutation(n, mesh->tag, order));
+  PetscCall(PetscMalloc1(n, &tag));
+  PetscCall(PetscMalloc1(3 * n, &xyz));
+  for (PetscInt k = 0; k < n; k++) {
+    tag[k] = mesh->tag[order[k]];
+    for (PetscInt c = 0; c < 3; c++) xyz[3 * k + c] = mesh->xyz[3 * order[k] + c];
+  }
+  PetscCall(PetscFree(order));
+  PetscCall(PetscFree(mesh->tag));
+  PetscCall(PetscFree(mesh->xyz));
+  mesh->tag = tag;
+  mesh->xyz = xyz;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckNodes(Msh *m)
+static PetscErrorCode ReadNodes(Msh *m)
 {
   PetscFunctionBegin;
   HycoCheck(!m->has_nodes, "the mesh %s has two sections $Nodes", m->path);
   m->has_nodes = PETSC_TRUE;
   if (m->four)
-    PetscCall(CheckNodes4(m));
+    PetscCall(ReadNodes4(m));
   else
-    PetscCall(CheckNodes2(m));
-  if (m->n_nodes) qsort(m->node, m->n_nodes, sizeof(*m->node), CompareTags);
-  for (size_t k = 1; k < m->n_nodes; k++)
-    HycoCheck(m->node[k] != m->node[k - 1], "%s: node %lld stands twice", m->path, (long long)m->node[k]);
+    PetscCall(ReadNodes2(m));
+  PetscCall(SortNodes(m->mesh));
+  for (PetscInt k = 1; k < m->mesh->n_nodes; k++)
+    HycoCheck(m->mesh->tag[k] != m->mesh->tag[k - 1], "%s: node %lld stands twice", m->path,
+              (long long)m->mesh->tag[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes of one element of a type that is known. */
-static PetscErrorCode CheckElement(Msh *m, size_t bytes, long long tag, long long type)
+/* Index of a node, or -1. */
+static PetscInt FindNode(const HycoMsh *mesh, long long tag)
+{
+  const PetscInt n = mesh->n_nodes;
+  PetscInt at;
+
+  if (!n || tag < mesh->tag[0] || tag > mesh->tag[n - 1]) return -1;
+  if (mesh->tag[n - 1] - mesh->tag[0] == n - 1) return (PetscInt)tag - mesh->tag[0]; /* no tag is missing */
+  return PetscFindInt((PetscInt)tag, n, mesh->tag, &at) || at < 0 ? -1 : at;
+}
+
+/* -- elements, by group -- */
+
+static PetscErrorCode FindGroup(HycoMsh *mesh, int dim, int tag, PetscInt *index)
+{
+  PetscInt k = 0;
+
+  PetscFunctionBegin;
+  while (k < mesh->n_groups && (mesh->group[k].dim < dim || (mesh->group[k].dim == dim && mesh->group[k].tag < tag)))
+    k++;
+  *index = k;
+  if (k < mesh->n_groups && mesh->group[k].dim == dim && mesh->group[k].tag == tag) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscRealloc(((size_t)mesh->n_groups + 1) * sizeof(*mesh->group), &mesh->group));
+  memmove(mesh->group + k + 1, mesh->group + k, (size_t)(mesh->n_groups - k) * sizeof(*mesh->group));
+  mesh->n_groups++;
+  memset(&mesh->group[k], 0, sizeof(*mesh->group));
+  mesh->group[k].dim = dim;
+  mesh->group[k].tag = tag;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The group's name; sets it at the first use. */
+static const char *GroupName(Msh *m, HycoMshGroup *g)
+{
+  if (!g->name[0]) snprintf(g->name, sizeof(g->name), "group_%d_%d", g->dim, g->tag);
+  for (size_t k = 0; k < m->n_names; k++) {
+    if (m->name[k].dim == g->dim && m->name[k].tag == g->tag && m->name[k].text[0])
+      snprintf(g->name, sizeof(g->name), "%s", m->name[k].text);
+  }
+  return g->name;
+}
+
+/* Appends an element to a group. */
+static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long long type, const PetscInt node[])
+{
+  const PetscInt nv = type_nodes[type];
+
+  PetscFunctionBegin;
+  HycoCheck(type <= 5 || type == 15,
+            "%s: group \"%s\" has elements of gmsh type %lld; hyco takes line2, tri3, quad4, tet4 and hex8 (first "
+            "order)",
+            m->path, GroupName(m, g), type);
+  HycoCheck(!g->n || g->nv == nv, "%s: group \"%s\" mixes elements of %d and %d nodes; hyco takes one type per mesh",
+            m->path, GroupName(m, g), (int)g->nv, (int)nv);
+  g->nv = nv;
+  if (g->n == g->room) {
+    HycoCheck(g->n < PETSC_MAX_INT / 16, "%s: group \"%s\" has too many elements", m->path, GroupName(m, g));
+    g->room = PetscMax(64, 2 * g->room);
+    PetscCall(PetscRealloc((size_t)g->room * sizeof(*g->id), &g->id));
+    PetscCall(PetscRealloc((size_t)(g->room * nv) * sizeof(*g->node), &g->node));
+  }
+  g->id[g->n] = (PetscInt)tag;
+  PetscCall(PetscArraycpy(g->node + g->n * nv, node, nv));
+  g->n++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The tag and the nodes of one element of a type that is known. */
+static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long type, PetscInt node[])
 {
   PetscFunctionBegin;
   HycoCheck(!m->failed && tag > 0 && tag < PETSC_MAX_INT, "the mesh %s is damaged: it has an element of the tag %lld",
             m->path, tag);
   for (int v = 0; v < type_nodes[type]; v++) {
-    const unsigned long long node = (unsigned long long)ReadInt(m, bytes);
+    const long long name = ReadInt(m, bytes);
 
     HycoCheck(!m->failed, "the mesh %s is damaged: it ends among its elements", m->path);
-    HycoCheck(m->n_nodes && bsearch(&node, m->node, m->n_nodes, sizeof(node), CompareTags),
-              "%s: element %lld names node %lld, which the file does not define", m->path, tag, (long long)node);
+    node[v] = FindNode(m->mesh, name);
+    HycoCheck(node[v] >= 0, "%s: element %lld names node %lld, which the file does not define", m->path, tag, name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -223,17 +344,8 @@ static PetscErrorCode CheckType(Msh *m, long long type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckTags2(Msh *m, long long n)
-{
-  PetscFunctionBegin;
-  HycoCheck(!m->failed && n >= 2 && n <= 3,
-            "the mesh %s has an element with %lld tags; 2 are expected (is it cut for "
-            "several processes? save the whole)",
-            m->path, n);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode CheckTagValues2(Msh *m, long long n)
+/* The tags of an element of format 2.2: its group (0: none), its entity, perhaps its partition. */
+static PetscErrorCode ReadTags2(Msh *m, long long n, long long *group)
 {
   PetscFunctionBegin;
   for (long long t = 0; t < n; t++) {
@@ -241,37 +353,72 @@ static PetscErrorCode CheckTagValues2(Msh *m, long long n)
 
     HycoCheck(!m->failed && value >= 0 && value < PETSC_MAX_INT, "the mesh %s is damaged: an element's group is %lld",
               m->path, value);
+    if (!t) *group = value;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckElements2(Msh *m)
+static PetscErrorCode ReadElements2(Msh *m)
 {
   size_t n;
 
   PetscFunctionBegin;
   PetscCall(ReadCountLine(m, 8, "elements", &n));
   for (size_t k = 0; k < n;) {
-    long long tag = m->binary ? 0 : ReadInt(m, 4), type, follow, n_tags;
+    long long tag = m->binary ? 0 : ReadInt(m, 4), type, follow, n_tags, group = 0;
 
     type = ReadInt(m, 4);
     follow = m->binary ? ReadInt(m, 4) : 1;
     n_tags = ReadInt(m, 4);
     PetscCall(CheckType(m, type));
-    PetscCall(CheckTags2(m, n_tags));
+    HycoCheck(!m->failed && n_tags >= 2 && n_tags <= 3,
+              "the mesh %s has an element with %lld tags; 2 are expected (is it cut for several processes? save the "
+              "whole)",
+              m->path, n_tags);
     HycoCheck(follow > 0 && (size_t)follow <= n - k, "the mesh %s is damaged: a block of %lld elements", m->path,
               follow);
     for (long long e = 0; e < follow; e++) {
+      PetscInt node[64], at;
+
       if (m->binary) tag = ReadInt(m, 4);
-      PetscCall(CheckTagValues2(m, n_tags));
-      PetscCall(CheckElement(m, 4, tag, type));
+      PetscCall(ReadTags2(m, n_tags, &group));
+      PetscCall(ReadElement(m, 4, tag, type, node));
+      if (!group) continue;
+      PetscCall(FindGroup(m->mesh, type_dim[type], (int)group, &at));
+      PetscCall(AddElement(m, &m->mesh->group[at], tag, type, node));
     }
     k += (size_t)follow;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckElements4(Msh *m)
+/* The elements of a block go to the groups of its entity. */
+static PetscErrorCode ReadBlock4(Msh *m, long long dim, long long entity, long long type, size_t n, long long least,
+                                 long long most)
+{
+  size_t first = 0, last;
+
+  PetscFunctionBegin;
+  while (first < m->n_members && (m->member[first].dim != dim || m->member[first].entity != entity)) first++;
+  for (last = first; last < m->n_members && m->member[last].dim == dim && m->member[last].entity == entity;) last++;
+  for (size_t k = 0; k < n; k++) {
+    const long long tag = ReadInt(m, 8);
+    PetscInt node[64];
+
+    PetscCall(ReadElement(m, 8, tag, type, node));
+    HycoCheck(tag >= least && tag <= most, "the mesh %s is damaged: element %lld lies outside its tags, %lld to %lld",
+              m->path, tag, least, most);
+    for (size_t g = first; g < last; g++) {
+      PetscInt at;
+
+      PetscCall(FindGroup(m->mesh, (int)dim, m->member[g].group, &at));
+      PetscCall(AddElement(m, &m->mesh->group[at], tag, type, node));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadElements4(Msh *m)
 {
   size_t blocks, n, all, done = 0;
   long long least, most;
@@ -290,33 +437,29 @@ static PetscErrorCode CheckElements4(Msh *m)
               "the mesh %s is damaged: elements of gmsh type %lld on an entity of dimension %lld", m->path, type, dim);
     PetscCall(ReadCount(m, 4, "elements of a block", &n));
     HycoCheck(done + n <= all, "the mesh %s is damaged: its blocks hold more elements than it counts", m->path);
-    for (size_t k = 0; k < n; k++) {
-      const long long tag = ReadInt(m, 8);
-
-      PetscCall(CheckElement(m, 8, tag, type));
-      HycoCheck(tag >= least && tag <= most, "the mesh %s is damaged: element %lld lies outside its tags, %lld to %lld",
-                m->path, tag, least, most);
-    }
+    PetscCall(ReadBlock4(m, dim, entity, type, n, least, most));
   }
   HycoCheck(done == all, "the mesh %s is damaged: its blocks hold fewer elements than it counts", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckElements(Msh *m)
+static PetscErrorCode ReadElements(Msh *m)
 {
   PetscFunctionBegin;
   HycoCheck(m->has_nodes && !m->has_elements, "the mesh %s must have one section $Nodes and then one $Elements",
             m->path);
   m->has_elements = PETSC_TRUE;
   if (m->four)
-    PetscCall(CheckElements4(m));
+    PetscCall(ReadElements4(m));
   else
-    PetscCall(CheckElements2(m));
+    PetscCall(ReadElements2(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A list of an entity: its groups, or what bounds it. */
-static PetscErrorCode SkipList(Msh *m)
+/* -- entities and names -- */
+
+/* A list of an entity: its groups, whose sign is an orientation, or what bounds it. */
+static PetscErrorCode ReadList(Msh *m, PetscBool groups, int dim, long long entity)
 {
   size_t n;
 
@@ -324,14 +467,23 @@ static PetscErrorCode SkipList(Msh *m)
   PetscCall(ReadCount(m, m->binary ? 4 : 2, "groups of an entity", &n));
   for (size_t k = 0; k < n; k++) {
     const long long tag = ReadInt(m, 4);
+    const Member member = {dim, (int)entity, (int)(tag < 0 ? -tag : tag)};
+    PetscInt at;
 
     HycoCheck(!m->failed && tag > -PETSC_MAX_INT && tag < PETSC_MAX_INT && tag, "the mesh %s is damaged: its entities",
               m->path);
+    if (!groups) continue;
+    PetscCall(FindGroup(m->mesh, dim, member.group, &at));
+    if (m->n_members == m->room) {
+      m->room = 2 * m->room + 16;
+      PetscCall(PetscRealloc(m->room * sizeof(*m->member), &m->member));
+    }
+    m->member[m->n_members++] = member;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckEntities(Msh *m)
+static PetscErrorCode ReadEntities(Msh *m)
 {
   size_t n[4];
 
@@ -340,10 +492,12 @@ static PetscErrorCode CheckEntities(Msh *m)
   for (int d = 0; d < 4; d++) PetscCall(ReadCount(m, 4, "entities", &n[d]));
   for (int d = 0; d < 4; d++) {
     for (size_t k = 0; k < n[d]; k++) {
-      PetscCall(CheckEntity(m, d, ReadInt(m, 4)));
+      const long long entity = ReadInt(m, 4);
+
+      PetscCall(CheckEntity(m, d, entity));
       for (int c = 0; c < (d ? 6 : 3); c++) (void)ReadDouble(m);
-      PetscCall(SkipList(m));
-      if (d) PetscCall(SkipList(m));
+      PetscCall(ReadList(m, PETSC_TRUE, d, entity));
+      if (d) PetscCall(ReadList(m, PETSC_FALSE, d, entity));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -361,8 +515,8 @@ static const char *NextLine(Msh *m)
   return line;
 }
 
-/* Whether the rest of a line is one name in quotes that gmsh has room for. */
-static PetscBool IsQuoted(const char *text)
+/* The one name in quotes, of at most 126 bytes, that is the rest of a line. */
+static PetscBool ReadQuoted(const char *text, char name[128])
 {
   const char *end;
 
@@ -370,12 +524,13 @@ static PetscBool IsQuoted(const char *text)
   if (*text != '"') return PETSC_FALSE;
   end = text + 1 + strcspn(text + 1, "\"\n");
   if (*end != '"' || end - text > 127) return PETSC_FALSE;
+  snprintf(name, 128, "%.*s", (int)(end - text - 1), text + 1);
   end += 1 + strspn(end + 1, " \t\r");
   return (PetscBool)(*end == '\n' || !*end);
 }
 
 /* A line each: dimension, tag, "name"; text in binary files too. */
-static PetscErrorCode CheckNames(Msh *m)
+static PetscErrorCode ReadNames(Msh *m)
 {
   const char *line = NextLine(m);
   char *end;
@@ -385,20 +540,26 @@ static PetscErrorCode CheckNames(Msh *m)
   HycoCheck(n >= 0 && n <= m->end - m->at, "the mesh %s speaks of %lld names, which it has no room for", m->path, n);
   for (long long k = 0; k < n; k++) {
     long long dim, tag;
+    Name name;
 
     line = NextLine(m);
     HycoCheck(line, "the mesh %s is damaged: it ends among its names", m->path);
     dim = strtoll(line, &end, 10);
     tag = strtoll(end, &end, 10);
-    HycoCheck(dim >= 0 && dim <= 3 && tag > 0 && tag < PETSC_MAX_INT && IsQuoted(end),
+    HycoCheck(dim >= 0 && dim <= 3 && tag > 0 && tag < PETSC_MAX_INT && ReadQuoted(end, name.text),
               "the mesh %s is damaged: a name of a group is \"%.*s\"; dimension (0 to 3), tag and a name in quotes "
               "are expected",
               m->path, (int)PetscMin(strcspn(line, "\r\n"), 40), line);
+    name.dim = (int)dim;
+    name.tag = (int)tag;
+    if (!(m->n_names & (m->n_names + 1))) /* one below a power of 2: as much again */
+      PetscCall(PetscRealloc((2 * m->n_names + 2) * sizeof(name), &m->name));
+    m->name[m->n_names++] = name;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckFormat(Msh *m)
+static PetscErrorCode ReadFormat(Msh *m)
 {
   const char *line = NextLine(m);
   double version;
@@ -422,21 +583,22 @@ static PetscErrorCode CheckFormat(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CheckSections(Msh *m)
+/* Sections that are not needed ($Periodic, post-processing data) are passed over, line by line. */
+static PetscErrorCode ReadSections(Msh *m)
 {
   const char *line;
 
   PetscFunctionBegin;
-  PetscCall(CheckFormat(m));
+  PetscCall(ReadFormat(m));
   while ((line = NextLine(m))) {
     if (strncmp(line, "$Nodes", 6) == 0)
-      PetscCall(CheckNodes(m));
+      PetscCall(ReadNodes(m));
     else if (strncmp(line, "$Elements", 9) == 0)
-      PetscCall(CheckElements(m));
+      PetscCall(ReadElements(m));
     else if (strncmp(line, "$Entities", 9) == 0)
-      PetscCall(CheckEntities(m));
+      PetscCall(ReadEntities(m));
     else if (strncmp(line, "$PhysicalNames", 14) == 0)
-      PetscCall(CheckNames(m));
+      PetscCall(ReadNames(m));
     else
       HycoCheck(strncmp(line, "$MeshFormat", 11) && strncmp(line, "$Parti", 6) && strncmp(line, "$Ghost", 6),
                 "the mesh %s has a section %.*s that hyco does not take", m->path,
@@ -445,6 +607,10 @@ static PetscErrorCode CheckSections(Msh *m)
   }
   HycoCheck(m->has_elements, "the mesh %s cannot be read: it has no $Nodes and $Elements, or ends before them",
             m->path);
+  HycoCheck(m->mesh->n_groups,
+            "%s has no physical groups; name the bodies and surfaces in gmsh (Physical Volume, Physical Surface, ...)",
+            m->path);
+  for (PetscInt k = 0; k < m->mesh->n_groups; k++) (void)GroupName(m, &m->mesh->group[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -468,16 +634,31 @@ static PetscErrorCode ReadAll(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMshCheck(const char path[])
+PetscErrorCode HycoMshRead(const char path[], HycoMsh *mesh)
 {
-  Msh m = {.path = path};
+  Msh m = {.path = path, .mesh = mesh};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  memset(mesh, 0, sizeof(*mesh));
   ierr = ReadAll(&m);
-  if (!ierr) ierr = CheckSections(&m);
+  if (!ierr) ierr = ReadSections(&m);
   PetscCall(PetscFree(m.text));
-  PetscCall(PetscFree(m.node));
+  PetscCall(PetscFree(m.name));
+  PetscCall(PetscFree(m.member));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMshDestroy(HycoMsh *mesh)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < mesh->n_groups; k++) {
+    PetscCall(PetscFree(mesh->group[k].id));
+    PetscCall(PetscFree(mesh->group[k].node));
+  }
+  PetscCall(PetscFree(mesh->group));
+  PetscCall(PetscFree(mesh->tag));
+  PetscCall(PetscFree(mesh->xyz));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

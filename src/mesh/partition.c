@@ -1,9 +1,11 @@
 /*
-  Cuts the cells into parts: the graph of cells that share a facet, with heavy edges between the cells on the two sides
-  of a contact, so that no cut separates them. METIS, or PT-Scotch (through PETSc) by request and where METIS fails.
+  A PetscPartitioner that cuts the graph of cells that share a facet, with heavy edges between the cells on the two
+  sides of a contact, so that no cut separates them. METIS, or PT-Scotch (through PETSc) by request and where METIS
+  fails.
 */
-#include <hycomesh.h>
+#include "plex.h"
 #include <metis.h>
+#include <petsc/private/partitionerimpl.h>
 #include <petscmat.h>
 
 #define HEAVY 1000
@@ -115,18 +117,81 @@ static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMeshPartition(HycoMesh m, PetscInt n_pairs, const PetscInt pairs[], HycoPartitioner partitioner,
-                                 PetscInt n_parts, PetscInt part[])
+/* What DMPlexDistribute() does not hand on: the mesh, its contacts. Borrowed. */
+typedef struct {
+  HycoMesh mesh; /* NULL where there are no cells */
+  PetscInt n_pairs;
+  const PetscInt *pairs;
+  HycoPartitioner by;
+} Data;
+
+static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
 {
   Graph graph;
   PetscBool done = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(CellGraph(m, n_pairs, pairs, &graph));
-  if (partitioner == HYCO_PARTITION_METIS) PetscCall(ByMetis(m->n_cells, &graph, n_parts, part, &done));
-  if (!done) PetscCall(ByScotch(m->n_cells, &graph, n_parts, part));
+  PetscCall(CellGraph(d->mesh, d->n_pairs, d->pairs, &graph));
+  if (d->by == HYCO_PARTITION_METIS) PetscCall(ByMetis(d->mesh->n_cells, &graph, n_parts, part, &done));
+  if (!done) PetscCall(ByScotch(d->mesh->n_cells, &graph, n_parts, part));
   PetscCall(PetscFree(graph.xadj));
   PetscCall(PetscFree(graph.adjncy));
   PetscCall(PetscFree(graph.weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells part by part. */
+static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, PetscInt n, PetscInt start[],
+                                PetscInt adjacent[], PetscSection weights, PetscSection targets, PetscSection sizes,
+                                IS *partition)
+{
+  Data *d = (Data *)partitioner->data;
+  PetscInt *part, *cells, at = 0;
+
+  PetscFunctionBegin;
+  (void)start, (void)adjacent, (void)weights, (void)targets;
+  PetscCall(PetscMalloc1(n, &part));
+  if (n && d->mesh) PetscCall(Cut(d, n_parts, part));
+  for (PetscInt c = 0; c < n; c++) PetscCall(PetscSectionAddDof(sizes, part[c], 1));
+  PetscCall(PetscMalloc1(n, &cells));
+  for (PetscInt p = 0; p < n_parts; p++) {
+    for (PetscInt c = 0; c < n; c++) {
+      if (part[c] == p) cells[at++] = c;
+    }
+  }
+  PetscCall(PetscFree(part));
+  PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)partitioner), n, cells, PETSC_OWN_POINTER, partition));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(PetscPartitioner partitioner)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(partitioner->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Create(PetscPartitioner partitioner)
+{
+  Data *d;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&d));
+  partitioner->data = d;
+  partitioner->noGraph = PETSC_TRUE; /* DMPlex's own has an edge for each vertex that two cells share */
+  partitioner->ops->partition = Partition;
+  partitioner->ops->destroy = Destroy;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPartitionerSetMesh(PetscPartitioner partitioner, HycoMesh mesh, PetscInt n_pairs,
+                                      const PetscInt pairs[], HycoPartitioner by)
+{
+  const Data data = {mesh, n_pairs, pairs, by};
+
+  PetscFunctionBegin;
+  PetscCall(PetscPartitionerRegister(HYCO_PARTITIONER, Create));
+  PetscCall(PetscPartitionerSetType(partitioner, HYCO_PARTITIONER));
+  *(Data *)partitioner->data = data;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -15,7 +15,7 @@ static PetscErrorCode ReadMesh(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  HycoOnRoot(HycoComm(t), HycoMeshRead(t->scene, &t->whole));
+  PetscCall(HycoMeshCreateWhole(HycoComm(t), t->scene, &t->whole));
   HycoOnRoot(HycoComm(t), HycoPairsFind(t->scene, t->whole, &t->pairs));
   for (PetscInt k = 0; k < t->n_groups; k++)
     HycoOnRoot(HycoComm(t), HycoMeshFindGroup(t->whole, "hyco_rid_groups", t->groups[k], &group));

@@ -181,7 +181,7 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   if (*groups) PetscFunctionReturn(PETSC_SUCCESS);
   *groups = PetscMax(1, PetscMin((PetscInt)size, n));
   if (stat(scene->mesh_path, &info) == 0) {
-    const double factor = 400.0 * (double)info.st_size,
+    const double factor = 400.0 * (double)info.st_size * (double)((size_t)1 << 3 * scene->refine),
                  memory = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGE_SIZE);
 
     while (*groups > 1 && *groups * factor > memory / 2) (*groups)--;

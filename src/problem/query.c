@@ -80,6 +80,40 @@ PetscErrorCode HycoSceneSetExtrapolate(HycoScene scene, PetscBool extrapolate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSceneSetDM(HycoScene scene, DM dm)
+{
+  PetscBool is_plex;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMPLEX, &is_plex));
+  HycoCheck(is_plex, "HycoSceneSetDM: the DM is no DMPlex");
+  PetscCall(PetscObjectReference((PetscObject)dm));
+  PetscCall(DMDestroy(&scene->dm));
+  scene->dm = dm;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The places of the vertices of the program's own mesh, in an order that no number of processes changes. Collective. */
+static PetscErrorCode HashDM(HycoScene scene, unsigned long long *hash)
+{
+  unsigned long long all = 0, one;
+  const PetscScalar *x;
+  PetscInt n, dim;
+  Vec place;
+
+  PetscFunctionBegin;
+  PetscCall(DMGetCoordinateDim(scene->dm, &dim));
+  PetscCall(DMGetCoordinates(scene->dm, &place));
+  PetscCall(VecGetLocalSize(place, &n));
+  PetscCall(VecGetArrayRead(place, &x));
+  for (PetscInt k = 0; k < n; k += dim) all ^= HycoHash(HYCO_HASH_START, x + k, (size_t)dim * sizeof(*x));
+  PetscCall(VecRestoreArrayRead(place, &x));
+  PetscCallMPI(MPI_Allreduce(&all, &one, 1, MPI_UNSIGNED_LONG_LONG, MPI_BXOR, HycoComm(scene->dm)));
+  *hash = HycoHash(*hash, &one, sizeof(one));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode HashFile(HycoScene scene, unsigned long long *hash)
 {
   unsigned char buffer[65536];
@@ -117,7 +151,10 @@ PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
     *hash = HycoHash(*hash, scene->value[k], strlen(scene->value[k]) + 1);
   }
   if (MayMoveSurfaces(scene)) *hash = HycoHash(*hash, "masters where they are", 22);
-  HycoOnRoot(HycoComm(scene), HashFile(scene, hash));
+  if (scene->dm)
+    PetscCall(HashDM(scene, hash));
+  else
+    HycoOnRoot(HycoComm(scene), HashFile(scene, hash));
   PetscCallMPI(MPI_Bcast(hash, 1, MPI_UNSIGNED_LONG_LONG, 0, HycoComm(scene)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -11,7 +11,7 @@
 static const char *const body_fields[] = {"element", "map_x", "map_y", "map_z", "law", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const contact_fields[] = {"type", NULL};
-static const char *const scene_fields[] = {"title", "mesh", "parameters", NULL};
+static const char *const scene_fields[] = {"title", "mesh", "parameters", "refine", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
 /* Splits "body_pellet_young" after "body_" into "pellet" and the index of "young"; false if no field ends it. */
@@ -459,6 +459,10 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscCall(HycoEntriesList(s));
   PetscCall(GetString(s, "scene_title", &s->title));
   PetscCall(FindMesh(s, folder));
+  PetscCall(PetscObjectSetOptions((PetscObject)s, s->options));
+  PetscObjectOptionsBegin((PetscObject)s);
+  PetscCall(HycoOptionsInt("-scene_refine", "uniform refinements of the mesh", 0, 12, &s->refine, NULL));
+  PetscOptionsEnd();
   PetscCall(ReadParameters(s));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     const char *key = s->key[k];
@@ -630,6 +634,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   PetscCall(PetscFree(s->contact));
   PetscCall(PetscFree(s->title));
   PetscCall(PetscFree(s->mesh_path));
+  PetscCall(DMDestroy(&s->dm));
   PetscCall(PetscOptionsDestroy(&s->options));
   PetscCall(PetscHeaderDestroy(&s));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,4 +1,4 @@
-"""How ranks are started: a launcher of another MPI is refused; no library of gmsh's where a model is all there is."""
+"""How ranks are started: a launcher of another MPI is refused; no library of gmsh's is loaded."""
 import os
 import re
 import subprocess
@@ -72,13 +72,10 @@ class Launch(Case):
 
     @unittest.skipIf(os.environ.get('HYCO_SANITIZE') == '1', 'sanitizers come first')
     def test_gmsh(self):
-        """libgmsh, with OpenCASCADE and FLTK, is loaded by what reads a mesh alone."""
-        for args, reads in ((('view', '-model', MODEL), False), (('predict', '-model', MODEL, *MU, '-output', 'p.xdmf'), False),
-                            (('solve', '-scene', ROPE, *MU), True)):
-            with self.subTest(command=args[0]):
-                names = self.loaded(*args)
-                self.assertEqual(any('libgmsh' in name for name in names), reads)
-                self.assertEqual(any('libTKernel' in name or 'libfltk' in name for name in names) and not reads, False)
+        """hyco reads meshes itself: libgmsh would bring OpenCASCADE and FLTK, a hundred libraries."""
+        names = self.loaded('solve', '-scene', ROPE, *MU)
+        self.assertTrue(names)
+        self.assertEqual([name for name in names if re.search('libgmsh|libTKernel|libfltk', name)], [])
 
     @unittest.skipIf(os.environ.get('HYCO_SANITIZE') == '1', 'sanitizers come first')
     def test_one_blas(self):

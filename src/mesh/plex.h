@@ -1,0 +1,46 @@
+/* The mesh as a DMPlex, inside src/mesh. */
+#ifndef PLEX_H
+#define PLEX_H
+
+#include <hycomesh.h>
+#include <petscdmplex.h>
+#include <petscsf.h>
+
+/* The value of a group's label for a cell with facet number k in the group: HYCO_FACET + k (DMs that are not
+   interpolated). */
+#define HYCO_FACET 10
+
+/* The IS of the file's tags of all points of this process, 0 for edges and faces, that is composed with the DM. */
+#define HYCO_TAGS "HycoTags"
+/* Attaches the file's tags of all points of this process (ownership passes). */
+PetscErrorCode HycoPlexSetTags(DM dm, PetscInt tag[]);
+/* Rank 0's tables (NULL elsewhere) as a DM that is not distributed. Collective. */
+PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh mesh, DM *dm);
+/* Sends the tags of a DM's points after them, along the star forest that they took to another DM. Collective. */
+PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to);
+/* Halves all cells `times` times. Vertices that are new get tags beyond those there, in the order of their parents'.
+   The DM must have no overlap. Groups go along; fails for one of the scene's whose lines or facets the DM does not
+   know. Collective. */
+PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times);
+/* The vertices of a point; of a cell in gmsh's order (type: HYCO_N_CELL_TYPES for what is no cell). `interpolated`:
+   edges and faces are points of the DM. */
+PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type, PetscInt point, PetscInt n,
+                                PetscInt vertex[]);
+/* The HycoCellType of the cells. Collective. */
+PetscErrorCode HycoPlexType(DM dm, PetscInt *type);
+/* Whether a label of this name is DMPlex's own. */
+PetscBool HycoPlexOwnLabel(const char name[]);
+/* The nodes of facet `number` of a cell, in gmsh's order. */
+const signed char *HycoFacetNodes(HycoCellType type, PetscInt number);
+
+/* The registered PetscPartitioner type HYCO_PARTITIONER, for a mesh (this process's; NULL: no cells) with contacts,
+   pairs of node indices. Both are borrowed until the partitioner has done its work. */
+#define HYCO_PARTITIONER "hyco"
+PetscErrorCode HycoPartitionerSetMesh(PetscPartitioner partitioner, HycoMesh mesh, PetscInt n_pairs,
+                                      const PetscInt pairs[], HycoPartitioner by);
+
+/* place[k]: how many different keys of all processes are smaller than key[k] >= 0. Collective. */
+PetscErrorCode HycoRankInts(MPI_Comm comm, PetscInt n, const PetscInt key[], PetscInt place[]);
+PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *total);
+
+#endif

@@ -1,0 +1,328 @@
+/*
+  A mesh file that has been read, checked against the scene and brought to tables on one process: cells of one type,
+  each in one body, facets that bound exactly one cell.
+*/
+#include <hycomesh.h>
+#include "msh.h"
+#include <string.h>
+
+/* gmsh's cell types in the order of HycoCellType. */
+static const PetscInt cell_dim[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 3};
+static const PetscInt cell_nodes[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 8};
+static const PetscInt facet_nodes[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 4};
+
+typedef HycoMshGroup Group;
+
+typedef struct {
+  HycoMsh file;
+  PetscInt n_groups;
+  Group *group;             /* of the file */
+  PetscInt *index;          /* of each node of the file among the mesh's, or -1 */
+  PetscInt *last, *before;  /* of each cell its last facet, of each facet the cell's one before, or -1 */
+  PetscInt *start, *around; /* the cells around each node */
+} Reader;
+
+/* Every body is a group of cells, all of one type; other groups may be anything below. */
+static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
+{
+  PetscInt cells = 0, nv = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < r->n_groups; k++) {
+    Group *g = &r->group[k];
+
+    g->body = -1;
+    for (PetscInt b = 0; b < scene->n_bodies; b++) {
+      if (g->dim > 0 && strcmp(scene->body[b].name, g->name) == 0) g->body = b;
+    }
+    if (g->body >= 0) m->dim = PetscMax(m->dim, g->dim);
+  }
+  for (PetscInt b = 0; b < scene->n_bodies; b++) {
+    char list[HYCO_LINE] = "";
+    PetscInt n = 0;
+
+    for (PetscInt k = 0; k < r->n_groups; k++) {
+      if (r->group[k].dim == 0) continue;
+      if (r->group[k].body == b) {
+        n += r->group[k].n;
+        HycoCheck(r->group[k].dim == m->dim, "body %s is a group of dimension %d; the other bodies have dimension %d",
+                  r->group[k].name, r->group[k].dim, (int)m->dim);
+        HycoCheck(!nv || nv == r->group[k].nv, "%s mixes cells of %d and %d nodes; hyco takes one cell type per mesh",
+                  scene->mesh_path, (int)nv, (int)r->group[k].nv);
+        nv = r->group[k].nv;
+      }
+      if (!m->dim || r->group[k].dim == m->dim) PetscCall(HycoListAdd(list, ", ", r->group[k].name));
+    }
+    HycoCheck(n, "body \"%s\" has no cells in %s; its cell groups are: %s", scene->body[b].name, scene->mesh_path,
+              list[0] ? list : "(none)");
+    cells += n;
+  }
+  for (int t = 0; t < HYCO_N_CELL_TYPES; t++) {
+    if (cell_dim[t] == m->dim && cell_nodes[t] == nv) m->type = (HycoCellType)t;
+  }
+  HycoCheck(cell_dim[m->type] == m->dim && cell_nodes[m->type] == nv,
+            "%s: cells of dimension %d with %d nodes are no line2, tri3, quad4, tet4 or hex8", scene->mesh_path,
+            (int)m->dim, (int)nv);
+  m->nv = nv;
+  m->nf = facet_nodes[m->type];
+  m->n_cells = cells;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells in the order of their tags, with the file's nodes for now. */
+static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m)
+{
+  PetscInt *order, *tag, *body, n = 0;
+  const PetscInt **source;
+
+  PetscFunctionBegin;
+  HycoCheck(m->n_cells <= PETSC_MAX_INT / 8, "%s: %ld cells are more than this PETSc's integers count",
+            scene->mesh_path, (long)m->n_cells);
+  PetscCall(PetscMalloc1(m->n_cells * m->nv, &m->cells));
+  PetscCall(PetscMalloc1(m->n_cells, &m->cell_id));
+  PetscCall(PetscMalloc1(m->n_cells, &m->cell_body));
+  PetscCall(PetscMalloc4(m->n_cells, &order, m->n_cells, &tag, m->n_cells, &body, m->n_cells, &source));
+  for (PetscInt k = 0; k < r->n_groups; k++) {
+    const Group *g = &r->group[k];
+
+    for (PetscInt e = 0; g->body >= 0 && e < g->n; e++, n++) {
+      source[n] = g->node + e * m->nv;
+      tag[n] = g->id[e];
+      body[n] = g->body;
+      order[n] = n;
+    }
+  }
+  PetscCall(PetscSortIntWithPermutation(n, tag, order));
+  for (PetscInt e = 0; e < n; e++) {
+    m->cell_id[e] = tag[order[e]];
+    m->cell_body[e] = body[order[e]];
+    PetscCall(PetscArraycpy(m->cells + e * m->nv, source[order[e]], m->nv));
+  }
+  PetscCall(PetscFree4(order, tag, body, source));
+  for (PetscInt e = 1; e < n; e++)
+    HycoCheck(m->cell_id[e] != m->cell_id[e - 1], "%s: cell %ld lies in two bodies; each cell must lie in one",
+              scene->mesh_path, (long)m->cell_id[e]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes of the cells, ascending by tag, and the cells' node indices. */
+static PetscErrorCode CollectNodes(Reader *r, HycoMesh m)
+{
+  const HycoMsh *file = &r->file;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(file->n_nodes, &r->index));
+  for (PetscInt i = 0; i < file->n_nodes; i++) r->index[i] = -1;
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) r->index[m->cells[k]] = 0;
+  for (PetscInt i = 0; i < file->n_nodes; i++) m->n_nodes += r->index[i] == 0;
+  PetscCall(PetscMalloc1(3 * m->n_nodes, &m->xyz));
+  PetscCall(PetscMalloc1(m->n_nodes, &m->node_id));
+  for (PetscInt i = 0; i < file->n_nodes; i++) {
+    if (r->index[i] < 0) continue;
+    m->node_id[n] = file->tag[i];
+    PetscCall(PetscArraycpy(m->xyz + 3 * n, file->xyz + 3 * i, 3));
+    r->index[i] = n++;
+  }
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) m->cells[k] = r->index[m->cells[k]];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the cell has all of node[0..n). */
+static PetscBool CellHas(HycoMesh m, PetscInt cell, PetscInt n, const PetscInt node[])
+{
+  for (PetscInt k = 0; k < n; k++) {
+    PetscBool has = PETSC_FALSE;
+
+    for (PetscInt v = 0; v < m->nv; v++) has = (PetscBool)(has || m->cells[cell * m->nv + v] == node[k]);
+    if (!has) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* A file may have a facet of a group several times: one counts. */
+static PetscBool HasTwin(const Reader *r, HycoMesh m, PetscInt cell, PetscInt group, const PetscInt facet[])
+{
+  for (PetscInt f = r->last[cell]; f >= 0; f = r->before[f]) {
+    const PetscInt *other = m->facets + f * m->nf;
+    PetscInt same = 0;
+
+    for (PetscInt v = 0; v < m->nf; v++) {
+      for (PetscInt w = 0; w < m->nf; w++) same += facet[v] == other[w];
+    }
+    if (m->facet_group[f] == group && same == m->nf) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g, PetscInt group,
+                                const PetscInt start[], const PetscInt around[])
+{
+  PetscFunctionBegin;
+  if (g->dim != m->dim - 1) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(!g->n || g->nv == m->nf, "%s: group \"%s\" has facets of %d nodes where the cells' have %d",
+            scene->mesh_path, g->name, (int)g->nv, (int)m->nf);
+  for (PetscInt f = 0; f < g->n; f++) {
+    PetscInt *facet = m->facets + m->n_facets * m->nf, cell = -1, n = 0;
+    PetscBool missing = PETSC_FALSE;
+
+    for (PetscInt v = 0; v < m->nf; v++) {
+      facet[v] = r->index[g->node[f * m->nf + v]];
+      missing = (PetscBool)(missing || facet[v] < 0);
+    }
+    for (PetscInt k = missing ? 0 : start[facet[0]]; k < (missing ? 0 : start[facet[0] + 1]); k++) {
+      if (CellHas(m, around[k], m->nf, facet)) {
+        cell = around[k];
+        n++;
+      }
+    }
+    HycoCheck(n > 0, "%s: facet %ld of group \"%s\" bounds no cell of a body", scene->mesh_path, (long)g->id[f],
+              g->name);
+    if (n > 1) { /* between two cells: no boundary, but its nodes are still in the group */
+      g->inner++;
+      continue;
+    }
+    if (HasTwin(r, m, cell, group, facet)) continue;
+    r->before[m->n_facets] = r->last[cell];
+    r->last[cell] = m->n_facets;
+    m->facet_group[m->n_facets] = group;
+    m->facet_cell[m->n_facets] = cell;
+    m->n_facets++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes and cells of each group as CSR lists. */
+static PetscErrorCode AddMembers(Reader *r, HycoMesh m, Group *g, PetscInt group, const PetscInt start[],
+                                 const PetscInt around[], PetscInt *n_node, PetscInt *n_cell)
+{
+  PetscInt first = *n_node;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < g->n * g->nv; k++) {
+    const PetscInt i = r->index[g->node[k]];
+
+    if (i >= 0) m->group_node[(*n_node)++] = i;
+  }
+  {
+    PetscInt n = *n_node - first;
+
+    PetscCall(PetscSortRemoveDupsInt(&n, m->group_node + first));
+    *n_node = first + n;
+  }
+  m->group_start[group + 1] = *n_node;
+  for (PetscInt e = 0; g->dim == m->dim && e < g->n; e++) {
+    PetscInt cell = -1, node[8];
+
+    for (PetscInt v = 0; v < m->nv; v++) node[v] = r->index[g->node[e * m->nv + v]];
+    for (PetscInt k = start[PetscMax(node[0], 0)]; node[0] >= 0 && k < start[node[0] + 1]; k++) {
+      if (CellHas(m, around[k], m->nv, node)) cell = around[k];
+    }
+    if (cell >= 0) m->group_cell[(*n_cell)++] = cell;
+  }
+  m->group_cell_start[group + 1] = *n_cell;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
+{
+  PetscInt n_facets = 0, n_members = 0, n_cells = 0, n_node = 0, n_cell = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < r->n_groups; k++) {
+    n_members += r->group[k].n * r->group[k].nv;
+    if (r->group[k].dim == m->dim - 1) n_facets += r->group[k].n;
+    if (r->group[k].dim == m->dim) n_cells += r->group[k].n;
+  }
+  m->n_groups = r->n_groups;
+  PetscCall(PetscCalloc1(m->n_groups, &m->group_name));
+  PetscCall(PetscMalloc1(m->n_groups, &m->group_dim));
+  PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_start));
+  PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_cell_start));
+  PetscCall(PetscMalloc1(n_members, &m->group_node));
+  PetscCall(PetscMalloc1(n_cells, &m->group_cell));
+  PetscCall(PetscMalloc1(n_facets * m->nf, &m->facets));
+  PetscCall(PetscMalloc1(n_facets, &m->facet_group));
+  PetscCall(PetscMalloc1(n_facets, &m->facet_cell));
+  PetscCall(PetscMalloc1(n_facets, &r->before));
+  PetscCall(PetscMalloc1(m->n_cells, &r->last));
+  for (PetscInt e = 0; e < m->n_cells; e++) r->last[e] = -1;
+  for (PetscInt k = 0; k < r->n_groups; k++) {
+    PetscCall(PetscStrallocpy(r->group[k].name, &m->group_name[k]));
+    m->group_dim[k] = r->group[k].dim;
+    PetscCall(AddFacets(scene, r, m, &r->group[k], k, r->start, r->around));
+    PetscCall(AddMembers(r, m, &r->group[k], k, r->start, r->around, &n_node, &n_cell));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A load pushes on a boundary, not between two cells. */
+static PetscErrorCode CheckLoads(HycoScene scene, Reader *r)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < scene->n_loads; k++) {
+    for (PetscInt g = 0; g < r->n_groups; g++) {
+      HycoCheck(!r->group[g].inner || strcmp(r->group[g].name, scene->load[k].group),
+                "the load on %s: %d of its facets lie between two cells; give a group on the boundary",
+                r->group[g].name, (int)r->group[g].inner);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two cells with the same nodes: a cell saved once per group, as format 2.2 does. */
+static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m, const PetscInt start[], const PetscInt around[])
+{
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const PetscInt *cell = m->cells + e * m->nv;
+
+    for (PetscInt k = start[cell[0]]; k < start[cell[0] + 1]; k++) {
+      HycoCheck(around[k] >= e || !CellHas(m, around[k], m->nv, cell),
+                "%s: cells %d and %d have the same nodes: is one cell in two bodies? Format 2.2 saves a cell once for "
+                "each of its groups; save as 4.1 to keep it in several",
+                scene->mesh_path, (int)m->cell_id[around[k]], (int)m->cell_id[e]);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MakeTables(HycoScene scene, Reader *r, HycoMesh m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoMshRead(scene->mesh_path, &r->file));
+  r->n_groups = r->file.n_groups;
+  r->group = r->file.group;
+  PetscCall(CheckBodies(scene, r, m));
+  PetscCall(CollectCells(scene, r, m));
+  PetscCall(CollectNodes(r, m));
+  PetscCall(HycoMeshNodeCells(m, &r->start, &r->around));
+  PetscCall(CheckTwins(scene, m, r->start, r->around));
+  PetscCall(CollectGroups(scene, r, m));
+  PetscCall(CheckLoads(scene, r));
+  PetscCall(HycoMeshSetNodeBodies(scene, m));
+  PetscCall(HycoMeshCheckGroups(m, scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
+{
+  Reader r = {0};
+  HycoMesh m;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheck(scene->mesh_path[0], "the scene names no mesh; write scene: mesh: FILE.msh, or give -scene_mesh FILE.msh");
+  PetscCall(PetscNew(&m));
+  ierr = MakeTables(scene, &r, m);
+  PetscCall(HycoMshDestroy(&r.file));
+  PetscCall(PetscFree(r.index));
+  PetscCall(PetscFree(r.last));
+  PetscCall(PetscFree(r.before));
+  PetscCall(PetscFree(r.start));
+  PetscCall(PetscFree(r.around));
+  if (ierr) PetscCall(HycoMeshDestroy(&m));
+  PetscCall(ierr);
+  *mesh = m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

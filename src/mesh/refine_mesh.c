@@ -1,0 +1,290 @@
+/*
+  Uniform refinement. The DM is interpolated for it, so that facets are points: a group's label then has its facets and
+  cells with their closure, and DMPlex hands labels on to what the points become.
+*/
+#include "plex.h"
+#include <hycocontactimpl.h>
+#include <petscdmplextransform.h>
+#include <string.h>
+
+/* The facet with this number of a cell, as a point of the interpolated DM. */
+static PetscErrorCode FacetPoint(DM dm, HycoCellType type, PetscInt nv, PetscInt nf, PetscInt cell, PetscInt number,
+                                 PetscInt *facet)
+{
+  const PetscInt *cone;
+  const signed char *of = HycoFacetNodes(type, number);
+  PetscInt vertex[8], n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPlexVertices(dm, PETSC_TRUE, type, cell, nv, vertex));
+  PetscCall(DMPlexGetConeSize(dm, cell, &n));
+  PetscCall(DMPlexGetCone(dm, cell, &cone));
+  *facet = -1;
+  for (PetscInt k = 0; k < n && *facet < 0; k++) {
+    PetscInt mine[4], found = 0;
+
+    PetscCall(HycoPlexVertices(dm, PETSC_TRUE, HYCO_N_CELL_TYPES, cone[k], nf, mine));
+    for (PetscInt v = 0; v < nf; v++) {
+      for (PetscInt w = 0; w < nf; w++) found += mine[v] == vertex[of[w]];
+    }
+    if (found == nf) *facet = cone[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points of a group itself: its cells, its facets, or its vertices where it is made of points. */
+static PetscErrorCode AddOwnPoints(DM dm, HycoCellType type, PetscInt nv, PetscInt nf, DMLabel from, DMLabel to)
+{
+  PetscInt dim, n_values, n, facet = -1;
+  const PetscInt *value, *point;
+  IS values, points;
+
+  PetscFunctionBegin;
+  PetscCall(DMGetDimension(dm, &dim));
+  PetscCall(DMLabelGetValueIS(from, &values));
+  PetscCall(ISGetLocalSize(values, &n_values));
+  PetscCall(ISGetIndices(values, &value));
+  for (PetscInt k = 0; k < n_values; k++) {
+    PetscCall(DMLabelGetStratumIS(from, value[k], &points));
+    if (!points) continue;
+    PetscCall(ISGetLocalSize(points, &n));
+    PetscCall(ISGetIndices(points, &point));
+    for (PetscInt j = 0; j < n; j++) {
+      PetscInt depth;
+
+      PetscCall(DMPlexGetPointDepth(dm, point[j], &depth));
+      if (value[k] >= HYCO_FACET) {
+        PetscCall(FacetPoint(dm, type, nv, nf, point[j], value[k] - HYCO_FACET, &facet));
+        if (facet >= 0) PetscCall(DMLabelSetValue(to, facet, 1));
+      } else if (value[k] == 1 || depth == dim)
+        PetscCall(DMLabelSetValue(to, point[j], 1));
+    }
+    PetscCall(ISRestoreIndices(points, &point));
+    PetscCall(ISDestroy(&points));
+  }
+  PetscCall(ISRestoreIndices(values, &value));
+  PetscCall(ISDestroy(&values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the scene speaks of a group. */
+static PetscBool IsNamed(HycoScene scene, const char group[])
+{
+  for (PetscInt k = 0; k < scene->n_fixed; k++) {
+    if (!strcmp(scene->fixed[k].group, group)) return PETSC_TRUE;
+  }
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
+    const HycoContact c = scene->contact[k];
+
+    if (!strcmp(c->slave, group) || (c->master && !strcmp(c->master, group))) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Vertices of a group that no cell or facet of it accounts for: lines in space, or facets between cells. */
+static PetscErrorCode CheckVertices(DM dm, HycoScene scene, const char name[], DMLabel from, DMLabel to)
+{
+  PetscInt n, v0, v1, value;
+  const PetscInt *point;
+
+  PetscFunctionBegin;
+  if (!IsNamed(scene, name)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DMPlexGetDepthStratum(dm, 0, &v0, &v1));
+  for (PetscInt k = 2; k <= 4; k++) {
+    IS points;
+
+    PetscCall(DMLabelGetStratumIS(from, k, &points));
+    if (!points) continue;
+    PetscCall(ISGetLocalSize(points, &n));
+    PetscCall(ISGetIndices(points, &point));
+    for (PetscInt j = 0; j < n; j++) {
+      PetscCall(DMLabelGetValue(to, point[j], &value));
+      HycoCheck(value == 1 || point[j] < v0 || point[j] >= v1,
+                "scene_refine: the group %s has lines in space or facets between two cells, which refinement cannot "
+                "follow; give a group of points, of boundary facets or of cells",
+                name);
+    }
+    PetscCall(ISRestoreIndices(points, &point));
+    PetscCall(ISDestroy(&points));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The DM with its edges and faces, and labels of facets that are points. */
+static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
+{
+  static const PetscInt corners[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 8}, of_facet[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 4};
+  const MPI_Comm comm = PetscObjectComm((PetscObject)*dm);
+  PetscInt n, last, *tag, dim, depth, type;
+  const PetscInt *had;
+  IS tags;
+  DM full;
+
+  PetscFunctionBegin;
+  PetscCall(DMGetDimension(*dm, &dim));
+  PetscCall(DMPlexGetDepth(*dm, &depth));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &depth, 1, MPIU_INT, MPI_MAX, comm));
+  if (depth == dim) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoPlexType(*dm, &type));
+  PetscCall(DMPlexInterpolate(*dm, &full));
+  PetscCall(PetscObjectQuery((PetscObject)*dm, HYCO_TAGS, (PetscObject *)&tags));
+  PetscCall(DMPlexGetChart(full, NULL, &last));
+  PetscCall(PetscCalloc1(last, &tag));
+  PetscCall(ISGetLocalSize(tags, &n));
+  PetscCall(ISGetIndices(tags, &had));
+  PetscCall(PetscArraycpy(tag, had, n));
+  PetscCall(ISRestoreIndices(tags, &had));
+  PetscCall(HycoPlexSetTags(full, tag));
+  PetscCall(DMGetNumLabels(*dm, &n));
+  for (PetscInt k = 0; k < n; k++) {
+    const char *name;
+    DMLabel from, to;
+
+    PetscCall(DMGetLabelName(*dm, k, &name));
+    if (HycoPlexOwnLabel(name)) continue;
+    PetscCall(DMGetLabel(*dm, name, &from));
+    PetscCall(DMRemoveLabel(full, name, NULL));
+    PetscCall(DMCreateLabel(full, name));
+    PetscCall(DMGetLabel(full, name, &to));
+    PetscCall(AddOwnPoints(full, (HycoCellType)type, corners[type], of_facet[type], from, to));
+    PetscCall(DMPlexLabelComplete(full, to));
+    HycoOnEach(comm, CheckVertices(full, scene, name, from, to));
+  }
+  PetscCall(DMDestroy(dm));
+  *dm = full;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points that one point becomes of type `type`; n = 0: none. The r-th is DMPlexTransformGetTargetPoint(). */
+static PetscErrorCode CountChildren(DMPlexTransform transform, PetscInt p, DMPolytopeType from, DMPolytopeType type,
+                                    PetscInt *n)
+{
+  DMPolytopeType *types;
+  PetscInt n_types, *size, *cone, *orientation;
+
+  PetscFunctionBegin;
+  *n = 0;
+  PetscCall(DMPlexTransformCellTransform(transform, from, p, NULL, &n_types, &types, &size, &cone, &orientation));
+  for (PetscInt k = 0; k < n_types; k++) {
+    if (types[k] == type) *n = size[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What a new vertex on a point is told from others of its kind by: the tags of two vertices, or a cell's. */
+static PetscErrorCode Key(DM dm, const PetscInt tag[], PetscInt p, PetscInt depth, PetscInt dim, PetscInt64 *key)
+{
+  PetscInt vertex[4], least = 0;
+  const PetscInt n = depth == 1 ? 2 : 4;
+
+  PetscFunctionBegin;
+  *key = tag[p];
+  if (depth == dim) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoPlexVertices(dm, PETSC_TRUE, HYCO_N_CELL_TYPES, p, n, vertex));
+  for (PetscInt v = 1; v < n; v++) least = tag[vertex[v]] < tag[vertex[least]] ? v : least;
+  *key = (PetscInt64)tag[vertex[least]] * ((PetscInt64)1 << 31) + tag[vertex[(least + n / 2) % n]]; /* and opposite */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Tags of the vertices in the middle of edges (depth 1), faces or cells, after those below *last. */
+static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscInt tag[], PetscInt depth, PetscInt *last,
+                                 PetscInt new_tag[])
+{
+  PetscInt first, end, n = 0, dim, total, *place, *child;
+  PetscInt64 *key;
+
+  PetscFunctionBegin;
+  PetscCall(DMGetDimension(dm, &dim));
+  PetscCall(DMPlexGetDepthStratum(dm, depth, &first, &end));
+  PetscCall(PetscMalloc3(end - first, &key, end - first, &place, end - first, &child));
+  for (PetscInt p = first; p < end; p++) {
+    DMPolytopeType type;
+    PetscInt has;
+
+    PetscCall(DMPlexGetCellType(dm, p, &type));
+    PetscCall(CountChildren(transform, p, type, DM_POLYTOPE_POINT, &has));
+    if (!has) continue;
+    PetscCall(DMPlexTransformGetTargetPoint(transform, type, DM_POLYTOPE_POINT, p, 0, &child[n]));
+    PetscCall(Key(dm, tag, p, depth, dim, &key[n++]));
+  }
+  PetscCall(HycoRankKeys(PetscObjectComm((PetscObject)dm), n, key, place, &total));
+  HycoCheck(total < PETSC_MAX_INT - *last, "the refined mesh has more nodes than this PETSc's integers count");
+  for (PetscInt k = 0; k < n; k++) new_tag[child[k]] = *last + 1 + place[k];
+  *last += total;
+  PetscCall(PetscFree3(key, place, child));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Tags of the cells: in the order of their parents'. */
+static PetscErrorCode TagCells(DM dm, DMPlexTransform transform, const PetscInt tag[], PetscInt new_tag[])
+{
+  PetscInt c0, c1, *place;
+
+  PetscFunctionBegin;
+  PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
+  PetscCall(PetscMalloc1(c1 - c0, &place));
+  PetscCall(HycoRankInts(PetscObjectComm((PetscObject)dm), c1 - c0, tag + c0, place));
+  for (PetscInt c = c0; c < c1; c++) {
+    DMPolytopeType type;
+    PetscInt n, child;
+
+    PetscCall(DMPlexGetCellType(dm, c, &type));
+    PetscCall(CountChildren(transform, c, type, type, &n));
+    HycoCheck(place[c - c0] < (PETSC_MAX_INT - n) / n,
+              "the refined mesh has more cells than this PETSc's integers count");
+    for (PetscInt r = 0; r < n; r++) {
+      PetscCall(DMPlexTransformGetTargetPoint(transform, type, type, c, r, &child));
+      new_tag[child] = 1 + place[c - c0] * n + r;
+    }
+  }
+  PetscCall(PetscFree(place));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode RefineOnce(DM *dm)
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)*dm);
+  DMPlexTransform transform;
+  PetscInt v0, v1, dim, end, last = 0, *new_tag;
+  const PetscInt *tag;
+  IS tags;
+  DM fine;
+
+  PetscFunctionBegin;
+  PetscCall(DMGetDimension(*dm, &dim));
+  PetscCall(DMPlexTransformCreate(comm, &transform));
+  PetscCall(DMPlexTransformSetDM(transform, *dm));
+  PetscCall(DMPlexTransformSetType(transform, DMPLEXREFINEREGULAR));
+  PetscCall(DMPlexTransformSetUp(transform));
+  PetscCall(DMPlexTransformApply(transform, *dm, &fine));
+  PetscCall(PetscObjectQuery((PetscObject)*dm, HYCO_TAGS, (PetscObject *)&tags));
+  PetscCall(ISGetIndices(tags, &tag));
+  PetscCall(DMPlexGetChart(fine, NULL, &end));
+  PetscCall(PetscCalloc1(end, &new_tag));
+  PetscCall(DMPlexGetDepthStratum(*dm, 0, &v0, &v1));
+  for (PetscInt v = v0; v < v1; v++) {
+    PetscInt child;
+
+    PetscCall(DMPlexTransformGetTargetPoint(transform, DM_POLYTOPE_POINT, DM_POLYTOPE_POINT, v, 0, &child));
+    new_tag[child] = tag[v];
+    last = PetscMax(last, tag[v]);
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &last, 1, MPIU_INT, MPI_MAX, comm));
+  for (PetscInt depth = 1; depth <= dim; depth++) PetscCall(TagMiddles(*dm, transform, tag, depth, &last, new_tag));
+  PetscCall(TagCells(*dm, transform, tag, new_tag));
+  PetscCall(ISRestoreIndices(tags, &tag));
+  PetscCall(HycoPlexSetTags(fine, new_tag));
+  PetscCall(DMPlexTransformDestroy(&transform));
+  PetscCall(DMDestroy(dm));
+  *dm = fine;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times)
+{
+  PetscFunctionBegin;
+  if (!times) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Interpolate(dm, scene));
+  for (PetscInt k = 0; k < times; k++) PetscCall(RefineOnce(dm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
