@@ -553,15 +553,17 @@ const char *HycoReasonName(HycoReason reason)
 
 PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
 {
-  const char *tao = "";
   PetscBool ascii;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!methods[s->type][0]) tao = s->tao_type[0] ? s->tao_type : "by the system";
-  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s%s%s; form: %s\n", HycoSolverTypes[s->type], tao[0] ? ", " : "", tao,
+  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s%s%s; form: %s\n", HycoSolverTypes[s->type],
+                                   methods[s->type][0] ? "" : ", ",
+                                   methods[s->type][0] ? ""
+                                   : s->tao_type[0]    ? s->tao_type
+                                                       : "by the system",
                                    s->form_name[0] ? s->form_name : "auto"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g; iterations: at most %d%s\n",
                                    (double)s->rtol, (int)s->max_its, s->max_its ? "" : " (by the number of contacts)"));
