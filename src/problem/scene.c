@@ -434,6 +434,20 @@ static PetscErrorCode GetString(HycoScene s, const char key[], char **value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode ReadRefine(HycoScene s)
+{
+  char *text = NULL, *end;
+  long times;
+
+  PetscFunctionBegin;
+  PetscCall(GetString(s, "scene_refine", &text));
+  times = strtol(text, &end, 10);
+  s->refine = *end || times < 0 || times > 12 ? -1 : (PetscInt)times;
+  PetscCall(PetscFree(text));
+  HycoCheck(s->refine >= 0, "scene_refine says how many times the mesh's cells are halved: a whole number, 0 to 12");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode FindMesh(HycoScene s, const char folder[])
 {
   char *mesh = NULL, path[PETSC_MAX_PATH_LEN];
@@ -459,10 +473,7 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscCall(HycoEntriesList(s));
   PetscCall(GetString(s, "scene_title", &s->title));
   PetscCall(FindMesh(s, folder));
-  PetscCall(PetscObjectSetOptions((PetscObject)s, s->options));
-  PetscObjectOptionsBegin((PetscObject)s);
-  PetscCall(HycoOptionsInt("-scene_refine", "uniform refinements of the mesh", 0, 12, &s->refine, NULL));
-  PetscOptionsEnd();
+  PetscCall(ReadRefine(s));
   PetscCall(ReadParameters(s));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     const char *key = s->key[k];

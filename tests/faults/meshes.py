@@ -180,7 +180,7 @@ SCENES = [
     (('poisson: 0.3}\n  up', 'poisson: 0.3}\n  top: {young: 1}\n  up'), 'body top is a group of dimension 1; the other bodies have dimension 2'),
     (('scene:\n', 'scene:\n# \0\n'), 'it has a byte 0'),
     (('  mesh: two.msh\n', ''), 'the scene names no mesh'),
-    (('floor: {x: 0, y: 0}', 'floor: {x: 0, y: 0}\n  low: {y: 1}'), 'node 1 is fixed twice in y, to 0 and to 1'),
+    (('floor: {x: 0, y: 0}', 'floor: {x: 0, y: 0}\n  low: {y: 1}'), 'is fixed twice in y, to 0 and to 1'),
     (('top: {x: 0, y: -load}', 'top: {x: 0, y: 1/(load-load)}'), 'fixed_top_y: "1/(load-load)" is not finite'),
     (('body:\n', 'pressure: {low: 1}\nbody:\n'), 'the load on low needs a group of dimension 1'),
     (('slave: over', 'slave: up'), 'takes its normal from the group up, which is no surface'),
