@@ -713,6 +713,7 @@ PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *
   Builder b = {.dm = dm, .scene = scene};
   PetscMPIInt size;
   PetscErrorCode ierr = 0;
+  size_t length;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(comm, &size));
@@ -722,7 +723,9 @@ PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *
   *first = 0;
   if (size > 1) PetscCall(AgreeOnGroups(comm, b.m));
   DropInnerFacets(b.m);
-  ierr = CheckGroups(comm, b.m, scene);
+  PetscCall(PetscStrlen(scene->mesh_path, &length));
+  if (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0)) /* no reader has seen to it */
+    ierr = CheckGroups(comm, b.m, scene);
   if (size > 1 && !ierr) ierr = Number(&b, n_owned, first);
   PetscCall(PetscFree(b.owned));
   PetscCall(PetscFree(b.node));

@@ -301,6 +301,7 @@ static PetscErrorCode MakeTables(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(CollectGroups(scene, r, m));
   PetscCall(CheckLoads(scene, r));
   PetscCall(HycoMeshSetNodeBodies(scene, m));
+  PetscCall(HycoMeshCheckGroups(m, scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
