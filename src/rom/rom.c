@@ -53,6 +53,7 @@ static PetscErrorCode DeclareAll(HycoROM m)
     PetscErrorCode ierr;
 
     PetscCall(HycoROMCreate(&each));
+    PetscCall(PetscObjectSetOptions((PetscObject)each, ((PetscObject)m)->options));
     PetscCall(HycoROMSetType(each, types[k]));
     ierr = each->ops->options ? (*each->ops->options)(each) : PETSC_SUCCESS;
     PetscCall(HycoROMDestroy(&each));

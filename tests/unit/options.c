@@ -8,7 +8,7 @@
 /* What can be refused when it is read: a folder, a group or a viewer is any word. */
 static PetscBool Refuses(const HycoOption *o)
 {
-  return (PetscBool)(strcmp(o->value, "<folder>") && strcmp(o->value, "<viewer>") &&
+  return (PetscBool)(strcmp(o->value, "<folder>") && strncmp(o->value, "<file", 5) && strcmp(o->value, "<viewer>") &&
                      strcmp(o->name, "hyco_rid_groups"));
 }
 
