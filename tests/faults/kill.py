@@ -149,11 +149,12 @@ class Kill(Case):
 
     def test_full_disk_condensed(self):
         """Full while flexibilities are written, which are larger than solutions, on 1 and 2 ranks."""
-        train = [a if a != '20,4' else '40,8' for a in CONDENSED]  # long enough to be caught in
-        for ranks, alone, more in ((1, 0, []), (2, 1, []), (2, 0, ['-hyco_groups', '1'])):
+        # long enough to be caught in; two ranks on one solution take long for each
+        for ranks, alone, more, grid, n in ((1, 0, [], '40,8', 320), (2, 1, [], '40,8', 320), (2, 0, ['-hyco_groups', '1'], '10,8', 80)):
+            train = [a if a != '20,4' else grid for a in CONDENSED]
             self.refused(self.limited(16, train + more, ranks, alone), 'flexibility-')
             self.assertFalse(os.path.exists(self.path('m.h5')))
-            self.assertEqual(len([f for f in os.listdir(self.path('m.h5.snapshots')) if '-' not in f]), 320)
+            self.assertEqual(len([f for f in os.listdir(self.path('m.h5.snapshots')) if '-' not in f]), n)
             self.setUp()
         ROWS.add('disk full while a flexibility is written, on 1 and 2 ranks', 'one line, no model; the solutions stay for the next run')
 
