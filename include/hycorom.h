@@ -29,9 +29,8 @@ extern const char *const HycoHybrids[]; /* their words; NULL ends */
 
 /* What a prediction amounts to, in scene units. Of a projection-based model the RID is the whole mesh. */
 typedef struct {
-  HycoROMType type;       /* borrowed from the library */
-  const char *title;      /* the type in words; borrowed too */
-  PetscInt n_multipliers; /* force unknowns: n_contacts, or the force vectors of a projection-based model */
+  char type[32], title[64]; /* the type, and in words; text, so that ranks may send the struct */
+  PetscInt n_multipliers;   /* force unknowns: n_contacts, or the force vectors of a projection-based model */
   PetscInt n_dof, n_contacts, n_modes, n_fe_dofs;  /* reduced unknowns (modes + FE unknowns), contacts in the RID */
   PetscInt n_facing;                               /* contacts of the RID that may close, as in HycoSummary */
   PetscReal overlap, sliding;                      /* the same, of the RID's contacts */

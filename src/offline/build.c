@@ -301,7 +301,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   HycoOnRoot(HycoComm(t), BuildOnRoot(t, useful, model, report));
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
-  report->type = t->prototype->type; /* each rank's own */
+  report->type = report->chosen.recipe.type = t->prototype->type; /* each rank's own */
   PetscCall(HycoROMBroadcast(HycoComm(t), model));
   if (!useful || !t->prototype->ops->finish) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_TRUE));

@@ -292,8 +292,8 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   p = &m->prediction;
   p->dim = m->fe->dim;
   p->n_dof = m->n;
-  p->type = m->type;
-  p->title = m->traits.title;
+  PetscCall(PetscStrncpy(p->type, m->type, sizeof(p->type)));
+  PetscCall(PetscStrncpy(p->title, m->traits.title, sizeof(p->title)));
   p->gives_forces = m->traits.forces;
   p->n_multipliers = m->n_L;
   p->n_contacts = m->m;
