@@ -15,7 +15,8 @@ typedef struct {
   PetscReal *value, *gap;
 } HycoRows;
 
-/* What an estimate of the error is made of (error_estimate.c): log(1 + feature / floor), a coefficient each, and a constant. */
+/* What an estimate of the error is made of (error_estimate.c): log(1 + feature / floor), a coefficient each, and a
+ * constant. */
 #define HYCO_TRUST_FEATURES 5
 #define HYCO_TRUST_DISTANCE 3 /* which of them is the distance */
 /* Contact forces below this share of the largest of a set count as that much where errors are divided by them. */
@@ -96,11 +97,12 @@ PetscErrorCode HycoROMCreate(HycoROM *model);
 PetscErrorCode HycoROMSetUp(HycoROM model);
 /* Frees what is online. */
 PetscErrorCode HycoROMReset(HycoROM model);
-/* The names of the registered types, in the alphabet's order; NULL ends. The caller frees the array. */
-PetscErrorCode HycoROMTypeNames(const char ***names);
+/* The names of the registered types, in the alphabet's order; NULL ends. Borrowed, until another is registered. */
+PetscErrorCode HycoROMTypeNames(const char *const **names);
 /* In a type's setup: gamma, U, Lambda, stress, slave tags and the solver, once fe is there. */
 PetscErrorCode HycoROMSetUpFields(HycoROM model);
-/* In a type's solve, after HycoROMSetUpDefault(): rows and gaps at mu, as far as they have changed; U = u0 + V gamma. */
+/* In a type's solve, after HycoROMSetUpDefault(): rows and gaps at mu, as far as they have changed; U = u0 + V gamma.
+ */
 PetscErrorCode HycoROMBringRows(HycoROM model, const PetscReal mu[]);
 PetscErrorCode HycoROMExpand(HycoROM model);
 /* Modes with a singular value: those of a POD. */

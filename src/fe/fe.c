@@ -146,7 +146,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
         HycoCheck(!fe->fixed[dof] ||
                       PetscAbsReal(value - fe->u0[dof]) <= 1e-12 * (PetscAbsReal(value) + PetscAbsReal(fe->u0[dof])),
                   "node %d is fixed twice in %c, to %g and to %g (by %s)", (int)m->node_id[i], "xyz"[c],
-                  (double)fe->u0[dof], (double)value, HycoExprKey(fixed->value[c]));
+                  (double)fe -> u0[dof], (double)value, HycoExprKey(fixed->value[c]));
         fe->fixed[dof] = PETSC_TRUE;
         fe->u0[dof] = value;
         fe->lifted = (PetscBool)(fe->lifted || value != 0);

@@ -514,7 +514,7 @@ static PetscErrorCode PlaceFacets(Builder *b, PetscInt group)
   const PetscInt n = m->n_facets + b->n_facets;
 
   PetscFunctionBegin;
-  qsort(b->facet, (size_t)b->n_facets, sizeof(*b->facet), CompareFacets);
+  if (b->n_facets) qsort(b->facet, (size_t)b->n_facets, sizeof(*b->facet), CompareFacets);
   PetscCall(PetscRealloc((size_t)(n * m->nf + 1) * sizeof(PetscInt), &m->facets));
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &m->facet_group));
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &m->facet_cell));

@@ -1,7 +1,8 @@
 /*
   What a model is worth: its predictions at held-out points beside their full-order solutions, and from these the
-  estimates of its errors online (error_estimate.c). A law is fitted to the errors and lifted above SHARE of them. Held-out
-  points are drawn as a user's points may be, all over what training reaches, so that the quantile number ceil(SHARE (n
+  estimates of its errors online (error_estimate.c). A law is fitted to the errors and lifted above SHARE of them.
+  Held-out points are drawn as a user's points may be, all over what training reaches, so that the quantile number
+  ceil(SHARE (n
   + 1)) of the ratios is a bound for SHARE of the points to come (split conformal prediction: Vovk, Gammerman, Shafer,
   Algorithmic Learning in a Random World, 2005), whatever the law is worth; a good law only makes the bound tight. The
   recipe was chosen by the same points, which MARGIN allows for.

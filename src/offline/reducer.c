@@ -235,7 +235,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
 {
   static const char *const indicators[] = {"local", "penetration", NULL};
   PetscInt type = 0, indicator = (PetscInt)t->greedy.indicator;
-  const char **types;
+  const char *const *types;
 
   PetscFunctionBegin;
   PetscCall(HycoROMTypeNames(&types));
@@ -282,7 +282,6 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscOptionsEnd();
   PetscCall(EndTraining(t)); /* its options may have changed */
   PetscCall(HycoReducerSetType(t, types[type]));
-  PetscCall(PetscFree(types));
   t->greedy.indicator = (HycoIndicatorKind)indicator;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -291,6 +290,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
 static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char *list[])
 {
   static const char *const words[HYCO_N_SEEDS] = {"displacement", "stress", "force", "dual"};
+  char wrong[HYCO_LINE] = "";
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;
@@ -298,11 +298,13 @@ static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char *list[])
     PetscInt k = 0;
 
     while (k < HYCO_N_SEEDS && strcmp(list[i], words[k])) k++;
-    if (k == HYCO_N_SEEDS)
-      HycoFail("-hyco_rid_modes has \"%s\"; its words are displacement, stress, force and dual", list[i]);
-    t->seed[k] = PETSC_TRUE;
+    if (k < HYCO_N_SEEDS)
+      t->seed[k] = PETSC_TRUE;
+    else
+      PetscCall(PetscStrncpy(wrong, list[i], sizeof(wrong)));
     PetscCall(PetscFree(list[i]));
   }
+  HycoCheck(!wrong[0], "-hyco_rid_modes has \"%s\"; its words are displacement, stress, force and dual", wrong);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -400,13 +402,12 @@ PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
 /* Its options and those of all types. */
 static PetscErrorCode DeclareAll(HycoReducer t)
 {
-  const char **types;
+  const char *const *types;
 
   PetscFunctionBegin;
   PetscCall(HycoReducerSetFromOptions(t));
   PetscCall(HycoROMTypeNames(&types));
   for (PetscInt k = 0; types[k]; k++) PetscCall(HycoReducerSetType(t, types[k]));
-  PetscCall(PetscFree(types));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

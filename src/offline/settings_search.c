@@ -45,10 +45,10 @@ enum { N_SIZES = sizeof(sizes) / sizeof(sizes[0]), FIRST_USUAL = 3 };
 typedef struct {
   HycoReducer t;
   HycoSnapshots store;
-  const char **types;  /* the registered ones */
-  HycoRecipe given;    /* as the options have it */
-  PetscReal extension; /* of the recipes that extend the contact */
-  PetscBool targets;   /* given by the user */
+  const char *const *types; /* the registered ones */
+  HycoRecipe given;         /* as the options have it */
+  PetscReal extension;      /* of the recipes that extend the contact */
+  PetscBool targets;        /* given by the user */
   PetscReal target[HYCO_N_ERRORS];
   PetscInt n;
   HycoAttempt attempt[MAX_ATTEMPTS];
@@ -567,7 +567,6 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   s->store = store;
   PetscCall(HycoROMTypeNames(&s->types));
   ierr = Learn(s, model, grown, report);
-  PetscCall(PetscFree(s->types));
   PetscCall(PetscFree(s->ratio));
   PetscCall(PetscFree(s));
   PetscCall(ierr);

@@ -43,7 +43,7 @@ PetscErrorCode HycoROMSetFromOptions(HycoROM m)
 /* Its options and those of all types. */
 static PetscErrorCode DeclareAll(HycoROM m)
 {
-  const char **types;
+  const char *const *types;
 
   PetscFunctionBegin;
   PetscCall(HycoROMSetFromOptions(m));
@@ -59,7 +59,6 @@ static PetscErrorCode DeclareAll(HycoROM m)
     PetscCall(HycoROMDestroy(&each));
     PetscCall(ierr);
   }
-  PetscCall(PetscFree(types));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,12 +6,14 @@
 
 static PetscFunctionList list = NULL;
 static PetscBool registered = PETSC_FALSE;
+static const char **sorted = NULL; /* the names in the list; made when asked for */
 
 /* PETSc may begin again after PetscFinalize(). */
 static PetscErrorCode Forget(void)
 {
   PetscFunctionBegin;
   PetscCall(PetscFunctionListDestroy(&list));
+  PetscCall(PetscFree(sorted));
   registered = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -34,6 +36,7 @@ PetscErrorCode HycoROMRegister(const char name[], PetscErrorCode (*create)(HycoR
   PetscFunctionBegin;
   PetscCall(HycoROMRegisterAll());
   PetscCall(PetscFunctionListAdd(&list, name, create));
+  PetscCall(PetscFree(sorted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -42,27 +45,32 @@ static int Compare(const void *a, const void *b)
   return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-PetscErrorCode HycoROMTypeNames(const char ***names)
+PetscErrorCode HycoROMTypeNames(const char *const **names)
 {
   const char **found;
   int n;
 
   PetscFunctionBegin;
   PetscCall(HycoROMRegisterAll());
+  if (sorted) {
+    *names = sorted;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(PetscFunctionListGet(list, &found, &n));
   while (n && !found[n - 1]) n--; /* releases of PETSc count a NULL at the end, or do not */
-  PetscCall(PetscMalloc1(n + 1, names));
-  PetscCall(PetscArraycpy(*names, found, n));
-  (*names)[n] = NULL;
-  qsort(*names, (size_t)n, sizeof(**names), Compare);
+  PetscCall(PetscMalloc1(n + 1, &sorted));
+  PetscCall(PetscArraycpy(sorted, found, n));
+  sorted[n] = NULL;
+  qsort(sorted, (size_t)n, sizeof(*sorted), Compare);
   PetscCall(PetscFree(found));
+  *names = sorted;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
 {
   PetscErrorCode (*create)(HycoROM);
-  const char **names;
+  const char *const *names;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
@@ -78,7 +86,6 @@ PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
   for (PetscInt k = 0; names[k]; k++) {
     if (strcmp(names[k], type) == 0) m->type = names[k];
   }
-  PetscCall(PetscFree(names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

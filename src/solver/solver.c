@@ -161,6 +161,7 @@ static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
 {
   const char **words;
   PetscInt form = 0;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(s->n_forms + 2, &words));
@@ -169,13 +170,13 @@ static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
     words[k + 1] = s->forms[k]->name;
     if (strcmp(s->form_name, s->forms[k]->name) == 0) form = k + 1;
   }
-  PetscCall(
-      HycoOptionsWord("-hyco_solver_form",
-                      "full order: pose it in the forces (few contacts; _free: no matrix) or in the gaps (as many "
-                      "as unknowns)",
-                      words, &form, NULL));
-  PetscCall(PetscStrncpy(s->form_name, form ? words[form] : "", sizeof(s->form_name)));
+  ierr = HycoOptionsWord("-hyco_solver_form",
+                         "full order: pose it in the forces (few contacts; _free: no matrix) or in the gaps (as many "
+                         "as unknowns)",
+                         words, &form, NULL);
+  if (!ierr) ierr = PetscStrncpy(s->form_name, form ? words[form] : "", sizeof(s->form_name));
   PetscCall(PetscFree(words));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
