@@ -25,7 +25,7 @@ static PetscErrorCode RankOwn(PetscInt n, const PetscInt64 key[], PetscInt place
 
   PetscFunctionBegin;
   HycoDuplicate(n, key, &sorted);
-  qsort(sorted, (size_t)n, sizeof(*sorted), Compare);
+  if (n) qsort(sorted, (size_t)n, sizeof(*sorted), Compare);
   for (PetscInt k = 0; k < n; k++) {
     if (!k || sorted[k] != sorted[m - 1]) sorted[m++] = sorted[k];
   }
