@@ -45,9 +45,10 @@ PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[]);
 /*
   Gives the scene a mesh of the program's own in place of a file: a DMPlex of segments, triangles, quadrilaterals,
   tetrahedra or hexahedra, interpolated, with a DMLabel for each group that the scene names. Points of a label, whatever
-  their values, are in the group: cells for a body, facets for a surface, vertices for points. The DM may be distributed,
-  by whatever partitioner, or not; its own numbering of vertices and cells gives the node and cell tags of outputs. It is
-  referenced, and not changed. Collective on the DM's communicator, which is that of the models made from the scene.
+  their values, are in the group: cells for a body, facets for a surface, vertices for points. The DM may be
+  distributed, by whatever partitioner, or not; its own numbering of vertices and cells gives the node and cell tags of
+  outputs. It is referenced, and not changed. Collective on the DM's communicator, which is that of the models made from
+  the scene.
 */
 PetscErrorCode HycoSceneSetDM(HycoScene scene, DM dm);
 
