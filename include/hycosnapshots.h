@@ -15,7 +15,8 @@ typedef struct _p_HycoSnapshots *HycoSnapshots;
    at the end once with n of n. */
 typedef PetscErrorCode (*HycoProgress)(PetscInt done, PetscInt n, void *ctx);
 
-/* Opens (creates if missing) the folder. Collective on `comm`. It keeps a reference to the scene. The caller owns it. */
+/* Opens (creates if missing) the folder. Collective on `comm`. It keeps a reference to the scene. The caller owns it.
+ */
 PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char folder[], HycoSnapshots *snapshots);
 /* Closes; sets the handle to NULL; NULL-safe. Collective. */
 PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots);

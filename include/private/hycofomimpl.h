@@ -14,7 +14,7 @@ struct _p_HycoFOM {
   PetscMPIInt rank, size;
   HycoScene scene; /* referenced */
   /* owned */
-  DM dm;           /* over the ranks */
+  DM dm; /* over the ranks */
   char mesh_write[PETSC_MAX_PATH_LEN];
   HycoMesh whole;  /* rank 0 */
   HycoMesh part;   /* each rank's cells; the whole mesh on one rank */

@@ -89,7 +89,7 @@ PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, 
 PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool *ascii);
 /* XViewFromOptions() of a class. */
 #define HycoDefineViewFromOptions(Class, classid)                                                                      \
-  PetscErrorCode Class##ViewFromOptions(Class object, PetscObject owner, const char option[])                         \
+  PetscErrorCode Class##ViewFromOptions(Class object, PetscObject owner, const char option[])                          \
   {                                                                                                                    \
     PetscFunctionBegin;                                                                                                \
     HycoCheckHandle(object, classid);                                                                                  \

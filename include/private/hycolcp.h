@@ -112,8 +112,8 @@ PetscErrorCode HycoTaoRegisterAll(void);
 
 /* A Tao, kept between problems; its options are -hyco_tao_..., behind the prefix of its owner. */
 typedef struct _n_HycoTao *HycoTao;
-/* Collective, as all that follows. `owner` (borrowed, may be NULL): of a problem that each of its ranks solves alone (comm:
-   PETSC_COMM_SELF) the first one prints what -hyco_tao_monitor and its like ask for. */
+/* Collective, as all that follows. `owner` (borrowed, may be NULL): of a problem that each of its ranks solves alone
+   (comm: PETSC_COMM_SELF) the first one prints what -hyco_tao_monitor and its like ask for. */
 PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *tao);
 /* NULL-safe. */
 PetscErrorCode HycoTaoDestroy(HycoTao *tao);

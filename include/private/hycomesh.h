@@ -86,8 +86,8 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
 /* Tables of each process's part: the cells that touch a node of its own. n_owned, first: its own nodes' rows in the
    distributed numbering. On one process node_global, node_whole and cell_whole stay NULL. Collective. */
 PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *n_owned, PetscInt *first);
-/* On rank 0 (elsewhere NULL) all of the parts, or with `in` (by group) the nodes and the facets of these groups, without
-   cells; `global`: the numbers of its nodes in the distributed vectors. The caller owns both. Collective. */
+/* On rank 0 (elsewhere NULL) all of the parts, or with `in` (by group) the nodes and the facets of these groups,
+   without cells; `global`: the numbers of its nodes in the distributed vectors. The caller owns both. Collective. */
 PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, PetscInt n_owned, PetscInt first, const PetscBool in[],
                               HycoMesh *mesh, PetscInt **global);
 /* The scene's whole mesh on rank 0 (elsewhere NULL). Collective. */

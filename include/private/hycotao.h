@@ -9,13 +9,13 @@
 struct _n_HycoTao {
   MPI_Comm comm;
   PetscObject owner; /* borrowed */
-  PetscBool quiet; /* another rank's Tao prints for the same problem */
+  PetscBool quiet;   /* another rank's Tao prints for the same problem */
   char type[HYCO_TAO_NAME];
   int traits;
   PetscInt max_its;
-  Tao tao;       /* kept while type, sizes and limit stay */
+  Tao tao;                    /* kept while type, sizes and limit stay */
   char prefix[HYCO_TAO_NAME]; /* its options prefix */
-  PetscInt n, N; /* its unknowns, on this rank and in all */
+  PetscInt n, N;              /* its unknowns, on this rank and in all */
   /* the problem, for hyco's own types: as it was given */
   const HycoLCP *lcp;
   const HycoActiveSet *set; /* where it is no dense one */

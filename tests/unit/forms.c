@@ -87,8 +87,8 @@ static PetscErrorCode CreateMine(HycoSolver s, HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x + L = 2, x <= 1: x = L = 1. The cheapest form is taken; what it gets wrong goes on to the next method, and to another
-   form where it does not accept that. */
+/* x + L = 2, x <= 1: x = L = 1. The cheapest form is taken; what it gets wrong goes on to the next method, and to
+   another form where it does not accept that. */
 static PetscErrorCode TestRegistered(void)
 {
   static const struct {

@@ -49,7 +49,8 @@ static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const P
 static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
 {
   PetscFunctionBegin;
-  PetscCall(HycoPartnersMatch(c, fe, index, PETSC_FALSE, HycoPairsFollows(pairs, index) ? NULL : Settle, Remedy, pairs));
+  PetscCall(
+      HycoPartnersMatch(c, fe, index, PETSC_FALSE, HycoPairsFollows(pairs, index) ? NULL : Settle, Remedy, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
