@@ -107,6 +107,11 @@ PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool 
     }                                                                                                                  \
   } while (0)
 
+/* Every rank's n items of an MPI type that takes `size` bytes, one rank after the other, in *all on rank 0 (elsewhere
+   NULL, *n_all 0); PetscFree() frees it. Collective. */
+PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
+                               PetscInt *n_all, void *all);
+
 /* 64-bit FNV-1a hash, continued from `hash` (start with HYCO_HASH_START). */
 #define HYCO_HASH_START 14695981039346656037ULL
 unsigned long long HycoHash(unsigned long long hash, const void *data, size_t bytes);

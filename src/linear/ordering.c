@@ -40,26 +40,6 @@ static PetscErrorCode LocalGraph(Mat K, PetscInt bs, PetscInt *n_nodes, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Concatenates every rank's items on rank 0. The caller frees all (NULL elsewhere). */
-static PetscErrorCode ToRoot(MPI_Comm comm, PetscInt n, const PetscInt mine[], PetscInt *n_all, PetscInt **all)
-{
-  PetscMPIInt rank, size, count = (PetscMPIInt)n, *counts, *offsets;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(PetscMalloc2(size, &counts, size + 1, &offsets));
-  PetscCallMPI(MPI_Gather(&count, 1, MPI_INT, counts, 1, MPI_INT, 0, comm));
-  offsets[0] = 0;
-  for (PetscMPIInt r = 0; r < size && rank == 0; r++) offsets[r + 1] = offsets[r] + counts[r];
-  *n_all = rank == 0 ? offsets[size] : 0;
-  *all = NULL;
-  if (rank == 0) PetscCall(PetscMalloc1(*n_all + 1, all));
-  PetscCallMPI(MPI_Gatherv(mine, count, MPIU_INT, *all, counts, offsets, MPIU_INT, 0, comm));
-  PetscCall(PetscFree2(counts, offsets));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* METIS on the whole graph: degree and neighbours of each node, to place[node]. On rank 0. */
 static PetscErrorCode Dissect(PetscInt n, const PetscInt degree[], const PetscInt next[], PetscInt place[])
 {
@@ -89,9 +69,9 @@ PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[])
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCall(MatGetBlockSize(K, &bs));
   PetscCall(LocalGraph(K, bs, &n_nodes, &start, &next));
-  PetscCall(ToRoot(comm, start[n_nodes], next, &n_edges, &edges));
+  PetscCall(HycoConcatenate(comm, start[n_nodes], next, MPIU_INT, sizeof(PetscInt), &n_edges, &edges));
   for (PetscInt i = 0; i < n_nodes; i++) start[i] = start[i + 1] - start[i];
-  PetscCall(ToRoot(comm, n_nodes, start, &n_all, &degree));
+  PetscCall(HycoConcatenate(comm, n_nodes, start, MPIU_INT, sizeof(PetscInt), &n_all, &degree));
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(next));
   if (rank == 0) PetscCall(PetscMalloc1(n_all, &node));

@@ -3,42 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rank 0's concatenation of every rank's n integers. */
-static PetscErrorCode GatherInts(MPI_Comm comm, PetscInt n, const PetscInt data[], PetscInt *n_all, PetscInt **all)
-{
-  PetscMPIInt rank, size, mine, *counts, *start;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(PetscMPIIntCast(n, &mine));
-  PetscCall(PetscCalloc2(size, &counts, size + 1, &start));
-  PetscCallMPI(MPI_Gather(&mine, 1, MPI_INT, counts, 1, MPI_INT, 0, comm));
-  for (PetscMPIInt r = 0; r < size && rank == 0; r++) start[r + 1] = start[r] + counts[r];
-  *n_all = start[size];
-  PetscCall(PetscMalloc1(*n_all, all));
-  PetscCallMPI(MPI_Gatherv(data, mine, MPIU_INT, *all, counts, start, MPIU_INT, 0, comm));
-  PetscCall(PetscFree2(counts, start));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode GatherReals(MPI_Comm comm, PetscInt n, const PetscReal data[], PetscReal **all)
-{
-  PetscMPIInt rank, size, mine, *counts, *start;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(PetscMPIIntCast(n, &mine));
-  PetscCall(PetscCalloc2(size, &counts, size + 1, &start));
-  PetscCallMPI(MPI_Gather(&mine, 1, MPI_INT, counts, 1, MPI_INT, 0, comm));
-  for (PetscMPIInt r = 0; r < size && rank == 0; r++) start[r + 1] = start[r] + counts[r];
-  PetscCall(PetscMalloc1(start[size], all));
-  PetscCallMPI(MPI_Gatherv(data, mine, MPIU_REAL, *all, counts, start, MPIU_REAL, 0, comm));
-  PetscCall(PetscFree2(counts, start));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Rows of integers that one rank sends, and what rank 0 has of all, sorted by their first entries. */
 typedef struct {
   PetscInt width, n, room, n_all;
@@ -69,7 +33,7 @@ static int CompareThree(const void *a, const void *b)
 static PetscErrorCode GatherRows(MPI_Comm comm, Rows *r)
 {
   PetscFunctionBegin;
-  PetscCall(GatherInts(comm, r->n * r->width, r->mine, &r->n_all, &r->all));
+  PetscCall(HycoConcatenate(comm, r->n * r->width, r->mine, MPIU_INT, sizeof(PetscInt), &r->n_all, &r->all));
   PetscCall(PetscFree(r->mine));
   r->n_all /= r->width;
   if (r->n_all) qsort(r->all, (size_t)r->n_all, (size_t)r->width * sizeof(PetscInt), CompareThree);
@@ -240,8 +204,8 @@ PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, PetscInt n_owned, Pe
     tag[k] = part->node_id[i];
     PetscCall(PetscArraycpy(xyz + 3 * k++, part->xyz + 3 * i, 3));
   }
-  PetscCall(GatherReals(comm, 3 * k, xyz, &all));
-  PetscCall(GatherInts(comm, k, tag, &n, &sent));
+  PetscCall(HycoConcatenate(comm, 3 * k, xyz, MPIU_REAL, sizeof(PetscReal), &n, &all));
+  PetscCall(HycoConcatenate(comm, k, tag, MPIU_INT, sizeof(PetscInt), &n, &sent));
   PetscCall(PetscFree2(xyz, tag));
   PetscCall(GatherRows(comm, &g.node));
   PetscCall(GatherRows(comm, &g.cell));
