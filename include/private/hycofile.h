@@ -1,7 +1,7 @@
 /*
   Files that are written whole or not at all, and the temporary names that this takes.
 
-  A file is written beside its place under the name PATH.hyco-NODE-PID-NUMBER.KIND and renamed: NODE stands for the
+  A file is written beside its place under the name PATH.hyco-NODE-PID-NUMBER.partial and renamed: NODE stands for the
   machine and its space of process ids, so that no two processes share a name. What a killed process left is told by its
   name, and removed by the next run that writes there.
 */
@@ -32,11 +32,6 @@ PetscErrorCode HycoFileFlush(HycoFile file);
 /* commit: the file takes its place, or fails with the system's reason and leaves none; else it is removed. Frees. */
 PetscErrorCode HycoFileClose(HycoFile *file, PetscBool commit);
 
-/* A name beside `path` (or the file that it is a link to) for what this run alone writes, reads and removes. Not
-   created. On rank 0 of comm; the same on every rank. Collective. */
-PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind[], char scratch[HYCO_FILE_NAME]);
-/* The file `scratch` takes the place of `path`. On this process alone. */
-PetscErrorCode HycoFileKeep(const char scratch[], const char path[]);
 /* The path that a temporary name belongs to: what a message names. A path that is none is returned as it is. */
 void HycoFileOwner(const char name[], char owner[HYCO_FILE_NAME]);
 /* Removes what dead processes have left of the file `path`, or, when it ends in '/', of all files in that folder. On

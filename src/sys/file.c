@@ -65,13 +65,6 @@ void HycoFileOwner(const char name[], char owner[HYCO_FILE_NAME])
   snprintf(owner, HYCO_FILE_NAME, "%.*s", (int)(tag ? (size_t)(tag - name) : strlen(name)), name);
 }
 
-static void Temporary(const char place[], const char kind[], char name[HYCO_FILE_NAME])
-{
-  static unsigned number;
-
-  snprintf(name, HYCO_FILE_NAME, "%s.hyco-%08x-%ld-%u.%s", place, Node(), (long)getpid(), number++, kind);
-}
-
 /* Whether the file of that name was left by a process that is dead. */
 static PetscBool IsLeft(const char path[], unsigned node, long pid)
 {
@@ -109,36 +102,6 @@ PetscErrorCode HycoFileSweep(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind[], char scratch[HYCO_FILE_NAME])
-{
-  char place[PETSC_MAX_PATH_LEN];
-  PetscMPIInt rank;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  if (rank == 0) {
-    HycoFileFollow(path, place);
-    Temporary(place, kind, scratch);
-  }
-  PetscCallMPI(MPI_Bcast(scratch, HYCO_FILE_NAME, MPI_CHAR, 0, comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFileKeep(const char scratch[], const char path[])
-{
-  char place[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBegin;
-  HycoFileFollow(path, place);
-  if (rename(scratch, place) != 0) {
-    const int failed = errno;
-
-    (void)unlink(scratch);
-    HycoFail("%s could not be written (%s)", path, strerror(failed));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFileKind kind, PetscBool *direct)
 {
   const char *dash = option[0] ? "-" : "", *blank = option[0] ? " " : "";
@@ -161,11 +124,13 @@ PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFi
 
 static PetscErrorCode OpenPlace(HycoFile f)
 {
+  static unsigned number;
   int fd;
 
   PetscFunctionBegin;
   PetscCall(HycoFileCheckPlace("", f->path, f->kind, &f->direct));
-  if (!f->direct) Temporary(f->place, "partial", f->temporary);
+  snprintf(f->temporary, sizeof(f->temporary), "%s.hyco-%08x-%ld-%u.partial", f->place, Node(), (long)getpid(),
+           number++);
   fd = f->direct ? open(f->path, O_WRONLY | O_APPEND) : open(f->temporary, O_WRONLY | O_CREAT | O_EXCL, 0666);
   f->stream = fd >= 0 ? fdopen(fd, "w") : NULL;
   HycoCheck(f->stream, "%s cannot be written (%s): is there such a folder, may you write there, is there room?",
