@@ -210,7 +210,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   HycoChanges c;
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {
+  for (PetscInt p = 0; p < fe->scene->n_variables; p++) {
     changed[p] = (PetscBool)(!fe->ready || mu[p] != fe->mu[p]);
     fe->mu[p] = mu[p];
   }
