@@ -61,6 +61,10 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
 /* Whether the scene has any contact. Not collective. */
 PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact);
 
+/* The times that its history lists, increasing, the begin of the path first; n is 0 for a scene without history. Either
+   output may be NULL. Not collective. Borrowed. */
+PetscErrorCode HycoSceneGetHistory(HycoScene scene, PetscInt *n, const PetscReal *times[]);
+
 /* The options that the scene carries (its hyco: section, overridden by the command line). Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options);
 

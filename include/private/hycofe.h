@@ -82,7 +82,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* Puts the nodes where the file has them; for geometry alone. */
 PetscErrorCode HycoFESetDrawn(HycoFE fe);
-/* Brings everything to mu (length scene->n_parameters), touching only what depends on what changed. */
+/* Brings everything to mu (length scene->n_variables), touching only what depends on what changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
 /* What the parameters p with changed[p] reach: the bodies' maps, K, the rows of B, the gaps. */
 typedef struct {

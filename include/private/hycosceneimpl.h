@@ -82,6 +82,12 @@ typedef struct {
   HycoExpr traction[3]; /* force per unit surface; NULL: none */
 } HycoLoad;
 
+/* A quantity over time: linear between its rows, constant before the first and after the last. */
+typedef struct {
+  PetscInt n;
+  PetscReal *t, *value;
+} HycoTimeTable;
+
 struct _p_HycoScene {
   PETSCHEADER(int);
   PetscOptions options; /* every entry, the command line's already in */
@@ -89,12 +95,16 @@ struct _p_HycoScene {
   DM dm;                 /* the program's own mesh; NULL: mesh_path */
   PetscInt refine;       /* times that the mesh's cells are halved */
   char *folder;          /* where relative paths of entries start */
-  PetscBool has_history; /* time runs: bodies may have memory */
   /* parameters */
   PetscInt n_parameters;
-  char *parameter[HYCO_MAX_PARAMETERS];
+  PetscInt n_variables; /* of expressions: the parameters; with a history t and its tables' values too */
+  char *parameter[HYCO_MAX_PARAMETERS]; /* names of the variables, the parameters' first */
   PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS];
   PetscBool extrapolate; /* values outside the ranges pass */
+  /* history; without one n_times is 0 */
+  PetscInt n_times, n_tables;
+  PetscReal *times; /* increasing; the first is where the path begins */
+  HycoTimeTable table[HYCO_MAX_PARAMETERS];
   /* description */
   PetscInt n_bodies, n_fixed, n_loads, n_contacts;
   HycoBody *body;
@@ -105,6 +115,19 @@ struct _p_HycoScene {
   PetscInt n_entries;
   char **key, **value;
 };
+
+/* Reads the history's entries, once the parameters are read. */
+PetscErrorCode HycoSceneReadHistory(HycoScene scene);
+/* Fails where the history reaches what must not change in time: the bodies' places, the rows of B. */
+PetscErrorCode HycoSceneCheckHistory(HycoScene scene);
+PetscErrorCode HycoSceneDestroyHistory(HycoScene scene);
+/* The variables at time t: the parameters mu (n_parameters), t, the tables' values; out has room for n_variables. */
+void HycoSceneSetTime(HycoScene scene, const PetscReal mu[], PetscReal t, PetscReal out[]);
+/* The first time after t at which a step ends: a listed one, or a row of a table. */
+PetscReal HycoSceneNextStop(HycoScene scene, PetscReal t);
+/* One line where the scene has a history, for `what` ("hyco train") that knows none. */
+PetscErrorCode HycoSceneRefuseHistory(HycoScene scene, const char what[]);
+PetscBool HycoIsVariableName(const char word[]);
 
 /* Builds a scene from n (key, value) entries; `folder` is where a relative mesh path starts. */
 PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[], char *const value[],

@@ -102,7 +102,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscMalloc1(scene->n_bodies, &bbar));
   ierr = ChooseElements(scene, mesh, bbar);
   for (PetscInt b = 0; b < scene->n_bodies && !ierr; b++)
-    ierr = HycoMaterialSetUp(scene->body[b].law, mesh->dim, scene->has_history);
+    ierr = HycoMaterialSetUp(scene->body[b].law, mesh->dim, (PetscBool)(scene->n_times > 0));
   if (ierr) PetscCall(PetscFree(bbar));
   PetscCall(ierr);
   PetscCall(PetscNew(&f));
@@ -245,7 +245,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   HycoChanges c;
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {
+  for (PetscInt p = 0; p < fe->scene->n_variables; p++) {
     changed[p] = (PetscBool)(!fe->ready || mu[p] != fe->mu[p]);
     fe->mu[p] = mu[p];
   }

@@ -87,7 +87,7 @@ static PetscErrorCode NewExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
 {
   PetscFunctionBegin;
   PetscCall(HycoExprDestroy(expr)); /* the same entry in another letter case */
-  PetscCall(HycoExprCreate(s->key[entry], s->value[entry], s->n_parameters, (const char *const *)s->parameter, expr));
+  PetscCall(HycoExprCreate(s->key[entry], s->value[entry], s->n_variables, (const char *const *)s->parameter, expr));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -132,8 +132,13 @@ static PetscErrorCode ReadRange(HycoScene s, PetscInt p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscBool IsIdentifier(const char *word)
+PetscBool HycoIsVariableName(const char word[])
 {
+  static const char *const taken[] = {"x", "y", "z", "pi"};
+
+  for (size_t k = 0; k < sizeof(taken) / sizeof(taken[0]); k++) {
+    if (strcmp(word, taken[k]) == 0) return PETSC_FALSE;
+  }
   if (!isalpha((unsigned char)word[0])) return PETSC_FALSE;
   for (; *word; word++) {
     if (!isalnum((unsigned char)*word) && *word != '_') return PETSC_FALSE;
@@ -153,11 +158,11 @@ static PetscErrorCode ReadParameters(HycoScene s)
   HycoCheck(commas < HYCO_MAX_PARAMETERS, "scene_parameters lists %d parameters; a scene has at most %d",
             (int)commas + 1, HYCO_MAX_PARAMETERS);
   PetscCall(PetscOptionsGetStringArray(s->options, NULL, "-scene_parameters", s->parameter, &n, &set));
-  s->n_parameters = set ? n : 0;
+  s->n_parameters = s->n_variables = set ? n : 0;
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     const char *name = s->parameter[p];
 
-    HycoCheck(IsIdentifier(name) && strcmp(name, "x") && strcmp(name, "y") && strcmp(name, "z") && strcmp(name, "pi"),
+    HycoCheck(HycoIsVariableName(name),
               "scene_parameters: \"%s\" cannot name a parameter; use letters, digits and _, and none of x, y, z, pi",
               name);
     for (PetscInt q = 0; q < p; q++)
@@ -447,6 +452,16 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CheckHistoryEntry(const char key[])
+{
+  static const char *const fields[] = {"times", "tables_NAME", NULL};
+
+  PetscFunctionBegin;
+  if (strcasecmp(key + 8, "times") && strncasecmp(key + 8, "tables_", 7))
+    PetscCall(UnknownKey(key, "history", NULL, fields));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Entries of heat that need one another; the law learns where its temperatures come from. */
 static PetscErrorCode CheckHeat(HycoBody *body)
 {
@@ -479,6 +494,7 @@ static PetscErrorCode CheckScene(HycoScene s)
     PetscCall(CheckHeat(&s->body[k]));
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactComplete(s->contact[k]));
+  PetscCall(HycoSceneCheckHistory(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -535,12 +551,15 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscCall(FindMesh(s, folder));
   PetscCall(ReadRefine(s));
   PetscCall(ReadParameters(s));
+  PetscCall(HycoSceneReadHistory(s));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     const char *key = s->key[k];
 
     if (strncasecmp(key, "scene_", 6) == 0 || strncasecmp(key, "parameter_", 10) == 0 ||
         strncasecmp(key, "hyco_", 5) == 0)
       PetscCall(CheckPlainEntry(s, k));
+    else if (strncasecmp(key, "history_", 8) == 0)
+      PetscCall(CheckHistoryEntry(key));
     else
       PetscCall(ReadMember(s, k));
   }
@@ -699,7 +718,8 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
     PetscCall(PetscFree(s->key[k]));
     PetscCall(PetscFree(s->value[k]));
   }
-  for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(PetscFree(s->parameter[p]));
+  for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PetscFree(s->parameter[p]));
+  PetscCall(HycoSceneDestroyHistory(s));
   PetscCall(PetscFree(s->key));
   PetscCall(PetscFree(s->value));
   PetscCall(PetscFree(s->body));
