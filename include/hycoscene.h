@@ -14,7 +14,7 @@ typedef struct _p_HycoScene *HycoScene;
 /* What an entry that a law or a contact type declares has as its value. */
 typedef enum {
   HYCO_ENTRY_EXPRESSION, /* in x, y, z and the parameters */
-  HYCO_ENTRY_GROUP,      /* a physical group of the mesh */
+  HYCO_ENTRY_GROUP,      /* a physical group of the mesh, or a text */
   HYCO_ENTRY_LENGTH      /* a number, 0 or more; -1 where the scene gives none */
 } HycoEntryKind;
 

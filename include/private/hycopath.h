@@ -1,4 +1,5 @@
-/* HycoPath: the solution of a scene with a history, from its first time to its last: substeps, Newton's method, energies. */
+/* HycoPath: the solution of a scene with a history, from its first time to its last: substeps, Newton's method,
+ * energies. */
 #ifndef HYCOPATH_H
 #define HYCOPATH_H
 
@@ -12,13 +13,13 @@ typedef enum { HYCO_NEWTON_AUTO, HYCO_NEWTON_TANGENT, HYCO_NEWTON_ELASTIC } Hyco
 
 /* An attempt at a step of time. */
 typedef struct {
-  PetscBool converged;
-  char why[HYCO_LINE];  /* else */
-  PetscInt iterations;  /* contact systems solved */
-  PetscInt factors;     /* of them with a new stiffness */
-  PetscInt active_its;  /* iterations within them */
-  PetscReal residual;   /* of equilibrium, relative to the largest of |f_int|, |F|, |B^T L| */
-  PetscReal order;      /* observed; 0: too few iterations to tell */
+  PetscBool converged, easy;
+  char why[HYCO_LINE]; /* else */
+  PetscInt iterations; /* contact systems solved */
+  PetscInt factors;    /* of them with a new stiffness */
+  PetscInt active_its; /* iterations within them */
+  PetscReal residual;  /* of equilibrium, relative to the largest of |f_int|, |F|, |B^T L| */
+  PetscReal order;     /* observed; 0: too few iterations to tell */
   PetscReal seconds_factor, seconds_solve, seconds_law;
   HycoFEStepReport law; /* over all ranks */
 } HycoAttempt;
@@ -40,7 +41,7 @@ struct _n_HycoPath {
   HycoFEState begin, end;
   /* distributed, as U: loads alone, of the attempt and of the last accepted time; internal forces, the same */
   Vec F, F_old, f_int, f_old, r, U_old, work, diagonal;
-  Vec L_old, gap_work; /* as Lambda; NULL without contact */
+  Vec L_old, gap_work;     /* as Lambda; NULL without contact */
   PetscReal *f_local, *u0; /* of the part's n_dof */
   PetscBool tangent;       /* f->K is a tangent, not the elastic stiffness */
   PetscBool flows;         /* some body's law has a memory */
@@ -52,6 +53,7 @@ struct _n_HycoPath {
   PetscReal mu[HYCO_MAX_PARAMETERS], t, dt;
   PetscInt step; /* listed times reached: the index of the next */
   HycoWork work_done;
+  HycoKKT kkt;  /* of the last accepted time */
   HycoStep now; /* since the last listed time */
   PetscInt n_steps;
   HycoStep *steps;
@@ -71,6 +73,15 @@ PetscErrorCode HycoPathSetFromOptions(HycoFOM fom, HycoOptionItems PetscOptionsO
 PetscErrorCode HycoPathSolve(HycoFOM fom, const PetscReal mu[]);
 /* One attempt, from the accepted state at t0 to t1: U, Lambda and the state `end`. Collective. */
 PetscErrorCode HycoPathAttempt(HycoFOM fom, PetscReal t0, PetscReal t1, HycoAttempt *attempt);
+/* U and Lambda of the last accepted time again. */
+PetscErrorCode HycoPathRestore(HycoFOM fom);
+/* Everything at t but the solution: the scene's parts, and the loads without what moved supports do. Collective. */
+PetscErrorCode HycoPathAssemble(HycoFOM fom, PetscReal t);
+/* Whether steps are solved with the elastic stiffness. */
+PetscBool HycoPathPrefersElastic(HycoFOM fom);
+/* The checkpoint, if there is to be one; back from it, if it is there. Collective. */
+PetscErrorCode HycoPathSave(HycoFOM fom);
+PetscErrorCode HycoPathLoad(HycoFOM fom);
 /* Of a path, in place of the linear identity's: energies. */
 void HycoPathSummary(HycoFOM fom, HycoSummary *summary);
 

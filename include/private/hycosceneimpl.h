@@ -20,8 +20,15 @@ PetscErrorCode HycoExprDestroy(HycoExpr *expr);
 PetscErrorCode HycoExprPlace(HycoExpr expr, const PetscReal mu[], const PetscReal xyz[3], char place[HYCO_LINE]);
 /* Values at n points (n x 3 coordinates) and mu; fails on a value that is not finite. */
 PetscErrorCode HycoExprEval(HycoExpr expr, const PetscReal mu[], PetscInt n, const PetscReal xyz[], PetscReal value[]);
+/* The same of an expression that may name `temperature`, n values; NULL where it does not. */
+PetscErrorCode HycoExprEvalHot(HycoExpr expr, const PetscReal mu[], PetscInt n, const PetscReal xyz[],
+                               const PetscReal temperature[], PetscReal value[]);
 /* Whether x, y or z appears; whether any parameter p with changed[p] does. NULL-safe (false). */
 PetscBool HycoExprInSpace(HycoExpr expr);
+/* Whether `temperature` does, which only a law's constants and the expansion may name. NULL-safe. */
+PetscBool HycoExprInHeat(HycoExpr expr);
+/* Fails where it does. */
+PetscErrorCode HycoExprRefuseHeat(HycoExpr expr);
 PetscBool HycoExprChanges(HycoExpr expr, const PetscBool changed[]);
 const char *HycoExprKey(HycoExpr expr);
 
@@ -32,7 +39,8 @@ typedef struct {
   HycoEntryKind kind;
   PetscBool required;
   HycoExpr expr;    /* of an expression that the scene gives */
-  char *text;       /* of a group */
+  char *text;       /* of a group, a text */
+  PetscBool heat;   /* its expression may name `temperature` */
   PetscReal value;  /* of a length, and where the scene gives no expression */
   PetscReal lo, hi; /* of a law's constant: open interval */
 } HycoEntry;
@@ -57,8 +65,10 @@ typedef struct {
   char *name;
   HycoMaterial law;
   PetscBool bbar;    /* mean dilatation (B-bar) instead of the displacements' own at each point */
+  PetscBool element; /* whether the scene says so; if not, HycoFE chooses by the law */
   HycoExpr map[3];   /* moved coordinates; NULL: not moved */
   HycoExpr force[3]; /* body force per unit volume; NULL: none */
+  HycoExpr temperature, reference, expansion; /* K; thermal strain expansion (temperature - reference); NULL: none */
 } HycoBody;
 
 typedef struct {
@@ -82,8 +92,10 @@ struct _p_HycoScene {
   PETSCHEADER(int);
   PetscOptions options; /* every entry, the command line's already in */
   char *title, *mesh_path;
-  DM dm;           /* the program's own mesh; NULL: mesh_path */
-  PetscInt refine; /* times that the mesh's cells are halved */
+  DM dm;                 /* the program's own mesh; NULL: mesh_path */
+  PetscInt refine;       /* times that the mesh's cells are halved */
+  char *folder;          /* where relative paths of entries start */
+  PetscBool has_history; /* time runs: bodies may have memory */
   /* parameters */
   PetscInt n_parameters;
   PetscInt n_variables; /* of expressions: the parameters; with a history t and its tables' values too */

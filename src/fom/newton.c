@@ -17,18 +17,11 @@
 
 /* What an iteration knows of the one before. */
 typedef struct {
-  PetscReal size, floor; /* of forces: the largest of the three; what rounding U makes of them */
-  PetscReal residual[3]; /* norms, newest last */
+  PetscReal size, floor;             /* of forces: the largest of the three; what rounding U makes of them */
+  PetscReal residual[3];             /* norms, newest last */
   PetscReal potential, slope, share; /* at the base of the step, along it, of it that was taken */
-  PetscBool search;
+  PetscBool feasible, search;        /* the base is at the step's supports and gaps; and there is a potential */
 } Progress;
-
-PetscInt HycoFOMOwned(HycoFOM f, PetscInt node)
-{
-  const PetscInt row = (f->part->node_global ? f->part->node_global[node] : node) - f->first;
-
-  return row >= 0 && row < f->n_owned ? row : -1;
-}
 
 /* The law over all ranks. */
 static PetscErrorCode ReduceReport(HycoFOM f, HycoFEStepReport *r)
@@ -84,8 +77,8 @@ static PetscErrorCode TakeForces(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The law at U: state `end`, f_int, r = F - f_int - B^T L, with `tangent` the consistent tangents; the sizes of what r is
-   made of. */
+/* The law at U: state `end`, f_int, r = F - f_int - B^T L, with `tangent` the consistent tangents; the sizes of what r
+   is made of. */
 static PetscErrorCode Evaluate(HycoFOM f, PetscReal t0, PetscReal t1, PetscBool tangent, HycoAttempt *a, Progress *now)
 {
   HycoPath p = f->path;
@@ -121,7 +114,8 @@ static PetscErrorCode Evaluate(HycoFOM f, PetscReal t0, PetscReal t1, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K (u0 - U) of the supports that have moved, taken from the loads of the free unknowns; K_ii (u0 - U)_i at the others. */
+/* K (u0 - U) of the supports that have moved, taken from the loads of the free unknowns; K_ii (u0 - U)_i at the others.
+ */
 static PetscErrorCode AddMoves(HycoFOM f, Vec rhs)
 {
   HycoPath p = f->path;
@@ -210,6 +204,7 @@ static PetscErrorCode Advance(HycoFOM f, PetscBool feasible, const HycoAttempt *
   PetscFunctionBegin;
   PetscCall(VecCopy(f->U, p->U_last));
   if (f->n_contacts) PetscCall(VecCopy(f->Lambda, p->L_last));
+  now->feasible = feasible;
   now->search = (PetscBool)(feasible && a->law.has_potential);
   now->share = 1;
   if (now->search) { /* r + B^T L = F - f_int on the free unknowns; along the others U stays */
@@ -254,7 +249,7 @@ static PetscErrorCode Shorten(HycoFOM f, PetscReal t0, PetscReal t1, HycoAttempt
 
   PetscFunctionBegin;
   PetscCall(IsLower(f, a, now, &lower));
-  for (PetscInt k = 0; k < SHORTENED && !lower; k++) {
+  for (PetscInt k = 0; k < SHORTENED && !lower && now->feasible; k++) {
     now->share /= 2;
     PetscCall(VecAXPBY(f->U, 0.5, 0.5, p->U_last));
     if (f->n_contacts) PetscCall(VecAXPBY(f->Lambda, 0.5, 0.5, p->L_last));
@@ -392,7 +387,7 @@ static PetscErrorCode Iterate(HycoFOM f, PetscReal t0, PetscReal t1, PetscBool e
 {
   HycoPath p = f->path;
   Progress now = {.residual = {0, 0, 0}};
-  PetscReal least = PETSC_MAX_REAL, worst;
+  PetscReal least = PETSC_MAX_REAL, worst = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; !a->why[0]; k++) {
@@ -425,8 +420,7 @@ static PetscErrorCode Iterate(HycoFOM f, PetscReal t0, PetscReal t1, PetscBool e
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the accepted state was. */
-static PetscErrorCode Restore(HycoFOM f)
+PetscErrorCode HycoPathRestore(HycoFOM f)
 {
   HycoPath p = f->path;
 
@@ -436,8 +430,7 @@ static PetscErrorCode Restore(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Everything at t1 but the solution: the scene's parts, and the loads without what moved supports do. */
-static PetscErrorCode AssembleAt(HycoFOM f, PetscReal t1)
+PetscErrorCode HycoPathAssemble(HycoFOM f, PetscReal t1)
 {
   HycoPath p = f->path;
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -457,9 +450,9 @@ static PetscErrorCode AssembleAt(HycoFOM f, PetscReal t1)
 }
 
 /*
-  Which variant costs less, by counts alone, so that a choice repeats on any machine: a factor with its flexibility takes
-  as long as so many solves (3D: 24 at 29,000 unknowns and 50 at 118,000; in 2D a fifth of that), and the elastic variant
-  as many iterations more as five times the tangent's.
+  Which variant costs less, by counts alone, so that a choice repeats on any machine: a factor with its flexibility
+  takes as long as so many solves (3D: 24 at 29,000 unknowns and 50 at 118,000; in 2D a fifth of that), and the elastic
+  variant as many iterations more as five times the tangent's.
 */
 PetscBool HycoPathPrefersElastic(HycoFOM f)
 {
@@ -479,7 +472,7 @@ PetscErrorCode HycoPathAttempt(HycoFOM f, PetscReal t0, PetscReal t1, HycoAttemp
   PetscCall(PetscMemzero(a, sizeof(*a)));
   PetscCall(VecCopy(f->U, p->U_old));
   if (f->n_contacts) PetscCall(VecCopy(f->Lambda, p->L_old));
-  PetscCall(AssembleAt(f, t1));
+  PetscCall(HycoPathAssemble(f, t1));
   elastic = HycoPathPrefersElastic(f);
   if (p->tangent && elastic) {
     PetscCall(HycoFEElasticTangent(f->fe));
@@ -489,9 +482,10 @@ PetscErrorCode HycoPathAttempt(HycoFOM f, PetscReal t0, PetscReal t1, HycoAttemp
   PetscCall(Iterate(f, t0, t1, elastic, p->max_its ? p->max_its : elastic ? 60 : 15, a));
   if (!a->converged && elastic && p->flows && p->method == HYCO_NEWTON_AUTO) {
     a->why[0] = '\0';
-    PetscCall(Restore(f));
+    PetscCall(HycoPathRestore(f));
     PetscCall(Iterate(f, t0, t1, PETSC_FALSE, p->max_its ? p->max_its : 15, a));
   }
-  if (!a->converged) PetscCall(Restore(f));
+  a->easy = (PetscBool)(a->iterations <= (elastic ? 30 : 7));
+  if (!a->converged) PetscCall(HycoPathRestore(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
