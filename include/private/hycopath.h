@@ -6,6 +6,8 @@
 #include <hycofomimpl.h>
 #include <hycoinelastic.h>
 
+typedef struct _n_HycoSeries *HycoSeries;
+
 /* What one iteration of a step solves with: the consistent tangent, or the elastic stiffness, whose factor stays. */
 typedef enum { HYCO_NEWTON_AUTO, HYCO_NEWTON_TANGENT, HYCO_NEWTON_ELASTIC } HycoNewton;
 
@@ -61,6 +63,7 @@ struct _n_HycoPath {
   PetscInt n_orders, room_orders;
   PetscBool ended; /* the last path reached its end */
   char why[HYCO_LINE];
+  HycoSeries series; /* NULL: none is asked for */
   HycoStepMonitor monitor;
   void *monitor_ctx;
 };
@@ -82,6 +85,11 @@ PetscBool HycoPathPrefersElastic(HycoFOM fom);
 /* The checkpoint, if there is to be one; back from it, if it is there. Collective. */
 PetscErrorCode HycoPathSave(HycoFOM fom);
 PetscErrorCode HycoPathLoad(HycoFOM fom);
+/* The series of fields, if one is asked for: made anew, the last time added, written. Collective. */
+PetscErrorCode HycoSeriesBegin(HycoFOM fom);
+PetscErrorCode HycoSeriesAdd(HycoFOM fom);
+PetscErrorCode HycoSeriesEnd(HycoFOM fom);
+PetscErrorCode HycoSeriesDestroy(HycoSeries *series);
 /* Of a path, in place of the linear identity's: energies. */
 void HycoPathSummary(HycoFOM fom, HycoSummary *summary);
 

@@ -88,6 +88,7 @@ PetscErrorCode HycoPathDestroy(HycoFOM f)
     PetscCall(VecDestroy(&p->dG[j]));
     PetscCall(VecDestroy(&p->dL[j]));
   }
+  PetscCall(HycoSeriesDestroy(&p->series));
   PetscCall(HycoFEStateDestroy(&p->begin));
   PetscCall(HycoFEStateDestroy(&p->end));
   PetscCall(PetscFree(p->f_local));
@@ -318,6 +319,7 @@ static PetscErrorCode Record(HycoFOM f)
   f->sigma_ready = PETSC_FALSE;
   p->steps[p->n_steps++] = *s;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
+  PetscCall(HycoSeriesAdd(f));
   if (p->monitor) PetscCall((*p->monitor)(f, &p->steps[p->n_steps - 1], p->monitor_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -415,12 +417,14 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
 
   PetscFunctionBegin;
   PetscCall(Begin(f, mu));
+  PetscCall(HycoSeriesBegin(f));
   if (p->resume) PetscCall(HycoPathLoad(f));
   while (p->step < f->scene->n_times && reached) PetscCall(Advance(f, &reached));
   p->ended = reached;
   if (!reached) PetscCall(HycoPathAssemble(f, p->t)); /* from the time that was not reached */
   if (!reached && p->now.substeps) PetscCall(Record(f));
   f->solved = (PetscBool)(p->n_steps > 0);
+  PetscCall(HycoSeriesEnd(f));
   f->summary.seconds.total = HycoNow() - begin;
   PetscCall(HycoFOMViewFromOptions(f, NULL, "-hyco_fom_view"));
   PetscFunctionReturn(PETSC_SUCCESS);

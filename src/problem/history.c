@@ -201,9 +201,10 @@ PetscErrorCode HycoSceneGetHistory(HycoScene s, PetscInt *n, const PetscReal *ti
 PetscErrorCode HycoSceneRefuseHistory(HycoScene s, const char what[])
 {
   PetscFunctionBegin;
-  HycoCheck(!s->n_times,
-            "the scene has a history (history_times), and %s is for scenes without: reduced models of scenes with a "
-            "history are not there yet; hyco solve solves them at full order",
-            what);
+  HycoCheck(
+      !s->n_times,
+      "the scene has a history (history_times): %s is for scenes without; reduced models of scenes with a history "
+      "are not there yet, hyco solve -mu solves them at full order",
+      what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
