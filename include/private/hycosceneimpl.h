@@ -95,7 +95,6 @@ struct _p_HycoScene {
   DM dm;                 /* the program's own mesh; NULL: mesh_path */
   PetscInt refine;       /* times that the mesh's cells are halved */
   char *folder;          /* where relative paths of entries start */
-  PetscBool has_history; /* time runs: bodies may have memory */
   /* parameters */
   PetscInt n_parameters;
   PetscInt n_variables; /* of expressions: the parameters; with a history t and its tables' values too */

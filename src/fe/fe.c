@@ -102,7 +102,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscMalloc1(scene->n_bodies, &bbar));
   ierr = ChooseElements(scene, mesh, bbar);
   for (PetscInt b = 0; b < scene->n_bodies && !ierr; b++)
-    ierr = HycoMaterialSetUp(scene->body[b].law, mesh->dim, scene->has_history);
+    ierr = HycoMaterialSetUp(scene->body[b].law, mesh->dim, (PetscBool)(scene->n_times > 0));
   if (ierr) PetscCall(PetscFree(bbar));
   PetscCall(ierr);
   PetscCall(PetscNew(&f));

@@ -176,7 +176,7 @@ static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Vec F)
 static PetscErrorCode AddForces(HycoFE fe, Vec F)
 {
   HycoMesh m = fe->mesh;
-  const PetscBool hot = (PetscBool)(fe->thermal && !fe->scene->has_history);
+  const PetscBool hot = (PetscBool)(fe->thermal && !fe->scene->n_times);
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
