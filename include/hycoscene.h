@@ -65,6 +65,9 @@ PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact);
    output may be NULL. Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetHistory(HycoScene scene, PetscInt *n, const PetscReal *times[]);
 
+/* Fails with one line where the scene has a history, for `what` ("hyco train"), which takes none. Not collective. */
+PetscErrorCode HycoSceneRefuseHistory(HycoScene scene, const char what[]);
+
 /* The options that the scene carries (its hyco: section, overridden by the command line). Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options);
 

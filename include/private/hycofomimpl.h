@@ -9,6 +9,8 @@
 /* Most rigid motions that -hyco_regularise releases. */
 #define HYCO_MAX_PINS 12
 
+typedef struct _n_HycoPath *HycoPath;
+
 struct _p_HycoFOM {
   PETSCHEADER(int);
   PetscMPIInt rank, size;
@@ -48,8 +50,17 @@ struct _p_HycoFOM {
   PetscInt partition; /* index in HycoPartitioners */
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
   Vec *released;
+  HycoPath path; /* of a scene with a history, else NULL */
   HycoSummary summary;
 };
+
+/* The place of a node of the part among this rank's rows, or -1. */
+static inline PetscInt HycoFOMOwned(HycoFOM f, PetscInt node)
+{
+  const PetscInt row = (f->part->node_global ? f->part->node_global[node] : node) - f->first;
+
+  return row >= 0 && row < f->n_owned ? row : -1;
+}
 
 /* K, F, B, D at mu, in the system. Collective. */
 PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);

@@ -125,8 +125,6 @@ PetscErrorCode HycoSceneDestroyHistory(HycoScene scene);
 void HycoSceneSetTime(HycoScene scene, const PetscReal mu[], PetscReal t, PetscReal out[]);
 /* The first time after t at which a step ends: a listed one, or a row of a table. */
 PetscReal HycoSceneNextStop(HycoScene scene, PetscReal t);
-/* One line where the scene has a history, for `what` ("hyco train") that knows none. */
-PetscErrorCode HycoSceneRefuseHistory(HycoScene scene, const char what[]);
 PetscBool HycoIsVariableName(const char word[]);
 
 /* Builds a scene from n (key, value) entries; `folder` is where a relative mesh path starts. */

@@ -10,14 +10,6 @@
 */
 #include <hycofomimpl.h>
 
-/* The place of a node of the part among this rank's rows, or -1. */
-static PetscInt Owned(HycoFOM f, PetscInt node)
-{
-  const PetscInt row = (f->part->node_global ? f->part->node_global[node] : node) - f->first;
-
-  return row >= 0 && row < f->n_owned ? row : -1;
-}
-
 /* F.U over this rank's free unknowns; F holds the lifting -K u0 of the prescribed displacements, given back below. */
 static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
 {
@@ -29,7 +21,7 @@ static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
   PetscCall(VecGetArrayRead(f->F, &F));
   PetscCall(VecGetArrayRead(f->U_local, &u));
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
-    const PetscInt row = Owned(f, i);
+    const PetscInt row = HycoFOMOwned(f, i);
 
     for (PetscInt c = 0; row >= 0 && c < dim; c++) {
       if (!f->fe->fixed[i * dim + c]) *work += F[row * dim + c] * u[i * dim + c];
@@ -82,7 +74,7 @@ static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
     PetscCall(HycoFEHeatWork(f->fe, u, heat));
   }
   for (PetscInt e = 0; e < f->part->n_cells; e++) {
-    if (Owned(f, f->part->cells[e * f->part->nv]) < 0) continue;
+    if (HycoFOMOwned(f, f->part->cells[e * f->part->nv]) < 0) continue;
     PetscCall(LiftingWork(f->fe, e, u, &one));
     *strain += each[e];
     *lifting += one;

@@ -1,5 +1,5 @@
 /* HycoFOM: reads and spreads the mesh, assembles (16), solves it, brings the solution home in the file's order. */
-#include <hycofomimpl.h>
+#include <hycopath.h>
 #include <hycofields.h>
 
 PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
@@ -11,6 +11,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   HycoCheckHandle(*fom, HYCO_FOM_CLASSID);
   HycoDereference(fom);
   f = *fom;
+  PetscCall(HycoPathDestroy(f));
   PetscCall(HycoSolverDestroy(&f->solver));
   PetscCall(HycoSystemDestroy(&f->system));
   PetscCall(HycoSolverDestroy(&f->given_solver));
@@ -196,6 +197,7 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
   PetscCall(HycoOptionsString(
       "-hyco_mesh_write", "<file.h5>: writes the mesh, refined as the scene says, in PETSc's HDF5 format of a DMPlex",
       f->mesh_write, sizeof(f->mesh_write), NULL));
+  if (!f->scene || f->scene->has_history) PetscCall(HycoPathSetFromOptions(f, PetscOptionsObject));
   PetscCall(HycoOptionsName("-hyco_fom_view", "after each full-order solve: sizes, system, solver"));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -248,6 +250,7 @@ static PetscErrorCode SetUp(HycoFOM f)
     PetscCall(PetscCalloc1(f->n_contacts + 1, &f->gap));
     PetscCall(PetscMalloc1(f->n_cells * f->fe->n_sigma, &f->sigma));
   }
+  if (f->path) PetscCall(HycoPathCreate(f));
   f->summary.seconds.setup += HycoNow();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -431,6 +434,10 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   t = &f->summary.seconds;
   PetscCall(CheckPoint(f, n, mu));
+  if (f->path) {
+    PetscCall(HycoPathSolve(f, mu));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoFOMAssemble(f, mu));
   t->assemble = HycoNow() - begin;
   PetscCall(HycoSolverSetSystem(f->solver, f->system));
@@ -479,7 +486,10 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(HycoSolverGetKKT(f->solver, &s->kkt));
   PetscCall(HycoSolverGetReason(f->given ? f->given_solver : f->solver, &s->reason));
   if (f->given) s->kkt = f->given_kkt;
-  PetscCall(HycoFOMEnergy(f, s));
+  if (f->path)
+    HycoPathSummary(f, s);
+  else
+    PetscCall(HycoFOMEnergy(f, s));
   s->n_facing = 0;
   s->overlap = s->sliding = 0;
   HycoOnRoot(HycoComm(f), MeasureContacts(f, s));
@@ -520,7 +530,10 @@ static PetscErrorCode GatherStress(HycoFOM f)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(f->part->n_cells * ns, &sigma));
   PetscCall(VecGetArrayRead(f->U_local, &u));
-  PetscCall(HycoFEStress(f->fe, u, sigma));
+  if (f->path)
+    PetscCall(HycoFEStateFields(f->fe, f->path->begin, sigma, NULL, NULL, NULL));
+  else
+    PetscCall(HycoFEStress(f->fe, u, sigma));
   PetscCall(VecRestoreArrayRead(f->U_local, &u));
   if (f->size == 1) {
     PetscCall(PetscArraycpy(f->sigma, sigma, f->n_cells * ns));

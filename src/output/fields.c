@@ -9,6 +9,11 @@
 static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
                                                         "Hexahedron"};
 
+const char *HycoFieldsTopology(HycoCellType type)
+{
+  return topology[type];
+}
+
 static PetscErrorCode WriteNumbers(HycoH5 h, HycoMesh m, const PetscReal X[], HycoScene scene, const PetscReal mu[],
                                    PetscInt n, const HycoField field[], const HycoContactTable *contact)
 {
@@ -42,8 +47,7 @@ static PetscErrorCode WriteNumbers(HycoH5 h, HycoMesh m, const PetscReal X[], Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A name as XML has it. */
-static void EscapeXML(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
+void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
 {
   static const char special[] = "&<>\"'";
   static const char *const entity[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&apos;"};
@@ -63,7 +67,7 @@ static void WriteXDMF(FILE *out, const char file[], HycoMesh m, PetscInt n, cons
 {
   char h5[6 * PETSC_MAX_PATH_LEN];
 
-  EscapeXML(file, h5);
+  HycoFieldsEscape(file, h5);
   fprintf(out, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n  <Grid Name=\"mesh\">\n");
   fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", topology[m->type], (long)m->n_cells,
           m->type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
@@ -150,8 +154,7 @@ PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stress in ParaView's order xx, xy, xz, yy, yz, zz. */
-static void Tensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[])
+void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[])
 {
   static const PetscInt place[6] = {0, 3, 5, 1, 4, 2};
 
@@ -176,7 +179,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, HycoPairs *pairs,
       PetscCalloc5(pairs->n, &gap, 3 * pairs->n, &normal, pairs->n, &area, pairs->n, &slave_id, m->n_nodes, &gap_node));
   for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
   PetscCall(HycoFEStress(fe, u, sigma));
-  Tensor6(m->n_cells, fe->n_sigma, sigma, tensor);
+  HycoTensor6(m->n_cells, fe->n_sigma, sigma, tensor);
   PetscCall(HycoContactGeometry(fe, pairs, normal, gap));
   PetscCall(HycoContactAreas(fe, pairs, area));
   for (PetscInt k = 0; k < pairs->n; k++) {

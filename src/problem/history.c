@@ -55,6 +55,7 @@ static PetscErrorCode ReadTimes(HycoScene s, const char key[], const char text[]
   HycoCheck(n >= 2, "%s is \"%.200s\"; it lists at least two numbers, the time where the path begins first", key, text);
   PetscCall(CheckTimes(key, n, s->times, 1));
   s->n_times = n;
+  s->has_history = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,9 +201,10 @@ PetscErrorCode HycoSceneGetHistory(HycoScene s, PetscInt *n, const PetscReal *ti
 PetscErrorCode HycoSceneRefuseHistory(HycoScene s, const char what[])
 {
   PetscFunctionBegin;
-  HycoCheck(!s->n_times,
-            "the scene has a history (history_times), and %s is for scenes without: reduced models of scenes with a "
-            "history are not there yet; hyco solve solves them at full order",
-            what);
+  HycoCheck(
+      !s->n_times,
+      "the scene has a history (history_times): %s is for scenes without; reduced models of scenes with a history "
+      "are not there yet, hyco solve -mu solves them at full order",
+      what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
