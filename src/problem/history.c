@@ -55,7 +55,6 @@ static PetscErrorCode ReadTimes(HycoScene s, const char key[], const char text[]
   HycoCheck(n >= 2, "%s is \"%.200s\"; it lists at least two numbers, the time where the path begins first", key, text);
   PetscCall(CheckTimes(key, n, s->times, 1));
   s->n_times = n;
-  s->has_history = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
