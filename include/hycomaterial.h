@@ -13,10 +13,19 @@ typedef struct _p_HycoMaterial *HycoMaterial;
 typedef const char *HycoMaterialType;
 #define HYCO_MATERIAL_ELASTIC "elastic" /* isotropic linear elasticity: young, poisson; in 1D sigma = young eps */
 
+/* Laws of scenes with a history: docs/materials.md. */
+#define HYCO_MATERIAL_J2                "j2"
+#define HYCO_MATERIAL_NORTON            "norton"
+#define HYCO_MATERIAL_STRAIN_HARDENING  "strain_hardening"
+#define HYCO_MATERIAL_LIMBACK_ANDERSSON "limback_andersson"
+
 /* As a constant's value for `initial`: the scene must give it. */
 #define HYCO_REQUIRED PETSC_INFINITY
 /* As the lower bound of a constant that may be 0, but not negative. */
 #define HYCO_NOT_NEGATIVE (-1e-300)
+/* As a bound that is in the interval itself, of constants from 1 on or up to it. */
+#define HYCO_FROM_ONE (1 - PETSC_MACHINE_EPSILON)
+#define HYCO_TO_ONE   (1 + PETSC_MACHINE_EPSILON)
 
 /*
   n integration points of one law. Strain and stress have n_strain components a point: 1D (xx), 2D plane strain

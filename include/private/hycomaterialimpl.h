@@ -40,6 +40,14 @@ PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const P
 void HycoTangentApply(PetscBool isotropic, PetscInt dim, const PetscReal tangent[], const PetscReal strain[],
                       PetscReal stress[]);
 
+/* Young's modulus and Poisson's ratio, the first two constants of isotropic laws; Lame's of them. */
+PetscErrorCode HycoElasticDeclare(HycoMaterial material);
+PetscErrorCode HycoElasticLame(HycoMaterial material, HycoMaterialPoints *points, PetscReal lame[]);
+
 PetscErrorCode HycoMaterialCreate_Elastic(HycoMaterial material);
+PetscErrorCode HycoMaterialCreate_J2(HycoMaterial material);
+PetscErrorCode HycoMaterialCreate_Norton(HycoMaterial material);
+PetscErrorCode HycoMaterialCreate_StrainHardening(HycoMaterial material);
+PetscErrorCode HycoMaterialCreate_LimbackAndersson(HycoMaterial material);
 
 #endif

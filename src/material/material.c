@@ -20,6 +20,10 @@ static PetscErrorCode RegisterAll(void)
   registered = PETSC_TRUE;
   PetscCall(HycoInitializePackage());
   PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_ELASTIC, HycoMaterialCreate_Elastic));
+  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_J2, HycoMaterialCreate_J2));
+  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_NORTON, HycoMaterialCreate_Norton));
+  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_STRAIN_HARDENING, HycoMaterialCreate_StrainHardening));
+  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_LIMBACK_ANDERSSON, HycoMaterialCreate_LimbackAndersson));
   PetscCall(PetscRegisterFinalize(Forget));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -308,7 +312,7 @@ static PetscErrorCode CheckConstant(const HycoEntry *e, const PetscReal mu[], Pe
     if (e->hi >= PETSC_INFINITY && (e->lo == 0 || e->lo == HYCO_NOT_NEGATIVE))
       HycoFail("%s is %g at %s; %s must %s", HycoExprKey(e->expr), (double)value[i], place, e->title,
                e->lo == 0 ? "be positive" : "not be negative");
-    HycoFail("%s is %g at %s; %s must lie between %g and %g", HycoExprKey(e->expr), (double)value[i], place, e->title,
+    HycoFail("%s is %.10g at %s; %s must lie between %g and %g", HycoExprKey(e->expr), (double)value[i], place, e->title,
              (double)e->lo, (double)e->hi);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
