@@ -236,7 +236,7 @@ static PetscErrorCode Accept(HycoFOM f, PetscReal t1, const HycoAttempt *a)
   PetscCall(VecCopy(p->f_int, p->f_old));
   p->t = t1;
   p->now.substeps++;
-  p->now.residual = PetscMax(p->now.residual, p->kkt.stationarity);
+  p->now.residual = PetscMax(p->now.residual, a->residual);
   p->now.kkt = PetscMax(p->now.kkt, HycoKKTMax(&p->kkt));
   p->now.energy_defect = PetscMax(p->now.energy_defect, defect);
   p->now.most_iterations = PetscMax(p->now.most_iterations, a->iterations);
