@@ -68,16 +68,15 @@ class Ring(Verify):
     def test_shrink_fit(self):
         off, steps = [], (40, 80, 160)
         for k in steps:
-            t, p, _ = self.path_of(4, k, 0, -0.01, 20, '-hyco_step_inelastic', 1)
-            finest = p
+            p = self.path_of(4, k, 0, -0.01, 8, '-hyco_step_inelastic', 1)[1]
             off.append(p)
-        t = np.linspace(0, 20, 41)
+        t = np.linspace(0, 8, 41)
         on = [p[::k // 40] for p, k in zip(off, steps)]
         first = [abs(a - b).max() for a, b in zip(on, on[1:])]
         self.row('shrink fit: order in time', math.log2(first[0] / first[1]), 1, 5)
-        p = self.path_of(8, 640, 0, -0.01, 20)[1][::16]
+        p = self.path_of(8, 640, 0, -0.01, 8)[1][::16]
         self.row('shrink fit: p at t = 0', p[0], relaxing(0), 0.1)
-        for k in (4, 10, 20, 40):
+        for k in (5, 10, 20, 40):
             self.row(f'shrink fit: p at t = {t[k]:g}', p[k], relaxing(t[k]), 0.2)
 
     def test_closing(self):
@@ -87,7 +86,7 @@ class Ring(Verify):
         k = int(np.argmax(p > 0))
         begin = t[k] - p[k] * (t[k + 1] - t[k]) / (p[k + 1] - p[k])
         self.row('closing: time', begin, CLOSES, 0.5)
-        for at in (2, 4, 8):
+        for at in (3, 4, 8):
             k = int(round(at / t[1]))
             self.row(f'closing: p at t = {at}', p[k], float(closing(t[k])), 0.2)
 
