@@ -8,6 +8,20 @@
 
 typedef struct _n_HycoSeries *HycoSeries;
 
+/* The items of one kind, nodes or cells: this rank's own, and on rank 0 the place of each gathered one by its tag. */
+typedef struct {
+  PetscInt n, *own; /* indices in the part */
+  PetscInt n_all, *tag, *place;
+} HycoItems;
+/* Nodes that a rank owns, cells whose first node it owns. Collective. */
+PetscErrorCode HycoItemsCreate(HycoFOM fom, HycoItems *node, HycoItems *cell);
+PetscErrorCode HycoItemsDestroy(HycoItems *items);
+/* Values by item of the part (cols each), on rank 0 in order; elsewhere NULL. The caller frees them. Collective. */
+PetscErrorCode HycoItemsBring(HycoFOM fom, const HycoItems *items, PetscInt cols, const PetscReal value[],
+                              PetscReal **out);
+/* Place of a tag on rank 0; -1: there is none. */
+PetscInt HycoItemsFind(const HycoItems *items, PetscInt tag);
+
 /* What one iteration of a step solves with: the consistent tangent, or the elastic stiffness, whose factor stays. */
 typedef enum { HYCO_NEWTON_AUTO, HYCO_NEWTON_TANGENT, HYCO_NEWTON_ELASTIC } HycoNewton;
 
@@ -63,7 +77,8 @@ struct _n_HycoPath {
   PetscInt n_orders, room_orders;
   PetscBool ended; /* the last path reached its end */
   char why[HYCO_LINE];
-  HycoSeries series; /* NULL: none is asked for */
+  HycoItems node, cell; /* of the checkpoints */
+  HycoSeries series;    /* NULL: none is asked for */
   HycoStepMonitor monitor;
   void *monitor_ctx;
 };
@@ -88,6 +103,8 @@ PetscErrorCode HycoPathLoad(HycoFOM fom);
 /* The series of fields, if one is asked for: made anew, the last time added, written. Collective. */
 PetscErrorCode HycoSeriesBegin(HycoFOM fom);
 PetscErrorCode HycoSeriesAdd(HycoFOM fom);
+/* The times before a checkpoint, from the files beside it. */
+PetscErrorCode HycoSeriesRestore(HycoFOM fom);
 PetscErrorCode HycoSeriesEnd(HycoFOM fom);
 PetscErrorCode HycoSeriesDestroy(HycoSeries *series);
 /* Of a path, in place of the linear identity's: energies. */

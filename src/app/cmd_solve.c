@@ -78,13 +78,14 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
 static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], const char table[])
 {
   HycoSummary summary;
-  PetscInt n, n_times;
+  DriverPath path = {.checked = PETSC_FALSE};
+  PetscInt n;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
-  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
+  PetscCall(HycoSceneGetHistory(scene, &path.n, NULL));
   if (output[0]) PetscCall(HycoFOMSetSeries(fom, output));
-  PetscCall(HycoFOMSetStepMonitor(fom, DriverSayStep, &n_times));
+  PetscCall(HycoFOMSetStepMonitor(fom, DriverSayStep, &path));
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(DriverEndHistory(fom, scene, mu, table));
   PetscCall(HycoFOMGetSummary(fom, &summary));

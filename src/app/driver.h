@@ -210,7 +210,12 @@ void DriverReportModel(cJSON *json, const Search *search, const HycoTraining *tr
 
 /* -- solve_history.c: a path -- */
 
-/* A HycoStepMonitor; ctx: how many times the scene lists. */
+/* How many times the scene lists; whether unread options have been looked for. */
+typedef struct {
+  PetscInt n;
+  PetscBool checked;
+} DriverPath;
+/* A HycoStepMonitor; ctx: a DriverPath. */
 PetscErrorCode DriverSayStep(HycoFOM fom, const HycoStep *step, void *ctx);
 void DriverReportHistory(cJSON *json, const HycoHistory *history);
 /* After the solve: the table ("": none), a summary; fails where the path has not reached its end. Collective. */

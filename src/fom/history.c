@@ -89,6 +89,8 @@ PetscErrorCode HycoPathDestroy(HycoFOM f)
     PetscCall(VecDestroy(&p->dL[j]));
   }
   PetscCall(HycoSeriesDestroy(&p->series));
+  PetscCall(HycoItemsDestroy(&p->node));
+  PetscCall(HycoItemsDestroy(&p->cell));
   PetscCall(HycoFEStateDestroy(&p->begin));
   PetscCall(HycoFEStateDestroy(&p->end));
   PetscCall(PetscFree(p->f_local));
@@ -234,7 +236,7 @@ static PetscErrorCode Accept(HycoFOM f, PetscReal t1, const HycoAttempt *a)
   PetscCall(VecCopy(p->f_int, p->f_old));
   p->t = t1;
   p->now.substeps++;
-  p->now.residual = PetscMax(p->now.residual, p->kkt.stationarity);
+  p->now.residual = PetscMax(p->now.residual, a->residual);
   p->now.kkt = PetscMax(p->now.kkt, HycoKKTMax(&p->kkt));
   p->now.energy_defect = PetscMax(p->now.energy_defect, defect);
   p->now.most_iterations = PetscMax(p->now.most_iterations, a->iterations);

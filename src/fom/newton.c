@@ -110,7 +110,7 @@ static PetscErrorCode Evaluate(HycoFOM f, PetscReal t0, PetscReal t1, PetscBool 
   PetscCall(VecNorm(p->r, NORM_2, &now->residual[2]));
   PetscCall(VecPointwiseMult(p->work, p->diagonal, f->U));
   PetscCall(VecNorm(p->work, NORM_2, &now->floor));
-  now->floor *= 64 * PETSC_MACHINE_EPSILON;
+  now->floor *= 16 * PETSC_MACHINE_EPSILON;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -404,7 +404,7 @@ static PetscErrorCode Iterate(HycoFOM f, PetscReal t0, PetscReal t1, PetscBool e
       if (a->converged) break;
     }
     if (k) least = PetscMin(least, now.residual[2] / (now.size > 0 ? now.size : 1));
-    if (k == most || !(now.residual[2] < 1e4 * PetscMax(now.size, now.floor))) {
+    if (k == most || !(now.residual[2] <= 1e4 * PetscMax(now.size, now.floor))) {
       HycoFormat(a->why, "the residual of equilibrium is %.1e after %d iterations (%s)", (double)least, (int)k,
                  elastic ? "elastic" : "tangent");
       break;

@@ -8,20 +8,14 @@
 #include <hycoh5.h>
 #include <hycopath.h>
 #include <hycomaterialimpl.h>
-#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #define MOST_FIELDS 24
 
-/* The items of one kind, nodes or cells: this rank's own, and on rank 0 the place of each gathered one by its tag. */
-typedef struct {
-  PetscInt n, *own; /* indices in the part */
-  PetscInt n_all, *tag, *place;
-} Items;
-
 struct _n_HycoSeries {
   char path[PETSC_MAX_PATH_LEN], h5_path[PETSC_MAX_PATH_LEN];
-  Items node, cell;
+  HycoItems node, cell;
   PetscInt nv, *cells; /* rank 0: n_all x nv, node numbers */
   PetscReal *X;        /* rank 0: nodes as moved, n_all x 3 */
   HycoH5 h;            /* rank 0 */
@@ -32,85 +26,6 @@ struct _n_HycoSeries {
   char name[MOST_FIELDS][64];
 };
 
-static int ByTag(const void *a, const void *b)
-{
-  const PetscInt x = *(const PetscInt *)a, y = *(const PetscInt *)b;
-
-  return (x > y) - (x < y);
-}
-
-/* Rank 0's order of the items with these tags (by index of the part). Collective. */
-static PetscErrorCode Arrange(HycoFOM f, const PetscInt tag[], Items *items)
-{
-  PetscInt *mine, *all, *sorted;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(items->n, &mine));
-  for (PetscInt k = 0; k < items->n; k++) mine[k] = tag[items->own[k]];
-  PetscCall(HycoConcatenate(HycoComm(f), items->n, mine, MPIU_INT, sizeof(PetscInt), &items->n_all, &all));
-  PetscCall(PetscFree(mine));
-  PetscCall(PetscMalloc1(2 * items->n_all, &sorted));
-  PetscCall(PetscMalloc1(items->n_all, &items->tag));
-  PetscCall(PetscMalloc1(items->n_all, &items->place));
-  for (PetscInt k = 0; k < items->n_all; k++) {
-    sorted[2 * k] = all[k];
-    sorted[2 * k + 1] = k;
-  }
-  if (items->n_all) qsort(sorted, (size_t)items->n_all, 2 * sizeof(*sorted), ByTag);
-  for (PetscInt k = 0; k < items->n_all; k++) {
-    items->tag[k] = sorted[2 * k];
-    items->place[sorted[2 * k + 1]] = k;
-  }
-  PetscCall(PetscFree(sorted));
-  PetscCall(PetscFree(all));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Index of a tag on rank 0. */
-static PetscInt Find(const Items *items, PetscInt tag)
-{
-  const PetscInt *at = (const PetscInt *)bsearch(&tag, items->tag, (size_t)items->n_all, sizeof(tag), ByTag);
-
-  return at ? (PetscInt)(at - items->tag) : -1;
-}
-
-/* Values by item of the part (cols each), on rank 0 in order; elsewhere NULL. The caller frees them. Collective. */
-static PetscErrorCode Bring(HycoFOM f, const Items *items, PetscInt cols, const PetscReal value[], PetscReal **out)
-{
-  PetscReal *mine, *all;
-  PetscInt n;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(items->n * cols, &mine));
-  for (PetscInt k = 0; k < items->n; k++) PetscCall(PetscArraycpy(mine + k * cols, value + items->own[k] * cols, cols));
-  PetscCall(HycoConcatenate(HycoComm(f), items->n * cols, mine, MPIU_REAL, sizeof(PetscReal), &n, &all));
-  PetscCall(PetscFree(mine));
-  *out = NULL;
-  if (f->rank == 0) PetscCall(PetscMalloc1(n, out));
-  for (PetscInt k = 0; k < n / cols; k++) PetscCall(PetscArraycpy(*out + items->place[k] * cols, all + k * cols, cols));
-  PetscCall(PetscFree(all));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The items that this rank counts: nodes that it owns, cells whose first node it owns. */
-static PetscErrorCode FindOwn(HycoFOM f, HycoSeries s)
-{
-  HycoMesh m = f->part;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_nodes, &s->node.own));
-  PetscCall(PetscMalloc1(m->n_cells, &s->cell.own));
-  for (PetscInt i = 0; i < m->n_nodes; i++) {
-    if (HycoFOMOwned(f, i) >= 0) s->node.own[s->node.n++] = i;
-  }
-  for (PetscInt e = 0; e < m->n_cells; e++) {
-    if (HycoFOMOwned(f, m->cells[e * m->nv]) >= 0) s->cell.own[s->cell.n++] = e;
-  }
-  PetscCall(Arrange(f, m->node_id, &s->node));
-  PetscCall(Arrange(f, m->cell_id, &s->cell));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The mesh on rank 0: cells by their nodes' tags. */
 static PetscErrorCode BringMesh(HycoFOM f, HycoSeries s)
 {
@@ -120,13 +35,13 @@ static PetscErrorCode BringMesh(HycoFOM f, HycoSeries s)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_cells * m->nv, &tags));
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) tags[k] = (PetscReal)m->node_id[m->cells[k]];
-  PetscCall(Bring(f, &s->cell, m->nv, tags, &all));
+  PetscCall(HycoItemsBring(f, &s->cell, m->nv, tags, &all));
   PetscCall(PetscFree(tags));
   s->nv = m->nv;
   if (f->rank == 0) PetscCall(PetscMalloc1(s->cell.n_all * m->nv, &s->cells));
-  for (PetscInt k = 0; k < s->cell.n_all * m->nv; k++) s->cells[k] = Find(&s->node, (PetscInt)all[k]);
+  for (PetscInt k = 0; k < s->cell.n_all * m->nv; k++) s->cells[k] = HycoItemsFind(&s->node, (PetscInt)all[k]);
   PetscCall(PetscFree(all));
-  PetscCall(Bring(f, &s->node, 3, f->fe->X, &s->X));
+  PetscCall(HycoItemsBring(f, &s->node, 3, f->fe->X, &s->X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -139,7 +54,7 @@ static PetscErrorCode AddField(HycoFOM f, HycoSeries s, const char name[], Petsc
 
   PetscFunctionBegin;
   if (s->n_fields == MOST_FIELDS) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Bring(f, on_cells ? &s->cell : &s->node, components, value, &all));
+  PetscCall(HycoItemsBring(f, on_cells ? &s->cell : &s->node, components, value, &all));
   PetscCall(PetscStrncpy(s->name[s->n_fields], name, sizeof(s->name[0])));
   field->name = s->name[s->n_fields];
   field->on_cells = on_cells;
@@ -205,7 +120,7 @@ static PetscErrorCode FillContacts(HycoFOM f, HycoSeries s, PetscReal force[], P
   PetscCall(HycoContactGeometry(f->fe_whole, &f->pairs, normal, gap));
   PetscCall(HycoContactAreas(f->fe_whole, &f->pairs, area));
   for (PetscInt k = 0; k < m; k++) {
-    const PetscInt slave = Find(&s->node, tag[HycoPairsSlave(&f->pairs, k)]), *master;
+    const PetscInt slave = HycoItemsFind(&s->node, tag[HycoPairsSlave(&f->pairs, k)]), *master;
     const PetscReal *weight, lambda = f->lambda[k], *n = normal + 3 * k;
     PetscInt masters;
 
@@ -217,7 +132,7 @@ static PetscErrorCode FillContacts(HycoFOM f, HycoSeries s, PetscReal force[], P
       force[3 * slave + c] -= lambda * n[c];
       open[slave] -= n[c] * s->field[0].data[3 * slave + c];
       for (PetscInt j = 0; j < masters; j++) {
-        const PetscInt at = Find(&s->node, tag[master[j]]);
+        const PetscInt at = HycoItemsFind(&s->node, tag[master[j]]);
 
         force[3 * at + c] += weight[j] * lambda * n[c];
         open[slave] += weight[j] * n[c] * s->field[0].data[3 * at + c];
@@ -315,11 +230,81 @@ PetscErrorCode HycoSeriesBegin(HycoFOM f)
   PetscFunctionBegin;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   s->n = 0;
-  if (!s->node.own) PetscCall(FindOwn(f, s));
+  if (!s->node.own) PetscCall(HycoItemsCreate(f, &s->node, &s->cell));
   PetscCall(PetscFree(s->cells));
   PetscCall(PetscFree(s->X));
   PetscCall(BringMesh(f, s));
   HycoOnRoot(HycoComm(f), WriteMesh(f, s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One time's fields in a file of their own, beside the checkpoint. */
+static void NamePart(HycoFOM f, PetscInt k, char path[PETSC_MAX_PATH_LEN])
+{
+  snprintf(path, PETSC_MAX_PATH_LEN, "%.*s.step-%04d.h5", PETSC_MAX_PATH_LEN - 32, f->path->checkpoint, (int)k);
+}
+
+static PetscErrorCode SavePart(HycoFOM f, HycoSeries s, PetscInt k)
+{
+  char path[PETSC_MAX_PATH_LEN], list[HYCO_LINE] = "";
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  NamePart(f, k, path);
+  for (PetscInt j = 0; j < s->n_fields; j++) PetscCall(HycoListAdd(list, " ", s->field[j].name));
+  PetscCall(HycoH5Create(path, &h));
+  ierr = WriteFields(s, h, k);
+  if (!ierr) ierr = HycoH5WriteText(h, "fields", list);
+  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The fields that the file lists, in place of those of the last time. */
+static PetscErrorCode ReadFields(HycoSeries s, HycoH5 h, PetscInt k)
+{
+  char *list = NULL, *word, *rest;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5LoadText(h, "fields", &list));
+  for (word = strtok_r(list, " ", &rest); word && s->n_fields < MOST_FIELDS; word = strtok_r(NULL, " ", &rest)) {
+    HycoField *field = &s->field[s->n_fields];
+    char name[HYCO_LINE];
+    PetscReal *data;
+    PetscInt rows = -1, cols = -1;
+
+    HycoFormat(name, "step-%04d/nodes/%s", (int)k, word);
+    PetscCall(PetscStrncpy(s->name[s->n_fields], word, sizeof(s->name[0])));
+    *field = (HycoField){s->name[s->n_fields], (PetscBool)!HycoH5Has(h, name), 0, NULL};
+    if (field->on_cells) HycoFormat(name, "step-%04d/cells/%s", (int)k, word);
+    PetscCall(HycoH5LoadReal(h, name, &rows, &cols, &data));
+    field->components = cols;
+    field->data = data;
+    s->n_fields++;
+    HycoCheck(rows == (field->on_cells ? s->cell.n_all : s->node.n_all), "its field %s has %d rows", word, (int)rows);
+  }
+  PetscCall(PetscFree(list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LoadPart(HycoFOM f, HycoSeries s, PetscInt k)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  NamePart(f, k, path);
+  HycoCheck(access(path, R_OK) == 0,
+            "there is no %s, with the fields of a time before the checkpoint: the run that wrote this had no series of "
+            "fields; start again without -hyco_resume, or resume without -output",
+            path);
+  PetscCall(HycoH5Open(path, &h));
+  ierr = ReadFields(s, h, k);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  if (!ierr) ierr = WriteFields(s, s->h, k);
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -334,6 +319,19 @@ static PetscErrorCode NoteTime(HycoSeries s, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSeriesRestore(HycoFOM f)
+{
+  HycoSeries s = f->path->series;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; s && k < f->path->n_steps; k++) {
+    PetscCall(ForgetFields(s));
+    HycoOnRoot(HycoComm(f), LoadPart(f, s, k));
+    PetscCall(NoteTime(s, f->path->steps[k].t));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSeriesAdd(HycoFOM f)
 {
   HycoSeries s = f->path->series;
@@ -345,6 +343,7 @@ PetscErrorCode HycoSeriesAdd(HycoFOM f)
   PetscCall(AddState(f, s));
   PetscCall(AddContacts(f, s));
   HycoOnRoot(HycoComm(f), WriteFields(s, s->h, s->n));
+  if (f->path->checkpoint[0]) HycoOnRoot(HycoComm(f), SavePart(f, s, s->n));
   PetscCall(NoteTime(s, f->path->t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -428,13 +427,8 @@ PetscErrorCode HycoSeriesDestroy(HycoSeries *series)
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   if (s->h) PetscCall(HycoH5Close(&s->h, PETSC_FALSE));
   PetscCall(ForgetFields(s));
-  for (PetscInt k = 0; k < 2; k++) {
-    Items *items = k ? &s->cell : &s->node;
-
-    PetscCall(PetscFree(items->own));
-    PetscCall(PetscFree(items->tag));
-    PetscCall(PetscFree(items->place));
-  }
+  PetscCall(HycoItemsDestroy(&s->node));
+  PetscCall(HycoItemsDestroy(&s->cell));
   PetscCall(PetscFree(s->cells));
   PetscCall(PetscFree(s->X));
   PetscCall(PetscFree(s->t));
