@@ -18,6 +18,7 @@ typedef const char *HycoMaterialType;
 #define HYCO_MATERIAL_NORTON            "norton"
 #define HYCO_MATERIAL_STRAIN_HARDENING  "strain_hardening"
 #define HYCO_MATERIAL_LIMBACK_ANDERSSON "limback_andersson"
+#define HYCO_MATERIAL_MFRONT            "mfront" /* from a shared library with MFront's generic C interface */
 
 /* As a constant's value for `initial`: the scene must give it. */
 #define HYCO_REQUIRED PETSC_INFINITY
@@ -31,8 +32,9 @@ typedef const char *HycoMaterialType;
   n integration points of one law. Strain and stress have n_strain components a point: 1D (xx), 2D plane strain
   (xx, yy, zz, xy), 3D (xx, yy, zz, xy, yz, xz), shear strains as angles (gamma = 2 eps), so that stress . strain is
   twice the energy. Strains are without the thermal strain, which the library takes out. What a caller does not have or
-  does not ask for is NULL: a linear law is asked for its tangent alone, without strains; temperatures are NULL in a
-  body that has none.
+  does not ask for is NULL, and a law that is not linear may be asked for its elastic tangent: strain and strain0 are
+  then the same array. A linear law is asked for its tangent alone, without strains; temperatures are NULL in a body
+  that has none.
 */
 typedef struct {
   PetscInt n, dim, n_strain;

@@ -12,6 +12,7 @@ struct _p_HycoMaterial {
   PetscInt n_state;
   char **state_name; /* n_state, or NULL */
   PetscBool linear, heat;
+  const char *folder;   /* where the scene's relative paths start; borrowed */
   HycoExpr temperature; /* of the body, which owns it; NULL: it has none */
   void *data;
 };
@@ -49,5 +50,6 @@ PetscErrorCode HycoMaterialCreate_J2(HycoMaterial material);
 PetscErrorCode HycoMaterialCreate_Norton(HycoMaterial material);
 PetscErrorCode HycoMaterialCreate_StrainHardening(HycoMaterial material);
 PetscErrorCode HycoMaterialCreate_LimbackAndersson(HycoMaterial material);
+PetscErrorCode HycoMaterialCreate_MFront(HycoMaterial material);
 
 #endif

@@ -24,6 +24,7 @@ static PetscErrorCode RegisterAll(void)
   PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_NORTON, HycoMaterialCreate_Norton));
   PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_STRAIN_HARDENING, HycoMaterialCreate_StrainHardening));
   PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_LIMBACK_ANDERSSON, HycoMaterialCreate_LimbackAndersson));
+  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_MFRONT, HycoMaterialCreate_MFront));
   PetscCall(PetscRegisterFinalize(Forget));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -221,6 +221,7 @@ static PetscErrorCode ReadTexts(HycoScene s, const char name[], HycoMaterial law
     if (!set) PetscCall(GetType(s, "body", name, e->name, &text, &set));
     if (set && text) PetscCall(PetscStrallocpy(text, &e->text));
   }
+  law->folder = s->folder;
   if (law->ops->declare) PetscCall((*law->ops->declare)(law));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
