@@ -317,7 +317,7 @@ static PetscErrorCode Record(HycoFOM f)
   s->thermal = p->work_done.thermal + p->work_done.moduli;
   PetscCall(HycoFOMGather(f));
   f->solved = PETSC_TRUE;
-  f->sigma_ready = PETSC_FALSE;
+  f->sigma_ready = f->all_ready = PETSC_FALSE;
   p->steps[p->n_steps++] = *s;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscCall(HycoSeriesAdd(f));

@@ -26,11 +26,6 @@ struct _n_HycoSeries {
   char name[MOST_FIELDS][64];
 };
 
-static PetscBool IsOfCells(const HycoField *field)
-{
-  return (PetscBool)(field->place == HYCO_ON_CELLS);
-}
-
 /* The mesh on rank 0: cells by their nodes' tags. */
 static PetscErrorCode BringMesh(HycoFOM f, HycoSeries s)
 {
@@ -183,9 +178,10 @@ static PetscErrorCode WriteFields(HycoSeries s, HycoH5 h, PetscInt k)
   for (PetscInt j = 0; j < s->n_fields; j++) {
     char name[HYCO_LINE];
 
-    HycoFormat(name, "step-%04d/%s/%s", (int)k, IsOfCells(&s->field[j]) ? "cells" : "nodes", s->field[j].name);
-    PetscCall(HycoH5WriteReal(h, name, IsOfCells(&s->field[j]) ? s->cell.n_all : s->node.n_all, s->field[j].components,
-                              s->field[j].data));
+    HycoFormat(name, "step-%04d/%s/%s", (int)k, s->field[j].place == HYCO_ON_CELLS ? "cells" : "nodes",
+               s->field[j].name);
+    PetscCall(HycoH5WriteReal(h, name, s->field[j].place == HYCO_ON_CELLS ? s->cell.n_all : s->node.n_all,
+                              s->field[j].components, s->field[j].data));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -282,12 +278,13 @@ static PetscErrorCode ReadFields(HycoSeries s, HycoH5 h, PetscInt k)
     HycoFormat(name, "step-%04d/nodes/%s", (int)k, word);
     PetscCall(PetscStrncpy(s->name[s->n_fields], word, sizeof(s->name[0])));
     *field = (HycoField){s->name[s->n_fields], HycoH5Has(h, name) ? HYCO_ON_NODES : HYCO_ON_CELLS, 0, NULL};
-    if (IsOfCells(field)) HycoFormat(name, "step-%04d/cells/%s", (int)k, word);
+    if (field->place == HYCO_ON_CELLS) HycoFormat(name, "step-%04d/cells/%s", (int)k, word);
     PetscCall(HycoH5LoadReal(h, name, &rows, &cols, &data));
     field->components = cols;
     field->data = data;
     s->n_fields++;
-    HycoCheck(rows == (IsOfCells(field) ? s->cell.n_all : s->node.n_all), "its field %s has %d rows", word, (int)rows);
+    HycoCheck(rows == (field->place == HYCO_ON_CELLS ? s->cell.n_all : s->node.n_all), "its field %s has %d rows", word,
+              (int)rows);
   }
   PetscCall(PetscFree(list));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -379,9 +376,10 @@ static void WriteTime(HycoSeries s, FILE *out, const char h5[], HycoCellType typ
             field->components == 1   ? "Scalar"
             : field->components == 3 ? "Vector"
                                      : "Tensor6",
-            IsOfCells(field) ? "Cell" : "Node");
-    HycoFormat(name, "step-%04d/%s/%s", (int)k, IsOfCells(field) ? "cells" : "nodes", field->name);
-    WriteItem(out, "Precision=\"8\"", IsOfCells(field) ? s->cell.n_all : s->node.n_all, field->components, h5, name);
+            field->place == HYCO_ON_CELLS ? "Cell" : "Node");
+    HycoFormat(name, "step-%04d/%s/%s", (int)k, field->place == HYCO_ON_CELLS ? "cells" : "nodes", field->name);
+    WriteItem(out, "Precision=\"8\"", field->place == HYCO_ON_CELLS ? s->cell.n_all : s->node.n_all, field->components,
+              h5, name);
     fprintf(out, "    </Attribute>\n");
   }
   fprintf(out, "   </Grid>\n");

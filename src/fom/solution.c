@@ -37,8 +37,7 @@ PetscErrorCode HycoFOMToRoot(HycoFOM f, HycoPlace place, PetscInt components, co
     PetscCall(PetscArraycpy(all, value, components * (place == HYCO_ON_CELLS ? f->n_cells : f->n_nodes)));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!f->rows_on_root)
-    PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, f->surface, PETSC_TRUE, &f->rows_on_root));
+  if (!f->rows_on_root) PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, f->surface, PETSC_TRUE, &f->rows_on_root));
   PetscCall(HycoFileOrderSend(f->rows_on_root, place, MPIU_REAL, components, value, all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -207,8 +206,7 @@ PetscErrorCode HycoFOMGetForces(HycoFOM f, PetscReal forces[])
 PetscErrorCode HycoFOMGetRows(HycoFOM f, const HycoFileOrder **rows)
 {
   PetscFunctionBegin;
-  if (f->size > 1 && !f->rows)
-    PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, f->surface, PETSC_FALSE, &f->rows));
+  if (f->size > 1 && !f->rows) PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, f->surface, PETSC_FALSE, &f->rows));
   *rows = f->rows;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

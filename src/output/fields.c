@@ -85,9 +85,9 @@ static const char *FieldFolder(const HycoField *field)
   return field->place == HYCO_ON_CELLS ? "cells" : "nodes";
 }
 
-static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder *order, HycoMesh m,
-                                   const PetscReal X[], HycoScene scene, const PetscReal mu[], PetscInt n,
-                                   const HycoField field[], const HycoContactTable *contact)
+static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder *order, HycoMesh m, const PetscReal X[],
+                                   HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
+                                   const HycoContactTable *contact)
 {
   PetscFunctionBegin;
   HycoOnRoot(comm, WriteHead(h, m, scene, mu, contact));
@@ -320,12 +320,10 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
   ierr = FillContactsOnRoot(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
   if (!ierr) {
     const HycoContactTable table = {pairs->n, f.slave_id, lambda, f.gap};
-    const HycoField field[6] = {{"displacement", HYCO_ON_NODES, 3, u3},
-                                {"stress", HYCO_ON_CELLS, 6, tensor},
-                                {"contact_force", HYCO_ON_SURFACE, 3, f.force},
-                                {"contact_pressure", HYCO_ON_SURFACE, 1, f.pressure},
-                                {"gap", HYCO_ON_SURFACE, 1, f.gap_node},
-                                {"rid", HYCO_ON_CELLS, 1, rid}};
+    const HycoField field[6] = {
+        {"displacement", HYCO_ON_NODES, 3, u3},         {"stress", HYCO_ON_CELLS, 6, tensor},
+        {"contact_force", HYCO_ON_SURFACE, 3, f.force}, {"contact_pressure", HYCO_ON_SURFACE, 1, f.pressure},
+        {"gap", HYCO_ON_SURFACE, 1, f.gap_node},        {"rid", HYCO_ON_CELLS, 1, rid}};
 
     ierr = HycoFieldsWrite(path, order, m, fe->X, fe->scene, fe->mu, rid ? 6 : 5, field, &table);
   }
