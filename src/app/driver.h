@@ -208,11 +208,13 @@ PetscErrorCode DriverSetSearch(Search *search, HycoScene scene, HycoReducer redu
 PetscErrorCode DriverJudgeModel(const Search *search, const HycoTraining *training);
 void DriverReportModel(cJSON *json, const Search *search, const HycoTraining *training);
 
+PetscErrorCode CommandCheck(void);
 PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);
 PetscErrorCode CommandPredict(void);
 PetscErrorCode CommandCompare(void);
 PetscErrorCode CommandView(void);
+PetscErrorCode DeclareCheck(PetscOptions options);
 PetscErrorCode DeclareSolve(PetscOptions options);
 PetscErrorCode DeclareTrain(PetscOptions options);
 PetscErrorCode DeclarePredict(PetscOptions options);
