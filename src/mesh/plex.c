@@ -299,7 +299,7 @@ static PetscErrorCode TakeCells(Builder *b)
   PetscCall(PetscMalloc1(b->c1 - b->c0, &b->cell));
   PetscCall(PetscMalloc3(b->c1 - b->c0, &keep, b->c1 - b->c0, &key, b->c1 - b->c0, &place));
   for (PetscInt c = b->c0; c < b->c1; c++) {
-    PetscInt vertex[8];
+    PetscInt vertex[8] = {0};
     PetscBool mine = b->all_owned;
 
     if (!mine) PetscCall(HycoPlexVertices(b->dm, b->facets_are_points, m->type, c, m->nv, vertex));
