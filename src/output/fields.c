@@ -215,10 +215,10 @@ static PetscErrorCode BeginTextOnRoot(MPI_Comm comm, const char path[], const ch
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode EndText(MPI_Comm comm, HycoFile *out, PetscBool commit)
+static PetscErrorCode EndText(MPI_Comm comm, HycoFile *out)
 {
   PetscFunctionBegin;
-  HycoOnRoot(comm, HycoFileClose(out, commit));
+  HycoOnRoot(comm, HycoFileClose(out, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -229,16 +229,19 @@ PetscErrorCode HycoFieldsWrite(const char path[], const HycoFileOrder *order, Hy
   const MPI_Comm comm = order ? order->comm : PETSC_COMM_SELF;
   char h5[PETSC_MAX_PATH_LEN];
   HycoFile out = NULL;
-  PetscErrorCode ierr, failed;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
   ierr = BeginTextOnRoot(comm, path, h5, order, m, n, field, &out);
   /* the numbers first: without them the .xdmf would point at none, or at those of another run */
   if (!ierr) ierr = WriteH5(comm, h5, order, m, X, scene, mu, n, field, contact);
-  failed = EndText(comm, &out, (PetscBool)!ierr);
-  if (failed && !ierr) (void)remove(h5);
-  PetscCall(ierr ? ierr : failed);
+  if (!ierr) {
+    ierr = EndText(comm, &out);
+    if (ierr) (void)remove(h5);
+  } else if (out)
+    PetscCall(HycoFileClose(&out, PETSC_FALSE));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
