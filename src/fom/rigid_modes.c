@@ -340,8 +340,7 @@ PetscErrorCode HycoFOMBalance(HycoFOM f)
   for (PetscInt k = 0; k < f->fe->n_pins; k++) { /* a support's row */
     const PetscInt own = HycoMeshOwned(f->part, f->fe->pin[k] / dim);
 
-    if (own >= 0)
-      PetscCall(VecSetValue(f->F, (f->part->first + own) * dim + f->fe->pin[k] % dim, 0, INSERT_VALUES));
+    if (own >= 0) PetscCall(VecSetValue(f->F, (f->part->first + own) * dim + f->fe->pin[k] % dim, 0, INSERT_VALUES));
   }
   PetscCall(VecAssemblyBegin(f->F));
   PetscCall(VecAssemblyEnd(f->F));

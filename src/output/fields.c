@@ -15,22 +15,24 @@ static PetscInt Count(const HycoFileOrder *order, HycoMesh m, HycoPlace place)
   return order ? order->all[place] : place == HYCO_ON_CELLS ? m->n_cells : m->n_nodes;
 }
 
-/* Values of nodes or cells, of type MPIU_REAL or MPIU_INT, in the file's order. Collective with an order. */
-static PetscErrorCode WriteRows(HycoH5 h, const HycoFileOrder *order, HycoMesh m, const char name[], HycoPlace place,
-                                MPI_Datatype type, PetscInt components, const void *value)
+PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
+                              MPI_Datatype type, PetscInt components, PetscInt cols, const void *value)
 {
-  const PetscInt all = Count(order, m, place), n = order ? order->n[place] : all;
+  const PetscInt all = order ? order->all[place] : n, own = order ? order->n[place] : n,
+                 first = order ? order->first[place] : 0, lines = components / cols;
   const size_t size = type == MPIU_INT ? sizeof(PetscInt) : sizeof(PetscReal);
   char *rows = NULL;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (order) {
-    PetscCall(PetscCalloc1((size_t)(n * components) * size, &rows));
+    PetscCall(PetscCalloc1((size_t)(own * components) * size, &rows));
     PetscCall(HycoFileOrderSend(order, place, type, components, value, rows));
     value = rows;
   }
-  PetscCall(HycoH5WriteRows(h, name, type, all, components, order ? order->first[place] : 0, n, value));
+  ierr = HycoH5WriteRows(h, name, type, all * lines, cols, first * lines, own * lines, value);
   PetscCall(PetscFree(rows));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -40,15 +42,15 @@ static PetscErrorCode WriteMesh(HycoH5 h, const HycoFileOrder *order, HycoMesh m
   PetscInt *cells = m->cells;
 
   PetscFunctionBegin;
-  PetscCall(WriteRows(h, order, m, "mesh/xyz", HYCO_ON_NODES, MPIU_REAL, 3, X));
+  PetscCall(HycoFieldWrite(h, order, m->n_nodes, "mesh/xyz", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
   if (order) {
     PetscCall(PetscMalloc1(m->n_cells * m->nv, &cells));
     for (PetscInt k = 0; k < m->n_cells * m->nv; k++) cells[k] = m->node_whole[m->cells[k]];
   }
-  PetscCall(WriteRows(h, order, m, "mesh/cells", HYCO_ON_CELLS, MPIU_INT, m->nv, cells));
+  PetscCall(HycoFieldWrite(h, order, m->n_cells, "mesh/cells", HYCO_ON_CELLS, MPIU_INT, m->nv, m->nv, cells));
   if (order) PetscCall(PetscFree(cells));
-  PetscCall(WriteRows(h, order, m, "mesh/node_id", HYCO_ON_NODES, MPIU_INT, 1, m->node_id));
-  PetscCall(WriteRows(h, order, m, "mesh/cell_id", HYCO_ON_CELLS, MPIU_INT, 1, m->cell_id));
+  PetscCall(HycoFieldWrite(h, order, m->n_nodes, "mesh/node_id", HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
+  PetscCall(HycoFieldWrite(h, order, m->n_cells, "mesh/cell_id", HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -80,9 +82,9 @@ static const char *FieldFolder(const HycoField *field)
   return field->place == HYCO_ON_CELLS ? "cells" : "nodes";
 }
 
-static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder *order, HycoMesh m,
-                                   const PetscReal X[], HycoScene scene, const PetscReal mu[], PetscInt n,
-                                   const HycoField field[], const HycoContactTable *contact)
+static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder *order, HycoMesh m, const PetscReal X[],
+                                   HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
+                                   const HycoContactTable *contact)
 {
   PetscFunctionBegin;
   HycoOnRoot(comm, WriteHead(h, m, scene, mu, contact));
@@ -91,7 +93,8 @@ static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder 
     char name[HYCO_LINE];
 
     PetscCall(PetscSNPrintf(name, sizeof(name), "%s/%s", FieldFolder(&field[k]), field[k].name));
-    PetscCall(WriteRows(h, order, m, name, field[k].place, MPIU_REAL, field[k].components, field[k].data));
+    PetscCall(HycoFieldWrite(h, order, Count(NULL, m, field[k].place), name, field[k].place, MPIU_REAL,
+                             field[k].components, field[k].components, field[k].data));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -320,12 +323,10 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
   ierr = FillContactsOnRoot(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
   if (!ierr) {
     const HycoContactTable table = {pairs->n, f.slave_id, lambda, f.gap};
-    const HycoField field[6] = {{"displacement", HYCO_ON_NODES, 3, u3},
-                                {"stress", HYCO_ON_CELLS, 6, tensor},
-                                {"contact_force", HYCO_ON_SURFACE, 3, f.force},
-                                {"contact_pressure", HYCO_ON_SURFACE, 1, f.pressure},
-                                {"gap", HYCO_ON_SURFACE, 1, f.gap_node},
-                                {"rid", HYCO_ON_CELLS, 1, rid}};
+    const HycoField field[6] = {
+        {"displacement", HYCO_ON_NODES, 3, u3},         {"stress", HYCO_ON_CELLS, 6, tensor},
+        {"contact_force", HYCO_ON_SURFACE, 3, f.force}, {"contact_pressure", HYCO_ON_SURFACE, 1, f.pressure},
+        {"gap", HYCO_ON_SURFACE, 1, f.gap_node},        {"rid", HYCO_ON_CELLS, 1, rid}};
 
     ierr = HycoFieldsWrite(path, order, m, fe->X, fe->scene, fe->mu, rid ? 6 : 5, field, &table);
   }
