@@ -1,41 +1,28 @@
 /* HycoMaterial: the class of material laws, its registry, and tangents at integration points. */
 #include <hycomaterialimpl.h>
+#include <hycoregistry.h>
 
-static PetscFunctionList laws = NULL;
-static PetscBool registered = PETSC_FALSE;
+static PetscErrorCode AddOwn(void);
+static HycoRegistry laws = {.add_own = AddOwn, .sorted = PETSC_TRUE};
 
-static PetscErrorCode Forget(void)
+static PetscErrorCode AddOwn(void)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFunctionListDestroy(&laws));
-  registered = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The library's own laws come with the first use of the class. */
-static PetscErrorCode RegisterAll(void)
-{
-  PetscFunctionBegin;
-  if (registered) PetscFunctionReturn(PETSC_SUCCESS);
-  registered = PETSC_TRUE;
-  PetscCall(HycoInitializePackage());
-  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_ELASTIC, HycoMaterialCreate_Elastic));
-  PetscCall(PetscRegisterFinalize(Forget));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_ELASTIC, HycoMaterialCreate_Elastic));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoMaterialRegister(const char name[], PetscErrorCode (*create)(HycoMaterial))
 {
   PetscFunctionBegin;
-  PetscCall(RegisterAll());
-  PetscCall(PetscFunctionListAdd(&laws, name, create));
+  PetscCall(HycoRegistryAdd(&laws, name, create));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoMaterialCreate(MPI_Comm comm, HycoMaterial *material)
 {
   PetscFunctionBegin;
-  PetscCall(RegisterAll());
+  PetscCall(HycoInitializePackage());
   PetscCall(PetscHeaderCreate(*material, HYCO_MATERIAL_CLASSID, "HycoMaterial", "Material law", "Hyco", comm,
                               HycoMaterialDestroy, HycoMaterialView));
   (*material)->linear = PETSC_TRUE;
@@ -60,11 +47,11 @@ PetscErrorCode HycoMaterialSetType(HycoMaterial material, HycoMaterialType type)
 
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
-  PetscCall(PetscFunctionListFind(laws, type, &create));
+  PetscCall(HycoRegistryFind(&laws, type, &create));
   if (!create) {
     char list[HYCO_LINE];
 
-    PetscCall(HycoListTypes(laws, type, list));
+    PetscCall(HycoRegistryList(&laws, type, list));
     HycoFail("body %s: the law \"%s\" is not registered; it must be %s",
              ((PetscObject)material)->name ? ((PetscObject)material)->name : "(none)", type, list);
   }
