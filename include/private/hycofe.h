@@ -47,10 +47,9 @@ struct _n_HycoFE {
   HycoAssemblyMap places; /* of the entries of K; made by the second assembly into it */
   PetscInt n_loads;
   HycoLoadShares *shares; /* n_loads: by load of the scene */
-  /* -hyco_regularise: unknowns held beside the scene's supports, and the motions that these keep (n_released x n_dof,
-     orthonormal; on the whole mesh alone); the contacts' normals are turned to leave the first n_turned of them alone
-   */
-  PetscInt n_pins, *pin, n_released, n_turned;
+  /* -hyco_regularise: unknowns held beside the scene's supports; the motions (n_turned x n_dof, orthonormal) that the
+     contacts' normals are turned to leave alone */
+  PetscInt n_pins, *pin, n_turned;
   PetscReal *released;
   /* the parameters, and what the last HycoFESetParameters changed */
   PetscBool ready;
@@ -78,10 +77,21 @@ static inline PetscBool HycoFEIsIsotropic(HycoFE fe, PetscInt cell)
   return (PetscBool)(fe->tangent_size[fe->mesh->cell_body[cell]] == 2);
 }
 
+/* The unknowns of the whole mesh, where fe's is a part or a surface of it. */
+static inline PetscInt HycoFEUnknowns(HycoFE fe)
+{
+  return fe->mesh->n_whole_nodes ? fe->mesh->n_whole_nodes * fe->dim : fe->n_dof;
+}
+
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* Puts the nodes where the file has them; for geometry alone. */
 PetscErrorCode HycoFESetDrawn(HycoFE fe);
+/* Fails for a cell without volume as drawn. */
+PetscErrorCode HycoMeshCheckCells(HycoMesh mesh);
+/* After HycoFESetParameters() on parts of a mesh: which bodies are mirrored is the same on all; fails where a map folds
+   a body between them. Collective. */
+PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe);
 /* Brings everything to mu (length scene->n_variables), touching only what depends on what changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
 /* What the parameters p with changed[p] reach: the bodies' maps, K, the rows of B, the gaps. */
@@ -110,8 +120,8 @@ typedef struct {
 /* Holds the unknowns `component` of the nodes with these tags (those that this mesh has) beside the scene's supports,
    in place of the last ones; n = 0: none. */
 PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const PetscInt component[]);
-/* Finds them on the whole mesh. */
-PetscErrorCode HycoFEFreeMotions(HycoFE fe, HycoMotions *motions);
+/* Finds them on the mesh of which each process has a part; motion: of the part's unknowns. Collective. */
+PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions);
 PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
 /* "body B from moving along ..." for the combination of motions with these coefficients. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);

@@ -6,7 +6,7 @@
 
 typedef struct {
   const char *name;
-  PetscBool on_cells;
+  HycoPlace place; /* of a mesh that one process has, a surface's nodes are its nodes */
   PetscInt components; /* 1, 3 (vector) or 6 (symmetric tensor xx, xy, xz, yy, yz, zz) */
   const PetscReal *data;
 } HycoField;
@@ -24,19 +24,22 @@ void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN]);
 const char *HycoFieldsTopology(HycoCellType type);
 void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
 
-/* Writes `path` (must end in .xdmf) and the .h5 beside it, both through temporary names. On this process alone. X:
-   moved nodes (n_nodes x 3). The .h5 also holds node_id, cell_id, the parameters and the contact table. */
-PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh mesh, const PetscReal X[], HycoScene scene,
-                               const PetscReal mu[], PetscInt n, const HycoField field[],
+/* Writes `path` (must end in .xdmf) and the .h5 beside it, both through temporary names. X: moved nodes (n_nodes x 3).
+   The .h5 also holds node_id, cell_id, the parameters and the contact table (rank 0's). order: of parts of a mesh, each
+   written by its process, collective; NULL: this process has it all. */
+PetscErrorCode HycoFieldsWrite(const char path[], const HycoFileOrder *order, HycoMesh mesh, const PetscReal X[],
+                               HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
                                const HycoContactTable *contact);
 /* Fails unless `path` ends in .xdmf, and where the .h5 beside it is a model or a snapshot. On this process alone. */
 PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /*
-  The usual fields from a solution on a whole mesh, then HycoFieldsWrite: displacement, stress, contact force (vector on
-  slaves, minus on masters), contact pressure, gap at the solution, RID marker (may be NULL: none written).
+  The usual fields of a solution, then HycoFieldsWrite: displacement, stress, contact force (vector on slaves, minus on
+  masters), contact pressure, gap at the solution, RID marker (may be NULL: none written). u on fe, u_surface on the mesh
+  of the pairs: with an order they are the part's and rank 0's (elsewhere `surface` is NULL), else the same.
 */
-PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, HycoPairs *pairs, const PetscReal u[],
+PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
+                                 HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],
                                  const PetscReal lambda[], const PetscReal *rid);
 
 #endif

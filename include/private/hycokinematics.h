@@ -39,7 +39,7 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
 /* Unit normals (n_nodes x 3; zero off the group) of the smooth surface behind a group's facets on fe's moved nodes, the
    angle by which faceting leaves each in doubt, and the largest angle between facets nearby (n_nodes both). 2D, 3D. */
 PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], PetscReal doubt[], PetscReal bend[]);
-/* Turns the normal of contact k so that the first n_turned motions of fe->released are tangential there. */
+/* Turns the normal of contact k so that the motions of fe->released are tangential there. */
 void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3]);
 
 #endif

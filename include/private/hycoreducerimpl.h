@@ -5,6 +5,7 @@
 #include <hycoromimpl.h>
 #include <hycosnapshotsimpl.h>
 #include <hycoreducer.h>
+#include <slepcsvd.h>
 
 enum { HYCO_SEED_DISPLACEMENT, HYCO_SEED_STRESS, HYCO_SEED_FORCE, HYCO_SEED_DUAL, HYCO_N_SEEDS };
 
@@ -35,6 +36,7 @@ struct _p_HycoReducer {
   char folder[PETSC_MAX_PATH_LEN]; /* of snapshots; "": from the model's name */
   PetscReal tol[HYCO_N_SEEDS], noise, extension;
   PetscInt max_modes, layers;
+  char svd_type[32]; /* of PODs */
   PetscBool seed[HYCO_N_SEEDS], whole_rid;
   PetscInt deim; /* of each basis that seeds the RID: 0 DEIM, 1 Q-DEIM */
   PetscInt n_groups;
@@ -109,6 +111,14 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
  */
 PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char path[], PetscBool learn,
                                  HycoTraining *report);
+/* The SVD of its PODs, the caller's: with the reducer's type, and options -hyco_pod_svd_... to be read. */
+PetscErrorCode HycoReducerCreateSVD(HycoReducer t, MPI_Comm comm, SVD *svd);
+/* HycoPOD() by that; how many of the `found` modes that
+   it gave the tolerance takes: fails where it takes more, for lack of accuracy. Collective on S; not collective. */
+PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
+                              PetscReal sigma[]);
+PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
+                                  PetscInt max_modes, PetscInt found, PetscInt *l);
 /* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
    rows, column major, on every rank; a dense matrix on rank 0, row or column major (the caller frees). Collective. */
 PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, Mat *S);

@@ -56,6 +56,19 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoMeshCheckCells(HycoMesh m)
+{
+  const HycoElement *el = HycoElementGet(m->type);
+  struct _n_HycoFE drawn = {.mesh = m, .dim = m->dim, .X = m->xyz};
+  PetscReal g[8][3], weight;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    for (PetscInt q = 0; q < el->nq; q++) PetscCall(HycoGradients(&drawn, el, e, q, g, &weight));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal mean[8][3])
 {
   PetscReal g[8][3], w, volume = 0;

@@ -99,7 +99,7 @@ static PetscErrorCode MoveNodes(HycoFOM f, PetscBool out, PetscReal value[])
 
     PetscCall(VecGetArray(vec[j], &v));
     for (PetscInt i = 0; i < f->part->n_nodes; i++) {
-      const PetscInt row = HycoFOMOwned(f, i);
+      const PetscInt row = HycoMeshOwned(f->part, i);
 
       for (PetscInt c = 0; row >= 0 && c < dim; c++) {
         PetscReal *at = value + i * cols + j * dim + c;

@@ -21,7 +21,7 @@ static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
   PetscCall(VecGetArrayRead(f->F, &F));
   PetscCall(VecGetArrayRead(f->U_local, &u));
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
-    const PetscInt row = HycoFOMOwned(f, i);
+    const PetscInt row = HycoMeshOwned(f->part, i);
 
     for (PetscInt c = 0; row >= 0 && c < dim; c++) {
       if (!f->fe->fixed[i * dim + c]) *work += F[row * dim + c] * u[i * dim + c];
@@ -74,7 +74,7 @@ static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
     PetscCall(HycoFEHeatWork(f->fe, u, heat));
   }
   for (PetscInt e = 0; e < f->part->n_cells; e++) {
-    if (HycoFOMOwned(f, f->part->cells[e * f->part->nv]) < 0) continue;
+    if (HycoMeshOwned(f->part, f->part->cells[e * f->part->nv]) < 0) continue;
     PetscCall(LiftingWork(f->fe, e, u, &one));
     *strain += each[e];
     *lifting += one;
@@ -93,7 +93,7 @@ static PetscErrorCode ContactSums(HycoFOM f, PetscReal *gap_work, PetscReal *fix
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(3 * f->pairs.n, &normal, f->pairs.n, &gap));
-  PetscCall(HycoContactGeometry(f->fe_whole, &f->pairs, normal, gap));
+  PetscCall(HycoContactGeometry(f->fe_surface, &f->pairs, normal, gap));
   *gap_work = *fixed_work = 0;
   for (PetscInt k = 0; k < f->pairs.n; k++) {
     *gap_work += f->lambda[k] * gap[k];

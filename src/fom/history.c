@@ -66,7 +66,7 @@ PetscErrorCode HycoPathCreate(HycoFOM f)
   PetscCall(PetscMalloc1(f->fe->n_dof, &p->f_local));
   PetscCall(PetscMalloc1(f->fe->n_dof, &p->u0));
   PetscCall(PetscCalloc1(f->scene->n_times + 1, &p->steps));
-  PetscCall(HycoFESetOwned(f->fe, f->n_owned, f->first));
+  PetscCall(HycoFESetOwned(f->fe, f->part->n_owned, f->part->first));
   for (PetscInt b = 0; b < f->scene->n_bodies; b++) p->flows = (PetscBool)(p->flows || !f->scene->body[b].law->linear);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -145,7 +145,7 @@ static PetscErrorCode MeanWork(HycoFOM f, Vec before, Vec after, PetscBool on_fi
   PetscCall(VecGetArrayRead(f->U, &u));
   PetscCall(VecGetArrayRead(f->path->U_old, &u_old));
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
-    const PetscInt row = HycoFOMOwned(f, i);
+    const PetscInt row = HycoMeshOwned(f->part, i);
 
     for (PetscInt c = 0; row >= 0 && c < dim; c++) {
       const PetscInt k = row * dim + c;
@@ -318,7 +318,7 @@ static PetscErrorCode Record(HycoFOM f)
   s->thermal = p->work_done.thermal + p->work_done.moduli;
   PetscCall(HycoFOMGather(f));
   f->solved = PETSC_TRUE;
-  f->sigma_ready = PETSC_FALSE;
+  f->sigma_ready = f->all_ready = PETSC_FALSE;
   p->steps[p->n_steps++] = *s;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscCall(HycoSeriesAdd(f));

@@ -70,10 +70,10 @@ PetscErrorCode HycoItemsCreate(HycoFOM f, HycoItems *node, HycoItems *cell)
   PetscCall(PetscMalloc1(m->n_nodes, &node->own));
   PetscCall(PetscMalloc1(m->n_cells, &cell->own));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
-    if (HycoFOMOwned(f, i) >= 0) node->own[node->n++] = i;
+    if (HycoMeshOwned(f->part, i) >= 0) node->own[node->n++] = i;
   }
   for (PetscInt e = 0; e < m->n_cells; e++) {
-    if (HycoFOMOwned(f, m->cells[e * m->nv]) >= 0) cell->own[cell->n++] = e;
+    if (HycoMeshOwned(f->part, m->cells[e * m->nv]) >= 0) cell->own[cell->n++] = e;
   }
   PetscCall(Arrange(f, m->node_id, node));
   PetscCall(Arrange(f, m->cell_id, cell));

@@ -62,7 +62,7 @@ static PetscErrorCode TakeForces(HycoFOM f)
   PetscCall(VecGetArray(p->f_int, &f_int));
   PetscCall(VecGetArray(p->r, &r));
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
-    const PetscInt row = HycoFOMOwned(f, i);
+    const PetscInt row = HycoMeshOwned(f->part, i);
 
     for (PetscInt c = 0; row >= 0 && c < dim; c++) {
       const PetscInt k = row * dim + c;

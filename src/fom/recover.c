@@ -78,10 +78,11 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
 /* A block of n patterns, from P to their columns of X (stride q). */
 static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], PetscInt q, PetscReal X[])
 {
-  const PetscScalar *root;
+  PetscReal *local, *all;
   Vec r[BLOCK], x[BLOCK];
 
   PetscFunctionBegin;
+  PetscCall(PetscMalloc2(f->fe->n_dof, &local, f->rank ? 0 : f->n_nodes * f->fe->dim, &all));
   for (PetscInt j = 0; j < n; j++) {
     PetscCall(VecDuplicate(f->U, &r[j]));
     PetscCall(VecDuplicate(f->U, &x[j]));
@@ -90,15 +91,14 @@ static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], P
   }
   PetscCall(HycoSolverApplyInverse(f->given_solver, n, r, x));
   for (PetscInt j = 0; j < n; j++) {
-    PetscCall(VecScatterBegin(f->to_root, x[j], f->U_root, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecScatterEnd(f->to_root, x[j], f->U_root, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecGetArrayRead(f->U_root, &root));
+    PetscCall(HycoFOMToLocal(f, x[j], local));
+    PetscCall(HycoFOMToRoot(f, HYCO_ON_NODES, f->fe->dim, local, all));
     for (PetscInt i = 0; f->rank == 0 && i < f->n_nodes * f->fe->dim; i++)
-      X[(size_t)i * (size_t)q + (size_t)j] = root[i];
-    PetscCall(VecRestoreArrayRead(f->U_root, &root));
+      X[(size_t)i * (size_t)q + (size_t)j] = all[i];
     PetscCall(VecDestroy(&r[j]));
     PetscCall(VecDestroy(&x[j]));
   }
+  PetscCall(PetscFree2(local, all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

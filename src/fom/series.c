@@ -57,7 +57,7 @@ static PetscErrorCode AddField(HycoFOM f, HycoSeries s, const char name[], Petsc
   PetscCall(HycoItemsBring(f, on_cells ? &s->cell : &s->node, components, value, &all));
   PetscCall(PetscStrncpy(s->name[s->n_fields], name, sizeof(s->name[0])));
   field->name = s->name[s->n_fields];
-  field->on_cells = on_cells;
+  field->place = on_cells ? HYCO_ON_CELLS : HYCO_ON_NODES;
   field->components = components;
   field->data = all;
   s->n_fields++;
@@ -112,13 +112,13 @@ static PetscErrorCode AddState(HycoFOM f, HycoSeries s)
 static PetscErrorCode FillContacts(HycoFOM f, HycoSeries s, PetscReal force[], PetscReal pressure[], PetscReal open[])
 {
   const PetscInt m = f->pairs.n, dim = f->part->dim;
-  const PetscInt *tag = f->fe_whole->mesh->node_id;
+  const PetscInt *tag = f->fe_surface->mesh->node_id;
   PetscReal *normal, *gap, *area;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(3 * m, &normal, m, &gap, m, &area));
-  PetscCall(HycoContactGeometry(f->fe_whole, &f->pairs, normal, gap));
-  PetscCall(HycoContactAreas(f->fe_whole, &f->pairs, area));
+  PetscCall(HycoContactGeometry(f->fe_surface, &f->pairs, normal, gap));
+  PetscCall(HycoContactAreas(f->fe_surface, &f->pairs, area));
   for (PetscInt k = 0; k < m; k++) {
     const PetscInt slave = HycoItemsFind(&s->node, tag[HycoPairsSlave(&f->pairs, k)]), *master;
     const PetscReal *weight, lambda = f->lambda[k], *n = normal + 3 * k;
@@ -156,7 +156,7 @@ static PetscErrorCode AddContacts(HycoFOM f, HycoSeries s)
 
     if (f->rank == 0) PetscCall(PetscCalloc1((k ? 1 : 3) * n, &value[k]));
     PetscCall(PetscStrncpy(s->name[s->n_fields + k], name[k], sizeof(s->name[0])));
-    *field = (HycoField){s->name[s->n_fields + k], PETSC_FALSE, k ? 1 : 3, value[k]};
+    *field = (HycoField){s->name[s->n_fields + k], HYCO_ON_NODES, k ? 1 : 3, value[k]};
   }
   HycoOnRoot(HycoComm(f), FillContacts(f, s, value[0], value[1], value[2]));
   s->n_fields += 3;
@@ -178,9 +178,10 @@ static PetscErrorCode WriteFields(HycoSeries s, HycoH5 h, PetscInt k)
   for (PetscInt j = 0; j < s->n_fields; j++) {
     char name[HYCO_LINE];
 
-    HycoFormat(name, "step-%04d/%s/%s", (int)k, s->field[j].on_cells ? "cells" : "nodes", s->field[j].name);
-    PetscCall(HycoH5WriteReal(h, name, s->field[j].on_cells ? s->cell.n_all : s->node.n_all, s->field[j].components,
-                              s->field[j].data));
+    HycoFormat(name, "step-%04d/%s/%s", (int)k, s->field[j].place == HYCO_ON_CELLS ? "cells" : "nodes",
+               s->field[j].name);
+    PetscCall(HycoH5WriteReal(h, name, s->field[j].place == HYCO_ON_CELLS ? s->cell.n_all : s->node.n_all,
+                              s->field[j].components, s->field[j].data));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -276,13 +277,14 @@ static PetscErrorCode ReadFields(HycoSeries s, HycoH5 h, PetscInt k)
 
     HycoFormat(name, "step-%04d/nodes/%s", (int)k, word);
     PetscCall(PetscStrncpy(s->name[s->n_fields], word, sizeof(s->name[0])));
-    *field = (HycoField){s->name[s->n_fields], (PetscBool)!HycoH5Has(h, name), 0, NULL};
-    if (field->on_cells) HycoFormat(name, "step-%04d/cells/%s", (int)k, word);
+    *field = (HycoField){s->name[s->n_fields], HycoH5Has(h, name) ? HYCO_ON_NODES : HYCO_ON_CELLS, 0, NULL};
+    if (field->place == HYCO_ON_CELLS) HycoFormat(name, "step-%04d/cells/%s", (int)k, word);
     PetscCall(HycoH5LoadReal(h, name, &rows, &cols, &data));
     field->components = cols;
     field->data = data;
     s->n_fields++;
-    HycoCheck(rows == (field->on_cells ? s->cell.n_all : s->node.n_all), "its field %s has %d rows", word, (int)rows);
+    HycoCheck(rows == (field->place == HYCO_ON_CELLS ? s->cell.n_all : s->node.n_all), "its field %s has %d rows", word,
+              (int)rows);
   }
   PetscCall(PetscFree(list));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -374,9 +376,10 @@ static void WriteTime(HycoSeries s, FILE *out, const char h5[], HycoCellType typ
             field->components == 1   ? "Scalar"
             : field->components == 3 ? "Vector"
                                      : "Tensor6",
-            field->on_cells ? "Cell" : "Node");
-    HycoFormat(name, "step-%04d/%s/%s", (int)k, field->on_cells ? "cells" : "nodes", field->name);
-    WriteItem(out, "Precision=\"8\"", field->on_cells ? s->cell.n_all : s->node.n_all, field->components, h5, name);
+            field->place == HYCO_ON_CELLS ? "Cell" : "Node");
+    HycoFormat(name, "step-%04d/%s/%s", (int)k, field->place == HYCO_ON_CELLS ? "cells" : "nodes", field->name);
+    WriteItem(out, "Precision=\"8\"", field->place == HYCO_ON_CELLS ? s->cell.n_all : s->node.n_all, field->components,
+              h5, name);
     fprintf(out, "    </Attribute>\n");
   }
   fprintf(out, "   </Grid>\n");

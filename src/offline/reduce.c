@@ -129,6 +129,44 @@ static PetscErrorCode Points(HycoReducer t, Mat V, PetscInt index[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoReducerCreateSVD(HycoReducer t, MPI_Comm comm, SVD *svd)
+{
+  const char *prefix;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPODCreateSVD(comm, svd));
+  PetscCall(SVDSetType(*svd, t->svd_type));
+  PetscCall(PetscObjectGetOptionsPrefix((PetscObject)t, &prefix));
+  PetscCall(SVDSetOptionsPrefix(*svd, prefix));
+  PetscCall(SVDAppendOptionsPrefix(*svd, "hyco_pod_"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
+                              PetscReal sigma[])
+{
+  SVD svd;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerCreateSVD(t, PetscObjectComm((PetscObject)S), &svd));
+  HycoLogged(HYCO_EVENT_POD, HycoPOD(svd, S, tol, t->noise, max_modes, V, l, sigma));
+  PetscCall(SVDDestroy(&svd));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
+                                  PetscInt max_modes, PetscInt found, PetscInt *l)
+{
+  PetscFunctionBegin;
+  *l = HycoPODRank(n_sigma, sigma, tol, t->noise, max_modes);
+  HycoCheckModel(*l <= found || tol == 0,
+                 "-hyco_pod_svd_type %s finds %d modes accurately, which leave out more than %g of the snapshots' "
+                 "energy; take tsqr, or a larger -hyco_pod_tol",
+                 t->svd_type, (int)found, (double)tol);
+  *l = PetscMin(*l, found);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. */
 static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool all)
 {
@@ -140,7 +178,7 @@ static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool a
   PetscCall(MatGetSize(S, &N, NULL));
   PetscCall(PetscCalloc1(t->n_s + 1, &basis->sigma));
   basis->n_sigma = PetscMin(N, t->n_s);
-  HycoLogged(HYCO_EVENT_POD, HycoPOD(S, all ? 0 : t->tol[kind], t->noise, most, &basis->V, &basis->l, basis->sigma));
+  PetscCall(HycoReducerPOD(t, S, all ? 0 : t->tol[kind], most, &basis->V, &basis->l, basis->sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -153,7 +191,7 @@ static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l
 
   PetscFunctionBegin;
   *V = NULL;
-  *l = PetscMin(basis->l, HycoPODRank(basis->n_sigma, basis->sigma, t->tol[kind], t->noise, most));
+  PetscCall(HycoReducerPODRank(t, basis->n_sigma, basis->sigma, t->tol[kind], most, basis->l, l));
   t->counts[kind] = *l;
   if (!*l) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatDenseGetSubMatrix(basis->V, PETSC_DECIDE, PETSC_DECIDE, 0, *l, &part));

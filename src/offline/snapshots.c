@@ -191,26 +191,65 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes the solution that the group's rank 0 holds. */
-static PetscErrorCode WriteSample(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], const PetscReal force[])
+/* What rank 0 has of a solution. */
+static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[])
 {
-  const PetscInt N = fom->n_nodes * fom->fe->dim;
-  char path[PETSC_MAX_PATH_LEN], fingerprint[32];
-  HycoH5 h;
+  char fingerprint[32];
+
+  PetscFunctionBegin;
+  snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
+  PetscCall(HycoH5WriteText(h, "fingerprint", fingerprint));
+  PetscCall(HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu));
+  PetscCall(HycoH5WriteReal(h, "lambda", fom->n_contacts, 1, fom->lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A field of the part's nodes or cells, by rows of the file's order. */
+static PetscErrorCode WriteField(HycoFOM fom, HycoH5 h, const char name[], HycoPlace place, PetscInt components,
+                                 const PetscReal value[])
+{
+  const PetscInt all = components * (place == HYCO_ON_CELLS ? fom->n_cells : fom->n_nodes);
+  const HycoFileOrder *order;
+  PetscReal *rows = NULL;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(SamplePath(s, mu, path));
-  snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
-  PetscCall(HycoH5Create(path, &h));
-  ierr = HycoH5WriteText(h, "fingerprint", fingerprint);
-  if (!ierr) ierr = HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu);
-  if (!ierr) ierr = HycoH5WriteReal(h, "U", N, 1, fom->u);
-  if (!ierr) ierr = HycoH5WriteReal(h, "lambda", fom->n_contacts, 1, fom->lambda);
-  if (!ierr) ierr = HycoH5WriteReal(h, "sigma", fom->n_cells * fom->fe->n_sigma, 1, fom->sigma);
-  if (!ierr) ierr = HycoH5WriteReal(h, "force", N, 1, force);
-  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  PetscCall(HycoFOMGetRows(fom, &order));
+  if (order) {
+    PetscCall(PetscMalloc1(order->n[place] * components, &rows));
+    PetscCall(HycoFileOrderSend(order, place, MPIU_REAL, components, value, rows));
+  }
+  ierr = HycoH5WriteRows(h, name, MPIU_REAL, all, 1, order ? order->first[place] * components : 0,
+                         order ? order->n[place] * components : all, order ? rows : value);
+  PetscCall(PetscFree(rows));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[],
+                                  const PetscReal force[])
+{
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(fom), WriteHead(s, fom, h, mu));
+  PetscCall(WriteField(fom, h, "U", HYCO_ON_NODES, fom->fe->dim, fom->u));
+  PetscCall(WriteField(fom, h, "sigma", HYCO_ON_CELLS, fom->fe->n_sigma, fom->sigma));
+  PetscCall(WriteField(fom, h, "force", HYCO_ON_NODES, fom->fe->dim, force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Writes the solution, each rank its rows. Collective on the group. */
+static PetscErrorCode WriteSample(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], const PetscReal force[])
+{
+  char path[PETSC_MAX_PATH_LEN];
+  HycoH5 h;
+  PetscErrorCode ierr, failed;
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(HycoH5CreateShared(HycoComm(fom), path, &h));
+  ierr = WriteFields(s, fom, h, mu, force);
+  failed = HycoH5Close(&h, (PetscBool)!ierr);
+  PetscCall(ierr ? ierr : failed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -237,9 +276,9 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
     SETERRQ(HycoComm(fom), PETSC_ERR_USER, "the snapshot at %s: %s%s%s", at, HycoReasonName(summary.reason),
             summary.free_motion[0] ? "; no support keeps " : "", summary.free_motion);
   }
-  PetscCall(HycoFOMGetSolution(fom, NULL, NULL, NULL, NULL, NULL, NULL));
+  PetscCall(HycoFOMStress(fom));
   PetscCall(HycoFOMGetForces(fom, force));
-  HycoOnRoot(HycoComm(fom), WriteSample(s, fom, mu, force));
+  PetscCall(WriteSample(s, fom, mu, force));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -279,7 +318,7 @@ static PetscErrorCode SolveGroup(HycoSnapshots s, MPI_Comm group, PetscInt color
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
   PetscCall(HycoFOMCreate(group, s->scene, &fom));
-  PetscCall(PetscMalloc1(fom->n_nodes * fom->fe->dim, &force));
+  PetscCall(PetscMalloc1(fom->fe->n_dof, &force));
   PetscCall(PetscCalloc1(groups, &next));
   for (PetscInt k = first; !ierr && k < last; k++) {
     ierr = SolveSample(s, fom, mu + missing[k] * n_par, force);

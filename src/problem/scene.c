@@ -47,8 +47,9 @@ static PetscErrorCode UnknownKey(const char key[], const char what[], const Hyco
   for (PetscInt j = 0; declared && j < declared->n; j++) fields[n++] = declared->entry[j].name;
   for (PetscInt j = 0; others[j]; j++) fields[n++] = others[j];
   for (PetscInt j = 0; j < n; j++) {
-    if (j) PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
-    PetscCall(PetscStrlcat(list, fields[j], sizeof(list)));
+    const size_t used = strlen(list);
+
+    PetscCall(PetscSNPrintf(list + used, sizeof(list) - used, "%s%s", j ? ", " : "", fields[j]));
   }
   if (last) near = HycoNearest(last + 1, n, fields);
   if (near) HycoFail("the scene's entry %s is unknown; %s has: %s; did you mean %s?", key, what, list, near);

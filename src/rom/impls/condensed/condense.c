@@ -307,7 +307,7 @@ static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
     for (PetscInt k = 0; affine && !c->exact_loads && k < 2; k++) PetscCall(AffineAt(t, p, k ? 0.71 : 0.38, &affine));
     c->affine[p] = affine;
   }
-  PetscCall(HycoFEFreeMotions(t->fe, &motions));
+  PetscCall(HycoFEFreeMotions(PETSC_COMM_SELF, t->fe, &motions));
   free = motions.n;
   if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
   PetscCall(HycoMotionsDestroy(&motions));

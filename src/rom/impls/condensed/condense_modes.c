@@ -213,8 +213,8 @@ static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(PetscMax(m, n), &sigma));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, L, &F));
-  PetscCall(HycoPOD(F, HycoCondensedModesTolerance(t), t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
-                    sigma));
+  PetscCall(HycoReducerPOD(t, F, HycoCondensedModesTolerance(t), PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
+                           sigma));
   PetscCall(MatDestroy(&F));
   PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &x->Q));
   PetscCall(PetscMalloc1(x->q + 1, &x->scale));
@@ -341,7 +341,7 @@ static PetscErrorCode TakeModes(HycoReducer t, Mat V, PetscInt n_sigma, PetscRea
   const PetscInt N = t->sizes[0] * t->sizes[3];
 
   PetscFunctionBegin;
-  t->l = HycoPODRank(n_sigma, sigma, HycoCondensedModesTolerance(t), t->noise, t->max_modes);
+  PetscCall(HycoReducerPODRank(t, n_sigma, sigma, HycoCondensedModesTolerance(t), t->max_modes, x->r, &t->l));
   HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoCondensedModesTolerance(t));
   PetscCall(PetscFree(t->sigma));
   t->sigma = sigma;
@@ -367,7 +367,7 @@ PetscErrorCode HycoCondensedFindModes(HycoReducer t, HycoSnapshots store)
   PetscCall(SpreadPatterns(t));
   PetscCall(Columns(t, store, &S));
   PetscCall(PetscMalloc1(x->n_columns + 1, &sigma));
-  HycoLogged(HYCO_EVENT_POD, HycoPOD(S, 0, t->noise, 0, &V, &x->r, sigma));
+  PetscCall(HycoReducerPOD(t, S, 0, 0, &V, &x->r, sigma));
   PetscCall(PetscMalloc1((size_t)x->r * (size_t)x->n_columns, &x->C));
   PetscCall(HycoReducerMultiply(t, V, S, x->C));
   PetscCall(TakeModes(t, V, PetscMin(t->sizes[0] * t->sizes[3], x->n_columns), sigma));

@@ -130,8 +130,8 @@ static PetscErrorCode Enrich(HycoReducer t)
   }
   PetscCall(RemoveModes(t, N, n, x));
   PetscCall(MatDenseRestoreArray(X, &x));
-  PetscCall(HycoPOD(X, 0, NEW, 0, &Q, &found, size));
-  while (q < found && size[q] > NEW) q++;
+  PetscCall(HycoReducerPOD(t, X, 0, 0, &Q, &found, size));
+  while (q < found && size[q] > NEW * PetscMax(1, size[0])) q++;
   if (found) {
     PetscCall(MatDenseGetArray(Q, &x));
     if (q) PetscCall(Append(t, N, q, x));
