@@ -192,6 +192,8 @@ typedef struct {
 /* Runs `declare` with an empty database, its declarations going to the list and reading nothing. */
 PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)(PetscOptions));
 PetscErrorCode HycoOptionListDestroy(HycoOptionList *list);
+/* The table of HycoGetOptionTable() is recorded anew when it is asked for again. */
+PetscErrorCode HycoOptionsForgetTable(void);
 /* The option of this name (without dash; mu_ is that of mu_radius), or NULL. Borrowed. */
 const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name[]);
 /* Makes an object of each class, which sets itself from `options`. */

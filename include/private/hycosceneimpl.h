@@ -58,8 +58,6 @@ HycoEntry *HycoDeclaredFind(HycoDeclared *declared, const char name[]);
 PetscErrorCode HycoDeclaredRead(HycoScene scene, const char key[], const char text[], HycoEntry *entry);
 PetscErrorCode HycoDeclaredView(const HycoDeclared *declared, PetscViewer viewer);
 PetscErrorCode HycoDeclaredDestroy(HycoDeclared *declared);
-/* "obstacle, pair or surface; did you mean pair?": the registered types, for one that is not. */
-PetscErrorCode HycoListTypes(PetscFunctionList types, const char type[], char list[HYCO_LINE]);
 
 typedef struct {
   char *name;

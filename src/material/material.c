@@ -1,46 +1,33 @@
 /* HycoMaterial: the class of material laws, its registry, and tangents at integration points. */
 #include <hycomaterialimpl.h>
+#include <hycoregistry.h>
 
-static PetscFunctionList laws = NULL;
-static PetscBool registered = PETSC_FALSE;
+static PetscErrorCode AddOwn(void);
+static HycoRegistry laws = {.add_own = AddOwn, .sorted = PETSC_TRUE};
 
-static PetscErrorCode Forget(void)
+static PetscErrorCode AddOwn(void)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFunctionListDestroy(&laws));
-  registered = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The library's own laws come with the first use of the class. */
-static PetscErrorCode RegisterAll(void)
-{
-  PetscFunctionBegin;
-  if (registered) PetscFunctionReturn(PETSC_SUCCESS);
-  registered = PETSC_TRUE;
-  PetscCall(HycoInitializePackage());
-  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_ELASTIC, HycoMaterialCreate_Elastic));
-  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_J2, HycoMaterialCreate_J2));
-  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_NORTON, HycoMaterialCreate_Norton));
-  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_STRAIN_HARDENING, HycoMaterialCreate_StrainHardening));
-  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_LIMBACK_ANDERSSON, HycoMaterialCreate_LimbackAndersson));
-  PetscCall(PetscFunctionListAdd(&laws, HYCO_MATERIAL_MFRONT, HycoMaterialCreate_MFront));
-  PetscCall(PetscRegisterFinalize(Forget));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_ELASTIC, HycoMaterialCreate_Elastic));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_J2, HycoMaterialCreate_J2));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_NORTON, HycoMaterialCreate_Norton));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_STRAIN_HARDENING, HycoMaterialCreate_StrainHardening));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_LIMBACK_ANDERSSON, HycoMaterialCreate_LimbackAndersson));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_MFRONT, HycoMaterialCreate_MFront));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoMaterialRegister(const char name[], PetscErrorCode (*create)(HycoMaterial))
 {
   PetscFunctionBegin;
-  PetscCall(RegisterAll());
-  PetscCall(PetscFunctionListAdd(&laws, name, create));
+  PetscCall(HycoRegistryAdd(&laws, name, create));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoMaterialCreate(MPI_Comm comm, HycoMaterial *material)
 {
   PetscFunctionBegin;
-  PetscCall(RegisterAll());
+  PetscCall(HycoInitializePackage());
   PetscCall(PetscHeaderCreate(*material, HYCO_MATERIAL_CLASSID, "HycoMaterial", "Material law", "Hyco", comm,
                               HycoMaterialDestroy, HycoMaterialView));
   (*material)->linear = PETSC_TRUE;
@@ -66,11 +53,11 @@ PetscErrorCode HycoMaterialSetType(HycoMaterial material, HycoMaterialType type)
 
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
-  PetscCall(PetscFunctionListFind(laws, type, &create));
+  PetscCall(HycoRegistryFind(&laws, type, &create));
   if (!create) {
     char list[HYCO_LINE];
 
-    PetscCall(HycoListTypes(laws, type, list));
+    PetscCall(HycoRegistryList(&laws, type, list));
     HycoFail("body %s: the law \"%s\" is not registered; it must be %s",
              ((PetscObject)material)->name ? ((PetscObject)material)->name : "(none)", type, list);
   }

@@ -9,7 +9,7 @@
 PetscErrorCode HycoROMCreate(HycoROM *model)
 {
   PetscFunctionBegin;
-  PetscCall(HycoROMRegisterAll());
+  PetscCall(HycoInitializePackage());
   PetscCall(PetscHeaderCreate(*model, HYCO_ROM_CLASSID, "HycoROM", "Reduced model", "Hyco", PETSC_COMM_SELF,
                               HycoROMDestroy, HycoROMView));
   (*model)->reconstruct = PETSC_TRUE;

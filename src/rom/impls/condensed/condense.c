@@ -523,6 +523,7 @@ PetscErrorCode HycoCondensedBuild(HycoROM m, HycoReducer t)
   PetscFunctionBegin;
   PetscCall(HycoCondensedFillFields(t, PETSC_TRUE));
   PetscCall(HycoCondensedLeaveOut(t));
+  PetscCall(HycoCondensedResetSystem(c));
   PetscCall(CutModes(c, t->l));
   PetscCall(HycoCondensedFree(&none));
   m->data = c;

@@ -8,7 +8,6 @@
 */
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
-#include <hycolcp.h>
 
 #define SAMPLES        480 /* points where the forces are sampled: half all over, half where contacts close or open */
 #define WAYS           16  /* on so many ways between points */
@@ -83,17 +82,14 @@ static PetscBool Held(HycoCondensed c, PetscInt number)
 static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscReal L[])
 {
   const PetscReal *nearest = c->Lambda + (size_t)HycoCondensedNearest(c, mu, NULL) * (size_t)c->m;
-  PetscBool definite;
-  PetscInt its;
-  HycoLCPStatus status = HYCO_LCP_RAY;
-  const HycoLCP lcp = {.n = c->m, .M = c->M, .q = c->g, .symmetric = PETSC_TRUE, .factor = c->set_factor};
+  PetscBool definite, solved = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
   PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
   for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(nearest[i] > 0);
-  if (definite) PetscCall(HycoLCPActiveSet(&lcp, c->active, L, &its, &status));
-  for (PetscInt i = 0; i < c->m; i++) L[i] = status == HYCO_LCP_SOLVED ? PetscMax(L[i], 0) : 0;
+  if (definite) PetscCall(HycoCondensedSolveForces(c, L, &solved));
+  if (!solved) PetscCall(PetscArrayzero(L, c->m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
