@@ -47,6 +47,22 @@ PetscErrorCode HycoPathSetFromOptions(HycoFOM f, HycoOptionItems PetscOptionsObj
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
+{
+  static const char *const name[] = {"-hyco_newton",         "-hyco_newton_rtol",   "-hyco_newton_max_its",
+                                     "-hyco_step_inelastic", "-hyco_step_smallest", "-hyco_substeps",
+                                     "-hyco_checkpoint",     "-hyco_resume"};
+
+  PetscFunctionBegin;
+  for (size_t k = 0; k < sizeof(name) / sizeof(name[0]); k++) {
+    PetscBool set;
+
+    PetscCall(PetscOptionsHasName(f->scene->options, NULL, name[k], &set));
+    PetscCheck(!set, HycoComm(f), PETSC_ERR_USER, "%s is for scenes with a history, and this one has none", name[k]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoPathCreate(HycoFOM f)
 {
   HycoPath p = f->path;
