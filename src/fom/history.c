@@ -43,7 +43,7 @@ PetscErrorCode HycoPathSetFromOptions(HycoFOM f, HycoOptionItems PetscOptionsObj
   PetscCall(HycoOptionsString("-hyco_checkpoint",
                               "<file.h5> history: the last accepted step is kept there, to be resumed from",
                               p->checkpoint, sizeof(p->checkpoint), NULL));
-  PetscCall(HycoOptionsFlag("-hyco_resume", "history: go on from the checkpoint, if it is there", &p->resume));
+  PetscCall(HycoOptionsBool("-hyco_resume", "history: go on from the checkpoint, if it is there", &p->resume, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
