@@ -17,7 +17,7 @@ struct _n_HycoFEState {
   PetscInt n_cells, *start; /* n_cells + 1 */
   PetscReal *value;
   PetscInt n_names;
-  const char **name; /* of the laws' state variables; the laws own them */
+  char **name; /* of the laws' state variables */
 };
 
 /* Where a point's reals are. */
@@ -45,6 +45,7 @@ PetscErrorCode HycoFEStateDestroy(HycoFEState *state)
   if (!state || !*state) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree((*state)->start));
   PetscCall(PetscFree((*state)->value));
+  for (PetscInt k = 0; k < (*state)->n_names; k++) PetscCall(PetscFree((*state)->name[k]));
   PetscCall(PetscFree((*state)->name));
   PetscCall(PetscFree(*state));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -65,7 +66,7 @@ static PetscErrorCode ListNames(HycoScene scene, HycoFEState s)
       PetscBool seen = PETSC_FALSE;
 
       for (PetscInt j = 0; j < s->n_names && !seen; j++) PetscCall(PetscStrcmp(s->name[j], law->state_name[k], &seen));
-      if (!seen) s->name[s->n_names++] = law->state_name[k];
+      if (!seen) PetscCall(PetscStrallocpy(law->state_name[k], &s->name[s->n_names++]));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -112,7 +113,7 @@ PetscErrorCode HycoFEStateGetNames(HycoFEState state, PetscInt *n, const char *c
 {
   PetscFunctionBegin;
   *n = state->n_names;
-  *names = state->name;
+  *names = (const char *const *)state->name;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

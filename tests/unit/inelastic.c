@@ -187,6 +187,82 @@ static PetscErrorCode TestState(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A program's law that tells stress, state and tangent alone: a Maxwell element. */
+static PetscErrorCode UpdateMaxwell(HycoMaterial law, HycoMaterialPoints *p)
+{
+  const PetscReal *young = p->constant[0], *rate = p->constant[1];
+
+  PetscFunctionBegin;
+  (void)law;
+  for (PetscInt i = 0; i < p->n; i++) {
+    const PetscReal tangent = young[i] / (1 + young[i] * rate[i] * p->dt);
+
+    p->stress[i] = tangent * (p->strain[i] - p->state0[i]);
+    p->state[i] = p->state0[i] + p->dt * rate[i] * p->stress[i];
+    if (p->tangent) p->tangent[i] = tangent;
+    if (p->dt > 0.5) p->dt_factor = 0.5;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CreateMaxwell(HycoMaterial law)
+{
+  static const struct _HycoMaterialOps ops = {.update = UpdateMaxwell};
+
+  PetscFunctionBegin;
+  PetscCall(HycoMaterialDeclare(law, "young", "Young's modulus", HYCO_REQUIRED, 0, PETSC_INFINITY));
+  PetscCall(HycoMaterialDeclare(law, "rate", "strain rate by stress", HYCO_REQUIRED, 0, PETSC_INFINITY));
+  PetscCall(HycoMaterialSetStateSize(law, 1));
+  PetscCall(HycoMaterialSetLinear(law, PETSC_FALSE));
+  PetscCall(HycoMaterialSetOps(law, &ops));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestProgram(void)
+{
+  static char *const names[] = {"scene_mesh", "body_block_law", "body_block_young", "body_block_rate", "history_times"};
+  char path[256];
+  char *values[] = {path, "maxwell", "100", "0.01", "0,1"};
+  const PetscReal strain = 0.3, stress = 100 * 0.3 / 2;
+  const PetscReal *values0;
+  PetscReal *K, sum = 0;
+  HycoFEStepReport report;
+  Model m;
+
+  PetscFunctionBegin;
+  snprintf(path, sizeof(path), "/tmp/hyco_inelastic_program_%ld.msh", (long)getpid());
+  PetscCall(HycoMaterialRegister("maxwell", CreateMaxwell));
+  PetscCall(PatchWrite(&patches[HYCO_LINE2], path));
+  PetscCall(HycoSceneFromEntries(PETSC_COMM_SELF, 5, names, values, "/", &m.scene));
+  PetscCall(HycoMeshCreateWhole(PETSC_COMM_SELF, m.scene, &m.mesh));
+  unlink(path);
+  PetscCall(HycoFECreate(m.scene, m.mesh, &m.fe));
+  m.mu[0] = 1;
+  PetscCall(HycoFESetParameters(m.fe, m.mu));
+  PetscCall(HycoFEStateCreate(m.fe, &m.begin));
+  PetscCall(HycoFEStateCreate(m.fe, &m.end));
+  PetscCall(PetscCalloc3(m.fe->n_dof, &m.u, m.fe->n_dof, &m.f, m.fe->n_dof, &m.work));
+  PetscCall(Stiffness(&m, &K));
+  for (PetscInt i = 0; i < m.fe->n_dof; i++) sum += K[i * m.fe->n_dof + i];
+  CHECK_NEAR(sum, 2 * 100 * (1 / 0.2 + 1 / 0.55 + 1 / 0.25), 1e-10); /* at rest it is elastic */
+  PetscCall(PetscFree(K));
+  for (PetscInt i = 0; i < m.fe->n_dof; i++) m.u[i] = strain * m.mesh->xyz[3 * i];
+  PetscCall(Step(&m, PETSC_TRUE, m.f, &report));
+  PetscCall(HycoFEStateGet(m.end, NULL, (PetscReal **)&values0));
+  CHECK_NEAR(values0[1], stress, 1e-12); /* strain, stress, ... of the first point */
+  CHECK(!report.has_potential, "the law tells no potential");
+  CHECK_NEAR(report.dt_factor, 0.5, 0);
+  CHECK_NEAR(report.work, stress / 2 * strain, 1e-12);
+  CHECK_NEAR(report.dissipated, report.work, 1e-12);
+  PetscCall(Stiffness(&m, &K));
+  sum = 0;
+  for (PetscInt i = 0; i < m.fe->n_dof; i++) sum += K[i * m.fe->n_dof + i];
+  CHECK_NEAR(sum, 100 * (1 / 0.2 + 1 / 0.55 + 1 / 0.25), 1e-10); /* E / (1 + E A dt) */
+  PetscCall(PetscFree(K));
+  PetscCall(Free(&m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
@@ -197,6 +273,7 @@ static PetscErrorCode Test(void)
   PetscCall(TestDerivatives(&patches[HYCO_TET4], "standard"));
   PetscCall(TestDerivatives(&patches[HYCO_HEX8], "bbar"));
   PetscCall(TestState());
+  PetscCall(TestProgram());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
