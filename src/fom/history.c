@@ -43,7 +43,7 @@ PetscErrorCode HycoPathSetFromOptions(HycoFOM f, HycoOptionItems PetscOptionsObj
   PetscCall(HycoOptionsString("-hyco_checkpoint",
                               "<file.h5> history: the last accepted step is kept there, to be resumed from",
                               p->checkpoint, sizeof(p->checkpoint), NULL));
-  PetscCall(HycoOptionsFlag("-hyco_resume", "history: go on from the checkpoint, if it is there", &p->resume));
+  PetscCall(HycoOptionsBool("-hyco_resume", "history: go on from the checkpoint, if it is there", &p->resume, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -485,7 +485,7 @@ PetscErrorCode HycoFOMGetHistory(HycoFOM f, HycoHistory *h)
   h->why = p->why;
   h->newton = HycoPathPrefersElastic(f) ? "elastic" : "tangent";
   h->n_orders = p->n_orders;
-  qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
+  if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
   if (p->n_orders) h->order = p->orders[p->n_orders / 2];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
