@@ -87,6 +87,8 @@ PetscErrorCode HycoPathCreate(HycoFOM fom);
 PetscErrorCode HycoPathDestroy(HycoFOM fom);
 /* Declares and reads the options of -hyco_newton and their kin. */
 PetscErrorCode HycoPathSetFromOptions(HycoFOM fom, HycoOptionItems PetscOptionsObject);
+/* Fails where one of them is given and the scene has no history. */
+PetscErrorCode HycoPathRefuseOptions(HycoFOM fom);
 /* Solves the history at mu; not reaching its end is told by the summary's reason. Collective. */
 PetscErrorCode HycoPathSolve(HycoFOM fom, const PetscReal mu[]);
 /* One attempt, from the accepted state at t0 to t1: U, Lambda and the state `end`. Collective. */

@@ -43,7 +43,23 @@ PetscErrorCode HycoPathSetFromOptions(HycoFOM f, HycoOptionItems PetscOptionsObj
   PetscCall(HycoOptionsString("-hyco_checkpoint",
                               "<file.h5> history: the last accepted step is kept there, to be resumed from",
                               p->checkpoint, sizeof(p->checkpoint), NULL));
-  PetscCall(HycoOptionsFlag("-hyco_resume", "history: go on from the checkpoint, if it is there", &p->resume));
+  PetscCall(HycoOptionsBool("-hyco_resume", "history: go on from the checkpoint, if it is there", &p->resume, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
+{
+  static const char *const name[] = {"-hyco_newton",         "-hyco_newton_rtol",   "-hyco_newton_max_its",
+                                     "-hyco_step_inelastic", "-hyco_step_smallest", "-hyco_substeps",
+                                     "-hyco_checkpoint",     "-hyco_resume"};
+
+  PetscFunctionBegin;
+  for (size_t k = 0; k < sizeof(name) / sizeof(name[0]); k++) {
+    PetscBool set;
+
+    PetscCall(PetscOptionsHasName(f->scene->options, NULL, name[k], &set));
+    PetscCheck(!set, HycoComm(f), PETSC_ERR_USER, "%s is for scenes with a history, and this one has none", name[k]);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -468,7 +484,7 @@ PetscErrorCode HycoFOMGetHistory(HycoFOM f, HycoHistory *h)
   h->why = p->why;
   h->newton = HycoPathPrefersElastic(f) ? "elastic" : "tangent";
   h->n_orders = p->n_orders;
-  qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
+  if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
   if (p->n_orders) h->order = p->orders[p->n_orders / 2];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -95,7 +95,7 @@ class Material(Case):
             self.assertIn(word, run.stderr)
 
     def test_refused(self):
-        self.refused('law: cubc, c11: 1', 'block', 'cubc', 'cubic or elastic', 'did you mean cubic?')
+        self.refused('law: cubc, c11: 1', 'block', 'cubc', 'cubic, elastic', 'did you mean cubic?')
         self.refused('law: cubic, c11: 1, c12: 0.1, young: 3', 'body_block_young', 'c11, c12, c44')
         self.refused('law: cubic, c11: 1, c12: 0.1, c34: 3', 'body_block_c34', 'did you mean c44?')
         self.refused('law: cubic, c11: 1, c12: 0.1', 'block', 'c44', 'shear stiffness')
