@@ -110,9 +110,9 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM fom, HycoSummary *summary);
 */
 PetscErrorCode HycoFOMGetSolution(HycoFOM fom, PetscInt *n_nodes, const PetscReal *U[], PetscInt *n_contacts,
                                   const PetscReal *Lambda[], PetscInt *n_cells, const PetscReal *sigma[]);
-/* Of a scene with a history, before it is solved: the fields at its listed times (displacement, stress and its von Mises
-   value, inelastic strain, temperature, the laws' state, contact) go to PATH.xdmf (`path`), which ParaView plays, and
-   PATH.h5, when the path ends, wherever that is. Collective. */
+/* Of a scene with a history, before it is solved: the fields at its listed times (displacement, stress and its von
+   Mises value, inelastic strain, temperature, the laws' state, contact) go to PATH.xdmf (`path`), which ParaView plays,
+   and PATH.h5, when the path ends, wherever that is. Collective. */
 PetscErrorCode HycoFOMSetSeries(HycoFOM fom, const char path[]);
 /* Writes the last solution to PATH.h5 and PATH.xdmf (`path` names the latter). Collective. */
 PetscErrorCode HycoFOMWrite(HycoFOM fom, const char path[]);

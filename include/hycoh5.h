@@ -13,8 +13,8 @@ typedef struct _n_HycoH5 *HycoH5;
 /* Begins a file in memory; HycoH5Close(commit) writes it and gives it its name (hycofile.h), HycoH5Close(no commit)
    forgets it. */
 PetscErrorCode HycoH5Create(const char path[], HycoH5 *file);
-/* The same of all ranks: a file on a disk that all see, to which each writes its rows (HycoH5WriteRows). The calls below
-   that are not collective are rank 0's. One rank: HycoH5Create(). Collective, as HycoH5Close() is then. */
+/* The same of all ranks: a file on a disk that all see, to which each writes its rows (HycoH5WriteRows). The calls
+   below that are not collective are rank 0's. One rank: HycoH5Create(). Collective, as HycoH5Close() is then. */
 PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file);
 /* The same without a file: HycoH5GetImage() gives its bytes (the caller frees them by PetscFree()), HycoH5OpenImage()
    opens such bytes, which must outlive it. `name`: what messages call it. */

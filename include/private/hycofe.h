@@ -41,7 +41,6 @@ struct _n_HycoFE {
   PetscInt n_constant;
   PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
   PetscBool *bbar;          /* by body: the dilatation is the cells' mean */
-  PetscBool *counted;       /* by cell: energies count it on this process; NULL: all */
   signed char *drawn_sign;  /* by cell: the sign of its volume in the mesh file's coordinates */
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* of the entries of K; made by the second assembly into it */

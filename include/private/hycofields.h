@@ -3,13 +3,19 @@
 #define HYCOFIELDS_H
 
 #include <hycocontactimpl.h>
+#include <hycoh5.h>
 
 typedef struct {
   const char *name;
-  HycoPlace place; /* of a mesh that one process has, a surface's nodes are its nodes */
+  HycoPlace place;     /* of a mesh that one process has, a surface's nodes are its nodes */
   PetscInt components; /* 1, 3 (vector) or 6 (symmetric tensor xx, xy, xz, yy, yz, zz) */
   const PetscReal *data;
 } HycoField;
+
+/* Writes `components` numbers, of type MPIU_REAL or MPIU_INT, of each node or cell in the file's order, as a set of
+   cols columns. Collective with an order; without one this process has all n of them. */
+PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
+                              MPI_Datatype type, PetscInt components, PetscInt cols, const void *value);
 
 /* Contact results by slave node. */
 typedef struct {
@@ -18,8 +24,8 @@ typedef struct {
   const PetscReal *lambda, *gap;
 } HycoContactTable;
 
-/* What both kinds of .xdmf, of one solution and of a series, are made of: a name as XML has it; a cell type's; stress of
-   cells (n_cells x ns) in ParaView's order xx, xy, xz, yy, yz, zz. */
+/* What both kinds of .xdmf, of one solution and of a series, are made of: a name as XML has it; a cell type's; stress
+   of cells (n_cells x ns) in ParaView's order xx, xy, xz, yy, yz, zz. */
 void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN]);
 const char *HycoFieldsTopology(HycoCellType type);
 void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
@@ -35,8 +41,8 @@ PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /*
   The usual fields of a solution, then HycoFieldsWrite: displacement, stress, contact force (vector on slaves, minus on
-  masters), contact pressure, gap at the solution, RID marker (may be NULL: none written). u on fe, u_surface on the mesh
-  of the pairs: with an order they are the part's and rank 0's (elsewhere `surface` is NULL), else the same.
+  masters), contact pressure, gap at the solution, RID marker (may be NULL: none written). u on fe, u_surface on the
+  mesh of the pairs: with an order they are the part's and rank 0's (elsewhere `surface` is NULL), else the same.
 */
 PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
                                  HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],

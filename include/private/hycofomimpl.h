@@ -27,12 +27,12 @@ struct _p_HycoFOM {
   HycoSolver solver;
   Mat K, B, Bt;
   Vec U, Lambda, F, D;
-  PetscInt n_nodes, n_cells, n_contacts, n_free; /* of the whole mesh, on every rank */
-  PetscInt width;                                /* most nodes of a contact, on every rank */
-  PetscBool searches;                            /* the masters of moved surfaces, anew where they are */
+  PetscInt n_nodes, n_cells, n_contacts, n_free;   /* of the whole mesh, on every rank */
+  PetscInt width;                                  /* most nodes of a contact, on every rank */
+  PetscBool searches;                              /* the masters of moved surfaces, anew where they are */
   VecScatter to_local, to_surface, lambda_to_root; /* to_surface: NULL on one rank */
   Vec U_local, U_surface, lambda_root;
-  HycoFileOrder *rows, *rows_on_root; /* NULL on one rank; made when needed */
+  HycoFileOrder *rows; /* NULL on one rank, and until it is needed */
   /* the last solution: displacements at the part's nodes and at the surface's (rank 0), without motions that were
      released; stresses of the part's cells, when asked for; on rank 0 the forces and gaps */
   PetscReal *u, *u_surface, *sigma, *lambda, *gap;
@@ -67,9 +67,6 @@ PetscErrorCode HycoFOMToSurface(HycoFOM fom, Vec v, PetscReal value[]);
 PetscErrorCode HycoFOMStress(HycoFOM fom);
 /* The file's order, spread over the ranks; NULL on one. Borrowed. Collective. */
 PetscErrorCode HycoFOMGetRows(HycoFOM fom, const HycoFileOrder **rows);
-/* Values on the part's nodes or cells, on rank 0 in the file's order. Collective. */
-PetscErrorCode HycoFOMToRoot(HycoFOM fom, HycoPlace place, PetscInt components, const PetscReal value[],
-                             PetscReal all[]);
 /* Looks for rigid motions that neither supports nor contact hold, at fe's parameters: fails with their names, or pins
    as many unknowns, as supports of fe. Collective, before the assembly. */
 PetscErrorCode HycoFOMRelease(HycoFOM fom);
@@ -96,7 +93,7 @@ PetscErrorCode HycoFOMEnergy(HycoFOM fom, HycoSummary *summary);
 */
 PetscErrorCode HycoFOMFlexibility(HycoFOM fom, const PetscReal mu[], PetscReal G[]);
 /* How the displacement answers contact forces at mu: X = K^-1 B^T P for q patterns P (n_contacts x q column major, read
-   on rank 0), n_dof x q row major in the file's order, filled on rank 0. One factor of K alone. Collective. */
+   on rank 0), at the part's unknowns, n_dof x q row major. One factor of K alone. Collective. */
 PetscErrorCode HycoFOMResponses(HycoFOM fom, const PetscReal mu[], PetscInt q, const PetscReal P[], PetscReal X[]);
 
 #endif

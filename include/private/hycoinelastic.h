@@ -46,8 +46,8 @@ PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name
 
 /*
   What a step says of itself, of this rank's cells. To be reduced over the ranks by the caller: the least dt_factor, the
-  largest increment, any failed; energies are summed over the cells that HycoFESetOwned() lets this rank count, so that
-  their sum over the ranks counts each cell once.
+  largest increment, any failed; energies are summed over the cells whose first node is this rank's
+  own, so that their sum over the ranks counts each cell once.
 
   With s_m = (s0 + s1) / 2 at each point, work = integral of s_m : (eps1 - eps0), and as an identity
 
@@ -66,10 +66,6 @@ typedef struct {
   PetscBool has_potential; /* whether every law is the gradient of one */
   PetscReal potential;     /* incremental: its gradient by u is f_int; valid with has_potential */
 } HycoFEStepReport;
-
-/* This rank counts the cells whose first node is one of the n_owned from `first` of the distributed numbering; not
-   called: all cells. */
-PetscErrorCode HycoFESetOwned(HycoFE fe, PetscInt n_owned, PetscInt first);
 
 /*
   A step from `begin` at t0 to `end` at t1 (>= t0; with t1 = t0 the laws answer at once, without creep) for the

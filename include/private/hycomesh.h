@@ -18,11 +18,11 @@ struct _n_HycoMesh {
   HycoCellType type;
   /* nodes, ascending by tag; in a part those of its cells, then the others */
   PetscInt n_nodes;
-  PetscReal *xyz;        /* n_nodes x 3, as in the file (not moved) */
-  PetscInt *node_id;     /* tag in the mesh file */
-  PetscInt *node_body;   /* the body that moves it */
-  PetscInt *node_global; /* number in the distributed vectors; NULL: its own index */
-  PetscInt *node_whole;  /* index in the whole mesh; NULL: its own index */
+  PetscReal *xyz;          /* n_nodes x 3, as in the file (not moved) */
+  PetscInt *node_id;       /* tag in the mesh file */
+  PetscInt *node_body;     /* the body that moves it */
+  PetscInt *node_global;   /* number in the distributed vectors; NULL: its own index */
+  PetscInt *node_whole;    /* index in the whole mesh; NULL: its own index */
   PetscInt n_owned, first; /* with node_global: the numbers of this process's own nodes, first .. first + n_owned - 1 */
   /* of the whole mesh of a part or a surface; 0: of this one */
   PetscInt n_whole_nodes, n_whole_cells;

@@ -90,9 +90,9 @@ struct _p_HycoScene {
   PETSCHEADER(int);
   PetscOptions options; /* every entry, the command line's already in */
   char *title, *mesh_path;
-  DM dm;                 /* the program's own mesh; NULL: mesh_path */
-  PetscInt refine;       /* times that the mesh's cells are halved */
-  char *folder;          /* where relative paths of entries start */
+  DM dm;           /* the program's own mesh; NULL: mesh_path */
+  PetscInt refine; /* times that the mesh's cells are halved */
+  char *folder;    /* where relative paths of entries start */
   /* parameters */
   PetscInt n_parameters;
   PetscInt n_variables; /* of expressions: the parameters; with a history t and its tables' values too */

@@ -221,11 +221,13 @@ void DriverReportHistory(cJSON *json, const HycoHistory *history);
 /* After the solve: the table ("": none), a summary; fails where the path has not reached its end. Collective. */
 PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char table[]);
 
+PetscErrorCode CommandCheck(void);
 PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);
 PetscErrorCode CommandPredict(void);
 PetscErrorCode CommandCompare(void);
 PetscErrorCode CommandView(void);
+PetscErrorCode DeclareCheck(PetscOptions options);
 PetscErrorCode DeclareSolve(PetscOptions options);
 PetscErrorCode DeclareTrain(PetscOptions options);
 PetscErrorCode DeclarePredict(PetscOptions options);

@@ -15,7 +15,6 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscCall(PetscFree((*fe)->shares));
   PetscCall(PetscFree((*fe)->constant));
   PetscCall(PetscFree((*fe)->bbar));
-  PetscCall(PetscFree((*fe)->counted));
   PetscCall(PetscFree((*fe)->temperature));
   PetscCall(PetscFree((*fe)->thermal));
   PetscCall(PetscFree((*fe)->pin));

@@ -117,20 +117,6 @@ PetscErrorCode HycoFEStateGetNames(HycoFEState state, PetscInt *n, const char *c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFESetOwned(HycoFE fe, PetscInt n_owned, PetscInt first)
-{
-  HycoMesh m = fe->mesh;
-
-  PetscFunctionBegin;
-  if (!fe->counted) PetscCall(PetscMalloc1(m->n_cells, &fe->counted));
-  for (PetscInt e = 0; e < m->n_cells; e++) {
-    const PetscInt node = m->cells[e * m->nv], row = (m->node_global ? m->node_global[node] : node) - first;
-
-    fe->counted[e] = (PetscBool)(row >= 0 && row < n_owned);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The points of some cells of one body: what their law reads and writes, and the kinematics that make forces of it. */
 typedef struct {
   const PetscReal *u;
@@ -365,7 +351,7 @@ static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear
       *to.accumulated = *from.accumulated + b->increment[i];
       HycoPointForce(fe, el, b->g[i], fe->bbar[body] ? b->mean[k] : NULL, b->w[i], s, f);
       b->report->increment = PetscMax(b->report->increment, b->increment[i]);
-      if (!fe->counted || fe->counted[cell]) Count(fe, b, i, &from, &to);
+      if (HycoMeshOwned(fe->mesh, fe->mesh->cells[cell * fe->mesh->nv]) >= 0) Count(fe, b, i, &from, &to);
       for (PetscInt r = 0; r < ns && b->tangents && !linear; r++) {
         const PetscReal *C = b->tangent + i * ns * ns;
 

@@ -50,8 +50,10 @@ static PetscErrorCode JoinPieces(MPI_Comm comm, HycoMesh m, const PetscInt piece
 static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], PetscInt *n_parts)
 {
   PetscInt *label, *number, n = 0;
+  PetscMPIInt size;
 
   PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
   for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = i;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
     const PetscInt a = Root(part, m->cells[k]), b = Root(part, m->cells[k - k % m->nv]);
@@ -65,7 +67,7 @@ static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], Pets
     part[i] = part[i] == i ? n++ : part[part[i]];
   }
   *n_parts = n;
-  if (m->node_global) {
+  if (size > 1) {
     PetscCall(JoinPieces(comm, m, part, label));
     PetscCall(HycoRankInts(comm, n, label, number, n_parts));
     for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = number[part[i]];
@@ -100,19 +102,21 @@ static void MPIAPI AddSums(void *in, void *inout, PetscMPIInt *n, MPI_Datatype *
   }
 }
 
-/* The sums over all processes, in `high`. Collective. */
+/* The sums over all processes, in `high`, the same bits on each. Collective. */
 static PetscErrorCode Total(MPI_Comm comm, PetscInt n, Sum sum[])
 {
   MPI_Datatype type;
   MPI_Op op;
-  PetscMPIInt count;
+  PetscMPIInt count, rank;
 
   PetscFunctionBegin;
   PetscCall(PetscMPIIntCast(n, &count));
   PetscCallMPI(MPI_Type_contiguous(2, MPIU_REAL, &type));
   PetscCallMPI(MPI_Type_commit(&type));
   PetscCallMPI(MPI_Op_create(AddSums, 1, &op));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, count, type, op, comm));
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Reduce(rank ? (void *)sum : MPI_IN_PLACE, sum, count, type, op, 0, comm));
+  PetscCallMPI(MPI_Bcast(sum, count, type, 0, comm));
   PetscCallMPI(MPI_Op_free(&op));
   PetscCallMPI(MPI_Type_free(&type));
   for (PetscInt k = 0; k < n; k++) sum[k].high += sum[k].low;

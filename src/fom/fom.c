@@ -34,7 +34,6 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   if (f->surface != f->part) PetscCall(HycoMeshDestroy(&f->surface));
   PetscCall(HycoMeshDestroy(&f->part));
   PetscCall(HycoFileOrderDestroy(&f->rows));
-  PetscCall(HycoFileOrderDestroy(&f->rows_on_root));
   PetscCall(DMDestroy(&f->dm));
   PetscCall(HycoPairsDestroy(&f->pairs));
   for (PetscInt k = 0; k < f->n_released; k++) PetscCall(VecDestroy(&f->released[k]));

@@ -82,7 +82,6 @@ PetscErrorCode HycoPathCreate(HycoFOM f)
   PetscCall(PetscMalloc1(f->fe->n_dof, &p->f_local));
   PetscCall(PetscMalloc1(f->fe->n_dof, &p->u0));
   PetscCall(PetscCalloc1(f->scene->n_times + 1, &p->steps));
-  PetscCall(HycoFESetOwned(f->fe, f->part->n_owned, f->part->first));
   for (PetscInt b = 0; b < f->scene->n_bodies; b++) p->flows = (PetscBool)(p->flows || !f->scene->body[b].law->linear);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

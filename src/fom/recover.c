@@ -78,11 +78,11 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
 /* A block of n patterns, from P to their columns of X (stride q). */
 static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], PetscInt q, PetscReal X[])
 {
-  PetscReal *local, *all;
+  PetscReal *local;
   Vec r[BLOCK], x[BLOCK];
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(f->fe->n_dof, &local, f->rank ? 0 : f->n_nodes * f->fe->dim, &all));
+  PetscCall(PetscMalloc1(f->fe->n_dof, &local));
   for (PetscInt j = 0; j < n; j++) {
     PetscCall(VecDuplicate(f->U, &r[j]));
     PetscCall(VecDuplicate(f->U, &x[j]));
@@ -92,13 +92,11 @@ static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], P
   PetscCall(HycoSolverApplyInverse(f->given_solver, n, r, x));
   for (PetscInt j = 0; j < n; j++) {
     PetscCall(HycoFOMToLocal(f, x[j], local));
-    PetscCall(HycoFOMToRoot(f, HYCO_ON_NODES, f->fe->dim, local, all));
-    for (PetscInt i = 0; f->rank == 0 && i < f->n_nodes * f->fe->dim; i++)
-      X[(size_t)i * (size_t)q + (size_t)j] = all[i];
+    for (PetscInt i = 0; i < f->fe->n_dof; i++) X[(size_t)i * (size_t)q + (size_t)j] = local[i];
     PetscCall(VecDestroy(&r[j]));
     PetscCall(VecDestroy(&x[j]));
   }
-  PetscCall(PetscFree2(local, all));
+  PetscCall(PetscFree(local));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -112,6 +110,6 @@ PetscErrorCode HycoFOMResponses(HycoFOM f, const PetscReal mu[], PetscInt q, con
   PetscCall(VecCopy(f->F, f->given_F));
   PetscCall(SolveGiven(f)); /* for its factor */
   for (PetscInt j = 0; j < q; j += BLOCK)
-    PetscCall(RespondBlock(f, PetscMin(BLOCK, q - j), P + (f->rank ? 0 : j * f->n_contacts), q, X + (f->rank ? 0 : j)));
+    PetscCall(RespondBlock(f, PetscMin(BLOCK, q - j), P + (f->rank ? 0 : j * f->n_contacts), q, X + j));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -30,18 +30,6 @@ PetscErrorCode HycoFOMToSurface(HycoFOM f, Vec v, PetscReal value[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFOMToRoot(HycoFOM f, HycoPlace place, PetscInt components, const PetscReal value[], PetscReal all[])
-{
-  PetscFunctionBegin;
-  if (f->size == 1) {
-    PetscCall(PetscArraycpy(all, value, components * (place == HYCO_ON_CELLS ? f->n_cells : f->n_nodes)));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  if (!f->rows_on_root) PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, f->surface, PETSC_TRUE, &f->rows_on_root));
-  PetscCall(HycoFileOrderSend(f->rows_on_root, place, MPIU_REAL, components, value, all));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoFOMGather(HycoFOM f)
 {
   const PetscScalar *v;
@@ -159,13 +147,17 @@ PetscErrorCode HycoFOMStress(HycoFOM f)
 /* The whole solution on rank 0. */
 static PetscErrorCode BringTogether(HycoFOM f)
 {
+  HycoFileOrder *all;
+
   PetscFunctionBegin;
   PetscCall(HycoFOMStress(f));
   if (f->size == 1 || f->all_ready) PetscFunctionReturn(PETSC_SUCCESS);
   if (f->rank == 0 && !f->u_all) PetscCall(PetscMalloc1(f->n_nodes * f->fe->dim, &f->u_all));
   if (f->rank == 0 && !f->sigma_all) PetscCall(PetscMalloc1(f->n_cells * f->fe->n_sigma, &f->sigma_all));
-  PetscCall(HycoFOMToRoot(f, HYCO_ON_NODES, f->fe->dim, f->u, f->u_all));
-  PetscCall(HycoFOMToRoot(f, HYCO_ON_CELLS, f->fe->n_sigma, f->sigma, f->sigma_all));
+  PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, f->surface, PETSC_TRUE, &all));
+  PetscCall(HycoFileOrderSend(all, HYCO_ON_NODES, MPIU_REAL, f->fe->dim, f->u, f->u_all));
+  PetscCall(HycoFileOrderSend(all, HYCO_ON_CELLS, MPIU_REAL, f->fe->n_sigma, f->sigma, f->sigma_all));
+  PetscCall(HycoFileOrderDestroy(&all));
   f->all_ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

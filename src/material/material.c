@@ -300,8 +300,8 @@ static PetscErrorCode CheckConstant(const HycoEntry *e, const PetscReal mu[], Pe
     if (e->hi >= PETSC_INFINITY && (e->lo == 0 || e->lo == HYCO_NOT_NEGATIVE))
       HycoFail("%s is %g at %s; %s must %s", HycoExprKey(e->expr), (double)value[i], place, e->title,
                e->lo == 0 ? "be positive" : "not be negative");
-    HycoFail("%s is %.10g at %s; %s must lie between %g and %g", HycoExprKey(e->expr), (double)value[i], place, e->title,
-             (double)e->lo, (double)e->hi);
+    HycoFail("%s is %.10g at %s; %s must lie between %g and %g", HycoExprKey(e->expr), (double)value[i], place,
+             e->title, (double)e->lo, (double)e->hi);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

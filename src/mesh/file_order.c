@@ -9,8 +9,11 @@ static PetscErrorCode CreateSF(HycoFileOrder *o, HycoPlace place, PetscInt n, co
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(o->comm, &rank));
-  PetscCall(PetscLayoutCreateFromSizes(o->comm, !root ? PETSC_DECIDE : rank == 0 ? o->all[place] : 0, o->all[place], 1,
-                                       &layout));
+  PetscCall(PetscLayoutCreateFromSizes(o->comm,
+                                       !root       ? PETSC_DECIDE
+                                       : rank == 0 ? o->all[place]
+                                                   : 0,
+                                       o->all[place], 1, &layout));
   PetscCall(PetscLayoutGetRange(layout, &o->first[place], &o->n[place]));
   o->n[place] -= o->first[place];
   PetscCall(PetscSFCreate(o->comm, &o->sf[place]));
@@ -41,8 +44,8 @@ PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh m, HycoMesh surface, 
     }
     PetscCall(CreateSF(o, on_cells ? HYCO_ON_CELLS : HYCO_ON_NODES, n, leaf, row, root));
   }
-  PetscCall(CreateSF(o, HYCO_ON_SURFACE, surface ? surface->n_nodes : 0, NULL, surface ? surface->node_whole : NULL,
-                     root));
+  PetscCall(
+      CreateSF(o, HYCO_ON_SURFACE, surface ? surface->n_nodes : 0, NULL, surface ? surface->node_whole : NULL, root));
   PetscCall(PetscFree2(leaf, row));
   *order = o;
   PetscFunctionReturn(PETSC_SUCCESS);

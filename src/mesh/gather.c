@@ -52,8 +52,9 @@ static PetscBool Owns(const Gather *g, PetscInt node)
   return (PetscBool)(HycoMeshOwned(g->part, node) >= 0);
 }
 
-/* A node's row: tag, 0, 0, body, numbers in the distributed vectors and in the whole mesh; a cell's, which belongs to the rank of its first node: tag, 0, 0, body,
-   nodes' tags; a facet's: group, tag of its cell, place among this rank's, nodes' tags. */
+/* A node's row: tag, 0, 0, body, numbers in the distributed vectors and in the whole mesh; a cell's, which belongs to
+   the rank of its first node: tag, 0, 0, body, nodes' tags; a facet's: group, tag of its cell, place among this rank's,
+   nodes' tags. */
 static PetscErrorCode Pack(Gather *g)
 {
   HycoMesh m = g->part;

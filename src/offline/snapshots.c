@@ -1,5 +1,6 @@
 /* HycoSnapshots: a folder with one file per parameter value, each complete or absent. */
 #include <hycosnapshotsimpl.h>
+#include <hycofields.h>
 #include <hycofile.h>
 #include <hycoh5.h>
 #include <errno.h>
@@ -204,36 +205,17 @@ static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A field of the part's nodes or cells, by rows of the file's order. */
-static PetscErrorCode WriteField(HycoFOM fom, HycoH5 h, const char name[], HycoPlace place, PetscInt components,
-                                 const PetscReal value[])
+static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[], const PetscReal force[])
 {
-  const PetscInt all = components * (place == HYCO_ON_CELLS ? fom->n_cells : fom->n_nodes);
-  const HycoFileOrder *order;
-  PetscReal *rows = NULL;
-  PetscErrorCode ierr;
+  const PetscInt dim = fom->fe->dim;
+  const HycoFileOrder *rows;
 
-  PetscFunctionBegin;
-  PetscCall(HycoFOMGetRows(fom, &order));
-  if (order) {
-    PetscCall(PetscMalloc1(order->n[place] * components, &rows));
-    PetscCall(HycoFileOrderSend(order, place, MPIU_REAL, components, value, rows));
-  }
-  ierr = HycoH5WriteRows(h, name, MPIU_REAL, all, 1, order ? order->first[place] * components : 0,
-                         order ? order->n[place] * components : all, order ? rows : value);
-  PetscCall(PetscFree(rows));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[],
-                                  const PetscReal force[])
-{
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(fom), WriteHead(s, fom, h, mu));
-  PetscCall(WriteField(fom, h, "U", HYCO_ON_NODES, fom->fe->dim, fom->u));
-  PetscCall(WriteField(fom, h, "sigma", HYCO_ON_CELLS, fom->fe->n_sigma, fom->sigma));
-  PetscCall(WriteField(fom, h, "force", HYCO_ON_NODES, fom->fe->dim, force));
+  PetscCall(HycoFOMGetRows(fom, &rows));
+  PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "U", HYCO_ON_NODES, MPIU_REAL, dim, 1, fom->u));
+  PetscCall(HycoFieldWrite(h, rows, fom->n_cells, "sigma", HYCO_ON_CELLS, MPIU_REAL, fom->fe->n_sigma, 1, fom->sigma));
+  PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "force", HYCO_ON_NODES, MPIU_REAL, dim, 1, force));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

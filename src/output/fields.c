@@ -20,22 +20,24 @@ static PetscInt Count(const HycoFileOrder *order, HycoMesh m, HycoPlace place)
   return order ? order->all[place] : place == HYCO_ON_CELLS ? m->n_cells : m->n_nodes;
 }
 
-/* Values of nodes or cells, of type MPIU_REAL or MPIU_INT, in the file's order. Collective with an order. */
-static PetscErrorCode WriteRows(HycoH5 h, const HycoFileOrder *order, HycoMesh m, const char name[], HycoPlace place,
-                                MPI_Datatype type, PetscInt components, const void *value)
+PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
+                              MPI_Datatype type, PetscInt components, PetscInt cols, const void *value)
 {
-  const PetscInt all = Count(order, m, place), n = order ? order->n[place] : all;
+  const PetscInt all = order ? order->all[place] : n, own = order ? order->n[place] : n,
+                 first = order ? order->first[place] : 0, lines = components / cols;
   const size_t size = type == MPIU_INT ? sizeof(PetscInt) : sizeof(PetscReal);
   char *rows = NULL;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (order) {
-    PetscCall(PetscCalloc1((size_t)(n * components) * size, &rows));
+    PetscCall(PetscCalloc1((size_t)(own * components) * size, &rows));
     PetscCall(HycoFileOrderSend(order, place, type, components, value, rows));
     value = rows;
   }
-  PetscCall(HycoH5WriteRows(h, name, type, all, components, order ? order->first[place] : 0, n, value));
+  ierr = HycoH5WriteRows(h, name, type, all * lines, cols, first * lines, own * lines, value);
   PetscCall(PetscFree(rows));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -45,15 +47,15 @@ static PetscErrorCode WriteMesh(HycoH5 h, const HycoFileOrder *order, HycoMesh m
   PetscInt *cells = m->cells;
 
   PetscFunctionBegin;
-  PetscCall(WriteRows(h, order, m, "mesh/xyz", HYCO_ON_NODES, MPIU_REAL, 3, X));
+  PetscCall(HycoFieldWrite(h, order, m->n_nodes, "mesh/xyz", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
   if (order) {
     PetscCall(PetscMalloc1(m->n_cells * m->nv, &cells));
     for (PetscInt k = 0; k < m->n_cells * m->nv; k++) cells[k] = m->node_whole[m->cells[k]];
   }
-  PetscCall(WriteRows(h, order, m, "mesh/cells", HYCO_ON_CELLS, MPIU_INT, m->nv, cells));
+  PetscCall(HycoFieldWrite(h, order, m->n_cells, "mesh/cells", HYCO_ON_CELLS, MPIU_INT, m->nv, m->nv, cells));
   if (order) PetscCall(PetscFree(cells));
-  PetscCall(WriteRows(h, order, m, "mesh/node_id", HYCO_ON_NODES, MPIU_INT, 1, m->node_id));
-  PetscCall(WriteRows(h, order, m, "mesh/cell_id", HYCO_ON_CELLS, MPIU_INT, 1, m->cell_id));
+  PetscCall(HycoFieldWrite(h, order, m->n_nodes, "mesh/node_id", HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
+  PetscCall(HycoFieldWrite(h, order, m->n_cells, "mesh/cell_id", HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,7 +98,8 @@ static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder 
     char name[HYCO_LINE];
 
     PetscCall(PetscSNPrintf(name, sizeof(name), "%s/%s", FieldFolder(&field[k]), field[k].name));
-    PetscCall(WriteRows(h, order, m, name, field[k].place, MPIU_REAL, field[k].components, field[k].data));
+    PetscCall(HycoFieldWrite(h, order, Count(NULL, m, field[k].place), name, field[k].place, MPIU_REAL,
+                             field[k].components, field[k].components, field[k].data));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -219,10 +222,10 @@ static PetscErrorCode BeginTextOnRoot(MPI_Comm comm, const char path[], const ch
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode EndText(MPI_Comm comm, HycoFile *out, PetscBool commit)
+static PetscErrorCode EndText(MPI_Comm comm, HycoFile *out)
 {
   PetscFunctionBegin;
-  HycoOnRoot(comm, HycoFileClose(out, commit));
+  HycoOnRoot(comm, HycoFileClose(out, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,16 +236,19 @@ PetscErrorCode HycoFieldsWrite(const char path[], const HycoFileOrder *order, Hy
   const MPI_Comm comm = order ? order->comm : PETSC_COMM_SELF;
   char h5[PETSC_MAX_PATH_LEN];
   HycoFile out = NULL;
-  PetscErrorCode ierr, failed;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
   ierr = BeginTextOnRoot(comm, path, h5, order, m, n, field, &out);
   /* the numbers first: without them the .xdmf would point at none, or at those of another run */
   if (!ierr) ierr = WriteH5(comm, h5, order, m, X, scene, mu, n, field, contact);
-  failed = EndText(comm, &out, (PetscBool)!ierr);
-  if (failed && !ierr) (void)remove(h5);
-  PetscCall(ierr ? ierr : failed);
+  if (!ierr) {
+    ierr = EndText(comm, &out);
+    if (ierr) (void)remove(h5);
+  } else if (out)
+    PetscCall(HycoFileClose(&out, PETSC_FALSE));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -25,7 +25,7 @@ struct _n_HycoH5 {
 };
 
 /* What the description of a set takes at most, and the first of a file. */
-#define ROOM 65536
+#define ROOM 4096
 
 /* A dataset that says that the file ends with a seal: one that has lost it is damaged, not old. */
 #define HYCO_H5_SEALED "sealed"
@@ -109,8 +109,8 @@ PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the disk takes the description of one more set, and the file may become as long as `bytes` of numbers make it.
-   Rank 0. */
+/* Whether the disk takes the description of one more set, and the file may become as long as `bytes` of numbers make
+   it. Rank 0. */
 static PetscErrorCode MakeRoom(HycoH5 f, size_t bytes)
 {
   static const char zeros[ROOM];

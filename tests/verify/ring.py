@@ -80,13 +80,13 @@ class Ring(Verify):
             self.row(f'shrink fit: p at t = {t[k]:g}', p[k], relaxing(t[k]), 0.2)
 
     def test_closing(self):
-        t, p, h = self.path_of(8, 640, 50, 0.02, 8)
+        t, p, h = self.path_of(8, 1280, 50, 0.02, 6)
         before = t < 0.99 * CLOSES
         self.row('closing: largest force before', max(np.array(h['lambda_max'])[before]), 0, 0)
         k = int(np.argmax(p > 0))
         begin = t[k] - p[k] * (t[k + 1] - t[k]) / (p[k + 1] - p[k])
         self.row('closing: time', begin, CLOSES, 0.5)
-        for at in (3, 4, 8):
+        for at in (3, 4, 6):
             k = int(round(at / t[1]))
             self.row(f'closing: p at t = {at}', p[k], float(closing(t[k])), 0.2)
 
