@@ -484,7 +484,7 @@ PetscErrorCode HycoFOMGetHistory(HycoFOM f, HycoHistory *h)
   h->why = p->why;
   h->newton = HycoPathPrefersElastic(f) ? "elastic" : "tangent";
   h->n_orders = p->n_orders;
-  qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
+  if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
   if (p->n_orders) h->order = p->orders[p->n_orders / 2];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
