@@ -99,6 +99,8 @@ PetscErrorCode HycoPathRestore(HycoFOM fom);
 PetscErrorCode HycoPathAssemble(HycoFOM fom, PetscReal t);
 /* Whether steps are solved with the elastic stiffness. */
 PetscBool HycoPathPrefersElastic(HycoFOM fom);
+/* Fails where the checkpoint would take the place of a model. Collective. */
+PetscErrorCode HycoPathCheckPlace(HycoFOM fom);
 /* The checkpoint, if there is to be one; back from it, if it is there. Collective. */
 PetscErrorCode HycoPathSave(HycoFOM fom);
 PetscErrorCode HycoPathLoad(HycoFOM fom);

@@ -244,6 +244,26 @@ static PetscErrorCode BringItems(HycoFOM f, Content *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What is at its place is a checkpoint, or nothing that took hours. */
+static PetscErrorCode CheckPlace(const char path[])
+{
+  PetscBool precious;
+
+  PetscFunctionBegin;
+  if (access(path, F_OK)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5IsPrecious(path, &precious));
+  HycoCheck(!precious, "-hyco_checkpoint %s is a model or a snapshot, and stays one; give the checkpoint another name",
+            path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathCheckPlace(HycoFOM f)
+{
+  PetscFunctionBegin;
+  if (f->path->checkpoint[0]) HycoOnRoot(HycoComm(f), CheckPlace(f->path->checkpoint));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoPathSave(HycoFOM f)
 {
   HycoPath p = f->path;

@@ -435,6 +435,7 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(Begin(f, mu));
   PetscCall(HycoSeriesBegin(f));
+  PetscCall(HycoPathCheckPlace(f));
   if (p->resume) PetscCall(HycoPathLoad(f));
   while (p->step < f->scene->n_times && reached) PetscCall(Advance(f, &reached));
   p->ended = reached;
@@ -452,7 +453,12 @@ void HycoPathSummary(HycoFOM f, HycoSummary *s)
   const HycoPath p = f->path;
 
   s->iterations = 0;
-  for (PetscInt k = 0; k < p->n_steps; k++) s->iterations += p->steps[k].iterations;
+  s->seconds.factor = s->seconds.solve = 0;
+  for (PetscInt k = 0; k < p->n_steps; k++) {
+    s->iterations += p->steps[k].iterations;
+    s->seconds.factor += p->steps[k].seconds_factor;
+    s->seconds.solve += p->steps[k].seconds_solve;
+  }
   s->kkt = p->kkt;
   s->reason = p->ended ? HYCO_CONVERGED : HYCO_DIVERGED_STEP;
   s->strain_energy = p->work_done.stored;
