@@ -51,7 +51,7 @@ class Documents(unittest.TestCase):
     def test_compare(self):
         """The comparison itself: words and numbers count, times do not."""
         document.compare('force 3.10, u 1e-9\n...\nseconds: 0.1 set-up', 'x\nforce 3.12, u 7e-12\ny\nseconds: 0.7 set-up\n')
-        for wrong in ('force 3.2, u 1e-9', 'forces 3.10, u 1e-9', 'force 3.10', 'y\nforce 3.10, u 1e-9'):
+        for wrong in ('force 3.20, u 1e-9', 'energy 3.10 for 1e-9', 'force 3.10', 'y\nforce 3.10, u 1e-9'):
             with self.assertRaises(AssertionError):
                 document.compare(wrong, 'force 3.10, u 1e-9\ny')
 
