@@ -39,7 +39,7 @@ PetscErrorCode HycoFinalize(void);
 const char *HycoVersion(void);
 
 /* Every -hyco_ option that the library's classes declare, in the order of the method; `*n` receives their number. Not
-   collective. Borrowed, until HycoFinalize(). */
+   collective. Borrowed, until a type is registered, or HycoFinalize(). */
 PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *table[]);
 
 /*

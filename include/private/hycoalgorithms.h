@@ -3,15 +3,25 @@
 #define HYCOALGORITHMS_H
 
 #include <hycoimpl.h>
+#include <slepcsvd.h>
+
+/* The accurate default among the SVD's types: tall-skinny QR of a dense matrix, SVD of its triangle. */
+#define HYCO_SVD_TSQR "tsqr"
+/* Registers it beside SLEPc's types. */
+PetscErrorCode HycoSVDRegisterAll(void);
+/* An SVD for HycoPOD(), of that type; the caller's. */
+PetscErrorCode HycoPODCreateSVD(MPI_Comm comm, SVD *svd);
 
 /*
   POD (17)-(18) in the 2-norm of a dense matrix S (N x n_s, any row distribution). V (N x l, the caller owns it) holds
   the first l left singular vectors with the smallest l whose energy is at least 1 - tol; singular values below noise *
   sigma_1 are never taken, nor more than max_modes (0: no limit). sigma (room for n_s) receives min(N, n_s) singular
   values. The sign of a mode: its entry of largest magnitude is positive. A zero matrix gives l = 0 and V = NULL.
-  Collective.
+  svd: sets its type, settings and options prefix; its options are read here. Where the type finds modes inaccurately or
+  not at all, those from the first such are left out, and sigma has one value for all their energy, then 0; l is less
+  than HycoPODRank() says if (18) needs them. Collective on S, and on svd, which has its communicator.
 */
-PetscErrorCode HycoPOD(Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
+PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
                        PetscReal sigma[]);
 
 /* The l of k singular values that HycoPOD() takes: the tail is summed, so that tol can be tiny. */

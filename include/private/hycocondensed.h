@@ -61,11 +61,11 @@ typedef struct _n_HycoCondensed {
   PetscReal last[HYCO_MAX_PARAMETERS];
   PetscReal gap_size;                       /* largest of the gap's field */
   PetscReal *packed, *M, *work, *g, *H, *a; /* M: G, m x m */
-  HycoSetFactor set_factor;                 /* of M on the active contacts */
-  PetscBool *active;
-  Mat flexibility; /* M; forces: the model's Lambda; the system that both make */
+  PetscBool *active;                        /* a solve's start */
+  Mat flexibility;                          /* M; with g the system; the forces that solve it */
   Vec forces;
   HycoSystem system;
+  HycoSolver solver; /* training only */
 } * HycoCondensed;
 
 /* What the modes are made of (condense_modes.c): snapshots, and responses K^-1 B^T P to patterns of forces at each node
@@ -132,6 +132,11 @@ PetscErrorCode HycoCondensedFree(HycoCondensed *condensed);
 PetscErrorCode HycoCondensedAllocate(HycoCondensed condensed);
 /* Room for what is online. */
 PetscErrorCode HycoCondensedPrepare(HycoCondensed condensed);
+/* The system of M and g, for this solver; forces: where they are to be (m, borrowed), or NULL. And its end. */
+PetscErrorCode HycoCondensedCreateSystem(HycoCondensed condensed, PetscReal forces[], HycoSolver solver);
+PetscErrorCode HycoCondensedResetSystem(HycoCondensed condensed);
+/* In training: the forces of M and g as they are, from the active contacts given; *solved: the residuals are small. */
+PetscErrorCode HycoCondensedSolveForces(HycoCondensed condensed, PetscReal forces[], PetscBool *solved);
 /* A field at mu without the nodes with number `skip` along `axis` (-1, -1: all); g into c->g likewise, and D alone into
    c->given.gap. */
 PetscErrorCode HycoCondensedEvaluate(HycoCondensed condensed, PetscInt field, const PetscReal mu[], PetscInt axis,

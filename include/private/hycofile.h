@@ -35,6 +35,12 @@ PetscErrorCode HycoFileClose(HycoFile *file, PetscBool commit);
 /* A name beside `path` (or the file that it is a link to) for what this run alone writes, reads and removes. Not
    created. On rank 0 of comm; the same on every rank. Collective. */
 PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind[], char scratch[HYCO_FILE_NAME]);
+/* Makes that file, empty, for the one that will be at `path`. On this process alone. */
+PetscErrorCode HycoFileOpenScratch(const char scratch[], const char path[], int *fd);
+/* Writes bytes at a place of an open file, all of them, or fails as a full disk makes it; the same of an errno that is
+   not 0. `path`: what messages name. On this process alone. */
+PetscErrorCode HycoFilePut(int fd, const char path[], const void *data, size_t bytes, size_t place);
+PetscErrorCode HycoFileComplain(const char path[], int failed);
 /* The file `scratch` takes the place of `path`. On this process alone. */
 PetscErrorCode HycoFileKeep(const char scratch[], const char path[]);
 /* The path that a temporary name belongs to: what a message names. A path that is none is returned as it is. */

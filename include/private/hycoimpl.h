@@ -161,6 +161,8 @@ PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin);
 /* The seal of a file with these bytes, to be appended to them. */
 #define HYCO_SEAL 24
 void HycoSealMake(const void *data, size_t bytes, unsigned char seal[HYCO_SEAL]);
+/* The seal of a file as it is, and its size. */
+PetscErrorCode HycoSealFile(const char path[], size_t *size, unsigned char seal[HYCO_SEAL]);
 /* Size of a file, and whether it has a seal; fails when it has one and its bytes are not the sealed ones. */
 PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed);
 
@@ -190,6 +192,8 @@ typedef struct {
 /* Runs `declare` with an empty database, its declarations going to the list and reading nothing. */
 PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)(PetscOptions));
 PetscErrorCode HycoOptionListDestroy(HycoOptionList *list);
+/* The table of HycoGetOptionTable() is recorded anew when it is asked for again. */
+PetscErrorCode HycoOptionsForgetTable(void);
 /* The option of this name (without dash; mu_ is that of mu_radius), or NULL. Borrowed. */
 const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name[]);
 /* Makes an object of each class, which sets itself from `options`. */

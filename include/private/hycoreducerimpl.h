@@ -5,6 +5,7 @@
 #include <hycoromimpl.h>
 #include <hycosnapshotsimpl.h>
 #include <hycoreducer.h>
+#include <slepcsvd.h>
 
 enum { HYCO_SEED_DISPLACEMENT, HYCO_SEED_STRESS, HYCO_SEED_FORCE, HYCO_SEED_DUAL, HYCO_N_SEEDS };
 
@@ -35,6 +36,7 @@ struct _p_HycoReducer {
   char folder[PETSC_MAX_PATH_LEN]; /* of snapshots; "": from the model's name */
   PetscReal tol[HYCO_N_SEEDS], noise, extension;
   PetscInt max_modes, layers;
+  char svd_type[32]; /* of PODs */
   PetscBool seed[HYCO_N_SEEDS], whole_rid;
   PetscInt deim; /* of each basis that seeds the RID: 0 DEIM, 1 Q-DEIM */
   PetscInt n_groups;
@@ -80,9 +82,14 @@ struct _p_HycoReducer {
   PetscInt l;            /* modes */
   PetscReal *sigma;      /* every rank: l */
   PetscReal *V_whole;    /* (n_nodes * dim) x l row major */
-  PetscReal *U, *Lambda; /* snapshots, column major: n_dof x n_s, n_contacts x n_s */
-  PetscReal *VtU;        /* l x n_s column major: V^T of the snapshots less their lifting */
-  PetscReal *U_norm;     /* n_s: of the whole snapshot */
+  Mat S;                 /* every rank: displacements, n_dof x n_s, rows spread */
+  PetscReal *U_rid;      /* of these, the rows of the model's mesh, column major */
+  PetscInt *contact_row; /* by node: its place in U_contact, or -1 */
+  PetscReal *U_contact;  /* the rows of the contacts' nodes, column major */
+  PetscInt n_contact_nodes;
+  PetscReal *Lambda; /* n_contacts x n_s column major */
+  PetscReal *VtU;    /* l x n_s column major: V^T of the snapshots less their lifting */
+  PetscReal *U_norm; /* n_s: of the whole snapshot */
   PetscInt n_s;
   unsigned long long fingerprint;
   PetscBool *grown; /* rank 0, greedy: cells of the RIDs so far; else NULL */
@@ -109,6 +116,17 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
  */
 PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char path[], PetscBool learn,
                                  HycoTraining *report);
+/* The SVD of its PODs, the caller's: with the reducer's type, and options -hyco_pod_svd_... to be read. */
+PetscErrorCode HycoReducerCreateSVD(HycoReducer t, MPI_Comm comm, SVD *svd);
+/* HycoPOD() by that; how many of the `found` modes that
+   it gave the tolerance takes: fails where it takes more, for lack of accuracy. Collective on S; not collective. */
+PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
+                              PetscReal sigma[]);
+PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
+                                  PetscInt max_modes, PetscInt found, PetscInt *l);
+/* On rank 0 (U, column major, the caller's; elsewhere empty) the snapshots' displacements at nodes that rank 0 gives.
+   Collective. */
+PetscErrorCode HycoReducerFetchRows(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **U);
 /* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
    rows, column major, on every rank; a dense matrix on rank 0, row or column major (the caller frees). Collective. */
 PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, Mat *S);

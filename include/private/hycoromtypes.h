@@ -4,8 +4,6 @@
 
 #include <hycoromtype.h>
 
-/* Registers them; called by whatever comes first. */
-PetscErrorCode HycoROMRegisterAll(void);
 PetscErrorCode HycoROMCreate_Hybrid(HycoROM model);
 PetscErrorCode HycoROMCreate_Projection(HycoROM model);
 PetscErrorCode HycoROMCreate_Condensed(HycoROM model);

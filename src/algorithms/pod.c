@@ -1,31 +1,22 @@
 /*
-  Proper orthogonal decomposition (section 4.1). Tall matrices: orthogonal factors by SLEPc's tall-skinny QR, then the
-  SVD of the small triangle by LAPACK: singular values accurate to 1e-7 relative at 1e-12 of the first, where the
-  cross-product matrix would have lost them at 1e-8. Matrices with few rows are gathered and decomposed whole.
+  Proper orthogonal decomposition (section 4.1): an SVD of SLEPc's, and what is taken of its left vectors. A type of SVD
+  that iterates, or works on the cross-product matrix, finds small singular values inaccurately or not at all, whatever
+  it says: its modes are taken up to the first that fails a check, and what they leave out counts by its energy.
 */
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
-#include <slepcbv.h>
 
-/* Thin SVD of A (m x n column major, overwritten): s (min(m, n)) and the left vectors U (m x min(m, n)). */
-static PetscErrorCode ThinSVD(PetscInt m, PetscInt n, PetscReal A[], PetscReal s[], PetscReal U[])
+/* A mode with more is not taken: relative error of its singular value, cosine with those before it. */
+#define ACCURATE    1e-3
+#define ORTHONORMAL 1e-9
+#define FIRST       16 /* triplets that are asked for at first; twice as many, until they suffice */
+
+PetscErrorCode HycoPODCreateSVD(MPI_Comm comm, SVD *svd)
 {
-  PetscBLASInt mb, nb, kb, lwork = -1, info;
-  PetscReal size, none;
-  PetscReal *work;
-
   PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(m, &mb));
-  PetscCall(PetscBLASIntCast(n, &nb));
-  PetscCall(PetscBLASIntCast(PetscMin(m, n), &kb));
-  LAPACKgesvd_("S", "N", &mb, &nb, A, &mb, s, U, &mb, &none, &(PetscBLASInt){1}, &size, &lwork, &info);
-  lwork = (PetscBLASInt)size;
-  PetscCall(PetscMalloc1(lwork, &work));
-  LAPACKgesvd_("S", "N", &mb, &nb, A, &mb, s, U, &mb, &none, &(PetscBLASInt){1}, work, &lwork, &info);
-  PetscCall(PetscFree(work));
-  (void)kb;
-  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB,
-             "the singular value decomposition did not converge (LAPACK gesvd: %d)", (int)info);
+  PetscCall(HycoSVDRegisterAll());
+  PetscCall(SVDCreate(comm, svd));
+  PetscCall(SVDSetType(*svd, HYCO_SVD_TSQR));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -41,92 +32,6 @@ PetscInt HycoPODRank(PetscInt k, const PetscReal s[], PetscReal tol, PetscReal n
   }
   while (l > 0 && !(s[l - 1] > noise * s[0])) l--;
   return max_modes > 0 ? PetscMin(l, max_modes) : l;
-}
-
-/* Whole matrix, column major, on every rank. */
-static PetscErrorCode GatherDense(Mat S, PetscReal all[])
-{
-  PetscInt N, n, *rows;
-  PetscReal *by_row;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetSize(S, &N, &n));
-  PetscCall(PetscMalloc2(N, &rows, N * n, &by_row));
-  for (PetscInt i = 0; i < N; i++) rows[i] = i;
-  PetscCall(HycoGatherRows(S, N, rows, by_row));
-  for (PetscInt i = 0; i < N; i++) {
-    for (PetscInt j = 0; j < n; j++) all[j * N + i] = by_row[i * n + j];
-  }
-  PetscCall(PetscFree2(rows, by_row));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode SmallPOD(Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
-                               PetscReal sigma[])
-{
-  PetscInt N, n, lo, hi, lda;
-  PetscReal *A, *U;
-  PetscScalar *v;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetSize(S, &N, &n));
-  PetscCall(PetscMalloc2(N * n, &A, N * PetscMin(N, n), &U));
-  PetscCall(GatherDense(S, A));
-  PetscCall(ThinSVD(N, n, A, sigma, U));
-  *l = HycoPODRank(PetscMin(N, n), sigma, tol, noise, max_modes);
-  if (*l) {
-    PetscCall(MatGetOwnershipRange(S, &lo, &hi));
-    PetscCall(MatCreateDense(PetscObjectComm((PetscObject)S), hi - lo, PETSC_DECIDE, N, *l, NULL, V));
-    PetscCall(MatDenseGetLDA(*V, &lda));
-    PetscCall(MatDenseGetArray(*V, &v));
-    for (PetscInt j = 0; j < *l; j++) PetscCall(PetscArraycpy(v + j * lda, U + j * N + lo, hi - lo));
-    PetscCall(MatDenseRestoreArray(*V, &v));
-  }
-  PetscCall(PetscFree2(A, U));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode TallPOD(Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
-                              PetscReal sigma[])
-{
-  PetscInt N, n;
-  BV Q;
-  Mat R, Ur;
-  PetscScalar *r;
-  PetscReal *A, *U;
-  PetscInt lda;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetSize(S, &N, &n));
-  PetscCall(BVCreateFromMat(S, &Q));
-  PetscCall(BVSetFromOptions(Q));
-  PetscCall(BVSetOrthogonalization(Q, BV_ORTHOG_CGS, BV_ORTHOG_REFINE_IFNEEDED, PETSC_DEFAULT, BV_ORTHOG_BLOCK_TSQR));
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, n, n, NULL, &R));
-  PetscCall(BVOrthogonalize(Q, R));
-  PetscCall(PetscMalloc2(n * n, &A, n * n, &U));
-  PetscCall(MatDenseGetLDA(R, &lda));
-  PetscCall(MatDenseGetArray(R, &r));
-  for (PetscInt j = 0; j < n; j++) {
-    for (PetscInt i = 0; i < n; i++) A[j * n + i] = i <= j ? r[j * lda + i] : 0;
-  }
-  PetscCall(MatDenseRestoreArray(R, &r));
-  PetscCall(ThinSVD(n, n, A, sigma, U));
-  *l = HycoPODRank(n, sigma, tol, noise, max_modes);
-  if (*l) {
-    Mat W;
-
-    PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, n, n, U, &Ur));
-    PetscCall(BVMultInPlace(Q, Ur, 0, *l));
-    PetscCall(MatDestroy(&Ur));
-    PetscCall(BVSetActiveColumns(Q, 0, *l));
-    PetscCall(BVGetMat(Q, &W));
-    PetscCall(MatDuplicate(W, MAT_COPY_VALUES, V));
-    PetscCall(BVRestoreMat(Q, &W));
-  }
-  PetscCall(PetscFree2(A, U));
-  PetscCall(MatDestroy(&R));
-  PetscCall(BVDestroy(&Q));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A mode's largest entry (the first of nearly equal ones) is made positive. */
@@ -158,26 +63,159 @@ static PetscErrorCode FixSigns(Mat V, PetscInt l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPOD(Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
+/* Runs the decomposition of S for its first `most` triplets; fixed: the options say another number. */
+static PetscErrorCode Solve(SVD svd, Mat S, PetscInt most, PetscBool *fixed)
+{
+  PetscInt N, n, asked;
+  SVDType type;
+  char name[64];
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(S, &N, &n));
+  PetscCall(SVDReset(svd));
+  PetscCall(SVDGetType(svd, &type));
+  PetscCall(PetscStrncpy(name, type, sizeof(name)));
+  PetscCall(SVDSetType(svd, SVDLAPACK)); /* and back: an eigensolver inside keeps the sizes of the problem before */
+  PetscCall(SVDSetType(svd, name));
+  PetscCall(SVDSetOperators(svd, S, NULL));
+  PetscCall(SVDSetImplicitTranspose(svd, (PetscBool)(N >= n))); /* no second copy of S; tsqr takes a wide one's */
+  PetscCall(SVDSetDimensions(svd, most, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(SVDSetWhichSingularTriplets(svd, SVD_LARGEST));
+  PetscCall(SVDSetFromOptions(svd));
+  PetscCall(SVDGetDimensions(svd, &asked, NULL, NULL));
+  *fixed = (PetscBool)(asked != most);
+  PetscCall(SVDSolve(svd));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first k left singular vectors, with the rows of S on their ranks. */
+static PetscErrorCode GetVectors(SVD svd, Mat S, PetscInt k, Mat *V)
+{
+  PetscInt N, rows;
+  Vec v;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(S, &N, NULL));
+  PetscCall(MatGetLocalSize(S, &rows, NULL));
+  PetscCall(MatCreateDense(PetscObjectComm((PetscObject)S), rows, PETSC_DECIDE, N, k, NULL, V));
+  for (PetscInt j = 0; j < k; j++) {
+    PetscCall(MatDenseGetColumnVecWrite(*V, j, &v));
+    PetscCall(SVDGetSingularTriplet(svd, j, NULL, v, NULL));
+    PetscCall(MatDenseRestoreColumnVecWrite(*V, j, &v));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How many of the first k modes are orthonormal, and stretched by S^T as their singular values say. */
+static PetscErrorCode CountAccurate(Mat S, Mat V, PetscInt k, const PetscReal sigma[], PetscInt *accurate)
+{
+  PetscInt lo, hi, lda;
+  const PetscScalar *g;
+  PetscReal *stretch, *skew;
+  Mat product;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(k, &stretch));
+  PetscCall(PetscCalloc1(k, &skew));
+  PetscCall(MatTransposeMatMult(S, V, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
+  PetscCall(MatGetColumnNorms(product, NORM_2, stretch));
+  PetscCall(MatDestroy(&product));
+  PetscCall(MatTransposeMatMult(V, V, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
+  PetscCall(MatGetOwnershipRange(product, &lo, &hi));
+  PetscCall(MatDenseGetLDA(product, &lda));
+  PetscCall(MatDenseGetArrayRead(product, &g));
+  for (PetscInt j = 0; j < k; j++) {
+    for (PetscInt i = lo; i < hi; i++) {
+      PetscReal *worst = &skew[PetscMax(i, j)];
+
+      *worst = PetscMax(*worst, PetscAbsScalar(g[j * lda + i - lo] - (i == j)));
+    }
+  }
+  PetscCall(MatDenseRestoreArrayRead(product, &g));
+  PetscCall(MatDestroy(&product));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, skew, (PetscMPIInt)k, MPIU_REAL, MPI_MAX, PetscObjectComm((PetscObject)S)));
+  for (*accurate = 0; *accurate < k; ++*accurate) {
+    const PetscReal s = sigma[*accurate];
+
+    if (!(PetscAbsReal(stretch[*accurate] - s) <= ACCURATE * s && skew[*accurate] <= ORTHONORMAL)) break;
+  }
+  PetscCall(PetscFree(stretch));
+  PetscCall(PetscFree(skew));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The k singular values of a solved problem, as found or 0. */
+static PetscErrorCode GetValues(SVD svd, PetscInt k, PetscReal sigma[], PetscInt *found)
+{
+  PetscFunctionBegin;
+  PetscCall(SVDGetConverged(svd, found));
+  *found = PetscMin(*found, k);
+  for (PetscInt j = 0; j < *found; j++) PetscCall(SVDGetSingularTriplet(svd, j, &sigma[j], NULL, NULL));
+  PetscCall(PetscArrayzero(sigma + *found, k - *found));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Another type than tsqr: as few triplets as the criterion needs, as far as they are accurate. What these leave out of
+   the energy size^2 becomes the next singular value, so that (18) counts it. */
+static PetscErrorCode SolveAccurate(SVD svd, Mat S, PetscReal size, PetscReal tol, PetscReal noise, PetscInt max_modes,
+                                    PetscInt k, PetscReal sigma[], PetscInt *accurate)
+{
+  PetscInt found = 0, limit = k;
+  PetscBool fixed = PETSC_FALSE, more = PETSC_TRUE, cyclic;
+  Mat V;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)svd, SVDCYCLIC, &cyclic));
+  if (cyclic) limit = (k + 2) / 3; /* with more, SLEPc 3.18 takes zeros of round-off for triplets, over k of them */
+  for (PetscInt most = PetscMin(limit, FIRST); more; most = PetscMin(limit, 2 * most)) {
+    PetscReal rest = size * size;
+
+    PetscCall(Solve(svd, S, most, &fixed));
+    PetscCall(GetValues(svd, k, sigma, &found));
+    PetscCall(GetVectors(svd, S, found, &V));
+    PetscCall(CountAccurate(S, V, found, sigma, accurate));
+    PetscCall(MatDestroy(&V));
+    PetscCall(PetscInfo(svd, "%d singular values of %d, %d of them accurate\n", (int)found, (int)k, (int)*accurate));
+    for (PetscInt j = 0; j < *accurate; j++) rest -= sigma[j] * sigma[j];
+    if (*accurate < k) sigma[*accurate] = PetscSqrtReal(PetscMax(rest, 0));
+    if (*accurate < k) PetscCall(PetscArrayzero(sigma + *accurate + 1, k - *accurate - 1));
+    more = (PetscBool)(!fixed && most < limit && *accurate >= PetscMin(most, found) &&
+                       HycoPODRank(k, sigma, tol, noise, max_modes) > *accurate);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
                        PetscReal sigma[])
 {
-  PetscInt N, n, rows;
-  PetscMPIInt tall, all;
-  MPI_Comm comm = PetscObjectComm((PetscObject)S);
+  PetscInt N, n, k, found;
+  PetscBool tsqr, fixed;
+  PetscReal size, unit;
 
   PetscFunctionBegin;
   *V = NULL;
   *l = 0;
   PetscCall(MatGetSize(S, &N, &n));
-  if (!N || !n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatGetLocalSize(S, &rows, NULL));
-  tall = rows >= n && N > 2000;
-  PetscCallMPI(MPI_Allreduce(&tall, &all, 1, MPI_INT, MPI_MIN, comm));
-  if (all)
-    PetscCall(TallPOD(S, tol, noise, max_modes, V, l, sigma));
-  else
-    PetscCall(SmallPOD(S, tol, noise, max_modes, V, l, sigma));
-  if (*l) PetscCall(FixSigns(*V, *l));
+  k = PetscMin(N, n);
+  PetscCall(PetscArrayzero(sigma, k));
+  PetscCall(MatNorm(S, NORM_FROBENIUS, &size));
+  if (!k || size == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompare((PetscObject)svd, HYCO_SVD_TSQR, &tsqr)); /* backward stable: nothing to check */
+  unit = PetscPowReal(2, PetscCeilReal(PetscLog2Real(size))); /* exact both ways; SLEPc has absolute tolerances */
+  PetscCall(MatScale(S, 1 / unit));
+  if (tsqr) {
+    PetscCall(Solve(svd, S, k, &fixed));
+    PetscCall(GetValues(svd, k, sigma, &found));
+  } else
+    PetscCall(SolveAccurate(svd, S, size / unit, tol, noise, max_modes, k, sigma, &found));
+  PetscCall(MatScale(S, unit));
+  for (PetscInt j = 0; j < k; j++) sigma[j] *= unit;
+  *l = PetscMin(found, HycoPODRank(k, sigma, tol, noise, max_modes));
+  if (*l) {
+    PetscCall(GetVectors(svd, S, *l, V));
+    PetscCall(FixSigns(*V, *l));
+  }
+  PetscCall(SVDReset(svd));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -4,11 +4,12 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Options of PETSc, SLEPc and the solvers inside: known by their beginnings, checked by who reads them. */
-static const char *const foreign[] = {"hyco_mumps_",
-                                      "hyco_primal_",
-                                      "hyco_norm_",
-                                      "hyco_tao_",
+/* Options of PETSc, SLEPc and the solvers inside: known by their beginnings, checked by who reads them; first those of
+   the solvers that hyco makes. */
+#define OWN_SOLVERS                                                                                                    \
+  "hyco_mumps_", "hyco_primal_", "hyco_norm_", "hyco_tao_", "hyco_pod_svd_", "hyco_pod_bv_", "hyco_pod_ds_"
+static const char *const own_solvers[] = {OWN_SOLVERS, NULL};
+static const char *const foreign[] = {OWN_SOLVERS,
                                       "log_",
                                       "info",
                                       "malloc",
@@ -39,10 +40,10 @@ static const char *const foreign[] = {"hyco_mumps_",
                                       "device_",
                                       NULL};
 
-static PetscBool IsForeign(const char name[])
+static PetscBool BeginsAs(const char *const beginnings[], const char name[])
 {
-  for (PetscInt k = 0; foreign[k]; k++) {
-    if (strncasecmp(name, foreign[k], strlen(foreign[k])) == 0) return PETSC_TRUE;
+  for (PetscInt k = 0; beginnings[k]; k++) {
+    if (strncasecmp(name, beginnings[k], strlen(beginnings[k])) == 0) return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }
@@ -118,7 +119,7 @@ static PetscErrorCode CheckName(const Command *command, const HycoOptionList *ow
 
   PetscFunctionBegin;
   if (option) PetscCall(CheckReaders(command, option));
-  if (option || HycoOptionListFind(own, name) || IsForeign(name) ||
+  if (option || HycoOptionListFind(own, name) || BeginsAs(foreign, name) ||
       (IsSceneEntry(name) && HycoOptionListFind(own, "scene")))
     PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!previous || !IsKey(previous) || !IsSceneEntry(previous + 1),
@@ -148,6 +149,14 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What a solver reads when it runs; an SVD has read all by then but what shows its result. */
+static PetscBool IsReadLate(const char name[])
+{
+  const PetscBool shows = (PetscBool)(strstr(name, "view") || strstr(name, "reason") || strstr(name, "error"));
+
+  return (PetscBool)(BeginsAs(own_solvers, name) && (shows || strncasecmp(name, "hyco_pod_", 9)));
+}
+
 static PetscErrorCode CheckLeft(PetscBool early)
 {
   PetscInt n;
@@ -156,9 +165,7 @@ static PetscErrorCode CheckLeft(PetscBool early)
   PetscFunctionBegin;
   PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
   for (PetscInt k = 0; k < n && !first[0]; k++) {
-    if (early && (strncasecmp(names[k], "hyco_mumps_", 11) == 0 || strncasecmp(names[k], "hyco_primal_", 12) == 0 ||
-                  strncasecmp(names[k], "hyco_norm_", 10) == 0 || strncasecmp(names[k], "hyco_tao_", 9) == 0))
-      continue;
+    if (early && IsReadLate(names[k])) continue;
     if (strncmp(names[k], "options_left", 12) && strncmp(names[k], "skip_petscrc", 12) && strcmp(names[k], "nox"))
       PetscCall(PetscStrncpy(first, names[k], sizeof(first)));
   }
@@ -249,7 +256,7 @@ PetscErrorCode DriverHelp(const Command *command)
     if (!command || !readers || strstr(readers, command->name)) HelpLine(&table[k]);
   }
   printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "
-         "-hyco_primal_..., -hyco_tao_type bntr.\n");
+         "-hyco_primal_..., -hyco_tao_monitor, -hyco_pod_svd_view.\n");
   printf("Exit status: 0 done; 1 an error, in one line; 3 a model is written, but it misses a target or the default "
          "bar.\n");
   printf("Under MPI: mpiexec -n 2 hyco ...; set OPENBLAS_NUM_THREADS=1.\n");

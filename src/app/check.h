@@ -13,7 +13,8 @@ typedef struct {
 
 /* What was found; on rank 0, but for the first line. */
 typedef struct {
-  HycoFOM fom; /* borrowed */
+  HycoFOM fom;   /* borrowed */
+  HycoFOM whole; /* rank 0: on it alone, for what is looked at; fom on one rank */
   PetscInt n_points;
   cJSON *json, *warnings; /* the report, and its array "warnings" */
   ContactRange *contact;  /* by contact of the scene */

@@ -22,7 +22,7 @@ static PetscReal Coarseness(const HycoPairs *p, PetscInt k, PetscInt n_nodes, co
 /* The median over the contacts of one entry; types that search, whose meshes need not match. */
 static PetscErrorCode CompareFacets(Check *check, HycoFE fe, PetscInt contact)
 {
-  const HycoPairs *p = &check->fom->pairs;
+  const HycoPairs *p = &check->whole->pairs;
   HycoContact c = fe->scene->contact[contact];
   PetscReal *size, *ratio;
   PetscInt g = 0, n = 0;
@@ -46,7 +46,7 @@ static PetscErrorCode CompareFacets(Check *check, HycoFE fe, PetscInt contact)
 
 PetscErrorCode CheckGaps(Check *check, HycoFE fe, PetscBool first)
 {
-  HycoPairs *p = &check->fom->pairs;
+  HycoPairs *p = &check->whole->pairs;
   HycoScene s = fe->scene;
   const PetscReal length = HycoMeshLength(fe->mesh);
   PetscReal *normal, *gap;
@@ -79,7 +79,7 @@ PetscErrorCode CheckGaps(Check *check, HycoFE fe, PetscBool first)
 
 static void Warn(Check *check, HycoContact c, const ContactRange *r)
 {
-  const PetscReal length = HycoMeshLength(check->fom->whole);
+  const PetscReal length = HycoMeshLength(check->whole->part);
 
   if (!r->n)
     CheckWarn(check, "contact %s has no contact: every node of %s is wholly fixed", c->name, c->slave);

@@ -104,7 +104,7 @@ static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
 
 PetscErrorCode CheckBodies(Check *check)
 {
-  HycoMesh m = check->fom->whole;
+  HycoMesh m = check->whole->part;
   HycoScene s = check->fom->scene;
   cJSON *bodies = cJSON_AddArrayToObject(check->json, "bodies");
   PetscInt *parts;
@@ -213,7 +213,7 @@ static PetscErrorCode MarkUsed(HycoScene s, HycoMesh m, PetscBool used[])
 
 PetscErrorCode CheckGroups(Check *check)
 {
-  HycoMesh m = check->fom->whole;
+  HycoMesh m = check->whole->part;
   cJSON *unused = cJSON_AddArrayToObject(check->json, "unused_groups");
   char list[HYCO_LINE] = "";
   PetscBool *used;

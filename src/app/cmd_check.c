@@ -48,11 +48,13 @@ static PetscErrorCode ListPoints(HycoScene s, PetscInt *n, PetscReal **mu)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Measure(Check *check, PetscBool first)
+/* On rank 0. */
+static PetscErrorCode Measure(Check *check, const PetscReal mu[], PetscBool first)
 {
-  HycoFE fe = check->fom->fe_whole;
+  HycoFE fe = check->whole->fe;
 
   PetscFunctionBegin;
+  if (check->whole != check->fom) PetscCall(HycoFOMAssemble(check->whole, mu));
   CheckCells(check, fe);
   PetscCall(CheckGaps(check, fe, first));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -77,7 +79,7 @@ static PetscErrorCode CheckPoint(Check *check, const PetscReal mu[], PetscBool f
     PetscCall(HycoListAdd(place, ", ", value));
   }
   HycoCheck(!ierr, "%s%s%s", place[0] ? "at " : "", place[0] ? strcat(place, ": ") : "", message);
-  HycoOnRoot(HycoComm(f), Measure(check, first));
+  HycoOnRoot(HycoComm(f), Measure(check, mu, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -86,7 +88,7 @@ static PetscErrorCode CheckPoint(Check *check, const PetscReal mu[], PetscBool f
 static PetscErrorCode SayMesh(Check *check)
 {
   HycoFOM f = check->fom;
-  HycoMesh m = f->whole;
+  HycoMesh m = f->part;
   const char *title;
 
   PetscFunctionBegin;
@@ -110,12 +112,12 @@ static PetscErrorCode SayMesh(Check *check)
    error of the assembly. */
 static PetscErrorCode SayMotions(Check *check)
 {
-  HycoFOM f = check->fom;
+  HycoFOM f = check->whole;
   cJSON *list = cJSON_AddArrayToObject(check->json, "free_motions");
   HycoMotions free = {0, NULL, NULL, NULL};
 
   PetscFunctionBegin;
-  PetscCall(HycoFEFreeMotions(f->fe_whole, &free));
+  PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &free));
   for (PetscInt k = 0; k < free.n; k++) {
     cJSON_AddItemToArray(list, cJSON_CreateString(free.name[k]));
     PetscCall(Say("no support keeps %s: contact alone does\n", free.name[k]));
@@ -452,11 +454,14 @@ PetscErrorCode CommandCheck(void)
   PetscCall(DriverGetSamples(scene, &samples, &given));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(DriverCheckLeftEarly());
+  check.whole = fom;
+  if (fom->size > 1) HycoOnRoot(PETSC_COMM_WORLD, HycoFOMCreate(PETSC_COMM_SELF, scene, &check.whole));
   PetscCall(Create(fom, &check));
   HycoStaged(HYCO_STAGE_FULL_ORDER, Visit(&check, solve, &cost));
   PetscCall(CountTraining(scene, samples, given, &cost));
   PetscCall(SayCost(&check, &cost, given));
   PetscCall(Finish(&check));
+  if (fom->size > 1 && fom->rank == 0) PetscCall(HycoFOMDestroy(&check.whole));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));

@@ -1,44 +1,31 @@
 /* HycoContact: the class of contacts, its registry, and what the scene's entries say of one. */
 #include <hycocontactimpl.h>
+#include <hycoregistry.h>
 #include <string.h>
 
-static PetscFunctionList types = NULL;
-static PetscBool registered = PETSC_FALSE;
+static PetscErrorCode AddOwn(void);
+static HycoRegistry types = {.add_own = AddOwn, .sorted = PETSC_TRUE};
 
-static PetscErrorCode Forget(void)
+static PetscErrorCode AddOwn(void)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFunctionListDestroy(&types));
-  registered = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The library's own types come with the first use of the class. */
-static PetscErrorCode RegisterAll(void)
-{
-  PetscFunctionBegin;
-  if (registered) PetscFunctionReturn(PETSC_SUCCESS);
-  registered = PETSC_TRUE;
-  PetscCall(HycoInitializePackage());
-  PetscCall(PetscFunctionListAdd(&types, HYCO_CONTACT_OBSTACLE, HycoContactCreate_Obstacle));
-  PetscCall(PetscFunctionListAdd(&types, HYCO_CONTACT_PAIR, HycoContactCreate_Pair));
-  PetscCall(PetscFunctionListAdd(&types, HYCO_CONTACT_SURFACE, HycoContactCreate_Surface));
-  PetscCall(PetscRegisterFinalize(Forget));
+  PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_OBSTACLE, HycoContactCreate_Obstacle));
+  PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_PAIR, HycoContactCreate_Pair));
+  PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_SURFACE, HycoContactCreate_Surface));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoContactRegister(const char name[], PetscErrorCode (*create)(HycoContact))
 {
   PetscFunctionBegin;
-  PetscCall(RegisterAll());
-  PetscCall(PetscFunctionListAdd(&types, name, create));
+  PetscCall(HycoRegistryAdd(&types, name, create));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoContactCreate(MPI_Comm comm, HycoContact *contact)
 {
   PetscFunctionBegin;
-  PetscCall(RegisterAll());
+  PetscCall(HycoInitializePackage());
   PetscCall(PetscHeaderCreate(*contact, HYCO_CONTACT_CLASSID, "HycoContact", "Contact discretisation", "Hyco", comm,
                               HycoContactDestroy, HycoContactView));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -62,11 +49,11 @@ PetscErrorCode HycoContactSetType(HycoContact contact, HycoContactType type)
 
   PetscFunctionBegin;
   HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
-  PetscCall(PetscFunctionListFind(types, type, &create));
+  PetscCall(HycoRegistryFind(&types, type, &create));
   if (!create) {
     char list[HYCO_LINE];
 
-    PetscCall(HycoListTypes(types, type, list));
+    PetscCall(HycoRegistryList(&types, type, list));
     HycoFail("contact %s: the type \"%s\" is not registered; it must be %s",
              ((PetscObject)contact)->name ? ((PetscObject)contact)->name : "(none)", type, list);
   }

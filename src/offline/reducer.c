@@ -1,4 +1,5 @@
 /* HycoReducer: made, configured, destroyed. */
+#include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
 #include <string.h>
 
@@ -13,6 +14,7 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
                               HycoReducerDestroy, HycoReducerView));
   PetscCallMPI(MPI_Comm_rank(HycoComm(t), &t->rank));
   t->noise = 1e-11;
+  PetscCall(PetscStrncpy(t->svd_type, HYCO_SVD_TSQR, sizeof(t->svd_type)));
   t->greedy.target = 1e-3;
   t->n_validation = -1;
   t->search = PETSC_TRUE;
@@ -56,6 +58,7 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(HycoSceneRefuseHistory(scene, "training"));
   PetscCall(Create(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
@@ -100,7 +103,10 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     PetscCall(PetscFree(t->basis[k].coefficients));
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
-  PetscCall(PetscFree(t->U));
+  PetscCall(MatDestroy(&t->S));
+  PetscCall(PetscFree(t->U_rid));
+  PetscCall(PetscFree(t->U_contact));
+  PetscCall(PetscFree(t->contact_row));
   PetscCall(PetscFree(t->Lambda));
   PetscCall(PetscFree(t->U_norm));
   PetscCall(PetscFree(t->dual_seeds));
@@ -230,6 +236,44 @@ PetscErrorCode HycoReducerSetGreedyStop(HycoReducer t, PetscReal target, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -hyco_pod_svd_type: a registered type, SLEPc's or the program's among them. */
+static PetscErrorCode ReadSVDType(HycoReducer t, HycoOptionItems PetscOptionsObject)
+{
+  const char **registered, **types;
+  int n;
+  PetscInt type = 0;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSVDRegisterAll());
+  PetscCall(PetscFunctionListGet(SVDList, &registered, &n));
+  while (n && !registered[n - 1]) n--; /* releases of PETSc count a NULL at the end, or do not */
+  PetscCall(PetscCalloc1(n + 1, &types));
+  PetscCall(PetscArraycpy(types, registered, n));
+  PetscCall(PetscFree(registered));
+  while (types[type] && strcmp(types[type], t->svd_type)) type++;
+  ierr = HycoOptionsWord("-hyco_pod_svd_type",
+                         "<tsqr|trlanczos|cross|cyclic|lapack|randomized|...> SVD of the POD: tall-skinny QR, or one "
+                         "of SLEPc's (-hyco_pod_svd_... sets its own options)",
+                         types, &type, NULL);
+  if (!ierr) ierr = PetscStrncpy(t->svd_type, types[type], sizeof(t->svd_type));
+  PetscCall(PetscFree(types));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads the other options of the PODs' SVD, so that a slip does not show after hours. */
+static PetscErrorCode CheckSVDOptions(HycoReducer t)
+{
+  SVD svd;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerCreateSVD(t, HycoComm(t), &svd));
+  PetscCall(SVDSetFromOptions(svd));
+  PetscCall(SVDDestroy(&svd));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What train is asked for, whatever the model. */
 static PetscErrorCode ReadTraining(HycoReducer t)
 {
@@ -253,6 +297,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
                             &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));
   PetscCall(HycoOptionsReal("-hyco_pod_noise", "singular values below this share of the first are noise", 0, 1,
                             &t->noise, NULL));
+  PetscCall(ReadSVDType(t, PetscOptionsObject));
   PetscCall(HycoOptionsInt("-hyco_pod_max_modes", "at most so many displacement modes (0: no limit)", 0, PETSC_MAX_INT,
                            &t->max_modes, NULL));
   PetscCall(
@@ -389,13 +434,21 @@ static PetscErrorCode CheckType(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode ReadAll(HycoReducer t)
+{
+  PetscFunctionBegin;
+  PetscCall(ReadTraining(t));
+  PetscCall(ReadRID(t));
+  PetscCall(CheckType(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  PetscCall(ReadTraining(t));
-  PetscCall(ReadRID(t));
-  PetscCall(CheckType(t));
+  PetscCall(ReadAll(t));
+  PetscCall(CheckSVDOptions(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -405,7 +458,7 @@ static PetscErrorCode DeclareAll(HycoReducer t)
   const char *const *types;
 
   PetscFunctionBegin;
-  PetscCall(HycoReducerSetFromOptions(t));
+  PetscCall(ReadAll(t));
   PetscCall(HycoROMTypeNames(&types));
   for (PetscInt k = 0; types[k]; k++) PetscCall(HycoReducerSetType(t, types[k]));
   PetscFunctionReturn(PETSC_SUCCESS);

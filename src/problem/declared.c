@@ -1,7 +1,6 @@
 /* Entries that laws and contact types declare, and what the scene says of them. */
 #include <hycosceneimpl.h>
 #include <petscviewer.h>
-#include <stdlib.h>
 #include <string.h>
 
 PetscErrorCode HycoDeclaredAdd(HycoDeclared *d, const char name[], const char title[], HycoEntryKind kind,
@@ -39,7 +38,8 @@ PetscErrorCode HycoDeclaredRead(HycoScene s, const char key[], const char text[]
   switch (e->kind) {
   case HYCO_ENTRY_EXPRESSION:
     PetscCall(HycoExprDestroy(&e->expr)); /* the same entry in another letter case */
-    PetscCall(HycoExprCreate(key, text, s->n_parameters, (const char *const *)s->parameter, &e->expr));
+    PetscCall(HycoExprCreate(key, text, s->n_variables, (const char *const *)s->parameter, &e->expr));
+    if (!e->heat) PetscCall(HycoExprRefuseHeat(e->expr));
     break;
   case HYCO_ENTRY_GROUP:
     PetscCall(PetscFree(e->text));
@@ -72,32 +72,5 @@ PetscErrorCode HycoDeclaredDestroy(HycoDeclared *d)
     PetscCall(HycoExprDestroy(&d->entry[j].expr));
   }
   d->n = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static int CompareNames(const void *a, const void *b)
-{
-  return strcmp(*(const char *const *)a, *(const char *const *)b);
-}
-
-PetscErrorCode HycoListTypes(PetscFunctionList types, const char type[], char list[HYCO_LINE])
-{
-  const char **names, *near;
-  int n;
-
-  PetscFunctionBegin;
-  PetscCall(PetscFunctionListGet(types, &names, &n));
-  if (n && !names[n - 1]) n--; /* PETSc 3.18 counts the NULL at the end */
-  qsort(names, (size_t)n, sizeof(*names), CompareNames);
-  list[0] = '\0';
-  for (int k = 0; k < n; k++) {
-    PetscCall(PetscStrlcat(list, names[k], HYCO_LINE));
-    if (k + 1 < n) PetscCall(PetscStrlcat(list, k + 2 < n ? ", " : " or ", HYCO_LINE));
-  }
-  near = HycoNearest(type, n, names);
-  if (near) PetscCall(PetscStrlcat(list, "; did you mean ", HYCO_LINE));
-  if (near) PetscCall(PetscStrlcat(list, near, HYCO_LINE));
-  if (near) PetscCall(PetscStrlcat(list, "?", HYCO_LINE));
-  PetscCall(PetscFree(names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

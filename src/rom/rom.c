@@ -9,7 +9,7 @@
 PetscErrorCode HycoROMCreate(HycoROM *model)
 {
   PetscFunctionBegin;
-  PetscCall(HycoROMRegisterAll());
+  PetscCall(HycoInitializePackage());
   PetscCall(PetscHeaderCreate(*model, HYCO_ROM_CLASSID, "HycoROM", "Reduced model", "Hyco", PETSC_COMM_SELF,
                               HycoROMDestroy, HycoROMView));
   (*model)->reconstruct = PETSC_TRUE;
@@ -185,6 +185,7 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(HycoSceneRefuseHistory(scene, "a reduced model"));
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
   HycoCheck(
@@ -389,7 +390,7 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
   PetscCall(HycoROMGetWholeU(m, NULL, &U));
   PetscCall(PetscCalloc1(m->whole->n_cells, &rid));
   for (PetscInt e = 0; e < m->mesh->n_cells; e++) rid[m->mesh->cell_whole[e]] = 1;
-  ierr = HycoSolutionWrite(path, m->fe_whole, &m->whole_pairs, U, m->Lambda, rid);
+  ierr = HycoSolutionWrite(path, NULL, m->fe_whole, U, m->fe_whole, &m->whole_pairs, U, m->Lambda, rid);
   PetscCall(PetscFree(rid));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

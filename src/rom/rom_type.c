@@ -1,69 +1,32 @@
 /* The types of reduced models: registered, set, described. */
+#include <hycoregistry.h>
 #include <hycoromimpl.h>
 #include <hycoromtypes.h>
-#include <stdlib.h>
 #include <string.h>
 
-static PetscFunctionList list = NULL;
-static PetscBool registered = PETSC_FALSE;
-static const char **sorted = NULL; /* the names in the list; made when asked for */
+static PetscErrorCode AddOwn(void);
+static HycoRegistry types = {.add_own = AddOwn, .sorted = PETSC_TRUE};
 
-/* PETSc may begin again after PetscFinalize(). */
-static PetscErrorCode Forget(void)
+static PetscErrorCode AddOwn(void)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFunctionListDestroy(&list));
-  PetscCall(PetscFree(sorted));
-  registered = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMRegisterAll(void)
-{
-  PetscFunctionBegin;
-  if (registered) PetscFunctionReturn(PETSC_SUCCESS);
-  registered = PETSC_TRUE;
-  PetscCall(HycoInitializePackage());
-  PetscCall(PetscRegisterFinalize(Forget));
-  PetscCall(HycoROMRegister(HYCO_ROM_HYBRID, HycoROMCreate_Hybrid));
-  PetscCall(HycoROMRegister(HYCO_ROM_PROJECTION, HycoROMCreate_Projection));
-  PetscCall(HycoROMRegister(HYCO_ROM_CONDENSED, HycoROMCreate_Condensed));
+  PetscCall(HycoRegistryAdd(&types, HYCO_ROM_HYBRID, HycoROMCreate_Hybrid));
+  PetscCall(HycoRegistryAdd(&types, HYCO_ROM_PROJECTION, HycoROMCreate_Projection));
+  PetscCall(HycoRegistryAdd(&types, HYCO_ROM_CONDENSED, HycoROMCreate_Condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoROMRegister(const char name[], PetscErrorCode (*create)(HycoROM))
 {
   PetscFunctionBegin;
-  PetscCall(HycoROMRegisterAll());
-  PetscCall(PetscFunctionListAdd(&list, name, create));
-  PetscCall(PetscFree(sorted));
+  PetscCall(HycoRegistryAdd(&types, name, create));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static int Compare(const void *a, const void *b)
-{
-  return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
 PetscErrorCode HycoROMTypeNames(const char *const **names)
 {
-  const char **found;
-  int n;
-
   PetscFunctionBegin;
-  PetscCall(HycoROMRegisterAll());
-  if (sorted) {
-    *names = sorted;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscFunctionListGet(list, &found, &n));
-  while (n && !found[n - 1]) n--; /* releases of PETSc count a NULL at the end, or do not */
-  PetscCall(PetscMalloc1(n + 1, &sorted));
-  PetscCall(PetscArraycpy(sorted, found, n));
-  sorted[n] = NULL;
-  qsort(sorted, (size_t)n, sizeof(*sorted), Compare);
-  PetscCall(PetscFree(found));
-  *names = sorted;
+  PetscCall(HycoRegistryNames(&types, NULL, names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -74,7 +37,7 @@ PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  PetscCall(PetscFunctionListFind(list, type, &create));
+  PetscCall(HycoRegistryFind(&types, type, &create));
   HycoCheck(create,
             "%s%sthere is no type of reduced model \"%s\" here; a program that has its own registers it by "
             "HycoROMRegister()",

@@ -159,6 +159,22 @@ PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CheckOpen(const char path[], PetscBool good)
+{
+  PetscFunctionBegin;
+  HycoCheck(good, "%s cannot be written (%s): is there such a folder, may you write there, is there room?", path,
+            strerror(errno));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileOpenScratch(const char scratch[], const char path[], int *fd)
+{
+  PetscFunctionBegin;
+  *fd = open(scratch, O_WRONLY | O_CREAT | O_EXCL, 0666);
+  PetscCall(CheckOpen(path, (PetscBool)(*fd >= 0)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode OpenPlace(HycoFile f)
 {
   int fd;
@@ -168,8 +184,7 @@ static PetscErrorCode OpenPlace(HycoFile f)
   if (!f->direct) Temporary(f->place, "partial", f->temporary);
   fd = f->direct ? open(f->path, O_WRONLY | O_APPEND) : open(f->temporary, O_WRONLY | O_CREAT | O_EXCL, 0666);
   f->stream = fd >= 0 ? fdopen(fd, "w") : NULL;
-  HycoCheck(f->stream, "%s cannot be written (%s): is there such a folder, may you write there, is there room?",
-            f->path, strerror(errno));
+  PetscCall(CheckOpen(f->path, (PetscBool)(f->stream != NULL)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -207,7 +222,22 @@ static int Flush(HycoFile f)
   return 0;
 }
 
-static PetscErrorCode Complain(const char shown[], int failed)
+PetscErrorCode HycoFilePut(int fd, const char path[], const void *data, size_t bytes, size_t place)
+{
+  PetscFunctionBegin;
+  while (bytes) {
+    const ssize_t n = pwrite(fd, data, bytes, (off_t)place);
+
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) PetscCall(HycoFileComplain(path, n < 0 ? errno : EIO));
+    data = (const char *)data + n;
+    bytes -= (size_t)n;
+    place += (size_t)n;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileComplain(const char shown[], int failed)
 {
   PetscFunctionBegin;
   HycoCheck(!failed, "%s could not be written to its end (%s): is the disk full?", shown, strerror(failed));
@@ -217,7 +247,7 @@ static PetscErrorCode Complain(const char shown[], int failed)
 PetscErrorCode HycoFileFlush(HycoFile file)
 {
   PetscFunctionBegin;
-  PetscCall(Complain(file->shown, Flush(file)));
+  PetscCall(HycoFileComplain(file->shown, Flush(file)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -238,6 +268,6 @@ PetscErrorCode HycoFileClose(HycoFile *file, PetscBool commit)
   }
   snprintf(shown, sizeof(shown), "%s", f->shown);
   PetscCall(PetscFree(f));
-  PetscCall(Complain(shown, failed));
+  PetscCall(HycoFileComplain(shown, failed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

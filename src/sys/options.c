@@ -57,6 +57,13 @@ PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoOptionsForgetTable(void)
+{
+  PetscFunctionBegin;
+  if (!recording) PetscCall(HycoOptionListDestroy(&table));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *options[])
 {
   PetscFunctionBegin;

@@ -133,17 +133,37 @@ static PetscErrorCode TestDamaged(void)
 }
 
 /* Temporary names: of this process alone, told from other files, swept when their process is dead. */
+/* The temporary name of a file just begun; among `before` names that were there. */
+static PetscErrorCode Begin(size_t before, HycoFile *file, char name[HYCO_FILE_NAME])
+{
+  glob_t found;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFileCreate(path, HYCO_FILE_NUMBERS, file));
+  glob(partial, 0, NULL, &found);
+  CHECK(found.gl_pathc == before + 1, "%d temporary files, expected %d", (int)found.gl_pathc, (int)before + 1);
+  name[0] = '\0';
+  for (size_t k = 0; k < found.gl_pathc; k++) { /* its number is the largest */
+    if (strcmp(found.gl_pathv[k], name) > 0) snprintf(name, HYCO_FILE_NAME, "%s", found.gl_pathv[k]);
+  }
+  globfree(&found);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode TestTemporary(void)
 {
   char mine[HYCO_FILE_NAME], other[HYCO_FILE_NAME], owner[HYCO_FILE_NAME], dead[2 * HYCO_FILE_NAME];
   const char *tag;
   unsigned node;
+  HycoFile first, second;
   FILE *f;
 
   PetscFunctionBegin;
-  PetscCall(HycoFileScratch(PETSC_COMM_SELF, path, "candidate", mine));
-  PetscCall(HycoFileScratch(PETSC_COMM_SELF, path, "candidate", other));
+  PetscCall(Begin(0, &first, mine));
+  PetscCall(Begin(1, &second, other));
   CHECK(strcmp(mine, other), "two temporary names are both %s", mine);
+  PetscCall(HycoFileClose(&second, PETSC_FALSE));
+  CHECK(access(other, F_OK) != 0 && access(path, F_OK) != 0, "%s was given up, and must be gone", other);
   HycoFileOwner(mine, owner);
   CHECK(strcmp(owner, path) == 0, "%s belongs to %s", mine, owner);
   HycoFileOwner("a.hyco-b/c.hyco-h5", owner);
@@ -153,14 +173,12 @@ static PetscErrorCode TestTemporary(void)
   snprintf(dead, sizeof(dead), "%s.hyco-%08x-%d-0.partial.fold", path, node, 0x3fffffff); /* beyond any process id */
   f = fopen(dead, "w");
   fclose(f);
-  f = fopen(mine, "w");
-  fclose(f);
   PetscCall(HycoFileSweep("/tmp/another"));
   CHECK(access(dead, F_OK) == 0, "another file's sweep took %s", dead);
   PetscCall(HycoFileSweep(path));
   CHECK(access(dead, F_OK) != 0, "%s must be gone", dead);
   CHECK(access(mine, F_OK) == 0, "%s, which lives, must stay", mine);
-  PetscCall(HycoFileKeep(mine, path));
+  PetscCall(HycoFileClose(&first, PETSC_TRUE));
   CHECK(access(mine, F_OK) != 0 && access(path, F_OK) == 0, "%s must have become %s", mine, path);
   unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -97,13 +97,16 @@ static PetscErrorCode TestMisfits(void)
   PetscReal *S, *W, *again, *sigma, total = 0, before = 1, misfit, same;
   PetscInt found, other;
   Mat A, V;
+  SVD svd;
   PetscInt l;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc4(m * n, &S, m * m, &W, m * m, &again, n, &sigma));
   Fill(&state, m * n, 5, S);
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, S, &A));
-  PetscCall(HycoPOD(A, 0, 0, 0, &V, &l, sigma));
+  PetscCall(HycoPODCreateSVD(PETSC_COMM_SELF, &svd));
+  PetscCall(HycoPOD(svd, A, 0, 0, 0, &V, &l, sigma));
+  PetscCall(SVDDestroy(&svd));
   for (PetscInt j = 0; j < m; j++) total += sigma[j] * sigma[j];
   for (PetscInt t = 0; t < 4; t++) {
     PetscReal least = 0, longer = 1;

@@ -2,6 +2,7 @@
  */
 #include "check.h"
 #include <hyco.h>
+#include <hycoromtype.h>
 #include <hycosolverimpl.h>
 #include <unistd.h>
 
@@ -35,6 +36,45 @@ static PetscErrorCode TestHonoured(void)
     PetscCall(PetscOptionsDestroy(&options));
   }
   CHECK(n_refused > 40, "%d options are refused", (int)n_refused);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode LateSetFromOptions(HycoReducer reducer)
+{
+  PetscReal value = 3;
+
+  PetscFunctionBegin;
+  PetscObjectOptionsBegin((PetscObject)reducer);
+  PetscCall(HycoOptionsReal("-hyco_late", "of a type that a program adds", 0, 9, &value, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CreateLate(HycoROM model)
+{
+  static const HycoROMTraits traits = {.title = "late"};
+  static const HycoROMOps ops = {.setfromoptions = LateSetFromOptions};
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetOps(model, &ops, &traits, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A type that is registered after the options were asked for has its options too, and its name among the types'. */
+static PetscErrorCode TestLate(void)
+{
+  const HycoOption *table, *types;
+  PetscInt before, n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGetOptionTable(&before, &table));
+  CHECK(!HycoOptionFind("hyco_late"), "-hyco_late is there before its type");
+  PetscCall(HycoROMRegister("late", CreateLate));
+  PetscCall(HycoGetOptionTable(&n, &table));
+  CHECK(n == before + 1, "%d options, %d before the type was registered", (int)n, (int)before);
+  CHECK(HycoOptionFind("hyco_late"), "-hyco_late is not there");
+  types = HycoOptionFind("hyco_model_type");
+  CHECK(types && strcmp(types->value, "<condensed|hybrid|late|projection>") == 0, "the types are %s", types->value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -140,6 +180,7 @@ static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
   PetscCall(TestHonoured());
+  PetscCall(TestLate());
   PetscCall(TestPrefix());
   PetscCall(TestViews());
   PetscFunctionReturn(PETSC_SUCCESS);

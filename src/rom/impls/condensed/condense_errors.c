@@ -7,7 +7,6 @@
 */
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
-#include <hycolcp.h>
 
 #define SMALL 1e-2 /* of the largest: what smaller ones are divided by */
 #define LAST  4    /* one of so many patterns of forces, the last, tells how those displace that are none */
@@ -45,9 +44,6 @@ static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal
 {
   const PetscReal *own = c->Lambda + (size_t)k * (size_t)c->m;
   const PetscInt node = HycoCondensedNode(c, &c->field[HYCO_FIELD_G], k);
-  PetscInt its;
-  HycoLCPStatus status = HYCO_LCP_RAY;
-  const HycoLCP lcp = {.n = c->m, .M = c->M, .q = c->g, .symmetric = PETSC_TRUE, .factor = c->set_factor};
 
   PetscFunctionBegin;
   if (node != w->last || c->stiff[w->p])
@@ -55,8 +51,8 @@ static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal
   w->last = node;
   PetscCall(HycoCondensedFreeGap(c, mu, w->p, w->i));
   for (PetscInt j = 0; j < c->m; j++) c->active[j] = (PetscBool)(own[j] > 0);
-  if (w->definite) PetscCall(HycoLCPActiveSet(&lcp, c->active, w->L, &its, &status));
-  *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
+  *solved = PETSC_FALSE;
+  if (w->definite) PetscCall(HycoCondensedSolveForces(c, w->L, solved));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -8,7 +8,6 @@
 */
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
-#include <hycolcp.h>
 
 #define SAMPLES        480 /* points where the forces are sampled: half all over, half where contacts close or open */
 #define WAYS           16  /* on so many ways between points */
@@ -83,17 +82,14 @@ static PetscBool Held(HycoCondensed c, PetscInt number)
 static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscReal L[])
 {
   const PetscReal *nearest = c->Lambda + (size_t)HycoCondensedNearest(c, mu, NULL) * (size_t)c->m;
-  PetscBool definite;
-  PetscInt its;
-  HycoLCPStatus status = HYCO_LCP_RAY;
-  const HycoLCP lcp = {.n = c->m, .M = c->M, .q = c->g, .symmetric = PETSC_TRUE, .factor = c->set_factor};
+  PetscBool definite, solved = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
   PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
   for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(nearest[i] > 0);
-  if (definite) PetscCall(HycoLCPActiveSet(&lcp, c->active, L, &its, &status));
-  for (PetscInt i = 0; i < c->m; i++) L[i] = status == HYCO_LCP_SOLVED ? PetscMax(L[i], 0) : 0;
+  if (definite) PetscCall(HycoCondensedSolveForces(c, L, &solved));
+  if (!solved) PetscCall(PetscArrayzero(L, c->m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -213,8 +209,8 @@ static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(PetscMax(m, n), &sigma));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, L, &F));
-  PetscCall(HycoPOD(F, HycoCondensedModesTolerance(t), t->noise, PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
-                    sigma));
+  PetscCall(HycoReducerPOD(t, F, HycoCondensedModesTolerance(t), PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
+                           sigma));
   PetscCall(MatDestroy(&F));
   PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &x->Q));
   PetscCall(PetscMalloc1(x->q + 1, &x->scale));
@@ -341,7 +337,7 @@ static PetscErrorCode TakeModes(HycoReducer t, Mat V, PetscInt n_sigma, PetscRea
   const PetscInt N = t->sizes[0] * t->sizes[3];
 
   PetscFunctionBegin;
-  t->l = HycoPODRank(n_sigma, sigma, HycoCondensedModesTolerance(t), t->noise, t->max_modes);
+  PetscCall(HycoReducerPODRank(t, n_sigma, sigma, HycoCondensedModesTolerance(t), t->max_modes, x->r, &t->l));
   HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoCondensedModesTolerance(t));
   PetscCall(PetscFree(t->sigma));
   t->sigma = sigma;
@@ -367,7 +363,7 @@ PetscErrorCode HycoCondensedFindModes(HycoReducer t, HycoSnapshots store)
   PetscCall(SpreadPatterns(t));
   PetscCall(Columns(t, store, &S));
   PetscCall(PetscMalloc1(x->n_columns + 1, &sigma));
-  HycoLogged(HYCO_EVENT_POD, HycoPOD(S, 0, t->noise, 0, &V, &x->r, sigma));
+  PetscCall(HycoReducerPOD(t, S, 0, 0, &V, &x->r, sigma));
   PetscCall(PetscMalloc1((size_t)x->r * (size_t)x->n_columns, &x->C));
   PetscCall(HycoReducerMultiply(t, V, S, x->C));
   PetscCall(TakeModes(t, V, PetscMin(t->sizes[0] * t->sizes[3], x->n_columns), sigma));

@@ -55,7 +55,7 @@ PetscErrorCode HycoCondensedFree(HycoCondensed *condensed)
   PetscCall(PetscFree(c->H));
   PetscCall(PetscFree(c->a));
   PetscCall(PetscFree(c->active));
-  PetscCall(HycoSetFactorDestroy(&c->set_factor));
+  PetscCall(HycoCondensedResetSystem(c));
   PetscCall(PetscFree(*condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -98,7 +98,6 @@ PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
   PetscCall(PetscMalloc1(m * m + 1, &c->M));
   PetscCall(PetscMalloc1(m + 1, &c->g));
   PetscCall(PetscCalloc1(m + 1, &c->active));
-  PetscCall(HycoSetFactorCreate(c->m, &c->set_factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -218,7 +217,7 @@ PetscErrorCode HycoCondensedFlexibility(HycoCondensed c, const PetscReal mu[], P
   PetscFunctionBegin;
   PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_G], mu, axis, skip, c->packed));
   Unpack(c->m, c->packed, c->M);
-  HycoSetFactorForget(c->set_factor);
+  if (c->flexibility) PetscCall(PetscObjectStateIncrease((PetscObject)c->flexibility));
   PetscCall(KnownDefinite(c, mu, axis, skip, definite));
   if (!*definite) PetscCall(HasFactor(c, c->packed, SEMIDEFINITE, definite));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -235,7 +234,6 @@ static PetscErrorCode BringStiffness(HycoROM m, const PetscReal mu[])
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   c->current = PETSC_FALSE;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
-  PetscCall(PetscObjectStateIncrease((PetscObject)c->flexibility));
   HycoCheckModel(
       definite,
       "the interpolated flexibility is not positive definite here (one value left out: error %.1e): train on "
@@ -343,20 +341,53 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w = g + G L on the arrays of the condensed model. */
-static PetscErrorCode CreateSystem(HycoROM m)
+PetscErrorCode HycoCondensedCreateSystem(HycoCondensed c, PetscReal forces[], HycoSolver solver)
 {
-  HycoCondensed c = (HycoCondensed)m->data;
   Vec g;
 
   PetscFunctionBegin;
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, c->m, c->m, c->M, &c->flexibility));
   PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, c->m, c->g, &g));
-  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, c->m, m->Lambda, &c->forces));
+  if (forces)
+    PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, c->m, forces, &c->forces));
+  else
+    PetscCall(VecCreateSeq(PETSC_COMM_SELF, c->m, &c->forces));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &c->system));
   PetscCall(HycoSystemSetFlexibility(c->system, c->flexibility, g));
-  PetscCall(HycoSolverSetSystem(m->solver, c->system));
+  PetscCall(HycoSolverSetSystem(solver, c->system));
   PetscCall(VecDestroy(&g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedResetSystem(HycoCondensed c)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSolverDestroy(&c->solver));
+  PetscCall(HycoSystemDestroy(&c->system));
+  PetscCall(MatDestroy(&c->flexibility));
+  PetscCall(VecDestroy(&c->forces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedSolveForces(HycoCondensed c, PetscReal forces[], PetscBool *solved)
+{
+  const PetscScalar *L;
+  HycoReason reason;
+
+  PetscFunctionBegin;
+  if (!c->solver) { /* samples are many, and one that is not solved is left out: no other method is tried */
+    PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &c->solver));
+    PetscCall(HycoSolverSetType(c->solver, HYCO_SOLVER_ACTIVE_SET));
+    PetscCall(HycoSolverSetFallback(c->solver, PETSC_FALSE));
+    PetscCall(HycoCondensedCreateSystem(c, NULL, c->solver));
+  }
+  PetscCall(HycoSolverSetStartSet(c->solver, c->active));
+  PetscCall(HycoSolverSolve(c->solver, NULL, c->forces));
+  PetscCall(HycoSolverGetReason(c->solver, &reason));
+  *solved = (PetscBool)(reason > 0);
+  PetscCall(VecGetArrayRead(c->forces, &L));
+  PetscCall(PetscArraycpy(forces, L, c->m));
+  PetscCall(VecRestoreArrayRead(c->forces, &L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -370,7 +401,7 @@ static PetscErrorCode SetUp(HycoROM m)
   c->given = (HycoGapSource){m->fe, &m->pairs, m->rows};
   c->scene = m->scene;
   if (c->exact_loads) PetscCall(HycoCondensedPrepareLoads(c));
-  PetscCall(CreateSystem(m));
+  PetscCall(HycoCondensedCreateSystem(c, m->Lambda, m->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -401,12 +432,8 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 
 static PetscErrorCode Reset(HycoROM m)
 {
-  HycoCondensed c = (HycoCondensed)m->data;
-
   PetscFunctionBegin;
-  PetscCall(HycoSystemDestroy(&c->system));
-  PetscCall(MatDestroy(&c->flexibility));
-  PetscCall(VecDestroy(&c->forces));
+  PetscCall(HycoCondensedResetSystem((HycoCondensed)m->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
