@@ -163,8 +163,10 @@ class Check(Case):
             for run in runs:
                 self.assertEqual(run.returncode, 1, run.stdout)
                 self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
-                self.assertIn('no support and no contact keeps body upper', run.stderr)
+                self.assertIn('body upper', run.stderr)
             self.assertIn('press = ', runs[0].stderr)
+        found = self.hyco('check', '-scene', free, '-hyco_regularise')
+        self.assertIn('body upper', found['regularised'])
 
     def test_refused(self):
         """What solve refuses: on every number of ranks, with the point where it is."""
