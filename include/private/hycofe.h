@@ -40,6 +40,7 @@ struct _n_HycoFE {
   PetscBool *constant; /* by cell: neither its nodes nor its material */
   PetscInt n_constant;
   PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
+  PetscBool *bbar;          /* by body: the dilatation is the cells' mean */
   signed char *drawn_sign;  /* by cell: the sign of its volume in the mesh file's coordinates */
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* of the entries of K; made by the second assembly into it */
@@ -62,6 +63,8 @@ struct _n_HycoFE {
   PetscBool *fixed; /* n_dof */
   PetscReal *u0;    /* n_dof, prescribed displacement, 0 where free */
   PetscBool lifted; /* whether any of u0 is not 0 */
+  /* temperature and thermal strain at mu, by cell and integration point; NULL: no body has a temperature */
+  PetscReal *temperature, *thermal;
   /* tangents at mu: those of cell e from tangent_start[e], tangent_size[body] reals for each of its points */
   PetscReal *tangent;
   PetscInt *tangent_start, *tangent_size;
@@ -88,7 +91,7 @@ PetscErrorCode HycoMeshCheckCells(HycoMesh mesh);
 /* After HycoFESetParameters() on parts of a mesh: which bodies are mirrored is the same on all; fails where a map folds
    a body between them. Collective. */
 PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe);
-/* Brings everything to mu (length scene->n_parameters), touching only what depends on what changed. */
+/* Brings everything to mu (length scene->n_variables), touching only what depends on what changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
 /* What the parameters p with changed[p] reach: the bodies' maps, K, the rows of B, the gaps. */
 typedef struct {
@@ -131,15 +134,20 @@ PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, Pe
 /* K (11): rows and columns of fixed unknowns hold only their own diagonal. Local values only: no communication but the
    assembly's. */
 PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K);
-/* F (12), with the lifting of the prescribed displacements: K u0 moved to the right, F_i = K_ii u0_i where fixed. */
+/* F (12), with the lifting of the prescribed displacements: K u0 moved to the right, F_i = K_ii u0_i where fixed; and
+   with what the thermal strains push, unless the scene has a history (HycoFEStep() has it in f_int). */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
 /* The norm matrix of H1: mass plus length^2 times gradient, fixed unknowns as in K. The length, of the whole mesh
    (HycoMeshLength()), keeps the norm the same in any unit; it is 1 in the paper's section 6. */
 PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 
-/* Stress of u (n_dof, local order) averaged over each cell: sigma n_cells x n_sigma. */
+/* Stress of u (n_dof, local order) by the elastic tangents, without the thermal strain's, averaged over each cell:
+   sigma n_cells x n_sigma. */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
-/* Strain energy 1/2 u^T K u of each cell. */
+/* Elastic energy of each cell: 1/2 u^T K u without thermal strains. */
 PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[]);
+/* What the energy identity of a linear scene has beside F.u where there is thermal strain e, of each cell: the integral
+   of e : C : (e - 2 eps(u)). */
+PetscErrorCode HycoFEHeatWork(HycoFE fe, const PetscReal u[], PetscReal work[]);
 
 #endif

@@ -24,6 +24,12 @@ typedef struct {
   const PetscReal *lambda, *gap;
 } HycoContactTable;
 
+/* What both kinds of .xdmf, of one solution and of a series, are made of: a name as XML has it; a cell type's; stress
+   of cells (n_cells x ns) in ParaView's order xx, xy, xz, yy, yz, zz. */
+void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN]);
+const char *HycoFieldsTopology(HycoCellType type);
+void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
+
 /* Writes `path` (must end in .xdmf) and the .h5 beside it, both through temporary names. X: moved nodes (n_nodes x 3).
    The .h5 also holds node_id, cell_id, the parameters and the contact table (rank 0's). order: of parts of a mesh, each
    written by its process, collective; NULL: this process has it all. */

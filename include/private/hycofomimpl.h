@@ -9,6 +9,8 @@
 /* Most rigid motions that -hyco_regularise releases. */
 #define HYCO_MAX_PINS 12
 
+typedef struct _n_HycoPath *HycoPath;
+
 struct _p_HycoFOM {
   PETSCHEADER(int);
   PetscMPIInt rank, size;
@@ -50,6 +52,7 @@ struct _p_HycoFOM {
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
   PetscInt n_turned; /* of released: those that the contacts' normals are turned for */
   Vec *released;
+  HycoPath path; /* of a scene with a history, else NULL */
   HycoSummary summary;
 };
 

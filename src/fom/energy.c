@@ -4,6 +4,8 @@
 
       2 W = F.U + R.u0 - L.D
 
+  With thermal strains, F holds what they push, and their own share is added to the work: HycoFEHeatWork().
+
   W comes from the stresses, the work from F and the element matrices, so that neither can hide an error of the other.
 */
 #include <hycofomimpl.h>
@@ -55,23 +57,30 @@ static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums strain energy and lifting over this rank's cells: a cell counts on the rank that owns its first node. */
+/* Sums strain energy, lifting and what heat does over this rank's cells: a cell counts on the rank that owns its first
+   node. */
 static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
 {
   const PetscScalar *u;
-  PetscReal *each, one;
+  PetscReal *each, *heat = NULL, one;
 
   PetscFunctionBegin;
   *strain = *lifting = 0;
   PetscCall(PetscMalloc1(f->part->n_cells, &each));
   PetscCall(VecGetArrayRead(f->U_local, &u));
   PetscCall(HycoFEEnergy(f->fe, u, each));
+  if (f->fe->thermal) {
+    PetscCall(PetscMalloc1(f->part->n_cells, &heat));
+    PetscCall(HycoFEHeatWork(f->fe, u, heat));
+  }
   for (PetscInt e = 0; e < f->part->n_cells; e++) {
     if (HycoMeshOwned(f->part, f->part->cells[e * f->part->nv]) < 0) continue;
     PetscCall(LiftingWork(f->fe, e, u, &one));
     *strain += each[e];
     *lifting += one;
+    if (heat) *lifting += heat[e];
   }
+  PetscCall(PetscFree(heat));
   PetscCall(VecRestoreArrayRead(f->U_local, &u));
   PetscCall(PetscFree(each));
   PetscFunctionReturn(PETSC_SUCCESS);

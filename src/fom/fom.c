@@ -1,5 +1,5 @@
 /* HycoFOM: reads and spreads the mesh, assembles (16), solves it, brings the solution home in the file's order. */
-#include <hycofomimpl.h>
+#include <hycopath.h>
 
 PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
 {
@@ -10,6 +10,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   HycoCheckHandle(*fom, HYCO_FOM_CLASSID);
   HycoDereference(fom);
   f = *fom;
+  PetscCall(HycoPathDestroy(f));
   PetscCall(HycoSolverDestroy(&f->solver));
   PetscCall(HycoSystemDestroy(&f->system));
   PetscCall(HycoSolverDestroy(&f->given_solver));
@@ -222,6 +223,7 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
   PetscCall(HycoOptionsString(
       "-hyco_mesh_write", "<file.h5>: writes the mesh, refined as the scene says, in PETSc's HDF5 format of a DMPlex",
       f->mesh_write, sizeof(f->mesh_write), NULL));
+  if (!f->scene || f->scene->n_times > 0) PetscCall(HycoPathSetFromOptions(f, PetscOptionsObject));
   PetscCall(HycoOptionsName("-hyco_fom_view", "after each full-order solve: sizes, system, solver"));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -275,6 +277,7 @@ static PetscErrorCode SetUp(HycoFOM f)
     PetscCall(PetscCalloc1(f->n_contacts + 1, &f->lambda));
     PetscCall(PetscCalloc1(f->n_contacts + 1, &f->gap));
   }
+  if (f->path) PetscCall(HycoPathCreate(f));
   f->summary.seconds.setup += HycoNow();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -443,6 +446,10 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   t = &f->summary.seconds;
   PetscCall(CheckPoint(f, n, mu));
+  if (f->path) {
+    PetscCall(HycoPathSolve(f, mu));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoFOMAssemble(f, mu));
   t->assemble = HycoNow() - begin;
   PetscCall(HycoSolverSetSystem(f->solver, f->system));

@@ -54,6 +54,7 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  PetscCall(HycoSceneRefuseHistory(f->scene, "HycoFOMSolveForces()"));
   t = &f->summary.seconds;
   PetscCall(HycoSceneCheckParameters(f->scene, n, mu));
   PetscCall(SetUp(f));
@@ -102,6 +103,7 @@ static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], P
 PetscErrorCode HycoFOMResponses(HycoFOM f, const PetscReal mu[], PetscInt q, const PetscReal P[], PetscReal X[])
 {
   PetscFunctionBegin;
+  PetscCall(HycoSceneRefuseHistory(f->scene, "HycoFOMResponses()"));
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCall(SetUp(f));
   PetscCall(HycoFOMAssemble(f, mu));

@@ -1,6 +1,6 @@
 /* The last solution of a full-order model: where its values are, what they amount to, who gets them. */
 #include <hycofields.h>
-#include <hycofomimpl.h>
+#include <hycopath.h>
 
 PetscErrorCode HycoFOMToLocal(HycoFOM f, Vec v, PetscReal value[])
 {
@@ -115,7 +115,10 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(HycoSolverGetKKT(f->solver, &s->kkt));
   PetscCall(HycoSolverGetReason(f->given ? f->given_solver : f->solver, &s->reason));
   if (f->given) s->kkt = f->given_kkt;
-  PetscCall(HycoFOMEnergy(f, s));
+  if (f->path)
+    HycoPathSummary(f, s);
+  else
+    PetscCall(HycoFOMEnergy(f, s));
   PetscCall(MeasureDisplacements(f, s));
   HycoOnRoot(HycoComm(f), MeasureContacts(f, s));
   if (s->reason > 0 && f->n_contacts) HycoOnRoot(HycoComm(f), HycoFOMCountDependent(f, &s->n_dependent));
@@ -132,7 +135,10 @@ PetscErrorCode HycoFOMStress(HycoFOM f)
   if (f->sigma_ready) PetscFunctionReturn(PETSC_SUCCESS);
   if (!f->sigma) PetscCall(PetscMalloc1(f->part->n_cells * f->fe->n_sigma, &f->sigma));
   PetscCall(VecGetArrayRead(f->U_local, &u));
-  PetscCall(HycoFEStress(f->fe, u, f->sigma));
+  if (f->path)
+    PetscCall(HycoFEStateFields(f->fe, f->path->begin, f->sigma, NULL, NULL, NULL));
+  else
+    PetscCall(HycoFEStress(f->fe, u, f->sigma));
   PetscCall(VecRestoreArrayRead(f->U_local, &u));
   f->sigma_ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

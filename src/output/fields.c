@@ -9,6 +9,11 @@
 static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
                                                         "Hexahedron"};
 
+const char *HycoFieldsTopology(HycoCellType type)
+{
+  return topology[type];
+}
+
 /* All of a mesh's nodes or cells. */
 static PetscInt Count(const HycoFileOrder *order, HycoMesh m, HycoPlace place)
 {
@@ -115,8 +120,7 @@ static PetscErrorCode WriteH5(MPI_Comm comm, const char path[], const HycoFileOr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A name as XML has it. */
-static void EscapeXML(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
+void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
 {
   static const char special[] = "&<>\"'";
   static const char *const entity[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&apos;"};
@@ -138,7 +142,7 @@ static void WriteXDMF(FILE *out, const char file[], const HycoFileOrder *order, 
   const long n_nodes = (long)Count(order, m, HYCO_ON_NODES), n_cells = (long)Count(order, m, HYCO_ON_CELLS);
   char h5[6 * PETSC_MAX_PATH_LEN];
 
-  EscapeXML(file, h5);
+  HycoFieldsEscape(file, h5);
   fprintf(out, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n  <Grid Name=\"mesh\">\n");
   fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", topology[m->type], n_cells,
           m->type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
@@ -248,8 +252,7 @@ PetscErrorCode HycoFieldsWrite(const char path[], const HycoFileOrder *order, Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stress in ParaView's order xx, xy, xz, yy, yz, zz. */
-static void Tensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[])
+void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[])
 {
   static const PetscInt place[6] = {0, 3, 5, 1, 4, 2};
 
@@ -319,7 +322,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
   PetscCall(PetscCalloc3(3 * m->n_nodes, &u3, m->n_cells * fe->n_sigma, &sigma, 6 * m->n_cells, &tensor));
   for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
   PetscCall(HycoFEStress(fe, u, sigma));
-  Tensor6(m->n_cells, fe->n_sigma, sigma, tensor);
+  HycoTensor6(m->n_cells, fe->n_sigma, sigma, tensor);
   ierr = FillContactsOnRoot(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
   if (!ierr) {
     const HycoContactTable table = {pairs->n, f.slave_id, lambda, f.gap};
