@@ -340,7 +340,7 @@ static PetscErrorCode SpreadSchur(HycoDirect d, PetscReal M[])
   for (size_t j = 0; j < n && d->rank == 0; j++) {
     for (size_t i = (size_t)d->n_pinned; i < n; i++) M[j * n + i] = -M[j * n + i];
   }
-  for (size_t j = 0; j < n; j++) PetscCallMPI(MPI_Bcast(M + j * n, (PetscMPIInt)n, MPIU_REAL, 0, d->comm));
+  for (size_t j = 0; j < n; j++) HycoBcast(M + j * n, n, MPIU_REAL, d->comm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -424,7 +424,7 @@ PetscErrorCode HycoDirectReduce(HycoDirect d, Vec F, const PetscReal D[], PetscR
   if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs + d->n, D, d->m));
   PetscCall(Run(d, 1));
   for (PetscInt k = 0; k < d->n_schur && d->rank == 0; k++) q[k] = k < d->n_pinned ? -d->reduced[k] : d->reduced[k];
-  PetscCallMPI(MPI_Bcast(q, (PetscMPIInt)d->n_schur, MPIU_REAL, 0, d->comm));
+  HycoBcast(q, d->n_schur, MPIU_REAL, d->comm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -17,7 +17,7 @@ static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n_dof, &fixed));
   if (t->rank == 0) PetscCall(PetscArraycpy(fixed, t->fe->fixed, n_dof));
-  PetscCallMPI(MPI_Bcast(fixed, (PetscMPIInt)(n_dof * (PetscInt)sizeof(PetscBool)), MPI_BYTE, 0, HycoComm(t)));
+  HycoBcast(fixed, n_dof * (PetscInt)sizeof(PetscBool), MPI_BYTE, HycoComm(t));
   PetscCall(MatGetOwnershipRange(S, &lo, &hi));
   PetscCall(MatGetSize(S, NULL, &n));
   PetscCall(MatDenseGetLDA(S, &lda));

@@ -72,14 +72,9 @@ PetscErrorCode HycoROMDeclare(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMGetFallback(HycoROM m, PetscBool *full_order, PetscBool *displacement)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  *full_order = m->full_order;
-  *displacement = m->full_displacement;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoROMGetFallback, (HycoROM m, PetscBool *full_order, PetscBool *displacement), m, HYCO_ROM_CLASSID,
+                 *full_order = m->full_order;
+                 *displacement = m->full_displacement)
 
 PetscErrorCode HycoROMReset(HycoROM m)
 {
@@ -132,21 +127,8 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMGetType(HycoROM m, HycoROMType *type)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  *type = m->type;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMGivesForces(HycoROM m, PetscBool *gives)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  *gives = m->traits.forces;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoROMGetType, (HycoROM m, HycoROMType *type), m, HYCO_ROM_CLASSID, *type = m->type)
+HycoDefineMethod(HycoROMGivesForces, (HycoROM m, PetscBool *gives), m, HYCO_ROM_CLASSID, *gives = m->traits.forces)
 
 PetscErrorCode HycoROMGetDimensions(HycoROM m, PetscInt *n_modes, PetscInt *n_contacts)
 {
@@ -169,13 +151,7 @@ PetscErrorCode HycoROMSetFE(HycoROM m, HycoHybrid hybrid, PetscInt n, const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMGetScene(HycoROM m, HycoScene *scene)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  *scene = m->scene;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoROMGetScene, (HycoROM m, HycoScene *scene), m, HYCO_ROM_CLASSID, *scene = m->scene)
 
 PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
 {
@@ -194,21 +170,10 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMSetReconstruct(HycoROM m, PetscBool reconstruct)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  m->reconstruct = reconstruct;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMSetExtrapolate(HycoROM m, PetscBool extrapolate)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  PetscCall(HycoSceneSetExtrapolate(m->scene, extrapolate));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoROMSetReconstruct, (HycoROM m, PetscBool reconstruct), m, HYCO_ROM_CLASSID,
+                 m->reconstruct = reconstruct)
+HycoDefineMethod(HycoROMSetExtrapolate, (HycoROM m, PetscBool extrapolate), m, HYCO_ROM_CLASSID,
+                 PetscCall(HycoSceneSetExtrapolate(m->scene, extrapolate)))
 
 PetscErrorCode HycoROMSetMonitor(HycoROM m, HycoMonitor monitor, void *ctx)
 {

@@ -11,6 +11,7 @@ struct _n_HycoH5 {
   hid_t id, access; /* the file; how datasets are opened */
   HycoFile out;     /* while writing, else NULL */
   size_t size;      /* of the file that is read */
+  PetscBool reads;
   char path[PETSC_MAX_PATH_LEN];
 };
 
@@ -97,6 +98,7 @@ PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, Hyco
   PetscFunctionBegin;
   PetscCall(New(name, &f));
   f->size = size;
+  f->reads = PETSC_TRUE;
   H5Pset_file_image(access, image, size);
   f->id = H5Fopen(f->path, H5F_ACC_RDONLY, access);
   H5Pclose(access);
@@ -116,6 +118,7 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
   PetscCall(HycoSealCheck(path, &size, &sealed));
   PetscCall(New(path, &f));
   f->size = size;
+  f->reads = PETSC_TRUE;
   access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_fclose_degree(access, H5F_CLOSE_STRONG); /* closing the file closes what a refusal left open in it */
   f->id = H5Fopen(path, H5F_ACC_RDONLY, access);
@@ -435,5 +438,57 @@ PetscErrorCode HycoH5LoadText(HycoH5 file, const char name[], char **text)
   ierr = ReadSet(file, name, set, H5T_NATIVE_CHAR, H5S_ALL, H5S_ALL, *text);
   if (ierr) PetscCall(PetscFree(*text));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool HycoH5Reads(HycoH5 file)
+{
+  return file->reads;
+}
+
+PetscErrorCode HycoH5Real(HycoH5 file, const char name[], PetscInt *rows, PetscInt cols, PetscReal **data)
+{
+  PetscFunctionBegin;
+  PetscCall(file->reads ? HycoH5LoadReal(file, name, rows, &cols, data)
+                        : HycoH5WriteReal(file, name, *rows, cols, *data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Int(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt *rows, PetscInt cols,
+                         PetscInt **data)
+{
+  PetscFunctionBegin;
+  PetscCall(file->reads ? HycoH5LoadInt(file, name, lo, hi, rows, &cols, data)
+                        : HycoH5WriteInt(file, name, *rows, cols, *data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Reals(HycoH5 file, const char name[], PetscInt n, PetscReal data[])
+{
+  PetscFunctionBegin;
+  PetscCall(file->reads ? HycoH5ReadReal(file, name, n, 1, data) : HycoH5WriteReal(file, name, n, 1, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Ints(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt n, PetscInt data[])
+{
+  PetscInt *read = data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Int(file, name, lo, hi, &n, 1, &read));
+  if (!file->reads) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscArraycpy(data, read, n));
+  PetscCall(PetscFree(read));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Starts(HycoH5 file, const char name[], PetscInt n, PetscInt **start)
+{
+  PetscInt rows = n + 1;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Int(file, name, 0, PETSC_MAX_INT, &rows, 1, start));
+  for (PetscInt k = 0; k < n; k++)
+    HycoCheck((*start)[0] == 0 && (*start)[k] <= (*start)[k + 1], "%s: %s is damaged", file->path, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

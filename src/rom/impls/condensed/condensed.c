@@ -101,6 +101,18 @@ PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscInt HycoCondensedNode(HycoCondensed c, const HycoGridField *f, PetscInt k)
+{
+  PetscInt index[HYCO_MAX_PARAMETERS], node = 0;
+
+  for (PetscInt p = c->dim - 1; p >= 0; p--) {
+    index[p] = k % c->n[p];
+    k /= c->n[p];
+  }
+  for (PetscInt p = 0; p < c->dim; p++) node = node * f->tensor.n[p] + (f->tensor.n[p] > 1 ? index[p] : 0);
+  return node;
+}
+
 #define TILE 64
 
 /* Both triangles of M from the columns of the lower one, by tiles, so that the transposed entries stay near. */
@@ -521,8 +533,8 @@ PetscErrorCode HycoROMCreate_Condensed(HycoROM m)
                                  .features = HycoCondensedFeatures,
                                  .estimate = HycoCondensedEstimate,
                                  .view = View,
-                                 .save = HycoCondensedSave,
-                                 .load = HycoCondensedLoad,
+                                 .save = HycoCondensedMove,
+                                 .load = HycoCondensedMove,
                                  .destroy = Destroy};
   HycoCondensed c;
 

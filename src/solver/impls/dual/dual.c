@@ -91,7 +91,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
 /* A distributed vector, whole on every rank. */
 static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
 {
-  PetscMPIInt size, *counts, *offsets;
+  PetscMPIInt size, count, *counts, *offsets;
   const PetscInt *ranges;
   const PetscScalar *local;
   PetscInt n;
@@ -108,12 +108,13 @@ static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
   PetscCall(VecGetOwnershipRanges(v, &ranges));
   PetscCall(PetscMalloc2(size, &counts, size, &offsets));
   for (PetscMPIInt r = 0; r < size; r++) {
-    counts[r] = (PetscMPIInt)(ranges[r + 1] - ranges[r]);
-    offsets[r] = (PetscMPIInt)ranges[r];
+    PetscCall(PetscMPIIntCast(ranges[r + 1] - ranges[r], &counts[r]));
+    PetscCall(PetscMPIIntCast(ranges[r], &offsets[r]));
   }
   PetscCall(VecGetLocalSize(v, &n));
+  PetscCall(PetscMPIIntCast(n, &count));
   PetscCall(VecGetArrayRead(v, &local));
-  PetscCallMPI(MPI_Allgatherv(local, (PetscMPIInt)n, MPIU_REAL, all, counts, offsets, MPIU_REAL, comm));
+  PetscCallMPI(MPI_Allgatherv(local, count, MPIU_REAL, all, counts, offsets, MPIU_REAL, comm));
   PetscCall(VecRestoreArrayRead(v, &local));
   PetscCall(PetscFree2(counts, offsets));
   PetscFunctionReturn(PETSC_SUCCESS);
