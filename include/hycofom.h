@@ -38,6 +38,38 @@ typedef struct {
   char free_motion[128]; /* one that contact alone prevents: "body block from moving along (0, 1, 0)"; "": none */
 } HycoSummary;
 
+/* A listed time of a history, and what it took to get there from the one before. Energies are since the first time. */
+typedef struct {
+  PetscInt index; /* among the listed times */
+  PetscReal t;
+  PetscInt substeps, cuts;                                              /* steps of time; attempts that were halved */
+  PetscInt iterations, most_iterations, factors, active_set_iterations; /* contact systems, most in a substep; with a
+                                                                           new stiffness; iterations inside them */
+  PetscInt n_active;                                                    /* contacts with L_i > 0 */
+  PetscReal total_contact_force, lambda_max, u_norm2;
+  PetscReal mises, inelastic; /* largest of the cells' means: von Mises stress, accumulated inelastic strain */
+  PetscReal residual, kkt;    /* largest of the substeps: of equilibrium, relative to the forces; of all four */
+  PetscReal work, contact_work, stored, dissipated, thermal; /* of loads and supports; against contact; elastic energy;
+                                                                dissipated; given to heat and to moduli that change */
+  PetscReal energy_defect; /* largest of the substeps: of their balance, over the sum of the terms' sizes so far */
+  PetscReal seconds, seconds_factor, seconds_solve, seconds_law;
+} HycoStep;
+
+/* The path of the last solve of a scene with a history. */
+typedef struct {
+  PetscInt n;           /* times that were reached */
+  const HycoStep *step; /* n, borrowed until the next solve; if the path did not end, the last is no listed time */
+  PetscBool ended;      /* the last listed time is reached */
+  PetscReal t;          /* the last accepted time */
+  const char *why;      /* if not ended: what the last attempt said. Borrowed */
+  const char *newton;   /* "tangent" or "elastic" */
+  PetscInt n_orders;    /* steps whose iterations told an order of convergence */
+  PetscReal order;      /* the median of these; of the tangent 2 */
+} HycoHistory;
+
+/* Called at each listed time, on every rank; HycoFOMGetSolution() then gives the solution there. */
+typedef PetscErrorCode (*HycoStepMonitor)(HycoFOM fom, const HycoStep *step, void *ctx);
+
 /* Reads and distributes the scene's mesh over `comm` (which may be smaller than the scene's communicator).
    Collective on `comm`. It keeps a reference to the scene. The caller owns it. */
 PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom);
@@ -48,7 +80,9 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM fom, HycoSolver *solver);
 
 /* Assembles what depends on the parameters that changed and solves (16) at mu (length n). Collective. Fails, on
    every rank, outside the ranges and where the ranks do not ask for one point; not converging is no error: see
-   HycoSummary.reason. */
+   HycoSummary.reason.
+   A scene with a history is solved from its first time to its last (docs/history.md). What is asked for afterwards is
+   of the last time that was reached: not converged, HYCO_DIVERGED_STEP, where that is not the last one listed. */
 PetscErrorCode HycoFOMSolve(HycoFOM fom, PetscInt n, const PetscReal mu[]);
 /*
   Solves K U = F - B^T Lambda at mu (length n) with the contact forces of somebody else: Lambda (n_contacts, read on
@@ -58,6 +92,10 @@ PetscErrorCode HycoFOMSolve(HycoFOM fom, PetscInt n, const PetscReal mu[]);
   Collective.
 */
 PetscErrorCode HycoFOMSolveForces(HycoFOM fom, PetscInt n, const PetscReal mu[], const PetscReal Lambda[]);
+/* The path of the last solve; n is 0 for a scene without history. Not collective. */
+PetscErrorCode HycoFOMGetHistory(HycoFOM fom, HycoHistory *history);
+/* Of a scene with a history: what is called at each listed time. Not collective. */
+PetscErrorCode HycoFOMSetStepMonitor(HycoFOM fom, HycoStepMonitor monitor, void *ctx);
 /* The system of the last solve (K with the fixed unknowns decoupled, F with their lifting). Borrowed. */
 PetscErrorCode HycoFOMGetSystem(HycoFOM fom, HycoSystem *system);
 /* What the last solution amounts to. Collective. */
@@ -72,6 +110,10 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM fom, HycoSummary *summary);
 */
 PetscErrorCode HycoFOMGetSolution(HycoFOM fom, PetscInt *n_nodes, const PetscReal *U[], PetscInt *n_contacts,
                                   const PetscReal *Lambda[], PetscInt *n_cells, const PetscReal *sigma[]);
+/* Of a scene with a history, before it is solved: the fields at its listed times (displacement, stress and its von
+   Mises value, inelastic strain, temperature, the laws' state, contact) go to PATH.xdmf (`path`), which ParaView plays,
+   and PATH.h5, when the path ends, wherever that is. Collective. */
+PetscErrorCode HycoFOMSetSeries(HycoFOM fom, const char path[]);
 /* Writes the last solution to PATH.h5 and PATH.xdmf (`path` names the latter). Collective. */
 PetscErrorCode HycoFOMWrite(HycoFOM fom, const char path[]);
 

@@ -1,5 +1,4 @@
-/* HDF5 on one process: typed arrays and text by name, checked against the expected size; whole-file writes are atomic.
- */
+/* HDF5: typed arrays and text by name, checked against the expected size; whole-file writes are atomic. */
 #ifndef HYCOH5_H
 #define HYCOH5_H
 
@@ -14,6 +13,9 @@ typedef struct _n_HycoH5 *HycoH5;
 /* Begins a file in memory; HycoH5Close(commit) writes it and gives it its name (hycofile.h), HycoH5Close(no commit)
    forgets it. */
 PetscErrorCode HycoH5Create(const char path[], HycoH5 *file);
+/* The same of all ranks: a file on a disk that all see, to which each writes its rows (HycoH5WriteRows). The calls
+   below that are not collective are rank 0's. One rank: HycoH5Create(). Collective, as HycoH5Close() is then. */
+PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file);
 /* The same without a file: HycoH5GetImage() gives its bytes (the caller frees them by PetscFree()), HycoH5OpenImage()
    opens such bytes, which must outlive it. `name`: what messages call it. */
 PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file);
@@ -30,6 +32,10 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit);
 /* Writes rows x cols (cols 1: a vector). Groups in the name ("mesh/cells") are made as needed. */
 PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscReal *data);
 PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscInt *data);
+/* Writes rows x cols numbers, of type MPIU_REAL or MPIU_INT, of which this rank has the rows first .. first + n - 1.
+   Collective, unless the file is one process's: then it has all. */
+PetscErrorCode HycoH5WriteRows(HycoH5 file, const char name[], MPI_Datatype type, PetscInt rows, PetscInt cols,
+                               PetscInt first, PetscInt n, const void *data);
 PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[]);
 
 /* Whether the file has a dataset of that name. */

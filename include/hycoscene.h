@@ -14,7 +14,7 @@ typedef struct _p_HycoScene *HycoScene;
 /* What an entry that a law or a contact type declares has as its value. */
 typedef enum {
   HYCO_ENTRY_EXPRESSION, /* in x, y, z and the parameters */
-  HYCO_ENTRY_GROUP,      /* a physical group of the mesh */
+  HYCO_ENTRY_GROUP,      /* a physical group of the mesh, or a text */
   HYCO_ENTRY_LENGTH      /* a number, 0 or more; -1 where the scene gives none */
 } HycoEntryKind;
 
@@ -60,6 +60,13 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
 
 /* Whether the scene has any contact. Not collective. */
 PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact);
+
+/* The times that its history lists, increasing, the begin of the path first; n is 0 for a scene without history. Either
+   output may be NULL. Not collective. Borrowed. */
+PetscErrorCode HycoSceneGetHistory(HycoScene scene, PetscInt *n, const PetscReal *times[]);
+
+/* Fails with one line where the scene has a history, for `what` ("hyco train"), which takes none. Not collective. */
+PetscErrorCode HycoSceneRefuseHistory(HycoScene scene, const char what[]);
 
 /* The options that the scene carries (its hyco: section, overridden by the command line). Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options);

@@ -47,7 +47,8 @@ typedef enum {
   HYCO_DIVERGED_ITERATIONS = -2, /* the limit of iterations */
   HYCO_DIVERGED_SINGULAR = -3,   /* K (or its active saddle point) is singular */
   HYCO_DIVERGED_FLOATING = -4,   /* the load takes a body away from the contact that alone holds it */
-  HYCO_DIVERGED_NO_CONTACT_BASIS = -5 /* a reduced model without any contact force, where bodies penetrate */
+  HYCO_DIVERGED_NO_CONTACT_BASIS = -5, /* a reduced model without any contact force, where bodies penetrate */
+  HYCO_DIVERGED_STEP = -6              /* a history: its steps of time have become too small */
 } HycoReason;
 
 /* Collective. The caller owns it. */

@@ -9,6 +9,9 @@
 
 #if PETSC_VERSION_LT(3, 21, 0)
 #define TaoMonitorCancel TaoCancelMonitors
+#define HYCO_EDGE_WEIGHTS_ARGUMENT
+#else /* a PetscPartitioner's edges may have weights */
+#define HYCO_EDGE_WEIGHTS_ARGUMENT PetscSection edge_weights __attribute__((unused)),
 #endif
 #if PETSC_VERSION_LT(3, 19, 0)
 #define PETSC_SUCCESS ((PetscErrorCode)0)

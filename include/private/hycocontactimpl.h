@@ -150,6 +150,8 @@ PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u
 */
 PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions, PetscInt *n_unheld,
                                 PetscReal **unheld, PetscInt *n_alike, PetscReal **alike);
+/* The longest edge around each node (n_nodes) of the facets of `group`; 0 where it has none. */
+void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
 /* Area (length in 2D, 1 in 1D) that each contact's slave node stands for; 0 when its group is no surface. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
 /* The nodes of the contacts and, where masters lie between nodes, all of the master's group. */

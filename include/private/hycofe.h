@@ -40,15 +40,15 @@ struct _n_HycoFE {
   PetscBool *constant; /* by cell: neither its nodes nor its material */
   PetscInt n_constant;
   PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
+  PetscBool *bbar;          /* by body: the dilatation is the cells' mean */
   signed char *drawn_sign;  /* by cell: the sign of its volume in the mesh file's coordinates */
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* of the entries of K; made by the second assembly into it */
   PetscInt n_loads;
   HycoLoadShares *shares; /* n_loads: by load of the scene */
-  /* -hyco_regularise: unknowns held beside the scene's supports, and the motions that these keep (n_released x n_dof,
-     orthonormal; on the whole mesh alone); the contacts' normals are turned to leave the first n_turned of them alone
-   */
-  PetscInt n_pins, *pin, n_released, n_turned;
+  /* -hyco_regularise: unknowns held beside the scene's supports; the motions (n_turned x n_dof, orthonormal) that the
+     contacts' normals are turned to leave alone */
+  PetscInt n_pins, *pin, n_turned;
   PetscReal *released;
   /* the parameters, and what the last HycoFESetParameters changed */
   PetscBool ready;
@@ -63,6 +63,8 @@ struct _n_HycoFE {
   PetscBool *fixed; /* n_dof */
   PetscReal *u0;    /* n_dof, prescribed displacement, 0 where free */
   PetscBool lifted; /* whether any of u0 is not 0 */
+  /* temperature and thermal strain at mu, by cell and integration point; NULL: no body has a temperature */
+  PetscReal *temperature, *thermal;
   /* tangents at mu: those of cell e from tangent_start[e], tangent_size[body] reals for each of its points */
   PetscReal *tangent;
   PetscInt *tangent_start, *tangent_size;
@@ -74,11 +76,22 @@ static inline PetscBool HycoFEIsIsotropic(HycoFE fe, PetscInt cell)
   return (PetscBool)(fe->tangent_size[fe->mesh->cell_body[cell]] == 2);
 }
 
+/* The unknowns of the whole mesh, where fe's is a part or a surface of it. */
+static inline PetscInt HycoFEUnknowns(HycoFE fe)
+{
+  return fe->mesh->n_whole_nodes ? fe->mesh->n_whole_nodes * fe->dim : fe->n_dof;
+}
+
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* Puts the nodes where the file has them; for geometry alone. */
 PetscErrorCode HycoFESetDrawn(HycoFE fe);
-/* Brings everything to mu (length scene->n_parameters), touching only what depends on what changed. */
+/* Fails for a cell without volume as drawn. */
+PetscErrorCode HycoMeshCheckCells(HycoMesh mesh);
+/* After HycoFESetParameters() on parts of a mesh: which bodies are mirrored is the same on all; fails where a map folds
+   a body between them. Collective. */
+PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe);
+/* Brings everything to mu (length scene->n_variables), touching only what depends on what changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
 /* What the parameters p with changed[p] reach: the bodies' maps, K, the rows of B, the gaps. */
 typedef struct {
@@ -106,8 +119,8 @@ typedef struct {
 /* Holds the unknowns `component` of the nodes with these tags (those that this mesh has) beside the scene's supports,
    in place of the last ones; n = 0: none. */
 PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const PetscInt component[]);
-/* Finds them on the whole mesh. */
-PetscErrorCode HycoFEFreeMotions(HycoFE fe, HycoMotions *motions);
+/* Finds them on the mesh of which each process has a part; motion: of the part's unknowns. Collective. */
+PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions);
 PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
 /* "body B from moving along ..." for the combination of motions with these coefficients. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);
@@ -121,15 +134,20 @@ PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, Pe
 /* K (11): rows and columns of fixed unknowns hold only their own diagonal. Local values only: no communication but the
    assembly's. */
 PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K);
-/* F (12), with the lifting of the prescribed displacements: K u0 moved to the right, F_i = K_ii u0_i where fixed. */
+/* F (12), with the lifting of the prescribed displacements: K u0 moved to the right, F_i = K_ii u0_i where fixed; and
+   with what the thermal strains push, unless the scene has a history (HycoFEStep() has it in f_int). */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
 /* The norm matrix of H1: mass plus length^2 times gradient, fixed unknowns as in K. The length, of the whole mesh
    (HycoMeshLength()), keeps the norm the same in any unit; it is 1 in the paper's section 6. */
 PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 
-/* Stress of u (n_dof, local order) averaged over each cell: sigma n_cells x n_sigma. */
+/* Stress of u (n_dof, local order) by the elastic tangents, without the thermal strain's, averaged over each cell:
+   sigma n_cells x n_sigma. */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
-/* Strain energy 1/2 u^T K u of each cell. */
+/* Elastic energy of each cell: 1/2 u^T K u without thermal strains. */
 PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[]);
+/* What the energy identity of a linear scene has beside F.u where there is thermal strain e, of each cell: the integral
+   of e : C : (e - 2 eps(u)). */
+PetscErrorCode HycoFEHeatWork(HycoFE fe, const PetscReal u[], PetscReal work[]);
 
 #endif

@@ -3,13 +3,19 @@
 #define HYCOFIELDS_H
 
 #include <hycocontactimpl.h>
+#include <hycoh5.h>
 
 typedef struct {
   const char *name;
-  PetscBool on_cells;
+  HycoPlace place;     /* of a mesh that one process has, a surface's nodes are its nodes */
   PetscInt components; /* 1, 3 (vector) or 6 (symmetric tensor xx, xy, xz, yy, yz, zz) */
   const PetscReal *data;
 } HycoField;
+
+/* Writes `components` numbers, of type MPIU_REAL or MPIU_INT, of each node or cell in the file's order, as a set of
+   cols columns. Collective with an order; without one this process has all n of them. */
+PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
+                              MPI_Datatype type, PetscInt components, PetscInt cols, const void *value);
 
 /* Contact results by slave node. */
 typedef struct {
@@ -18,19 +24,28 @@ typedef struct {
   const PetscReal *lambda, *gap;
 } HycoContactTable;
 
-/* Writes `path` (must end in .xdmf) and the .h5 beside it, both through temporary names. On this process alone. X:
-   moved nodes (n_nodes x 3). The .h5 also holds node_id, cell_id, the parameters and the contact table. */
-PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh mesh, const PetscReal X[], HycoScene scene,
-                               const PetscReal mu[], PetscInt n, const HycoField field[],
+/* What both kinds of .xdmf, of one solution and of a series, are made of: a name as XML has it; a cell type's; stress
+   of cells (n_cells x ns) in ParaView's order xx, xy, xz, yy, yz, zz. */
+void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN]);
+const char *HycoFieldsTopology(HycoCellType type);
+void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
+
+/* Writes `path` (must end in .xdmf) and the .h5 beside it, both through temporary names. X: moved nodes (n_nodes x 3).
+   The .h5 also holds node_id, cell_id, the parameters and the contact table (rank 0's). order: of parts of a mesh, each
+   written by its process, collective; NULL: this process has it all. */
+PetscErrorCode HycoFieldsWrite(const char path[], const HycoFileOrder *order, HycoMesh mesh, const PetscReal X[],
+                               HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
                                const HycoContactTable *contact);
 /* Fails unless `path` ends in .xdmf, and where the .h5 beside it is a model or a snapshot. On this process alone. */
 PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /*
-  The usual fields from a solution on a whole mesh, then HycoFieldsWrite: displacement, stress, contact force (vector on
-  slaves, minus on masters), contact pressure, gap at the solution, RID marker (may be NULL: none written).
+  The usual fields of a solution, then HycoFieldsWrite: displacement, stress, contact force (vector on slaves, minus on
+  masters), contact pressure, gap at the solution, RID marker (may be NULL: none written). u on fe, u_surface on the
+  mesh of the pairs: with an order they are the part's and rank 0's (elsewhere `surface` is NULL), else the same.
 */
-PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, HycoPairs *pairs, const PetscReal u[],
+PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
+                                 HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],
                                  const PetscReal lambda[], const PetscReal *rid);
 
 #endif

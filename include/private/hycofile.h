@@ -1,7 +1,7 @@
 /*
   Files that are written whole or not at all, and the temporary names that this takes.
 
-  A file is written beside its place under the name PATH.hyco-NODE-PID-NUMBER.partial and renamed: NODE stands for the
+  A file is written beside its place under the name PATH.hyco-NODE-PID-NUMBER.KIND and renamed: NODE stands for the
   machine and its space of process ids, so that no two processes share a name. What a killed process left is told by its
   name, and removed by the next run that writes there.
 */
@@ -32,6 +32,17 @@ PetscErrorCode HycoFileFlush(HycoFile file);
 /* commit: the file takes its place, or fails with the system's reason and leaves none; else it is removed. Frees. */
 PetscErrorCode HycoFileClose(HycoFile *file, PetscBool commit);
 
+/* A name beside `path` (or the file that it is a link to) for what this run alone writes, reads and removes. Not
+   created. On rank 0 of comm; the same on every rank. Collective. */
+PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind[], char scratch[HYCO_FILE_NAME]);
+/* Makes that file, empty, for the one that will be at `path`. On this process alone. */
+PetscErrorCode HycoFileOpenScratch(const char scratch[], const char path[], int *fd);
+/* Writes bytes at a place of an open file, all of them, or fails as a full disk makes it; the same of an errno that is
+   not 0. `path`: what messages name. On this process alone. */
+PetscErrorCode HycoFilePut(int fd, const char path[], const void *data, size_t bytes, size_t place);
+PetscErrorCode HycoFileComplain(const char path[], int failed);
+/* The file `scratch` takes the place of `path`. On this process alone. */
+PetscErrorCode HycoFileKeep(const char scratch[], const char path[]);
 /* The path that a temporary name belongs to: what a message names. A path that is none is returned as it is. */
 void HycoFileOwner(const char name[], char owner[HYCO_FILE_NAME]);
 /* Removes what dead processes have left of the file `path`, or, when it ends in '/', of all files in that folder. On

@@ -185,6 +185,8 @@ PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin);
 /* The seal of a file with these bytes, to be appended to them. */
 #define HYCO_SEAL 24
 void HycoSealMake(const void *data, size_t bytes, unsigned char seal[HYCO_SEAL]);
+/* The seal of a file as it is, and its size. */
+PetscErrorCode HycoSealFile(const char path[], size_t *size, unsigned char seal[HYCO_SEAL]);
 /* Size of a file, and whether it has a seal; fails when it has one and its bytes are not the sealed ones. */
 PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed);
 

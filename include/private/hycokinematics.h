@@ -10,6 +10,18 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
                              PetscReal *weight);
 /* Their means over the cell, which make the dilatation of the element bbar. */
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[8][3]);
+/* The place of quadrature point q of a cell. */
+void HycoPointPlace(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal x[3]);
+/* Strain at a point of u (six components; those that are not n_sigma's are 0), from the shape functions' gradients g
+   there; mean: those that make the dilatation of the element bbar, or NULL. */
+void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal u[], PetscReal g[8][3],
+                     PetscReal mean[8][3], PetscReal strain[6]);
+/* f += w B^T stress of that point, at the cell's unknowns (nv x dim). */
+void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[8][3], PetscReal mean[8][3], PetscReal w,
+                    const PetscReal stress[6], PetscReal f[]);
+/* Room for temperatures and thermal strains; fills them at fe's nodes and mu where what changed reaches them. */
+PetscErrorCode HycoHeatCreate(HycoFE fe);
+PetscErrorCode HycoFESetHeat(HycoFE fe, PetscBool all, const PetscBool changed[]);
 /* Room for the tangents. */
 PetscErrorCode HycoTangentsCreate(HycoFE fe);
 /* The tangents at fe's nodes and mu; all: of cells that no parameter reaches too. */
@@ -27,7 +39,7 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
 /* Unit normals (n_nodes x 3; zero off the group) of the smooth surface behind a group's facets on fe's moved nodes, the
    angle by which faceting leaves each in doubt, and the largest angle between facets nearby (n_nodes both). 2D, 3D. */
 PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], PetscReal doubt[], PetscReal bend[]);
-/* Turns the normal of contact k so that the first n_turned motions of fe->released are tangential there. */
+/* Turns the normal of contact k so that the motions of fe->released are tangential there. */
 void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3]);
 
 #endif

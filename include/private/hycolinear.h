@@ -26,6 +26,8 @@ PetscErrorCode HycoDirectPinKernel(HycoDirect direct, Mat K);
 /* Orders and analyses [K Bt; B 0] (B and Bt may be NULL) unless the pattern is the last one's; bytes: what the factor
    is estimated to take on all ranks together. */
 PetscErrorCode HycoDirectAnalyse(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscBool symmetric, PetscReal *bytes);
+/* After HycoDirectAnalyse(): floating-point operations that the factor is estimated to take. */
+PetscReal HycoDirectOperations(HycoDirect direct);
 /* Factors, after HycoDirectAnalyse() with the same matrices: S = B K^-1 Bt, m x m, column major, on every rank. */
 PetscErrorCode HycoDirectFactor(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscReal S[], PetscBool *singular);
 /* g = D - B K^-1 F on every rank; D (length m) is read on rank 0. */

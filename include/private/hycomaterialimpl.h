@@ -10,7 +10,10 @@ struct _p_HycoMaterial {
   /* what the type declares */
   HycoDeclared constants;
   PetscInt n_state;
-  PetscBool linear;
+  char **state_name; /* n_state, or NULL */
+  PetscBool linear, heat;
+  const char *folder;   /* where the scene's relative paths start; borrowed */
+  HycoExpr temperature; /* of the body, which owns it; NULL: it has none */
   void *data;
 };
 
@@ -21,18 +24,32 @@ static inline PetscInt HycoStrainSize(PetscInt dim)
 }
 /* Reals of a tangent: 2 where it is isotropic (Lame's lambda and mu), else the square of HycoStrainSize(). */
 PetscInt HycoMaterialTangentSize(HycoMaterial material, PetscInt dim);
-/* Whether the law is one that the library solves with, in this dimension. */
-PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim);
+/* Whether the law is one that the library solves with, in this dimension and with a history of the scene or without. */
+PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, PetscBool has_history);
 /* Whether the tangent changes where the parameters p with changed[p] do. */
 PetscBool HycoMaterialChanges(HycoMaterial material, const PetscBool changed[]);
-/* Tangents of a linear law at n points x (n x 3) and mu; work: room for n reals a constant. Fails where a constant
-   leaves its interval, and where the law refuses a point or gives a tangent that is not symmetric and definite. */
+/* The constants at n points x (n x 3), their temperatures (NULL: none) and mu; work: room for n reals a constant. Fails
+   where a constant leaves its interval. */
+PetscErrorCode HycoMaterialConstants(HycoMaterial material, const PetscReal mu[], PetscInt n, const PetscReal x[],
+                                     const PetscReal temperature[], PetscReal work[], const PetscReal *constant[]);
+/* Elastic tangents there: of a linear law the tangents, of another those at rest. Fails also where the law refuses a
+   point or gives a tangent that is not symmetric and definite. */
 PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const PetscReal mu[], PetscInt n,
-                                    const PetscReal x[], PetscReal work[], PetscReal tangent[]);
+                                    const PetscReal x[], const PetscReal temperature[], PetscReal work[],
+                                    PetscReal tangent[]);
 /* stress = tangent . strain at a point. */
 void HycoTangentApply(PetscBool isotropic, PetscInt dim, const PetscReal tangent[], const PetscReal strain[],
                       PetscReal stress[]);
 
+/* Young's modulus and Poisson's ratio, the first two constants of isotropic laws; Lame's of them. */
+PetscErrorCode HycoElasticDeclare(HycoMaterial material);
+PetscErrorCode HycoElasticLame(HycoMaterial material, HycoMaterialPoints *points, PetscReal lame[]);
+
 PetscErrorCode HycoMaterialCreate_Elastic(HycoMaterial material);
+PetscErrorCode HycoMaterialCreate_J2(HycoMaterial material);
+PetscErrorCode HycoMaterialCreate_Norton(HycoMaterial material);
+PetscErrorCode HycoMaterialCreate_StrainHardening(HycoMaterial material);
+PetscErrorCode HycoMaterialCreate_LimbackAndersson(HycoMaterial material);
+PetscErrorCode HycoMaterialCreate_MFront(HycoMaterial material);
 
 #endif

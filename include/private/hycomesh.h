@@ -7,6 +7,7 @@
 
 #include <hycosceneimpl.h>
 #include <petscdmplex.h>
+#include <petscsf.h>
 
 typedef enum { HYCO_LINE2, HYCO_TRI3, HYCO_QUAD4, HYCO_TET4, HYCO_HEX8, HYCO_N_CELL_TYPES } HycoCellType;
 
@@ -17,11 +18,15 @@ struct _n_HycoMesh {
   HycoCellType type;
   /* nodes, ascending by tag; in a part those of its cells, then the others */
   PetscInt n_nodes;
-  PetscReal *xyz;        /* n_nodes x 3, as in the file (not moved) */
-  PetscInt *node_id;     /* tag in the mesh file */
-  PetscInt *node_body;   /* the body that moves it */
-  PetscInt *node_global; /* number in the distributed vectors; NULL: its own index */
-  PetscInt *node_whole;  /* index in the whole mesh; NULL: its own index */
+  PetscReal *xyz;          /* n_nodes x 3, as in the file (not moved) */
+  PetscInt *node_id;       /* tag in the mesh file */
+  PetscInt *node_body;     /* the body that moves it */
+  PetscInt *node_global;   /* number in the distributed vectors; NULL: its own index */
+  PetscInt *node_whole;    /* index in the whole mesh; NULL: its own index */
+  PetscInt n_owned, first; /* with node_global: the numbers of this process's own nodes, first .. first + n_owned - 1 */
+  /* of the whole mesh of a part or a surface; 0: of this one */
+  PetscInt n_whole_nodes, n_whole_cells;
+  PetscReal whole_length;
   /* cells, ascending by tag */
   PetscInt n_cells;
   PetscInt *cells;      /* n_cells x nv, node indices */
@@ -64,8 +69,17 @@ PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt k
 /* Sorts a[0..*n), unless it is, and keeps one of each. */
 PetscErrorCode HycoSortUnique(PetscInt *n, PetscInt a[]);
 
-/* The largest extent of the mesh, as in the file, along an axis. */
+/* Its largest and (negated) smallest coordinates, as in the file. */
+void HycoMeshEnds(HycoMesh mesh, PetscReal ends[6]);
+/* The largest extent of the whole mesh, as in the file, along an axis. */
 PetscReal HycoMeshLength(HycoMesh mesh);
+/* The place of a node among this process's own, or -1: another's. */
+static inline PetscInt HycoMeshOwned(HycoMesh m, PetscInt node)
+{
+  const PetscInt place = m->node_global ? m->node_global[node] - m->first : node;
+
+  return !m->node_global || (place >= 0 && place < m->n_owned) ? place : -1;
+}
 
 /* Cells around each node: CSR start[n_nodes + 1], cell[]. The caller frees both. */
 PetscErrorCode HycoMeshNodeCells(HycoMesh mesh, PetscInt **start, PetscInt **cell);
@@ -83,13 +97,35 @@ extern const char *const HycoPartitioners[];
 PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm);
 PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
                                   HycoPartitioner by, const char write[]);
-/* Tables of each process's part: the cells that touch a node of its own. n_owned, first: its own nodes' rows in the
-   distributed numbering. On one process node_global, node_whole and cell_whole stay NULL. Collective. */
-PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *n_owned, PetscInt *first);
+/* Tables of each process's part: the cells that touch a node of its own. On one process node_global, node_whole and
+   cell_whole stay NULL. Collective. */
+PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh);
 /* On rank 0 (elsewhere NULL) all of the parts, or with `in` (by group) the nodes and the facets of these groups,
-   without cells; `global`: the numbers of its nodes in the distributed vectors. The caller owns both. Collective. */
-PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, PetscInt n_owned, PetscInt first, const PetscBool in[],
-                              HycoMesh *mesh, PetscInt **global);
+   without cells; with the parts' node_global and node_whole. The caller owns it. Collective. */
+PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[], HycoMesh *mesh);
+/* place[k]: how many different keys of all processes are smaller than key[k] >= 0. Collective. */
+PetscErrorCode HycoRankInts(MPI_Comm comm, PetscInt n, const PetscInt key[], PetscInt place[], PetscInt *total);
+/* A star forest from the nodes of a part (leaves) to the processes that own them (roots, by place). Collective; the
+   caller destroys it. */
+PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscSF *sf);
+
+/* The order of the file: a part's own nodes, its own cells (those whose first node is) and rank 0's nodes of a surface
+   as leaves of star forests, whose roots are the rows n[] from first[] that a process has of all. */
+typedef enum { HYCO_ON_NODES, HYCO_ON_CELLS, HYCO_ON_SURFACE, HYCO_N_PLACES } HycoPlace;
+typedef struct {
+  MPI_Comm comm;
+  PetscInt all[HYCO_N_PLACES], n[HYCO_N_PLACES], first[HYCO_N_PLACES];
+  PetscSF sf[HYCO_N_PLACES];
+} HycoFileOrder;
+/* surface: on rank 0, NULL elsewhere. root: rank 0 has all rows, else each process as many. Collective. */
+PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh part, HycoMesh surface, PetscBool root,
+                                   HycoFileOrder **order);
+PetscErrorCode HycoFileOrderDestroy(HycoFileOrder **order);
+/* Brings values (by node, cell or surface node, `components` of a type each) to the rows; rows without any are left
+   alone. Collective. */
+PetscErrorCode HycoFileOrderSend(const HycoFileOrder *order, HycoPlace place, MPI_Datatype type, PetscInt components,
+                                 const void *value, void *rows);
+
 /* The scene's whole mesh on rank 0 (elsewhere NULL). Collective. */
 PetscErrorCode HycoMeshCreateWhole(MPI_Comm comm, HycoScene scene, HycoMesh *mesh);
 

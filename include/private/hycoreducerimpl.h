@@ -82,9 +82,14 @@ struct _p_HycoReducer {
   PetscInt l;            /* modes */
   PetscReal *sigma;      /* every rank: l */
   PetscReal *V_whole;    /* (n_nodes * dim) x l row major */
-  PetscReal *U, *Lambda; /* snapshots, column major: n_dof x n_s, n_contacts x n_s */
-  PetscReal *VtU;        /* l x n_s column major: V^T of the snapshots less their lifting */
-  PetscReal *U_norm;     /* n_s: of the whole snapshot */
+  Mat S;                 /* every rank: displacements, n_dof x n_s, rows spread */
+  PetscReal *U_rid;      /* of these, the rows of the model's mesh, column major */
+  PetscInt *contact_row; /* by node: its place in U_contact, or -1 */
+  PetscReal *U_contact;  /* the rows of the contacts' nodes, column major */
+  PetscInt n_contact_nodes;
+  PetscReal *Lambda; /* n_contacts x n_s column major */
+  PetscReal *VtU;    /* l x n_s column major: V^T of the snapshots less their lifting */
+  PetscReal *U_norm; /* n_s: of the whole snapshot */
   PetscInt n_s;
   unsigned long long fingerprint;
   PetscBool *grown; /* rank 0, greedy: cells of the RIDs so far; else NULL */
@@ -119,6 +124,9 @@ PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_
                               PetscReal sigma[]);
 PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
                                   PetscInt max_modes, PetscInt found, PetscInt *l);
+/* On rank 0 (U, column major, the caller's; elsewhere empty) the snapshots' displacements at nodes that rank 0 gives.
+   Collective. */
+PetscErrorCode HycoReducerFetchRows(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **U);
 /* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
    rows, column major, on every rank; a dense matrix on rank 0, row or column major (the caller frees). Collective. */
 PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, Mat *S);

@@ -20,8 +20,15 @@ PetscErrorCode HycoExprDestroy(HycoExpr *expr);
 PetscErrorCode HycoExprPlace(HycoExpr expr, const PetscReal mu[], const PetscReal xyz[3], char place[HYCO_LINE]);
 /* Values at n points (n x 3 coordinates) and mu; fails on a value that is not finite. */
 PetscErrorCode HycoExprEval(HycoExpr expr, const PetscReal mu[], PetscInt n, const PetscReal xyz[], PetscReal value[]);
+/* The same of an expression that may name `temperature`, n values; NULL where it does not. */
+PetscErrorCode HycoExprEvalHot(HycoExpr expr, const PetscReal mu[], PetscInt n, const PetscReal xyz[],
+                               const PetscReal temperature[], PetscReal value[]);
 /* Whether x, y or z appears; whether any parameter p with changed[p] does. NULL-safe (false). */
 PetscBool HycoExprInSpace(HycoExpr expr);
+/* Whether `temperature` does, which only a law's constants and the expansion may name. NULL-safe. */
+PetscBool HycoExprInHeat(HycoExpr expr);
+/* Fails where it does. */
+PetscErrorCode HycoExprRefuseHeat(HycoExpr expr);
 PetscBool HycoExprChanges(HycoExpr expr, const PetscBool changed[]);
 const char *HycoExprKey(HycoExpr expr);
 
@@ -32,7 +39,8 @@ typedef struct {
   HycoEntryKind kind;
   PetscBool required;
   HycoExpr expr;    /* of an expression that the scene gives */
-  char *text;       /* of a group */
+  char *text;       /* of a group, a text */
+  PetscBool heat;   /* its expression may name `temperature` */
   PetscReal value;  /* of a length, and where the scene gives no expression */
   PetscReal lo, hi; /* of a law's constant: open interval */
 } HycoEntry;
@@ -55,8 +63,10 @@ typedef struct {
   char *name;
   HycoMaterial law;
   PetscBool bbar;    /* mean dilatation (B-bar) instead of the displacements' own at each point */
+  PetscBool element; /* whether the scene says so; if not, HycoFE chooses by the law */
   HycoExpr map[3];   /* moved coordinates; NULL: not moved */
   HycoExpr force[3]; /* body force per unit volume; NULL: none */
+  HycoExpr temperature, reference, expansion; /* K; thermal strain expansion (temperature - reference); NULL: none */
 } HycoBody;
 
 typedef struct {
@@ -70,17 +80,29 @@ typedef struct {
   HycoExpr traction[3]; /* force per unit surface; NULL: none */
 } HycoLoad;
 
+/* A quantity over time: linear between its rows, constant before the first and after the last. */
+typedef struct {
+  PetscInt n;
+  PetscReal *t, *value;
+} HycoTimeTable;
+
 struct _p_HycoScene {
   PETSCHEADER(int);
   PetscOptions options; /* every entry, the command line's already in */
   char *title, *mesh_path;
   DM dm;           /* the program's own mesh; NULL: mesh_path */
   PetscInt refine; /* times that the mesh's cells are halved */
+  char *folder;    /* where relative paths of entries start */
   /* parameters */
   PetscInt n_parameters;
-  char *parameter[HYCO_MAX_PARAMETERS];
+  PetscInt n_variables; /* of expressions: the parameters; with a history t and its tables' values too */
+  char *parameter[HYCO_MAX_PARAMETERS]; /* names of the variables, the parameters' first */
   PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS];
   PetscBool extrapolate; /* values outside the ranges pass */
+  /* history; without one n_times is 0 */
+  PetscInt n_times, n_tables;
+  PetscReal *times; /* increasing; the first is where the path begins */
+  HycoTimeTable table[HYCO_MAX_PARAMETERS];
   /* description */
   PetscInt n_bodies, n_fixed, n_loads, n_contacts;
   HycoBody *body;
@@ -91,6 +113,17 @@ struct _p_HycoScene {
   PetscInt n_entries;
   char **key, **value;
 };
+
+/* Reads the history's entries, once the parameters are read. */
+PetscErrorCode HycoSceneReadHistory(HycoScene scene);
+/* Fails where the history reaches what must not change in time: the bodies' places, the rows of B. */
+PetscErrorCode HycoSceneCheckHistory(HycoScene scene);
+PetscErrorCode HycoSceneDestroyHistory(HycoScene scene);
+/* The variables at time t: the parameters mu (n_parameters), t, the tables' values; out has room for n_variables. */
+void HycoSceneSetTime(HycoScene scene, const PetscReal mu[], PetscReal t, PetscReal out[]);
+/* The first time after t at which a step ends: a listed one, or a row of a table. */
+PetscReal HycoSceneNextStop(HycoScene scene, PetscReal t);
+PetscBool HycoIsVariableName(const char word[]);
 
 /* Builds a scene from n (key, value) entries; `folder` is where a relative mesh path starts. */
 PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[], char *const value[],

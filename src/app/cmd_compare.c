@@ -205,6 +205,7 @@ PetscErrorCode CommandCompare(void)
   PetscCall(DriverRequire("scene", path));
   PetscCall(DriverRequire("model", file));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
+  PetscCall(HycoSceneRefuseHistory(scene, "hyco compare"));
   PetscCall(DriverCheckMesh(scene));
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(file, &model));
   PetscCall(HycoROMCheckScene(model, scene));

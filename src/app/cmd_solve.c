@@ -21,6 +21,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
 {
   cJSON *json;
   HycoSolver solver;
+  HycoHistory history;
   const char *method, *linear;
 
   PetscFunctionBegin;
@@ -52,6 +53,8 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   ReportKKT(json, &s->kkt);
   cJSON_AddNumberToObject(json, "rounding", s->kkt.rounding);
   ReportSeconds(json, &s->seconds);
+  PetscCall(HycoFOMGetHistory(fom, &history));
+  if (history.n) DriverReportHistory(json, &history);
   PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
                 (int)s->n_active, (int)s->iterations, method));
   PetscCall(Remarks(s));
@@ -68,6 +71,25 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   PetscCall(Say("seconds: %.3f assemble, %.3f factor, %.3f solve (%s)\n", (double)s->seconds.assemble,
                 (double)s->seconds.factor, (double)s->seconds.solve, linear));
   PetscCall(ReportWrite(&json));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A scene with a history: its path. */
+static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], const char table[])
+{
+  HycoSummary summary;
+  DriverPath path = {.checked = PETSC_FALSE};
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  PetscCall(HycoSceneGetHistory(scene, &path.n, NULL));
+  if (output[0]) PetscCall(HycoFOMSetSeries(fom, output));
+  PetscCall(HycoFOMSetStepMonitor(fom, DriverSayStep, &path));
+  PetscCall(HycoFOMSolve(fom, n, mu));
+  PetscCall(DriverEndHistory(fom, scene, mu, table));
+  PetscCall(HycoFOMGetSummary(fom, &summary));
+  PetscCall(Report(scene, mu, fom, &summary));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -151,6 +173,7 @@ PetscErrorCode CommandSolve(void)
   HycoFOM fom;
   HycoSolver solver;
   PetscBool monitor, set;
+  PetscInt n_times;
   PetscReal mu[64];
   char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN] = "";
 
@@ -160,17 +183,21 @@ PetscErrorCode CommandSolve(void)
   PetscCall(DriverReadMonitor(&monitor));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverCheckMesh(scene));
+  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverHasSamples(scene, &set));
+  if (set) PetscCall(HycoSceneRefuseHistory(scene, "a set of points"));
   HycoCheck(!set || !output[0], "-output is for one point (-mu); a set of points gives a -table");
   if (set) {
     PetscCall(DriverGetSamples(scene, &samples, &set));
-    PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   } else
     PetscCall(DriverGetPoint(scene, mu));
+  if (set || n_times) PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMGetSolver(fom, &solver));
   if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
-  HycoStaged(HYCO_STAGE_FULL_ORDER, set ? Many(fom, scene, samples, table) : One(fom, scene, mu, output));
+  HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? Many(fom, scene, samples, table)
+                                    : n_times ? Path(fom, scene, mu, output, table)
+                                              : One(fom, scene, mu, output));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));

@@ -1,5 +1,6 @@
 /* hyco view: what is in a model or a scene. */
 #include "driver.h"
+#include <hycomesh.h>
 #include <petscviewer.h>
 
 PetscErrorCode DeclareView(PetscOptions options)
@@ -17,6 +18,7 @@ PetscErrorCode CommandView(void)
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
   HycoROM model = NULL;
   HycoScene scene;
+  HycoMesh mesh;
   PetscMPIInt rank;
 
   PetscFunctionBegin;
@@ -31,6 +33,8 @@ PetscErrorCode CommandView(void)
   } else {
     PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
     PetscCall(DriverCheckLeft());
+    PetscCall(HycoMeshCreateWhole(PETSC_COMM_WORLD, scene, &mesh)); /* fails where it, or a group, is missing */
+    PetscCall(HycoMeshDestroy(&mesh));
     if (rank == 0) PetscCall(HycoSceneView(scene, PETSC_VIEWER_STDOUT_SELF));
     PetscCall(HycoSceneDestroy(&scene));
   }

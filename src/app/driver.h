@@ -208,11 +208,26 @@ PetscErrorCode DriverSetSearch(Search *search, HycoScene scene, HycoReducer redu
 PetscErrorCode DriverJudgeModel(const Search *search, const HycoTraining *training);
 void DriverReportModel(cJSON *json, const Search *search, const HycoTraining *training);
 
+/* -- solve_history.c: a path -- */
+
+/* How many times the scene lists; whether unread options have been looked for. */
+typedef struct {
+  PetscInt n;
+  PetscBool checked;
+} DriverPath;
+/* A HycoStepMonitor; ctx: a DriverPath. */
+PetscErrorCode DriverSayStep(HycoFOM fom, const HycoStep *step, void *ctx);
+void DriverReportHistory(cJSON *json, const HycoHistory *history);
+/* After the solve: the table ("": none), a summary; fails where the path has not reached its end. Collective. */
+PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char table[]);
+
+PetscErrorCode CommandCheck(void);
 PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);
 PetscErrorCode CommandPredict(void);
 PetscErrorCode CommandCompare(void);
 PetscErrorCode CommandView(void);
+PetscErrorCode DeclareCheck(PetscOptions options);
 PetscErrorCode DeclareSolve(PetscOptions options);
 PetscErrorCode DeclareTrain(PetscOptions options);
 PetscErrorCode DeclarePredict(PetscOptions options);

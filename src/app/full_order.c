@@ -56,6 +56,7 @@ PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback
             f->on ? "-hyco_fallback solves full order where the reduced model is not enough"
                   : "-hyco_full_displacement solves on the whole mesh with the predicted forces");
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &f->scene));
+  PetscCall(HycoSceneRefuseHistory(f->scene, "hyco predict"));
   PetscCall(DriverCheckMesh(f->scene));
   PetscCall(HycoROMCheckScene(model, f->scene));
   PetscCall(HycoSceneSetExtrapolate(f->scene, extrapolate));

@@ -7,6 +7,9 @@
 #include <time.h>
 
 const Command commands[] = {
+    {"check", CommandCheck, DeclareCheck, "hyco check -scene FOLDER [-check_solve] [-report R.json]",
+     "read all of a scene and assemble it at the corners of its ranges: what is there, what is suspicious, what a "
+     "solve and a training (-grid N,N,...) take"},
     {"solve", CommandSolve, DeclareSolve, "hyco solve -scene FOLDER -mu V,V,... [-output F.xdmf] [-report R.json]",
      "solve full order, for one point or a set (-table T.csv)"},
     {"train", CommandTrain, DeclareTrain,
@@ -117,11 +120,13 @@ static int AnswerAtOnce(int argc, char **argv)
 
     for (; commands[n].name; n++) names[n] = commands[n].name;
     near = HycoNearest(argv[1], n, names);
-    fprintf(stderr,
-            "hyco: error: there is no command \"%s\"; commands are solve, train, predict, compare and view%s%s%s\n",
-            argv[1], near ? "; did you mean " : "", near ? near : "", near ? "?" : "");
+    fprintf(
+        stderr,
+        "hyco: error: there is no command \"%s\"; commands are check, solve, train, predict, compare and view%s%s%s\n",
+        argv[1], near ? "; did you mean " : "", near ? near : "", near ? "?" : "");
   } else
-    fprintf(stderr, "hyco: error: give a command: solve, train, predict, compare or view (hyco -help explains them)\n");
+    fprintf(stderr,
+            "hyco: error: give a command: check, solve, train, predict, compare or view (hyco -help explains them)\n");
   return 1;
 }
 

@@ -12,7 +12,5 @@ PetscErrorCode HycoFacetVector(HycoFE fe, PetscInt facet, PetscReal vector[3]);
 /* Fails where measured gaps overlap more than the scene allows, or a map has moved a pair's nodes apart along the
    surface. normal and gap as HycoContactGeometry() gives them. */
 PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[]);
-/* The longest edge around each node (n_nodes) of the facets of `group`; 0 where it has none. */
-void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
 
 #endif

@@ -169,19 +169,6 @@ static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fails for a cell without volume. */
-static PetscErrorCode CheckCells(HycoFE fe)
-{
-  const HycoElement *el = HycoElementGet(fe->mesh->type);
-  PetscReal g[8][3], weight;
-
-  PetscFunctionBegin;
-  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
-    for (PetscInt q = 0; q < el->nq; q++) PetscCall(HycoGradients(fe, el, e, q, g, &weight));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
 {
   HycoScene scene = fe->scene;
@@ -190,7 +177,7 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
 
   PetscFunctionBegin;
   PetscCall(HycoFESetDrawn(fe));
-  PetscCall(CheckCells(fe)); /* a broken cell explains what its facets seem to do */
+  PetscCall(HycoMeshCheckCells(fe->mesh)); /* a broken cell explains what its facets seem to do */
   PetscCall(HycoPairsSetSearch(scene, fe->mesh, pairs));
   PetscCall(PetscMalloc1(fe->mesh->n_nodes, &held));
   PetscCall(CountHeld(scene, fe->mesh, held));

@@ -109,7 +109,7 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
   PetscCall(PetscArrayzero(A, k * k));
   PetscCall(PetscArrayzero(M, k * k));
   for (PetscInt a = 0; a < k; a++)
-    M[a * k + a] = 1e-3 * (PetscReal)(s->m + 1) / s->fe->n_dof; /* bodies that move together */
+    M[a * k + a] = 1e-3 * (PetscReal)(s->m + 1) / HycoFEUnknowns(s->fe); /* bodies that move together */
   for (PetscInt i = 0; i < s->m; i++) {
     const PetscInt t = sense[s->pairs->contact[i]];
     const PetscReal *d = s->d + (size_t)i * (size_t)k * 3;
@@ -131,7 +131,7 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
 /* Whether the combination z is tangential at every contact; the weights of those where it is not are raised. */
 static PetscBool Tangential(const Shapes *s, const PetscInt sense[], const PetscReal z[], PetscReal weight[])
 {
-  const PetscReal noise = 1e-9 / PetscSqrtReal((PetscReal)s->fe->n_dof);
+  const PetscReal noise = 1e-9 / PetscSqrtReal((PetscReal)HycoFEUnknowns(s->fe));
   PetscReal norm = 0;
   PetscBool all = PETSC_TRUE;
 
@@ -335,7 +335,7 @@ void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3
       for (PetscInt c = 0; c < 3; c++) d[c] -= dot * unit[b][c];
     }
     length = PetscSqrtReal(HycoDot(d, d));
-    if (length <= 1e-9 / PetscSqrtReal((PetscReal)fe->n_dof) || length * length < 0.01 * before) continue;
+    if (length <= 1e-9 / PetscSqrtReal((PetscReal)HycoFEUnknowns(fe)) || length * length < 0.01 * before) continue;
     for (PetscInt c = 0; c < 3; c++) d[c] /= length;
     n_units++;
   }

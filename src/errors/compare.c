@@ -71,7 +71,7 @@ PetscErrorCode HycoROMCompareFields(HycoROM m, const PetscReal u_full[], const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Compare(HycoROM m, HycoFOM f, const PetscReal sigma[], HycoErrors *e)
+static PetscErrorCode Compare(HycoROM m, HycoFOM f, const PetscReal U[], const PetscReal sigma[], HycoErrors *e)
 {
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
@@ -79,18 +79,18 @@ static PetscErrorCode Compare(HycoROM m, HycoFOM f, const PetscReal sigma[], Hyc
             "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
             "training mesh",
             (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
-  PetscCall(HycoROMCompareFields(m, f->u, sigma, f->lambda, e, NULL));
-  PetscCall(CompareH1(m, m->U_whole, f->u, f->lambda, e));
+  PetscCall(HycoROMCompareFields(m, U, sigma, f->lambda, e, NULL));
+  PetscCall(CompareH1(m, m->U_whole, U, f->lambda, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
 {
-  const PetscReal *sigma;
+  const PetscReal *U, *sigma;
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
-  PetscCall(HycoFOMGetSolution(f, NULL, NULL, NULL, NULL, NULL, &sigma));
-  HycoOnRoot(HycoComm(f), Compare(m, f, sigma, e));
+  PetscCall(HycoFOMGetSolution(f, NULL, &U, NULL, NULL, NULL, &sigma));
+  HycoOnRoot(HycoComm(f), Compare(m, f, U, sigma, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -14,6 +14,9 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   }
   PetscCall(PetscFree((*fe)->shares));
   PetscCall(PetscFree((*fe)->constant));
+  PetscCall(PetscFree((*fe)->bbar));
+  PetscCall(PetscFree((*fe)->temperature));
+  PetscCall(PetscFree((*fe)->thermal));
   PetscCall(PetscFree((*fe)->pin));
   PetscCall(PetscFree((*fe)->released));
   PetscCall(PetscFree((*fe)->X));
@@ -43,7 +46,9 @@ static PetscErrorCode FindConstant(HycoFE fe)
     any = (PetscBool)(any || moves[b]);
   }
   for (PetscInt e = 0; e < m->n_cells; e++) {
-    fe->constant[e] = (PetscBool)!HycoMaterialChanges(s->body[m->cell_body[e]].law, every);
+    const HycoMaterial law = s->body[m->cell_body[e]].law;
+
+    fe->constant[e] = (PetscBool)(law->linear && !HycoMaterialChanges(law, every));
     for (PetscInt a = 0; a < m->nv; a++) {
       if (moves[m->node_body[m->cells[e * m->nv + a]]]) fe->constant[e] = PETSC_FALSE;
     }
@@ -61,18 +66,46 @@ static PetscErrorCode FindConstant(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The element of each body. Flow keeps the volume, and then first-order cells are too stiff: bbar unless the scene says
+   otherwise, and no simplices unless it says that they are meant. */
+static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool bbar[])
+{
+  const PetscBool has_mean = (PetscBool)(mesh->type == HYCO_QUAD4 || mesh->type == HYCO_HEX8);
+
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < scene->n_bodies; b++) {
+    const HycoBody *body = &scene->body[b];
+    const PetscBool flows = (PetscBool)!body->law->linear;
+
+    HycoCheck(!body->bbar || has_mean,
+              "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (line2, tri3 or tet4) the "
+              "dilatation is constant already and nothing would change",
+              body->name);
+    HycoCheck(
+        !flows || body->element || has_mean || mesh->dim == 1,
+        "body %s flows (law %s), which keeps its volume, and cells of tri3 or tet4 are then much too stiff; mesh it "
+        "with quad4 or hex8, or write element: standard to take them all the same",
+        body->name, ((PetscObject)body->law)->type_name);
+    bbar[b] = body->element ? body->bbar : (PetscBool)(flows && has_mean);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
 {
+  PetscBool *bbar;
+  PetscErrorCode ierr;
   HycoFE f;
 
   PetscFunctionBegin;
-  for (PetscInt b = 0; b < scene->n_bodies; b++)
-    HycoCheck(!scene->body[b].bbar || mesh->type == HYCO_QUAD4 || mesh->type == HYCO_HEX8,
-              "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (line2, tri3 or tet4) the "
-              "dilatation is constant already and nothing would change",
-              scene->body[b].name);
-  for (PetscInt b = 0; b < scene->n_bodies; b++) PetscCall(HycoMaterialSetUp(scene->body[b].law, mesh->dim));
+  PetscCall(PetscMalloc1(scene->n_bodies, &bbar));
+  ierr = ChooseElements(scene, mesh, bbar);
+  for (PetscInt b = 0; b < scene->n_bodies && !ierr; b++)
+    ierr = HycoMaterialSetUp(scene->body[b].law, mesh->dim, (PetscBool)(scene->n_times > 0));
+  if (ierr) PetscCall(PetscFree(bbar));
+  PetscCall(ierr);
   PetscCall(PetscNew(&f));
+  f->bbar = bbar;
   f->scene = scene;
   f->mesh = mesh;
   f->dim = mesh->dim;
@@ -82,6 +115,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscCalloc1(f->n_dof, &f->fixed));
   PetscCall(PetscCalloc1(f->n_dof, &f->u0));
   PetscCall(HycoTangentsCreate(f));
+  PetscCall(HycoHeatCreate(f));
   PetscCall(PetscCalloc1(mesh->n_cells, &f->constant));
   f->n_loads = scene->n_loads;
   PetscCall(PetscCalloc1(f->n_loads, &f->shares));
@@ -210,7 +244,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   HycoChanges c;
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < fe->scene->n_parameters; p++) {
+  for (PetscInt p = 0; p < fe->scene->n_variables; p++) {
     changed[p] = (PetscBool)(!fe->ready || mu[p] != fe->mu[p]);
     fe->mu[p] = mu[p];
   }
@@ -225,6 +259,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
     for (PetscInt k = 0; k < fe->n_loads; k++) fe->shares[k].ready = PETSC_FALSE;
   }
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
+  if (fe->temperature) PetscCall(HycoFESetHeat(fe, (PetscBool)(first || c.nodes), changed));
   if (fe->stiffness_changed) PetscCall(HycoFESetTangents(fe, first));
   fe->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,5 +1,6 @@
-/* F: body forces, pressures, tractions, and the lifting of prescribed displacements. */
+/* F: body forces, pressures, tractions, thermal strains, and the lifting of prescribed displacements. */
 #include <hycokinematics.h>
+#include <hycomaterialimpl.h>
 
 static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal value, Vec F)
 {
@@ -18,12 +19,10 @@ static PetscErrorCode AddBodyForces(HycoFE fe, PetscInt cell, Vec F)
 
   PetscFunctionBegin;
   for (PetscInt q = 0; q < el->nq; q++) {
-    PetscReal x[3] = {0, 0, 0}, g[8][3], w, f;
+    PetscReal x[3], g[8][3], w, f;
 
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
-    for (PetscInt a = 0; a < m->nv; a++) {
-      for (PetscInt c = 0; c < 3; c++) x[c] += el->N[q][a] * fe->X[3 * m->cells[cell * m->nv + a] + c];
-    }
+    HycoPointPlace(fe, el, cell, q, x);
     for (PetscInt c = 0; c < m->dim; c++) {
       if (!body->force[c]) continue;
       PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
@@ -149,9 +148,35 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What the thermal strains of a cell push: the sum of w B^T C eps. */
+static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Vec F)
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGet(m->type);
+  const PetscInt size = fe->tangent_size[m->cell_body[cell]];
+  const PetscBool bbar = fe->bbar[m->cell_body[cell]];
+  PetscReal f[HYCO_MAX_CELL_DOFS] = {0}, g[8][3], mean[8][3], w;
+
+  PetscFunctionBegin;
+  if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));
+  for (PetscInt q = 0; q < el->nq; q++) {
+    const PetscReal hot = fe->thermal[cell * el->nq + q], strain[6] = {hot, hot, hot, 0, 0, 0};
+    PetscReal stress[6];
+
+    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    HycoTangentApply(HycoFEIsIsotropic(fe, cell), fe->dim, fe->tangent + fe->tangent_start[cell] + q * size, strain,
+                     stress);
+    HycoPointForce(fe, el, g, bbar ? mean : NULL, w, stress, f);
+  }
+  for (PetscInt k = 0; k < m->nv * m->dim; k++)
+    PetscCall(AddNode(fe, m->cells[cell * m->nv + k / m->dim], k % m->dim, f[k], F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode AddForces(HycoFE fe, Vec F)
 {
   HycoMesh m = fe->mesh;
+  const PetscBool hot = (PetscBool)(fe->thermal && !fe->scene->n_times);
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
@@ -159,6 +184,7 @@ static PetscErrorCode AddForces(HycoFE fe, Vec F)
 
     if (body->force[0] || body->force[1] || body->force[2]) PetscCall(AddBodyForces(fe, e, F));
     if (fe->lifted) PetscCall(AddLifting(fe, e, F));
+    if (hot && body->expansion) PetscCall(AddHeat(fe, e, F));
   }
   for (PetscInt k = 0; k < fe->scene->n_loads; k++) {
     const HycoLoad *load = &fe->scene->load[k];

@@ -56,6 +56,19 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoMeshCheckCells(HycoMesh m)
+{
+  const HycoElement *el = HycoElementGet(m->type);
+  struct _n_HycoFE drawn = {.mesh = m, .dim = m->dim, .X = m->xyz};
+  PetscReal g[8][3], weight;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    for (PetscInt q = 0; q < el->nq; q++) PetscCall(HycoGradients(&drawn, el, e, q, g, &weight));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal mean[8][3])
 {
   PetscReal g[8][3], w, volume = 0;
@@ -105,4 +118,51 @@ PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet,
     n[c] = side * el->w[q] * (t[0][d] * t[1][e] - t[0][e] * t[1][d]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoPointPlace(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal x[3])
+{
+  const PetscInt *node = fe->mesh->cells + cell * fe->mesh->nv;
+
+  x[0] = x[1] = x[2] = 0;
+  for (PetscInt a = 0; a < el->nv; a++) {
+    for (PetscInt c = 0; c < 3; c++) x[c] += el->N[q][a] * fe->X[3 * node[a] + c];
+  }
+}
+
+void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal u[], PetscReal g[8][3],
+                     PetscReal mean[8][3], PetscReal e[6])
+{
+  HycoMesh m = fe->mesh;
+  PetscReal h[3][3], excess = 0;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    for (PetscInt d = 0; d < 3; d++) {
+      h[c][d] = 0;
+      for (PetscInt a = 0; c < m->dim && a < el->nv; a++)
+        h[c][d] += u[m->cells[cell * m->nv + a] * m->dim + c] * g[a][d];
+    }
+  }
+  for (PetscInt c = 0; mean && c < m->dim; c++) {
+    for (PetscInt a = 0; a < el->nv; a++) excess += u[m->cells[cell * m->nv + a] * m->dim + c] * (mean[a][c] - g[a][c]);
+  }
+  for (PetscInt c = 0; mean && c < 3; c++) h[c][c] += excess / 3;
+  for (PetscInt k = 0; k < 6; k++)
+    e[k] = k < 3 ? h[k][k] : h[k == 4 ? 1 : 0][k == 3 ? 1 : 2] + h[k == 3 ? 1 : 2][k == 4 ? 1 : 0];
+}
+
+void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[8][3], PetscReal mean[8][3], PetscReal w,
+                    const PetscReal s[6], PetscReal f[])
+{
+  static const PetscInt at[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}}; /* component of the stress's (c, d) */
+  const PetscReal pressure = mean ? (s[0] + s[1] + s[2]) / 3 : 0;
+
+  for (PetscInt a = 0; a < el->nv; a++) {
+    for (PetscInt c = 0; c < fe->dim; c++) {
+      PetscReal sum = mean ? pressure * (mean[a][c] - g[a][c]) : 0;
+
+      for (PetscInt d = 0; d < fe->dim; d++) sum += g[a][d] * s[at[c][d]];
+      f[a * fe->dim + c] += w * sum;
+    }
+  }
 }

@@ -122,3 +122,23 @@ PetscErrorCode HycoMirrorFind(HycoFE fe)
   PetscCall(CheckPieces(fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe)
+{
+  const PetscInt n = fe->scene->n_bodies;
+  PetscBool *seen; /* by body: cells that are as drawn, that are mirrored */
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(2 * n, &seen));
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++)
+    seen[2 * fe->mesh->cell_body[e] + fe->mirrored[fe->mesh->cell_body[e]]] = PETSC_TRUE;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, seen, (PetscMPIInt)(2 * n), HYCO_MPI_BOOL, MPI_LOR, comm));
+  for (PetscInt b = 0; b < n; b++) {
+    HycoCheck(!seen[2 * b] || !seen[2 * b + 1],
+              "body %s: its map turns some cells inside out and not others; a map may mirror a whole body, not fold it",
+              fe->scene->body[b].name);
+    fe->mirrored[b] = seen[2 * b + 1];
+  }
+  PetscCall(PetscFree(seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

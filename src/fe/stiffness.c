@@ -57,7 +57,7 @@ static PetscErrorCode AddMean(HycoFE fe, const HycoElement *el, PetscInt cell, P
 static PetscErrorCode AddIsotropic(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal Ke[])
 {
   const PetscInt dim = fe->dim, n = el->nv * dim;
-  const PetscBool bbar = fe->scene->body[fe->mesh->cell_body[cell]].bbar;
+  const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
   const PetscReal *lame = fe->tangent + fe->tangent_start[cell];
   PetscReal P[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS], bulk = 0;
 
@@ -104,7 +104,7 @@ static void StrainRows(HycoFE fe, const HycoElement *el, PetscReal g[8][3], Pets
 static PetscErrorCode AddGeneral(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal Ke[])
 {
   const PetscInt ns = fe->n_sigma, n = el->nv * fe->dim;
-  const PetscBool bbar = fe->scene->body[fe->mesh->cell_body[cell]].bbar;
+  const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
   PetscReal mean[8][3];
 
   PetscFunctionBegin;

@@ -16,10 +16,44 @@ static PetscInt Root(PetscInt part[], PetscInt i)
   return i;
 }
 
-/* part[i]: number of the connected part that node i is in. */
-static PetscErrorCode FindParts(HycoMesh m, PetscInt part[], PetscInt *n_parts)
+/* Where each process knows a piece of a part by its smallest node in the whole mesh: all learn the smallest of the
+   part. piece: of each node; label: of each piece. */
+static PetscErrorCode JoinPieces(MPI_Comm comm, HycoMesh m, const PetscInt piece[], PetscInt label[])
 {
+  PetscInt *node, *own;
+  PetscBool change = PETSC_TRUE;
+  PetscSF sf;
+
   PetscFunctionBegin;
+  PetscCall(HycoMeshNodeSF(comm, m, &sf));
+  PetscCall(PetscMalloc2(m->n_nodes, &node, m->n_owned, &own));
+  while (change) {
+    change = PETSC_FALSE;
+    for (PetscInt i = 0; i < m->n_nodes; i++) node[i] = label[piece[i]];
+    for (PetscInt i = 0; i < m->n_owned; i++) own[i] = PETSC_MAX_INT;
+    PetscCall(PetscSFReduceBegin(sf, MPIU_INT, node, own, MPI_MIN));
+    PetscCall(PetscSFReduceEnd(sf, MPIU_INT, node, own, MPI_MIN));
+    PetscCall(PetscSFBcastBegin(sf, MPIU_INT, own, node, MPI_REPLACE));
+    PetscCall(PetscSFBcastEnd(sf, MPIU_INT, own, node, MPI_REPLACE));
+    for (PetscInt i = 0; i < m->n_nodes; i++) {
+      change = (PetscBool)(change || node[i] < label[piece[i]]);
+      label[piece[i]] = PetscMin(label[piece[i]], node[i]);
+    }
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &change, 1, HYCO_MPI_BOOL, MPI_LOR, comm));
+  }
+  PetscCall(PetscFree2(node, own));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* part[i]: number of the connected part that node i is in, in the order of the parts' first nodes. Collective. */
+static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], PetscInt *n_parts)
+{
+  PetscInt *label, *number, n = 0;
+  PetscMPIInt size;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
   for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = i;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
     const PetscInt a = Root(part, m->cells[k]), b = Root(part, m->cells[k - k % m->nv]);
@@ -27,16 +61,72 @@ static PetscErrorCode FindParts(HycoMesh m, PetscInt part[], PetscInt *n_parts)
     part[PetscMax(a, b)] = PetscMin(a, b);
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = Root(part, i);
-  *n_parts = 0;
-  for (PetscInt i = 0; i < m->n_nodes; i++)
-    part[i] = part[i] == i ? (*n_parts)++ : part[part[i]]; /* roots come first */
+  PetscCall(PetscMalloc2(m->n_nodes, &label, m->n_nodes, &number));
+  for (PetscInt i = 0; i < m->n_nodes; i++) { /* roots come first */
+    if (part[i] == i) label[n] = m->node_global ? m->node_whole[i] : i;
+    part[i] = part[i] == i ? n++ : part[part[i]];
+  }
+  *n_parts = n;
+  if (size > 1) {
+    PetscCall(JoinPieces(comm, m, part, label));
+    PetscCall(HycoRankInts(comm, n, label, number, n_parts));
+    for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = number[part[i]];
+  }
+  PetscCall(PetscFree2(label, number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A sum to twice the precision: rounded, it is the same in any order, and so is the basis of a kernel that syev chooses
+   by round-off. */
+typedef struct {
+  PetscReal high, low;
+} Sum;
+
+static void Add(Sum *s, PetscReal value)
+{
+  const PetscReal sum = s->high + value, part = sum - s->high;
+
+  s->low += (s->high - (sum - part)) + (value - part);
+  s->high = sum;
+}
+
+static void MPIAPI AddSums(void *in, void *inout, PetscMPIInt *n, MPI_Datatype *type)
+{
+  const Sum *from = (const Sum *)in;
+  Sum *to = (Sum *)inout;
+
+  (void)type;
+  for (PetscMPIInt k = 0; k < *n; k++) {
+    Add(&to[k], from[k].high);
+    Add(&to[k], from[k].low);
+  }
+}
+
+/* The sums over all processes, in `high`, the same bits on each. Collective. */
+static PetscErrorCode Total(MPI_Comm comm, PetscInt n, Sum sum[])
+{
+  MPI_Datatype type;
+  MPI_Op op;
+  PetscMPIInt count, rank;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMPIIntCast(n, &count));
+  PetscCallMPI(MPI_Type_contiguous(2, MPIU_REAL, &type));
+  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCallMPI(MPI_Op_create(AddSums, 1, &op));
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Reduce(rank ? (void *)sum : MPI_IN_PLACE, sum, count, type, op, 0, comm));
+  PetscCallMPI(MPI_Bcast(sum, count, type, 0, comm));
+  PetscCallMPI(MPI_Op_free(&op));
+  PetscCallMPI(MPI_Type_free(&type));
+  for (PetscInt k = 0; k < n; k++) sum[k].high += sum[k].low;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What the rigid motions of one part do at its fixed unknowns: the Gram matrix of those rows, about a centre and in a
  * length. */
 typedef struct {
-  PetscInt nodes, body;
+  PetscInt body;
   PetscReal centre[3], size, gram[6][6];
 } Part;
 
@@ -134,16 +224,28 @@ void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coef
   Name(fe, &best, others, name);
 }
 
+/* The product of two motions, over all unknowns. Collective. */
+static PetscErrorCode Product(MPI_Comm comm, HycoFE fe, const PetscReal a[], const PetscReal b[], PetscReal *dot)
+{
+  PetscFunctionBegin;
+  *dot = 0;
+  for (PetscInt i = 0; i < fe->n_dof; i++) {
+    if (HycoMeshOwned(fe->mesh, i / fe->dim) >= 0) *dot += a[i] * b[i];
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, dot, 1, MPIU_REAL, MPI_SUM, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Adds a motion: its values on the part's nodes, made orthonormal to the part's motions from `first`. */
-static PetscErrorCode AddMotion(HycoFE fe, const PetscInt part[], PetscInt which, const Part *p, const PetscReal v[],
-                                PetscInt first, HycoMotions *motions)
+static PetscErrorCode AddMotion(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt which, const Part *p,
+                                const PetscReal v[], PetscInt first, HycoMotions *motions)
 {
   const PetscInt n = fe->n_dof, k = motions->n, n_rigid = fe->dim == 1 ? 1 : fe->dim == 2 ? 3 : 6;
-  PetscReal *u, norm = 0;
+  PetscReal *u, norm, dot;
   HycoRigid *own;
 
   PetscFunctionBegin;
-  PetscCall(PetscRealloc((size_t)(k + 1) * (size_t)n * sizeof(PetscReal), &motions->motion));
+  PetscCall(PetscRealloc(((size_t)(k + 1) * (size_t)n + 1) * sizeof(PetscReal), &motions->motion));
   PetscCall(PetscRealloc((size_t)(k + 1) * sizeof(*motions->name), &motions->name));
   PetscCall(PetscRealloc((size_t)(k + 1) * sizeof(*motions->rigid), &motions->rigid));
   own = &motions->rigid[k];
@@ -165,13 +267,12 @@ static PetscErrorCode AddMotion(HycoFE fe, const PetscInt part[], PetscInt which
   }
   for (PetscInt j = first; j < k; j++) {
     const PetscReal *w = motions->motion + (size_t)j * (size_t)n;
-    PetscReal dot = 0;
 
-    for (PetscInt i = 0; i < n; i++) dot += u[i] * w[i];
+    PetscCall(Product(comm, fe, u, w, &dot));
     for (PetscInt i = 0; i < n; i++) u[i] -= dot * w[i];
     for (PetscInt i = 0; i < 6; i++) own->rigid[i] -= dot * motions->rigid[j].rigid[i];
   }
-  for (PetscInt i = 0; i < n; i++) norm += u[i] * u[i];
+  PetscCall(Product(comm, fe, u, u, &norm));
   for (PetscInt i = 0; i < n; i++) u[i] /= PetscSqrtReal(norm);
   for (PetscInt i = 0; i < 6; i++) own->rigid[i] /= PetscSqrtReal(norm);
   Name(fe, own, "", motions->name[k]);
@@ -179,7 +280,8 @@ static PetscErrorCode AddMotion(HycoFE fe, const PetscInt part[], PetscInt which
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode PartMotions(HycoFE fe, const PetscInt part[], PetscInt which, Part *p, HycoMotions *motions)
+static PetscErrorCode PartMotions(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt which, Part *p,
+                                  HycoMotions *motions)
 {
   PetscBLASInt n = fe->dim == 1 ? 1 : fe->dim == 2 ? 3 : 6, lwork = 64, info, ld = 6;
   PetscReal values[6], work[64];
@@ -189,59 +291,83 @@ static PetscErrorCode PartMotions(HycoFE fe, const PetscInt part[], PetscInt whi
   LAPACKsyev_("V", "U", &n, &p->gram[0][0], &ld, values, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
   for (PetscInt j = 0; j < n && values[j] <= 1e-13 * PetscMax(values[n - 1], 1); j++)
-    PetscCall(AddMotion(fe, part, which, p, p->gram[j], first, motions));
+    PetscCall(AddMotion(comm, fe, part, which, p, p->gram[j], first, motions));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Centre, size and Gram matrix of each part. */
-static PetscErrorCode MeasureParts(HycoFE fe, const PetscInt part[], PetscInt n_parts, Part parts[])
+/* Body (of its last node), centre and size of each part. */
+static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt n_parts, Part parts[])
 {
   HycoMesh m = fe->mesh;
+  const PetscInt n_bodies = fe->scene->n_bodies;
+  PetscInt64 *last;
+  PetscReal *size;
+  Sum *sum; /* of each part: nodes, coordinates */
 
   PetscFunctionBegin;
+  PetscCall(PetscCalloc3(n_parts, &last, n_parts, &size, 4 * n_parts, &sum));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
-    parts[part[i]].nodes++;
-    parts[part[i]].body = m->node_body[i];
-    for (PetscInt c = 0; c < 3; c++) parts[part[i]].centre[c] += fe->X[3 * i + c];
+    const PetscInt64 node = m->node_global ? m->node_whole[i] : i;
+
+    if (HycoMeshOwned(m, i) < 0) continue;
+    last[part[i]] = PetscMax(last[part[i]], node * n_bodies + m->node_body[i]);
+    Add(&sum[4 * part[i]], 1);
+    for (PetscInt c = 0; c < 3; c++) Add(&sum[4 * part[i] + 1 + c], fe->X[3 * i + c]);
   }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, last, (PetscMPIInt)n_parts, MPIU_INT64, MPI_MAX, comm));
+  PetscCall(Total(comm, 4 * n_parts, sum));
   for (PetscInt p = 0; p < n_parts; p++) {
-    for (PetscInt c = 0; c < 3; c++) parts[p].centre[c] /= parts[p].nodes;
+    parts[p].body = (PetscInt)(last[p] % n_bodies);
+    for (PetscInt c = 0; c < 3; c++) parts[p].centre[c] = sum[4 * p + 1 + c].high / sum[4 * p].high;
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     for (PetscInt c = 0; c < 3; c++)
-      parts[part[i]].size = PetscMax(parts[part[i]].size, PetscAbsReal(fe->X[3 * i + c] - parts[part[i]].centre[c]));
+      size[part[i]] = PetscMax(size[part[i]], PetscAbsReal(fe->X[3 * i + c] - parts[part[i]].centre[c]));
   }
-  for (PetscInt k = 0; k < fe->n_dof; k++) {
-    Part *p = &parts[part[k / fe->dim]];
-    PetscReal x[3], row[6];
-    PetscInt n;
-
-    if (!fe->fixed[k]) continue;
-    for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * (k / fe->dim) + c] - p->centre[c]) / p->size;
-    n = RigidRow(fe->dim, x, k % fe->dim, row);
-    for (PetscInt a = 0; a < n; a++) {
-      for (PetscInt b = 0; b < n; b++) p->gram[a][b] += row[a] * row[b];
-    }
-  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, size, (PetscMPIInt)n_parts, MPIU_REAL, MPI_MAX, comm));
+  for (PetscInt p = 0; p < n_parts; p++) parts[p].size = size[p];
+  PetscCall(PetscFree3(last, size, sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEFreeMotions(HycoFE fe, HycoMotions *motions)
+/* Gram matrix of each part. */
+static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt n_parts, Part parts[])
+{
+  Sum *sum;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(36 * n_parts, &sum));
+  for (PetscInt k = 0; k < fe->n_dof; k++) {
+    const PetscInt i = k / fe->dim;
+    const Part *p = &parts[part[i]];
+    PetscReal x[3], row[6];
+    PetscInt n;
+
+    if (!fe->fixed[k] || HycoMeshOwned(fe->mesh, i) < 0) continue;
+    for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * i + c] - p->centre[c]) / p->size;
+    n = RigidRow(fe->dim, x, k % fe->dim, row);
+    for (PetscInt a = 0; a < n * n; a++) Add(&sum[36 * part[i] + a / n * 6 + a % n], row[a / n] * row[a % n]);
+  }
+  PetscCall(Total(comm, 36 * n_parts, sum));
+  for (PetscInt k = 0; k < 36 * n_parts; k++) parts[k / 36].gram[k % 36 / 6][k % 6] = sum[k].high;
+  PetscCall(PetscFree(sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions)
 {
   HycoMesh m = fe->mesh;
   PetscInt *part, n_parts;
   Part *parts;
 
   PetscFunctionBegin;
-  motions->n = 0;
-  motions->motion = NULL;
-  motions->name = NULL;
-  motions->rigid = NULL;
+  PetscCall(PetscMemzero(motions, sizeof(*motions)));
   PetscCall(PetscMalloc1(m->n_nodes, &part));
-  PetscCall(FindParts(m, part, &n_parts));
+  PetscCall(FindParts(comm, m, part, &n_parts));
   PetscCall(PetscCalloc1(n_parts, &parts));
-  PetscCall(MeasureParts(fe, part, n_parts, parts));
-  for (PetscInt p = 0; p < n_parts; p++) PetscCall(PartMotions(fe, part, p, &parts[p], motions));
+  PetscCall(PlaceParts(comm, fe, part, n_parts, parts));
+  PetscCall(MeasureParts(comm, fe, part, n_parts, parts));
+  for (PetscInt p = 0; p < n_parts; p++) PetscCall(PartMotions(comm, fe, part, p, &parts[p], motions));
   PetscCall(PetscFree(part));
   PetscCall(PetscFree(parts));
   PetscFunctionReturn(PETSC_SUCCESS);

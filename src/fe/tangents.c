@@ -26,7 +26,7 @@ PetscErrorCode HycoTangentsCreate(HycoFE fe)
 /* Room for a batch. */
 typedef struct {
   PetscInt n, cell[BATCH];
-  PetscReal *x, *constant, *tangent;
+  PetscReal *x, *temperature, *constant, *tangent;
 } Batch;
 
 /* Tangents of the batch's cells. */
@@ -35,20 +35,16 @@ static PetscErrorCode Update(HycoFE fe, Batch *b)
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
   const PetscInt body = b->n ? m->cell_body[b->cell[0]] : 0, size = el->nq * fe->tangent_size[body];
+  const PetscBool hot = (PetscBool)(fe->scene->body[body].temperature != NULL);
 
   PetscFunctionBegin;
   if (!b->n) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < b->n * el->nq; k++) {
-    const PetscInt *node = m->cells + b->cell[k / el->nq] * m->nv;
-    PetscReal *x = b->x + 3 * k;
-
-    x[0] = x[1] = x[2] = 0;
-    for (PetscInt a = 0; a < m->nv; a++) {
-      for (PetscInt c = 0; c < 3; c++) x[c] += el->N[k % el->nq][a] * fe->X[3 * node[a] + c];
-    }
+    HycoPointPlace(fe, el, b->cell[k / el->nq], k % el->nq, b->x + 3 * k);
+    if (hot) b->temperature[k] = fe->temperature[b->cell[k / el->nq] * el->nq + k % el->nq];
   }
-  PetscCall(
-      HycoMaterialTangents(fe->scene->body[body].law, fe->dim, fe->mu, b->n * el->nq, b->x, b->constant, b->tangent));
+  PetscCall(HycoMaterialTangents(fe->scene->body[body].law, fe->dim, fe->mu, b->n * el->nq, b->x,
+                                 hot ? b->temperature : NULL, b->constant, b->tangent));
   for (PetscInt k = 0; k < b->n; k++)
     PetscCall(PetscArraycpy(fe->tangent + fe->tangent_start[b->cell[k]], b->tangent + k * size, size));
   b->n = 0;
@@ -76,9 +72,10 @@ PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(3 * n, &b.x, HYCO_MAX_DECLARED * n, &b.constant, PetscMax(2, ns * ns) * n, &b.tangent));
+  PetscCall(PetscMalloc4(3 * n, &b.x, n, &b.temperature, HYCO_MAX_DECLARED * n, &b.constant, PetscMax(2, ns * ns) * n,
+                         &b.tangent));
   ierr = UpdateAll(fe, all, &b);
-  PetscCall(PetscFree3(b.x, b.constant, b.tangent));
+  PetscCall(PetscFree4(b.x, b.temperature, b.constant, b.tangent));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

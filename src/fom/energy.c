@@ -4,17 +4,11 @@
 
       2 W = F.U + R.u0 - L.D
 
+  With thermal strains, F holds what they push, and their own share is added to the work: HycoFEHeatWork().
+
   W comes from the stresses, the work from F and the element matrices, so that neither can hide an error of the other.
 */
 #include <hycofomimpl.h>
-
-/* The place of a node of the part among this rank's rows, or -1. */
-static PetscInt Owned(HycoFOM f, PetscInt node)
-{
-  const PetscInt row = (f->part->node_global ? f->part->node_global[node] : node) - f->first;
-
-  return row >= 0 && row < f->n_owned ? row : -1;
-}
 
 /* F.U over this rank's free unknowns; F holds the lifting -K u0 of the prescribed displacements, given back below. */
 static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
@@ -27,7 +21,7 @@ static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
   PetscCall(VecGetArrayRead(f->F, &F));
   PetscCall(VecGetArrayRead(f->U_local, &u));
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
-    const PetscInt row = Owned(f, i);
+    const PetscInt row = HycoMeshOwned(f->part, i);
 
     for (PetscInt c = 0; row >= 0 && c < dim; c++) {
       if (!f->fe->fixed[i * dim + c]) *work += F[row * dim + c] * u[i * dim + c];
@@ -63,23 +57,30 @@ static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums strain energy and lifting over this rank's cells: a cell counts on the rank that owns its first node. */
+/* Sums strain energy, lifting and what heat does over this rank's cells: a cell counts on the rank that owns its first
+   node. */
 static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
 {
   const PetscScalar *u;
-  PetscReal *each, one;
+  PetscReal *each, *heat = NULL, one;
 
   PetscFunctionBegin;
   *strain = *lifting = 0;
   PetscCall(PetscMalloc1(f->part->n_cells, &each));
   PetscCall(VecGetArrayRead(f->U_local, &u));
   PetscCall(HycoFEEnergy(f->fe, u, each));
+  if (f->fe->thermal) {
+    PetscCall(PetscMalloc1(f->part->n_cells, &heat));
+    PetscCall(HycoFEHeatWork(f->fe, u, heat));
+  }
   for (PetscInt e = 0; e < f->part->n_cells; e++) {
-    if (Owned(f, f->part->cells[e * f->part->nv]) < 0) continue;
+    if (HycoMeshOwned(f->part, f->part->cells[e * f->part->nv]) < 0) continue;
     PetscCall(LiftingWork(f->fe, e, u, &one));
     *strain += each[e];
     *lifting += one;
+    if (heat) *lifting += heat[e];
   }
+  PetscCall(PetscFree(heat));
   PetscCall(VecRestoreArrayRead(f->U_local, &u));
   PetscCall(PetscFree(each));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -92,7 +93,7 @@ static PetscErrorCode ContactSums(HycoFOM f, PetscReal *gap_work, PetscReal *fix
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(3 * f->pairs.n, &normal, f->pairs.n, &gap));
-  PetscCall(HycoContactGeometry(f->fe_whole, &f->pairs, normal, gap));
+  PetscCall(HycoContactGeometry(f->fe_surface, &f->pairs, normal, gap));
   *gap_work = *fixed_work = 0;
   for (PetscInt k = 0; k < f->pairs.n; k++) {
     *gap_work += f->lambda[k] * gap[k];

@@ -8,6 +8,7 @@ PetscErrorCode HycoFOMFlexibility(HycoFOM f, const PetscReal mu[], PetscReal G[]
   size_t at = 0;
 
   PetscFunctionBegin;
+  PetscCall(HycoSceneRefuseHistory(f->scene, "HycoFOMFlexibility()"));
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCall(HycoSolverSetForm(f->solver, HYCO_FORM_DUAL));
   PetscCall(HycoFOMSolve(f, f->scene->n_parameters, mu));

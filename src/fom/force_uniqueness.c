@@ -21,8 +21,8 @@ static void MarkClosed(HycoFOM f, const Rows *r, PetscBool in[])
       PetscReal left = r->gap[k], size = PetscAbsReal(r->gap[k]);
 
       for (PetscInt j = r->start[k]; j < r->start[k + 1]; j++) {
-        left -= r->value[j] * f->u[r->dof[j]];
-        size += PetscAbsReal(r->value[j] * f->u[r->dof[j]]);
+        left -= r->value[j] * f->u_surface[r->dof[j]];
+        size += PetscAbsReal(r->value[j] * f->u_surface[r->dof[j]]);
       }
       scale = PetscMax(scale, size);
       in[k] = (PetscBool)(r->start[k + 1] > r->start[k] && (f->lambda[k] > 0 || left <= 1e-9 * scale));
@@ -90,7 +90,7 @@ static PetscErrorCode Dependent(const Rows *r, PetscInt n_dof, PetscInt n, const
 
 PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
 {
-  const PetscInt m = f->pairs.n, n_dof = f->fe_whole->n_dof;
+  const PetscInt m = f->pairs.n, n_dof = f->fe_surface->n_dof;
   const size_t entries = (size_t)HycoPairsWidth(&f->pairs) * (size_t)f->fe->dim * (size_t)m;
   Rows r = {m, NULL, NULL, NULL, NULL};
   PetscBool *in, pressed = PETSC_FALSE;
@@ -100,7 +100,7 @@ PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
   PetscFunctionBegin;
   *dependent = 0;
   PetscCall(PetscMalloc5(m + 1, &r.start, entries, &r.dof, entries, &r.value, m, &r.gap, m, &in));
-  ierr = HycoContactRows(f->fe_whole, &f->pairs, r.start, r.dof, r.value, r.gap);
+  ierr = HycoContactRows(f->fe_surface, &f->pairs, r.start, r.dof, r.value, r.gap);
   if (!ierr) MarkClosed(f, &r, in);
   if (!ierr) ierr = Peel(&r, n_dof, in);
   for (PetscInt k = 0; k < m && !ierr; k++) {

@@ -54,6 +54,7 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  PetscCall(HycoSceneRefuseHistory(f->scene, "HycoFOMSolveForces()"));
   t = &f->summary.seconds;
   PetscCall(HycoSceneCheckParameters(f->scene, n, mu));
   PetscCall(SetUp(f));
@@ -77,10 +78,11 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
 /* A block of n patterns, from P to their columns of X (stride q). */
 static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], PetscInt q, PetscReal X[])
 {
-  const PetscScalar *root;
+  PetscReal *local;
   Vec r[BLOCK], x[BLOCK];
 
   PetscFunctionBegin;
+  PetscCall(PetscMalloc1(f->fe->n_dof, &local));
   for (PetscInt j = 0; j < n; j++) {
     PetscCall(VecDuplicate(f->U, &r[j]));
     PetscCall(VecDuplicate(f->U, &x[j]));
@@ -89,27 +91,25 @@ static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], P
   }
   PetscCall(HycoSolverApplyInverse(f->given_solver, n, r, x));
   for (PetscInt j = 0; j < n; j++) {
-    PetscCall(VecScatterBegin(f->to_root, x[j], f->U_root, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecScatterEnd(f->to_root, x[j], f->U_root, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecGetArrayRead(f->U_root, &root));
-    for (PetscInt i = 0; f->rank == 0 && i < f->n_nodes * f->fe->dim; i++)
-      X[(size_t)i * (size_t)q + (size_t)j] = root[i];
-    PetscCall(VecRestoreArrayRead(f->U_root, &root));
+    PetscCall(HycoFOMToLocal(f, x[j], local));
+    for (PetscInt i = 0; i < f->fe->n_dof; i++) X[(size_t)i * (size_t)q + (size_t)j] = local[i];
     PetscCall(VecDestroy(&r[j]));
     PetscCall(VecDestroy(&x[j]));
   }
+  PetscCall(PetscFree(local));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoFOMResponses(HycoFOM f, const PetscReal mu[], PetscInt q, const PetscReal P[], PetscReal X[])
 {
   PetscFunctionBegin;
+  PetscCall(HycoSceneRefuseHistory(f->scene, "HycoFOMResponses()"));
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCall(SetUp(f));
   PetscCall(HycoFOMAssemble(f, mu));
   PetscCall(VecCopy(f->F, f->given_F));
   PetscCall(SolveGiven(f)); /* for its factor */
   for (PetscInt j = 0; j < q; j += BLOCK)
-    PetscCall(RespondBlock(f, PetscMin(BLOCK, q - j), P + (f->rank ? 0 : j * f->n_contacts), q, X + (f->rank ? 0 : j)));
+    PetscCall(RespondBlock(f, PetscMin(BLOCK, q - j), P + (f->rank ? 0 : j * f->n_contacts), q, X + j));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

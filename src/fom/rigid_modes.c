@@ -8,25 +8,38 @@
   for these motions, which are taken out of it.
 */
 #include <hycofomimpl.h>
+#include <limits.h>
 #include <string.h>
 
-/* The motions as distributed vectors; rank 0 has them. */
-static PetscErrorCode Spread(HycoFOM f, const PetscReal motion[], PetscInt n, Vec v[])
+/* The motions as distributed vectors. */
+static PetscErrorCode CreateVectors(HycoFOM f, const HycoMotions *motions, Vec **v)
 {
   const PetscInt dim = f->fe->dim;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < n; k++) {
-    PetscCall(VecDuplicate(f->U, &v[k]));
-    for (PetscInt i = 0; f->rank == 0 && i < f->n_nodes * dim; i++) {
-      const PetscInt node = f->global ? f->global[i / dim] : i / dim;
+  PetscCall(VecDuplicateVecs(f->U, motions->n, v));
+  for (PetscInt k = 0; k < motions->n; k++) {
+    const PetscReal *motion = motions->motion + (size_t)k * (size_t)f->fe->n_dof;
+    PetscScalar *own;
 
-      PetscCall(VecSetValue(v[k], node * dim + i % dim, motion[(size_t)k * (size_t)(f->n_nodes * dim) + (size_t)i],
-                            INSERT_VALUES));
+    PetscCall(VecGetArray((*v)[k], &own));
+    for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+      const PetscInt at = HycoMeshOwned(f->part, i);
+
+      if (at >= 0) PetscCall(PetscArraycpy(own + at * dim, motion + i * dim, dim));
     }
-    PetscCall(VecAssemblyBegin(v[k]));
-    PetscCall(VecAssemblyEnd(v[k]));
+    PetscCall(VecRestoreArray((*v)[k], &own));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Their values at the contacts' nodes, on rank 0 (n x n_dof of fe_surface). */
+static PetscErrorCode ToSurface(HycoFOM f, PetscInt n, const Vec v[], PetscReal **values)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(f->fe_surface ? n * f->fe_surface->n_dof : 0, values));
+  for (PetscInt k = 0; k < n; k++)
+    PetscCall(HycoFOMToSurface(f, v[k], *values + (f->fe_surface ? k * f->fe_surface->n_dof : 0)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -38,160 +51,249 @@ static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscRea
   for (PetscInt k = 0; k < n; k++) {
     char name[HYCO_LINE];
 
-    HycoMotionsName(f->fe_whole, free, unheld + k * free->n, name);
+    HycoMotionsName(f->fe, free, unheld + k * free->n, name);
     if (strlen(list) + strlen(name) + strlen(between) + 1 > room) break;
     if (k) strcat(list, between);
     strcat(list, name);
   }
 }
 
-/* Adds a combination to fe->released, made orthonormal to those there; what brings nothing new is left out. */
-static void AddReleased(HycoFE fe, const HycoMotions *free, const PetscReal z[])
+/* Adds a combination to the released motions, made orthonormal to those there; what brings nothing new is left out. */
+static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], const PetscReal z[])
 {
-  const size_t n_dof = (size_t)fe->n_dof;
-  PetscReal *u = fe->released + (size_t)fe->n_released * n_dof, norm = 0, before = 0;
+  PetscReal norm, before;
+  Vec u;
 
-  for (size_t i = 0; i < n_dof; i++) {
-    u[i] = 0;
-    for (PetscInt a = 0; a < free->n; a++) u[i] += z[a] * free->motion[(size_t)a * n_dof + i];
-    before += u[i] * u[i];
-  }
-  for (PetscInt k = 0; k < 2 * fe->n_released; k++) { /* twice: round-off */
-    const PetscReal *w = fe->released + (size_t)(k % fe->n_released) * n_dof;
-    PetscReal dot = 0;
-
-    for (size_t i = 0; i < n_dof; i++) dot += u[i] * w[i];
-    for (size_t i = 0; i < n_dof; i++) u[i] -= dot * w[i];
-  }
-  for (size_t i = 0; i < n_dof; i++) norm += u[i] * u[i];
-  if (norm < 0.01 * before) return;
-  for (size_t i = 0; i < n_dof; i++) u[i] /= PetscSqrtReal(norm);
-  fe->n_released++;
-}
-
-/* All that nothing holds is released, first what is tangential in one sense: the normals can be turned for that alone.
- */
-static PetscErrorCode Release(HycoFE fe, const HycoMotions *free, PetscInt n_alike, const PetscReal alike[],
-                              PetscInt n_unheld, const PetscReal unheld[])
-{
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1((size_t)(n_alike + n_unheld) * (size_t)fe->n_dof, &fe->released));
-  for (PetscInt k = 0; k < n_alike; k++) AddReleased(fe, free, alike + k * free->n);
-  fe->n_turned = fe->n_released;
-  for (PetscInt k = 0; k < n_unheld; k++) AddReleased(fe, free, unheld + k * free->n);
+  PetscCall(VecDuplicate(f->U, &u));
+  PetscCall(VecSet(u, 0));
+  PetscCall(VecMAXPY(u, n, z, (Vec *)motion));
+  PetscCall(VecNorm(u, NORM_2, &before));
+  for (PetscInt k = 0; k < 2 * f->n_released; k++) { /* twice: round-off */
+    PetscScalar dot;
+
+    PetscCall(VecDot(u, f->released[k % f->n_released], &dot));
+    PetscCall(VecAXPY(u, -dot, f->released[k % f->n_released]));
+  }
+  PetscCall(VecNorm(u, NORM_2, &norm));
+  if (norm < 0.1 * before) {
+    PetscCall(VecDestroy(&u));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecScale(u, 1 / norm));
+  f->released[f->n_released++] = u;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Motions that nothing holds are refused, or released. */
-static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
+/* Combinations of the motions that contact does not hold either: all of them, and those that are tangential in one
+   sense. */
+typedef struct {
+  PetscInt n, n_alike;
+  PetscReal *all, *alike;
+} Unheld;
+
+/* Finds them (rank 0), and refuses them unless they are to be released. */
+static PetscErrorCode FindUnheld(HycoFOM f, const HycoMotions *free, Unheld *z)
 {
-  PetscInt n_unheld = 0, n_alike = 0;
-  PetscReal *unheld = NULL, *alike = NULL;
-  PetscErrorCode ierr;
   char list[HYCO_LINE / 2];
 
   PetscFunctionBegin;
-  ierr = HycoFEFindUnheld(f->fe_whole, &f->pairs, free, &n_unheld, &unheld, &n_alike, &alike);
-  Names(f, free, n_unheld, unheld, "; nor ", sizeof(list), list);
-  Names(f, free, n_unheld, unheld, "; ", sizeof(f->summary.regularised), f->summary.regularised);
-  if (!ierr && n_unheld && f->regularise) ierr = Release(f->fe_whole, free, n_alike, alike, n_unheld, unheld);
-  PetscCall(PetscFree(unheld));
-  PetscCall(PetscFree(alike));
-  PetscCall(ierr);
-  HycoCheck(!n_unheld || f->regularise,
+  PetscCall(HycoFEFindUnheld(f->fe_surface, &f->pairs, free, &z->n, &z->all, &z->n_alike, &z->alike));
+  Names(f, free, z->n, z->all, "; nor ", sizeof(list), list);
+  Names(f, free, z->n, z->all, "; ", sizeof(f->summary.regularised), f->summary.regularised);
+  HycoCheck(!z->n || f->regularise,
             "no support%s keeps %s; fix a component on one of its groups, or -hyco_regularise solves without %s",
-            f->pairs.n ? " and no contact" : "", list, n_unheld > 1 ? "these motions" : "that motion");
+            f->pairs.n ? " and no contact" : "", list, z->n > 1 ? "these motions" : "that motion");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same from rank 0 to all. */
+static PetscErrorCode BroadcastUnheld(HycoFOM f, const HycoMotions *free, Unheld *z)
+{
+  const PetscInt k = free->n;
+  PetscInt n[2];
+
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(f), FindUnheld(f, free, z));
+  n[0] = z->n;
+  n[1] = z->n_alike;
+  PetscCallMPI(MPI_Bcast(n, 2, MPIU_INT, 0, HycoComm(f)));
+  z->n = n[0];
+  z->n_alike = n[1];
+  if (f->rank) PetscCall(PetscMalloc1(z->n * k, &z->all));
+  if (f->rank) PetscCall(PetscMalloc1(z->n_alike * k, &z->alike));
+  PetscCallMPI(MPI_Bcast(z->all, (PetscMPIInt)(z->n * k), MPIU_REAL, 0, HycoComm(f)));
+  PetscCallMPI(MPI_Bcast(z->alike, (PetscMPIInt)(z->n_alike * k), MPIU_REAL, 0, HycoComm(f)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Motions that nothing holds are released, first what is tangential in one sense: the normals can be turned for that
+   alone. */
+static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
+{
+  Unheld z = {0, 0, NULL, NULL};
+  HycoMotions at_surface = *free;
+  PetscErrorCode ierr;
+  Vec *motion;
+
+  PetscFunctionBegin;
+  PetscCall(CreateVectors(f, free, &motion));
+  PetscCall(ToSurface(f, free->n, motion, &at_surface.motion));
+  ierr = BroadcastUnheld(f, &at_surface, &z);
+  if (!ierr) PetscCall(PetscMalloc1(z.n + z.n_alike, &f->released));
+  for (PetscInt k = 0; !ierr && k < z.n_alike && z.n; k++)
+    PetscCall(AddReleased(f, free->n, motion, z.alike + k * free->n));
+  f->n_turned = f->n_released;
+  for (PetscInt k = 0; !ierr && k < z.n; k++) PetscCall(AddReleased(f, free->n, motion, z.all + k * free->n));
+  PetscCall(VecDestroyVecs(free->n, &motion));
+  PetscCall(PetscFree(at_surface.motion));
+  PetscCall(PetscFree(z.all));
+  PetscCall(PetscFree(z.alike));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of the released motions at this rank's unknowns, zero at the contacts' nodes. */
+static PetscErrorCode ReleasedRows(HycoFOM f, PetscReal row[])
+{
+  const PetscInt n = f->n_released, n_own = f->part->n_owned * f->fe->dim;
+  PetscScalar *mark;
+  const PetscScalar *v;
+  Vec contact;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(f->U, &contact));
+  PetscCall(VecSet(contact, 0));
+  if (f->rank == 0) {
+    PetscBool *node;
+
+    PetscCall(PetscCalloc1(f->surface->n_nodes, &node));
+    HycoPairsMark(&f->pairs, node);
+    for (PetscInt i = 0; i < f->surface->n_nodes; i++) {
+      const PetscInt at = f->surface->node_global ? f->surface->node_global[i] : i;
+
+      if (node[i]) PetscCall(VecSetValue(contact, at * f->fe->dim, 1, INSERT_VALUES));
+    }
+    PetscCall(PetscFree(node));
+  }
+  PetscCall(VecAssemblyBegin(contact));
+  PetscCall(VecAssemblyEnd(contact));
+  PetscCall(VecGetArray(contact, &mark));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(VecGetArrayRead(f->released[k], &v));
+    for (PetscInt i = 0; i < n_own; i++) row[i * n + k] = mark[i / f->fe->dim * f->fe->dim] > 0 ? 0 : v[i];
+    PetscCall(VecRestoreArrayRead(f->released[k], &v));
+  }
+  PetscCall(VecRestoreArray(contact, &mark));
+  PetscCall(VecDestroy(&contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal RowSize(PetscInt n, const PetscReal row[])
+{
+  PetscReal size = 0;
+
+  for (PetscInt k = 0; k < n; k++) size += row[k] * row[k];
+  return size;
+}
+
+/* The longest of all ranks' rows, of equal ones that of the node of the smallest tag: its tag and component, and the
+   row. tag: of this rank's nodes. */
+static PetscErrorCode LongestRow(HycoFOM f, const PetscInt tag[], const PetscReal row[], PetscInt *pin,
+                                 PetscInt *component, PetscReal longest[])
+{
+  const PetscInt n = f->n_released, dim = f->fe->dim, n_own = f->part->n_owned * dim;
+  PetscReal best = 0;
+  PetscInt64 key = LLONG_MAX, all;
+  PetscInt at = -1;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < n_own; i++) best = PetscMax(best, RowSize(n, row + i * n));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &best, 1, MPIU_REAL, MPI_MAX, HycoComm(f)));
+  for (PetscInt i = 0; i < n_own; i++) {
+    const PetscInt64 here = (PetscInt64)tag[i / dim] * dim + i % dim;
+
+    if (here >= key || RowSize(n, row + i * n) < best * (1 - 1e-10)) continue;
+    key = here;
+    at = i;
+  }
+  PetscCallMPI(MPI_Allreduce(&key, &all, 1, MPIU_INT64, MPI_MIN, HycoComm(f)));
+  for (PetscInt k = 0; k < n; k++) longest[k] = at >= 0 && key == all ? row[at * n + k] : 0;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, longest, (PetscMPIInt)n, MPIU_REAL, MPI_SUM, HycoComm(f)));
+  *pin = (PetscInt)(all / dim);
+  *component = (PetscInt)(all % dim);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* As many unknowns as are released, pivots of the motions' rows, apart from the contacts: by tag and component. */
-static PetscErrorCode ChoosePins(HycoFOM f, PetscInt tag[], PetscInt component[])
+static PetscErrorCode ChoosePins(HycoFOM f)
 {
-  HycoFE fe = f->fe_whole;
-  const PetscInt n = fe->n_released, dim = fe->dim;
-  PetscBool *contact;
-  PetscReal *row, unit[HYCO_MAX_PINS];
+  const PetscInt n = f->n_released, n_own = f->part->n_owned * f->fe->dim;
+  PetscReal *row, unit[HYCO_MAX_PINS], length;
+  PetscInt *tag;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(fe->mesh->n_nodes, &contact));
-  HycoPairsMark(&f->pairs, contact);
-  PetscCall(PetscMalloc1(n * fe->n_dof, &row));
-  for (PetscInt i = 0; i < fe->n_dof; i++) {
-    for (PetscInt k = 0; k < n; k++)
-      row[i * n + k] = contact[i / dim] ? 0 : fe->released[(size_t)k * (size_t)fe->n_dof + (size_t)i];
+  PetscCall(PetscMalloc2(n * n_own, &row, f->part->n_owned, &tag));
+  PetscCall(ReleasedRows(f, row));
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    if (HycoMeshOwned(f->part, i) >= 0) tag[HycoMeshOwned(f->part, i)] = f->part->node_id[i];
   }
   for (PetscInt p = 0; p < n; p++) {
-    PetscReal best = 0;
-    PetscInt at = 0;
-
-    for (PetscInt i = 0; i < fe->n_dof; i++) {
-      PetscReal size = 0;
-
-      for (PetscInt k = 0; k < n; k++) size += row[i * n + k] * row[i * n + k];
-      if (size > best * (1 + 1e-10)) at = i;
-      best = PetscMax(best, size);
-    }
-    tag[p] = fe->mesh->node_id[at / dim];
-    component[p] = at % dim;
-    for (PetscInt k = 0; k < n; k++) unit[k] = row[at * n + k] / PetscSqrtReal(best);
-    for (PetscInt i = 0; i < fe->n_dof && best > 0; i++) {
+    PetscCall(LongestRow(f, tag, row, &f->pin_tag[p], &f->pin_component[p], unit));
+    length = PetscSqrtReal(RowSize(n, unit));
+    for (PetscInt k = 0; k < n && length > 0; k++) unit[k] /= length;
+    for (PetscInt i = 0; i < n_own && length > 0; i++) {
       PetscReal dot = 0;
 
       for (PetscInt k = 0; k < n; k++) dot += row[i * n + k] * unit[k];
       for (PetscInt k = 0; k < n; k++) row[i * n + k] -= dot * unit[k];
     }
   }
-  PetscCall(PetscFree(contact));
-  PetscCall(PetscFree(row));
+  PetscCall(PetscFree2(row, tag));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: what the supports leave free, and of it what contact does not hold; pins for that, the last ones if there
- * are. */
-static PetscErrorCode FindPins(HycoFOM f)
+/* The pins, on the part and on the surfaces; what the normals there are turned for. */
+static PetscErrorCode SetPins(HycoFOM f, PetscInt n)
 {
-  HycoFE fe = f->fe_whole;
-  HycoMotions free = {0, NULL, NULL, NULL};
-  PetscErrorCode ierr = 0;
+  HycoFE fe = f->fe_surface;
+  PetscReal *released;
 
   PetscFunctionBegin;
-  PetscCall(HycoFESetPins(fe, 0, NULL, NULL));
+  if (n || f->fe->n_pins) PetscCall(HycoFESetPins(f->fe, n, f->pin_tag, f->pin_component));
+  if (fe && fe != f->fe) PetscCall(HycoFESetPins(fe, n, f->pin_tag, f->pin_component));
+  PetscCall(ToSurface(f, n ? f->n_turned : 0, f->released, &released));
+  if (!fe) PetscCall(PetscFree(released));
+  if (!fe) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(fe->released));
-  fe->n_released = fe->n_turned = 0;
-  PetscCall(HycoFEFreeMotions(fe, &free));
-  f->summary.regularised[0] = '\0';
-  if (free.n) ierr = FindReleased(f, &free);
-  PetscCall(HycoMotionsDestroy(&free));
-  PetscCall(ierr);
-  HycoCheck(fe->n_released <= HYCO_MAX_PINS, "%d motions are held by nothing; at most %d can be regularised",
-            (int)fe->n_released, HYCO_MAX_PINS);
-  HycoCheck(!f->pinned || f->n_pins == fe->n_released,
-            "%d motions are held by nothing at this point, %d at the last one; solve such points apart",
-            (int)fe->n_released, (int)f->n_pins);
-  if (!f->pinned && fe->n_released) PetscCall(ChoosePins(f, f->pin_tag, f->pin_component));
-  f->n_pins = fe->n_released;
+  fe->released = released;
+  fe->n_turned = n ? f->n_turned : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoFOMRelease(HycoFOM f)
 {
-  PetscInt n;
+  HycoMotions free;
+  PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
-  HycoOnRoot(HycoComm(f), FindPins(f));
-  PetscCallMPI(MPI_Bcast(&f->n_pins, 1, MPIU_INT, 0, HycoComm(f)));
-  PetscCallMPI(MPI_Bcast(f->pin_tag, HYCO_MAX_PINS, MPIU_INT, 0, HycoComm(f)));
-  PetscCallMPI(MPI_Bcast(f->pin_component, HYCO_MAX_PINS, MPIU_INT, 0, HycoComm(f)));
-  n = f->n_pins;
-  if (n || f->fe->n_pins) PetscCall(HycoFESetPins(f->fe, n, f->pin_tag, f->pin_component));
-  if (f->fe_whole != f->fe && f->rank == 0) PetscCall(HycoFESetPins(f->fe_whole, n, f->pin_tag, f->pin_component));
-  if (!f->pinned && n) {
-    PetscCall(PetscMalloc1(n, &f->released));
-    f->n_released = n;
-  } else {
-    for (PetscInt k = 0; k < n; k++) PetscCall(VecDestroy(&f->released[k]));
-  }
-  PetscCall(Spread(f, f->rank ? NULL : f->fe_whole->released, n, f->released));
+  PetscCall(SetPins(f, 0));
+  for (PetscInt k = 0; k < f->n_released; k++) PetscCall(VecDestroy(&f->released[k]));
+  PetscCall(PetscFree(f->released));
+  f->n_released = f->n_turned = 0;
+  PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &free));
+  f->summary.regularised[0] = '\0';
+  if (free.n) ierr = FindReleased(f, &free);
+  PetscCall(HycoMotionsDestroy(&free));
+  PetscCall(ierr);
+  HycoCheck(f->n_released <= HYCO_MAX_PINS, "%d motions are held by nothing; at most %d can be regularised",
+            (int)f->n_released, HYCO_MAX_PINS);
+  HycoCheck(!f->pinned || f->n_pins == f->n_released,
+            "%d motions are held by nothing at this point, %d at the last one; solve such points apart",
+            (int)f->n_released, (int)f->n_pins);
+  if (!f->pinned && f->n_released) PetscCall(ChoosePins(f));
+  f->n_pins = f->n_released;
+  PetscCall(SetPins(f, f->n_pins));
   f->pinned = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -236,10 +338,9 @@ PetscErrorCode HycoFOMBalance(HycoFOM f)
   }
   PetscCall(CheckBalance(f, "loads", worst));
   for (PetscInt k = 0; k < f->fe->n_pins; k++) { /* a support's row */
-    const PetscInt node = f->fe->pin[k] / dim, row = f->part->node_global ? f->part->node_global[node] : node;
+    const PetscInt own = HycoMeshOwned(f->part, f->fe->pin[k] / dim);
 
-    if (row >= f->first && row < f->first + f->n_owned)
-      PetscCall(VecSetValue(f->F, row * dim + f->fe->pin[k] % dim, 0, INSERT_VALUES));
+    if (own >= 0) PetscCall(VecSetValue(f->F, (f->part->first + own) * dim + f->fe->pin[k] % dim, 0, INSERT_VALUES));
   }
   PetscCall(VecAssemblyBegin(f->F));
   PetscCall(VecAssemblyEnd(f->F));
@@ -268,44 +369,36 @@ PetscErrorCode HycoFOMCheckContactBalance(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void HycoFOMTakeOutReleased(HycoFOM f)
+PetscErrorCode HycoFOMTakeOutReleased(HycoFOM f, Vec u)
 {
-  const HycoFE fe = f->fe_whole;
+  PetscScalar dot;
 
-  for (PetscInt k = 0; k < fe->n_turned; k++) {
-    const PetscReal *motion = fe->released + (size_t)k * (size_t)fe->n_dof;
-    PetscReal dot = 0;
-
-    for (PetscInt i = 0; i < fe->n_dof; i++) dot += f->u[i] * motion[i];
-    for (PetscInt i = 0; i < fe->n_dof; i++) f->u[i] -= dot * motion[i];
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < f->n_turned; k++) {
+    PetscCall(VecDot(u, f->released[k], &dot));
+    PetscCall(VecAXPY(u, -dot, f->released[k]));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode SetKernel(HycoFOM f)
 {
-  HycoMotions motions = {0, NULL, NULL, NULL};
+  HycoMotions motions;
   MatNullSpace kernel;
-  PetscInt n;
   Vec *v;
 
   PetscFunctionBegin;
-  HycoOnRoot(HycoComm(f), HycoFEFreeMotions(f->fe_whole, &motions));
-  n = motions.n;
-  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(f)));
-  f->summary.free_motion[0] = '\0'; /* rank 0 spreads the summary */
-  if (f->rank == 0 && n)
+  PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
+  f->summary.free_motion[0] = '\0';
+  if (motions.n) {
     PetscCall(PetscStrncpy(f->summary.free_motion, motions.name[0], sizeof(f->summary.free_motion)));
-  if (!n) {
+    PetscCall(CreateVectors(f, &motions, &v));
+    PetscCall(MatNullSpaceCreate(HycoComm(f), PETSC_FALSE, motions.n, v, &kernel));
+    PetscCall(MatSetNullSpace(f->K, kernel));
+    PetscCall(MatNullSpaceDestroy(&kernel));
+    PetscCall(VecDestroyVecs(motions.n, &v));
+  } else
     PetscCall(MatSetNullSpace(f->K, NULL));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscMalloc1(n, &v));
-  PetscCall(Spread(f, motions.motion, n, v));
-  PetscCall(MatNullSpaceCreate(HycoComm(f), PETSC_FALSE, n, v, &kernel));
-  PetscCall(MatSetNullSpace(f->K, kernel));
-  PetscCall(MatNullSpaceDestroy(&kernel));
-  for (PetscInt k = 0; k < n; k++) PetscCall(VecDestroy(&v[k]));
-  PetscCall(PetscFree(v));
   PetscCall(HycoMotionsDestroy(&motions));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -352,10 +445,10 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
   PetscCall(VecDuplicate(f->U, &x));
   PetscCall(VecSetBlockSize(x, dim));
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
-    const PetscInt row = f->part->node_global ? f->part->node_global[i] : i;
+    const PetscInt own = HycoMeshOwned(f->part, i);
 
-    if (row < f->first || row >= f->first + f->n_owned) continue;
-    for (PetscInt c = 0; c < dim; c++) PetscCall(VecSetValue(x, row * dim + c, f->fe->X[3 * i + c], INSERT_VALUES));
+    for (PetscInt c = 0; c < dim && own >= 0; c++)
+      PetscCall(VecSetValue(x, (f->part->first + own) * dim + c, f->fe->X[3 * i + c], INSERT_VALUES));
   }
   PetscCall(VecAssemblyBegin(x));
   PetscCall(VecAssemblyEnd(x));
@@ -366,10 +459,10 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
     PetscCall(VecDuplicate(v[k], &moves[k]));
     PetscCall(VecCopy(v[k], moves[k]));
     for (PetscInt i = 0; i < f->part->n_nodes * dim; i++) {
-      const PetscInt node = f->part->node_global ? f->part->node_global[i / dim] : i / dim;
+      const PetscInt own = HycoMeshOwned(f->part, i / dim);
 
-      if (f->fe->fixed[i] && node >= f->first && node < f->first + f->n_owned)
-        PetscCall(VecSetValue(moves[k], node * dim + i % dim, 0, INSERT_VALUES));
+      if (f->fe->fixed[i] && own >= 0)
+        PetscCall(VecSetValue(moves[k], (f->part->first + own) * dim + i % dim, 0, INSERT_VALUES));
     }
     PetscCall(VecAssemblyBegin(moves[k]));
     PetscCall(VecAssemblyEnd(moves[k]));

@@ -323,6 +323,11 @@ PetscErrorCode HycoDirectAnalyse(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscReal HycoDirectOperations(HycoDirect d)
+{
+  return (PetscReal)d->id.rinfog[0];
+}
+
 /* Rank 0's Schur complement (by rows; the lower triangle when symmetric) to M on every rank, by columns. */
 static PetscErrorCode SpreadSchur(HycoDirect d, PetscReal M[])
 {

@@ -9,6 +9,11 @@ static PetscErrorCode AddOwn(void)
 {
   PetscFunctionBegin;
   PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_ELASTIC, HycoMaterialCreate_Elastic));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_J2, HycoMaterialCreate_J2));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_NORTON, HycoMaterialCreate_Norton));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_STRAIN_HARDENING, HycoMaterialCreate_StrainHardening));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_LIMBACK_ANDERSSON, HycoMaterialCreate_LimbackAndersson));
+  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_MFRONT, HycoMaterialCreate_MFront));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -36,6 +41,7 @@ PetscErrorCode HycoMaterialDestroy(HycoMaterial *material)
   HycoCheckHandle(*material, HYCO_MATERIAL_CLASSID);
   HycoDereference(material);
   if ((*material)->ops->destroy) PetscCall((*(*material)->ops->destroy)(*material));
+  PetscCall(HycoMaterialSetStateSize(*material, 0));
   PetscCall(HycoDeclaredDestroy(&(*material)->constants));
   PetscCall(PetscHeaderDestroy(material));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -95,6 +101,28 @@ PetscErrorCode HycoMaterialDeclare(HycoMaterial material, const char name[], con
   entry->value = initial;
   entry->lo = lo;
   entry->hi = hi;
+  entry->heat = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMaterialDeclareText(HycoMaterial material, const char name[], const char title[])
+{
+  HycoEntry *entry;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  PetscCall(HycoDeclaredAdd(&material->constants, name, title, HYCO_ENTRY_GROUP, PETSC_TRUE, &entry));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMaterialGetText(HycoMaterial material, const char name[], const char **text)
+{
+  const HycoEntry *entry;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  entry = HycoDeclaredFind(&material->constants, name);
+  *text = entry ? entry->text : NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -112,7 +140,29 @@ PetscErrorCode HycoMaterialSetStateSize(HycoMaterial material, PetscInt n_state)
 {
   PetscFunctionBegin;
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  PetscCall(HycoMaterialSetStateNames(material, n_state, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMaterialSetStateNames(HycoMaterial material, PetscInt n_state, const char *const names[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  for (PetscInt k = 0; material->state_name && k < material->n_state; k++)
+    PetscCall(PetscFree(material->state_name[k]));
+  PetscCall(PetscFree(material->state_name));
   material->n_state = n_state;
+  if (!n_state || !names) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(n_state, &material->state_name));
+  for (PetscInt k = 0; k < n_state; k++) PetscCall(PetscStrallocpy(names[k], &material->state_name[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMaterialSetHeat(HycoMaterial material, PetscBool heat)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
+  material->heat = heat;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -140,12 +190,13 @@ PetscErrorCode HycoMaterialGetData(HycoMaterial material, void *data)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim)
+PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, PetscBool has_history)
 {
   PetscFunctionBegin;
   if (material->ops->setup) PetscCall((*material->ops->setup)(material, dim));
-  HycoCheck(material->linear && !material->n_state,
-            "body %s: its law %s is not linear; the library solves scenes of linear laws",
+  HycoCheck(has_history || (material->linear && !material->n_state),
+            "body %s: its law %s is not linear, and what it answers depends on its past; give the scene a history: "
+            "{times: [...]}",
             ((PetscObject)material)->name, ((PetscObject)material)->type_name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -155,15 +206,24 @@ PetscBool HycoMaterialChanges(HycoMaterial material, const PetscBool changed[])
   PetscBool constant[HYCO_MAX_DECLARED], any = PETSC_FALSE;
 
   for (PetscInt j = 0; j < material->constants.n; j++) {
-    constant[j] = HycoExprChanges(material->constants.entry[j].expr, changed);
+    const HycoExpr expr = material->constants.entry[j].expr;
+
+    constant[j] = (PetscBool)(HycoExprChanges(expr, changed) ||
+                              (HycoExprInHeat(expr) && HycoExprChanges(material->temperature, changed)));
     any = (PetscBool)(any || constant[j]);
   }
   return any && material->ops->depends ? (*material->ops->depends)(material, constant) : any;
 }
 
+/* Whether the law is Lame's constants alone. */
+static PetscBool IsLame(HycoMaterial material)
+{
+  return (PetscBool)(material->linear && material->ops->isotropic);
+}
+
 PetscInt HycoMaterialTangentSize(HycoMaterial material, PetscInt dim)
 {
-  return material->ops->isotropic ? 2 : HycoStrainSize(dim) * HycoStrainSize(dim);
+  return IsLame(material) ? 2 : HycoStrainSize(dim) * HycoStrainSize(dim);
 }
 
 void HycoTangentApply(PetscBool isotropic, PetscInt dim, const PetscReal tangent[], const PetscReal strain[],
@@ -185,6 +245,21 @@ void HycoTangentApply(PetscBool isotropic, PetscInt dim, const PetscReal tangent
   }
 }
 
+/* The tangent of a point from its Lame constants: the columns are stresses of unit strains. */
+static void ExpandLame(PetscInt dim, const PetscReal lame[2], PetscReal tangent[])
+{
+  const PetscInt ns = HycoStrainSize(dim);
+  const PetscReal own[2] = {lame[0], lame[1]};
+
+  for (PetscInt c = 0; c < ns; c++) {
+    PetscReal unit[6] = {0, 0, 0, 0, 0, 0}, column[6];
+
+    unit[c] = 1;
+    HycoTangentApply(PETSC_TRUE, dim, own, unit, column);
+    for (PetscInt r = 0; r < ns; r++) tangent[r * ns + c] = column[r];
+  }
+}
+
 PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
 {
   const PetscInt ns = p->n_strain;
@@ -195,7 +270,7 @@ PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
   HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
   p->dt_factor = 1;
   p->failed = -1;
-  if (!material->ops->isotropic) {
+  if (!IsLame(material)) {
     PetscCall((*material->ops->update)(material, p));
     for (PetscInt i = 0; material->linear && p->stress && i < p->n; i++)
       HycoTangentApply(PETSC_FALSE, p->dim, p->tangent + i * ns * ns, p->strain + i * ns, p->stress + i * ns);
@@ -205,13 +280,7 @@ PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
   ierr = (*material->ops->isotropic)(material, p, lame);
   for (PetscInt i = 0; i < p->n && !ierr; i++) {
     if (p->stress) HycoTangentApply(PETSC_TRUE, p->dim, lame + 2 * i, p->strain + i * ns, p->stress + i * ns);
-    for (PetscInt c = 0; p->tangent && c < ns; c++) { /* its columns: stresses of unit strains */
-      PetscReal unit[6] = {0, 0, 0, 0, 0, 0}, column[6];
-
-      unit[c] = 1;
-      HycoTangentApply(PETSC_TRUE, p->dim, lame + 2 * i, unit, column);
-      for (PetscInt r = 0; r < ns; r++) p->tangent[(i * ns + r) * ns + c] = column[r];
-    }
+    if (p->tangent) ExpandLame(p->dim, lame + 2 * i, p->tangent + i * ns * ns);
   }
   PetscCall(PetscFree(lame));
   PetscCall(ierr);
@@ -228,10 +297,11 @@ static PetscErrorCode CheckConstant(const HycoEntry *e, const PetscReal mu[], Pe
 
     if (value[i] > e->lo && value[i] < e->hi) continue;
     PetscCall(HycoExprPlace(e->expr, mu, x + 3 * i, place));
-    if (e->lo == 0 && e->hi >= PETSC_INFINITY)
-      HycoFail("%s is %g at %s; %s must be positive", HycoExprKey(e->expr), (double)value[i], place, e->title);
-    HycoFail("%s is %g at %s; %s must lie between %g and %g", HycoExprKey(e->expr), (double)value[i], place, e->title,
-             (double)e->lo, (double)e->hi);
+    if (e->hi >= PETSC_INFINITY && (e->lo == 0 || e->lo == HYCO_NOT_NEGATIVE))
+      HycoFail("%s is %g at %s; %s must %s", HycoExprKey(e->expr), (double)value[i], place, e->title,
+               e->lo == 0 ? "be positive" : "not be negative");
+    HycoFail("%s is %.10g at %s; %s must lie between %g and %g", HycoExprKey(e->expr), (double)value[i], place,
+             e->title, (double)e->lo, (double)e->hi);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -259,12 +329,10 @@ static PetscBool IsDefinite(PetscInt dim, const PetscReal C[])
   return PETSC_TRUE;
 }
 
-PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const PetscReal mu[], PetscInt n,
-                                    const PetscReal x[], PetscReal work[], PetscReal tangent[])
+PetscErrorCode HycoMaterialConstants(HycoMaterial material, const PetscReal mu[], PetscInt n, const PetscReal x[],
+                                     const PetscReal temperature[], PetscReal work[], const PetscReal *constant[])
 {
   const HycoDeclared *d = &material->constants;
-  const PetscReal *constant[HYCO_MAX_DECLARED];
-  HycoMaterialPoints p = {.n = n, .dim = dim, .n_strain = HycoStrainSize(dim), .constant = constant, .failed = -1};
 
   PetscFunctionBegin;
   for (PetscInt j = 0; j < d->n; j++) {
@@ -273,14 +341,61 @@ PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const P
     constant[j] = value;
     for (PetscInt i = 0; i < n; i++) value[i] = d->entry[j].value;
     if (!d->entry[j].expr) continue;
-    PetscCall(HycoExprEval(d->entry[j].expr, mu, n, x, value));
+    PetscCall(HycoExprEvalHot(d->entry[j].expr, mu, n, x, temperature, value));
     PetscCall(CheckConstant(&d->entry[j], mu, n, x, value));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The tangents of a law that is not linear, as it answers at once at rest: without strain, state and time. */
+static PetscErrorCode RestTangents(HycoMaterial material, HycoMaterialPoints *p)
+{
+  const PetscInt n = p->n * (3 * p->n_strain + 2 * material->n_state);
+  PetscReal *zero;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n, &zero));
+  p->strain0 = p->strain = p->stress0 = zero;
+  p->stress = zero + 2 * p->n * p->n_strain;
+  p->state0 = zero + 3 * p->n * p->n_strain;
+  p->state = zero + p->n * (3 * p->n_strain + material->n_state);
+  ierr = HycoMaterialUpdate(material, p);
+  PetscCall(PetscFree(zero));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lame's constants (n x 2) as tangents, in their place: in the order in which none is written before it is read. */
+static void ExpandAll(PetscInt dim, PetscInt n, PetscReal tangent[])
+{
+  const PetscInt size = HycoStrainSize(dim) * HycoStrainSize(dim);
+
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = size < 2 ? k : n - 1 - k;
+
+    ExpandLame(dim, tangent + 2 * i, tangent + i * size);
+  }
+}
+
+PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const PetscReal mu[], PetscInt n,
+                                    const PetscReal x[], const PetscReal temperature[], PetscReal work[],
+                                    PetscReal tangent[])
+{
+  const PetscReal *constant[HYCO_MAX_DECLARED];
+  HycoMaterialPoints p = {.n = n, .dim = dim, .n_strain = HycoStrainSize(dim), .constant = constant, .failed = -1};
+
+  PetscFunctionBegin;
+  PetscCall(HycoMaterialConstants(material, mu, n, x, temperature, work, constant));
   p.tangent = tangent;
+  p.temperature0 = p.temperature = temperature;
   if (material->ops->isotropic)
     PetscCall((*material->ops->isotropic)(material, &p, tangent));
-  else
+  else if (material->linear)
     PetscCall(HycoMaterialUpdate(material, &p));
+  else
+    PetscCall(RestTangents(material, &p));
+  if (material->ops->isotropic && !material->linear) ExpandAll(dim, n, tangent);
   for (PetscInt i = 0; i < n && p.failed < 0 && !material->ops->isotropic; i++) {
     if (IsDefinite(dim, tangent + i * p.n_strain * p.n_strain)) continue;
     p.failed = i;

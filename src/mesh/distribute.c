@@ -148,7 +148,6 @@ PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
 PetscErrorCode HycoMeshCreateWhole(MPI_Comm comm, HycoScene scene, HycoMesh *whole)
 {
   PetscMPIInt size;
-  PetscInt n_owned, first, *global;
   HycoMesh part;
   DM dm;
 
@@ -156,12 +155,14 @@ PetscErrorCode HycoMeshCreateWhole(MPI_Comm comm, HycoScene scene, HycoMesh *who
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(HycoMeshLoad(comm, scene, &dm));
   PetscCall(HycoPlexRefine(&dm, scene, scene->refine));
-  PetscCall(HycoPlexToMesh(dm, scene, &part, &n_owned, &first));
+  PetscCall(HycoPlexToMesh(dm, scene, &part));
   PetscCall(DMDestroy(&dm));
   *whole = part;
   if (size == 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoMeshGather(comm, part, n_owned, first, NULL, whole, &global));
-  PetscCall(PetscFree(global));
+  PetscCall(HycoMeshGather(comm, part, NULL, whole));
   PetscCall(HycoMeshDestroy(&part));
+  if (!*whole) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*whole)->node_global)); /* it is no part any more */
+  PetscCall(PetscFree((*whole)->node_whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

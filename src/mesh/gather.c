@@ -42,7 +42,6 @@ static PetscErrorCode GatherRows(MPI_Comm comm, Rows *r)
 
 typedef struct {
   HycoMesh part;
-  PetscInt n_owned, first;
   const PetscBool *in; /* by group; NULL: all of the mesh */
   PetscBool *take;     /* by node of the part */
   Rows node, cell, facet, member, region;
@@ -50,13 +49,12 @@ typedef struct {
 
 static PetscBool Owns(const Gather *g, PetscInt node)
 {
-  const PetscInt row = g->part->node_global[node] - g->first;
-
-  return (PetscBool)(row >= 0 && row < g->n_owned);
+  return (PetscBool)(HycoMeshOwned(g->part, node) >= 0);
 }
 
-/* A node's row: tag, 0, 0, body, global number; a cell's, which belongs to the rank of its first node: tag, 0, 0, body,
-   nodes' tags; a facet's: group, tag of its cell, place among this rank's, nodes' tags. */
+/* A node's row: tag, 0, 0, body, numbers in the distributed vectors and in the whole mesh; a cell's, which belongs to
+   the rank of its first node: tag, 0, 0, body, nodes' tags; a facet's: group, tag of its cell, place among this rank's,
+   nodes' tags. */
 static PetscErrorCode Pack(Gather *g)
 {
   HycoMesh m = g->part;
@@ -70,7 +68,7 @@ static PetscErrorCode Pack(Gather *g)
       g->take[m->group_node[j]] = PETSC_TRUE;
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) {
-    const PetscInt node[5] = {m->node_id[i], 0, 0, m->node_body[i], m->node_global[i]};
+    const PetscInt node[6] = {m->node_id[i], 0, 0, m->node_body[i], m->node_global[i], m->node_whole[i]};
 
     g->take[i] = (PetscBool)(g->take[i] && Owns(g, i));
     if (g->take[i]) PetscCall(AddRow(&g->node, node));
@@ -120,19 +118,22 @@ static PetscInt Find(PetscInt n, const PetscInt tag[], PetscInt value)
 }
 
 /* xyz of the nodes in the order of their tags: they come in the order of the ranks, as `sent` tags. */
-static PetscErrorCode PlaceNodes(Gather *g, HycoMesh m, PetscInt n, const PetscInt sent[], const PetscReal xyz[],
-                                 PetscInt **global)
+static PetscErrorCode PlaceNodes(Gather *g, HycoMesh m, PetscInt n, const PetscInt sent[], const PetscReal xyz[])
 {
   PetscFunctionBegin;
   m->n_nodes = n;
   PetscCall(PetscMalloc1(n, &m->node_id));
   PetscCall(PetscMalloc1(n, &m->node_body));
-  PetscCall(PetscMalloc1(n, global));
+  PetscCall(PetscMalloc1(n, &m->node_global));
+  PetscCall(PetscMalloc1(n, &m->node_whole));
   PetscCall(PetscMalloc1(3 * n, &m->xyz));
   for (PetscInt i = 0; i < n; i++) {
-    m->node_id[i] = g->node.all[5 * i];
-    m->node_body[i] = g->node.all[5 * i + 3];
-    (*global)[i] = g->node.all[5 * i + 4];
+    const PetscInt *row = g->node.all + i * g->node.width;
+
+    m->node_id[i] = row[0];
+    m->node_body[i] = row[3];
+    m->node_global[i] = row[4];
+    m->node_whole[i] = row[5];
   }
   for (PetscInt k = 0; k < n; k++) PetscCall(PetscArraycpy(m->xyz + 3 * Find(n, m->node_id, sent[k]), xyz + 3 * k, 3));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -182,10 +183,9 @@ static PetscErrorCode PlaceMembers(PetscInt n_groups, const Rows *r, PetscInt n,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, PetscInt n_owned, PetscInt first, const PetscBool in[],
-                              HycoMesh *mesh, PetscInt **global)
+PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[], HycoMesh *mesh)
 {
-  Gather g = {.part = part, .n_owned = n_owned, .first = first, .in = in};
+  Gather g = {.part = part, .in = in};
   PetscMPIInt rank;
   PetscReal *xyz, *all;
   PetscInt *tag, *sent, n, k = 0;
@@ -193,7 +193,7 @@ PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, PetscInt n_owned, Pe
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  g.node.width = 5;
+  g.node.width = 6;
   g.cell.width = 4 + part->nv;
   g.facet.width = 3 + part->nf;
   g.member.width = g.region.width = 3;
@@ -213,18 +213,20 @@ PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, PetscInt n_owned, Pe
   PetscCall(GatherRows(comm, &g.member));
   PetscCall(GatherRows(comm, &g.region));
   *mesh = NULL;
-  *global = NULL;
   if (rank == 0) {
     PetscCall(PetscNew(&m));
     m->dim = part->dim;
     m->nv = part->nv;
     m->nf = part->nf;
     m->type = part->type;
+    m->n_owned = m->n_whole_nodes = part->n_whole_nodes; /* all are rank 0's */
+    m->n_whole_cells = part->n_whole_cells;
+    m->whole_length = part->whole_length;
     m->n_groups = part->n_groups;
     PetscCall(PetscMalloc1(m->n_groups, &m->group_name));
     for (PetscInt j = 0; j < m->n_groups; j++) PetscCall(PetscStrallocpy(part->group_name[j], &m->group_name[j]));
     HycoDuplicate(m->n_groups, part->group_dim, &m->group_dim);
-    PetscCall(PlaceNodes(&g, m, n, sent, all, global));
+    PetscCall(PlaceNodes(&g, m, n, sent, all));
     PetscCall(PlaceCells(&g, m));
     PetscCall(PlaceMembers(m->n_groups, &g.member, m->n_nodes, m->node_id, &m->group_start, &m->group_node));
     PetscCall(PlaceMembers(m->n_groups, &g.region, m->n_cells, m->cell_id, &m->group_cell_start, &m->group_cell));

@@ -135,20 +135,35 @@ PetscErrorCode HycoSortUnique(PetscInt *n, PetscInt a[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoMeshEnds(HycoMesh m, PetscReal ends[6])
+{
+  for (PetscInt c = 0; c < 6; c++) ends[c] = PETSC_MIN_REAL;
+  for (PetscInt k = 0; k < 3 * m->n_nodes; k++) {
+    ends[k % 3] = PetscMax(ends[k % 3], m->xyz[k]);
+    ends[3 + k % 3] = PetscMax(ends[3 + k % 3], -m->xyz[k]);
+  }
+}
+
 PetscReal HycoMeshLength(HycoMesh m)
 {
-  PetscReal length = 0;
+  PetscReal length = m->whole_length, ends[6];
 
-  for (PetscInt c = 0; c < 3; c++) {
-    PetscReal lo = PETSC_MAX_REAL, hi = PETSC_MIN_REAL;
-
-    for (PetscInt i = 0; i < m->n_nodes; i++) {
-      lo = PetscMin(lo, m->xyz[3 * i + c]);
-      hi = PetscMax(hi, m->xyz[3 * i + c]);
-    }
-    length = PetscMax(length, hi - lo);
-  }
+  if (length > 0) return length;
+  HycoMeshEnds(m, ends);
+  for (PetscInt c = 0; c < 3; c++) length = PetscMax(length, ends[c] + ends[3 + c]);
   return length;
+}
+
+PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh m, PetscSF *sf)
+{
+  PetscLayout layout;
+
+  PetscFunctionBegin;
+  PetscCall(PetscLayoutCreateFromSizes(comm, m->n_owned, PETSC_DETERMINE, 1, &layout));
+  PetscCall(PetscSFCreate(comm, sf));
+  PetscCall(PetscSFSetGraphLayout(*sf, layout, m->n_nodes, NULL, PETSC_OWN_POINTER, m->node_global));
+  PetscCall(PetscLayoutDestroy(&layout));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)

@@ -142,8 +142,8 @@ static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
 
 /* The cells part by part. */
 static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, PetscInt n, PetscInt start[],
-                                PetscInt adjacent[], PetscSection weights, PetscSection targets, PetscSection sizes,
-                                IS *partition)
+                                PetscInt adjacent[], PetscSection weights,
+                                HYCO_EDGE_WEIGHTS_ARGUMENT PetscSection targets, PetscSection sizes, IS *partition)
 {
   Data *d = (Data *)partitioner->data;
   PetscInt *part, *cells, at = 0;

@@ -299,7 +299,7 @@ static PetscErrorCode TakeCells(Builder *b)
   PetscCall(PetscMalloc1(b->c1 - b->c0, &b->cell));
   PetscCall(PetscMalloc3(b->c1 - b->c0, &keep, b->c1 - b->c0, &key, b->c1 - b->c0, &place));
   for (PetscInt c = b->c0; c < b->c1; c++) {
-    PetscInt vertex[8];
+    PetscInt vertex[8] = {0};
     PetscBool mine = b->all_owned;
 
     if (!mine) PetscCall(HycoPlexVertices(b->dm, b->facets_are_points, m->type, c, m->nv, vertex));
@@ -641,7 +641,7 @@ static PetscErrorCode MakeTables(Builder *b)
 }
 
 /* Numbers in the distributed vectors, by a section of the unknowns; places in the whole mesh, by tag. */
-static PetscErrorCode Number(Builder *b, PetscInt *n_owned, PetscInt *first)
+static PetscErrorCode Number(Builder *b)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)b->dm);
   HycoMesh m = b->m;
@@ -655,9 +655,8 @@ static PetscErrorCode Number(Builder *b, PetscInt *n_owned, PetscInt *first)
   PetscCall(DMSetLocalSection(b->dm, section));
   PetscCall(PetscSectionDestroy(&section));
   PetscCall(DMGetGlobalSection(b->dm, &global));
-  *n_owned = 0;
-  for (PetscInt i = 0; i < m->n_nodes; i++) *n_owned += b->owned[b->vertex[i] - b->v0];
-  PetscCallMPI(MPI_Exscan(n_owned, first, 1, MPIU_INT, MPI_SUM, comm));
+  for (PetscInt i = 0; i < m->n_nodes; i++) m->n_owned += b->owned[b->vertex[i] - b->v0];
+  PetscCallMPI(MPI_Exscan(&m->n_owned, &m->first, 1, MPIU_INT, MPI_SUM, comm));
   PetscCall(PetscMalloc1(m->n_nodes, &m->node_global));
   PetscCall(PetscMalloc1(m->n_nodes, &m->node_whole));
   PetscCall(PetscMalloc1(m->n_cells, &m->cell_whole));
@@ -667,17 +666,21 @@ static PetscErrorCode Number(Builder *b, PetscInt *n_owned, PetscInt *first)
     PetscCall(PetscSectionGetOffset(global, b->vertex[i], &at));
     m->node_global[i] = (at < 0 ? -(at + 1) : at) / m->dim;
   }
-  PetscCall(HycoRankInts(comm, m->n_nodes, m->node_id, m->node_whole));
-  PetscCall(HycoRankInts(comm, m->n_cells, m->cell_id, m->cell_whole));
+  PetscCall(HycoRankInts(comm, m->n_nodes, m->node_id, m->node_whole, &m->n_whole_nodes));
+  PetscCall(HycoRankInts(comm, m->n_cells, m->cell_id, m->cell_whole, &m->n_whole_cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A type, and dimensions of groups, that a process without their points does not know. */
+/* The whole mesh's length; a type, and dimensions of groups, that a process without their points does not know. */
 static PetscErrorCode AgreeOnGroups(MPI_Comm comm, HycoMesh m)
 {
   PetscInt head[3] = {m->n_cells ? (PetscInt)m->type : -1, m->nv, m->nf};
+  PetscReal ends[6];
 
   PetscFunctionBegin;
+  HycoMeshEnds(m, ends);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ends, 6, MPIU_REAL, MPI_MAX, comm));
+  for (PetscInt c = 0; c < 3; c++) m->whole_length = PetscMax(m->whole_length, ends[c] + ends[3 + c]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, head, 3, MPIU_INT, MPI_MAX, comm));
   m->type = (HycoCellType)head[0];
   m->nv = head[1];
@@ -707,7 +710,7 @@ static PetscErrorCode CheckGroups(MPI_Comm comm, HycoMesh m, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *n_owned, PetscInt *first)
+PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
   Builder b = {.dm = dm, .scene = scene};
@@ -719,14 +722,13 @@ PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh, PetscInt *
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(PetscNew(&b.m));
   HycoOnEach(comm, MakeTables(&b));
-  *n_owned = b.m->n_nodes;
-  *first = 0;
+  if (size == 1) b.m->n_owned = b.m->n_nodes;
   if (size > 1) PetscCall(AgreeOnGroups(comm, b.m));
   DropInnerFacets(b.m);
   PetscCall(PetscStrlen(scene->mesh_path, &length));
   if (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0)) /* no reader has seen to it */
     ierr = CheckGroups(comm, b.m, scene);
-  if (size > 1 && !ierr) ierr = Number(&b, n_owned, first);
+  if (size > 1 && !ierr) ierr = Number(&b);
   PetscCall(PetscFree(b.owned));
   PetscCall(PetscFree(b.node));
   PetscCall(PetscFree(b.vertex));

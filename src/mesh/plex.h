@@ -43,8 +43,7 @@ PetscErrorCode HycoPartitionerSetMesh(PetscPartitioner partitioner, HycoMesh mes
 PetscErrorCode HycoPlexWrite(DM dm, const char path[]);
 PetscErrorCode HycoPlexRead(MPI_Comm comm, const char path[], DM *dm);
 
-/* place[k]: how many different keys of all processes are smaller than key[k] >= 0. Collective. */
-PetscErrorCode HycoRankInts(MPI_Comm comm, PetscInt n, const PetscInt key[], PetscInt place[]);
+/* HycoRankInts() for keys of 64 bits. */
 PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *total);
 
 #endif

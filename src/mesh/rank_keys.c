@@ -72,15 +72,14 @@ PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoRankInts(MPI_Comm comm, PetscInt n, const PetscInt key[], PetscInt place[])
+PetscErrorCode HycoRankInts(MPI_Comm comm, PetscInt n, const PetscInt key[], PetscInt place[], PetscInt *total)
 {
   PetscInt64 *wide;
-  PetscInt total;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &wide));
   for (PetscInt k = 0; k < n; k++) wide[k] = key[k];
-  PetscCall(HycoRankKeys(comm, n, wide, place, &total));
+  PetscCall(HycoRankKeys(comm, n, wide, place, total));
   PetscCall(PetscFree(wide));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

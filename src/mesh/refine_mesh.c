@@ -218,12 +218,12 @@ static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscIn
 /* Tags of the cells: in the order of their parents'. */
 static PetscErrorCode TagCells(DM dm, DMPlexTransform transform, const PetscInt tag[], PetscInt new_tag[])
 {
-  PetscInt c0, c1, *place;
+  PetscInt c0, c1, *place, total;
 
   PetscFunctionBegin;
   PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
   PetscCall(PetscMalloc1(c1 - c0, &place));
-  PetscCall(HycoRankInts(PetscObjectComm((PetscObject)dm), c1 - c0, tag + c0, place));
+  PetscCall(HycoRankInts(PetscObjectComm((PetscObject)dm), c1 - c0, tag + c0, place, &total));
   for (PetscInt c = c0; c < c1; c++) {
     DMPolytopeType type;
     PetscInt n, child;

@@ -261,12 +261,10 @@ static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: the RID, the model on it; nothing that is online. */
+/* Rank 0: the model on its RID; nothing that is online. */
 static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, HycoTraining *report)
 {
   PetscFunctionBegin;
-  PetscCall(HycoROMSetType(m, t->prototype->type));
-  PetscCall(CutDomain(t, m));
   PetscCall(LimitModes(t, m));
   PetscCall(FillModel(t, m));
   PetscCall((*m->ops->build)(m, t));
@@ -278,12 +276,25 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report)
+/* Rank 0: a model with its RID. */
+static PetscErrorCode BeginOnRoot(HycoReducer t, HycoROM *model)
 {
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoROMCreate(model));
+  ierr = HycoROMSetType(*model, t->prototype->type);
+  if (!ierr) ierr = CutDomain(t, *model);
+  if (ierr) (void)!HycoROMDestroy(model);
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
   ierr = BuildModel(t, useful, *model, report);
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
@@ -297,6 +308,10 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   PetscFunctionBegin;
   *model = NULL;
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_TRUE));
+  HycoOnRoot(HycoComm(t), BeginOnRoot(t, model));
+  PetscCall(PetscFree(t->U_rid));
+  PetscCall(HycoReducerFetchRows(t, *model ? (*model)->mesh->n_nodes : 0, *model ? (*model)->mesh->node_whole : NULL,
+                                 &t->U_rid));
   HycoOnRoot(HycoComm(t), BuildOnRoot(t, useful, model, report));
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));

@@ -94,15 +94,13 @@ static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, 
 /* The solutions on the unknowns of the model's mesh, n_dof x n_s row major, on every rank. Collective. */
 static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at)
 {
-  const PetscInt dim = t->sizes[3], n_dof = m->mesh->n_nodes * dim, whole = t->sizes[0] * dim;
+  const PetscInt n_dof = m->mesh->n_nodes * t->sizes[3];
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1((size_t)n_dof * (size_t)t->n_s, U_at));
   for (PetscInt i = 0; t->rank == 0 && i < n_dof; i++) {
-    const PetscInt from = m->mesh->node_whole[i / dim] * dim + i % dim;
-
     for (PetscInt k = 0; k < t->n_s; k++)
-      (*U_at)[(size_t)i * (size_t)t->n_s + (size_t)k] = t->U[(size_t)k * (size_t)whole + (size_t)from];
+      (*U_at)[(size_t)i * (size_t)t->n_s + (size_t)k] = t->U_rid[(size_t)k * (size_t)n_dof + (size_t)i];
   }
   for (PetscInt i = 0; i < n_dof; i++) /* by rows: a message's length is an int */
     HycoBcast(*U_at + (size_t)i * (size_t)t->n_s, t->n_s, MPIU_REAL, HycoComm(t));

@@ -6,18 +6,18 @@
 static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, PetscReal *lambda)
 {
   const PetscInt dim = t->sizes[3];
-  const PetscReal *U = t->U + (size_t)k * (size_t)(t->sizes[0] * dim), *L = t->Lambda + (size_t)k * (size_t)t->sizes[2],
-                  *c = t->VtU + k * t->l;
+  const PetscReal *U = t->U_rid + (size_t)k * (size_t)(m->mesh->n_nodes * dim),
+                  *L = t->Lambda + (size_t)k * (size_t)t->sizes[2], *c = t->VtU + k * t->l;
   PetscReal sum, lost = 0, size = 0;
 
   sum = t->U_norm[k] * t->U_norm[k];
   for (PetscInt j = 0; j < t->l; j++) sum += (m->gamma[j] - c[j]) * (m->gamma[j] - c[j]) - c[j] * c[j];
   for (PetscInt f = 0; f < m->n_fe; f++) {
-    const PetscInt dof = m->fe_dof[f], whole = m->mesh->node_whole[dof / dim] * dim + dof % dim;
+    const PetscInt dof = m->fe_dof[f];
     PetscReal by_modes = 0;
 
     for (PetscInt j = 0; j < m->l; j++) by_modes += m->V[dof * m->l + j] * m->gamma[j];
-    sum += (m->U[dof] - U[whole]) * (m->U[dof] - U[whole]) - (by_modes - U[whole]) * (by_modes - U[whole]);
+    sum += (m->U[dof] - U[dof]) * (m->U[dof] - U[dof]) - (by_modes - U[dof]) * (by_modes - U[dof]);
   }
   *u = t->U_norm[k] > 0 ? PetscSqrtReal(PetscMax(sum, 0)) / t->U_norm[k] : 0;
   for (PetscInt j = 0; j < m->m; j++) {

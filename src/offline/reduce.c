@@ -9,24 +9,31 @@
 /* Snapshots less their lifting r(u0): zero on the fixed unknowns. */
 static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
 {
-  const PetscInt n_dof = t->sizes[0] * t->sizes[3];
   PetscBool *fixed;
-  PetscInt lo, hi, lda, n;
+  PetscInt n_rows, lda, n;
+  PetscMPIInt size, *counts, *offsets;
+  const PetscInt *ranges;
   PetscScalar *s;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n_dof, &fixed));
-  if (t->rank == 0) PetscCall(PetscArraycpy(fixed, t->fe->fixed, n_dof));
-  HycoBcast(fixed, n_dof * (PetscInt)sizeof(PetscBool), MPI_BYTE, HycoComm(t));
-  PetscCall(MatGetOwnershipRange(S, &lo, &hi));
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
+  PetscCall(MatGetLocalSize(S, &n_rows, NULL));
+  PetscCall(MatGetOwnershipRanges(S, &ranges));
+  PetscCall(PetscMalloc3(n_rows, &fixed, size, &counts, size, &offsets));
+  for (PetscMPIInt r = 0; r < size; r++) {
+    counts[r] = (PetscMPIInt)(ranges[r + 1] - ranges[r]);
+    offsets[r] = (PetscMPIInt)ranges[r];
+  }
+  PetscCallMPI(MPI_Scatterv(t->rank ? NULL : t->fe->fixed, counts, offsets, HYCO_MPI_BOOL, fixed, (PetscMPIInt)n_rows,
+                            HYCO_MPI_BOOL, 0, HycoComm(t)));
   PetscCall(MatGetSize(S, NULL, &n));
   PetscCall(MatDenseGetLDA(S, &lda));
   PetscCall(MatDenseGetArray(S, &s));
-  for (PetscInt i = lo; i < hi; i++) {
-    for (PetscInt j = 0; fixed[i] && j < n; j++) s[(size_t)j * (size_t)lda + (size_t)(i - lo)] = 0;
+  for (PetscInt i = 0; i < n_rows; i++) {
+    for (PetscInt j = 0; fixed[i] && j < n; j++) s[(size_t)j * (size_t)lda + (size_t)i] = 0;
   }
   PetscCall(MatDenseRestoreArray(S, &s));
-  PetscCall(PetscFree(fixed));
+  PetscCall(PetscFree3(fixed, counts, offsets));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,16 +207,71 @@ static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacements: U on rank 0, norms, and V^T of the snapshots less their lifting, which judge a model on the whole mesh
-   at the cost of its modes. */
+PetscErrorCode HycoReducerFetchRows(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **U)
+{
+  const PetscInt dim = t->sizes[3], n_rows = t->rank ? 0 : n * dim;
+  const PetscScalar *s;
+  PetscLayout layout;
+  PetscInt *row, lda;
+  PetscSF sf;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n_rows, &row));
+  for (PetscInt i = 0; i < n_rows; i++) row[i] = node[i / dim] * dim + i % dim;
+  PetscCall(MatGetLayouts(t->S, &layout, NULL));
+  PetscCall(PetscSFCreate(HycoComm(t), &sf));
+  PetscCall(PetscSFSetGraphLayout(sf, layout, n_rows, NULL, PETSC_OWN_POINTER, row));
+  PetscCall(PetscMalloc1((size_t)n_rows * (size_t)t->n_s + 1, U));
+  PetscCall(MatDenseGetLDA(t->S, &lda));
+  PetscCall(MatDenseGetArrayRead(t->S, &s));
+  for (PetscInt k = 0; k < t->n_s; k++) {
+    PetscReal *column = *U + (size_t)k * (size_t)n_rows;
+
+    PetscCall(PetscSFBcastBegin(sf, MPIU_REAL, s + (size_t)k * (size_t)lda, column, MPI_REPLACE));
+    PetscCall(PetscSFBcastEnd(sf, MPIU_REAL, s + (size_t)k * (size_t)lda, column, MPI_REPLACE));
+  }
+  PetscCall(MatDenseRestoreArrayRead(t->S, &s));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscFree(row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The displacements where contacts may be. */
+static PetscErrorCode FetchContacts(HycoReducer t)
+{
+  const PetscInt n_nodes = t->rank ? 0 : t->sizes[0];
+  PetscInt *node;
+  PetscBool *contact;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(t->contact_row));
+  PetscCall(PetscFree(t->U_contact));
+  PetscCall(PetscCalloc1(n_nodes, &contact));
+  PetscCall(PetscMalloc1(n_nodes, &t->contact_row));
+  PetscCall(PetscMalloc1(n_nodes, &node));
+  t->n_contact_nodes = 0;
+  if (t->rank == 0) PetscCall(HycoPairsMarkSurfaces(t->scene, t->whole, &t->pairs, contact));
+  for (PetscInt i = 0; i < n_nodes; i++) {
+    t->contact_row[i] = contact[i] ? t->n_contact_nodes : -1;
+    if (contact[i]) node[t->n_contact_nodes++] = i;
+  }
+  PetscCall(HycoReducerFetchRows(t, t->n_contact_nodes, node, &t->U_contact));
+  PetscCall(PetscFree(node));
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Displacements: their norms, and V^T of the snapshots less their lifting, which judge a model on the whole mesh at the
+   cost of its modes. */
 static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, PetscBool all)
 {
   HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
   Mat S;
 
   PetscFunctionBegin;
-  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", &S));
-  PetscCall(HycoReducerToRoot(t, S, PETSC_FALSE, &t->U));
+  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", &t->S));
+  PetscCall(FetchContacts(t));
+  PetscCall(MatDuplicate(t->S, MAT_COPY_VALUES, &S));
   PetscCall(RemoveLifting(t, S));
   PetscCall(FindBasis(t, S, HYCO_SEED_DISPLACEMENT, all));
   HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",

@@ -58,6 +58,7 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(HycoSceneRefuseHistory(scene, "training"));
   PetscCall(Create(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
@@ -102,7 +103,10 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     PetscCall(PetscFree(t->basis[k].coefficients));
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
-  PetscCall(PetscFree(t->U));
+  PetscCall(MatDestroy(&t->S));
+  PetscCall(PetscFree(t->U_rid));
+  PetscCall(PetscFree(t->U_contact));
+  PetscCall(PetscFree(t->contact_row));
   PetscCall(PetscFree(t->Lambda));
   PetscCall(PetscFree(t->U_norm));
   PetscCall(PetscFree(t->dual_seeds));

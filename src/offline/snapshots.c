@@ -1,5 +1,6 @@
 /* HycoSnapshots: a folder with one file per parameter value, each complete or absent. */
 #include <hycosnapshotsimpl.h>
+#include <hycofields.h>
 #include <hycofile.h>
 #include <hycoh5.h>
 #include <errno.h>
@@ -40,6 +41,7 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
 
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(HycoSceneRefuseHistory(scene, "a store of solutions"));
   PetscCall(PetscHeaderCreate(s, HYCO_SNAPSHOTS_CLASSID, "HycoSnapshots", "Store of full-order solutions", "Hyco", comm,
                               HycoSnapshotsDestroy, HycoSnapshotsView));
   PetscCall(PetscObjectReference((PetscObject)scene));
@@ -190,26 +192,46 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes the solution that the group's rank 0 holds. */
+/* What rank 0 has of a solution. */
+static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[])
+{
+  char fingerprint[32];
+
+  PetscFunctionBegin;
+  snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
+  PetscCall(HycoH5WriteText(h, "fingerprint", fingerprint));
+  PetscCall(HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu));
+  PetscCall(HycoH5WriteReal(h, "lambda", fom->n_contacts, 1, fom->lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[], const PetscReal force[])
+{
+  const PetscInt dim = fom->fe->dim;
+  const HycoFileOrder *rows;
+
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(fom), WriteHead(s, fom, h, mu));
+  PetscCall(HycoFOMGetRows(fom, &rows));
+  PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "U", HYCO_ON_NODES, MPIU_REAL, dim, 1, fom->u));
+  PetscCall(HycoFieldWrite(h, rows, fom->n_cells, "sigma", HYCO_ON_CELLS, MPIU_REAL, fom->fe->n_sigma, 1, fom->sigma));
+  PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "force", HYCO_ON_NODES, MPIU_REAL, dim, 1, force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Writes the solution, each rank its rows. Collective on the group. */
 static PetscErrorCode WriteSample(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], const PetscReal force[])
 {
-  const PetscInt N = fom->n_nodes * fom->fe->dim;
-  char path[PETSC_MAX_PATH_LEN], fingerprint[32];
+  char path[PETSC_MAX_PATH_LEN];
   HycoH5 h;
-  PetscErrorCode ierr;
+  PetscErrorCode ierr, failed;
 
   PetscFunctionBegin;
   PetscCall(SamplePath(s, mu, path));
-  snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
-  PetscCall(HycoH5Create(path, &h));
-  ierr = HycoH5WriteText(h, "fingerprint", fingerprint);
-  if (!ierr) ierr = HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu);
-  if (!ierr) ierr = HycoH5WriteReal(h, "U", N, 1, fom->u);
-  if (!ierr) ierr = HycoH5WriteReal(h, "lambda", fom->n_contacts, 1, fom->lambda);
-  if (!ierr) ierr = HycoH5WriteReal(h, "sigma", fom->n_cells * fom->fe->n_sigma, 1, fom->sigma);
-  if (!ierr) ierr = HycoH5WriteReal(h, "force", N, 1, force);
-  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
-  PetscCall(ierr);
+  PetscCall(HycoH5CreateShared(HycoComm(fom), path, &h));
+  ierr = WriteFields(s, fom, h, mu, force);
+  failed = HycoH5Close(&h, (PetscBool)!ierr);
+  PetscCall(ierr ? ierr : failed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -236,9 +258,9 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
     SETERRQ(HycoComm(fom), PETSC_ERR_USER, "the snapshot at %s: %s%s%s", at, HycoReasonName(summary.reason),
             summary.free_motion[0] ? "; no support keeps " : "", summary.free_motion);
   }
-  PetscCall(HycoFOMGetSolution(fom, NULL, NULL, NULL, NULL, NULL, NULL));
+  PetscCall(HycoFOMStress(fom));
   PetscCall(HycoFOMGetForces(fom, force));
-  HycoOnRoot(HycoComm(fom), WriteSample(s, fom, mu, force));
+  PetscCall(WriteSample(s, fom, mu, force));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -278,7 +300,7 @@ static PetscErrorCode SolveGroup(HycoSnapshots s, MPI_Comm group, PetscInt color
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
   PetscCall(HycoFOMCreate(group, s->scene, &fom));
-  PetscCall(PetscMalloc1(fom->n_nodes * fom->fe->dim, &force));
+  PetscCall(PetscMalloc1(fom->fe->n_dof, &force));
   PetscCall(PetscCalloc1(groups, &next));
   for (PetscInt k = first; !ierr && k < last; k++) {
     ierr = SolveSample(s, fom, mu + missing[k] * n_par, force);

@@ -9,30 +9,70 @@
 static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
                                                         "Hexahedron"};
 
-static PetscErrorCode WriteNumbers(HycoH5 h, HycoMesh m, const PetscReal X[], HycoScene scene, const PetscReal mu[],
-                                   PetscInt n, const HycoField field[], const HycoContactTable *contact)
+const char *HycoFieldsTopology(HycoCellType type)
+{
+  return topology[type];
+}
+
+/* All of a mesh's nodes or cells. */
+static PetscInt Count(const HycoFileOrder *order, HycoMesh m, HycoPlace place)
+{
+  return order ? order->all[place] : place == HYCO_ON_CELLS ? m->n_cells : m->n_nodes;
+}
+
+PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
+                              MPI_Datatype type, PetscInt components, PetscInt cols, const void *value)
+{
+  const PetscInt all = order ? order->all[place] : n, own = order ? order->n[place] : n,
+                 first = order ? order->first[place] : 0, lines = components / cols;
+  const size_t size = type == MPIU_INT ? sizeof(PetscInt) : sizeof(PetscReal);
+  char *rows = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (order) {
+    PetscCall(PetscCalloc1((size_t)(own * components) * size, &rows));
+    PetscCall(HycoFileOrderSend(order, place, type, components, value, rows));
+    value = rows;
+  }
+  ierr = HycoH5WriteRows(h, name, type, all * lines, cols, first * lines, own * lines, value);
+  PetscCall(PetscFree(rows));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells with their nodes' places in the whole mesh. */
+static PetscErrorCode WriteMesh(HycoH5 h, const HycoFileOrder *order, HycoMesh m, const PetscReal X[])
+{
+  PetscInt *cells = m->cells;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFieldWrite(h, order, m->n_nodes, "mesh/xyz", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
+  if (order) {
+    PetscCall(PetscMalloc1(m->n_cells * m->nv, &cells));
+    for (PetscInt k = 0; k < m->n_cells * m->nv; k++) cells[k] = m->node_whole[m->cells[k]];
+  }
+  PetscCall(HycoFieldWrite(h, order, m->n_cells, "mesh/cells", HYCO_ON_CELLS, MPIU_INT, m->nv, m->nv, cells));
+  if (order) PetscCall(PetscFree(cells));
+  PetscCall(HycoFieldWrite(h, order, m->n_nodes, "mesh/node_id", HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
+  PetscCall(HycoFieldWrite(h, order, m->n_cells, "mesh/cell_id", HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What rank 0 has. */
+static PetscErrorCode WriteHead(HycoH5 h, HycoMesh m, HycoScene scene, const PetscReal mu[],
+                                const HycoContactTable *contact)
 {
   const PetscInt head[2] = {(PetscInt)m->type, m->dim};
 
   PetscFunctionBegin;
   PetscCall(HycoH5WriteText(h, "title", scene->title));
   PetscCall(HycoH5WriteInt(h, "mesh/head", 2, 1, head)); /* cell type (line2, tri3, quad4, tet4, hex8), dimension */
-  PetscCall(HycoH5WriteReal(h, "mesh/xyz", m->n_nodes, 3, X));
-  PetscCall(HycoH5WriteInt(h, "mesh/cells", m->n_cells, m->nv, m->cells));
-  PetscCall(HycoH5WriteInt(h, "mesh/node_id", m->n_nodes, 1, m->node_id));
-  PetscCall(HycoH5WriteInt(h, "mesh/cell_id", m->n_cells, 1, m->cell_id));
   for (PetscInt p = 0; p < scene->n_parameters; p++) {
     char name[HYCO_LINE];
 
     PetscCall(PetscSNPrintf(name, sizeof(name), "mu/%s", scene->parameter[p]));
     PetscCall(HycoH5WriteReal(h, name, 1, 1, &mu[p]));
-  }
-  for (PetscInt k = 0; k < n; k++) {
-    char name[HYCO_LINE];
-
-    PetscCall(PetscSNPrintf(name, sizeof(name), "%s/%s", field[k].on_cells ? "cells" : "nodes", field[k].name));
-    PetscCall(
-        HycoH5WriteReal(h, name, field[k].on_cells ? m->n_cells : m->n_nodes, field[k].components, field[k].data));
   }
   if (contact && contact->n) {
     PetscCall(HycoH5WriteInt(h, "contact/node_id", contact->n, 1, contact->node_id));
@@ -42,8 +82,45 @@ static PetscErrorCode WriteNumbers(HycoH5 h, HycoMesh m, const PetscReal X[], Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A name as XML has it. */
-static void EscapeXML(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
+static const char *FieldFolder(const HycoField *field)
+{
+  return field->place == HYCO_ON_CELLS ? "cells" : "nodes";
+}
+
+static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder *order, HycoMesh m, const PetscReal X[],
+                                   HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
+                                   const HycoContactTable *contact)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(comm, WriteHead(h, m, scene, mu, contact));
+  PetscCall(WriteMesh(h, order, m, X));
+  for (PetscInt k = 0; k < n; k++) {
+    char name[HYCO_LINE];
+
+    PetscCall(PetscSNPrintf(name, sizeof(name), "%s/%s", FieldFolder(&field[k]), field[k].name));
+    PetscCall(HycoFieldWrite(h, order, Count(NULL, m, field[k].place), name, field[k].place, MPIU_REAL,
+                             field[k].components, field[k].components, field[k].data));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The file of numbers. */
+static PetscErrorCode WriteH5(MPI_Comm comm, const char path[], const HycoFileOrder *order, HycoMesh m,
+                              const PetscReal X[], HycoScene scene, const PetscReal mu[], PetscInt n,
+                              const HycoField field[], const HycoContactTable *contact)
+{
+  HycoH5 h;
+  PetscErrorCode ierr, failed;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5CreateShared(comm, path, &h));
+  ierr = WriteNumbers(comm, h, order, m, X, scene, mu, n, field, contact);
+  failed = HycoH5Close(&h, (PetscBool)!ierr);
+  PetscCall(ierr ? ierr : failed);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
 {
   static const char special[] = "&<>\"'";
   static const char *const entity[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&apos;"};
@@ -59,32 +136,34 @@ static void EscapeXML(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
   *out = '\0';
 }
 
-static void WriteXDMF(FILE *out, const char file[], HycoMesh m, PetscInt n, const HycoField field[])
+static void WriteXDMF(FILE *out, const char file[], const HycoFileOrder *order, HycoMesh m, PetscInt n,
+                      const HycoField field[])
 {
+  const long n_nodes = (long)Count(order, m, HYCO_ON_NODES), n_cells = (long)Count(order, m, HYCO_ON_CELLS);
   char h5[6 * PETSC_MAX_PATH_LEN];
 
-  EscapeXML(file, h5);
+  HycoFieldsEscape(file, h5);
   fprintf(out, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n  <Grid Name=\"mesh\">\n");
-  fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", topology[m->type], (long)m->n_cells,
+  fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", topology[m->type], n_cells,
           m->type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
   fprintf(out,
           "    <DataItem Format=\"HDF\" NumberType=\"Int\" Precision=\"%d\" Dimensions=\"%ld "
           "%ld\">%s:/mesh/cells</DataItem>\n   </Topology>\n",
-          (int)sizeof(PetscInt), (long)m->n_cells, (long)m->nv, h5);
+          (int)sizeof(PetscInt), n_cells, (long)m->nv, h5);
   fprintf(out,
           "   <Geometry GeometryType=\"XYZ\">\n    <DataItem Format=\"HDF\" Precision=\"8\" Dimensions=\"%ld "
           "3\">%s:/mesh/xyz</DataItem>\n   </Geometry>\n",
-          (long)m->n_nodes, h5);
+          n_nodes, h5);
   for (PetscInt k = 0; k < n; k++) {
     const char *kind = field[k].components == 1 ? "Scalar" : field[k].components == 3 ? "Vector" : "Tensor6";
 
     fprintf(out, "   <Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"%s\">\n", field[k].name, kind,
-            field[k].on_cells ? "Cell" : "Node");
+            field[k].place == HYCO_ON_CELLS ? "Cell" : "Node");
     fprintf(
         out,
         "    <DataItem Format=\"HDF\" Precision=\"8\" Dimensions=\"%ld %ld\">%s:/%s/%s</DataItem>\n   </Attribute>\n",
-        (long)(field[k].on_cells ? m->n_cells : m->n_nodes), (long)field[k].components, h5,
-        field[k].on_cells ? "cells" : "nodes", field[k].name);
+        field[k].place == HYCO_ON_CELLS ? n_cells : n_nodes, (long)field[k].components, h5, FieldFolder(&field[k]),
+        field[k].name);
   }
   fprintf(out, "  </Grid>\n </Domain>\n</Xdmf>\n");
 }
@@ -121,37 +200,59 @@ PetscErrorCode HycoFieldsCheckPath(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFieldsWrite(const char path[], HycoMesh m, const PetscReal X[], HycoScene scene,
-                               const PetscReal mu[], PetscInt n, const HycoField field[],
-                               const HycoContactTable *contact)
+/* The text, which has its place when the numbers have theirs. On one process. */
+static PetscErrorCode BeginText(const char path[], const char h5[], const HycoFileOrder *order, HycoMesh m, PetscInt n,
+                                const HycoField field[], HycoFile *out)
 {
-  char h5[PETSC_MAX_PATH_LEN];
-  const char *slash;
-  HycoH5 h;
-  HycoFile out;
-  PetscErrorCode ierr, failed;
+  const char *slash = strrchr(h5, '/');
 
   PetscFunctionBegin;
   PetscCall(HycoFieldsCheckPath(path));
-  snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
-  PetscCall(HycoFileCreate(path, HYCO_FILE_TEXT, &out));
-  slash = strrchr(h5, '/');
-  WriteXDMF(HycoFileStream(out), slash ? slash + 1 : h5, m, n, field);
-  ierr = HycoFileFlush(out);
-  if (!ierr) ierr = HycoH5Create(h5, &h);
-  if (!ierr) { /* the numbers first: without them the .xdmf would point at none, or at those of another run */
-    failed = WriteNumbers(h, m, X, scene, mu, n, field, contact);
-    ierr = HycoH5Close(&h, (PetscBool)!failed);
-    if (failed) ierr = failed;
-  }
-  failed = HycoFileClose(&out, (PetscBool)!ierr);
-  if (failed && !ierr) (void)remove(h5);
-  PetscCall(ierr ? ierr : failed);
+  PetscCall(HycoFileCreate(path, HYCO_FILE_TEXT, out));
+  WriteXDMF(HycoFileStream(*out), slash ? slash + 1 : h5, order, m, n, field);
+  PetscCall(HycoFileFlush(*out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stress in ParaView's order xx, xy, xz, yy, yz, zz. */
-static void Tensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[])
+static PetscErrorCode BeginTextOnRoot(MPI_Comm comm, const char path[], const char h5[], const HycoFileOrder *order,
+                                      HycoMesh m, PetscInt n, const HycoField field[], HycoFile *out)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(comm, BeginText(path, h5, order, m, n, field, out));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode EndText(MPI_Comm comm, HycoFile *out)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(comm, HycoFileClose(out, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldsWrite(const char path[], const HycoFileOrder *order, HycoMesh m, const PetscReal X[],
+                               HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
+                               const HycoContactTable *contact)
+{
+  const MPI_Comm comm = order ? order->comm : PETSC_COMM_SELF;
+  char h5[PETSC_MAX_PATH_LEN];
+  HycoFile out = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
+  ierr = BeginTextOnRoot(comm, path, h5, order, m, n, field, &out);
+  /* the numbers first: without them the .xdmf would point at none, or at those of another run */
+  if (!ierr) ierr = WriteH5(comm, h5, order, m, X, scene, mu, n, field, contact);
+  if (!ierr) {
+    ierr = EndText(comm, &out);
+    if (ierr) (void)remove(h5);
+  } else if (out)
+    PetscCall(HycoFileClose(&out, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[])
 {
   static const PetscInt place[6] = {0, 3, 5, 1, 4, 2};
 
@@ -160,58 +261,81 @@ static void Tensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], Pets
   }
 }
 
-PetscErrorCode HycoSolutionWrite(const char path[], HycoFE fe, HycoPairs *pairs, const PetscReal u[],
-                                 const PetscReal lambda[], const PetscReal *rid)
-{
-  HycoMesh m = fe->mesh;
-  PetscReal *u3, *sigma, *tensor, *force, *pressure, *gap, *normal, *area, *gap_node;
-  PetscInt *slave_id, n = 5;
-  HycoContactTable table;
-  PetscErrorCode ierr; /* a place where nothing can be written is the caller's to mend: nothing is kept for it */
+/* The fields of the contacts, by node of their mesh, and their table. */
+typedef struct {
+  PetscReal *force, *pressure, *gap_node, *gap, *normal, *area;
+  PetscInt *slave_id;
+} ContactFields;
 
+/* On the process of the contacts. */
+static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal lambda[],
+                                   ContactFields *f)
+{
   PetscFunctionBegin;
-  PetscCall(PetscCalloc5(3 * m->n_nodes, &u3, m->n_cells * fe->n_sigma, &sigma, 6 * m->n_cells, &tensor, 3 * m->n_nodes,
-                         &force, m->n_nodes, &pressure));
-  PetscCall(
-      PetscCalloc5(pairs->n, &gap, 3 * pairs->n, &normal, pairs->n, &area, pairs->n, &slave_id, m->n_nodes, &gap_node));
-  for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
-  PetscCall(HycoFEStress(fe, u, sigma));
-  Tensor6(m->n_cells, fe->n_sigma, sigma, tensor);
-  PetscCall(HycoContactGeometry(fe, pairs, normal, gap));
-  PetscCall(HycoContactAreas(fe, pairs, area));
+  PetscCall(HycoContactGeometry(fe, pairs, f->normal, f->gap));
+  PetscCall(HycoContactAreas(fe, pairs, f->area));
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscInt s = HycoPairsSlave(pairs, k), *master;
     const PetscReal *weight;
     PetscInt masters;
 
     HycoPairsMasters(pairs, k, &masters, &master, &weight);
-    slave_id[k] = m->node_id[s];
+    f->slave_id[k] = fe->mesh->node_id[s];
     for (PetscInt c = 0; c < fe->dim && !HycoPairsAlone(fe->scene, pairs, k); c++) {
-      force[3 * s + c] -= lambda[k] * normal[3 * k + c];
-      gap[k] -= normal[3 * k + c] * u[s * fe->dim + c];
+      const PetscReal n = f->normal[3 * k + c];
+
+      f->force[3 * s + c] -= lambda[k] * n;
+      f->gap[k] -= n * u[s * fe->dim + c];
       for (PetscInt j = 0; j < masters; j++) {
-        force[3 * master[j] + c] += weight[j] * lambda[k] * normal[3 * k + c];
-        gap[k] += weight[j] * normal[3 * k + c] * u[master[j] * fe->dim + c];
+        f->force[3 * master[j] + c] += weight[j] * lambda[k] * n;
+        f->gap[k] += weight[j] * n * u[master[j] * fe->dim + c];
       }
     }
-    pressure[s] = area[k] > 0 ? lambda[k] / area[k] : 0;
-    gap_node[s] = gap[k];
+    f->pressure[s] = f->area[k] > 0 ? lambda[k] / f->area[k] : 0;
+    f->gap_node[s] = f->gap[k];
   }
-  table.n = pairs->n;
-  table.node_id = slave_id;
-  table.lambda = lambda;
-  table.gap = gap;
-  {
-    const HycoField field[6] = {
-        {"displacement", PETSC_FALSE, 3, u3},     {"stress", PETSC_TRUE, 6, tensor},
-        {"contact_force", PETSC_FALSE, 3, force}, {"contact_pressure", PETSC_FALSE, 1, pressure},
-        {"gap", PETSC_FALSE, 1, gap_node},        {"rid", PETSC_TRUE, 1, rid}};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    if (rid) n = 6;
-    ierr = HycoFieldsWrite(path, m, fe->X, fe->scene, fe->mu, n, field, &table);
+static PetscErrorCode FillContactsOnRoot(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
+                                         const PetscReal lambda[], ContactFields *f)
+{
+  const PetscInt n = surface ? surface->mesh->n_nodes : 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc3(3 * n, &f->force, n, &f->pressure, n, &f->gap_node));
+  PetscCall(PetscCalloc4(pairs->n, &f->gap, 3 * pairs->n, &f->normal, pairs->n, &f->area, pairs->n, &f->slave_id));
+  HycoOnRoot(comm, FillContacts(surface, pairs, u, lambda, f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
+                                 HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],
+                                 const PetscReal lambda[], const PetscReal *rid)
+{
+  HycoMesh m = fe->mesh;
+  PetscReal *u3, *sigma, *tensor;
+  ContactFields f;
+  PetscErrorCode ierr; /* a place where nothing can be written is the caller's to mend: nothing is kept for it */
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc3(3 * m->n_nodes, &u3, m->n_cells * fe->n_sigma, &sigma, 6 * m->n_cells, &tensor));
+  for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
+  PetscCall(HycoFEStress(fe, u, sigma));
+  HycoTensor6(m->n_cells, fe->n_sigma, sigma, tensor);
+  ierr = FillContactsOnRoot(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
+  if (!ierr) {
+    const HycoContactTable table = {pairs->n, f.slave_id, lambda, f.gap};
+    const HycoField field[6] = {
+        {"displacement", HYCO_ON_NODES, 3, u3},         {"stress", HYCO_ON_CELLS, 6, tensor},
+        {"contact_force", HYCO_ON_SURFACE, 3, f.force}, {"contact_pressure", HYCO_ON_SURFACE, 1, f.pressure},
+        {"gap", HYCO_ON_SURFACE, 1, f.gap_node},        {"rid", HYCO_ON_CELLS, 1, rid}};
+
+    ierr = HycoFieldsWrite(path, order, m, fe->X, fe->scene, fe->mu, rid ? 6 : 5, field, &table);
   }
-  PetscCall(PetscFree5(u3, sigma, tensor, force, pressure));
-  PetscCall(PetscFree5(gap, normal, area, slave_id, gap_node));
+  PetscCall(PetscFree3(u3, sigma, tensor));
+  PetscCall(PetscFree3(f.force, f.pressure, f.gap_node));
+  PetscCall(PetscFree4(f.gap, f.normal, f.area, f.slave_id));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

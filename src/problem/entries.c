@@ -9,7 +9,7 @@
 #include <sys/stat.h>
 
 static const char *const sections[] = {"scene_",    "parameter_", "body_",    "fixed_", "pressure_",
-                                       "traction_", "force_",     "contact_", "hyco_"};
+                                       "traction_", "force_",     "contact_", "hyco_",  "history_"};
 
 PetscBool HycoIsSceneKey(const char name[])
 {
@@ -102,7 +102,7 @@ static PetscErrorCode RefuseOthers(PetscOptions options)
   PetscCall(PetscOptionsLeftRestore(options, &n, &names, &values));
   HycoCheck(!name[0],
             "the scene's entry \"%s\" is unknown; an entry stands under scene, parameter, body, fixed, pressure, "
-            "traction, force, contact or hyco, and its name has no blank",
+            "traction, force, contact, history or hyco, and its name has no blank",
             name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -172,45 +172,57 @@ static PetscBool IsText(const char file[])
   return (PetscBool)(byte == EOF);
 }
 
-static PetscErrorCode CheckTwice(const char file[])
+/* The file's text, ended by a byte 0; NULL where it has none. The caller frees it. */
+static PetscErrorCode ReadText(const char file[], char **text)
 {
   FILE *f = fopen(file, "rb");
   long size = f && fseek(f, 0, SEEK_END) == 0 ? ftell(f) : 0;
-  char *text;
-  PetscErrorCode ierr;
+  PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
-  if (size <= 0) {
-    if (f) fclose(f);
-    PetscFunctionReturn(PETSC_SUCCESS);
+  *text = NULL;
+  if (size > 0) {
+    rewind(f);
+    ierr = PetscCalloc1((size_t)size + 1, text);
+    if (!ierr) (*text)[fread(*text, 1, (size_t)size, f)] = '\0';
   }
-  rewind(f);
-  ierr = PetscCalloc1((size_t)size + 1, &text);
-  if (!ierr) text[fread(text, 1, (size_t)size, f)] = '\0';
-  fclose(f);
+  if (f) fclose(f);
   PetscCall(ierr);
-  ierr = HycoEntriesCheckTwice(text, file);
-  PetscCall(PetscFree(text));
-  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* PETSc reads the file itself, but for lists of lists. */
+static PetscErrorCode Insert(PetscOptions options, const char file[], char text[])
+{
+  PetscFunctionBegin;
+  if (text && HycoEntriesFlatten(text))
+    PetscCall(PetscOptionsInsertStringYAML(options, text));
+  else
+    PetscCall(PetscOptionsInsertFileYAML(PETSC_COMM_SELF, options, file, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
 {
-  char message[HYCO_LINE];
-  PetscErrorCode caught;
+  char message[HYCO_LINE], *text, *copy;
+  PetscErrorCode caught, ierr = 0;
 
   PetscFunctionBegin;
   HycoCheck(IsText(file), "%s is not YAML that hyco reads: it has a byte 0, or cannot be read", file);
+  PetscCall(ReadText(file, &text));
+  PetscCall(PetscStrallocpy(text, &copy));
   PetscCall(HycoCatchBegin());
-  caught = PetscOptionsInsertFileYAML(PETSC_COMM_SELF, options, file, PETSC_TRUE);
+  caught = Insert(options, file, text);
   PetscCall(HycoCatchEnd(caught, message));
+  PetscCall(PetscFree(text));
+  if (!caught && copy) ierr = HycoEntriesCheckTwice(copy, file);
+  PetscCall(PetscFree(copy));
   HycoCheck(!caught || !strstr(message, "max number of options"),
             "%s has more entries than the 512 that this PETSc (%d.%d) keeps; put what is alike into one expression, or "
             "take a newer PETSc",
             file, PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR);
   HycoCheck(!caught, "%s is not YAML that hyco reads: %s", file, message);
-  PetscCall(CheckTwice(file));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -9,9 +9,9 @@ struct _n_HycoExpr {
   char *key, *text;
   muParserHandle_t parser; /* NULL when the text is a number */
   double constant;         /* its value then */
-  double x[3], mu[HYCO_MAX_PARAMETERS];
+  double x[3], mu[HYCO_MAX_PARAMETERS], temperature;
   PetscInt n_parameters;
-  PetscBool in_space, in_mu[HYCO_MAX_PARAMETERS];
+  PetscBool in_space, in_heat, in_mu[HYCO_MAX_PARAMETERS];
 };
 
 PetscErrorCode HycoExprDestroy(HycoExpr *expr)
@@ -67,6 +67,8 @@ static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const na
       e->in_space = PETSC_TRUE;
     } else if (address >= e->mu && address < e->mu + n) {
       e->in_mu[address - e->mu] = PETSC_TRUE;
+    } else if (address == &e->temperature) {
+      e->in_heat = PETSC_TRUE;
     } else {
       char list[HYCO_LINE] = "x, y, z", text[SHORT];
 
@@ -93,7 +95,8 @@ static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
   mupSetErrorHandler(e->parser, Quiet);
   mupDefineConst(e->parser, "pi", PETSC_PI); /* muParser's own _pi has 12 digits */
   for (int c = 0; c < 3; c++) mupDefineVar(e->parser, axis[c], &e->x[c]);
-  for (PetscInt p = 0; p < n; p++) mupDefineVar(e->parser, names[p], &e->mu[p]);
+  mupDefineVar(e->parser, "temperature", &e->temperature);
+  for (PetscInt p = 0; p < n; p++) mupDefineVar(e->parser, names[p], &e->mu[p]); /* one may be named temperature */
   if (mupError(e->parser)) PetscCall(Raise(e));
   mupSetExpr(e->parser, e->text);
   if (mupError(e->parser)) PetscCall(Raise(e));
@@ -139,12 +142,21 @@ PetscErrorCode HycoExprPlace(HycoExpr e, const PetscReal mu[], const PetscReal x
 PetscErrorCode HycoExprEval(HycoExpr e, const PetscReal mu[], PetscInt n, const PetscReal xyz[], PetscReal value[])
 {
   PetscFunctionBegin;
+  PetscCall(HycoExprEvalHot(e, mu, n, xyz, NULL, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExprEvalHot(HycoExpr e, const PetscReal mu[], PetscInt n, const PetscReal xyz[],
+                               const PetscReal temperature[], PetscReal value[])
+{
+  PetscFunctionBegin;
   if (!e->parser) {
     for (PetscInt k = 0; k < n; k++) value[k] = e->constant;
   } else {
     for (PetscInt p = 0; p < e->n_parameters; p++) e->mu[p] = mu[p];
     for (PetscInt k = 0; k < n; k++) {
-      if (e->in_space || k == 0) {
+      if (e->in_space || e->in_heat || k == 0) {
+        if (temperature) e->temperature = temperature[k];
         for (int c = 0; c < 3; c++) e->x[c] = xyz[3 * k + c];
         value[k] = mupEval(e->parser);
       } else {
@@ -168,6 +180,22 @@ PetscErrorCode HycoExprEval(HycoExpr e, const PetscReal mu[], PetscInt n, const 
 PetscBool HycoExprInSpace(HycoExpr e)
 {
   return (PetscBool)(e && e->in_space);
+}
+
+PetscBool HycoExprInHeat(HycoExpr e)
+{
+  return (PetscBool)(e && e->in_heat);
+}
+
+PetscErrorCode HycoExprRefuseHeat(HycoExpr e)
+{
+  char text[SHORT];
+
+  PetscFunctionBegin;
+  Shorten(e->text, text);
+  HycoCheck(!e->in_heat, "%s: \"%s\" names temperature, which only a law's constants and the expansion may", e->key,
+            text);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscBool HycoExprChanges(HycoExpr e, const PetscBool changed[])

@@ -8,7 +8,8 @@
 #include <string.h>
 
 /* Fields of a section's members; a member's name is what stands between the section and the field. */
-static const char *const body_fields[] = {"element", "map_x", "map_y", "map_z", "law", NULL};
+static const char *const body_fields[] = {
+    "element", "map_x", "map_y", "map_z", "law", "temperature", "reference_temperature", "expansion", "law_type", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const contact_fields[] = {"type", NULL};
 static const char *const scene_fields[] = {"title", "mesh", "parameters", "refine", NULL};
@@ -46,8 +47,9 @@ static PetscErrorCode UnknownKey(const char key[], const char what[], const Hyco
   for (PetscInt j = 0; declared && j < declared->n; j++) fields[n++] = declared->entry[j].name;
   for (PetscInt j = 0; others[j]; j++) fields[n++] = others[j];
   for (PetscInt j = 0; j < n; j++) {
-    if (j) PetscCall(PetscStrlcat(list, ", ", sizeof(list)));
-    PetscCall(PetscStrlcat(list, fields[j], sizeof(list)));
+    const size_t used = strlen(list);
+
+    PetscCall(PetscSNPrintf(list + used, sizeof(list) - used, "%s%s", j ? ", " : "", fields[j]));
   }
   if (last) near = HycoNearest(last + 1, n, fields);
   if (near) HycoFail("the scene's entry %s is unknown; %s has: %s; did you mean %s?", key, what, list, near);
@@ -86,7 +88,16 @@ static PetscErrorCode NewExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
 {
   PetscFunctionBegin;
   PetscCall(HycoExprDestroy(expr)); /* the same entry in another letter case */
-  PetscCall(HycoExprCreate(s->key[entry], s->value[entry], s->n_parameters, (const char *const *)s->parameter, expr));
+  PetscCall(HycoExprCreate(s->key[entry], s->value[entry], s->n_variables, (const char *const *)s->parameter, expr));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An expression outside the materials. */
+static PetscErrorCode NewColdExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
+{
+  PetscFunctionBegin;
+  PetscCall(NewExpr(s, entry, expr));
+  PetscCall(HycoExprRefuseHeat(*expr));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -122,8 +133,13 @@ static PetscErrorCode ReadRange(HycoScene s, PetscInt p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscBool IsIdentifier(const char *word)
+PetscBool HycoIsVariableName(const char word[])
 {
+  static const char *const taken[] = {"x", "y", "z", "pi"};
+
+  for (size_t k = 0; k < sizeof(taken) / sizeof(taken[0]); k++) {
+    if (strcmp(word, taken[k]) == 0) return PETSC_FALSE;
+  }
   if (!isalpha((unsigned char)word[0])) return PETSC_FALSE;
   for (; *word; word++) {
     if (!isalnum((unsigned char)*word) && *word != '_') return PETSC_FALSE;
@@ -143,11 +159,11 @@ static PetscErrorCode ReadParameters(HycoScene s)
   HycoCheck(commas < HYCO_MAX_PARAMETERS, "scene_parameters lists %d parameters; a scene has at most %d",
             (int)commas + 1, HYCO_MAX_PARAMETERS);
   PetscCall(PetscOptionsGetStringArray(s->options, NULL, "-scene_parameters", s->parameter, &n, &set));
-  s->n_parameters = set ? n : 0;
+  s->n_parameters = s->n_variables = set ? n : 0;
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     const char *name = s->parameter[p];
 
-    HycoCheck(IsIdentifier(name) && strcmp(name, "x") && strcmp(name, "y") && strcmp(name, "z") && strcmp(name, "pi"),
+    HycoCheck(HycoIsVariableName(name),
               "scene_parameters: \"%s\" cannot name a parameter; use letters, digits and _, and none of x, y, z, pi",
               name);
     for (PetscInt q = 0; q < p; q++)
@@ -162,6 +178,7 @@ static PetscErrorCode ReadElement(HycoScene s, PetscInt entry, HycoBody *body)
   const char *value = s->value[entry];
 
   PetscFunctionBegin;
+  body->element = PETSC_TRUE;
   body->bbar = (PetscBool)(strcmp(value, "bbar") == 0);
   HycoCheck(body->bbar || strcmp(value, "standard") == 0, "%s is \"%s\"; it must be standard or bbar", s->key[entry],
             value);
@@ -171,6 +188,7 @@ static PetscErrorCode ReadElement(HycoScene s, PetscInt entry, HycoBody *body)
 /* A section whose members have a type that declares entries: bodies with their laws, contacts. */
 typedef struct {
   const char *what, *const *others; /* for messages; entries beside the declared ones */
+  const char *nested;               /* what may stand before the declared ones; or NULL */
   PetscErrorCode (*create)(HycoScene, const char name[], PetscObject *object, HycoDeclared **declared,
                            PetscBool *given);
 } Section;
@@ -187,6 +205,27 @@ static PetscErrorCode GetType(HycoScene s, const char section[], const char name
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The law's texts, "-body_NAME_law_library" or "-body_NAME_library", which say what else it declares. */
+static PetscErrorCode ReadTexts(HycoScene s, const char name[], HycoMaterial law)
+{
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < law->constants.n; j++) {
+    HycoEntry *e = &law->constants.entry[j];
+    char field[HYCO_LINE];
+    const char *text = NULL;
+    PetscBool set;
+
+    if (e->kind != HYCO_ENTRY_GROUP) continue;
+    HycoFormat(field, "law_%s", e->name);
+    PetscCall(GetType(s, "body", name, field, &text, &set));
+    if (!set) PetscCall(GetType(s, "body", name, e->name, &text, &set));
+    if (set && text) PetscCall(PetscStrallocpy(text, &e->text));
+  }
+  law->folder = s->folder;
+  if (law->ops->declare) PetscCall((*law->ops->declare)(law));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The law that the scene gives to the body `name`. The caller owns it. */
 static PetscErrorCode CreateLaw(HycoScene s, const char name[], PetscObject *object, HycoDeclared **declared,
                                 PetscBool *given)
@@ -196,10 +235,12 @@ static PetscErrorCode CreateLaw(HycoScene s, const char name[], PetscObject *obj
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(GetType(s, "body", name, "law", &type, given));
+  PetscCall(GetType(s, "body", name, "law_type", &type, given));
+  if (!*given) PetscCall(GetType(s, "body", name, "law", &type, given));
   PetscCall(HycoMaterialCreate(PETSC_COMM_SELF, &law));
   PetscCall(PetscObjectSetName((PetscObject)law, name));
   ierr = HycoMaterialSetType(law, *given ? type : HYCO_MATERIAL_ELASTIC);
+  if (!ierr) ierr = ReadTexts(s, name, law);
   if (ierr) PetscCall(HycoMaterialDestroy(&law));
   PetscCall(ierr);
   *declared = &law->constants;
@@ -227,8 +268,8 @@ static PetscErrorCode CreateContact(HycoScene s, const char name[], PetscObject 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static const Section contacts = {"a contact of type", contact_fields, CreateContact};
-static const Section bodies = {"a body of law", body_fields, CreateLaw};
+static const Section contacts = {"a contact of type", contact_fields, NULL, CreateContact};
+static const Section bodies = {"a body of law", body_fields, "law_", CreateLaw};
 
 /* "a_b_young" is b_young of a if the type of a declares it, else young of a_b: name and field; NULL where neither.
    likely: the member that was meant, with its type, for the message; the caller destroys it. */
@@ -247,6 +288,9 @@ static PetscErrorCode SplitDeclared(HycoScene s, const Section *section, const c
     name[bar - rest] = '\0';
     PetscCall((*section->create)(s, name, &object, &of_object, &given));
     if (HycoDeclaredFind(of_object, bar + 1)) *field = bar + 1;
+    if (section->nested && strncasecmp(bar + 1, section->nested, strlen(section->nested)) == 0 &&
+        HycoDeclaredFind(of_object, bar + 1 + strlen(section->nested)))
+      *field = bar + 1 + strlen(section->nested);
     if (given || !*likely) {
       PetscCall(PetscObjectDestroy(likely));
       *likely = object;
@@ -307,7 +351,10 @@ static PetscErrorCode ReadBody(HycoScene s, PetscInt entry, const char rest[])
   }
   PetscCall(FindBody(s, name, &body)); /* which reads `law` */
   if (field == 0) PetscCall(ReadElement(s, entry, body));
-  if (field > 0 && field < 4) PetscCall(NewExpr(s, entry, &body->map[field - 1]));
+  if (field > 0 && field < 4) PetscCall(NewColdExpr(s, entry, &body->map[field - 1]));
+  if (field == 5) PetscCall(NewColdExpr(s, entry, &body->temperature));
+  if (field == 6) PetscCall(NewColdExpr(s, entry, &body->reference));
+  if (field == 7) PetscCall(NewExpr(s, entry, &body->expansion));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -360,20 +407,20 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
     if (!SplitKey(rest, component_fields, name, &field))
       PetscCall(UnknownKey(key, "a body force", NULL, component_fields));
     PetscCall(FindBody(s, name, &body));
-    PetscCall(NewExpr(s, entry, &body->force[field]));
+    PetscCall(NewColdExpr(s, entry, &body->force[field]));
   } else if (strncasecmp(key, "fixed_", 6) == 0) {
     if (!SplitKey(rest, component_fields, name, &field))
       PetscCall(UnknownKey(key, "a fixed group", NULL, component_fields));
     PetscCall(Member(name, sizeof(HycoFixed), &s->n_fixed, (void **)&s->fixed, &k));
-    PetscCall(NewExpr(s, entry, &s->fixed[k].value[field]));
+    PetscCall(NewColdExpr(s, entry, &s->fixed[k].value[field]));
   } else if (strncasecmp(key, "pressure_", 9) == 0) {
     PetscCall(Member(rest, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
-    PetscCall(NewExpr(s, entry, &s->load[k].pressure));
+    PetscCall(NewColdExpr(s, entry, &s->load[k].pressure));
   } else if (strncasecmp(key, "traction_", 9) == 0) {
     if (!SplitKey(rest, component_fields, name, &field))
       PetscCall(UnknownKey(key, "a traction", NULL, component_fields));
     PetscCall(Member(name, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
-    PetscCall(NewExpr(s, entry, &s->load[k].traction[field]));
+    PetscCall(NewColdExpr(s, entry, &s->load[k].traction[field]));
   } else {
     PetscCall(ReadContact(s, entry, rest));
   }
@@ -407,6 +454,34 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CheckHistoryEntry(const char key[])
+{
+  static const char *const fields[] = {"times", "tables_NAME", NULL};
+
+  PetscFunctionBegin;
+  if (strcasecmp(key + 8, "times") && strncasecmp(key + 8, "tables_", 7))
+    PetscCall(UnknownKey(key, "history", NULL, fields));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Entries of heat that need one another; the law learns where its temperatures come from. */
+static PetscErrorCode CheckHeat(HycoBody *body)
+{
+  PetscBool reads = body->law->heat;
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < body->law->constants.n; j++)
+    reads = (PetscBool)(reads || HycoExprInHeat(body->law->constants.entry[j].expr));
+  HycoCheck(!body->expansion || (body->temperature && body->reference),
+            "body %s has an expansion; it needs its temperature and its reference_temperature too", body->name);
+  HycoCheck(body->expansion || !body->reference,
+            "body %s has a reference_temperature, but no expansion; give expansion: (1/K)", body->name);
+  HycoCheck(!reads || body->temperature, "body %s has no temperature; its law %s needs one (K)", body->name,
+            ((PetscObject)body->law)->type_name);
+  body->law->temperature = body->temperature;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A description that cannot be solved is refused here, before any mesh is read. */
 static PetscErrorCode CheckScene(HycoScene s)
 {
@@ -416,10 +491,12 @@ static PetscErrorCode CheckScene(HycoScene s)
     const HycoDeclared *d = &s->body[k].law->constants;
 
     for (PetscInt j = 0; j < d->n; j++)
-      HycoCheck(!d->entry[j].required || d->entry[j].expr, "body %s has no %s (%s)", s->body[k].name, d->entry[j].name,
-                d->entry[j].title);
+      HycoCheck(!d->entry[j].required || d->entry[j].expr || d->entry[j].text, "body %s has no %s (%s)",
+                s->body[k].name, d->entry[j].name, d->entry[j].title);
+    PetscCall(CheckHeat(&s->body[k]));
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactComplete(s->contact[k]));
+  PetscCall(HycoSceneCheckHistory(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -470,17 +547,21 @@ static PetscErrorCode FindMesh(HycoScene s, const char folder[])
 static PetscErrorCode Build(HycoScene s, const char folder[])
 {
   PetscFunctionBegin;
+  PetscCall(PetscStrallocpy(folder, &s->folder));
   PetscCall(HycoEntriesList(s));
   PetscCall(GetString(s, "scene_title", &s->title));
   PetscCall(FindMesh(s, folder));
   PetscCall(ReadRefine(s));
   PetscCall(ReadParameters(s));
+  PetscCall(HycoSceneReadHistory(s));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     const char *key = s->key[k];
 
     if (strncasecmp(key, "scene_", 6) == 0 || strncasecmp(key, "parameter_", 10) == 0 ||
         strncasecmp(key, "hyco_", 5) == 0)
       PetscCall(CheckPlainEntry(s, k));
+    else if (strncasecmp(key, "history_", 8) == 0)
+      PetscCall(CheckHistoryEntry(key));
     else
       PetscCall(ReadMember(s, k));
   }
@@ -620,6 +701,9 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
       PetscCall(HycoExprDestroy(&s->body[k].map[c]));
       PetscCall(HycoExprDestroy(&s->body[k].force[c]));
     }
+    PetscCall(HycoExprDestroy(&s->body[k].temperature));
+    PetscCall(HycoExprDestroy(&s->body[k].reference));
+    PetscCall(HycoExprDestroy(&s->body[k].expansion));
     PetscCall(PetscFree(s->body[k].name));
   }
   for (PetscInt k = 0; k < s->n_fixed; k++) {
@@ -636,7 +720,8 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
     PetscCall(PetscFree(s->key[k]));
     PetscCall(PetscFree(s->value[k]));
   }
-  for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(PetscFree(s->parameter[p]));
+  for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PetscFree(s->parameter[p]));
+  PetscCall(HycoSceneDestroyHistory(s));
   PetscCall(PetscFree(s->key));
   PetscCall(PetscFree(s->value));
   PetscCall(PetscFree(s->body));
@@ -645,6 +730,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   PetscCall(PetscFree(s->contact));
   PetscCall(PetscFree(s->title));
   PetscCall(PetscFree(s->mesh_path));
+  PetscCall(PetscFree(s->folder));
   PetscCall(DMDestroy(&s->dm));
   PetscCall(PetscOptionsDestroy(&s->options));
   PetscCall(PetscHeaderDestroy(&s));

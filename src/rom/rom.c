@@ -161,6 +161,7 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(HycoSceneRefuseHistory(scene, "a reduced model"));
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
   HycoCheck(
@@ -354,7 +355,7 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
   PetscCall(HycoROMGetWholeU(m, NULL, &U));
   PetscCall(PetscCalloc1(m->whole->n_cells, &rid));
   for (PetscInt e = 0; e < m->mesh->n_cells; e++) rid[m->mesh->cell_whole[e]] = 1;
-  ierr = HycoSolutionWrite(path, m->fe_whole, &m->whole_pairs, U, m->Lambda, rid);
+  ierr = HycoSolutionWrite(path, NULL, m->fe_whole, U, m->fe_whole, &m->whole_pairs, U, m->Lambda, rid);
   PetscCall(PetscFree(rid));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

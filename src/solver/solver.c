@@ -471,6 +471,8 @@ const char *HycoReasonName(HycoReason reason)
   case HYCO_DIVERGED_NO_CONTACT_BASIS:
     return "not converged: the model has no contact force to give, and bodies penetrate here; train on solutions that "
            "press";
+  case HYCO_DIVERGED_STEP:
+    return "not converged: the history goes no further, its steps have become too small";
   case HYCO_DIVERGED_ITERATIONS:
     return "not converged: the limit of iterations, or a cycle";
   default:

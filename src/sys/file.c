@@ -65,6 +65,13 @@ void HycoFileOwner(const char name[], char owner[HYCO_FILE_NAME])
   snprintf(owner, HYCO_FILE_NAME, "%.*s", (int)(tag ? (size_t)(tag - name) : strlen(name)), name);
 }
 
+static void Temporary(const char place[], const char kind[], char name[HYCO_FILE_NAME])
+{
+  static unsigned number;
+
+  snprintf(name, HYCO_FILE_NAME, "%s.hyco-%08x-%ld-%u.%s", place, Node(), (long)getpid(), number++, kind);
+}
+
 /* Whether the file of that name was left by a process that is dead. */
 static PetscBool IsLeft(const char path[], unsigned node, long pid)
 {
@@ -102,6 +109,36 @@ PetscErrorCode HycoFileSweep(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind[], char scratch[HYCO_FILE_NAME])
+{
+  char place[PETSC_MAX_PATH_LEN];
+  PetscMPIInt rank;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (rank == 0) {
+    HycoFileFollow(path, place);
+    Temporary(place, kind, scratch);
+  }
+  PetscCallMPI(MPI_Bcast(scratch, HYCO_FILE_NAME, MPI_CHAR, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileKeep(const char scratch[], const char path[])
+{
+  char place[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  HycoFileFollow(path, place);
+  if (rename(scratch, place) != 0) {
+    const int failed = errno;
+
+    (void)unlink(scratch);
+    HycoFail("%s could not be written (%s)", path, strerror(failed));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFileKind kind, PetscBool *direct)
 {
   const char *dash = option[0] ? "-" : "", *blank = option[0] ? " " : "";
@@ -122,19 +159,32 @@ PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CheckOpen(const char path[], PetscBool good)
+{
+  PetscFunctionBegin;
+  HycoCheck(good, "%s cannot be written (%s): is there such a folder, may you write there, is there room?", path,
+            strerror(errno));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileOpenScratch(const char scratch[], const char path[], int *fd)
+{
+  PetscFunctionBegin;
+  *fd = open(scratch, O_WRONLY | O_CREAT | O_EXCL, 0666);
+  PetscCall(CheckOpen(path, (PetscBool)(*fd >= 0)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode OpenPlace(HycoFile f)
 {
-  static unsigned number;
   int fd;
 
   PetscFunctionBegin;
   PetscCall(HycoFileCheckPlace("", f->path, f->kind, &f->direct));
-  snprintf(f->temporary, sizeof(f->temporary), "%s.hyco-%08x-%ld-%u.partial", f->place, Node(), (long)getpid(),
-           number++);
+  if (!f->direct) Temporary(f->place, "partial", f->temporary);
   fd = f->direct ? open(f->path, O_WRONLY | O_APPEND) : open(f->temporary, O_WRONLY | O_CREAT | O_EXCL, 0666);
   f->stream = fd >= 0 ? fdopen(fd, "w") : NULL;
-  HycoCheck(f->stream, "%s cannot be written (%s): is there such a folder, may you write there, is there room?",
-            f->path, strerror(errno));
+  PetscCall(CheckOpen(f->path, (PetscBool)(f->stream != NULL)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,7 +222,22 @@ static int Flush(HycoFile f)
   return 0;
 }
 
-static PetscErrorCode Complain(const char shown[], int failed)
+PetscErrorCode HycoFilePut(int fd, const char path[], const void *data, size_t bytes, size_t place)
+{
+  PetscFunctionBegin;
+  while (bytes) {
+    const ssize_t n = pwrite(fd, data, bytes, (off_t)place);
+
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) PetscCall(HycoFileComplain(path, n < 0 ? errno : EIO));
+    data = (const char *)data + n;
+    bytes -= (size_t)n;
+    place += (size_t)n;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileComplain(const char shown[], int failed)
 {
   PetscFunctionBegin;
   HycoCheck(!failed, "%s could not be written to its end (%s): is the disk full?", shown, strerror(failed));
@@ -182,7 +247,7 @@ static PetscErrorCode Complain(const char shown[], int failed)
 PetscErrorCode HycoFileFlush(HycoFile file)
 {
   PetscFunctionBegin;
-  PetscCall(Complain(file->shown, Flush(file)));
+  PetscCall(HycoFileComplain(file->shown, Flush(file)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,6 +268,6 @@ PetscErrorCode HycoFileClose(HycoFile *file, PetscBool commit)
   }
   snprintf(shown, sizeof(shown), "%s", f->shown);
   PetscCall(PetscFree(f));
-  PetscCall(Complain(shown, failed));
+  PetscCall(HycoFileComplain(shown, failed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

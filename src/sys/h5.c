@@ -1,11 +1,16 @@
 /*
-  HDF5 on one process. What is written is made in memory and goes to the disk in one piece, sealed: HDF5 itself, when a
-  disk is full, can neither finish a file nor close it.
+  HDF5. What one process writes is made in memory and goes to the disk in one piece, sealed: HDF5 itself, when a disk is
+  full, can neither finish a file nor close it. What several write, each its rows, is laid out on the disk by rank 0's
+  HDF5, set by set, where there is room for it; the numbers go to their places past HDF5, whose parallel part cannot say
+  that a disk is full.
 */
 #include <hycofile.h>
 #include <hycoh5.h>
+#include <errno.h>
+#include <fcntl.h>
 #include <hdf5.h>
 #include <string.h>
+#include <unistd.h>
 
 struct _n_HycoH5 {
   hid_t id, access; /* the file; how datasets are opened */
@@ -13,7 +18,15 @@ struct _n_HycoH5 {
   size_t size;      /* of the file that is read */
   PetscBool reads;
   char path[PETSC_MAX_PATH_LEN];
+  /* of a file that several processes write */
+  PetscBool shared;
+  MPI_Comm comm; /* the caller's */
+  int fd;        /* of the file on the disk, until it is in its place */
+  char scratch[HYCO_FILE_NAME];
 };
+
+/* What the description of a set takes at most, and the first of a file. */
+#define ROOM 4096
 
 /* A dataset that says that the file ends with a seal: one that has lost it is damaged, not old. */
 #define HYCO_H5_SEALED "sealed"
@@ -49,16 +62,23 @@ static PetscErrorCode Free(HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How the bytes of a file in memory are held; they go nowhere by themselves. */
-static hid_t InMemory(void)
+static hid_t Access(void)
 {
   hid_t access = H5Pcreate(H5P_FILE_ACCESS);
 
-  H5Pset_fapl_core(access, (size_t)1 << 18, 0);
   /* one format whatever the library: HDF5 2's own default puts the time into each group, and no two files would be
      alike */
   H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_LATEST);
   H5Pset_fclose_degree(access, H5F_CLOSE_STRONG); /* closing the file closes what a refusal left open in it */
+  return access;
+}
+
+/* How the bytes of a file in memory are held; they go nowhere by themselves. */
+static hid_t InMemory(void)
+{
+  hid_t access = Access();
+
+  H5Pset_fapl_core(access, (size_t)1 << 18, 0);
   return access;
 }
 
@@ -87,6 +107,81 @@ PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
   PetscCall(HycoFileCreate(path, HYCO_FILE_NUMBERS, &out));
   PetscCall(HycoH5CreateImage(path, file));
   (*file)->out = out;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the disk takes the description of one more set, and the file may become as long as `bytes` of numbers make
+   it. Rank 0. */
+static PetscErrorCode MakeRoom(HycoH5 f, size_t bytes)
+{
+  static const char zeros[ROOM];
+  const off_t end = lseek(f->fd, 0, SEEK_END);
+
+  PetscFunctionBegin;
+  PetscCall(HycoFilePut(f->fd, f->path, zeros, ROOM, (size_t)end));
+  if (ftruncate(f->fd, end + (off_t)bytes + ROOM) != 0) PetscCall(HycoFileComplain(f->path, errno));
+  (void)!ftruncate(f->fd, end);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On rank 0. */
+static PetscErrorCode BeginShared(HycoH5 f)
+{
+  const PetscInt yes = 1;
+  PetscBool direct;
+  hid_t access;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFileCheckPlace("", f->path, HYCO_FILE_NUMBERS, &direct));
+  PetscCall(HycoFileOpenScratch(f->scratch, f->path, &f->fd));
+  PetscCall(MakeRoom(f, 0));
+  access = Access();
+  f->id = H5Fcreate(f->scratch, H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  H5Pclose(access);
+  PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 does not make the file %s", f->scratch);
+  PetscCall(HycoH5WriteInt(f, HYCO_H5_SEALED, 1, 1, &yes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On the others. */
+static PetscErrorCode JoinShared(HycoH5 f)
+{
+  PetscFunctionBegin;
+  if (f->fd < 0) f->fd = open(f->scratch, O_WRONLY);
+  HycoCheck(f->fd >= 0, "%s cannot be written (%s): do all ranks see that folder?", f->path, strerror(errno));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode OpenShared(HycoH5 f)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(f->comm, BeginShared(f));
+  HycoOnEach(f->comm, JoinShared(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file)
+{
+  PetscErrorCode ierr;
+  PetscMPIInt size;
+  HycoH5 f;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  if (size == 1) {
+    PetscCall(HycoH5Create(path, file));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(New(path, &f));
+  f->shared = PETSC_TRUE;
+  f->comm = comm;
+  f->fd = -1;
+  f->id = H5I_INVALID_HID;
+  PetscCall(HycoFileScratch(comm, path, "partial", f->scratch));
+  ierr = OpenShared(f);
+  if (ierr) PetscCall(HycoH5Close(&f, PETSC_FALSE));
+  PetscCall(ierr);
+  *file = f;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -198,6 +293,71 @@ static PetscErrorCode WriteImage(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every rank's numbers are on the disk. */
+static PetscErrorCode Sync(HycoH5 f)
+{
+  int failed = 0;
+
+  PetscFunctionBegin;
+  if (fsync(f->fd) != 0) failed = errno;
+  if (close(f->fd) != 0 && !failed) failed = errno;
+  f->fd = -1;
+  PetscCall(HycoFileComplain(f->path, failed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Seals the file and puts it in its place. On rank 0. */
+static PetscErrorCode Place(HycoH5 f)
+{
+  unsigned char seal[HYCO_SEAL];
+  size_t bytes;
+  FILE *end;
+  int failed = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSealFile(f->scratch, &bytes, seal));
+  end = fopen(f->scratch, "ab");
+  if (!end || fwrite(seal, 1, HYCO_SEAL, end) != HYCO_SEAL || fflush(end) != 0 || fsync(fileno(end)) != 0)
+    failed = errno ? errno : EIO;
+  if (end && fclose(end) != 0 && !failed) failed = errno;
+  PetscCall(HycoFileComplain(f->path, failed));
+  PetscCall(HycoFileKeep(f->scratch, f->path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rank 0's HDF5 has laid out all. */
+static PetscErrorCode EndLayout(HycoH5 f)
+{
+  const hid_t id = f->id;
+
+  PetscFunctionBegin;
+  f->id = H5I_INVALID_HID;
+  if (H5Fclose(id) < 0) PetscCall(HycoFileComplain(f->path, EIO));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Commit(HycoH5 f)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(f->comm, EndLayout(f));
+  HycoOnEach(f->comm, Sync(f));
+  HycoOnRoot(f->comm, Place(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CloseShared(HycoH5 f, PetscBool commit)
+{
+  PetscErrorCode ierr = commit ? Commit(f) : PETSC_SUCCESS;
+
+  PetscFunctionBegin;
+  if (f->id >= 0) H5Fclose(f->id);
+  if (f->fd >= 0) close(f->fd);
+  if (ierr || !commit) (void)unlink(f->scratch);
+  PetscCall(Free(&f));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
 {
   HycoH5 f = *file;
@@ -207,6 +367,10 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
   *file = NULL;
+  if (f->shared) {
+    PetscCall(CloseShared(f, commit));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   out = f->out;
   ierr = out && commit ? WriteImage(f) : PETSC_SUCCESS;
   H5Fclose(f->id);
@@ -217,39 +381,95 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, const void *data)
+/* A new set of rows x cols numbers. Of a shared file, its place on the disk. */
+static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, hid_t *set,
+                                long long *place)
 {
   hsize_t dims[2] = {(hsize_t)rows, (hsize_t)cols};
-  hid_t space, links, made, set;
-  herr_t failed = 0;
+  hid_t space, links, made;
 
   PetscFunctionBegin;
+  if (f->shared) PetscCall(MakeRoom(f, (size_t)rows * (size_t)cols * H5Tget_size(type)));
   space = H5Screate_simple(2, dims, NULL);
   links = H5Pcreate(H5P_LINK_CREATE);
   H5Pset_create_intermediate_group(links, 1);
   made = H5Pcreate(H5P_DATASET_CREATE);
   H5Pset_obj_track_times(made, 0); /* the same model is the same file, byte for byte */
-  set = H5Dcreate2(f->id, name, type, space, links, made, H5P_DEFAULT);
-  if (set < 0 || (rows && cols && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)) failed = -1;
-  if (set >= 0) H5Dclose(set);
+  if (f->shared) H5Pset_alloc_time(made, H5D_ALLOC_TIME_EARLY);
+  if (f->shared) H5Pset_fill_time(made, H5D_FILL_TIME_NEVER);
+  *set = H5Dcreate2(f->id, name, type, space, links, made, H5P_DEFAULT);
   H5Pclose(made);
   H5Pclose(links);
   H5Sclose(space);
+  HycoCheck(*set >= 0, "%s: writing %s failed: is there memory?", f->path, name);
+  *place = f->shared && rows && cols ? (long long)H5Dget_offset(*set) : 0;
+  HycoCheck(!f->shared || H5Fflush(f->id, H5F_SCOPE_GLOBAL) >= 0, "%s: writing %s failed: is the disk full?", f->path,
+            name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, const void *data)
+{
+  long long place;
+  herr_t failed = 0;
+  hid_t set;
+
+  PetscFunctionBegin;
+  PetscCall(CreateSet(f, name, type, rows, cols, &set, &place));
+  if (!f->shared && rows && cols) failed = H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
+  H5Dclose(set);
   HycoCheck(failed >= 0, "%s: writing %s failed: is there memory?", f->path, name);
+  if (f->shared)
+    PetscCall(HycoFilePut(f->fd, f->path, data, (size_t)rows * (size_t)cols * H5Tget_size(type), (size_t)place));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The type of PetscReal (MPIU_REAL) or PetscInt (MPIU_INT) numbers. */
+static hid_t NumberType(MPI_Datatype type)
+{
+  return type == MPIU_REAL ? H5T_NATIVE_DOUBLE : sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32;
+}
+
+/* On rank 0. */
+static PetscErrorCode LayOut(HycoH5 f, const char name[], MPI_Datatype type, PetscInt rows, PetscInt cols,
+                             long long *place)
+{
+  hid_t set;
+
+  PetscFunctionBegin;
+  PetscCall(CreateSet(f, name, NumberType(type), rows, cols, &set, place));
+  H5Dclose(set);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5WriteRows(HycoH5 f, const char name[], MPI_Datatype type, PetscInt rows, PetscInt cols,
+                               PetscInt first, PetscInt n, const void *data)
+{
+  const size_t width = (size_t)cols * H5Tget_size(NumberType(type));
+  long long place = 0;
+
+  PetscFunctionBegin;
+  if (!f->shared) {
+    PetscCall(Write(f, name, NumberType(type), rows, cols, data));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  HycoOnRoot(f->comm, LayOut(f, name, type, rows, cols, &place));
+  PetscCallMPI(MPI_Bcast(&place, 1, MPI_LONG_LONG, 0, f->comm));
+  HycoOnEach(f->comm, HycoFilePut(f->fd, f->path, data, (size_t)n * width, (size_t)place + (size_t)first * width));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscReal *data)
 {
   PetscFunctionBegin;
-  PetscCall(Write(file, name, H5T_NATIVE_DOUBLE, rows, cols, data));
+  PetscCall(Write(file, name, NumberType(MPIU_REAL), rows, cols, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscInt *data)
 {
   PetscFunctionBegin;
-  PetscCall(Write(file, name, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32, rows, cols, data));
+  PetscCall(Write(file, name, NumberType(MPIU_INT), rows, cols, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -391,7 +611,7 @@ PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscI
   *rows = (PetscInt)dims[0];
   *cols = (PetscInt)dims[1];
   PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
-  ierr = ReadSet(file, name, set, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, *data);
+  ierr = ReadSet(file, name, set, NumberType(MPIU_INT), H5S_ALL, H5S_ALL, *data);
   if (ierr) PetscCall(PetscFree(*data));
   PetscCall(ierr);
   for (size_t k = 0; k < dims[0] * dims[1]; k++) {

@@ -49,31 +49,60 @@ static PetscBool ReadSeal(FILE *file, long long size, unsigned char seal[HYCO_SE
                      fread(seal, 1, HYCO_SEAL, file) == HYCO_SEAL && memcmp(seal, magic, 8) == 0);
 }
 
-PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed)
+/* The sum of the first `left` bytes of an open file. */
+static unsigned long long SumFile(FILE *file, size_t left)
 {
-  unsigned char seal[HYCO_SEAL], buffer[65536];
+  unsigned char buffer[65536];
   unsigned long long sum = HYCO_HASH_START;
-  FILE *file = fopen(path, "rb");
+  size_t n = 1;
+
+  rewind(file);
+  while (left && n) {
+    n = fread(buffer, 1, PetscMin(left, sizeof(buffer)), file);
+    sum = Sum(sum, buffer, n);
+    left -= n;
+  }
+  return sum;
+}
+
+static PetscErrorCode Open(const char path[], FILE **file, size_t *size)
+{
   struct stat info;
-  size_t left, n = 1;
 
   PetscFunctionBegin;
-  HycoCheck(file, "%s cannot be opened: no such file, or not readable", path);
-  if (fstat(fileno(file), &info) != 0 || !S_ISREG(info.st_mode)) {
-    fclose(file);
+  *file = fopen(path, "rb");
+  HycoCheck(*file, "%s cannot be opened: no such file, or not readable", path);
+  if (fstat(fileno(*file), &info) != 0 || !S_ISREG(info.st_mode)) {
+    fclose(*file);
     HycoFail("%s is no file; one that hyco has written is expected: a model of hyco train ends in .h5", path);
   }
   *size = (size_t)info.st_size;
-  *sealed = ReadSeal(file, (long long)info.st_size, seal);
-  if (*sealed) {
-    left = *size - HYCO_SEAL;
-    rewind(file);
-    while (left && n) {
-      n = fread(buffer, 1, PetscMin(left, sizeof(buffer)), file);
-      sum = Sum(sum, buffer, n);
-      left -= n;
-    }
-  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSealFile(const char path[], size_t *size, unsigned char seal[HYCO_SEAL])
+{
+  FILE *file;
+
+  PetscFunctionBegin;
+  PetscCall(Open(path, &file, size));
+  memcpy(seal, magic, 8);
+  StoreWord((unsigned long long)*size, seal + 8);
+  StoreWord(SumFile(file, *size), seal + 16);
+  fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed)
+{
+  unsigned char seal[HYCO_SEAL];
+  unsigned long long sum = 0;
+  FILE *file;
+
+  PetscFunctionBegin;
+  PetscCall(Open(path, &file, size));
+  *sealed = ReadSeal(file, (long long)*size, seal);
+  if (*sealed) sum = SumFile(file, *size - HYCO_SEAL);
   fclose(file);
   if (*sealed && (LoadWord(seal + 8) != *size - HYCO_SEAL || LoadWord(seal + 16) != sum))
     HycoFail("%s is damaged: its bytes are not those that were written (checksum)", path);

@@ -78,3 +78,12 @@ def read(path):
             out['at'] = out['mesh/xyz'][slave]
             out['pressure'] = out['nodes/contact_pressure'][slave, 0]
     return out
+
+
+def read_step(path, step):
+    """The arrays of one time of a series."""
+    with h5py.File(path) as f:
+        fields = f[f'step-{step:04d}']
+        out = {f'{kind}/{name}': fields[kind][name][:] for kind in fields for name in fields[kind]}
+        out['mesh/xyz'], out['mesh/cells'] = f['mesh/xyz'][:], f['mesh/cells'][:]
+        return out

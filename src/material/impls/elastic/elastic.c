@@ -1,7 +1,7 @@
 /* Isotropic linear elasticity. */
 #include <hycomaterialimpl.h>
 
-static PetscErrorCode Isotropic(HycoMaterial material, HycoMaterialPoints *p, PetscReal lame[])
+PetscErrorCode HycoElasticLame(HycoMaterial material, HycoMaterialPoints *p, PetscReal lame[])
 {
   const PetscReal *young = p->constant[0], *poisson = p->constant[1];
 
@@ -14,13 +14,20 @@ static PetscErrorCode Isotropic(HycoMaterial material, HycoMaterialPoints *p, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMaterialCreate_Elastic(HycoMaterial material)
+PetscErrorCode HycoElasticDeclare(HycoMaterial material)
 {
-  static const struct _HycoMaterialOps ops = {.isotropic = Isotropic};
-
   PetscFunctionBegin;
   PetscCall(HycoMaterialDeclare(material, "young", "Young's modulus", HYCO_REQUIRED, 0, PETSC_INFINITY));
   PetscCall(HycoMaterialDeclare(material, "poisson", "Poisson's ratio", 0, -1, 0.5));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMaterialCreate_Elastic(HycoMaterial material)
+{
+  static const struct _HycoMaterialOps ops = {.isotropic = HycoElasticLame};
+
+  PetscFunctionBegin;
+  PetscCall(HycoElasticDeclare(material));
   PetscCall(HycoMaterialSetOps(material, &ops));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -307,7 +307,7 @@ static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
     for (PetscInt k = 0; affine && !c->exact_loads && k < 2; k++) PetscCall(AffineAt(t, p, k ? 0.71 : 0.38, &affine));
     c->affine[p] = affine;
   }
-  PetscCall(HycoFEFreeMotions(t->fe, &motions));
+  PetscCall(HycoFEFreeMotions(PETSC_COMM_SELF, t->fe, &motions));
   free = motions.n;
   if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
   PetscCall(HycoMotionsDestroy(&motions));
@@ -361,11 +361,12 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -B K^-1 F = -B U - G L of one snapshot; 0 where it is the difference of what is much larger. */
+/* -B K^-1 F = -B U - G L of one snapshot (U at the contacts' nodes); 0 where it is the difference of what is much
+   larger. */
 static PetscErrorCode FreeGap(HycoReducer t, const PetscReal mu[], const PetscReal U[], const PetscReal L[],
                               const PetscReal packed[], PetscReal g[])
 {
-  const PetscInt m = t->pairs.n, entries = HycoPairsWidth(&t->pairs) * t->fe->dim * m;
+  const PetscInt m = t->pairs.n, dim = t->fe->dim, entries = HycoPairsWidth(&t->pairs) * dim * m;
   PetscInt *start, *dof;
   PetscReal *value, moved = 0, left = 0;
 
@@ -375,7 +376,8 @@ static PetscErrorCode FreeGap(HycoReducer t, const PetscReal mu[], const PetscRe
   PetscCall(HycoContactRows(t->fe, &t->pairs, start, dof, value, g));
   for (PetscInt k = 0; k < m; k++) {
     g[k] = 0;
-    for (PetscInt j = start[k]; j < start[k + 1]; j++) g[k] -= value[j] * U[dof[j]];
+    for (PetscInt j = start[k]; j < start[k + 1]; j++)
+      g[k] -= value[j] * U[t->contact_row[dof[j] / dim] * dim + dof[j] % dim];
     moved = PetscMax(moved, PetscAbsReal(g[k]));
   }
   for (PetscInt j = 0; j < m; j++) {
@@ -430,7 +432,7 @@ static PetscErrorCode FromSnapshots(HycoReducer t, HycoCondensed c)
   HycoGridField *gap = &c->field[HYCO_FIELD_GAP], *unloaded = &c->field[HYCO_FIELD_FREE];
   const HycoGridField *G = &c->field[HYCO_FIELD_G];
   const PetscInt n = HycoTensorSize(&gap->tensor), m = c->m, l = c->l;
-  const size_t n_dof = (size_t)(t->sizes[0] * t->sizes[3]);
+  const size_t n_dof = (size_t)(t->n_contact_nodes * t->sizes[3]);
   const PetscReal *mu;
 
   PetscFunctionBegin;
@@ -446,7 +448,7 @@ static PetscErrorCode FromSnapshots(HycoReducer t, HycoCondensed c)
     const PetscReal *L = t->Lambda + (size_t)s * (size_t)m;
 
     PetscCall(PetscArraycpy(c->Lambda + k * m, L, m));
-    PetscCall(FreeGap(t, mu + s * c->dim, t->U + (size_t)s * n_dof, L, G->data + (size_t)node * (size_t)G->rows,
+    PetscCall(FreeGap(t, mu + s * c->dim, t->U_contact + (size_t)s * n_dof, L, G->data + (size_t)node * (size_t)G->rows,
                       gap->data + k * m));
     if (l) PetscCall(PetscArraycpy(unloaded->data + k * l, Condensing(t)->responses.C + (size_t)s * (size_t)l, l));
   }

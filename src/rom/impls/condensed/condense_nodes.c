@@ -4,6 +4,7 @@
   that was killed solves what is missing.
 */
 #include <hycocondensed.h>
+#include <hycofields.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -41,20 +42,35 @@ static PetscErrorCode Path(HycoReducer t, HycoSnapshots store, PetscInt k, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode WriteOne(HycoSnapshots store, const char path[], const char name[], PetscInt rows, PetscInt cols,
-                               const PetscReal data[])
+/* G, which rank 0 has, or X at the unknowns of each rank's part. Collective. */
+static PetscErrorCode WriteData(HycoSnapshots store, HycoFOM fom, HycoH5 h, PetscInt q, PetscInt n_G,
+                                const PetscReal data[])
 {
   char fingerprint[32];
-  HycoH5 h;
-  PetscErrorCode ierr;
+  const HycoFileOrder *rows;
 
   PetscFunctionBegin;
   snprintf(fingerprint, sizeof(fingerprint), "%016llx", store->fingerprint);
-  PetscCall(HycoH5Create(path, &h));
-  ierr = HycoH5WriteText(h, "fingerprint", fingerprint);
-  if (!ierr) ierr = HycoH5WriteReal(h, name, rows, cols, data);
-  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
-  PetscCall(ierr);
+  HycoOnRoot(HycoComm(fom), HycoH5WriteText(h, "fingerprint", fingerprint));
+  PetscCall(HycoFOMGetRows(fom, &rows));
+  if (q)
+    PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "X", HYCO_ON_NODES, MPIU_REAL, fom->fe->dim * q, q, data));
+  else
+    PetscCall(HycoH5WriteRows(h, "G", MPIU_REAL, n_G, 1, 0, fom->rank ? 0 : n_G, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteOne(HycoSnapshots store, HycoFOM fom, const char path[], PetscInt q, PetscInt n_G,
+                               const PetscReal data[])
+{
+  HycoH5 h;
+  PetscErrorCode ierr, failed;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5CreateShared(HycoComm(fom), path, &h));
+  ierr = WriteData(store, fom, h, q, n_G, data);
+  failed = HycoH5Close(&h, (PetscBool)!ierr);
+  PetscCall(ierr ? ierr : failed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -110,8 +126,8 @@ static PetscErrorCode FindMissing(HycoReducer t, HycoSnapshots store, const Task
 }
 
 /* One node of G's grid, solved and written. data: room for it. */
-static PetscErrorCode SolveOne(HycoReducer t, HycoSnapshots store, MPI_Comm group, HycoFOM fom, PetscInt node,
-                               const Task *task, PetscReal data[])
+static PetscErrorCode SolveOne(HycoReducer t, HycoSnapshots store, HycoFOM fom, PetscInt node, const Task *task,
+                               PetscReal data[])
 {
   PetscReal mu[HYCO_MAX_PARAMETERS], key[HYCO_MAX_PARAMETERS];
   char path[PETSC_MAX_PATH_LEN];
@@ -119,13 +135,11 @@ static PetscErrorCode SolveOne(HycoReducer t, HycoSnapshots store, MPI_Comm grou
   PetscFunctionBegin;
   StiffPoint(Condensing(t)->condensed, node, mu, key);
   PetscCall(Path(t, store, node, task, path));
-  if (task->q) {
+  if (task->q)
     PetscCall(HycoFOMResponses(fom, mu, task->q, task->P, data));
-    HycoOnRoot(group, WriteOne(store, path, "X", t->sizes[0] * t->sizes[3], task->q, data));
-  } else {
+  else
     PetscCall(HycoFOMFlexibility(fom, mu, data));
-    HycoOnRoot(group, WriteOne(store, path, "G", Condensing(t)->condensed->field[HYCO_FIELD_G].rows, 1, data));
-  }
+  PetscCall(WriteOne(store, fom, path, task->q, Condensing(t)->condensed->field[HYCO_FIELD_G].rows, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -133,17 +147,17 @@ static PetscErrorCode SolveOne(HycoReducer t, HycoSnapshots store, MPI_Comm grou
 static PetscErrorCode SolveGroup(HycoReducer t, HycoSnapshots store, MPI_Comm group, PetscInt color, PetscInt groups,
                                  PetscInt n_missing, const PetscInt missing[], const Task *task)
 {
-  const size_t size = task->q ? (size_t)(t->sizes[0] * t->sizes[3]) * (size_t)task->q
-                              : (size_t)Condensing(t)->condensed->field[HYCO_FIELD_G].rows;
   HycoFOM fom;
   PetscReal *data;
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMCreate(group, t->scene, &fom));
-  PetscCall(PetscMalloc1(size, &data));
+  PetscCall(PetscMalloc1(task->q ? (size_t)fom->fe->n_dof * (size_t)task->q
+                                 : (size_t)Condensing(t)->condensed->field[HYCO_FIELD_G].rows,
+                         &data));
   for (PetscInt k = color * n_missing / groups; !ierr && k < (color + 1) * n_missing / groups; k++)
-    ierr = SolveOne(t, store, group, fom, missing[k], task, data);
+    ierr = SolveOne(t, store, fom, missing[k], task, data);
   PetscCall(PetscFree(data));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(ierr);

@@ -74,8 +74,9 @@ static PetscErrorCode RemoveModes(HycoReducer t, PetscInt N, PetscInt n, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The reducer's modes, their singular values and the snapshots' coefficients, with q more columns of Q (N x q). */
-static PetscErrorCode Append(HycoReducer t, PetscInt N, PetscInt q, const PetscReal Q[])
+/* The reducer's modes, their singular values and the snapshots' coefficients, with q more columns of Q (N x q) and of
+   these the coefficients QtU (q x n_s column major). Rank 0. */
+static PetscErrorCode Append(HycoReducer t, PetscInt N, PetscInt q, const PetscReal Q[], const PetscReal QtU[])
 {
   const PetscInt l = t->l, both = l + q;
   PetscReal *V, *VtU, *sigma;
@@ -88,10 +89,7 @@ static PetscErrorCode Append(HycoReducer t, PetscInt N, PetscInt q, const PetscR
   }
   for (PetscInt k = 0; k < t->n_s; k++) {
     PetscCall(PetscArraycpy(VtU + k * both, t->VtU + k * l, l));
-    for (PetscInt j = 0; j < q; j++) {
-      VtU[k * both + l + j] = 0;
-      for (PetscInt i = 0; i < N; i++) VtU[k * both + l + j] += Q[j * N + i] * t->U[(size_t)k * (size_t)N + (size_t)i];
-    }
+    PetscCall(PetscArraycpy(VtU + k * both + l, QtU + k * q, q));
   }
   for (PetscInt j = 0; j < both; j++) sigma[j] = j < l ? t->sigma[j] : 0;
   PetscCall(PetscFree(t->V_whole));
@@ -102,19 +100,17 @@ static PetscErrorCode Append(HycoReducer t, PetscInt N, PetscInt q, const PetscR
   HycoDuplicate(both, sigma, &t->sigma);
   PetscCall(PetscFree3(V, VtU, sigma));
   t->l = both;
-  ((Training)t->training)->n_supremizers = q;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V_whole, sigma (0 for these)
-   and VtU have more columns. Rank 0. */
-static PetscErrorCode Enrich(HycoReducer t)
+/* What the supremizers of the dual snapshots add to the modes: the first *q columns of Q. Rank 0. */
+static PetscErrorCode FindSupremizers(HycoReducer t, Mat *Q, PetscInt *q)
 {
   const PetscInt N = t->sizes[0] * t->sizes[3], n = t->n_s;
-  Mat R, X, Q;
+  Mat R, X;
   PetscScalar *x;
   PetscReal *size;
-  PetscInt q = 0, found;
+  PetscInt found;
 
   PetscFunctionBegin;
   if (!t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
@@ -130,16 +126,57 @@ static PetscErrorCode Enrich(HycoReducer t)
   }
   PetscCall(RemoveModes(t, N, n, x));
   PetscCall(MatDenseRestoreArray(X, &x));
-  PetscCall(HycoReducerPOD(t, X, 0, 0, &Q, &found, size));
-  while (q < found && size[q] > NEW * PetscMax(1, size[0])) q++;
-  if (found) {
-    PetscCall(MatDenseGetArray(Q, &x));
-    if (q) PetscCall(Append(t, N, q, x));
-    PetscCall(MatDenseRestoreArray(Q, &x));
-    PetscCall(MatDestroy(&Q));
-  }
+  PetscCall(HycoReducerPOD(t, X, 0, 0, Q, &found, size));
+  while (*q < found && size[*q] > NEW * PetscMax(1, size[0])) (*q)++;
   PetscCall(MatDestroy(&X));
   PetscCall(PetscFree(size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Q^T of the snapshots, for q columns that rank 0 has: q x n_s column major. */
+static PetscErrorCode Coefficients(HycoReducer t, PetscInt N, PetscInt q, const PetscReal Q[], PetscReal QtU[])
+{
+  PetscInt n_own, *row;
+  Mat spread;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetLocalSize(t->S, &n_own, NULL));
+  PetscCall(MatCreateDense(HycoComm(t), n_own, PETSC_DECIDE, N, q, NULL, &spread));
+  PetscCall(PetscMalloc1(t->rank ? 0 : N, &row));
+  for (PetscInt i = 0; i < N && t->rank == 0; i++) row[i] = i;
+  for (PetscInt j = 0; j < q && t->rank == 0; j++)
+    PetscCall(MatSetValues(spread, N, row, 1, &j, Q + (size_t)j * (size_t)N, INSERT_VALUES));
+  PetscCall(MatAssemblyBegin(spread, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(spread, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoReducerMultiply(t, spread, t->S, QtU));
+  PetscCall(MatDestroy(&spread));
+  PetscCall(PetscFree(row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V_whole, sigma (0 for these)
+   and VtU have more columns. */
+static PetscErrorCode Enrich(HycoReducer t)
+{
+  const PetscInt N = t->sizes[0] * t->sizes[3];
+  PetscScalar *x = NULL;
+  PetscReal *QtU;
+  PetscInt q = 0;
+  Mat Q = NULL;
+
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(t), FindSupremizers(t, &Q, &q));
+  PetscCallMPI(MPI_Bcast(&q, 1, MPIU_INT, 0, HycoComm(t)));
+  ((Training)t->training)->n_supremizers = q;
+  if (q) {
+    PetscCall(PetscMalloc1(q * t->n_s, &QtU));
+    if (Q) PetscCall(MatDenseGetArray(Q, &x));
+    PetscCall(Coefficients(t, N, q, x, QtU));
+    if (t->rank == 0) PetscCall(Append(t, N, q, x, QtU));
+    if (Q) PetscCall(MatDenseRestoreArray(Q, &x));
+    PetscCall(PetscFree(QtU));
+  }
+  PetscCall(MatDestroy(&Q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -150,7 +187,7 @@ PetscErrorCode HycoProjectionModes(HycoReducer t, HycoSnapshots store)
   PetscFunctionBegin;
   (void)store;
   s->n_supremizers = 0;
-  if (s->dual == HYCO_DUAL_SNAPSHOTS) HycoOnRoot(HycoComm(t), Enrich(t));
+  if (s->dual == HYCO_DUAL_SNAPSHOTS) PetscCall(Enrich(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

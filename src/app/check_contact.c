@@ -1,0 +1,135 @@
+/* hyco check: gaps, and what faces what. */
+#include "check.h"
+
+/* Facets of the slave larger than the master's by this factor are coarser, not merely of another shape. */
+#define COARSER 1.5
+/* A smallest gap beyond this share of the mesh's extent does not close by small displacements. */
+#define FAR 0.1
+/* Of the mesh's extent: a gap no larger is round-off. */
+#define ROUNDING 1e-12
+
+/* The slave's facets over the master's around contact k; 0: one of them is no surface. size: room for 2 reals a node.
+ */
+static PetscReal Coarseness(const HycoPairs *p, PetscInt k, PetscInt n_nodes, const PetscReal size[])
+{
+  PetscReal master = 0;
+
+  for (PetscInt j = p->master_start[k]; j < p->master_start[k + 1]; j++)
+    master += p->weight[j] * size[n_nodes + p->master[j]];
+  return master > 0 ? size[p->slave[k]] / master : 0;
+}
+
+/* The median over the contacts of one entry; types that search, whose meshes need not match. */
+static PetscErrorCode CompareFacets(Check *check, HycoFE fe, PetscInt contact)
+{
+  const HycoPairs *p = &check->whole->pairs;
+  HycoContact c = fe->scene->contact[contact];
+  PetscReal *size, *ratio;
+  PetscInt g = 0, n = 0;
+
+  PetscFunctionBegin;
+  if (!c->master || !c->ops->find || fe->dim == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc2(2 * fe->mesh->n_nodes, &size, p->n, &ratio));
+  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
+  HycoSurfaceSizes(fe, g, size);
+  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &g));
+  HycoSurfaceSizes(fe, g, size + fe->mesh->n_nodes);
+  for (PetscInt k = 0; k < p->n; k++) {
+    if (p->contact[k] == contact && p->master_start[k] < p->master_start[k + 1])
+      ratio[n++] = Coarseness(p, k, fe->mesh->n_nodes, size);
+  }
+  PetscCall(PetscSortReal(n, ratio));
+  if (n) check->contact[contact].coarse = ratio[n / 2];
+  PetscCall(PetscFree2(size, ratio));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckGaps(Check *check, HycoFE fe, PetscBool first)
+{
+  HycoPairs *p = &check->whole->pairs;
+  HycoScene s = fe->scene;
+  const PetscReal length = HycoMeshLength(fe->mesh);
+  PetscReal *normal, *gap;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(3 * p->n, &normal, p->n, &gap));
+  PetscCall(HycoContactGeometry(fe, p, normal, gap));
+  for (PetscInt c = 0; c < s->n_contacts; c++) {
+    ContactRange *r = &check->contact[c];
+    PetscInt facing = 0;
+
+    r->n = 0;
+    for (PetscInt k = 0; k < p->n; k++) {
+      if (p->contact[k] != c) continue;
+      r->n++;
+      if (HycoPairsAlone(s, p, k)) continue;
+      facing++;
+      if (PetscAbsReal(gap[k]) <= ROUNDING * length) gap[k] = 0;
+      r->gap_min = PetscMin(r->gap_min, gap[k]);
+      r->gap_max = PetscMax(r->gap_max, gap[k]);
+    }
+    r->facing_min = PetscMin(r->facing_min, facing);
+    r->facing_max = PetscMax(r->facing_max, facing);
+    if (first) PetscCall(CompareFacets(check, fe, c));
+  }
+  check->n_without = PetscMax(check->n_without, check->fom->summary.n_still);
+  PetscCall(PetscFree2(normal, gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void Warn(Check *check, HycoContact c, const ContactRange *r)
+{
+  const PetscReal length = HycoMeshLength(check->whole->part);
+
+  if (!r->n)
+    CheckWarn(check, "contact %s has no contact: every node of %s is wholly fixed", c->name, c->slave);
+  else if (!r->facing_max)
+    CheckWarn(check, "contact %s never faces anything: no node of %s finds %s at any of the points that were tried",
+              c->name, c->slave, c->master);
+  else if (c->master && r->gap_min > FAR * length)
+    CheckWarn(check,
+              "contact %s: the smallest gap is %.3g, %.2g of the mesh's extent; small displacements do not close it",
+              c->name, (double)r->gap_min, (double)(r->gap_min / length));
+  if (r->coarse > COARSER)
+    CheckWarn(check, "contact %s: the slave's facets (%s) are %.2g times the master's (%s); let the finer be the slave",
+              c->name, c->slave, (double)r->coarse, c->master);
+}
+
+static void Print(const HycoContact c, const ContactRange *r)
+{
+  PetscCallVoid(Say("contact %s, %s: %d nodes of %s", c->name, ((PetscObject)c)->type_name, (int)r->n, c->slave));
+  if (c->master) PetscCallVoid(Say(" against %s", c->master));
+  if (r->facing_max && c->master)
+    PetscCallVoid(r->facing_min == r->n ? Say(", all of which face it")
+                                        : Say(", %d to %d of which face it", (int)r->facing_min, (int)r->facing_max));
+  if (r->facing_max) PetscCallVoid(Say("; gaps from %.4g to %.4g", (double)r->gap_min, (double)r->gap_max));
+  if (r->facing_max && r->gap_min < 0) PetscCallVoid(Say(" (below 0 they overlap before any load)"));
+  PetscCallVoid(Say("\n"));
+}
+
+void CheckContacts(Check *check)
+{
+  HycoScene s = check->fom->scene;
+  cJSON *contacts = cJSON_AddArrayToObject(check->json, "contacts");
+
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    const ContactRange *r = &check->contact[k];
+    cJSON *contact = cJSON_CreateObject();
+
+    cJSON_AddItemToArray(contacts, contact);
+    cJSON_AddStringToObject(contact, "name", s->contact[k]->name);
+    cJSON_AddStringToObject(contact, "type", ((PetscObject)s->contact[k])->type_name);
+    cJSON_AddNumberToObject(contact, "n", r->n);
+    cJSON_AddNumberToObject(contact, "n_facing_min", r->facing_min);
+    cJSON_AddNumberToObject(contact, "n_facing_max", r->facing_max);
+    if (r->facing_max) cJSON_AddNumberToObject(contact, "gap_min", r->gap_min);
+    if (r->facing_max) cJSON_AddNumberToObject(contact, "gap_max", r->gap_max);
+    if (r->coarse > 0) cJSON_AddNumberToObject(contact, "slave_over_master", r->coarse);
+    Print(s->contact[k], r);
+    Warn(check, s->contact[k], r);
+  }
+  cJSON_AddNumberToObject(check->json, "n_without_effect", check->n_without);
+  if (check->n_without)
+    PetscCallVoid(Say("%d contact%s between fixed displacements: without effect\n", (int)check->n_without,
+                      check->n_without > 1 ? "s lie" : " lies"));
+}

@@ -1,0 +1,235 @@
+/* hyco check: cells, bodies and groups of the mesh. */
+#include "check.h"
+#include <hycokinematics.h>
+#include <string.h>
+
+/* A cell beyond this is said: the solver bears more, but what happens across the cell is hardly resolved along it. */
+#define LONG_CELL 100
+/* Two groups that have this share of their nodes in common are alike. */
+#define ALIKE 0.95
+
+/* From the reference simplex to the regular one, inverted. */
+static void ToRegular(PetscInt dim, PetscReal J[3][3])
+{
+  const PetscReal a = 1 / PetscSqrtReal(3), b = 1 / PetscSqrtReal(6);
+
+  for (PetscInt c = 0; c < dim; c++) {
+    const PetscReal x = J[c][0], y = J[c][1];
+
+    J[c][1] = 2 * a * y - a * x;
+    if (dim == 3) J[c][2] = PetscSqrtReal(1.5) * J[c][2] - b * (x + y);
+  }
+}
+
+/* How many times as long as wide a cell is at a quadrature point, 1 if it is regular there: k + sqrt(k^2 - 1) with the
+   condition number k = |J| |J^-1| / dim in Frobenius's norm of the map from the regular cell. Exact for rectangles. */
+static PetscReal Stretch(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q)
+{
+  const PetscInt dim = el->dim;
+  PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, norm = 0, inverse = 0, det = 0, k;
+
+  for (PetscInt c = 0; c < dim; c++) {
+    for (PetscInt d = 0; d < dim; d++) {
+      J[c][d] = 0;
+      for (PetscInt a = 0; a < el->nv; a++) J[c][d] += X[3 * node[a] + c] * el->dN[q][a][d];
+    }
+  }
+  if (el->nv == dim + 1) ToRegular(dim, J);
+  for (PetscInt c = 0; c < dim; c++) {
+    for (PetscInt d = 0; d < dim; d++) {
+      const PetscInt c1 = (c + 1) % 3, c2 = (c + 2) % 3, d1 = (d + 1) % 3, d2 = (d + 2) % 3;
+      const PetscReal minor = J[c1][d1] * J[c2][d2] - J[c1][d2] * J[c2][d1];
+
+      norm += J[c][d] * J[c][d];
+      inverse += minor * minor;
+      if (c == 0) det += J[c][d] * minor;
+    }
+  }
+  k = PetscMax(PetscSqrtReal(norm * inverse) / (PetscAbsReal(det) * dim), 1); /* no division by 0: K is assembled */
+  return k + PetscSqrtReal(k * k - 1);
+}
+
+void CheckCells(Check *check, HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGet(m->type);
+
+  for (PetscInt e = 0; e < m->n_cells && m->dim > 1; e++) {
+    const PetscInt b = m->cell_body[e];
+
+    for (PetscInt q = 0; q < (m->nv == m->dim + 1 ? 1 : el->nq); q++) {
+      const PetscReal stretch = Stretch(el, m->cells + e * m->nv, fe->X, q);
+
+      if (stretch <= check->stretch[b] * (1 + 1e-10)) continue;
+      check->stretch[b] = stretch;
+      check->stretched[b] = m->cell_id[e];
+    }
+  }
+}
+
+static PetscInt Root(PetscInt part[], PetscInt i)
+{
+  while (part[i] != i) i = part[i] = part[part[i]];
+  return i;
+}
+
+/* How many parts that share no node each body is in. */
+static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
+{
+  PetscInt *part;
+  PetscBool *seen;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &part));
+  PetscCall(PetscMalloc1(m->n_nodes, &seen));
+  for (PetscInt b = 0; b < n_bodies; b++) {
+    n[b] = 0;
+    for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = i;
+    PetscCall(PetscArrayzero(seen, m->n_nodes));
+    for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
+      if (m->cell_body[k / m->nv] == b) part[Root(part, m->cells[k])] = Root(part, m->cells[k - k % m->nv]);
+    }
+    for (PetscInt e = 0; e < m->n_cells; e++) {
+      const PetscInt root = Root(part, m->cells[e * m->nv]);
+
+      if (m->cell_body[e] != b || seen[root]) continue;
+      seen[root] = PETSC_TRUE;
+      n[b]++;
+    }
+  }
+  PetscCall(PetscFree(part));
+  PetscCall(PetscFree(seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckBodies(Check *check)
+{
+  HycoMesh m = check->whole->part;
+  HycoScene s = check->fom->scene;
+  cJSON *bodies = cJSON_AddArrayToObject(check->json, "bodies");
+  PetscInt *parts;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(s->n_bodies, &parts));
+  PetscCall(CountParts(m, s->n_bodies, parts));
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    cJSON *body = cJSON_CreateObject();
+    PetscInt cells = 0;
+
+    for (PetscInt e = 0; e < m->n_cells; e++) cells += m->cell_body[e] == b;
+    cJSON_AddItemToArray(bodies, body);
+    cJSON_AddStringToObject(body, "name", s->body[b].name);
+    cJSON_AddNumberToObject(body, "n_cells", cells);
+    cJSON_AddNumberToObject(body, "n_parts", parts[b]);
+    cJSON_AddNumberToObject(body, "stretch", check->stretch[b]);
+    cJSON_AddNumberToObject(body, "stretched_cell", check->stretched[b]);
+    PetscCall(Say("body %s: %d cells", s->body[b].name, (int)cells));
+    if (m->dim > 1)
+      PetscCall(Say("; the most stretched one, %d, is %.3g times as long as wide", (int)check->stretched[b],
+                    (double)check->stretch[b]));
+    PetscCall(Say("\n"));
+    if (parts[b] > 1)
+      CheckWarn(check,
+                "body %s is in %d parts that share no node; if it should be one piece, the mesh has nodes twice "
+                "(gmsh: Coherence, or BooleanFragments)",
+                s->body[b].name, (int)parts[b]);
+    if (check->stretch[b] > LONG_CELL)
+      CheckWarn(check, "body %s: cell %d is %.3g times as long as wide", s->body[b].name, (int)check->stretched[b],
+                (double)check->stretch[b]);
+  }
+  PetscCall(PetscFree(parts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How many nodes the groups g and h have in common; both ascend. */
+static PetscInt Common(HycoMesh m, PetscInt g, PetscInt h)
+{
+  PetscInt n = 0, j = m->group_start[h];
+
+  for (PetscInt i = m->group_start[g]; i < m->group_start[g + 1]; i++) {
+    while (j < m->group_start[h + 1] && m->group_node[j] < m->group_node[i]) j++;
+    n += j < m->group_start[h + 1] && m->group_node[j] == m->group_node[i];
+  }
+  return n;
+}
+
+static void CheckTwins(Check *check, HycoMesh m)
+{
+  for (PetscInt g = 0; g < m->n_groups; g++) {
+    for (PetscInt h = 0; h < g; h++) {
+      const PetscInt n = m->group_start[g + 1] - m->group_start[g], k = m->group_start[h + 1] - m->group_start[h];
+      PetscInt common;
+
+      if (strcasecmp(m->group_name[g], m->group_name[h]) == 0)
+        CheckWarn(check, "the groups %s and %s differ in letter case alone; options do not tell them apart",
+                  m->group_name[h], m->group_name[g]);
+      if (m->group_dim[g] != m->group_dim[h] || !n || PetscMin(n, k) < ALIKE * PetscMax(n, k)) continue;
+      common = Common(m, g, h);
+      if (common == n && common == k)
+        CheckWarn(check, "the groups %s and %s have the same nodes", m->group_name[h], m->group_name[g]);
+      else if (common >= ALIKE * PetscMax(n, k))
+        CheckWarn(check, "the groups %s (%d nodes) and %s (%d) have %d nodes in common", m->group_name[h], (int)k,
+                  m->group_name[g], (int)n, (int)common);
+    }
+  }
+}
+
+/* Sets used[g] for the group `name`; fails where there is none. */
+static PetscErrorCode Use(HycoMesh m, const char key[], const char name[], PetscBool used[])
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, key, name, &g));
+  used[g] = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The groups that the scene names: bodies, supports, loads, contacts with what their types declare, the region of
+   interest. */
+static PetscErrorCode MarkUsed(HycoScene s, HycoMesh m, PetscBool used[])
+{
+  char *region[64];
+  PetscInt n = 64;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_bodies; k++) PetscCall(Use(m, "body", s->body[k].name, used));
+  for (PetscInt k = 0; k < s->n_fixed; k++) PetscCall(Use(m, "fixed", s->fixed[k].group, used));
+  for (PetscInt k = 0; k < s->n_loads; k++) PetscCall(Use(m, "load", s->load[k].group, used));
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    for (PetscInt j = 0; j < s->contact[k]->entries.n; j++) {
+      const HycoEntry *entry = &s->contact[k]->entries.entry[j];
+
+      if (entry->kind == HYCO_ENTRY_GROUP && entry->text) PetscCall(Use(m, "contact", entry->text, used));
+    }
+  }
+  PetscCall(PetscOptionsGetStringArray(s->options, NULL, "-hyco_rid_groups", region, &n, NULL));
+  for (PetscInt k = 0; k < n && n < 64; k++) {
+    PetscCall(Use(m, "hyco_rid_groups", region[k], used));
+    PetscCall(PetscFree(region[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckGroups(Check *check)
+{
+  HycoMesh m = check->whole->part;
+  cJSON *unused = cJSON_AddArrayToObject(check->json, "unused_groups");
+  char list[HYCO_LINE] = "";
+  PetscBool *used;
+
+  PetscFunctionBegin;
+  CheckTwins(check, m);
+  PetscCall(PetscCalloc1(m->n_groups, &used));
+  PetscCall(MarkUsed(check->fom->scene, m, used));
+  for (PetscInt g = 0; g < m->n_groups; g++) {
+    if (used[g] && m->group_start[g] == m->group_start[g + 1])
+      CheckWarn(check, "the group %s has no node of a body", m->group_name[g]);
+    if (used[g]) continue;
+    cJSON_AddItemToArray(unused, cJSON_CreateString(m->group_name[g]));
+    PetscCall(HycoListAdd(list, ", ", m->group_name[g]));
+  }
+  if (list[0]) CheckWarn(check, "no entry of the scene names %s (of the mesh's groups)", list);
+  PetscCall(PetscFree(used));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,469 @@
+/* hyco check: reads and assembles all of a scene, solves nothing unless asked; says what is there and what it costs. */
+#include "check.h"
+#include <hycolinear.h>
+#include <hycomaterialimpl.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/resource.h>
+
+/* Up to so many parameters all corners of the ranges are tried, beyond it the ends of each alone. */
+#define MOST_CORNERS 4
+/* Solutions of a training whose points are not given. */
+#define TYPICAL_TRAINING 100
+/* Of a matrix product's speed: what a sparse factor reaches. */
+#define SPARSE_SHARE 0.3
+
+void CheckWarn(Check *check, const char format[], ...)
+{
+  char line[HYCO_LINE];
+  va_list args;
+
+  va_start(args, format);
+  vsnprintf(line, sizeof(line), format, args);
+  va_end(args);
+  cJSON_AddItemToArray(check->warnings, cJSON_CreateString(line));
+}
+
+static const char *const cell_names[HYCO_N_CELL_TYPES] = {"line2", "tri3", "quad4", "tet4", "hex8"};
+
+/* The centre of the ranges, then their corners, or, of many parameters, the ends of each. The caller frees mu. */
+static PetscErrorCode ListPoints(HycoScene s, PetscInt *n, PetscReal **mu)
+{
+  const PetscInt p = s->n_parameters;
+
+  PetscFunctionBegin;
+  *n = p ? 1 + (p <= MOST_CORNERS ? 1 << p : 2 * p) : 1;
+  PetscCall(PetscMalloc1(*n * p + 1, mu));
+  for (PetscInt k = 0; k < *n; k++) {
+    for (PetscInt j = 0; j < p; j++) {
+      PetscReal *v = *mu + k * p + j;
+      const PetscBool corner = (PetscBool)(k && (p <= MOST_CORNERS || (k - 1) / 2 == j));
+      const PetscInt bit = p <= MOST_CORNERS ? j : 0;
+
+      *v = (s->lo[j] + s->hi[j]) / 2;
+      if (corner) *v = ((k - 1) >> bit) & 1 ? s->hi[j] : s->lo[j];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On rank 0. */
+static PetscErrorCode Measure(Check *check, const PetscReal mu[], PetscBool first)
+{
+  HycoFE fe = check->whole->fe;
+
+  PetscFunctionBegin;
+  if (check->whole != check->fom) PetscCall(HycoFOMAssemble(check->whole, mu));
+  CheckCells(check, fe);
+  PetscCall(CheckGaps(check, fe, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* K, F, B and D at mu as solve makes them, with its errors, which are told with the point. Collective. */
+static PetscErrorCode CheckPoint(Check *check, const PetscReal mu[], PetscBool first)
+{
+  HycoFOM f = check->fom;
+  HycoScene s = f->scene;
+  char message[HYCO_LINE], place[HYCO_LINE] = "";
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCatchBegin());
+  ierr = HycoFOMAssemble(f, mu);
+  PetscCall(HycoCatchEnd(ierr, message));
+  for (PetscInt p = 0; ierr && p < s->n_parameters; p++) {
+    char value[HYCO_LINE];
+
+    HycoFormat(value, "%s = %g", s->parameter[p], (double)mu[p]);
+    PetscCall(HycoListAdd(place, ", ", value));
+  }
+  HycoCheck(!ierr, "%s%s%s", place[0] ? "at " : "", place[0] ? strcat(place, ": ") : "", message);
+  HycoOnRoot(HycoComm(f), Measure(check, mu, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- what is there: rank 0 -- */
+
+static PetscErrorCode SayMesh(Check *check)
+{
+  HycoFOM f = check->fom;
+  HycoMesh m = f->part;
+  const char *title;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetTitle(f->scene, &title));
+  PetscCall(Say("scene: %s\n", title[0] ? title : "(no title)"));
+  PetscCall(Say("mesh %s: %dD, %s, %d nodes, %d cells; %d unknowns, and %d that supports fix\n",
+                f->scene->dm ? "of the program" : f->scene->mesh_path, (int)m->dim, cell_names[m->type],
+                (int)f->n_nodes, (int)f->n_cells, (int)f->n_free, (int)(f->n_nodes * m->dim - f->n_free)));
+  cJSON_AddNumberToObject(check->json, "dimension", m->dim);
+  cJSON_AddStringToObject(check->json, "cell_type", cell_names[m->type]);
+  cJSON_AddNumberToObject(check->json, "n_nodes", f->n_nodes);
+  cJSON_AddNumberToObject(check->json, "n_cells", f->n_cells);
+  cJSON_AddNumberToObject(check->json, "n_dof", f->n_free);
+  cJSON_AddNumberToObject(check->json, "n_fixed", f->n_nodes * m->dim - f->n_free);
+  cJSON_AddNumberToObject(check->json, "n_contacts", f->n_contacts);
+  cJSON_AddNumberToObject(check->json, "points_checked", check->n_points);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Motions that the supports leave free: contact alone prevents them, or -hyco_regularise takes them out; others are an
+   error of the assembly. */
+static PetscErrorCode SayMotions(Check *check)
+{
+  HycoFOM f = check->whole;
+  cJSON *list = cJSON_AddArrayToObject(check->json, "free_motions");
+  HycoMotions free = {0, NULL, NULL, NULL};
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &free));
+  for (PetscInt k = 0; k < free.n; k++) {
+    cJSON_AddItemToArray(list, cJSON_CreateString(free.name[k]));
+    PetscCall(Say("no support keeps %s: contact alone does\n", free.name[k]));
+  }
+  if (free.n)
+    CheckWarn(check,
+              "%d rigid motion%s held by contact alone: full order solves that where the loads press the "
+              "bodies together; a reduced model needs supports",
+              (int)free.n, free.n > 1 ? "s are" : " is");
+  PetscCall(HycoMotionsDestroy(&free));
+  cJSON_AddStringToObject(check->json, "regularised", f->summary.regularised);
+  if (f->summary.regularised[0])
+    PetscCall(Say("regularised: neither supports nor contact keep %s\n", f->summary.regularised));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool AnyChanges(HycoExpr const e[3], const PetscBool changed[])
+{
+  return (PetscBool)(HycoExprChanges(e[0], changed) || HycoExprChanges(e[1], changed) ||
+                     HycoExprChanges(e[2], changed));
+}
+
+/* What a parameter reaches: all but maps by the entries that name it; a map moves what lies on its body. */
+static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
+{
+  enum { MAPS, STIFFNESS, ROWS, GAPS, LOADS, SUPPORTS, N };
+  static const char *const names[N] = {"maps", "stiffness", "contact rows", "gaps", "loads", "supports"};
+  HycoScene s = check->fom->scene;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, does[N] = {PETSC_FALSE};
+  HycoChanges c;
+  cJSON *list = cJSON_AddArrayToObject(reaches, s->parameter[p]);
+  char words[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  changed[p] = PETSC_TRUE;
+  c = HycoSceneChanges(s, changed);
+  does[MAPS] = c.nodes;
+  does[STIFFNESS] = c.stiffness;
+  does[ROWS] = (PetscBool)(c.rows && s->n_contacts);
+  does[GAPS] = (PetscBool)(c.gaps && s->n_contacts);
+  for (PetscInt k = 0; k < s->n_loads; k++)
+    does[LOADS] = (PetscBool)(does[LOADS] || HycoExprChanges(s->load[k].pressure, changed) ||
+                              AnyChanges(s->load[k].traction, changed));
+  for (PetscInt k = 0; k < s->n_bodies; k++)
+    does[LOADS] = (PetscBool)(does[LOADS] || AnyChanges(s->body[k].force, changed));
+  for (PetscInt k = 0; k < s->n_fixed; k++)
+    does[SUPPORTS] = (PetscBool)(does[SUPPORTS] || AnyChanges(s->fixed[k].value, changed));
+  for (PetscInt k = 0; k < N; k++) {
+    if (!does[k]) continue;
+    PetscCall(HycoListAdd(words, ", ", names[k]));
+    cJSON_AddItemToArray(list, cJSON_CreateString(names[k]));
+  }
+  PetscCall(Say("parameter %s from %g to %g: reaches %s\n", s->parameter[p], (double)s->lo[p], (double)s->hi[p],
+                words[0] ? words : "nothing"));
+  if (!words[0]) CheckWarn(check, "the parameter %s reaches nothing: no expression reads it", s->parameter[p]);
+  if (s->lo[p] == s->hi[p]) CheckWarn(check, "the range of the parameter %s is one value", s->parameter[p]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Describe(Check *check)
+{
+  HycoScene s = check->fom->scene;
+  cJSON *reaches;
+
+  PetscFunctionBegin;
+  PetscCall(SayMesh(check));
+  PetscCall(CheckBodies(check));
+  CheckContacts(check);
+  PetscCall(SayMotions(check));
+  reaches = cJSON_AddObjectToObject(check->json, "parameters");
+  for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(SayReach(check, p, reaches));
+  PetscCall(CheckGroups(check));
+  PetscCall(Say("%d point%s of the ranges assembled%s\n", (int)check->n_points, check->n_points > 1 ? "s" : "",
+                s->n_parameters > MOST_CORNERS ? ": the centre and the ends of each parameter"
+                : s->n_parameters              ? ": the centre and the corners"
+                                               : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- what it costs -- */
+
+typedef struct {
+  PetscBool solved;             /* measured by a solve at the centre, else estimated */
+  PetscReal bytes, resident;    /* of a factor; of the process as it is, all ranks */
+  PetscReal first, next;        /* seconds: a solve with a new stiffness, with that of the last */
+  PetscInt n_training, n_stiff; /* solutions of a training, held-out ones included; stiffnesses among them */
+} Cost;
+
+/* Floating-point operations a second of a small matrix product, this process's. */
+static PetscErrorCode Speed(PetscReal *flops)
+{
+  const PetscBLASInt n = 256;
+  const PetscScalar one = 1, zero = 0;
+  PetscScalar *a;
+  PetscReal begin;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * n * n, &a));
+  for (PetscInt k = 0; k < 3 * n * n; k++) a[k] = 1;
+  *flops = 0;
+  for (PetscInt k = 0; k < 3; k++) { /* the first warms up */
+    begin = HycoNow();
+    BLASgemm_("N", "N", &n, &n, &n, &one, a, &n, a + n * n, &n, &zero, a + 2 * n * n, &n);
+    *flops = PetscMax(*flops, 2. * n * n * n / PetscMax(HycoNow() - begin, 1e-9));
+  }
+  PetscCall(PetscFree(a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The factor's memory by MUMPS's analysis of the stiffness with the contacts; seconds by its count of operations, the
+   matrix assembled anew and the analysis. Collective. */
+static PetscErrorCode Estimate(Check *check, PetscReal assembly, Cost *cost)
+{
+  HycoFOM f = check->fom;
+  HycoDirect probe;
+  PetscReal begin = HycoNow(), speed = 1;
+  MatInfo info;
+
+  PetscFunctionBegin;
+  PetscCall(HycoDirectCreate(HycoComm(f), &probe));
+  PetscCall(HycoDirectPinKernel(probe, f->K));
+  PetscCall(HycoDirectAnalyse(probe, f->K, f->n_contacts ? f->Bt : NULL, f->n_contacts ? f->B : NULL, PETSC_TRUE,
+                              &cost->bytes));
+  PetscCall(Speed(&speed));
+  PetscCall(MatGetInfo(f->K, MAT_GLOBAL_SUM, &info));
+  cost->first = assembly + HycoNow() - begin + HycoDirectOperations(probe) / (SPARSE_SHARE * speed * f->size);
+  cost->next = 20 * cost->bytes / 8 / (SPARSE_SHARE * speed * f->size); /* a few products with the factor */
+  PetscCall(HycoDirectDestroy(&probe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Solve(Check *check, const PetscReal mu[], Cost *cost)
+{
+  HycoSummary s;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMSolve(check->fom, check->fom->scene->n_parameters, mu));
+  PetscCall(HycoFOMGetSummary(check->fom, &s));
+  HycoCheck(s.reason > 0, "the solve at the centre of the ranges: %s%s%s", HycoReasonName(s.reason),
+            s.free_motion[0] ? "; no support keeps " : "", s.free_motion);
+  cost->solved = PETSC_TRUE;
+  cost->first = s.seconds.total;
+  cost->next = s.seconds.solve;
+  PetscCall(Say("solved at the centre: %d of %d contacts closed, total contact force %.10g\n", (int)s.n_active,
+                (int)s.n_contacts, (double)s.total_contact_force));
+  cJSON_AddNumberToObject(check->json, "n_active", s.n_active);
+  cJSON_AddNumberToObject(check->json, "total_contact_force", s.total_contact_force);
+  if (s.n_contacts && !s.n_active && check->warnings) CheckWarn(check, "no contact closes at the centre of the ranges");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The training's solutions and the stiffnesses among them: those of the points that are given, or a typical number. */
+static PetscErrorCode CountTraining(HycoScene s, HycoSamples samples, PetscBool given, Cost *cost)
+{
+  PetscBool reaches[HYCO_MAX_PARAMETERS], any = PETSC_FALSE;
+  PetscInt n = TYPICAL_TRAINING, held;
+  const PetscReal *mu = NULL;
+
+  PetscFunctionBegin;
+  HycoSceneReaches(s, reaches);
+  for (PetscInt p = 0; p < s->n_parameters; p++) any = (PetscBool)(any || reaches[p]);
+  if (given) PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
+  held = PetscMin(PetscMax(n, 20), 30);
+  cost->n_training = n + held;
+  cost->n_stiff = any ? n : 1;
+  for (PetscInt k = 1; mu && any && k < n; k++) { /* those that were there before */
+    PetscBool seen = PETSC_FALSE;
+
+    for (PetscInt j = 0; j < k && !seen; j++) {
+      seen = PETSC_TRUE;
+      for (PetscInt p = 0; p < s->n_parameters; p++)
+        seen = (PetscBool)(seen && (!reaches[p] || mu[j * s->n_parameters + p] == mu[k * s->n_parameters + p]));
+    }
+    cost->n_stiff -= seen;
+  }
+  if (any) cost->n_stiff += held; /* three may share one, which does not matter here */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void Seconds(PetscReal t, char text[32])
+{
+  if (t < 60)
+    snprintf(text, 32, "%.2g s", (double)t);
+  else if (t < 7200)
+    snprintf(text, 32, "%.2g minutes", (double)t / 60);
+  else
+    snprintf(text, 32, "%.2g hours", (double)t / 3600);
+}
+
+static PetscErrorCode SayCost(Check *check, const Cost *cost, PetscBool given)
+{
+  HycoFOM f = check->fom;
+  const PetscReal values =
+      2. * (PetscReal)f->n_nodes * f->fe->dim + (PetscReal)f->n_cells * f->fe->n_sigma + f->n_contacts;
+  const PetscReal training = cost->n_stiff * cost->first + (cost->n_training - cost->n_stiff) * cost->next;
+  const PetscReal snapshots = 8 * values * cost->n_training;
+  char first[32], next[32], all[32];
+  cJSON *object = cJSON_AddObjectToObject(check->json, "estimate");
+
+  PetscFunctionBegin;
+  Seconds(cost->first, first);
+  Seconds(cost->next, next);
+  Seconds(training, all);
+  PetscCall(Say("a full-order solve, %s: %s, or %s where the stiffness is the last one's; %.3g MB, of which %.3g MB "
+                "are a factor\n",
+                cost->solved ? "as measured" : "about", first, next, 1e-6 * (double)(cost->resident + cost->bytes),
+                1e-6 * (double)cost->bytes));
+  PetscCall(Say("a training on %s%d solutions, with those that judge it: about %s of full-order solves, and %.3g MB of "
+                "solutions; the reduction is extra\n",
+                given ? "" : "say ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
+  cJSON_AddBoolToObject(object, "measured", cost->solved);
+  cJSON_AddNumberToObject(object, "factor_mb", 1e-6 * cost->bytes);
+  cJSON_AddNumberToObject(object, "solve_mb", 1e-6 * (cost->resident + cost->bytes));
+  cJSON_AddNumberToObject(object, "seconds_first", cost->first);
+  cJSON_AddNumberToObject(object, "seconds_next", cost->next);
+  cJSON_AddNumberToObject(object, "n_training", cost->n_training);
+  cJSON_AddNumberToObject(object, "n_stiffness", cost->n_stiff);
+  cJSON_AddNumberToObject(object, "seconds_training", training);
+  cJSON_AddNumberToObject(object, "snapshots_mb", 1e-6 * snapshots);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the command -- */
+
+static PetscErrorCode ReadSolve(PetscBool *solve)
+{
+  PetscFunctionBegin;
+  *solve = PETSC_FALSE;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(HycoOptionsFlag("-check_solve", "solve at the centre of the ranges, so that seconds are measured", solve));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DeclareCheck(PetscOptions options)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool solve;
+
+  PetscFunctionBegin;
+  (void)options;
+  PetscCall(DriverReadFiles(path, NULL, NULL, path, NULL));
+  PetscCall(DriverGetSamples(NULL, NULL, NULL));
+  PetscCall(ReadSolve(&solve));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Create(HycoFOM fom, Check *check)
+{
+  const PetscInt bodies = fom->scene->n_bodies, contacts = fom->scene->n_contacts;
+
+  PetscFunctionBegin;
+  check->fom = fom;
+  PetscCall(ReportCreate("check", fom->scene, NULL, &check->json));
+  check->warnings = cJSON_CreateArray();
+  PetscCall(PetscCalloc1(contacts, &check->contact));
+  PetscCall(PetscCalloc1(bodies, &check->stretch));
+  PetscCall(PetscCalloc1(bodies, &check->stretched));
+  for (PetscInt k = 0; k < contacts; k++) {
+    check->contact[k].facing_min = PETSC_MAX_INT;
+    check->contact[k].gap_min = PETSC_MAX_REAL;
+    check->contact[k].gap_max = -PETSC_MAX_REAL;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The warnings, in words and into the report, which is written. */
+static PetscErrorCode Finish(Check *check)
+{
+  const int n = cJSON_GetArraySize(check->warnings);
+
+  PetscFunctionBegin;
+  for (int k = 0; k < n; k++)
+    PetscCall(Say("warning: %s\n", cJSON_GetStringValue(cJSON_GetArrayItem(check->warnings, k))));
+  PetscCall(Say("%d warning%s, no error\n", n, n == 1 ? "" : "s"));
+  cJSON_AddItemToObject(check->json, "warnings", check->warnings);
+  cJSON_AddNumberToObject(check->json, "n_warnings", n);
+  PetscCall(ReportWrite(&check->json));
+  PetscCall(PetscFree(check->contact));
+  PetscCall(PetscFree(check->stretch));
+  PetscCall(PetscFree(check->stretched));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What a process holds now, on all ranks. */
+static PetscErrorCode Resident(PetscReal *bytes)
+{
+  struct rusage usage;
+  PetscReal mine;
+
+  PetscFunctionBegin;
+  getrusage(RUSAGE_SELF, &usage);
+  mine = 1024 * (PetscReal)usage.ru_maxrss;
+  PetscCallMPI(MPI_Allreduce(&mine, bytes, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All points, the centre last, where the costs are measured. */
+static PetscErrorCode Visit(Check *check, PetscBool solve, Cost *cost)
+{
+  const PetscInt p = check->fom->scene->n_parameters;
+  PetscReal *mu, begin;
+
+  PetscFunctionBegin;
+  PetscCall(ListPoints(check->fom->scene, &check->n_points, &mu));
+  for (PetscInt k = 1; k < check->n_points; k++) PetscCall(CheckPoint(check, mu + k * p, (PetscBool)(k == 1)));
+  begin = HycoNow();
+  PetscCall(CheckPoint(check, mu, (PetscBool)(check->n_points == 1)));
+  begin = HycoNow() - begin;
+  PetscCall(Resident(&cost->resident));
+  PetscCall(Estimate(check, begin, cost));
+  HycoOnRoot(HycoComm(check->fom), Describe(check));
+  if (solve) PetscCall(Solve(check, mu, cost));
+  PetscCall(PetscFree(mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CommandCheck(void)
+{
+  HycoScene scene;
+  HycoSamples samples = NULL;
+  HycoFOM fom;
+  Check check = {0};
+  Cost cost = {0};
+  PetscBool given, solve;
+  char path[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(DriverReadFiles(path, NULL, NULL, report, NULL));
+  PetscCall(DriverRequire("scene", path));
+  PetscCall(ReadSolve(&solve));
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
+  PetscCall(DriverCheckMesh(scene));
+  PetscCall(DriverGetSamples(scene, &samples, &given));
+  PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
+  PetscCall(DriverCheckLeftEarly());
+  check.whole = fom;
+  if (fom->size > 1) HycoOnRoot(PETSC_COMM_WORLD, HycoFOMCreate(PETSC_COMM_SELF, scene, &check.whole));
+  PetscCall(Create(fom, &check));
+  HycoStaged(HYCO_STAGE_FULL_ORDER, Visit(&check, solve, &cost));
+  PetscCall(CountTraining(scene, samples, given, &cost));
+  PetscCall(SayCost(&check, &cost, given));
+  PetscCall(Finish(&check));
+  if (fom->size > 1 && fom->rank == 0) PetscCall(HycoFOMDestroy(&check.whole));
+  PetscCall(HycoFOMDestroy(&fom));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(HycoSceneDestroy(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

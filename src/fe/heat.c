@@ -1,0 +1,58 @@
+/* Temperatures of the bodies, a given field, and the thermal strains they cause: expansion (T - reference), isotropic.
+ */
+#include <hycokinematics.h>
+
+PetscErrorCode HycoHeatCreate(HycoFE fe)
+{
+  const PetscInt n = fe->mesh->n_cells * HycoElementGet(fe->mesh->type)->nq;
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < fe->scene->n_bodies; b++) any = (PetscBool)(any || fe->scene->body[b].temperature);
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(n, &fe->temperature));
+  PetscCall(PetscCalloc1(n, &fe->thermal));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One cell: its points' temperatures and strains. */
+static PetscErrorCode SetCell(HycoFE fe, const HycoElement *el, PetscInt cell)
+{
+  const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
+  PetscReal x[3 * 8], reference[8], expansion[8], *T = fe->temperature + cell * el->nq;
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; q < el->nq; q++) HycoPointPlace(fe, el, cell, q, x + 3 * q);
+  PetscCall(HycoExprEval(body->temperature, fe->mu, el->nq, x, T));
+  for (PetscInt q = 0; q < el->nq; q++) {
+    char place[HYCO_LINE];
+
+    if (T[q] >= 0) continue;
+    PetscCall(HycoExprPlace(body->temperature, fe->mu, x + 3 * q, place));
+    HycoFail("%s is %g at %s; temperatures are in kelvin and not below 0", HycoExprKey(body->temperature), (double)T[q],
+             place);
+  }
+  if (!body->expansion) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoExprEval(body->reference, fe->mu, el->nq, x, reference));
+  PetscCall(HycoExprEvalHot(body->expansion, fe->mu, el->nq, x, T, expansion));
+  for (PetscInt q = 0; q < el->nq; q++)
+    HycoCheck(reference[q] >= 0, "%s is %g; temperatures are in kelvin and not below 0", HycoExprKey(body->reference),
+              (double)reference[q]);
+  for (PetscInt q = 0; q < el->nq; q++) fe->thermal[cell * el->nq + q] = expansion[q] * (T[q] - reference[q]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFESetHeat(HycoFE fe, PetscBool all, const PetscBool changed[])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[e]];
+
+    if (body->temperature && (all || HycoExprChanges(body->temperature, changed) ||
+                              HycoExprChanges(body->reference, changed) || HycoExprChanges(body->expansion, changed)))
+      PetscCall(SetCell(fe, el, e));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

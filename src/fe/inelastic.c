@@ -1,0 +1,471 @@
+/*
+  A step of bodies with memory: strains of the displacement at the integration points, the laws there in batches, their
+  stresses as nodal forces, their consistent tangents in fe's place for tangents. A point's reals in a state are
+
+      strain (n_sigma), stress (n_sigma), temperature, thermal strain, stored energy, accumulated inelastic strain,
+      the law's state variables
+*/
+#include <hycoinelastic.h>
+#include <hycokinematics.h>
+#include <hycomaterialimpl.h>
+
+#define BATCH   16 /* cells of one body whose points a law takes together */
+#define VIRGIN  -1 /* temperature of a point that no step has seen */
+#define N_PLAIN 4
+
+struct _n_HycoFEState {
+  PetscInt n_cells, *start; /* n_cells + 1 */
+  PetscReal *value;
+  PetscInt n_names;
+  const char **name; /* of the laws' state variables; the laws own them */
+};
+
+/* Where a point's reals are. */
+typedef struct {
+  PetscReal *strain, *stress, *temperature, *thermal, *stored, *accumulated, *variable;
+} Point;
+
+static PetscInt PointSize(HycoFE fe, PetscInt cell)
+{
+  return 2 * fe->n_sigma + N_PLAIN + fe->scene->body[fe->mesh->cell_body[cell]].law->n_state;
+}
+
+static Point PointAt(HycoFE fe, HycoFEState state, PetscInt cell, PetscInt q)
+{
+  PetscReal *value = state->value + state->start[cell] + q * PointSize(fe, cell);
+  PetscReal *plain = value + 2 * fe->n_sigma;
+  const Point p = {value, value + fe->n_sigma, plain, plain + 1, plain + 2, plain + 3, plain + N_PLAIN};
+
+  return p;
+}
+
+PetscErrorCode HycoFEStateDestroy(HycoFEState *state)
+{
+  PetscFunctionBegin;
+  if (!state || !*state) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*state)->start));
+  PetscCall(PetscFree((*state)->value));
+  PetscCall(PetscFree((*state)->name));
+  PetscCall(PetscFree(*state));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One of each of the laws' names. */
+static PetscErrorCode ListNames(HycoScene scene, HycoFEState s)
+{
+  PetscInt room = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < scene->n_bodies; b++) room += scene->body[b].law->n_state;
+  PetscCall(PetscCalloc1(room, &s->name));
+  for (PetscInt b = 0; b < scene->n_bodies; b++) {
+    const HycoMaterial law = scene->body[b].law;
+
+    for (PetscInt k = 0; law->state_name && k < law->n_state; k++) {
+      PetscBool seen = PETSC_FALSE;
+
+      for (PetscInt j = 0; j < s->n_names && !seen; j++) PetscCall(PetscStrcmp(s->name[j], law->state_name[k], &seen));
+      if (!seen) s->name[s->n_names++] = law->state_name[k];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEStateCreate(HycoFE fe, HycoFEState *state)
+{
+  const PetscInt n = fe->mesh->n_cells, nq = HycoElementGet(fe->mesh->type)->nq;
+  HycoFEState s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(state));
+  s = *state;
+  s->n_cells = n;
+  PetscCall(PetscMalloc1(n + 1, &s->start));
+  s->start[0] = 0;
+  for (PetscInt e = 0; e < n; e++) s->start[e + 1] = s->start[e] + nq * PointSize(fe, e);
+  PetscCall(PetscCalloc1(s->start[n], &s->value));
+  for (PetscInt e = 0; e < n; e++) {
+    for (PetscInt q = 0; q < nq; q++) *PointAt(fe, s, e, q).temperature = VIRGIN;
+  }
+  PetscCall(ListNames(fe->scene, s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEStateCopy(HycoFEState from, HycoFEState to)
+{
+  PetscFunctionBegin;
+  PetscCheck(from->n_cells == to->n_cells && from->start[from->n_cells] == to->start[to->n_cells], PETSC_COMM_SELF,
+             PETSC_ERR_ARG_INCOMP, "the states are of two meshes");
+  PetscCall(PetscArraycpy(to->value, from->value, from->start[from->n_cells]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEStateGet(HycoFEState state, const PetscInt **start, PetscReal **values)
+{
+  PetscFunctionBegin;
+  if (start) *start = state->start;
+  if (values) *values = state->value;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEStateGetNames(HycoFEState state, PetscInt *n, const char *const *names[])
+{
+  PetscFunctionBegin;
+  *n = state->n_names;
+  *names = state->name;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points of some cells of one body: what their law reads and writes, and the kinematics that make forces of it. */
+typedef struct {
+  const PetscReal *u;
+  PetscReal t0, t1;
+  HycoFEState begin, end;
+  PetscReal *f_int;
+  PetscBool tangents;
+  HycoFEStepReport *report;
+  PetscInt n, cell[BATCH];
+  PetscReal *memory, *x, *w, *strain0, *strain, *stress0, *stress, *temperature0, *temperature, *state0, *state;
+  PetscReal *stored, *dissipated, *increment, *potential, *tangent, *constant;
+  PetscReal (*g)[8][3], (*mean)[8][3];
+} Batch;
+
+/* All of a batch's arrays in one block. */
+static PetscErrorCode BatchCreate(HycoFE fe, Batch *b)
+{
+  const PetscInt n = BATCH * HycoElementGet(fe->mesh->type)->nq, ns = fe->n_sigma;
+  PetscInt n_state = 0, room, at = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < fe->scene->n_bodies; k++) n_state = PetscMax(n_state, fe->scene->body[k].law->n_state);
+  {
+    struct {
+      PetscReal **array;
+      PetscInt size;
+    } part[] = {{&b->x, 3},
+                {&b->w, 1},
+                {&b->strain0, ns},
+                {&b->strain, ns},
+                {&b->stress0, ns},
+                {&b->stress, ns},
+                {&b->temperature0, 1},
+                {&b->temperature, 1},
+                {&b->state0, n_state},
+                {&b->state, n_state},
+                {&b->stored, 1},
+                {&b->dissipated, 1},
+                {&b->increment, 1},
+                {&b->potential, 1},
+                {&b->tangent, ns * ns},
+                {&b->constant, HYCO_MAX_DECLARED}};
+    const PetscInt parts = (PetscInt)(sizeof(part) / sizeof(part[0]));
+
+    room = 0;
+    for (PetscInt k = 0; k < parts; k++) room += part[k].size * n;
+    PetscCall(PetscMalloc1(room, &b->memory));
+    for (PetscInt k = 0; k < parts; k++) {
+      *part[k].array = b->memory + at;
+      at += part[k].size * n;
+    }
+  }
+  PetscCall(PetscMalloc2(n, &b->g, BATCH, &b->mean));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode BatchDestroy(Batch *b)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree2(b->g, b->mean));
+  PetscCall(PetscFree(b->memory));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Strains at the end of the step, and what the state at its begin has; the law's strains are without the thermal ones.
+ */
+static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
+{
+  const PetscInt ns = fe->n_sigma, body = fe->mesh->cell_body[b->cell[0]];
+  const PetscInt n_state = fe->scene->body[body].law->n_state;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscInt cell = b->cell[k];
+
+    if (fe->bbar[body]) PetscCall(HycoMeanGradients(fe, el, cell, b->mean[k]));
+    for (PetscInt q = 0; q < el->nq; q++) {
+      const PetscInt i = k * el->nq + q;
+      const PetscReal T = fe->temperature ? fe->temperature[cell * el->nq + q] : 0;
+      const PetscReal hot = fe->thermal ? fe->thermal[cell * el->nq + q] : 0;
+      const Point from = PointAt(fe, b->begin, cell, q), to = PointAt(fe, b->end, cell, q);
+      PetscReal strain[6];
+
+      PetscCall(HycoGradients(fe, el, cell, q, b->g[i], &b->w[i]));
+      HycoPointStrain(fe, el, cell, b->u, b->g[i], fe->bbar[body] ? b->mean[k] : NULL, strain);
+      HycoPointPlace(fe, el, cell, q, b->x + 3 * i);
+      for (PetscInt c = 0; c < ns; c++) {
+        to.strain[c] = strain[c];
+        b->strain[i * ns + c] = strain[c] - (c < 3 ? hot : 0);
+        b->strain0[i * ns + c] = from.strain[c] - (c < 3 ? *from.thermal : 0);
+        b->stress0[i * ns + c] = from.stress[c];
+      }
+      for (PetscInt j = 0; j < n_state; j++) b->state0[i * n_state + j] = from.variable[j];
+      b->temperature0[i] = *from.temperature == VIRGIN ? T : *from.temperature;
+      b->temperature[i] = *to.temperature = T;
+      *to.thermal = hot;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A linear law: stress and energy by fe's tangents. */
+static void Linear(HycoFE fe, const HycoElement *el, Batch *b)
+{
+  const PetscInt ns = fe->n_sigma, size = fe->tangent_size[fe->mesh->cell_body[b->cell[0]]];
+
+  for (PetscInt i = 0; i < b->n * el->nq; i++) {
+    const PetscReal *C = fe->tangent + fe->tangent_start[b->cell[i / el->nq]] + i % el->nq * size;
+    const PetscReal *strain = b->strain + i * ns;
+    PetscReal *stress = b->stress + i * ns;
+
+    HycoTangentApply((PetscBool)(size == 2), fe->dim, C, strain, stress);
+    b->stored[i] = b->dissipated[i] = b->increment[i] = 0;
+    for (PetscInt c = 0; c < ns; c++) b->stored[i] += stress[c] * strain[c] / 2;
+    b->potential[i] = b->stored[i];
+  }
+}
+
+/* What a law leaves: nothing stored, all of the work dissipated. */
+static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
+{
+  const PetscInt ns = fe->n_sigma;
+
+  for (PetscInt i = 0; i < b->n * el->nq; i++) {
+    if (!PetscIsNanReal(b->dissipated[i])) continue;
+    b->dissipated[i] = *PointAt(fe, b->begin, b->cell[i / el->nq], i % el->nq).stored - b->stored[i];
+    for (PetscInt c = i * ns; c < (i + 1) * ns; c++)
+      b->dissipated[i] += (b->stress0[c] + b->stress[c]) / 2 * (b->strain[c] - b->strain0[c]);
+  }
+}
+
+/* The batch's law; *failed: a point where it has no answer. */
+static PetscErrorCode Update(HycoFE fe, const HycoElement *el, Batch *b, PetscBool *failed)
+{
+  const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[b->cell[0]]];
+  const PetscReal *constant[HYCO_MAX_DECLARED];
+  HycoMaterialPoints p = {.n = b->n * el->nq,
+                          .dim = fe->dim,
+                          .n_strain = fe->n_sigma,
+                          .constant = constant,
+                          .dt = b->t1 - b->t0,
+                          .strain0 = b->strain0,
+                          .strain = b->strain,
+                          .stress0 = b->stress0,
+                          .temperature0 = body->temperature ? b->temperature0 : NULL,
+                          .temperature = body->temperature ? b->temperature : NULL,
+                          .state0 = b->state0,
+                          .state = b->state,
+                          .stress = b->stress,
+                          .tangent = b->tangents ? b->tangent : NULL,
+                          .stored = b->stored,
+                          .dissipated = b->dissipated,
+                          .increment = b->increment,
+                          .potential = b->potential};
+  const PetscReal nothing = NAN;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMaterialConstants(body->law, fe->mu, p.n, b->x, p.temperature, b->constant, constant));
+  for (PetscInt i = 0; i < p.n; i++) {
+    b->stored[i] = b->increment[i] = 0;
+    b->dissipated[i] = b->potential[i] = nothing;
+  }
+  PetscCall(HycoMaterialUpdate(body->law, &p));
+  b->report->dt_factor = PetscMin(b->report->dt_factor, p.dt_factor);
+  *failed = (PetscBool)(p.failed >= 0);
+  if (*failed && !b->report->failed)
+    HycoFormat(b->report->why, "body %s, law %s: %s at x = %g, y = %g, z = %g", body->name,
+               ((PetscObject)body->law)->type_name, p.why ? p.why : "no answer", (double)b->x[3 * p.failed],
+               (double)b->x[3 * p.failed + 1], (double)b->x[3 * p.failed + 2]);
+  b->report->failed = (PetscBool)(b->report->failed || *failed);
+  if (!*failed) Complete(fe, el, b);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A point's energies, with the identity of the report. */
+static void Count(HycoFE fe, Batch *b, PetscInt i, const Point *from, const Point *to)
+{
+  HycoFEStepReport *r = b->report;
+  PetscReal work = 0, thermal = 0;
+
+  for (PetscInt c = 0; c < fe->n_sigma; c++) {
+    const PetscReal mean = (from->stress[c] + to->stress[c]) / 2;
+
+    work += mean * (to->strain[c] - from->strain[c]);
+    if (c < 3) thermal += mean * (*to->thermal - *from->thermal);
+  }
+  r->work += b->w[i] * work;
+  r->stored += b->w[i] * b->stored[i];
+  r->dissipated += b->w[i] * b->dissipated[i];
+  r->thermal += b->w[i] * thermal;
+  r->moduli += b->w[i] * (work - thermal - b->dissipated[i] - (b->stored[i] - *from->stored));
+  if (PetscIsNanReal(b->potential[i]))
+    r->has_potential = PETSC_FALSE;
+  else
+    r->potential += b->w[i] * b->potential[i];
+}
+
+/* The batch's answers into the state, f_int, the tangents and the report. */
+static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear)
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt ns = fe->n_sigma, body = m->cell_body[b->cell[0]], n_state = fe->scene->body[body].law->n_state;
+
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscInt cell = b->cell[k];
+    PetscReal f[HYCO_MAX_CELL_DOFS] = {0};
+
+    for (PetscInt q = 0; q < el->nq; q++) {
+      const PetscInt i = k * el->nq + q;
+      const Point from = PointAt(fe, b->begin, cell, q), to = PointAt(fe, b->end, cell, q);
+      PetscReal s[6] = {0, 0, 0, 0, 0, 0};
+
+      for (PetscInt c = 0; c < ns; c++) s[c] = to.stress[c] = b->stress[i * ns + c];
+      for (PetscInt j = 0; j < n_state && !linear; j++) to.variable[j] = b->state[i * n_state + j];
+      *to.stored = b->stored[i];
+      *to.accumulated = *from.accumulated + b->increment[i];
+      HycoPointForce(fe, el, b->g[i], fe->bbar[body] ? b->mean[k] : NULL, b->w[i], s, f);
+      b->report->increment = PetscMax(b->report->increment, b->increment[i]);
+      if (HycoMeshOwned(fe->mesh, fe->mesh->cells[cell * fe->mesh->nv]) >= 0) Count(fe, b, i, &from, &to);
+      for (PetscInt r = 0; r < ns && b->tangents && !linear; r++) {
+        const PetscReal *C = b->tangent + i * ns * ns;
+
+        for (PetscInt c = 0; c < ns; c++)
+          fe->tangent[fe->tangent_start[cell] + (q * ns + r) * ns + c] = (C[r * ns + c] + C[c * ns + r]) / 2;
+      }
+    }
+    for (PetscInt r = 0; r < m->nv * fe->dim; r++)
+      b->f_int[m->cells[cell * m->nv + r / fe->dim] * fe->dim + r % fe->dim] += f[r];
+  }
+}
+
+static PetscErrorCode Step(HycoFE fe, const HycoElement *el, Batch *b)
+{
+  PetscBool failed = PETSC_FALSE, linear;
+
+  PetscFunctionBegin;
+  if (!b->n) PetscFunctionReturn(PETSC_SUCCESS);
+  linear = fe->scene->body[fe->mesh->cell_body[b->cell[0]]].law->linear;
+  PetscCall(Gather(fe, el, b));
+  if (linear)
+    Linear(fe, el, b);
+  else
+    PetscCall(Update(fe, el, b, &failed));
+  if (!failed) Scatter(fe, el, b, linear);
+  b->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode StepAll(HycoFE fe, Batch *b)
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGet(m->type);
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Step(fe, el, b));
+    b->cell[b->n++] = e;
+  }
+  PetscCall(Step(fe, el, b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
+                          HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report)
+{
+  const HycoFEStepReport fresh = {.dt_factor = 1, .has_potential = PETSC_TRUE};
+  Batch b = {.u = u, .t0 = t0, .t1 = t1, .begin = begin, .end = end, .f_int = f_int, .tangents = tangent};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCheck(begin != end, PETSC_COMM_SELF, PETSC_ERR_ARG_IDN, "a step begins and ends in one state");
+  PetscCheck(t1 >= t0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "a step from %g back to %g", (double)t0, (double)t1);
+  *report = fresh;
+  b.report = report;
+  PetscCall(BatchCreate(fe, &b));
+  ierr = StepAll(fe, &b);
+  PetscCall(BatchDestroy(&b));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEElasticTangent(HycoFE fe)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFESetTangents(fe, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal Mises(PetscInt dim, const PetscReal s[])
+{
+  PetscReal mean, sum = 0;
+
+  if (dim == 1) return PetscAbsReal(s[0]);
+  mean = (s[0] + s[1] + s[2]) / 3;
+  for (PetscInt c = 0; c < HycoStrainSize(dim); c++) sum += c < 3 ? (s[c] - mean) * (s[c] - mean) : 2 * s[c] * s[c];
+  return PetscSqrtReal(1.5 * sum);
+}
+
+PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[], PetscReal mises[],
+                                 PetscReal inelastic[], PetscReal temperature[])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscInt ns = fe->n_sigma;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    PetscReal sum[9] = {0}, volume = 0;
+
+    for (PetscInt q = 0; q < el->nq; q++) {
+      const Point p = PointAt(fe, state, e, q);
+      PetscReal g[8][3], w;
+
+      PetscCall(HycoGradients(fe, el, e, q, g, &w));
+      volume += w;
+      for (PetscInt c = 0; c < ns; c++) sum[c] += w * p.stress[c];
+      sum[6] += w * Mises(fe->dim, p.stress);
+      sum[7] += w * *p.accumulated;
+      sum[8] += w * PetscMax(*p.temperature, 0);
+    }
+    for (PetscInt c = 0; sigma && c < ns; c++) sigma[e * ns + c] = sum[c] / volume;
+    if (mises) mises[e] = sum[6] / volume;
+    if (inelastic) inelastic[e] = sum[7] / volume;
+    if (temperature) temperature[e] = sum[8] / volume;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name[], PetscReal value[])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    const HycoMaterial law = fe->scene->body[fe->mesh->cell_body[e]].law;
+    PetscReal g[8][3], w, volume = 0;
+    PetscInt which = -1;
+
+    value[e] = 0;
+    for (PetscInt k = 0; law->state_name && k < law->n_state && which < 0; k++) {
+      PetscBool same;
+
+      PetscCall(PetscStrcmp(law->state_name[k], name, &same));
+      if (same) which = k;
+    }
+    for (PetscInt q = 0; q < el->nq && which >= 0; q++) {
+      PetscCall(HycoGradients(fe, el, e, q, g, &w));
+      volume += w;
+      value[e] += w * PointAt(fe, state, e, q).variable[which];
+    }
+    if (volume > 0) value[e] /= volume;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,425 @@
+/*
+  A path's last accepted step, on file: displacements and forces of the nodes by their tags, the state of the cells by
+  theirs, the contact forces in the contacts' order, so that another number of ranks may go on. Written whole or not at
+  all, after each accepted step; the steps' fields for a series stand in files of their own beside it.
+*/
+#include <hycoh5.h>
+#include <hycopath.h>
+#include <stddef.h>
+#include <string.h>
+#include <unistd.h>
+
+#define FORMAT 1
+
+/* A HycoStep as reals. */
+typedef struct {
+  size_t at;
+  PetscBool is_int;
+} Member;
+#define INT(name)                                                                                                      \
+  {                                                                                                                    \
+    offsetof(HycoStep, name), PETSC_TRUE                                                                               \
+  }
+#define REAL(name)                                                                                                     \
+  {                                                                                                                    \
+    offsetof(HycoStep, name), PETSC_FALSE                                                                              \
+  }
+static const Member member[] = {INT(index),          REAL(t),
+                                INT(substeps),       INT(cuts),
+                                INT(iterations),     INT(most_iterations),
+                                INT(factors),        INT(active_set_iterations),
+                                INT(n_active),       REAL(total_contact_force),
+                                REAL(lambda_max),    REAL(u_norm2),
+                                REAL(mises),         REAL(inelastic),
+                                REAL(residual),      REAL(kkt),
+                                REAL(work),          REAL(contact_work),
+                                REAL(stored),        REAL(dissipated),
+                                REAL(thermal),       REAL(energy_defect),
+                                REAL(seconds),       REAL(seconds_factor),
+                                REAL(seconds_solve), REAL(seconds_law)};
+#define N_MEMBERS ((PetscInt)(sizeof(member) / sizeof(member[0])))
+
+static void StepToReals(const HycoStep *s, PetscReal v[])
+{
+  for (PetscInt j = 0; j < N_MEMBERS; j++) {
+    const char *at = (const char *)s + member[j].at;
+
+    v[j] = member[j].is_int ? (PetscReal) * (const PetscInt *)(const void *)at : *(const PetscReal *)(const void *)at;
+  }
+}
+
+static void RealsToStep(const PetscReal v[], HycoStep *s)
+{
+  for (PetscInt j = 0; j < N_MEMBERS; j++) {
+    char *at = (char *)s + member[j].at;
+
+    if (member[j].is_int)
+      *(PetscInt *)(void *)at = (PetscInt)v[j];
+    else
+      *(PetscReal *)(void *)at = v[j];
+  }
+}
+
+/* What the file has by item: U, F_old, f_old of a node; the state of a cell, as long as the longest. */
+#define NODE_COLS(f) (3 * (f)->part->dim)
+static PetscErrorCode StateCols(HycoFOM f, PetscInt *cols)
+{
+  const PetscInt *start;
+  PetscReal *value;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEStateGet(f->path->begin, &start, &value));
+  *cols = 1;
+  for (PetscInt e = 0; e < f->part->n_cells; e++) *cols = PetscMax(*cols, start[e + 1] - start[e]);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, cols, 1, MPIU_INT, MPI_MAX, HycoComm(f)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The scene and the point that a checkpoint is of. */
+static PetscErrorCode Identify(HycoFOM f, char text[HYCO_LINE])
+{
+  unsigned long long hash;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneFingerprint(f->scene, &hash));
+  hash = HycoHash(hash, f->path->mu, (size_t)f->scene->n_parameters * sizeof(PetscReal));
+  HycoFormat(text, "%016llx", hash);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes' values (n_nodes of the part x NODE_COLS) from or into the vectors; own nodes alone. */
+static PetscErrorCode MoveNodes(HycoFOM f, PetscBool out, PetscReal value[])
+{
+  const PetscInt dim = f->part->dim, cols = NODE_COLS(f);
+  Vec vec[3] = {f->U, f->path->F_old, f->path->f_old};
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < 3; j++) {
+    PetscScalar *v;
+
+    PetscCall(VecGetArray(vec[j], &v));
+    for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+      const PetscInt row = HycoMeshOwned(f->part, i);
+
+      for (PetscInt c = 0; row >= 0 && c < dim; c++) {
+        PetscReal *at = value + i * cols + j * dim + c;
+
+        if (out)
+          *at = v[row * dim + c];
+        else
+          v[row * dim + c] = *at;
+      }
+    }
+    PetscCall(VecRestoreArray(vec[j], &v));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MoveState(HycoFOM f, PetscBool out, PetscInt cols, PetscReal value[])
+{
+  const PetscInt *start;
+  PetscReal *state;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEStateGet(f->path->begin, &start, &state));
+  for (PetscInt e = 0; e < f->part->n_cells; e++) {
+    const PetscInt n = start[e + 1] - start[e];
+
+    if (out)
+      PetscCall(PetscArraycpy(value + e * cols, state + start[e], n));
+    else
+      PetscCall(PetscArraycpy(state + start[e], value + e * cols, n));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The reals that say where the path is. */
+#define N_HEAD (4 + (PetscInt)(sizeof(HycoWork) / sizeof(PetscReal)) + (PetscInt)(sizeof(HycoKKT) / sizeof(PetscReal)))
+static void MoveHead(HycoPath p, PetscBool out, PetscReal head[])
+{
+  PetscReal *work = (PetscReal *)&p->work_done, *kkt = (PetscReal *)&p->kkt;
+  const size_t n_work = sizeof(HycoWork) / sizeof(PetscReal), n_kkt = sizeof(HycoKKT) / sizeof(PetscReal);
+
+  if (out) {
+    head[0] = p->t;
+    head[1] = p->dt;
+    head[2] = (PetscReal)p->step;
+    head[3] = (PetscReal)p->n_steps;
+    memcpy(head + 4, work, n_work * sizeof(PetscReal));
+    memcpy(head + 4 + n_work, kkt, n_kkt * sizeof(PetscReal));
+  } else {
+    p->t = head[0];
+    p->dt = head[1];
+    p->step = (PetscInt)head[2];
+    p->n_steps = (PetscInt)head[3];
+    memcpy(work, head + 4, n_work * sizeof(PetscReal));
+    memcpy(kkt, head + 4 + n_work, n_kkt * sizeof(PetscReal));
+  }
+}
+
+/* A checkpoint on rank 0; on the others after Spread(). */
+typedef struct {
+  PetscReal *node, *cell, *lambda, *head, *steps, *orders;
+  PetscInt *node_tag, *cell_tag, n_nodes, n_cells, cell_cols, n_steps, n_orders;
+} Content;
+
+static PetscErrorCode WriteContent(HycoFOM f, const Content *c, const char key[])
+{
+  const PetscInt format = FORMAT;
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Create(f->path->checkpoint, &h));
+  ierr = HycoH5WriteInt(h, "checkpoint/format", 1, 1, &format);
+  if (!ierr) ierr = HycoH5WriteText(h, "checkpoint/key", key);
+  if (!ierr) ierr = HycoH5WriteReal(h, "head", N_HEAD, 1, c->head);
+  if (!ierr) ierr = HycoH5WriteReal(h, "steps", c->n_steps + 1, N_MEMBERS, c->steps);
+  if (!ierr && c->n_orders) ierr = HycoH5WriteReal(h, "orders", c->n_orders, 1, c->orders);
+  if (!ierr) ierr = HycoH5WriteInt(h, "node_tag", c->n_nodes, 1, c->node_tag);
+  if (!ierr) ierr = HycoH5WriteReal(h, "node", c->n_nodes, NODE_COLS(f), c->node);
+  if (!ierr) ierr = HycoH5WriteInt(h, "cell_tag", c->n_cells, 1, c->cell_tag);
+  if (!ierr) ierr = HycoH5WriteReal(h, "cell", c->n_cells, c->cell_cols, c->cell);
+  if (!ierr && f->n_contacts) ierr = HycoH5WriteReal(h, "lambda", f->n_contacts, 1, c->lambda);
+  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lambda in the contacts' order: on rank 0, or from there. */
+static PetscErrorCode MoveForces(HycoFOM f, PetscBool out, PetscReal lambda[])
+{
+  const ScatterMode mode = out ? SCATTER_FORWARD : SCATTER_REVERSE;
+  Vec from = out ? f->Lambda : f->lambda_root, to = out ? f->lambda_root : f->Lambda;
+  PetscScalar *v;
+
+  PetscFunctionBegin;
+  if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    if (pass == (out ? 0 : 1)) {
+      PetscCall(VecScatterBegin(f->lambda_to_root, from, to, INSERT_VALUES, mode));
+      PetscCall(VecScatterEnd(f->lambda_to_root, from, to, INSERT_VALUES, mode));
+    } else {
+      PetscCall(VecGetArray(f->lambda_root, &v));
+      if (f->rank == 0) PetscCall(PetscArraycpy(out ? lambda : v, out ? v : lambda, f->n_contacts));
+      PetscCall(VecRestoreArray(f->lambda_root, &v));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FreeContent(Content *c)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(c->node));
+  PetscCall(PetscFree(c->cell));
+  PetscCall(PetscFree(c->lambda));
+  PetscCall(PetscFree(c->head));
+  PetscCall(PetscFree(c->steps));
+  PetscCall(PetscFree(c->orders));
+  PetscCall(PetscFree(c->node_tag));
+  PetscCall(PetscFree(c->cell_tag));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes and cells to rank 0. */
+static PetscErrorCode BringItems(HycoFOM f, Content *c)
+{
+  HycoPath p = f->path;
+  PetscReal *mine;
+
+  PetscFunctionBegin;
+  if (!p->node.own) PetscCall(HycoItemsCreate(f, &p->node, &p->cell));
+  PetscCall(PetscMalloc1(f->part->n_nodes * NODE_COLS(f), &mine));
+  PetscCall(MoveNodes(f, PETSC_TRUE, mine));
+  PetscCall(HycoItemsBring(f, &p->node, NODE_COLS(f), mine, &c->node));
+  PetscCall(PetscFree(mine));
+  PetscCall(StateCols(f, &c->cell_cols));
+  PetscCall(PetscCalloc1(f->part->n_cells * c->cell_cols, &mine));
+  PetscCall(MoveState(f, PETSC_TRUE, c->cell_cols, mine));
+  PetscCall(HycoItemsBring(f, &p->cell, c->cell_cols, mine, &c->cell));
+  PetscCall(PetscFree(mine));
+  c->n_nodes = p->node.n_all;
+  c->n_cells = p->cell.n_all;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathSave(HycoFOM f)
+{
+  HycoPath p = f->path;
+  Content c = {.n_steps = p->n_steps, .n_orders = p->n_orders};
+  char key[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (!p->checkpoint[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Identify(f, key));
+  PetscCall(BringItems(f, &c));
+  PetscCall(PetscCalloc1(f->n_contacts + 1, &c.lambda));
+  PetscCall(MoveForces(f, PETSC_TRUE, c.lambda));
+  PetscCall(PetscMalloc1(N_HEAD, &c.head));
+  MoveHead(p, PETSC_TRUE, c.head);
+  PetscCall(PetscMalloc1((p->n_steps + 1) * N_MEMBERS, &c.steps));
+  for (PetscInt k = 0; k < p->n_steps; k++) StepToReals(&p->steps[k], c.steps + k * N_MEMBERS);
+  StepToReals(&p->now, c.steps + p->n_steps * N_MEMBERS);
+  HycoDuplicate(p->n_orders, p->orders, &c.orders);
+  HycoDuplicate(p->node.n_all, p->node.tag, &c.node_tag);
+  HycoDuplicate(p->cell.n_all, p->cell.tag, &c.cell_tag);
+  HycoOnRoot(HycoComm(f), WriteContent(f, &c, key));
+  PetscCall(FreeContent(&c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content *c)
+{
+  char *text = NULL;
+  PetscInt one = 1, rows = -1, *format = NULL, cols = NODE_COLS(f);
+  PetscBool same;
+
+  PetscFunctionBegin;
+  HycoCheck(HycoH5Has(h, "checkpoint/key"), "%s is no checkpoint of a history", f->path->checkpoint);
+  PetscCall(HycoH5LoadInt(h, "checkpoint/format", 1, FORMAT, &one, &one, &format));
+  PetscCall(PetscFree(format));
+  PetscCall(HycoH5LoadText(h, "checkpoint/key", &text));
+  same = (PetscBool)(strcmp(text, key) == 0);
+  PetscCall(PetscFree(text));
+  HycoCheck(same,
+            "the checkpoint %s is of another scene, mesh or point; take away -hyco_resume, or give it another name",
+            f->path->checkpoint);
+  rows = N_HEAD;
+  PetscCall(HycoH5LoadReal(h, "head", &rows, &one, &c->head));
+  rows = -1;
+  PetscCall(HycoH5LoadReal(h, "steps", &rows, (PetscInt[]){N_MEMBERS}, &c->steps));
+  c->n_steps = rows - 1;
+  HycoCheck(c->n_steps >= 0 && c->n_steps <= f->scene->n_times && c->head[2] >= 0 &&
+                c->head[2] <= (PetscReal)f->scene->n_times && c->head[3] == (PetscReal)c->n_steps,
+            "the checkpoint %s is damaged", f->path->checkpoint);
+  rows = -1;
+  if (HycoH5Has(h, "orders")) PetscCall(HycoH5LoadReal(h, "orders", &rows, &one, &c->orders));
+  c->n_orders = PetscMax(0, rows);
+  c->n_nodes = f->n_nodes;
+  c->n_cells = f->n_cells;
+  c->cell_cols = -1;
+  PetscCall(HycoH5LoadInt(h, "node_tag", 0, PETSC_MAX_INT, &c->n_nodes, &one, &c->node_tag));
+  PetscCall(HycoH5LoadReal(h, "node", &c->n_nodes, &cols, &c->node));
+  PetscCall(HycoH5LoadInt(h, "cell_tag", 0, PETSC_MAX_INT, &c->n_cells, &one, &c->cell_tag));
+  PetscCall(HycoH5LoadReal(h, "cell", &c->n_cells, &c->cell_cols, &c->cell));
+  rows = f->n_contacts;
+  if (rows) PetscCall(HycoH5LoadReal(h, "lambda", &rows, &one, &c->lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadContent(HycoFOM f, const char key[], Content *c)
+{
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5OpenOr(f->path->checkpoint, "take away -hyco_resume", &h));
+  ierr = ReadOpened(f, h, key, c);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* n reals or integers of rank 0, on every rank. */
+static PetscErrorCode Spread(HycoFOM f, PetscInt n, MPI_Datatype type, size_t size, void *array)
+{
+  void **at = (void **)array;
+  size_t done = 0;
+  const size_t all = (size_t)n, block = 1 << 24;
+
+  PetscFunctionBegin;
+  if (f->rank) PetscCall(PetscMalloc((all + 1) * size, at));
+  for (; done < all; done += block)
+    PetscCallMPI(MPI_Bcast((char *)*at + done * size, (PetscMPIInt)PetscMin(block, all - done), type, 0, HycoComm(f)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SpreadContent(HycoFOM f, Content *c)
+{
+  PetscInt size[5] = {c->n_nodes, c->n_cells, c->cell_cols, c->n_steps, c->n_orders};
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Bcast(size, 5, MPIU_INT, 0, HycoComm(f)));
+  c->n_nodes = size[0];
+  c->n_cells = size[1];
+  c->cell_cols = size[2];
+  c->n_steps = size[3];
+  c->n_orders = size[4];
+  PetscCall(Spread(f, c->n_nodes, MPIU_INT, sizeof(PetscInt), &c->node_tag));
+  PetscCall(Spread(f, c->n_cells, MPIU_INT, sizeof(PetscInt), &c->cell_tag));
+  PetscCall(Spread(f, c->n_nodes * NODE_COLS(f), MPIU_REAL, sizeof(PetscReal), &c->node));
+  PetscCall(Spread(f, c->n_cells * c->cell_cols, MPIU_REAL, sizeof(PetscReal), &c->cell));
+  PetscCall(Spread(f, N_HEAD, MPIU_REAL, sizeof(PetscReal), &c->head));
+  PetscCall(Spread(f, (c->n_steps + 1) * N_MEMBERS, MPIU_REAL, sizeof(PetscReal), &c->steps));
+  if (c->n_orders) PetscCall(Spread(f, c->n_orders, MPIU_REAL, sizeof(PetscReal), &c->orders));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rows by ascending tag, in the order of these tags. */
+static PetscErrorCode Pick(PetscInt n_all, const PetscInt tag_all[], PetscInt cols, const PetscReal all[], PetscInt n,
+                           const PetscInt tag[], PetscReal value[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    PetscInt at;
+
+    PetscCall(PetscFindInt(tag[k], n_all, tag_all, &at));
+    HycoCheck(at >= 0, "the checkpoint has no node or cell %d", (int)tag[k]);
+    PetscCall(PetscArraycpy(value + k * cols, all + at * cols, cols));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
+{
+  HycoPath p = f->path;
+  PetscReal *mine;
+  PetscInt cols;
+
+  PetscFunctionBegin;
+  PetscCall(StateCols(f, &cols));
+  PetscCheck(cols == c->cell_cols, HycoComm(f), PETSC_ERR_USER,
+             "the checkpoint has %d reals a cell, the laws have %d; take away -hyco_resume", (int)c->cell_cols,
+             (int)cols);
+  PetscCall(PetscMalloc1(f->part->n_nodes * NODE_COLS(f), &mine));
+  HycoOnEach(HycoComm(f),
+             Pick(c->n_nodes, c->node_tag, NODE_COLS(f), c->node, f->part->n_nodes, f->part->node_id, mine));
+  PetscCall(MoveNodes(f, PETSC_FALSE, mine));
+  PetscCall(PetscFree(mine));
+  PetscCall(PetscMalloc1(f->part->n_cells * cols, &mine));
+  HycoOnEach(HycoComm(f), Pick(c->n_cells, c->cell_tag, cols, c->cell, f->part->n_cells, f->part->cell_id, mine));
+  PetscCall(MoveState(f, PETSC_FALSE, cols, mine));
+  PetscCall(PetscFree(mine));
+  PetscCall(MoveForces(f, PETSC_FALSE, c->lambda));
+  MoveHead(p, PETSC_FALSE, c->head);
+  for (PetscInt k = 0; k < c->n_steps; k++) RealsToStep(c->steps + k * N_MEMBERS, &p->steps[k]);
+  RealsToStep(c->steps + c->n_steps * N_MEMBERS, &p->now);
+  PetscCall(PetscFree(p->orders));
+  HycoDuplicate(c->n_orders, c->orders, &p->orders);
+  p->n_orders = p->room_orders = c->n_orders;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathLoad(HycoFOM f)
+{
+  HycoPath p = f->path;
+  Content c = {.n_steps = 0};
+  char key[HYCO_LINE];
+  PetscInt there = f->rank == 0 && access(p->checkpoint, F_OK) == 0;
+
+  PetscFunctionBegin;
+  PetscCheck(p->checkpoint[0], HycoComm(f), PETSC_ERR_USER,
+             "-hyco_resume goes on from a checkpoint; name it by -hyco_checkpoint FILE.h5");
+  PetscCallMPI(MPI_Bcast(&there, 1, MPIU_INT, 0, HycoComm(f)));
+  if (!there) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Identify(f, key));
+  HycoOnRoot(HycoComm(f), ReadContent(f, key, &c));
+  PetscCall(SpreadContent(f, &c));
+  PetscCall(TakeContent(f, &c));
+  PetscCall(FreeContent(&c));
+  PetscCall(HycoPathAssemble(f, p->t)); /* what is asked for without another step */
+  PetscCall(HycoFOMGather(f));
+  PetscCall(HycoSeriesRestore(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,336 @@
+/*
+  Radial return for laws of von Mises type (J. C. Simo, T. J. R. Hughes, Computational Inelasticity, 1998, chapter 3,
+  for any creep and hardening): with the trial stress q_tr of a step without flow, H = 3 G (1D: H = E),
+
+      q + H dp = q_tr,   dp = dp_creep(q) + dp_plastic,   0 <= dp_plastic complementary to Y(p + dp_plastic) - q >= 0
+
+  by a Newton method that a bracket guards. Points are independent of one another: a batch gives the bits that each of
+  its points gives alone.
+*/
+#include <hycoflow.h>
+
+#define ITERATIONS 500  /* with a bisection every eighth, ten times more than any bracket needs */
+#define BLOCK      32   /* points at a time */
+#define CLOSE      1e-8 /* a Newton step this small, relatively, leaves an error of its square */
+
+/* The bracket [lo, hi] of a root, and the next iterate: `newton`, unless it leaves the bracket or it is time to bisect.
+   Whether that ends the iteration is returned. */
+typedef struct {
+  PetscReal lo, hi;
+  PetscInt iterations;
+} Bracket;
+
+static PetscBool Advance(Bracket *b, PetscReal newton, PetscReal *q)
+{
+  const PetscReal old = *q;
+  const PetscBool inside = (PetscBool)(newton > b->lo && newton < b->hi);
+
+  if (newton >= b->lo && newton <= b->hi && PetscAbsReal(newton - old) <= CLOSE * old) {
+    *q = newton;
+    return PETSC_TRUE;
+  }
+  *q = inside && ++b->iterations % 8 ? newton : b->lo + (b->hi - b->lo) / 2;
+  return (PetscBool)(*q == b->lo || *q == b->hi || b->iterations > ITERATIONS);
+}
+
+/* A point in work: its trial state, and the iteration for the equivalent stress under creep alone. */
+typedef struct {
+  HycoFlowPoint p;
+  PetscReal H, trial, pressure, s[6]; /* trial: q_tr; s: the trial stress's deviator (1D: the stress) */
+  PetscReal q, creep, slope;          /* creep strain of the step at q, and its derivative */
+  Bracket b;
+  PetscBool done;
+} Work;
+
+/* The first iterate: q_tr, or where creep there is too fast, a step towards the root of the power law that touches it.
+ */
+static void StartCreep(const HycoFlowRule *rule, Work *w)
+{
+  const PetscReal trial = w->trial;
+
+  w->q = trial;
+  w->creep = w->slope = 0;
+  w->done = PETSC_TRUE;
+  if (!rule->creep || !(w->p.dt > 0) || !(trial > 0)) return;
+  w->creep = (*rule->creep)(&w->p, trial, &w->slope);
+  if (!(w->creep > 0)) return;
+  w->done = PETSC_FALSE;
+  w->b.lo = 0;
+  w->b.hi = trial;
+  w->b.iterations = 0;
+  if (w->H * w->creep > trial) {
+    const PetscReal power = trial * w->slope / w->creep;
+    const PetscReal guess = trial * PetscPowReal(trial / (w->H * w->creep), 1 / power);
+
+    w->q = guess > 0 && guess < trial ? guess * (1 - guess / (guess + power * trial)) : trial / 2;
+    w->creep = (*rule->creep)(&w->p, w->q, &w->slope);
+  }
+}
+
+/* An iteration for q + H creep(q) = q_tr, on the logarithms of H creep and q_tr - q where creep decides: a power law is
+   nearly straight there. After the last one creep follows its tangent, and the slope that of a power law: what is left
+   is of the step's square. */
+static void IterateCreep(const HycoFlowRule *rule, Work *w)
+{
+  const PetscReal old = w->q, rest = w->trial - old, excess = w->H * w->creep - rest;
+  PetscReal newton = old - excess / (1 + w->H * w->slope);
+
+  if (w->H * w->slope > 1 && rest > 0)
+    newton = old - PetscLogReal(w->H * w->creep / rest) / (w->slope / w->creep + 1 / rest); /* NaN: creep overflows */
+  if (excess < 0)
+    w->b.lo = old;
+  else if (excess == 0) {
+    w->done = PETSC_TRUE;
+    return;
+  } else
+    w->b.hi = old;
+  w->done = Advance(&w->b, newton, &w->q);
+  if (w->done && w->q == newton) {
+    const PetscReal power = old * w->slope / w->creep, change = (w->q - old) / old;
+
+    w->creep += w->slope * (w->q - old);
+    w->slope *= 1 + (power - 1) * change;
+  } else
+    w->creep = (*rule->creep)(&w->p, w->q, &w->slope);
+}
+
+/* What the flow of a step makes of a point. */
+typedef struct {
+  PetscReal q, creep, plastic; /* equivalent stress; equivalent strains of the step */
+  PetscReal slope;             /* of both together by q_tr */
+} Flow;
+
+/* q = Y(plastic0 + (q_tr - q) / H - creep(q)) between the yield stress before the step and q of creep alone, f->q. */
+static PetscReal SolveYield(const HycoFlowRule *rule, const Work *w, PetscReal yield, Flow *f, PetscReal *slope,
+                            PetscReal *hardening)
+{
+  Bracket b = {yield, f->q, 0};
+  PetscReal q = yield;
+  PetscBool done = PETSC_FALSE;
+
+  for (;;) {
+    PetscReal excess;
+
+    if (rule->creep) f->creep = (*rule->creep)(&w->p, q, slope);
+    f->plastic = PetscMax((w->trial - q) / w->H - f->creep, 0);
+    excess = q - (*rule->yield)(&w->p, w->p.plastic0 + f->plastic, hardening);
+    if (done || excess == 0) return q;
+    if (excess > 0)
+      b.hi = q;
+    else
+      b.lo = q;
+    done = Advance(&b, q - excess / (1 + *hardening * (1 / w->H + *slope)), &q);
+  }
+}
+
+/* The flow of a point whose creep alone is known. */
+static Flow Solve(const HycoFlowRule *rule, const Work *w)
+{
+  Flow f = {w->q, w->creep, 0, 0};
+  PetscReal slope = w->slope, hardening = 0, yield = -1;
+
+  if (!(w->trial > 0)) return f;
+  if (rule->yield) yield = (*rule->yield)(&w->p, w->p.plastic0, &hardening);
+  if (yield >= 0 && f.q > yield) {
+    f.q = SolveYield(rule, w, yield, &f, &slope, &hardening);
+    f.slope = 1 / (w->H + hardening / (1 + slope * hardening));
+  } else
+    f.slope = slope / (1 + w->H * slope);
+  return f;
+}
+
+/* Trial stress without flow, deviator first: returns q_tr; s[n_strain] the deviator, *pressure the mean. */
+static PetscReal Trial(PetscInt ns, PetscReal G, PetscReal bulk, const PetscReal elastic[], PetscReal s[],
+                       PetscReal *pressure)
+{
+  const PetscReal trace = elastic[0] + elastic[1] + elastic[2];
+  PetscReal sum = 0;
+
+  *pressure = bulk * trace;
+  for (PetscInt c = 0; c < 3; c++) {
+    s[c] = 2 * G * (elastic[c] - trace / 3);
+    sum += s[c] * s[c];
+  }
+  for (PetscInt c = 3; c < ns; c++) {
+    s[c] = G * elastic[c];
+    sum += 2 * s[c] * s[c];
+  }
+  return PetscSqrtReal(1.5 * sum);
+}
+
+/* C - 6 G^2 r I_dev - 4 G^2 (slope - r) N N with r = dp / q_tr, N = 3/2 s / q. */
+static void Tangent(PetscInt ns, PetscReal G, PetscReal bulk, PetscReal slope, PetscReal r, const PetscReal N[],
+                    PetscReal C[])
+{
+  const PetscReal shear = G - 3 * G * G * r, normal = bulk - 2 * shear / 3, along = 4 * G * G * (slope - r);
+
+  for (PetscInt a = 0; a < ns; a++) {
+    for (PetscInt b = 0; b < ns; b++) C[a * ns + b] = -along * N[a] * N[b];
+    C[a * ns + a] += a < 3 ? 2 * shear : shear;
+  }
+  for (PetscInt a = 0; a < 3; a++) {
+    for (PetscInt b = 0; b < 3; b++) C[a * ns + b] += normal;
+  }
+}
+
+/* A point's energies: elastic, dissipated, and the potential: elastic and what the flow at this stress takes. */
+static void Energies(const HycoFlowRule *rule, const HycoFlowPoint *p, HycoMaterialPoints *m, PetscInt i, const Flow *f,
+                     PetscReal elastic)
+{
+  const PetscInt ns = m->n_strain, n_state = ns + 2;
+  PetscReal sum = 0;
+
+  m->stored[i] = elastic;
+  if (m->increment) m->increment[i] = f->creep + f->plastic;
+  for (PetscInt c = 0; m->dissipated && c < ns; c++)
+    sum +=
+        (m->stress0[i * ns + c] + m->stress[i * ns + c]) / 2 * (m->state[i * n_state + c] - m->state0[i * n_state + c]);
+  if (m->dissipated) m->dissipated[i] = sum;
+  if (!m->potential || (rule->creep && !rule->creep_integral)) return;
+  m->potential[i] = elastic;
+  if (f->creep > 0) m->potential[i] += f->q * f->creep - (*rule->creep_integral)(p, f->q);
+  if (f->plastic > 0) m->potential[i] += (*rule->yield_integral)(p, f->plastic);
+}
+
+/* The trial state of point i. State: inelastic strain, accumulated creep, accumulated plastic strain. */
+static void Begin(const HycoMaterialPoints *m, PetscInt i, Work *w)
+{
+  const PetscInt ns = m->n_strain;
+  const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], G = young / (2 * (1 + poisson));
+  const PetscReal *strain = m->strain + i * ns, *state0 = m->state0 + i * (ns + 2);
+  PetscReal elastic[6];
+
+  for (PetscInt c = 0; c < ns; c++) elastic[c] = strain[c] - state0[c];
+  w->H = ns == 1 ? young : 3 * G;
+  if (ns == 1) {
+    w->s[0] = young * elastic[0];
+    w->trial = PetscAbsReal(w->s[0]);
+    w->pressure = 0;
+  } else
+    w->trial = Trial(ns, G, young / (3 * (1 - 2 * poisson)), elastic, w->s, &w->pressure);
+}
+
+/* Point i at the step's end. */
+static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, const Work *w)
+{
+  const PetscInt ns = m->n_strain;
+  const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], *strain = m->strain + i * ns;
+  const PetscReal *state0 = m->state0 + i * (ns + 2);
+  const Flow f = Solve(rule, w);
+  const PetscReal dp = f.creep + f.plastic, unit = w->trial > 0 ? (ns == 1 ? 1.0 : 1.5) / w->trial : 0;
+  const PetscReal left = w->trial > 0 ? f.q / w->trial : 0;
+  PetscReal *state = m->state + i * (ns + 2), *stress = m->stress + i * ns, N[6], energy = 0;
+
+  for (PetscInt c = 0; c < ns; c++) {
+    N[c] = unit * w->s[c];
+    state[c] = state0[c] + (c < 3 ? dp : 2 * dp) * N[c];
+    stress[c] = left * w->s[c] + (c < 3 ? w->pressure : 0);
+    energy += stress[c] * (strain[c] - state[c]) / 2;
+  }
+  state[ns] = state0[ns] + f.creep;
+  state[ns + 1] = state0[ns + 1] + f.plastic;
+  if (m->tangent && ns == 1)
+    m->tangent[i] = young - young * young * f.slope;
+  else if (m->tangent)
+    Tangent(ns, young / (2 * (1 + poisson)), young / (3 * (1 - 2 * poisson)), f.slope,
+            w->trial > 0 ? dp / w->trial : f.slope, N, m->tangent + i * ns * ns);
+  if (m->stored) Energies(rule, &w->p, m, i, &f, energy);
+}
+
+/* The law at n points from `first`: the iterations of different points go on side by side, so that a processor has more
+   to do than to wait for one logarithm after the other. */
+static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt first, PetscInt n)
+{
+  const PetscInt ns = m->n_strain;
+  Work work[BLOCK];
+  PetscInt left = 0, active[BLOCK];
+
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = first + k;
+    Work *w = &work[k];
+    const char *why = NULL;
+
+    for (PetscInt j = 0; j < rule->n_constants; j++) w->p.c[j] = m->constant[2 + j][i];
+    w->p.dt = m->dt;
+    w->p.temperature = m->temperature ? m->temperature[i] : 0;
+    w->p.creep0 = m->state0[i * (ns + 2) + ns];
+    w->p.plastic0 = m->state0[i * (ns + 2) + ns + 1];
+    if (rule->prepare) (*rule->prepare)(&w->p, &why);
+    if (why && m->failed < 0) {
+      m->failed = i;
+      m->why = why;
+    }
+    Begin(m, i, w);
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    StartCreep(rule, &work[k]);
+    if (!work[k].done) active[left++] = k;
+  }
+  while (left) {
+    PetscInt still = 0;
+
+    for (PetscInt k = 0; k < left; k++) {
+      IterateCreep(rule, &work[active[k]]);
+      if (!work[active[k]].done) active[still++] = active[k];
+    }
+    left = still;
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    Finish(rule, m, first + k, &work[k]);
+    if (m->failed >= 0 || PetscAbsReal(m->stress[(first + k) * ns]) < PETSC_INFINITY) continue;
+    m->failed = first + k;
+    m->why = "the stress is not finite";
+  }
+}
+
+static PetscErrorCode Update(HycoMaterial material, HycoMaterialPoints *m)
+{
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->n; i += BLOCK)
+    UpdateBlock((const HycoFlowRule *)material->data, m, i, PetscMin(BLOCK, m->n - i));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoMaterial material, PetscInt dim)
+{
+  static const char *const component[] = {"xx", "yy", "zz", "xy", "yz", "xz"};
+  const PetscInt ns = HycoStrainSize(dim);
+  char text[6][32];
+  const char *name[8];
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < ns; c++) {
+    PetscCall(PetscSNPrintf(text[c], sizeof(text[c]), "inelastic_%s", component[c]));
+    name[c] = text[c];
+  }
+  name[ns] = "creep_strain";
+  name[ns + 1] = "plastic_strain";
+  PetscCall(HycoMaterialSetStateNames(material, ns + 2, name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The elastic part is young and poisson's. */
+static PetscBool Depends(HycoMaterial material, const PetscBool changed[])
+{
+  (void)material;
+  return (PetscBool)(changed[0] || changed[1]);
+}
+
+PetscErrorCode HycoFlowBegin(HycoMaterial material)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoElasticDeclare(material));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFlowEnd(HycoMaterial material, const HycoFlowRule *rule)
+{
+  static const struct _HycoMaterialOps ops = {
+      .setup = SetUp, .update = Update, .isotropic = HycoElasticLame, .depends = Depends};
+
+  PetscFunctionBegin;
+  PetscCall(HycoMaterialSetLinear(material, PETSC_FALSE));
+  material->data = (void *)(uintptr_t)rule;
+  PetscCall(HycoMaterialSetOps(material, &ops));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,38 @@
+/* Plasticity without rate: von Mises, isotropic hardening Y(p) = yield + hardening p + saturation (1 - exp(-rate p)).
+ */
+#include <hycoflow.h>
+
+enum { YIELD, HARDENING, SATURATION, RATE, N_CONSTANTS };
+
+static PetscReal Yield(const HycoFlowPoint *p, PetscReal x, PetscReal *slope)
+{
+  const PetscReal left = p->c[SATURATION] > 0 ? p->c[SATURATION] * PetscExpReal(-p->c[RATE] * x) : 0;
+
+  *slope = p->c[HARDENING] + p->c[RATE] * left;
+  return p->c[YIELD] + p->c[HARDENING] * x + (p->c[SATURATION] - left);
+}
+
+static PetscReal YieldIntegral(const HycoFlowPoint *p, PetscReal dp)
+{
+  const PetscReal r = p->c[RATE], left = PetscExpReal(-r * p->plastic0);
+  PetscReal sum = dp * (p->c[YIELD] + p->c[HARDENING] * (p->plastic0 + dp / 2));
+
+  if (r > 0) sum += p->c[SATURATION] * (dp + left * expm1(-r * dp) / r);
+  return sum;
+}
+
+PetscErrorCode HycoMaterialCreate_J2(HycoMaterial material)
+{
+  static const HycoFlowRule rule = {.n_constants = N_CONSTANTS, .yield = Yield, .yield_integral = YieldIntegral};
+
+  PetscFunctionBegin;
+  PetscCall(HycoFlowBegin(material));
+  PetscCall(HycoMaterialDeclare(material, "yield", "the yield stress", HYCO_REQUIRED, 0, PETSC_INFINITY));
+  PetscCall(HycoMaterialDeclare(material, "hardening", "the hardening modulus", 0, HYCO_NOT_NEGATIVE, PETSC_INFINITY));
+  PetscCall(HycoMaterialDeclare(material, "saturation", "the stress that Voce's hardening adds in the end", 0,
+                                HYCO_NOT_NEGATIVE, PETSC_INFINITY));
+  PetscCall(HycoMaterialDeclare(material, "rate", "the rate of Voce's hardening by plastic strain", 0,
+                                HYCO_NOT_NEGATIVE, PETSC_INFINITY));
+  PetscCall(HycoFlowEnd(material, &rule));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,58 @@
+/*
+  Secondary thermal creep of Zircaloy after M. Limback, T. Andersson, ASTM STP 1295 (1996) 448-468 (stress-relieved):
+  with the temperature T and the modulus E' = 1.148e5 - 59.9 T (MPa, unless the scene gives another)
+
+      creep rate = rate E' / T sinh(factor q / E')^2 exp(-activation / (R T))
+*/
+#include <hycoflow.h>
+
+#define GAS_CONSTANT 8.31446261815324 /* J / (mol K) */
+
+enum { RATE, FACTOR, ACTIVATION, MODULUS, N_CONSTANTS };
+
+/* scratch: dt rate E'/T exp(-Q/RT), factor / E' */
+static void Prepare(HycoFlowPoint *p, const char **why)
+{
+  const PetscReal T = p->temperature, modulus = p->c[MODULUS] < 0 ? 1.148e5 - 59.9 * T : p->c[MODULUS];
+
+  if (!(T > 0)) *why = "creep of Limback and Andersson needs a temperature above 0 K";
+  if (!(modulus > 0)) *why = "it is too hot: the modulus 1.148e5 - 59.9 T is not positive";
+  p->scratch[0] = *why ? 0 : p->dt * p->c[RATE] * modulus / T * PetscExpReal(-p->c[ACTIVATION] / (GAS_CONSTANT * T));
+  p->scratch[1] = *why ? 0 : p->c[FACTOR] / modulus;
+}
+
+static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
+{
+  const PetscReal sh = sinh(p->scratch[1] * q), ch = PetscSqrtReal(1 + sh * sh);
+
+  *slope = 2 * p->scratch[0] * p->scratch[1] * sh * ch;
+  return p->scratch[0] * sh * sh;
+}
+
+/* sinh(2 x) / 4 - x / 2, by its series where that is a difference of like numbers. */
+static PetscReal CreepIntegral(const HycoFlowPoint *p, PetscReal q)
+{
+  const PetscReal x = p->scratch[1] * q, y = x * x;
+  const PetscReal sum = x > 0.1 ? sinh(2 * x) / 4 - x / 2
+                                : x * y * (1.0 / 3 + y * (1.0 / 15 + y * (2.0 / 315 + y * (1.0 / 2835 + y / 77962.5))));
+
+  return x > 0 ? p->scratch[0] / p->scratch[1] * sum : 0;
+}
+
+PetscErrorCode HycoMaterialCreate_LimbackAndersson(HycoMaterial material)
+{
+  static const HycoFlowRule rule = {
+      .n_constants = N_CONSTANTS, .prepare = Prepare, .creep = Creep, .creep_integral = CreepIntegral};
+
+  PetscFunctionBegin;
+  PetscCall(HycoFlowBegin(material));
+  PetscCall(
+      HycoMaterialDeclare(material, "rate", "the creep rate (K / (MPa h))", 1.08e9, HYCO_NOT_NEGATIVE, PETSC_INFINITY));
+  PetscCall(HycoMaterialDeclare(material, "factor", "the factor of the stress", 650, 0, PETSC_INFINITY));
+  PetscCall(HycoMaterialDeclare(material, "activation", "the activation energy (J/mol)", 201000, HYCO_NOT_NEGATIVE,
+                                PETSC_INFINITY));
+  PetscCall(HycoMaterialDeclare(material, "modulus", "the modulus E' of creep", -1, 0, PETSC_INFINITY)); /* -1: of T */
+  PetscCall(HycoMaterialSetHeat(material, PETSC_TRUE));
+  PetscCall(HycoFlowEnd(material, &rule));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,344 @@
+/*
+  A user's law from a shared library with the generic C interface of MFront (https://tfel.sourceforge.net), version 1 of
+  it: TFEL 3.4.1 and later, 4.x, 5.x. Nothing of TFEL is linked. What is relied on was read in the public headers of the
+  MFrontGenericInterfaceSupport: include/MGIS/Behaviour/BehaviourDataView.hxx and StateView.hxx for the structs,
+  LibrariesManager.cxx for the symbols.
+
+  Small strain, a strain in and a stress out; symmetric tensors as xx, yy, zz, xy, xz, yz with shear times sqrt(2).
+*/
+#include <hycomaterialimpl.h>
+#include <dlfcn.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <string.h>
+#include <unistd.h>
+
+#define API_VERSION    1
+#define NO_TEMPERATURE 293.15 /* of a body without one, for laws that do not care */
+#define MESSAGE        512    /* room that the interface asks for */
+#define CONSISTENT     4.     /* in K[0]: integrate, with the consistent tangent */
+#define ELASTIC        -1.    /* in K[0]: the elastic tangent alone */
+#define MAX_INTERNAL   64
+
+/* The interface's structs: what points to the begin of a step, to its end, and both with what is asked for. */
+typedef struct {
+  const double *gradients, *forces, *density, *properties, *internal, *stored, *dissipated, *external;
+} StateBegin;
+typedef struct {
+  const double *gradients;
+  double *forces;
+  const double *density, *properties;
+  double *internal, *stored, *dissipated;
+  const double *external;
+} StateEnd;
+typedef struct {
+  char *message;
+  double dt, *K, *rdt, *speed_of_sound;
+  StateBegin s0;
+  StateEnd s1;
+} Data;
+
+typedef struct {
+  void *library;
+  int (*integrate)(Data *);
+  char *behaviour; /* its name */
+  PetscInt n_properties;
+  PetscBool stores; /* it computes the stored energy */
+} MFront;
+
+/* Signals that a library may die of while it is loaded: they end the loading, not the process. */
+static const int deadly[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+#define N_DEADLY ((int)(sizeof(deadly) / sizeof(deadly[0])))
+static sigjmp_buf alive;
+
+static void Escape(int signal)
+{
+  siglongjmp(alive, signal);
+}
+
+/* dlopen(); *died: the signal that it ended with, or 0. */
+static void *Open(const char path[], int *died)
+{
+  struct sigaction mine, before[N_DEADLY];
+  void *volatile library = NULL;
+
+  memset(&mine, 0, sizeof(mine));
+  mine.sa_handler = Escape;
+  sigemptyset(&mine.sa_mask);
+  for (int k = 0; k < N_DEADLY; k++) sigaction(deadly[k], &mine, &before[k]);
+  *died = sigsetjmp(alive, 1);
+  if (!*died) library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+  for (int k = 0; k < N_DEADLY; k++) sigaction(deadly[k], &before[k], NULL);
+  return library;
+}
+
+static const char *BodyName(HycoMaterial law)
+{
+  return ((PetscObject)law)->name;
+}
+
+/* A name with a slash is a path from the scene's folder, or else from where the user stands; one without may lie beside
+   the scene too, and else is looked for where the system looks. */
+static PetscErrorCode Load(HycoMaterial law, const char name[], MFront *m)
+{
+  char path[HYCO_LINE];
+  const char *why;
+  int died;
+
+  PetscFunctionBegin;
+  HycoFormat(path, "%s/%s", law->folder ? law->folder : ".", name);
+  if (name[0] == '/' || access(path, F_OK)) HycoFormat(path, "%s", name);
+  (void)dlerror();
+  m->library = Open(path, &died);
+  why = died ? NULL : dlerror();
+  HycoCheck(!died, "body %s: the library %s crashes when it is loaded (signal %d)", BodyName(law), path, died);
+  HycoCheck(m->library, "body %s: the library %s cannot be loaded: %s", BodyName(law), path,
+            why ? why : "no reason given");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The symbol BEHAVIOUR_HYPOTHESIS_what, or BEHAVIOUR_what; hypothesis NULL: the latter alone. NULL: there is none. */
+static const void *Find(const MFront *m, const char hypothesis[], const char what[])
+{
+  char symbol[HYCO_LINE];
+  const void *found = NULL;
+
+  if (hypothesis) {
+    HycoFormat(symbol, "%s_%s_%s", m->behaviour, hypothesis, what);
+    found = dlsym(m->library, symbol);
+  }
+  if (!found) {
+    HycoFormat(symbol, "%s_%s", m->behaviour, what);
+    found = dlsym(m->library, symbol);
+  }
+  return found;
+}
+
+static unsigned Number(const MFront *m, const char hypothesis[], const char what[], unsigned absent)
+{
+  const unsigned short *value = (const unsigned short *)Find(m, hypothesis, what);
+
+  return value ? *value : absent;
+}
+
+/* A list of names with the number of them under the same name with an n before. */
+static PetscErrorCode List(HycoMaterial law, const MFront *m, const char hypothesis[], const char what[], PetscInt *n,
+                           const char *const **names)
+{
+  char count[HYCO_LINE];
+
+  PetscFunctionBegin;
+  HycoFormat(count, "n%s", what);
+  HycoCheck(Find(m, hypothesis, count),
+            "body %s: the library has no symbol %s_%s; is %s a behaviour of MFront's generic interface?", BodyName(law),
+            m->behaviour, count, m->behaviour);
+  *n = (PetscInt)Number(m, hypothesis, count, 0);
+  *names = (const char *const *)Find(m, hypothesis, what);
+  HycoCheck(!*n || *names, "body %s: the library has no symbol %s_%s", BodyName(law), m->behaviour, what);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the behaviour is of a kind that the finite elements can use. */
+static PetscErrorCode CheckKind(HycoMaterial law, const MFront *m)
+{
+  const char *const *interface = (const char *const *)Find(m, NULL, "mfront_interface");
+  const unsigned version = Number(m, NULL, "api_version", 0);
+
+  PetscFunctionBegin;
+  HycoCheck(interface && Find(m, NULL, "mfront_mkt"),
+            "body %s: the library has no behaviour %s of MFront's interfaces (no symbol %s_mfront_interface)",
+            BodyName(law), m->behaviour, m->behaviour);
+  HycoCheck(strcmp(*interface, "Generic") == 0 && Number(m, NULL, "mfront_mkt", 0) == 1,
+            "body %s: %s is made for MFront's interface \"%s\"; make the library by mfront --interface=generic",
+            BodyName(law), m->behaviour, *interface);
+  HycoCheck(version == API_VERSION,
+            "body %s: %s has version %u of MFront's generic interface; hyco knows version %d (TFEL 3.4.1 and later)",
+            BodyName(law), m->behaviour, version, API_VERSION);
+  HycoCheck(Number(m, NULL, "BehaviourType", 0) == 1 && Number(m, NULL, "BehaviourKinematic", 0) == 1,
+            "body %s: %s is no law of small strain", BodyName(law), m->behaviour);
+  HycoCheck(!Number(m, NULL, "SymmetryType", 0),
+            "body %s: %s is orthotropic; its axes would have to be given, which hyco does not do", BodyName(law),
+            m->behaviour);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Both texts are read: the material properties become constants, H[1] by the name H_1. */
+static PetscErrorCode Declare(HycoMaterial law)
+{
+  MFront *m = (MFront *)law->data;
+  const char *library, *const *names, *name;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMaterialGetText(law, "library", &library));
+  PetscCall(HycoMaterialGetText(law, "behaviour", &name));
+  HycoCheck(library && name, "body %s: law mfront needs library: (a file) and behaviour: (its name)", BodyName(law));
+  PetscCall(PetscFree(m->behaviour));
+  PetscCall(PetscStrallocpy(name, &m->behaviour));
+  PetscCall(Load(law, library, m));
+  PetscCall(CheckKind(law, m));
+  PetscCall(List(law, m, "Tridimensional", "MaterialProperties", &n, &names));
+  HycoCheck(n <= HYCO_MAX_DECLARED - 2, "body %s: %s has %d material properties; hyco takes %d", BodyName(law), name,
+            (int)n, HYCO_MAX_DECLARED - 2);
+  for (PetscInt j = 0; j < n; j++) {
+    char constant[HYCO_LINE];
+    size_t at = 0;
+
+    for (const char *c = names[j]; *c && at + 1 < sizeof(constant); c++) {
+      if (*c != ']') constant[at++] = *c == '[' ? '_' : *c;
+    }
+    constant[at] = '\0';
+    PetscCall(HycoMaterialDeclare(law, constant, names[j], HYCO_REQUIRED, -PETSC_INFINITY, PETSC_INFINITY));
+  }
+  m->n_properties = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Components of an internal variable by its type: scalar, symmetric tensor, vector, tensor. */
+static PetscInt TypeSize(int type, PetscInt dim)
+{
+  static const PetscInt size[4][2] = {{1, 1}, {4, 6}, {2, 3}, {5, 9}};
+
+  return type >= 0 && type < 4 ? size[type][dim - 2] : 0;
+}
+
+static PetscErrorCode SetState(HycoMaterial law, const MFront *m, const char hypothesis[], PetscInt dim)
+{
+  const char *const *names, *list[MAX_INTERNAL];
+  char text[MAX_INTERNAL][64];
+  const int *type;
+  PetscInt n, total = 0;
+
+  PetscFunctionBegin;
+  PetscCall(List(law, m, hypothesis, "InternalStateVariables", &n, &names));
+  type = (const int *)Find(m, hypothesis, "InternalStateVariablesTypes");
+  HycoCheck(!n || type, "body %s: the library has no symbol %s_InternalStateVariablesTypes", BodyName(law),
+            m->behaviour);
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt size = TypeSize(type[k], dim);
+
+    HycoCheck(size && total + size <= MAX_INTERNAL,
+              "body %s: %s has internal variables of a kind or a number (over %d) that hyco does not take",
+              BodyName(law), m->behaviour, MAX_INTERNAL);
+    for (PetscInt c = 0; c < size; c++, total++) {
+      list[total] = text[total];
+      if (size == 1)
+        PetscCall(PetscSNPrintf(text[total], sizeof(text[total]), "%.50s", names[k]));
+      else
+        PetscCall(PetscSNPrintf(text[total], sizeof(text[total]), "%.50s_%d", names[k], (int)c));
+    }
+  }
+  PetscCall(HycoMaterialSetStateNames(law, total, list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoMaterial law, PetscInt dim)
+{
+  MFront *m = (MFront *)law->data;
+  const char *hypothesis = dim == 2 ? "PlaneStrain" : "Tridimensional", *const * names;
+  char symbol[HYCO_LINE];
+  PetscInt n;
+
+  PetscFunctionBegin;
+  HycoCheck(dim > 1, "body %s: laws of MFront are for 2D and 3D", BodyName(law));
+  HycoFormat(symbol, "%s_%s", m->behaviour, hypothesis);
+  *(void **)(&m->integrate) = dlsym(m->library, symbol);
+  HycoCheck(m->integrate, "body %s: %s is not made for the hypothesis %s (no symbol %s)", BodyName(law), m->behaviour,
+            hypothesis, symbol);
+  PetscCall(List(law, m, hypothesis, "MaterialProperties", &n, &names));
+  HycoCheck(n == m->n_properties, "body %s: %s has other material properties in 2D than in 3D", BodyName(law),
+            m->behaviour);
+  PetscCall(List(law, m, hypothesis, "ExternalStateVariables", &n, &names));
+  for (PetscInt k = 0; k < n; k++)
+    HycoCheck(strcmp(names[k], "Temperature") == 0,
+              "body %s: %s needs the external variable %s; hyco has the temperature alone", BodyName(law), m->behaviour,
+              names[k]);
+  HycoCheck(!Number(m, hypothesis, "requiresStiffnessTensor", 0) &&
+                !Number(m, hypothesis, "requiresThermalExpansionCoefficientTensor", 0),
+            "body %s: %s wants the stiffness or the thermal expansion handed in; let it compute them", BodyName(law),
+            m->behaviour);
+  m->stores = (PetscBool)(Number(m, hypothesis, "ComputesInternalEnergy", 0) == 1);
+  PetscCall(SetState(law, m, hypothesis, dim));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The interface's component of ours, and the factor of shear. */
+static const PetscInt theirs[6] = {0, 1, 2, 3, 5, 4};
+static PetscReal Root(PetscInt c)
+{
+  return c < 3 ? 1 : PetscSqrtReal(2);
+}
+
+/* One point; false where the behaviour has no answer, with its message. */
+static PetscBool Integrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, PetscInt n_state, char message[MESSAGE])
+{
+  const PetscInt ns = p->n_strain;
+  const PetscBool at_rest = (PetscBool)(p->strain0 == p->strain);
+  double e0[6], e1[6], s0[6], s1[6], K[36] = {0}, properties[HYCO_MAX_DECLARED], rdt = 1, stored0 = 0, stored1 = 0,
+                                     dissipated0 = 0, dissipated1 = 0, density = 0;
+  double T0 = p->temperature0 ? p->temperature0[i] : NO_TEMPERATURE,
+         T1 = p->temperature ? p->temperature[i] : NO_TEMPERATURE;
+  Data d = {.message = message, .dt = p->dt, .K = K, .rdt = &rdt};
+
+  for (PetscInt j = 0; j < m->n_properties; j++) properties[j] = p->constant[2 + j][i];
+  for (PetscInt c = 0; c < ns; c++) {
+    e0[theirs[c]] = p->strain0[i * ns + c] / Root(c);
+    e1[theirs[c]] = p->strain[i * ns + c] / Root(c);
+    s0[theirs[c]] = s1[theirs[c]] = p->stress0[i * ns + c] * Root(c);
+  }
+  for (PetscInt k = 0; k < n_state; k++) p->state[i * n_state + k] = p->state0[i * n_state + k];
+  K[0] = at_rest ? ELASTIC : p->tangent ? CONSISTENT : 0;
+  d.s0 = (StateBegin){e0, s0, &density, properties, p->state0 + i * n_state, &stored0, &dissipated0, &T0};
+  d.s1 = (StateEnd){e1, s1, &density, properties, p->state + i * n_state, &stored1, &dissipated1, &T1};
+  message[0] = '\0';
+  if ((*m->integrate)(&d) < 0) return PETSC_FALSE;
+  p->dt_factor = PetscMin(p->dt_factor, rdt);
+  for (PetscInt r = 0; r < ns; r++) {
+    p->stress[i * ns + r] = s1[theirs[r]] / Root(r);
+    for (PetscInt c = 0; p->tangent && c < ns; c++)
+      p->tangent[(i * ns + r) * ns + c] = K[theirs[r] * ns + theirs[c]] / (Root(r) * Root(c));
+  }
+  if (p->stored && m->stores) p->stored[i] = stored1;
+  return PETSC_TRUE;
+}
+
+static PetscErrorCode Update(HycoMaterial law, HycoMaterialPoints *p)
+{
+  static char message[MESSAGE];
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < p->n; i++) {
+    if (Integrate((const MFront *)law->data, p, i, law->n_state, message)) continue;
+    message[MESSAGE - 1] = '\0';
+    p->failed = i;
+    p->why = message[0] ? message : "the behaviour did not converge";
+    break;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoMaterial law)
+{
+  MFront *m = (MFront *)law->data;
+
+  PetscFunctionBegin;
+  if (m->library) dlclose(m->library);
+  PetscCall(PetscFree(m->behaviour));
+  PetscCall(PetscFree(law->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMaterialCreate_MFront(HycoMaterial law)
+{
+  static const struct _HycoMaterialOps ops = {.declare = Declare, .setup = SetUp, .update = Update, .destroy = Destroy};
+  MFront *m;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&m));
+  PetscCall(HycoMaterialSetData(law, m));
+  PetscCall(HycoMaterialDeclareText(law, "library", "the file of a shared library"));
+  PetscCall(HycoMaterialDeclareText(law, "behaviour", "the behaviour's name"));
+  PetscCall(HycoMaterialSetLinear(law, PETSC_FALSE));
+  PetscCall(HycoMaterialSetOps(law, &ops));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,46 @@
+/*
+  Creep that slows down as it goes: at a constant stress p = rate q^exponent t^time_exponent, under another stress as if
+  the strain so far had come under that one (strain hardening). A step takes its end's stress as constant and is then
+  exact: with m the time exponent,
+
+      dp = (p0^(1/m) + dt (rate q^exponent)^(1/m))^m - p0
+*/
+#include <hycoflow.h>
+
+enum { RATE, EXPONENT, TIME_EXPONENT, N_CONSTANTS };
+
+/* scratch: p0^(1/m) */
+static void Prepare(HycoFlowPoint *p, const char **why)
+{
+  (void)why;
+  p->scratch[0] = PetscPowReal(p->creep0, 1 / p->c[TIME_EXPONENT]);
+}
+
+static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
+{
+  const PetscReal m = p->c[TIME_EXPONENT], before = p->scratch[0];
+  const PetscReal more = p->dt * PetscPowReal(p->c[RATE] * PetscPowReal(q, p->c[EXPONENT]), 1 / m);
+  PetscReal after;
+
+  if (!(more > 0)) {
+    *slope = 0;
+    return 0;
+  }
+  after = PetscPowReal(before + more, m);
+  *slope = p->c[EXPONENT] * more * after / ((before + more) * q);
+  return before > more ? p->creep0 * expm1(m * log1p(more / before)) : after - p->creep0;
+}
+
+PetscErrorCode HycoMaterialCreate_StrainHardening(HycoMaterial material)
+{
+  static const HycoFlowRule rule = {.n_constants = N_CONSTANTS, .prepare = Prepare, .creep = Creep};
+
+  PetscFunctionBegin;
+  PetscCall(HycoFlowBegin(material));
+  PetscCall(HycoMaterialDeclare(material, "rate", "the creep strain at the stress 1 after the time 1", HYCO_REQUIRED,
+                                HYCO_NOT_NEGATIVE, PETSC_INFINITY));
+  PetscCall(HycoMaterialDeclare(material, "exponent", "the creep exponent", HYCO_REQUIRED, HYCO_FROM_ONE, 100));
+  PetscCall(HycoMaterialDeclare(material, "time_exponent", "the exponent of time", HYCO_REQUIRED, 0, HYCO_TO_ONE));
+  PetscCall(HycoFlowEnd(material, &rule));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,77 @@
+/* The file's order: rows by ascending tags, in contiguous blocks over the processes, or all on rank 0. */
+#include <hycomesh.h>
+
+static PetscErrorCode CreateSF(HycoFileOrder *o, HycoPlace place, PetscInt n, const PetscInt leaf[],
+                               const PetscInt row[], PetscBool root)
+{
+  PetscMPIInt rank;
+  PetscLayout layout;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(o->comm, &rank));
+  PetscCall(PetscLayoutCreateFromSizes(o->comm,
+                                       !root       ? PETSC_DECIDE
+                                       : rank == 0 ? o->all[place]
+                                                   : 0,
+                                       o->all[place], 1, &layout));
+  PetscCall(PetscLayoutGetRange(layout, &o->first[place], &o->n[place]));
+  o->n[place] -= o->first[place];
+  PetscCall(PetscSFCreate(o->comm, &o->sf[place]));
+  PetscCall(PetscSFSetGraphLayout(o->sf[place], layout, n, (PetscInt *)leaf, PETSC_COPY_VALUES, row));
+  PetscCall(PetscLayoutDestroy(&layout));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh m, HycoMesh surface, PetscBool root, HycoFileOrder **order)
+{
+  PetscInt *leaf, *row;
+  HycoFileOrder *o;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&o));
+  o->comm = comm;
+  o->all[HYCO_ON_NODES] = o->all[HYCO_ON_SURFACE] = m->n_whole_nodes;
+  o->all[HYCO_ON_CELLS] = m->n_whole_cells;
+  PetscCall(PetscMalloc2(PetscMax(m->n_nodes, m->n_cells), &leaf, PetscMax(m->n_nodes, m->n_cells), &row));
+  for (PetscInt on_cells = 0; on_cells < 2; on_cells++) {
+    const PetscInt *whole = on_cells ? m->cell_whole : m->node_whole;
+    PetscInt n = 0;
+
+    for (PetscInt k = 0; k < (on_cells ? m->n_cells : m->n_nodes); k++) {
+      if (HycoMeshOwned(m, on_cells ? m->cells[k * m->nv] : k) < 0) continue;
+      leaf[n] = k;
+      row[n++] = whole[k];
+    }
+    PetscCall(CreateSF(o, on_cells ? HYCO_ON_CELLS : HYCO_ON_NODES, n, leaf, row, root));
+  }
+  PetscCall(
+      CreateSF(o, HYCO_ON_SURFACE, surface ? surface->n_nodes : 0, NULL, surface ? surface->node_whole : NULL, root));
+  PetscCall(PetscFree2(leaf, row));
+  *order = o;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileOrderDestroy(HycoFileOrder **order)
+{
+  PetscFunctionBegin;
+  if (!*order) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < HYCO_N_PLACES; k++) PetscCall(PetscSFDestroy(&(*order)->sf[k]));
+  PetscCall(PetscFree(*order));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileOrderSend(const HycoFileOrder *o, HycoPlace place, MPI_Datatype type, PetscInt components,
+                                 const void *value, void *rows)
+{
+  PetscMPIInt count;
+  MPI_Datatype unit;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMPIIntCast(components, &count));
+  PetscCallMPI(MPI_Type_contiguous(count, type, &unit));
+  PetscCallMPI(MPI_Type_commit(&unit));
+  PetscCall(PetscSFReduceBegin(o->sf[place], unit, value, rows, MPI_REPLACE));
+  PetscCall(PetscSFReduceEnd(o->sf[place], unit, value, rows, MPI_REPLACE));
+  PetscCallMPI(MPI_Type_free(&unit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,209 @@
+/* The history of a scene: the times that it lists, its tables, and the variables that they give to expressions. */
+#include "entries.h"
+#include <hycocontactimpl.h>
+#include <string.h>
+
+#define TABLES "history_tables_"
+
+/* A finite number where `text` goes on; *text moves past it and the blanks behind. */
+static PetscBool TakeNumber(const char **text, PetscReal *value)
+{
+  char *end;
+
+  *value = HycoNumber(*text, &end);
+  if (end == *text || PetscIsInfOrNanReal(*value)) return PETSC_FALSE;
+  *text = end + strspn(end, " ");
+  return PETSC_TRUE;
+}
+
+/* "0 1,2 3": rows of `width` numbers with commas between; *n is -1 where that is not what the text says. */
+static PetscErrorCode ReadRows(const char text[], PetscInt width, PetscInt *n, PetscReal **value)
+{
+  PetscInt room = 1;
+  PetscBool right = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  for (const char *c = text; *c; c++) room += *c == ',';
+  PetscCall(PetscMalloc1(room * width, value));
+  for (*n = 0; right && *n < room; ++*n) {
+    text += strspn(text, " ");
+    for (PetscInt k = 0; right && k < width; k++) right = TakeNumber(&text, *value + *n * width + k);
+    right = (PetscBool)(right && *text == (*n + 1 < room ? ',' : '\0'));
+    text++;
+  }
+  if (!right) *n = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckTimes(const char key[], PetscInt n, const PetscReal t[], PetscInt stride)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 1; k < n; k++)
+    HycoCheck(t[k * stride] > t[(k - 1) * stride], "%s goes %s: %.10g follows %.10g; times increase", key,
+              t[k * stride] < t[(k - 1) * stride] ? "back in time" : "on without time", (double)t[k * stride],
+              (double)t[(k - 1) * stride]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadTimes(HycoScene s, const char key[], const char text[])
+{
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(s->times));
+  PetscCall(ReadRows(text, 1, &n, &s->times));
+  HycoCheck(n >= 2, "%s is \"%.200s\"; it lists at least two numbers, the time where the path begins first", key, text);
+  PetscCall(CheckTimes(key, n, s->times, 1));
+  s->n_times = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The next variable of the scene's expressions. */
+static PetscErrorCode AddVariable(HycoScene s, const char key[], const char name[])
+{
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < s->n_variables; p++)
+    HycoCheck(strcasecmp(s->parameter[p], name), "%s: %s is the name of %s already; each variable has its own", key,
+              name,
+              p < s->n_parameters    ? "a parameter"
+              : p == s->n_parameters ? "the time"
+                                     : "a table");
+  HycoCheck(s->n_variables < HYCO_MAX_PARAMETERS,
+            "%s: the scene has more than %d variables (parameters, t and the tables of the history)", key,
+            HYCO_MAX_PARAMETERS);
+  PetscCall(PetscStrallocpy(name, &s->parameter[s->n_variables]));
+  s->n_variables++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadTable(HycoScene s, const char key[], const char text[])
+{
+  const char *name = key + strlen(TABLES);
+  HycoTimeTable *table = &s->table[s->n_tables];
+  PetscReal *row = NULL;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  HycoCheck(HycoIsVariableName(name),
+            "%s: \"%s\" cannot name a table; use letters, digits and _, and none of x, y, z, pi", key, name);
+  PetscCall(AddVariable(s, key, name));
+  s->n_tables++;
+  PetscCall(ReadRows(text, 2, &n, &row));
+  if (n > 0) {
+    PetscCall(PetscMalloc1(n, &table->t));
+    PetscCall(PetscMalloc1(n, &table->value));
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    table->t[k] = row[2 * k];
+    table->value[k] = row[2 * k + 1];
+  }
+  table->n = n;
+  PetscCall(PetscFree(row));
+  HycoCheck(n > 0, "%s is \"%.200s\"; a table has rows of two numbers, time and value: [[0, 1], [10, 2.5]]", key, text);
+  PetscCall(CheckTimes(key, n, table->t, 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneReadHistory(HycoScene s)
+{
+  const char *table = NULL;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_entries; k++) {
+    if (strcasecmp(s->key[k], "history_times") == 0) PetscCall(ReadTimes(s, s->key[k], s->value[k]));
+    if (strncasecmp(s->key[k], TABLES, strlen(TABLES)) == 0) table = s->key[k];
+  }
+  HycoCheck(s->n_times || !table, "%s is a table of a history that lists no times; write history: {times: [0, ...]}",
+            table);
+  if (!s->n_times) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(AddVariable(s, "history_times", "t"));
+  for (PetscInt k = 0; k < s->n_entries; k++) {
+    if (strncasecmp(s->key[k], TABLES, strlen(TABLES)) == 0) PetscCall(ReadTable(s, s->key[k], s->value[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneCheckHistory(HycoScene s)
+{
+  PetscBool in_time[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, rows = PETSC_FALSE, gaps;
+
+  PetscFunctionBegin;
+  for (PetscInt p = s->n_parameters; p < s->n_variables; p++) in_time[p] = PETSC_TRUE;
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    for (PetscInt c = 0; c < 3; c++)
+      HycoCheck(!HycoExprChanges(s->body[b].map[c], in_time),
+                "%s changes in time; a map says where the bodies are before the history begins",
+                HycoExprKey(s->body[b].map[c]));
+  }
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    HycoContactChanges(s->contact[k], in_time, &rows, &gaps);
+    HycoCheck(!rows, "contact %s: its normal changes in time; a history changes its gap alone",
+              ((PetscObject)s->contact[k])->name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneDestroyHistory(HycoScene s)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_tables; k++) {
+    PetscCall(PetscFree(s->table[k].t));
+    PetscCall(PetscFree(s->table[k].value));
+  }
+  PetscCall(PetscFree(s->times));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal ValueAt(const HycoTimeTable *table, PetscReal t)
+{
+  PetscInt k = 0;
+
+  while (k < table->n && table->t[k] <= t) k++;
+  if (k == 0) return table->value[0];
+  if (k == table->n) return table->value[k - 1];
+  return table->value[k - 1] +
+         (table->value[k] - table->value[k - 1]) * ((t - table->t[k - 1]) / (table->t[k] - table->t[k - 1]));
+}
+
+void HycoSceneSetTime(HycoScene s, const PetscReal mu[], PetscReal t, PetscReal out[])
+{
+  for (PetscInt p = 0; p < s->n_parameters; p++) out[p] = mu[p];
+  if (!s->n_times) return;
+  out[s->n_parameters] = t;
+  for (PetscInt k = 0; k < s->n_tables; k++) out[s->n_parameters + 1 + k] = ValueAt(&s->table[k], t);
+}
+
+PetscReal HycoSceneNextStop(HycoScene s, PetscReal t)
+{
+  PetscReal next = PETSC_MAX_REAL;
+
+  for (PetscInt k = s->n_times - 1; k >= 0 && s->times[k] > t; k--) next = s->times[k];
+  for (PetscInt j = 0; j < s->n_tables; j++) {
+    const HycoTimeTable *table = &s->table[j];
+
+    for (PetscInt k = 0; k < table->n; k++) {
+      if (table->t[k] > t) next = PetscMin(next, table->t[k]);
+    }
+  }
+  return next;
+}
+
+PetscErrorCode HycoSceneGetHistory(HycoScene s, PetscInt *n, const PetscReal *times[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SCENE_CLASSID);
+  if (n) *n = s->n_times;
+  if (times) *times = s->times;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneRefuseHistory(HycoScene s, const char what[])
+{
+  PetscFunctionBegin;
+  HycoCheck(
+      !s->n_times,
+      "the scene has a history (history_times): %s is for scenes without; reduced models of scenes with a history "
+      "are not there yet, hyco solve -mu solves them at full order",
+      what);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

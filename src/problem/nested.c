@@ -1,0 +1,61 @@
+/*
+  Lists of lists in a scene's YAML, which PETSc does not read: [[0, 1], [10, 2.5]] becomes [ 0 1 ,  10 2.5 ], a list of
+  scalars "0 1" and "10 2.5", every character in its place, so that messages name the right lines.
+*/
+#include "entries.h"
+#include <string.h>
+
+/* Past a quoted scalar. */
+static char *SkipQuoted(char *c)
+{
+  const char quote = *c++;
+
+  while (*c && *c != quote) c += quote == '"' && *c == '\\' && c[1] ? 2 : 1;
+  return *c ? c + 1 : c;
+}
+
+/* Where a scalar, a list or a mapping may begin: after a separator, with blanks between. */
+static PetscBool Begins(const char text[], const char *c)
+{
+  while (c > text && (c[-1] == ' ' || c[-1] == '\t')) c--;
+  return (PetscBool)(c == text || strchr(":,[{-\n", c[-1]));
+}
+
+/* "- [0, 1]": an item of a block's list that is a list. */
+static PetscBool IsItem(const char line[])
+{
+  line += strspn(line, " \t");
+  return (PetscBool)(line[0] == '-' && strchr(" \t", line[1]) && line[1 + strspn(line + 1, " \t")] == '[');
+}
+
+PetscBool HycoEntriesFlatten(char text[])
+{
+  PetscInt depth = 0; /* of brackets */
+  PetscBool nested = PETSC_FALSE;
+  const char *line = text;
+
+  for (char *c = text; *c;) {
+    if (*c == '\n') line = c + 1;
+    if (*c == '#' && (c == text || strchr(" \t\n", c[-1]))) {
+      c += strcspn(c, "\n");
+    } else if ((*c == '"' || *c == '\'') && Begins(text, c)) {
+      c = SkipQuoted(c);
+    } else if (*c == '[' && (depth || Begins(text, c))) {
+      /* as if the list around it had brackets */
+      if (!depth && IsItem(line)) depth = 1;
+      if (depth++) {
+        *c = ' ';
+        nested = PETSC_TRUE;
+      }
+      c++;
+    } else if (*c == ']' && depth) {
+      if (--depth) *c = ' ';
+      if (depth == 1 && IsItem(line)) depth = 0;
+      c++;
+    } else {
+      if (*c == ',' && depth > 1) *c = ' ';
+      c++;
+    }
+  }
+  return nested;
+}

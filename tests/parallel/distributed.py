@@ -1,0 +1,146 @@
+"""Nothing of the mesh's size on one rank: floating bodies, surfaces that do not match or that a map moves, on 1 to 4 ranks; memory."""
+import os
+import re
+import unittest
+
+import h5py
+import numpy as np
+
+from common import PELLET, SOURCE, Case, msh
+
+EXAMPLES = os.path.join(SOURCE, 'examples')
+RANKS = (2, 3, 4)
+STACK = """
+scene: {title: stack, mesh: stack.msh, parameters: [press]}
+parameter: {press: {range: [0, 1]}}
+body: {low: {young: 100, poisson: 0.3}, middle: {young: 80, poisson: 0.2}, high: {young: 120, poisson: 0.3}}
+fixed: {low_foot: {x: 0, y: 0}, high_head: {x: 0, y: -0.01*press}, high_side: {x: 0}, middle_side: {x: 0}}
+contact:
+  first: {type: surface, slave: middle_foot, master: low_head, tolerance: 0.01}
+  second: {type: pair, slave: high_foot, master: middle_head, tolerance: 0.01}
+"""
+
+
+def datasets(path):
+    """All numbers of a file, by name."""
+    found = {}
+    with h5py.File(path) as file:
+        file.visititems(lambda name, item: found.update({name: item[:]}) if isinstance(item, h5py.Dataset) else None)
+    return found
+
+
+class Distributed(Case):
+    def same(self, scene, mu, *more, tolerance=1e-9):
+        """Report and fields on several ranks are those of one."""
+        one = self.hyco('solve', '-scene', scene, '-mu', mu, '-output', 'one.xdmf', *more)
+        right = datasets(self.path('one.h5'))
+        for ranks in RANKS:
+            with self.subTest(scene=scene, ranks=ranks):
+                r = self.hyco('solve', '-scene', scene, '-mu', mu, '-output', 'many.xdmf', *more, ranks=ranks)
+                self.solved(r)
+                for key in ('n_dof', 'n_contacts', 'n_active', 'regularised'):
+                    self.assertEqual(r[key], one[key], key)
+                for key in ('total_contact_force', 'strain_energy', 'u_norm2'):
+                    self.near(r[key], one[key], tolerance, key)
+                found = datasets(self.path('many.h5'))
+                self.assertEqual(sorted(found), sorted(right))
+                for name, value in right.items():
+                    if value.dtype.kind == 'f':  # a gap that is closed is round-off of the displacement
+                        size = np.abs(right['nodes/displacement'] if 'gap' in name else value).max()
+                        self.assertLessEqual(np.abs(found[name] - value).max(), tolerance * size, name)
+                    else:
+                        self.assertTrue(np.array_equal(found[name], value), name)
+        return one
+
+    def stack(self):
+        """Three blocks on one another; contact alone holds the middle one up; its foot and what it stands on do not match."""
+        nodes, elements, names = [], [], {}
+        for body, (name, n) in enumerate((('low', 7), ('middle', 10), ('high', 10))):
+            first, wide = len(nodes) + 1, n + 1
+            nodes += [(i / n, body + j / n, 0) for j in range(wide) for i in range(wide)]
+            at = lambda i, j, first=first, wide=wide: first + i + wide * j
+            elements += [(3, 1 + body, (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1))) for j in range(n) for i in range(n)]
+            elements += [(1, 11 + body, (at(i, 0), at(i + 1, 0))) for i in range(n)]
+            elements += [(1, 21 + body, (at(i, n), at(i + 1, n))) for i in range(n)]
+            elements += [(1, 31 + body, (at(0, j), at(0, j + 1))) for j in range(n)]
+            names.update({1 + body: (2, name), 11 + body: (1, name + '_foot'), 21 + body: (1, name + '_head'), 31 + body: (1, name + '_side')})
+        msh(self.path('stack.msh'), nodes, elements, names)
+        with open(self.path('stack.yaml'), 'w', encoding='ascii') as file:
+            file.write(STACK)
+        return self.path('stack.yaml')
+
+    def test_floating(self):
+        r = self.same(self.stack(), 1)
+        self.assertGreater(r['n_active'], 0)
+
+    def test_refined(self):
+        """Contacts are found after the distribution."""
+        self.same(self.stack(), 1, '-scene_refine', 1)
+
+    def test_moved(self):
+        self.same(os.path.join(EXAMPLES, 'roller', 'scene.yaml'), '2.3,0.6,12')
+
+    def test_not_matching_3d(self):
+        self.same(os.path.join(EXAMPLES, 'roller3d', 'scene.yaml'), '1.3,0.5,12')
+
+    def test_whole_boundary(self):
+        self.same(os.path.join(EXAMPLES, 'rope', 'scene.yaml'), '0.07,0.17')
+
+    def test_free(self):
+        """What nothing holds has one name on all ranks."""
+        with open(os.path.join(PELLET, 'scene.yaml'), encoding='utf-8') as file:
+            text = file.read().replace('mesh: A.msh', 'mesh: ' + os.path.join(PELLET, 'A.msh'))
+        text = text.replace('  sym_x0: {x: 0}\n', '  clad_outer_high: {x: 0, y: 0}\n').replace('  sym_y0: {y: 0}\n', '')
+        with open(self.path('free.yaml'), 'w', encoding='utf-8') as file:
+            file.write(text)
+        said = []
+        for ranks in (0, 2, 4):
+            run = self.run_raw('solve', '-scene', self.path('free.yaml'), '-mu', '4.06,1', ranks=ranks)
+            self.assertNotEqual(run.returncode, 0)
+            said.append(next(line for line in run.stderr.splitlines() if 'error: ' in line))
+        self.assertIn('body pellet from turning about (0, 0, 1) through (0, 0, ', said[0])
+        self.assertEqual(said[1:], said[:1] * 2)
+
+    def test_folded(self):
+        """A map that mirrors a part of a body is refused, wherever the mesh is cut."""
+        scene = self.stack()
+        with open(scene, encoding='ascii') as file:
+            text = file.read().replace('low: {young: 100, poisson: 0.3}', "low: {young: 100, poisson: 0.3, map: {x: '(x - 0.5)^2'}}")
+        with open(scene, 'w', encoding='ascii') as file:
+            file.write(text)
+        for ranks in (0, 2, 4):
+            run = self.run_raw('solve', '-scene', scene, '-mu', 1, ranks=ranks)
+            self.assertNotEqual(run.returncode, 0)
+            self.assertIn('body low: its map turns', run.stderr)
+
+    def test_snapshots(self):
+        """The solutions that four ranks write together are those of one."""
+        train = ('train', '-scene', os.path.join(EXAMPLES, 'roller', 'scene.yaml'), '-values_place', '-1,1', '-values_press', '0.5',
+                 '-values_modulus', '10,15', '-hyco_groups', 1)
+        for name, ranks in (('one', 0), ('four', 4)):
+            self.run_raw(*train, '-model', name + '.h5', ranks=ranks, timeout=200)
+        names = [sorted(f for f in os.listdir(self.path(n + '.h5.snapshots')) if f.endswith('.h5')) for n in ('one', 'four')]
+        self.assertEqual(names[0], names[1])
+        self.assertGreaterEqual(len(names[0]), 4)
+        for name in names[0]:
+            one, four = (datasets(self.path(n + '.h5.snapshots', name)) for n in ('one', 'four'))
+            self.assertEqual(sorted(one), sorted(four))
+            for key, value in one.items():
+                self.assertLessEqual(np.abs(four[key] - value).max(), 1e-9 * np.abs(value).max(), key)
+
+    def test_memory(self):
+        """What PETSc allocates at most: on no rank of four much more than on the others (with the whole mesh on rank 0, 1.14 of
+        the mean), and together not much more than on one."""
+        most = {}
+        for ranks in (1, 4):
+            run = self.run_raw('solve', '-scene', os.path.join(PELLET, 'scene.yaml'), '-scene_refine', 1, '-mu', '4.06,1', '-output',
+                               'memory.xdmf', '-malloc_debug', '-memory_view', ranks=ranks, timeout=200)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            found = re.search(r'Maximum .* space PetscMalloc\(\)ed: *total *(\S+) *max *(\S+) *min', run.stdout)
+            most[ranks] = [float(v) for v in found.groups()]
+        self.assertLess(most[4][1], 1.08 * most[4][0] / 4)
+        self.assertLess(most[4][0], 1.4 * most[1][0])
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,198 @@
+"""hyco check: what it counts, warns of, refuses and estimates, on several ranks as on one; hyco view of what is missing."""
+import os
+import shutil
+import unittest
+
+from common import SANITIZED, SOURCE, Case, msh
+
+EXAMPLES = os.path.join(SOURCE, 'examples')
+
+SCENE = '''scene: {mesh: two.msh, parameters: [press, idle]}
+parameter:
+  press: {range: [0.01, 0.05]}
+  idle: {range: [0, 1]}
+body:
+  upper: {young: 100, poisson: 0.3}
+  lower: {young: 100, poisson: 0.3, map: {y: y*lower}}
+fixed:
+  base: {x: 0, y: 0}
+  top: {x: 0, y: -press}
+contact:
+  under: {type: surface, slave: under, master: over, gap: 0.02}
+'''
+
+
+def two(path, upper=2, lower=4, height=1.0, twice=False):
+    """Two unit squares, one on the other, of so many cells along x: quad4, a row each; twice: the upper in two parts."""
+    nodes, cells = [], []
+
+    def block(n, y, tag, bottom, top, halves=1):
+        for half in range(halves):
+            first = len(nodes)
+            k = n // halves
+            for j in (0, 1):
+                nodes.extend((half / halves + i / n, y + j * height, 0.0) for i in range(k + 1))
+            for i in range(k):
+                a, b = first + i + 1, first + k + 1 + i + 1
+                cells.append((3, tag, [a, a + 1, b + 1, b]))
+                cells.append((1, bottom, [a, a + 1]))
+                cells.append((1, top, [b, b + 1]))
+
+    block(upper, height, 1, 3, 4, 2 if twice else 1)
+    block(lower, 0.0, 2, 5, 6)
+    msh(path, nodes, cells, {1: (2, 'upper'), 2: (2, 'lower'), 3: (1, 'under'), 4: (1, 'top'), 5: (1, 'base'), 6: (1, 'over')})
+
+
+class Check(Case):
+    def scene(self, name='scene', text=SCENE.replace(', map: {y: y*lower}', ''), **mesh):
+        os.makedirs(self.path(name), exist_ok=True)
+        two(self.path(name, 'two.msh'), **mesh)
+        with open(self.path(name, 'scene.yaml'), 'w', encoding='utf-8') as f:
+            f.write(text)
+        return name
+
+    def warned(self, report, *words):
+        """One warning has all these words."""
+        self.assertTrue(any(all(w in line for w in words) for line in report['warnings']), (words, report['warnings']))
+
+    def test_examples(self):
+        """Nothing is suspicious about the examples; sizes are those that solve reports."""
+        for name, point in (('rope', '0.07,0.17'), ('blocks', '0.05,0.06'), ('hertz', '0.05,1,10'), ('plate', '1,0.5'),
+                            ('roller', '0,0.5,10'), ('pellet', '4.06,1')):
+            with self.subTest(name):
+                found = self.hyco('check', '-scene', os.path.join(EXAMPLES, name))
+                self.assertEqual(found['warnings'], [])
+                self.assertEqual(found['n_warnings'], 0)
+                solved = self.hyco('solve', '-scene', os.path.join(EXAMPLES, name), '-mu', point)
+                for key in ('n_dof', 'n_contacts'):
+                    self.assertEqual(found[key], solved[key], key)
+
+    def test_pellet(self):
+        """Gaps as the scene states them, 4.1 - radius; what the parameters reach; the same on three ranks."""
+        found = self.hyco('check', '-scene', os.path.join(EXAMPLES, 'pellet'))
+        gap, = found['contacts']
+        self.assertEqual((gap['n'], gap['n_facing_min'], gap['n_facing_max']), (189, 189, 189))
+        self.assertEqual(gap['gap_min'], 0)
+        self.near(gap['gap_max'], 0.08, 1e-12)
+        self.assertEqual(found['parameters'], {'radius': ['maps', 'stiffness', 'contact rows', 'gaps'], 'load': ['loads']})
+        self.assertEqual([(b['name'], b['n_cells'], b['n_parts']) for b in found['bodies']], [('cladding', 320, 1), ('pellet', 960, 1)])
+        apart = self.hyco('check', '-scene', os.path.join(EXAMPLES, 'pellet'), ranks=3)
+        for key in found:
+            if key not in ('estimate', 'ranks', 'memory_mb', 'bodies', 'contacts'):
+                self.assertEqual(apart[key], found[key], key)
+        for ours, theirs in zip(apart['contacts'] + apart['bodies'], found['contacts'] + found['bodies']):
+            for key, value in theirs.items():
+                if isinstance(value, float):
+                    self.near(ours[key], value, 1e-9, key)
+                else:
+                    self.assertEqual(ours[key], value, key)
+
+    def test_costs(self):
+        """The points of a training are counted: with those held out, and the stiffnesses among them. A solve measures."""
+        pellet = os.path.join(EXAMPLES, 'pellet')
+        found = self.hyco('check', '-scene', pellet, '-values_radius', '4.02,4.06', '-values_load', '0.2,0.5,1')['estimate']
+        self.assertEqual((found['n_training'], found['n_stiffness'], found['measured']), (6 + 20, 2 + 20, False))
+        solved = self.hyco('check', '-scene', pellet, '-check_solve')
+        self.assertTrue(solved['estimate']['measured'])
+        self.near(solved['total_contact_force'], self.hyco('solve', '-scene', pellet, '-mu', '4.06,0.5')['total_contact_force'], 1e-9)
+        if not SANITIZED:  # its memory is another
+            memory = self.hyco('solve', '-scene', pellet, '-mu', '4.06,1')['memory_mb']
+            self.assertLess(abs(solved['estimate']['solve_mb'] - memory), 0.5 * memory)
+
+    def test_suspicious(self):
+        """A coarse slave, an unused parameter and group, equal groups, a body in two parts, long cells, a gap that is too wide."""
+        found = self.hyco('check', '-scene', self.scene())
+        self.near(found['contacts'][0]['slave_over_master'], 2, 1e-12)
+        self.warned(found, 'under', 'slave')
+        self.warned(found, 'idle', 'nothing')
+        self.assertEqual(found['n_warnings'], 2, found['warnings'])
+        fine = self.hyco('check', '-scene', self.scene(upper=4, lower=2))
+        self.assertEqual(fine['n_warnings'], 1, fine['warnings'])
+        self.warned(self.hyco('check', '-scene', self.scene(upper=4, twice=True)), 'upper', '2 parts')
+        flat = self.hyco('check', '-scene', self.scene(height=1e-3))
+        self.near(next(b['stretch'] for b in flat['bodies'] if b['name'] == 'upper'), 500, 1e-9)
+        self.warned(flat, 'upper', '500')
+        wide = self.hyco('check', '-scene', self.scene(upper=4), '-contact_under_gap', '0.5')
+        self.warned(wide, 'under', '0.5')
+        self.scene(upper=4)
+        with open(self.path('scene', 'two.msh'), encoding='ascii') as f:
+            lines = f.read().split('\n')
+        at = next(k for k, line in enumerate(lines) if line == '$Elements')
+        more = [line.split() for line in lines[at + 2:] if line.split()[1:2] == ['1'] and line.split()[3] == '6']
+        count = int(lines[at + 1])
+        lines[at + 1] = str(count + len(more))
+        lines[at + 2 + count:at + 2 + count] = [f'{count + 1 + k} 1 2 7 7 {" ".join(e[5:])}' for k, e in enumerate(more)]
+        text = '\n'.join(lines).replace('$PhysicalNames\n6\n', '$PhysicalNames\n7\n1 7 "Over"\n')
+        with open(self.path('scene', 'two.msh'), 'w', encoding='ascii') as f:
+            f.write(text)
+        found = self.hyco('check', '-scene', 'scene')
+        self.assertEqual(found['unused_groups'], ['Over'])
+        self.warned(found, 'over', 'Over', 'letter case')
+        self.warned(found, 'over', 'Over', 'same nodes')
+        self.warned(found, 'Over', 'no entry')
+
+    def test_facing(self):
+        """Where a map moves a body away, no slave node faces the master: anywhere, or at some points."""
+        text = SCENE.replace('{young: 100, poisson: 0.3}', '{young: 100, poisson: 0.3, map: {x: x + 8*idle}}').replace(
+            ', map: {y: y*lower}', '').replace(', gap: 0.02', '')
+        found = self.hyco('check', '-scene', self.scene(text=text, upper=4))
+        self.assertEqual((found['contacts'][0]['n_facing_min'], found['contacts'][0]['n_facing_max']), (0, 5))
+        self.assertEqual(found['warnings'], [])
+        found = self.hyco('check', '-scene', self.scene(text=text.replace('[0, 1]', '[0.5, 1]'), upper=4))
+        self.warned(found, 'under', 'never faces')
+
+    def test_floating(self):
+        """Motions that contact alone holds are named, and those that nothing holds are solve's error."""
+        blocks = os.path.join(EXAMPLES, 'hertz')
+        free = self.path('floating.yaml')
+        with open(os.path.join(blocks, 'scene.yaml'), encoding='utf-8') as f:
+            text = f.read()
+        text = text.replace('mesh: hertz.msh', f'mesh: {blocks}/hertz.msh').replace('  upper_top: {y: -press}', '#')
+        text = text.replace('\nfixed:', '\npressure: {upper_top: press}\nfixed:')
+        with open(free, 'w', encoding='utf-8') as f:
+            f.write(text)
+        found = self.hyco('check', '-scene', free)
+        self.assertEqual(len(found['free_motions']), 1)
+        self.assertIn('upper', found['free_motions'][0])
+        self.assertIn('(0, 1, 0)', found['free_motions'][0])
+        self.warned(found, 'contact alone')
+        with open(free, 'w', encoding='utf-8') as f:
+            f.write(text.replace('  upper_sym: {x: 0}', '#'))
+        for ranks in (0, 2):
+            runs = [self.run_raw(command, '-scene', free, *more, ranks=ranks) for command, *more in (('check',), ('solve', '-mu', '0.05,1,10'))]
+            for run in runs:
+                self.assertEqual(run.returncode, 1, run.stdout)
+                self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
+                self.assertIn('no support and no contact keeps body upper', run.stderr)
+            self.assertIn('press = ', runs[0].stderr)
+
+    def test_refused(self):
+        """What solve refuses: on every number of ranks, with the point where it is."""
+        scene = self.scene(text=SCENE.replace('y*lower', 'y - 30*press*x*y'))
+        for ranks in (0, 2):
+            run = self.run_raw('check', '-scene', scene, '-report', 'none.json', ranks=ranks)
+            self.assertEqual(run.returncode, 1, run.stdout)
+            self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
+            self.assertIn('press = 0.05', run.stderr)
+            self.assertFalse(os.path.exists(self.path('none.json')))
+        self.assertEqual(self.run_raw('check', '-scene', self.scene(), '-fixed_nowhere_x', '0').returncode, 1)
+        run = self.run_raw('check', '-scene', self.scene(), '-hyco_rid_groups', 'nowhere')
+        self.assertEqual(run.returncode, 1, run.stdout)
+        run = self.run_raw('check', '-scene', self.scene(), '-mu', '1,2')
+        self.assertIn('-mu', run.stderr)
+
+    def test_view(self):
+        """hyco view of a scene whose mesh or group is missing fails, and names it."""
+        self.assertEqual(self.run_raw('view', '-scene', self.scene()).returncode, 0)
+        for option, word in (('-scene_mesh', 'nowhere.msh'), ('-fixed_nowhere_x', 'nowhere'), ('-contact_under_slave', 'elsewhere'),
+                             ('-body_third_young', 'third')):
+            for ranks in (0, 2):
+                run = self.run_raw('view', '-scene', 'scene', option, '1' if option.endswith(('_x', '_young')) else word, ranks=ranks)
+                self.assertEqual(run.returncode, 1, run.stdout)
+                self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
+                self.assertIn(word, run.stderr)
+        shutil.rmtree(self.path('scene'))
+
+
+if __name__ == '__main__':
+    unittest.main()

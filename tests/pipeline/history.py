@@ -1,0 +1,153 @@
+"""Scenes with a history: their path, on any number of ranks, by either kind of iteration, interrupted or not."""
+import csv
+import os
+import signal
+import subprocess
+import time
+import unittest
+import sys
+import xml.etree.ElementTree as ET
+
+import h5py
+import numpy as np
+
+from common import HYCO, PATIENCE, PELLET, SOURCE, Case
+
+sys.path.append(os.path.join(SOURCE, 'tests', 'verify'))
+RING = os.path.join(SOURCE, 'examples', 'ring')
+
+
+def arrays(path):
+    """All numbers of a series by name."""
+    out = {}
+    with h5py.File(path) as f:
+        f.visititems(lambda name, item: out.update({name: item[()]}) if isinstance(item, h5py.Dataset) and item.dtype.kind == 'f' else None)
+    return out
+
+
+class History(Case):
+    def ring(self, name, *args, **options):
+        """The report and the series of the ring, on a coarse history."""
+        report = self.hyco('solve', '-scene', RING, '-mu', '0.01,1', '-history_times', '0,1,3,8', '-body_ring_exponent', '4',
+                           '-body_ring_rate', '1e-12', '-output', self.path(name + '.xdmf'), *args, **options)
+        return report, arrays(self.path(name + '.h5'))
+
+    def alike(self, a, b, relative):
+        self.assertEqual(a.keys(), b.keys())
+        for name, value in a.items():
+            self.assertLessEqual(abs(value - b[name]).max(initial=0), relative * max(abs(value).max(initial=0), 1e-30), name)
+
+    def elastic(self, times='0,0.5,1', tables='0 0.2,1 1'):
+        """The pellet, elastic, its loads times the table q."""
+        with open(os.path.join(PELLET, 'scene.yaml'), encoding='utf-8') as f:
+            text = f.read().replace('*load', '*load*q').replace('mesh: A.msh', f'mesh: {PELLET}/A.msh')
+        with open(self.path('pellet.yaml'), 'w', encoding='utf-8') as f:
+            f.write(text)
+        return ['solve', '-scene', self.path('pellet.yaml'), '-history_times', times, '-history_tables_q', tables]
+
+    def test_elastic_path(self):
+        """Without memory each time's solution is that of a scene with its loads."""
+        report = self.hyco(*self.elastic(), '-mu', '4.06,1')
+        for q, force in zip((0.2, 0.6, 1), report['history']['total_contact_force']):
+            alone = self.hyco('solve', '-scene', PELLET, '-mu', f'4.06,{q}')
+            self.assertAlmostEqual(force, alone['total_contact_force'], delta=1e-9 * (1 + abs(force)))
+        self.near(report['strain_energy'], alone['strain_energy'], 1e-9)
+        self.assertEqual(report['history']['factors'], [1, 0, 0])
+        self.assertLess(max(report['history']['energy_defect']), 1e-10)
+
+    def test_ring(self):
+        """Either iteration, any number of ranks: one answer; the tangent's converge quadratically, the other keeps its factor."""
+        tangent, fields = self.ring('tangent', '-hyco_newton', 'tangent')
+        self.assertGreaterEqual(tangent['history']['newton_order'], 1.8)
+        self.assertLessEqual(max(tangent['history']['most_iterations']), 4)
+        for name, args, ranks in (('elastic', ['-hyco_newton', 'elastic'], 0), ('two', ['-hyco_newton', 'tangent'], 2),
+                                  ('four', ['-hyco_newton', 'elastic'], 4)):
+            report, others = self.ring(name, *args, ranks=ranks)
+            self.alike(fields, others, 1e-8 if name == 'elastic' else 1e-9 if ranks == 2 else 1e-8)
+            history = report['history']
+            self.assertLess(max(history['kkt_max']), 1e-8)
+            self.assertLess(max(history['energy_defect']), 1e-8)
+            self.near(history['total_contact_force'][-1], tangent['history']['total_contact_force'][-1], 1e-9)
+            if 'elastic' in args:
+                self.assertEqual(sum(history['factors']), 1)
+
+    def test_series_and_table(self):
+        report, fields = self.ring('series', '-table', self.path('t.csv'))
+        grids = ET.parse(self.path('series.xdmf')).getroot().findall('.//Grid[@CollectionType="Temporal"]/Grid')
+        self.assertEqual([float(g.find('Time').get('Value')) for g in grids], [0, 1, 3, 8])
+        names = {a.get('Name') for a in grids[-1].findall('Attribute')}
+        self.assertLessEqual({'displacement', 'stress', 'mises', 'inelastic', 'contact_pressure', 'gap'}, names)
+        for item in grids[-1].iter('DataItem'):
+            file, place = item.text.split(':/')
+            with h5py.File(self.path(file)) as f:
+                self.assertEqual(list(f[place].shape), [int(n) for n in item.get('Dimensions').split()])
+        with open(self.path('t.csv'), encoding='utf-8') as f:
+            rows = list(csv.DictReader(f))
+        self.assertEqual([float(r['t']) for r in rows], [0, 1, 3, 8])
+        self.assertAlmostEqual(float(rows[-1]['total_contact_force']), report['total_contact_force'], places=5)
+        self.near(fields['step-0003/cells/inelastic'].max(), report['history']['inelastic'][-1], 1e-12)
+
+    def test_resume(self):
+        """A run that is killed goes on from its last step, on another number of ranks too, and ends as if nothing had been."""
+        args = ['-scene', RING, '-mu', '0.01,1', '-history_times', ','.join(str(k / 20) for k in range(161)), '-hyco_newton', 'tangent']
+        whole = self.hyco('solve', *args, '-output', self.path('whole.xdmf'))
+        keep = ['-hyco_checkpoint', self.path('c.h5'), '-output', self.path('parts.xdmf')]
+        run = subprocess.Popen([HYCO, 'solve', *args, *keep], stdout=subprocess.PIPE, text=True)
+        for _ in range(30):
+            run.stdout.readline()
+        run.send_signal(signal.SIGKILL)
+        run.wait()
+        run.stdout.close()
+        self.assertFalse(os.path.exists(self.path('parts.h5')))
+        begin = time.time()
+        rest = self.hyco('solve', *args, *keep, '-hyco_resume', ranks=2)
+        self.assertLess(time.time() - begin, 100 * PATIENCE)
+        for column in ('t', 'total_contact_force', 'inelastic', 'stored', 'dissipated', 'iterations'):
+            a, b = np.array(whole['history'][column]), np.array(rest['history'][column])
+            self.assertLessEqual(abs(a - b).max(), 1e-9 * abs(a).max() if column != 'iterations' else 2, column)
+        self.alike(arrays(self.path('whole.h5')), arrays(self.path('parts.h5')), 1e-9)
+        again = self.hyco('solve', *args, *keep, '-hyco_resume')
+        self.assertEqual(again['history']['total_contact_force'], rest['history']['total_contact_force'])
+
+    def test_resume_is_exact(self):
+        """On as many ranks the rest is equal to 1e-12."""
+        args = ['-scene', RING, '-mu', '0.01,1', '-history_times', '0,0.5,1,1.5,2,3,4']
+        whole = self.hyco('solve', *args)
+        keep = ['-hyco_checkpoint', self.path('e.h5')]
+        run = subprocess.Popen([HYCO, 'solve', *args, *keep], stdout=subprocess.PIPE, text=True)
+        for _ in range(3):
+            run.stdout.readline()
+        run.send_signal(signal.SIGKILL)
+        run.wait()
+        run.stdout.close()
+        rest = self.hyco('solve', *args, *keep, '-hyco_resume')
+        for column in ('total_contact_force', 'inelastic', 'mises', 'stored', 'dissipated'):
+            self.assertLessEqual(abs(np.array(whole['history'][column]) - rest['history'][column]).max(),
+                                 1e-12 * max(abs(v) for v in whole['history'][column]), column)
+
+    def test_ends_early(self):
+        """A limit load: the last accepted state is written, and the run fails."""
+        self.write_bar()
+        run = self.run_raw('solve', '-scene', self.path('bar.yaml'), '-output', self.path('bar.xdmf'), '-table', self.path('bar.csv'))
+        self.assertEqual(run.returncode, 1, run.stderr)
+        self.assertIn('the history ends at t = ', run.stderr)
+        self.assertEqual(len(run.stderr.splitlines()), 1)
+        with open(self.path('bar.csv'), encoding='utf-8') as f:
+            last = [float(r['t']) for r in csv.DictReader(f)][-1]
+        with h5py.File(self.path('bar.h5')) as f:
+            self.assertAlmostEqual(f['t'][-1, 0], last, places=6)
+        self.assertGreater(last, 0.9)
+        self.assertLess(last, 1.0001)  # plane strain, free sides: 2/sqrt(3) of the yield stress, reached at t = 1
+
+    def write_bar(self):
+        from grids import Grid
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 1, 3), np.linspace(0, 1, 3)], lambda x: x, 'bar', {'x0': 'left', 'y0': 'foot', 'x1': 'pull'})
+        grid.write(self.path('bar.msh'))
+        with open(self.path('bar.yaml'), 'w', encoding='utf-8') as f:
+            f.write('scene: {title: bar, mesh: bar.msh}\nbody: {bar: {law: j2, young: 1000, poisson: 0.3, yield: 1}}\n'
+                    'fixed: {left: {x: 0}, foot: {y: 0}}\ntraction: {pull: {x: 2/sqrt(3)*t}}\nhistory: {times: [0, 0.5, 2]}\n')
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,106 @@
+"""What cmake --install puts in a folder is enough to build on: the ladder, by pkg-config and by CMake; and it shows no private symbol."""
+import glob
+import os
+import re
+import subprocess
+import tempfile
+import unittest
+
+from common import PATIENCE
+
+BUILD = os.path.dirname(os.environ['HYCO'])
+SOURCE = os.path.dirname(os.path.realpath(os.path.join(os.environ['HYCO_SOURCE'], 'CMakeLists.txt')))
+LADDER = [os.path.basename(name)[:-2] for name in sorted(glob.glob(os.path.join(SOURCE, 'examples', 'ladder', '*.c')))]
+
+
+def run(*command, **more):
+    done = subprocess.run(command, capture_output=True, text=True, timeout=500 * PATIENCE, check=False, **more)
+    assert done.returncode == 0, ' '.join(command) + '\n' + done.stdout + done.stderr
+    return done.stdout
+
+
+@unittest.skipIf(os.environ.get('HYCO_SANITIZE') == '1', 'who links the library would want its flags')
+class Installed(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory(prefix='a b ')
+        cls.prefix = os.path.join(cls.folder.name, 'prefix')
+        run('cmake', '--install', BUILD, '--prefix', cls.prefix)
+        cls.library, = glob.glob(os.path.join(cls.prefix, '**', 'libhyco.so'), recursive=True)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def found(self, pattern):
+        return glob.glob(os.path.join(self.prefix, pattern), recursive=True)
+
+    def predicts(self, program):
+        """`program` loads a model of the tests and predicts."""
+        model = os.path.join(SOURCE, 'tests', 'data', 'rope-hybrid-4-table.h5')
+        self.assertIn('force', run(program, '-model', model, '-points', '3'))
+
+    def test_files(self):
+        for pattern in ('bin/hyco', 'include/hyco.h', 'share/man/man1/hyco.1', 'share/man/man1/hyco-predict.1',
+                        'share/bash-completion/completions/hyco', 'share/doc/hyco/LICENSE', 'share/doc/hyco/docs/scenes.md',
+                        'share/doc/hyco/examples/rope/scene.yaml', 'share/doc/hyco/examples/ladder/Makefile'):
+            self.assertTrue(self.found(pattern), pattern)
+        self.assertFalse(self.found('**/private'))
+        self.assertFalse(self.found('**/*impl.h'))
+        soname = re.search(r'soname: \[(\S+)\]', run('readelf', '-d', self.library)).group(1)
+        self.assertTrue(os.path.exists(os.path.join(os.path.dirname(self.library), soname)))
+
+    def test_symbols(self):
+        """The library shows what the installed headers declare, all of it and nothing else."""
+        text = ''.join(open(name, encoding='utf-8').read() for name in self.found('include/*.h'))
+        text = re.sub(r'/\*.*?\*/', '', text, flags=re.S)
+        shown = {line.split()[-1].split('@')[0] for line in run('nm', '-D', '--defined-only', self.library).splitlines()
+                 if ' A ' not in line}
+        private = sorted(name for name in shown if not re.search(rf'\b{name}\b', text))
+        self.assertEqual(private, [])
+        declared = set(re.findall(r'^(?:PetscErrorCode|const char \*|void|PetscBool) ?\*?(Hyco[A-Z]\w*)\(', text, flags=re.M))
+        self.assertGreater(len(declared), 100)
+        self.assertEqual(sorted(declared - shown), [])
+
+    def test_manual(self):
+        """Each option of the help stands in its page, and completes."""
+        options = re.findall(r'^  (-[a-z]\w*) ', run(os.path.join(self.prefix, 'bin', 'hyco'), 'predict', '-help'), flags=re.M)
+        with open(os.path.join(self.prefix, 'share', 'man', 'man1', 'hyco-predict.1'), encoding='utf-8') as file:
+            page = file.read().replace('\\-', '-')
+        self.assertGreater(len(options), 30)
+        for option in options:
+            self.assertRegex(page, rf'\n\.B {option}( <|\n)')
+        completion = os.path.join(self.prefix, 'share', 'bash-completion', 'completions', 'hyco')
+        words = run('bash', '-c', 'source "$1"; COMP_WORDS=(hyco predict -mo); COMP_CWORD=2; _hyco; echo "${COMPREPLY[@]}"', '-', completion)
+        self.assertEqual(words.split(), ['-model'])
+
+    def test_pkg_config(self):
+        ladder = os.path.join(self.folder.name, 'make')
+        run('cp', '-r', os.path.join(self.prefix, 'share', 'doc', 'hyco', 'examples', 'ladder'), ladder)
+        path = os.path.join(os.path.dirname(self.library), 'pkgconfig') + ':' + os.environ.get('PKG_CONFIG_PATH', '')
+        run('make', '-s', '-C', ladder, env={**os.environ, 'PKG_CONFIG_PATH': path})
+        for name in LADDER:
+            self.assertTrue(os.access(os.path.join(ladder, name), os.X_OK), name)
+        self.predicts(os.path.join(ladder, 'batch'))
+
+    def test_cmake(self):
+        build = os.path.join(self.folder.name, 'cmake')
+        run('cmake', '-S', os.path.join(self.prefix, 'share', 'doc', 'hyco', 'examples', 'ladder'), '-B', build,
+            '-DCMAKE_PREFIX_PATH=' + self.prefix)
+        run('cmake', '--build', build, '-j', '2')
+        for name in LADDER:
+            self.assertTrue(os.access(os.path.join(build, name), os.X_OK), name)
+        self.predicts(os.path.join(build, 'batch'))
+
+    def test_version(self):
+        """One version, CMakeLists.txt's."""
+        with open(os.path.join(SOURCE, 'CMakeLists.txt'), encoding='utf-8') as file:
+            version = re.search(r'project\(hyco VERSION (\S+)', file.read()).group(1)
+        self.assertEqual(run(os.path.join(self.prefix, 'bin', 'hyco'), '-version').strip(), 'hyco ' + version)
+        for name, pattern in (('CITATION.cff', r'^version: (\S+)'), ('CHANGELOG.md', r'^## (\d\S*)')):
+            with open(os.path.join(SOURCE, name), encoding='utf-8') as file:
+                self.assertEqual(re.search(pattern, file.read(), flags=re.M).group(1), version, name)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,95 @@
+"""A ring that creeps, plane strain, a = 4.1, b = 4.7, E = 1e5, nu = 0.3, Norton n = 1, rate A = 2e-6: with n = 1 the
+deviator obeys Maxwell's law, dilatation is elastic, and pressures are sums of two exponentials, by hand from the
+correspondence principle (R. M. Christensen, Theory of Viscoelasticity, 2nd ed. 1982, section 2.1).
+
+Shrunk on a solid elastic core with interference 0.01: p = 21.8253172 exp(-0.146510938 t) + 10.2066022 exp(-0.225014142 t).
+Pressed from outside by 50 over a gap of 0.02 it closes at t = 1.63214460, and then, s = t - 1.63214460,
+p = 50 - 34.2891470 exp(-0.146510938 s) - 15.7108530 exp(-0.225014142 s).
+"""
+import math
+import unittest
+
+import numpy as np
+
+from grids import Grid
+from verify import Verify, order
+
+SCENE = """
+scene: {{title: ring on a core, mesh: mesh.msh}}
+body:
+  core: {{young: 1e5, poisson: 0.3}}
+  ring: {{law: norton, young: 1e5, poisson: 0.3, rate: 2e-6, exponent: 1}}
+fixed: {{x0: {{x: 0}}, y0: {{y: 0}}}}
+pressure: {{outside: {outside}}}
+contact: {{fit: {{type: pair, slave: shaft, master: sleeve, tolerance: 1e-6, normal: {{x: x, y: y}}, gap: {gap}}}}}
+history: {{times: [{times}]}}
+"""
+CLOSES = 1.63214460
+LENGTH = 4.1 * math.pi / 2  # of the contact, on the quarter
+
+
+def relaxing(t):
+    return 21.8253172 * np.exp(-0.146510938 * t) + 10.2066022 * np.exp(-0.225014142 * t)
+
+
+def closing(t):
+    s = np.maximum(t - CLOSES, 0)
+    return np.where(t < CLOSES, 0, 50 - 34.2891470 * np.exp(-0.146510938 * s) - 15.7108530 * np.exp(-0.225014142 * s))
+
+
+def polar(x):
+    return x[:, :1] * np.column_stack([np.cos(x[:, 1]), np.sin(x[:, 1])])
+
+
+class Ring(Verify):
+    name = 'ring'
+
+    def mesh(self, n):
+        """A quarter, n cells through the ring; the core has a bore of a hundredth of its radius, which changes 1e-5 of p."""
+        grid = Grid()
+        angle = np.linspace(0, np.pi / 2, 4 * n + 1)
+        grid.box('quad4', [np.linspace(4.1, 4.7, n + 1), angle], polar, 'ring',
+                 {'x0': 'sleeve', 'x1': 'outside', 'y0': 'y0', 'y1': 'x0'})
+        grid.box('quad4', [np.geomspace(0.041, 4.1, 4 * n + 1), angle], polar, 'core',
+                 {'x1': 'shaft', 'y0': 'y0', 'y1': 'x0'})
+        return grid
+
+    def path_of(self, n, steps, outside, gap, end, *args, **options):
+        """Times and mean pressures: the nodes' radial forces, over the length of the arc."""
+        times = ', '.join(f'{t:.12g}' for t in np.linspace(0, end, steps + 1))
+        scene = self.scene(SCENE.format(outside=outside, gap=gap, times=times), self.mesh(n))
+        report = self.hyco('solve', '-scene', scene, *args, **options)
+        h = report['history']
+        self.assertTrue(h['ended'])
+        self.assertLess(max(h['kkt_max']), 1e-8)
+        self.assertLess(max(h['energy_defect']), 1e-8)
+        return np.array(h['t']), np.array(h['total_contact_force']) / LENGTH, h
+
+    def test_shrink_fit(self):
+        off, steps = [], (40, 80, 160)
+        for k in steps:
+            p = self.path_of(4, k, 0, -0.01, 8, '-hyco_step_inelastic', 1)[1]
+            off.append(p)
+        t = np.linspace(0, 8, 41)
+        on = [p[::k // 40] for p, k in zip(off, steps)]
+        first = [abs(a - b).max() for a, b in zip(on, on[1:])]
+        self.row('shrink fit: order in time', math.log2(first[0] / first[1]), 1, 5)
+        p = self.path_of(8, 640, 0, -0.01, 8)[1][::16]
+        self.row('shrink fit: p at t = 0', p[0], relaxing(0), 0.1)
+        for k in (5, 10, 20, 40):
+            self.row(f'shrink fit: p at t = {t[k]:g}', p[k], relaxing(t[k]), 0.2)
+
+    def test_closing(self):
+        t, p, h = self.path_of(8, 640, 50, 0.02, 8)
+        before = t < 0.99 * CLOSES
+        self.row('closing: largest force before', max(np.array(h['lambda_max'])[before]), 0, 0)
+        k = int(np.argmax(p > 0))
+        begin = t[k] - p[k] * (t[k + 1] - t[k]) / (p[k + 1] - p[k])
+        self.row('closing: time', begin, CLOSES, 0.5)
+        for at in (3, 4, 8):
+            k = int(round(at / t[1]))
+            self.row(f'closing: p at t = {at}', p[k], float(closing(t[k])), 0.2)
+
+
+if __name__ == '__main__':
+    unittest.main()
