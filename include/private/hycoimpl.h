@@ -246,6 +246,10 @@ PetscErrorCode HycoOptionsCheckName(const char name[]);
 /* Whether an option's name (without dash) begins as a scene's entry does. */
 PetscBool HycoIsSceneKey(const char name[]);
 
+/* PetscFree() of each pointer, whose addresses are given. */
+#define HycoFreeAll(...) PetscCall(HycoFreeAll_Private((void *[]){__VA_ARGS__, NULL}))
+PetscErrorCode HycoFreeAll_Private(void *const addresses[]);
+
 /* A copy of `n` items of type `type`: *to = copy of from. */
 #define HycoDuplicate(n, from, to)                                                                                     \
   do {                                                                                                                 \

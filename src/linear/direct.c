@@ -46,13 +46,7 @@ static PetscErrorCode Release(HycoDirect d)
   if (d->begun) Call(d, END);
   d->begun = PETSC_FALSE;
   d->K_id = d->B_id = 0;
-  PetscCall(PetscFree(d->id.irn_loc));
-  PetscCall(PetscFree(d->id.jcn_loc));
-  PetscCall(PetscFree(d->id.a_loc));
-  PetscCall(PetscFree(d->id.perm_in));
-  PetscCall(PetscFree(d->id.listvar_schur));
-  PetscCall(PetscFree(d->rhs));
-  PetscCall(PetscFree(d->reduced));
+  HycoFreeAll(&d->id.irn_loc, &d->id.jcn_loc, &d->id.a_loc, &d->id.perm_in, &d->id.listvar_schur, &d->rhs, &d->reduced);
   PetscCall(VecScatterDestroy(&d->to_root));
   PetscCall(VecDestroy(&d->root));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -84,11 +84,7 @@ PetscErrorCode HycoReducerReset(HycoReducer t)
 PetscErrorCode HycoReducerDropBases(HycoReducer t)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(t->seeds_node));
-  PetscCall(PetscFree(t->seeds_cell));
-  PetscCall(PetscFree(t->sigma));
-  PetscCall(PetscFree(t->V_whole));
-  PetscCall(PetscFree(t->VtU));
+  HycoFreeAll(&t->seeds_node, &t->seeds_cell, &t->sigma, &t->V_whole, &t->VtU);
   t->n_seeds_node = t->n_seeds_cell = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -104,12 +100,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
   PetscCall(MatDestroy(&t->S));
-  PetscCall(PetscFree(t->U_rid));
-  PetscCall(PetscFree(t->U_contact));
-  PetscCall(PetscFree(t->contact_row));
-  PetscCall(PetscFree(t->Lambda));
-  PetscCall(PetscFree(t->U_norm));
-  PetscCall(PetscFree(t->dual_seeds));
+  HycoFreeAll(&t->U_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

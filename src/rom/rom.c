@@ -87,12 +87,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscCall(HycoRowsDestroy(&m->rows));
   PetscCall(HycoFEDestroy(&m->fe));
   m->of_fe = NULL;
-  PetscCall(PetscFree(m->contact));
-  PetscCall(PetscFree(m->gamma));
-  PetscCall(PetscFree(m->U));
-  PetscCall(PetscFree(m->Lambda));
-  PetscCall(PetscFree(m->stress));
-  PetscCall(PetscFree(m->slave_id));
+  HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -113,16 +108,8 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
   PetscCall(HycoPairsDestroy(&m->pairs));
   PetscCall(HycoMeshDestroy(&m->mesh));
   PetscCall(HycoSceneDestroy(&m->scene));
-  PetscCall(PetscFree(m->role));
-  PetscCall(PetscFree(m->master_reach));
-  PetscCall(PetscFree(m->in_rid));
-  PetscCall(PetscFree(m->V));
-  PetscCall(PetscFree(m->sigma));
-  PetscCall(PetscFree(m->fe_dof));
-  PetscCall(PetscFree(m->points));
-  PetscCall(PetscFree(m->reach));
-  PetscCall(PetscFree(m->provenance));
-  PetscCall(PetscFree(m->search));
+  HycoFreeAll(&m->role, &m->master_reach, &m->in_rid, &m->V, &m->sigma, &m->fe_dof, &m->points, &m->reach,
+              &m->provenance, &m->search);
   PetscCall(PetscHeaderDestroy(model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

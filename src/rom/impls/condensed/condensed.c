@@ -38,23 +38,8 @@ PetscErrorCode HycoCondensedFree(HycoCondensed *condensed)
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt p = 0; p < c->dim; p++) PetscCall(PetscFree(c->x[p]));
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) PetscCall(PetscFree(c->field[f].data));
-  PetscCall(PetscFree(c->Lambda));
-  PetscCall(PetscFree(c->bounds));
-  PetscCall(PetscFree(c->law));
-  PetscCall(PetscFree(c->flat));
-  PetscCall(PetscFree(c->sample));
-  PetscCall(PetscFree(c->probe));
-  PetscCall(PetscFree(c->inverse));
-  PetscCall(PetscFree(c->theta_scale));
-  PetscCall(PetscFree(c->node_stiff));
-  PetscCall(PetscFree(c->node_load));
-  PetscCall(PetscFree(c->packed));
-  PetscCall(PetscFree(c->M));
-  PetscCall(PetscFree(c->work));
-  PetscCall(PetscFree(c->g));
-  PetscCall(PetscFree(c->H));
-  PetscCall(PetscFree(c->a));
-  PetscCall(PetscFree(c->active));
+  HycoFreeAll(&c->Lambda, &c->bounds, &c->law, &c->flat, &c->sample, &c->probe, &c->inverse, &c->theta_scale,
+              &c->node_stiff, &c->node_load, &c->packed, &c->M, &c->work, &c->g, &c->H, &c->a, &c->active);
   PetscCall(HycoCondensedResetSystem(c));
   PetscCall(PetscFree(*condensed));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -58,10 +58,7 @@ static PetscErrorCode Resize(Dual *d, PetscInt m, PetscInt p)
   const PetscInt n = m + p;
 
   PetscFunctionBegin;
-  PetscCall(PetscFree(d->S));
-  PetscCall(PetscFree(d->g));
-  PetscCall(PetscFree(d->L));
-  PetscCall(PetscFree(d->active));
+  HycoFreeAll(&d->S, &d->g, &d->L, &d->active);
   PetscCall(PetscMalloc1((size_t)n * (size_t)n + 1, &d->S));
   PetscCall(PetscCalloc1(n + 1, &d->g));
   PetscCall(PetscCalloc1(n + 1, &d->L));
@@ -341,11 +338,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
 
   PetscFunctionBegin;
   PetscCall(HycoTaoDestroy(&d->tao));
-  PetscCall(PetscFree(d->S));
-  PetscCall(PetscFree(d->g));
-  PetscCall(PetscFree(d->L));
-  PetscCall(PetscFree(d->active));
-  PetscCall(PetscFree(form->data));
+  HycoFreeAll(&d->S, &d->g, &d->L, &d->active, &form->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
