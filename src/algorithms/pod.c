@@ -79,7 +79,7 @@ static PetscErrorCode Solve(SVD svd, Mat S, PetscInt most, PetscBool *fixed)
   PetscCall(SVDSetType(svd, name));
   PetscCall(SVDSetOperators(svd, S, NULL));
   PetscCall(SVDSetImplicitTranspose(svd, (PetscBool)(N >= n))); /* no second copy of S; tsqr takes a wide one's */
-  PetscCall(SVDSetDimensions(svd, most, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(SVDSetDimensions(svd, most, PETSC_DETERMINE, PETSC_DETERMINE));
   PetscCall(SVDSetWhichSingularTriplets(svd, SVD_LARGEST));
   PetscCall(SVDSetFromOptions(svd));
   PetscCall(SVDGetDimensions(svd, &asked, NULL, NULL));
