@@ -74,7 +74,7 @@ class Material(Program):
 
     def test_refused(self):
         for body, *words in (
-                ('law: cubc, c11: 1', 'block', 'cubc', 'it must be cubic, elastic', 'did you mean cubic?'),
+                ('law: cubc, c11: 1', 'block', 'cubc', 'cubic, elastic', 'did you mean cubic?'),
                 ('law: cubic, c11: 1, c12: 0.1, young: 3', 'body_block_young', 'c11, c12, c44'),
                 ('law: cubic, c11: 1, c12: 0.1, c34: 3', 'body_block_c34', 'did you mean c44?'),
                 ('law: cubic, c11: 1, c12: 0.1', 'block', 'c44', 'shear stiffness'),
