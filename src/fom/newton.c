@@ -302,7 +302,7 @@ static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[
   PetscReal A[HYCO_ANDERSON][HYCO_ANDERSON], trace = 0;
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < n; i++) {
+  for (PetscInt i = 0; i < n && i < HYCO_ANDERSON; i++) {
     PetscCall(VecMDot(dG[i], n, dG, A[i]));
     trace += A[i][i];
   }
