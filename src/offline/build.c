@@ -238,6 +238,8 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
   PetscBool presses = PETSC_FALSE, kept = PETSC_FALSE;
 
   PetscFunctionBegin;
+  PetscCall(PetscObjectSetOptions((PetscObject)t->prototype, t->scene->options));
+  PetscCall(HycoROMSetFromOptions(t->prototype)); /* as the model when it predicts */
   for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
   HycoCheckModel(

@@ -384,8 +384,6 @@ PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(ReadAll(t));
-  PetscCall(PetscObjectSetOptions((PetscObject)t->prototype, ((PetscObject)t)->options));
-  PetscCall(HycoROMSetFromOptions(t->prototype)); /* what its models will be set to when they predict */
   PetscCall(CheckSVDOptions(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
