@@ -47,7 +47,8 @@ typedef struct {
   PetscReal *state;                            /* out: at the step's end */
   PetscReal *stress;                           /* out: n x n_strain */
   PetscReal *tangent; /* out: n x n_strain x n_strain, d stress / d strain of the step, row major, symmetric */
-  /* out, n each, densities by volume; a law may leave them: then nothing is stored, all work is dissipated */
+  /* out, n each, densities by volume; a law may leave them: then nothing is stored, all work is dissipated,
+     and where it stores, the increment is what is dissipated over the equivalent stress */
   PetscReal *stored;     /* elastic energy at the step's end */
   PetscReal *dissipated; /* by the step: (stress0 + stress) / 2 : its inelastic strain */
   PetscReal *increment;  /* equivalent inelastic strain of the step, 0 or more */

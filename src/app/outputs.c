@@ -110,6 +110,8 @@ static PetscErrorCode CheckNames(PetscBool trains)
     PetscCall(Peek(written[k] + 1, path));
     if (path[0]) PetscCall(strcmp(written[k], "-output") ? Take(written[k], path, PETSC_TRUE) : AddFields(path));
   }
+  PetscCall(Peek("hyco_checkpoint", path));
+  PetscCall(Take("-hyco_checkpoint", path, PETSC_TRUE));
   if (trains && model[0]) PetscCall(AddSnapshots(model));
   if (!trains) PetscCall(Take("-model", model, PETSC_FALSE));
   PetscCall(CheckSceneFile());

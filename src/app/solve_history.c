@@ -84,7 +84,7 @@ PetscErrorCode DriverSayStep(HycoFOM fom, const HycoStep *s, void *ctx)
   (void)fom;
   if (!path->checked) PetscCall(DriverCheckLeft()); /* the solvers have read theirs */
   path->checked = PETSC_TRUE;
-  PetscCall(Say("t %-11.6g %3d of %d: %d step%s, %d iteration%s%s, %d closed, force %.8g, inelastic %.3g, mises %.5g\n",
+  PetscCall(Say("t %-11.10g %3d of %d: %d step%s, %d iteration%s%s, %d closed, force %.8g, inelastic %.3g, mises %.5g\n",
                 (double)s->t, (int)s->index + 1, (int)path->n, (int)s->substeps, s->substeps == 1 ? "" : "s",
                 (int)s->iterations, s->iterations == 1 ? "" : "s", s->cuts ? ", cut" : "", (int)s->n_active,
                 (double)s->total_contact_force, (double)s->inelastic, (double)s->mises));

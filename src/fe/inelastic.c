@@ -17,7 +17,7 @@ struct _n_HycoFEState {
   PetscInt n_cells, *start; /* n_cells + 1 */
   PetscReal *value;
   PetscInt n_names;
-  const char **name; /* of the laws' state variables; the laws own them */
+  char **name; /* of the laws' state variables */
 };
 
 /* Where a point's reals are. */
@@ -45,6 +45,7 @@ PetscErrorCode HycoFEStateDestroy(HycoFEState *state)
   if (!state || !*state) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree((*state)->start));
   PetscCall(PetscFree((*state)->value));
+  for (PetscInt k = 0; k < (*state)->n_names; k++) PetscCall(PetscFree((*state)->name[k]));
   PetscCall(PetscFree((*state)->name));
   PetscCall(PetscFree(*state));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -65,7 +66,7 @@ static PetscErrorCode ListNames(HycoScene scene, HycoFEState s)
       PetscBool seen = PETSC_FALSE;
 
       for (PetscInt j = 0; j < s->n_names && !seen; j++) PetscCall(PetscStrcmp(s->name[j], law->state_name[k], &seen));
-      if (!seen) s->name[s->n_names++] = law->state_name[k];
+      if (!seen) PetscCall(PetscStrallocpy(law->state_name[k], &s->name[s->n_names++]));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -112,7 +113,7 @@ PetscErrorCode HycoFEStateGetNames(HycoFEState state, PetscInt *n, const char *c
 {
   PetscFunctionBegin;
   *n = state->n_names;
-  *names = state->name;
+  *names = (const char *const *)state->name;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -234,16 +235,35 @@ static void Linear(HycoFE fe, const HycoElement *el, Batch *b)
   }
 }
 
-/* What a law leaves: nothing stored, all of the work dissipated. */
+static PetscReal Mises(PetscInt dim, const PetscReal s[])
+{
+  PetscReal mean, sum = 0;
+
+  if (dim == 1) return PetscAbsReal(s[0]);
+  mean = (s[0] + s[1] + s[2]) / 3;
+  for (PetscInt c = 0; c < HycoStrainSize(dim); c++) sum += c < 3 ? (s[c] - mean) * (s[c] - mean) : 2 * s[c] * s[c];
+  return PetscSqrtReal(1.5 * sum);
+}
+
+/* What a law leaves: nothing is stored, all of the work is dissipated; where it stores, the equivalent inelastic strain
+   is what is dissipated over the mean equivalent stress. */
 static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
 {
   const PetscInt ns = fe->n_sigma;
 
   for (PetscInt i = 0; i < b->n * el->nq; i++) {
-    if (!PetscIsNanReal(b->dissipated[i])) continue;
-    b->dissipated[i] = *PointAt(fe, b->begin, b->cell[i / el->nq], i % el->nq).stored - b->stored[i];
-    for (PetscInt c = i * ns; c < (i + 1) * ns; c++)
-      b->dissipated[i] += (b->stress0[c] + b->stress[c]) / 2 * (b->strain[c] - b->strain0[c]);
+    const PetscBool stores = (PetscBool)!PetscIsNanReal(b->stored[i]);
+    PetscReal mean[6], equivalent;
+
+    if (!stores) b->stored[i] = 0;
+    for (PetscInt c = 0; c < ns; c++) mean[c] = (b->stress0[i * ns + c] + b->stress[i * ns + c]) / 2;
+    if (PetscIsNanReal(b->dissipated[i])) {
+      b->dissipated[i] = *PointAt(fe, b->begin, b->cell[i / el->nq], i % el->nq).stored - b->stored[i];
+      for (PetscInt c = 0; c < ns; c++) b->dissipated[i] += mean[c] * (b->strain[i * ns + c] - b->strain0[i * ns + c]);
+    }
+    if (!PetscIsNanReal(b->increment[i])) continue;
+    equivalent = Mises(fe->dim, mean);
+    b->increment[i] = stores && equivalent > 0 ? PetscMax(b->dissipated[i], 0) / equivalent : 0;
   }
 }
 
@@ -274,10 +294,7 @@ static PetscErrorCode Update(HycoFE fe, const HycoElement *el, Batch *b, PetscBo
 
   PetscFunctionBegin;
   PetscCall(HycoMaterialConstants(body->law, fe->mu, p.n, b->x, p.temperature, b->constant, constant));
-  for (PetscInt i = 0; i < p.n; i++) {
-    b->stored[i] = b->increment[i] = 0;
-    b->dissipated[i] = b->potential[i] = nothing;
-  }
+  for (PetscInt i = 0; i < p.n; i++) b->stored[i] = b->increment[i] = b->dissipated[i] = b->potential[i] = nothing;
   PetscCall(HycoMaterialUpdate(body->law, &p));
   b->report->dt_factor = PetscMin(b->report->dt_factor, p.dt_factor);
   *failed = (PetscBool)(p.failed >= 0);
@@ -402,16 +419,6 @@ PetscErrorCode HycoFEElasticTangent(HycoFE fe)
   PetscFunctionBegin;
   PetscCall(HycoFESetTangents(fe, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscReal Mises(PetscInt dim, const PetscReal s[])
-{
-  PetscReal mean, sum = 0;
-
-  if (dim == 1) return PetscAbsReal(s[0]);
-  mean = (s[0] + s[1] + s[2]) / 3;
-  for (PetscInt c = 0; c < HycoStrainSize(dim); c++) sum += c < 3 ? (s[c] - mean) * (s[c] - mean) : 2 * s[c] * s[c];
-  return PetscSqrtReal(1.5 * sum);
 }
 
 PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[], PetscReal mises[],

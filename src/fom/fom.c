@@ -223,7 +223,10 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
   PetscCall(HycoOptionsString(
       "-hyco_mesh_write", "<file.h5>: writes the mesh, refined as the scene says, in PETSc's HDF5 format of a DMPlex",
       f->mesh_write, sizeof(f->mesh_write), NULL));
-  if (!f->scene || f->scene->n_times > 0) PetscCall(HycoPathSetFromOptions(f, PetscOptionsObject));
+  if (!f->scene || f->scene->n_times > 0)
+    PetscCall(HycoPathSetFromOptions(f, PetscOptionsObject));
+  else
+    PetscCall(HycoPathRefuseOptions(f));
   PetscCall(HycoOptionsName("-hyco_fom_view", "after each full-order solve: sizes, system, solver"));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);

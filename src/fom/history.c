@@ -43,7 +43,23 @@ PetscErrorCode HycoPathSetFromOptions(HycoFOM f, HycoOptionItems PetscOptionsObj
   PetscCall(HycoOptionsString("-hyco_checkpoint",
                               "<file.h5> history: the last accepted step is kept there, to be resumed from",
                               p->checkpoint, sizeof(p->checkpoint), NULL));
-  PetscCall(HycoOptionsFlag("-hyco_resume", "history: go on from the checkpoint, if it is there", &p->resume));
+  PetscCall(HycoOptionsBool("-hyco_resume", "history: go on from the checkpoint, if it is there", &p->resume, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
+{
+  static const char *const name[] = {"-hyco_newton",         "-hyco_newton_rtol",   "-hyco_newton_max_its",
+                                     "-hyco_step_inelastic", "-hyco_step_smallest", "-hyco_substeps",
+                                     "-hyco_checkpoint",     "-hyco_resume"};
+
+  PetscFunctionBegin;
+  for (size_t k = 0; k < sizeof(name) / sizeof(name[0]); k++) {
+    PetscBool set;
+
+    PetscCall(PetscOptionsHasName(f->scene->options, NULL, name[k], &set));
+    PetscCheck(!set, HycoComm(f), PETSC_ERR_USER, "%s is for scenes with a history, and this one has none", name[k]);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,8 +104,6 @@ PetscErrorCode HycoPathDestroy(HycoFOM f)
     PetscCall(VecDestroy(&p->dL[j]));
   }
   PetscCall(HycoSeriesDestroy(&p->series));
-  PetscCall(HycoItemsDestroy(&p->node));
-  PetscCall(HycoItemsDestroy(&p->cell));
   PetscCall(HycoFEStateDestroy(&p->begin));
   PetscCall(HycoFEStateDestroy(&p->end));
   PetscCall(PetscFree(p->f_local));
@@ -419,6 +433,7 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(Begin(f, mu));
   PetscCall(HycoSeriesBegin(f));
+  PetscCall(HycoPathCheckPlace(f));
   if (p->resume) PetscCall(HycoPathLoad(f));
   while (p->step < f->scene->n_times && reached) PetscCall(Advance(f, &reached));
   p->ended = reached;
@@ -436,7 +451,12 @@ void HycoPathSummary(HycoFOM f, HycoSummary *s)
   const HycoPath p = f->path;
 
   s->iterations = 0;
-  for (PetscInt k = 0; k < p->n_steps; k++) s->iterations += p->steps[k].iterations;
+  s->seconds.factor = s->seconds.solve = 0;
+  for (PetscInt k = 0; k < p->n_steps; k++) {
+    s->iterations += p->steps[k].iterations;
+    s->seconds.factor += p->steps[k].seconds_factor;
+    s->seconds.solve += p->steps[k].seconds_solve;
+  }
   s->kkt = p->kkt;
   s->reason = p->ended ? HYCO_CONVERGED : HYCO_DIVERGED_STEP;
   s->strain_energy = p->work_done.stored;
@@ -468,7 +488,7 @@ PetscErrorCode HycoFOMGetHistory(HycoFOM f, HycoHistory *h)
   h->why = p->why;
   h->newton = HycoPathPrefersElastic(f) ? "elastic" : "tangent";
   h->n_orders = p->n_orders;
-  qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
+  if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
   if (p->n_orders) h->order = p->orders[p->n_orders / 2];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

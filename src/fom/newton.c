@@ -377,9 +377,9 @@ static PetscErrorCode Judge(HycoFOM f, const Progress *now, HycoAttempt *a, Pets
 /* log(r2 / r1) / log(r1 / r0), where none of the three is round-off yet. */
 static void Observe(const Progress *now, PetscInt k, HycoAttempt *a)
 {
-  const PetscReal *r = now->residual, least = 1e-14 * now->size + now->floor;
+  const PetscReal *r = now->residual, least = 1e-13 * now->size + now->floor;
 
-  if (k < 2 || !(r[2] > least) || !(r[2] < r[1]) || !(r[1] < 0.1 * r[0]) || !(r[0] < 0.1 * now->size)) return;
+  if (k < 2 || !(r[2] > least) || !(r[2] < r[1]) || !(r[1] < 0.2 * r[0])) return;
   a->order = PetscLogReal(r[2] / r[1]) / PetscLogReal(r[1] / r[0]);
 }
 

@@ -43,17 +43,17 @@ PetscBool HycoEntriesFlatten(char text[])
     } else if (*c == '[' && (depth || Begins(text, c))) {
       /* as if the list around it had brackets */
       if (!depth && IsItem(line)) depth = 1;
-      if (depth++) {
+      if (++depth == 2) {
         *c = ' ';
         nested = PETSC_TRUE;
       }
       c++;
     } else if (*c == ']' && depth) {
-      if (--depth) *c = ' ';
+      if (--depth == 1) *c = ' ';
       if (depth == 1 && IsItem(line)) depth = 0;
       c++;
     } else {
-      if (*c == ',' && depth > 1) *c = ' ';
+      if (*c == ',' && depth == 2) *c = ' ';
       c++;
     }
   }

@@ -7,10 +7,12 @@ Pressed from outside by 50 over a gap of 0.02 it closes at t = 1.63214460, and t
 p = 50 - 34.2891470 exp(-0.146510938 s) - 15.7108530 exp(-0.225014142 s).
 """
 import math
+import os
 import unittest
 
 import numpy as np
 
+from common import PELLET
 from grids import Grid
 from verify import Verify, order
 
@@ -23,6 +25,16 @@ fixed: {{x0: {{x: 0}}, y0: {{y: 0}}}}
 pressure: {{outside: {outside}}}
 contact: {{fit: {{type: pair, slave: shaft, master: sleeve, tolerance: 1e-6, normal: {{x: x, y: y}}, gap: {gap}}}}}
 history: {{times: [{times}]}}
+"""
+PELLET_SCENE = """
+scene: {{title: the same in 3D, mesh: {mesh}}}
+body:
+  pellet: {{young: 1e5, poisson: 0.3}}
+  cladding: {{law: norton, young: 1e5, poisson: 0.3, rate: 2e-6, exponent: 1}}
+fixed: {{sym_x0: {{x: 0}}, sym_y0: {{y: 0}}, pellet: {{z: 0}}, cladding: {{z: 0}}}}
+contact:
+  gap: {{type: pair, slave: contact_pellet, master: contact_clad, tolerance: 1e-3, normal: {{x: x, y: y}}, gap: -0.01}}
+history: {{times: [0, 1, 2]}}
 """
 CLOSES = 1.63214460
 LENGTH = 4.1 * math.pi / 2  # of the contact, on the quarter
@@ -44,12 +56,13 @@ def polar(x):
 class Ring(Verify):
     name = 'ring'
 
-    def mesh(self, n):
+    def mesh(self, n, core=0):
         """A quarter, n cells through the ring; the core has a bore of a hundredth of its radius, which changes 1e-5 of p."""
         grid = Grid()
         angle = np.linspace(0, np.pi / 2, 4 * n + 1)
         grid.box('quad4', [np.linspace(4.1, 4.7, n + 1), angle], polar, 'ring',
                  {'x0': 'sleeve', 'x1': 'outside', 'y0': 'y0', 'y1': 'x0'})
+        angle = np.linspace(0, np.pi / 2, (core or 4 * n) + 1)
         grid.box('quad4', [np.geomspace(0.041, 4.1, 4 * n + 1), angle], polar, 'core',
                  {'x1': 'shaft', 'y0': 'y0', 'y1': 'x0'})
         return grid
@@ -80,15 +93,34 @@ class Ring(Verify):
             self.row(f'shrink fit: p at t = {t[k]:g}', p[k], relaxing(t[k]), 0.2)
 
     def test_closing(self):
-        t, p, h = self.path_of(8, 640, 50, 0.02, 8)
+        t, p, h = self.path_of(8, 1280, 50, 0.02, 6)
         before = t < 0.99 * CLOSES
         self.row('closing: largest force before', max(np.array(h['lambda_max'])[before]), 0, 0)
         k = int(np.argmax(p > 0))
         begin = t[k] - p[k] * (t[k + 1] - t[k]) / (p[k + 1] - p[k])
         self.row('closing: time', begin, CLOSES, 0.5)
-        for at in (3, 4, 8):
+        for at in (3, 4, 6):
             k = int(round(at / t[1]))
             self.row(f'closing: p at t = {at}', p[k], float(closing(t[k])), 0.2)
+
+
+    def test_pellet(self):
+        """The same shrink fit in 3D, the pellet's meshes with all z held."""
+        area = LENGTH * 6.75
+        for mesh, times, steps, bound in (('A', '0,1,2', 50, 0.4), ('B', '0,0.25', 10, 0.2)):
+            with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
+                f.write(PELLET_SCENE.format(mesh=os.path.join(PELLET, mesh + '.msh')))
+            h = self.hyco('solve', '-scene', self.folder, '-history_times', times, '-hyco_substeps', steps, timeout=300)['history']
+            for t, force in zip(h['t'], h['total_contact_force']):
+                self.row(f'pellet {mesh}, z held: p at t = {t:g}', force / area, relaxing(t), bound)
+
+    def test_surfaces_that_do_not_match(self):
+        """The core has 13 cells where the ring has 16; the pressure is the mean."""
+        scene = self.scene(SCENE.replace('type: pair', 'type: surface').replace('1e-6', '0.05')
+                           .format(outside=0, gap=-0.01, times=', '.join(f'{k / 40:g}' for k in range(81))), self.mesh(4, 13))
+        h = self.hyco('solve', '-scene', scene)['history']
+        for k in (0, 40, 80):
+            self.row(f'surfaces that do not match: p at t = {k / 40:g}', h['total_contact_force'][k] / LENGTH, relaxing(k / 40), 0.5)
 
 
 if __name__ == '__main__':

@@ -44,6 +44,7 @@ typedef struct {
   char *behaviour; /* its name */
   PetscInt n_properties;
   PetscBool stores; /* it computes the stored energy */
+  char message[MESSAGE];
 } MFront;
 
 /* Signals that a library may die of while it is loaded: they end the loading, not the process. */
@@ -304,14 +305,14 @@ static PetscBool Integrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, P
 
 static PetscErrorCode Update(HycoMaterial law, HycoMaterialPoints *p)
 {
-  static char message[MESSAGE];
+  MFront *m = (MFront *)law->data;
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < p->n; i++) {
-    if (Integrate((const MFront *)law->data, p, i, law->n_state, message)) continue;
-    message[MESSAGE - 1] = '\0';
+    if (Integrate(m, p, i, law->n_state, m->message)) continue;
+    m->message[MESSAGE - 1] = '\0';
     p->failed = i;
-    p->why = message[0] ? message : "the behaviour did not converge";
+    p->why = m->message[0] ? m->message : "the behaviour did not converge";
     break;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
