@@ -26,6 +26,13 @@ typedef struct {
 /* A warning: into the report; printed at the end. On rank 0. */
 void CheckWarn(Check *check, const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
+typedef struct {
+  PetscBool solved;             /* measured by a solve at the centre, else estimated */
+  PetscReal bytes, resident;    /* of a factor; of the process as it is, all ranks */
+  PetscReal first, next;        /* seconds: a solve with a new stiffness, with that of the last */
+  PetscInt n_training, n_stiff; /* solutions of a training, held-out ones included; stiffnesses among them */
+} Cost;
+
 /* -- check_mesh.c, on rank 0 -- */
 
 /* Cells at fe's nodes: the most stretched of each body. */
@@ -40,5 +47,16 @@ PetscErrorCode CheckGroups(Check *check);
 PetscErrorCode CheckGaps(Check *check, HycoFE fe, PetscBool first);
 /* What the ranges of gaps say. */
 void CheckContacts(Check *check);
+
+/* -- check_cost.c; collective -- */
+
+/* Of the system as it is assembled, which took `assembly` seconds: the factor's memory by MUMPS's analysis of the
+   stiffness with the contacts, seconds by its count of operations. */
+PetscErrorCode CheckEstimate(Check *check, PetscReal assembly, Cost *cost);
+/* Seconds by a solve at mu; fails where that does not converge. */
+PetscErrorCode CheckSolve(Check *check, const PetscReal mu[], Cost *cost);
+/* The training's solutions and the stiffnesses among them: those of the points that are given, or a typical number. */
+PetscErrorCode CheckCountTraining(HycoScene scene, HycoSamples samples, PetscBool given, Cost *cost);
+PetscErrorCode CheckSayCost(Check *check, const Cost *cost, PetscBool given);
 
 #endif

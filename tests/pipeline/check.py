@@ -165,7 +165,7 @@ class Check(Case):
                 self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
                 self.assertIn('body upper', run.stderr)
             self.assertIn('press = ', runs[0].stderr)
-        found = self.hyco('check', '-scene', free, '-hyco_regularise')
+        found = self.hyco('check', '-scene', free, '-hyco_regularise', '-pressure_upper_top', '0')
         self.assertIn('body upper', found['regularised'])
 
     def test_refused(self):

@@ -1,0 +1,169 @@
+/* hyco check: memory and time of a solve and a training. */
+#include "check.h"
+#include <hycolinear.h>
+#include <stdio.h>
+#include <sys/resource.h>
+
+/* Solutions of a training whose points are not given. */
+#define TYPICAL_TRAINING 100
+/* Of a matrix product's speed: what a sparse factor reaches. */
+#define SPARSE_SHARE 0.5
+
+/* What a process holds now, on all ranks. */
+static PetscErrorCode Resident(PetscReal *bytes)
+{
+  struct rusage usage;
+  PetscReal mine;
+
+  PetscFunctionBegin;
+  getrusage(RUSAGE_SELF, &usage);
+  mine = 1024 * (PetscReal)usage.ru_maxrss;
+  PetscCallMPI(MPI_Allreduce(&mine, bytes, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Floating-point operations a second of a small matrix product, this process's. */
+static PetscErrorCode Speed(PetscReal *flops)
+{
+  const PetscBLASInt n = 256;
+  const PetscScalar one = 1, zero = 0;
+  PetscScalar *a;
+  PetscReal begin;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * n * n, &a));
+  for (PetscInt k = 0; k < 3 * n * n; k++) a[k] = 1;
+  *flops = 0;
+  for (PetscInt k = 0; k < 10; k++) { /* the fastest: others use the machine, too */
+    begin = HycoNow();
+    BLASgemm_("N", "N", &n, &n, &n, &one, a, &n, a + n * n, &n, &zero, a + 2 * n * n, &n);
+    *flops = PetscMax(*flops, 2. * n * n * n / PetscMax(HycoNow() - begin, 1e-9));
+  }
+  PetscCall(PetscFree(a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckEstimate(Check *check, PetscReal assembly, Cost *cost)
+{
+  HycoFOM f = check->fom;
+  HycoDirect probe;
+  PetscReal begin = HycoNow(), speed = 1;
+  MatInfo info;
+
+  PetscFunctionBegin;
+  PetscCall(Resident(&cost->resident));
+  PetscCall(HycoDirectCreate(HycoComm(f), &probe));
+  PetscCall(HycoDirectPinKernel(probe, f->K));
+  PetscCall(HycoDirectAnalyse(probe, f->K, f->n_contacts ? f->Bt : NULL, f->n_contacts ? f->B : NULL, PETSC_TRUE,
+                              &cost->bytes));
+  PetscCall(Speed(&speed));
+  PetscCall(MatGetInfo(f->K, MAT_GLOBAL_SUM, &info));
+  cost->first = assembly + HycoNow() - begin + HycoDirectOperations(probe) / (SPARSE_SHARE * speed * f->size);
+  cost->next = 20 * cost->bytes / 8 / (SPARSE_SHARE * speed * f->size); /* a few products with the factor */
+  PetscCall(HycoDirectDestroy(&probe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckSolve(Check *check, const PetscReal mu[], Cost *cost)
+{
+  HycoSummary s;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMSolve(check->fom, check->fom->scene->n_parameters, mu));
+  PetscCall(HycoFOMGetSummary(check->fom, &s));
+  HycoCheck(s.reason > 0, "the solve at the centre of the ranges: %s%s%s", HycoReasonName(s.reason),
+            s.free_motion[0] ? "; no support keeps " : "", s.free_motion);
+  cost->solved = PETSC_TRUE;
+  cost->first = s.seconds.total;
+  cost->next = s.seconds.solve;
+  PetscCall(Say("solved at the centre: %d of %d contacts closed, total contact force %.10g\n", (int)s.n_active,
+                (int)s.n_contacts, (double)s.total_contact_force));
+  cJSON_AddNumberToObject(check->json, "n_active", s.n_active);
+  cJSON_AddNumberToObject(check->json, "total_contact_force", s.total_contact_force);
+  if (s.n_contacts && !s.n_active && check->warnings) CheckWarn(check, "no contact closes at the centre of the ranges");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckCountTraining(HycoScene s, HycoSamples samples, PetscBool given, Cost *cost)
+{
+  PetscBool reaches[HYCO_MAX_PARAMETERS], any = PETSC_FALSE;
+  PetscInt n = TYPICAL_TRAINING, held;
+  const PetscReal *mu = NULL;
+
+  PetscFunctionBegin;
+  HycoSceneReaches(s, reaches);
+  for (PetscInt p = 0; p < s->n_parameters; p++) any = (PetscBool)(any || reaches[p]);
+  if (given) PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
+  held = PetscMin(PetscMax(n, 20), 30);
+  cost->n_training = n + held;
+  cost->n_stiff = any ? n : 1;
+  for (PetscInt k = 1; mu && any && k < n; k++) { /* those that were there before */
+    PetscBool seen = PETSC_FALSE;
+
+    for (PetscInt j = 0; j < k && !seen; j++) {
+      seen = PETSC_TRUE;
+      for (PetscInt p = 0; p < s->n_parameters; p++)
+        seen = (PetscBool)(seen && (!reaches[p] || mu[j * s->n_parameters + p] == mu[k * s->n_parameters + p]));
+    }
+    cost->n_stiff -= seen;
+  }
+  if (any) cost->n_stiff += held; /* three may share one, which does not matter here */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void Seconds(PetscReal t, char text[32])
+{
+  if (t < 60)
+    snprintf(text, 32, "%.2g s", (double)t);
+  else if (t < 7200)
+    snprintf(text, 32, "%.2g minutes", (double)t / 60);
+  else
+    snprintf(text, 32, "%.2g hours", (double)t / 3600);
+}
+
+static PetscErrorCode SayTraining(Check *check, const Cost *cost, PetscBool given, cJSON *object)
+{
+  HycoFOM f = check->fom;
+  const PetscReal values =
+      2. * (PetscReal)f->n_nodes * f->fe->dim + (PetscReal)f->n_cells * f->fe->n_sigma + f->n_contacts;
+  const PetscReal training = cost->n_stiff * cost->first + (cost->n_training - cost->n_stiff) * cost->next;
+  const PetscReal snapshots = 8 * values * cost->n_training;
+  char all[32];
+
+  PetscFunctionBegin;
+  Seconds(training, all);
+  PetscCall(Say("a training on %s%d solutions, with those that judge it: about %s of full-order solves, and %.3g MB of "
+                "solutions; the reduction is extra\n",
+                given ? "" : "say ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
+  cJSON_AddNumberToObject(object, "n_training", cost->n_training);
+  cJSON_AddNumberToObject(object, "n_stiffness", cost->n_stiff);
+  cJSON_AddNumberToObject(object, "seconds_training", training);
+  cJSON_AddNumberToObject(object, "snapshots_mb", 1e-6 * snapshots);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckSayCost(Check *check, const Cost *cost, PetscBool given)
+{
+  const PetscInt n_times = check->fom->scene->n_times;
+  char first[32], next[32];
+  cJSON *object = cJSON_AddObjectToObject(check->json, "estimate");
+
+  PetscFunctionBegin;
+  Seconds(cost->first, first);
+  Seconds(cost->next, next);
+  if (n_times && cost->solved)
+    PetscCall(Say("a full-order solve of the history, as measured: %s", first));
+  else
+    PetscCall(Say("%s, %s: %s, or %s where the stiffness is the last one's",
+                  n_times ? "an iteration of a step of the history" : "a full-order solve",
+                  cost->solved ? "as measured" : "about", first, next));
+  PetscCall(Say("; %.3g MB, of which %.3g MB are a factor\n", 1e-6 * (double)(cost->resident + cost->bytes),
+                1e-6 * (double)cost->bytes));
+  cJSON_AddBoolToObject(object, "measured", cost->solved);
+  cJSON_AddNumberToObject(object, "factor_mb", 1e-6 * cost->bytes);
+  cJSON_AddNumberToObject(object, "solve_mb", 1e-6 * (cost->resident + cost->bytes));
+  cJSON_AddNumberToObject(object, "seconds_first", cost->first);
+  cJSON_AddNumberToObject(object, "seconds_next", cost->next);
+  if (!n_times) PetscCall(SayTraining(check, cost, given, object)); /* train refuses histories */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
