@@ -220,6 +220,7 @@ PetscErrorCode HycoFOMSetSeries(HycoFOM f, const char path[])
   PetscCall(PetscNew(&s));
   PetscCall(PetscStrncpy(s->path, path, sizeof(s->path)));
   PetscCall(PetscSNPrintf(s->h5_path, sizeof(s->h5_path), "%.*s.h5", (int)strlen(path) - 5, path));
+  PetscCall(HycoSeriesDestroy(&f->path->series));
   f->path->series = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -231,6 +232,7 @@ PetscErrorCode HycoSeriesBegin(HycoFOM f)
   PetscFunctionBegin;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   s->n = 0;
+  if (s->h) PetscCall(HycoH5Close(&s->h, PETSC_FALSE)); /* of a path without any time */
   if (!s->node.own) PetscCall(HycoItemsCreate(f, &s->node, &s->cell));
   PetscCall(PetscFree(s->cells));
   PetscCall(PetscFree(s->X));
