@@ -48,6 +48,18 @@ PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, Pet
 PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols, PetscReal **data);
 PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt *rows, PetscInt *cols,
                              PetscInt **data);
+/* Whether the file is read; else it is being made. */
+PetscBool HycoH5Reads(HycoH5 file);
+/* One line for both ways: writes the array to a file that is being made, loads it into new memory from one that is
+   read; then a number of rows < 0 is taken from the file, and integers must lie in [lo, hi]. */
+PetscErrorCode HycoH5Real(HycoH5 file, const char name[], PetscInt *rows, PetscInt cols, PetscReal **data);
+PetscErrorCode HycoH5Int(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt *rows, PetscInt cols,
+                         PetscInt **data);
+/* The same for arrays of n numbers that are there. */
+PetscErrorCode HycoH5Reals(HycoH5 file, const char name[], PetscInt n, PetscReal data[]);
+PetscErrorCode HycoH5Ints(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt n, PetscInt data[]);
+/* And for where each of n parts begins: n + 1 integers, ascending from 0. */
+PetscErrorCode HycoH5Starts(HycoH5 file, const char name[], PetscInt n, PetscInt **start);
 /* Rows [start, start + n) of a two-dimensional dataset. */
 PetscErrorCode HycoH5ReadRows(HycoH5 file, const char name[], PetscInt start, PetscInt n, PetscInt cols,
                               PetscReal *data);

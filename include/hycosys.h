@@ -47,11 +47,14 @@ PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *table[]);
   names, with the object's prefix and options database, but a value that is not of the form or out of its range ends
   with one line that names it, and numbers have a decimal point in any locale. What the object has before is the
   default. The text is "meaning", "<form> meaning", "meaning [default]" or both: form and default as they are to be
-  told, where the call's own are not enough. `set` (may be NULL): whether it was given. Collective on the object. Real,
-  Int    lo <= value <= hi Bool, Flag   a flag takes no value Word         index of one of `words`, which ends with
-  NULL; < 0 is no word String       length: of value List         words with commas between, in: at most n; out: n of
-  them, which the caller frees; "none": 0 Name         one that something else reads: PetscObjectViewFromOptions() For
-  what alone reads those that follow, in words: HycoOption.only
+  told, where the call's own are not enough. `set` (may be NULL): whether it was given. Collective on the object.
+  - Real, Int: lo <= value <= hi
+  - Bool, Flag: a flag takes no value
+  - Word: index of one of `words`, which ends with NULL; < 0 is no word
+  - String: length: of value
+  - List: words with commas between: n of them and NULL, which the caller frees by PetscStrArrayDestroy(); "none": 0
+  - Name: one that something else reads: PetscObjectViewFromOptions()
+  - For: what alone reads those that follow, in words: HycoOption.only
 */
 #if PETSC_VERSION_LT(3, 23, 0)
 typedef PetscOptionItems *HycoOptionItems;
@@ -81,7 +84,7 @@ PetscErrorCode HycoOptionsWord_Private(HycoOptionItems items, const char name[],
 PetscErrorCode HycoOptionsString_Private(HycoOptionItems items, const char name[], const char text[], char value[],
                                          size_t length, PetscBool *set);
 PetscErrorCode HycoOptionsList_Private(HycoOptionItems items, const char name[], const char text[], PetscInt *n,
-                                       char *list[], PetscBool *set);
+                                       char ***list, PetscBool *set);
 PetscErrorCode HycoOptionsName_Private(HycoOptionItems items, const char name[], const char text[]);
 PetscErrorCode HycoOptionsFor(const char only[]);
 

@@ -156,8 +156,7 @@ void HycoCondensedPoint(HycoCondensed condensed, PetscInt k, PetscReal mu[]);
 PetscErrorCode HycoCondensedFeatures(HycoROM model, PetscReal misfit[2]);
 PetscErrorCode HycoCondensedEstimate(HycoROM model, HycoPrediction *prediction);
 /* To and from the model's file. */
-PetscErrorCode HycoCondensedSave(HycoROM model, HycoH5 file);
-PetscErrorCode HycoCondensedLoad(HycoROM model, HycoH5 file);
+PetscErrorCode HycoCondensedMove(HycoROM model, HycoH5 file);
 /* The bounds of G at its nodes. */
 PetscErrorCode HycoCondensedBound(HycoCondensed condensed);
 /* The node of the whole grid that is nearest to mu, and the square of its distance (may be NULL), each parameter

@@ -30,6 +30,21 @@ void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN]);
 const char *HycoFieldsTopology(HycoCellType type);
 void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
 
+/* The title, cell type, dimension, parameters and contact table (NULL: none). On one process. */
+PetscErrorCode HycoFieldsWriteHead(HycoH5 h, HycoMesh mesh, HycoScene scene, const PetscReal mu[],
+                                   const HycoContactTable *contact);
+/* Nodes at X, tags, the cells with their nodes' places in the whole mesh. Collective with an order. */
+PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const HycoFileOrder *order, HycoMesh mesh, const PetscReal X[]);
+/* The fields of a solution's contacts by node of their mesh (vector on slaves, minus on masters), gaps and slaves' tags
+   by contact; filled on rank 0, where the contacts are (surface NULL elsewhere). Collective; to be destroyed after an
+   error too. */
+typedef struct {
+  PetscReal *force, *pressure, *gap_node, *gap, *normal, *area;
+  PetscInt *slave_id;
+} HycoContactFields;
+PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
+                                       const PetscReal lambda[], HycoContactFields *fields);
+PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *fields);
 /* Writes `path` (must end in .xdmf) and the .h5 beside it, both through temporary names. X: moved nodes (n_nodes x 3).
    The .h5 also holds node_id, cell_id, the parameters and the contact table (rank 0's). order: of parts of a mesh, each
    written by its process, collective; NULL: this process has it all. */

@@ -53,8 +53,7 @@ PetscErrorCode HycoGalerkinSolve(HycoROM model, const PetscReal mu[]);
 PetscErrorCode HycoGalerkinEnergy(HycoROM model, PetscReal *energy, PetscBool *known);
 PetscErrorCode HycoGalerkinCondition(HycoROM model, PetscReal *condition);
 PetscErrorCode HycoGalerkinView(HycoROM model, PetscViewer viewer);
-PetscErrorCode HycoGalerkinSave(HycoROM model, HycoH5 file);
-PetscErrorCode HycoGalerkinLoad(HycoROM model, HycoH5 file);
+PetscErrorCode HycoGalerkinMove(HycoROM model, HycoH5 file);
 /* What of it is no field of the ops: NULL-safe parts of the data. */
 PetscErrorCode HycoGalerkinDestroy(HycoGalerkin galerkin);
 /* The ranges scanned for a singular reduced stiffness, the points spread over the ranks: kept in the model, or refused;

@@ -96,6 +96,15 @@ PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool 
     PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));                                         \
     PetscFunctionReturn(PETSC_SUCCESS);                                                                                \
   }
+/* A function of a class that sets or gets what statements say, once the handle is checked. */
+#define HycoDefineMethod(function, arguments, object, classid, ...)                                                    \
+  PetscErrorCode function arguments                                                                                    \
+  {                                                                                                                    \
+    PetscFunctionBegin;                                                                                                \
+    HycoCheckHandle(object, classid);                                                                                  \
+    __VA_ARGS__;                                                                                                       \
+    PetscFunctionReturn(PETSC_SUCCESS);                                                                                \
+  }
 /* The communicator of an object of any class. */
 #define HycoComm(object) PetscObjectComm((PetscObject)(object))
 /* Takes one reference from `*object` and clears it; returns unless that was the last. */
@@ -111,6 +120,21 @@ PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool 
    NULL, *n_all 0); PetscFree() frees it. Collective. */
 PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
                                PetscInt *n_all, void *all);
+
+/* MPI_Bcast() from rank 0 and MPI_Allreduce() in place, of as many items as a PetscInt says: more than MPI counts are
+   an error. */
+#define HycoBcast(data, n, type, comm)                                                                                 \
+  do {                                                                                                                 \
+    PetscMPIInt count_;                                                                                                \
+    PetscCall(PetscMPIIntCast((n), &count_));                                                                          \
+    PetscCallMPI(MPI_Bcast((data), count_, (type), 0, (comm)));                                                        \
+  } while (0)
+#define HycoAllreduce(data, n, type, op, comm)                                                                         \
+  do {                                                                                                                 \
+    PetscMPIInt count_;                                                                                                \
+    PetscCall(PetscMPIIntCast((n), &count_));                                                                          \
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, (data), count_, (type), (op), (comm)));                                   \
+  } while (0)
 
 /* 64-bit FNV-1a hash, continued from `hash` (start with HYCO_HASH_START). */
 #define HYCO_HASH_START 14695981039346656037ULL
@@ -221,6 +245,10 @@ const char *HycoOptionNearest(const char word[], const HycoOptionList *more);
 PetscErrorCode HycoOptionsCheckName(const char name[]);
 /* Whether an option's name (without dash) begins as a scene's entry does. */
 PetscBool HycoIsSceneKey(const char name[]);
+
+/* PetscFree() of each pointer, whose addresses are given. */
+#define HycoFreeAll(...) PetscCall(HycoFreeAll_Private((void *[]){__VA_ARGS__, NULL}))
+PetscErrorCode HycoFreeAll_Private(void *const addresses[]);
 
 /* A copy of `n` items of type `type`: *to = copy of from. */
 #define HycoDuplicate(n, from, to)                                                                                     \

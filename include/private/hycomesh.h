@@ -125,6 +125,9 @@ PetscErrorCode HycoFileOrderDestroy(HycoFileOrder **order);
    alone. Collective. */
 PetscErrorCode HycoFileOrderSend(const HycoFileOrder *order, HycoPlace place, MPI_Datatype type, PetscInt components,
                                  const void *value, void *rows);
+/* The reverse: from the rows to all nodes or cells of the part, its own or not. Collective. */
+PetscErrorCode HycoFileOrderFetch(const HycoFileOrder *order, HycoMesh part, HycoPlace place, PetscInt components,
+                                  const PetscReal rows[], PetscReal value[]);
 
 /* The scene's whole mesh on rank 0 (elsewhere NULL). Collective. */
 PetscErrorCode HycoMeshCreateWhole(MPI_Comm comm, HycoScene scene, HycoMesh *mesh);

@@ -8,20 +8,6 @@
 
 typedef struct _n_HycoSeries *HycoSeries;
 
-/* The items of one kind, nodes or cells: this rank's own, and on rank 0 the place of each gathered one by its tag. */
-typedef struct {
-  PetscInt n, *own; /* indices in the part */
-  PetscInt n_all, *tag, *place;
-} HycoItems;
-/* Nodes that a rank owns, cells whose first node it owns. Collective. */
-PetscErrorCode HycoItemsCreate(HycoFOM fom, HycoItems *node, HycoItems *cell);
-PetscErrorCode HycoItemsDestroy(HycoItems *items);
-/* Values by item of the part (cols each), on rank 0 in order; elsewhere NULL. The caller frees them. Collective. */
-PetscErrorCode HycoItemsBring(HycoFOM fom, const HycoItems *items, PetscInt cols, const PetscReal value[],
-                              PetscReal **out);
-/* Place of a tag on rank 0; -1: there is none. */
-PetscInt HycoItemsFind(const HycoItems *items, PetscInt tag);
-
 /* What one iteration of a step solves with: the consistent tangent, or the elastic stiffness, whose factor stays. */
 typedef enum { HYCO_NEWTON_AUTO, HYCO_NEWTON_TANGENT, HYCO_NEWTON_ELASTIC } HycoNewton;
 
@@ -77,8 +63,7 @@ struct _n_HycoPath {
   PetscInt n_orders, room_orders;
   PetscBool ended; /* the last path reached its end */
   char why[HYCO_LINE];
-  HycoItems node, cell; /* of the checkpoints */
-  HycoSeries series;    /* NULL: none is asked for */
+  HycoSeries series; /* NULL: none is asked for */
   HycoStepMonitor monitor;
   void *monitor_ctx;
 };

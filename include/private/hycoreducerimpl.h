@@ -40,7 +40,7 @@ struct _p_HycoReducer {
   PetscBool seed[HYCO_N_SEEDS], whole_rid;
   PetscInt deim; /* of each basis that seeds the RID: 0 DEIM, 1 Q-DEIM */
   PetscInt n_groups;
-  char *groups[64], *region;
+  char **groups, *region; /* n_groups, and NULL */
   HycoHybrid hybrid;
   PetscInt most_full_order; /* hybrid all: the most full-order displacements; 0: no limit */
   PetscInt scan;            /* points per parameter; 0: chosen */

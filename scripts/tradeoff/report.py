@@ -107,18 +107,24 @@ def ramp(row, full):
 
 
 def headline(case, rows, full):
-    """One line for the README: what is asked for, and what each type takes for it."""
+    """A table for the README: what is asked for, and what each type takes for it, in brackets how much faster than warm full order."""
     words, bounds = case.wanted[1]
-    parts = []
+    warm = full["warm"]
+    ramps = "ramp_s" in warm
+
+    def line(name, row, factor):
+        def cell(key):
+            return "" if key not in row else seconds(row[key]) + (f" ({warm[key] / row[key]:.0f} times)" if factor else "")
+        return [name, *([cell("ramp_s")] if ramps else []), cell("single_s")]
+
+    lines = [line(f"full order, {PLAIN} (the paper's baseline)", full[PLAIN], False),
+             line("full order that keeps its factor and its active set", warm, False)]
     for kind in COLORS:
         r = joint(rows, bounds, kind)
         if r:
-            whole = (f"{seconds(r['ramp_s'])} for a ramp of {r['ramp_n']:.0f} loads ({full['warm']['ramp_s'] / r['ramp_s']:.0f} times), "
-                     if "ramp_s" in r else "")
-            parts.append(f"{kind} {whole}{seconds(r['single_s'])} for a new geometry ({full['warm']['single_s'] / r['single_s']:.0f} times)")
-    return (f"{case.name}, {words}: {'; '.join(parts)}. In brackets: faster than full order that keeps its factor and its active "
-            f"set; that takes {seconds(full['warm'].get('ramp_s', full['warm']['batch_s']))} and {seconds(full['warm']['single_s'])}, and "
-            f"{seconds(full[PLAIN]['single_s'])} with {PLAIN}, the paper's baseline.")
+            lines.append(line(kind, r, True))
+    columns = ["", *([f"a ramp of {warm['ramp_n']:.0f} loads"] if ramps else []), "a new geometry"]
+    return [f"{case.name}; errors {words}:", "", *table(columns, lines)]
 
 
 def settings(rows):

@@ -19,8 +19,7 @@ PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscRea
       values[k * cols + j] = mine ? v[(size_t)j * (size_t)lda + (size_t)(rows[k] - lo)] : 0;
   }
   PetscCall(MatDenseRestoreArrayRead(V, &v));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, values, (PetscMPIInt)(n * cols), MPIU_REAL, MPI_SUM,
-                             PetscObjectComm((PetscObject)V)));
+  HycoAllreduce(values, n * cols, MPIU_REAL, MPI_SUM, PetscObjectComm((PetscObject)V));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

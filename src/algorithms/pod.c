@@ -133,7 +133,7 @@ static PetscErrorCode CountAccurate(Mat S, Mat V, PetscInt k, const PetscReal si
   }
   PetscCall(MatDenseRestoreArrayRead(product, &g));
   PetscCall(MatDestroy(&product));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, skew, (PetscMPIInt)k, MPIU_REAL, MPI_MAX, PetscObjectComm((PetscObject)S)));
+  HycoAllreduce(skew, k, MPIU_REAL, MPI_MAX, PetscObjectComm((PetscObject)S));
   for (*accurate = 0; *accurate < k; ++*accurate) {
     const PetscReal s = sigma[*accurate];
 

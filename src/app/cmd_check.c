@@ -12,7 +12,7 @@
 /* Solutions of a training whose points are not given. */
 #define TYPICAL_TRAINING 100
 /* Of a matrix product's speed: what a sparse factor reaches. */
-#define SPARSE_SHARE 0.3
+#define SPARSE_SHARE 0.5
 
 void CheckWarn(Check *check, const char format[], ...)
 {
@@ -60,26 +60,55 @@ static PetscErrorCode Measure(Check *check, const PetscReal mu[], PetscBool firs
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K, F, B and D at mu as solve makes them, with its errors, which are told with the point. Collective. */
-static PetscErrorCode CheckPoint(Check *check, const PetscReal mu[], PetscBool first)
+/* "radius = 4.02, load = 0, t = 1: ", of the variables v; "" of none. */
+static PetscErrorCode NamePoint(HycoScene s, const PetscReal v[], char place[HYCO_LINE])
+{
+  const PetscInt n = s->n_parameters + (s->n_times > 0); /* tables follow from the time */
+
+  PetscFunctionBegin;
+  place[0] = '\0';
+  for (PetscInt p = 0; p < n; p++) {
+    char value[HYCO_LINE];
+
+    HycoFormat(value, "%s%s = %g", p ? "" : "at ", s->parameter[p], (double)v[p]);
+    PetscCall(HycoListAdd(place, ", ", value));
+  }
+  if (n) PetscCall(HycoListAdd(place, "", ": "));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* K, F, B and D for the variables v as solve makes them, with its errors, which are told with the point. Collective. */
+static PetscErrorCode Assemble(Check *check, const PetscReal v[], PetscBool first)
 {
   HycoFOM f = check->fom;
-  HycoScene s = f->scene;
-  char message[HYCO_LINE], place[HYCO_LINE] = "";
+  char message[HYCO_LINE], place[HYCO_LINE];
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoCatchBegin());
-  ierr = HycoFOMAssemble(f, mu);
+  ierr = HycoFOMAssemble(f, v);
   PetscCall(HycoCatchEnd(ierr, message));
-  for (PetscInt p = 0; ierr && p < s->n_parameters; p++) {
-    char value[HYCO_LINE];
+  PetscCall(NamePoint(f->scene, v, place));
+  HycoCheck(!ierr, "%s%s", place, message);
+  HycoOnRoot(HycoComm(f), Measure(check, v, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    HycoFormat(value, "%s = %g", s->parameter[p], (double)mu[p]);
-    PetscCall(HycoListAdd(place, ", ", value));
+/* A point of the ranges: with a history where that ends and where it begins. Collective. */
+static PetscErrorCode CheckPoint(Check *check, const PetscReal mu[], PetscBool first)
+{
+  HycoScene s = check->fom->scene;
+  PetscReal v[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  if (!s->n_times) {
+    PetscCall(Assemble(check, mu, first));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoCheck(!ierr, "%s%s%s", place[0] ? "at " : "", place[0] ? strcat(place, ": ") : "", message);
-  HycoOnRoot(HycoComm(f), Measure(check, mu, first));
+  HycoSceneSetTime(s, mu, s->times[s->n_times - 1], v);
+  PetscCall(Assemble(check, v, first));
+  HycoSceneSetTime(s, mu, s->times[0], v);
+  PetscCall(Assemble(check, v, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -117,6 +146,11 @@ static PetscErrorCode SayMotions(Check *check)
   HycoMotions free = {0, NULL, NULL, NULL};
 
   PetscFunctionBegin;
+  cJSON_AddStringToObject(check->json, "regularised", f->summary.regularised);
+  if (f->summary.regularised[0]) {
+    PetscCall(Say("regularised: neither supports nor contact keep %s\n", f->summary.regularised));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &free));
   for (PetscInt k = 0; k < free.n; k++) {
     cJSON_AddItemToArray(list, cJSON_CreateString(free.name[k]));
@@ -128,9 +162,6 @@ static PetscErrorCode SayMotions(Check *check)
               "bodies together; a reduced model needs supports",
               (int)free.n, free.n > 1 ? "s are" : " is");
   PetscCall(HycoMotionsDestroy(&free));
-  cJSON_AddStringToObject(check->json, "regularised", f->summary.regularised);
-  if (f->summary.regularised[0])
-    PetscCall(Say("regularised: neither supports nor contact keep %s\n", f->summary.regularised));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -140,18 +171,17 @@ static PetscBool AnyChanges(HycoExpr const e[3], const PetscBool changed[])
                      HycoExprChanges(e[2], changed));
 }
 
-/* What a parameter reaches: all but maps by the entries that name it; a map moves what lies on its body. */
-static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
-{
-  enum { MAPS, STIFFNESS, ROWS, GAPS, LOADS, SUPPORTS, N };
-  static const char *const names[N] = {"maps", "stiffness", "contact rows", "gaps", "loads", "supports"};
-  HycoScene s = check->fom->scene;
-  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, does[N] = {PETSC_FALSE};
-  HycoChanges c;
-  cJSON *list = cJSON_AddArrayToObject(reaches, s->parameter[p]);
-  char words[HYCO_LINE] = "";
+enum { MAPS, STIFFNESS, LAWS, TEMPERATURES, ROWS, GAPS, LOADS, SUPPORTS, N_REACHED };
+static const char *const reached[N_REACHED] = {"maps",         "stiffness", "laws",  "temperatures",
+                                               "contact rows", "gaps",      "loads", "supports"};
 
-  PetscFunctionBegin;
+/* What a variable reaches by the entries that name it; a map moves what lies on its body. "laws": constants that leave
+   the elastic stiffness alone. */
+static void FindReach(HycoScene s, PetscInt p, PetscBool does[N_REACHED])
+{
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+  HycoChanges c;
+
   changed[p] = PETSC_TRUE;
   c = HycoSceneChanges(s, changed);
   does[MAPS] = c.nodes;
@@ -161,19 +191,42 @@ static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
   for (PetscInt k = 0; k < s->n_loads; k++)
     does[LOADS] = (PetscBool)(does[LOADS] || HycoExprChanges(s->load[k].pressure, changed) ||
                               AnyChanges(s->load[k].traction, changed));
-  for (PetscInt k = 0; k < s->n_bodies; k++)
-    does[LOADS] = (PetscBool)(does[LOADS] || AnyChanges(s->body[k].force, changed));
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    const HycoMaterial law = s->body[b].law;
+    HycoExpr const heat[3] = {s->body[b].temperature, s->body[b].reference, s->body[b].expansion};
+
+    does[LOADS] = (PetscBool)(does[LOADS] || AnyChanges(s->body[b].force, changed));
+    does[TEMPERATURES] = (PetscBool)(does[TEMPERATURES] || AnyChanges(heat, changed));
+    for (PetscInt j = 0; j < law->constants.n && !c.stiffness; j++)
+      does[LAWS] = (PetscBool)(does[LAWS] || HycoExprChanges(law->constants.entry[j].expr, changed));
+  }
   for (PetscInt k = 0; k < s->n_fixed; k++)
     does[SUPPORTS] = (PetscBool)(does[SUPPORTS] || AnyChanges(s->fixed[k].value, changed));
-  for (PetscInt k = 0; k < N; k++) {
+}
+
+/* A parameter, or the time of a history, or one of its tables. */
+static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
+{
+  HycoScene s = check->fom->scene;
+  PetscBool does[N_REACHED] = {PETSC_FALSE};
+  const char *what = p < s->n_parameters ? "parameter" : p == s->n_parameters ? "time" : "table";
+  cJSON *list = cJSON_AddArrayToObject(reaches, s->parameter[p]);
+  char words[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  FindReach(s, p, does);
+  for (PetscInt k = 0; k < N_REACHED; k++) {
     if (!does[k]) continue;
-    PetscCall(HycoListAdd(words, ", ", names[k]));
-    cJSON_AddItemToArray(list, cJSON_CreateString(names[k]));
+    PetscCall(HycoListAdd(words, ", ", reached[k]));
+    cJSON_AddItemToArray(list, cJSON_CreateString(reached[k]));
   }
-  PetscCall(Say("parameter %s from %g to %g: reaches %s\n", s->parameter[p], (double)s->lo[p], (double)s->hi[p],
-                words[0] ? words : "nothing"));
-  if (!words[0]) CheckWarn(check, "the parameter %s reaches nothing: no expression reads it", s->parameter[p]);
-  if (s->lo[p] == s->hi[p]) CheckWarn(check, "the range of the parameter %s is one value", s->parameter[p]);
+  if (!words[0] && p == s->n_parameters) PetscFunctionReturn(PETSC_SUCCESS); /* laws and tables have it all the same */
+  PetscCall(Say("%s %s", what, s->parameter[p]));
+  if (p < s->n_parameters) PetscCall(Say(" from %g to %g", (double)s->lo[p], (double)s->hi[p]));
+  PetscCall(Say(": reaches %s\n", words[0] ? words : "nothing"));
+  if (!words[0]) CheckWarn(check, "the %s %s reaches nothing: no expression reads it", what, s->parameter[p]);
+  if (p < s->n_parameters && s->lo[p] == s->hi[p])
+    CheckWarn(check, "the range of the parameter %s is one value", s->parameter[p]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -188,12 +241,17 @@ static PetscErrorCode Describe(Check *check)
   CheckContacts(check);
   PetscCall(SayMotions(check));
   reaches = cJSON_AddObjectToObject(check->json, "parameters");
-  for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(SayReach(check, p, reaches));
+  for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(SayReach(check, p, reaches));
+  if (s->n_times)
+    PetscCall(Say("history of %d times from %g to %g\n", (int)s->n_times, (double)s->times[0],
+                  (double)s->times[s->n_times - 1]));
+  cJSON_AddNumberToObject(check->json, "n_times", s->n_times);
   PetscCall(CheckGroups(check));
-  PetscCall(Say("%d point%s of the ranges assembled%s\n", (int)check->n_points, check->n_points > 1 ? "s" : "",
+  PetscCall(Say("%d point%s of the ranges assembled%s%s\n", (int)check->n_points, check->n_points > 1 ? "s" : "",
                 s->n_parameters > MOST_CORNERS ? ": the centre and the ends of each parameter"
                 : s->n_parameters              ? ": the centre and the corners"
-                                               : ""));
+                                               : "",
+                s->n_times ? ", each at the first and the last time" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -218,7 +276,7 @@ static PetscErrorCode Speed(PetscReal *flops)
   PetscCall(PetscMalloc1(3 * n * n, &a));
   for (PetscInt k = 0; k < 3 * n * n; k++) a[k] = 1;
   *flops = 0;
-  for (PetscInt k = 0; k < 3; k++) { /* the first warms up */
+  for (PetscInt k = 0; k < 10; k++) { /* the fastest: others use the machine, too */
     begin = HycoNow();
     BLASgemm_("N", "N", &n, &n, &n, &one, a, &n, a + n * n, &n, &zero, a + 2 * n * n, &n);
     *flops = PetscMax(*flops, 2. * n * n * n / PetscMax(HycoNow() - begin, 1e-9));
@@ -307,36 +365,50 @@ static void Seconds(PetscReal t, char text[32])
     snprintf(text, 32, "%.2g hours", (double)t / 3600);
 }
 
-static PetscErrorCode SayCost(Check *check, const Cost *cost, PetscBool given)
+static PetscErrorCode SayTraining(Check *check, const Cost *cost, PetscBool given, cJSON *object)
 {
   HycoFOM f = check->fom;
   const PetscReal values =
       2. * (PetscReal)f->n_nodes * f->fe->dim + (PetscReal)f->n_cells * f->fe->n_sigma + f->n_contacts;
   const PetscReal training = cost->n_stiff * cost->first + (cost->n_training - cost->n_stiff) * cost->next;
   const PetscReal snapshots = 8 * values * cost->n_training;
-  char first[32], next[32], all[32];
+  char all[32];
+
+  PetscFunctionBegin;
+  Seconds(training, all);
+  PetscCall(Say("a training on %s%d solutions, with those that judge it: about %s of full-order solves, and %.3g MB of "
+                "solutions; the reduction is extra\n",
+                given ? "" : "say ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
+  cJSON_AddNumberToObject(object, "n_training", cost->n_training);
+  cJSON_AddNumberToObject(object, "n_stiffness", cost->n_stiff);
+  cJSON_AddNumberToObject(object, "seconds_training", training);
+  cJSON_AddNumberToObject(object, "snapshots_mb", 1e-6 * snapshots);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SayCost(Check *check, const Cost *cost, PetscBool given)
+{
+  const PetscInt n_times = check->fom->scene->n_times;
+  char first[32], next[32];
   cJSON *object = cJSON_AddObjectToObject(check->json, "estimate");
 
   PetscFunctionBegin;
   Seconds(cost->first, first);
   Seconds(cost->next, next);
-  Seconds(training, all);
-  PetscCall(Say("a full-order solve, %s: %s, or %s where the stiffness is the last one's; %.3g MB, of which %.3g MB "
-                "are a factor\n",
-                cost->solved ? "as measured" : "about", first, next, 1e-6 * (double)(cost->resident + cost->bytes),
+  if (n_times && cost->solved)
+    PetscCall(Say("a full-order solve of the history, as measured: %s", first));
+  else
+    PetscCall(Say("%s, %s: %s, or %s where the stiffness is the last one's",
+                  n_times ? "an iteration of a step of the history" : "a full-order solve",
+                  cost->solved ? "as measured" : "about", first, next));
+  PetscCall(Say("; %.3g MB, of which %.3g MB are a factor\n", 1e-6 * (double)(cost->resident + cost->bytes),
                 1e-6 * (double)cost->bytes));
-  PetscCall(Say("a training on %s%d solutions, with those that judge it: about %s of full-order solves, and %.3g MB of "
-                "solutions; the reduction is extra\n",
-                given ? "" : "say ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
   cJSON_AddBoolToObject(object, "measured", cost->solved);
   cJSON_AddNumberToObject(object, "factor_mb", 1e-6 * cost->bytes);
   cJSON_AddNumberToObject(object, "solve_mb", 1e-6 * (cost->resident + cost->bytes));
   cJSON_AddNumberToObject(object, "seconds_first", cost->first);
   cJSON_AddNumberToObject(object, "seconds_next", cost->next);
-  cJSON_AddNumberToObject(object, "n_training", cost->n_training);
-  cJSON_AddNumberToObject(object, "n_stiffness", cost->n_stiff);
-  cJSON_AddNumberToObject(object, "seconds_training", training);
-  cJSON_AddNumberToObject(object, "snapshots_mb", 1e-6 * snapshots);
+  if (!n_times) PetscCall(SayTraining(check, cost, given, object)); /* train refuses histories */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

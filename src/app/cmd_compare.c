@@ -224,7 +224,7 @@ PetscErrorCode CommandCompare(void)
   PetscCall(PetscCalloc1(n * N_COLUMNS, &value));
   HycoOnEach(PETSC_COMM_WORLD,
              CompareMine(scene, model, group, color * n / groups, (color + 1) * n / groups, n, n_par, mu, value));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)(n * N_COLUMNS), MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  HycoAllreduce(value, n * N_COLUMNS, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
   if (table[0]) PetscCall(DriverWriteTable(table, scene, n, mu, N_COLUMNS, columns, value));
   PetscCall(Report(scene, contact, n, value));
   PetscCall(PetscFree(value));

@@ -270,8 +270,8 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscCall(PetscCalloc2(n * N_COLUMNS, &value, n, &full));
   begin = HycoNow();
   HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, value, full));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)(n * N_COLUMNS), MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, full, (PetscMPIInt)n, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  HycoAllreduce(value, n * N_COLUMNS, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
+  HycoAllreduce(full, n, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD);
   PetscCall(SolveRest(fallback, n, n_par, mu, full, value));
   begin = HycoNow() - begin;
   PetscCall(ReportSet("predict", table, scene, samples, N_COLUMNS, columns, value, begin));

@@ -19,7 +19,7 @@ const Command commands[] = {
     {"predict", CommandPredict, DeclarePredict,
      "hyco predict -model M.h5 -mu V,V,... [-output F.xdmf] [-report R.json]",
      "solve the reduced model, for one point or a set (-table T.csv), and estimate its errors; reads only the model "
-     "file, but with -hyco_fallback or -hyco_full_displacement, and -scene FOLDER"},
+     "file, except with -hyco_fallback or -hyco_full_displacement, and -scene FOLDER"},
     {"compare", CommandCompare, DeclareCompare,
      "hyco compare -scene FOLDER -model M.h5 -mu V,V,... | -grid N,N,... [-report R.json] [-table T.csv]",
      "errors and speed-up of the reduced model against full order over a set of points"},

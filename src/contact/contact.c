@@ -62,13 +62,8 @@ PetscErrorCode HycoContactSetType(HycoContact contact, HycoContactType type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoContactGetType(HycoContact contact, HycoContactType *type)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
-  *type = ((PetscObject)contact)->type_name;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoContactGetType, (HycoContact contact, HycoContactType *type), contact, HYCO_CONTACT_CLASSID,
+                 *type = ((PetscObject)contact)->type_name)
 
 PetscErrorCode HycoContactView(HycoContact contact, PetscViewer viewer)
 {
@@ -105,29 +100,12 @@ PetscErrorCode HycoContactDeclareNormal(HycoContact contact)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoContactSetOps(HycoContact contact, const struct _HycoContactOps *ops)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
-  *contact->ops = *ops;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoContactSetData(HycoContact contact, void *data)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
-  contact->data = data;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoContactGetData(HycoContact contact, void *data)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
-  *(void **)data = contact->data;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoContactSetOps, (HycoContact contact, const struct _HycoContactOps *ops), contact,
+                 HYCO_CONTACT_CLASSID, *contact->ops = *ops)
+HycoDefineMethod(HycoContactSetData, (HycoContact contact, void *data), contact, HYCO_CONTACT_CLASSID,
+                 contact->data = data)
+HycoDefineMethod(HycoContactGetData, (HycoContact contact, void *data), contact, HYCO_CONTACT_CLASSID,
+                 *(void **)data = contact->data)
 
 PetscErrorCode HycoContactEvaluate(HycoContact contact, const char name[], const PetscReal mu[], PetscInt n,
                                    const PetscReal x[], PetscReal value[])

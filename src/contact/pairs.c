@@ -212,12 +212,7 @@ PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoPairs *pairs)
 PetscErrorCode HycoPairsDestroy(HycoPairs *pairs)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(pairs->slave));
-  PetscCall(PetscFree(pairs->contact));
-  PetscCall(PetscFree(pairs->master_start));
-  PetscCall(PetscFree(pairs->master));
-  PetscCall(PetscFree(pairs->weight));
-  PetscCall(PetscFree(pairs->search));
+  HycoFreeAll(&pairs->slave, &pairs->contact, &pairs->master_start, &pairs->master, &pairs->weight, &pairs->search);
   pairs->n = pairs->room = pairs->place = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -59,11 +59,7 @@ PetscErrorCode HycoPartnersDestroy(HycoPartners *t)
 {
   PetscFunctionBegin;
   PetscCall(HycoPatchesDestroy(&t->patches));
-  PetscCall(PetscFree(t->node));
-  PetscCall(PetscFree(t->normal));
-  PetscCall(PetscFree(t->outward));
-  PetscCall(PetscFree(t->border));
-  PetscCall(PetscFree(t->at_border));
+  HycoFreeAll(&t->node, &t->normal, &t->outward, &t->border, &t->at_border);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -90,7 +90,7 @@ static void Add(Sum *s, PetscReal value)
   s->high = sum;
 }
 
-static void MPIAPI AddSums(void *in, void *inout, PetscMPIInt *n, MPI_Datatype *type)
+static void AddSums(void *in, void *inout, PetscMPIInt *n, MPI_Datatype *type)
 {
   const Sum *from = (const Sum *)in;
   Sum *to = (Sum *)inout;

@@ -3,7 +3,7 @@
   theirs, the contact forces in the contacts' order, so that another number of ranks may go on. Written whole or not at
   all, after each accepted step; the steps' fields for a series stand in files of their own beside it.
 */
-#include <hycoh5.h>
+#include <hycofields.h>
 #include <hycopath.h>
 #include <stddef.h>
 #include <string.h>
@@ -157,32 +157,53 @@ static void MoveHead(HycoPath p, PetscBool out, PetscReal head[])
   }
 }
 
-/* A checkpoint on rank 0; on the others after Spread(). */
+/* What a checkpoint has beside its nodes and cells: on rank 0; on the others after Spread(), without the forces. */
 typedef struct {
-  PetscReal *node, *cell, *lambda, *head, *steps, *orders;
-  PetscInt *node_tag, *cell_tag, n_nodes, n_cells, cell_cols, n_steps, n_orders;
+  PetscReal *lambda, *head, *steps, *orders;
+  PetscInt cell_cols, n_steps, n_orders;
 } Content;
 
-static PetscErrorCode WriteContent(HycoFOM f, const Content *c, const char key[])
+static PetscErrorCode WriteContent(HycoFOM f, HycoH5 h, const Content *c, const char key[])
 {
   const PetscInt format = FORMAT;
-  HycoH5 h;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5Create(f->path->checkpoint, &h));
-  ierr = HycoH5WriteInt(h, "checkpoint/format", 1, 1, &format);
-  if (!ierr) ierr = HycoH5WriteText(h, "checkpoint/key", key);
-  if (!ierr) ierr = HycoH5WriteReal(h, "head", N_HEAD, 1, c->head);
-  if (!ierr) ierr = HycoH5WriteReal(h, "steps", c->n_steps + 1, N_MEMBERS, c->steps);
-  if (!ierr && c->n_orders) ierr = HycoH5WriteReal(h, "orders", c->n_orders, 1, c->orders);
-  if (!ierr) ierr = HycoH5WriteInt(h, "node_tag", c->n_nodes, 1, c->node_tag);
-  if (!ierr) ierr = HycoH5WriteReal(h, "node", c->n_nodes, NODE_COLS(f), c->node);
-  if (!ierr) ierr = HycoH5WriteInt(h, "cell_tag", c->n_cells, 1, c->cell_tag);
-  if (!ierr) ierr = HycoH5WriteReal(h, "cell", c->n_cells, c->cell_cols, c->cell);
-  if (!ierr && f->n_contacts) ierr = HycoH5WriteReal(h, "lambda", f->n_contacts, 1, c->lambda);
-  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
-  PetscCall(ierr);
+  PetscCall(HycoH5WriteInt(h, "checkpoint/format", 1, 1, &format));
+  PetscCall(HycoH5WriteText(h, "checkpoint/key", key));
+  PetscCall(HycoH5WriteReal(h, "head", N_HEAD, 1, c->head));
+  PetscCall(HycoH5WriteReal(h, "steps", c->n_steps + 1, N_MEMBERS, c->steps));
+  if (c->n_orders) PetscCall(HycoH5WriteReal(h, "orders", c->n_orders, 1, c->orders));
+  if (f->n_contacts) PetscCall(HycoH5WriteReal(h, "lambda", f->n_contacts, 1, c->lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes and cells, each rank its rows. */
+static PetscErrorCode WriteItems(HycoFOM f, HycoH5 h)
+{
+  HycoMesh m = f->part;
+  const HycoFileOrder *rows;
+  PetscReal *node, *cell;
+  PetscInt cols;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(f, &rows));
+  PetscCall(StateCols(f, &cols));
+  PetscCall(PetscCalloc2(m->n_nodes * NODE_COLS(f), &node, m->n_cells * cols, &cell));
+  PetscCall(MoveNodes(f, PETSC_TRUE, node));
+  PetscCall(MoveState(f, PETSC_TRUE, cols, cell));
+  PetscCall(HycoFieldWrite(h, rows, m->n_nodes, "node_tag", HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
+  PetscCall(HycoFieldWrite(h, rows, m->n_nodes, "node", HYCO_ON_NODES, MPIU_REAL, NODE_COLS(f), NODE_COLS(f), node));
+  PetscCall(HycoFieldWrite(h, rows, m->n_cells, "cell_tag", HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
+  PetscCall(HycoFieldWrite(h, rows, m->n_cells, "cell", HYCO_ON_CELLS, MPIU_REAL, cols, cols, cell));
+  PetscCall(PetscFree2(node, cell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteAll(HycoFOM f, HycoH5 h, const Content *c, const char key[])
+{
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(f), WriteContent(f, h, c, key));
+  PetscCall(WriteItems(f, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -211,36 +232,10 @@ static PetscErrorCode MoveForces(HycoFOM f, PetscBool out, PetscReal lambda[])
 static PetscErrorCode FreeContent(Content *c)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(c->node));
-  PetscCall(PetscFree(c->cell));
   PetscCall(PetscFree(c->lambda));
   PetscCall(PetscFree(c->head));
   PetscCall(PetscFree(c->steps));
   PetscCall(PetscFree(c->orders));
-  PetscCall(PetscFree(c->node_tag));
-  PetscCall(PetscFree(c->cell_tag));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Nodes and cells to rank 0. */
-static PetscErrorCode BringItems(HycoFOM f, Content *c)
-{
-  HycoPath p = f->path;
-  PetscReal *mine;
-
-  PetscFunctionBegin;
-  if (!p->node.own) PetscCall(HycoItemsCreate(f, &p->node, &p->cell));
-  PetscCall(PetscMalloc1(f->part->n_nodes * NODE_COLS(f), &mine));
-  PetscCall(MoveNodes(f, PETSC_TRUE, mine));
-  PetscCall(HycoItemsBring(f, &p->node, NODE_COLS(f), mine, &c->node));
-  PetscCall(PetscFree(mine));
-  PetscCall(StateCols(f, &c->cell_cols));
-  PetscCall(PetscCalloc1(f->part->n_cells * c->cell_cols, &mine));
-  PetscCall(MoveState(f, PETSC_TRUE, c->cell_cols, mine));
-  PetscCall(HycoItemsBring(f, &p->cell, c->cell_cols, mine, &c->cell));
-  PetscCall(PetscFree(mine));
-  c->n_nodes = p->node.n_all;
-  c->n_cells = p->cell.n_all;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -269,11 +264,12 @@ PetscErrorCode HycoPathSave(HycoFOM f)
   HycoPath p = f->path;
   Content c = {.n_steps = p->n_steps, .n_orders = p->n_orders};
   char key[HYCO_LINE];
+  HycoH5 h;
+  PetscErrorCode ierr, failed;
 
   PetscFunctionBegin;
   if (!p->checkpoint[0]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Identify(f, key));
-  PetscCall(BringItems(f, &c));
   PetscCall(PetscCalloc1(f->n_contacts + 1, &c.lambda));
   PetscCall(MoveForces(f, PETSC_TRUE, c.lambda));
   PetscCall(PetscMalloc1(N_HEAD, &c.head));
@@ -282,17 +278,18 @@ PetscErrorCode HycoPathSave(HycoFOM f)
   for (PetscInt k = 0; k < p->n_steps; k++) StepToReals(&p->steps[k], c.steps + k * N_MEMBERS);
   StepToReals(&p->now, c.steps + p->n_steps * N_MEMBERS);
   HycoDuplicate(p->n_orders, p->orders, &c.orders);
-  HycoDuplicate(p->node.n_all, p->node.tag, &c.node_tag);
-  HycoDuplicate(p->cell.n_all, p->cell.tag, &c.cell_tag);
-  HycoOnRoot(HycoComm(f), WriteContent(f, &c, key));
+  PetscCall(HycoH5CreateShared(HycoComm(f), p->checkpoint, &h));
+  ierr = WriteAll(f, h, &c, key);
+  failed = HycoH5Close(&h, (PetscBool)!ierr);
   PetscCall(FreeContent(&c));
+  PetscCall(ierr ? ierr : failed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content *c)
 {
   char *text = NULL;
-  PetscInt one = 1, rows = -1, *format = NULL, cols = NODE_COLS(f);
+  PetscInt one = 1, rows = -1, *format = NULL, n_nodes, n_cells, cols;
   PetscBool same;
 
   PetscFunctionBegin;
@@ -316,13 +313,10 @@ static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content 
   rows = -1;
   if (HycoH5Has(h, "orders")) PetscCall(HycoH5LoadReal(h, "orders", &rows, &one, &c->orders));
   c->n_orders = PetscMax(0, rows);
-  c->n_nodes = f->n_nodes;
-  c->n_cells = f->n_cells;
-  c->cell_cols = -1;
-  PetscCall(HycoH5LoadInt(h, "node_tag", 0, PETSC_MAX_INT, &c->n_nodes, &one, &c->node_tag));
-  PetscCall(HycoH5LoadReal(h, "node", &c->n_nodes, &cols, &c->node));
-  PetscCall(HycoH5LoadInt(h, "cell_tag", 0, PETSC_MAX_INT, &c->n_cells, &one, &c->cell_tag));
-  PetscCall(HycoH5LoadReal(h, "cell", &c->n_cells, &c->cell_cols, &c->cell));
+  PetscCall(HycoH5GetSize(h, "node", &n_nodes, &cols));
+  PetscCall(HycoH5GetSize(h, "cell", &n_cells, &c->cell_cols));
+  HycoCheck(n_nodes == f->n_nodes && cols == NODE_COLS(f) && n_cells == f->n_cells, "the checkpoint %s is damaged",
+            f->path->checkpoint);
   rows = f->n_contacts;
   if (rows) PetscCall(HycoH5LoadReal(h, "lambda", &rows, &one, &c->lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -341,53 +335,63 @@ static PetscErrorCode ReadContent(HycoFOM f, const char key[], Content *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n reals or integers of rank 0, on every rank. */
-static PetscErrorCode Spread(HycoFOM f, PetscInt n, MPI_Datatype type, size_t size, void *array)
+/* n reals of rank 0, on every rank. */
+static PetscErrorCode Spread(HycoFOM f, PetscInt n, PetscReal **array)
 {
-  void **at = (void **)array;
-  size_t done = 0;
-  const size_t all = (size_t)n, block = 1 << 24;
+  PetscMPIInt count;
 
   PetscFunctionBegin;
-  if (f->rank) PetscCall(PetscMalloc((all + 1) * size, at));
-  for (; done < all; done += block)
-    PetscCallMPI(MPI_Bcast((char *)*at + done * size, (PetscMPIInt)PetscMin(block, all - done), type, 0, HycoComm(f)));
+  PetscCall(PetscMPIIntCast(n, &count));
+  if (f->rank) PetscCall(PetscMalloc1(n + 1, array));
+  PetscCallMPI(MPI_Bcast(*array, count, MPIU_REAL, 0, HycoComm(f)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode SpreadContent(HycoFOM f, Content *c)
 {
-  PetscInt size[5] = {c->n_nodes, c->n_cells, c->cell_cols, c->n_steps, c->n_orders};
+  PetscInt size[3] = {c->cell_cols, c->n_steps, c->n_orders};
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Bcast(size, 5, MPIU_INT, 0, HycoComm(f)));
-  c->n_nodes = size[0];
-  c->n_cells = size[1];
-  c->cell_cols = size[2];
-  c->n_steps = size[3];
-  c->n_orders = size[4];
-  PetscCall(Spread(f, c->n_nodes, MPIU_INT, sizeof(PetscInt), &c->node_tag));
-  PetscCall(Spread(f, c->n_cells, MPIU_INT, sizeof(PetscInt), &c->cell_tag));
-  PetscCall(Spread(f, c->n_nodes * NODE_COLS(f), MPIU_REAL, sizeof(PetscReal), &c->node));
-  PetscCall(Spread(f, c->n_cells * c->cell_cols, MPIU_REAL, sizeof(PetscReal), &c->cell));
-  PetscCall(Spread(f, N_HEAD, MPIU_REAL, sizeof(PetscReal), &c->head));
-  PetscCall(Spread(f, (c->n_steps + 1) * N_MEMBERS, MPIU_REAL, sizeof(PetscReal), &c->steps));
-  if (c->n_orders) PetscCall(Spread(f, c->n_orders, MPIU_REAL, sizeof(PetscReal), &c->orders));
+  PetscCallMPI(MPI_Bcast(size, 3, MPIU_INT, 0, HycoComm(f)));
+  c->cell_cols = size[0];
+  c->n_steps = size[1];
+  c->n_orders = size[2];
+  PetscCall(Spread(f, N_HEAD, &c->head));
+  PetscCall(Spread(f, (c->n_steps + 1) * N_MEMBERS, &c->steps));
+  if (c->n_orders) PetscCall(Spread(f, c->n_orders, &c->orders));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows by ascending tag, in the order of these tags. */
-static PetscErrorCode Pick(PetscInt n_all, const PetscInt tag_all[], PetscInt cols, const PetscReal all[], PetscInt n,
-                           const PetscInt tag[], PetscReal value[])
+static PetscErrorCode ReadRows(HycoFOM f, const char name[], PetscInt first, PetscInt n, PetscInt cols,
+                               PetscReal rows[])
 {
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < n; k++) {
-    PetscInt at;
+  HycoH5 h;
+  PetscErrorCode ierr;
 
-    PetscCall(PetscFindInt(tag[k], n_all, tag_all, &at));
-    HycoCheck(at >= 0, "the checkpoint has no node or cell %d", (int)tag[k]);
-    PetscCall(PetscArraycpy(value + k * cols, all + at * cols, cols));
+  PetscFunctionBegin;
+  PetscCall(HycoH5OpenOr(f->path->checkpoint, "take away -hyco_resume", &h));
+  ierr = HycoH5ReadRows(h, name, first, n, cols, rows);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Values of all nodes or cells of the part: each rank reads its rows. */
+static PetscErrorCode ReadItems(HycoFOM f, const char name[], HycoPlace place, PetscInt cols, PetscReal value[])
+{
+  const HycoFileOrder *order;
+  PetscReal *rows;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(f, &order));
+  if (!order) {
+    PetscCall(ReadRows(f, name, 0, place == HYCO_ON_CELLS ? f->n_cells : f->n_nodes, cols, value));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscCall(PetscMalloc1(order->n[place] * cols, &rows));
+  HycoOnEach(HycoComm(f), ReadRows(f, name, order->first[place], order->n[place], cols, rows));
+  PetscCall(HycoFileOrderFetch(order, f->part, place, cols, rows, value));
+  PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -403,12 +407,11 @@ static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
              "the checkpoint has %d reals a cell, the laws have %d; take away -hyco_resume", (int)c->cell_cols,
              (int)cols);
   PetscCall(PetscMalloc1(f->part->n_nodes * NODE_COLS(f), &mine));
-  HycoOnEach(HycoComm(f),
-             Pick(c->n_nodes, c->node_tag, NODE_COLS(f), c->node, f->part->n_nodes, f->part->node_id, mine));
+  PetscCall(ReadItems(f, "node", HYCO_ON_NODES, NODE_COLS(f), mine));
   PetscCall(MoveNodes(f, PETSC_FALSE, mine));
   PetscCall(PetscFree(mine));
   PetscCall(PetscMalloc1(f->part->n_cells * cols, &mine));
-  HycoOnEach(HycoComm(f), Pick(c->n_cells, c->cell_tag, cols, c->cell, f->part->n_cells, f->part->cell_id, mine));
+  PetscCall(ReadItems(f, "cell", HYCO_ON_CELLS, cols, mine));
   PetscCall(MoveState(f, PETSC_FALSE, cols, mine));
   PetscCall(PetscFree(mine));
   PetscCall(MoveForces(f, PETSC_FALSE, c->lambda));

@@ -104,8 +104,6 @@ PetscErrorCode HycoPathDestroy(HycoFOM f)
     PetscCall(VecDestroy(&p->dL[j]));
   }
   PetscCall(HycoSeriesDestroy(&p->series));
-  PetscCall(HycoItemsDestroy(&p->node));
-  PetscCall(HycoItemsDestroy(&p->cell));
   PetscCall(HycoFEStateDestroy(&p->begin));
   PetscCall(HycoFEStateDestroy(&p->end));
   PetscCall(PetscFree(p->f_local));

@@ -1,7 +1,6 @@
 /*
   The fields of a path at its listed times, for ParaView: one .h5 with all numbers and an .xdmf that strings them
-  together. Ranks bring what they own to rank 0, where it is put in the order of the mesh file's tags, whatever the
-  ranks.
+  together. Each rank writes its rows of the file's order.
 */
 #include <hycofile.h>
 #include <hycofields.h>
@@ -15,69 +14,67 @@
 
 struct _n_HycoSeries {
   char path[PETSC_MAX_PATH_LEN], h5_path[PETSC_MAX_PATH_LEN];
-  HycoItems node, cell;
-  PetscInt nv, *cells; /* rank 0: n_all x nv, node numbers */
-  PetscReal *X;        /* rank 0: nodes as moved, n_all x 3 */
-  HycoH5 h;            /* rank 0 */
-  PetscInt n, room;    /* times */
+  HycoH5 h, part;   /* part: this time's alone, beside the checkpoint; NULL: none */
+  PetscInt n, room; /* times */
   PetscReal *t;
   PetscInt n_fields;
-  HycoField field[MOST_FIELDS]; /* of the last time; rank 0 owns the data */
+  HycoField field[MOST_FIELDS]; /* of the last time, without data */
   char name[MOST_FIELDS][64];
 };
 
-/* The mesh on rank 0: cells by their nodes' tags. */
-static PetscErrorCode BringMesh(HycoFOM f, HycoSeries s)
+static PetscInt CountItems(HycoFOM f, HycoPlace place)
 {
-  HycoMesh m = f->part;
-  PetscReal *tags, *all;
+  return place == HYCO_ON_CELLS ? f->n_cells : f->n_nodes;
+}
 
+/* "step-0003/nodes/displacement" */
+static void NameSet(const HycoField *field, PetscInt k, char name[HYCO_LINE])
+{
+  HycoFormat(name, "step-%04d/%s/%s", (int)k, field->place == HYCO_ON_CELLS ? "cells" : "nodes", field->name);
+}
+
+/* Notes a field of this time; NULL: there are too many. */
+static PetscErrorCode NoteField(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
+                                HycoField **field)
+{
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_cells * m->nv, &tags));
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) tags[k] = (PetscReal)m->node_id[m->cells[k]];
-  PetscCall(HycoItemsBring(f, &s->cell, m->nv, tags, &all));
-  PetscCall(PetscFree(tags));
-  s->nv = m->nv;
-  if (f->rank == 0) PetscCall(PetscMalloc1(s->cell.n_all * m->nv, &s->cells));
-  for (PetscInt k = 0; k < s->cell.n_all * m->nv; k++) s->cells[k] = HycoItemsFind(&s->node, (PetscInt)all[k]);
-  PetscCall(PetscFree(all));
-  PetscCall(HycoItemsBring(f, &s->node, 3, f->fe->X, &s->X));
+  *field = NULL;
+  if (s->n_fields == MOST_FIELDS) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscStrncpy(s->name[s->n_fields], name, sizeof(s->name[0])));
+  *field = &s->field[s->n_fields];
+  **field = (HycoField){s->name[s->n_fields++], place, components, NULL};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds a field of this time. */
-static PetscErrorCode AddField(HycoFOM f, HycoSeries s, const char name[], PetscBool on_cells, PetscInt components,
+/* Writes a field of this time. */
+static PetscErrorCode AddField(HycoFOM f, HycoSeries s, const char name[], HycoPlace place, PetscInt components,
                                const PetscReal value[])
 {
-  HycoField *field = &s->field[s->n_fields];
-  PetscReal *all;
+  const HycoFileOrder *rows;
+  HycoField *field;
+  char set[HYCO_LINE];
 
   PetscFunctionBegin;
-  if (s->n_fields == MOST_FIELDS) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoItemsBring(f, on_cells ? &s->cell : &s->node, components, value, &all));
-  PetscCall(PetscStrncpy(s->name[s->n_fields], name, sizeof(s->name[0])));
-  field->name = s->name[s->n_fields];
-  field->place = on_cells ? HYCO_ON_CELLS : HYCO_ON_NODES;
-  field->components = components;
-  field->data = all;
-  s->n_fields++;
+  PetscCall(HycoFOMGetRows(f, &rows));
+  PetscCall(NoteField(s, name, place, components, &field));
+  if (!field) PetscFunctionReturn(PETSC_SUCCESS);
+  NameSet(field, s->n, set);
+  PetscCall(HycoFieldWrite(s->h, rows, CountItems(f, place), set, place, MPIU_REAL, components, components, value));
+  if (s->part)
+    PetscCall(
+        HycoFieldWrite(s->part, rows, CountItems(f, place), set, place, MPIU_REAL, components, components, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode AddDisplacement(HycoFOM f, HycoSeries s)
 {
   const PetscInt dim = f->part->dim;
-  const PetscScalar *u;
   PetscReal *u3;
 
   PetscFunctionBegin;
-  PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(PetscCalloc1(3 * f->part->n_nodes, &u3));
-  PetscCall(VecGetArrayRead(f->U_local, &u));
-  for (PetscInt k = 0; k < f->fe->n_dof; k++) u3[3 * (k / dim) + k % dim] = u[k];
-  PetscCall(VecRestoreArrayRead(f->U_local, &u));
-  PetscCall(AddField(f, s, "displacement", PETSC_FALSE, 3, u3));
+  for (PetscInt k = 0; k < f->fe->n_dof; k++) u3[3 * (k / dim) + k % dim] = f->u[k];
+  PetscCall(AddField(f, s, "displacement", HYCO_ON_NODES, 3, u3));
   PetscCall(PetscFree(u3));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -95,117 +92,45 @@ static PetscErrorCode AddState(HycoFOM f, HycoSeries s)
   PetscCall(PetscCalloc5(n * ns, &sigma, 6 * n, &tensor, n, &mises, n, &inelastic, n, &temperature));
   PetscCall(HycoFEStateFields(f->fe, state, sigma, mises, inelastic, temperature));
   HycoTensor6(n, ns, sigma, tensor);
-  PetscCall(AddField(f, s, "stress", PETSC_TRUE, 6, tensor));
-  PetscCall(AddField(f, s, "mises", PETSC_TRUE, 1, mises));
-  PetscCall(AddField(f, s, "inelastic", PETSC_TRUE, 1, inelastic));
-  PetscCall(AddField(f, s, "temperature", PETSC_TRUE, 1, temperature));
+  PetscCall(AddField(f, s, "stress", HYCO_ON_CELLS, 6, tensor));
+  PetscCall(AddField(f, s, "mises", HYCO_ON_CELLS, 1, mises));
+  PetscCall(AddField(f, s, "inelastic", HYCO_ON_CELLS, 1, inelastic));
+  PetscCall(AddField(f, s, "temperature", HYCO_ON_CELLS, 1, temperature));
   PetscCall(HycoFEStateGetNames(state, &n_names, &names));
   for (PetscInt k = 0; k < n_names; k++) {
     PetscCall(HycoFEStateVariable(f->fe, state, names[k], mises));
-    PetscCall(AddField(f, s, names[k], PETSC_TRUE, 1, mises));
+    PetscCall(AddField(f, s, names[k], HYCO_ON_CELLS, 1, mises));
   }
   PetscCall(PetscFree5(sigma, tensor, mises, inelastic, temperature));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contact force, pressure and gap by node, on rank 0, where the contacts are. */
-static PetscErrorCode FillContacts(HycoFOM f, HycoSeries s, PetscReal force[], PetscReal pressure[], PetscReal open[])
-{
-  const PetscInt m = f->pairs.n, dim = f->part->dim;
-  const PetscInt *tag = f->fe_surface->mesh->node_id;
-  PetscReal *normal, *gap, *area;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc3(3 * m, &normal, m, &gap, m, &area));
-  PetscCall(HycoContactGeometry(f->fe_surface, &f->pairs, normal, gap));
-  PetscCall(HycoContactAreas(f->fe_surface, &f->pairs, area));
-  for (PetscInt k = 0; k < m; k++) {
-    const PetscInt slave = HycoItemsFind(&s->node, tag[HycoPairsSlave(&f->pairs, k)]), *master;
-    const PetscReal *weight, lambda = f->lambda[k], *n = normal + 3 * k;
-    PetscInt masters;
-
-    if (HycoPairsAlone(f->scene, &f->pairs, k)) continue;
-    HycoPairsMasters(&f->pairs, k, &masters, &master, &weight);
-    pressure[slave] = area[k] > 0 ? lambda / area[k] : 0;
-    open[slave] = gap[k];
-    for (PetscInt c = 0; c < dim; c++) {
-      force[3 * slave + c] -= lambda * n[c];
-      open[slave] -= n[c] * s->field[0].data[3 * slave + c];
-      for (PetscInt j = 0; j < masters; j++) {
-        const PetscInt at = HycoItemsFind(&s->node, tag[master[j]]);
-
-        force[3 * at + c] += weight[j] * lambda * n[c];
-        open[slave] += weight[j] * n[c] * s->field[0].data[3 * at + c];
-      }
-    }
-  }
-  PetscCall(PetscFree3(normal, gap, area));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
+/* Contact force, pressure and gap by node. */
 static PetscErrorCode AddContacts(HycoFOM f, HycoSeries s)
 {
-  static const char *const name[3] = {"contact_force", "contact_pressure", "gap"};
-  const PetscInt n = s->node.n_all;
-  PetscReal *value[3] = {NULL, NULL, NULL};
+  HycoContactFields c;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt k = 0; k < 3; k++) {
-    HycoField *field = &s->field[s->n_fields + k];
-
-    if (f->rank == 0) PetscCall(PetscCalloc1((k ? 1 : 3) * n, &value[k]));
-    PetscCall(PetscStrncpy(s->name[s->n_fields + k], name[k], sizeof(s->name[0])));
-    *field = (HycoField){s->name[s->n_fields + k], HYCO_ON_NODES, k ? 1 : 3, value[k]};
-  }
-  HycoOnRoot(HycoComm(f), FillContacts(f, s, value[0], value[1], value[2]));
-  s->n_fields += 3;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode ForgetFields(HycoSeries s)
-{
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < s->n_fields; k++) PetscCall(PetscFree(s->field[k].data));
-  s->n_fields = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The fields of the last time, into a file, under "step-0003/". */
-static PetscErrorCode WriteFields(HycoSeries s, HycoH5 h, PetscInt k)
-{
-  PetscFunctionBegin;
-  for (PetscInt j = 0; j < s->n_fields; j++) {
-    char name[HYCO_LINE];
-
-    HycoFormat(name, "step-%04d/%s/%s", (int)k, s->field[j].place == HYCO_ON_CELLS ? "cells" : "nodes",
-               s->field[j].name);
-    PetscCall(HycoH5WriteReal(h, name, s->field[j].place == HYCO_ON_CELLS ? s->cell.n_all : s->node.n_all,
-                              s->field[j].components, s->field[j].data));
-  }
+  ierr = HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c);
+  if (!ierr) ierr = AddField(f, s, "contact_force", HYCO_ON_SURFACE, 3, c.force);
+  if (!ierr) ierr = AddField(f, s, "contact_pressure", HYCO_ON_SURFACE, 1, c.pressure);
+  if (!ierr) ierr = AddField(f, s, "gap", HYCO_ON_SURFACE, 1, c.gap_node);
+  PetscCall(HycoContactFieldsDestroy(&c));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What does not change in time. */
 static PetscErrorCode WriteMesh(HycoFOM f, HycoSeries s)
 {
-  const PetscInt head[2] = {(PetscInt)f->part->type, f->part->dim};
-  HycoScene scene = f->scene;
+  const HycoFileOrder *rows;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5Create(s->h5_path, &s->h));
-  PetscCall(HycoH5WriteText(s->h, "title", scene->title));
-  PetscCall(HycoH5WriteInt(s->h, "mesh/head", 2, 1, head));
-  PetscCall(HycoH5WriteReal(s->h, "mesh/xyz", s->node.n_all, 3, s->X));
-  PetscCall(HycoH5WriteInt(s->h, "mesh/cells", s->cell.n_all, s->nv, s->cells));
-  PetscCall(HycoH5WriteInt(s->h, "mesh/node_id", s->node.n_all, 1, s->node.tag));
-  PetscCall(HycoH5WriteInt(s->h, "mesh/cell_id", s->cell.n_all, 1, s->cell.tag));
-  for (PetscInt p = 0; p < scene->n_parameters; p++) {
-    char name[HYCO_LINE];
-
-    HycoFormat(name, "mu/%s", scene->parameter[p]);
-    PetscCall(HycoH5WriteReal(s->h, name, 1, 1, &f->path->mu[p]));
-  }
+  PetscCall(HycoFOMGetRows(f, &rows));
+  HycoOnRoot(HycoComm(f), HycoFieldsWriteHead(s->h, f->part, f->scene, f->path->mu, NULL));
+  PetscCall(HycoFieldsWriteMesh(s->h, rows, f->part, f->fe->X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -232,12 +157,9 @@ PetscErrorCode HycoSeriesBegin(HycoFOM f)
   PetscFunctionBegin;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   s->n = 0;
-  if (s->h) PetscCall(HycoH5Close(&s->h, PETSC_FALSE)); /* of a path without any time */
-  if (!s->node.own) PetscCall(HycoItemsCreate(f, &s->node, &s->cell));
-  PetscCall(PetscFree(s->cells));
-  PetscCall(PetscFree(s->X));
-  PetscCall(BringMesh(f, s));
-  HycoOnRoot(HycoComm(f), WriteMesh(f, s));
+  if (s->h) PetscCall(HycoH5Close(&s->h, PETSC_FALSE));
+  PetscCall(HycoH5CreateShared(HycoComm(f), s->h5_path, &s->h));
+  PetscCall(WriteMesh(f, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -247,56 +169,73 @@ static void NamePart(HycoFOM f, PetscInt k, char path[PETSC_MAX_PATH_LEN])
   snprintf(path, PETSC_MAX_PATH_LEN, "%.*s.step-%04d.h5", PETSC_MAX_PATH_LEN - 32, f->path->checkpoint, (int)k);
 }
 
-static PetscErrorCode SavePart(HycoFOM f, HycoSeries s, PetscInt k)
+/* What fields there are. */
+static PetscErrorCode WriteList(HycoSeries s)
 {
-  char path[PETSC_MAX_PATH_LEN], list[HYCO_LINE] = "";
-  HycoH5 h;
-  PetscErrorCode ierr;
+  char list[HYCO_LINE] = "";
 
   PetscFunctionBegin;
-  NamePart(f, k, path);
   for (PetscInt j = 0; j < s->n_fields; j++) PetscCall(HycoListAdd(list, " ", s->field[j].name));
-  PetscCall(HycoH5Create(path, &h));
-  ierr = WriteFields(s, h, k);
-  if (!ierr) ierr = HycoH5WriteText(h, "fields", list);
-  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
+  PetscCall(HycoH5WriteText(s->part, "fields", list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* This rank's rows of one field of an earlier time, from its file. */
+static PetscErrorCode ReadField(HycoFOM f, HycoH5 h, const HycoFileOrder *order, const char set[],
+                                const HycoField *field, PetscReal **rows)
+{
+  const PetscInt all = CountItems(f, field->place), n = order ? order->n[field->place] : all;
+  PetscInt n_rows, cols;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5GetSize(h, set, &n_rows, &cols));
+  HycoCheck(n_rows == all, "its field %s has %d rows", field->name, (int)n_rows);
+  PetscCall(PetscMalloc1(n * cols, rows));
+  PetscCall(HycoH5ReadRows(h, set, order ? order->first[field->place] : 0, n, cols, *rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CopyField(HycoFOM f, HycoSeries s, HycoH5 h, const char name[], PetscInt k)
+{
+  const HycoFileOrder *order;
+  HycoField *field;
+  PetscReal *rows = NULL;
+  PetscInt n_rows;
+  char set[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(f, &order));
+  PetscCall(NoteField(s, name, HYCO_ON_NODES, 0, &field));
+  if (!field) PetscFunctionReturn(PETSC_SUCCESS);
+  NameSet(field, k, set);
+  if (!HycoH5Has(h, set)) field->place = HYCO_ON_CELLS;
+  NameSet(field, k, set);
+  HycoOnEach(HycoComm(f), ReadField(f, h, order, set, field, &rows));
+  PetscCall(HycoH5GetSize(h, set, &n_rows, &field->components));
+  PetscCall(HycoH5WriteRows(s->h, set, MPIU_REAL, n_rows, field->components, order ? order->first[field->place] : 0,
+                            order ? order->n[field->place] : n_rows, rows));
+  PetscCall(PetscFree(rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The fields that a file lists, into the series. */
+static PetscErrorCode CopyFields(HycoFOM f, HycoSeries s, HycoH5 h, PetscInt k)
+{
+  char *list = NULL, *word, *rest;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(f), HycoH5LoadText(h, "fields", &list));
+  for (word = strtok_r(list, " ", &rest); word && !ierr; word = strtok_r(NULL, " ", &rest))
+    ierr = CopyField(f, s, h, word, k);
+  PetscCall(PetscFree(list));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The fields that the file lists, in place of those of the last time. */
-static PetscErrorCode ReadFields(HycoSeries s, HycoH5 h, PetscInt k)
-{
-  char *list = NULL, *word, *rest;
-
-  PetscFunctionBegin;
-  PetscCall(HycoH5LoadText(h, "fields", &list));
-  for (word = strtok_r(list, " ", &rest); word && s->n_fields < MOST_FIELDS; word = strtok_r(NULL, " ", &rest)) {
-    HycoField *field = &s->field[s->n_fields];
-    char name[HYCO_LINE];
-    PetscReal *data;
-    PetscInt rows = -1, cols = -1;
-
-    HycoFormat(name, "step-%04d/nodes/%s", (int)k, word);
-    PetscCall(PetscStrncpy(s->name[s->n_fields], word, sizeof(s->name[0])));
-    *field = (HycoField){s->name[s->n_fields], HycoH5Has(h, name) ? HYCO_ON_NODES : HYCO_ON_CELLS, 0, NULL};
-    if (field->place == HYCO_ON_CELLS) HycoFormat(name, "step-%04d/cells/%s", (int)k, word);
-    PetscCall(HycoH5LoadReal(h, name, &rows, &cols, &data));
-    field->components = cols;
-    field->data = data;
-    s->n_fields++;
-    HycoCheck(rows == (field->place == HYCO_ON_CELLS ? s->cell.n_all : s->node.n_all), "its field %s has %d rows", word,
-              (int)rows);
-  }
-  PetscCall(PetscFree(list));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode LoadPart(HycoFOM f, HycoSeries s, PetscInt k)
+static PetscErrorCode OpenPart(HycoFOM f, PetscInt k, HycoH5 *h)
 {
   char path[PETSC_MAX_PATH_LEN];
-  HycoH5 h;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   NamePart(f, k, path);
@@ -304,11 +243,7 @@ static PetscErrorCode LoadPart(HycoFOM f, HycoSeries s, PetscInt k)
             "there is no %s, with the fields of a time before the checkpoint: the run that wrote this had no series of "
             "fields; start again without -hyco_resume, or resume without -output",
             path);
-  PetscCall(HycoH5Open(path, &h));
-  ierr = ReadFields(s, h, k);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  if (!ierr) ierr = WriteFields(s, s->h, k);
-  PetscCall(ierr);
+  PetscCall(HycoH5Open(path, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -329,25 +264,45 @@ PetscErrorCode HycoSeriesRestore(HycoFOM f)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; s && k < f->path->n_steps; k++) {
-    PetscCall(ForgetFields(s));
-    HycoOnRoot(HycoComm(f), LoadPart(f, s, k));
+    HycoH5 h = NULL;
+    PetscErrorCode ierr;
+
+    s->n_fields = 0;
+    HycoOnEach(HycoComm(f), OpenPart(f, k, &h));
+    ierr = CopyFields(f, s, h, k);
+    PetscCall(HycoH5Close(&h, PETSC_FALSE));
+    PetscCall(ierr);
     PetscCall(NoteTime(s, f->path->steps[k].t));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddFields(HycoFOM f, HycoSeries s)
+{
+  PetscFunctionBegin;
+  s->n_fields = 0;
+  PetscCall(AddDisplacement(f, s));
+  PetscCall(AddState(f, s));
+  PetscCall(AddContacts(f, s));
+  if (s->part) HycoOnRoot(HycoComm(f), WriteList(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSeriesAdd(HycoFOM f)
 {
   HycoSeries s = f->path->series;
+  char path[PETSC_MAX_PATH_LEN];
+  PetscErrorCode ierr, failed;
 
   PetscFunctionBegin;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ForgetFields(s));
-  PetscCall(AddDisplacement(f, s));
-  PetscCall(AddState(f, s));
-  PetscCall(AddContacts(f, s));
-  HycoOnRoot(HycoComm(f), WriteFields(s, s->h, s->n));
-  if (f->path->checkpoint[0]) HycoOnRoot(HycoComm(f), SavePart(f, s, s->n));
+  if (f->path->checkpoint[0]) {
+    NamePart(f, s->n, path);
+    PetscCall(HycoH5CreateShared(HycoComm(f), path, &s->part));
+  }
+  ierr = AddFields(f, s);
+  failed = HycoH5Close(&s->part, (PetscBool)!ierr);
+  PetscCall(ierr ? ierr : failed);
   PetscCall(NoteTime(s, f->path->t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -359,17 +314,18 @@ static void WriteItem(FILE *out, const char kind[], PetscInt rows, PetscInt cols
 }
 
 /* One time: the mesh, which all share, and its fields. */
-static void WriteTime(HycoSeries s, FILE *out, const char h5[], HycoCellType type, PetscInt k)
+static void WriteTime(HycoFOM f, HycoSeries s, FILE *out, const char h5[], PetscInt k)
 {
+  const HycoCellType type = f->part->type;
   char name[HYCO_LINE], kind[64];
 
   fprintf(out, "   <Grid Name=\"mesh\">\n    <Time Value=\"%.17g\"/>\n", (double)s->t[k]);
   fprintf(out, "    <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", HycoFieldsTopology(type),
-          (long)s->cell.n_all, type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
+          (long)f->n_cells, type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
   snprintf(kind, sizeof(kind), "NumberType=\"Int\" Precision=\"%d\"", (int)sizeof(PetscInt));
-  WriteItem(out, kind, s->cell.n_all, s->nv, h5, "mesh/cells");
+  WriteItem(out, kind, f->n_cells, f->part->nv, h5, "mesh/cells");
   fprintf(out, "    </Topology>\n    <Geometry GeometryType=\"XYZ\">\n");
-  WriteItem(out, "Precision=\"8\"", s->node.n_all, 3, h5, "mesh/xyz");
+  WriteItem(out, "Precision=\"8\"", f->n_nodes, 3, h5, "mesh/xyz");
   fprintf(out, "    </Geometry>\n");
   for (PetscInt j = 0; j < s->n_fields; j++) {
     const HycoField *field = &s->field[j];
@@ -379,48 +335,54 @@ static void WriteTime(HycoSeries s, FILE *out, const char h5[], HycoCellType typ
             : field->components == 3 ? "Vector"
                                      : "Tensor6",
             field->place == HYCO_ON_CELLS ? "Cell" : "Node");
-    HycoFormat(name, "step-%04d/%s/%s", (int)k, field->place == HYCO_ON_CELLS ? "cells" : "nodes", field->name);
-    WriteItem(out, "Precision=\"8\"", field->place == HYCO_ON_CELLS ? s->cell.n_all : s->node.n_all, field->components,
-              h5, name);
+    NameSet(field, k, name);
+    WriteItem(out, "Precision=\"8\"", CountItems(f, field->place), field->components, h5, name);
     fprintf(out, "    </Attribute>\n");
   }
   fprintf(out, "   </Grid>\n");
 }
 
-/* The two files take their places, the numbers first. */
-static PetscErrorCode WriteSeries(HycoFOM f, HycoSeries s)
+/* The text, and the last of the numbers. On rank 0. */
+static PetscErrorCode WriteText(HycoFOM f, HycoSeries s, HycoFile *out)
 {
   const char *slash = strrchr(s->h5_path, '/');
   char h5[6 * PETSC_MAX_PATH_LEN];
-  HycoFile out;
-  PetscErrorCode ierr;
+  FILE *text;
 
   PetscFunctionBegin;
   HycoFieldsEscape(slash ? slash + 1 : s->h5_path, h5);
-  PetscCall(HycoFileCreate(s->path, HYCO_FILE_TEXT, &out));
-  fprintf(HycoFileStream(out), "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n"
-                               "  <Grid Name=\"history\" GridType=\"Collection\" CollectionType=\"Temporal\">\n");
-  for (PetscInt k = 0; k < s->n; k++) WriteTime(s, HycoFileStream(out), h5, f->part->type, k);
-  fprintf(HycoFileStream(out), "  </Grid>\n </Domain>\n</Xdmf>\n");
-  ierr = HycoFileFlush(out);
-  if (!ierr) ierr = HycoH5WriteReal(s->h, "t", s->n, 1, s->t);
-  if (!ierr) ierr = HycoH5Close(&s->h, PETSC_TRUE);
-  if (!ierr)
-    ierr = HycoFileClose(&out, PETSC_TRUE);
-  else
-    PetscCall(HycoFileClose(&out, PETSC_FALSE));
-  PetscCall(ierr);
+  PetscCall(HycoFileCreate(s->path, HYCO_FILE_TEXT, out));
+  text = HycoFileStream(*out);
+  fprintf(text, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n"
+                "  <Grid Name=\"history\" GridType=\"Collection\" CollectionType=\"Temporal\">\n");
+  for (PetscInt k = 0; k < s->n; k++) WriteTime(f, s, text, h5, k);
+  fprintf(text, "  </Grid>\n </Domain>\n</Xdmf>\n");
+  PetscCall(HycoFileFlush(*out));
+  PetscCall(HycoH5WriteReal(s->h, "t", s->n, 1, s->t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The two files take their places, the numbers first. */
+static PetscErrorCode WriteSeries(HycoFOM f, HycoSeries s, HycoFile *out)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(f), WriteText(f, s, out));
+  PetscCall(HycoH5Close(&s->h, PETSC_TRUE));
+  HycoOnRoot(HycoComm(f), HycoFileClose(out, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSeriesEnd(HycoFOM f)
 {
   HycoSeries s = f->path->series;
+  HycoFile out = NULL;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (!s || !s->n) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoOnRoot(HycoComm(f), WriteSeries(f, s));
-  PetscCall(ForgetFields(s));
+  ierr = WriteSeries(f, s, &out);
+  if (out) PetscCall(HycoFileClose(&out, PETSC_FALSE));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -431,11 +393,6 @@ PetscErrorCode HycoSeriesDestroy(HycoSeries *series)
   PetscFunctionBegin;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   if (s->h) PetscCall(HycoH5Close(&s->h, PETSC_FALSE));
-  PetscCall(ForgetFields(s));
-  PetscCall(HycoItemsDestroy(&s->node));
-  PetscCall(HycoItemsDestroy(&s->cell));
-  PetscCall(PetscFree(s->cells));
-  PetscCall(PetscFree(s->X));
   PetscCall(PetscFree(s->t));
   PetscCall(PetscFree(*series));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -46,13 +46,7 @@ static PetscErrorCode Release(HycoDirect d)
   if (d->begun) Call(d, END);
   d->begun = PETSC_FALSE;
   d->K_id = d->B_id = 0;
-  PetscCall(PetscFree(d->id.irn_loc));
-  PetscCall(PetscFree(d->id.jcn_loc));
-  PetscCall(PetscFree(d->id.a_loc));
-  PetscCall(PetscFree(d->id.perm_in));
-  PetscCall(PetscFree(d->id.listvar_schur));
-  PetscCall(PetscFree(d->rhs));
-  PetscCall(PetscFree(d->reduced));
+  HycoFreeAll(&d->id.irn_loc, &d->id.jcn_loc, &d->id.a_loc, &d->id.perm_in, &d->id.listvar_schur, &d->rhs, &d->reduced);
   PetscCall(VecScatterDestroy(&d->to_root));
   PetscCall(VecDestroy(&d->root));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -345,7 +339,7 @@ static PetscErrorCode SpreadSchur(HycoDirect d, PetscReal M[])
   for (size_t j = 0; j < n && d->rank == 0; j++) {
     for (size_t i = (size_t)d->n_pinned; i < n; i++) M[j * n + i] = -M[j * n + i];
   }
-  for (size_t j = 0; j < n; j++) PetscCallMPI(MPI_Bcast(M + j * n, (PetscMPIInt)n, MPIU_REAL, 0, d->comm));
+  for (size_t j = 0; j < n; j++) HycoBcast(M + j * n, n, MPIU_REAL, d->comm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -429,7 +423,7 @@ PetscErrorCode HycoDirectReduce(HycoDirect d, Vec F, const PetscReal D[], PetscR
   if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs + d->n, D, d->m));
   PetscCall(Run(d, 1));
   for (PetscInt k = 0; k < d->n_schur && d->rank == 0; k++) q[k] = k < d->n_pinned ? -d->reduced[k] : d->reduced[k];
-  PetscCallMPI(MPI_Bcast(q, (PetscMPIInt)d->n_schur, MPIU_REAL, 0, d->comm));
+  HycoBcast(q, d->n_schur, MPIU_REAL, d->comm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -61,7 +61,7 @@ static PetscErrorCode Longest(MPI_Comm comm, PetscInt first, PetscInt rows, Pets
   PetscCallMPI(MPI_Allreduce(&mine, at, 1, MPIU_INT, MPI_MIN, comm));
   for (PetscInt k = 0; k < n; k++)
     unit[k] = *at >= first && *at < first + rows ? row[(*at - first) * n + k] / PetscSqrtReal(largest) : 0;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, unit, (PetscMPIInt)n, MPIU_REAL, MPI_SUM, comm));
+  HycoAllreduce(unit, n, MPIU_REAL, MPI_SUM, comm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -75,3 +75,28 @@ PetscErrorCode HycoFileOrderSend(const HycoFileOrder *o, HycoPlace place, MPI_Da
   PetscCallMPI(MPI_Type_free(&unit));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode HycoFileOrderFetch(const HycoFileOrder *o, HycoMesh m, HycoPlace place, PetscInt components,
+                                  const PetscReal rows[], PetscReal value[])
+{
+  const PetscBool on_cells = (PetscBool)(place == HYCO_ON_CELLS);
+  PetscMPIInt count;
+  MPI_Datatype unit;
+  PetscLayout layout;
+  PetscSF sf;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMPIIntCast(components, &count));
+  PetscCallMPI(MPI_Type_contiguous(count, MPIU_REAL, &unit));
+  PetscCallMPI(MPI_Type_commit(&unit));
+  PetscCall(PetscLayoutCreateFromSizes(o->comm, o->n[place], o->all[place], 1, &layout));
+  PetscCall(PetscSFCreate(o->comm, &sf));
+  PetscCall(PetscSFSetGraphLayout(sf, layout, on_cells ? m->n_cells : m->n_nodes, NULL, PETSC_OWN_POINTER,
+                                  on_cells ? m->cell_whole : m->node_whole));
+  PetscCall(PetscSFBcastBegin(sf, unit, rows, value, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, unit, rows, value, MPI_REPLACE));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscLayoutDestroy(&layout));
+  PetscCallMPI(MPI_Type_free(&unit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

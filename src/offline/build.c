@@ -235,14 +235,13 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 /* A model that reconstructs forces from its own has none without a contact, also where its training solutions press. */
 static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
 {
-  PetscBool reconstruct = PETSC_TRUE, presses = PETSC_FALSE, kept = PETSC_FALSE;
+  PetscBool presses = PETSC_FALSE, kept = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(PetscOptionsGetBool(t->scene->options, NULL, "-hyco_reconstruct", &reconstruct, NULL));
   for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
   HycoCheckModel(
-      !m->ops->reconstruct || !reconstruct || kept || !presses,
+      !m->ops->reconstruct || !t->prototype->reconstruct || kept || !presses,
       "the RID has no contact, and the training solutions press: the model would give no force; let the RID reach "
       "the contact (-hyco_rid_modes displacement,dual or -hyco_rid_groups GROUP), or take displacements alone by "
       "-hyco_reconstruct false");
@@ -398,7 +397,7 @@ static PetscErrorCode DrawHeld(HycoReducer t, HycoSamples *held)
   if (count < 0) count = PetscMin(MOST_HELD, PetscMax(LEAST_HELD, n));
   if (t->rank == 0) HycoSceneReaches(t->fe->scene, reaches);
   for (PetscInt p = 0; p < n_par; p++) slow[p] = t->rank == 0 && reaches[p];
-  PetscCallMPI(MPI_Bcast(slow, (PetscMPIInt)n_par, MPIU_INT, 0, HycoComm(t)));
+  HycoBcast(slow, n_par, MPIU_INT, HycoComm(t));
   for (PetscInt p = 0; p < n_par; p++) reaches[p] = (PetscBool)slow[p];
   PetscCall(HycoSamplesUnseen(t->samples, t->drawn, count, TOGETHER, reaches, held));
   t->drawn += count;

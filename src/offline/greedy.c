@@ -103,7 +103,7 @@ static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at
       (*U_at)[(size_t)i * (size_t)t->n_s + (size_t)k] = t->U_rid[(size_t)k * (size_t)n_dof + (size_t)i];
   }
   for (PetscInt i = 0; i < n_dof; i++) /* by rows: a message's length is an int */
-    PetscCallMPI(MPI_Bcast(*U_at + (size_t)i * (size_t)t->n_s, (PetscMPIInt)t->n_s, MPIU_REAL, 0, HycoComm(t)));
+    HycoBcast(*U_at + (size_t)i * (size_t)t->n_s, t->n_s, MPIU_REAL, HycoComm(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

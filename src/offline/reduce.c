@@ -6,26 +6,38 @@
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
 
+/* The rows of a matrix on each rank, as MPI counts them; this rank's. PetscFree2() frees. */
+static PetscErrorCode CountRows(Mat S, PetscMPIInt **counts, PetscMPIInt **offsets, PetscMPIInt *mine)
+{
+  PetscMPIInt size, rank;
+  const PetscInt *ranges;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)S), &size));
+  PetscCallMPI(MPI_Comm_rank(PetscObjectComm((PetscObject)S), &rank));
+  PetscCall(MatGetOwnershipRanges(S, &ranges));
+  PetscCall(PetscMalloc2(size, counts, size, offsets));
+  for (PetscMPIInt r = 0; r < size; r++) {
+    PetscCall(PetscMPIIntCast(ranges[r + 1] - ranges[r], &(*counts)[r]));
+    PetscCall(PetscMPIIntCast(ranges[r], &(*offsets)[r]));
+  }
+  *mine = (*counts)[rank];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Snapshots less their lifting r(u0): zero on the fixed unknowns. */
 static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
 {
   PetscBool *fixed;
-  PetscInt n_rows, lda, n;
-  PetscMPIInt size, *counts, *offsets;
-  const PetscInt *ranges;
+  PetscInt lda, n;
+  PetscMPIInt *counts, *offsets, n_rows;
   PetscScalar *s;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
-  PetscCall(MatGetLocalSize(S, &n_rows, NULL));
-  PetscCall(MatGetOwnershipRanges(S, &ranges));
-  PetscCall(PetscMalloc3(n_rows, &fixed, size, &counts, size, &offsets));
-  for (PetscMPIInt r = 0; r < size; r++) {
-    counts[r] = (PetscMPIInt)(ranges[r + 1] - ranges[r]);
-    offsets[r] = (PetscMPIInt)ranges[r];
-  }
-  PetscCallMPI(MPI_Scatterv(t->rank ? NULL : t->fe->fixed, counts, offsets, HYCO_MPI_BOOL, fixed, (PetscMPIInt)n_rows,
-                            HYCO_MPI_BOOL, 0, HycoComm(t)));
+  PetscCall(CountRows(S, &counts, &offsets, &n_rows));
+  PetscCall(PetscMalloc1(n_rows, &fixed));
+  PetscCallMPI(MPI_Scatterv(t->rank ? NULL : t->fe->fixed, counts, offsets, HYCO_MPI_BOOL, fixed, n_rows, HYCO_MPI_BOOL,
+                            0, HycoComm(t)));
   PetscCall(MatGetSize(S, NULL, &n));
   PetscCall(MatDenseGetLDA(S, &lda));
   PetscCall(MatDenseGetArray(S, &s));
@@ -33,7 +45,8 @@ static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
     for (PetscInt j = 0; fixed[i] && j < n; j++) s[(size_t)j * (size_t)lda + (size_t)i] = 0;
   }
   PetscCall(MatDenseRestoreArray(S, &s));
-  PetscCall(PetscFree3(fixed, counts, offsets));
+  PetscCall(PetscFree(fixed));
+  PetscCall(PetscFree2(counts, offsets));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -47,38 +60,28 @@ static PetscErrorCode AddSeeds(PetscInt n, const PetscInt add[], PetscInt divide
 
 PetscErrorCode HycoReducerToRoot(HycoReducer t, Mat S, PetscBool row_major, PetscReal **out)
 {
-  PetscInt N, n, lo, hi, lda;
-  PetscMPIInt size, *counts, *offsets;
-  const PetscInt *ranges;
+  PetscInt N, n, rows, lda;
+  PetscMPIInt cols;
   const PetscScalar *s;
-  PetscReal *mine, *all = NULL;
+  PetscReal *mine, *all;
+  MPI_Datatype row;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
-  PetscCall(MatGetSize(S, &N, &n));
-  PetscCall(MatGetOwnershipRange(S, &lo, &hi));
-  PetscCall(MatGetOwnershipRanges(S, &ranges));
+  PetscCall(MatGetSize(S, NULL, &n));
+  PetscCall(MatGetLocalSize(S, &rows, NULL));
   PetscCall(MatDenseGetLDA(S, &lda));
-  PetscCall(PetscMalloc3(size, &counts, size, &offsets, (size_t)(hi - lo) * (size_t)n, &mine));
-  if (t->rank == 0) PetscCall(PetscMalloc1((size_t)N * (size_t)n + 1, &all));
+  PetscCall(PetscMalloc1((size_t)rows * (size_t)n, &mine));
   PetscCall(MatDenseGetArrayRead(S, &s));
-  for (PetscInt i = 0; i < hi - lo; i++) {
+  for (PetscInt i = 0; i < rows; i++) {
     for (PetscInt j = 0; j < n; j++) mine[(size_t)i * (size_t)n + (size_t)j] = s[(size_t)j * (size_t)lda + (size_t)i];
   }
   PetscCall(MatDenseRestoreArrayRead(S, &s));
-  {
-    MPI_Datatype row;
-
-    PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)n, MPIU_REAL, &row));
-    PetscCallMPI(MPI_Type_commit(&row));
-    for (PetscMPIInt r = 0; r < size; r++) {
-      counts[r] = (PetscMPIInt)(ranges[r + 1] - ranges[r]);
-      offsets[r] = (PetscMPIInt)ranges[r];
-    }
-    PetscCallMPI(MPI_Gatherv(mine, (PetscMPIInt)(hi - lo), row, all, counts, offsets, row, 0, HycoComm(t)));
-    PetscCallMPI(MPI_Type_free(&row));
-  }
-  PetscCall(PetscFree3(counts, offsets, mine));
+  PetscCall(PetscMPIIntCast(n, &cols));
+  PetscCallMPI(MPI_Type_contiguous(cols, MPIU_REAL, &row));
+  PetscCallMPI(MPI_Type_commit(&row));
+  PetscCall(HycoConcatenate(HycoComm(t), rows, mine, row, (size_t)n * sizeof(PetscReal), &N, &all));
+  PetscCallMPI(MPI_Type_free(&row));
+  PetscCall(PetscFree(mine));
   if (t->rank == 0 && !row_major) {
     PetscReal *columns;
 

@@ -84,11 +84,7 @@ PetscErrorCode HycoReducerReset(HycoReducer t)
 PetscErrorCode HycoReducerDropBases(HycoReducer t)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(t->seeds_node));
-  PetscCall(PetscFree(t->seeds_cell));
-  PetscCall(PetscFree(t->sigma));
-  PetscCall(PetscFree(t->V_whole));
-  PetscCall(PetscFree(t->VtU));
+  HycoFreeAll(&t->seeds_node, &t->seeds_cell, &t->sigma, &t->V_whole, &t->VtU);
   t->n_seeds_node = t->n_seeds_cell = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -104,12 +100,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
   PetscCall(MatDestroy(&t->S));
-  PetscCall(PetscFree(t->U_rid));
-  PetscCall(PetscFree(t->U_contact));
-  PetscCall(PetscFree(t->contact_row));
-  PetscCall(PetscFree(t->Lambda));
-  PetscCall(PetscFree(t->U_norm));
-  PetscCall(PetscFree(t->dual_seeds));
+  HycoFreeAll(&t->U_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -125,72 +116,29 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   t = *reducer;
   PetscCall(HycoReducerReset(t));
   PetscCall(EndTraining(t));
-  for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
+  PetscCall(PetscStrArrayDestroy(&t->groups));
   PetscCall(PetscFree(t->region));
   PetscCall(HycoSceneDestroy(&t->scene));
   PetscCall(PetscHeaderDestroy(reducer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerSetSnapshotFolder(HycoReducer t, const char folder[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoReducerChooses(HycoReducer t, PetscBool *chooses)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  *chooses = (PetscBool)(t->prototype->ops->choosepoints != NULL);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoReducerSetProgress(HycoReducer t, HycoProgress progress, void *ctx)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  t->progress = progress;
-  t->progress_ctx = ctx;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoReducerSetValidation(HycoReducer t, HycoSamples validation)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  t->validation = validation;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoReducerSetValidationCount(HycoReducer t, PetscInt n)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  t->n_validation = n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoReducerSetSearch(HycoReducer t, PetscBool search)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  t->search = search;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoReducerSetAttemptMonitor(HycoReducer t, HycoAttemptMonitor attempt, HycoAddedMonitor added,
-                                            void *ctx)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  t->attempt = attempt;
-  t->added = added;
-  t->attempt_ctx = ctx;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoReducerSetSnapshotFolder, (HycoReducer t, const char folder[]), t, HYCO_REDUCER_CLASSID,
+                 PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder))))
+HycoDefineMethod(HycoReducerChooses, (HycoReducer t, PetscBool *chooses), t, HYCO_REDUCER_CLASSID,
+                 *chooses = (PetscBool)(t->prototype->ops->choosepoints != NULL))
+HycoDefineMethod(HycoReducerSetProgress, (HycoReducer t, HycoProgress progress, void *ctx), t, HYCO_REDUCER_CLASSID,
+                 t->progress = progress;
+                 t->progress_ctx = ctx)
+HycoDefineMethod(HycoReducerSetValidation, (HycoReducer t, HycoSamples validation), t, HYCO_REDUCER_CLASSID,
+                 t->validation = validation)
+HycoDefineMethod(HycoReducerSetValidationCount, (HycoReducer t, PetscInt n), t, HYCO_REDUCER_CLASSID,
+                 t->n_validation = n)
+HycoDefineMethod(HycoReducerSetSearch, (HycoReducer t, PetscBool search), t, HYCO_REDUCER_CLASSID, t->search = search)
+HycoDefineMethod(HycoReducerSetAttemptMonitor,
+                 (HycoReducer t, HycoAttemptMonitor attempt, HycoAddedMonitor added, void *ctx), t,
+                 HYCO_REDUCER_CLASSID, t->attempt = attempt;
+                 t->added = added; t->attempt_ctx = ctx)
 
 PetscErrorCode HycoReducerSetTargets(HycoReducer t, const PetscReal target[], PetscInt budget)
 {
@@ -205,22 +153,11 @@ PetscErrorCode HycoReducerSetTargets(HycoReducer t, const PetscReal target[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerSetGreedyMonitor(HycoReducer t, HycoGreedyMonitor monitor, void *ctx)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  t->greedy.monitor = monitor;
-  t->greedy.ctx = ctx;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoReducerSetGreedyIndicator(HycoReducer t, HycoIndicatorKind kind)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  t->greedy.indicator = kind;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoReducerSetGreedyMonitor, (HycoReducer t, HycoGreedyMonitor monitor, void *ctx), t,
+                 HYCO_REDUCER_CLASSID, t->greedy.monitor = monitor;
+                 t->greedy.ctx = ctx)
+HycoDefineMethod(HycoReducerSetGreedyIndicator, (HycoReducer t, HycoIndicatorKind kind), t, HYCO_REDUCER_CLASSID,
+                 t->greedy.indicator = kind)
 
 PetscErrorCode HycoReducerSetGreedyStop(HycoReducer t, PetscReal target, PetscInt max_snapshots, PetscReal max_seconds)
 {
@@ -332,7 +269,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
 }
 
 /* -hyco_rid_modes */
-static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char *list[])
+static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char ***list)
 {
   static const char *const words[HYCO_N_SEEDS] = {"displacement", "stress", "force", "dual"};
   char wrong[HYCO_LINE] = "";
@@ -342,13 +279,13 @@ static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char *list[])
   for (PetscInt i = 0; i < n; i++) {
     PetscInt k = 0;
 
-    while (k < HYCO_N_SEEDS && strcmp(list[i], words[k])) k++;
+    while (k < HYCO_N_SEEDS && strcmp((*list)[i], words[k])) k++;
     if (k < HYCO_N_SEEDS)
       t->seed[k] = PETSC_TRUE;
     else
-      PetscCall(PetscStrncpy(wrong, list[i], sizeof(wrong)));
-    PetscCall(PetscFree(list[i]));
+      PetscCall(PetscStrncpy(wrong, (*list)[i], sizeof(wrong)));
   }
+  PetscCall(PetscStrArrayDestroy(list));
   HycoCheck(!wrong[0], "-hyco_rid_modes has \"%s\"; its words are displacement, stress, force and dual", wrong);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -371,21 +308,20 @@ static PetscErrorCode TakeRegion(HycoReducer t, const char text[])
 static PetscErrorCode ReadRID(HycoReducer t)
 {
   static const char *const deims[] = {"deim", "qdeim", NULL};
-  char region[4 * HYCO_LINE] = "", *kinds[16];
-  PetscInt hybrid = (PetscInt)t->hybrid, n_kinds = 16;
+  char region[4 * HYCO_LINE] = "", **kinds;
+  PetscInt hybrid = (PetscInt)t->hybrid, n_kinds;
   PetscBool set;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < t->n_groups; k++) PetscCall(PetscFree(t->groups[k]));
-  t->n_groups = (PetscInt)(sizeof(t->groups) / sizeof(t->groups[0]));
+  PetscCall(PetscStrArrayDestroy(&t->groups));
   t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_DISPLACEMENT];
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("hybrid or condensed"));
   PetscCall(HycoOptionsList("-hyco_rid_modes",
                             "bases whose DEIM points seed the RID: displacement, stress, force, dual "
                             "[displacement,stress,force]",
-                            &n_kinds, kinds, &set));
-  if (set) PetscCall(TakeSeedKinds(t, n_kinds, kinds));
+                            &n_kinds, &kinds, &set));
+  if (set) PetscCall(TakeSeedKinds(t, n_kinds, &kinds));
   PetscCall(
       HycoOptionsReal("-hyco_rid_dual_tol", "epsilon of (18) for the dual basis", 0, 1, &t->tol[HYCO_SEED_DUAL], NULL));
   PetscCall(HycoOptionsReal("-hyco_rid_stress_tol", "epsilon of (18) for the stress basis [hyco_pod_tol]", 0, 1,
@@ -401,7 +337,7 @@ static PetscErrorCode ReadRID(HycoReducer t)
                             "<length> contact nodes this close to the RID's join it with their elements", 0,
                             PETSC_MAX_REAL, &t->extension, &t->pinned[HYCO_CHOICE_EXTENSION]));
   PetscCall(HycoOptionsList("-hyco_rid_groups", "mesh groups whose elements join the RID (region of interest)",
-                            &t->n_groups, t->groups, NULL));
+                            &t->n_groups, &t->groups, NULL));
   PetscCall(HycoOptionsString("-hyco_rid_region",
                               "<expression> elements with a node where this is positive join the RID [none]", region,
                               sizeof(region), NULL));
@@ -448,6 +384,8 @@ PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(ReadAll(t));
+  PetscCall(PetscObjectSetOptions((PetscObject)t->prototype, ((PetscObject)t)->options));
+  PetscCall(HycoROMSetFromOptions(t->prototype)); /* what its models will be set to when they predict */
   PetscCall(CheckSVDOptions(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -474,13 +412,8 @@ PetscErrorCode HycoReducerDeclare(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerGetType(HycoReducer t, HycoROMType *type)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  *type = t->prototype->type;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoReducerGetType, (HycoReducer t, HycoROMType *type), t, HYCO_REDUCER_CLASSID,
+                 *type = t->prototype->type)
 
 PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 {

@@ -41,8 +41,7 @@ PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells with their nodes' places in the whole mesh. */
-static PetscErrorCode WriteMesh(HycoH5 h, const HycoFileOrder *order, HycoMesh m, const PetscReal X[])
+PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const HycoFileOrder *order, HycoMesh m, const PetscReal X[])
 {
   PetscInt *cells = m->cells;
 
@@ -59,9 +58,8 @@ static PetscErrorCode WriteMesh(HycoH5 h, const HycoFileOrder *order, HycoMesh m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What rank 0 has. */
-static PetscErrorCode WriteHead(HycoH5 h, HycoMesh m, HycoScene scene, const PetscReal mu[],
-                                const HycoContactTable *contact)
+PetscErrorCode HycoFieldsWriteHead(HycoH5 h, HycoMesh m, HycoScene scene, const PetscReal mu[],
+                                   const HycoContactTable *contact)
 {
   const PetscInt head[2] = {(PetscInt)m->type, m->dim};
 
@@ -92,8 +90,8 @@ static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder 
                                    const HycoContactTable *contact)
 {
   PetscFunctionBegin;
-  HycoOnRoot(comm, WriteHead(h, m, scene, mu, contact));
-  PetscCall(WriteMesh(h, order, m, X));
+  HycoOnRoot(comm, HycoFieldsWriteHead(h, m, scene, mu, contact));
+  PetscCall(HycoFieldsWriteMesh(h, order, m, X));
   for (PetscInt k = 0; k < n; k++) {
     char name[HYCO_LINE];
 
@@ -261,15 +259,9 @@ void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscRe
   }
 }
 
-/* The fields of the contacts, by node of their mesh, and their table. */
-typedef struct {
-  PetscReal *force, *pressure, *gap_node, *gap, *normal, *area;
-  PetscInt *slave_id;
-} ContactFields;
-
 /* On the process of the contacts. */
 static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal lambda[],
-                                   ContactFields *f)
+                                   HycoContactFields *f)
 {
   PetscFunctionBegin;
   PetscCall(HycoContactGeometry(fe, pairs, f->normal, f->gap));
@@ -297,8 +289,8 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode FillContactsOnRoot(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
-                                         const PetscReal lambda[], ContactFields *f)
+PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
+                                       const PetscReal lambda[], HycoContactFields *f)
 {
   const PetscInt n = surface ? surface->mesh->n_nodes : 0;
 
@@ -309,13 +301,21 @@ static PetscErrorCode FillContactsOnRoot(MPI_Comm comm, HycoFE surface, HycoPair
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *f)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree3(f->force, f->pressure, f->gap_node));
+  PetscCall(PetscFree4(f->gap, f->normal, f->area, f->slave_id));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
                                  HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],
                                  const PetscReal lambda[], const PetscReal *rid)
 {
   HycoMesh m = fe->mesh;
   PetscReal *u3, *sigma, *tensor;
-  ContactFields f;
+  HycoContactFields f;
   PetscErrorCode ierr; /* a place where nothing can be written is the caller's to mend: nothing is kept for it */
 
   PetscFunctionBegin;
@@ -323,7 +323,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
   for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
   PetscCall(HycoFEStress(fe, u, sigma));
   HycoTensor6(m->n_cells, fe->n_sigma, sigma, tensor);
-  ierr = FillContactsOnRoot(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
+  ierr = HycoContactFieldsCreate(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
   if (!ierr) {
     const HycoContactTable table = {pairs->n, f.slave_id, lambda, f.gap};
     const HycoField field[6] = {
@@ -334,8 +334,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
     ierr = HycoFieldsWrite(path, order, m, fe->X, fe->scene, fe->mu, rid ? 6 : 5, field, &table);
   }
   PetscCall(PetscFree3(u3, sigma, tensor));
-  PetscCall(PetscFree3(f.force, f.pressure, f.gap_node));
-  PetscCall(PetscFree4(f.gap, f.normal, f.area, f.slave_id));
+  PetscCall(HycoContactFieldsDestroy(&f));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -16,37 +16,14 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  *title = scene->title;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSceneGetMesh(HycoScene scene, const char *path[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  *path = scene->mesh_path;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  *contact = (PetscBool)(scene->n_contacts > 0);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSceneGetOptions(HycoScene scene, PetscOptions *options)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  *options = scene->options;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoSceneGetTitle, (HycoScene scene, const char *title[]), scene, HYCO_SCENE_CLASSID,
+                 *title = scene->title)
+HycoDefineMethod(HycoSceneGetMesh, (HycoScene scene, const char *path[]), scene, HYCO_SCENE_CLASSID,
+                 *path = scene->mesh_path)
+HycoDefineMethod(HycoSceneHasContact, (HycoScene scene, PetscBool *contact), scene, HYCO_SCENE_CLASSID,
+                 *contact = (PetscBool)(scene->n_contacts > 0))
+HycoDefineMethod(HycoSceneGetOptions, (HycoScene scene, PetscOptions *options), scene, HYCO_SCENE_CLASSID,
+                 *options = scene->options)
 
 PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const PetscReal mu[])
 {
@@ -72,13 +49,8 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSceneSetExtrapolate(HycoScene scene, PetscBool extrapolate)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  scene->extrapolate = extrapolate;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoSceneSetExtrapolate, (HycoScene scene, PetscBool extrapolate), scene, HYCO_SCENE_CLASSID,
+                 scene->extrapolate = extrapolate)
 
 PetscErrorCode HycoSceneSetDM(HycoScene scene, DM dm)
 {

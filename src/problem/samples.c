@@ -36,13 +36,7 @@ PetscErrorCode HycoSamplesDestroy(HycoSamples *samples)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSamplesGetScene(HycoSamples s, HycoScene *scene)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
-  *scene = s->scene;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoSamplesGetScene, (HycoSamples s, HycoScene *scene), s, HYCO_SAMPLES_CLASSID, *scene = s->scene)
 
 PetscErrorCode HycoSamplesAddPoint(HycoSamples s, const PetscReal mu[])
 {
@@ -212,14 +206,9 @@ static PetscErrorCode ReadFile(HycoSamples s, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSamplesAddFile(HycoSamples s, const char path[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
-  HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
-  HycoOnEach(HycoComm(s->scene), ReadFile(s, path));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoSamplesAddFile, (HycoSamples s, const char path[]), s, HYCO_SAMPLES_CLASSID,
+                 HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
+                 HycoOnEach(HycoComm(s->scene), ReadFile(s, path)))
 
 typedef struct {
   unsigned long long hash;

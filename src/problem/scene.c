@@ -722,15 +722,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   }
   for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PetscFree(s->parameter[p]));
   PetscCall(HycoSceneDestroyHistory(s));
-  PetscCall(PetscFree(s->key));
-  PetscCall(PetscFree(s->value));
-  PetscCall(PetscFree(s->body));
-  PetscCall(PetscFree(s->fixed));
-  PetscCall(PetscFree(s->load));
-  PetscCall(PetscFree(s->contact));
-  PetscCall(PetscFree(s->title));
-  PetscCall(PetscFree(s->mesh_path));
-  PetscCall(PetscFree(s->folder));
+  HycoFreeAll(&s->key, &s->value, &s->body, &s->fixed, &s->load, &s->contact, &s->title, &s->mesh_path, &s->folder);
   PetscCall(DMDestroy(&s->dm));
   PetscCall(PetscOptionsDestroy(&s->options));
   PetscCall(PetscHeaderDestroy(&s));

@@ -17,10 +17,7 @@ PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *ro
 PetscErrorCode HycoRowsDestroy(HycoRows *rows)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(rows->start));
-  PetscCall(PetscFree(rows->dof));
-  PetscCall(PetscFree(rows->value));
-  PetscCall(PetscFree(rows->gap));
+  HycoFreeAll(&rows->start, &rows->dof, &rows->value, &rows->gap);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -72,14 +72,9 @@ PetscErrorCode HycoROMDeclare(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMGetFallback(HycoROM m, PetscBool *full_order, PetscBool *displacement)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  *full_order = m->full_order;
-  *displacement = m->full_displacement;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoROMGetFallback, (HycoROM m, PetscBool *full_order, PetscBool *displacement), m, HYCO_ROM_CLASSID,
+                 *full_order = m->full_order;
+                 *displacement = m->full_displacement)
 
 PetscErrorCode HycoROMReset(HycoROM m)
 {
@@ -92,12 +87,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscCall(HycoRowsDestroy(&m->rows));
   PetscCall(HycoFEDestroy(&m->fe));
   m->of_fe = NULL;
-  PetscCall(PetscFree(m->contact));
-  PetscCall(PetscFree(m->gamma));
-  PetscCall(PetscFree(m->U));
-  PetscCall(PetscFree(m->Lambda));
-  PetscCall(PetscFree(m->stress));
-  PetscCall(PetscFree(m->slave_id));
+  HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -118,35 +108,14 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
   PetscCall(HycoPairsDestroy(&m->pairs));
   PetscCall(HycoMeshDestroy(&m->mesh));
   PetscCall(HycoSceneDestroy(&m->scene));
-  PetscCall(PetscFree(m->role));
-  PetscCall(PetscFree(m->master_reach));
-  PetscCall(PetscFree(m->in_rid));
-  PetscCall(PetscFree(m->V));
-  PetscCall(PetscFree(m->sigma));
-  PetscCall(PetscFree(m->fe_dof));
-  PetscCall(PetscFree(m->points));
-  PetscCall(PetscFree(m->reach));
-  PetscCall(PetscFree(m->provenance));
-  PetscCall(PetscFree(m->search));
+  HycoFreeAll(&m->role, &m->master_reach, &m->in_rid, &m->V, &m->sigma, &m->fe_dof, &m->points, &m->reach,
+              &m->provenance, &m->search);
   PetscCall(PetscHeaderDestroy(model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMGetType(HycoROM m, HycoROMType *type)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  *type = m->type;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMGivesForces(HycoROM m, PetscBool *gives)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  *gives = m->traits.forces;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoROMGetType, (HycoROM m, HycoROMType *type), m, HYCO_ROM_CLASSID, *type = m->type)
+HycoDefineMethod(HycoROMGivesForces, (HycoROM m, PetscBool *gives), m, HYCO_ROM_CLASSID, *gives = m->traits.forces)
 
 PetscErrorCode HycoROMGetDimensions(HycoROM m, PetscInt *n_modes, PetscInt *n_contacts)
 {
@@ -169,13 +138,7 @@ PetscErrorCode HycoROMSetFE(HycoROM m, HycoHybrid hybrid, PetscInt n, const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMGetScene(HycoROM m, HycoScene *scene)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  *scene = m->scene;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoROMGetScene, (HycoROM m, HycoScene *scene), m, HYCO_ROM_CLASSID, *scene = m->scene)
 
 PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
 {
@@ -195,21 +158,10 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMSetReconstruct(HycoROM m, PetscBool reconstruct)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  m->reconstruct = reconstruct;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMSetExtrapolate(HycoROM m, PetscBool extrapolate)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  PetscCall(HycoSceneSetExtrapolate(m->scene, extrapolate));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoROMSetReconstruct, (HycoROM m, PetscBool reconstruct), m, HYCO_ROM_CLASSID,
+                 m->reconstruct = reconstruct)
+HycoDefineMethod(HycoROMSetExtrapolate, (HycoROM m, PetscBool extrapolate), m, HYCO_ROM_CLASSID,
+                 PetscCall(HycoSceneSetExtrapolate(m->scene, extrapolate)))
 
 PetscErrorCode HycoROMSetMonitor(HycoROM m, HycoMonitor monitor, void *ctx)
 {

@@ -15,171 +15,91 @@
 #define HYCO_ROM_OLDEST 2
 #define HYCO_ROM_KIND   "hyco hybrid model"
 
-static PetscErrorCode Name(const char prefix[], const char name[], char out[128])
+/* The groups' names, a line each. */
+static PetscErrorCode MoveGroupNames(HycoH5 h, const char name[], HycoMesh m)
 {
-  PetscFunctionBegin;
-  PetscCall(PetscSNPrintf(out, 128, "%s/%s", prefix, name));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode PutInt(HycoH5 h, const char prefix[], const char name[], PetscInt rows, PetscInt cols,
-                             const PetscInt *data)
-{
-  char at[128];
-
-  PetscFunctionBegin;
-  PetscCall(Name(prefix, name, at));
-  PetscCall(HycoH5WriteInt(h, at, rows, cols, data));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode SaveGroups(HycoH5 h, const char prefix[], HycoMesh m)
-{
-  char *names, at[128];
+  char *names, *word, *rest;
   size_t length = 1;
+  PetscInt g = 0;
 
   PetscFunctionBegin;
-  for (PetscInt g = 0; g < m->n_groups; g++) length += strlen(m->group_name[g]) + 1;
-  PetscCall(PetscCalloc1(length, &names));
-  for (PetscInt g = 0; g < m->n_groups; g++) {
-    PetscCall(PetscStrlcat(names, m->group_name[g], length));
-    PetscCall(PetscStrlcat(names, "\n", length));
+  if (!HycoH5Reads(h)) {
+    for (g = 0; g < m->n_groups; g++) length += strlen(m->group_name[g]) + 1;
+    PetscCall(PetscCalloc1(length, &names));
+    for (g = 0; g < m->n_groups; g++) {
+      PetscCall(PetscStrlcat(names, m->group_name[g], length));
+      PetscCall(PetscStrlcat(names, "\n", length));
+    }
+    PetscCall(HycoH5WriteText(h, name, names));
+  } else {
+    PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_name));
+    PetscCall(HycoH5LoadText(h, name, &names));
+    for (word = strtok_r(names, "\n", &rest); word && g < m->n_groups; word = strtok_r(NULL, "\n", &rest))
+      PetscCall(PetscStrallocpy(word, &m->group_name[g++]));
   }
-  PetscCall(Name(prefix, "group_name", at));
-  PetscCall(HycoH5WriteText(h, at, names));
   PetscCall(PetscFree(names));
-  PetscCall(PutInt(h, prefix, "group_dim", m->n_groups, 1, m->group_dim));
-  PetscCall(PutInt(h, prefix, "group_start", m->n_groups + 1, 1, m->group_start));
-  PetscCall(PutInt(h, prefix, "group_node", m->group_start[m->n_groups], 1, m->group_node));
+  HycoCheck(g == m->n_groups, "the model's group names are damaged");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SaveMesh(HycoH5 h, const char prefix[], HycoMesh m)
+static const char *At(const char prefix[], const char name[], char path[128])
 {
-  const PetscInt head[2] = {(PetscInt)m->type, m->dim};
-  char at[128];
-
-  PetscFunctionBegin;
-  PetscCall(PutInt(h, prefix, "head", 2, 1, head));
-  PetscCall(Name(prefix, "xyz", at));
-  PetscCall(HycoH5WriteReal(h, at, m->n_nodes, 3, m->xyz));
-  PetscCall(PutInt(h, prefix, "node_id", m->n_nodes, 1, m->node_id));
-  PetscCall(PutInt(h, prefix, "node_body", m->n_nodes, 1, m->node_body));
-  PetscCall(PutInt(h, prefix, "cells", m->n_cells, m->nv, m->cells));
-  PetscCall(PutInt(h, prefix, "cell_id", m->n_cells, 1, m->cell_id));
-  PetscCall(PutInt(h, prefix, "cell_body", m->n_cells, 1, m->cell_body));
-  PetscCall(PutInt(h, prefix, "facets", m->n_facets, m->nf, m->facets));
-  PetscCall(PutInt(h, prefix, "facet_group", m->n_facets, 1, m->facet_group));
-  PetscCall(PutInt(h, prefix, "facet_cell", m->n_facets, 1, m->facet_cell));
-  PetscCall(SaveGroups(h, prefix, m));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  (void)snprintf(path, 128, "%s/%s", prefix, name);
+  return path;
 }
 
-static PetscErrorCode LoadGroups(HycoH5 h, const char prefix[], HycoMesh m)
+/* To the file, or from it: then *mesh is made. */
+static PetscErrorCode MoveMesh(HycoH5 h, const char prefix[], PetscInt n_bodies, HycoMesh *mesh)
 {
-  char *names, *word, *rest, at[128];
-  PetscInt n = -1, one = 1, g = 0;
+  HycoMesh m;
+  PetscInt head[2], last;
+  char path[128];
 
   PetscFunctionBegin;
-  PetscCall(Name(prefix, "group_dim", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, 3, &n, &one, &m->group_dim));
-  PetscCall(PetscCalloc1(n + 1, &m->group_name));
-  m->n_groups = n;
-  PetscCall(Name(prefix, "group_name", at));
-  PetscCall(HycoH5LoadText(h, at, &names));
-  for (word = strtok_r(names, "\n", &rest); word && g < n; word = strtok_r(NULL, "\n", &rest))
-    PetscCall(PetscStrallocpy(word, &m->group_name[g++]));
-  PetscCall(PetscFree(names));
-  HycoCheck(g == n, "the model's group names are damaged");
-  n++;
-  PetscCall(Name(prefix, "group_start", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &n, &one, &m->group_start));
-  for (g = 0; g < m->n_groups; g++)
-    HycoCheck(m->group_start[0] == 0 && m->group_start[g] <= m->group_start[g + 1], "the model's groups are damaged");
-  n = m->group_start[m->n_groups];
-  PetscCall(Name(prefix, "group_node", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, m->n_nodes - 1, &n, &one, &m->group_node));
+  if (HycoH5Reads(h)) {
+    PetscCall(PetscNew(mesh));
+    (*mesh)->n_nodes = (*mesh)->n_cells = (*mesh)->n_facets = (*mesh)->n_groups = -1;
+  }
+  m = *mesh;
+  head[0] = (PetscInt)m->type;
+  head[1] = m->dim;
+  PetscCall(HycoH5Ints(h, At(prefix, "head", path), 0, HYCO_N_CELL_TYPES - 1, 2, head));
+  m->type = (HycoCellType)head[0];
+  m->dim = HycoElementGet(m->type)->dim;
+  m->nv = HycoElementGet(m->type)->nv;
+  m->nf = HycoElementGetFacet(m->type)->nv;
+  PetscCall(HycoH5Real(h, At(prefix, "xyz", path), &m->n_nodes, 3, &m->xyz));
+  last = m->n_nodes - 1;
+  PetscCall(HycoH5Int(h, At(prefix, "node_id", path), 0, PETSC_MAX_INT, &m->n_nodes, 1, &m->node_id));
+  PetscCall(HycoH5Int(h, At(prefix, "node_body", path), 0, n_bodies - 1, &m->n_nodes, 1, &m->node_body));
+  PetscCall(HycoH5Int(h, At(prefix, "cells", path), 0, last, &m->n_cells, m->nv, &m->cells));
+  PetscCall(HycoH5Int(h, At(prefix, "cell_id", path), 0, PETSC_MAX_INT, &m->n_cells, 1, &m->cell_id));
+  PetscCall(HycoH5Int(h, At(prefix, "cell_body", path), 0, n_bodies - 1, &m->n_cells, 1, &m->cell_body));
+  PetscCall(HycoH5Int(h, At(prefix, "facets", path), 0, last, &m->n_facets, m->nf, &m->facets));
+  PetscCall(HycoH5Int(h, At(prefix, "group_dim", path), 0, 3, &m->n_groups, 1, &m->group_dim));
+  PetscCall(MoveGroupNames(h, At(prefix, "group_name", path), m));
+  PetscCall(HycoH5Starts(h, At(prefix, "group_start", path), m->n_groups, &m->group_start));
+  PetscCall(HycoH5Int(h, At(prefix, "group_node", path), 0, last, &m->group_start[m->n_groups], 1, &m->group_node));
+  PetscCall(HycoH5Int(h, At(prefix, "facet_group", path), 0, m->n_groups - 1, &m->n_facets, 1, &m->facet_group));
+  PetscCall(HycoH5Int(h, At(prefix, "facet_cell", path), -1, m->n_cells - 1, &m->n_facets, 1, &m->facet_cell));
+  if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_cell_start));
   PetscCall(PetscMalloc1(1, &m->group_cell));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode LoadMesh(HycoH5 h, const char prefix[], PetscInt n_bodies, HycoMesh *mesh)
+static PetscErrorCode MovePairs(HycoH5 h, PetscInt n_nodes, PetscInt n_contacts, HycoPairs *p)
 {
-  HycoMesh m;
-  PetscInt *head, two = 2, one = 1, three = 3;
-  char at[128];
+  PetscInt *entries;
 
   PetscFunctionBegin;
-  PetscCall(PetscNew(&m));
-  *mesh = m;
-  PetscCall(Name(prefix, "head", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, HYCO_N_CELL_TYPES - 1, &two, &one, &head));
-  m->type = (HycoCellType)head[0];
-  m->dim = HycoElementGet(m->type)->dim;
-  m->nv = HycoElementGet(m->type)->nv;
-  m->nf = HycoElementGetFacet(m->type)->nv;
-  PetscCall(PetscFree(head));
-  m->n_nodes = m->n_cells = m->n_facets = -1;
-  PetscCall(Name(prefix, "xyz", at));
-  PetscCall(HycoH5LoadReal(h, at, &m->n_nodes, &three, &m->xyz));
-  PetscCall(Name(prefix, "node_id", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &m->n_nodes, &one, &m->node_id));
-  PetscCall(Name(prefix, "node_body", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, n_bodies - 1, &m->n_nodes, &one, &m->node_body));
-  PetscCall(Name(prefix, "cells", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, m->n_nodes - 1, &m->n_cells, &m->nv, &m->cells));
-  PetscCall(Name(prefix, "cell_id", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &m->n_cells, &one, &m->cell_id));
-  PetscCall(Name(prefix, "cell_body", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, n_bodies - 1, &m->n_cells, &one, &m->cell_body));
-  PetscCall(Name(prefix, "facets", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, m->n_nodes - 1, &m->n_facets, &m->nf, &m->facets));
-  PetscCall(LoadGroups(h, prefix, m));
-  PetscCall(Name(prefix, "facet_group", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, m->n_groups - 1, &m->n_facets, &one, &m->facet_group));
-  PetscCall(Name(prefix, "facet_cell", at));
-  PetscCall(HycoH5LoadInt(h, at, -1, m->n_cells - 1, &m->n_facets, &one, &m->facet_cell));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode SavePairs(HycoH5 h, const char prefix[], const HycoPairs *p)
-{
-  const PetscInt entries = p->master_start[p->n];
-  char at[128];
-
-  PetscFunctionBegin;
-  PetscCall(PutInt(h, prefix, "slave", p->n, 1, p->slave));
-  PetscCall(PutInt(h, prefix, "contact", p->n, 1, p->contact));
-  PetscCall(PutInt(h, prefix, "master_start", p->n + 1, 1, p->master_start));
-  PetscCall(PutInt(h, prefix, "master", entries, 1, p->master));
-  PetscCall(Name(prefix, "weight", at));
-  PetscCall(HycoH5WriteReal(h, at, entries, 1, p->weight));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode LoadPairs(HycoH5 h, const char prefix[], PetscInt n_nodes, PetscInt n_contacts, HycoPairs *p)
-{
-  PetscInt one = 1, starts, entries;
-  char at[128];
-
-  PetscFunctionBegin;
-  p->n = -1;
-  PetscCall(Name(prefix, "slave", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, n_nodes - 1, &p->n, &one, &p->slave));
-  PetscCall(Name(prefix, "contact", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, n_contacts - 1, &p->n, &one, &p->contact));
-  starts = p->n + 1;
-  PetscCall(Name(prefix, "master_start", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, PETSC_MAX_INT, &starts, &one, &p->master_start));
-  for (PetscInt k = 0; k < p->n; k++)
-    HycoCheck(p->master_start[0] == 0 && p->master_start[k] <= p->master_start[k + 1],
-              "the model's contacts are damaged");
-  entries = p->master_start[p->n];
-  PetscCall(Name(prefix, "master", at));
-  PetscCall(HycoH5LoadInt(h, at, 0, n_nodes - 1, &entries, &one, &p->master));
-  PetscCall(Name(prefix, "weight", at));
-  PetscCall(HycoH5LoadReal(h, at, &entries, &one, &p->weight));
+  if (HycoH5Reads(h)) p->n = -1;
+  PetscCall(HycoH5Int(h, "problem/pairs/slave", 0, n_nodes - 1, &p->n, 1, &p->slave));
+  PetscCall(HycoH5Int(h, "problem/pairs/contact", 0, n_contacts - 1, &p->n, 1, &p->contact));
+  PetscCall(HycoH5Starts(h, "problem/pairs/master_start", p->n, &p->master_start));
+  entries = &p->master_start[p->n];
+  PetscCall(HycoH5Int(h, "problem/pairs/master", 0, n_nodes - 1, entries, 1, &p->master));
+  PetscCall(HycoH5Real(h, "problem/pairs/weight", entries, 1, &p->weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -340,48 +260,120 @@ static PetscErrorCode LoadTrust(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
+static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m)
 {
-  const PetscInt n_dof = m->mesh->n_nodes * m->mesh->dim,
-                 sizes[6] = {m->whole_nodes, m->whole_cells, (PetscInt)m->hybrid,
-                             m->counts[0],   m->counts[1],   m->counts[2]};
-  char *text;
+  PetscInt sizes[6] = {m->whole_nodes, m->whole_cells, (PetscInt)m->hybrid, m->counts[0], m->counts[1], m->counts[2]};
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneToText(m->scene, &text));
-  PetscCall(HycoH5WriteText(h, "problem/scene", text));
+  PetscCall(HycoH5Ints(h, "problem/sizes", 0, PETSC_MAX_INT, 6, sizes));
+  m->whole_nodes = sizes[0];
+  m->whole_cells = sizes[1];
+  m->hybrid = (HycoHybrid)sizes[2];
+  for (PetscInt k = 0; k < 3; k++) m->counts[k] = sizes[3 + k];
+  HycoCheck(sizes[2] <= HYCO_HYBRID_ALL && m->whole_nodes > 0 && m->whole_cells > 0, "%s: problem/sizes is damaged",
+            m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The search of moved surfaces; files before format 5 have none, and keep the masters as drawn. */
+static PetscErrorCode MoveReach(HycoH5 h, HycoROM m)
+{
+  PetscFunctionBegin;
+  if (HycoH5Reads(h) ? !HycoH5Has(h, "problem/reach") : !m->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5Real(h, "problem/reach", &m->scene->n_contacts, 1, &m->master_reach));
+  if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoPairsSetSearch(m->scene, m->mesh, &m->pairs));
+  for (PetscInt c = 0; c < m->scene->n_contacts; c++)
+    HycoCheck(m->pairs.room && m->master_reach[c] >= 0, "%s: problem/reach is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MoveScene(HycoH5 h, HycoROM m)
+{
+  char *text;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Reads(h) ? HycoH5LoadText(h, "problem/scene", &text) : HycoSceneToText(m->scene, &text));
+  ierr =
+      HycoH5Reads(h) ? HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene) : HycoH5WriteText(h, "problem/scene", text);
   PetscCall(PetscFree(text));
-  PetscCall(SaveMesh(h, "mesh", m->mesh));
-  PetscCall(HycoH5WriteInt(h, "mesh/node_whole", m->mesh->n_nodes, 1, m->mesh->node_whole));
-  PetscCall(HycoH5WriteInt(h, "mesh/cell_whole", m->mesh->n_cells, 1, m->mesh->cell_whole));
-  PetscCall(HycoH5WriteInt(h, "problem/sizes", 6, 1, sizes));
-  PetscCall(HycoH5WriteInt(h, "problem/role", m->mesh->n_nodes, 1, m->role));
-  PetscCall(SavePairs(h, "problem/pairs", &m->pairs));
-  PetscCall(HycoH5WriteInt(h, "problem/in_rid", m->pairs.n, 1, m->in_rid));
-  if (m->pairs.room) PetscCall(HycoH5WriteReal(h, "problem/reach", m->scene->n_contacts, 1, m->master_reach));
-  PetscCall(HycoH5WriteReal(h, "problem/V", n_dof, m->l, m->V));
-  PetscCall(HycoH5WriteReal(h, "problem/singular_values", m->l, 1, m->sigma));
-  PetscCall(HycoH5WriteInt(h, "problem/fe_dof", m->n_fe, 1, m->fe_dof));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The type with what it has of its own. */
+static PetscErrorCode MoveType(HycoH5 h, HycoROM m)
+{
+  PetscFunctionBegin;
+  if (HycoH5Reads(h)) {
+    PetscCall(LoadType(h, m));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoH5WriteText(h, "problem/type", m->type));
   PetscTryTypeMethod(m, save, h);
   if (!HycoH5Has(h, "reconstruction")) /* older readers ask every type for it */
     PetscCall(HycoH5WriteReal(h, "reconstruction/S_lambda", 0, m->pairs.n, NULL));
-  PetscCall(HycoH5WriteReal(h, "training/points", m->n_points, m->scene->n_parameters, m->points));
-  PetscCall(HycoH5WriteReal(h, "training/numbers", 3, 1, m->numbers));
-  PetscCall(SaveTrust(h, m));
-  PetscCall(HycoH5WriteText(h, "training/provenance", m->provenance));
-  PetscCall(HycoH5WriteText(h, "training/fingerprint", m->fingerprint));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReadWhole(HycoH5 h, HycoROM m)
+static PetscErrorCode MoveProvenance(HycoH5 h, HycoROM m)
+{
+  char *text;
+
+  PetscFunctionBegin;
+  if (!HycoH5Reads(h)) {
+    PetscCall(HycoH5WriteText(h, "training/provenance", m->provenance));
+    PetscCall(HycoH5WriteText(h, "training/fingerprint", m->fingerprint));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
+  PetscCall(HycoH5LoadText(h, "training/fingerprint", &text));
+  PetscCall(PetscStrncpy(m->fingerprint, text, sizeof(m->fingerprint)));
+  PetscCall(PetscFree(text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All but the whole mesh, to the file or from it. */
+static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
+{
+  PetscInt n_dof, *nodes;
+
+  PetscFunctionBegin;
+  PetscCall(MoveScene(h, m));
+  PetscCall(MoveMesh(h, "mesh", m->scene->n_bodies, &m->mesh));
+  PetscCall(MoveSizes(h, m));
+  nodes = &m->mesh->n_nodes;
+  n_dof = *nodes * m->mesh->dim;
+  PetscCall(HycoH5Int(h, "mesh/node_whole", 0, m->whole_nodes - 1, nodes, 1, &m->mesh->node_whole));
+  PetscCall(HycoH5Int(h, "mesh/cell_whole", 0, m->whole_cells - 1, &m->mesh->n_cells, 1, &m->mesh->cell_whole));
+  PetscCall(HycoH5Int(h, "problem/role", 0, HYCO_ROLE_A, nodes, 1, &m->role));
+  PetscCall(MovePairs(h, *nodes, m->scene->n_contacts, &m->pairs));
+  PetscCall(HycoH5Int(h, "problem/in_rid", 0, 1, &m->pairs.n, 1, &m->in_rid));
+  PetscCall(MoveReach(h, m));
+  if (HycoH5Reads(h)) m->l = m->n_fe = m->n_points = -1;
+  PetscCall(HycoH5Real(h, "problem/singular_values", &m->l, 1, &m->sigma));
+  PetscCall(HycoH5Real(h, "problem/V", &n_dof, m->l, &m->V));
+  PetscCall(HycoH5Int(h, "problem/fe_dof", 0, n_dof - 1, &m->n_fe, 1, &m->fe_dof));
+  for (PetscInt k = 1; k < m->n_fe; k++)
+    HycoCheck(m->fe_dof[k] > m->fe_dof[k - 1], "%s: problem/fe_dof is damaged", m->path);
+  PetscCall(MoveType(h, m));
+  PetscCall(HycoH5Real(h, "training/points", &m->n_points, m->scene->n_parameters, &m->points));
+  PetscCall(HycoH5Reals(h, "training/numbers", 3, m->numbers));
+  PetscCall(HycoH5Reads(h) ? LoadTrust(h, m) : SaveTrust(h, m));
+  PetscCall(MoveProvenance(h, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The whole mesh and the modes on it. */
+static PetscErrorCode MoveWhole(HycoH5 h, HycoROM m)
 {
   PetscInt n_dof;
 
   PetscFunctionBegin;
-  PetscCall(LoadMesh(h, "whole", m->scene->n_bodies, &m->whole));
+  PetscCall(MoveMesh(h, "whole", m->scene->n_bodies, &m->whole));
   n_dof = m->whole->n_nodes * m->whole->dim;
-  PetscCall(HycoH5LoadReal(h, "whole/V", &n_dof, &m->l, &m->V_whole));
+  PetscCall(HycoH5Real(h, "whole/V", &n_dof, m->l, &m->V_whole));
   HycoCheck(m->whole->n_nodes == m->whole_nodes && m->whole->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
             m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -399,7 +391,7 @@ static PetscErrorCode OpenWhole(HycoROM m)
     PetscCall(HycoH5OpenImage("the model", m->image, m->image_size, &h));
   else
     PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
-  ierr = ReadWhole(h, m);
+  ierr = MoveWhole(h, m);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   if (!ierr) PetscCall(PetscFree(m->image)); /* nothing is left in it to read */
   PetscCall(ierr);
@@ -417,9 +409,8 @@ static PetscErrorCode SaveAll(HycoH5 h, HycoROM m)
   PetscCall(OpenWhole(m));
   PetscCall(HycoH5WriteText(h, "kind", HYCO_ROM_KIND));
   PetscCall(HycoH5WriteInt(h, "format", 1, 1, &format));
-  PetscCall(SaveProblem(h, m));
-  PetscCall(SaveMesh(h, "whole", m->whole));
-  PetscCall(HycoH5WriteReal(h, "whole/V", m->whole->n_nodes * m->whole->dim, m->l, m->V_whole));
+  PetscCall(MoveProblem(h, m));
+  PetscCall(MoveWhole(h, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -458,83 +449,6 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode LoadSizes(HycoH5 h, HycoROM m)
-{
-  PetscInt one = 1, six = 6, *sizes, hybrid;
-
-  PetscFunctionBegin;
-  PetscCall(HycoH5LoadInt(h, "problem/sizes", 0, PETSC_MAX_INT, &six, &one, &sizes));
-  m->whole_nodes = sizes[0];
-  m->whole_cells = sizes[1];
-  hybrid = sizes[2];
-  for (PetscInt k = 0; k < 3; k++) m->counts[k] = sizes[3 + k];
-  PetscCall(PetscFree(sizes));
-  HycoCheck(hybrid <= HYCO_HYBRID_ALL && m->whole_nodes > 0 && m->whole_cells > 0, "%s: problem/sizes is damaged",
-            m->path);
-  m->hybrid = (HycoHybrid)hybrid;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The search of moved surfaces; files before format 5 have none, and keep the masters as drawn. */
-static PetscErrorCode LoadReach(HycoH5 h, HycoROM m)
-{
-  PetscInt one = 1;
-
-  PetscFunctionBegin;
-  if (!HycoH5Has(h, "problem/reach")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoH5LoadReal(h, "problem/reach", &m->scene->n_contacts, &one, &m->master_reach));
-  PetscCall(HycoPairsSetSearch(m->scene, m->mesh, &m->pairs));
-  for (PetscInt c = 0; c < m->scene->n_contacts; c++)
-    HycoCheck(m->pairs.room && m->master_reach[c] >= 0, "%s: problem/reach is damaged", m->path);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode LoadProblem(HycoH5 h, HycoROM m)
-{
-  PetscInt one = 1, n_dof, n_par;
-  char *text;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  PetscCall(HycoH5LoadText(h, "problem/scene", &text));
-  ierr = HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene);
-  PetscCall(PetscFree(text));
-  PetscCall(ierr);
-  PetscCall(LoadMesh(h, "mesh", m->scene->n_bodies, &m->mesh));
-  PetscCall(LoadSizes(h, m));
-  PetscCall(HycoH5LoadInt(h, "mesh/node_whole", 0, m->whole_nodes - 1, &m->mesh->n_nodes, &one, &m->mesh->node_whole));
-  PetscCall(HycoH5LoadInt(h, "mesh/cell_whole", 0, m->whole_cells - 1, &m->mesh->n_cells, &one, &m->mesh->cell_whole));
-  n_dof = m->mesh->n_nodes * m->mesh->dim;
-  PetscCall(HycoH5LoadInt(h, "problem/role", 0, HYCO_ROLE_A, &m->mesh->n_nodes, &one, &m->role));
-  PetscCall(LoadPairs(h, "problem/pairs", m->mesh->n_nodes, m->scene->n_contacts, &m->pairs));
-  PetscCall(HycoH5LoadInt(h, "problem/in_rid", 0, 1, &m->pairs.n, &one, &m->in_rid));
-  PetscCall(LoadReach(h, m));
-  m->l = m->n_fe = m->n_points = -1;
-  PetscCall(HycoH5LoadReal(h, "problem/V", &n_dof, &m->l, &m->V));
-  PetscCall(HycoH5LoadReal(h, "problem/singular_values", &m->l, &one, &m->sigma));
-  PetscCall(HycoH5LoadInt(h, "problem/fe_dof", 0, n_dof - 1, &m->n_fe, &one, &m->fe_dof));
-  for (PetscInt k = 1; k < m->n_fe; k++)
-    HycoCheck(m->fe_dof[k] > m->fe_dof[k - 1], "%s: problem/fe_dof is damaged", m->path);
-  PetscCall(LoadType(h, m));
-  n_par = m->scene->n_parameters;
-  PetscCall(HycoH5LoadReal(h, "training/points", &m->n_points, &n_par, &m->points));
-  PetscCall(HycoH5ReadReal(h, "training/numbers", 3, 1, m->numbers));
-  PetscCall(LoadTrust(h, m));
-  PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
-  PetscCall(HycoH5LoadText(h, "training/fingerprint", &text));
-  PetscCall(PetscStrncpy(m->fingerprint, text, sizeof(m->fingerprint)));
-  PetscCall(PetscFree(text));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode LoadAll(HycoH5 h, HycoROM m)
-{
-  PetscFunctionBegin;
-  PetscCall(CheckKind(h, m->path));
-  PetscCall(LoadProblem(h, m));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* From an open file, which is closed; no model is left of one that is refused. `path`: what messages call it. */
 static PetscErrorCode Load(HycoH5 *h, const char path[], HycoROM *model)
 {
@@ -546,7 +460,8 @@ static PetscErrorCode Load(HycoH5 *h, const char path[], HycoROM *model)
   PetscCall(HycoROMCreate(&m));
   PetscCall(PetscStrncpy(m->path, path, sizeof(m->path)));
   PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_TRUE));
-  ierr = LoadAll(*h, m);
+  ierr = CheckKind(*h, m->path);
+  if (!ierr) ierr = MoveProblem(*h, m);
   PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_FALSE));
   PetscCall(HycoH5Close(h, PETSC_FALSE));
   if (!ierr) ierr = PetscObjectSetOptions((PetscObject)m, m->scene->options);

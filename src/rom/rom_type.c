@@ -52,20 +52,7 @@ PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMSetOps(HycoROM m, const HycoROMOps *ops, const HycoROMTraits *traits, void *data)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  *m->ops = *ops;
-  m->traits = *traits;
-  m->data = data;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMGetData(HycoROM m, void *data)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  *(void **)data = m->data;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoROMSetOps, (HycoROM m, const HycoROMOps *ops, const HycoROMTraits *traits, void *data), m,
+                 HYCO_ROM_CLASSID, *m->ops = *ops;
+                 m->traits = *traits; m->data = data)
+HycoDefineMethod(HycoROMGetData, (HycoROM m, void *data), m, HYCO_ROM_CLASSID, *(void **)data = m->data)

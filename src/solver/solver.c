@@ -87,13 +87,8 @@ PetscErrorCode HycoSolverSetTaoType(HycoSolver s, const char type[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolverSetForm(HycoSolver s, HycoForm form)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  PetscCall(PetscStrncpy(s->form_name, form_names[form], sizeof(s->form_name)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoSolverSetForm, (HycoSolver s, HycoForm form), s, HYCO_SOLVER_CLASSID,
+                 PetscCall(PetscStrncpy(s->form_name, form_names[form], sizeof(s->form_name))))
 
 PetscErrorCode HycoSolverSetLinear(HycoSolver s, HycoLinear linear, PetscReal gigabytes)
 {
@@ -115,46 +110,15 @@ PetscErrorCode HycoSolverSetTolerance(HycoSolver s, PetscReal rtol)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolverSetMaxIts(HycoSolver s, PetscInt max_its)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  s->max_its = max_its;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSolverSetWarmStart(HycoSolver s, PetscBool warm)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  s->warm = warm;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSolverSetMultilevel(HycoSolver s, PetscBool multilevel)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  s->multilevel = multilevel;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSolverSetFallback(HycoSolver s, PetscBool fallback)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  s->fallback = fallback;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSolverSetMonitor(HycoSolver s, HycoMonitor monitor, void *ctx)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  s->monitor = monitor;
-  s->monitor_ctx = ctx;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoSolverSetMaxIts, (HycoSolver s, PetscInt max_its), s, HYCO_SOLVER_CLASSID, s->max_its = max_its)
+HycoDefineMethod(HycoSolverSetWarmStart, (HycoSolver s, PetscBool warm), s, HYCO_SOLVER_CLASSID, s->warm = warm)
+HycoDefineMethod(HycoSolverSetMultilevel, (HycoSolver s, PetscBool multilevel), s, HYCO_SOLVER_CLASSID,
+                 s->multilevel = multilevel)
+HycoDefineMethod(HycoSolverSetFallback, (HycoSolver s, PetscBool fallback), s, HYCO_SOLVER_CLASSID,
+                 s->fallback = fallback)
+HycoDefineMethod(HycoSolverSetMonitor, (HycoSolver s, HycoMonitor monitor, void *ctx), s, HYCO_SOLVER_CLASSID,
+                 s->monitor = monitor;
+                 s->monitor_ctx = ctx)
 
 /* -hyco_solver_form: auto, or a registered form's name. */
 static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
@@ -201,13 +165,8 @@ static PetscErrorCode ReadTaoType(HycoSolver s, HycoOptionItems PetscOptionsObje
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolverSetOptionsPrefix(HycoSolver s, const char prefix[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  PetscCall(PetscObjectSetOptionsPrefix((PetscObject)s, prefix));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoSolverSetOptionsPrefix, (HycoSolver s, const char prefix[]), s, HYCO_SOLVER_CLASSID,
+                 PetscCall(PetscObjectSetOptionsPrefix((PetscObject)s, prefix)))
 
 PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
 {
@@ -482,45 +441,12 @@ PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolverGetReason(HycoSolver s, HycoReason *reason)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  *reason = s->reason;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSolverGetIterations(HycoSolver s, PetscInt *its)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  *its = s->its;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSolverGetKKT(HycoSolver s, HycoKKT *kkt)
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  *kkt = s->kkt;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSolverGetMethod(HycoSolver s, const char *method[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  *method = s->method;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSolverGetLinear(HycoSolver s, const char *linear[])
-{
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  *linear = s->linear_method;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineMethod(HycoSolverGetReason, (HycoSolver s, HycoReason *reason), s, HYCO_SOLVER_CLASSID, *reason = s->reason)
+HycoDefineMethod(HycoSolverGetIterations, (HycoSolver s, PetscInt *its), s, HYCO_SOLVER_CLASSID, *its = s->its)
+HycoDefineMethod(HycoSolverGetKKT, (HycoSolver s, HycoKKT *kkt), s, HYCO_SOLVER_CLASSID, *kkt = s->kkt)
+HycoDefineMethod(HycoSolverGetMethod, (HycoSolver s, const char *method[]), s, HYCO_SOLVER_CLASSID, *method = s->method)
+HycoDefineMethod(HycoSolverGetLinear, (HycoSolver s, const char *linear[]), s, HYCO_SOLVER_CLASSID,
+                 *linear = s->linear_method)
 
 PetscErrorCode HycoSolverGetSeconds(HycoSolver s, PetscReal *factor, PetscReal *solve)
 {

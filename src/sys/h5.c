@@ -16,6 +16,7 @@ struct _n_HycoH5 {
   hid_t id, access; /* the file; how datasets are opened */
   HycoFile out;     /* while writing, else NULL */
   size_t size;      /* of the file that is read */
+  PetscBool reads;
   char path[PETSC_MAX_PATH_LEN];
   /* of a file that several processes write */
   PetscBool shared;
@@ -29,6 +30,7 @@ struct _n_HycoH5 {
 
 /* A dataset that says that the file ends with a seal: one that has lost it is damaged, not old. */
 #define HYCO_H5_SEALED "sealed"
+#define NATIVE_INT     (sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32)
 
 /* A file may not send its reader to another one. */
 static herr_t RefuseLink(const char *parent_file, const char *parent_group, const char *child_file,
@@ -192,6 +194,7 @@ PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, Hyco
   PetscFunctionBegin;
   PetscCall(New(name, &f));
   f->size = size;
+  f->reads = PETSC_TRUE;
   H5Pset_file_image(access, image, size);
   f->id = H5Fopen(f->path, H5F_ACC_RDONLY, access);
   H5Pclose(access);
@@ -211,6 +214,7 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
   PetscCall(HycoSealCheck(path, &size, &sealed));
   PetscCall(New(path, &f));
   f->size = size;
+  f->reads = PETSC_TRUE;
   access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_fclose_degree(access, H5F_CLOSE_STRONG); /* closing the file closes what a refusal left open in it */
   f->id = H5Fopen(path, H5F_ACC_RDONLY, access);
@@ -424,7 +428,7 @@ static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt ro
 /* The type of PetscReal (MPIU_REAL) or PetscInt (MPIU_INT) numbers. */
 static hid_t NumberType(MPI_Datatype type)
 {
-  return type == MPIU_REAL ? H5T_NATIVE_DOUBLE : sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32;
+  return type == MPIU_REAL ? H5T_NATIVE_DOUBLE : NATIVE_INT;
 }
 
 /* On rank 0. */
@@ -576,20 +580,33 @@ PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols, PetscReal **data)
+/* A dataset in new memory (*data), whose numbers take `size` bytes each, with room for one more. */
+static PetscErrorCode LoadSet(HycoH5 f, const char name[], H5T_class_t class, hid_t type, size_t size, PetscInt *rows,
+                              PetscInt *cols, void *data)
 {
   hid_t set;
   hsize_t dims[2];
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
-  PetscCall(CheckSize(file, name, dims, *rows, *cols));
+  PetscCall(OpenSet(f, name, class, &set, dims));
+  PetscCall(CheckSize(f, name, dims, *rows, *cols));
   *rows = (PetscInt)dims[0];
   *cols = (PetscInt)dims[1];
-  PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
-  ierr = ReadSet(file, name, set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, *data);
-  if (!ierr) ierr = CheckFinite(file, name, dims[0] * dims[1], *data);
+  PetscCall(PetscMalloc((dims[0] * dims[1] + 1) * size, (void **)data));
+  ierr = ReadSet(f, name, set, type, H5S_ALL, H5S_ALL, *(void **)data);
+  if (ierr) PetscCall(PetscFree(*(void **)data));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols, PetscReal **data)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(LoadSet(file, name, H5T_FLOAT, H5T_NATIVE_DOUBLE, sizeof(PetscReal), rows, cols, data));
+  ierr = CheckFinite(file, name, (size_t)*rows * (size_t)*cols, *data);
   if (ierr) PetscCall(PetscFree(*data));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -598,20 +615,9 @@ PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, Pe
 PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt *rows, PetscInt *cols,
                              PetscInt **data)
 {
-  hid_t set;
-  hsize_t dims[2];
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
-  PetscCall(OpenSet(file, name, H5T_INTEGER, &set, dims));
-  PetscCall(CheckSize(file, name, dims, *rows, *cols));
-  *rows = (PetscInt)dims[0];
-  *cols = (PetscInt)dims[1];
-  PetscCall(PetscMalloc1(dims[0] * dims[1] + 1, data));
-  ierr = ReadSet(file, name, set, NumberType(MPIU_INT), H5S_ALL, H5S_ALL, *data);
-  if (ierr) PetscCall(PetscFree(*data));
-  PetscCall(ierr);
-  for (size_t k = 0; k < dims[0] * dims[1]; k++) {
+  PetscCall(LoadSet(file, name, H5T_INTEGER, NATIVE_INT, sizeof(PetscInt), rows, cols, data));
+  for (size_t k = 0; k < (size_t)*rows * (size_t)*cols; k++) {
     const PetscInt value = (*data)[k];
 
     if (value >= lo && value <= hi) continue;
@@ -644,16 +650,62 @@ PetscErrorCode HycoH5ReadRows(HycoH5 file, const char name[], PetscInt start, Pe
 
 PetscErrorCode HycoH5LoadText(HycoH5 file, const char name[], char **text)
 {
-  hid_t set;
-  hsize_t dims[2];
-  PetscErrorCode ierr;
+  PetscInt length = -1, one = 1;
 
   PetscFunctionBegin;
-  PetscCall(OpenSet(file, name, H5T_INTEGER, &set, dims));
-  HycoCheck(dims[1] == 1, "%s: %s is damaged", file->path, name);
-  PetscCall(PetscCalloc1(dims[0] + 1, text));
-  ierr = ReadSet(file, name, set, H5T_NATIVE_CHAR, H5S_ALL, H5S_ALL, *text);
-  if (ierr) PetscCall(PetscFree(*text));
-  PetscCall(ierr);
+  PetscCall(LoadSet(file, name, H5T_INTEGER, H5T_NATIVE_CHAR, 1, &length, &one, text));
+  (*text)[length] = '\0';
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool HycoH5Reads(HycoH5 file)
+{
+  return file->reads;
+}
+
+PetscErrorCode HycoH5Real(HycoH5 file, const char name[], PetscInt *rows, PetscInt cols, PetscReal **data)
+{
+  PetscFunctionBegin;
+  PetscCall(file->reads ? HycoH5LoadReal(file, name, rows, &cols, data)
+                        : HycoH5WriteReal(file, name, *rows, cols, *data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Int(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt *rows, PetscInt cols,
+                         PetscInt **data)
+{
+  PetscFunctionBegin;
+  PetscCall(file->reads ? HycoH5LoadInt(file, name, lo, hi, rows, &cols, data)
+                        : HycoH5WriteInt(file, name, *rows, cols, *data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Reals(HycoH5 file, const char name[], PetscInt n, PetscReal data[])
+{
+  PetscFunctionBegin;
+  PetscCall(file->reads ? HycoH5ReadReal(file, name, n, 1, data) : HycoH5WriteReal(file, name, n, 1, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Ints(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt n, PetscInt data[])
+{
+  PetscInt *read = data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Int(file, name, lo, hi, &n, 1, &read));
+  if (!file->reads) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscArraycpy(data, read, n));
+  PetscCall(PetscFree(read));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Starts(HycoH5 file, const char name[], PetscInt n, PetscInt **start)
+{
+  PetscInt rows = n + 1;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Int(file, name, 0, PETSC_MAX_INT, &rows, 1, start));
+  for (PetscInt k = 0; k < n; k++)
+    HycoCheck((*start)[0] == 0 && (*start)[k] <= (*start)[k + 1], "%s: %s is damaged", file->path, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -364,26 +364,25 @@ PetscErrorCode HycoOptionsString_Private(HycoOptionItems items, const char name[
 }
 
 PetscErrorCode HycoOptionsList_Private(HycoOptionItems items, const char name[], const char text[], PetscInt *n,
-                                       char *list[], PetscBool *set)
+                                       char ***list, PetscBool *set)
 {
   const char *word;
-  PetscInt room;
+  PetscInt room = 1;
   PetscBool given;
 
   PetscFunctionBegin;
   PetscCall(Find(items, name, text, "<list>", "none", 4 * HYCO_LINE, &word, &given));
   if (set) *set = given;
-  room = *n;
   *n = 0;
+  *list = NULL;
   if (!given || strcasecmp(word, "none") == 0) PetscFunctionReturn(PETSC_SUCCESS);
-  for (;;) {
+  for (const char *c = word; *c; c++) room += *c == ',';
+  PetscCall(PetscCalloc1(room + 1, list));
+  for (; *n < room; word += strcspn(word, ",") + 1) {
     const size_t length = strcspn(word, ",");
 
-    HycoCheck(*n < room, "-%s%s has more than %d words", NAMED(items, name), (int)room);
-    PetscCall(PetscMalloc1(length + 1, &list[*n]));
-    PetscCall(PetscStrncpy(list[(*n)++], word, length + 1));
-    if (!word[length]) break;
-    word += length + 1;
+    PetscCall(PetscMalloc1(length + 1, &(*list)[*n]));
+    PetscCall(PetscStrncpy((*list)[(*n)++], word, length + 1));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

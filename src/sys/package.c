@@ -79,3 +79,10 @@ PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool 
   PetscCall(PetscViewerASCIIPushTab(*viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode HycoFreeAll_Private(void *const addresses[])
+{
+  PetscFunctionBegin;
+  for (; *addresses; addresses++) PetscCall(PetscFree(*(void **)*addresses));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

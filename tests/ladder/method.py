@@ -1,39 +1,32 @@
 """A complementarity method that a program registers (examples/ladder/method.c) against TAO's and hyco's on the same scene."""
 import os
 import re
-import subprocess
 import unittest
 
-from common import HYCO, MPIRUN, PATIENCE, SOURCE, Case
+from common import SOURCE, Program
 
-PROGRAM = os.path.join(os.path.dirname(HYCO), 'ladder', 'method')
 BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
-OUT = re.compile(r'(.+) by (.+): (\d+) iterations, force (\S+), largest residual (\S+)')
 PROJECTED = ['-hyco_solver_type', 'tao', '-hyco_tao_type', 'projected']
 
 
-class Method(Case):
-    def step(self, name, *args, ranks=0, ok=True):
-        command = [*MPIRUN, str(ranks)] * bool(ranks) + [os.path.join(os.path.dirname(HYCO), 'ladder', name), '-scene', BLOCKS,
-                                                         '-mu', '0.05,0.06', *args]
-        run = subprocess.run(command, capture_output=True, text=True, timeout=60 * PATIENCE, check=False)
-        self.assertEqual(run.returncode == 0, ok, run.stdout + run.stderr)
-        return run.stdout + run.stderr
+class Method(Program):
+    name = 'method'
+    out = r'(.+) by (.+): (\d+) iterations, force (\S+), largest residual (\S+)'
 
-    def solve(self, *args, ranks=0):
-        reason, method, _, force, residual = OUT.search(self.step('method', *args, ranks=ranks)).groups()
-        self.assertLess(float(residual), 1e-8, method)
-        return reason, method, float(force)
+    def step(self, *args, ranks=0):
+        reason, method, _, force, residual = self.solve('-scene', BLOCKS, '-mu', '0.05,0.06', *args, ranks=ranks)
+        self.assertLess(residual, 1e-8, method)
+        return reason, method, force
 
     def test_against_the_others(self):
-        _, _, force = self.solve()
+        _, _, force = self.step()
         for ranks in (0, 2):
-            reason, method, its_force = self.solve(*PROJECTED, ranks=ranks)
+            reason, method, its_force = self.step(*PROJECTED, ranks=ranks)
             self.assertEqual((reason, method), ('converged', 'tao projected dual'))
             self.assertLess(abs(its_force - force), 1e-9 * force)
 
     def test_falling_back(self):
-        reason, method, _ = self.solve(*PROJECTED, '-hyco_tao_max_it', '1')
+        reason, method, _ = self.step(*PROJECTED, '-hyco_tao_max_it', '1')
         self.assertEqual((reason, method), ('converged by the fallback solver', 'tao projected dual, then active_set'))
 
     def test_tao_shows_it(self):
@@ -42,14 +35,16 @@ class Method(Case):
         for name, args in (('projected', PROJECTED), ('gpcg', ['-hyco_solver_type', 'tao', '-hyco_tao_type', 'gpcg']),
                            ('hyco_active_set', []), ('hyco_lemke', ['-hyco_solver_type', 'lemke'])):
             with self.subTest(name):
-                out = self.step('method', *watch, *args, ranks=2 if name == 'hyco_active_set' else 0)
+                run = self.run_program('-scene', BLOCKS, '-mu', '0.05,0.06', *watch, *args, ranks=2 if name == 'hyco_active_set' else 0)
+                self.assertEqual(run.returncode, 0, run.stderr)
+                out = run.stdout + run.stderr
                 self.assertEqual(len(re.findall(rf'Tao Object:[^\n]*\n +type: {name}\b', out)), 1, out)
                 self.assertEqual(out.count('solve converged'), 1, out)
                 if name != 'hyco_lemke':  # it has pivots, no iterates
                     self.assertRegex(out, r'Residual: ')
 
     def test_what_the_program_does_not_register(self):
-        self.assertIn('projectd', self.step('method', '-hyco_solver_type', 'tao', '-hyco_tao_type', 'projectd', ok=False))
+        self.refused(['projectd'], '-scene', BLOCKS, '-mu', '0.05,0.06', '-hyco_solver_type', 'tao', '-hyco_tao_type', 'projectd')
 
 
 if __name__ == '__main__':

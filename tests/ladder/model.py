@@ -1,29 +1,20 @@
 """A type of reduced model that a program registers (examples/ladder/model.c): trained, saved, loaded, predicted and compared by the
 library's own calls, on any number of ranks; the command, which does not have it, says so."""
-import os
-import re
-import subprocess
 import unittest
 
-from common import HYCO, MPIRUN, PATIENCE, SOURCE, Case
-
-PROGRAM = os.path.join(os.path.dirname(HYCO), 'ladder', 'model')
-ROPE = os.path.join(SOURCE, 'examples', 'rope')
-OUT = re.compile(r'nearest solutions: contact force (\S+), complementarity (\S+), adhesion (\S+); errors: u (\S+), sigma (\S+), lambda (\S+); '
-                 r'estimated: u (\S+)')
+from common import ROPE, Program
 
 
-class Model(Case):
-    def run_program(self, *mu, ranks=0):
-        command = [*(MPIRUN + [str(ranks)] if ranks else []), PROGRAM, ROPE, self.path('nearest.h5'), *map(str, mu)]
-        run = subprocess.run(command, capture_output=True, text=True, timeout=100 * PATIENCE)
-        self.assertEqual(run.returncode, 0, run.stderr)
-        found = OUT.search(run.stdout)
-        self.assertTrue(found, run.stdout)
-        return [float(x) for x in found.groups()]
+class Model(Program):
+    name = 'model'
+    out = (r'nearest solutions: contact force (\S+), complementarity (\S+), adhesion (\S+); errors: u (\S+), sigma (\S+), lambda (\S+); '
+           r'estimated: u (\S+)')
+
+    def nearest(self, *mu, ranks=0):
+        return self.solve(ROPE, self.path('nearest.h5'), *mu, ranks=ranks)
 
     def test_model(self):
-        first = self.run_program(0.07, 0.17)
+        first = self.nearest(0.07, 0.17)
         force, complementarity, adhesion, u, sigma, forces, estimated = first
         self.assertGreater(force, 0)
         self.assertEqual(adhesion, 0)
@@ -32,14 +23,14 @@ class Model(Case):
             self.assertGreater(error, 1e-6)
             self.assertLess(error, 1)
         self.assertGreater(estimated, 0)  # calibrated by held-out solutions as any other
-        for a, b in zip(first, self.run_program(0.07, 0.17, ranks=3)):
+        for a, b in zip(first, self.nearest(0.07, 0.17, ranks=3)):
             self.near(b, a, 1e-6)
-        at = self.run_program(0.25, 0.5)  # the corners of the ranges are training points
+        at = self.nearest(0.25, 0.5)  # the corners of the ranges are training points
         self.assertLess(at[5], 1e-6)  # of the forces; the displacement lacks what the modes cut off
         self.assertLess(at[3], u)
 
     def test_refused(self):
-        self.run_program(0.07, 0.17)
+        self.nearest(0.07, 0.17)
         run = self.run_raw('predict', '-model', self.path('nearest.h5'), '-mu', '0.07,0.17')
         self.assertNotEqual(run.returncode, 0)
         for word in ('nearest.h5', '"nearest"', 'HycoROMRegister'):

@@ -1,6 +1,7 @@
 """Runs the hyco command in a temporary folder and reads what it wrote."""
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -105,3 +106,46 @@ def msh(path, nodes, elements, names, binary=False):
         for i, (kind, tag, nodes_of) in enumerate(elements):
             f.write(f'{i + 1} {kind} 2 {tag} {tag} {" ".join(str(n) for n in nodes_of)}\n')
         f.write('$EndElements\n')
+
+
+def square(n, title='block', move=lambda i, j: (i, j)):
+    """The unit square of n x n cells, their nodes moved by `move` in units of a cell, for msh(): body and sides low, high, left, right."""
+    nodes = [(*(c / n for c in move(i, j)), 0) for j in range(n + 1) for i in range(n + 1)]
+    at = lambda i, j: j * (n + 1) + i + 1
+    elements = [(3, 1, (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1))) for j in range(n) for i in range(n)]
+    for k in range(n):
+        elements += [(1, 2, (at(k, 0), at(k + 1, 0))), (1, 3, (at(k, n), at(k + 1, n)))]
+        elements += [(1, 4, (at(0, k), at(0, k + 1))), (1, 5, (at(n, k), at(n, k + 1)))]
+    return nodes, elements, {1: (2, title), 2: (1, 'low'), 3: (1, 'high'), 4: (1, 'left'), 5: (1, 'right')}
+
+
+class Program(Case):
+    """A program of examples/ladder: its name, the scene with places for what varies, what it prints."""
+    name = scene_text = out = ''
+
+    def scene(self, *parts):
+        """The path of scene.yaml with these parts in its places."""
+        path = self.path('scene.yaml')
+        with open(path, 'w', encoding='ascii') as file:
+            file.write(self.scene_text % parts)
+        return path
+
+    def run_program(self, *args, name=None, ranks=0):
+        """The finished process; ranks 0: without mpiexec."""
+        command = [*MPIRUN, str(ranks)] * bool(ranks) + [os.path.join(os.path.dirname(HYCO), 'ladder', name or self.name), *map(str, args)]
+        return subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE, check=False)
+
+    def solve(self, *args, **options):
+        """The words of `out` in what the program prints, numbers as such."""
+        run = self.run_program(*args, **options)
+        self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
+        found = re.search(self.out, run.stdout)
+        self.assertTrue(found, run.stdout)
+        return [float(x) if re.fullmatch(r'[-+.\de]+', x) else x for x in found.groups()]
+
+    def refused(self, words, *args, **options):
+        """A run that fails, and says these words."""
+        run = self.run_program(*args, **options)
+        self.assertNotEqual(run.returncode, 0)
+        for word in words:
+            self.assertIn(word, run.stdout + run.stderr)

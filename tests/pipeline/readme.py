@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Every command of the README works as written: the indented lines that call what is built, in order."""
+"""Every command of the README and of docs/commands.md works as written: the indented lines that call what is built, in order."""
 import os
 import shlex
 import subprocess
@@ -13,17 +13,18 @@ BUILD = os.path.dirname(os.environ["HYCO"])
 
 
 def commands():
-    with open(f"{SOURCE}/README.md", encoding="utf-8") as file:
-        for line in file:
-            words = line.split()
-            if line.startswith("    ") and any(w in ("build/hyco", "build/embed") or w.startswith("build/ladder/") for w in words[:5]) and "..." not in words:
-                yield line.strip()
+    for page in ("README.md", "docs/commands.md"):
+        with open(f"{SOURCE}/{page}", encoding="utf-8") as file:
+            for line in file:
+                words = line.split()
+                if line.startswith("    ") and any(w in ("build/hyco", "build/embed") or w.startswith("build/ladder/") for w in words[:5]) and "..." not in words:
+                    yield line.strip()
 
 
 def main():
     listed = list(commands())
-    if len(listed) < 6:
-        sys.exit(f"the README lists {len(listed)} commands; at least 6 were expected")
+    if len(listed) < 15:
+        sys.exit(f"the pages list {len(listed)} commands; at least 15 were expected")
     with tempfile.TemporaryDirectory() as folder:
         os.symlink(f"{SOURCE}/examples", f"{folder}/examples")
         os.symlink(BUILD, f"{folder}/build")

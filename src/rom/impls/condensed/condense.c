@@ -322,12 +322,17 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
 {
   HycoCondensed c;
   const PetscInt m = t->sizes[2];
-  char linear[32] = "";
+  HycoSolver solver;
+  HycoLinear linear;
 
   PetscFunctionBegin;
-  PetscCall(PetscOptionsGetString(t->scene->options, NULL, "-hyco_linear", linear, sizeof(linear), NULL));
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
+  PetscCall(PetscObjectSetOptions((PetscObject)solver, t->scene->options));
+  PetscCall(HycoSolverSetFromOptions(solver));
+  linear = solver->linear;
+  PetscCall(HycoSolverDestroy(&solver));
   HycoCheckModel(
-      strcasecmp(linear, HycoLinearNames[HYCO_LINEAR_ITERATIVE]),
+      linear != HYCO_LINEAR_ITERATIVE,
       "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a hybrid "
       "model, or take -hyco_linear auto");
   HycoCheckModel(m > 0,
@@ -356,20 +361,8 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscInt HycoCondensedNode(HycoCondensed c, const HycoGridField *f, PetscInt k)
-{
-  PetscInt index[HYCO_MAX_PARAMETERS], node = 0;
-
-  for (PetscInt p = c->dim - 1; p >= 0; p--) {
-    index[p] = k % c->n[p];
-    k /= c->n[p];
-  }
-  for (PetscInt p = 0; p < c->dim; p++) node = node * f->tensor.n[p] + (f->tensor.n[p] > 1 ? index[p] : 0);
-  return node;
-}
-
 /* -B K^-1 F = -B U - G L of one snapshot (U at the contacts' nodes); 0 where it is the difference of what is much
- * larger. */
+   larger. */
 static PetscErrorCode FreeGap(HycoReducer t, const PetscReal mu[], const PetscReal U[], const PetscReal L[],
                               const PetscReal packed[], PetscReal g[])
 {

@@ -277,18 +277,16 @@ static PetscErrorCode SpreadPatterns(HycoReducer t)
 {
   HycoResponses *x = &Condensing(t)->responses;
   const PetscInt m = Condensing(t)->condensed->m;
-  PetscMPIInt size;
 
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(t), FindPatterns(t));
   PetscCallMPI(MPI_Bcast(&x->q, 1, MPIU_INT, 0, HycoComm(t)));
-  PetscCall(PetscMPIIntCast(m * x->q, &size));
   if (t->rank) {
     PetscCall(PetscMalloc1(m * x->q + 1, &x->Q));
     PetscCall(PetscMalloc1(x->q + 1, &x->scale));
   }
-  PetscCallMPI(MPI_Bcast(x->Q, size, MPIU_REAL, 0, HycoComm(t)));
-  PetscCallMPI(MPI_Bcast(x->scale, (PetscMPIInt)x->q, MPIU_REAL, 0, HycoComm(t)));
+  HycoBcast(x->Q, m * x->q, MPIU_REAL, HycoComm(t));
+  HycoBcast(x->scale, x->q, MPIU_REAL, HycoComm(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -176,7 +176,7 @@ static PetscErrorCode SolveMissing(HycoReducer t, HycoSnapshots store, const Tas
   PetscCall(PetscMalloc1(HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor), &missing));
   HycoOnRoot(HycoComm(t), FindMissing(t, store, task, &n_missing, missing));
   PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, HycoComm(t)));
-  PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, HycoComm(t)));
+  HycoBcast(missing, n_missing, MPIU_INT, HycoComm(t));
   if (n_missing) {
     PetscCall(HycoSnapshotsChooseGroups(HycoComm(t), t->scene, n_missing, &groups));
     color = (PetscInt)t->rank * groups / size;

@@ -38,23 +38,8 @@ PetscErrorCode HycoCondensedFree(HycoCondensed *condensed)
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt p = 0; p < c->dim; p++) PetscCall(PetscFree(c->x[p]));
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) PetscCall(PetscFree(c->field[f].data));
-  PetscCall(PetscFree(c->Lambda));
-  PetscCall(PetscFree(c->bounds));
-  PetscCall(PetscFree(c->law));
-  PetscCall(PetscFree(c->flat));
-  PetscCall(PetscFree(c->sample));
-  PetscCall(PetscFree(c->probe));
-  PetscCall(PetscFree(c->inverse));
-  PetscCall(PetscFree(c->theta_scale));
-  PetscCall(PetscFree(c->node_stiff));
-  PetscCall(PetscFree(c->node_load));
-  PetscCall(PetscFree(c->packed));
-  PetscCall(PetscFree(c->M));
-  PetscCall(PetscFree(c->work));
-  PetscCall(PetscFree(c->g));
-  PetscCall(PetscFree(c->H));
-  PetscCall(PetscFree(c->a));
-  PetscCall(PetscFree(c->active));
+  HycoFreeAll(&c->Lambda, &c->bounds, &c->law, &c->flat, &c->sample, &c->probe, &c->inverse, &c->theta_scale,
+              &c->node_stiff, &c->node_load, &c->packed, &c->M, &c->work, &c->g, &c->H, &c->a, &c->active);
   PetscCall(HycoCondensedResetSystem(c));
   PetscCall(PetscFree(*condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -99,6 +84,18 @@ PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
   PetscCall(PetscMalloc1(m + 1, &c->g));
   PetscCall(PetscCalloc1(m + 1, &c->active));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt HycoCondensedNode(HycoCondensed c, const HycoGridField *f, PetscInt k)
+{
+  PetscInt index[HYCO_MAX_PARAMETERS], node = 0;
+
+  for (PetscInt p = c->dim - 1; p >= 0; p--) {
+    index[p] = k % c->n[p];
+    k /= c->n[p];
+  }
+  for (PetscInt p = 0; p < c->dim; p++) node = node * f->tensor.n[p] + (f->tensor.n[p] > 1 ? index[p] : 0);
+  return node;
 }
 
 #define TILE 64
@@ -521,8 +518,8 @@ PetscErrorCode HycoROMCreate_Condensed(HycoROM m)
                                  .features = HycoCondensedFeatures,
                                  .estimate = HycoCondensedEstimate,
                                  .view = View,
-                                 .save = HycoCondensedSave,
-                                 .load = HycoCondensedLoad,
+                                 .save = HycoCondensedMove,
+                                 .load = HycoCondensedMove,
                                  .destroy = Destroy};
   HycoCondensed c;
 

@@ -2,53 +2,33 @@
 #include <hycotable.h>
 #include <petscviewer.h>
 
-PetscErrorCode HycoGalerkinSave(HycoROM m, HycoH5 h)
-{
-  HycoGalerkin g = (HycoGalerkin)m->data;
-
-  PetscFunctionBegin;
-  if (g->G) {
-    PetscCall(HycoH5WriteReal(h, "problem/G", m->l, m->n_fe, g->G));
-    PetscCall(HycoH5WriteReal(h, "problem/ridge", 1, 1, &g->ridge));
-  }
-  if (g->scan.n) {
-    const PetscInt counts[2] = {g->scan.n, g->scan.n_singular};
-
-    PetscCall(HycoH5WriteInt(h, "training/scan_counts", 2, 1, counts));
-    PetscCall(HycoH5WriteReal(h, "training/scan_smallest", 1, 1, &g->scan.smallest));
-    PetscCall(HycoH5WriteReal(h, "training/scan_at", m->scene->n_parameters, 1, g->scan.at));
-  }
-  if (g->table) PetscCall(HycoTableSave(m, h));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode LoadScan(HycoH5 h, HycoROM m)
+static PetscErrorCode MoveScan(HycoROM m, HycoH5 h)
 {
   HycoScan *scan = &((HycoGalerkin)m->data)->scan;
-  PetscInt one = 1, two = 2, *counts;
+  PetscInt counts[2] = {scan->n, scan->n_singular};
 
   PetscFunctionBegin;
-  if (!HycoH5Has(h, "training/scan_counts")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoH5LoadInt(h, "training/scan_counts", 0, PETSC_MAX_INT, &two, &one, &counts));
+  if (HycoH5Reads(h) ? !HycoH5Has(h, "training/scan_counts") : !scan->n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5Ints(h, "training/scan_counts", 0, PETSC_MAX_INT, 2, counts));
   scan->n = counts[0];
   scan->n_singular = counts[1];
-  PetscCall(PetscFree(counts));
-  PetscCall(HycoH5ReadReal(h, "training/scan_smallest", 1, 1, &scan->smallest));
-  PetscCall(HycoH5ReadReal(h, "training/scan_at", m->scene->n_parameters, 1, scan->at));
+  PetscCall(HycoH5Reals(h, "training/scan_smallest", 1, &scan->smallest));
+  PetscCall(HycoH5Reals(h, "training/scan_at", m->scene->n_parameters, scan->at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoGalerkinLoad(HycoROM m, HycoH5 h)
+PetscErrorCode HycoGalerkinMove(HycoROM m, HycoH5 h)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
 
   PetscFunctionBegin;
-  if (HycoH5Has(h, "problem/G")) {
-    PetscCall(HycoH5LoadReal(h, "problem/G", &m->l, &m->n_fe, &g->G));
-    PetscCall(HycoH5ReadReal(h, "problem/ridge", 1, 1, &g->ridge));
+  if (HycoH5Reads(h) ? HycoH5Has(h, "problem/G") : g->G != NULL) {
+    PetscCall(HycoH5Real(h, "problem/G", &m->l, m->n_fe, &g->G));
+    PetscCall(HycoH5Reals(h, "problem/ridge", 1, &g->ridge));
   }
-  PetscCall(LoadScan(h, m));
-  if (HycoH5Has(h, "table")) PetscCall(HycoTableLoad(m, h));
+  PetscCall(MoveScan(m, h));
+  if (!HycoH5Reads(h) && g->table) PetscCall(HycoTableSave(m, h));
+  if (HycoH5Reads(h) && HycoH5Has(h, "table")) PetscCall(HycoTableLoad(m, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -133,8 +133,8 @@ static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
   PetscCall(PetscCalloc2(g->scan.n, &sign, g->scan.n, &ratio));
   HycoOnEach(HycoComm(t),
              ScanMine(m, reaches, each, t->rank * g->scan.n / size, (t->rank + 1) * g->scan.n / size, sign, ratio));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sign, (PetscMPIInt)g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ratio, (PetscMPIInt)g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t)));
+  HycoAllreduce(sign, g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t));
+  HycoAllreduce(ratio, g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoOnRoot(HycoComm(t), Conclude(t, m, reaches, each, sign, ratio));
   PetscCall(PetscFree2(sign, ratio));
   PetscFunctionReturn(PETSC_SUCCESS);

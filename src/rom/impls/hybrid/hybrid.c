@@ -77,24 +77,15 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Save(HycoROM m, HycoH5 file)
-{
-  const HycoHybridROM h = (HycoHybridROM)m->data;
-
-  PetscFunctionBegin;
-  PetscCall(HycoGalerkinSave(m, file));
-  PetscCall(HycoH5WriteReal(file, "reconstruction/S_lambda", h->n_dual, m->pairs.n, h->S_lambda));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Load(HycoROM m, HycoH5 file)
+/* To the model file, or from it. */
+static PetscErrorCode Move(HycoROM m, HycoH5 file)
 {
   HycoHybridROM h = (HycoHybridROM)m->data;
 
   PetscFunctionBegin;
-  PetscCall(HycoGalerkinLoad(m, file));
-  h->n_dual = -1;
-  PetscCall(HycoH5LoadReal(file, "reconstruction/S_lambda", &h->n_dual, &m->pairs.n, &h->S_lambda));
+  PetscCall(HycoGalerkinMove(m, file));
+  if (HycoH5Reads(file)) h->n_dual = -1;
+  PetscCall(HycoH5Real(file, "reconstruction/S_lambda", &h->n_dual, m->pairs.n, &h->S_lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -130,8 +121,8 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
                                  .condition = HycoGalerkinCondition,
                                  .local = HycoGalerkinLocal,
                                  .view = View,
-                                 .save = Save,
-                                 .load = Load,
+                                 .save = Move,
+                                 .load = Move,
                                  .destroy = Destroy};
   HycoHybridROM h;
 

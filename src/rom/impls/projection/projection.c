@@ -111,31 +111,23 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Save(HycoROM m, HycoH5 h)
+/* To the model file, or from it. */
+static PetscErrorCode Move(HycoROM m, HycoH5 h)
 {
   HycoProjectionROM p = (HycoProjectionROM)m->data;
+  PetscInt word = p->dual;
 
   PetscFunctionBegin;
-  PetscCall(HycoGalerkinSave(m, h));
-  PetscCall(HycoH5WriteText(h, "problem/dual", HycoDuals[p->dual]));
-  PetscCall(HycoH5WriteReal(h, "problem/V_lambda", p->l_lambda, m->pairs.n, p->V_lambda));
-  PetscCall(HycoH5WriteReal(h, "training/dual_misfit", 1, 1, &p->dual_misfit));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Load(HycoROM m, HycoH5 h)
-{
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
-  PetscInt word;
-
-  PetscFunctionBegin;
-  PetscCall(HycoGalerkinLoad(m, h));
-  PetscCall(HycoROMLoadWord(m, h, "problem/dual", HycoDuals, &word));
-  p->dual = (HycoDual)word;
-  HycoCheck(p->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);
-  p->l_lambda = -1;
-  PetscCall(HycoH5LoadReal(h, "problem/V_lambda", &p->l_lambda, &m->pairs.n, &p->V_lambda));
-  PetscCall(HycoH5ReadReal(h, "training/dual_misfit", 1, 1, &p->dual_misfit));
+  PetscCall(HycoGalerkinMove(m, h));
+  if (HycoH5Reads(h)) {
+    PetscCall(HycoROMLoadWord(m, h, "problem/dual", HycoDuals, &word));
+    p->dual = (HycoDual)word;
+    p->l_lambda = -1;
+    HycoCheck(p->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);
+  } else
+    PetscCall(HycoH5WriteText(h, "problem/dual", HycoDuals[p->dual]));
+  PetscCall(HycoH5Real(h, "problem/V_lambda", &p->l_lambda, m->pairs.n, &p->V_lambda));
+  PetscCall(HycoH5Reals(h, "training/dual_misfit", 1, &p->dual_misfit));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -171,8 +163,8 @@ PetscErrorCode HycoROMCreate_Projection(HycoROM m)
                                  .condition = HycoGalerkinCondition,
                                  .local = HycoGalerkinLocal,
                                  .view = View,
-                                 .save = Save,
-                                 .load = Load,
+                                 .save = Move,
+                                 .load = Move,
                                  .destroy = Destroy};
   HycoProjectionROM p;
 

@@ -58,10 +58,7 @@ static PetscErrorCode Resize(Dual *d, PetscInt m, PetscInt p)
   const PetscInt n = m + p;
 
   PetscFunctionBegin;
-  PetscCall(PetscFree(d->S));
-  PetscCall(PetscFree(d->g));
-  PetscCall(PetscFree(d->L));
-  PetscCall(PetscFree(d->active));
+  HycoFreeAll(&d->S, &d->g, &d->L, &d->active);
   PetscCall(PetscMalloc1((size_t)n * (size_t)n + 1, &d->S));
   PetscCall(PetscCalloc1(n + 1, &d->g));
   PetscCall(PetscCalloc1(n + 1, &d->L));
@@ -91,7 +88,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
 /* A distributed vector, whole on every rank. */
 static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
 {
-  PetscMPIInt size, *counts, *offsets;
+  PetscMPIInt size, count, *counts, *offsets;
   const PetscInt *ranges;
   const PetscScalar *local;
   PetscInt n;
@@ -108,12 +105,13 @@ static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
   PetscCall(VecGetOwnershipRanges(v, &ranges));
   PetscCall(PetscMalloc2(size, &counts, size, &offsets));
   for (PetscMPIInt r = 0; r < size; r++) {
-    counts[r] = (PetscMPIInt)(ranges[r + 1] - ranges[r]);
-    offsets[r] = (PetscMPIInt)ranges[r];
+    PetscCall(PetscMPIIntCast(ranges[r + 1] - ranges[r], &counts[r]));
+    PetscCall(PetscMPIIntCast(ranges[r], &offsets[r]));
   }
   PetscCall(VecGetLocalSize(v, &n));
+  PetscCall(PetscMPIIntCast(n, &count));
   PetscCall(VecGetArrayRead(v, &local));
-  PetscCallMPI(MPI_Allgatherv(local, (PetscMPIInt)n, MPIU_REAL, all, counts, offsets, MPIU_REAL, comm));
+  PetscCallMPI(MPI_Allgatherv(local, count, MPIU_REAL, all, counts, offsets, MPIU_REAL, comm));
   PetscCall(VecRestoreArrayRead(v, &local));
   PetscCall(PetscFree2(counts, offsets));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -340,11 +338,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
 
   PetscFunctionBegin;
   PetscCall(HycoTaoDestroy(&d->tao));
-  PetscCall(PetscFree(d->S));
-  PetscCall(PetscFree(d->g));
-  PetscCall(PetscFree(d->L));
-  PetscCall(PetscFree(d->active));
-  PetscCall(PetscFree(form->data));
+  HycoFreeAll(&d->S, &d->g, &d->L, &d->active, &form->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

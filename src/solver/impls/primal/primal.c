@@ -345,10 +345,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscCall(MatDestroy(&g->Kg));
   PetscCall(MatDestroy(&g->Kw));
   PetscCall(MatDestroy(&g->H));
-  PetscCall(PetscFree(g->pivot));
-  PetscCall(PetscFree(g->contact));
-  PetscCall(PetscFree(g->active));
-  PetscCall(PetscFree(form->data));
+  HycoFreeAll(&g->pivot, &g->contact, &g->active, &form->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

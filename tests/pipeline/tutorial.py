@@ -1,0 +1,60 @@
+"""docs/tutorial.md and docs/faq.md, line by line: their files are written, their commands run, what they print is compared."""
+import glob
+import importlib.util
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import document
+from common import PATIENCE, SANITIZED, SOURCE
+
+BUILD = os.path.dirname(os.environ['HYCO'])
+DOCS = os.path.join(SOURCE, 'docs')
+
+
+def drawable():
+    """Whether scripts/plot has what it takes."""
+    return all(importlib.util.find_spec(name) for name in ('matplotlib', 'h5py', 'numpy'))
+
+
+class Documents(unittest.TestCase):
+    def run_page(self, name, commands, **environment):
+        with tempfile.TemporaryDirectory(prefix='hyco-document-') as folder:
+            environment.update(TREE=SOURCE, PATH=BUILD + ':' + os.environ['PATH'])
+            skip = (lambda line: False) if drawable() else (lambda line: 'scripts/plot' in line)
+            self.assertGreaterEqual(document.run(os.path.join(DOCS, name), folder, environment, skip), commands)
+
+    def test_tutorial(self):
+        with tempfile.TemporaryDirectory(prefix='hyco-installed-') as prefix:
+            subprocess.run(['cmake', '--install', BUILD, '--prefix', prefix], check=True, timeout=100 * PATIENCE, stdout=subprocess.DEVNULL)
+            library, = glob.glob(os.path.join(prefix, '**', 'libhyco.so'), recursive=True) or [None]
+            if SANITIZED or not library:
+                self.skipTest('the C program of the tutorial would want the flags of the library')
+            paths = [os.path.join(os.path.dirname(library), 'pkgconfig'), os.environ.get('PKG_CONFIG_PATH', '')]
+            self.run_page('tutorial.md', 12, PKG_CONFIG_PATH=':'.join(p for p in paths if p), LD_LIBRARY_PATH=os.path.dirname(library))
+
+    def test_faq(self):
+        self.run_page('faq.md', 8)
+
+    def test_pictures(self):
+        """They are small, and the tutorial shows each."""
+        with open(os.path.join(DOCS, 'tutorial.md'), encoding='utf-8') as f:
+            text = f.read()
+        pictures = glob.glob(os.path.join(DOCS, 'tutorial', '*.png'))
+        self.assertGreaterEqual(len(pictures), 3)
+        for picture in pictures:
+            self.assertLess(os.path.getsize(picture), 100000, picture)
+            self.assertIn('tutorial/' + os.path.basename(picture), text)
+
+    def test_compare(self):
+        """The comparison itself: words and numbers count, times do not."""
+        document.compare('force 3.10, u 1e-9\n...\nseconds: 0.1 set-up', 'x\nforce 3.12, u 7e-12\ny\nseconds: 0.7 set-up\n')
+        for wrong in ('force 3.20, u 1e-9', 'energy 3.10 for 1e-9', 'force 3.10', 'y\nforce 3.10, u 1e-9'):
+            with self.assertRaises(AssertionError):
+                document.compare(wrong, 'force 3.10, u 1e-9\ny')
+
+
+if __name__ == '__main__':
+    sys.exit(unittest.main())
