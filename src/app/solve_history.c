@@ -117,6 +117,7 @@ void DriverReportHistory(cJSON *json, const HycoHistory *h)
   cJSON_AddBoolToObject(history, "ended", h->ended);
   cJSON_AddNumberToObject(history, "t_end", h->t);
   cJSON_AddStringToObject(history, "newton", h->newton);
+  cJSON_AddNumberToObject(history, "factor_in_solves", h->factor_cost);
   cJSON_AddNumberToObject(history, "newton_order", h->order);
   cJSON_AddNumberToObject(history, "newton_orders", h->n_orders);
   for (PetscInt c = 0; c < N_COLUMNS; c++) array[c] = cJSON_AddArrayToObject(history, columns[c]);

@@ -487,6 +487,7 @@ PetscErrorCode HycoFOMGetHistory(HycoFOM f, HycoHistory *h)
   h->t = p->t;
   h->why = p->why;
   h->newton = HycoPathPrefersElastic(f) ? "elastic" : "tangent";
+  h->factor_cost = HycoPathFactorCost(f);
   h->n_orders = p->n_orders;
   if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
   if (p->n_orders) h->order = p->orders[p->n_orders / 2];

@@ -449,18 +449,19 @@ PetscErrorCode HycoPathAssemble(HycoFOM f, PetscReal t1)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Which variant costs less, by counts alone, so that a choice repeats on any machine: a factor with its flexibility
-  takes as long as so many solves (3D: 24 at 29,000 unknowns and 50 at 118,000; in 2D a fifth of that), and the elastic
-  variant as many iterations more as five times the tangent's.
-*/
+PetscReal HycoPathFactorCost(HycoFOM f)
+{
+  return (f->fe->dim == 3 ? 0.15 : 0.03) * PetscSqrtReal((PetscReal)f->n_free);
+}
+
+/* By counts alone, so that a choice repeats on any machine: the elastic variant takes up to five times as many
+   iterations. */
 PetscBool HycoPathPrefersElastic(HycoFOM f)
 {
   const HycoPath p = f->path;
-  const PetscReal n = (PetscReal)f->n_free;
 
   if (!p->flows || p->method != HYCO_NEWTON_AUTO) return (PetscBool)(!p->flows || p->method == HYCO_NEWTON_ELASTIC);
-  return (PetscBool)((f->fe->dim == 3 ? 0.15 : 0.03) * PetscSqrtReal(n) > 5);
+  return (PetscBool)(HycoPathFactorCost(f) > 5);
 }
 
 PetscErrorCode HycoPathAttempt(HycoFOM f, PetscReal t0, PetscReal t1, HycoAttempt *a)

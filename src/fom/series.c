@@ -145,6 +145,7 @@ PetscErrorCode HycoFOMSetSeries(HycoFOM f, const char path[])
   PetscCall(PetscNew(&s));
   PetscCall(PetscStrncpy(s->path, path, sizeof(s->path)));
   PetscCall(PetscSNPrintf(s->h5_path, sizeof(s->h5_path), "%.*s.h5", (int)strlen(path) - 5, path));
+  PetscCall(HycoSeriesDestroy(&f->path->series));
   f->path->series = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

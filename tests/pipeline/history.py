@@ -126,6 +126,22 @@ class History(Case):
             self.assertLessEqual(abs(np.array(whole['history'][column]) - rest['history'][column]).max(),
                                  1e-12 * max(abs(v) for v in whole['history'][column]), column)
 
+    def test_rod(self):
+        """The power ramp on a slice: two to four iterations a step, quadratic; the gap closes, the ramp presses, the hold relaxes; at zero power it is open."""
+        report = self.hyco('solve', '-scene', os.path.join(SOURCE, 'examples', 'rod'), '-mu', '0.05,40,1', '-hyco_newton', 'tangent')
+        h = report['history']
+        self.assertTrue(h['ended'])
+        self.assertLessEqual(max(h['most_iterations']), 4)
+        self.assertGreater(h['newton_order'], 1.8)
+        self.assertLess(max(h['kkt_max']), 1e-8)
+        self.assertLess(max(h['energy_defect']), 1e-8)
+        force = dict(zip(h['t'], h['total_contact_force']))
+        self.assertEqual(force[1000], 0)
+        self.assertGreater(force[10001], 0)
+        self.assertGreater(force[10001.03333], 5 * force[10001])
+        self.assertLess(force[10025.03333], 0.95 * force[10001.03333])
+        self.assertEqual(force[10025.53333], 0)
+
     def test_ends_early(self):
         """A limit load: the last accepted state is written, and the run fails."""
         self.write_bar()
