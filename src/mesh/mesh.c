@@ -9,7 +9,7 @@ PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
   PetscFunctionBegin;
   if (!m) PetscFunctionReturn(PETSC_SUCCESS);
   *mesh = NULL;
-  for (PetscInt g = 0; g < m->n_groups; g++) PetscCall(PetscFree(m->group_name[g]));
+  for (PetscInt g = 0; m->group_name && g < m->n_groups; g++) PetscCall(PetscFree(m->group_name[g]));
   PetscCall(PetscFree(m->group_name));
   PetscCall(PetscFree(m->group_dim));
   PetscCall(PetscFree(m->group_start));

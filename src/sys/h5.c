@@ -533,10 +533,14 @@ static PetscErrorCode ReadSet(HycoH5 f, const char name[], hid_t set, hid_t type
 
 static PetscErrorCode CheckSize(HycoH5 f, const char name[], const hsize_t dims[2], PetscInt rows, PetscInt cols)
 {
+  char wanted[2][24];
+
   PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(wanted[0], sizeof(wanted[0]), rows < 0 ? "n" : "%" PetscInt_FMT, rows));
+  PetscCall(PetscSNPrintf(wanted[1], sizeof(wanted[1]), cols < 0 ? "n" : "%" PetscInt_FMT, cols));
   HycoCheck((rows < 0 || dims[0] == (hsize_t)rows) && (cols < 0 || dims[1] == (hsize_t)cols),
-            "%s: %s is %ld x %ld where %d x %d was expected: the file is damaged", f->path, name, (long)dims[0],
-            (long)dims[1], (int)rows, (int)cols);
+            "%s: %s is %ld x %ld where %s x %s was expected: the file is damaged", f->path, name, (long)dims[0],
+            (long)dims[1], wanted[0], wanted[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

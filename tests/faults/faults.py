@@ -22,7 +22,7 @@ OUT = ['-output', 'out.xdmf', '-report', 'out.json']
 CASES = [
     # the command line
     (['slve', *R], 'there is no command "slve"'),
-    ([], 'give a command: solve, train, predict, compare or view'),
+    ([], 'give a command: check, solve, train, predict, compare or view'),
     (['solve', *R, '-hyco_solver_typ', 'tao'], 'knows no option -hyco_solver_typ; did you mean -hyco_solver_type?'),
     (['solve', *R, '-zzz', '1'], 'knows no option -zzz'),
     (['solve', *R, '-model', 'm.h5'], 'hyco solve knows no option -model'),

@@ -187,7 +187,7 @@ class Files(Case):
             del f['problem/scene']
             f['problem/scene'] = np.hstack([text, text])
 
-        self.refused(self.edited(pair), 'problem/scene is damaged')
+        self.refused(self.edited(pair), 'problem/scene is .* where .* was expected: the file is damaged')
         self.refused(self.edited(put('problem/sizes', (0, 0), 101)), 'the whole mesh is damaged', 'predict', '-output', 'w.xdmf')
         shutil.copy(os.path.join(DATA, 'rope-projection-4.h5'), self.path('p.h5'))
         self.refused(self.edited(put('problem/sizes', (4, 0), 9), 'p.h5'), 'problem/dual is damaged')
