@@ -41,6 +41,9 @@ typedef struct {
   PetscReal total_contact_force;                                   /* reconstructed, whole contact surface */
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
+  PetscReal path_force, path_mises,
+      path_inelastic; /* of a path the largest of its listed times: total contact force, von
+                         Mises stress and accumulated inelastic strain of the RID; else 0 */
   /* An upper estimate of the relative errors of u (whole mesh, 2-norm), of the stress (RID, 2-norm of the cells'
      values) and of all contact forces (2-norm; a force below a tenth of the largest held out in training counts as that
      tenth), calibrated at training on held-out solutions; < 0: the model has none, or the solve did not converge. */
@@ -107,6 +110,19 @@ PetscErrorCode HycoROMGetFallback(HycoROM model, PetscBool *full_order, PetscBoo
 PetscErrorCode HycoROMSetReconstruct(HycoROM model, PetscBool reconstruct);
 /* Called after each iteration of the active set. */
 PetscErrorCode HycoROMSetMonitor(HycoROM model, HycoMonitor monitor, void *ctx);
+/*
+  A model of paths, of a scene with a history: HycoROMPredict() solves the path at mu, in steps of its own choice by the
+  rules of the full order (docs/history.md). HycoROMGetHistory() has the listed times that it reached (n is 0 for other
+  models); what is asked for afterwards is of the last of them, or of that which HycoROMSetStep() names, 0 .. n - 1.
+  HycoROMSetSteps() gives the times of the steps instead, as a full-order path took them (HycoHistory.taken): they are
+  cut where they fail, and only there. NULL: its own choice. Borrowed, for all predictions to come. Not collective.
+*/
+PetscErrorCode HycoROMGetHistory(HycoROM model, HycoHistory *history);
+PetscErrorCode HycoROMSetStep(HycoROM model, PetscInt k);
+PetscErrorCode HycoROMSetSteps(HycoROM model, PetscInt n, const PetscReal t[]);
+/* Accumulated inelastic strain of the RID's cells (mean), at that time. Borrowed until the next prediction. */
+PetscErrorCode HycoROMGetInelastic(HycoROM model, PetscInt *n_cells, const PetscReal *inelastic[]);
+
 /* What the last prediction amounts to, its errors estimated. Fails before the first. */
 PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);
 /* Strain energy of the last prediction on the RID's cells; it may cost as much as the prediction. */

@@ -1,6 +1,6 @@
 /* Errors of a prediction against the full-order solution. */
 #include <hycofomimpl.h>
-#include <hycoromimpl.h>
+#include <hycoreducerimpl.h>
 
 /* Sums and maxima of one quantity, and the quotient they end in. */
 typedef struct {
@@ -34,12 +34,12 @@ static PetscErrorCode CompareH1(HycoROM m, const PetscReal U[], const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMCompareFields(HycoROM m, const PetscReal u_full[], const PetscReal sigma[],
-                                    const PetscReal lambda[], HycoErrors *e, HycoForceErrors *forces)
+PetscErrorCode HycoROMMeasureErrors(HycoROM m, const PetscReal u_full[], const PetscReal sigma[],
+                                    const PetscReal inelastic[], const PetscReal lambda[], HycoLost lost[])
 {
-  const PetscReal *U, *stress;
+  const PetscReal *U, *stress, *flow = NULL;
   const PetscInt dim = m->mesh->dim, ns = m->fe->n_sigma;
-  Norms u = {0}, rid = {0}, s = {0}, s11 = {0}, lr = {0}, l = {0};
+  Norms u = {0}, rid = {0}, s = {0}, s11 = {0}, lr = {0}, l = {0}, p = {0};
 
   PetscFunctionBegin;
   PetscCall(HycoROMGetWholeU(m, NULL, &U));
@@ -55,19 +55,40 @@ PetscErrorCode HycoROMCompareFields(HycoROM m, const PetscReal u_full[], const P
     Add(&s, stress[k], reference);
     if (k % ns == 0) Add(&s11, stress[k], reference);
   }
+  if (inelastic) PetscCall(HycoROMGetInelastic(m, NULL, &flow));
+  for (PetscInt e = 0; inelastic && e < m->mesh->n_cells; e++) Add(&p, flow[e], inelastic[m->mesh->cell_whole[e]]);
   for (PetscInt k = 0; k < m->pairs.n; k++) {
     Add(&l, m->Lambda[k], lambda[k]);
     if (m->in_rid[k]) Add(&lr, m->Lambda[k], lambda[k]);
   }
-  e->u = HycoRelative(PetscSqrtReal(u.lost2), PetscSqrtReal(u.size2));
-  e->u_rid = HycoRelative(rid.lost, rid.size);
-  e->sigma = HycoRelative(PetscSqrtReal(s.lost2), PetscSqrtReal(s.size2));
-  e->sigma_11 = HycoRelative(s11.lost, s11.size);
-  e->lambda_rid = HycoRelative(PetscSqrtReal(lr.lost2), PetscSqrtReal(lr.size2));
-  e->lambda = HycoRelative(PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2));
+  lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(u.lost2), PetscSqrtReal(u.size2)};
+  lost[HYCO_ERROR_U_RID] = (HycoLost){rid.lost, rid.size};
+  lost[HYCO_ERROR_SIGMA] = (HycoLost){PetscSqrtReal(s.lost2), PetscSqrtReal(s.size2)};
+  lost[HYCO_ERROR_SIGMA_11] = (HycoLost){s11.lost, s11.size};
+  lost[HYCO_ERROR_LAMBDA] = (HycoLost){PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2)};
+  lost[HYCO_ERROR_LAMBDA_RID] = (HycoLost){PetscSqrtReal(lr.lost2), PetscSqrtReal(lr.size2)};
+  lost[HYCO_ERROR_INELASTIC] = (HycoLost){PetscSqrtReal(p.lost2), PetscSqrtReal(p.size2)};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMCompareFields(HycoROM m, const PetscReal u[], const PetscReal sigma[], const PetscReal lambda[],
+                                    HycoErrors *e, HycoForceErrors *forces)
+{
+  HycoLost lost[HYCO_N_ERRORS];
+  PetscReal relative[HYCO_N_ERRORS];
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMMeasureErrors(m, u, sigma, NULL, lambda, lost));
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) relative[j] = HycoRelative(lost[j].lost, lost[j].size);
+  e->u = relative[HYCO_ERROR_U];
+  e->u_rid = relative[HYCO_ERROR_U_RID];
+  e->sigma = relative[HYCO_ERROR_SIGMA];
+  e->sigma_11 = relative[HYCO_ERROR_SIGMA_11];
+  e->lambda_rid = relative[HYCO_ERROR_LAMBDA_RID];
+  e->lambda = relative[HYCO_ERROR_LAMBDA];
   if (forces)
-    *forces = (HycoForceErrors){PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2), PetscSqrtReal(lr.lost2),
-                                PetscSqrtReal(lr.size2)};
+    *forces = (HycoForceErrors){lost[HYCO_ERROR_LAMBDA].lost, lost[HYCO_ERROR_LAMBDA].size,
+                                lost[HYCO_ERROR_LAMBDA_RID].lost, lost[HYCO_ERROR_LAMBDA_RID].size};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -2,7 +2,46 @@
    an online solve takes. */
 #include <hycoreducerimpl.h>
 
-const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda", "lambda_rid", NULL};
+const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda", "lambda_rid", "inelastic", NULL};
+
+/* A path in the store. */
+typedef struct {
+  HycoROM m;
+  HycoSnapshots store;
+  const PetscReal *mu;
+} Stored;
+
+static PetscErrorCode ReadStored(void *ctx, PetscInt k, PetscReal u[], PetscReal sigma[], PetscReal inelastic[],
+                                 PetscReal lambda[])
+{
+  const Stored *s = (const Stored *)ctx;
+  const HycoROM m = s->m;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsRead(s->store, s->mu, k, "U", m->whole_nodes * m->mesh->dim, u));
+  PetscCall(HycoSnapshotsRead(s->store, s->mu, k, "sigma", m->whole_cells * m->fe->n_sigma, sigma));
+  PetscCall(HycoSnapshotsRead(s->store, s->mu, k, "inelastic", m->whole_cells, inelastic));
+  PetscCall(HycoSnapshotsRead(s->store, s->mu, k, "lambda", m->pairs.n, lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces as they are before they are divided by what is large among the held-out paths. */
+static PetscErrorCode ComparePath(HycoROM m, HycoSnapshots store, const PetscReal mu[], HycoHeldOut *row)
+{
+  Stored stored = {m, store, mu};
+  const HycoPathSource source = {m->scene->n_times, ReadStored, &stored};
+  HycoPathErrors e;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMMeasurePath(m, &source, &e));
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) row->error[j] = e.worst[j];
+  row->size = e.force;
+  row->rid_size = e.force_rid;
+  if (e.force > 0) row->error[HYCO_ERROR_LAMBDA] *= e.force;
+  if (e.force_rid > 0) row->error[HYCO_ERROR_LAMBDA_RID] *= e.force_rid;
+  if (row->converged > 0) PetscCall(HycoTrustMeasure(m, row->feature));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 static PetscErrorCode Compare(HycoROM m, HycoSnapshots store, const PetscReal mu[], HycoHeldOut *row)
 {
@@ -13,9 +52,9 @@ static PetscErrorCode Compare(HycoROM m, HycoSnapshots store, const PetscReal mu
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(n_dof, &u, n_sigma, &sigma, m->pairs.n, &lambda));
-  PetscCall(HycoSnapshotsRead(store, mu, "U", n_dof, u));
-  PetscCall(HycoSnapshotsRead(store, mu, "sigma", n_sigma, sigma));
-  PetscCall(HycoSnapshotsRead(store, mu, "lambda", m->pairs.n, lambda));
+  PetscCall(HycoSnapshotsRead(store, mu, 0, "U", n_dof, u));
+  PetscCall(HycoSnapshotsRead(store, mu, 0, "sigma", n_sigma, sigma));
+  PetscCall(HycoSnapshotsRead(store, mu, 0, "lambda", m->pairs.n, lambda));
   PetscCall(HycoROMCompareFields(m, u, sigma, lambda, &e, &f));
   row->error[HYCO_ERROR_U] = e.u;
   row->error[HYCO_ERROR_U_RID] = e.u_rid;
@@ -30,6 +69,25 @@ static PetscErrorCode Compare(HycoROM m, HycoSnapshots store, const PetscReal mu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One held-out point; of a path in the steps that full order took. */
+static PetscErrorCode PredictOne(HycoROM m, HycoSnapshots store, const PetscReal mu[])
+{
+  PetscReal *taken = NULL;
+  PetscInt n;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (m->scene->n_times) {
+    PetscCall(HycoSnapshotsReadTaken(store, mu, &n, &taken));
+    PetscCall(HycoROMSetSteps(m, n, taken));
+  }
+  ierr = HycoROMPredict(m, m->scene->n_parameters, mu);
+  if (taken) PetscCall(HycoROMSetSteps(m, 0, NULL));
+  PetscCall(PetscFree(taken));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Points first .. last-1 in their order, several times: what a load ramp keeps from one step to the next is kept. */
 static PetscErrorCode PredictShare(HycoROM m, HycoSnapshots store, PetscInt first, PetscInt last, const PetscReal mu[],
                                    HycoHeldOut rows[])
@@ -37,13 +95,17 @@ static PetscErrorCode PredictShare(HycoROM m, HycoSnapshots store, PetscInt firs
   const PetscInt n_par = m->scene->n_parameters;
 
   PetscFunctionBegin;
-  for (PetscInt r = 0; r < HYCO_HELD_REPEATS; r++) {
+  for (PetscInt r = 0; r < (m->scene->n_times ? 1 : HYCO_HELD_REPEATS); r++) {
     for (PetscInt k = first; k < last; k++) {
-      PetscCall(HycoROMPredict(m, n_par, mu + k * n_par));
+      PetscCall(PredictOne(m, store, mu + k * n_par));
       rows[k].seconds[r] = m->prediction.seconds.total;
+      for (PetscInt j = 0; j < HYCO_HELD_REPEATS && m->scene->n_times; j++) rows[k].seconds[j] = rows[k].seconds[0];
       if (r) continue;
       rows[k].converged = m->prediction.reason > 0;
-      PetscCall(Compare(m, store, mu + k * n_par, &rows[k]));
+      if (m->scene->n_times)
+        PetscCall(ComparePath(m, store, mu + k * n_par, &rows[k]));
+      else
+        PetscCall(Compare(m, store, mu + k * n_par, &rows[k]));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -77,8 +139,9 @@ PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[])
 
 PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force)
 {
+  const PetscBool forces = (PetscBool)(kind == HYCO_ERROR_LAMBDA || kind == HYCO_ERROR_LAMBDA_RID);
   const PetscReal size = kind == HYCO_ERROR_LAMBDA ? row->size : row->rid_size,
-                  by = kind < HYCO_ERROR_LAMBDA ? 1 : PetscMax(size, HYCO_SMALL_FORCE * force);
+                  by = forces ? PetscMax(size, HYCO_SMALL_FORCE * force) : 1;
 
   if (row->converged < 0.5) return PETSC_INFINITY;
   if (by > 0) return row->error[kind] / by;

@@ -7,14 +7,24 @@
 #include <hycoreducerimpl.h>
 #include <string.h>
 
+/* What paths are not there for yet. */
+static PetscErrorCode RefuseMoved(HycoReducer t)
+{
+  PetscFunctionBegin;
+  HycoCheck(!t->pairs.room,
+            "the scene has a history, and a map moves a contact surface (type surface) whose masters are searched for: "
+            "reduced models of such paths are not there; hyco solve -mu solves them at full order");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The whole mesh on rank 0, its sizes everywhere. */
 static PetscErrorCode ReadMesh(HycoReducer t)
 {
-  PetscInt n_par, group = 0;
-  const PetscReal *mu;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscInt group = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoMeshCreateWhole(HycoComm(t), t->scene, &t->whole));
   HycoOnRoot(HycoComm(t), HycoPairsFind(t->scene, t->whole, &t->pairs));
   for (PetscInt k = 0; k < t->n_groups; k++)
@@ -28,6 +38,7 @@ static PetscErrorCode ReadMesh(HycoReducer t)
   }
   HycoOnRoot(HycoComm(t), HycoFESetParameters(t->fe, mu));
   PetscCallMPI(MPI_Bcast(t->sizes, 4, MPIU_INT, 0, HycoComm(t)));
+  if (t->scene->n_times) HycoOnRoot(HycoComm(t), RefuseMoved(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -211,7 +222,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   r->n_facts = 0; /* of the iteration before */
   r->stiffness = m->traits.stiffness;
   r->chosen.recipe.rid = (PetscBool)(m->traits.settings == HYCO_SETTINGS_RID);
-  r->n_samples = t->n_s;
+  r->n_samples = m->n_points;
   r->n_modes = t->l;
   r->n_dual_modes = t->counts[HYCO_SEED_DUAL];
   r->n_stress_modes = t->counts[HYCO_SEED_STRESS];
@@ -369,7 +380,7 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
   PetscFunctionBegin;
   PetscCall(HycoReducerReset(t));
   t->samples = samples;
-  PetscCall(HycoSamplesGet(samples, &t->n_s, NULL, NULL));
+  PetscCall(HycoReducerCount(t));
   PetscCheck(t->n_s > 0, HycoComm(t), PETSC_ERR_USER, "the set of training points is empty");
   HycoOnRoot(HycoComm(t), CheckWritable(path));
   PetscCall(ReadMesh(t));
