@@ -80,6 +80,11 @@ typedef struct {
   HycoExpr traction[3]; /* force per unit surface; NULL: none */
 } HycoLoad;
 
+/* What a 2D scene stands for: a slice of thickness 1 that does not stretch (eps_zz = 0) or is free to (sigma_zz = 0),
+   or a body of revolution about x = 0: x is the radius, y the axis, zz the hoop; all integrals are over the full
+   circle. */
+typedef enum { HYCO_PLANE_STRAIN, HYCO_PLANE_STRESS, HYCO_AXISYMMETRIC } HycoFormulation;
+
 /* A quantity over time: linear between its rows, constant before the first and after the last. */
 typedef struct {
   PetscInt n;
@@ -92,7 +97,8 @@ struct _p_HycoScene {
   char *title, *mesh_path;
   DM dm;           /* the program's own mesh; NULL: mesh_path */
   PetscInt refine; /* times that the mesh's cells are halved */
-  char *folder;    /* where relative paths of entries start */
+  HycoFormulation formulation;
+  char *folder; /* where relative paths of entries start */
   /* parameters */
   PetscInt n_parameters;
   PetscInt n_variables; /* of expressions: the parameters; with a history t and its tables' values too */

@@ -42,6 +42,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscCall(PetscFree(f->u));
   PetscCall(PetscFree(f->u_all));
   PetscCall(PetscFree(f->sigma_all));
+  PetscCall(PetscFree(f->contact_result));
   PetscCall(PetscFree(f->lambda));
   PetscCall(PetscFree(f->sigma));
   PetscCall(PetscFree(f->gap));

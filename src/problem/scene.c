@@ -12,7 +12,7 @@ static const char *const body_fields[] = {
     "element", "map_x", "map_y", "map_z", "law", "temperature", "reference_temperature", "expansion", "law_type", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const contact_fields[] = {"type", NULL};
-static const char *const scene_fields[] = {"title", "mesh", "parameters", "refine", NULL};
+static const char *const scene_fields[] = {"title", "mesh", "parameters", "refine", "formulation", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
 /* Splits "body_pellet_young" after "body_" into "pellet" and the index of "young"; false if no field ends it. */
@@ -525,6 +525,25 @@ static PetscErrorCode ReadRefine(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode ReadFormulation(HycoScene s)
+{
+  static const char *const names[] = {"plane_strain", "plane_stress", "axisymmetric"};
+  char *text = NULL;
+  PetscBool known;
+
+  PetscFunctionBegin;
+  PetscCall(GetString(s, "scene_formulation", &text));
+  known = (PetscBool)!text[0];
+  for (PetscInt k = 0; k < 3; k++) {
+    if (strcasecmp(text, names[k])) continue;
+    s->formulation = (HycoFormulation)k;
+    known = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(text));
+  HycoCheck(known, "scene_formulation says what a 2D scene stands for: plane_strain, plane_stress or axisymmetric");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode FindMesh(HycoScene s, const char folder[])
 {
   char *mesh = NULL, path[PETSC_MAX_PATH_LEN];
@@ -552,6 +571,7 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscCall(GetString(s, "scene_title", &s->title));
   PetscCall(FindMesh(s, folder));
   PetscCall(ReadRefine(s));
+  PetscCall(ReadFormulation(s));
   PetscCall(ReadParameters(s));
   PetscCall(HycoSceneReadHistory(s));
   for (PetscInt k = 0; k < s->n_entries; k++) {
