@@ -139,7 +139,8 @@ PetscErrorCode HycoROMGetLambda(HycoROM model, PetscInt *n_contacts, const Petsc
 /* Displacement of the whole mesh, n_nodes x dim in the mesh file's order: reads the whole-mesh part on first use.
  * Borrowed. */
 PetscErrorCode HycoROMGetWholeU(HycoROM model, PetscInt *n_nodes, const PetscReal *U[]);
-/* Writes the last prediction on the whole mesh to `path` (.xdmf) and the .h5 beside it. */
+/* Writes the last prediction on the whole mesh to `path` (.xdmf) and the .h5 beside it. Of a path all of its listed
+   times, as HycoFOMSetSeries() has them: the laws are replayed outside the RID, which fails where one has no answer. */
 PetscErrorCode HycoROMWrite(HycoROM model, const char path[]);
 /*
   Errors of the last prediction against the last full-order solution at the same parameters; relative, as fractions.

@@ -114,6 +114,8 @@ PetscErrorCode HycoTraceBegin(HycoROM model);
 PetscErrorCode HycoTraceAdd(HycoROM model, PetscReal t);
 PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inelastic);
 PetscErrorCode HycoTraceFree(HycoROM model);
+/* The fields of the path at its listed times on the whole mesh, as HycoFOMSetSeries() has them (replay.c). */
+PetscErrorCode HycoTraceWrite(HycoROM model, const char path[]);
 /* The path's part of a prediction. */
 void HycoTraceSummary(HycoROM model, HycoPrediction *prediction);
 /* U of the whole mesh (n_dof) from what accepted step k left of it, fe_whole being at its parameters. */

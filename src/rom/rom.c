@@ -348,7 +348,10 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
 
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
-  HycoCheck(!m->scene->n_times, "-output is not there for reduced paths; -table has their listed times");
+  if (m->scene->n_times) {
+    PetscCall(HycoTraceWrite(m, path));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoROMGetWholeU(m, NULL, &U));
   PetscCall(PetscCalloc1(m->whole->n_cells, &rid));
   for (PetscInt e = 0; e < m->mesh->n_cells; e++) rid[m->mesh->cell_whole[e]] = 1;

@@ -35,6 +35,14 @@ J2 = 'law: j2, yield: 80, hardening: 2000'
 KINDS = ('u', 'sigma', 'lambda', 'inelastic')
 
 
+def arrays(path):
+    """All numbers of a series by name."""
+    out = {}
+    with h5py.File(path) as f:
+        f.visititems(lambda name, item: out.update({name: item[()]}) if isinstance(item, h5py.Dataset) and item.dtype.kind == 'f' else None)
+    return out
+
+
 class Paths(Case):
     @classmethod
     def setUpClass(cls):
@@ -134,6 +142,22 @@ class Paths(Case):
         for column in ('total_contact_force', 'rid_inelastic', 'rid_mises', 'rid_u_norm2'):
             a, b = (np.array(h[column]) for h in histories)
             self.assertLess(abs(a - b).max(), 1e-6 * abs(a).max(), column)
+
+    def test_replay(self):
+        """The series has the state of the whole mesh: full order's where the model is exact, nearly that from an RID."""
+        self.hyco('solve', '-scene', self.norton, '-mu', '0.0052,0.93', '-output', self.path('full.xdmf'))
+        full = arrays(self.path('full.h5'))
+        for name, settings, limit in (('exact', ['-grid', '1,1', '-hyco_rid_whole', '-hyco_hybrid', 'all'], 1e-7),
+                                      ('near', ['-grid', '3,3', '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', '1'], 3e-2)):
+            self.train(self.norton, name + '.h5', *settings)
+            self.hyco('predict', '-model', self.path(name + '.h5'), '-mu', '0.0052,0.93', '-output', self.path(name + '-path.xdmf'))
+            reduced = arrays(self.path(name + '-path.h5'))
+            self.assertEqual(full.keys(), reduced.keys())
+            for field in ('nodes/displacement', 'cells/stress', 'cells/inelastic', 'nodes/contact_force'):
+                steps = [n for n in full if n.endswith(field)]
+                self.assertEqual(len(steps), 7)
+                size = max(abs(full[n]).max() for n in steps)
+                self.assertLess(max(abs(full[n] - reduced[n]).max() for n in steps), limit * size, (name, field))
 
     def test_without_flow(self):
         """A path without flow: at each time the answer of an elastic model with the same solutions, the load its parameter."""
