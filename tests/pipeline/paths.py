@@ -115,6 +115,15 @@ class Paths(Case):
         view = self.run_raw('view', '-model', self.path('unseen.h5')).stdout
         self.assertIn('7 listed times', view)
 
+    def test_projection(self):
+        """The projection-based model has paths too: on the whole mesh, with nonnegative force vectors."""
+        for dual, limit in (('nnmf', 0.15), ('snapshots', 0.15)):
+            self.train(self.norton, 'projection.h5', '-grid', '3,3', '-hyco_model_type', 'projection', '-hyco_dual', dual, '-hyco_pod_tol', '1e-8',
+                       '-hyco_snapshots', self.path('projection'))
+            report = self.compare(self.norton, 'projection.h5', '0.0055,0.91')
+            for kind, bound in zip(KINDS, (0.03, 0.03, limit, 0.03)):
+                self.assertLess(report['worst_' + kind]['max'], bound, (dual, kind))
+
     def test_order_of_questions(self):
         """A point's path is the same to the last bit whatever was asked before it."""
         self.train(self.norton, 'order.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9')
