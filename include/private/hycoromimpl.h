@@ -8,6 +8,7 @@
 #include <hycosolverimpl.h>
 
 typedef struct _n_HycoNorms *HycoNorms;
+typedef struct _n_HycoProbe *HycoProbe;
 
 /* Rows of B in CSR over dofs of a mesh, and D: see HycoContactRows(). */
 typedef struct {
@@ -73,6 +74,7 @@ struct _p_HycoROM {
   HycoFE fe_whole;
   HycoPairs whole_pairs;
   HycoNorms norms; /* made by the first comparison */
+  HycoProbe probe; /* of the scene's quantities; made by the first prediction that is asked for */
   /* online */
   PetscBool full_order, full_displacement; /* what its user, who has the scene, is to do: HycoROMGetFallback() */
   PetscBool ready, reconstruct, solved, whole_current;
@@ -122,6 +124,11 @@ static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start
     start += model->rows.value[j] * model->U[model->rows.dof[j]];
   return start;
 }
+
+/* The scene's quantities (value[scene->n_quantities]) of the last prediction (probe.c). */
+PetscErrorCode HycoROMMeasureQuantities(HycoROM model, PetscReal value[]);
+/* NULL-safe. */
+PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
 
 /* Norms of errors on the whole mesh (norms.c). Scene and mesh are borrowed. */
 PetscErrorCode HycoNormsCreate(HycoScene scene, HycoMesh whole, HycoNorms *norms);
