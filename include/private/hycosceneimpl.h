@@ -109,6 +109,8 @@ struct _p_HycoScene {
   PetscInt n_times, n_tables;
   PetscReal *times; /* increasing; the first is where the path begins */
   HycoTimeTable table[HYCO_MAX_PARAMETERS];
+  /* names that stand for expressions; the texts are the entries' */
+  PetscInt n_constants, *constant;
   /* description */
   PetscInt n_bodies, n_fixed, n_loads, n_contacts;
   HycoBody *body;
@@ -120,6 +122,10 @@ struct _p_HycoScene {
   char **key, **value;
 };
 
+/* Notes the entries constant_NAME, once all variables are known. */
+PetscErrorCode HycoSceneReadConstants(HycoScene scene);
+/* The expression of an entry, with the scene's constants put in. */
+PetscErrorCode HycoSceneExpression(HycoScene scene, const char key[], const char text[], HycoExpr *expr);
 /* Reads the history's entries, once the parameters are read. */
 PetscErrorCode HycoSceneReadHistory(HycoScene scene);
 /* Fails where the history reaches what must not change in time: the bodies' places, the rows of B. */
