@@ -159,10 +159,11 @@ PetscErrorCode HycoMeshCreateWhole(MPI_Comm comm, HycoScene scene, HycoMesh *who
   PetscCall(DMDestroy(&dm));
   *whole = part;
   if (size == 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoMeshGather(comm, part, NULL, whole));
+  PetscCall(HycoMeshGather(comm, part, NULL, NULL, whole));
   PetscCall(HycoMeshDestroy(&part));
   if (!*whole) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree((*whole)->node_global)); /* it is no part any more */
   PetscCall(PetscFree((*whole)->node_whole));
+  PetscCall(PetscFree((*whole)->cell_whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
