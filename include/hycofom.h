@@ -38,6 +38,16 @@ typedef struct {
   char free_motion[128]; /* one that contact alone prevents: "body block from moving along (0, 1, 0)"; "": none */
 } HycoSummary;
 
+/* What a contact of the scene carries. */
+typedef struct {
+  const char *name;     /* the scene's. Borrowed */
+  PetscInt n, n_active; /* contacts, those with L_i > 0 */
+  PetscReal force[3];   /* on the slave's side: the sum of -L_i n_i; on the master's the opposite */
+  PetscReal moment[3];  /* of these about the origin; 2D: the last component alone, and 0 in an axisymmetric scene */
+  PetscReal area;       /* that the contacts with L_i > 0 stand for (2D: length; 1D: 0) */
+  PetscReal pressure; /* the largest of L_i over the area that contact i stands for; 0 where the group is no surface */
+} HycoContactResult;
+
 /* A listed time of a history, and what it took to get there from the one before. Energies are since the first time. */
 typedef struct {
   PetscInt index; /* among the listed times */
@@ -102,6 +112,9 @@ PetscErrorCode HycoFOMGetSystem(HycoFOM fom, HycoSystem *system);
 /* What the last solution amounts to. Collective. */
 PetscErrorCode HycoFOMGetSummary(HycoFOM fom, HycoSummary *summary);
 
+/* What each contact of the scene carries in the last solution, in the scene's order. Collective. Borrowed until the
+   next solve. */
+PetscErrorCode HycoFOMGetContacts(HycoFOM fom, PetscInt *n, const HycoContactResult *result[]);
 /*
   The last solution on rank 0 (empty elsewhere), in the mesh file's order (ascending tags). Collective. Borrowed until
   the next solve:

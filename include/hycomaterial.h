@@ -29,7 +29,7 @@ typedef const char *HycoMaterialType;
 #define HYCO_TO_ONE   (1 + PETSC_MACHINE_EPSILON)
 
 /*
-  n integration points of one law. Strain and stress have n_strain components a point: 1D (xx), 2D plane strain
+  n integration points of one law. Strain and stress have n_strain components a point: 1D (xx), 2D
   (xx, yy, zz, xy), 3D (xx, yy, zz, xy, yz, xz), shear strains as angles (gamma = 2 eps), so that stress . strain is
   twice the energy. Strains are without the thermal strain, which the library takes out. What a caller does not have or
   does not ask for is NULL, and a law that is not linear may be asked for its elastic tangent: strain and strain0 are

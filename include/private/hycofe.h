@@ -36,6 +36,7 @@ struct _n_HycoFE {
   HycoMesh mesh;
   /* sizes: space dimension, n_nodes * dim, stress components */
   PetscInt dim, n_dof, n_sigma;
+  HycoFormulation formulation; /* in 1D and 3D HYCO_PLANE_STRAIN */
   /* what no parameter reaches */
   PetscBool *constant; /* by cell: neither its nodes nor its material */
   PetscInt n_constant;

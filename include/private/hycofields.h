@@ -55,8 +55,9 @@ PetscErrorCode HycoFieldsWrite(const char path[], const HycoFileOrder *order, Hy
 PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /*
-  The usual fields of a solution, then HycoFieldsWrite: displacement, stress, contact force (vector on slaves, minus on
-  masters), contact pressure, gap at the solution, RID marker (may be NULL: none written). u on fe, u_surface on the
+  The usual fields of a solution, then HycoFieldsWrite: displacement, of each cell stress, von Mises stress,
+  principal stresses and body, contact force (vector on slaves, minus on masters), contact pressure, gap at the
+  solution, RID marker (may be NULL: none written). u on fe, u_surface on the
   mesh of the pairs: with an order they are the part's and rank 0's (elsewhere `surface` is NULL), else the same.
 */
 PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],

@@ -36,7 +36,8 @@ struct _p_HycoFOM {
   /* the last solution: displacements at the part's nodes and at the surface's (rank 0), without motions that were
      released; stresses of the part's cells, when asked for; on rank 0 the forces and gaps */
   PetscReal *u, *u_surface, *sigma, *lambda, *gap;
-  PetscReal *u_all, *sigma_all; /* on rank 0 when asked for, in the file's order; on one rank u and sigma */
+  HycoContactResult *contact_result; /* by contact of the scene, when asked for */
+  PetscReal *u_all, *sigma_all;      /* on rank 0 when asked for, in the file's order; on one rank u and sigma */
   PetscBool solved, sigma_ready, all_ready;
   /* U under given forces: its factor of K; residuals of the whole of (16); whether the last solution is one */
   HycoSystem given_system;

@@ -5,11 +5,17 @@
 
 /* Determinant of the map from the reference cell to the nodes at X (3 a node of the mesh), at quadrature point q. */
 PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q);
-/* Gradients dN/dX (nv x 3) of the shape functions at quadrature point q, and |det J| w. */
+/* Gradients dN/dX (nv x 3) of the shape functions at quadrature point q, and |det J| w. In an axisymmetric scene the
+   third component is N / r, the hoop strain of a radial displacement, and the weight that of the full circle. */
 PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal g[8][3],
                              PetscReal *weight);
-/* Their means over the cell, which make the dilatation of the element bbar. */
+/* Means over the cell of the dilatation of unit displacements, which make that of the element bbar. */
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[8][3]);
+/* The dilatation of a unit displacement of a cell's node a along c. */
+static inline PetscReal HycoDilatation(HycoFE fe, PetscReal g[8][3], PetscInt a, PetscInt c)
+{
+  return g[a][c] + (fe->formulation == HYCO_AXISYMMETRIC && c == 0 ? g[a][2] : 0);
+}
 /* The place of quadrature point q of a cell. */
 void HycoPointPlace(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal x[3]);
 /* Strain at a point of u (six components; those that are not n_sigma's are 0), from the shape functions' gradients g
@@ -26,8 +32,8 @@ PetscErrorCode HycoFESetHeat(HycoFE fe, PetscBool all, const PetscBool changed[]
 PetscErrorCode HycoTangentsCreate(HycoFE fe);
 /* The tangents at fe's nodes and mu; all: of cells that no parameter reaches too. */
 PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all);
-/* Outward normal times area weight (n dS) at point q of a facet, of the moved body; in 1D the sign away from its cell.
- */
+/* Outward normal times area weight (n dS, of the full circle in an axisymmetric scene) at point q of a facet, of the
+   moved body; in 1D the sign away from its cell. */
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);
 /* The signs of the cells as drawn, and room for fe->mirrored; finds fe->mirrored at fe's nodes. Fails when a map folds
    a body (some of its cells turned inside out) or mirrors one of two bodies that share nodes. */

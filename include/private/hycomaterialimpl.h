@@ -12,8 +12,9 @@ struct _p_HycoMaterial {
   PetscInt n_state;
   char **state_name; /* n_state, or NULL */
   PetscBool linear, heat;
-  const char *folder;   /* where the scene's relative paths start; borrowed */
-  HycoExpr temperature; /* of the body, which owns it; NULL: it has none */
+  HycoFormulation formulation; /* of the scene; in 1D and 3D HYCO_PLANE_STRAIN */
+  const char *folder;          /* where the scene's relative paths start; borrowed */
+  HycoExpr temperature;        /* of the body, which owns it; NULL: it has none */
   void *data;
 };
 
@@ -22,10 +23,13 @@ static inline PetscInt HycoStrainSize(PetscInt dim)
 {
   return dim == 1 ? 1 : dim == 2 ? 4 : 6;
 }
-/* Reals of a tangent: 2 where it is isotropic (Lame's lambda and mu), else the square of HycoStrainSize(). */
+/* Reals of a tangent: 2 where it is isotropic (Lame's lambda and mu) and a 2D scene is one of plane strain, else the
+   square of HycoStrainSize(). */
 PetscInt HycoMaterialTangentSize(HycoMaterial material, PetscInt dim);
-/* Whether the law is one that the library solves with, in this dimension and with a history of the scene or without. */
-PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, PetscBool has_history);
+/* Whether the law is one that the library solves with, in this dimension and formulation, and with a history of the
+   scene or without. */
+PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, HycoFormulation formulation,
+                                 PetscBool has_history);
 /* Whether the tangent changes where the parameters p with changed[p] do. */
 PetscBool HycoMaterialChanges(HycoMaterial material, const PetscBool changed[]);
 /* The constants at n points x (n x 3), their temperatures (NULL: none) and mu; work: room for n reals a constant. Fails

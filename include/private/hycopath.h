@@ -1,5 +1,8 @@
-/* HycoPath: the solution of a scene with a history, from its first time to its last: substeps, Newton's method,
- * energies. */
+/*
+  HycoPath: the solution of a scene with a history, from its first time to its last. Steps of time and Newton's method
+  are the same whoever has the bodies (history.c, newton.c): the full order on distributed vectors (path.c), a reduced
+  model on its small ones. Its ops say what it is made of.
+*/
 #ifndef HYCOPATH_H
 #define HYCOPATH_H
 
@@ -24,7 +27,7 @@ typedef struct {
   PetscReal order;     /* observed; 0: too few iterations to tell */
   PetscReal seconds_factor, seconds_solve, seconds_law;
   HycoFEStepReport law; /* over all ranks */
-} HycoAttempt;
+} HycoStepAttempt;
 
 typedef struct {
   PetscReal loads, supports, contact; /* work of loads, of moved supports, against contact forces */
@@ -32,20 +35,52 @@ typedef struct {
   PetscReal defect, size; /* of their balance, the largest of a step so far; the sum of the terms' sizes */
 } HycoWork;
 
+/* All are collective on the path's communicator. NULL for what a path does not do. */
+typedef struct {
+  /* Everything at mu (the scene's variables at the attempt's time): what is borrowed below, F, and D; elastic: K too.
+   */
+  PetscErrorCode (*assemble)(HycoPath, const PetscReal mu[], PetscBool elastic);
+  /* The laws at U: the state `end`, f_int, and r = F - f_int, 0 where U is prescribed; the report over all ranks. */
+  PetscErrorCode (*step)(HycoPath, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report);
+  /* K from fe's tangents. */
+  PetscErrorCode (*stiffness)(HycoPath);
+  /* Adds what supports do that have moved since the last accepted time. */
+  PetscErrorCode (*moves)(HycoPath, Vec rhs);
+  PetscErrorCode (*accept)(HycoPath, const HycoStepAttempt *); /* the attempt is the state at t now */
+  PetscErrorCode (*record)(HycoPath); /* a listed time is reached, or the last that is: fills `now` */
+  PetscErrorCode (*save)(HycoPath);   /* the checkpoint */
+} HycoPathOps;
+
 struct _n_HycoPath {
+  const HycoPathOps *ops;
+  void *ctx; /* whose path it is */
+  MPI_Comm comm;
+  /* borrowed; matrices and system are those of the attempt's time */
+  HycoScene scene;
+  HycoFE fe;
+  HycoSystem system;
+  HycoSolver solver;
+  Mat K, B, Bt;
+  Vec U, Lambda, rhs, D; /* the solution, and the right side of the contact system */
+  PetscInt n_contacts;   /* length of Lambda */
+  PetscInt n_free;       /* unknowns */
+  PetscBool cold;        /* the next contact system is solved without what the solver knows of the last */
   /* options */
   PetscInt method; /* a HycoNewton */
   PetscInt max_its, substeps;
   PetscReal rtol, bound, smallest;
   char checkpoint[PETSC_MAX_PATH_LEN];
   PetscBool resume;
+  /* times of the steps to be taken, instead of its own choice; NULL: none. Borrowed */
+  PetscInt n_given;
+  const PetscReal *given;
   /* state of the material at the last accepted time, and of the attempt */
   HycoFEState begin, end;
-  /* distributed, as U: loads alone, of the attempt and of the last accepted time; internal forces, the same */
-  Vec F, F_old, f_int, f_old, r, U_old, work, diagonal;
+  /* as U: loads alone, of the attempt; internal forces, the same */
+  Vec F, f_int, r, U_old, work, diagonal;
   Vec L_old, gap_work;     /* as Lambda; NULL without contact */
-  PetscReal *f_local, *u0; /* of the part's n_dof */
-  PetscBool tangent;       /* f->K is a tangent, not the elastic stiffness */
+  PetscReal *f_local, *u0; /* of fe's n_dof */
+  PetscBool tangent;       /* K is a tangent, not the elastic stiffness */
   PetscBool flows;         /* some body's law has a memory */
   /* Anderson's acceleration: differences of iterates and residuals, newest last */
   PetscInt n_mixed;
@@ -54,39 +89,60 @@ struct _n_HycoPath {
   /* where the path is */
   PetscReal mu[HYCO_MAX_PARAMETERS], t, dt;
   PetscInt step; /* listed times reached: the index of the next */
-  HycoWork work_done;
-  HycoKKT kkt;  /* of the last accepted time */
-  HycoStep now; /* since the last listed time */
+  HycoKKT kkt;   /* of the last accepted time */
+  HycoStep now;  /* since the last listed time */
   PetscInt n_steps;
   HycoStep *steps;
   PetscReal *orders; /* of the attempts that told one */
   PetscInt n_orders, room_orders;
+  PetscReal *taken; /* times of the accepted steps, the first among them */
+  PetscInt n_taken, room_taken;
   PetscBool ended; /* the last path reached its end */
   char why[HYCO_LINE];
+  /* of the full order */
+  HycoWork work_done;
+  Vec F_old, f_old;  /* of the last accepted time */
   HycoSeries series; /* NULL: none is asked for */
   HycoStepMonitor monitor;
   void *monitor_ctx;
 };
 
-PetscErrorCode HycoPathCreate(HycoFOM fom);
-PetscErrorCode HycoPathDestroy(HycoFOM fom);
+/* With the options' defaults. The caller owns it. */
+PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path);
+/* Vectors as U and Lambda (NULL: no contact), once U, Lambda and fe are there. */
+PetscErrorCode HycoPathSetUp(HycoPath path);
+/* NULL-safe. */
+PetscErrorCode HycoPathFree(HycoPath *path);
 /* Declares and reads the options of -hyco_newton and their kin. */
-PetscErrorCode HycoPathSetFromOptions(HycoFOM fom, HycoOptionItems PetscOptionsObject);
-/* Fails where one of them is given and the scene has no history. */
+PetscErrorCode HycoPathSetFromOptions(HycoPath path, HycoOptionItems PetscOptionsObject);
+/* The virgin bodies, at the first time. Collective. */
+PetscErrorCode HycoPathBegin(HycoPath path, const PetscReal mu[]);
+/* On from where the path is to its end, or as far as it gets: path->ended. Collective. */
+PetscErrorCode HycoPathRun(HycoPath path);
+/* One attempt, from the accepted state at t0 to t1: U, Lambda and the state `end`. Collective. */
+PetscErrorCode HycoPathAttempt(HycoPath path, PetscReal t0, PetscReal t1, HycoStepAttempt *attempt);
+/* U and Lambda of the last accepted time again. */
+PetscErrorCode HycoPathRestore(HycoPath path);
+/* Everything at t but the solution. Collective. */
+PetscErrorCode HycoPathAssemble(HycoPath path, PetscReal t);
+/* In ops->moves: what supports do that have moved away from u (fe's n_dof) is added to the loads of `work`, as
+   HycoFEAssembleForce() has them; *moved: there is some. Collective. */
+PetscErrorCode HycoPathMoves(HycoPath path, const PetscScalar u[], Vec work, PetscBool *moved);
+/* How many solves a factor with its flexibility costs, as a rule: in 3D 24 were counted at 29,000 unknowns and 50 at
+   118,000, the root of their number; in 2D a fifth of that. */
+PetscReal HycoPathFactorCost(HycoPath path);
+/* Whether steps are solved with the elastic stiffness. */
+PetscBool HycoPathPrefersElastic(HycoPath path);
+/* What a path has to tell. */
+void HycoPathGetHistory(HycoPath path, HycoHistory *history);
+
+/* -- of the full order: a HycoPath whose ctx is the HycoFOM -- */
+
+PetscErrorCode HycoFOMPathCreate(HycoFOM fom);
+/* Fails where one of the options of paths is given and the scene has no history. */
 PetscErrorCode HycoPathRefuseOptions(HycoFOM fom);
 /* Solves the history at mu; not reaching its end is told by the summary's reason. Collective. */
 PetscErrorCode HycoPathSolve(HycoFOM fom, const PetscReal mu[]);
-/* One attempt, from the accepted state at t0 to t1: U, Lambda and the state `end`. Collective. */
-PetscErrorCode HycoPathAttempt(HycoFOM fom, PetscReal t0, PetscReal t1, HycoAttempt *attempt);
-/* U and Lambda of the last accepted time again. */
-PetscErrorCode HycoPathRestore(HycoFOM fom);
-/* Everything at t but the solution: the scene's parts, and the loads without what moved supports do. Collective. */
-PetscErrorCode HycoPathAssemble(HycoFOM fom, PetscReal t);
-/* How many solves a factor with its flexibility costs, as a rule: in 3D 24 were counted at 29,000 unknowns and 50 at
-   118,000, the root of their number; in 2D a fifth of that. */
-PetscReal HycoPathFactorCost(HycoFOM fom);
-/* Whether steps are solved with the elastic stiffness. */
-PetscBool HycoPathPrefersElastic(HycoFOM fom);
 /* Fails where the checkpoint would take the place of a model. Collective. */
 PetscErrorCode HycoPathCheckPlace(HycoFOM fom);
 /* The checkpoint, if there is to be one; back from it, if it is there. Collective. */

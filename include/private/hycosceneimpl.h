@@ -80,6 +80,11 @@ typedef struct {
   HycoExpr traction[3]; /* force per unit surface; NULL: none */
 } HycoLoad;
 
+/* What a 2D scene stands for: a slice of thickness 1 that does not stretch (eps_zz = 0) or is free to (sigma_zz = 0),
+   or a body of revolution about x = 0: x is the radius, y the axis, zz the hoop; all integrals are over the full
+   circle. */
+typedef enum { HYCO_PLANE_STRAIN, HYCO_PLANE_STRESS, HYCO_AXISYMMETRIC } HycoFormulation;
+
 /* A quantity over time: linear between its rows, constant before the first and after the last. */
 typedef struct {
   PetscInt n;
@@ -92,7 +97,8 @@ struct _p_HycoScene {
   char *title, *mesh_path;
   DM dm;           /* the program's own mesh; NULL: mesh_path */
   PetscInt refine; /* times that the mesh's cells are halved */
-  char *folder;    /* where relative paths of entries start */
+  HycoFormulation formulation;
+  char *folder; /* where relative paths of entries start */
   /* parameters */
   PetscInt n_parameters;
   PetscInt n_variables; /* of expressions: the parameters; with a history t and its tables' values too */
@@ -103,6 +109,8 @@ struct _p_HycoScene {
   PetscInt n_times, n_tables;
   PetscReal *times; /* increasing; the first is where the path begins */
   HycoTimeTable table[HYCO_MAX_PARAMETERS];
+  /* names that stand for expressions; the texts are the entries' */
+  PetscInt n_constants, *constant;
   /* description */
   PetscInt n_bodies, n_fixed, n_loads, n_contacts;
   HycoBody *body;
@@ -114,6 +122,10 @@ struct _p_HycoScene {
   char **key, **value;
 };
 
+/* Notes the entries constant_NAME, once all variables are known. */
+PetscErrorCode HycoSceneReadConstants(HycoScene scene);
+/* The expression of an entry, with the scene's constants put in. */
+PetscErrorCode HycoSceneExpression(HycoScene scene, const char key[], const char text[], HycoExpr *expr);
 /* Reads the history's entries, once the parameters are read. */
 PetscErrorCode HycoSceneReadHistory(HycoScene scene);
 /* Fails where the history reaches what must not change in time: the bodies' places, the rows of B. */

@@ -6,18 +6,23 @@ STIFFNESS = 1e7  # N/mm of a closed gap: stiff beside the bodies; more would dro
 YIELD = 1e12  # never reached: CalculiX iterates on gap elements only where something else is nonlinear (or the geometry)
 
 
-def write(path, p):
-    """The input file path.inp for ccx -i path. CalculiX reads no more than 20 characters of a number: 12 digits fit."""
+def write(path, p, creep=None):
+    """The input file path.inp for ccx -i path. CalculiX reads no more than 20 characters of a number: 12 digits fit.
+    creep: rate and exponent of the cladding's Norton law, and the end of time, in steps; else all is elastic."""
     with open(path + ".inp", "w", encoding="ascii") as file:
         file.write("*NODE, NSET=ALL\n")
         for i, x in enumerate(p["xyz"]):
             file.write("%d, %.12g, %.12g, %.12g\n" % (i + 1, *x))
-        file.write("*ELEMENT, TYPE=C3D8, ELSET=SOLID\n")
-        for i, cell in enumerate(p["hexes"] + 1):
-            file.write(f"{i + 1}, {', '.join(map(str, cell))}\n")
-        file.write(f"*MATERIAL, NAME=BODY\n*ELASTIC\n{p['young']:.12g}, {p['poisson']:.12g}\n"
-                   f"*PLASTIC\n{YIELD:.12g}, 0.\n{2 * YIELD:.12g}, 1.\n"
-                   "*SOLID SECTION, ELSET=SOLID, MATERIAL=BODY\n")
+        for name, cells in (("PELLET", range(p["n_pellet"])), ("CLADDING", range(p["n_pellet"], len(p["hexes"])))):
+            file.write(f"*ELEMENT, TYPE=C3D8, ELSET={name}\n")
+            for i in cells:
+                file.write(f"{i + 1}, {', '.join(map(str, p['hexes'][i] + 1))}\n")
+            file.write(f"*MATERIAL, NAME={name}\n*ELASTIC\n{p['young']:.12g}, {p['poisson']:.12g}\n")
+            if not creep:
+                file.write(f"*PLASTIC\n{YIELD:.12g}, 0.\n{2 * YIELD:.12g}, 1.\n")
+            elif name == "CLADDING":
+                file.write(f"*CREEP, LAW=NORTON\n{creep['rate']:.12g}, {creep['exponent']:.12g}, 0.\n")
+            file.write(f"*SOLID SECTION, ELSET={name}, MATERIAL={name}\n")
         for i, (slave, master, n) in enumerate(zip(p["slave"], p["master"], p["normal"])):
             # the stretch of a gap element is gap + n.(u_second - u_first)
             file.write(f"*ELEMENT, TYPE=GAPUNI, ELSET=G{i}\n{len(p['hexes']) + 1 + i}, {slave + 1}, {master + 1}\n"
@@ -25,23 +30,29 @@ def write(path, p):
         file.write("*BOUNDARY\n")
         for node, axis in p["fixed"]:
             file.write(f"{node + 1}, {axis + 1}, {axis + 1}\n")
-        file.write("*STEP\n*STATIC\n1., 1.\n*CLOAD\n")
+        file.write(f"*STEP\n*STATIC\n{'1e-9, 1e-9' if creep else '1., 1.'}\n*CLOAD\n")
         for node, axis in np.argwhere(p["force"]):
             file.write(f"{node + 1}, {axis + 1}, {p['force'][node, axis]:.12g}\n")
         file.write("*NODE PRINT, NSET=ALL\nU\n*END STEP\n")
+        if creep:
+            file.write(f"*STEP, INC={creep['steps'] + 1}\n*VISCO, DIRECT, CETOL=1.\n"
+                       f"{creep['end'] / creep['steps']:.12g}, {creep['end']:.12g}\n"
+                       f"*NODE PRINT, NSET=ALL, FREQUENCY={creep['every']}\nU\n*END STEP\n")
 
 
 def displacements(path, n):
-    """n x 3 from path.dat."""
-    u = np.full((n, 3), np.nan)
+    """n x 3 at each printed time, from path.dat."""
+    found = []
     with open(path + ".dat", encoding="ascii") as file:
         for line in file:
             words = line.split()
-            if len(words) == 4 and words[0].isdigit():
-                u[int(words[0]) - 1] = [float(w) for w in words[1:]]
-    if np.isnan(u).any():
+            if words[:1] == ["displacements"]:
+                found.append(np.full((n, 3), np.nan))
+            elif len(words) == 4 and words[0].isdigit():
+                found[-1][int(words[0]) - 1] = [float(w) for w in words[1:]]
+    if not found or np.isnan(found).any():
         raise ValueError("CalculiX printed no displacement of some nodes")
-    return u
+    return found
 
 
 def contact(p, u):

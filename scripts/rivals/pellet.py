@@ -58,16 +58,17 @@ def pairs(xyz, slave, master):
     return slave, master
 
 
-def problem(mesh, radius, load, copy):
-    """Everything as a dictionary of arrays."""
+def problem(mesh, radius, load, copy, pressures=None):
+    """Everything as a dictionary of arrays; of the cells the pellet's come first."""
     drawn, groups = read_mesh(mesh, copy)
     slave, master = pairs(drawn, groups["contact_pellet"], groups["contact_clad"])
     xyz = drawn.copy()
     xyz[np.unique(groups["pellet"]), :2] *= radius / DRAWN_RADIUS
-    force = sum(pressure_forces(xyz, groups[name], np.zeros(3), p * load) for name, p in PRESSURES.items())
+    force = sum(pressure_forces(xyz, groups[name], np.zeros(3), p * load) for name, p in (pressures or PRESSURES).items())
     normal = drawn[master] * [1, 1, 0]
     fixed = [(node, axis) for name, axis in FIXED.items() for node in np.unique(groups[name])]
-    return {"xyz": xyz, "hexes": np.concatenate([groups["pellet"], groups["cladding"]]), "force": force, "slave": slave,
+    return {"xyz": xyz, "hexes": np.concatenate([groups["pellet"], groups["cladding"]]),
+            "n_pellet": np.array(len(groups["pellet"])), "force": force, "slave": slave,
             "master": master, "normal": normal / np.linalg.norm(normal, axis=1)[:, None],
             "gap": np.array(DRAWN_RADIUS - radius), "fixed": np.array(fixed), "young": np.array(YOUNG),
             "poisson": np.array(POISSON)}

@@ -17,6 +17,33 @@ static PetscErrorCode Remarks(const HycoSummary *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What each contact carries; in words where there are several. */
+static PetscErrorCode SayContacts(cJSON *json, HycoFOM fom, PetscInt dim)
+{
+  const HycoContactResult *r;
+  cJSON *all = cJSON_AddObjectToObject(json, "contacts");
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetContacts(fom, &n, &r));
+  for (PetscInt k = 0; k < n; k++) {
+    cJSON *one = cJSON_AddObjectToObject(all, r[k].name);
+
+    cJSON_AddNumberToObject(one, "n", r[k].n);
+    cJSON_AddNumberToObject(one, "n_active", r[k].n_active);
+    ReportVector(one, "force", dim, r[k].force);
+    if (dim == 2) ReportVector(one, "moment", 1, r[k].moment + 2);
+    if (dim == 3) ReportVector(one, "moment", 3, r[k].moment);
+    cJSON_AddNumberToObject(one, "area", r[k].area);
+    cJSON_AddNumberToObject(one, "pressure_max", r[k].pressure);
+    if (n > 1)
+      PetscCall(Say("contact %s: %d of %d active, force on the slave (%.6g, %.6g, %.6g), largest pressure %.6g\n",
+                    r[k].name, (int)r[k].n_active, (int)r[k].n, (double)r[k].force[0], (double)r[k].force[1],
+                    (double)r[k].force[2], (double)r[k].pressure));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom, const HycoSummary *s)
 {
   cJSON *json;
@@ -61,6 +88,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g, identity to %.1e\n",
                 (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
                 (double)s->energy_defect));
+  PetscCall(SayContacts(json, fom, s->dim));
   PetscCall(
       Say("KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
           (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,

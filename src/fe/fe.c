@@ -73,6 +73,9 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
   const PetscBool has_mean = (PetscBool)(mesh->type == HYCO_QUAD4 || mesh->type == HYCO_HEX8);
 
   PetscFunctionBegin;
+  HycoCheck(mesh->dim == 2 || scene->formulation == HYCO_PLANE_STRAIN,
+            "scene_formulation says what a 2D scene stands for, and this mesh has %d dimension%s; take it out",
+            (int)mesh->dim, mesh->dim == 1 ? "" : "s");
   for (PetscInt b = 0; b < scene->n_bodies; b++) {
     const HycoBody *body = &scene->body[b];
     const PetscBool flows = (PetscBool)!body->law->linear;
@@ -80,6 +83,10 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
     HycoCheck(!body->bbar || has_mean,
               "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (line2, tri3 or tet4) the "
               "dilatation is constant already and nothing would change",
+              body->name);
+    HycoCheck(!body->bbar || scene->formulation != HYCO_PLANE_STRESS,
+              "body_%s_element is bbar, against locking where the volume is kept; under plane_stress the thickness is "
+              "free, and nothing locks",
               body->name);
     HycoCheck(
         !flows || body->element || has_mean || mesh->dim == 1,
@@ -101,7 +108,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscMalloc1(scene->n_bodies, &bbar));
   ierr = ChooseElements(scene, mesh, bbar);
   for (PetscInt b = 0; b < scene->n_bodies && !ierr; b++)
-    ierr = HycoMaterialSetUp(scene->body[b].law, mesh->dim, (PetscBool)(scene->n_times > 0));
+    ierr = HycoMaterialSetUp(scene->body[b].law, mesh->dim, scene->formulation, (PetscBool)(scene->n_times > 0));
   if (ierr) PetscCall(PetscFree(bbar));
   PetscCall(ierr);
   PetscCall(PetscNew(&f));
@@ -109,6 +116,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   f->scene = scene;
   f->mesh = mesh;
   f->dim = mesh->dim;
+  f->formulation = scene->formulation;
   f->n_dof = mesh->n_nodes * mesh->dim;
   f->n_sigma = HycoStrainSize(mesh->dim);
   PetscCall(PetscMalloc1(3 * mesh->n_nodes, &f->X));
@@ -157,6 +165,33 @@ static PetscErrorCode MoveNodes(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of an axisymmetric scene: whether a node, as drawn, lies on the axis, where it cannot leave it. */
+static PetscBool OnAxis(HycoFE fe, PetscInt node)
+{
+  return (PetscBool)(fe->formulation == HYCO_AXISYMMETRIC &&
+                     PetscAbsReal(fe->mesh->xyz[3 * node]) <= 1e-9 * HycoMeshLength(fe->mesh));
+}
+
+/* Of an axisymmetric scene: no node on the other side of the axis, and those that lie on it stay there. */
+static PetscErrorCode CheckAxis(HycoFE fe)
+{
+  const PetscReal zero = 1e-9 * HycoMeshLength(fe->mesh);
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; fe->formulation == HYCO_AXISYMMETRIC && i < fe->mesh->n_nodes; i++) {
+    const PetscReal r = fe->X[3 * i];
+
+    HycoCheck(r >= -zero, "node %d lies at x = %g; an axisymmetric scene is drawn on one side of its axis, x >= 0",
+              (int)fe->mesh->node_id[i], (double)r);
+    HycoCheck((r <= zero) == OnAxis(fe, i),
+              "the map of body %s moves node %d from x = %g to x = %g; in an axisymmetric scene nodes of the axis, x = "
+              "0, stay there, and others off it",
+              fe->scene->body[fe->mesh->node_body[i]].name, (int)fe->mesh->node_id[i], (double)fe->mesh->xyz[3 * i],
+              (double)r);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Fixed components and their values, evaluated at the moved nodes. */
 static PetscErrorCode SetSupports(HycoFE fe)
 {
@@ -166,6 +201,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
   PetscCall(PetscArrayzero(fe->fixed, fe->n_dof));
   PetscCall(PetscArrayzero(fe->u0, fe->n_dof));
   fe->lifted = PETSC_FALSE;
+  for (PetscInt i = 0; i < m->n_nodes; i++) fe->fixed[i * m->dim] = OnAxis(fe, i);
   for (PetscInt k = 0; k < fe->scene->n_fixed; k++) {
     HycoFixed *fixed = &fe->scene->fixed[k];
     PetscInt g = 0;
@@ -255,6 +291,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   fe->ready = PETSC_FALSE; /* until all of it is done */
   if (first || c.nodes) {
     PetscCall(MoveNodes(fe));
+    PetscCall(CheckAxis(fe));
     PetscCall(HycoMirrorFind(fe));
     for (PetscInt k = 0; k < fe->n_loads; k++) fe->shares[k].ready = PETSC_FALSE;
   }

@@ -15,6 +15,15 @@ PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const Pe
          J[0][2] * (J[1][0] * J[2][1] - J[1][1] * J[2][0]);
 }
 
+/* The radius of a point from its shape functions N at these nodes. */
+static PetscReal Radius(HycoFE fe, PetscInt n, const PetscInt node[], const PetscReal N[])
+{
+  PetscReal r = 0;
+
+  for (PetscInt a = 0; a < n; a++) r += N[a] * fe->X[3 * node[a]];
+  return r;
+}
+
 PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal g[8][3],
                              PetscReal *weight)
 {
@@ -53,6 +62,12 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
     }
   }
   *weight = PetscAbsReal(det) * el->w[q];
+  if (fe->formulation == HYCO_AXISYMMETRIC) {
+    const PetscReal r = Radius(fe, el->nv, node, el->N[q]);
+
+    for (PetscInt a = 0; a < el->nv; a++) g[a][2] = el->N[q][a] / r;
+    *weight *= 2 * PETSC_PI * r;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -71,6 +86,7 @@ PetscErrorCode HycoMeshCheckCells(HycoMesh m)
 
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal mean[8][3])
 {
+  const PetscInt dim = el->dim;
   PetscReal g[8][3], w, volume = 0;
 
   PetscFunctionBegin;
@@ -79,11 +95,11 @@ PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
     volume += w;
     for (PetscInt a = 0; a < el->nv; a++) {
-      for (PetscInt c = 0; c < 3; c++) mean[a][c] += w * g[a][c];
+      for (PetscInt c = 0; c < dim; c++) mean[a][c] += w * HycoDilatation(fe, g, a, c);
     }
   }
   for (PetscInt a = 0; a < el->nv; a++) {
-    for (PetscInt c = 0; c < 3; c++) mean[a][c] /= volume;
+    for (PetscInt c = 0; c < dim; c++) mean[a][c] /= volume;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -116,6 +132,7 @@ PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet,
     const PetscInt d = (c + 1) % 3, e = (c + 2) % 3;
 
     n[c] = side * el->w[q] * (t[0][d] * t[1][e] - t[0][e] * t[1][d]);
+    if (fe->formulation == HYCO_AXISYMMETRIC) n[c] *= 2 * PETSC_PI * Radius(fe, el->nv, node, el->N[q]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -143,8 +160,13 @@ void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const Pets
         h[c][d] += u[m->cells[cell * m->nv + a] * m->dim + c] * g[a][d];
     }
   }
+  if (fe->formulation == HYCO_AXISYMMETRIC) {
+    h[2][2] = h[0][2];
+    h[0][2] = h[1][2] = 0;
+  }
   for (PetscInt c = 0; mean && c < m->dim; c++) {
-    for (PetscInt a = 0; a < el->nv; a++) excess += u[m->cells[cell * m->nv + a] * m->dim + c] * (mean[a][c] - g[a][c]);
+    for (PetscInt a = 0; a < el->nv; a++)
+      excess += u[m->cells[cell * m->nv + a] * m->dim + c] * (mean[a][c] - HycoDilatation(fe, g, a, c));
   }
   for (PetscInt c = 0; mean && c < 3; c++) h[c][c] += excess / 3;
   for (PetscInt k = 0; k < 6; k++)
@@ -159,9 +181,10 @@ void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[8][3], PetscRe
 
   for (PetscInt a = 0; a < el->nv; a++) {
     for (PetscInt c = 0; c < fe->dim; c++) {
-      PetscReal sum = mean ? pressure * (mean[a][c] - g[a][c]) : 0;
+      PetscReal sum = mean ? pressure * (mean[a][c] - HycoDilatation(fe, g, a, c)) : 0;
 
       for (PetscInt d = 0; d < fe->dim; d++) sum += g[a][d] * s[at[c][d]];
+      if (fe->formulation == HYCO_AXISYMMETRIC && c == 0) sum += g[a][2] * s[2];
       f[a * fe->dim + c] += w * sum;
     }
   }

@@ -1,5 +1,5 @@
 /*
-  K: the element loop over the laws' tangents C (plane strain in 2D), and the matrices it fills: the sum of w B^T C B
+  K: the element loop over the laws' tangents C, and the matrices it fills: the sum of w B^T C B
   over a cell's points, or for isotropic tangents products of gradients that need no B. The element bbar takes the
   dilatation's mean over the cell (T. J. R. Hughes, Int. J. Numer. Meth. Engng 15 (1980) 1413-1418); isotropic:
 
@@ -96,7 +96,8 @@ static void StrainRows(HycoFE fe, const HycoElement *el, PetscReal g[8][3], Pets
     for (PetscInt d = 0; d < dim; d++) {
       if (d != c) B[shear[c][d] * n + r] = g[a][d];
     }
-    for (PetscInt k = 0; mean && k < 3; k++) B[k * n + r] += (mean[a][c] - g[a][c]) / 3;
+    if (fe->formulation == HYCO_AXISYMMETRIC && c == 0) B[2 * n + r] = g[a][2];
+    for (PetscInt k = 0; mean && k < 3; k++) B[k * n + r] += (mean[a][c] - HycoDilatation(fe, g, a, c)) / 3;
   }
 }
 
@@ -282,10 +283,13 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
       PetscCall(HycoGradients(fe, el, e, q, g, &w));
       for (PetscInt a = 0; a < el->nv; a++) {
         for (PetscInt b = 0; b < el->nv; b++) {
-          const PetscReal slopes = g[a][0] * g[b][0] + g[a][1] * g[b][1] + g[a][2] * g[b][2];
-          const PetscReal value = w * (el->N[q][a] * el->N[q][b] + length * length * slopes);
+          const PetscReal plane = g[a][0] * g[b][0] + g[a][1] * g[b][1], third = g[a][2] * g[b][2];
 
-          for (PetscInt c = 0; c < dim; c++) Me[(a * dim + c) * n + b * dim + c] += value;
+          for (PetscInt c = 0; c < dim; c++) {
+            const PetscReal slopes = plane + (fe->formulation != HYCO_AXISYMMETRIC || c == 0 ? third : 0);
+
+            Me[(a * dim + c) * n + b * dim + c] += w * (el->N[q][a] * el->N[q][b] + length * length * slopes);
+          }
         }
       }
     }

@@ -350,6 +350,8 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part
   }
   PetscCall(Total(comm, 36 * n_parts, sum));
   for (PetscInt k = 0; k < 36 * n_parts; k++) parts[k / 36].gram[k % 36 / 6][k % 6] = sum[k].high;
+  for (PetscInt p = 0; p < n_parts && fe->formulation == HYCO_AXISYMMETRIC; p++) /* only along the axis is it rigid */
+    parts[p].gram[0][0] += 1, parts[p].gram[2][2] += 1;
   PetscCall(PetscFree(sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -441,7 +441,7 @@ PetscErrorCode HycoPathLoad(HycoFOM f)
   PetscCall(SpreadContent(f, &c));
   PetscCall(TakeContent(f, &c));
   PetscCall(FreeContent(&c));
-  PetscCall(HycoPathAssemble(f, p->t)); /* what is asked for without another step */
+  PetscCall(HycoPathAssemble(p, p->t)); /* what is asked for without another step */
   PetscCall(HycoFOMGather(f));
   PetscCall(HycoSeriesRestore(f));
   PetscFunctionReturn(PETSC_SUCCESS);

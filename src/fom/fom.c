@@ -10,7 +10,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   HycoCheckHandle(*fom, HYCO_FOM_CLASSID);
   HycoDereference(fom);
   f = *fom;
-  PetscCall(HycoPathDestroy(f));
+  PetscCall(HycoPathFree(&f->path));
   PetscCall(HycoSolverDestroy(&f->solver));
   PetscCall(HycoSystemDestroy(&f->system));
   PetscCall(HycoSolverDestroy(&f->given_solver));
@@ -42,6 +42,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscCall(PetscFree(f->u));
   PetscCall(PetscFree(f->u_all));
   PetscCall(PetscFree(f->sigma_all));
+  PetscCall(PetscFree(f->contact_result));
   PetscCall(PetscFree(f->lambda));
   PetscCall(PetscFree(f->sigma));
   PetscCall(PetscFree(f->gap));
@@ -215,6 +216,15 @@ static PetscErrorCode CreateB(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The options of paths; without a scene they are declared. */
+static PetscErrorCode ReadPath(HycoFOM f, HycoOptionItems PetscOptionsObject)
+{
+  PetscFunctionBegin;
+  if (!f->path) PetscCall(HycoPathNew(HycoComm(f), f->scene, &f->path));
+  PetscCall(HycoPathSetFromOptions(f->path, PetscOptionsObject));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SetFromOptions(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -231,7 +241,7 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
       "-hyco_mesh_write", "<file.h5>: writes the mesh, refined as the scene says, in PETSc's HDF5 format of a DMPlex",
       f->mesh_write, sizeof(f->mesh_write), NULL));
   if (!f->scene || f->scene->n_times > 0)
-    PetscCall(HycoPathSetFromOptions(f, PetscOptionsObject));
+    PetscCall(ReadPath(f, PetscOptionsObject));
   else
     PetscCall(HycoPathRefuseOptions(f));
   PetscCall(HycoOptionsName("-hyco_fom_view", "after each full-order solve: sizes, system, solver"));
@@ -287,7 +297,7 @@ static PetscErrorCode SetUp(HycoFOM f)
     PetscCall(PetscCalloc1(f->n_contacts + 1, &f->lambda));
     PetscCall(PetscCalloc1(f->n_contacts + 1, &f->gap));
   }
-  if (f->path) PetscCall(HycoPathCreate(f));
+  if (f->path) PetscCall(HycoFOMPathCreate(f));
   f->summary.seconds.setup += HycoNow();
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -190,14 +190,21 @@ PetscErrorCode HycoMaterialGetData(HycoMaterial material, void *data)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, PetscBool has_history)
+PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, HycoFormulation formulation,
+                                 PetscBool has_history)
 {
   PetscFunctionBegin;
+  material->formulation = formulation;
   if (material->ops->setup) PetscCall((*material->ops->setup)(material, dim));
   HycoCheck(has_history || (material->linear && !material->n_state),
             "body %s: its law %s is not linear, and what it answers depends on its past; give the scene a history: "
             "{times: [...]}",
             ((PetscObject)material)->name, ((PetscObject)material)->type_name);
+  HycoCheck(
+      material->linear || formulation != HYCO_PLANE_STRESS,
+      "body %s: its law %s flows, and plane_stress is for linear laws; take scene_formulation plane_strain or a 3D "
+      "mesh",
+      ((PetscObject)material)->name, ((PetscObject)material)->type_name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -223,7 +230,7 @@ static PetscBool IsLame(HycoMaterial material)
 
 PetscInt HycoMaterialTangentSize(HycoMaterial material, PetscInt dim)
 {
-  return IsLame(material) ? 2 : HycoStrainSize(dim) * HycoStrainSize(dim);
+  return IsLame(material) && material->formulation == HYCO_PLANE_STRAIN ? 2 : HycoStrainSize(dim) * HycoStrainSize(dim);
 }
 
 void HycoTangentApply(PetscBool isotropic, PetscInt dim, const PetscReal tangent[], const PetscReal strain[],
@@ -378,6 +385,20 @@ static void ExpandAll(PetscInt dim, PetscInt n, PetscReal tangent[])
   }
 }
 
+/* The tangents (n x 4 x 4) where nothing holds zz: sigma_zz = 0 gives eps_zz, and its row and column vanish. */
+static void ReleaseThickness(PetscInt n, PetscReal tangent[])
+{
+  for (PetscInt i = 0; i < n; i++) {
+    PetscReal *C = tangent + 16 * i, row[4], column[4];
+
+    for (PetscInt k = 0; k < 4; k++) {
+      row[k] = C[2 * 4 + k];
+      column[k] = C[4 * k + 2] / C[2 * 4 + 2];
+    }
+    for (PetscInt k = 0; k < 16; k++) C[k] = k / 4 == 2 || k % 4 == 2 ? 0 : C[k] - column[k / 4] * row[k % 4];
+  }
+}
+
 PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const PetscReal mu[], PetscInt n,
                                     const PetscReal x[], const PetscReal temperature[], PetscReal work[],
                                     PetscReal tangent[])
@@ -395,7 +416,7 @@ PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const P
     PetscCall(HycoMaterialUpdate(material, &p));
   else
     PetscCall(RestTangents(material, &p));
-  if (material->ops->isotropic && !material->linear) ExpandAll(dim, n, tangent);
+  if (material->ops->isotropic && HycoMaterialTangentSize(material, dim) != 2) ExpandAll(dim, n, tangent);
   for (PetscInt i = 0; i < n && p.failed < 0 && !material->ops->isotropic; i++) {
     if (IsDefinite(dim, tangent + i * p.n_strain * p.n_strain)) continue;
     p.failed = i;
@@ -404,5 +425,6 @@ PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const P
   HycoCheck(p.failed < 0, "body %s, law %s: %s at x = %g, y = %g, z = %g", ((PetscObject)material)->name,
             ((PetscObject)material)->type_name, p.why ? p.why : "no answer", (double)x[3 * p.failed],
             (double)x[3 * p.failed + 1], (double)x[3 * p.failed + 2]);
+  if (material->formulation == HYCO_PLANE_STRESS) ReleaseThickness(n, tangent);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

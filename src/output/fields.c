@@ -2,6 +2,7 @@
 #include <hycofields.h>
 #include <hycofile.h>
 #include <hycoh5.h>
+#include <petscblaslapack.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -259,6 +260,34 @@ void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscRe
   }
 }
 
+static PetscReal Mises(const PetscReal s[6])
+{
+  const PetscReal xx = s[0], xy = s[1], xz = s[2], yy = s[3], yz = s[4], zz = s[5];
+
+  return PetscSqrtReal(((xx - yy) * (xx - yy) + (yy - zz) * (yy - zz) + (zz - xx) * (zz - xx)) / 2 +
+                       3 * (xy * xy + xz * xz + yz * yz));
+}
+
+/* Of a cell's stress: von Mises', and the principal values, the largest first. */
+static PetscErrorCode Invariants(PetscInt n_cells, PetscInt dim, const PetscReal tensor[], PetscReal mises[],
+                                 PetscReal principal[])
+{
+  PetscBLASInt three = 3, lwork = 32, info;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < n_cells; e++) {
+    const PetscReal *s = tensor + 6 * e;
+    PetscScalar matrix[9] = {s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5]}, work[32];
+    PetscReal value[3];
+
+    mises[e] = dim == 1 ? PetscAbsReal(s[0]) : Mises(s);
+    LAPACKsyev_("N", "U", &three, matrix, &three, value, work, &lwork, &info);
+    PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
+    for (PetscInt k = 0; k < 3; k++) principal[3 * e + k] = value[2 - k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* On the process of the contacts. */
 static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal lambda[],
                                    HycoContactFields *f)
@@ -314,26 +343,34 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
                                  const PetscReal lambda[], const PetscReal *rid)
 {
   HycoMesh m = fe->mesh;
-  PetscReal *u3, *sigma, *tensor;
+  PetscReal *u3, *sigma, *tensor, *mises, *principal, *body;
   HycoContactFields f;
   PetscErrorCode ierr; /* a place where nothing can be written is the caller's to mend: nothing is kept for it */
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc3(3 * m->n_nodes, &u3, m->n_cells * fe->n_sigma, &sigma, 6 * m->n_cells, &tensor));
+  PetscCall(PetscCalloc6(3 * m->n_nodes, &u3, m->n_cells * fe->n_sigma, &sigma, 6 * m->n_cells, &tensor, m->n_cells,
+                         &mises, 3 * m->n_cells, &principal, m->n_cells, &body));
   for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
   PetscCall(HycoFEStress(fe, u, sigma));
   HycoTensor6(m->n_cells, fe->n_sigma, sigma, tensor);
+  PetscCall(Invariants(m->n_cells, fe->dim, tensor, mises, principal));
+  for (PetscInt e = 0; e < m->n_cells; e++) body[e] = m->cell_body[e];
   ierr = HycoContactFieldsCreate(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
   if (!ierr) {
     const HycoContactTable table = {pairs->n, f.slave_id, lambda, f.gap};
-    const HycoField field[6] = {
-        {"displacement", HYCO_ON_NODES, 3, u3},         {"stress", HYCO_ON_CELLS, 6, tensor},
-        {"contact_force", HYCO_ON_SURFACE, 3, f.force}, {"contact_pressure", HYCO_ON_SURFACE, 1, f.pressure},
-        {"gap", HYCO_ON_SURFACE, 1, f.gap_node},        {"rid", HYCO_ON_CELLS, 1, rid}};
+    const HycoField field[9] = {{"displacement", HYCO_ON_NODES, 3, u3},
+                                {"stress", HYCO_ON_CELLS, 6, tensor},
+                                {"mises", HYCO_ON_CELLS, 1, mises},
+                                {"principal_stress", HYCO_ON_CELLS, 3, principal},
+                                {"body", HYCO_ON_CELLS, 1, body},
+                                {"contact_force", HYCO_ON_SURFACE, 3, f.force},
+                                {"contact_pressure", HYCO_ON_SURFACE, 1, f.pressure},
+                                {"gap", HYCO_ON_SURFACE, 1, f.gap_node},
+                                {"rid", HYCO_ON_CELLS, 1, rid}};
 
-    ierr = HycoFieldsWrite(path, order, m, fe->X, fe->scene, fe->mu, rid ? 6 : 5, field, &table);
+    ierr = HycoFieldsWrite(path, order, m, fe->X, fe->scene, fe->mu, rid ? 9 : 8, field, &table);
   }
-  PetscCall(PetscFree3(u3, sigma, tensor));
+  PetscCall(PetscFree6(u3, sigma, tensor, mises, principal, body));
   PetscCall(HycoContactFieldsDestroy(&f));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -38,7 +38,7 @@ PetscErrorCode HycoDeclaredRead(HycoScene s, const char key[], const char text[]
   switch (e->kind) {
   case HYCO_ENTRY_EXPRESSION:
     PetscCall(HycoExprDestroy(&e->expr)); /* the same entry in another letter case */
-    PetscCall(HycoExprCreate(key, text, s->n_variables, (const char *const *)s->parameter, &e->expr));
+    PetscCall(HycoSceneExpression(s, key, text, &e->expr));
     if (!e->heat) PetscCall(HycoExprRefuseHeat(e->expr));
     break;
   case HYCO_ENTRY_GROUP:

@@ -8,8 +8,8 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static const char *const sections[] = {"scene_",    "parameter_", "body_",    "fixed_", "pressure_",
-                                       "traction_", "force_",     "contact_", "hyco_",  "history_"};
+static const char *const sections[] = {"scene_",    "parameter_", "constant_", "body_", "fixed_",  "pressure_",
+                                       "traction_", "force_",     "contact_",  "hyco_", "history_"};
 
 PetscBool HycoIsSceneKey(const char name[])
 {
@@ -101,8 +101,8 @@ static PetscErrorCode RefuseOthers(PetscOptions options)
   if (n) snprintf(name, sizeof(name), "%.200s", names[0]);
   PetscCall(PetscOptionsLeftRestore(options, &n, &names, &values));
   HycoCheck(!name[0],
-            "the scene's entry \"%s\" is unknown; an entry stands under scene, parameter, body, fixed, pressure, "
-            "traction, force, contact, history or hyco, and its name has no blank",
+            "the scene's entry \"%s\" is unknown; an entry stands under scene, parameter, constant, body, fixed, "
+            "pressure, traction, force, contact, history or hyco, and its name has no blank",
             name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -12,7 +12,7 @@ static const char *const body_fields[] = {
     "element", "map_x", "map_y", "map_z", "law", "temperature", "reference_temperature", "expansion", "law_type", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const contact_fields[] = {"type", NULL};
-static const char *const scene_fields[] = {"title", "mesh", "parameters", "refine", NULL};
+static const char *const scene_fields[] = {"title", "mesh", "parameters", "refine", "formulation", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
 /* Splits "body_pellet_young" after "body_" into "pellet" and the index of "young"; false if no field ends it. */
@@ -87,8 +87,10 @@ static PetscErrorCode Member(const char name[], size_t size, PetscInt *n, void *
 static PetscErrorCode NewExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
 {
   PetscFunctionBegin;
+  HycoCheck(!*expr || strcasecmp(HycoExprKey(*expr), s->key[entry]) == 0,
+            "%s and %s are of the same group; say it once", HycoExprKey(*expr), s->key[entry]);
   PetscCall(HycoExprDestroy(expr)); /* the same entry in another letter case */
-  PetscCall(HycoExprCreate(s->key[entry], s->value[entry], s->n_variables, (const char *const *)s->parameter, expr));
+  PetscCall(HycoSceneExpression(s, s->key[entry], s->value[entry], expr));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -392,35 +394,61 @@ static PetscErrorCode ReadContact(HycoScene s, PetscInt entry, const char rest[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The next of the groups that an entry names, "left" or "left,right"; NULL: there is none. */
+static char *NextGroup(char names[], char **rest)
+{
+  char *name = strtok_r(names, ",", rest);
+
+  if (!name) return NULL;
+  name += strspn(name, " ");
+  while (*name && name[strlen(name) - 1] == ' ') name[strlen(name) - 1] = '\0';
+  return name;
+}
+
+/* An entry of a section whose members are groups: its expression, for each group that it names. */
+static PetscErrorCode ReadGroups(HycoScene s, PetscInt entry, char names[], PetscInt field)
+{
+  const char *key = s->key[entry];
+  char *rest;
+
+  PetscFunctionBegin;
+  for (char *name = NextGroup(names, &rest); name; name = NextGroup(NULL, &rest)) {
+    PetscInt k = 0;
+    HycoBody *body;
+
+    if (strncasecmp(key, "force_", 6) == 0) {
+      PetscCall(FindBody(s, name, &body));
+      PetscCall(NewColdExpr(s, entry, &body->force[field]));
+    } else if (strncasecmp(key, "fixed_", 6) == 0) {
+      PetscCall(Member(name, sizeof(HycoFixed), &s->n_fixed, (void **)&s->fixed, &k));
+      PetscCall(NewColdExpr(s, entry, &s->fixed[k].value[field]));
+    } else {
+      PetscCall(Member(name, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
+      PetscCall(NewColdExpr(s, entry, field < 0 ? &s->load[k].pressure : &s->load[k].traction[field]));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One entry of a section with members. */
 static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
 {
-  const char *key = s->key[entry], *rest = strchr(key, '_') + 1;
+  const char *key = s->key[entry], *rest = strchr(key, '_') + 1, *what = NULL;
   char name[HYCO_LINE];
-  PetscInt field = 0, k = 0;
-  HycoBody *body;
+  PetscInt field = -1;
 
   PetscFunctionBegin;
+  if (strncasecmp(key, "force_", 6) == 0) what = "a body force";
+  if (strncasecmp(key, "fixed_", 6) == 0) what = "a fixed group";
+  if (strncasecmp(key, "traction_", 9) == 0) what = "a traction";
   if (strncasecmp(key, "body_", 5) == 0) {
     PetscCall(ReadBody(s, entry, rest));
-  } else if (strncasecmp(key, "force_", 6) == 0) {
-    if (!SplitKey(rest, component_fields, name, &field))
-      PetscCall(UnknownKey(key, "a body force", NULL, component_fields));
-    PetscCall(FindBody(s, name, &body));
-    PetscCall(NewColdExpr(s, entry, &body->force[field]));
-  } else if (strncasecmp(key, "fixed_", 6) == 0) {
-    if (!SplitKey(rest, component_fields, name, &field))
-      PetscCall(UnknownKey(key, "a fixed group", NULL, component_fields));
-    PetscCall(Member(name, sizeof(HycoFixed), &s->n_fixed, (void **)&s->fixed, &k));
-    PetscCall(NewColdExpr(s, entry, &s->fixed[k].value[field]));
+  } else if (what) {
+    if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, what, NULL, component_fields));
+    PetscCall(ReadGroups(s, entry, name, field));
   } else if (strncasecmp(key, "pressure_", 9) == 0) {
-    PetscCall(Member(rest, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
-    PetscCall(NewColdExpr(s, entry, &s->load[k].pressure));
-  } else if (strncasecmp(key, "traction_", 9) == 0) {
-    if (!SplitKey(rest, component_fields, name, &field))
-      PetscCall(UnknownKey(key, "a traction", NULL, component_fields));
-    PetscCall(Member(name, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
-    PetscCall(NewColdExpr(s, entry, &s->load[k].traction[field]));
+    PetscCall(PetscStrncpy(name, rest, sizeof(name)));
+    PetscCall(ReadGroups(s, entry, name, -1));
   } else {
     PetscCall(ReadContact(s, entry, rest));
   }
@@ -525,6 +553,25 @@ static PetscErrorCode ReadRefine(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode ReadFormulation(HycoScene s)
+{
+  static const char *const names[] = {"plane_strain", "plane_stress", "axisymmetric"};
+  char *text = NULL;
+  PetscBool known;
+
+  PetscFunctionBegin;
+  PetscCall(GetString(s, "scene_formulation", &text));
+  known = (PetscBool)!text[0];
+  for (PetscInt k = 0; k < 3; k++) {
+    if (strcasecmp(text, names[k])) continue;
+    s->formulation = (HycoFormulation)k;
+    known = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(text));
+  HycoCheck(known, "scene_formulation says what a 2D scene stands for: plane_strain, plane_stress or axisymmetric");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode FindMesh(HycoScene s, const char folder[])
 {
   char *mesh = NULL, path[PETSC_MAX_PATH_LEN];
@@ -552,8 +599,10 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscCall(GetString(s, "scene_title", &s->title));
   PetscCall(FindMesh(s, folder));
   PetscCall(ReadRefine(s));
+  PetscCall(ReadFormulation(s));
   PetscCall(ReadParameters(s));
   PetscCall(HycoSceneReadHistory(s));
+  PetscCall(HycoSceneReadConstants(s));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     const char *key = s->key[k];
 
@@ -562,6 +611,8 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
       PetscCall(CheckPlainEntry(s, k));
     else if (strncasecmp(key, "history_", 8) == 0)
       PetscCall(CheckHistoryEntry(key));
+    else if (strncasecmp(key, "constant_", 9) == 0)
+      continue; /* HycoSceneReadConstants() */
     else
       PetscCall(ReadMember(s, k));
   }
@@ -722,7 +773,8 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   }
   for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PetscFree(s->parameter[p]));
   PetscCall(HycoSceneDestroyHistory(s));
-  HycoFreeAll(&s->key, &s->value, &s->body, &s->fixed, &s->load, &s->contact, &s->title, &s->mesh_path, &s->folder);
+  HycoFreeAll(&s->key, &s->value, &s->constant, &s->body, &s->fixed, &s->load, &s->contact, &s->title, &s->mesh_path,
+              &s->folder);
   PetscCall(DMDestroy(&s->dm));
   PetscCall(PetscOptionsDestroy(&s->options));
   PetscCall(PetscHeaderDestroy(&s));

@@ -1,4 +1,4 @@
-"""scripts/bench-full-order on mesh A: its CSV, its picture, the problem it gives to other solvers, and what it does when a
+"""scripts/bench-full-order and scripts/bench-history on mesh A: its CSV, its picture, the problem it gives to other solvers, and what it does when a
 command fails or takes too long."""
 import csv
 import importlib.machinery
@@ -16,9 +16,12 @@ SCRIPT = os.path.join(SOURCE, 'scripts', 'bench-full-order')
 FORCE = 1409.70532353  # as pellet.py has it
 
 
-def load():
-    loader = importlib.machinery.SourceFileLoader('bench_full_order', SCRIPT)
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader('bench_full_order', loader))
+HISTORY = os.path.join(SOURCE, 'scripts', 'bench-history')
+
+
+def load(script=SCRIPT):
+    loader = importlib.machinery.SourceFileLoader('bench', script)
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader('bench', loader))
     loader.exec_module(module)
     return module
 
@@ -66,6 +69,23 @@ class Bench(Case):
             fields = [f.strip() for line in file if not line.startswith('*') for f in line.split(',')]
         self.assertGreater(len(fields), 10000)
         self.assertLessEqual(max(map(len, fields)), 20)
+
+    def test_history(self):
+        """The rod on mesh A, and what CalculiX is given of the cladding's creep."""
+        run = subprocess.run([sys.executable, HISTORY, '--rod', 'A', '--newton', 'elastic', '--bound', '1e-3', '--creep', 'none',
+                              '--output', self.folder], cwd=SOURCE, capture_output=True, text=True, timeout=100 * PATIENCE)
+        self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
+        with open(self.path('history.csv'), encoding='utf-8', newline='') as file:
+            row, = csv.DictReader(file)
+        self.assertEqual((row['case'], row['solver'], row['unknowns'], row['factors']), ('rod', 'hyco elastic', '4952', '1'))
+        self.near(float(row['force']), 2168, 2e-3)
+        bench = load(HISTORY)
+        problem = bench.pellet.problem(os.path.join(PELLET, 'A.msh'), bench.RADIUS, 1.0, self.path('text.msh'), bench.PRESSURES)
+        bench.calculix.write(self.path('creep'), problem, bench.CREEP)
+        with open(self.path('creep.inp'), encoding='ascii') as file:
+            lines = file.read().splitlines()
+        self.assertEqual(lines[lines.index('*CREEP, LAW=NORTON') + 1], '2e-11, 3, 0.')
+        self.assertEqual(lines.count('*STEP') + lines.count('*STEP, INC=61'), 2)
 
     def test_failures(self):
         bench = load()

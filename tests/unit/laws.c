@@ -44,7 +44,7 @@ static PetscErrorCode Begin(const Case *c, PetscInt dim, One *o)
   PetscCall(PetscMemzero(o, sizeof(*o)));
   PetscCall(HycoMaterialCreate(PETSC_COMM_SELF, &o->law));
   PetscCall(HycoMaterialSetType(o->law, c->type));
-  PetscCall(HycoMaterialSetUp(o->law, dim, PETSC_TRUE));
+  PetscCall(HycoMaterialSetUp(o->law, dim, HYCO_PLANE_STRAIN, PETSC_TRUE));
   o->dim = dim;
   o->ns = HycoStrainSize(dim);
   o->n_state = o->law->n_state;

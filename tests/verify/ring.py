@@ -14,7 +14,7 @@ import numpy as np
 
 from common import PELLET
 from grids import Grid
-from verify import Verify, order
+from verify import Verify
 
 SCENE = """
 scene: {{title: ring on a core, mesh: mesh.msh}}
@@ -32,9 +32,10 @@ body:
   pellet: {{young: 1e5, poisson: 0.3}}
   cladding: {{law: norton, young: 1e5, poisson: 0.3, rate: 2e-6, exponent: 1}}
 fixed: {{sym_x0: {{x: 0}}, sym_y0: {{y: 0}}, pellet: {{z: 0}}, cladding: {{z: 0}}}}
+pressure: {{clad_outer_high: {outside}, clad_outer_low: {outside}}}
 contact:
-  gap: {{type: pair, slave: contact_pellet, master: contact_clad, tolerance: 1e-3, normal: {{x: x, y: y}}, gap: -0.01}}
-history: {{times: [0, 1, 2]}}
+  gap: {{type: pair, slave: contact_pellet, master: contact_clad, tolerance: 1e-3, normal: {{x: x, y: y}}, gap: {gap}}}
+history: {{times: [{times}]}}
 """
 CLOSES = 1.63214460
 LENGTH = 4.1 * math.pi / 2  # of the contact, on the quarter
@@ -49,12 +50,16 @@ def closing(t):
     return np.where(t < CLOSES, 0, 50 - 34.2891470 * np.exp(-0.146510938 * s) - 15.7108530 * np.exp(-0.225014142 * s))
 
 
+def equal(steps, end):
+    return ', '.join(f'{t:.12g}' for t in np.linspace(0, end, steps + 1))
+
+
 def polar(x):
     return x[:, :1] * np.column_stack([np.cos(x[:, 1]), np.sin(x[:, 1])])
 
 
-class Ring(Verify):
-    name = 'ring'
+class Paths(Verify):
+    """What ring_long.py shares."""
 
     def mesh(self, n, core=0):
         """A quarter, n cells through the ring; the core has a bore of a hundredth of its radius, which changes 1e-5 of p."""
@@ -67,52 +72,65 @@ class Ring(Verify):
                  {'x1': 'shaft', 'y0': 'y0', 'y1': 'x0'})
         return grid
 
-    def path_of(self, n, steps, outside, gap, end, *args, **options):
-        """Times and mean pressures: the nodes' radial forces, over the length of the arc."""
-        times = ', '.join(f'{t:.12g}' for t in np.linspace(0, end, steps + 1))
-        scene = self.scene(SCENE.format(outside=outside, gap=gap, times=times), self.mesh(n))
-        report = self.hyco('solve', '-scene', scene, *args, **options)
-        h = report['history']
+    def solved_path(self, scene, area, *args, **options):
+        """Times and mean pressures: the nodes' radial forces, over the area of the contact."""
+        h = self.hyco('solve', '-scene', scene, *args, **options)['history']
         self.assertTrue(h['ended'])
         self.assertLess(max(h['kkt_max']), 1e-8)
         self.assertLess(max(h['energy_defect']), 1e-8)
-        return np.array(h['t']), np.array(h['total_contact_force']) / LENGTH, h
+        return np.array(h['t']), np.array(h['total_contact_force']) / area, h
+
+    def path_of(self, n, steps, outside, gap, end, *args):
+        scene = self.scene(SCENE.format(outside=outside, gap=gap, times=equal(steps, end)), self.mesh(n))
+        return self.solved_path(scene, LENGTH, *args)
+
+    def pellet_path(self, mesh, steps, outside, gap, end):
+        """In 3D, on a mesh of the pellet with all z held."""
+        with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
+            f.write(PELLET_SCENE.format(mesh=os.path.join(PELLET, mesh + '.msh'), outside=outside, gap=gap, times=equal(steps, end)))
+        return self.solved_path(self.folder, LENGTH * 6.75, timeout=1500)
+
+    def judge_order(self, title, paths):
+        """Paths of k, 2 k and 4 k steps: the slope of their differences at the times of the first."""
+        k = len(paths[0]) - 1
+        on = [p[::(len(p) - 1) // k] for p in paths]
+        first = [abs(a - b).max() for a, b in zip(on, on[1:])]
+        self.row(f'{title}: order in time', math.log2(first[0] / first[1]), 1, 5)
+
+    def judge_closing(self, title, path, at, off=0.5, bound=0.2):
+        t, p, h = path
+        before = t < (1 - 0.02 * off) * CLOSES
+        self.row(f'{title}: largest force before', max(np.array(h['lambda_max'])[before]), 0, 0)
+        k = int(np.argmax(p > 0))
+        begin = t[k] - p[k] * (t[k + 1] - t[k]) / (p[k + 1] - p[k])
+        self.row(f'{title}: time', begin, CLOSES, off)
+        for time in at:
+            k = int(round(time / t[1]))
+            self.row(f'{title}: p at t = {time:g}', p[k], float(closing(t[k])), bound)
+        return begin
+
+
+class Ring(Paths):
+    name = 'ring'
 
     def test_shrink_fit(self):
-        off, steps = [], (40, 80, 160)
-        for k in steps:
-            p = self.path_of(4, k, 0, -0.01, 8, '-hyco_step_inelastic', 1)[1]
-            off.append(p)
-        t = np.linspace(0, 8, 41)
-        on = [p[::k // 40] for p, k in zip(off, steps)]
-        first = [abs(a - b).max() for a, b in zip(on, on[1:])]
-        self.row('shrink fit: order in time', math.log2(first[0] / first[1]), 1, 5)
-        p = self.path_of(8, 640, 0, -0.01, 8)[1][::16]
+        self.judge_order('shrink fit', [self.path_of(4, k, 0, -0.01, 8, '-hyco_step_inelastic', 1)[1] for k in (40, 80, 160)])
+        t, p, _ = self.path_of(8, 640, 0, -0.01, 8)
         self.row('shrink fit: p at t = 0', p[0], relaxing(0), 0.1)
-        for k in (5, 10, 20, 40):
+        for k in (80, 160, 320, 640):
             self.row(f'shrink fit: p at t = {t[k]:g}', p[k], relaxing(t[k]), 0.2)
 
     def test_closing(self):
-        t, p, h = self.path_of(8, 1280, 50, 0.02, 6)
-        before = t < 0.99 * CLOSES
-        self.row('closing: largest force before', max(np.array(h['lambda_max'])[before]), 0, 0)
-        k = int(np.argmax(p > 0))
-        begin = t[k] - p[k] * (t[k + 1] - t[k]) / (p[k + 1] - p[k])
-        self.row('closing: time', begin, CLOSES, 0.5)
-        for at in (3, 4, 6):
-            k = int(round(at / t[1]))
-            self.row(f'closing: p at t = {at}', p[k], float(closing(t[k])), 0.2)
-
+        self.judge_closing('closing', self.path_of(8, 1280, 50, 0.02, 6), (3, 4, 6))
 
     def test_pellet(self):
-        """The same shrink fit in 3D, the pellet's meshes with all z held."""
-        area = LENGTH * 6.75
-        for mesh, times, steps, bound in (('A', '0,1,2', 50, 0.4), ('B', '0,0.25', 10, 0.2)):
-            with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
-                f.write(PELLET_SCENE.format(mesh=os.path.join(PELLET, mesh + '.msh')))
-            h = self.hyco('solve', '-scene', self.folder, '-history_times', times, '-hyco_substeps', steps, timeout=300)['history']
-            for t, force in zip(h['t'], h['total_contact_force']):
-                self.row(f'pellet {mesh}, z held: p at t = {t:g}', force / area, relaxing(t), bound)
+        """The same in 3D; the finest mesh: ring_long.py."""
+        self.judge_order('pellet A, z held', [self.pellet_path('A', k, 0, -0.01, 2)[1] for k in (10, 20, 40)])
+        for mesh, steps, end, bound in (('A', 100, 2, 0.4), ('B', 10, 0.25, 0.2)):
+            t, p, _ = self.pellet_path(mesh, steps, 0, -0.01, end)
+            for k in (0, steps // 2, steps):
+                self.row(f'pellet {mesh}, z held: p at t = {t[k]:g}', p[k], relaxing(t[k]), bound)
+        self.judge_closing('pellet A, z held, closing', self.pellet_path('A', 100, 50, 0.02, 4), (4,), 2, 2)
 
     def test_surfaces_that_do_not_match(self):
         """The core has 13 cells where the ring has 16; the pressure is the mean."""

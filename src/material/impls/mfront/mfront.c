@@ -236,7 +236,8 @@ static PetscErrorCode SetState(HycoMaterial law, const MFront *m, const char hyp
 static PetscErrorCode SetUp(HycoMaterial law, PetscInt dim)
 {
   MFront *m = (MFront *)law->data;
-  const char *hypothesis = dim == 2 ? "PlaneStrain" : "Tridimensional", *const * names;
+  const char *plane = law->formulation == HYCO_AXISYMMETRIC ? "Axisymmetrical" : "PlaneStrain";
+  const char *hypothesis = dim == 2 ? plane : "Tridimensional", *const * names;
   char symbol[HYCO_LINE];
   PetscInt n;
 

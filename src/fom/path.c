@@ -1,0 +1,388 @@
+/*
+  The full order's path: the HycoPath on its distributed vectors, with the energies of its steps, the series of fields
+  and the checkpoint.
+*/
+#include <hycopath.h>
+
+PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
+{
+  static const char *const name[] = {"-hyco_newton",         "-hyco_newton_rtol",   "-hyco_newton_max_its",
+                                     "-hyco_step_inelastic", "-hyco_step_smallest", "-hyco_substeps",
+                                     "-hyco_checkpoint",     "-hyco_resume"};
+
+  PetscFunctionBegin;
+  for (size_t k = 0; k < sizeof(name) / sizeof(name[0]); k++) {
+    PetscBool set;
+
+    PetscCall(PetscOptionsHasName(f->scene->options, NULL, name[k], &set));
+    PetscCheck(!set, HycoComm(f), PETSC_ERR_USER, "%s is for scenes with a history, and this one has none", name[k]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The law over all ranks. */
+static PetscErrorCode ReduceReport(HycoFOM f, HycoFEStepReport *r)
+{
+  PetscReal sum[6] = {r->work, r->stored, r->dissipated, r->thermal, r->moduli, r->potential};
+  PetscReal most[4] = {-r->dt_factor, r->increment, (PetscReal)r->failed, (PetscReal)!r->has_potential};
+  PetscMPIInt lowest = r->failed ? f->rank : f->size;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 6, MPIU_REAL, MPI_SUM, HycoComm(f)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 4, MPIU_REAL, MPI_MAX, HycoComm(f)));
+  r->work = sum[0];
+  r->stored = sum[1];
+  r->dissipated = sum[2];
+  r->thermal = sum[3];
+  r->moduli = sum[4];
+  r->potential = sum[5];
+  r->dt_factor = -most[0];
+  r->increment = most[1];
+  r->has_potential = (PetscBool)(most[3] == 0);
+  r->failed = (PetscBool)(most[2] > 0);
+  if (!r->failed) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &lowest, 1, MPI_INT, MPI_MIN, HycoComm(f)));
+  PetscCallMPI(MPI_Bcast(r->why, HYCO_LINE, MPI_CHAR, lowest, HycoComm(f)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* This rank's rows of f_local; and r = F - f_int there, 0 where fixed. */
+static PetscErrorCode TakeForces(HycoFOM f)
+{
+  HycoPath p = f->path;
+  const PetscInt dim = f->part->dim;
+  const PetscScalar *F;
+  PetscScalar *f_int, *r;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(p->F, &F));
+  PetscCall(VecGetArray(p->f_int, &f_int));
+  PetscCall(VecGetArray(p->r, &r));
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    const PetscInt row = HycoMeshOwned(f->part, i);
+
+    for (PetscInt c = 0; row >= 0 && c < dim; c++) {
+      const PetscInt k = row * dim + c;
+
+      f_int[k] = p->f_local[i * dim + c];
+      r[k] = f->fe->fixed[i * dim + c] ? 0 : F[k] - f_int[k];
+    }
+  }
+  PetscCall(VecRestoreArrayRead(p->F, &F));
+  PetscCall(VecRestoreArray(p->f_int, &f_int));
+  PetscCall(VecRestoreArray(p->r, &r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+/* f->fe at mu, K, B, D; the loads without what moved supports do. */
+static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
+{
+  HycoFOM f = (HycoFOM)p->ctx;
+  PetscBool lifted;
+
+  PetscFunctionBegin;
+  (void)elastic;
+  PetscCall(HycoFOMAssemble(f, mu));
+  PetscCheck(!f->n_pins, p->comm, PETSC_ERR_USER,
+             "-hyco_regularise is for scenes without a history; fix what holds no body (%s)", f->summary.regularised);
+  p->B = f->B;
+  p->Bt = f->Bt;
+  p->n_free = f->n_free;
+  lifted = f->fe->lifted;
+  f->fe->lifted = PETSC_FALSE;
+  HycoOnEach(p->comm, HycoFEAssembleForce(f->fe, p->F));
+  f->fe->lifted = lifted;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report)
+{
+  HycoFOM f = (HycoFOM)p->ctx;
+  const PetscScalar *u;
+
+  PetscFunctionBegin;
+  PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(PetscArrayzero(p->f_local, f->fe->n_dof));
+  PetscCall(VecGetArrayRead(f->U_local, &u));
+  HycoOnEach(p->comm, HycoFEStep(f->fe, u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
+  PetscCall(VecRestoreArrayRead(f->U_local, &u));
+  PetscCall(ReduceReport(f, report));
+  if (!report->failed) PetscCall(TakeForces(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Stiffness(HycoPath p)
+{
+  PetscFunctionBegin;
+  HycoOnEach(p->comm, HycoFEAssembleStiffness(p->fe, p->K));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Moves(HycoPath p, Vec rhs)
+{
+  HycoFOM f = (HycoFOM)p->ctx;
+  const PetscScalar *u;
+  PetscBool moved;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(f->U_local, &u));
+  PetscCall(HycoPathMoves(p, u, p->work, &moved));
+  PetscCall(VecRestoreArrayRead(f->U_local, &u));
+  if (!moved) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecAXPY(rhs, 1, p->work));
+  PetscCall(VecAXPY(rhs, -1, p->F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The mean of two vectors times what U has changed by, over the free or the fixed unknowns. */
+static PetscErrorCode MeanWork(HycoFOM f, Vec before, Vec after, PetscBool on_fixed, PetscReal *work)
+{
+  const PetscInt dim = f->part->dim;
+  const PetscScalar *a, *b, *u, *u_old;
+  PetscReal sum = 0;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(before, &a));
+  PetscCall(VecGetArrayRead(after, &b));
+  PetscCall(VecGetArrayRead(f->U, &u));
+  PetscCall(VecGetArrayRead(f->path->U_old, &u_old));
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    const PetscInt row = HycoMeshOwned(f->part, i);
+
+    for (PetscInt c = 0; row >= 0 && c < dim; c++) {
+      const PetscInt k = row * dim + c;
+
+      if (f->fe->fixed[i * dim + c] == on_fixed) sum += (a[k] + b[k]) / 2 * (u[k] - u_old[k]);
+    }
+  }
+  PetscCall(VecRestoreArrayRead(before, &a));
+  PetscCall(VecRestoreArrayRead(after, &b));
+  PetscCall(VecRestoreArrayRead(f->U, &u));
+  PetscCall(VecRestoreArrayRead(f->path->U_old, &u_old));
+  PetscCallMPI(MPI_Allreduce(&sum, work, 1, MPIU_REAL, MPI_SUM, HycoComm(f)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* (L0 + L1) / 2 . B (U1 - U0): what the bodies do against the contact forces. */
+static PetscErrorCode ContactWork(HycoFOM f, PetscReal *sum)
+{
+  HycoPath p = f->path;
+
+  PetscFunctionBegin;
+  *sum = 0;
+  if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecWAXPY(p->work, -1, p->U_old, f->U));
+  PetscCall(MatMult(f->B, p->work, p->gap_work));
+  PetscCall(VecWAXPY(p->L_new, 1, p->L_old, f->Lambda));
+  PetscCall(VecDot(p->L_new, p->gap_work, sum));
+  *sum /= 2;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  The energies of the accepted step. With all forces at their mean over the step the balance
+
+      work of loads and supports = stored + dissipated + of heat and of moduli that change + work against contact
+
+  is an identity: its defect measures equilibrium, by energies that the laws compute and works that the loads do.
+*/
+static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal *step_defect)
+{
+  HycoPath p = f->path;
+  HycoWork *w = &p->work_done;
+  PetscReal loads, supports, contact, stored = law->stored - w->stored, defect;
+
+  PetscFunctionBegin;
+  PetscCall(MeanWork(f, p->F_old, p->F, PETSC_FALSE, &loads));
+  PetscCall(MeanWork(f, p->f_old, p->f_int, PETSC_TRUE, &supports));
+  PetscCall(ContactWork(f, &contact));
+  defect = PetscAbsReal(loads + supports - contact - stored - law->dissipated - law->thermal - law->moduli);
+  w->size += PetscAbsReal(loads) + PetscAbsReal(supports) + PetscAbsReal(contact) + PetscAbsReal(stored) +
+             PetscAbsReal(law->dissipated) + PetscAbsReal(law->thermal) + PetscAbsReal(law->moduli);
+  *step_defect = HycoRelative(defect, w->size);
+  w->defect = PetscMax(w->defect, *step_defect);
+  w->loads += loads;
+  w->supports += supports;
+  w->contact += contact;
+  w->stored = law->stored;
+  w->dissipated += law->dissipated;
+  w->thermal += law->thermal;
+  w->moduli += law->moduli;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
+{
+  PetscReal defect = 0;
+
+  PetscFunctionBegin;
+  PetscCall(AddWork((HycoFOM)p->ctx, &a->law, &defect));
+  PetscCall(VecCopy(p->F, p->F_old));
+  PetscCall(VecCopy(p->f_int, p->f_old));
+  p->now.energy_defect = PetscMax(p->now.energy_defect, defect);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The largest over the cells of all ranks. */
+static PetscErrorCode Largest(HycoFOM f, HycoStep *s)
+{
+  PetscReal *mises, *inelastic, most[2] = {0, 0};
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(f->part->n_cells, &mises, f->part->n_cells, &inelastic));
+  PetscCall(HycoFEStateFields(f->fe, f->path->begin, NULL, mises, inelastic, NULL));
+  for (PetscInt e = 0; e < f->part->n_cells; e++) {
+    most[0] = PetscMax(most[0], mises[e]);
+    most[1] = PetscMax(most[1], inelastic[e]);
+  }
+  PetscCall(PetscFree2(mises, inelastic));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 2, MPIU_REAL, MPI_MAX, HycoComm(f)));
+  s->mises = most[0];
+  s->inelastic = most[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MeasureContacts(HycoFOM f, HycoStep *s)
+{
+  const PetscScalar *l;
+  PetscReal sum[2] = {0, 0};
+  PetscInt n;
+
+  PetscFunctionBegin;
+  s->total_contact_force = s->lambda_max = 0;
+  s->n_active = 0;
+  if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetLocalSize(f->Lambda, &n));
+  PetscCall(VecGetArrayRead(f->Lambda, &l));
+  for (PetscInt k = 0; k < n; k++) {
+    sum[0] += l[k];
+    sum[1] += l[k] > 0;
+    s->lambda_max = PetscMax(s->lambda_max, l[k]);
+  }
+  PetscCall(VecRestoreArrayRead(f->Lambda, &l));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, HycoComm(f)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &s->lambda_max, 1, MPIU_REAL, MPI_MAX, HycoComm(f)));
+  s->total_contact_force = sum[0];
+  s->n_active = (PetscInt)sum[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A listed time. */
+static PetscErrorCode Record(HycoPath p)
+{
+  HycoFOM f = (HycoFOM)p->ctx;
+  HycoStep *s = &p->now;
+
+  PetscFunctionBegin;
+  PetscCall(MeasureContacts(f, s));
+  PetscCall(Largest(f, s));
+  PetscCall(VecNorm(f->U, NORM_2, &s->u_norm2));
+  s->work = p->work_done.loads + p->work_done.supports;
+  s->contact_work = p->work_done.contact;
+  s->stored = p->work_done.stored;
+  s->dissipated = p->work_done.dissipated;
+  s->thermal = p->work_done.thermal + p->work_done.moduli;
+  PetscCall(HycoFOMGather(f));
+  f->solved = PETSC_TRUE;
+  f->sigma_ready = f->all_ready = PETSC_FALSE;
+  p->steps[p->n_steps++] = *s;
+  PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
+  PetscCall(HycoSeriesAdd(f));
+  if (p->monitor) PetscCall((*p->monitor)(f, &p->steps[p->n_steps - 1], p->monitor_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Save(HycoPath p)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoPathSave((HycoFOM)p->ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMPathCreate(HycoFOM f)
+{
+  static const HycoPathOps ops = {.assemble = Assemble,
+                                  .step = Step,
+                                  .stiffness = Stiffness,
+                                  .moves = Moves,
+                                  .accept = Accept,
+                                  .record = Record,
+                                  .save = Save};
+  HycoPath p = f->path;
+
+  PetscFunctionBegin;
+  p->ops = &ops;
+  p->ctx = f;
+  p->fe = f->fe;
+  p->system = f->system;
+  p->solver = f->solver;
+  p->K = f->K;
+  p->U = f->U;
+  p->Lambda = f->Lambda;
+  p->rhs = f->F;
+  p->D = f->D;
+  p->n_contacts = f->n_contacts;
+  PetscCall(HycoPathSetUp(p));
+  PetscCall(VecDuplicate(f->U, &p->F_old));
+  PetscCall(VecDuplicate(f->U, &p->f_old));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
+{
+  HycoPath p = f->path;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  PetscCall(HycoPathBegin(p, mu));
+  PetscCall(PetscMemzero(&p->work_done, sizeof(p->work_done)));
+  PetscCall(VecSet(p->F_old, 0));
+  PetscCall(VecSet(p->f_old, 0));
+  PetscCall(HycoSeriesBegin(f));
+  PetscCall(HycoPathCheckPlace(f));
+  if (p->resume) PetscCall(HycoPathLoad(f));
+  PetscCall(HycoPathRun(p));
+  f->solved = (PetscBool)(p->n_steps > 0);
+  PetscCall(HycoSeriesEnd(f));
+  f->summary.seconds.total = HycoNow() - begin;
+  PetscCall(HycoFOMViewFromOptions(f, NULL, "-hyco_fom_view"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoPathSummary(HycoFOM f, HycoSummary *s)
+{
+  const HycoPath p = f->path;
+
+  s->iterations = 0;
+  s->seconds.factor = s->seconds.solve = 0;
+  for (PetscInt k = 0; k < p->n_steps; k++) {
+    s->iterations += p->steps[k].iterations;
+    s->seconds.factor += p->steps[k].seconds_factor;
+    s->seconds.solve += p->steps[k].seconds_solve;
+  }
+  s->kkt = p->kkt;
+  s->reason = p->ended ? HYCO_CONVERGED : HYCO_DIVERGED_STEP;
+  s->strain_energy = p->work_done.stored;
+  s->external_work = p->work_done.loads + p->work_done.supports;
+  s->gap_work = p->work_done.contact;
+  s->energy_defect = p->work_done.defect;
+}
+
+PetscErrorCode HycoFOMGetHistory(HycoFOM f, HycoHistory *h)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  PetscCall(PetscMemzero(h, sizeof(*h)));
+  if (f->path) HycoPathGetHistory(f->path, h);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMSetStepMonitor(HycoFOM f, HycoStepMonitor monitor, void *ctx)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheck(f->path, "HycoFOMSetStepMonitor: the scene has no history, and its solution no steps");
+  f->path->monitor = monitor;
+  f->path->monitor_ctx = ctx;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
