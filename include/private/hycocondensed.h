@@ -119,8 +119,6 @@ PetscErrorCode HycoCondensedFlexibilities(HycoReducer reducer, HycoSnapshots sto
    ..., dense) from `first` on. Collective. */
 PetscErrorCode HycoCondensedResponses(HycoReducer reducer, HycoSnapshots store, PetscInt q, const PetscReal P[], Mat S,
                                       PetscInt first);
-/* What its modes are chosen by: stresses lose the derivative's share of digits, and forces have many. */
-PetscReal HycoCondensedModesTolerance(HycoReducer reducer);
 /* Its fields and degrees, of all modes or none; the errors where values are left out. Rank 0. */
 PetscErrorCode HycoCondensedFillFields(HycoReducer reducer, PetscBool modes);
 PetscErrorCode HycoCondensedLeaveOut(HycoReducer reducer);
@@ -132,8 +130,7 @@ PetscErrorCode HycoCondensedFree(HycoCondensed *condensed);
 PetscErrorCode HycoCondensedAllocate(HycoCondensed condensed);
 /* Room for what is online. */
 PetscErrorCode HycoCondensedPrepare(HycoCondensed condensed);
-/* The system of M and g, for this solver; forces: where they are to be (m, borrowed), or NULL. And its end. */
-PetscErrorCode HycoCondensedCreateSystem(HycoCondensed condensed, PetscReal forces[], HycoSolver solver);
+/* Ends the system of M and g. */
 PetscErrorCode HycoCondensedResetSystem(HycoCondensed condensed);
 /* In training: the forces of M and g as they are, from the active contacts given; *solved: the residuals are small. */
 PetscErrorCode HycoCondensedSolveForces(HycoCondensed condensed, PetscReal forces[], PetscBool *solved);

@@ -136,7 +136,8 @@ PetscErrorCode HycoFileOrderSend(const HycoFileOrder *order, HycoPlace place, MP
 PetscErrorCode HycoFileOrderFetch(const HycoFileOrder *order, HycoMesh part, HycoPlace place, PetscInt components,
                                   const PetscReal rows[], PetscReal value[]);
 
-/* The scene's whole mesh on rank 0 (elsewhere NULL). Collective. */
-PetscErrorCode HycoMeshCreateWhole(MPI_Comm comm, HycoScene scene, HycoMesh *mesh);
+/* The scene's mesh as it is read, and refined: each process has the part that it has read (rank 0 all of a mesh file).
+   Fails where the mesh, or a group of it, is missing. Collective; the caller owns it. */
+PetscErrorCode HycoMeshCreate(MPI_Comm comm, HycoScene scene, HycoMesh *mesh);
 
 #endif

@@ -133,10 +133,9 @@ PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, Pe
 PetscErrorCode HycoReducerToRows(HycoReducer t, HycoPlace place, MPI_Datatype type, PetscInt components,
                                  const void *value, void *rows);
 /* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
-   rows, column major, on every rank; a dense matrix on rank 0, column major (the caller frees). Collective. */
+   rows, column major, on every rank. Collective. */
 PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, Mat *S);
 PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal product[]);
-PetscErrorCode HycoReducerToRoot(HycoReducer t, Mat S, PetscReal **out);
 /* The bases of all snapshots in the store and the points that seed the RID; all: every mode above the noise, so that
    HycoReducerTakeBases() can cut the bases again when the tolerances have changed. Collective. */
 PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool all);

@@ -54,45 +54,6 @@ static PetscErrorCode AddSeeds(PetscInt n, const PetscInt add[], PetscInt divide
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerToRoot(HycoReducer t, Mat S, PetscReal **out)
-{
-  PetscInt N, n, rows, lda;
-  PetscMPIInt cols;
-  const PetscScalar *s;
-  PetscReal *mine, *all;
-  MPI_Datatype row;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetSize(S, NULL, &n));
-  PetscCall(MatGetLocalSize(S, &rows, NULL));
-  PetscCall(MatDenseGetLDA(S, &lda));
-  PetscCall(PetscMalloc1((size_t)rows * (size_t)n, &mine));
-  PetscCall(MatDenseGetArrayRead(S, &s));
-  for (PetscInt i = 0; i < rows; i++) {
-    for (PetscInt j = 0; j < n; j++) mine[(size_t)i * (size_t)n + (size_t)j] = s[(size_t)j * (size_t)lda + (size_t)i];
-  }
-  PetscCall(MatDenseRestoreArrayRead(S, &s));
-  PetscCall(PetscMPIIntCast(n, &cols));
-  PetscCallMPI(MPI_Type_contiguous(cols, MPIU_REAL, &row));
-  PetscCallMPI(MPI_Type_commit(&row));
-  PetscCall(HycoConcatenate(HycoComm(t), rows, mine, row, (size_t)n * sizeof(PetscReal), &N, &all));
-  PetscCallMPI(MPI_Type_free(&row));
-  PetscCall(PetscFree(mine));
-  if (t->rank == 0) {
-    PetscReal *columns;
-
-    PetscCall(PetscMalloc1((size_t)N * (size_t)n + 1, &columns));
-    for (PetscInt i = 0; i < N; i++) {
-      for (PetscInt j = 0; j < n; j++)
-        columns[(size_t)j * (size_t)N + (size_t)i] = all[(size_t)i * (size_t)n + (size_t)j];
-    }
-    PetscCall(PetscFree(all));
-    all = columns;
-  }
-  *out = all;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal product[])
 {
   Mat P, whole = NULL;
@@ -509,15 +470,26 @@ static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The dual snapshots. Rank 0. */
+static PetscErrorCode ReadForces(HycoReducer t, HycoSnapshots store)
+{
+  const PetscInt m = t->sizes[2];
+  PetscInt n_par;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  PetscCall(PetscMalloc1((size_t)m * (size_t)t->n_s + 1, &t->Lambda));
+  for (PetscInt k = 0; k < t->n_s; k++)
+    PetscCall(HycoSnapshotsReadRows(store, mu + k * n_par, "lambda", 0, m, t->Lambda + (size_t)k * (size_t)m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The dual snapshots on rank 0; their seeds, which only -hyco_rid_dual_tol decides. */
 static PetscErrorCode ReduceForces(HycoReducer t, HycoSnapshots store)
 {
-  Mat S;
-
   PetscFunctionBegin;
-  PetscCall(HycoSnapshotsGetField(store, t->samples, "lambda", 1, &S));
-  PetscCall(HycoReducerToRoot(t, S, &t->Lambda));
-  PetscCall(MatDestroy(&S));
+  HycoOnRoot(HycoComm(t), ReadForces(t, store));
   if (!t->seed[HYCO_SEED_DUAL] || !t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(5 * t->n_s, &t->dual_seeds));
   PetscCall(DualSeeds(t, &t->n_dual_seeds, t->dual_seeds));

@@ -20,7 +20,8 @@
 #define MOST_RESPONSES 5e7     /* numbers of all responses: 400 MB */
 #define SMALL          1e-2
 
-PetscReal HycoCondensedModesTolerance(HycoReducer t)
+/* What the modes are chosen by: stresses lose the derivative's share of digits, and forces have many. */
+static PetscReal Tolerance(HycoReducer t)
 {
   return PetscMin(Condensing(t)->pod_tol, t->tol[HYCO_SEED_DISPLACEMENT]);
 }
@@ -209,8 +210,7 @@ static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(PetscMax(m, n), &sigma));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, L, &F));
-  PetscCall(HycoReducerPOD(t, F, HycoCondensedModesTolerance(t), PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
-                           sigma));
+  PetscCall(HycoReducerPOD(t, F, Tolerance(t), PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q, sigma));
   PetscCall(MatDestroy(&F));
   PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &x->Q));
   PetscCall(PetscMalloc1(x->q + 1, &x->scale));
@@ -333,8 +333,8 @@ static PetscErrorCode TakeModes(HycoReducer t, Mat V, PetscInt n_sigma, PetscRea
   HycoResponses *x = &Condensing(t)->responses;
 
   PetscFunctionBegin;
-  PetscCall(HycoReducerPODRank(t, n_sigma, sigma, HycoCondensedModesTolerance(t), t->max_modes, x->r, &t->l));
-  HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoCondensedModesTolerance(t));
+  PetscCall(HycoReducerPODRank(t, n_sigma, sigma, Tolerance(t), t->max_modes, x->r, &t->l));
+  HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)Tolerance(t));
   PetscCall(PetscFree(t->sigma));
   t->sigma = sigma;
   PetscCall(PetscFree(t->VtU));
