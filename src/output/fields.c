@@ -228,9 +228,11 @@ static PetscErrorCode EndText(MPI_Comm comm, HycoFile *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFieldsWrite(const char path[], const HycoFileOrder *order, HycoMesh m, const PetscReal X[],
-                               HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
-                               const HycoContactTable *contact)
+/* Writes `path` and the .h5 beside it, both through temporary names. X: moved nodes (n_nodes x 3). The .h5 also holds
+   node_id, cell_id, the parameters and the contact table (rank 0's). */
+static PetscErrorCode Write(const char path[], const HycoFileOrder *order, HycoMesh m, const PetscReal X[],
+                            HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
+                            const HycoContactTable *contact)
 {
   const MPI_Comm comm = order ? order->comm : PETSC_COMM_SELF;
   char h5[PETSC_MAX_PATH_LEN];
@@ -367,7 +369,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
                                 {"gap", HYCO_ON_SURFACE, 1, f.gap_node},
                                 {"rid", HYCO_ON_CELLS, 1, rid}};
 
-    ierr = HycoFieldsWrite(path, order, m, fe->X, fe->scene, fe->mu, rid ? 9 : 8, field, &table);
+    ierr = Write(path, order, m, fe->X, fe->scene, fe->mu, rid ? 9 : 8, field, &table);
   }
   PetscCall(PetscFree6(u3, sigma, tensor, mises, principal, body));
   PetscCall(HycoContactFieldsDestroy(&f));

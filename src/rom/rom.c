@@ -105,7 +105,6 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
   PetscTryTypeMethod(m, destroy);
   PetscCall(HycoNormsDestroy(&m->norms));
   PetscCall(HycoROMFreeWhole(m));
-  PetscCall(PetscFree(m->image));
   PetscCall(HycoPairsDestroy(&m->pairs));
   PetscCall(HycoMeshDestroy(&m->mesh));
   PetscCall(HycoSceneDestroy(&m->scene));
