@@ -3,8 +3,11 @@
 #include <hycoreducerimpl.h>
 
 /* Each kind at its worst time and at the end. */
-static void Judge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
+void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
 {
+  const HycoPathErrors none = {.n = n};
+
+  *e = none;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
     PetscReal size = 0;
 
@@ -20,28 +23,6 @@ static void Judge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
     if (j == HYCO_ERROR_LAMBDA) e->force = size;
     if (j == HYCO_ERROR_LAMBDA_RID) e->force_rid = size;
   }
-}
-
-PetscErrorCode HycoROMMeasurePath(HycoROM m, const HycoPathSource *source, HycoPathErrors *e)
-{
-  const PetscInt n_sigma = m->whole_cells * m->fe->n_sigma;
-  PetscReal *u, *sigma, *inelastic, *lambda;
-  HycoLost *lost;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMemzero(e, sizeof(*e)));
-  e->n_full = source->n;
-  e->n = PetscMin(source->n, m->trace.n_listed);
-  PetscCall(PetscMalloc5(m->whole_nodes * m->mesh->dim, &u, n_sigma, &sigma, m->whole_cells, &inelastic, m->pairs.n,
-                         &lambda, e->n * HYCO_N_ERRORS, &lost));
-  for (PetscInt k = 0; k < e->n; k++) {
-    PetscCall((*source->read)(source->ctx, k, u, sigma, inelastic, lambda));
-    PetscCall(HycoROMSetStep(m, k));
-    PetscCall(HycoROMMeasureErrors(m, u, sigma, inelastic, lambda, lost + k * HYCO_N_ERRORS));
-  }
-  Judge(e->n, lost, e);
-  PetscCall(PetscFree5(u, sigma, inelastic, lambda, lost));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The full-order path on rank 0, as its listed times come. */
@@ -84,17 +65,32 @@ static PetscErrorCode Keep(HycoFOM f, const HycoStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReadKept(void *ctx, PetscInt k, PetscReal u[], PetscReal sigma[], PetscReal inelastic[],
-                               PetscReal lambda[])
+/* What the model misses of listed time k: of the whole mesh U, of the RID and the contacts the rest. */
+static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost lost[])
 {
-  const Kept *kept = (const Kept *)ctx;
-  const PetscReal *from = At(kept, k);
+  const PetscInt dim = m->mesh->dim, ns = m->fe->n_sigma;
+  const PetscReal *u = At(kept, k), *sigma = u + kept->n_dof, *inelastic = sigma + kept->n_sigma,
+                  *lambda = inelastic + kept->n_cells, *found;
+  PetscReal *u_rid, *sigma_rid, *inelastic_rid, square[2] = {0, 0};
 
   PetscFunctionBegin;
-  PetscCall(PetscArraycpy(u, from, kept->n_dof));
-  PetscCall(PetscArraycpy(sigma, from + kept->n_dof, kept->n_sigma));
-  PetscCall(PetscArraycpy(inelastic, from + kept->n_dof + kept->n_sigma, kept->n_cells));
-  PetscCall(PetscArraycpy(lambda, from + kept->n_dof + kept->n_sigma + kept->n_cells, kept->n_contacts));
+  PetscCall(HycoROMSetStep(m, k));
+  PetscCall(HycoROMGetWholeU(m, NULL, &found));
+  for (PetscInt i = 0; i < kept->n_dof; i++) {
+    square[0] += (found[i] - u[i]) * (found[i] - u[i]);
+    square[1] += u[i] * u[i];
+  }
+  PetscCall(PetscMalloc3(m->mesh->n_nodes * dim, &u_rid, m->mesh->n_cells * ns, &sigma_rid, m->mesh->n_cells,
+                         &inelastic_rid));
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
+    PetscCall(PetscArraycpy(u_rid + i * dim, u + m->mesh->node_whole[i] * dim, dim));
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+    PetscCall(PetscArraycpy(sigma_rid + e * ns, sigma + m->mesh->cell_whole[e] * ns, ns));
+    inelastic_rid[e] = inelastic[m->mesh->cell_whole[e]];
+  }
+  PetscCall(HycoROMMeasureRID(m, u_rid, sigma_rid, inelastic_rid, lambda, lost));
+  lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
+  PetscCall(PetscFree3(u_rid, sigma_rid, inelastic_rid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -102,7 +98,8 @@ static PetscErrorCode ReadKept(void *ctx, PetscInt k, PetscReal u[], PetscReal s
 static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const HycoHistory *h, Kept *kept,
                               HycoPathErrors *e)
 {
-  const HycoPathSource source = {kept->n, ReadKept, kept};
+  PetscInt reached;
+  HycoLost *lost;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
@@ -116,7 +113,12 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
   ierr = HycoROMPredict(m, n, mu);
   PetscCall(HycoROMSetSteps(m, 0, NULL));
   PetscCall(ierr);
-  PetscCall(HycoROMMeasurePath(m, &source, e));
+  reached = PetscMin(kept->n, m->trace.n_listed);
+  PetscCall(PetscMalloc1(reached * HYCO_N_ERRORS, &lost));
+  for (PetscInt k = 0; k < reached; k++) PetscCall(Measure(m, kept, k, lost + k * HYCO_N_ERRORS));
+  HycoPathErrorsJudge(reached, lost, e);
+  e->n_full = kept->n;
+  PetscCall(PetscFree(lost));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

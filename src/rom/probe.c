@@ -1,0 +1,159 @@
+/*
+  The scene's quantities of a prediction: displacements and stresses of the cells that they need, wherever these are,
+  from the modes there, U = r(u0) + V gamma (30); of a path the laws are replayed there up to the time that is shown.
+*/
+#include <hycoinelastic.h>
+#include <hycoquantities.h>
+#include <hycoromimpl.h>
+
+struct _n_HycoProbe {
+  HycoMesh mesh; /* the cells */
+  HycoFE fe;
+  PetscReal *V, *u, *sigma; /* n_dof x l; n_dof; n_cells x n_sigma */
+  PetscInt *fe_at;          /* by full-order displacement: its place in u; -1: none */
+};
+
+PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
+{
+  PetscFunctionBegin;
+  if (!*probe) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFEDestroy(&(*probe)->fe));
+  PetscCall(HycoMeshDestroy(&(*probe)->mesh));
+  HycoFreeAll(&(*probe)->V, &(*probe)->u, &(*probe)->sigma, &(*probe)->fe_at);
+  PetscCall(PetscFree(*probe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Extract(HycoROM m, HycoProbe p)
+{
+  PetscBool *needed;
+  PetscInt *keep, n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(m->whole->n_cells, &needed, m->whole->n_cells, &keep));
+  PetscCall(HycoQuantitiesMarkCells(m->scene, m->whole, needed));
+  for (PetscInt e = 0; e < m->whole->n_cells; e++) {
+    if (needed[e]) keep[n++] = e;
+  }
+  PetscCall(HycoMeshExtract(m->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
+  PetscCall(PetscFree2(needed, keep));
+  PetscCall(HycoMeshSetNodeBodies(m->scene, p->mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Fill(HycoROM m, HycoProbe p)
+{
+  const PetscInt dim = m->whole->dim;
+  PetscInt *place;
+
+  PetscFunctionBegin;
+  PetscCall(Extract(m, p));
+  PetscCall(HycoFECreate(m->scene, p->mesh, &p->fe));
+  PetscCall(PetscMalloc1(p->fe->n_dof * m->l, &p->V));
+  PetscCall(PetscMalloc1(p->fe->n_dof, &p->u));
+  PetscCall(PetscMalloc1(p->mesh->n_cells * p->fe->n_sigma, &p->sigma));
+  PetscCall(PetscMalloc1(m->n_fe, &p->fe_at));
+  PetscCall(PetscMalloc1(m->whole->n_nodes, &place));
+  for (PetscInt i = 0; i < m->whole->n_nodes; i++) place[i] = -1;
+  for (PetscInt i = 0; i < p->mesh->n_nodes; i++) place[p->mesh->node_whole[i]] = i;
+  for (PetscInt k = 0; k < p->fe->n_dof; k++)
+    PetscCall(PetscArraycpy(p->V + k * m->l, m->V_whole + (p->mesh->node_whole[k / dim] * dim + k % dim) * m->l, m->l));
+  for (PetscInt k = 0; k < m->n_fe; k++) {
+    const PetscInt i = place[m->mesh->node_whole[m->fe_dof[k] / dim]];
+
+    p->fe_at[k] = i < 0 ? -1 : i * dim + m->fe_dof[k] % dim;
+  }
+  PetscCall(PetscFree(place));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* p->u of these coefficients and full-order displacements. */
+static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const PetscReal U_fe[])
+{
+  for (PetscInt k = 0; k < p->fe->n_dof; k++) {
+    p->u[k] = p->fe->u0[k];
+    for (PetscInt j = 0; j < m->l; j++) p->u[k] += p->V[k * m->l + j] * gamma[j];
+  }
+  for (PetscInt k = 0; k < m->n_fe; k++) {
+    if (p->fe_at[k] >= 0) p->u[p->fe_at[k]] = U_fe[k];
+  }
+}
+
+/* The laws from the first time to that which is shown; p->u and p->sigma there. *state: begin and end, the caller's. */
+static PetscErrorCode Replay(HycoROM m, HycoProbe p, HycoFEState state[2], PetscReal f_int[])
+{
+  const HycoTrace *r = &m->trace;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k <= r->at[r->shown]; k++) {
+    PetscReal mu[HYCO_MAX_PARAMETERS];
+    HycoFEStepReport report;
+    HycoFEState begin = state[1];
+
+    HycoSceneSetTime(m->scene, m->fe->mu, r->t[k], mu);
+    PetscCall(HycoFESetParameters(p->fe, mu));
+    if (!k) PetscCall(HycoFEStateCreate(p->fe, &state[0]));
+    if (!k) PetscCall(HycoFEStateCreate(p->fe, &state[1]));
+    if (!k) begin = state[1];
+    Displace(m, p, r->gamma + (size_t)k * (size_t)m->l, r->U_fe + (size_t)k * (size_t)m->n_fe);
+    PetscCall(
+        HycoFEStep(p->fe, p->u, r->t[PetscMax(k - 1, 0)], r->t[k], state[0], state[1], f_int, PETSC_FALSE, &report));
+    HycoCheck(!report.failed, "the laws have no answer to the predicted displacements at t = %.10g: %s",
+              (double)r->t[k], report.why);
+    state[1] = state[0];
+    state[0] = begin;
+  }
+  PetscCall(HycoFEStateFields(p->fe, state[0], p->sigma, NULL, NULL, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReplayAll(HycoROM m, HycoProbe p)
+{
+  HycoFEState state[2] = {NULL, NULL};
+  PetscReal *f_int;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(p->fe->n_dof, &f_int));
+  ierr = Replay(m, p, state, f_int);
+  PetscCall(PetscFree(f_int));
+  PetscCall(HycoFEStateDestroy(&state[0]));
+  PetscCall(HycoFEStateDestroy(&state[1]));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* p->u and p->sigma of a prediction without a history. */
+static PetscErrorCode Follow(HycoROM m, HycoProbe p)
+{
+  PetscReal *U_fe;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_fe, &U_fe));
+  for (PetscInt k = 0; k < m->n_fe; k++) U_fe[k] = m->U[m->fe_dof[k]];
+  PetscCall(HycoFESetParameters(p->fe, m->fe->mu));
+  Displace(m, p, m->gamma, U_fe);
+  PetscCall(PetscFree(U_fe));
+  PetscCall(HycoFEStress(p->fe, p->u, p->sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMMeasureQuantities(HycoROM m, PetscReal value[])
+{
+  HycoProbe p;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!m->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->probe) {
+    PetscCall(HycoROMLoadWhole(m));
+    PetscCall(PetscNew(&m->probe));
+    ierr = Fill(m, m->probe);
+    if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
+    PetscCall(ierr);
+  }
+  p = m->probe;
+  PetscCall(m->trace.n_listed ? ReplayAll(m, p) : Follow(m, p));
+  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
