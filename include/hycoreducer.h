@@ -131,13 +131,6 @@ PetscErrorCode HycoReducerSetAttemptMonitor(HycoReducer reducer, HycoAttemptMoni
    are added near the worst points, `budget` of them at most (< 0: as many as there were at first). */
 PetscErrorCode HycoReducerSetTargets(HycoReducer reducer, const PetscReal target[], PetscInt budget);
 
-/* -- judging a model by stored solutions -- */
-
-/* Predicts at each sample and compares with its solution, which must be in the store. `model` on every rank; the ranks
-   share the samples out. Collective on `comm`. */
-PetscErrorCode HycoROMValidate(MPI_Comm comm, HycoROM model, HycoSnapshots store, HycoSamples samples,
-                               HycoValidation *validation);
-
 /* -- greedy training (section 5.4) -- */
 
 /* What judges a model where no full-order solution is known; the order of -hyco_greedy_indicator's words. */

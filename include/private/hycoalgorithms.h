@@ -140,12 +140,8 @@ PetscInt HycoTensorSize(const HycoTensor *t);
 /* The weights of all grid nodes; the nodes with number `skip` along `axis` left out (-1, -1: none). */
 PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscInt axis, PetscInt skip,
                                  PetscReal weight[]);
-/* Each node along `axis` left out and predicted by the others on its line: the largest error, 2-norm of a column, over
-   the largest column. With interpolation this is the error of one degree less. */
-PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
-                                     PetscReal *error);
-/* Sets degree[axis] to the one that this error favours, of inner nodes where there are few, the highest unless a lower
-   one halves it; gives the error of all. */
+/* Sets degree[axis] to the one that the leave-one-out error favours, of inner nodes where there are few, the highest
+   unless a lower one halves it; gives the error of all. */
 PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                       PetscReal *error);
 

@@ -103,7 +103,7 @@ static inline HycoCondensing Condensing(HycoReducer t)
 
 /* The training's part of the ops: checks that scene and samples are fit, before hours of work; two values of each
    parameter, to begin with; solving and factoring on the way, the points that meet -hyco_condensed_tol, in *samples
-   (the caller's); G at all its nodes, factoring where no file has it, and the modes l, sigma, V_whole, VtU anew, with
+   (the caller's); G at all its nodes, factoring where no file has it, and the modes l, sigma, V, VtU anew, with
    `responses`; the fields and their errors, handed to the model with numbers[]. */
 PetscErrorCode HycoCondensedSetFromOptions(HycoReducer reducer);
 PetscErrorCode HycoCondensedResetTraining(HycoReducer reducer);
@@ -119,8 +119,6 @@ PetscErrorCode HycoCondensedFlexibilities(HycoReducer reducer, HycoSnapshots sto
    ..., dense) from `first` on. Collective. */
 PetscErrorCode HycoCondensedResponses(HycoReducer reducer, HycoSnapshots store, PetscInt q, const PetscReal P[], Mat S,
                                       PetscInt first);
-/* What its modes are chosen by: stresses lose the derivative's share of digits, and forces have many. */
-PetscReal HycoCondensedModesTolerance(HycoReducer reducer);
 /* Its fields and degrees, of all modes or none; the errors where values are left out. Rank 0. */
 PetscErrorCode HycoCondensedFillFields(HycoReducer reducer, PetscBool modes);
 PetscErrorCode HycoCondensedLeaveOut(HycoReducer reducer);
@@ -132,8 +130,7 @@ PetscErrorCode HycoCondensedFree(HycoCondensed *condensed);
 PetscErrorCode HycoCondensedAllocate(HycoCondensed condensed);
 /* Room for what is online. */
 PetscErrorCode HycoCondensedPrepare(HycoCondensed condensed);
-/* The system of M and g, for this solver; forces: where they are to be (m, borrowed), or NULL. And its end. */
-PetscErrorCode HycoCondensedCreateSystem(HycoCondensed condensed, PetscReal forces[], HycoSolver solver);
+/* Ends the system of M and g. */
 PetscErrorCode HycoCondensedResetSystem(HycoCondensed condensed);
 /* In training: the forces of M and g as they are, from the active contacts given; *solved: the residuals are small. */
 PetscErrorCode HycoCondensedSolveForces(HycoCondensed condensed, PetscReal forces[], PetscBool *solved);
@@ -143,8 +140,8 @@ PetscErrorCode HycoCondensedEvaluate(HycoCondensed condensed, PetscInt field, co
                                      PetscInt skip, PetscReal value[]);
 PetscErrorCode HycoCondensedFreeGap(HycoCondensed condensed, const PetscReal mu[], PetscInt axis, PetscInt skip);
 PetscErrorCode HycoCondensedBringGap(HycoCondensed condensed, const PetscReal mu[]);
-/* Where loads in space are evaluated, on a mesh with its nodes at X; *fit: no shape follows the stiffness. */
-PetscErrorCode HycoCondensedSurveyLoads(HycoCondensed condensed, HycoMesh mesh, const PetscReal X[], PetscBool *fit);
+/* Where loads in space are evaluated, at the mesh's parameters; *fit: no shape follows the stiffness. Collective. */
+PetscErrorCode HycoCondensedSurveyLoads(HycoCondensed condensed, HycoFOM mesh, PetscBool *fit);
 /* After it or with the file's points: what the weights of the training loads need. */
 PetscErrorCode HycoCondensedPrepareLoads(HycoCondensed condensed);
 /* The weights of the training loads (n_load) at node s of G whose sum is the load at mu; *span: it is one. */

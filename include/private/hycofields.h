@@ -28,6 +28,10 @@ typedef struct {
    of cells (n_cells x ns) in ParaView's order xx, xy, xz, yy, yz, zz. */
 void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN]);
 const char *HycoFieldsTopology(HycoCellType type);
+/* Of cells' stresses in that order (n_cells x 6): von Mises' (n_cells), the principal ones (n_cells x 3), the largest
+   first. */
+PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal tensor[], PetscReal mises[],
+                                    PetscReal principal[]);
 void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
 
 /* The title, cell type, dimension, parameters and contact table (NULL: none). On one process. */
@@ -45,20 +49,15 @@ typedef struct {
 PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
                                        const PetscReal lambda[], HycoContactFields *fields);
 PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *fields);
-/* Writes `path` (must end in .xdmf) and the .h5 beside it, both through temporary names. X: moved nodes (n_nodes x 3).
-   The .h5 also holds node_id, cell_id, the parameters and the contact table (rank 0's). order: of parts of a mesh, each
-   written by its process, collective; NULL: this process has it all. */
-PetscErrorCode HycoFieldsWrite(const char path[], const HycoFileOrder *order, HycoMesh mesh, const PetscReal X[],
-                               HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
-                               const HycoContactTable *contact);
 /* Fails unless `path` ends in .xdmf, and where the .h5 beside it is a model or a snapshot. On this process alone. */
 PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /*
-  The usual fields of a solution, then HycoFieldsWrite: displacement, of each cell stress, von Mises stress,
+  Writes `path` (must end in .xdmf) and the .h5 beside it: displacement, of each cell stress, von Mises stress,
   principal stresses and body, contact force (vector on slaves, minus on masters), contact pressure, gap at the
-  solution, RID marker (may be NULL: none written). u on fe, u_surface on the
-  mesh of the pairs: with an order they are the part's and rank 0's (elsewhere `surface` is NULL), else the same.
+  solution, RID marker (may be NULL: none written), and in the .h5 the parameters and the contact table. u on fe,
+  u_surface on the mesh of the pairs: with an order, of parts of a mesh, they are the part's and rank 0's (elsewhere
+  `surface` is NULL), and the call is collective; NULL: this process has all.
 */
 PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
                                  HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],

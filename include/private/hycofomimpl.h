@@ -57,6 +57,12 @@ struct _p_HycoFOM {
   HycoSummary summary;
 };
 
+/* A model that has its mesh, contacts and tables alone: for training, which reads solutions of others. Collective. */
+PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom);
+/* group[g]: whether a contact of the scene is on it; the others are left alone. */
+PetscErrorCode HycoMarkContactGroups(HycoScene scene, HycoMesh mesh, PetscBool group[]);
+/* Brings fe and fe_surface to mu. Collective. */
+PetscErrorCode HycoFOMSetParameters(HycoFOM fom, const PetscReal mu[]);
 /* K, F, B, D at mu, in the system. Collective. */
 PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);
 /* After a solve: u, u_surface and lambda of U and Lambda. Collective. */

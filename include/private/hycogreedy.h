@@ -15,10 +15,10 @@ typedef struct _n_HycoIndicator *HycoIndicator;
 
 /*
   The indicator of `model` (borrowed). U_at: snapshots on the unknowns of the model's mesh (n_dof x n row major) at the
-  n points (n x n_parameters); read by (43) alone, borrowed. Not collective.
+  n points (n x n_parameters); read by (43) alone, borrowed. length: of the whole mesh. Not collective.
 */
 PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscInt n, const PetscReal points[],
-                                   const PetscReal U_at[], HycoIndicator *indicator);
+                                   const PetscReal U_at[], PetscReal length, HycoIndicator *indicator);
 PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator);
 /* Predicts at mu and judges the prediction. What it gives does not depend on what was asked before. */
 PetscErrorCode HycoIndicatorEvaluate(HycoIndicator indicator, const PetscReal mu[], HycoIndication *value);

@@ -23,6 +23,7 @@ struct _n_HycoMesh {
   PetscInt *node_body;     /* the body that moves it */
   PetscInt *node_global;   /* number in the distributed vectors; NULL: its own index */
   PetscInt *node_whole;    /* index in the whole mesh; NULL: its own index */
+  PetscInt *node_point;    /* the DM's point, of tables made of one; else NULL */
   PetscInt n_owned, first; /* with node_global: the numbers of this process's own nodes, first .. first + n_owned - 1 */
   /* of the whole mesh of a part or a surface; 0: of this one */
   PetscInt n_whole_nodes, n_whole_cells;
@@ -33,6 +34,7 @@ struct _n_HycoMesh {
   PetscInt *cell_id;    /* tag in the mesh file */
   PetscInt *cell_body;  /* index in scene->body */
   PetscInt *cell_whole; /* index in the whole mesh; NULL: its own index */
+  PetscInt *cell_point; /* the DM's point, of tables made of one; else NULL */
   /* groups of the file, by name */
   PetscInt n_groups;
   char **group_name;
@@ -81,6 +83,8 @@ static inline PetscInt HycoMeshOwned(HycoMesh m, PetscInt node)
   return !m->node_global || (place >= 0 && place < m->n_owned) ? place : -1;
 }
 
+/* The number of a facet in its cell. */
+PetscInt HycoMeshFacetNumber(HycoMesh mesh, PetscInt facet);
 /* Cells around each node: CSR start[n_nodes + 1], cell[]. The caller frees both. */
 PetscErrorCode HycoMeshNodeCells(HycoMesh mesh, PetscInt **start, PetscInt **cell);
 
@@ -100,14 +104,17 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
 /* Tables of each process's part: the cells that touch a node of its own. On one process node_global, node_whole and
    cell_whole stay NULL. Collective. */
 PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh);
-/* On rank 0 (elsewhere NULL) all of the parts, or with `in` (by group) the nodes and the facets of these groups,
-   without cells; with the parts' node_global and node_whole. The caller owns it. Collective. */
-PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[], HycoMesh *mesh);
+/* On rank 0 (elsewhere NULL) all of the parts, or with `in` (by group) the nodes and the facets of these groups and the
+   cells with cell[e] (by cell of the part; NULL: none), with their nodes and facets; with the parts' node_global,
+   node_whole and cell_whole. The caller owns it. Collective. */
+PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[], const PetscBool cell[],
+                              HycoMesh *mesh);
 /* place[k]: how many different keys of all processes are smaller than key[k] >= 0. Collective. */
 PetscErrorCode HycoRankInts(MPI_Comm comm, PetscInt n, const PetscInt key[], PetscInt place[], PetscInt *total);
-/* A star forest from the nodes of a part (leaves) to the processes that own them (roots, by place). Collective; the
-   caller destroys it. */
-PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscSF *sf);
+PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *total);
+/* A star forest from n nodes (leaves, by their numbers in the distributed vectors: those of the part itself, of a
+   surface on rank 0) to the processes that own them (roots, by place). Collective; the caller destroys it. */
+PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscInt n, const PetscInt global[], PetscSF *sf);
 
 /* The order of the file: a part's own nodes, its own cells (those whose first node is) and rank 0's nodes of a surface
    as leaves of star forests, whose roots are the rows n[] from first[] that a process has of all. */
@@ -129,7 +136,8 @@ PetscErrorCode HycoFileOrderSend(const HycoFileOrder *order, HycoPlace place, MP
 PetscErrorCode HycoFileOrderFetch(const HycoFileOrder *order, HycoMesh part, HycoPlace place, PetscInt components,
                                   const PetscReal rows[], PetscReal value[]);
 
-/* The scene's whole mesh on rank 0 (elsewhere NULL). Collective. */
-PetscErrorCode HycoMeshCreateWhole(MPI_Comm comm, HycoScene scene, HycoMesh *mesh);
+/* The scene's mesh as it is read, and refined: each process has the part that it has read (rank 0 all of a mesh file).
+   Fails where the mesh, or a group of it, is missing. Collective; the caller owns it. */
+PetscErrorCode HycoMeshCreate(MPI_Comm comm, HycoScene scene, HycoMesh *mesh);
 
 #endif

@@ -72,27 +72,28 @@ struct _p_HycoReducer {
   PetscInt drawn;         /* unseen points drawn so far */
   HycoBasis basis[HYCO_N_SEEDS];
   PetscInt n_dual_seeds, *dual_seeds; /* nodes */
-  HycoMesh whole;
-  HycoPairs pairs;
-  HycoMet met;       /* moved surfaces: what they meet, as far as it matters */
-  HycoFE fe;         /* on the whole mesh */
-  PetscInt sizes[4]; /* every rank: nodes, cells, contacts, dim */
+  HycoFOM fom;                        /* every rank: the mesh over the ranks and its contacts, without matrices */
+  HycoMet met;                        /* moved surfaces: what they meet, as far as it matters */
+  PetscInt sizes[4];                  /* every rank: nodes, cells, contacts, dim */
   PetscInt n_seeds_node, n_seeds_cell, *seeds_node, *seeds_cell; /* every rank */
   PetscInt counts[HYCO_N_SEEDS];
-  PetscInt l;            /* modes */
-  PetscReal *sigma;      /* every rank: l */
-  PetscReal *V_whole;    /* (n_nodes * dim) x l row major */
-  Mat S;                 /* every rank: displacements, n_dof x n_s, rows spread */
-  PetscReal *U_rid;      /* of these, the rows of the model's mesh, column major */
-  PetscInt *contact_row; /* by node: its place in U_contact, or -1 */
-  PetscReal *U_contact;  /* the rows of the contacts' nodes, column major */
+  PetscInt l;             /* modes */
+  PetscReal *sigma;       /* every rank: l */
+  Mat V;                  /* every rank: the modes (at least l), rows spread */
+  Mat S;                  /* every rank: displacements, n_dof x n_s, rows spread as V's */
+  PetscReal *U_rid;       /* of these, the rows of the model's mesh, column major */
+  PetscReal *V_rid;       /* and of V */
+  PetscInt *surface_node; /* by node of the contacts' surfaces: that of the model's mesh, or -1 */
+  PetscBool *fixed;       /* by unknown of the model's mesh */
+  PetscInt *contact_row;  /* by node of the contacts' surfaces: its place in U_contact, or -1 */
+  PetscReal *U_contact;   /* the rows of the contacts' nodes, column major */
   PetscInt n_contact_nodes;
   PetscReal *Lambda; /* n_contacts x n_s column major */
   PetscReal *VtU;    /* l x n_s column major: V^T of the snapshots less their lifting */
   PetscReal *U_norm; /* n_s: of the whole snapshot */
   PetscInt n_s;
   unsigned long long fingerprint;
-  PetscBool *grown; /* rank 0, greedy: cells of the RIDs so far; else NULL */
+  PetscBool *grown; /* every rank, greedy: cells of its part in the RIDs so far; else NULL */
 };
 
 /* Frees what one run leaves behind. */
@@ -108,8 +109,8 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t);
 PetscErrorCode HycoReducerDropBases(HycoReducer t);
 /* Begins a run: checks, the mesh, the store of snapshots (the caller destroys it). Collective. */
 PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char path[], HycoSnapshots *store);
-/* From the bases: the RID, the model on it, in *model on every rank (the caller's, before the run ends: its whole-mesh
-   part is the reducer's on rank 0), and what it gave. `useful`: refuse a model that misses its own training solutions
+/* From the bases: the RID, the model on it, in *model on every rank (the caller's; its whole-mesh part is the reducer's
+   alone), and what it gave. `useful`: refuse a model that misses its own training solutions
    or is singular in the ranges. Collective. */
 PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report);
 /* The useful model with its estimates, then its file, written once: a run that fails leaves what was there. Collective.
@@ -124,14 +125,17 @@ PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_
                               PetscReal sigma[]);
 PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
                                   PetscInt max_modes, PetscInt found, PetscInt *l);
-/* On rank 0 (U, column major, the caller's; elsewhere empty) the snapshots' displacements at nodes that rank 0 gives.
-   Collective. */
-PetscErrorCode HycoReducerFetchRows(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **U);
+/* On rank 0 (column major, the caller's; elsewhere empty) the first n_columns of S, a matrix of displacements, at nodes
+   that rank 0 gives by their numbers in the whole mesh. Collective. */
+PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
+                                    PetscReal **rows);
+/* Values of the part's nodes or cells as rows in the file's order, which are spread as those of S and V. Collective. */
+PetscErrorCode HycoReducerToRows(HycoReducer t, HycoPlace place, MPI_Datatype type, PetscInt components,
+                                 const void *value, void *rows);
 /* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
-   rows, column major, on every rank; a dense matrix on rank 0, row or column major (the caller frees). Collective. */
+   rows, column major, on every rank. Collective. */
 PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, Mat *S);
 PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal product[]);
-PetscErrorCode HycoReducerToRoot(HycoReducer t, Mat S, PetscBool row_major, PetscReal **out);
 /* The bases of all snapshots in the store and the points that seed the RID; all: every mode above the noise, so that
    HycoReducerTakeBases() can cut the bases again when the tolerances have changed. Collective. */
 PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool all);
@@ -146,7 +150,7 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store);
 PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *model, HycoSamples *grown,
                                 HycoTraining *report);
 /* B^T of the dual snapshots, and M^-1 of it with the matrix M of the H1 norm: where each force works most. Both n_dof x
-   n_s, dense, the caller's. Rank 0. */
+   n_s, dense, rows by the distributed vectors' order, the caller's. Collective. */
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers);
 /* Judges the model by the held-out solutions, calibrates the estimates of its errors on them and notes both in it (rank
    0): report->held_out, and n_held, the predictions behind the estimates (0: none; too few). Collective. */
@@ -158,9 +162,9 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
 typedef struct {
   PetscReal error[HYCO_N_ERRORS], size, rid_size, converged, feature[HYCO_TRUST_FEATURES], seconds[HYCO_HELD_REPEATS];
 } HycoHeldOut;
-/* Predicts at each sample, whose solution must be in the store; rows[n] on every rank. Collective on `comm`. */
-PetscErrorCode HycoROMPredictHeldOut(MPI_Comm comm, HycoROM model, HycoSnapshots store, HycoSamples samples,
-                                     HycoHeldOut rows[]);
+/* Predicts at each held-out point, whose solution must be in the store, with the model just built; rows[n] on every
+   rank. The ranks share the points out, and of each compare their rows of the whole mesh. Collective. */
+PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM model, HycoSnapshots store, HycoHeldOut rows[]);
 /* The largest contact forces' 2-norm; a relative error, forces below a tenth of that one divided by the tenth
    (PETSC_INFINITY: not converged, or x/0); all of it in short. */
 PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[]);

@@ -5,9 +5,11 @@
 #include <hycodomain.h>
 #include <hycocontactimpl.h>
 #include <hycoromtype.h>
+#include <hycofomimpl.h>
 #include <hycosolverimpl.h>
 
 typedef struct _n_HycoNorms *HycoNorms;
+typedef struct _n_HycoProbe *HycoProbe;
 
 /* Rows of B in CSR over dofs of a mesh, and D: see HycoContactRows(). */
 typedef struct {
@@ -38,8 +40,6 @@ struct _p_HycoROM {
   HycoROMType type; /* the registry's own string */
   HycoROMTraits traits;
   char path[PETSC_MAX_PATH_LEN]; /* "": never was in a file */
-  void *image;                   /* the bytes of the file, of a model that came from another rank; NULL: none */
-  size_t image_size;
   /* the description, as in the file */
   HycoScene scene;
   HycoMesh mesh;           /* cells of Omega_A; its nodes and those of every contact */
@@ -69,10 +69,10 @@ struct _p_HycoROM {
   /* the whole mesh, on demand */
   HycoMesh whole;
   PetscReal *V_whole, *U_whole;
-  PetscBool lent; /* whole and V_whole are the reducer's */
   HycoFE fe_whole;
   HycoPairs whole_pairs;
   HycoNorms norms; /* made by the first comparison */
+  HycoProbe probe; /* of the scene's quantities; made by the first prediction that is asked for */
   /* online */
   PetscBool full_order, full_displacement; /* what its user, who has the scene, is to do: HycoROMGetFallback() */
   PetscBool ready, reconstruct, solved, whole_current;
@@ -123,6 +123,11 @@ static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start
   return start;
 }
 
+/* The scene's quantities (value[scene->n_quantities]) of the last prediction (probe.c). */
+PetscErrorCode HycoROMMeasureQuantities(HycoROM model, PetscReal value[]);
+/* NULL-safe. */
+PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
+
 /* Norms of errors on the whole mesh (norms.c). Scene and mesh are borrowed. */
 PetscErrorCode HycoNormsCreate(HycoScene scene, HycoMesh whole, HycoNorms *norms);
 /* NULL-safe. */
@@ -147,16 +152,21 @@ typedef struct {
   PetscReal lost, size, rid_lost, rid_size;
 } HycoForceErrors;
 
-/* Errors of the last prediction against a full-order solution on the whole mesh: u (n_nodes * dim), sigma (n_cells *
-   n_sigma; NULL: not compared), lambda (n_contacts). The errors in H1 and its dual are left alone. `forces` may be
-   NULL. */
-PetscErrorCode HycoROMCompareFields(HycoROM model, const PetscReal u[], const PetscReal sigma[],
-                                    const PetscReal lambda[], HycoErrors *errors, HycoForceErrors *forces);
+/* Errors of the last prediction on the RID and of its forces against a full-order solution: u at the nodes of the
+   model's mesh (n_nodes * dim), sigma in its cells (n_cells * n_sigma; NULL: not compared), lambda (n_contacts). The
+   errors on the whole mesh are left alone. `forces` may be NULL. */
+PetscErrorCode HycoROMCompareRID(HycoROM model, const PetscReal u[], const PetscReal sigma[], const PetscReal lambda[],
+                                 HycoErrors *errors, HycoForceErrors *forces);
 
-/* Writes the model, with its whole-mesh part (HycoROMLoadWhole()). */
-PetscErrorCode HycoROMSave(HycoROM model, const char path[]);
-/* The model of rank 0 on every rank, as the same bytes that HycoROMSave() writes; others' *model is destroyed first.
-   Collective. */
+/* Writes rank 0's model and, each rank its rows, the mesh over the ranks with its first l modes V (rows in the file's
+   order). Collective. */
+PetscErrorCode HycoROMSave(HycoROM model, HycoFOM mesh, PetscInt l, Mat V, const char path[]);
+/* The names of a mesh's groups, to the file or from it. */
+PetscErrorCode HycoMeshMoveGroupNames(HycoH5 file, const char name[], HycoMesh mesh);
+/* The whole-mesh part of the file, by rows (whole_mesh.c). Collective. */
+PetscErrorCode HycoROMWriteWhole(HycoH5 file, HycoFOM mesh, PetscInt l, Mat V);
+/* The model of rank 0, without its whole-mesh part, on every rank, as the same bytes that HycoROMSave() writes; others'
+ *model is destroyed first. Collective. */
 PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model);
 /* Reads the whole-mesh part, unless it is there. */
 PetscErrorCode HycoROMLoadWhole(HycoROM model);

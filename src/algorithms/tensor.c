@@ -171,8 +171,10 @@ static PetscErrorCode LeaveOut(const HycoTensor *t, PetscInt axis, PetscInt firs
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoTensorLeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
-                                     PetscReal *error)
+/* Each node along `axis` left out and predicted by the others on its line: the largest error, 2-norm of a column, over
+   the largest column. With interpolation this is the error of one degree less. */
+static PetscErrorCode LeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
+                                  PetscReal *error)
 {
   PetscFunctionBegin;
   PetscCall(LeaveOut(t, axis, 0, t->n[axis] - 1, rows, data, error));
@@ -245,7 +247,7 @@ PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt row
     *error = PetscMin(e, *error);
   }
   t->degree[axis] = best;
-  PetscCall(HycoTensorLeaveOneOut(t, axis, rows, data, error));
+  PetscCall(LeaveOneOut(t, axis, rows, data, error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -34,32 +34,26 @@ static PetscErrorCode CompareH1(HycoROM m, const PetscReal U[], const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMCompareFields(HycoROM m, const PetscReal u_full[], const PetscReal sigma[],
-                                    const PetscReal lambda[], HycoErrors *e, HycoForceErrors *forces)
+PetscErrorCode HycoROMCompareRID(HycoROM m, const PetscReal u[], const PetscReal sigma[], const PetscReal lambda[],
+                                 HycoErrors *e, HycoForceErrors *forces)
 {
-  const PetscReal *U, *stress;
+  const PetscReal *stress;
   const PetscInt dim = m->mesh->dim, ns = m->fe->n_sigma;
-  Norms u = {0}, rid = {0}, s = {0}, s11 = {0}, lr = {0}, l = {0};
+  Norms rid = {0}, s = {0}, s11 = {0}, lr = {0}, l = {0};
 
   PetscFunctionBegin;
-  PetscCall(HycoROMGetWholeU(m, NULL, &U));
-  for (PetscInt k = 0; k < m->whole_nodes * dim; k++) Add(&u, U[k], u_full[k]);
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
-    for (PetscInt c = 0; m->role[i] != HYCO_ROLE_OUTSIDE && c < dim; c++)
-      Add(&rid, m->U[i * dim + c], u_full[m->mesh->node_whole[i] * dim + c]);
+  for (PetscInt k = 0; k < m->mesh->n_nodes * dim; k++) {
+    if (m->role[k / dim] != HYCO_ROLE_OUTSIDE) Add(&rid, m->U[k], u[k]);
   }
   PetscCall(HycoROMGetRID(m, NULL, NULL, NULL, NULL, NULL, &stress));
   for (PetscInt k = 0; sigma && k < m->mesh->n_cells * ns; k++) {
-    const PetscReal reference = sigma[m->mesh->cell_whole[k / ns] * ns + k % ns];
-
-    Add(&s, stress[k], reference);
-    if (k % ns == 0) Add(&s11, stress[k], reference);
+    Add(&s, stress[k], sigma[k]);
+    if (k % ns == 0) Add(&s11, stress[k], sigma[k]);
   }
   for (PetscInt k = 0; k < m->pairs.n; k++) {
     Add(&l, m->Lambda[k], lambda[k]);
     if (m->in_rid[k]) Add(&lr, m->Lambda[k], lambda[k]);
   }
-  e->u = HycoRelative(PetscSqrtReal(u.lost2), PetscSqrtReal(u.size2));
   e->u_rid = HycoRelative(rid.lost, rid.size);
   e->sigma = HycoRelative(PetscSqrtReal(s.lost2), PetscSqrtReal(s.size2));
   e->sigma_11 = HycoRelative(s11.lost, s11.size);
@@ -71,15 +65,38 @@ PetscErrorCode HycoROMCompareFields(HycoROM m, const PetscReal u_full[], const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The part of values on the whole mesh that belongs to n nodes or cells of it. */
+static PetscErrorCode TakeRows(PetscInt n, const PetscInt whole[], PetscInt width, const PetscReal value[],
+                               PetscReal **rows)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n * width, rows));
+  for (PetscInt i = 0; i < n; i++)
+    PetscCall(PetscArraycpy(*rows + i * width, value + (size_t)whole[i] * (size_t)width, width));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Compare(HycoROM m, HycoFOM f, const PetscReal U[], const PetscReal sigma[], HycoErrors *e)
 {
+  const PetscInt dim = m->mesh->dim;
+  const PetscReal *found;
+  PetscReal *u_rid, *sigma_rid;
+  Norms u = {0};
+
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
             "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
             "training mesh",
             (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
-  PetscCall(HycoROMCompareFields(m, U, sigma, f->lambda, e, NULL));
+  PetscCall(HycoROMGetWholeU(m, NULL, &found));
+  for (PetscInt k = 0; k < m->whole_nodes * dim; k++) Add(&u, found[k], U[k]);
+  PetscCall(TakeRows(m->mesh->n_nodes, m->mesh->node_whole, dim, U, &u_rid));
+  PetscCall(TakeRows(m->mesh->n_cells, m->mesh->cell_whole, m->fe->n_sigma, sigma, &sigma_rid));
+  PetscCall(HycoROMCompareRID(m, u_rid, sigma_rid, f->lambda, e, NULL));
+  e->u = HycoRelative(PetscSqrtReal(u.lost2), PetscSqrtReal(u.size2));
+  PetscCall(PetscFree(u_rid));
+  PetscCall(PetscFree(sigma_rid));
   PetscCall(CompareH1(m, m->U_whole, U, f->lambda, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -25,7 +25,7 @@ static PetscErrorCode JoinPieces(MPI_Comm comm, HycoMesh m, const PetscInt piece
   PetscSF sf;
 
   PetscFunctionBegin;
-  PetscCall(HycoMeshNodeSF(comm, m, &sf));
+  PetscCall(HycoMeshNodeSF(comm, m, m->n_nodes, m->node_global, &sf));
   PetscCall(PetscMalloc2(m->n_nodes, &node, m->n_owned, &own));
   while (change) {
     change = PETSC_FALSE;

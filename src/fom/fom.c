@@ -51,6 +51,20 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoMarkContactGroups(HycoScene scene, HycoMesh mesh, PetscBool group[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < 2 * scene->n_contacts; k++) {
+    HycoContact c = scene->contact[k / 2];
+    PetscInt g = 0;
+
+    if (k % 2 && !c->master) continue;
+    PetscCall(HycoMeshFindGroup(mesh, "contact", k % 2 ? c->master : c->slave, &g));
+    group[g] = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The contacts' surfaces on rank 0 (of a line all of the mesh: its facets need their cells). */
 static PetscErrorCode GatherSurface(HycoFOM f, HycoMesh part)
 {
@@ -58,15 +72,8 @@ static PetscErrorCode GatherSurface(HycoFOM f, HycoMesh part)
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(part->n_groups, &in));
-  for (PetscInt k = 0; k < 2 * f->scene->n_contacts; k++) {
-    HycoContact c = f->scene->contact[k / 2];
-    PetscInt g = 0;
-
-    if (k % 2 && !c->master) continue;
-    PetscCall(HycoMeshFindGroup(part, "contact", k % 2 ? c->master : c->slave, &g));
-    in[g] = PETSC_TRUE;
-  }
-  PetscCall(HycoMeshGather(HycoComm(f), part, part->dim > 1 ? in : NULL, &f->surface));
+  PetscCall(HycoMarkContactGroups(f->scene, part, in));
+  PetscCall(HycoMeshGather(HycoComm(f), part, part->dim > 1 ? in : NULL, NULL, &f->surface));
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -310,6 +317,23 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(Create(comm, fom));
+  PetscCall(PetscObjectReference((PetscObject)scene));
+  (*fom)->scene = scene;
+  PetscCall(PetscObjectSetOptions((PetscObject)*fom, scene->options));
+  PetscCall(SetFromOptions(*fom));
+  (*fom)->mesh_write[0] = '\0'; /* that is for who solves */
+  ierr = ReadMesh(*fom);
+  if (ierr) PetscCall(HycoFOMDestroy(fom));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
 {
   PetscFunctionBegin;
@@ -393,10 +417,11 @@ static PetscErrorCode AssembleForce(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Brings the contacts' surfaces to mu too. */
-static PetscErrorCode FollowOnSurface(HycoFOM f, const PetscReal mu[])
+PetscErrorCode HycoFOMSetParameters(HycoFOM f, const PetscReal mu[])
 {
   PetscFunctionBegin;
+  HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
+  if (f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
   if (f->fe->contact_changed) PetscCall(HycoFEAgreeOnMirrors(HycoComm(f), f->fe));
   HycoOnRoot(HycoComm(f), HycoFESetParameters(f->fe_surface, mu));
   if (f->rank == 0) PetscCall(PetscArraycpy(f->fe_surface->mirrored, f->fe->mirrored, f->scene->n_bodies));
@@ -407,8 +432,7 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
 {
   PetscFunctionBegin;
   f->solved = f->given = f->sigma_ready = f->all_ready = PETSC_FALSE;
-  HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
-  if (f->size > 1) PetscCall(FollowOnSurface(f, mu));
+  PetscCall(HycoFOMSetParameters(f, mu));
   f->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
   if (f->fe->stiffness_changed || f->fe->contact_changed) PetscCall(HycoFOMRelease(f));
   if (!f->n_free) PetscCall(CountFree(f));

@@ -145,24 +145,14 @@ PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMeshCreateWhole(MPI_Comm comm, HycoScene scene, HycoMesh *whole)
+PetscErrorCode HycoMeshCreate(MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
-  PetscMPIInt size;
-  HycoMesh part;
   DM dm;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(HycoMeshLoad(comm, scene, &dm));
   PetscCall(HycoPlexRefine(&dm, scene, scene->refine));
-  PetscCall(HycoPlexToMesh(dm, scene, &part));
+  PetscCall(HycoPlexToMesh(dm, scene, mesh));
   PetscCall(DMDestroy(&dm));
-  *whole = part;
-  if (size == 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoMeshGather(comm, part, NULL, whole));
-  PetscCall(HycoMeshDestroy(&part));
-  if (!*whole) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree((*whole)->node_global)); /* it is no part any more */
-  PetscCall(PetscFree((*whole)->node_whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

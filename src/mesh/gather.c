@@ -42,8 +42,9 @@ static PetscErrorCode GatherRows(MPI_Comm comm, Rows *r)
 
 typedef struct {
   HycoMesh part;
-  const PetscBool *in; /* by group; NULL: all of the mesh */
-  PetscBool *take;     /* by node of the part */
+  const PetscBool *in;   /* by group; NULL: all of the mesh */
+  const PetscBool *keep; /* by cell, beside the groups; NULL: none */
+  PetscBool *take;       /* by node of the part */
   Rows node, cell, facet, member, region;
 } Gather;
 
@@ -52,9 +53,14 @@ static PetscBool Owns(const Gather *g, PetscInt node)
   return (PetscBool)(HycoMeshOwned(g->part, node) >= 0);
 }
 
+static PetscBool Keeps(const Gather *g, PetscInt cell)
+{
+  return (PetscBool)(!g->in || (g->keep && g->keep[cell]));
+}
+
 /* A node's row: tag, 0, 0, body, numbers in the distributed vectors and in the whole mesh; a cell's, which belongs to
-   the rank of its first node: tag, 0, 0, body, nodes' tags; a facet's: group, tag of its cell, place among this rank's,
-   nodes' tags. */
+   the rank of its first node: tag, 0, 0, body, number in the whole mesh, nodes' tags; a facet's: group, tag of its
+   cell, place among this rank's, nodes' tags. */
 static PetscErrorCode Pack(Gather *g)
 {
   HycoMesh m = g->part;
@@ -67,25 +73,29 @@ static PetscErrorCode Pack(Gather *g)
     for (PetscInt j = m->group_start[k]; g->in && g->in[k] && j < m->group_start[k + 1]; j++)
       g->take[m->group_node[j]] = PETSC_TRUE;
   }
+  for (PetscInt k = 0; g->keep && k < m->n_cells * m->nv; k++) {
+    if (g->keep[k / m->nv]) g->take[m->cells[k]] = PETSC_TRUE;
+  }
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     const PetscInt node[6] = {m->node_id[i], 0, 0, m->node_body[i], m->node_global[i], m->node_whole[i]};
 
     g->take[i] = (PetscBool)(g->take[i] && Owns(g, i));
     if (g->take[i]) PetscCall(AddRow(&g->node, node));
   }
-  for (PetscInt e = 0; e < m->n_cells && !g->in; e++) {
-    if (!Owns(g, m->cells[e * m->nv])) continue;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    if (!Keeps(g, e) || !Owns(g, m->cells[e * m->nv])) continue;
     row[0] = m->cell_id[e];
     row[1] = row[2] = 0;
     row[3] = m->cell_body[e];
-    for (PetscInt v = 0; v < m->nv; v++) row[4 + v] = m->node_id[m->cells[e * m->nv + v]];
+    row[4] = m->cell_whole[e];
+    for (PetscInt v = 0; v < m->nv; v++) row[5 + v] = m->node_id[m->cells[e * m->nv + v]];
     PetscCall(AddRow(&g->cell, row));
   }
   for (PetscInt f = 0; f < m->n_facets; f++) {
     PetscInt least = m->facets[f * m->nf]; /* the facet's rank is that of its node of the smallest tag */
 
     for (PetscInt v = 1; v < m->nf; v++) least = PetscMin(least, m->facets[f * m->nf + v]);
-    if (!Owns(g, least) || (g->in && !g->in[m->facet_group[f]])) continue;
+    if (!Owns(g, least) || (g->in && !g->in[m->facet_group[f]] && !Keeps(g, m->facet_cell[f]))) continue;
     row[0] = m->facet_group[f];
     row[1] = m->cell_id[m->facet_cell[f]];
     row[2] = f;
@@ -100,21 +110,23 @@ static PetscErrorCode Pack(Gather *g)
       row[1] = m->node_id[m->group_node[j]];
       if (g->take[m->group_node[j]]) PetscCall(AddRow(&g->member, row));
     }
-    for (PetscInt j = m->group_cell_start[k]; !g->in && j < m->group_cell_start[k + 1]; j++) {
-      row[1] = m->cell_id[m->group_cell[j]];
-      if (Owns(g, m->cells[m->group_cell[j] * m->nv])) PetscCall(AddRow(&g->region, row));
+    for (PetscInt j = m->group_cell_start[k]; j < m->group_cell_start[k + 1]; j++) {
+      const PetscInt e = m->group_cell[j];
+
+      row[1] = m->cell_id[e];
+      if (Keeps(g, e) && Owns(g, m->cells[e * m->nv])) PetscCall(AddRow(&g->region, row));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Index of a tag that is there. */
+/* Index of a tag, or -1. */
 static PetscInt Find(PetscInt n, const PetscInt tag[], PetscInt value)
 {
-  PetscInt at = 0;
+  PetscInt at = -1;
 
   (void)PetscFindInt(value, n, tag, &at);
-  return at;
+  return at < 0 ? -1 : at;
 }
 
 /* xyz of the nodes in the order of their tags: they come in the order of the ranks, as `sent` tags. */
@@ -147,12 +159,14 @@ static PetscErrorCode PlaceCells(Gather *g, HycoMesh m)
   m->n_cells = g->cell.n_all;
   PetscCall(PetscMalloc1(m->n_cells, &m->cell_id));
   PetscCall(PetscMalloc1(m->n_cells, &m->cell_body));
+  PetscCall(PetscMalloc1(m->n_cells, &m->cell_whole));
   PetscCall(PetscMalloc1(m->n_cells * m->nv, &m->cells));
   for (PetscInt e = 0; e < m->n_cells; e++) {
     m->cell_id[e] = g->cell.all[e * width];
     m->cell_body[e] = g->cell.all[e * width + 3];
+    m->cell_whole[e] = g->cell.all[e * width + 4];
     for (PetscInt v = 0; v < m->nv; v++)
-      m->cells[e * m->nv + v] = Find(m->n_nodes, m->node_id, g->cell.all[e * width + 4 + v]);
+      m->cells[e * m->nv + v] = Find(m->n_nodes, m->node_id, g->cell.all[e * width + 5 + v]);
   }
   m->n_facets = g->facet.n_all;
   PetscCall(PetscMalloc1(m->n_facets, &m->facet_group));
@@ -162,7 +176,7 @@ static PetscErrorCode PlaceCells(Gather *g, HycoMesh m)
     const PetscInt *row = g->facet.all + f * g->facet.width;
 
     m->facet_group[f] = row[0];
-    m->facet_cell[f] = g->in ? -1 : Find(m->n_cells, m->cell_id, row[1]);
+    m->facet_cell[f] = Find(m->n_cells, m->cell_id, row[1]);
     for (PetscInt v = 0; v < m->nf; v++) m->facets[f * m->nf + v] = Find(m->n_nodes, m->node_id, row[3 + v]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -183,9 +197,10 @@ static PetscErrorCode PlaceMembers(PetscInt n_groups, const Rows *r, PetscInt n,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[], HycoMesh *mesh)
+PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[], const PetscBool cell[],
+                              HycoMesh *mesh)
 {
-  Gather g = {.part = part, .in = in};
+  Gather g = {.part = part, .in = in, .keep = cell};
   PetscMPIInt rank;
   PetscReal *xyz, *all;
   PetscInt *tag, *sent, n, k = 0;
@@ -194,7 +209,7 @@ PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[]
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   g.node.width = 6;
-  g.cell.width = 4 + part->nv;
+  g.cell.width = 5 + part->nv;
   g.facet.width = 3 + part->nf;
   g.member.width = g.region.width = 3;
   PetscCall(Pack(&g));

@@ -21,6 +21,8 @@ PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
   PetscCall(PetscFree(m->node_body));
   PetscCall(PetscFree(m->node_global));
   PetscCall(PetscFree(m->node_whole));
+  PetscCall(PetscFree(m->node_point));
+  PetscCall(PetscFree(m->cell_point));
   PetscCall(PetscFree(m->cells));
   PetscCall(PetscFree(m->cell_id));
   PetscCall(PetscFree(m->cell_body));
@@ -79,6 +81,9 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
               (int)mesh->dim - 1, (int)mesh->group_dim[group]);
   }
   for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(HycoContactCheckGroups(scene->contact[k], mesh));
+  for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    if (scene->quantity[k].group) PetscCall(HycoMeshFindGroup(mesh, "output", scene->quantity[k].group, &group));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -154,14 +159,14 @@ PetscReal HycoMeshLength(HycoMesh m)
   return length;
 }
 
-PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh m, PetscSF *sf)
+PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscInt n, const PetscInt global[], PetscSF *sf)
 {
   PetscLayout layout;
 
   PetscFunctionBegin;
-  PetscCall(PetscLayoutCreateFromSizes(comm, m->n_owned, PETSC_DETERMINE, 1, &layout));
+  PetscCall(PetscLayoutCreateFromSizes(comm, part->n_owned, PETSC_DETERMINE, 1, &layout));
   PetscCall(PetscSFCreate(comm, sf));
-  PetscCall(PetscSFSetGraphLayout(*sf, layout, m->n_nodes, NULL, PETSC_OWN_POINTER, m->node_global));
+  PetscCall(PetscSFSetGraphLayout(*sf, layout, n, NULL, PETSC_OWN_POINTER, global));
   PetscCall(PetscLayoutDestroy(&layout));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -258,13 +263,14 @@ static PetscErrorCode SelectFacets(HycoMesh whole, PetscInt n_all, const PetscIn
   PetscCall(PetscMalloc1(whole->n_facets, &part->facet_group));
   PetscCall(PetscMalloc1(whole->n_facets, &part->facet_cell));
   for (PetscInt f = 0; f < whole->n_facets; f++) {
-    PetscBool take = (PetscBool)(cell_index[whole->facet_cell[f]] >= 0);
+    const PetscInt cell = whole->facet_cell[f] < 0 ? -1 : cell_index[whole->facet_cell[f]];
+    PetscBool take = (PetscBool)(cell >= 0);
 
     for (PetscInt k = 0; k < n_all; k++) take = (PetscBool)(take || whole->facet_group[f] == all_facets[k]);
     if (!take) continue;
     for (PetscInt v = 0; v < nf; v++) part->facets[part->n_facets * nf + v] = index[whole->facets[f * nf + v]];
     part->facet_group[part->n_facets] = whole->facet_group[f];
-    part->facet_cell[part->n_facets] = cell_index[whole->facet_cell[f]];
+    part->facet_cell[part->n_facets] = cell;
     part->n_facets++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

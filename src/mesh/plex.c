@@ -117,8 +117,7 @@ static PetscErrorCode SetStratum(DMLabel label, PetscInt value, PetscInt n, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The number of a facet in its cell. */
-static PetscInt FaceNumber(HycoMesh m, PetscInt facet)
+PetscInt HycoMeshFacetNumber(HycoMesh m, PetscInt facet)
 {
   const PetscInt *cell = m->cells + m->facet_cell[facet] * m->nv, *node = m->facets + facet * m->nf;
 
@@ -148,7 +147,8 @@ static PetscErrorCode FillLabel(DMLabel label, HycoMesh m, PetscInt g)
   PetscCall(PetscArraycpy(point, m->group_cell + m->group_cell_start[g], n_cell));
   for (PetscInt k = 0; k < n_node; k++) point[n_cell + k] = m->n_cells + m->group_node[m->group_start[g] + k];
   PetscCall(SetStratum(label, value, n_cell + n_node, point));
-  for (PetscInt f = 0; f < m->n_facets; f++) in_face[f] = m->facet_group[f] == g && m->dim > 1 ? FaceNumber(m, f) : -1;
+  for (PetscInt f = 0; f < m->n_facets; f++)
+    in_face[f] = m->facet_group[f] == g && m->dim > 1 ? HycoMeshFacetNumber(m, f) : -1;
   for (PetscInt k = 0; k < n_faces[m->type]; k++) {
     PetscInt n = 0;
 
@@ -232,12 +232,11 @@ typedef struct {
   DM dm;
   HycoScene scene;
   HycoMesh m;
-  PetscInt c0, c1, v0, v1;        /* cells, vertices */
-  PetscBool facets_are_points;    /* the DM is interpolated */
-  const PetscInt *tag;            /* by point */
-  PetscBool *owned, all_owned;    /* by vertex */
-  PetscInt *node, *vertex, *cell; /* node of each vertex (or -1), vertex of each node, cell of each DM's cell (or -1) */
-  PetscInt *point;                /* the DM's cell of each cell */
+  PetscInt c0, c1, v0, v1;     /* cells, vertices */
+  PetscBool facets_are_points; /* the DM is interpolated */
+  const PetscInt *tag;         /* by point */
+  PetscBool *owned, all_owned; /* by vertex */
+  PetscInt *node, *cell;       /* node of each vertex, cell of each DM's cell; -1: none */
   PetscInt n_facets, room, node_room, cell_room;
   Facet *facet; /* of the group at hand */
 } Builder;
@@ -311,14 +310,14 @@ static PetscErrorCode TakeCells(Builder *b)
   }
   PetscCall(Order(n, key, place));
   m->n_cells = n;
-  PetscCall(PetscMalloc1(n, &b->point));
+  PetscCall(PetscMalloc1(n, &b->m->cell_point));
   PetscCall(PetscMalloc1(n, &m->cell_id));
   PetscCall(PetscMalloc1(n * m->nv, &m->cells));
   for (PetscInt e = 0; e < n; e++) {
-    b->point[e] = keep[place[e]];
-    b->cell[b->point[e] - b->c0] = e;
+    b->m->cell_point[e] = keep[place[e]];
+    b->cell[b->m->cell_point[e] - b->c0] = e;
     m->cell_id[e] = key[place[e]];
-    PetscCall(HycoPlexVertices(b->dm, b->facets_are_points, m->type, b->point[e], m->nv, m->cells + e * m->nv));
+    PetscCall(HycoPlexVertices(b->dm, b->facets_are_points, m->type, b->m->cell_point[e], m->nv, m->cells + e * m->nv));
   }
   PetscCall(PetscFree3(keep, key, place));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -345,7 +344,7 @@ static PetscErrorCode TakeNodes(Builder *b)
   }
   PetscCall(Order(n, key, place));
   m->n_nodes = n;
-  PetscCall(PetscMalloc1(n, &b->vertex));
+  PetscCall(PetscMalloc1(n, &b->m->node_point));
   PetscCall(PetscMalloc1(n, &m->node_id));
   PetscCall(PetscMalloc1(3 * n, &m->xyz));
   PetscCall(DMGetCoordinateDim(b->dm, &dim));
@@ -355,10 +354,10 @@ static PetscErrorCode TakeNodes(Builder *b)
   for (PetscInt i = 0; i < n; i++) {
     PetscInt at;
 
-    b->vertex[i] = keep[place[i]];
-    b->node[b->vertex[i] - b->v0] = i;
+    b->m->node_point[i] = keep[place[i]];
+    b->node[b->m->node_point[i] - b->v0] = i;
     m->node_id[i] = key[place[i]];
-    PetscCall(PetscSectionGetOffset(section, b->vertex[i], &at));
+    PetscCall(PetscSectionGetOffset(section, b->m->node_point[i], &at));
     for (PetscInt c = 0; c < 3; c++) m->xyz[3 * i + c] = c < dim ? xyz[at + c] : 0;
   }
   PetscCall(VecRestoreArrayRead(x, &xyz));
@@ -403,7 +402,7 @@ static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt number, const
   PetscBool mine = PETSC_FALSE;
 
   PetscFunctionBegin;
-  for (PetscInt v = 0; v < m->nf; v++) mine = (PetscBool)(mine || b->owned[b->vertex[node[v]] - b->v0]);
+  for (PetscInt v = 0; v < m->nf; v++) mine = (PetscBool)(mine || b->owned[b->m->node_point[node[v]] - b->v0]);
   if (!mine || cell < 0) PetscFunctionReturn(PETSC_SUCCESS);
   if (b->n_facets == b->room) {
     b->room = 2 * b->room + 64;
@@ -655,7 +654,7 @@ static PetscErrorCode Number(Builder *b)
   PetscCall(DMSetLocalSection(b->dm, section));
   PetscCall(PetscSectionDestroy(&section));
   PetscCall(DMGetGlobalSection(b->dm, &global));
-  for (PetscInt i = 0; i < m->n_nodes; i++) m->n_owned += b->owned[b->vertex[i] - b->v0];
+  for (PetscInt i = 0; i < m->n_nodes; i++) m->n_owned += b->owned[b->m->node_point[i] - b->v0];
   PetscCallMPI(MPI_Exscan(&m->n_owned, &m->first, 1, MPIU_INT, MPI_SUM, comm));
   PetscCall(PetscMalloc1(m->n_nodes, &m->node_global));
   PetscCall(PetscMalloc1(m->n_nodes, &m->node_whole));
@@ -663,7 +662,7 @@ static PetscErrorCode Number(Builder *b)
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     PetscInt at;
 
-    PetscCall(PetscSectionGetOffset(global, b->vertex[i], &at));
+    PetscCall(PetscSectionGetOffset(global, b->m->node_point[i], &at));
     m->node_global[i] = (at < 0 ? -(at + 1) : at) / m->dim;
   }
   PetscCall(HycoRankInts(comm, m->n_nodes, m->node_id, m->node_whole, &m->n_whole_nodes));
@@ -731,9 +730,7 @@ PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh)
   if (size > 1 && !ierr) ierr = Number(&b);
   PetscCall(PetscFree(b.owned));
   PetscCall(PetscFree(b.node));
-  PetscCall(PetscFree(b.vertex));
   PetscCall(PetscFree(b.cell));
-  PetscCall(PetscFree(b.point));
   PetscCall(PetscFree(b.facet));
   PetscCall(ierr);
   *mesh = b.m;

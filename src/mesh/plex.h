@@ -43,7 +43,4 @@ PetscErrorCode HycoPartitionerSetMesh(PetscPartitioner partitioner, HycoMesh mes
 PetscErrorCode HycoPlexWrite(DM dm, const char path[]);
 PetscErrorCode HycoPlexRead(MPI_Comm comm, const char path[], DM *dm);
 
-/* HycoRankInts() for keys of 64 bits. */
-PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *total);
-
 #endif

@@ -1,113 +1,226 @@
 /*
   The offline phase (sections 4.1, 4.2, 5): snapshots -> POD -> DEIM -> RID -> sets -> reduced model -> file.
-  Matrices of snapshots are spread over the ranks; the mesh, the RID and the model live on rank 0.
+  The mesh and the matrices of snapshots are spread over the ranks; the reduced mesh and the model live on rank 0.
 */
 #include <hycoalgorithms.h>
 #include <hycofile.h>
 #include <hycoreducerimpl.h>
 #include <string.h>
 
-/* The whole mesh on rank 0, its sizes everywhere. */
+/* The mesh over the ranks, its contacts on rank 0, its sizes everywhere. */
 static PetscErrorCode ReadMesh(HycoReducer t)
 {
-  PetscInt n_par, group = 0;
+  PetscInt group = 0;
   const PetscReal *mu;
+  HycoFOM f;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  PetscCall(HycoMeshCreateWhole(HycoComm(t), t->scene, &t->whole));
-  HycoOnRoot(HycoComm(t), HycoPairsFind(t->scene, t->whole, &t->pairs));
+  PetscCall(HycoSamplesGet(t->samples, NULL, NULL, &mu));
+  PetscCall(HycoFOMCreateMesh(HycoComm(t), t->scene, &t->fom));
+  f = t->fom;
   for (PetscInt k = 0; k < t->n_groups; k++)
-    HycoOnRoot(HycoComm(t), HycoMeshFindGroup(t->whole, "hyco_rid_groups", t->groups[k], &group));
-  HycoOnRoot(HycoComm(t), HycoFECreate(t->scene, t->whole, &t->fe));
-  if (t->rank == 0) {
-    t->sizes[0] = t->whole->n_nodes;
-    t->sizes[1] = t->whole->n_cells;
-    t->sizes[2] = t->pairs.n;
-    t->sizes[3] = t->whole->dim;
-  }
-  HycoOnRoot(HycoComm(t), HycoFESetParameters(t->fe, mu));
-  PetscCallMPI(MPI_Bcast(t->sizes, 4, MPIU_INT, 0, HycoComm(t)));
+    HycoOnRoot(HycoComm(t), HycoMeshFindGroup(f->part, "hyco_rid_groups", t->groups[k], &group));
+  t->sizes[0] = f->n_nodes;
+  t->sizes[1] = f->n_cells;
+  t->sizes[2] = f->n_contacts;
+  t->sizes[3] = f->part->dim;
+  PetscCall(HycoFOMSetParameters(f, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What moved surfaces meet: every contact's masters at the training points and over the ranges, as far as contacts may
-   close. *rows, *of: of all contacts; those of the mesh as they are where nothing is moved (of: NULL). */
-static PetscErrorCode Meet(HycoReducer t, HycoROM m, const HycoPairs **rows, const PetscInt **of)
+/* What moved surfaces meet, in t->met: every contact's masters at the training points and over the ranges, as far as
+   contacts may close. Rank 0. */
+static PetscErrorCode Meet(HycoReducer t, HycoROM m)
 {
+  HycoFOM f = t->fom;
   PetscInt n;
   const PetscReal *mu;
 
   PetscFunctionBegin;
-  *rows = &t->pairs;
-  *of = NULL;
-  if (!t->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!f->searches) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, &mu));
   PetscCall(HycoMetDestroy(&t->met));
   PetscCall(PetscMalloc1(t->scene->n_contacts, &m->master_reach));
-  PetscCall(HycoMetReach(t->scene, t->whole, &t->pairs, n, mu, t->Lambda, m->master_reach));
-  PetscCall(HycoMetFind(t->scene, t->whole, &t->pairs, n, mu, m->master_reach, &t->met));
-  *rows = &t->met.rows;
-  *of = t->met.of;
+  PetscCall(HycoMetReach(t->scene, f->surface, &f->pairs, n, mu, t->Lambda, m->master_reach));
+  PetscCall(HycoMetFind(t->scene, f->surface, &f->pairs, n, mu, m->master_reach, &t->met));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The nodes beside the RID that the model's mesh has: those of every contact, of moved surfaces all; and the groups
-   whose facets it has, wherever their cells are. */
+   whose facets it has, wherever their cells are. By node of the contacts' surfaces. */
 static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n_all, PetscInt all[])
 {
-  HycoMesh whole = t->whole;
+  HycoMesh surface = t->fom->surface;
 
   PetscFunctionBegin;
-  HycoPairsMark(&t->pairs, contact);
-  PetscCall(HycoMovedGroups(t->scene, whole, &t->pairs, n_all, all));
+  HycoPairsMark(&t->fom->pairs, contact);
+  PetscCall(HycoMovedGroups(t->scene, surface, &t->fom->pairs, n_all, all));
   for (PetscInt g = 0; g < *n_all; g++) {
-    for (PetscInt k = whole->group_start[all[g]]; k < whole->group_start[all[g] + 1]; k++)
-      contact[whole->group_node[k]] = PETSC_TRUE;
+    for (PetscInt k = surface->group_start[all[g]]; k < surface->group_start[all[g] + 1]; k++)
+      contact[surface->group_node[k]] = PETSC_TRUE;
   }
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
-    PetscCall(HycoMeshFindGroup(whole, "contact", t->scene->contact[k]->slave, &all[(*n_all)++]));
+    PetscCall(HycoMeshFindGroup(surface, "contact", t->scene->contact[k]->slave, &all[(*n_all)++]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Omega_A and the reduced mesh: its cells, their nodes, the nodes and surfaces of every contact. */
-static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
+/* The cells of the part in Omega_A, of a greedy training in those before too. Collective. */
+static PetscErrorCode FindCells(HycoReducer t, PetscBool in[])
 {
-  HycoRIDRecipe recipe = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell, t->layers,
-                          t->extension,    t->n_groups,     t->groups,     t->region,     t->whole_rid};
-  HycoMesh whole = t->whole;
-  const HycoPairs *rows;
-  const PetscInt *of;
-  PetscBool *in, *contact;
-  PetscInt *role, *keep, *extra, *index, *all, n_keep = 0, n_extra = 0, n_all = 0;
+  const HycoRIDRecipe recipe = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell, t->layers,
+                                t->extension,    t->n_groups,     t->groups,     t->region,     t->whole_rid};
+  HycoMesh part = t->fom->part;
+  DMLabel rid;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc5(whole->n_cells, &in, whole->n_nodes, &role, whole->n_cells, &keep, whole->n_nodes, &extra,
-                         whole->n_nodes, &index));
-  PetscCall(PetscCalloc1(whole->n_nodes, &contact));
+  HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->fom, t->fom->searches ? &t->met.rows : &t->fom->pairs, &recipe, &rid));
+  for (PetscInt e = 0; e < part->n_cells; e++) {
+    PetscCall(DMLabelStratumHasPoint(rid, HYCO_RID, part->cell_point[e], &in[e]));
+    if (t->grown) t->grown[e] = in[e] = (PetscBool)(in[e] || t->grown[e]);
+  }
+  PetscCall(DMLabelDestroy(&rid));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The RID's cells and the contacts' surfaces on rank 0; elsewhere NULL. */
+static PetscErrorCode GatherCells(HycoReducer t, const PetscBool in[], HycoMesh *mesh)
+{
+  HycoMesh part = t->fom->part;
+  PetscBool *group;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(part->n_groups, &group));
+  PetscCall(HycoMarkContactGroups(t->scene, part, group));
+  PetscCall(HycoMeshGather(HycoComm(t), part, group, in, mesh));
+  PetscCall(PetscFree(group));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The model's mesh of the cells in[] (NULL: all) of `from`: these, their nodes, the nodes and surfaces of every
+   contact; its nodes' numbers in the distributed vectors; the node of it that each of the surfaces' is (-1: none).
+   Rank 0. */
+static PetscErrorCode ExtractMesh(HycoReducer t, HycoMesh from, const PetscBool in[], HycoROM m, PetscInt **global)
+{
+  HycoMesh surface = t->fom->surface;
+  PetscBool *contact;
+  PetscInt *keep, *extra, *all, *node, *at, n_keep = 0, n_extra = 0, n_all = 0, n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(surface->n_nodes, &contact));
   PetscCall(PetscMalloc1(3 * t->scene->n_contacts, &all));
-  PetscCall(Meet(t, m, &rows, &of));
-  HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->scene, whole, rows, &recipe, in));
-  for (PetscInt e = 0; t->grown && e < whole->n_cells; e++) t->grown[e] = in[e] = (PetscBool)(in[e] || t->grown[e]);
-  PetscCall(PetscMalloc1(t->pairs.n, &m->in_rid));
-  PetscCall(HycoRIDSets(t->fe, &t->pairs, rows, of, in, role, m->in_rid));
+  PetscCall(PetscMalloc2(from->n_cells, &keep, surface->n_nodes, &extra));
   PetscCall(SurfacesOf(t, contact, &n_all, all));
-  for (PetscInt e = 0; e < whole->n_cells; e++) {
-    if (in[e]) keep[n_keep++] = e;
+  for (PetscInt e = 0; e < from->n_cells; e++) {
+    if (!in || in[e]) keep[n_keep++] = e;
   }
-  for (PetscInt i = 0; i < whole->n_nodes; i++) {
-    if (contact[i]) extra[n_extra++] = i;
+  for (PetscInt i = 0; i < surface->n_nodes; i++) {
+    extra[n_extra] = i;
+    if (from->node_whole)
+      PetscCall(PetscFindInt(surface->node_whole[i], from->n_nodes, from->node_whole, extra + n_extra));
+    n_extra += contact[i];
   }
-  PetscCall(HycoMeshExtract(whole, n_keep, keep, n_extra, extra, n_all, all, &m->mesh));
-  PetscCall(PetscMalloc1(m->mesh->n_nodes, &m->role));
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
-    m->role[i] = role[m->mesh->node_whole[i]];
-    index[m->mesh->node_whole[i]] = i;
+  PetscCall(HycoMeshExtract(from, n_keep, keep, n_extra, extra, n_all, all, &m->mesh));
+  n = m->mesh->n_nodes;
+  HycoDuplicate(n, m->mesh->node_whole, global);
+  for (PetscInt i = 0; i < n && from->node_whole; i++) {
+    (*global)[i] = from->node_global[m->mesh->node_whole[i]];
+    m->mesh->node_whole[i] = from->node_whole[m->mesh->node_whole[i]];
   }
-  PetscCall(HycoPairsRenumber(&t->pairs, index, &m->pairs));
+  for (PetscInt e = 0; e < m->mesh->n_cells && from->cell_whole; e++)
+    m->mesh->cell_whole[e] = from->cell_whole[m->mesh->cell_whole[e]];
+  PetscCall(PetscFree(t->surface_node));
+  PetscCall(PetscMalloc1(surface->n_nodes, &t->surface_node));
+  PetscCall(PetscMalloc2(n, &node, n, &at));
+  for (PetscInt i = 0; i < n; i++) at[i] = i;
+  PetscCall(PetscArraycpy(node, m->mesh->node_whole, n));
+  PetscCall(PetscSortIntWithArray(n, node, at));
+  for (PetscInt i = 0; i < surface->n_nodes; i++) {
+    PetscInt place;
+
+    PetscCall(PetscFindInt(surface->node_whole ? surface->node_whole[i] : i, n, node, &place));
+    t->surface_node[i] = place < 0 ? -1 : at[place];
+  }
+  PetscCall(PetscFree2(node, at));
+  PetscCall(PetscFree2(keep, extra));
   PetscCall(PetscFree(all));
   PetscCall(PetscFree(contact));
-  PetscCall(PetscFree5(in, role, keep, extra, index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What only a node's own rank knows: whether it has a cell outside Omega_A, and which of its components are fixed. */
+#define BESIDE 8
+
+static PetscErrorCode FetchNotes(HycoReducer t, const PetscBool in[], PetscInt n, const PetscInt global[],
+                                 PetscInt note[])
+{
+  HycoMesh part = t->fom->part;
+  HycoFE fe = t->fom->fe;
+  PetscInt *of, *own;
+  PetscSF sf;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(part->n_nodes, &of, part->n_owned, &own));
+  for (PetscInt k = 0; k < fe->n_dof; k++) of[k / fe->dim] |= fe->fixed[k] ? 1 << k % fe->dim : 0;
+  for (PetscInt k = 0; k < part->n_cells * part->nv; k++) of[part->cells[k]] |= in[k / part->nv] ? 0 : BESIDE;
+  for (PetscInt i = 0; i < part->n_nodes; i++) {
+    if (HycoMeshOwned(part, i) >= 0) own[HycoMeshOwned(part, i)] = of[i];
+  }
+  PetscCall(HycoMeshNodeSF(HycoComm(t), part, n, global, &sf));
+  PetscCall(PetscSFBcastBegin(sf, MPIU_INT, own, note, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, MPIU_INT, own, note, MPI_REPLACE));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscFree2(of, own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The model's sets by what its nodes' ranks know. Rank 0. */
+static PetscErrorCode TakeSets(HycoReducer t, HycoROM m, const PetscInt note[])
+{
+  HycoFOM f = t->fom;
+  const PetscInt n = m->mesh->n_nodes, dim = m->mesh->dim;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(t->fixed));
+  PetscCall(PetscMalloc1(n * dim, &t->fixed));
+  for (PetscInt k = 0; k < n * dim; k++) t->fixed[k] = (PetscBool)((note[k / dim] >> k % dim & 1) != 0);
+  PetscCall(PetscMalloc1(n, &m->role));
+  for (PetscInt i = 0; i < n; i++) m->role[i] = HYCO_ROLE_OUTSIDE;
+  for (PetscInt k = 0; k < m->mesh->n_cells * m->mesh->nv; k++) { /* connected to Omega_B, or not */
+    const PetscInt i = m->mesh->cells[k];
+
+    m->role[i] = note[i] & BESIDE ? HYCO_ROLE_INTERFACE : HYCO_ROLE_A;
+  }
+  PetscCall(PetscMalloc1(f->n_contacts, &m->in_rid));
+  PetscCall(HycoRIDSets(f->fe_surface, &f->pairs, f->searches ? &t->met.rows : &f->pairs,
+                        f->searches ? t->met.of : NULL, t->surface_node, n, m->role, m->in_rid));
+  PetscCall(HycoPairsRenumber(&f->pairs, t->surface_node, &m->pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Omega_A, chosen on all ranks; on rank 0 the reduced mesh and its sets. Collective; m: on rank 0. */
+static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
+{
+  HycoMesh gathered = NULL;
+  PetscBool *in;
+  PetscInt *global = NULL, *note, n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(t->fom->part->n_cells, &in));
+  PetscCall(FindCells(t, in));
+  if (t->fom->size == 1)
+    PetscCall(ExtractMesh(t, t->fom->part, in, m, &global));
+  else {
+    PetscCall(GatherCells(t, in, &gathered));
+    HycoOnRoot(HycoComm(t), ExtractMesh(t, gathered, NULL, m, &global));
+    PetscCall(HycoMeshDestroy(&gathered));
+  }
+  if (m) n = m->mesh->n_nodes;
+  PetscCall(PetscMalloc1(n, &note));
+  PetscCall(FetchNotes(t, in, n, global, note));
+  HycoOnRoot(HycoComm(t), TakeSets(t, m, note));
+  PetscCall(PetscFree(note));
+  PetscCall(PetscFree(global));
+  PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -151,7 +264,7 @@ PetscErrorCode HycoTrainingAddFact(HycoTraining *r, const char name[], PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Greedy: more modes than unknowns in A would leave some without an equation. */
+/* Greedy: more modes than unknowns in A would leave some without an equation. Collective; m: on rank 0. */
 static PetscErrorCode LimitModes(HycoReducer t, HycoROM m)
 {
   const PetscInt dim = t->sizes[3], l = t->l;
@@ -159,20 +272,18 @@ static PetscErrorCode LimitModes(HycoReducer t, HycoROM m)
 
   PetscFunctionBegin;
   if (!t->grown) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt i = 0; i < m->mesh->n_nodes * dim; i++)
-    n_A += m->role[i / dim] == HYCO_ROLE_A && !t->fe->fixed[m->mesh->node_whole[i / dim] * dim + i % dim];
+  for (PetscInt i = 0; m && i < m->mesh->n_nodes * dim; i++) n_A += m->role[i / dim] == HYCO_ROLE_A && !t->fixed[i];
+  PetscCallMPI(MPI_Bcast(&n_A, 1, MPIU_INT, 0, HycoComm(t)));
   if (n_A >= l || !n_A) PetscFunctionReturn(PETSC_SUCCESS);
-  t->l = n_A; /* rows of V and columns of V^T U move together */
-  for (PetscInt i = 1; i < t->sizes[0] * dim; i++)
-    PetscCall(PetscArraymove(t->V_whole + i * n_A, t->V_whole + i * l, n_A));
+  t->l = n_A;
   for (PetscInt k = 1; k < t->n_s; k++) PetscCall(PetscArraymove(t->VtU + k * n_A, t->VtU + k * l, n_A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes on the reduced mesh and the whole, the training points, where it all came from. */
+/* The modes on the reduced mesh, the training points, where it all came from. */
 static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
 {
-  const PetscInt dim = t->sizes[3];
+  const PetscInt n_dof = m->mesh->n_nodes * t->sizes[3];
   PetscInt n_par;
   const PetscReal *mu;
   char *text;
@@ -182,9 +293,10 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
   PetscCall(HycoSamplesGet(t->samples, &m->n_points, &n_par, &mu));
   m->l = t->l;
   HycoDuplicate(t->l, t->sigma, &m->sigma);
-  PetscCall(PetscMalloc1(m->mesh->n_nodes * dim * m->l, &m->V));
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
-    PetscCall(PetscArraycpy(m->V + i * dim * m->l, t->V_whole + m->mesh->node_whole[i] * dim * m->l, dim * m->l));
+  PetscCall(PetscMalloc1(n_dof * m->l, &m->V));
+  for (PetscInt i = 0; i < n_dof; i++) {
+    for (PetscInt j = 0; j < m->l; j++) m->V[i * m->l + j] = t->V_rid[j * n_dof + i];
+  }
   HycoDuplicate(m->n_points * n_par, mu, &m->points);
   m->whole_nodes = t->sizes[0];
   m->whole_cells = t->sizes[1];
@@ -195,9 +307,6 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
            PETSC_VERSION_MINOR, PETSC_VERSION_SUBMINOR);
   PetscCall(PetscStrallocpy(line, &m->provenance));
   snprintf(m->fingerprint, sizeof(m->fingerprint), "%016llx", t->fingerprint);
-  m->whole = t->whole;
-  m->V_whole = t->V_whole;
-  m->lent = PETSC_TRUE;
   /* the model has a scene of its own, read from the text it will carry */
   PetscCall(HycoSceneToText(t->scene, &text));
   PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene));
@@ -267,7 +376,6 @@ static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
 static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, HycoTraining *report)
 {
   PetscFunctionBegin;
-  PetscCall(LimitModes(t, m));
   PetscCall(FillModel(t, m));
   PetscCall((*m->ops->build)(m, t));
   if (useful) PetscCall(CheckUseful(t, m));
@@ -278,7 +386,7 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: a model with its RID. */
+/* Rank 0: a model that knows what its contacts meet. */
 static PetscErrorCode BeginOnRoot(HycoReducer t, HycoROM *model)
 {
   PetscErrorCode ierr;
@@ -286,7 +394,7 @@ static PetscErrorCode BeginOnRoot(HycoReducer t, HycoROM *model)
   PetscFunctionBegin;
   PetscCall(HycoROMCreate(model));
   ierr = HycoROMSetType(*model, t->prototype->type);
-  if (!ierr) ierr = CutDomain(t, *model);
+  if (!ierr) ierr = Meet(t, *model);
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -303,6 +411,19 @@ static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *mode
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The snapshots' and modes' rows at the nodes of the model's mesh, on rank 0. Collective. */
+static PetscErrorCode FetchOnModel(HycoReducer t, HycoROM m)
+{
+  const PetscInt n = m ? m->mesh->n_nodes : 0, *node = m ? m->mesh->node_whole : NULL;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(t->U_rid));
+  PetscCall(PetscFree(t->V_rid));
+  PetscCall(HycoReducerFetchRows(t, t->S, t->n_s, n, node, &t->U_rid));
+  PetscCall(HycoReducerFetchRows(t, t->V, t->l, n, node, &t->V_rid));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report)
 {
   PetscErrorCode ierr;
@@ -311,9 +432,11 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   *model = NULL;
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_TRUE));
   HycoOnRoot(HycoComm(t), BeginOnRoot(t, model));
-  PetscCall(PetscFree(t->U_rid));
-  PetscCall(HycoReducerFetchRows(t, *model ? (*model)->mesh->n_nodes : 0, *model ? (*model)->mesh->node_whole : NULL,
-                                 &t->U_rid));
+  ierr = CutDomain(t, *model);
+  if (!ierr) ierr = LimitModes(t, *model);
+  if (!ierr) ierr = FetchOnModel(t, *model);
+  if (ierr) (void)!HycoROMDestroy(model);
+  PetscCall(ierr);
   HycoOnRoot(HycoComm(t), BuildOnRoot(t, useful, model, report));
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
@@ -344,7 +467,7 @@ PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char 
     ierr = HycoReducerBuild(t, PETSC_TRUE, &model, report);
   if (!ierr) ierr = HycoReducerCalibrate(t, store, model, report);
   PetscCall(HycoSamplesDestroy(&grown));
-  if (!ierr) HycoOnRoot(HycoComm(t), HycoROMSave(model, path));
+  if (!ierr) ierr = HycoROMSave(model, t->fom, t->l, t->V, path);
   PetscCall(HycoROMDestroy(&model));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -397,7 +520,7 @@ static PetscErrorCode DrawHeld(HycoReducer t, HycoSamples *held)
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, &n, &n_par, NULL));
   if (count < 0) count = PetscMin(MOST_HELD, PetscMax(LEAST_HELD, n));
-  if (t->rank == 0) HycoSceneReaches(t->fe->scene, reaches);
+  if (t->rank == 0) HycoSceneReaches(t->scene, reaches);
   for (PetscInt p = 0; p < n_par; p++) slow[p] = t->rank == 0 && reaches[p];
   HycoBcast(slow, n_par, MPIU_INT, HycoComm(t));
   for (PetscInt p = 0; p < n_par; p++) reaches[p] = (PetscBool)slow[p];

@@ -148,7 +148,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
   if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &rows));
-  PetscCall(HycoROMPredictHeldOut(HycoComm(t), model, store, t->held, rows));
+  PetscCall(HycoReducerPredictHeldOut(t, model, store, rows));
   PetscCall(HycoHeldOutSummarise(n, rows, &report->held_out));
   HycoOnRoot(HycoComm(t), Conclude(t, rows, model, report));
   PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, HycoComm(t)));

@@ -110,6 +110,7 @@ static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at
 /* This rank's share of the training points. */
 static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const PetscReal U_at[])
 {
+  const PetscReal length = HycoMeshLength(t->fom->part);
   const PetscReal *solved;
   PetscMPIInt size;
   HycoIndicator indicator;
@@ -117,7 +118,7 @@ static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(HycoSamplesGet(loop->samples, NULL, NULL, &solved));
-  PetscCall(HycoIndicatorCreate(m, t->greedy.indicator, t->n_s, solved, U_at, &indicator));
+  PetscCall(HycoIndicatorCreate(m, t->greedy.indicator, t->n_s, solved, U_at, length, &indicator));
   for (PetscInt k = t->rank; k < loop->n_points; k += size) {
     HycoIndication v;
 
@@ -199,14 +200,14 @@ static const char *WhyStop(HycoReducer t, const HycoGreedyStep *step)
   return step->worst ? NULL : "points";
 }
 
-/* The iteration's model, which has been judged, goes to greedy-NNN.h5 beside the solutions. Rank 0. */
-static PetscErrorCode KeepModel(const Loop *loop, PetscInt iteration)
+/* The iteration's model, which has been judged, goes to greedy-NNN.h5 beside the solutions. Collective. */
+static PetscErrorCode KeepModel(HycoReducer t, const Loop *loop, PetscInt iteration)
 {
   char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(path, sizeof(path), "%s/greedy-%03d.h5", loop->store->folder, (int)iteration));
-  PetscCall(HycoROMSave(loop->model, path));
+  PetscCall(HycoROMSave(loop->model, t->fom, t->l, t->V, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -219,7 +220,7 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   PetscCall(HycoROMDestroy(&loop->model));
   PetscCall(BuildModel(t, loop, iteration, report));
   PetscCall(Evaluate(t, loop));
-  if (t->greedy.keep) HycoOnRoot(HycoComm(t), KeepModel(loop, iteration));
+  if (t->greedy.keep) PetscCall(KeepModel(t, loop, iteration));
   PetscCall(Choose(loop, &worst, &step));
   step.iteration = iteration;
   step.n_samples = t->n_s;
@@ -304,7 +305,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscCall(Start(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
-  PetscCall(PetscCalloc1(t->rank == 0 ? t->whole->n_cells : 0, &t->grown));
+  PetscCall(PetscCalloc1(t->fom->part->n_cells, &t->grown));
   PetscCall(RunLoop(t, &loop, &report));
   PetscCall(Conclude(t, &loop, path, &report));
   report.seconds_reduction = HycoNow() - loop.begin;

@@ -21,6 +21,7 @@ struct _n_HycoIndicator {
   HycoIndicatorKind kind;
   PetscInt n;            /* snapshots */
   const PetscReal *U_at; /* borrowed */
+  PetscReal length;      /* of the whole mesh */
   HycoInterpolant interpolant;
   PetscReal *weight; /* n */
   /* the local problem, from the first evaluation */
@@ -37,7 +38,7 @@ struct _n_HycoIndicator {
 };
 
 PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscInt n, const PetscReal points[],
-                                   const PetscReal U_at[], HycoIndicator *indicator)
+                                   const PetscReal U_at[], PetscReal length, HycoIndicator *indicator)
 {
   HycoIndicator d;
 
@@ -48,6 +49,7 @@ PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscI
   d->kind = kind;
   d->n = n;
   d->U_at = U_at;
+  d->length = length;
   PetscCall(HycoROMSetReconstruct(model, PETSC_FALSE));
   if (kind == HYCO_INDICATOR_PENETRATION) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &d->weight));
@@ -126,8 +128,7 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
   d->geometry = now;
   PetscCall(KSPDestroy(&d->norm));
   PetscCall(MatDestroy(&d->M_A));
-  PetscCall(HycoROMLoadWhole(m));
-  PetscCall(HycoFEAssembleH1(m->fe, HycoMeshLength(m->whole), d->M));
+  PetscCall(HycoFEAssembleH1(m->fe, d->length, d->M));
   PetscCall(MatCreateSubMatrix(d->M, d->local.is_A, d->local.is_A, MAT_INITIAL_MATRIX, &d->M_A));
   PetscCall(MatSetOption(d->M_A, MAT_SPD, PETSC_TRUE));
   PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", d->M_A, PETSC_TRUE, &d->norm));

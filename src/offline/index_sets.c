@@ -1,6 +1,13 @@
 /* The sets A, I and A_lambda of an RID, by node and by contact: (21)-(22), (32)-(37). */
 #include <hycodomain.h>
 
+/* The contacts with their nodes' roles. */
+typedef struct {
+  const HycoPairs *pairs;
+  const PetscInt *index; /* by node of the pairs: that of the reduced mesh */
+  PetscInt n, *role;     /* of the reduced mesh */
+} Sets;
+
 /* The nodes of contact k: j = -1 the slave, then its masters. */
 static PetscInt ContactNode(const HycoPairs *pairs, PetscInt k, PetscInt j)
 {
@@ -12,17 +19,21 @@ static PetscInt CountMasters(const HycoPairs *pairs, PetscInt k)
   return pairs->master_start[k + 1] - pairs->master_start[k];
 }
 
-/* Gamma_I^C, (32): of a contact that misses a node the gap cannot be computed, nor the force on those it has. */
-static void CloseIncomplete(const HycoPairs *pairs, PetscInt role[])
+static PetscInt *Role(const Sets *s, PetscInt k, PetscInt j)
 {
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscInt masters = CountMasters(pairs, k);
+  return &s->role[s->index[ContactNode(s->pairs, k, j)]];
+}
+
+/* Gamma_I^C, (32): of a contact that misses a node the gap cannot be computed, nor the force on those it has. */
+static void CloseIncomplete(const Sets *s)
+{
+  for (PetscInt k = 0; k < s->pairs->n; k++) {
+    const PetscInt masters = CountMasters(s->pairs, k);
     PetscBool missing = PETSC_FALSE;
 
-    for (PetscInt j = -1; j < masters; j++)
-      missing = (PetscBool)(missing || role[ContactNode(pairs, k, j)] == HYCO_ROLE_OUTSIDE);
+    for (PetscInt j = -1; j < masters; j++) missing = (PetscBool)(missing || *Role(s, k, j) == HYCO_ROLE_OUTSIDE);
     for (PetscInt j = -1; missing && j < masters; j++) {
-      if (role[ContactNode(pairs, k, j)] == HYCO_ROLE_A) role[ContactNode(pairs, k, j)] = HYCO_ROLE_INTERFACE;
+      if (*Role(s, k, j) == HYCO_ROLE_A) *Role(s, k, j) = HYCO_ROLE_INTERFACE;
     }
   }
 }
@@ -33,55 +44,38 @@ static void CloseIncomplete(const HycoPairs *pairs, PetscInt role[])
   masters, shared by several contacts, its force would be badly determined (errors several times larger were measured):
   they join the interface. So do all masters of such slaves on moved surfaces, which change. *lost: nodes that left A.
 */
-static PetscErrorCode CloseDependent(HycoMesh m, const HycoPairs *pairs, PetscInt role[], PetscInt *lost)
+static PetscErrorCode CloseDependent(const Sets *s, PetscInt *lost)
 {
   PetscBool *taken, *close;
 
   PetscFunctionBegin;
   *lost = 0;
-  PetscCall(PetscCalloc2(m->n_nodes, &taken, m->n_nodes, &close));
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    if (role[pairs->slave[k]] == HYCO_ROLE_A) taken[pairs->slave[k]] = PETSC_TRUE;
+  PetscCall(PetscCalloc2(s->n, &taken, s->n, &close));
+  for (PetscInt k = 0; k < s->pairs->n; k++) {
+    if (*Role(s, k, -1) == HYCO_ROLE_A) taken[Role(s, k, -1) - s->role] = PETSC_TRUE;
   }
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscInt masters = CountMasters(pairs, k), *node = pairs->master + pairs->master_start[k];
+  for (PetscInt k = 0; k < s->pairs->n; k++) {
+    const PetscInt masters = CountMasters(s->pairs, k);
 
-    if (role[pairs->slave[k]] == HYCO_ROLE_A || !masters) continue;
-    if (masters == 1 && !taken[node[0]] && !HycoPairsMoved(pairs, k))
-      taken[node[0]] = PETSC_TRUE;
+    if (*Role(s, k, -1) == HYCO_ROLE_A || !masters) continue;
+    if (masters == 1 && !taken[Role(s, k, 0) - s->role] && !HycoPairsMoved(s->pairs, k))
+      taken[Role(s, k, 0) - s->role] = PETSC_TRUE;
     else {
-      for (PetscInt j = 0; j < masters; j++) close[node[j]] = (PetscBool)(role[node[j]] == HYCO_ROLE_A);
+      for (PetscInt j = 0; j < masters; j++)
+        close[Role(s, k, j) - s->role] = (PetscBool)(*Role(s, k, j) == HYCO_ROLE_A);
     }
   }
-  for (PetscInt i = 0; i < m->n_nodes; i++) {
+  for (PetscInt i = 0; i < s->n; i++) {
     if (!close[i]) continue;
-    role[i] = HYCO_ROLE_INTERFACE;
+    s->role[i] = HYCO_ROLE_INTERFACE;
     (*lost)++;
   }
   PetscCall(PetscFree2(taken, close));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The roles of the nodes. */
-static PetscErrorCode SetRoles(HycoMesh m, const HycoPairs *pairs, const PetscBool in[], PetscInt role[])
-{
-  PetscInt lost = 1;
-
-  PetscFunctionBegin;
-  for (PetscInt i = 0; i < m->n_nodes; i++) role[i] = HYCO_ROLE_OUTSIDE;
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
-    if (in[k / m->nv]) role[m->cells[k]] = HYCO_ROLE_A;
-  }
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) { /* connected to Omega_B */
-    if (!in[k / m->nv] && role[m->cells[k]] == HYCO_ROLE_A) role[m->cells[k]] = HYCO_ROLE_INTERFACE;
-  }
-  CloseIncomplete(pairs, role);
-  while (lost) PetscCall(CloseDependent(m, pairs, role, &lost));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* (35)-(36): a contact is in A_lambda if its row acts on a free unknown of A_c. */
-static PetscErrorCode FindContacts(HycoFE fe, HycoPairs *pairs, const PetscInt role[], PetscInt in_rid[])
+static PetscErrorCode FindContacts(HycoFE fe, HycoPairs *pairs, const Sets *s, PetscInt in_rid[])
 {
   const PetscInt n = pairs->n, dim = fe->dim, entries = HycoPairsWidth(pairs) * dim * n;
   PetscInt *start, *dof;
@@ -91,36 +85,39 @@ static PetscErrorCode FindContacts(HycoFE fe, HycoPairs *pairs, const PetscInt r
   PetscCall(PetscMalloc4(n + 1, &start, entries, &dof, entries, &value, n, &gap));
   PetscCall(HycoContactRows(fe, pairs, start, dof, value, gap));
   for (PetscInt k = 0; k < n; k++) {
-    in_rid[k] = 0;
-    for (PetscInt j = start[k]; j < start[k + 1]; j++) in_rid[k] = in_rid[k] || role[dof[j] / dim] == HYCO_ROLE_A;
+    for (PetscInt j = start[k]; j < start[k + 1]; j++)
+      in_rid[k] = in_rid[k] || s->role[s->index[dof[j] / dim]] == HYCO_ROLE_A;
   }
   PetscCall(PetscFree4(start, dof, value, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Of moved surfaces, whose rows are those of one place: if any node that it meets is in A and not fixed. */
-static void FindMovedContacts(HycoFE fe, const HycoPairs *rows, const PetscInt of[], const PetscInt role[],
-                              PetscInt in_rid[])
+static void FindMovedContacts(HycoFE fe, const Sets *s, const PetscInt of[], PetscInt in_rid[])
 {
-  for (PetscInt r = 0; r < rows->n; r++) {
-    for (PetscInt j = -1; j < CountMasters(rows, r); j++) {
-      const PetscInt i = ContactNode(rows, r, j);
+  for (PetscInt r = 0; r < s->pairs->n; r++) {
+    for (PetscInt j = -1; j < CountMasters(s->pairs, r); j++) {
+      const PetscInt i = ContactNode(s->pairs, r, j);
 
-      for (PetscInt c = 0; c < fe->dim && role[i] == HYCO_ROLE_A; c++)
+      for (PetscInt c = 0; c < fe->dim && *Role(s, r, j) == HYCO_ROLE_A; c++)
         in_rid[of[r]] = in_rid[of[r]] || !fe->fixed[i * fe->dim + c];
     }
   }
 }
 
 PetscErrorCode HycoRIDSets(HycoFE fe, HycoPairs *pairs, const HycoPairs *rows, const PetscInt of[],
-                           const PetscBool in[], PetscInt role[], PetscInt in_rid[])
+                           const PetscInt index[], PetscInt n, PetscInt role[], PetscInt in_rid[])
 {
+  const Sets s = {rows, index, n, role};
+  PetscInt lost = 1;
+
   PetscFunctionBegin;
-  PetscCall(SetRoles(fe->mesh, rows, in, role));
+  CloseIncomplete(&s);
+  while (lost) PetscCall(CloseDependent(&s, &lost));
   PetscCall(PetscArrayzero(in_rid, pairs->n));
   if (of)
-    FindMovedContacts(fe, rows, of, role, in_rid);
+    FindMovedContacts(fe, &s, of, in_rid);
   else
-    PetscCall(FindContacts(fe, pairs, role, in_rid));
+    PetscCall(FindContacts(fe, pairs, &s, in_rid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

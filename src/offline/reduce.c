@@ -6,22 +6,21 @@
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
 
-/* The rows of a matrix on each rank, as MPI counts them; this rank's. PetscFree2() frees. */
-static PetscErrorCode CountRows(Mat S, PetscMPIInt **counts, PetscMPIInt **offsets, PetscMPIInt *mine)
+PetscErrorCode HycoReducerToRows(HycoReducer t, HycoPlace place, MPI_Datatype type, PetscInt components,
+                                 const void *value, void *rows)
 {
-  PetscMPIInt size, rank;
-  const PetscInt *ranges;
+  const HycoFileOrder *order;
+  const PetscInt n = place == HYCO_ON_CELLS ? t->fom->part->n_cells : t->fom->part->n_nodes;
+  PetscMPIInt size;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)S), &size));
-  PetscCallMPI(MPI_Comm_rank(PetscObjectComm((PetscObject)S), &rank));
-  PetscCall(MatGetOwnershipRanges(S, &ranges));
-  PetscCall(PetscMalloc2(size, counts, size, offsets));
-  for (PetscMPIInt r = 0; r < size; r++) {
-    PetscCall(PetscMPIIntCast(ranges[r + 1] - ranges[r], &(*counts)[r]));
-    PetscCall(PetscMPIIntCast(ranges[r], &(*offsets)[r]));
+  PetscCall(HycoFOMGetRows(t->fom, &order));
+  if (order) {
+    PetscCall(HycoFileOrderSend(order, place, type, components, value, rows));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  *mine = (*counts)[rank];
+  PetscCallMPI(MPI_Type_size(type, &size));
+  PetscCall(PetscMemcpy(rows, value, (size_t)(n * components) * (size_t)size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -29,15 +28,13 @@ static PetscErrorCode CountRows(Mat S, PetscMPIInt **counts, PetscMPIInt **offse
 static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
 {
   PetscBool *fixed;
-  PetscInt lda, n;
-  PetscMPIInt *counts, *offsets, n_rows;
+  PetscInt lda, n, n_rows;
   PetscScalar *s;
 
   PetscFunctionBegin;
-  PetscCall(CountRows(S, &counts, &offsets, &n_rows));
+  PetscCall(MatGetLocalSize(S, &n_rows, NULL));
   PetscCall(PetscMalloc1(n_rows, &fixed));
-  PetscCallMPI(MPI_Scatterv(t->rank ? NULL : t->fe->fixed, counts, offsets, HYCO_MPI_BOOL, fixed, n_rows, HYCO_MPI_BOOL,
-                            0, HycoComm(t)));
+  PetscCall(HycoReducerToRows(t, HYCO_ON_NODES, HYCO_MPI_BOOL, t->sizes[3], t->fom->fe->fixed, fixed));
   PetscCall(MatGetSize(S, NULL, &n));
   PetscCall(MatDenseGetLDA(S, &lda));
   PetscCall(MatDenseGetArray(S, &s));
@@ -46,7 +43,6 @@ static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
   }
   PetscCall(MatDenseRestoreArray(S, &s));
   PetscCall(PetscFree(fixed));
-  PetscCall(PetscFree2(counts, offsets));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -55,45 +51,6 @@ static PetscErrorCode AddSeeds(PetscInt n, const PetscInt add[], PetscInt divide
   PetscFunctionBegin;
   PetscCall(PetscRealloc((size_t)(*n_seeds + n + 1) * sizeof(PetscInt), seeds));
   for (PetscInt k = 0; k < n; k++) (*seeds)[(*n_seeds)++] = add[k] / divide;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoReducerToRoot(HycoReducer t, Mat S, PetscBool row_major, PetscReal **out)
-{
-  PetscInt N, n, rows, lda;
-  PetscMPIInt cols;
-  const PetscScalar *s;
-  PetscReal *mine, *all;
-  MPI_Datatype row;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetSize(S, NULL, &n));
-  PetscCall(MatGetLocalSize(S, &rows, NULL));
-  PetscCall(MatDenseGetLDA(S, &lda));
-  PetscCall(PetscMalloc1((size_t)rows * (size_t)n, &mine));
-  PetscCall(MatDenseGetArrayRead(S, &s));
-  for (PetscInt i = 0; i < rows; i++) {
-    for (PetscInt j = 0; j < n; j++) mine[(size_t)i * (size_t)n + (size_t)j] = s[(size_t)j * (size_t)lda + (size_t)i];
-  }
-  PetscCall(MatDenseRestoreArrayRead(S, &s));
-  PetscCall(PetscMPIIntCast(n, &cols));
-  PetscCallMPI(MPI_Type_contiguous(cols, MPIU_REAL, &row));
-  PetscCallMPI(MPI_Type_commit(&row));
-  PetscCall(HycoConcatenate(HycoComm(t), rows, mine, row, (size_t)n * sizeof(PetscReal), &N, &all));
-  PetscCallMPI(MPI_Type_free(&row));
-  PetscCall(PetscFree(mine));
-  if (t->rank == 0 && !row_major) {
-    PetscReal *columns;
-
-    PetscCall(PetscMalloc1((size_t)N * (size_t)n + 1, &columns));
-    for (PetscInt i = 0; i < N; i++) {
-      for (PetscInt j = 0; j < n; j++)
-        columns[(size_t)j * (size_t)N + (size_t)i] = all[(size_t)i * (size_t)n + (size_t)j];
-    }
-    PetscCall(PetscFree(all));
-    all = columns;
-  }
-  *out = all;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -127,7 +84,7 @@ PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal produc
 PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, Mat *S)
 {
   PetscFunctionBegin;
-  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", S));
+  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", t->sizes[3], S));
   PetscCall(RemoveLifting(t, *S));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -210,7 +167,8 @@ static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerFetchRows(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **U)
+PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
+                                    PetscReal **rows)
 {
   const PetscInt dim = t->sizes[3], n_rows = t->rank ? 0 : n * dim;
   const PetscScalar *s;
@@ -221,19 +179,19 @@ PetscErrorCode HycoReducerFetchRows(HycoReducer t, PetscInt n, const PetscInt no
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n_rows, &row));
   for (PetscInt i = 0; i < n_rows; i++) row[i] = node[i / dim] * dim + i % dim;
-  PetscCall(MatGetLayouts(t->S, &layout, NULL));
+  PetscCall(MatGetLayouts(S, &layout, NULL));
   PetscCall(PetscSFCreate(HycoComm(t), &sf));
   PetscCall(PetscSFSetGraphLayout(sf, layout, n_rows, NULL, PETSC_OWN_POINTER, row));
-  PetscCall(PetscMalloc1((size_t)n_rows * (size_t)t->n_s + 1, U));
-  PetscCall(MatDenseGetLDA(t->S, &lda));
-  PetscCall(MatDenseGetArrayRead(t->S, &s));
-  for (PetscInt k = 0; k < t->n_s; k++) {
-    PetscReal *column = *U + (size_t)k * (size_t)n_rows;
+  PetscCall(PetscMalloc1((size_t)n_rows * (size_t)n_columns + 1, rows));
+  PetscCall(MatDenseGetLDA(S, &lda));
+  PetscCall(MatDenseGetArrayRead(S, &s));
+  for (PetscInt k = 0; k < n_columns; k++) {
+    PetscReal *column = *rows + (size_t)k * (size_t)n_rows;
 
     PetscCall(PetscSFBcastBegin(sf, MPIU_REAL, s + (size_t)k * (size_t)lda, column, MPI_REPLACE));
     PetscCall(PetscSFBcastEnd(sf, MPIU_REAL, s + (size_t)k * (size_t)lda, column, MPI_REPLACE));
   }
-  PetscCall(MatDenseRestoreArrayRead(t->S, &s));
+  PetscCall(MatDenseRestoreArrayRead(S, &s));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(PetscFree(row));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -242,7 +200,8 @@ PetscErrorCode HycoReducerFetchRows(HycoReducer t, PetscInt n, const PetscInt no
 /* The displacements where contacts may be. */
 static PetscErrorCode FetchContacts(HycoReducer t)
 {
-  const PetscInt n_nodes = t->rank ? 0 : t->sizes[0];
+  HycoMesh surface = t->fom->surface;
+  const PetscInt n_nodes = surface ? surface->n_nodes : 0;
   PetscInt *node;
   PetscBool *contact;
 
@@ -253,12 +212,12 @@ static PetscErrorCode FetchContacts(HycoReducer t)
   PetscCall(PetscMalloc1(n_nodes, &t->contact_row));
   PetscCall(PetscMalloc1(n_nodes, &node));
   t->n_contact_nodes = 0;
-  if (t->rank == 0) PetscCall(HycoPairsMarkSurfaces(t->scene, t->whole, &t->pairs, contact));
+  if (surface) PetscCall(HycoPairsMarkSurfaces(t->scene, surface, &t->fom->pairs, contact));
   for (PetscInt i = 0; i < n_nodes; i++) {
     t->contact_row[i] = contact[i] ? t->n_contact_nodes : -1;
-    if (contact[i]) node[t->n_contact_nodes++] = i;
+    if (contact[i]) node[t->n_contact_nodes++] = surface->node_whole ? surface->node_whole[i] : i;
   }
-  PetscCall(HycoReducerFetchRows(t, t->n_contact_nodes, node, &t->U_contact));
+  PetscCall(HycoReducerFetchRows(t, t->S, t->n_s, t->n_contact_nodes, node, &t->U_contact));
   PetscCall(PetscFree(node));
   PetscCall(PetscFree(contact));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -272,7 +231,7 @@ static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, Pe
   Mat S;
 
   PetscFunctionBegin;
-  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", &t->S));
+  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", t->sizes[3], &t->S));
   PetscCall(FetchContacts(t));
   PetscCall(MatDuplicate(t->S, MAT_COPY_VALUES, &S));
   PetscCall(RemoveLifting(t, S));
@@ -295,7 +254,7 @@ static PetscErrorCode ReduceField(HycoReducer t, HycoSnapshots store, const char
 
   PetscFunctionBegin;
   if (!t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSnapshotsGetField(store, t->samples, field, &S));
+  PetscCall(HycoSnapshotsGetField(store, t->samples, field, 1, &S));
   PetscCall(FindBasis(t, S, kind, all));
   PetscCall(MatDestroy(&S));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -316,7 +275,7 @@ static PetscErrorCode SeedFrom(HycoReducer t, Mat V, PetscInt l, PetscInt kind, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes, on the whole mesh on rank 0, and the snapshots' coefficients. */
+/* The modes and the snapshots' coefficients. */
 static PetscErrorCode TakeDisplacements(HycoReducer t)
 {
   const HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
@@ -331,8 +290,7 @@ static PetscErrorCode TakeDisplacements(HycoReducer t)
   PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
   for (PetscInt k = 0; k < t->n_s; k++)
     PetscCall(PetscArraycpy(t->VtU + k * t->l, basis->coefficients + k * basis->l, t->l));
-  PetscCall(HycoReducerToRoot(t, V, PETSC_TRUE, &t->V_whole));
-  PetscCall(MatDestroy(&V));
+  t->V = V;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -349,38 +307,53 @@ static PetscErrorCode TakeField(HycoReducer t, PetscInt kind, PetscInt divide, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Column k of B^T Lambda, by nodes in the distributed vectors' order. */
+static PetscErrorCode SetForces(HycoReducer t, PetscInt k, Mat R)
+{
+  HycoFOM f = t->fom;
+  const PetscInt m = t->sizes[2], dim = t->sizes[3], entries = HycoPairsWidth(&f->pairs) * dim * m;
+  PetscInt *start, *dof;
+  PetscReal *value, *gap;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc4(m + 1, &start, entries, &dof, entries, &value, m, &gap));
+  PetscCall(HycoContactRows(f->fe_surface, &f->pairs, start, dof, value, gap));
+  for (PetscInt i = 0; i < m; i++) {
+    for (PetscInt j = start[i]; j < start[i + 1]; j++) {
+      const PetscInt node = f->surface->node_global ? f->surface->node_global[dof[j] / dim] : dof[j] / dim;
+
+      PetscCall(MatSetValue(R, node * dim + dof[j] % dim, k, value[j] * t->Lambda[(size_t)k * (size_t)m + (size_t)i],
+                            ADD_VALUES));
+    }
+  }
+  PetscCall(PetscFree4(start, dof, value, gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers)
 {
-  const PetscInt m = t->sizes[2], n = t->n_s, dim = t->sizes[3], entries = HycoPairsWidth(&t->pairs) * dim * m;
-  PetscInt *start, *dof, n_par;
-  PetscReal *value, *gap;
+  HycoFOM f = t->fom;
+  const PetscInt n = t->n_s, n_own = f->part->n_owned * t->sizes[3];
+  PetscInt n_par;
   const PetscReal *mu;
-  Mat M, R, X;
-  PetscScalar *r;
+  Mat M, R, X, factor;
   KSP ksp;
   PetscBool singular;
   PC pc;
-  Mat factor;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  PetscCall(PetscMalloc4(m + 1, &start, entries, &dof, entries, &value, m, &gap));
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, t->sizes[0] * dim, n, NULL, &R));
-  PetscCall(MatDenseGetArray(R, &r));
+  PetscCall(MatCreateDense(HycoComm(t), n_own, PETSC_DECIDE, t->sizes[0] * t->sizes[3], n, NULL, &R));
   for (PetscInt k = 0; k < n; k++) {
-    PetscCall(HycoFESetParameters(t->fe, mu + k * n_par));
-    PetscCall(HycoContactRows(t->fe, &t->pairs, start, dof, value, gap));
-    for (PetscInt i = 0; i < m; i++) {
-      for (PetscInt j = start[i]; j < start[i + 1]; j++)
-        r[(size_t)k * (size_t)(t->sizes[0] * dim) + (size_t)dof[j]] +=
-            value[j] * t->Lambda[(size_t)k * (size_t)m + (size_t)i];
-    }
+    PetscCall(HycoFOMSetParameters(f, mu + k * n_par));
+    HycoOnRoot(HycoComm(t), SetForces(t, k, R));
   }
-  PetscCall(MatDenseRestoreArray(R, &r));
-  PetscCall(HycoFECreateMatrix(t->fe, PETSC_COMM_SELF, t->sizes[0], 0, &M));
-  PetscCall(HycoFEAssembleH1(t->fe, HycoMeshLength(t->whole), M));
+  PetscCall(MatAssemblyBegin(R, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(R, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoFECreateMatrix(f->fe, HycoComm(t), f->part->n_owned, f->part->first, &M));
+  HycoOnEach(HycoComm(t), HycoFEAssembleH1(f->fe, HycoMeshLength(f->part), M));
   PetscCall(MatSetOption(M, MAT_SPD, PETSC_TRUE));
-  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", M, PETSC_TRUE, &ksp));
+  PetscCall(HycoDirectSolver(HycoComm(t), "hyco_norm_", M, PETSC_TRUE, &ksp));
   PetscCall(HycoFactor(ksp, &singular));
   PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the H1 norm's matrix is singular");
   PetscCall(KSPGetPC(ksp, &pc));
@@ -389,34 +362,29 @@ PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremize
   PetscCall(MatMatSolve(factor, R, X));
   PetscCall(MatDestroy(&M));
   PetscCall(KSPDestroy(&ksp));
-  PetscCall(PetscFree4(start, dof, value, gap));
   *forces = R;
   *supremizers = X;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gram matrix of the dual snapshots in the norm of the dual of H1: (B^T L)^T M^-1 (B^T L). On rank 0. */
+/* Gram matrix of the dual snapshots in the norm of the dual of H1: (B^T L)^T M^-1 (B^T L). On every rank. */
 static PetscErrorCode DualGram(HycoReducer t, PetscReal G[])
 {
   const PetscInt n = t->n_s;
-  Mat R, X, GX;
-  PetscScalar *r;
+  Mat R, X;
 
   PetscFunctionBegin;
   PetscCall(HycoReducerSupremizers(t, &R, &X));
-  PetscCall(MatTransposeMatMult(R, X, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &GX));
-  PetscCall(MatDenseGetArray(GX, &r));
+  PetscCall(HycoReducerMultiply(t, R, X, G));
   for (PetscInt j = 0; j < n; j++) {
-    for (PetscInt i = 0; i < n; i++) G[j * n + i] = (r[j * n + i] + r[i * n + j]) / 2;
+    for (PetscInt i = 0; i <= j; i++) G[j * n + i] = G[i * n + j] = (G[j * n + i] + G[i * n + j]) / 2;
   }
-  PetscCall(MatDenseRestoreArray(GX, &r));
-  PetscCall(MatDestroy(&GX));
   PetscCall(MatDestroy(&X));
   PetscCall(MatDestroy(&R));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Brings moved surfaces to the training point where contact k presses most. */
+/* Brings moved surfaces to the training point where contact k presses most. Collective; k: on rank 0. */
 static PetscErrorCode MoveWherePresses(HycoReducer t, PetscInt k)
 {
   const size_t m = (size_t)t->sizes[2];
@@ -424,72 +392,107 @@ static PetscErrorCode MoveWherePresses(HycoReducer t, PetscInt k)
   const PetscReal *mu;
 
   PetscFunctionBegin;
-  if (!t->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!t->fom->searches) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  for (PetscInt q = 1; q < t->n_s; q++) {
+  for (PetscInt q = 1; q < t->n_s && t->rank == 0; q++) {
     if (t->Lambda[(size_t)q * m + (size_t)k] > t->Lambda[(size_t)most * m + (size_t)k]) most = q;
   }
-  PetscCall(HycoFESetParameters(t->fe, mu + most * n_par));
-  PetscCall(HycoPairsMove(t->fe, &t->pairs));
+  PetscCallMPI(MPI_Bcast(&most, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCall(HycoFOMSetParameters(t->fom, mu + most * n_par));
+  HycoOnRoot(HycoComm(t), HycoPairsMove(t->fom->fe_surface, &t->fom->pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* POD of the multipliers in (H1)', DEIM on it: the nodes of each point's contact are seeds. On rank 0. */
-static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes[])
+/* POD of the multipliers in (H1)', whose Gram matrix is G, and DEIM on it: l contacts. On rank 0. */
+static PetscErrorCode DualPoints(HycoReducer t, const PetscReal G[], PetscInt *l, PetscInt index[])
 {
   const PetscInt m = t->sizes[2], n = t->n_s;
-  PetscReal *G, *W, *sigma;
-  PetscInt l, *index;
+  PetscReal *W, *sigma;
   Mat V;
   PetscScalar *v;
 
   PetscFunctionBegin;
-  *n_nodes = 0;
-  PetscCall(PetscMalloc2(n * n, &G, n, &sigma));
-  PetscCall(DualGram(t, G));
-  PetscCall(HycoPODGram(n, G, t->tol[HYCO_SEED_DUAL], t->noise, &W, &l, sigma));
-  t->counts[HYCO_SEED_DUAL] = l;
-  if (l) {
-    PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, l, NULL, &V));
+  PetscCall(PetscMalloc1(n, &sigma));
+  PetscCall(HycoPODGram(n, G, t->tol[HYCO_SEED_DUAL], t->noise, &W, l, sigma));
+  if (*l) {
+    PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, *l, NULL, &V));
     PetscCall(MatDenseGetArray(V, &v));
-    for (PetscInt j = 0; j < l; j++) {
+    for (PetscInt j = 0; j < *l; j++) {
       for (PetscInt k = 0; k < n; k++) {
         for (PetscInt i = 0; i < m; i++) v[j * m + i] += t->Lambda[(size_t)k * (size_t)m + (size_t)i] * W[j * n + k];
       }
     }
     PetscCall(MatDenseRestoreArray(V, &v));
-    PetscCall(PetscMalloc1(l, &index));
     HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
-    for (PetscInt k = 0; k < l; k++) {
-      const PetscInt *master;
-      const PetscReal *weight;
-      PetscInt masters;
-
-      PetscCall(MoveWherePresses(t, index[k]));
-      HycoPairsMasters(&t->pairs, index[k], &masters, &master, &weight);
-      nodes[(*n_nodes)++] = HycoPairsSlave(&t->pairs, index[k]);
-      for (PetscInt j = 0; j < masters; j++) nodes[(*n_nodes)++] = master[j];
-    }
-    PetscCall(PetscFree(index));
     PetscCall(MatDestroy(&V));
   }
   PetscCall(PetscFree(W));
-  PetscCall(PetscFree2(G, sigma));
+  PetscCall(PetscFree(sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nodes of contact k, by their numbers in the whole mesh. Rank 0. */
+static void AddContactNodes(HycoReducer t, PetscInt k, PetscInt *n, PetscInt nodes[])
+{
+  HycoFOM f = t->fom;
+  const PetscInt *master;
+  const PetscReal *weight;
+  PetscInt masters;
+
+  HycoPairsMasters(&f->pairs, k, &masters, &master, &weight);
+  for (PetscInt j = -1; j < masters; j++) {
+    const PetscInt node = j < 0 ? HycoPairsSlave(&f->pairs, k) : master[j];
+
+    nodes[(*n)++] = f->surface->node_whole ? f->surface->node_whole[node] : node;
+  }
+}
+
+/* The nodes of the contacts that DEIM takes of the dual snapshots, on every rank. Collective. */
+static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes[])
+{
+  PetscReal *G;
+  PetscInt l = 0, *index;
+
+  PetscFunctionBegin;
+  *n_nodes = 0;
+  PetscCall(PetscMalloc2(t->n_s * t->n_s, &G, t->n_s, &index));
+  PetscCall(DualGram(t, G));
+  HycoOnRoot(HycoComm(t), DualPoints(t, G, &l, index));
+  PetscCallMPI(MPI_Bcast(&l, 1, MPIU_INT, 0, HycoComm(t)));
+  t->counts[HYCO_SEED_DUAL] = l;
+  for (PetscInt k = 0; k < l; k++) {
+    PetscCall(MoveWherePresses(t, index[k]));
+    if (t->rank == 0) AddContactNodes(t, index[k], n_nodes, nodes);
+  }
+  PetscCallMPI(MPI_Bcast(n_nodes, 1, MPIU_INT, 0, HycoComm(t)));
+  HycoBcast(nodes, *n_nodes, MPIU_INT, HycoComm(t));
+  PetscCall(PetscFree2(G, index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The dual snapshots. Rank 0. */
+static PetscErrorCode ReadForces(HycoReducer t, HycoSnapshots store)
+{
+  const PetscInt m = t->sizes[2];
+  PetscInt n_par;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  PetscCall(PetscMalloc1((size_t)m * (size_t)t->n_s + 1, &t->Lambda));
+  for (PetscInt k = 0; k < t->n_s; k++)
+    PetscCall(HycoSnapshotsReadRows(store, mu + k * n_par, "lambda", 0, m, t->Lambda + (size_t)k * (size_t)m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The dual snapshots on rank 0; their seeds, which only -hyco_rid_dual_tol decides. */
 static PetscErrorCode ReduceForces(HycoReducer t, HycoSnapshots store)
 {
-  Mat S;
-
   PetscFunctionBegin;
-  PetscCall(HycoSnapshotsGetField(store, t->samples, "lambda", &S));
-  PetscCall(HycoReducerToRoot(t, S, PETSC_FALSE, &t->Lambda));
-  PetscCall(MatDestroy(&S));
+  HycoOnRoot(HycoComm(t), ReadForces(t, store));
   if (!t->seed[HYCO_SEED_DUAL] || !t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(5 * t->n_s, &t->dual_seeds));
-  HycoOnRoot(HycoComm(t), DualSeeds(t, &t->n_dual_seeds, t->dual_seeds));
+  PetscCall(DualSeeds(t, &t->n_dual_seeds, t->dual_seeds));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -502,8 +505,7 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t)
   PetscCall(TakeDisplacements(t));
   PetscCall(TakeField(t, HYCO_SEED_STRESS, n_sigma, &t->n_seeds_cell, &t->seeds_cell));
   PetscCall(TakeField(t, HYCO_SEED_FORCE, dim, &t->n_seeds_node, &t->seeds_node));
-  if (t->rank == 0 && t->seed[HYCO_SEED_DUAL])
-    PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
+  if (t->seed[HYCO_SEED_DUAL]) PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

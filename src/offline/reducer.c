@@ -72,11 +72,9 @@ PetscErrorCode HycoReducerReset(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(HycoReducerResetBases(t));
   if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
-  PetscCall(HycoFEDestroy(&t->fe));
-  PetscCall(HycoPairsDestroy(&t->pairs));
+  PetscCall(HycoFOMDestroy(&t->fom));
   PetscCall(HycoMetDestroy(&t->met));
-  PetscCall(HycoMeshDestroy(&t->whole));
-  PetscCall(PetscFree(t->grown));
+  HycoFreeAll(&t->grown, &t->surface_node, &t->fixed);
   PetscCall(HycoSamplesDestroy(&t->held));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -84,7 +82,8 @@ PetscErrorCode HycoReducerReset(HycoReducer t)
 PetscErrorCode HycoReducerDropBases(HycoReducer t)
 {
   PetscFunctionBegin;
-  HycoFreeAll(&t->seeds_node, &t->seeds_cell, &t->sigma, &t->V_whole, &t->VtU);
+  HycoFreeAll(&t->seeds_node, &t->seeds_cell, &t->sigma, &t->VtU);
+  PetscCall(MatDestroy(&t->V));
   t->n_seeds_node = t->n_seeds_cell = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -100,7 +99,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
   PetscCall(MatDestroy(&t->S));
-  HycoFreeAll(&t->U_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds);
+  HycoFreeAll(&t->U_rid, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,226 +1,398 @@
-/* Omega_A: supports of the interpolation points, region of interest, contact extension, layers. */
+/*
+  Omega_A as a label of the DM over the ranks: supports of the interpolation points, region of interest, contact
+  extension, layers. A cell that joins is labelled where it is seen; DMPlexLabelComplete() adds its closure and tells
+  the other ranks, whose cells around the vertices join next. What contacts decide is decided on rank 0, which has their
+  surfaces.
+*/
+#include <hycofomimpl.h>
 #include <hycodomain.h>
-#include <string.h>
 
-/* Cells all of whose nodes lie in the union of the points' supports (20). */
-static PetscErrorCode AddSupports(HycoMesh m, const HycoRIDRecipe *r, const PetscInt start[], const PetscInt around[],
-                                  PetscBool in[])
+typedef struct {
+  HycoFOM f;
+  HycoMesh part;
+  DMLabel label;
+  PetscInt *start, *around; /* cells around the part's nodes */
+  PetscInt *own;            /* by place of this rank's nodes: room for what goes through the star forests */
+  PetscSF to_part, to_surface;
+} Rid;
+
+static PetscErrorCode RidDestroy(Rid *r)
 {
-  PetscBool *covered;
+  PetscFunctionBegin;
+  PetscCall(PetscSFDestroy(&r->to_part));
+  PetscCall(PetscSFDestroy(&r->to_surface));
+  PetscCall(PetscFree(r->start));
+  PetscCall(PetscFree(r->around));
+  PetscCall(PetscFree(r->own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode RidCreate(HycoFOM f, Rid *r)
+{
+  HycoMesh part = f->part, surface = f->surface;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->n_nodes, &covered));
-  for (PetscInt k = 0; k < r->n_nodes; k++) {
-    for (PetscInt j = start[r->nodes[k]]; j < start[r->nodes[k] + 1]; j++) {
-      for (PetscInt v = 0; v < m->nv; v++) covered[m->cells[around[j] * m->nv + v]] = PETSC_TRUE;
-    }
+  PetscCall(PetscMemzero(r, sizeof(*r)));
+  r->f = f;
+  r->part = part;
+  PetscCall(DMLabelCreate(PETSC_COMM_SELF, "rid", &r->label));
+  PetscCall(HycoMeshNodeCells(part, &r->start, &r->around));
+  PetscCall(PetscMalloc1(part->n_owned, &r->own));
+  if (f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoMeshNodeSF(HycoComm(f), part, part->n_nodes, part->node_global, &r->to_part));
+  PetscCall(HycoMeshNodeSF(HycoComm(f), part, surface ? surface->n_nodes : 0, surface ? surface->node_global : NULL,
+                           &r->to_surface));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Add(Rid *r, PetscInt cell)
+{
+  PetscFunctionBegin;
+  PetscCall(DMLabelSetValue(r->label, r->part->cell_point[cell], HYCO_RID));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells around node i of the part; where other ranks have some of these, they add them. */
+static PetscErrorCode AddAround(Rid *r, PetscInt i)
+{
+  PetscFunctionBegin;
+  for (PetscInt j = r->start[i]; j < r->start[i + 1]; j++) PetscCall(Add(r, r->around[j]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The part's nodes that a label has after it is completed over the ranks. Collective. */
+static PetscErrorCode MarkNodes(const Rid *r, DMLabel label, PetscBool node[])
+{
+  PetscFunctionBegin;
+  PetscCall(DMPlexLabelComplete(r->f->dm, label));
+  for (PetscInt i = 0; i < r->part->n_nodes; i++)
+    PetscCall(DMLabelStratumHasPoint(label, HYCO_RID, r->part->node_point[i], &node[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Flags of the part's nodes to the surface's on rank 0, and back. Collective. */
+static PetscErrorCode ToSurface(Rid *r, const PetscBool node[], PetscInt on[])
+{
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < r->part->n_nodes; i++) {
+    const PetscInt place = HycoMeshOwned(r->part, i);
+
+    if (place >= 0) r->own[place] = node[i];
   }
-  for (PetscInt k = 0; k < r->n_cells; k++) {
-    for (PetscInt v = 0; v < m->nv; v++) covered[m->cells[r->cells[k] * m->nv + v]] = PETSC_TRUE;
+  if (r->f->size == 1) {
+    PetscCall(PetscArraycpy(on, r->own, r->part->n_nodes));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscCall(PetscSFBcastBegin(r->to_surface, MPIU_INT, r->own, on, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(r->to_surface, MPIU_INT, r->own, on, MPI_REPLACE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FromSurface(Rid *r, const PetscInt on[], PetscInt node[])
+{
+  PetscFunctionBegin;
+  if (r->f->size == 1) {
+    PetscCall(PetscArraycpy(node, on, r->part->n_nodes));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscArrayzero(r->own, r->part->n_owned));
+  PetscCall(PetscSFReduceBegin(r->to_surface, MPIU_INT, on, r->own, MPI_REPLACE));
+  PetscCall(PetscSFReduceEnd(r->to_surface, MPIU_INT, on, r->own, MPI_REPLACE));
+  PetscCall(PetscSFBcastBegin(r->to_part, MPIU_INT, r->own, node, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(r->to_part, MPIU_INT, r->own, node, MPI_REPLACE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A node or cell of the whole mesh in the part; -1: it is not there. `of`: the part's in the whole mesh, ascending. */
+static PetscErrorCode FindInPart(PetscInt n, const PetscInt of[], PetscInt whole, PetscInt *at)
+{
+  PetscFunctionBegin;
+  *at = whole;
+  if (of) PetscCall(PetscFindInt(whole, n, of, at));
+  *at = PetscMax(*at, -1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cells all of whose nodes lie in the union of the points' supports (20). */
+static PetscErrorCode AddSupports(Rid *r, const HycoRIDRecipe *recipe)
+{
+  HycoMesh m = r->part;
+  Rid support = *r;
+  PetscBool *covered;
+  PetscInt at;
+
+  PetscFunctionBegin;
+  PetscCall(DMLabelCreate(PETSC_COMM_SELF, "support", &support.label));
+  for (PetscInt k = 0; k < recipe->n_nodes; k++) {
+    PetscCall(FindInPart(m->n_nodes, m->node_whole, recipe->nodes[k], &at));
+    if (at >= 0) PetscCall(AddAround(&support, at));
+  }
+  for (PetscInt k = 0; k < recipe->n_cells; k++) {
+    PetscCall(FindInPart(m->n_cells, m->cell_whole, recipe->cells[k], &at));
+    if (at >= 0) PetscCall(Add(&support, at));
+  }
+  PetscCall(PetscMalloc1(m->n_nodes, &covered));
+  PetscCall(MarkNodes(r, support.label, covered));
   for (PetscInt e = 0; e < m->n_cells; e++) {
     PetscBool all = PETSC_TRUE;
 
     for (PetscInt v = 0; v < m->nv; v++) all = (PetscBool)(all && covered[m->cells[e * m->nv + v]]);
-    if (all) in[e] = PETSC_TRUE;
+    if (all) PetscCall(Add(r, e));
   }
   PetscCall(PetscFree(covered));
+  PetscCall(DMLabelDestroy(&support.label));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The region of interest: cells of cell groups, cells behind facet groups, cells at nodes of smaller groups. */
-static PetscErrorCode AddGroup(HycoMesh m, const char name[], const PetscInt start[], const PetscInt around[],
-                               PetscBool in[])
+static PetscErrorCode AddGroup(Rid *r, const char name[])
 {
+  HycoMesh m = r->part;
   PetscInt g = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "hyco_rid_groups", name, &g));
   if (m->group_dim[g] == m->dim) {
-    for (PetscInt k = m->group_cell_start[g]; k < m->group_cell_start[g + 1]; k++) in[m->group_cell[k]] = PETSC_TRUE;
+    for (PetscInt k = m->group_cell_start[g]; k < m->group_cell_start[g + 1]; k++) PetscCall(Add(r, m->group_cell[k]));
   } else if (m->group_dim[g] == m->dim - 1) {
     for (PetscInt f = 0; f < m->n_facets; f++) {
-      if (m->facet_group[f] == g) in[m->facet_cell[f]] = PETSC_TRUE;
+      if (m->facet_group[f] == g) PetscCall(Add(r, m->facet_cell[f]));
     }
   } else {
-    for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
-      for (PetscInt j = start[m->group_node[k]]; j < start[m->group_node[k] + 1]; j++) in[around[j]] = PETSC_TRUE;
-    }
+    for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) PetscCall(AddAround(r, m->group_node[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddRegion(HycoScene scene, HycoMesh m, const char text[], const PetscInt start[],
-                                const PetscInt around[], PetscBool in[])
+static PetscErrorCode AddRegion(Rid *r, const char text[])
 {
+  HycoMesh m = r->part;
   HycoExpr expr;
   PetscReal *value;
 
   PetscFunctionBegin;
   PetscCall(HycoExprCreate("hyco_rid_region", text, 0, NULL, &expr));
-  (void)scene;
   PetscCall(PetscMalloc1(m->n_nodes, &value));
   PetscCall(HycoExprEval(expr, NULL, m->n_nodes, m->xyz, value));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
-    for (PetscInt j = start[i]; value[i] > 0 && j < start[i + 1]; j++) in[around[j]] = PETSC_TRUE;
+    if (value[i] > 0) PetscCall(AddAround(r, i));
   }
   PetscCall(PetscFree(value));
   PetscCall(HycoExprDestroy(&expr));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode MarkNodes(HycoMesh m, const PetscBool in[], PetscBool node[])
+/* near[i]: a node of Gamma^C closer than d to one of it that Omega_A has (in); 2 for the others of Gamma^C. Rank 0. */
+static PetscErrorCode FindNear(HycoFOM f, const HycoPairs *pairs, PetscReal d, const PetscInt in[], PetscInt near[])
 {
+  HycoMesh m = f->surface;
+  PetscBool *contact;
+  PetscInt *list, n = 0;
+
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(node, m->n_nodes));
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
-    if (in[k / m->nv]) node[m->cells[k]] = PETSC_TRUE;
+  PetscCall(PetscCalloc2(m->n_nodes, &contact, m->n_nodes, &list));
+  PetscCall(HycoPairsMarkSurfaces(f->scene, m, pairs, contact));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    if (contact[i] && in[i]) list[n++] = i;
   }
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    PetscBool close = PETSC_FALSE;
+
+    for (PetscInt j = 0; contact[i] && !in[i] && j < n && !close; j++) {
+      PetscReal sum = 0;
+
+      for (PetscInt c = 0; c < 3; c++)
+        sum += (m->xyz[3 * i + c] - m->xyz[3 * list[j] + c]) * (m->xyz[3 * i + c] - m->xyz[3 * list[j] + c]);
+      close = (PetscBool)(sum < d * d);
+    }
+    near[i] = !contact[i] ? 0 : close ? 1 : 2;
+  }
+  PetscCall(PetscFree2(contact, list));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Section 7.2: cells on Gamma^C with a node closer than d to a node of Gamma^C that Omega_A has. */
-static PetscErrorCode ExtendContact(HycoScene scene, HycoMesh m, const HycoPairs *pairs, PetscReal d,
-                                    const PetscInt start[], const PetscInt around[], PetscBool in[])
+static PetscErrorCode ExtendContact(Rid *r, const HycoPairs *pairs, PetscReal d)
 {
-  PetscBool *node, *contact;
-  PetscInt *list, n = 0, n_in = 0;
+  HycoMesh m = r->part;
+  const PetscInt n_surface = r->f->surface ? r->f->surface->n_nodes : 0;
+  PetscBool *node;
+  PetscInt *in, *near_on, *near;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_nodes, &node));
-  PetscCall(PetscCalloc2(m->n_nodes, &contact, m->n_nodes, &list));
-  PetscCall(MarkNodes(m, in, node));
-  PetscCall(HycoPairsMarkSurfaces(scene, m, pairs, contact));
-  for (PetscInt pass = 0; pass < 2; pass++) { /* those in Omega_A first */
-    for (PetscInt i = 0; i < m->n_nodes; i++) {
-      if (contact[i] && node[i] == (pass == 0)) list[n++] = i;
-    }
-    if (pass == 0) n_in = n;
-  }
-  for (PetscInt k = n_in; k < n; k++) {
-    PetscBool near = PETSC_FALSE;
-
-    for (PetscInt j = 0; j < n_in && !near; j++) {
-      PetscReal sum = 0;
-
-      for (PetscInt c = 0; c < 3; c++)
-        sum +=
-            (m->xyz[3 * list[k] + c] - m->xyz[3 * list[j] + c]) * (m->xyz[3 * list[k] + c] - m->xyz[3 * list[j] + c]);
-      near = (PetscBool)(sum < d * d);
-    }
-    for (PetscInt j = start[list[k]]; near && j < start[list[k] + 1]; j++) {
+  PetscCall(PetscMalloc4(m->n_nodes, &node, n_surface, &in, n_surface, &near_on, m->n_nodes, &near));
+  PetscCall(MarkNodes(r, r->label, node));
+  PetscCall(ToSurface(r, node, in));
+  HycoOnRoot(HycoComm(r->f), FindNear(r->f, pairs, d, in, near_on));
+  PetscCall(FromSurface(r, near_on, near));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    for (PetscInt j = r->start[i]; near[i] == 1 && j < r->start[i + 1]; j++) {
       PetscInt on = 0;
 
-      for (PetscInt v = 0; v < m->nv; v++) on += contact[m->cells[around[j] * m->nv + v]];
-      if (on >= m->nf) in[around[j]] = PETSC_TRUE;
+      for (PetscInt v = 0; v < m->nv; v++) on += near[m->cells[r->around[j] * m->nv + v]] > 0;
+      if (on >= m->nf) PetscCall(Add(r, r->around[j]));
     }
   }
-  PetscCall(PetscFree(node));
-  PetscCall(PetscFree2(contact, list));
+  PetscCall(PetscFree4(node, in, near_on, near));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define MOST_MASTERS 4
+
+/* The masters, in the whole mesh, of the slaves that Omega_A has (in), MOST_MASTERS each, padded by -1. Rank 0. */
+static PetscErrorCode ListMasters(HycoFOM f, const HycoPairs *pairs, const PetscInt in[], PetscInt *n, PetscInt list[])
+{
+  PetscFunctionBegin;
+  *n = 0;
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscInt *master;
+    const PetscReal *weight;
+    PetscInt masters;
+
+    HycoPairsMasters(pairs, k, &masters, &master, &weight);
+    if (masters < 2 || !in[HycoPairsSlave(pairs, k)]) continue;
+    for (PetscInt j = 0; j < MOST_MASTERS; j++)
+      list[*n * MOST_MASTERS + j] = j >= masters             ? -1
+                                    : f->surface->node_whole ? f->surface->node_whole[master[j]]
+                                                             : master[j];
+    (*n)++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells with all of these masters. */
+static PetscErrorCode AddBehind(Rid *r, const PetscInt master[])
+{
+  HycoMesh m = r->part;
+  PetscInt node[MOST_MASTERS], n = 0;
+
+  PetscFunctionBegin;
+  for (; n < MOST_MASTERS && master[n] >= 0; n++) {
+    PetscCall(FindInPart(m->n_nodes, m->node_whole, master[n], &node[n]));
+    if (node[n] < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt j = r->start[node[0]]; j < r->start[node[0] + 1]; j++) {
+    PetscInt has = 0;
+
+    for (PetscInt v = 0; v < m->nv; v++) {
+      for (PetscInt i = 0; i < n; i++) has += m->cells[r->around[j] * m->nv + v] == node[i];
+    }
+    if (has == n) PetscCall(Add(r, r->around[j]));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Surfaces that do not match: the cells with the masters of the slaves that Omega_A has, so that their gaps can be
    computed. (Their other neighbours then have an interface of their own: the other way round all of Gamma^C would
    come.) */
-static PetscErrorCode CompleteSlaves(HycoMesh m, const HycoPairs *pairs, const PetscInt start[],
-                                     const PetscInt around[], PetscBool in[])
+static PetscErrorCode CompleteSlaves(Rid *r, const HycoPairs *pairs, PetscInt n_rows)
 {
+  const PetscInt n_surface = r->f->surface ? r->f->surface->n_nodes : 0;
   PetscBool *node;
+  PetscInt *in, *list, n = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_nodes, &node));
-  PetscCall(MarkNodes(m, in, node));
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscInt *master;
-    const PetscReal *weight;
-    PetscInt n;
-
-    HycoPairsMasters(pairs, k, &n, &master, &weight);
-    if (n < 2 || !node[HycoPairsSlave(pairs, k)]) continue;
-    for (PetscInt j = start[master[0]]; j < start[master[0] + 1]; j++) {
-      PetscInt has = 0;
-
-      for (PetscInt v = 0; v < m->nv; v++) {
-        for (PetscInt i = 0; i < n; i++) has += m->cells[around[j] * m->nv + v] == master[i];
-      }
-      if (has == n) in[around[j]] = PETSC_TRUE;
-    }
-  }
-  PetscCall(PetscFree(node));
+  PetscCall(PetscMalloc3(r->part->n_nodes, &node, n_surface, &in, MOST_MASTERS * n_rows, &list));
+  PetscCall(MarkNodes(r, r->label, node));
+  PetscCall(ToSurface(r, node, in));
+  HycoOnRoot(HycoComm(r->f), ListMasters(r->f, pairs, in, &n, list));
+  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(r->f)));
+  HycoBcast(list, MOST_MASTERS * n, MPIU_INT, HycoComm(r->f));
+  for (PetscInt k = 0; k < n; k++) PetscCall(AddBehind(r, list + k * MOST_MASTERS));
+  PetscCall(PetscFree3(node, in, list));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* on[i]: node i of contacts on moved surfaces that have one in Omega_A (in). Rank 0. */
+static void MarkMet(HycoFOM f, const HycoPairs *pairs, const PetscInt in[], PetscInt on[])
+{
+  for (PetscInt i = 0; i < f->surface->n_nodes; i++) on[i] = 0;
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscInt slave = HycoPairsSlave(pairs, k), *master;
+    const PetscReal *weight;
+    PetscInt n, any = in[slave];
+
+    if (!HycoPairsMoved(pairs, k)) continue;
+    HycoPairsMasters(pairs, k, &n, &master, &weight);
+    for (PetscInt j = 0; j < n; j++) any = any || in[master[j]];
+    for (PetscInt j = -1; any && j < n; j++) on[j < 0 ? slave : master[j]] = 1;
+  }
 }
 
 /* Moved surfaces: the cells around all nodes of contacts that have one in Omega_A. A slave outside would close, on its
    way, the masters of all places to the interface, and leave no contact node of the master's body in A. */
-static PetscErrorCode CompleteMoved(HycoMesh m, const HycoPairs *pairs, const PetscInt start[], const PetscInt around[],
-                                    PetscBool in[])
+static PetscErrorCode CompleteMoved(Rid *r, const HycoPairs *pairs)
 {
-  PetscBool *node, grown = (PetscBool)(pairs->room > 0);
+  const PetscInt n_surface = r->f->surface ? r->f->surface->n_nodes : 0;
+  PetscBool *node, grown = r->f->searches;
+  PetscInt *in, *on, *take;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_nodes, &node));
+  PetscCall(PetscMalloc4(r->part->n_nodes, &node, n_surface, &in, n_surface, &on, r->part->n_nodes, &take));
   while (grown) {
-    grown = PETSC_FALSE;
-    PetscCall(MarkNodes(m, in, node));
-    for (PetscInt k = 0; k < pairs->n; k++) {
-      const PetscInt slave = HycoPairsSlave(pairs, k), *master;
-      const PetscReal *weight;
-      PetscBool any = node[slave];
-      PetscInt n;
+    PetscInt before, after;
 
-      if (!HycoPairsMoved(pairs, k)) continue;
-      HycoPairsMasters(pairs, k, &n, &master, &weight);
-      for (PetscInt j = 0; j < n; j++) any = (PetscBool)(any || node[master[j]]);
-      for (PetscInt j = -1; any && j < n; j++) {
-        const PetscInt i = j < 0 ? slave : master[j];
-
-        for (PetscInt e = start[i]; e < start[i + 1]; e++) {
-          grown = (PetscBool)(grown || !in[around[e]]);
-          in[around[e]] = PETSC_TRUE;
-        }
-      }
+    PetscCall(MarkNodes(r, r->label, node));
+    PetscCall(ToSurface(r, node, in));
+    if (r->f->rank == 0) MarkMet(r->f, pairs, in, on);
+    PetscCall(FromSurface(r, on, take));
+    PetscCall(DMLabelGetStratumSize(r->label, HYCO_RID, &before));
+    for (PetscInt i = 0; i < r->part->n_nodes; i++) {
+      if (take[i]) PetscCall(AddAround(r, i));
     }
+    PetscCall(DMLabelGetStratumSize(r->label, HYCO_RID, &after));
+    grown = (PetscBool)(after > before);
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &grown, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(r->f)));
   }
-  PetscCall(PetscFree(node));
+  PetscCall(PetscFree4(node, in, on, take));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Cells that share a node with Omega_A. */
-static PetscErrorCode AddLayer(HycoMesh m, PetscBool in[], PetscInt *added)
+static PetscErrorCode AddLayer(Rid *r)
 {
   PetscBool *node;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_nodes, &node));
-  PetscCall(MarkNodes(m, in, node));
-  *added = 0;
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
-    if (!node[m->cells[k]] || in[k / m->nv]) continue;
-    in[k / m->nv] = PETSC_TRUE;
-    (*added)++;
+  PetscCall(PetscMalloc1(r->part->n_nodes, &node));
+  PetscCall(MarkNodes(r, r->label, node));
+  for (PetscInt i = 0; i < r->part->n_nodes; i++) {
+    if (node[i]) PetscCall(AddAround(r, i));
   }
   PetscCall(PetscFree(node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoRIDBuild(HycoScene scene, HycoMesh m, const HycoPairs *pairs, const HycoRIDRecipe *r, PetscBool in[])
+/* What each rank finds alone. */
+static PetscErrorCode AddRegions(Rid *r, const HycoRIDRecipe *recipe)
 {
-  PetscInt *start, *around, added = 1;
+  PetscFunctionBegin;
+  for (PetscInt e = 0; recipe->whole && e < r->part->n_cells; e++) PetscCall(Add(r, e));
+  for (PetscInt k = 0; k < recipe->n_groups; k++) PetscCall(AddGroup(r, recipe->groups[k]));
+  if (recipe->region) PetscCall(AddRegion(r, recipe->region));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDRecipe *recipe, DMLabel *label)
+{
+  PetscInt n_rows = f->rank ? 0 : pairs->n;
+  Rid r;
 
   PetscFunctionBegin;
-  for (PetscInt e = 0; e < m->n_cells; e++) in[e] = r->whole;
-  PetscCall(HycoMeshNodeCells(m, &start, &around));
-  PetscCall(AddSupports(m, r, start, around, in));
-  for (PetscInt k = 0; k < r->n_groups; k++) PetscCall(AddGroup(m, r->groups[k], start, around, in));
-  if (r->region) PetscCall(AddRegion(scene, m, r->region, start, around, in));
-  if (r->extension > 0) PetscCall(ExtendContact(scene, m, pairs, r->extension, start, around, in));
-  PetscCall(CompleteSlaves(m, pairs, start, around, in));
-  PetscCall(CompleteMoved(m, pairs, start, around, in));
-  for (PetscInt k = 0; k < r->layers && added; k++) PetscCall(AddLayer(m, in, &added));
-  PetscCall(CompleteSlaves(m, pairs, start, around, in));
-  PetscCall(CompleteMoved(m, pairs, start, around, in));
-  PetscCall(PetscFree(start));
-  PetscCall(PetscFree(around));
+  PetscCallMPI(MPI_Bcast(&n_rows, 1, MPIU_INT, 0, HycoComm(f)));
+  PetscCall(RidCreate(f, &r));
+  HycoOnEach(HycoComm(f), AddRegions(&r, recipe));
+  if (!recipe->whole) {
+    PetscCall(AddSupports(&r, recipe));
+    if (recipe->extension > 0) PetscCall(ExtendContact(&r, pairs, recipe->extension));
+    PetscCall(CompleteSlaves(&r, pairs, n_rows));
+    PetscCall(CompleteMoved(&r, pairs));
+    for (PetscInt k = 0; k < recipe->layers; k++) PetscCall(AddLayer(&r));
+    PetscCall(CompleteSlaves(&r, pairs, n_rows));
+    PetscCall(CompleteMoved(&r, pairs));
+  }
+  PetscCall(DMPlexLabelComplete(f->dm, r.label));
+  *label = r.label;
+  PetscCall(RidDestroy(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -107,7 +107,7 @@ static PetscReal EdgeLength(HycoMesh m, PetscInt a, PetscInt b)
 /* Mean length of an edge of the slave surfaces' facets; 0 without any. Rank 0. */
 static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
 {
-  const HycoMesh m = t->whole;
+  const HycoMesh m = t->fom->surface;
   PetscReal sum = 0;
   PetscInt n = 0;
 
@@ -139,7 +139,7 @@ static PetscErrorCode Judge(Search *s, HycoROM model, HycoAttempt *a)
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   PetscCall(PetscMalloc1(n, &rows));
-  PetscCall(HycoROMPredictHeldOut(HycoComm(t), model, s->store, t->held, rows));
+  PetscCall(HycoReducerPredictHeldOut(t, model, s->store, rows));
   PetscCall(HycoHeldOutSummarise(n, rows, &a->held_out));
   a->ratio = 0;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {

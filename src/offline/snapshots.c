@@ -386,16 +386,18 @@ static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const char field[], Mat *S)
+PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt block, Mat *S)
 {
-  PetscInt n, total = 0, lo, hi, lda;
+  PetscInt n, total = 0, blocks, own = PETSC_DECIDE, lo, hi, lda;
   PetscScalar *data;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
   HycoOnRoot(HycoComm(s), FirstSize(s, samples, field, &total));
   PetscCallMPI(MPI_Bcast(&total, 1, MPIU_INT, 0, HycoComm(s)));
-  PetscCall(MatCreateDense(HycoComm(s), PETSC_DECIDE, PETSC_DECIDE, total, n, NULL, S));
+  blocks = total / block;
+  PetscCall(PetscSplitOwnership(HycoComm(s), &own, &blocks));
+  PetscCall(MatCreateDense(HycoComm(s), own * block, PETSC_DECIDE, total, n, NULL, S));
   PetscCall(MatGetOwnershipRange(*S, &lo, &hi));
   PetscCall(MatDenseGetLDA(*S, &lda));
   PetscCall(MatDenseGetArray(*S, &data));
@@ -406,8 +408,8 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSnapshotsRead(HycoSnapshots s, const PetscReal mu[], const char field[], PetscInt n,
-                                 PetscReal value[])
+PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], const char field[], PetscInt first,
+                                     PetscInt n, PetscReal value[])
 {
   char path[PETSC_MAX_PATH_LEN];
   HycoH5 h;
@@ -417,7 +419,7 @@ PetscErrorCode HycoSnapshotsRead(HycoSnapshots s, const PetscReal mu[], const ch
   PetscCall(SamplePath(s, mu, path));
   PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
   ierr = CheckFingerprint(s, h, path);
-  if (!ierr) ierr = HycoH5ReadReal(h, field, n, 1, value);
+  if (!ierr) ierr = HycoH5ReadRows(h, field, first, n, 1, value);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

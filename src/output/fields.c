@@ -228,9 +228,11 @@ static PetscErrorCode EndText(MPI_Comm comm, HycoFile *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFieldsWrite(const char path[], const HycoFileOrder *order, HycoMesh m, const PetscReal X[],
-                               HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
-                               const HycoContactTable *contact)
+/* Writes `path` and the .h5 beside it, both through temporary names. X: moved nodes (n_nodes x 3). The .h5 also holds
+   node_id, cell_id, the parameters and the contact table (rank 0's). */
+static PetscErrorCode Write(const char path[], const HycoFileOrder *order, HycoMesh m, const PetscReal X[],
+                            HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
+                            const HycoContactTable *contact)
 {
   const MPI_Comm comm = order ? order->comm : PETSC_COMM_SELF;
   char h5[PETSC_MAX_PATH_LEN];
@@ -268,9 +270,8 @@ static PetscReal Mises(const PetscReal s[6])
                        3 * (xy * xy + xz * xz + yz * yz));
 }
 
-/* Of a cell's stress: von Mises', and the principal values, the largest first. */
-static PetscErrorCode Invariants(PetscInt n_cells, PetscInt dim, const PetscReal tensor[], PetscReal mises[],
-                                 PetscReal principal[])
+PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal tensor[], PetscReal mises[],
+                                    PetscReal principal[])
 {
   PetscBLASInt three = 3, lwork = 32, info;
 
@@ -353,7 +354,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
   for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
   PetscCall(HycoFEStress(fe, u, sigma));
   HycoTensor6(m->n_cells, fe->n_sigma, sigma, tensor);
-  PetscCall(Invariants(m->n_cells, fe->dim, tensor, mises, principal));
+  PetscCall(HycoStressInvariants(m->n_cells, fe->dim, tensor, mises, principal));
   for (PetscInt e = 0; e < m->n_cells; e++) body[e] = m->cell_body[e];
   ierr = HycoContactFieldsCreate(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
   if (!ierr) {
@@ -368,7 +369,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
                                 {"gap", HYCO_ON_SURFACE, 1, f.gap_node},
                                 {"rid", HYCO_ON_CELLS, 1, rid}};
 
-    ierr = HycoFieldsWrite(path, order, m, fe->X, fe->scene, fe->mu, rid ? 9 : 8, field, &table);
+    ierr = Write(path, order, m, fe->X, fe->scene, fe->mu, rid ? 9 : 8, field, &table);
   }
   PetscCall(PetscFree6(u3, sigma, tensor, mises, principal, body));
   PetscCall(HycoContactFieldsDestroy(&f));

@@ -16,7 +16,7 @@
 #define HYCO_ROM_KIND   "hyco hybrid model"
 
 /* The groups' names, a line each. */
-static PetscErrorCode MoveGroupNames(HycoH5 h, const char name[], HycoMesh m)
+PetscErrorCode HycoMeshMoveGroupNames(HycoH5 h, const char name[], HycoMesh m)
 {
   char *names, *word, *rest;
   size_t length = 1;
@@ -77,7 +77,7 @@ static PetscErrorCode MoveMesh(HycoH5 h, const char prefix[], PetscInt n_bodies,
   PetscCall(HycoH5Int(h, At(prefix, "cell_body", path), 0, n_bodies - 1, &m->n_cells, 1, &m->cell_body));
   PetscCall(HycoH5Int(h, At(prefix, "facets", path), 0, last, &m->n_facets, m->nf, &m->facets));
   PetscCall(HycoH5Int(h, At(prefix, "group_dim", path), 0, 3, &m->n_groups, 1, &m->group_dim));
-  PetscCall(MoveGroupNames(h, At(prefix, "group_name", path), m));
+  PetscCall(HycoMeshMoveGroupNames(h, At(prefix, "group_name", path), m));
   PetscCall(HycoH5Starts(h, At(prefix, "group_start", path), m->n_groups, &m->group_start));
   PetscCall(HycoH5Int(h, At(prefix, "group_node", path), 0, last, &m->group_start[m->n_groups], 1, &m->group_node));
   PetscCall(HycoH5Int(h, At(prefix, "facet_group", path), 0, m->n_groups - 1, &m->n_facets, 1, &m->facet_group));
@@ -366,7 +366,7 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
 }
 
 /* The whole mesh and the modes on it. */
-static PetscErrorCode MoveWhole(HycoH5 h, HycoROM m)
+static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoROM m)
 {
   PetscInt n_dof;
 
@@ -387,18 +387,16 @@ static PetscErrorCode OpenWhole(HycoROM m)
 
   PetscFunctionBegin;
   if (m->whole) PetscFunctionReturn(PETSC_SUCCESS);
-  if (m->image)
-    PetscCall(HycoH5OpenImage("the model", m->image, m->image_size, &h));
-  else
-    PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
-  ierr = MoveWhole(h, m);
+  PetscCheck(m->path[0], PETSC_COMM_SELF, PETSC_ERR_PLIB, "a model under training has no whole mesh");
+  PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
+  ierr = LoadWholeMesh(h, m);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  if (!ierr) PetscCall(PetscFree(m->image)); /* nothing is left in it to read */
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SaveAll(HycoH5 h, HycoROM m)
+/* All but the whole mesh. */
+static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
 {
   PetscInt format = m->pairs.room ? HYCO_ROM_FORMAT : HYCO_ROM_STILL;
 
@@ -406,24 +404,30 @@ static PetscErrorCode SaveAll(HycoH5 h, HycoROM m)
   for (PetscInt k = 0; k < m->pairs.n; k++) {
     if (HycoPairsAlone(m->scene, &m->pairs, k)) format = HYCO_ROM_FORMAT;
   }
-  PetscCall(OpenWhole(m));
   PetscCall(HycoH5WriteText(h, "kind", HYCO_ROM_KIND));
   PetscCall(HycoH5WriteInt(h, "format", 1, 1, &format));
   PetscCall(MoveProblem(h, m));
-  PetscCall(MoveWhole(h, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMSave(HycoROM m, const char path[])
+static PetscErrorCode SaveAll(HycoH5 h, HycoROM m, HycoFOM mesh, PetscInt l, Mat V)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(mesh), SaveProblem(h, m));
+  PetscCall(HycoROMWriteWhole(h, mesh, l, V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSave(HycoROM m, HycoFOM mesh, PetscInt l, Mat V, const char path[])
 {
   HycoH5 h;
-  PetscErrorCode ierr;
+  PetscErrorCode ierr, failed;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5Create(path, &h));
-  ierr = SaveAll(h, m);
-  PetscCall(HycoH5Close(&h, (PetscBool)!ierr));
-  PetscCall(ierr);
+  PetscCall(HycoH5CreateShared(HycoComm(mesh), path, &h));
+  ierr = SaveAll(h, m, mesh, l, V);
+  failed = HycoH5Close(&h, (PetscBool)!ierr);
+  PetscCall(ierr ? ierr : failed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -493,14 +497,14 @@ static PetscErrorCode MakeImage(HycoROM m, void **image, size_t *size)
 
   PetscFunctionBegin;
   PetscCall(HycoH5CreateImage("the model", &h));
-  ierr = SaveAll(h, m);
+  ierr = SaveProblem(h, m);
   if (!ierr) ierr = HycoH5GetImage(h, image, size);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A model of these bytes, which it keeps for the whole-mesh part. */
+/* A model of these bytes. */
 static PetscErrorCode FromImage(void *image, size_t size, HycoROM *model)
 {
   HycoH5 h;
@@ -508,8 +512,6 @@ static PetscErrorCode FromImage(void *image, size_t size, HycoROM *model)
   PetscFunctionBegin;
   PetscCall(HycoH5OpenImage("the model", image, size, &h));
   PetscCall(Load(&h, "", model));
-  (*model)->image = image;
-  (*model)->image_size = size;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -540,7 +542,7 @@ PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model)
   PetscCall(HycoCatchBegin());
   if (rank) ierr = FromImage(image, (size_t)bytes, model);
   PetscCall(HycoCatchEnd(ierr, message));
-  if (!rank || ierr) PetscCall(PetscFree(image));
+  PetscCall(PetscFree(image));
   PetscCall(HycoErrorSync(comm, ierr, message));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -551,7 +553,6 @@ PetscErrorCode HycoROMFreeWhole(HycoROM m)
   PetscCall(HycoFEDestroy(&m->fe_whole));
   PetscCall(HycoPairsDestroy(&m->whole_pairs));
   PetscCall(PetscFree(m->U_whole));
-  if (m->lent) PetscFunctionReturn(PETSC_SUCCESS);
   if (m->whole) PetscCall(HycoMeshDestroy(&m->whole));
   PetscCall(PetscFree(m->V_whole));
   PetscFunctionReturn(PETSC_SUCCESS);

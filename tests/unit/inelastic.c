@@ -43,7 +43,7 @@ static PetscErrorCode Load(const Patch *p, const char element[], Model *m)
   snprintf(name, sizeof(name), "%s", element);
   PetscCall(PatchWrite(p, path));
   PetscCall(HycoSceneFromEntries(PETSC_COMM_SELF, N_KEYS, keys, values, "/", &m->scene));
-  PetscCall(HycoMeshCreateWhole(PETSC_COMM_SELF, m->scene, &m->mesh));
+  PetscCall(HycoMeshCreate(PETSC_COMM_SELF, m->scene, &m->mesh));
   unlink(path);
   PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
   m->mu[0] = 1;
@@ -232,7 +232,7 @@ static PetscErrorCode TestProgram(void)
   PetscCall(HycoMaterialRegister("maxwell", CreateMaxwell));
   PetscCall(PatchWrite(&patches[HYCO_LINE2], path));
   PetscCall(HycoSceneFromEntries(PETSC_COMM_SELF, 5, names, values, "/", &m.scene));
-  PetscCall(HycoMeshCreateWhole(PETSC_COMM_SELF, m.scene, &m.mesh));
+  PetscCall(HycoMeshCreate(PETSC_COMM_SELF, m.scene, &m.mesh));
   unlink(path);
   PetscCall(HycoFECreate(m.scene, m.mesh, &m.fe));
   m.mu[0] = 1;

@@ -164,7 +164,7 @@ static inline PetscErrorCode PatchLoad(const Patch *p, const char key[], const c
     PetscCall(PetscFree(keys[i]));
     PetscCall(PetscFree(values[i]));
   }
-  PetscCall(HycoMeshCreateWhole(PETSC_COMM_SELF, *scene, mesh));
+  PetscCall(HycoMeshCreate(PETSC_COMM_SELF, *scene, mesh));
   unlink(path);
   PetscCall(HycoFECreate(*scene, *mesh, fe));
   PetscCall(HycoFESetParameters(*fe, NULL));

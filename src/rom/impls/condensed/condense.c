@@ -76,15 +76,16 @@ static PetscErrorCode FindGrid(HycoReducer t, HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* F at mu. Rank 0. */
+/* F at mu, this rank's part. Collective. */
 static PetscErrorCode Loads(HycoReducer t, const PetscReal mu[], PetscReal data[])
 {
+  HycoFOM f = t->fom;
   Vec F;
 
   PetscFunctionBegin;
-  PetscCall(HycoFESetParameters(t->fe, mu));
-  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, t->fe->n_dof, data, &F));
-  PetscCall(HycoFEAssembleForce(t->fe, F));
+  PetscCall(HycoFOMSetParameters(f, mu));
+  PetscCall(VecCreateMPIWithArray(HycoComm(t), 1, f->part->n_owned * f->fe->dim, PETSC_DETERMINE, data, &F));
+  HycoOnEach(HycoComm(t), HycoFEAssembleForce(f->fe, F));
   PetscCall(VecDestroy(&F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -93,10 +94,10 @@ static PetscErrorCode Loads(HycoReducer t, const PetscReal mu[], PetscReal data[
 static PetscErrorCode AffineAt(HycoReducer t, PetscInt p, PetscReal share, PetscBool *affine)
 {
   static const PetscReal at[3] = {0.06, 0.93, 0.47};
-  const PetscInt n = t->fe->n_dof;
+  const PetscInt n = t->fom->part->n_owned * t->fom->fe->dim;
   const PetscReal a = (at[1] - at[2]) / (at[1] - at[0]);
   HycoScene s = t->scene;
-  PetscReal mu[HYCO_MAX_PARAMETERS], *v[3], lost = 0, size = 0;
+  PetscReal mu[HYCO_MAX_PARAMETERS], *v[3], most[2] = {0, 0}; /* what is lost, and the size */
 
   PetscFunctionBegin;
   for (PetscInt q = 0; q < s->n_parameters; q++) mu[q] = s->lo[q] + share * (s->hi[q] - s->lo[q]);
@@ -106,42 +107,44 @@ static PetscErrorCode AffineAt(HycoReducer t, PetscInt p, PetscReal share, Petsc
     PetscCall(Loads(t, mu, v[k]));
   }
   for (PetscInt i = 0; i < n; i++) {
-    lost = PetscMax(lost, PetscAbsReal(a * v[0][i] + (1 - a) * v[1][i] - v[2][i]));
-    size = PetscMax(size, PetscMax(PetscAbsReal(v[0][i]), PetscAbsReal(v[1][i])));
+    most[0] = PetscMax(most[0], PetscAbsReal(a * v[0][i] + (1 - a) * v[1][i] - v[2][i]));
+    most[1] = PetscMax(most[1], PetscMax(PetscAbsReal(v[0][i]), PetscAbsReal(v[1][i])));
   }
-  *affine = (PetscBool)(*affine && lost <= 1e-12 * size);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 2, MPIU_REAL, MPI_MAX, HycoComm(t)));
+  *affine = (PetscBool)(*affine && most[0] <= 1e-12 * most[1]);
   for (PetscInt k = 0; k < 3; k++) PetscCall(PetscFree(v[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the load at mu, at node s of the stiffness, is the sum of its training loads that values say. Rank 0. */
+/* Whether the load at mu, at node s of the stiffness, is the sum of its training loads that values say. Collective. */
 static PetscErrorCode CheckSum(HycoReducer t, HycoCondensed c, PetscInt s, const PetscReal mu[], PetscBool *exact)
 {
-  const PetscInt n = t->fe->n_dof, nodes = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
-  PetscReal *weight, *rest, *F, at[HYCO_MAX_PARAMETERS], size = 0, lost = 0;
+  const PetscInt n = t->fom->part->n_owned * t->fom->fe->dim, nodes = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
+  PetscReal *weight, *rest, *F, at[HYCO_MAX_PARAMETERS], most[2] = {0, 0}; /* what is lost, and the size */
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(c->n_load, &weight, n, &rest, n, &F));
   PetscCall(HycoCondensedLoadWeights(c, mu, s, weight, exact));
   PetscCall(Loads(t, mu, rest));
-  for (PetscInt i = 0; i < n; i++) size = PetscMax(size, PetscAbsReal(rest[i]));
+  for (PetscInt i = 0; i < n; i++) most[1] = PetscMax(most[1], PetscAbsReal(rest[i]));
   for (PetscInt j = 0; *exact && j < nodes; j++) {
     if (c->node_stiff[j] != s) continue;
     HycoCondensedPoint(c, j, at);
     PetscCall(Loads(t, at, F));
     for (PetscInt i = 0; i < n; i++) {
-      size = PetscMax(size, PetscAbsReal(F[i]));
+      most[1] = PetscMax(most[1], PetscAbsReal(F[i]));
       rest[i] -= weight[c->node_load[j]] * F[i];
     }
   }
-  for (PetscInt i = 0; i < n; i++) lost = PetscMax(lost, PetscAbsReal(rest[i]));
-  *exact = (PetscBool)(*exact && lost <= 1e-11 * size);
+  for (PetscInt i = 0; i < n; i++) most[0] = PetscMax(most[0], PetscAbsReal(rest[i]));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 2, MPIU_REAL, MPI_MAX, HycoComm(t)));
+  *exact = (PetscBool)(*exact && most[0] <= 1e-11 * most[1]);
   PetscCall(PetscFree3(weight, rest, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether loads come as sums of training loads: at several points for the values of all, for the first and the last
-   stiffness assembled. Rank 0. */
+   stiffness assembled. Collective. */
 static PetscErrorCode FindExactLoads(HycoReducer t, HycoCondensed c)
 {
   static const PetscReal share[3] = {0.31, 0.77, 0.53};
@@ -152,8 +155,8 @@ static PetscErrorCode FindExactLoads(HycoReducer t, HycoCondensed c)
 
   PetscFunctionBegin;
   HycoCondensedPoint(c, 0, mu);
-  PetscCall(HycoFESetParameters(t->fe, mu));
-  PetscCall(HycoCondensedSurveyLoads(c, t->whole, t->fe->X, &exact));
+  PetscCall(HycoFOMSetParameters(t->fom, mu));
+  PetscCall(HycoCondensedSurveyLoads(c, t->fom, &exact));
   if (!exact) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoCondensedPrepareLoads(c));
   PetscCall(PetscMalloc1(c->n_load, &weight));
@@ -234,7 +237,8 @@ PetscErrorCode HycoCondensedResetTraining(HycoReducer t)
 /* The contacts' nodes and slave facets, and the gaps' place in the condensed model under training. Rank 0. */
 static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
 {
-  const PetscInt n = t->whole->n_nodes;
+  HycoMesh surface = t->fom->surface;
+  const PetscInt n = surface->n_nodes;
   HycoSurfaces *s = &Condensing(t)->surfaces;
   PetscBool *contact;
   PetscInt *extra, *index, *all, n_extra = 0;
@@ -243,17 +247,17 @@ static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
   PetscCall(ResetSurfaces(t));
   PetscCall(PetscCalloc1(n, &contact));
   PetscCall(PetscMalloc3(n, &extra, n, &index, t->scene->n_contacts, &all));
-  HycoPairsMark(&t->pairs, contact);
+  HycoPairsMark(&t->fom->pairs, contact);
   for (PetscInt i = 0; i < n; i++) {
     if (contact[i]) extra[n_extra++] = i;
   }
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
-    PetscCall(HycoMeshFindGroup(t->whole, "contact", t->scene->contact[k]->slave, &all[k]));
-  PetscCall(HycoMeshExtract(t->whole, 0, NULL, n_extra, extra, t->scene->n_contacts, all, &s->mesh));
+    PetscCall(HycoMeshFindGroup(surface, "contact", t->scene->contact[k]->slave, &all[k]));
+  PetscCall(HycoMeshExtract(surface, 0, NULL, n_extra, extra, t->scene->n_contacts, all, &s->mesh));
   for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->mesh->node_whole[i]] = i;
-  PetscCall(HycoPairsRenumber(&t->pairs, index, &s->pairs));
+  PetscCall(HycoPairsRenumber(&t->fom->pairs, index, &s->pairs));
   PetscCall(HycoFECreate(t->scene, s->mesh, &s->fe));
-  PetscCall(HycoRowsCreate(&t->pairs, t->whole->dim, &s->rows));
+  PetscCall(HycoRowsCreate(&t->fom->pairs, surface->dim, &s->rows));
   c->given = (HycoGapSource){s->fe, &s->pairs, s->rows};
   PetscCall(PetscFree3(extra, index, all));
   PetscCall(PetscFree(contact));
@@ -268,9 +272,9 @@ static PetscErrorCode CheckFacets(HycoReducer t)
   HycoMet met;
 
   PetscFunctionBegin;
-  if (!t->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!t->fom->searches) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, &mu));
-  PetscCall(HycoMetFind(t->scene, t->whole, &t->pairs, n, mu, NULL, &met));
+  PetscCall(HycoMetFind(t->scene, t->fom->surface, &t->fom->pairs, n, mu, NULL, &met));
   for (PetscInt r = 1; r < met.rows.n; r++) {
     const HycoPairs *p = &met.rows;
 
@@ -278,14 +282,14 @@ static PetscErrorCode CheckFacets(HycoReducer t)
         met.of[r] != met.of[r - 1],
         "contact %s: node %d meets other facets of %s as the parameters move it; a condensed model interpolates "
         "over the parameters what has kinks there: train a hybrid one",
-        t->scene->contact[p->contact[r]]->name, (int)t->whole->node_id[p->slave[r]],
+        t->scene->contact[p->contact[r]]->name, (int)t->fom->surface->node_id[p->slave[r]],
         t->scene->contact[p->contact[r]]->master);
   }
   PetscCall(HycoMetDestroy(&met));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which parameters reach what; that the scene is one for this model. Rank 0. */
+/* Which parameters reach what; that the scene is one for this model. Collective. */
 static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
 {
   HycoMotions motions;
@@ -294,12 +298,12 @@ static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
   char name[HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCall(CheckFacets(t));
+  HycoOnRoot(HycoComm(t), CheckFacets(t));
   HycoSceneReaches(t->scene, reaches);
   for (PetscInt p = 0; p < c->dim; p++) c->stiff[p] = reaches[p] && t->scene->hi[p] > t->scene->lo[p];
   PetscCall(HycoCondensedAllocate(c));
   c->exact_gap = 1;
-  PetscCall(TakeSurfaces(t, c));
+  HycoOnRoot(HycoComm(t), TakeSurfaces(t, c));
   PetscCall(FindExactLoads(t, c));
   for (PetscInt p = 0; p < c->dim; p++) {
     PetscBool affine = (PetscBool)!c->stiff[p];
@@ -307,7 +311,7 @@ static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
     for (PetscInt k = 0; affine && !c->exact_loads && k < 2; k++) PetscCall(AffineAt(t, p, k ? 0.71 : 0.38, &affine));
     c->affine[p] = affine;
   }
-  PetscCall(HycoFEFreeMotions(PETSC_COMM_SELF, t->fe, &motions));
+  PetscCall(HycoFEFreeMotions(HycoComm(t), t->fom->fe, &motions));
   free = motions.n;
   if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
   PetscCall(HycoMotionsDestroy(&motions));
@@ -348,10 +352,7 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
   Condensing(t)->condensed = c;
   c->scene = t->scene;
   PetscCall(FindGrid(t, c));
-  HycoOnRoot(HycoComm(t), Inspect(t, c));
-  PetscCallMPI(MPI_Bcast(c->stiff, HYCO_MAX_PARAMETERS, MPIU_INT, 0, HycoComm(t)));
-  PetscCallMPI(MPI_Bcast(c->affine, HYCO_MAX_PARAMETERS, MPIU_INT, 0, HycoComm(t)));
-  PetscCall(HycoCondensedAllocate(c));
+  PetscCall(Inspect(t, c));
   HycoCheckModel(
       (PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=
           MOST_NUMBERS,
@@ -366,14 +367,16 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
 static PetscErrorCode FreeGap(HycoReducer t, const PetscReal mu[], const PetscReal U[], const PetscReal L[],
                               const PetscReal packed[], PetscReal g[])
 {
-  const PetscInt m = t->pairs.n, dim = t->fe->dim, entries = HycoPairsWidth(&t->pairs) * dim * m;
+  HycoFE fe = t->fom->fe_surface;
+  HycoPairs *pairs = &t->fom->pairs;
+  const PetscInt m = pairs->n, dim = fe->dim, entries = HycoPairsWidth(pairs) * dim * m;
   PetscInt *start, *dof;
   PetscReal *value, moved = 0, left = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(m + 1, &start, entries, &dof, entries, &value));
-  PetscCall(HycoFESetParameters(t->fe, mu));
-  PetscCall(HycoContactRows(t->fe, &t->pairs, start, dof, value, g));
+  PetscCall(HycoFESetParameters(fe, mu));
+  PetscCall(HycoContactRows(fe, pairs, start, dof, value, g));
   for (PetscInt k = 0; k < m; k++) {
     g[k] = 0;
     for (PetscInt j = start[k]; j < start[k + 1]; j++)

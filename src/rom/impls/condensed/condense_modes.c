@@ -20,7 +20,8 @@
 #define MOST_RESPONSES 5e7     /* numbers of all responses: 400 MB */
 #define SMALL          1e-2
 
-PetscReal HycoCondensedModesTolerance(HycoReducer t)
+/* What the modes are chosen by: stresses lose the derivative's share of digits, and forces have many. */
+static PetscReal Tolerance(HycoReducer t)
 {
   return PetscMin(Condensing(t)->pod_tol, t->tol[HYCO_SEED_DISPLACEMENT]);
 }
@@ -209,8 +210,7 @@ static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(PetscMax(m, n), &sigma));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, L, &F));
-  PetscCall(HycoReducerPOD(t, F, HycoCondensedModesTolerance(t), PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q,
-                           sigma));
+  PetscCall(HycoReducerPOD(t, F, Tolerance(t), PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q, sigma));
   PetscCall(MatDestroy(&F));
   PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &x->Q));
   PetscCall(PetscMalloc1(x->q + 1, &x->scale));
@@ -296,7 +296,7 @@ static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
   HycoResponses *x = &Condensing(t)->responses;
   const PetscInt m = Condensing(t)->condensed->m,
                  nodes = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
-  PetscInt lo, hi, lda[2];
+  PetscInt n_own, lda[2];
   PetscReal *P;
   const PetscScalar *from;
   PetscScalar *to;
@@ -305,15 +305,14 @@ static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
   PetscFunctionBegin;
   x->n_columns = t->n_s + nodes * x->q;
   PetscCall(HycoReducerGetDisplacements(t, store, &S));
-  PetscCall(
-      MatCreateDense(HycoComm(t), PETSC_DECIDE, PETSC_DECIDE, t->sizes[0] * t->sizes[3], x->n_columns, NULL, columns));
-  PetscCall(MatGetOwnershipRange(S, &lo, &hi));
+  PetscCall(MatGetLocalSize(S, &n_own, NULL));
+  PetscCall(MatCreateDense(HycoComm(t), n_own, PETSC_DECIDE, t->sizes[0] * t->sizes[3], x->n_columns, NULL, columns));
   PetscCall(MatDenseGetLDA(S, &lda[0]));
   PetscCall(MatDenseGetLDA(*columns, &lda[1]));
   PetscCall(MatDenseGetArrayRead(S, &from));
   PetscCall(MatDenseGetArray(*columns, &to));
   for (PetscInt k = 0; k < t->n_s; k++)
-    PetscCall(PetscArraycpy(to + (size_t)k * (size_t)lda[1], from + (size_t)k * (size_t)lda[0], hi - lo));
+    PetscCall(PetscArraycpy(to + (size_t)k * (size_t)lda[1], from + (size_t)k * (size_t)lda[0], n_own));
   PetscCall(MatDenseRestoreArray(*columns, &to));
   PetscCall(MatDenseRestoreArrayRead(S, &from));
   PetscCall(MatDestroy(&S));
@@ -328,25 +327,23 @@ static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* l, sigma, V_whole and VtU from all r modes V. */
+/* l, sigma, V and VtU from all r modes V. */
 static PetscErrorCode TakeModes(HycoReducer t, Mat V, PetscInt n_sigma, PetscReal sigma[])
 {
   HycoResponses *x = &Condensing(t)->responses;
-  const PetscInt N = t->sizes[0] * t->sizes[3];
 
   PetscFunctionBegin;
-  PetscCall(HycoReducerPODRank(t, n_sigma, sigma, HycoCondensedModesTolerance(t), t->max_modes, x->r, &t->l));
-  HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)HycoCondensedModesTolerance(t));
+  PetscCall(HycoReducerPODRank(t, n_sigma, sigma, Tolerance(t), t->max_modes, x->r, &t->l));
+  HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)Tolerance(t));
   PetscCall(PetscFree(t->sigma));
   t->sigma = sigma;
   PetscCall(PetscFree(t->VtU));
   PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
   for (PetscInt k = 0; k < t->n_s; k++)
     PetscCall(PetscArraycpy(t->VtU + k * t->l, x->C + (size_t)k * (size_t)x->r, t->l));
-  PetscCall(PetscFree(t->V_whole));
-  PetscCall(HycoReducerToRoot(t, V, PETSC_TRUE, &t->V_whole));
-  for (PetscInt i = 1; t->rank == 0 && i < N; i++)
-    PetscCall(PetscArraymove(t->V_whole + (size_t)i * (size_t)t->l, t->V_whole + (size_t)i * (size_t)x->r, t->l));
+  PetscCall(MatDestroy(&t->V));
+  PetscCall(PetscObjectReference((PetscObject)V));
+  t->V = V;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

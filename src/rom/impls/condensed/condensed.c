@@ -338,7 +338,8 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoCondensedCreateSystem(HycoCondensed c, PetscReal forces[], HycoSolver solver)
+/* The system of M and g, for this solver; forces: where they are to be (m, borrowed), or NULL. */
+static PetscErrorCode CreateSystem(HycoCondensed c, PetscReal forces[], HycoSolver solver)
 {
   Vec g;
 
@@ -376,7 +377,7 @@ PetscErrorCode HycoCondensedSolveForces(HycoCondensed c, PetscReal forces[], Pet
     PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &c->solver));
     PetscCall(HycoSolverSetType(c->solver, HYCO_SOLVER_ACTIVE_SET));
     PetscCall(HycoSolverSetFallback(c->solver, PETSC_FALSE));
-    PetscCall(HycoCondensedCreateSystem(c, NULL, c->solver));
+    PetscCall(CreateSystem(c, NULL, c->solver));
   }
   PetscCall(HycoSolverSetStartSet(c->solver, c->active));
   PetscCall(HycoSolverSolve(c->solver, NULL, c->forces));
@@ -398,7 +399,7 @@ static PetscErrorCode SetUp(HycoROM m)
   c->given = (HycoGapSource){m->fe, &m->pairs, m->rows};
   c->scene = m->scene;
   if (c->exact_loads) PetscCall(HycoCondensedPrepareLoads(c));
-  PetscCall(HycoCondensedCreateSystem(c, m->Lambda, m->solver));
+  PetscCall(CreateSystem(c, m->Lambda, m->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -47,42 +47,55 @@ static PetscErrorCode ForEach(HycoCondensed c, HycoMesh mesh, Visit visit, void 
 
 /* Whether the expressions allow it, and how many values they have; the points where those in space are evaluated. */
 typedef struct {
-  const PetscReal *X; /* positions of the mesh's nodes */
+  HycoFOM fom;
   PetscBool fit;
   PetscInt n_theta, n_probes;
 } Survey;
+
+/* Points of the nodes of a group (or, where that is < 0, of a body), spread over them in the file's order, the first
+   and the last among them. Collective. */
+static PetscErrorCode ProbeNodes(HycoFOM f, PetscInt group, PetscInt body, PetscReal probe[3 * PROBES])
+{
+  HycoMesh m = f->part;
+  const PetscInt first = group < 0 ? 0 : m->group_start[group],
+                 last = group < 0 ? m->n_nodes : m->group_start[group + 1];
+  PetscInt *node, *key, *place, n = 0, all;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(last - first, &node, last - first, &key, last - first, &place));
+  for (PetscInt k = first; k < last; k++) {
+    const PetscInt i = group < 0 ? k : m->group_node[k];
+
+    if ((group < 0 && m->node_body[i] != body) || HycoMeshOwned(m, i) < 0) continue;
+    node[n] = i;
+    key[n++] = m->node_whole ? m->node_whole[i] : i;
+  }
+  PetscCall(HycoRankInts(HycoComm(f), n, key, place, &all));
+  PetscCall(PetscArrayzero(probe, 3 * PROBES));
+  for (PetscInt k = 0; k < n * PROBES; k++) {
+    if (place[k / PROBES] == k % PROBES * (all - 1) / (PROBES - 1))
+      PetscCall(PetscArraycpy(probe + 3 * (k % PROBES), f->fe->X + 3 * node[k / PROBES], 3));
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, probe, 3 * PROBES, MPIU_REAL, MPI_SUM, HycoComm(f)));
+  PetscCall(PetscFree3(node, key, place));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 static PetscErrorCode Inspect(HycoCondensed c, HycoExpr expr, HycoMesh mesh, PetscInt group, PetscInt body, void *ctx)
 {
   Survey *s = (Survey *)ctx;
   PetscBool stiff[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
-  PetscInt n = 0, seen = 0;
 
   PetscFunctionBegin;
+  (void)mesh;
   for (PetscInt p = 0; p < c->dim; p++) stiff[p] = (PetscBool)(c->stiff[p] != 0);
   if (!HycoExprInSpace(expr)) {
     s->n_theta++;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (HycoExprChanges(expr, stiff)) s->fit = PETSC_FALSE; /* its shape may follow a map, and need not be finite here */
-  if (body >= 0)
-    for (PetscInt i = 0; i < mesh->n_nodes; i++) n += mesh->node_body[i] == body;
-  else
-    n = mesh->group_start[group + 1] - mesh->group_start[group];
   PetscCall(PetscRealloc(sizeof(PetscReal) * 3 * (size_t)(s->n_probes + PROBES), &c->probe));
-  for (PetscInt j = 0, k = 0; n && k < PROBES; k++) { /* spread over them, the first and the last among them */
-    const PetscInt wanted = k * (n - 1) / (PROBES - 1);
-    PetscInt node;
-
-    if (body < 0)
-      node = mesh->group_node[mesh->group_start[group] + wanted];
-    else {
-      while (mesh->node_body[j] != body || seen < wanted) seen += mesh->node_body[j++] == body;
-      node = j;
-    }
-    PetscCall(PetscArraycpy(c->probe + 3 * (s->n_probes + k), s->X + 3 * node, 3));
-  }
-  if (!n) PetscCall(PetscArrayzero(c->probe + 3 * s->n_probes, 3 * PROBES));
+  PetscCall(ProbeNodes(s->fom, body < 0 ? group : -1, body, c->probe + 3 * s->n_probes));
   s->n_probes += PROBES;
   s->n_theta += PROBES;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -183,13 +196,13 @@ static PetscErrorCode InvertLoads(HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoCondensedSurveyLoads(HycoCondensed c, HycoMesh mesh, const PetscReal X[], PetscBool *fit)
+PetscErrorCode HycoCondensedSurveyLoads(HycoCondensed c, HycoFOM fom, PetscBool *fit)
 {
-  Survey s = {X, PETSC_TRUE, 0, 0};
+  Survey s = {fom, PETSC_TRUE, 0, 0};
 
   PetscFunctionBegin;
   PetscCall(PetscFree(c->probe));
-  PetscCall(ForEach(c, mesh, Inspect, &s));
+  PetscCall(ForEach(c, fom->part, Inspect, &s));
   c->n_probes = s.n_probes;
   *fit = s.fit;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -331,17 +331,20 @@ static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
 /* Nodes of the model's mesh that a contact has, of moved surfaces in any place. */
 static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
 {
-  PetscBool *whole;
+  const PetscInt n = t->fom->surface->n_nodes;
+  PetscBool *met;
 
   PetscFunctionBegin;
-  if (!t->pairs.room) {
+  if (!t->fom->searches) {
     HycoPairsMark(&m->pairs, contact);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscCalloc1(t->sizes[0], &whole));
-  HycoPairsMark(&t->met.rows, whole);
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) contact[i] = whole[m->mesh->node_whole[i]];
-  PetscCall(PetscFree(whole));
+  PetscCall(PetscCalloc1(n, &met));
+  HycoPairsMark(&t->met.rows, met);
+  for (PetscInt i = 0; i < n; i++) {
+    if (met[i]) contact[t->surface_node[i]] = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(met));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -356,7 +359,7 @@ static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_o
   PetscCall(MarkContact(t, m, contact));
   *n = 0;
   for (PetscInt i = 0; i < m->mesh->n_nodes * dim; i++) {
-    if (m->role[i / dim] != HYCO_ROLE_A || t->fe->fixed[m->mesh->node_whole[i / dim] * dim + i % dim]) continue;
+    if (m->role[i / dim] != HYCO_ROLE_A || t->fixed[i]) continue;
     if (contact[i / dim] || !contact_only) dof[(*n)++] = i;
   }
   PetscCall(PetscFree(contact));

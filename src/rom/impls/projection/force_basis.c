@@ -54,126 +54,149 @@ PetscBool HycoProjectionOffers(HycoReducer t, PetscBool targets)
 /* Supremizers of unit length: this share of them beyond the modes is round-off. */
 #define NEW 1e-8
 
-/* X -= V V^T X twice; V row major. */
-static PetscErrorCode RemoveModes(HycoReducer t, PetscInt N, PetscInt n, PetscReal X[])
+/* X -= V V^T X twice. */
+static PetscErrorCode RemoveModes(HycoReducer t, Mat X)
 {
-  PetscBLASInt Nb, nb, l;
-  const PetscReal one = 1, zero = 0, minus = -1;
+  PetscBLASInt rows, n, l, lda[2];
+  const PetscReal one = 1, minus = -1;
+  const PetscScalar *v;
+  PetscInt n_own, n_columns, ld[2];
+  PetscScalar *x;
   PetscReal *C;
 
   PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(N, &Nb));
-  PetscCall(PetscBLASIntCast(n, &nb));
+  PetscCall(MatGetLocalSize(X, &n_own, NULL));
+  PetscCall(MatGetSize(X, NULL, &n_columns));
+  PetscCall(MatDenseGetLDA(t->V, &ld[0]));
+  PetscCall(MatDenseGetLDA(X, &ld[1]));
+  PetscCall(PetscBLASIntCast(n_own, &rows));
+  PetscCall(PetscBLASIntCast(n_columns, &n));
   PetscCall(PetscBLASIntCast(t->l, &l));
-  PetscCall(PetscMalloc1(t->l * n, &C));
+  for (int k = 0; k < 2; k++) PetscCall(PetscBLASIntCast(PetscMax(1, ld[k]), &lda[k]));
+  PetscCall(PetscMalloc1(t->l * n_columns, &C));
   for (PetscInt pass = 0; pass < 2; pass++) {
-    BLASgemm_("N", "N", &l, &nb, &Nb, &one, t->V_whole, &l, X, &Nb, &zero, C, &l);
-    BLASgemm_("T", "N", &Nb, &nb, &l, &minus, t->V_whole, &l, C, &l, &one, X, &Nb);
+    PetscCall(HycoReducerMultiply(t, t->V, X, C));
+    PetscCall(MatDenseGetArrayRead(t->V, &v));
+    PetscCall(MatDenseGetArray(X, &x));
+    BLASgemm_("N", "N", &rows, &n, &l, &minus, v, &lda[0], C, &l, &one, x, &lda[1]);
+    PetscCall(MatDenseRestoreArray(X, &x));
+    PetscCall(MatDenseRestoreArrayRead(t->V, &v));
   }
   PetscCall(PetscFree(C));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The reducer's modes, their singular values and the snapshots' coefficients, with q more columns of Q (N x q) and of
-   these the coefficients QtU (q x n_s column major). Rank 0. */
-static PetscErrorCode Append(HycoReducer t, PetscInt N, PetscInt q, const PetscReal Q[], const PetscReal QtU[])
+/* The first n columns of A from column `first` of B on, which has the same rows. */
+static PetscErrorCode CopyColumns(Mat A, PetscInt n, Mat B, PetscInt first)
 {
-  const PetscInt l = t->l, both = l + q;
-  PetscReal *V, *VtU, *sigma;
+  PetscInt rows, lda[2];
+  const PetscScalar *a;
+  PetscScalar *b;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(N * both, &V, both * t->n_s, &VtU, both, &sigma));
-  for (PetscInt i = 0; i < N; i++) {
-    PetscCall(PetscArraycpy(V + i * both, t->V_whole + i * l, l));
-    for (PetscInt j = 0; j < q; j++) V[i * both + l + j] = Q[j * N + i];
-  }
+  PetscCall(MatGetLocalSize(A, &rows, NULL));
+  PetscCall(MatDenseGetLDA(A, &lda[0]));
+  PetscCall(MatDenseGetLDA(B, &lda[1]));
+  PetscCall(MatDenseGetArrayRead(A, &a));
+  PetscCall(MatDenseGetArray(B, &b));
+  for (PetscInt j = 0; j < n; j++)
+    PetscCall(PetscArraycpy(b + (size_t)(first + j) * (size_t)lda[1], a + (size_t)j * (size_t)lda[0], rows));
+  PetscCall(MatDenseRestoreArray(B, &b));
+  PetscCall(MatDenseRestoreArrayRead(A, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The reducer's modes, their singular values and the snapshots' coefficients, with q more columns of Q, and of these
+   the coefficients QtU (n_q x n_s column major). */
+static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, const PetscReal QtU[])
+{
+  const PetscInt l = t->l, both = l + q;
+  PetscReal *VtU, *sigma;
+  PetscInt rows;
+  Mat V;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetLocalSize(t->V, &rows, NULL));
+  PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, t->sizes[0] * t->sizes[3], both, NULL, &V));
+  PetscCall(CopyColumns(t->V, l, V, 0));
+  PetscCall(CopyColumns(Q, q, V, l));
+  PetscCall(PetscMalloc1(both * t->n_s, &VtU));
+  PetscCall(PetscMalloc1(both, &sigma));
   for (PetscInt k = 0; k < t->n_s; k++) {
     PetscCall(PetscArraycpy(VtU + k * both, t->VtU + k * l, l));
-    PetscCall(PetscArraycpy(VtU + k * both + l, QtU + k * q, q));
+    PetscCall(PetscArraycpy(VtU + k * both + l, QtU + k * n_q, q));
   }
   for (PetscInt j = 0; j < both; j++) sigma[j] = j < l ? t->sigma[j] : 0;
-  PetscCall(PetscFree(t->V_whole));
+  PetscCall(MatDestroy(&t->V));
   PetscCall(PetscFree(t->VtU));
   PetscCall(PetscFree(t->sigma));
-  HycoDuplicate(N * both, V, &t->V_whole);
-  HycoDuplicate(both * t->n_s, VtU, &t->VtU);
-  HycoDuplicate(both, sigma, &t->sigma);
-  PetscCall(PetscFree3(V, VtU, sigma));
+  t->V = V;
+  t->VtU = VtU;
+  t->sigma = sigma;
   t->l = both;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the supremizers of the dual snapshots add to the modes: the first *q columns of Q. Rank 0. */
-static PetscErrorCode FindSupremizers(HycoReducer t, Mat *Q, PetscInt *q)
+/* The supremizers of unit length (0 where one has none, and where fixed) with the rows of the modes. */
+static PetscErrorCode ScaledSupremizers(HycoReducer t, Mat *scaled)
 {
-  const PetscInt N = t->sizes[0] * t->sizes[3], n = t->n_s;
+  HycoMesh part = t->fom->part;
+  const PetscInt n = t->n_s, dim = t->sizes[3];
+  PetscInt rows, lda[2];
+  PetscReal *size, *value;
+  const PetscScalar *x;
+  PetscScalar *y;
   Mat R, X;
-  PetscScalar *x;
-  PetscReal *size;
-  PetscInt found;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerSupremizers(t, &R, &X));
+  PetscCall(MatDestroy(&R));
+  PetscCall(MatGetLocalSize(t->V, &rows, NULL));
+  PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, t->sizes[0] * dim, n, NULL, scaled));
+  PetscCall(PetscMalloc2(n, &size, part->n_nodes * dim, &value));
+  PetscCall(MatGetColumnNorms(X, NORM_2, size));
+  PetscCall(MatDenseGetLDA(X, &lda[0]));
+  PetscCall(MatDenseGetLDA(*scaled, &lda[1]));
+  PetscCall(MatDenseGetArrayRead(X, &x));
+  PetscCall(MatDenseGetArray(*scaled, &y));
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt i = 0; i < part->n_nodes * dim; i++) {
+      const PetscInt place = HycoMeshOwned(part, i / dim);
+      const PetscBool none = (PetscBool)(place < 0 || t->fom->fe->fixed[i] || size[k] == 0);
+
+      value[i] = none ? 0 : x[(size_t)k * (size_t)lda[0] + (size_t)(place * dim + i % dim)] / size[k];
+    }
+    PetscCall(HycoReducerToRows(t, HYCO_ON_NODES, MPIU_REAL, dim, value, y + (size_t)k * (size_t)lda[1]));
+  }
+  PetscCall(MatDenseRestoreArray(*scaled, &y));
+  PetscCall(MatDenseRestoreArrayRead(X, &x));
+  PetscCall(PetscFree2(size, value));
+  PetscCall(MatDestroy(&X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V, sigma (0 for these) and
+   VtU have more columns. */
+static PetscErrorCode Enrich(HycoReducer t)
+{
+  PetscReal *QtU, *size;
+  PetscInt found, q = 0;
+  Mat X, Q;
 
   PetscFunctionBegin;
   if (!t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoReducerSupremizers(t, &R, &X));
-  PetscCall(MatDestroy(&R));
-  PetscCall(PetscMalloc1(PetscMax(n, N), &size));
-  PetscCall(MatGetColumnNorms(X, NORM_2, size));
-  PetscCall(MatDenseGetArray(X, &x));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscScalar *column = x + (size_t)k * (size_t)N;
-
-    for (PetscInt i = 0; i < N; i++) column[i] = t->fe->fixed[i] || size[k] == 0 ? 0 : column[i] / size[k];
-  }
-  PetscCall(RemoveModes(t, N, n, x));
-  PetscCall(MatDenseRestoreArray(X, &x));
-  PetscCall(HycoReducerPOD(t, X, 0, 0, Q, &found, size));
-  while (*q < found && size[*q] > NEW * PetscMax(1, size[0])) (*q)++;
-  PetscCall(MatDestroy(&X));
+  PetscCall(ScaledSupremizers(t, &X));
+  PetscCall(RemoveModes(t, X));
+  PetscCall(PetscMalloc1(t->n_s + 1, &size));
+  PetscCall(HycoReducerPOD(t, X, 0, 0, &Q, &found, size));
+  while (q < found && size[q] > NEW * PetscMax(1, size[0])) q++;
   PetscCall(PetscFree(size));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Q^T of the snapshots, for q columns that rank 0 has: q x n_s column major. */
-static PetscErrorCode Coefficients(HycoReducer t, PetscInt N, PetscInt q, const PetscReal Q[], PetscReal QtU[])
-{
-  PetscInt n_own, *row;
-  Mat spread;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetLocalSize(t->S, &n_own, NULL));
-  PetscCall(MatCreateDense(HycoComm(t), n_own, PETSC_DECIDE, N, q, NULL, &spread));
-  PetscCall(PetscMalloc1(t->rank ? 0 : N, &row));
-  for (PetscInt i = 0; i < N && t->rank == 0; i++) row[i] = i;
-  for (PetscInt j = 0; j < q && t->rank == 0; j++)
-    PetscCall(MatSetValues(spread, N, row, 1, &j, Q + (size_t)j * (size_t)N, INSERT_VALUES));
-  PetscCall(MatAssemblyBegin(spread, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(spread, MAT_FINAL_ASSEMBLY));
-  PetscCall(HycoReducerMultiply(t, spread, t->S, QtU));
-  PetscCall(MatDestroy(&spread));
-  PetscCall(PetscFree(row));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V_whole, sigma (0 for these)
-   and VtU have more columns. */
-static PetscErrorCode Enrich(HycoReducer t)
-{
-  const PetscInt N = t->sizes[0] * t->sizes[3];
-  PetscScalar *x = NULL;
-  PetscReal *QtU;
-  PetscInt q = 0;
-  Mat Q = NULL;
-
-  PetscFunctionBegin;
-  HycoOnRoot(HycoComm(t), FindSupremizers(t, &Q, &q));
-  PetscCallMPI(MPI_Bcast(&q, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCall(MatDestroy(&X));
   ((Training)t->training)->n_supremizers = q;
   if (q) {
-    PetscCall(PetscMalloc1(q * t->n_s, &QtU));
-    if (Q) PetscCall(MatDenseGetArray(Q, &x));
-    PetscCall(Coefficients(t, N, q, x, QtU));
-    if (t->rank == 0) PetscCall(Append(t, N, q, x, QtU));
-    if (Q) PetscCall(MatDenseRestoreArray(Q, &x));
+    PetscCall(PetscMalloc1(found * t->n_s, &QtU));
+    PetscCall(HycoReducerMultiply(t, Q, t->S, QtU));
+    PetscCall(Append(t, q, Q, found, QtU));
     PetscCall(PetscFree(QtU));
   }
   PetscCall(MatDestroy(&Q));

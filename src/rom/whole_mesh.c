@@ -1,0 +1,167 @@
+/* The whole-mesh part of a model file, which training has by rows on all ranks: the mesh in the file's order, and the
+   modes on it. */
+#include <hycofields.h>
+#include <hycoromimpl.h>
+#include <string.h>
+
+#define IN(name) "whole/" name
+
+/* n integers of `width` each, whose places among all ranks' are given. Collective. */
+static PetscErrorCode WritePlaced(MPI_Comm comm, HycoH5 h, const char name[], PetscInt all, PetscInt width, PetscInt n,
+                                  const PetscInt place[], const PetscInt value[])
+{
+  PetscLayout layout;
+  PetscSF sf;
+  PetscInt first, last, *rows;
+  PetscMPIInt count;
+  MPI_Datatype unit;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscLayoutCreateFromSizes(comm, PETSC_DECIDE, all, 1, &layout));
+  PetscCall(PetscLayoutGetRange(layout, &first, &last));
+  PetscCall(PetscMalloc1((last - first) * width, &rows));
+  PetscCall(PetscSFCreate(comm, &sf));
+  PetscCall(PetscSFSetGraphLayout(sf, layout, n, NULL, PETSC_OWN_POINTER, place));
+  PetscCall(PetscMPIIntCast(width, &count));
+  PetscCallMPI(MPI_Type_contiguous(count, MPIU_INT, &unit));
+  PetscCallMPI(MPI_Type_commit(&unit));
+  PetscCall(PetscSFReduceBegin(sf, unit, value, rows, MPI_REPLACE));
+  PetscCall(PetscSFReduceEnd(sf, unit, value, rows, MPI_REPLACE));
+  PetscCallMPI(MPI_Type_free(&unit));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscLayoutDestroy(&layout));
+  ierr = HycoH5WriteRows(h, name, MPIU_INT, all, width, first, last - first, rows);
+  PetscCall(PetscFree(rows));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nodes of groups, group by group. Collective. */
+static PetscErrorCode WriteGroupNodes(MPI_Comm comm, HycoH5 h, HycoMesh m, PetscInt n_nodes)
+{
+  PetscInt64 *key;
+  PetscInt *node, *place, *start, n = 0, all;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(m->group_start[m->n_groups], &key, m->group_start[m->n_groups], &node,
+                         m->group_start[m->n_groups], &place));
+  PetscCall(PetscCalloc1(m->n_groups + 1, &start));
+  for (PetscInt g = 0; g < m->n_groups; g++) {
+    for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
+      const PetscInt i = m->group_node[k];
+
+      if (HycoMeshOwned(m, i) < 0) continue;
+      node[n] = m->node_whole ? m->node_whole[i] : i;
+      key[n] = (PetscInt64)g * n_nodes + node[n];
+      n++;
+      start[g + 1]++;
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, start, (PetscMPIInt)(m->n_groups + 1), MPIU_INT, MPI_SUM, comm));
+  for (PetscInt g = 0; g < m->n_groups; g++) start[g + 1] += start[g];
+  PetscCall(HycoRankKeys(comm, n, key, place, &all));
+  HycoOnRoot(comm, HycoH5WriteInt(h, IN("group_start"), m->n_groups + 1, 1, start));
+  PetscCall(WritePlaced(comm, h, IN("group_node"), all, 1, n, place, node));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree3(key, node, place));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The facets, group by group in the order of their cells. Collective. */
+static PetscErrorCode WriteFacets(MPI_Comm comm, HycoH5 h, HycoMesh m, PetscInt n_cells)
+{
+  PetscInt64 *key;
+  PetscInt *nodes, *group, *cell, *place, n = 0, all;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc5(m->n_facets, &key, m->n_facets * m->nf, &nodes, m->n_facets, &group, m->n_facets, &cell,
+                         m->n_facets, &place));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    const PetscInt *node = m->facets + f * m->nf, e = m->facet_cell[f];
+    PetscInt least = node[0]; /* the facet's rank is that of its node of the smallest tag */
+
+    for (PetscInt v = 1; v < m->nf; v++) least = PetscMin(least, node[v]);
+    if (HycoMeshOwned(m, least) < 0) continue;
+    for (PetscInt v = 0; v < m->nf; v++) nodes[n * m->nf + v] = m->node_whole ? m->node_whole[node[v]] : node[v];
+    group[n] = m->facet_group[f];
+    cell[n] = m->cell_whole ? m->cell_whole[e] : e;
+    key[n] = ((PetscInt64)group[n] * n_cells + cell[n]) * 8 + HycoMeshFacetNumber(m, f);
+    n++;
+  }
+  PetscCall(HycoRankKeys(comm, n, key, place, &all));
+  PetscCall(WritePlaced(comm, h, IN("facets"), all, m->nf, n, place, nodes));
+  PetscCall(WritePlaced(comm, h, IN("facet_group"), all, 1, n, place, group));
+  PetscCall(WritePlaced(comm, h, IN("facet_cell"), all, 1, n, place, cell));
+  PetscCall(PetscFree5(key, nodes, group, cell, place));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What is small. On one process. */
+static PetscErrorCode WriteHead(HycoH5 h, HycoMesh m)
+{
+  PetscInt head[2] = {(PetscInt)m->type, m->dim};
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5WriteInt(h, IN("head"), 2, 1, head));
+  PetscCall(HycoH5WriteInt(h, IN("group_dim"), m->n_groups, 1, m->group_dim));
+  PetscCall(HycoMeshMoveGroupNames(h, IN("group_name"), m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nodes and cells. Collective. */
+static PetscErrorCode WriteTables(HycoH5 h, const HycoFileOrder *order, HycoMesh m)
+{
+  const PetscInt nn = m->n_nodes, nc = m->n_cells;
+  PetscInt *cells = m->cells;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFieldWrite(h, order, nn, IN("xyz"), HYCO_ON_NODES, MPIU_REAL, 3, 3, m->xyz));
+  PetscCall(HycoFieldWrite(h, order, nn, IN("node_id"), HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
+  PetscCall(HycoFieldWrite(h, order, nn, IN("node_body"), HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_body));
+  if (order) PetscCall(PetscMalloc1(nc * m->nv, &cells));
+  for (PetscInt k = 0; order && k < nc * m->nv; k++) cells[k] = m->node_whole[m->cells[k]];
+  PetscCall(HycoFieldWrite(h, order, nc, IN("cells"), HYCO_ON_CELLS, MPIU_INT, m->nv, m->nv, cells));
+  if (order) PetscCall(PetscFree(cells));
+  PetscCall(HycoFieldWrite(h, order, nc, IN("cell_id"), HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
+  PetscCall(HycoFieldWrite(h, order, nc, IN("cell_body"), HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_body));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first l columns of V, row by row. Collective. */
+static PetscErrorCode WriteModes(HycoH5 h, PetscInt l, Mat V)
+{
+  PetscInt all, first, last, lda;
+  const PetscScalar *v;
+  PetscReal *rows;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(V, &all, NULL));
+  PetscCall(MatGetOwnershipRange(V, &first, &last));
+  PetscCall(MatDenseGetLDA(V, &lda));
+  PetscCall(PetscMalloc1((size_t)(last - first) * (size_t)l, &rows));
+  PetscCall(MatDenseGetArrayRead(V, &v));
+  for (PetscInt i = 0; i < last - first; i++) {
+    for (PetscInt j = 0; j < l; j++) rows[(size_t)i * (size_t)l + (size_t)j] = v[(size_t)j * (size_t)lda + (size_t)i];
+  }
+  PetscCall(MatDenseRestoreArrayRead(V, &v));
+  ierr = HycoH5WriteRows(h, IN("V"), MPIU_REAL, all, l, first, last - first, rows);
+  PetscCall(PetscFree(rows));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMWriteWhole(HycoH5 h, HycoFOM f, PetscInt l, Mat V)
+{
+  const HycoFileOrder *order;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(f, &order));
+  HycoOnRoot(HycoComm(f), WriteHead(h, f->part));
+  PetscCall(WriteTables(h, order, f->part));
+  PetscCall(WriteGroupNodes(HycoComm(f), h, f->part, f->n_nodes));
+  PetscCall(WriteFacets(HycoComm(f), h, f->part, f->n_cells));
+  PetscCall(WriteModes(h, l, V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
