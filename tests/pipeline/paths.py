@@ -124,6 +124,18 @@ class Paths(Case):
             for kind, bound in zip(KINDS, (0.03, 0.03, limit, 0.03)):
                 self.assertLess(report['worst_' + kind]['max'], bound, (dual, kind))
 
+    def test_outputs(self):
+        """The outputs that a scene names are those of the replayed laws, at the path's end."""
+        scene = self.scene('outputs.yaml', NORTON, HISTORY + 'output:\n  hoop: {max: sigma_tt, group: ring}\n  out: {mean: u, group: ring_outside}\n')
+        full = self.hyco('solve', '-scene', scene, '-mu', '0.0052,0.93')['outputs']
+        for name, settings, limit in (('all.h5', ['-grid', '1,1', '-hyco_rid_whole', '-hyco_hybrid', 'all'], 1e-7),
+                                      ('some.h5', ['-grid', '3,3', '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', '1'], 1e-2)):
+            self.train(scene, name, *settings)
+            reduced = self.hyco('predict', '-model', self.path(name), '-mu', '0.0052,0.93')['outputs']
+            self.assertEqual(reduced.keys(), full.keys())
+            for key, value in full.items():
+                self.assertLess(abs(reduced[key] - value), limit * abs(value), (name, key))
+
     def test_order_of_questions(self):
         """A point's path is the same to the last bit whatever was asked before it."""
         self.train(self.norton, 'order.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9')
