@@ -86,7 +86,7 @@ static PetscErrorCode CompareMine(HycoScene scene, HycoROM model, MPI_Comm group
   PetscCallMPI(MPI_Comm_rank(group, &rank));
   for (PetscInt k = first; k < last; k++) {
     v = rank == 0 ? value + k * n_columns : unused;
-    PetscCall(paths ? DriverComparePath(fom, model, n_par, mu + k * n_par, v)
+    PetscCall(paths ? DriverComparePath(fom, model, (PetscBool)(rank == 0), n_par, mu + k * n_par, v)
                     : ComparePoint(scene, fom, model, n_par, mu + k * n_par, v));
     if (first == 0 && rank == 0) PetscCall(DriverProgress((k + 1 - first) * n / (last - first), n, word));
   }

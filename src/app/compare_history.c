@@ -9,17 +9,18 @@ PetscInt DriverPathColumns(void)
   return N_COLUMNS;
 }
 
-/* Its full-order path and the model's, their difference. */
-PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[], PetscReal v[])
+/* Its full-order path and the model's, their difference; root: the one rank that predicts and whose v counts. */
+PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
+                                 PetscReal v[])
 {
   HycoSummary s;
-  HycoPrediction p;
+  HycoPrediction p = {0};
   HycoPathErrors e = {0};
 
   PetscFunctionBegin;
   PetscCall(HycoROMComparePath(model, fom, n_par, mu, &e));
   PetscCall(HycoFOMGetSummary(fom, &s));
-  PetscCall(HycoROMGetPrediction(model, &p));
+  if (root) PetscCall(HycoROMGetPrediction(model, &p));
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
     v[j] = e.worst[j];
     v[HYCO_N_ERRORS + j] = e.end[j];

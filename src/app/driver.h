@@ -248,7 +248,8 @@ void DriverReportReducedPath(cJSON *json, const DriverReducedPath *path);
 /* The numbers of a point; one point on one group; their statistics, table ("": none) and report, on every rank; fails
    where a reduced path did not reach its end. */
 PetscInt DriverPathColumns(void);
-PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[], PetscReal v[]);
+PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
+                                 PetscReal v[]);
 PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal mu[],
                                  const PetscReal value[], const char table[]);
 

@@ -163,6 +163,29 @@ class Paths(Case):
         for column in ('total_contact_force', 'rid_inelastic', 'rid_mises', 'rid_u_norm2'):
             a, b = (np.array(h[column]) for h in histories)
             self.assertLess(abs(a - b).max(), 1e-6 * abs(a).max(), column)
+        one, two = (self.hyco('compare', '-scene', self.norton, '-model', self.path('ranks0.h5'), '-mu', '0.0063,1.11', ranks=ranks) for ranks in (0, 2))
+        for kind in KINDS:
+            self.near(two['worst_' + kind]['max'], one['worst_' + kind]['max'], 1e-4)
+
+    def test_damaged(self):
+        """A path file that lacks a time, or is cut short, is named in one line."""
+        args = ['train', '-scene', self.norton, '-model', self.path('damaged.h5'), '-grid', '1,1', '-hyco_rid_whole', '-hyco_snapshots', self.path('damaged')]
+        self.hyco(*args)
+        file = self.path('damaged', os.listdir(self.path('damaged'))[0])
+        with h5py.File(file, 'a') as f:
+            del f['step-0003']
+            if 'sealed' in f:
+                del f['sealed']
+        self.fails(args, os.path.basename(file))
+        with open(file, 'r+b') as f:
+            f.truncate(os.path.getsize(file) // 2)
+        self.fails(args, os.path.basename(file))
+
+    def fails(self, args, word):
+        run = self.run_raw(*args)
+        self.assertEqual(run.returncode, 1, run.stdout)
+        self.assertEqual(len(said(run)), 1, run.stderr)
+        self.assertIn(word, said(run)[0])
 
     def test_replay(self):
         """The series has the state of the whole mesh: full order's where the model is exact, nearly that from an RID."""
