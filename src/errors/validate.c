@@ -5,19 +5,20 @@
 */
 #include <hycoreducerimpl.h>
 
-const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda", "lambda_rid", NULL};
+const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda", "lambda_rid", "inelastic", NULL};
 
 typedef struct {
   HycoReducer t;
   HycoROM m;
   HycoSnapshots store;
-  PetscInt n[2], first[2], width[2]; /* this rank's nodes and cells in the file's order, values of each */
-  PetscReal *value[2], *rid[2];      /* of a solution: U and sigma at these, and in the model's mesh */
-  PetscSF sf[2];                     /* from these to those */
+  PetscInt n_fields;                 /* the last of a history alone */
+  PetscInt n[3], first[3], width[3]; /* this rank's nodes and cells in the file's order, values of each */
+  PetscReal *value[3], *rid[3];      /* of a solution: these fields there, and in the model's mesh */
+  PetscSF sf[3];                     /* from these to those */
   PetscReal *coefficient, *U;        /* of a prediction: gamma and the full-order unknowns; its displacement */
 } Rows;
 
-static const char *const fields[2] = {"U", "sigma"};
+static const char *const fields[3] = {"U", "sigma", "inelastic"};
 
 static PetscErrorCode RowsCreate(HycoReducer t, HycoROM m, HycoSnapshots store, Rows *r)
 {
@@ -30,11 +31,13 @@ static PetscErrorCode RowsCreate(HycoReducer t, HycoROM m, HycoSnapshots store, 
   r->store = store;
   r->width[0] = t->sizes[3];
   r->width[1] = t->fom->fe->n_sigma;
-  for (int k = 0; k < 2; k++) {
+  r->width[2] = 1;
+  r->n_fields = t->scene->n_times ? 3 : 2;
+  for (PetscInt k = 0; k < r->n_fields; k++) {
     const PetscInt n_rid = k ? mesh->n_cells : mesh->n_nodes;
     PetscLayout layout;
 
-    PetscCall(PetscLayoutCreateFromSizes(HycoComm(t), PETSC_DECIDE, t->sizes[k], 1, &layout));
+    PetscCall(PetscLayoutCreateFromSizes(HycoComm(t), PETSC_DECIDE, t->sizes[PetscMin(k, 1)], 1, &layout));
     PetscCall(PetscLayoutGetRange(layout, &r->first[k], &r->n[k]));
     r->n[k] -= r->first[k];
     PetscCall(PetscMalloc2(r->n[k] * r->width[k], &r->value[k], n_rid * r->width[k], &r->rid[k]));
@@ -50,7 +53,7 @@ static PetscErrorCode RowsCreate(HycoReducer t, HycoROM m, HycoSnapshots store, 
 static PetscErrorCode RowsDestroy(Rows *r)
 {
   PetscFunctionBegin;
-  for (int k = 0; k < 2; k++) {
+  for (PetscInt k = 0; k < r->n_fields; k++) {
     PetscCall(PetscFree2(r->value[k], r->rid[k]));
     PetscCall(PetscSFDestroy(&r->sf[k]));
   }
@@ -58,21 +61,22 @@ static PetscErrorCode RowsDestroy(Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Read(Rows *r, const PetscReal mu[])
+/* step: the listed time, of a history. */
+static PetscErrorCode Read(Rows *r, const PetscReal mu[], PetscInt step)
 {
   PetscFunctionBegin;
-  for (int k = 0; k < 2; k++)
-    PetscCall(
-        HycoSnapshotsReadRows(r->store, mu, fields[k], r->first[k] * r->width[k], r->n[k] * r->width[k], r->value[k]));
+  for (PetscInt k = 0; k < r->n_fields; k++)
+    PetscCall(HycoSnapshotsReadRows(r->store, mu, step, fields[k], r->first[k] * r->width[k], r->n[k] * r->width[k],
+                                    r->value[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The solution at mu: this rank's rows, and what the model's mesh has of it. Collective. */
-static PetscErrorCode ReadSolution(Rows *r, const PetscReal mu[])
+static PetscErrorCode ReadSolution(Rows *r, const PetscReal mu[], PetscInt step)
 {
   PetscFunctionBegin;
-  HycoOnEach(HycoComm(r->t), Read(r, mu));
-  for (int k = 0; k < 2; k++) {
+  HycoOnEach(HycoComm(r->t), Read(r, mu, step));
+  for (PetscInt k = 0; k < r->n_fields; k++) {
     PetscMPIInt width;
     MPI_Datatype unit;
 
@@ -88,10 +92,11 @@ static PetscErrorCode ReadSolution(Rows *r, const PetscReal mu[])
 
 /* U = r(u0) + V gamma (30) with the full-order values, of the prediction that rank `of` has: this rank's rows.
    Collective. */
-static PetscErrorCode MakeRows(Rows *r, const PetscReal mu[], PetscMPIInt of)
+static PetscErrorCode MakeRows(Rows *r, const PetscReal mu[], PetscInt step, PetscMPIInt of)
 {
   HycoReducer t = r->t;
   HycoROM m = r->m;
+  PetscReal all[HYCO_MAX_PARAMETERS];
   const PetscInt dim = r->width[0], n = r->n[0] * dim;
   const PetscScalar *v;
   PetscInt lda;
@@ -104,7 +109,8 @@ static PetscErrorCode MakeRows(Rows *r, const PetscReal mu[], PetscMPIInt of)
   }
   PetscCall(PetscMPIIntCast(m->l + m->n_fe, &count));
   PetscCallMPI(MPI_Bcast(r->coefficient, count, MPIU_REAL, of, HycoComm(t)));
-  PetscCall(HycoFOMSetParameters(t->fom, mu));
+  HycoSceneSetTime(t->scene, mu, t->scene->n_times ? t->scene->times[step] : 0, all);
+  PetscCall(HycoFOMSetParameters(t->fom, all));
   PetscCall(HycoReducerToRows(t, HYCO_ON_NODES, MPIU_REAL, dim, t->fom->fe->u0, r->U));
   PetscCall(MatDenseGetLDA(t->V, &lda));
   PetscCall(MatDenseGetArrayRead(t->V, &v));
@@ -130,7 +136,7 @@ static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->pairs.n, &lambda));
-  PetscCall(HycoSnapshotsReadRows(r->store, mu, "lambda", 0, m->pairs.n, lambda));
+  PetscCall(HycoSnapshotsReadRows(r->store, mu, 0, "lambda", 0, m->pairs.n, lambda));
   PetscCall(HycoROMCompareRID(m, r->rid[0], r->rid[1], lambda, &e, &f));
   row->error[HYCO_ERROR_U_RID] = e.u_rid;
   row->error[HYCO_ERROR_SIGMA] = e.sigma;
@@ -144,39 +150,125 @@ static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last prediction of rank `of`, at mu, whose row it is. Collective. */
-static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, HycoHeldOut *row)
+/* The squares of the displacement that is missed, and of the solution's, over the whole mesh; the solution on the RID.
+   Collective. */
+static PetscErrorCode MeasureU(Rows *r, const PetscReal mu[], PetscInt step, PetscMPIInt of, PetscReal square[2])
 {
-  PetscReal square[2] = {0, 0}; /* of what is missed, of the solution */
-
   PetscFunctionBegin;
-  PetscCall(ReadSolution(r, mu));
-  PetscCall(MakeRows(r, mu, of));
+  PetscCall(ReadSolution(r, mu, step));
+  PetscCall(MakeRows(r, mu, step, of));
+  square[0] = square[1] = 0;
   for (PetscInt i = 0; i < r->n[0] * r->width[0]; i++) {
     square[0] += (r->U[i] - r->value[0][i]) * (r->U[i] - r->value[0][i]);
     square[1] += r->value[0][i] * r->value[0][i];
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, square, 2, MPIU_REAL, MPI_SUM, HycoComm(r->t)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the process that has predicted makes of listed time `step`, which the model shows. */
+static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, const PetscReal square[2],
+                                  HycoLost lost[])
+{
+  PetscReal *lambda;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(r->m->pairs.n, &lambda));
+  PetscCall(HycoSnapshotsReadRows(r->store, mu, step, "lambda", 0, r->m->pairs.n, lambda));
+  PetscCall(HycoROMMeasureRID(r->m, r->rid[0], r->rid[1], r->rid[2], lambda, lost));
+  lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
+  PetscCall(PetscFree(lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A path in short; forces as they are before they are divided by what is large among the held-out paths. */
+static PetscErrorCode ConcludePath(HycoROM m, PetscInt n, const HycoLost lost[], HycoHeldOut *row)
+{
+  HycoPathErrors e;
+
+  PetscFunctionBegin;
+  HycoPathErrorsJudge(n, lost, &e);
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) row->error[j] = e.worst[j];
+  row->size = e.force;
+  row->rid_size = e.force_rid;
+  if (e.force > 0) row->error[HYCO_ERROR_LAMBDA] *= e.force;
+  if (e.force_rid > 0) row->error[HYCO_ERROR_LAMBDA_RID] *= e.force_rid;
+  if (row->converged > 0) PetscCall(HycoTrustMeasure(m, row->feature));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last predicted path of rank `of`, at mu, at the listed times that it reached. Collective. */
+static PetscErrorCode ComparePath(Rows *r, const PetscReal mu[], PetscMPIInt of, HycoHeldOut *row)
+{
+  const PetscBool mine = (PetscBool)(r->t->rank == of);
+  PetscInt n = r->m->trace.n_listed;
+  HycoLost *lost;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, of, HycoComm(r->t)));
+  n = PetscMin(n, r->t->scene->n_times);
+  PetscCall(PetscCalloc1(n * HYCO_N_ERRORS, &lost));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal square[2];
+
+    HycoOnEach(HycoComm(r->t), mine ? HycoROMSetStep(r->m, k) : PETSC_SUCCESS);
+    PetscCall(MeasureU(r, mu, k, of, square));
+    HycoOnEach(HycoComm(r->t), mine ? MeasureStep(r, mu, k, square, lost + k * HYCO_N_ERRORS) : PETSC_SUCCESS);
+  }
+  HycoOnEach(HycoComm(r->t), mine ? ConcludePath(r->m, n, lost, row) : PETSC_SUCCESS);
+  PetscCall(PetscFree(lost));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last prediction of rank `of`, at mu, whose row it is. Collective. */
+static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, HycoHeldOut *row)
+{
+  PetscReal square[2];
+
+  PetscFunctionBegin;
+  PetscCall(MeasureU(r, mu, 0, of, square));
   if (r->t->rank == of) row->error[HYCO_ERROR_U] = HycoRelative(PetscSqrtReal(square[0]), PetscSqrtReal(square[1]));
   HycoOnEach(HycoComm(r->t), r->t->rank == of ? CompareRID(r, mu, row) : PETSC_SUCCESS);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Predict(HycoROM m, const PetscReal mu[], PetscInt repeat, HycoHeldOut *row)
+/* One held-out point; of a path in the steps that full order took. */
+static PetscErrorCode PredictOne(HycoROM m, HycoSnapshots store, const PetscReal mu[])
+{
+  PetscReal *taken = NULL;
+  PetscInt n;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (m->scene->n_times) {
+    PetscCall(HycoSnapshotsReadTaken(store, mu, &n, &taken));
+    PetscCall(HycoROMSetSteps(m, n, taken));
+  }
+  ierr = HycoROMPredict(m, m->scene->n_parameters, mu);
+  if (taken) PetscCall(HycoROMSetSteps(m, 0, NULL));
+  PetscCall(PetscFree(taken));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Predict(HycoROM m, HycoSnapshots store, const PetscReal mu[], PetscInt repeat, HycoHeldOut *row)
 {
   PetscFunctionBegin;
-  PetscCall(HycoROMPredict(m, m->scene->n_parameters, mu));
+  PetscCall(PredictOne(m, store, mu));
   row->seconds[repeat] = m->prediction.seconds.total;
-  if (!repeat) row->converged = m->prediction.reason > 0;
+  if (repeat) PetscFunctionReturn(PETSC_SUCCESS);
+  row->converged = m->prediction.reason > 0;
+  for (PetscInt j = 1; j < HYCO_HELD_REPEATS; j++) row->seconds[j] = row->seconds[0]; /* of a path once */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Points first .. last-1 in their order, several times: what a load ramp keeps from one step to the next is kept. */
-static PetscErrorCode PredictAgain(HycoROM m, PetscInt first, PetscInt last, const PetscReal mu[], HycoHeldOut rows[])
+static PetscErrorCode PredictAgain(HycoROM m, HycoSnapshots store, PetscInt first, PetscInt last, const PetscReal mu[],
+                                   HycoHeldOut rows[])
 {
   PetscFunctionBegin;
   for (PetscInt r = 1; r < HYCO_HELD_REPEATS; r++) {
-    for (PetscInt k = first; k < last; k++) PetscCall(Predict(m, mu + k * m->scene->n_parameters, r, &rows[k]));
+    for (PetscInt k = first; k < last; k++) PetscCall(Predict(m, store, mu + k * m->scene->n_parameters, r, &rows[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -199,15 +291,17 @@ PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots
   for (PetscInt step = 0; step * size < n + size; step++) { /* one point of each rank */
     const PetscInt k = first + step;
 
-    HycoOnEach(HycoComm(t), k < last ? Predict(m, mu + k * n_par, 0, &rows[k]) : PETSC_SUCCESS);
+    HycoOnEach(HycoComm(t), k < last ? Predict(m, store, mu + k * n_par, 0, &rows[k]) : PETSC_SUCCESS);
     for (PetscMPIInt of = 0; of < size; of++) {
       const PetscInt j = of * n / size + step;
 
-      if (j < (of + 1) * n / size) PetscCall(Compare(&r, mu + j * n_par, of, &rows[j]));
+      if (j >= (of + 1) * n / size) continue;
+      PetscCall(t->scene->n_times ? ComparePath(&r, mu + j * n_par, of, &rows[j])
+                                  : Compare(&r, mu + j * n_par, of, &rows[j]));
     }
   }
   PetscCall(RowsDestroy(&r));
-  HycoOnEach(HycoComm(t), PredictAgain(m, first, last, mu, rows));
+  if (!t->scene->n_times) HycoOnEach(HycoComm(t), PredictAgain(m, store, first, last, mu, rows));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, count, MPIU_REAL, MPI_SUM, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -222,8 +316,9 @@ PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[])
 
 PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force)
 {
+  const PetscBool forces = (PetscBool)(kind == HYCO_ERROR_LAMBDA || kind == HYCO_ERROR_LAMBDA_RID);
   const PetscReal size = kind == HYCO_ERROR_LAMBDA ? row->size : row->rid_size,
-                  by = kind < HYCO_ERROR_LAMBDA ? 1 : PetscMax(size, HYCO_SMALL_FORCE * force);
+                  by = forces ? PetscMax(size, HYCO_SMALL_FORCE * force) : 1;
 
   if (row->converged < 0.5) return PETSC_INFINITY;
   if (by > 0) return row->error[kind] / by;
