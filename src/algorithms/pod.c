@@ -210,6 +210,13 @@ PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt 
     PetscCall(SolveAccurate(svd, S, size / unit, tol, noise, max_modes, k, sigma, &found));
   PetscCall(MatScale(S, unit));
   for (PetscInt j = 0; j < k; j++) sigma[j] *= unit;
+  if (!found) {
+    SVDType type;
+
+    PetscCall(SVDGetType(svd, &type));
+    HycoFail("the SVD type %s found no mode of the solutions that is accurate; take another, or the default, %s", type,
+             HYCO_SVD_TSQR);
+  }
   *l = PetscMin(found, HycoPODRank(k, sigma, tol, noise, max_modes));
   if (*l) {
     PetscCall(GetVectors(svd, S, *l, V));
