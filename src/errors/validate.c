@@ -3,135 +3,32 @@
   online, and what an online solve takes. The ranks share the predictions out; of each, every rank makes and compares
   its rows of the whole mesh, and hands the predicting one the solution on the RID.
 */
+#include <hycocomparison.h>
 #include <hycoreducerimpl.h>
 
 const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda", "lambda_rid", NULL};
 
-typedef struct {
-  HycoReducer t;
-  HycoROM m;
-  HycoSnapshots store;
-  PetscInt n[2], first[2], width[2]; /* this rank's nodes and cells in the file's order, values of each */
-  PetscReal *value[2], *rid[2];      /* of a solution: U and sigma at these, and in the model's mesh */
-  PetscSF sf[2];                     /* from these to those */
-  PetscReal *coefficient, *U;        /* of a prediction: gamma and the full-order unknowns; its displacement */
-} Rows;
-
-static const char *const fields[2] = {"U", "sigma"};
-
-static PetscErrorCode RowsCreate(HycoReducer t, HycoROM m, HycoSnapshots store, Rows *r)
-{
-  HycoMesh mesh = m->mesh;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMemzero(r, sizeof(*r)));
-  r->t = t;
-  r->m = m;
-  r->store = store;
-  r->width[0] = t->sizes[3];
-  r->width[1] = t->fom->fe->n_sigma;
-  for (int k = 0; k < 2; k++) {
-    const PetscInt n_rid = k ? mesh->n_cells : mesh->n_nodes;
-    PetscLayout layout;
-
-    PetscCall(PetscLayoutCreateFromSizes(HycoComm(t), PETSC_DECIDE, t->sizes[k], 1, &layout));
-    PetscCall(PetscLayoutGetRange(layout, &r->first[k], &r->n[k]));
-    r->n[k] -= r->first[k];
-    PetscCall(PetscMalloc2(r->n[k] * r->width[k], &r->value[k], n_rid * r->width[k], &r->rid[k]));
-    PetscCall(PetscSFCreate(HycoComm(t), &r->sf[k]));
-    PetscCall(PetscSFSetGraphLayout(r->sf[k], layout, n_rid, NULL, PETSC_OWN_POINTER,
-                                    k ? mesh->cell_whole : mesh->node_whole));
-    PetscCall(PetscLayoutDestroy(&layout));
-  }
-  PetscCall(PetscMalloc2(m->l + m->n_fe, &r->coefficient, r->n[0] * r->width[0], &r->U));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode RowsDestroy(Rows *r)
-{
-  PetscFunctionBegin;
-  for (int k = 0; k < 2; k++) {
-    PetscCall(PetscFree2(r->value[k], r->rid[k]));
-    PetscCall(PetscSFDestroy(&r->sf[k]));
-  }
-  PetscCall(PetscFree2(r->coefficient, r->U));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Read(Rows *r, const PetscReal mu[])
+static PetscErrorCode Read(HycoComparison *c, HycoSnapshots store, const PetscReal mu[])
 {
   PetscFunctionBegin;
   for (int k = 0; k < 2; k++)
-    PetscCall(
-        HycoSnapshotsReadRows(r->store, mu, fields[k], r->first[k] * r->width[k], r->n[k] * r->width[k], r->value[k]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The solution at mu: this rank's rows, and what the model's mesh has of it. Collective. */
-static PetscErrorCode ReadSolution(Rows *r, const PetscReal mu[])
-{
-  PetscFunctionBegin;
-  HycoOnEach(HycoComm(r->t), Read(r, mu));
-  for (int k = 0; k < 2; k++) {
-    PetscMPIInt width;
-    MPI_Datatype unit;
-
-    PetscCall(PetscMPIIntCast(r->width[k], &width));
-    PetscCallMPI(MPI_Type_contiguous(width, MPIU_REAL, &unit));
-    PetscCallMPI(MPI_Type_commit(&unit));
-    PetscCall(PetscSFBcastBegin(r->sf[k], unit, r->value[k], r->rid[k], MPI_REPLACE));
-    PetscCall(PetscSFBcastEnd(r->sf[k], unit, r->value[k], r->rid[k], MPI_REPLACE));
-    PetscCallMPI(MPI_Type_free(&unit));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* U = r(u0) + V gamma (30) with the full-order values, of the prediction that rank `of` has: this rank's rows.
-   Collective. */
-static PetscErrorCode MakeRows(Rows *r, const PetscReal mu[], PetscMPIInt of)
-{
-  HycoReducer t = r->t;
-  HycoROM m = r->m;
-  const PetscInt dim = r->width[0], n = r->n[0] * dim;
-  const PetscScalar *v;
-  PetscInt lda;
-  PetscMPIInt count;
-
-  PetscFunctionBegin;
-  if (t->rank == of) {
-    PetscCall(PetscArraycpy(r->coefficient, m->gamma, m->l));
-    for (PetscInt k = 0; k < m->n_fe; k++) r->coefficient[m->l + k] = m->U[m->fe_dof[k]];
-  }
-  PetscCall(PetscMPIIntCast(m->l + m->n_fe, &count));
-  PetscCallMPI(MPI_Bcast(r->coefficient, count, MPIU_REAL, of, HycoComm(t)));
-  PetscCall(HycoFOMSetParameters(t->fom, mu));
-  PetscCall(HycoReducerToRows(t, HYCO_ON_NODES, MPIU_REAL, dim, t->fom->fe->u0, r->U));
-  PetscCall(MatDenseGetLDA(t->V, &lda));
-  PetscCall(MatDenseGetArrayRead(t->V, &v));
-  for (PetscInt j = 0; j < m->l; j++) {
-    for (PetscInt i = 0; i < n; i++) r->U[i] += v[(size_t)j * (size_t)lda + (size_t)i] * r->coefficient[j];
-  }
-  PetscCall(MatDenseRestoreArrayRead(t->V, &v));
-  for (PetscInt k = 0; k < m->n_fe; k++) {
-    const PetscInt i = (m->mesh->node_whole[m->fe_dof[k] / dim] - r->first[0]) * dim + m->fe_dof[k] % dim;
-
-    if (i >= 0 && i < n) r->U[i] = r->coefficient[m->l + k];
-  }
+    PetscCall(HycoSnapshotsReadRows(store, mu, k ? "sigma" : "U", c->first[k] * c->width[k], c->n[k] * c->width[k],
+                                    c->value[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What the process that has predicted makes of it. */
-static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row)
+static PetscErrorCode CompareRID(const HycoComparison *c, HycoROM m, HycoSnapshots store, const PetscReal mu[],
+                                 HycoHeldOut *row)
 {
-  HycoROM m = r->m;
   PetscReal *lambda;
   HycoErrors e;
   HycoForceErrors f;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->pairs.n, &lambda));
-  PetscCall(HycoSnapshotsReadRows(r->store, mu, "lambda", 0, m->pairs.n, lambda));
-  PetscCall(HycoROMCompareRID(m, r->rid[0], r->rid[1], lambda, &e, &f));
+  PetscCall(HycoSnapshotsReadRows(store, mu, "lambda", 0, m->pairs.n, lambda));
+  PetscCall(HycoROMCompareRID(m, c->rid[0], c->rid[1], lambda, &e, &f));
   row->error[HYCO_ERROR_U_RID] = e.u_rid;
   row->error[HYCO_ERROR_SIGMA] = e.sigma;
   row->error[HYCO_ERROR_SIGMA_11] = e.sigma_11;
@@ -145,20 +42,24 @@ static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row
 }
 
 /* The last prediction of rank `of`, at mu, whose row it is. Collective. */
-static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, HycoHeldOut *row)
+static PetscErrorCode Compare(HycoComparison *c, HycoReducer t, HycoROM m, HycoSnapshots store, const PetscReal mu[],
+                              PetscMPIInt of, HycoHeldOut *row)
 {
-  PetscReal square[2] = {0, 0}; /* of what is missed, of the solution */
+  const PetscScalar *V;
+  PetscInt lda;
+  PetscReal error;
 
   PetscFunctionBegin;
-  PetscCall(ReadSolution(r, mu));
-  PetscCall(MakeRows(r, mu, of));
-  for (PetscInt i = 0; i < r->n[0] * r->width[0]; i++) {
-    square[0] += (r->U[i] - r->value[0][i]) * (r->U[i] - r->value[0][i]);
-    square[1] += r->value[0][i] * r->value[0][i];
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, square, 2, MPIU_REAL, MPI_SUM, HycoComm(r->t)));
-  if (r->t->rank == of) row->error[HYCO_ERROR_U] = HycoRelative(PetscSqrtReal(square[0]), PetscSqrtReal(square[1]));
-  HycoOnEach(HycoComm(r->t), r->t->rank == of ? CompareRID(r, mu, row) : PETSC_SUCCESS);
+  HycoOnEach(HycoComm(t), Read(c, store, mu));
+  PetscCall(HycoComparisonBring(c));
+  PetscCall(HycoFOMSetParameters(t->fom, mu));
+  PetscCall(MatDenseGetLDA(t->V, &lda));
+  PetscCall(MatDenseGetArrayRead(t->V, &V));
+  PetscCall(HycoComparisonPredict(c, m, of, V, lda));
+  PetscCall(MatDenseRestoreArrayRead(t->V, &V));
+  PetscCall(HycoComparisonError(c, &error));
+  if (t->rank == of) row->error[HYCO_ERROR_U] = error;
+  HycoOnEach(HycoComm(t), t->rank == of ? CompareRID(c, m, store, mu, row) : PETSC_SUCCESS);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -186,7 +87,7 @@ PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots
   PetscInt n, n_par, first, last;
   const PetscReal *mu;
   PetscMPIInt size, count;
-  Rows r;
+  HycoComparison c;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->held, &n, &n_par, &mu));
@@ -195,7 +96,7 @@ PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots
   PetscCall(PetscArrayzero(rows, n));
   first = t->rank * n / size;
   last = (t->rank + 1) * n / size;
-  PetscCall(RowsCreate(t, m, store, &r));
+  PetscCall(HycoComparisonCreate(t->fom, m, &c));
   for (PetscInt step = 0; step * size < n + size; step++) { /* one point of each rank */
     const PetscInt k = first + step;
 
@@ -203,10 +104,10 @@ PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots
     for (PetscMPIInt of = 0; of < size; of++) {
       const PetscInt j = of * n / size + step;
 
-      if (j < (of + 1) * n / size) PetscCall(Compare(&r, mu + j * n_par, of, &rows[j]));
+      if (j < (of + 1) * n / size) PetscCall(Compare(&c, t, m, store, mu + j * n_par, of, &rows[j]));
     }
   }
-  PetscCall(RowsDestroy(&r));
+  PetscCall(HycoComparisonDestroy(&c));
   HycoOnEach(HycoComm(t), PredictAgain(m, first, last, mu, rows));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, count, MPIU_REAL, MPI_SUM, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
