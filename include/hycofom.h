@@ -27,6 +27,7 @@ typedef struct {
   PetscInt n_dependent; /* closed contacts whose rows depend on others': with any, Lambda is not unique (U is) */
   PetscInt iterations, dim;
   PetscReal total_contact_force, lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3];
+  PetscReal quantity[HYCO_MAX_QUANTITIES]; /* those of HycoSceneGetQuantities() */
   PetscInt n_facing;          /* contacts that may close: of moved surfaces the slave nodes that face a master */
   PetscReal overlap, sliding; /* largest initial overlap (length); largest motion of a closed contact along its
                                  surface, over the size of a facet: beyond 1 displacements are not small */

@@ -40,6 +40,7 @@ typedef struct {
   PetscReal covered_force; /* share of the total contact force that the RID's own multipliers carry; 1 without force */
   PetscReal total_contact_force;                                   /* reconstructed, whole contact surface */
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
+  PetscReal quantity[HYCO_MAX_QUANTITIES];                         /* those of HycoSceneGetQuantities() */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
   /* An upper estimate of the relative errors of u (whole mesh, 2-norm), of the stress (RID, 2-norm of the cells'
      values) and of all contact forces (2-norm; a force below a tenth of the largest held out in training counts as that

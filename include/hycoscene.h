@@ -36,6 +36,11 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene);
 PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *const *names[], const PetscReal *lo[],
                                       const PetscReal *hi[]);
 
+/* The quantities that the scene's `output` entries name, in the order of HycoSummary's and HycoPrediction's. Not
+   collective. Borrowed. */
+#define HYCO_MAX_QUANTITIES 16
+PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *names[HYCO_MAX_QUANTITIES]);
+
 /* Whether parameter values outside the ranges are refused (default) or taken. Not collective. */
 PetscErrorCode HycoSceneSetExtrapolate(HycoScene scene, PetscBool extrapolate);
 

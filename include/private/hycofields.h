@@ -28,6 +28,10 @@ typedef struct {
    of cells (n_cells x ns) in ParaView's order xx, xy, xz, yy, yz, zz. */
 void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN]);
 const char *HycoFieldsTopology(HycoCellType type);
+/* Of cells' stresses in that order (n_cells x 6): von Mises' (n_cells), the principal ones (n_cells x 3), the largest
+   first. */
+PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal tensor[], PetscReal mises[],
+                                    PetscReal principal[]);
 void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
 
 /* The title, cell type, dimension, parameters and contact table (NULL: none). On one process. */

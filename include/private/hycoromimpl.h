@@ -8,6 +8,8 @@
 #include <hycofomimpl.h>
 #include <hycosolverimpl.h>
 
+typedef struct _n_HycoProbe *HycoProbe;
+
 /* Rows of B in CSR over dofs of a mesh, and D: see HycoContactRows(). */
 typedef struct {
   PetscInt *start, *dof;
@@ -68,6 +70,7 @@ struct _p_HycoROM {
   PetscReal *V_whole, *U_whole;
   HycoFE fe_whole;
   HycoPairs whole_pairs;
+  HycoProbe probe; /* of the scene's quantities; made by the first prediction that is asked for */
   /* online */
   PetscBool full_order, full_displacement; /* what its user, who has the scene, is to do: HycoROMGetFallback() */
   PetscBool ready, reconstruct, solved, whole_current;
@@ -117,6 +120,11 @@ static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start
     start += model->rows.value[j] * model->U[model->rows.dof[j]];
   return start;
 }
+
+/* The scene's quantities (value[scene->n_quantities]) of the last prediction (probe.c). */
+PetscErrorCode HycoROMMeasureQuantities(HycoROM model, PetscReal value[]);
+/* NULL-safe. */
+PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
 
 /* What tells of the last prediction's error without a full-order solution: feature[HYCO_TRUST_FEATURES], all >= 0. */
 PetscErrorCode HycoTrustMeasure(HycoROM model, PetscReal feature[]);

@@ -85,6 +85,16 @@ typedef struct {
    circle. */
 typedef enum { HYCO_PLANE_STRAIN, HYCO_PLANE_STRESS, HYCO_AXISYMMETRIC } HycoFormulation;
 
+/* A number that the scene asks of each solution: the largest, smallest or mean value of a field over a group. */
+typedef enum { HYCO_QUANTITY_MAX, HYCO_QUANTITY_MIN, HYCO_QUANTITY_MEAN } HycoQuantityKind;
+typedef struct {
+  char *name, *group; /* group NULL: all of the mesh */
+  PetscBool given;    /* the kind and the field are */
+  HycoQuantityKind kind;
+  PetscInt field; /* of HycoQuantityFields */
+} HycoQuantity;
+extern const char *const HycoQuantityFields[]; /* NULL ends */
+
 /* A quantity over time: linear between its rows, constant before the first and after the last. */
 typedef struct {
   PetscInt n;
@@ -117,6 +127,8 @@ struct _p_HycoScene {
   HycoFixed *fixed;
   HycoLoad *load;
   HycoContact *contact;
+  PetscInt n_quantities;
+  HycoQuantity *quantity;
   /* entries, sorted by key: what a model file carries */
   PetscInt n_entries;
   char **key, **value;
@@ -126,6 +138,9 @@ struct _p_HycoScene {
 PetscErrorCode HycoSceneReadConstants(HycoScene scene);
 /* The expression of an entry, with the scene's constants put in. */
 PetscErrorCode HycoSceneExpression(HycoScene scene, const char key[], const char text[], HycoExpr *expr);
+/* Reads an entry output_NAME_...; checks all of them. */
+PetscErrorCode HycoSceneReadQuantity(HycoScene scene, PetscInt entry, const char name[], PetscInt field);
+PetscErrorCode HycoSceneCheckQuantities(HycoScene scene);
 /* Reads the history's entries, once the parameters are read. */
 PetscErrorCode HycoSceneReadHistory(HycoScene scene);
 /* Fails where the history reaches what must not change in time: the bodies' places, the rows of B. */

@@ -77,6 +77,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   ReportVector(json, whole ? "u_max" : "rid_u_max", p->dim, p->u_max);
   cJSON_AddNumberToObject(json, whole ? "strain_energy" : "rid_strain_energy", energy);
   PetscCall(ReportContacts(json, p->n_contacts, p->n_facing, p->overlap, p->sliding));
+  PetscCall(ReportQuantities(json, scene, p->quantity));
   ReportTrust(json, p);
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
@@ -189,7 +190,8 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "beyond",
                                                "full_order"};
 
-static void FillRow(const HycoPrediction *p, PetscReal v[])
+/* width: columns, with the scene's quantities. */
+static void FillRow(const HycoPrediction *p, PetscInt width, PetscReal v[])
 {
   v[FORCE] = p->total_contact_force;
   v[LAMBDA_MAX] = p->lambda_max;
@@ -204,11 +206,12 @@ static void FillRow(const HycoPrediction *p, PetscReal v[])
   v[ESTIMATE_SIGMA] = p->estimated_error_sigma >= 0 ? p->estimated_error_sigma : NAN;
   v[ESTIMATE_LAMBDA] = p->estimated_error_lambda >= 0 ? p->estimated_error_lambda : NAN;
   v[BEYOND] = p->beyond;
+  for (PetscInt k = 0; k < width - N_COLUMNS; k++) v[N_COLUMNS + k] = p->quantity[k];
 }
 
 /* This rank's points. full[k]: point k is to be solved full order. */
 static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, PetscInt n, PetscInt n_par,
-                                  const PetscReal mu[], PetscReal value[], PetscInt full[])
+                                  const PetscReal mu[], PetscInt width, PetscReal value[], PetscInt full[])
 {
   PetscMPIInt rank, size;
   PetscInt first, count;
@@ -223,7 +226,7 @@ static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, Petsc
   PetscCall(PetscMalloc1(count, &all));
   PetscCall(HycoROMSolveMany(model, count, n_par, mu + first * n_par, all, NULL, NULL));
   for (PetscInt k = 0; k < count; k++) {
-    FillRow(&all[k], value + (first + k) * N_COLUMNS);
+    FillRow(&all[k], width, value + (first + k) * width);
     DriverWantsFullOrder(fallback, &all[k], why);
     full[first + k] = why[0] != '\0';
   }
@@ -233,7 +236,7 @@ static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, Petsc
 
 /* All ranks together, the points where the reduced model was not enough. */
 static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, const PetscReal mu[],
-                                const PetscInt full[], PetscReal value[])
+                                const PetscInt full[], PetscInt width, PetscReal value[])
 {
   PetscInt count = 0;
 
@@ -243,13 +246,13 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
 
     if (!full[k]) continue;
     PetscCall(DriverSolveFullOrder(fallback, n_par, mu + k * n_par, &p));
-    p.estimated_error_u = value[k * N_COLUMNS + ESTIMATE_U]; /* the model's, which asked for full order */
-    p.estimated_error_sigma = value[k * N_COLUMNS + ESTIMATE_SIGMA];
-    p.estimated_error_lambda = value[k * N_COLUMNS + ESTIMATE_LAMBDA];
-    p.beyond = value[k * N_COLUMNS + BEYOND];
-    FillRow(&p, value + k * N_COLUMNS);
-    value[k * N_COLUMNS + U_NORM] = NAN; /* the whole mesh's, no RID's */
-    value[k * N_COLUMNS + FULL_ORDER] = 1;
+    p.estimated_error_u = value[k * width + ESTIMATE_U]; /* the model's, which asked for full order */
+    p.estimated_error_sigma = value[k * width + ESTIMATE_SIGMA];
+    p.estimated_error_lambda = value[k * width + ESTIMATE_LAMBDA];
+    p.beyond = value[k * width + BEYOND];
+    FillRow(&p, width, value + k * width);
+    value[k * width + U_NORM] = NAN; /* the whole mesh's, no RID's */
+    value[k * width + FULL_ORDER] = 1;
     count++;
   }
   if (fallback->on) PetscCall(Say("%d of the %d points were solved full order\n", (int)count, (int)n));
@@ -258,8 +261,9 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
 
 static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples)
 {
-  PetscInt n, n_par, *full;
+  PetscInt n, n_par, width, *full;
   const PetscReal *mu;
+  const char *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
   PetscReal *value, begin;
   char table[PETSC_MAX_PATH_LEN];
 
@@ -267,14 +271,15 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(DriverCheckLeftEarly()); /* what the solver alone knows is read by the first prediction */
-  PetscCall(PetscCalloc2(n * N_COLUMNS, &value, n, &full));
+  PetscCall(ReportColumns(scene, N_COLUMNS, columns, &width, names));
+  PetscCall(PetscCalloc2(n * width, &value, n, &full));
   begin = HycoNow();
-  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, value, full));
-  HycoAllreduce(value, n * N_COLUMNS, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
+  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, width, value, full));
+  HycoAllreduce(value, n * width, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
   HycoAllreduce(full, n, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD);
-  PetscCall(SolveRest(fallback, n, n_par, mu, full, value));
+  PetscCall(SolveRest(fallback, n, n_par, mu, full, width, value));
   begin = HycoNow() - begin;
-  PetscCall(ReportSet("predict", table, scene, samples, N_COLUMNS, columns, value, begin));
+  PetscCall(ReportSet("predict", table, scene, samples, width, names, value, begin));
   PetscCall(PetscFree2(value, full));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -89,6 +89,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
                 (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
                 (double)s->energy_defect));
   PetscCall(SayContacts(json, fom, s->dim));
+  PetscCall(ReportQuantities(json, scene, s->quantity));
   PetscCall(
       Say("KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
           (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,
@@ -149,17 +150,19 @@ static const char *const columns[N_COLUMNS] = {
 /* The points in their order, each from the last one's active contacts, all ranks together. */
 static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, const char table[])
 {
-  PetscInt n, n_par;
+  PetscInt n, n_par, width;
   const PetscReal *mu;
+  const char *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
   PetscReal *value, begin;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCall(PetscCalloc1(n * N_COLUMNS, &value));
+  PetscCall(ReportColumns(scene, N_COLUMNS, columns, &width, names));
+  PetscCall(PetscCalloc1(n * width, &value));
   begin = HycoNow();
   for (PetscInt k = 0; k < n; k++) {
     HycoSummary s;
-    PetscReal *v = value + k * N_COLUMNS;
+    PetscReal *v = value + k * width;
 
     PetscCall(HycoFOMSolve(fom, n_par, mu + k * n_par));
     PetscCall(HycoFOMGetSummary(fom, &s));
@@ -174,8 +177,9 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     v[CONVERGED] = s.reason > 0;
     v[ITERATIONS] = s.iterations;
     v[SECONDS] = s.seconds.total;
+    PetscCall(PetscArraycpy(v + N_COLUMNS, s.quantity, width - N_COLUMNS));
   }
-  PetscCall(ReportSet("solve", table, scene, samples, N_COLUMNS, columns, value, HycoNow() - begin));
+  PetscCall(ReportSet("solve", table, scene, samples, width, names, value, HycoNow() - begin));
   PetscCall(PetscFree(value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -105,6 +105,11 @@ PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscRe
    faces anything. */
 PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap,
                               PetscReal sliding);
+/* The scene's quantities, in the report and in words. */
+PetscErrorCode ReportQuantities(cJSON *json, HycoScene scene, const PetscReal value[]);
+/* A table's columns: `n` of them, then the scene's quantities; names: room for HYCO_MAX_QUANTITIES more. */
+PetscErrorCode ReportColumns(HycoScene scene, PetscInt n, const char *const columns[], PetscInt *n_all,
+                             const char *names[]);
 void ReportKKT(cJSON *json, const HycoKKT *kkt);
 void ReportSeconds(cJSON *json, const HycoSeconds *seconds);
 void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[]);

@@ -100,6 +100,7 @@ static void TakeDisplacement(Fallback *f, const HycoSummary *s, HycoPrediction *
   p->overlap = s->overlap;
   p->sliding = s->sliding;
   f->strain_energy = s->strain_energy;
+  for (PetscInt k = 0; k < HYCO_MAX_QUANTITIES; k++) p->quantity[k] = s->quantity[k];
   for (PetscInt c = 0; c < 3; c++) {
     p->u_min[c] = s->u_min[c];
     p->u_max[c] = s->u_max[c];

@@ -43,6 +43,33 @@ PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode ReportQuantities(cJSON *json, HycoScene scene, const PetscReal value[])
+{
+  const char *names[HYCO_MAX_QUANTITIES];
+  cJSON *object;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetQuantities(scene, &n, names));
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  object = cJSON_AddObjectToObject(json, "outputs");
+  for (PetscInt k = 0; k < n; k++) {
+    cJSON_AddNumberToObject(object, names[k], value[k]);
+    PetscCall(Say("%s %.6g%s", names[k], (double)value[k], k + 1 < n ? ", " : "\n"));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ReportColumns(HycoScene scene, PetscInt n, const char *const columns[], PetscInt *n_all,
+                             const char *names[])
+{
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < n; c++) names[c] = columns[c];
+  PetscCall(HycoSceneGetQuantities(scene, n_all, names + n));
+  *n_all += n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 void ReportKKT(cJSON *json, const HycoKKT *kkt)
 {
   cJSON *object = cJSON_AddObjectToObject(json, "kkt");

@@ -45,28 +45,29 @@ PetscErrorCode HycoROMCompareRID(HycoROM m, const PetscReal u[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a full-order model keeps for the comparisons with one model. */
-typedef struct {
+/* Modes, norms and star forests of the last model that a full-order one was compared with. */
+struct _n_HycoCompared {
   PetscObjectId id; /* the model's, on rank 0 */
   HycoComparison rows;
   HycoNorms norms;
   PetscReal *V; /* the modes, these rows, column major */
-} Kept;
+};
 
-static PetscErrorCode KeptDestroy(void *kept)
+PetscErrorCode HycoComparedDestroy(HycoCompared *compared)
 {
-  Kept *k = (Kept *)kept;
+  HycoCompared k = *compared;
 
   PetscFunctionBegin;
+  if (!k) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoComparisonDestroy(&k->rows));
   PetscCall(HycoNormsDestroy(&k->norms));
   PetscCall(PetscFree(k->V));
-  PetscCall(PetscFree(k));
+  PetscCall(PetscFree(*compared));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* This rank's rows of the modes on the whole mesh, from the model's file. */
-static PetscErrorCode ReadModes(Kept *k, const char path[])
+static PetscErrorCode ReadModes(HycoCompared k, const char path[])
 {
   const PetscInt dim = k->rows.width[0], n = k->rows.n[0] * dim, l = k->rows.l;
   PetscReal *V;
@@ -87,7 +88,7 @@ static PetscErrorCode ReadModes(Kept *k, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Fill(HycoROM m, HycoFOM f, Kept *k)
+static PetscErrorCode Fill(HycoROM m, HycoFOM f, HycoCompared k)
 {
   char path[PETSC_MAX_PATH_LEN] = "";
 
@@ -100,31 +101,22 @@ static PetscErrorCode Fill(HycoROM m, HycoFOM f, Kept *k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Modes, norms and star forests of the last model that f was compared with. */
-static PetscErrorCode Keep(HycoROM m, HycoFOM f, Kept **kept)
+/* f->compared for this model. Collective. */
+static PetscErrorCode Keep(HycoROM m, HycoFOM f)
 {
-  PetscContainer container;
   PetscObjectId id = 0;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (f->rank == 0) PetscCall(PetscObjectGetId((PetscObject)m, &id));
   PetscCallMPI(MPI_Bcast(&id, 1, MPIU_INT64, 0, HycoComm(f)));
-  PetscCall(PetscObjectQuery((PetscObject)f, "HycoKept", (PetscObject *)&container));
-  if (container) {
-    PetscCall(PetscContainerGetPointer(container, (void **)kept));
-    if ((*kept)->id == id) PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscNew(kept));
-  (*kept)->id = id;
-  ierr = Fill(m, f, *kept);
-  if (ierr) PetscCall(KeptDestroy(*kept));
+  if (f->compared && f->compared->id == id) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoComparedDestroy(&f->compared));
+  PetscCall(PetscNew(&f->compared));
+  f->compared->id = id;
+  ierr = Fill(m, f, f->compared);
+  if (ierr) PetscCall(HycoComparedDestroy(&f->compared));
   PetscCall(ierr);
-  PetscCall(PetscContainerCreate(HycoComm(f), &container));
-  PetscCall(PetscContainerSetPointer(container, *kept));
-  PetscCall(PetscContainerSetUserDestroy(container, KeptDestroy));
-  PetscCall(PetscObjectCompose((PetscObject)f, "HycoKept", (PetscObject)container));
-  PetscCall(PetscContainerDestroy(&container));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -142,7 +134,7 @@ static PetscErrorCode Check(HycoROM m, HycoFOM f)
 }
 
 /* The errors in H1 and its dual. Collective. */
-static PetscErrorCode CompareH1(HycoROM m, HycoFOM f, Kept *k, HycoErrors *e)
+static PetscErrorCode CompareH1(HycoROM m, HycoFOM f, HycoCompared k, HycoErrors *e)
 {
   PetscReal lost, size;
 
@@ -161,13 +153,14 @@ static PetscErrorCode CompareH1(HycoROM m, HycoFOM f, Kept *k, HycoErrors *e)
 PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
 {
   HycoErrors found = {0};
-  Kept *k;
+  HycoCompared k;
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoROMCompare()");
   HycoOnRoot(HycoComm(f), Check(m, f));
-  PetscCall(Keep(m, f, &k));
+  PetscCall(Keep(m, f));
+  k = f->compared;
   PetscCall(HycoFOMStress(f));
   PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, k->rows.width[0], f->u, k->rows.value[0]));
   PetscCall(HycoFOMToRows(f, HYCO_ON_CELLS, MPIU_REAL, k->rows.width[1], f->sigma, k->rows.value[1]));

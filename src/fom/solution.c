@@ -1,5 +1,6 @@
 /* The last solution of a full-order model: where its values are, what they amount to, who gets them. */
 #include <hycofields.h>
+#include <hycoquantities.h>
 #include <hycopath.h>
 
 PetscErrorCode HycoFOMToLocal(HycoFOM f, Vec v, PetscReal value[])
@@ -122,6 +123,10 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(MeasureDisplacements(f, s));
   HycoOnRoot(HycoComm(f), MeasureContacts(f, s));
   if (s->reason > 0 && f->n_contacts) HycoOnRoot(HycoComm(f), HycoFOMCountDependent(f, &s->n_dependent));
+  if (f->scene->n_quantities) {
+    PetscCall(HycoFOMStress(f));
+    PetscCall(HycoQuantitiesMeasure(HycoComm(f), f->fe, f->u, f->sigma, s->quantity));
+  }
   PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, HycoComm(f)));
   *out = *s;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -81,6 +81,9 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
               (int)mesh->dim - 1, (int)mesh->group_dim[group]);
   }
   for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(HycoContactCheckGroups(scene->contact[k], mesh));
+  for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    if (scene->quantity[k].group) PetscCall(HycoMeshFindGroup(mesh, "output", scene->quantity[k].group, &group));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -270,9 +270,8 @@ static PetscReal Mises(const PetscReal s[6])
                        3 * (xy * xy + xz * xz + yz * yz));
 }
 
-/* Of a cell's stress: von Mises', and the principal values, the largest first. */
-static PetscErrorCode Invariants(PetscInt n_cells, PetscInt dim, const PetscReal tensor[], PetscReal mises[],
-                                 PetscReal principal[])
+PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal tensor[], PetscReal mises[],
+                                    PetscReal principal[])
 {
   PetscBLASInt three = 3, lwork = 32, info;
 
@@ -355,7 +354,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
   for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
   PetscCall(HycoFEStress(fe, u, sigma));
   HycoTensor6(m->n_cells, fe->n_sigma, sigma, tensor);
-  PetscCall(Invariants(m->n_cells, fe->dim, tensor, mises, principal));
+  PetscCall(HycoStressInvariants(m->n_cells, fe->dim, tensor, mises, principal));
   for (PetscInt e = 0; e < m->n_cells; e++) body[e] = m->cell_body[e];
   ierr = HycoContactFieldsCreate(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
   if (!ierr) {

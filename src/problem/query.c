@@ -16,6 +16,15 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *names[HYCO_MAX_QUANTITIES])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  *n = scene->n_quantities;
+  for (PetscInt k = 0; k < *n && names; k++) names[k] = scene->quantity[k].name;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 HycoDefineMethod(HycoSceneGetTitle, (HycoScene scene, const char *title[]), scene, HYCO_SCENE_CLASSID,
                  *title = scene->title)
 HycoDefineMethod(HycoSceneGetMesh, (HycoScene scene, const char *path[]), scene, HYCO_SCENE_CLASSID,
@@ -117,7 +126,8 @@ PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
   *hash = HYCO_HASH_START;
   for (PetscInt k = 0; k < scene->n_entries; k++) {
     if (strncasecmp(scene->key[k], "hyco_", 5) == 0 || strncasecmp(scene->key[k], "parameter_", 10) == 0 ||
-        strcasecmp(scene->key[k], "scene_mesh") == 0 || strcasecmp(scene->key[k], "scene_title") == 0)
+        strncasecmp(scene->key[k], "output_", 7) == 0 || strcasecmp(scene->key[k], "scene_mesh") == 0 ||
+        strcasecmp(scene->key[k], "scene_title") == 0)
       continue;
     *hash = HycoHash(*hash, scene->key[k], strlen(scene->key[k]) + 1);
     *hash = HycoHash(*hash, scene->value[k], strlen(scene->value[k]) + 1);

@@ -12,6 +12,7 @@ static const char *const body_fields[] = {
     "element", "map_x", "map_y", "map_z", "law", "temperature", "reference_temperature", "expansion", "law_type", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const contact_fields[] = {"type", NULL};
+static const char *const output_fields[] = {"max", "min", "mean", "group", NULL};
 static const char *const scene_fields[] = {"title", "mesh", "parameters", "refine", "formulation", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
@@ -446,6 +447,9 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
   } else if (what) {
     if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, what, NULL, component_fields));
     PetscCall(ReadGroups(s, entry, name, field));
+  } else if (strncasecmp(key, "output_", 7) == 0) {
+    if (!SplitKey(rest, output_fields, name, &field)) PetscCall(UnknownKey(key, "an output", NULL, output_fields));
+    PetscCall(HycoSceneReadQuantity(s, entry, name, field));
   } else if (strncasecmp(key, "pressure_", 9) == 0) {
     PetscCall(PetscStrncpy(name, rest, sizeof(name)));
     PetscCall(ReadGroups(s, entry, name, -1));
@@ -525,6 +529,7 @@ static PetscErrorCode CheckScene(HycoScene s)
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactComplete(s->contact[k]));
   PetscCall(HycoSceneCheckHistory(s));
+  PetscCall(HycoSceneCheckQuantities(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -771,10 +776,14 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
     PetscCall(PetscFree(s->key[k]));
     PetscCall(PetscFree(s->value[k]));
   }
+  for (PetscInt k = 0; k < s->n_quantities; k++) {
+    PetscCall(PetscFree(s->quantity[k].name));
+    PetscCall(PetscFree(s->quantity[k].group));
+  }
   for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PetscFree(s->parameter[p]));
   PetscCall(HycoSceneDestroyHistory(s));
-  HycoFreeAll(&s->key, &s->value, &s->constant, &s->body, &s->fixed, &s->load, &s->contact, &s->title, &s->mesh_path,
-              &s->folder);
+  HycoFreeAll(&s->key, &s->value, &s->constant, &s->quantity, &s->body, &s->fixed, &s->load, &s->contact, &s->title,
+              &s->mesh_path, &s->folder);
   PetscCall(DMDestroy(&s->dm));
   PetscCall(PetscOptionsDestroy(&s->options));
   PetscCall(PetscHeaderDestroy(&s));

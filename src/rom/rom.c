@@ -81,6 +81,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscFunctionBegin;
   m->ready = m->solved = m->whole_current = m->beyond_current = PETSC_FALSE;
   PetscTryTypeMethod(m, reset);
+  PetscCall(HycoProbeDestroy(&m->probe));
   PetscCall(HycoSolverDestroy(&m->solver));
   PetscCall(HycoFEDestroy(&m->fe_beyond));
   PetscCall(PetscFree(m->beyond));
@@ -271,6 +272,7 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   p->u_norm2 = PetscSqrtReal(p->u_norm2);
   PetscCall(MeasureContacts(m, p));
   PetscCall(HycoTrustEstimate(m, p));
+  PetscCall(HycoROMMeasureQuantities(m, p->quantity));
   *out = *p;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

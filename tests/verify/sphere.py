@@ -25,6 +25,14 @@ STIFF = E / (1 - NU**2)
 C = 1.295 * np.exp(0.736 * NU)
 W_C = (np.pi * C * Y / (2 * STIFF))**2
 F_C = 4 / 3 / STIFF**2 * (np.pi * C * Y / 2)**3
+SECTION = f"""
+scene: {{title: sphere on a rigid plane, mesh: mesh.msh, formulation: axisymmetric}}
+body: {{sphere: {{young: {E}, poisson: {NU}, law: {{type: j2, yield: {Y}}}}}}}
+fixed: {{top: {{y: "-{W_C:.12g}*t"}}}}
+contact: {{plane: {{type: obstacle, group: under, normal: {{y: -1}}, gap: y + 1}}}}
+history: {{times: [0, %s]}}
+hyco: {{step_inelastic: 0.01}}
+"""
 SCENE = f"""
 scene: {{title: sphere on a rigid plane, mesh: mesh.msh}}
 body: {{sphere: {{young: {E}, poisson: {NU}, law: {{type: j2, yield: {Y}}}}}}}
@@ -51,31 +59,37 @@ def jackson_green(w):
 class Spheres(Verify):
     """What sphere_long.py shares."""
 
-    def judge(self, n, at, substeps):
-        """n cells in the last contact's radius; at: the quotients w, judged."""
-        force, h = self.forces(n, at, '-hyco_substeps', substeps)
-        self.assertTrue(h['ended'])
+    def judge(self, title, force, at):
         for w, f in zip(at, force):
             for name, fit in (('Kogut, Etsion', kogut_etsion), ('Jackson, Green', jackson_green)):
-                self.row(f'{n} cells in the contact, w = {w}: force, {name}', f, fit(w), 5)
+                self.row(f'{title}, w = {w}: force, {name}', f, fit(w), 5)
 
-    def forces(self, n, at, *args):
+    def forces(self, n, at, substeps, solid):
+        """The quotients F at the quotients w; n cells in the last contact's radius; of the section, or of an eighth in 3D."""
         along, towards = axes(radius(at[-1]), n, 1, 20)
-        grid = Grid()
-        grid.box('hex8', [along, along, towards], under, 'sphere',
-                 {'x0': 'side_x', 'y0': 'side_y', 'z0': 'top', 'z1': ('under', 3 * n // 2)})
-        h = self.hyco('solve', '-scene', self.scene(SCENE % ', '.join(map(str, at)), grid), *args, timeout=900)['history']
+        grid, part = Grid(), 3 * n // 2
+        if solid:
+            grid.box('hex8', [along, along, towards], under, 'sphere', {'x0': 'side_x', 'y0': 'side_y', 'z0': 'top', 'z1': ('under', part)})
+        else:
+            grid.box('quad4', [along, towards], under, 'sphere', {'y0': 'top', 'y1': ('under', part)})
+        scene = self.scene((SCENE if solid else SECTION) % ', '.join(map(str, at)), grid)
+        h = self.hyco('solve', '-scene', scene, '-hyco_substeps', substeps, timeout=900)['history']
+        self.assertTrue(h['ended'])
         self.assertLess(max(h['kkt_max']), 1e-8)
         self.assertLess(max(h['energy_defect']), 1e-8)
-        return 4 * np.array(h['total_contact_force'][1:]) / F_C, h
+        return (4 if solid else 1) * np.array(h['total_contact_force'][1:]) / F_C
 
 
 class Sphere(Spheres):
     name = 'sphere'
 
-    def test_force(self):
-        """Coarse: with this few cells the force at a smaller w is that of a contact to half a cell. The finer one: sphere_long.py."""
-        self.judge(4, (80,), 20)
+    def test_section(self):
+        at = (20, 40, 60, 80)
+        self.judge('axisymmetric', self.forces(24, at, 8, False), at)
+
+    def test_solid(self):
+        """In 3D, and coarse: with few cells in the contact its radius, and with it the force, is known to half a cell. Finer: sphere_long.py."""
+        self.judge('3D, 4 cells in the contact', self.forces(4, (80,), 20, True), (80,))
 
 
 if __name__ == '__main__':

@@ -8,7 +8,8 @@ class Long(Spheres):
     name = 'sphere_long'
 
     def test_force(self):
-        self.judge(8, (40, 60, 80), 8)
+        at = (40, 60, 80)
+        self.judge('3D, 8 cells in the contact', self.forces(8, at, 8, True), at)
 
 
 if __name__ == '__main__':

@@ -1,0 +1,240 @@
+/*
+  Quantities: the largest, smallest or mean value of a field over a group. Displacements are those of nodes, stresses
+  the cells' means: of a group of facets those of the cells that they bound, of points and lines those of the cells
+  around them. A mean is the integral over the cells or facets of the group over their volume or area; of points, plain.
+*/
+#include <hycofields.h>
+#include <hycokinematics.h>
+#include <hycoquantities.h>
+#include <string.h>
+
+enum { U, UX, UY, UZ, XX, YY, ZZ, XY, YZ, XZ, RR, TT, MISES, FIRST };
+
+typedef struct {
+  PetscReal most, least, sum, weight;
+} Sum;
+
+/* What a quantity is of: cells (all, or of group g), facets of group g, or its nodes. */
+typedef struct {
+  PetscInt group, dim;
+  PetscInt body; /* that has the group's name; -1: none */
+} Place;
+
+static PetscErrorCode FindPlace(HycoScene scene, HycoMesh m, const HycoQuantity *q, Place *p)
+{
+  PetscFunctionBegin;
+  p->group = p->body = -1;
+  p->dim = m->dim;
+  if (!q->group) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoMeshFindGroup(m, "output", q->group, &p->group));
+  p->dim = m->group_dim[p->group];
+  for (PetscInt b = 0; b < scene->n_bodies; b++) {
+    if (strcmp(scene->body[b].name, q->group) == 0) p->body = b;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* in[n_cells]: the cells of a place that is made of cells. */
+static void MarkCells(HycoMesh m, const Place *p, PetscBool in[])
+{
+  for (PetscInt e = 0; e < m->n_cells; e++) in[e] = (PetscBool)(p->group < 0 || m->cell_body[e] == p->body);
+  for (PetscInt k = p->group < 0 ? 0 : m->group_cell_start[p->group];
+       p->group >= 0 && k < m->group_cell_start[p->group + 1]; k++)
+    in[m->group_cell[k]] = PETSC_TRUE;
+}
+
+/* in[n_cells]: the cells around the nodes of a place. */
+static PetscErrorCode MarkAround(HycoMesh m, const Place *p, PetscBool in[])
+{
+  PetscBool *node;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_nodes, &node));
+  for (PetscInt k = m->group_start[p->group]; k < m->group_start[p->group + 1]; k++)
+    node[m->group_node[k]] = PETSC_TRUE;
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++)
+    in[k / m->nv] = (PetscBool)((k % m->nv && in[k / m->nv]) || node[m->cells[k]]);
+  PetscCall(PetscFree(node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh m, PetscBool needed[])
+{
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_cells, &in));
+  for (PetscInt e = 0; e < m->n_cells; e++) needed[e] = PETSC_FALSE;
+  for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    Place p;
+
+    PetscCall(FindPlace(scene, m, &scene->quantity[k], &p));
+    PetscCall(PetscArrayzero(in, m->n_cells));
+    if (p.dim == m->dim)
+      MarkCells(m, &p, in);
+    else if (p.dim < m->dim - 1)
+      PetscCall(MarkAround(m, &p, in));
+    for (PetscInt f = 0; f < m->n_facets && p.dim == m->dim - 1; f++) {
+      if (m->facet_group[f] == p.group && m->facet_cell[f] >= 0) in[m->facet_cell[f]] = PETSC_TRUE;
+    }
+    for (PetscInt e = 0; e < m->n_cells; e++) needed[e] = (PetscBool)(needed[e] || in[e]);
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal OfNode(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt node)
+{
+  PetscReal sum = 0;
+
+  if (field != U) return u[node * fe->dim + field - UX];
+  for (PetscInt c = 0; c < fe->dim; c++) sum += u[node * fe->dim + c] * u[node * fe->dim + c];
+  return PetscSqrtReal(sum);
+}
+
+/* Of a cell; r and t: about z in 2D and 3D, of a body of revolution about its axis. */
+static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell, PetscReal *value)
+{
+  static const PetscInt place[6] = {0, 3, 5, 1, 4, 2}; /* of xx, yy, zz, xy, yz, xz in a tensor */
+  HycoMesh m = fe->mesh;
+  PetscReal s[6], x = 0, y = 0, r, mises, principal[3];
+
+  PetscFunctionBegin;
+  HycoTensor6(1, fe->n_sigma, sigma + cell * fe->n_sigma, s);
+  if (field >= XX && field <= XZ) *value = s[place[field - XX]];
+  if (field == RR || field == TT) {
+    for (PetscInt v = 0; v < m->nv; v++) {
+      x += fe->X[3 * m->cells[cell * m->nv + v]];
+      y += fe->X[3 * m->cells[cell * m->nv + v] + 1];
+    }
+    r = PetscSqrtReal(x * x + y * y);
+    if (r > 0) x /= r, y /= r;
+    if (field == RR) *value = x * x * s[0] + y * y * s[3] + 2 * x * y * s[1];
+    if (field == TT) *value = y * y * s[0] + x * x * s[3] - 2 * x * y * s[1];
+    if (fe->formulation == HYCO_AXISYMMETRIC) *value = field == RR ? s[0] : s[5];
+  }
+  if (field >= MISES) {
+    PetscCall(HycoStressInvariants(1, fe->dim, s, &mises, principal));
+    *value = field == MISES ? mises : principal[field - FIRST];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void Extend(Sum *s, PetscReal value)
+{
+  s->most = PetscMax(s->most, value);
+  s->least = PetscMin(s->least, value);
+}
+
+/* A cell or facet with these nodes and the value of the cell (stress), or those of its nodes (NULL). */
+static PetscErrorCode AddEntity(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt cell, PetscInt facet,
+                                const PetscReal *value, Sum *s)
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = facet < 0 ? HycoElementGet(m->type) : HycoElementGetFacet(m->type);
+  const PetscInt *node = facet < 0 ? m->cells + cell * m->nv : m->facets + facet * m->nf;
+
+  PetscFunctionBegin;
+  if (value) Extend(s, *value);
+  for (PetscInt a = 0; a < el->nv && !value; a++) Extend(s, OfNode(fe, field, u, node[a]));
+  if (HycoMeshOwned(m, node[0]) < 0) PetscFunctionReturn(PETSC_SUCCESS); /* another's to add */
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal g[8][3], n[3], w = 0, here = value ? *value : 0;
+
+    if (facet < 0) {
+      PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    } else {
+      PetscCall(HycoFacetNormal(fe, el, facet, q, n));
+      for (PetscInt c = 0; c < 3; c++) w += n[c] * n[c];
+      w = PetscSqrtReal(w);
+    }
+    for (PetscInt a = 0; a < el->nv && !value; a++) here += el->N[q][a] * OfNode(fe, field, u, node[a]);
+    s->sum += w * here;
+    s->weight += w;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A group of points or lines: its nodes, or the cells around them. */
+static PetscErrorCode AddNodes(HycoFE fe, PetscInt field, const PetscReal u[], const PetscReal sigma[], const Place *p,
+                               Sum *s)
+{
+  HycoMesh m = fe->mesh;
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  for (PetscInt k = m->group_start[p->group]; field < XX && k < m->group_start[p->group + 1]; k++) {
+    const PetscReal value = OfNode(fe, field, u, m->group_node[k]);
+
+    Extend(s, value);
+    if (HycoMeshOwned(m, m->group_node[k]) < 0) continue;
+    s->sum += value;
+    s->weight += 1;
+  }
+  if (field < XX) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(m->n_cells, &in));
+  PetscCall(MarkAround(m, p, in));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    PetscReal value = 0;
+
+    if (!in[e]) continue;
+    PetscCall(OfCell(fe, field, sigma, e, &value));
+    PetscCall(AddEntity(fe, field, u, e, -1, &value, s));
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[], Sum *s)
+{
+  HycoMesh m = fe->mesh;
+  PetscBool *in;
+  Place p;
+
+  PetscFunctionBegin;
+  HycoCheck(q->field < UX || q->field > UZ || q->field - UX < fe->dim,
+            "output_%s: the mesh has %d space dimension%s, and no %s", q->name, (int)fe->dim, fe->dim == 1 ? "" : "s",
+            HycoQuantityFields[q->field]);
+  PetscCall(FindPlace(fe->scene, m, q, &p));
+  if (p.dim < m->dim - 1) {
+    PetscCall(AddNodes(fe, q->field, u, sigma, &p, s));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscCalloc1(m->n_cells, &in));
+  if (p.dim == m->dim) MarkCells(m, &p, in);
+  for (PetscInt k = 0; k < m->n_cells + m->n_facets; k++) {
+    const PetscInt facet = k < m->n_cells ? -1 : k - m->n_cells, cell = facet < 0 ? k : m->facet_cell[facet];
+    PetscReal value = 0;
+
+    if (facet < 0 ? !in[k] : p.dim == m->dim || m->facet_group[facet] != p.group || cell < 0) continue;
+    if (q->field >= XX) PetscCall(OfCell(fe, q->field, sigma, cell, &value));
+    PetscCall(AddEntity(fe, q->field, u, cell, facet, q->field >= XX ? &value : NULL, s));
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u[], const PetscReal sigma[],
+                                     PetscReal value[])
+{
+  const HycoScene scene = fe->scene;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    const HycoQuantity *q = &scene->quantity[k];
+    Sum s = {-PETSC_INFINITY, PETSC_INFINITY, 0, 0};
+    PetscReal ends[2], sums[2];
+
+    HycoOnEach(comm, Measure(fe, q, u, sigma, &s));
+    ends[0] = s.most;
+    ends[1] = -s.least;
+    sums[0] = s.sum;
+    sums[1] = s.weight;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ends, 2, MPIU_REAL, MPI_MAX, comm));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, comm));
+    HycoCheck(sums[1] > 0, "output_%s: the group %s has no cell, facet or node", q->name,
+              q->group ? q->group : "of all cells");
+    value[k] = q->kind == HYCO_QUANTITY_MAX ? ends[0] : q->kind == HYCO_QUANTITY_MIN ? -ends[1] : sums[0] / sums[1];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,95 @@
+/*
+  The scene's quantities of a prediction: displacements and stresses of the cells that they need, wherever these are,
+  from the modes there, U = r(u0) + V gamma (30).
+*/
+#include <hycoquantities.h>
+#include <hycoromimpl.h>
+
+struct _n_HycoProbe {
+  HycoMesh mesh; /* the cells */
+  HycoFE fe;
+  PetscReal *V, *u, *sigma; /* n_dof x l; n_dof; n_cells x n_sigma */
+  PetscInt *fe_at;          /* by full-order displacement: its place in u; -1: none */
+};
+
+PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
+{
+  PetscFunctionBegin;
+  if (!*probe) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFEDestroy(&(*probe)->fe));
+  PetscCall(HycoMeshDestroy(&(*probe)->mesh));
+  HycoFreeAll(&(*probe)->V, &(*probe)->u, &(*probe)->sigma, &(*probe)->fe_at);
+  PetscCall(PetscFree(*probe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Extract(HycoROM m, HycoProbe p)
+{
+  PetscBool *needed;
+  PetscInt *keep, n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(m->whole->n_cells, &needed, m->whole->n_cells, &keep));
+  PetscCall(HycoQuantitiesMarkCells(m->scene, m->whole, needed));
+  for (PetscInt e = 0; e < m->whole->n_cells; e++) {
+    if (needed[e]) keep[n++] = e;
+  }
+  PetscCall(HycoMeshExtract(m->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
+  PetscCall(PetscFree2(needed, keep));
+  PetscCall(HycoMeshSetNodeBodies(m->scene, p->mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Fill(HycoROM m, HycoProbe p)
+{
+  const PetscInt dim = m->whole->dim;
+  PetscInt *place;
+
+  PetscFunctionBegin;
+  PetscCall(Extract(m, p));
+  PetscCall(HycoFECreate(m->scene, p->mesh, &p->fe));
+  PetscCall(PetscMalloc1(p->fe->n_dof * m->l, &p->V));
+  PetscCall(PetscMalloc1(p->fe->n_dof, &p->u));
+  PetscCall(PetscMalloc1(p->mesh->n_cells * p->fe->n_sigma, &p->sigma));
+  PetscCall(PetscMalloc1(m->n_fe, &p->fe_at));
+  PetscCall(PetscMalloc1(m->whole->n_nodes, &place));
+  for (PetscInt i = 0; i < m->whole->n_nodes; i++) place[i] = -1;
+  for (PetscInt i = 0; i < p->mesh->n_nodes; i++) place[p->mesh->node_whole[i]] = i;
+  for (PetscInt k = 0; k < p->fe->n_dof; k++)
+    PetscCall(PetscArraycpy(p->V + k * m->l, m->V_whole + (p->mesh->node_whole[k / dim] * dim + k % dim) * m->l, m->l));
+  for (PetscInt k = 0; k < m->n_fe; k++) {
+    const PetscInt i = place[m->mesh->node_whole[m->fe_dof[k] / dim]];
+
+    p->fe_at[k] = i < 0 ? -1 : i * dim + m->fe_dof[k] % dim;
+  }
+  PetscCall(PetscFree(place));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMMeasureQuantities(HycoROM m, PetscReal value[])
+{
+  HycoProbe p;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!m->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->probe) {
+    PetscCall(HycoROMLoadWhole(m));
+    PetscCall(PetscNew(&m->probe));
+    ierr = Fill(m, m->probe);
+    if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
+    PetscCall(ierr);
+  }
+  p = m->probe;
+  PetscCall(HycoFESetParameters(p->fe, m->fe->mu));
+  for (PetscInt k = 0; k < p->fe->n_dof; k++) {
+    p->u[k] = p->fe->u0[k];
+    for (PetscInt j = 0; j < m->l; j++) p->u[k] += p->V[k * m->l + j] * m->gamma[j];
+  }
+  for (PetscInt k = 0; k < m->n_fe; k++) {
+    if (p->fe_at[k] >= 0) p->u[p->fe_at[k]] = m->U[m->fe_dof[k]];
+  }
+  PetscCall(HycoFEStress(p->fe, p->u, p->sigma));
+  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
