@@ -52,17 +52,7 @@ PetscErrorCode HycoComparisonDestroy(HycoComparison *c)
 PetscErrorCode HycoComparisonBring(HycoComparison *c)
 {
   PetscFunctionBegin;
-  for (int k = 0; k < 2; k++) {
-    PetscMPIInt width;
-    MPI_Datatype unit;
-
-    PetscCall(PetscMPIIntCast(c->width[k], &width));
-    PetscCallMPI(MPI_Type_contiguous(width, MPIU_REAL, &unit));
-    PetscCallMPI(MPI_Type_commit(&unit));
-    PetscCall(PetscSFBcastBegin(c->sf[k], unit, c->value[k], c->rid[k], MPI_REPLACE));
-    PetscCall(PetscSFBcastEnd(c->sf[k], unit, c->value[k], c->rid[k], MPI_REPLACE));
-    PetscCallMPI(MPI_Type_free(&unit));
-  }
+  for (int k = 0; k < 2; k++) PetscCall(HycoSFBcast(c->sf[k], MPIU_REAL, c->width[k], c->value[k], c->rid[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

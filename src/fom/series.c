@@ -130,7 +130,7 @@ static PetscErrorCode WriteMesh(HycoFOM f, HycoSeries s)
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(f, &rows));
   HycoOnRoot(HycoComm(f), HycoFieldsWriteHead(s->h, f->part, f->scene, f->path->mu, NULL));
-  PetscCall(HycoFieldsWriteMesh(s->h, rows, f->part, f->fe->X));
+  PetscCall(HycoFieldsWriteMesh(s->h, "mesh", rows, f->part, f->fe->X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

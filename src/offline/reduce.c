@@ -170,8 +170,7 @@ PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, Pe
   for (PetscInt k = 0; k < n_columns; k++) {
     PetscReal *column = *rows + (size_t)k * (size_t)n_rows;
 
-    PetscCall(PetscSFBcastBegin(sf, MPIU_REAL, s + (size_t)k * (size_t)lda, column, MPI_REPLACE));
-    PetscCall(PetscSFBcastEnd(sf, MPIU_REAL, s + (size_t)k * (size_t)lda, column, MPI_REPLACE));
+    PetscCall(HycoSFBcast(sf, MPIU_REAL, 1, s + (size_t)k * (size_t)lda, column));
   }
   PetscCall(MatDenseRestoreArrayRead(S, &s));
   PetscCall(PetscSFDestroy(&sf));
