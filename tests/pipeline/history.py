@@ -115,7 +115,7 @@ class History(Case):
         for _ in range(30):
             run.stdout.readline()
         run.send_signal(signal.SIGKILL)
-        run.wait()
+        self.assertEqual(run.wait(), -signal.SIGKILL, 'it had ended before')
         run.stdout.close()
         self.assertFalse(os.path.exists(self.path('parts.h5')))
         begin = time.time()
@@ -130,14 +130,14 @@ class History(Case):
 
     def test_resume_is_exact(self):
         """On as many ranks the rest is equal to 1e-12."""
-        args = ['-scene', RING, '-mu', '0.01,1', '-history_times', '0,0.5,1,1.5,2,3,4']
+        args = ['-scene', RING, '-mu', '0.01,1', '-history_times', '0,0.5,1,1.5,2,3,4', '-hyco_substeps', '8']
         whole = self.hyco('solve', *args)
         keep = ['-hyco_checkpoint', self.path('e.h5')]
         run = subprocess.Popen([HYCO, 'solve', *args, *keep], stdout=subprocess.PIPE, text=True)
         for _ in range(3):
             run.stdout.readline()
         run.send_signal(signal.SIGKILL)
-        run.wait()
+        self.assertEqual(run.wait(), -signal.SIGKILL, 'it had ended before')
         run.stdout.close()
         rest = self.hyco('solve', *args, *keep, '-hyco_resume')
         for column in ('total_contact_force', 'inelastic', 'mises', 'stored', 'dissipated'):

@@ -8,13 +8,14 @@ p = 50 - 34.2891470 exp(-0.146510938 s) - 15.7108530 exp(-0.225014142 s).
 """
 import math
 import os
+import subprocess
 import unittest
 
 import numpy as np
 
 from common import PELLET
 from grids import Grid
-from verify import Verify
+from verify import Verify, order
 
 SCENE = """
 scene: {{title: ring on a core, mesh: mesh.msh}}
@@ -85,10 +86,18 @@ class Paths(Verify):
         return self.solved_path(scene, LENGTH, *args)
 
     def pellet_path(self, mesh, steps, outside, gap, end):
-        """In 3D, on a mesh of the pellet with all z held."""
+        """In 3D, on a mesh of the pellet with all z held, where every layer of cells bears the same."""
         with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
-            f.write(PELLET_SCENE.format(mesh=os.path.join(PELLET, mesh + '.msh'), outside=outside, gap=gap, times=equal(steps, end)))
+            f.write(PELLET_SCENE.format(mesh=mesh, outside=outside, gap=gap, times=equal(steps, end)))
         return self.solved_path(self.folder, LENGTH * 6.75, timeout=1500)
+
+    def two_layers(self, mesh):
+        """The pellet's mesh of this name with two layers of cells."""
+        path = self.path(mesh + '.msh')
+        m, nc = {'A': (4, 2), 'B': (8, 4), 'C': (12, 6)}[mesh]
+        subprocess.run(['gmsh', '-3', os.path.join(PELLET, 'pellet.geo'), '-format', 'msh41', '-o', path, '-v', '1', *(
+            str(w) for name, n in (('m', m), ('nr', m), ('nc', nc), ('nzl', 1), ('nzh', 1)) for w in ('-setnumber', name, n))], check=True)
+        return path
 
     def judge_order(self, title, paths):
         """Paths of k, 2 k and 4 k steps: the slope of their differences at the times of the first."""
@@ -124,13 +133,18 @@ class Ring(Paths):
         self.judge_closing('closing', self.path_of(8, 1280, 50, 0.02, 6), (3, 4, 6))
 
     def test_pellet(self):
-        """The same in 3D; the finest mesh: ring_long.py."""
-        self.judge_order('pellet A, z held', [self.pellet_path('A', k, 0, -0.01, 2)[1] for k in (10, 20, 40)])
+        """The same in 3D; finer steps, and the whole of mesh C: ring_long.py."""
         for mesh, steps, end, bound in (('A', 100, 2, 0.4), ('B', 10, 0.25, 0.2)):
-            t, p, _ = self.pellet_path(mesh, steps, 0, -0.01, end)
+            t, p, _ = self.pellet_path(os.path.join(PELLET, mesh + '.msh'), steps, 0, -0.01, end)
             for k in (0, steps // 2, steps):
                 self.row(f'pellet {mesh}, z held: p at t = {t[k]:g}', p[k], relaxing(t[k]), bound)
-        self.judge_closing('pellet A, z held, closing', self.pellet_path('A', 100, 50, 0.02, 4), (4,), 2, 2)
+
+    def test_pellet_closing(self):
+        begin = [self.judge_closing(f'pellet {mesh}, z held, closing', self.pellet_path(self.two_layers(mesh), steps, 50, 0.02, end), at,
+                                    off, bound)
+                 for mesh, steps, end, at, off, bound in (('A', 80, 2, (), 2, 0), ('B', 80, 2, (), 0.5, 0), ('C', 240, 12, (12,), 0.5, 0.3))]
+        self.row('pellet A, B, C, z held: order of the time of closing', order(1 / np.array([2, 4, 6]), abs(np.array(begin) - CLOSES)), 2, 20)
+        self.judge_order('pellet A, z held, closing', [self.pellet_path(self.path('A.msh'), k, 50, 0.02, 8)[1] for k in (20, 40, 80)])
 
     def test_surfaces_that_do_not_match(self):
         """The core has 13 cells where the ring has 16; the pressure is the mean."""
