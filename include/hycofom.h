@@ -68,15 +68,17 @@ typedef struct {
 
 /* The path of the last solve of a scene with a history. */
 typedef struct {
-  PetscInt n;            /* times that were reached */
-  const HycoStep *step;  /* n, borrowed until the next solve; if the path did not end, the last is no listed time */
-  PetscBool ended;       /* the last listed time is reached */
-  PetscReal t;           /* the last accepted time */
-  const char *why;       /* if not ended: what the last attempt said. Borrowed */
-  const char *newton;    /* "tangent" or "elastic" */
-  PetscReal factor_cost; /* solves that a factor costs, by the rule that -hyco_newton auto goes by */
-  PetscInt n_orders;     /* steps whose iterations told an order of convergence */
-  PetscReal order;       /* the median of these; of the tangent 2 */
+  PetscInt n;             /* times that were reached */
+  const HycoStep *step;   /* n, borrowed until the next solve; if the path did not end, the last is no listed time */
+  PetscBool ended;        /* the last listed time is reached */
+  PetscReal t;            /* the last accepted time */
+  const char *why;        /* if not ended: what the last attempt said. Borrowed */
+  const char *newton;     /* "tangent" or "elastic" */
+  PetscReal factor_cost;  /* solves that a factor costs, by the rule that -hyco_newton auto goes by */
+  PetscInt n_orders;      /* steps whose iterations told an order of convergence */
+  PetscReal order;        /* the median of these; of the tangent 2 */
+  PetscInt n_taken;       /* accepted steps of time, with the first time */
+  const PetscReal *taken; /* where they end. Borrowed; a path that was resumed has those since */
 } HycoHistory;
 
 /* Called at each listed time, on every rank; HycoFOMGetSolution() then gives the solution there. */

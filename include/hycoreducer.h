@@ -22,12 +22,32 @@ typedef enum {
   HYCO_ERROR_SIGMA_11,
   HYCO_ERROR_LAMBDA,
   HYCO_ERROR_LAMBDA_RID,
+  HYCO_ERROR_INELASTIC,
   HYCO_N_ERRORS
 } HycoErrorKind;                           /* of HycoErrors, those without H1 */
 extern const char *const HycoErrorKinds[]; /* their words: u, u_rid, sigma, ...; NULL ends */
 
-/* Errors over a set of points, as fractions. Of contact forces (HYCO_ERROR_LAMBDA and _RID), those smaller than a tenth
-   of the largest of the set count as that tenth. PETSC_INFINITY where a solve did not converge. */
+/* Errors of a path as HycoROMComparePath() has them, by kind. */
+typedef struct {
+  PetscInt n, n_full;             /* listed times that both paths reached, and the full-order one */
+  PetscReal worst[HYCO_N_ERRORS]; /* of these times */
+  PetscReal end[HYCO_N_ERRORS];   /* of the last */
+  PetscInt at[HYCO_N_ERRORS];     /* where the worst is */
+  PetscReal force, force_rid;     /* the largest contact forces of the full-order path: 2-norm, all and the RID's */
+} HycoPathErrors;
+
+/*
+  Solves the full-order path at mu (length n) and the model's in the same steps of time, and compares them at the listed
+  times: the 2-norm or max norm of what is missed over that of the full order; where this is below a tenth of the path's
+  largest, over that tenth, for before contact closes there is no force to be relative to. x/0 is PETSC_INFINITY.
+  Collective on the full-order model's communicator; model on its rank 0 (NULL elsewhere), errors filled there. Fails
+  where the full-order path does not reach its end.
+*/
+PetscErrorCode HycoROMComparePath(HycoROM model, HycoFOM fom, PetscInt n, const PetscReal mu[], HycoPathErrors *errors);
+
+/* Errors over a set of points, as fractions; of a path its worst listed time (HycoROMComparePaths()). Of contact forces
+   (HYCO_ERROR_LAMBDA and _RID), those smaller than a tenth of the largest of the set count as that tenth.
+   PETSC_INFINITY where a solve did not converge. */
 typedef struct {
   PetscInt n, not_converged;
   PetscReal largest[HYCO_N_ERRORS], median[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];

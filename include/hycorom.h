@@ -42,6 +42,9 @@ typedef struct {
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
   PetscReal quantity[HYCO_MAX_QUANTITIES];                         /* those of HycoSceneGetQuantities() */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
+  PetscReal path_force, path_mises,
+      path_inelastic; /* of a path the largest of its listed times: total contact force, von
+                         Mises stress and accumulated inelastic strain of the RID; else 0 */
   /* An upper estimate of the relative errors of u (whole mesh, 2-norm), of the stress (RID, 2-norm of the cells'
      values) and of all contact forces (2-norm; a force below a tenth of the largest held out in training counts as that
      tenth), calibrated at training on held-out solutions; < 0: the model has none, or the solve did not converge. */
@@ -108,6 +111,19 @@ PetscErrorCode HycoROMGetFallback(HycoROM model, PetscBool *full_order, PetscBoo
 PetscErrorCode HycoROMSetReconstruct(HycoROM model, PetscBool reconstruct);
 /* Called after each iteration of the active set. */
 PetscErrorCode HycoROMSetMonitor(HycoROM model, HycoMonitor monitor, void *ctx);
+/*
+  A model of paths, of a scene with a history: HycoROMPredict() solves the path at mu, in steps of its own choice by the
+  rules of the full order (docs/history.md). HycoROMGetHistory() has the listed times that it reached (n is 0 for other
+  models); what is asked for afterwards is of the last of them, or of that which HycoROMSetStep() names, 0 .. n - 1.
+  HycoROMSetSteps() gives the times of the steps instead, as a full-order path took them (HycoHistory.taken): they are
+  cut where they fail, and only there. NULL: its own choice. Borrowed, for all predictions to come. Not collective.
+*/
+PetscErrorCode HycoROMGetHistory(HycoROM model, HycoHistory *history);
+PetscErrorCode HycoROMSetStep(HycoROM model, PetscInt k);
+PetscErrorCode HycoROMSetSteps(HycoROM model, PetscInt n, const PetscReal t[]);
+/* Accumulated inelastic strain of the RID's cells (mean), at that time. Borrowed until the next prediction. */
+PetscErrorCode HycoROMGetInelastic(HycoROM model, PetscInt *n_cells, const PetscReal *inelastic[]);
+
 /* What the last prediction amounts to, its errors estimated. Fails before the first. */
 PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);
 /* Strain energy of the last prediction on the RID's cells; it may cost as much as the prediction. */
@@ -124,7 +140,8 @@ PetscErrorCode HycoROMGetLambda(HycoROM model, PetscInt *n_contacts, const Petsc
 /* Displacement of the whole mesh, n_nodes x dim in the mesh file's order: reads the whole-mesh part on first use.
  * Borrowed. */
 PetscErrorCode HycoROMGetWholeU(HycoROM model, PetscInt *n_nodes, const PetscReal *U[]);
-/* Writes the last prediction on the whole mesh to `path` (.xdmf) and the .h5 beside it. */
+/* Writes the last prediction on the whole mesh to `path` (.xdmf) and the .h5 beside it. Of a path all of its listed
+   times, as HycoFOMSetSeries() has them: the laws are replayed outside the RID, which fails where one has no answer. */
 PetscErrorCode HycoROMWrite(HycoROM model, const char path[]);
 /*
   Errors of the last prediction against the last full-order solution at the same parameters; relative, as fractions.

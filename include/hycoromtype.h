@@ -29,6 +29,7 @@ typedef struct {
   PetscBool constrains;  /* the gap of each contact of A_lambda is held nonnegative */
   PetscBool forces;      /* it gives the forces of all contacts as those of the full order: HycoFOMSolveForces() */
   PetscBool force_basis; /* it takes -hyco_dual nnmf and snapshots */
+  PetscBool history;     /* its solve has the paths of scenes with a history */
 } HycoROMTraits;
 
 /* The system on the RID before reduction, for the indicator (43). Borrowed. */

@@ -5,13 +5,18 @@
 #include <hycofomimpl.h>
 #include <hycoromimpl.h>
 
+/* U, sigma, and of a history the inelastic strain. */
+#define HYCO_COMPARED 3
+
 typedef struct {
-  HycoFOM f;                         /* borrowed: the mesh, at the parameters */
-  PetscInt n[2], first[2], width[2]; /* this rank's nodes and cells in the file's order, values of each */
-  PetscReal *value[2], *rid[2];      /* the solution, U and sigma: there, and on the mesh of this rank's model */
-  PetscSF sf[2];                     /* from those to these */
-  PetscInt l, n_fe, *fe_dof;         /* the model's modes, and full-order unknowns by the whole mesh */
-  PetscReal *coefficient, *U;        /* gamma and these; the predicted displacement in the rows */
+  HycoFOM f; /* borrowed: the mesh, at the parameters */
+  PetscInt n_fields;
+  PetscInt n[HYCO_COMPARED], first[HYCO_COMPARED];      /* this rank's nodes and cells in the file's order */
+  PetscInt width[HYCO_COMPARED];                        /* values of each */
+  PetscReal *value[HYCO_COMPARED], *rid[HYCO_COMPARED]; /* a solution there, and on the mesh of this rank's model */
+  PetscSF sf[HYCO_COMPARED];                            /* from those to these */
+  PetscInt l, n_fe, *fe_dof;  /* the model's modes, and full-order unknowns by the whole mesh */
+  PetscReal *coefficient, *U; /* gamma and these; the predicted displacement in the rows */
 } HycoComparison;
 
 /* For a model that rank 0 has and others may have (NULL: not here). Collective, as all below. */
@@ -22,8 +27,8 @@ PetscErrorCode HycoComparisonBring(HycoComparison *comparison);
 /* Makes U of the last prediction that rank `of` has; V: the modes' rows of this rank, column major. */
 PetscErrorCode HycoComparisonPredict(HycoComparison *comparison, HycoROM model, PetscMPIInt of, const PetscReal V[],
                                      PetscInt lda);
-/* The relative error of U, 2-norm. */
-PetscErrorCode HycoComparisonError(const HycoComparison *comparison, PetscReal *error);
+/* The squares of what U misses, and of the solution's displacement, 2-norm. */
+PetscErrorCode HycoComparisonSquares(const HycoComparison *comparison, PetscReal square[2]);
 
 /* Norms on the whole mesh (norms.c). */
 typedef struct _n_HycoNorms *HycoNorms;

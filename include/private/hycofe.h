@@ -60,6 +60,8 @@ struct _n_HycoFE {
   PetscReal *X;        /* n_nodes x 3, moved nodes */
   PetscBool *mirrored; /* by body: its map is a mirror image */
   PetscInt place;      /* of the nodes: a number that no other place has, on this process */
+  PetscReal *kept;     /* by point, nv x 3 gradients and the weight at kept_place: HycoFEKeepGradients(); or NULL */
+  PetscInt kept_place;
   /* supports at mu */
   PetscBool *fixed; /* n_dof */
   PetscReal *u0;    /* n_dof, prescribed displacement, 0 where free */
@@ -85,6 +87,9 @@ static inline PetscInt HycoFEUnknowns(HycoFE fe)
 
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
+/* For who comes to the same nodes again and again, as a path does: the shape functions' gradients are kept until the
+   nodes move. */
+PetscErrorCode HycoFEKeepGradients(HycoFE fe);
 /* Puts the nodes where the file has them; for geometry alone. */
 PetscErrorCode HycoFESetDrawn(HycoFE fe);
 /* Fails for a cell without volume as drawn. */

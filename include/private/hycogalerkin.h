@@ -10,6 +10,7 @@
 typedef struct _n_HycoReduced *HycoReduced;
 typedef struct _n_HycoLoads *HycoLoads;
 typedef struct _n_HycoTable *HycoTable;
+typedef struct _n_HycoGalerkinPath *HycoGalerkinPath;
 
 /* The sets of (21)-(22), (32)-(37): unknowns of the model's own mesh without the fixed ones, and contacts. */
 typedef struct {
@@ -18,6 +19,13 @@ typedef struct {
   IS is_Ac, is_Ac_all; /* A_c: of A, those that these act on; A'_c: with those on the interface. From
                     HycoGalerkinContactMatrix() */
 } HycoIndexSets;
+
+/* What is looked at along a path: the sign of the tangent's determinant and its smallest singular value over the
+   largest, by listed time; 0: not looked at. */
+typedef struct {
+  PetscInt stride; /* listed times from one look to the next; 0: none */
+  PetscReal *sign, *ratio;
+} HycoWatch;
 
 typedef struct _n_HycoGalerkin {
   /* the type's own: Br and Btr, and Dr, from own_rows; Lambda from L. NULL: each contact of A_lambda has a multiplier
@@ -30,11 +38,13 @@ typedef struct _n_HycoGalerkin {
   HycoTable table; /* Kr's entries as polynomials of the parameters; NULL: assembled */
   HycoScan scan;
   /* online */
-  PetscInt n_free;     /* modes that are unknowns */
-  PetscInt *fe_at;     /* by dof of mesh: place in fe_dof, or -1 */
-  PetscReal *Vp;       /* V, zero on full-order and fixed unknowns */
-  HycoReduced reduced; /* how K goes into Kr, and what of it stays; made by the first */
-  HycoLoads loads;     /* solutions without contact that loads share; NULL: a dense Kr, or no such parameter */
+  PetscInt n_free;       /* modes that are unknowns */
+  PetscInt *fe_at;       /* by dof of mesh: place in fe_dof, or -1 */
+  PetscReal *Vp;         /* V, zero on full-order and fixed unknowns */
+  HycoReduced reduced;   /* how K goes into Kr, and what of it stays; made by the first */
+  HycoLoads loads;       /* solutions without contact that loads share; NULL: a dense Kr, or no such parameter */
+  HycoGalerkinPath path; /* of a scene with a history */
+  HycoWatch watch;
   HycoIndexSets sets;
   Mat K, Kr, Br, Btr;
   Vec F, Fr, Dr, x, L;
@@ -76,12 +86,22 @@ PetscErrorCode HycoReducedCreateSparse(HycoROM model);
 PetscErrorCode HycoReducedFillStiffness(HycoROM model);
 PetscErrorCode HycoReducedFillContact(HycoROM model);
 PetscErrorCode HycoReducedFillVectors(HycoROM model);
+/* Vbar[A,:]^T F[A] of forces F on fe's unknowns. */
+PetscErrorCode HycoReducedTest(HycoROM model, const PetscScalar F[], Vec Fr);
 PetscErrorCode HycoReducedDestroy(HycoReduced *reduced);
 /* Kr's entries in the order in which it has them, borrowed while it lives; the row of each. */
 PetscErrorCode HycoReducedEntries(HycoROM model, PetscInt *n, PetscScalar *a[]);
 PetscErrorCode HycoReducedRows(HycoROM model, PetscInt row[]);
 /* galerkin->reduced, where a table fills Kr. */
 PetscErrorCode HycoReducedPrepare(HycoROM model);
+
+/* The path of a scene with a history (galerkin_path.c): made by setup; solved; NULL-safe. HycoGalerkinUnpack(): gamma,
+   U and Lambda from x and L. HycoGalerkinExpand(): U of x alone. */
+PetscErrorCode HycoGalerkinPathCreate(HycoROM model);
+PetscErrorCode HycoGalerkinPathSolve(HycoROM model, const PetscReal mu[]);
+PetscErrorCode HycoGalerkinPathDestroy(HycoGalerkinPath *path);
+PetscErrorCode HycoGalerkinUnpack(HycoROM model);
+PetscErrorCode HycoGalerkinExpand(HycoROM model);
 
 /* What loads share while the stiffness stays (loads.c). HycoLoadsCreate() needs Fr and x; HycoLoadsForget(): the
    stiffness has changed (NULL-safe); HycoLoadsSetFree() gives the solver the solution without contact at mu, where the

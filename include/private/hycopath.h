@@ -155,6 +155,24 @@ PetscErrorCode HycoSeriesAdd(HycoFOM fom);
 PetscErrorCode HycoSeriesRestore(HycoFOM fom);
 PetscErrorCode HycoSeriesEnd(HycoFOM fom);
 PetscErrorCode HycoSeriesDestroy(HycoSeries *series);
+/* What a series shows of a time, whoever has it: a HycoFE of each rank with the state of its cells, u on it, and on
+   rank 0 the contacts' surface with displacements and forces. Borrowed. */
+typedef struct {
+  MPI_Comm comm;
+  HycoFE fe;
+  HycoFEState state;
+  HycoFE fe_surface;
+  HycoPairs *pairs;
+  PetscInt n_nodes, n_cells, n_contacts; /* of the whole mesh */
+  const HycoFileOrder *rows;             /* NULL on one rank */
+  const PetscReal *u, *u_surface, *lambda, *mu;
+  PetscReal t;
+} HycoSeriesSource;
+/* To PATH.xdmf and the .h5 beside it: created, the mesh written, a time added, put in its place. Collective. */
+PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], HycoSeries *series);
+PetscErrorCode HycoSeriesOpen(HycoSeries series, const HycoSeriesSource *from);
+PetscErrorCode HycoSeriesAddTime(HycoSeries series, const HycoSeriesSource *from);
+PetscErrorCode HycoSeriesClose(HycoSeries series);
 /* Of a path, in place of the linear identity's: energies. */
 void HycoPathSummary(HycoFOM fom, HycoSummary *summary);
 

@@ -7,7 +7,14 @@
 #include <hycoreducer.h>
 #include <slepcsvd.h>
 
-enum { HYCO_SEED_DISPLACEMENT, HYCO_SEED_STRESS, HYCO_SEED_FORCE, HYCO_SEED_DUAL, HYCO_N_SEEDS };
+enum {
+  HYCO_SEED_DISPLACEMENT,
+  HYCO_SEED_STRESS,
+  HYCO_SEED_FORCE,
+  HYCO_SEED_DUAL,
+  HYCO_SEED_INELASTIC, /* of scenes with a history */
+  HYCO_N_SEEDS
+};
 
 /* The basis of one field of the snapshots, which a recipe takes the first modes of. Every rank. */
 typedef struct {
@@ -88,14 +95,20 @@ struct _p_HycoReducer {
   PetscInt *contact_row;  /* by node of the contacts' surfaces: its place in U_contact, or -1 */
   PetscReal *U_contact;   /* the rows of the contacts' nodes, column major */
   PetscInt n_contact_nodes;
-  PetscReal *Lambda; /* n_contacts x n_s column major */
-  PetscReal *VtU;    /* l x n_s column major: V^T of the snapshots less their lifting */
-  PetscReal *U_norm; /* n_s: of the whole snapshot */
-  PetscInt n_s;
+  PetscReal *Lambda;     /* n_contacts x n_s column major */
+  PetscReal *VtU;        /* l x n_s column major: V^T of the snapshots less their lifting */
+  PetscReal *U_norm;     /* n_s: of the whole snapshot */
+  PetscInt n_s;          /* columns of snapshots: a sample each, of a history one per listed time of each */
+  PetscInt *taken_start; /* rank 0, of a history: n_samples + 1, where the times of a path's steps begin in */
+  PetscReal *taken;
   unsigned long long fingerprint;
   PetscBool *grown; /* every rank, greedy: cells of its part in the RIDs so far; else NULL */
 };
 
+/* The scene's variables where column k of the snapshots is: all of mu (HYCO_MAX_PARAMETERS). */
+PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[]);
+/* t->n_s of the samples. */
+PetscErrorCode HycoReducerCount(HycoReducer t);
 /* Frees what one run leaves behind. */
 PetscErrorCode HycoReducerReset(HycoReducer t);
 /* Takes a registered type, with its options; the present one stays as it is. */
@@ -159,6 +172,18 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
 typedef struct {
   PetscReal error[HYCO_N_ERRORS], size, rid_size, converged, feature[HYCO_TRUST_FEATURES], seconds[HYCO_HELD_REPEATS];
 } HycoHeldOut;
+/* What a prediction misses, by HycoErrorKind, and the size of what it is to be. */
+typedef struct {
+  PetscReal lost, size;
+} HycoLost;
+/* All of these but HYCO_ERROR_U, of the prediction as it stands, against a full-order solution: u at the nodes of the
+   model's mesh (n_nodes * dim), sigma (n_cells * n_sigma; NULL: not compared) and inelastic (n_cells; NULL) in its
+   cells, lambda (n_contacts). */
+PetscErrorCode HycoROMMeasureRID(HycoROM model, const PetscReal u[], const PetscReal sigma[],
+                                 const PetscReal inelastic[], const PetscReal lambda[], HycoLost lost[]);
+/* The errors of a path from those of its n listed times (n x HYCO_N_ERRORS). */
+void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *errors);
+
 /* Predicts at each held-out point, whose solution must be in the store, with the model just built; rows[n] on every
    rank. The ranks share the points out, and of each compare their rows of the whole mesh. Collective. */
 PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM model, HycoSnapshots store, HycoHeldOut rows[]);

@@ -33,6 +33,19 @@ typedef struct {
   PetscReal median[HYCO_N_TRUST], largest[HYCO_N_TRUST]; /* their relative errors; huge: not converged, or x/0 */
 } HycoTrust;
 
+/* The path of the last prediction, of a scene with a history. `room` and `n` count accepted steps, the arrays of listed
+   times have room for all of them. */
+typedef struct {
+  PetscInt n_given; /* times of steps to be taken; NULL: its own. Borrowed */
+  const PetscReal *given;
+  PetscInt n, room;
+  PetscReal *t, *gamma, *U_fe; /* n, n x l, n x n_fe */
+  PetscInt n_listed, shown;    /* reached; the one that gamma, U, Lambda are of */
+  PetscInt *at;                /* by listed time: its accepted step */
+  PetscReal *Lambda, *sigma, *inelastic;
+  HycoHistory history;
+} HycoTrace;
+
 /* What all types of reduced model have; a type's own is in `data`. */
 struct _p_HycoROM {
   PETSCHEADER(HycoROMOps);
@@ -86,11 +99,25 @@ struct _p_HycoROM {
   HycoRows rows;            /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
   HycoSolver solver;
   PetscReal *gamma, *U, *Lambda, *stress;
+  HycoTrace trace; /* of a scene with a history */
   HycoPrediction prediction;
   void *data;
 };
 
 PetscErrorCode HycoROMCreate(HycoROM *model);
+/* In the solve of a type that has paths: the accepted step whose gamma and U are the model's, at fe's parameters; and,
+   of a listed time, Lambda, and the stresses (n_cells x n_sigma) and inelastic strains of the RID's cells (rom_path.c).
+ */
+PetscErrorCode HycoTraceBegin(HycoROM model);
+PetscErrorCode HycoTraceAdd(HycoROM model, PetscReal t);
+PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inelastic);
+PetscErrorCode HycoTraceFree(HycoROM model);
+/* The fields of the path at its listed times on the whole mesh, as HycoFOMSetSeries() has them (replay.c). */
+PetscErrorCode HycoTraceWrite(HycoROM model, const char path[]);
+/* The path's part of a prediction. */
+void HycoTraceSummary(HycoROM model, HycoPrediction *prediction);
+/* U of the whole mesh (n_dof) from what accepted step k left of it, fe_whole being at its parameters. */
+void HycoTraceWholeU(HycoROM model, PetscInt k, PetscReal U[]);
 /* Builds what the online phase needs from the description; again after the full-order set changed. */
 PetscErrorCode HycoROMSetUp(HycoROM model);
 /* Frees what is online. */

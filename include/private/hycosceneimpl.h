@@ -149,6 +149,8 @@ PetscErrorCode HycoSceneDestroyHistory(HycoScene scene);
 /* The variables at time t: the parameters mu (n_parameters), t, the tables' values; out has room for n_variables. */
 void HycoSceneSetTime(HycoScene scene, const PetscReal mu[], PetscReal t, PetscReal out[]);
 /* The first time after t at which a step ends: a listed one, or a row of a table. */
+/* Fails where the history of a scene is not that which the model at `path` was trained with, naming what differs. */
+PetscErrorCode HycoSceneCompareHistory(HycoScene trained, HycoScene scene, const char path[]);
 PetscReal HycoSceneNextStop(HycoScene scene, PetscReal t);
 PetscBool HycoIsVariableName(const char word[]);
 

@@ -12,16 +12,25 @@ struct _p_HycoSnapshots {
   unsigned long long fingerprint;
 };
 
+/* Columns of a sample: 1, or the listed times of a history. */
+static inline PetscInt HycoSnapshotsSteps(HycoScene scene)
+{
+  return PetscMax(1, scene->n_times);
+}
 /*
-  One field of all samples as a dense matrix, a column per sample: "U" (n_nodes x dim unrolled), "lambda" (n_contacts),
-  "sigma" (n_cells x n_sigma unrolled), "force" (as U). Rows in the mesh file's order, in contiguous blocks over comm,
-  of whole blocks of rows: those of U that belong to a node stay together. Collective; the caller owns it. A field
-  without rows gives a matrix of zero rows.
+  One field of all samples as a dense matrix, a column per sample, of a scene with a history one per listed time of
+  each, sample after sample: "U" (n_nodes x dim unrolled), "lambda" (n_contacts), "sigma" (n_cells x n_sigma unrolled),
+  "force" (as U); of a history "inelastic" (n_cells, accumulated). Rows in the mesh file's order, in contiguous blocks
+  over comm, of whole blocks of rows: those of U that belong to a node stay together. Collective; the caller owns it. A
+  field without rows gives a matrix of zero rows.
 */
 PetscErrorCode HycoSnapshotsGetField(HycoSnapshots store, HycoSamples samples, const char field[], PetscInt block,
                                      Mat *S);
-/* The n values from `first` on of one field of the solution at mu, into the caller's memory. Not collective. */
-PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots store, const PetscReal mu[], const char field[], PetscInt first,
-                                     PetscInt n, PetscReal value[]);
+/* The n values from `first` on of one field of the solution at mu, of a history at listed time k (else 0), into the
+   caller's memory. Not collective. */
+PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots store, const PetscReal mu[], PetscInt k, const char field[],
+                                     PetscInt first, PetscInt n, PetscReal value[]);
+/* The times of the steps that the path at mu took (the caller's). Not collective. */
+PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots store, const PetscReal mu[], PetscInt *n, PetscReal **taken);
 
 #endif

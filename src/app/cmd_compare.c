@@ -57,21 +57,40 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the scene has a history, and how many numbers a point then has. */
+static PetscErrorCode CountColumns(HycoScene scene, PetscBool *paths, PetscInt *n)
+{
+  PetscInt n_times;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
+  *paths = (PetscBool)(n_times > 0);
+  *n = *paths ? DriverPathColumns() : N_COLUMNS;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode CompareMine(HycoScene scene, HycoROM model, MPI_Comm group, PetscInt first, PetscInt last,
                                   PetscInt n, PetscInt n_par, const PetscReal mu[], PetscReal value[])
 {
   HycoFOM fom;
   PetscMPIInt rank;
-  PetscReal unused[N_COLUMNS];
+  PetscReal *unused, *v;
+  PetscBool paths = PETSC_FALSE;
+  PetscInt n_columns = N_COLUMNS;
   char word[] = "points:";
 
   PetscFunctionBegin;
+  PetscCall(CountColumns(scene, &paths, &n_columns));
+  PetscCall(PetscMalloc1(n_columns, &unused));
   PetscCall(HycoFOMCreate(group, scene, &fom));
   PetscCallMPI(MPI_Comm_rank(group, &rank));
   for (PetscInt k = first; k < last; k++) {
-    PetscCall(ComparePoint(scene, fom, model, n_par, mu + k * n_par, rank == 0 ? value + k * N_COLUMNS : unused));
+    v = rank == 0 ? value + k * n_columns : unused;
+    PetscCall(paths ? DriverComparePath(fom, model, n_par, mu + k * n_par, v)
+                    : ComparePoint(scene, fom, model, n_par, mu + k * n_par, v));
     if (first == 0 && rank == 0) PetscCall(DriverProgress((k + 1 - first) * n / (last - first), n, word));
   }
+  PetscCall(PetscFree(unused));
   PetscCall(HycoFOMDestroy(&fom));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -192,10 +211,10 @@ PetscErrorCode CommandCompare(void)
   HycoScene scene;
   HycoROM model = NULL;
   HycoSamples samples;
-  PetscInt n, n_par, groups = 0, color;
+  PetscInt n, n_par, n_columns = N_COLUMNS, groups = 0, color;
   const PetscReal *mu;
   PetscReal *value;
-  PetscBool given, contact;
+  PetscBool given, contact, paths = PETSC_FALSE;
   PetscMPIInt rank, size;
   MPI_Comm group;
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
@@ -205,7 +224,6 @@ PetscErrorCode CommandCompare(void)
   PetscCall(DriverRequire("scene", path));
   PetscCall(DriverRequire("model", file));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
-  PetscCall(HycoSceneRefuseHistory(scene, "hyco compare"));
   PetscCall(DriverCheckMesh(scene));
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(file, &model));
   PetscCall(HycoROMCheckScene(model, scene));
@@ -221,12 +239,13 @@ PetscErrorCode CommandCompare(void)
   PetscCall(HycoSnapshotsChooseGroups(PETSC_COMM_WORLD, scene, n, &groups));
   color = (PetscInt)rank * groups / size;
   PetscCallMPI(MPI_Comm_split(PETSC_COMM_WORLD, (PetscMPIInt)color, rank, &group));
-  PetscCall(PetscCalloc1(n * N_COLUMNS, &value));
+  PetscCall(CountColumns(scene, &paths, &n_columns));
+  PetscCall(PetscCalloc1(n * n_columns, &value));
   HycoOnEach(PETSC_COMM_WORLD,
              CompareMine(scene, model, group, color * n / groups, (color + 1) * n / groups, n, n_par, mu, value));
-  HycoAllreduce(value, n * N_COLUMNS, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
-  if (table[0]) PetscCall(DriverWriteTable(table, scene, n, mu, N_COLUMNS, columns, value));
-  PetscCall(Report(scene, contact, n, value));
+  HycoAllreduce(value, n * n_columns, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
+  if (table[0] && !paths) PetscCall(DriverWriteTable(table, scene, n, mu, N_COLUMNS, columns, value));
+  PetscCall(paths ? DriverReportPaths(scene, contact, n, mu, value, table) : Report(scene, contact, n, value));
   PetscCall(PetscFree(value));
   PetscCallMPI(MPI_Comm_free(&group));
   PetscCall(HycoSamplesDestroy(&samples));

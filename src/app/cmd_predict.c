@@ -49,9 +49,10 @@ static void ReportRID(cJSON *json, const HycoPrediction *p)
   cJSON_AddNumberToObject(json, "rid_active", p->n_rid_active);
 }
 
-/* fallback: why it was solved full order; "": it was not. whole: u is that of the whole mesh. */
+/* fallback: why it was solved full order; "": it was not. whole: u is that of the whole mesh. path: NULL, or of a
+   history. */
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, PetscReal energy,
-                             const char fallback[], PetscBool whole)
+                             const char fallback[], PetscBool whole, const DriverReducedPath *path)
 {
   cJSON *json;
 
@@ -87,6 +88,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   }
   ReportKKT(json, &p->kkt);
   ReportSeconds(json, &p->seconds);
+  if (path) DriverReportReducedPath(json, path);
   PetscCall(ReportWrite(&json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -153,7 +155,46 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
     energy = fallback->strain_energy;
   else
     HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
-  PetscCall(Report(scene, mu, &p, energy, why, (PetscBool)(why[0] || fallback->displacement)));
+  PetscCall(Report(scene, mu, &p, energy, why, (PetscBool)(why[0] || fallback->displacement), NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One path: what it reached is written, and it fails where that is not its end. */
+static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
+{
+  DriverReducedPath path = {0};
+  HycoPrediction p = {0};
+  PetscInt n;
+  PetscReal mu[64], energy = 0;
+  char table[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  PetscCall(DriverGetPoint(scene, mu));
+  PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
+  HycoOnRoot(PETSC_COMM_WORLD, HycoROMPredict(model, n, mu));
+  PetscCall(DriverCheckLeft());
+  PetscCall(DriverGetReducedPath(model, &path));
+  HycoCheck(path.n, "no prediction: %s; nothing was written", path.why);
+  HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetPrediction(model, &p));
+  PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
+  PetscCall(SayReduced(&p));
+  PetscCall(DriverSayReducedPath(scene, mu, &path, table));
+  if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoROMWrite(model, output));
+  PetscCall(
+      Say("%d iterations; KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
+          (int)p.iterations, (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
+          (double)p.kkt.complementarity));
+  PetscCall(SayTrust(&p));
+  PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
+  HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
+  PetscCall(Report(scene, mu, &p, energy, "", PETSC_FALSE, &path));
+  PetscCall(PetscFree(path.value));
+  HycoCheck(p.reason != HYCO_DIVERGED_STEP,
+            "the history ends at t = %.10g, beyond which its steps have become too small: %s; what was reached is "
+            "written",
+            (double)path.t, path.why);
+  HycoCheck(p.reason > 0, "%s; what was reached is written", HycoReasonName(p.reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -173,6 +214,9 @@ enum {
   ESTIMATE_LAMBDA,
   BEYOND,
   FULL_ORDER,
+  PATH_FORCE, /* of paths alone */
+  PATH_MISES,
+  PATH_INELASTIC,
   N_COLUMNS
 };
 static const char *const columns[N_COLUMNS] = {"total_contact_force",
@@ -188,10 +232,17 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "estimated_error_sigma",
                                                "estimated_error_lambda",
                                                "beyond",
-                                               "full_order"};
+                                               "full_order",
+                                               "largest_contact_force",
+                                               "largest_rid_mises",
+                                               "largest_rid_inelastic"};
 
-/* width: columns, with the scene's quantities. */
-static void FillRow(const HycoPrediction *p, PetscInt width, PetscReal v[])
+/* own: columns without the scene's quantities, more of paths; width: with them. */
+typedef struct {
+  PetscInt own, width;
+} Shape;
+
+static void FillRow(const HycoPrediction *p, Shape s, PetscReal v[])
 {
   v[FORCE] = p->total_contact_force;
   v[LAMBDA_MAX] = p->lambda_max;
@@ -206,12 +257,17 @@ static void FillRow(const HycoPrediction *p, PetscInt width, PetscReal v[])
   v[ESTIMATE_SIGMA] = p->estimated_error_sigma >= 0 ? p->estimated_error_sigma : NAN;
   v[ESTIMATE_LAMBDA] = p->estimated_error_lambda >= 0 ? p->estimated_error_lambda : NAN;
   v[BEYOND] = p->beyond;
-  for (PetscInt k = 0; k < width - N_COLUMNS; k++) v[N_COLUMNS + k] = p->quantity[k];
+  if (s.own > PATH_FORCE) {
+    v[PATH_FORCE] = p->path_force;
+    v[PATH_MISES] = p->path_mises;
+    v[PATH_INELASTIC] = p->path_inelastic;
+  }
+  for (PetscInt k = s.own; k < s.width; k++) v[k] = p->quantity[k - s.own];
 }
 
 /* This rank's points. full[k]: point k is to be solved full order. */
 static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, PetscInt n, PetscInt n_par,
-                                  const PetscReal mu[], PetscInt width, PetscReal value[], PetscInt full[])
+                                  const PetscReal mu[], Shape s, PetscReal value[], PetscInt full[])
 {
   PetscMPIInt rank, size;
   PetscInt first, count;
@@ -226,7 +282,7 @@ static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, Petsc
   PetscCall(PetscMalloc1(count, &all));
   PetscCall(HycoROMSolveMany(model, count, n_par, mu + first * n_par, all, NULL, NULL));
   for (PetscInt k = 0; k < count; k++) {
-    FillRow(&all[k], width, value + (first + k) * width);
+    FillRow(&all[k], s, value + (first + k) * s.width);
     DriverWantsFullOrder(fallback, &all[k], why);
     full[first + k] = why[0] != '\0';
   }
@@ -236,8 +292,9 @@ static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, Petsc
 
 /* All ranks together, the points where the reduced model was not enough. */
 static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, const PetscReal mu[],
-                                const PetscInt full[], PetscInt width, PetscReal value[])
+                                const PetscInt full[], Shape s, PetscReal value[])
 {
+  const PetscInt width = s.width;
   PetscInt count = 0;
 
   PetscFunctionBegin;
@@ -250,7 +307,7 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
     p.estimated_error_sigma = value[k * width + ESTIMATE_SIGMA];
     p.estimated_error_lambda = value[k * width + ESTIMATE_LAMBDA];
     p.beyond = value[k * width + BEYOND];
-    FillRow(&p, width, value + k * width);
+    FillRow(&p, s, value + k * width);
     value[k * width + U_NORM] = NAN; /* the whole mesh's, no RID's */
     value[k * width + FULL_ORDER] = 1;
     count++;
@@ -261,7 +318,8 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
 
 static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples)
 {
-  PetscInt n, n_par, width, *full;
+  PetscInt n, n_par, n_times, *full;
+  Shape s;
   const PetscReal *mu;
   const char *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
   PetscReal *value, begin;
@@ -269,17 +327,19 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
+  s.own = n_times ? N_COLUMNS : PATH_FORCE;
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(DriverCheckLeftEarly()); /* what the solver alone knows is read by the first prediction */
-  PetscCall(ReportColumns(scene, N_COLUMNS, columns, &width, names));
-  PetscCall(PetscCalloc2(n * width, &value, n, &full));
+  PetscCall(ReportColumns(scene, s.own, columns, &s.width, names));
+  PetscCall(PetscCalloc2(n * s.width, &value, n, &full));
   begin = HycoNow();
-  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, width, value, full));
-  HycoAllreduce(value, n * width, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
+  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, s, value, full));
+  HycoAllreduce(value, n * s.width, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
   HycoAllreduce(full, n, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD);
-  PetscCall(SolveRest(fallback, n, n_par, mu, full, width, value));
+  PetscCall(SolveRest(fallback, n, n_par, mu, full, s, value));
   begin = HycoNow() - begin;
-  PetscCall(ReportSet("predict", table, scene, samples, width, names, value, begin));
+  PetscCall(ReportSet("predict", table, scene, samples, s.width, names, value, begin));
   PetscCall(PetscFree2(value, full));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -320,6 +380,7 @@ PetscErrorCode CommandPredict(void)
   HycoSamples samples = NULL;
   Fallback fallback = {0};
   PetscBool set, monitor, extrapolate;
+  PetscInt n_times;
   char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
@@ -330,6 +391,7 @@ PetscErrorCode CommandPredict(void)
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(path, &model));
   PetscCall(HycoROMSetExtrapolate(model, extrapolate));
   PetscCall(HycoROMGetScene(model, &scene));
+  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverReadFallback(model, extrapolate, &fallback));
   if (monitor) PetscCall(HycoROMSetMonitor(model, DriverMonitor, NULL));
   PetscCall(DriverHasSamples(scene, &set));
@@ -340,7 +402,7 @@ PetscErrorCode CommandPredict(void)
     PetscCall(DriverGetSamples(scene, &samples, &set));
     HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples));
   } else {
-    HycoStaged(HYCO_STAGE_ONLINE, One(model, scene, &fallback, output));
+    HycoStaged(HYCO_STAGE_ONLINE, n_times ? Path(model, scene, output) : One(model, scene, &fallback, output));
   }
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(DriverEndFallback(&fallback));

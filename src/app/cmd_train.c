@@ -162,7 +162,6 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverRequire("scene", path));
   PetscCall(DriverRequire("model", model));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
-  PetscCall(HycoSceneRefuseHistory(scene, "hyco train"));
   PetscCall(DriverCheckMesh(scene));
   PetscCall(DriverGetSamples(scene, &samples, &given));
   PetscCall(ReadGreedy(&greedy));

@@ -226,6 +226,32 @@ void DriverReportHistory(cJSON *json, const HycoHistory *history);
 /* After the solve: the table ("": none), a summary; fails where the path has not reached its end. Collective. */
 PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char table[]);
 
+/* -- predict_history.c: a reduced path -- */
+
+/* The listed times that a prediction reached, a row of numbers each. On every rank. */
+typedef struct {
+  PetscInt n;
+  PetscReal *value; /* PetscFree() it */
+  PetscBool ended;
+  PetscReal t;
+  char why[DRIVER_LINE];
+} DriverReducedPath;
+/* The last prediction's, model on rank 0. Collective. */
+PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path);
+/* A line a time; the table ("": none). Collective. */
+PetscErrorCode DriverSayReducedPath(HycoScene scene, const PetscReal mu[], const DriverReducedPath *path,
+                                    const char table[]);
+void DriverReportReducedPath(cJSON *json, const DriverReducedPath *path);
+
+/* -- compare_history.c -- */
+
+/* The numbers of a point; one point on one group; their statistics, table ("": none) and report, on every rank; fails
+   where a reduced path did not reach its end. */
+PetscInt DriverPathColumns(void);
+PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[], PetscReal v[]);
+PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal mu[],
+                                 const PetscReal value[], const char table[]);
+
 PetscErrorCode CommandCheck(void);
 PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);

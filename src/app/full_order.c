@@ -15,7 +15,8 @@ PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target)
       [HYCO_ERROR_SIGMA] = "<real> train: the same for the stress over the RID",
       [HYCO_ERROR_SIGMA_11] = "<real> train: the same for its first component, max norm",
       [HYCO_ERROR_LAMBDA] = "<real> train, predict: the same for all contact forces",
-      [HYCO_ERROR_LAMBDA_RID] = "<real> train: the same for the RID's own contact forces"};
+      [HYCO_ERROR_LAMBDA_RID] = "<real> train: the same for the RID's own contact forces",
+      [HYCO_ERROR_INELASTIC] = "<real> train, scenes with a history: the same for the inelastic strain over the RID"};
   char name[64], text[PETSC_MAX_PATH_LEN], *end;
 
   PetscFunctionBegin;
@@ -56,7 +57,7 @@ PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback
             f->on ? "-hyco_fallback solves full order where the reduced model is not enough"
                   : "-hyco_full_displacement solves on the whole mesh with the predicted forces");
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &f->scene));
-  PetscCall(HycoSceneRefuseHistory(f->scene, "hyco predict"));
+  PetscCall(HycoSceneRefuseHistory(f->scene, "-hyco_fallback"));
   PetscCall(DriverCheckMesh(f->scene));
   PetscCall(HycoROMCheckScene(model, f->scene));
   PetscCall(HycoSceneSetExtrapolate(f->scene, extrapolate));

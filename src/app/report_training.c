@@ -45,19 +45,34 @@ static void Number(PetscReal value, char text[32])
 }
 
 /* "u 0.12 %, stress 3.4 %, forces 5 %" of one number per kind of error. */
-static void DescribeErrors(const PetscReal error[], char text[DRIVER_LINE])
+static void DescribeErrors(PetscBool path, const PetscReal error[], char text[DRIVER_LINE])
 {
-  static const HycoErrorKind kinds[] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
-  static const char *const words[] = {"u", "stress", "forces"};
+  static const HycoErrorKind kinds[] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA, HYCO_ERROR_INELASTIC};
+  static const char *const words[] = {"u", "stress", "forces", "inelastic strain"};
   size_t at = 0;
 
-  for (size_t j = 0; j < 3; j++) {
+  for (size_t j = 0; j < (path ? 4 : 3); j++) {
     char percent[32];
 
     DriverPercent(error[kinds[j]], percent);
     at += (size_t)snprintf(text + at, DRIVER_LINE - at, "%s%s %s", j ? ", " : "", words[j],
                            error[kinds[j]] > PETSC_MAX_REAL / 8 ? "infinite" : percent);
   }
+}
+
+/* Whether the scene has a history: there is inelastic strain then. */
+static PetscBool IsPath(const Search *s)
+{
+  PetscInt n = 0;
+
+  (void)!HycoSceneGetHistory(s->scene, &n, NULL);
+  return (PetscBool)(n > 0);
+}
+
+/* The kinds of error that there are. */
+static PetscInt CountKinds(const Search *s)
+{
+  return IsPath(s) ? HYCO_N_ERRORS : HYCO_ERROR_INELASTIC;
 }
 
 static PetscErrorCode Append(Search *s, const char text[])
@@ -85,7 +100,7 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
     PetscCall(Append(
         s, "attempt,training_points,model_type,pod_tol,rid_layers,rid_contact_extension,hybrid,rid_whole,n_modes,"
            "rid_elements,rid_fraction"));
-    for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    for (PetscInt j = 0; j < CountKinds(s); j++) {
       snprintf(row, sizeof(row), ",error_%s,median_%s", HycoErrorKinds[j], HycoErrorKinds[j]);
       PetscCall(Append(s, row));
     }
@@ -94,7 +109,7 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
   at = (size_t)snprintf(row, sizeof(row), "%d,%d,%s,%g,%d,%g,%s,%d,%d,%d,%.6g", (int)++s->n, (int)s->n_points, r->type,
                         (double)r->pod_tol, (int)r->layers, (double)r->contact_extension, HycoHybrids[r->hybrid],
                         (int)r->whole, (int)a->n_modes, (int)a->rid_elements, (double)a->rid_fraction);
-  for (PetscInt j = 0; j < 2 * HYCO_N_ERRORS; j++) {
+  for (PetscInt j = 0; j < 2 * CountKinds(s); j++) {
     Number(a->failure[0] ? (PetscReal)NAN : (j % 2 ? a->held_out.median : a->held_out.largest)[j / 2], number);
     at += (size_t)snprintf(row + at, sizeof(row) - at, ",%s", number);
   }
@@ -117,7 +132,7 @@ static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
   if (a->number == 1)
     PetscCall(Say("recipes, each judged at %d held-out points (largest errors):\n", (int)a->held_out.n));
   HycoRecipeDescribe(&a->recipe, sizeof(what), what);
-  DescribeErrors(a->held_out.largest, errors);
+  DescribeErrors(IsPath(s), a->held_out.largest, errors);
   if (a->failure[0])
     PetscCall(Say("  %2d %s: no model: %s\n", (int)a->number, what, a->failure));
   else
@@ -167,9 +182,10 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
     DriverPercent(limit[j], asked);
     PetscCall(
         DriverMissed("the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s",
-                     j == HYCO_ERROR_U        ? "u"
-                     : j == HYCO_ERROR_LAMBDA ? "the contact forces"
-                                              : HycoErrorKinds[j],
+                     j == HYCO_ERROR_U           ? "u"
+                     : j == HYCO_ERROR_LAMBDA    ? "the contact forces"
+                     : j == HYCO_ERROR_INELASTIC ? "the inelastic strain"
+                                                 : HycoErrorKinds[j],
                      t->held_out.largest[j] > PETSC_MAX_REAL / 8 ? "infinite" : reached, (int)t->held_out.n,
                      s->on ? "the target is" : "without a target it should stay below", asked,
                      s->on ? "give more training points, a larger -target_max_added, or loosen the target"
@@ -193,8 +209,8 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
     PetscCall(Say("no held-out points: the errors of this model are not known, and it does not estimate them\n"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  DescribeErrors(t->held_out.median, median);
-  DescribeErrors(t->held_out.largest, largest);
+  DescribeErrors(IsPath(s), t->held_out.median, median);
+  DescribeErrors(IsPath(s), t->held_out.largest, largest);
   PetscCall(Say("errors at %d held-out points: median %s; largest %s\n", (int)t->held_out.n, median, largest));
   if (!t->n_held)
     PetscCall(Say("the model does not estimate its errors: fewer than 10 predictions of held-out solutions\n"));
@@ -221,7 +237,7 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
     cJSON_AddNumberToObject(held, "n", t->held_out.n);
     cJSON_AddNumberToObject(held, "not_converged", t->held_out.not_converged);
     cJSON_AddNumberToObject(held, "online_seconds", t->held_out.seconds);
-    for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    for (PetscInt j = 0; j < CountKinds(s); j++) {
       cJSON *error = cJSON_AddObjectToObject(held, HycoErrorKinds[j]);
 
       AddFinite(error, "median", t->held_out.median[j]);

@@ -3,7 +3,7 @@
 
 PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
 {
-  const PetscInt all[2] = {f->n_nodes, f->n_cells}, dim = f->part->dim;
+  const PetscInt all[HYCO_COMPARED] = {f->n_nodes, f->n_cells, f->n_cells}, dim = f->part->dim;
   PetscInt head[2] = {m ? m->l : 0, m ? m->n_fe : 0};
 
   PetscFunctionBegin;
@@ -11,7 +11,9 @@ PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
   c->f = f;
   c->width[0] = dim;
   c->width[1] = f->fe->n_sigma;
-  for (int k = 0; k < 2; k++) {
+  c->width[2] = 1;
+  c->n_fields = f->scene->n_times ? HYCO_COMPARED : HYCO_COMPARED - 1;
+  for (PetscInt k = 0; k < c->n_fields; k++) {
     const PetscInt n_rid = !m ? 0 : k ? m->mesh->n_cells : m->mesh->n_nodes;
     PetscLayout layout;
 
@@ -40,7 +42,7 @@ PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
 PetscErrorCode HycoComparisonDestroy(HycoComparison *c)
 {
   PetscFunctionBegin;
-  for (int k = 0; k < 2; k++) {
+  for (PetscInt k = 0; k < c->n_fields; k++) {
     PetscCall(PetscFree2(c->value[k], c->rid[k]));
     PetscCall(PetscSFDestroy(&c->sf[k]));
   }
@@ -52,7 +54,8 @@ PetscErrorCode HycoComparisonDestroy(HycoComparison *c)
 PetscErrorCode HycoComparisonBring(HycoComparison *c)
 {
   PetscFunctionBegin;
-  for (int k = 0; k < 2; k++) PetscCall(HycoSFBcast(c->sf[k], MPIU_REAL, c->width[k], c->value[k], c->rid[k]));
+  for (PetscInt k = 0; k < c->n_fields; k++)
+    PetscCall(HycoSFBcast(c->sf[k], MPIU_REAL, c->width[k], c->value[k], c->rid[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,16 +82,14 @@ PetscErrorCode HycoComparisonPredict(HycoComparison *c, HycoROM m, PetscMPIInt o
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoComparisonError(const HycoComparison *c, PetscReal *error)
+PetscErrorCode HycoComparisonSquares(const HycoComparison *c, PetscReal square[2])
 {
-  PetscReal square[2] = {0, 0}; /* of what is missed, of the solution */
-
   PetscFunctionBegin;
+  square[0] = square[1] = 0;
   for (PetscInt i = 0; i < c->n[0] * c->width[0]; i++) {
     square[0] += (c->U[i] - c->value[0][i]) * (c->U[i] - c->value[0][i]);
     square[1] += c->value[0][i] * c->value[0][i];
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, square, 2, MPIU_REAL, MPI_SUM, HycoComm(c->f)));
-  *error = HycoRelative(PetscSqrtReal(square[0]), PetscSqrtReal(square[1]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

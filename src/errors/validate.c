@@ -6,29 +6,41 @@
 #include <hycocomparison.h>
 #include <hycoreducerimpl.h>
 
-const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda", "lambda_rid", NULL};
+const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda", "lambda_rid", "inelastic", NULL};
 
-static PetscErrorCode Read(HycoComparison *c, HycoSnapshots store, const PetscReal mu[])
+typedef struct {
+  HycoReducer t;
+  HycoROM m;
+  HycoSnapshots store;
+  HycoComparison c;
+} Rows;
+
+static const char *const fields[HYCO_COMPARED] = {"U", "sigma", "inelastic"};
+
+/* step: the listed time, of a history. */
+static PetscErrorCode Read(Rows *r, const PetscReal mu[], PetscInt step)
 {
+  HycoComparison *c = &r->c;
+
   PetscFunctionBegin;
-  for (int k = 0; k < 2; k++)
-    PetscCall(HycoSnapshotsReadRows(store, mu, k ? "sigma" : "U", c->first[k] * c->width[k], c->n[k] * c->width[k],
+  for (PetscInt k = 0; k < c->n_fields; k++)
+    PetscCall(HycoSnapshotsReadRows(r->store, mu, step, fields[k], c->first[k] * c->width[k], c->n[k] * c->width[k],
                                     c->value[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What the process that has predicted makes of it. */
-static PetscErrorCode CompareRID(const HycoComparison *c, HycoROM m, HycoSnapshots store, const PetscReal mu[],
-                                 HycoHeldOut *row)
+static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row)
 {
+  HycoROM m = r->m;
   PetscReal *lambda;
   HycoErrors e;
   HycoForceErrors f;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->pairs.n, &lambda));
-  PetscCall(HycoSnapshotsReadRows(store, mu, "lambda", 0, m->pairs.n, lambda));
-  PetscCall(HycoROMCompareRID(m, c->rid[0], c->rid[1], lambda, &e, &f));
+  PetscCall(HycoSnapshotsReadRows(r->store, mu, 0, "lambda", 0, m->pairs.n, lambda));
+  PetscCall(HycoROMCompareRID(m, r->c.rid[0], r->c.rid[1], lambda, &e, &f));
   row->error[HYCO_ERROR_U_RID] = e.u_rid;
   row->error[HYCO_ERROR_SIGMA] = e.sigma;
   row->error[HYCO_ERROR_SIGMA_11] = e.sigma_11;
@@ -41,43 +53,131 @@ static PetscErrorCode CompareRID(const HycoComparison *c, HycoROM m, HycoSnapsho
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last prediction of rank `of`, at mu, whose row it is. Collective. */
-static PetscErrorCode Compare(HycoComparison *c, HycoReducer t, HycoROM m, HycoSnapshots store, const PetscReal mu[],
-                              PetscMPIInt of, HycoHeldOut *row)
+/* The squares of the displacement that is missed, and of the solution's, over the whole mesh; the solution on the RID.
+   Collective. */
+static PetscErrorCode MeasureU(Rows *r, const PetscReal mu[], PetscInt step, PetscMPIInt of, PetscReal square[2])
 {
+  HycoReducer t = r->t;
+  PetscReal all[HYCO_MAX_PARAMETERS];
   const PetscScalar *V;
   PetscInt lda;
-  PetscReal error;
 
   PetscFunctionBegin;
-  HycoOnEach(HycoComm(t), Read(c, store, mu));
-  PetscCall(HycoComparisonBring(c));
-  PetscCall(HycoFOMSetParameters(t->fom, mu));
+  HycoOnEach(HycoComm(t), Read(r, mu, step));
+  PetscCall(HycoComparisonBring(&r->c));
+  HycoSceneSetTime(t->scene, mu, t->scene->n_times ? t->scene->times[step] : 0, all);
+  PetscCall(HycoFOMSetParameters(t->fom, all));
   PetscCall(MatDenseGetLDA(t->V, &lda));
   PetscCall(MatDenseGetArrayRead(t->V, &V));
-  PetscCall(HycoComparisonPredict(c, m, of, V, lda));
+  PetscCall(HycoComparisonPredict(&r->c, r->m, of, V, lda));
   PetscCall(MatDenseRestoreArrayRead(t->V, &V));
-  PetscCall(HycoComparisonError(c, &error));
-  if (t->rank == of) row->error[HYCO_ERROR_U] = error;
-  HycoOnEach(HycoComm(t), t->rank == of ? CompareRID(c, m, store, mu, row) : PETSC_SUCCESS);
+  PetscCall(HycoComparisonSquares(&r->c, square));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Predict(HycoROM m, const PetscReal mu[], PetscInt repeat, HycoHeldOut *row)
+/* What the process that has predicted makes of listed time `step`, which the model shows. */
+static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, const PetscReal square[2],
+                                  HycoLost lost[])
+{
+  PetscReal *lambda;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(r->m->pairs.n, &lambda));
+  PetscCall(HycoSnapshotsReadRows(r->store, mu, step, "lambda", 0, r->m->pairs.n, lambda));
+  PetscCall(HycoROMMeasureRID(r->m, r->c.rid[0], r->c.rid[1], r->c.rid[2], lambda, lost));
+  lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
+  PetscCall(PetscFree(lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A path in short; forces as they are before they are divided by what is large among the held-out paths. */
+static PetscErrorCode ConcludePath(HycoROM m, PetscInt n, const HycoLost lost[], HycoHeldOut *row)
+{
+  HycoPathErrors e;
+
+  PetscFunctionBegin;
+  HycoPathErrorsJudge(n, lost, &e);
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) row->error[j] = e.worst[j];
+  row->size = e.force;
+  row->rid_size = e.force_rid;
+  if (e.force > 0) row->error[HYCO_ERROR_LAMBDA] *= e.force;
+  if (e.force_rid > 0) row->error[HYCO_ERROR_LAMBDA_RID] *= e.force_rid;
+  if (row->converged > 0) PetscCall(HycoTrustMeasure(m, row->feature));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last predicted path of rank `of`, at mu, at the listed times that it reached. Collective. */
+static PetscErrorCode ComparePath(Rows *r, const PetscReal mu[], PetscMPIInt of, HycoHeldOut *row)
+{
+  const PetscBool mine = (PetscBool)(r->t->rank == of);
+  PetscInt n = r->m->trace.n_listed;
+  HycoLost *lost;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, of, HycoComm(r->t)));
+  n = PetscMin(n, r->t->scene->n_times);
+  PetscCall(PetscCalloc1(n * HYCO_N_ERRORS, &lost));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal square[2];
+
+    HycoOnEach(HycoComm(r->t), mine ? HycoROMSetStep(r->m, k) : PETSC_SUCCESS);
+    PetscCall(MeasureU(r, mu, k, of, square));
+    HycoOnEach(HycoComm(r->t), mine ? MeasureStep(r, mu, k, square, lost + k * HYCO_N_ERRORS) : PETSC_SUCCESS);
+  }
+  HycoOnEach(HycoComm(r->t), mine ? ConcludePath(r->m, n, lost, row) : PETSC_SUCCESS);
+  PetscCall(PetscFree(lost));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last prediction of rank `of`, at mu, whose row it is. Collective. */
+static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, HycoHeldOut *row)
+{
+  PetscReal square[2];
+
+  PetscFunctionBegin;
+  PetscCall(MeasureU(r, mu, 0, of, square));
+  if (r->t->rank == of) row->error[HYCO_ERROR_U] = HycoRelative(PetscSqrtReal(square[0]), PetscSqrtReal(square[1]));
+  HycoOnEach(HycoComm(r->t), r->t->rank == of ? CompareRID(r, mu, row) : PETSC_SUCCESS);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One held-out point; of a path in the steps that full order took. */
+static PetscErrorCode PredictOne(HycoROM m, HycoSnapshots store, const PetscReal mu[])
+{
+  PetscReal *taken = NULL;
+  PetscInt n;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (m->scene->n_times) {
+    PetscCall(HycoSnapshotsReadTaken(store, mu, &n, &taken));
+    PetscCall(HycoROMSetSteps(m, n, taken));
+  }
+  ierr = HycoROMPredict(m, m->scene->n_parameters, mu);
+  if (taken) PetscCall(HycoROMSetSteps(m, 0, NULL));
+  PetscCall(PetscFree(taken));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Predict(HycoROM m, HycoSnapshots store, const PetscReal mu[], PetscInt repeat, HycoHeldOut *row)
 {
   PetscFunctionBegin;
-  PetscCall(HycoROMPredict(m, m->scene->n_parameters, mu));
+  PetscCall(PredictOne(m, store, mu));
   row->seconds[repeat] = m->prediction.seconds.total;
-  if (!repeat) row->converged = m->prediction.reason > 0;
+  if (repeat) PetscFunctionReturn(PETSC_SUCCESS);
+  row->converged = m->prediction.reason > 0;
+  for (PetscInt j = 1; j < HYCO_HELD_REPEATS; j++) row->seconds[j] = row->seconds[0]; /* of a path once */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Points first .. last-1 in their order, several times: what a load ramp keeps from one step to the next is kept. */
-static PetscErrorCode PredictAgain(HycoROM m, PetscInt first, PetscInt last, const PetscReal mu[], HycoHeldOut rows[])
+static PetscErrorCode PredictAgain(HycoROM m, HycoSnapshots store, PetscInt first, PetscInt last, const PetscReal mu[],
+                                   HycoHeldOut rows[])
 {
   PetscFunctionBegin;
   for (PetscInt r = 1; r < HYCO_HELD_REPEATS; r++) {
-    for (PetscInt k = first; k < last; k++) PetscCall(Predict(m, mu + k * m->scene->n_parameters, r, &rows[k]));
+    for (PetscInt k = first; k < last; k++) PetscCall(Predict(m, store, mu + k * m->scene->n_parameters, r, &rows[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -87,7 +187,7 @@ PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots
   PetscInt n, n_par, first, last;
   const PetscReal *mu;
   PetscMPIInt size, count;
-  HycoComparison c;
+  Rows r = {t, m, store, {0}};
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->held, &n, &n_par, &mu));
@@ -96,19 +196,21 @@ PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots
   PetscCall(PetscArrayzero(rows, n));
   first = t->rank * n / size;
   last = (t->rank + 1) * n / size;
-  PetscCall(HycoComparisonCreate(t->fom, m, &c));
+  PetscCall(HycoComparisonCreate(t->fom, m, &r.c));
   for (PetscInt step = 0; step * size < n + size; step++) { /* one point of each rank */
     const PetscInt k = first + step;
 
-    HycoOnEach(HycoComm(t), k < last ? Predict(m, mu + k * n_par, 0, &rows[k]) : PETSC_SUCCESS);
+    HycoOnEach(HycoComm(t), k < last ? Predict(m, store, mu + k * n_par, 0, &rows[k]) : PETSC_SUCCESS);
     for (PetscMPIInt of = 0; of < size; of++) {
       const PetscInt j = of * n / size + step;
 
-      if (j < (of + 1) * n / size) PetscCall(Compare(&c, t, m, store, mu + j * n_par, of, &rows[j]));
+      if (j >= (of + 1) * n / size) continue;
+      PetscCall(t->scene->n_times ? ComparePath(&r, mu + j * n_par, of, &rows[j])
+                                  : Compare(&r, mu + j * n_par, of, &rows[j]));
     }
   }
-  PetscCall(HycoComparisonDestroy(&c));
-  HycoOnEach(HycoComm(t), PredictAgain(m, first, last, mu, rows));
+  PetscCall(HycoComparisonDestroy(&r.c));
+  if (!t->scene->n_times) HycoOnEach(HycoComm(t), PredictAgain(m, store, first, last, mu, rows));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, count, MPIU_REAL, MPI_SUM, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -123,8 +225,9 @@ PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[])
 
 PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force)
 {
+  const PetscBool forces = (PetscBool)(kind == HYCO_ERROR_LAMBDA || kind == HYCO_ERROR_LAMBDA_RID);
   const PetscReal size = kind == HYCO_ERROR_LAMBDA ? row->size : row->rid_size,
-                  by = kind < HYCO_ERROR_LAMBDA ? 1 : PetscMax(size, HYCO_SMALL_FORCE * force);
+                  by = forces ? PetscMax(size, HYCO_SMALL_FORCE * force) : 1;
 
   if (row->converged < 0.5) return PETSC_INFINITY;
   if (by > 0) return row->error[kind] / by;

@@ -407,6 +407,7 @@ PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscRea
   PetscCheck(t1 >= t0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "a step from %g back to %g", (double)t0, (double)t1);
   *report = fresh;
   b.report = report;
+  PetscCall(HycoFEKeepGradients(fe));
   PetscCall(BatchCreate(fe, &b));
   ierr = StepAll(fe, &b);
   PetscCall(BatchDestroy(&b));

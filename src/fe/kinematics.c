@@ -31,6 +31,13 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, inv[3][3], det, size = 1;
 
   PetscFunctionBegin;
+  if (fe->kept && fe->kept_place == fe->place) {
+    const PetscReal *kept = fe->kept + (size_t)(cell * el->nq + q) * (size_t)(3 * el->nv + 1);
+
+    PetscCall(PetscArraycpy(&g[0][0], kept, 3 * el->nv));
+    *weight = kept[3 * el->nv];
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   for (PetscInt c = 0; c < dim; c++) {
     PetscReal row = 0;
 
@@ -68,6 +75,30 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
     for (PetscInt a = 0; a < el->nv; a++) g[a][2] = el->N[q][a] / r;
     *weight *= 2 * PETSC_PI * r;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEKeepGradients(HycoFE fe)
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const size_t size = (size_t)(3 * el->nv + 1), n = (size_t)(fe->mesh->n_cells * el->nq);
+  PetscReal *kept = fe->kept;
+
+  PetscFunctionBegin;
+  if (kept && fe->kept_place == fe->place) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!kept) PetscCall(PetscMalloc1(n * size + 1, &kept));
+  fe->kept = NULL; /* they are computed */
+  for (size_t k = 0; k < n; k++) {
+    PetscReal g[8][3];
+    PetscErrorCode ierr =
+        HycoGradients(fe, el, (PetscInt)k / el->nq, (PetscInt)k % el->nq, g, kept + k * size + size - 1);
+
+    if (ierr) PetscCall(PetscFree(kept));
+    PetscCall(ierr);
+    PetscCall(PetscArraycpy(kept + k * size, &g[0][0], 3 * el->nv));
+  }
+  fe->kept = kept;
+  fe->kept_place = fe->place;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -310,6 +310,8 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->newton = HycoPathPrefersElastic(p) ? "elastic" : "tangent";
   h->factor_cost = HycoPathFactorCost(p);
   h->n_orders = p->n_orders;
+  h->n_taken = p->n_taken;
+  h->taken = p->taken;
   if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
   if (p->n_orders) h->order = p->orders[p->n_orders / 2];
 }

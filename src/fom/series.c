@@ -13,6 +13,7 @@
 #define MOST_FIELDS 24
 
 struct _n_HycoSeries {
+  HycoSeriesSource from; /* of the last time */
   char path[PETSC_MAX_PATH_LEN], h5_path[PETSC_MAX_PATH_LEN];
   HycoH5 h, part;   /* part: this time's alone, beside the checkpoint; NULL: none */
   PetscInt n, room; /* times */
@@ -22,9 +23,9 @@ struct _n_HycoSeries {
   char name[MOST_FIELDS][64];
 };
 
-static PetscInt CountItems(HycoFOM f, HycoPlace place)
+static PetscInt CountItems(HycoSeries s, HycoPlace place)
 {
-  return place == HYCO_ON_CELLS ? f->n_cells : f->n_nodes;
+  return place == HYCO_ON_CELLS ? s->from.n_cells : s->from.n_nodes;
 }
 
 /* "step-0003/nodes/displacement" */
@@ -47,43 +48,44 @@ static PetscErrorCode NoteField(HycoSeries s, const char name[], HycoPlace place
 }
 
 /* Writes a field of this time. */
-static PetscErrorCode AddField(HycoFOM f, HycoSeries s, const char name[], HycoPlace place, PetscInt components,
+static PetscErrorCode AddField(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
                                const PetscReal value[])
 {
-  const HycoFileOrder *rows;
+  const HycoFileOrder *rows = s->from.rows;
   HycoField *field;
   char set[HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCall(HycoFOMGetRows(f, &rows));
   PetscCall(NoteField(s, name, place, components, &field));
   if (!field) PetscFunctionReturn(PETSC_SUCCESS);
   NameSet(field, s->n, set);
-  PetscCall(HycoFieldWrite(s->h, rows, CountItems(f, place), set, place, MPIU_REAL, components, components, value));
+  PetscCall(HycoFieldWrite(s->h, rows, CountItems(s, place), set, place, MPIU_REAL, components, components, value));
   if (s->part)
     PetscCall(
-        HycoFieldWrite(s->part, rows, CountItems(f, place), set, place, MPIU_REAL, components, components, value));
+        HycoFieldWrite(s->part, rows, CountItems(s, place), set, place, MPIU_REAL, components, components, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddDisplacement(HycoFOM f, HycoSeries s)
+static PetscErrorCode AddDisplacement(HycoSeries s)
 {
-  const PetscInt dim = f->part->dim;
+  const HycoSeriesSource *f = &s->from;
+  const PetscInt dim = f->fe->dim;
   PetscReal *u3;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(3 * f->part->n_nodes, &u3));
+  PetscCall(PetscCalloc1(3 * f->fe->mesh->n_nodes, &u3));
   for (PetscInt k = 0; k < f->fe->n_dof; k++) u3[3 * (k / dim) + k % dim] = f->u[k];
-  PetscCall(AddField(f, s, "displacement", HYCO_ON_NODES, 3, u3));
+  PetscCall(AddField(s, "displacement", HYCO_ON_NODES, 3, u3));
   PetscCall(PetscFree(u3));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Stress, its von Mises value, inelastic strain, temperature, and the laws' own variables. */
-static PetscErrorCode AddState(HycoFOM f, HycoSeries s)
+static PetscErrorCode AddState(HycoSeries s)
 {
-  const PetscInt n = f->part->n_cells, ns = f->fe->n_sigma;
-  HycoFEState state = f->path->begin;
+  const HycoSeriesSource *f = &s->from;
+  const PetscInt n = f->fe->mesh->n_cells, ns = f->fe->n_sigma;
+  HycoFEState state = f->state;
   PetscReal *sigma, *tensor, *mises, *inelastic, *temperature;
   const char *const *names;
   PetscInt n_names;
@@ -92,45 +94,58 @@ static PetscErrorCode AddState(HycoFOM f, HycoSeries s)
   PetscCall(PetscCalloc5(n * ns, &sigma, 6 * n, &tensor, n, &mises, n, &inelastic, n, &temperature));
   PetscCall(HycoFEStateFields(f->fe, state, sigma, mises, inelastic, temperature));
   HycoTensor6(n, ns, sigma, tensor);
-  PetscCall(AddField(f, s, "stress", HYCO_ON_CELLS, 6, tensor));
-  PetscCall(AddField(f, s, "mises", HYCO_ON_CELLS, 1, mises));
-  PetscCall(AddField(f, s, "inelastic", HYCO_ON_CELLS, 1, inelastic));
-  PetscCall(AddField(f, s, "temperature", HYCO_ON_CELLS, 1, temperature));
+  PetscCall(AddField(s, "stress", HYCO_ON_CELLS, 6, tensor));
+  PetscCall(AddField(s, "mises", HYCO_ON_CELLS, 1, mises));
+  PetscCall(AddField(s, "inelastic", HYCO_ON_CELLS, 1, inelastic));
+  PetscCall(AddField(s, "temperature", HYCO_ON_CELLS, 1, temperature));
   PetscCall(HycoFEStateGetNames(state, &n_names, &names));
   for (PetscInt k = 0; k < n_names; k++) {
     PetscCall(HycoFEStateVariable(f->fe, state, names[k], mises));
-    PetscCall(AddField(f, s, names[k], HYCO_ON_CELLS, 1, mises));
+    PetscCall(AddField(s, names[k], HYCO_ON_CELLS, 1, mises));
   }
   PetscCall(PetscFree5(sigma, tensor, mises, inelastic, temperature));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Contact force, pressure and gap by node. */
-static PetscErrorCode AddContacts(HycoFOM f, HycoSeries s)
+static PetscErrorCode AddContacts(HycoSeries s)
 {
+  const HycoSeriesSource *f = &s->from;
   HycoContactFields c;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
-  ierr = HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c);
-  if (!ierr) ierr = AddField(f, s, "contact_force", HYCO_ON_SURFACE, 3, c.force);
-  if (!ierr) ierr = AddField(f, s, "contact_pressure", HYCO_ON_SURFACE, 1, c.pressure);
-  if (!ierr) ierr = AddField(f, s, "gap", HYCO_ON_SURFACE, 1, c.gap_node);
+  ierr = HycoContactFieldsCreate(f->comm, f->fe_surface, f->pairs, f->u_surface, f->lambda, &c);
+  if (!ierr) ierr = AddField(s, "contact_force", HYCO_ON_SURFACE, 3, c.force);
+  if (!ierr) ierr = AddField(s, "contact_pressure", HYCO_ON_SURFACE, 1, c.pressure);
+  if (!ierr) ierr = AddField(s, "gap", HYCO_ON_SURFACE, 1, c.gap_node);
   PetscCall(HycoContactFieldsDestroy(&c));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What does not change in time. */
-static PetscErrorCode WriteMesh(HycoFOM f, HycoSeries s)
+static PetscErrorCode WriteMesh(HycoSeries s)
 {
-  const HycoFileOrder *rows;
+  const HycoSeriesSource *f = &s->from;
 
   PetscFunctionBegin;
-  PetscCall(HycoFOMGetRows(f, &rows));
-  HycoOnRoot(HycoComm(f), HycoFieldsWriteHead(s->h, f->part, f->scene, f->path->mu, NULL));
-  PetscCall(HycoFieldsWriteMesh(s->h, "mesh", rows, f->part, f->fe->X));
+  HycoOnRoot(f->comm, HycoFieldsWriteHead(s->h, f->fe->mesh, f->fe->scene, f->mu, NULL));
+  PetscCall(HycoFieldsWriteMesh(s->h, "mesh", f->rows, f->fe->mesh, f->fe->X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], HycoSeries *series)
+{
+  HycoSeries s;
+
+  PetscFunctionBegin;
+  HycoOnRoot(comm, HycoFieldsCheckPath(path));
+  PetscCall(PetscNew(&s));
+  PetscCall(PetscStrncpy(s->path, path, sizeof(s->path)));
+  PetscCall(PetscSNPrintf(s->h5_path, sizeof(s->h5_path), "%.*s.h5", (int)strlen(path) - 5, path));
+  *series = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -141,25 +156,54 @@ PetscErrorCode HycoFOMSetSeries(HycoFOM f, const char path[])
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   HycoCheck(f->path, "HycoFOMSetSeries: the scene has no history; HycoFOMWrite() writes its solution");
-  HycoOnRoot(HycoComm(f), HycoFieldsCheckPath(path));
-  PetscCall(PetscNew(&s));
-  PetscCall(PetscStrncpy(s->path, path, sizeof(s->path)));
-  PetscCall(PetscSNPrintf(s->h5_path, sizeof(s->h5_path), "%.*s.h5", (int)strlen(path) - 5, path));
+  PetscCall(HycoSeriesCreate(HycoComm(f), path, &s));
   PetscCall(HycoSeriesDestroy(&f->path->series));
   f->path->series = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSeriesBegin(HycoFOM f)
+/* What the full order has at its last time. */
+static PetscErrorCode Look(HycoFOM f, HycoSeriesSource *from)
 {
-  HycoSeries s = f->path->series;
+  HycoPath p = f->path;
 
   PetscFunctionBegin;
-  if (!s) PetscFunctionReturn(PETSC_SUCCESS);
+  *from = (HycoSeriesSource){.comm = HycoComm(f),
+                             .fe = f->fe,
+                             .state = p->begin,
+                             .fe_surface = f->fe_surface,
+                             .pairs = &f->pairs,
+                             .n_nodes = f->n_nodes,
+                             .n_cells = f->n_cells,
+                             .n_contacts = f->n_contacts,
+                             .u = f->u,
+                             .u_surface = f->u_surface,
+                             .lambda = f->lambda,
+                             .mu = p->mu,
+                             .t = p->t};
+  PetscCall(HycoFOMGetRows(f, &from->rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSeriesOpen(HycoSeries s, const HycoSeriesSource *from)
+{
+  PetscFunctionBegin;
   s->n = 0;
+  s->from = *from;
   if (s->h) PetscCall(HycoH5Close(&s->h, PETSC_FALSE));
-  PetscCall(HycoH5CreateShared(HycoComm(f), s->h5_path, &s->h));
-  PetscCall(WriteMesh(f, s));
+  PetscCall(HycoH5CreateShared(from->comm, s->h5_path, &s->h));
+  PetscCall(WriteMesh(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSeriesBegin(HycoFOM f)
+{
+  HycoSeriesSource from;
+
+  PetscFunctionBegin;
+  if (!f->path->series) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Look(f, &from));
+  PetscCall(HycoSeriesOpen(f->path->series, &from));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -184,7 +228,7 @@ static PetscErrorCode WriteList(HycoSeries s)
 static PetscErrorCode ReadField(HycoFOM f, HycoH5 h, const HycoFileOrder *order, const char set[],
                                 const HycoField *field, PetscReal **rows)
 {
-  const PetscInt all = CountItems(f, field->place), n = order ? order->n[field->place] : all;
+  const PetscInt all = CountItems(f->path->series, field->place), n = order ? order->n[field->place] : all;
   PetscInt n_rows, cols;
 
   PetscFunctionBegin;
@@ -277,33 +321,43 @@ PetscErrorCode HycoSeriesRestore(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddFields(HycoFOM f, HycoSeries s)
+static PetscErrorCode AddFields(HycoSeries s)
 {
   PetscFunctionBegin;
   s->n_fields = 0;
-  PetscCall(AddDisplacement(f, s));
-  PetscCall(AddState(f, s));
-  PetscCall(AddContacts(f, s));
-  if (s->part) HycoOnRoot(HycoComm(f), WriteList(s));
+  PetscCall(AddDisplacement(s));
+  PetscCall(AddState(s));
+  PetscCall(AddContacts(s));
+  if (s->part) HycoOnRoot(s->from.comm, WriteList(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSeriesAddTime(HycoSeries s, const HycoSeriesSource *from)
+{
+  PetscFunctionBegin;
+  s->from = *from;
+  PetscCall(AddFields(s));
+  PetscCall(NoteTime(s, from->t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSeriesAdd(HycoFOM f)
 {
   HycoSeries s = f->path->series;
+  HycoSeriesSource from;
   char path[PETSC_MAX_PATH_LEN];
   PetscErrorCode ierr, failed;
 
   PetscFunctionBegin;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Look(f, &from));
   if (f->path->checkpoint[0]) {
     NamePart(f, s->n, path);
     PetscCall(HycoH5CreateShared(HycoComm(f), path, &s->part));
   }
-  ierr = AddFields(f, s);
+  ierr = HycoSeriesAddTime(s, &from);
   failed = HycoH5Close(&s->part, (PetscBool)!ierr);
   PetscCall(ierr ? ierr : failed);
-  PetscCall(NoteTime(s, f->path->t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -314,16 +368,17 @@ static void WriteItem(FILE *out, const char kind[], PetscInt rows, PetscInt cols
 }
 
 /* One time: the mesh, which all share, and its fields. */
-static void WriteTime(HycoFOM f, HycoSeries s, FILE *out, const char h5[], PetscInt k)
+static void WriteTime(HycoSeries s, FILE *out, const char h5[], PetscInt k)
 {
-  const HycoCellType type = f->part->type;
+  const HycoSeriesSource *f = &s->from;
+  const HycoCellType type = f->fe->mesh->type;
   char name[HYCO_LINE], kind[64];
 
   fprintf(out, "   <Grid Name=\"mesh\">\n    <Time Value=\"%.17g\"/>\n", (double)s->t[k]);
   fprintf(out, "    <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", HycoFieldsTopology(type),
           (long)f->n_cells, type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
   snprintf(kind, sizeof(kind), "NumberType=\"Int\" Precision=\"%d\"", (int)sizeof(PetscInt));
-  WriteItem(out, kind, f->n_cells, f->part->nv, h5, "mesh/cells");
+  WriteItem(out, kind, f->n_cells, f->fe->mesh->nv, h5, "mesh/cells");
   fprintf(out, "    </Topology>\n    <Geometry GeometryType=\"XYZ\">\n");
   WriteItem(out, "Precision=\"8\"", f->n_nodes, 3, h5, "mesh/xyz");
   fprintf(out, "    </Geometry>\n");
@@ -336,14 +391,14 @@ static void WriteTime(HycoFOM f, HycoSeries s, FILE *out, const char h5[], Petsc
                                      : "Tensor6",
             field->place == HYCO_ON_CELLS ? "Cell" : "Node");
     NameSet(field, k, name);
-    WriteItem(out, "Precision=\"8\"", CountItems(f, field->place), field->components, h5, name);
+    WriteItem(out, "Precision=\"8\"", CountItems(s, field->place), field->components, h5, name);
     fprintf(out, "    </Attribute>\n");
   }
   fprintf(out, "   </Grid>\n");
 }
 
 /* The text, and the last of the numbers. On rank 0. */
-static PetscErrorCode WriteText(HycoFOM f, HycoSeries s, HycoFile *out)
+static PetscErrorCode WriteText(HycoSeries s, HycoFile *out)
 {
   const char *slash = strrchr(s->h5_path, '/');
   char h5[6 * PETSC_MAX_PATH_LEN];
@@ -355,7 +410,7 @@ static PetscErrorCode WriteText(HycoFOM f, HycoSeries s, HycoFile *out)
   text = HycoFileStream(*out);
   fprintf(text, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n"
                 "  <Grid Name=\"history\" GridType=\"Collection\" CollectionType=\"Temporal\">\n");
-  for (PetscInt k = 0; k < s->n; k++) WriteTime(f, s, text, h5, k);
+  for (PetscInt k = 0; k < s->n; k++) WriteTime(s, text, h5, k);
   fprintf(text, "  </Grid>\n </Domain>\n</Xdmf>\n");
   PetscCall(HycoFileFlush(*out));
   PetscCall(HycoH5WriteReal(s->h, "t", s->n, 1, s->t));
@@ -363,26 +418,32 @@ static PetscErrorCode WriteText(HycoFOM f, HycoSeries s, HycoFile *out)
 }
 
 /* The two files take their places, the numbers first. */
-static PetscErrorCode WriteSeries(HycoFOM f, HycoSeries s, HycoFile *out)
+static PetscErrorCode WriteSeries(HycoSeries s, HycoFile *out)
 {
   PetscFunctionBegin;
-  HycoOnRoot(HycoComm(f), WriteText(f, s, out));
+  HycoOnRoot(s->from.comm, WriteText(s, out));
   PetscCall(HycoH5Close(&s->h, PETSC_TRUE));
-  HycoOnRoot(HycoComm(f), HycoFileClose(out, PETSC_TRUE));
+  HycoOnRoot(s->from.comm, HycoFileClose(out, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSeriesClose(HycoSeries s)
+{
+  HycoFile out = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!s->n) PetscFunctionReturn(PETSC_SUCCESS);
+  ierr = WriteSeries(s, &out);
+  if (out) PetscCall(HycoFileClose(&out, PETSC_FALSE));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSeriesEnd(HycoFOM f)
 {
-  HycoSeries s = f->path->series;
-  HycoFile out = NULL;
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
-  if (!s || !s->n) PetscFunctionReturn(PETSC_SUCCESS);
-  ierr = WriteSeries(f, s, &out);
-  if (out) PetscCall(HycoFileClose(&out, PETSC_FALSE));
-  PetscCall(ierr);
+  if (f->path->series) PetscCall(HycoSeriesClose(f->path->series));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -10,14 +10,17 @@
 /* The mesh over the ranks, its contacts on rank 0, its sizes everywhere. */
 static PetscErrorCode ReadMesh(HycoReducer t)
 {
+  PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscInt group = 0;
-  const PetscReal *mu;
   HycoFOM f;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, NULL, &mu));
+  PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoFOMCreateMesh(HycoComm(t), t->scene, &t->fom));
   f = t->fom;
+  HycoCheck(!t->scene->n_times || !f->searches,
+            "the scene has a history, and a map moves a contact surface (type surface) whose masters are searched for: "
+            "reduced models of such paths are not there; hyco solve -mu solves them at full order");
   for (PetscInt k = 0; k < t->n_groups; k++)
     HycoOnRoot(HycoComm(t), HycoMeshFindGroup(f->part, "hyco_rid_groups", t->groups[k], &group));
   t->sizes[0] = f->n_nodes;
@@ -319,7 +322,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   r->n_facts = 0; /* of the iteration before */
   r->stiffness = m->traits.stiffness;
   r->chosen.recipe.rid = (PetscBool)(m->traits.settings == HYCO_SETTINGS_RID);
-  r->n_samples = t->n_s;
+  r->n_samples = m->n_points;
   r->n_modes = t->l;
   r->n_dual_modes = t->counts[HYCO_SEED_DUAL];
   r->n_stress_modes = t->counts[HYCO_SEED_STRESS];
@@ -491,7 +494,7 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
   PetscFunctionBegin;
   PetscCall(HycoReducerReset(t));
   t->samples = samples;
-  PetscCall(HycoSamplesGet(samples, &t->n_s, NULL, NULL));
+  PetscCall(HycoReducerCount(t));
   PetscCheck(t->n_s > 0, HycoComm(t), PETSC_ERR_USER, "the set of training points is empty");
   HycoOnRoot(HycoComm(t), CheckWritable(path));
   PetscCall(ReadMesh(t));

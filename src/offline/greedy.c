@@ -296,6 +296,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  PetscCall(HycoSceneRefuseHistory(t->scene, "greedy training"));
   HycoCheck(!t->prototype->ops->choosepoints,
             "a condensed model needs a tensor grid of training points, which -greedy does not give: use -grid, or "
             "-values_NAME");

@@ -27,26 +27,62 @@ static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, P
   *lambda = size > 0 ? PetscSqrtReal(lost / size) : lost > 0 ? HYCO_JUDGED_WORST : 0;
 }
 
+/* The worst of the listed times of training path k, in the path's own steps; what is small beside the path's largest is
+   divided by a tenth of that. */
+static PetscErrorCode PathErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, PetscReal *lambda)
+{
+  const PetscInt n = m->scene->n_times, first = k * n;
+  PetscReal size[2] = {0, 0}, eu, el;
+  PetscReal *force;
+
+  PetscFunctionBegin;
+  *u = *lambda = 0;
+  PetscCall(PetscCalloc1(n, &force));
+  for (PetscInt j = 0; j < n; j++) {
+    const PetscReal *L = t->Lambda + (size_t)(first + j) * (size_t)t->sizes[2];
+
+    for (PetscInt i = 0; i < m->m; i++) force[j] += L[m->contact[i]] * L[m->contact[i]];
+    force[j] = PetscSqrtReal(force[j]);
+    size[0] = PetscMax(size[0], t->U_norm[first + j]);
+    size[1] = PetscMax(size[1], force[j]);
+  }
+  for (PetscInt j = 0; j < m->trace.n_listed; j++) {
+    PetscCall(HycoROMSetStep(m, j));
+    SnapshotErrors(t, m, first + j, &eu, &el);
+    if (size[0] > 0) *u = PetscMax(*u, eu * t->U_norm[first + j] / PetscMax(t->U_norm[first + j], 0.1 * size[0]));
+    if (force[j] > 0) el *= force[j] / PetscMax(force[j], HYCO_SMALL_FORCE * size[1]);
+    if (force[j] > 0) *lambda = PetscMax(*lambda, el);
+  }
+  PetscCall(PetscFree(force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Mean training errors of the model as it stands. */
 PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM m, PetscReal *u, PetscReal *lambda)
 {
-  PetscInt n_par;
+  PetscInt n, n_par;
   const PetscReal *mu;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  PetscCall(HycoSamplesGet(t->samples, &n, &n_par, &mu));
   m->reconstruct = PETSC_FALSE;
   *u = *lambda = 0;
-  for (PetscInt k = 0; k < t->n_s; k++) {
+  for (PetscInt k = 0; k < n; k++) {
     PetscReal eu, el;
 
+    if (m->scene->n_times)
+      PetscCall(HycoROMSetSteps(m, t->taken_start[k + 1] - t->taken_start[k], t->taken + t->taken_start[k]));
     PetscCall(HycoROMPredict(m, n_par, mu + k * n_par));
-    SnapshotErrors(t, m, k, &eu, &el);
+    if (m->scene->n_times)
+      PetscCall(PathErrors(t, m, k, &eu, &el));
+    else
+      SnapshotErrors(t, m, k, &eu, &el);
     if (m->prediction.reason < 0 || !(eu < HYCO_JUDGED_WORST)) eu = HYCO_JUDGED_WORST;
     if (m->prediction.reason < 0 || !(el < HYCO_JUDGED_WORST)) el = HYCO_JUDGED_WORST;
-    *u += eu / t->n_s;
-    *lambda += el / t->n_s;
+    *u += eu / n;
+    *lambda += el / n;
   }
+  if (m->scene->n_times) PetscCall(HycoROMSetSteps(m, 0, NULL));
   m->reconstruct = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

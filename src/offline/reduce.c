@@ -6,6 +6,26 @@
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
 
+PetscErrorCode HycoReducerCount(HycoReducer t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, &t->n_s, NULL, NULL));
+  t->n_s *= HycoSnapshotsSteps(t->scene);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[])
+{
+  const PetscInt n_steps = HycoSnapshotsSteps(t->scene);
+  const PetscReal *all;
+  PetscInt n_par;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &all));
+  HycoSceneSetTime(t->scene, all + k / n_steps * n_par, t->scene->n_times ? t->scene->times[k % n_steps] : 0, mu);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Snapshots less their lifting r(u0): zero on the fixed unknowns. */
 static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
 {
@@ -116,18 +136,98 @@ PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. */
+/* Paths that move this much less than the largest are not brought to its size: they may be nothing but noise. */
+#define SLIGHT 1e-3
+
+/* The modes of path j of S, times their singular values, in V (NULL: none), and the first singular value. */
+static PetscErrorCode PathModes(HycoReducer t, Mat S, PetscInt j, PetscReal tol, Mat *V, PetscReal *first)
+{
+  const PetscInt n = HycoSnapshotsSteps(t->scene);
+  PetscReal *sigma;
+  PetscInt l;
+  Vec scale;
+  Mat part, path;
+
+  PetscFunctionBegin;
+  PetscCall(MatDenseGetSubMatrix(S, PETSC_DECIDE, PETSC_DECIDE, j * n, (j + 1) * n, &part));
+  PetscCall(MatDuplicate(part, MAT_COPY_VALUES, &path));
+  PetscCall(MatDenseRestoreSubMatrix(S, &part));
+  PetscCall(PetscCalloc1(n + 1, &sigma));
+  PetscCall(HycoReducerPOD(t, path, tol, 0, V, &l, sigma));
+  PetscCall(MatDestroy(&path));
+  *first = sigma[0];
+  if (!l) PetscCall(MatDestroy(V));
+  if (l) {
+    PetscCall(MatCreateVecs(*V, &scale, NULL));
+    for (PetscInt k = 0; k < l; k++) PetscCall(VecSetValue(scale, k, t->rank ? 0 : sigma[k], ADD_VALUES));
+    PetscCall(VecAssemblyBegin(scale));
+    PetscCall(VecAssemblyEnd(scale));
+    PetscCall(MatDiagonalScale(*V, NULL, scale));
+    PetscCall(VecDestroy(&scale));
+  }
+  PetscCall(PetscFree(sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes of the paths side by side, each path brought to the size of the largest: a slow one counts as much as a
+   fast one. */
+static PetscErrorCode JoinPaths(HycoReducer t, Mat S, PetscReal tol, Mat *joined)
+{
+  const PetscInt paths = t->n_s / HycoSnapshotsSteps(t->scene);
+  PetscInt N, rows, n = 0, at = 0;
+  PetscReal *first, largest = 0;
+  Mat *V;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(S, &N, NULL));
+  PetscCall(MatGetLocalSize(S, &rows, NULL));
+  PetscCall(PetscMalloc2(paths, &V, paths, &first));
+  for (PetscInt j = 0; j < paths; j++) {
+    PetscInt l = 0;
+
+    V[j] = NULL;
+    PetscCall(PathModes(t, S, j, tol, &V[j], &first[j]));
+    if (V[j]) PetscCall(MatGetSize(V[j], NULL, &l));
+    n += l;
+    largest = PetscMax(largest, first[j]);
+  }
+  PetscCall(MatCreateDense(PetscObjectComm((PetscObject)S), rows, PETSC_DECIDE, N, PetscMax(n, 1), NULL, joined));
+  for (PetscInt j = 0; j < paths; j++) {
+    PetscInt l;
+    Mat part;
+
+    if (!V[j]) continue;
+    PetscCall(MatGetSize(V[j], NULL, &l));
+    PetscCall(MatScale(V[j], largest / PetscMax(first[j], SLIGHT * largest)));
+    PetscCall(MatDenseGetSubMatrix(*joined, PETSC_DECIDE, PETSC_DECIDE, at, at + l, &part));
+    PetscCall(MatCopy(V[j], part, SAME_NONZERO_PATTERN));
+    PetscCall(MatDenseRestoreSubMatrix(*joined, &part));
+    PetscCall(MatDestroy(&V[j]));
+    at += l;
+  }
+  PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*joined, MAT_FINAL_ASSEMBLY));
+  PetscCall(PetscFree2(V, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. Of paths
+   that of each, then of these. */
 static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool all)
 {
   HycoBasis *basis = &t->basis[kind];
   const PetscInt most = kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0;
-  PetscInt N;
+  const PetscReal tol = all ? 0 : t->tol[kind];
+  PetscInt N, n;
+  Mat joined = S;
 
   PetscFunctionBegin;
-  PetscCall(MatGetSize(S, &N, NULL));
+  if (t->scene->n_times) PetscCall(JoinPaths(t, S, tol, &joined));
+  PetscCall(MatGetSize(joined, &N, &n));
   PetscCall(PetscCalloc1(t->n_s + 1, &basis->sigma));
-  basis->n_sigma = PetscMin(N, t->n_s);
-  PetscCall(HycoReducerPOD(t, S, all ? 0 : t->tol[kind], most, &basis->V, &basis->l, basis->sigma));
+  basis->n_sigma = PetscMin(N, n);
+  PetscCall(HycoReducerPOD(t, joined, tol, most, &basis->V, &basis->l, basis->sigma));
+  if (joined != S) PetscCall(MatDestroy(&joined));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -315,18 +415,17 @@ PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremize
 {
   HycoFOM f = t->fom;
   const PetscInt n = t->n_s, n_own = f->part->n_owned * t->sizes[3];
-  PetscInt n_par;
-  const PetscReal *mu;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
   Mat M, R, X, factor;
   KSP ksp;
   PetscBool singular;
   PC pc;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
   PetscCall(MatCreateDense(HycoComm(t), n_own, PETSC_DECIDE, t->sizes[0] * t->sizes[3], n, NULL, &R));
   for (PetscInt k = 0; k < n; k++) {
-    PetscCall(HycoFOMSetParameters(f, mu + k * n_par));
+    PetscCall(HycoReducerColumn(t, k, mu));
+    PetscCall(HycoFOMSetParameters(f, mu));
     HycoOnRoot(HycoComm(t), SetForces(t, k, R));
   }
   PetscCall(MatAssemblyBegin(R, MAT_FINAL_ASSEMBLY));
@@ -369,17 +468,17 @@ static PetscErrorCode DualGram(HycoReducer t, PetscReal G[])
 static PetscErrorCode MoveWherePresses(HycoReducer t, PetscInt k)
 {
   const size_t m = (size_t)t->sizes[2];
-  PetscInt n_par, most = 0;
-  const PetscReal *mu;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscInt most = 0;
 
   PetscFunctionBegin;
   if (!t->fom->searches) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
   for (PetscInt q = 1; q < t->n_s && t->rank == 0; q++) {
     if (t->Lambda[(size_t)q * m + (size_t)k] > t->Lambda[(size_t)most * m + (size_t)k]) most = q;
   }
   PetscCallMPI(MPI_Bcast(&most, 1, MPIU_INT, 0, HycoComm(t)));
-  PetscCall(HycoFOMSetParameters(t->fom, mu + most * n_par));
+  PetscCall(HycoReducerColumn(t, most, mu));
+  PetscCall(HycoFOMSetParameters(t->fom, mu));
   HycoOnRoot(HycoComm(t), HycoPairsMove(t->fom->fe_surface, &t->fom->pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -454,7 +553,7 @@ static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes
 /* The dual snapshots. Rank 0. */
 static PetscErrorCode ReadForces(HycoReducer t, HycoSnapshots store)
 {
-  const PetscInt m = t->sizes[2];
+  const PetscInt m = t->sizes[2], steps = HycoSnapshotsSteps(t->scene);
   PetscInt n_par;
   const PetscReal *mu;
 
@@ -462,7 +561,8 @@ static PetscErrorCode ReadForces(HycoReducer t, HycoSnapshots store)
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
   PetscCall(PetscMalloc1((size_t)m * (size_t)t->n_s + 1, &t->Lambda));
   for (PetscInt k = 0; k < t->n_s; k++)
-    PetscCall(HycoSnapshotsReadRows(store, mu + k * n_par, "lambda", 0, m, t->Lambda + (size_t)k * (size_t)m));
+    PetscCall(HycoSnapshotsReadRows(store, mu + k / steps * n_par, k % steps, "lambda", 0, m,
+                                    t->Lambda + (size_t)k * (size_t)m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -486,7 +586,30 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t)
   PetscCall(TakeDisplacements(t));
   PetscCall(TakeField(t, HYCO_SEED_STRESS, n_sigma, &t->n_seeds_cell, &t->seeds_cell));
   PetscCall(TakeField(t, HYCO_SEED_FORCE, dim, &t->n_seeds_node, &t->seeds_node));
+  PetscCall(TakeField(t, HYCO_SEED_INELASTIC, 1, &t->n_seeds_cell, &t->seeds_cell));
   if (t->seed[HYCO_SEED_DUAL]) PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The times of the steps of the training paths. */
+static PetscErrorCode ReadTaken(HycoReducer t, HycoSnapshots store)
+{
+  PetscInt n, n_par;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, &n, &n_par, &mu));
+  PetscCall(PetscCalloc1(n + 1, &t->taken_start));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal *taken;
+    PetscInt count;
+
+    PetscCall(HycoSnapshotsReadTaken(store, mu + k * n_par, &count, &taken));
+    PetscCall(PetscRealloc((size_t)(t->taken_start[k] + count + 1) * sizeof(PetscReal), &t->taken));
+    PetscCall(PetscArraycpy(t->taken + t->taken_start[k], taken, count));
+    t->taken_start[k + 1] = t->taken_start[k] + count;
+    PetscCall(PetscFree(taken));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -496,6 +619,8 @@ PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool a
   PetscCall(ReduceDisplacements(t, store, all));
   PetscCall(ReduceField(t, store, "sigma", HYCO_SEED_STRESS, all));
   PetscCall(ReduceField(t, store, "force", HYCO_SEED_FORCE, all));
+  PetscCall(ReduceField(t, store, "inelastic", HYCO_SEED_INELASTIC, all));
+  if (t->scene->n_times) HycoOnRoot(HycoComm(t), ReadTaken(t, store));
   PetscCall(ReduceForces(t, store));
   PetscCall(HycoReducerTakeBases(t));
   PetscFunctionReturn(PETSC_SUCCESS);

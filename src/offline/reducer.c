@@ -1,5 +1,6 @@
 /* HycoReducer: made, configured, destroyed. */
 #include <hycoalgorithms.h>
+#include <hycomaterialimpl.h>
 #include <hycoreducerimpl.h>
 #include <string.h>
 
@@ -58,10 +59,12 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  PetscCall(HycoSceneRefuseHistory(scene, "training"));
   PetscCall(Create(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
+  for (PetscInt b = 0; b < scene->n_bodies && scene->n_times; b++) {
+    if (!scene->body[b].law->linear) (*reducer)->seed[HYCO_SEED_INELASTIC] = PETSC_TRUE;
+  }
   PetscCall(PetscObjectSetOptions((PetscObject)*reducer, scene->options));
   PetscCall(HycoReducerSetType(*reducer, HYCO_ROM_HYBRID));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -99,7 +102,8 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
   PetscCall(MatDestroy(&t->S));
-  HycoFreeAll(&t->U_rid, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds);
+  HycoFreeAll(&t->U_rid, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds,
+              &t->taken_start, &t->taken);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -270,7 +274,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
 /* -hyco_rid_modes */
 static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char ***list)
 {
-  static const char *const words[HYCO_N_SEEDS] = {"displacement", "stress", "force", "dual"};
+  static const char *const words[HYCO_N_SEEDS] = {"displacement", "stress", "force", "dual", "inelastic"};
   char wrong[HYCO_LINE] = "";
 
   PetscFunctionBegin;
@@ -285,7 +289,10 @@ static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char ***list)
       PetscCall(PetscStrncpy(wrong, (*list)[i], sizeof(wrong)));
   }
   PetscCall(PetscStrArrayDestroy(list));
-  HycoCheck(!wrong[0], "-hyco_rid_modes has \"%s\"; its words are displacement, stress, force and dual", wrong);
+  HycoCheck(!wrong[0], "-hyco_rid_modes has \"%s\"; its words are displacement, stress, force, dual and inelastic",
+            wrong);
+  HycoCheck(!t->seed[HYCO_SEED_INELASTIC] || !t->scene || t->scene->n_times,
+            "-hyco_rid_modes inelastic is for scenes with a history, and this one has none");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -317,8 +324,8 @@ static PetscErrorCode ReadRID(HycoReducer t)
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("hybrid or condensed"));
   PetscCall(HycoOptionsList("-hyco_rid_modes",
-                            "bases whose DEIM points seed the RID: displacement, stress, force, dual "
-                            "[displacement,stress,force]",
+                            "bases whose DEIM points seed the RID: displacement, stress, force, dual, of a history "
+                            "inelastic [displacement,stress,force,inelastic]",
                             &n_kinds, &kinds, &set));
   if (set) PetscCall(TakeSeedKinds(t, n_kinds, &kinds));
   PetscCall(
@@ -347,6 +354,7 @@ static PetscErrorCode ReadRID(HycoReducer t)
                             "displacements kept full order: fewest for full row rank, all contact ones, all",
                             HycoHybrids, &hybrid, &t->pinned[HYCO_CHOICE_HYBRID]));
   PetscOptionsEnd();
+  t->tol[HYCO_SEED_INELASTIC] = t->tol[HYCO_SEED_STRESS];
   t->hybrid = (HycoHybrid)hybrid;
   PetscCall(TakeRegion(t, region));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -363,6 +371,9 @@ static PetscErrorCode CheckType(HycoReducer t)
   HycoCheckModel(t->prototype->traits.force_basis || strcmp(dual, "fe") == 0,
                  "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
                  dual);
+  HycoCheckModel(t->prototype->traits.history || !t->scene || !t->scene->n_times,
+                 "the scene has a history (history_times), and -hyco_model_type %s has no paths; take hybrid",
+                 t->prototype->type);
   if (!t->prototype->traits.whole) PetscFunctionReturn(PETSC_SUCCESS);
   t->whole_rid = PETSC_TRUE;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;

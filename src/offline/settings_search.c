@@ -16,7 +16,7 @@
 
 /* Where no target is given: errors that most studies do not see. */
 static const PetscReal usual[HYCO_N_ERRORS] = {
-    [HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2, [HYCO_ERROR_LAMBDA] = 1e-2};
+    [HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2, [HYCO_ERROR_LAMBDA] = 1e-2, [HYCO_ERROR_INELASTIC] = 2e-2};
 
 #define LITTLE        1.25 /* a model that misses by so much more than the best is as good, if it is cheaper */
 #define EXTENSION     2.5  /* edges of the contact surface's facets */
@@ -87,6 +87,7 @@ static PetscErrorCode SetRecipe(HycoReducer t, const HycoRecipe *r)
   for (PetscInt k = HYCO_SEED_STRESS; k <= HYCO_SEED_FORCE; k++) {
     if (t->tol[k] == t->tol[HYCO_SEED_DISPLACEMENT]) t->tol[k] = r->pod_tol;
   }
+  t->tol[HYCO_SEED_INELASTIC] = t->tol[HYCO_SEED_STRESS];
   t->tol[HYCO_SEED_DISPLACEMENT] = r->pod_tol;
   t->extension = r->contact_extension;
   t->layers = r->layers;
@@ -318,7 +319,8 @@ static PetscErrorCode TryType(Search *s, const char name[])
   if (t->pinned[HYCO_CHOICE_TYPE])
     wanted = (PetscBool)(strcmp(name, s->given.type) == 0);
   else
-    wanted = type->ops->offers ? (*type->ops->offers)(t, s->targets) : PETSC_FALSE;
+    wanted = type->ops->offers && (type->traits.history || !t->scene->n_times) ? (*type->ops->offers)(t, s->targets)
+                                                                               : PETSC_FALSE;
   if (wanted && type->traits.settings == HYCO_SETTINGS_NONE) PetscCall(TryOne(s, type));
   if (wanted && type->traits.settings == HYCO_SETTINGS_RID) PetscCall(TryHybrids(s, type));
   if (wanted && type->traits.settings == HYCO_SETTINGS_MODES) PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
@@ -488,7 +490,7 @@ static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report
     report->n_added += n_add;
     if (t->added) HycoOnRoot(HycoComm(t), t->added(n_add, by, t->attempt_ctx));
     t->samples = *grown;
-    PetscCall(HycoSamplesGet(*grown, &t->n_s, NULL, NULL));
+    PetscCall(HycoReducerCount(t));
     PetscCall(HycoReducerResetBases(t));
     HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(s->store, *grown, t->progress, t->progress_ctx));
   }

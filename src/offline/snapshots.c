@@ -1,4 +1,5 @@
 /* HycoSnapshots: a folder with one file per parameter value, each complete or absent. */
+#include <hycopath.h>
 #include <hycosnapshotsimpl.h>
 #include <hycofields.h>
 #include <hycofile.h>
@@ -41,7 +42,6 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
 
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  PetscCall(HycoSceneRefuseHistory(scene, "a store of solutions"));
   PetscCall(PetscHeaderCreate(s, HYCO_SNAPSHOTS_CLASSID, "HycoSnapshots", "Store of full-order solutions", "Hyco", comm,
                               HycoSnapshotsDestroy, HycoSnapshotsView));
   PetscCall(PetscObjectReference((PetscObject)scene));
@@ -86,8 +86,8 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   same = strcmp(text, mine) == 0;
   PetscCall(PetscFree(text));
   HycoCheck(same,
-            "%s is a snapshot of another scene or mesh; remove the folder %s, or name another with -hyco_snapshots",
-            path, s->folder);
+            "%s is a snapshot of another scene%s or mesh; remove the folder %s, or name another with -hyco_snapshots",
+            path, s->scene->n_times ? ", history" : "", s->folder);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -193,7 +193,7 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
 }
 
 /* What rank 0 has of a solution. */
-static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[])
+static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
 {
   char fingerprint[32];
 
@@ -201,7 +201,6 @@ static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const Pe
   snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
   PetscCall(HycoH5WriteText(h, "fingerprint", fingerprint));
   PetscCall(HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu));
-  PetscCall(HycoH5WriteReal(h, "lambda", fom->n_contacts, 1, fom->lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -211,7 +210,8 @@ static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const 
   const HycoFileOrder *rows;
 
   PetscFunctionBegin;
-  HycoOnRoot(HycoComm(fom), WriteHead(s, fom, h, mu));
+  HycoOnRoot(HycoComm(fom), WriteHead(s, h, mu));
+  HycoOnRoot(HycoComm(fom), HycoH5WriteReal(h, "lambda", fom->n_contacts, 1, fom->lambda));
   PetscCall(HycoFOMGetRows(fom, &rows));
   PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "U", HYCO_ON_NODES, MPIU_REAL, dim, 1, fom->u));
   PetscCall(HycoFieldWrite(h, rows, fom->n_cells, "sigma", HYCO_ON_CELLS, MPIU_REAL, fom->fe->n_sigma, 1, fom->sigma));
@@ -235,12 +235,108 @@ static PetscErrorCode WriteSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* "step-0003/U"; without a history the field's own name. */
+static void NameField(HycoSnapshots s, PetscInt k, const char field[], char name[HYCO_LINE])
+{
+  if (s->scene->n_times)
+    HycoFormat(name, "step-%04d/%s", (int)k, field);
+  else
+    HycoFormat(name, "%s", field);
+}
+
+/* "gap = 0.05, q2 = 40" */
+static void NamePoint(HycoSnapshots s, const PetscReal mu[], char at[HYCO_LINE])
+{
+  at[0] = '\0';
+  for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
+    const size_t length = strlen(at);
+
+    snprintf(at + length, HYCO_LINE - length, "%s%s = %.10g", p ? ", " : "", s->scene->parameter[p], (double)mu[p]);
+  }
+}
+
+/* A path on its way into its file. */
+typedef struct {
+  HycoSnapshots s;
+  HycoH5 h;
+  PetscReal *force, *inelastic;
+} PathWriter;
+
+/* A HycoStepMonitor: the fields of a listed time. The forces are those that the bodies resist with, f_int. */
+static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
+{
+  PathWriter *w = (PathWriter *)ctx;
+  const PetscInt dim = fom->fe->dim;
+  const HycoFileOrder *rows;
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(fom, &rows));
+  PetscCall(HycoFOMStress(fom));
+  PetscCall(HycoFEStateFields(fom->fe, fom->path->begin, NULL, NULL, w->inelastic, NULL));
+  PetscCall(HycoFOMToLocal(fom, fom->path->f_old, w->force));
+  for (PetscInt k = 0; k < fom->fe->n_dof; k++) w->force[k] = fom->fe->fixed[k] ? 0 : w->force[k];
+  NameField(w->s, step->index, "lambda", name);
+  HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, name, fom->n_contacts, 1, fom->lambda));
+  NameField(w->s, step->index, "U", name);
+  PetscCall(HycoFieldWrite(w->h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, dim, 1, fom->u));
+  NameField(w->s, step->index, "sigma", name);
+  PetscCall(HycoFieldWrite(w->h, rows, fom->n_cells, name, HYCO_ON_CELLS, MPIU_REAL, fom->fe->n_sigma, 1, fom->sigma));
+  NameField(w->s, step->index, "force", name);
+  PetscCall(HycoFieldWrite(w->h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, dim, 1, w->force));
+  NameField(w->s, step->index, "inelastic", name);
+  PetscCall(HycoFieldWrite(w->h, rows, fom->n_cells, name, HYCO_ON_CELLS, MPIU_REAL, 1, 1, w->inelastic));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solves the path into its file; one that does not reach its end is no sample. */
+static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[])
+{
+  HycoHistory history;
+  char at[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMSetStepMonitor(fom, WriteStep, w));
+  PetscCall(HycoFOMSolve(fom, w->s->scene->n_parameters, mu));
+  PetscCall(HycoFOMGetHistory(fom, &history));
+  NamePoint(w->s, mu, at);
+  HycoCheck(history.ended, "the path at %s ends at t = %.10g, beyond which its steps have become too small: %s", at,
+            (double)history.t, history.why);
+  HycoOnRoot(HycoComm(fom), WriteHead(w->s, w->h, mu));
+  HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, "taken", history.n_taken, 1, history.taken));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One path by one group: solved and stored, with what its listed times have. Collective on the group. */
+static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], PetscReal force[])
+{
+  PathWriter w = {.s = s, .force = force};
+  char path[PETSC_MAX_PATH_LEN];
+  PetscErrorCode ierr, failed;
+
+  PetscFunctionBegin;
+  PetscCheck(!fom->path->checkpoint[0], HycoComm(fom), PETSC_ERR_USER,
+             "-hyco_checkpoint is for hyco solve; training keeps each path that it has solved in its store");
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(PetscMalloc1(fom->part->n_cells, &w.inelastic));
+  PetscCall(HycoH5CreateShared(HycoComm(fom), path, &w.h));
+  ierr = WritePath(&w, fom, mu);
+  failed = HycoH5Close(&w.h, (PetscBool)!ierr);
+  PetscCall(PetscFree(w.inelastic));
+  PetscCall(ierr ? ierr : failed);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One sample by one group: solve, check, store. Collective on the group. */
 static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], PetscReal force[])
 {
   HycoSummary summary;
 
   PetscFunctionBegin;
+  if (fom->path) {
+    PetscCall(SolvePath(s, fom, mu, force));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoFOMSolve(fom, s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
   HycoCheck(
@@ -248,13 +344,9 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
       "neither supports nor contact keep %s: full order can be regularised, a reduced model cannot; fix a component",
       summary.regularised);
   if (summary.reason < 0) {
-    char at[HYCO_LINE] = "";
+    char at[HYCO_LINE];
 
-    for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
-      const size_t length = strlen(at);
-
-      snprintf(at + length, sizeof(at) - length, "%s%s = %.10g", p ? ", " : "", s->scene->parameter[p], (double)mu[p]);
-    }
+    NamePoint(s, mu, at);
     SETERRQ(HycoComm(fom), PETSC_ERR_USER, "the snapshot at %s: %s%s%s", at, HycoReasonName(summary.reason),
             summary.free_motion[0] ? "; no support keeps " : "", summary.free_motion);
   }
@@ -348,23 +440,27 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
 static PetscErrorCode ReadColumns(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt lo, PetscInt rows,
                                   PetscInt total, PetscScalar data[], PetscInt lda)
 {
+  const PetscInt n_steps = HycoSnapshotsSteps(s->scene);
   PetscInt n, n_par;
   const PetscReal *mu;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   for (PetscInt k = 0; k < n; k++) {
-    char path[PETSC_MAX_PATH_LEN];
+    char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
     HycoH5 h;
     PetscInt size, one;
 
     PetscCall(SamplePath(s, mu + k * n_par, path));
     PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
     PetscCall(CheckFingerprint(s, h, path));
-    PetscCall(HycoH5GetSize(h, field, &size, &one));
-    HycoCheck(size == total, "%s: %s has %d rows where other snapshots have %d; remove the folder", path, field,
-              (int)size, (int)total);
-    PetscCall(HycoH5ReadRows(h, field, lo, rows, 1, data + (size_t)k * (size_t)lda));
+    for (PetscInt j = 0; j < n_steps; j++) {
+      NameField(s, j, field, name);
+      PetscCall(HycoH5GetSize(h, name, &size, &one));
+      HycoCheck(size == total, "%s: %s has %d rows where other snapshots have %d; remove the folder", path, name,
+                (int)size, (int)total);
+      PetscCall(HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)(k * n_steps + j) * (size_t)lda));
+    }
     PetscCall(HycoH5Close(&h, PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -373,7 +469,7 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, HycoSamples samples, const ch
 static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt *rows)
 {
   const PetscReal *mu;
-  char path[PETSC_MAX_PATH_LEN];
+  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
   HycoH5 h;
   PetscInt one;
 
@@ -381,7 +477,8 @@ static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char
   PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
   PetscCall(SamplePath(s, mu, path));
   PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  PetscCall(HycoH5GetSize(h, field, rows, &one));
+  NameField(s, 0, field, name);
+  PetscCall(HycoH5GetSize(h, name, rows, &one));
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -397,7 +494,7 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const
   PetscCallMPI(MPI_Bcast(&total, 1, MPIU_INT, 0, HycoComm(s)));
   blocks = total / block;
   PetscCall(PetscSplitOwnership(HycoComm(s), &own, &blocks));
-  PetscCall(MatCreateDense(HycoComm(s), own * block, PETSC_DECIDE, total, n, NULL, S));
+  PetscCall(MatCreateDense(HycoComm(s), own * block, PETSC_DECIDE, total, n * HycoSnapshotsSteps(s->scene), NULL, S));
   PetscCall(MatGetOwnershipRange(*S, &lo, &hi));
   PetscCall(MatDenseGetLDA(*S, &lda));
   PetscCall(MatDenseGetArray(*S, &data));
@@ -408,10 +505,10 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], const char field[], PetscInt first,
-                                     PetscInt n, PetscReal value[])
+PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], PetscInt k, const char field[],
+                                     PetscInt first, PetscInt n, PetscReal value[])
 {
-  char path[PETSC_MAX_PATH_LEN];
+  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
   HycoH5 h;
   PetscErrorCode ierr;
 
@@ -419,7 +516,26 @@ PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], cons
   PetscCall(SamplePath(s, mu, path));
   PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
   ierr = CheckFingerprint(s, h, path);
-  if (!ierr) ierr = HycoH5ReadRows(h, field, first, n, 1, value);
+  NameField(s, k, field, name);
+  if (!ierr) ierr = HycoH5ReadRows(h, name, first, n, 1, value);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], PetscInt *n, PetscReal **taken)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  HycoH5 h;
+  PetscInt one = 1;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *n = -1;
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  ierr = CheckFingerprint(s, h, path);
+  if (!ierr) ierr = HycoH5LoadReal(h, "taken", n, &one, taken);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

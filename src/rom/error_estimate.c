@@ -84,7 +84,8 @@ static PetscReal Tail(HycoROM m)
   return Quotient(last, all);
 }
 
-PetscErrorCode HycoTrustMeasure(HycoROM m, PetscReal feature[])
+/* Of the solution as it stands, of a path of the listed time that is shown. */
+static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
 {
   const PetscInt n_par = m->scene->n_parameters;
 
@@ -101,6 +102,27 @@ PetscErrorCode HycoTrustMeasure(HycoROM m, PetscReal feature[])
   feature[DISTANCE] = m->n_points && n_par ? PETSC_MAX_REAL : 0;
   for (PetscInt k = 0; n_par && k < m->n_points; k++)
     feature[DISTANCE] = PetscMin(feature[DISTANCE], HycoTrustDistance(m->scene, m->fe->mu, m->points + k * n_par));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of a path the largest of its listed times. */
+PetscErrorCode HycoTrustMeasure(HycoROM m, PetscReal feature[])
+{
+  const PetscInt shown = m->trace.shown;
+  PetscReal one[HYCO_TRUST_FEATURES];
+
+  PetscFunctionBegin;
+  if (!m->trace.n_listed) {
+    PetscCall(MeasureOne(m, feature));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscArrayzero(feature, HYCO_TRUST_FEATURES));
+  for (PetscInt k = 0; k < m->trace.n_listed; k++) {
+    PetscCall(HycoROMSetStep(m, k));
+    PetscCall(MeasureOne(m, one));
+    for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) feature[j] = PetscMax(feature[j], one[j]);
+  }
+  PetscCall(HycoROMSetStep(m, shown));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

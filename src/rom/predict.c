@@ -58,7 +58,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   p->seconds.setup = HycoNow() - begin;
   begin = HycoNow();
   PetscUseTypeMethod(m, solve, mu);
-  if (m->ops->reconstruct && m->reconstruct && p->reason > 0)
+  if (m->ops->reconstruct && m->reconstruct && p->reason > 0 && !m->scene->n_times) /* of a path at its times */
     HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   p->seconds.total = HycoNow() - begin;
   m->solved = PETSC_TRUE;

@@ -1,7 +1,8 @@
 /*
   The scene's quantities of a prediction: displacements and stresses of the cells that they need, wherever these are,
-  from the modes there, U = r(u0) + V gamma (30).
+  from the modes there, U = r(u0) + V gamma (30); of a path the laws are replayed there up to the time that is shown.
 */
+#include <hycoinelastic.h>
 #include <hycoquantities.h>
 #include <hycoromimpl.h>
 
@@ -66,6 +67,77 @@ static PetscErrorCode Fill(HycoROM m, HycoProbe p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* p->u of these coefficients and full-order displacements. */
+static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const PetscReal U_fe[])
+{
+  for (PetscInt k = 0; k < p->fe->n_dof; k++) {
+    p->u[k] = p->fe->u0[k];
+    for (PetscInt j = 0; j < m->l; j++) p->u[k] += p->V[k * m->l + j] * gamma[j];
+  }
+  for (PetscInt k = 0; k < m->n_fe; k++) {
+    if (p->fe_at[k] >= 0) p->u[p->fe_at[k]] = U_fe[k];
+  }
+}
+
+/* The laws from the first time to that which is shown; p->u and p->sigma there. *state: begin and end, the caller's. */
+static PetscErrorCode Replay(HycoROM m, HycoProbe p, HycoFEState state[2], PetscReal f_int[])
+{
+  const HycoTrace *r = &m->trace;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k <= r->at[r->shown]; k++) {
+    PetscReal mu[HYCO_MAX_PARAMETERS];
+    HycoFEStepReport report;
+    HycoFEState begin = state[1];
+
+    HycoSceneSetTime(m->scene, m->fe->mu, r->t[k], mu);
+    PetscCall(HycoFESetParameters(p->fe, mu));
+    if (!k) PetscCall(HycoFEStateCreate(p->fe, &state[0]));
+    if (!k) PetscCall(HycoFEStateCreate(p->fe, &state[1]));
+    if (!k) begin = state[1];
+    Displace(m, p, r->gamma + (size_t)k * (size_t)m->l, r->U_fe + (size_t)k * (size_t)m->n_fe);
+    PetscCall(
+        HycoFEStep(p->fe, p->u, r->t[PetscMax(k - 1, 0)], r->t[k], state[0], state[1], f_int, PETSC_FALSE, &report));
+    HycoCheck(!report.failed, "the laws have no answer to the predicted displacements at t = %.10g: %s",
+              (double)r->t[k], report.why);
+    state[1] = state[0];
+    state[0] = begin;
+  }
+  PetscCall(HycoFEStateFields(p->fe, state[0], p->sigma, NULL, NULL, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReplayAll(HycoROM m, HycoProbe p)
+{
+  HycoFEState state[2] = {NULL, NULL};
+  PetscReal *f_int;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(p->fe->n_dof, &f_int));
+  ierr = Replay(m, p, state, f_int);
+  PetscCall(PetscFree(f_int));
+  PetscCall(HycoFEStateDestroy(&state[0]));
+  PetscCall(HycoFEStateDestroy(&state[1]));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* p->u and p->sigma of a prediction without a history. */
+static PetscErrorCode Follow(HycoROM m, HycoProbe p)
+{
+  PetscReal *U_fe;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_fe, &U_fe));
+  for (PetscInt k = 0; k < m->n_fe; k++) U_fe[k] = m->U[m->fe_dof[k]];
+  PetscCall(HycoFESetParameters(p->fe, m->fe->mu));
+  Displace(m, p, m->gamma, U_fe);
+  PetscCall(PetscFree(U_fe));
+  PetscCall(HycoFEStress(p->fe, p->u, p->sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoROMMeasureQuantities(HycoROM m, PetscReal value[])
 {
   HycoProbe p;
@@ -81,15 +153,7 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, PetscReal value[])
     PetscCall(ierr);
   }
   p = m->probe;
-  PetscCall(HycoFESetParameters(p->fe, m->fe->mu));
-  for (PetscInt k = 0; k < p->fe->n_dof; k++) {
-    p->u[k] = p->fe->u0[k];
-    for (PetscInt j = 0; j < m->l; j++) p->u[k] += p->V[k * m->l + j] * m->gamma[j];
-  }
-  for (PetscInt k = 0; k < m->n_fe; k++) {
-    if (p->fe_at[k] >= 0) p->u[p->fe_at[k]] = m->U[m->fe_dof[k]];
-  }
-  PetscCall(HycoFEStress(p->fe, p->u, p->sigma));
+  PetscCall(m->trace.n_listed ? ReplayAll(m, p) : Follow(m, p));
   PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

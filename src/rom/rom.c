@@ -88,6 +88,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscCall(HycoRowsDestroy(&m->rows));
   PetscCall(HycoFEDestroy(&m->fe));
   m->of_fe = NULL;
+  PetscCall(HycoTraceFree(m));
   HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -147,9 +148,9 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  PetscCall(HycoSceneRefuseHistory(scene, "a reduced model"));
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
+  PetscCall(HycoSceneCompareHistory(m->scene, scene, m->path));
   HycoCheck(
       strcmp(text, m->fingerprint) == 0,
       "%s was trained on another scene or mesh; give the scene, the mesh and the entries that it was trained with",
@@ -186,6 +187,10 @@ PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
 
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
+  if (m->trace.n_listed) {
+    *energy = m->trace.history.step[m->trace.shown].stored;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscTryTypeMethod(m, energy, energy, &known);
   if (known) PetscFunctionReturn(PETSC_SUCCESS);
   *energy = 0;
@@ -257,6 +262,7 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   p->rid_fraction = (PetscReal)m->mesh->n_cells / m->whole_cells;
   p->condition = m->numbers[0];
   SumForces(m, p);
+  HycoTraceSummary(m, p);
   p->u_norm2 = 0;
   for (PetscInt c = 0; c < 3; c++) p->u_min[c] = p->u_max[c] = 0;
   for (PetscInt k = 0, first = 1; k < m->fe->n_dof; k++) {
@@ -288,7 +294,9 @@ PetscErrorCode HycoROMGetRID(HycoROM m, PetscInt *n_nodes, const PetscInt *node_
   if (U) *U = m->U;
   if (n_cells) *n_cells = m->mesh->n_cells;
   if (cell_ids) *cell_ids = m->mesh->cell_id;
-  if (sigma) {
+  if (sigma && m->trace.n_listed)
+    *sigma = m->trace.sigma + (size_t)m->trace.shown * (size_t)(m->mesh->n_cells * m->fe->n_sigma);
+  else if (sigma) {
     PetscCall(HycoFEStress(m->fe, m->U, m->stress));
     *sigma = m->stress;
   }
@@ -339,6 +347,11 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  if (m->scene->n_times) {
+    PetscCall(HycoTraceWrite(m, path));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoROMGetWholeU(m, NULL, &U));
   PetscCall(PetscCalloc1(m->whole->n_cells, &rid));
   for (PetscInt e = 0; e < m->mesh->n_cells; e++) rid[m->mesh->cell_whole[e]] = 1;
@@ -367,6 +380,10 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
   PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, %sforces %.2e\n",
                                    (int)m->n_points, (double)m->numbers[1],
                                    m->traits.settings == HYCO_SETTINGS_RID ? "RID " : "", (double)m->numbers[2]));
+  if (m->scene->n_times)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  of paths: %d listed times from t = %g to %g, solved step by step\n",
+                                     (int)m->scene->n_times, (double)m->scene->times[0],
+                                     (double)m->scene->times[m->scene->n_times - 1]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
                                    (int)pod, pod ? (double)m->sigma[0] : 0., pod ? (double)m->sigma[pod - 1] : 0.));
   PetscTryTypeMethod(m, view, viewer);

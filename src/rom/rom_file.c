@@ -8,9 +8,11 @@
 
 /* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters.
    3: problem/type; what has none is hybrid. 4: the type may be condensed. 5: surfaces that a map moves are searched for
-   their masters, and a slave node may face none; models without such are written as 4. The kind is every type's, so
+   their masters, and a slave node may face none; models without such are written as 4. 6: of scenes with a history. The
+   kind is every type's, so
    that an older reader tells the format. */
-#define HYCO_ROM_FORMAT 5
+#define HYCO_ROM_FORMAT 6
+#define HYCO_ROM_MOVED  5
 #define HYCO_ROM_STILL  4
 #define HYCO_ROM_OLDEST 2
 #define HYCO_ROM_KIND   "hyco hybrid model"
@@ -398,12 +400,13 @@ static PetscErrorCode OpenWhole(HycoROM m)
 /* All but the whole mesh. */
 static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
 {
-  PetscInt format = m->pairs.room ? HYCO_ROM_FORMAT : HYCO_ROM_STILL;
+  PetscInt format = m->pairs.room ? HYCO_ROM_MOVED : HYCO_ROM_STILL;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m->pairs.n; k++) {
-    if (HycoPairsAlone(m->scene, &m->pairs, k)) format = HYCO_ROM_FORMAT;
+    if (HycoPairsAlone(m->scene, &m->pairs, k)) format = HYCO_ROM_MOVED;
   }
+  if (m->scene->n_times) format = HYCO_ROM_FORMAT;
   PetscCall(HycoH5WriteText(h, "kind", HYCO_ROM_KIND));
   PetscCall(HycoH5WriteInt(h, "format", 1, 1, &format));
   PetscCall(MoveProblem(h, m));

@@ -62,11 +62,12 @@ class Faults(Case):
         self.fails('solve', '-scene', path, '-mu', '0.01,1', words=['ring', 'norton', 'history'])
 
     def test_no_reduced_models(self):
+        """Of the types of model that have no paths, and where points are chosen."""
         model = self.path('m.h5')
         for ranks in (0, 2):
-            self.fails('train', '-scene', RING, '-grid', '2,2', '-model', model, words=['history'], ranks=ranks)
+            self.fails('train', '-scene', RING, '-grid', '2,2', '-model', model, '-hyco_model_type', 'condensed', words=['history', 'condensed'],
+                       ranks=ranks)
         self.fails('train', '-scene', RING, '-greedy', '-training_grid', '2,2', '-model', model, words=['history'])
-        self.fails('compare', '-scene', RING, '-grid', '2,2', '-model', model, words=['history'])
         self.fails('solve', '-scene', RING, '-grid', '2,2', words=['history'])
         self.assertFalse(os.path.exists(model))
 

@@ -109,7 +109,7 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   else
     PetscCall(g->table ? HycoTableCreateSparse(m) : HycoReducedCreateSparse(m));
   PetscCall(MatCreateVecs(g->Kr, &g->x, &g->Fr));
-  if (!dense) PetscCall(HycoLoadsCreate(m));
+  if (!dense && !m->scene->n_times) PetscCall(HycoLoadsCreate(m));
   if (m->n_L) {
     PetscCall(CreateReduced(m, m->n_L, m->n, dense, &g->Br));
     PetscCall(CreateReduced(m, m->n, m->n_L, dense, &g->Btr));
@@ -123,6 +123,7 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
   PetscCall(HycoSolverSetWarmStart(m->solver, PETSC_FALSE));
   if (HycoSolverNeedsSymmetry(m->solver)) PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
+  if (m->scene->n_times) PetscCall(HycoGalerkinPathCreate(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -133,6 +134,7 @@ PetscErrorCode HycoGalerkinReset(HycoROM m)
   PetscFunctionBegin;
   PetscCall(HycoReducedDestroy(&g->reduced));
   PetscCall(HycoLoadsDestroy(&g->loads));
+  PetscCall(HycoGalerkinPathDestroy(&g->path));
   PetscCall(HycoSystemDestroy(&g->system));
   PetscCall(MatDestroy(&g->K));
   PetscCall(MatDestroy(&g->B));
@@ -202,11 +204,11 @@ PetscErrorCode HycoGalerkinAssemble(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gamma, U on the nodes of mesh, Lambda on A_lambda. */
-static PetscErrorCode Unpack(HycoROM m)
+/* gamma, and U on the nodes of fe's mesh. */
+PetscErrorCode HycoGalerkinExpand(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
-  const PetscScalar *x, *L;
+  const PetscScalar *x;
   const PetscReal one = 1;
   PetscBLASInt l, n_dof, inc = 1;
 
@@ -222,6 +224,17 @@ static PetscErrorCode Unpack(HycoROM m)
   if (l) BLASgemv_("T", &l, &n_dof, &one, g->Vp, &l, m->gamma, &inc, &one, m->U, &inc);
   for (PetscInt f = 0; f < m->n_fe; f++) m->U[m->fe_dof[f]] = x[g->n_free + f];
   PetscCall(VecRestoreArrayRead(g->x, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* gamma, U on the nodes of mesh, Lambda on A_lambda. */
+PetscErrorCode HycoGalerkinUnpack(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscScalar *L;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinExpand(m));
   if (m->spread) PetscCall(PetscArrayzero(m->Lambda, m->pairs.n));
   m->spread = PETSC_FALSE;
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
@@ -244,6 +257,10 @@ PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
   PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
+  if (g->path) {
+    PetscCall(HycoGalerkinPathSolve(m, mu));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(Assemble(m, mu));
   p->seconds.assemble = HycoNow() - begin;
   HycoLogged(HYCO_EVENT_SOLVE, HycoLoadsSetFree(m, mu));
@@ -254,7 +271,7 @@ PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
   PetscCall(HycoSolverGetKKT(m->solver, &p->kkt));
   PetscCall(HycoSolverGetMethod(m->solver, &method));
   PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
-  PetscCall(Unpack(m));
+  PetscCall(HycoGalerkinUnpack(m));
   PetscCall(HycoGalerkinCheckForceless(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -386,17 +386,14 @@ PetscErrorCode HycoReducedFillContact(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vbar[A,:]^T F[A] and D[A_lambda] */
-PetscErrorCode HycoReducedFillVectors(HycoROM m)
+PetscErrorCode HycoReducedTest(HycoROM m, const PetscScalar F[], Vec Fr)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
-  const PetscScalar *F;
-  PetscScalar *f, *d;
+  PetscScalar *f;
 
   PetscFunctionBegin;
-  PetscCall(VecSet(g->Fr, 0));
-  PetscCall(VecGetArrayRead(g->F, &F));
-  PetscCall(VecGetArray(g->Fr, &f));
+  PetscCall(VecSet(Fr, 0));
+  PetscCall(VecGetArray(Fr, &f));
   for (PetscInt r = 0; r < g->reduced->n_rows; r++) {
     const PetscInt i = g->reduced->row[r];
 
@@ -404,7 +401,20 @@ PetscErrorCode HycoReducedFillVectors(HycoROM m)
     if (g->fe_at[i] >= 0) f[g->n_free + g->fe_at[i]] += F[i];
     for (PetscInt j = 0; j < g->n_free; j++) f[j] += g->Vp[(size_t)i * (size_t)m->l + (size_t)j] * F[i];
   }
-  PetscCall(VecRestoreArray(g->Fr, &f));
+  PetscCall(VecRestoreArray(Fr, &f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Vbar[A,:]^T F[A] and D[A_lambda] */
+PetscErrorCode HycoReducedFillVectors(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscScalar *F;
+  PetscScalar *d;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(g->F, &F));
+  PetscCall(HycoReducedTest(m, F, g->Fr));
   PetscCall(VecRestoreArrayRead(g->F, &F));
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
   if (g->gap) {

@@ -118,6 +118,82 @@ static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches
       here, there);
 }
 
+/* Paths first .. last-1 of the training, looked at on their way. */
+static PetscErrorCode ScanMyPaths(HycoReducer t, HycoROM m, PetscInt first, PetscInt last, PetscInt each,
+                                  PetscInt stride, PetscReal sign[], PetscReal ratio[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  PetscInt n_par;
+  const PetscReal *mu;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  m->reconstruct = PETSC_FALSE;
+  for (PetscInt k = first; k < last && !ierr; k++) {
+    g->watch = (HycoWatch){stride, sign + k * each, ratio + k * each};
+    ierr = HycoROMPredict(m, n_par, mu + k * n_par);
+  }
+  g->watch = (HycoWatch){0, NULL, NULL};
+  m->reconstruct = PETSC_TRUE;
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What was seen of n tangents, `each` of them along one training path. */
+static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscInt each, const PetscReal sign[],
+                                    const PetscReal ratio[])
+{
+  HycoScan *s = &((HycoGalerkin)m->data)->scan;
+  PetscInt positive = 0, worst = 0, change = -1, n_par;
+  const PetscReal *mu;
+  char here[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  s->n = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    if (sign[k] == 0) continue; /* not looked at */
+    s->n++;
+    positive += sign[k] > 0;
+    if (ratio[k] < ratio[worst] || sign[worst] == 0) worst = k;
+    if (sign[k] < 0 && change < 0) change = k;
+  }
+  s->n_singular = PetscMin(positive, s->n - positive);
+  s->smallest = ratio[worst];
+  PetscCall(PetscArraycpy(s->at, mu + worst / each * n_par, n_par));
+  if (t->keep_singular || !s->n_singular) PetscFunctionReturn(PETSC_SUCCESS);
+  Say(m->scene, mu + change / each * n_par, here);
+  HycoFailNoModel(
+      "the reduced tangent becomes singular along the training path at %s: its determinant changes sign at %d "
+      "of %d times, and predictions near there are arbitrary; enlarge the RID (-hyco_rid_layers 1), change "
+      "the modes (-hyco_pod_tol), or keep the model: -hyco_keep_singular",
+      here, (int)s->n_singular, (int)s->n);
+}
+
+/* Of a scene with a history: the tangents along the training paths; of long paths and large models some of them. */
+static PetscErrorCode ScanPaths(HycoReducer t, HycoROM m)
+{
+  const PetscInt each = t->scene->n_times + 1;
+  PetscInt n, stride;
+  PetscReal *sign, *ratio;
+  PetscMPIInt size;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  HycoOnEach(HycoComm(t), HycoROMSetUp(m));
+  if (m->n > LARGEST) PetscFunctionReturn(PETSC_SUCCESS);
+  stride = 1 + (PetscInt)((PetscReal)(n * each) * PetscPowReal((PetscReal)m->n, 3) / 5e10);
+  PetscCall(PetscCalloc2(n * each, &sign, n * each, &ratio));
+  HycoOnEach(HycoComm(t), ScanMyPaths(t, m, t->rank * n / size, (t->rank + 1) * n / size, each, stride, sign, ratio));
+  HycoAllreduce(sign, n * each, MPIU_REAL, MPI_SUM, HycoComm(t));
+  HycoAllreduce(ratio, n * each, MPIU_REAL, MPI_SUM, HycoComm(t));
+  HycoOnRoot(HycoComm(t), ConcludePaths(t, m, n * each, each, sign, ratio));
+  PetscCall(PetscFree2(sign, ratio));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -145,8 +221,12 @@ PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report
   PetscBool reaches[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  PetscCall(Scan(t, m, reaches));
-  HycoOnRoot(HycoComm(t), HycoGalerkinTabulate(m, reaches));
+  if (t->scene->n_times)
+    PetscCall(ScanPaths(t, m));
+  else {
+    PetscCall(Scan(t, m, reaches));
+    HycoOnRoot(HycoComm(t), HycoGalerkinTabulate(m, reaches));
+  }
   report->scan = ((HycoGalerkin)m->data)->scan;
   PetscCallMPI(MPI_Bcast(&report->scan, sizeof(report->scan), MPI_BYTE, 0, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);

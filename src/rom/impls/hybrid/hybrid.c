@@ -105,7 +105,8 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
   static const HycoROMTraits traits = {.title = "hybrid hyper-reduced",
                                        .settings = HYCO_SETTINGS_RID,
                                        .stiffness = PETSC_TRUE,
-                                       .constrains = PETSC_TRUE};
+                                       .constrains = PETSC_TRUE,
+                                       .history = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoHybridSetFromOptions,
                                  .build = HycoHybridBuild,
                                  .finish = HycoGalerkinFinish,

@@ -148,7 +148,8 @@ PetscErrorCode HycoROMCreate_Projection(HycoROM m)
                                        .settings = HYCO_SETTINGS_MODES,
                                        .whole = PETSC_TRUE,
                                        .stiffness = PETSC_TRUE,
-                                       .force_basis = PETSC_TRUE};
+                                       .force_basis = PETSC_TRUE,
+                                       .history = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoProjectionSetFromOptions,
                                  .modes = HycoProjectionModes,
                                  .build = HycoProjectionBuild,

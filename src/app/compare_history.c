@@ -1,0 +1,122 @@
+/* hyco compare of a model of paths: the worst listed time and the end of each path, in the full order's steps. */
+#include "driver.h"
+
+/* Errors by kind, at the worst time and at the end; then what follows. */
+enum { CONVERGED = 2 * HYCO_N_ERRORS, REACHED, KKT, ITERATIONS, SECONDS_FOM, SECONDS_ROM, N_COLUMNS };
+
+PetscInt DriverPathColumns(void)
+{
+  return N_COLUMNS;
+}
+
+/* Its full-order path and the model's, their difference. */
+PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[], PetscReal v[])
+{
+  HycoSummary s;
+  HycoPrediction p;
+  HycoPathErrors e = {0};
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMComparePath(model, fom, n_par, mu, &e));
+  PetscCall(HycoFOMGetSummary(fom, &s));
+  PetscCall(HycoROMGetPrediction(model, &p));
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    v[j] = e.worst[j];
+    v[HYCO_N_ERRORS + j] = e.end[j];
+  }
+  v[CONVERGED] = p.reason > 0;
+  v[REACHED] = e.n;
+  v[KKT] = HycoKKTMax(&p.kkt);
+  v[ITERATIONS] = p.iterations;
+  v[SECONDS_FOM] = s.seconds.total;
+  v[SECONDS_ROM] = p.seconds.total;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* "worst_u", ..., "end_u", ... */
+static PetscErrorCode NameColumns(char names[][64], const char *columns[])
+{
+  static const char *const rest[] = {"converged",  "times_reached",      "kkt_max",
+                                     "iterations", "seconds_full_order", "seconds_reduced"};
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < N_COLUMNS; c++) {
+    if (c < CONVERGED)
+      PetscCall(
+          PetscSNPrintf(names[c], 64, "%s_%s", c < HYCO_N_ERRORS ? "worst" : "end", HycoErrorKinds[c % HYCO_N_ERRORS]));
+    else
+      PetscCall(PetscStrncpy(names[c], rest[c - CONVERGED], 64));
+    columns[c] = names[c];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Mean and largest over the points of which a path reached its end. */
+static void AddStatistics(cJSON *json, const char name[], PetscInt n, const PetscReal value[], PetscInt column)
+{
+  cJSON *object = cJSON_AddObjectToObject(json, name);
+  PetscReal sum = 0, worst = 0;
+  PetscInt used = 0, undefined = 0;
+
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal *v = value + k * N_COLUMNS;
+
+    if (v[CONVERGED] < 0.5) continue;
+    undefined += v[column] > PETSC_MAX_REAL / 8;
+    if (v[column] > PETSC_MAX_REAL / 8) continue;
+    sum += v[column];
+    worst = PetscMax(worst, v[column]);
+    used++;
+  }
+  cJSON_AddNumberToObject(object, "undefined", undefined);
+  if (used) {
+    cJSON_AddNumberToObject(object, "mean", sum / used);
+    cJSON_AddNumberToObject(object, "max", worst);
+    (void)!Say("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(sum / used), 100 * (double)worst);
+  } else {
+    cJSON_AddNullToObject(object, "mean");
+    cJSON_AddNullToObject(object, "max");
+    (void)!Say("  %-21s undefined at every point\n", name);
+  }
+}
+
+PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal mu[],
+                                 const PetscReal value[], const char table[])
+{
+  char names[N_COLUMNS][64];
+  const char *columns[N_COLUMNS];
+  PetscReal seconds[2] = {0, 0}, kkt = 0;
+  PetscInt failed = 0;
+  cJSON *json;
+
+  PetscFunctionBegin;
+  PetscCall(NameColumns(names, columns));
+  if (table[0]) PetscCall(DriverWriteTable(table, scene, n, mu, N_COLUMNS, columns, value));
+  PetscCall(ReportCreate("compare", scene, NULL, &json));
+  cJSON_AddNumberToObject(json, "n_points", n);
+  PetscCall(Say("%d path%s, each at its worst listed time and at its end\n", (int)n, n == 1 ? "" : "s"));
+  for (PetscInt c = 0; c < CONVERGED; c++) {
+    const PetscInt kind = c % HYCO_N_ERRORS;
+
+    if (contact || (kind != HYCO_ERROR_LAMBDA && kind != HYCO_ERROR_LAMBDA_RID))
+      AddStatistics(json, names[c], n, value, c);
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal *v = value + k * N_COLUMNS;
+
+    seconds[0] += v[SECONDS_FOM] / n;
+    seconds[1] += v[SECONDS_ROM] / n;
+    kkt = PetscMax(kkt, v[KKT]);
+    failed += v[CONVERGED] < 0.5;
+  }
+  cJSON_AddNumberToObject(json, "seconds_full_order", seconds[0]);
+  cJSON_AddNumberToObject(json, "seconds_reduced", seconds[1]);
+  cJSON_AddNumberToObject(json, "not_converged", failed);
+  cJSON_AddNumberToObject(json, "kkt_max", kkt);
+  PetscCall(Say("mean seconds of a path: full order %.3g, reduced %.3g; %d not ended; largest KKT residual %.1e\n",
+                (double)seconds[0], (double)seconds[1], (int)failed, (double)kkt));
+  PetscCall(ReportWrite(&json));
+  HycoCheck(!failed, "%d of the %d reduced paths did not reach their end; the errors leave them out", (int)failed,
+            (int)n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

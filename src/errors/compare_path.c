@@ -1,0 +1,151 @@
+/* The path of a model against that of the full order, at the listed times. */
+#include <hycopath.h>
+#include <hycoreducerimpl.h>
+
+/* Each kind at its worst time and at the end. */
+void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
+{
+  const HycoPathErrors none = {.n = n};
+
+  *e = none;
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    PetscReal size = 0;
+
+    for (PetscInt k = 0; k < n; k++) size = PetscMax(size, lost[k * HYCO_N_ERRORS + j].size);
+    for (PetscInt k = 0; k < n; k++) {
+      const HycoLost *here = &lost[k * HYCO_N_ERRORS + j];
+
+      e->end[j] = HycoRelative(here->lost, PetscMax(here->size, HYCO_SMALL_FORCE * size));
+      if (e->end[j] <= e->worst[j]) continue;
+      e->worst[j] = e->end[j];
+      e->at[j] = k;
+    }
+    if (j == HYCO_ERROR_LAMBDA) e->force = size;
+    if (j == HYCO_ERROR_LAMBDA_RID) e->force_rid = size;
+  }
+}
+
+/* The full-order path on rank 0, as its listed times come. */
+typedef struct {
+  PetscInt n_dof, n_sigma, n_cells, n_contacts, n;
+  PetscReal *value; /* of each time u, sigma, inelastic, lambda */
+} Kept;
+
+static PetscReal *At(const Kept *kept, PetscInt k)
+{
+  return kept->value + (size_t)k * (size_t)(kept->n_dof + kept->n_sigma + kept->n_cells + kept->n_contacts);
+}
+
+/* A HycoStepMonitor. */
+static PetscErrorCode Keep(HycoFOM f, const HycoStep *step, void *ctx)
+{
+  Kept *kept = (Kept *)ctx;
+  const PetscReal *u, *sigma;
+  PetscReal *to = f->rank ? NULL : At(kept, step->index), *mine;
+  HycoFileOrder *all;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetSolution(f, NULL, &u, NULL, NULL, NULL, &sigma));
+  PetscCall(PetscMalloc1(f->part->n_cells, &mine));
+  PetscCall(HycoFEStateFields(f->fe, f->path->begin, NULL, NULL, mine, NULL));
+  if (f->rank == 0) {
+    PetscCall(PetscArraycpy(to, u, kept->n_dof));
+    PetscCall(PetscArraycpy(to + kept->n_dof, sigma, kept->n_sigma));
+    PetscCall(PetscArraycpy(to + kept->n_dof + kept->n_sigma + kept->n_cells, f->lambda, kept->n_contacts));
+  }
+  if (f->size == 1)
+    PetscCall(PetscArraycpy(to + kept->n_dof + kept->n_sigma, mine, kept->n_cells));
+  else {
+    PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, f->surface, PETSC_TRUE, &all));
+    PetscCall(HycoFileOrderSend(all, HYCO_ON_CELLS, MPIU_REAL, 1, mine, to ? to + kept->n_dof + kept->n_sigma : NULL));
+    PetscCall(HycoFileOrderDestroy(&all));
+  }
+  PetscCall(PetscFree(mine));
+  kept->n = step->index + 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the model misses of listed time k: of the whole mesh U, of the RID and the contacts the rest. */
+static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost lost[])
+{
+  const PetscInt dim = m->mesh->dim, ns = m->fe->n_sigma;
+  const PetscReal *u = At(kept, k), *sigma = u + kept->n_dof, *inelastic = sigma + kept->n_sigma,
+                  *lambda = inelastic + kept->n_cells, *found;
+  PetscReal *u_rid, *sigma_rid, *inelastic_rid, square[2] = {0, 0};
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetStep(m, k));
+  PetscCall(HycoROMGetWholeU(m, NULL, &found));
+  for (PetscInt i = 0; i < kept->n_dof; i++) {
+    square[0] += (found[i] - u[i]) * (found[i] - u[i]);
+    square[1] += u[i] * u[i];
+  }
+  PetscCall(PetscMalloc3(m->mesh->n_nodes * dim, &u_rid, m->mesh->n_cells * ns, &sigma_rid, m->mesh->n_cells,
+                         &inelastic_rid));
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
+    PetscCall(PetscArraycpy(u_rid + i * dim, u + m->mesh->node_whole[i] * dim, dim));
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+    PetscCall(PetscArraycpy(sigma_rid + e * ns, sigma + m->mesh->cell_whole[e] * ns, ns));
+    inelastic_rid[e] = inelastic[m->mesh->cell_whole[e]];
+  }
+  PetscCall(HycoROMMeasureRID(m, u_rid, sigma_rid, inelastic_rid, lambda, lost));
+  lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
+  PetscCall(PetscFree3(u_rid, sigma_rid, inelastic_rid));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The prediction in the same steps, and its errors. Rank 0. */
+static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const HycoHistory *h, Kept *kept,
+                              HycoPathErrors *e)
+{
+  PetscInt reached;
+  HycoLost *lost;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheck(m->whole_nodes * m->mesh->dim == kept->n_dof && m->whole_cells == kept->n_cells &&
+                m->pairs.n == kept->n_contacts,
+            "the model was trained on a mesh of %d nodes and %d cells, and the scene's has %d cells: compare on the "
+            "training mesh",
+            (int)m->whole_nodes, (int)m->whole_cells, (int)kept->n_cells);
+  PetscCall(HycoROMSetSteps(m, h->n_taken, h->taken));
+  ierr = HycoROMPredict(m, n, mu);
+  PetscCall(HycoROMSetSteps(m, 0, NULL));
+  PetscCall(ierr);
+  reached = PetscMin(kept->n, m->trace.n_listed);
+  PetscCall(PetscMalloc1(reached * HYCO_N_ERRORS, &lost));
+  for (PetscInt k = 0; k < reached; k++) PetscCall(Measure(m, kept, k, lost + k * HYCO_N_ERRORS));
+  HycoPathErrorsJudge(reached, lost, e);
+  e->n_full = kept->n;
+  PetscCall(PetscFree(lost));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMComparePath(HycoROM m, HycoFOM f, PetscInt n, const PetscReal mu[], HycoPathErrors *e)
+{
+  Kept kept = {0};
+  HycoHistory h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheck(f->path, "HycoROMComparePath: the scene has no history; HycoROMCompare() is for its solutions");
+  kept.n_dof = f->n_nodes * f->fe->dim;
+  kept.n_sigma = f->n_cells * f->fe->n_sigma;
+  kept.n_cells = f->n_cells;
+  kept.n_contacts = f->n_contacts;
+  if (f->rank == 0)
+    PetscCall(PetscMalloc1((size_t)(kept.n_dof + kept.n_sigma + kept.n_cells + kept.n_contacts) *
+                               (size_t)(f->scene->n_times + 1),
+                           &kept.value));
+  PetscCall(HycoFOMSetStepMonitor(f, Keep, &kept));
+  ierr = HycoFOMSolve(f, n, mu);
+  PetscCall(HycoFOMSetStepMonitor(f, NULL, NULL));
+  PetscCall(ierr);
+  PetscCall(HycoFOMGetHistory(f, &h));
+  HycoCheck(h.ended, "the full-order path ends at t = %.10g: %s; there is nothing to compare with", (double)h.t, h.why);
+  HycoOnRoot(HycoComm(f), Compare(m, n, mu, &h, &kept, e));
+  PetscCall(PetscFree(kept.value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,279 @@
+/*
+  The path of a hybrid or projection-based model: the full order's steps of time and Newton's method (src/fom) on the
+  reduced unknowns. The laws step at the integration points of the RID's cells alone; an iteration is one contact system
+
+      V[A]^T K_t[A,A+I] V[A+I] x' + V[A_c]^T B^T L = V[A]^T (F - f_int) + V[A]^T K_t V x
+
+  with K_t = d f_int / d U, the true derivative, so that the iterations stay quadratic. The reduced problem has no
+  potential: steps are judged by their residual. Each path begins with no contact closed, whatever was solved before.
+*/
+#include <hycoalgorithms.h>
+#include <hycogalerkin.h>
+#include <hycopath.h>
+
+struct _n_HycoGalerkinPath {
+  HycoPath path;
+  PetscReal *held, *u; /* of fe's unknowns: prescribed displacements of the last accepted time; of an iteration */
+  PetscBool moved;     /* the attempt's own are in U */
+};
+
+/* K and Kr. The first assembly again, in the order of all that come: the same sums to the last bit. */
+static PetscErrorCode Stiffness(HycoPath p)
+{
+  HycoROM m = (HycoROM)p->ctx;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEAssembleStiffness(m->fe, g->K));
+  if (!g->reduced) PetscCall(HycoFEAssembleStiffness(m->fe, g->K));
+  HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillStiffness(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The loads alone, without what moved supports do. */
+static PetscErrorCode Loads(HycoPath p)
+{
+  HycoROM m = (HycoROM)p->ctx;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscBool lifted = m->fe->lifted;
+
+  PetscFunctionBegin;
+  m->fe->lifted = PETSC_FALSE;
+  HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, g->F));
+  m->fe->lifted = lifted;
+  HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
+  PetscCall(VecCopy(g->Fr, p->F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
+{
+  HycoROM m = (HycoROM)p->ctx;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoFE fe = m->fe;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFESetParameters(fe, mu));
+  fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
+  g->path->moved = m->beyond_current = PETSC_FALSE;
+  if (fe->stiffness_changed && (elastic || !p->n_taken)) PetscCall(Stiffness(p)); /* the first is the elastic one */
+  if (fe->contact_changed) PetscCall(MatDestroy(&g->B));
+  if (fe->contact_changed || fe->gap_changed) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
+  if (m->n_L && fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
+  PetscCall(Loads(p));
+  fe->ready = PETSC_TRUE;
+  if (!g->system->K) PetscCall(HycoSystemSetMatrices(g->system, g->Kr, g->Btr, g->Br, g->symmetric));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U of the iteration in path->u: supports are where the last time left them until the first contact system of the step
+   has moved them. */
+static PetscErrorCode Displace(HycoROM m)
+{
+  HycoGalerkinPath q = ((HycoGalerkin)m->data)->path;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinExpand(m));
+  PetscCall(PetscArraycpy(q->u, m->U, m->fe->n_dof));
+  for (PetscInt k = 0; k < m->fe->n_dof && !q->moved; k++) {
+    if (m->fe->fixed[k]) q->u[k] = q->held[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report)
+{
+  HycoROM m = (HycoROM)p->ctx;
+  HycoGalerkinPath q = ((HycoGalerkin)m->data)->path;
+
+  PetscFunctionBegin;
+  PetscCall(Displace(m));
+  PetscCall(PetscArrayzero(p->f_local, m->fe->n_dof));
+  PetscCall(HycoFEStep(m->fe, q->u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
+  report->has_potential = PETSC_FALSE;
+  if (report->failed) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoReducedTest(m, p->f_local, p->f_int));
+  PetscCall(VecWAXPY(p->r, -1, p->f_int, p->F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Moves(HycoPath p, Vec rhs)
+{
+  HycoROM m = (HycoROM)p->ctx;
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscScalar *F;
+  PetscBool moved;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPathMoves(p, g->path->u, g->F, &moved));
+  g->path->moved = PETSC_TRUE;
+  if (!moved) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(g->F, &F));
+  PetscCall(HycoReducedTest(m, F, p->work));
+  PetscCall(VecRestoreArrayRead(g->F, &F));
+  PetscCall(VecAXPY(rhs, 1, p->work));
+  PetscCall(VecAXPY(rhs, -1, p->F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
+{
+  HycoROM m = (HycoROM)p->ctx;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(((HycoGalerkin)m->data)->path->held, m->fe->u0, m->fe->n_dof));
+  PetscCall(HycoGalerkinExpand(m));
+  PetscCall(HycoTraceAdd(m, p->t));
+  p->now.stored = a->law.stored;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What a listed time amounts to, over the RID and all contacts. */
+static PetscErrorCode Measure(HycoROM m, HycoFEState state, HycoStep *s)
+{
+  PetscReal *sigma, *inelastic, *mises;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTraceList(m, &sigma, &inelastic));
+  PetscCall(PetscMalloc1(m->mesh->n_cells, &mises));
+  PetscCall(HycoFEStateFields(m->fe, state, sigma, mises, inelastic, NULL));
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+    s->mises = PetscMax(s->mises, mises[e]);
+    s->inelastic = PetscMax(s->inelastic, inelastic[e]);
+  }
+  PetscCall(PetscFree(mises));
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    s->total_contact_force += m->Lambda[k];
+    s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);
+  }
+  for (PetscInt k = 0; k < m->pairs.n; k++) s->n_active += m->Lambda[k] > 1e-10 * s->lambda_max; /* no round-off */
+  for (PetscInt k = 0; k < m->fe->n_dof; k++) {
+    if (m->role[k / m->fe->dim] != HYCO_ROLE_OUTSIDE) s->u_norm2 += m->U[k] * m->U[k];
+  }
+  s->u_norm2 = PetscSqrtReal(s->u_norm2);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last tangent: whether the path comes near to where it is singular. */
+static PetscErrorCode Watch(HycoROM m, PetscInt k)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  Mat dense;
+  PetscScalar *a;
+  PetscInt sign;
+
+  PetscFunctionBegin;
+  if (!g->watch.stride || k % g->watch.stride) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatConvert(g->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
+  PetscCall(MatDenseGetArray(dense, &a));
+  PetscCall(HycoSingularity(m->n, a, &sign, &g->watch.ratio[k]));
+  PetscCall(MatDenseRestoreArray(dense, &a));
+  PetscCall(MatDestroy(&dense));
+  g->watch.sign[k] = sign;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Record(HycoPath p)
+{
+  HycoROM m = (HycoROM)p->ctx;
+
+  PetscFunctionBegin;
+  PetscCall(Watch(m, p->n_steps));
+  PetscCall(HycoGalerkinUnpack(m));
+  PetscCall(HycoGalerkinCheckForceless(m));
+  if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
+  PetscCall(Measure(m, p->begin, &p->now));
+  p->steps[p->n_steps++] = p->now;
+  PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadOptions(HycoROM m, HycoPath p)
+{
+  PetscFunctionBegin;
+  PetscObjectOptionsBegin((PetscObject)m);
+  PetscCall(HycoPathSetFromOptions(p, PetscOptionsObject));
+  PetscOptionsEnd();
+  HycoCheck(!p->checkpoint[0] && !p->resume,
+            "-hyco_checkpoint and -hyco_resume are for hyco solve; a reduced path takes seconds");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
+{
+  static const HycoPathOps ops = {
+      .assemble = Assemble, .step = Step, .stiffness = Stiffness, .moves = Moves, .accept = Accept, .record = Record};
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoPath p;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&g->path));
+  PetscCall(HycoPathNew(PETSC_COMM_SELF, m->scene, &p));
+  g->path->path = p;
+  PetscCall(ReadOptions(m, p));
+  if (p->method == HYCO_NEWTON_AUTO && p->flows) p->method = HYCO_NEWTON_TANGENT; /* its factor is small */
+  p->ops = &ops;
+  p->ctx = m;
+  p->fe = m->fe;
+  p->system = g->system;
+  p->solver = m->solver;
+  p->K = g->Kr;
+  p->B = g->Br;
+  p->Bt = g->Btr;
+  p->U = g->x;
+  p->Lambda = g->L;
+  p->rhs = g->Fr;
+  p->D = g->Dr;
+  p->n_contacts = m->n_L;
+  p->n_free = m->n;
+  PetscCall(HycoPathSetUp(p));
+  PetscCall(PetscMalloc2(m->fe->n_dof, &g->path->held, m->fe->n_dof, &g->path->u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGalerkinPathDestroy(HycoGalerkinPath *path)
+{
+  PetscFunctionBegin;
+  if (!*path) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoPathFree(&(*path)->path));
+  PetscCall(PetscFree2((*path)->held, (*path)->u));
+  PetscCall(PetscFree(*path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the path as a whole amounts to. */
+static void Summarise(HycoPath p, HycoPrediction *out)
+{
+  out->kkt = p->kkt;
+  if (out->reason > 0) out->reason = p->ended ? HYCO_CONVERGED : HYCO_DIVERGED_STEP;
+  for (PetscInt k = 0; k < p->n_steps; k++) {
+    out->iterations += p->steps[k].iterations;
+    out->seconds.factor += p->steps[k].seconds_factor;
+    out->seconds.solve += p->steps[k].seconds_solve;
+  }
+}
+
+PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
+{
+  HycoGalerkinPath q = ((HycoGalerkin)m->data)->path;
+  HycoPath p = q->path;
+  HycoPrediction *out = &m->prediction;
+  const char *method;
+
+  PetscFunctionBegin;
+  out->iterations = 0;
+  out->seconds.assemble = out->seconds.factor = out->seconds.solve = 0;
+  out->reason = HYCO_CONVERGED; /* until a listed time says else */
+  p->n_given = m->trace.n_given;
+  p->given = m->trace.given;
+  p->cold = PETSC_TRUE;
+  PetscCall(PetscArrayzero(q->held, m->fe->n_dof));
+  PetscCall(HycoTraceBegin(m));
+  PetscCall(HycoPathBegin(p, mu));
+  PetscCall(HycoPathRun(p));
+  HycoPathGetHistory(p, &m->trace.history);
+  Summarise(p, out);
+  PetscCall(HycoSolverGetMethod(m->solver, &method));
+  PetscCall(PetscStrncpy(out->method, method, sizeof(out->method)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

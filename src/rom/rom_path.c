@@ -1,0 +1,150 @@
+/* What a model of paths keeps of the last prediction: displacements at all accepted times, all that is asked for at the
+   listed ones. */
+#include <hycoromimpl.h>
+
+PetscErrorCode HycoTraceFree(HycoROM m)
+{
+  HycoTrace *r = &m->trace;
+  const HycoTrace empty = {.n_given = r->n_given, .given = r->given};
+
+  PetscFunctionBegin;
+  HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->Lambda, &r->sigma, &r->inelastic);
+  *r = empty;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTraceBegin(HycoROM m)
+{
+  const PetscInt n_times = m->scene->n_times;
+  HycoTrace *r = &m->trace;
+
+  PetscFunctionBegin;
+  r->n = r->n_listed = r->shown = 0;
+  PetscCall(PetscMemzero(&r->history, sizeof(r->history)));
+  if (r->at) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(n_times + 1, &r->at)); /* one more: the end of a path that ends early */
+  PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->pairs.n + 1, &r->Lambda));
+  PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)(m->mesh->n_cells * m->fe->n_sigma) + 1, &r->sigma));
+  PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->mesh->n_cells + 1, &r->inelastic));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTraceAdd(HycoROM m, PetscReal t)
+{
+  const size_t l = (size_t)m->l, n_fe = (size_t)m->n_fe;
+  HycoTrace *r = &m->trace;
+
+  PetscFunctionBegin;
+  if (r->n == r->room) {
+    r->room = 2 * r->room + 64;
+    PetscCall(PetscRealloc((size_t)r->room * sizeof(PetscReal), &r->t));
+    PetscCall(PetscRealloc(((size_t)r->room * l + 1) * sizeof(PetscReal), &r->gamma));
+    PetscCall(PetscRealloc(((size_t)r->room * n_fe + 1) * sizeof(PetscReal), &r->U_fe));
+  }
+  r->t[r->n] = t;
+  PetscCall(PetscArraycpy(r->gamma + (size_t)r->n * l, m->gamma, l));
+  for (size_t k = 0; k < n_fe; k++) r->U_fe[(size_t)r->n * n_fe + k] = m->U[m->fe_dof[k]];
+  r->n++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTraceList(HycoROM m, PetscReal **sigma, PetscReal **inelastic)
+{
+  HycoTrace *r = &m->trace;
+  const size_t k = (size_t)r->n_listed, n_cells = (size_t)m->mesh->n_cells;
+
+  PetscFunctionBegin;
+  r->at[r->n_listed] = r->n - 1;
+  r->shown = r->n_listed++;
+  PetscCall(PetscArraycpy(r->Lambda + k * (size_t)m->pairs.n, m->Lambda, m->pairs.n));
+  *sigma = r->sigma + k * n_cells * (size_t)m->fe->n_sigma;
+  *inelastic = r->inelastic + k * n_cells;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoTraceWholeU(HycoROM m, PetscInt k, PetscReal U[])
+{
+  const HycoTrace *r = &m->trace;
+  const PetscInt dim = m->mesh->dim;
+  const PetscReal *gamma = r->gamma + (size_t)k * (size_t)m->l, *U_fe = r->U_fe + (size_t)k * (size_t)m->n_fe;
+
+  for (PetscInt i = 0; i < m->fe_whole->n_dof; i++) {
+    const PetscReal *v = m->V_whole + (size_t)i * (size_t)m->l;
+
+    U[i] = m->fe_whole->u0[i];
+    for (PetscInt j = 0; j < m->l; j++) U[i] += v[j] * gamma[j];
+  }
+  for (PetscInt f = 0; f < m->n_fe; f++)
+    U[m->mesh->node_whole[m->fe_dof[f] / dim] * dim + m->fe_dof[f] % dim] = U_fe[f];
+}
+
+void HycoTraceSummary(HycoROM m, HycoPrediction *p)
+{
+  const HycoHistory *h = &m->trace.history;
+
+  p->path_force = p->path_mises = p->path_inelastic = 0;
+  for (PetscInt k = 0; k < h->n; k++) {
+    p->path_force = PetscMax(p->path_force, h->step[k].total_contact_force);
+    p->path_mises = PetscMax(p->path_mises, h->step[k].mises);
+    p->path_inelastic = PetscMax(p->path_inelastic, h->step[k].inelastic);
+  }
+}
+
+static PetscErrorCode CheckPath(HycoROM m, const char what[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before %s", what);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetHistory(HycoROM m, HycoHistory *history)
+{
+  PetscFunctionBegin;
+  PetscCall(CheckPath(m, "HycoROMGetHistory()"));
+  *history = m->trace.history;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
+{
+  HycoTrace *r = &m->trace;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscInt at;
+
+  PetscFunctionBegin;
+  PetscCall(CheckPath(m, "HycoROMSetStep()"));
+  PetscCheck(k >= 0 && k < r->n_listed, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+             "HycoROMSetStep: %d is no listed time that the path reached; there are %d", (int)k, (int)r->n_listed);
+  at = r->at[k];
+  HycoSceneSetTime(m->scene, m->fe->mu, r->t[at], mu);
+  PetscCall(HycoFESetParameters(m->fe, mu));
+  PetscCall(PetscArraycpy(m->gamma, r->gamma + (size_t)at * (size_t)m->l, m->l));
+  PetscCall(PetscArraycpy(m->Lambda, r->Lambda + (size_t)k * (size_t)m->pairs.n, m->pairs.n));
+  PetscCall(HycoROMExpand(m));
+  for (PetscInt f = 0; f < m->n_fe; f++) m->U[m->fe_dof[f]] = r->U_fe[(size_t)at * (size_t)m->n_fe + (size_t)f];
+  m->spread = PETSC_TRUE;
+  m->whole_current = m->beyond_current = PETSC_FALSE;
+  r->shown = k;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSetSteps(HycoROM m, PetscInt n, const PetscReal t[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheck(m->scene->n_times, "HycoROMSetSteps: the model's scene has no history, and its solution no steps");
+  m->trace.n_given = t ? n : 0;
+  m->trace.given = t;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetInelastic(HycoROM m, PetscInt *n_cells, const PetscReal *inelastic[])
+{
+  PetscFunctionBegin;
+  PetscCall(CheckPath(m, "HycoROMGetInelastic()"));
+  HycoCheck(m->scene->n_times, "HycoROMGetInelastic: the model's scene has no history, and its bodies do not flow");
+  if (n_cells) *n_cells = m->mesh->n_cells;
+  *inelastic = m->trace.inelastic + (size_t)m->trace.shown * (size_t)m->mesh->n_cells;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
