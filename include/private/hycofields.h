@@ -37,8 +37,10 @@ void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscRe
 /* The title, cell type, dimension, parameters and contact table (NULL: none). On one process. */
 PetscErrorCode HycoFieldsWriteHead(HycoH5 h, HycoMesh mesh, HycoScene scene, const PetscReal mu[],
                                    const HycoContactTable *contact);
-/* Nodes at X, tags, the cells with their nodes' places in the whole mesh. Collective with an order. */
-PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const HycoFileOrder *order, HycoMesh mesh, const PetscReal X[]);
+/* Nodes at X, tags, the cells with their nodes' places in the whole mesh, as sets of a group of the file. Collective
+   with an order. */
+PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char group[], const HycoFileOrder *order, HycoMesh mesh,
+                                   const PetscReal X[]);
 /* The fields of a solution's contacts by node of their mesh (vector on slaves, minus on masters), gaps and slaves' tags
    by contact; filled on rank 0, where the contacts are (surface NULL elsewhere). Collective; to be destroyed after an
    error too. */

@@ -10,6 +10,7 @@
 #define HYCO_MAX_PINS 12
 
 typedef struct _n_HycoPath *HycoPath;
+typedef struct _n_HycoCompared *HycoCompared;
 
 struct _p_HycoFOM {
   PETSCHEADER(int);
@@ -53,10 +54,13 @@ struct _p_HycoFOM {
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
   PetscInt n_turned; /* of released: those that the contacts' normals are turned for */
   Vec *released;
-  HycoPath path; /* of a scene with a history, else NULL */
+  HycoPath path;         /* of a scene with a history, else NULL */
+  HycoCompared compared; /* what comparisons with a reduced model keep (errors/compare.c); NULL: none yet */
   HycoSummary summary;
 };
 
+/* NULL-safe. */
+PetscErrorCode HycoComparedDestroy(HycoCompared *compared);
 /* A model that has its mesh, contacts and tables alone: for training, which reads solutions of others. Collective. */
 PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom);
 /* group[g]: whether a contact of the scene is on it; the others are left alone. */
@@ -74,6 +78,9 @@ PetscErrorCode HycoFOMToSurface(HycoFOM fom, Vec v, PetscReal value[]);
 PetscErrorCode HycoFOMStress(HycoFOM fom);
 /* The file's order, spread over the ranks; NULL on one. Borrowed. Collective. */
 PetscErrorCode HycoFOMGetRows(HycoFOM fom, const HycoFileOrder **rows);
+/* Values of the part's nodes or cells, so many of a type each, as this rank's rows in the file's order. Collective. */
+PetscErrorCode HycoFOMToRows(HycoFOM fom, HycoPlace place, MPI_Datatype type, PetscInt components, const void *value,
+                             void *rows);
 /* Looks for rigid motions that neither supports nor contact hold, at fe's parameters: fails with their names, or pins
    as many unknowns, as supports of fe. Collective, before the assembly. */
 PetscErrorCode HycoFOMRelease(HycoFOM fom);

@@ -116,6 +116,11 @@ PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], P
    surface on rank 0) to the processes that own them (roots, by place). Collective; the caller destroys it. */
 PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscInt n, const PetscInt global[], PetscSF *sf);
 
+/* Values, `width` of a type at each point, from the roots of a star forest to its leaves; from the leaves to the roots,
+   each of which has one leaf, or none and is left alone. Collective. */
+PetscErrorCode HycoSFBcast(PetscSF sf, MPI_Datatype type, PetscInt width, const void *root, void *leaf);
+PetscErrorCode HycoSFSend(PetscSF sf, MPI_Datatype type, PetscInt width, const void *leaf, void *root);
+
 /* The order of the file: a part's own nodes, its own cells (those whose first node is) and rank 0's nodes of a surface
    as leaves of star forests, whose roots are the rows n[] from first[] that a process has of all. */
 typedef enum { HYCO_ON_NODES, HYCO_ON_CELLS, HYCO_ON_SURFACE, HYCO_N_PLACES } HycoPlace;

@@ -142,9 +142,6 @@ PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscRe
    that rank 0 gives by their numbers in the whole mesh. Collective. */
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
                                     PetscReal **rows);
-/* Values of the part's nodes or cells as rows in the file's order, which are spread as those of S and V. Collective. */
-PetscErrorCode HycoReducerToRows(HycoReducer t, HycoPlace place, MPI_Datatype type, PetscInt components,
-                                 const void *value, void *rows);
 /* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
    rows, column major, on every rank. Collective. */
 PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, Mat *S);

@@ -8,7 +8,6 @@
 #include <hycofomimpl.h>
 #include <hycosolverimpl.h>
 
-typedef struct _n_HycoNorms *HycoNorms;
 typedef struct _n_HycoProbe *HycoProbe;
 
 /* Rows of B in CSR over dofs of a mesh, and D: see HycoContactRows(). */
@@ -84,7 +83,6 @@ struct _p_HycoROM {
   PetscReal *V_whole, *U_whole;
   HycoFE fe_whole;
   HycoPairs whole_pairs;
-  HycoNorms norms; /* made by the first comparison */
   HycoProbe probe; /* of the scene's quantities; made by the first prediction that is asked for */
   /* online */
   PetscBool full_order, full_displacement; /* what its user, who has the scene, is to do: HycoROMGetFallback() */
@@ -154,17 +152,6 @@ static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start
 PetscErrorCode HycoROMMeasureQuantities(HycoROM model, PetscReal value[]);
 /* NULL-safe. */
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
-
-/* Norms of errors on the whole mesh (norms.c). Scene and mesh are borrowed. */
-PetscErrorCode HycoNormsCreate(HycoScene scene, HycoMesh whole, HycoNorms *norms);
-/* NULL-safe. */
-PetscErrorCode HycoNormsDestroy(HycoNorms *norms);
-/* H1 norm of u - minus (n_nodes * dim of the whole mesh; minus may be NULL). */
-PetscErrorCode HycoNormH1(HycoNorms norms, const PetscReal u[], const PetscReal minus[], PetscReal *norm);
-/* Norm in the dual of H1 of B^T (L - minus), of all contacts or those of the RID, B as at the last prediction; minus
-   may be NULL. */
-PetscErrorCode HycoNormDual(HycoNorms norms, HycoROM model, PetscBool rid_only, const PetscReal L[],
-                            const PetscReal minus[], PetscReal *norm);
 
 /* What tells of the last prediction's error without a full-order solution: feature[HYCO_TRUST_FEATURES], all >= 0. */
 PetscErrorCode HycoTrustMeasure(HycoROM model, PetscReal feature[]);

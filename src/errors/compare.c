@@ -1,5 +1,5 @@
 /* Errors of a prediction against the full-order solution. */
-#include <hycofomimpl.h>
+#include <hycocomparison.h>
 #include <hycoreducerimpl.h>
 
 /* Sums and maxima of one quantity, and the quotient they end in. */
@@ -13,25 +13,6 @@ static void Add(Norms *n, PetscReal value, PetscReal reference)
   n->size2 += reference * reference;
   n->lost = PetscMax(n->lost, PetscAbsReal(value - reference));
   n->size = PetscMax(n->size, PetscAbsReal(reference));
-}
-
-/* The errors in H1 and its dual. */
-static PetscErrorCode CompareH1(HycoROM m, const PetscReal U[], const PetscReal u[], const PetscReal lambda[],
-                                HycoErrors *e)
-{
-  PetscReal lost, size;
-
-  PetscFunctionBegin;
-  if (!m->norms) PetscCall(HycoNormsCreate(m->scene, m->whole, &m->norms));
-  PetscCall(HycoNormH1(m->norms, U, u, &lost));
-  PetscCall(HycoNormH1(m->norms, u, NULL, &size));
-  e->u_h1 = HycoRelative(lost, size);
-  for (int rid = 0; rid < 2; rid++) {
-    PetscCall(HycoNormDual(m->norms, m, (PetscBool)rid, m->Lambda, lambda, &lost));
-    PetscCall(HycoNormDual(m->norms, m, (PetscBool)rid, lambda, NULL, &size));
-    *(rid ? &e->lambda_rid_dual : &e->lambda_dual) = HycoRelative(lost, size);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal sigma[], const PetscReal inelastic[],
@@ -82,49 +63,132 @@ PetscErrorCode HycoROMCompareRID(HycoROM m, const PetscReal u[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of values on the whole mesh that belongs to n nodes or cells of it. */
-static PetscErrorCode TakeRows(PetscInt n, const PetscInt whole[], PetscInt width, const PetscReal value[],
-                               PetscReal **rows)
+/* Modes, norms and star forests of the last model that a full-order one was compared with. */
+struct _n_HycoCompared {
+  PetscObjectId id; /* the model's, on rank 0 */
+  HycoComparison rows;
+  HycoNorms norms;
+  PetscReal *V; /* the modes, these rows, column major */
+};
+
+PetscErrorCode HycoComparedDestroy(HycoCompared *compared)
 {
+  HycoCompared k = *compared;
+
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n * width, rows));
-  for (PetscInt i = 0; i < n; i++)
-    PetscCall(PetscArraycpy(*rows + i * width, value + (size_t)whole[i] * (size_t)width, width));
+  if (!k) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoComparisonDestroy(&k->rows));
+  PetscCall(HycoNormsDestroy(&k->norms));
+  PetscCall(PetscFree(k->V));
+  PetscCall(PetscFree(*compared));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Compare(HycoROM m, HycoFOM f, const PetscReal U[], const PetscReal sigma[], HycoErrors *e)
+/* This rank's rows of the modes on the whole mesh, from the model's file. */
+static PetscErrorCode ReadModes(HycoCompared k, const char path[])
 {
-  const PetscInt dim = m->mesh->dim;
-  const PetscReal *found;
-  PetscReal *u_rid, *sigma_rid;
-  Norms u = {0};
+  const PetscInt dim = k->rows.width[0], n = k->rows.n[0] * dim, l = k->rows.l;
+  PetscReal *V;
+  HycoH5 h;
+  PetscErrorCode ierr;
 
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1((size_t)n * (size_t)l, &k->V));
+  PetscCall(PetscMalloc1((size_t)n * (size_t)l, &V));
+  PetscCall(HycoH5OpenOr(path, "train the model again", &h));
+  ierr = HycoH5ReadRows(h, "whole/V", k->rows.first[0] * dim, n, l, V);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  for (PetscInt i = 0; !ierr && i < n; i++) {
+    for (PetscInt j = 0; j < l; j++) k->V[(size_t)j * (size_t)n + (size_t)i] = V[(size_t)i * (size_t)l + (size_t)j];
+  }
+  PetscCall(PetscFree(V));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Fill(HycoROM m, HycoFOM f, HycoCompared k)
+{
+  char path[PETSC_MAX_PATH_LEN] = "";
+
+  PetscFunctionBegin;
+  PetscCall(HycoComparisonCreate(f, m, &k->rows));
+  if (f->rank == 0) PetscCall(PetscStrncpy(path, m->path, sizeof(path)));
+  PetscCallMPI(MPI_Bcast(path, sizeof(path), MPI_CHAR, 0, HycoComm(f)));
+  HycoOnEach(HycoComm(f), ReadModes(k, path));
+  PetscCall(HycoNormsCreate(f, &k->norms));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* f->compared for this model. Collective. */
+static PetscErrorCode Keep(HycoROM m, HycoFOM f)
+{
+  PetscObjectId id = 0;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (f->rank == 0) PetscCall(PetscObjectGetId((PetscObject)m, &id));
+  PetscCallMPI(MPI_Bcast(&id, 1, MPIU_INT64, 0, HycoComm(f)));
+  if (f->compared && f->compared->id == id) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoComparedDestroy(&f->compared));
+  PetscCall(PetscNew(&f->compared));
+  f->compared->id = id;
+  ierr = Fill(m, f, f->compared);
+  if (ierr) PetscCall(HycoComparedDestroy(&f->compared));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rank 0. */
+static PetscErrorCode Check(HycoROM m, HycoFOM f)
+{
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
             "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
             "training mesh",
             (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
-  PetscCall(HycoROMGetWholeU(m, NULL, &found));
-  for (PetscInt k = 0; k < m->whole_nodes * dim; k++) Add(&u, found[k], U[k]);
-  PetscCall(TakeRows(m->mesh->n_nodes, m->mesh->node_whole, dim, U, &u_rid));
-  PetscCall(TakeRows(m->mesh->n_cells, m->mesh->cell_whole, m->fe->n_sigma, sigma, &sigma_rid));
-  PetscCall(HycoROMCompareRID(m, u_rid, sigma_rid, f->lambda, e, NULL));
-  e->u = HycoRelative(PetscSqrtReal(u.lost2), PetscSqrtReal(u.size2));
-  PetscCall(PetscFree(u_rid));
-  PetscCall(PetscFree(sigma_rid));
-  PetscCall(CompareH1(m, m->U_whole, U, f->lambda, e));
+  PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMCompare()");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The errors in H1 and its dual. Collective. */
+static PetscErrorCode CompareH1(HycoROM m, HycoFOM f, HycoCompared k, HycoErrors *e)
+{
+  PetscReal lost, size;
+
+  PetscFunctionBegin;
+  PetscCall(HycoNormH1(k->norms, k->rows.U, k->rows.value[0], &lost));
+  PetscCall(HycoNormH1(k->norms, k->rows.value[0], NULL, &size));
+  e->u_h1 = HycoRelative(lost, size);
+  for (int rid = 0; rid < 2; rid++) {
+    PetscCall(HycoNormDual(k->norms, m, (PetscBool)rid, m ? m->Lambda : NULL, f->lambda, &lost));
+    PetscCall(HycoNormDual(k->norms, m, (PetscBool)rid, f->lambda, NULL, &size));
+    *(rid ? &e->lambda_rid_dual : &e->lambda_dual) = HycoRelative(lost, size);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
 {
-  const PetscReal *U, *sigma;
+  HycoErrors found = {0};
+  HycoCompared k;
+  PetscReal square[2];
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
-  PetscCall(HycoFOMGetSolution(f, NULL, &U, NULL, NULL, NULL, &sigma));
-  HycoOnRoot(HycoComm(f), Compare(m, f, U, sigma, e));
+  PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoROMCompare()");
+  HycoOnRoot(HycoComm(f), Check(m, f));
+  PetscCall(Keep(m, f));
+  k = f->compared;
+  PetscCall(HycoFOMStress(f));
+  PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, k->rows.width[0], f->u, k->rows.value[0]));
+  PetscCall(HycoFOMToRows(f, HYCO_ON_CELLS, MPIU_REAL, k->rows.width[1], f->sigma, k->rows.value[1]));
+  PetscCall(HycoComparisonBring(&k->rows));
+  PetscCall(HycoComparisonPredict(&k->rows, m, 0, k->V, k->rows.n[0] * k->rows.width[0]));
+  HycoOnRoot(HycoComm(f), HycoROMCompareRID(m, k->rows.rid[0], k->rows.rid[1], f->lambda, &found, NULL));
+  PetscCall(HycoComparisonSquares(&k->rows, square));
+  found.u = HycoRelative(PetscSqrtReal(square[0]), PetscSqrtReal(square[1]));
+  PetscCall(CompareH1(m, f, k, &found));
+  if (f->rank == 0) *e = found;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

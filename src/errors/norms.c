@@ -4,27 +4,30 @@
   functions that vanish on the supports), sup r.v / |v|_H1 = sqrt(r^T M^-1 r) with M the part of H on the free unknowns.
   On a mesh that the parameters move, both are those of the middle of the ranges, so that one factor serves every point.
 */
+#include <hycocomparison.h>
 #include <hycolinear.h>
-#include <hycoromimpl.h>
 
 struct _n_HycoNorms {
-  PetscInt dim;
+  HycoFOM f; /* borrowed */
   HycoFE fe;
   Mat H, M;
   Vec x, y;
   KSP ksp;
 };
 
-static PetscErrorCode AssembleNorm(HycoFE fe, Mat *A)
+static PetscErrorCode AssembleNorm(HycoNorms h, Mat *A)
 {
+  HycoMesh part = h->f->part;
+
   PetscFunctionBegin;
-  PetscCall(HycoFECreateMatrix(fe, PETSC_COMM_SELF, fe->mesh->n_nodes, 0, A));
-  PetscCall(HycoFEAssembleH1(fe, HycoMeshLength(fe->mesh), *A));
+  PetscCall(HycoFECreateMatrix(h->fe, HycoComm(h->f), part->n_owned, part->first, A));
+  HycoOnEach(HycoComm(h->f), HycoFEAssembleH1(h->fe, HycoMeshLength(part), *A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoNormsCreate(HycoScene scene, HycoMesh whole, HycoNorms *norms)
+PetscErrorCode HycoNormsCreate(HycoFOM f, HycoNorms *norms)
 {
+  HycoScene scene = f->scene;
   HycoNorms h;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscBool singular;
@@ -32,16 +35,16 @@ PetscErrorCode HycoNormsCreate(HycoScene scene, HycoMesh whole, HycoNorms *norms
   PetscFunctionBegin;
   PetscCall(PetscNew(&h));
   *norms = h;
-  h->dim = whole->dim;
+  h->f = f;
   for (PetscInt p = 0; p < scene->n_parameters; p++) mu[p] = (scene->lo[p] + scene->hi[p]) / 2;
-  PetscCall(HycoFECreate(scene, whole, &h->fe));
-  PetscCall(HycoFESetParameters(h->fe, mu));
-  PetscCall(AssembleNorm(h->fe, &h->M));
+  HycoOnEach(HycoComm(f), HycoFECreate(scene, f->part, &h->fe));
+  HycoOnEach(HycoComm(f), HycoFESetParameters(h->fe, mu));
+  PetscCall(AssembleNorm(h, &h->M));
   PetscCall(PetscArrayzero(h->fe->fixed, h->fe->n_dof)); /* prescribed displacements count in the norm */
-  PetscCall(AssembleNorm(h->fe, &h->H));
+  PetscCall(AssembleNorm(h, &h->H));
   PetscCall(MatSetOption(h->M, MAT_SPD, PETSC_TRUE));
   PetscCall(MatCreateVecs(h->M, &h->x, &h->y));
-  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", h->M, PETSC_TRUE, &h->ksp));
+  PetscCall(HycoDirectSolver(HycoComm(f), "hyco_norm_", h->M, PETSC_TRUE, &h->ksp));
   PetscCall(HycoFactor(h->ksp, &singular));
   PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the H1 norm's matrix is singular");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -63,48 +66,90 @@ PetscErrorCode HycoNormsDestroy(HycoNorms *norms)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minus[], PetscReal *norm)
+/* sqrt(x.y) */
+static PetscErrorCode Root(HycoNorms h, PetscReal *norm)
 {
-  PetscScalar *x, square;
-  PetscInt n;
+  PetscScalar square;
 
   PetscFunctionBegin;
-  PetscCall(VecGetSize(h->x, &n));
-  PetscCall(VecGetArray(h->x, &x));
-  for (PetscInt i = 0; i < n; i++) x[i] = minus ? u[i] - minus[i] : u[i];
-  PetscCall(VecRestoreArray(h->x, &x));
-  PetscCall(MatMult(h->H, h->x, h->y));
   PetscCall(VecDot(h->x, h->y, &square));
   *norm = PetscSqrtReal(PetscMax(square, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minus[], PetscReal *norm)
+{
+  HycoMesh part = h->f->part;
+  const PetscInt dim = part->dim;
+  const HycoFileOrder *order;
+  PetscInt n;
+  PetscScalar *x;
+  PetscReal *rows, *value;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(h->f, &order));
+  n = dim * (order ? order->n[HYCO_ON_NODES] : part->n_nodes);
+  PetscCall(PetscMalloc2(n, &rows, part->n_nodes * dim, &value));
+  for (PetscInt i = 0; i < n; i++) rows[i] = minus ? u[i] - minus[i] : u[i];
+  if (order)
+    PetscCall(HycoFileOrderFetch(order, part, HYCO_ON_NODES, dim, rows, value));
+  else
+    PetscCall(PetscArraycpy(value, rows, n));
+  PetscCall(VecGetArray(h->x, &x));
+  for (PetscInt i = 0; i < part->n_nodes; i++) {
+    const PetscInt place = HycoMeshOwned(part, i);
+
+    if (place >= 0) PetscCall(PetscArraycpy(x + place * dim, value + i * dim, dim));
+  }
+  PetscCall(VecRestoreArray(h->x, &x));
+  PetscCall(PetscFree2(rows, value));
+  PetscCall(MatMult(h->H, h->x, h->y));
+  PetscCall(Root(h, norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* B^T (L - minus) in x, the contacts' nodes being among those of the surfaces. Rank 0. */
+static PetscErrorCode AddForces(HycoNorms h, HycoROM m, PetscBool rid_only, const PetscReal L[],
+                                const PetscReal minus[], PetscBool *any)
+{
+  HycoMesh surface = h->f->surface;
+  const PetscInt dim = h->f->part->dim;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMComplete(m));
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    const PetscReal force = minus ? L[k] - minus[k] : L[k];
+
+    if (force == 0 || (rid_only && !m->in_rid[k])) continue;
+    *any = PETSC_TRUE;
+    for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++) {
+      const PetscInt dof = m->rows.dof[j];
+      PetscInt node = m->mesh->node_whole[dof / dim];
+
+      if (surface->node_global) {
+        PetscCall(PetscFindInt(node, surface->n_nodes, surface->node_whole, &node));
+        node = surface->node_global[node];
+      }
+      PetscCall(VecSetValue(h->x, node * dim + dof % dim, m->rows.value[j] * force, ADD_VALUES));
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoNormDual(HycoNorms h, HycoROM m, PetscBool rid_only, const PetscReal L[], const PetscReal minus[],
                             PetscReal *norm)
 {
-  PetscScalar *r, square;
   PetscBool any = PETSC_FALSE;
 
   PetscFunctionBegin;
   *norm = 0;
-  PetscCall(HycoROMComplete(m));
   PetscCall(VecSet(h->x, 0));
-  PetscCall(VecGetArray(h->x, &r));
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
-    const PetscReal force = minus ? L[k] - minus[k] : L[k];
-
-    if (force == 0 || (rid_only && !m->in_rid[k])) continue;
-    any = PETSC_TRUE;
-    for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++) {
-      const PetscInt dof = m->rows.dof[j];
-
-      r[m->mesh->node_whole[dof / h->dim] * h->dim + dof % h->dim] += m->rows.value[j] * force;
-    }
-  }
-  PetscCall(VecRestoreArray(h->x, &r));
+  HycoOnRoot(HycoComm(h->f), AddForces(h, m, rid_only, L, minus, &any));
+  PetscCall(VecAssemblyBegin(h->x));
+  PetscCall(VecAssemblyEnd(h->x));
+  PetscCallMPI(MPI_Bcast(&any, 1, HYCO_MPI_BOOL, 0, HycoComm(h->f)));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSolve(h->ksp, h->x, h->y));
-  PetscCall(VecDot(h->x, h->y, &square));
-  *norm = PetscSqrtReal(PetscMax(square, 0));
+  PetscCall(Root(h, norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

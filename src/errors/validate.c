@@ -3,6 +3,7 @@
   online, and what an online solve takes. The ranks share the predictions out; of each, every rank makes and compares
   its rows of the whole mesh, and hands the predicting one the solution on the RID.
 */
+#include <hycocomparison.h>
 #include <hycoreducerimpl.h>
 
 const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda", "lambda_rid", "inelastic", NULL};
@@ -11,118 +12,20 @@ typedef struct {
   HycoReducer t;
   HycoROM m;
   HycoSnapshots store;
-  PetscInt n_fields;                 /* the last of a history alone */
-  PetscInt n[3], first[3], width[3]; /* this rank's nodes and cells in the file's order, values of each */
-  PetscReal *value[3], *rid[3];      /* of a solution: these fields there, and in the model's mesh */
-  PetscSF sf[3];                     /* from these to those */
-  PetscReal *coefficient, *U;        /* of a prediction: gamma and the full-order unknowns; its displacement */
+  HycoComparison c;
 } Rows;
 
-static const char *const fields[3] = {"U", "sigma", "inelastic"};
-
-static PetscErrorCode RowsCreate(HycoReducer t, HycoROM m, HycoSnapshots store, Rows *r)
-{
-  HycoMesh mesh = m->mesh;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMemzero(r, sizeof(*r)));
-  r->t = t;
-  r->m = m;
-  r->store = store;
-  r->width[0] = t->sizes[3];
-  r->width[1] = t->fom->fe->n_sigma;
-  r->width[2] = 1;
-  r->n_fields = t->scene->n_times ? 3 : 2;
-  for (PetscInt k = 0; k < r->n_fields; k++) {
-    const PetscInt n_rid = k ? mesh->n_cells : mesh->n_nodes;
-    PetscLayout layout;
-
-    PetscCall(PetscLayoutCreateFromSizes(HycoComm(t), PETSC_DECIDE, t->sizes[PetscMin(k, 1)], 1, &layout));
-    PetscCall(PetscLayoutGetRange(layout, &r->first[k], &r->n[k]));
-    r->n[k] -= r->first[k];
-    PetscCall(PetscMalloc2(r->n[k] * r->width[k], &r->value[k], n_rid * r->width[k], &r->rid[k]));
-    PetscCall(PetscSFCreate(HycoComm(t), &r->sf[k]));
-    PetscCall(PetscSFSetGraphLayout(r->sf[k], layout, n_rid, NULL, PETSC_OWN_POINTER,
-                                    k ? mesh->cell_whole : mesh->node_whole));
-    PetscCall(PetscLayoutDestroy(&layout));
-  }
-  PetscCall(PetscMalloc2(m->l + m->n_fe, &r->coefficient, r->n[0] * r->width[0], &r->U));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode RowsDestroy(Rows *r)
-{
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < r->n_fields; k++) {
-    PetscCall(PetscFree2(r->value[k], r->rid[k]));
-    PetscCall(PetscSFDestroy(&r->sf[k]));
-  }
-  PetscCall(PetscFree2(r->coefficient, r->U));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+static const char *const fields[HYCO_COMPARED] = {"U", "sigma", "inelastic"};
 
 /* step: the listed time, of a history. */
 static PetscErrorCode Read(Rows *r, const PetscReal mu[], PetscInt step)
 {
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < r->n_fields; k++)
-    PetscCall(HycoSnapshotsReadRows(r->store, mu, step, fields[k], r->first[k] * r->width[k], r->n[k] * r->width[k],
-                                    r->value[k]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The solution at mu: this rank's rows, and what the model's mesh has of it. Collective. */
-static PetscErrorCode ReadSolution(Rows *r, const PetscReal mu[], PetscInt step)
-{
-  PetscFunctionBegin;
-  HycoOnEach(HycoComm(r->t), Read(r, mu, step));
-  for (PetscInt k = 0; k < r->n_fields; k++) {
-    PetscMPIInt width;
-    MPI_Datatype unit;
-
-    PetscCall(PetscMPIIntCast(r->width[k], &width));
-    PetscCallMPI(MPI_Type_contiguous(width, MPIU_REAL, &unit));
-    PetscCallMPI(MPI_Type_commit(&unit));
-    PetscCall(PetscSFBcastBegin(r->sf[k], unit, r->value[k], r->rid[k], MPI_REPLACE));
-    PetscCall(PetscSFBcastEnd(r->sf[k], unit, r->value[k], r->rid[k], MPI_REPLACE));
-    PetscCallMPI(MPI_Type_free(&unit));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* U = r(u0) + V gamma (30) with the full-order values, of the prediction that rank `of` has: this rank's rows.
-   Collective. */
-static PetscErrorCode MakeRows(Rows *r, const PetscReal mu[], PetscInt step, PetscMPIInt of)
-{
-  HycoReducer t = r->t;
-  HycoROM m = r->m;
-  PetscReal all[HYCO_MAX_PARAMETERS];
-  const PetscInt dim = r->width[0], n = r->n[0] * dim;
-  const PetscScalar *v;
-  PetscInt lda;
-  PetscMPIInt count;
+  HycoComparison *c = &r->c;
 
   PetscFunctionBegin;
-  if (t->rank == of) {
-    PetscCall(PetscArraycpy(r->coefficient, m->gamma, m->l));
-    for (PetscInt k = 0; k < m->n_fe; k++) r->coefficient[m->l + k] = m->U[m->fe_dof[k]];
-  }
-  PetscCall(PetscMPIIntCast(m->l + m->n_fe, &count));
-  PetscCallMPI(MPI_Bcast(r->coefficient, count, MPIU_REAL, of, HycoComm(t)));
-  HycoSceneSetTime(t->scene, mu, t->scene->n_times ? t->scene->times[step] : 0, all);
-  PetscCall(HycoFOMSetParameters(t->fom, all));
-  PetscCall(HycoReducerToRows(t, HYCO_ON_NODES, MPIU_REAL, dim, t->fom->fe->u0, r->U));
-  PetscCall(MatDenseGetLDA(t->V, &lda));
-  PetscCall(MatDenseGetArrayRead(t->V, &v));
-  for (PetscInt j = 0; j < m->l; j++) {
-    for (PetscInt i = 0; i < n; i++) r->U[i] += v[(size_t)j * (size_t)lda + (size_t)i] * r->coefficient[j];
-  }
-  PetscCall(MatDenseRestoreArrayRead(t->V, &v));
-  for (PetscInt k = 0; k < m->n_fe; k++) {
-    const PetscInt i = (m->mesh->node_whole[m->fe_dof[k] / dim] - r->first[0]) * dim + m->fe_dof[k] % dim;
-
-    if (i >= 0 && i < n) r->U[i] = r->coefficient[m->l + k];
-  }
+  for (PetscInt k = 0; k < c->n_fields; k++)
+    PetscCall(HycoSnapshotsReadRows(r->store, mu, step, fields[k], c->first[k] * c->width[k], c->n[k] * c->width[k],
+                                    c->value[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -137,7 +40,7 @@ static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->pairs.n, &lambda));
   PetscCall(HycoSnapshotsReadRows(r->store, mu, 0, "lambda", 0, m->pairs.n, lambda));
-  PetscCall(HycoROMCompareRID(m, r->rid[0], r->rid[1], lambda, &e, &f));
+  PetscCall(HycoROMCompareRID(m, r->c.rid[0], r->c.rid[1], lambda, &e, &f));
   row->error[HYCO_ERROR_U_RID] = e.u_rid;
   row->error[HYCO_ERROR_SIGMA] = e.sigma;
   row->error[HYCO_ERROR_SIGMA_11] = e.sigma_11;
@@ -154,15 +57,21 @@ static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row
    Collective. */
 static PetscErrorCode MeasureU(Rows *r, const PetscReal mu[], PetscInt step, PetscMPIInt of, PetscReal square[2])
 {
+  HycoReducer t = r->t;
+  PetscReal all[HYCO_MAX_PARAMETERS];
+  const PetscScalar *V;
+  PetscInt lda;
+
   PetscFunctionBegin;
-  PetscCall(ReadSolution(r, mu, step));
-  PetscCall(MakeRows(r, mu, step, of));
-  square[0] = square[1] = 0;
-  for (PetscInt i = 0; i < r->n[0] * r->width[0]; i++) {
-    square[0] += (r->U[i] - r->value[0][i]) * (r->U[i] - r->value[0][i]);
-    square[1] += r->value[0][i] * r->value[0][i];
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, square, 2, MPIU_REAL, MPI_SUM, HycoComm(r->t)));
+  HycoOnEach(HycoComm(t), Read(r, mu, step));
+  PetscCall(HycoComparisonBring(&r->c));
+  HycoSceneSetTime(t->scene, mu, t->scene->n_times ? t->scene->times[step] : 0, all);
+  PetscCall(HycoFOMSetParameters(t->fom, all));
+  PetscCall(MatDenseGetLDA(t->V, &lda));
+  PetscCall(MatDenseGetArrayRead(t->V, &V));
+  PetscCall(HycoComparisonPredict(&r->c, r->m, of, V, lda));
+  PetscCall(MatDenseRestoreArrayRead(t->V, &V));
+  PetscCall(HycoComparisonSquares(&r->c, square));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -175,7 +84,7 @@ static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(r->m->pairs.n, &lambda));
   PetscCall(HycoSnapshotsReadRows(r->store, mu, step, "lambda", 0, r->m->pairs.n, lambda));
-  PetscCall(HycoROMMeasureRID(r->m, r->rid[0], r->rid[1], r->rid[2], lambda, lost));
+  PetscCall(HycoROMMeasureRID(r->m, r->c.rid[0], r->c.rid[1], r->c.rid[2], lambda, lost));
   lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
   PetscCall(PetscFree(lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -278,7 +187,7 @@ PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots
   PetscInt n, n_par, first, last;
   const PetscReal *mu;
   PetscMPIInt size, count;
-  Rows r;
+  Rows r = {t, m, store, {0}};
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->held, &n, &n_par, &mu));
@@ -287,7 +196,7 @@ PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots
   PetscCall(PetscArrayzero(rows, n));
   first = t->rank * n / size;
   last = (t->rank + 1) * n / size;
-  PetscCall(RowsCreate(t, m, store, &r));
+  PetscCall(HycoComparisonCreate(t->fom, m, &r.c));
   for (PetscInt step = 0; step * size < n + size; step++) { /* one point of each rank */
     const PetscInt k = first + step;
 
@@ -300,7 +209,7 @@ PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots
                                   : Compare(&r, mu + j * n_par, of, &rows[j]));
     }
   }
-  PetscCall(RowsDestroy(&r));
+  PetscCall(HycoComparisonDestroy(&r.c));
   if (!t->scene->n_times) HycoOnEach(HycoComm(t), PredictAgain(m, store, first, last, mu, rows));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, count, MPIU_REAL, MPI_SUM, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);

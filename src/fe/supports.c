@@ -33,8 +33,7 @@ static PetscErrorCode JoinPieces(MPI_Comm comm, HycoMesh m, const PetscInt piece
     for (PetscInt i = 0; i < m->n_owned; i++) own[i] = PETSC_MAX_INT;
     PetscCall(PetscSFReduceBegin(sf, MPIU_INT, node, own, MPI_MIN));
     PetscCall(PetscSFReduceEnd(sf, MPIU_INT, node, own, MPI_MIN));
-    PetscCall(PetscSFBcastBegin(sf, MPIU_INT, own, node, MPI_REPLACE));
-    PetscCall(PetscSFBcastEnd(sf, MPIU_INT, own, node, MPI_REPLACE));
+    PetscCall(HycoSFBcast(sf, MPIU_INT, 1, own, node));
     for (PetscInt i = 0; i < m->n_nodes; i++) {
       change = (PetscBool)(change || node[i] < label[piece[i]]);
       label[piece[i]] = PetscMin(label[piece[i]], node[i]);

@@ -10,6 +10,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   HycoCheckHandle(*fom, HYCO_FOM_CLASSID);
   HycoDereference(fom);
   f = *fom;
+  PetscCall(HycoComparedDestroy(&f->compared));
   PetscCall(HycoPathFree(&f->path));
   PetscCall(HycoSolverDestroy(&f->solver));
   PetscCall(HycoSystemDestroy(&f->system));

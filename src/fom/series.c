@@ -132,7 +132,7 @@ static PetscErrorCode WriteMesh(HycoSeries s)
 
   PetscFunctionBegin;
   HycoOnRoot(f->comm, HycoFieldsWriteHead(s->h, f->fe->mesh, f->fe->scene, f->mu, NULL));
-  PetscCall(HycoFieldsWriteMesh(s->h, f->rows, f->fe->mesh, f->fe->X));
+  PetscCall(HycoFieldsWriteMesh(s->h, "mesh", f->rows, f->fe->mesh, f->fe->X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -259,6 +259,24 @@ PetscErrorCode HycoFOMGetRows(HycoFOM f, const HycoFileOrder **rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFOMToRows(HycoFOM f, HycoPlace place, MPI_Datatype type, PetscInt components, const void *value,
+                             void *rows)
+{
+  const HycoFileOrder *order;
+  const PetscInt n = place == HYCO_ON_CELLS ? f->part->n_cells : f->part->n_nodes;
+  PetscMPIInt size;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(f, &order));
+  if (order) {
+    PetscCall(HycoFileOrderSend(order, place, type, components, value, rows));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCallMPI(MPI_Type_size(type, &size));
+  PetscCall(PetscMemcpy(rows, value, (size_t)(n * components) * (size_t)size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMWrite(HycoFOM f, const char path[])
 {
   const HycoFileOrder *rows;

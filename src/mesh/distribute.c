@@ -13,8 +13,7 @@ PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to)
   PetscCall(DMPlexGetChart(to, &first, &last));
   PetscCall(PetscCalloc1(last, &tag));
   PetscCall(ISGetIndices(tags, &sent));
-  PetscCall(PetscSFBcastBegin(sf, MPIU_INT, sent, tag, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(sf, MPIU_INT, sent, tag, MPI_REPLACE));
+  PetscCall(HycoSFBcast(sf, MPIU_INT, 1, sent, tag));
   PetscCall(ISRestoreIndices(tags, &sent));
   PetscCall(HycoPlexSetTags(to, tag));
   PetscFunctionReturn(PETSC_SUCCESS);

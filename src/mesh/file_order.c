@@ -60,19 +60,46 @@ PetscErrorCode HycoFileOrderDestroy(HycoFileOrder **order)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFileOrderSend(const HycoFileOrder *o, HycoPlace place, MPI_Datatype type, PetscInt components,
-                                 const void *value, void *rows)
+static PetscErrorCode CreateUnit(MPI_Datatype type, PetscInt width, MPI_Datatype *unit)
 {
   PetscMPIInt count;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMPIIntCast(width, &count));
+  PetscCallMPI(MPI_Type_contiguous(count, type, unit));
+  PetscCallMPI(MPI_Type_commit(unit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSFBcast(PetscSF sf, MPI_Datatype type, PetscInt width, const void *root, void *leaf)
+{
   MPI_Datatype unit;
 
   PetscFunctionBegin;
-  PetscCall(PetscMPIIntCast(components, &count));
-  PetscCallMPI(MPI_Type_contiguous(count, type, &unit));
-  PetscCallMPI(MPI_Type_commit(&unit));
-  PetscCall(PetscSFReduceBegin(o->sf[place], unit, value, rows, MPI_REPLACE));
-  PetscCall(PetscSFReduceEnd(o->sf[place], unit, value, rows, MPI_REPLACE));
+  PetscCall(CreateUnit(type, width, &unit));
+  PetscCall(PetscSFBcastBegin(sf, unit, root, leaf, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, unit, root, leaf, MPI_REPLACE));
   PetscCallMPI(MPI_Type_free(&unit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSFSend(PetscSF sf, MPI_Datatype type, PetscInt width, const void *leaf, void *root)
+{
+  MPI_Datatype unit;
+
+  PetscFunctionBegin;
+  PetscCall(CreateUnit(type, width, &unit));
+  PetscCall(PetscSFReduceBegin(sf, unit, leaf, root, MPI_REPLACE));
+  PetscCall(PetscSFReduceEnd(sf, unit, leaf, root, MPI_REPLACE));
+  PetscCallMPI(MPI_Type_free(&unit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFileOrderSend(const HycoFileOrder *o, HycoPlace place, MPI_Datatype type, PetscInt components,
+                                 const void *value, void *rows)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSFSend(o->sf[place], type, components, value, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -80,23 +107,16 @@ PetscErrorCode HycoFileOrderFetch(const HycoFileOrder *o, HycoMesh m, HycoPlace 
                                   const PetscReal rows[], PetscReal value[])
 {
   const PetscBool on_cells = (PetscBool)(place == HYCO_ON_CELLS);
-  PetscMPIInt count;
-  MPI_Datatype unit;
   PetscLayout layout;
   PetscSF sf;
 
   PetscFunctionBegin;
-  PetscCall(PetscMPIIntCast(components, &count));
-  PetscCallMPI(MPI_Type_contiguous(count, MPIU_REAL, &unit));
-  PetscCallMPI(MPI_Type_commit(&unit));
   PetscCall(PetscLayoutCreateFromSizes(o->comm, o->n[place], o->all[place], 1, &layout));
   PetscCall(PetscSFCreate(o->comm, &sf));
   PetscCall(PetscSFSetGraphLayout(sf, layout, on_cells ? m->n_cells : m->n_nodes, NULL, PETSC_OWN_POINTER,
                                   on_cells ? m->cell_whole : m->node_whole));
-  PetscCall(PetscSFBcastBegin(sf, unit, rows, value, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(sf, unit, rows, value, MPI_REPLACE));
+  PetscCall(HycoSFBcast(sf, MPIU_REAL, components, rows, value));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(PetscLayoutDestroy(&layout));
-  PetscCallMPI(MPI_Type_free(&unit));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

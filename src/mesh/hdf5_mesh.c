@@ -38,8 +38,7 @@ static PetscErrorCode OrderTags(DM dm, IS *ordered)
   PetscCall(PetscSFSetGraphLayout(sf, layout, n, leaf, PETSC_COPY_VALUES, to));
   PetscCall(PetscLayoutGetLocalSize(layout, &n));
   PetscCall(PetscMalloc1(n, &root));
-  PetscCall(PetscSFReduceBegin(sf, MPIU_INT, tag, root, MPI_REPLACE));
-  PetscCall(PetscSFReduceEnd(sf, MPIU_INT, tag, root, MPI_REPLACE));
+  PetscCall(HycoSFSend(sf, MPIU_INT, 1, tag, root));
   PetscCall(ISRestoreIndices(numbers, &number));
   PetscCall(ISRestoreIndices(tags, &tag));
   PetscCall(ISCreateGeneral(comm, n, root, PETSC_OWN_POINTER, ordered));
@@ -121,8 +120,7 @@ static PetscErrorCode LoadTags(DM dm, PetscViewer viewer, PetscSF from_file)
   PetscCall(DMPlexGetChart(dm, NULL, &last));
   PetscCall(PetscCalloc1(last, &tag));
   PetscCall(ISGetIndices(tags, &sent));
-  PetscCall(PetscSFBcastBegin(from_file, MPIU_INT, sent, tag, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(from_file, MPIU_INT, sent, tag, MPI_REPLACE));
+  PetscCall(HycoSFBcast(from_file, MPIU_INT, 1, sent, tag));
   PetscCall(ISRestoreIndices(tags, &sent));
   PetscCall(ISDestroy(&tags));
   PetscCall(HycoPlexSetTags(dm, tag));

@@ -169,8 +169,7 @@ static PetscErrorCode FetchNotes(HycoReducer t, const PetscBool in[], PetscInt n
     if (HycoMeshOwned(part, i) >= 0) own[HycoMeshOwned(part, i)] = of[i];
   }
   PetscCall(HycoMeshNodeSF(HycoComm(t), part, n, global, &sf));
-  PetscCall(PetscSFBcastBegin(sf, MPIU_INT, own, note, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(sf, MPIU_INT, own, note, MPI_REPLACE));
+  PetscCall(HycoSFBcast(sf, MPIU_INT, 1, own, note));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(PetscFree2(of, own));
   PetscFunctionReturn(PETSC_SUCCESS);

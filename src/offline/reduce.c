@@ -6,24 +6,6 @@
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
 
-PetscErrorCode HycoReducerToRows(HycoReducer t, HycoPlace place, MPI_Datatype type, PetscInt components,
-                                 const void *value, void *rows)
-{
-  const HycoFileOrder *order;
-  const PetscInt n = place == HYCO_ON_CELLS ? t->fom->part->n_cells : t->fom->part->n_nodes;
-  PetscMPIInt size;
-
-  PetscFunctionBegin;
-  PetscCall(HycoFOMGetRows(t->fom, &order));
-  if (order) {
-    PetscCall(HycoFileOrderSend(order, place, type, components, value, rows));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCallMPI(MPI_Type_size(type, &size));
-  PetscCall(PetscMemcpy(rows, value, (size_t)(n * components) * (size_t)size));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoReducerCount(HycoReducer t)
 {
   PetscFunctionBegin;
@@ -54,7 +36,7 @@ static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
   PetscFunctionBegin;
   PetscCall(MatGetLocalSize(S, &n_rows, NULL));
   PetscCall(PetscMalloc1(n_rows, &fixed));
-  PetscCall(HycoReducerToRows(t, HYCO_ON_NODES, HYCO_MPI_BOOL, t->sizes[3], t->fom->fe->fixed, fixed));
+  PetscCall(HycoFOMToRows(t->fom, HYCO_ON_NODES, HYCO_MPI_BOOL, t->sizes[3], t->fom->fe->fixed, fixed));
   PetscCall(MatGetSize(S, NULL, &n));
   PetscCall(MatDenseGetLDA(S, &lda));
   PetscCall(MatDenseGetArray(S, &s));
@@ -288,8 +270,7 @@ PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, Pe
   for (PetscInt k = 0; k < n_columns; k++) {
     PetscReal *column = *rows + (size_t)k * (size_t)n_rows;
 
-    PetscCall(PetscSFBcastBegin(sf, MPIU_REAL, s + (size_t)k * (size_t)lda, column, MPI_REPLACE));
-    PetscCall(PetscSFBcastEnd(sf, MPIU_REAL, s + (size_t)k * (size_t)lda, column, MPI_REPLACE));
+    PetscCall(HycoSFBcast(sf, MPIU_REAL, 1, s + (size_t)k * (size_t)lda, column));
   }
   PetscCall(MatDenseRestoreArrayRead(S, &s));
   PetscCall(PetscSFDestroy(&sf));

@@ -83,8 +83,7 @@ static PetscErrorCode ToSurface(Rid *r, const PetscBool node[], PetscInt on[])
     PetscCall(PetscArraycpy(on, r->own, r->part->n_nodes));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscSFBcastBegin(r->to_surface, MPIU_INT, r->own, on, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(r->to_surface, MPIU_INT, r->own, on, MPI_REPLACE));
+  PetscCall(HycoSFBcast(r->to_surface, MPIU_INT, 1, r->own, on));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,10 +95,8 @@ static PetscErrorCode FromSurface(Rid *r, const PetscInt on[], PetscInt node[])
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscArrayzero(r->own, r->part->n_owned));
-  PetscCall(PetscSFReduceBegin(r->to_surface, MPIU_INT, on, r->own, MPI_REPLACE));
-  PetscCall(PetscSFReduceEnd(r->to_surface, MPIU_INT, on, r->own, MPI_REPLACE));
-  PetscCall(PetscSFBcastBegin(r->to_part, MPIU_INT, r->own, node, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(r->to_part, MPIU_INT, r->own, node, MPI_REPLACE));
+  PetscCall(HycoSFSend(r->to_surface, MPIU_INT, 1, on, r->own));
+  PetscCall(HycoSFBcast(r->to_part, MPIU_INT, 1, r->own, node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -42,20 +42,24 @@ PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const HycoFileOrder *order, HycoMesh m, const PetscReal X[])
+PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char folder[], const HycoFileOrder *order, HycoMesh m,
+                                   const PetscReal X[])
 {
   PetscInt *cells = m->cells;
+  char name[4][HYCO_LINE];
+  static const char *const of[4] = {"xyz", "cells", "node_id", "cell_id"};
 
   PetscFunctionBegin;
-  PetscCall(HycoFieldWrite(h, order, m->n_nodes, "mesh/xyz", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
+  for (int k = 0; k < 4; k++) PetscCall(PetscSNPrintf(name[k], HYCO_LINE, "%s/%s", folder, of[k]));
+  PetscCall(HycoFieldWrite(h, order, m->n_nodes, name[0], HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
   if (order) {
     PetscCall(PetscMalloc1(m->n_cells * m->nv, &cells));
     for (PetscInt k = 0; k < m->n_cells * m->nv; k++) cells[k] = m->node_whole[m->cells[k]];
   }
-  PetscCall(HycoFieldWrite(h, order, m->n_cells, "mesh/cells", HYCO_ON_CELLS, MPIU_INT, m->nv, m->nv, cells));
+  PetscCall(HycoFieldWrite(h, order, m->n_cells, name[1], HYCO_ON_CELLS, MPIU_INT, m->nv, m->nv, cells));
   if (order) PetscCall(PetscFree(cells));
-  PetscCall(HycoFieldWrite(h, order, m->n_nodes, "mesh/node_id", HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
-  PetscCall(HycoFieldWrite(h, order, m->n_cells, "mesh/cell_id", HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
+  PetscCall(HycoFieldWrite(h, order, m->n_nodes, name[2], HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
+  PetscCall(HycoFieldWrite(h, order, m->n_cells, name[3], HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,7 +96,7 @@ static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder 
 {
   PetscFunctionBegin;
   HycoOnRoot(comm, HycoFieldsWriteHead(h, m, scene, mu, contact));
-  PetscCall(HycoFieldsWriteMesh(h, order, m, X));
+  PetscCall(HycoFieldsWriteMesh(h, "mesh", order, m, X));
   for (PetscInt k = 0; k < n; k++) {
     char name[HYCO_LINE];
 

@@ -104,7 +104,6 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
   m = *model;
   PetscCall(HycoROMReset(m));
   PetscTryTypeMethod(m, destroy);
-  PetscCall(HycoNormsDestroy(&m->norms));
   PetscCall(HycoROMFreeWhole(m));
   PetscCall(HycoPairsDestroy(&m->pairs));
   PetscCall(HycoMeshDestroy(&m->mesh));

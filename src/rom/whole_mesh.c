@@ -13,8 +13,6 @@ static PetscErrorCode WritePlaced(MPI_Comm comm, HycoH5 h, const char name[], Pe
   PetscLayout layout;
   PetscSF sf;
   PetscInt first, last, *rows;
-  PetscMPIInt count;
-  MPI_Datatype unit;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
@@ -23,12 +21,7 @@ static PetscErrorCode WritePlaced(MPI_Comm comm, HycoH5 h, const char name[], Pe
   PetscCall(PetscMalloc1((last - first) * width, &rows));
   PetscCall(PetscSFCreate(comm, &sf));
   PetscCall(PetscSFSetGraphLayout(sf, layout, n, NULL, PETSC_OWN_POINTER, place));
-  PetscCall(PetscMPIIntCast(width, &count));
-  PetscCallMPI(MPI_Type_contiguous(count, MPIU_INT, &unit));
-  PetscCallMPI(MPI_Type_commit(&unit));
-  PetscCall(PetscSFReduceBegin(sf, unit, value, rows, MPI_REPLACE));
-  PetscCall(PetscSFReduceEnd(sf, unit, value, rows, MPI_REPLACE));
-  PetscCallMPI(MPI_Type_free(&unit));
+  PetscCall(HycoSFSend(sf, MPIU_INT, width, value, rows));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(PetscLayoutDestroy(&layout));
   ierr = HycoH5WriteRows(h, name, MPIU_INT, all, width, first, last - first, rows);
@@ -109,25 +102,6 @@ static PetscErrorCode WriteHead(HycoH5 h, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes and cells. Collective. */
-static PetscErrorCode WriteTables(HycoH5 h, const HycoFileOrder *order, HycoMesh m)
-{
-  const PetscInt nn = m->n_nodes, nc = m->n_cells;
-  PetscInt *cells = m->cells;
-
-  PetscFunctionBegin;
-  PetscCall(HycoFieldWrite(h, order, nn, IN("xyz"), HYCO_ON_NODES, MPIU_REAL, 3, 3, m->xyz));
-  PetscCall(HycoFieldWrite(h, order, nn, IN("node_id"), HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
-  PetscCall(HycoFieldWrite(h, order, nn, IN("node_body"), HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_body));
-  if (order) PetscCall(PetscMalloc1(nc * m->nv, &cells));
-  for (PetscInt k = 0; order && k < nc * m->nv; k++) cells[k] = m->node_whole[m->cells[k]];
-  PetscCall(HycoFieldWrite(h, order, nc, IN("cells"), HYCO_ON_CELLS, MPIU_INT, m->nv, m->nv, cells));
-  if (order) PetscCall(PetscFree(cells));
-  PetscCall(HycoFieldWrite(h, order, nc, IN("cell_id"), HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
-  PetscCall(HycoFieldWrite(h, order, nc, IN("cell_body"), HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_body));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The first l columns of V, row by row. Collective. */
 static PetscErrorCode WriteModes(HycoH5 h, PetscInt l, Mat V)
 {
@@ -154,14 +128,17 @@ static PetscErrorCode WriteModes(HycoH5 h, PetscInt l, Mat V)
 
 PetscErrorCode HycoROMWriteWhole(HycoH5 h, HycoFOM f, PetscInt l, Mat V)
 {
+  HycoMesh m = f->part;
   const HycoFileOrder *order;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(f, &order));
-  HycoOnRoot(HycoComm(f), WriteHead(h, f->part));
-  PetscCall(WriteTables(h, order, f->part));
-  PetscCall(WriteGroupNodes(HycoComm(f), h, f->part, f->n_nodes));
-  PetscCall(WriteFacets(HycoComm(f), h, f->part, f->n_cells));
+  HycoOnRoot(HycoComm(f), WriteHead(h, m));
+  PetscCall(HycoFieldsWriteMesh(h, "whole", order, m, m->xyz));
+  PetscCall(HycoFieldWrite(h, order, m->n_nodes, IN("node_body"), HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_body));
+  PetscCall(HycoFieldWrite(h, order, m->n_cells, IN("cell_body"), HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_body));
+  PetscCall(WriteGroupNodes(HycoComm(f), h, m, f->n_nodes));
+  PetscCall(WriteFacets(HycoComm(f), h, m, f->n_cells));
   PetscCall(WriteModes(h, l, V));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

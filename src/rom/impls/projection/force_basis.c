@@ -166,7 +166,7 @@ static PetscErrorCode ScaledSupremizers(HycoReducer t, Mat *scaled)
 
       value[i] = none ? 0 : x[(size_t)k * (size_t)lda[0] + (size_t)(place * dim + i % dim)] / size[k];
     }
-    PetscCall(HycoReducerToRows(t, HYCO_ON_NODES, MPIU_REAL, dim, value, y + (size_t)k * (size_t)lda[1]));
+    PetscCall(HycoFOMToRows(t->fom, HYCO_ON_NODES, MPIU_REAL, dim, value, y + (size_t)k * (size_t)lda[1]));
   }
   PetscCall(MatDenseRestoreArray(*scaled, &y));
   PetscCall(MatDenseRestoreArrayRead(X, &x));
