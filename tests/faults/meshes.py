@@ -215,7 +215,7 @@ SCENES = [
     (('range: [0.001, 0.1]', 'range: [0, .inf]'), 'its range is missing or wrong'),
     (('parameters: [load]', 'parameters: [x]'), 'cannot name a parameter'),
     (('parameters: [load]', 'parameters: [load, load]'), 'stands twice'),
-    (('body:\n', 'bodies:\n'), 'is unknown; an entry stands under scene, parameter, body'),
+    (('body:\n', 'bodies:\n'), 'is unknown; an entry stands under scene, parameter,'),
     (('body:\n', 'log_view: here\nbody:\n'), '"log_view" is unknown'),
     (('young: 1,', '"young ": 1,'), 'unknown'),
     (('scene:\n', 'scene: {\n'), 'is not YAML that hyco reads'),
