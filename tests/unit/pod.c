@@ -208,7 +208,7 @@ static PetscErrorCode TestTypes(void)
       CHECK(l >= types[t].least && l <= 13, "%s, %d x %d: %d modes", types[t].type, (int)N, (int)n, (int)l);
       for (int k = 0; k < l; k++) CHECK_NEAR(sigma[k], s[k], 2e-3 * s[k]);
       CHECK(sigma[l] < fmax(1.2 * s[l], 1e-7 * s[0]), "%s: %g for what it leaves out", types[t].type, sigma[l]);
-      PetscCall(CheckModes(V, N, l, s, 1e-9, 1e-4));
+      PetscCall(CheckModes(V, N, l, s, 1e-9, 2e-3)); /* the last ones' singular values are good to 1e-3 */
       PetscCall(MatDestroy(&V));
       PetscCall(MatDestroy(&S));
     }
