@@ -42,7 +42,7 @@ static PetscInt Place(const HycoRegistry *r, const char name[])
   return -1;
 }
 
-PetscErrorCode HycoRegistryAdd_Private(HycoRegistry *r, const char name[], PetscVoidFunction create)
+PetscErrorCode HycoRegistryAdd_Private(HycoRegistry *r, const char name[], HycoVoidFn *create)
 {
   PetscInt k;
 
@@ -64,7 +64,7 @@ PetscErrorCode HycoRegistryAdd_Private(HycoRegistry *r, const char name[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoRegistryFind_Private(HycoRegistry *r, const char name[], PetscVoidFunction *create)
+PetscErrorCode HycoRegistryFind_Private(HycoRegistry *r, const char name[], HycoVoidFn **create)
 {
   PetscInt k;
 
