@@ -17,6 +17,12 @@ SANITIZED = os.environ.get('HYCO_SANITIZE') == '1'
 PATIENCE = int(os.environ.get('HYCO_PATIENCE', '15'))  # factor of a run's limit of time: tests/CMakeLists.txt
 
 
+def library_path(*folders):
+    """Where programs that a test makes find libraries: in these folders, and beside the .pc files of a PETSc of one's own."""
+    own = [os.path.dirname(p.rstrip('/')) for p in os.environ.get('PKG_CONFIG_PATH', '').split(':') if p]
+    return ':'.join([*folders, *own, *filter(None, [os.environ.get('LD_LIBRARY_PATH')])])
+
+
 def said(run):
     """What hyco or PETSc said on stderr, by line, progress apart; launchers have words of their own, in each version others."""
     return [line for line in run.stderr.splitlines() if line.startswith('hyco: ') or 'PETSC ERROR' in line]

@@ -8,7 +8,7 @@ import tempfile
 import unittest
 
 import document
-from common import PATIENCE, SANITIZED, SOURCE
+from common import PATIENCE, SANITIZED, SOURCE, library_path
 
 BUILD = os.path.dirname(os.environ['HYCO'])
 DOCS = os.path.join(SOURCE, 'docs')
@@ -33,7 +33,7 @@ class Documents(unittest.TestCase):
             if SANITIZED or not library:
                 self.skipTest('the C program of the tutorial would want the flags of the library')
             paths = [os.path.join(os.path.dirname(library), 'pkgconfig'), os.environ.get('PKG_CONFIG_PATH', '')]
-            self.run_page('tutorial.md', 12, PKG_CONFIG_PATH=':'.join(p for p in paths if p), LD_LIBRARY_PATH=os.path.dirname(library))
+            self.run_page('tutorial.md', 12, PKG_CONFIG_PATH=':'.join(p for p in paths if p), LD_LIBRARY_PATH=library_path(os.path.dirname(library)))
 
     def test_faq(self):
         self.run_page('faq.md', 8)

@@ -6,7 +6,7 @@ import subprocess
 import tempfile
 import unittest
 
-from common import PATIENCE
+from common import PATIENCE, library_path
 
 BUILD = os.path.dirname(os.environ['HYCO'])
 SOURCE = os.path.dirname(os.path.realpath(os.path.join(os.environ['HYCO_SOURCE'], 'CMakeLists.txt')))
@@ -26,6 +26,8 @@ class Installed(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory(prefix='a b ')
         cls.prefix = os.path.join(cls.folder.name, 'prefix')
         run('cmake', '--install', BUILD, '--prefix', cls.prefix)
+        if library_path():
+            os.environ['LD_LIBRARY_PATH'] = library_path()  # hyco's own library is found without it
         cls.library, = glob.glob(os.path.join(cls.prefix, '**', 'libhyco.so'), recursive=True)
 
     @classmethod
