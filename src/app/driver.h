@@ -87,6 +87,10 @@ void DriverStartAlone(void);
 /* Fails where a launcher of another MPI has started several processes, each of which would do all the work and write
    the same files. Collective. */
 PetscErrorCode DriverCheckLaunch(void);
+/* Where OpenBLAS does not know this processor, which is younger, and takes the kernels of its oldest: starts this
+   program anew with those that the processor runs (a factor takes half the time), unless OPENBLAS_CORETYPE says which.
+   The library reads that variable when it is loaded, before main(). */
+void DriverChooseKernels(char **argv);
 /* One thread a rank for the BLAS, unless its variables, or OpenMP's, say how many. (A BLAS reads them when it is
    loaded, before main().) */
 void DriverOneThread(void);

@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 /* Variables by which launchers tell a process how many ranks they have started. */
@@ -85,6 +86,34 @@ PetscErrorCode DriverCheckLaunch(void)
             "the mpiexec (or srun --mpi=...) of the MPI that PETSc was built with",
             launched);
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The newest kernels of OpenBLAS that this processor runs; NULL: no newer ones than Prescott's. */
+static const char *KernelsOfProcessor(void)
+{
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
+      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512cd"))
+    return "SkylakeX";
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return "Haswell";
+#endif
+  return NULL;
+}
+
+void DriverChooseKernels(char **argv)
+{
+  static const char choice[] = "OPENBLAS_CORETYPE";
+  union {
+    void *address;
+    const char *(*name)(void);
+  } call;
+  const char *kernels = KernelsOfProcessor();
+
+  call.address = dlsym(RTLD_DEFAULT, "openblas_get_corename");
+  if (!kernels || !call.address || getenv(choice) || strcmp(call.name(), "Prescott") || setenv(choice, kernels, 1))
+    return;
+  execv("/proc/self/exe", argv); /* comes back only where it fails: hyco then goes on as it is */
 }
 
 void DriverOneThread(void)

@@ -181,6 +181,12 @@ static int Help(char **argv)
   return HycoFinalize() || ierr ? DRIVER_FAILED : DRIVER_DONE;
 }
 
+/* Does it solve full order? A start anew takes longer than a prediction. */
+static int Factors(const Command *command)
+{
+  return command->run == CommandSolve || command->run == CommandTrain || command->run == CommandCompare;
+}
+
 int main(int argc, char **argv)
 {
   PetscErrorCode ierr;
@@ -189,6 +195,7 @@ int main(int argc, char **argv)
   if (AsksHelp(argc, argv)) return Help(argv);
   status = AnswerAtOnce(argc, argv);
   if (status >= 0) return status;
+  if (Factors(FindCommand(argv[1]))) DriverChooseKernels(argv);
   DriverOneThread();
   DriverNoteLaunch();
   DriverStartAlone();

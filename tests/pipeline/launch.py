@@ -40,6 +40,22 @@ class Launch(Case):
         self.assertEqual(run.returncode, 0, run.stderr)
         return {re.sub(r'\d+', '0', line) for line in run.stderr.splitlines()}
 
+    def kernels(self, command, **environment):
+        """Those that OpenBLAS says it takes, a start a line."""
+        return re.findall(r'(?m)^Core: (\S+)', self.start(*command, OPENBLAS_VERBOSE='2', **environment).stderr)
+
+    def test_young_processor(self):
+        """An OpenBLAS older than the processor takes its oldest kernels; solve and train then start anew with those that the processor runs."""
+        predict, solve = self.kernels(self.COMMANDS[1]), self.kernels(self.COMMANDS[2])
+        if predict != ['Prescott']:
+            self.assertEqual(solve, predict)
+            self.skipTest(f'the kernels that OpenBLAS takes here are {predict}')
+        with open('/proc/cpuinfo', encoding='utf-8') as file:
+            flags = set(re.search(r'(?m)^flags\s*:(.*)', file.read()).group(1).split())
+        best = 'SkylakeX' if {'avx512f', 'avx512dq', 'avx512bw', 'avx512vl', 'avx512cd'} <= flags else 'Haswell' if {'avx2', 'fma'} <= flags else None
+        self.assertEqual(solve, ['Prescott', best] if best else ['Prescott'])
+        self.assertEqual(self.kernels(self.COMMANDS[2], OPENBLAS_CORETYPE='Prescott'), ['Prescott'])
+
     def test_temporary_folder(self):
         """No folder for temporary files, or one that cannot be used: Open MPI 5 wants one, crashes without it, and makes one that is missing."""
         usual = self.noise()
