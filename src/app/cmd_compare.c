@@ -102,38 +102,6 @@ static int CompareReal(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-/* Mean and worst over the points where the error is defined, and how many there are where it is not (x/0). */
-static void AddStatistics(cJSON *json, PetscInt n, const PetscReal value[], PetscInt column, PetscInt *all_undefined)
-{
-  const char *name = columns[column];
-  cJSON *object = cJSON_AddObjectToObject(json, name);
-  PetscReal sum = 0, worst = 0;
-  PetscInt used = 0, undefined = 0;
-
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscReal e = value[k * N_COLUMNS + column];
-
-    if (e > PETSC_MAX_REAL / 8 || value[k * N_COLUMNS + CONVERGED] < 0.5) {
-      undefined += value[k * N_COLUMNS + CONVERGED] > 0.5;
-      continue;
-    }
-    sum += e;
-    worst = PetscMax(worst, e);
-    used++;
-  }
-  *all_undefined += undefined;
-  cJSON_AddNumberToObject(object, "undefined", undefined);
-  if (used) {
-    cJSON_AddNumberToObject(object, "mean", sum / used);
-    cJSON_AddNumberToObject(object, "max", worst);
-    (void)!Say("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(sum / used), 100 * (double)worst);
-  } else { /* no point where it is defined */
-    cJSON_AddNullToObject(object, "mean");
-    cJSON_AddNullToObject(object, "max");
-    (void)!Say("  %-21s undefined at every point\n", name);
-  }
-}
-
 static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal value[])
 {
   cJSON *json, *object;
@@ -157,7 +125,8 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
   PetscCall(ReportCreate("compare", scene, NULL, &json));
   cJSON_AddNumberToObject(json, "n_points", n);
   PetscCall(Say("%d point%s\n", (int)n, n == 1 ? "" : "s"));
-  for (PetscInt k = 0; k < (contact ? N_ERRORS : E_LAMBDA_RID); k++) AddStatistics(json, n, value, k, &undefined);
+  for (PetscInt k = 0; k < (contact ? N_ERRORS : E_LAMBDA_RID); k++)
+    ReportError(json, columns[k], n, N_COLUMNS, value, k, CONVERGED, &undefined);
   object = cJSON_AddObjectToObject(json, "speedup");
   cJSON_AddNumberToObject(object, "mean", mean);
   cJSON_AddNumberToObject(object, "median", ratio[n / 2]);

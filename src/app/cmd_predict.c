@@ -189,7 +189,7 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
   PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
   PetscCall(Report(scene, mu, &p, energy, "", PETSC_FALSE, &path));
-  PetscCall(PetscFree(path.value));
+  PetscCall(PetscFree(path.step));
   HycoCheck(p.reason != HYCO_DIVERGED_STEP,
             "the history ends at t = %.10g, beyond which its steps have become too small: %s; what was reached is "
             "written",

@@ -114,7 +114,7 @@ static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], c
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   PetscCall(HycoSceneGetHistory(scene, &path.n, NULL));
   if (output[0]) PetscCall(HycoFOMSetSeries(fom, output));
-  PetscCall(HycoFOMSetStepMonitor(fom, DriverSayStep, &path));
+  PetscCall(HycoFOMSetStepMonitor(fom, DriverMonitorStep, &path));
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(DriverEndHistory(fom, scene, mu, table));
   PetscCall(HycoFOMGetSummary(fom, &summary));

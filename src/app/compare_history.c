@@ -52,42 +52,13 @@ static PetscErrorCode NameColumns(char names[][64], const char *columns[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mean and largest over the points of which a path reached its end. */
-static void AddStatistics(cJSON *json, const char name[], PetscInt n, const PetscReal value[], PetscInt column)
-{
-  cJSON *object = cJSON_AddObjectToObject(json, name);
-  PetscReal sum = 0, worst = 0;
-  PetscInt used = 0, undefined = 0;
-
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *v = value + k * N_COLUMNS;
-
-    if (v[CONVERGED] < 0.5) continue;
-    undefined += v[column] > PETSC_MAX_REAL / 8;
-    if (v[column] > PETSC_MAX_REAL / 8) continue;
-    sum += v[column];
-    worst = PetscMax(worst, v[column]);
-    used++;
-  }
-  cJSON_AddNumberToObject(object, "undefined", undefined);
-  if (used) {
-    cJSON_AddNumberToObject(object, "mean", sum / used);
-    cJSON_AddNumberToObject(object, "max", worst);
-    (void)!Say("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(sum / used), 100 * (double)worst);
-  } else {
-    cJSON_AddNullToObject(object, "mean");
-    cJSON_AddNullToObject(object, "max");
-    (void)!Say("  %-21s undefined at every point\n", name);
-  }
-}
-
 PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal mu[],
                                  const PetscReal value[], const char table[])
 {
   char names[N_COLUMNS][64];
   const char *columns[N_COLUMNS];
   PetscReal seconds[2] = {0, 0}, kkt = 0;
-  PetscInt failed = 0;
+  PetscInt failed = 0, undefined = 0;
   cJSON *json;
 
   PetscFunctionBegin;
@@ -100,7 +71,7 @@ PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n,
     const PetscInt kind = c % HYCO_N_ERRORS;
 
     if (contact || (kind != HYCO_ERROR_LAMBDA && kind != HYCO_ERROR_LAMBDA_RID))
-      AddStatistics(json, names[c], n, value, c);
+      ReportError(json, names[c], n, N_COLUMNS, value, c, CONVERGED, &undefined);
   }
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal *v = value + k * N_COLUMNS;
@@ -112,6 +83,7 @@ PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n,
   }
   cJSON_AddNumberToObject(json, "seconds_full_order", seconds[0]);
   cJSON_AddNumberToObject(json, "seconds_reduced", seconds[1]);
+  cJSON_AddNumberToObject(json, "undefined", undefined);
   cJSON_AddNumberToObject(json, "not_converged", failed);
   cJSON_AddNumberToObject(json, "kkt_max", kkt);
   PetscCall(Say("mean seconds of a path: full order %.3g, reduced %.3g; %d not ended; largest KKT residual %.1e\n",

@@ -117,6 +117,10 @@ PetscErrorCode ReportColumns(HycoScene scene, PetscInt n, const char *const colu
 void ReportKKT(cJSON *json, const HycoKKT *kkt);
 void ReportSeconds(cJSON *json, const HycoSeconds *seconds);
 void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[]);
+/* Mean and largest of an error, in the report and in words, over the converged of n points, and at how many it is not
+   defined (x/0; also added to all_undefined). value: n x n_columns row major; column, converged: which of these. */
+void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
+                 PetscInt column, PetscInt converged, PetscInt *all_undefined);
 /* Adds memory_mb and what was missed, writes to -report (if given) on rank 0 and frees. */
 PetscErrorCode ReportWrite(cJSON **json);
 /* The report of a set of points, n rows of values by column (one named "converged"), and their CSV at `table` ("":
@@ -217,6 +221,16 @@ PetscErrorCode DriverSetSearch(Search *search, HycoScene scene, HycoReducer redu
 PetscErrorCode DriverJudgeModel(const Search *search, const HycoTraining *training);
 void DriverReportModel(cJSON *json, const Search *search, const HycoTraining *training);
 
+/* -- steps.c: the listed times of a path; reduced: those of predict, whose numbers are of the RID -- */
+
+/* A line on rank 0; n: how many times the scene lists. */
+PetscErrorCode DriverSayStep(const HycoStep *step, PetscInt n);
+/* A CSV ("": none) with a row for each of n times. Collective. */
+PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const PetscReal mu[], PetscBool reduced,
+                                PetscInt n, const HycoStep step[]);
+/* An array of n for each of their numbers. */
+void DriverReportSteps(cJSON *history, PetscBool reduced, PetscInt n, const HycoStep step[]);
+
 /* -- solve_history.c: a path -- */
 
 /* How many times the scene lists; whether unread options have been looked for. */
@@ -225,17 +239,17 @@ typedef struct {
   PetscBool checked;
 } DriverPath;
 /* A HycoStepMonitor; ctx: a DriverPath. */
-PetscErrorCode DriverSayStep(HycoFOM fom, const HycoStep *step, void *ctx);
+PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *step, void *ctx);
 void DriverReportHistory(cJSON *json, const HycoHistory *history);
 /* After the solve: the table ("": none), a summary; fails where the path has not reached its end. Collective. */
 PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char table[]);
 
 /* -- predict_history.c: a reduced path -- */
 
-/* The listed times that a prediction reached, a row of numbers each. On every rank. */
+/* The listed times that a prediction reached. On every rank. */
 typedef struct {
   PetscInt n;
-  PetscReal *value; /* PetscFree() it */
+  HycoStep *step; /* PetscFree() it */
   PetscBool ended;
   PetscReal t;
   char why[DRIVER_LINE];

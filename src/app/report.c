@@ -136,6 +136,36 @@ PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
+                 PetscInt column, PetscInt converged, PetscInt *all_undefined)
+{
+  cJSON *object = cJSON_AddObjectToObject(json, name);
+  PetscReal sum = 0, worst = 0;
+  PetscInt used = 0, undefined = 0;
+
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal e = value[k * n_columns + column];
+
+    if (value[k * n_columns + converged] < 0.5) continue;
+    undefined += e > PETSC_MAX_REAL / 8;
+    if (e > PETSC_MAX_REAL / 8) continue;
+    sum += e;
+    worst = PetscMax(worst, e);
+    used++;
+  }
+  *all_undefined += undefined;
+  cJSON_AddNumberToObject(object, "undefined", undefined);
+  if (used) {
+    cJSON_AddNumberToObject(object, "mean", sum / used);
+    cJSON_AddNumberToObject(object, "max", worst);
+    (void)!Say("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(sum / used), 100 * (double)worst);
+  } else { /* no point where it is defined */
+    cJSON_AddNullToObject(object, "mean");
+    cJSON_AddNullToObject(object, "max");
+    (void)!Say("  %-21s undefined at every point\n", name);
+  }
+}
+
 /* The column of a set's table that says whether a point converged. */
 static PetscInt FindConverged(PetscInt n_columns, const char *const columns[])
 {

@@ -1,0 +1,110 @@
+/* The listed times of a path, of solve and of predict: a line each, the table, the report's history. */
+#include "driver.h"
+#include <stddef.h>
+
+/* A number of a listed time: its column with solve and with predict (NULL: no such), where in HycoStep it stands. */
+typedef struct {
+  const char *full, *reduced;
+  size_t at;
+  PetscBool count; /* PetscInt, else PetscReal */
+} Column;
+
+#define BOTH(name, member, count)                                                                                      \
+  {                                                                                                                    \
+    name, name, offsetof(HycoStep, member), count                                                                      \
+  }
+#define ON_RID(name, member)                                                                                           \
+  {                                                                                                                    \
+    name, "rid_" name, offsetof(HycoStep, member), PETSC_FALSE                                                         \
+  }
+#define FULL_ONLY(name, member, count)                                                                                 \
+  {                                                                                                                    \
+    name, NULL, offsetof(HycoStep, member), count                                                                      \
+  }
+
+static const Column columns[] = {
+    BOTH("t", t, PETSC_FALSE),
+    BOTH("substeps", substeps, PETSC_TRUE),
+    BOTH("cuts", cuts, PETSC_TRUE),
+    BOTH("iterations", iterations, PETSC_TRUE),
+    BOTH("most_iterations", most_iterations, PETSC_TRUE),
+    FULL_ONLY("factors", factors, PETSC_TRUE),
+    BOTH("active_set_iterations", active_set_iterations, PETSC_TRUE),
+    BOTH("n_active", n_active, PETSC_TRUE),
+    BOTH("total_contact_force", total_contact_force, PETSC_FALSE),
+    BOTH("lambda_max", lambda_max, PETSC_FALSE),
+    ON_RID("u_norm2", u_norm2),
+    ON_RID("mises", mises),
+    ON_RID("inelastic", inelastic),
+    BOTH("residual", residual, PETSC_FALSE),
+    BOTH("kkt_max", kkt, PETSC_FALSE),
+    FULL_ONLY("work", work, PETSC_FALSE),
+    FULL_ONLY("contact_work", contact_work, PETSC_FALSE),
+    FULL_ONLY("stored", stored, PETSC_FALSE),
+    FULL_ONLY("dissipated", dissipated, PETSC_FALSE),
+    FULL_ONLY("thermal", thermal, PETSC_FALSE),
+    FULL_ONLY("energy_defect", energy_defect, PETSC_FALSE),
+    BOTH("seconds", seconds, PETSC_FALSE),
+};
+enum { N_COLUMNS = sizeof(columns) / sizeof(columns[0]) };
+
+static const char *NameOf(const Column *c, PetscBool reduced)
+{
+  return reduced ? c->reduced : c->full;
+}
+
+static PetscReal ValueOf(const Column *c, const HycoStep *s)
+{
+  const char *at = (const char *)s + c->at;
+
+  return c->count ? (PetscReal) * (const PetscInt *)(const void *)at : *(const PetscReal *)(const void *)at;
+}
+
+PetscErrorCode DriverSayStep(const HycoStep *s, PetscInt n)
+{
+  PetscFunctionBegin;
+  PetscCall(
+      Say("t %-11.10g %3d of %d: %d step%s, %d iteration%s%s, %d closed, force %.8g, inelastic %.3g, mises %.5g\n",
+          (double)s->t, (int)s->index + 1, (int)n, (int)s->substeps, s->substeps == 1 ? "" : "s", (int)s->iterations,
+          s->iterations == 1 ? "" : "s", s->cuts ? ", cut" : "", (int)s->n_active, (double)s->total_contact_force,
+          (double)s->inelastic, (double)s->mises));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const PetscReal mu[], PetscBool reduced,
+                                PetscInt n, const HycoStep step[])
+{
+  const char *names[N_COLUMNS];
+  PetscReal *value, *point;
+  PetscInt n_par, n_columns = 0;
+
+  PetscFunctionBegin;
+  if (!n || !table[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt c = 0; c < N_COLUMNS; c++) {
+    if (NameOf(&columns[c], reduced)) names[n_columns++] = NameOf(&columns[c], reduced);
+  }
+  PetscCall(HycoSceneGetParameters(scene, &n_par, NULL, NULL, NULL));
+  PetscCall(PetscMalloc2(n * n_columns, &value, n * n_par, &point));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal *v = value + k * n_columns;
+
+    for (PetscInt c = 0; c < N_COLUMNS; c++) {
+      if (NameOf(&columns[c], reduced)) *v++ = ValueOf(&columns[c], &step[k]);
+    }
+    PetscCall(PetscArraycpy(point + k * n_par, mu, n_par));
+  }
+  PetscCall(DriverWriteTable(table, scene, n, point, n_columns, names, value));
+  PetscCall(PetscFree2(value, point));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void DriverReportSteps(cJSON *history, PetscBool reduced, PetscInt n, const HycoStep step[])
+{
+  for (PetscInt c = 0; c < N_COLUMNS; c++) {
+    const char *name = NameOf(&columns[c], reduced);
+    cJSON *array = name ? cJSON_AddArrayToObject(history, name) : NULL;
+
+    for (PetscInt k = 0; array && k < n; k++)
+      cJSON_AddItemToArray(array, cJSON_CreateNumber(ValueOf(&columns[c], &step[k])));
+  }
+}
