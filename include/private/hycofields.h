@@ -25,14 +25,13 @@ typedef struct {
 } HycoContactTable;
 
 /* What both kinds of .xdmf, of one solution and of a series, are made of: a name as XML has it; a cell type's; stress
-   of cells (n_cells x ns) in ParaView's order xx, xy, xz, yy, yz, zz. */
+   of cells (n_cells x ns: xx, yy, zz, xy, yz, xz) in ParaView's order xx, xy, xz, yy, yz, zz. */
 void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN]);
 const char *HycoFieldsTopology(HycoCellType type);
-/* Of cells' stresses in that order (n_cells x 6): von Mises' (n_cells), the principal ones (n_cells x 3), the largest
-   first. */
-PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal tensor[], PetscReal mises[],
-                                    PetscReal principal[]);
 void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
+/* Of the same stresses: von Mises' (n_cells), the principal ones (n_cells x 3), the largest first. */
+PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal sigma[], PetscReal mises[],
+                                    PetscReal principal[]);
 
 /* The title, cell type, dimension, parameters and contact table (NULL: none). On one process. */
 PetscErrorCode HycoFieldsWriteHead(HycoH5 h, HycoMesh mesh, HycoScene scene, const PetscReal mu[],

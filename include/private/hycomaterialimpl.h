@@ -23,6 +23,8 @@ static inline PetscInt HycoStrainSize(PetscInt dim)
 {
   return dim == 1 ? 1 : dim == 2 ? 4 : 6;
 }
+/* Von Mises' equivalent of a stress (xx, yy, zz, xy, yz, xz as far as HycoStrainSize(); 1D: its size). */
+PetscReal HycoMises(PetscInt dim, const PetscReal stress[]);
 /* Reals of a tangent: 2 where it is isotropic (Lame's lambda and mu) and a 2D scene is one of plane strain, else the
    square of HycoStrainSize(). */
 PetscInt HycoMaterialTangentSize(HycoMaterial material, PetscInt dim);

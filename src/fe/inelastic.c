@@ -235,16 +235,6 @@ static void Linear(HycoFE fe, const HycoElement *el, Batch *b)
   }
 }
 
-static PetscReal Mises(PetscInt dim, const PetscReal s[])
-{
-  PetscReal mean, sum = 0;
-
-  if (dim == 1) return PetscAbsReal(s[0]);
-  mean = (s[0] + s[1] + s[2]) / 3;
-  for (PetscInt c = 0; c < HycoStrainSize(dim); c++) sum += c < 3 ? (s[c] - mean) * (s[c] - mean) : 2 * s[c] * s[c];
-  return PetscSqrtReal(1.5 * sum);
-}
-
 /* What a law leaves: nothing is stored, all of the work is dissipated; where it stores, the equivalent inelastic strain
    is what is dissipated over the mean equivalent stress. */
 static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
@@ -262,7 +252,7 @@ static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
       for (PetscInt c = 0; c < ns; c++) b->dissipated[i] += mean[c] * (b->strain[i * ns + c] - b->strain0[i * ns + c]);
     }
     if (!PetscIsNanReal(b->increment[i])) continue;
-    equivalent = Mises(fe->dim, mean);
+    equivalent = HycoMises(fe->dim, mean);
     b->increment[i] = stores && equivalent > 0 ? PetscMax(b->dissipated[i], 0) / equivalent : 0;
   }
 }
@@ -439,7 +429,7 @@ PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[]
       PetscCall(HycoGradients(fe, el, e, q, g, &w));
       volume += w;
       for (PetscInt c = 0; c < ns; c++) sum[c] += w * p.stress[c];
-      sum[6] += w * Mises(fe->dim, p.stress);
+      sum[6] += w * HycoMises(fe->dim, p.stress);
       sum[7] += w * *p.accumulated;
       sum[8] += w * PetscMax(*p.temperature, 0);
     }

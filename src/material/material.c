@@ -228,6 +228,16 @@ static PetscBool IsLame(HycoMaterial material)
   return (PetscBool)(material->linear && material->ops->isotropic);
 }
 
+PetscReal HycoMises(PetscInt dim, const PetscReal s[])
+{
+  PetscReal mean, sum = 0;
+
+  if (dim == 1) return PetscAbsReal(s[0]);
+  mean = (s[0] + s[1] + s[2]) / 3;
+  for (PetscInt c = 0; c < HycoStrainSize(dim); c++) sum += c < 3 ? (s[c] - mean) * (s[c] - mean) : 2 * s[c] * s[c];
+  return PetscSqrtReal(1.5 * sum);
+}
+
 PetscInt HycoMaterialTangentSize(HycoMaterial material, PetscInt dim)
 {
   return IsLame(material) && material->formulation == HYCO_PLANE_STRAIN ? 2 : HycoStrainSize(dim) * HycoStrainSize(dim);

@@ -2,6 +2,7 @@
 #include <hycofields.h>
 #include <hycofile.h>
 #include <hycoh5.h>
+#include <hycomaterialimpl.h>
 #include <petscblaslapack.h>
 #include <stdio.h>
 #include <string.h>
@@ -266,26 +267,19 @@ void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscRe
   }
 }
 
-static PetscReal Mises(const PetscReal s[6])
-{
-  const PetscReal xx = s[0], xy = s[1], xz = s[2], yy = s[3], yz = s[4], zz = s[5];
-
-  return PetscSqrtReal(((xx - yy) * (xx - yy) + (yy - zz) * (yy - zz) + (zz - xx) * (zz - xx)) / 2 +
-                       3 * (xy * xy + xz * xz + yz * yz));
-}
-
-PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal tensor[], PetscReal mises[],
+PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal sigma[], PetscReal mises[],
                                     PetscReal principal[])
 {
   PetscBLASInt three = 3, lwork = 32, info;
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < n_cells; e++) {
-    const PetscReal *s = tensor + 6 * e;
-    PetscScalar matrix[9] = {s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5]}, work[32];
-    PetscReal value[3];
+    PetscReal s[6], value[3];
+    PetscScalar work[32];
 
-    mises[e] = dim == 1 ? PetscAbsReal(s[0]) : Mises(s);
+    HycoTensor6(1, HycoStrainSize(dim), sigma + e * HycoStrainSize(dim), s);
+    PetscScalar matrix[9] = {s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5]};
+    mises[e] = HycoMises(dim, sigma + e * HycoStrainSize(dim));
     LAPACKsyev_("N", "U", &three, matrix, &three, value, work, &lwork, &info);
     PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
     for (PetscInt k = 0; k < 3; k++) principal[3 * e + k] = value[2 - k];
@@ -358,7 +352,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
   for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
   PetscCall(HycoFEStress(fe, u, sigma));
   HycoTensor6(m->n_cells, fe->n_sigma, sigma, tensor);
-  PetscCall(HycoStressInvariants(m->n_cells, fe->dim, tensor, mises, principal));
+  PetscCall(HycoStressInvariants(m->n_cells, fe->dim, sigma, mises, principal));
   for (PetscInt e = 0; e < m->n_cells; e++) body[e] = m->cell_body[e];
   ierr = HycoContactFieldsCreate(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
   if (!ierr) {

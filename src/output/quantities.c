@@ -95,13 +95,12 @@ static PetscReal OfNode(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt
 /* Of a cell; r and t: about z in 2D and 3D, of a body of revolution about its axis. */
 static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell, PetscReal *value)
 {
-  static const PetscInt place[6] = {0, 3, 5, 1, 4, 2}; /* of xx, yy, zz, xy, yz, xz in a tensor */
   HycoMesh m = fe->mesh;
-  PetscReal s[6], x = 0, y = 0, r, mises, principal[3];
+  PetscReal s[6] = {0}, x = 0, y = 0, r, mises, principal[3];
 
   PetscFunctionBegin;
-  HycoTensor6(1, fe->n_sigma, sigma + cell * fe->n_sigma, s);
-  if (field >= XX && field <= XZ) *value = s[place[field - XX]];
+  PetscCall(PetscArraycpy(s, sigma + cell * fe->n_sigma, fe->n_sigma)); /* xx, yy, zz, xy, yz, xz */
+  if (field >= XX && field <= XZ) *value = s[field - XX];
   if (field == RR || field == TT) {
     for (PetscInt v = 0; v < m->nv; v++) {
       x += fe->X[3 * m->cells[cell * m->nv + v]];
@@ -109,9 +108,9 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
     }
     r = PetscSqrtReal(x * x + y * y);
     if (r > 0) x /= r, y /= r;
-    if (field == RR) *value = x * x * s[0] + y * y * s[3] + 2 * x * y * s[1];
-    if (field == TT) *value = y * y * s[0] + x * x * s[3] - 2 * x * y * s[1];
-    if (fe->formulation == HYCO_AXISYMMETRIC) *value = field == RR ? s[0] : s[5];
+    if (field == RR) *value = x * x * s[0] + y * y * s[1] + 2 * x * y * s[3];
+    if (field == TT) *value = y * y * s[0] + x * x * s[1] - 2 * x * y * s[3];
+    if (fe->formulation == HYCO_AXISYMMETRIC) *value = field == RR ? s[0] : s[2];
   }
   if (field >= MISES) {
     PetscCall(HycoStressInvariants(1, fe->dim, s, &mises, principal));
