@@ -6,6 +6,7 @@
 #include <hycocontactimpl.h>
 #include <hycoromtype.h>
 #include <hycofomimpl.h>
+#include <hycoinelastic.h>
 #include <hycosolverimpl.h>
 
 typedef struct _n_HycoProbe *HycoProbe;
@@ -114,6 +115,22 @@ PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inela
 PetscErrorCode HycoTraceFree(HycoROM model);
 /* The fields of the path at its listed times on the whole mesh, as HycoFOMSetSeries() has them (replay.c). */
 PetscErrorCode HycoTraceWrite(HycoROM model, const char path[]);
+/*
+  The laws again along the path of the last prediction, on `fe` (of whatever cells): HycoReplayBegin(), then of each
+  accepted step k from 0 on HycoReplayMove(), with which fe stands at its time and parameters, and HycoReplayStep() with
+  fe's displacements u (n_dof) there, after which `state` is that of its end; fails where a law has no answer.
+  HycoReplayEnd() also after a failure.
+*/
+typedef struct {
+  HycoROM m;
+  HycoFE fe; /* both borrowed */
+  HycoFEState state, end;
+  PetscReal *f_int; /* nobody asks for */
+} HycoReplay;
+PetscErrorCode HycoReplayBegin(HycoROM model, HycoFE fe, HycoReplay *replay);
+PetscErrorCode HycoReplayMove(HycoReplay *replay, PetscInt k);
+PetscErrorCode HycoReplayStep(HycoReplay *replay, PetscInt k, const PetscReal u[]);
+PetscErrorCode HycoReplayEnd(HycoReplay *replay);
 /* The path's part of a prediction. */
 void HycoTraceSummary(HycoROM model, HycoPrediction *prediction);
 /* U of the whole mesh (n_dof) from what accepted step k left of it, fe_whole being at its parameters. */

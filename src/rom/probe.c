@@ -79,46 +79,32 @@ static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const Pets
   }
 }
 
-/* The laws from the first time to that which is shown; p->u and p->sigma there. *state: begin and end, the caller's. */
-static PetscErrorCode Replay(HycoROM m, HycoProbe p, HycoFEState state[2], PetscReal f_int[])
+/* The laws from the first time to that which is shown. */
+static PetscErrorCode March(HycoProbe p, HycoReplay *r)
 {
-  const HycoTrace *r = &m->trace;
+  HycoROM m = r->m;
+  const HycoTrace *trace = &m->trace;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k <= r->at[r->shown]; k++) {
-    PetscReal mu[HYCO_MAX_PARAMETERS];
-    HycoFEStepReport report;
-    HycoFEState begin = state[1];
-
-    HycoSceneSetTime(m->scene, m->fe->mu, r->t[k], mu);
-    PetscCall(HycoFESetParameters(p->fe, mu));
-    if (!k) PetscCall(HycoFEStateCreate(p->fe, &state[0]));
-    if (!k) PetscCall(HycoFEStateCreate(p->fe, &state[1]));
-    if (!k) begin = state[1];
-    Displace(m, p, r->gamma + (size_t)k * (size_t)m->l, r->U_fe + (size_t)k * (size_t)m->n_fe);
-    PetscCall(
-        HycoFEStep(p->fe, p->u, r->t[PetscMax(k - 1, 0)], r->t[k], state[0], state[1], f_int, PETSC_FALSE, &report));
-    HycoCheck(!report.failed, "the laws have no answer to the predicted displacements at t = %.10g: %s",
-              (double)r->t[k], report.why);
-    state[1] = state[0];
-    state[0] = begin;
+  for (PetscInt k = 0; k <= trace->at[trace->shown]; k++) {
+    PetscCall(HycoReplayMove(r, k));
+    Displace(m, p, trace->gamma + (size_t)k * (size_t)m->l, trace->U_fe + (size_t)k * (size_t)m->n_fe);
+    PetscCall(HycoReplayStep(r, k, p->u));
   }
-  PetscCall(HycoFEStateFields(p->fe, state[0], p->sigma, NULL, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReplayAll(HycoROM m, HycoProbe p)
+/* p->u and p->sigma of a path at the time that is shown. */
+static PetscErrorCode FollowPath(HycoROM m, HycoProbe p)
 {
-  HycoFEState state[2] = {NULL, NULL};
-  PetscReal *f_int;
+  HycoReplay r = {0};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(p->fe->n_dof, &f_int));
-  ierr = Replay(m, p, state, f_int);
-  PetscCall(PetscFree(f_int));
-  PetscCall(HycoFEStateDestroy(&state[0]));
-  PetscCall(HycoFEStateDestroy(&state[1]));
+  ierr = HycoReplayBegin(m, p->fe, &r);
+  if (!ierr) ierr = March(p, &r);
+  if (!ierr) ierr = HycoFEStateFields(p->fe, r.state, p->sigma, NULL, NULL, NULL);
+  PetscCall(HycoReplayEnd(&r));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -153,7 +139,7 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, PetscReal value[])
     PetscCall(ierr);
   }
   p = m->probe;
-  PetscCall(m->trace.n_listed ? ReplayAll(m, p) : Follow(m, p));
+  PetscCall(m->trace.n_listed ? FollowPath(m, p) : Follow(m, p));
   PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,56 +1,62 @@
 /*
   Replay: stress and state outside the RID of a predicted path. A law is pointwise: with the displacement V gamma(t) at
-  each accepted time it gives the state of every cell of the whole mesh, without a solve. Into a series of fields.
+  each accepted time it gives the state of every cell, without a solve; of the whole mesh into a series of fields.
 */
 #include <hycopath.h>
 #include <hycoromimpl.h>
 
-typedef struct {
-  HycoROM m;
-  HycoSeries series;
-  HycoFEState begin, end;
-  PetscReal *f_int; /* nobody asks for */
-} Replay;
-
-/* The whole mesh at the time of accepted step k. */
-static PetscErrorCode MoveTo(HycoROM m, PetscInt k)
+PetscErrorCode HycoReplayMove(HycoReplay *r, PetscInt k)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  HycoSceneSetTime(m->scene, m->fe->mu, m->trace.t[k], mu);
-  PetscCall(HycoFESetParameters(m->fe_whole, mu));
+  HycoSceneSetTime(r->m->scene, r->m->fe->mu, r->m->trace.t[k], mu);
+  PetscCall(HycoFESetParameters(r->fe, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The laws from accepted step k - 1 to k. */
-static PetscErrorCode StepTo(Replay *r, PetscInt k)
+PetscErrorCode HycoReplayBegin(HycoROM m, HycoFE fe, HycoReplay *r)
 {
-  HycoROM m = r->m;
-  const PetscReal *t = m->trace.t;
-  HycoFEState state = r->begin;
+  PetscFunctionBegin;
+  *r = (HycoReplay){.m = m, .fe = fe};
+  PetscCall(HycoReplayMove(r, 0)); /* the state is made at the first temperature */
+  PetscCall(HycoFEStateCreate(fe, &r->state));
+  PetscCall(HycoFEStateCreate(fe, &r->end));
+  PetscCall(PetscCalloc1(fe->n_dof, &r->f_int));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReplayStep(HycoReplay *r, PetscInt k, const PetscReal u[])
+{
+  const PetscReal *t = r->m->trace.t;
+  HycoFEState state = r->state;
   HycoFEStepReport report;
 
   PetscFunctionBegin;
-  PetscCall(MoveTo(m, k));
-  HycoTraceWholeU(m, k, m->U_whole);
-  PetscCall(PetscArrayzero(r->f_int, m->fe_whole->n_dof));
-  PetscCall(HycoFEStep(m->fe_whole, m->U_whole, t[PetscMax(k - 1, 0)], t[k], r->begin, r->end, r->f_int, PETSC_FALSE,
-                       &report));
-  HycoCheck(!report.failed, "outside the RID the laws have no answer to the predicted displacements at t = %.10g: %s",
-            (double)t[k], report.why);
-  r->begin = r->end;
+  PetscCall(HycoFEStep(r->fe, u, t[PetscMax(k - 1, 0)], t[k], r->state, r->end, r->f_int, PETSC_FALSE, &report));
+  HycoCheck(!report.failed, "the laws have no answer to the predicted displacements at t = %.10g: %s", (double)t[k],
+            report.why);
+  r->state = r->end;
   r->end = state;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoReplayEnd(HycoReplay *r)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEStateDestroy(&r->state));
+  PetscCall(HycoFEStateDestroy(&r->end));
+  PetscCall(PetscFree(r->f_int));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What the series shows of listed time j, where the replay is. */
-static HycoSeriesSource Look(const Replay *r, PetscInt j)
+static HycoSeriesSource Look(const HycoReplay *r, PetscInt j)
 {
   HycoROM m = r->m;
   const HycoSeriesSource from = {.comm = PETSC_COMM_SELF,
                                  .fe = m->fe_whole,
-                                 .state = r->begin,
+                                 .state = r->state,
                                  .fe_surface = m->fe_whole,
                                  .pairs = &m->whole_pairs,
                                  .n_nodes = m->whole->n_nodes,
@@ -65,42 +71,39 @@ static HycoSeriesSource Look(const Replay *r, PetscInt j)
   return from;
 }
 
-static PetscErrorCode Run(Replay *r)
+static PetscErrorCode WriteTimes(HycoReplay *r, HycoSeries series)
 {
-  const HycoTrace *trace = &r->m->trace;
-  HycoSeriesSource from;
+  HycoROM m = r->m;
+  HycoSeriesSource from = Look(r, 0);
 
   PetscFunctionBegin;
-  PetscCall(MoveTo(r->m, 0)); /* the state is made at the first temperature */
-  PetscCall(HycoFEStateCreate(r->m->fe_whole, &r->begin));
-  PetscCall(HycoFEStateCreate(r->m->fe_whole, &r->end));
-  PetscCall(PetscMalloc1(r->m->fe_whole->n_dof, &r->f_int));
-  from = Look(r, 0);
-  PetscCall(HycoSeriesOpen(r->series, &from));
-  for (PetscInt k = 0, j = 0; k < trace->n; k++) {
-    PetscCall(StepTo(r, k));
-    if (j == trace->n_listed || trace->at[j] != k) continue;
+  PetscCall(HycoSeriesOpen(series, &from));
+  for (PetscInt k = 0, j = 0; k < m->trace.n; k++) {
+    PetscCall(HycoReplayMove(r, k));
+    HycoTraceWholeU(m, k, m->U_whole);
+    PetscCall(HycoReplayStep(r, k, m->U_whole));
+    if (j == m->trace.n_listed || m->trace.at[j] != k) continue;
     from = Look(r, j++);
-    PetscCall(HycoSeriesAddTime(r->series, &from));
+    PetscCall(HycoSeriesAddTime(series, &from));
   }
-  PetscCall(HycoSeriesClose(r->series));
+  PetscCall(HycoSeriesClose(series));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoTraceWrite(HycoROM m, const char path[])
 {
-  Replay r = {.m = m};
+  HycoReplay r = {0};
+  HycoSeries series;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoROMLoadWhole(m));
   m->whole_current = PETSC_FALSE; /* U_whole is the replay's */
-  PetscCall(HycoSeriesCreate(PETSC_COMM_SELF, path, &r.series));
-  ierr = Run(&r);
-  PetscCall(HycoSeriesDestroy(&r.series));
-  PetscCall(HycoFEStateDestroy(&r.begin));
-  PetscCall(HycoFEStateDestroy(&r.end));
-  PetscCall(PetscFree(r.f_int));
+  PetscCall(HycoSeriesCreate(PETSC_COMM_SELF, path, &series));
+  ierr = HycoReplayBegin(m, m->fe_whole, &r);
+  if (!ierr) ierr = WriteTimes(&r, series);
+  PetscCall(HycoReplayEnd(&r));
+  PetscCall(HycoSeriesDestroy(&series));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
