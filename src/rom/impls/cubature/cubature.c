@@ -1,0 +1,195 @@
+/*
+  The cubature's model: projection-based (44), with modes tested by themselves over all of the bodies and nonnegative
+  vectors of contact forces, but integrals over the bodies are sums over few cells,
+
+      V^T f_int = sum of w_e V_e^T f_e over chosen cells e,   w_e > 0
+
+  so that the reduced stiffness stays symmetric and, as a sum of the cells' with positive weights, semidefinite. Loads
+  on surfaces and contacts are those of the whole mesh. With every cell once it is the projection-based model.
+*/
+#include <hycocubature.h>
+#include <hycoromtypes.h>
+#include <petscviewer.h>
+
+static PetscErrorCode SetFromOptions(HycoReducer t)
+{
+  HycoCubatureTraining c;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&c));
+  t->training = c;
+  c->tol = 1e-4;
+  PetscCall(HycoForceBasisSetFromOptions(t));
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("cubature"));
+  PetscCall(HycoOptionsReal("-hyco_cubature_tol",
+                            "what the chosen cells may miss of the training's internal forces, relative (0: all cells)",
+                            0, 1, &c->tol, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ResetTraining(HycoReducer t)
+{
+  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(c->weight));
+  c->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Begin(HycoReducer t)
+{
+  PetscFunctionBegin;
+  HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for scenes in the plane and in space; on a line take hybrid "
+                             "or projection");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The force basis' modes, then the cells. Collective. */
+static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
+{
+  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
+  PetscReal *sigma;
+  PetscInt n;
+  Mat W;
+
+  PetscFunctionBegin;
+  HycoCheck(!t->grown, "train -greedy adds cells to the RID of before, and a cubature chooses all of its cells anew: "
+                       "train it on a grid or on points");
+  PetscCall(HycoProjectionModes(t, store));
+  if (c->tol == 0) {
+    PetscCall(HycoCubatureChooseAll(t));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoCubatureSample(t, store, c->tol * c->tol, &W, &n, &sigma));
+  HycoCheckModel(n, "no training solution has internal forces: there is nothing to integrate");
+  PetscCall(HycoCubatureChoose(t, W, n, sigma));
+  PetscCall(MatDestroy(&W));
+  PetscCall(PetscFree(sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every node is tested, every contact is the model's; the cells' weights. */
+static PetscErrorCode Build(HycoROM m, HycoReducer t)
+{
+  const HycoCubatureTraining c = (HycoCubatureTraining)t->training;
+  HycoCubatureROM r = (HycoCubatureROM)m->data;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) m->role[i] = HYCO_ROLE_A;
+  for (PetscInt k = 0; k < m->pairs.n; k++) m->in_rid[k] = 1;
+  PetscCall(PetscMalloc1(m->mesh->n_cells, &r->weight));
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+    PetscInt at = -1;
+
+    PetscCall(PetscFindInt(m->mesh->cell_whole[e], c->n, t->seeds_cell, &at));
+    PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a cell of the model has no weight");
+    r->weight[e] = c->weight[at];
+  }
+  PetscCall(PetscArraycpy(r->error, c->error, 2));
+  PetscCall(HycoProjectionBuild(m, t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+{
+  const HycoCubatureROM c = (HycoCubatureROM)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoProjectionReport(t, m, r));
+  PetscCall(HycoTrainingAddFact(r, "cubature_error", c->error[0]));
+  snprintf(
+      r->summary, sizeof(r->summary),
+      "%d snapshots; %d displacement modes, %d force vectors; cubature on %d of %d elements (%.1f %%), which misses "
+      "%.1e of the training's internal forces\n",
+      (int)r->n_samples, (int)r->n_modes, (int)c->projection.l_lambda, (int)m->mesh->n_cells, (int)m->whole_cells,
+      100 * (double)r->rid_fraction, (double)c->error[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoProjectionSetUp(m));
+  m->fe->cell_weight = ((HycoCubatureROM)m->data)->weight;
+  m->fe->all_facets = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+{
+  const HycoCubatureROM c = (HycoCubatureROM)m->data;
+  PetscReal least = PETSC_MAX_REAL, most = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+    least = PetscMin(least, c->weight[e]);
+    most = PetscMax(most, c->weight[e]);
+  }
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "  cubature: %d of %d elements (%.1f %%), weights from %.3g to %.3g; missed of the "
+                                   "training's internal forces: %.1e; %d contacts\n",
+                                   (int)m->mesh->n_cells, (int)m->whole_cells,
+                                   100. * (double)m->mesh->n_cells / (double)m->whole_cells, (double)least,
+                                   (double)most, (double)c->error[0], (int)m->pairs.n));
+  PetscCall(HycoProjectionViewForces(m, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* To the model file, or from it. */
+static PetscErrorCode Move(HycoROM m, HycoH5 h)
+{
+  HycoCubatureROM c = (HycoCubatureROM)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoProjectionMove(m, h));
+  PetscCall(HycoH5Real(h, "cubature/weight", &m->mesh->n_cells, 1, &c->weight));
+  PetscCall(HycoH5Reals(h, "cubature/error", 2, c->error));
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++)
+    HycoCheck(c->weight[e] > 0, "%s: cubature/weight is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(((HycoCubatureROM)m->data)->weight));
+  PetscCall(HycoProjectionDestroy(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMCreate_Cubature(HycoROM m)
+{
+  static const HycoROMTraits traits = {.title = "projection-based with cubature",
+                                       .settings = HYCO_SETTINGS_MODES,
+                                       .stiffness = PETSC_TRUE,
+                                       .force_basis = PETSC_TRUE,
+                                       .history = PETSC_TRUE,
+                                       .cells = PETSC_TRUE};
+  static const HycoROMOps ops = {.setfromoptions = SetFromOptions,
+                                 .resettraining = ResetTraining,
+                                 .begin = Begin,
+                                 .modes = Modes,
+                                 .build = Build,
+                                 .finish = HycoGalerkinFinish,
+                                 .report = Report,
+                                 .cost = HycoGalerkinCost,
+                                 .setup = SetUp,
+                                 .reset = HycoGalerkinReset,
+                                 .solve = HycoGalerkinSolve,
+                                 .energy = HycoGalerkinEnergy,
+                                 .condition = HycoGalerkinCondition,
+                                 .view = View,
+                                 .save = Move,
+                                 .load = Move,
+                                 .destroy = Destroy};
+  HycoCubatureROM c;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&c));
+  HycoProjectionInit(&c->projection);
+  PetscCall(HycoROMSetOps(m, &ops, &traits, c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
