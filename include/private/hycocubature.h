@@ -1,4 +1,5 @@
-/* The cubature's model: projection-based (44), its laws at some cells alone, each counted with a weight. */
+/* The cubature's model: tested by modes over all of the bodies, its laws at some cells alone, each counted with a
+   weight; contact as in the hybrid model, or by force vectors as in the projection-based one. */
 #ifndef HYCOCUBATURE_H
 #define HYCOCUBATURE_H
 
@@ -17,6 +18,8 @@ typedef struct {
   PetscReal tol;
   PetscInt n;         /* chosen cells; every rank */
   PetscReal *weight;  /* of these, in the order of t->seeds_cell; every rank */
+  PetscBool *near;    /* by cell of the part: at a contact whose displacements are full order, and so once in the sum;
+                         NULL: none */
   PetscReal error[2]; /* as the model has it; rank 0 */
 } * HycoCubatureTraining;
 

@@ -32,11 +32,15 @@ PetscErrorCode HycoProjectionMove(HycoROM model, HycoH5 file);
 PetscErrorCode HycoProjectionViewForces(HycoROM model, PetscViewer viewer);
 PetscErrorCode HycoProjectionDestroy(HycoROM model);
 
-/* The training's part of the ops (force_basis.c); HycoForceBasisSetFromOptions(): into what t->training begins with. */
+/* The training's part of the ops (force_basis.c); HycoForceBasisSetFromOptions(): into what t->training begins with,
+   whose `dual` is the default. */
 PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer reducer);
 PetscErrorCode HycoProjectionSetFromOptions(HycoReducer reducer);
 PetscErrorCode HycoProjectionModes(HycoReducer reducer, HycoSnapshots store);
 PetscErrorCode HycoProjectionBuild(HycoROM model, HycoReducer reducer);
+/* Its parts on rank 0: V_lambda from the dual snapshots (fe: none); the judgement, which refuses a useless model. */
+PetscErrorCode HycoProjectionMakeBasis(HycoROM model, HycoReducer reducer);
+PetscErrorCode HycoProjectionJudge(HycoROM model, HycoReducer reducer);
 PetscErrorCode HycoProjectionReport(HycoReducer reducer, HycoROM model, HycoTraining *report);
 PetscBool HycoProjectionOffers(HycoReducer reducer, PetscBool targets);
 

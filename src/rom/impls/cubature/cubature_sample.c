@@ -114,11 +114,12 @@ static PetscErrorCode Step(Sampler *s, PetscInt k, PetscReal t0, PetscReal t1)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* g: V_e^T f_e of the part's cells. */
+/* g: V_e^T f_e of the part's cells; 0 of those that are in the sum once. */
 static PetscErrorCode Project(Sampler *s)
 {
   HycoMesh m = s->fe->mesh;
   const PetscInt l = s->t->l, n = m->nv * m->dim;
+  const PetscBool *near = ((HycoCubatureTraining)s->t->training)->near;
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
@@ -127,7 +128,7 @@ static PetscErrorCode Project(Sampler *s)
     PetscCall(HycoFEStateForce(s->fe, s->begin, e, f));
     PetscCall(HycoFEBodyForce(s->fe, e, load));
     for (PetscInt j = 0; j < l; j++) g[j] = 0;
-    for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt k = 0; k < n && !(near && near[e]); k++) {
       const PetscReal *v = s->V + (size_t)(m->cells[e * m->nv + k / m->dim] * m->dim + k % m->dim) * (size_t)l;
 
       for (PetscInt j = 0; j < l; j++) g[j] += v[j] * (f[k] - load[k]);

@@ -7,6 +7,7 @@
 
   W the leading singular vectors of what cells give to the reduced internal forces. w = 1 is an answer; nonnegative
   least squares find one with no more cells than there are equations.
+  Cells at contacts with full-order displacements have w = 1 and stand in none of them.
 */
 #include <hycoalgorithms.h>
 #include <hycocubature.h>
@@ -34,8 +35,10 @@ static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The volumes and bodies of this rank's cells, by cell of the part. */
-static PetscErrorCode FillVolumes(HycoFE fe, PetscReal value[])
+#define N_NOTES 3 /* of a cell: its volume, 0 if it is in the sum once; its body; whether it is in the sum once */
+
+/* By cell of the part. */
+static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal value[])
 {
   const PetscInt n = fe->mesh->n_cells;
   PetscReal *volume;
@@ -45,16 +48,17 @@ static PetscErrorCode FillVolumes(HycoFE fe, PetscReal value[])
   PetscCall(PetscMalloc1(n, &volume));
   ierr = HycoFEVolumes(fe, volume);
   for (PetscInt e = 0; e < n; e++) {
-    value[2 * e] = volume[e];
-    value[2 * e + 1] = fe->mesh->cell_body[e];
+    value[N_NOTES * e] = near && near[e] ? 0 : volume[e];
+    value[N_NOTES * e + 1] = fe->mesh->cell_body[e];
+    value[N_NOTES * e + 2] = near && near[e];
   }
   PetscCall(PetscFree(volume));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells' volumes and bodies, a column each, rows in the file's order. Collective. */
-static PetscErrorCode Volumes(HycoReducer t, PetscInt n_rows, Mat *X)
+/* The notes, a column each, rows in the file's order. Collective. */
+static PetscErrorCode Notes(HycoReducer t, PetscInt n_rows, Mat *X)
 {
   HycoFE fe = t->fom->fe;
   PetscReal *value, *rows;
@@ -62,15 +66,14 @@ static PetscErrorCode Volumes(HycoReducer t, PetscInt n_rows, Mat *X)
   PetscInt lda;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(2 * fe->mesh->n_cells, &value, 2 * n_rows, &rows));
-  HycoOnEach(HycoComm(t), FillVolumes(fe, value));
-  PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, 2, value, rows));
-  PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, t->sizes[1], 2, NULL, X));
+  PetscCall(PetscMalloc2(N_NOTES * fe->mesh->n_cells, &value, N_NOTES * n_rows, &rows));
+  HycoOnEach(HycoComm(t), FillNotes(fe, ((HycoCubatureTraining)t->training)->near, value));
+  PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, N_NOTES, value, rows));
+  PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, t->sizes[1], N_NOTES, NULL, X));
   PetscCall(MatDenseGetLDA(*X, &lda));
   PetscCall(MatDenseGetArray(*X, &x));
   for (PetscInt i = 0; i < n_rows; i++) {
-    x[i] = rows[2 * i];
-    x[lda + i] = rows[2 * i + 1];
+    for (PetscInt j = 0; j < N_NOTES; j++) x[j * lda + i] = rows[N_NOTES * i + j];
   }
   PetscCall(MatDenseRestoreArray(*X, &x));
   PetscCall(MatAssemblyBegin(*X, MAT_FINAL_ASSEMBLY));
@@ -97,7 +100,7 @@ static void FillSystem(PetscInt n_cells, PetscInt n, const PetscReal vectors[], 
       if (i < n)
         *a = vectors[(size_t)i * (size_t)n_cells + (size_t)e];
       else
-        *a = (PetscInt)body[e] == i - n ? volume[e] / PetscSqrtReal(size) : 0;
+        *a = (PetscInt)body[e] == i - n && size > 0 ? volume[e] / PetscSqrtReal(size) : 0;
       b[i] += *a;
     }
   }
@@ -135,10 +138,11 @@ static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], con
 
 /* The weights of all cells. On rank 0. */
 static PetscErrorCode FindWeights(HycoReducer t, PetscInt n, const PetscReal vectors[], const PetscReal sigma[],
-                                  const PetscReal volume[], const PetscReal body[], PetscReal w[])
+                                  const PetscReal notes[], PetscReal w[])
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
   const PetscInt n_cells = t->sizes[1], n_bodies = t->scene->n_bodies;
+  const PetscReal *volume = notes, *body = notes + n_cells, *near = notes + 2 * n_cells;
   const PetscInt leading = HycoPODRank(n, sigma, c->tol * c->tol, t->noise, 0), m = leading + n_bodies;
   PetscReal *A, *b;
 
@@ -147,6 +151,7 @@ static PetscErrorCode FindWeights(HycoReducer t, PetscInt n, const PetscReal vec
   FillSystem(n_cells, leading, vectors, n_bodies, volume, body, A, b);
   PetscCall(HycoNNLS(m, n_cells, A, b, w, NULL));
   PetscCall(PetscFree2(A, b));
+  for (PetscInt e = 0; e < n_cells; e++) w[e] = near[e] > 0 ? 1 : w[e];
   Measure(n_cells, n, vectors, sigma, n_bodies, volume, body, w, c->error);
   HycoCheckModel(c->error[0] <= PetscMax(10 * c->tol, 1e-6) && c->error[1] <= 1e-3,
                  "the cubature misses %.1e of the training's internal forces and %.1e of a body's volume: take another "
@@ -196,19 +201,19 @@ PetscErrorCode HycoCubatureChooseAll(HycoReducer t)
 PetscErrorCode HycoCubatureChoose(HycoReducer t, Mat W, PetscInt n, const PetscReal sigma[])
 {
   const size_t n_cells = t->rank ? 0 : (size_t)t->sizes[1];
-  PetscReal *vectors, *volumes, *w;
+  PetscReal *vectors, *notes, *w;
   PetscInt rows;
   Mat X;
 
   PetscFunctionBegin;
   PetscCall(MatGetLocalSize(W, &rows, NULL));
-  PetscCall(Volumes(t, rows, &X));
-  PetscCall(PetscMalloc3((size_t)n * n_cells + 1, &vectors, 2 * n_cells + 1, &volumes, n_cells + 1, &w));
+  PetscCall(Notes(t, rows, &X));
+  PetscCall(PetscMalloc3((size_t)n * n_cells + 1, &vectors, N_NOTES * n_cells + 1, &notes, n_cells + 1, &w));
   for (PetscInt j = 0; j < n; j++) PetscCall(GatherColumn(W, j, vectors + (size_t)j * n_cells));
-  for (PetscInt j = 0; j < 2; j++) PetscCall(GatherColumn(X, j, volumes + (size_t)j * n_cells));
+  for (PetscInt j = 0; j < N_NOTES; j++) PetscCall(GatherColumn(X, j, notes + (size_t)j * n_cells));
   PetscCall(MatDestroy(&X));
-  HycoOnRoot(HycoComm(t), FindWeights(t, n, vectors, sigma, volumes, volumes + n_cells, w));
+  HycoOnRoot(HycoComm(t), FindWeights(t, n, vectors, sigma, notes, w));
   PetscCall(Take(t, t->rank ? NULL : w));
-  PetscCall(PetscFree3(vectors, volumes, w));
+  PetscCall(PetscFree3(vectors, notes, w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

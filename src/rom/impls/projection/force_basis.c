@@ -12,15 +12,15 @@
 PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
 {
   HycoForceBasis s = (HycoForceBasis)t->training;
-  PetscInt dual = HYCO_DUAL_NNMF;
+  PetscInt dual = (PetscInt)s->dual;
 
   PetscFunctionBegin;
   s->max_its = 100;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor(""));
   PetscCall(HycoOptionsWord("-hyco_dual",
-                            "forces: of the finite elements (hybrid); factorised dual snapshots, or they themselves "
-                            "(projection, cubature) [fe; nnmf if these]",
+                            "forces: of the finite elements (hybrid, cubature); factorised dual snapshots, or they "
+                            "themselves (projection, cubature) [fe; nnmf if projection]",
                             HycoDuals, &dual, NULL));
   PetscCall(HycoOptionsFor("projection or cubature"));
   PetscCall(HycoOptionsInt("-hyco_nnmf_vectors",
@@ -30,8 +30,6 @@ PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
                            &s->max_its, NULL));
   PetscOptionsEnd();
   s->dual = (HycoDual)dual;
-  HycoCheckModel(s->dual != HYCO_DUAL_FE,
-                 "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -42,7 +40,10 @@ PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(PetscNew(&s));
   t->training = s;
+  s->dual = HYCO_DUAL_NNMF;
   PetscCall(HycoForceBasisSetFromOptions(t));
+  HycoCheckModel(s->dual != HYCO_DUAL_FE,
+                 "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,8 +234,7 @@ static PetscErrorCode FromSnapshots(HycoROM m, PetscInt n, const PetscReal S[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* V_lambda from the dual snapshots. */
-static PetscErrorCode MakeBasis(HycoReducer t, HycoROM m)
+PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
 {
   HycoProjectionROM p = (HycoProjectionROM)m->data;
   const HycoForceBasis s = (HycoForceBasis)t->training;
@@ -243,13 +243,14 @@ static PetscErrorCode MakeBasis(HycoReducer t, HycoROM m)
   PetscReal *S;
 
   PetscFunctionBegin;
+  p->dual = s->dual;
   PetscCall(HycoReducerDualSnapshots(t, &n, &S));
   k = s->vectors ? PetscMin(s->vectors, PetscMin(N, n)) : m->l;
   for (PetscInt i = 0; i < N * n; i++) S[i] = PetscMax(S[i], 0); /* round-off of iterative solves */
   PetscCall(PetscMalloc1(N * PetscMax(n, k) + 1, &p->V_lambda));
   if (p->dual == HYCO_DUAL_SNAPSHOTS)
     PetscCall(FromSnapshots(m, n, S));
-  else if (n)
+  else if (n && p->dual == HYCO_DUAL_NNMF)
     PetscCall(HycoNNMF(N, n, S, k, s->max_its, p->V_lambda, &p->l_lambda, &p->dual_misfit));
   PetscCall(PetscFree(S));
   m->counts[1] = s->n_supremizers;
@@ -257,19 +258,25 @@ static PetscErrorCode MakeBasis(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoProjectionBuild(HycoROM m, HycoReducer t)
+PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  const HycoProjectionROM p = (HycoProjectionROM)m->data;
 
   PetscFunctionBegin;
-  p->dual = ((HycoForceBasis)t->training)->dual;
-  PetscCall(MakeBasis(t, m));
-  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
   PetscCall(HycoReducerJudge(t, m));
   HycoCheckModel(m->numbers[1] < 0.5,
                  "the %s model misses its own training displacements by %.0f %% on average (%d modes, %d force "
                  "vectors, condition %.0e): take more modes (a smaller -hyco_pod_tol)",
                  m->traits.title, 100 * (double)m->numbers[1], (int)m->l, (int)p->l_lambda, (double)m->numbers[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoProjectionBuild(HycoROM m, HycoReducer t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoProjectionMakeBasis(m, t));
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
+  PetscCall(HycoProjectionJudge(m, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

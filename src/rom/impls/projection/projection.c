@@ -131,11 +131,20 @@ PetscErrorCode HycoProjectionMove(HycoROM m, HycoH5 h)
     PetscCall(HycoROMLoadWord(m, h, "problem/dual", HycoDuals, &word));
     p->dual = (HycoDual)word;
     p->l_lambda = -1;
-    HycoCheck(p->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);
+    HycoCheck((p->dual == HYCO_DUAL_FE || m->n_fe == 0) && m->counts[1] <= m->l, "%s: problem/dual is damaged",
+              m->path);
   } else
     PetscCall(HycoH5WriteText(h, "problem/dual", HycoDuals[p->dual]));
   PetscCall(HycoH5Real(h, "problem/V_lambda", &p->l_lambda, m->pairs.n, &p->V_lambda));
   PetscCall(HycoH5Reals(h, "training/dual_misfit", 1, &p->dual_misfit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Load(HycoROM m, HycoH5 h)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoProjectionMove(m, h));
+  HycoCheck(((HycoProjectionROM)m->data)->dual != HYCO_DUAL_FE, "%s: problem/dual is damaged", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -181,7 +190,7 @@ PetscErrorCode HycoROMCreate_Projection(HycoROM m)
                                  .local = HycoGalerkinLocal,
                                  .view = View,
                                  .save = HycoProjectionMove,
-                                 .load = HycoProjectionMove,
+                                 .load = Load,
                                  .destroy = HycoProjectionDestroy};
   HycoProjectionROM p;
 
