@@ -30,6 +30,7 @@ typedef struct {
   PetscReal *sigma, *inelastic; /* of a history: n_cells x n_sigma, n_cells rows */
   PetscReal *inverse;           /* online: of the system for c, a, b (symmetric) */
   PetscReal *right, *weight;    /* its right side; the points' weights, with those of a, b */
+  PetscReal largest;            /* contact force of the training */
   HycoStep *step;               /* by listed time */
 } * Regression;
 
@@ -168,6 +169,8 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscCall(PetscMalloc1(size, &r->right));
   PetscCall(PetscMalloc1(size, &r->weight));
   PetscCall(PetscCalloc1(PetscMax(1, m->scene->n_times), &r->step));
+  r->largest = 0;
+  for (PetscInt k = 0; k < r->n_columns * m->pairs.n; k++) r->largest = PetscMax(r->largest, r->Lambda[k]);
   PetscCall(Invert(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -209,6 +212,8 @@ static void Sum(HycoROM m, PetscInt step, PetscInt rows, const PetscReal data[],
   for (PetscInt i = 0; i < rows; i++) value[i] = PetscMax(value[i], least);
 }
 
+#define NO_FORCE 1e-12 /* of the largest in training: round-off */
+
 /* Displacement and forces at mu (all variables), where the history is at listed time `step`. */
 static PetscErrorCode Evaluate(HycoROM m, PetscInt step, const PetscReal mu[])
 {
@@ -217,6 +222,7 @@ static PetscErrorCode Evaluate(HycoROM m, PetscInt step, const PetscReal mu[])
   PetscFunctionBegin;
   Sum(m, step, m->l, r->gamma, PETSC_MIN_REAL, m->gamma);
   Sum(m, step, m->pairs.n, r->Lambda, 0, m->Lambda);
+  for (PetscInt k = 0; k < m->pairs.n; k++) m->Lambda[k] = m->Lambda[k] > NO_FORCE * r->largest ? m->Lambda[k] : 0;
   PetscCall(HycoROMSetSolution(m, mu, NULL, NULL));
   m->beyond_current = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
