@@ -174,6 +174,13 @@ class Rivals(Ring):
         """What is not there is said in one line."""
         train = ['train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '2,2']
         self.train('damaged.h5', *CUBATURE, grid='2,2')
+        self.train('short.h5', *REGRESSION, grid='2,2')
+        with h5py.File(self.path('short.h5'), 'r+') as f:
+            for name in ('gamma', 'Lambda', 'sigma', 'inelastic'):
+                rows = f['regression'][name][:-1]
+                del f['regression'][name]
+                f['regression'][name] = rows
+            del f['sealed']
         flat = self.scene('flat.yaml', 'law: elastic', '')
         with open(flat, encoding='utf-8') as f:
             text = f.read().replace('*q*', '*')
@@ -189,7 +196,8 @@ class Rivals(Ring):
                             (['train', '-scene', self.norton.replace('norton', 'flat'), '-model', self.path('no.h5'), '-greedy', '-training_grid', '3,3', *CUBATURE],
                              ['-greedy', 'cubature']),
                             ([*train, *REGRESSION, '-hyco_dual', 'nnmf'], ['-hyco_dual', 'projection']),
-                            (['predict', '-model', self.path('damaged.h5'), '-mu', POINT], ['damaged.h5', 'cubature/weight'])):
+                            (['predict', '-model', self.path('damaged.h5'), '-mu', POINT], ['damaged.h5', 'cubature/weight']),
+                            (['predict', '-model', self.path('short.h5'), '-mu', POINT], ['short.h5', 'regression/gamma'])):
             run = self.run_raw(*args)
             self.assertEqual(run.returncode, 1, run.stdout)
             self.assertEqual(len(said(run)), 1, run.stderr)
