@@ -130,7 +130,7 @@ class History(Case):
 
     def test_resume_is_exact(self):
         """On as many ranks the rest is equal to 1e-12."""
-        args = ['-scene', RING, '-mu', '0.01,1', '-history_times', '0,0.5,1,1.5,2,3,4', '-hyco_substeps', '8']
+        args = ['-scene', RING, '-mu', '0.01,1', '-history_times', '0,0.5,1,1.5,2,3,4', '-hyco_substeps', '8', '-output_most_max', 'mises']
         whole = self.hyco('solve', *args)
         keep = ['-hyco_checkpoint', self.path('e.h5')]
         run = subprocess.Popen([HYCO, 'solve', *args, *keep], stdout=subprocess.PIPE, text=True)
@@ -143,6 +143,11 @@ class History(Case):
         for column in ('total_contact_force', 'inelastic', 'mises', 'stored', 'dissipated'):
             self.assertLessEqual(abs(np.array(whole['history'][column]) - rest['history'][column]).max(),
                                  1e-12 * max(abs(v) for v in whole['history'][column]), column)
+        self.assertEqual(len(rest['history']['outputs']['most']), 7)
+        np.testing.assert_allclose(rest['history']['outputs']['most'], whole['history']['outputs']['most'], rtol=1e-12)
+        other = self.run_raw('solve', *args[:-2], '-output_least_min', 'mises', *keep, '-hyco_resume')
+        self.assertEqual(other.returncode, 1)
+        self.assertRegex(other.stderr, 'e.h5 is of another scene')
 
     def test_rod(self):
         """The power ramp on a slice: two to four iterations a step, quadratic; the gap closes, the ramp presses, the hold relaxes; at zero power it is open."""

@@ -125,16 +125,25 @@ class Paths(Case):
                 self.assertLess(report['worst_' + kind]['max'], bound, (dual, kind))
 
     def test_outputs(self):
-        """The outputs that a scene names are those of the replayed laws, at the path's end."""
-        scene = self.scene('outputs.yaml', NORTON, HISTORY + 'output:\n  hoop: {max: sigma_tt, group: ring}\n  out: {mean: u, group: ring_outside}\n')
-        full = self.hyco('solve', '-scene', scene, '-mu', '0.0052,0.93')['outputs']
+        """The outputs that a scene names are those of the replayed laws: at the listed times, at the end, their extremes in a set of points."""
+        scene = self.scene('outputs.yaml', NORTON,
+                           HISTORY + 'output:\n  hoop: {max: sigma_tt, group: ring}\n  out: {mean: u, group: ring_outside}\n  low: {min: sigma_tt, group: ring}\n')
+        solved = self.hyco('solve', '-scene', scene, '-mu', '0.0052,0.93')
+        full = {name: np.array(values) for name, values in solved['history']['outputs'].items()}
+        self.assertEqual({name: values[-1] for name, values in full.items()}, solved['outputs'])
         for name, settings, limit in (('all.h5', ['-grid', '1,1', '-hyco_rid_whole', '-hyco_hybrid', 'all'], 1e-7),
                                       ('some.h5', ['-grid', '3,3', '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', '1'], 1e-2)):
             self.train(scene, name, *settings)
-            reduced = self.hyco('predict', '-model', self.path(name), '-mu', '0.0052,0.93')['outputs']
+            predicted = self.hyco('predict', '-model', self.path(name), '-mu', '0.0052,0.93')
+            reduced = {output: np.array(values) for output, values in predicted['history']['outputs'].items()}
+            row, = self.rows(name, '-values_gap', '0.0052', '-values_push', '0.93')
             self.assertEqual(reduced.keys(), full.keys())
-            for key, value in full.items():
-                self.assertLess(abs(reduced[key] - value), limit * abs(value), (name, key))
+            for key, values in full.items():
+                self.assertLess(abs(reduced[key] - values).max(), limit * abs(values).max(), (name, key))
+                self.assertEqual(reduced[key][-1], predicted['outputs'][key])
+                self.assertAlmostEqual(float(row[key]), reduced[key][-1], delta=1e-6 * abs(values).max())
+                extreme = min if key == 'low' else max
+                self.assertAlmostEqual(float(row['path_' + key]), extreme(reduced[key]), delta=1e-6 * abs(values).max())
 
     def test_order_of_questions(self):
         """A point's path is the same to the last bit whatever was asked before it."""
