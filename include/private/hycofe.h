@@ -57,10 +57,11 @@ struct _n_HycoFE {
   PetscBool stiffness_changed, contact_changed;
   PetscBool gap_changed; /* the contacts' gaps, or what the supports take from them */
   /* geometry at mu */
-  PetscReal *X;        /* n_nodes x 3, moved nodes */
-  PetscBool *mirrored; /* by body: its map is a mirror image */
-  PetscInt place;      /* of the nodes: a number that no other place has, on this process */
-  PetscReal *kept;     /* by point, nv x 3 gradients and the weight at kept_place: HycoFEKeepGradients(); or NULL */
+  PetscReal *X;         /* n_nodes x 3, moved nodes */
+  PetscBool *mirrored;  /* by body: its map is a mirror image */
+  PetscInt place;       /* of the nodes: a number that no other place has, on this process */
+  PetscReal *kept;      /* by point, nv x 3 gradients and the weight at kept_place: HycoFEKeepGradients(); or NULL */
+  PetscReal *kept_mean; /* the same by cell of the mean gradients, nv x 3; NULL: no body is bbar */
   PetscInt kept_place;
   /* supports at mu */
   PetscBool *fixed; /* n_dof */

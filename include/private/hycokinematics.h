@@ -25,6 +25,8 @@ void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const Pets
 /* f += w B^T stress of that point, at the cell's unknowns (nv x dim). */
 void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[8][3], PetscReal mean[8][3], PetscReal w,
                     const PetscReal stress[6], PetscReal f[]);
+/* push (nv x dim) += what the thermal strains of a cell push, the sum of w B^T C eps, by fe's tangents. */
+PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[]);
 /* Room for temperatures and thermal strains; fills them at fe's nodes and mu where what changed reaches them. */
 PetscErrorCode HycoHeatCreate(HycoFE fe);
 PetscErrorCode HycoFESetHeat(HycoFE fe, PetscBool all, const PetscBool changed[]);

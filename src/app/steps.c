@@ -28,7 +28,7 @@ static const Column columns[] = {
     BOTH("cuts", cuts, PETSC_TRUE),
     BOTH("iterations", iterations, PETSC_TRUE),
     BOTH("most_iterations", most_iterations, PETSC_TRUE),
-    FULL_ONLY("factors", factors, PETSC_TRUE),
+    BOTH("factors", factors, PETSC_TRUE),
     BOTH("active_set_iterations", active_set_iterations, PETSC_TRUE),
     BOTH("n_active", n_active, PETSC_TRUE),
     BOTH("total_contact_force", total_contact_force, PETSC_FALSE),

@@ -148,14 +148,12 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the thermal strains of a cell push: the sum of w B^T C eps. */
-static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Vec F)
+PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
 {
-  HycoMesh m = fe->mesh;
-  const HycoElement *el = HycoElementGet(m->type);
-  const PetscInt size = fe->tangent_size[m->cell_body[cell]];
-  const PetscBool bbar = fe->bbar[m->cell_body[cell]];
-  PetscReal f[HYCO_MAX_CELL_DOFS] = {0}, g[8][3], mean[8][3], w;
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscInt size = fe->tangent_size[fe->mesh->cell_body[cell]];
+  const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
+  PetscReal g[8][3], mean[8][3], w;
 
   PetscFunctionBegin;
   if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));
@@ -166,8 +164,18 @@ static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Vec F)
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
     HycoTangentApply(HycoFEIsIsotropic(fe, cell), fe->dim, fe->tangent + fe->tangent_start[cell] + q * size, strain,
                      stress);
-    HycoPointForce(fe, el, g, bbar ? mean : NULL, w, stress, f);
+    HycoPointForce(fe, el, g, bbar ? mean : NULL, w, stress, push);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Vec F)
+{
+  HycoMesh m = fe->mesh;
+  PetscReal f[HYCO_MAX_CELL_DOFS] = {0};
+
+  PetscFunctionBegin;
+  PetscCall(HycoCellHeat(fe, cell, f));
   for (PetscInt k = 0; k < m->nv * m->dim; k++)
     PetscCall(AddNode(fe, m->cells[cell * m->nv + k / m->dim], k % m->dim, f[k], F));
   PetscFunctionReturn(PETSC_SUCCESS);

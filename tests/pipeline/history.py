@@ -65,6 +65,10 @@ class History(Case):
         self.alike(fields, others, 1e-8)
         self.assertEqual(sum(report['history']['factors']), 1)
         self.well(report, tangent)
+        report, others_too = self.ring('modified', '-hyco_newton', 'modified', '-hyco_newton_rtol', '1e-12')
+        self.alike(fields, others_too, 1e-8)
+        self.well(report, tangent)
+        self.assertLess(sum(report['history']['factors']), sum(tangent['history']['factors']) / 2)
         for kind, all_alone in (('tangent', fields), ('elastic', others)):
             for ranks in (2, 4):
                 report, same = self.ring('ranks', '-hyco_newton', kind, '-hyco_newton_rtol', '1e-12', ranks=ranks)

@@ -124,6 +124,18 @@ class Paths(Case):
             for kind, bound in zip(KINDS, (0.03, 0.03, limit, 0.03)):
                 self.assertLess(report['worst_' + kind]['max'], bound, (dual, kind))
 
+    def test_newton(self):
+        """A tangent for each iteration, one that is kept, the elastic stiffness: one answer, and far fewer factors."""
+        self.train(self.norton, 'newton.h5', '-grid', '3,3', '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', '1')
+        found = {kind: self.hyco('predict', '-model', self.path('newton.h5'), '-mu', '0.0055,0.91', '-hyco_newton', kind)['history']
+                 for kind in ('tangent', 'elastic', 'modified', 'auto')}
+        for kind, other in found.items():
+            for column in ('total_contact_force', 'rid_inelastic', 'rid_mises', 'rid_u_norm2'):
+                a, b = np.array(found['tangent'][column]), np.array(other[column])
+                self.assertLess(abs(a - b).max(), 1e-7 * abs(a).max(), (kind, column))
+        self.assertEqual(found['auto']['iterations'], found['modified']['iterations'])
+        self.assertLess(sum(found['modified']['factors']), sum(found['tangent']['factors']) / 2)
+
     def test_outputs(self):
         """The outputs that a scene names are those of the replayed laws: at the listed times, at the end, their extremes in a set of points."""
         scene = self.scene('outputs.yaml', NORTON,
