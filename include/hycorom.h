@@ -17,6 +17,8 @@ typedef const char *HycoROMType;
 #define HYCO_ROM_HYBRID     "hybrid"
 #define HYCO_ROM_PROJECTION "projection"
 #define HYCO_ROM_CONDENSED  "condensed"
+#define HYCO_ROM_CUBATURE   "cubature"
+#define HYCO_ROM_REGRESSION "regression"
 
 /* Which displacements of a hybrid model are full order: -hyco_hybrid. */
 typedef enum {

@@ -43,6 +43,10 @@ struct _n_HycoFE {
   PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
   PetscBool *bbar;          /* by body: the dilatation is the cells' mean */
   signed char *drawn_sign;  /* by cell: the sign of its volume in the mesh file's coordinates */
+  /* of a cubature (borrowed; set before anything is assembled): how often each cell's integrals count; NULL: once.
+     all_facets: loads act on facets whose cell the mesh does not have, too (2D, 3D) */
+  const PetscReal *cell_weight;
+  PetscBool all_facets;
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* of the entries of K; made by the second assembly into it */
   PetscInt n_loads;
@@ -151,6 +155,10 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 /* Stress of u (n_dof, local order) by the elastic tangents, without the thermal strain's, averaged over each cell:
    sigma n_cells x n_sigma. */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
+/* The volumes of the cells, of the full circle in an axisymmetric scene. */
+PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[]);
+/* What the body forces give to a cell's unknowns (f: nv x dim, added to). */
+PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal f[]);
 /* Elastic energy of each cell: 1/2 u^T K u without thermal strains. */
 PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[]);
 /* What the energy identity of a linear scene has beside F.u where there is thermal strain e, of each cell: the integral

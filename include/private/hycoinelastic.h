@@ -85,6 +85,8 @@ typedef struct {
 PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
                           HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report);
 PetscErrorCode HycoFEElasticTangent(HycoFE fe);
+/* The internal forces of one cell from the state's stresses, the integral of B^T sigma (f: nv x dim, overwritten). */
+PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, PetscReal f[]);
 
 /*
   The same of some bodies alone: those of laws that flow, or those of linear laws, whose stress and energy do not depend

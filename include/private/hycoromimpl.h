@@ -113,6 +113,8 @@ PetscErrorCode HycoROMCreate(HycoROM *model);
 PetscErrorCode HycoTraceBegin(HycoROM model);
 PetscErrorCode HycoTraceAdd(HycoROM model, PetscReal t);
 PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inelastic);
+/* Of that listed time, once m->Lambda is of all contacts: its forces, and the size of U in the RID. */
+void HycoTraceMeasure(HycoROM model, HycoStep *step);
 PetscErrorCode HycoTraceFree(HycoROM model);
 /* The fields of the path at its listed times on the whole mesh, as HycoFOMSetSeries() has them (replay.c). */
 PetscErrorCode HycoTraceWrite(HycoROM model, const char path[]);

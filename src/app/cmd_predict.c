@@ -98,6 +98,9 @@ static PetscErrorCode SayReduced(const HycoPrediction *p)
   PetscFunctionBegin;
   if (p->gives_forces)
     PetscCall(Say("%s: %d contacts, %d modes\n", p->title, (int)p->n_contacts, (int)p->n_modes));
+  else if (p->rid_fraction < 1 && p->n_multipliers != p->n_contacts)
+    PetscCall(Say("%s: %d modes, %d force vectors for %d contacts; %d elements (%.1f %%)\n", p->title, (int)p->n_modes,
+                  (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements, 100 * (double)p->rid_fraction));
   else if (p->n_fe_dofs || p->rid_fraction < 1)
     PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
                   (int)p->n_modes, (int)p->n_fe_dofs, (int)p->n_contacts, (int)p->rid_elements,

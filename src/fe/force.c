@@ -11,26 +11,55 @@ static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal va
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddBodyForces(HycoFE fe, PetscInt cell, Vec F)
+/* What the body forces at point q of a cell give to its unknowns, added to value. */
+static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, PetscReal value[])
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
   const HycoBody *body = &fe->scene->body[m->cell_body[cell]];
+  PetscReal x[3], g[8][3], w, f;
 
   PetscFunctionBegin;
-  for (PetscInt q = 0; q < el->nq; q++) {
-    PetscReal x[3], g[8][3], w, f;
-
-    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
-    HycoPointPlace(fe, el, cell, q, x);
-    for (PetscInt c = 0; c < m->dim; c++) {
-      if (!body->force[c]) continue;
-      PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
-      for (PetscInt a = 0; a < m->nv; a++)
-        PetscCall(AddNode(fe, m->cells[cell * m->nv + a], c, w * f * el->N[q][a], F));
-    }
+  PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+  HycoPointPlace(fe, el, cell, q, x);
+  for (PetscInt c = 0; c < m->dim; c++) {
+    if (!body->force[c]) continue;
+    PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
+    for (PetscInt a = 0; a < m->nv; a++) value[a * m->dim + c] += w * f * el->N[q][a];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal value[])
+{
+  const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
+  const PetscBool none = (PetscBool)(!body->force[0] && !body->force[1] && !body->force[2]);
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; q < HycoElementGet(fe->mesh->type)->nq && !none; q++)
+    PetscCall(AddPointForce(fe, cell, q, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddBodyForces(HycoFE fe, PetscInt cell, Vec F)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; q < HycoElementGet(m->type)->nq; q++) {
+    PetscReal f[HYCO_MAX_CELL_DOFS] = {0};
+
+    PetscCall(AddPointForce(fe, cell, q, f));
+    for (PetscInt k = 0; k < m->nv * m->dim; k++)
+      PetscCall(AddNode(fe, m->cells[cell * m->nv + k / m->dim], k % m->dim, f[k], F));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a load acts on a facet: where its cell is another process's, that does. */
+static PetscBool Acts(HycoFE fe, PetscInt facet)
+{
+  return (PetscBool)(fe->all_facets || fe->mesh->facet_cell[facet] >= 0);
 }
 
 static PetscErrorCode AddFacetLoad(HycoFE fe, const HycoLoad *load, PetscInt facet, Vec F)
@@ -70,7 +99,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(4 * m->n_nodes, &sum));
   for (PetscInt f = 0; f < m->n_facets; f++) {
-    if (m->facet_group[f] != group || m->facet_cell[f] < 0) continue;
+    if (m->facet_group[f] != group || !Acts(fe, f)) continue;
     for (PetscInt q = 0; q < el->nq; q++) {
       PetscReal v[4];
 
@@ -203,7 +232,7 @@ static PetscErrorCode AddForces(HycoFE fe, Vec F)
     for (PetscInt c = 0; c < m->dim; c++) in_space = (PetscBool)(in_space || HycoExprInSpace(load->traction[c]));
     if (!in_space) PetscCall(AddUniformLoad(fe, load, g, &fe->shares[k], F));
     for (PetscInt f = 0; f < m->n_facets && in_space; f++) {
-      if (m->facet_group[f] == g && m->facet_cell[f] >= 0) PetscCall(AddFacetLoad(fe, load, f, F));
+      if (m->facet_group[f] == g && Acts(fe, f)) PetscCall(AddFacetLoad(fe, load, f, F));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

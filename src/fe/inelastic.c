@@ -424,6 +424,25 @@ PetscErrorCode HycoFEElasticTangent(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, PetscReal f[])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
+  PetscReal g[8][3], mean[8][3], w;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(f, fe->mesh->nv * fe->dim));
+  if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal s[6] = {0, 0, 0, 0, 0, 0};
+
+    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    PetscCall(PetscArraycpy(s, PointAt(fe, state, cell, q).stress, fe->n_sigma));
+    HycoPointForce(fe, el, g, bbar ? mean : NULL, w, s, f);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[], PetscReal mises[],
                                  PetscReal inelastic[], PetscReal temperature[])
 {

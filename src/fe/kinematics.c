@@ -75,6 +75,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
     for (PetscInt a = 0; a < el->nv; a++) g[a][2] = el->N[q][a] / r;
     *weight *= 2 * PETSC_PI * r;
   }
+  if (fe->cell_weight) *weight *= fe->cell_weight[cell];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -63,6 +63,19 @@ PetscErrorCode HycoTraceList(HycoROM m, PetscReal **sigma, PetscReal **inelastic
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoTraceMeasure(HycoROM m, HycoStep *s)
+{
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    s->total_contact_force += m->Lambda[k];
+    s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);
+  }
+  for (PetscInt k = 0; k < m->pairs.n; k++) s->n_active += m->Lambda[k] > 1e-10 * s->lambda_max; /* no round-off */
+  for (PetscInt k = 0; k < m->fe->n_dof; k++) {
+    if (m->role[k / m->fe->dim] != HYCO_ROLE_OUTSIDE) s->u_norm2 += m->U[k] * m->U[k];
+  }
+  s->u_norm2 = PetscSqrtReal(s->u_norm2);
+}
+
 void HycoTraceWholeU(HycoROM m, PetscInt k, PetscReal U[])
 {
   const HycoTrace *r = &m->trace;
@@ -120,7 +133,10 @@ PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
              "HycoROMSetStep: %d is no listed time that the path reached; there are %d", (int)k, (int)r->n_listed);
   at = r->at[k];
   HycoSceneSetTime(m->scene, m->fe->mu, r->t[at], mu);
-  PetscCall(HycoFESetParameters(m->fe, mu));
+  if (m->fe->mesh == m->mesh)
+    PetscCall(HycoROMBringRows(m, mu));
+  else
+    PetscCall(HycoFESetParameters(m->fe, mu));
   PetscCall(PetscArraycpy(m->gamma, r->gamma + (size_t)at * (size_t)m->l, m->l));
   PetscCall(PetscArraycpy(m->Lambda, r->Lambda + (size_t)k * (size_t)m->pairs.n, m->pairs.n));
   PetscCall(HycoROMExpand(m));

@@ -158,15 +158,7 @@ static PetscErrorCode Measure(HycoROM m, HycoFEState state, HycoStep *s)
     s->inelastic = PetscMax(s->inelastic, inelastic[e]);
   }
   PetscCall(PetscFree(mises));
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
-    s->total_contact_force += m->Lambda[k];
-    s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);
-  }
-  for (PetscInt k = 0; k < m->pairs.n; k++) s->n_active += m->Lambda[k] > 1e-10 * s->lambda_max; /* no round-off */
-  for (PetscInt k = 0; k < m->fe->n_dof; k++) {
-    if (m->role[k / m->fe->dim] != HYCO_ROLE_OUTSIDE) s->u_norm2 += m->U[k] * m->U[k];
-  }
-  s->u_norm2 = PetscSqrtReal(s->u_norm2);
+  HycoTraceMeasure(m, s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
