@@ -114,6 +114,7 @@ PetscErrorCode HycoSolverFormCreate_Linear(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Shell(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form);
+PetscErrorCode HycoSolverFormCreate_Projected(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm form);
 /* The form of that name; NULL: there is none. */
 HycoSolverForm HycoSolverFindForm(HycoSolver s, const char name[]);
