@@ -402,6 +402,13 @@ PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscRea
   ierr = StepAll(fe, &b);
   PetscCall(BatchDestroy(&b));
   PetscCall(ierr);
+  if (fe->springs && !report->failed) {
+    const PetscReal energy = HycoSpringsEnergy(fe, u);
+
+    HycoSpringsAddForces(fe, -1, u, f_int);
+    report->stored += energy;
+    report->potential += energy;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -124,8 +124,15 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   HycoOnRoot(HycoComm(f), MeasureContacts(f, s));
   if (s->reason > 0 && f->n_contacts) HycoOnRoot(HycoComm(f), HycoFOMCountDependent(f, &s->n_dependent));
   if (f->scene->n_quantities) {
+    PetscReal *reaction = NULL;
+
     PetscCall(HycoFOMStress(f));
-    PetscCall(HycoQuantitiesMeasure(HycoComm(f), f->fe, f->u, f->sigma, s->quantity));
+    if (HycoSceneHasReactions(f->scene)) {
+      PetscCall(PetscMalloc1(f->fe->n_dof, &reaction));
+      PetscCall(HycoFOMReactions(f, reaction));
+    }
+    PetscCall(HycoQuantitiesMeasure(HycoComm(f), f->fe, f->u, f->sigma, reaction, s->quantity));
+    PetscCall(PetscFree(reaction));
   }
   PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, HycoComm(f)));
   *out = *s;
