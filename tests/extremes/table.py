@@ -1,5 +1,5 @@
 """The tables of the numerical extremes: every test's rows, printed and written to extremes.md; fails when a row is out of
-its bound or a test left none. With --write-doc they go into docs/limits.md, between the markers of that section:
+its bound or a test left none. With --write-doc they go into docs/limits/extremes.md:
 
     (cd build/tests && /usr/bin/python3 ../../tests/extremes/table.py --write-doc)
 
@@ -22,7 +22,12 @@ TABLES = {
     'parameters': 'Parameters',
     'battery': 'Random scenes',
 }
-BEGIN, END = '<!-- numerical extremes: written by tests/extremes/table.py --write-doc -->\n', '<!-- end of numerical extremes -->\n'
+HEAD = '''# Numerical extremes: every case
+
+Written by `tests/extremes/table.py --write-doc` after `ctest -L extremes`. *found* within *bound*, or *refused* in one line with an exit status that is
+not 0. What follows from them is in [limits.md](../limits.md).
+
+'''
 
 
 def read(name):
@@ -45,7 +50,7 @@ def tables(write):
         if not rows:
             problems.append(f'{name} left no rows: run it first (ctest -L extremes)')
         problems += [f'{name}: {row[0]}, {row[1]} is out of its bound' for row in rows if row[-1] == 'OUT']
-        text += [f'### {title}', '', '| case | what | found | bound |', '|---|---|---|---|']
+        text += [f'## {title}', '', '| case | what | found | bound |', '|---|---|---|---|']
         text += ['| ' + ' | '.join([*row[:3], 'limit' if row[4] == 'limit' else row[3]]) + ' |' for row in rows] + ['']
     return '\n'.join(text), problems
 
@@ -58,11 +63,9 @@ def main():
     if problems:
         sys.exit('\n'.join(problems))
     if '--write-doc' in sys.argv:
-        page = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'docs', 'limits.md')
-        with open(page, encoding='utf-8') as f:
-            before, rest = f.read().split(BEGIN)
+        page = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'docs', 'limits', 'extremes.md')
         with open(page, 'w', encoding='utf-8') as f:
-            f.write(before + BEGIN + '\n' + text + END + rest.split(END)[1])
+            f.write(HEAD + text)
 
 
 if __name__ == '__main__':
