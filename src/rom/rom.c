@@ -197,6 +197,7 @@ PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
   PetscCall(PetscMalloc1(m->mesh->n_cells, &each));
   PetscCall(HycoFEEnergy(m->fe, m->U, each));
   for (PetscInt e = 0; e < m->mesh->n_cells; e++) *energy += each[e];
+  *energy += HycoSpringsEnergy(m->fe, m->U);
   PetscCall(PetscFree(each));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
