@@ -208,6 +208,9 @@ output: {wall: {reaction: x}, low: {min: u_y}}
         model = self.hyco('predict', '-model', 'm.h5', '-mu', '40')
         self.near(model['outputs']['low'], found['outputs']['low'], 0.01)
         self.assertLess(abs(model['outputs']['wall'] - found['outputs']['wall']), 0.02)
+        cubature = self.run_raw('train', '-scene', scene, '-grid', '4', '-model', 'c.h5', '-hyco_model_type', 'cubature')
+        self.assertEqual(cubature.returncode, 1)
+        self.assertIn('springs on y0', cubature.stderr)
 
     def test_refused(self):
         base = 'body: {block: {young: 200}}\nfixed: {x0: {x: 0, y: 0}}\n'
