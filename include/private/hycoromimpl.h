@@ -45,6 +45,7 @@ typedef struct {
   PetscInt *at;                /* by listed time: its accepted step */
   PetscReal *Lambda, *sigma, *inelastic;
   HycoHistory history;
+  HycoStep *step; /* n_listed: its steps with the scene's quantities; NULL: not measured yet, or there are none */
 } HycoTrace;
 
 /* What all types of reduced model have; a type's own is in `data`. */
@@ -167,8 +168,10 @@ static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start
   return start;
 }
 
-/* The scene's quantities (value[scene->n_quantities]) of the last prediction (probe.c). */
-PetscErrorCode HycoROMMeasureQuantities(HycoROM model, PetscReal value[]);
+/* The scene's quantities of the last prediction, of a path also those of its listed times (probe.c). */
+PetscErrorCode HycoROMMeasureQuantities(HycoROM model, HycoPrediction *prediction);
+/* Of a path: into its history's steps; done once. */
+PetscErrorCode HycoROMMeasurePath(HycoROM model);
 /* NULL-safe. */
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
 

@@ -371,13 +371,16 @@ static PetscErrorCode Step(HycoFE fe, const HycoElement *el, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode StepAll(HycoFE fe, Batch *b)
+static PetscErrorCode StepAll(HycoFE fe, HycoBodies bodies, Batch *b)
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
+    const PetscBool linear = fe->scene->body[m->cell_body[e]].law->linear;
+
+    if (bodies != HYCO_BODIES_ALL && linear != (PetscBool)(bodies == HYCO_BODIES_LINEAR)) continue;
     if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Step(fe, el, b));
     b->cell[b->n++] = e;
   }
@@ -385,8 +388,9 @@ static PetscErrorCode StepAll(HycoFE fe, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
-                          HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report)
+PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[], PetscReal t0, PetscReal t1,
+                                HycoFEState begin, HycoFEState end, PetscReal f_int[], PetscBool tangent,
+                                HycoFEStepReport *report)
 {
   const HycoFEStepReport fresh = {.dt_factor = 1, .has_potential = PETSC_TRUE};
   Batch b = {.u = u, .t0 = t0, .t1 = t1, .begin = begin, .end = end, .f_int = f_int, .tangents = tangent};
@@ -399,9 +403,24 @@ PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscRea
   b.report = report;
   PetscCall(HycoFEKeepGradients(fe));
   PetscCall(BatchCreate(fe, &b));
-  ierr = StepAll(fe, &b);
+  ierr = StepAll(fe, bodies, &b);
   PetscCall(BatchDestroy(&b));
   PetscCall(ierr);
+  if (fe->springs && !report->failed) {
+    const PetscReal energy = HycoSpringsEnergy(fe, u);
+
+    HycoSpringsAddForces(fe, -1, u, f_int);
+    report->stored += energy;
+    report->potential += energy;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
+                          HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEStepBodies(fe, HYCO_BODIES_ALL, u, t0, t1, begin, end, f_int, tangent, report));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -8,7 +8,7 @@ PetscErrorCode HycoTraceFree(HycoROM m)
   const HycoTrace empty = {.n_given = r->n_given, .given = r->given};
 
   PetscFunctionBegin;
-  HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->Lambda, &r->sigma, &r->inelastic);
+  HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->Lambda, &r->sigma, &r->inelastic, &r->step);
   *r = empty;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -21,6 +21,7 @@ PetscErrorCode HycoTraceBegin(HycoROM m)
   PetscFunctionBegin;
   r->n = r->n_listed = r->shown = 0;
   PetscCall(PetscMemzero(&r->history, sizeof(r->history)));
+  PetscCall(PetscFree(r->step));
   if (r->at) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n_times + 1, &r->at)); /* one more: the end of a path that ends early */
   PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->pairs.n + 1, &r->Lambda));
@@ -115,6 +116,7 @@ PetscErrorCode HycoROMGetHistory(HycoROM m, HycoHistory *history)
 {
   PetscFunctionBegin;
   PetscCall(CheckPath(m, "HycoROMGetHistory()"));
+  PetscCall(HycoROMMeasurePath(m));
   *history = m->trace.history;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
