@@ -56,10 +56,6 @@ static PetscErrorCode Begin(HycoReducer t)
             "displacements of the contacts' nodes) or rank (one for each contact)");
   HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for scenes in the plane and in space; on a line take hybrid "
                              "or projection");
-  HycoCheck(
-      !t->scene->n_springs,
-      "-hyco_model_type cubature integrates over cells, and the scene has springs on %s; take hybrid or projection",
-      t->scene->spring[0].group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
