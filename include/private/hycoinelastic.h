@@ -52,6 +52,8 @@ PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name
   With s_m = (s0 + s1) / 2 at each point, work = integral of s_m : (eps1 - eps0), and as an identity
 
       work = (stored at the end) - (stored at the begin) + dissipated + thermal + moduli
+
+  without springs, whose energy `stored` and `potential` have, and whose forces are in f_int.
 */
 typedef struct {
   PetscReal dt_factor;  /* what the laws would multiply the step by: 1, or less */
@@ -85,5 +87,28 @@ typedef struct {
 PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
                           HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report);
 PetscErrorCode HycoFEElasticTangent(HycoFE fe);
+/* The internal forces of one cell from the state's stresses, the integral of B^T sigma (f: nv x dim, overwritten). */
+PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, PetscReal f[]);
+
+/*
+  The same of some bodies alone: those of laws that flow, or those of linear laws, whose stress and energy do not depend
+  on the past. Of the other cells nothing is read or written, and the report leaves them out.
+*/
+typedef enum { HYCO_BODIES_ALL, HYCO_BODIES_FLOWING, HYCO_BODIES_LINEAR } HycoBodies;
+PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[], PetscReal t0, PetscReal t1,
+                                HycoFEState begin, HycoFEState end, PetscReal f_int[], PetscBool tangent,
+                                HycoFEStepReport *report);
+
+/*
+  What the linear bodies give to f_int at some nodes, K u less what the thermal strains push, for who comes to one time
+  again and again: a product in place of their points. `nodes` (n_nodes; NULL: all): those whose rows are wanted.
+  HycoLinearForceSet(): at fe's parameters; K: the linear bodies' tangents or the nodes' places may have changed.
+  HycoLinearForceAdd(): added to f_int (n_dof). Not collective; destroying is NULL-safe.
+*/
+typedef struct _n_HycoLinearForce *HycoLinearForce;
+PetscErrorCode HycoLinearForceCreate(HycoFE fe, const PetscBool nodes[], HycoLinearForce *force);
+PetscErrorCode HycoLinearForceDestroy(HycoLinearForce *force);
+PetscErrorCode HycoLinearForceSet(HycoLinearForce force, PetscBool K);
+void HycoLinearForceAdd(HycoLinearForce force, const PetscReal u[], PetscReal f_int[]);
 
 #endif

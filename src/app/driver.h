@@ -134,14 +134,21 @@ PetscErrorCode DriverWriteText(const char path[], const char text[]);
 PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, const PetscReal mu[],
                                 PetscInt n_columns, const char *const names[], const PetscReal value[]);
 
+/* Where train keeps its solutions, with a model of this name. */
+PetscErrorCode DriverSnapshotFolder(const char model[], char folder[PETSC_MAX_PATH_LEN]);
+
 /* -- progress.c -- */
 
 /* Prints on rank 0. */
 PetscErrorCode Say(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 /* A share in percent: "0.12 %", "120 %". */
 void DriverPercent(PetscReal share, char text[32]);
-/* A HycoProgress: a bar that moves on a terminal, a line now and then elsewhere. ctx: a word for what is done. */
+/* A HycoProgress: a bar that moves on a terminal, a line a minute elsewhere. ctx: a word for what is done. */
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx);
+/* -quiet: from here on neither words nor progress; errors are told all the same. */
+PetscErrorCode DriverReadQuiet(void);
+/* Ctrl-C and termination end the run with 130 or 143 and one line, of where the solutions are that are kept. */
+PetscErrorCode DriverCatchInterrupt(const char folder[]);
 /* -hyco_monitor */
 PetscErrorCode DriverReadMonitor(PetscBool *monitor);
 /* A HycoMonitor. */
@@ -228,8 +235,8 @@ PetscErrorCode DriverSayStep(const HycoStep *step, PetscInt n);
 /* A CSV ("": none) with a row for each of n times. Collective. */
 PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const PetscReal mu[], PetscBool reduced,
                                 PetscInt n, const HycoStep step[]);
-/* An array of n for each of their numbers. */
-void DriverReportSteps(cJSON *history, PetscBool reduced, PetscInt n, const HycoStep step[]);
+/* An array of n for each of their numbers, and of the scene's quantities under `outputs`. */
+PetscErrorCode DriverReportSteps(cJSON *history, HycoScene scene, PetscBool reduced, PetscInt n, const HycoStep step[]);
 
 /* -- solve_history.c: a path -- */
 
@@ -240,7 +247,7 @@ typedef struct {
 } DriverPath;
 /* A HycoStepMonitor; ctx: a DriverPath. */
 PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *step, void *ctx);
-void DriverReportHistory(cJSON *json, const HycoHistory *history);
+PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHistory *history);
 /* After the solve: the table ("": none), a summary; fails where the path has not reached its end. Collective. */
 PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char table[]);
 
@@ -259,7 +266,7 @@ PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path);
 /* A line a time; the table ("": none). Collective. */
 PetscErrorCode DriverSayReducedPath(HycoScene scene, const PetscReal mu[], const DriverReducedPath *path,
                                     const char table[]);
-void DriverReportReducedPath(cJSON *json, const DriverReducedPath *path);
+PetscErrorCode DriverReportReducedPath(cJSON *json, HycoScene scene, const DriverReducedPath *path);
 
 /* -- compare_history.c -- */
 

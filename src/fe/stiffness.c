@@ -117,12 +117,16 @@ static PetscErrorCode AddGeneral(HycoFE fe, const HycoElement *el, PetscInt cell
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
     StrainRows(fe, el, g, bbar ? mean : NULL, B);
     for (PetscInt k = 0; k < ns; k++) {
-      for (PetscInt t = 0; t < n; t++) {
-        CB[t] = 0;
-        for (PetscInt l = 0; l < ns; l++) CB[t] += w * C[k * ns + l] * B[l * n + t];
+      for (PetscInt t = 0; t < n; t++) CB[t] = 0;
+      for (PetscInt l = 0; l < ns; l++) {
+        const PetscReal c = w * C[k * ns + l];
+
+        for (PetscInt t = 0; t < n; t++) CB[t] += c * B[l * n + t];
       }
       for (PetscInt r = 0; r < n; r++) {
-        for (PetscInt t = r / fe->dim * fe->dim; t < n; t++) Ke[r * n + t] += B[k * n + r] * CB[t];
+        const PetscReal b = B[k * n + r];
+
+        for (PetscInt t = r / fe->dim * fe->dim; t < n && b != 0; t++) Ke[r * n + t] += b * CB[t];
       }
     }
   }
@@ -143,6 +147,7 @@ PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   for (PetscInt r = 0; r < n; r++) {
     for (PetscInt t = 0; t < r / dim * dim; t++) Ke[r * n + t] = Ke[t * n + r];
   }
+  if (fe->springs) HycoSpringsAddStiffness(fe, cell, Ke);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

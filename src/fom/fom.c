@@ -44,6 +44,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscCall(PetscFree(f->u_all));
   PetscCall(PetscFree(f->sigma_all));
   PetscCall(PetscFree(f->contact_result));
+  PetscCall(PetscFree(f->reaction));
   PetscCall(PetscFree(f->lambda));
   PetscCall(PetscFree(f->sigma));
   PetscCall(PetscFree(f->gap));

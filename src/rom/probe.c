@@ -1,7 +1,8 @@
 /*
   The scene's quantities of a prediction: displacements and stresses of the cells that they need, wherever these are,
-  from the modes there, U = r(u0) + V gamma (30); of a path the laws are replayed there up to the time that is shown.
+  from the modes there, U = r(u0) + V gamma (30); of a path the laws are replayed there, once for all listed times.
 */
+#include <hycofields.h>
 #include <hycoinelastic.h>
 #include <hycoquantities.h>
 #include <hycoromimpl.h>
@@ -11,6 +12,8 @@ struct _n_HycoProbe {
   HycoFE fe;
   PetscReal *V, *u, *sigma; /* n_dof x l; n_dof; n_cells x n_sigma */
   PetscInt *fe_at;          /* by full-order displacement: its place in u; -1: none */
+  PetscReal *reaction;      /* n_dof, of supports; NULL: no quantity asks for them */
+  PetscBool *touched;       /* by node: of a contact; then too */
 };
 
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
@@ -19,7 +22,7 @@ PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
   if (!*probe) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFEDestroy(&(*probe)->fe));
   PetscCall(HycoMeshDestroy(&(*probe)->mesh));
-  HycoFreeAll(&(*probe)->V, &(*probe)->u, &(*probe)->sigma, &(*probe)->fe_at);
+  HycoFreeAll(&(*probe)->V, &(*probe)->u, &(*probe)->sigma, &(*probe)->fe_at, &(*probe)->reaction, &(*probe)->touched);
   PetscCall(PetscFree(*probe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -38,6 +41,53 @@ static PetscErrorCode Extract(HycoROM m, HycoProbe p)
   PetscCall(HycoMeshExtract(m->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
   PetscCall(PetscFree2(needed, keep));
   PetscCall(HycoMeshSetNodeBodies(m->scene, p->mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Room for reactions, and the nodes where contact forces may be part of them. */
+static PetscErrorCode PrepareReactions(HycoROM m, HycoProbe p)
+{
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  if (!HycoSceneHasReactions(m->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(p->fe->n_dof, &p->reaction));
+  PetscCall(PetscMalloc1(p->mesh->n_nodes, &p->touched));
+  PetscCall(PetscCalloc1(m->whole->n_nodes, &in));
+  PetscCall(HycoPairsMarkSurfaces(m->scene, m->whole, &m->whole_pairs, in));
+  for (PetscInt i = 0; i < p->mesh->n_nodes; i++) p->touched[i] = in[p->mesh->node_whole[i]];
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes what contacts press on fixed unknowns from the reactions there. */
+static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda[])
+{
+  const PetscInt dim = p->fe->dim;
+  PetscBool any = PETSC_FALSE;
+  HycoContactFields c;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < p->fe->n_dof; k++) any = (PetscBool)(any || (p->fe->fixed[k] && p->touched[k / dim]));
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFESetParameters(m->fe_whole, p->fe->mu));
+  ierr = HycoContactFieldsCreate(PETSC_COMM_SELF, m->fe_whole, &m->whole_pairs, m->U_whole, Lambda, &c);
+  for (PetscInt k = 0; k < p->fe->n_dof && !ierr; k++) {
+    if (p->fe->fixed[k]) p->reaction[k] -= c.force[3 * p->mesh->node_whole[k / dim] + k % dim];
+  }
+  PetscCall(HycoContactFieldsDestroy(&c));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* f_int: NULL: of a prediction without a history. */
+static PetscErrorCode React(HycoROM m, HycoProbe p, const PetscReal f_int[], const PetscReal Lambda[])
+{
+  PetscFunctionBegin;
+  if (!p->reaction) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFEReactions(p->fe, p->u, f_int, p->reaction));
+  PetscCall(TakeContact(m, p, Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -64,6 +114,7 @@ static PetscErrorCode Fill(HycoROM m, HycoProbe p)
     p->fe_at[k] = i < 0 ? -1 : i * dim + m->fe_dof[k] % dim;
   }
   PetscCall(PetscFree(place));
+  PetscCall(PrepareReactions(m, p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,34 +130,42 @@ static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const Pets
   }
 }
 
-/* The laws from the first time to that which is shown. */
+/* The laws from the first time to the last, and the quantities at the listed ones. */
 static PetscErrorCode March(HycoProbe p, HycoReplay *r)
 {
   HycoROM m = r->m;
-  const HycoTrace *trace = &m->trace;
+  HycoTrace *trace = &m->trace;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k <= trace->at[trace->shown]; k++) {
+  for (PetscInt k = 0, j = 0; k < trace->n; k++) {
     PetscCall(HycoReplayMove(r, k));
     Displace(m, p, trace->gamma + (size_t)k * (size_t)m->l, trace->U_fe + (size_t)k * (size_t)m->n_fe);
     PetscCall(HycoReplayStep(r, k, p->u));
+    if (j == trace->n_listed || trace->at[j] != k) continue;
+    PetscCall(HycoFEStateFields(p->fe, r->state, p->sigma, NULL, NULL, NULL));
+    PetscCall(React(m, p, r->f_int, trace->Lambda + (size_t)j * (size_t)m->pairs.n));
+    PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, p->reaction, trace->step[j++].quantity));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* p->u and p->sigma of a path at the time that is shown. */
-static PetscErrorCode FollowPath(HycoROM m, HycoProbe p)
+/* What the listed times have: the one that is shown, and their largest (of `min` the smallest). */
+static void CollectPath(HycoROM m, HycoPrediction *out)
 {
-  HycoReplay r = {0};
-  PetscErrorCode ierr;
+  const HycoTrace *trace = &m->trace;
 
-  PetscFunctionBegin;
-  ierr = HycoReplayBegin(m, p->fe, &r);
-  if (!ierr) ierr = March(p, &r);
-  if (!ierr) ierr = HycoFEStateFields(p->fe, r.state, p->sigma, NULL, NULL, NULL);
-  PetscCall(HycoReplayEnd(&r));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt q = 0; q < m->scene->n_quantities; q++) {
+    const PetscBool least = (PetscBool)(m->scene->quantity[q].kind == HYCO_QUANTITY_MIN);
+    PetscReal *most = &out->path_quantity[q];
+
+    out->quantity[q] = trace->step[trace->shown].quantity[q];
+    *most = trace->step[0].quantity[q];
+    for (PetscInt j = 1; j < trace->n_listed; j++) {
+      const PetscReal value = trace->step[j].quantity[q];
+
+      *most = least ? PetscMin(*most, value) : PetscMax(*most, value);
+    }
+  }
 }
 
 /* p->u and p->sigma of a prediction without a history. */
@@ -121,25 +180,57 @@ static PetscErrorCode Follow(HycoROM m, HycoProbe p)
   Displace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
   PetscCall(HycoFEStress(p->fe, p->u, p->sigma));
+  PetscCall(React(m, p, NULL, m->Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMMeasureQuantities(HycoROM m, PetscReal value[])
+/* Made when somebody asks. */
+static PetscErrorCode Make(HycoROM m)
 {
-  HycoProbe p;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  if (m->probe) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMLoadWhole(m));
+  PetscCall(PetscNew(&m->probe));
+  ierr = Fill(m, m->probe);
+  if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMMeasurePath(HycoROM m)
+{
+  HycoTrace *trace = &m->trace;
+  HycoReplay r = {0};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!m->scene->n_quantities || !trace->n_listed || trace->step) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Make(m));
+  PetscCall(PetscMalloc1(trace->n_listed, &trace->step));
+  PetscCall(PetscArraycpy(trace->step, trace->history.step, trace->n_listed));
+  ierr = HycoReplayBegin(m, m->probe->fe, &r);
+  if (!ierr) ierr = March(m->probe, &r);
+  PetscCall(HycoReplayEnd(&r));
+  if (ierr) PetscCall(PetscFree(trace->step));
+  PetscCall(ierr);
+  trace->history.step = trace->step;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
+{
+  PetscFunctionBegin;
   if (!m->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!m->probe) {
-    PetscCall(HycoROMLoadWhole(m));
-    PetscCall(PetscNew(&m->probe));
-    ierr = Fill(m, m->probe);
-    if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
-    PetscCall(ierr);
+  if (m->trace.n_listed) {
+    PetscCall(HycoROMMeasurePath(m));
+    CollectPath(m, out);
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  p = m->probe;
-  PetscCall(m->trace.n_listed ? FollowPath(m, p) : Follow(m, p));
-  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, value));
+  PetscCall(Make(m));
+  PetscCall(Follow(m, m->probe));
+  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, m->probe->fe, m->probe->u, m->probe->sigma, m->probe->reaction,
+                                  out->quantity));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -197,6 +197,7 @@ PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
   PetscCall(PetscMalloc1(m->mesh->n_cells, &each));
   PetscCall(HycoFEEnergy(m->fe, m->U, each));
   for (PetscInt e = 0; e < m->mesh->n_cells; e++) *energy += each[e];
+  *energy += HycoSpringsEnergy(m->fe, m->U);
   PetscCall(PetscFree(each));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -278,7 +279,7 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   p->u_norm2 = PetscSqrtReal(p->u_norm2);
   PetscCall(MeasureContacts(m, p));
   PetscCall(HycoTrustEstimate(m, p));
-  PetscCall(HycoROMMeasureQuantities(m, p->quantity));
+  PetscCall(HycoROMMeasureQuantities(m, p));
   *out = *p;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
