@@ -71,6 +71,7 @@ static PetscErrorCode TestByHand(void)
 {
   const PetscReal eye[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, b[3] = {2, -3, 0.5}, zero[3] = {0, 0, 0};
   const PetscReal twice[6] = {1, 1, 0, 1, 1, 0}, nothing[6] = {0, 0, 0, 1, 0, 0};
+  const PetscReal alike[6] = {1, 1, 1, 1 + 1e-12, 1 + 1e-12, 1 + 1e-12}, sum[3] = {1, 1, 1};
   PetscReal x[3], residual, norm;
 
   PetscFunctionBegin;
@@ -83,6 +84,9 @@ static PetscErrorCode TestByHand(void)
   CHECK_NEAR(x[0] + x[1] + x[2] + residual, 0, 0);
   PetscCall(CheckKKT(3, 2, twice, b, &norm)); /* both columns push the same way: |r|^2 with x = 0 is best */
   CHECK_NEAR(norm, sqrt(4 + 9 + 0.25), 1e-14);
+  PetscCall(HycoNNLS(3, 2, alike, sum, x, NULL)); /* round-off does not choose between columns that are alike */
+  CHECK_NEAR(x[0], 1, 1e-9);
+  CHECK_NEAR(x[1], 0, 0);
   PetscCall(CheckKKT(3, 2, nothing, b, &norm));
   CHECK_NEAR(norm, sqrt(9 + 0.25), 1e-14);
   PetscFunctionReturn(PETSC_SUCCESS);
