@@ -49,6 +49,22 @@ typedef struct {
   PetscReal pressure; /* the largest of L_i over the area that contact i stands for; 0 where the group is no surface */
 } HycoContactResult;
 
+/* What acts on the bodies: the supports of a group and the springs of a group, which hold them; all loads; all contacts
+   (between bodies they add up to nothing). */
+typedef enum {
+  HYCO_REACTION_SUPPORT,
+  HYCO_REACTION_SPRING,
+  HYCO_REACTION_LOADS,
+  HYCO_REACTION_CONTACT
+} HycoReactionKind;
+typedef struct {
+  HycoReactionKind kind;
+  const char *group;  /* of supports and springs; an unknown that two groups fix counts with the first. Borrowed */
+  PetscReal force[3]; /* on the bodies; in an axisymmetric scene without the radius's component */
+  PetscReal
+      moment[3]; /* about the origin, at the moved nodes; 2D: the last component alone; 0 in an axisymmetric scene */
+} HycoReaction;
+
 /* A listed time of a history, and what it took to get there from the one before. Energies are since the first time. */
 typedef struct {
   PetscInt index; /* among the listed times */
@@ -119,6 +135,10 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM fom, HycoSummary *summary);
 /* What each contact of the scene carries in the last solution, in the scene's order. Collective. Borrowed until the
    next solve. */
 PetscErrorCode HycoFOMGetContacts(HycoFOM fom, PetscInt *n, const HycoContactResult *result[]);
+/* What holds and loads the bodies in the last solution: n results, those of supports and springs in the scene's order,
+   then the loads and the contacts. balance: the largest component of their sum over the sum of all nodal forces' sizes.
+   Collective. Borrowed until the next solve. */
+PetscErrorCode HycoFOMGetReactions(HycoFOM fom, PetscInt *n, const HycoReaction *result[], PetscReal *balance);
 /*
   The last solution on rank 0 (empty elsewhere), in the mesh file's order (ascending tags). Collective. Borrowed until
   the next solve:

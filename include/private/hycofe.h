@@ -22,6 +22,7 @@ const HycoElement *HycoElementGetFacet(HycoCellType type);
 
 typedef struct _n_HycoFE *HycoFE;
 typedef struct _n_HycoAssemblyMap *HycoAssemblyMap;
+typedef struct _n_HycoSprings *HycoSprings;
 
 /* What a uniform load gives to the nodes that carry it. */
 typedef struct {
@@ -76,6 +77,7 @@ struct _n_HycoFE {
   /* tangents at mu: those of cell e from tangent_start[e], tangent_size[body] reals for each of its points */
   PetscReal *tangent;
   PetscInt *tangent_start, *tangent_size;
+  HycoSprings springs; /* at mu; NULL: the scene has none */
 };
 
 /* Of a body's cells: whether their tangents are Lame's lambda and mu, or else n_sigma x n_sigma. */
@@ -136,7 +138,7 @@ PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
 /* "body B from moving along ..." for the combination of motions with these coefficients. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);
 
-/* Element stiffness of a cell, row major, nv * dim square, nodes outer, components inner. */
+/* Element stiffness of a cell and of the springs on it, row major, nv * dim square, nodes outer, components inner. */
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 
 /* An empty, preallocated AIJ matrix for K or a norm over the nodes `n_owned` from `first` of the distributed numbering.
@@ -148,6 +150,11 @@ PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K);
 /* F (12), with the lifting of the prescribed displacements: K u0 moved to the right, F_i = K_ii u0_i where fixed; and
    with what the thermal strains push, unless the scene has a history (HycoFEStep() has it in f_int). */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
+/* The loads at all of fe's unknowns (n_dof; a part has all of its own nodes'), fixed ones too, without lifting. */
+PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[]);
+/* The forces of supports on the fixed unknowns (r: n_dof, 0 at the others; right at the nodes that this process owns):
+   f_int less the loads, where no contact presses. f_int: NULL: K u. */
+PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[]);
 /* The norm matrix of H1: mass plus length^2 times gradient, fixed unknowns as in K. The length, of the whole mesh
    (HycoMeshLength()), keeps the norm the same in any unit; it is 1 in the paper's section 6. */
 PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
@@ -159,10 +166,19 @@ PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
 PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[]);
 /* What the body forces give to a cell's unknowns (f: nv x dim, added to). */
 PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal f[]);
-/* Elastic energy of each cell: 1/2 u^T K u without thermal strains. */
+/* Elastic energy of each cell: 1/2 u^T K u without thermal strains and springs. */
 PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[]);
 /* What the energy identity of a linear scene has beside F.u where there is thermal strain e, of each cell: the integral
    of e : C : (e - 2 eps(u)). */
 PetscErrorCode HycoFEHeatWork(HycoFE fe, const PetscReal u[], PetscReal work[]);
+
+/* Springs to the ground (springs.c), at fe's parameters: f += scale (-K u), what they do to the unknowns (n_dof; a part
+   has all of its own nodes'); their energy u^T K u / 2, of those that count on this process. */
+void HycoSpringsAddForces(HycoFE fe, PetscReal scale, const PetscReal u[], PetscReal f[]);
+PetscReal HycoSpringsEnergy(HycoFE fe, const PetscReal u[]);
+/* Each that counts on this process: its number in the scene, its n nodes, its matrix (n dim square, row major). */
+typedef PetscErrorCode (*HycoSpringVisit)(HycoFE fe, PetscInt spring, PetscInt n, const PetscInt node[],
+                                          const PetscReal K[], void *ctx);
+PetscErrorCode HycoSpringsVisit(HycoFE fe, HycoSpringVisit visit, void *ctx);
 
 #endif

@@ -10,12 +10,16 @@ typedef struct {
   HycoPlace place;     /* of a mesh that one process has, a surface's nodes are its nodes */
   PetscInt components; /* 1, 3 (vector) or 6 (symmetric tensor xx, xy, xz, yy, yz, zz) */
   const PetscReal *data;
+  PetscReal missing; /* of a surface: at the nodes off it */
 } HycoField;
 
 /* Writes `components` numbers, of type MPIU_REAL or MPIU_INT, of each node or cell in the file's order, as a set of
    cols columns. Collective with an order; without one this process has all n of them. */
 PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
                               MPI_Datatype type, PetscInt components, PetscInt cols, const void *value);
+/* The same of a field's data; n nodes or cells. */
+PetscErrorCode HycoFieldWriteData(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[],
+                                  const HycoField *field);
 
 /* Contact results by slave node. */
 typedef struct {
@@ -56,9 +60,10 @@ PetscErrorCode HycoFieldsCheckPath(const char path[]);
 /*
   Writes `path` (must end in .xdmf) and the .h5 beside it: displacement, of each cell stress, von Mises stress,
   principal stresses and body, contact force (vector on slaves, minus on masters), contact pressure, gap at the
-  solution, RID marker (may be NULL: none written), and in the .h5 the parameters and the contact table. u on fe,
-  u_surface on the mesh of the pairs: with an order, of parts of a mesh, they are the part's and rank 0's (elsewhere
-  `surface` is NULL), and the call is collective; NULL: this process has all.
+  solution (NaN at nodes without a contact, or whose contact faces nothing), RID marker (may be NULL: none written), and
+  in the .h5 the parameters and the contact table. u on fe, u_surface on the mesh of the pairs: with an order, of parts
+  of a mesh, they are the part's and rank 0's (elsewhere `surface` is NULL), and the call is collective; NULL: this
+  process has all.
 */
 PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
                                  HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],

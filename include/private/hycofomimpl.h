@@ -38,6 +38,7 @@ struct _p_HycoFOM {
      released; stresses of the part's cells, when asked for; on rank 0 the forces and gaps */
   PetscReal *u, *u_surface, *sigma, *lambda, *gap;
   HycoContactResult *contact_result; /* by contact of the scene, when asked for */
+  HycoReaction *reaction;            /* HycoFOMGetReactions() */
   PetscReal *u_all, *sigma_all;      /* on rank 0 when asked for, in the file's order; on one rank u and sigma */
   PetscBool solved, sigma_ready, all_ready;
   /* U under given forces: its factor of K; residuals of the whole of (16); whether the last solution is one */
@@ -76,6 +77,8 @@ PetscErrorCode HycoFOMToLocal(HycoFOM fom, Vec v, PetscReal value[]);
 PetscErrorCode HycoFOMToSurface(HycoFOM fom, Vec v, PetscReal value[]);
 /* The stresses of the last solution in sigma. Collective. */
 PetscErrorCode HycoFOMStress(HycoFOM fom);
+/* The scene's quantities of the last solution (value[scene->n_quantities]). Collective. */
+PetscErrorCode HycoFOMMeasureQuantities(HycoFOM fom, PetscReal value[]);
 /* The file's order, spread over the ranks; NULL on one. Borrowed. Collective. */
 PetscErrorCode HycoFOMGetRows(HycoFOM fom, const HycoFileOrder **rows);
 /* Values of the part's nodes or cells, so many of a type each, as this rank's rows in the file's order. Collective. */
@@ -96,6 +99,9 @@ PetscErrorCode HycoFOMTakeOutReleased(HycoFOM fom, Vec u);
 PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
 /* Attaches the rigid motions that contact alone holds to K. Collective. */
 PetscErrorCode HycoFOMSetMotions(HycoFOM fom);
+/* The forces of supports in the last solution, at the part's unknowns (its own nodes'), 0 where nothing is fixed.
+   Collective. */
+PetscErrorCode HycoFOMReactions(HycoFOM fom, PetscReal r[]);
 /* Generalised forces F - B^T Lambda of the last solution at the part's nodes, zero on fixed unknowns. Collective. */
 PetscErrorCode HycoFOMGetForces(HycoFOM fom, PetscReal forces[]);
 /* Fills strain_energy, external_work, gap_work and energy_defect from the last solution. Collective. */

@@ -52,6 +52,8 @@ PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name
   With s_m = (s0 + s1) / 2 at each point, work = integral of s_m : (eps1 - eps0), and as an identity
 
       work = (stored at the end) - (stored at the begin) + dissipated + thermal + moduli
+
+  without springs, whose energy `stored` and `potential` have, and whose forces are in f_int.
 */
 typedef struct {
   PetscReal dt_factor;  /* what the laws would multiply the step by: 1, or less */

@@ -31,6 +31,14 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[]);
 /* Room for temperatures and thermal strains; fills them at fe's nodes and mu where what changed reaches them. */
 PetscErrorCode HycoHeatCreate(HycoFE fe);
 PetscErrorCode HycoFESetHeat(HycoFE fe, PetscBool all, const PetscBool changed[]);
+/* Finds the springs of fe's mesh; their matrices at fe's nodes and mu; those of a cell, added to its stiffness. The
+   first and the last are NULL-safe. */
+PetscErrorCode HycoSpringsCreate(HycoFE fe);
+PetscErrorCode HycoSpringsSet(HycoFE fe);
+void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
+/* Takes the cells from fe->constant whose springs change with the parameters p with changed[p]. */
+void HycoSpringsMarkVarying(HycoFE fe, const PetscBool changed[]);
+PetscErrorCode HycoSpringsDestroy(HycoSprings *springs);
 /* Room for the tangents. */
 PetscErrorCode HycoTangentsCreate(HycoFE fe);
 /* The tangents at fe's nodes and mu; all: of cells that no parameter reaches too. */

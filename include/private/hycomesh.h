@@ -85,6 +85,9 @@ static inline PetscInt HycoMeshOwned(HycoMesh m, PetscInt node)
 
 /* The number of a facet in its cell. */
 PetscInt HycoMeshFacetNumber(HycoMesh mesh, PetscInt facet);
+/* The segments of a group of dimension 1 in space, n x 2 nodes: the edges of cells between nodes of the group. Fails
+   where they branch. The caller frees them. */
+PetscErrorCode HycoMeshLine(HycoMesh mesh, PetscInt group, PetscInt *n, PetscInt **segment);
 /* Cells around each node: CSR start[n_nodes + 1], cell[]. The caller frees both. */
 PetscErrorCode HycoMeshNodeCells(HycoMesh mesh, PetscInt **start, PetscInt **cell);
 

@@ -5,10 +5,10 @@
 #include <hycofe.h>
 
 /* value[scene->n_quantities] of displacements u (n_dof) and cell stresses sigma (n_cells x n_sigma) on fe's mesh, or on
-   the parts of it that the processes have. Fails where a group is empty, and for a component that the mesh does not
-   have. Collective. */
+   the parts of it that the processes have; reaction: n_dof, the supports' forces, where HycoSceneHasReactions(). Fails
+   where a group is empty, and for a component that the mesh does not have. Collective. */
 PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u[], const PetscReal sigma[],
-                                     PetscReal value[]);
+                                     const PetscReal reaction[], PetscReal value[]);
 /* Marks the cells (n_cells) that the scene's quantities need. */
 PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh mesh, PetscBool needed[]);
 

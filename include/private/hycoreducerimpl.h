@@ -13,6 +13,7 @@ enum {
   HYCO_SEED_FORCE,
   HYCO_SEED_DUAL,
   HYCO_SEED_INELASTIC, /* of scenes with a history */
+  HYCO_SEED_SPRING,    /* of scenes with springs: forces, too */
   HYCO_N_SEEDS
 };
 

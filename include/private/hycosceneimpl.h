@@ -66,6 +66,7 @@ typedef struct {
   PetscBool element; /* whether the scene says so; if not, HycoFE chooses by the law */
   HycoExpr map[3];   /* moved coordinates; NULL: not moved */
   HycoExpr force[3]; /* body force per unit volume; NULL: none */
+  HycoExpr density;  /* mass per unit volume, of gravity and rotation; NULL: none */
   HycoExpr temperature, reference, expansion; /* K; thermal strain expansion (temperature - reference); NULL: none */
 } HycoBody;
 
@@ -80,18 +81,36 @@ typedef struct {
   HycoExpr traction[3]; /* force per unit surface; NULL: none */
 } HycoLoad;
 
+/* Forces on each point of a group of points, per unit length of a group of lines in space. */
+typedef struct {
+  char *group;
+  HycoExpr force[3]; /* NULL: none */
+} HycoPointLoad;
+
+/* Accelerations of the whole scene: gravity; angular speed about an axis through a point. NULL: none. */
+typedef struct {
+  HycoExpr gravity[3], speed, axis[3], through[3];
+} HycoMotion;
+
+/* Springs to the ground: force per displacement and unit surface; of a group of points, per point. */
+typedef struct {
+  char *group;
+  HycoExpr stiffness[4]; /* along x, y, z and the surface's normal, 0 or more; NULL: none */
+} HycoSpring;
+
 /* What a 2D scene stands for: a slice of thickness 1 that does not stretch (eps_zz = 0) or is free to (sigma_zz = 0),
    or a body of revolution about x = 0: x is the radius, y the axis, zz the hoop; all integrals are over the full
    circle. */
 typedef enum { HYCO_PLANE_STRAIN, HYCO_PLANE_STRESS, HYCO_AXISYMMETRIC } HycoFormulation;
 
-/* A number that the scene asks of each solution: the largest, smallest or mean value of a field over a group. */
-typedef enum { HYCO_QUANTITY_MAX, HYCO_QUANTITY_MIN, HYCO_QUANTITY_MEAN } HycoQuantityKind;
+/* A number that the scene asks of each solution: the largest, smallest or mean value of a field over a group; the force
+   of its supports along an axis. */
+typedef enum { HYCO_QUANTITY_MAX, HYCO_QUANTITY_MIN, HYCO_QUANTITY_MEAN, HYCO_QUANTITY_REACTION } HycoQuantityKind;
 typedef struct {
   char *name, *group; /* group NULL: all of the mesh */
   PetscBool given;    /* the kind and the field are */
   HycoQuantityKind kind;
-  PetscInt field; /* of HycoQuantityFields */
+  PetscInt field; /* of HycoQuantityFields; of a reaction 0 to 2 */
 } HycoQuantity;
 extern const char *const HycoQuantityFields[]; /* NULL ends */
 
@@ -122,10 +141,13 @@ struct _p_HycoScene {
   /* names that stand for expressions; the texts are the entries' */
   PetscInt n_constants, *constant;
   /* description */
-  PetscInt n_bodies, n_fixed, n_loads, n_contacts;
+  PetscInt n_bodies, n_fixed, n_loads, n_point_loads, n_springs, n_contacts;
   HycoBody *body;
   HycoFixed *fixed;
   HycoLoad *load;
+  HycoPointLoad *point_load;
+  HycoMotion motion;
+  HycoSpring *spring;
   HycoContact *contact;
   PetscInt n_quantities;
   HycoQuantity *quantity;
@@ -138,9 +160,17 @@ struct _p_HycoScene {
 PetscErrorCode HycoSceneReadConstants(HycoScene scene);
 /* The expression of an entry, with the scene's constants put in. */
 PetscErrorCode HycoSceneExpression(HycoScene scene, const char key[], const char text[], HycoExpr *expr);
+/* Reads an entry of gravity or rotation; checks them. */
+PetscErrorCode HycoSceneReadMotion(HycoScene scene, PetscInt entry);
+PetscErrorCode HycoSceneCheckMotion(HycoScene scene);
+/* Whether a body's mass makes a force, which changes with the parameters p with changed[p] (NULL: whether there is). */
+PetscBool HycoSceneHasInertia(HycoScene scene, const HycoBody *body, const PetscBool changed[]);
+PetscErrorCode HycoSceneDestroyMotion(HycoScene scene);
 /* Reads an entry output_NAME_...; checks all of them. */
 PetscErrorCode HycoSceneReadQuantity(HycoScene scene, PetscInt entry, const char name[], PetscInt field);
 PetscErrorCode HycoSceneCheckQuantities(HycoScene scene);
+/* Whether one of them is a reaction. */
+PetscBool HycoSceneHasReactions(HycoScene scene);
 /* Reads the history's entries, once the parameters are read. */
 PetscErrorCode HycoSceneReadHistory(HycoScene scene);
 /* Fails where the history reaches what must not change in time: the bodies' places, the rows of B. */

@@ -214,6 +214,7 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
     PetscCall(DriverGet("output", "<file.xdmf> fields for ParaView; the numbers in the .h5 beside it", output));
   if (report) PetscCall(DriverGet("report", "<file.json> the result as one JSON object", report));
   if (table) PetscCall(DriverGet("table", "<file.csv> a line per point", table));
+  if (report) PetscCall(DriverReadQuiet());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -258,7 +259,7 @@ PetscErrorCode DriverHelp(const Command *command)
   printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "
          "-hyco_primal_..., -hyco_tao_monitor, -hyco_pod_svd_view.\n");
   printf("Exit status: 0 done; 1 an error, in one line; 3 a model is written, but it misses a target or the default "
-         "bar.\n");
+         "bar; 130 a training was interrupted (Ctrl-C), and goes on with the same command.\n");
   printf("Under MPI: mpiexec -n 2 hyco ...; set OPENBLAS_NUM_THREADS=1.\n");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

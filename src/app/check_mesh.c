@@ -196,6 +196,8 @@ static PetscErrorCode MarkUsed(HycoScene s, HycoMesh m, PetscBool used[])
   for (PetscInt k = 0; k < s->n_bodies; k++) PetscCall(Use(m, "body", s->body[k].name, used));
   for (PetscInt k = 0; k < s->n_fixed; k++) PetscCall(Use(m, "fixed", s->fixed[k].group, used));
   for (PetscInt k = 0; k < s->n_loads; k++) PetscCall(Use(m, "load", s->load[k].group, used));
+  for (PetscInt k = 0; k < s->n_point_loads; k++) PetscCall(Use(m, "force", s->point_load[k].group, used));
+  for (PetscInt k = 0; k < s->n_springs; k++) PetscCall(Use(m, "spring", s->spring[k].group, used));
   for (PetscInt k = 0; k < s->n_contacts; k++) {
     for (PetscInt j = 0; j < s->contact[k]->entries.n; j++) {
       const HycoEntry *entry = &s->contact[k]->entries.entry[j];

@@ -185,11 +185,14 @@ static void FindReach(HycoScene s, PetscInt p, PetscBool does[N_REACHED])
   for (PetscInt k = 0; k < s->n_loads; k++)
     does[LOADS] = (PetscBool)(does[LOADS] || HycoExprChanges(s->load[k].pressure, changed) ||
                               AnyChanges(s->load[k].traction, changed));
+  for (PetscInt k = 0; k < s->n_point_loads; k++)
+    does[LOADS] = (PetscBool)(does[LOADS] || AnyChanges(s->point_load[k].force, changed));
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     const HycoMaterial law = s->body[b].law;
     HycoExpr const heat[3] = {s->body[b].temperature, s->body[b].reference, s->body[b].expansion};
 
-    does[LOADS] = (PetscBool)(does[LOADS] || AnyChanges(s->body[b].force, changed));
+    does[LOADS] = (PetscBool)(does[LOADS] || AnyChanges(s->body[b].force, changed) ||
+                              HycoSceneHasInertia(s, &s->body[b], changed));
     does[TEMPERATURES] = (PetscBool)(does[TEMPERATURES] || AnyChanges(heat, changed));
     for (PetscInt j = 0; j < law->constants.n && !c.stiffness; j++)
       does[LAWS] = (PetscBool)(does[LAWS] || HycoExprChanges(law->constants.entry[j].expr, changed));

@@ -44,6 +44,33 @@ static PetscErrorCode SayContacts(cJSON *json, HycoFOM fom, PetscInt dim)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What holds the bodies, and how far all forces are from balance. */
+static PetscErrorCode SayReactions(cJSON *json, HycoFOM fom, PetscInt dim)
+{
+  static const char *const section[] = {"supports", "springs", "loads", "contact"};
+  const HycoReaction *r;
+  PetscReal balance = 0;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetReactions(fom, &n, &r, &balance));
+  for (PetscInt k = 0; k < n; k++) {
+    cJSON *one = cJSON_GetObjectItem(json, section[r[k].kind]);
+
+    if (!one) one = cJSON_AddObjectToObject(json, section[r[k].kind]);
+    if (r[k].group[0]) one = cJSON_AddObjectToObject(one, r[k].group);
+    ReportVector(one, "force", dim, r[k].force);
+    if (dim == 2) ReportVector(one, "moment", 1, r[k].moment + 2);
+    if (dim == 3) ReportVector(one, "moment", 3, r[k].moment);
+    if (r[k].group[0])
+      PetscCall(Say("%s %s: force on the bodies (%.6g, %.6g, %.6g)\n",
+                    r[k].kind == HYCO_REACTION_SPRING ? "springs" : "support", r[k].group, (double)r[k].force[0],
+                    (double)r[k].force[1], (double)r[k].force[2]));
+  }
+  cJSON_AddNumberToObject(json, "balance", balance);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom, const HycoSummary *s)
 {
   cJSON *json;
@@ -89,6 +116,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
                 (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
                 (double)s->energy_defect));
   PetscCall(SayContacts(json, fom, s->dim));
+  PetscCall(SayReactions(json, fom, s->dim));
   PetscCall(ReportQuantities(json, scene, s->quantity));
   PetscCall(
       Say("KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",

@@ -156,6 +156,7 @@ PetscErrorCode CommandTrain(void)
   PetscBool given, chooses, greedy;
   PetscInt n;
   char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
+  char folder[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
   PetscCall(DriverReadFiles(path, model, NULL, report, NULL));
@@ -178,6 +179,8 @@ PetscErrorCode CommandTrain(void)
   HycoCheck(given || greedy || chooses,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoReducerSetProgress(reducer, DriverProgress, word));
+  PetscCall(DriverSnapshotFolder(model, folder));
+  PetscCall(DriverCatchInterrupt(folder));
   PetscCall(HycoReducerSetValidation(reducer, validation));
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
   PetscCall(DriverSetSearch(&search, scene, reducer, n));

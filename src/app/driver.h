@@ -134,14 +134,21 @@ PetscErrorCode DriverWriteText(const char path[], const char text[]);
 PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, const PetscReal mu[],
                                 PetscInt n_columns, const char *const names[], const PetscReal value[]);
 
+/* Where train keeps its solutions, with a model of this name. */
+PetscErrorCode DriverSnapshotFolder(const char model[], char folder[PETSC_MAX_PATH_LEN]);
+
 /* -- progress.c -- */
 
 /* Prints on rank 0. */
 PetscErrorCode Say(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 /* A share in percent: "0.12 %", "120 %". */
 void DriverPercent(PetscReal share, char text[32]);
-/* A HycoProgress: a bar that moves on a terminal, a line now and then elsewhere. ctx: a word for what is done. */
+/* A HycoProgress: a bar that moves on a terminal, a line a minute elsewhere. ctx: a word for what is done. */
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx);
+/* -quiet: from here on neither words nor progress; errors are told all the same. */
+PetscErrorCode DriverReadQuiet(void);
+/* Ctrl-C and termination end the run with 130 or 143 and one line, of where the solutions are that are kept. */
+PetscErrorCode DriverCatchInterrupt(const char folder[]);
 /* -hyco_monitor */
 PetscErrorCode DriverReadMonitor(PetscBool *monitor);
 /* A HycoMonitor. */

@@ -68,14 +68,21 @@ static PetscErrorCode AddFields(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode DriverSnapshotFolder(const char model[], char folder[PETSC_MAX_PATH_LEN])
+{
+  PetscFunctionBegin;
+  PetscCall(Peek("hyco_snapshots", folder));
+  if (!folder[0]) snprintf(folder, PETSC_MAX_PATH_LEN, "%.*s.snapshots", PETSC_MAX_PATH_LEN - 16, model);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Where train keeps its solutions: no file may have that name. */
 static PetscErrorCode AddSnapshots(const char model[])
 {
   char folder[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
-  PetscCall(Peek("hyco_snapshots", folder));
-  if (!folder[0]) snprintf(folder, sizeof(folder), "%.*s.snapshots", PETSC_MAX_PATH_LEN - 16, model);
+  PetscCall(DriverSnapshotFolder(model, folder));
   PetscCall(Take("the snapshot folder", folder, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

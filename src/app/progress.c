@@ -1,8 +1,56 @@
 /* What a person at the terminal sees while it runs. */
 #include "driver.h"
+#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
+
+static PetscBool quiet = PETSC_FALSE;
+
+PetscErrorCode DriverReadQuiet(void)
+{
+  PetscFunctionBegin;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(HycoOptionsFlag("-quiet", "say nothing but errors; results are in -report and -table", &quiet));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What an interrupted training says: made while it runs, for a signal's handler may write and do little else. */
+static char kept_in[PETSC_MAX_PATH_LEN], last_words[2][PETSC_MAX_PATH_LEN + 256];
+static const char *volatile words;
+static volatile sig_atomic_t speaks;
+
+static void SetLastWords(const char what[])
+{
+  static int next;
+
+  next = !next;
+  snprintf(last_words[next], sizeof(last_words[next]),
+           "\nhyco: interrupted; %s solutions in %s are kept: the same command goes on from there\n", what, kept_in);
+  words = last_words[next];
+}
+
+static void Interrupted(int number)
+{
+  if (speaks && words) (void)!write(STDERR_FILENO, words, strlen(words));
+  _exit(128 + number);
+}
+
+PetscErrorCode DriverCatchInterrupt(const char folder[])
+{
+  PetscMPIInt rank;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  speaks = rank == 0;
+  PetscCall(PetscStrncpy(kept_in, folder, sizeof(kept_in)));
+  SetLastWords("the");
+  signal(SIGINT, Interrupted);
+  signal(SIGTERM, Interrupted);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 PetscErrorCode Say(const char format[], ...)
 {
@@ -11,7 +59,7 @@ PetscErrorCode Say(const char format[], ...)
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (rank == 0) {
+  if (rank == 0 && !quiet) {
     va_start(args, format);
     vfprintf(stdout, format, args);
     va_end(args);
@@ -34,17 +82,20 @@ PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
   const PetscReal now = HycoNow();
   const int terminal = isatty(STDERR_FILENO);
   PetscReal left;
+  char share[64];
 
   PetscFunctionBegin;
+  snprintf(share, sizeof(share), "%d of %d", (int)done, (int)n);
+  if (kept_in[0]) SetLastWords(share);
   if (begin < 0 || done < first) {
     begin = last = now;
     first = done;
   }
   left = done > first ? (now - begin) / (done - first) * (n - done) : 0;
-  if (done == n || now - last > (terminal ? 0.2 : 10)) {
+  if (!quiet && (done == n || now - last > (terminal ? 0.2 : 60))) {
     last = now;
-    fprintf(stderr, "%s%s %d of %d, %.0f s left%s", terminal ? "\r\033[K" : "", (const char *)ctx, (int)done, (int)n,
-            (double)left, terminal && done < n ? "" : "\n");
+    fprintf(stderr, "%s%s %s, %.0f s left%s", terminal ? "\r\033[K" : "", (const char *)ctx, share, (double)left,
+            terminal && done < n ? "" : "\n");
     fflush(stderr);
   }
   if (done == n) begin = -1;

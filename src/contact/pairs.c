@@ -110,24 +110,6 @@ PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A node's row pivot in gap coordinates is its own: no node may be the slave of two contacts. */
-static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const HycoPairs *p)
-{
-  PetscInt *seen;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_nodes, &seen));
-  for (PetscInt i = 0; i < m->n_nodes; i++) seen[i] = -1;
-  for (PetscInt k = 0; k < p->n; k++) {
-    HycoCheck(seen[p->slave[k]] < 0, "node %d is a slave of the contacts %s and %s; a node may be the slave of one",
-              (int)m->node_id[p->slave[k]], scene->contact[seen[p->slave[k]]]->name,
-              scene->contact[p->contact[k]]->name);
-    seen[p->slave[k]] = p->contact[k];
-  }
-  PetscCall(PetscFree(seen));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Number of fixed components of each node. */
 static PetscErrorCode CountHeld(HycoScene scene, HycoMesh m, PetscInt held[])
 {
@@ -149,6 +131,28 @@ static PetscErrorCode CountHeld(HycoScene scene, HycoMesh m, PetscInt held[])
     for (PetscInt c = 0; c < m->dim; c++) held[i] += fixed[i * m->dim + c];
   }
   PetscCall(PetscFree(fixed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A node may be the slave of as many contacts as it has free displacements: more would leave their forces open. A rigid
+   tool's nodes have none, and their contacts act on the masters. */
+static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt held[], const HycoPairs *p)
+{
+  PetscInt *count, *first;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(m->n_nodes, &count, m->n_nodes, &first));
+  for (PetscInt k = 0; k < p->n; k++) {
+    const PetscInt i = p->slave[k], free = m->dim - held[i];
+
+    if (!count[i]++) first[i] = p->contact[k];
+    HycoCheck(!free || count[i] <= free,
+              "node %d is a slave of %d contacts, %s and %s among them, and has %d free displacement%s: their forces "
+              "would not be determined; take it from one",
+              (int)m->node_id[i], (int)count[i], scene->contact[first[i]]->name, scene->contact[p->contact[k]]->name,
+              (int)free, free == 1 ? "" : "s");
+  }
+  PetscCall(PetscFree2(count, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -186,9 +190,9 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
 
     ierr = c->ops->setup ? (*c->ops->setup)(c, fe, k, pairs) : AppendNodes(fe, k, held, pairs);
   }
+  if (!ierr) ierr = CheckSlaves(scene, fe->mesh, held, pairs);
   PetscCall(PetscFree(held));
   PetscCall(ierr);
-  PetscCall(CheckSlaves(scene, fe->mesh, pairs));
   PetscCall(HycoPairsMove(fe, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

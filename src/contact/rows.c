@@ -1,6 +1,7 @@
 /* B and D: normals, gaps and the rows of the potential contacts at the current parameters. */
 #include "facing.h"
 #include <hycokinematics.h>
+#include <hycovector.h>
 
 PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
 {
@@ -149,6 +150,59 @@ static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal 
   }
 }
 
+/* Of contacts with one slave node the normals must differ: parallel ones would share a force in no definite way.
+   before: the contact before k with k's slave, -1: none. */
+static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscInt before[],
+                                  const PetscReal normal[])
+{
+  const PetscInt slave = pairs->slave[k];
+  PetscReal base[3][3], rest[3] = {0, 0, 0}, size = 0;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt j = k; j >= 0; j = before[j], n++) { /* k's own last: Gram and Schmidt from the other end */
+    for (PetscInt c = 0; c < 3; c++)
+      base[n][c] = c < fe->dim && !fe->fixed[slave * fe->dim + c] ? normal[3 * j + c] : 0;
+  }
+  for (PetscInt a = n - 1; a >= 0; a--) {
+    PetscCall(PetscArraycpy(rest, base[a], 3));
+    size = HycoLength(rest);
+    for (PetscInt b = a + 1; b < n; b++) {
+      const PetscReal along = HycoDot(base[a], base[b]);
+
+      for (PetscInt c = 0; c < 3; c++) rest[c] -= along * base[b][c];
+    }
+    PetscCall(PetscArraycpy(base[a], rest, 3));
+    HycoNormalise(base[a]);
+  }
+  HycoCheck(!size || HycoLength(rest) > 1e-3 * size,
+            "node %d is a slave of the contacts %s and %s, whose normals there are parallel: their forces would not be "
+            "determined; take it from one",
+            (int)fe->mesh->node_id[slave], fe->scene->contact[pairs->contact[before[k]]]->name,
+            fe->scene->contact[pairs->contact[k]]->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckCorners(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[])
+{
+  PetscInt *last, *before;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(fe->mesh->n_nodes, &last, pairs->n, &before));
+  for (PetscInt i = 0; i < fe->mesh->n_nodes; i++) last[i] = -1;
+  for (PetscInt k = 0; k < pairs->n && !ierr; k++) {
+    before[k] = -1;
+    if (HycoPairsAlone(fe->scene, pairs, k)) continue;
+    before[k] = last[pairs->slave[k]];
+    last[pairs->slave[k]] = k;
+    if (before[k] >= 0) ierr = CheckCorner(fe, pairs, k, before, normal);
+  }
+  PetscCall(PetscFree2(last, before));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], PetscInt start[],
                            PetscInt dof[], PetscReal value[], PetscReal gap[])
 {
@@ -178,6 +232,7 @@ PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], Pe
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(3 * pairs->n, &normal));
   ierr = HycoContactGeometry(fe, pairs, normal, gap);
+  if (!ierr) ierr = CheckCorners(fe, pairs, normal);
   if (!ierr) ierr = Rows(fe, pairs, normal, start, dof, value, gap);
   PetscCall(PetscFree(normal));
   PetscCall(ierr);

@@ -8,6 +8,7 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscFunctionBegin;
   if (!*fe) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoAssemblyMapDestroy(&(*fe)->places));
+  PetscCall(HycoSpringsDestroy(&(*fe)->springs));
   for (PetscInt k = 0; k < (*fe)->n_loads; k++) {
     PetscCall(PetscFree((*fe)->shares[k].node));
     PetscCall(PetscFree((*fe)->shares[k].share));
@@ -54,8 +55,9 @@ static PetscErrorCode FindConstant(HycoFE fe)
     for (PetscInt a = 0; a < m->nv; a++) {
       if (moves[m->node_body[m->cells[e * m->nv + a]]]) fe->constant[e] = PETSC_FALSE;
     }
-    fe->n_constant += fe->constant[e];
   }
+  HycoSpringsMarkVarying(fe, every);
+  for (PetscInt e = 0; e < m->n_cells; e++) fe->n_constant += fe->constant[e];
   fe->fixed_constant = PETSC_TRUE;
   for (PetscInt k = 0; k < s->n_fixed; k++) {
     for (PetscInt c = 0; c < 3; c++) {
@@ -129,6 +131,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscCalloc1(mesh->n_cells, &f->constant));
   f->n_loads = scene->n_loads;
   PetscCall(PetscCalloc1(f->n_loads, &f->shares));
+  PetscCall(HycoSpringsCreate(f));
   PetscCall(FindConstant(f));
   PetscCall(HycoMirrorCreate(f));
   *fe = f;
@@ -260,6 +263,8 @@ HycoChanges HycoSceneChanges(HycoScene s, const PetscBool changed[])
   c.stiffness = c.rows = c.gaps = c.nodes;
   for (PetscInt b = 0; b < s->n_bodies; b++)
     c.stiffness = (PetscBool)(c.stiffness || HycoMaterialChanges(s->body[b].law, changed));
+  for (PetscInt k = 0; k < 4 * s->n_springs; k++)
+    c.stiffness = (PetscBool)(c.stiffness || HycoExprChanges(s->spring[k / 4].stiffness[k % 4], changed));
   for (PetscInt k = 0; k < s->n_contacts; k++) HycoContactChanges(s->contact[k], changed, &c.rows, &c.gaps);
   return c;
 }
@@ -300,6 +305,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
   if (fe->temperature) PetscCall(HycoFESetHeat(fe, (PetscBool)(first || c.nodes), changed));
   if (fe->stiffness_changed) PetscCall(HycoFESetTangents(fe, first));
+  if (fe->stiffness_changed) PetscCall(HycoSpringsSet(fe));
   fe->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,55 +1,83 @@
-/* F: body forces, pressures, tractions, thermal strains, and the lifting of prescribed displacements. */
-#include <hycokinematics.h>
+/* F: body forces, pressures, tractions, forces on points and lines, thermal strains, and the lifting of prescribed
+   displacements. */
+#include "inertia.h"
+#include <hycovector.h>
 #include <hycomaterialimpl.h>
 
-static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal value, Vec F)
+/* Where forces go: a vector in the distributed numbering, fixed unknowns left out; or all of fe's unknowns. */
+typedef struct {
+  Vec vec;
+  PetscReal *all; /* n_dof; NULL: the vector */
+} Into;
+
+static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal value, Into F)
 {
   const PetscInt global = fe->mesh->node_global ? fe->mesh->node_global[node] : node;
 
   PetscFunctionBegin;
-  if (!fe->fixed[node * fe->dim + c]) PetscCall(VecSetValue(F, global * fe->dim + c, value, ADD_VALUES));
+  if (F.all)
+    F.all[node * fe->dim + c] += value;
+  else if (!fe->fixed[node * fe->dim + c])
+    PetscCall(VecSetValue(F.vec, global * fe->dim + c, value, ADD_VALUES));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What the body forces at point q of a cell give to its unknowns, added to value. */
-static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, PetscReal value[])
+static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, const HycoAcceleration *motion,
+                                    PetscReal value[])
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
   const HycoBody *body = &fe->scene->body[m->cell_body[cell]];
-  PetscReal x[3], g[8][3], w, f;
+  PetscReal x[3], g[8][3], w, inertia[3];
 
   PetscFunctionBegin;
   PetscCall(HycoGradients(fe, el, cell, q, g, &w));
   HycoPointPlace(fe, el, cell, q, x);
+  PetscCall(HycoInertiaForce(fe, body, motion, x, inertia));
   for (PetscInt c = 0; c < m->dim; c++) {
-    if (!body->force[c]) continue;
-    PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
+    PetscReal f = 0;
+
+    if (!body->force[c] && inertia[c] == 0) continue;
+    if (body->force[c]) PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
+    f += inertia[c];
     for (PetscInt a = 0; a < m->nv; a++) value[a * m->dim + c] += w * f * el->N[q][a];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal value[])
+/* Whether any force acts on the volume of a body. */
+static PetscBool HasBodyForce(HycoFE fe, PetscInt cell)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
-  const PetscBool none = (PetscBool)(!body->force[0] && !body->force[1] && !body->force[2]);
+
+  return (PetscBool)(body->force[0] || body->force[1] || body->force[2] || HycoSceneHasInertia(fe->scene, body, NULL));
+}
+
+PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal value[])
+{
+  HycoAcceleration motion;
 
   PetscFunctionBegin;
-  for (PetscInt q = 0; q < HycoElementGet(fe->mesh->type)->nq && !none; q++)
-    PetscCall(AddPointForce(fe, cell, q, value));
+  if (!HasBodyForce(fe, cell)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoAccelerationSet(fe, &fe->scene->body[fe->mesh->cell_body[cell]], &motion));
+  for (PetscInt q = 0; q < HycoElementGet(fe->mesh->type)->nq; q++)
+    PetscCall(AddPointForce(fe, cell, q, &motion, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddBodyForces(HycoFE fe, PetscInt cell, Vec F)
+static PetscErrorCode AddBodyForces(HycoFE fe, PetscInt cell, Into F)
 {
   HycoMesh m = fe->mesh;
+  HycoAcceleration motion;
 
   PetscFunctionBegin;
+  if (!HasBodyForce(fe, cell)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoAccelerationSet(fe, &fe->scene->body[m->cell_body[cell]], &motion));
   for (PetscInt q = 0; q < HycoElementGet(m->type)->nq; q++) {
     PetscReal f[HYCO_MAX_CELL_DOFS] = {0};
 
-    PetscCall(AddPointForce(fe, cell, q, f));
+    PetscCall(AddPointForce(fe, cell, q, &motion, f));
     for (PetscInt k = 0; k < m->nv * m->dim; k++)
       PetscCall(AddNode(fe, m->cells[cell * m->nv + k / m->dim], k % m->dim, f[k], F));
   }
@@ -62,7 +90,7 @@ static PetscBool Acts(HycoFE fe, PetscInt facet)
   return (PetscBool)(fe->all_facets || fe->mesh->facet_cell[facet] >= 0);
 }
 
-static PetscErrorCode AddFacetLoad(HycoFE fe, const HycoLoad *load, PetscInt facet, Vec F)
+static PetscErrorCode AddFacetLoad(HycoFE fe, const HycoLoad *load, PetscInt facet, Into F)
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGetFacet(m->type);
@@ -129,7 +157,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
 }
 
 /* A load that is the same everywhere: its values times the nodes' shares of the surface. */
-static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt group, HycoLoadShares *s, Vec F)
+static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt group, HycoLoadShares *s, Into F)
 {
   PetscReal p = 0, t[3] = {0, 0, 0};
 
@@ -148,7 +176,7 @@ static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt g
 }
 
 /* Moves K u0 of one cell to the right-hand side. */
-static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Vec F)
+static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
 {
   HycoMesh m = fe->mesh;
   const PetscInt *node = m->cells + cell * m->nv, n = m->nv * m->dim;
@@ -166,7 +194,7 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Vec F)
     const PetscInt i = node[k / m->dim], c = k % m->dim, global = m->node_global ? m->node_global[i] : i;
 
     if (fe->fixed[i * m->dim + c]) {
-      PetscCall(VecSetValue(F, global * m->dim + c, Ke[k * n + k] * u0[k], ADD_VALUES));
+      PetscCall(VecSetValue(F.vec, global * m->dim + c, Ke[k * n + k] * u0[k], ADD_VALUES));
     } else {
       PetscReal sum = 0;
 
@@ -198,7 +226,8 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Vec F)
+/* What the thermal strains of a cell push: the sum of w B^T C eps. */
+static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Into F)
 {
   HycoMesh m = fe->mesh;
   PetscReal f[HYCO_MAX_CELL_DOFS] = {0};
@@ -210,7 +239,60 @@ static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddForces(HycoFE fe, Vec F)
+/* The force per unit length along a segment, by two Gauss points. */
+static PetscErrorCode AddSegment(HycoFE fe, const HycoPointLoad *load, const PetscInt node[2], Into F)
+{
+  const HycoElement *el = HycoElementGet(HYCO_LINE2);
+  const PetscReal *a = fe->X + 3 * node[0], *b = fe->X + 3 * node[1], length = HycoDistance(a, b);
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal x[3], f;
+
+    for (PetscInt c = 0; c < 3; c++) x[c] = el->N[q][0] * a[c] + el->N[q][1] * b[c];
+    for (PetscInt c = 0; c < 3; c++) {
+      if (!load->force[c]) continue;
+      PetscCall(HycoExprEval(load->force[c], fe->mu, 1, x, &f));
+      for (PetscInt e = 0; e < 2; e++) PetscCall(AddNode(fe, node[e], c, f * el->N[q][e] * length / 2, F));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces on points and along lines in space. */
+static PetscErrorCode AddPointLoad(HycoFE fe, const HycoPointLoad *load, Into F)
+{
+  HycoMesh m = fe->mesh;
+  PetscInt g = 0, n, *segment;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, "force", load->group, &g));
+  if (m->group_dim[g] == 0) {
+    for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
+      const PetscInt i = m->group_node[k];
+
+      for (PetscInt c = 0; c < m->dim; c++) {
+        PetscReal f;
+
+        if (!load->force[c]) continue;
+        PetscCall(HycoExprEval(load->force[c], fe->mu, 1, fe->X + 3 * i, &f));
+        PetscCall(AddNode(fe, i, c, f, F));
+      }
+    }
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoMeshLine(m, g, &n, &segment));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscErrorCode ierr = AddSegment(fe, load, segment + 2 * k, F);
+
+    if (ierr) PetscCall(PetscFree(segment));
+    PetscCall(ierr);
+  }
+  PetscCall(PetscFree(segment));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddForces(HycoFE fe, Into F)
 {
   HycoMesh m = fe->mesh;
   const PetscBool hot = (PetscBool)(fe->thermal && !fe->scene->n_times);
@@ -219,8 +301,8 @@ static PetscErrorCode AddForces(HycoFE fe, Vec F)
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const HycoBody *body = &fe->scene->body[m->cell_body[e]];
 
-    if (body->force[0] || body->force[1] || body->force[2]) PetscCall(AddBodyForces(fe, e, F));
-    if (fe->lifted) PetscCall(AddLifting(fe, e, F));
+    PetscCall(AddBodyForces(fe, e, F));
+    if (fe->lifted && F.vec) PetscCall(AddLifting(fe, e, F));
     if (hot && body->expansion) PetscCall(AddHeat(fe, e, F));
   }
   for (PetscInt k = 0; k < fe->scene->n_loads; k++) {
@@ -235,6 +317,7 @@ static PetscErrorCode AddForces(HycoFE fe, Vec F)
       if (m->facet_group[f] == g && Acts(fe, f)) PetscCall(AddFacetLoad(fe, load, f, F));
     }
   }
+  for (PetscInt k = 0; k < fe->scene->n_point_loads; k++) PetscCall(AddPointLoad(fe, &fe->scene->point_load[k], F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -246,9 +329,40 @@ PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
   PetscFunctionBegin;
   PetscCall(VecSet(F, 0));
   PetscCall(VecSetOption(F, VEC_IGNORE_OFF_PROC_ENTRIES, PETSC_TRUE));
-  ierr = AddForces(fe, F);
+  ierr = AddForces(fe, (Into){F, NULL});
   PetscCall(VecAssemblyBegin(F));
   PetscCall(VecAssemblyEnd(F));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(f, fe->n_dof));
+  PetscCall(AddForces(fe, (Into){NULL, f}));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[])
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt n = m->nv * m->dim;
+  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+
+  PetscFunctionBegin;
+  PetscCall(HycoFELoads(fe, r));
+  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = (f_int ? f_int[k] : 0) - r[k];
+  for (PetscInt e = 0; e < m->n_cells && !f_int; e++) {
+    const PetscInt *node = m->cells + e * m->nv;
+    PetscBool holds = PETSC_FALSE;
+
+    for (PetscInt k = 0; k < n; k++) holds = (PetscBool)(holds || fe->fixed[node[k / m->dim] * m->dim + k % m->dim]);
+    if (!holds) continue;
+    PetscCall(HycoFEElementStiffness(fe, e, Ke));
+    for (PetscInt k = 0; k < n * n; k++)
+      r[node[k / n / m->dim] * m->dim + k / n % m->dim] += Ke[k] * u[node[k % n / m->dim] * m->dim + k % n % m->dim];
+  }
+  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? r[k] : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -406,6 +406,13 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
   ierr = StepAll(fe, bodies, &b);
   PetscCall(BatchDestroy(&b));
   PetscCall(ierr);
+  if (fe->springs && !report->failed) {
+    const PetscReal energy = HycoSpringsEnergy(fe, u);
+
+    HycoSpringsAddForces(fe, -1, u, f_int);
+    report->stored += energy;
+    report->potential += energy;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -147,6 +147,7 @@ PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   for (PetscInt r = 0; r < n; r++) {
     for (PetscInt t = 0; t < r / dim * dim; t++) Ke[r * n + t] = Ke[t * n + r];
   }
+  if (fe->springs) HycoSpringsAddStiffness(fe, cell, Ke);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -329,9 +329,43 @@ static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Springs hold a part like supports, however stiff they are. */
+typedef struct {
+  const PetscInt *part;
+  const Part *parts;
+  Sum *sum;
+} SpringGram;
+
+static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const PetscInt node[], const PetscReal K[],
+                                void *ctx)
+{
+  const SpringGram *g = (const SpringGram *)ctx;
+  const PetscInt size = n * fe->dim, which = g->part[node[0]];
+  const Part *p = &g->parts[which];
+  PetscReal row[12][6], most = 0;
+  PetscInt n_rigid = 0;
+
+  PetscFunctionBegin;
+  (void)spring;
+  for (PetscInt r = 0; r < size; r++) {
+    PetscReal x[3];
+
+    for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * node[r / fe->dim] + c] - p->centre[c]) / p->size;
+    n_rigid = RigidRow(fe->dim, x, r % fe->dim, row[r]);
+    most = PetscMax(most, K[r * size + r]);
+  }
+  for (PetscInt k = 0; k < size * size && most > 0; k++) {
+    for (PetscInt a = 0; a < n_rigid * n_rigid; a++)
+      Add(&g->sum[36 * which + a / n_rigid * 6 + a % n_rigid],
+          K[k] / most * row[k / size][a / n_rigid] * row[k % size][a % n_rigid]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Gram matrix of each part. */
 static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt n_parts, Part parts[])
 {
+  SpringGram ctx;
   Sum *sum;
 
   PetscFunctionBegin;
@@ -347,6 +381,8 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part
     n = RigidRow(fe->dim, x, k % fe->dim, row);
     for (PetscInt a = 0; a < n * n; a++) Add(&sum[36 * part[i] + a / n * 6 + a % n], row[a / n] * row[a % n]);
   }
+  ctx = (SpringGram){part, parts, sum};
+  PetscCall(HycoSpringsVisit(fe, AddSpring, &ctx));
   PetscCall(Total(comm, 36 * n_parts, sum));
   for (PetscInt k = 0; k < 36 * n_parts; k++) parts[k / 36].gram[k % 36 / 6][k % 6] = sum[k].high;
   for (PetscInt p = 0; p < n_parts && fe->formulation == HYCO_AXISYMMETRIC; p++) /* only along the axis is it rigid */

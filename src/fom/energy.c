@@ -65,10 +65,11 @@ static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
   PetscReal *each, *heat = NULL, one;
 
   PetscFunctionBegin;
-  *strain = *lifting = 0;
+  *lifting = 0;
   PetscCall(PetscMalloc1(f->part->n_cells, &each));
   PetscCall(VecGetArrayRead(f->U_local, &u));
   PetscCall(HycoFEEnergy(f->fe, u, each));
+  *strain = HycoSpringsEnergy(f->fe, u);
   if (f->fe->thermal) {
     PetscCall(PetscMalloc1(f->part->n_cells, &heat));
     PetscCall(HycoFEHeatWork(f->fe, u, heat));

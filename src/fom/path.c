@@ -3,7 +3,6 @@
   and the checkpoint.
 */
 #include <hycopath.h>
-#include <hycoquantities.h>
 
 PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
 {
@@ -286,10 +285,7 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(HycoFOMGather(f));
   f->solved = PETSC_TRUE;
   f->sigma_ready = f->all_ready = PETSC_FALSE;
-  if (f->scene->n_quantities) {
-    PetscCall(HycoFOMStress(f));
-    PetscCall(HycoQuantitiesMeasure(HycoComm(f), f->fe, f->u, f->sigma, s->quantity));
-  }
+  PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   p->steps[p->n_steps++] = *s;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscCall(HycoSeriesAdd(f));

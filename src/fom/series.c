@@ -43,13 +43,13 @@ static PetscErrorCode NoteField(HycoSeries s, const char name[], HycoPlace place
   if (s->n_fields == MOST_FIELDS) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrncpy(s->name[s->n_fields], name, sizeof(s->name[0])));
   *field = &s->field[s->n_fields];
-  **field = (HycoField){s->name[s->n_fields++], place, components, NULL};
+  **field = (HycoField){s->name[s->n_fields++], place, components, NULL, 0};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes a field of this time. */
-static PetscErrorCode AddField(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
-                               const PetscReal value[])
+/* Writes a field of this time; missing: at nodes off its surface. */
+static PetscErrorCode AddPartial(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
+                                 const PetscReal value[], PetscReal missing)
 {
   const HycoFileOrder *rows = s->from.rows;
   HycoField *field;
@@ -59,10 +59,19 @@ static PetscErrorCode AddField(HycoSeries s, const char name[], HycoPlace place,
   PetscCall(NoteField(s, name, place, components, &field));
   if (!field) PetscFunctionReturn(PETSC_SUCCESS);
   NameSet(field, s->n, set);
-  PetscCall(HycoFieldWrite(s->h, rows, CountItems(s, place), set, place, MPIU_REAL, components, components, value));
-  if (s->part)
-    PetscCall(
-        HycoFieldWrite(s->part, rows, CountItems(s, place), set, place, MPIU_REAL, components, components, value));
+  field->data = value;
+  field->missing = missing;
+  PetscCall(HycoFieldWriteData(s->h, rows, CountItems(s, place), set, field));
+  if (s->part) PetscCall(HycoFieldWriteData(s->part, rows, CountItems(s, place), set, field));
+  field->data = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddField(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
+                               const PetscReal value[])
+{
+  PetscFunctionBegin;
+  PetscCall(AddPartial(s, name, place, components, value, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -119,7 +128,7 @@ static PetscErrorCode AddContacts(HycoSeries s)
   ierr = HycoContactFieldsCreate(f->comm, f->fe_surface, f->pairs, f->u_surface, f->lambda, &c);
   if (!ierr) ierr = AddField(s, "contact_force", HYCO_ON_SURFACE, 3, c.force);
   if (!ierr) ierr = AddField(s, "contact_pressure", HYCO_ON_SURFACE, 1, c.pressure);
-  if (!ierr) ierr = AddField(s, "gap", HYCO_ON_SURFACE, 1, c.gap_node);
+  if (!ierr) ierr = AddPartial(s, "gap", HYCO_ON_SURFACE, 1, c.gap_node, NAN);
   PetscCall(HycoContactFieldsDestroy(&c));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

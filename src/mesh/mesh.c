@@ -63,6 +63,38 @@ static PetscErrorCode CheckComponents(HycoMesh mesh, HycoExpr component[3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Forces are on points, or on lines in space: on a surface they are a traction. */
+static PetscErrorCode CheckPointLoad(HycoMesh mesh, const HycoPointLoad *load)
+{
+  PetscInt group, dim;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(mesh, "force", load->group, &group));
+  dim = mesh->group_dim[group];
+  HycoCheck(dim < mesh->dim, "the force on %s: that group has cells, and is no body of the scene", load->group);
+  HycoCheck(!dim || dim < mesh->dim - 1,
+            "the force on %s: that group is a boundary; write traction: %s: {...} (force per unit %s)", load->group,
+            load->group, mesh->dim == 3 ? "area" : "length");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckSpring(HycoMesh mesh, const HycoSpring *spring)
+{
+  PetscInt group, dim;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(mesh, "spring", spring->group, &group));
+  dim = mesh->group_dim[group];
+  HycoCheck(!dim || dim == mesh->dim - 1,
+            "the spring on %s needs a group of points or of dimension %d; that group has "
+            "dimension %d",
+            spring->group, (int)mesh->dim - 1, (int)dim);
+  HycoCheck(dim == mesh->dim - 1 || !spring->stiffness[3],
+            "%s: the group %s is of points and has no normal; write x, y, z", HycoExprKey(spring->stiffness[3]),
+            spring->group);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
 {
   PetscInt group;
@@ -73,6 +105,9 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   for (PetscInt k = 0; k < scene->n_fixed; k++) PetscCall(CheckComponents(mesh, scene->fixed[k].value));
   for (PetscInt k = 0; k < scene->n_bodies; k++) PetscCall(CheckComponents(mesh, scene->body[k].force));
   for (PetscInt k = 0; k < scene->n_loads; k++) PetscCall(CheckComponents(mesh, scene->load[k].traction));
+  for (PetscInt k = 0; k < scene->n_point_loads; k++) PetscCall(CheckComponents(mesh, scene->point_load[k].force));
+  for (PetscInt k = 0; k < scene->n_springs; k++) PetscCall(CheckComponents(mesh, scene->spring[k].stiffness));
+  PetscCall(CheckComponents(mesh, scene->motion.gravity));
   for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(CheckComponents(mesh, scene->contact[k]->normal));
   for (PetscInt k = 0; k < scene->n_loads; k++) {
     PetscCall(HycoMeshFindGroup(mesh, scene->load[k].pressure ? "pressure" : "traction", scene->load[k].group, &group));
@@ -80,6 +115,8 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
               "the load on %s needs a group of dimension %d; that group has dimension %d", scene->load[k].group,
               (int)mesh->dim - 1, (int)mesh->group_dim[group]);
   }
+  for (PetscInt k = 0; k < scene->n_point_loads; k++) PetscCall(CheckPointLoad(mesh, &scene->point_load[k]));
+  for (PetscInt k = 0; k < scene->n_springs; k++) PetscCall(CheckSpring(mesh, &scene->spring[k]));
   for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(HycoContactCheckGroups(scene->contact[k], mesh));
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     if (scene->quantity[k].group) PetscCall(HycoMeshFindGroup(mesh, "output", scene->quantity[k].group, &group));

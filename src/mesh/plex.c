@@ -456,6 +456,10 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
     HycoCheck(strcmp(b->scene->load[k].group, m->group_name[group]),
               "the load on %s: a facet of it lies between two cells; give a group on the boundary",
               m->group_name[group]);
+  for (PetscInt k = 0; k < b->scene->n_springs && n > 1 && m->dim > 1; k++)
+    HycoCheck(strcmp(b->scene->spring[k].group, m->group_name[group]),
+              "the spring on %s: a facet of it lies between two cells; give a group on the boundary",
+              m->group_name[group]);
   if (n != 1) PetscFunctionReturn(PETSC_SUCCESS);
   cell = b->cell[support[0] - b->c0];
   PetscCall(DMPlexGetCone(b->dm, support[0], &cone));

@@ -256,7 +256,7 @@ static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A load pushes on a boundary, not between two cells. */
+/* A load pushes on a boundary, not between two cells, and a surface of springs holds one. */
 static PetscErrorCode CheckLoads(HycoScene scene, Reader *r)
 {
   PetscFunctionBegin;
@@ -264,6 +264,13 @@ static PetscErrorCode CheckLoads(HycoScene scene, Reader *r)
     for (PetscInt g = 0; g < r->n_groups; g++) {
       HycoCheck(!r->group[g].inner || strcmp(r->group[g].name, scene->load[k].group),
                 "the load on %s: %d of its facets lie between two cells; give a group on the boundary",
+                r->group[g].name, (int)r->group[g].inner);
+    }
+  }
+  for (PetscInt k = 0; k < scene->n_springs; k++) {
+    for (PetscInt g = 0; g < r->n_groups; g++) {
+      HycoCheck(!r->group[g].inner || !r->group[g].dim || strcmp(r->group[g].name, scene->spring[k].group),
+                "the spring on %s: %d of its facets lie between two cells; give a group on the boundary",
                 r->group[g].name, (int)r->group[g].inner);
     }
   }

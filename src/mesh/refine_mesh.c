@@ -73,6 +73,12 @@ static PetscBool IsNamed(HycoScene scene, const char group[])
   for (PetscInt k = 0; k < scene->n_fixed; k++) {
     if (!strcmp(scene->fixed[k].group, group)) return PETSC_TRUE;
   }
+  for (PetscInt k = 0; k < scene->n_point_loads; k++) {
+    if (!strcmp(scene->point_load[k].group, group)) return PETSC_TRUE;
+  }
+  for (PetscInt k = 0; k < scene->n_springs; k++) {
+    if (!strcmp(scene->spring[k].group, group)) return PETSC_TRUE;
+  }
   for (PetscInt k = 0; k < scene->n_contacts; k++) {
     const HycoContact c = scene->contact[k];
 

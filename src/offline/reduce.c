@@ -328,7 +328,7 @@ static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stresses (points are cells) or generalised forces (points are nodes), if they seed the RID. */
+/* Stresses (points are cells) or generalised forces, also those of springs (points are nodes), if they seed the RID. */
 static PetscErrorCode ReduceField(HycoReducer t, HycoSnapshots store, const char field[], PetscInt kind, PetscBool all)
 {
   Mat S;
@@ -586,6 +586,7 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t)
   PetscCall(TakeDisplacements(t));
   PetscCall(TakeField(t, HYCO_SEED_STRESS, n_sigma, &t->n_seeds_cell, &t->seeds_cell));
   PetscCall(TakeField(t, HYCO_SEED_FORCE, dim, &t->n_seeds_node, &t->seeds_node));
+  PetscCall(TakeField(t, HYCO_SEED_SPRING, dim, &t->n_seeds_node, &t->seeds_node));
   PetscCall(TakeField(t, HYCO_SEED_INELASTIC, 1, &t->n_seeds_cell, &t->seeds_cell));
   if (t->seed[HYCO_SEED_DUAL]) PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -619,6 +620,7 @@ PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool a
   PetscCall(ReduceDisplacements(t, store, all));
   PetscCall(ReduceField(t, store, "sigma", HYCO_SEED_STRESS, all));
   PetscCall(ReduceField(t, store, "force", HYCO_SEED_FORCE, all));
+  PetscCall(ReduceField(t, store, "spring", HYCO_SEED_SPRING, all));
   PetscCall(ReduceField(t, store, "inelastic", HYCO_SEED_INELASTIC, all));
   if (t->scene->n_times) HycoOnRoot(HycoComm(t), ReadTaken(t, store));
   PetscCall(ReduceForces(t, store));

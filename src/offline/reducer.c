@@ -62,6 +62,7 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   PetscCall(Create(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
+  (*reducer)->seed[HYCO_SEED_SPRING] = (PetscBool)(scene->n_springs > 0);
   for (PetscInt b = 0; b < scene->n_bodies && scene->n_times; b++) {
     if (!scene->body[b].law->linear) (*reducer)->seed[HYCO_SEED_INELASTIC] = PETSC_TRUE;
   }
@@ -274,7 +275,8 @@ static PetscErrorCode ReadTraining(HycoReducer t)
 /* -hyco_rid_modes */
 static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char ***list)
 {
-  static const char *const words[HYCO_N_SEEDS] = {"displacement", "stress", "force", "dual", "inelastic"};
+  static const char *const words[] = {"displacement", "stress", "force", "dual", "inelastic"};
+  const PetscInt n_words = HYCO_SEED_INELASTIC + 1;
   char wrong[HYCO_LINE] = "";
 
   PetscFunctionBegin;
@@ -282,13 +284,14 @@ static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char ***list)
   for (PetscInt i = 0; i < n; i++) {
     PetscInt k = 0;
 
-    while (k < HYCO_N_SEEDS && strcmp((*list)[i], words[k])) k++;
-    if (k < HYCO_N_SEEDS)
+    while (k < n_words && strcmp((*list)[i], words[k])) k++;
+    if (k < n_words)
       t->seed[k] = PETSC_TRUE;
     else
       PetscCall(PetscStrncpy(wrong, (*list)[i], sizeof(wrong)));
   }
   PetscCall(PetscStrArrayDestroy(list));
+  t->seed[HYCO_SEED_SPRING] = (PetscBool)(t->seed[HYCO_SEED_FORCE] && t->scene && t->scene->n_springs);
   HycoCheck(!wrong[0], "-hyco_rid_modes has \"%s\"; its words are displacement, stress, force, dual and inelastic",
             wrong);
   HycoCheck(!t->seed[HYCO_SEED_INELASTIC] || !t->scene || t->scene->n_times,
@@ -349,12 +352,13 @@ static PetscErrorCode ReadRID(HycoReducer t)
                               sizeof(region), NULL));
   PetscCall(HycoOptionsBool("-hyco_rid_whole", "take the whole mesh as the RID", &t->whole_rid,
                             &t->pinned[HYCO_CHOICE_WHOLE]));
-  PetscCall(HycoOptionsFor("hybrid"));
+  PetscCall(HycoOptionsFor("hybrid or cubature"));
   PetscCall(HycoOptionsWord("-hyco_hybrid",
                             "displacements kept full order: fewest for full row rank, all contact ones, all",
                             HycoHybrids, &hybrid, &t->pinned[HYCO_CHOICE_HYBRID]));
   PetscOptionsEnd();
   t->tol[HYCO_SEED_INELASTIC] = t->tol[HYCO_SEED_STRESS];
+  t->tol[HYCO_SEED_SPRING] = t->tol[HYCO_SEED_FORCE];
   t->hybrid = (HycoHybrid)hybrid;
   PetscCall(TakeRegion(t, region));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -94,6 +94,7 @@ static PetscErrorCode SetRecipe(HycoReducer t, const HycoRecipe *r)
     if (t->tol[k] == t->tol[HYCO_SEED_DISPLACEMENT]) t->tol[k] = r->pod_tol;
   }
   t->tol[HYCO_SEED_INELASTIC] = t->tol[HYCO_SEED_STRESS];
+  t->tol[HYCO_SEED_SPRING] = t->tol[HYCO_SEED_FORCE];
   t->tol[HYCO_SEED_DISPLACEMENT] = r->pod_tol;
   t->extension = r->contact_extension;
   t->layers = r->layers;

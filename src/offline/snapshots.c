@@ -204,6 +204,25 @@ static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The forces of springs, zero on fixed unknowns, where the scene has any. Collective. */
+static PetscErrorCode WriteSprings(HycoFOM fom, HycoH5 h, const char name[])
+{
+  const HycoFileOrder *rows;
+  PetscReal *force;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!fom->scene->n_springs) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFOMGetRows(fom, &rows));
+  PetscCall(PetscCalloc1(fom->fe->n_dof, &force));
+  HycoSpringsAddForces(fom->fe, 1, fom->u, force);
+  for (PetscInt k = 0; k < fom->fe->n_dof; k++) force[k] = fom->fe->fixed[k] ? 0 : force[k];
+  ierr = HycoFieldWrite(h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, fom->fe->dim, 1, force);
+  PetscCall(PetscFree(force));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[], const PetscReal force[])
 {
   const PetscInt dim = fom->fe->dim;
@@ -216,6 +235,7 @@ static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const 
   PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "U", HYCO_ON_NODES, MPIU_REAL, dim, 1, fom->u));
   PetscCall(HycoFieldWrite(h, rows, fom->n_cells, "sigma", HYCO_ON_CELLS, MPIU_REAL, fom->fe->n_sigma, 1, fom->sigma));
   PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "force", HYCO_ON_NODES, MPIU_REAL, dim, 1, force));
+  PetscCall(WriteSprings(fom, h, "spring"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -275,6 +295,7 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscCall(HycoFOMStress(fom));
   PetscCall(HycoFEStateFields(fom->fe, fom->path->begin, NULL, NULL, w->inelastic, NULL));
   PetscCall(HycoFOMToLocal(fom, fom->path->f_old, w->force));
+  HycoSpringsAddForces(fom->fe, 1, fom->u, w->force); /* theirs apart */
   for (PetscInt k = 0; k < fom->fe->n_dof; k++) w->force[k] = fom->fe->fixed[k] ? 0 : w->force[k];
   NameField(w->s, step->index, "lambda", name);
   HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, name, fom->n_contacts, 1, fom->lambda));
@@ -284,6 +305,8 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscCall(HycoFieldWrite(w->h, rows, fom->n_cells, name, HYCO_ON_CELLS, MPIU_REAL, fom->fe->n_sigma, 1, fom->sigma));
   NameField(w->s, step->index, "force", name);
   PetscCall(HycoFieldWrite(w->h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, dim, 1, w->force));
+  NameField(w->s, step->index, "spring", name);
+  PetscCall(WriteSprings(fom, w->h, name));
   NameField(w->s, step->index, "inelastic", name);
   PetscCall(HycoFieldWrite(w->h, rows, fom->n_cells, name, HYCO_ON_CELLS, MPIU_REAL, 1, 1, w->inelastic));
   PetscFunctionReturn(PETSC_SUCCESS);

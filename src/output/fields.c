@@ -22,8 +22,10 @@ static PetscInt Count(const HycoFileOrder *order, HycoMesh m, HycoPlace place)
   return order ? order->all[place] : place == HYCO_ON_CELLS ? m->n_cells : m->n_nodes;
 }
 
-PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
-                              MPI_Datatype type, PetscInt components, PetscInt cols, const void *value)
+/* missing: what rows get that no process has a value of. */
+static PetscErrorCode WriteRows(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
+                                MPI_Datatype type, PetscInt components, PetscInt cols, const void *value,
+                                PetscReal missing)
 {
   const PetscInt all = order ? order->all[place] : n, own = order ? order->n[place] : n,
                  first = order ? order->first[place] : 0, lines = components / cols;
@@ -34,12 +36,30 @@ PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, 
   PetscFunctionBegin;
   if (order) {
     PetscCall(PetscCalloc1((size_t)(own * components) * size, &rows));
+    for (PetscInt k = 0; missing != 0 && k < own * components; k++) ((PetscReal *)(void *)rows)[k] = missing;
     PetscCall(HycoFileOrderSend(order, place, type, components, value, rows));
     value = rows;
   }
   ierr = HycoH5WriteRows(h, name, type, all * lines, cols, first * lines, own * lines, value);
   PetscCall(PetscFree(rows));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
+                              MPI_Datatype type, PetscInt components, PetscInt cols, const void *value)
+{
+  PetscFunctionBegin;
+  PetscCall(WriteRows(h, order, n, name, place, type, components, cols, value, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldWriteData(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[],
+                                  const HycoField *field)
+{
+  PetscFunctionBegin;
+  PetscCall(WriteRows(h, order, n, name, field->place, MPIU_REAL, field->components, field->components, field->data,
+                      field->missing));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -102,8 +122,7 @@ static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder 
     char name[HYCO_LINE];
 
     PetscCall(PetscSNPrintf(name, sizeof(name), "%s/%s", FieldFolder(&field[k]), field[k].name));
-    PetscCall(HycoFieldWrite(h, order, Count(NULL, m, field[k].place), name, field[k].place, MPIU_REAL,
-                             field[k].components, field[k].components, field[k].data));
+    PetscCall(HycoFieldWriteData(h, order, Count(NULL, m, field[k].place), name, &field[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -292,6 +311,7 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
                                    HycoContactFields *f)
 {
   PetscFunctionBegin;
+  for (PetscInt i = 0; i < fe->mesh->n_nodes; i++) f->gap_node[i] = NAN;
   PetscCall(HycoContactGeometry(fe, pairs, f->normal, f->gap));
   PetscCall(HycoContactAreas(fe, pairs, f->area));
   for (PetscInt k = 0; k < pairs->n; k++) {
@@ -311,8 +331,10 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
         f->gap[k] += weight[j] * n * u[master[j] * fe->dim + c];
       }
     }
-    f->pressure[s] = f->area[k] > 0 ? lambda[k] / f->area[k] : 0;
-    f->gap_node[s] = f->gap[k];
+    /* of a node in several contacts the largest and the smallest */
+    if (f->area[k] > 0) f->pressure[s] = PetscMax(f->pressure[s], lambda[k] / f->area[k]);
+    if (HycoPairsAlone(fe->scene, pairs, k)) f->gap[k] = NAN;
+    if (!(f->gap_node[s] <= f->gap[k])) f->gap_node[s] = f->gap[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -357,15 +379,15 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
   ierr = HycoContactFieldsCreate(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
   if (!ierr) {
     const HycoContactTable table = {pairs->n, f.slave_id, lambda, f.gap};
-    const HycoField field[9] = {{"displacement", HYCO_ON_NODES, 3, u3},
-                                {"stress", HYCO_ON_CELLS, 6, tensor},
-                                {"mises", HYCO_ON_CELLS, 1, mises},
-                                {"principal_stress", HYCO_ON_CELLS, 3, principal},
-                                {"body", HYCO_ON_CELLS, 1, body},
-                                {"contact_force", HYCO_ON_SURFACE, 3, f.force},
-                                {"contact_pressure", HYCO_ON_SURFACE, 1, f.pressure},
-                                {"gap", HYCO_ON_SURFACE, 1, f.gap_node},
-                                {"rid", HYCO_ON_CELLS, 1, rid}};
+    const HycoField field[9] = {{"displacement", HYCO_ON_NODES, 3, u3, 0},
+                                {"stress", HYCO_ON_CELLS, 6, tensor, 0},
+                                {"mises", HYCO_ON_CELLS, 1, mises, 0},
+                                {"principal_stress", HYCO_ON_CELLS, 3, principal, 0},
+                                {"body", HYCO_ON_CELLS, 1, body, 0},
+                                {"contact_force", HYCO_ON_SURFACE, 3, f.force, 0},
+                                {"contact_pressure", HYCO_ON_SURFACE, 1, f.pressure, 0},
+                                {"gap", HYCO_ON_SURFACE, 1, f.gap_node, NAN},
+                                {"rid", HYCO_ON_CELLS, 1, rid, 0}};
 
     ierr = Write(path, order, m, fe->X, fe->scene, fe->mu, rid ? 9 : 8, field, &table);
   }

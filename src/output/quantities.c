@@ -70,7 +70,10 @@ PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh m, PetscBool ne
 
     PetscCall(FindPlace(scene, m, &scene->quantity[k], &p));
     PetscCall(PetscArrayzero(in, m->n_cells));
-    if (p.dim == m->dim)
+    if (scene->quantity[k].kind == HYCO_QUANTITY_REACTION && p.group >= 0) {
+      PetscCall(MarkAround(m, &p, in));
+      p.dim = -1;
+    } else if (p.dim == m->dim)
       MarkCells(m, &p, in);
     else if (p.dim < m->dim - 1)
       PetscCall(MarkAround(m, &p, in));
@@ -184,6 +187,30 @@ static PetscErrorCode AddNodes(HycoFE fe, PetscInt field, const PetscReal u[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The supports' force along an axis at the nodes of a group, or at all; its weight counts what they fix. */
+static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const PetscReal reaction[], Sum *s)
+{
+  HycoMesh m = fe->mesh;
+  PetscInt n;
+  Place p;
+
+  PetscFunctionBegin;
+  HycoCheck(q->field < fe->dim, "output_%s: the mesh has %d space dimension%s, and no reaction along %c", q->name,
+            (int)fe->dim, fe->dim == 1 ? "" : "s", "xyz"[q->field]);
+  HycoCheck(q->field || fe->formulation != HYCO_AXISYMMETRIC,
+            "output_%s: around the circle reactions along the radius x add up to nothing; ask for y", q->name);
+  PetscCall(FindPlace(fe->scene, m, q, &p));
+  n = p.group < 0 ? m->n_nodes : m->group_start[p.group + 1] - m->group_start[p.group];
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = p.group < 0 ? k : m->group_node[m->group_start[p.group] + k], dof = i * fe->dim + q->field;
+
+    if (HycoMeshOwned(m, i) < 0 || !fe->fixed[dof]) continue;
+    s->sum += reaction[dof];
+    s->weight += 1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[], Sum *s)
 {
   HycoMesh m = fe->mesh;
@@ -214,7 +241,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
 }
 
 PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u[], const PetscReal sigma[],
-                                     PetscReal value[])
+                                     const PetscReal reaction[], PetscReal value[])
 {
   const HycoScene scene = fe->scene;
 
@@ -224,16 +251,23 @@ PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u
     Sum s = {-PETSC_INFINITY, PETSC_INFINITY, 0, 0};
     PetscReal ends[2], sums[2];
 
-    HycoOnEach(comm, Measure(fe, q, u, sigma, &s));
+    const PetscBool is_reaction = (PetscBool)(q->kind == HYCO_QUANTITY_REACTION);
+
+    HycoOnEach(comm, is_reaction ? AddReactions(fe, q, reaction, &s) : Measure(fe, q, u, sigma, &s));
     ends[0] = s.most;
     ends[1] = -s.least;
     sums[0] = s.sum;
     sums[1] = s.weight;
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ends, 2, MPIU_REAL, MPI_MAX, comm));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, comm));
+    HycoCheck(sums[1] > 0 || !is_reaction, "output_%s: no support fixes %c on %s", q->name, "xyz"[q->field],
+              q -> group ? q -> group : "any group");
     HycoCheck(sums[1] > 0, "output_%s: the group %s has no cell, facet or node", q->name,
               q->group ? q->group : "of all cells");
-    value[k] = q->kind == HYCO_QUANTITY_MAX ? ends[0] : q->kind == HYCO_QUANTITY_MIN ? -ends[1] : sums[0] / sums[1];
+    value[k] = is_reaction                    ? sums[0]
+               : q->kind == HYCO_QUANTITY_MAX ? ends[0]
+               : q->kind == HYCO_QUANTITY_MIN ? -ends[1]
+                                              : sums[0] / sums[1];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -8,8 +8,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static const char *const sections[] = {"scene_",    "parameter_", "constant_", "body_", "fixed_",  "pressure_",
-                                       "traction_", "force_",     "contact_",  "hyco_", "output_", "history_"};
+static const char *const sections[] = {"scene_",    "parameter_", "constant_", "body_",   "fixed_",
+                                       "pressure_", "traction_",  "force_",    "spring_", "gravity_",
+                                       "rotation_", "contact_",   "hyco_",     "output_", "history_"};
 
 PetscBool HycoIsSceneKey(const char name[])
 {
@@ -102,7 +103,8 @@ static PetscErrorCode RefuseOthers(PetscOptions options)
   PetscCall(PetscOptionsLeftRestore(options, &n, &names, &values));
   HycoCheck(!name[0],
             "the scene's entry \"%s\" is unknown; an entry stands under scene, parameter, constant, body, fixed, "
-            "pressure, traction, force, contact, history, output or hyco, and its name has no blank",
+            "pressure, traction, force, spring, gravity, rotation, contact, history, output or hyco, and its name has "
+            "no blank",
             name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

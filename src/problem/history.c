@@ -135,6 +135,12 @@ PetscErrorCode HycoSceneCheckHistory(HycoScene s)
                 "%s changes in time; a map says where the bodies are before the history begins",
                 HycoExprKey(s->body[b].map[c]));
   }
+  for (PetscInt k = 0; k < 4 * s->n_springs; k++) {
+    HycoExpr stiffness = s->spring[k / 4].stiffness[k % 4];
+
+    HycoCheck(!HycoExprChanges(stiffness, in_time), "%s changes in time; a spring keeps its stiffness",
+              HycoExprKey(stiffness));
+  }
   for (PetscInt k = 0; k < s->n_contacts; k++) {
     HycoContactChanges(s->contact[k], in_time, &rows, &gaps);
     HycoCheck(!rows, "contact %s: its normal changes in time; a history changes its gap alone",

@@ -34,17 +34,33 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     q = &s->quantity[s->n_quantities++];
     PetscCall(PetscStrallocpy(name, &q->name));
   }
-  if (field > HYCO_QUANTITY_MEAN) {
+  if (field > HYCO_QUANTITY_REACTION) {
     PetscCall(PetscFree(q->group));
     PetscCall(PetscStrallocpy(s->value[entry], &q->group));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoCheck(!q->given, "%s: the output %s has one of max, min and mean already; give each its own name", s->key[entry],
-            name);
+  HycoCheck(!q->given, "%s: the output %s has one of max, min, mean and reaction already; give each its own name",
+            s->key[entry], name);
   q->given = PETSC_TRUE;
   q->kind = (HycoQuantityKind)field;
+  if (q->kind == HYCO_QUANTITY_REACTION) {
+    const char *axis = s->value[entry];
+
+    HycoCheck(axis[0] && !axis[1] && strchr("xyz", axis[0]), "%s is \"%.100s\"; a reaction is along x, y or z",
+              s->key[entry], axis);
+    q->field = axis[0] - 'x';
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(FindField(s->key[entry], s->value[entry], &q->field));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool HycoSceneHasReactions(HycoScene s)
+{
+  for (PetscInt k = 0; k < s->n_quantities; k++) {
+    if (s->quantity[k].kind == HYCO_QUANTITY_REACTION) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
 }
 
 PetscErrorCode HycoSceneCheckQuantities(HycoScene s)
@@ -55,7 +71,7 @@ PetscErrorCode HycoSceneCheckQuantities(HycoScene s)
               "the output %s has the name of a parameter; give it another", s->quantity[k / s->n_parameters].name);
   for (PetscInt k = 0; k < s->n_quantities; k++)
     HycoCheck(s->quantity[k].given,
-              "the output %s says no field; write output: {%s: {max: mises, group: ...}}, or min or mean",
+              "the output %s says no field; write output: {%s: {max: mises, group: ...}}, or min, mean or reaction",
               s->quantity[k].name, s->quantity[k].name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

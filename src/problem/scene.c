@@ -9,10 +9,12 @@
 
 /* Fields of a section's members; a member's name is what stands between the section and the field. */
 static const char *const body_fields[] = {
-    "element", "map_x", "map_y", "map_z", "law", "temperature", "reference_temperature", "expansion", "law_type", NULL};
+    "element",   "map_x",    "map_y",   "map_z", "law", "temperature", "reference_temperature",
+    "expansion", "law_type", "density", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
+static const char *const spring_fields[] = {"x", "y", "z", "normal", NULL};
 static const char *const contact_fields[] = {"type", NULL};
-static const char *const output_fields[] = {"max", "min", "mean", "group", NULL};
+static const char *const output_fields[] = {"max", "min", "mean", "reaction", "group", NULL};
 static const char *const scene_fields[] = {"title", "mesh", "parameters", "refine", "formulation", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
@@ -358,6 +360,7 @@ static PetscErrorCode ReadBody(HycoScene s, PetscInt entry, const char rest[])
   if (field == 5) PetscCall(NewColdExpr(s, entry, &body->temperature));
   if (field == 6) PetscCall(NewColdExpr(s, entry, &body->reference));
   if (field == 7) PetscCall(NewExpr(s, entry, &body->expansion));
+  if (field == 9) PetscCall(NewColdExpr(s, entry, &body->density));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -406,6 +409,32 @@ static char *NextGroup(char names[], char **rest)
   return name;
 }
 
+/* Whether the scene has read a body of this name: bodies come before forces. */
+static PetscBool IsBody(HycoScene s, const char name[])
+{
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    if (strcmp(s->body[b].name, name) == 0) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* A force per unit volume of a body, or on a group of points or lines. */
+static PetscErrorCode ReadForce(HycoScene s, PetscInt entry, const char name[], PetscInt field)
+{
+  PetscInt k = 0;
+  HycoBody *body;
+
+  PetscFunctionBegin;
+  if (IsBody(s, name)) {
+    PetscCall(FindBody(s, name, &body));
+    PetscCall(NewColdExpr(s, entry, &body->force[field]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(Member(name, sizeof(HycoPointLoad), &s->n_point_loads, (void **)&s->point_load, &k));
+  PetscCall(NewColdExpr(s, entry, &s->point_load[k].force[field]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* An entry of a section whose members are groups: its expression, for each group that it names. */
 static PetscErrorCode ReadGroups(HycoScene s, PetscInt entry, char names[], PetscInt field)
 {
@@ -415,11 +444,12 @@ static PetscErrorCode ReadGroups(HycoScene s, PetscInt entry, char names[], Pets
   PetscFunctionBegin;
   for (char *name = NextGroup(names, &rest); name; name = NextGroup(NULL, &rest)) {
     PetscInt k = 0;
-    HycoBody *body;
 
     if (strncasecmp(key, "force_", 6) == 0) {
-      PetscCall(FindBody(s, name, &body));
-      PetscCall(NewColdExpr(s, entry, &body->force[field]));
+      PetscCall(ReadForce(s, entry, name, field));
+    } else if (strncasecmp(key, "spring_", 7) == 0) {
+      PetscCall(Member(name, sizeof(HycoSpring), &s->n_springs, (void **)&s->spring, &k));
+      PetscCall(NewColdExpr(s, entry, &s->spring[k].stiffness[field]));
     } else if (strncasecmp(key, "fixed_", 6) == 0) {
       PetscCall(Member(name, sizeof(HycoFixed), &s->n_fixed, (void **)&s->fixed, &k));
       PetscCall(NewColdExpr(s, entry, &s->fixed[k].value[field]));
@@ -439,7 +469,7 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
   PetscInt field = -1;
 
   PetscFunctionBegin;
-  if (strncasecmp(key, "force_", 6) == 0) what = "a body force";
+  if (strncasecmp(key, "force_", 6) == 0) what = "a force";
   if (strncasecmp(key, "fixed_", 6) == 0) what = "a fixed group";
   if (strncasecmp(key, "traction_", 9) == 0) what = "a traction";
   if (strncasecmp(key, "body_", 5) == 0) {
@@ -447,6 +477,11 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
   } else if (what) {
     if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, what, NULL, component_fields));
     PetscCall(ReadGroups(s, entry, name, field));
+  } else if (strncasecmp(key, "spring_", 7) == 0) {
+    if (!SplitKey(rest, spring_fields, name, &field)) PetscCall(UnknownKey(key, "a spring", NULL, spring_fields));
+    PetscCall(ReadGroups(s, entry, name, field));
+  } else if (strncasecmp(key, "gravity_", 8) == 0 || strncasecmp(key, "rotation_", 9) == 0) {
+    PetscCall(HycoSceneReadMotion(s, entry));
   } else if (strncasecmp(key, "output_", 7) == 0) {
     if (!SplitKey(rest, output_fields, name, &field)) PetscCall(UnknownKey(key, "an output", NULL, output_fields));
     PetscCall(HycoSceneReadQuantity(s, entry, name, field));
@@ -528,6 +563,7 @@ static PetscErrorCode CheckScene(HycoScene s)
     PetscCall(CheckHeat(&s->body[k]));
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactComplete(s->contact[k]));
+  PetscCall(HycoSceneCheckMotion(s));
   PetscCall(HycoSceneCheckHistory(s));
   PetscCall(HycoSceneCheckQuantities(s));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -757,6 +793,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
       PetscCall(HycoExprDestroy(&s->body[k].map[c]));
       PetscCall(HycoExprDestroy(&s->body[k].force[c]));
     }
+    PetscCall(HycoExprDestroy(&s->body[k].density));
     PetscCall(HycoExprDestroy(&s->body[k].temperature));
     PetscCall(HycoExprDestroy(&s->body[k].reference));
     PetscCall(HycoExprDestroy(&s->body[k].expansion));
@@ -771,6 +808,15 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
     for (PetscInt c = 0; c < 3; c++) PetscCall(HycoExprDestroy(&s->load[k].traction[c]));
     PetscCall(PetscFree(s->load[k].group));
   }
+  for (PetscInt k = 0; k < s->n_point_loads; k++) {
+    for (PetscInt c = 0; c < 3; c++) PetscCall(HycoExprDestroy(&s->point_load[k].force[c]));
+    PetscCall(PetscFree(s->point_load[k].group));
+  }
+  for (PetscInt k = 0; k < s->n_springs; k++) {
+    for (PetscInt c = 0; c < 4; c++) PetscCall(HycoExprDestroy(&s->spring[k].stiffness[c]));
+    PetscCall(PetscFree(s->spring[k].group));
+  }
+  PetscCall(HycoSceneDestroyMotion(s));
   for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactDestroy(&s->contact[k]));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     PetscCall(PetscFree(s->key[k]));
@@ -782,8 +828,8 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   }
   for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PetscFree(s->parameter[p]));
   PetscCall(HycoSceneDestroyHistory(s));
-  HycoFreeAll(&s->key, &s->value, &s->constant, &s->quantity, &s->body, &s->fixed, &s->load, &s->contact, &s->title,
-              &s->mesh_path, &s->folder);
+  HycoFreeAll(&s->key, &s->value, &s->constant, &s->quantity, &s->body, &s->fixed, &s->load, &s->point_load, &s->spring,
+              &s->contact, &s->title, &s->mesh_path, &s->folder);
   PetscCall(DMDestroy(&s->dm));
   PetscCall(PetscOptionsDestroy(&s->options));
   PetscCall(PetscHeaderDestroy(&s));

@@ -2,6 +2,7 @@
   The scene's quantities of a prediction: displacements and stresses of the cells that they need, wherever these are,
   from the modes there, U = r(u0) + V gamma (30); of a path the laws are replayed there, once for all listed times.
 */
+#include <hycofields.h>
 #include <hycoinelastic.h>
 #include <hycoquantities.h>
 #include <hycoromimpl.h>
@@ -11,6 +12,8 @@ struct _n_HycoProbe {
   HycoFE fe;
   PetscReal *V, *u, *sigma; /* n_dof x l; n_dof; n_cells x n_sigma */
   PetscInt *fe_at;          /* by full-order displacement: its place in u; -1: none */
+  PetscReal *reaction;      /* n_dof, of supports; NULL: no quantity asks for them */
+  PetscBool *touched;       /* by node: of a contact; then too */
 };
 
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
@@ -19,7 +22,7 @@ PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
   if (!*probe) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFEDestroy(&(*probe)->fe));
   PetscCall(HycoMeshDestroy(&(*probe)->mesh));
-  HycoFreeAll(&(*probe)->V, &(*probe)->u, &(*probe)->sigma, &(*probe)->fe_at);
+  HycoFreeAll(&(*probe)->V, &(*probe)->u, &(*probe)->sigma, &(*probe)->fe_at, &(*probe)->reaction, &(*probe)->touched);
   PetscCall(PetscFree(*probe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -38,6 +41,53 @@ static PetscErrorCode Extract(HycoROM m, HycoProbe p)
   PetscCall(HycoMeshExtract(m->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
   PetscCall(PetscFree2(needed, keep));
   PetscCall(HycoMeshSetNodeBodies(m->scene, p->mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Room for reactions, and the nodes where contact forces may be part of them. */
+static PetscErrorCode PrepareReactions(HycoROM m, HycoProbe p)
+{
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  if (!HycoSceneHasReactions(m->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(p->fe->n_dof, &p->reaction));
+  PetscCall(PetscMalloc1(p->mesh->n_nodes, &p->touched));
+  PetscCall(PetscCalloc1(m->whole->n_nodes, &in));
+  PetscCall(HycoPairsMarkSurfaces(m->scene, m->whole, &m->whole_pairs, in));
+  for (PetscInt i = 0; i < p->mesh->n_nodes; i++) p->touched[i] = in[p->mesh->node_whole[i]];
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes what contacts press on fixed unknowns from the reactions there. */
+static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda[])
+{
+  const PetscInt dim = p->fe->dim;
+  PetscBool any = PETSC_FALSE;
+  HycoContactFields c;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < p->fe->n_dof; k++) any = (PetscBool)(any || (p->fe->fixed[k] && p->touched[k / dim]));
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFESetParameters(m->fe_whole, p->fe->mu));
+  ierr = HycoContactFieldsCreate(PETSC_COMM_SELF, m->fe_whole, &m->whole_pairs, m->U_whole, Lambda, &c);
+  for (PetscInt k = 0; k < p->fe->n_dof && !ierr; k++) {
+    if (p->fe->fixed[k]) p->reaction[k] -= c.force[3 * p->mesh->node_whole[k / dim] + k % dim];
+  }
+  PetscCall(HycoContactFieldsDestroy(&c));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* f_int: NULL: of a prediction without a history. */
+static PetscErrorCode React(HycoROM m, HycoProbe p, const PetscReal f_int[], const PetscReal Lambda[])
+{
+  PetscFunctionBegin;
+  if (!p->reaction) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFEReactions(p->fe, p->u, f_int, p->reaction));
+  PetscCall(TakeContact(m, p, Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -64,6 +114,7 @@ static PetscErrorCode Fill(HycoROM m, HycoProbe p)
     p->fe_at[k] = i < 0 ? -1 : i * dim + m->fe_dof[k] % dim;
   }
   PetscCall(PetscFree(place));
+  PetscCall(PrepareReactions(m, p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,7 +143,8 @@ static PetscErrorCode March(HycoProbe p, HycoReplay *r)
     PetscCall(HycoReplayStep(r, k, p->u));
     if (j == trace->n_listed || trace->at[j] != k) continue;
     PetscCall(HycoFEStateFields(p->fe, r->state, p->sigma, NULL, NULL, NULL));
-    PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, trace->step[j++].quantity));
+    PetscCall(React(m, p, r->f_int, trace->Lambda + (size_t)j * (size_t)m->pairs.n));
+    PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, p->reaction, trace->step[j++].quantity));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -128,6 +180,7 @@ static PetscErrorCode Follow(HycoROM m, HycoProbe p)
   Displace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
   PetscCall(HycoFEStress(p->fe, p->u, p->sigma));
+  PetscCall(React(m, p, NULL, m->Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -177,6 +230,7 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
   }
   PetscCall(Make(m));
   PetscCall(Follow(m, m->probe));
-  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, m->probe->fe, m->probe->u, m->probe->sigma, out->quantity));
+  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, m->probe->fe, m->probe->u, m->probe->sigma, m->probe->reaction,
+                                  out->quantity));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -33,6 +33,7 @@ PetscErrorCode HycoReplayStep(HycoReplay *r, PetscInt k, const PetscReal u[])
   HycoFEStepReport report;
 
   PetscFunctionBegin;
+  PetscCall(PetscArrayzero(r->f_int, r->fe->n_dof));
   PetscCall(HycoFEStep(r->fe, u, t[PetscMax(k - 1, 0)], t[k], r->state, r->end, r->f_int, PETSC_FALSE, &report));
   HycoCheck(!report.failed, "the laws have no answer to the predicted displacements at t = %.10g: %s", (double)t[k],
             report.why);

@@ -4,6 +4,7 @@ import os
 import unittest
 
 import h5py
+import numpy as np
 
 from common import PELLET, Case
 
@@ -29,7 +30,7 @@ class MeshHDF5(Case):
                     self.near(report['strain_energy'], expected['strain_energy'], 1e-9)
                     for name, value in fields.items():
                         self.assertEqual(found[name].shape, value.shape)
-                        self.assertLessEqual(abs(found[name] - value).max(), 1e-9 * abs(value).max(), name)
+                        np.testing.assert_allclose(found[name], value, rtol=0, atol=1e-9 * np.nanmax(abs(value)), err_msg=name)
 
     def test_as_read(self):
         self.same(PELLET, '4.06,1', '-scene_mesh', os.path.join(PELLET, 'A.msh'))

@@ -61,7 +61,7 @@ class Verify(Case):
         if 'lambda' in out:
             small = 1e-9 * abs(out['nodes/displacement']).max()
             self.assertLessEqual(abs(out['gap'][out['lambda'] > 0]).max(initial=0), small)
-            self.assertGreaterEqual(out['gap'].min(), -small)
+            self.assertGreaterEqual(np.nanmin(out['gap'], initial=0), -small)  # NaN where a slave faces nothing
         return report, out
 
 

@@ -42,6 +42,12 @@ static PetscErrorCode ForEach(HycoCondensed c, HycoMesh mesh, Visit visit, void 
       if (s->load[f].traction[k]) PetscCall(visit(c, s->load[f].traction[k], mesh, group, -1, ctx));
     }
   }
+  for (PetscInt f = 0; f < s->n_point_loads; f++) {
+    if (mesh) PetscCall(HycoMeshFindGroup(mesh, "force", s->point_load[f].group, &group));
+    for (PetscInt k = 0; k < 3; k++) {
+      if (s->point_load[f].force[k]) PetscCall(visit(c, s->point_load[f].force[k], mesh, group, -1, ctx));
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -202,6 +208,10 @@ PetscErrorCode HycoCondensedSurveyLoads(HycoCondensed c, HycoFOM fom, PetscBool 
 
   PetscFunctionBegin;
   PetscCall(PetscFree(c->probe));
+  for (PetscInt b = 0; b < c->scene->n_bodies; b++) {
+    /* products of expressions, of which F is no sum */
+    if (HycoSceneHasInertia(c->scene, &c->scene->body[b], NULL)) s.fit = PETSC_FALSE;
+  }
   PetscCall(ForEach(c, fom->part, Inspect, &s));
   c->n_probes = s.n_probes;
   *fit = s.fit;

@@ -1,0 +1,214 @@
+/*
+  What holds the bodies of the last solution: the forces of supports on the unknowns that they fix,
+
+      R = f_int - F + B^T L  there,
+
+  with f_int = K u, of a path that of its last step; the pull of springs; the resultants of loads and of obstacles. All
+  of them together balance, in each direction that is no radius.
+*/
+#include <hycofields.h>
+#include <hycopath.h>
+
+/* -B^T L at all unknowns of the part, fixed ones too, by the contacts of rank 0. Collective. */
+static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
+{
+  const PetscInt dim = f->fe->dim;
+  HycoContactFields c;
+  Vec all, at;
+  PetscScalar *v;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c);
+  if (ierr) PetscCall(HycoContactFieldsDestroy(&c));
+  PetscCall(ierr);
+  PetscCall(VecDuplicate(f->U, &all));
+  PetscCall(VecSet(all, 0));
+  at = f->to_surface ? f->U_surface : all;
+  PetscCall(VecGetArray(at, &v));
+  for (PetscInt k = 0; f->rank == 0 && k < f->fe_surface->n_dof; k++) v[k] = c.force[3 * (k / dim) + k % dim];
+  PetscCall(VecRestoreArray(at, &v));
+  PetscCall(HycoContactFieldsDestroy(&c));
+  if (f->to_surface) {
+    PetscCall(VecScatterBegin(f->to_surface, at, all, ADD_VALUES, SCATTER_REVERSE));
+    PetscCall(VecScatterEnd(f->to_surface, at, all, ADD_VALUES, SCATTER_REVERSE));
+  }
+  PetscCall(HycoFOMToLocal(f, all, force));
+  PetscCall(VecDestroy(&all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Room for n_dof reals at contact. Collective. */
+static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
+{
+  const PetscScalar *u;
+  PetscReal *f_int = NULL;
+
+  PetscFunctionBegin;
+  if (f->path) {
+    PetscCall(PetscMalloc1(f->fe->n_dof, &f_int));
+    PetscCall(HycoFOMToLocal(f, f->path->f_old, f_int));
+  }
+  PetscCall(VecGetArrayRead(f->U_local, &u));
+  HycoOnEach(HycoComm(f), HycoFEReactions(f->fe, u, f_int, r));
+  PetscCall(VecRestoreArrayRead(f->U_local, &u));
+  PetscCall(PetscFree(f_int));
+  PetscCall(PetscArrayzero(contact, f->fe->n_dof));
+  if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ContactForces(f, contact));
+  for (PetscInt k = 0; k < f->fe->n_dof; k++) r[k] -= f->fe->fixed[k] ? contact[k] : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMReactions(HycoFOM f, PetscReal r[])
+{
+  PetscReal *contact;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(f->fe->n_dof, &contact));
+  PetscCall(Reactions(f, contact, r));
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A nodal force in a resultant; an axisymmetric scene has none along the radius, and no moment. */
+static void AddTo(HycoFE fe, PetscInt dof, PetscReal value, HycoReaction *to)
+{
+  const PetscInt c = dof % fe->dim, d = (c + 1) % 3, e = (c + 2) % 3;
+  const PetscReal *x = fe->X + 3 * (dof / fe->dim);
+
+  if (fe->formulation == HYCO_AXISYMMETRIC) {
+    if (c) to->force[c] += value;
+    return;
+  }
+  to->force[c] += value;
+  to->moment[d] += x[e] * value;
+  to->moment[e] -= x[d] * value;
+}
+
+/* The support of each unknown: the first that the scene lists; -1: none. */
+static PetscErrorCode FindSupports(HycoFOM f, PetscInt support[])
+{
+  HycoMesh m = f->part;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < f->fe->n_dof; k++) support[k] = -1;
+  for (PetscInt s = f->scene->n_fixed - 1; s >= 0; s--) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "fixed", f->scene->fixed[s].group, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
+      for (PetscInt c = 0; c < m->dim; c++) {
+        if (f->scene->fixed[s].value[c]) support[m->group_node[j] * m->dim + c] = s;
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What Sums() adds up: the results, supports first, then springs, the loads, the obstacles; the sum of all sizes. */
+typedef struct {
+  HycoReaction *result;
+  const PetscReal *u;
+  PetscReal size;
+} Sums;
+
+static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const PetscInt node[], const PetscReal K[],
+                                void *ctx)
+{
+  Sums *s = (Sums *)ctx;
+  const PetscInt size = n * fe->dim;
+
+  PetscFunctionBegin;
+  for (PetscInt r = 0; r < size; r++) {
+    PetscReal force = 0;
+
+    for (PetscInt t = 0; t < size; t++) force -= K[r * size + t] * s->u[node[t / fe->dim] * fe->dim + t % fe->dim];
+    AddTo(fe, node[r / fe->dim] * fe->dim + r % fe->dim, force, &s->result[fe->scene->n_fixed + spring]);
+    s->size += PetscAbsReal(force);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of this process's own nodes; work: 3 x n_dof reals. Collective. */
+static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums *s)
+{
+  const PetscInt n = f->fe->n_dof;
+  PetscReal *contact = work, *r = work + n, *load = work + 2 * n;
+  HycoReaction *loads = s->result + f->scene->n_fixed + f->scene->n_springs;
+
+  PetscFunctionBegin;
+  PetscCall(Reactions(f, contact, r));
+  HycoOnEach(HycoComm(f), HycoFELoads(f->fe, load));
+  PetscCall(FindSupports(f, support));
+  for (PetscInt k = 0; k < n; k++) {
+    if (HycoMeshOwned(f->part, k / f->fe->dim) < 0) continue;
+    if (support[k] >= 0) AddTo(f->fe, k, r[k], &s->result[support[k]]);
+    AddTo(f->fe, k, load[k], &loads[0]);
+    AddTo(f->fe, k, contact[k], &loads[1]);
+    s->size += PetscAbsReal(r[k]) + PetscAbsReal(load[k]) + PetscAbsReal(contact[k]);
+  }
+  PetscCall(HycoSpringsVisit(f->fe, AddSpring, s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All of them over the ranks, and how far they are from balance. Collective. */
+static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance)
+{
+  PetscReal *sum, most = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(6 * n + 1, &sum));
+  for (PetscInt k = 0; k < 6 * n; k++)
+    sum[k] = k % 6 < 3 ? s->result[k / 6].force[k % 6] : s->result[k / 6].moment[k % 6 - 3];
+  sum[6 * n] = s->size;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(6 * n + 1), MPIU_REAL, MPI_SUM, HycoComm(f)));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(PetscArraycpy(s->result[k].force, sum + 6 * k, 3));
+    PetscCall(PetscArraycpy(s->result[k].moment, sum + 6 * k + 3, 3));
+  }
+  for (PetscInt c = 0; c < 3; c++) {
+    PetscReal rest = 0;
+
+    for (PetscInt k = 0; k < n; k++) rest += s->result[k].force[c];
+    most = PetscMax(most, PetscAbsReal(rest));
+  }
+  *balance = sum[6 * n] > 0 ? most / sum[6 * n] : 0;
+  PetscCall(PetscFree(sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *result[], PetscReal *balance)
+{
+  const HycoScene scene = f->scene;
+  const PetscInt n_springs = scene->n_springs, all = scene->n_fixed + n_springs + 2, n_dof = f->fe->n_dof;
+  PetscInt *support;
+  PetscReal *work;
+  Sums s = {0};
+
+  PetscFunctionBegin;
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetReactions()");
+  if (!f->reaction) PetscCall(PetscMalloc1(all, &f->reaction));
+  PetscCall(PetscArrayzero(f->reaction, all));
+  PetscCall(PetscMalloc2(3 * n_dof, &work, n_dof, &support));
+  s.result = f->reaction;
+  s.u = f->u;
+  PetscCall(AddUp(f, work, support, &s));
+  PetscCall(PetscFree2(work, support));
+  PetscCall(Balance(f, all, &s, balance));
+  for (PetscInt k = 0; k < all; k++) {
+    HycoReaction *r = &f->reaction[k];
+
+    r->kind = k < scene->n_fixed ? HYCO_REACTION_SUPPORT
+              : k < all - 2      ? HYCO_REACTION_SPRING
+              : k < all - 1      ? HYCO_REACTION_LOADS
+                                 : HYCO_REACTION_CONTACT;
+    r->group = r->kind == HYCO_REACTION_SUPPORT  ? scene->fixed[k].group
+               : r->kind == HYCO_REACTION_SPRING ? scene->spring[k - scene->n_fixed].group
+                                                 : "";
+  }
+  *n = all;
+  *result = f->reaction;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,84 @@
+/* Gravity and rotation: accelerations of the whole scene, which bodies with a density feel. */
+#include <hycosceneimpl.h>
+#include <string.h>
+
+/* Entries and where their expressions go. */
+static HycoExpr *Find(HycoScene s, const char key[])
+{
+  HycoMotion *m = &s->motion;
+  static const char *const vectors[] = {"gravity_", "rotation_axis_", "rotation_through_"};
+  HycoExpr *const at[] = {m->gravity, m->axis, m->through};
+
+  if (strcasecmp(key, "rotation_speed") == 0) return &m->speed;
+  for (PetscInt k = 0; k < 3; k++) {
+    const size_t n = strlen(vectors[k]);
+
+    for (PetscInt c = 0; c < 3; c++) {
+      if (strncasecmp(key, vectors[k], n) == 0 && (key[n] | 32) == "xyz"[c] && !key[n + 1]) return &at[k][c];
+    }
+  }
+  return NULL;
+}
+
+PetscErrorCode HycoSceneReadMotion(HycoScene s, PetscInt entry)
+{
+  const char *key = s->key[entry];
+  HycoExpr *expr = Find(s, key);
+
+  PetscFunctionBegin;
+  HycoCheck(expr,
+            "the scene's entry %s is unknown; there is gravity: {x: ..., y: ..., z: ...} and rotation: {speed: ..., "
+            "axis: {x: ..., y: ..., z: ...}, through: {x: ..., y: ..., z: ...}}",
+            key);
+  PetscCall(HycoExprDestroy(expr)); /* the same entry in another letter case */
+  PetscCall(HycoSceneExpression(s, key, s->value[entry], expr));
+  PetscCall(HycoExprRefuseHeat(*expr));
+  HycoCheck(!HycoExprInSpace(*expr), "%s names x, y or z; it is the same everywhere", key);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The expressions in their order; NULL: one that the scene does not give. */
+#define N_EXPR 10
+static HycoExpr *At(HycoScene s, PetscInt k)
+{
+  HycoMotion *m = &s->motion;
+
+  return k < 3 ? &m->gravity[k] : k == 3 ? &m->speed : k < 7 ? &m->axis[k - 4] : &m->through[k - 7];
+}
+
+PetscBool HycoSceneHasInertia(HycoScene s, const HycoBody *body, const PetscBool changed[])
+{
+  const HycoMotion *m = &s->motion;
+  PetscBool changes = PETSC_FALSE;
+
+  if (!body->density || !(m->gravity[0] || m->gravity[1] || m->gravity[2] || m->speed)) return PETSC_FALSE;
+  if (!changed) return PETSC_TRUE;
+  for (PetscInt k = 0; k < N_EXPR; k++) changes = (PetscBool)(changes || HycoExprChanges(*At(s, k), changed));
+  return (PetscBool)(changes || HycoExprChanges(body->density, changed));
+}
+
+PetscErrorCode HycoSceneCheckMotion(HycoScene s)
+{
+  const char *given = NULL, *place = NULL;
+  PetscBool density = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < s->n_bodies; b++) density = (PetscBool)(density || s->body[b].density);
+  for (PetscInt k = 0; k < N_EXPR; k++) {
+    if (*At(s, k)) given = HycoExprKey(*At(s, k));
+    if (*At(s, k) && k > 3) place = HycoExprKey(*At(s, k));
+  }
+  HycoCheck(!given || density, "%s acts on mass, and no body has a density; write body: NAME: {density: ...}", given);
+  HycoCheck(!place || s->motion.speed,
+            "%s says where the scene turns; write rotation: {speed: ...} too (radians per "
+            "unit of time)",
+            place);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneDestroyMotion(HycoScene s)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < N_EXPR; k++) PetscCall(HycoExprDestroy(At(s, k)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

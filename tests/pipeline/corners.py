@@ -1,0 +1,100 @@
+"""Nodes that are slaves of two or three contacts: a block in a corner, in a V-groove; each contact has its own force there, at full order and in models."""
+import os
+import sys
+import unittest
+
+import h5py
+import numpy as np
+
+from common import SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid  # noqa: E402
+
+MODEL = """
+scene: {mesh: mesh.msh, parameters: [push, wedge]}
+parameter: {push: {range: [0.5, 2]}, wedge: {range: [-0.002, 0.002]}}
+body: {block: {young: 200, poisson: 0.3}}
+spring: {x1: {x: 3, y: 3}, y1: {x: 3, y: 3}}
+pressure: {x1: push*(1 + x), y1: 1 + x^2}
+contact:
+  left: {group: x0, gap: "max(wedge, 0)*abs(x)"}
+  right: {group: y0, gap: "-min(wedge, 0)*abs(y)"}
+"""
+
+
+class Corners(Case):
+    def block(self, kind, angle, n=4):
+        """The unit square or cube, turned about its corner."""
+        dim = 3 if kind in ('hex8', 'tet4') else 2
+        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        turn = np.eye(dim)
+        turn[:2, :2] = [[c, s], [-s, c]]
+        grid = Grid()
+        grid.box(kind, [np.linspace(0, 1, n + 1)] * dim, lambda x: x @ turn, 'block', {f'{a}{e}': f'{a}{e}' for a in 'xyz'[:dim] for e in '01'})
+        grid.write(self.path('mesh.msh'))
+
+    def written(self, text):
+        with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
+            f.write(text)
+        return self.folder
+
+    def test_uniform(self):
+        """Pressed on the other faces: the contacts carry these pressures, the corner node its share of each face."""
+        n = 4
+        for kind, angle, ranks in (('quad4', 0, 0), ('quad4', 45, 3), ('tri3', 30, 0), ('hex8', 0, 2), ('hex8', 45, 0)):
+            faces = 'xyz' if kind == 'hex8' else 'xy'
+            self.block(kind, angle, n)
+            load = {a: 1.5 + k for k, a in enumerate(faces)}
+            text = ('scene: {mesh: mesh.msh}\nbody: {block: {young: 200, poisson: 0.3}}\npressure: {%s}\ncontact: {%s}\n'
+                    % (', '.join(f'{a}1: {p}' for a, p in load.items()), ', '.join(f'{a}: {{group: {a}0, gap: 0}}' for a in faces)))
+            with self.subTest(kind=kind, angle=angle):
+                found = self.hyco('solve', '-scene', self.written(text), '-output', 'out.xdmf', ranks=ranks)
+                self.solved(found)
+                self.assertTrue(found['forces_unique'])
+                for a, p in load.items():
+                    self.near(np.linalg.norm(found['contacts'][a]['force']), p, 1e-8, a)
+                with h5py.File(self.path('out.h5')) as f:
+                    forces = f['contact/lambda'][:, 0][f['contact/node_id'][:, 0] == 1]
+                share = sorted(p / n**(len(faces) - 1) / 2**(len(faces) - 1) for p in load.values())
+                np.testing.assert_allclose(sorted(forces), share, rtol=1e-7)
+
+    def test_models(self):
+        """In a V-groove whose sides open in turn: forces of both contacts at the node, against full order at other points."""
+        self.block('quad4', 45, 6)
+        scene = self.written(MODEL)
+        bounds = {'hybrid': 0.05, 'condensed': 1e-4, 'projection': 0.05}
+        for kind, bound in bounds.items():
+            for more in (('contact', 'all') if kind == 'hybrid' else (None,)):
+                with self.subTest(kind=kind, hybrid=more):
+                    self.hyco('train', '-scene', scene, '-grid', '5,5', '-model', 'm.h5', '-hyco_model_type', kind, '-hyco_pod_tol', 1e-11,
+                              *(('-hyco_hybrid', more, '-hyco_rid_layers', 1) if more else ()), *(('-hyco_dual', 'snapshots') if kind == 'projection' else ()))
+                    found = self.hyco('compare', '-scene', scene, '-model', 'm.h5', '-grid', '4,4')
+                    self.assertLess(found['error_u']['max'], min(bound, 0.05))
+                    if kind == 'projection':  # its forces, of all training points, are smeared between them
+                        continue
+                    self.assertLess(found['error_lambda']['max'], bound)
+                    self.hyco('solve', '-scene', scene, '-mu', '1.3,0', '-output', 'full.xdmf')
+                    self.hyco('predict', '-model', 'm.h5', '-mu', '1.3,0', '-output', 'model.xdmf')
+                    with h5py.File(self.path('full.h5')) as a, h5py.File(self.path('model.h5')) as b:
+                        at = a['contact/node_id'][:, 0] == 1
+                        self.assertEqual(at.sum(), 2)
+                        full, model = a['contact/lambda'][:, 0], b['contact/lambda'][:, 0]
+                        self.assertGreater(full[at].min(), 0.01 * full.max())
+                        np.testing.assert_allclose(model[at], full[at], atol=bound * full.max())
+
+    def test_refused(self):
+        """Contacts whose normals are parallel, and more than a node has free displacements."""
+        self.block('quad4', 0)
+        base = 'scene: {mesh: mesh.msh}\nbody: {block: {young: 200}}\npressure: {x1: 1, y1: 1}\n'
+        for text, said in (('contact: {a: {group: x0, gap: 0}, b: {group: y0, gap: 0, normal: {x: -1, y: 0.0001}}}', 'whose normals there are parallel'),
+                           ('fixed: {y0: {y: 0}}\ncontact: {a: {group: x0, gap: 0}, b: {group: y0, gap: 0}}', 'a slave of 2 contacts, a and b among them, and has 1 free')):
+            for ranks in (0, 2):
+                run = self.run_raw('solve', '-scene', self.written(base + text + '\n'), ranks=ranks)
+                self.assertEqual(run.returncode, 1, run.stdout)
+                self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
+                self.assertIn(said, run.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()
