@@ -80,6 +80,7 @@ typedef struct {
                                                                 dissipated; given to heat and to moduli that change */
   PetscReal energy_defect; /* largest of the substeps: of their balance, over the sum of the terms' sizes so far */
   PetscReal seconds, seconds_factor, seconds_solve, seconds_law;
+  PetscReal quantity[HYCO_MAX_QUANTITIES]; /* those of HycoSceneGetQuantities() */
 } HycoStep;
 
 /* The path of the last solve of a scene with a history. */

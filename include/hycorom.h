@@ -17,6 +17,8 @@ typedef const char *HycoROMType;
 #define HYCO_ROM_HYBRID     "hybrid"
 #define HYCO_ROM_PROJECTION "projection"
 #define HYCO_ROM_CONDENSED  "condensed"
+#define HYCO_ROM_CUBATURE   "cubature"
+#define HYCO_ROM_REGRESSION "regression"
 
 /* Which displacements of a hybrid model are full order: -hyco_hybrid. */
 typedef enum {
@@ -42,6 +44,8 @@ typedef struct {
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
   PetscReal quantity[HYCO_MAX_QUANTITIES];                         /* those of HycoSceneGetQuantities() */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
+  PetscReal
+      path_quantity[HYCO_MAX_QUANTITIES]; /* of a path, over its listed times: the largest, of `min` the smallest */
   PetscReal path_force, path_mises,
       path_inelastic; /* of a path the largest of its listed times: total contact force, von
                          Mises stress and accumulated inelastic strain of the RID; else 0 */

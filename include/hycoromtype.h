@@ -30,6 +30,7 @@ typedef struct {
   PetscBool forces;      /* it gives the forces of all contacts as those of the full order: HycoFOMSolveForces() */
   PetscBool force_basis; /* it takes -hyco_dual nnmf and snapshots */
   PetscBool history;     /* its solve has the paths of scenes with a history */
+  PetscBool cells; /* its mesh is of the cells that its modes choose alone, with the surfaces of contacts and loads */
 } HycoROMTraits;
 
 /* The system on the RID before reduction, for the indicator (43). Borrowed. */

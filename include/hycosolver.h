@@ -36,7 +36,7 @@ PetscErrorCode HycoSolverRegister(const char name[], HycoSolverFormCreate create
 typedef enum {
   HYCO_LINEAR_AUTO,     /* direct, unless the factor is estimated to take more memory than there is */
   HYCO_LINEAR_DIRECT,   /* MUMPS, ordered by nested dissection */
-  HYCO_LINEAR_ITERATIVE /* conjugate gradients with algebraic multigrid, on the primal form */
+  HYCO_LINEAR_ITERATIVE /* conjugate gradients with algebraic multigrid, the contacts as constraints */
 } HycoLinear;
 
 /* How a solve ended. Negative: not solved, x and L are the last iterate. */

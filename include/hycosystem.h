@@ -40,8 +40,11 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system);
 /*
   Sets (references) the matrices: K n x n, Bt n x m, B m x n. B and Bt may be NULL: no contact. `symmetric` says
   that K is symmetric positive definite and Bt = B^T. Where contact alone holds a body, K is only semidefinite: attach
-  its kernel, an orthonormal basis, by MatSetNullSpace(). Changing a matrix in place is noticed through its state.
+  its kernel, an orthonormal basis, by MatSetNullSpace(). Changing a matrix in place is noticed through its state. A
+  vector of length m that is composed with B as HYCO_SLAVES says, for iterative solves, which node each contact belongs
+  to: the number of its first unknown.
 */
+#define HYCO_SLAVES "hyco_slaves"
 PetscErrorCode HycoSystemSetMatrices(HycoSystem system, Mat K, Mat Bt, Mat B, PetscBool symmetric);
 /* The matrices; each output may be NULL. Not collective. Borrowed. */
 PetscErrorCode HycoSystemGetMatrices(HycoSystem system, Mat *K, Mat *Bt, Mat *B);

@@ -16,6 +16,7 @@ typedef struct {
   char **groups;
   const char *region; /* expression, or NULL */
   PetscBool whole;
+  PetscBool exact; /* the cells and nothing else */
 } HycoRIDRecipe;
 
 /*

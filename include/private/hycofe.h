@@ -51,6 +51,10 @@ struct _n_HycoFE {
   PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
   PetscBool *bbar;          /* by body: the dilatation is the cells' mean */
   signed char *drawn_sign;  /* by cell: the sign of its volume in the mesh file's coordinates */
+  /* of a cubature (borrowed; set before anything is assembled): how often each cell's integrals count; NULL: once.
+     all_facets: loads act on facets whose cell the mesh does not have, too (2D, 3D) */
+  const PetscReal *cell_weight;
+  PetscBool all_facets;
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* of the entries of K; made by the second assembly into it */
   PetscInt n_loads;
@@ -65,10 +69,11 @@ struct _n_HycoFE {
   PetscBool stiffness_changed, contact_changed;
   PetscBool gap_changed; /* the contacts' gaps, or what the supports take from them */
   /* geometry at mu */
-  PetscReal *X;        /* n_nodes x 3, moved nodes */
-  PetscBool *mirrored; /* by body: its map is a mirror image */
-  PetscInt place;      /* of the nodes: a number that no other place has, on this process */
-  PetscReal *kept;     /* by point, nv x 3 gradients and the weight at kept_place: HycoFEKeepGradients(); or NULL */
+  PetscReal *X;         /* n_nodes x 3, moved nodes */
+  PetscBool *mirrored;  /* by body: its map is a mirror image */
+  PetscInt place;       /* of the nodes: a number that no other place has, on this process */
+  PetscReal *kept;      /* by point, nv x 3 gradients and the weight at kept_place: HycoFEKeepGradients(); or NULL */
+  PetscReal *kept_mean; /* the same by cell of the mean gradients, nv x 3; NULL: no body is bbar */
   PetscInt kept_place;
   /* supports at mu */
   PetscBool *fixed; /* n_dof */
@@ -142,7 +147,9 @@ PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
 /* "body B from moving along ..." for the combination of motions with these coefficients. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);
 
-/* Element stiffness of a cell and of the springs on it, row major, nv * dim square, nodes outer, components inner. */
+/* Element stiffness of a cell, row major, nv * dim square, nodes outer, components inner: of its body alone, for
+   displacements; with the springs on it, of the unknowns, which oblique supports make others. */
+PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 
 /* An empty, preallocated AIJ matrix for K or a norm over the nodes `n_owned` from `first` of the distributed numbering.
@@ -172,6 +179,10 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 /* Stress of u (n_dof, local order) by the elastic tangents, without the thermal strain's, averaged over each cell:
    sigma n_cells x n_sigma. */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
+/* The volumes of the cells, of the full circle in an axisymmetric scene. */
+PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[]);
+/* What the body forces give to a cell's unknowns (f: nv x dim, added to). */
+PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal f[]);
 /* Elastic energy of each cell: 1/2 u^T K u without thermal strains and springs. */
 PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[]);
 /* What the energy identity of a linear scene has beside F.u where there is thermal strain e, of each cell: the integral

@@ -77,6 +77,8 @@ PetscErrorCode HycoFOMToLocal(HycoFOM fom, Vec v, PetscReal value[]);
 PetscErrorCode HycoFOMToSurface(HycoFOM fom, Vec v, PetscReal value[]);
 /* The stresses of the last solution in sigma. Collective. */
 PetscErrorCode HycoFOMStress(HycoFOM fom);
+/* The scene's quantities of the last solution (value[scene->n_quantities]). Collective. */
+PetscErrorCode HycoFOMMeasureQuantities(HycoFOM fom, PetscReal value[]);
 /* The file's order, spread over the ranks; NULL on one. Borrowed. Collective. */
 PetscErrorCode HycoFOMGetRows(HycoFOM fom, const HycoFileOrder **rows);
 /* Values of the part's nodes or cells, so many of a type each, as this rank's rows in the file's order. Collective. */

@@ -87,5 +87,29 @@ typedef struct {
 PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
                           HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report);
 PetscErrorCode HycoFEElasticTangent(HycoFE fe);
+/* The internal forces of one cell from the state's stresses, the integral of B^T sigma (f: nv x dim, overwritten). */
+PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, PetscReal f[]);
+
+/*
+  The same of some bodies alone: those of laws that flow, or those of linear laws, whose stress and energy do not depend
+  on the past. Of the other cells nothing is read or written, and the report leaves them out. Springs, whatever they hold,
+  go with the bodies that flow.
+*/
+typedef enum { HYCO_BODIES_ALL, HYCO_BODIES_FLOWING, HYCO_BODIES_LINEAR } HycoBodies;
+PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[], PetscReal t0, PetscReal t1,
+                                HycoFEState begin, HycoFEState end, PetscReal f_int[], PetscBool tangent,
+                                HycoFEStepReport *report);
+
+/*
+  What the linear bodies give to f_int at some nodes, K u less what the thermal strains push, for who comes to one time
+  again and again: a product in place of their points. `nodes` (n_nodes; NULL: all): those whose rows are wanted.
+  HycoLinearForceSet(): at fe's parameters; K: the linear bodies' tangents or the nodes' places may have changed.
+  HycoLinearForceAdd(): added to f_int (n_dof). Not collective; destroying is NULL-safe.
+*/
+typedef struct _n_HycoLinearForce *HycoLinearForce;
+PetscErrorCode HycoLinearForceCreate(HycoFE fe, const PetscBool nodes[], HycoLinearForce *force);
+PetscErrorCode HycoLinearForceDestroy(HycoLinearForce *force);
+PetscErrorCode HycoLinearForceSet(HycoLinearForce force, PetscBool K);
+void HycoLinearForceAdd(HycoLinearForce force, const PetscReal u[], PetscReal f_int[]);
 
 #endif

@@ -6,7 +6,8 @@
 /* Determinant of the map from the reference cell to the nodes at X (3 a node of the mesh), at quadrature point q. */
 PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q);
 /* Gradients dN/dX (nv x 3) of the shape functions at quadrature point q, and |det J| w. In an axisymmetric scene the
-   third component is N / r, the hoop strain of a radial displacement, and the weight that of the full circle. */
+   third component is N / r, the hoop strain of a radial displacement, and the weight that of the full circle. The
+   weight is multiplied by the cell's in a cubature (fe->cell_weight). */
 PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal g[8][3],
                              PetscReal *weight);
 /* Means over the cell of the dilatation of unit displacements, which make that of the element bbar. */
@@ -25,6 +26,8 @@ void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const Pets
 /* f += w B^T stress of that point, at the cell's unknowns (nv x dim). */
 void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[8][3], PetscReal mean[8][3], PetscReal w,
                     const PetscReal stress[6], PetscReal f[]);
+/* push (nv x dim) += what the thermal strains of a cell push, the sum of w B^T C eps, by fe's tangents. */
+PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[]);
 /* Room for temperatures and thermal strains; fills them at fe's nodes and mu where what changed reaches them. */
 PetscErrorCode HycoHeatCreate(HycoFE fe);
 PetscErrorCode HycoFESetHeat(HycoFE fe, PetscBool all, const PetscBool changed[]);

@@ -75,4 +75,24 @@ PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular);
 /* Conjugate gradients with algebraic multigrid for a sparse, symmetric K, from the last solution. */
 PetscErrorCode HycoIterativeSolver(MPI_Comm comm, const char prefix[], Mat K, KSP *ksp);
 
+/* -- the same under constraints, K x + B^T l = f, B x = d, for a regular K; all calls collective -- */
+
+typedef struct _n_HycoConstrained *HycoConstrained;
+
+/* Sets the multigrid for K up; K is borrowed and must not change. No constraint yet. */
+PetscErrorCode HycoConstrainedCreate(MPI_Comm comm, const char prefix[], Mat K, HycoConstrained *constrained);
+/* Frees; sets the handle to NULL. NULL-safe. */
+PetscErrorCode HycoConstrainedDestroy(HycoConstrained *constrained);
+/* The rows of B (referenced) are the constraints from now on; at: for each of this rank's rows an unknown of the node
+   that it belongs to, a contact's slave. *singular: they depend on each other. */
+PetscErrorCode HycoConstrainedSet(HycoConstrained constrained, Mat B, const PetscInt at[], PetscBool *singular);
+/* |f| as the solver measures it: sqrt(f . M f), M the preconditioner. */
+PetscErrorCode HycoConstrainedSize(HycoConstrained constrained, Vec f, PetscReal *size);
+/* x from what it is, to a residual of that size; d (as B x) is not read without constraints. its: what it took. */
+PetscErrorCode HycoConstrainedSolve(HycoConstrained constrained, Vec f, Vec d, PetscReal size, Vec x, PetscInt *its);
+/* The constraints' forces l for which B^T l is closest to r = f - K x. */
+PetscErrorCode HycoConstrainedForces(HycoConstrained constrained, Vec r, Vec l);
+/* Borrowed. */
+PetscErrorCode HycoConstrainedGetKSP(HycoConstrained constrained, KSP *ksp);
+
 #endif

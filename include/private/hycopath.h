@@ -11,8 +11,9 @@
 
 typedef struct _n_HycoSeries *HycoSeries;
 
-/* What one iteration of a step solves with: the consistent tangent, or the elastic stiffness, whose factor stays. */
-typedef enum { HYCO_NEWTON_AUTO, HYCO_NEWTON_TANGENT, HYCO_NEWTON_ELASTIC } HycoNewton;
+/* What one iteration of a step solves with: the consistent tangent; the elastic stiffness, whose factor stays; a
+   tangent that stays as long as the iterations contract. */
+typedef enum { HYCO_NEWTON_AUTO, HYCO_NEWTON_TANGENT, HYCO_NEWTON_ELASTIC, HYCO_NEWTON_MODIFIED } HycoNewton;
 
 #define HYCO_ANDERSON 5 /* depth of the acceleration */
 
@@ -81,6 +82,7 @@ struct _n_HycoPath {
   Vec L_old, gap_work;     /* as Lambda; NULL without contact */
   PetscReal *f_local, *u0; /* of fe's n_dof */
   PetscBool tangent;       /* K is a tangent, not the elastic stiffness */
+  PetscInt kept;           /* contact systems that were solved with this K */
   PetscBool flows;         /* some body's law has a memory */
   /* Anderson's acceleration: differences of iterates and residuals, newest last */
   PetscInt n_mixed;
@@ -131,8 +133,8 @@ PetscErrorCode HycoPathMoves(HycoPath path, const PetscScalar u[], Vec work, Pet
 /* How many solves a factor with its flexibility costs, as a rule: in 3D 24 were counted at 29,000 unknowns and 50 at
    118,000, the root of their number; in 2D a fifth of that. */
 PetscReal HycoPathFactorCost(HycoPath path);
-/* Whether steps are solved with the elastic stiffness. */
-PetscBool HycoPathPrefersElastic(HycoPath path);
+/* What steps are solved with; not HYCO_NEWTON_AUTO. */
+HycoNewton HycoPathMethod(HycoPath path);
 /* What a path has to tell. */
 void HycoPathGetHistory(HycoPath path, HycoHistory *history);
 

@@ -45,6 +45,7 @@ typedef struct {
   PetscInt *at;                /* by listed time: its accepted step */
   PetscReal *Lambda, *sigma, *inelastic;
   HycoHistory history;
+  HycoStep *step; /* n_listed: its steps with the scene's quantities; NULL: not measured yet, or there are none */
 } HycoTrace;
 
 /* What all types of reduced model have; a type's own is in `data`. */
@@ -112,6 +113,8 @@ PetscErrorCode HycoROMCreate(HycoROM *model);
 PetscErrorCode HycoTraceBegin(HycoROM model);
 PetscErrorCode HycoTraceAdd(HycoROM model, PetscReal t);
 PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inelastic);
+/* Of that listed time, once m->Lambda is of all contacts: its forces, and the size of U in the RID. */
+void HycoTraceMeasure(HycoROM model, HycoStep *step);
 PetscErrorCode HycoTraceFree(HycoROM model);
 /* The fields of the path at its listed times on the whole mesh, as HycoFOMSetSeries() has them (replay.c). */
 PetscErrorCode HycoTraceWrite(HycoROM model, const char path[]);
@@ -165,8 +168,10 @@ static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start
   return start;
 }
 
-/* The scene's quantities (value[scene->n_quantities]) of the last prediction (probe.c). */
-PetscErrorCode HycoROMMeasureQuantities(HycoROM model, PetscReal value[]);
+/* The scene's quantities of the last prediction, of a path also those of its listed times (probe.c). */
+PetscErrorCode HycoROMMeasureQuantities(HycoROM model, HycoPrediction *prediction);
+/* Of a path: into its history's steps; done once. */
+PetscErrorCode HycoROMMeasurePath(HycoROM model);
 /* NULL-safe. */
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
 

@@ -7,5 +7,7 @@
 PetscErrorCode HycoROMCreate_Hybrid(HycoROM model);
 PetscErrorCode HycoROMCreate_Projection(HycoROM model);
 PetscErrorCode HycoROMCreate_Condensed(HycoROM model);
+PetscErrorCode HycoROMCreate_Cubature(HycoROM model);
+PetscErrorCode HycoROMCreate_Regression(HycoROM model);
 
 #endif

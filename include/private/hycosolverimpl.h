@@ -77,7 +77,7 @@ struct _p_HycoSolver {
   char form_name[32], tao_type[HYCO_TAO_NAME]; /* empty: by the problem */
   PetscReal rtol;
   PetscInt max_its;
-  PetscBool warm, fallback, multilevel;
+  PetscBool warm, fallback, multilevel, refine;
   HycoLinear linear;
   PetscReal memory; /* bytes that factors may take, all ranks together; 0: most of what is free */
   HycoMonitor monitor;
@@ -114,6 +114,7 @@ PetscErrorCode HycoSolverFormCreate_Linear(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Shell(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form);
+PetscErrorCode HycoSolverFormCreate_Projected(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm form);
 /* The form of that name; NULL: there is none. */
 HycoSolverForm HycoSolverFindForm(HycoSolver s, const char name[]);
@@ -153,6 +154,9 @@ PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x);
 /* K^-1 F of the next solve, which takes it for granted if it uses the dual form and K is regular. Borrowed until then.
  */
 PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x);
+/* Whether what misses its residuals by round-off is solved again by solves refined in twice the working precision
+   (yes), which take hundreds of times as long: not for an iteration whose end is judged anyway. */
+PetscErrorCode HycoSolverSetRefine(HycoSolver s, PetscBool refine);
 /* The contacts from which the active set of the next solve begins, m of them, with a given flexibility. Borrowed until
    then. */
 PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);

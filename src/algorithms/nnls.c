@@ -88,6 +88,8 @@ static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[
   return PETSC_FALSE;
 }
 
+#define TIE 1e-8 /* of two gradients this close neither is larger: the first column is taken */
+
 /* r = b - A x = b - Q Q^T b, and the gradient w = A^T r. */
 static void Gradient(const Passive *f, const PetscReal A[], const PetscReal b[], PetscReal r[], PetscReal w[])
 {
@@ -127,7 +129,7 @@ PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Petsc
     PetscInt best = -1;
 
     for (PetscInt j = 0; j < n; j++) {
-      if (!passive[j] && !banned[j] && w[j] > tol && (best < 0 || w[j] > w[best])) best = j;
+      if (!passive[j] && !banned[j] && w[j] > tol && (best < 0 || w[j] > (1 + TIE) * w[best])) best = j;
     }
     if (best < 0) break;
     banned[best] = PETSC_TRUE; /* until the set has changed */

@@ -88,7 +88,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   }
   ReportKKT(json, &p->kkt);
   ReportSeconds(json, &p->seconds);
-  if (path) DriverReportReducedPath(json, path);
+  if (path) PetscCall(DriverReportReducedPath(json, scene, path));
   PetscCall(ReportWrite(&json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -98,6 +98,9 @@ static PetscErrorCode SayReduced(const HycoPrediction *p)
   PetscFunctionBegin;
   if (p->gives_forces)
     PetscCall(Say("%s: %d contacts, %d modes\n", p->title, (int)p->n_contacts, (int)p->n_modes));
+  else if (p->rid_fraction < 1 && p->n_multipliers != p->n_contacts)
+    PetscCall(Say("%s: %d modes, %d force vectors for %d contacts; %d elements (%.1f %%)\n", p->title, (int)p->n_modes,
+                  (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements, 100 * (double)p->rid_fraction));
   else if (p->n_fe_dofs || p->rid_fraction < 1)
     PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
                   (int)p->n_modes, (int)p->n_fe_dofs, (int)p->n_contacts, (int)p->rid_elements,
@@ -237,12 +240,32 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "largest_rid_mises",
                                                "largest_rid_inelastic"};
 
-/* own: columns without the scene's quantities, more of paths; width: with them. */
+/* own: columns without the scene's quantities, more of paths; with them; width: of paths with their extremes too. */
 typedef struct {
-  PetscInt own, width;
+  PetscInt own, with_quantities, width;
+  char path_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
 } Shape;
 
-static void FillRow(const HycoPrediction *p, Shape s, PetscReal v[])
+/* names: room for N_COLUMNS + 2 HYCO_MAX_QUANTITIES, borrowed from the scene and the shape. */
+static PetscErrorCode ShapeOf(HycoScene scene, Shape *s, const char *names[])
+{
+  PetscInt n_times;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
+  s->own = n_times ? N_COLUMNS : PATH_FORCE;
+  PetscCall(ReportColumns(scene, s->own, columns, &s->with_quantities, names));
+  s->width = s->with_quantities;
+  for (PetscInt c = s->own; n_times && c < s->with_quantities; c++) {
+    char *name = s->path_name[c - s->own];
+
+    PetscCall(PetscSNPrintf(name, DRIVER_LINE, "path_%s", names[c]));
+    names[s->width++] = name;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void FillRow(const HycoPrediction *p, const Shape *s, PetscReal v[])
 {
   v[FORCE] = p->total_contact_force;
   v[LAMBDA_MAX] = p->lambda_max;
@@ -257,17 +280,18 @@ static void FillRow(const HycoPrediction *p, Shape s, PetscReal v[])
   v[ESTIMATE_SIGMA] = p->estimated_error_sigma >= 0 ? p->estimated_error_sigma : NAN;
   v[ESTIMATE_LAMBDA] = p->estimated_error_lambda >= 0 ? p->estimated_error_lambda : NAN;
   v[BEYOND] = p->beyond;
-  if (s.own > PATH_FORCE) {
+  if (s->own > PATH_FORCE) {
     v[PATH_FORCE] = p->path_force;
     v[PATH_MISES] = p->path_mises;
     v[PATH_INELASTIC] = p->path_inelastic;
   }
-  for (PetscInt k = s.own; k < s.width; k++) v[k] = p->quantity[k - s.own];
+  for (PetscInt k = s->own; k < s->with_quantities; k++) v[k] = p->quantity[k - s->own];
+  for (PetscInt k = s->with_quantities; k < s->width; k++) v[k] = p->path_quantity[k - s->with_quantities];
 }
 
 /* This rank's points. full[k]: point k is to be solved full order. */
 static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, PetscInt n, PetscInt n_par,
-                                  const PetscReal mu[], Shape s, PetscReal value[], PetscInt full[])
+                                  const PetscReal mu[], const Shape *s, PetscReal value[], PetscInt full[])
 {
   PetscMPIInt rank, size;
   PetscInt first, count;
@@ -282,7 +306,7 @@ static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, Petsc
   PetscCall(PetscMalloc1(count, &all));
   PetscCall(HycoROMSolveMany(model, count, n_par, mu + first * n_par, all, NULL, NULL));
   for (PetscInt k = 0; k < count; k++) {
-    FillRow(&all[k], s, value + (first + k) * s.width);
+    FillRow(&all[k], s, value + (first + k) * s->width);
     DriverWantsFullOrder(fallback, &all[k], why);
     full[first + k] = why[0] != '\0';
   }
@@ -292,9 +316,9 @@ static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, Petsc
 
 /* All ranks together, the points where the reduced model was not enough. */
 static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, const PetscReal mu[],
-                                const PetscInt full[], Shape s, PetscReal value[])
+                                const PetscInt full[], const Shape *s, PetscReal value[])
 {
-  const PetscInt width = s.width;
+  const PetscInt width = s->width;
   PetscInt count = 0;
 
   PetscFunctionBegin;
@@ -318,26 +342,24 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
 
 static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples)
 {
-  PetscInt n, n_par, n_times, *full;
+  PetscInt n, n_par, *full;
   Shape s;
   const PetscReal *mu;
-  const char *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
+  const char *names[N_COLUMNS + 2 * HYCO_MAX_QUANTITIES];
   PetscReal *value, begin;
   char table[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
-  s.own = n_times ? N_COLUMNS : PATH_FORCE;
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(DriverCheckLeftEarly()); /* what the solver alone knows is read by the first prediction */
-  PetscCall(ReportColumns(scene, s.own, columns, &s.width, names));
+  PetscCall(ShapeOf(scene, &s, names));
   PetscCall(PetscCalloc2(n * s.width, &value, n, &full));
   begin = HycoNow();
-  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, s, value, full));
+  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, &s, value, full));
   HycoAllreduce(value, n * s.width, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
   HycoAllreduce(full, n, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD);
-  PetscCall(SolveRest(fallback, n, n_par, mu, full, s, value));
+  PetscCall(SolveRest(fallback, n, n_par, mu, full, &s, value));
   begin = HycoNow() - begin;
   PetscCall(ReportSet("predict", table, scene, samples, s.width, names, value, begin));
   PetscCall(PetscFree2(value, full));

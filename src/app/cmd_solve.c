@@ -108,7 +108,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   cJSON_AddNumberToObject(json, "rounding", s->kkt.rounding);
   ReportSeconds(json, &s->seconds);
   PetscCall(HycoFOMGetHistory(fom, &history));
-  if (history.n) DriverReportHistory(json, &history);
+  if (history.n) PetscCall(DriverReportHistory(json, scene, &history));
   PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
                 (int)s->n_active, (int)s->iterations, method));
   PetscCall(Remarks(s));

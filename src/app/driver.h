@@ -237,8 +237,8 @@ PetscErrorCode DriverSayStep(const HycoStep *step, PetscInt n);
 /* A CSV ("": none) with a row for each of n times. Collective. */
 PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const PetscReal mu[], PetscBool reduced,
                                 PetscInt n, const HycoStep step[]);
-/* An array of n for each of their numbers. */
-void DriverReportSteps(cJSON *history, PetscBool reduced, PetscInt n, const HycoStep step[]);
+/* An array of n for each of their numbers, and of the scene's quantities under `outputs`. */
+PetscErrorCode DriverReportSteps(cJSON *history, HycoScene scene, PetscBool reduced, PetscInt n, const HycoStep step[]);
 
 /* -- solve_history.c: a path -- */
 
@@ -249,7 +249,7 @@ typedef struct {
 } DriverPath;
 /* A HycoStepMonitor; ctx: a DriverPath. */
 PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *step, void *ctx);
-void DriverReportHistory(cJSON *json, const HycoHistory *history);
+PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHistory *history);
 /* After the solve: the table ("": none), a summary; fails where the path has not reached its end. Collective. */
 PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char table[]);
 
@@ -268,7 +268,7 @@ PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path);
 /* A line a time; the table ("": none). Collective. */
 PetscErrorCode DriverSayReducedPath(HycoScene scene, const PetscReal mu[], const DriverReducedPath *path,
                                     const char table[]);
-void DriverReportReducedPath(cJSON *json, const DriverReducedPath *path);
+PetscErrorCode DriverReportReducedPath(cJSON *json, HycoScene scene, const DriverReducedPath *path);
 
 /* -- compare_history.c -- */
 

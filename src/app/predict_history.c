@@ -32,11 +32,13 @@ PetscErrorCode DriverSayReducedPath(HycoScene scene, const PetscReal mu[], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void DriverReportReducedPath(cJSON *json, const DriverReducedPath *path)
+PetscErrorCode DriverReportReducedPath(cJSON *json, HycoScene scene, const DriverReducedPath *path)
 {
   cJSON *history = cJSON_AddObjectToObject(json, "history");
 
+  PetscFunctionBegin;
   cJSON_AddBoolToObject(history, "ended", path->ended);
   cJSON_AddNumberToObject(history, "t_end", path->t);
-  DriverReportSteps(history, PETSC_TRUE, path->n, path->step);
+  PetscCall(DriverReportSteps(history, scene, PETSC_TRUE, path->n, path->step));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

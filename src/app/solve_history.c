@@ -13,18 +13,19 @@ PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *s, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void DriverReportHistory(cJSON *json, const HycoHistory *h)
+PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHistory *h)
 {
   cJSON *history = cJSON_AddObjectToObject(json, "history");
   PetscReal seconds[3] = {0, 0, 0};
 
+  PetscFunctionBegin;
   cJSON_AddBoolToObject(history, "ended", h->ended);
   cJSON_AddNumberToObject(history, "t_end", h->t);
   cJSON_AddStringToObject(history, "newton", h->newton);
   cJSON_AddNumberToObject(history, "factor_in_solves", h->factor_cost);
   cJSON_AddNumberToObject(history, "newton_order", h->order);
   cJSON_AddNumberToObject(history, "newton_orders", h->n_orders);
-  DriverReportSteps(history, PETSC_FALSE, h->n, h->step);
+  PetscCall(DriverReportSteps(history, scene, PETSC_FALSE, h->n, h->step));
   for (PetscInt k = 0; k < h->n; k++) {
     seconds[0] += h->step[k].seconds_factor;
     seconds[1] += h->step[k].seconds_solve;
@@ -33,6 +34,7 @@ void DriverReportHistory(cJSON *json, const HycoHistory *h)
   cJSON_AddNumberToObject(history, "seconds_factor", seconds[0]);
   cJSON_AddNumberToObject(history, "seconds_solve", seconds[1]);
   cJSON_AddNumberToObject(history, "seconds_law", seconds[2]);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode SayEnd(const HycoHistory *h)

@@ -28,7 +28,7 @@ static const Column columns[] = {
     BOTH("cuts", cuts, PETSC_TRUE),
     BOTH("iterations", iterations, PETSC_TRUE),
     BOTH("most_iterations", most_iterations, PETSC_TRUE),
-    FULL_ONLY("factors", factors, PETSC_TRUE),
+    BOTH("factors", factors, PETSC_TRUE),
     BOTH("active_set_iterations", active_set_iterations, PETSC_TRUE),
     BOTH("n_active", n_active, PETSC_TRUE),
     BOTH("total_contact_force", total_contact_force, PETSC_FALSE),
@@ -74,32 +74,39 @@ PetscErrorCode DriverSayStep(const HycoStep *s, PetscInt n)
 PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const PetscReal mu[], PetscBool reduced,
                                 PetscInt n, const HycoStep step[])
 {
-  const char *names[N_COLUMNS];
+  const char *own[N_COLUMNS], *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
   PetscReal *value, *point;
-  PetscInt n_par, n_columns = 0;
+  PetscInt n_par, n_own = 0, width;
 
   PetscFunctionBegin;
   if (!n || !table[0]) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt c = 0; c < N_COLUMNS; c++) {
-    if (NameOf(&columns[c], reduced)) names[n_columns++] = NameOf(&columns[c], reduced);
+    if (NameOf(&columns[c], reduced)) own[n_own++] = NameOf(&columns[c], reduced);
   }
+  PetscCall(ReportColumns(scene, n_own, own, &width, names));
   PetscCall(HycoSceneGetParameters(scene, &n_par, NULL, NULL, NULL));
-  PetscCall(PetscMalloc2(n * n_columns, &value, n * n_par, &point));
+  PetscCall(PetscMalloc2(n * width, &value, n * n_par, &point));
   for (PetscInt k = 0; k < n; k++) {
-    PetscReal *v = value + k * n_columns;
+    PetscReal *v = value + k * width;
 
     for (PetscInt c = 0; c < N_COLUMNS; c++) {
       if (NameOf(&columns[c], reduced)) *v++ = ValueOf(&columns[c], &step[k]);
     }
+    PetscCall(PetscArraycpy(v, step[k].quantity, width - n_own));
     PetscCall(PetscArraycpy(point + k * n_par, mu, n_par));
   }
-  PetscCall(DriverWriteTable(table, scene, n, point, n_columns, names, value));
+  PetscCall(DriverWriteTable(table, scene, n, point, width, names, value));
   PetscCall(PetscFree2(value, point));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void DriverReportSteps(cJSON *history, PetscBool reduced, PetscInt n, const HycoStep step[])
+PetscErrorCode DriverReportSteps(cJSON *history, HycoScene scene, PetscBool reduced, PetscInt n, const HycoStep step[])
 {
+  const char *names[HYCO_MAX_QUANTITIES];
+  cJSON *outputs;
+  PetscInt n_quantities;
+
+  PetscFunctionBegin;
   for (PetscInt c = 0; c < N_COLUMNS; c++) {
     const char *name = NameOf(&columns[c], reduced);
     cJSON *array = name ? cJSON_AddArrayToObject(history, name) : NULL;
@@ -107,4 +114,12 @@ void DriverReportSteps(cJSON *history, PetscBool reduced, PetscInt n, const Hyco
     for (PetscInt k = 0; array && k < n; k++)
       cJSON_AddItemToArray(array, cJSON_CreateNumber(ValueOf(&columns[c], &step[k])));
   }
+  PetscCall(HycoSceneGetQuantities(scene, &n_quantities, names));
+  outputs = n_quantities ? cJSON_AddObjectToObject(history, "outputs") : NULL;
+  for (PetscInt q = 0; q < n_quantities; q++) {
+    cJSON *array = cJSON_AddArrayToObject(outputs, names[q]);
+
+    for (PetscInt k = 0; k < n; k++) cJSON_AddItemToArray(array, cJSON_CreateNumber(step[k].quantity[q]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

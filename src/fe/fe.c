@@ -28,6 +28,7 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscCall(PetscFree((*fe)->oblique_at));
   PetscCall(PetscFree((*fe)->u0));
   PetscCall(PetscFree((*fe)->kept));
+  PetscCall(PetscFree((*fe)->kept_mean));
   PetscCall(PetscFree((*fe)->tangent));
   PetscCall(PetscFree((*fe)->tangent_start));
   PetscCall(PetscFree((*fe)->tangent_size));

@@ -29,32 +29,72 @@ static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal va
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddBodyForces(HycoFE fe, PetscInt cell, Into F)
+/* What the body forces at point q of a cell give to its unknowns, added to value. */
+static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, const HycoAcceleration *motion,
+                                    PetscReal value[])
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
   const HycoBody *body = &fe->scene->body[m->cell_body[cell]];
+  PetscReal x[3], g[8][3], w, inertia[3];
+
+  PetscFunctionBegin;
+  PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+  HycoPointPlace(fe, el, cell, q, x);
+  PetscCall(HycoInertiaForce(fe, body, motion, x, inertia));
+  for (PetscInt c = 0; c < m->dim; c++) {
+    PetscReal f = 0;
+
+    if (!body->force[c] && inertia[c] == 0) continue;
+    if (body->force[c]) PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
+    f += inertia[c];
+    for (PetscInt a = 0; a < m->nv; a++) value[a * m->dim + c] += w * f * el->N[q][a];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether any force acts on the volume of a body. */
+static PetscBool HasBodyForce(HycoFE fe, PetscInt cell)
+{
+  const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
+
+  return (PetscBool)(body->force[0] || body->force[1] || body->force[2] || HycoSceneHasInertia(fe->scene, body, NULL));
+}
+
+PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal value[])
+{
   HycoAcceleration motion;
 
   PetscFunctionBegin;
-  PetscCall(HycoAccelerationSet(fe, body, &motion));
-  for (PetscInt q = 0; q < el->nq; q++) {
-    PetscReal x[3], g[8][3], w, inertia[3];
+  if (!HasBodyForce(fe, cell)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoAccelerationSet(fe, &fe->scene->body[fe->mesh->cell_body[cell]], &motion));
+  for (PetscInt q = 0; q < HycoElementGet(fe->mesh->type)->nq; q++)
+    PetscCall(AddPointForce(fe, cell, q, &motion, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
-    HycoPointPlace(fe, el, cell, q, x);
-    PetscCall(HycoInertiaForce(fe, body, &motion, x, inertia));
-    for (PetscInt c = 0; c < m->dim; c++) {
-      PetscReal f = 0;
+static PetscErrorCode AddBodyForces(HycoFE fe, PetscInt cell, Into F)
+{
+  HycoMesh m = fe->mesh;
+  HycoAcceleration motion;
 
-      if (!body->force[c] && inertia[c] == 0) continue;
-      if (body->force[c]) PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
-      f += inertia[c];
-      for (PetscInt a = 0; a < m->nv; a++)
-        PetscCall(AddNode(fe, m->cells[cell * m->nv + a], c, w * f * el->N[q][a], F));
-    }
+  PetscFunctionBegin;
+  if (!HasBodyForce(fe, cell)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoAccelerationSet(fe, &fe->scene->body[m->cell_body[cell]], &motion));
+  for (PetscInt q = 0; q < HycoElementGet(m->type)->nq; q++) {
+    PetscReal f[HYCO_MAX_CELL_DOFS] = {0};
+
+    PetscCall(AddPointForce(fe, cell, q, &motion, f));
+    for (PetscInt k = 0; k < m->nv * m->dim; k++)
+      PetscCall(AddNode(fe, m->cells[cell * m->nv + k / m->dim], k % m->dim, f[k], F));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a load acts on a facet: where its cell is another process's, that does. */
+static PetscBool Acts(HycoFE fe, PetscInt facet)
+{
+  return (PetscBool)(fe->all_facets || fe->mesh->facet_cell[facet] >= 0);
 }
 
 static PetscErrorCode AddFacetLoad(HycoFE fe, const HycoLoad *load, PetscInt facet, Into F)
@@ -94,7 +134,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(4 * m->n_nodes, &sum));
   for (PetscInt f = 0; f < m->n_facets; f++) {
-    if (m->facet_group[f] != group || m->facet_cell[f] < 0) continue;
+    if (m->facet_group[f] != group || !Acts(fe, f)) continue;
     for (PetscInt q = 0; q < el->nq; q++) {
       PetscReal v[4];
 
@@ -172,14 +212,12 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the thermal strains of a cell push: the sum of w B^T C eps. */
-static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Into F)
+PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
 {
-  HycoMesh m = fe->mesh;
-  const HycoElement *el = HycoElementGet(m->type);
-  const PetscInt size = fe->tangent_size[m->cell_body[cell]];
-  const PetscBool bbar = fe->bbar[m->cell_body[cell]];
-  PetscReal f[HYCO_MAX_CELL_DOFS] = {0}, g[8][3], mean[8][3], w;
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscInt size = fe->tangent_size[fe->mesh->cell_body[cell]];
+  const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
+  PetscReal g[8][3], mean[8][3], w;
 
   PetscFunctionBegin;
   if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));
@@ -190,8 +228,19 @@ static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Into F)
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
     HycoTangentApply(HycoFEIsIsotropic(fe, cell), fe->dim, fe->tangent + fe->tangent_start[cell] + q * size, strain,
                      stress);
-    HycoPointForce(fe, el, g, bbar ? mean : NULL, w, stress, f);
+    HycoPointForce(fe, el, g, bbar ? mean : NULL, w, stress, push);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the thermal strains of a cell push: the sum of w B^T C eps. */
+static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Into F)
+{
+  HycoMesh m = fe->mesh;
+  PetscReal f[HYCO_MAX_CELL_DOFS] = {0};
+
+  PetscFunctionBegin;
+  PetscCall(HycoCellHeat(fe, cell, f));
   for (PetscInt k = 0; k < m->nv * m->dim; k++)
     PetscCall(AddNode(fe, m->cells[cell * m->nv + k / m->dim], k % m->dim, f[k], F));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -259,8 +308,7 @@ static PetscErrorCode AddForces(HycoFE fe, Into F)
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const HycoBody *body = &fe->scene->body[m->cell_body[e]];
 
-    if (body->force[0] || body->force[1] || body->force[2] || HycoSceneHasInertia(fe->scene, body, NULL))
-      PetscCall(AddBodyForces(fe, e, F));
+    PetscCall(AddBodyForces(fe, e, F));
     if (fe->lifted && F.vec) PetscCall(AddLifting(fe, e, F));
     if (hot && body->expansion) PetscCall(AddHeat(fe, e, F));
   }
@@ -273,7 +321,7 @@ static PetscErrorCode AddForces(HycoFE fe, Into F)
     for (PetscInt c = 0; c < m->dim; c++) in_space = (PetscBool)(in_space || HycoExprInSpace(load->traction[c]));
     if (!in_space) PetscCall(AddUniformLoad(fe, load, g, &fe->shares[k], F));
     for (PetscInt f = 0; f < m->n_facets && in_space; f++) {
-      if (m->facet_group[f] == g && m->facet_cell[f] >= 0) PetscCall(AddFacetLoad(fe, load, f, F));
+      if (m->facet_group[f] == g && Acts(fe, f)) PetscCall(AddFacetLoad(fe, load, f, F));
     }
   }
   for (PetscInt k = 0; k < fe->scene->n_point_loads; k++) PetscCall(AddPointLoad(fe, &fe->scene->point_load[k], F));

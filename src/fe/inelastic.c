@@ -371,13 +371,16 @@ static PetscErrorCode Step(HycoFE fe, const HycoElement *el, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode StepAll(HycoFE fe, Batch *b)
+static PetscErrorCode StepAll(HycoFE fe, HycoBodies bodies, Batch *b)
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
+    const PetscBool linear = fe->scene->body[m->cell_body[e]].law->linear;
+
+    if (bodies != HYCO_BODIES_ALL && linear != (PetscBool)(bodies == HYCO_BODIES_LINEAR)) continue;
     if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Step(fe, el, b));
     b->cell[b->n++] = e;
   }
@@ -385,8 +388,9 @@ static PetscErrorCode StepAll(HycoFE fe, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
-                          HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report)
+PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[], PetscReal t0, PetscReal t1,
+                                HycoFEState begin, HycoFEState end, PetscReal f_int[], PetscBool tangent,
+                                HycoFEStepReport *report)
 {
   const HycoFEStepReport fresh = {.dt_factor = 1, .has_potential = PETSC_TRUE};
   Batch b = {.u = u, .t0 = t0, .t1 = t1, .begin = begin, .end = end, .f_int = f_int, .tangents = tangent};
@@ -399,10 +403,10 @@ PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscRea
   b.report = report;
   PetscCall(HycoFEKeepGradients(fe));
   PetscCall(BatchCreate(fe, &b));
-  ierr = StepAll(fe, &b);
+  ierr = StepAll(fe, bodies, &b);
   PetscCall(BatchDestroy(&b));
   PetscCall(ierr);
-  if (fe->springs && !report->failed) {
+  if (fe->springs && bodies != HYCO_BODIES_LINEAR && !report->failed) { /* once, of all bodies */
     const PetscReal energy = HycoSpringsEnergy(fe, u);
 
     HycoSpringsAddForces(fe, -1, u, f_int);
@@ -412,10 +416,37 @@ PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
+                          HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEStepBodies(fe, HYCO_BODIES_ALL, u, t0, t1, begin, end, f_int, tangent, report));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFEElasticTangent(HycoFE fe)
 {
   PetscFunctionBegin;
   PetscCall(HycoFESetTangents(fe, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, PetscReal f[])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
+  PetscReal g[8][3], mean[8][3], w;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(f, fe->mesh->nv * fe->dim));
+  if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal s[6] = {0, 0, 0, 0, 0, 0};
+
+    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    PetscCall(PetscArraycpy(s, PointAt(fe, state, cell, q).stress, fe->n_sigma));
+    HycoPointForce(fe, el, g, bbar ? mean : NULL, w, s, f);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

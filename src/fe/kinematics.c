@@ -75,6 +75,29 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
     for (PetscInt a = 0; a < el->nv; a++) g[a][2] = el->N[q][a] / r;
     *weight *= 2 * PETSC_PI * r;
   }
+  if (fe->cell_weight) *weight *= fe->cell_weight[cell];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of the cells of bodies with bbar, from the gradients that are kept. */
+static PetscErrorCode KeepMeans(HycoFE fe, const HycoElement *el)
+{
+  PetscReal *mean = fe->kept_mean;
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < fe->scene->n_bodies; b++) any = (PetscBool)(any || fe->bbar[b]);
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!mean) PetscCall(PetscCalloc1((size_t)fe->mesh->n_cells * (size_t)(3 * el->nv), &mean));
+  fe->kept_mean = NULL; /* they are computed */
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    PetscReal g[8][3];
+
+    if (!fe->bbar[fe->mesh->cell_body[e]]) continue;
+    PetscCall(HycoMeanGradients(fe, el, e, g));
+    PetscCall(PetscArraycpy(mean + (size_t)e * (size_t)(3 * el->nv), &g[0][0], 3 * el->nv));
+  }
+  fe->kept_mean = mean;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,6 +122,7 @@ PetscErrorCode HycoFEKeepGradients(HycoFE fe)
   }
   fe->kept = kept;
   fe->kept_place = fe->place;
+  PetscCall(KeepMeans(fe, el));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -121,6 +145,10 @@ PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell
   PetscReal g[8][3], w, volume = 0;
 
   PetscFunctionBegin;
+  if (fe->kept_mean && fe->kept_place == fe->place) {
+    PetscCall(PetscArraycpy(&mean[0][0], fe->kept_mean + (size_t)cell * (size_t)(3 * el->nv), 3 * el->nv));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(PetscMemzero(mean, 8 * sizeof(mean[0])));
   for (PetscInt q = 0; q < el->nq; q++) {
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
@@ -182,13 +210,14 @@ void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const Pets
                      PetscReal mean[8][3], PetscReal e[6])
 {
   HycoMesh m = fe->mesh;
-  PetscReal h[3][3], excess = 0;
+  const PetscInt *node = m->cells + cell * m->nv;
+  PetscReal h[3][3] = {{0}}, excess = 0;
 
-  for (PetscInt c = 0; c < 3; c++) {
-    for (PetscInt d = 0; d < 3; d++) {
-      h[c][d] = 0;
-      for (PetscInt a = 0; c < m->dim && a < el->nv; a++)
-        h[c][d] += u[m->cells[cell * m->nv + a] * m->dim + c] * g[a][d];
+  for (PetscInt a = 0; a < el->nv; a++) {
+    const PetscReal *own = u + node[a] * m->dim;
+
+    for (PetscInt c = 0; c < m->dim; c++) {
+      for (PetscInt d = 0; d < 3; d++) h[c][d] += own[c] * g[a][d];
     }
   }
   if (fe->formulation == HYCO_AXISYMMETRIC) {

@@ -117,19 +117,23 @@ static PetscErrorCode AddGeneral(HycoFE fe, const HycoElement *el, PetscInt cell
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
     StrainRows(fe, el, g, bbar ? mean : NULL, B);
     for (PetscInt k = 0; k < ns; k++) {
-      for (PetscInt t = 0; t < n; t++) {
-        CB[t] = 0;
-        for (PetscInt l = 0; l < ns; l++) CB[t] += w * C[k * ns + l] * B[l * n + t];
+      for (PetscInt t = 0; t < n; t++) CB[t] = 0;
+      for (PetscInt l = 0; l < ns; l++) {
+        const PetscReal c = w * C[k * ns + l];
+
+        for (PetscInt t = 0; t < n; t++) CB[t] += c * B[l * n + t];
       }
       for (PetscInt r = 0; r < n; r++) {
-        for (PetscInt t = r / fe->dim * fe->dim; t < n; t++) Ke[r * n + t] += B[k * n + r] * CB[t];
+        const PetscReal b = B[k * n + r];
+
+        for (PetscInt t = r / fe->dim * fe->dim; t < n && b != 0; t++) Ke[r * n + t] += b * CB[t];
       }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
@@ -143,7 +147,14 @@ PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   for (PetscInt r = 0; r < n; r++) {
     for (PetscInt t = 0; t < r / dim * dim; t++) Ke[r * n + t] = Ke[t * n + r];
   }
-  if (fe->springs) HycoSpringsAddStiffness(fe, cell, Ke);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEBodyStiffness(fe, cell, Ke));
+  HycoSpringsAddStiffness(fe, cell, Ke);
   HycoObliqueStiffness(fe, cell, Ke);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -55,6 +55,23 @@ PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+
+  PetscFunctionBegin;
+  for (PetscInt cell = 0; cell < fe->mesh->n_cells; cell++) {
+    volume[cell] = 0;
+    for (PetscInt q = 0; q < el->nq; q++) {
+      PetscReal g[8][3], w;
+
+      PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+      volume[cell] += w;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);

@@ -39,16 +39,19 @@ static const Member member[] = {INT(index),          REAL(t),
                                 REAL(seconds_solve), REAL(seconds_law)};
 #define N_MEMBERS ((PetscInt)(sizeof(member) / sizeof(member[0])))
 
-static void StepToReals(const HycoStep *s, PetscReal v[])
+#define STEP_COLS(f) (N_MEMBERS + (f)->scene->n_quantities)
+
+static void StepToReals(HycoFOM f, const HycoStep *s, PetscReal v[])
 {
   for (PetscInt j = 0; j < N_MEMBERS; j++) {
     const char *at = (const char *)s + member[j].at;
 
     v[j] = member[j].is_int ? (PetscReal) * (const PetscInt *)(const void *)at : *(const PetscReal *)(const void *)at;
   }
+  for (PetscInt k = 0; k < f->scene->n_quantities; k++) v[N_MEMBERS + k] = s->quantity[k];
 }
 
-static void RealsToStep(const PetscReal v[], HycoStep *s)
+static void RealsToStep(HycoFOM f, const PetscReal v[], HycoStep *s)
 {
   for (PetscInt j = 0; j < N_MEMBERS; j++) {
     char *at = (char *)s + member[j].at;
@@ -58,6 +61,7 @@ static void RealsToStep(const PetscReal v[], HycoStep *s)
     else
       *(PetscReal *)(void *)at = v[j];
   }
+  for (PetscInt k = 0; k < f->scene->n_quantities; k++) s->quantity[k] = v[N_MEMBERS + k];
 }
 
 /* What the file has by item: U, F_old, f_old of a node; the state of a cell, as long as the longest. */
@@ -78,11 +82,17 @@ static PetscErrorCode StateCols(HycoFOM f, PetscInt *cols)
 /* The scene and the point that a checkpoint is of. */
 static PetscErrorCode Identify(HycoFOM f, char text[HYCO_LINE])
 {
+  HycoScene scene = f->scene;
   unsigned long long hash;
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneFingerprint(f->scene, &hash));
-  hash = HycoHash(hash, f->path->mu, (size_t)f->scene->n_parameters * sizeof(PetscReal));
+  PetscCall(HycoSceneFingerprint(scene, &hash));
+  hash = HycoHash(hash, f->path->mu, (size_t)scene->n_parameters * sizeof(PetscReal));
+  for (PetscInt k = 0; k < scene->n_entries; k++) { /* the steps hold the outputs */
+    if (strncasecmp(scene->key[k], "output_", 7)) continue;
+    hash = HycoHash(hash, scene->key[k], strlen(scene->key[k]) + 1);
+    hash = HycoHash(hash, scene->value[k], strlen(scene->value[k]) + 1);
+  }
   HycoFormat(text, "%016llx", hash);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -171,7 +181,7 @@ static PetscErrorCode WriteContent(HycoFOM f, HycoH5 h, const Content *c, const 
   PetscCall(HycoH5WriteInt(h, "checkpoint/format", 1, 1, &format));
   PetscCall(HycoH5WriteText(h, "checkpoint/key", key));
   PetscCall(HycoH5WriteReal(h, "head", N_HEAD, 1, c->head));
-  PetscCall(HycoH5WriteReal(h, "steps", c->n_steps + 1, N_MEMBERS, c->steps));
+  PetscCall(HycoH5WriteReal(h, "steps", c->n_steps + 1, STEP_COLS(f), c->steps));
   if (c->n_orders) PetscCall(HycoH5WriteReal(h, "orders", c->n_orders, 1, c->orders));
   if (f->n_contacts) PetscCall(HycoH5WriteReal(h, "lambda", f->n_contacts, 1, c->lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -274,9 +284,9 @@ PetscErrorCode HycoPathSave(HycoFOM f)
   PetscCall(MoveForces(f, PETSC_TRUE, c.lambda));
   PetscCall(PetscMalloc1(N_HEAD, &c.head));
   MoveHead(p, PETSC_TRUE, c.head);
-  PetscCall(PetscMalloc1((p->n_steps + 1) * N_MEMBERS, &c.steps));
-  for (PetscInt k = 0; k < p->n_steps; k++) StepToReals(&p->steps[k], c.steps + k * N_MEMBERS);
-  StepToReals(&p->now, c.steps + p->n_steps * N_MEMBERS);
+  PetscCall(PetscMalloc1((p->n_steps + 1) * STEP_COLS(f), &c.steps));
+  for (PetscInt k = 0; k < p->n_steps; k++) StepToReals(f, &p->steps[k], c.steps + k * STEP_COLS(f));
+  StepToReals(f, &p->now, c.steps + p->n_steps * STEP_COLS(f));
   HycoDuplicate(p->n_orders, p->orders, &c.orders);
   PetscCall(HycoH5CreateShared(HycoComm(f), p->checkpoint, &h));
   ierr = WriteAll(f, h, &c, key);
@@ -305,7 +315,7 @@ static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content 
   rows = N_HEAD;
   PetscCall(HycoH5LoadReal(h, "head", &rows, &one, &c->head));
   rows = -1;
-  PetscCall(HycoH5LoadReal(h, "steps", &rows, (PetscInt[]){N_MEMBERS}, &c->steps));
+  PetscCall(HycoH5LoadReal(h, "steps", &rows, (PetscInt[]){STEP_COLS(f)}, &c->steps));
   c->n_steps = rows - 1;
   HycoCheck(c->n_steps >= 0 && c->n_steps <= f->scene->n_times && c->head[2] >= 0 &&
                 c->head[2] <= (PetscReal)f->scene->n_times && c->head[3] == (PetscReal)c->n_steps,
@@ -357,7 +367,7 @@ static PetscErrorCode SpreadContent(HycoFOM f, Content *c)
   c->n_steps = size[1];
   c->n_orders = size[2];
   PetscCall(Spread(f, N_HEAD, &c->head));
-  PetscCall(Spread(f, (c->n_steps + 1) * N_MEMBERS, &c->steps));
+  PetscCall(Spread(f, (c->n_steps + 1) * STEP_COLS(f), &c->steps));
   if (c->n_orders) PetscCall(Spread(f, c->n_orders, &c->orders));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -416,8 +426,8 @@ static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
   PetscCall(PetscFree(mine));
   PetscCall(MoveForces(f, PETSC_FALSE, c->lambda));
   MoveHead(p, PETSC_FALSE, c->head);
-  for (PetscInt k = 0; k < c->n_steps; k++) RealsToStep(c->steps + k * N_MEMBERS, &p->steps[k]);
-  RealsToStep(c->steps + c->n_steps * N_MEMBERS, &p->now);
+  for (PetscInt k = 0; k < c->n_steps; k++) RealsToStep(f, c->steps + k * STEP_COLS(f), &p->steps[k]);
+  RealsToStep(f, c->steps + c->n_steps * STEP_COLS(f), &p->now);
   PetscCall(PetscFree(p->orders));
   HycoDuplicate(c->n_orders, c->orders, &p->orders);
   p->n_orders = p->room_orders = c->n_orders;

@@ -344,8 +344,13 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B (if what it depends on changed) and D, from rank 0. */
-static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
+static PetscInt GlobalNode(HycoFOM f, PetscInt node)
+{
+  return f->surface->node_global ? f->surface->node_global[node] : node;
+}
+
+/* B, its slaves (if what they depend on changed) and D, from rank 0. */
+static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed, Vec slaves)
 {
   PetscErrorCode ierr;
   const PetscInt m = f->pairs.n, dim = f->part->dim, entries = f->width * dim * m;
@@ -358,11 +363,9 @@ static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
   if (!ierr) ierr = HycoContactCountStill(f->fe_surface, &f->pairs, start, &f->summary.n_still);
   for (PetscInt k = 0; !ierr && k < m; k++) {
     PetscCall(VecSetValue(f->D, k, f->gap[k], INSERT_VALUES));
-    for (PetscInt j = start[k]; rows_changed && j < start[k + 1]; j++) {
-      const PetscInt node = f->surface->node_global ? f->surface->node_global[dof[j] / dim] : dof[j] / dim;
-
-      PetscCall(MatSetValue(f->B, k, node * dim + dof[j] % dim, value[j], INSERT_VALUES));
-    }
+    PetscCall(VecSetValue(slaves, k, GlobalNode(f, HycoPairsSlave(&f->pairs, k)) * dim, INSERT_VALUES));
+    for (PetscInt j = start[k]; rows_changed && j < start[k + 1]; j++)
+      PetscCall(MatSetValue(f->B, k, GlobalNode(f, dof[j] / dim) * dim + dof[j] % dim, value[j], INSERT_VALUES));
   }
   PetscCall(PetscFree3(start, dof, value));
   PetscCall(ierr);
@@ -371,6 +374,8 @@ static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
 
 static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 {
+  Vec slaves;
+
   PetscFunctionBegin;
   if (!f->n_contacts) { /* perhaps obstacles whose nodes are all fixed */
     HycoOnRoot(HycoComm(f), HycoContactCountStill(f->fe_surface, &f->pairs, NULL, &f->summary.n_still));
@@ -381,9 +386,14 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
     PetscCall(CreateB(f));
   } else if (rows_changed && f->Bt)
     PetscCall(MatZeroEntries(f->B));
-  HycoOnRoot(HycoComm(f), FillContact(f, rows_changed));
+  PetscCall(VecDuplicate(f->D, &slaves));
+  HycoOnRoot(HycoComm(f), FillContact(f, rows_changed, slaves));
   PetscCall(VecAssemblyBegin(f->D));
   PetscCall(VecAssemblyEnd(f->D));
+  PetscCall(VecAssemblyBegin(slaves));
+  PetscCall(VecAssemblyEnd(slaves));
+  PetscCall(PetscObjectCompose((PetscObject)f->B, HYCO_SLAVES, (PetscObject)slaves));
+  PetscCall(VecDestroy(&slaves));
   if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatAssemblyBegin(f->B, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(f->B, MAT_FINAL_ASSEMBLY));

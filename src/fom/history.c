@@ -9,7 +9,7 @@
 
 #define GROWTH 1.5
 
-static const char *const newton_names[] = {"auto", "tangent", "elastic", NULL};
+static const char *const newton_names[] = {"auto", "tangent", "elastic", "modified", NULL}; /* by HycoNewton */
 
 PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path)
 {
@@ -78,15 +78,16 @@ PetscErrorCode HycoPathSetFromOptions(HycoPath p, HycoOptionItems PetscOptionsOb
 {
   PetscFunctionBegin;
   PetscCall(HycoOptionsWord("-hyco_newton",
-                            "history: iterate with the tangent, or with the elastic stiffness, whose factor is kept "
-                            "(auto: what takes less time by the number of unknowns)",
+                            "history: iterate with the tangent, with the elastic stiffness, whose factor is kept, or "
+                            "with a tangent that is kept while that is faster (auto: what takes less time by counts)",
                             newton_names, &p->method, NULL));
   PetscCall(HycoOptionsReal("-hyco_newton_rtol",
                             "history: residual of equilibrium, relative to the largest of the forces", 1e-14, 1e-2,
                             &p->rtol, NULL));
   PetscCall(HycoOptionsInt("-hyco_newton_max_its",
-                           "history: contact systems of a step before it is cut (0: tangent 15, elastic 60)", 0, 100000,
-                           &p->max_its, NULL));
+                           "history: contact systems of a step before it is cut (0: tangent 15, modified 30, elastic "
+                           "60)",
+                           0, 100000, &p->max_its, NULL));
   PetscCall(HycoOptionsReal("-hyco_step_inelastic", "history: largest inelastic strain of a step; beyond, it is halved",
                             1e-12, 1e3, &p->bound, NULL));
   PetscCall(HycoOptionsReal("-hyco_step_smallest", "history: no step is cut below this share of the whole time", 1e-15,
@@ -307,7 +308,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->ended = p->ended;
   h->t = p->t;
   h->why = p->why;
-  h->newton = HycoPathPrefersElastic(p) ? "elastic" : "tangent";
+  h->newton = newton_names[HycoPathMethod(p)];
   h->factor_cost = HycoPathFactorCost(p);
   h->n_orders = p->n_orders;
   h->n_taken = p->n_taken;

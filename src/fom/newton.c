@@ -7,13 +7,15 @@
   K = d f_int / d U (tangent), or the elastic stiffness (elastic), whose factor and flexibility the solver keeps; that
   fixed-point iteration is accelerated by Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547-560; H. F. Walker, P.
   Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735), which begins anew where contacts open or close. Where the laws are
-  gradients of a potential, tangent steps are shortened until it falls (Armijo). What ends the iterations is the
+  gradients of a potential, tangent steps are shortened until it falls (Armijo). In between (modified) a tangent is kept
+  with its factor, over steps too, as long as the accelerated iterations contract well. What ends the iterations is the
   recomputed residual F - f_int - B^T L relative to the largest of these three; F alone may be nothing.
 */
 #include <hycopath.h>
 
 #define ARMIJO    1e-4
 #define SHORTENED 8 /* times that a step is halved at most */
+#define WORTH     8 /* iterations to come for which a new tangent is made (modified) */
 
 /* What an iteration knows of the one before. */
 typedef struct {
@@ -94,6 +96,7 @@ static PetscErrorCode AssembleK(HycoPath p, PetscBool tangent)
   PetscFunctionBegin;
   HycoLogged(HYCO_EVENT_ASSEMBLE, (*p->ops->stiffness)(p));
   p->tangent = tangent;
+  p->kept = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -118,6 +121,7 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, HycoStepAttempt *
   PetscCall(HycoSolverGetReason(p->solver, &reason));
   PetscCall(HycoSolverGetSeconds(p->solver, &factor, &solve));
   PetscCall(HycoSolverGetIterations(p->solver, &its));
+  p->kept++;
   a->iterations++;
   a->factors += factor > 0;
   a->active_its += its;
@@ -253,8 +257,8 @@ static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next iterate of the elastic variant: the system's solution, mixed with those before it on the same contacts. The
-   first of a step, k = 0, is not at the step's supports and is left out. */
+/* The next iterate with a K that is kept: the system's solution, mixed with those before it on the same contacts. The
+   first of a step, k = 0, is not at the step's supports and is left out; with k = 1 the mixing begins. */
 static PetscErrorCode Mix(HycoPath p, PetscInt k)
 {
   PetscReal gamma[HYCO_ANDERSON];
@@ -312,21 +316,46 @@ static void Observe(const Progress *now, PetscInt k, HycoStepAttempt *a)
   a->order = PetscLogReal(r[2] / r[1]) / PetscLogReal(r[1] / r[0]);
 }
 
-static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool elastic, PetscInt most,
-                              HycoStepAttempt *a)
+/* Whether a new tangent is worth its price: with the one that is kept, too many iterations would follow. */
+static PetscBool Stalls(HycoPath p, const Progress *now)
 {
+  const PetscReal *r = now->residual, target = PetscMax(p->rtol * now->size, now->floor), rate = r[2] / r[1];
+
+  return (PetscBool)(p->kept > 0 && !(rate < 1 && PetscLogReal(target / r[2]) > WORTH * PetscLogReal(rate)));
+}
+
+/* K at U, where `now` is. */
+static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
+{
+  const Progress here = *now;
+
+  PetscFunctionBegin;
+  PetscCall(Evaluate(p, t0, t1, PETSC_TRUE, a, now));
+  *now = here;
+  PetscCall(AssembleK(p, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton method, HycoStepAttempt *a)
+{
+  static const char *const name[] = {"", "tangent", "elastic", "modified"};
+  static const PetscInt usual[] = {0, 15, 60, 30};
+  const PetscBool tangent = (PetscBool)(method == HYCO_NEWTON_TANGENT);
+  const PetscInt most = p->max_its ? p->max_its : usual[method];
   Progress now = {.residual = {0, 0, 0}};
   PetscReal least = PETSC_MAX_REAL, worst = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; !a->why[0]; k++) {
-    PetscCall(Evaluate(p, t0, t1, (PetscBool)!elastic, a, &now));
-    if (!elastic && k) PetscCall(Shorten(p, t0, t1, a, &now));
+    PetscBool fresh = PETSC_FALSE;
+
+    PetscCall(Evaluate(p, t0, t1, tangent, a, &now));
+    if (tangent && k) PetscCall(Shorten(p, t0, t1, a, &now));
     if (a->law.failed) {
       HycoFormat(a->why, "%s", a->law.why);
       break;
     }
-    if (!elastic) Observe(&now, k, a);
+    if (tangent) Observe(&now, k, a);
     if (k && now.residual[2] <= PetscMax(p->rtol * now.size, now.floor)) {
       PetscCall(Judge(p, &now, a, &worst));
       a->converged = (PetscBool)(worst <= 1e-8);
@@ -335,16 +364,18 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool 
     if (k) least = PetscMin(least, now.residual[2] / (now.size > 0 ? now.size : 1));
     if (k == most || !(now.residual[2] <= 1e4 * PetscMax(now.size, now.floor))) {
       HycoFormat(a->why, "the residual of equilibrium is %.1e after %d iterations (%s)", (double)least, (int)k,
-                 elastic ? "elastic" : "tangent");
+                 name[method]);
       break;
     }
-    if (!elastic) PetscCall(AssembleK(p, PETSC_TRUE));
+    if (method == HYCO_NEWTON_MODIFIED && k) fresh = Stalls(p, &now);
+    if (tangent) PetscCall(AssembleK(p, PETSC_TRUE));
+    if (fresh) PetscCall(Renew(p, t0, t1, a, &now));
     PetscCall(SolveSystem(p, (PetscBool)(k == 0), a));
     if (a->why[0]) break;
-    if (elastic)
-      PetscCall(Mix(p, k));
-    else
+    if (tangent)
       PetscCall(Advance(p, (PetscBool)(k > 0), a, &now));
+    else
+      PetscCall(Mix(p, fresh ? 1 : k));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -364,7 +395,7 @@ PetscErrorCode HycoPathAssemble(HycoPath p, PetscReal t1)
 
   PetscFunctionBegin;
   HycoSceneSetTime(p->scene, p->mu, t1, mu);
-  PetscCall((*p->ops->assemble)(p, mu, HycoPathPrefersElastic(p)));
+  PetscCall((*p->ops->assemble)(p, mu, (PetscBool)(HycoPathMethod(p) == HYCO_NEWTON_ELASTIC)));
   if (p->fe->stiffness_changed) p->tangent = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -376,35 +407,36 @@ PetscReal HycoPathFactorCost(HycoPath p)
 
 /* By counts alone, so that a choice repeats on any machine: the elastic variant takes up to five times as many
    iterations. */
-PetscBool HycoPathPrefersElastic(HycoPath p)
+HycoNewton HycoPathMethod(HycoPath p)
 {
-
-  if (!p->flows || p->method != HYCO_NEWTON_AUTO) return (PetscBool)(!p->flows || p->method == HYCO_NEWTON_ELASTIC);
-  return (PetscBool)(HycoPathFactorCost(p) > 5);
+  if (!p->flows) return HYCO_NEWTON_ELASTIC;
+  if (p->method != HYCO_NEWTON_AUTO) return (HycoNewton)p->method;
+  return HycoPathFactorCost(p) > 5 ? HYCO_NEWTON_ELASTIC : HYCO_NEWTON_TANGENT;
 }
 
 PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a)
 {
-  PetscBool elastic;
+  static const PetscInt easy[] = {0, 7, 30, 15}; /* iterations, by method */
+  HycoNewton method;
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(a, sizeof(*a)));
   PetscCall(VecCopy(p->U, p->U_old));
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_old));
   PetscCall(HycoPathAssemble(p, t1));
-  elastic = HycoPathPrefersElastic(p);
-  if (p->tangent && elastic) {
+  method = HycoPathMethod(p);
+  if (p->tangent && method == HYCO_NEWTON_ELASTIC) {
     PetscCall(HycoFEElasticTangent(p->fe));
     PetscCall(AssembleK(p, PETSC_FALSE));
   }
   PetscCall(MatGetDiagonal(p->K, p->diagonal));
-  PetscCall(Iterate(p, t0, t1, elastic, p->max_its ? p->max_its : elastic ? 60 : 15, a));
-  if (!a->converged && elastic && p->flows && p->method == HYCO_NEWTON_AUTO) {
+  PetscCall(Iterate(p, t0, t1, method, a));
+  if (!a->converged && p->flows && method != HYCO_NEWTON_TANGENT && p->method != HYCO_NEWTON_ELASTIC) {
     a->why[0] = '\0';
     PetscCall(HycoPathRestore(p));
-    PetscCall(Iterate(p, t0, t1, PETSC_FALSE, p->max_its ? p->max_its : 15, a));
+    PetscCall(Iterate(p, t0, t1, HYCO_NEWTON_TANGENT, a));
   }
-  a->easy = (PetscBool)(a->iterations <= (elastic ? 30 : 7));
+  a->easy = (PetscBool)(a->iterations <= easy[method]);
   if (!a->converged) PetscCall(HycoPathRestore(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

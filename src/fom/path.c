@@ -285,6 +285,7 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(HycoFOMGather(f));
   f->solved = PETSC_TRUE;
   f->sigma_ready = f->all_ready = PETSC_FALSE;
+  PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   p->steps[p->n_steps++] = *s;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscCall(HycoSeriesAdd(f));

@@ -107,6 +107,22 @@ static PetscErrorCode MeasureDisplacements(HycoFOM f, HycoSummary *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFOMMeasureQuantities(HycoFOM f, PetscReal value[])
+{
+  PetscReal *reaction = NULL;
+
+  PetscFunctionBegin;
+  if (!f->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFOMStress(f));
+  if (HycoSceneHasReactions(f->scene)) {
+    PetscCall(PetscMalloc1(f->fe->n_dof, &reaction));
+    PetscCall(HycoFOMReactions(f, reaction));
+  }
+  PetscCall(HycoQuantitiesMeasure(HycoComm(f), f->fe, f->u, f->sigma, reaction, value));
+  PetscCall(PetscFree(reaction));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
 {
   HycoSummary *s;
@@ -129,17 +145,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(MeasureDisplacements(f, s));
   HycoOnRoot(HycoComm(f), MeasureContacts(f, s));
   if (s->reason > 0 && f->n_contacts) HycoOnRoot(HycoComm(f), HycoFOMCountDependent(f, &s->n_dependent));
-  if (f->scene->n_quantities) {
-    PetscReal *reaction = NULL;
-
-    PetscCall(HycoFOMStress(f));
-    if (HycoSceneHasReactions(f->scene)) {
-      PetscCall(PetscMalloc1(f->fe->n_dof, &reaction));
-      PetscCall(HycoFOMReactions(f, reaction));
-    }
-    PetscCall(HycoQuantitiesMeasure(HycoComm(f), f->fe, f->u, f->sigma, reaction, s->quantity));
-    PetscCall(PetscFree(reaction));
-  }
+  PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, HycoComm(f)));
   *out = *s;
   PetscFunctionReturn(PETSC_SUCCESS);

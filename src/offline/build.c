@@ -70,8 +70,17 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
 /* The cells of the part in Omega_A, of a greedy training in those before too. Collective. */
 static PetscErrorCode FindCells(HycoReducer t, PetscBool in[])
 {
-  const HycoRIDRecipe recipe = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell, t->layers,
-                                t->extension,    t->n_groups,     t->groups,     t->region,     t->whole_rid};
+  const HycoRIDRecipe recipe = {t->n_seeds_node,
+                                t->n_seeds_cell,
+                                t->seeds_node,
+                                t->seeds_cell,
+                                t->layers,
+                                t->extension,
+                                t->n_groups,
+                                t->groups,
+                                t->region,
+                                t->whole_rid,
+                                t->prototype->traits.cells};
   HycoMesh part = t->fom->part;
   DMLabel rid;
 
@@ -94,6 +103,12 @@ static PetscErrorCode GatherCells(HycoReducer t, const PetscBool in[], HycoMesh 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(part->n_groups, &group));
   PetscCall(HycoMarkContactGroups(t->scene, part, group));
+  for (PetscInt k = 0; t->prototype->traits.cells && k < t->scene->n_loads; k++) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(part, "load", t->scene->load[k].group, &g));
+    group[g] = PETSC_TRUE;
+  }
   PetscCall(HycoMeshGather(HycoComm(t), part, group, in, mesh));
   PetscCall(PetscFree(group));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -110,9 +125,11 @@ static PetscErrorCode ExtractMesh(HycoReducer t, HycoMesh from, const PetscBool 
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(surface->n_nodes, &contact));
-  PetscCall(PetscMalloc1(3 * t->scene->n_contacts, &all));
+  PetscCall(PetscMalloc1(3 * t->scene->n_contacts + t->scene->n_loads, &all));
   PetscCall(PetscMalloc2(from->n_cells, &keep, surface->n_nodes, &extra));
   PetscCall(SurfacesOf(t, contact, &n_all, all));
+  for (PetscInt k = 0; t->prototype->traits.cells && k < t->scene->n_loads; k++)
+    PetscCall(HycoMeshFindGroup(from, "load", t->scene->load[k].group, &all[n_all++]));
   for (PetscInt e = 0; e < from->n_cells; e++) {
     if (!in || in[e]) keep[n_keep++] = e;
   }

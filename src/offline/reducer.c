@@ -234,8 +234,8 @@ static PetscErrorCode ReadTraining(HycoReducer t)
                               t->folder, sizeof(t->folder), NULL));
   PetscCall(
       HycoOptionsWord("-hyco_model_type",
-                      "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh; condensed on "
-                      "the contact forces",
+                      "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh, or with a "
+                      "cubature on some of its cells; condensed on the contact forces; regression without a solve",
                       types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
   PetscCall(HycoOptionsReal("-hyco_pod_tol", "energy left out of the displacement basis, the epsilon of (18)", 0, 1,
                             &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));
@@ -261,7 +261,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
                             indicators, &indicator, NULL));
   PetscCall(HycoOptionsBool("-hyco_greedy_keep", "train -greedy keeps each iteration's model beside the snapshots",
                             &t->greedy.keep, NULL));
-  PetscCall(HycoOptionsFor("hybrid or projection"));
+  PetscCall(HycoOptionsFor("hybrid, projection or cubature"));
   PetscCall(HycoOptionsInt("-hyco_scan",
                            "points per parameter that look for a singular reduced stiffness (0: up to some hundred in "
                            "all)",
@@ -328,7 +328,7 @@ static PetscErrorCode ReadRID(HycoReducer t)
   PetscCall(PetscStrArrayDestroy(&t->groups));
   t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_DISPLACEMENT];
   PetscObjectOptionsBegin((PetscObject)t);
-  PetscCall(HycoOptionsFor("hybrid or condensed"));
+  PetscCall(HycoOptionsFor("hybrid, condensed or regression"));
   PetscCall(HycoOptionsList("-hyco_rid_modes",
                             "bases whose DEIM points seed the RID: displacement, stress, force, dual, of a history "
                             "inelastic [displacement,stress,force,inelastic]",
@@ -376,13 +376,14 @@ static PetscErrorCode CheckType(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(PetscOptionsGetString(((PetscObject)t)->options, NULL, "-hyco_dual", dual, sizeof(dual), NULL));
   HycoCheckModel(t->prototype->traits.force_basis || strcmp(dual, "fe") == 0,
-                 "-hyco_dual %s is for -hyco_model_type projection; the other models have the finite-element forces",
+                 "-hyco_dual %s is for -hyco_model_type projection and cubature; the other models have no vectors of "
+                 "forces",
                  dual);
   HycoCheckModel(t->prototype->traits.history || !t->scene || !t->scene->n_times,
                  "the scene has a history (history_times), and -hyco_model_type %s has no paths; take hybrid",
                  t->prototype->type);
-  if (!t->prototype->traits.whole) PetscFunctionReturn(PETSC_SUCCESS);
-  t->whole_rid = PETSC_TRUE;
+  if (!t->prototype->traits.whole && !t->prototype->traits.cells) PetscFunctionReturn(PETSC_SUCCESS);
+  t->whole_rid = t->prototype->traits.whole;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -363,7 +363,13 @@ static PetscErrorCode AddLayer(Rid *r)
 /* What each rank finds alone. */
 static PetscErrorCode AddRegions(Rid *r, const HycoRIDRecipe *recipe)
 {
+  PetscInt at;
+
   PetscFunctionBegin;
+  for (PetscInt k = 0; recipe->exact && k < recipe->n_cells; k++) {
+    PetscCall(FindInPart(r->part->n_cells, r->part->cell_whole, recipe->cells[k], &at));
+    if (at >= 0) PetscCall(Add(r, at));
+  }
   for (PetscInt e = 0; recipe->whole && e < r->part->n_cells; e++) PetscCall(Add(r, e));
   for (PetscInt k = 0; k < recipe->n_groups; k++) PetscCall(AddGroup(r, recipe->groups[k]));
   if (recipe->region) PetscCall(AddRegion(r, recipe->region));
@@ -379,7 +385,7 @@ PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDReci
   PetscCallMPI(MPI_Bcast(&n_rows, 1, MPIU_INT, 0, HycoComm(f)));
   PetscCall(RidCreate(f, &r));
   HycoOnEach(HycoComm(f), AddRegions(&r, recipe));
-  if (!recipe->whole) {
+  if (!recipe->whole && !recipe->exact) {
     PetscCall(AddSupports(&r, recipe));
     if (recipe->extension > 0) PetscCall(ExtendContact(&r, pairs, recipe->extension));
     PetscCall(CompleteSlaves(&r, pairs, n_rows));

@@ -1,6 +1,6 @@
 /*
   The scene's quantities of a prediction: displacements and stresses of the cells that they need, wherever these are,
-  from the modes there, U = r(u0) + V gamma (30); of a path the laws are replayed there up to the time that is shown.
+  from the modes there, U = r(u0) + V gamma (30); of a path the laws are replayed there, once for all listed times.
 */
 #include <hycofields.h>
 #include <hycoinelastic.h>
@@ -61,11 +61,9 @@ static PetscErrorCode PrepareReactions(HycoROM m, HycoProbe p)
 }
 
 /* Takes what contacts press on fixed unknowns from the reactions there. */
-static PetscErrorCode TakeContact(HycoROM m, HycoProbe p)
+static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda[])
 {
   const PetscInt dim = p->fe->dim;
-  const PetscReal *Lambda =
-      m->trace.n_listed ? m->trace.Lambda + (size_t)m->trace.shown * (size_t)m->pairs.n : m->Lambda;
   PetscBool any = PETSC_FALSE;
   HycoContactFields c;
   PetscReal *force;
@@ -87,12 +85,12 @@ static PetscErrorCode TakeContact(HycoROM m, HycoProbe p)
 }
 
 /* f_int: NULL: of a prediction without a history. */
-static PetscErrorCode React(HycoROM m, HycoProbe p, const PetscReal f_int[])
+static PetscErrorCode React(HycoROM m, HycoProbe p, const PetscReal f_int[], const PetscReal Lambda[])
 {
   PetscFunctionBegin;
   if (!p->reaction) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFEReactions(p->fe, p->u, f_int, p->reaction));
-  PetscCall(TakeContact(m, p));
+  PetscCall(TakeContact(m, p, Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -136,35 +134,42 @@ static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const Pets
   HycoFEComplete(p->fe, p->u);
 }
 
-/* The laws from the first time to that which is shown. */
+/* The laws from the first time to the last, and the quantities at the listed ones. */
 static PetscErrorCode March(HycoProbe p, HycoReplay *r)
 {
   HycoROM m = r->m;
-  const HycoTrace *trace = &m->trace;
+  HycoTrace *trace = &m->trace;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k <= trace->at[trace->shown]; k++) {
+  for (PetscInt k = 0, j = 0; k < trace->n; k++) {
     PetscCall(HycoReplayMove(r, k));
     Displace(m, p, trace->gamma + (size_t)k * (size_t)m->l, trace->U_fe + (size_t)k * (size_t)m->n_fe);
     PetscCall(HycoReplayStep(r, k, p->u));
+    if (j == trace->n_listed || trace->at[j] != k) continue;
+    PetscCall(HycoFEStateFields(p->fe, r->state, p->sigma, NULL, NULL, NULL));
+    PetscCall(React(m, p, r->f_int, trace->Lambda + (size_t)j * (size_t)m->pairs.n));
+    PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, p->reaction, trace->step[j++].quantity));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* p->u and p->sigma of a path at the time that is shown. */
-static PetscErrorCode FollowPath(HycoROM m, HycoProbe p)
+/* What the listed times have: the one that is shown, and their largest (of `min` the smallest). */
+static void CollectPath(HycoROM m, HycoPrediction *out)
 {
-  HycoReplay r = {0};
-  PetscErrorCode ierr;
+  const HycoTrace *trace = &m->trace;
 
-  PetscFunctionBegin;
-  ierr = HycoReplayBegin(m, p->fe, &r);
-  if (!ierr) ierr = March(p, &r);
-  if (!ierr) ierr = HycoFEStateFields(p->fe, r.state, p->sigma, NULL, NULL, NULL);
-  if (!ierr) ierr = React(m, p, r.f_int);
-  PetscCall(HycoReplayEnd(&r));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt q = 0; q < m->scene->n_quantities; q++) {
+    const PetscBool least = (PetscBool)(m->scene->quantity[q].kind == HYCO_QUANTITY_MIN);
+    PetscReal *most = &out->path_quantity[q];
+
+    out->quantity[q] = trace->step[trace->shown].quantity[q];
+    *most = trace->step[0].quantity[q];
+    for (PetscInt j = 1; j < trace->n_listed; j++) {
+      const PetscReal value = trace->step[j].quantity[q];
+
+      *most = least ? PetscMin(*most, value) : PetscMax(*most, value);
+    }
+  }
 }
 
 /* p->u and p->sigma of a prediction without a history. */
@@ -179,26 +184,57 @@ static PetscErrorCode Follow(HycoROM m, HycoProbe p)
   Displace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
   PetscCall(HycoFEStress(p->fe, p->u, p->sigma));
-  PetscCall(React(m, p, NULL));
+  PetscCall(React(m, p, NULL, m->Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMMeasureQuantities(HycoROM m, PetscReal value[])
+/* Made when somebody asks. */
+static PetscErrorCode Make(HycoROM m)
 {
-  HycoProbe p;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  if (m->probe) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMLoadWhole(m));
+  PetscCall(PetscNew(&m->probe));
+  ierr = Fill(m, m->probe);
+  if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMMeasurePath(HycoROM m)
+{
+  HycoTrace *trace = &m->trace;
+  HycoReplay r = {0};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!m->scene->n_quantities || !trace->n_listed || trace->step) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Make(m));
+  PetscCall(PetscMalloc1(trace->n_listed, &trace->step));
+  PetscCall(PetscArraycpy(trace->step, trace->history.step, trace->n_listed));
+  ierr = HycoReplayBegin(m, m->probe->fe, &r);
+  if (!ierr) ierr = March(m->probe, &r);
+  PetscCall(HycoReplayEnd(&r));
+  if (ierr) PetscCall(PetscFree(trace->step));
+  PetscCall(ierr);
+  trace->history.step = trace->step;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
+{
+  PetscFunctionBegin;
   if (!m->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!m->probe) {
-    PetscCall(HycoROMLoadWhole(m));
-    PetscCall(PetscNew(&m->probe));
-    ierr = Fill(m, m->probe);
-    if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
-    PetscCall(ierr);
+  if (m->trace.n_listed) {
+    PetscCall(HycoROMMeasurePath(m));
+    CollectPath(m, out);
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  p = m->probe;
-  PetscCall(m->trace.n_listed ? FollowPath(m, p) : Follow(m, p));
-  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, p->reaction, value));
+  PetscCall(Make(m));
+  PetscCall(Follow(m, m->probe));
+  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, m->probe->fe, m->probe->u, m->probe->sigma, m->probe->reaction,
+                                  out->quantity));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -279,7 +279,7 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   p->u_norm2 = PetscSqrtReal(p->u_norm2);
   PetscCall(MeasureContacts(m, p));
   PetscCall(HycoTrustEstimate(m, p));
-  PetscCall(HycoROMMeasureQuantities(m, p->quantity));
+  PetscCall(HycoROMMeasureQuantities(m, p));
   *out = *p;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -8,7 +8,7 @@ PetscErrorCode HycoTraceFree(HycoROM m)
   const HycoTrace empty = {.n_given = r->n_given, .given = r->given};
 
   PetscFunctionBegin;
-  HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->Lambda, &r->sigma, &r->inelastic);
+  HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->Lambda, &r->sigma, &r->inelastic, &r->step);
   *r = empty;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -21,6 +21,7 @@ PetscErrorCode HycoTraceBegin(HycoROM m)
   PetscFunctionBegin;
   r->n = r->n_listed = r->shown = 0;
   PetscCall(PetscMemzero(&r->history, sizeof(r->history)));
+  PetscCall(PetscFree(r->step));
   if (r->at) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n_times + 1, &r->at)); /* one more: the end of a path that ends early */
   PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->pairs.n + 1, &r->Lambda));
@@ -60,6 +61,19 @@ PetscErrorCode HycoTraceList(HycoROM m, PetscReal **sigma, PetscReal **inelastic
   *sigma = r->sigma + k * n_cells * (size_t)m->fe->n_sigma;
   *inelastic = r->inelastic + k * n_cells;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoTraceMeasure(HycoROM m, HycoStep *s)
+{
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    s->total_contact_force += m->Lambda[k];
+    s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);
+  }
+  for (PetscInt k = 0; k < m->pairs.n; k++) s->n_active += m->Lambda[k] > 1e-10 * s->lambda_max; /* no round-off */
+  for (PetscInt k = 0; k < m->fe->n_dof; k++) {
+    if (m->role[k / m->fe->dim] != HYCO_ROLE_OUTSIDE) s->u_norm2 += m->U[k] * m->U[k];
+  }
+  s->u_norm2 = PetscSqrtReal(s->u_norm2);
 }
 
 void HycoTraceWholeU(HycoROM m, PetscInt k, PetscReal U[])
@@ -102,6 +116,7 @@ PetscErrorCode HycoROMGetHistory(HycoROM m, HycoHistory *history)
 {
   PetscFunctionBegin;
   PetscCall(CheckPath(m, "HycoROMGetHistory()"));
+  PetscCall(HycoROMMeasurePath(m));
   *history = m->trace.history;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -118,7 +133,10 @@ PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
              "HycoROMSetStep: %d is no listed time that the path reached; there are %d", (int)k, (int)r->n_listed);
   at = r->at[k];
   HycoSceneSetTime(m->scene, m->fe->mu, r->t[at], mu);
-  PetscCall(HycoFESetParameters(m->fe, mu));
+  if (m->fe->mesh == m->mesh)
+    PetscCall(HycoROMBringRows(m, mu));
+  else
+    PetscCall(HycoFESetParameters(m->fe, mu));
   PetscCall(PetscArraycpy(m->gamma, r->gamma + (size_t)at * (size_t)m->l, m->l));
   PetscCall(PetscArraycpy(m->Lambda, r->Lambda + (size_t)k * (size_t)m->pairs.n, m->pairs.n));
   PetscCall(HycoROMExpand(m));

@@ -13,6 +13,8 @@ static PetscErrorCode AddOwn(void)
   PetscCall(HycoRegistryAdd(&types, HYCO_ROM_HYBRID, HycoROMCreate_Hybrid));
   PetscCall(HycoRegistryAdd(&types, HYCO_ROM_PROJECTION, HycoROMCreate_Projection));
   PetscCall(HycoRegistryAdd(&types, HYCO_ROM_CONDENSED, HycoROMCreate_Condensed));
+  PetscCall(HycoRegistryAdd(&types, HYCO_ROM_CUBATURE, HycoROMCreate_Cubature));
+  PetscCall(HycoRegistryAdd(&types, HYCO_ROM_REGRESSION, HycoROMCreate_Regression));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

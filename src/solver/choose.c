@@ -77,7 +77,8 @@ static PetscErrorCode TakeIterative(HycoSolver s, HycoSolverForm *form)
   if (other) *form = other;
   PetscCheck(other || s->linear != HYCO_LINEAR_ITERATIVE || !asked[0] || strcmp(asked, "primal") == 0, HycoComm(s),
              PETSC_ERR_USER,
-             "-hyco_linear iterative solves the primal form; take away -hyco_solver_form, or say primal");
+             "-hyco_linear iterative solves the primal form or the projected one; take away -hyco_solver_form, or say "
+             "primal or projected");
   PetscCheck(other || s->linear != HYCO_LINEAR_ITERATIVE, HycoComm(s), PETSC_ERR_USER,
              "-hyco_linear iterative needs a symmetric system, the types active_set or tao, and for each contact an "
              "unknown of its own; use -hyco_linear direct");
@@ -141,6 +142,7 @@ PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
   PetscCall(KSPGetType(ksp, &method));
   PetscCall(KSPGetPC(ksp, &handle));
   PetscCall(PCGetType(handle, &pc));
+  if (strcmp(pc, PCSHELL) == 0) PetscCall(PCShellGetName(handle, &pc)); /* what it makes use of */
   if (!s->iterative) PetscCall(PCFactorGetMatSolverType(handle, &package));
   if (package)
     PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: %s by %s", pc, package));

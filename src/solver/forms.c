@@ -12,6 +12,7 @@ static PetscErrorCode AddOwn(void)
   PetscCall(HycoRegistryAdd(&forms, "dual", HycoSolverFormCreate_Dual));
   PetscCall(HycoRegistryAdd(&forms, "primal", HycoSolverFormCreate_Primal));
   PetscCall(HycoRegistryAdd(&forms, "dual_free", HycoSolverFormCreate_Shell));
+  PetscCall(HycoRegistryAdd(&forms, "projected", HycoSolverFormCreate_Projected));
   PetscCall(HycoRegistryAdd(&forms, "linear", HycoSolverFormCreate_Linear));
   PetscCall(HycoRegistryAdd(&forms, "condensed", HycoSolverFormCreate_Flexibility));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -22,6 +22,7 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
   (*solver)->warm = PETSC_TRUE;
   (*solver)->fallback = PETSC_TRUE;
   (*solver)->multilevel = PETSC_TRUE;
+  (*solver)->refine = PETSC_TRUE;
   PetscCall(HycoSolverCreateForms(*solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -363,7 +364,7 @@ static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
     if (!form) continue;
     PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
     PetscCall(Attempt(s, form, x, L));
-    if (s->reason < 0 && form->ops->refine) PetscCall(form->ops->refine(s, form, &better));
+    if (s->reason < 0 && s->refine && form->ops->refine) PetscCall(form->ops->refine(s, form, &better));
     if (s->reason < 0 && better) PetscCall(Attempt(s, form, x, L));
     better = PETSC_FALSE;
     fell_back = s->falling_back;
@@ -426,6 +427,8 @@ PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x)
   PetscCall(VecAXPY(x, 1, y->work_x[1]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+HycoDefineMethod(HycoSolverSetRefine, (HycoSolver s, PetscBool refine), s, HYCO_SOLVER_CLASSID, s->refine = refine)
 
 PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x)
 {

@@ -68,6 +68,10 @@ class History(Case):
         self.alike(fields, others, 1e-8)
         self.assertEqual(sum(report['history']['factors']), 1)
         self.well(report, tangent)
+        report, others_too = self.ring('modified', '-hyco_newton', 'modified', '-hyco_newton_rtol', '1e-12')
+        self.alike(fields, others_too, 1e-8)
+        self.well(report, tangent)
+        self.assertLess(sum(report['history']['factors']), sum(tangent['history']['factors']) / 2)
         for kind, all_alone in (('tangent', fields), ('elastic', others)):
             for ranks in (2, 4):
                 report, same = self.ring('ranks', '-hyco_newton', kind, '-hyco_newton_rtol', '1e-12', ranks=ranks)
@@ -133,7 +137,7 @@ class History(Case):
 
     def test_resume_is_exact(self):
         """On as many ranks the rest is equal to 1e-12."""
-        args = ['-scene', RING, '-mu', '0.01,1', '-history_times', '0,0.5,1,1.5,2,3,4', '-hyco_substeps', '8']
+        args = ['-scene', RING, '-mu', '0.01,1', '-history_times', '0,0.5,1,1.5,2,3,4', '-hyco_substeps', '8', '-output_most_max', 'mises']
         whole = self.hyco('solve', *args)
         keep = ['-hyco_checkpoint', self.path('e.h5')]
         run = subprocess.Popen([HYCO, 'solve', *args, *keep], stdout=subprocess.PIPE, text=True)
@@ -146,6 +150,11 @@ class History(Case):
         for column in ('total_contact_force', 'inelastic', 'mises', 'stored', 'dissipated'):
             self.assertLessEqual(abs(np.array(whole['history'][column]) - rest['history'][column]).max(),
                                  1e-12 * max(abs(v) for v in whole['history'][column]), column)
+        self.assertEqual(len(rest['history']['outputs']['most']), 7)
+        np.testing.assert_allclose(rest['history']['outputs']['most'], whole['history']['outputs']['most'], rtol=1e-12)
+        other = self.run_raw('solve', *args[:-2], '-output_least_min', 'mises', *keep, '-hyco_resume')
+        self.assertEqual(other.returncode, 1)
+        self.assertRegex(other.stderr, 'e.h5 is of another scene')
 
     def test_rod(self):
         """The power ramp on a slice: two to four iterations a step, quadratic; the gap closes, the ramp presses, the hold relaxes; at zero power it is open."""

@@ -124,17 +124,38 @@ class Paths(Case):
             for kind, bound in zip(KINDS, (0.03, 0.03, limit, 0.03)):
                 self.assertLess(report['worst_' + kind]['max'], bound, (dual, kind))
 
+    def test_newton(self):
+        """A tangent for each iteration, one that is kept, the elastic stiffness: one answer, and far fewer factors."""
+        self.train(self.norton, 'newton.h5', '-grid', '3,3', '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', '1')
+        found = {kind: self.hyco('predict', '-model', self.path('newton.h5'), '-mu', '0.0055,0.91', '-hyco_newton', kind)['history']
+                 for kind in ('tangent', 'elastic', 'modified', 'auto')}
+        for kind, other in found.items():
+            for column in ('total_contact_force', 'rid_inelastic', 'rid_mises', 'rid_u_norm2'):
+                a, b = np.array(found['tangent'][column]), np.array(other[column])
+                self.assertLess(abs(a - b).max(), 1e-7 * abs(a).max(), (kind, column))
+        self.assertEqual(found['auto']['iterations'], found['modified']['iterations'])
+        self.assertLess(sum(found['modified']['factors']), sum(found['tangent']['factors']) / 2)
+
     def test_outputs(self):
-        """The outputs that a scene names are those of the replayed laws, at the path's end."""
-        scene = self.scene('outputs.yaml', NORTON, HISTORY + 'output:\n  hoop: {max: sigma_tt, group: ring}\n  out: {mean: u, group: ring_outside}\n')
-        full = self.hyco('solve', '-scene', scene, '-mu', '0.0052,0.93')['outputs']
+        """The outputs that a scene names are those of the replayed laws: at the listed times, at the end, their extremes in a set of points."""
+        scene = self.scene('outputs.yaml', NORTON,
+                           HISTORY + 'output:\n  hoop: {max: sigma_tt, group: ring}\n  out: {mean: u, group: ring_outside}\n  low: {min: sigma_tt, group: ring}\n')
+        solved = self.hyco('solve', '-scene', scene, '-mu', '0.0052,0.93')
+        full = {name: np.array(values) for name, values in solved['history']['outputs'].items()}
+        self.assertEqual({name: values[-1] for name, values in full.items()}, solved['outputs'])
         for name, settings, limit in (('all.h5', ['-grid', '1,1', '-hyco_rid_whole', '-hyco_hybrid', 'all'], 1e-7),
                                       ('some.h5', ['-grid', '3,3', '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', '1'], 1e-2)):
             self.train(scene, name, *settings)
-            reduced = self.hyco('predict', '-model', self.path(name), '-mu', '0.0052,0.93')['outputs']
+            predicted = self.hyco('predict', '-model', self.path(name), '-mu', '0.0052,0.93')
+            reduced = {output: np.array(values) for output, values in predicted['history']['outputs'].items()}
+            row, = self.rows(name, '-values_gap', '0.0052', '-values_push', '0.93')
             self.assertEqual(reduced.keys(), full.keys())
-            for key, value in full.items():
-                self.assertLess(abs(reduced[key] - value), limit * abs(value), (name, key))
+            for key, values in full.items():
+                self.assertLess(abs(reduced[key] - values).max(), limit * abs(values).max(), (name, key))
+                self.assertEqual(reduced[key][-1], predicted['outputs'][key])
+                self.assertAlmostEqual(float(row[key]), reduced[key][-1], delta=1e-6 * abs(values).max())
+                extreme = min if key == 'low' else max
+                self.assertAlmostEqual(float(row['path_' + key]), extreme(reduced[key]), delta=1e-6 * abs(values).max())
 
     def test_order_of_questions(self):
         """A point's path is the same to the last bit whatever was asked before it."""

@@ -199,7 +199,7 @@ class Rope(Case):
     def test_bad_options(self):
         for words, line in ((('-hyco_dual', 'snapshots'), '-hyco_dual snapshots is for -hyco_model_type projection'),
                             ((*TYPE, '-hyco_dual', 'fe'), 'use nnmf or snapshots'),
-                            (('-hyco_model_type', 'galerkin'), 'it must be one of: condensed, hybrid, projection'),
+                            (('-hyco_model_type', 'galerkin'), 'it must be one of: condensed, cubature, hybrid, projection, regression'),
                             ((*TYPE, '-hyco_nnmf_max_its', '0'), 'it must be a whole number, at least 1')):
             run = self.run_raw('train', '-scene', ROPE, '-grid', '2,2', '-model', 'no.h5', *words)
             self.assertNotEqual(run.returncode, 0)

@@ -13,8 +13,10 @@
 
 struct _n_HycoGalerkinPath {
   HycoPath path;
-  PetscReal *held, *u; /* of fe's unknowns: prescribed displacements of the last accepted time; of an iteration */
-  PetscBool moved;     /* the attempt's own are in U */
+  HycoNewton method;      /* of predictions */
+  HycoLinearForce linear; /* of the bodies that do not flow, on A */
+  PetscReal *held, *u;    /* of fe's unknowns: prescribed displacements of the last accepted time; of an iteration */
+  PetscBool moved;        /* the attempt's own are in U */
 };
 
 /* K and Kr. The first assembly again, in the order of all that come: the same sums to the last bit. */
@@ -57,6 +59,7 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
   g->path->moved = m->beyond_current = PETSC_FALSE;
   if (fe->stiffness_changed && (elastic || !p->n_taken)) PetscCall(Stiffness(p)); /* the first is the elastic one */
+  PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
   if (fe->contact_changed) PetscCall(MatDestroy(&g->B));
   if (fe->contact_changed || fe->gap_changed) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
   if (m->n_L && fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
@@ -89,9 +92,10 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   PetscFunctionBegin;
   PetscCall(Displace(m));
   PetscCall(PetscArrayzero(p->f_local, m->fe->n_dof));
-  PetscCall(HycoFEStep(m->fe, q->u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
+  PetscCall(HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, q->u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
   report->has_potential = PETSC_FALSE;
   if (report->failed) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoLinearForceAdd(q->linear, q->u, p->f_local);
   PetscCall(HycoReducedTest(m, p->f_local, p->f_int));
   PetscCall(VecWAXPY(p->r, -1, p->f_int, p->F));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -128,6 +132,18 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The linear bodies' part of the state at the accepted time, and of its energy. */
+static PetscErrorCode CompleteState(HycoROM m, HycoPath p)
+{
+  HycoFEStepReport report;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEStepBodies(m->fe, HYCO_BODIES_LINEAR, m->U, p->t, p->t, p->end, p->begin, p->f_local, PETSC_FALSE,
+                             &report));
+  p->now.stored += report.stored;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What a listed time amounts to, over the RID and all contacts. */
 static PetscErrorCode Measure(HycoROM m, HycoFEState state, HycoStep *s)
 {
@@ -142,15 +158,7 @@ static PetscErrorCode Measure(HycoROM m, HycoFEState state, HycoStep *s)
     s->inelastic = PetscMax(s->inelastic, inelastic[e]);
   }
   PetscCall(PetscFree(mises));
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
-    s->total_contact_force += m->Lambda[k];
-    s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);
-  }
-  for (PetscInt k = 0; k < m->pairs.n; k++) s->n_active += m->Lambda[k] > 1e-10 * s->lambda_max; /* no round-off */
-  for (PetscInt k = 0; k < m->fe->n_dof; k++) {
-    if (m->role[k / m->fe->dim] != HYCO_ROLE_OUTSIDE) s->u_norm2 += m->U[k] * m->U[k];
-  }
-  s->u_norm2 = PetscSqrtReal(s->u_norm2);
+  HycoTraceMeasure(m, s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -181,6 +189,7 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(Watch(m, p->n_steps));
   PetscCall(HycoGalerkinUnpack(m));
   PetscCall(HycoGalerkinCheckForceless(m));
+  PetscCall(CompleteState(m, p));
   if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   PetscCall(Measure(m, p->begin, &p->now));
   p->steps[p->n_steps++] = p->now;
@@ -199,6 +208,18 @@ static PetscErrorCode ReadOptions(HycoROM m, HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CreateLinear(HycoROM m)
+{
+  PetscBool *inside;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->fe->mesh->n_nodes, &inside));
+  for (PetscInt i = 0; i < m->fe->mesh->n_nodes; i++) inside[i] = (PetscBool)(m->role[i] == HYCO_ROLE_A);
+  PetscCall(HycoLinearForceCreate(m->fe, inside, &((HycoGalerkin)m->data)->path->linear));
+  PetscCall(PetscFree(inside));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
 {
   static const HycoPathOps ops = {
@@ -211,7 +232,8 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   PetscCall(HycoPathNew(PETSC_COMM_SELF, m->scene, &p));
   g->path->path = p;
   PetscCall(ReadOptions(m, p));
-  if (p->method == HYCO_NEWTON_AUTO && p->flows) p->method = HYCO_NEWTON_TANGENT; /* its factor is small */
+  if (p->method == HYCO_NEWTON_AUTO) p->method = HYCO_NEWTON_MODIFIED; /* a tangent costs more than the laws */
+  g->path->method = (HycoNewton)p->method;
   p->ops = &ops;
   p->ctx = m;
   p->fe = m->fe;
@@ -227,7 +249,9 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   p->n_contacts = m->n_L;
   p->n_free = m->n;
   PetscCall(HycoPathSetUp(p));
+  PetscCall(HycoSolverSetRefine(m->solver, PETSC_FALSE));
   PetscCall(PetscMalloc2(m->fe->n_dof, &g->path->held, m->fe->n_dof, &g->path->u));
+  PetscCall(CreateLinear(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -237,6 +261,7 @@ PetscErrorCode HycoGalerkinPathDestroy(HycoGalerkinPath *path)
   if (!*path) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoPathFree(&(*path)->path));
   PetscCall(PetscFree2((*path)->held, (*path)->u));
+  PetscCall(HycoLinearForceDestroy(&(*path)->linear));
   PetscCall(PetscFree(*path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -267,6 +292,7 @@ PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
   p->n_given = m->trace.n_given;
   p->given = m->trace.given;
   p->cold = PETSC_TRUE;
+  p->method = ((HycoGalerkin)m->data)->watch.stride ? HYCO_NEWTON_TANGENT : q->method; /* what is watched is current */
   PetscCall(PetscArrayzero(q->held, m->fe->n_dof));
   PetscCall(HycoTraceBegin(m));
   PetscCall(HycoPathBegin(p, mu));

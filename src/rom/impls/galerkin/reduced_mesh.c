@@ -5,7 +5,8 @@
 */
 #include <hycogalerkin.h>
 
-/* One past the last node that matters: of a cell, of a contact of A_lambda, of a facet whose normal counts there. */
+/* One past the last node that matters: of a cell or a load in Omega_A, of a contact of A_lambda, of a facet whose
+   normal counts there. */
 static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
 {
   HycoMesh mesh = m->mesh;
@@ -14,6 +15,7 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
   PetscFunctionBegin;
   *n = 0;
   for (PetscInt k = 0; k < mesh->n_cells * mesh->nv; k++) *n = PetscMax(*n, mesh->cells[k] + 1);
+  for (PetscInt i = *n; i < mesh->n_nodes; i++) *n = m->role[i] == HYCO_ROLE_A ? i + 1 : *n;
   PetscCall(PetscCalloc1(mesh->n_nodes, &slave)); /* with a measured normal */
   for (PetscInt k = 0; k < m->pairs.n; k++) {
     if (!m->in_rid[k]) continue;

@@ -9,29 +9,20 @@
 #include <hycoprojection.h>
 #include <petscblaslapack.h>
 
-/* What the options of this type say, and what a run makes of them. */
-typedef struct {
-  HycoDual dual;
-  PetscInt max_its, vectors; /* of the factorisation; 0: as many as there are modes */
-  PetscInt n_supremizers;    /* of the modes, the last */
-} * Training;
-
-PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t)
+PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
 {
-  Training s;
-  PetscInt dual = HYCO_DUAL_NNMF;
+  HycoForceBasis s = (HycoForceBasis)t->training;
+  PetscInt dual = (PetscInt)s->dual;
 
   PetscFunctionBegin;
-  PetscCall(PetscNew(&s));
-  t->training = s;
   s->max_its = 100;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor(""));
   PetscCall(HycoOptionsWord("-hyco_dual",
-                            "forces: of the finite elements (hybrid); factorised dual snapshots, or they themselves "
-                            "(projection) [fe; nnmf if projection]",
+                            "forces: of the finite elements (hybrid, cubature); factorised dual snapshots, or they "
+                            "themselves (projection, cubature) [fe; nnmf if projection]",
                             HycoDuals, &dual, NULL));
-  PetscCall(HycoOptionsFor("projection"));
+  PetscCall(HycoOptionsFor("projection or cubature"));
   PetscCall(HycoOptionsInt("-hyco_nnmf_vectors",
                            "vectors of the nonnegative factorisation (0: as many as displacement modes)", 0,
                            PETSC_MAX_INT, &s->vectors, NULL));
@@ -39,6 +30,18 @@ PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t)
                            &s->max_its, NULL));
   PetscOptionsEnd();
   s->dual = (HycoDual)dual;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t)
+{
+  HycoForceBasis s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s));
+  t->training = s;
+  s->dual = HYCO_DUAL_NNMF;
+  PetscCall(HycoForceBasisSetFromOptions(t));
   HycoCheckModel(s->dual != HYCO_DUAL_FE,
                  "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -192,7 +195,7 @@ static PetscErrorCode Enrich(HycoReducer t)
   while (q < found && size[q] > NEW * PetscMax(1, size[0])) q++;
   PetscCall(PetscFree(size));
   PetscCall(MatDestroy(&X));
-  ((Training)t->training)->n_supremizers = q;
+  ((HycoForceBasis)t->training)->n_supremizers = q;
   if (q) {
     PetscCall(PetscMalloc1(found * t->n_s, &QtU));
     PetscCall(HycoReducerMultiply(t, Q, t->S, QtU));
@@ -205,7 +208,7 @@ static PetscErrorCode Enrich(HycoReducer t)
 
 PetscErrorCode HycoProjectionModes(HycoReducer t, HycoSnapshots store)
 {
-  Training s = (Training)t->training;
+  HycoForceBasis s = (HycoForceBasis)t->training;
 
   PetscFunctionBegin;
   (void)store;
@@ -231,23 +234,23 @@ static PetscErrorCode FromSnapshots(HycoROM m, PetscInt n, const PetscReal S[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* V_lambda from the dual snapshots. */
-static PetscErrorCode MakeBasis(HycoReducer t, HycoROM m)
+PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
 {
   HycoProjectionROM p = (HycoProjectionROM)m->data;
-  const Training s = (Training)t->training;
+  const HycoForceBasis s = (HycoForceBasis)t->training;
   const PetscInt N = m->pairs.n;
   PetscInt n, k;
   PetscReal *S;
 
   PetscFunctionBegin;
+  p->dual = s->dual;
   PetscCall(HycoReducerDualSnapshots(t, &n, &S));
   k = s->vectors ? PetscMin(s->vectors, PetscMin(N, n)) : m->l;
   for (PetscInt i = 0; i < N * n; i++) S[i] = PetscMax(S[i], 0); /* round-off of iterative solves */
   PetscCall(PetscMalloc1(N * PetscMax(n, k) + 1, &p->V_lambda));
   if (p->dual == HYCO_DUAL_SNAPSHOTS)
     PetscCall(FromSnapshots(m, n, S));
-  else if (n)
+  else if (n && p->dual == HYCO_DUAL_NNMF)
     PetscCall(HycoNNMF(N, n, S, k, s->max_its, p->V_lambda, &p->l_lambda, &p->dual_misfit));
   PetscCall(PetscFree(S));
   m->counts[1] = s->n_supremizers;
@@ -255,27 +258,32 @@ static PetscErrorCode MakeBasis(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoProjectionBuild(HycoROM m, HycoReducer t)
+PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  const HycoProjectionROM p = (HycoProjectionROM)m->data;
 
   PetscFunctionBegin;
-  p->dual = ((Training)t->training)->dual;
-  PetscCall(MakeBasis(t, m));
-  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
   PetscCall(HycoReducerJudge(t, m));
-  HycoCheckModel(
-      m->numbers[1] < 0.5,
-      "the projection-based model misses its own training displacements by %.0f %% on average (%d modes, %d force "
-      "vectors, condition %.0e): take more modes (a smaller -hyco_pod_tol)",
-      100 * (double)m->numbers[1], (int)m->l, (int)p->l_lambda, (double)m->numbers[0]);
+  HycoCheckModel(m->numbers[1] < 0.5,
+                 "the %s model misses its own training displacements by %.0f %% on average (%d modes, %d force "
+                 "vectors, condition %.0e): take more modes (a smaller -hyco_pod_tol)",
+                 m->traits.title, 100 * (double)m->numbers[1], (int)m->l, (int)p->l_lambda, (double)m->numbers[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoProjectionBuild(HycoROM m, HycoReducer t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoProjectionMakeBasis(m, t));
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
+  PetscCall(HycoProjectionJudge(m, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoProjectionReport(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   const HycoProjectionROM p = (HycoProjectionROM)m->data;
-  const PetscInt n = ((Training)t->training)->n_supremizers;
+  const PetscInt n = ((HycoForceBasis)t->training)->n_supremizers;
 
   PetscFunctionBegin;
   PetscCall(HycoTrainingAddFact(r, "n_supremizers", (PetscReal)n));

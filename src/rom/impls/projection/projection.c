@@ -86,12 +86,11 @@ static PetscErrorCode Expand(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+PetscErrorCode HycoProjectionViewForces(HycoROM m, PetscViewer viewer)
 {
   HycoProjectionROM p = (HycoProjectionROM)m->data;
+
   PetscFunctionBegin;
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  on the whole mesh: %d elements, %d nodes, %d contacts\n",
-                                   (int)m->whole_cells, (int)m->whole_nodes, (int)m->pairs.n));
   if (m->counts[1])
     PetscCall(PetscViewerASCIIPrintf(viewer, "  supremizers of the dual snapshots, which join the modes: %d\n",
                                      (int)m->counts[1]));
@@ -103,7 +102,16 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SetUp(HycoROM m)
+static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  on the whole mesh: %d elements, %d nodes, %d contacts\n",
+                                   (int)m->whole_cells, (int)m->whole_nodes, (int)m->pairs.n));
+  PetscCall(HycoProjectionViewForces(m, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoProjectionSetUp(HycoROM m)
 {
   PetscFunctionBegin;
   m->n_L = ((HycoProjectionROM)m->data)->l_lambda;
@@ -112,7 +120,7 @@ static PetscErrorCode SetUp(HycoROM m)
 }
 
 /* To the model file, or from it. */
-static PetscErrorCode Move(HycoROM m, HycoH5 h)
+PetscErrorCode HycoProjectionMove(HycoROM m, HycoH5 h)
 {
   HycoProjectionROM p = (HycoProjectionROM)m->data;
   PetscInt word = p->dual;
@@ -123,7 +131,8 @@ static PetscErrorCode Move(HycoROM m, HycoH5 h)
     PetscCall(HycoROMLoadWord(m, h, "problem/dual", HycoDuals, &word));
     p->dual = (HycoDual)word;
     p->l_lambda = -1;
-    HycoCheck(p->dual != HYCO_DUAL_FE && m->counts[1] <= m->l && m->n_fe == 0, "%s: problem/dual is damaged", m->path);
+    HycoCheck((p->dual == HYCO_DUAL_FE || m->n_fe == 0) && m->counts[1] <= m->l, "%s: problem/dual is damaged",
+              m->path);
   } else
     PetscCall(HycoH5WriteText(h, "problem/dual", HycoDuals[p->dual]));
   PetscCall(HycoH5Real(h, "problem/V_lambda", &p->l_lambda, m->pairs.n, &p->V_lambda));
@@ -131,7 +140,15 @@ static PetscErrorCode Move(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(HycoROM m)
+static PetscErrorCode Load(HycoROM m, HycoH5 h)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoProjectionMove(m, h));
+  HycoCheck(((HycoProjectionROM)m->data)->dual != HYCO_DUAL_FE, "%s: problem/dual is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoProjectionDestroy(HycoROM m)
 {
   HycoProjectionROM p = (HycoProjectionROM)m->data;
 
@@ -140,6 +157,14 @@ static PetscErrorCode Destroy(HycoROM m)
   PetscCall(PetscFree(p->V_lambda));
   PetscCall(PetscFree(m->data));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoProjectionInit(HycoProjectionROM p)
+{
+  p->galerkin.contact = FillContact;
+  p->galerkin.gap = FillGap;
+  p->galerkin.expand = Expand;
+  p->galerkin.symmetric = PETSC_TRUE;
 }
 
 PetscErrorCode HycoROMCreate_Projection(HycoROM m)
@@ -157,24 +182,21 @@ PetscErrorCode HycoROMCreate_Projection(HycoROM m)
                                  .report = HycoProjectionReport,
                                  .cost = HycoGalerkinCost,
                                  .offers = HycoProjectionOffers,
-                                 .setup = SetUp,
+                                 .setup = HycoProjectionSetUp,
                                  .reset = HycoGalerkinReset,
                                  .solve = HycoGalerkinSolve,
                                  .energy = HycoGalerkinEnergy,
                                  .condition = HycoGalerkinCondition,
                                  .local = HycoGalerkinLocal,
                                  .view = View,
-                                 .save = Move,
-                                 .load = Move,
-                                 .destroy = Destroy};
+                                 .save = HycoProjectionMove,
+                                 .load = Load,
+                                 .destroy = HycoProjectionDestroy};
   HycoProjectionROM p;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&p));
-  p->galerkin.contact = FillContact;
-  p->galerkin.gap = FillGap;
-  p->galerkin.expand = Expand;
-  p->galerkin.symmetric = PETSC_TRUE;
+  HycoProjectionInit(p);
   PetscCall(HycoROMSetOps(m, &ops, &traits, p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

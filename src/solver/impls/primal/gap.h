@@ -25,6 +25,11 @@ PetscErrorCode HycoGapSetUp(HycoSolver s, Gap *g);
 PetscErrorCode HycoGapWork(Mat Kw);
 PetscErrorCode HycoSolveOnSet(Mat Kg, Mat Kw, KSP ksp, Vec f, PetscInt n, const PetscInt a[], const PetscReal d[],
                               Vec rhs, Vec y, PetscBool *singular);
+/* For each of this rank's contact rows the unknown with its largest entry that no other row has (global number);
+   HYCO_NO_PIVOT: none; HYCO_IDLE: the row is empty, of a contact between fixed unknowns. *all: no rank has a row of the
+   former. Collective. */
+enum { HYCO_NO_PIVOT = -1, HYCO_IDLE = -2 };
+PetscErrorCode HycoGapPivots(HycoSystem system, PetscInt pivot[], PetscBool *all);
 /* Whether gap coordinates exist: each contact row has an unknown that no other row has. Collective. */
 PetscErrorCode HycoGapPossible(HycoSystem system, PetscBool *possible);
 /*

@@ -4,11 +4,7 @@
 */
 #include "gap.h"
 
-enum { HYCO_NO_PIVOT = -1, HYCO_IDLE = -2 };
-
-/* Pivot (global unknown) of each of this rank's rows: the largest entry whose unknown no other row has; HYCO_NO_PIVOT:
-   none; HYCO_IDLE: the row is empty, of a contact between fixed unknowns. *all: no rank has a row of the former. */
-static PetscErrorCode FindPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
+PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
 {
   PetscMPIInt bad = 0, any;
   PetscInt lo, hi;
@@ -89,7 +85,7 @@ PetscErrorCode HycoGapPossible(HycoSystem y, PetscBool *possible)
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
   PetscCall(PetscMalloc1(hi - lo, &pivot));
-  PetscCall(FindPivots(y, pivot, possible));
+  PetscCall(HycoGapPivots(y, pivot, possible));
   PetscCall(PetscFree(pivot));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -295,7 +291,7 @@ PetscErrorCode HycoGapSetUp(HycoSolver s, Gap *g)
   PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
   PetscCall(PetscFree(g->pivot));
   PetscCall(PetscMalloc1(hi - lo, &g->pivot));
-  PetscCall(FindPivots(y, g->pivot, &possible));
+  PetscCall(HycoGapPivots(y, g->pivot, &possible));
   if (!possible) g->transformed.K = 0;
   PetscCheck(possible, HycoComm(s), PETSC_ERR_USER,
              "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");

@@ -1,0 +1,328 @@
+/*
+  Conjugate gradients on the displacements that satisfy constraints, K x + B^T l = f, B x = d, preconditioned by
+  multigrid for K alone: its hierarchy is made once for any number of sets of constraints. The constraints are coarsened
+  with it (constraint_levels.c), and each smoother and correction is projected onto the displacements that satisfy them,
+  in the way of Braess and Sarazin (Appl. Numer. Math. 23 (1997) 3-19), as multigrid for contact does (M. Adams, Numer.
+  Linear Algebra Appl. 11 (2004) 141-153; T. Wiesner et al., Int. J. Numer. Meth. Engng 122 (2021) 3751-3779).
+*/
+#include "constrained.h"
+
+/* Iterations of the estimate of a level's largest eigenvalue, and what is added to it; where a smoother's interval
+   begins: PETSc's own choices for Chebyshev's method. */
+#define HYCO_EIGEN_ITS    10
+#define HYCO_EIGEN_SAFETY 1.1
+#define HYCO_EIGEN_LEAST  0.1
+
+/* The largest eigenvalue of D^-1 K by Lanczos' method. */
+static PetscErrorCode LargestEigenvalue(Mat K, PetscReal *largest)
+{
+  KSP ksp;
+  PC pc;
+  Vec b, x;
+  PetscScalar *v;
+  PetscInt lo, hi;
+  PetscReal least;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateVecs(K, &x, &b));
+  PetscCall(VecGetOwnershipRange(b, &lo, &hi));
+  PetscCall(VecGetArray(b, &v));
+  for (PetscInt i = lo; i < hi; i++)
+    v[i - lo] = (PetscReal)(HycoHash(HYCO_HASH_START, &i, sizeof(i)) >> 32) / 4294967296. - 0.5;
+  PetscCall(VecRestoreArray(b, &v));
+  PetscCall(KSPCreate(PetscObjectComm((PetscObject)K), &ksp));
+  PetscCall(KSPSetOperators(ksp, K, K));
+  PetscCall(KSPSetType(ksp, KSPCG));
+  PetscCall(KSPSetComputeSingularValues(ksp, PETSC_TRUE));
+  PetscCall(KSPSetTolerances(ksp, 1e-12, PETSC_DEFAULT, PETSC_DEFAULT, HYCO_EIGEN_ITS));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCSetType(pc, PCJACOBI));
+  PetscCall(KSPSolve(ksp, b, x));
+  PetscCall(KSPComputeExtremeSingularValues(ksp, largest, &least));
+  PetscCall(KSPDestroy(&ksp));
+  PetscCall(VecDestroy(&b));
+  PetscCall(VecDestroy(&x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The levels of the multigrid `pc`, finest first; of another preconditioner the finest alone. */
+static PetscErrorCode ReadLevels(HycoConstrained c, Mat K)
+{
+  PetscBool multigrid;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)c->pc, &multigrid, PCGAMG, PCMG, PCML, ""));
+  c->n = 1;
+  if (multigrid) PetscCall(PCMGGetLevels(c->pc, &c->n));
+  if (multigrid) PetscCall(PCMGGetCoarseSolve(c->pc, &c->coarse));
+  PetscCall(PetscCalloc1(c->n, &c->level));
+  for (PetscInt l = 0; l < c->n; l++) {
+    HycoLevel *v = &c->level[l];
+    KSP smoother;
+
+    v->K = K;
+    v->smooths = 2;
+    if (multigrid) {
+      PetscCall(PCMGGetSmoother(c->pc, c->n - 1 - l, &smoother));
+      PetscCall(KSPGetOperators(smoother, NULL, &v->K));
+      PetscCall(KSPGetTolerances(smoother, NULL, NULL, NULL, &v->smooths));
+    }
+    if (l + 1 < c->n) PetscCall(PCMGGetInterpolation(c->pc, c->n - 1 - l, &v->P));
+    PetscCall(MatCreateVecs(v->K, &v->inverse, &v->z));
+    PetscCall(MatGetDiagonal(v->K, v->inverse));
+    PetscCall(VecReciprocal(v->inverse));
+    PetscCall(VecDuplicate(v->z, &v->r));
+    PetscCall(VecDuplicate(v->z, &v->d));
+    PetscCall(VecDuplicate(v->z, &v->w));
+    if (l + 1 < c->n) PetscCall(LargestEigenvalue(v->K, &v->largest));
+    if (l + 1 < c->n) PetscCall(HycoUpperBlocks(v->K, &v->product));
+    if (!v->product) PetscCall(PetscObjectReference((PetscObject)v->K));
+    if (!v->product) v->product = v->K;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* mu = (B D^-1 B^T)^-1 mu */
+static PetscErrorCode SolveG(const HycoLevel *v, Vec mu)
+{
+  PetscFunctionBegin;
+  if (v->G_diagonal)
+    PetscCall(VecPointwiseMult(mu, mu, v->G_diagonal));
+  else {
+    PetscCall(KSPSolve(v->G, mu, v->mu_work));
+    PetscCall(VecCopy(v->mu_work, mu));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoLevelProject(const HycoLevel *v, Vec z)
+{
+  PetscFunctionBegin;
+  if (!v->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatMult(v->B, z, v->mu));
+  PetscCall(SolveG(v, v->mu));
+  PetscCall(VecScale(v->mu, -1));
+  PetscCall(MatMultAdd(v->DBt, v->mu, z, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* r without what constraint forces can take: the transpose of HycoLevelProject(); v->mu: these forces, negative. */
+static PetscErrorCode ProjectForce(const HycoLevel *v, Vec r)
+{
+  PetscFunctionBegin;
+  if (!v->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatMultTranspose(v->DBt, r, v->mu));
+  PetscCall(SolveG(v, v->mu));
+  PetscCall(VecScale(v->mu, -1));
+  PetscCall(MatMultTransposeAdd(v->B, v->mu, r, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Chebyshev steps on K z = r, from what z is; r becomes the residual (without `residual` it is that of the last step
+   but one). */
+static PetscErrorCode Smooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
+{
+  const PetscReal hi = HYCO_EIGEN_SAFETY * v->largest, lo = HYCO_EIGEN_LEAST * v->largest;
+  const PetscReal theta = (hi + lo) / 2, delta = (hi - lo) / 2;
+  PetscReal rho = delta / theta;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < v->smooths; k++) {
+    const PetscReal before = rho;
+
+    PetscCall(VecPointwiseMult(v->w, v->inverse, r));
+    PetscCall(HycoLevelProject(v, v->w));
+    if (k == 0)
+      PetscCall(VecAXPBY(v->d, 1 / theta, 0, v->w));
+    else {
+      rho = 1 / (2 * theta / delta - before);
+      PetscCall(VecAXPBY(v->d, 2 * rho / delta, rho * before, v->w));
+    }
+    PetscCall(VecAXPY(z, 1, v->d));
+    if (k + 1 == v->smooths && !residual) break;
+    PetscCall(MatMult(v->product, v->d, v->w));
+    PetscCall(VecAXPY(r, -1, v->w));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The coarsest level: K z + B^T mu = r, B z = 0 by the multigrid's own solver and B K^-1 B^T. */
+static PetscErrorCode SolveCoarsest(HycoConstrained c, HycoLevel *v, Vec r, Vec z)
+{
+  PetscBLASInt m, one = 1, info;
+  PetscScalar *mu;
+
+  PetscFunctionBegin;
+  PetscCall(KSPSolve(c->coarse, r, z));
+  if (!v->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatMult(v->B, z, v->mu));
+  PetscCall(VecScatterBegin(c->all, v->mu, c->mu_all, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(c->all, v->mu, c->mu_all, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(PetscBLASIntCast(v->m, &m));
+  PetscCall(VecGetArray(c->mu_all, &mu));
+  LAPACKpotrs_("L", &m, &one, c->S, &m, mu, &m, &info);
+  for (PetscInt k = 0; k < v->m; k++) mu[k] = -mu[k];
+  PetscCall(VecMAXPY(z, v->m, mu, c->Y));
+  PetscCall(VecRestoreArray(c->mu_all, &mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* z = M r, M symmetric, B z = 0; r is spent. */
+static PetscErrorCode Cycle(HycoConstrained c, PetscInt l, Vec r, Vec z)
+{
+  HycoLevel *v = &c->level[l];
+
+  PetscFunctionBegin;
+  if (l + 1 == c->n) {
+    PetscCall(SolveCoarsest(c, v, r, z));
+    if (l == 0) PetscCall(HycoLevelProject(v, z));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecSet(z, 0));
+  PetscCall(Smooth(v, PETSC_TRUE, r, z));
+  PetscCall(ProjectForce(v, r));
+  PetscCall(MatMultTranspose(v->P, r, v[1].r));
+  PetscCall(Cycle(c, l + 1, v[1].r, v[1].z));
+  PetscCall(MatMult(v->P, v[1].z, v->d));
+  PetscCall(HycoLevelProject(v, v->d));
+  PetscCall(VecAXPY(z, 1, v->d));
+  PetscCall(MatMult(v->product, v->d, v->w));
+  PetscCall(VecAXPY(r, -1, v->w));
+  PetscCall(Smooth(v, PETSC_FALSE, r, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Apply(PC shell, Vec r, Vec z)
+{
+  HycoConstrained c;
+  HycoLevel *v;
+
+  PetscFunctionBegin;
+  PetscCall(PCShellGetContext(shell, &c));
+  v = c->level;
+  PetscCall(VecCopy(r, v->r));
+  if (c->coarse)
+    PetscCall(Cycle(c, 0, v->r, z));
+  else {
+    PetscCall(ProjectForce(v, v->r));
+    PetscCall(PCApply(c->pc, v->r, z));
+    PetscCall(HycoLevelProject(v, z));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode View(PC shell, PetscViewer viewer)
+{
+  HycoConstrained c;
+
+  PetscFunctionBegin;
+  PetscCall(PCShellGetContext(shell, &c));
+  PetscCall(PCView(c->pc, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConstrainedCreate(MPI_Comm comm, const char prefix[], Mat K, HycoConstrained *constrained)
+{
+  HycoConstrained c;
+  PC shell;
+  PCType type;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&c));
+  *constrained = c;
+  PetscCall(HycoIterativeSolver(comm, prefix, K, &c->ksp));
+  PetscCall(KSPSetNormType(c->ksp, KSP_NORM_NATURAL));
+  PetscCall(KSPSetInitialGuessNonzero(c->ksp, PETSC_FALSE));
+  PetscCall(MatCreateVecs(K, &c->correction, &c->residual));
+  PetscCall(KSPGetPC(c->ksp, &c->pc));
+  PetscCall(PetscObjectReference((PetscObject)c->pc));
+  PetscCall(KSPSetUp(c->ksp));
+  PetscCall(PCGetType(c->pc, &type));
+  PetscCall(ReadLevels(c, K));
+  PetscCall(PCCreate(comm, &shell));
+  PetscCall(PCSetType(shell, PCSHELL));
+  PetscCall(PCSetOperators(shell, c->level->product, K));
+  PetscCall(PCShellSetName(shell, type));
+  PetscCall(PCShellSetContext(shell, c));
+  PetscCall(PCShellSetApply(shell, Apply));
+  PetscCall(PCShellSetView(shell, View));
+  PetscCall(KSPSetPC(c->ksp, shell));
+  c->shell = shell;
+  PetscCall(PCDestroy(&shell)); /* the solver has it */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConstrainedDestroy(HycoConstrained *constrained)
+{
+  HycoConstrained c = *constrained;
+
+  PetscFunctionBegin;
+  if (!c) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoConstraintsFree(c));
+  for (PetscInt l = 0; l < c->n; l++) {
+    PetscCall(MatDestroy(&c->level[l].product));
+    PetscCall(VecDestroy(&c->level[l].inverse));
+    PetscCall(VecDestroy(&c->level[l].r));
+    PetscCall(VecDestroy(&c->level[l].z));
+    PetscCall(VecDestroy(&c->level[l].d));
+    PetscCall(VecDestroy(&c->level[l].w));
+    PetscCall(VecDestroy(&c->level[l].aggregate));
+  }
+  PetscCall(PetscFree(c->level));
+  PetscCall(VecDestroy(&c->residual));
+  PetscCall(VecDestroy(&c->correction));
+  PetscCall(KSPDestroy(&c->ksp));
+  PetscCall(PCDestroy(&c->pc));
+  PetscCall(PetscFree(*constrained));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConstrainedGetKSP(HycoConstrained c, KSP *ksp)
+{
+  PetscFunctionBegin;
+  *ksp = c->ksp;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConstrainedSize(HycoConstrained c, Vec f, PetscReal *size)
+{
+  PetscScalar dot;
+
+  PetscFunctionBegin;
+  PetscCall(PCApply(c->shell, f, c->level->z));
+  PetscCall(VecDot(f, c->level->z, &dot));
+  *size = PetscSqrtReal(PetscMax(PetscRealPart(dot), 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConstrainedSolve(HycoConstrained c, Vec f, Vec d, PetscReal tolerance, Vec x, PetscInt *its)
+{
+  HycoLevel *v = c->level;
+
+  PetscFunctionBegin;
+  if (v->m) { /* onto the constraints */
+    PetscCall(MatMult(v->B, x, v->mu));
+    PetscCall(VecAYPX(v->mu, -1, d));
+    PetscCall(SolveG(v, v->mu));
+    PetscCall(MatMultAdd(v->DBt, v->mu, x, x));
+  }
+  /* a correction, so that the constraints' forces do not drown the residual */
+  PetscCall(MatMult(v->product, x, c->residual));
+  PetscCall(VecAYPX(c->residual, -1, f));
+  PetscCall(ProjectForce(v, c->residual));
+  PetscCall(KSPSetTolerances(c->ksp, 1e-300, tolerance, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(KSPSolve(c->ksp, c->residual, c->correction));
+  PetscCall(VecAXPY(x, 1, c->correction));
+  PetscCall(KSPGetIterationNumber(c->ksp, its));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConstrainedForces(HycoConstrained c, Vec r, Vec force)
+{
+  HycoLevel *v = c->level;
+
+  PetscFunctionBegin;
+  PetscCall(MatMultTranspose(v->DBt, r, force));
+  PetscCall(SolveG(v, force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

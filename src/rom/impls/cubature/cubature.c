@@ -1,0 +1,304 @@
+/*
+  The cubature's model: modes are tested by themselves over all of the bodies, but integrals over the bodies are sums
+  over few cells,
+
+      V^T f_int = sum of w_e V_e^T f_e over chosen cells e,   w_e > 0
+
+  so that the reduced stiffness stays symmetric and, as a sum of the cells' with positive weights, semidefinite. Contact
+  is the hybrid model's (-hyco_dual fe): a finite-element multiplier for each contact, and the displacements of the
+  contacts' nodes full order (39)-(40), whose equations are those of the cells around them, each of which has w = 1.
+  With every cell once it is the hybrid model with the whole mesh as its RID. Or it is the projection-based model's,
+  nonnegative vectors of forces (44): then with every cell once it is that one. Loads on surfaces are those of the whole
+  mesh.
+*/
+#include <hycocubature.h>
+#include <hycoromtypes.h>
+#include <petscviewer.h>
+
+static PetscErrorCode SetFromOptions(HycoReducer t)
+{
+  HycoCubatureTraining c;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&c));
+  t->training = c;
+  c->tol = 1e-4;
+  c->forces.dual = HYCO_DUAL_FE;
+  PetscCall(HycoForceBasisSetFromOptions(t));
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("cubature"));
+  PetscCall(HycoOptionsReal("-hyco_cubature_tol",
+                            "what the chosen cells may miss of the training's internal forces, relative (0: all cells)",
+                            0, 1, &c->tol, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ResetTraining(HycoReducer t)
+{
+  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(c->weight));
+  PetscCall(PetscFree(c->near));
+  c->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Begin(HycoReducer t)
+{
+  PetscFunctionBegin;
+  HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for scenes in the plane and in space; on a line take hybrid "
+                             "or projection");
+  HycoCheck(
+      !t->scene->n_springs,
+      "-hyco_model_type cubature integrates over cells, and the scene has springs on %s; take hybrid or projection",
+      t->scene->spring[0].group);
+  for (PetscInt k = 0; k < t->scene->n_fixed; k++)
+    HycoCheck(!t->scene->fixed[k].normal,
+              "-hyco_model_type cubature takes supports along the axes, and that of %s has a direction; take hybrid or "
+              "projection",
+              t->scene->fixed[k].group);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nodes of contacts, by their numbers in the whole mesh, ascending. On rank 0. */
+static PetscErrorCode ListContacts(HycoReducer t, PetscInt *n, PetscInt node[])
+{
+  HycoMesh surface = t->fom->surface;
+  PetscBool *contact;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(surface->n_nodes, &contact));
+  HycoPairsMark(&t->fom->pairs, contact);
+  *n = 0;
+  for (PetscInt i = 0; i < surface->n_nodes; i++) {
+    if (contact[i]) node[(*n)++] = surface->node_whole ? surface->node_whole[i] : i;
+  }
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells around contacts: c->near. Collective. */
+static PetscErrorCode MarkNear(HycoReducer t)
+{
+  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
+  HycoMesh part = t->fom->part;
+  PetscInt n = 0, *node, at;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(c->near));
+  if (c->forces.dual != HYCO_DUAL_FE) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(t->sizes[0], &node));
+  HycoOnRoot(HycoComm(t), ListContacts(t, &n, node));
+  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(t)));
+  HycoBcast(node, n, MPIU_INT, HycoComm(t));
+  PetscCall(PetscCalloc1(part->n_cells, &c->near));
+  for (PetscInt k = 0; k < part->n_cells * part->nv; k++) {
+    PetscCall(PetscFindInt(part->node_whole ? part->node_whole[part->cells[k]] : part->cells[k], n, node, &at));
+    if (at >= 0) c->near[k / part->nv] = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The force basis' modes, then the cells. Collective. */
+static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
+{
+  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
+  PetscReal *sigma;
+  PetscInt n = 0;
+  Mat W;
+
+  PetscFunctionBegin;
+  HycoCheck(!t->grown, "train -greedy adds cells to the RID of before, and a cubature chooses all of its cells anew: "
+                       "train it on a grid or on points");
+  PetscCall(HycoProjectionModes(t, store));
+  PetscCall(MarkNear(t));
+  if (c->tol == 0) {
+    PetscCall(HycoCubatureChooseAll(t));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoCubatureSample(t, store, c->tol * c->tol, &W, &n, &sigma));
+  if (n)
+    PetscCall(HycoCubatureChoose(t, W, n, sigma));
+  else /* contacts are everywhere */
+    PetscCall(HycoCubatureChooseAll(t));
+  PetscCall(MatDestroy(&W));
+  PetscCall(PetscFree(sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With finite-element multipliers nothing of the force vectors is asked for. */
+static void TakeContact(HycoROM m)
+{
+  HycoProjectionROM p = (HycoProjectionROM)m->data;
+
+  if (p->dual != HYCO_DUAL_FE) return;
+  p->galerkin.contact = p->galerkin.gap = p->galerkin.expand = NULL;
+  m->traits.constrains = PETSC_TRUE;
+}
+
+/* The displacements of contacts' nodes are full order where their multipliers are the finite elements'. */
+static PetscErrorCode SetFullOrder(HycoROM m, HycoReducer t)
+{
+  const PetscInt dim = m->mesh->dim;
+  PetscBool *contact;
+  PetscInt n = 0, *dof;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->mesh->n_nodes, &contact));
+  PetscCall(PetscMalloc1(m->mesh->n_nodes * dim, &dof));
+  if (((HycoProjectionROM)m->data)->dual == HYCO_DUAL_FE) HycoPairsMark(&m->pairs, contact);
+  for (PetscInt k = 0; k < m->mesh->n_nodes * dim; k++) {
+    if (contact[k / dim] && !t->fixed[k]) dof[n++] = k;
+  }
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n, dof));
+  PetscCall(PetscFree(dof));
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every node is tested, every contact is the model's; the cells' weights. */
+static PetscErrorCode Build(HycoROM m, HycoReducer t)
+{
+  const HycoCubatureTraining c = (HycoCubatureTraining)t->training;
+  HycoCubatureROM r = (HycoCubatureROM)m->data;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) m->role[i] = HYCO_ROLE_A;
+  for (PetscInt k = 0; k < m->pairs.n; k++) m->in_rid[k] = 1;
+  PetscCall(PetscMalloc1(m->mesh->n_cells, &r->weight));
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+    PetscInt at = -1;
+
+    PetscCall(PetscFindInt(m->mesh->cell_whole[e], c->n, t->seeds_cell, &at));
+    PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a cell of the model has no weight");
+    r->weight[e] = c->weight[at];
+  }
+  PetscCall(PetscArraycpy(r->error, c->error, 2));
+  PetscCall(HycoProjectionMakeBasis(m, t));
+  TakeContact(m);
+  PetscCall(SetFullOrder(m, t));
+  PetscCall(HycoProjectionJudge(m, t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define WORDS 96
+
+/* "33 contacts with 128 full-order displacements", or "8 force vectors for 33 contacts" */
+static void DescribeContact(HycoROM m, char text[WORDS])
+{
+  const HycoProjectionROM p = (HycoProjectionROM)m->data;
+
+  if (p->dual == HYCO_DUAL_FE)
+    (void)snprintf(text, WORDS, "%d contacts with %d full-order displacements", (int)m->pairs.n, (int)m->n_fe);
+  else
+    (void)snprintf(text, WORDS, "%d force vectors for %d contacts", (int)p->l_lambda, (int)m->pairs.n);
+}
+
+static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+{
+  const HycoCubatureROM c = (HycoCubatureROM)m->data;
+  char contact[WORDS];
+
+  PetscFunctionBegin;
+  PetscCall(HycoProjectionReport(t, m, r));
+  PetscCall(HycoTrainingAddFact(r, "cubature_error", c->error[0]));
+  DescribeContact(m, contact);
+  snprintf(r->summary, sizeof(r->summary),
+           "%d snapshots; %d displacement modes; %s; cubature on %d of %d elements (%.1f %%), which misses %.1e of the "
+           "training's internal forces\n",
+           (int)r->n_samples, (int)r->n_modes, contact, (int)m->mesh->n_cells, (int)m->whole_cells,
+           100 * (double)r->rid_fraction, (double)c->error[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoProjectionSetUp(m));
+  m->fe->cell_weight = ((HycoCubatureROM)m->data)->weight;
+  m->fe->all_facets = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+{
+  const HycoCubatureROM c = (HycoCubatureROM)m->data;
+  PetscReal least = PETSC_MAX_REAL, most = 0;
+  char contact[WORDS];
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+    least = PetscMin(least, c->weight[e]);
+    most = PetscMax(most, c->weight[e]);
+  }
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "  cubature: %d of %d elements (%.1f %%), weights from %.3g to %.3g; missed of the "
+                                   "training's internal forces: %.1e; %d contacts\n",
+                                   (int)m->mesh->n_cells, (int)m->whole_cells,
+                                   100. * (double)m->mesh->n_cells / (double)m->whole_cells, (double)least,
+                                   (double)most, (double)c->error[0], (int)m->pairs.n));
+  DescribeContact(m, contact);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  %s\n", contact));
+  PetscCall(c->projection.dual == HYCO_DUAL_FE ? HycoGalerkinView(m, viewer) : HycoProjectionViewForces(m, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* To the model file, or from it. */
+static PetscErrorCode Move(HycoROM m, HycoH5 h)
+{
+  HycoCubatureROM c = (HycoCubatureROM)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoProjectionMove(m, h));
+  TakeContact(m);
+  PetscCall(HycoH5Real(h, "cubature/weight", &m->mesh->n_cells, 1, &c->weight));
+  PetscCall(HycoH5Reals(h, "cubature/error", 2, c->error));
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++)
+    HycoCheck(c->weight[e] > 0, "%s: cubature/weight is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(((HycoCubatureROM)m->data)->weight));
+  PetscCall(HycoProjectionDestroy(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMCreate_Cubature(HycoROM m)
+{
+  static const HycoROMTraits traits = {.title = "cubature",
+                                       .settings = HYCO_SETTINGS_MODES,
+                                       .stiffness = PETSC_TRUE,
+                                       .force_basis = PETSC_TRUE,
+                                       .history = PETSC_TRUE,
+                                       .cells = PETSC_TRUE};
+  static const HycoROMOps ops = {.setfromoptions = SetFromOptions,
+                                 .resettraining = ResetTraining,
+                                 .begin = Begin,
+                                 .modes = Modes,
+                                 .build = Build,
+                                 .finish = HycoGalerkinFinish,
+                                 .report = Report,
+                                 .cost = HycoGalerkinCost,
+                                 .setup = SetUp,
+                                 .reset = HycoGalerkinReset,
+                                 .solve = HycoGalerkinSolve,
+                                 .energy = HycoGalerkinEnergy,
+                                 .condition = HycoGalerkinCondition,
+                                 .view = View,
+                                 .save = Move,
+                                 .load = Move,
+                                 .destroy = Destroy};
+  HycoCubatureROM c;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&c));
+  HycoProjectionInit(&c->projection);
+  PetscCall(HycoROMSetOps(m, &ops, &traits, c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,219 @@
+/*
+  Empirical cubature (Hernandez, Caicedo, Ferrer, Comput. Methods Appl. Mech. Engrg. 313 (2017) 687-722; its conditions
+  as ECSW's: Farhat, Avery, Chapman, Cortial, Int. J. Numer. Meth. Engng 98 (2014) 625-662): few cells and weights w >=
+  0 with
+
+      W^T w = W^T 1,    sum of w_e vol_e over a body = its volume,
+
+  W the leading singular vectors of what cells give to the reduced internal forces. w = 1 is an answer; nonnegative
+  least squares find one with no more cells than there are equations.
+  Cells at contacts with full-order displacements have w = 1 and stand in none of them.
+*/
+#include <hycoalgorithms.h>
+#include <hycocubature.h>
+
+/* Column j of A (rows spread) on rank 0. Collective. */
+static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
+{
+  const PetscScalar *value;
+  VecScatter scatter;
+  PetscInt n;
+  Vec v, all;
+
+  PetscFunctionBegin;
+  PetscCall(MatDenseGetColumnVecRead(A, j, &v));
+  PetscCall(VecScatterCreateToZero(v, &scatter, &all));
+  PetscCall(VecScatterBegin(scatter, v, all, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(scatter, v, all, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(MatDenseRestoreColumnVecRead(A, j, &v));
+  PetscCall(VecGetLocalSize(all, &n));
+  PetscCall(VecGetArrayRead(all, &value));
+  PetscCall(PetscArraycpy(column, value, n));
+  PetscCall(VecRestoreArrayRead(all, &value));
+  PetscCall(VecScatterDestroy(&scatter));
+  PetscCall(VecDestroy(&all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define N_NOTES 3 /* of a cell: its volume, 0 if it is in the sum once; its body; whether it is in the sum once */
+
+/* By cell of the part. */
+static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal value[])
+{
+  const PetscInt n = fe->mesh->n_cells;
+  PetscReal *volume;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &volume));
+  ierr = HycoFEVolumes(fe, volume);
+  for (PetscInt e = 0; e < n; e++) {
+    value[N_NOTES * e] = near && near[e] ? 0 : volume[e];
+    value[N_NOTES * e + 1] = fe->mesh->cell_body[e];
+    value[N_NOTES * e + 2] = near && near[e];
+  }
+  PetscCall(PetscFree(volume));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The notes, a column each, rows in the file's order. Collective. */
+static PetscErrorCode Notes(HycoReducer t, PetscInt n_rows, Mat *X)
+{
+  HycoFE fe = t->fom->fe;
+  PetscReal *value, *rows;
+  PetscScalar *x;
+  PetscInt lda;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(N_NOTES * fe->mesh->n_cells, &value, N_NOTES * n_rows, &rows));
+  HycoOnEach(HycoComm(t), FillNotes(fe, ((HycoCubatureTraining)t->training)->near, value));
+  PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, N_NOTES, value, rows));
+  PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, t->sizes[1], N_NOTES, NULL, X));
+  PetscCall(MatDenseGetLDA(*X, &lda));
+  PetscCall(MatDenseGetArray(*X, &x));
+  for (PetscInt i = 0; i < n_rows; i++) {
+    for (PetscInt j = 0; j < N_NOTES; j++) x[j * lda + i] = rows[N_NOTES * i + j];
+  }
+  PetscCall(MatDenseRestoreArray(*X, &x));
+  PetscCall(MatAssemblyBegin(*X, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*X, MAT_FINAL_ASSEMBLY));
+  PetscCall(PetscFree2(value, rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A: a column per cell, the n leading entries of its row of W (columns of n_cells in `vectors`), then a row per body of
+   volumes over their 2-norm; b = A 1. */
+static void FillSystem(PetscInt n_cells, PetscInt n, const PetscReal vectors[], PetscInt n_bodies,
+                       const PetscReal volume[], const PetscReal body[], PetscReal A[], PetscReal b[])
+{
+  const PetscInt m = n + n_bodies;
+
+  for (PetscInt i = 0; i < m; i++) {
+    PetscReal size = 0;
+
+    b[i] = 0;
+    for (PetscInt e = 0; e < n_cells && i >= n; e++) size += (PetscInt)body[e] == i - n ? volume[e] * volume[e] : 0;
+    for (PetscInt e = 0; e < n_cells; e++) {
+      PetscReal *a = A + (size_t)e * (size_t)m + (size_t)i;
+
+      if (i < n)
+        *a = vectors[(size_t)i * (size_t)n_cells + (size_t)e];
+      else
+        *a = (PetscInt)body[e] == i - n && size > 0 ? volume[e] / PetscSqrtReal(size) : 0;
+      b[i] += *a;
+    }
+  }
+}
+
+/* What the weights miss of all n vectors' integrals, and of the volumes: relative. */
+static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], const PetscReal sigma[], PetscInt n_bodies,
+                    const PetscReal volume[], const PetscReal body[], const PetscReal w[], PetscReal error[2])
+{
+  PetscReal lost = 0, size = 0;
+
+  for (PetscInt i = 0; i < n; i++) {
+    PetscReal missed = 0, all = 0;
+
+    for (PetscInt e = 0; e < n_cells; e++) {
+      missed += vectors[(size_t)i * (size_t)n_cells + (size_t)e] * (w[e] - 1);
+      all += vectors[(size_t)i * (size_t)n_cells + (size_t)e];
+    }
+    lost += sigma[i] * missed * sigma[i] * missed;
+    size += sigma[i] * all * sigma[i] * all;
+  }
+  error[0] = HycoRelative(PetscSqrtReal(lost), PetscSqrtReal(size));
+  error[1] = 0;
+  for (PetscInt b = 0; b < n_bodies; b++) {
+    PetscReal missed = 0, all = 0;
+
+    for (PetscInt e = 0; e < n_cells; e++) {
+      if ((PetscInt)body[e] != b) continue;
+      missed += volume[e] * (w[e] - 1);
+      all += volume[e];
+    }
+    error[1] = PetscMax(error[1], HycoRelative(PetscAbsReal(missed), all));
+  }
+}
+
+/* The weights of all cells. On rank 0. */
+static PetscErrorCode FindWeights(HycoReducer t, PetscInt n, const PetscReal vectors[], const PetscReal sigma[],
+                                  const PetscReal notes[], PetscReal w[])
+{
+  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
+  const PetscInt n_cells = t->sizes[1], n_bodies = t->scene->n_bodies;
+  const PetscReal *volume = notes, *body = notes + n_cells, *near = notes + 2 * n_cells;
+  const PetscInt leading = HycoPODRank(n, sigma, c->tol * c->tol, t->noise, 0), m = leading + n_bodies;
+  PetscReal *A, *b;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2((size_t)m * (size_t)n_cells, &A, m, &b));
+  FillSystem(n_cells, leading, vectors, n_bodies, volume, body, A, b);
+  PetscCall(HycoNNLS(m, n_cells, A, b, w, NULL));
+  PetscCall(PetscFree2(A, b));
+  for (PetscInt e = 0; e < n_cells; e++) w[e] = near[e] > 0 ? 1 : w[e];
+  Measure(n_cells, n, vectors, sigma, n_bodies, volume, body, w, c->error);
+  HycoCheckModel(c->error[0] <= PetscMax(10 * c->tol, 1e-6) && c->error[1] <= 1e-3,
+                 "the cubature misses %.1e of the training's internal forces and %.1e of a body's volume: take another "
+                 "-hyco_cubature_tol, or fewer modes (-hyco_pod_tol)",
+                 (double)c->error[0], (double)c->error[1]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells whose weight is positive, on every rank. Collective; w: on rank 0. */
+static PetscErrorCode Take(HycoReducer t, const PetscReal w[])
+{
+  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
+  const PetscInt n_cells = t->sizes[1];
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(c->weight));
+  PetscCall(PetscFree(t->seeds_cell));
+  PetscCall(PetscMalloc1(n_cells, &c->weight));
+  PetscCall(PetscMalloc1(n_cells, &t->seeds_cell));
+  for (PetscInt e = 0; w && e < n_cells; e++) {
+    if (!(w[e] > 0)) continue;
+    t->seeds_cell[n] = e;
+    c->weight[n++] = w[e];
+  }
+  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(t)));
+  HycoBcast(t->seeds_cell, n, MPIU_INT, HycoComm(t));
+  HycoBcast(c->weight, n, MPIU_REAL, HycoComm(t));
+  c->n = t->n_seeds_cell = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCubatureChooseAll(HycoReducer t)
+{
+  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
+  PetscReal *w;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(t->sizes[1], &w));
+  for (PetscInt e = 0; e < t->sizes[1]; e++) w[e] = 1;
+  c->error[0] = c->error[1] = 0;
+  PetscCall(Take(t, w));
+  PetscCall(PetscFree(w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCubatureChoose(HycoReducer t, Mat W, PetscInt n, const PetscReal sigma[])
+{
+  const size_t n_cells = t->rank ? 0 : (size_t)t->sizes[1];
+  PetscReal *vectors, *notes, *w;
+  PetscInt rows;
+  Mat X;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetLocalSize(W, &rows, NULL));
+  PetscCall(Notes(t, rows, &X));
+  PetscCall(PetscMalloc3((size_t)n * n_cells + 1, &vectors, N_NOTES * n_cells + 1, &notes, n_cells + 1, &w));
+  for (PetscInt j = 0; j < n; j++) PetscCall(GatherColumn(W, j, vectors + (size_t)j * n_cells));
+  for (PetscInt j = 0; j < N_NOTES; j++) PetscCall(GatherColumn(X, j, notes + (size_t)j * n_cells));
+  PetscCall(MatDestroy(&X));
+  HycoOnRoot(HycoComm(t), FindWeights(t, n, vectors, sigma, notes, w));
+  PetscCall(Take(t, t->rank ? NULL : w));
+  PetscCall(PetscFree3(vectors, notes, w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

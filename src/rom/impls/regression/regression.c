@@ -1,0 +1,372 @@
+/*
+  The regression: every coefficient, contact force, stress and inelastic strain is a function of the parameters, of a
+  history one at each listed time, by radial basis functions with a linear tail,
+
+      y(mu) = sum over the training points k of c_k phi(|mu - mu_k|) + a + b . mu,    sum of c_k (1, mu_k) = 0
+
+  parameters scaled by their ranges, which has the training values at the training points. All of it is one set of
+  weights, y(mu) = sum of w_k(mu) y_k. Contact forces and inelastic strains are cut at 0. No law is evaluated and no
+  equation solved: nothing keeps bodies from penetrating, as the residuals at the contacts say. It shows what the
+  others' physics is worth.
+*/
+#include <hycoalgorithms.h>
+#include <hycomaterialimpl.h>
+#include <hycoreducerimpl.h>
+#include <hycoromtypes.h>
+#include <petscviewer.h>
+
+enum { KERNEL_CUBIC, KERNEL_THIN_PLATE, KERNEL_LINEAR };
+static const char *const kernels[] = {"cubic", "thin_plate", "linear", NULL};
+
+typedef struct {
+  HycoSnapshots store; /* borrowed, of this run */
+  PetscInt kernel;
+} * Training;
+
+/* Values: a column for each training point, of a history one for each of its listed times, point after point. */
+typedef struct {
+  PetscInt kernel, n_columns;
+  PetscReal *gamma, *Lambda;    /* l, N_lambda rows */
+  PetscReal *sigma, *inelastic; /* of a history: n_cells x n_sigma, n_cells rows */
+  PetscReal *inverse;           /* online: of the system for c, a, b (symmetric) */
+  PetscReal *right, *weight;    /* its right side; the points' weights, with those of a, b */
+  PetscReal largest;            /* contact force of the training */
+  HycoStep *step;               /* by listed time */
+} * Regression;
+
+/* -- training -- */
+
+static PetscErrorCode SetFromOptions(HycoReducer t)
+{
+  Training s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s));
+  t->training = s;
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("regression"));
+  PetscCall(HycoOptionsWord("-hyco_regression_kernel",
+                            "radial basis functions of the distance r: r^3, r^2 log r, r; with a linear polynomial",
+                            kernels, &s->kernel, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
+{
+  PetscFunctionBegin;
+  ((Training)t->training)->store = store;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A field of the training paths in the model's cells, `width` numbers each. */
+static PetscErrorCode ReadCells(HycoReducer t, HycoROM m, const char field[], PetscInt width, PetscReal value[])
+{
+  const HycoSnapshots store = ((Training)t->training)->store;
+  const PetscInt steps = HycoSnapshotsSteps(t->scene), n_cells = m->mesh->n_cells;
+  const PetscReal *mu;
+  PetscReal *all;
+  PetscInt n_par;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  PetscCall(PetscMalloc1(t->sizes[1] * width, &all));
+  for (PetscInt k = 0; k < t->n_s; k++) {
+    PetscCall(HycoSnapshotsReadRows(store, mu + k / steps * n_par, k % steps, field, 0, t->sizes[1] * width, all));
+    for (PetscInt e = 0; e < n_cells; e++)
+      PetscCall(PetscArraycpy(value + (size_t)(k * n_cells + e) * (size_t)width, all + m->mesh->cell_whole[e] * width,
+                              width));
+  }
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Build(HycoROM m, HycoReducer t)
+{
+  Regression r = (Regression)m->data;
+  const PetscInt n_sigma = t->fom->fe->n_sigma;
+  const size_t n_s = (size_t)t->n_s, cells = n_s * (size_t)m->mesh->n_cells;
+
+  PetscFunctionBegin;
+  r->kernel = ((Training)t->training)->kernel;
+  r->n_columns = t->n_s;
+  HycoDuplicate(n_s * (size_t)m->l, t->VtU, &r->gamma);
+  HycoDuplicate(n_s * (size_t)m->pairs.n, t->Lambda, &r->Lambda);
+  if (t->scene->n_times) {
+    PetscCall(PetscMalloc1(cells * (size_t)n_sigma + 1, &r->sigma));
+    PetscCall(PetscMalloc1(cells + 1, &r->inelastic));
+    PetscCall(ReadCells(t, m, "sigma", n_sigma, r->sigma));
+    PetscCall(ReadCells(t, m, "inelastic", 1, r->inelastic));
+  }
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
+  PetscCall(HycoReducerJudge(t, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *out)
+{
+  PetscFunctionBegin;
+  (void)t;
+  snprintf(out->summary, sizeof(out->summary),
+           "regression: %d snapshots; %d displacement modes, %d contact forces; stresses in %d elements (%.1f %%)\n",
+           (int)out->n_samples, (int)out->n_modes, (int)m->pairs.n, (int)m->mesh->n_cells,
+           100 * (double)out->rid_fraction);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- online -- */
+
+static PetscReal Kernel(PetscInt kernel, PetscReal r)
+{
+  if (kernel == KERNEL_CUBIC) return r * r * r;
+  if (kernel == KERNEL_LINEAR) return r;
+  return r > 0 ? r * r * PetscLogReal(r) : 0;
+}
+
+/* The system's column of a point: kernels to the training points, 1, the scaled parameters. */
+static void Column(HycoROM m, const PetscReal mu[], PetscReal column[])
+{
+  const HycoScene s = m->scene;
+  const PetscInt n = m->n_points, n_par = s->n_parameters;
+
+  for (PetscInt k = 0; k < n; k++)
+    column[k] = Kernel(((Regression)m->data)->kernel, HycoTrustDistance(s, mu, m->points + k * n_par));
+  column[n] = 1;
+  for (PetscInt p = 0; p < n_par; p++)
+    column[n + 1 + p] = (mu[p] - s->lo[p]) / (s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1);
+}
+
+#define SINGULAR 1e-13 /* points on one plane leave the polynomial open: its least norm is taken */
+
+/* The inverse of the system, the tail's columns below and beside the kernels'. */
+static PetscErrorCode Invert(HycoROM m)
+{
+  Regression r = (Regression)m->data;
+  const PetscInt n = m->n_points, size = n + 1 + m->scene->n_parameters;
+  PetscReal *A;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1((size_t)size * (size_t)size, &A));
+  PetscCall(PetscMalloc1((size_t)size * (size_t)size, &r->inverse));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal *column = A + (size_t)k * (size_t)size;
+
+    Column(m, m->points + k * m->scene->n_parameters, column);
+    for (PetscInt i = n; i < size; i++) A[(size_t)i * (size_t)size + (size_t)k] = column[i];
+  }
+  PetscCall(HycoPseudoInverse(size, size, A, SINGULAR, r->inverse));
+  PetscCall(PetscFree(A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoROM m)
+{
+  Regression r = (Regression)m->data;
+  const PetscInt size = m->n_points + 1 + m->scene->n_parameters;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetUpDefault(m));
+  PetscCall(PetscMalloc1(size, &r->right));
+  PetscCall(PetscMalloc1(size, &r->weight));
+  PetscCall(PetscCalloc1(PetscMax(1, m->scene->n_times), &r->step));
+  r->largest = 0;
+  for (PetscInt k = 0; k < r->n_columns * m->pairs.n; k++) r->largest = PetscMax(r->largest, r->Lambda[k]);
+  PetscCall(Invert(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Reset(HycoROM m)
+{
+  Regression r = (Regression)m->data;
+
+  PetscFunctionBegin;
+  HycoFreeAll(&r->inverse, &r->right, &r->weight, &r->step);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The training points' weights at mu. */
+static void Weigh(HycoROM m, const PetscReal mu[])
+{
+  Regression r = (Regression)m->data;
+  const PetscInt n = m->n_points, size = n + 1 + m->scene->n_parameters;
+
+  Column(m, mu, r->right);
+  for (PetscInt k = 0; k < n; k++) {
+    r->weight[k] = 0;
+    for (PetscInt i = 0; i < size; i++) r->weight[k] += r->inverse[(size_t)k * (size_t)size + (size_t)i] * r->right[i];
+  }
+}
+
+/* The weighted sum of the points' columns of listed time `step`, `rows` numbers each; at least `least`. */
+static void Sum(HycoROM m, PetscInt step, PetscInt rows, const PetscReal data[], PetscReal least, PetscReal value[])
+{
+  const Regression r = (Regression)m->data;
+  const PetscInt steps = HycoSnapshotsSteps(m->scene);
+
+  for (PetscInt i = 0; i < rows; i++) value[i] = 0;
+  for (PetscInt k = 0; k < m->n_points; k++) {
+    const PetscReal *column = data + (size_t)(k * steps + step) * (size_t)rows;
+
+    for (PetscInt i = 0; i < rows; i++) value[i] += r->weight[k] * column[i];
+  }
+  for (PetscInt i = 0; i < rows; i++) value[i] = PetscMax(value[i], least);
+}
+
+#define NO_FORCE 1e-12 /* of the largest in training: round-off */
+
+/* Displacement and forces at mu (all variables), where the history is at listed time `step`. */
+static PetscErrorCode Evaluate(HycoROM m, PetscInt step, const PetscReal mu[])
+{
+  const Regression r = (Regression)m->data;
+
+  PetscFunctionBegin;
+  Sum(m, step, m->l, r->gamma, PETSC_MIN_REAL, m->gamma);
+  Sum(m, step, m->pairs.n, r->Lambda, 0, m->Lambda);
+  for (PetscInt k = 0; k < m->pairs.n; k++) m->Lambda[k] = m->Lambda[k] > NO_FORCE * r->largest ? m->Lambda[k] : 0;
+  PetscCall(HycoROMSetSolution(m, mu, NULL, NULL));
+  m->beyond_current = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The listed time where the model is, with the fields of its cells. */
+static PetscErrorCode List(HycoROM m, PetscInt step, PetscReal t)
+{
+  const Regression r = (Regression)m->data;
+  const PetscInt n_cells = m->mesh->n_cells, ns = m->fe->n_sigma;
+  HycoStep *s = &r->step[step];
+  PetscReal *sigma, *inelastic;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(s, sizeof(*s)));
+  s->index = step;
+  s->t = t;
+  s->kkt = HycoKKTMax(&m->prediction.kkt);
+  s->stored = NAN; /* nobody knows */
+  PetscCall(HycoTraceAdd(m, t));
+  PetscCall(HycoTraceList(m, &sigma, &inelastic));
+  Sum(m, step, n_cells * ns, r->sigma, PETSC_MIN_REAL, sigma);
+  Sum(m, step, n_cells, r->inelastic, 0, inelastic);
+  for (PetscInt e = 0; e < n_cells; e++) {
+    s->mises = PetscMax(s->mises, HycoMises(m->fe->dim, sigma + e * ns));
+    s->inelastic = PetscMax(s->inelastic, inelastic[e]);
+  }
+  HycoTraceMeasure(m, s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All listed times; the residuals are the largest of them. */
+static PetscErrorCode Path(HycoROM m, const PetscReal mu[])
+{
+  const HycoScene s = m->scene;
+  const Regression r = (Regression)m->data;
+  HycoPrediction *p = &m->prediction;
+  HycoReason reason = HYCO_CONVERGED;
+  HycoKKT worst = {0};
+
+  PetscFunctionBegin;
+  PetscCall(HycoTraceBegin(m));
+  for (PetscInt k = 0; k < s->n_times; k++) {
+    PetscReal all[HYCO_MAX_PARAMETERS];
+
+    HycoSceneSetTime(s, mu, s->times[k], all);
+    PetscCall(Evaluate(m, k, all));
+    PetscCall(List(m, k, s->times[k]));
+    worst.penetration = PetscMax(worst.penetration, p->kkt.penetration);
+    worst.adhesion = PetscMax(worst.adhesion, p->kkt.adhesion);
+    worst.complementarity = PetscMax(worst.complementarity, p->kkt.complementarity);
+    if (p->reason < 0) reason = p->reason;
+  }
+  p->kkt = worst;
+  p->reason = reason;
+  m->trace.history = (HycoHistory){.n = s->n_times,
+                                   .step = r->step,
+                                   .ended = PETSC_TRUE,
+                                   .t = s->times[s->n_times - 1],
+                                   .why = "",
+                                   .newton = "none",
+                                   .n_taken = s->n_times,
+                                   .taken = s->times};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
+{
+  PetscReal all[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  Weigh(m, mu);
+  if (m->scene->n_times) {
+    PetscCall(Path(m, mu));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  HycoSceneSetTime(m->scene, mu, 0, all);
+  PetscCall(Evaluate(m, 0, all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- file, words -- */
+
+/* To the model file, or from it. */
+static PetscErrorCode Move(HycoROM m, HycoH5 h)
+{
+  Regression r = (Regression)m->data;
+  const PetscInt n_sigma = HycoStrainSize(m->mesh->dim);
+
+  PetscFunctionBegin;
+  if (HycoH5Reads(h)) {
+    PetscCall(HycoROMLoadWord(m, h, "regression/kernel", kernels, &r->kernel));
+    r->n_columns = -1;
+  } else
+    PetscCall(HycoH5WriteText(h, "regression/kernel", kernels[r->kernel]));
+  PetscCall(HycoH5Real(h, "regression/gamma", &r->n_columns, m->l, &r->gamma));
+  PetscCall(HycoH5Real(h, "regression/Lambda", &r->n_columns, m->pairs.n, &r->Lambda));
+  if (!m->scene->n_times) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5Real(h, "regression/sigma", &r->n_columns, m->mesh->n_cells * n_sigma, &r->sigma));
+  PetscCall(HycoH5Real(h, "regression/inelastic", &r->n_columns, m->mesh->n_cells, &r->inelastic));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+{
+  const Regression r = (Regression)m->data;
+
+  PetscFunctionBegin;
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "  regression: %s radial basis functions and a linear polynomial of %d parameters, "
+                                   "from %d solutions; %d contact forces, stresses in %d of %d elements\n",
+                                   kernels[r->kernel], (int)m->scene->n_parameters, (int)r->n_columns, (int)m->pairs.n,
+                                   (int)m->mesh->n_cells, (int)m->whole_cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoROM m)
+{
+  Regression r = (Regression)m->data;
+
+  PetscFunctionBegin;
+  HycoFreeAll(&r->gamma, &r->Lambda, &r->sigma, &r->inelastic);
+  PetscCall(PetscFree(m->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMCreate_Regression(HycoROM m)
+{
+  static const HycoROMTraits traits = {.title = "regression", .settings = HYCO_SETTINGS_NONE, .history = PETSC_TRUE};
+  static const HycoROMOps ops = {.setfromoptions = SetFromOptions,
+                                 .modes = Modes,
+                                 .build = Build,
+                                 .report = Report,
+                                 .setup = SetUp,
+                                 .reset = Reset,
+                                 .solve = Solve,
+                                 .view = View,
+                                 .save = Move,
+                                 .load = Move,
+                                 .destroy = Destroy};
+  Regression r;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&r));
+  PetscCall(HycoROMSetOps(m, &ops, &traits, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,361 @@
+/*
+  The projected form: the active set in the displacements themselves, each set by conjugate gradients on those that
+  close its contacts, with multigrid for K alone (linear/constrained.c). Nothing is factored, K is not copied, and the
+  multigrid serves every set. Solves are loose while the set changes and become more accurate when it has settled.
+*/
+#include "../primal/gap.h"
+#include <string.h>
+
+/* Accuracy of the first solves, and what each settled set makes of it. */
+#define HYCO_FIRST   1e-3
+#define HYCO_SHARPEN 3e-4
+/* The last accuracy that every solution has; more where its residual asks for it. */
+#define HYCO_LAST  1e-10
+#define HYCO_LEAST 1e-15
+/* Changes of the set that are believed, as a multiple of the accuracy; the least of them. */
+#define HYCO_BELIEVED 30
+#define HYCO_NOISE    1e-9
+
+/* What the form keeps. */
+typedef struct {
+  HycoConstrained constrained;
+  HycoOperatorState made, seen; /* K of the multigrid; B about which `possible` and `node` were found */
+  PetscBool possible;
+  PetscInt *node, *contact, n; /* this rank's contacts that are not idle: their nodes' unknowns, their rows */
+  PetscBool *active;           /* of this rank's n */
+  PetscBool started;           /* active holds a solution's set */
+  HycoTao tao;
+} Projected;
+
+/* What the iterations share. */
+typedef struct {
+  HycoSolver s;
+  Projected *form;
+  PetscReal *bound, *value, *force;
+  PetscReal accuracy, size;   /* relative accuracy of solves; of F */
+  PetscInt *at;               /* work */
+  PetscBool *solved;          /* the set of the last solve */
+  PetscBool any;              /* there was one */
+  PetscInt solves, its, most; /* of conjugate gradients */
+  Vec x, d, l, r, gap;        /* d, l: of the active rows */
+} Run;
+
+/* The node that each contact belongs to: its slave where B says so, else that of an entry no other contact has. */
+static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
+{
+  PetscInt lo, hi, *pivot;
+  PetscMPIInt differs, any;
+  const PetscInt before = f->n;
+  const PetscScalar *s = NULL;
+  Vec slave;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  PetscCall(PetscFree(f->node));
+  PetscCall(PetscFree(f->contact));
+  PetscCall(PetscMalloc1(hi - lo, &f->node));
+  PetscCall(PetscMalloc1(hi - lo, &f->contact));
+  PetscCall(PetscMalloc1(hi - lo, &pivot));
+  PetscCall(HycoGapPivots(y, pivot, &f->possible));
+  PetscCall(PetscObjectQuery((PetscObject)y->B, HYCO_SLAVES, (PetscObject *)&slave));
+  if (slave) PetscCall(VecGetArrayRead(slave, &s));
+  f->n = 0;
+  for (PetscInt k = 0; k < hi - lo; k++) {
+    if (pivot[k] == HYCO_IDLE) continue;
+    f->contact[f->n] = k;
+    f->node[f->n++] = s ? (PetscInt)s[k] : pivot[k];
+  }
+  if (slave) PetscCall(VecRestoreArrayRead(slave, &s));
+  PetscCall(PetscFree(pivot));
+  differs = !f->active || f->n != before;
+  PetscCallMPI(MPI_Allreduce(&differs, &any, 1, MPI_INT, MPI_MAX, HycoComm(y)));
+  if (any) {
+    PetscCall(PetscFree(f->active));
+    PetscCall(PetscCalloc1(f->n + 1, &f->active));
+    f->started = PETSC_FALSE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The active rows of B and their nodes become the constraints. */
+static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool *singular)
+{
+  const Projected *f = p->form;
+  Mat B = p->s->system->B, rows;
+  PetscInt n = 0, lo, *row;
+  PetscMPIInt differs = (PetscMPIInt)!p->any, any;
+  PetscScalar *d;
+  IS is;
+
+  PetscFunctionBegin;
+  *singular = PETSC_FALSE;
+  for (PetscInt k = 0; k < f->n; k++) differs = differs || p->solved[k] != active[k];
+  PetscCallMPI(MPI_Allreduce(&differs, &any, 1, MPI_INT, MPI_MAX, HycoComm(p->s)));
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  p->any = PETSC_TRUE;
+  PetscCall(PetscArraycpy(p->solved, active, f->n));
+  PetscCall(MatGetOwnershipRange(B, &lo, NULL));
+  PetscCall(PetscMalloc1(f->n, &row));
+  for (PetscInt k = 0; k < f->n; k++) {
+    if (!active[k]) continue;
+    row[n] = lo + f->contact[k];
+    p->at[n++] = f->node[k];
+  }
+  PetscCall(ISCreateGeneral(HycoComm(B), n, row, PETSC_OWN_POINTER, &is));
+  PetscCall(MatCreateSubMatrix(B, is, NULL, MAT_INITIAL_MATRIX, &rows));
+  PetscCall(HycoConstrainedSet(f->constrained, rows, p->at, singular));
+  PetscCall(VecDestroy(&p->d));
+  PetscCall(VecDestroy(&p->l));
+  PetscCall(MatCreateVecs(rows, NULL, &p->d));
+  PetscCall(VecDuplicate(p->d, &p->l));
+  PetscCall(VecGetArray(p->d, &d));
+  n = 0;
+  for (PetscInt k = 0; k < f->n; k++) {
+    if (active[k]) d[n++] = p->bound[k];
+  }
+  PetscCall(VecRestoreArray(p->d, &d));
+  PetscCall(MatDestroy(&rows));
+  PetscCall(ISDestroy(&is));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The contacts' B x, and the forces of the active ones. */
+static PetscErrorCode Evaluate(Run *p, const PetscBool active[])
+{
+  const Projected *f = p->form;
+  HycoSystem y = p->s->system;
+  const PetscScalar *v;
+  PetscInt n = 0, m;
+
+  PetscFunctionBegin;
+  PetscCall(MatMult(y->B, p->x, p->gap));
+  PetscCall(VecGetArrayRead(p->gap, &v));
+  for (PetscInt k = 0; k < f->n; k++) {
+    p->value[k] = v[f->contact[k]];
+    p->force[k] = 0;
+  }
+  PetscCall(VecRestoreArrayRead(p->gap, &v));
+  PetscCall(VecGetSize(p->l, &m));
+  if (!m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatMult(y->K, p->x, p->r));
+  PetscCall(VecAYPX(p->r, -1, y->F));
+  PetscCall(HycoConstrainedForces(f->constrained, p->r, p->l));
+  PetscCall(VecGetArrayRead(p->l, &v));
+  for (PetscInt k = 0; k < f->n; k++) {
+    if (active[k]) p->force[k] = v[n++];
+  }
+  PetscCall(VecRestoreArrayRead(p->l, &v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
+{
+  Run *p = (Run *)ctx;
+  PetscInt its;
+
+  PetscFunctionBegin;
+  PetscCall(SetConstraints(p, active, singular));
+  if (*singular) PetscFunctionReturn(PETSC_SUCCESS);
+  if (p->size < 0) PetscCall(HycoConstrainedSize(p->form->constrained, p->s->system->F, &p->size));
+  PetscCall(HycoConstrainedSolve(p->form->constrained, p->s->system->F, p->d, p->accuracy * p->size, p->x, &its));
+  p->solves++;
+  p->its += its;
+  p->most = PetscMax(p->most, its);
+  PetscCall(Evaluate(p, active));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
+{
+  const Run *p = (const Run *)ctx;
+  const Projected *f = p->form;
+  const PetscReal noise = PetscMax(HYCO_BELIEVED * p->accuracy, HYCO_NOISE);
+  PetscReal size[2] = {0, 0}, sizes[2];
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < f->n; k++) {
+    size[0] = PetscMax(size[0], PetscMax(PetscAbsReal(p->bound[k]), PetscAbsReal(p->value[k])));
+    size[1] = PetscMax(size[1], PetscAbsReal(p->force[k]));
+  }
+  PetscCallMPI(MPI_Allreduce(size, sizes, 2, MPIU_REAL, MPI_MAX, HycoComm(p->s)));
+  for (PetscInt k = 0; k < f->n; k++)
+    violates[k] =
+        (PetscBool)(active[k] ? p->force[k] < -noise * sizes[1] : p->value[k] > p->bound[k] + noise * sizes[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The forces of the set, none of them negative, in L. */
+static PetscErrorCode FillForces(const Run *p, PetscBool clean, const PetscBool active[], Vec L)
+{
+  PetscScalar *l;
+
+  PetscFunctionBegin;
+  PetscCall(VecSet(L, 0));
+  PetscCall(VecGetArray(L, &l));
+  for (PetscInt k = 0; k < p->form->n; k++) {
+    if (active[k]) l[p->form->contact[k]] = clean ? PetscMax(p->force[k], 0) : p->force[k];
+  }
+  PetscCall(VecRestoreArray(L, &l));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The set settled: solve more accurately, to the last accuracy and as far as the residual then asks for. */
+static PetscErrorCode Settled(void *ctx, PetscBool *more)
+{
+  Run *p = (Run *)ctx;
+  HycoKKT kkt;
+
+  PetscFunctionBegin;
+  *more = PETSC_TRUE;
+  if (p->accuracy > 2 * HYCO_LAST) {
+    p->accuracy = PetscMax(HYCO_LAST, HYCO_SHARPEN * p->accuracy);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(FillForces(p, PETSC_TRUE, p->solved, p->gap));
+  PetscCall(HycoSystemComputeKKT(p->s->system, p->x, p->gap, &kkt));
+  *more = (PetscBool)(kkt.stationarity > 0.3 * p->s->rtol && p->accuracy > HYCO_LEAST);
+  p->accuracy *= *more ? 0.03 : 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
+{
+  HycoSystem y = s->system;
+  const PetscScalar *d;
+
+  PetscFunctionBegin;
+  *p = (Run){.s = s, .form = f, .accuracy = HYCO_FIRST, .size = -1, .x = x};
+  PetscCall(PetscCalloc5(f->n, &p->bound, f->n, &p->value, f->n, &p->force, f->n, &p->at, f->n, &p->solved));
+  PetscCall(VecGetArrayRead(y->D, &d));
+  for (PetscInt k = 0; k < f->n; k++) p->bound[k] = d[f->contact[k]];
+  PetscCall(VecRestoreArrayRead(y->D, &d));
+  PetscCall(VecSet(x, 0));
+  PetscCall(VecDuplicate(x, &p->r));
+  PetscCall(VecDuplicate(y->D, &p->gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode RunDestroy(Run *p)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree5(p->bound, p->value, p->force, p->at, p->solved));
+  PetscCall(VecDestroy(&p->d));
+  PetscCall(VecDestroy(&p->l));
+  PetscCall(VecDestroy(&p->r));
+  PetscCall(VecDestroy(&p->gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* For solves without a factor, by the active set. */
+static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
+{
+  Projected *f = (Projected *)form->data;
+  HycoSystem y = s->system;
+  const PetscBool iterative = (PetscBool)(s->iterative || (asked && s->linear == HYCO_LINEAR_ITERATIVE));
+  const PetscBool own = (PetscBool)(s->now.traits & HYCO_TAO_OWN && !(s->now.traits & HYCO_TAO_DENSE));
+  PetscBool aij = PETSC_FALSE, same;
+  PetscInt p = 0;
+
+  PetscFunctionBegin;
+  *cost = -1;
+  if (!y->K || !y->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)y->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
+  if (aij) PetscCall(HycoKernelSize(y->K, &p));
+  if (iterative && own && aij && y->symmetric && !p) {
+    PetscCall(HycoOperatorStateUpdate(&f->seen, y->B, NULL, &same));
+    if (!same) PetscCall(FindNodes(y, f));
+    if (f->possible) *cost = 0.5;
+  }
+  if (asked && *cost < 0)
+    HycoFormat(why, "the form projected needs -hyco_linear iterative, the type active_set, a symmetric system with "
+                    "supports, and for each contact an unknown of its own; use -hyco_solver_form auto");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
+{
+  Projected *f = (Projected *)form->data;
+  PetscBool same;
+  PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  *singular = PETSC_FALSE;
+  PetscCall(HycoOperatorStateUpdate(&f->made, s->system->K, NULL, &same));
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoConstrainedDestroy(&f->constrained));
+  PetscCall(HycoConstrainedCreate(HycoComm(s), "hyco_primal_", s->system->K, &f->constrained));
+  s->seconds_factor += HycoNow() - begin;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Says in the report what conjugate gradients took. */
+static PetscErrorCode NameSolves(const Run *p)
+{
+  HycoSolver s = p->s;
+  KSP ksp;
+  char words[64];
+
+  PetscFunctionBegin;
+  PetscCall(HycoConstrainedGetKSP(p->form->constrained, &ksp));
+  PetscCall(HycoNameLinear(s, ksp));
+  PetscCall(PetscSNPrintf(words, sizeof(words), "; %d iterations in %d solves, at most %d", (int)p->its, (int)p->solves,
+                          (int)p->most));
+  PetscCall(PetscStrlcat(s->linear_method, words, sizeof(s->linear_method)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
+{
+  Projected *f = (Projected *)form->data;
+  HycoActiveSet set = {.comm = HycoComm(s),
+                       .n = f->n,
+                       .max_its = s->max_its ? s->max_its : 100 + s->system->m,
+                       .one_by_one = PETSC_TRUE,
+                       .solve = SolveOnSet,
+                       .violations = Violations,
+                       .settled = Settled,
+                       .monitor = s->monitor,
+                       .monitor_ctx = s->monitor_ctx};
+  HycoLCPStatus status;
+  PetscBool singular;
+  Run p;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSolverNameMethod(s, "projected"));
+  PetscCall(SetUp(s, form, &singular));
+  PetscCall(RunCreate(s, f, x, &p));
+  set.ctx = &p;
+  PetscCall(VecGetOwnershipRange(s->system->D, &set.first, NULL));
+  if (!s->warm || !f->started) PetscCall(PetscArrayzero(f->active, f->n));
+  PetscCall(HycoTaoSetType(f->tao, s->now.type, set.max_its));
+  PetscCall(HycoTaoSolveSet(f->tao, &set, f->active, x, &s->its, &status));
+  if (status == HYCO_LCP_SINGULAR) s->reason = HYCO_DIVERGED_SINGULAR;
+  f->started = *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
+  PetscCall(NameSolves(&p));
+  PetscCall(FillForces(&p, *solved, p.solved, L)); /* not solved: the set has changed since */
+  PetscCall(RunDestroy(&p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoSolverForm form)
+{
+  Projected *f = (Projected *)form->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTaoDestroy(&f->tao));
+  PetscCall(HycoConstrainedDestroy(&f->constrained));
+  HycoFreeAll(&f->node, &f->contact, &f->active, &form->data);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverFormCreate_Projected(HycoSolver s, HycoSolverForm form)
+{
+  Projected *f;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&f));
+  PetscCall(HycoTaoCreate(HycoComm(s), (PetscObject)s, &f->tao));
+  form->data = f;
+  *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,70 @@
+"""Iterative solves (-hyco_linear iterative): what conjugate gradients and the active set take does not grow with the mesh or the ranks, and the solution is the
+factor's. Counts, not seconds."""
+import csv
+import os
+import re
+import unittest
+
+from common import PELLET, SOURCE, Case
+
+EXAMPLES = os.path.join(SOURCE, 'examples')
+MOST, SETS = 40, 12  # iterations of a solve, sets: at every size
+
+
+class Iterative(Case):
+    def counts(self, report):
+        """Iterations of conjugate gradients in all, and at most in one solve."""
+        found = re.search(r'iterative: cg with gamg.*; (\d+) iterations in (\d+) solves, at most (\d+)', report['linear'])
+        self.assertTrue(found, report['linear'])
+        self.assertEqual(int(found[2]), report['active_set_iterations'])
+        return int(found[1]), int(found[3])
+
+    def held(self, scene, mu, *options, ranks=(0, 2), most=MOST):
+        direct = self.hyco('solve', '-scene', scene, '-mu', mu, *options, '-hyco_linear', 'direct')
+        for n in ranks:
+            with self.subTest(scene=scene, options=options, ranks=n):
+                r = self.hyco('solve', '-scene', scene, '-mu', mu, *options, '-hyco_linear', 'iterative', ranks=n)
+                self.assertEqual(r['solver'], 'active_set projected')
+                self.assertEqual(r['n_active'], direct['n_active'])
+                self.near(r['total_contact_force'], direct['total_contact_force'], 1e-7)
+                self.solved(r)
+                self.assertLessEqual(self.counts(r)[1], most)
+                self.assertLessEqual(r['active_set_iterations'], SETS)
+
+    def test_pellet(self):
+        """A, and A with each cell cut into eight."""
+        self.held(PELLET, '4.06,1')
+        self.held(PELLET, '4.06,1', '-scene_refine', '1', ranks=(2,))
+
+    def test_unseen(self):
+        """Scenes by which no setting was chosen: matching and other surfaces, 2D and 3D."""
+        for name, mu in (('hertz', '0.06,1,10'), ('roller', '0,0.6,10'), ('roller3d', '0,0.5,10'), ('blocks', '0.05,0.05')):
+            self.held(os.path.join(EXAMPLES, name, 'scene.yaml'), mu, most=20)
+
+    def test_ramp(self):
+        """Several points on one K, the next from the last one's contacts; a preconditioner that is no multigrid."""
+        table = self.path('ramp.csv')
+        for options in ((), ('-hyco_primal_pc_type', 'icc')):
+            rows = []
+            for linear in ('direct', 'iterative'):
+                self.hyco('solve', '-scene', PELLET, '-values_radius', '4.06', '-values_load', '0.4,0.7,1', '-hyco_linear', linear, '-table', table,
+                          *(options if linear == 'iterative' else ()))
+                with open(table, encoding='utf-8', newline='') as file:
+                    rows.append(list(csv.DictReader(file)))
+            for direct, iterative in zip(*rows):
+                self.assertEqual(direct['n_active'], iterative['n_active'])
+                self.near(float(iterative['total_contact_force']), float(direct['total_contact_force']), 1e-7)
+
+    def test_form(self):
+        """By name; refused without iterations."""
+        args = ('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_solver_form', 'projected')
+        self.assertEqual(self.hyco(*args, '-hyco_linear', 'iterative')['solver'], 'active_set projected')
+        run = self.run_raw(*args)
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('the form projected needs -hyco_linear iterative', run.stderr)
+        primal = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_solver_form', 'primal', '-hyco_linear', 'iterative')
+        self.assertEqual(primal['solver'], 'active_set primal')
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,193 @@
+"""The baselines of the hybrid model for paths: cubature and regression, on a small ring that creeps while its gap closes and opens."""
+import csv
+import os
+import subprocess
+import unittest
+
+import h5py
+import numpy as np
+
+from common import PATIENCE, ROPE, SOURCE, Case, said
+from paths import HISTORY, KINDS, NORTON, SCENE, arrays
+
+CUBATURE = ['-hyco_model_type', 'cubature']
+REGRESSION = ['-hyco_model_type', 'regression']
+POINT = '0.0055,0.91'  # no training point of the grids here
+COLUMNS = ('total_contact_force', 'rid_inelastic', 'rid_mises', 'rid_u_norm2')
+
+
+class Ring(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        subprocess.run(['gmsh', '-2', os.path.join(SOURCE, 'examples', 'ring', 'ring.geo'), '-setnumber', 'n', '2', '-v', '1', '-o', cls.path('ring.msh')],
+                       check=True, timeout=60 * PATIENCE, stdout=subprocess.DEVNULL)
+        cls.norton = cls.scene('norton.yaml', NORTON)
+
+    @classmethod
+    def scene(cls, name, law, history=HISTORY):
+        with open(cls.path(name), 'w', encoding='utf-8') as f:
+            f.write(SCENE.replace('LAW', law) + history)
+        return cls.path(name)
+
+    def train(self, model, *args, scene=None, grid='3,3', store='store', **options):
+        return self.hyco('train', '-scene', scene or self.norton, '-model', self.path(model), '-grid', grid, '-hyco_snapshots', self.path(store), *args,
+                         **options)
+
+    def compare(self, model, point=POINT, scene=None, **options):
+        return self.hyco('compare', '-scene', scene or self.norton, '-model', self.path(model), '-mu', point, **options)
+
+    def predict(self, model, *args):
+        return self.hyco('predict', '-model', self.path(model), '-mu', POINT, *args)
+
+
+class Rivals(Ring):
+    def test_all_cells(self):
+        """Every cell once, to round-off: the hybrid model on the whole mesh; with force vectors the projection-based one."""
+        for dual, other in (('fe', ['-hyco_rid_whole', '-hyco_hybrid', 'contact']), ('nnmf', ['-hyco_model_type', 'projection'])):
+            self.train('other.h5', *other, '-hyco_pod_tol', '1e-8')
+            trained = self.train('all.h5', *CUBATURE, '-hyco_cubature_tol', '0', '-hyco_dual', dual, '-hyco_pod_tol', '1e-8')
+            self.assertEqual((trained['model_type'], trained['rid_fraction'], trained['cubature_error']), ('cubature', 1, 0))
+            one, all_of_them = (self.predict(name)['history'] for name in ('other.h5', 'all.h5'))
+            for column in COLUMNS:
+                a, b = np.array(one[column]), np.array(all_of_them[column])
+                self.assertLess(abs(a - b).max(), 1e-9 * abs(a).max(), (dual, column))
+
+    def test_unseen(self):
+        """Few cells: what they miss of the training is what was asked; the errors at an unseen point are nearly those with all cells."""
+        for dual in ('fe', 'nnmf'):
+            settings = [*CUBATURE, '-hyco_dual', dual, '-hyco_pod_tol', '1e-8']
+            self.train('all.h5', *settings, '-hyco_cubature_tol', '0')
+            base = self.compare('all.h5')
+            self.assertLess(base['worst_lambda']['max'], 0.01 if dual == 'fe' else 0.15)
+            shares = []
+            for tol, factor in (('1e-3', 4), ('1e-5', 1.2)):
+                trained = self.train('some.h5', *settings, '-hyco_cubature_tol', tol)
+                shares.append(trained['rid_fraction'])
+                self.assertLessEqual(trained['cubature_error'], 3 * float(tol))
+                report = self.compare('some.h5')
+                for kind in KINDS:
+                    self.assertLess(report['worst_' + kind]['max'], factor * base['worst_' + kind]['max'] + 30 * float(tol), (dual, tol, kind))
+            self.assertLess(shares[0], shares[1])
+            self.assertLess(shares[1], 0.9)
+            with h5py.File(self.path('some.h5')) as f:
+                weight = f['cubature/weight'][:]
+            self.assertGreater(weight.min(), 0)
+            self.assertGreater(len(weight), trained['n_modes'] / 3)  # points enough for the modes
+            self.assertGreater(len(set(weight.ravel())), 5)
+
+    def test_without_history(self):
+        """Scenes without a history: body forces, pressure and contact integrated by few cells."""
+        scene = self.scene('elastic.yaml', 'law: elastic', '')
+        with open(scene, encoding='utf-8') as f:
+            text = f.read().replace('*q*', '*') + 'force: {core: {x: -2*push*x}}\n'
+        with open(scene, 'w', encoding='utf-8') as f:
+            f.write(text)
+        errors = {}
+        for name, settings in (('whole.h5', [*CUBATURE, '-hyco_cubature_tol', '0']), ('cells.h5', [*CUBATURE, '-hyco_cubature_tol', '1e-6']),
+                               ('regression.h5', REGRESSION)):
+            trained = self.train(name, *settings, '-hyco_pod_tol', '1e-9', scene=scene, store='elastic')
+            report = self.compare(name, scene=scene)
+            errors[name] = {kind: report['error_' + kind]['max'] for kind in ('u', 'lambda')}
+            if name == 'cells.h5':
+                self.assertLess(trained['rid_fraction'], 0.9)
+        for kind in ('u', 'lambda'):
+            self.assertLess(errors['cells.h5'][kind], 1.2 * errors['whole.h5'][kind] + 1e-4)
+        self.assertLess(errors['regression.h5']['u'], 0.02)
+
+    def test_regression(self):
+        """Training values at training points; near them elsewhere, and the residuals say that nothing keeps bodies apart."""
+        for kernel in ('cubic', 'thin_plate', 'linear'):
+            self.train('regression.h5', *REGRESSION, '-hyco_regression_kernel', kernel, '-hyco_pod_tol', '1e-12', '-hyco_rid_layers', '1')
+            report = self.compare('regression.h5', '0.006,1')
+            for kind, limit in zip(KINDS, (1e-5, 1e-9, 1e-9, 1e-9)):
+                self.assertLess(report['worst_' + kind]['max'], limit, (kernel, kind))
+            report = self.compare('regression.h5')
+            for kind, limit in zip(KINDS, (0.1, 0.1, 0.5, 0.2)):
+                self.assertLess(report['worst_' + kind]['max'], limit, (kernel, kind))
+            self.assertGreater(report['kkt_max'], 1e-6)
+        history = self.predict('regression.h5')['history']
+        self.assertTrue(history['ended'])
+        self.assertGreaterEqual(min(history['lambda_max']), 0)
+        self.assertEqual(len(history['t']), 7)
+
+    def test_one_value(self):
+        """A parameter with one training value: the regression is constant along it."""
+        self.train('flat.h5', *REGRESSION, grid='3,1')
+        report = self.compare('flat.h5', '0.006,1')
+        self.assertLess(report['worst_lambda']['max'], 1e-9)
+
+    def test_order_of_questions(self):
+        """A point's path is the same to the last bit whatever was asked before it."""
+        points = [(0.005, 0.9), (0.0075, 1.15), (0.0041, 1.2)]
+        for settings in (CUBATURE, REGRESSION):
+            self.train('order.h5', *settings, '-hyco_pod_tol', '1e-8')
+            tables = []
+            for k, order in enumerate((points, points[::-1])):
+                with open(self.path(f'order{k}.csv'), 'w', encoding='utf-8') as f:
+                    f.write('gap,push\n' + '\n'.join(f'{a},{b}' for a, b in order) + '\n')
+                self.hyco('predict', '-model', self.path('order.h5'), '-points', self.path(f'order{k}.csv'), '-table', self.path('rows.csv'))
+                with open(self.path('rows.csv'), encoding='utf-8') as f:
+                    tables.append({(r['gap'], r['push']): [v for c, v in r.items() if c != 'seconds'] for r in csv.DictReader(f)})
+            self.assertEqual(tables[0], tables[1])
+
+    def test_ranks(self):
+        """One and two ranks train the same model."""
+        for settings in (CUBATURE, [*CUBATURE, '-hyco_dual', 'nnmf'], REGRESSION):
+            reports, histories = [], []
+            for ranks in (0, 2):
+                reports.append(self.train(f'ranks{ranks}.h5', *settings, '-hyco_pod_tol', '1e-8', ranks=ranks))
+                histories.append(self.predict(f'ranks{ranks}.h5')['history'])
+            for name in ('n_modes', 'rid_elements', 'rid_contacts'):
+                self.assertEqual(reports[0][name], reports[1][name], name)
+            for column in COLUMNS:
+                a, b = (np.array(h[column]) for h in histories)
+                self.assertLess(abs(a - b).max(), 1e-6 * abs(a).max(), column)
+
+    def test_outputs(self):
+        """The series has the whole mesh's fields by replay, the view says what the model is."""
+        self.hyco('solve', '-scene', self.norton, '-mu', POINT, '-output', self.path('full.xdmf'))
+        full = arrays(self.path('full.h5'))
+        for settings, word in ((CUBATURE, 'cubature: '), (REGRESSION, 'regression: ')):
+            self.train('series.h5', *settings, '-hyco_pod_tol', '1e-8')
+            self.predict('series.h5', '-output', self.path('path.xdmf'))
+            reduced = arrays(self.path('path.h5'))
+            self.assertEqual(full.keys(), reduced.keys())
+            steps = [n for n in full if n.endswith('nodes/displacement')]
+            size = max(abs(full[n]).max() for n in steps)
+            self.assertLess(max(abs(full[n] - reduced[n]).max() for n in steps), 0.1 * size, word)
+            self.assertIn(word, self.run_raw('view', '-model', self.path('series.h5')).stdout)
+
+    def test_refused(self):
+        """What is not there is said in one line."""
+        train = ['train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '2,2']
+        self.train('damaged.h5', *CUBATURE, grid='2,2')
+        with h5py.File(self.path('damaged.h5'), 'r+') as f:
+            f['cubature/weight'][0] = -1
+            del f['sealed']
+        for args, words in ((['train', '-scene', ROPE, '-model', self.path('no.h5'), '-grid', '3,3', *CUBATURE], ['cubature', 'line']),
+                            ([*train, '-hyco_cubature_tol', '1e-3'], ['-hyco_cubature_tol', 'cubature', 'hybrid']),
+                            ([*train, *REGRESSION, '-hyco_dual', 'nnmf'], ['-hyco_dual', 'projection']),
+                            (['predict', '-model', self.path('damaged.h5'), '-mu', POINT], ['damaged.h5', 'cubature/weight'])):
+            run = self.run_raw(*args)
+            self.assertEqual(run.returncode, 1, run.stdout)
+            self.assertEqual(len(said(run)), 1, run.stderr)
+            for word in words:
+                self.assertIn(word, said(run)[0])
+        self.assertFalse(os.path.exists(self.path('no.h5')))
+
+
+class Judged(Ring):
+    """Held-out errors and estimates, as any other model has them."""
+    newcomer = True
+
+    def test_held_out(self):
+        for settings, kind, limit in ((CUBATURE, 'u', 0.01), ([*CUBATURE, '-hyco_dual', 'nnmf'], 'u', 0.1), (REGRESSION, 'lambda', 0.3)):
+            trained = self.train('judged.h5', *settings, '-hyco_pod_tol', '1e-8', '-hyco_validation', '12', '-hyco_search', 'false', status=None)
+            self.assertEqual((trained['held_out']['n'], trained['held_out']['not_converged']), (12, 0))
+            self.assertLess(trained['held_out'][kind]['largest'], limit)
+            self.assertGreater(self.predict('judged.h5')['estimated_error_u'], 0)
+
+
+if __name__ == '__main__':
+    unittest.main()
