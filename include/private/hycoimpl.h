@@ -149,6 +149,7 @@ typedef enum {
   HYCO_EVENT_REDUCE,   /* the reduced system from K, F, B, D of the RID */
   HYCO_EVENT_FACTOR,   /* with the flexibility */
   HYCO_EVENT_FORCES,   /* the complementarity problem: active set, Lemke, TAO */
+  HYCO_EVENT_ITERATE,  /* conjugate gradients under constraints */
   HYCO_EVENT_KKT,
   HYCO_EVENT_POD,
   HYCO_EVENT_DEIM,

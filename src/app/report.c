@@ -203,13 +203,15 @@ PetscErrorCode ReportWrite(cJSON **json)
 {
   char path[PETSC_MAX_PATH_LEN], *text;
   struct rusage usage;
-  PetscReal mine, all;
+  PetscReal mine, all, largest;
 
   PetscFunctionBegin;
   getrusage(RUSAGE_SELF, &usage);
   mine = (PetscReal)usage.ru_maxrss / 1024;
   PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Allreduce(&mine, &largest, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
   cJSON_AddNumberToObject(*json, "memory_mb", all);
+  cJSON_AddNumberToObject(*json, "memory_mb_largest_rank", largest);
   DriverReportMissed(*json);
   PetscCall(DriverReadFiles(NULL, NULL, NULL, path, NULL));
   if (path[0]) {

@@ -520,8 +520,34 @@ PetscErrorCode HycoFOMGetSystem(HycoFOM f, HycoSystem *system)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of the rank that has most: its own unknowns, those of others that its rows need, the ranks that these belong to. */
+static PetscErrorCode LargestPart(HycoFOM f, PetscInt largest[3])
+{
+  const PetscInt dim = f->part->dim, *start;
+  PetscBool *neighbour;
+  PetscInt rank;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRanges(f->U, &start));
+  PetscCall(PetscCalloc1(f->size, &neighbour));
+  largest[0] = f->part->n_owned * dim;
+  largest[1] = (f->part->n_nodes - f->part->n_owned) * dim;
+  largest[2] = 0;
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    if (HycoMeshOwned(f->part, i) >= 0) continue;
+    PetscCall(PetscFindInt(f->part->node_global[i] * dim, f->size + 1, start, &rank));
+    if (rank < 0) rank = -rank - 2; /* between two ranks' first unknowns */
+    largest[2] += !neighbour[rank];
+    neighbour[rank] = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(neighbour));
+  HycoAllreduce(largest, 3, MPIU_INT, MPI_MAX, HycoComm(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
 {
+  PetscInt largest[3] = {0, 0, 0};
   PetscBool ascii;
 
   PetscFunctionBegin;
@@ -530,6 +556,11 @@ PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscViewerASCIIPrintf(viewer, "%d nodes, %d cells, %d contacts, on %d ranks\n", (int)f->n_nodes,
                                    (int)f->n_cells, (int)f->n_contacts, (int)f->size));
+  if (f->size > 1) {
+    PetscCall(LargestPart(f, largest));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "a rank: at most %d unknowns of its own, %d of %d others\n",
+                                     (int)largest[0], (int)largest[1], (int)largest[2]));
+  }
   PetscCall(HycoSystemView(f->system, viewer));
   PetscCall(HycoSolverView(f->solver, viewer));
   PetscCall(PetscViewerASCIIPopTab(viewer));

@@ -90,7 +90,7 @@ static PetscErrorCode SolveG(const HycoLevel *v, Vec mu)
     PetscCall(VecPointwiseMult(mu, mu, v->G_diagonal));
   else {
     PetscCall(KSPSolve(v->G, mu, v->mu_work));
-    PetscCall(VecCopy(v->mu_work, mu));
+    PetscCall(VecAXPBY(mu, v->G_scale, 0, v->mu_work));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -311,7 +311,7 @@ PetscErrorCode HycoConstrainedSolve(HycoConstrained c, Vec f, Vec d, PetscReal t
   PetscCall(VecAYPX(c->residual, -1, f));
   PetscCall(ProjectForce(v, c->residual));
   PetscCall(KSPSetTolerances(c->ksp, 1e-300, tolerance, PETSC_DEFAULT, PETSC_DEFAULT));
-  PetscCall(KSPSolve(c->ksp, c->residual, c->correction));
+  HycoLogged(HYCO_EVENT_ITERATE, KSPSolve(c->ksp, c->residual, c->correction));
   PetscCall(VecAXPY(x, 1, c->correction));
   PetscCall(KSPGetIterationNumber(c->ksp, its));
   PetscFunctionReturn(PETSC_SUCCESS);

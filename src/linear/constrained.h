@@ -14,9 +14,10 @@ typedef struct {
   PetscInt smooths;
   /* the constraints */
   PetscInt m;
-  Mat B, DBt;      /* DBt = D^-1 B^T */
-  Vec G_diagonal;  /* the inverse of B D^-1 B^T where that is diagonal, else NULL */
-  KSP G;           /* else its factor */
+  Mat B, DBt;     /* DBt = D^-1 B^T */
+  Vec G_diagonal; /* the inverse of B D^-1 B^T where that is diagonal, else NULL */
+  PetscReal G_scale;
+  KSP G;           /* else the solver for G_scale times it */
   Vec mu, mu_work; /* as B x */
 } HycoLevel;
 

@@ -8,6 +8,9 @@
 
 /* Directions of an aggregate's normals that are smaller than this share of the largest are left out. */
 #define HYCO_DIRECTION 0.1
+/* Up to that many constraints of a level every rank factors their matrix and solves with it: MUMPS's own exchange takes
+   longer than all else. */
+#define HYCO_ALIKE 20000
 /* What is added to the diagonal of coarse matrices of constraints, which may depend on each other a little. */
 #define HYCO_COARSE_SHIFT 1e-8
 
@@ -282,13 +285,50 @@ static PetscErrorCode CoarseB(HycoLevel *fine, const Known *known, Mat coarse_K,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A solver for G, of ones on its diagonal about, whose factor each rank has. */
+static PetscErrorCode Redundant(Mat G, KSP *ksp)
+{
+  KSP inner;
+  PC pc;
+
+  PetscFunctionBegin;
+  PetscCall(KSPCreate(PetscObjectComm((PetscObject)G), ksp));
+  PetscCall(KSPSetOperators(*ksp, G, G));
+  PetscCall(KSPSetType(*ksp, KSPPREONLY));
+  PetscCall(KSPGetPC(*ksp, &pc));
+  PetscCall(PCSetType(pc, PCREDUNDANT));
+  PetscCall(PCRedundantGetKSP(pc, &inner));
+  PetscCall(KSPSetType(inner, KSPPREONLY));
+  PetscCall(KSPGetPC(inner, &pc));
+  PetscCall(PCSetType(pc, PCCHOLESKY));
+  PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGND));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A solver for G by its size. */
+static PetscErrorCode SolverForG(Mat G, KSP *ksp)
+{
+  MPI_Comm comm = PetscObjectComm((PetscObject)G);
+  PetscMPIInt size;
+  PetscInt m;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(MatGetSize(G, &m, NULL));
+  if (size > 1 && m <= HYCO_ALIKE)
+    PetscCall(Redundant(G, ksp));
+  else
+    PetscCall(HycoDirectSolver(comm, "hyco_primal_constraints_", G, PETSC_TRUE, ksp));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* B D^-1 B^T, inverted or factored. */
 static PetscErrorCode PrepareG(HycoLevel *v, PetscReal shift, PetscBool *singular)
 {
   Mat G;
   MatInfo info;
   Vec diagonal;
-  PetscReal least;
+  PetscReal least, most;
 
   PetscFunctionBegin;
   PetscCall(MatTranspose(v->B, MAT_INITIAL_MATRIX, &v->DBt));
@@ -307,12 +347,15 @@ static PetscErrorCode PrepareG(HycoLevel *v, PetscReal shift, PetscBool *singula
     PetscCall(MatDestroy(&G));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscCall(VecMax(diagonal, NULL, &most));
   PetscCall(VecScale(diagonal, 1 + shift));
   PetscCall(MatDiagonalSet(G, diagonal, INSERT_VALUES));
   PetscCall(VecDestroy(&diagonal));
   PetscCall(MatSetOption(G, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(G, MAT_SPD, PETSC_TRUE));
-  PetscCall(HycoDirectSolver(PetscObjectComm((PetscObject)G), "hyco_primal_constraints_", G, PETSC_TRUE, &v->G));
+  v->G_scale = 1 / most;
+  PetscCall(MatScale(G, v->G_scale));
+  PetscCall(SolverForG(G, &v->G));
   PetscCall(HycoFactor(v->G, singular));
   PetscCall(MatDestroy(&G));
   PetscFunctionReturn(PETSC_SUCCESS);

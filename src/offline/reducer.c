@@ -355,7 +355,7 @@ static PetscErrorCode ReadRID(HycoReducer t)
                               sizeof(region), NULL));
   PetscCall(HycoOptionsBool("-hyco_rid_whole", "take the whole mesh as the RID", &t->whole_rid,
                             &t->pinned[HYCO_CHOICE_WHOLE]));
-  PetscCall(HycoOptionsFor("hybrid"));
+  PetscCall(HycoOptionsFor("hybrid or cubature"));
   PetscCall(HycoOptionsWord("-hyco_hybrid",
                             "displacements kept full order: fewest for full row rank, all contact ones, all",
                             HycoHybrids, &hybrid, &t->pinned[HYCO_CHOICE_HYBRID]));

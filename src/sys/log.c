@@ -2,9 +2,9 @@
 #include <hycoimpl.h>
 
 static const char *const event_names[HYCO_N_EVENTS] = {
-    "HycoMesh",   "HycoAssemble", "HycoForce", "HycoContact", "HycoReduce",  "HycoFactor",
-    "HycoForces", "HycoKKT",      "HycoPOD",   "HycoDEIM",    "HycoRID",     "HycoROM",
-    "HycoScan",   "HycoLoad",     "HycoSetUp", "HycoSolve",   "HycoReconstr"};
+    "HycoMesh",   "HycoAssemble", "HycoForce", "HycoContact", "HycoReduce", "HycoFactor",
+    "HycoForces", "HycoIterate",  "HycoKKT",   "HycoPOD",     "HycoDEIM",   "HycoRID",
+    "HycoROM",    "HycoScan",     "HycoLoad",  "HycoSetUp",   "HycoSolve",  "HycoReconstr"};
 static const char *const stage_names[HYCO_N_STAGES] = {"hyco full order", "hyco reduction", "hyco online"};
 static PetscLogEvent events[HYCO_N_EVENTS];
 static PetscLogStage stages[HYCO_N_STAGES];
