@@ -91,6 +91,7 @@ static void Displace(Sampler *s, PetscInt k, PetscReal time)
     s->u[i] = s->fe->u0[i];
     for (PetscInt j = 0; j < l; j++) s->u[i] += v[j] * (share > 0 ? (1 - share) * a[j] + share * a[l + j] : a[j]);
   }
+  HycoFEComplete(s->fe, s->u);
 }
 
 /* The laws from t0 to t1, which fe is at. */
@@ -114,6 +115,20 @@ static PetscErrorCode Step(Sampler *s, PetscInt k, PetscReal t0, PetscReal t1)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* g += f V[dof,:], by the unknowns in the place of a displacement that a support along a direction gives. */
+static void AddForce(const Sampler *s, PetscInt dof, PetscReal f, PetscReal g[])
+{
+  const PetscInt l = s->t->l, node = dof / s->fe->dim;
+  const HycoOblique *oblique = HycoFEOblique(s->fe, dof);
+
+  for (PetscInt d = -1; d < (oblique ? s->fe->dim : 0); d++) {
+    const PetscReal *v = s->V + (size_t)(d < 0 ? dof : node * s->fe->dim + d) * (size_t)l;
+    const PetscReal share = d < 0 ? f : f * oblique->a[d];
+
+    for (PetscInt j = 0; j < l; j++) g[j] += v[j] * share;
+  }
+}
+
 /* g: V_e^T f_e of the part's cells; 0 of those that are in the sum once. */
 static PetscErrorCode Project(Sampler *s)
 {
@@ -125,14 +140,12 @@ static PetscErrorCode Project(Sampler *s)
   for (PetscInt e = 0; e < m->n_cells; e++) {
     PetscReal f[HYCO_MAX_CELL_DOFS], load[HYCO_MAX_CELL_DOFS] = {0}, *g = s->g + (size_t)e * (size_t)l;
 
+    for (PetscInt j = 0; j < l; j++) g[j] = 0;
+    if (near && near[e]) continue;
     PetscCall(HycoFEStateForce(s->fe, s->begin, e, f));
     PetscCall(HycoFEBodyForce(s->fe, e, load));
-    for (PetscInt j = 0; j < l; j++) g[j] = 0;
-    for (PetscInt k = 0; k < n && !(near && near[e]); k++) {
-      const PetscReal *v = s->V + (size_t)(m->cells[e * m->nv + k / m->dim] * m->dim + k % m->dim) * (size_t)l;
-
-      for (PetscInt j = 0; j < l; j++) g[j] += v[j] * (f[k] - load[k]);
-    }
+    for (PetscInt k = 0; k < n; k++)
+      AddForce(s, m->cells[e * m->nv + k / m->dim] * m->dim + k % m->dim, f[k] - load[k], g);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
