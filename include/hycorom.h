@@ -1,6 +1,6 @@
 /* HycoROM: the reduced model of a file, hybrid hyper-reduced (38)-(41), where online nothing of the full mesh is
-   known; projection-based (44), on the whole mesh; or condensed on the contact forces, interpolated over the
-   parameters. */
+   known; projection-based (44), on the whole mesh; with a cubature, on few weighted cells; condensed on the contact
+   forces, interpolated over the parameters; or a regression over the parameters. */
 #ifndef HYCOROM_H
 #define HYCOROM_H
 

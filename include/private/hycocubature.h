@@ -16,12 +16,18 @@ typedef struct {
 typedef struct {
   struct _n_HycoForceBasis forces;
   PetscReal tol;
-  PetscInt n;         /* chosen cells; every rank */
-  PetscReal *weight;  /* of these, in the order of t->seeds_cell; every rank */
-  PetscBool *near;    /* by cell of the part: at a contact whose displacements are full order, and so once in the sum;
-                         NULL: none */
-  PetscReal error[2]; /* as the model has it; rank 0 */
+  PetscInt n;        /* chosen cells; every rank */
+  PetscReal *weight; /* of these, in the order of t->seeds_cell; every rank */
+  PetscBool *near; /* by cell of the part: once in the sum, at a contact whose displacements are full order, at springs
+                      and point loads */
+  PetscReal error[2];     /* as the model has it; rank 0 */
+  PetscInt n_full, *full; /* full-order displacements, by unknown of the contacts' surfaces, ascending; rank 0 */
 } * HycoCubatureTraining;
+
+/* Which displacements are full order, and the cells around them: c->full, c->near (cubature_contact.c). Collective. */
+PetscErrorCode HycoCubatureFindContacts(HycoReducer reducer);
+/* These as the model's. Rank 0. */
+PetscErrorCode HycoCubatureSetFullOrder(HycoROM model, HycoReducer reducer);
 
 /* What the cells of the whole mesh give to the reduced internal forces along the training paths (cubature_sample.c):
    the left singular vectors W (n_cells x n, rows in the file's order; the caller's) of the contributions, with their

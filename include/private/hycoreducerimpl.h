@@ -49,6 +49,7 @@ struct _p_HycoReducer {
   PetscInt deim; /* of each basis that seeds the RID: 0 DEIM, 1 Q-DEIM */
   PetscInt n_groups;
   char **groups, *region; /* n_groups, and NULL */
+  const char *plane;      /* of the search for a recipe: a group more, and displacements alone seed; NULL: none */
   HycoHybrid hybrid;
   PetscInt most_full_order; /* hybrid all: the most full-order displacements; 0: no limit */
   PetscInt scan;            /* points per parameter; 0: chosen */
@@ -64,7 +65,8 @@ struct _p_HycoReducer {
   HycoROM prototype;               /* a model of the type to be trained, without anything in it: its ops. Every rank */
   void *training;                  /* the type's options, and what a run has made */
   HycoProgress progress;
-  void *progress_ctx;
+  HycoPhaseMonitor phase;
+  void *progress_ctx, *phase_ctx;
   struct {
     HycoIndicatorKind indicator;
     PetscReal target, max_seconds;

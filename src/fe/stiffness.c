@@ -148,6 +148,7 @@ PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
     for (PetscInt t = 0; t < r / dim * dim; t++) Ke[r * n + t] = Ke[t * n + r];
   }
   if (fe->springs) HycoSpringsAddStiffness(fe, cell, Ke);
+  HycoObliqueStiffness(fe, cell, Ke);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -298,6 +299,7 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
         }
       }
     }
+    HycoObliqueStiffness(fe, e, Me);
     PetscCall(AddElement(fe, e, Me, M));
   }
   PetscCall(Finish(M));

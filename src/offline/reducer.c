@@ -134,6 +134,9 @@ HycoDefineMethod(HycoReducerChooses, (HycoReducer t, PetscBool *chooses), t, HYC
 HycoDefineMethod(HycoReducerSetProgress, (HycoReducer t, HycoProgress progress, void *ctx), t, HYCO_REDUCER_CLASSID,
                  t->progress = progress;
                  t->progress_ctx = ctx)
+HycoDefineMethod(HycoReducerSetPhaseMonitor, (HycoReducer t, HycoPhaseMonitor monitor, void *ctx), t,
+                 HYCO_REDUCER_CLASSID, t->phase = monitor;
+                 t->phase_ctx = ctx)
 HycoDefineMethod(HycoReducerSetValidation, (HycoReducer t, HycoSamples validation), t, HYCO_REDUCER_CLASSID,
                  t->validation = validation)
 HycoDefineMethod(HycoReducerSetValidationCount, (HycoReducer t, PetscInt n), t, HYCO_REDUCER_CLASSID,
@@ -352,7 +355,7 @@ static PetscErrorCode ReadRID(HycoReducer t)
                               sizeof(region), NULL));
   PetscCall(HycoOptionsBool("-hyco_rid_whole", "take the whole mesh as the RID", &t->whole_rid,
                             &t->pinned[HYCO_CHOICE_WHOLE]));
-  PetscCall(HycoOptionsFor("hybrid"));
+  PetscCall(HycoOptionsFor("hybrid or cubature"));
   PetscCall(HycoOptionsWord("-hyco_hybrid",
                             "displacements kept full order: fewest for full row rank, all contact ones, all",
                             HycoHybrids, &hybrid, &t->pinned[HYCO_CHOICE_HYBRID]));

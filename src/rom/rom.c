@@ -334,6 +334,7 @@ PetscErrorCode HycoROMGetWholeU(HycoROM m, PetscInt *n_nodes, const PetscReal *U
     }
     for (PetscInt k = 0; k < m->n_fe; k++)
       m->U_whole[m->mesh->node_whole[m->fe_dof[k] / dim] * dim + m->fe_dof[k] % dim] = m->U[m->fe_dof[k]];
+    HycoFEComplete(m->fe_whole, m->U_whole);
     m->whole_current = PETSC_TRUE;
   }
   if (n_nodes) *n_nodes = m->whole->n_nodes;
@@ -382,9 +383,9 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
                                    (int)m->n_points, (double)m->numbers[1],
                                    m->traits.settings == HYCO_SETTINGS_RID ? "RID " : "", (double)m->numbers[2]));
   if (m->scene->n_times)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  of paths: %d listed times from t = %g to %g, solved step by step\n",
-                                     (int)m->scene->n_times, (double)m->scene->times[0],
-                                     (double)m->scene->times[m->scene->n_times - 1]));
+    PetscCall(PetscViewerASCIIPrintf(
+        viewer, "  of paths: %d listed times from t = %g to %g%s\n", (int)m->scene->n_times, (double)m->scene->times[0],
+        (double)m->scene->times[m->scene->n_times - 1], m->traits.stiffness ? ", solved step by step" : ""));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
                                    (int)pod, pod ? (double)m->sigma[0] : 0., pod ? (double)m->sigma[pod - 1] : 0.));
   PetscTryTypeMethod(m, view, viewer);

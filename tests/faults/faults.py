@@ -139,7 +139,7 @@ CASES = [
     (['train', '-scene', ROPE, '-grid', '3,3', '-model', 'o.h5', '-hyco_model_type', 'projection', '-hyco_rid_layers', '1'],
      'nothing reads -hyco_rid_layers here: it is for -hyco_model_type hybrid, condensed or regression, and the model is projection'),
     (['train', '-scene', ROPE, '-grid', '3,3', '-model', 'o.h5', '-hyco_model_type', 'condensed', '-hyco_hybrid', 'all'],
-     'nothing reads -hyco_hybrid here: it is for -hyco_model_type hybrid, and'),
+     'nothing reads -hyco_hybrid here: it is for -hyco_model_type hybrid or cubature, and'),
     (['train', *T, *N, '-hyco_fallback'], 'hyco train does not read -hyco_fallback; what does: hyco predict'),
     (['solve', *R, '-hyco_fallback'], 'hyco solve does not read -hyco_fallback'),
     (['solve', *R, '-hyco_reconstruct', 'false'], 'what does: hyco train, predict, compare'),

@@ -76,13 +76,25 @@ class Rivals(Ring):
             self.assertGreater(len(weight), trained['n_modes'] / 3)  # points enough for the modes
             self.assertGreater(len(set(weight.ravel())), 5)
 
+    def test_one_displacement_a_contact(self):
+        """One full-order displacement for each contact: fewer unknowns and cells, forces nearly as good."""
+        trained = {}
+        for hybrid in ('contact', 'rank'):
+            trained[hybrid] = self.train('few.h5', *CUBATURE, '-hyco_hybrid', hybrid, '-hyco_pod_tol', '1e-8')
+            report = self.compare('few.h5')
+            for kind, limit in zip(KINDS, (0.01, 0.01, 0.01, 0.005)):
+                self.assertLess(report['worst_' + kind]['max'], limit, (hybrid, kind))
+        self.assertEqual(trained['rank']['n_fe_dofs'], trained['rank']['rid_contacts'])
+        self.assertLess(trained['rank']['n_fe_dofs'], trained['contact']['n_fe_dofs'] / 3)
+        self.assertLess(trained['rank']['rid_elements'], trained['contact']['rid_elements'])
+
     def test_without_history(self):
         """Scenes without a history: body forces, pressure and contact integrated by few cells."""
         scene = self.scene('elastic.yaml', 'law: elastic', '')
         with open(scene, encoding='utf-8') as f:
             text = f.read().replace('*q*', '*') + 'force: {core: {x: -2*push*x}}\n'
         with open(scene, 'w', encoding='utf-8') as f:
-            f.write(text)
+            f.write(text + 'hyco: {rid_groups: core_outside}\n')  # no cubature's
         errors = {}
         for name, settings in (('whole.h5', [*CUBATURE, '-hyco_cubature_tol', '0']), ('cells.h5', [*CUBATURE, '-hyco_cubature_tol', '1e-6']),
                                ('regression.h5', REGRESSION)):
@@ -162,13 +174,29 @@ class Rivals(Ring):
         """What is not there is said in one line."""
         train = ['train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '2,2']
         self.train('damaged.h5', *CUBATURE, grid='2,2')
+        self.train('short.h5', *REGRESSION, grid='2,2')
+        with h5py.File(self.path('short.h5'), 'r+') as f:
+            for name in ('gamma', 'Lambda', 'sigma', 'inelastic'):
+                rows = f['regression'][name][:-1]
+                del f['regression'][name]
+                f['regression'][name] = rows
+            del f['sealed']
+        flat = self.scene('flat.yaml', 'law: elastic', '')
+        with open(flat, encoding='utf-8') as f:
+            text = f.read().replace('*q*', '*')
+        with open(flat, 'w', encoding='utf-8') as f:
+            f.write(text)
         with h5py.File(self.path('damaged.h5'), 'r+') as f:
             f['cubature/weight'][0] = -1
             del f['sealed']
         for args, words in ((['train', '-scene', ROPE, '-model', self.path('no.h5'), '-grid', '3,3', *CUBATURE], ['cubature', 'line']),
                             ([*train, '-hyco_cubature_tol', '1e-3'], ['-hyco_cubature_tol', 'cubature', 'hybrid']),
+                            ([*train, *CUBATURE, '-hyco_hybrid', 'all'], ['-hyco_hybrid', 'contact', 'rank']),
+                            (['train', '-scene', self.norton.replace('norton', 'flat'), '-model', self.path('no.h5'), '-greedy', '-training_grid', '3,3', *CUBATURE],
+                             ['-greedy', 'cubature']),
                             ([*train, *REGRESSION, '-hyco_dual', 'nnmf'], ['-hyco_dual', 'projection']),
-                            (['predict', '-model', self.path('damaged.h5'), '-mu', POINT], ['damaged.h5', 'cubature/weight'])):
+                            (['predict', '-model', self.path('damaged.h5'), '-mu', POINT], ['damaged.h5', 'cubature/weight']),
+                            (['predict', '-model', self.path('short.h5'), '-mu', POINT], ['short.h5', 'regression/gamma'])):
             run = self.run_raw(*args)
             self.assertEqual(run.returncode, 1, run.stdout)
             self.assertEqual(len(said(run)), 1, run.stderr)

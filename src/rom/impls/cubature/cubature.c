@@ -41,59 +41,21 @@ static PetscErrorCode ResetTraining(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(PetscFree(c->weight));
   PetscCall(PetscFree(c->near));
-  c->n = 0;
+  PetscCall(PetscFree(c->full));
+  c->n = c->n_full = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Begin(HycoReducer t)
 {
+  const PetscBool vectors = (PetscBool)(((HycoCubatureTraining)t->training)->forces.dual != HYCO_DUAL_FE);
+
   PetscFunctionBegin;
+  HycoCheck(vectors || t->hybrid != HYCO_HYBRID_ALL,
+            "-hyco_hybrid all is for -hyco_model_type hybrid; a cubature has contact (all "
+            "displacements of the contacts' nodes) or rank (one for each contact)");
   HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for scenes in the plane and in space; on a line take hybrid "
                              "or projection");
-  HycoCheck(
-      !t->scene->n_springs,
-      "-hyco_model_type cubature integrates over cells, and the scene has springs on %s; take hybrid or projection",
-      t->scene->spring[0].group);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The nodes of contacts, by their numbers in the whole mesh, ascending. On rank 0. */
-static PetscErrorCode ListContacts(HycoReducer t, PetscInt *n, PetscInt node[])
-{
-  HycoMesh surface = t->fom->surface;
-  PetscBool *contact;
-
-  PetscFunctionBegin;
-  PetscCall(PetscCalloc1(surface->n_nodes, &contact));
-  HycoPairsMark(&t->fom->pairs, contact);
-  *n = 0;
-  for (PetscInt i = 0; i < surface->n_nodes; i++) {
-    if (contact[i]) node[(*n)++] = surface->node_whole ? surface->node_whole[i] : i;
-  }
-  PetscCall(PetscFree(contact));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The cells around contacts: c->near. Collective. */
-static PetscErrorCode MarkNear(HycoReducer t)
-{
-  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
-  HycoMesh part = t->fom->part;
-  PetscInt n = 0, *node, at;
-
-  PetscFunctionBegin;
-  PetscCall(PetscFree(c->near));
-  if (c->forces.dual != HYCO_DUAL_FE) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(t->sizes[0], &node));
-  HycoOnRoot(HycoComm(t), ListContacts(t, &n, node));
-  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(t)));
-  HycoBcast(node, n, MPIU_INT, HycoComm(t));
-  PetscCall(PetscCalloc1(part->n_cells, &c->near));
-  for (PetscInt k = 0; k < part->n_cells * part->nv; k++) {
-    PetscCall(PetscFindInt(part->node_whole ? part->node_whole[part->cells[k]] : part->cells[k], n, node, &at));
-    if (at >= 0) c->near[k / part->nv] = PETSC_TRUE;
-  }
-  PetscCall(PetscFree(node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -109,7 +71,7 @@ static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
   HycoCheck(!t->grown, "train -greedy adds cells to the RID of before, and a cubature chooses all of its cells anew: "
                        "train it on a grid or on points");
   PetscCall(HycoProjectionModes(t, store));
-  PetscCall(MarkNear(t));
+  PetscCall(HycoCubatureFindContacts(t));
   if (c->tol == 0) {
     PetscCall(HycoCubatureChooseAll(t));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -134,26 +96,6 @@ static void TakeContact(HycoROM m)
   m->traits.constrains = PETSC_TRUE;
 }
 
-/* The displacements of contacts' nodes are full order where their multipliers are the finite elements'. */
-static PetscErrorCode SetFullOrder(HycoROM m, HycoReducer t)
-{
-  const PetscInt dim = m->mesh->dim;
-  PetscBool *contact;
-  PetscInt n = 0, *dof;
-
-  PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->mesh->n_nodes, &contact));
-  PetscCall(PetscMalloc1(m->mesh->n_nodes * dim, &dof));
-  if (((HycoProjectionROM)m->data)->dual == HYCO_DUAL_FE) HycoPairsMark(&m->pairs, contact);
-  for (PetscInt k = 0; k < m->mesh->n_nodes * dim; k++) {
-    if (contact[k / dim] && !t->fixed[k]) dof[n++] = k;
-  }
-  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n, dof));
-  PetscCall(PetscFree(dof));
-  PetscCall(PetscFree(contact));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Every node is tested, every contact is the model's; the cells' weights. */
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
@@ -174,7 +116,7 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   PetscCall(PetscArraycpy(r->error, c->error, 2));
   PetscCall(HycoProjectionMakeBasis(m, t));
   TakeContact(m);
-  PetscCall(SetFullOrder(m, t));
+  PetscCall(HycoCubatureSetFullOrder(m, t));
   PetscCall(HycoProjectionJudge(m, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

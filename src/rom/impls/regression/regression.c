@@ -165,6 +165,7 @@ static PetscErrorCode SetUp(HycoROM m)
   const PetscInt size = m->n_points + 1 + m->scene->n_parameters;
 
   PetscFunctionBegin;
+  HycoCheck(r->n_columns == m->n_points * HycoSnapshotsSteps(m->scene), "%s: regression/gamma is damaged", m->path);
   PetscCall(HycoROMSetUpDefault(m));
   PetscCall(PetscMalloc1(size, &r->right));
   PetscCall(PetscMalloc1(size, &r->weight));
