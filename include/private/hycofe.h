@@ -147,7 +147,9 @@ PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
 /* "body B from moving along ..." for the combination of motions with these coefficients. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);
 
-/* Element stiffness of a cell and of the springs on it, row major, nv * dim square, nodes outer, components inner. */
+/* Element stiffness of a cell, row major, nv * dim square, nodes outer, components inner: of its body alone, for
+   displacements; with the springs on it, of the unknowns, which oblique supports make others. */
+PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 
 /* An empty, preallocated AIJ matrix for K or a norm over the nodes `n_owned` from `first` of the distributed numbering.

@@ -56,6 +56,11 @@ static PetscErrorCode Begin(HycoReducer t)
             "displacements of the contacts' nodes) or rank (one for each contact)");
   HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for scenes in the plane and in space; on a line take hybrid "
                              "or projection");
+  for (PetscInt k = 0; k < t->scene->n_fixed; k++)
+    HycoCheck(!t->scene->fixed[k].normal,
+              "-hyco_model_type cubature takes supports along the axes, and that of %s has a direction; take hybrid or "
+              "projection",
+              t->scene->fixed[k].group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
