@@ -88,8 +88,11 @@ PetscErrorCode HycoConstrainedDestroy(HycoConstrained *constrained);
 PetscErrorCode HycoConstrainedSet(HycoConstrained constrained, Mat B, const PetscInt at[], PetscBool *singular);
 /* |f| as the solver measures it: sqrt(f . M f), M the preconditioner. */
 PetscErrorCode HycoConstrainedSize(HycoConstrained constrained, Vec f, PetscReal *size);
-/* x from what it is, to a residual of that size; d (as B x) is not read without constraints. its: what it took. */
-PetscErrorCode HycoConstrainedSolve(HycoConstrained constrained, Vec f, Vec d, PetscReal size, Vec x, PetscInt *its);
+/* x from what it is, to a residual of `accuracy` times *size, which grows to a share of the residual at the start if
+   that is more (without loads the constraints alone act); d (as B x) is not read without constraints. its: what it
+   took. */
+PetscErrorCode HycoConstrainedSolve(HycoConstrained constrained, Vec f, Vec d, PetscReal accuracy, PetscReal *size,
+                                    Vec x, PetscInt *its);
 /* The constraints' forces l for which B^T l is closest to r = f - K x. */
 PetscErrorCode HycoConstrainedForces(HycoConstrained constrained, Vec r, Vec l);
 /* Borrowed. */

@@ -213,7 +213,7 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
   if (output)
     PetscCall(DriverGet("output", "<file.xdmf> fields for ParaView; the numbers in the .h5 beside it", output));
   if (report) PetscCall(DriverGet("report", "<file.json> the result as one JSON object", report));
-  if (table) PetscCall(DriverGet("table", "<file.csv> a line per point", table));
+  if (table) PetscCall(DriverGet("table", "<file.csv> a line per point, or <file.h5>, a dataset per column", table));
   if (report) PetscCall(DriverReadQuiet());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -123,14 +123,15 @@ void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns,
                  PetscInt column, PetscInt converged, PetscInt *all_undefined);
 /* Adds memory_mb and what was missed, writes to -report (if given) on rank 0 and frees. */
 PetscErrorCode ReportWrite(cJSON **json);
-/* The report of a set of points, n rows of values by column (one named "converged"), and their CSV at `table` ("":
-   none); fails when a point did not converge. */
+/* The report of a set of points, n rows of values by column (one named "converged"), and their table at `table`
+   ("": none); fails when a point did not converge. */
 PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
                          PetscInt n_columns, const char *const columns[], const PetscReal value[], PetscReal seconds);
 /* Writes text to a file, whole or not at all, or into a device. On this process alone. */
 PetscErrorCode DriverWriteText(const char path[], const char text[]);
 
-/* Writes a CSV: the parameters of each point, then its columns (n x n_columns row major). Collective. */
+/* Writes a CSV: the parameters of each point, then its columns (n x n_columns row major); to a path that ends in .h5 a
+   dataset for each. Collective. */
 PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, const PetscReal mu[],
                                 PetscInt n_columns, const char *const names[], const PetscReal value[]);
 

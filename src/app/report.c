@@ -1,6 +1,7 @@
 /* The JSON report. */
 #include "driver.h"
 #include <hycofile.h>
+#include <hycoh5.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/resource.h>
@@ -109,16 +110,15 @@ PetscErrorCode DriverWriteText(const char path[], const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, const PetscReal mu[],
-                                PetscInt n_columns, const char *const names[], const PetscReal value[])
+/* The table as CSV. */
+static PetscErrorCode WriteRows(const char path[], PetscInt n_par, const char *const par[], PetscInt n,
+                                const PetscReal mu[], PetscInt n_columns, const char *const names[],
+                                const PetscReal value[])
 {
-  PetscInt n_par;
-  const char *const *par;
   char *text;
   size_t at = 0, room;
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneGetParameters(scene, &n_par, &par, NULL, NULL));
   room = (size_t)(n + 1) * (size_t)(n_par + n_columns) * 64 + 64;
   PetscCall(PetscMalloc1(room, &text));
   for (PetscInt p = 0; p < n_par; p++) at += (size_t)snprintf(text + at, room - at, "%s,", par[p]);
@@ -131,8 +131,54 @@ PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, 
       at += (size_t)snprintf(text + at, room - at, "%.8g%s", (double)value[k * n_columns + c],
                              c < n_columns - 1 ? "," : "\n");
   }
-  HycoOnRoot(PETSC_COMM_WORLD, DriverWriteText(path, text));
+  PetscCall(DriverWriteText(path, text));
   PetscCall(PetscFree(text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Column `c` of n rows as a dataset. */
+static PetscErrorCode WriteColumn(HycoH5 file, const char name[], PetscInt n, PetscInt width, PetscInt c,
+                                  const PetscReal value[])
+{
+  PetscReal *column;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &column));
+  for (PetscInt k = 0; k < n; k++) column[k] = value[k * width + c];
+  PetscCall(HycoH5WriteReal(file, name, n, 1, column));
+  PetscCall(PetscFree(column));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The table as HDF5: a dataset a column. */
+static PetscErrorCode WriteColumns(const char path[], PetscInt n_par, const char *const par[], PetscInt n,
+                                   const PetscReal mu[], PetscInt n_columns, const char *const names[],
+                                   const PetscReal value[])
+{
+  HycoH5 file;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Create(path, &file));
+  for (PetscInt p = 0; p < n_par && !ierr; p++) ierr = WriteColumn(file, par[p], n, n_par, p, mu);
+  for (PetscInt c = 0; c < n_columns && !ierr; c++) ierr = WriteColumn(file, names[c], n, n_columns, c, value);
+  if (ierr) PetscCall(HycoH5Close(&file, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscCall(HycoH5Close(&file, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, const PetscReal mu[],
+                                PetscInt n_columns, const char *const names[], const PetscReal value[])
+{
+  PetscInt n_par;
+  const char *const *par;
+  const char *dot = strrchr(path, '.');
+  const PetscBool h5 = (PetscBool)(dot && strcmp(dot, ".h5") == 0);
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetParameters(scene, &n_par, &par, NULL, NULL));
+  HycoOnRoot(PETSC_COMM_WORLD, (h5 ? WriteColumns : WriteRows)(path, n_par, par, n, mu, n_columns, names, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -187,12 +233,14 @@ PetscErrorCode ReportSet(const char command[], const char table[], HycoScene sce
   PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
   for (PetscInt k = 0; k < n; k++) failed += value[k * n_columns + converged] < 0.5;
   if (table[0]) PetscCall(DriverWriteTable(table, scene, n, mu, n_columns, columns, value));
-  PetscCall(Say("%d points in %.3f s, %d not converged%s\n", (int)n, (double)seconds, (int)failed,
+  PetscCall(Say("%d points in %.3f s (%.3g a second), %d not converged%s\n", (int)n, (double)seconds,
+                seconds > 0 ? (double)(n / seconds) : 0., (int)failed,
                 table[0] ? "" : "; -table FILE.csv writes their results"));
   PetscCall(ReportCreate(command, scene, NULL, &json));
   cJSON_AddNumberToObject(json, "n_points", n);
   cJSON_AddNumberToObject(json, "not_converged", failed);
   cJSON_AddNumberToObject(json, "seconds_total", seconds);
+  if (seconds > 0) cJSON_AddNumberToObject(json, "points_per_second", n / seconds);
   PetscCall(ReportWrite(&json));
   HycoCheck(!failed, "%d of the %d points did not converge; the column converged of %s says which", (int)failed, (int)n,
             table[0] ? table : "a table (-table FILE.csv)");

@@ -13,6 +13,9 @@
 #define HYCO_EIGEN_SAFETY 1.1
 #define HYCO_EIGEN_LEAST  0.1
 
+/* The share of the residual at a start that counts beside the loads: without loads the constraints alone act. */
+#define HYCO_START 0.01
+
 /* The largest eigenvalue of D^-1 K by Lanczos' method. */
 static PetscErrorCode LargestEigenvalue(Mat K, PetscReal *largest)
 {
@@ -233,6 +236,7 @@ PetscErrorCode HycoConstrainedCreate(MPI_Comm comm, const char prefix[], Mat K, 
   PetscCall(HycoIterativeSolver(comm, prefix, K, &c->ksp));
   PetscCall(KSPSetNormType(c->ksp, KSP_NORM_NATURAL));
   PetscCall(KSPSetInitialGuessNonzero(c->ksp, PETSC_FALSE));
+  PetscCall(KSPSetResidualHistory(c->ksp, NULL, PETSC_DECIDE, PETSC_TRUE));
   PetscCall(MatCreateVecs(K, &c->correction, &c->residual));
   PetscCall(KSPGetPC(c->ksp, &c->pc));
   PetscCall(PetscObjectReference((PetscObject)c->pc));
@@ -295,9 +299,12 @@ PetscErrorCode HycoConstrainedSize(HycoConstrained c, Vec f, PetscReal *size)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoConstrainedSolve(HycoConstrained c, Vec f, Vec d, PetscReal tolerance, Vec x, PetscInt *its)
+PetscErrorCode HycoConstrainedSolve(HycoConstrained c, Vec f, Vec d, PetscReal accuracy, PetscReal *size, Vec x,
+                                    PetscInt *its)
 {
   HycoLevel *v = c->level;
+  const PetscReal *history;
+  PetscInt n;
 
   PetscFunctionBegin;
   if (v->m) { /* onto the constraints */
@@ -310,9 +317,11 @@ PetscErrorCode HycoConstrainedSolve(HycoConstrained c, Vec f, Vec d, PetscReal t
   PetscCall(MatMult(v->product, x, c->residual));
   PetscCall(VecAYPX(c->residual, -1, f));
   PetscCall(ProjectForce(v, c->residual));
-  PetscCall(KSPSetTolerances(c->ksp, 1e-300, tolerance, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(KSPSetTolerances(c->ksp, HYCO_START * accuracy, accuracy * *size, PETSC_DEFAULT, PETSC_DEFAULT));
   HycoLogged(HYCO_EVENT_ITERATE, KSPSolve(c->ksp, c->residual, c->correction));
   PetscCall(VecAXPY(x, 1, c->correction));
+  PetscCall(KSPGetResidualHistory(c->ksp, &history, &n));
+  if (n) *size = PetscMax(*size, HYCO_START * history[0]);
   PetscCall(KSPGetIterationNumber(c->ksp, its));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

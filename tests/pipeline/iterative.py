@@ -41,6 +41,10 @@ class Iterative(Case):
         for name, mu in (('hertz', '0.06,1,10'), ('roller', '0,0.6,10'), ('roller3d', '0,0.5,10'), ('blocks', '0.05,0.05')):
             self.held(os.path.join(EXAMPLES, name, 'scene.yaml'), mu, most=20)
 
+    def test_overlap(self):
+        """No loads: what overlaps as drawn is all that acts."""
+        self.held(PELLET, '4.06,0', '-contact_gap_gap', '-0.01', ranks=(0,))
+
     def test_ramp(self):
         """Several points on one K, the next from the last one's contacts; a preconditioner that is no multigrid."""
         table = self.path('ramp.csv')

@@ -32,7 +32,7 @@ typedef struct {
   HycoSolver s;
   Projected *form;
   PetscReal *bound, *value, *force;
-  PetscReal accuracy, size;   /* relative accuracy of solves; of F */
+  PetscReal accuracy, size;   /* relative accuracy of solves; of what acts */
   PetscInt *at;               /* work */
   PetscBool *solved;          /* the set of the last solve */
   PetscBool any;              /* there was one */
@@ -157,7 +157,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   PetscCall(SetConstraints(p, active, singular));
   if (*singular) PetscFunctionReturn(PETSC_SUCCESS);
   if (p->size < 0) PetscCall(HycoConstrainedSize(p->form->constrained, p->s->system->F, &p->size));
-  PetscCall(HycoConstrainedSolve(p->form->constrained, p->s->system->F, p->d, p->accuracy * p->size, p->x, &its));
+  PetscCall(HycoConstrainedSolve(p->form->constrained, p->s->system->F, p->d, p->accuracy, &p->size, p->x, &its));
   p->solves++;
   p->its += its;
   p->most = PetscMax(p->most, its);
