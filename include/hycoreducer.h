@@ -63,7 +63,8 @@ typedef struct {
   PetscReal pod_tol, contact_extension; /* energy left out of the displacement basis; a length */
   PetscInt layers;
   HycoHybrid hybrid;
-  PetscBool whole; /* the whole mesh as the RID */
+  PetscBool whole;   /* the whole mesh as the RID */
+  const char *plane; /* the group of a plane of symmetry whose cells the RID has; NULL: none. Borrowed from the scene */
 } HycoRecipe;
 
 /* In words: "hybrid, pod_tol 1e-10, hybrid contact, layers 1, contact extension 2.5". */

@@ -14,6 +14,7 @@ typedef struct {
   PetscReal extension; /* distance on the contact surfaces; 0: none */
   PetscInt n_groups;   /* region of interest */
   char **groups;
+  const char *plane;  /* a group more, or NULL */
   const char *region; /* expression, or NULL */
   PetscBool whole;
   PetscBool exact; /* the cells and nothing else */

@@ -39,6 +39,7 @@ typedef struct _n_HycoGalerkin {
   HycoScan scan;
   /* online */
   PetscInt n_free;       /* modes that are unknowns */
+  PetscBool bordered;    /* hybrid all, large: gamma is unknown beside U[A], with gamma = G U[A], and Kr sparse */
   PetscInt *fe_at;       /* by dof of mesh: place in fe_dof, or -1 */
   PetscReal *Vp;         /* V, zero on full-order and fixed unknowns */
   HycoReduced reduced;   /* how K goes into Kr, and what of it stays; made by the first */

@@ -49,6 +49,7 @@ struct _p_HycoReducer {
   PetscInt deim; /* of each basis that seeds the RID: 0 DEIM, 1 Q-DEIM */
   PetscInt n_groups;
   char **groups, *region; /* n_groups, and NULL */
+  const char *plane;      /* of the search for a recipe: a group more, and displacements alone seed; NULL: none */
   HycoHybrid hybrid;
   PetscInt most_full_order; /* hybrid all: the most full-order displacements; 0: no limit */
   PetscInt scan;            /* points per parameter; 0: chosen */

@@ -70,17 +70,9 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
 /* The cells of the part in Omega_A, of a greedy training in those before too. Collective. */
 static PetscErrorCode FindCells(HycoReducer t, PetscBool in[])
 {
-  const HycoRIDRecipe recipe = {t->n_seeds_node,
-                                t->n_seeds_cell,
-                                t->seeds_node,
-                                t->seeds_cell,
-                                t->layers,
-                                t->extension,
-                                t->n_groups,
-                                t->groups,
-                                t->region,
-                                t->whole_rid,
-                                t->prototype->traits.cells};
+  const HycoRIDRecipe recipe = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell,
+                                t->layers,       t->extension,    t->n_groups,   t->groups,
+                                t->plane,        t->region,       t->whole_rid,  t->prototype->traits.cells};
   HycoMesh part = t->fom->part;
   DMLabel rid;
 

@@ -381,7 +381,7 @@ static PetscErrorCode TakeField(HycoReducer t, PetscInt kind, PetscInt divide, P
   PetscInt l;
 
   PetscFunctionBegin;
-  if (!t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!t->seed[kind] || t->plane) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CutBasis(t, kind, &V, &l));
   PetscCall(SeedFrom(t, V, l, kind, divide, n_seeds, seeds));
   PetscCall(MatDestroy(&V));

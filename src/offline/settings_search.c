@@ -42,12 +42,17 @@ static const Size sizes[] = {{1e-5, 0, PETSC_FALSE}, {1e-5, 1, PETSC_FALSE},    
                              {1e-13, 3, PETSC_TRUE}, {1e-13, WHOLE, PETSC_FALSE}};
 enum { N_SIZES = sizeof(sizes) / sizeof(sizes[0]), FIRST_USUAL = 3 };
 
+/* Of paths, with the cells at a plane of symmetry as the RID, all displacements of A full order. */
+static const PetscReal plane_tol[] = {1e-9, 1e-12, 1e-14};
+enum { N_PLANES = sizeof(plane_tol) / sizeof(plane_tol[0]) };
+
 typedef struct {
   HycoReducer t;
   HycoSnapshots store;
   const char *const *types; /* the registered ones */
   HycoRecipe given;         /* as the options have it */
   PetscReal extension;      /* of the recipes that extend the contact */
+  const char *plane;        /* of symmetry; NULL: none */
   PetscBool targets;        /* given by the user */
   PetscReal target[HYCO_N_ERRORS];
   PetscInt n;
@@ -64,8 +69,9 @@ void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
   else if (r->whole)
     snprintf(text, length, "%s, pod_tol %g, hybrid %s, the whole mesh as RID", r->type, (double)r->pod_tol, kind);
   else
-    snprintf(text, length, "%s, pod_tol %g, hybrid %s, layers %d, contact extension %.3g", r->type, (double)r->pod_tol,
-             kind, (int)r->layers, (double)r->contact_extension);
+    snprintf(text, length, "%s, pod_tol %g, hybrid %s, layers %d, contact extension %.3g%s%s", r->type,
+             (double)r->pod_tol, kind, (int)r->layers, (double)r->contact_extension, r->plane ? ", at " : "",
+             r->plane ? r->plane : "");
 }
 
 void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *r)
@@ -94,6 +100,7 @@ static PetscErrorCode SetRecipe(HycoReducer t, const HycoRecipe *r)
   t->layers = r->layers;
   t->hybrid = r->hybrid;
   t->whole_rid = (PetscBool)(r->whole || t->prototype->traits.whole);
+  t->plane = r->plane;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,7 +210,8 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
   a->recipe = *recipe;
   a->ratio = PETSC_INFINITY;
   PetscCall(HycoSamplesGet(t->held, &a->held_out.n, NULL, NULL));
-  t->most_full_order = t->pinned[HYCO_CHOICE_HYBRID] || recipe->hybrid != HYCO_HYBRID_ALL ? 0 : MANY_UNKNOWNS;
+  t->most_full_order =
+      t->pinned[HYCO_CHOICE_HYBRID] || recipe->hybrid != HYCO_HYBRID_ALL || recipe->plane ? 0 : MANY_UNKNOWNS;
   PetscCall(SetRecipe(t, recipe));
   PetscCall(HycoCatchBegin());
   ierr = BuildAndJudge(s, a, &report);
@@ -243,7 +251,8 @@ static HycoRecipe Recipe(const Search *s, const Size *size)
 static PetscBool Same(const HycoRecipe *a, const HycoRecipe *b)
 {
   return (PetscBool)(strcmp(a->type, b->type) == 0 && a->pod_tol == b->pod_tol && a->layers == b->layers &&
-                     a->whole == b->whole && a->contact_extension == b->contact_extension && a->hybrid == b->hybrid);
+                     a->whole == b->whole && a->contact_extension == b->contact_extension && a->hybrid == b->hybrid &&
+                     a->plane == b->plane);
 }
 
 /* Whether the whole mesh as RID is a model: not where every unknown would be full order, but for a few. */
@@ -285,12 +294,90 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* How many contacts have their slave in a group of supports. */
+static PetscErrorCode CountContacts(HycoReducer t, const char group[], PetscInt *n)
+{
+  const HycoMesh m = t->fom->surface;
+  const HycoPairs *pairs = &t->fom->pairs;
+  PetscBool *in;
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  *n = 0;
+  PetscCall(HycoMeshFindGroup(m, "fixed", group, &g));
+  PetscCall(PetscCalloc1(m->n_nodes, &in));
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) in[m->group_node[k]] = PETSC_TRUE;
+  for (PetscInt k = 0; k < pairs->n; k++) *n += in[HycoPairsSlave(pairs, k)];
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The support that looks most like a plane of symmetry across the contacts: it holds one component at 0, and most of
+   the contacts lie in it; the first of equals; -1: none. Rank 0. */
+static PetscErrorCode FindPlane(HycoReducer t, PetscInt *plane)
+{
+  const HycoScene s = t->scene;
+  PetscBool every[HYCO_MAX_PARAMETERS];
+  PetscInt most = 2;
+
+  PetscFunctionBegin;
+  *plane = -1;
+  for (PetscInt p = 0; p < HYCO_MAX_PARAMETERS; p++) every[p] = PETSC_TRUE;
+  for (PetscInt k = 0; k < s->n_fixed; k++) {
+    const PetscReal origin[3] = {0, 0, 0};
+    PetscInt held = 0, n;
+    PetscReal value = 0;
+
+    for (PetscInt c = 0; c < 3; c++) {
+      const HycoExpr e = s->fixed[k].value[c];
+
+      if (!e) continue;
+      held++;
+      if (HycoExprInSpace(e) || HycoExprChanges(e, every)) value = 1;
+      if (value == 0) PetscCall(HycoExprEval(e, t->fom->fe_surface->mu, 1, origin, &value));
+    }
+    if (held != 1 || value != 0) continue;
+    PetscCall(CountContacts(t, s->fixed[k].group, &n));
+    if (n <= most) continue;
+    most = n;
+    *plane = k;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Paths: equations inside a small RID say little of modes that no load reaches there, unless the RID cuts the bodies
+   from side to side. The cells at a plane of symmetry do, and all of its nodes are inside. */
+static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
+{
+  const PetscBool *pinned = s->t->pinned;
+
+  PetscFunctionBegin;
+  *met = PETSC_FALSE;
+  if (!s->plane || s->given.whole || (pinned[HYCO_CHOICE_HYBRID] && s->given.hybrid != HYCO_HYBRID_ALL))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < N_PLANES && !*met; k++) {
+    const Size size = {plane_tol[k], 0, PETSC_FALSE};
+    HycoRecipe r = Recipe(s, &size);
+
+    r.type = type->type;
+    r.rid = PETSC_TRUE;
+    r.hybrid = HYCO_HYBRID_ALL;
+    r.plane = s->plane;
+    if (k && pinned[HYCO_CHOICE_TOLERANCE]) break;
+    PetscCall(Try(s, &r));
+    *met = (PetscBool)(s->attempt[s->n - 1].ratio <= 1);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* All of A full order, where "auto" keeps the contacts' displacements and is not good enough. */
 static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
 {
-  PetscBool met;
+  PetscBool met = PETSC_FALSE;
 
   PetscFunctionBegin;
+  if (strcmp(type->type, HYCO_ROM_HYBRID) == 0) PetscCall(TryPlanes(s, type, &met));
+  if (met) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
   if (!met && !s->t->pinned[HYCO_CHOICE_HYBRID] && s->t->sizes[2]) PetscCall(TrySizes(s, type, HYCO_HYBRID_ALL, &met));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -539,12 +626,16 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
 {
   HycoReducer t = s->t;
   PetscReal edge = 0;
+  PetscInt plane = -1;
 
   PetscFunctionBegin;
   HycoReducerGetRecipe(t, &s->given);
   HycoOnRoot(HycoComm(t), SurfaceEdge(t, &edge));
   PetscCallMPI(MPI_Bcast(&edge, 1, MPIU_REAL, 0, HycoComm(t)));
   s->extension = EXTENSION * edge;
+  if (t->scene->n_times && t->sizes[3] == 3) HycoOnRoot(HycoComm(t), FindPlane(t, &plane));
+  PetscCallMPI(MPI_Bcast(&plane, 1, MPIU_INT, 0, HycoComm(t)));
+  s->plane = plane < 0 ? NULL : t->scene->fixed[plane].group;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) s->targets = (PetscBool)(s->targets || t->target[j] > 0);
   PetscCall(PetscArraycpy(s->target, s->targets ? t->target : usual, HYCO_N_ERRORS));
   PetscCall(Rounds(s, grown, report));
@@ -560,6 +651,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
 
   PetscFunctionBegin;
   *grown = NULL;
+  t->plane = NULL;
   if (Settled(t)) {
     PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
     PetscCall(TakeModes(t, store));

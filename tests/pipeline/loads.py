@@ -204,13 +204,11 @@ output: {wall: {reaction: x}, low: {min: u_y}}
             self.near(found['springs']['y0']['force'][1], 1.5 + 0.2, 1e-9)
             self.near(found['u_max'][1], -1.7 / 40, 0.05)
             self.near(found['supports']['x0']['force'][0], -found['springs']['y0']['force'][0], 1e-8)
-        self.hyco('train', '-scene', scene, '-grid', '4', '-model', 'm.h5', '-hyco_model_type', 'projection', '-hyco_pod_tol', 1e-10)
-        model = self.hyco('predict', '-model', 'm.h5', '-mu', '40')
-        self.near(model['outputs']['low'], found['outputs']['low'], 0.01)
-        self.assertLess(abs(model['outputs']['wall'] - found['outputs']['wall']), 0.02)
-        cubature = self.run_raw('train', '-scene', scene, '-grid', '4', '-model', 'c.h5', '-hyco_model_type', 'cubature')
-        self.assertEqual(cubature.returncode, 1)
-        self.assertIn('springs on y0', cubature.stderr)
+        for model_type in ('projection', 'cubature'):  # whose cells with springs are once in the sum
+            self.hyco('train', '-scene', scene, '-grid', '4', '-model', 'm.h5', '-hyco_model_type', model_type, '-hyco_pod_tol', 1e-10)
+            model = self.hyco('predict', '-model', 'm.h5', '-mu', '40')
+            self.near(model['outputs']['low'], found['outputs']['low'], 0.01)
+            self.assertLess(abs(model['outputs']['wall'] - found['outputs']['wall']), 0.02)
 
     def test_linear_history(self):
         """A linear bar on a foundation beside one that creeps, loaded in time: springs count once in the model's path."""

@@ -5,7 +5,8 @@
 
       U[A u I] = Vp gamma + E x_fe      test space: the same restricted to A      (39)-(40)
 
-  (hybrid all: every unknown of A is full order and gamma = G U[A] is no unknown.) reduced_system.c fills the system.
+  (hybrid all: every unknown of A is full order and gamma = G U[A] is no unknown; of a large path's it is one, with
+  these as equations: the matrix is sparse then.) reduced_system.c fills the system.
 */
 #include <hycoalgorithms.h>
 #include <hycotable.h>
@@ -13,6 +14,8 @@
 
 /* Beyond this many unknowns the reduced matrix is stored sparse (a dense border of l modes). */
 #define HYCO_DENSE_MAX 700
+/* Of a path with all of A full order: its iterations multiply by the matrix again and again. */
+#define BORDERED_MIN 300
 
 PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
 {
@@ -66,7 +69,8 @@ static PetscErrorCode SetUpBasis(HycoROM m)
     g->fe_at[m->fe_dof[k]] = k;
     PetscCall(PetscArrayzero(g->Vp + m->fe_dof[k] * l, l));
   }
-  g->n_free = m->hybrid == HYCO_HYBRID_ALL ? 0 : l;
+  g->bordered = (PetscBool)(g->G && m->scene->n_times && l + m->n_fe > BORDERED_MIN);
+  g->n_free = m->hybrid == HYCO_HYBRID_ALL && !g->bordered ? 0 : l;
   m->n = g->n_free + m->n_fe;
   if (!g->contact) m->n_L = m->m; /* else the type has said it */
   HycoCheckModel(m->n > 0, "the model has no unknown: every training solution is zero");
@@ -101,7 +105,8 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscCall(SetUpBasis(m));
   PetscCall(HycoGalerkinCreateSets(m));
   PetscCall(ISGetLocalSize(g->sets.is_I, &n_I));
-  dense = (PetscBool)(m->n <= HYCO_DENSE_MAX || (g->symmetric && !m->n_fe) || (m->hybrid == HYCO_HYBRID_ALL && n_I));
+  dense = (PetscBool)((m->n <= HYCO_DENSE_MAX && !g->bordered) || (g->symmetric && !m->n_fe) ||
+                      (m->hybrid == HYCO_HYBRID_ALL && n_I && !g->bordered));
   if (!g->table) PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, g->own->n_nodes, 0, &g->K));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->fe->n_dof, &g->F));
   if (dense)
@@ -215,8 +220,8 @@ PetscErrorCode HycoGalerkinExpand(HycoROM m)
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(g->x, &x));
   for (PetscInt j = 0; j < m->l; j++) {
-    m->gamma[j] = g->n_free ? x[j] : 0;
-    for (PetscInt f = 0; g->G && f < m->n_fe; f++) m->gamma[j] += g->G[j * m->n_fe + f] * x[f];
+    m->gamma[j] = g->n_free && !g->G ? x[j] : 0;
+    for (PetscInt f = 0; g->G && f < m->n_fe; f++) m->gamma[j] += g->G[j * m->n_fe + f] * x[g->n_free + f];
   }
   PetscCall(PetscArraycpy(m->U, m->fe->u0, m->fe->n_dof));
   PetscCall(PetscBLASIntCast(m->l, &l));

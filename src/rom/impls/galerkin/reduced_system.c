@@ -96,7 +96,7 @@ static PetscInt ReducedRow(HycoROM m, PetscInt n, const PetscInt col[], const Pe
   PetscInt count = 0;
 
   RowTimesModes(m, n, col, val, y);
-  if (g->G) {
+  if (g->G && !g->bordered) {
     for (PetscInt f = 0; f < m->n_fe; f++) {
       PetscReal sum = 0;
 
@@ -185,6 +185,19 @@ static void PutModes(HycoROM m, const PetscInt start[], PetscScalar kr[])
   }
 }
 
+/* The rows gamma - G U[A] = 0 of a sparse Kr. */
+static void PutBorder(HycoROM m, const PetscInt start[], PetscScalar kr[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+
+  for (PetscInt j = 0; j < g->n_free; j++) {
+    PetscScalar *row = kr + start[j];
+
+    for (PetscInt k = 0; k < g->n_free; k++) row[k] = k == j;
+    for (PetscInt f = 0; f < m->n_fe; f++) row[g->n_free + f] = -g->G[j * m->n_fe + f];
+  }
+}
+
 /* hybrid all: Kr = (K Vp) G + K[A,A], a dense product. */
 static PetscErrorCode FillAll(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[],
                               PetscScalar kr[])
@@ -224,7 +237,7 @@ static PetscErrorCode Create(HycoROM m, const PetscInt ia[], const PetscInt ja[]
   PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &r->dense));
   PetscCall(ListRows(m, r));
   PetscCall(PetscMalloc5(m->l, &r->y, m->n + 100, &r->value, m->n + 100, &r->index, g->n_free * m->n, &r->modes,
-                         g->G ? m->n_fe * m->l : 0, &r->Y));
+                         g->G && !g->bordered ? m->n_fe * m->l : 0, &r->Y));
   if (!r->dense && ia) PetscCall(SetPattern(m, ia, ja, a)); /* else the table gave it */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -251,6 +264,7 @@ static PetscErrorCode FillRows(HycoROM m, const PetscInt ia[], const PetscInt ja
   PetscCall(PetscArrayzero(r->modes, g->n_free * m->n));
   AddRows(m, r->n_constant, r->n_rows, ia, ja, a, start, kr);
   PutModes(m, start, kr);
+  if (g->bordered) PutBorder(m, start, kr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -240,6 +240,6 @@ PetscReal HycoGalerkinCost(HycoReducer t, const HycoAttempt *a)
                                     : 24,
                   l = a->n_modes, n = l + (PetscReal)a->n_fe_dofs;
 
-  return n * n * n * 2 / 3 + 20 * (PetscReal)a->rid_elements * cell * cell +
+  return (t->scene->n_times && n > 700 ? 4e5 * n : n * n * n * 2 / 3) + 20 * (PetscReal)a->rid_elements * cell * cell +
          2 * (PetscReal)a->rid_nodes * dim * l * (l + 10);
 }
