@@ -208,12 +208,15 @@ static PetscErrorCode SetOblique(HycoFE fe)
   HycoObliqueClear(fe);
   for (PetscInt k = 0; k < fe->scene->n_fixed; k++) {
     const HycoFixed *fixed = &fe->scene->fixed[k];
+    const PetscBool turns = (PetscBool)(HycoExprInSpace(fixed->direction[0]) || HycoExprInSpace(fixed->direction[1]) ||
+                                        HycoExprInSpace(fixed->direction[2]));
     PetscInt g = 0;
 
     if (!fixed->normal) continue;
     PetscCall(HycoMeshFindGroup(m, "fixed", fixed->group, &g));
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
       const PetscInt i = m->group_node[j];
+      const HycoBody *body = &fe->scene->body[m->node_body[i]];
       PetscReal n[3] = {0, 0, 0}, value, size = 0;
 
       for (PetscInt c = 0; c < m->dim; c++) {
@@ -221,6 +224,9 @@ static PetscErrorCode SetOblique(HycoFE fe)
         size += n[c] * n[c];
       }
       HycoCheck(size > 0, "%s: its direction has no length at node %d", HycoExprKey(fixed->normal), (int)m->node_id[i]);
+      HycoCheck(!turns || !(body->map[0] || body->map[1] || body->map[2]),
+                "%s: its direction depends on the place, and the map of body %s moves node %d; give one direction",
+                HycoExprKey(fixed->normal), body->name, (int)m->node_id[i]);
       PetscCall(HycoExprEval(fixed->normal, fe->mu, 1, fe->X + 3 * i, &value));
       PetscCall(HycoObliqueAdd(fe, k, i, n, value, HycoExprKey(fixed->normal)));
       fe->lifted = (PetscBool)(fe->lifted || value != 0);

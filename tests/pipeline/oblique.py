@@ -131,6 +131,7 @@ class Oblique(Case):
                            ('fixed: {y0: {x: 0, y: 0}, x0: {normal: 1, direction: {x: 1, y: 1}}}', 'fixed twice along'),
                            ('fixed: {y0: {normal: 0, direction: {y: 1}}, x0: {normal: 0, direction: {x: 0.001, y: 1}}}', 'nearly that of other supports'),
                            ('fixed: {y0: {normal: 0, direction: {x: 0}}}', 'has no length'),
+                           ('fixed: {y0: {normal: 0, direction: {x: 1, y: x}}}\nbody_block_map_x: x + a', 'depends on the place'),
                            ('fixed: {y0: {normal: 0, direction: {x: 1}}}\nhistory: {times: [0, 1]}', 'scenes without a history')):
             for ranks in (0, 2):
                 run = self.run_raw('solve', '-scene', self.written(base + text + '\n', grid), '-mu', '0.5', ranks=ranks)
