@@ -131,6 +131,10 @@ PetscErrorCode HycoReducerSetSnapshotFolder(HycoReducer reducer, const char fold
 PetscErrorCode HycoReducerChooses(HycoReducer reducer, PetscBool *chooses);
 /* Called as snapshots are solved. */
 PetscErrorCode HycoReducerSetProgress(HycoReducer reducer, HycoProgress progress, void *ctx);
+/* Called on one rank in the other phases that may take long, flexibilities of condensed models and the search for
+   settings: `done` of n, which is 0 while nobody knows it. */
+typedef PetscErrorCode (*HycoPhaseMonitor)(const char phase[], PetscInt done, PetscInt n, void *ctx);
+PetscErrorCode HycoReducerSetPhaseMonitor(HycoReducer reducer, HycoPhaseMonitor monitor, void *ctx);
 /* Solves the samples that are missing, reduces, and writes the model to `path` (temporary name, then renamed).
    Collective. Beside them it solves the points that the model is judged by (HycoReducerSetValidation()). `training` may
    be NULL; so may `samples` for a condensed model, which then chooses them until its

@@ -16,11 +16,11 @@ typedef struct {
 typedef struct {
   struct _n_HycoForceBasis forces;
   PetscReal tol;
-  PetscInt n;         /* chosen cells; every rank */
-  PetscReal *weight;  /* of these, in the order of t->seeds_cell; every rank */
-  PetscBool *near;    /* by cell of the part: at a contact whose displacements are full order, and so once in the sum;
-                         NULL: none */
-  PetscReal error[2]; /* as the model has it; rank 0 */
+  PetscInt n;        /* chosen cells; every rank */
+  PetscReal *weight; /* of these, in the order of t->seeds_cell; every rank */
+  PetscBool *near; /* by cell of the part: once in the sum, at a contact whose displacements are full order, at springs
+                      and point loads */
+  PetscReal error[2];     /* as the model has it; rank 0 */
   PetscInt n_full, *full; /* full-order displacements, by unknown of the contacts' surfaces, ascending; rank 0 */
 } * HycoCubatureTraining;
 

@@ -31,6 +31,13 @@ typedef struct {
   PetscReal *share; /* n x 4: the sum of n dS, of dS */
 } HycoLoadShares;
 
+/* A support along a direction, which takes the place of u_c: u_c = u0 + sum of a_d u_d at a node (oblique.c). */
+typedef struct {
+  PetscInt node, c, support; /* of the scene */
+  PetscReal a[3];            /* 0 at c, and at others that take a place */
+  PetscReal n[3];            /* its direction, of unit length */
+} HycoOblique;
+
 struct _n_HycoFE {
   /* borrowed */
   HycoScene scene;
@@ -70,7 +77,9 @@ struct _n_HycoFE {
   PetscInt kept_place;
   /* supports at mu */
   PetscBool *fixed; /* n_dof */
-  PetscReal *u0;    /* n_dof, prescribed displacement, 0 where free */
+  PetscReal *u0;    /* n_dof, prescribed displacement, 0 where free; of an oblique support the offset */
+  PetscInt n_oblique, room_oblique, *oblique_at; /* by dof: which, or -1; only with n_oblique */
+  HycoOblique *oblique;
   PetscBool lifted; /* whether any of u0 is not 0 */
   /* temperature and thermal strain at mu, by cell and integration point; NULL: no body has a temperature */
   PetscReal *temperature, *thermal;
@@ -138,7 +147,9 @@ PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
 /* "body B from moving along ..." for the combination of motions with these coefficients. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);
 
-/* Element stiffness of a cell and of the springs on it, row major, nv * dim square, nodes outer, components inner. */
+/* Element stiffness of a cell, row major, nv * dim square, nodes outer, components inner: of its body alone, for
+   displacements; with the springs on it, of the unknowns, which oblique supports make others. */
+PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 
 /* An empty, preallocated AIJ matrix for K or a norm over the nodes `n_owned` from `first` of the distributed numbering.
@@ -150,10 +161,16 @@ PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K);
 /* F (12), with the lifting of the prescribed displacements: K u0 moved to the right, F_i = K_ii u0_i where fixed; and
    with what the thermal strains push, unless the scene has a history (HycoFEStep() has it in f_int). */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
+/* Of supports along a direction: the one in the place of an unknown, or NULL; brings displacements to be what they are
+   at these places (u: n_dof); nodal forces to be those of the unknowns, T^T f. All at fe's parameters. */
+const HycoOblique *HycoFEOblique(HycoFE fe, PetscInt dof);
+void HycoFEComplete(HycoFE fe, PetscReal u[]);
+void HycoFEGeneralise(HycoFE fe, PetscReal f[]);
 /* The loads at all of fe's unknowns (n_dof; a part has all of its own nodes'), fixed ones too, without lifting. */
 PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[]);
 /* The forces of supports on the fixed unknowns (r: n_dof, 0 at the others; right at the nodes that this process owns):
-   f_int less the loads, where no contact presses. f_int: NULL: K u. */
+   f_int less the loads, where no contact presses. f_int: NULL: K u. Of an oblique support the component c of its
+   force, whose others are -a_d times that. */
 PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[]);
 /* The norm matrix of H1: mass plus length^2 times gradient, fixed unknowns as in K. The length, of the whole mesh
    (HycoMeshLength()), keeps the norm the same in any unit; it is 1 in the paper's section 6. */

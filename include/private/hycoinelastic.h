@@ -92,7 +92,8 @@ PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, Pet
 
 /*
   The same of some bodies alone: those of laws that flow, or those of linear laws, whose stress and energy do not depend
-  on the past. Of the other cells nothing is read or written, and the report leaves them out.
+  on the past. Of the other cells nothing is read or written, and the report leaves them out. Springs, whatever they hold,
+  go with the bodies that flow.
 */
 typedef enum { HYCO_BODIES_ALL, HYCO_BODIES_FLOWING, HYCO_BODIES_LINEAR } HycoBodies;
 PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[], PetscReal t0, PetscReal t1,

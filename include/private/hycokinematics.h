@@ -31,6 +31,13 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[]);
 /* Room for temperatures and thermal strains; fills them at fe's nodes and mu where what changed reaches them. */
 PetscErrorCode HycoHeatCreate(HycoFE fe);
 PetscErrorCode HycoFESetHeat(HycoFE fe, PetscBool all, const PetscBool changed[]);
+/* Supports along a direction at fe's nodes: none; one more, of the scene's support, n.u = value; those by unknown,
+   after the last. Their part in a cell's matrix: T^T Ke T. */
+void HycoObliqueClear(HycoFE fe);
+PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const PetscReal direction[3], PetscReal value,
+                              const char key[]);
+PetscErrorCode HycoObliqueIndex(HycoFE fe);
+void HycoObliqueStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 /* Finds the springs of fe's mesh; their matrices at fe's nodes and mu; those of a cell, added to its stiffness. The
    first and the last are NULL-safe. */
 PetscErrorCode HycoSpringsCreate(HycoFE fe);

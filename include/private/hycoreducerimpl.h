@@ -65,7 +65,8 @@ struct _p_HycoReducer {
   HycoROM prototype;               /* a model of the type to be trained, without anything in it: its ops. Every rank */
   void *training;                  /* the type's options, and what a run has made */
   HycoProgress progress;
-  void *progress_ctx;
+  HycoPhaseMonitor phase;
+  void *progress_ctx, *phase_ctx;
   struct {
     HycoIndicatorKind indicator;
     PetscReal target, max_seconds;

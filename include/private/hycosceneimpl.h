@@ -72,7 +72,8 @@ typedef struct {
 
 typedef struct {
   char *group;
-  HycoExpr value[3]; /* prescribed displacement of component c; NULL: free */
+  HycoExpr value[3];             /* prescribed displacement of component c; NULL: free */
+  HycoExpr normal, direction[3]; /* prescribed displacement along a direction; NULL: none */
 } HycoFixed;
 
 typedef struct {
@@ -160,6 +161,8 @@ struct _p_HycoScene {
 PetscErrorCode HycoSceneReadConstants(HycoScene scene);
 /* The expression of an entry, with the scene's constants put in. */
 PetscErrorCode HycoSceneExpression(HycoScene scene, const char key[], const char text[], HycoExpr *expr);
+/* Fails where a support along a direction has none, or one that changes. */
+PetscErrorCode HycoSceneCheckSupports(HycoScene scene);
 /* Reads an entry of gravity or rotation; checks them. */
 PetscErrorCode HycoSceneReadMotion(HycoScene scene, PetscInt entry);
 PetscErrorCode HycoSceneCheckMotion(HycoScene scene);

@@ -198,7 +198,8 @@ static void FindReach(HycoScene s, PetscInt p, PetscBool does[N_REACHED])
       does[LAWS] = (PetscBool)(does[LAWS] || HycoExprChanges(law->constants.entry[j].expr, changed));
   }
   for (PetscInt k = 0; k < s->n_fixed; k++)
-    does[SUPPORTS] = (PetscBool)(does[SUPPORTS] || AnyChanges(s->fixed[k].value, changed));
+    does[SUPPORTS] = (PetscBool)(does[SUPPORTS] || AnyChanges(s->fixed[k].value, changed) ||
+                                 HycoExprChanges(s->fixed[k].normal, changed));
 }
 
 /* A parameter, or the time of a history, or one of its tables. */

@@ -179,6 +179,7 @@ PetscErrorCode CommandTrain(void)
   HycoCheck(given || greedy || chooses,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoReducerSetProgress(reducer, DriverProgress, word));
+  PetscCall(HycoReducerSetPhaseMonitor(reducer, DriverPhase, NULL));
   PetscCall(DriverSnapshotFolder(model, folder));
   PetscCall(DriverCatchInterrupt(folder));
   PetscCall(HycoReducerSetValidation(reducer, validation));

@@ -145,6 +145,8 @@ PetscErrorCode Say(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 void DriverPercent(PetscReal share, char text[32]);
 /* A HycoProgress: a bar that moves on a terminal, a line a minute elsewhere. ctx: a word for what is done. */
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx);
+/* A HycoPhaseMonitor: the same, where it takes long. */
+PetscErrorCode DriverPhase(const char phase[], PetscInt done, PetscInt n, void *ctx);
 /* -quiet: from here on neither words nor progress; errors are told all the same. */
 PetscErrorCode DriverReadQuiet(void);
 /* Ctrl-C and termination end the run with 130 or 143 and one line, of where the solutions are that are kept. */

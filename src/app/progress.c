@@ -75,30 +75,55 @@ void DriverPercent(PetscReal share, char text[32])
   snprintf(text, 32, percent >= 99.5 && percent < 1e6 ? "%.0f %%" : "%.2g %%", percent);
 }
 
-PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
+/* A bar, or a line a minute; n = 0: nobody knows how many. The last line only where there was another, unless `ends`.
+ */
+static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
 {
   static PetscReal begin = -1, last = -1;
   static PetscInt first = 0;
+  static PetscBool shown;
   const PetscReal now = HycoNow();
   const int terminal = isatty(STDERR_FILENO);
-  PetscReal left;
+  char share[64] = "", left[64] = "";
+
+  if (begin < 0 || done < first) {
+    begin = last = now;
+    first = done;
+    shown = PETSC_FALSE;
+  }
+  if (n) snprintf(share, sizeof(share), " of %d", (int)n);
+  if (n)
+    snprintf(left, sizeof(left), ", %.0f s left",
+             done > first ? (double)(now - begin) / (done - first) * (n - done) : 0.);
+  if (!quiet && (done == n ? ends || shown : now - last > (terminal ? 0.2 : 60))) {
+    last = now;
+    shown = PETSC_TRUE;
+    fprintf(stderr, "%s%s %d%s%s%s", terminal ? "\r\033[K" : "", word, (int)done, share, left,
+            terminal && done != n ? "" : "\n");
+    fflush(stderr);
+  }
+  if (done == n) begin = -1;
+}
+
+PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
+{
   char share[64];
 
   PetscFunctionBegin;
   snprintf(share, sizeof(share), "%d of %d", (int)done, (int)n);
   if (kept_in[0]) SetLastWords(share);
-  if (begin < 0 || done < first) {
-    begin = last = now;
-    first = done;
-  }
-  left = done > first ? (now - begin) / (done - first) * (n - done) : 0;
-  if (!quiet && (done == n || now - last > (terminal ? 0.2 : 60))) {
-    last = now;
-    fprintf(stderr, "%s%s %s, %.0f s left%s", terminal ? "\r\033[K" : "", (const char *)ctx, share, (double)left,
-            terminal && done < n ? "" : "\n");
-    fflush(stderr);
-  }
-  if (done == n) begin = -1;
+  Show((const char *)ctx, done, n, PETSC_TRUE);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverPhase(const char phase[], PetscInt done, PetscInt n, void *ctx)
+{
+  char word[64];
+
+  PetscFunctionBegin;
+  (void)ctx;
+  snprintf(word, sizeof(word), "%s:", phase);
+  Show(word, done, n, PETSC_FALSE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

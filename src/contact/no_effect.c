@@ -75,7 +75,13 @@ static PetscErrorCode CheckObstacles(HycoFE fe, HycoPairs *still, PetscReal norm
   for (PetscInt k = 0; k < still->n; k++) {
     PetscReal left = gap[k];
 
-    for (PetscInt c = 0; c < fe->dim; c++) left -= normal[3 * k + c] * fe->u0[still->slave[k] * fe->dim + c];
+    for (PetscInt c = 0; c < fe->dim; c++) {
+      const HycoOblique *oblique = HycoFEOblique(fe, still->slave[k] * fe->dim + c);
+      PetscReal u = fe->u0[still->slave[k] * fe->dim + c];
+
+      for (PetscInt d = 0; oblique && d < fe->dim; d++) u += oblique->a[d] * fe->u0[still->slave[k] * fe->dim + d];
+      left -= normal[3 * k + c] * u;
+    }
     PetscCall(HycoContactCheckStill(fe, still, k, gap[k], &left));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

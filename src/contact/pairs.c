@@ -130,6 +130,14 @@ static PetscErrorCode CountHeld(HycoScene scene, HycoMesh m, PetscInt held[])
     held[i] = 0;
     for (PetscInt c = 0; c < m->dim; c++) held[i] += fixed[i * m->dim + c];
   }
+  for (PetscInt k = 0; k < scene->n_fixed; k++) { /* along other directions */
+    PetscInt g = 0;
+
+    if (!scene->fixed[k].normal) continue;
+    PetscCall(HycoMeshFindGroup(m, "fixed", scene->fixed[k].group, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++)
+      held[m->group_node[j]] = PetscMin(held[m->group_node[j]] + 1, m->dim);
+  }
   PetscCall(PetscFree(fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -133,12 +133,26 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What a normal is of a node's unknowns, B T. */
+static void OfUnknowns(HycoFE fe, PetscInt node, const PetscReal normal[3], PetscReal along[3])
+{
+  for (PetscInt c = 0; c < 3; c++) along[c] = normal[c];
+  for (PetscInt c = 0; c < fe->dim; c++) {
+    const HycoOblique *oblique = HycoFEOblique(fe, node * fe->dim + c);
+
+    for (PetscInt d = 0; oblique && d < fe->dim; d++) along[d] += oblique->a[d] * normal[c];
+  }
+}
+
 /* Adds `scale` times the normal at a node to a row: to its free unknowns as entries, to its fixed ones in the gap. */
 static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal normal[3], PetscInt *n, PetscInt dof[],
                      PetscReal value[], PetscReal *gap)
 {
+  PetscReal along[3];
+
+  OfUnknowns(fe, node, normal, along);
   for (PetscInt c = 0; c < fe->dim; c++) {
-    const PetscReal entry = scale * normal[c];
+    const PetscReal entry = scale * along[c];
     const PetscInt i = node * fe->dim + c;
 
     if (fe->fixed[i]) {
@@ -161,8 +175,8 @@ static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k,
 
   PetscFunctionBegin;
   for (PetscInt j = k; j >= 0; j = before[j], n++) { /* k's own last: Gram and Schmidt from the other end */
-    for (PetscInt c = 0; c < 3; c++)
-      base[n][c] = c < fe->dim && !fe->fixed[slave * fe->dim + c] ? normal[3 * j + c] : 0;
+    OfUnknowns(fe, slave, normal + 3 * j, base[n]);
+    for (PetscInt c = 0; c < 3; c++) base[n][c] = c < fe->dim && !fe->fixed[slave * fe->dim + c] ? base[n][c] : 0;
   }
   for (PetscInt a = n - 1; a >= 0; a--) {
     PetscCall(PetscArraycpy(rest, base[a], 3));

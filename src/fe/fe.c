@@ -24,6 +24,8 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscCall(PetscFree((*fe)->mirrored));
   PetscCall(PetscFree((*fe)->drawn_sign));
   PetscCall(PetscFree((*fe)->fixed));
+  PetscCall(PetscFree((*fe)->oblique));
+  PetscCall(PetscFree((*fe)->oblique_at));
   PetscCall(PetscFree((*fe)->u0));
   PetscCall(PetscFree((*fe)->kept));
   PetscCall(PetscFree((*fe)->kept_mean));
@@ -60,8 +62,8 @@ static PetscErrorCode FindConstant(HycoFE fe)
   for (PetscInt e = 0; e < m->n_cells; e++) fe->n_constant += fe->constant[e];
   fe->fixed_constant = PETSC_TRUE;
   for (PetscInt k = 0; k < s->n_fixed; k++) {
-    for (PetscInt c = 0; c < 3; c++) {
-      HycoExpr value = s->fixed[k].value[c];
+    for (PetscInt c = 0; c < 7; c++) {
+      HycoExpr value = c < 3 ? s->fixed[k].value[c] : c < 6 ? s->fixed[k].direction[c - 3] : s->fixed[k].normal;
 
       if (HycoExprChanges(value, every) || (any && value && HycoExprInSpace(value))) fe->fixed_constant = PETSC_FALSE;
     }
@@ -197,6 +199,37 @@ static PetscErrorCode CheckAxis(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Supports along a direction, once all others are set: in the order of the scene. */
+static PetscErrorCode SetOblique(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  HycoObliqueClear(fe);
+  for (PetscInt k = 0; k < fe->scene->n_fixed; k++) {
+    const HycoFixed *fixed = &fe->scene->fixed[k];
+    PetscInt g = 0;
+
+    if (!fixed->normal) continue;
+    PetscCall(HycoMeshFindGroup(m, "fixed", fixed->group, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
+      const PetscInt i = m->group_node[j];
+      PetscReal n[3] = {0, 0, 0}, value, size = 0;
+
+      for (PetscInt c = 0; c < m->dim; c++) {
+        if (fixed->direction[c]) PetscCall(HycoExprEval(fixed->direction[c], fe->mu, 1, fe->X + 3 * i, &n[c]));
+        size += n[c] * n[c];
+      }
+      HycoCheck(size > 0, "%s: its direction has no length at node %d", HycoExprKey(fixed->normal), (int)m->node_id[i]);
+      PetscCall(HycoExprEval(fixed->normal, fe->mu, 1, fe->X + 3 * i, &value));
+      PetscCall(HycoObliqueAdd(fe, k, i, n, value, HycoExprKey(fixed->normal)));
+      fe->lifted = (PetscBool)(fe->lifted || value != 0);
+    }
+  }
+  PetscCall(HycoObliqueIndex(fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Fixed components and their values, evaluated at the moved nodes. */
 static PetscErrorCode SetSupports(HycoFE fe)
 {
@@ -228,6 +261,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
       }
     }
   }
+  PetscCall(SetOblique(fe));
   for (PetscInt k = 0; k < fe->n_pins; k++) fe->fixed[fe->pin[k]] = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -13,12 +13,19 @@ typedef struct {
 static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal value, Into F)
 {
   const PetscInt global = fe->mesh->node_global ? fe->mesh->node_global[node] : node;
+  const HycoOblique *oblique;
 
   PetscFunctionBegin;
-  if (F.all)
+  if (F.all) {
     F.all[node * fe->dim + c] += value;
-  else if (!fe->fixed[node * fe->dim + c])
-    PetscCall(VecSetValue(F.vec, global * fe->dim + c, value, ADD_VALUES));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (!fe->fixed[node * fe->dim + c]) PetscCall(VecSetValue(F.vec, global * fe->dim + c, value, ADD_VALUES));
+  oblique = HycoFEOblique(fe, node * fe->dim + c);
+  for (PetscInt d = 0; oblique && d < fe->dim; d++) {
+    if (!fe->fixed[node * fe->dim + d])
+      PetscCall(VecSetValue(F.vec, global * fe->dim + d, oblique->a[d] * value, ADD_VALUES));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -199,7 +206,7 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
       PetscReal sum = 0;
 
       for (PetscInt j = 0; j < n; j++) sum += Ke[k * n + j] * u0[j];
-      PetscCall(AddNode(fe, i, c, -sum, F));
+      PetscCall(VecSetValue(F.vec, global * m->dim + c, -sum, ADD_VALUES)); /* T^T K T has its share of others */
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -352,6 +359,7 @@ PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f
 
   PetscFunctionBegin;
   PetscCall(HycoFELoads(fe, r));
+  HycoFEGeneralise(fe, r);
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = (f_int ? f_int[k] : 0) - r[k];
   for (PetscInt e = 0; e < m->n_cells && !f_int; e++) {
     const PetscInt *node = m->cells + e * m->nv;
@@ -360,8 +368,11 @@ PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f
     for (PetscInt k = 0; k < n; k++) holds = (PetscBool)(holds || fe->fixed[node[k / m->dim] * m->dim + k % m->dim]);
     if (!holds) continue;
     PetscCall(HycoFEElementStiffness(fe, e, Ke));
-    for (PetscInt k = 0; k < n * n; k++)
-      r[node[k / n / m->dim] * m->dim + k / n % m->dim] += Ke[k] * u[node[k % n / m->dim] * m->dim + k % n % m->dim];
+    for (PetscInt k = 0; k < n * n; k++) {
+      const PetscInt j = node[k % n / m->dim] * m->dim + k % n % m->dim;
+
+      r[node[k / n / m->dim] * m->dim + k / n % m->dim] += Ke[k] * (fe->fixed[j] ? fe->u0[j] : u[j]);
+    }
   }
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? r[k] : 0;
   PetscFunctionReturn(PETSC_SUCCESS);

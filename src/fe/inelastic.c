@@ -406,7 +406,7 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
   ierr = StepAll(fe, bodies, &b);
   PetscCall(BatchDestroy(&b));
   PetscCall(ierr);
-  if (fe->springs && !report->failed) {
+  if (fe->springs && bodies != HYCO_BODIES_LINEAR && !report->failed) { /* once, of all bodies */
     const PetscReal energy = HycoSpringsEnergy(fe, u);
 
     HycoSpringsAddForces(fe, -1, u, f_int);

@@ -116,7 +116,7 @@ static PetscErrorCode SetStiffness(HycoLinearForce f)
   for (PetscInt k = 0; k < f->n_cells; k++) {
     const PetscInt *node = f->fe->mesh->cells + f->cell[k] * nv;
 
-    PetscCall(HycoFEElementStiffness(f->fe, f->cell[k], Ke));
+    PetscCall(HycoFEBodyStiffness(f->fe, f->cell[k], Ke));
     for (PetscInt a = 0; a < nv; a++) {
       const PetscInt row = f->row[node[a]];
 

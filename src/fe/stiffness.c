@@ -133,7 +133,7 @@ static PetscErrorCode AddGeneral(HycoFE fe, const HycoElement *el, PetscInt cell
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
@@ -147,7 +147,15 @@ PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   for (PetscInt r = 0; r < n; r++) {
     for (PetscInt t = 0; t < r / dim * dim; t++) Ke[r * n + t] = Ke[t * n + r];
   }
-  if (fe->springs) HycoSpringsAddStiffness(fe, cell, Ke);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEBodyStiffness(fe, cell, Ke));
+  HycoSpringsAddStiffness(fe, cell, Ke);
+  HycoObliqueStiffness(fe, cell, Ke);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -298,6 +306,7 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
         }
       }
     }
+    HycoObliqueStiffness(fe, e, Me);
     PetscCall(AddElement(fe, e, Me, M));
   }
   PetscCall(Finish(M));

@@ -373,12 +373,20 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part
   for (PetscInt k = 0; k < fe->n_dof; k++) {
     const PetscInt i = k / fe->dim;
     const Part *p = &parts[part[i]];
+    const HycoOblique *oblique;
     PetscReal x[3], row[6];
     PetscInt n;
 
     if (!fe->fixed[k] || HycoMeshOwned(fe->mesh, i) < 0) continue;
     for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * i + c] - p->centre[c]) / p->size;
     n = RigidRow(fe->dim, x, k % fe->dim, row);
+    oblique = HycoFEOblique(fe, k);
+    for (PetscInt d = 0; oblique && d < fe->dim; d++) {
+      PetscReal other[6];
+
+      RigidRow(fe->dim, x, d, other);
+      for (PetscInt a = 0; a < n; a++) row[a] -= oblique->a[d] * other[a];
+    }
     for (PetscInt a = 0; a < n * n; a++) Add(&sum[36 * part[i] + a / n * 6 + a % n], row[a / n] * row[a % n]);
   }
   ctx = (SpringGram){part, parts, sum};

@@ -51,7 +51,7 @@ static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[],
     for (PetscInt j = 0; u0 != 0 && j < n; j++) {
       const PetscInt dof = node[j / m->dim] * m->dim + j % m->dim;
 
-      *work += u0 * Ke[k * n + j] * (2 * u[dof] - fe->u0[dof]);
+      *work += u0 * Ke[k * n + j] * (2 * (fe->fixed[dof] ? fe->u0[dof] : u[dof]) - fe->u0[dof]);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -42,7 +42,7 @@ static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
 static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
 {
   const PetscScalar *u;
-  PetscReal *f_int = NULL;
+  PetscReal *f_int = NULL, *along;
 
   PetscFunctionBegin;
   if (f->path) {
@@ -56,7 +56,11 @@ static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
   PetscCall(PetscArrayzero(contact, f->fe->n_dof));
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ContactForces(f, contact));
-  for (PetscInt k = 0; k < f->fe->n_dof; k++) r[k] -= f->fe->fixed[k] ? contact[k] : 0;
+  PetscCall(PetscMalloc1(f->fe->n_dof, &along));
+  PetscCall(PetscArraycpy(along, contact, f->fe->n_dof));
+  HycoFEGeneralise(f->fe, along);
+  for (PetscInt k = 0; k < f->fe->n_dof; k++) r[k] -= f->fe->fixed[k] ? along[k] : 0;
+  PetscCall(PetscFree(along));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -130,10 +134,64 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* rho of min |force - sum of rho_k n_k| over the components that no plain support fixes, by Gauss: n vectors, n <= 3.
+ */
+static void Resolve(PetscInt n, const HycoOblique *const o[], const PetscBool plain[3], const PetscReal force[3],
+                    PetscReal rho[3])
+{
+  PetscReal A[3][4];
+
+  for (PetscInt a = 0; a < n; a++) {
+    for (PetscInt b = 0; b <= n; b++) {
+      A[a][b] = 0;
+      for (PetscInt d = 0; d < 3; d++) A[a][b] += plain[d] ? 0 : o[a]->n[d] * (b < n ? o[b]->n[d] : force[d]);
+    }
+  }
+  for (PetscInt a = 0; a < n; a++) { /* definite: no pivots */
+    for (PetscInt r = a + 1; r < n; r++) {
+      for (PetscInt b = n; b >= a; b--) A[r][b] -= A[r][a] / A[a][a] * A[a][b];
+    }
+  }
+  for (PetscInt a = n - 1; a >= 0; a--) {
+    for (PetscInt b = a + 1; b < n; b++) A[a][n] -= A[a][b] * rho[b];
+    rho[a] = A[a][n] / A[a][a];
+  }
+}
+
+/* The supports' force on a node, by support: r is of the unknowns, support[] of these. */
+static void AddSupports(HycoFE fe, PetscInt node, const PetscReal r[], const PetscInt support[], HycoReaction result[])
+{
+  const HycoOblique *o[3];
+  PetscBool plain[3] = {PETSC_FALSE};
+  PetscReal force[3] = {0, 0, 0}, rho[3];
+  PetscInt n = 0;
+
+  for (PetscInt c = 0; c < fe->dim; c++) {
+    const PetscInt dof = node * fe->dim + c;
+    const HycoOblique *oblique = HycoFEOblique(fe, dof);
+
+    force[c] += r[dof];
+    plain[c] = (PetscBool)(fe->fixed[dof] && !oblique);
+    for (PetscInt d = 0; oblique && d < fe->dim; d++) force[d] -= oblique->a[d] * r[dof];
+    if (oblique) o[n++] = oblique;
+  }
+  if (n) Resolve(n, o, plain, force, rho);
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt d = 0; d < fe->dim; d++) {
+      AddTo(fe, node * fe->dim + d, rho[k] * o[k]->n[d], &result[o[k]->support]);
+      force[d] -= rho[k] * o[k]->n[d];
+    }
+  }
+  for (PetscInt c = 0; c < fe->dim; c++) {
+    if (plain[c] && support[node * fe->dim + c] >= 0)
+      AddTo(fe, node * fe->dim + c, force[c], &result[support[node * fe->dim + c]]);
+  }
+}
+
 /* Of this process's own nodes; work: 3 x n_dof reals. Collective. */
 static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums *s)
 {
-  const PetscInt n = f->fe->n_dof;
+  const PetscInt n = f->fe->n_dof, dim = f->fe->dim;
   PetscReal *contact = work, *r = work + n, *load = work + 2 * n;
   HycoReaction *loads = s->result + f->scene->n_fixed + f->scene->n_springs;
 
@@ -141,12 +199,14 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
   PetscCall(Reactions(f, contact, r));
   HycoOnEach(HycoComm(f), HycoFELoads(f->fe, load));
   PetscCall(FindSupports(f, support));
-  for (PetscInt k = 0; k < n; k++) {
-    if (HycoMeshOwned(f->part, k / f->fe->dim) < 0) continue;
-    if (support[k] >= 0) AddTo(f->fe, k, r[k], &s->result[support[k]]);
-    AddTo(f->fe, k, load[k], &loads[0]);
-    AddTo(f->fe, k, contact[k], &loads[1]);
-    s->size += PetscAbsReal(r[k]) + PetscAbsReal(load[k]) + PetscAbsReal(contact[k]);
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    if (HycoMeshOwned(f->part, i) < 0) continue;
+    AddSupports(f->fe, i, r, support, s->result);
+    for (PetscInt k = i * dim; k < (i + 1) * dim; k++) {
+      AddTo(f->fe, k, load[k], &loads[0]);
+      AddTo(f->fe, k, contact[k], &loads[1]);
+      s->size += PetscAbsReal(r[k]) + PetscAbsReal(load[k]) + PetscAbsReal(contact[k]);
+    }
   }
   PetscCall(HycoSpringsVisit(f->fe, AddSpring, s));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -34,18 +34,24 @@ PetscErrorCode HycoFOMToSurface(HycoFOM f, Vec v, PetscReal value[])
 PetscErrorCode HycoFOMGather(HycoFOM f)
 {
   const PetscScalar *v;
+  PetscScalar *local;
   Vec shown = f->U;
 
   PetscFunctionBegin;
   PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArray(f->U_local, &local));
+  HycoFEComplete(f->fe, local);
+  PetscCall(VecRestoreArray(f->U_local, &local));
   if (f->n_turned) {
     PetscCall(VecDuplicate(f->U, &shown));
     PetscCall(VecCopy(f->U, shown));
     PetscCall(HycoFOMTakeOutReleased(f, shown));
   }
   PetscCall(HycoFOMToLocal(f, shown, f->u));
+  HycoFEComplete(f->fe, f->u);
   if (f->to_surface) PetscCall(HycoFOMToSurface(f, shown, f->u_surface));
+  if (f->to_surface && f->rank == 0) HycoFEComplete(f->fe_surface, f->u_surface);
   if (f->n_turned) PetscCall(VecDestroy(&shown));
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecScatterBegin(f->lambda_to_root, f->Lambda, f->lambda_root, INSERT_VALUES, SCATTER_FORWARD));

@@ -103,6 +103,7 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   for (PetscInt k = 0; k < scene->n_fixed; k++)
     PetscCall(HycoMeshFindGroup(mesh, "fixed", scene->fixed[k].group, &group));
   for (PetscInt k = 0; k < scene->n_fixed; k++) PetscCall(CheckComponents(mesh, scene->fixed[k].value));
+  for (PetscInt k = 0; k < scene->n_fixed; k++) PetscCall(CheckComponents(mesh, scene->fixed[k].direction));
   for (PetscInt k = 0; k < scene->n_bodies; k++) PetscCall(CheckComponents(mesh, scene->body[k].force));
   for (PetscInt k = 0; k < scene->n_loads; k++) PetscCall(CheckComponents(mesh, scene->load[k].traction));
   for (PetscInt k = 0; k < scene->n_point_loads; k++) PetscCall(CheckComponents(mesh, scene->point_load[k].force));

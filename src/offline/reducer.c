@@ -134,6 +134,9 @@ HycoDefineMethod(HycoReducerChooses, (HycoReducer t, PetscBool *chooses), t, HYC
 HycoDefineMethod(HycoReducerSetProgress, (HycoReducer t, HycoProgress progress, void *ctx), t, HYCO_REDUCER_CLASSID,
                  t->progress = progress;
                  t->progress_ctx = ctx)
+HycoDefineMethod(HycoReducerSetPhaseMonitor, (HycoReducer t, HycoPhaseMonitor monitor, void *ctx), t,
+                 HYCO_REDUCER_CLASSID, t->phase = monitor;
+                 t->phase_ctx = ctx)
 HycoDefineMethod(HycoReducerSetValidation, (HycoReducer t, HycoSamples validation), t, HYCO_REDUCER_CLASSID,
                  t->validation = validation)
 HycoDefineMethod(HycoReducerSetValidationCount, (HycoReducer t, PetscInt n), t, HYCO_REDUCER_CLASSID,

@@ -370,6 +370,7 @@ static PetscErrorCode AddRegions(Rid *r, const HycoRIDRecipe *recipe)
     PetscCall(FindInPart(r->part->n_cells, r->part->cell_whole, recipe->cells[k], &at));
     if (at >= 0) PetscCall(Add(r, at));
   }
+  if (recipe->exact) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt e = 0; recipe->whole && e < r->part->n_cells; e++) PetscCall(Add(r, e));
   for (PetscInt k = 0; k < recipe->n_groups; k++) PetscCall(AddGroup(r, recipe->groups[k]));
   if (recipe->plane) PetscCall(AddGroup(r, recipe->plane));

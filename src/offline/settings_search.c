@@ -231,6 +231,7 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
   }
   PetscCall(PetscStrncpy(a->failure, message, sizeof(a->failure)));
   if (t->attempt) HycoOnRoot(HycoComm(t), t->attempt(a, t->attempt_ctx));
+  if (t->phase) HycoOnRoot(HycoComm(t), t->phase("settings tried", s->n, 0, t->phase_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -546,6 +547,7 @@ static PetscErrorCode Attempts(Search *s)
   s->least = PETSC_INFINITY;
   s->n = 0;
   PetscCall(TryAll(s));
+  if (s->t->phase) HycoOnRoot(HycoComm(s->t), s->t->phase("settings tried", s->n, s->n, s->t->phase_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -204,9 +204,16 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt i = p.group < 0 ? k : m->group_node[m->group_start[p.group] + k], dof = i * fe->dim + q->field;
 
-    if (HycoMeshOwned(m, i) < 0 || !fe->fixed[dof]) continue;
-    s->sum += reaction[dof];
-    s->weight += 1;
+    if (HycoMeshOwned(m, i) < 0) continue;
+    if (fe->fixed[dof]) s->sum += reaction[dof];
+    s->weight += fe->fixed[dof];
+    for (PetscInt c = 0; c < fe->dim; c++) {
+      const HycoOblique *oblique = HycoFEOblique(fe, i * fe->dim + c);
+
+      if (!oblique || oblique->a[q->field] == 0) continue;
+      s->sum -= oblique->a[q->field] * reaction[i * fe->dim + c];
+      s->weight += 1;
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

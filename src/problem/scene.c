@@ -12,6 +12,7 @@ static const char *const body_fields[] = {
     "element",   "map_x",    "map_y",   "map_z", "law", "temperature", "reference_temperature",
     "expansion", "law_type", "density", NULL};
 static const char *const component_fields[] = {"x", "y", "z", NULL};
+static const char *const fixed_fields[] = {"x", "y", "z", "normal", "direction_x", "direction_y", "direction_z", NULL};
 static const char *const spring_fields[] = {"x", "y", "z", "normal", NULL};
 static const char *const contact_fields[] = {"type", NULL};
 static const char *const output_fields[] = {"max", "min", "mean", "reaction", "group", NULL};
@@ -452,7 +453,10 @@ static PetscErrorCode ReadGroups(HycoScene s, PetscInt entry, char names[], Pets
       PetscCall(NewColdExpr(s, entry, &s->spring[k].stiffness[field]));
     } else if (strncasecmp(key, "fixed_", 6) == 0) {
       PetscCall(Member(name, sizeof(HycoFixed), &s->n_fixed, (void **)&s->fixed, &k));
-      PetscCall(NewColdExpr(s, entry, &s->fixed[k].value[field]));
+      PetscCall(NewColdExpr(s, entry,
+                            field < 3    ? &s->fixed[k].value[field]
+                            : field == 3 ? &s->fixed[k].normal
+                                         : &s->fixed[k].direction[field - 4]));
     } else {
       PetscCall(Member(name, sizeof(HycoLoad), &s->n_loads, (void **)&s->load, &k));
       PetscCall(NewColdExpr(s, entry, field < 0 ? &s->load[k].pressure : &s->load[k].traction[field]));
@@ -470,10 +474,12 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
 
   PetscFunctionBegin;
   if (strncasecmp(key, "force_", 6) == 0) what = "a force";
-  if (strncasecmp(key, "fixed_", 6) == 0) what = "a fixed group";
   if (strncasecmp(key, "traction_", 9) == 0) what = "a traction";
   if (strncasecmp(key, "body_", 5) == 0) {
     PetscCall(ReadBody(s, entry, rest));
+  } else if (strncasecmp(key, "fixed_", 6) == 0) {
+    if (!SplitKey(rest, fixed_fields, name, &field)) PetscCall(UnknownKey(key, "a fixed group", NULL, fixed_fields));
+    PetscCall(ReadGroups(s, entry, name, field));
   } else if (what) {
     if (!SplitKey(rest, component_fields, name, &field)) PetscCall(UnknownKey(key, what, NULL, component_fields));
     PetscCall(ReadGroups(s, entry, name, field));
@@ -563,6 +569,7 @@ static PetscErrorCode CheckScene(HycoScene s)
     PetscCall(CheckHeat(&s->body[k]));
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactComplete(s->contact[k]));
+  PetscCall(HycoSceneCheckSupports(s));
   PetscCall(HycoSceneCheckMotion(s));
   PetscCall(HycoSceneCheckHistory(s));
   PetscCall(HycoSceneCheckQuantities(s));
@@ -800,7 +807,11 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
     PetscCall(PetscFree(s->body[k].name));
   }
   for (PetscInt k = 0; k < s->n_fixed; k++) {
-    for (PetscInt c = 0; c < 3; c++) PetscCall(HycoExprDestroy(&s->fixed[k].value[c]));
+    for (PetscInt c = 0; c < 3; c++) {
+      PetscCall(HycoExprDestroy(&s->fixed[k].value[c]));
+      PetscCall(HycoExprDestroy(&s->fixed[k].direction[c]));
+    }
+    PetscCall(HycoExprDestroy(&s->fixed[k].normal));
     PetscCall(PetscFree(s->fixed[k].group));
   }
   for (PetscInt k = 0; k < s->n_loads; k++) {

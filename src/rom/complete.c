@@ -63,6 +63,7 @@ static void Expand(HycoROM m, HycoFE fe, PetscInt first)
     m->U[i] = fe->u0[i];
     for (PetscInt j = 0; j < l; j++) m->U[i] += v[j] * m->gamma[j];
   }
+  HycoFEComplete(fe, m->U);
 }
 
 PetscErrorCode HycoROMExpand(HycoROM m)

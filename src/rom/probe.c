@@ -66,6 +66,7 @@ static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda
   const PetscInt dim = p->fe->dim;
   PetscBool any = PETSC_FALSE;
   HycoContactFields c;
+  PetscReal *force;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
@@ -73,9 +74,11 @@ static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFESetParameters(m->fe_whole, p->fe->mu));
   ierr = HycoContactFieldsCreate(PETSC_COMM_SELF, m->fe_whole, &m->whole_pairs, m->U_whole, Lambda, &c);
-  for (PetscInt k = 0; k < p->fe->n_dof && !ierr; k++) {
-    if (p->fe->fixed[k]) p->reaction[k] -= c.force[3 * p->mesh->node_whole[k / dim] + k % dim];
-  }
+  PetscCall(PetscMalloc1(p->fe->n_dof, &force));
+  for (PetscInt k = 0; k < p->fe->n_dof; k++) force[k] = ierr ? 0 : c.force[3 * p->mesh->node_whole[k / dim] + k % dim];
+  HycoFEGeneralise(p->fe, force);
+  for (PetscInt k = 0; k < p->fe->n_dof; k++) p->reaction[k] -= p->fe->fixed[k] ? force[k] : 0;
+  PetscCall(PetscFree(force));
   PetscCall(HycoContactFieldsDestroy(&c));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -128,6 +131,7 @@ static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const Pets
   for (PetscInt k = 0; k < m->n_fe; k++) {
     if (p->fe_at[k] >= 0) p->u[p->fe_at[k]] = U_fe[k];
   }
+  HycoFEComplete(p->fe, p->u);
 }
 
 /* The laws from the first time to the last, and the quantities at the listed ones. */

@@ -334,6 +334,7 @@ PetscErrorCode HycoROMGetWholeU(HycoROM m, PetscInt *n_nodes, const PetscReal *U
     }
     for (PetscInt k = 0; k < m->n_fe; k++)
       m->U_whole[m->mesh->node_whole[m->fe_dof[k] / dim] * dim + m->fe_dof[k] % dim] = m->U[m->fe_dof[k]];
+    HycoFEComplete(m->fe_whole, m->U_whole);
     m->whole_current = PETSC_TRUE;
   }
   if (n_nodes) *n_nodes = m->whole->n_nodes;

@@ -5,7 +5,7 @@ import os
 import re
 import unittest
 
-from common import PELLET, SOURCE, Case
+from common import PELLET, ROPE, SOURCE, Case
 
 EXAMPLES = os.path.join(SOURCE, 'examples')
 MOST, SETS = 40, 12  # iterations of a solve, sets: at every size
@@ -64,6 +64,8 @@ class Iterative(Case):
         self.assertIn('the form projected needs -hyco_linear iterative', run.stderr)
         primal = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_solver_form', 'primal', '-hyco_linear', 'iterative')
         self.assertEqual(primal['solver'], 'active_set primal')
+        rope = self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17', '-hyco_linear', 'iterative')  # an obstacle under all of it
+        self.assertEqual(rope['solver'], 'active_set primal, multilevel start')
 
 
 if __name__ == '__main__':

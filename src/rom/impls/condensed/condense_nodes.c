@@ -147,6 +147,7 @@ static PetscErrorCode SolveOne(HycoReducer t, HycoSnapshots store, HycoFOM fom, 
 static PetscErrorCode SolveGroup(HycoReducer t, HycoSnapshots store, MPI_Comm group, PetscInt color, PetscInt groups,
                                  PetscInt n_missing, const PetscInt missing[], const Task *task)
 {
+  const PetscInt first = color * n_missing / groups, last = (color + 1) * n_missing / groups;
   HycoFOM fom;
   PetscReal *data;
   PetscErrorCode ierr = 0;
@@ -156,8 +157,12 @@ static PetscErrorCode SolveGroup(HycoReducer t, HycoSnapshots store, MPI_Comm gr
   PetscCall(PetscMalloc1(task->q ? (size_t)fom->fe->n_dof * (size_t)task->q
                                  : (size_t)Condensing(t)->condensed->field[HYCO_FIELD_G].rows,
                          &data));
-  for (PetscInt k = color * n_missing / groups; !ierr && k < (color + 1) * n_missing / groups; k++)
+  for (PetscInt k = first; !ierr && k < last; k++) {
     ierr = SolveOne(t, store, fom, missing[k], task, data);
+    if (!ierr && t->phase && t->rank == 0) /* the other groups are as far */
+      ierr = t->phase(task->q ? "responses" : "flexibilities", (k + 1 - first) * n_missing / (last - first), n_missing,
+                      t->phase_ctx);
+  }
   PetscCall(PetscFree(data));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(ierr);

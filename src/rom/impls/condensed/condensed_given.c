@@ -34,6 +34,7 @@ static PetscErrorCode ForEach(HycoCondensed c, HycoMesh mesh, Visit visit, void 
     for (PetscInt k = 0; k < 3; k++) {
       if (s->fixed[f].value[k]) PetscCall(visit(c, s->fixed[f].value[k], mesh, group, -1, ctx));
     }
+    if (s->fixed[f].normal) PetscCall(visit(c, s->fixed[f].normal, mesh, group, -1, ctx));
   }
   for (PetscInt f = 0; f < s->n_loads; f++) {
     if (mesh) PetscCall(HycoMeshFindGroup(mesh, "load", s->load[f].group, &group));

@@ -51,20 +51,16 @@ static PetscErrorCode Begin(HycoReducer t)
   const PetscBool vectors = (PetscBool)(((HycoCubatureTraining)t->training)->forces.dual != HYCO_DUAL_FE);
 
   PetscFunctionBegin;
-  HycoCheck(
-      !vectors || t->hybrid == HYCO_HYBRID_AUTO,
-      "-hyco_hybrid %s and -hyco_dual %s: with force vectors a cubature has no full-order displacement; give one of "
-      "the two",
-      HycoHybrids[t->hybrid], HycoDuals[((HycoCubatureTraining)t->training)->forces.dual]);
-  HycoCheck(t->hybrid != HYCO_HYBRID_ALL,
+  HycoCheck(vectors || t->hybrid != HYCO_HYBRID_ALL,
             "-hyco_hybrid all is for -hyco_model_type hybrid; a cubature has contact (all "
             "displacements of the contacts' nodes) or rank (one for each contact)");
   HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for scenes in the plane and in space; on a line take hybrid "
                              "or projection");
-  HycoCheck(
-      !t->scene->n_springs,
-      "-hyco_model_type cubature integrates over cells, and the scene has springs on %s; take hybrid or projection",
-      t->scene->spring[0].group);
+  for (PetscInt k = 0; k < t->scene->n_fixed; k++)
+    HycoCheck(!t->scene->fixed[k].normal,
+              "-hyco_model_type cubature takes supports along the axes, and that of %s has a direction; take hybrid or "
+              "projection",
+              t->scene->fixed[k].group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -2,7 +2,8 @@
   The cubature's full-order displacements (39)-(40), where each contact has its finite-element multiplier: so that the
   rows of B have full rank on them, all of the contacts' nodes (-hyco_hybrid contact), or one for each contact (rank):
   the component of its slave, or else of a master, that the row acts on most and no other contact has. Their equations
-  are the finite elements', so that the cells around them are once in the sum.
+  are the finite elements', so that the cells around them are once in the sum, as are those with springs and point
+  loads.
 */
 #include <hycocubature.h>
 
@@ -81,6 +82,35 @@ static PetscErrorCode ListFull(HycoReducer t, PetscInt *n, PetscInt node[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The part's cells with a node of a group. */
+static PetscErrorCode MarkGroup(HycoMesh part, const char key[], const char name[], PetscBool near[])
+{
+  PetscBool *in;
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(part, key, name, &g));
+  PetscCall(PetscCalloc1(part->n_nodes, &in));
+  for (PetscInt k = part->group_start[g]; k < part->group_start[g + 1]; k++) in[part->group_node[k]] = PETSC_TRUE;
+  for (PetscInt k = 0; k < part->n_cells * part->nv; k++) {
+    if (in[part->cells[k]]) near[k / part->nv] = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Springs and point loads belong to cells, or to their nodes, and are no integrals over the bodies. */
+static PetscErrorCode MarkSprings(HycoReducer t, PetscBool near[])
+{
+  const HycoScene s = t->scene;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_springs; k++) PetscCall(MarkGroup(t->fom->part, "spring", s->spring[k].group, near));
+  for (PetscInt k = 0; k < s->n_point_loads; k++)
+    PetscCall(MarkGroup(t->fom->part, "force", s->point_load[k].group, near));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoCubatureFindContacts(HycoReducer t)
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
@@ -92,6 +122,8 @@ PetscErrorCode HycoCubatureFindContacts(HycoReducer t)
   PetscCall(PetscFree(c->near));
   PetscCall(PetscFree(c->full));
   c->n_full = 0;
+  PetscCall(PetscCalloc1(part->n_cells, &c->near));
+  HycoOnEach(HycoComm(t), MarkSprings(t, c->near));
   if (c->forces.dual != HYCO_DUAL_FE) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoFOMSetParameters(t->fom, mu));
@@ -99,7 +131,6 @@ PetscErrorCode HycoCubatureFindContacts(HycoReducer t)
   HycoOnRoot(HycoComm(t), ListFull(t, &n, node));
   PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(t)));
   HycoBcast(node, n, MPIU_INT, HycoComm(t));
-  PetscCall(PetscCalloc1(part->n_cells, &c->near));
   for (PetscInt k = 0; k < part->n_cells * part->nv; k++) {
     PetscCall(PetscFindInt(part->node_whole ? part->node_whole[part->cells[k]] : part->cells[k], n, node, &at));
     if (at >= 0) c->near[k / part->nv] = PETSC_TRUE;

@@ -228,6 +228,7 @@ PetscErrorCode HycoGalerkinExpand(HycoROM m)
   PetscCall(PetscBLASIntCast(m->fe->n_dof, &n_dof));
   if (l) BLASgemv_("T", &l, &n_dof, &one, g->Vp, &l, m->gamma, &inc, &one, m->U, &inc);
   for (PetscInt f = 0; f < m->n_fe; f++) m->U[m->fe_dof[f]] = x[g->n_free + f];
+  HycoFEComplete(m->fe, m->U);
   PetscCall(VecRestoreArrayRead(g->x, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -337,7 +338,7 @@ PetscErrorCode HycoGalerkinEnergy(HycoROM m, PetscReal *energy, PetscBool *known
 
   PetscFunctionBegin;
   *known = PETSC_FALSE;
-  if (!g->K || g->table || m->fe->lifted) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!g->K || g->table || m->fe->lifted || m->fe->n_oblique) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(QuadraticForm(m, energy, &size));
   *known = (PetscBool)(*energy >= 1e-5 * size);
   PetscFunctionReturn(PETSC_SUCCESS);

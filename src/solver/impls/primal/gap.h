@@ -4,6 +4,9 @@
 
 #include <hycosolverimpl.h>
 
+/* More contacts than this share of the unknowns are an obstacle under a whole body. */
+#define HYCO_MANY_SHARE 0.25
+
 /* What the form keeps. */
 typedef struct {
   Mat T, Kg, Kw, H; /* H: the copy that TAO's types scale */

@@ -6,9 +6,8 @@
 #include "gap.h"
 #include <string.h>
 
-/* Contacts are many where they are more than this share of the unknowns, or so many that S would not fit. */
-#define HYCO_MANY_SHARE 0.25
-#define HYCO_MANY       6000
+/* Contacts are many where they are more than a share of the unknowns, or so many that S would not fit. */
+#define HYCO_MANY 6000
 /* A warm start that is not over by then began too far off: coarser problems give a better one. */
 #define HYCO_WARM_ITS 4
 /* Noise of iterative solves while the set changes, and in the last. */

@@ -246,7 +246,8 @@ static PetscErrorCode RunDestroy(Run *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For solves without a factor, by the active set. */
+/* For solves without a factor, by the active set; an obstacle under a whole body is left to the primal form, which
+   starts from coarser problems. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
 {
   Projected *f = (Projected *)form->data;
@@ -264,7 +265,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   if (iterative && own && aij && y->symmetric && !p) {
     PetscCall(HycoOperatorStateUpdate(&f->seen, y->B, NULL, &same));
     if (!same) PetscCall(FindNodes(y, f));
-    if (f->possible) *cost = 0.5;
+    if (f->possible) *cost = y->m > HYCO_MANY_SHARE * (PetscReal)y->n ? 2 : 0.5;
   }
   if (asked && *cost < 0)
     HycoFormat(why, "the form projected needs -hyco_linear iterative, the type active_set, a symmetric system with "

@@ -1,0 +1,152 @@
+/*
+  Supports along any direction: n.u = v at a node. Of the node's displacements the one with the largest entry of n is
+  expressed by the others,
+
+      u_c = o + sum of a_d u_d,    a_d = -n_d / n_c,  o = v / n_c,
+
+  and the unknown in its place is the offset u_c - sum of a_d u_d, which is fixed to o as the unknowns of other supports
+  are to their values. The stiffness, the loads and the contacts' rows are those of the new unknowns, T^T K T, T^T F and
+  B T; displacements are brought back by HycoFEComplete(). Several directions at a node are eliminated one by one.
+*/
+#include <hycokinematics.h>
+#include <hycovector.h>
+
+/* Of the length of n, what is left of it by other supports at the node: nothing; too little to tell two planes apart.
+ */
+#define NOTHING  1e-9
+#define PARALLEL 1e-2
+
+void HycoObliqueClear(HycoFE fe)
+{
+  fe->n_oblique = 0;
+}
+
+/* Takes from the row n.u = v what other directions at the node say already. */
+static void Substitute(HycoFE fe, PetscInt node, PetscReal n[3], PetscReal *v)
+{
+  for (PetscInt k = 0; k < fe->n_oblique; k++) {
+    const HycoOblique *o = &fe->oblique[k];
+    PetscReal share;
+
+    if (o->node != node) continue;
+    share = n[o->c];
+    n[o->c] = 0;
+    for (PetscInt d = 0; d < fe->dim; d++) n[d] += share * o->a[d];
+    *v -= share * fe->u0[node * fe->dim + o->c];
+  }
+}
+
+/* Of a row without free displacements: whether it says what is fixed already. */
+static PetscErrorCode CheckSame(HycoFE fe, PetscInt node, const PetscReal n[3], PetscReal v, PetscReal size,
+                                const char key[])
+{
+  PetscReal rest = v;
+
+  PetscFunctionBegin;
+  for (PetscInt d = 0; d < fe->dim; d++) {
+    rest -= n[d] * fe->u0[node * fe->dim + d];
+    size = PetscMax(size, PetscAbsReal(fe->u0[node * fe->dim + d]));
+  }
+  HycoCheck(PetscAbsReal(rest) <= 1e-9 * size,
+            "node %d is fixed twice along the direction of %s, to values that differ by %g",
+            (int)fe->mesh->node_id[node], key, (double)rest);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const PetscReal direction[3], PetscReal value,
+                              const char key[])
+{
+  PetscReal n[3], v = value, best = 0;
+  HycoOblique *o;
+  PetscInt c = -1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(n, direction, 3));
+  HycoNormalise(n);
+  Substitute(fe, node, n, &v);
+  for (PetscInt d = 0; d < fe->dim; d++) {
+    if (fe->fixed[node * fe->dim + d] || PetscAbsReal(n[d]) <= best * (1 + 1e-9)) continue;
+    best = PetscAbsReal(n[d]);
+    c = d;
+  }
+  if (best <= NOTHING) {
+    PetscCall(CheckSame(fe, node, n, v, PetscAbsReal(value), key));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  HycoCheck(best > PARALLEL, "%s: at node %d its direction is nearly that of other supports; give both one direction",
+            key, (int)fe->mesh->node_id[node]);
+  if (fe->n_oblique == fe->room_oblique) {
+    fe->room_oblique = 2 * fe->room_oblique + 64;
+    PetscCall(PetscRealloc((size_t)fe->room_oblique * sizeof(*fe->oblique), &fe->oblique));
+  }
+  o = &fe->oblique[fe->n_oblique];
+  *o = (HycoOblique){.node = node, .c = c, .support = support};
+  PetscCall(PetscArraycpy(o->n, direction, 3));
+  HycoNormalise(o->n);
+  for (PetscInt d = 0; d < fe->dim; d++) o->a[d] = d == c ? 0 : -n[d] / n[c];
+  fe->fixed[node * fe->dim + c] = PETSC_TRUE;
+  fe->u0[node * fe->dim + c] = v / n[c];
+  for (PetscInt k = 0; k < fe->n_oblique; k++) { /* what others say of u_c */
+    HycoOblique *other = &fe->oblique[k];
+    PetscReal share;
+
+    if (other->node != node) continue;
+    share = other->a[c];
+    other->a[c] = 0;
+    for (PetscInt d = 0; d < fe->dim; d++) other->a[d] += share * o->a[d];
+    fe->u0[node * fe->dim + other->c] += share * fe->u0[node * fe->dim + c];
+  }
+  fe->n_oblique++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoObliqueIndex(HycoFE fe)
+{
+  PetscFunctionBegin;
+  if (!fe->n_oblique) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!fe->oblique_at) PetscCall(PetscMalloc1(fe->n_dof, &fe->oblique_at));
+  for (PetscInt k = 0; k < fe->n_dof; k++) fe->oblique_at[k] = -1;
+  for (PetscInt k = 0; k < fe->n_oblique; k++) fe->oblique_at[fe->oblique[k].node * fe->dim + fe->oblique[k].c] = k;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const HycoOblique *HycoFEOblique(HycoFE fe, PetscInt dof)
+{
+  return fe->n_oblique && fe->oblique_at[dof] >= 0 ? &fe->oblique[fe->oblique_at[dof]] : NULL;
+}
+
+void HycoObliqueStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+{
+  const PetscInt *node = fe->mesh->cells + cell * fe->mesh->nv, dim = fe->dim, n = fe->mesh->nv * dim;
+
+  for (PetscInt k = 0; fe->n_oblique && k < n; k++) {
+    const HycoOblique *o = HycoFEOblique(fe, node[k / dim] * dim + k % dim);
+
+    for (PetscInt d = 0; o && d < dim; d++) {
+      const PetscInt to = k - k % dim + d;
+
+      for (PetscInt j = 0; o->a[d] != 0 && j < n; j++) Ke[to * n + j] += o->a[d] * Ke[k * n + j];
+      for (PetscInt j = 0; o->a[d] != 0 && j < n; j++) Ke[j * n + to] += o->a[d] * Ke[j * n + k];
+    }
+  }
+}
+
+void HycoFEGeneralise(HycoFE fe, PetscReal f[])
+{
+  for (PetscInt k = 0; k < fe->n_oblique; k++) {
+    const HycoOblique *o = &fe->oblique[k];
+
+    for (PetscInt d = 0; d < fe->dim; d++) f[o->node * fe->dim + d] += o->a[d] * f[o->node * fe->dim + o->c];
+  }
+}
+
+void HycoFEComplete(HycoFE fe, PetscReal u[])
+{
+  for (PetscInt k = 0; k < fe->n_oblique; k++) {
+    const HycoOblique *o = &fe->oblique[k];
+    PetscReal sum = fe->u0[o->node * fe->dim + o->c];
+
+    for (PetscInt d = 0; d < fe->dim; d++) sum += o->a[d] != 0 ? o->a[d] * u[o->node * fe->dim + d] : 0;
+    u[o->node * fe->dim + o->c] = sum;
+  }
+}
