@@ -20,6 +20,7 @@ TABLES = {
     'bases': 'Bases',
     'rids': 'RIDs',
     'parameters': 'Parameters',
+    'paths': 'Paths of bodies that flow',
     'battery': 'Random scenes',
 }
 HEAD = '''# Numerical extremes: every case

@@ -10,12 +10,14 @@ import subprocess
 import time
 import unittest
 
-from common import HYCO, MPIRUN, PATIENCE, ROPE, Case, settled
+from common import HYCO, MPIRUN, PATIENCE, ROPE, SOURCE, Case, settled
 from rows import Rows
 
 TRAIN = ['train', '-scene', ROPE, '-grid', '12,12', '-model', 'm.h5']
+PATHS = ['train', '-scene', os.path.join(SOURCE, 'examples', 'rod'), '-grid', '2,2,1', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', '1',
+         '-hyco_rid_contact_extension', '1', '-model', 'm.h5']
 CONDENSED = ['train', '-scene', ROPE, '-grid', '20,4', '-hyco_model_type', 'condensed', '-model', 'm.h5']
-KILLS = {'hybrid': 5, 'condensed': 3}
+KILLS = {'hybrid': 5, 'condensed': 3, 'hybrid with a history': 3}
 ROWS = Rows('kill')
 
 
@@ -115,6 +117,10 @@ class Kill(Case):
 
     def test_two_ranks(self):
         self.check_kills(2)
+
+    def test_paths(self):
+        """A path that was in flight is solved again, those before it are not."""
+        self.check_kills(1, 'hybrid with a history', PATHS)
 
     def test_condensed(self):
         """Flexibilities are kept like solutions: one a value of the stiffness, and one of the modes."""
