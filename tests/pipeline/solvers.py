@@ -39,6 +39,7 @@ UNFIT = [
     ('*', 'primal', QUASI, 'stands still'),
     ('*', 'primal', ['blmvm'], 'stands still'),
     ('pellet A', 'primal', ['bncg'], 'stands still'),
+    ('rope 100', 'dual', ['blmvm'], 'slow: round-off decides whether it ends in time'),
     ('rope 2000', '*', FIRST_ORDER, 'stands still'),
     ('rope 2000', 'primal', ['bntr', 'bnls', 'bntl'], 'stands still at 1e-7'),
 ]
