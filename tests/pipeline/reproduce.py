@@ -25,7 +25,7 @@ class Reproduce(Case):
             self.assertIn(word, run.stdout)
 
     def test_refusals(self):
-        for args, hyco, line in ((('rod',), HYCO, "invalid choice: 'rod'"), (('--quick',), HYCO, 'another folder with --docs'),
+        for args, hyco, line in ((('stick',), HYCO, "invalid choice: 'stick'"), (('--quick',), HYCO, 'another folder with --docs'),
                                  ((), '/nowhere/hyco', 'run scripts/build first')):
             run = reproduce(*args, hyco=hyco)
             self.assertNotEqual(run.returncode, 0)
@@ -91,6 +91,22 @@ class Reproduce(Case):
         self.assertLess(float(bounds[-1][2]), error)     # and a bound is none if the model beats it
         self.assertLess(float(fine['displacement']), 0.1 * error)
         self.assertIn('; 0 of the elements found so are outside', text)
+
+    def test_rod(self):
+        """The power ramp: the page has the runs' numbers, the study's table every ramp, with the largest hoop stress of its path."""
+        out, docs = self.path('rod'), self.path('docs')
+        run = reproduce('rod', '--quick', '--output', out, '--docs', docs)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        with open(os.path.join(docs, 'rod.md'), encoding='utf-8') as file:
+            text = file.read()
+        for name in re.findall(r'\]\((rod/[^)]+\.png)\)', text):
+            self.assertGreater(os.path.getsize(os.path.join(docs, name)), 5000, name)
+        with open(os.path.join(out, 'rod-slice-study.csv'), encoding='utf-8') as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(len(rows), 20)
+        largest = max(float(row['path_hoop']) for row in rows)
+        self.assertIn(f'{largest:.3g} |', text)
+        self.assertTrue(all(float(row['path_hoop']) > float(row['hoop']) for row in rows))
 
 
 if __name__ == '__main__':
