@@ -62,7 +62,8 @@ class Ladder(Case):
         report = self.hyco('predict', '-model', 'm.h5', '-mu', '0.07,0.17')
         self.assertIn(f'36 solutions, {trained["n_modes"]} modes, RID of {trained["rid_elements"]} elements', said)
         self.near(self.number(said, 'converged: force'), report['total_contact_force'], 1e-9)
-        self.near(self.number(said, 'estimated error of u'), report['estimated_error_u'], 0.06)  # two digits
+        # two digits; what is round-off differs with the kernels of the BLAS, which the command chooses anew on a young processor
+        self.assertAlmostEqual(self.number(said, 'estimated error of u'), report['estimated_error_u'], delta=1e-12 + 0.06 * report['estimated_error_u'])
 
     def test_batch(self):
         model = os.path.join(SOURCE, 'tests', 'data', 'rope-hybrid-4.h5')
