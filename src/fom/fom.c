@@ -204,6 +204,27 @@ static PetscErrorCode CreateScatters(HycoFOM f)
 }
 
 /* B and Bt with the pattern that any parameter gives: all components of a contact's nodes. */
+static PetscInt GlobalNode(HycoFOM f, PetscInt node)
+{
+  return f->surface->node_global ? f->surface->node_global[node] : node;
+}
+
+/* Composes B with its rows' slaves, which the contacts keep. Collective. */
+static PetscErrorCode TellSlaves(HycoFOM f)
+{
+  Vec slaves;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateVecs(f->B, NULL, &slaves));
+  for (PetscInt k = 0; f->rank == 0 && k < f->pairs.n; k++)
+    PetscCall(VecSetValue(slaves, k, GlobalNode(f, HycoPairsSlave(&f->pairs, k)) * f->part->dim, INSERT_VALUES));
+  PetscCall(VecAssemblyBegin(slaves));
+  PetscCall(VecAssemblyEnd(slaves));
+  PetscCall(PetscObjectCompose((PetscObject)f->B, HYCO_SLAVES, (PetscObject)slaves));
+  PetscCall(VecDestroy(&slaves));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode CreateB(HycoFOM f)
 {
   const PetscInt dim = f->part->dim, entries = f->width * dim;
@@ -215,6 +236,7 @@ static PetscErrorCode CreateB(HycoFOM f)
   PetscCall(MatSeqAIJSetPreallocation(f->B, entries, NULL));
   PetscCall(MatMPIAIJSetPreallocation(f->B, entries, NULL, entries, NULL));
   PetscCall(MatSetOption(f->B, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_FALSE));
+  PetscCall(TellSlaves(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -344,13 +366,8 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscInt GlobalNode(HycoFOM f, PetscInt node)
-{
-  return f->surface->node_global ? f->surface->node_global[node] : node;
-}
-
-/* B, its slaves (if what they depend on changed) and D, from rank 0. */
-static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed, Vec slaves)
+/* B (if what it depends on changed) and D, from rank 0. */
+static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
 {
   PetscErrorCode ierr;
   const PetscInt m = f->pairs.n, dim = f->part->dim, entries = f->width * dim * m;
@@ -363,7 +380,6 @@ static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed, Vec slaves)
   if (!ierr) ierr = HycoContactCountStill(f->fe_surface, &f->pairs, start, &f->summary.n_still);
   for (PetscInt k = 0; !ierr && k < m; k++) {
     PetscCall(VecSetValue(f->D, k, f->gap[k], INSERT_VALUES));
-    PetscCall(VecSetValue(slaves, k, GlobalNode(f, HycoPairsSlave(&f->pairs, k)) * dim, INSERT_VALUES));
     for (PetscInt j = start[k]; rows_changed && j < start[k + 1]; j++)
       PetscCall(MatSetValue(f->B, k, GlobalNode(f, dof[j] / dim) * dim + dof[j] % dim, value[j], INSERT_VALUES));
   }
@@ -374,8 +390,6 @@ static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed, Vec slaves)
 
 static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 {
-  Vec slaves;
-
   PetscFunctionBegin;
   if (!f->n_contacts) { /* perhaps obstacles whose nodes are all fixed */
     HycoOnRoot(HycoComm(f), HycoContactCountStill(f->fe_surface, &f->pairs, NULL, &f->summary.n_still));
@@ -386,14 +400,9 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
     PetscCall(CreateB(f));
   } else if (rows_changed && f->Bt)
     PetscCall(MatZeroEntries(f->B));
-  PetscCall(VecDuplicate(f->D, &slaves));
-  HycoOnRoot(HycoComm(f), FillContact(f, rows_changed, slaves));
+  HycoOnRoot(HycoComm(f), FillContact(f, rows_changed));
   PetscCall(VecAssemblyBegin(f->D));
   PetscCall(VecAssemblyEnd(f->D));
-  PetscCall(VecAssemblyBegin(slaves));
-  PetscCall(VecAssemblyEnd(slaves));
-  PetscCall(PetscObjectCompose((PetscObject)f->B, HYCO_SLAVES, (PetscObject)slaves));
-  PetscCall(VecDestroy(&slaves));
   if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatAssemblyBegin(f->B, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(f->B, MAT_FINAL_ASSEMBLY));
