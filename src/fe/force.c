@@ -73,21 +73,14 @@ PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal value[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddBodyForces(HycoFE fe, PetscInt cell, Into F)
+/* A cell's forces on its unknowns. */
+static PetscErrorCode AddCell(HycoFE fe, PetscInt cell, const PetscReal f[], Into F)
 {
   HycoMesh m = fe->mesh;
-  HycoAcceleration motion;
 
   PetscFunctionBegin;
-  if (!HasBodyForce(fe, cell)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoAccelerationSet(fe, &fe->scene->body[m->cell_body[cell]], &motion));
-  for (PetscInt q = 0; q < HycoElementGet(m->type)->nq; q++) {
-    PetscReal f[HYCO_MAX_CELL_DOFS] = {0};
-
-    PetscCall(AddPointForce(fe, cell, q, &motion, f));
-    for (PetscInt k = 0; k < m->nv * m->dim; k++)
-      PetscCall(AddNode(fe, m->cells[cell * m->nv + k / m->dim], k % m->dim, f[k], F));
-  }
+  for (PetscInt k = 0; k < m->nv * m->dim; k++)
+    PetscCall(AddNode(fe, m->cells[cell * m->nv + k / m->dim], k % m->dim, f[k], F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,16 +226,22 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the thermal strains of a cell push: the sum of w B^T C eps. */
-static PetscErrorCode AddHeat(HycoFE fe, PetscInt cell, Into F)
+/* Body forces and what thermal strains push, of a cell. */
+static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
 {
-  HycoMesh m = fe->mesh;
-  PetscReal f[HYCO_MAX_CELL_DOFS] = {0};
+  const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
+  const PetscBool hot = (PetscBool)(fe->thermal && !fe->scene->n_times && body->expansion);
+  PetscReal f[HYCO_MAX_CELL_DOFS] = {0}, push[HYCO_MAX_CELL_DOFS] = {0};
 
   PetscFunctionBegin;
-  PetscCall(HycoCellHeat(fe, cell, f));
-  for (PetscInt k = 0; k < m->nv * m->dim; k++)
-    PetscCall(AddNode(fe, m->cells[cell * m->nv + k / m->dim], k % m->dim, f[k], F));
+  if (HasBodyForce(fe, cell)) {
+    PetscCall(HycoFEBodyForce(fe, cell, f));
+    PetscCall(AddCell(fe, cell, f, F));
+  }
+  if (hot) {
+    PetscCall(HycoCellHeat(fe, cell, push));
+    PetscCall(AddCell(fe, cell, push, F));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -302,15 +301,11 @@ static PetscErrorCode AddPointLoad(HycoFE fe, const HycoPointLoad *load, Into F)
 static PetscErrorCode AddForces(HycoFE fe, Into F)
 {
   HycoMesh m = fe->mesh;
-  const PetscBool hot = (PetscBool)(fe->thermal && !fe->scene->n_times);
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
-    const HycoBody *body = &fe->scene->body[m->cell_body[e]];
-
-    PetscCall(AddBodyForces(fe, e, F));
+    PetscCall(AddVolume(fe, e, F));
     if (fe->lifted && F.vec) PetscCall(AddLifting(fe, e, F));
-    if (hot && body->expansion) PetscCall(AddHeat(fe, e, F));
   }
   for (PetscInt k = 0; k < fe->scene->n_loads; k++) {
     const HycoLoad *load = &fe->scene->load[k];
