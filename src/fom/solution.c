@@ -278,6 +278,19 @@ PetscErrorCode HycoFOMGetRows(HycoFOM f, const HycoFileOrder **rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFOMFromRows(HycoFOM f, PetscInt components, const PetscReal rows[], PetscReal value[])
+{
+  const HycoFileOrder *order;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(f, &order));
+  if (order)
+    PetscCall(HycoFileOrderFetch(order, f->part, HYCO_ON_NODES, components, rows, value));
+  else
+    PetscCall(PetscArraycpy(value, rows, f->part->n_nodes * components));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMToRows(HycoFOM f, HycoPlace place, MPI_Datatype type, PetscInt components, const void *value,
                              void *rows)
 {

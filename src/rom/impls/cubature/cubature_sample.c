@@ -32,21 +32,14 @@ static PetscErrorCode FetchModes(Sampler *s)
 {
   HycoReducer t = s->t;
   const PetscInt n_dof = s->fe->n_dof, l = t->l;
-  const HycoFileOrder *order;
   const PetscScalar *v;
   PetscInt lda;
 
   PetscFunctionBegin;
-  PetscCall(HycoFOMGetRows(t->fom, &order));
   PetscCall(MatDenseGetLDA(t->V, &lda));
   PetscCall(MatDenseGetArrayRead(t->V, &v));
   for (PetscInt j = 0; j < l; j++) {
-    const PetscScalar *column = v + (size_t)j * (size_t)lda;
-
-    if (order)
-      PetscCall(HycoFileOrderFetch(order, t->fom->part, HYCO_ON_NODES, s->fe->dim, column, s->u));
-    else
-      PetscCall(PetscArraycpy(s->u, column, n_dof));
+    PetscCall(HycoFOMFromRows(t->fom, s->fe->dim, v + (size_t)j * (size_t)lda, s->u));
     for (PetscInt i = 0; i < n_dof; i++) s->V[(size_t)i * (size_t)l + (size_t)j] = s->u[i];
   }
   PetscCall(MatDenseRestoreArrayRead(t->V, &v));
