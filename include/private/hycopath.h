@@ -14,6 +14,7 @@ typedef struct _n_HycoSeries *HycoSeries;
 /* What one iteration of a step solves with: the consistent tangent; the elastic stiffness, whose factor stays; a
    tangent that stays as long as the iterations contract. */
 typedef enum { HYCO_NEWTON_AUTO, HYCO_NEWTON_TANGENT, HYCO_NEWTON_ELASTIC, HYCO_NEWTON_MODIFIED } HycoNewton;
+extern const char *const HycoNewtons[]; /* NULL ends */
 
 #define HYCO_ANDERSON 5 /* depth of the acceleration */
 

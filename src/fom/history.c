@@ -9,7 +9,7 @@
 
 #define GROWTH 1.5
 
-static const char *const newton_names[] = {"auto", "tangent", "elastic", "modified", NULL}; /* by HycoNewton */
+const char *const HycoNewtons[] = {"auto", "tangent", "elastic", "modified", NULL};
 
 PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path)
 {
@@ -80,7 +80,7 @@ PetscErrorCode HycoPathSetFromOptions(HycoPath p, HycoOptionItems PetscOptionsOb
   PetscCall(HycoOptionsWord("-hyco_newton",
                             "history: iterate with the tangent, with the elastic stiffness, whose factor is kept, or "
                             "with a tangent that is kept while that is faster (auto: what takes less time by counts)",
-                            newton_names, &p->method, NULL));
+                            HycoNewtons, &p->method, NULL));
   PetscCall(HycoOptionsReal("-hyco_newton_rtol",
                             "history: residual of equilibrium, relative to the largest of the forces", 1e-14, 1e-2,
                             &p->rtol, NULL));
@@ -308,7 +308,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->ended = p->ended;
   h->t = p->t;
   h->why = p->why;
-  h->newton = newton_names[HycoPathMethod(p)];
+  h->newton = HycoNewtons[HycoPathMethod(p)];
   h->factor_cost = HycoPathFactorCost(p);
   h->n_orders = p->n_orders;
   h->n_taken = p->n_taken;

@@ -336,12 +336,13 @@ static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAtte
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Iterations of a step before it is cut, by HycoNewton; with half of them a step was easy. */
+static const PetscInt usual_its[] = {0, 15, 60, 30};
+
 static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton method, HycoStepAttempt *a)
 {
-  static const char *const name[] = {"", "tangent", "elastic", "modified"};
-  static const PetscInt usual[] = {0, 15, 60, 30};
   const PetscBool tangent = (PetscBool)(method == HYCO_NEWTON_TANGENT);
-  const PetscInt most = p->max_its ? p->max_its : usual[method];
+  const PetscInt most = p->max_its ? p->max_its : usual_its[method];
   Progress now = {.residual = {0, 0, 0}};
   PetscReal least = PETSC_MAX_REAL, worst = 0;
 
@@ -364,7 +365,7 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
     if (k) least = PetscMin(least, now.residual[2] / (now.size > 0 ? now.size : 1));
     if (k == most || !(now.residual[2] <= 1e4 * PetscMax(now.size, now.floor))) {
       HycoFormat(a->why, "the residual of equilibrium is %.1e after %d iterations (%s)", (double)least, (int)k,
-                 name[method]);
+                 HycoNewtons[method]);
       break;
     }
     if (method == HYCO_NEWTON_MODIFIED && k) fresh = Stalls(p, &now);
@@ -416,7 +417,6 @@ HycoNewton HycoPathMethod(HycoPath p)
 
 PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a)
 {
-  static const PetscInt easy[] = {0, 7, 30, 15}; /* iterations, by method */
   HycoNewton method;
 
   PetscFunctionBegin;
@@ -436,7 +436,7 @@ PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepA
     PetscCall(HycoPathRestore(p));
     PetscCall(Iterate(p, t0, t1, HYCO_NEWTON_TANGENT, a));
   }
-  a->easy = (PetscBool)(a->iterations <= easy[method]);
+  a->easy = (PetscBool)(a->iterations <= usual_its[method] / 2);
   if (!a->converged) PetscCall(HycoPathRestore(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
