@@ -161,8 +161,6 @@ struct _p_HycoScene {
 PetscErrorCode HycoSceneReadConstants(HycoScene scene);
 /* The expression of an entry, with the scene's constants put in. */
 PetscErrorCode HycoSceneExpression(HycoScene scene, const char key[], const char text[], HycoExpr *expr);
-/* Fails where a support along a direction has none, or one that changes. */
-PetscErrorCode HycoSceneCheckSupports(HycoScene scene);
 /* Reads an entry of gravity or rotation; checks them. */
 PetscErrorCode HycoSceneReadMotion(HycoScene scene, PetscInt entry);
 PetscErrorCode HycoSceneCheckMotion(HycoScene scene);

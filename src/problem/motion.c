@@ -82,33 +82,3 @@ PetscErrorCode HycoSceneDestroyMotion(HycoScene s)
   for (PetscInt k = 0; k < N_EXPR; k++) PetscCall(HycoExprDestroy(At(s, k)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-PetscErrorCode HycoSceneCheckSupports(HycoScene s)
-{
-  PetscBool every[HYCO_MAX_PARAMETERS];
-
-  PetscFunctionBegin;
-  for (PetscInt p = 0; p < HYCO_MAX_PARAMETERS; p++) every[p] = PETSC_TRUE;
-  for (PetscInt k = 0; k < s->n_fixed; k++) {
-    const HycoFixed *fixed = &s->fixed[k];
-    HycoExpr given = NULL;
-
-    for (PetscInt c = 0; c < 3; c++) {
-      if (fixed->direction[c]) given = fixed->direction[c];
-      HycoCheck(!HycoExprChanges(fixed->direction[c], every),
-                "%s changes with a parameter; a support keeps its direction", HycoExprKey(fixed->direction[c]));
-    }
-    HycoCheck(given || !fixed->normal,
-              "%s has no direction; write fixed: %s: {normal: ..., direction: {x: ..., y: ..., z: ...}}",
-              HycoExprKey(fixed->normal), fixed->group);
-    HycoCheck(fixed->normal || !given,
-              "%s is the direction of no support; write fixed: %s: {normal: 0, direction: ...}", HycoExprKey(given),
-              fixed->group);
-    HycoCheck(
-        !fixed->normal || !s->n_times,
-        "%s: supports along a direction are for scenes without a history; a stiff spring along the normal does for "
-        "a plane",
-        HycoExprKey(fixed->normal));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

@@ -555,6 +555,37 @@ static PetscErrorCode CheckHeat(HycoBody *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A direction for each displacement along one, the same at all parameter values; none over time. */
+static PetscErrorCode CheckSupports(HycoScene s)
+{
+  PetscBool every[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < HYCO_MAX_PARAMETERS; p++) every[p] = PETSC_TRUE;
+  for (PetscInt k = 0; k < s->n_fixed; k++) {
+    const HycoFixed *fixed = &s->fixed[k];
+    HycoExpr given = NULL;
+
+    for (PetscInt c = 0; c < 3; c++) {
+      if (fixed->direction[c]) given = fixed->direction[c];
+      HycoCheck(!HycoExprChanges(fixed->direction[c], every),
+                "%s changes with a parameter; a support keeps its direction", HycoExprKey(fixed->direction[c]));
+    }
+    HycoCheck(given || !fixed->normal,
+              "%s has no direction; write fixed: %s: {normal: ..., direction: {x: ..., y: ..., z: ...}}",
+              HycoExprKey(fixed->normal), fixed->group);
+    HycoCheck(fixed->normal || !given,
+              "%s is the direction of no support; write fixed: %s: {normal: 0, direction: ...}", HycoExprKey(given),
+              fixed->group);
+    HycoCheck(
+        !fixed->normal || !s->n_times,
+        "%s: supports along a direction are for scenes without a history; a stiff spring along the normal does for "
+        "a plane",
+        HycoExprKey(fixed->normal));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A description that cannot be solved is refused here, before any mesh is read. */
 static PetscErrorCode CheckScene(HycoScene s)
 {
@@ -569,7 +600,7 @@ static PetscErrorCode CheckScene(HycoScene s)
     PetscCall(CheckHeat(&s->body[k]));
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactComplete(s->contact[k]));
-  PetscCall(HycoSceneCheckSupports(s));
+  PetscCall(CheckSupports(s));
   PetscCall(HycoSceneCheckMotion(s));
   PetscCall(HycoSceneCheckHistory(s));
   PetscCall(HycoSceneCheckQuantities(s));
