@@ -177,6 +177,8 @@ PetscErrorCode HycoSceneReadHistory(HycoScene scene);
 /* Fails where the history reaches what must not change in time: the bodies' places, the rows of B. */
 PetscErrorCode HycoSceneCheckHistory(HycoScene scene);
 PetscErrorCode HycoSceneDestroyHistory(HycoScene scene);
+/* "gap = 0.05, q2 = 40" */
+void HycoSceneNamePoint(HycoScene scene, const PetscReal mu[], char at[HYCO_LINE]);
 /* The variables at time t: the parameters mu (n_parameters), t, the tables' values; out has room for n_variables. */
 void HycoSceneSetTime(HycoScene scene, const PetscReal mu[], PetscReal t, PetscReal out[]);
 /* The first time after t at which a step ends: a listed one, or a row of a table. */

@@ -373,12 +373,16 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
 /* A model that misses its own training solutions by half is refused. */
 static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
 {
+  char worst[HYCO_LINE] = "";
+
   PetscFunctionBegin;
+  if (!(m->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(m->numbers[1] < 0.5,
                  "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
-                 "condition %.0e): enlarge the RID (-hyco_rid_layers 1, "
-                 "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)",
-                 100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0]);
+                 "condition %.0e)%s: enlarge the RID (-hyco_rid_layers 1, "
+                 "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)%s",
+                 100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0], worst,
+                 m->scene->n_times ? ", or -hyco_model_type cubature" : "");
   PetscCall(CheckForces(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -104,7 +104,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
   }
   PetscCall(MatDestroy(&t->S));
   HycoFreeAll(&t->U_rid, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds,
-              &t->taken_start, &t->taken);
+              &t->taken_start, &t->taken, &t->judged);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
