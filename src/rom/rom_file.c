@@ -553,6 +553,7 @@ PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model)
 PetscErrorCode HycoROMFreeWhole(HycoROM m)
 {
   PetscFunctionBegin;
+  PetscCall(HycoBalanceDestroy(&m->balance));
   PetscCall(HycoFEDestroy(&m->fe_whole));
   PetscCall(HycoPairsDestroy(&m->whole_pairs));
   PetscCall(PetscFree(m->U_whole));
