@@ -36,6 +36,7 @@ def cubature(tolerance, *contact):
 
 
 RANK, VECTORS = ("hybrid", "rank"), ("dual", "nnmf")
+TRAINING = {name: ["-scatter", "12"] for name in ("", "searched")}
 SEARCHED = Setting("hybrid", "searched")  # no option: the recipe that train finds
 BASELINES = [Setting("projection", "", TIGHT), *(cubature(tol, *contact) for contact in ([], [RANK], [VECTORS]) for tol in ("1e-4", "1e-6"))]
 
@@ -44,7 +45,7 @@ BASELINES = [Setting("projection", "", TIGHT), *(cubature(tol, *contact) for con
 class Case:
     name: str
     scene: list
-    grid: str
+    training: dict    # by a setting's training: arguments of its points
     unseen: list      # paths by NAMES
     batch: list       # what is timed: arguments of a set, and of one of its points
     settings: list
@@ -59,15 +60,15 @@ BATCH = [["-values_gap", "0.041,0.053", "-values_q2", "38.5,44", "-values_creep"
 
 def case_of(mesh):
     if mesh == "slice":
-        return Case("rod, a slice", ["-scene", "examples/rod"], "5,2,2", SLICE, BATCH,
-                    [SEARCHED, Setting("hybrid", "", (("pod_tol", "1e-9"), *LAYER)), Setting("hybrid", "", (*TIGHT, *LAYER)), *BASELINES,
+        return Case("rod, a slice", ["-scene", "examples/rod"], TRAINING | {"grid 5,2,2": ["-grid", "5,2,2"]}, SLICE, BATCH,
+                    [SEARCHED, Setting("hybrid", "grid 5,2,2", (*TIGHT, *LAYER)), Setting("hybrid", "", (("pod_tol", "1e-9"), *LAYER)), Setting("hybrid", "", (*TIGHT, *LAYER)), *BASELINES,
                      Setting("regression", "", (*TIGHT, ("rid_layers", 1)))], SLICE[::7])
     scene = ["-scene", "examples/rod/3d.yaml", "-scene_mesh", f"examples/pellet/{mesh}.msh"]
     planes = [Setting("hybrid", "", (("pod_tol", tol), *PLANE)) for tol in ("1e-8", "1e-10", "1e-12")]
     if mesh == "C":  # half an hour for the references, ten minutes for each setting
-        return Case("rod, mesh C", scene, "3,2,2", SOLID, BATCH, [*planes, cubature("1e-4", RANK)], SOLID[1:2])
-    return Case(f"rod, mesh {mesh}", scene, "3,2,2", SOLID, BATCH,
-                [SEARCHED, *planes, Setting("hybrid", "", (*TIGHT, *PLANE, ("rid_layers", 1))), *BASELINES[:4], BASELINES[5],
+        return Case("rod, mesh C", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2"]}, SOLID, BATCH, [*planes, cubature("1e-4", RANK)], SOLID[1:2])
+    return Case(f"rod, mesh {mesh}", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2"]}, SOLID, BATCH,
+                [SEARCHED, *planes, Setting("hybrid", "grid 3,2,2", (*TIGHT, *PLANE)), Setting("hybrid", "", (*TIGHT, *PLANE, ("rid_layers", 1))), *BASELINES[:4], BASELINES[5],
                  Setting("regression", "", (*TIGHT, *PLANE))], SOLID[:3])
 
 
@@ -99,7 +100,7 @@ class Bench:
         row = {"type": setting.type, "label": setting.label, "status": "ok"}
         try:
             known = [] if setting == SEARCHED else ["-hyco_search", "false", "-validation_points", self.points]
-            cpu, trained = self.hyco("train", *self.case.scene, "-model", model, "-grid", self.case.grid, "-hyco_snapshots", self.snapshots,
+            cpu, trained = self.hyco("train", *self.case.scene, "-model", model, *self.case.training[setting.training], "-hyco_snapshots", self.snapshots,
                                      *setting.arguments(), *known, ends=(0, 3))
             held = trained["held_out"] if known else self.compare(model)
             one, _ = self.hyco("predict", "-model", model, *self.case.batch[1])
@@ -136,7 +137,7 @@ def measure(mesh, snapshots, timeout, quick=False):
     """Rows of the settings, then those of full order."""
     case = case_of(mesh)
     if quick:
-        case.settings, case.unseen, case.references = case.settings[2:3], case.unseen[:1], case.references[:1]
+        case.settings, case.unseen, case.references = case.settings[3:4], case.unseen[:1], case.references[:1]
     bench = Bench(case, snapshots, timeout)
     rows = []
     for k, setting in enumerate(bench.case.settings, 1):
@@ -145,7 +146,7 @@ def measure(mesh, snapshots, timeout, quick=False):
         print(f"{k}/{len(bench.case.settings)} {row['label']}: {row['status']}" +
               (f", {seconds(row['path_s'])}, " + ", ".join(f"{kind} {percent(row[kind + '_max'])} %" for kind in KINDS if kind + "_max" in row)
                if row["status"] == "ok" else ""), flush=True)
-    words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core. Trained on a grid of {bench.case.grid}; {len(bench.case.unseen)} "
+    words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core. Trained on 12 scattered paths (`-scatter 12`) where no grid is named; {len(bench.case.unseen)} "
              "paths that no training has seen.")
     for newton, name in (("tangent", "full order, Newton"), ("elastic", "full order, the elastic factor kept")):
         rows.append({"id": 0, "type": "full", "label": name, "status": words, "path_s": bench.full_order(newton)})
