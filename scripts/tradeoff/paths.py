@@ -133,12 +133,14 @@ class Bench:
         return found | {"bounded": sum(r >= 1 for r in ratios) / len(ratios), "ratio": statistics.median(ratios)}
 
 
-def measure(mesh, snapshots, timeout, quick=False):
+def measure(mesh, arguments):
     """Rows of the settings, then those of full order."""
     case = case_of(mesh)
-    if quick:
+    if arguments.settings:
+        case.settings = [case.settings[int(k) - 1] for k in arguments.settings.split(",")]
+    if arguments.quick:
         case.settings, case.unseen, case.references = case.settings[3:4], case.unseen[:1], case.references[:1]
-    bench = Bench(case, snapshots, timeout)
+    bench = Bench(case, arguments.snapshots, arguments.timeout)
     rows = []
     for k, setting in enumerate(bench.case.settings, 1):
         row = bench.setting(setting, os.path.join(timed.folder, "model.h5")) | {"id": k}
@@ -147,10 +149,11 @@ def measure(mesh, snapshots, timeout, quick=False):
               (f", {seconds(row['path_s'])}, " + ", ".join(f"{kind} {percent(row[kind + '_max'])} %" for kind in KINDS if kind + "_max" in row)
                if row["status"] == "ok" else ""), flush=True)
     words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core. Trained on 12 scattered paths (`-scatter 12`) where no grid is named; {len(bench.case.unseen)} "
-             "paths that no training has seen.")
-    for newton, name in (("tangent", "full order, Newton"), ("elastic", "full order, the elastic factor kept")):
-        rows.append({"id": 0, "type": "full", "label": name, "status": words, "path_s": bench.full_order(newton)})
-        print(f"{name}: {seconds(rows[-1]['path_s'])}", flush=True)
+             "paths that no training has seen." + (" Full order's seconds are those of `scripts/bench history`." if arguments.full_order else ""))
+    known = map(float, arguments.full_order.split(",")) if arguments.full_order else map(bench.full_order, ("tangent", "elastic"))
+    for name, cpu in zip(("full order, Newton", "full order, the elastic factor kept"), known):
+        rows.append({"id": 0, "type": "full", "label": name, "status": words, "path_s": cpu})
+        print(f"{name}: {seconds(cpu)}", flush=True)
     return rows
 
 
