@@ -127,12 +127,15 @@ typedef struct {
   PetscReal *t, *value;
 } HycoTimeTable;
 
+/* What fields are measured in. */
+enum { HYCO_UNIT_LENGTH, HYCO_UNIT_FORCE, HYCO_UNIT_STRESS, HYCO_N_UNITS };
+
 struct _p_HycoScene {
   PETSCHEADER(int);
-  PetscOptions options; /* every entry, the command line's already in */
-  char *title, *mesh_path;
-  DM dm;           /* the program's own mesh; NULL: mesh_path */
-  PetscInt refine; /* times that the mesh's cells are halved */
+  PetscOptions options;                         /* every entry, the command line's already in */
+  char *title, *mesh_path, *unit[HYCO_N_UNITS]; /* units: notes, "" where the scene has none */
+  DM dm;                                        /* the program's own mesh; NULL: mesh_path */
+  PetscInt refine;                              /* times that the mesh's cells are halved */
   HycoFormulation formulation;
   char *folder; /* where relative paths of entries start */
   /* parameters */
