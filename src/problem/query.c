@@ -34,6 +34,16 @@ HycoDefineMethod(HycoSceneHasContact, (HycoScene scene, PetscBool *contact), sce
 HycoDefineMethod(HycoSceneGetOptions, (HycoScene scene, PetscOptions *options), scene, HYCO_SCENE_CLASSID,
                  *options = scene->options)
 
+void HycoSceneNamePoint(HycoScene s, const PetscReal mu[], char at[HYCO_LINE])
+{
+  at[0] = '\0';
+  for (PetscInt p = 0; p < s->n_parameters; p++) {
+    const size_t length = strlen(at);
+
+    snprintf(at + length, HYCO_LINE - length, "%s%s = %.10g", p ? ", " : "", s->parameter[p], (double)mu[p]);
+  }
+}
+
 PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const PetscReal mu[])
 {
   PetscFunctionBegin;

@@ -15,6 +15,7 @@ static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const fixed_fields[] = {"x", "y", "z", "normal", "direction_x", "direction_y", "direction_z", NULL};
 static const char *const spring_fields[] = {"x", "y", "z", "normal", NULL};
 static const char *const contact_fields[] = {"type", NULL};
+static const char *const tie_fields[] = {"slave", "master", "tolerance", NULL};
 static const char *const output_fields[] = {"max", "min", "mean", "reaction", "group", NULL};
 static const char *const scene_fields[] = {"title",       "mesh",       "parameters",  "refine", "formulation",
                                            "unit_length", "unit_force", "unit_stress", NULL};
@@ -489,6 +490,9 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
     PetscCall(ReadGroups(s, entry, name, field));
   } else if (strncasecmp(key, "gravity_", 8) == 0 || strncasecmp(key, "rotation_", 9) == 0) {
     PetscCall(HycoSceneReadMotion(s, entry));
+  } else if (strncasecmp(key, "tie_", 4) == 0) {
+    if (!SplitKey(rest, tie_fields, name, &field)) PetscCall(UnknownKey(key, "a tie", NULL, tie_fields));
+    PetscCall(HycoSceneReadTie(s, entry, name, field));
   } else if (strncasecmp(key, "output_", 7) == 0) {
     if (!SplitKey(rest, output_fields, name, &field)) PetscCall(UnknownKey(key, "an output", NULL, output_fields));
     PetscCall(HycoSceneReadQuantity(s, entry, name, field));
@@ -605,6 +609,7 @@ static PetscErrorCode CheckScene(HycoScene s)
   PetscCall(HycoSceneCheckMotion(s));
   PetscCall(HycoSceneCheckHistory(s));
   PetscCall(HycoSceneCheckQuantities(s));
+  PetscCall(HycoSceneCheckTies(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -874,6 +879,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   }
   for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PetscFree(s->parameter[p]));
   PetscCall(HycoSceneDestroyHistory(s));
+  PetscCall(HycoSceneDestroyTies(s));
   HycoFreeAll(&s->key, &s->value, &s->constant, &s->quantity, &s->body, &s->fixed, &s->load, &s->point_load, &s->spring,
               &s->contact, &s->title, &s->mesh_path, &s->folder, &s->unit[0], &s->unit[1], &s->unit[2]);
   PetscCall(DMDestroy(&s->dm));
