@@ -208,6 +208,7 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     v[SECONDS] = s.seconds.total;
     PetscCall(PetscArraycpy(v + N_COLUMNS, s.quantity, width - N_COLUMNS));
     if (output[0]) PetscCall(HycoFOMWriteAdd(fom));
+    PetscCall(DriverSetPhase(k + 1, n));
   }
   if (output[0]) PetscCall(HycoFOMWriteEnd(fom));
   PetscCall(ReportSet("solve", table, scene, samples, width, names, value, HycoNow() - begin));
