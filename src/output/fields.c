@@ -8,8 +8,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
-                                                        "Hexahedron"};
+static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline",        "Triangle",       "Quadrilateral",
+                                                        "Tetrahedron",     "Hexahedron",     "Triangle_6",
+                                                        "Quadrilateral_8", "Quadrilateral_9"};
 
 const char *HycoFieldsTopology(HycoCellType type)
 {
