@@ -9,8 +9,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
-                                                        "Hexahedron"};
+static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline",        "Triangle",       "Quadrilateral",
+                                                        "Tetrahedron",     "Hexahedron",     "Triangle_6",
+                                                        "Quadrilateral_8", "Quadrilateral_9"};
 
 /* The length of the ending .vtkhdf or .xdmf of a path; 0: it has neither. */
 static size_t Ending(const char path[])

@@ -6,8 +6,8 @@
 
 #define ROOT "VTKHDF/"
 
-/* VTK's numbers of line2, tri3, quad4, tet4, hex8. */
-static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12};
+/* VTK's numbers of line2, tri3, quad4, tet4, hex8, tri6, quad8, quad9. */
+static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12, 22, 23, 28};
 
 /* A set of one dimension of n integers, value, value + step, ... On one process. */
 static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, PetscInt value, PetscInt step)
