@@ -112,7 +112,7 @@ static PetscErrorCode TestPatch(const Patch *p, HycoFE fe)
 /* Shape functions: a partition of unity, and weights that sum to the reference cell's size. */
 static void TestShapes(HycoCellType type)
 {
-  const double size[HYCO_N_CELL_TYPES] = {2, 0.5, 4, 1.0 / 6, 8};
+  const double size[HYCO_N_CELL_TYPES] = {2, 0.5, 4, 1.0 / 6, 8, 0.5, 4, 4};
   const HycoElement *el = HycoElementGet(type);
   double weight = 0;
 

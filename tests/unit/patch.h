@@ -10,7 +10,7 @@ typedef struct {
   const char *name;
   int dim, nv, nf, gmsh_cell, gmsh_facet, n_nodes, n_cells, n_facets, first_inner; /* inner nodes: the last ones */
   double xyz[16][3];
-  int cell[12][8], facet[12][4];
+  int cell[12][9], facet[12][4];
   double volume; /* of the whole patch: 1 */
 } Patch;
 
@@ -18,6 +18,13 @@ typedef struct {
   {0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1},                                         \
   {                                                                                                                    \
     0, 1, 1                                                                                                            \
+  }
+
+/* The unit square in two quadrilaterals, nodes at the middles of their sides, the last one between them. */
+#define PATCH_PAIR                                                                                                     \
+  {0, 0}, {0.4, 0}, {1, 0}, {1, 1}, {0.6, 1}, {0, 1}, {0.2, 0}, {0.7, 0}, {1, 0.5}, {0.8, 1}, {0.3, 1}, {0, 0.5},      \
+  {                                                                                                                    \
+    0.5, 0.5                                                                                                           \
   }
 
 /* Inner nodes: MacNeal, Harder, Finite Elem. Anal. Des. 1 (1985) 3-20, for hex8; otherwise off the centre. Facets are
@@ -115,6 +122,48 @@ static const Patch patches[HYCO_N_CELL_TYPES] = {
       {3, 0, 8, 11, 7, 4, 12, 15},
       {8, 9, 10, 11, 12, 13, 14, 15}},
      {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}},
+     1},
+    {"tri6",
+     2,
+     6,
+     3,
+     9,
+     8,
+     9,
+     2,
+     4,
+     8,
+     {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0.5, 0}, {1, 0.5}, {0.5, 1}, {0, 0.5}, {0.5, 0.5}},
+     {{0, 1, 2, 4, 5, 8}, {0, 2, 3, 8, 6, 7}},
+     {{0, 1, 4}, {2, 1, 5}, {2, 3, 6}, {0, 3, 7}},
+     1},
+    {"quad8",
+     2,
+     8,
+     3,
+     16,
+     8,
+     13,
+     2,
+     6,
+     12,
+     {PATCH_PAIR},
+     {{0, 1, 4, 5, 6, 12, 10, 11}, {1, 2, 3, 4, 7, 8, 9, 12}},
+     {{0, 1, 6}, {1, 2, 7}, {3, 2, 8}, {3, 4, 9}, {4, 5, 10}, {0, 5, 11}},
+     1},
+    {"quad9",
+     2,
+     9,
+     3,
+     10,
+     8,
+     15,
+     2,
+     6,
+     12,
+     {PATCH_PAIR, {0.25, 0.5}, {0.75, 0.5}},
+     {{0, 1, 4, 5, 6, 12, 10, 11, 13}, {1, 2, 3, 4, 7, 8, 9, 12, 14}},
+     {{0, 1, 6}, {1, 2, 7}, {3, 2, 8}, {3, 4, 9}, {4, 5, 10}, {0, 5, 11}},
      1},
 };
 
