@@ -56,7 +56,8 @@ def seconds(value):
     if value is None:
         return ""
     unit = next((u for u in ((1, "s"), (1e-3, "ms"), (1e-6, "us")) if value >= u[0]), (1e-6, "us"))
-    return f"{value / unit[0]:.3g} {unit[1]}"
+    shown = value / unit[0]
+    return f"{shown:.0f} {unit[1]}" if shown >= 100 else f"{shown:.3g} {unit[1]}"
 
 
 def percent(value):
