@@ -137,7 +137,7 @@ PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
   for (PetscInt k = 0; k < scene->n_entries; k++) {
     if (strncasecmp(scene->key[k], "hyco_", 5) == 0 || strncasecmp(scene->key[k], "parameter_", 10) == 0 ||
         strncasecmp(scene->key[k], "output_", 7) == 0 || strcasecmp(scene->key[k], "scene_mesh") == 0 ||
-        strcasecmp(scene->key[k], "scene_title") == 0)
+        strcasecmp(scene->key[k], "scene_title") == 0 || strncasecmp(scene->key[k], "scene_unit_", 11) == 0)
       continue;
     *hash = HycoHash(*hash, scene->key[k], strlen(scene->key[k]) + 1);
     *hash = HycoHash(*hash, scene->value[k], strlen(scene->value[k]) + 1);

@@ -108,7 +108,7 @@ PetscErrorCode HycoTraceWrite(HycoROM m, const char path[])
   PetscFunctionBegin;
   PetscCall(HycoROMLoadWhole(m));
   m->whole_current = PETSC_FALSE; /* U_whole is the replay's */
-  PetscCall(HycoSeriesCreate(PETSC_COMM_SELF, path, &series));
+  PetscCall(HycoSeriesCreate(PETSC_COMM_SELF, path, m->trace.n_listed, &series));
   ierr = HycoReplayBegin(m, m->fe_whole, &r);
   if (!ierr) ierr = WriteTimes(&r, series);
   PetscCall(HycoReplayEnd(&r));

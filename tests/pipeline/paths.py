@@ -43,7 +43,9 @@ def arrays(path):
     return out
 
 
-class Paths(Case):
+class FlowingRing(Case):
+    """The mesh and the scenes, and no test."""
+
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
@@ -57,6 +59,8 @@ class Paths(Case):
             f.write(SCENE.replace('LAW', law) + history)
         return cls.path(name)
 
+
+class Paths(FlowingRing):
     @classmethod
     def train(cls, scene, model, *args, **options):
         return cls.hyco('train', '-scene', scene, '-model', cls.path(model), *args, **options)
