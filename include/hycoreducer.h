@@ -52,6 +52,7 @@ typedef struct {
   PetscInt n, not_converged;
   PetscReal largest[HYCO_N_ERRORS], median[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];
   PetscInt worst[HYCO_N_ERRORS]; /* the point with the largest */
+  PetscReal end[HYCO_N_ERRORS];  /* of paths, the largest at their last listed time; else 0 */
   PetscReal
       seconds; /* of an online solve, wall clock: the mean over the points, in their order, of each one's median */
 } HycoValidation;

@@ -170,6 +170,9 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store);
    points with those that were added to meet the targets, or NULL; the caller destroys it. Collective. */
 PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *model, HycoSamples *grown,
                                 HycoTraining *report);
+/* Of paths in 3D the group of the support that looks most like a plane of symmetry across the contacts, whose cells
+   are then the first RID; else NULL. Borrowed from the scene. Collective. */
+PetscErrorCode HycoReducerFindPlane(HycoReducer t, const char **group);
 /* B^T of the dual snapshots, and M^-1 of it with the matrix M of the H1 norm: where each force works most. Both n_dof x
    n_s, dense, rows by the distributed vectors' order, the caller's. Collective. */
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers);
@@ -177,11 +180,13 @@ PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremize
    0): report->held_out, and n_held, the predictions behind the estimates (0: none; too few). Collective. */
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report);
 
-/* What a model gave at one held-out point, all PetscReal: errors (those of forces before division), the forces' sizes,
-   whether it converged, the features of the estimates, the time of some repetitions. */
+/* What a model gave at one held-out point, all PetscReal: errors (those of forces before division), of a path at its
+   worst time, and at its end; the forces' sizes, whether it converged, the features of the estimates, the time of some
+   repetitions. */
 #define HYCO_HELD_REPEATS 3
 typedef struct {
-  PetscReal error[HYCO_N_ERRORS], size, rid_size, converged, feature[HYCO_TRUST_FEATURES], seconds[HYCO_HELD_REPEATS];
+  PetscReal error[HYCO_N_ERRORS], end[HYCO_N_ERRORS], size, rid_size, converged, feature[HYCO_TRUST_FEATURES],
+      seconds[HYCO_HELD_REPEATS];
 } HycoHeldOut;
 /* What a prediction misses, by HycoErrorKind, and the size of what it is to be. */
 typedef struct {

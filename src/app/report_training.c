@@ -198,7 +198,7 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
 
 PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
 {
-  char what[DRIVER_LINE], median[DRIVER_LINE], largest[DRIVER_LINE];
+  char what[DRIVER_LINE], median[DRIVER_LINE], largest[DRIVER_LINE], end[DRIVER_LINE];
 
   PetscFunctionBegin;
   if (t->chosen.number) {
@@ -212,6 +212,8 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
   DescribeErrors(IsPath(s), t->held_out.median, median);
   DescribeErrors(IsPath(s), t->held_out.largest, largest);
   PetscCall(Say("errors at %d held-out points: median %s; largest %s\n", (int)t->held_out.n, median, largest));
+  DescribeErrors(IsPath(s), t->held_out.end, end);
+  if (IsPath(s)) PetscCall(Say("these are of each path's worst listed time; at the end the largest are %s\n", end));
   if (!t->n_held)
     PetscCall(Say("the model does not estimate its errors: fewer than 10 predictions of held-out solutions\n"));
   PetscCall(Misses(s, t));
@@ -243,6 +245,7 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
       AddFinite(error, "median", t->held_out.median[j]);
       AddFinite(error, "mean", t->held_out.mean[j]);
       AddFinite(error, "largest", t->held_out.largest[j]);
+      if (IsPath(s)) AddFinite(error, "end", t->held_out.end[j]);
       if (s->target[j] > 0) cJSON_AddNumberToObject(error, "target", s->target[j]);
     }
   } else

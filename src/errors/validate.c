@@ -97,11 +97,17 @@ static PetscErrorCode ConcludePath(HycoROM m, PetscInt n, const HycoLost lost[],
 
   PetscFunctionBegin;
   HycoPathErrorsJudge(n, lost, &e);
-  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) row->error[j] = e.worst[j];
   row->size = e.force;
   row->rid_size = e.force_rid;
-  if (e.force > 0) row->error[HYCO_ERROR_LAMBDA] *= e.force;
-  if (e.force_rid > 0) row->error[HYCO_ERROR_LAMBDA_RID] *= e.force_rid;
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    const PetscReal force = j == HYCO_ERROR_LAMBDA       ? e.force
+                            : j == HYCO_ERROR_LAMBDA_RID ? e.force_rid
+                                                         : 0,
+                    by = force > 0 ? force : 1;
+
+    row->error[j] = e.worst[j] * by;
+    row->end[j] = e.end[j] * by;
+  }
   if (row->converged > 0) PetscCall(HycoTrustMeasure(m, row->feature));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -223,15 +229,21 @@ PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[])
   return force;
 }
 
-PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force)
+/* One of row->error or row->end, divided. */
+static PetscReal Divided(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force, PetscReal error)
 {
   const PetscBool forces = (PetscBool)(kind == HYCO_ERROR_LAMBDA || kind == HYCO_ERROR_LAMBDA_RID);
   const PetscReal size = kind == HYCO_ERROR_LAMBDA ? row->size : row->rid_size,
                   by = forces ? PetscMax(size, HYCO_SMALL_FORCE * force) : 1;
 
   if (row->converged < 0.5) return PETSC_INFINITY;
-  if (by > 0) return row->error[kind] / by;
-  return row->error[kind] > 0 ? PETSC_INFINITY : 0;
+  if (by > 0) return error / by;
+  return error > 0 ? PETSC_INFINITY : 0;
+}
+
+PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force)
+{
+  return Divided(row, kind, force, row->error[kind]);
 }
 
 PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], HycoValidation *v)
@@ -254,6 +266,7 @@ PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], HycoVa
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
     for (PetscInt k = 0; k < n; k++) {
       error[k] = HycoHeldOutError(&rows[k], (HycoErrorKind)j, force);
+      v->end[j] = PetscMax(v->end[j], Divided(&rows[k], (HycoErrorKind)j, force, rows[k].end[j]));
       if (error[k] > v->largest[j]) {
         v->largest[j] = error[k];
         v->worst[j] = k;

@@ -7,6 +7,7 @@
 #include <hycogreedy.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 /* Of two indicators this close, neither is worse. */
 #define TIE      1e-9
@@ -301,13 +302,25 @@ static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
 }
 
 /* The loop needs a recipe that is accurate wherever it leads; the model's own is searched when the solutions are there.
- */
-static void SetRecipe(HycoReducer t)
+   Of paths in 3D it begins with the cells at a plane of symmetry, as that search does. Collective. */
+static PetscErrorCode SetRecipe(HycoReducer t)
 {
-  if (!t->search || t->prototype->traits.settings != HYCO_SETTINGS_RID) return;
-  if (!t->pinned[HYCO_CHOICE_TOLERANCE])
-    t->tol[HYCO_SEED_DISPLACEMENT] = t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = ACCURATE;
-  if (!t->pinned[HYCO_CHOICE_LAYERS]) t->layers = 1;
+  const PetscBool *pinned = t->pinned;
+
+  PetscFunctionBegin;
+  t->plane = NULL;
+  if (!t->search || t->prototype->traits.settings != HYCO_SETTINGS_RID) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!pinned[HYCO_CHOICE_TOLERANCE])
+    t->tol[HYCO_SEED_DISPLACEMENT] = t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_INELASTIC] =
+        ACCURATE;
+  if (strcmp(t->prototype->type, HYCO_ROM_HYBRID) == 0 && !pinned[HYCO_CHOICE_HYBRID] && !pinned[HYCO_CHOICE_LAYERS] &&
+      !t->whole_rid)
+    PetscCall(HycoReducerFindPlane(t, &t->plane));
+  if (t->plane)
+    t->hybrid = HYCO_HYBRID_ALL;
+  else if (!pinned[HYCO_CHOICE_LAYERS])
+    t->layers = 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The model of the solutions that were chosen, judged by others. */
@@ -351,11 +364,11 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
             "a condensed model needs a tensor grid of training points, which -greedy does not give: use -grid, or "
             "-values_NAME");
   loop.begin = HycoNow();
-  SetRecipe(t);
   PetscCall(TakeTraining(training, &loop));
   PetscCall(Start(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
+  PetscCall(SetRecipe(t));
   PetscCall(PetscCalloc1(t->fom->part->n_cells, &t->grown));
   PetscCall(RunLoop(t, &loop, &report));
   PetscCall(Conclude(t, &loop, path, &report));

@@ -345,6 +345,17 @@ static PetscErrorCode FindPlane(HycoReducer t, PetscInt *plane)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoReducerFindPlane(HycoReducer t, const char **group)
+{
+  PetscInt plane = -1;
+
+  PetscFunctionBegin;
+  if (t->scene->n_times && t->sizes[3] == 3) HycoOnRoot(HycoComm(t), FindPlane(t, &plane));
+  PetscCallMPI(MPI_Bcast(&plane, 1, MPIU_INT, 0, HycoComm(t)));
+  *group = plane < 0 ? NULL : t->scene->fixed[plane].group;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Paths: equations inside a small RID say little of modes that no load reaches there, unless the RID cuts the bodies
    from side to side. The cells at a plane of symmetry do, and all of its nodes are inside. */
 static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
@@ -626,16 +637,13 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
 {
   HycoReducer t = s->t;
   PetscReal edge = 0;
-  PetscInt plane = -1;
 
   PetscFunctionBegin;
   HycoReducerGetRecipe(t, &s->given);
   HycoOnRoot(HycoComm(t), SurfaceEdge(t, &edge));
   PetscCallMPI(MPI_Bcast(&edge, 1, MPIU_REAL, 0, HycoComm(t)));
   s->extension = EXTENSION * edge;
-  if (t->scene->n_times && t->sizes[3] == 3) HycoOnRoot(HycoComm(t), FindPlane(t, &plane));
-  PetscCallMPI(MPI_Bcast(&plane, 1, MPIU_INT, 0, HycoComm(t)));
-  s->plane = plane < 0 ? NULL : t->scene->fixed[plane].group;
+  PetscCall(HycoReducerFindPlane(t, &s->plane));
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) s->targets = (PetscBool)(s->targets || t->target[j] > 0);
   PetscCall(PetscArraycpy(s->target, s->targets ? t->target : usual, HYCO_N_ERRORS));
   PetscCall(Rounds(s, grown, report));

@@ -177,5 +177,36 @@ class Residual(Ring):
             self.assertLess(residual, 10 * max(compared['worst_' + error]['max'] for error in KINDS), kind)
 
 
+class Targets(Ring):
+    """-target_... over paths: the judged errors are those of the worst listed time."""
+    newcomer = True
+    settings = ('-hyco_model_type', 'hybrid', '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', 1, '-hyco_hybrid', 'contact',
+                '-hyco_rid_whole', 'false')  # the contact extension is open
+
+    def test_added(self):
+        """Paths are added until the targets hold; what was judged is what compare finds at the held-out paths, at their worst time and their end."""
+        with open(self.path('held.csv'), 'w', encoding='utf-8') as f:
+            f.write('gap,push\n0.0045,0.85\n0.0052,1.05\n0.0061,0.95\n0.0072,1.15\n')
+        targets = {'u': 2e-3, 'inelastic': 2e-3}
+        run = [a for kind, target in targets.items() for a in ('-target_' + kind, target)]
+        trained = self.train('targets.h5', *self.settings, *run, '-validation_points', 'held.csv', '-target_max_added', 8, grid='2,2')
+        self.assertGreater(trained['search']['added'], 0)
+        self.assertEqual(trained['n_samples'], 4 + trained['search']['added'])
+        found = self.hyco('compare', '-scene', self.norton, '-model', self.path('targets.h5'), '-points', 'held.csv')
+        for kind, target in targets.items():
+            held = trained['held_out'][kind]
+            self.assertLessEqual(held['largest'], target)
+            self.assertLessEqual(held['end'], held['largest'])
+            self.near(held['largest'], found['worst_' + kind]['max'], 1e-3, kind)
+            self.near(held['end'], found['end_' + kind]['max'], 1e-3, kind)
+
+    def test_missed(self):
+        """No path may be added: the best model is written, one line says what is missed, status 3."""
+        trained = self.train('missed.h5', *self.settings, '-target_u', '1e-9', '-target_inelastic', '1e-9', '-target_max_added', 0, '-hyco_validation', 3,
+                             grid='2,2', status=3)
+        self.assertIn('the target is', trained['missed'][0])
+        self.hyco('predict', '-model', self.path('missed.h5'), '-mu', '0.0055,0.91')
+
+
 if __name__ == '__main__':
     unittest.main()
