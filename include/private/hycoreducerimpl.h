@@ -141,6 +141,10 @@ PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_
                               PetscReal sigma[]);
 PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
                                   PetscInt max_modes, PetscInt found, PetscInt *l);
+/* The POD of a field of the snapshots, a column each: V, l, sigma and n_sigma of `basis`, the caller's (no mode: V has
+   no column). tol 0: every mode above the noise. Of paths that of each, then of these, each brought to the size of the
+   largest: a slow one counts as much as a fast one. Collective. */
+PetscErrorCode HycoReducerPODPaths(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, HycoBasis *basis);
 /* On rank 0 (column major, the caller's; elsewhere empty) the first n_columns of S, a matrix of displacements, at nodes
    that rank 0 gives by their numbers in the whole mesh. Collective. */
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
@@ -162,9 +166,36 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store);
    points with those that were added to meet the targets, or NULL; the caller destroys it. Collective. */
 PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *model, HycoSamples *grown,
                                 HycoTraining *report);
+/*
+  The laws again along the training paths (training_replay.c), on this rank's part, in the steps that full order took;
+  between listed times displacements are linear in time. HycoTrainingReplayFollow() goes through one path (without a
+  history: a point) and calls record(ctx, k) at each listed time, where k is its column of the snapshots, the part's fe
+  is at its parameters and `u` and `state` are there. displacement(ctx, k, u): that of column k at the part's nodes
+  (n_dof) less its lifting. Both are collective, as all of it. HycoTrainingReplayDestroy() also after a failure.
+*/
+typedef struct {
+  HycoReducer t; /* borrowed, as fe */
+  HycoFE fe;
+  PetscErrorCode (*displacement)(void *ctx, PetscInt k, PetscReal u[]), (*record)(void *ctx, PetscInt k);
+  void *ctx;
+  PetscReal *u; /* n_dof */
+  HycoFEState state, end;
+  PetscInt column;                   /* that of `before`; -1: none */
+  PetscReal *before, *after, *f_int; /* n_dof: displacements of two listed times; nobody asks for */
+} HycoTrainingReplay;
+PetscErrorCode HycoTrainingReplayCreate(HycoReducer t, PetscErrorCode (*displacement)(void *, PetscInt, PetscReal[]),
+                                        PetscErrorCode (*record)(void *, PetscInt), void *ctx,
+                                        HycoTrainingReplay *replay);
+PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *replay, HycoSnapshots store, PetscInt path);
+PetscErrorCode HycoTrainingReplayDestroy(HycoTrainingReplay *replay);
 /* B^T of the dual snapshots, and M^-1 of it with the matrix M of the H1 norm: where each force works most. Both n_dof x
    n_s, dense, rows by the distributed vectors' order, the caller's. Collective. */
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers);
+/* A^-1 R by one factor of A, which is symmetric and definite, of that name (X: the caller's); columns of unit length (0
+   where one has none, and where fixed) of dense X, rows by the distributed vectors' order, with the rows of the modes,
+   by the file's (the caller's). Collective. */
+PetscErrorCode HycoReducerSolve(HycoReducer t, Mat A, const char name[], Mat R, Mat *X);
+PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled);
 /* Judges the model by the held-out solutions, calibrates the estimates of its errors on them and notes both in it (rank
    0): report->held_out, and n_held, the predictions behind the estimates (0: none; too few). Collective. */
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report);

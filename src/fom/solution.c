@@ -278,16 +278,18 @@ PetscErrorCode HycoFOMGetRows(HycoFOM f, const HycoFileOrder **rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFOMFromRows(HycoFOM f, PetscInt components, const PetscReal rows[], PetscReal value[])
+PetscErrorCode HycoFOMFromRows(HycoFOM f, HycoPlace place, PetscInt components, const PetscReal rows[],
+                               PetscReal value[])
 {
+  const PetscInt n = place == HYCO_ON_CELLS ? f->part->n_cells : f->part->n_nodes;
   const HycoFileOrder *order;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(f, &order));
   if (order)
-    PetscCall(HycoFileOrderFetch(order, f->part, HYCO_ON_NODES, components, rows, value));
+    PetscCall(HycoFileOrderFetch(order, f->part, place, components, rows, value));
   else
-    PetscCall(PetscArraycpy(value, rows, f->part->n_nodes * components));
+    PetscCall(PetscArraycpy(value, rows, n * components));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -211,13 +211,8 @@ static PetscErrorCode JoinPaths(HycoReducer t, Mat S, PetscReal tol, Mat *joined
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. Of paths
-   that of each, then of these. */
-static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool all)
+PetscErrorCode HycoReducerPODPaths(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, HycoBasis *basis)
 {
-  HycoBasis *basis = &t->basis[kind];
-  const PetscInt most = kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0;
-  const PetscReal tol = all ? 0 : t->tol[kind];
   PetscInt N, n;
   Mat joined = S;
 
@@ -226,8 +221,17 @@ static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool a
   PetscCall(MatGetSize(joined, &N, &n));
   PetscCall(PetscCalloc1(t->n_s + 1, &basis->sigma));
   basis->n_sigma = PetscMin(N, n);
-  PetscCall(HycoReducerPOD(t, joined, tol, most, &basis->V, &basis->l, basis->sigma));
+  PetscCall(HycoReducerPOD(t, joined, tol, max_modes, &basis->V, &basis->l, basis->sigma));
   if (joined != S) PetscCall(MatDestroy(&joined));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. */
+static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool all)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoReducerPODPaths(t, S, all ? 0 : t->tol[kind], kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0,
+                                &t->basis[kind]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -411,15 +415,68 @@ static PetscErrorCode SetForces(HycoReducer t, PetscInt k, Mat R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoReducerSolve(HycoReducer t, Mat A, const char name[], Mat R, Mat *X)
+{
+  KSP ksp;
+  PetscBool singular;
+  Mat factor;
+  PC pc;
+
+  PetscFunctionBegin;
+  PetscCall(MatSetOption(A, MAT_SPD, PETSC_TRUE));
+  PetscCall(HycoDirectSolver(HycoComm(t), "hyco_norm_", A, PETSC_TRUE, &ksp));
+  PetscCall(HycoFactor(ksp, &singular));
+  PetscCheck(!singular, HycoComm(t), PETSC_ERR_PLIB, "%s is singular", name);
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCFactorGetMatrix(pc, &factor));
+  PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, X));
+  PetscCall(MatMatSolve(factor, R, *X));
+  PetscCall(KSPDestroy(&ksp));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled)
+{
+  HycoMesh part = t->fom->part;
+  const PetscInt dim = t->sizes[3];
+  const HycoFileOrder *order;
+  PetscInt n, rows, lda[2];
+  PetscReal *size, *value;
+  const PetscScalar *x;
+  PetscScalar *y;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(t->fom, &order));
+  rows = dim * (order ? order->n[HYCO_ON_NODES] : part->n_nodes);
+  PetscCall(MatGetSize(X, NULL, &n));
+  PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, t->sizes[0] * dim, n, NULL, scaled));
+  PetscCall(PetscMalloc2(n, &size, part->n_nodes * dim, &value));
+  PetscCall(MatGetColumnNorms(X, NORM_2, size));
+  PetscCall(MatDenseGetLDA(X, &lda[0]));
+  PetscCall(MatDenseGetLDA(*scaled, &lda[1]));
+  PetscCall(MatDenseGetArrayRead(X, &x));
+  PetscCall(MatDenseGetArray(*scaled, &y));
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt i = 0; i < part->n_nodes * dim; i++) {
+      const PetscInt place = HycoMeshOwned(part, i / dim);
+      const PetscBool none = (PetscBool)(place < 0 || t->fom->fe->fixed[i] || size[k] == 0);
+
+      value[i] = none ? 0 : x[(size_t)k * (size_t)lda[0] + (size_t)(place * dim + i % dim)] / size[k];
+    }
+    PetscCall(HycoFOMToRows(t->fom, HYCO_ON_NODES, MPIU_REAL, dim, value, y + (size_t)k * (size_t)lda[1]));
+  }
+  PetscCall(MatDenseRestoreArray(*scaled, &y));
+  PetscCall(MatDenseRestoreArrayRead(X, &x));
+  PetscCall(PetscFree2(size, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers)
 {
   HycoFOM f = t->fom;
   const PetscInt n = t->n_s, n_own = f->part->n_owned * t->sizes[3];
   PetscReal mu[HYCO_MAX_PARAMETERS];
-  Mat M, R, X, factor;
-  KSP ksp;
-  PetscBool singular;
-  PC pc;
+  Mat M, R;
 
   PetscFunctionBegin;
   PetscCall(MatCreateDense(HycoComm(t), n_own, PETSC_DECIDE, t->sizes[0] * t->sizes[3], n, NULL, &R));
@@ -432,18 +489,9 @@ PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremize
   PetscCall(MatAssemblyEnd(R, MAT_FINAL_ASSEMBLY));
   PetscCall(HycoFECreateMatrix(f->fe, HycoComm(t), f->part->n_owned, f->part->first, &M));
   HycoOnEach(HycoComm(t), HycoFEAssembleH1(f->fe, HycoMeshLength(f->part), M));
-  PetscCall(MatSetOption(M, MAT_SPD, PETSC_TRUE));
-  PetscCall(HycoDirectSolver(HycoComm(t), "hyco_norm_", M, PETSC_TRUE, &ksp));
-  PetscCall(HycoFactor(ksp, &singular));
-  PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the H1 norm's matrix is singular");
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCFactorGetMatrix(pc, &factor));
-  PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, &X));
-  PetscCall(MatMatSolve(factor, R, X));
+  PetscCall(HycoReducerSolve(t, M, "the H1 norm's matrix", R, supremizers));
   PetscCall(MatDestroy(&M));
-  PetscCall(KSPDestroy(&ksp));
   *forces = R;
-  *supremizers = X;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
