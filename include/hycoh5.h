@@ -29,14 +29,21 @@ PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file
 PetscErrorCode HycoH5IsPrecious(const char path[], PetscBool *precious);
 PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit);
 
-/* Writes rows x cols (cols 1: a vector). Groups in the name ("mesh/cells") are made as needed. */
+#define HYCO_H5_LINE (-1)
+/* Writes rows x cols (cols 1: a vector; HYCO_H5_LINE: a set of one dimension). Groups in the name ("mesh/cells") are
+   made as needed. */
 PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscReal *data);
 PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscInt *data);
-/* Writes rows x cols numbers, of type MPIU_REAL or MPIU_INT, of which this rank has the rows first .. first + n - 1.
-   Collective, unless the file is one process's: then it has all. */
+/* Writes rows of a set of rows x cols numbers (or HYCO_H5_LINE), of type MPIU_REAL, MPIU_INT or
+   MPI_UNSIGNED_CHAR: this rank's rows first .. first + n - 1. The set is made when its first rows are written.
+   Collective, unless the file is one process's. */
 PetscErrorCode HycoH5WriteRows(HycoH5 file, const char name[], MPI_Datatype type, PetscInt rows, PetscInt cols,
                                PetscInt first, PetscInt n, const void *data);
 PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[]);
+/* Gives a set or group that is there an attribute: text, or n integers; one of that name stays as it is. */
+PetscErrorCode HycoH5WriteAttribute(HycoH5 file, const char at[], const char name[], const char text[]);
+PetscErrorCode HycoH5WriteAttributeInt(HycoH5 file, const char at[], const char name[], PetscInt n,
+                                       const PetscInt value[]);
 
 /* Whether the file has a dataset of that name. */
 PetscBool HycoH5Has(HycoH5 file, const char name[]);

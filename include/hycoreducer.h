@@ -160,8 +160,9 @@ PetscErrorCode HycoReducerSetTargets(HycoReducer reducer, const PetscReal target
 
 /* What judges a model where no full-order solution is known; the order of -hyco_greedy_indicator's words. */
 typedef enum {
-  HYCO_INDICATOR_LOCAL,      /* (43): distance from the full-order problem on the RID, its interface interpolated */
-  HYCO_INDICATOR_PENETRATION /* (45): 2-norm of the penetration, a length */
+  HYCO_INDICATOR_LOCAL,       /* (43): distance from the full-order problem on the RID, its interface interpolated */
+  HYCO_INDICATOR_PENETRATION, /* (45): 2-norm of the penetration, a length */
+  HYCO_INDICATOR_RESIDUAL     /* of paths, which have no other: HycoROMGetEquilibrium(), the worst time */
 } HycoIndicatorKind;
 
 /* One iteration: a model from n_samples solutions, judged at every training point. Borrowed by the monitor. */
@@ -179,7 +180,7 @@ typedef struct {
 typedef PetscErrorCode (*HycoGreedyMonitor)(const HycoGreedyStep *step, void *ctx);
 
 PetscErrorCode HycoReducerSetGreedyMonitor(HycoReducer reducer, HycoGreedyMonitor monitor, void *ctx);
-/* -hyco_greedy_indicator (default: local) */
+/* -hyco_greedy_indicator (default: local; of a scene with a history residual) */
 PetscErrorCode HycoReducerSetGreedyIndicator(HycoReducer reducer, HycoIndicatorKind kind);
 /* The loop ends when max_eta <= target (> 0, default 1e-3), with max_snapshots solutions (0, default: no limit), after
    max_seconds (0, default: no limit), or when every training point is solved. */

@@ -49,6 +49,8 @@ typedef struct {
   PetscReal path_force, path_mises,
       path_inelastic; /* of a path the largest of its listed times: total contact force, von
                          Mises stress and accumulated inelastic strain of the RID; else 0 */
+  PetscReal residual,
+      contact_residual; /* -hyco_residual: worst and worst_contact of HycoROMGetEquilibrium(); else -1 */
   /* An upper estimate of the relative errors of u (whole mesh, 2-norm), of the stress (RID, 2-norm of the cells'
      values) and of all contact forces (2-norm; a force below a tenth of the largest held out in training counts as that
      tenth), calibrated at training on held-out solutions; < 0: the model has none, or the solve did not converge. */
@@ -106,11 +108,14 @@ PetscErrorCode HycoROMGetSizes(HycoROM model, PetscInt *n_contacts, PetscInt *n_
 */
 PetscErrorCode HycoROMSolveMany(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
-/* Reads -hyco_reconstruct, -hyco_reconstruct_solver, -hyco_fallback, -hyco_full_displacement; HycoROMLoad() does. */
+/* Reads -hyco_reconstruct, -hyco_reconstruct_solver, -hyco_fallback, -hyco_full_displacement, -hyco_residual;
+   HycoROMLoad() does. */
 PetscErrorCode HycoROMSetFromOptions(HycoROM model);
 /* -hyco_fallback and -hyco_full_displacement: whether who has the scene is to solve full order where a prediction is
    not enough, and to solve once on the whole mesh with the predicted forces. */
 PetscErrorCode HycoROMGetFallback(HycoROM model, PetscBool *full_order, PetscBool *displacement);
+/* -hyco_residual: whether HycoROMGetPrediction() is to call HycoROMGetEquilibrium(). */
+PetscErrorCode HycoROMWantsEquilibrium(HycoROM model, PetscBool *wants);
 /* Whether Predict reconstructs the forces outside the RID (default: yes). */
 PetscErrorCode HycoROMSetReconstruct(HycoROM model, PetscBool reconstruct);
 /* Called after each iteration of the active set. */
@@ -127,6 +132,23 @@ PetscErrorCode HycoROMSetStep(HycoROM model, PetscInt k);
 PetscErrorCode HycoROMSetSteps(HycoROM model, PetscInt n, const PetscReal t[]);
 /* Accumulated inelastic strain of the RID's cells (mean), at that time. Borrowed until the next prediction. */
 PetscErrorCode HycoROMGetInelastic(HycoROM model, PetscInt *n_cells, const PetscReal *inelastic[]);
+/*
+  How far the last prediction of a path is from the full order's equations, without a solution of them: at each listed
+  time that it reached (n), as fractions. residual: of equilibrium on the whole mesh, |f_int - F + B^T L| in the dual
+  of the elastic energy norm, beside the largest |u| of the path in that norm; contact: |min(g, c L)| with the gaps
+  g = D - B u, beside the largest |B u| of the path, c the largest |B u| over the largest contact force. Arrays are
+  borrowed until the next call. why: NULL, or why there is no answer; worst and worst_contact are then infinite, and n
+  0.
+*/
+typedef struct {
+  PetscInt n, at; /* at: the listed time of the worst residual */
+  PetscReal worst, worst_contact;
+  const PetscReal *residual, *contact;
+  const char *why;
+} HycoEquilibrium;
+/* The laws are replayed on the whole mesh, which is read from the file on first use; the elastic stiffness is factored
+   there, again where a parameter changes it. Not collective. Fails for a model without a history. */
+PetscErrorCode HycoROMGetEquilibrium(HycoROM model, HycoEquilibrium *equilibrium);
 
 /* What the last prediction amounts to, its errors estimated. Fails before the first. */
 PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);

@@ -24,6 +24,9 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples samples, const PetscInt counts[], 
 /* The same at the roots of Chebyshev polynomials over each range, counts[i] >= 1 of them: the nodes for interpolation
    by polynomials, as in a condensed model. */
 PetscErrorCode HycoSamplesAddChebyshev(HycoSamples samples, const PetscInt counts[]);
+/* Appends the first `count` >= 1 points of Halton's sequence over the ranges: each parameter takes `count` values where
+   a grid of as many points has few. More of them hold the fewer. */
+PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count);
 /* Appends the tensor product of the lists values[i][0..counts[i]-1], the last parameter running fastest. */
 PetscErrorCode HycoSamplesAddProduct(HycoSamples samples, const PetscInt counts[], const PetscReal *const values[]);
 /* Appends one point (length = number of parameters); fails outside the range. */

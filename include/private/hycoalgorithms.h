@@ -51,6 +51,9 @@ PetscErrorCode HycoQDEIMRank(Mat V, PetscInt index[], PetscInt *rank);
 /* Rows of a dense distributed matrix (n x cols row major), on every rank. Collective. */
 PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscReal values[]);
 
+/* Coordinate j >= 0 of point k >= 1 of Halton's sequence, in (0, 1). */
+PetscReal HycoHalton(PetscInt k, PetscInt j);
+
 /* min |A x - b|_2, x >= 0: Lawson, Hanson, Solving Least Squares Problems (1974), chapter 23. A: m x n column major.
  * Not collective. */
 PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscReal x[],

@@ -24,6 +24,16 @@
 #define HYCO_MPI_BOOL MPI_C_BOOL
 #endif
 
+/* What a container's destructor takes, and the context in it. */
+#if PETSC_VERSION_LT(3, 23, 0)
+typedef void *HycoContained;
+#define HycoContainedContext(contained) (contained)
+#define PetscContainerSetCtxDestroy     PetscContainerSetUserDestroy
+#else
+typedef void **HycoContained;
+#define HycoContainedContext(contained) (*(contained))
+#endif
+
 /* What PetscErrorMessage() gives. */
 #if PETSC_VERSION_LT(3, 25, 0)
 typedef char *HycoErrorText;

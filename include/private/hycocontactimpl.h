@@ -28,6 +28,10 @@ PetscErrorCode HycoContactCreate_Obstacle(HycoContact contact);
 PetscErrorCode HycoContactCreate_Pair(HycoContact contact);
 PetscErrorCode HycoContactCreate_Surface(HycoContact contact);
 
+/* The scene's ties on a mesh that has all nodes and facets of their surfaces; fails for nodes that have no master, and
+   where a node that others follow follows another. NULL: none. The caller destroys them. */
+PetscErrorCode HycoTiesFind(HycoScene scene, HycoMesh mesh, HycoTies *ties);
+
 /* -- potential contacts: all on one process, over a mesh that has every contact node -- */
 
 /*
@@ -58,6 +62,9 @@ typedef struct _n_HycoPairs {
 /* Contacts on the nodes as drawn: where no map moves the surfaces they are final, and a slave node without a master is
    an error. */
 PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
+/* Takes contacts of tied nodes out whose masters have the contact too: they move by these. Fails for other tied nodes
+   of contacts. */
+PetscErrorCode HycoPairsDropTied(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
 PetscErrorCode HycoPairsDestroy(HycoPairs *pairs);
 /* Searches for the masters of moved surfaces on fe's nodes, if those have moved since; fe's mesh has the pairs' nodes
    and the facets that may be masters. What works with the contacts at fe's parameters calls it itself. */

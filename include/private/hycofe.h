@@ -19,6 +19,8 @@ const HycoElement *HycoElementGet(HycoCellType type);
 const HycoElement *HycoElementGetFacet(HycoCellType type);
 
 #define HYCO_MAX_CELL_DOFS 24
+/* Of a cell with tied nodes: HycoMeshCellNodes(). */
+#define HYCO_MAX_CELL_UNKNOWNS (3 * HYCO_MAX_CELL_NODES)
 
 typedef struct _n_HycoFE *HycoFE;
 typedef struct _n_HycoAssemblyMap *HycoAssemblyMap;
@@ -81,6 +83,7 @@ struct _n_HycoFE {
   PetscInt n_oblique, room_oblique, *oblique_at; /* by dof: which, or -1; only with n_oblique */
   HycoOblique *oblique;
   PetscBool lifted; /* whether any of u0 is not 0 */
+  PetscBool plain; /* matrices are those of the displacements: neither oblique supports nor ties take a place in them */
   /* temperature and thermal strain at mu, by cell and integration point; NULL: no body has a temperature */
   PetscReal *temperature, *thermal;
   /* tangents at mu: those of cell e from tangent_start[e], tangent_size[body] reals for each of its points */
@@ -147,8 +150,9 @@ PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
 /* "body B from moving along ..." for the combination of motions with these coefficients. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);
 
-/* Element stiffness of a cell, row major, nv * dim square, nodes outer, components inner: of its body alone, for
-   displacements; with the springs on it, of the unknowns, which oblique supports make others. */
+/* Element stiffness of a cell, row major, nodes outer, components inner: of its body alone, for displacements, nv * dim
+   square; with the springs on it, of the unknowns, which oblique supports and ties make others: of the nodes that
+   HycoMeshCellNodes() gives (room for HYCO_MAX_CELL_UNKNOWNS square). */
 PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 
@@ -161,11 +165,17 @@ PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K);
 /* F (12), with the lifting of the prescribed displacements: K u0 moved to the right, F_i = K_ii u0_i where fixed; and
    with what the thermal strains push, unless the scene has a history (HycoFEStep() has it in f_int). */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
-/* Of supports along a direction: the one in the place of an unknown, or NULL; brings displacements to be what they are
-   at these places (u: n_dof); nodal forces to be those of the unknowns, T^T f. All at fe's parameters. */
+/* Of supports along a direction: the one in the place of an unknown, or NULL. Of these and of ties: brings
+   displacements to be what they are at these places (u: n_dof); nodal forces to be those of the unknowns, T^T f. All at
+   fe's parameters. */
 const HycoOblique *HycoFEOblique(HycoFE fe, PetscInt dof);
 void HycoFEComplete(HycoFE fe, PetscReal u[]);
 void HycoFEGeneralise(HycoFE fe, PetscReal f[]);
+/* Whether a support fixes an unknown, not a tie. */
+static inline PetscBool HycoFESupports(HycoFE fe, PetscInt dof)
+{
+  return (PetscBool)(fe->fixed[dof] && HycoMeshTied(fe->mesh, dof / fe->dim) < 0);
+}
 /* The loads at all of fe's unknowns (n_dof; a part has all of its own nodes'), fixed ones too, without lifting. */
 PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[]);
 /* The forces of supports on the fixed unknowns (r: n_dof, 0 at the others; right at the nodes that this process owns):

@@ -1,4 +1,4 @@
-/* Fields on a mesh, written to HDF5 with the XDMF that ParaView opens. */
+/* Fields on a mesh, written to HDF5 with the XDMF that ParaView opens, or as VTKHDF. */
 #ifndef HYCOFIELDS_H
 #define HYCOFIELDS_H
 
@@ -13,6 +13,10 @@ typedef struct {
   PetscReal missing; /* of a surface: at the nodes off it */
 } HycoField;
 
+/* Values by node or cell (n, of `components` numbers each) as this rank's rows in the file's order, `missing` where no
+   process has any; without an order, `value` itself: else the caller frees them by PetscFree(). Collective. */
+PetscErrorCode HycoFieldRows(const HycoFileOrder *order, PetscInt n, HycoPlace place, MPI_Datatype type,
+                             PetscInt components, const void *value, PetscReal missing, void **rows);
 /* Writes `components` numbers, of type MPIU_REAL or MPIU_INT, of each node or cell in the file's order, as a set of
    cols columns. Collective with an order; without one this process has all n of them. */
 PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
@@ -28,22 +32,19 @@ typedef struct {
   const PetscReal *lambda, *gap;
 } HycoContactTable;
 
-/* What both kinds of .xdmf, of one solution and of a series, are made of: a name as XML has it; a cell type's; stress
-   of cells (n_cells x ns: xx, yy, zz, xy, yz, xz) in ParaView's order xx, xy, xz, yy, yz, zz. */
-void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN]);
-const char *HycoFieldsTopology(HycoCellType type);
+/* Stress of cells (n_cells x ns: xx, yy, zz, xy, yz, xz) in XDMF's order xx, xy, xz, yy, yz, zz. */
 void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
 /* Of the same stresses: von Mises' (n_cells), the principal ones (n_cells x 3), the largest first. */
 PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal sigma[], PetscReal mises[],
                                     PetscReal principal[]);
 
-/* The title, cell type, dimension, parameters and contact table (NULL: none). On one process. */
-PetscErrorCode HycoFieldsWriteHead(HycoH5 h, HycoMesh mesh, HycoScene scene, const PetscReal mu[],
-                                   const HycoContactTable *contact);
 /* Nodes at X, tags, the cells with their nodes' places in the whole mesh, as sets of a group of the file. Collective
    with an order. */
 PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char group[], const HycoFileOrder *order, HycoMesh mesh,
                                    const PetscReal X[]);
+/* The cells alone, as a set of cols columns. */
+PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileOrder *order, HycoMesh mesh,
+                                    PetscInt cols);
 /* The fields of a solution's contacts by node of their mesh (vector on slaves, minus on masters), gaps and slaves' tags
    by contact; filled on rank 0, where the contacts are (surface NULL elsewhere). Collective; to be destroyed after an
    error too. */
@@ -54,16 +55,61 @@ typedef struct {
 PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
                                        const PetscReal lambda[], HycoContactFields *fields);
 PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *fields);
-/* Fails unless `path` ends in .xdmf, and where the .h5 beside it is a model or a snapshot. On this process alone. */
+/* The file of numbers of an output: PATH.h5 of PATH.xdmf, PATH.vtkhdf itself; fails for other endings. */
+PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_LEN]);
+/* Fails for other endings too, and where a model or a snapshot is in the place of the numbers. On this process alone.
+ */
 PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /*
-  Writes `path` (must end in .xdmf) and the .h5 beside it: displacement, of each cell stress, von Mises stress,
-  principal stresses and body, contact force (vector on slaves, minus on masters), contact pressure, gap at the
-  solution (NaN at nodes without a contact, or whose contact faces nothing), RID marker (may be NULL: none written), and
-  in the .h5 the parameters and the contact table. u on fe, u_surface on the mesh of the pairs: with an order, of parts
-  of a mesh, they are the part's and rank 0's (elsewhere `surface` is NULL), and the call is collective; NULL: this
-  process has all.
+  A file of fields on one mesh (src/output/field_file.c): PATH.xdmf and PATH.h5, or PATH.vtkhdf, which ParaView, VTK and
+  pyvista open. Of one solution (most = 0), or of at most `most` times. Open begins it anew with the mesh at X; then
+  Add writes fields: of times, between BeginTime and EndTime. Commit puts it in its place; the text of an .xdmf is made
+  then. Order, mesh and scene are borrowed. All are collective on comm.
+*/
+#define HYCO_MOST_FIELDS 24
+typedef struct _n_HycoFieldFile *HycoFieldFile;
+struct _n_HycoFieldFile {
+  MPI_Comm comm;
+  char path[PETSC_MAX_PATH_LEN], h5_path[PETSC_MAX_PATH_LEN];
+  PetscBool vtk;
+  PetscInt most, n; /* times: at most, so far */
+  PetscReal *t;
+  const HycoFileOrder *order; /* NULL: this process has all */
+  HycoMesh mesh;
+  HycoScene scene;
+  HycoH5 h;
+  PetscInt n_fields;
+  HycoField field[HYCO_MOST_FIELDS]; /* of the last time, without data */
+  char name[HYCO_MOST_FIELDS][64];
+};
+PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt most, HycoFieldFile *file);
+PetscErrorCode HycoFieldFileOpen(HycoFieldFile file, const HycoFileOrder *order, HycoMesh mesh, HycoScene scene,
+                                 const PetscReal X[], const PetscReal mu[]);
+PetscErrorCode HycoFieldFileBeginTime(HycoFieldFile file, PetscReal t);
+PetscErrorCode HycoFieldFileAdd(HycoFieldFile file, const HycoField *field);
+/* The same of rows in the file's order. */
+PetscErrorCode HycoFieldFileAddRows(HycoFieldFile file, const HycoField *field, const PetscReal rows[]);
+PetscErrorCode HycoFieldFileEndTime(HycoFieldFile file);
+PetscErrorCode HycoFieldFileCommit(HycoFieldFile file);
+PetscErrorCode HycoFieldFileDestroy(HycoFieldFile *file);
+/* All nodes or cells. Not collective. */
+PetscInt HycoFieldFileCount(HycoFieldFile file, HycoPlace place);
+/* "step-0003/nodes/displacement": a field of time k in the .h5. */
+void HycoFieldName(const HycoField *field, PetscInt k, char name[HYCO_LINE]);
+/* The parts of a .vtkhdf (src/output/vtkhdf.c): the mesh, the last field of the current time with the name of its set,
+   the times. Collective. */
+PetscErrorCode HycoVTKWriteMesh(HycoFieldFile file, const PetscReal X[], const PetscReal mu[]);
+PetscErrorCode HycoVTKWriteField(HycoFieldFile file, const HycoField *field, const PetscReal rows[],
+                                 char set[HYCO_LINE]);
+PetscErrorCode HycoVTKWriteTimes(HycoFieldFile file);
+
+/*
+  Writes `path` (HycoFieldFile): displacement, of each cell stress, von Mises stress, principal stresses and body,
+  contact force (vector on slaves, minus on masters), contact pressure, gap at the solution (NaN at nodes without a
+  contact, or whose contact faces nothing), RID marker (may be NULL: none written), and in an .h5 the parameters and the
+  contact table. u on fe, u_surface on the mesh of the pairs: with an order, of parts of a mesh, they are the part's and
+  rank 0's (elsewhere `surface` is NULL), and the call is collective; NULL: this process has all.
 */
 PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
                                  HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],

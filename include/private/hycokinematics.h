@@ -38,6 +38,15 @@ PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const 
                               const char key[]);
 PetscErrorCode HycoObliqueIndex(HycoFE fe);
 void HycoObliqueStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
+/* Tied nodes (tied.c): puts them where their masters say, on moved nodes; fixes what they differ by, once the supports
+   along axes are set; checks one of a support along a direction. Their part in a cell's matrix, which grows by the
+   nodes that they follow. */
+PetscErrorCode HycoTiedPlace(HycoFE fe);
+PetscErrorCode HycoTiedFix(HycoFE fe);
+PetscErrorCode HycoTiedCheckOblique(HycoFE fe, const HycoFixed *fixed, PetscInt group, PetscInt node);
+void HycoTiedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
+void HycoTiedComplete(HycoFE fe, PetscReal u[]);
+void HycoTiedGeneralise(HycoFE fe, PetscReal f[]);
 /* Finds the springs of fe's mesh; their matrices at fe's nodes and mu; those of a cell, added to its stiffness. The
    first and the last are NULL-safe. */
 PetscErrorCode HycoSpringsCreate(HycoFE fe);

@@ -13,6 +13,19 @@ typedef enum { HYCO_LINE2, HYCO_TRI3, HYCO_QUAD4, HYCO_TET4, HYCO_HEX8, HYCO_N_C
 
 typedef struct _n_HycoMesh *HycoMesh;
 
+/* The scene's ties on the whole mesh, the same on all ranks: slave nodes with their masters, u_slave = sum of weight
+   times u_master. Entries of a slave stand together, slaves and masters ascend. Counted references. */
+typedef struct _n_HycoTies *HycoTies;
+struct _n_HycoTies {
+  PetscInt references, n;
+  PetscInt *slave, *master;  /* tags in the mesh file */
+  PetscInt *tie, *body;      /* of the scene; the body that moves the master */
+  PetscReal *weight, *reach; /* how far the slave may lie from the place that its masters give */
+};
+
+/* Nodes of a cell's unknowns: its own, and those that its tied ones follow. */
+#define HYCO_MAX_CELL_NODES (8 + 8 * 4)
+
 struct _n_HycoMesh {
   PetscInt dim, nv, nf; /* space dimension; nodes of a cell, of a facet */
   HycoCellType type;
@@ -47,7 +60,30 @@ struct _n_HycoMesh {
   PetscInt *facet_cell;  /* the cell it bounds; -1: not in this mesh */
   /* cell groups that are no body (regions): cells of group g as CSR over groups */
   PetscInt *group_cell_start, *group_cell;
+  /* ties (ties.c); NULL where the scene has none. Of the nodes here that are tied, ascending: their masters, all of
+     them here too; by cell, CSR: the nodes that its tied ones follow and that are not its own */
+  HycoTies ties;
+  PetscInt n_tied, *tied, *tied_start, *tied_entry; /* tied_start: n_tied + 1; tied_entry: of each, its first in ties */
+  PetscInt *tied_master;                            /* nodes; their weights stand in ties */
+  PetscInt *tied_at;                                /* by node: its place in tied, or -1 */
+  PetscInt *follow_start, *follow;
 };
+
+/* The nodes of a cell's unknowns (room for HYCO_MAX_CELL_NODES); their number. */
+static inline PetscInt HycoMeshCellNodes(HycoMesh m, PetscInt cell, PetscInt node[])
+{
+  PetscInt n = m->nv;
+
+  for (PetscInt v = 0; v < m->nv; v++) node[v] = m->cells[cell * m->nv + v];
+  for (PetscInt k = m->ties ? m->follow_start[cell] : 0; m->ties && k < m->follow_start[cell + 1]; k++)
+    node[n++] = m->follow[k];
+  return n;
+}
+/* A tied node's place in mesh->tied, or -1. */
+static inline PetscInt HycoMeshTied(HycoMesh m, PetscInt node)
+{
+  return m->ties ? m->tied_at[node] : -1;
+}
 
 PetscErrorCode HycoMeshDestroy(HycoMesh *mesh);
 
@@ -88,7 +124,18 @@ PetscInt HycoMeshFacetNumber(HycoMesh mesh, PetscInt facet);
 /* The segments of a group of dimension 1 in space, n x 2 nodes: the edges of cells between nodes of the group. Fails
    where they branch. The caller frees them. */
 PetscErrorCode HycoMeshLine(HycoMesh mesh, PetscInt group, PetscInt *n, PetscInt **segment);
-/* Cells around each node: CSR start[n_nodes + 1], cell[]. The caller frees both. */
+/* The ties of the mesh's nodes, by tag (NULL: none); takes a reference. Nodes and cells must be there. */
+PetscErrorCode HycoMeshSetTies(HycoMesh mesh, HycoTies ties);
+/* Room for n entries; one reference, which the last HycoTiesDestroy() gives back. */
+PetscErrorCode HycoTiesCreate(PetscInt n, HycoTies *ties);
+PetscErrorCode HycoTiesDestroy(HycoTies *ties);
+/* Rank 0's ties on every rank (NULL: none). Collective. */
+PetscErrorCode HycoTiesBcast(MPI_Comm comm, HycoTies *ties);
+/* Those that are composed with a DM (borrowed), or NULL; composes them (takes a reference). */
+PetscErrorCode HycoTiesOf(DM dm, HycoTies *ties);
+PetscErrorCode HycoTiesAttach(DM dm, HycoTies ties);
+/* Cells around each node, those too whose tied nodes follow it: CSR start[n_nodes + 1], cell[]. The caller frees both.
+ */
 PetscErrorCode HycoMeshNodeCells(HycoMesh mesh, PetscInt **start, PetscInt **cell);
 
 /* What cuts the mesh: -hyco_partition. */

@@ -172,8 +172,9 @@ typedef struct {
   const PetscReal *u, *u_surface, *lambda, *mu;
   PetscReal t;
 } HycoSeriesSource;
-/* To PATH.xdmf and the .h5 beside it: created, the mesh written, a time added, put in its place. Collective. */
-PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], HycoSeries *series);
+/* To a HycoFieldFile of at most so many times: created, the mesh written, a time added, put in its place. Collective.
+ */
+PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], PetscInt most, HycoSeries *series);
 PetscErrorCode HycoSeriesOpen(HycoSeries series, const HycoSeriesSource *from);
 PetscErrorCode HycoSeriesAddTime(HycoSeries series, const HycoSeriesSource *from);
 PetscErrorCode HycoSeriesClose(HycoSeries series);

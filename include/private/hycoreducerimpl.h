@@ -36,6 +36,13 @@ enum {
   HYCO_N_CHOICES
 };
 
+/* What a model made of a training solution. */
+typedef struct {
+  PetscReal u, lambda; /* errors, at most HYCO_JUDGED_WORST */
+  PetscBool solved;
+  PetscReal t; /* else, of a path: how far it came */
+} HycoJudged;
+
 struct _p_HycoReducer {
   PETSCHEADER(int);
   PetscMPIInt rank;
@@ -104,6 +111,7 @@ struct _p_HycoReducer {
   PetscInt n_s;          /* columns of snapshots: a sample each, of a history one per listed time of each */
   PetscInt *taken_start; /* rank 0, of a history: n_samples + 1, where the times of a path's steps begin in */
   PetscReal *taken;
+  HycoJudged *judged; /* rank 0, by sample: of HycoReducerJudge(); NULL: it was not called */
   unsigned long long fingerprint;
   PetscBool *grown; /* every rank, greedy: cells of its part in the RIDs so far; else NULL */
 };
@@ -232,6 +240,8 @@ PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], HycoVa
 #define HYCO_JUDGED_WORST 10.0
 PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM model);
 PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM model, PetscReal *u, PetscReal *lambda);
+/* After HycoReducerJudge(): which training solutions that model does not reach, and which it misses most. Rank 0. */
+void HycoReducerNameWorst(HycoReducer t, char text[HYCO_LINE]);
 
 /* The settings as they stand. */
 void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *recipe);

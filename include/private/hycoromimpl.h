@@ -10,6 +10,7 @@
 #include <hycosolverimpl.h>
 
 typedef struct _n_HycoProbe *HycoProbe;
+typedef struct _n_HycoBalance *HycoBalance;
 
 /* Rows of B in CSR over dofs of a mesh, and D: see HycoContactRows(). */
 typedef struct {
@@ -85,9 +86,12 @@ struct _p_HycoROM {
   PetscReal *V_whole, *U_whole;
   HycoFE fe_whole;
   HycoPairs whole_pairs;
+  HycoBalance balance; /* what HycoROMGetEquilibrium() keeps; NULL: it was not called */
+  PetscBool balanced;  /* it is that of the last prediction */
   HycoProbe probe; /* of the scene's quantities; made by the first prediction that is asked for */
   /* online */
   PetscBool full_order, full_displacement; /* what its user, who has the scene, is to do: HycoROMGetFallback() */
+  PetscBool wants_equilibrium;             /* -hyco_residual: a prediction has it */
   PetscBool ready, reconstruct, solved, whole_current;
   HycoFE fe;                /* on mesh, or on its first nodes (galerkin) */
   PetscInt n, n_L;          /* unknowns and multipliers of the reduced problem */
@@ -121,18 +125,20 @@ PetscErrorCode HycoTraceWrite(HycoROM model, const char path[]);
 /*
   The laws again along the path of the last prediction, on `fe` (of whatever cells): HycoReplayBegin(), then of each
   accepted step k from 0 on HycoReplayMove(), with which fe stands at its time and parameters, and HycoReplayStep() with
-  fe's displacements u (n_dof) there, after which `state` is that of its end; fails where a law has no answer.
+  fe's displacements u (n_dof) there, after which `state` is that of its end and f_int (n_dof) the internal forces;
+  fails where a law has no answer. HycoReplayTry() says so in the report instead.
   HycoReplayEnd() also after a failure.
 */
 typedef struct {
   HycoROM m;
   HycoFE fe; /* both borrowed */
   HycoFEState state, end;
-  PetscReal *f_int; /* nobody asks for */
+  PetscReal *f_int;
 } HycoReplay;
 PetscErrorCode HycoReplayBegin(HycoROM model, HycoFE fe, HycoReplay *replay);
 PetscErrorCode HycoReplayMove(HycoReplay *replay, PetscInt k);
 PetscErrorCode HycoReplayStep(HycoReplay *replay, PetscInt k, const PetscReal u[]);
+PetscErrorCode HycoReplayTry(HycoReplay *replay, PetscInt k, const PetscReal u[], HycoFEStepReport *report);
 PetscErrorCode HycoReplayEnd(HycoReplay *replay);
 /* The path's part of a prediction. */
 void HycoTraceSummary(HycoROM model, HycoPrediction *prediction);
@@ -174,6 +180,7 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM model, HycoPrediction *predictio
 PetscErrorCode HycoROMMeasurePath(HycoROM model);
 /* NULL-safe. */
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
+PetscErrorCode HycoBalanceDestroy(HycoBalance *balance);
 
 /* What tells of the last prediction's error without a full-order solution: feature[HYCO_TRUST_FEATURES], all >= 0. */
 PetscErrorCode HycoTrustMeasure(HycoROM model, PetscReal feature[]);

@@ -99,6 +99,12 @@ typedef struct {
   HycoExpr stiffness[4]; /* along x, y, z and the surface's normal, 0 or more; NULL: none */
 } HycoSpring;
 
+/* Surfaces of two bodies that move as one: the slave's nodes follow the master's facets. */
+typedef struct {
+  char *name, *slave, *master;
+  PetscReal tolerance; /* largest distance as drawn; negative: by the slave's facets */
+} HycoTie;
+
 /* What a 2D scene stands for: a slice of thickness 1 that does not stretch (eps_zz = 0) or is free to (sigma_zz = 0),
    or a body of revolution about x = 0: x is the radius, y the axis, zz the hoop; all integrals are over the full
    circle. */
@@ -121,12 +127,15 @@ typedef struct {
   PetscReal *t, *value;
 } HycoTimeTable;
 
+/* What fields are measured in. */
+enum { HYCO_UNIT_LENGTH, HYCO_UNIT_FORCE, HYCO_UNIT_STRESS, HYCO_N_UNITS };
+
 struct _p_HycoScene {
   PETSCHEADER(int);
-  PetscOptions options; /* every entry, the command line's already in */
-  char *title, *mesh_path;
-  DM dm;           /* the program's own mesh; NULL: mesh_path */
-  PetscInt refine; /* times that the mesh's cells are halved */
+  PetscOptions options;                         /* every entry, the command line's already in */
+  char *title, *mesh_path, *unit[HYCO_N_UNITS]; /* units: notes, "" where the scene has none */
+  DM dm;                                        /* the program's own mesh; NULL: mesh_path */
+  PetscInt refine;                              /* times that the mesh's cells are halved */
   HycoFormulation formulation;
   char *folder; /* where relative paths of entries start */
   /* parameters */
@@ -142,7 +151,7 @@ struct _p_HycoScene {
   /* names that stand for expressions; the texts are the entries' */
   PetscInt n_constants, *constant;
   /* description */
-  PetscInt n_bodies, n_fixed, n_loads, n_point_loads, n_springs, n_contacts;
+  PetscInt n_bodies, n_fixed, n_loads, n_point_loads, n_springs, n_contacts, n_ties;
   HycoBody *body;
   HycoFixed *fixed;
   HycoLoad *load;
@@ -150,6 +159,7 @@ struct _p_HycoScene {
   HycoMotion motion;
   HycoSpring *spring;
   HycoContact *contact;
+  HycoTie *tie;
   PetscInt n_quantities;
   HycoQuantity *quantity;
   /* entries, sorted by key: what a model file carries */
@@ -167,6 +177,10 @@ PetscErrorCode HycoSceneCheckMotion(HycoScene scene);
 /* Whether a body's mass makes a force, which changes with the parameters p with changed[p] (NULL: whether there is). */
 PetscBool HycoSceneHasInertia(HycoScene scene, const HycoBody *body, const PetscBool changed[]);
 PetscErrorCode HycoSceneDestroyMotion(HycoScene scene);
+/* Reads an entry tie_NAME_...; checks all of them. */
+PetscErrorCode HycoSceneReadTie(HycoScene scene, PetscInt entry, const char name[], PetscInt field);
+PetscErrorCode HycoSceneCheckTies(HycoScene scene);
+PetscErrorCode HycoSceneDestroyTies(HycoScene scene);
 /* Reads an entry output_NAME_...; checks all of them. */
 PetscErrorCode HycoSceneReadQuantity(HycoScene scene, PetscInt entry, const char name[], PetscInt field);
 PetscErrorCode HycoSceneCheckQuantities(HycoScene scene);
@@ -177,6 +191,8 @@ PetscErrorCode HycoSceneReadHistory(HycoScene scene);
 /* Fails where the history reaches what must not change in time: the bodies' places, the rows of B. */
 PetscErrorCode HycoSceneCheckHistory(HycoScene scene);
 PetscErrorCode HycoSceneDestroyHistory(HycoScene scene);
+/* "gap = 0.05, q2 = 40" */
+void HycoSceneNamePoint(HycoScene scene, const PetscReal mu[], char at[HYCO_LINE]);
 /* The variables at time t: the parameters mu (n_parameters), t, the tables' values; out has room for n_variables. */
 void HycoSceneSetTime(HycoScene scene, const PetscReal mu[], PetscReal t, PetscReal out[]);
 /* The first time after t at which a step ends: a listed one, or a row of a table. */

@@ -211,7 +211,9 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
                         scene));
   if (model) PetscCall(DriverGet("model", "<file.h5> the reduced model: written by train, read by the others", model));
   if (output)
-    PetscCall(DriverGet("output", "<file.xdmf> fields for ParaView; the numbers in the .h5 beside it", output));
+    PetscCall(DriverGet("output",
+                        "<file.xdmf> fields for ParaView, the numbers in the .h5 beside it; or <file.vtkhdf>, one file",
+                        output));
   if (report) PetscCall(DriverGet("report", "<file.json> the result as one JSON object", report));
   if (table) PetscCall(DriverGet("table", "<file.csv> a line per point, or <file.h5>, a dataset per column", table));
   if (report) PetscCall(DriverReadQuiet());

@@ -198,6 +198,8 @@ static PetscErrorCode MarkUsed(HycoScene s, HycoMesh m, PetscBool used[])
   for (PetscInt k = 0; k < s->n_loads; k++) PetscCall(Use(m, "load", s->load[k].group, used));
   for (PetscInt k = 0; k < s->n_point_loads; k++) PetscCall(Use(m, "force", s->point_load[k].group, used));
   for (PetscInt k = 0; k < s->n_springs; k++) PetscCall(Use(m, "spring", s->spring[k].group, used));
+  for (PetscInt k = 0; k < 2 * s->n_ties; k++)
+    PetscCall(Use(m, "tie", k % 2 ? s->tie[k / 2].master : s->tie[k / 2].slave, used));
   for (PetscInt k = 0; k < s->n_contacts; k++) {
     for (PetscInt j = 0; j < s->contact[k]->entries.n; j++) {
       const HycoEntry *entry = &s->contact[k]->entries.entry[j];

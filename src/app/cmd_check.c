@@ -108,24 +108,49 @@ static PetscErrorCode CheckPoint(Check *check, const PetscReal mu[], PetscBool f
 
 /* -- what is there: rank 0 -- */
 
+/* How many nodes follow each tie's master; *n: of all ties. */
+static PetscErrorCode SayTies(Check *check, HycoMesh m, PetscInt *n)
+{
+  HycoScene s = check->fom->scene;
+  cJSON *list = cJSON_AddArrayToObject(check->json, "ties");
+
+  PetscFunctionBegin;
+  *n = 0;
+  for (PetscInt t = 0; t < s->n_ties; t++) {
+    PetscInt entry = 0, nodes = 0;
+    cJSON *one = cJSON_CreateObject();
+
+    for (; m->ties && entry < m->ties->n; entry++)
+      nodes += m->ties->tie[entry] == t && (!entry || m->ties->slave[entry - 1] != m->ties->slave[entry]);
+    cJSON_AddStringToObject(one, "name", s->tie[t].name);
+    cJSON_AddNumberToObject(one, "n_nodes", nodes);
+    cJSON_AddItemToArray(list, one);
+    PetscCall(Say("tie %s: %d nodes of %s follow %s\n", s->tie[t].name, (int)nodes, s->tie[t].slave, s->tie[t].master));
+    *n += nodes;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SayMesh(Check *check)
 {
   HycoFOM f = check->fom;
   HycoMesh m = f->part;
   const char *title;
+  PetscInt n_fixed = f->n_nodes * m->dim - f->n_free, n_tied;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetTitle(f->scene, &title));
   PetscCall(Say("scene: %s\n", title[0] ? title : "(no title)"));
-  PetscCall(Say("mesh %s: %dD, %s, %d nodes, %d cells; %d unknowns, and %d that supports fix\n",
+  PetscCall(Say("mesh %s: %dD, %s, %d nodes, %d cells; %d unknowns, and %d that supports%s fix\n",
                 f->scene->dm ? "of the program" : f->scene->mesh_path, (int)m->dim, cell_names[m->type],
-                (int)f->n_nodes, (int)f->n_cells, (int)f->n_free, (int)(f->n_nodes * m->dim - f->n_free)));
+                (int)f->n_nodes, (int)f->n_cells, (int)f->n_free, (int)n_fixed, f->scene->n_ties ? " and ties" : ""));
+  PetscCall(SayTies(check, m, &n_tied));
   cJSON_AddNumberToObject(check->json, "dimension", m->dim);
   cJSON_AddStringToObject(check->json, "cell_type", cell_names[m->type]);
   cJSON_AddNumberToObject(check->json, "n_nodes", f->n_nodes);
   cJSON_AddNumberToObject(check->json, "n_cells", f->n_cells);
   cJSON_AddNumberToObject(check->json, "n_dof", f->n_free);
-  cJSON_AddNumberToObject(check->json, "n_fixed", f->n_nodes * m->dim - f->n_free);
+  cJSON_AddNumberToObject(check->json, "n_fixed", n_fixed - n_tied * m->dim);
   cJSON_AddNumberToObject(check->json, "n_contacts", f->n_contacts);
   cJSON_AddNumberToObject(check->json, "points_checked", check->n_points);
   PetscFunctionReturn(PETSC_SUCCESS);

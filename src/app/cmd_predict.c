@@ -189,6 +189,7 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
           (int)p.iterations, (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
           (double)p.kkt.complementarity));
   PetscCall(SayTrust(&p));
+  PetscCall(DriverSayEquilibrium(&path));
   PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
   PetscCall(Report(scene, mu, &p, energy, "", PETSC_FALSE, &path));
@@ -220,6 +221,8 @@ enum {
   PATH_FORCE, /* of paths alone */
   PATH_MISES,
   PATH_INELASTIC,
+  RESIDUAL, /* where it is asked for */
+  CONTACT_RESIDUAL,
   N_COLUMNS
 };
 static const char *const columns[N_COLUMNS] = {"total_contact_force",
@@ -238,7 +241,9 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "full_order",
                                                "largest_contact_force",
                                                "largest_rid_mises",
-                                               "largest_rid_inelastic"};
+                                               "largest_rid_inelastic",
+                                               "equilibrium_residual",
+                                               "contact_residual"};
 
 /* own: columns without the scene's quantities, more of paths; with them; width: of paths with their extremes too. */
 typedef struct {
@@ -247,13 +252,15 @@ typedef struct {
 } Shape;
 
 /* names: room for N_COLUMNS + 2 HYCO_MAX_QUANTITIES, borrowed from the scene and the shape. */
-static PetscErrorCode ShapeOf(HycoScene scene, Shape *s, const char *names[])
+static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s, const char *names[])
 {
   PetscInt n_times;
+  PetscBool residual;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
-  s->own = n_times ? N_COLUMNS : PATH_FORCE;
+  PetscCall(HycoROMWantsEquilibrium(model, &residual));
+  s->own = n_times ? (residual ? N_COLUMNS : RESIDUAL) : PATH_FORCE;
   PetscCall(ReportColumns(scene, s->own, columns, &s->with_quantities, names));
   s->width = s->with_quantities;
   for (PetscInt c = s->own; n_times && c < s->with_quantities; c++) {
@@ -284,6 +291,10 @@ static void FillRow(const HycoPrediction *p, const Shape *s, PetscReal v[])
     v[PATH_FORCE] = p->path_force;
     v[PATH_MISES] = p->path_mises;
     v[PATH_INELASTIC] = p->path_inelastic;
+  }
+  if (s->own > RESIDUAL) {
+    v[RESIDUAL] = p->residual;
+    v[CONTACT_RESIDUAL] = p->contact_residual;
   }
   for (PetscInt k = s->own; k < s->with_quantities; k++) v[k] = p->quantity[k - s->own];
   for (PetscInt k = s->with_quantities; k < s->width; k++) v[k] = p->path_quantity[k - s->with_quantities];
@@ -353,7 +364,7 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(DriverCheckLeftEarly()); /* what the solver alone knows is read by the first prediction */
-  PetscCall(ShapeOf(scene, &s, names));
+  PetscCall(ShapeOf(model, scene, &s, names));
   PetscCall(PetscCalloc2(n * s.width, &value, n, &full));
   begin = HycoNow();
   HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, &s, value, full));
@@ -401,7 +412,7 @@ PetscErrorCode CommandPredict(void)
   HycoScene scene;
   HycoSamples samples = NULL;
   Fallback fallback = {0};
-  PetscBool set, monitor, extrapolate;
+  PetscBool set, monitor, extrapolate, residual;
   PetscInt n_times;
   char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
@@ -415,6 +426,8 @@ PetscErrorCode CommandPredict(void)
   PetscCall(HycoROMGetScene(model, &scene));
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverReadFallback(model, extrapolate, &fallback));
+  PetscCall(HycoROMWantsEquilibrium(model, &residual));
+  HycoCheck(!residual || n_times, "-hyco_residual is for models of paths, and the scene of %s has no history", path);
   if (monitor) PetscCall(HycoROMSetMonitor(model, DriverMonitor, NULL));
   PetscCall(DriverHasSamples(scene, &set));
   if (set) {

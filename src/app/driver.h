@@ -263,6 +263,8 @@ typedef struct {
   PetscBool ended;
   PetscReal t;
   char why[DRIVER_LINE];
+  PetscBool balanced;          /* -hyco_residual */
+  HycoEquilibrium equilibrium; /* then, on rank 0; the model's */
 } DriverReducedPath;
 /* The last prediction's, model on rank 0. Collective. */
 PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path);
@@ -270,6 +272,8 @@ PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path);
 PetscErrorCode DriverSayReducedPath(HycoScene scene, const PetscReal mu[], const DriverReducedPath *path,
                                     const char table[]);
 PetscErrorCode DriverReportReducedPath(cJSON *json, HycoScene scene, const DriverReducedPath *path);
+/* How far from equilibrium it is, where that is asked for. */
+PetscErrorCode DriverSayEquilibrium(const DriverReducedPath *path);
 
 /* -- compare_history.c -- */
 

@@ -62,9 +62,9 @@ static PetscErrorCode AddFields(const char path[])
 
   PetscFunctionBegin;
   PetscCall(HycoFieldsCheckPath(path));
-  snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
+  PetscCall(HycoFieldsNumbers(path, h5));
   PetscCall(Take("-output", path, PETSC_TRUE));
-  PetscCall(Take("the numbers of -output", h5, PETSC_TRUE));
+  if (strcmp(path, h5)) PetscCall(Take("the numbers of -output", h5, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

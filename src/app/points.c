@@ -185,6 +185,7 @@ PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
   PetscFunctionBegin;
   PetscCall(HasNamed(scene, "-grid", "-values_", given));
   if (!*given) PetscCall(PetscOptionsHasName(NULL, NULL, "-points", given));
+  if (!*given) PetscCall(PetscOptionsHasName(NULL, NULL, "-scatter", given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -273,9 +274,24 @@ static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscInt *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode AddScattered(HycoSamples samples, const char text[])
+{
+  PetscInt m;
+  PetscReal *value, count;
+
+  PetscFunctionBegin;
+  PetscCall(ParseNumbers("scatter", text, &m, &value));
+  count = m == 1 ? value[0] : 0;
+  PetscCall(PetscFree(value));
+  HycoCheck(count >= 1 && count <= 1e8 && count == PetscFloorReal(count),
+            "-scatter is \"%s\"; one whole number, at least 1, is expected", text);
+  PetscCall(HycoSamplesAddScattered(samples, (PetscInt)count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given)
 {
-  char grid[PETSC_MAX_PATH_LEN], points[PETSC_MAX_PATH_LEN];
+  char grid[PETSC_MAX_PATH_LEN], points[PETSC_MAX_PATH_LEN], scatter[PETSC_MAX_PATH_LEN];
   PetscInt n_sets = 0, n, type = 0;
 
   PetscFunctionBegin;
@@ -284,14 +300,20 @@ PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool
   if (scene) PetscCall(HycoSamplesCreate(scene, samples));
   PetscCall(AddValues(scene, scene ? *samples : NULL, &n_sets));
   PetscCall(DriverGet("points", "<file.csv> a set of points: a header with the names, then a point per line", points));
+  PetscCall(DriverGet("scatter",
+                      "<n> a set of points: n of them all over the ranges, each parameter at n values (Halton's "
+                      "sequence); for training beside 3 parameters or more",
+                      scatter));
   if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
-  n_sets += (grid[0] != '\0') + (points[0] != '\0');
-  HycoCheck(n_sets <= 1, "give one set of points: -grid, or -values_NAME, or -points");
+  n_sets += (grid[0] != '\0') + (points[0] != '\0') + (scatter[0] != '\0');
+  HycoCheck(n_sets <= 1, "give one set of points: -grid, or -values_NAME, or -points, or -scatter");
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   if (grid[0])
     PetscCall(AddGrid(scene, *samples, "grid", 0, grid));
   else if (points[0])
     PetscCall(HycoSamplesAddFile(*samples, points));
+  else if (scatter[0])
+    PetscCall(AddScattered(*samples, scatter));
   else if (!n) /* a scene without parameters has one point */
     PetscCall(HycoSamplesAddPoint(*samples, NULL));
   *given = (PetscBool)(n_sets || !n);

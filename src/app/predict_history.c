@@ -17,6 +17,8 @@ PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path)
   PetscCall(PetscMalloc1(path->n, &path->step));
   if (rank == 0) PetscCall(PetscArraycpy(path->step, h.step, path->n));
   HycoBcast(path->step, path->n * (PetscInt)sizeof(*path->step), MPI_BYTE, PETSC_COMM_WORLD);
+  PetscCall(HycoROMWantsEquilibrium(model, &path->balanced));
+  if (path->n && path->balanced) HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetEquilibrium(model, &path->equilibrium));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -32,6 +34,44 @@ PetscErrorCode DriverSayReducedPath(HycoScene scene, const PetscReal mu[], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode DriverSayEquilibrium(const DriverReducedPath *path)
+{
+  const HycoEquilibrium *e = &path->equilibrium;
+  char words[3][32];
+
+  PetscFunctionBegin;
+  if (!path->balanced) PetscFunctionReturn(PETSC_SUCCESS);
+  if (e->why) {
+    PetscCall(Say("equilibrium on the whole mesh: not known; %s\n", e->why));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  DriverPercent(e->worst, words[0]);
+  DriverPercent(e->n ? e->residual[e->n - 1] : 0, words[1]);
+  DriverPercent(e->worst_contact, words[2]);
+  PetscCall(Say("equilibrium on the whole mesh: residual %s of the path's size at worst, at t = %.10g; %s at the end; "
+                "contact conditions missed by %s\n",
+                words[0], (double)path->step[e->at].t, words[1], words[2]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* "equilibrium": null where the laws have no answer. */
+static void ReportEquilibrium(cJSON *json, const DriverReducedPath *path)
+{
+  const HycoEquilibrium *e = &path->equilibrium;
+  cJSON *object;
+
+  if (e->why) {
+    cJSON_AddNullToObject(json, "equilibrium");
+    return;
+  }
+  object = cJSON_AddObjectToObject(json, "equilibrium");
+  cJSON_AddNumberToObject(object, "worst", e->worst);
+  cJSON_AddNumberToObject(object, "t", path->step[e->at].t);
+  cJSON_AddNumberToObject(object, "worst_contact", e->worst_contact);
+  ReportVector(object, "residual", e->n, e->residual);
+  ReportVector(object, "contact", e->n, e->contact);
+}
+
 PetscErrorCode DriverReportReducedPath(cJSON *json, HycoScene scene, const DriverReducedPath *path)
 {
   cJSON *history = cJSON_AddObjectToObject(json, "history");
@@ -40,5 +80,6 @@ PetscErrorCode DriverReportReducedPath(cJSON *json, HycoScene scene, const Drive
   cJSON_AddBoolToObject(history, "ended", path->ended);
   cJSON_AddNumberToObject(history, "t_end", path->t);
   PetscCall(DriverReportSteps(history, scene, PETSC_TRUE, path->n, path->step));
+  if (path->balanced) ReportEquilibrium(json, path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -55,7 +55,7 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
     PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k]->slave, &g));
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
       const PetscInt i = m->group_node[j];
-      PetscBool fixed = (PetscBool)!is_slave[i];
+      PetscBool fixed = (PetscBool)(!is_slave[i] && HycoMeshTied(m, i) < 0);
 
       for (PetscInt c = 0; c < fe->dim; c++) fixed = (PetscBool)(fixed && fe->fixed[i * fe->dim + c]);
       if (!fixed) continue;

@@ -6,8 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The tolerance when none is stated: a tenth of the shortest edge between the slave's facet corners. */
-static PetscReal DefaultTolerance(HycoMesh m, PetscInt group)
+PetscReal HycoSurfaceTolerance(HycoMesh m, PetscInt group)
 {
   PetscReal shortest = PETSC_MAX_REAL;
 
@@ -171,7 +170,7 @@ static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, Hyco
   PetscCall(CheckApart(t, c));
   for (PetscInt k = 0; k < m.n && !settle; k++) HycoPairsAppend(p, index, m.slave[k], 0, NULL, NULL);
   if (!settle) PetscFunctionReturn(PETSC_SUCCESS);
-  m.small = DefaultTolerance(mesh, t->slave);
+  m.small = HycoSurfaceTolerance(mesh, t->slave);
   PetscCall(HycoContactGetLength(c, "tolerance", &m.tolerance));
   if (m.tolerance < 0) m.tolerance = m.small;
   PetscCall(PetscMalloc3(m.n, &m.at, m.n, &m.why, m.n, &missed));

@@ -198,6 +198,7 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
 
     ierr = c->ops->setup ? (*c->ops->setup)(c, fe, k, pairs) : AppendNodes(fe, k, held, pairs);
   }
+  if (!ierr) ierr = HycoPairsDropTied(scene, fe->mesh, pairs);
   if (!ierr) ierr = CheckSlaves(scene, fe->mesh, held, pairs);
   PetscCall(PetscFree(held));
   PetscCall(ierr);

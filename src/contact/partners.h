@@ -17,6 +17,8 @@ typedef struct {
   PetscBool *at_border;       /* by node of the mesh; NULL: not made */
 } HycoPartners;
 
+/* The tolerance when none is stated: a tenth of the shortest edge between the corners of the group's facets. */
+PetscReal HycoSurfaceTolerance(HycoMesh mesh, PetscInt group);
 /* The search on fe's nodes. The caller destroys it. */
 PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact contact, PetscBool nodes, HycoPartners *partners);
 PetscErrorCode HycoPartnersDestroy(HycoPartners *partners);

@@ -59,29 +59,21 @@ PetscErrorCode HycoComparisonBring(HycoComparison *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What supports along a direction say of displacements: rows a of HycoOblique, of each node's rows as all are spread.
- */
+/* What supports along a direction and ties say of displacements: by the ranks' parts, as all are spread. */
 static PetscErrorCode Complete(HycoComparison *c)
 {
-  const PetscInt dim = c->width[0];
   HycoFE fe = c->f->fe;
-  PetscReal *own, *rows;
-  PetscInt any = fe->n_oblique;
+  PetscReal *u;
+  PetscInt any = fe->n_oblique + fe->mesh->n_tied;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPIU_INT, MPI_MAX, HycoComm(c->f)));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc2(fe->n_dof * dim, &own, c->n[0] * dim * dim, &rows));
-  for (PetscInt k = 0; k < fe->n_oblique; k++) {
-    const HycoOblique *o = &fe->oblique[k];
-
-    PetscCall(PetscArraycpy(own + (o->node * dim + o->c) * dim, o->a, dim));
-  }
-  PetscCall(HycoFOMToRows(c->f, HYCO_ON_NODES, MPIU_REAL, dim * dim, own, rows));
-  for (PetscInt i = 0; i < c->n[0] * dim; i++) { /* the offset is there */
-    for (PetscInt d = 0; d < dim; d++) c->U[i] += rows[i * dim + d] * c->U[i - i % dim + d];
-  }
-  PetscCall(PetscFree2(own, rows));
+  PetscCall(PetscMalloc1(fe->n_dof, &u));
+  PetscCall(HycoFOMFromRows(c->f, fe->dim, c->U, u));
+  HycoFEComplete(fe, u);
+  PetscCall(HycoFOMToRows(c->f, HYCO_ON_NODES, MPIU_REAL, fe->dim, u, c->U));
+  PetscCall(PetscFree(u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -41,6 +41,7 @@ PetscErrorCode HycoNormsCreate(HycoFOM f, HycoNorms *norms)
   HycoOnEach(HycoComm(f), HycoFESetParameters(h->fe, mu));
   PetscCall(AssembleNorm(h, &h->M));
   PetscCall(PetscArrayzero(h->fe->fixed, h->fe->n_dof)); /* prescribed displacements count in the norm */
+  h->fe->plain = PETSC_TRUE;
   PetscCall(AssembleNorm(h, &h->H));
   PetscCall(MatSetOption(h->M, MAT_SPD, PETSC_TRUE));
   PetscCall(MatCreateVecs(h->M, &h->x, &h->y));

@@ -8,7 +8,8 @@
 struct _n_HycoAssemblyMap {
   PetscObjectId matrix;
   PetscObjectState pattern;
-  PetscInt *offset;      /* n_cells x nv x nv: of the first free unknown of node b in the rows of a's free unknowns */
+  PetscInt *start;       /* of each cell's n x n offsets, n its nodes */
+  PetscInt *offset;      /* of the first free unknown of node b in the rows of a's free unknowns */
   PetscScalar *constant; /* values of the cells that no parameter reaches; NULL: there is none */
 };
 
@@ -16,6 +17,7 @@ PetscErrorCode HycoAssemblyMapDestroy(HycoAssemblyMap *places)
 {
   PetscFunctionBegin;
   if (!*places) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*places)->start));
   PetscCall(PetscFree((*places)->offset));
   PetscCall(PetscFree((*places)->constant));
   PetscCall(PetscFree(*places));
@@ -34,18 +36,20 @@ static PetscInt FirstFree(HycoFE fe, PetscInt node)
 /* False where a row lacks an entry: the matrix was not made by cells of this mesh. */
 static PetscBool FindOffsets(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt offset[])
 {
-  const PetscInt nv = fe->mesh->nv;
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    PetscInt node[HYCO_MAX_CELL_NODES];
+    const PetscInt n = HycoMeshCellNodes(fe->mesh, e, node);
 
-  for (PetscInt k = 0; k < fe->mesh->n_cells * nv * nv; k++) {
-    const PetscInt *node = fe->mesh->cells + k / (nv * nv) * nv;
-    const PetscInt row = FirstFree(fe, node[k / nv % nv]), col = FirstFree(fe, node[k % nv]);
-    PetscInt at = 0;
+    for (PetscInt k = 0; k < n * n; k++, offset++) {
+      const PetscInt row = FirstFree(fe, node[k / n]), col = FirstFree(fe, node[k % n]);
+      PetscInt at = 0;
 
-    offset[k] = 0;
-    if (row < 0 || col < 0) continue;
-    while (ia[row] + at < ia[row + 1] && ja[ia[row] + at] != col) at++;
-    if (ia[row] + at == ia[row + 1]) return PETSC_FALSE;
-    offset[k] = at;
+      *offset = 0;
+      if (row < 0 || col < 0) continue;
+      while (ia[row] + at < ia[row + 1] && ja[ia[row] + at] != col) at++;
+      if (ia[row] + at == ia[row + 1]) return PETSC_FALSE;
+      *offset = at;
+    }
   }
   return PETSC_TRUE;
 }
@@ -54,9 +58,9 @@ static PetscBool FindOffsets(HycoFE fe, const PetscInt ia[], const PetscInt ja[]
 static void Add(HycoFE fe, const PetscInt offset[], PetscInt cell, const PetscReal Ae[], const PetscInt ia[],
                 PetscScalar a[])
 {
-  const PetscInt nv = fe->mesh->nv, dim = fe->dim, n = nv * dim, *node = fe->mesh->cells + cell * nv;
+  PetscInt node[HYCO_MAX_CELL_NODES];
+  const PetscInt dim = fe->dim, nv = HycoMeshCellNodes(fe->mesh, cell, node), n = nv * dim;
 
-  offset += cell * nv * nv;
   for (PetscInt r = 0; r < n; r++) {
     const PetscInt row = node[r / dim] * dim + r % dim;
 
@@ -79,13 +83,13 @@ static void Add(HycoFE fe, const PetscInt offset[], PetscInt cell, const PetscRe
 /* Adds the cells that parameters reach, or the others. */
 static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant, const PetscInt ia[], PetscScalar a[])
 {
-  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+  PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     if (fe->constant[e] != constant) continue;
     PetscCall(HycoFEElementStiffness(fe, e, Ke));
-    Add(fe, p->offset, e, Ke, ia, a);
+    Add(fe, p->offset + p->start[e], e, Ke, ia, a);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -93,11 +97,19 @@ static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant,
 static PetscErrorCode Create(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt n, HycoAssemblyMap *places)
 {
   HycoAssemblyMap p;
+  PetscInt node[HYCO_MAX_CELL_NODES];
 
   PetscFunctionBegin;
   PetscCall(PetscNew(places));
   p = *places;
-  PetscCall(PetscMalloc1(fe->mesh->n_cells * fe->mesh->nv * fe->mesh->nv, &p->offset));
+  PetscCall(PetscMalloc1(fe->mesh->n_cells + 1, &p->start));
+  p->start[0] = 0;
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    const PetscInt n_nodes = HycoMeshCellNodes(fe->mesh, e, node);
+
+    p->start[e + 1] = p->start[e] + n_nodes * n_nodes;
+  }
+  PetscCall(PetscMalloc1(p->start[fe->mesh->n_cells], &p->offset));
   if (!FindOffsets(fe, ia, ja, p->offset)) {
     PetscCall(HycoAssemblyMapDestroy(places));
     PetscFunctionReturn(PETSC_SUCCESS);

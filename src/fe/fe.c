@@ -57,6 +57,9 @@ static PetscErrorCode FindConstant(HycoFE fe)
     for (PetscInt a = 0; a < m->nv; a++) {
       if (moves[m->node_body[m->cells[e * m->nv + a]]]) fe->constant[e] = PETSC_FALSE;
     }
+    for (PetscInt k = m->ties ? m->follow_start[e] : 0; m->ties && k < m->follow_start[e + 1]; k++) {
+      if (moves[m->node_body[m->follow[k]]]) fe->constant[e] = PETSC_FALSE;
+    }
   }
   HycoSpringsMarkVarying(fe, every);
   for (PetscInt e = 0; e < m->n_cells; e++) fe->n_constant += fe->constant[e];
@@ -223,6 +226,10 @@ static PetscErrorCode SetOblique(HycoFE fe)
         if (fixed->direction[c]) PetscCall(HycoExprEval(fixed->direction[c], fe->mu, 1, fe->X + 3 * i, &n[c]));
         size += n[c] * n[c];
       }
+      if (HycoMeshTied(m, i) >= 0) {
+        PetscCall(HycoTiedCheckOblique(fe, fixed, g, i));
+        continue;
+      }
       HycoCheck(size > 0, "%s: its direction has no length at node %d", HycoExprKey(fixed->normal), (int)m->node_id[i]);
       HycoCheck(!turns || !(body->map[0] || body->map[1] || body->map[2]),
                 "%s: its direction depends on the place, and the map of body %s moves node %d; give one direction",
@@ -268,6 +275,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
     }
   }
   PetscCall(SetOblique(fe));
+  PetscCall(HycoTiedFix(fe));
   for (PetscInt k = 0; k < fe->n_pins; k++) fe->fixed[fe->pin[k]] = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -338,6 +346,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   fe->ready = PETSC_FALSE; /* until all of it is done */
   if (first || c.nodes) {
     PetscCall(MoveNodes(fe));
+    PetscCall(HycoTiedPlace(fe));
     PetscCall(CheckAxis(fe));
     PetscCall(HycoMirrorFind(fe));
     for (PetscInt k = 0; k < fe->n_loads; k++) fe->shares[k].ready = PETSC_FALSE;

@@ -13,11 +13,20 @@ typedef struct {
 static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal value, Into F)
 {
   const PetscInt global = fe->mesh->node_global ? fe->mesh->node_global[node] : node;
+  const PetscInt tied = HycoMeshTied(fe->mesh, node);
   const HycoOblique *oblique;
 
   PetscFunctionBegin;
   if (F.all) {
     F.all[node * fe->dim + c] += value;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (tied >= 0) {
+    const PetscInt first = fe->mesh->tied_start[tied];
+    const PetscReal *weight = fe->mesh->ties->weight + fe->mesh->tied_entry[tied];
+
+    for (PetscInt j = first; j < fe->mesh->tied_start[tied + 1]; j++)
+      PetscCall(AddNode(fe, fe->mesh->tied_master[j], c, weight[j - first] * value, F));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!fe->fixed[node * fe->dim + c]) PetscCall(VecSetValue(F.vec, global * fe->dim + c, value, ADD_VALUES));
@@ -179,8 +188,9 @@ static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt g
 static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
 {
   HycoMesh m = fe->mesh;
-  const PetscInt *node = m->cells + cell * m->nv, n = m->nv * m->dim;
-  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS], u0[HYCO_MAX_CELL_DOFS];
+  PetscInt node[HYCO_MAX_CELL_NODES];
+  const PetscInt n = m->dim * HycoMeshCellNodes(m, cell, node);
+  PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS], u0[HYCO_MAX_CELL_UNKNOWNS];
   PetscBool any = PETSC_FALSE;
 
   PetscFunctionBegin;
@@ -349,15 +359,15 @@ PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[])
 PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[])
 {
   HycoMesh m = fe->mesh;
-  const PetscInt n = m->nv * m->dim;
-  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+  PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
 
   PetscFunctionBegin;
   PetscCall(HycoFELoads(fe, r));
   HycoFEGeneralise(fe, r);
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = (f_int ? f_int[k] : 0) - r[k];
   for (PetscInt e = 0; e < m->n_cells && !f_int; e++) {
-    const PetscInt *node = m->cells + e * m->nv;
+    PetscInt node[HYCO_MAX_CELL_NODES];
+    const PetscInt n = m->dim * HycoMeshCellNodes(m, e, node);
     PetscBool holds = PETSC_FALSE;
 
     for (PetscInt k = 0; k < n; k++) holds = (PetscBool)(holds || fe->fixed[node[k / m->dim] * m->dim + k % m->dim]);
@@ -369,6 +379,6 @@ PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f
       r[node[k / n / m->dim] * m->dim + k / n % m->dim] += Ke[k] * (fe->fixed[j] ? fe->u0[j] : u[j]);
     }
   }
-  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? r[k] : 0;
+  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = HycoFESupports(fe, k) ? r[k] : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -117,9 +117,12 @@ const HycoOblique *HycoFEOblique(HycoFE fe, PetscInt dof)
 
 void HycoObliqueStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
-  const PetscInt *node = fe->mesh->cells + cell * fe->mesh->nv, dim = fe->dim, n = fe->mesh->nv * dim;
+  const PetscInt dim = fe->dim;
+  PetscInt node[HYCO_MAX_CELL_NODES], n;
 
-  for (PetscInt k = 0; fe->n_oblique && k < n; k++) {
+  if (!fe->n_oblique || fe->plain) return;
+  n = dim * HycoMeshCellNodes(fe->mesh, cell, node);
+  for (PetscInt k = 0; k < n; k++) {
     const HycoOblique *o = HycoFEOblique(fe, node[k / dim] * dim + k % dim);
 
     for (PetscInt d = 0; o && d < dim; d++) {
@@ -133,6 +136,7 @@ void HycoObliqueStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 
 void HycoFEGeneralise(HycoFE fe, PetscReal f[])
 {
+  HycoTiedGeneralise(fe, f);
   for (PetscInt k = 0; k < fe->n_oblique; k++) {
     const HycoOblique *o = &fe->oblique[k];
 
@@ -149,4 +153,5 @@ void HycoFEComplete(HycoFE fe, PetscReal u[])
     for (PetscInt d = 0; d < fe->dim; d++) sum += o->a[d] != 0 ? o->a[d] * u[o->node * fe->dim + d] : 0;
     u[o->node * fe->dim + o->c] = sum;
   }
+  HycoTiedComplete(fe, u);
 }

@@ -155,6 +155,7 @@ PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   PetscFunctionBegin;
   PetscCall(HycoFEBodyStiffness(fe, cell, Ke));
   HycoSpringsAddStiffness(fe, cell, Ke);
+  HycoTiedStiffness(fe, cell, Ke);
   HycoObliqueStiffness(fe, cell, Ke);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -167,7 +168,7 @@ static PetscInt Global(HycoMesh m, PetscInt node)
 /* Distinct neighbours of each owned node, on this rank's columns and off them. */
 static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt first, PetscInt on[], PetscInt off[])
 {
-  PetscInt *start, *around, *seen;
+  PetscInt *start, *around, *seen, node[HYCO_MAX_CELL_NODES];
 
   PetscFunctionBegin;
   PetscCall(HycoMeshNodeCells(m, &start, &around));
@@ -180,8 +181,10 @@ static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt fir
     on[row] = 1; /* its own diagonal, even of a node without cells */
     seen[i] = i;
     for (PetscInt k = start[i]; k < start[i + 1]; k++) {
-      for (PetscInt v = 0; v < m->nv; v++) {
-        const PetscInt j = m->cells[around[k] * m->nv + v], col = Global(m, j) - first;
+      const PetscInt n = HycoMeshCellNodes(m, around[k], node);
+
+      for (PetscInt v = 0; v < n; v++) {
+        const PetscInt j = node[v], col = Global(m, j) - first;
 
         if (seen[j] == i) continue;
         seen[j] = i;
@@ -221,12 +224,12 @@ PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, Pe
 static PetscErrorCode AddElement(HycoFE fe, PetscInt cell, const PetscReal Ae[], Mat A)
 {
   HycoMesh m = fe->mesh;
-  const PetscInt n = m->nv * m->dim;
-  PetscInt index[HYCO_MAX_CELL_DOFS];
+  PetscInt index[HYCO_MAX_CELL_UNKNOWNS], node[HYCO_MAX_CELL_NODES];
+  const PetscInt n_nodes = HycoMeshCellNodes(m, cell, node), n = n_nodes * m->dim;
 
   PetscFunctionBegin;
-  for (PetscInt v = 0; v < m->nv; v++) {
-    const PetscInt i = m->cells[cell * m->nv + v];
+  for (PetscInt v = 0; v < n_nodes; v++) {
+    const PetscInt i = node[v];
 
     for (PetscInt c = 0; c < m->dim; c++) {
       const PetscInt row = Global(m, i) * m->dim + c, k = v * m->dim + c;
@@ -253,7 +256,7 @@ static PetscErrorCode Finish(Mat A)
 
 static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
 {
-  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+  PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
   PetscBool done;
 
   PetscFunctionBegin;
@@ -283,7 +286,7 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
-  PetscReal Me[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+  PetscReal Me[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
 
   PetscFunctionBegin;
   PetscCall(MatSetOption(M, MAT_IGNORE_ZERO_ENTRIES, PETSC_TRUE)); /* components do not couple */
@@ -306,6 +309,7 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
         }
       }
     }
+    HycoTiedStiffness(fe, e, Me);
     HycoObliqueStiffness(fe, e, Me);
     PetscCall(AddElement(fe, e, Me, M));
   }

@@ -59,6 +59,13 @@ static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], Pets
 
     part[PetscMax(a, b)] = PetscMin(a, b);
   }
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+      const PetscInt a = Root(part, m->tied[k]), b = Root(part, m->tied_master[j]);
+
+      part[PetscMax(a, b)] = PetscMin(a, b);
+    }
+  }
   for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = Root(part, i);
   PetscCall(PetscMalloc2(m->n_nodes, &label, m->n_nodes, &number));
   for (PetscInt i = 0; i < m->n_nodes; i++) { /* roots come first */
@@ -377,7 +384,7 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part
     PetscReal x[3], row[6];
     PetscInt n;
 
-    if (!fe->fixed[k] || HycoMeshOwned(fe->mesh, i) < 0) continue;
+    if (!HycoFESupports(fe, k) || HycoMeshOwned(fe->mesh, i) < 0) continue;
     for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * i + c] - p->centre[c]) / p->size;
     n = RigidRow(fe->dim, x, k % fe->dim, row);
     oblique = HycoFEOblique(fe, k);

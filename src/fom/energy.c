@@ -36,8 +36,9 @@ static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
 static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[], PetscReal *work)
 {
   HycoMesh m = fe->mesh;
-  const PetscInt *node = m->cells + cell * m->nv, n = m->nv * m->dim;
-  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+  PetscInt node[HYCO_MAX_CELL_NODES];
+  const PetscInt n = m->dim * HycoMeshCellNodes(m, cell, node);
+  PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
   PetscBool any = PETSC_FALSE;
 
   PetscFunctionBegin;

@@ -59,7 +59,7 @@ static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
   PetscCall(PetscMalloc1(f->fe->n_dof, &along));
   PetscCall(PetscArraycpy(along, contact, f->fe->n_dof));
   HycoFEGeneralise(f->fe, along);
-  for (PetscInt k = 0; k < f->fe->n_dof; k++) r[k] -= f->fe->fixed[k] ? along[k] : 0;
+  for (PetscInt k = 0; k < f->fe->n_dof; k++) r[k] -= HycoFESupports(f->fe, k) ? along[k] : 0;
   PetscCall(PetscFree(along));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,7 +1,5 @@
-/*
-  The fields of a path at its listed times, for ParaView: one .h5 with all numbers and an .xdmf that strings them
-  together. Each rank writes its rows of the file's order.
-*/
+/* The fields of a path at its listed times: each as it comes into one file, and into one of its own beside a
+   checkpoint. */
 #include <hycofile.h>
 #include <hycofields.h>
 #include <hycoh5.h>
@@ -10,60 +8,23 @@
 #include <string.h>
 #include <unistd.h>
 
-#define MOST_FIELDS 24
-
 struct _n_HycoSeries {
   HycoSeriesSource from; /* of the last time */
-  char path[PETSC_MAX_PATH_LEN], h5_path[PETSC_MAX_PATH_LEN];
-  HycoH5 h, part;   /* part: this time's alone, beside the checkpoint; NULL: none */
-  PetscInt n, room; /* times */
-  PetscReal *t;
-  PetscInt n_fields;
-  HycoField field[MOST_FIELDS]; /* of the last time, without data */
-  char name[MOST_FIELDS][64];
+  HycoFieldFile file;
+  HycoH5 part; /* this time's alone, beside the checkpoint; NULL: none */
 };
-
-static PetscInt CountItems(HycoSeries s, HycoPlace place)
-{
-  return place == HYCO_ON_CELLS ? s->from.n_cells : s->from.n_nodes;
-}
-
-/* "step-0003/nodes/displacement" */
-static void NameSet(const HycoField *field, PetscInt k, char name[HYCO_LINE])
-{
-  HycoFormat(name, "step-%04d/%s/%s", (int)k, field->place == HYCO_ON_CELLS ? "cells" : "nodes", field->name);
-}
-
-/* Notes a field of this time; NULL: there are too many. */
-static PetscErrorCode NoteField(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
-                                HycoField **field)
-{
-  PetscFunctionBegin;
-  *field = NULL;
-  if (s->n_fields == MOST_FIELDS) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscStrncpy(s->name[s->n_fields], name, sizeof(s->name[0])));
-  *field = &s->field[s->n_fields];
-  **field = (HycoField){s->name[s->n_fields++], place, components, NULL, 0};
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Writes a field of this time; missing: at nodes off its surface. */
 static PetscErrorCode AddPartial(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
                                  const PetscReal value[], PetscReal missing)
 {
-  const HycoFileOrder *rows = s->from.rows;
-  HycoField *field;
+  const HycoField field = {name, place, components, value, missing};
   char set[HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCall(NoteField(s, name, place, components, &field));
-  if (!field) PetscFunctionReturn(PETSC_SUCCESS);
-  NameSet(field, s->n, set);
-  field->data = value;
-  field->missing = missing;
-  PetscCall(HycoFieldWriteData(s->h, rows, CountItems(s, place), set, field));
-  if (s->part) PetscCall(HycoFieldWriteData(s->part, rows, CountItems(s, place), set, field));
-  field->data = NULL;
+  PetscCall(HycoFieldFileAdd(s->file, &field));
+  HycoFieldName(&field, s->file->n, set);
+  if (s->part) PetscCall(HycoFieldWriteData(s->part, s->from.rows, HycoFieldFileCount(s->file, place), set, &field));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -134,26 +95,15 @@ static PetscErrorCode AddContacts(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What does not change in time. */
-static PetscErrorCode WriteMesh(HycoSeries s)
+PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], PetscInt most, HycoSeries *series)
 {
-  const HycoSeriesSource *f = &s->from;
-
-  PetscFunctionBegin;
-  HycoOnRoot(f->comm, HycoFieldsWriteHead(s->h, f->fe->mesh, f->fe->scene, f->mu, NULL));
-  PetscCall(HycoFieldsWriteMesh(s->h, "mesh", f->rows, f->fe->mesh, f->fe->X));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], HycoSeries *series)
-{
+  HycoFieldFile file;
   HycoSeries s;
 
   PetscFunctionBegin;
-  HycoOnRoot(comm, HycoFieldsCheckPath(path));
+  PetscCall(HycoFieldFileCreate(comm, path, most, &file));
   PetscCall(PetscNew(&s));
-  PetscCall(PetscStrncpy(s->path, path, sizeof(s->path)));
-  PetscCall(PetscSNPrintf(s->h5_path, sizeof(s->h5_path), "%.*s.h5", (int)strlen(path) - 5, path));
+  s->file = file;
   *series = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -165,7 +115,7 @@ PetscErrorCode HycoFOMSetSeries(HycoFOM f, const char path[])
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   HycoCheck(f->path, "HycoFOMSetSeries: the scene has no history; HycoFOMWrite() writes its solution");
-  PetscCall(HycoSeriesCreate(HycoComm(f), path, &s));
+  PetscCall(HycoSeriesCreate(HycoComm(f), path, f->scene->n_times, &s));
   PetscCall(HycoSeriesDestroy(&f->path->series));
   f->path->series = s;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -197,11 +147,8 @@ static PetscErrorCode Look(HycoFOM f, HycoSeriesSource *from)
 PetscErrorCode HycoSeriesOpen(HycoSeries s, const HycoSeriesSource *from)
 {
   PetscFunctionBegin;
-  s->n = 0;
   s->from = *from;
-  if (s->h) PetscCall(HycoH5Close(&s->h, PETSC_FALSE));
-  PetscCall(HycoH5CreateShared(from->comm, s->h5_path, &s->h));
-  PetscCall(WriteMesh(s));
+  PetscCall(HycoFieldFileOpen(s->file, from->rows, from->fe->mesh, from->fe->scene, from->fe->X, from->mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -228,7 +175,7 @@ static PetscErrorCode WriteList(HycoSeries s)
   char list[HYCO_LINE] = "";
 
   PetscFunctionBegin;
-  for (PetscInt j = 0; j < s->n_fields; j++) PetscCall(HycoListAdd(list, " ", s->field[j].name));
+  for (PetscInt j = 0; j < s->file->n_fields; j++) PetscCall(HycoListAdd(list, " ", s->file->field[j].name));
   PetscCall(HycoH5WriteText(s->part, "fields", list));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -237,7 +184,8 @@ static PetscErrorCode WriteList(HycoSeries s)
 static PetscErrorCode ReadField(HycoFOM f, HycoH5 h, const HycoFileOrder *order, const char set[],
                                 const HycoField *field, PetscReal **rows)
 {
-  const PetscInt all = CountItems(f->path->series, field->place), n = order ? order->n[field->place] : all;
+  const PetscInt all = HycoFieldFileCount(f->path->series->file, field->place),
+                 n = order ? order->n[field->place] : all;
   PetscInt n_rows, cols;
 
   PetscFunctionBegin;
@@ -250,24 +198,23 @@ static PetscErrorCode ReadField(HycoFOM f, HycoH5 h, const HycoFileOrder *order,
 
 static PetscErrorCode CopyField(HycoFOM f, HycoSeries s, HycoH5 h, const char name[], PetscInt k)
 {
+  HycoField field = {name, HYCO_ON_NODES, 0, NULL, 0};
   const HycoFileOrder *order;
-  HycoField *field;
   PetscReal *rows = NULL;
   PetscInt n_rows;
+  PetscErrorCode ierr;
   char set[HYCO_LINE];
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(f, &order));
-  PetscCall(NoteField(s, name, HYCO_ON_NODES, 0, &field));
-  if (!field) PetscFunctionReturn(PETSC_SUCCESS);
-  NameSet(field, k, set);
-  if (!HycoH5Has(h, set)) field->place = HYCO_ON_CELLS;
-  NameSet(field, k, set);
-  HycoOnEach(HycoComm(f), ReadField(f, h, order, set, field, &rows));
-  PetscCall(HycoH5GetSize(h, set, &n_rows, &field->components));
-  PetscCall(HycoH5WriteRows(s->h, set, MPIU_REAL, n_rows, field->components, order ? order->first[field->place] : 0,
-                            order ? order->n[field->place] : n_rows, rows));
+  HycoFieldName(&field, k, set);
+  if (!HycoH5Has(h, set)) field.place = HYCO_ON_CELLS;
+  HycoFieldName(&field, k, set);
+  HycoOnEach(HycoComm(f), ReadField(f, h, order, set, &field, &rows));
+  PetscCall(HycoH5GetSize(h, set, &n_rows, &field.components));
+  ierr = HycoFieldFileAddRows(s->file, &field, rows);
   PetscCall(PetscFree(rows));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -300,17 +247,6 @@ static PetscErrorCode OpenPart(HycoFOM f, PetscInt k, HycoH5 *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode NoteTime(HycoSeries s, PetscReal t)
-{
-  PetscFunctionBegin;
-  if (s->n == s->room) {
-    s->room = 2 * s->room + 64;
-    PetscCall(PetscRealloc((size_t)s->room * sizeof(*s->t), &s->t));
-  }
-  s->t[s->n++] = t;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoSeriesRestore(HycoFOM f)
 {
   HycoSeries s = f->path->series;
@@ -320,12 +256,12 @@ PetscErrorCode HycoSeriesRestore(HycoFOM f)
     HycoH5 h = NULL;
     PetscErrorCode ierr;
 
-    s->n_fields = 0;
+    PetscCall(HycoFieldFileBeginTime(s->file, f->path->steps[k].t));
     HycoOnEach(HycoComm(f), OpenPart(f, k, &h));
     ierr = CopyFields(f, s, h, k);
     PetscCall(HycoH5Close(&h, PETSC_FALSE));
     PetscCall(ierr);
-    PetscCall(NoteTime(s, f->path->steps[k].t));
+    PetscCall(HycoFieldFileEndTime(s->file));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -333,7 +269,6 @@ PetscErrorCode HycoSeriesRestore(HycoFOM f)
 static PetscErrorCode AddFields(HycoSeries s)
 {
   PetscFunctionBegin;
-  s->n_fields = 0;
   PetscCall(AddDisplacement(s));
   PetscCall(AddState(s));
   PetscCall(AddContacts(s));
@@ -345,8 +280,9 @@ PetscErrorCode HycoSeriesAddTime(HycoSeries s, const HycoSeriesSource *from)
 {
   PetscFunctionBegin;
   s->from = *from;
+  PetscCall(HycoFieldFileBeginTime(s->file, from->t));
   PetscCall(AddFields(s));
-  PetscCall(NoteTime(s, from->t));
+  PetscCall(HycoFieldFileEndTime(s->file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -361,7 +297,7 @@ PetscErrorCode HycoSeriesAdd(HycoFOM f)
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Look(f, &from));
   if (f->path->checkpoint[0]) {
-    NamePart(f, s->n, path);
+    NamePart(f, s->file->n, path);
     PetscCall(HycoH5CreateShared(HycoComm(f), path, &s->part));
   }
   ierr = HycoSeriesAddTime(s, &from);
@@ -370,82 +306,10 @@ PetscErrorCode HycoSeriesAdd(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void WriteItem(FILE *out, const char kind[], PetscInt rows, PetscInt cols, const char h5[], const char name[])
-{
-  fprintf(out, "     <DataItem Format=\"HDF\" %s Dimensions=\"%ld %ld\">%s:/%s</DataItem>\n", kind, (long)rows,
-          (long)cols, h5, name);
-}
-
-/* One time: the mesh, which all share, and its fields. */
-static void WriteTime(HycoSeries s, FILE *out, const char h5[], PetscInt k)
-{
-  const HycoSeriesSource *f = &s->from;
-  const HycoCellType type = f->fe->mesh->type;
-  char name[HYCO_LINE], kind[64];
-
-  fprintf(out, "   <Grid Name=\"mesh\">\n    <Time Value=\"%.17g\"/>\n", (double)s->t[k]);
-  fprintf(out, "    <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", HycoFieldsTopology(type),
-          (long)f->n_cells, type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
-  snprintf(kind, sizeof(kind), "NumberType=\"Int\" Precision=\"%d\"", (int)sizeof(PetscInt));
-  WriteItem(out, kind, f->n_cells, f->fe->mesh->nv, h5, "mesh/cells");
-  fprintf(out, "    </Topology>\n    <Geometry GeometryType=\"XYZ\">\n");
-  WriteItem(out, "Precision=\"8\"", f->n_nodes, 3, h5, "mesh/xyz");
-  fprintf(out, "    </Geometry>\n");
-  for (PetscInt j = 0; j < s->n_fields; j++) {
-    const HycoField *field = &s->field[j];
-
-    fprintf(out, "    <Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"%s\">\n", field->name,
-            field->components == 1   ? "Scalar"
-            : field->components == 3 ? "Vector"
-                                     : "Tensor6",
-            field->place == HYCO_ON_CELLS ? "Cell" : "Node");
-    NameSet(field, k, name);
-    WriteItem(out, "Precision=\"8\"", CountItems(s, field->place), field->components, h5, name);
-    fprintf(out, "    </Attribute>\n");
-  }
-  fprintf(out, "   </Grid>\n");
-}
-
-/* The text, and the last of the numbers. On rank 0. */
-static PetscErrorCode WriteText(HycoSeries s, HycoFile *out)
-{
-  const char *slash = strrchr(s->h5_path, '/');
-  char h5[6 * PETSC_MAX_PATH_LEN];
-  FILE *text;
-
-  PetscFunctionBegin;
-  HycoFieldsEscape(slash ? slash + 1 : s->h5_path, h5);
-  PetscCall(HycoFileCreate(s->path, HYCO_FILE_TEXT, out));
-  text = HycoFileStream(*out);
-  fprintf(text, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n"
-                "  <Grid Name=\"history\" GridType=\"Collection\" CollectionType=\"Temporal\">\n");
-  for (PetscInt k = 0; k < s->n; k++) WriteTime(s, text, h5, k);
-  fprintf(text, "  </Grid>\n </Domain>\n</Xdmf>\n");
-  PetscCall(HycoFileFlush(*out));
-  PetscCall(HycoH5WriteReal(s->h, "t", s->n, 1, s->t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The two files take their places, the numbers first. */
-static PetscErrorCode WriteSeries(HycoSeries s, HycoFile *out)
-{
-  PetscFunctionBegin;
-  HycoOnRoot(s->from.comm, WriteText(s, out));
-  PetscCall(HycoH5Close(&s->h, PETSC_TRUE));
-  HycoOnRoot(s->from.comm, HycoFileClose(out, PETSC_TRUE));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoSeriesClose(HycoSeries s)
 {
-  HycoFile out = NULL;
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
-  if (!s->n) PetscFunctionReturn(PETSC_SUCCESS);
-  ierr = WriteSeries(s, &out);
-  if (out) PetscCall(HycoFileClose(&out, PETSC_FALSE));
-  PetscCall(ierr);
+  if (s->file->n) PetscCall(HycoFieldFileCommit(s->file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -462,8 +326,7 @@ PetscErrorCode HycoSeriesDestroy(HycoSeries *series)
 
   PetscFunctionBegin;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
-  if (s->h) PetscCall(HycoH5Close(&s->h, PETSC_FALSE));
-  PetscCall(PetscFree(s->t));
+  PetscCall(HycoFieldFileDestroy(&s->file));
   PetscCall(PetscFree(*series));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,5 +1,6 @@
 /* The mesh over the ranks: DMPlexDistribute() with this library's partitioner, and the tags sent after it. */
 #include "plex.h"
+#include <hycocontactimpl.h>
 #include <string.h>
 
 PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to)
@@ -22,8 +23,12 @@ PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to)
 /* Puts what a distribution made (NULL: nothing) in a DM's place. */
 static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
 {
+  HycoTies ties;
+
   PetscFunctionBegin;
   if (!by) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoTiesOf(*dm, &ties));
+  PetscCall(HycoTiesAttach(by, ties));
   PetscCall(HycoPlexSendTags(*dm, sf, by));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(DMDestroy(dm));
@@ -52,6 +57,8 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   }
   PetscCall(HycoPlexRefine(dm, scene, scene->refine));
   if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(!write[0] || !scene->n_ties, "hyco_mesh_write: a mesh with ties (%s) is not written as a DMPlex",
+            scene->tie[0].name);
   if (write[0]) PetscCall(HycoPlexWrite(*dm, write));
   PetscCall(DMSetBasicAdjacency(*dm, PETSC_FALSE, PETSC_TRUE)); /* cells that share a vertex are neighbours */
   PetscCall(DMPlexDistributeOverlap(*dm, 1, &sf, &next));
@@ -116,12 +123,45 @@ static PetscErrorCode Complete(DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Ties are found in the mesh file, before its nodes are many or anywhere else. */
+static PetscErrorCode CheckTies(HycoScene scene)
+{
+  size_t length;
+
+  PetscFunctionBegin;
+  if (!scene->n_ties) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscStrlen(scene->mesh_path, &length));
+  HycoCheck(!scene->dm && (length < 3 || strcmp(scene->mesh_path + length - 3, ".h5")),
+            "tie %s: ties need the mesh as a gmsh file, not as a DMPlex", scene->tie[0].name);
+  HycoCheck(!scene->refine, "tie %s: a mesh with ties is not refined by scene_refine; refine the file (gmsh -refine)",
+            scene->tie[0].name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadMesh(HycoScene scene, HycoMesh *mesh)
+{
+  HycoTies ties = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshRead(scene, mesh));
+  if (!scene->n_ties) PetscFunctionReturn(PETSC_SUCCESS);
+  ierr = HycoMeshCheckCells(*mesh);
+  if (!ierr) ierr = HycoTiesFind(scene, *mesh, &ties);
+  if (!ierr) ierr = HycoMeshSetTies(*mesh, ties);
+  PetscCall(HycoTiesDestroy(&ties));
+  if (ierr) PetscCall(HycoMeshDestroy(mesh));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
 {
   HycoMesh mesh = NULL;
   size_t length;
 
   PetscFunctionBegin;
+  PetscCall(CheckTies(scene));
   if (scene->dm) {
     int same;
 
@@ -138,7 +178,7 @@ PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
     PetscCall(Complete(*dm));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoOnRoot(comm, HycoMeshRead(scene, &mesh));
+  HycoOnRoot(comm, ReadMesh(scene, &mesh));
   PetscCall(HycoPlexFromMesh(comm, mesh, dm));
   if (mesh) PetscCall(HycoMeshDestroy(&mesh));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -73,8 +73,15 @@ static PetscErrorCode Pack(Gather *g)
     for (PetscInt j = m->group_start[k]; g->in && g->in[k] && j < m->group_start[k + 1]; j++)
       g->take[m->group_node[j]] = PETSC_TRUE;
   }
-  for (PetscInt k = 0; g->keep && k < m->n_cells * m->nv; k++) {
-    if (g->keep[k / m->nv]) g->take[m->cells[k]] = PETSC_TRUE;
+  for (PetscInt e = 0; g->keep && e < m->n_cells; e++) {
+    PetscInt node[HYCO_MAX_CELL_NODES];
+    const PetscInt n = HycoMeshCellNodes(m, e, node);
+
+    for (PetscInt v = 0; v < n && g->keep[e]; v++) g->take[node[v]] = PETSC_TRUE;
+  }
+  for (PetscInt k = 0; k < m->n_tied; k++) { /* and what tied nodes follow */
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++)
+      g->take[m->tied_master[j]] = (PetscBool)(g->take[m->tied_master[j]] || g->take[m->tied[k]]);
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     const PetscInt node[6] = {m->node_id[i], 0, 0, m->node_body[i], m->node_global[i], m->node_whole[i]};
@@ -244,6 +251,7 @@ PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[]
     PetscCall(PlaceNodes(&g, m, n, sent, all));
     PetscCall(PlaceCells(&g, m));
     PetscCall(PlaceMembers(m->n_groups, &g.member, m->n_nodes, m->node_id, &m->group_start, &m->group_node));
+    PetscCall(HycoMeshSetTies(m, part->ties));
     PetscCall(PlaceMembers(m->n_groups, &g.region, m->n_cells, m->cell_id, &m->group_cell_start, &m->group_cell));
     *mesh = m;
   }

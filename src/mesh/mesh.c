@@ -30,6 +30,7 @@ PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
   PetscCall(PetscFree(m->facets));
   PetscCall(PetscFree(m->facet_group));
   PetscCall(PetscFree(m->facet_cell));
+  PetscCall(HycoMeshSetTies(m, NULL));
   PetscCall(PetscFree(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -95,6 +96,23 @@ static PetscErrorCode CheckSpring(HycoMesh mesh, const HycoSpring *spring)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CheckTie(HycoMesh mesh, const HycoTie *tie)
+{
+  PetscFunctionBegin;
+  HycoCheck(mesh->dim > 1,
+            "tie %s: ties are for scenes in the plane and in space; in 1D let both bodies share the node", tie->name);
+  for (PetscInt side = 0; side < 2; side++) {
+    const char *name = side ? tie->master : tie->slave;
+    PetscInt group = 0;
+
+    PetscCall(HycoMeshFindGroup(mesh, "tie", name, &group));
+    HycoCheck(mesh->group_dim[group] == mesh->dim - 1,
+              "tie %s: its %s is to be a group of dimension %d; %s has dimension %d", tie->name,
+              side ? "master" : "slave", (int)mesh->dim - 1, name, (int)mesh->group_dim[group]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
 {
   PetscInt group;
@@ -119,6 +137,7 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   for (PetscInt k = 0; k < scene->n_point_loads; k++) PetscCall(CheckPointLoad(mesh, &scene->point_load[k]));
   for (PetscInt k = 0; k < scene->n_springs; k++) PetscCall(CheckSpring(mesh, &scene->spring[k]));
   for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(HycoContactCheckGroups(scene->contact[k], mesh));
+  for (PetscInt k = 0; k < scene->n_ties; k++) PetscCall(CheckTie(mesh, &scene->tie[k]));
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     if (scene->quantity[k].group) PetscCall(HycoMeshFindGroup(mesh, "output", scene->quantity[k].group, &group));
   }
@@ -149,6 +168,13 @@ PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh m)
       *body = PetscMin(*body, b);
     } else
       *body = b;
+  }
+  for (PetscInt k = 0; k < m->n_tied; k++) { /* masters whose own cells are elsewhere */
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+      PetscInt *body = &m->node_body[m->tied_master[j]];
+
+      if (*body < 0) *body = m->ties->body[m->tied_entry[k] + j - m->tied_start[k]];
+    }
   }
   /* A mesh of the line or the plane must lie in it. */
   for (PetscInt c = m->dim; c < 3; c++) {
@@ -211,17 +237,23 @@ PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
 
 PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
 {
-  PetscInt *next;
+  PetscInt *next, node[HYCO_MAX_CELL_NODES];
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->n_nodes + 1, start));
-  PetscCall(PetscMalloc1(m->n_cells * m->nv, cell));
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) (*start)[m->cells[k] + 1]++;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const PetscInt n = HycoMeshCellNodes(m, e, node);
+
+    for (PetscInt v = 0; v < n; v++) (*start)[node[v] + 1]++;
+  }
   for (PetscInt i = 0; i < m->n_nodes; i++) (*start)[i + 1] += (*start)[i];
+  PetscCall(PetscMalloc1((*start)[m->n_nodes], cell));
   PetscCall(PetscMalloc1(m->n_nodes, &next));
   PetscCall(PetscArraycpy(next, *start, m->n_nodes));
   for (PetscInt e = 0; e < m->n_cells; e++) {
-    for (PetscInt v = 0; v < m->nv; v++) (*cell)[next[m->cells[e * m->nv + v]]++] = e;
+    const PetscInt n = HycoMeshCellNodes(m, e, node);
+
+    for (PetscInt v = 0; v < n; v++) (*cell)[next[node[v]]++] = e;
   }
   PetscCall(PetscFree(next));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -236,7 +268,10 @@ static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscIn
   PetscFunctionBegin;
   for (PetscInt i = 0; i < whole->n_nodes; i++) index[i] = -1;
   for (PetscInt k = 0; k < n_keep; k++) {
-    for (PetscInt v = 0; v < whole->nv; v++) index[whole->cells[keep[k] * whole->nv + v]] = 0;
+    PetscInt node[HYCO_MAX_CELL_NODES];
+    const PetscInt n = HycoMeshCellNodes(whole, keep[k], node);
+
+    for (PetscInt v = 0; v < n; v++) index[node[v]] = 0;
   }
   for (PetscInt k = 0; k < n_extra; k++) {
     if (index[extra[k]] < 0) index[extra[k]] = -2;
@@ -246,6 +281,13 @@ static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscIn
 
     for (PetscInt k = 0; k < n_all && *node == -1; k++)
       *node = whole->facet_group[f / whole->nf] == all_facets[k] ? -2 : -1;
+  }
+  for (PetscInt k = 0; k < whole->n_tied; k++) { /* what tied nodes follow */
+    for (PetscInt j = whole->tied_start[k]; j < whole->tied_start[k + 1]; j++) {
+      PetscInt *master = &index[whole->tied_master[j]];
+
+      if (index[whole->tied[k]] != -1 && *master == -1) *master = -2;
+    }
   }
   for (PetscInt pass = 0; pass > -3; pass -= 2) {
     for (PetscInt i = 0; i < whole->n_nodes; i++) {
@@ -358,6 +400,7 @@ PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt k
   PetscCall(SelectGroups(m->n_groups, whole->group_cell_start, whole->group_cell, cell_index, &m->group_cell_start,
                          &m->group_cell));
   PetscCall(PetscFree2(index, cell_index));
+  PetscCall(HycoMeshSetTies(m, whole->ties));
   *part = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

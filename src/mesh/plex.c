@@ -11,6 +11,9 @@
 static const signed char cone_place[HYCO_N_CELL_TYPES][8] = {
     {0, 1}, {0, 1, 2}, {0, 1, 2, 3}, {1, 0, 2, 3}, {0, 3, 2, 1, 4, 5, 6, 7}};
 static const PetscInt n_faces[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 6};
+static const DMPolytopeType plex_type[HYCO_N_CELL_TYPES] = {DM_POLYTOPE_SEGMENT, DM_POLYTOPE_TRIANGLE,
+                                                            DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_TETRAHEDRON,
+                                                            DM_POLYTOPE_HEXAHEDRON};
 /* The nodes of a cell's facets, in gmsh's order of the cell's nodes. */
 static const signed char face[HYCO_N_CELL_TYPES][6][4] = {
     {{0}, {1}},
@@ -53,9 +56,6 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
 /* The HycoCellType of this process's cells; -1: there are none. */
 static PetscErrorCode CellType(DM dm, PetscInt *type)
 {
-  static const DMPolytopeType plex_type[HYCO_N_CELL_TYPES] = {DM_POLYTOPE_SEGMENT, DM_POLYTOPE_TRIANGLE,
-                                                              DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_TETRAHEDRON,
-                                                              DM_POLYTOPE_HEXAHEDRON};
   PetscInt c0, c1, last = -1;
 
   PetscFunctionBegin;
@@ -198,20 +198,62 @@ PetscErrorCode HycoPlexSetTags(DM dm, PetscInt tag[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The cones of the cells: their nodes, after these what their tied ones follow. */
+static PetscErrorCode SetCones(DM dm, HycoMesh m)
+{
+  PetscInt node[HYCO_MAX_CELL_NODES], cone[HYCO_MAX_CELL_NODES];
+
+  PetscFunctionBegin;
+  PetscCall(DMPlexSetChart(dm, 0, m ? m->n_cells + m->n_nodes : 0));
+  for (PetscInt e = 0; m && e < m->n_cells; e++) PetscCall(DMPlexSetConeSize(dm, e, HycoMeshCellNodes(m, e, node)));
+  PetscCall(DMSetUp(dm));
+  for (PetscInt e = 0; m && e < m->n_cells; e++) {
+    const PetscInt n = HycoMeshCellNodes(m, e, node);
+
+    for (PetscInt k = 0; k < n; k++) cone[k < m->nv ? cone_place[m->type][k] : k] = m->n_cells + node[k];
+    PetscCall(DMPlexSetCone(dm, e, cone));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The DM of a mesh with ties. A cell's cone says which cells are around a node, wherever that is asked: of ranks that
+   share it, of the overlap, of an RID. DMPlex would tell a cell's type by the size of its cone: it is told. */
+static PetscErrorCode FromTied(MPI_Comm comm, PetscInt dim, HycoMesh m, DM *dm)
+{
+  PetscFunctionBegin;
+  PetscCall(DMPlexCreate(comm, dm));
+  PetscCall(DMSetDimension(*dm, dim));
+  PetscCall(SetCones(*dm, m));
+  PetscCall(DMPlexSymmetrize(*dm));
+  PetscCall(DMPlexStratify(*dm));
+  PetscCall(DMCreateLabel(*dm, "celltype"));
+  for (PetscInt p = 0; m && p < m->n_cells + m->n_nodes; p++)
+    PetscCall(DMPlexSetCellType(*dm, p, p < m->n_cells ? plex_type[m->type] : DM_POLYTOPE_POINT));
+  PetscCall(DMPlexBuildCoordinatesFromCellList(*dm, 3, m ? m->xyz : NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
 {
   PetscInt head[2] = {m ? m->dim : 0, m ? m->nv : 0}, *cone = NULL, *tag;
+  HycoTies ties = m ? m->ties : NULL;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Bcast(head, 2, MPIU_INT, 0, comm));
-  if (m) {
+  PetscCall(HycoTiesBcast(comm, &ties));
+  if (m && !ties) {
     PetscCall(PetscMalloc1(m->n_cells * m->nv, &cone));
     for (PetscInt k = 0; k < m->n_cells * m->nv; k++)
       cone[k / m->nv * m->nv + cone_place[m->type][k % m->nv]] = m->cells[k];
   }
-  PetscCall(DMPlexCreateFromCellListPetsc(comm, head[0], m ? m->n_cells : 0, m ? m->n_nodes : 0, head[1], PETSC_FALSE,
-                                          cone, 3, m ? m->xyz : NULL, dm));
+  if (ties)
+    PetscCall(FromTied(comm, head[0], m, dm));
+  else
+    PetscCall(DMPlexCreateFromCellListPetsc(comm, head[0], m ? m->n_cells : 0, m ? m->n_nodes : 0, head[1], PETSC_FALSE,
+                                            cone, 3, m ? m->xyz : NULL, dm));
   PetscCall(PetscFree(cone));
+  PetscCall(HycoTiesAttach(*dm, ties));
+  if (!m) PetscCall(HycoTiesDestroy(&ties));
   PetscCall(PetscMalloc1(m ? m->n_cells + m->n_nodes : 0, &tag));
   if (m) {
     PetscCall(PetscArraycpy(tag, m->cell_id, m->n_cells));
@@ -236,6 +278,7 @@ typedef struct {
   PetscBool facets_are_points; /* the DM is interpolated */
   const PetscInt *tag;         /* by point */
   PetscBool *owned, all_owned; /* by vertex */
+  HycoTies ties;               /* borrowed; NULL: none */
   PetscInt *node, *cell;       /* node of each vertex, cell of each DM's cell; -1: none */
   PetscInt n_facets, room, node_room, cell_room;
   Facet *facet; /* of the group at hand */
@@ -288,6 +331,17 @@ static PetscErrorCode FindOwned(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The vertices that a cell's tied ones follow: with ties, the end of its cone. */
+static PetscErrorCode FollowedVertices(const Builder *b, PetscInt cell, PetscInt *n, const PetscInt *vertex[])
+{
+  PetscFunctionBegin;
+  PetscCall(DMPlexGetConeSize(b->dm, cell, n));
+  PetscCall(DMPlexGetCone(b->dm, cell, vertex));
+  *n -= b->m->nv;
+  *vertex += b->m->nv;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The cells that touch a vertex of this process's own, by tag. */
 static PetscErrorCode TakeCells(Builder *b)
 {
@@ -298,11 +352,16 @@ static PetscErrorCode TakeCells(Builder *b)
   PetscCall(PetscMalloc1(b->c1 - b->c0, &b->cell));
   PetscCall(PetscMalloc3(b->c1 - b->c0, &keep, b->c1 - b->c0, &key, b->c1 - b->c0, &place));
   for (PetscInt c = b->c0; c < b->c1; c++) {
-    PetscInt vertex[8] = {0};
+    PetscInt vertex[8] = {0}, n_followed;
+    const PetscInt *followed;
     PetscBool mine = b->all_owned;
 
     if (!mine) PetscCall(HycoPlexVertices(b->dm, b->facets_are_points, m->type, c, m->nv, vertex));
     for (PetscInt v = 0; v < m->nv && !mine; v++) mine = (PetscBool)(mine || b->owned[vertex[v] - b->v0]);
+    if (b->ties && !mine) {
+      PetscCall(FollowedVertices(b, c, &n_followed, &followed));
+      for (PetscInt k = 0; k < n_followed; k++) mine = (PetscBool)(mine || b->owned[followed[k] - b->v0]);
+    }
     b->cell[c - b->c0] = -1;
     if (!mine) continue;
     key[n] = b->tag[c];
@@ -336,6 +395,13 @@ static PetscErrorCode TakeNodes(Builder *b)
   PetscCall(PetscMalloc1(b->v1 - b->v0, &b->node));
   for (PetscInt v = b->v0; v < b->v1; v++) b->node[v - b->v0] = -1;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) b->node[m->cells[k] - b->v0] = 0;
+  for (PetscInt e = 0; e < m->n_cells && b->ties; e++) {
+    const PetscInt *followed;
+    PetscInt n_followed;
+
+    PetscCall(FollowedVertices(b, m->cell_point[e], &n_followed, &followed));
+    for (PetscInt k = 0; k < n_followed; k++) b->node[followed[k] - b->v0] = 0;
+  }
   PetscCall(PetscMalloc3(b->v1 - b->v0, &keep, b->v1 - b->v0, &key, b->v1 - b->v0, &place));
   for (PetscInt v = b->v0; v < b->v1; v++) {
     if (b->node[v - b->v0] < 0) continue;
@@ -402,7 +468,13 @@ static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt number, const
   PetscBool mine = PETSC_FALSE;
 
   PetscFunctionBegin;
-  for (PetscInt v = 0; v < m->nf; v++) mine = (PetscBool)(mine || b->owned[b->m->node_point[node[v]] - b->v0]);
+  for (PetscInt v = 0; v < m->nf; v++) {
+    const PetscInt tied = HycoMeshTied(m, node[v]);
+
+    mine = (PetscBool)(mine || b->owned[m->node_point[node[v]] - b->v0]);
+    for (PetscInt j = tied < 0 ? 0 : m->tied_start[tied]; tied >= 0 && j < m->tied_start[tied + 1]; j++)
+      mine = (PetscBool)(mine || b->owned[m->node_point[m->tied_master[j]] - b->v0]);
+  }
   if (!mine || cell < 0) PetscFunctionReturn(PETSC_SUCCESS);
   if (b->n_facets == b->room) {
     b->room = 2 * b->room + 64;
@@ -632,10 +704,12 @@ static PetscErrorCode MakeTables(Builder *b)
   b->facets_are_points = (PetscBool)(depth == b->m->dim);
   PetscCall(PetscObjectQuery((PetscObject)b->dm, HYCO_TAGS, (PetscObject *)&tags));
   PetscCall(ISGetIndices(tags, &b->tag));
+  PetscCall(HycoTiesOf(b->dm, &b->ties));
   PetscCall(FindType(b));
   PetscCall(FindOwned(b));
   PetscCall(TakeCells(b));
   PetscCall(TakeNodes(b));
+  PetscCall(HycoMeshSetTies(b->m, b->ties));
   PetscCall(TakeGroups(b));
   PetscCall(TakeBodies(b));
   PetscCall(HycoMeshSetNodeBodies(b->scene, b->m));

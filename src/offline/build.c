@@ -167,13 +167,17 @@ static PetscErrorCode FetchNotes(HycoReducer t, const PetscBool in[], PetscInt n
 {
   HycoMesh part = t->fom->part;
   HycoFE fe = t->fom->fe;
-  PetscInt *of, *own;
+  PetscInt *of, *own, node[HYCO_MAX_CELL_NODES];
   PetscSF sf;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc2(part->n_nodes, &of, part->n_owned, &own));
   for (PetscInt k = 0; k < fe->n_dof; k++) of[k / fe->dim] |= fe->fixed[k] ? 1 << k % fe->dim : 0;
-  for (PetscInt k = 0; k < part->n_cells * part->nv; k++) of[part->cells[k]] |= in[k / part->nv] ? 0 : BESIDE;
+  for (PetscInt e = 0; e < part->n_cells; e++) {
+    const PetscInt n_nodes = HycoMeshCellNodes(part, e, node);
+
+    for (PetscInt v = 0; v < n_nodes; v++) of[node[v]] |= in[e] ? 0 : BESIDE;
+  }
   for (PetscInt i = 0; i < part->n_nodes; i++) {
     if (HycoMeshOwned(part, i) >= 0) own[HycoMeshOwned(part, i)] = of[i];
   }
@@ -196,10 +200,12 @@ static PetscErrorCode TakeSets(HycoReducer t, HycoROM m, const PetscInt note[])
   for (PetscInt k = 0; k < n * dim; k++) t->fixed[k] = (PetscBool)((note[k / dim] >> k % dim & 1) != 0);
   PetscCall(PetscMalloc1(n, &m->role));
   for (PetscInt i = 0; i < n; i++) m->role[i] = HYCO_ROLE_OUTSIDE;
-  for (PetscInt k = 0; k < m->mesh->n_cells * m->mesh->nv; k++) { /* connected to Omega_B, or not */
-    const PetscInt i = m->mesh->cells[k];
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) { /* connected to Omega_B, or not */
+    PetscInt node[HYCO_MAX_CELL_NODES];
+    const PetscInt n_nodes = HycoMeshCellNodes(m->mesh, e, node);
 
-    m->role[i] = note[i] & BESIDE ? HYCO_ROLE_INTERFACE : HYCO_ROLE_A;
+    for (PetscInt v = 0; v < n_nodes; v++)
+      m->role[node[v]] = note[node[v]] & BESIDE ? HYCO_ROLE_INTERFACE : HYCO_ROLE_A;
   }
   PetscCall(PetscMalloc1(f->n_contacts, &m->in_rid));
   PetscCall(HycoRIDSets(f->fe_surface, &f->pairs, f->searches ? &t->met.rows : &f->pairs,
@@ -373,12 +379,16 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
 /* A model that misses its own training solutions by half is refused. */
 static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
 {
+  char worst[HYCO_LINE] = "";
+
   PetscFunctionBegin;
+  if (!(m->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(m->numbers[1] < 0.5,
                  "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
-                 "condition %.0e): enlarge the RID (-hyco_rid_layers 1, "
-                 "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)",
-                 100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0]);
+                 "condition %.0e)%s: enlarge the RID (-hyco_rid_layers 1, "
+                 "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)%s",
+                 100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0], worst,
+                 m->scene->n_times ? ", or -hyco_model_type cubature" : "");
   PetscCall(CheckForces(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

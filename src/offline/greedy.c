@@ -5,6 +5,7 @@
 */
 #include <hycoalgorithms.h>
 #include <hycogreedy.h>
+#include <math.h>
 #include <stdio.h>
 
 /* Of two indicators this close, neither is worse. */
@@ -53,6 +54,19 @@ static PetscErrorCode Start(HycoReducer t, HycoSamples start, HycoSamples *sampl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Paths are judged by the replayed residual, solutions without a history by the others. */
+static PetscErrorCode CheckIndicator(HycoReducer t)
+{
+  const PetscBool residual = (PetscBool)(t->greedy.indicator == HYCO_INDICATOR_RESIDUAL);
+
+  PetscFunctionBegin;
+  HycoCheck(residual || !t->scene->n_times,
+            "the scene has a history (history_times), and paths are judged by -hyco_greedy_indicator residual alone");
+  HycoCheck(!residual || t->scene->n_times,
+            "-hyco_greedy_indicator residual judges paths, and the scene has no history; take local or penetration");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Before anything is solved: enough to start from, not more than asked for, and nothing that (42) cannot interpolate.
  */
 static PetscErrorCode CheckStart(HycoReducer t, PetscBool corners, HycoSamples samples)
@@ -67,7 +81,7 @@ static PetscErrorCode CheckStart(HycoReducer t, PetscBool corners, HycoSamples s
       !t->greedy.max_snapshots || t->greedy.max_snapshots >= n,
       "-max_snapshots is %d; at least %d are needed: a greedy training first solves at the %d %s, and adds to these",
       (int)t->greedy.max_snapshots, (int)n, (int)n, corners ? "corners of the parameters' ranges" : "points given");
-  if (t->greedy.indicator != HYCO_INDICATOR_LOCAL) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!HycoIndicatorInterpolates(t->greedy.indicator)) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(
       n > n_par || n == t->greedy.max_snapshots,
       "the greedy training starts from %d point%s; its indicator interpolates over %d parameters and needs at least "
@@ -82,7 +96,7 @@ static PetscErrorCode CheckStart(HycoReducer t, PetscBool corners, HycoSamples s
 static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report)
 {
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(loop->samples, &t->n_s, NULL, NULL));
+  PetscCall(HycoReducerCount(t));
   PetscCall(HycoSnapshotsFill(loop->store, loop->samples, iteration ? NULL : t->progress, t->progress_ctx));
   PetscCall(HycoReducerResetBases(t));
   PetscCall(HycoReducerReduce(t, loop->store, PETSC_FALSE));
@@ -107,26 +121,33 @@ static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* PETSc's infinity is a large number; the table's and the comparisons' is none. */
+static PetscReal Infinite(PetscReal value)
+{
+  return value >= PETSC_INFINITY ? INFINITY : value;
+}
+
 /* This rank's share of the training points. */
 static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const PetscReal U_at[])
 {
   const PetscReal length = HycoMeshLength(t->fom->part);
   const PetscReal *solved;
+  PetscInt n;
   PetscMPIInt size;
   HycoIndicator indicator;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
-  PetscCall(HycoSamplesGet(loop->samples, NULL, NULL, &solved));
-  PetscCall(HycoIndicatorCreate(m, t->greedy.indicator, t->n_s, solved, U_at, length, &indicator));
+  PetscCall(HycoSamplesGet(loop->samples, &n, NULL, &solved));
+  PetscCall(HycoIndicatorCreate(m, t->greedy.indicator, n, solved, U_at, length, &indicator));
   for (PetscInt k = t->rank; k < loop->n_points; k += size) {
     HycoIndication v;
 
     PetscCall(HycoIndicatorEvaluate(indicator, loop->points + k * loop->n_par, &v));
-    loop->value[4 * k] = v.eta;
-    loop->value[4 * k + 1] = v.eta_u;
-    loop->value[4 * k + 2] = v.eta_lambda;
-    loop->value[4 * k + 3] = v.size;
+    loop->value[4 * k] = Infinite(v.eta);
+    loop->value[4 * k + 1] = Infinite(v.eta_u);
+    loop->value[4 * k + 2] = Infinite(v.eta_lambda);
+    loop->value[4 * k + 3] = Infinite(v.size);
   }
   PetscCall(HycoIndicatorDestroy(&indicator));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -136,16 +157,34 @@ static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const 
 static PetscErrorCode Evaluate(HycoReducer t, Loop *loop)
 {
   HycoROM m = loop->model;
-  PetscReal *U_at;
+  PetscReal *U_at = NULL;
   PetscMPIInt count;
 
   PetscFunctionBegin;
   PetscCall(PetscMPIIntCast(4 * loop->n_points, &count));
-  PetscCall(SpreadSnapshots(t, m, &U_at));
+  if (HycoIndicatorInterpolates(t->greedy.indicator)) PetscCall(SpreadSnapshots(t, m, &U_at));
   PetscCall(PetscArrayzero(loop->value, 4 * loop->n_points));
   HycoOnEach(HycoComm(t), EvaluateShare(t, loop, m, U_at));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, loop->value, count, MPIU_REAL, MPI_SUM, HycoComm(t)));
   PetscCall(PetscFree(U_at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same, of a model that is kept in greedy-NNN.h5 beside the solutions, or is there while it is judged on the whole
+   mesh, which each rank reads. Collective. */
+static PetscErrorCode EvaluateModel(HycoReducer t, Loop *loop, PetscInt iteration)
+{
+  const PetscBool whole = HycoIndicatorOnWhole(t->greedy.indicator);
+  char path[PETSC_MAX_PATH_LEN];
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscSNPrintf(path, sizeof(path), "%s/greedy-%03d.h5", loop->store->folder, (int)iteration));
+  if (t->greedy.keep || whole) PetscCall(HycoROMSave(loop->model, t->fom, t->l, t->V, path));
+  if (whole) PetscCall(PetscStrncpy(loop->model->path, path, sizeof(loop->model->path)));
+  ierr = Evaluate(t, loop);
+  if (whole && !t->greedy.keep && t->rank == 0) remove(path);
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -157,8 +196,31 @@ static PetscBool Worse(const PetscReal a[], const PetscReal b[])
   return (PetscBool)(PetscIsInfReal(b[by]) ? PETSC_FALSE : a[by] > b[by] * (1 + TIE));
 }
 
+/* From training point k to the nearest solution. */
+static PetscReal Distance(HycoReducer t, const Loop *loop, PetscInt k)
+{
+  const PetscReal *solved;
+  PetscReal least = PETSC_MAX_REAL;
+  PetscInt n;
+
+  if (HycoSamplesGet(loop->samples, &n, NULL, &solved)) return 0;
+  for (PetscInt j = 0; j < n; j++)
+    least = PetscMin(least, HycoTrustDistance(t->scene, solved + j * loop->n_par, loop->points + k * loop->n_par));
+  return least;
+}
+
+/* Whether training point a is to be solved before b: it is worse, or neither has a prediction and a solution near it
+   is farther away. */
+static PetscBool Before(HycoReducer t, const Loop *loop, PetscInt a, PetscInt b)
+{
+  const PetscReal *of_a = loop->value + 4 * a, *of_b = loop->value + 4 * b;
+
+  if (!PetscIsInfReal(of_a[3]) || !PetscIsInfReal(of_b[3])) return Worse(of_a, of_b);
+  return (PetscBool)(Distance(t, loop, a) > Distance(t, loop, b) * (1 + TIE));
+}
+
 /* The worst point that is not solved yet (-1: none is left), and what the monitor hears. */
-static PetscErrorCode Choose(Loop *loop, PetscInt *worst, HycoGreedyStep *step)
+static PetscErrorCode Choose(HycoReducer t, Loop *loop, PetscInt *worst, HycoGreedyStep *step)
 {
   const PetscReal *solved;
   PetscInt n_solved, n_finite = 0;
@@ -178,7 +240,7 @@ static PetscErrorCode Choose(Loop *loop, PetscInt *worst, HycoGreedyStep *step)
     }
     for (PetscInt j = 0; j < n_solved && !known; j++)
       PetscCall(PetscArraycmp(solved + j * loop->n_par, loop->points + k * loop->n_par, loop->n_par, &known));
-    if (!known && (*worst < 0 || Worse(value, loop->value + 4 * *worst))) *worst = k;
+    if (!known && (*worst < 0 || Before(t, loop, k, *worst))) *worst = k;
   }
   step->n_points = loop->n_points;
   step->n_infinite = loop->n_points - n_finite;
@@ -200,17 +262,6 @@ static const char *WhyStop(HycoReducer t, const HycoGreedyStep *step)
   return step->worst ? NULL : "points";
 }
 
-/* The iteration's model, which has been judged, goes to greedy-NNN.h5 beside the solutions. Collective. */
-static PetscErrorCode KeepModel(HycoReducer t, const Loop *loop, PetscInt iteration)
-{
-  char path[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBegin;
-  PetscCall(PetscSNPrintf(path, sizeof(path), "%s/greedy-%03d.h5", loop->store->folder, (int)iteration));
-  PetscCall(HycoROMSave(loop->model, t->fom, t->l, t->V, path));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report, PetscBool *last)
 {
   HycoGreedyStep step = {0};
@@ -219,11 +270,10 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   PetscFunctionBegin;
   PetscCall(HycoROMDestroy(&loop->model));
   PetscCall(BuildModel(t, loop, iteration, report));
-  PetscCall(Evaluate(t, loop));
-  if (t->greedy.keep) PetscCall(KeepModel(t, loop, iteration));
-  PetscCall(Choose(loop, &worst, &step));
+  PetscCall(EvaluateModel(t, loop, iteration));
+  PetscCall(Choose(t, loop, &worst, &step));
   step.iteration = iteration;
-  step.n_samples = t->n_s;
+  PetscCall(HycoSamplesGet(loop->samples, &step.n_samples, NULL, NULL));
   step.n_modes = report->n_modes;
   step.rid_nodes = report->rid_nodes;
   step.rid_elements = report->rid_elements;
@@ -296,7 +346,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  PetscCall(HycoSceneRefuseHistory(t->scene, "greedy training"));
+  PetscCall(CheckIndicator(t));
   HycoCheck(!t->prototype->ops->choosepoints,
             "a condensed model needs a tensor grid of training points, which -greedy does not give: use -grid, or "
             "-values_NAME");

@@ -11,6 +11,10 @@
   dual of that space (contact forces).
 
   (45): the 2-norm of the predicted displacement's penetration, over all contacts.
+
+  Of paths: how far the predicted path is from the full order's equations, equilibrium and contact, at the worst listed
+  time of each (src/rom/equilibrium.c): targets and held-out errors are those of the worst time, too, and a sum over the
+  times would change with how densely these are listed.
 */
 #include <hycoalgorithms.h>
 #include <hycogreedy.h>
@@ -37,6 +41,16 @@ struct _n_HycoIndicator {
   HycoSolver solver;
 };
 
+PetscBool HycoIndicatorInterpolates(HycoIndicatorKind kind)
+{
+  return (PetscBool)(kind == HYCO_INDICATOR_LOCAL);
+}
+
+PetscBool HycoIndicatorOnWhole(HycoIndicatorKind kind)
+{
+  return (PetscBool)(kind == HYCO_INDICATOR_RESIDUAL);
+}
+
 PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscInt n, const PetscReal points[],
                                    const PetscReal U_at[], PetscReal length, HycoIndicator *indicator)
 {
@@ -50,8 +64,8 @@ PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscI
   d->n = n;
   d->U_at = U_at;
   d->length = length;
-  PetscCall(HycoROMSetReconstruct(model, PETSC_FALSE));
-  if (kind == HYCO_INDICATOR_PENETRATION) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMSetReconstruct(model, (PetscBool)(kind == HYCO_INDICATOR_RESIDUAL)));
+  if (!HycoIndicatorInterpolates(kind)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &d->weight));
   PetscCall(HycoInterpolantCreate(model->scene->n_parameters, n, points, &d->interpolant));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -265,6 +279,38 @@ static PetscReal Penetration(HycoROM m)
   return PetscSqrtReal(sum);
 }
 
+/* (43), of the last prediction. */
+static PetscErrorCode EvaluateLocal(HycoIndicator d, const PetscReal mu[], HycoReason *reason, HycoIndication *v)
+{
+  HycoROM m = d->model;
+
+  PetscFunctionBegin;
+  HycoCheck(
+      m->ops->local,
+      "-hyco_greedy_indicator local needs the system on the RID, which a %s model does not have; take penetration",
+      m->type);
+  PetscUseTypeMethod(m, local, &d->local);
+  if (!d->system) PetscCall(SetUp(d));
+  PetscCall(AssembleNorm(d));
+  PetscCall(Interpolate(d, mu));
+  PetscCall(SolveLocal(d, reason));
+  PetscCall(Distances(d, v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of the last predicted path; where the laws have no answer infinite. */
+static PetscErrorCode EvaluateResidual(HycoIndicator d, HycoIndication *v)
+{
+  HycoEquilibrium e;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMGetEquilibrium(d->model, &e));
+  v->eta_u = e.worst;
+  v->eta_lambda = e.worst_contact;
+  v->eta = v->size = e.worst + e.worst_contact;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoIndicatorEvaluate(HycoIndicator d, const PetscReal mu[], HycoIndication *v)
 {
   HycoROM m = d->model;
@@ -276,18 +322,10 @@ PetscErrorCode HycoIndicatorEvaluate(HycoIndicator d, const PetscReal mu[], Hyco
     PetscCall(HycoROMComplete(m));
     v->eta = v->eta_u = v->size = Penetration(m);
     v->eta_lambda = 0;
-  } else {
-    HycoCheck(
-        m->ops->local,
-        "-hyco_greedy_indicator local needs the system on the RID, which a %s model does not have; take penetration",
-        m->type);
-    PetscUseTypeMethod(m, local, &d->local);
-    if (!d->system) PetscCall(SetUp(d));
-    PetscCall(AssembleNorm(d));
-    PetscCall(Interpolate(d, mu));
-    PetscCall(SolveLocal(d, &reason));
-    PetscCall(Distances(d, v));
-  }
+  } else if (d->kind == HYCO_INDICATOR_LOCAL)
+    PetscCall(EvaluateLocal(d, mu, &reason, v));
+  else if (m->prediction.reason > 0)
+    PetscCall(EvaluateResidual(d, v));
   v->solved = (PetscBool)(m->prediction.reason > 0 && reason > 0 && !PetscIsNanReal(v->eta));
   if (!v->solved) v->eta = v->eta_u = v->eta_lambda = v->size = PETSC_INFINITY;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,5 +1,7 @@
 /* A model under training against its own training solutions. */
 #include <hycoreducerimpl.h>
+#include <stdio.h>
+#include <string.h>
 
 /* Relative error of the last prediction against snapshot k: u on the whole mesh (by the coefficients: V is
  * orthonormal), forces on A_lambda. */
@@ -57,8 +59,27 @@ static PetscErrorCode PathErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mean training errors of the model as it stands. */
-PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM m, PetscReal *u, PetscReal *lambda)
+/* The model as it stands at training point k. */
+static PetscErrorCode JudgeSample(HycoReducer t, HycoROM m, PetscInt k, const PetscReal mu[], HycoJudged *j)
+{
+  const PetscBool path = (PetscBool)(m->scene->n_times > 0);
+
+  PetscFunctionBegin;
+  if (path) PetscCall(HycoROMSetSteps(m, t->taken_start[k + 1] - t->taken_start[k], t->taken + t->taken_start[k]));
+  PetscCall(HycoROMPredict(m, m->scene->n_parameters, mu));
+  if (path)
+    PetscCall(PathErrors(t, m, k, &j->u, &j->lambda));
+  else
+    SnapshotErrors(t, m, k, &j->u, &j->lambda);
+  j->solved = (PetscBool)(m->prediction.reason >= 0);
+  j->t = m->trace.history.t;
+  if (!j->solved || !(j->u < HYCO_JUDGED_WORST)) j->u = HYCO_JUDGED_WORST;
+  if (!j->solved || !(j->lambda < HYCO_JUDGED_WORST)) j->lambda = HYCO_JUDGED_WORST;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Means over the samples; of each: to judged (NULL: nobody asks). */
+static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, HycoJudged judged[], PetscReal *u, PetscReal *lambda)
 {
   PetscInt n, n_par;
   const PetscReal *mu;
@@ -68,30 +89,83 @@ PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM m, PetscReal *u, Pet
   m->reconstruct = PETSC_FALSE;
   *u = *lambda = 0;
   for (PetscInt k = 0; k < n; k++) {
-    PetscReal eu, el;
+    HycoJudged j;
 
-    if (m->scene->n_times)
-      PetscCall(HycoROMSetSteps(m, t->taken_start[k + 1] - t->taken_start[k], t->taken + t->taken_start[k]));
-    PetscCall(HycoROMPredict(m, n_par, mu + k * n_par));
-    if (m->scene->n_times)
-      PetscCall(PathErrors(t, m, k, &eu, &el));
-    else
-      SnapshotErrors(t, m, k, &eu, &el);
-    if (m->prediction.reason < 0 || !(eu < HYCO_JUDGED_WORST)) eu = HYCO_JUDGED_WORST;
-    if (m->prediction.reason < 0 || !(el < HYCO_JUDGED_WORST)) el = HYCO_JUDGED_WORST;
-    *u += eu / n;
-    *lambda += el / n;
+    PetscCall(JudgeSample(t, m, k, mu + k * n_par, &j));
+    *u += j.u / n;
+    *lambda += j.lambda / n;
+    if (judged) judged[k] = j;
   }
   if (m->scene->n_times) PetscCall(HycoROMSetSteps(m, 0, NULL));
   m->reconstruct = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
+/* Mean training errors of the model as it stands. */
+PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM m, PetscReal *u, PetscReal *lambda)
 {
   PetscFunctionBegin;
-  PetscCall(HycoReducerJudgeMeans(t, m, &m->numbers[1], &m->numbers[2]));
+  PetscCall(JudgeAll(t, m, NULL, u, lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
+{
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  PetscCall(PetscFree(t->judged));
+  PetscCall(PetscMalloc1(n, &t->judged));
+  PetscCall(JudgeAll(t, m, t->judged, &m->numbers[1], &m->numbers[2]));
   m->numbers[0] = 0;
   PetscTryTypeMethod(m, condition, &m->numbers[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define NAMED 3 /* a line has room for */
+
+/* "; 2 of 9 paths do not reach their end: gap = 0.004 (t = 3.1), gap = 0.005 (t = 6)" */
+static PetscInt NameUnsolved(HycoReducer t, PetscInt n, const PetscReal mu[], char text[HYCO_LINE])
+{
+  const PetscBool path = (PetscBool)(t->scene->n_times > 0);
+  PetscInt missing = 0, named = 0;
+  size_t length;
+
+  for (PetscInt k = 0; k < n; k++) missing += !t->judged[k].solved;
+  if (!missing) return 0;
+  HycoFormat(text, "; %d of %d %s: ", (int)missing, (int)n,
+             path ? "paths do not reach their end" : "solves do not converge");
+  for (PetscInt k = 0; k < n && named < NAMED; k++) {
+    char at[HYCO_LINE], when[64] = "";
+
+    if (t->judged[k].solved) continue;
+    HycoSceneNamePoint(t->scene, mu + k * t->scene->n_parameters, at);
+    if (path) snprintf(when, sizeof(when), " (t = %.6g)", (double)t->judged[k].t);
+    length = strlen(text);
+    snprintf(text + length, HYCO_LINE - length, "%s%s%s", named++ ? "; " : "", at, when);
+  }
+  length = strlen(text);
+  if (missing > named) snprintf(text + length, HYCO_LINE - length, "; and %d more", (int)(missing - named));
+  return missing;
+}
+
+void HycoReducerNameWorst(HycoReducer t, char text[HYCO_LINE])
+{
+  PetscInt n, n_par, worst = -1, missing;
+  const PetscReal *mu;
+  char at[HYCO_LINE];
+  size_t length;
+
+  text[0] = '\0';
+  if (!t->judged || HycoSamplesGet(t->samples, &n, &n_par, &mu)) return;
+  missing = NameUnsolved(t, n, mu, text);
+  for (PetscInt k = 0; k < n; k++) {
+    if (t->judged[k].solved && (worst < 0 || t->judged[k].u > t->judged[worst].u)) worst = k;
+  }
+  if (worst < 0) return;
+  HycoSceneNamePoint(t->scene, mu + worst * n_par, at);
+  length = strlen(text);
+  snprintf(text + length, HYCO_LINE - length, "; the worst%s, by %.0f %%%s, at %s", missing ? " of the others" : "",
+           100 * (double)t->judged[worst].u, t->judged[worst].u < HYCO_JUDGED_WORST ? "" : " or more", at);
 }

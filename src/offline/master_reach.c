@@ -2,6 +2,7 @@
   What slave nodes of moved surfaces meet over the parameters: at the training points, and at points spread over the
   ranges until these bring nothing new. It is geometry alone, on a mesh of the surfaces without cells.
 */
+#include <hycoalgorithms.h>
 #include <hycodomain.h>
 #include <hycovector.h>
 
@@ -184,18 +185,6 @@ static PetscErrorCode NoteAt(Surfaces *s, const PetscReal mu[], Lists *l, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The k-th number of van der Corput's sequence in a base. */
-static PetscReal Corput(PetscInt k, PetscInt base)
-{
-  PetscReal value = 0, digit = 1;
-
-  for (; k > 0; k /= base) {
-    digit /= (PetscReal)base;
-    value += digit * (PetscReal)(k % base);
-  }
-  return value;
-}
-
 /* Whether parameter p moves a body. */
 static PetscBool Moves(HycoScene scene, PetscInt p)
 {
@@ -211,8 +200,7 @@ static PetscBool Moves(HycoScene scene, PetscInt p)
 /* Points of the ranges, in the parameters that move something; the others as at mu. */
 static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal mu[], Lists *l)
 {
-  static const PetscInt prime[] = {2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53};
-  const PetscInt n_par = scene->n_parameters, n_primes = (PetscInt)(sizeof(prime) / sizeof(prime[0]));
+  const PetscInt n_par = scene->n_parameters;
   PetscReal at[HYCO_MAX_PARAMETERS];
   PetscInt fruitless = 0;
 
@@ -222,7 +210,7 @@ static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal 
 
     for (PetscInt p = 0; p < n_par; p++) {
       at[p] = mu[p];
-      if (Moves(scene, p)) at[p] = scene->lo[p] + (scene->hi[p] - scene->lo[p]) * Corput(k, prime[moving++ % n_primes]);
+      if (Moves(scene, p)) at[p] = scene->lo[p] + (scene->hi[p] - scene->lo[p]) * HycoHalton(k, moving++);
     }
     if (!moving) break;
     PetscCall(NoteAt(s, at, l, &grown));

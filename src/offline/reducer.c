@@ -62,6 +62,7 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   PetscCall(Create(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
+  if (scene->n_times) (*reducer)->greedy.indicator = HYCO_INDICATOR_RESIDUAL;
   (*reducer)->seed[HYCO_SEED_SPRING] = (PetscBool)(scene->n_springs > 0);
   for (PetscInt b = 0; b < scene->n_bodies && scene->n_times; b++) {
     if (!scene->body[b].law->linear) (*reducer)->seed[HYCO_SEED_INELASTIC] = PETSC_TRUE;
@@ -104,7 +105,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
   }
   PetscCall(MatDestroy(&t->S));
   HycoFreeAll(&t->U_rid, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds,
-              &t->taken_start, &t->taken);
+              &t->taken_start, &t->taken, &t->judged);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -221,7 +222,7 @@ static PetscErrorCode CheckSVDOptions(HycoReducer t)
 /* What train is asked for, whatever the model. */
 static PetscErrorCode ReadTraining(HycoReducer t)
 {
-  static const char *const indicators[] = {"local", "penetration", NULL};
+  static const char *const indicators[] = {"local", "penetration", "residual", NULL};
   PetscInt type = 0, indicator = (PetscInt)t->greedy.indicator;
   const char *const *types;
 
@@ -256,8 +257,8 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscCall(HycoOptionsName("-hyco_reducer_view", "the settings of the training, before it begins"));
   PetscCall(HycoOptionsFor("greedy"));
   PetscCall(HycoOptionsWord("-hyco_greedy_indicator",
-                            "what train -greedy judges by: distance from a full-order problem on the RID (43), or "
-                            "penetration (45)",
+                            "what train -greedy judges by: distance from a full-order problem on the RID (43), "
+                            "penetration (45), or, of paths, the residual of the full order",
                             indicators, &indicator, NULL));
   PetscCall(HycoOptionsBool("-hyco_greedy_keep", "train -greedy keeps each iteration's model beside the snapshots",
                             &t->greedy.keep, NULL));

@@ -264,17 +264,6 @@ static void NameField(HycoSnapshots s, PetscInt k, const char field[], char name
     HycoFormat(name, "%s", field);
 }
 
-/* "gap = 0.05, q2 = 40" */
-static void NamePoint(HycoSnapshots s, const PetscReal mu[], char at[HYCO_LINE])
-{
-  at[0] = '\0';
-  for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
-    const size_t length = strlen(at);
-
-    snprintf(at + length, HYCO_LINE - length, "%s%s = %.10g", p ? ", " : "", s->scene->parameter[p], (double)mu[p]);
-  }
-}
-
 /* A path on its way into its file. */
 typedef struct {
   HycoSnapshots s;
@@ -322,7 +311,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   PetscCall(HycoFOMSetStepMonitor(fom, WriteStep, w));
   PetscCall(HycoFOMSolve(fom, w->s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetHistory(fom, &history));
-  NamePoint(w->s, mu, at);
+  HycoSceneNamePoint(w->s->scene, mu, at);
   HycoCheck(history.ended, "the path at %s ends at t = %.10g, beyond which its steps have become too small: %s", at,
             (double)history.t, history.why);
   HycoOnRoot(HycoComm(fom), WriteHead(w->s, w->h, mu));
@@ -369,7 +358,7 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   if (summary.reason < 0) {
     char at[HYCO_LINE];
 
-    NamePoint(s, mu, at);
+    HycoSceneNamePoint(s->scene, mu, at);
     SETERRQ(HycoComm(fom), PETSC_ERR_USER, "the snapshot at %s: %s%s%s", at, HycoReasonName(summary.reason),
             summary.free_motion[0] ? "; no support keeps " : "", summary.free_motion);
   }

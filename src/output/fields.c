@@ -1,25 +1,24 @@
-/* HDF5 for the numbers, XDMF for ParaView. */
+/* What is written of a solution, and how rows of a mesh and its fields come into a file. */
 #include <hycofields.h>
-#include <hycofile.h>
 #include <hycoh5.h>
 #include <hycomaterialimpl.h>
 #include <petscblaslapack.h>
-#include <stdio.h>
-#include <string.h>
-#include <sys/stat.h>
 
-static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
-                                                        "Hexahedron"};
-
-const char *HycoFieldsTopology(HycoCellType type)
+PetscErrorCode HycoFieldRows(const HycoFileOrder *order, PetscInt n, HycoPlace place, MPI_Datatype type,
+                             PetscInt components, const void *value, PetscReal missing, void **rows)
 {
-  return topology[type];
-}
+  const PetscInt count = (order ? order->n[place] : n) * components;
+  const size_t size = type == MPIU_INT ? sizeof(PetscInt) : sizeof(PetscReal);
+  PetscReal *reals;
 
-/* All of a mesh's nodes or cells. */
-static PetscInt Count(const HycoFileOrder *order, HycoMesh m, HycoPlace place)
-{
-  return order ? order->all[place] : place == HYCO_ON_CELLS ? m->n_cells : m->n_nodes;
+  PetscFunctionBegin;
+  *rows = (void *)value;
+  if (!order) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1((size_t)count * size, (char **)rows));
+  reals = (PetscReal *)*rows;
+  for (PetscInt k = 0; missing != 0 && k < count; k++) reals[k] = missing;
+  PetscCall(HycoFileOrderSend(order, place, type, components, value, *rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* missing: what rows get that no process has a value of. */
@@ -28,20 +27,14 @@ static PetscErrorCode WriteRows(HycoH5 h, const HycoFileOrder *order, PetscInt n
                                 PetscReal missing)
 {
   const PetscInt all = order ? order->all[place] : n, own = order ? order->n[place] : n,
-                 first = order ? order->first[place] : 0, lines = components / cols;
-  const size_t size = type == MPIU_INT ? sizeof(PetscInt) : sizeof(PetscReal);
-  char *rows = NULL;
+                 first = order ? order->first[place] : 0, lines = components / PetscAbsInt(cols);
+  void *rows = NULL;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (order) {
-    PetscCall(PetscCalloc1((size_t)(own * components) * size, &rows));
-    for (PetscInt k = 0; missing != 0 && k < own * components; k++) ((PetscReal *)(void *)rows)[k] = missing;
-    PetscCall(HycoFileOrderSend(order, place, type, components, value, rows));
-    value = rows;
-  }
-  ierr = HycoH5WriteRows(h, name, type, all * lines, cols, first * lines, own * lines, value);
-  PetscCall(PetscFree(rows));
+  PetscCall(HycoFieldRows(order, n, place, type, components, value, missing, &rows));
+  ierr = HycoH5WriteRows(h, name, type, all * lines, cols, first * lines, own * lines, rows);
+  if (order) PetscCall(PetscFree(rows));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -63,217 +56,32 @@ PetscErrorCode HycoFieldWriteData(HycoH5 h, const HycoFileOrder *order, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileOrder *order, HycoMesh m, PetscInt cols)
+{
+  PetscInt *cells = m->cells;
+
+  PetscFunctionBegin;
+  if (order) {
+    PetscCall(PetscMalloc1(m->n_cells * m->nv, &cells));
+    for (PetscInt k = 0; k < m->n_cells * m->nv; k++) cells[k] = m->node_whole[m->cells[k]];
+  }
+  PetscCall(HycoFieldWrite(h, order, m->n_cells, name, HYCO_ON_CELLS, MPIU_INT, m->nv, cols, cells));
+  if (order) PetscCall(PetscFree(cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char folder[], const HycoFileOrder *order, HycoMesh m,
                                    const PetscReal X[])
 {
-  PetscInt *cells = m->cells;
   char name[4][HYCO_LINE];
   static const char *const of[4] = {"xyz", "cells", "node_id", "cell_id"};
 
   PetscFunctionBegin;
   for (int k = 0; k < 4; k++) PetscCall(PetscSNPrintf(name[k], HYCO_LINE, "%s/%s", folder, of[k]));
   PetscCall(HycoFieldWrite(h, order, m->n_nodes, name[0], HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
-  if (order) {
-    PetscCall(PetscMalloc1(m->n_cells * m->nv, &cells));
-    for (PetscInt k = 0; k < m->n_cells * m->nv; k++) cells[k] = m->node_whole[m->cells[k]];
-  }
-  PetscCall(HycoFieldWrite(h, order, m->n_cells, name[1], HYCO_ON_CELLS, MPIU_INT, m->nv, m->nv, cells));
-  if (order) PetscCall(PetscFree(cells));
+  PetscCall(HycoFieldsWriteCells(h, name[1], order, m, m->nv));
   PetscCall(HycoFieldWrite(h, order, m->n_nodes, name[2], HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
   PetscCall(HycoFieldWrite(h, order, m->n_cells, name[3], HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFieldsWriteHead(HycoH5 h, HycoMesh m, HycoScene scene, const PetscReal mu[],
-                                   const HycoContactTable *contact)
-{
-  const PetscInt head[2] = {(PetscInt)m->type, m->dim};
-
-  PetscFunctionBegin;
-  PetscCall(HycoH5WriteText(h, "title", scene->title));
-  PetscCall(HycoH5WriteInt(h, "mesh/head", 2, 1, head)); /* cell type (line2, tri3, quad4, tet4, hex8), dimension */
-  for (PetscInt p = 0; p < scene->n_parameters; p++) {
-    char name[HYCO_LINE];
-
-    PetscCall(PetscSNPrintf(name, sizeof(name), "mu/%s", scene->parameter[p]));
-    PetscCall(HycoH5WriteReal(h, name, 1, 1, &mu[p]));
-  }
-  if (contact && contact->n) {
-    PetscCall(HycoH5WriteInt(h, "contact/node_id", contact->n, 1, contact->node_id));
-    PetscCall(HycoH5WriteReal(h, "contact/lambda", contact->n, 1, contact->lambda));
-    PetscCall(HycoH5WriteReal(h, "contact/gap", contact->n, 1, contact->gap));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static const char *FieldFolder(const HycoField *field)
-{
-  return field->place == HYCO_ON_CELLS ? "cells" : "nodes";
-}
-
-static PetscErrorCode WriteNumbers(MPI_Comm comm, HycoH5 h, const HycoFileOrder *order, HycoMesh m, const PetscReal X[],
-                                   HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
-                                   const HycoContactTable *contact)
-{
-  PetscFunctionBegin;
-  HycoOnRoot(comm, HycoFieldsWriteHead(h, m, scene, mu, contact));
-  PetscCall(HycoFieldsWriteMesh(h, "mesh", order, m, X));
-  for (PetscInt k = 0; k < n; k++) {
-    char name[HYCO_LINE];
-
-    PetscCall(PetscSNPrintf(name, sizeof(name), "%s/%s", FieldFolder(&field[k]), field[k].name));
-    PetscCall(HycoFieldWriteData(h, order, Count(NULL, m, field[k].place), name, &field[k]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The file of numbers. */
-static PetscErrorCode WriteH5(MPI_Comm comm, const char path[], const HycoFileOrder *order, HycoMesh m,
-                              const PetscReal X[], HycoScene scene, const PetscReal mu[], PetscInt n,
-                              const HycoField field[], const HycoContactTable *contact)
-{
-  HycoH5 h;
-  PetscErrorCode ierr, failed;
-
-  PetscFunctionBegin;
-  PetscCall(HycoH5CreateShared(comm, path, &h));
-  ierr = WriteNumbers(comm, h, order, m, X, scene, mu, n, field, contact);
-  failed = HycoH5Close(&h, (PetscBool)!ierr);
-  PetscCall(ierr ? ierr : failed);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void HycoFieldsEscape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
-{
-  static const char special[] = "&<>\"'";
-  static const char *const entity[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&apos;"};
-
-  for (; *name; name++) {
-    const char *at = strchr(special, *name);
-
-    if (at)
-      out += sprintf(out, "%s", entity[at - special]);
-    else
-      *out++ = *name;
-  }
-  *out = '\0';
-}
-
-static void WriteXDMF(FILE *out, const char file[], const HycoFileOrder *order, HycoMesh m, PetscInt n,
-                      const HycoField field[])
-{
-  const long n_nodes = (long)Count(order, m, HYCO_ON_NODES), n_cells = (long)Count(order, m, HYCO_ON_CELLS);
-  char h5[6 * PETSC_MAX_PATH_LEN];
-
-  HycoFieldsEscape(file, h5);
-  fprintf(out, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n  <Grid Name=\"mesh\">\n");
-  fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", topology[m->type], n_cells,
-          m->type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
-  fprintf(out,
-          "    <DataItem Format=\"HDF\" NumberType=\"Int\" Precision=\"%d\" Dimensions=\"%ld "
-          "%ld\">%s:/mesh/cells</DataItem>\n   </Topology>\n",
-          (int)sizeof(PetscInt), n_cells, (long)m->nv, h5);
-  fprintf(out,
-          "   <Geometry GeometryType=\"XYZ\">\n    <DataItem Format=\"HDF\" Precision=\"8\" Dimensions=\"%ld "
-          "3\">%s:/mesh/xyz</DataItem>\n   </Geometry>\n",
-          n_nodes, h5);
-  for (PetscInt k = 0; k < n; k++) {
-    const char *kind = field[k].components == 1 ? "Scalar" : field[k].components == 3 ? "Vector" : "Tensor6";
-
-    fprintf(out, "   <Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"%s\">\n", field[k].name, kind,
-            field[k].place == HYCO_ON_CELLS ? "Cell" : "Node");
-    fprintf(
-        out,
-        "    <DataItem Format=\"HDF\" Precision=\"8\" Dimensions=\"%ld %ld\">%s:/%s/%s</DataItem>\n   </Attribute>\n",
-        field[k].place == HYCO_ON_CELLS ? n_cells : n_nodes, (long)field[k].components, h5, FieldFolder(&field[k]),
-        field[k].name);
-  }
-  fprintf(out, "  </Grid>\n </Domain>\n</Xdmf>\n");
-}
-
-/* The numbers must not take the place of a model or a snapshot, or of what is no file. */
-static PetscErrorCode CheckPlace(const char h5[], const char path[])
-{
-  struct stat info;
-  PetscBool precious;
-
-  PetscFunctionBegin;
-  if (stat(h5, &info) != 0) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(S_ISREG(info.st_mode),
-            "%s is no file (a folder, a device, a pipe), and the numbers of %s would go there; give the output another "
-            "name",
-            h5, path);
-  PetscCall(HycoH5IsPrecious(h5, &precious));
-  HycoCheck(!precious,
-            "%s is a model or a snapshot, and the numbers of %s would go there; give the output another name", h5,
-            path);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFieldsCheckPath(const char path[])
-{
-  const size_t n = strlen(path);
-  char h5[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBegin;
-  HycoCheck(n > 5 && n < PETSC_MAX_PATH_LEN - 16 && strcmp(path + n - 5, ".xdmf") == 0,
-            "the output is named %s; give a name that ends in .xdmf (the numbers go to the .h5 beside it)", path);
-  snprintf(h5, sizeof(h5), "%.*s.h5", (int)n - 5, path);
-  PetscCall(CheckPlace(h5, path));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The text, which has its place when the numbers have theirs. On one process. */
-static PetscErrorCode BeginText(const char path[], const char h5[], const HycoFileOrder *order, HycoMesh m, PetscInt n,
-                                const HycoField field[], HycoFile *out)
-{
-  const char *slash = strrchr(h5, '/');
-
-  PetscFunctionBegin;
-  PetscCall(HycoFieldsCheckPath(path));
-  PetscCall(HycoFileCreate(path, HYCO_FILE_TEXT, out));
-  WriteXDMF(HycoFileStream(*out), slash ? slash + 1 : h5, order, m, n, field);
-  PetscCall(HycoFileFlush(*out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode BeginTextOnRoot(MPI_Comm comm, const char path[], const char h5[], const HycoFileOrder *order,
-                                      HycoMesh m, PetscInt n, const HycoField field[], HycoFile *out)
-{
-  PetscFunctionBegin;
-  HycoOnRoot(comm, BeginText(path, h5, order, m, n, field, out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode EndText(MPI_Comm comm, HycoFile *out)
-{
-  PetscFunctionBegin;
-  HycoOnRoot(comm, HycoFileClose(out, PETSC_TRUE));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Writes `path` and the .h5 beside it, both through temporary names. X: moved nodes (n_nodes x 3). The .h5 also holds
-   node_id, cell_id, the parameters and the contact table (rank 0's). */
-static PetscErrorCode Write(const char path[], const HycoFileOrder *order, HycoMesh m, const PetscReal X[],
-                            HycoScene scene, const PetscReal mu[], PetscInt n, const HycoField field[],
-                            const HycoContactTable *contact)
-{
-  const MPI_Comm comm = order ? order->comm : PETSC_COMM_SELF;
-  char h5[PETSC_MAX_PATH_LEN];
-  HycoFile out = NULL;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  snprintf(h5, sizeof(h5), "%.*s.h5", (int)strlen(path) - 5, path);
-  ierr = BeginTextOnRoot(comm, path, h5, order, m, n, field, &out);
-  /* the numbers first: without them the .xdmf would point at none, or at those of another run */
-  if (!ierr) ierr = WriteH5(comm, h5, order, m, X, scene, mu, n, field, contact);
-  if (!ierr) {
-    ierr = EndText(comm, &out);
-    if (ierr) (void)remove(h5);
-  } else if (out)
-    PetscCall(HycoFileClose(&out, PETSC_FALSE));
-  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -359,6 +167,42 @@ PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode WriteContacts(HycoH5 h, const HycoContactTable *contact)
+{
+  PetscFunctionBegin;
+  if (!contact->n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5WriteInt(h, "contact/node_id", contact->n, 1, contact->node_id));
+  PetscCall(HycoH5WriteReal(h, "contact/lambda", contact->n, 1, contact->lambda));
+  PetscCall(HycoH5WriteReal(h, "contact/gap", contact->n, 1, contact->gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One solution; the contact table is rank 0's. */
+static PetscErrorCode WriteAll(HycoFieldFile file, const HycoFileOrder *order, HycoFE fe, PetscInt n,
+                               const HycoField field[], const HycoContactTable *contact)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFieldFileOpen(file, order, fe->mesh, fe->scene, fe->X, fe->mu));
+  if (!file->vtk) HycoOnRoot(file->comm, WriteContacts(file->h, contact));
+  for (PetscInt k = 0; k < n; k++) PetscCall(HycoFieldFileAdd(file, &field[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Write(const char path[], const HycoFileOrder *order, HycoFE fe, PetscInt n,
+                            const HycoField field[], const HycoContactTable *contact)
+{
+  HycoFieldFile file;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFieldFileCreate(order ? order->comm : PETSC_COMM_SELF, path, 0, &file));
+  ierr = WriteAll(file, order, fe, n, field, contact);
+  if (!ierr) ierr = HycoFieldFileCommit(file);
+  PetscCall(HycoFieldFileDestroy(&file));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
                                  HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],
                                  const PetscReal lambda[], const PetscReal *rid)
@@ -389,7 +233,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, 
                                 {"gap", HYCO_ON_SURFACE, 1, f.gap_node, NAN},
                                 {"rid", HYCO_ON_CELLS, 1, rid, 0}};
 
-    ierr = Write(path, order, m, fe->X, fe->scene, fe->mu, rid ? 9 : 8, field, &table);
+    ierr = Write(path, order, fe, rid ? 9 : 8, field, &table);
   }
   PetscCall(PetscFree6(u3, sigma, tensor, mises, principal, body));
   PetscCall(HycoContactFieldsDestroy(&f));

@@ -47,13 +47,18 @@ static void MarkCells(HycoMesh m, const Place *p, PetscBool in[])
 static PetscErrorCode MarkAround(HycoMesh m, const Place *p, PetscBool in[])
 {
   PetscBool *node;
+  PetscInt of[HYCO_MAX_CELL_NODES];
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->n_nodes, &node));
   for (PetscInt k = m->group_start[p->group]; k < m->group_start[p->group + 1]; k++)
     node[m->group_node[k]] = PETSC_TRUE;
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++)
-    in[k / m->nv] = (PetscBool)((k % m->nv && in[k / m->nv]) || node[m->cells[k]]);
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const PetscInt n = HycoMeshCellNodes(m, e, of);
+
+    in[e] = PETSC_FALSE;
+    for (PetscInt v = 0; v < n; v++) in[e] = (PetscBool)(in[e] || node[of[v]]);
+  }
   PetscCall(PetscFree(node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -206,7 +211,7 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
 
     if (HycoMeshOwned(m, i) < 0) continue;
     if (fe->fixed[dof]) s->sum += reaction[dof];
-    s->weight += fe->fixed[dof];
+    s->weight += HycoFESupports(fe, dof);
     for (PetscInt c = 0; c < fe->dim; c++) {
       const HycoOblique *oblique = HycoFEOblique(fe, i * fe->dim + c);
 

@@ -8,9 +8,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static const char *const sections[] = {"scene_",    "parameter_", "constant_", "body_",   "fixed_",
-                                       "pressure_", "traction_",  "force_",    "spring_", "gravity_",
-                                       "rotation_", "contact_",   "hyco_",     "output_", "history_"};
+static const char *const sections[] = {"scene_",    "parameter_", "constant_", "body_",    "fixed_",    "pressure_",
+                                       "traction_", "force_",     "spring_",   "gravity_", "rotation_", "contact_",
+                                       "hyco_",     "output_",    "history_",  "tie_"};
 
 PetscBool HycoIsSceneKey(const char name[])
 {

@@ -34,6 +34,16 @@ HycoDefineMethod(HycoSceneHasContact, (HycoScene scene, PetscBool *contact), sce
 HycoDefineMethod(HycoSceneGetOptions, (HycoScene scene, PetscOptions *options), scene, HYCO_SCENE_CLASSID,
                  *options = scene->options)
 
+void HycoSceneNamePoint(HycoScene s, const PetscReal mu[], char at[HYCO_LINE])
+{
+  at[0] = '\0';
+  for (PetscInt p = 0; p < s->n_parameters; p++) {
+    const size_t length = strlen(at);
+
+    snprintf(at + length, HYCO_LINE - length, "%s%s = %.10g", p ? ", " : "", s->parameter[p], (double)mu[p]);
+  }
+}
+
 PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -127,7 +137,7 @@ PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
   for (PetscInt k = 0; k < scene->n_entries; k++) {
     if (strncasecmp(scene->key[k], "hyco_", 5) == 0 || strncasecmp(scene->key[k], "parameter_", 10) == 0 ||
         strncasecmp(scene->key[k], "output_", 7) == 0 || strcasecmp(scene->key[k], "scene_mesh") == 0 ||
-        strcasecmp(scene->key[k], "scene_title") == 0)
+        strcasecmp(scene->key[k], "scene_title") == 0 || strncasecmp(scene->key[k], "scene_unit_", 11) == 0)
       continue;
     *hash = HycoHash(*hash, scene->key[k], strlen(scene->key[k]) + 1);
     *hash = HycoHash(*hash, scene->value[k], strlen(scene->value[k]) + 1);

@@ -15,8 +15,10 @@ static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const fixed_fields[] = {"x", "y", "z", "normal", "direction_x", "direction_y", "direction_z", NULL};
 static const char *const spring_fields[] = {"x", "y", "z", "normal", NULL};
 static const char *const contact_fields[] = {"type", NULL};
+static const char *const tie_fields[] = {"slave", "master", "tolerance", NULL};
 static const char *const output_fields[] = {"max", "min", "mean", "reaction", "group", NULL};
-static const char *const scene_fields[] = {"title", "mesh", "parameters", "refine", "formulation", NULL};
+static const char *const scene_fields[] = {"title",       "mesh",       "parameters",  "refine", "formulation",
+                                           "unit_length", "unit_force", "unit_stress", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
 /* Splits "body_pellet_young" after "body_" into "pellet" and the index of "young"; false if no field ends it. */
@@ -488,6 +490,9 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
     PetscCall(ReadGroups(s, entry, name, field));
   } else if (strncasecmp(key, "gravity_", 8) == 0 || strncasecmp(key, "rotation_", 9) == 0) {
     PetscCall(HycoSceneReadMotion(s, entry));
+  } else if (strncasecmp(key, "tie_", 4) == 0) {
+    if (!SplitKey(rest, tie_fields, name, &field)) PetscCall(UnknownKey(key, "a tie", NULL, tie_fields));
+    PetscCall(HycoSceneReadTie(s, entry, name, field));
   } else if (strncasecmp(key, "output_", 7) == 0) {
     if (!SplitKey(rest, output_fields, name, &field)) PetscCall(UnknownKey(key, "an output", NULL, output_fields));
     PetscCall(HycoSceneReadQuantity(s, entry, name, field));
@@ -604,6 +609,7 @@ static PetscErrorCode CheckScene(HycoScene s)
   PetscCall(HycoSceneCheckMotion(s));
   PetscCall(HycoSceneCheckHistory(s));
   PetscCall(HycoSceneCheckQuantities(s));
+  PetscCall(HycoSceneCheckTies(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -676,6 +682,9 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscCall(PetscStrallocpy(folder, &s->folder));
   PetscCall(HycoEntriesList(s));
   PetscCall(GetString(s, "scene_title", &s->title));
+  PetscCall(GetString(s, "scene_unit_length", &s->unit[HYCO_UNIT_LENGTH]));
+  PetscCall(GetString(s, "scene_unit_force", &s->unit[HYCO_UNIT_FORCE]));
+  PetscCall(GetString(s, "scene_unit_stress", &s->unit[HYCO_UNIT_STRESS]));
   PetscCall(FindMesh(s, folder));
   PetscCall(ReadRefine(s));
   PetscCall(ReadFormulation(s));
@@ -870,8 +879,9 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   }
   for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PetscFree(s->parameter[p]));
   PetscCall(HycoSceneDestroyHistory(s));
+  PetscCall(HycoSceneDestroyTies(s));
   HycoFreeAll(&s->key, &s->value, &s->constant, &s->quantity, &s->body, &s->fixed, &s->load, &s->point_load, &s->spring,
-              &s->contact, &s->title, &s->mesh_path, &s->folder);
+              &s->contact, &s->title, &s->mesh_path, &s->folder, &s->unit[0], &s->unit[1], &s->unit[2]);
   PetscCall(DMDestroy(&s->dm));
   PetscCall(PetscOptionsDestroy(&s->options));
   PetscCall(PetscHeaderDestroy(&s));

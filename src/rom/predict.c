@@ -53,7 +53,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   p = &m->prediction;
   PetscCall(HycoSceneCheckParameters(m->scene, n, mu));
-  m->solved = m->whole_current = PETSC_FALSE;
+  m->solved = m->whole_current = m->balanced = PETSC_FALSE;
   HycoLogged(HYCO_EVENT_SETUP, HycoROMSetUp(m));
   p->seconds.setup = HycoNow() - begin;
   begin = HycoNow();

@@ -40,7 +40,6 @@ static PetscErrorCode Extract(HycoROM m, HycoProbe p)
   }
   PetscCall(HycoMeshExtract(m->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
   PetscCall(PetscFree2(needed, keep));
-  PetscCall(HycoMeshSetNodeBodies(m->scene, p->mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -70,14 +69,15 @@ static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < p->fe->n_dof; k++) any = (PetscBool)(any || (p->fe->fixed[k] && p->touched[k / dim]));
+  for (PetscInt k = 0; k < p->fe->n_dof; k++)
+    any = (PetscBool)(any || (HycoFESupports(p->fe, k) && p->touched[k / dim]));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFESetParameters(m->fe_whole, p->fe->mu));
   ierr = HycoContactFieldsCreate(PETSC_COMM_SELF, m->fe_whole, &m->whole_pairs, m->U_whole, Lambda, &c);
   PetscCall(PetscMalloc1(p->fe->n_dof, &force));
   for (PetscInt k = 0; k < p->fe->n_dof; k++) force[k] = ierr ? 0 : c.force[3 * p->mesh->node_whole[k / dim] + k % dim];
   HycoFEGeneralise(p->fe, force);
-  for (PetscInt k = 0; k < p->fe->n_dof; k++) p->reaction[k] -= p->fe->fixed[k] ? force[k] : 0;
+  for (PetscInt k = 0; k < p->fe->n_dof; k++) p->reaction[k] -= HycoFESupports(p->fe, k) ? force[k] : 0;
   PetscCall(PetscFree(force));
   PetscCall(HycoContactFieldsDestroy(&c));
   PetscCall(ierr);

@@ -26,19 +26,27 @@ PetscErrorCode HycoReplayBegin(HycoROM m, HycoFE fe, HycoReplay *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReplayStep(HycoReplay *r, PetscInt k, const PetscReal u[])
+PetscErrorCode HycoReplayTry(HycoReplay *r, PetscInt k, const PetscReal u[], HycoFEStepReport *report)
 {
   const PetscReal *t = r->m->trace.t;
   HycoFEState state = r->state;
-  HycoFEStepReport report;
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(r->f_int, r->fe->n_dof));
-  PetscCall(HycoFEStep(r->fe, u, t[PetscMax(k - 1, 0)], t[k], r->state, r->end, r->f_int, PETSC_FALSE, &report));
-  HycoCheck(!report.failed, "the laws have no answer to the predicted displacements at t = %.10g: %s", (double)t[k],
-            report.why);
+  PetscCall(HycoFEStep(r->fe, u, t[PetscMax(k - 1, 0)], t[k], r->state, r->end, r->f_int, PETSC_FALSE, report));
   r->state = r->end;
   r->end = state;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReplayStep(HycoReplay *r, PetscInt k, const PetscReal u[])
+{
+  HycoFEStepReport report;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReplayTry(r, k, u, &report));
+  HycoCheck(!report.failed, "the laws have no answer to the predicted displacements at t = %.10g: %s",
+            (double)r->m->trace.t[k], report.why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -100,7 +108,7 @@ PetscErrorCode HycoTraceWrite(HycoROM m, const char path[])
   PetscFunctionBegin;
   PetscCall(HycoROMLoadWhole(m));
   m->whole_current = PETSC_FALSE; /* U_whole is the replay's */
-  PetscCall(HycoSeriesCreate(PETSC_COMM_SELF, path, &series));
+  PetscCall(HycoSeriesCreate(PETSC_COMM_SELF, path, m->trace.n_listed, &series));
   ierr = HycoReplayBegin(m, m->fe_whole, &r);
   if (!ierr) ierr = WriteTimes(&r, series);
   PetscCall(HycoReplayEnd(&r));

@@ -31,6 +31,9 @@ PetscErrorCode HycoROMSetFromOptions(HycoROM m)
                             "predict, condensed: displacements and stresses by one full solve on -scene with the "
                             "predicted forces",
                             &m->full_displacement, NULL));
+  PetscCall(HycoOptionsBool("-hyco_residual",
+                            "predict, paths: how far from equilibrium on the whole mesh, by the laws replayed there",
+                            &m->wants_equilibrium, NULL));
   PetscCall(HycoOptionsFor(""));
   PetscCall(HycoOptionsBool("-hyco_reconstruct", "reconstruct the contact forces outside the RID by (41)",
                             &m->reconstruct, NULL));
@@ -75,6 +78,9 @@ PetscErrorCode HycoROMDeclare(PetscOptions options)
 HycoDefineMethod(HycoROMGetFallback, (HycoROM m, PetscBool *full_order, PetscBool *displacement), m, HYCO_ROM_CLASSID,
                  *full_order = m->full_order;
                  *displacement = m->full_displacement)
+
+HycoDefineMethod(HycoROMWantsEquilibrium, (HycoROM m, PetscBool *wants), m, HYCO_ROM_CLASSID,
+                 *wants = m->wants_equilibrium)
 
 PetscErrorCode HycoROMReset(HycoROM m)
 {
@@ -239,6 +245,20 @@ static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where it is asked for; else -1. */
+static PetscErrorCode MeasureEquilibrium(HycoROM m, HycoPrediction *p)
+{
+  HycoEquilibrium e;
+
+  PetscFunctionBegin;
+  p->residual = p->contact_residual = -1;
+  if (!m->wants_equilibrium || !m->trace.n_listed) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMGetEquilibrium(m, &e));
+  p->residual = e.worst;
+  p->contact_residual = e.worst_contact;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Stresses of the RID's cells and the numbers that need them or the reconstruction. */
 PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
 {
@@ -280,6 +300,7 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   PetscCall(MeasureContacts(m, p));
   PetscCall(HycoTrustEstimate(m, p));
   PetscCall(HycoROMMeasureQuantities(m, p));
+  PetscCall(MeasureEquilibrium(m, p));
   *out = *p;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

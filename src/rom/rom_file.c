@@ -90,6 +90,32 @@ static PetscErrorCode MoveMesh(HycoH5 h, const char prefix[], PetscInt n_bodies,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The ties of the whole mesh, which a model without has not; they go to its meshes. */
+static PetscErrorCode MoveTies(HycoH5 h, HycoROM m)
+{
+  HycoTies t = m->mesh->ties;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (HycoH5Reads(h) ? !HycoH5Has(h, "ties/slave") : !t) PetscFunctionReturn(PETSC_SUCCESS);
+  if (HycoH5Reads(h)) {
+    PetscCall(HycoTiesCreate(0, &t));
+    HycoFreeAll(&t->slave, &t->master, &t->tie, &t->body, &t->weight, &t->reach);
+    t->n = -1;
+  }
+  PetscCall(HycoH5Int(h, "ties/slave", 0, PETSC_MAX_INT, &t->n, 1, &t->slave));
+  PetscCall(HycoH5Int(h, "ties/master", 0, PETSC_MAX_INT, &t->n, 1, &t->master));
+  PetscCall(HycoH5Int(h, "ties/tie", 0, m->scene->n_ties - 1, &t->n, 1, &t->tie));
+  PetscCall(HycoH5Int(h, "ties/body", 0, m->scene->n_bodies - 1, &t->n, 1, &t->body));
+  PetscCall(HycoH5Real(h, "ties/weight", &t->n, 1, &t->weight));
+  PetscCall(HycoH5Real(h, "ties/reach", &t->n, 1, &t->reach));
+  if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
+  ierr = HycoMeshSetTies(m->mesh, t);
+  PetscCall(HycoTiesDestroy(&t));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode MovePairs(HycoH5 h, PetscInt n_nodes, PetscInt n_contacts, HycoPairs *p)
 {
   PetscInt *entries;
@@ -344,6 +370,7 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
   PetscFunctionBegin;
   PetscCall(MoveScene(h, m));
   PetscCall(MoveMesh(h, "mesh", m->scene->n_bodies, &m->mesh));
+  PetscCall(MoveTies(h, m));
   PetscCall(MoveSizes(h, m));
   nodes = &m->mesh->n_nodes;
   n_dof = *nodes * m->mesh->dim;
@@ -374,6 +401,7 @@ static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(MoveMesh(h, "whole", m->scene->n_bodies, &m->whole));
+  PetscCall(HycoMeshSetTies(m->whole, m->mesh->ties));
   n_dof = m->whole->n_nodes * m->whole->dim;
   PetscCall(HycoH5Real(h, "whole/V", &n_dof, m->l, &m->V_whole));
   HycoCheck(m->whole->n_nodes == m->whole_nodes && m->whole->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
@@ -553,6 +581,7 @@ PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model)
 PetscErrorCode HycoROMFreeWhole(HycoROM m)
 {
   PetscFunctionBegin;
+  PetscCall(HycoBalanceDestroy(&m->balance));
   PetscCall(HycoFEDestroy(&m->fe_whole));
   PetscCall(HycoPairsDestroy(&m->whole_pairs));
   PetscCall(PetscFree(m->U_whole));

@@ -90,6 +90,7 @@ void HycoTraceWholeU(HycoROM m, PetscInt k, PetscReal U[])
   }
   for (PetscInt f = 0; f < m->n_fe; f++)
     U[m->mesh->node_whole[m->fe_dof[f] / dim] * dim + m->fe_dof[f] % dim] = U_fe[f];
+  HycoFEComplete(m->fe_whole, U);
 }
 
 void HycoTraceSummary(HycoROM m, HycoPrediction *p)

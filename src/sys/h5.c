@@ -382,16 +382,21 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A new set of rows x cols numbers. Of a shared file, its place on the disk. */
-static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, hid_t *set,
-                                long long *place)
+/* The bytes of a row. */
+static size_t Width(hid_t type, PetscInt cols)
+{
+  return (cols == HYCO_H5_LINE ? 1 : (size_t)cols) * H5Tget_size(type);
+}
+
+/* A new set of rows x cols numbers, or of one dimension. Of a shared file there is room for it on the disk. */
+static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, hid_t *set)
 {
   hsize_t dims[2] = {(hsize_t)rows, (hsize_t)cols};
   hid_t space, links, made;
 
   PetscFunctionBegin;
-  if (f->shared) PetscCall(MakeRoom(f, (size_t)rows * (size_t)cols * H5Tget_size(type)));
-  space = H5Screate_simple(2, dims, NULL);
+  if (f->shared) PetscCall(MakeRoom(f, (size_t)rows * Width(type, cols)));
+  space = H5Screate_simple(cols == HYCO_H5_LINE ? 1 : 2, dims, NULL);
   links = H5Pcreate(H5P_LINK_CREATE);
   H5Pset_create_intermediate_group(links, 1);
   made = H5Pcreate(H5P_DATASET_CREATE);
@@ -403,32 +408,58 @@ static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscIn
   H5Pclose(links);
   H5Sclose(space);
   HycoCheck(*set >= 0, "%s: writing %s failed: is there memory?", f->path, name);
-  *place = f->shared && rows && cols ? (long long)H5Dget_offset(*set) : 0;
   HycoCheck(!f->shared || H5Fflush(f->id, H5F_SCOPE_GLOBAL) >= 0, "%s: writing %s failed: is the disk full?", f->path,
             name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, const void *data)
+/* The set of that name, made where it is not there yet. Of a shared file, its place on the disk. */
+static PetscErrorCode FindSet(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, hid_t *set,
+                              long long *place)
 {
-  long long place;
+  PetscFunctionBegin;
+  *set = HycoH5Has(f, name) ? H5Dopen2(f->id, name, f->access) : H5I_INVALID_HID;
+  if (*set < 0) PetscCall(CreateSet(f, name, type, rows, cols, set));
+  *place = f->shared && rows && cols ? (long long)H5Dget_offset(*set) : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows first .. first + n - 1 of a set, into the file in memory. */
+static herr_t PutRows(hid_t set, hid_t type, PetscInt cols, PetscInt first, PetscInt n, const void *data)
+{
+  const hsize_t start[2] = {(hsize_t)first, 0}, count[2] = {(hsize_t)n, (hsize_t)cols};
+  hid_t memory = H5Screate_simple(cols == HYCO_H5_LINE ? 1 : 2, count, NULL), file = H5Dget_space(set);
+  herr_t failed;
+
+  H5Sselect_hyperslab(file, H5S_SELECT_SET, start, NULL, count, NULL);
+  failed = H5Dwrite(set, type, memory, file, H5P_DEFAULT, data);
+  H5Sclose(file);
+  H5Sclose(memory);
+  return failed;
+}
+
+/* The rows first .. first + n - 1 of a set of so many rows; a set that is not there yet is made. */
+static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, PetscInt first,
+                            PetscInt n, const void *data)
+{
+  const size_t width = Width(type, cols);
+  long long place = 0;
   herr_t failed = 0;
   hid_t set;
 
   PetscFunctionBegin;
-  PetscCall(CreateSet(f, name, type, rows, cols, &set, &place));
-  if (!f->shared && rows && cols) failed = H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
+  PetscCall(FindSet(f, name, type, rows, cols, &set, &place));
+  if (!f->shared && n && cols) failed = PutRows(set, type, cols, first, n, data);
   H5Dclose(set);
   HycoCheck(failed >= 0, "%s: writing %s failed: is there memory?", f->path, name);
-  if (f->shared)
-    PetscCall(HycoFilePut(f->fd, f->path, data, (size_t)rows * (size_t)cols * H5Tget_size(type), (size_t)place));
+  if (f->shared) PetscCall(HycoFilePut(f->fd, f->path, data, (size_t)n * width, (size_t)place + (size_t)first * width));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The type of PetscReal (MPIU_REAL) or PetscInt (MPIU_INT) numbers. */
+/* The type of PetscReal (MPIU_REAL), PetscInt (MPIU_INT) or byte numbers. */
 static hid_t NumberType(MPI_Datatype type)
 {
-  return type == MPIU_REAL ? H5T_NATIVE_DOUBLE : NATIVE_INT;
+  return type == MPIU_REAL ? H5T_NATIVE_DOUBLE : type == MPI_UNSIGNED_CHAR ? H5T_NATIVE_UCHAR : NATIVE_INT;
 }
 
 /* On rank 0. */
@@ -438,7 +469,7 @@ static PetscErrorCode LayOut(HycoH5 f, const char name[], MPI_Datatype type, Pet
   hid_t set;
 
   PetscFunctionBegin;
-  PetscCall(CreateSet(f, name, NumberType(type), rows, cols, &set, place));
+  PetscCall(FindSet(f, name, NumberType(type), rows, cols, &set, place));
   H5Dclose(set);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -446,12 +477,12 @@ static PetscErrorCode LayOut(HycoH5 f, const char name[], MPI_Datatype type, Pet
 PetscErrorCode HycoH5WriteRows(HycoH5 f, const char name[], MPI_Datatype type, PetscInt rows, PetscInt cols,
                                PetscInt first, PetscInt n, const void *data)
 {
-  const size_t width = (size_t)cols * H5Tget_size(NumberType(type));
+  const size_t width = Width(NumberType(type), cols);
   long long place = 0;
 
   PetscFunctionBegin;
   if (!f->shared) {
-    PetscCall(Write(f, name, NumberType(type), rows, cols, data));
+    PetscCall(Write(f, name, NumberType(type), rows, cols, first, n, data));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   HycoOnRoot(f->comm, LayOut(f, name, type, rows, cols, &place));
@@ -463,21 +494,66 @@ PetscErrorCode HycoH5WriteRows(HycoH5 f, const char name[], MPI_Datatype type, P
 PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscReal *data)
 {
   PetscFunctionBegin;
-  PetscCall(Write(file, name, NumberType(MPIU_REAL), rows, cols, data));
+  PetscCall(Write(file, name, NumberType(MPIU_REAL), rows, cols, 0, rows, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscInt *data)
 {
   PetscFunctionBegin;
-  PetscCall(Write(file, name, NumberType(MPIU_INT), rows, cols, data));
+  PetscCall(Write(file, name, NumberType(MPIU_INT), rows, cols, 0, rows, data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[])
 {
   PetscFunctionBegin;
-  PetscCall(Write(file, name, H5T_NATIVE_CHAR, (PetscInt)strlen(text), 1, text));
+  PetscCall(Write(file, name, H5T_NATIVE_CHAR, (PetscInt)strlen(text), 1, 0, (PetscInt)strlen(text), text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An attribute; one that is there stays. */
+static PetscErrorCode WriteAttribute(HycoH5 f, const char at[], const char name[], hid_t type, hid_t space,
+                                     const void *value)
+{
+  herr_t failed = 0;
+  hid_t made;
+
+  PetscFunctionBegin;
+  if (H5Aexists_by_name(f->id, at, name, H5P_DEFAULT) <= 0) {
+    made = H5Acreate_by_name(f->id, at, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    failed = made < 0 ? -1 : H5Awrite(made, type, value);
+    if (made >= 0) H5Aclose(made);
+  }
+  HycoCheck(failed >= 0, "%s: writing the attribute %s of %s failed: is there memory?", f->path, name, at);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5WriteAttribute(HycoH5 f, const char at[], const char name[], const char text[])
+{
+  hid_t space = H5Screate(H5S_SCALAR), type = H5Tcopy(H5T_C_S1);
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  H5Tset_size(type, PetscMax(strlen(text), 1));
+  H5Tset_strpad(type, H5T_STR_NULLPAD);
+  ierr = WriteAttribute(f, at, name, type, space, text);
+  H5Tclose(type);
+  H5Sclose(space);
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5WriteAttributeInt(HycoH5 f, const char at[], const char name[], PetscInt n, const PetscInt value[])
+{
+  const hsize_t size = (hsize_t)n;
+  hid_t space = n == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &size, NULL);
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = WriteAttribute(f, at, name, NATIVE_INT, space, value);
+  H5Sclose(space);
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

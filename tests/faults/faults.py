@@ -183,6 +183,8 @@ CASES = [
     (['train', *T, '-points', 'header.csv'], 'header.csv holds no point; a header'),
     (['predict', '-model', 'rope.h5', '-points', os.devnull], '/dev/null holds no point; a header'),
     (['train', *T, *N, '-points', 'p.csv'], 'give one set of points'),
+    (['train', *T, *N, '-scatter', '3'], 'give one set of points'),
+    (['train', *T, '-scatter', '2.5'], 'one whole number, at least 1, is expected'),
     (['train', '-scene', ROPE, '-model', 'none/out.h5', *N], 'none/out.h5 cannot be written'),
     (['train', *T, *N, '-hyco_rid_modes', 'foo'], '-hyco_rid_modes has "foo"'),
     (['train', *T, *N, '-hyco_rid_groups', 'foo'], 'the mesh has no group "foo"'),

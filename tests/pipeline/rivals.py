@@ -1,14 +1,13 @@
 """The baselines of the hybrid model for paths: cubature and regression, on a small ring that creeps while its gap closes and opens."""
 import csv
 import os
-import subprocess
 import unittest
 
 import h5py
 import numpy as np
 
-from common import PATIENCE, ROPE, SOURCE, Case, said
-from paths import HISTORY, KINDS, NORTON, SCENE, arrays
+from common import ROPE, said
+from paths import KINDS, FlowingRing, arrays
 
 CUBATURE = ['-hyco_model_type', 'cubature']
 REGRESSION = ['-hyco_model_type', 'regression']
@@ -16,20 +15,7 @@ POINT = '0.0055,0.91'  # no training point of the grids here
 COLUMNS = ('total_contact_force', 'rid_inelastic', 'rid_mises', 'rid_u_norm2')
 
 
-class Ring(Case):
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        subprocess.run(['gmsh', '-2', os.path.join(SOURCE, 'examples', 'ring', 'ring.geo'), '-setnumber', 'n', '2', '-v', '1', '-o', cls.path('ring.msh')],
-                       check=True, timeout=60 * PATIENCE, stdout=subprocess.DEVNULL)
-        cls.norton = cls.scene('norton.yaml', NORTON)
-
-    @classmethod
-    def scene(cls, name, law, history=HISTORY):
-        with open(cls.path(name), 'w', encoding='utf-8') as f:
-            f.write(SCENE.replace('LAW', law) + history)
-        return cls.path(name)
-
+class Ring(FlowingRing):
     def train(self, model, *args, scene=None, grid='3,3', store='store', **options):
         return self.hyco('train', '-scene', scene or self.norton, '-model', self.path(model), '-grid', grid, '-hyco_snapshots', self.path(store), *args,
                          **options)

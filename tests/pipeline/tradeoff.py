@@ -10,6 +10,7 @@ from common import PATIENCE, SOURCE, Case
 
 sys.path.insert(0, os.path.join(SOURCE, 'scripts', 'tradeoff'))
 import page
+import paths
 import report
 
 
@@ -38,6 +39,17 @@ class Tradeoff(Case):
         self.assertLess(float(rows[1]['u_mean']), float(rows[0]['u_mean']))
         self.assertLess(float(rows[3]['lambda_max']), 1e-4)  # condensed: forces as full order's
         self.assertIn("| all contact forces | condensed |", words)
+
+    def test_rod(self):
+        """One setting, one unseen path: the errors are those of a model that was judged, the times those of both full orders."""
+        words = self.bench('tradeoff', 'rod', '--mesh', 'slice', '--quick')
+        hybrid, newton, elastic = self.rows('rod-slice')
+        self.assertEqual([hybrid['status'], hybrid['type'], newton['type'], elastic['type']], ['ok', 'hybrid', 'full', 'full'])
+        for kind in paths.KINDS:
+            self.assertTrue(0 < float(hybrid[kind + '_max']) < 0.05, hybrid)
+        self.assertLess(float(hybrid['path_s']), float(newton['path_s']))
+        self.assertIn('times faster than Newton', words)
+        self.assertTrue(words.endswith(self.bench('tradeoff', 'rod', '--mesh', 'slice', '--redraw')), 'the same page from the table')
 
     def test_growth(self):
         self.bench('growth', '--rope', '100,1000', '--pellet', '')

@@ -15,6 +15,7 @@ static PetscErrorCode TestGrids(HycoScene scene)
   /* cell centres lo + (k + 1/2) (hi - lo) / n, the last parameter fastest */
   const PetscReal centred[8][2] = {{0.25, -0.5}, {0.25, 0.5}, {0.25, 1.5}, {0.25, 2.5},
                                    {0.75, -0.5}, {0.75, 0.5}, {0.75, 1.5}, {0.75, 2.5}};
+  const PetscReal scattered[3][2] = {{0.5, 1. / 3}, {0.25, 5. / 3}, {0.75, -1 + 4. / 9}};
   HycoSamples samples;
   PetscInt n, p;
   const PetscReal *mu;
@@ -34,6 +35,11 @@ static PetscErrorCode TestGrids(HycoScene scene)
   CHECK_NEAR(mu[32], 0.5, 0);
   CHECK_NEAR(mu[33], 2, 0);
   CHECK_NEAR(mu[35], -1, 0);
+  PetscCall(HycoSamplesAddScattered(samples, 3)); /* halves, quarters of the first; thirds of the second */
+  PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
+  CHECK(n == 21, "expected 21 points, found %d", (int)n);
+  for (int k = 0; k < 6; k++) CHECK_NEAR(mu[36 + k], scattered[k / 2][k % 2], 1e-15);
+  CHECK_FAILS(HycoSamplesAddScattered(samples, 0), "0 scattered points; 1 to 100 million are expected");
   CHECK_FAILS(HycoSamplesAddPoint(samples, outside), "b = 3.01 lies outside its range [-1");
   CHECK_FAILS(HycoSamplesAddGrid(samples, one, PETSC_TRUE), "the grid has 1 points for a; at least 2 are needed");
   PetscCall(HycoSamplesDestroy(&samples));

@@ -26,29 +26,6 @@ static PetscReal Tolerance(HycoReducer t)
   return PetscMin(Condensing(t)->pod_tol, t->tol[HYCO_SEED_DISPLACEMENT]);
 }
 
-/* Halton's sequence in base b. */
-static PetscReal Halton(PetscInt i, PetscInt b)
-{
-  PetscReal value = 0, share = 1;
-
-  for (; i > 0; i /= b) {
-    share /= (PetscReal)b;
-    value += share * (PetscReal)(i % b);
-  }
-  return value;
-}
-
-static PetscInt NextPrime(PetscInt n)
-{
-  for (;;) {
-    PetscInt d = 2;
-
-    n++;
-    while (d * d <= n && n % d) d++;
-    if (d * d > n) return n;
-  }
-}
-
 static PetscInt Corners(HycoCondensed c)
 {
   return 1 << PetscMin(c->dim, 5);
@@ -59,16 +36,14 @@ static PetscInt Corners(HycoCondensed c)
 static void SamplePoint(HycoReducer t, PetscInt number, PetscReal mu[])
 {
   const HycoCondensed c = Condensing(t)->condensed;
-  PetscInt base = 1;
 
   for (PetscInt p = 0; p < c->dim; p++) {
     PetscReal step = 0, lo = c->x[p][0], hi = c->x[p][c->n[p] - 1], share = p < 5 ? number >> p & 1 : 0;
 
-    base = NextPrime(base);
     for (PetscInt k = 1; k < c->n[p]; k++) step = PetscMax(step, c->x[p][k] - c->x[p][k - 1]);
     lo = PetscMin(lo, PetscMax(t->scene->lo[p], lo - step / 2));
     hi = PetscMax(hi, PetscMin(t->scene->hi[p], hi + step / 2));
-    if (number >= Corners(c)) share = Halton(number - Corners(c) + 1, base);
+    if (number >= Corners(c)) share = HycoHalton(number - Corners(c) + 1, p);
     mu[p] = lo + (hi - lo) * share;
   }
 }

@@ -31,10 +31,11 @@ static PetscErrorCode CheckLoads(HycoScene s)
   PetscFunctionBegin;
   for (PetscInt k = 0; k < s->n_fixed; k++) oblique = (PetscBool)(oblique || s->fixed[k].normal);
   for (PetscInt k = 0; k < s->n_fixed; k++) oblique = (PetscBool)(oblique || s->fixed[k].direction[0]);
-  HycoCheckModel(!s->n_springs && !s->n_point_loads && !oblique,
-                 "the scene has %s, and a condensed model of paths knows none; train a hybrid model or a cubature",
+  HycoCheckModel(!s->n_springs && !s->n_point_loads && !s->n_ties && !oblique,
+                 "the scene has %s, and a condensed model of paths knows none; train a hybrid one",
                  s->n_springs       ? "springs"
                  : s->n_point_loads ? "forces on points"
+                 : s->n_ties        ? "ties"
                                     : "a support along a direction");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -518,6 +519,9 @@ PetscErrorCode HycoCondensedPathModes(HycoReducer t, HycoSnapshots store)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  HycoCheck(!t->grown,
+            "train -greedy adds cells to the RID of before, and a condensed model of paths chooses all of its "
+            "cells anew: train it on a grid or on points");
   ierr = Sample(t, store, modes);
   if (!ierr) ierr = Condense(t, store, modes);
   for (PetscInt k = 0; k < N_SAMPLED; k++) {

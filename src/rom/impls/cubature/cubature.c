@@ -56,6 +56,8 @@ static PetscErrorCode Begin(HycoReducer t)
             "displacements of the contacts' nodes) or rank (one for each contact)");
   HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for scenes in the plane and in space; on a line take hybrid "
                              "or projection");
+  HycoCheck(!t->scene->n_ties, "-hyco_model_type cubature is for scenes without ties; take hybrid, projection, "
+                               "condensed or regression");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -338,7 +338,7 @@ PetscErrorCode HycoGalerkinEnergy(HycoROM m, PetscReal *energy, PetscBool *known
 
   PetscFunctionBegin;
   *known = PETSC_FALSE;
-  if (!g->K || g->table || m->fe->lifted || m->fe->n_oblique) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!g->K || g->table || m->fe->lifted || m->fe->n_oblique || m->fe->mesh->n_tied) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(QuadraticForm(m, energy, &size));
   *known = (PetscBool)(*energy >= 1e-5 * size);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -11,10 +11,15 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
 {
   HycoMesh mesh = m->mesh;
   PetscBool *slave;
+  PetscInt node[HYCO_MAX_CELL_NODES];
 
   PetscFunctionBegin;
   *n = 0;
-  for (PetscInt k = 0; k < mesh->n_cells * mesh->nv; k++) *n = PetscMax(*n, mesh->cells[k] + 1);
+  for (PetscInt e = 0; e < mesh->n_cells; e++) {
+    const PetscInt n_nodes = HycoMeshCellNodes(mesh, e, node);
+
+    for (PetscInt v = 0; v < n_nodes; v++) *n = PetscMax(*n, node[v] + 1);
+  }
   for (PetscInt i = *n; i < mesh->n_nodes; i++) *n = m->role[i] == HYCO_ROLE_A ? i + 1 : *n;
   PetscCall(PetscCalloc1(mesh->n_nodes, &slave)); /* with a measured normal */
   for (PetscInt k = 0; k < m->pairs.n; k++) {
@@ -29,6 +34,10 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
 
     for (PetscInt a = 0; a < mesh->nf; a++) any = (PetscBool)(any || slave[mesh->facets[f * mesh->nf + a]]);
     for (PetscInt a = 0; any && a < mesh->nf; a++) *n = PetscMax(*n, mesh->facets[f * mesh->nf + a] + 1);
+  }
+  for (PetscInt k = 0; k < mesh->n_tied && mesh->tied[k] < *n; k++) { /* which follow nodes; more of them come in */
+    for (PetscInt j = mesh->tied_start[k]; j < mesh->tied_start[k + 1]; j++)
+      *n = PetscMax(*n, mesh->tied_master[j] + 1);
   }
   PetscCall(PetscFree(slave));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -45,6 +54,7 @@ static PetscErrorCode ViewMesh(HycoMesh mesh, PetscInt n, HycoMesh *own)
   o = *own;
   *o = *mesh;
   o->n_nodes = n;
+  while (o->n_tied && o->tied[o->n_tied - 1] >= n) o->n_tied--;
   o->n_facets = 0;
   PetscCall(PetscMalloc1(mesh->n_facets * mesh->nf, &o->facets));
   PetscCall(PetscMalloc1(mesh->n_facets, &o->facet_group));

@@ -59,8 +59,11 @@ static PetscErrorCode ListRows(HycoROM m, HycoReduced r)
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->mesh->n_nodes, &varies));
-  for (PetscInt k = 0; k < m->mesh->n_cells * m->mesh->nv; k++) {
-    if (!m->fe->constant[k / m->mesh->nv]) varies[m->mesh->cells[k]] = PETSC_TRUE;
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+    PetscInt node[HYCO_MAX_CELL_NODES];
+    const PetscInt n = HycoMeshCellNodes(m->mesh, e, node);
+
+    for (PetscInt v = 0; v < n && !m->fe->constant[e]; v++) varies[node[v]] = PETSC_TRUE;
   }
   PetscCall(PetscMalloc1(m->fe->n_dof, &r->row));
   for (PetscInt pass = 0; pass < 2; pass++) {

@@ -226,14 +226,16 @@ PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
 PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
 {
   const HycoProjectionROM p = (HycoProjectionROM)m->data;
+  char worst[HYCO_LINE] = "";
 
   PetscFunctionBegin;
   PetscCall(HycoReducerJudge(t, m));
+  if (!(m->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(m->numbers[1] < 0.5,
                  "the %s model misses its own training displacements by %.0f %% on average (%d modes, %d force "
-                 "vectors, condition %.0e): take more modes (a smaller -hyco_pod_tol)%s",
+                 "vectors, condition %.0e)%s: take more modes (a smaller -hyco_pod_tol)%s",
                  m->traits.title, 100 * (double)m->numbers[1], (int)m->l, (int)p->l_lambda, (double)m->numbers[0],
-                 m->traits.cells ? ", or more cells (a smaller -hyco_cubature_tol)" : "");
+                 worst, m->traits.cells ? ", or more cells (a smaller -hyco_cubature_tol)" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,0 +1,231 @@
+"""Reduced models of paths on examples/rod: settings of each type, errors at paths that they have not seen, CPU seconds of a path."""
+import csv
+import json
+import os
+import statistics
+import sys
+import time
+from dataclasses import dataclass
+
+sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "rivals"))
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from cases import Setting
+from page import machine
+from report import COLORS, MARKS, percent, seconds, table
+from timing import timed
+
+NAMES = ["gap", "q2", "creep"]
+KINDS = {"u": "displacement", "sigma": "stress of the RID's cells", "inelastic": "inelastic strain", "lambda_rid": "forces on the RID's contacts"}
+LIMITS = [{"u": 0.002, "sigma": 0.005, "inelastic": 0.005, "lambda_rid": 0.01}, {"u": 0.01, "sigma": 0.03, "inelastic": 0.03, "lambda_rid": 0.05}]
+COLOR = COLORS | {"cubature": "#8a4fa3", "regression": "#777777"}
+MARK = MARKS | {"cubature": "D", "regression": "x"}
+ESTIMATES = ["bounded", "ratio"]
+EXTRA = ["times faster than Newton", "than elastic"]
+
+# A plane of symmetry as RID, all of its displacements full order
+PLANE = (("rid_groups", "sym_y0"), ("hybrid", "all"), ("rid_modes", "displacement"))
+TIGHT = (("pod_tol", "1e-12"),)
+LAYER = (("rid_layers", 1), ("rid_contact_extension", 1))  # mm: two and a half edges of the slice's contact
+
+
+def cubature(tolerance, *contact):
+    return Setting("cubature", "", (*TIGHT, ("cubature_tol", tolerance), *contact))
+
+
+RANK, VECTORS = ("hybrid", "rank"), ("dual", "nnmf")
+TRAINING = {name: ["-scatter", "12"] for name in ("", "searched")}
+SEARCHED = Setting("hybrid", "searched")  # no option: the recipe that train finds
+BASELINES = [Setting("projection", "", TIGHT), *(cubature(tol, *contact) for contact in ([], [RANK], [VECTORS]) for tol in ("1e-4", "1e-6"))]
+CONDENSED = [Setting("condensed", ""), Setting("condensed", "", (("condensed_inelastic_tol", "1e-14"),))]
+
+
+@dataclass
+class Case:
+    name: str
+    scene: list
+    training: dict    # by a setting's training: arguments of its points
+    unseen: list      # paths by NAMES
+    batch: list       # what is timed: arguments of a set, and of one of its points
+    settings: list
+    references: list  # points of full order
+
+
+SLICE = [[g, q, c] for g in (0.034, 0.047, 0.058, 0.066) for q in (37.1, 43.3) for c in (0.8, 1.6)]
+SOLID = [[0.039, 42.3, 0.65], [0.049, 36.4, 1.45], [0.056, 43.6, 0.9], [0.067, 40.1, 1.85]]
+BATCH = [["-values_gap", "0.041,0.053", "-values_q2", "38.5,44", "-values_creep", "0.7,1.3"],
+         ["-values_gap", "0.041", "-values_q2", "38.5", "-values_creep", "0.7"], 8]
+
+
+def case_of(mesh):
+    if mesh == "slice":
+        return Case("rod, a slice", ["-scene", "examples/rod"], TRAINING | {"grid 5,2,2": ["-grid", "5,2,2"]}, SLICE, BATCH,
+                    [SEARCHED, Setting("hybrid", "grid 5,2,2", (*TIGHT, *LAYER)), Setting("hybrid", "", (("pod_tol", "1e-9"), *LAYER)), Setting("hybrid", "", (*TIGHT, *LAYER)), *BASELINES,
+                     *CONDENSED, Setting("regression", "", (*TIGHT, ("rid_layers", 1)))], SLICE[::7])
+    scene = ["-scene", "examples/rod/3d.yaml", "-scene_mesh", f"examples/pellet/{mesh}.msh"]
+    planes = [Setting("hybrid", "", (("pod_tol", tol), *PLANE)) for tol in ("1e-8", "1e-10", "1e-12")]
+    if mesh == "C":  # half an hour for the references, ten minutes for each setting
+        return Case("rod, mesh C", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2"]}, SOLID, BATCH, [*planes, cubature("1e-4", RANK)], SOLID[1:2])
+    return Case(f"rod, mesh {mesh}", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2"]}, SOLID, BATCH,
+                [SEARCHED, *planes, Setting("hybrid", "grid 3,2,2", (*TIGHT, *PLANE)), Setting("hybrid", "", (*TIGHT, *PLANE, ("rid_layers", 1))), *BASELINES[:4], BASELINES[5],
+                 *CONDENSED, Setting("regression", "", (*TIGHT, *PLANE))], SOLID[:3])
+
+
+class Bench:
+    """Runs hyco in timed.folder."""
+
+    def __init__(self, case, snapshots, timeout):
+        self.case, self.timeout = case, timeout
+        self.snapshots = snapshots or os.path.join(timed.folder, "snapshots")
+        self.points = os.path.join(timed.folder, "unseen.csv")
+        with open(self.points, "w", encoding="utf-8", newline="") as file:
+            csv.writer(file).writerows([NAMES, *case.unseen])
+
+    def hyco(self, *arguments, ends=(0,)):
+        """CPU seconds and the report. A model that misses ends with 3."""
+        report = os.path.join(timed.folder, "report.json")
+        _, cpu, megabytes, failure = timed([os.environ.get("HYCO", "build/hyco"), *map(str, arguments), "-report", report], self.timeout)
+        if failure and not any(failure.startswith(f"ended with {code}:") for code in ends):
+            raise RuntimeError(failure)
+        with open(report, encoding="utf-8") as file:
+            return cpu, json.load(file) | {"peak_mb": megabytes}
+
+    def full_order(self, newton):
+        """The median CPU seconds of a path."""
+        return statistics.median(self.hyco("solve", *self.case.scene, "-mu", ",".join(map(str, p)), "-hyco_newton", newton)[0]
+                                 for p in self.case.references)
+
+    def setting(self, setting, model):
+        row = {"type": setting.type, "label": setting.label, "status": "ok"}
+        try:
+            known = [] if setting == SEARCHED else ["-hyco_search", "false", "-validation_points", self.points]
+            cpu, trained = self.hyco("train", *self.case.scene, "-model", model, *self.case.training[setting.training], "-hyco_snapshots", self.snapshots,
+                                     *setting.arguments(), *known, ends=(0, 3))
+            held = trained["held_out"] if known else self.compare(model)
+            one, _ = self.hyco("predict", "-model", model, *self.case.batch[1])
+            every, predicted = self.hyco("predict", "-model", model, *self.case.batch[0])
+        except RuntimeError as error:
+            return row | {"status": str(error)}
+        if held["not_converged"]:
+            return row | {"status": f"{held['not_converged']} of {held['n']} paths did not reach their end"}
+        row |= {"modes": trained["n_modes"], "rid_fraction": trained["rid_fraction"], "train_s": cpu,
+                "path_s": (every - one) / (self.case.batch[2] - 1), "memory_mb": predicted["peak_mb"], "model_bytes": os.path.getsize(model)}
+        for kind in KINDS:
+            row |= {f"{kind}_median": held[kind]["median"], f"{kind}_max": held[kind]["largest"]} if kind in held else {}
+        return row | {name: value for name, value in held.items() if name in ESTIMATES}
+
+    def table(self, *arguments):
+        path = os.path.join(timed.folder, "table.csv")
+        self.hyco(*arguments, "-table", path)
+        with open(path, encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file))
+
+    def compare(self, model):
+        """Of a training whose held-out paths chose its settings: errors, and how the estimates bound them."""
+        true = self.table("compare", *self.case.scene, "-model", model, "-points", self.points)
+        guess = self.table("predict", "-model", model, "-points", self.points)
+        found = {"n": len(true), "not_converged": 0}
+        for kind in KINDS:
+            errors = [float(row[f"worst_{kind}"]) for row in true]
+            found[kind] = {"median": statistics.median(errors), "largest": max(errors)}
+        ratios = [float(g[f"estimated_error_{kind}"]) / float(t[f"worst_{kind}"]) for kind in ("u", "sigma", "lambda") for t, g in zip(true, guess)]
+        return found | {"bounded": sum(r >= 1 for r in ratios) / len(ratios), "ratio": statistics.median(ratios)}
+
+
+def measure(mesh, arguments):
+    """Rows of the settings, then those of full order."""
+    case = case_of(mesh)
+    if arguments.settings:
+        case.settings = [case.settings[int(k) - 1] for k in arguments.settings.split(",")]
+    if arguments.quick:
+        case.settings, case.unseen, case.references = case.settings[3:4], case.unseen[:1], case.references[:1]
+    bench = Bench(case, arguments.snapshots, arguments.timeout)
+    rows = []
+    for k, setting in enumerate(bench.case.settings, 1):
+        row = bench.setting(setting, os.path.join(timed.folder, "model.h5")) | {"id": k}
+        rows.append(row)
+        print(f"{k}/{len(bench.case.settings)} {row['label']}: {row['status']}" +
+              (f", {seconds(row['path_s'])}, " + ", ".join(f"{kind} {percent(row[kind + '_max'])} %" for kind in KINDS if kind + "_max" in row)
+               if row["status"] == "ok" else ""), flush=True)
+    words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core. Trained on 12 scattered paths (`-scatter 12`) where no grid is named; {len(bench.case.unseen)} "
+             "paths that no training has seen." + (" Full order's seconds are those of `scripts/bench history`." if arguments.full_order else ""))
+    known = map(float, arguments.full_order.split(",")) if arguments.full_order else map(bench.full_order, ("tangent", "elastic"))
+    for name, cpu in zip(("full order, Newton", "full order, the elastic factor kept"), known):
+        rows.append({"id": 0, "type": "full", "label": name, "status": words, "path_s": cpu})
+        print(f"{name}: {seconds(cpu)}", flush=True)
+    return rows
+
+
+def split(rows):
+    """Those that gave a model, those that did not, the two full orders."""
+    return ([r for r in rows if r["status"] == "ok"], [r for r in rows if r["type"] != "full" and r["status"] != "ok"],
+            [r for r in rows if r["type"] == "full"])
+
+
+def within(row, limits):
+    return all(row.get(f"{kind}_max", float("inf")) <= limit for kind, limit in limits.items())
+
+
+def say(limits):
+    return ", ".join(f"{KINDS[kind]} {100 * limit:g} %" for kind, limit in limits.items())
+
+
+def line_of(row, full):
+    errors = [f"{percent(row[k + '_median'])} / {percent(row[k + '_max'])}" if k + "_max" in row else "" for k in KINDS]
+    return [row["id"], row["label"], row["modes"], f"{100 * row['rid_fraction']:.1f}", *errors, seconds(row["path_s"]),
+            *(f"{f['path_s'] / row['path_s']:.3g}" for f in full), f"{row['memory_mb']:.0f}", seconds(row["train_s"])]
+
+
+def section(mesh, rows, picture):
+    ok, failed, full = split(rows)
+    lines = [full[0]["status"], "", f"![error against online time, {case_of(mesh).name}]({picture})", "",
+             *table(["full order", "a path"], [[f["label"], seconds(f["path_s"])] for f in full]), "",
+             "Errors: median / largest over the paths, each at its worst listed time.", "",
+             *table(["", "setting", "modes", "cells %", *(f"{words} %" for words in KINDS.values()), "a path", *EXTRA, "MB", "training, solutions known"],
+                    [line_of(r, full) for r in sorted(ok, key=lambda r: r["path_s"])]), ""]
+    for limits in LIMITS:
+        best = min((r for r in ok if within(r, limits)), key=lambda r: r["path_s"], default=None)
+        lines.append(f"- Within {say(limits)} at all of them, the cheapest: " + (f"number {best['id']}, {line_of(best, full)[-4]} times faster than Newton, "
+                     f"{line_of(best, full)[-3]} than the elastic factor kept." if best else "none."))
+    lines += [f"- Estimates of number {r['id']}, of displacement, stress and forces: {100 * r['bounded']:.0f} % bound the error, their median is {r['ratio']:.2g} times "
+              "as large." for r in ok if "bounded" in r]
+    lines += [f"- No model, or a path without its end: {r['label']}: {r['status']}" for r in failed]
+    return lines
+
+
+def headline(mesh, rows, picture):
+    """The README's picture and sentence: the most accurate hybrid model's gain."""
+    ok, _, full = split(rows)
+    best = min((r for r in ok if r["type"] == "hybrid"), key=lambda r: sum(r[k + "_median"] for k in KINDS))
+    return [f"![error against online time, {case_of(mesh).name}: bodies that creep and yield]({picture})", "",
+            f"Where bodies creep and yield: a power ramp on a fuel rod ({case_of(mesh).name}) takes {seconds(full[0]['path_s'])} by full Newton, "
+            f"{seconds(full[1]['path_s'])} with the elastic factor kept, and {seconds(best['path_s'])} by the hybrid model ({full[0]['path_s'] / best['path_s']:.0f} "
+            f"and {full[1]['path_s'] / best['path_s']:.0f} times faster), off at unseen parameters by " +
+            ", ".join(f"{percent(best[k + '_median'])} / {percent(best[k + '_max'])} % in {words}" for k, words in KINDS.items()) +
+            " (median / largest over the paths, each at its worst time)."]
+
+
+def plot(mesh, rows, path):
+    ok, _, full = split(rows)
+    figure, axes = plt.subplots(2, 2, figsize=(11, 8.2), layout="constrained", sharex=True)
+    for axis, (kind, words) in zip(axes.flat, KINDS.items()):
+        for type_ in dict.fromkeys(r["type"] for r in ok):
+            mine = [r for r in ok if r["type"] == type_ and kind + "_max" in r]
+            x, low, high = ([r["path_s"] for r in mine], *([max(100 * r[f"{kind}_{which}"], 1e-6) for r in mine] for which in ("median", "max")))
+            axis.vlines(x, low, high, color=COLOR[type_], lw=1.2, alpha=0.6)
+            axis.scatter(x, high, s=30, marker=MARK[type_], color=COLOR[type_], label=type_)
+            for r, y in zip(mine, high):
+                axis.annotate(str(r["id"]), (r["path_s"], y), xytext=(4, 3), textcoords="offset points", fontsize=8)
+        for f, style in zip(full, ("--", "-")):
+            axis.axvline(f["path_s"], color="0.4", ls=style, label=f["label"])
+        for limits in LIMITS:
+            axis.axhline(100 * limits[kind], color="0.8", lw=0.9, zorder=0)
+        axis.set(xscale="log", yscale="log", title=words, ylabel="error, %: median to largest")
+    for axis in axes[1]:
+        axis.set_xlabel("CPU seconds of a path")
+    axes[0, 0].legend(fontsize=8, framealpha=0.9)
+    figure.suptitle(f"{case_of(mesh).name}: error at unseen paths, each at its worst time, against online time")
+    figure.savefig(path, dpi=100)
+    plt.close(figure)

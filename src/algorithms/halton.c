@@ -1,0 +1,28 @@
+/* Halton's sequence (J. H. Halton, Numer. Math. 2 (1960) 84-90): points that fill a cube evenly, each after the last.
+ */
+#include <hycoalgorithms.h>
+
+/* The j-th prime, from 0. */
+static PetscInt Prime(PetscInt j)
+{
+  PetscInt n = 2;
+
+  for (;; n++) {
+    PetscInt d = 2;
+
+    while (d * d <= n && n % d) d++;
+    if (d * d > n && j-- == 0) return n;
+  }
+}
+
+PetscReal HycoHalton(PetscInt k, PetscInt j)
+{
+  const PetscInt base = Prime(j);
+  PetscReal value = 0, share = 1;
+
+  for (; k > 0; k /= base) {
+    share /= (PetscReal)base;
+    value += share * (PetscReal)(k % base);
+  }
+  return value;
+}

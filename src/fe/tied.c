@@ -1,0 +1,155 @@
+/*
+  Ties: the displacement of a tied node is that of a point of the master's surface, u_s = sum of w_m u_m. The unknown in
+  its place is what it differs by, fixed to 0, as of a support along a direction (oblique.c): stiffness, loads and norm
+  are T^T K T, T^T F; displacements are brought back by HycoFEComplete(). The node is put onto that point, so that a
+  rigid motion of the masters is one of the slaves.
+*/
+#include <hycokinematics.h>
+#include <hycovector.h>
+
+PetscErrorCode HycoTiedPlace(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    const PetscInt entry = m->tied_entry[k];
+    const PetscReal *weight = m->ties->weight + entry;
+    PetscReal *X = fe->X + 3 * m->tied[k], at[3] = {0, 0, 0};
+
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+      for (PetscInt c = 0; c < 3; c++) at[c] += weight[j - m->tied_start[k]] * fe->X[3 * m->tied_master[j] + c];
+    }
+    HycoCheck(HycoDistance(X, at) <= m->ties->reach[entry],
+              "tie %s: maps bring node %d of %s %g away from what it is tied to, farther than its tolerance %g; move "
+              "both bodies alike there",
+              fe->scene->tie[m->ties->tie[entry]].name, (int)m->node_id[m->tied[k]],
+              fe->scene->tie[m->ties->tie[entry]].slave, (double)HycoDistance(X, at), (double)m->ties->reach[entry]);
+    PetscCall(PetscArraycpy(X, at, 3));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the masters of tied node k hold its component c where a support of its own does. */
+static PetscBool MastersHold(HycoFE fe, PetscInt k, PetscInt c)
+{
+  HycoMesh m = fe->mesh;
+  const PetscReal own = fe->u0[m->tied[k] * fe->dim + c], *weight = m->ties->weight + m->tied_entry[k];
+  PetscReal u = 0, size = PetscAbsReal(own);
+
+  for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+    const PetscInt dof = m->tied_master[j] * fe->dim + c;
+
+    if (!fe->fixed[dof] || HycoFEOblique(fe, dof)) return PETSC_FALSE;
+    u += weight[j - m->tied_start[k]] * fe->u0[dof];
+    size += PetscAbsReal(fe->u0[dof]);
+  }
+  return (PetscBool)(PetscAbsReal(u - own) <= 1e-9 * size);
+}
+
+PetscErrorCode HycoTiedFix(HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    const HycoTie *tie = &fe->scene->tie[m->ties->tie[m->tied_entry[k]]];
+
+    for (PetscInt c = 0; c < fe->dim; c++) {
+      const PetscInt dof = m->tied[k] * fe->dim + c;
+
+      HycoCheck(!fe->fixed[dof] || MastersHold(fe, k, c),
+                "node %d is tied (tie %s, slave %s) and held in %c, and what it is tied to is not held alike; exchange "
+                "slave and master, or take the node from the support",
+                (int)m->node_id[m->tied[k]], tie->name, tie->slave, "xyz"[c]);
+      fe->fixed[dof] = PETSC_TRUE;
+      fe->u0[dof] = 0;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTiedCheckOblique(HycoFE fe, const HycoFixed *fixed, PetscInt group, PetscInt node)
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt k = HycoMeshTied(m, node), *of = m->group_node + m->group_start[group];
+  PetscBool alike = (PetscBool)!HycoExprInSpace(fixed->normal);
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < 3; c++) alike = (PetscBool)(alike && !HycoExprInSpace(fixed->direction[c]));
+  for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+    PetscInt at;
+
+    PetscCall(PetscFindInt(m->tied_master[j], m->group_start[group + 1] - m->group_start[group], of, &at));
+    alike = (PetscBool)(alike && at >= 0);
+  }
+  HycoCheck(alike,
+            "node %d is tied (tie %s) and held by %s, and what it is tied to is not held alike; exchange slave and "
+            "master, or take the node from the support",
+            (int)m->node_id[node], fe->scene->tie[m->ties->tie[m->tied_entry[k]]].name, HycoExprKey(fixed->normal));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A matrix of n rows as one of `to` > n, its new rows and columns 0. */
+static void Grow(PetscInt n, PetscInt to, PetscReal Ke[])
+{
+  for (PetscInt r = to - 1; r >= 0; r--) {
+    for (PetscInt t = to - 1; t >= 0; t--) Ke[r * to + t] = r < n && t < n ? Ke[r * n + t] : 0;
+  }
+}
+
+void HycoTiedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt dim = fe->dim;
+  PetscInt node[HYCO_MAX_CELL_NODES], n;
+
+  if (!m->ties) return;
+  n = HycoMeshCellNodes(m, cell, node);
+  if (n > m->nv) Grow(m->nv * dim, n * dim, Ke);
+  for (PetscInt a = 0; a < m->nv && !fe->plain; a++) {
+    const PetscInt k = HycoMeshTied(m, node[a]), size = n * dim;
+
+    for (PetscInt j = k < 0 ? 0 : m->tied_start[k]; k >= 0 && j < m->tied_start[k + 1]; j++) {
+      const PetscReal w = m->ties->weight[m->tied_entry[k] + j - m->tied_start[k]];
+      PetscInt b = 0;
+
+      while (node[b] != m->tied_master[j]) b++;
+      for (PetscInt c = 0; c < dim; c++) {
+        for (PetscInt t = 0; t < size; t++) Ke[(b * dim + c) * size + t] += w * Ke[(a * dim + c) * size + t];
+        for (PetscInt t = 0; t < size; t++) Ke[t * size + b * dim + c] += w * Ke[t * size + a * dim + c];
+      }
+    }
+  }
+}
+
+void HycoTiedComplete(HycoFE fe, PetscReal u[])
+{
+  HycoMesh m = fe->mesh;
+
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    const PetscReal *weight = m->ties->weight + m->tied_entry[k];
+
+    for (PetscInt c = 0; c < fe->dim; c++) {
+      PetscReal sum = 0;
+
+      for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++)
+        sum += weight[j - m->tied_start[k]] * u[m->tied_master[j] * fe->dim + c];
+      u[m->tied[k] * fe->dim + c] = sum;
+    }
+  }
+}
+
+void HycoTiedGeneralise(HycoFE fe, PetscReal f[])
+{
+  HycoMesh m = fe->mesh;
+
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    const PetscReal *weight = m->ties->weight + m->tied_entry[k];
+
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+      for (PetscInt c = 0; c < fe->dim; c++)
+        f[m->tied_master[j] * fe->dim + c] += weight[j - m->tied_start[k]] * f[m->tied[k] * fe->dim + c];
+    }
+  }
+}

@@ -1,0 +1,336 @@
+/*
+  Files of fields of one mesh: PATH.xdmf with its numbers in PATH.h5, or one PATH.vtkhdf; of one solution, or of several
+  times. Each rank writes its rows of the file's order.
+*/
+#include <hycofields.h>
+#include <hycofile.h>
+#include <hycoh5.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
+                                                        "Hexahedron"};
+
+/* The length of the ending .vtkhdf or .xdmf of a path; 0: it has neither. */
+static size_t Ending(const char path[])
+{
+  const size_t n = strlen(path);
+
+  if (n > 5 && strcmp(path + n - 5, ".xdmf") == 0) return 5;
+  return n > 7 && strcmp(path + n - 7, ".vtkhdf") == 0 ? 7 : 0;
+}
+
+PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_LEN])
+{
+  const size_t ending = Ending(path);
+
+  PetscFunctionBegin;
+  HycoCheck(
+      ending && strlen(path) < PETSC_MAX_PATH_LEN - 16,
+      "the output is named %s; give a name that ends in .xdmf (the numbers go to the .h5 beside it) or in .vtkhdf",
+      path);
+  if (ending == 5)
+    snprintf(numbers, PETSC_MAX_PATH_LEN, "%.*s.h5", (int)strlen(path) - 5, path);
+  else
+    PetscCall(PetscStrncpy(numbers, path, PETSC_MAX_PATH_LEN));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldsCheckPath(const char path[])
+{
+  char h5[PETSC_MAX_PATH_LEN];
+  struct stat info;
+  PetscBool precious;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFieldsNumbers(path, h5));
+  if (stat(h5, &info) != 0) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(S_ISREG(info.st_mode),
+            "%s is no file (a folder, a device, a pipe), and the numbers of %s would go there; give the output another "
+            "name",
+            h5, path);
+  PetscCall(HycoH5IsPrecious(h5, &precious));
+  HycoCheck(!precious,
+            "%s is a model or a snapshot, and the numbers of %s would go there; give the output another name", h5,
+            path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt most, HycoFieldFile *file)
+{
+  HycoFieldFile f;
+
+  PetscFunctionBegin;
+  HycoOnRoot(comm, HycoFieldsCheckPath(path));
+  PetscCall(PetscNew(&f));
+  f->comm = comm;
+  f->most = most;
+  f->vtk = (PetscBool)(Ending(path) == 7);
+  PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
+  PetscCall(HycoFieldsNumbers(path, f->h5_path));
+  PetscCall(PetscMalloc1(most, &f->t));
+  *file = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt HycoFieldFileCount(HycoFieldFile f, HycoPlace place)
+{
+  return f->order ? f->order->all[place] : place == HYCO_ON_CELLS ? f->mesh->n_cells : f->mesh->n_nodes;
+}
+
+/* The title, cell type, dimension and parameters. On one process. */
+static PetscErrorCode WriteHead(HycoFieldFile f, const PetscReal mu[])
+{
+  const PetscInt head[2] = {(PetscInt)f->mesh->type, f->mesh->dim};
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5WriteText(f->h, "title", f->scene->title));
+  PetscCall(HycoH5WriteInt(f->h, "mesh/head", 2, 1, head)); /* cell type (line2, tri3, quad4, tet4, hex8), dimension */
+  for (PetscInt p = 0; p < f->scene->n_parameters; p++) {
+    char name[HYCO_LINE];
+
+    PetscCall(PetscSNPrintf(name, sizeof(name), "mu/%s", f->scene->parameter[p]));
+    PetscCall(HycoH5WriteReal(f->h, name, 1, 1, &mu[p]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldFileOpen(HycoFieldFile f, const HycoFileOrder *order, HycoMesh mesh, HycoScene scene,
+                                 const PetscReal X[], const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  f->order = order;
+  f->mesh = mesh;
+  f->scene = scene;
+  f->n = f->n_fields = 0;
+  PetscCall(HycoH5Close(&f->h, PETSC_FALSE));
+  PetscCall(HycoH5CreateShared(f->comm, f->h5_path, &f->h));
+  if (f->vtk) {
+    PetscCall(HycoVTKWriteMesh(f, X, mu));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  HycoOnRoot(f->comm, WriteHead(f, mu));
+  PetscCall(HycoFieldsWriteMesh(f->h, "mesh", order, mesh, X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* "nodes/displacement", of times "step-0003/nodes/displacement" */
+static void NameSet(HycoFieldFile f, PetscInt k, const HycoField *field, char name[HYCO_LINE])
+{
+  const char *folder = field->place == HYCO_ON_CELLS ? "cells" : "nodes";
+
+  if (f->most)
+    HycoFieldName(field, k, name);
+  else
+    HycoFormat(name, "%s/%s", folder, field->name);
+}
+
+void HycoFieldName(const HycoField *field, PetscInt k, char name[HYCO_LINE])
+{
+  HycoFormat(name, "step-%04d/%s/%s", (int)k, field->place == HYCO_ON_CELLS ? "cells" : "nodes", field->name);
+}
+
+/* What a field is measured in, as the scene has it, and what its components are called; of a set that is there. On one
+   process. */
+static PetscErrorCode Describe(HycoFieldFile f, const char set[], const HycoField *field)
+{
+  static const char *const lengths[] = {"displacement", "gap", NULL}, *const forces[] = {"contact_force", NULL},
+                           *const stresses[] = {"stress", "mises", "principal_stress", "contact_pressure", NULL};
+  const char *const *const kinds[3] = {lengths, forces, stresses};
+
+  PetscFunctionBegin;
+  for (PetscInt kind = 0; kind < 3; kind++) {
+    for (PetscInt k = 0; kinds[kind][k]; k++) {
+      if (!strcmp(field->name, kinds[kind][k]) && f->scene->unit[kind] && f->scene->unit[kind][0])
+        PetscCall(HycoH5WriteAttribute(f->h, set, "unit", f->scene->unit[kind]));
+    }
+  }
+  if (!strcmp(field->name, "principal_stress"))
+    PetscCall(HycoH5WriteAttribute(f->h, set, "components", "1 2 3"));
+  else if (field->components == 3)
+    PetscCall(HycoH5WriteAttribute(f->h, set, "components", "x y z"));
+  else if (field->components == 6)
+    PetscCall(HycoH5WriteAttribute(f->h, set, "components", f->vtk ? "xx yy zz xy yz xz" : "xx xy xz yy yz zz"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldFileAddRows(HycoFieldFile f, const HycoField *field, const PetscReal rows[])
+{
+  const PetscInt all = HycoFieldFileCount(f, field->place), own = f->order ? f->order->n[field->place] : all,
+                 first = f->order ? f->order->first[field->place] : 0;
+  HycoField *noted = &f->field[f->n_fields];
+  char set[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (f->n_fields == HYCO_MOST_FIELDS) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscStrncpy(f->name[f->n_fields], field->name, sizeof(f->name[0])));
+  *noted = *field;
+  noted->name = f->name[f->n_fields++];
+  noted->data = NULL;
+  if (f->vtk)
+    PetscCall(HycoVTKWriteField(f, field, rows, set));
+  else {
+    NameSet(f, f->n, field, set);
+    PetscCall(HycoH5WriteRows(f->h, set, MPIU_REAL, all, field->components, first, own, rows));
+  }
+  HycoOnRoot(f->comm, Describe(f, set, field));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldFileAdd(HycoFieldFile f, const HycoField *field)
+{
+  const PetscInt n = HycoFieldFileCount(f, field->place);
+  void *rows;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFieldRows(f->order, n, field->place, MPIU_REAL, field->components, field->data, field->missing, &rows));
+  ierr = HycoFieldFileAddRows(f, field, (const PetscReal *)rows);
+  if (rows != field->data) PetscCall(PetscFree(rows));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldFileBeginTime(HycoFieldFile f, PetscReal t)
+{
+  PetscFunctionBegin;
+  PetscCheck(f->n < f->most, PETSC_COMM_SELF, PETSC_ERR_PLIB, "more times than the %d that were announced",
+             (int)f->most);
+  f->t[f->n] = t;
+  f->n_fields = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldFileEndTime(HycoFieldFile f)
+{
+  PetscFunctionBegin;
+  f->n++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------------------------------ XDMF */
+
+/* A name as XML has it. */
+static void Escape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
+{
+  static const char special[] = "&<>\"'";
+  static const char *const entity[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&apos;"};
+
+  for (; *name; name++) {
+    const char *at = strchr(special, *name);
+
+    if (at)
+      out += sprintf(out, "%s", entity[at - special]);
+    else
+      *out++ = *name;
+  }
+  *out = '\0';
+}
+
+static void WriteItem(FILE *out, const char kind[], PetscInt rows, PetscInt cols, const char h5[], const char name[])
+{
+  fprintf(out, "    <DataItem Format=\"HDF\" %s Dimensions=\"%ld %ld\">%s:/%s</DataItem>\n", kind, (long)rows,
+          (long)cols, h5, name);
+}
+
+/* The mesh, which all times share, and the fields of one. */
+static void WriteGrid(HycoFieldFile f, FILE *out, const char h5[], PetscInt k)
+{
+  const HycoCellType type = f->mesh->type;
+  const PetscInt n_cells = HycoFieldFileCount(f, HYCO_ON_CELLS);
+  char name[HYCO_LINE], kind[64];
+
+  fprintf(out, "  <Grid Name=\"mesh\" GridType=\"Uniform\">\n");
+  if (f->most) fprintf(out, "   <Time Value=\"%.17g\"/>\n", (double)f->t[k]);
+  fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", topology[type], (long)n_cells,
+          type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
+  snprintf(kind, sizeof(kind), "NumberType=\"Int\" Precision=\"%d\"", (int)sizeof(PetscInt));
+  WriteItem(out, kind, n_cells, f->mesh->nv, h5, "mesh/cells");
+  fprintf(out, "   </Topology>\n   <Geometry GeometryType=\"XYZ\">\n");
+  WriteItem(out, "Precision=\"8\"", HycoFieldFileCount(f, HYCO_ON_NODES), 3, h5, "mesh/xyz");
+  fprintf(out, "   </Geometry>\n");
+  for (PetscInt j = 0; j < f->n_fields; j++) {
+    const HycoField *field = &f->field[j];
+
+    fprintf(out, "   <Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"%s\">\n", field->name,
+            field->components == 1   ? "Scalar"
+            : field->components == 3 ? "Vector"
+                                     : "Tensor6",
+            field->place == HYCO_ON_CELLS ? "Cell" : "Node");
+    NameSet(f, k, field, name);
+    WriteItem(out, "Precision=\"8\"", HycoFieldFileCount(f, field->place), field->components, h5, name);
+    fprintf(out, "   </Attribute>\n");
+  }
+  fprintf(out, "  </Grid>\n");
+}
+
+/* The text, which has its place when the numbers have theirs. On rank 0. */
+static PetscErrorCode WriteText(HycoFieldFile f, HycoFile *out)
+{
+  const char *slash = strrchr(f->h5_path, '/');
+  char h5[6 * PETSC_MAX_PATH_LEN];
+  FILE *text;
+
+  PetscFunctionBegin;
+  Escape(slash ? slash + 1 : f->h5_path, h5);
+  PetscCall(HycoFileCreate(f->path, HYCO_FILE_TEXT, out));
+  text = HycoFileStream(*out);
+  fprintf(text, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n");
+  if (f->most) fprintf(text, "  <Grid Name=\"history\" GridType=\"Collection\" CollectionType=\"Temporal\">\n");
+  for (PetscInt k = 0; k < PetscMax(f->n, !f->most); k++) WriteGrid(f, text, h5, k);
+  fprintf(text, "%s </Domain>\n</Xdmf>\n", f->most ? "  </Grid>\n" : "");
+  PetscCall(HycoFileFlush(*out));
+  if (f->most) PetscCall(HycoH5WriteReal(f->h, "t", f->n, 1, f->t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------------------------------ the end */
+
+static PetscErrorCode EndText(HycoFieldFile f, HycoFile *out)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(f->comm, HycoFileClose(out, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The files take their places, the numbers first: without them the .xdmf would point at none, or at those of another
+   run. */
+static PetscErrorCode Place(HycoFieldFile f, HycoFile *out)
+{
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  if (f->vtk)
+    PetscCall(HycoVTKWriteTimes(f));
+  else
+    HycoOnRoot(f->comm, WriteText(f, out));
+  PetscCall(HycoH5Close(&f->h, PETSC_TRUE));
+  if (!f->vtk) ierr = EndText(f, out);
+  if (ierr) (void)remove(f->h5_path);
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldFileCommit(HycoFieldFile f)
+{
+  HycoFile out = NULL;
+  PetscErrorCode ierr = Place(f, &out);
+
+  PetscFunctionBegin;
+  if (out) PetscCall(HycoFileClose(&out, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFieldFileDestroy(HycoFieldFile *file)
+{
+  HycoFieldFile f = *file;
+
+  PetscFunctionBegin;
+  if (!f) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5Close(&f->h, PETSC_FALSE));
+  PetscCall(PetscFree(f->t));
+  PetscCall(PetscFree(*file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,158 @@
+/*
+  VTKHDF 2.0, an unstructured grid: VTK's own layout of HDF5 (docs.vtk.org, VTKHDF file format). Fields of several times
+  stand one after the other in one set; the mesh, which all share, is there once.
+*/
+#include <hycofields.h>
+
+#define ROOT "VTKHDF/"
+
+/* VTK's numbers of line2, tri3, quad4, tet4, hex8. */
+static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12};
+
+/* A set of one dimension of n integers, value, value + step, ... On one process. */
+static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, PetscInt value, PetscInt step)
+{
+  PetscInt *all;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &all));
+  for (PetscInt k = 0; k < n; k++) all[k] = value + k * step;
+  ierr = HycoH5WriteInt(h, name, n, HYCO_H5_LINE, all);
+  PetscCall(PetscFree(all));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On one process. */
+static PetscErrorCode WriteHead(HycoFieldFile f, const PetscReal mu[])
+{
+  static const PetscInt version[2] = {2, 0};
+  const PetscInt n_cells = HycoFieldFileCount(f, HYCO_ON_CELLS);
+
+  PetscFunctionBegin;
+  PetscCall(WriteSequence(f->h, ROOT "NumberOfPoints", 1, HycoFieldFileCount(f, HYCO_ON_NODES), 0));
+  PetscCall(WriteSequence(f->h, ROOT "NumberOfCells", 1, n_cells, 0));
+  PetscCall(WriteSequence(f->h, ROOT "NumberOfConnectivityIds", 1, n_cells * f->mesh->nv, 0));
+  PetscCall(HycoH5WriteAttributeInt(f->h, "VTKHDF", "Version", 2, version));
+  PetscCall(HycoH5WriteAttribute(f->h, "VTKHDF", "Type", "UnstructuredGrid"));
+  PetscCall(HycoH5WriteAttribute(f->h, "VTKHDF", "title", f->scene->title));
+  for (PetscInt p = 0; p < f->scene->n_parameters; p++) {
+    char name[HYCO_LINE];
+
+    HycoFormat(name, ROOT "FieldData/%s", f->scene->parameter[p]);
+    PetscCall(HycoH5WriteReal(f->h, name, 1, HYCO_H5_LINE, &mu[p]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells' types, and where the nodes of each begin: one more than cells, which the process of the last has. */
+static PetscErrorCode WriteTypes(HycoFieldFile f)
+{
+  const HycoFileOrder *order = f->order;
+  const PetscInt all = HycoFieldFileCount(f, HYCO_ON_CELLS), first = order ? order->first[HYCO_ON_CELLS] : 0,
+                 own = order ? order->n[HYCO_ON_CELLS] : all, begins = own + (first + own == all);
+  PetscInt *start;
+  unsigned char *type;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(begins, &start, own, &type));
+  for (PetscInt k = 0; k < begins; k++) start[k] = (first + k) * f->mesh->nv;
+  for (PetscInt k = 0; k < own; k++) type[k] = vtk_type[f->mesh->type];
+  ierr = HycoH5WriteRows(f->h, ROOT "Offsets", MPIU_INT, all + 1, HYCO_H5_LINE, first, begins, start);
+  if (!ierr) ierr = HycoH5WriteRows(f->h, ROOT "Types", MPI_UNSIGNED_CHAR, all, HYCO_H5_LINE, first, own, type);
+  PetscCall(PetscFree2(start, type));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoVTKWriteMesh(HycoFieldFile f, const PetscReal X[], const PetscReal mu[])
+{
+  HycoMesh m = f->mesh;
+
+  PetscFunctionBegin;
+  HycoOnRoot(f->comm, WriteHead(f, mu));
+  PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "Points", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
+  PetscCall(HycoFieldsWriteCells(f->h, ROOT "Connectivity", f->order, m, HYCO_H5_LINE));
+  PetscCall(WriteTypes(f));
+  PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "PointData/node_id", HYCO_ON_NODES, MPIU_INT, 1,
+                           HYCO_H5_LINE, m->node_id));
+  PetscCall(HycoFieldWrite(f->h, f->order, m->n_cells, ROOT "CellData/cell_id", HYCO_ON_CELLS, MPIU_INT, 1,
+                           HYCO_H5_LINE, m->cell_id));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* VTK's order of a symmetric tensor is xx, yy, zz, xy, yz, xz. */
+static void Permute(PetscInt n, const PetscReal tensor[], PetscReal out[])
+{
+  static const PetscInt from[6] = {0, 3, 5, 1, 4, 2};
+
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt c = 0; c < 6; c++) out[6 * k + c] = tensor[6 * k + from[c]];
+  }
+}
+
+PetscErrorCode HycoVTKWriteField(HycoFieldFile f, const HycoField *field, const PetscReal rows[], char set[HYCO_LINE])
+{
+  const PetscInt all = HycoFieldFileCount(f, field->place), own = f->order ? f->order->n[field->place] : all,
+                 first = f->order ? f->order->first[field->place] : 0;
+  PetscReal *tensor = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheck((PetscInt64)all * PetscMax(f->most, 1) < PETSC_MAX_INT,
+            "%s: %d times of %d nodes or cells are too many for one set; give an output that ends in .xdmf", f->path,
+            (int)f->most, (int)all);
+  HycoFormat(set, ROOT "%s/%s", field->place == HYCO_ON_CELLS ? "CellData" : "PointData", field->name);
+  if (field->components == 6) {
+    PetscCall(PetscMalloc1(6 * own, &tensor));
+    Permute(own, rows, tensor);
+    rows = tensor;
+  }
+  ierr = HycoH5WriteRows(f->h, set, MPIU_REAL, all * PetscMax(f->most, 1),
+                         field->components == 1 ? HYCO_H5_LINE : field->components, all * f->n + first, own, rows);
+  PetscCall(PetscFree(tensor));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where each time's mesh and fields begin: of the one mesh and of what does not change, at 0. On one process. */
+static PetscErrorCode WriteSteps(HycoFieldFile f)
+{
+  static const char *const zeros[] = {"PartOffsets",
+                                      "PointOffsets",
+                                      "CellOffsets",
+                                      "ConnectivityIdOffsets",
+                                      "PointDataOffsets/node_id",
+                                      "CellDataOffsets/cell_id"};
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5WriteReal(f->h, ROOT "Steps/Values", f->n, HYCO_H5_LINE, f->t));
+  PetscCall(HycoH5WriteAttributeInt(f->h, ROOT "Steps", "NSteps", 1, &f->n));
+  PetscCall(WriteSequence(f->h, ROOT "Steps/NumberOfParts", f->n, 1, 0));
+  for (size_t k = 0; k < sizeof(zeros) / sizeof(zeros[0]); k++) {
+    HycoFormat(name, ROOT "Steps/%s", zeros[k]);
+    PetscCall(WriteSequence(f->h, name, f->n, 0, 0));
+  }
+  for (PetscInt p = 0; p < f->scene->n_parameters; p++) {
+    HycoFormat(name, ROOT "Steps/FieldDataOffsets/%s", f->scene->parameter[p]);
+    PetscCall(WriteSequence(f->h, name, f->n, 0, 0));
+  }
+  for (PetscInt k = 0; k < f->n_fields; k++) {
+    const HycoField *field = &f->field[k];
+
+    HycoFormat(name, ROOT "Steps/%s/%s", field->place == HYCO_ON_CELLS ? "CellDataOffsets" : "PointDataOffsets",
+               field->name);
+    PetscCall(WriteSequence(f->h, name, f->n, 0, HycoFieldFileCount(f, field->place)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoVTKWriteTimes(HycoFieldFile f)
+{
+  PetscFunctionBegin;
+  if (f->most) HycoOnRoot(f->comm, WriteSteps(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

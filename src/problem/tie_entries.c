@@ -1,0 +1,57 @@
+/* Tied surfaces: tie: {glue: {slave: GROUP, master: GROUP, tolerance: LENGTH}}. */
+#include <hycosceneimpl.h>
+#include <string.h>
+
+PetscErrorCode HycoSceneReadTie(HycoScene s, PetscInt entry, const char name[], PetscInt field)
+{
+  HycoTie *tie = NULL;
+  char **group;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_ties; k++) {
+    if (strcmp(s->tie[k].name, name) == 0) tie = &s->tie[k];
+  }
+  if (!tie) {
+    PetscCall(PetscRealloc((size_t)(s->n_ties + 1) * sizeof(*s->tie), &s->tie));
+    tie = &s->tie[s->n_ties++];
+    *tie = (HycoTie){.tolerance = -1};
+    PetscCall(PetscStrallocpy(name, &tie->name));
+  }
+  if (field == 2) {
+    char *end;
+
+    tie->tolerance = HycoNumber(s->value[entry], &end);
+    HycoCheck(end != s->value[entry] && !*end && tie->tolerance >= 0 && !PetscIsInfOrNanReal(tie->tolerance),
+              "%s is \"%.100s\"; it must be a length, 0 or more", s->key[entry], s->value[entry]);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  group = field ? &tie->master : &tie->slave;
+  PetscCall(PetscFree(*group));
+  PetscCall(PetscStrallocpy(s->value[entry], group));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneCheckTies(HycoScene s)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_ties; k++) {
+    const HycoTie *tie = &s->tie[k];
+
+    HycoCheck(tie->slave && tie->master, "tie %s has no %s; write tie: %s: {slave: GROUP, master: GROUP}", tie->name,
+              tie->slave ? "master" : "slave", tie->name);
+    HycoCheck(strcmp(tie->slave, tie->master), "tie %s: its slave and its master are one group, %s", tie->name,
+              tie->slave);
+    HycoCheck(!s->n_times,
+              "tie %s: ties are for scenes without a history; let both bodies share the surface's nodes in the mesh",
+              tie->name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSceneDestroyTies(HycoScene s)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_ties; k++) HycoFreeAll(&s->tie[k].name, &s->tie[k].slave, &s->tie[k].master);
+  PetscCall(PetscFree(s->tie));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

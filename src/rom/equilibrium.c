@@ -1,0 +1,251 @@
+/*
+  How far a predicted path is from the full order's equations, without a solution of these. The laws are replayed on the
+  whole mesh; at each listed time the residual of equilibrium r = f_int - F + B^T L has the size sqrt(r . K^-1 r) with
+  the elastic stiffness K at the path's first time, whose factor is kept while no parameter changes it. For bodies that
+  do not flow, and with the right contact forces, it is the energy norm of the displacement's error. The contacts' own
+  conditions 0 <= L complementary to g = D - B u >= 0 are measured by min(g, c L), with the length c L of the size of
+  the displacements at the contacts.
+*/
+#include <hycolinear.h>
+#include <hycopath.h>
+#include <hycoromimpl.h>
+
+struct _n_HycoBalance {
+  PetscBool factored;
+  PetscReal mu[HYCO_MAX_PARAMETERS]; /* the variables that K is of */
+  Mat K;
+  KSP ksp;
+  Vec r, x;
+  HycoRows rows;                    /* of B over dofs of the whole mesh */
+  PetscReal *load, *energy;         /* n_dof; n_cells */
+  PetscReal *gap, *size, *approach; /* of the last path: n_listed x n_contacts; by listed time |u| and |B u| */
+  PetscReal *residual, *contact;    /* by listed time */
+  char why[HYCO_LINE];
+  HycoEquilibrium last;
+};
+
+PetscErrorCode HycoBalanceDestroy(HycoBalance *balance)
+{
+  HycoBalance b = *balance;
+
+  PetscFunctionBegin;
+  if (!b) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(KSPDestroy(&b->ksp));
+  PetscCall(MatDestroy(&b->K));
+  PetscCall(VecDestroy(&b->r));
+  PetscCall(VecDestroy(&b->x));
+  PetscCall(HycoRowsDestroy(&b->rows));
+  HycoFreeAll(&b->load, &b->energy, &b->gap, &b->size, &b->approach, &b->residual, &b->contact);
+  PetscCall(PetscFree(*balance));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Create(HycoROM m, HycoBalance b)
+{
+  const HycoFE fe = m->fe_whole;
+  const PetscInt n_times = m->scene->n_times + 1; /* one more: the end of a path that ends early */
+
+  PetscFunctionBegin;
+  PetscCall(HycoFECreateMatrix(fe, PETSC_COMM_SELF, fe->mesh->n_nodes, 0, &b->K));
+  PetscCall(MatCreateVecs(b->K, &b->x, &b->r));
+  PetscCall(HycoRowsCreate(&m->whole_pairs, fe->dim, &b->rows));
+  PetscCall(PetscMalloc1(fe->n_dof, &b->load));
+  PetscCall(PetscMalloc1(fe->mesh->n_cells, &b->energy));
+  PetscCall(PetscMalloc1((size_t)n_times * (size_t)m->pairs.n + 1, &b->gap));
+  PetscCall(PetscMalloc1(n_times, &b->size));
+  PetscCall(PetscMalloc1(n_times, &b->approach));
+  PetscCall(PetscMalloc1(n_times, &b->residual));
+  PetscCall(PetscMalloc1(n_times, &b->contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rigid motions that contact alone holds: springs of the norm of H1 to the ground, as stiff as the bodies. */
+static PetscErrorCode HoldFloating(HycoFE fe, Mat K)
+{
+  HycoMotions motions;
+  Mat M;
+  PetscScalar of_K, of_M;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEFreeMotions(PETSC_COMM_SELF, fe, &motions));
+  n = motions.n;
+  PetscCall(HycoMotionsDestroy(&motions));
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFECreateMatrix(fe, PETSC_COMM_SELF, fe->mesh->n_nodes, 0, &M));
+  PetscCall(HycoFEAssembleH1(fe, HycoMeshLength(fe->mesh), M));
+  PetscCall(MatGetTrace(K, &of_K));
+  PetscCall(MatGetTrace(M, &of_M));
+  PetscCall(MatAXPY(K, of_K / of_M, M, DIFFERENT_NONZERO_PATTERN));
+  PetscCall(MatDestroy(&M));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The factor of K where fe is, unless it is the one that is there. */
+static PetscErrorCode Factor(HycoROM m, HycoBalance b)
+{
+  const HycoFE fe = m->fe_whole;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, singular;
+  HycoChanges reached;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < m->scene->n_variables; p++) changed[p] = (PetscBool)(b->mu[p] != fe->mu[p]);
+  reached = HycoSceneChanges(m->scene, changed);
+  if (b->factored && !reached.nodes && !reached.stiffness) PetscFunctionReturn(PETSC_SUCCESS);
+  b->factored = PETSC_FALSE;
+  PetscCall(KSPDestroy(&b->ksp));
+  PetscCall(HycoFEAssembleStiffness(fe, b->K));
+  PetscCall(HoldFloating(fe, b->K));
+  PetscCall(MatSetOption(b->K, MAT_SPD, PETSC_TRUE));
+  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", b->K, PETSC_TRUE, &b->ksp));
+  HycoLogged(HYCO_EVENT_FACTOR, HycoFactor(b->ksp, &singular));
+  PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the elastic stiffness of the whole mesh is singular");
+  PetscCall(PetscArraycpy(b->mu, fe->mu, m->scene->n_variables));
+  b->factored = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds B^T L to f, and notes the gaps and the displacements at the contacts, of listed time j. */
+static void AddContact(HycoROM m, HycoBalance b, PetscInt j, PetscReal f[])
+{
+  const HycoRows *B = &b->rows;
+  const PetscInt n = m->pairs.n;
+  const PetscReal *L = m->trace.Lambda + (size_t)j * (size_t)n;
+
+  b->approach[j] = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal bu = 0;
+
+    for (PetscInt i = B->start[k]; i < B->start[k + 1]; i++) {
+      bu += B->value[i] * m->U_whole[B->dof[i]];
+      f[B->dof[i]] += B->value[i] * L[k];
+    }
+    b->gap[(size_t)j * (size_t)n + (size_t)k] = B->gap[k] - bu;
+    b->approach[j] += bu * bu;
+  }
+  b->approach[j] = PetscSqrtReal(b->approach[j]);
+}
+
+/* |r| at listed time j, where the replay is, and |u|, both in the energy norm. */
+static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, PetscInt j)
+{
+  const HycoFE fe = m->fe_whole;
+  PetscReal sum = 0;
+  PetscScalar *r, square;
+
+  PetscFunctionBegin;
+  PetscCall(HycoContactRows(fe, &m->whole_pairs, b->rows.start, b->rows.dof, b->rows.value, b->rows.gap));
+  PetscCall(HycoFELoads(fe, b->load));
+  HycoFEGeneralise(fe, b->load);
+  PetscCall(VecGetArray(b->r, &r));
+  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = replay->f_int[k] - b->load[k];
+  AddContact(m, b, j, r);
+  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? 0 : r[k];
+  PetscCall(VecRestoreArray(b->r, &r));
+  PetscCall(KSPSolve(b->ksp, b->r, b->x));
+  PetscCall(VecDot(b->r, b->x, &square));
+  b->residual[j] = PetscSqrtReal(PetscMax(square, 0));
+  PetscCall(HycoFEEnergy(fe, m->U_whole, b->energy));
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) sum += b->energy[e];
+  b->size[j] = PetscSqrtReal(2 * PetscMax(sum + HycoSpringsEnergy(fe, m->U_whole), 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The laws from the first time to the last; a law without an answer ends it. */
+static PetscErrorCode March(HycoROM m, HycoBalance b, HycoReplay *replay)
+{
+  const HycoTrace *trace = &m->trace;
+
+  PetscFunctionBegin;
+  PetscCall(Factor(m, b));
+  for (PetscInt k = 0, j = 0; k < trace->n && j < trace->n_listed; k++) {
+    HycoFEStepReport report;
+
+    PetscCall(HycoReplayMove(replay, k));
+    HycoTraceWholeU(m, k, m->U_whole);
+    PetscCall(HycoReplayTry(replay, k, m->U_whole, &report));
+    if (report.failed)
+      HycoFormat(b->why, "the laws have no answer on the whole mesh at t = %.10g: %s", (double)trace->t[k], report.why);
+    if (report.failed) PetscFunctionReturn(PETSC_SUCCESS);
+    if (trace->at[j] == k) PetscCall(MeasureTime(m, b, replay, j++));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal Largest(PetscInt n, const PetscReal value[])
+{
+  PetscReal most = 0;
+
+  for (PetscInt j = 0; j < n; j++) most = PetscMax(most, value[j]);
+  return most;
+}
+
+/* |min(g, c L)| at listed time j. */
+static PetscReal ContactResidual(HycoROM m, const HycoBalance b, PetscInt j, PetscReal c)
+{
+  const PetscInt n = m->pairs.n;
+  PetscReal sum = 0;
+
+  for (PetscInt k = 0; k < n; k++) {
+    const size_t at = (size_t)j * (size_t)n + (size_t)k;
+    const PetscReal both = PetscMin(b->gap[at], c * m->trace.Lambda[at]);
+
+    sum += both * both;
+  }
+  return PetscSqrtReal(sum);
+}
+
+/* What the times amount to beside the path's largest. */
+static void Summarise(HycoROM m, HycoBalance b, HycoEquilibrium *e)
+{
+  const PetscInt n = m->trace.n_listed;
+  const PetscReal size = Largest(n, b->size), approach = Largest(n, b->approach),
+                  force = Largest(n * m->pairs.n, m->trace.Lambda);
+
+  *e = (HycoEquilibrium){.n = n, .residual = b->residual, .contact = b->contact};
+  for (PetscInt j = 0; j < n; j++) {
+    b->contact[j] = HycoRelative(ContactResidual(m, b, j, force > 0 ? approach / force : 0), approach);
+    b->residual[j] = HycoRelative(b->residual[j], size);
+    if (b->residual[j] > e->worst) e->at = j;
+    e->worst = PetscMax(e->worst, b->residual[j]);
+    e->worst_contact = PetscMax(e->worst_contact, b->contact[j]);
+  }
+}
+
+static PetscErrorCode Measure(HycoROM m, HycoBalance b, HycoEquilibrium *e)
+{
+  HycoReplay replay = {0};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  b->why[0] = '\0';
+  if (!b->K) PetscCall(Create(m, b));
+  m->whole_current = PETSC_FALSE; /* U_whole is the replay's */
+  ierr = HycoReplayBegin(m, m->fe_whole, &replay);
+  if (!ierr) ierr = March(m, b, &replay);
+  PetscCall(HycoReplayEnd(&replay));
+  PetscCall(ierr);
+  if (b->why[0])
+    *e = (HycoEquilibrium){.worst = PETSC_INFINITY, .worst_contact = PETSC_INFINITY, .why = b->why};
+  else
+    Summarise(m, b, e);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetEquilibrium(HycoROM m, HycoEquilibrium *e)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMGetEquilibrium()");
+  HycoCheck(m->scene->n_times, "HycoROMGetEquilibrium: the model's scene has no history");
+  PetscCall(HycoROMLoadWhole(m));
+  if (!m->balance) PetscCall(PetscNew(&m->balance));
+  ierr = m->balanced ? PETSC_SUCCESS : Measure(m, m->balance, &m->balance->last);
+  m->balanced = (PetscBool)!ierr;
+  if (ierr) PetscCall(HycoBalanceDestroy(&m->balance));
+  PetscCall(ierr);
+  *e = m->balance->last;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,84 @@
+"""What others open: pyvista and meshio, from the Python package index into an environment of the test's own, read each output of hyco."""
+import json
+import os
+import subprocess
+import sys
+import unittest
+
+from common import PATIENCE, SOURCE, Case
+
+READ = r'''
+import json, sys
+import meshio
+import numpy as np
+import pyvista
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
+
+def largest(points):
+    return float(np.linalg.norm(points['displacement']))
+
+def one(name):
+    g = pyvista.read(name + '.vtkhdf')
+    m = meshio.read(name + '.xdmf')
+    return {'vtkhdf': [largest(g.point_data), float(g.cell_data['mises'].max()), float(g.volume or g.area), g.n_cells, float(g.point_data['contact_pressure'].max())],
+            'xdmf': [largest(m.point_data), float(m.cell_data['mises'][0].max()), float(pyvista.from_meshio(m).volume or pyvista.from_meshio(m).area),
+                     len(m.cells[0].data), float(m.point_data['contact_pressure'].max())]}
+
+def series(name):
+    reader = pyvista.get_reader(name + '.vtkhdf').reader
+    reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(Pipeline.TIME_STEPS())
+    steps = []
+    for k in range(reader.GetNumberOfSteps()):
+        reader.SetStep(k)
+        reader.Update()
+        steps.append(largest(pyvista.wrap(reader.GetOutput()).point_data))
+    with meshio.xdmf.TimeSeriesReader(name + '.xdmf') as x:
+        x.read_points_cells()
+        read = [x.read_data(k) for k in range(x.num_steps)]
+    last = pyvista.get_reader(name + '.xdmf')
+    last.set_active_time_value(last.time_values[-1])
+    return {'times': list(times), 'vtkhdf': steps, 'times_xdmf': [r[0] for r in read], 'xdmf': [largest(r[1]) for r in read], 'pyvista_xdmf': largest(last.read().point_data)}
+
+print(json.dumps({'one': {n: one(n) for n in sys.argv[2:]}, 'series': series(sys.argv[1])}))
+'''
+ONE = {'pellet': '4.06,1', 'blocks': '0.05,0.05'}
+
+
+class Ecosystem(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        subprocess.run([sys.executable, '-m', 'venv', cls.path('venv')], check=True, timeout=100 * PATIENCE)
+        cls.python = cls.path('venv', 'bin', 'python')
+        subprocess.run([cls.python, '-m', 'pip', 'install', '-q', 'pyvista', 'meshio', 'h5py'], check=True, timeout=300 * PATIENCE)
+
+    def test_all(self):
+        reports = {}
+        for name, mu in ONE.items():
+            for ending in ('.xdmf', '.vtkhdf'):
+                reports[name] = self.hyco('solve', '-scene', os.path.join(SOURCE, 'examples', name), '-mu', mu, '-output', name + ending)
+        for ending in ('.xdmf', '.vtkhdf'):
+            path = self.hyco('solve', '-scene', os.path.join(SOURCE, 'examples', 'ring'), '-mu', '0.01,1', '-output', 'ring' + ending)
+        run = subprocess.run([self.python, '-c', READ, 'ring', *ONE], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        found = json.loads(run.stdout.splitlines()[-1])
+        for name, report in reports.items():
+            pressure = max(c['pressure_max'] for c in report['contacts'].values())
+            for ending, (u, mises, volume, n_cells, largest) in found['one'][name].items():
+                self.near(u, report['u_norm2'], 1e-9, f'{name}{ending}: displacement')
+                self.near(largest, pressure, 1e-9, f'{name}{ending}: pressure')
+                self.near(mises, found['one'][name]['xdmf'][1], 1e-12, f'{name}{ending}: stress')
+                self.near(volume, found['one'][name]['xdmf'][2], 1e-9, f'{name}{ending}: volume')
+                self.assertEqual(n_cells, found['one'][name]['xdmf'][3])
+        ring = found['series']
+        self.assertEqual(ring['times'], path['history']['t'])
+        self.assertEqual(ring['times_xdmf'], ring['times'])
+        for a, b in zip(ring['vtkhdf'], ring['xdmf']):
+            self.near(a, b, 1e-9, 'displacement of a time')
+        self.near(ring['vtkhdf'][-1], path['u_norm2'], 1e-9, 'displacement at the end')
+        self.near(ring['pyvista_xdmf'], ring['vtkhdf'][-1], 1e-9, 'displacement at the end, XDMF by pyvista')
+
+
+if __name__ == '__main__':
+    unittest.main()
