@@ -149,10 +149,21 @@ PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_
                               PetscReal sigma[]);
 PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
                                   PetscInt max_modes, PetscInt found, PetscInt *l);
-/* The POD of a field of the snapshots, a column each: V, l, sigma and n_sigma of `basis`, the caller's (no mode: V has
-   no column). tol 0: every mode above the noise. Of paths that of each, then of these, each brought to the size of the
-   largest: a slow one counts as much as a fast one. Collective. */
-PetscErrorCode HycoReducerPODPaths(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, HycoBasis *basis);
+/*
+  The POD of paths: of each, then of these, each brought to the size of the largest: a slow one counts as much as a fast
+  one. HycoPathModesAdd(): of a path's columns, which stay; the modes begin as {0}. HycoPathModesJoin() ends them: V, l,
+  sigma and n_sigma of `basis`, the caller's (no mode: V is NULL or has no column), of N rows, n_rows here. tol 0: every
+  mode above the noise. Collective. HycoPathModesDestroy() after a failure.
+*/
+typedef struct {
+  PetscInt n;
+  Mat *V;           /* the modes of each path, times their singular values; NULL: none */
+  PetscReal *first; /* of these */
+} HycoPathModes;
+PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPathModes *modes);
+PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N, PetscInt n_rows, PetscReal tol,
+                                 PetscInt max_modes, HycoBasis *basis);
+PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes);
 /* On rank 0 (column major, the caller's; elsewhere empty) the first n_columns of S, a matrix of displacements, at nodes
    that rank 0 gives by their numbers in the whole mesh. Collective. */
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],

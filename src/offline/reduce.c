@@ -139,99 +139,136 @@ PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscRe
 /* Paths that move this much less than the largest are not brought to its size: they may be nothing but noise. */
 #define SLIGHT 1e-3
 
-/* The modes of path j of S, times their singular values, in V (NULL: none), and the first singular value. */
-static PetscErrorCode PathModes(HycoReducer t, Mat S, PetscInt j, PetscReal tol, Mat *V, PetscReal *first)
+PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPathModes *modes)
 {
-  const PetscInt n = HycoSnapshotsSteps(t->scene);
   PetscReal *sigma;
-  PetscInt l;
+  PetscInt N, columns, l;
   Vec scale;
-  Mat part, path;
+  Mat V;
 
   PetscFunctionBegin;
-  PetscCall(MatDenseGetSubMatrix(S, PETSC_DECIDE, PETSC_DECIDE, j * n, (j + 1) * n, &part));
-  PetscCall(MatDuplicate(part, MAT_COPY_VALUES, &path));
-  PetscCall(MatDenseRestoreSubMatrix(S, &part));
-  PetscCall(PetscCalloc1(n + 1, &sigma));
-  PetscCall(HycoReducerPOD(t, path, tol, 0, V, &l, sigma));
-  PetscCall(MatDestroy(&path));
-  *first = sigma[0];
-  if (!l) PetscCall(MatDestroy(V));
+  PetscCall(MatGetSize(path, &N, &columns));
+  PetscCall(PetscCalloc1(columns + 1, &sigma));
+  PetscCall(HycoReducerPOD(t, path, tol, 0, &V, &l, sigma));
+  if (!l) PetscCall(MatDestroy(&V));
   if (l) {
-    PetscCall(MatCreateVecs(*V, &scale, NULL));
+    PetscCall(MatCreateVecs(V, &scale, NULL));
     for (PetscInt k = 0; k < l; k++) PetscCall(VecSetValue(scale, k, t->rank ? 0 : sigma[k], ADD_VALUES));
     PetscCall(VecAssemblyBegin(scale));
     PetscCall(VecAssemblyEnd(scale));
-    PetscCall(MatDiagonalScale(*V, NULL, scale));
+    PetscCall(MatDiagonalScale(V, NULL, scale));
     PetscCall(VecDestroy(&scale));
   }
+  PetscCall(PetscRealloc((size_t)(modes->n + 1) * sizeof(*modes->V), &modes->V));
+  PetscCall(PetscRealloc((size_t)(modes->n + 1) * sizeof(*modes->first), &modes->first));
+  modes->V[modes->n] = l ? V : NULL;
+  modes->first[modes->n++] = sigma[0];
   PetscCall(PetscFree(sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes of the paths side by side, each path brought to the size of the largest: a slow one counts as much as a
-   fast one. */
-static PetscErrorCode JoinPaths(HycoReducer t, Mat S, PetscReal tol, Mat *joined)
+PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes)
 {
-  const PetscInt paths = t->n_s / HycoSnapshotsSteps(t->scene);
-  PetscInt N, rows, n = 0, at = 0;
-  PetscReal *first, largest = 0;
-  Mat *V;
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < modes->n; j++) PetscCall(MatDestroy(&modes->V[j]));
+  HycoFreeAll(&modes->V, &modes->first);
+  modes->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes of the paths side by side (N rows, n_rows of them here), each path brought to the size of the largest: a
+   slow one counts as much as a fast one. */
+static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, PetscInt N, PetscInt n_rows, Mat *joined)
+{
+  PetscInt n = 0, at = 0;
+  PetscReal largest = 0;
 
   PetscFunctionBegin;
-  PetscCall(MatGetSize(S, &N, NULL));
-  PetscCall(MatGetLocalSize(S, &rows, NULL));
-  PetscCall(PetscMalloc2(paths, &V, paths, &first));
-  for (PetscInt j = 0; j < paths; j++) {
+  for (PetscInt j = 0; j < modes->n; j++) {
     PetscInt l = 0;
 
-    V[j] = NULL;
-    PetscCall(PathModes(t, S, j, tol, &V[j], &first[j]));
-    if (V[j]) PetscCall(MatGetSize(V[j], NULL, &l));
+    if (modes->V[j]) PetscCall(MatGetSize(modes->V[j], NULL, &l));
     n += l;
-    largest = PetscMax(largest, first[j]);
+    largest = PetscMax(largest, modes->first[j]);
   }
-  PetscCall(MatCreateDense(PetscObjectComm((PetscObject)S), rows, PETSC_DECIDE, N, PetscMax(n, 1), NULL, joined));
-  for (PetscInt j = 0; j < paths; j++) {
+  PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, N, PetscMax(n, 1), NULL, joined));
+  for (PetscInt j = 0; j < modes->n; j++) {
     PetscInt l;
     Mat part;
 
-    if (!V[j]) continue;
-    PetscCall(MatGetSize(V[j], NULL, &l));
-    PetscCall(MatScale(V[j], largest / PetscMax(first[j], SLIGHT * largest)));
+    if (!modes->V[j]) continue;
+    PetscCall(MatGetSize(modes->V[j], NULL, &l));
+    PetscCall(MatScale(modes->V[j], largest / PetscMax(modes->first[j], SLIGHT * largest)));
     PetscCall(MatDenseGetSubMatrix(*joined, PETSC_DECIDE, PETSC_DECIDE, at, at + l, &part));
-    PetscCall(MatCopy(V[j], part, SAME_NONZERO_PATTERN));
+    PetscCall(MatCopy(modes->V[j], part, SAME_NONZERO_PATTERN));
     PetscCall(MatDenseRestoreSubMatrix(*joined, &part));
-    PetscCall(MatDestroy(&V[j]));
     at += l;
   }
   PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(*joined, MAT_FINAL_ASSEMBLY));
-  PetscCall(PetscFree2(V, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerPODPaths(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, HycoBasis *basis)
+/* POD of S into a basis. */
+static PetscErrorCode TakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscInt most, HycoBasis *basis)
 {
   PetscInt N, n;
-  Mat joined = S;
 
   PetscFunctionBegin;
-  if (t->scene->n_times) PetscCall(JoinPaths(t, S, tol, &joined));
-  PetscCall(MatGetSize(joined, &N, &n));
+  PetscCall(MatGetSize(S, &N, &n));
   PetscCall(PetscCalloc1(t->n_s + 1, &basis->sigma));
   basis->n_sigma = PetscMin(N, n);
-  PetscCall(HycoReducerPOD(t, joined, tol, max_modes, &basis->V, &basis->l, basis->sigma));
-  if (joined != S) PetscCall(MatDestroy(&joined));
+  PetscCall(HycoReducerPOD(t, S, tol, most, &basis->V, &basis->l, basis->sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. */
-static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool all)
+PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N, PetscInt n_rows, PetscReal tol,
+                                 PetscInt max_modes, HycoBasis *basis)
+{
+  Mat joined;
+
+  PetscFunctionBegin;
+  PetscCall(JoinPaths(t, modes, N, n_rows, &joined));
+  PetscCall(HycoPathModesDestroy(modes));
+  PetscCall(TakeBasis(t, joined, tol, max_modes, basis));
+  PetscCall(MatDestroy(&joined));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The paths of S, `n` columns each. */
+static PetscErrorCode AddPaths(HycoReducer t, Mat S, PetscInt n, PetscReal tol, HycoPathModes *modes)
 {
   PetscFunctionBegin;
-  PetscCall(HycoReducerPODPaths(t, S, all ? 0 : t->tol[kind], kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0,
-                                &t->basis[kind]));
+  for (PetscInt j = 0; j < t->n_s / n; j++) {
+    Mat part, path;
+
+    PetscCall(MatDenseGetSubMatrix(S, PETSC_DECIDE, PETSC_DECIDE, j * n, (j + 1) * n, &part));
+    PetscCall(MatDuplicate(part, MAT_COPY_VALUES, &path));
+    PetscCall(MatDenseRestoreSubMatrix(S, &part));
+    PetscCall(HycoPathModesAdd(t, path, tol, modes));
+    PetscCall(MatDestroy(&path));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. Of paths
+   that of each, then of these. */
+static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool all)
+{
+  const PetscInt most = kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0;
+  const PetscReal tol = all ? 0 : t->tol[kind];
+  HycoPathModes modes = {0};
+  PetscInt N, n_rows;
+
+  PetscFunctionBegin;
+  if (!t->scene->n_times) {
+    PetscCall(TakeBasis(t, S, tol, most, &t->basis[kind]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(MatGetSize(S, &N, NULL));
+  PetscCall(MatGetLocalSize(S, &n_rows, NULL));
+  PetscCall(AddPaths(t, S, HycoSnapshotsSteps(t->scene), tol, &modes));
+  PetscCall(HycoPathModesJoin(t, &modes, N, n_rows, tol, most, &t->basis[kind]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

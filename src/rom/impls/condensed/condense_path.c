@@ -17,7 +17,7 @@ typedef struct {
   PetscInt *flowing; /* by cell: its place among those that flow, or -1 */
   PetscReal *Ke;     /* of these, nv dim square */
   PetscReal *value[N_SAMPLED];
-  Mat S[N_SAMPLED]; /* a column for each snapshot, rows by the file's order */
+  Mat S[N_SAMPLED]; /* of a path, a column for each listed time; rows by the file's order */
   Mat U;            /* displacements less their lifting */
 } Sampler;
 
@@ -66,6 +66,14 @@ PetscErrorCode HycoCondensedPathBegin(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode End(Mat A)
+{
+  PetscFunctionBegin;
+  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* -- samples -- */
 
 static PetscErrorCode DestroySampler(Sampler *s)
@@ -88,7 +96,7 @@ static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
   PetscFunctionBegin;
   PetscCall(MatDenseGetLDA(s->U, &lda));
   PetscCall(MatDenseGetArrayRead(s->U, &columns));
-  PetscCall(HycoFOMFromRows(s->t->fom, HYCO_ON_NODES, s->fe->dim, columns + (size_t)k * (size_t)lda, u));
+  PetscCall(HycoFOMFromRows(s->t->fom, s->fe->dim, columns + (size_t)k * (size_t)lda, u));
   PetscCall(MatDenseRestoreArrayRead(s->U, &columns));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -120,11 +128,11 @@ static PetscErrorCode Measure(Sampler *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Column k of the samples. Collective. */
+/* The column of a listed time. Collective. */
 static PetscErrorCode Record(void *ctx, PetscInt k)
 {
   Sampler *s = (Sampler *)ctx;
-  const PetscInt n = s->fe->mesh->nv * s->fe->dim;
+  const PetscInt n = s->fe->mesh->nv * s->fe->dim, step = k % HycoSnapshotsSteps(s->t->scene);
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(s->t), Measure(s));
@@ -136,7 +144,7 @@ static PetscErrorCode Record(void *ctx, PetscInt k)
     PetscCall(MatDenseGetLDA(s->S[field], &lda));
     PetscCall(MatDenseGetArray(s->S[field], &a));
     PetscCall(HycoFOMToRows(s->t->fom, on_nodes ? HYCO_ON_NODES : HYCO_ON_CELLS, MPIU_REAL, on_nodes ? s->fe->dim : n,
-                            s->value[field], a + (size_t)k * (size_t)lda));
+                            s->value[field], a + (size_t)step * (size_t)lda));
     PetscCall(MatDenseRestoreArray(s->S[field], &a));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -178,39 +186,50 @@ static PetscErrorCode CreateSampler(HycoReducer t, HycoSnapshots store, Sampler 
                                    : (order ? order->n[HYCO_ON_CELLS] : part->n_cells) * n;
 
     PetscCall(PetscCalloc1((on_nodes ? part->n_nodes * dim : part->n_cells * n) + 1, &s->value[k]));
-    PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, on_nodes ? t->sizes[0] * dim : t->sizes[1] * n, t->n_s,
-                             NULL, &s->S[k]));
+    PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, on_nodes ? t->sizes[0] * dim : t->sizes[1] * n,
+                             HycoSnapshotsSteps(t->scene), NULL, &s->S[k]));
   }
   PetscCall(HycoTrainingReplayCreate(t, Displacement, Record, s, &s->replay));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store)
+static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, const PetscReal tol[], HycoPathModes modes[])
 {
   PetscInt n;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(s->t->samples, &n, NULL, NULL));
-  for (PetscInt k = 0; k < n; k++) PetscCall(HycoTrainingReplayFollow(&s->replay, store, k));
-  for (PetscInt k = 0; k < N_SAMPLED; k++) {
-    PetscCall(MatAssemblyBegin(s->S[k], MAT_FINAL_ASSEMBLY));
-    PetscCall(MatAssemblyEnd(s->S[k], MAT_FINAL_ASSEMBLY));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(HycoTrainingReplayFollow(&s->replay, store, k));
+    for (PetscInt f = 0; f < N_SAMPLED; f++) {
+      PetscCall(End(s->S[f]));
+      PetscCall(HycoPathModesAdd(s->t, s->S[f], tol[f], &modes[f]));
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes of all that is sampled. Collective. */
-static PetscErrorCode Sample(HycoReducer t, HycoSnapshots store, HycoBasis modes[N_SAMPLED])
+/* The modes of all that is sampled, path by path. Collective. */
+static PetscErrorCode Sample(HycoReducer t, HycoSnapshots store, HycoBasis basis[N_SAMPLED])
 {
-  Sampler s;
+  const PetscReal tol[N_SAMPLED] = {Condensing(t)->path.tol, 0, 0};
+  HycoPathModes modes[N_SAMPLED] = {{0}};
+  PetscInt N[N_SAMPLED], n_rows[N_SAMPLED];
   PetscErrorCode ierr;
+  Sampler s;
 
   PetscFunctionBegin;
   PetscCall(CreateSampler(t, store, &s));
-  ierr = FollowAll(&s, store);
-  for (PetscInt k = 0; k < N_SAMPLED && !ierr; k++)
-    ierr = HycoReducerPODPaths(t, s.S[k], k == INELASTIC ? Condensing(t)->path.tol : 0, 0, &modes[k]);
+  for (PetscInt f = 0; f < N_SAMPLED; f++) {
+    PetscCall(MatGetSize(s.S[f], &N[f], NULL));
+    PetscCall(MatGetLocalSize(s.S[f], &n_rows[f], NULL));
+  }
+  ierr = FollowAll(&s, store, tol, modes);
   PetscCall(DestroySampler(&s));
+  for (PetscInt f = 0; f < N_SAMPLED; f++) {
+    if (!ierr) ierr = HycoPathModesJoin(t, &modes[f], N[f], n_rows[f], tol[f], 0, &basis[f]);
+    PetscCall(HycoPathModesDestroy(&modes[f]));
+  }
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -252,7 +271,8 @@ static PetscErrorCode PutModes(HycoReducer t, const HycoBasis *modes, HycoPlace 
   PetscCall(MatDenseGetLDA(modes->V, &lda));
   for (PetscInt j = 0; j < modes->l; j++) {
     PetscCall(MatDenseGetArrayRead(modes->V, &rows));
-    PetscCall(HycoFOMFromRows(t->fom, place, n, rows + (size_t)j * (size_t)lda, value));
+    PetscCall((place == HYCO_ON_CELLS ? HycoFOMFromCellRows : HycoFOMFromRows)(t->fom, n,
+                                                                               rows + (size_t)j * (size_t)lda, value));
     PetscCall(MatDenseRestoreArrayRead(modes->V, &rows));
     PetscCall(PetscArrayzero(node, part->n_nodes * dim));
     for (PetscInt k = 0; k < part->n_cells * n && place == HYCO_ON_CELLS; k++)
@@ -289,14 +309,6 @@ static PetscErrorCode CreateColumns(HycoReducer t, PetscInt n, Mat *A)
   PetscFunctionBegin;
   PetscCall(MatCreateDense(HycoComm(t), t->fom->part->n_owned * t->sizes[3], PETSC_DECIDE, t->sizes[0] * t->sizes[3], n,
                            NULL, A));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode End(Mat A)
-{
-  PetscFunctionBegin;
-  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -411,7 +423,7 @@ static PetscErrorCode TabulateAll(HycoReducer t, PetscReal **table)
   PetscCall(MatDenseGetLDA(t->V, &lda));
   PetscCall(MatDenseGetArrayRead(t->V, &v));
   for (PetscInt j = 0; j < l; j++) {
-    PetscCall(HycoFOMFromRows(t->fom, HYCO_ON_NODES, dim, v + (size_t)j * (size_t)lda, node));
+    PetscCall(HycoFOMFromRows(t->fom, dim, v + (size_t)j * (size_t)lda, node));
     for (PetscInt k = 0; k < part->n_cells * n; k++) {
       const PetscInt cell = part->cell_whole ? part->cell_whole[k / n] : k / n;
 

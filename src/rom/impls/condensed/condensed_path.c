@@ -246,6 +246,7 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   const HycoCondensedTable *from = &Condensing(t)->path.table;
   HycoCondensedTable *to = &((HycoCondensedPath)m->data)->table;
+  char worst[HYCO_LINE] = "";
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->mesh->n_nodes; i++) m->role[i] = HYCO_ROLE_A;
@@ -256,12 +257,12 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   PetscCall(TakeColumns(m, t, from->loads, &to->loads));
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
   PetscCall(HycoReducerJudge(t, m));
-  HycoCheckModel(
-      m->numbers[1] < 0.5,
-      "the condensed model misses its own training displacements by %.0f %% on average (%d inelastic modes, %d "
-      "cells): take more cells (-hyco_condensed_cells; 0: all), fewer modes (-hyco_condensed_inelastic_tol), or train "
-      "a cubature",
-      100 * (double)m->numbers[1], (int)to->n_inelastic, (int)m->mesh->n_cells);
+  if (!(m->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
+  HycoCheckModel(m->numbers[1] < 0.5,
+                 "the condensed model misses its own training displacements by %.0f %% on average (%d inelastic modes, "
+                 "%d cells)%s: take more cells (-hyco_condensed_cells; 0: all), fewer modes "
+                 "(-hyco_condensed_inelastic_tol), or train a cubature",
+                 100 * (double)m->numbers[1], (int)to->n_inelastic, (int)m->mesh->n_cells, worst);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
