@@ -45,6 +45,8 @@ PetscErrorCode HycoDEIM(Mat V, PetscInt index[]);
   V^T, which any rotation of the modes leaves the same. Ties and ranks as HycoDEIM().
 */
 PetscErrorCode HycoQDEIM(Mat V, PetscInt index[]);
+/* The same as far as V's rank goes, which may be less. */
+PetscErrorCode HycoQDEIMRank(Mat V, PetscInt index[], PetscInt *rank);
 
 /* Rows of a dense distributed matrix (n x cols row major), on every rank. Collective. */
 PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscReal values[]);

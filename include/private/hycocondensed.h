@@ -11,6 +11,7 @@
 #define HYCOCONDENSED_H
 
 #include <hycoalgorithms.h>
+#include <hycocondensedpath.h>
 #include <hycoreducerimpl.h>
 
 enum { HYCO_FIELD_G, HYCO_FIELD_GAP, HYCO_FIELD_H, HYCO_FIELD_FREE, HYCO_N_FIELDS };
@@ -94,6 +95,7 @@ typedef struct {
   HycoResponses responses;
   HycoCondensed condensed; /* under training; the grid on every rank, the fields on rank 0 */
   HycoSurfaces surfaces;   /* rank 0 */
+  HycoCondensingPath path; /* of a scene with a history */
 } * HycoCondensing;
 
 static inline HycoCondensing Condensing(HycoReducer t)
@@ -108,6 +110,9 @@ static inline HycoCondensing Condensing(HycoReducer t)
 PetscErrorCode HycoCondensedSetFromOptions(HycoReducer reducer);
 PetscErrorCode HycoCondensedResetTraining(HycoReducer reducer);
 PetscErrorCode HycoCondensedBegin(HycoReducer reducer);
+/* What it refuses with a history and without; a support that lets a body move. Collective. */
+PetscErrorCode HycoCondensedCheckContacts(HycoReducer reducer);
+PetscErrorCode HycoCondensedCheckSupports(HycoReducer reducer);
 PetscErrorCode HycoCondensedStartPoints(HycoReducer reducer, HycoSamples *samples);
 PetscErrorCode HycoCondensedChoosePoints(HycoReducer reducer, HycoSnapshots store, HycoSamples *samples);
 PetscErrorCode HycoCondensedFindModes(HycoReducer reducer, HycoSnapshots store);

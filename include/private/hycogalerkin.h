@@ -31,6 +31,10 @@ typedef struct _n_HycoGalerkin {
   /* the type's own: Br and Btr, and Dr, from own_rows; Lambda from L. NULL: each contact of A_lambda has a multiplier
    */
   PetscErrorCode (*contact)(HycoROM), (*gap)(HycoROM), (*expand)(HycoROM);
+  /* of a path, in place of sums over the RID's cells: Kr at fe's tangents; what is to be added to Fr; f_int at U and
+     the state of the laws, and the size of what it is a difference of. NULL: there are none */
+  PetscErrorCode (*stiffness)(HycoROM), (*add_loads)(HycoROM),
+      (*forces)(HycoROM, HycoFEState, Vec f_int, PetscReal *summands);
   PetscBool symmetric;
   /* as in the file */
   PetscReal *G;    /* l x n_fe row major (hybrid all), else NULL */

@@ -82,6 +82,7 @@ struct _n_HycoPath {
   Vec F, f_int, r, U_old, work, diagonal;
   Vec L_old, gap_work;     /* as Lambda; NULL without contact */
   PetscReal *f_local, *u0; /* of fe's n_dof */
+  PetscReal summands;      /* 2-norm of what f_int is a small difference of, as ops->step has it; 0: of nothing */
   PetscBool tangent;       /* K is a tangent, not the elastic stiffness */
   PetscInt kept;           /* contact systems that were solved with this K */
   PetscBool flows;         /* some body's law has a memory */

@@ -149,6 +149,21 @@ PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_
                               PetscReal sigma[]);
 PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
                                   PetscInt max_modes, PetscInt found, PetscInt *l);
+/*
+  The POD of paths: of each, then of these, each brought to the size of the largest: a slow one counts as much as a fast
+  one. HycoPathModesAdd(): of a path's columns, which stay; the modes begin as {0}. HycoPathModesJoin() ends them: V, l,
+  sigma and n_sigma of `basis`, the caller's (no mode: V is NULL or has no column), of N rows, n_rows here. tol 0: every
+  mode above the noise. Collective. HycoPathModesDestroy() after a failure.
+*/
+typedef struct {
+  PetscInt n;
+  Mat *V;           /* the modes of each path, times their singular values; NULL: none */
+  PetscReal *first; /* of these */
+} HycoPathModes;
+PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPathModes *modes);
+PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N, PetscInt n_rows, PetscReal tol,
+                                 PetscInt max_modes, HycoBasis *basis);
+PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes);
 /* On rank 0 (column major, the caller's; elsewhere empty) the first n_columns of S, a matrix of displacements, at nodes
    that rank 0 gives by their numbers in the whole mesh. Collective. */
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
@@ -173,9 +188,36 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
 /* Of paths in 3D the group of the support that looks most like a plane of symmetry across the contacts, whose cells
    are then the first RID; else NULL. Borrowed from the scene. Collective. */
 PetscErrorCode HycoReducerFindPlane(HycoReducer t, const char **group);
+/*
+  The laws again along the training paths (training_replay.c), on this rank's part, in the steps that full order took;
+  between listed times displacements are linear in time. HycoTrainingReplayFollow() goes through one path (without a
+  history: a point) and calls record(ctx, k) at each listed time, where k is its column of the snapshots, the part's fe
+  is at its parameters and `u` and `state` are there. displacement(ctx, k, u): that of column k at the part's nodes
+  (n_dof) less its lifting. Both are collective, as all of it. HycoTrainingReplayDestroy() also after a failure.
+*/
+typedef struct {
+  HycoReducer t; /* borrowed, as fe */
+  HycoFE fe;
+  PetscErrorCode (*displacement)(void *ctx, PetscInt k, PetscReal u[]), (*record)(void *ctx, PetscInt k);
+  void *ctx;
+  PetscReal *u; /* n_dof */
+  HycoFEState state, end;
+  PetscInt column;                   /* that of `before`; -1: none */
+  PetscReal *before, *after, *f_int; /* n_dof: displacements of two listed times; nobody asks for */
+} HycoTrainingReplay;
+PetscErrorCode HycoTrainingReplayCreate(HycoReducer t, PetscErrorCode (*displacement)(void *, PetscInt, PetscReal[]),
+                                        PetscErrorCode (*record)(void *, PetscInt), void *ctx,
+                                        HycoTrainingReplay *replay);
+PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *replay, HycoSnapshots store, PetscInt path);
+PetscErrorCode HycoTrainingReplayDestroy(HycoTrainingReplay *replay);
 /* B^T of the dual snapshots, and M^-1 of it with the matrix M of the H1 norm: where each force works most. Both n_dof x
    n_s, dense, rows by the distributed vectors' order, the caller's. Collective. */
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers);
+/* A^-1 R by one factor of A, which is symmetric and definite, of that name (X: the caller's); columns of unit length (0
+   where one has none, and where fixed) of dense X, rows by the distributed vectors' order, with the rows of the modes,
+   by the file's (the caller's). Collective. */
+PetscErrorCode HycoReducerSolve(HycoReducer t, Mat A, const char name[], Mat R, Mat *X);
+PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled);
 /* Judges the model by the held-out solutions, calibrates the estimates of its errors on them and notes both in it (rank
    0): report->held_out, and n_held, the predictions behind the estimates (0: none; too few). Collective. */
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report);

@@ -98,6 +98,17 @@ static PetscErrorCode LongestRow(Mat V, const PetscReal length2[], PetscInt *row
 
 PetscErrorCode HycoQDEIM(Mat V, PetscInt index[])
 {
+  PetscInt l, found;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(V, NULL, &l));
+  PetscCall(HycoQDEIMRank(V, index, &found));
+  HycoCheckModel(found == l, "Q-DEIM: the basis has rank %d of %d", (int)found, (int)l);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQDEIMRank(Mat V, PetscInt index[], PetscInt *found)
+{
   Mat R;
   PetscInt l, lo, hi, lda;
   PetscScalar *r;
@@ -109,7 +120,8 @@ PetscErrorCode HycoQDEIM(Mat V, PetscInt index[])
   PetscCall(MatDuplicate(V, MAT_COPY_VALUES, &R));
   PetscCall(MatDenseGetLDA(R, &lda));
   PetscCall(PetscMalloc2(l, &pivot, hi - lo, &length2));
-  for (PetscInt k = 0; k < l; k++) {
+  for (*found = 0; *found < l; (*found)++) {
+    const PetscInt k = *found;
     PetscReal size2 = 0;
 
     PetscCall(PetscArrayzero(length2, hi - lo));
@@ -124,7 +136,7 @@ PetscErrorCode HycoQDEIM(Mat V, PetscInt index[])
     PetscCall(LongestRow(R, length2, &index[k]));
     PetscCall(HycoGatherRows(R, 1, &index[k], pivot));
     for (PetscInt j = 0; j < l; j++) size2 += pivot[j] * pivot[j];
-    HycoCheckModel(size2 > 0, "Q-DEIM: the basis has rank %d of %d", (int)k, (int)l);
+    if (!(size2 > 0)) break;
     PetscCall(MatDenseGetArray(R, &r));
     for (PetscInt i = 0; i < hi - lo; i++) {
       PetscReal dot = 0;

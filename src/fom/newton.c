@@ -50,7 +50,7 @@ static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool
   PetscCall(VecNorm(p->r, NORM_2, &now->residual[2]));
   PetscCall(VecPointwiseMult(p->work, p->diagonal, p->U));
   PetscCall(VecNorm(p->work, NORM_2, &now->floor));
-  now->floor *= 16 * PETSC_MACHINE_EPSILON;
+  now->floor = 16 * PETSC_MACHINE_EPSILON * (now->floor + p->summands);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -278,16 +278,32 @@ PetscErrorCode HycoFOMGetRows(HycoFOM f, const HycoFileOrder **rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFOMFromRows(HycoFOM f, PetscInt components, const PetscReal rows[], PetscReal value[])
+static PetscErrorCode FromRows(HycoFOM f, HycoPlace place, PetscInt components, const PetscReal rows[],
+                               PetscReal value[])
 {
+  const PetscInt n = place == HYCO_ON_CELLS ? f->part->n_cells : f->part->n_nodes;
   const HycoFileOrder *order;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(f, &order));
   if (order)
-    PetscCall(HycoFileOrderFetch(order, f->part, HYCO_ON_NODES, components, rows, value));
+    PetscCall(HycoFileOrderFetch(order, f->part, place, components, rows, value));
   else
-    PetscCall(PetscArraycpy(value, rows, f->part->n_nodes * components));
+    PetscCall(PetscArraycpy(value, rows, n * components));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMFromRows(HycoFOM f, PetscInt components, const PetscReal rows[], PetscReal value[])
+{
+  PetscFunctionBegin;
+  PetscCall(FromRows(f, HYCO_ON_NODES, components, rows, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMFromCellRows(HycoFOM f, PetscInt components, const PetscReal rows[], PetscReal value[])
+{
+  PetscFunctionBegin;
+  PetscCall(FromRows(f, HYCO_ON_CELLS, components, rows, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -139,75 +139,115 @@ PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscRe
 /* Paths that move this much less than the largest are not brought to its size: they may be nothing but noise. */
 #define SLIGHT 1e-3
 
-/* The modes of path j of S, times their singular values, in V (NULL: none), and the first singular value. */
-static PetscErrorCode PathModes(HycoReducer t, Mat S, PetscInt j, PetscReal tol, Mat *V, PetscReal *first)
+PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPathModes *modes)
 {
-  const PetscInt n = HycoSnapshotsSteps(t->scene);
   PetscReal *sigma;
-  PetscInt l;
+  PetscInt N, columns, l;
   Vec scale;
-  Mat part, path;
+  Mat V;
 
   PetscFunctionBegin;
-  PetscCall(MatDenseGetSubMatrix(S, PETSC_DECIDE, PETSC_DECIDE, j * n, (j + 1) * n, &part));
-  PetscCall(MatDuplicate(part, MAT_COPY_VALUES, &path));
-  PetscCall(MatDenseRestoreSubMatrix(S, &part));
-  PetscCall(PetscCalloc1(n + 1, &sigma));
-  PetscCall(HycoReducerPOD(t, path, tol, 0, V, &l, sigma));
-  PetscCall(MatDestroy(&path));
-  *first = sigma[0];
-  if (!l) PetscCall(MatDestroy(V));
+  PetscCall(MatGetSize(path, &N, &columns));
+  PetscCall(PetscCalloc1(columns + 1, &sigma));
+  PetscCall(HycoReducerPOD(t, path, tol, 0, &V, &l, sigma));
+  if (!l) PetscCall(MatDestroy(&V));
   if (l) {
-    PetscCall(MatCreateVecs(*V, &scale, NULL));
+    PetscCall(MatCreateVecs(V, &scale, NULL));
     for (PetscInt k = 0; k < l; k++) PetscCall(VecSetValue(scale, k, t->rank ? 0 : sigma[k], ADD_VALUES));
     PetscCall(VecAssemblyBegin(scale));
     PetscCall(VecAssemblyEnd(scale));
-    PetscCall(MatDiagonalScale(*V, NULL, scale));
+    PetscCall(MatDiagonalScale(V, NULL, scale));
     PetscCall(VecDestroy(&scale));
   }
+  PetscCall(PetscRealloc((size_t)(modes->n + 1) * sizeof(*modes->V), &modes->V));
+  PetscCall(PetscRealloc((size_t)(modes->n + 1) * sizeof(*modes->first), &modes->first));
+  modes->V[modes->n] = l ? V : NULL;
+  modes->first[modes->n++] = sigma[0];
   PetscCall(PetscFree(sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes of the paths side by side, each path brought to the size of the largest: a slow one counts as much as a
-   fast one. */
-static PetscErrorCode JoinPaths(HycoReducer t, Mat S, PetscReal tol, Mat *joined)
+PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes)
 {
-  const PetscInt paths = t->n_s / HycoSnapshotsSteps(t->scene);
-  PetscInt N, rows, n = 0, at = 0;
-  PetscReal *first, largest = 0;
-  Mat *V;
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < modes->n; j++) PetscCall(MatDestroy(&modes->V[j]));
+  HycoFreeAll(&modes->V, &modes->first);
+  modes->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes of the paths side by side (N rows, n_rows of them here), each path brought to the size of the largest: a
+   slow one counts as much as a fast one. */
+static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, PetscInt N, PetscInt n_rows, Mat *joined)
+{
+  PetscInt n = 0, at = 0;
+  PetscReal largest = 0;
 
   PetscFunctionBegin;
-  PetscCall(MatGetSize(S, &N, NULL));
-  PetscCall(MatGetLocalSize(S, &rows, NULL));
-  PetscCall(PetscMalloc2(paths, &V, paths, &first));
-  for (PetscInt j = 0; j < paths; j++) {
+  for (PetscInt j = 0; j < modes->n; j++) {
     PetscInt l = 0;
 
-    V[j] = NULL;
-    PetscCall(PathModes(t, S, j, tol, &V[j], &first[j]));
-    if (V[j]) PetscCall(MatGetSize(V[j], NULL, &l));
+    if (modes->V[j]) PetscCall(MatGetSize(modes->V[j], NULL, &l));
     n += l;
-    largest = PetscMax(largest, first[j]);
+    largest = PetscMax(largest, modes->first[j]);
   }
-  PetscCall(MatCreateDense(PetscObjectComm((PetscObject)S), rows, PETSC_DECIDE, N, PetscMax(n, 1), NULL, joined));
-  for (PetscInt j = 0; j < paths; j++) {
+  PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, N, PetscMax(n, 1), NULL, joined));
+  for (PetscInt j = 0; j < modes->n; j++) {
     PetscInt l;
     Mat part;
 
-    if (!V[j]) continue;
-    PetscCall(MatGetSize(V[j], NULL, &l));
-    PetscCall(MatScale(V[j], largest / PetscMax(first[j], SLIGHT * largest)));
+    if (!modes->V[j]) continue;
+    PetscCall(MatGetSize(modes->V[j], NULL, &l));
+    PetscCall(MatScale(modes->V[j], largest / PetscMax(modes->first[j], SLIGHT * largest)));
     PetscCall(MatDenseGetSubMatrix(*joined, PETSC_DECIDE, PETSC_DECIDE, at, at + l, &part));
-    PetscCall(MatCopy(V[j], part, SAME_NONZERO_PATTERN));
+    PetscCall(MatCopy(modes->V[j], part, SAME_NONZERO_PATTERN));
     PetscCall(MatDenseRestoreSubMatrix(*joined, &part));
-    PetscCall(MatDestroy(&V[j]));
     at += l;
   }
   PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(*joined, MAT_FINAL_ASSEMBLY));
-  PetscCall(PetscFree2(V, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* POD of S into a basis. */
+static PetscErrorCode TakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscInt most, HycoBasis *basis)
+{
+  PetscInt N, n;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(S, &N, &n));
+  PetscCall(PetscCalloc1(t->n_s + 1, &basis->sigma));
+  basis->n_sigma = PetscMin(N, n);
+  PetscCall(HycoReducerPOD(t, S, tol, most, &basis->V, &basis->l, basis->sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N, PetscInt n_rows, PetscReal tol,
+                                 PetscInt max_modes, HycoBasis *basis)
+{
+  Mat joined;
+
+  PetscFunctionBegin;
+  PetscCall(JoinPaths(t, modes, N, n_rows, &joined));
+  PetscCall(HycoPathModesDestroy(modes));
+  PetscCall(TakeBasis(t, joined, tol, max_modes, basis));
+  PetscCall(MatDestroy(&joined));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The paths of S, `n` columns each. */
+static PetscErrorCode AddPaths(HycoReducer t, Mat S, PetscInt n, PetscReal tol, HycoPathModes *modes)
+{
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < t->n_s / n; j++) {
+    Mat part, path;
+
+    PetscCall(MatDenseGetSubMatrix(S, PETSC_DECIDE, PETSC_DECIDE, j * n, (j + 1) * n, &part));
+    PetscCall(MatDuplicate(part, MAT_COPY_VALUES, &path));
+    PetscCall(MatDenseRestoreSubMatrix(S, &part));
+    PetscCall(HycoPathModesAdd(t, path, tol, modes));
+    PetscCall(MatDestroy(&path));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -215,19 +255,20 @@ static PetscErrorCode JoinPaths(HycoReducer t, Mat S, PetscReal tol, Mat *joined
    that of each, then of these. */
 static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool all)
 {
-  HycoBasis *basis = &t->basis[kind];
   const PetscInt most = kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0;
   const PetscReal tol = all ? 0 : t->tol[kind];
-  PetscInt N, n;
-  Mat joined = S;
+  HycoPathModes modes = {0};
+  PetscInt N, n_rows;
 
   PetscFunctionBegin;
-  if (t->scene->n_times) PetscCall(JoinPaths(t, S, tol, &joined));
-  PetscCall(MatGetSize(joined, &N, &n));
-  PetscCall(PetscCalloc1(t->n_s + 1, &basis->sigma));
-  basis->n_sigma = PetscMin(N, n);
-  PetscCall(HycoReducerPOD(t, joined, tol, most, &basis->V, &basis->l, basis->sigma));
-  if (joined != S) PetscCall(MatDestroy(&joined));
+  if (!t->scene->n_times) {
+    PetscCall(TakeBasis(t, S, tol, most, &t->basis[kind]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(MatGetSize(S, &N, NULL));
+  PetscCall(MatGetLocalSize(S, &n_rows, NULL));
+  PetscCall(AddPaths(t, S, HycoSnapshotsSteps(t->scene), tol, &modes));
+  PetscCall(HycoPathModesJoin(t, &modes, N, n_rows, tol, most, &t->basis[kind]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -411,15 +452,68 @@ static PetscErrorCode SetForces(HycoReducer t, PetscInt k, Mat R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoReducerSolve(HycoReducer t, Mat A, const char name[], Mat R, Mat *X)
+{
+  KSP ksp;
+  PetscBool singular;
+  Mat factor;
+  PC pc;
+
+  PetscFunctionBegin;
+  PetscCall(MatSetOption(A, MAT_SPD, PETSC_TRUE));
+  PetscCall(HycoDirectSolver(HycoComm(t), "hyco_norm_", A, PETSC_TRUE, &ksp));
+  PetscCall(HycoFactor(ksp, &singular));
+  PetscCheck(!singular, HycoComm(t), PETSC_ERR_PLIB, "%s is singular", name);
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCFactorGetMatrix(pc, &factor));
+  PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, X));
+  PetscCall(MatMatSolve(factor, R, *X));
+  PetscCall(KSPDestroy(&ksp));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled)
+{
+  HycoMesh part = t->fom->part;
+  const PetscInt dim = t->sizes[3];
+  const HycoFileOrder *order;
+  PetscInt n, rows, lda[2];
+  PetscReal *size, *value;
+  const PetscScalar *x;
+  PetscScalar *y;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(t->fom, &order));
+  rows = dim * (order ? order->n[HYCO_ON_NODES] : part->n_nodes);
+  PetscCall(MatGetSize(X, NULL, &n));
+  PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, t->sizes[0] * dim, n, NULL, scaled));
+  PetscCall(PetscMalloc2(n, &size, part->n_nodes * dim, &value));
+  PetscCall(MatGetColumnNorms(X, NORM_2, size));
+  PetscCall(MatDenseGetLDA(X, &lda[0]));
+  PetscCall(MatDenseGetLDA(*scaled, &lda[1]));
+  PetscCall(MatDenseGetArrayRead(X, &x));
+  PetscCall(MatDenseGetArray(*scaled, &y));
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt i = 0; i < part->n_nodes * dim; i++) {
+      const PetscInt place = HycoMeshOwned(part, i / dim);
+      const PetscBool none = (PetscBool)(place < 0 || t->fom->fe->fixed[i] || size[k] == 0);
+
+      value[i] = none ? 0 : x[(size_t)k * (size_t)lda[0] + (size_t)(place * dim + i % dim)] / size[k];
+    }
+    PetscCall(HycoFOMToRows(t->fom, HYCO_ON_NODES, MPIU_REAL, dim, value, y + (size_t)k * (size_t)lda[1]));
+  }
+  PetscCall(MatDenseRestoreArray(*scaled, &y));
+  PetscCall(MatDenseRestoreArrayRead(X, &x));
+  PetscCall(PetscFree2(size, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers)
 {
   HycoFOM f = t->fom;
   const PetscInt n = t->n_s, n_own = f->part->n_owned * t->sizes[3];
   PetscReal mu[HYCO_MAX_PARAMETERS];
-  Mat M, R, X, factor;
-  KSP ksp;
-  PetscBool singular;
-  PC pc;
+  Mat M, R;
 
   PetscFunctionBegin;
   PetscCall(MatCreateDense(HycoComm(t), n_own, PETSC_DECIDE, t->sizes[0] * t->sizes[3], n, NULL, &R));
@@ -432,18 +526,9 @@ PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremize
   PetscCall(MatAssemblyEnd(R, MAT_FINAL_ASSEMBLY));
   PetscCall(HycoFECreateMatrix(f->fe, HycoComm(t), f->part->n_owned, f->part->first, &M));
   HycoOnEach(HycoComm(t), HycoFEAssembleH1(f->fe, HycoMeshLength(f->part), M));
-  PetscCall(MatSetOption(M, MAT_SPD, PETSC_TRUE));
-  PetscCall(HycoDirectSolver(HycoComm(t), "hyco_norm_", M, PETSC_TRUE, &ksp));
-  PetscCall(HycoFactor(ksp, &singular));
-  PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the H1 norm's matrix is singular");
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCFactorGetMatrix(pc, &factor));
-  PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, &X));
-  PetscCall(MatMatSolve(factor, R, X));
+  PetscCall(HycoReducerSolve(t, M, "the H1 norm's matrix", R, supremizers));
   PetscCall(MatDestroy(&M));
-  PetscCall(KSPDestroy(&ksp));
   *forces = R;
-  *supremizers = X;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -262,7 +262,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
                             indicators, &indicator, NULL));
   PetscCall(HycoOptionsBool("-hyco_greedy_keep", "train -greedy keeps each iteration's model beside the snapshots",
                             &t->greedy.keep, NULL));
-  PetscCall(HycoOptionsFor("hybrid, projection or cubature"));
+  PetscCall(HycoOptionsFor("hybrid, projection, cubature or condensed"));
   PetscCall(HycoOptionsInt("-hyco_scan",
                            "points per parameter that look for a singular reduced stiffness (0: up to some hundred in "
                            "all)",

@@ -20,8 +20,8 @@ class Ring(FlowingRing):
         return self.hyco('train', '-scene', scene or self.norton, '-model', self.path(model), '-grid', grid, '-hyco_snapshots', self.path(store), *args,
                          **options)
 
-    def compare(self, model, point=POINT, scene=None, **options):
-        return self.hyco('compare', '-scene', scene or self.norton, '-model', self.path(model), '-mu', point, **options)
+    def compare(self, model, point=POINT, *args, scene=None, **options):
+        return self.hyco('compare', '-scene', scene or self.norton, '-model', self.path(model), '-mu', point, *args, **options)
 
     def predict(self, model, *args):
         return self.hyco('predict', '-model', self.path(model), '-mu', POINT, *args)

@@ -200,6 +200,7 @@ static PetscErrorCode ResetResponses(HycoResponses *x)
 PetscErrorCode HycoCondensedSetFromOptions(HycoReducer t)
 {
   HycoCondensing s;
+  PetscBool set[2];
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&s));
@@ -207,6 +208,8 @@ PetscErrorCode HycoCondensedSetFromOptions(HycoReducer t)
   s->tol = 1e-7;
   s->pod_tol = 1e-14;
   s->max_values = 24;
+  s->path.tol = 1e-10;
+  s->path.cells = 2;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("condensed"));
   PetscCall(HycoOptionsReal("-hyco_condensed_pod_tol",
@@ -221,13 +224,26 @@ PetscErrorCode HycoCondensedSetFromOptions(HycoReducer t)
   PetscCall(HycoOptionsInt("-hyco_condensed_max_values",
                            "condensed, no points given: at most so many values per parameter", 3, 1000, &s->max_values,
                            NULL));
+  PetscCall(HycoOptionsFor("condensed, of a history"));
+  PetscCall(HycoOptionsReal("-hyco_condensed_inelastic_tol",
+                            "condensed, of a history: energy that the modes of the inelastic strain may leave out", 0,
+                            1, &s->path.tol, &set[0]));
+  PetscCall(
+      HycoOptionsInt("-hyco_condensed_cells",
+                     "condensed, of a history: cells with laws for each mode of the inelastic strain (0: every cell)",
+                     0, 1000000, &s->path.cells, &set[1]));
   PetscOptionsEnd();
+  HycoCheck(!(set[0] || set[1]) || !t->scene || t->scene->n_times,
+            "%s is for scenes with a history, and this one has none",
+            set[0] ? "-hyco_condensed_inelastic_tol" : "-hyco_condensed_cells");
+  if (t->scene && t->scene->n_times) PetscCall(HycoCondensedTakePath(t->prototype));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoCondensedResetTraining(HycoReducer t)
 {
   PetscFunctionBegin;
+  PetscCall(HycoCondensedTableFree(&Condensing(t)->path.table));
   PetscCall(ResetSurfaces(t));
   PetscCall(ResetResponses(&Condensing(t)->responses));
   PetscCall(HycoCondensedFree(&Condensing(t)->condensed));
@@ -289,13 +305,28 @@ static PetscErrorCode CheckFacets(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoCondensedCheckSupports(HycoReducer t)
+{
+  HycoMotions motions;
+  PetscInt free;
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEFreeMotions(HycoComm(t), t->fom->fe, &motions));
+  free = motions.n;
+  if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
+  PetscCall(HycoMotionsDestroy(&motions));
+  HycoCheckModel(!free,
+                 "no support keeps %s: contact alone holds it, K^-1 does not exist and no condensed model with it; "
+                 "train a hybrid one",
+                 name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Which parameters reach what; that the scene is one for this model. Collective. */
 static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
 {
-  HycoMotions motions;
   PetscBool reaches[HYCO_MAX_PARAMETERS];
-  PetscInt free;
-  char name[HYCO_LINE];
 
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(t), CheckFacets(t));
@@ -311,20 +342,12 @@ static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
     for (PetscInt k = 0; affine && !c->exact_loads && k < 2; k++) PetscCall(AffineAt(t, p, k ? 0.71 : 0.38, &affine));
     c->affine[p] = affine;
   }
-  PetscCall(HycoFEFreeMotions(HycoComm(t), t->fom->fe, &motions));
-  free = motions.n;
-  if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
-  PetscCall(HycoMotionsDestroy(&motions));
-  HycoCheckModel(!free,
-                 "no support keeps %s: contact alone holds it, K^-1 does not exist and no condensed model with it; "
-                 "train a hybrid one",
-                 name);
+  PetscCall(HycoCondensedCheckSupports(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoCondensedBegin(HycoReducer t)
+PetscErrorCode HycoCondensedCheckContacts(HycoReducer t)
 {
-  HycoCondensed c;
   const PetscInt m = t->sizes[2];
   HycoSolver solver;
   HycoLinear linear;
@@ -346,6 +369,19 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
       "the scene has %d contacts: a condensed model stores the square of their number at every training point, "
       "and goes to %d; train a hybrid model",
       (int)m, MOST_CONTACTS);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedBegin(HycoReducer t)
+{
+  HycoCondensed c;
+  const PetscInt m = t->sizes[2];
+
+  PetscFunctionBegin;
+  HycoCheck(!t->scan && !t->keep_singular,
+            "-hyco_scan and -hyco_keep_singular are for models that are scanned, and one of "
+            "-hyco_model_type condensed is not, unless the scene has a history");
+  PetscCall(HycoCondensedCheckContacts(t));
   PetscCall(HycoCondensedFree(&Condensing(t)->condensed));
   PetscCall(ResetResponses(&Condensing(t)->responses));
   PetscCall(HycoCondensedCreate(t->scene->n_parameters, m, 0, &c));
@@ -519,6 +555,11 @@ PetscErrorCode HycoCondensedBuild(HycoROM m, HycoReducer t)
   HycoCondensed c = Condensing(t)->condensed, none = (HycoCondensed)m->data;
 
   PetscFunctionBegin;
+  if (t->scene->n_times) {
+    PetscCall(HycoCondensedTakePath(m));
+    PetscCall((*m->ops->build)(m, t));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoCondensedFillFields(t, PETSC_TRUE));
   PetscCall(HycoCondensedLeaveOut(t));
   PetscCall(HycoCondensedResetSystem(c));

@@ -73,6 +73,11 @@ PetscErrorCode HycoCondensedMove(HycoROM m, HycoH5 h)
   PetscInt n;
 
   PetscFunctionBegin;
+  if (m->scene->n_times) { /* it is read: a model of a path has its own */
+    PetscCall(HycoCondensedTakePath(m));
+    PetscCall((*m->ops->load)(m, h));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   c->dim = m->scene->n_parameters;
   c->m = m->pairs.n;
   c->l = m->l;

@@ -11,19 +11,19 @@
 
 typedef struct {
   HycoReducer t;
-  HycoFE fe;                /* this rank's part */
-  PetscReal *V, *u, *f, *g; /* the modes there, n_dof x l row major; n_dof; n_dof; cells x l */
-  PetscInt n_rows;          /* this rank's cells in the file's order */
-  PetscReal *rows;          /* n_rows x l row major */
-  HycoFEState begin, end;
+  HycoTrainingReplay replay;
+  HycoFE fe;        /* this rank's part */
+  PetscReal *V, *g; /* the modes there, n_dof x l row major; cells x l */
+  PetscInt n_rows;  /* this rank's cells in the file's order */
+  PetscReal *rows;  /* n_rows x l row major */
+  Mat J;            /* of the training point that is followed */
 } Sampler;
 
 static PetscErrorCode Destroy(Sampler *s)
 {
   PetscFunctionBegin;
-  PetscCall(HycoFEStateDestroy(&s->begin));
-  PetscCall(HycoFEStateDestroy(&s->end));
-  HycoFreeAll(&s->V, &s->u, &s->f, &s->g, &s->rows);
+  PetscCall(HycoTrainingReplayDestroy(&s->replay));
+  HycoFreeAll(&s->V, &s->g, &s->rows);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -33,78 +33,36 @@ static PetscErrorCode FetchModes(Sampler *s)
   HycoReducer t = s->t;
   const PetscInt n_dof = s->fe->n_dof, l = t->l;
   const PetscScalar *v;
+  PetscReal *column;
   PetscInt lda;
 
   PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n_dof, &column));
   PetscCall(MatDenseGetLDA(t->V, &lda));
   PetscCall(MatDenseGetArrayRead(t->V, &v));
   for (PetscInt j = 0; j < l; j++) {
-    PetscCall(HycoFOMFromRows(t->fom, s->fe->dim, v + (size_t)j * (size_t)lda, s->u));
-    for (PetscInt i = 0; i < n_dof; i++) s->V[(size_t)i * (size_t)l + (size_t)j] = s->u[i];
+    PetscCall(HycoFOMFromRows(t->fom, s->fe->dim, v + (size_t)j * (size_t)lda, column));
+    for (PetscInt i = 0; i < n_dof; i++) s->V[(size_t)i * (size_t)l + (size_t)j] = column[i];
   }
   PetscCall(MatDenseRestoreArrayRead(t->V, &v));
+  PetscCall(PetscFree(column));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Create(HycoReducer t, Sampler *s)
+/* V gamma of column k of the snapshots. */
+static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
 {
-  const HycoFileOrder *order;
-  const PetscInt l = t->l;
+  const Sampler *s = (const Sampler *)ctx;
+  const PetscInt l = s->t->l;
+  const PetscReal *a = s->t->VtU + (size_t)k * (size_t)l;
 
   PetscFunctionBegin;
-  *s = (Sampler){.t = t, .fe = t->fom->fe};
-  PetscCall(HycoFOMGetRows(t->fom, &order));
-  s->n_rows = order ? order->n[HYCO_ON_CELLS] : t->fom->part->n_cells;
-  PetscCall(PetscMalloc1((size_t)s->fe->n_dof * (size_t)l + 1, &s->V));
-  PetscCall(PetscMalloc1(s->fe->n_dof, &s->u));
-  PetscCall(PetscMalloc1(s->fe->n_dof, &s->f));
-  PetscCall(PetscMalloc1((size_t)t->fom->part->n_cells * (size_t)l + 1, &s->g));
-  PetscCall(PetscCalloc1((size_t)s->n_rows * (size_t)l + 1, &s->rows));
-  PetscCall(FetchModes(s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* u of training point k at a time. */
-static void Displace(Sampler *s, PetscInt k, PetscReal time)
-{
-  const HycoScene scene = s->t->scene;
-  const PetscInt l = s->t->l, n = HycoSnapshotsSteps(scene);
-  const PetscReal *a = s->t->VtU + (size_t)(k * n) * (size_t)l;
-  PetscReal share = 0;
-  PetscInt at = 0;
-
-  if (scene->n_times > 1) {
-    while (at + 2 < n && scene->times[at + 1] < time) at++;
-    share = PetscMin(1, (time - scene->times[at]) / (scene->times[at + 1] - scene->times[at]));
-  }
-  a += (size_t)at * (size_t)l;
   for (PetscInt i = 0; i < s->fe->n_dof; i++) {
     const PetscReal *v = s->V + (size_t)i * (size_t)l;
 
-    s->u[i] = s->fe->u0[i];
-    for (PetscInt j = 0; j < l; j++) s->u[i] += v[j] * (share > 0 ? (1 - share) * a[j] + share * a[l + j] : a[j]);
+    u[i] = 0;
+    for (PetscInt j = 0; j < l; j++) u[i] += v[j] * a[j];
   }
-  HycoFEComplete(s->fe, s->u);
-}
-
-/* The laws from t0 to t1, which fe is at. */
-static PetscErrorCode Step(Sampler *s, PetscInt k, PetscReal t0, PetscReal t1)
-{
-  HycoFEState state = s->begin;
-  HycoFEStepReport report;
-
-  PetscFunctionBegin;
-  if (!s->begin) {
-    PetscCall(HycoFEStateCreate(s->fe, &s->begin));
-    PetscCall(HycoFEStateCreate(s->fe, &s->end));
-    state = s->begin;
-  }
-  Displace(s, k, t1);
-  PetscCall(HycoFEStep(s->fe, s->u, t0, t1, s->begin, s->end, s->f, PETSC_FALSE, &report));
-  HycoCheckModel(!report.failed, "the laws have no answer to the training displacements at t = %.10g: %s", (double)t1,
-                 report.why);
-  s->begin = s->end;
-  s->end = state;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -135,7 +93,7 @@ static PetscErrorCode Project(Sampler *s)
 
     for (PetscInt j = 0; j < l; j++) g[j] = 0;
     if (near && near[e]) continue;
-    PetscCall(HycoFEStateForce(s->fe, s->begin, e, f));
+    PetscCall(HycoFEStateForce(s->fe, s->replay.state, e, f));
     PetscCall(HycoFEBodyForce(s->fe, e, load));
     for (PetscInt k = 0; k < n; k++)
       AddForce(s, m->cells[e * m->nv + k / m->dim] * m->dim + k % m->dim, f[k] - load[k], g);
@@ -143,45 +101,41 @@ static PetscErrorCode Project(Sampler *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The l columns of listed time `step`. Collective. */
-static PetscErrorCode Record(Sampler *s, PetscInt step, Mat J)
+/* The l columns of a listed time. Collective. */
+static PetscErrorCode Record(void *ctx, PetscInt k)
 {
-  const PetscInt l = s->t->l;
+  Sampler *s = (Sampler *)ctx;
+  const PetscInt l = s->t->l, step = k % HycoSnapshotsSteps(s->t->scene);
   PetscScalar *a;
   PetscInt lda;
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(s->t), Project(s));
   PetscCall(HycoFOMToRows(s->t->fom, HYCO_ON_CELLS, MPIU_REAL, l, s->g, s->rows));
-  PetscCall(MatDenseGetLDA(J, &lda));
-  PetscCall(MatDenseGetArray(J, &a));
+  PetscCall(MatDenseGetLDA(s->J, &lda));
+  PetscCall(MatDenseGetArray(s->J, &a));
   for (PetscInt j = 0; j < l; j++) {
     for (PetscInt i = 0; i < s->n_rows; i++)
       a[(size_t)(step * l + j) * (size_t)lda + (size_t)i] = s->rows[(size_t)i * (size_t)l + (size_t)j];
   }
-  PetscCall(MatDenseRestoreArray(J, &a));
+  PetscCall(MatDenseRestoreArray(s->J, &a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Training point k, the laws stepping at the n times taken[]. Collective. */
-static PetscErrorCode Follow(Sampler *s, PetscInt k, PetscInt n, const PetscReal taken[], Mat J)
+static PetscErrorCode Create(HycoReducer t, Sampler *s)
 {
-  HycoReducer t = s->t;
-  const HycoScene scene = t->scene;
-  PetscReal all[HYCO_MAX_PARAMETERS];
-  const PetscReal *mu;
-  PetscInt n_par, step = 0;
+  const HycoFileOrder *order;
+  const PetscInt l = t->l;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  PetscCall(HycoFEStateDestroy(&s->begin));
-  PetscCall(HycoFEStateDestroy(&s->end));
-  for (PetscInt i = 0; i < n; i++) {
-    HycoSceneSetTime(scene, mu + k * n_par, taken[i], all);
-    PetscCall(HycoFOMSetParameters(t->fom, all));
-    HycoOnEach(HycoComm(t), Step(s, k, taken[PetscMax(i - 1, 0)], taken[i]));
-    if (!scene->n_times || (step < scene->n_times && taken[i] == scene->times[step])) PetscCall(Record(s, step++, J));
-  }
+  *s = (Sampler){.t = t, .fe = t->fom->fe};
+  PetscCall(HycoFOMGetRows(t->fom, &order));
+  s->n_rows = order ? order->n[HYCO_ON_CELLS] : t->fom->part->n_cells;
+  PetscCall(PetscMalloc1((size_t)s->fe->n_dof * (size_t)l + 1, &s->V));
+  PetscCall(PetscMalloc1((size_t)t->fom->part->n_cells * (size_t)l + 1, &s->g));
+  PetscCall(PetscCalloc1((size_t)s->n_rows * (size_t)l + 1, &s->rows));
+  PetscCall(FetchModes(s));
+  PetscCall(HycoTrainingReplayCreate(t, Displacement, Record, s, &s->replay));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -234,27 +188,18 @@ static PetscErrorCode Decompose(HycoReducer t, Mat J, PetscReal tol, Mat *W, Pet
 static PetscErrorCode SamplePoint(Sampler *s, HycoSnapshots store, PetscInt k, PetscReal tol, Mat *W, PetscInt *n)
 {
   HycoReducer t = s->t;
-  const PetscReal *mu;
-  PetscReal *taken = NULL, *sigma;
-  PetscInt n_par, n_taken = 1;
+  PetscReal *sigma;
   PetscScalar *a;
   PetscInt lda;
   PetscErrorCode ierr;
-  Mat J;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  if (t->scene->n_times)
-    HycoOnEach(HycoComm(t), HycoSnapshotsReadTaken(store, mu + k * n_par, &n_taken, &taken));
-  else
-    PetscCall(PetscCalloc1(1, &taken));
-  PetscCall(
-      MatCreateDense(HycoComm(t), s->n_rows, PETSC_DECIDE, t->sizes[1], HycoSnapshotsSteps(t->scene) * t->l, NULL, &J));
-  ierr = Follow(s, k, n_taken, taken, J);
-  PetscCall(PetscFree(taken));
-  if (!ierr) ierr = Balance(t, J);
-  if (!ierr) ierr = Decompose(t, J, tol, W, n, &sigma);
-  PetscCall(MatDestroy(&J));
+  PetscCall(MatCreateDense(HycoComm(t), s->n_rows, PETSC_DECIDE, t->sizes[1], HycoSnapshotsSteps(t->scene) * t->l, NULL,
+                           &s->J));
+  ierr = HycoTrainingReplayFollow(&s->replay, store, k);
+  if (!ierr) ierr = Balance(t, s->J);
+  if (!ierr) ierr = Decompose(t, s->J, tol, W, n, &sigma);
+  PetscCall(MatDestroy(&s->J));
   PetscCall(ierr);
   if (*n) {
     PetscCall(MatDenseGetLDA(*W, &lda));

@@ -105,7 +105,7 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscCall(SetUpBasis(m));
   PetscCall(HycoGalerkinCreateSets(m));
   PetscCall(ISGetLocalSize(g->sets.is_I, &n_I));
-  dense = (PetscBool)((m->n <= HYCO_DENSE_MAX && !g->bordered) || (g->symmetric && !m->n_fe) ||
+  dense = (PetscBool)((m->n <= HYCO_DENSE_MAX && !g->bordered) || ((g->symmetric || g->stiffness) && !m->n_fe) ||
                       (m->hybrid == HYCO_HYBRID_ALL && n_I && !g->bordered));
   if (!g->table) PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, g->own->n_nodes, 0, &g->K));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->fe->n_dof, &g->F));

@@ -26,6 +26,10 @@ static PetscErrorCode Stiffness(HycoPath p)
   HycoGalerkin g = (HycoGalerkin)m->data;
 
   PetscFunctionBegin;
+  if (g->stiffness) {
+    HycoLogged(HYCO_EVENT_REDUCE, (*g->stiffness)(m));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoFEAssembleStiffness(m->fe, g->K));
   if (!g->reduced) PetscCall(HycoFEAssembleStiffness(m->fe, g->K));
   HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillStiffness(m));
@@ -44,6 +48,7 @@ static PetscErrorCode Loads(HycoPath p)
   HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, g->F));
   m->fe->lifted = lifted;
   HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
+  if (g->add_loads) HycoLogged(HYCO_EVENT_REDUCE, (*g->add_loads)(m));
   PetscCall(VecCopy(g->Fr, p->F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -56,10 +61,11 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
 
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(fe, mu));
-  fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
-  g->path->moved = m->beyond_current = PETSC_FALSE;
+  fe->ready = PETSC_FALSE;                         /* until all that depends on it is assembled */
+  g->path->moved = (PetscBool)(g->forces != NULL); /* their loads have all that supports do */
+  m->beyond_current = PETSC_FALSE;
   if (fe->stiffness_changed && (elastic || !p->n_taken)) PetscCall(Stiffness(p)); /* the first is the elastic one */
-  PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
+  if (!g->forces) PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
   if (fe->contact_changed) PetscCall(MatDestroy(&g->B));
   if (fe->contact_changed || fe->gap_changed) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
   if (m->n_L && fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
@@ -95,8 +101,12 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   PetscCall(HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, q->u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
   report->has_potential = PETSC_FALSE;
   if (report->failed) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoLinearForceAdd(q->linear, q->u, p->f_local);
-  PetscCall(HycoReducedTest(m, p->f_local, p->f_int));
+  if (((HycoGalerkin)m->data)->forces)
+    PetscCall((*((HycoGalerkin)m->data)->forces)(m, p->end, p->f_int, &p->summands));
+  else {
+    HycoLinearForceAdd(q->linear, q->u, p->f_local);
+    PetscCall(HycoReducedTest(m, p->f_local, p->f_int));
+  }
   PetscCall(VecWAXPY(p->r, -1, p->f_int, p->F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -109,6 +119,7 @@ static PetscErrorCode Moves(HycoPath p, Vec rhs)
   PetscBool moved;
 
   PetscFunctionBegin;
+  if (g->forces) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoPathMoves(p, g->path->u, g->F, &moved));
   g->path->moved = PETSC_TRUE;
   if (!moved) PetscFunctionReturn(PETSC_SUCCESS);
@@ -251,7 +262,7 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   PetscCall(HycoPathSetUp(p));
   PetscCall(HycoSolverSetRefine(m->solver, PETSC_FALSE));
   PetscCall(PetscMalloc2(m->fe->n_dof, &g->path->held, m->fe->n_dof, &g->path->u));
-  PetscCall(CreateLinear(m));
+  if (!g->forces) PetscCall(CreateLinear(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

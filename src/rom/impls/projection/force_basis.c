@@ -140,55 +140,20 @@ static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The supremizers of unit length (0 where one has none, and where fixed) with the rows of the modes. */
-static PetscErrorCode ScaledSupremizers(HycoReducer t, Mat *scaled)
-{
-  HycoMesh part = t->fom->part;
-  const PetscInt n = t->n_s, dim = t->sizes[3];
-  PetscInt rows, lda[2];
-  PetscReal *size, *value;
-  const PetscScalar *x;
-  PetscScalar *y;
-  Mat R, X;
-
-  PetscFunctionBegin;
-  PetscCall(HycoReducerSupremizers(t, &R, &X));
-  PetscCall(MatDestroy(&R));
-  PetscCall(MatGetLocalSize(t->V, &rows, NULL));
-  PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, t->sizes[0] * dim, n, NULL, scaled));
-  PetscCall(PetscMalloc2(n, &size, part->n_nodes * dim, &value));
-  PetscCall(MatGetColumnNorms(X, NORM_2, size));
-  PetscCall(MatDenseGetLDA(X, &lda[0]));
-  PetscCall(MatDenseGetLDA(*scaled, &lda[1]));
-  PetscCall(MatDenseGetArrayRead(X, &x));
-  PetscCall(MatDenseGetArray(*scaled, &y));
-  for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt i = 0; i < part->n_nodes * dim; i++) {
-      const PetscInt place = HycoMeshOwned(part, i / dim);
-      const PetscBool none = (PetscBool)(place < 0 || t->fom->fe->fixed[i] || size[k] == 0);
-
-      value[i] = none ? 0 : x[(size_t)k * (size_t)lda[0] + (size_t)(place * dim + i % dim)] / size[k];
-    }
-    PetscCall(HycoFOMToRows(t->fom, HYCO_ON_NODES, MPIU_REAL, dim, value, y + (size_t)k * (size_t)lda[1]));
-  }
-  PetscCall(MatDenseRestoreArray(*scaled, &y));
-  PetscCall(MatDenseRestoreArrayRead(X, &x));
-  PetscCall(PetscFree2(size, value));
-  PetscCall(MatDestroy(&X));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V, sigma (0 for these) and
    VtU have more columns. */
 static PetscErrorCode Enrich(HycoReducer t)
 {
   PetscReal *QtU, *size;
   PetscInt found, q = 0;
-  Mat X, Q;
+  Mat forces, all, X, Q;
 
   PetscFunctionBegin;
   if (!t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ScaledSupremizers(t, &X));
+  PetscCall(HycoReducerSupremizers(t, &forces, &all));
+  PetscCall(MatDestroy(&forces));
+  PetscCall(HycoReducerUnitRows(t, all, &X));
+  PetscCall(MatDestroy(&all));
   PetscCall(RemoveModes(t, X));
   PetscCall(PetscMalloc1(t->n_s + 1, &size));
   PetscCall(HycoReducerPOD(t, X, 0, 0, &Q, &found, size));

@@ -1,0 +1,63 @@
+/*
+  The condensed model of a scene with a history. While K stays, displacements are linear in the loads F, the inelastic
+  strains and the contact forces,
+
+      U = K^-1 (F + sum over cells e of q_e - B^T L),      q_e = integral over e of B^T C eps_in
+
+  exactly, and inelastic strains along paths fill few modes, q = sum of beta_j Q_j. So U lies in the span V of the
+  answers K^-1 F, K^-1 Q_j and K^-1 B^T, and the equations tested by V, with V^T K V, are these ones: G = B K^-1 B^T is
+  B V (V^T K V)^-1 V^T B^T. beta is what the laws say in few cells, chosen by Q-DEIM on the modes, in the sense of least
+  squares; what loads inside the bodies, heat and supports give to F comes from the same cells in the same way. It
+  begins as HycoGalerkin, whose path solves it.
+*/
+#ifndef HYCOCONDENSEDPATH_H
+#define HYCOCONDENSEDPATH_H
+
+#include <hycogalerkin.h>
+#include <hycomaterialimpl.h>
+
+/* What is tabulated. Of the n chosen cells one after the other, the columns of their unknowns. */
+typedef struct {
+  PetscInt n_inelastic, n_loads; /* modes */
+  PetscReal amplification;       /* 2-norm of the inverse on the chosen cells: of what the modes do not have */
+  PetscReal *K;                  /* V^T K V, l x l */
+  PetscReal *inelastic, *loads;  /* l x (n nv dim) column major: their inelastic forces and loads to those on V */
+} HycoCondensedTable;
+
+typedef struct _n_HycoCondensedPath {
+  struct _n_HycoGalerkin galerkin;
+  HycoCondensedTable table;
+  /* online */
+  PetscReal *Ke, *heat; /* by cell: elastic stiffness (nv dim square); what its thermal strains push (nv dim) */
+  PetscReal *weight;    /* by cell: 2-norm of its columns of the inelastic forces */
+} * HycoCondensedPath;
+
+/* Its training, in the reducer's data beside that of the condensed model without a history. */
+typedef struct {
+  PetscReal tol;            /* of the inelastic modes */
+  PetscInt cells;           /* chosen for each of these; 0: every cell there is */
+  HycoCondensedTable table; /* of t->seeds_cell, ascending; every rank */
+} HycoCondensingPath;
+
+/* Whether a cell's body may flow. */
+static inline PetscBool HycoCondensedFlows(HycoFE fe, PetscInt cell)
+{
+  return (PetscBool)!fe->scene->body[fe->mesh->cell_body[cell]].law->linear;
+}
+/* The load of a cell from its supports and heat, K_e u0_e - heat_e by fe's elastic tangents (load: nv x dim); heat_e
+   (NULL: not asked for). */
+PetscErrorCode HycoCondensedCellLoad(HycoFE fe, PetscInt cell, PetscReal load[], PetscReal heat[]);
+/* The inelastic force of a cell in a state at u (q: nv x dim), 0 where it is round-off; Ke, heat: its own; the largest
+   of the sums of sizes that it is a difference of (NULL: not asked for). */
+PetscErrorCode HycoCondensedCellForce(HycoFE fe, PetscInt cell, const PetscReal Ke[], const PetscReal heat[],
+                                      const PetscReal u[], HycoFEState state, PetscReal q[], PetscReal *summands);
+
+/* Makes a model of the type condensed one of paths: its ops, traits and data; training: a prototype. */
+PetscErrorCode HycoCondensedTakePath(HycoROM model);
+PetscErrorCode HycoCondensedTableFree(HycoCondensedTable *table);
+
+/* The training's part of the ops (condense_path.c). */
+PetscErrorCode HycoCondensedPathBegin(HycoReducer reducer);
+PetscErrorCode HycoCondensedPathModes(HycoReducer reducer, HycoSnapshots store);
+
+#endif

@@ -1,0 +1,111 @@
+/* The laws again along the training paths: stress and state of each listed time, for what is sampled of them. */
+#include <hycoreducerimpl.h>
+
+PetscErrorCode HycoTrainingReplayCreate(HycoReducer t, PetscErrorCode (*displacement)(void *, PetscInt, PetscReal[]),
+                                        PetscErrorCode (*record)(void *, PetscInt), void *ctx, HycoTrainingReplay *r)
+{
+  PetscFunctionBegin;
+  *r = (HycoTrainingReplay){
+      .t = t, .fe = t->fom->fe, .displacement = displacement, .record = record, .ctx = ctx, .column = -1};
+  PetscCall(PetscMalloc1(r->fe->n_dof, &r->u));
+  PetscCall(PetscMalloc1(r->fe->n_dof, &r->before));
+  PetscCall(PetscMalloc1(r->fe->n_dof, &r->after));
+  PetscCall(PetscCalloc1(r->fe->n_dof, &r->f_int));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainingReplayDestroy(HycoTrainingReplay *r)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEStateDestroy(&r->state));
+  PetscCall(HycoFEStateDestroy(&r->end));
+  HycoFreeAll(&r->u, &r->before, &r->after, &r->f_int);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* u of training point k at a time, at fe's parameters. Collective. */
+static PetscErrorCode Displace(HycoTrainingReplay *r, PetscInt k, PetscReal time)
+{
+  const HycoScene scene = r->t->scene;
+  const PetscInt n = HycoSnapshotsSteps(scene);
+  PetscReal share = 0;
+  PetscInt at = 0;
+
+  PetscFunctionBegin;
+  if (scene->n_times > 1) {
+    while (at + 2 < n && scene->times[at + 1] < time) at++;
+    share = PetscMin(1, (time - scene->times[at]) / (scene->times[at + 1] - scene->times[at]));
+  }
+  if (r->column != k * n + at) {
+    PetscCall((*r->displacement)(r->ctx, k * n + at, r->before));
+    if (n > 1) PetscCall((*r->displacement)(r->ctx, k * n + at + 1, r->after));
+  }
+  r->column = k * n + at;
+  for (PetscInt i = 0; i < r->fe->n_dof; i++)
+    r->u[i] = r->fe->u0[i] + (share > 0 ? (1 - share) * r->before[i] + share * r->after[i] : r->before[i]);
+  HycoFEComplete(r->fe, r->u);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The laws from t0 to t1, which fe and u are at. */
+static PetscErrorCode Step(HycoTrainingReplay *r, PetscReal t0, PetscReal t1)
+{
+  HycoFEState state;
+  HycoFEStepReport report;
+
+  PetscFunctionBegin;
+  if (!r->state) {
+    PetscCall(HycoFEStateCreate(r->fe, &r->state));
+    PetscCall(HycoFEStateCreate(r->fe, &r->end));
+  }
+  state = r->state;
+  PetscCall(HycoFEStep(r->fe, r->u, t0, t1, r->state, r->end, r->f_int, PETSC_FALSE, &report));
+  HycoCheckModel(!report.failed, "the laws have no answer to the training displacements at t = %.10g: %s", (double)t1,
+                 report.why);
+  r->state = r->end;
+  r->end = state;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The laws stepping at the n times taken[]. */
+static PetscErrorCode Follow(HycoTrainingReplay *r, PetscInt k, const PetscReal mu[], PetscInt n,
+                             const PetscReal taken[])
+{
+  const HycoScene scene = r->t->scene;
+  const PetscInt steps = HycoSnapshotsSteps(scene);
+  PetscReal all[HYCO_MAX_PARAMETERS];
+  PetscInt step = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEStateDestroy(&r->state));
+  PetscCall(HycoFEStateDestroy(&r->end));
+  for (PetscInt i = 0; i < n; i++) {
+    HycoSceneSetTime(scene, mu, taken[i], all);
+    PetscCall(HycoFOMSetParameters(r->t->fom, all));
+    PetscCall(Displace(r, k, taken[i]));
+    HycoOnEach(HycoComm(r->t), Step(r, taken[PetscMax(i - 1, 0)], taken[i]));
+    if (!scene->n_times || (step < scene->n_times && taken[i] == scene->times[step]))
+      PetscCall((*r->record)(r->ctx, k * steps + step++));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *r, HycoSnapshots store, PetscInt k)
+{
+  HycoReducer t = r->t;
+  const PetscReal *mu;
+  PetscReal *taken = NULL;
+  PetscInt n_par, n = 1;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  if (t->scene->n_times)
+    HycoOnEach(HycoComm(t), HycoSnapshotsReadTaken(store, mu + k * n_par, &n, &taken));
+  else
+    PetscCall(PetscCalloc1(1, &taken));
+  ierr = Follow(r, k, mu + k * n_par, n, taken);
+  PetscCall(PetscFree(taken));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
