@@ -270,7 +270,6 @@ class Paths(FlowingRing):
                 (['compare', '-scene', self.norton, '-model', model, '-mu', '0.006,1', '-history_times', '0,1,12'], ['history_times', '0,1,12']),
                 (['compare', '-scene', self.norton, '-model', model, '-mu', '0.006,1', '-history_tables_q', '0 0,1 2,12 2'], ['history_tables_q']),
                 (['predict', '-scene', self.norton, '-model', model, '-mu', '0.006,1', '-hyco_fallback'], ['-hyco_fallback', 'history']),
-                (['train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '2,2', '-hyco_model_type', 'condensed'], ['condensed', 'history']),
                 (['train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '2,2', '-hyco_checkpoint', self.path('c.h5')], ['-hyco_checkpoint'])):
             run = self.run_raw(*args)
             self.assertEqual(run.returncode, 1, run.stdout)
