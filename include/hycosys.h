@@ -30,7 +30,9 @@ PETSC_EXTERN PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_
 /* Registers the classes; whatever makes an object calls it. Not collective. */
 PetscErrorCode HycoInitializePackage(void);
 
-/* Starts PETSc (if needed) and SLEPc for hyco. Collective on all processes. `argc`, `argv` may be NULL. */
+/* Starts PETSc (if needed) and SLEPc for hyco. Collective on all processes. `argc`, `argv` may be NULL. Where it starts
+   PETSc, an error is one line on stderr, "hyco: error: ..."; PETSc's trace of the calls with HYCO_TRACE=1 in the
+   environment, or by PetscPushErrorHandler(PetscTraceBackErrorHandler, NULL). */
 PetscErrorCode HycoInitialize(int *argc, char ***argv);
 /* Ends what HycoInitialize started. Collective on all processes. */
 PetscErrorCode HycoFinalize(void);

@@ -34,7 +34,7 @@ static char message[DRIVER_LINE];
 static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                                   PetscErrorType type, const char *text, void *ctx)
 {
-  (void)comm, (void)ctx;
+  if (HycoWantsTrace()) (void)!PetscTraceBackErrorHandler(comm, line, function, file, code, type, text, ctx);
   if (type == PETSC_ERROR_INITIAL) {
     if (code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL)
       snprintf(message, sizeof(message), "%s", text ? text : "");

@@ -1,8 +1,54 @@
-/* Start and end of the package. */
+/* Start and end of the package, and how a program that starts by it tells an error: in one line. */
 #include <hycoimpl.h>
 #include <slepcsys.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
-static PetscBool began_petsc = PETSC_FALSE;
+static PetscBool began_petsc = PETSC_FALSE, handles = PETSC_FALSE;
+
+PetscBool HycoWantsTrace(void)
+{
+  const char *trace = getenv("HYCO_TRACE");
+
+  return (PetscBool)(trace && trace[0] && strcmp(trace, "0") != 0);
+}
+
+/* A message of hyco's own, or PETSc's with its place. On rank 0 of what has the error. */
+static void Tell(MPI_Comm comm, int line, const char function[], const char file[], PetscErrorCode code,
+                 const char text[])
+{
+  const PetscBool own = (PetscBool)(code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL ||
+                                    code == PETSC_ERR_ARG_NULL || code == PETSC_ERR_ARG_WRONG);
+  PetscMPIInt rank = 0;
+
+  MPI_Comm_rank(comm, &rank);
+  if (rank) return;
+  if (own && text && text[0])
+    fprintf(stderr, "hyco: error: %s\n", text);
+  else
+    fprintf(stderr, "hyco: error: %s (PETSc error %d in %s(), %s:%d; HYCO_TRACE=1 shows the calls)\n",
+            text && text[0] ? text : "failed", (int)code, function ? function : "?", file ? file : "?", line);
+  fflush(stderr);
+}
+
+/* Where PETSc's own handler prints a trace of calls. In main() PETSc aborts by MPI; a process alone ends without the
+   words that launchers have for that. */
+static PetscErrorCode OneLine(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
+                              PetscErrorType type, const char *text, void *ctx)
+{
+  PetscMPIInt size = 0;
+
+  (void)ctx;
+  if (type == PETSC_ERROR_INITIAL) Tell(comm, line, function, file, code, text);
+  MPI_Comm_size(PETSC_COMM_WORLD, &size);
+  if (size == 1 && function && strcmp(function, "main") == 0) {
+    fflush(NULL);
+    _exit(1);
+  }
+  return code;
+}
 
 PetscErrorCode HycoInitialize(int *argc, char ***argv)
 {
@@ -15,6 +61,7 @@ PetscErrorCode HycoInitialize(int *argc, char ***argv)
     ierr = PetscInitialize(argc, argv, NULL, NULL);
     if (ierr) return ierr;
     began_petsc = PETSC_TRUE;
+    handles = (PetscBool)(!HycoWantsTrace() && PetscPushErrorHandler(OneLine, NULL) == 0);
   }
   ierr = SlepcInitialized(&slepc);
   if (ierr || slepc) return ierr;
@@ -25,6 +72,9 @@ PetscErrorCode HycoFinalize(void)
 {
   PetscErrorCode ierr = SlepcFinalize();
 
+  if (ierr) return ierr;
+  if (handles) ierr = PetscPopErrorHandler();
+  handles = PETSC_FALSE;
   if (ierr) return ierr;
   return began_petsc ? PetscFinalize() : 0;
 }
