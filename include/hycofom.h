@@ -150,10 +150,15 @@ PetscErrorCode HycoFOMGetSolution(HycoFOM fom, PetscInt *n_nodes, const PetscRea
                                   const PetscReal *Lambda[], PetscInt *n_cells, const PetscReal *sigma[]);
 /* Of a scene with a history, before it is solved: the fields at its listed times (displacement, stress and its von
    Mises value, inelastic strain, temperature, the laws' state, contact) go to PATH.xdmf (`path`), which ParaView plays,
-   and PATH.h5, when the path ends, wherever that is. Collective. */
+   and PATH.h5, or to PATH.vtkhdf, when the path ends, wherever that is. Collective. */
 PetscErrorCode HycoFOMSetSeries(HycoFOM fom, const char path[]);
-/* Writes the last solution to PATH.h5 and PATH.xdmf (`path` names the latter). Collective. */
+/* Writes the last solution to PATH.h5 and PATH.xdmf (`path` names the latter), or to PATH.vtkhdf. Collective. */
 PetscErrorCode HycoFOMWrite(HycoFOM fom, const char path[]);
+/* The same of at most n points, as the times 0, 1, ... of one series, each with its mesh and parameters: Begin; for
+   each point HycoFOMSolve() and Add; End puts the file in its place. Not of a scene with a history. Collective. */
+PetscErrorCode HycoFOMWriteBegin(HycoFOM fom, const char path[], PetscInt n);
+PetscErrorCode HycoFOMWriteAdd(HycoFOM fom);
+PetscErrorCode HycoFOMWriteEnd(HycoFOM fom);
 
 /* Prints it, in words, on an ASCII viewer (NULL: stdout). Collective. */
 PetscErrorCode HycoFOMView(HycoFOM object, PetscViewer viewer);

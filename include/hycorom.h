@@ -166,9 +166,14 @@ PetscErrorCode HycoROMGetLambda(HycoROM model, PetscInt *n_contacts, const Petsc
 /* Displacement of the whole mesh, n_nodes x dim in the mesh file's order: reads the whole-mesh part on first use.
  * Borrowed. */
 PetscErrorCode HycoROMGetWholeU(HycoROM model, PetscInt *n_nodes, const PetscReal *U[]);
-/* Writes the last prediction on the whole mesh to `path` (.xdmf) and the .h5 beside it. Of a path all of its listed
-   times, as HycoFOMSetSeries() has them: the laws are replayed outside the RID, which fails where one has no answer. */
+/* Writes the last prediction on the whole mesh to `path` (.xdmf) and the .h5 beside it, or to `path` (.vtkhdf). Of a
+   path all of its listed times, as HycoFOMSetSeries() has them: the laws are replayed outside the RID, which fails
+   where one has no answer. */
 PetscErrorCode HycoROMWrite(HycoROM model, const char path[]);
+/* Predicts at n points (n x n_parameters) and writes them to one file, as the times 0, 1, ... of a series, each with
+   its mesh and parameters. Not of paths. */
+PetscErrorCode HycoROMWriteMany(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
+                                const char path[]);
 /*
   Errors of the last prediction against the last full-order solution at the same parameters; relative, as fractions.
   0/0 counts as 0; x/0 is PETSC_INFINITY. On a mesh that moves, H1 and its dual are those of the middle of the ranges.

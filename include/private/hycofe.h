@@ -8,14 +8,17 @@
 #include <hycomesh.h>
 #include <petscmat.h>
 
+/* The most quadrature points of a cell. */
+#define HYCO_CELL_POINTS 9
+
 /* Shape functions at the quadrature points of the reference cell (or facet). */
 typedef struct {
   PetscInt dim, nv, nq;
-  PetscReal w[8], N[8][8], dN[8][8][3];
+  PetscReal w[HYCO_CELL_POINTS], N[HYCO_CELL_POINTS][HYCO_CELL_NODES], dN[HYCO_CELL_POINTS][HYCO_CELL_NODES][3];
 } HycoElement;
 
 const HycoElement *HycoElementGet(HycoCellType type);
-/* The facet of a cell type: a point, line2, tri3 or quad4. */
+/* The facet of a cell type: a point, line2, tri3, quad4 or the line of three nodes. */
 const HycoElement *HycoElementGetFacet(HycoCellType type);
 
 #define HYCO_MAX_CELL_DOFS 24

@@ -25,13 +25,6 @@ PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, 
 PetscErrorCode HycoFieldWriteData(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[],
                                   const HycoField *field);
 
-/* Contact results by slave node. */
-typedef struct {
-  PetscInt n;
-  const PetscInt *node_id;
-  const PetscReal *lambda, *gap;
-} HycoContactTable;
-
 /* Stress of cells (n_cells x ns: xx, yy, zz, xy, yz, xz) in XDMF's order xx, xy, xz, yy, yz, zz. */
 void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
 /* Of the same stresses: von Mises' (n_cells), the principal ones (n_cells x 3), the largest first. */
@@ -42,6 +35,10 @@ PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscR
    with an order. */
 PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char group[], const HycoFileOrder *order, HycoMesh mesh,
                                    const PetscReal X[]);
+/* Stress of cells (n_cells x n_sigma) at nodes: the mean over the cells around a node, by volume, of one body; where
+   bodies share nodes, of the first of them. Right at the process's own nodes, all of whose cells it has. As tensors of
+   XDMF's order (n_nodes x 6), with von Mises' value (n_nodes). */
+PetscErrorCode HycoNodalStress(HycoFE fe, const PetscReal sigma[], PetscReal tensor[], PetscReal mises[]);
 /* The cells alone, as a set of cols columns. */
 PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileOrder *order, HycoMesh mesh,
                                     PetscInt cols);
@@ -63,18 +60,20 @@ PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /*
   A file of fields on one mesh (src/output/field_file.c): PATH.xdmf and PATH.h5, or PATH.vtkhdf, which ParaView, VTK and
-  pyvista open. Of one solution (most = 0), or of at most `most` times. Open begins it anew with the mesh at X; then
-  Add writes fields: of times, between BeginTime and EndTime. Commit puts it in its place; the text of an .xdmf is made
-  then. Order, mesh and scene are borrowed. All are collective on comm.
+  pyvista open. Of one solution (most = 0), or of at most `most` times, or points of a set. Open begins it anew with the
+  mesh at X; then Add writes fields: of times between BeginTime and EndTime, of points between BeginPoint, which has a
+  mesh and parameters of its own, and EndTime. Commit puts it in its place; the text of an .xdmf is made then. Order,
+  mesh and scene are borrowed. All are collective on comm.
 */
-#define HYCO_MOST_FIELDS 24
+#define HYCO_MOST_FIELDS 32
 typedef struct _n_HycoFieldFile *HycoFieldFile;
 struct _n_HycoFieldFile {
   MPI_Comm comm;
   char path[PETSC_MAX_PATH_LEN], h5_path[PETSC_MAX_PATH_LEN];
   PetscBool vtk;
-  PetscInt most, n; /* times: at most, so far */
-  PetscReal *t;
+  PetscInt most, n;           /* times: at most, so far */
+  PetscBool points;           /* each with a mesh and parameters of its own */
+  PetscReal *t, *mu;          /* mu: n_parameters, of points each */
   const HycoFileOrder *order; /* NULL: this process has all */
   HycoMesh mesh;
   HycoScene scene;
@@ -83,10 +82,12 @@ struct _n_HycoFieldFile {
   HycoField field[HYCO_MOST_FIELDS]; /* of the last time, without data */
   char name[HYCO_MOST_FIELDS][64];
 };
-PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt most, HycoFieldFile *file);
+PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt most, PetscBool points,
+                                   HycoFieldFile *file);
 PetscErrorCode HycoFieldFileOpen(HycoFieldFile file, const HycoFileOrder *order, HycoMesh mesh, HycoScene scene,
                                  const PetscReal X[], const PetscReal mu[]);
 PetscErrorCode HycoFieldFileBeginTime(HycoFieldFile file, PetscReal t);
+PetscErrorCode HycoFieldFileBeginPoint(HycoFieldFile file, const PetscReal X[], const PetscReal mu[]);
 PetscErrorCode HycoFieldFileAdd(HycoFieldFile file, const HycoField *field);
 /* The same of rows in the file's order. */
 PetscErrorCode HycoFieldFileAddRows(HycoFieldFile file, const HycoField *field, const PetscReal rows[]);
@@ -97,22 +98,31 @@ PetscErrorCode HycoFieldFileDestroy(HycoFieldFile *file);
 PetscInt HycoFieldFileCount(HycoFieldFile file, HycoPlace place);
 /* "step-0003/nodes/displacement": a field of time k in the .h5. */
 void HycoFieldName(const HycoField *field, PetscInt k, char name[HYCO_LINE]);
-/* The parts of a .vtkhdf (src/output/vtkhdf.c): the mesh, the last field of the current time with the name of its set,
-   the times. Collective. */
-PetscErrorCode HycoVTKWriteMesh(HycoFieldFile file, const PetscReal X[], const PetscReal mu[]);
+/* The parts of a .vtkhdf (src/output/vtkhdf.c): the mesh, the nodes of a point, the last field of the current time with
+   the name of its set, the times. Collective. */
+PetscErrorCode HycoVTKWriteMesh(HycoFieldFile file, const PetscReal X[]);
+PetscErrorCode HycoVTKWritePoints(HycoFieldFile file, const PetscReal X[]);
 PetscErrorCode HycoVTKWriteField(HycoFieldFile file, const HycoField *field, const PetscReal rows[],
                                  char set[HYCO_LINE]);
 PetscErrorCode HycoVTKWriteTimes(HycoFieldFile file);
 
+/* A solution: u on fe, u_surface on the mesh of the pairs. With an order, of parts of a mesh, they are the part's and
+   rank 0's (elsewhere `surface` is NULL); NULL: this process has all. rid: marks cells, or NULL. Borrowed. */
+typedef struct {
+  const HycoFileOrder *order;
+  HycoFE fe, surface;
+  HycoPairs *pairs;
+  const PetscReal *u, *u_surface, *lambda, *rid;
+} HycoSolution;
+
 /*
-  Writes `path` (HycoFieldFile): displacement, of each cell stress, von Mises stress, principal stresses and body,
-  contact force (vector on slaves, minus on masters), contact pressure, gap at the solution (NaN at nodes without a
-  contact, or whose contact faces nothing), RID marker (may be NULL: none written), and in an .h5 the parameters and the
-  contact table. u on fe, u_surface on the mesh of the pairs: with an order, of parts of a mesh, they are the part's and
-  rank 0's (elsewhere `surface` is NULL), and the call is collective; NULL: this process has all.
+  Writes `path` (HycoFieldFile): displacement, of each cell stress, von Mises stress, principal stresses and body, at
+  nodes the mean stress of the cells around, contact force (vector on slaves, minus on masters), contact pressure, gap
+  at the solution (NaN at nodes without a contact, or whose contact faces nothing), RID marker, and in an .h5 the
+  parameters and the contact table. Collective with an order.
 */
-PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
-                                 HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],
-                                 const PetscReal lambda[], const PetscReal *rid);
+PetscErrorCode HycoSolutionWrite(const char path[], const HycoSolution *solution);
+/* The same into a file of a set of points, one solution after the other. */
+PetscErrorCode HycoSolutionAdd(HycoFieldFile file, const HycoSolution *solution);
 
 #endif

@@ -37,6 +37,7 @@ struct _p_HycoFOM {
   /* the last solution: displacements at the part's nodes and at the surface's (rank 0), without motions that were
      released; stresses of the part's cells, when asked for; on rank 0 the forces and gaps */
   PetscReal *u, *u_surface, *sigma, *lambda, *gap;
+  struct _n_HycoFieldFile *set;      /* HycoFOMWriteBegin() */
   HycoContactResult *contact_result; /* by contact of the scene, when asked for */
   HycoReaction *reaction;            /* HycoFOMGetReactions() */
   PetscReal *u_all, *sigma_all;      /* on rank 0 when asked for, in the file's order; on one rank u and sigma */

@@ -165,6 +165,8 @@ typedef enum {
 typedef enum { HYCO_STAGE_FULL_ORDER, HYCO_STAGE_REDUCTION, HYCO_STAGE_ONLINE, HYCO_N_STAGES } HycoStage;
 PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin);
 PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin);
+/* What runs now, in words: the innermost event, else the stage, else NULL. From any thread. */
+const char *HycoLogDoing(void);
 /* PetscCall(call) within the event, or the stage; both end with an error too. */
 #define HycoLogged(event, call)                                                                                        \
   do {                                                                                                                 \

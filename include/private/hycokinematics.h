@@ -8,12 +8,12 @@ PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const Pe
 /* Gradients dN/dX (nv x 3) of the shape functions at quadrature point q, and |det J| w. In an axisymmetric scene the
    third component is N / r, the hoop strain of a radial displacement, and the weight that of the full circle. The
    weight is multiplied by the cell's in a cubature (fe->cell_weight). */
-PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal g[8][3],
-                             PetscReal *weight);
+PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q,
+                             PetscReal g[HYCO_CELL_NODES][3], PetscReal *weight);
 /* Means over the cell of the dilatation of unit displacements, which make that of the element bbar. */
-PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[8][3]);
+PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[HYCO_CELL_NODES][3]);
 /* The dilatation of a unit displacement of a cell's node a along c. */
-static inline PetscReal HycoDilatation(HycoFE fe, PetscReal g[8][3], PetscInt a, PetscInt c)
+static inline PetscReal HycoDilatation(HycoFE fe, PetscReal g[HYCO_CELL_NODES][3], PetscInt a, PetscInt c)
 {
   return g[a][c] + (fe->formulation == HYCO_AXISYMMETRIC && c == 0 ? g[a][2] : 0);
 }
@@ -21,11 +21,11 @@ static inline PetscReal HycoDilatation(HycoFE fe, PetscReal g[8][3], PetscInt a,
 void HycoPointPlace(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal x[3]);
 /* Strain at a point of u (six components; those that are not n_sigma's are 0), from the shape functions' gradients g
    there; mean: those that make the dilatation of the element bbar, or NULL. */
-void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal u[], PetscReal g[8][3],
-                     PetscReal mean[8][3], PetscReal strain[6]);
+void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal u[],
+                     PetscReal g[HYCO_CELL_NODES][3], PetscReal mean[HYCO_CELL_NODES][3], PetscReal strain[6]);
 /* f += w B^T stress of that point, at the cell's unknowns (nv x dim). */
-void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[8][3], PetscReal mean[8][3], PetscReal w,
-                    const PetscReal stress[6], PetscReal f[]);
+void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[HYCO_CELL_NODES][3],
+                    PetscReal mean[HYCO_CELL_NODES][3], PetscReal w, const PetscReal stress[6], PetscReal f[]);
 /* push (nv x dim) += what the thermal strains of a cell push, the sum of w B^T C eps, by fe's tangents. */
 PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[]);
 /* Room for temperatures and thermal strains; fills them at fe's nodes and mu where what changed reaches them. */

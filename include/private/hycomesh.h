@@ -9,7 +9,28 @@
 #include <petscdmplex.h>
 #include <petscsf.h>
 
-typedef enum { HYCO_LINE2, HYCO_TRI3, HYCO_QUAD4, HYCO_TET4, HYCO_HEX8, HYCO_N_CELL_TYPES } HycoCellType;
+typedef enum {
+  HYCO_LINE2,
+  HYCO_TRI3,
+  HYCO_QUAD4,
+  HYCO_TET4,
+  HYCO_HEX8,
+  HYCO_TRI6,
+  HYCO_QUAD8,
+  HYCO_QUAD9,
+  HYCO_N_CELL_TYPES
+} HycoCellType;
+
+/* The most nodes of a cell. */
+#define HYCO_CELL_NODES 9
+
+/* What is told of the types: names, dimensions, nodes of a cell and of its facets. */
+typedef struct {
+  const char *name;
+  PetscInt dim, nv, nf;
+  PetscBool quadratic;
+} HycoCellKind;
+extern const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES];
 
 typedef struct _n_HycoMesh *HycoMesh;
 
@@ -24,7 +45,7 @@ struct _n_HycoTies {
 };
 
 /* Nodes of a cell's unknowns: its own, and those that its tied ones follow. */
-#define HYCO_MAX_CELL_NODES (8 + 8 * 4)
+#define HYCO_MAX_CELL_NODES (8 + 8 * 4) /* those of second order have no ties */
 
 struct _n_HycoMesh {
   PetscInt dim, nv, nf; /* space dimension; nodes of a cell, of a facet */
@@ -87,6 +108,11 @@ static inline PetscInt HycoMeshTied(HycoMesh m, PetscInt node)
 
 PetscErrorCode HycoMeshDestroy(HycoMesh *mesh);
 
+/* Whether the mesh's cells are of second order. */
+static inline PetscBool HycoMeshIsQuadratic(HycoMesh mesh)
+{
+  return HycoCellKinds[mesh->type].quadratic;
+}
 /* Reads and checks the scene's mesh file on this process alone. */
 PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh);
 /* Index of a group; fails with the list of those that exist. `key` says who asks. */

@@ -88,7 +88,7 @@ struct _p_HycoROM {
   HycoPairs whole_pairs;
   HycoBalance balance; /* what HycoROMGetEquilibrium() keeps; NULL: it was not called */
   PetscBool balanced;  /* it is that of the last prediction */
-  HycoProbe probe; /* of the scene's quantities; made by the first prediction that is asked for */
+  HycoProbe probe;     /* of the scene's quantities; made by the first prediction that is asked for */
   /* online */
   PetscBool full_order, full_displacement; /* what its user, who has the scene, is to do: HycoROMGetFallback() */
   PetscBool wants_equilibrium;             /* -hyco_residual: a prediction has it */

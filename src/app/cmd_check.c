@@ -19,8 +19,6 @@ void CheckWarn(Check *check, const char format[], ...)
   cJSON_AddItemToArray(check->warnings, cJSON_CreateString(line));
 }
 
-static const char *const cell_names[HYCO_N_CELL_TYPES] = {"line2", "tri3", "quad4", "tet4", "hex8"};
-
 /* The centre of the ranges, then their corners, or, of many parameters, the ends of each. The caller frees mu. */
 static PetscErrorCode ListPoints(HycoScene s, PetscInt *n, PetscReal **mu)
 {
@@ -142,11 +140,11 @@ static PetscErrorCode SayMesh(Check *check)
   PetscCall(HycoSceneGetTitle(f->scene, &title));
   PetscCall(Say("scene: %s\n", title[0] ? title : "(no title)"));
   PetscCall(Say("mesh %s: %dD, %s, %d nodes, %d cells; %d unknowns, and %d that supports%s fix\n",
-                f->scene->dm ? "of the program" : f->scene->mesh_path, (int)m->dim, cell_names[m->type],
+                f->scene->dm ? "of the program" : f->scene->mesh_path, (int)m->dim, HycoCellKinds[m->type].name,
                 (int)f->n_nodes, (int)f->n_cells, (int)f->n_free, (int)n_fixed, f->scene->n_ties ? " and ties" : ""));
   PetscCall(SayTies(check, m, &n_tied));
   cJSON_AddNumberToObject(check->json, "dimension", m->dim);
-  cJSON_AddStringToObject(check->json, "cell_type", cell_names[m->type]);
+  cJSON_AddStringToObject(check->json, "cell_type", HycoCellKinds[m->type].name);
   cJSON_AddNumberToObject(check->json, "n_nodes", f->n_nodes);
   cJSON_AddNumberToObject(check->json, "n_cells", f->n_cells);
   cJSON_AddNumberToObject(check->json, "n_dof", f->n_free);

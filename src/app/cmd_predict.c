@@ -351,7 +351,7 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples)
+static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples, const char output[])
 {
   PetscInt n, n_par, *full;
   Shape s;
@@ -372,6 +372,7 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   HycoAllreduce(full, n, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD);
   PetscCall(SolveRest(fallback, n, n_par, mu, full, &s, value));
   begin = HycoNow() - begin;
+  if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoROMWriteMany(model, n, n_par, mu, output));
   PetscCall(ReportSet("predict", table, scene, samples, s.width, names, value, begin));
   PetscCall(PetscFree2(value, full));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -431,11 +432,14 @@ PetscErrorCode CommandPredict(void)
   if (monitor) PetscCall(HycoROMSetMonitor(model, DriverMonitor, NULL));
   PetscCall(DriverHasSamples(scene, &set));
   if (set) {
-    HycoCheck(!output[0], "-output is for one point (-mu); a set of points gives a -table");
+    HycoCheck(!output[0] || !n_times,
+              "-output of a model of paths is for one point (-mu); a set of points gives a -table");
+    HycoCheck(!output[0] || !fallback.on,
+              "-output of a set of points is the model's alone; leave out -hyco_fallback, or give one point (-mu)");
     HycoCheck(!fallback.displacement,
               "-hyco_full_displacement is for one point (-mu); a set of points gives a -table, which has no fields");
     PetscCall(DriverGetSamples(scene, &samples, &set));
-    HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples));
+    HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples, output));
   } else {
     HycoStaged(HYCO_STAGE_ONLINE, n_times ? Path(model, scene, output) : One(model, scene, &fallback, output));
   }

@@ -176,7 +176,7 @@ static const char *const columns[N_COLUMNS] = {
     "converged",           "iterations", "seconds"};
 
 /* The points in their order, each from the last one's active contacts, all ranks together. */
-static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, const char table[])
+static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, const char output[], const char table[])
 {
   PetscInt n, n_par, width;
   const PetscReal *mu;
@@ -187,6 +187,7 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(ReportColumns(scene, N_COLUMNS, columns, &width, names));
   PetscCall(PetscCalloc1(n * width, &value));
+  if (output[0]) PetscCall(HycoFOMWriteBegin(fom, output, n));
   begin = HycoNow();
   for (PetscInt k = 0; k < n; k++) {
     HycoSummary s;
@@ -206,7 +207,10 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     v[ITERATIONS] = s.iterations;
     v[SECONDS] = s.seconds.total;
     PetscCall(PetscArraycpy(v + N_COLUMNS, s.quantity, width - N_COLUMNS));
+    if (output[0]) PetscCall(HycoFOMWriteAdd(fom));
+    PetscCall(DriverSetPhase(k + 1, n));
   }
+  if (output[0]) PetscCall(HycoFOMWriteEnd(fom));
   PetscCall(ReportSet("solve", table, scene, samples, width, names, value, HycoNow() - begin));
   PetscCall(PetscFree(value));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -246,7 +250,6 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverHasSamples(scene, &set));
   if (set) PetscCall(HycoSceneRefuseHistory(scene, "a set of points"));
-  HycoCheck(!set || !output[0], "-output is for one point (-mu); a set of points gives a -table");
   if (set) {
     PetscCall(DriverGetSamples(scene, &samples, &set));
   } else
@@ -255,7 +258,7 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMGetSolver(fom, &solver));
   if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
-  HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? Many(fom, scene, samples, table)
+  HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? Many(fom, scene, samples, output, table)
                                     : n_times ? Path(fom, scene, mu, output, table)
                                               : One(fom, scene, mu, output));
   PetscCall(HycoFOMDestroy(&fom));

@@ -148,14 +148,27 @@ void DriverPercent(PetscReal share, char text[32]);
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx);
 /* A HycoPhaseMonitor: the same, where it takes long. */
 PetscErrorCode DriverPhase(const char phase[], PetscInt done, PetscInt n, void *ctx);
+/* The same of the points of a set, on rank 0. */
+PetscErrorCode DriverSetPhase(PetscInt done, PetscInt n);
 /* -quiet: from here on neither words nor progress; errors are told all the same. */
 PetscErrorCode DriverReadQuiet(void);
+PetscBool DriverIsQuiet(void);
 /* Ctrl-C and termination end the run with 130 or 143 and one line, of where the solutions are that are kept. */
 PetscErrorCode DriverCatchInterrupt(const char folder[]);
 /* -hyco_monitor */
 PetscErrorCode DriverReadMonitor(PetscBool *monitor);
 /* A HycoMonitor. */
 PetscErrorCode DriverMonitor(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx);
+
+/* -- beat.c -- */
+
+/* Rank 0's thread that tells what a long step is: begun, ended, put off by what else is said. */
+void DriverBeatBegin(void);
+void DriverBeatHold(void);
+void DriverBeatEnd(void);
+/* Seconds between lines of progress in a file. */
+void DriverBeatSetPeriod(PetscReal seconds);
+PetscReal DriverBeatPeriod(void);
 
 /* -- greedy.c -- */
 

@@ -136,6 +136,7 @@ static PetscErrorCode Run(const Command *command, int argc, char **argv)
   PetscCall(DriverCheckLaunch());
   PetscCall(DriverCheckArguments(command, argc, argv));
   PetscCall(DriverCheckOutputs(command));
+  DriverBeatBegin();
   PetscCall(command->run());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -204,6 +205,7 @@ int main(int argc, char **argv)
   signal(SIGPIPE, SIG_IGN);                 /* "hyco ... | head" is no error */
   signal(SIGXFSZ, SIG_IGN);                 /* a file beyond the limit is a failed write, which is told */
   ierr = Run(FindCommand(argv[1]), argc, argv);
+  DriverBeatEnd();
   PetscPopErrorHandler();
   if (ierr) Stop();
   PetscOptionsSetValue(NULL, "-options_left", "0"); /* what is left was checked where it matters */

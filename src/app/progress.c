@@ -8,12 +8,22 @@
 
 static PetscBool quiet = PETSC_FALSE;
 
+PetscBool DriverIsQuiet(void)
+{
+  return quiet;
+}
+
 PetscErrorCode DriverReadQuiet(void)
 {
+  PetscReal seconds = 60;
+
   PetscFunctionBegin;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
   PetscCall(HycoOptionsFlag("-quiet", "say nothing but errors; results are in -report and -table", &quiet));
+  PetscCall(HycoOptionsReal("-progress", "<seconds> between the lines of progress in a file", 0.01, PETSC_MAX_REAL,
+                            &seconds, NULL));
   PetscOptionsEnd();
+  DriverBeatSetPeriod(seconds);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -60,6 +70,7 @@ PetscErrorCode Say(const char format[], ...)
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   if (rank == 0 && !quiet) {
+    DriverBeatHold();
     va_start(args, format);
     vfprintf(stdout, format, args);
     va_end(args);
@@ -75,7 +86,8 @@ void DriverPercent(PetscReal share, char text[32])
   snprintf(text, 32, percent >= 99.5 && percent < 1e6 ? "%.0f %%" : "%.2g %%", percent);
 }
 
-/* A bar, or a line a minute; n = 0: nobody knows how many. The last line only where there was another, unless `ends`.
+/* A bar, or a line a minute (-progress); n = 0: nobody knows how many. The last line only where there was another,
+ * unless `ends`.
  */
 static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
 {
@@ -95,9 +107,10 @@ static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
   if (n)
     snprintf(left, sizeof(left), ", %.0f s left",
              done > first ? (double)(now - begin) / (done - first) * (n - done) : 0.);
-  if (!quiet && (done == n ? ends || shown : now - last > (terminal ? 0.2 : 60))) {
+  if (!quiet && (done == n ? ends || shown : now - last > (terminal ? 0.2 : DriverBeatPeriod()))) {
     last = now;
     shown = PETSC_TRUE;
+    DriverBeatHold();
     fprintf(stderr, "%s%s %d%s%s%s", terminal ? "\r\033[K" : "", word, (int)done, share, left,
             terminal && done != n ? "" : "\n");
     fflush(stderr);
@@ -124,6 +137,16 @@ PetscErrorCode DriverPhase(const char phase[], PetscInt done, PetscInt n, void *
   (void)ctx;
   snprintf(word, sizeof(word), "%s:", phase);
   Show(word, done, n, PETSC_FALSE);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverSetPhase(PetscInt done, PetscInt n)
+{
+  PetscMPIInt rank;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (rank == 0) PetscCall(DriverPhase("points", done, n, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -82,6 +82,10 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
   const PetscBool has_mean = (PetscBool)(mesh->type == HYCO_QUAD4 || mesh->type == HYCO_HEX8);
 
   PetscFunctionBegin;
+  HycoCheck(!HycoMeshIsQuadratic(mesh) || !scene->n_times,
+            "the mesh has cells of second order (%s), and scenes with a history take those of first order: mesh it "
+            "with gmsh -order 1",
+            HycoCellKinds[mesh->type].name);
   HycoCheck(mesh->dim == 2 || scene->formulation == HYCO_PLANE_STRAIN,
             "scene_formulation says what a 2D scene stands for, and this mesh has %d dimension%s; take it out",
             (int)mesh->dim, mesh->dim == 1 ? "" : "s");
@@ -90,9 +94,9 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
     const PetscBool flows = (PetscBool)!body->law->linear;
 
     HycoCheck(!body->bbar || has_mean,
-              "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (line2, tri3 or tet4) the "
-              "dilatation is constant already and nothing would change",
-              body->name);
+              "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (%s) the dilatation %s",
+              body->name, HycoCellKinds[mesh->type].name,
+              HycoMeshIsQuadratic(mesh) ? "is free enough" : "is constant already and nothing would change");
     HycoCheck(!body->bbar || scene->formulation != HYCO_PLANE_STRESS,
               "body_%s_element is bbar, against locking where the volume is kept; under plane_stress the thickness is "
               "free, and nothing locks",

@@ -45,7 +45,7 @@ static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, const 
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
   const HycoBody *body = &fe->scene->body[m->cell_body[cell]];
-  PetscReal x[3], g[8][3], w, inertia[3];
+  PetscReal x[3], g[HYCO_CELL_NODES][3], w, inertia[3];
 
   PetscFunctionBegin;
   PetscCall(HycoGradients(fe, el, cell, q, g, &w));
@@ -220,7 +220,7 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt size = fe->tangent_size[fe->mesh->cell_body[cell]];
   const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
-  PetscReal g[8][3], mean[8][3], w;
+  PetscReal g[HYCO_CELL_NODES][3], mean[HYCO_CELL_NODES][3], w;
 
   PetscFunctionBegin;
   if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));

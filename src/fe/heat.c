@@ -19,7 +19,8 @@ PetscErrorCode HycoHeatCreate(HycoFE fe)
 static PetscErrorCode SetCell(HycoFE fe, const HycoElement *el, PetscInt cell)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
-  PetscReal x[3 * 8], reference[8], expansion[8], *T = fe->temperature + cell * el->nq;
+  PetscReal x[3 * HYCO_CELL_POINTS], reference[HYCO_CELL_POINTS], expansion[HYCO_CELL_POINTS],
+      *T = fe->temperature + cell * el->nq;
 
   PetscFunctionBegin;
   for (PetscInt q = 0; q < el->nq; q++) HycoPointPlace(fe, el, cell, q, x + 3 * q);

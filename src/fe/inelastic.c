@@ -128,7 +128,7 @@ typedef struct {
   PetscInt n, cell[BATCH];
   PetscReal *memory, *x, *w, *strain0, *strain, *stress0, *stress, *temperature0, *temperature, *state0, *state;
   PetscReal *stored, *dissipated, *increment, *potential, *tangent, *constant;
-  PetscReal (*g)[8][3], (*mean)[8][3];
+  PetscReal (*g)[HYCO_CELL_NODES][3], (*mean)[HYCO_CELL_NODES][3];
 } Batch;
 
 /* All of a batch's arrays in one block. */
@@ -435,7 +435,7 @@ PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, Pet
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
-  PetscReal g[8][3], mean[8][3], w;
+  PetscReal g[HYCO_CELL_NODES][3], mean[HYCO_CELL_NODES][3], w;
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(f, fe->mesh->nv * fe->dim));
@@ -462,7 +462,7 @@ PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[]
 
     for (PetscInt q = 0; q < el->nq; q++) {
       const Point p = PointAt(fe, state, e, q);
-      PetscReal g[8][3], w;
+      PetscReal g[HYCO_CELL_NODES][3], w;
 
       PetscCall(HycoGradients(fe, el, e, q, g, &w));
       volume += w;
@@ -486,7 +486,7 @@ PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name
   PetscFunctionBegin;
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     const HycoMaterial law = fe->scene->body[fe->mesh->cell_body[e]].law;
-    PetscReal g[8][3], w, volume = 0;
+    PetscReal g[HYCO_CELL_NODES][3], w, volume = 0;
     PetscInt which = -1;
 
     value[e] = 0;

@@ -24,8 +24,8 @@ static PetscReal Radius(HycoFE fe, PetscInt n, const PetscInt node[], const Pets
   return r;
 }
 
-PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal g[8][3],
-                             PetscReal *weight)
+PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q,
+                             PetscReal g[HYCO_CELL_NODES][3], PetscReal *weight)
 {
   const PetscInt *node = fe->mesh->cells + cell * fe->mesh->nv, dim = el->dim;
   PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, inv[3][3], det, size = 1;
@@ -91,7 +91,7 @@ static PetscErrorCode KeepMeans(HycoFE fe, const HycoElement *el)
   if (!mean) PetscCall(PetscCalloc1((size_t)fe->mesh->n_cells * (size_t)(3 * el->nv), &mean));
   fe->kept_mean = NULL; /* they are computed */
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
-    PetscReal g[8][3];
+    PetscReal g[HYCO_CELL_NODES][3];
 
     if (!fe->bbar[fe->mesh->cell_body[e]]) continue;
     PetscCall(HycoMeanGradients(fe, el, e, g));
@@ -112,7 +112,7 @@ PetscErrorCode HycoFEKeepGradients(HycoFE fe)
   if (!kept) PetscCall(PetscMalloc1(n * size + 1, &kept));
   fe->kept = NULL; /* they are computed */
   for (size_t k = 0; k < n; k++) {
-    PetscReal g[8][3];
+    PetscReal g[HYCO_CELL_NODES][3];
     PetscErrorCode ierr =
         HycoGradients(fe, el, (PetscInt)k / el->nq, (PetscInt)k % el->nq, g, kept + k * size + size - 1);
 
@@ -130,7 +130,7 @@ PetscErrorCode HycoMeshCheckCells(HycoMesh m)
 {
   const HycoElement *el = HycoElementGet(m->type);
   struct _n_HycoFE drawn = {.mesh = m, .dim = m->dim, .X = m->xyz};
-  PetscReal g[8][3], weight;
+  PetscReal g[HYCO_CELL_NODES][3], weight;
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
@@ -139,17 +139,17 @@ PetscErrorCode HycoMeshCheckCells(HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal mean[8][3])
+PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal mean[HYCO_CELL_NODES][3])
 {
   const PetscInt dim = el->dim;
-  PetscReal g[8][3], w, volume = 0;
+  PetscReal g[HYCO_CELL_NODES][3], w, volume = 0;
 
   PetscFunctionBegin;
   if (fe->kept_mean && fe->kept_place == fe->place) {
     PetscCall(PetscArraycpy(&mean[0][0], fe->kept_mean + (size_t)cell * (size_t)(3 * el->nv), 3 * el->nv));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscMemzero(mean, 8 * sizeof(mean[0])));
+  PetscCall(PetscMemzero(mean, HYCO_CELL_NODES * sizeof(mean[0])));
   for (PetscInt q = 0; q < el->nq; q++) {
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
     volume += w;
@@ -206,8 +206,8 @@ void HycoPointPlace(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q,
   }
 }
 
-void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal u[], PetscReal g[8][3],
-                     PetscReal mean[8][3], PetscReal e[6])
+void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal u[],
+                     PetscReal g[HYCO_CELL_NODES][3], PetscReal mean[HYCO_CELL_NODES][3], PetscReal e[6])
 {
   HycoMesh m = fe->mesh;
   const PetscInt *node = m->cells + cell * m->nv;
@@ -233,8 +233,8 @@ void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const Pets
     e[k] = k < 3 ? h[k][k] : h[k == 4 ? 1 : 0][k == 3 ? 1 : 2] + h[k == 3 ? 1 : 2][k == 4 ? 1 : 0];
 }
 
-void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[8][3], PetscReal mean[8][3], PetscReal w,
-                    const PetscReal s[6], PetscReal f[])
+void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[HYCO_CELL_NODES][3],
+                    PetscReal mean[HYCO_CELL_NODES][3], PetscReal w, const PetscReal s[6], PetscReal f[])
 {
   static const PetscInt at[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}}; /* component of the stress's (c, d) */
   const PetscReal pressure = mean ? (s[0] + s[1] + s[2]) / 3 : 0;

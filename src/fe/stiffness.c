@@ -42,7 +42,7 @@ static void AddMaterial(PetscInt nv, PetscInt dim, const PetscReal lame[2], cons
 static PetscErrorCode AddMean(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal bulk, PetscReal Ke[])
 {
   const PetscInt n = el->nv * fe->dim;
-  PetscReal mean[8][3];
+  PetscReal mean[HYCO_CELL_NODES][3];
 
   PetscFunctionBegin;
   PetscCall(HycoMeanGradients(fe, el, cell, mean));
@@ -65,7 +65,7 @@ static PetscErrorCode AddIsotropic(HycoFE fe, const HycoElement *el, PetscInt ce
   PetscCall(PetscArrayzero(P, n * n));
   for (PetscInt q = 0; q < el->nq; q++, lame += 2) {
     const PetscReal own[2] = {bbar ? -2 * lame[1] / 3 : lame[0], lame[1]};
-    PetscReal g[8][3], w, p[HYCO_MAX_CELL_DOFS], s[HYCO_MAX_CELL_DOFS];
+    PetscReal g[HYCO_CELL_NODES][3], w, p[HYCO_MAX_CELL_DOFS], s[HYCO_MAX_CELL_DOFS];
 
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
     for (PetscInt r = 0; r < n; r++) {
@@ -83,7 +83,8 @@ static PetscErrorCode AddIsotropic(HycoFE fe, const HycoElement *el, PetscInt ce
 }
 
 /* Strain components of unit displacements at a point, B (n_sigma x n); mean: gradients that make the dilatation. */
-static void StrainRows(HycoFE fe, const HycoElement *el, PetscReal g[8][3], PetscReal mean[8][3], PetscReal B[])
+static void StrainRows(HycoFE fe, const HycoElement *el, PetscReal g[HYCO_CELL_NODES][3],
+                       PetscReal mean[HYCO_CELL_NODES][3], PetscReal B[])
 {
   static const PetscInt shear[3][3] = {{-1, 3, 5}, {3, -1, 4}, {5, 4, -1}}; /* component of h_cd + h_dc */
   const PetscInt dim = fe->dim, n = el->nv * dim;
@@ -106,13 +107,13 @@ static PetscErrorCode AddGeneral(HycoFE fe, const HycoElement *el, PetscInt cell
 {
   const PetscInt ns = fe->n_sigma, n = el->nv * fe->dim;
   const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
-  PetscReal mean[8][3];
+  PetscReal mean[HYCO_CELL_NODES][3];
 
   PetscFunctionBegin;
   if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));
   for (PetscInt q = 0; q < el->nq; q++) {
     const PetscReal *C = fe->tangent + fe->tangent_start[cell] + q * ns * ns;
-    PetscReal g[8][3], w, B[6 * HYCO_MAX_CELL_DOFS], CB[HYCO_MAX_CELL_DOFS];
+    PetscReal g[HYCO_CELL_NODES][3], w, B[6 * HYCO_MAX_CELL_DOFS], CB[HYCO_MAX_CELL_DOFS];
 
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
     StrainRows(fe, el, g, bbar ? mean : NULL, B);
@@ -294,7 +295,7 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     PetscCall(PetscArrayzero(Me, n * n));
     for (PetscInt q = 0; q < el->nq; q++) {
-      PetscReal g[8][3], w;
+      PetscReal g[HYCO_CELL_NODES][3], w;
 
       PetscCall(HycoGradients(fe, el, e, q, g, &w));
       for (PetscInt a = 0; a < el->nv; a++) {

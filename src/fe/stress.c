@@ -5,7 +5,7 @@
 /* The shape functions' mean gradients in a cell, where its dilatation is made of them. */
 typedef struct {
   PetscBool used;
-  PetscReal g[8][3];
+  PetscReal g[HYCO_CELL_NODES][3];
 } Mean;
 
 static PetscErrorCode GetMean(HycoFE fe, const HycoElement *el, PetscInt cell, Mean *mean)
@@ -21,7 +21,7 @@ static PetscErrorCode AtPoint(HycoFE fe, const HycoElement *el, PetscInt cell, P
                               Mean *mean, PetscReal e[6], PetscReal s[6], PetscReal *w)
 {
   const PetscInt size = fe->tangent_size[fe->mesh->cell_body[cell]];
-  PetscReal g[8][3];
+  PetscReal g[HYCO_CELL_NODES][3];
 
   PetscFunctionBegin;
   PetscCall(HycoGradients(fe, el, cell, q, g, w));
@@ -63,7 +63,7 @@ PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[])
   for (PetscInt cell = 0; cell < fe->mesh->n_cells; cell++) {
     volume[cell] = 0;
     for (PetscInt q = 0; q < el->nq; q++) {
-      PetscReal g[8][3], w;
+      PetscReal g[HYCO_CELL_NODES][3], w;
 
       PetscCall(HycoGradients(fe, el, cell, q, g, &w));
       volume[cell] += w;

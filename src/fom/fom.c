@@ -1,4 +1,5 @@
 /* HycoFOM: reads and spreads the mesh, assembles (16), solves it, brings the solution home in the file's order. */
+#include <hycofields.h>
 #include <hycopath.h>
 
 PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
@@ -43,6 +44,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscCall(PetscFree(f->u));
   PetscCall(PetscFree(f->u_all));
   PetscCall(PetscFree(f->sigma_all));
+  PetscCall(HycoFieldFileDestroy(&f->set));
   PetscCall(PetscFree(f->contact_result));
   PetscCall(PetscFree(f->reaction));
   PetscCall(PetscFree(f->lambda));

@@ -56,7 +56,7 @@ static PetscErrorCode AddState(HycoSeries s)
   const HycoSeriesSource *f = &s->from;
   const PetscInt n = f->fe->mesh->n_cells, ns = f->fe->n_sigma;
   HycoFEState state = f->state;
-  PetscReal *sigma, *tensor, *mises, *inelastic, *temperature;
+  PetscReal *sigma, *tensor, *mises, *inelastic, *temperature, *nodal, *nodal_mises;
   const char *const *names;
   PetscInt n_names;
 
@@ -68,6 +68,11 @@ static PetscErrorCode AddState(HycoSeries s)
   PetscCall(AddField(s, "mises", HYCO_ON_CELLS, 1, mises));
   PetscCall(AddField(s, "inelastic", HYCO_ON_CELLS, 1, inelastic));
   PetscCall(AddField(s, "temperature", HYCO_ON_CELLS, 1, temperature));
+  PetscCall(PetscCalloc2(6 * f->fe->mesh->n_nodes, &nodal, f->fe->mesh->n_nodes, &nodal_mises));
+  PetscCall(HycoNodalStress(f->fe, sigma, nodal, nodal_mises));
+  PetscCall(AddField(s, "nodal_stress", HYCO_ON_NODES, 6, nodal));
+  PetscCall(AddField(s, "nodal_mises", HYCO_ON_NODES, 1, nodal_mises));
+  PetscCall(PetscFree2(nodal, nodal_mises));
   PetscCall(HycoFEStateGetNames(state, &n_names, &names));
   for (PetscInt k = 0; k < n_names; k++) {
     PetscCall(HycoFEStateVariable(f->fe, state, names[k], mises));
@@ -101,7 +106,7 @@ PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], PetscInt most,
   HycoSeries s;
 
   PetscFunctionBegin;
-  PetscCall(HycoFieldFileCreate(comm, path, most, &file));
+  PetscCall(HycoFieldFileCreate(comm, path, most, PETSC_FALSE, &file));
   PetscCall(PetscNew(&s));
   s->file = file;
   *series = s;

@@ -325,14 +325,64 @@ PetscErrorCode HycoFOMToRows(HycoFOM f, HycoPlace place, MPI_Datatype type, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The last solution, as it is written. Collective. */
+static PetscErrorCode Look(HycoFOM f, HycoSolution *solution)
+{
+  PetscFunctionBegin;
+  *solution = (HycoSolution){.fe = f->fe,
+                             .surface = f->fe_surface,
+                             .pairs = &f->pairs,
+                             .u = f->u,
+                             .u_surface = f->u_surface,
+                             .lambda = f->lambda};
+  PetscCall(HycoFOMGetRows(f, &solution->order));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMWrite(HycoFOM f, const char path[])
 {
-  const HycoFileOrder *rows;
+  HycoSolution solution;
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMWrite()");
-  PetscCall(HycoFOMGetRows(f, &rows));
-  PetscCall(HycoSolutionWrite(path, rows, f->fe, f->u, f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL));
+  PetscCall(Look(f, &solution));
+  PetscCall(HycoSolutionWrite(path, &solution));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMWriteBegin(HycoFOM f, const char path[], PetscInt n)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  HycoCheck(!f->path, "HycoFOMWriteBegin: the scene has a history; HycoFOMSetSeries() writes its path");
+  PetscCall(HycoFieldFileDestroy(&f->set));
+  PetscCall(HycoFieldFileCreate(HycoComm(f), path, n, PETSC_TRUE, &f->set));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMWriteAdd(HycoFOM f)
+{
+  HycoSolution solution;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  PetscCheck(f->solved && f->set, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+             "call HycoFOMWriteBegin() and HycoFOMSolve() before HycoFOMWriteAdd()");
+  PetscCall(Look(f, &solution));
+  PetscCall(HycoSolutionAdd(f->set, &solution));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMWriteEnd(HycoFOM f)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(f, HYCO_FOM_CLASSID);
+  PetscCheck(f->set, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMWriteBegin() before HycoFOMWriteEnd()");
+  ierr = HycoFieldFileCommit(f->set);
+  PetscCall(HycoFieldFileDestroy(&f->set));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -41,7 +41,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
 {
   PetscPartitioner partitioner;
   PetscBool done;
-  PetscInt overlap;
+  PetscInt overlap, type;
   PetscSF sf;
   DM next;
 
@@ -59,7 +59,13 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!write[0] || !scene->n_ties, "hyco_mesh_write: a mesh with ties (%s) is not written as a DMPlex",
             scene->tie[0].name);
-  if (write[0]) PetscCall(HycoPlexWrite(*dm, write));
+  if (write[0]) {
+    PetscCall(HycoPlexType(*dm, &type));
+    HycoCheck(!HycoCellKinds[PetscMax(type, 0)].quadratic,
+              "hyco_mesh_write: a mesh of %s is not written as a DMPlex; keep its gmsh file",
+              HycoCellKinds[PetscMax(type, 0)].name);
+    PetscCall(HycoPlexWrite(*dm, write));
+  }
   PetscCall(DMSetBasicAdjacency(*dm, PETSC_FALSE, PETSC_TRUE)); /* cells that share a vertex are neighbours */
   PetscCall(DMPlexDistributeOverlap(*dm, 1, &sf, &next));
   PetscCall(Replace(dm, sf, next));

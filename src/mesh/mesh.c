@@ -2,6 +2,11 @@
 #include <hycocontactimpl.h>
 #include <string.h>
 
+const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES] = {{"line2", 1, 2, 1, PETSC_FALSE}, {"tri3", 2, 3, 2, PETSC_FALSE},
+                                                       {"quad4", 2, 4, 2, PETSC_FALSE}, {"tet4", 3, 4, 3, PETSC_FALSE},
+                                                       {"hex8", 3, 8, 4, PETSC_FALSE},  {"tri6", 2, 6, 3, PETSC_TRUE},
+                                                       {"quad8", 2, 8, 3, PETSC_TRUE},  {"quad9", 2, 9, 3, PETSC_TRUE}};
+
 PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
 {
   HycoMesh m = *mesh;
@@ -99,6 +104,9 @@ static PetscErrorCode CheckSpring(HycoMesh mesh, const HycoSpring *spring)
 static PetscErrorCode CheckTie(HycoMesh mesh, const HycoTie *tie)
 {
   PetscFunctionBegin;
+  HycoCheck(!HycoMeshIsQuadratic(mesh),
+            "tie %s: ties are for cells of first order, and the mesh has %s; mesh it with gmsh -order 1", tie->name,
+            HycoCellKinds[mesh->type].name);
   HycoCheck(mesh->dim > 1,
             "tie %s: ties are for scenes in the plane and in space; in 1D let both bodies share the node", tie->name);
   for (PetscInt side = 0; side < 2; side++) {
@@ -138,6 +146,12 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   for (PetscInt k = 0; k < scene->n_springs; k++) PetscCall(CheckSpring(mesh, &scene->spring[k]));
   for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(HycoContactCheckGroups(scene->contact[k], mesh));
   for (PetscInt k = 0; k < scene->n_ties; k++) PetscCall(CheckTie(mesh, &scene->tie[k]));
+  for (PetscInt k = 0; k < scene->n_contacts; k++)
+    HycoCheck(
+        !HycoMeshIsQuadratic(mesh) || !scene->contact[k]->ops->find,
+        "contact %s: surfaces that do not match (type surface) are for cells of first order, and the mesh has %s; "
+        "match the meshes and take type: pair, or mesh with gmsh -order 1",
+        scene->contact[k]->name, HycoCellKinds[mesh->type].name);
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     if (scene->quantity[k].group) PetscCall(HycoMeshFindGroup(mesh, "output", scene->quantity[k].group, &group));
   }

@@ -294,17 +294,44 @@ static const char *GroupName(Msh *m, HycoMshGroup *g)
   return g->name;
 }
 
+#define TAKES "hyco takes line2, tri3, quad4, tet4 and hex8, and of second order tri6, quad8 and quad9: %s"
+
+static const char *Remedy(long long type)
+{
+  return type == 11 || type == 12 || type == 17 ? "mesh it with gmsh -order 1" : "mesh the bodies with one of these";
+}
+
+/* Of a type that is refused. */
+static const char *TypeName(long long type)
+{
+  switch (type) {
+  case 6:
+    return "prisms";
+  case 7:
+    return "pyramids";
+  case 11:
+    return "tet10";
+  case 12:
+    return "hex27";
+  case 17:
+    return "hex20";
+  default:
+    return "not known here";
+  }
+}
+
 /* Appends an element to a group. */
 static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long long type, const PetscInt node[])
 {
   const PetscInt nv = type_nodes[type];
 
   PetscFunctionBegin;
-  HycoCheck(type <= 5 || type == 15,
-            "%s: group \"%s\" has elements of gmsh type %lld; hyco takes line2, tri3, quad4, tet4 and hex8 (first "
-            "order)",
-            m->path, GroupName(m, g), type);
-  HycoCheck(!g->n || g->nv == nv, "%s: group \"%s\" mixes elements of %d and %d nodes; hyco takes one type per mesh",
+  HycoCheck(type <= 5 || (type >= 8 && type <= 10) || type == 15 || type == 16,
+            "%s: group \"%s\" has elements of gmsh type %lld (%s); " TAKES, m->path, GroupName(m, g), type,
+            TypeName(type), Remedy(type));
+  HycoCheck(!g->n || g->nv == nv,
+            "%s: group \"%s\" mixes elements of %d and %d nodes; hyco takes one type per mesh: "
+            "recombine all surfaces in gmsh, or none",
             m->path, GroupName(m, g), (int)g->nv, (int)nv);
   g->nv = nv;
   if (g->n == g->room) {
@@ -338,9 +365,8 @@ static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long
 static PetscErrorCode CheckType(Msh *m, long long type)
 {
   PetscFunctionBegin;
-  HycoCheck(!m->failed && type > 0 && type < 32,
-            "the mesh %s has elements of gmsh type %lld; hyco takes line2, tri3, quad4, tet4 and hex8 (first order)",
-            m->path, type);
+  HycoCheck(!m->failed && type > 0 && type < 32, "the mesh %s has elements of gmsh type %lld (%s); " TAKES, m->path,
+            type, TypeName(type), Remedy(type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -8,19 +8,28 @@
 #include <string.h>
 
 /* The places of gmsh's nodes in DMPlex's cone of a cell; its own inverse. */
-static const signed char cone_place[HYCO_N_CELL_TYPES][8] = {
-    {0, 1}, {0, 1, 2}, {0, 1, 2, 3}, {1, 0, 2, 3}, {0, 3, 2, 1, 4, 5, 6, 7}};
-static const PetscInt n_faces[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 6};
-static const DMPolytopeType plex_type[HYCO_N_CELL_TYPES] = {DM_POLYTOPE_SEGMENT, DM_POLYTOPE_TRIANGLE,
-                                                            DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_TETRAHEDRON,
-                                                            DM_POLYTOPE_HEXAHEDRON};
+static const signed char cone_place[HYCO_N_CELL_TYPES][HYCO_CELL_NODES] = {{0, 1},
+                                                                           {0, 1, 2},
+                                                                           {0, 1, 2, 3},
+                                                                           {1, 0, 2, 3},
+                                                                           {0, 3, 2, 1, 4, 5, 6, 7},
+                                                                           {0, 1, 2, 3, 4, 5},
+                                                                           {0, 1, 2, 3, 4, 5, 6, 7},
+                                                                           {0, 1, 2, 3, 4, 5, 6, 7, 8}};
+static const PetscInt n_faces[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 6, 3, 4, 4};
+static const DMPolytopeType plex_type[HYCO_N_CELL_TYPES] = {
+    DM_POLYTOPE_SEGMENT,    DM_POLYTOPE_TRIANGLE, DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_TETRAHEDRON,
+    DM_POLYTOPE_HEXAHEDRON, DM_POLYTOPE_TRIANGLE, DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_QUADRILATERAL};
 /* The nodes of a cell's facets, in gmsh's order of the cell's nodes. */
 static const signed char face[HYCO_N_CELL_TYPES][6][4] = {
     {{0}, {1}},
     {{0, 1}, {1, 2}, {2, 0}},
     {{0, 1}, {1, 2}, {2, 3}, {3, 0}},
     {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}},
-    {{0, 3, 2, 1}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}, {4, 5, 6, 7}}};
+    {{0, 3, 2, 1}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}, {4, 5, 6, 7}},
+    {{0, 1, 3}, {1, 2, 4}, {2, 0, 5}},
+    {{0, 1, 4}, {1, 2, 5}, {2, 3, 6}, {3, 0, 7}},
+    {{0, 1, 4}, {1, 2, 5}, {2, 3, 6}, {3, 0, 7}}};
 
 const signed char *HycoFacetNodes(HycoCellType type, PetscInt number)
 {
@@ -53,13 +62,27 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a cone of this size may be of a type, whose DMPlex's type it has: those of second order have all their nodes
+   in their cones, those of first order in DMs of edges and faces what they want, and with ties more. */
+static PetscBool ConeIsOf(HycoCellType type, PetscInt size, PetscBool tied)
+{
+  const PetscBool quadratic = (PetscBool)(!tied && (size == 6 || size >= 8));
+
+  if (HycoCellKinds[type].dim == 3) return PETSC_TRUE;
+  return quadratic ? (PetscBool)(HycoCellKinds[type].nv == size) : (PetscBool)!HycoCellKinds[type].quadratic;
+}
+
 /* The HycoCellType of this process's cells; -1: there are none. */
 static PetscErrorCode CellType(DM dm, PetscInt *type)
 {
+  HycoTies ties;
+  PetscBool tied;
   PetscInt c0, c1, last = -1;
 
   PetscFunctionBegin;
   *type = -1;
+  PetscCall(HycoTiesOf(dm, &ties));
+  tied = (PetscBool)(ties != NULL);
   PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
   for (PetscInt c = c0; c < c1; c++) {
     DMPolytopeType of;
@@ -69,7 +92,7 @@ static PetscErrorCode CellType(DM dm, PetscInt *type)
     if (size == last) continue;
     last = size;
     PetscCall(DMPlexGetCellType(dm, c, &of));
-    while (t < HYCO_N_CELL_TYPES && plex_type[t] != of) t++;
+    while (t < HYCO_N_CELL_TYPES && (plex_type[t] != of || !ConeIsOf((HycoCellType)t, size, tied))) t++;
     HycoCheck(t < HYCO_N_CELL_TYPES && (c == c0 || t == *type),
               "the mesh has cells of DMPlex's type %s; hyco takes segments, triangles, quadrilaterals, tetrahedra or "
               "hexahedra, one type per mesh",
@@ -216,9 +239,10 @@ static PetscErrorCode SetCones(DM dm, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The DM of a mesh with ties. A cell's cone says which cells are around a node, wherever that is asked: of ranks that
-   share it, of the overlap, of an RID. DMPlex would tell a cell's type by the size of its cone: it is told. */
-static PetscErrorCode FromTied(MPI_Comm comm, PetscInt dim, HycoMesh m, DM *dm)
+/* The DM of a mesh with ties, or of second order. A cell's cone says which cells are around a node, wherever that is
+   asked: of ranks that share it, of the overlap, of an RID. DMPlex would tell a cell's type by the size of its cone: it
+   is told. */
+static PetscErrorCode FromCones(MPI_Comm comm, PetscInt dim, HycoMesh m, DM *dm)
 {
   PetscFunctionBegin;
   PetscCall(DMPlexCreate(comm, dm));
@@ -235,19 +259,19 @@ static PetscErrorCode FromTied(MPI_Comm comm, PetscInt dim, HycoMesh m, DM *dm)
 
 PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
 {
-  PetscInt head[2] = {m ? m->dim : 0, m ? m->nv : 0}, *cone = NULL, *tag;
+  PetscInt head[3] = {m ? m->dim : 0, m ? m->nv : 0, m ? HycoMeshIsQuadratic(m) : 0}, *cone = NULL, *tag;
   HycoTies ties = m ? m->ties : NULL;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Bcast(head, 2, MPIU_INT, 0, comm));
+  PetscCallMPI(MPI_Bcast(head, 3, MPIU_INT, 0, comm));
   PetscCall(HycoTiesBcast(comm, &ties));
-  if (m && !ties) {
+  if (m && !ties && !head[2]) {
     PetscCall(PetscMalloc1(m->n_cells * m->nv, &cone));
     for (PetscInt k = 0; k < m->n_cells * m->nv; k++)
       cone[k / m->nv * m->nv + cone_place[m->type][k % m->nv]] = m->cells[k];
   }
-  if (ties)
-    PetscCall(FromTied(comm, head[0], m, dm));
+  if (ties || head[2])
+    PetscCall(FromCones(comm, head[0], m, dm));
   else
     PetscCall(DMPlexCreateFromCellListPetsc(comm, head[0], m ? m->n_cells : 0, m ? m->n_nodes : 0, head[1], PETSC_FALSE,
                                             cone, 3, m ? m->xyz : NULL, dm));
@@ -286,15 +310,14 @@ typedef struct {
 
 static PetscErrorCode FindType(Builder *b)
 {
-  static const PetscInt nv[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 8}, nf[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 4};
   HycoMesh m = b->m;
   PetscInt type;
 
   PetscFunctionBegin;
   PetscCall(CellType(b->dm, &type));
   m->type = (HycoCellType)PetscMax(type, 0);
-  m->nv = nv[m->type];
-  m->nf = nf[m->type];
+  m->nv = HycoCellKinds[m->type].nv;
+  m->nf = HycoCellKinds[m->type].nf;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -352,7 +375,7 @@ static PetscErrorCode TakeCells(Builder *b)
   PetscCall(PetscMalloc1(b->c1 - b->c0, &b->cell));
   PetscCall(PetscMalloc3(b->c1 - b->c0, &keep, b->c1 - b->c0, &key, b->c1 - b->c0, &place));
   for (PetscInt c = b->c0; c < b->c1; c++) {
-    PetscInt vertex[8] = {0}, n_followed;
+    PetscInt vertex[HYCO_CELL_NODES] = {0}, n_followed;
     const PetscInt *followed;
     PetscBool mine = b->all_owned;
 
@@ -437,6 +460,7 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
 {
   PetscReal inside[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, out = 0;
   const PetscReal *p = m->xyz + 3 * facet[0], *q, *s = m->xyz + 3 * facet[m->nf - 1];
+  const PetscInt last = m->dim == 2 ? 1 : m->nf - 1; /* of the corners */
 
   if (m->dim == 1) return;
   q = m->xyz + 3 * facet[1];
@@ -454,7 +478,7 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
   }
   for (PetscInt c = 0; c < 3; c++) out += normal[c] * (p[c] - inside[c]);
   if (out < 0) {
-    const PetscInt first = m->dim == 2 ? 0 : 1, last = m->nf - 1, keep = facet[first];
+    const PetscInt first = m->dim == 2 ? 0 : 1, keep = facet[first];
 
     facet[first] = facet[last];
     facet[last] = keep;

@@ -6,11 +6,6 @@
 #include "msh.h"
 #include <string.h>
 
-/* gmsh's cell types in the order of HycoCellType. */
-static const PetscInt cell_dim[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 3};
-static const PetscInt cell_nodes[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 8};
-static const PetscInt facet_nodes[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 4};
-
 typedef HycoMshGroup Group;
 
 typedef struct {
@@ -47,7 +42,9 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
         n += r->group[k].n;
         HycoCheck(r->group[k].dim == m->dim, "body %s is a group of dimension %d; the other bodies have dimension %d",
                   r->group[k].name, r->group[k].dim, (int)m->dim);
-        HycoCheck(!nv || nv == r->group[k].nv, "%s mixes cells of %d and %d nodes; hyco takes one cell type per mesh",
+        HycoCheck(!nv || nv == r->group[k].nv,
+                  "%s mixes cells of %d and %d nodes; hyco takes one cell type per mesh: recombine all surfaces in "
+                  "gmsh, or none",
                   scene->mesh_path, (int)nv, (int)r->group[k].nv);
         nv = r->group[k].nv;
       }
@@ -58,13 +55,13 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
     cells += n;
   }
   for (int t = 0; t < HYCO_N_CELL_TYPES; t++) {
-    if (cell_dim[t] == m->dim && cell_nodes[t] == nv) m->type = (HycoCellType)t;
+    if (HycoCellKinds[t].dim == m->dim && HycoCellKinds[t].nv == nv) m->type = (HycoCellType)t;
   }
-  HycoCheck(cell_dim[m->type] == m->dim && cell_nodes[m->type] == nv,
-            "%s: cells of dimension %d with %d nodes are no line2, tri3, quad4, tet4 or hex8", scene->mesh_path,
-            (int)m->dim, (int)nv);
+  HycoCheck(HycoCellKinds[m->type].dim == m->dim && HycoCellKinds[m->type].nv == nv,
+            "%s: cells of dimension %d with %d nodes are no line2, tri3, quad4, tet4, hex8, tri6, quad8 or quad9",
+            scene->mesh_path, (int)m->dim, (int)nv);
   m->nv = nv;
-  m->nf = facet_nodes[m->type];
+  m->nf = HycoCellKinds[m->type].nf;
   m->n_cells = cells;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -212,7 +209,7 @@ static PetscErrorCode AddMembers(Reader *r, HycoMesh m, Group *g, PetscInt group
   }
   m->group_start[group + 1] = *n_node;
   for (PetscInt e = 0; g->dim == m->dim && e < g->n; e++) {
-    PetscInt cell = -1, node[8];
+    PetscInt cell = -1, node[HYCO_CELL_NODES];
 
     for (PetscInt v = 0; v < m->nv; v++) node[v] = r->index[g->node[e * m->nv + v]];
     for (PetscInt k = start[PetscMax(node[0], 0)]; node[0] >= 0 && k < start[node[0] + 1]; k++) {

@@ -119,7 +119,6 @@ static PetscErrorCode CheckVertices(DM dm, HycoScene scene, const char name[], D
 /* The DM with its edges and faces, and labels of facets that are points. */
 static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
 {
-  static const PetscInt corners[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 8}, of_facet[HYCO_N_CELL_TYPES] = {1, 2, 2, 3, 4};
   const MPI_Comm comm = PetscObjectComm((PetscObject)*dm);
   PetscInt n, last, *tag, dim, depth, type;
   const PetscInt *had;
@@ -132,6 +131,9 @@ static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &depth, 1, MPIU_INT, MPI_MAX, comm));
   if (depth == dim) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoPlexType(*dm, &type));
+  HycoCheck(!HycoCellKinds[PetscMax(type, 0)].quadratic,
+            "scene_refine halves cells of first order; the mesh has %s: refine the file (gmsh -refine)",
+            HycoCellKinds[PetscMax(type, 0)].name);
   PetscCall(DMPlexInterpolate(*dm, &full));
   PetscCall(PetscObjectQuery((PetscObject)*dm, HYCO_TAGS, (PetscObject *)&tags));
   PetscCall(DMPlexGetChart(full, NULL, &last));
@@ -152,7 +154,7 @@ static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
     PetscCall(DMRemoveLabel(full, name, NULL));
     PetscCall(DMCreateLabel(full, name));
     PetscCall(DMGetLabel(full, name, &to));
-    PetscCall(AddOwnPoints(full, (HycoCellType)type, corners[type], of_facet[type], from, to));
+    PetscCall(AddOwnPoints(full, (HycoCellType)type, HycoCellKinds[type].nv, HycoCellKinds[type].nf, from, to));
     PetscCall(DMPlexLabelComplete(full, to));
     HycoOnEach(comm, CheckVertices(full, scene, name, from, to));
   }

@@ -9,8 +9,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline", "Triangle", "Quadrilateral", "Tetrahedron",
-                                                        "Hexahedron"};
+static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline",        "Triangle",       "Quadrilateral",
+                                                        "Tetrahedron",     "Hexahedron",     "Triangle_6",
+                                                        "Quadrilateral_8", "Quadrilateral_9"};
 
 /* The length of the ending .vtkhdf or .xdmf of a path; 0: it has neither. */
 static size_t Ending(const char path[])
@@ -57,7 +58,8 @@ PetscErrorCode HycoFieldsCheckPath(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt most, HycoFieldFile *file)
+PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt most, PetscBool points,
+                                   HycoFieldFile *file)
 {
   HycoFieldFile f;
 
@@ -66,6 +68,7 @@ PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt mo
   PetscCall(PetscNew(&f));
   f->comm = comm;
   f->most = most;
+  f->points = points;
   f->vtk = (PetscBool)(Ending(path) == 7);
   PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
   PetscCall(HycoFieldsNumbers(path, f->h5_path));
@@ -79,20 +82,14 @@ PetscInt HycoFieldFileCount(HycoFieldFile f, HycoPlace place)
   return f->order ? f->order->all[place] : place == HYCO_ON_CELLS ? f->mesh->n_cells : f->mesh->n_nodes;
 }
 
-/* The title, cell type, dimension and parameters. On one process. */
-static PetscErrorCode WriteHead(HycoFieldFile f, const PetscReal mu[])
+/* The title, cell type and dimension. On one process. */
+static PetscErrorCode WriteHead(HycoFieldFile f)
 {
   const PetscInt head[2] = {(PetscInt)f->mesh->type, f->mesh->dim};
 
   PetscFunctionBegin;
   PetscCall(HycoH5WriteText(f->h, "title", f->scene->title));
   PetscCall(HycoH5WriteInt(f->h, "mesh/head", 2, 1, head)); /* cell type (line2, tri3, quad4, tet4, hex8), dimension */
-  for (PetscInt p = 0; p < f->scene->n_parameters; p++) {
-    char name[HYCO_LINE];
-
-    PetscCall(PetscSNPrintf(name, sizeof(name), "mu/%s", f->scene->parameter[p]));
-    PetscCall(HycoH5WriteReal(f->h, name, 1, 1, &mu[p]));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -104,13 +101,16 @@ PetscErrorCode HycoFieldFileOpen(HycoFieldFile f, const HycoFileOrder *order, Hy
   f->mesh = mesh;
   f->scene = scene;
   f->n = f->n_fields = 0;
+  PetscCall(PetscFree(f->mu));
+  PetscCall(PetscMalloc1(PetscMax(f->most, 1) * scene->n_parameters + 1, &f->mu));
+  PetscCall(PetscArraycpy(f->mu, mu, scene->n_parameters));
   PetscCall(HycoH5Close(&f->h, PETSC_FALSE));
   PetscCall(HycoH5CreateShared(f->comm, f->h5_path, &f->h));
   if (f->vtk) {
-    PetscCall(HycoVTKWriteMesh(f, X, mu));
+    PetscCall(HycoVTKWriteMesh(f, X));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoOnRoot(f->comm, WriteHead(f, mu));
+  HycoOnRoot(f->comm, WriteHead(f));
   PetscCall(HycoFieldsWriteMesh(f->h, "mesh", order, mesh, X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -136,7 +136,9 @@ void HycoFieldName(const HycoField *field, PetscInt k, char name[HYCO_LINE])
 static PetscErrorCode Describe(HycoFieldFile f, const char set[], const HycoField *field)
 {
   static const char *const lengths[] = {"displacement", "gap", NULL}, *const forces[] = {"contact_force", NULL},
-                           *const stresses[] = {"stress", "mises", "principal_stress", "contact_pressure", NULL};
+                           *const stresses[] = {
+                               "stress",      "mises", "principal_stress", "contact_pressure", "nodal_stress",
+                               "nodal_mises", NULL};
   const char *const *const kinds[3] = {lengths, forces, stresses};
 
   PetscFunctionBegin;
@@ -202,6 +204,23 @@ PetscErrorCode HycoFieldFileBeginTime(HycoFieldFile f, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFieldFileBeginPoint(HycoFieldFile f, const PetscReal X[], const PetscReal mu[])
+{
+  const PetscInt n_par = f->scene->n_parameters;
+  char set[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoFieldFileBeginTime(f, f->n));
+  PetscCall(PetscArraycpy(f->mu + f->n * n_par, mu, n_par));
+  if (f->vtk) {
+    PetscCall(HycoVTKWritePoints(f, X));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  HycoFormat(set, "step-%04d/xyz", (int)f->n);
+  PetscCall(HycoFieldWrite(f->h, f->order, f->mesh->n_nodes, set, HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFieldFileEndTime(HycoFieldFile f)
 {
   PetscFunctionBegin;
@@ -234,7 +253,7 @@ static void WriteItem(FILE *out, const char kind[], PetscInt rows, PetscInt cols
           (long)cols, h5, name);
 }
 
-/* The mesh, which all times share, and the fields of one. */
+/* The mesh, whose cells all times share, and the fields of one. */
 static void WriteGrid(HycoFieldFile f, FILE *out, const char h5[], PetscInt k)
 {
   const HycoCellType type = f->mesh->type;
@@ -248,7 +267,8 @@ static void WriteGrid(HycoFieldFile f, FILE *out, const char h5[], PetscInt k)
   snprintf(kind, sizeof(kind), "NumberType=\"Int\" Precision=\"%d\"", (int)sizeof(PetscInt));
   WriteItem(out, kind, n_cells, f->mesh->nv, h5, "mesh/cells");
   fprintf(out, "   </Topology>\n   <Geometry GeometryType=\"XYZ\">\n");
-  WriteItem(out, "Precision=\"8\"", HycoFieldFileCount(f, HYCO_ON_NODES), 3, h5, "mesh/xyz");
+  HycoFormat(name, f->points ? "step-%04d/xyz" : "mesh/xyz", (int)k);
+  WriteItem(out, "Precision=\"8\"", HycoFieldFileCount(f, HYCO_ON_NODES), 3, h5, name);
   fprintf(out, "   </Geometry>\n");
   for (PetscInt j = 0; j < f->n_fields; j++) {
     const HycoField *field = &f->field[j];
@@ -294,6 +314,26 @@ static PetscErrorCode EndText(HycoFieldFile f, HycoFile *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The parameters: a number each, of points one for each. On one process. */
+static PetscErrorCode WriteParameters(HycoFieldFile f)
+{
+  const PetscInt n_par = f->scene->n_parameters, rows = f->points ? f->n : 1;
+  PetscReal *column;
+  PetscErrorCode ierr = 0;
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(rows, &column));
+  for (PetscInt p = 0; p < n_par && !ierr; p++) {
+    for (PetscInt k = 0; k < rows; k++) column[k] = f->mu[k * n_par + p];
+    HycoFormat(name, "%s/%s", f->vtk ? "VTKHDF/FieldData" : "mu", f->scene->parameter[p]);
+    ierr = HycoH5WriteReal(f->h, name, rows, f->vtk ? HYCO_H5_LINE : 1, column);
+  }
+  PetscCall(PetscFree(column));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The files take their places, the numbers first: without them the .xdmf would point at none, or at those of another
    run. */
 static PetscErrorCode Place(HycoFieldFile f, HycoFile *out)
@@ -301,6 +341,7 @@ static PetscErrorCode Place(HycoFieldFile f, HycoFile *out)
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
+  HycoOnRoot(f->comm, WriteParameters(f));
   if (f->vtk)
     PetscCall(HycoVTKWriteTimes(f));
   else
@@ -331,6 +372,7 @@ PetscErrorCode HycoFieldFileDestroy(HycoFieldFile *file)
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5Close(&f->h, PETSC_FALSE));
   PetscCall(PetscFree(f->t));
+  PetscCall(PetscFree(f->mu));
   PetscCall(PetscFree(*file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -167,76 +167,144 @@ PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode WriteContacts(HycoH5 h, const HycoContactTable *contact)
+PetscErrorCode HycoNodalStress(HycoFE fe, const PetscReal sigma[], PetscReal tensor[], PetscReal mises[])
 {
+  HycoMesh m = fe->mesh;
+  const PetscInt ns = fe->n_sigma;
+  PetscReal *volume, *weight, *mean, *principal;
+  PetscInt *body;
+
   PetscFunctionBegin;
-  if (!contact->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoH5WriteInt(h, "contact/node_id", contact->n, 1, contact->node_id));
-  PetscCall(HycoH5WriteReal(h, "contact/lambda", contact->n, 1, contact->lambda));
-  PetscCall(HycoH5WriteReal(h, "contact/gap", contact->n, 1, contact->gap));
+  PetscCall(PetscMalloc2(m->n_cells, &volume, m->n_nodes, &body));
+  PetscCall(PetscCalloc3(m->n_nodes, &weight, m->n_nodes * ns, &mean, 3 * m->n_nodes, &principal));
+  PetscCall(HycoFEVolumes(fe, volume));
+  for (PetscInt i = 0; i < m->n_nodes; i++) body[i] = PETSC_MAX_INT;
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++)
+    body[m->cells[k]] = PetscMin(body[m->cells[k]], m->cell_body[k / m->nv]);
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
+    const PetscInt i = m->cells[k], e = k / m->nv;
+
+    if (m->cell_body[e] != body[i]) continue;
+    weight[i] += volume[e];
+    for (PetscInt c = 0; c < ns; c++) mean[i * ns + c] += volume[e] * sigma[e * ns + c];
+  }
+  for (PetscInt k = 0; k < m->n_nodes * ns; k++) mean[k] = weight[k / ns] > 0 ? mean[k] / weight[k / ns] : 0;
+  HycoTensor6(m->n_nodes, ns, mean, tensor);
+  PetscCall(HycoStressInvariants(m->n_nodes, fe->dim, mean, mises, principal));
+  PetscCall(PetscFree2(volume, body));
+  PetscCall(PetscFree3(weight, mean, principal));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One solution; the contact table is rank 0's. */
-static PetscErrorCode WriteAll(HycoFieldFile file, const HycoFileOrder *order, HycoFE fe, PetscInt n,
-                               const HycoField field[], const HycoContactTable *contact)
+/* The fields of the bodies. */
+static PetscErrorCode AddBodies(HycoFieldFile file, HycoFE fe, const PetscReal u[])
 {
+  HycoMesh m = fe->mesh;
+  PetscReal *u3, *sigma, *tensor, *mises, *principal, *body, *nodal, *nodal_mises;
+  PetscErrorCode ierr = 0; /* a place where nothing can be written is the caller's to mend: nothing is kept for it */
+
   PetscFunctionBegin;
-  PetscCall(HycoFieldFileOpen(file, order, fe->mesh, fe->scene, fe->X, fe->mu));
-  if (!file->vtk) HycoOnRoot(file->comm, WriteContacts(file->h, contact));
-  for (PetscInt k = 0; k < n; k++) PetscCall(HycoFieldFileAdd(file, &field[k]));
+  PetscCall(PetscCalloc5(m->n_cells * fe->n_sigma, &sigma, 6 * m->n_cells, &tensor, m->n_cells, &mises, 3 * m->n_cells,
+                         &principal, m->n_cells, &body));
+  PetscCall(PetscCalloc3(3 * m->n_nodes, &u3, 6 * m->n_nodes, &nodal, m->n_nodes, &nodal_mises));
+  for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
+  PetscCall(HycoFEStress(fe, u, sigma));
+  HycoTensor6(m->n_cells, fe->n_sigma, sigma, tensor);
+  PetscCall(HycoStressInvariants(m->n_cells, fe->dim, sigma, mises, principal));
+  PetscCall(HycoNodalStress(fe, sigma, nodal, nodal_mises));
+  for (PetscInt e = 0; e < m->n_cells; e++) body[e] = m->cell_body[e];
+  const HycoField field[] = {{"displacement", HYCO_ON_NODES, 3, u3, 0},
+                             {"stress", HYCO_ON_CELLS, 6, tensor, 0},
+                             {"mises", HYCO_ON_CELLS, 1, mises, 0},
+                             {"principal_stress", HYCO_ON_CELLS, 3, principal, 0},
+                             {"body", HYCO_ON_CELLS, 1, body, 0},
+                             {"nodal_stress", HYCO_ON_NODES, 6, nodal, 0},
+                             {"nodal_mises", HYCO_ON_NODES, 1, nodal_mises, 0}};
+
+  for (size_t k = 0; !ierr && k < sizeof(field) / sizeof(field[0]); k++) ierr = HycoFieldFileAdd(file, &field[k]);
+  PetscCall(PetscFree5(sigma, tensor, mises, principal, body));
+  PetscCall(PetscFree3(u3, nodal, nodal_mises));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Write(const char path[], const HycoFileOrder *order, HycoFE fe, PetscInt n,
-                            const HycoField field[], const HycoContactTable *contact)
+/* The table of the contacts by slave node. On one process. */
+static PetscErrorCode WriteContacts(HycoH5 h, PetscInt n, const PetscInt node_id[], const PetscReal lambda[],
+                                    const PetscReal gap[])
+{
+  PetscFunctionBegin;
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5WriteInt(h, "contact/node_id", n, 1, node_id));
+  PetscCall(HycoH5WriteReal(h, "contact/lambda", n, 1, lambda));
+  PetscCall(HycoH5WriteReal(h, "contact/gap", n, 1, gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddContactFields(HycoFieldFile file, const HycoSolution *s, const HycoContactFields *f)
+{
+  const HycoField field[3] = {{"contact_force", HYCO_ON_SURFACE, 3, f->force, 0},
+                              {"contact_pressure", HYCO_ON_SURFACE, 1, f->pressure, 0},
+                              {"gap", HYCO_ON_SURFACE, 1, f->gap_node, NAN}};
+
+  PetscFunctionBegin;
+  if (!file->vtk && !file->most)
+    HycoOnRoot(file->comm, WriteContacts(file->h, s->pairs->n, f->slave_id, s->lambda, f->gap));
+  for (PetscInt k = 0; k < 3; k++) PetscCall(HycoFieldFileAdd(file, &field[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddContacts(HycoFieldFile file, const HycoSolution *s)
+{
+  HycoContactFields f;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = HycoContactFieldsCreate(file->comm, s->surface, s->pairs, s->u_surface, s->lambda, &f);
+  if (!ierr) ierr = AddContactFields(file, s, &f);
+  PetscCall(HycoContactFieldsDestroy(&f));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddFields(HycoFieldFile file, const HycoSolution *s)
+{
+  const HycoField rid = {"rid", HYCO_ON_CELLS, 1, s->rid, 0};
+
+  PetscFunctionBegin;
+  PetscCall(AddBodies(file, s->fe, s->u));
+  PetscCall(AddContacts(file, s));
+  if (s->rid) PetscCall(HycoFieldFileAdd(file, &rid));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Write(HycoFieldFile file, const HycoSolution *s)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFieldFileOpen(file, s->order, s->fe->mesh, s->fe->scene, s->fe->X, s->fe->mu));
+  PetscCall(AddFields(file, s));
+  PetscCall(HycoFieldFileCommit(file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolutionWrite(const char path[], const HycoSolution *s)
 {
   HycoFieldFile file;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoFieldFileCreate(order ? order->comm : PETSC_COMM_SELF, path, 0, &file));
-  ierr = WriteAll(file, order, fe, n, field, contact);
-  if (!ierr) ierr = HycoFieldFileCommit(file);
+  PetscCall(HycoFieldFileCreate(s->order ? s->order->comm : PETSC_COMM_SELF, path, 0, PETSC_FALSE, &file));
+  ierr = Write(file, s);
   PetscCall(HycoFieldFileDestroy(&file));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSolutionWrite(const char path[], const HycoFileOrder *order, HycoFE fe, const PetscReal u[],
-                                 HycoFE surface, HycoPairs *pairs, const PetscReal u_surface[],
-                                 const PetscReal lambda[], const PetscReal *rid)
+PetscErrorCode HycoSolutionAdd(HycoFieldFile file, const HycoSolution *s)
 {
-  HycoMesh m = fe->mesh;
-  PetscReal *u3, *sigma, *tensor, *mises, *principal, *body;
-  HycoContactFields f;
-  PetscErrorCode ierr; /* a place where nothing can be written is the caller's to mend: nothing is kept for it */
-
   PetscFunctionBegin;
-  PetscCall(PetscCalloc6(3 * m->n_nodes, &u3, m->n_cells * fe->n_sigma, &sigma, 6 * m->n_cells, &tensor, m->n_cells,
-                         &mises, 3 * m->n_cells, &principal, m->n_cells, &body));
-  for (PetscInt k = 0; k < fe->n_dof; k++) u3[3 * (k / fe->dim) + k % fe->dim] = u[k];
-  PetscCall(HycoFEStress(fe, u, sigma));
-  HycoTensor6(m->n_cells, fe->n_sigma, sigma, tensor);
-  PetscCall(HycoStressInvariants(m->n_cells, fe->dim, sigma, mises, principal));
-  for (PetscInt e = 0; e < m->n_cells; e++) body[e] = m->cell_body[e];
-  ierr = HycoContactFieldsCreate(order ? order->comm : PETSC_COMM_SELF, surface, pairs, u_surface, lambda, &f);
-  if (!ierr) {
-    const HycoContactTable table = {pairs->n, f.slave_id, lambda, f.gap};
-    const HycoField field[9] = {{"displacement", HYCO_ON_NODES, 3, u3, 0},
-                                {"stress", HYCO_ON_CELLS, 6, tensor, 0},
-                                {"mises", HYCO_ON_CELLS, 1, mises, 0},
-                                {"principal_stress", HYCO_ON_CELLS, 3, principal, 0},
-                                {"body", HYCO_ON_CELLS, 1, body, 0},
-                                {"contact_force", HYCO_ON_SURFACE, 3, f.force, 0},
-                                {"contact_pressure", HYCO_ON_SURFACE, 1, f.pressure, 0},
-                                {"gap", HYCO_ON_SURFACE, 1, f.gap_node, NAN},
-                                {"rid", HYCO_ON_CELLS, 1, rid, 0}};
-
-    ierr = Write(path, order, fe, rid ? 9 : 8, field, &table);
-  }
-  PetscCall(PetscFree6(u3, sigma, tensor, mises, principal, body));
-  PetscCall(HycoContactFieldsDestroy(&f));
-  PetscCall(ierr);
+  if (!file->h) PetscCall(HycoFieldFileOpen(file, s->order, s->fe->mesh, s->fe->scene, s->fe->X, s->fe->mu));
+  PetscCall(HycoFieldFileBeginPoint(file, s->fe->X, s->fe->mu));
+  PetscCall(AddFields(file, s));
+  PetscCall(HycoFieldFileEndTime(file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -146,7 +146,7 @@ static PetscErrorCode AddEntity(HycoFE fe, PetscInt field, const PetscReal u[], 
   for (PetscInt a = 0; a < el->nv && !value; a++) Extend(s, OfNode(fe, field, u, node[a]));
   if (HycoMeshOwned(m, node[0]) < 0) PetscFunctionReturn(PETSC_SUCCESS); /* another's to add */
   for (PetscInt q = 0; q < el->nq; q++) {
-    PetscReal g[8][3], n[3], w = 0, here = value ? *value : 0;
+    PetscReal g[HYCO_CELL_NODES][3], n[3], w = 0, here = value ? *value : 0;
 
     if (facet < 0) {
       PetscCall(HycoGradients(fe, el, cell, q, g, &w));

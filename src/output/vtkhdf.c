@@ -6,8 +6,8 @@
 
 #define ROOT "VTKHDF/"
 
-/* VTK's numbers of line2, tri3, quad4, tet4, hex8. */
-static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12};
+/* VTK's numbers of line2, tri3, quad4, tet4, hex8, tri6, quad8, quad9. */
+static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12, 22, 23, 28};
 
 /* A set of one dimension of n integers, value, value + step, ... On one process. */
 static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, PetscInt value, PetscInt step)
@@ -25,7 +25,7 @@ static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, Pet
 }
 
 /* On one process. */
-static PetscErrorCode WriteHead(HycoFieldFile f, const PetscReal mu[])
+static PetscErrorCode WriteHead(HycoFieldFile f)
 {
   static const PetscInt version[2] = {2, 0};
   const PetscInt n_cells = HycoFieldFileCount(f, HYCO_ON_CELLS);
@@ -37,12 +37,21 @@ static PetscErrorCode WriteHead(HycoFieldFile f, const PetscReal mu[])
   PetscCall(HycoH5WriteAttributeInt(f->h, "VTKHDF", "Version", 2, version));
   PetscCall(HycoH5WriteAttribute(f->h, "VTKHDF", "Type", "UnstructuredGrid"));
   PetscCall(HycoH5WriteAttribute(f->h, "VTKHDF", "title", f->scene->title));
-  for (PetscInt p = 0; p < f->scene->n_parameters; p++) {
-    char name[HYCO_LINE];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    HycoFormat(name, ROOT "FieldData/%s", f->scene->parameter[p]);
-    PetscCall(HycoH5WriteReal(f->h, name, 1, HYCO_H5_LINE, &mu[p]));
-  }
+/* Rows of nodes or cells at the current time, in a set that holds those of all times one after the other. */
+static PetscErrorCode WriteRows(HycoFieldFile f, const char set[], HycoPlace place, PetscInt cols,
+                                const PetscReal rows[])
+{
+  const PetscInt all = HycoFieldFileCount(f, place), own = f->order ? f->order->n[place] : all,
+                 first = f->order ? f->order->first[place] : 0, times = PetscMax(f->most, 1);
+
+  PetscFunctionBegin;
+  HycoCheck((PetscInt64)all * times < PETSC_MAX_INT,
+            "%s: %d times of %d nodes or cells are too many for one set; give an output that ends in .xdmf", f->path,
+            (int)times, (int)all);
+  PetscCall(HycoH5WriteRows(f->h, set, MPIU_REAL, all * times, cols, all * f->n + first, own, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -67,19 +76,33 @@ static PetscErrorCode WriteTypes(HycoFieldFile f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoVTKWriteMesh(HycoFieldFile f, const PetscReal X[], const PetscReal mu[])
+PetscErrorCode HycoVTKWriteMesh(HycoFieldFile f, const PetscReal X[])
 {
   HycoMesh m = f->mesh;
 
   PetscFunctionBegin;
-  HycoOnRoot(f->comm, WriteHead(f, mu));
-  PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "Points", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
+  HycoOnRoot(f->comm, WriteHead(f));
+  if (!f->points)
+    PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "Points", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
   PetscCall(HycoFieldsWriteCells(f->h, ROOT "Connectivity", f->order, m, HYCO_H5_LINE));
   PetscCall(WriteTypes(f));
   PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "PointData/node_id", HYCO_ON_NODES, MPIU_INT, 1,
                            HYCO_H5_LINE, m->node_id));
   PetscCall(HycoFieldWrite(f->h, f->order, m->n_cells, ROOT "CellData/cell_id", HYCO_ON_CELLS, MPIU_INT, 1,
                            HYCO_H5_LINE, m->cell_id));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoVTKWritePoints(HycoFieldFile f, const PetscReal X[])
+{
+  void *rows;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFieldRows(f->order, f->mesh->n_nodes, HYCO_ON_NODES, MPIU_REAL, 3, X, 0, &rows));
+  ierr = WriteRows(f, ROOT "Points", HYCO_ON_NODES, 3, (const PetscReal *)rows);
+  if (f->order) PetscCall(PetscFree(rows));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -95,36 +118,28 @@ static void Permute(PetscInt n, const PetscReal tensor[], PetscReal out[])
 
 PetscErrorCode HycoVTKWriteField(HycoFieldFile f, const HycoField *field, const PetscReal rows[], char set[HYCO_LINE])
 {
-  const PetscInt all = HycoFieldFileCount(f, field->place), own = f->order ? f->order->n[field->place] : all,
-                 first = f->order ? f->order->first[field->place] : 0;
+  const PetscInt n = f->order ? f->order->n[field->place] : HycoFieldFileCount(f, field->place);
   PetscReal *tensor = NULL;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  HycoCheck((PetscInt64)all * PetscMax(f->most, 1) < PETSC_MAX_INT,
-            "%s: %d times of %d nodes or cells are too many for one set; give an output that ends in .xdmf", f->path,
-            (int)f->most, (int)all);
   HycoFormat(set, ROOT "%s/%s", field->place == HYCO_ON_CELLS ? "CellData" : "PointData", field->name);
   if (field->components == 6) {
-    PetscCall(PetscMalloc1(6 * own, &tensor));
-    Permute(own, rows, tensor);
+    PetscCall(PetscMalloc1(6 * n, &tensor));
+    Permute(n, rows, tensor);
     rows = tensor;
   }
-  ierr = HycoH5WriteRows(f->h, set, MPIU_REAL, all * PetscMax(f->most, 1),
-                         field->components == 1 ? HYCO_H5_LINE : field->components, all * f->n + first, own, rows);
+  ierr = WriteRows(f, set, field->place, field->components == 1 ? HYCO_H5_LINE : field->components, rows);
   PetscCall(PetscFree(tensor));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where each time's mesh and fields begin: of the one mesh and of what does not change, at 0. On one process. */
+/* Where each time's mesh and fields begin: what does not change, at 0; a point's nodes and parameters, at its own. On
+   one process. */
 static PetscErrorCode WriteSteps(HycoFieldFile f)
 {
-  static const char *const zeros[] = {"PartOffsets",
-                                      "PointOffsets",
-                                      "CellOffsets",
-                                      "ConnectivityIdOffsets",
-                                      "PointDataOffsets/node_id",
+  static const char *const zeros[] = {"PartOffsets", "CellOffsets", "ConnectivityIdOffsets", "PointDataOffsets/node_id",
                                       "CellDataOffsets/cell_id"};
   char name[HYCO_LINE];
 
@@ -136,9 +151,11 @@ static PetscErrorCode WriteSteps(HycoFieldFile f)
     HycoFormat(name, ROOT "Steps/%s", zeros[k]);
     PetscCall(WriteSequence(f->h, name, f->n, 0, 0));
   }
+  PetscCall(
+      WriteSequence(f->h, ROOT "Steps/PointOffsets", f->n, 0, f->points ? HycoFieldFileCount(f, HYCO_ON_NODES) : 0));
   for (PetscInt p = 0; p < f->scene->n_parameters; p++) {
     HycoFormat(name, ROOT "Steps/FieldDataOffsets/%s", f->scene->parameter[p]);
-    PetscCall(WriteSequence(f->h, name, f->n, 0, 0));
+    PetscCall(WriteSequence(f->h, name, f->n, 0, f->points));
   }
   for (PetscInt k = 0; k < f->n_fields; k++) {
     const HycoField *field = &f->field[k];

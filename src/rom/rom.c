@@ -363,9 +363,28 @@ PetscErrorCode HycoROMGetWholeU(HycoROM m, PetscInt *n_nodes, const PetscReal *U
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
+/* The last prediction, as it is written. `rid` is the caller's to free. */
+static PetscErrorCode Look(HycoROM m, HycoSolution *solution, PetscReal **rid)
 {
   const PetscReal *U;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMGetWholeU(m, NULL, &U));
+  PetscCall(PetscCalloc1(m->whole->n_cells, rid));
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) (*rid)[m->mesh->cell_whole[e]] = 1;
+  *solution = (HycoSolution){.fe = m->fe_whole,
+                             .surface = m->fe_whole,
+                             .pairs = &m->whole_pairs,
+                             .u = U,
+                             .u_surface = U,
+                             .lambda = m->Lambda,
+                             .rid = *rid};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
+{
+  HycoSolution solution;
   PetscReal *rid;
   PetscErrorCode ierr;
 
@@ -375,11 +394,41 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
     PetscCall(HycoTraceWrite(m, path));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoROMGetWholeU(m, NULL, &U));
-  PetscCall(PetscCalloc1(m->whole->n_cells, &rid));
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) rid[m->mesh->cell_whole[e]] = 1;
-  ierr = HycoSolutionWrite(path, NULL, m->fe_whole, U, m->fe_whole, &m->whole_pairs, U, m->Lambda, rid);
+  PetscCall(Look(m, &solution, &rid));
+  ierr = HycoSolutionWrite(path, &solution);
   PetscCall(PetscFree(rid));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WritePoint(HycoROM m, const PetscReal mu[], HycoFieldFile file)
+{
+  HycoSolution solution;
+  PetscReal *rid;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMPredict(m, m->scene->n_parameters, mu));
+  PetscCall(Look(m, &solution, &rid));
+  ierr = HycoSolutionAdd(file, &solution);
+  PetscCall(PetscFree(rid));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMWriteMany(HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[], const char path[])
+{
+  HycoFieldFile file;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheck(!m->scene->n_times, "HycoROMWriteMany: the scene has a history; HycoROMWrite() writes a path");
+  for (PetscInt k = 0; k < n; k++) PetscCall(HycoSceneCheckParameters(m->scene, n_parameters, mu + k * n_parameters));
+  PetscCall(HycoFieldFileCreate(PETSC_COMM_SELF, path, n, PETSC_TRUE, &file));
+  for (PetscInt k = 0; k < n && !ierr; k++) ierr = WritePoint(m, mu + k * n_parameters, file);
+  if (!ierr && n) ierr = HycoFieldFileCommit(file);
+  PetscCall(HycoFieldFileDestroy(&file));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

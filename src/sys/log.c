@@ -5,10 +5,45 @@ static const char *const event_names[HYCO_N_EVENTS] = {
     "HycoMesh",   "HycoAssemble", "HycoForce", "HycoContact", "HycoReduce", "HycoFactor",
     "HycoForces", "HycoIterate",  "HycoKKT",   "HycoPOD",     "HycoDEIM",   "HycoRID",
     "HycoROM",    "HycoScan",     "HycoLoad",  "HycoSetUp",   "HycoSolve",  "HycoReconstr"};
+static const char *const event_words[HYCO_N_EVENTS] = {"the mesh",
+                                                       "assembling the stiffness",
+                                                       "assembling the loads",
+                                                       "the contacts",
+                                                       "the reduced system",
+                                                       "factorisation",
+                                                       "contact forces",
+                                                       "iterations",
+                                                       "residuals",
+                                                       "modes (POD)",
+                                                       "DEIM points",
+                                                       "the reduced domain (RID)",
+                                                       "the reduced model",
+                                                       "scan for a singular stiffness",
+                                                       "loading",
+                                                       "set-up of a prediction",
+                                                       "solving",
+                                                       "reconstruction of forces"};
 static const char *const stage_names[HYCO_N_STAGES] = {"hyco full order", "hyco reduction", "hyco online"};
 static PetscLogEvent events[HYCO_N_EVENTS];
 static PetscLogStage stages[HYCO_N_STAGES];
 static PetscBool registered = PETSC_FALSE;
+/* What runs, the innermost last: another thread may look. */
+#define DEEPEST 16
+static volatile int depth, running[DEEPEST];
+static const char *volatile stage_runs;
+
+const char *HycoLogDoing(void)
+{
+  const int n = depth;
+
+  return n > 0 && n <= DEEPEST ? event_words[running[n - 1]] : stage_runs;
+}
+
+static void Note(HycoEvent event, PetscBool begin)
+{
+  if (begin && depth < DEEPEST) running[depth] = (int)event;
+  depth += begin ? 1 : -1;
+}
 
 /* A name that cannot be registered leaves its time to what contains it. */
 static PetscErrorCode Register(void)
@@ -27,6 +62,7 @@ PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin)
 {
   PetscFunctionBegin;
   if (!registered) PetscCall(Register());
+  Note(event, begin);
   if (begin)
     PetscCall(PetscLogEventBegin(events[event], 0, 0, 0, 0));
   else
@@ -38,6 +74,7 @@ PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin)
 {
   PetscFunctionBegin;
   if (!registered) PetscCall(Register());
+  stage_runs = begin ? stage_names[stage] + 5 : NULL; /* without "hyco" */
   if (begin)
     PetscCall(PetscLogStagePush(stages[stage]));
   else

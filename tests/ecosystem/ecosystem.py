@@ -42,6 +42,17 @@ def series(name):
 
 print(json.dumps({'one': {n: one(n) for n in sys.argv[2:]}, 'series': series(sys.argv[1])}))
 '''
+MESHES = r"""
+import meshio, numpy as np
+points = [[i, j, 0.0] for j in (0.0, 1.0) for i in (0.0, 1.0, 2.0)]
+quads = [[0, 1, 4, 3], [1, 2, 5, 4]]
+meshio.Mesh(points, [('quad', quads)], cell_data={'material': [np.array([1, 2])]}, point_data={'foot': np.array([1, 1, 1, 0, 0, 0])}).write('m.vtu')
+m = meshio.Mesh(np.array(points)[:, :2], [('quad', quads), ('line', [[0, 1]])], cell_data={'cell_tags': [np.array([-1, -2]), np.array([-3])]},
+                point_data={'point_tags': np.zeros(6, int)})
+m.cell_tags = {-1: ['soft', 'all'], -2: ['stiff', 'all'], -3: ['foot']}
+m.point_tags = {}
+m.write('m.med')
+"""
 ONE = {'pellet': '4.06,1', 'blocks': '0.05,0.05'}
 
 
@@ -78,6 +89,24 @@ class Ecosystem(Case):
             self.near(a, b, 1e-9, 'displacement of a time')
         self.near(ring['vtkhdf'][-1], path['u_norm2'], 1e-9, 'displacement at the end')
         self.near(ring['pyvista_xdmf'], ring['vtkhdf'][-1], 1e-9, 'displacement at the end, XDMF by pyvista')
+
+
+    def convert(self, name, *args):
+        """What scripts/convert says of a mesh that meshio wrote: {group: (count, kind)}."""
+        run = subprocess.run([self.python, os.path.join(SOURCE, 'scripts', 'convert'), name, 'm.msh', *args], cwd=self.folder,
+                             capture_output=True, text=True, timeout=100 * PATIENCE)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        rows = [line.split() for line in run.stdout.splitlines()[1:]]
+        return {row[0][:-1]: (int(row[1]), row[2]) for row in rows}
+
+    def test_convert(self):
+        subprocess.run([self.python, '-c', MESHES], cwd=self.folder, check=True, timeout=100 * PATIENCE)
+        self.assertEqual(self.convert('m.vtu', '--groups', 'material,foot'), {'material_1': (1, 'quad4'), 'material_2': (1, 'quad4'), 'foot_1': (2, 'line2')})
+        self.assertEqual(self.convert('m.med'), {'soft': (1, 'quad4'), 'stiff': (1, 'quad4'), 'foot': (1, 'line2'), 'all': (2, 'quad4')})
+        with open(self.path('scene.yaml'), 'w', encoding='ascii') as f:
+            f.write('scene: {mesh: m.msh, parameters: [p]}\nparameter: {p: {range: [1, 2]}}\nbody: {soft: {young: 1}, stiff: {young: 9}}\n'
+                    'fixed: {foot: {x: 0, y: 0}}\nforce: {soft: {y: p}}\n')
+        self.solved(self.hyco('solve', '-scene', 'scene.yaml', '-mu', '1'))
 
 
 if __name__ == '__main__':

@@ -58,7 +58,7 @@ MESHES = [
     ('an empty group', lambda n, e, g: (n, [x for x in e if x[1] != 6], g), 'the mesh has no group "over"; its groups are: floor, top'),
     ('a body without cells', lambda n, e, g: (n, [x for x in e if x[1] != 2], g), 'body "up" has no cells'),
     ('mixed cells', lambda n, e, g: (n, e + [(2, 1, [1, 2, 4])], g), 'group "low" mixes elements of 4 and 3 nodes'),
-    ('second order', lambda n, e, g: (n, [(10, 1, [1, 3, 9, 7, 2, 6, 8, 4, 5])] + e, g), 'gmsh type 10'),
+    ('second order', lambda n, e, g: (n, [(10, 1, [1, 3, 9, 7, 2, 6, 8, 4, 5])] + e, g), 'mixes elements of 9 and 4 nodes'),
     ('an unknown type', lambda n, e, g: (n, [(77, 1, [1, 2, 3])] + e, g), 'gmsh type 77'),
     ('a facet of no cell', lambda n, e, g: (n, e + [(1, 5, [1, 9])], g), 'bounds no cell of a body'),
     ('unpaired surfaces', lambda n, e, g: ([(x, y + 5 if k > 8 else y, z) for k, (x, y, z) in enumerate(n)], e, g), 'have no node of under within'),

@@ -1,0 +1,170 @@
+"""scripts/convert: Abaqus .inp, .unv, and by meshio where it is, as scenes' meshes with their groups."""
+import importlib.util
+import os
+import subprocess
+import sys
+import unittest
+
+from common import PATIENCE, SOURCE, Case
+
+CONVERT = os.path.join(SOURCE, 'scripts', 'convert')
+
+
+def block(x, y):
+    """A 2 x 1 block's nodes and cells at (x, y), in Abaqus's words."""
+    nodes = '\n'.join(f'{1 + i + 3 * j}, {x + i}., {y + j}.' for j in range(2) for i in range(3))
+    return f'*Node\n{nodes}\n*Element, type=CPE4\n1, 1, 2, 5, 4\n2, 2, 3, 6, 5\n'
+
+
+FLAT = f"""*Heading
+** a comment, with commas
+{block(0, 0)}*Elset, elset=all, generate
+1, 2, 1
+*Elset, elset=first
+1,
+*Nset, nset=foot, generate
+1, 3, 1
+*Nset, nset=corner
+4
+*Nset, nset=two
+corner, 1
+*Nset, nset=some
+1, 3
+*Surface, type=ELEMENT, name=top
+all, S3
+*Surface, type=ELEMENT, name="outer skin"
+all,
+*Material, name=steel
+*Elastic
+2e5, 0.3
+"""
+PARTS = f"""*Part, name=slab
+{block(0, 0)}*Elset, elset=all, generate
+ 1, 2, 1
+*Nset, nset=left
+ 1, 4
+*Surface, type=ELEMENT, name=over
+all, S3
+*Surface, type=ELEMENT, name=under
+all, S1
+*End Part
+*Assembly, name=Assembly
+*Instance, name=low, part=slab
+*End Instance
+*Instance, name=high, part=slab
+ 0., 1.
+*End Instance
+*Nset, nset=foot, instance=low
+ 1, 2, 3
+*Elset, elset=both, instance=low
+ all,
+*Elset, elset=both, instance=high
+ all,
+*End Assembly
+"""
+SCENE = """
+scene: {mesh: m.msh, parameters: [p]}
+parameter: {p: {range: [0.1, 2]}}
+body: {low.ALL: {young: 100}, high.ALL: {young: 100}}
+fixed: {FOOT: {y: 0}, LEFT: {x: 0}}
+pressure: {high.OVER: p}
+contact: {gap: {type: pair, slave: high.UNDER, master: low.OVER}}
+"""
+UNV = """    -1
+  2411
+""" + ''.join(f'{k:10d}         1         1        11\n   {x:.16E}   {y:.16E}   {z:.16E}\n'.replace('E', 'D')
+              for k, (x, y, z) in enumerate([(i, j, k) for k in (0, 1) for j in (0, 1) for i in (0, 1)], 1)) + """    -1
+    -1
+  2412
+         1       115         1         1         7         8
+         1         2         4         3         5         6         8         7
+         2        44         1         1         7         4
+         1         2         4         3
+         3        11         1         1         7         2
+         0         0         0
+         1         2
+    -1
+    -1
+  2467
+         1         0         0         0         0         0         0         1
+the cube
+         8         1         0         0
+         2         0         0         0         0         0         0         1
+floor
+         8         2         0         0
+         3         0         0         0         0         0         0         3
+roof
+         7         5         0         0         7         6         0         0
+         7         7         0         0
+         4         0         0         0         0         0         0         4
+right
+         7         2         0         0         7         4         0         0
+         7         6         0         0         7         8         0         0
+    -1
+"""
+
+
+class Convert(Case):
+    def convert(self, name, text, *args, status=0):
+        """What the script says of a file with this text: groups {name: (count, kind)}, or its one line of error."""
+        with open(self.path(name), 'w', encoding='utf-8') as f:
+            f.write(text)
+        run = subprocess.run([sys.executable, CONVERT, self.path(name), self.path('m.msh'), *args], capture_output=True, text=True, timeout=20 * PATIENCE)
+        self.assertEqual(run.returncode, status, run.stdout + run.stderr)
+        if status:
+            self.assertEqual(run.stderr.count('\n'), 1, run.stderr)
+            self.assertIn('convert: error: ', run.stderr)
+            return run.stderr
+        rows = [line.split() for line in run.stdout.splitlines()[1:]]
+        return {' '.join(row[:-2])[:-1]: (int(row[-2]), row[-1]) for row in rows}
+
+    def checked(self, scene):
+        with open(self.path('scene.yaml'), 'w', encoding='ascii') as f:
+            f.write(scene)
+        return self.hyco('check', '-scene', 'scene.yaml')
+
+    def test_flat(self):
+        self.assertEqual(self.convert('flat.inp', FLAT),
+                         {'ALL': (2, 'quad4'), 'FIRST': (1, 'quad4'), 'FOOT': (2, 'line2'), 'TOP': (2, 'line2'), '_OUTER_SKIN_': (6, 'line2'),
+                          'CORNER': (1, 'point1'), 'TWO': (1, 'line2'), 'SOME': (2, 'point1')})
+        self.checked('scene: {mesh: m.msh, parameters: [p]}\nparameter: {p: {range: [0.1, 1]}}\nbody: {ALL: {young: 100, poisson: 0.3}}\n'
+                     'fixed: {FOOT: {y: 0}, CORNER: {x: 0}}\npressure: {TOP: p}\n')
+
+    def test_parts(self):
+        """Two slabs in contact, of parts and instances, under a pressure: stress -p, the top sinks by p 2 / 100."""
+        groups = self.convert('parts.inp', PARTS)
+        self.assertEqual({k: groups[k] for k in ('ALL', 'LOW.ALL', 'HIGH.ALL', 'BOTH', 'FOOT', 'LEFT', 'LOW.OVER', 'HIGH.UNDER')},
+                         {'ALL': (4, 'quad4'), 'LOW.ALL': (2, 'quad4'), 'HIGH.ALL': (2, 'quad4'), 'BOTH': (4, 'quad4'), 'FOOT': (2, 'line2'),
+                          'LEFT': (2, 'line2'), 'LOW.OVER': (2, 'line2'), 'HIGH.UNDER': (2, 'line2')})
+        with open(self.path('scene.yaml'), 'w', encoding='ascii') as f:
+            f.write(SCENE.replace('low.', 'LOW.').replace('high.', 'HIGH.'))
+        report = self.hyco('solve', '-scene', 'scene.yaml', '-mu', '1')
+        self.solved(report)
+        self.near(report['total_contact_force'], 2, 1e-10, 'the pressure over the length')
+        self.near(report['u_min'][1], -0.02, 1e-10, 'the top')
+
+    def test_unv(self):
+        self.assertEqual(self.convert('cube.unv', UNV, '--scale', '10'),
+                         {'the_cube': (1, 'hex8'), 'floor': (1, 'quad4'), 'right': (1, 'quad4'), 'roof': (3, 'point1')})
+        report = self.checked('scene: {mesh: m.msh, parameters: [p]}\nparameter: {p: {range: [1, 2]}}\nbody: {the_cube: {young: 7}}\n'
+                              'fixed: {floor: {x: 0, y: 0, z: 0}}\npressure: {right: p}\n')
+        self.assertEqual(report['command'], 'check')
+        with open(self.path('m.msh'), encoding='ascii') as f:
+            self.assertIn('\n10 10 10\n', f.read())
+
+    def test_refused(self):
+        for name, text, words in (('a.inp', FLAT.replace('CPE4', 'CPE8R'), 'elements of type CPE8R'), ('b.inp', '*Heading\n', 'has no cells'),
+                                  ('c.inp', FLAT.replace('1, 1, 2, 5, 4', '1, 1, 2, 5, 44'), 'is not as such a file should be'),
+                                  ('d.inp', PARTS.replace(' 0., 1.', ' 0., 1.\n 0,0,0,0,0,1,90'), 'is rotated'),
+                                  ('e.unv', UNV.replace('115', '116'), 'FE descriptor 116')):
+            self.assertIn(words, self.convert(name, text, status=1))
+        self.assertIn('has groups of its own', self.convert('f.inp', FLAT, '--groups', 'x', status=1))
+        self.assertFalse(os.path.exists(self.path('m.msh.partial')))
+
+    @unittest.skipIf(importlib.util.find_spec('meshio'), 'meshio is here: tests/ecosystem reads by it')
+    def test_without_meshio(self):
+        self.assertIn('pip install meshio', self.convert('a.vtu', '<VTKFile/>', status=1))
+
+
+if __name__ == '__main__':
+    unittest.main()

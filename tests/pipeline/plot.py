@@ -1,0 +1,53 @@
+"""scripts/plot: pictures of solutions in 1D, 2D and 3D, of a path and a study, with and without zoom: made, small, not blank; what is wrong is one line."""
+import os
+import subprocess
+import sys
+import unittest
+
+from common import PATIENCE, ROPE, SOURCE, Case
+
+PLOT = os.path.join(SOURCE, 'scripts', 'plot')
+EXAMPLES = os.path.join(SOURCE, 'examples')
+
+
+class Plot(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.hyco('solve', '-scene', os.path.join(EXAMPLES, 'hertz'), '-mu', '0.06,1,10', '-output', 'hertz.xdmf', '-scene_unit_stress', 'MPa')
+        cls.hyco('solve', '-scene', os.path.join(EXAMPLES, 'pellet'), '-mu', '4.06,1', '-output', 'pellet.xdmf')
+        cls.hyco('solve', '-scene', os.path.join(EXAMPLES, 'ring'), '-mu', '0.01,1', '-history_times', '0,1,2', '-output', 'ring.xdmf')
+        cls.hyco('solve', '-scene', ROPE, '-grid', '4,5', '-table', 'study.csv', '-output', 'points.xdmf')
+
+    def plot(self, *args, status=0):
+        """Runs the script; of an error its line."""
+        run = subprocess.run([sys.executable, PLOT, *args], cwd=self.folder, capture_output=True, text=True, timeout=60 * PATIENCE)
+        self.assertEqual(run.returncode, status, f'{args}: {run.stdout}{run.stderr}')
+        if status:
+            self.assertEqual(run.stderr.count('\n'), 1, run.stderr)
+        return run.stderr
+
+    def test_pictures(self):
+        from PIL import Image
+        for k, args in enumerate((['solution', 'hertz.h5'], ['solution', 'hertz.h5', '--zoom', 'contact', '--field', 'nodal_mises'],
+                                  ['solution', 'pellet.h5'], ['solution', 'pellet.h5', '--zoom', 'contact', '--field', 'principal_stress', '--component', '3'],
+                                  ['solution', 'ring.h5', '--step', '1', '--field', 'inelastic', '--scale', '20', '--no-pressure'],
+                                  ['solution', 'points.h5', '--step', '3'], ['compare', 'pellet.h5', 'pellet.h5', '--field', 'displacement'],
+                                  ['study', 'study.csv', '--x', 'mu2', '--y', 'lambda_max', '--colour', 'mu1'])):
+            name = f'{k}.png'
+            self.plot(*args, '-o', name)
+            self.assertLess(os.path.getsize(self.path(name)), 200000, args)
+            with Image.open(self.path(name)) as picture:
+                self.assertGreater(len(picture.convert('RGB').getcolors(1 << 24)), 20, args)
+
+    def test_refused(self):
+        for words, *args in (('it has xx, xy', 'solution', 'hertz.h5', '--field', 'stress', '--component', 'q'), ('there is no field heat', 'solution', 'hertz.h5', '--field', 'heat'),
+                             ('the times 0 to', 'solution', 'ring.h5', '--step', '7'), ('takes lowest and highest', 'solution', 'hertz.h5', '--zoom', '1,0,0,1'),
+                             ('no column hoop', 'study', 'study.csv', '--y', 'hoop'),
+                             ('no table', 'study', 'hertz.xdmf')):
+            self.assertIn(words, self.plot(*args, '-o', 'no.png', status=1), args)
+        self.assertFalse(os.path.exists(self.path('no.png')))
+
+
+if __name__ == '__main__':
+    unittest.main()

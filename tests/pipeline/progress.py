@@ -1,0 +1,54 @@
+"""What a person reads while it runs: in a file a line each -progress seconds of every long phase, counts where there are counts; nothing with -quiet."""
+import os
+import re
+import unittest
+
+from common import PELLET, ROPE, Case
+
+DOING = re.compile(r'^after \d+ s: (the mesh|assembling|the contacts|factorisation|contact forces|full order|solving|residuals|modes|the reduced|reduction)')
+
+
+class Progress(Case):
+    def lines(self, *args, **options):
+        run = self.run_raw(*args, **options)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        return [line for line in run.stderr.splitlines() if re.match(r'after |\w[\w ]*: \d', line)]
+
+    def test_long_step(self):
+        """A solve of one point has nothing to count: its steps are told."""
+        args = ['solve', '-scene', PELLET, '-mu', '4.06,1', '-scene_refine', '1']
+        for ranks in (0, 2):
+            lines = self.lines(*args, '-progress', '0.05', ranks=ranks)
+            self.assertGreater(len(lines), 2)
+            self.assertTrue(all(DOING.match(line) for line in lines), lines)
+        self.assertEqual(self.lines(*args), [])
+        self.assertEqual(self.lines(*args, '-progress', '0.05', '-quiet'), [])
+
+    def test_sets(self):
+        lines = self.lines('solve', '-scene', ROPE, '-grid', '40,40', '-table', 't.csv', '-progress', '0.05')
+        counted = [line for line in lines if re.match(r'points: \d+ of 1600, \d+ s left', line)]
+        self.assertGreater(len(counted), 2, lines)
+
+    def test_training(self):
+        lines = self.lines('train', '-scene', ROPE, '-grid', '8,8', '-model', 'm.h5', '-progress', '0.02')
+        self.assertTrue(any(line.startswith('snapshots: ') for line in lines), lines)
+        self.assertTrue(os.path.exists(self.path('m.h5')))
+
+    def test_search(self):
+        type(self).newcomer = True
+        try:
+            run = self.run_raw('train', '-scene', ROPE, '-grid', '3,3', '-hyco_model_type', 'projection', '-model', 's.h5', '-progress', '0.02')
+        finally:
+            type(self).newcomer = False
+        self.assertIn(run.returncode, (0, 3), run.stderr)
+        lines = run.stderr.splitlines()
+        self.assertTrue(any(line.startswith('settings tried: ') for line in lines), lines)
+
+    def test_wrong(self):
+        run = self.run_raw('solve', '-scene', ROPE, '-mu', '0.1,0.1', '-progress', '0')
+        self.assertNotEqual(run.returncode, 0)
+        self.assertIn('-progress', run.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()
