@@ -30,7 +30,6 @@ static PetscErrorCode CheckLoads(HycoScene s)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < s->n_fixed; k++) oblique = (PetscBool)(oblique || s->fixed[k].normal);
-  for (PetscInt k = 0; k < s->n_fixed; k++) oblique = (PetscBool)(oblique || s->fixed[k].direction[0]);
   HycoCheckModel(!s->n_springs && !s->n_point_loads && !s->n_ties && !oblique,
                  "the scene has %s, and a condensed model of paths knows none; train a hybrid one",
                  s->n_springs       ? "springs"
