@@ -172,6 +172,7 @@ PetscErrorCode DriverSetSearch(Search *s, HycoScene scene, HycoReducer reducer, 
 static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
 {
   const PetscReal *limit = s->on ? s->target : bar;
+  const PetscBool hybrid = (PetscBool)(IsPath(s) && strcmp(t->type, HYCO_ROM_HYBRID) == 0);
 
   PetscFunctionBegin;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
@@ -181,7 +182,7 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
     DriverPercent(t->held_out.largest[j], reached);
     DriverPercent(limit[j], asked);
     PetscCall(
-        DriverMissed("the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s",
+        DriverMissed("the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s%s",
                      j == HYCO_ERROR_U           ? "u"
                      : j == HYCO_ERROR_LAMBDA    ? "the contact forces"
                      : j == HYCO_ERROR_INELASTIC ? "the inelastic strain"
@@ -191,7 +192,8 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
                      s->on ? "give more training points, a larger -target_max_added, or loosen the target"
                            : "give more training points, let training add them (-target_u 5e-3 -target_lambda 3e-2), "
                              "or say by such targets "
-                             "what is enough"));
+                             "what is enough",
+                     hybrid ? "; or try -hyco_model_type cubature (docs/models.md)" : ""));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -205,6 +205,7 @@ class Targets(Ring):
         trained = self.train('missed.h5', *self.settings, '-target_u', '1e-9', '-target_inelastic', '1e-9', '-target_max_added', 0, '-hyco_validation', 3,
                              grid='2,2', status=3)
         self.assertIn('the target is', trained['missed'][0])
+        self.assertIn('-hyco_model_type cubature', trained['missed'][0])
         self.hyco('predict', '-model', self.path('missed.h5'), '-mu', '0.0055,0.91')
 
 
