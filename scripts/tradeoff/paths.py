@@ -134,28 +134,32 @@ class Bench:
         return found | {"bounded": sum(r >= 1 for r in ratios) / len(ratios), "ratio": statistics.median(ratios)}
 
 
-def measure(mesh, arguments):
-    """Rows of the settings, then those of full order."""
-    case = case_of(mesh)
-    if arguments.settings:
-        case.settings = [case.settings[int(k) - 1] for k in arguments.settings.split(",")]
-    if arguments.quick:
-        case.settings, case.unseen, case.references = case.settings[3:4], case.unseen[:1], case.references[:1]
-    bench = Bench(case, arguments.snapshots, arguments.timeout)
-    rows = []
-    for k, setting in enumerate(bench.case.settings, 1):
-        row = bench.setting(setting, os.path.join(timed.folder, "model.h5")) | {"id": k}
-        rows.append(row)
-        print(f"{k}/{len(bench.case.settings)} {row['label']}: {row['status']}" +
-              (f", {seconds(row['path_s'])}, " + ", ".join(f"{kind} {percent(row[kind + '_max'])} %" for kind in KINDS if kind + "_max" in row)
-               if row["status"] == "ok" else ""), flush=True)
+def full_orders(bench, arguments):
+    """Their rows; `status` says where and how all was measured."""
     words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core. Trained on 12 scattered paths (`-scatter 12`) where no grid is named; {len(bench.case.unseen)} "
              "paths that no training has seen." + (" Full order's seconds are those of `scripts/bench history`." if arguments.full_order else ""))
     known = map(float, arguments.full_order.split(",")) if arguments.full_order else map(bench.full_order, ("tangent", "elastic"))
-    for name, cpu in zip(("full order, Newton", "full order, the elastic factor kept"), known):
-        rows.append({"id": 0, "type": "full", "label": name, "status": words, "path_s": cpu})
-        print(f"{name}: {seconds(cpu)}", flush=True)
-    return rows
+    return [{"id": 0, "type": "full", "label": name, "status": words, "path_s": cpu}
+            for name, cpu in zip(("full order, Newton", "full order, the elastic factor kept"), known)]
+
+
+def measure(mesh, arguments, before):
+    """Rows of the settings, then those of full order. before: rows of the last run, which stay where only some settings are asked for."""
+    case = case_of(mesh)
+    if arguments.quick:
+        case.unseen, case.references = case.unseen[:1], case.references[:1]
+    chosen = [int(k) for k in arguments.settings.split(",")] if arguments.settings else [4] if arguments.quick else range(1, len(case.settings) + 1)
+    names = [setting.label for setting in case.settings]
+    rows = {row["label"]: row | {"id": names.index(row["label"]) + 1} for row in before if arguments.settings and row["label"] in names}
+    bench = Bench(case, arguments.snapshots, arguments.timeout)
+    for k in chosen:
+        row = bench.setting(case.settings[k - 1], os.path.join(timed.folder, "model.h5")) | {"id": k}
+        rows[row["label"]] = row
+        print(f"{k}/{len(names)} {row['label']}: {row['status']}" +
+              (f", {seconds(row['path_s'])}, " + ", ".join(f"{kind} {percent(row[kind + '_max'])} %" for kind in KINDS if kind + "_max" in row)
+               if row["status"] == "ok" else ""), flush=True)
+    full = [row for row in before if arguments.settings and row["type"] == "full"]
+    return sorted(rows.values(), key=lambda row: row["id"]) + (full or full_orders(bench, arguments))
 
 
 def split(rows):
@@ -210,7 +214,8 @@ def headline(mesh, rows):
 
 def plot(mesh, rows, path):
     ok, _, full = split(rows)
-    figure, axes = plt.subplots(2, 2, figsize=(11, 8.2), layout="constrained", sharex=True)
+    figure, axes = plt.subplots(2, 2, figsize=(11, 8.6), sharex=True)
+    figure.set_layout_engine("constrained", rect=(0, 0.06, 1, 0.94))  # the legend below
     for axis, (kind, words) in zip(axes.flat, KINDS.items()):
         for type_ in dict.fromkeys(r["type"] for r in ok):
             mine = [r for r in ok if r["type"] == type_ and kind + "_max" in r]
@@ -226,7 +231,8 @@ def plot(mesh, rows, path):
         axis.set(xscale="log", yscale="log", title=words, ylabel="error, %: median to largest")
     for axis in axes[1]:
         axis.set_xlabel("CPU seconds of a path")
-    axes[0, 0].legend(fontsize=8, framealpha=0.9)
+    handles, words = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, words, loc="lower center", ncol=4, fontsize=9)
     figure.suptitle(f"{case_of(mesh).name}: error at unseen paths, each at its worst time, against online time")
     figure.savefig(path, dpi=100)
     plt.close(figure)
