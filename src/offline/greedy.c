@@ -363,6 +363,11 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   HycoCheck(!t->prototype->ops->choosepoints,
             "a condensed model needs a tensor grid of training points, which -greedy does not give: use -grid, or "
             "-values_NAME");
+  HycoCheck(
+      !t->prototype->traits.cells,
+      "train -greedy adds cells to the RID of before, and a %s model chooses all of its cells anew: train it on a "
+      "grid or on points",
+      t->prototype->traits.title);
   loop.begin = HycoNow();
   PetscCall(TakeTraining(training, &loop));
   PetscCall(Start(t, start, &loop.samples));

@@ -1,4 +1,5 @@
 """Histories that are none, and what takes no history: one line each, whatever the ranks."""
+import glob
 import os
 import unittest
 
@@ -62,14 +63,17 @@ class Faults(Case):
         self.fails('solve', '-scene', path, '-mu', '0.01,1', words=['ring', 'norton', 'history'])
 
     def test_no_reduced_models(self):
-        """Of the types of model that have no paths, and where points are chosen."""
+        """Where a type has none of such scenes, and what takes no set of paths; nothing is solved before it is said."""
         model = self.path('m.h5')
         for ranks in (0, 2):
-            self.fails('train', '-scene', RING, '-grid', '2,2', '-model', model, '-hyco_model_type', 'condensed', words=['history', 'condensed'],
-                       ranks=ranks)
-        self.fails('train', '-scene', RING, '-greedy', '-training_grid', '2,2', '-model', model, words=['history'])
+            self.fails('train', '-scene', RING, '-grid', '2,2', '-model', model, '-hyco_model_type', 'condensed', '-body_core_young', '1e5*(1+creep)',
+                       words=['creep reaches the stiffness', 'condensed'], ranks=ranks)
+        for kind in ('condensed', 'cubature'):
+            self.fails('train', '-scene', RING, '-greedy', '-training_grid', '2,2', '-model', model, '-hyco_model_type', kind,
+                       words=['-greedy', kind, 'grid'])
         self.fails('solve', '-scene', RING, '-grid', '2,2', words=['history'])
         self.assertFalse(os.path.exists(model))
+        self.assertEqual(glob.glob(os.path.join(model + '.snapshots', '*')), [])
 
     def test_options(self):
         self.fails('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_newton', 'tangent', words=['hyco_newton'])

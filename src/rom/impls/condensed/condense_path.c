@@ -530,9 +530,6 @@ PetscErrorCode HycoCondensedPathModes(HycoReducer t, HycoSnapshots store)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  HycoCheck(!t->grown,
-            "train -greedy adds cells to the RID of before, and a condensed model of paths chooses all of its "
-            "cells anew: train it on a grid or on points");
   ierr = Sample(t, store, modes);
   if (!ierr) ierr = Condense(t, store, modes);
   for (PetscInt k = 0; k < N_SAMPLED; k++) {

@@ -70,8 +70,6 @@ static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
   Mat W;
 
   PetscFunctionBegin;
-  HycoCheck(!t->grown, "train -greedy adds cells to the RID of before, and a cubature chooses all of its cells anew: "
-                       "train it on a grid or on points");
   PetscCall(HycoProjectionModes(t, store));
   PetscCall(HycoCubatureFindContacts(t));
   if (c->tol == 0) {
