@@ -136,7 +136,7 @@ class Bench:
 
 def full_orders(bench, arguments):
     """Their rows; `status` says where and how all was measured."""
-    words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core. Trained on 12 scattered paths (`-scatter 12`) where no grid is named; {len(bench.case.unseen)} "
+    words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core; other work on the machine adds tens of per cent. Trained on 12 scattered paths (`-scatter 12`) where no grid is named; {len(bench.case.unseen)} "
              "paths that no training has seen." + (" Full order's seconds are those of `scripts/bench history`." if arguments.full_order else ""))
     known = map(float, arguments.full_order.split(",")) if arguments.full_order else map(bench.full_order, ("tangent", "elastic"))
     return [{"id": 0, "type": "full", "label": name, "status": words, "path_s": cpu}
