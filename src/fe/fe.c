@@ -226,8 +226,9 @@ static PetscErrorCode SetOblique(HycoFE fe)
       const HycoBody *body = &fe->scene->body[m->node_body[i]];
       PetscReal n[3] = {0, 0, 0}, value, size = 0;
 
-      for (PetscInt c = 0; c < m->dim; c++) {
-        if (fixed->direction[c]) PetscCall(HycoExprEval(fixed->direction[c], fe->mu, 1, fe->X + 3 * i, &n[c]));
+      for (PetscInt c = 0; c < 3; c++) {
+        if (c < m->dim && fixed->direction[c])
+          PetscCall(HycoExprEval(fixed->direction[c], fe->mu, 1, fe->X + 3 * i, &n[c]));
         size += n[c] * n[c];
       }
       if (HycoMeshTied(m, i) >= 0) {
