@@ -155,7 +155,7 @@ class Ties(Case):
             grid.box('quad4', [np.linspace(1, 2, 4), np.linspace(0, a, n + 1)], arc, 'inner', {'x0': 'bore', 'x1': 'out', 'y0': 'y0', 'y1': 'y1'})
             grid.box('quad4', [np.linspace(2, 3, 4), np.linspace(0, a, 2 * n + 1)], arc, 'outer', {'x0': 'in', 'y0': 'y0', 'y1': 'y1'})
             text = ('scene: {mesh: mesh.msh}\nbody: {inner: {young: 200, poisson: 0.3}, outer: {young: 100, poisson: 0.3}}\npressure: {bore: 1}\n'
-                    f'fixed: {{y0: {{y: 0}}, y1: {{normal: 0, direction: {{x: {-np.sin(a)!r}, y: {np.cos(a)!r}}}}}}}\n'
+                    f'fixed: {{y0: {{y: 0}}, y1: {{normal: 0, direction: {{x: {-np.sin(a):.17g}, y: {np.cos(a):.17g}}}}}}}\n'
                     'tie: {glue: {slave: in, master: out, tolerance: 0.1}}\n')
             for ranks in (0, 2):
                 found = self.hyco('solve', '-scene', self.written(text, grid), ranks=ranks)
