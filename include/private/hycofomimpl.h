@@ -82,10 +82,10 @@ PetscErrorCode HycoFOMStress(HycoFOM fom);
 PetscErrorCode HycoFOMMeasureQuantities(HycoFOM fom, PetscReal value[]);
 /* The file's order, spread over the ranks; NULL on one. Borrowed. Collective. */
 PetscErrorCode HycoFOMGetRows(HycoFOM fom, const HycoFileOrder **rows);
-/* The reals of this rank's rows in the file's order, `components` a node, at the part's nodes; `components` a cell, at
-   its cells. Collective. */
-PetscErrorCode HycoFOMFromRows(HycoFOM fom, PetscInt components, const PetscReal rows[], PetscReal value[]);
-PetscErrorCode HycoFOMFromCellRows(HycoFOM fom, PetscInt components, const PetscReal rows[], PetscReal value[]);
+/* The reals of this rank's rows in the file's order, so many a node or cell, at the part's nodes or cells. Collective.
+ */
+PetscErrorCode HycoFOMFromRows(HycoFOM fom, HycoPlace place, PetscInt components, const PetscReal rows[],
+                               PetscReal value[]);
 /* Values of the part's nodes or cells, so many of a type each, as this rank's rows in the file's order. Collective. */
 PetscErrorCode HycoFOMToRows(HycoFOM fom, HycoPlace place, MPI_Datatype type, PetscInt components, const void *value,
                              void *rows);

@@ -70,7 +70,7 @@ static PetscErrorCode Complete(HycoComparison *c)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPIU_INT, MPI_MAX, HycoComm(c->f)));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(fe->n_dof, &u));
-  PetscCall(HycoFOMFromRows(c->f, fe->dim, c->U, u));
+  PetscCall(HycoFOMFromRows(c->f, HYCO_ON_NODES, fe->dim, c->U, u));
   HycoFEComplete(fe, u);
   PetscCall(HycoFOMToRows(c->f, HYCO_ON_NODES, MPIU_REAL, fe->dim, u, c->U));
   PetscCall(PetscFree(u));

@@ -92,7 +92,7 @@ PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minu
   n = dim * (order ? order->n[HYCO_ON_NODES] : part->n_nodes);
   PetscCall(PetscMalloc2(n, &rows, part->n_nodes * dim, &value));
   for (PetscInt i = 0; i < n; i++) rows[i] = minus ? u[i] - minus[i] : u[i];
-  PetscCall(HycoFOMFromRows(h->f, dim, rows, value));
+  PetscCall(HycoFOMFromRows(h->f, HYCO_ON_NODES, dim, rows, value));
   PetscCall(VecGetArray(h->x, &x));
   for (PetscInt i = 0; i < part->n_nodes; i++) {
     const PetscInt place = HycoMeshOwned(part, i);

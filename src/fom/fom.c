@@ -205,7 +205,6 @@ static PetscErrorCode CreateScatters(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B and Bt with the pattern that any parameter gives: all components of a contact's nodes. */
 static PetscInt GlobalNode(HycoFOM f, PetscInt node)
 {
   return f->surface->node_global ? f->surface->node_global[node] : node;
@@ -227,6 +226,7 @@ static PetscErrorCode TellSlaves(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* B and Bt with the pattern that any parameter gives: all components of a contact's nodes. */
 static PetscErrorCode CreateB(HycoFOM f)
 {
   const PetscInt dim = f->part->dim, entries = f->width * dim;

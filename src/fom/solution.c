@@ -278,7 +278,7 @@ PetscErrorCode HycoFOMGetRows(HycoFOM f, const HycoFileOrder **rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode FromRows(HycoFOM f, HycoPlace place, PetscInt components, const PetscReal rows[],
+PetscErrorCode HycoFOMFromRows(HycoFOM f, HycoPlace place, PetscInt components, const PetscReal rows[],
                                PetscReal value[])
 {
   const PetscInt n = place == HYCO_ON_CELLS ? f->part->n_cells : f->part->n_nodes;
@@ -290,20 +290,6 @@ static PetscErrorCode FromRows(HycoFOM f, HycoPlace place, PetscInt components, 
     PetscCall(HycoFileOrderFetch(order, f->part, place, components, rows, value));
   else
     PetscCall(PetscArraycpy(value, rows, n * components));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMFromRows(HycoFOM f, PetscInt components, const PetscReal rows[], PetscReal value[])
-{
-  PetscFunctionBegin;
-  PetscCall(FromRows(f, HYCO_ON_NODES, components, rows, value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMFromCellRows(HycoFOM f, PetscInt components, const PetscReal rows[], PetscReal value[])
-{
-  PetscFunctionBegin;
-  PetscCall(FromRows(f, HYCO_ON_CELLS, components, rows, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -95,7 +95,7 @@ static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
   PetscFunctionBegin;
   PetscCall(MatDenseGetLDA(s->U, &lda));
   PetscCall(MatDenseGetArrayRead(s->U, &columns));
-  PetscCall(HycoFOMFromRows(s->t->fom, s->fe->dim, columns + (size_t)k * (size_t)lda, u));
+  PetscCall(HycoFOMFromRows(s->t->fom, HYCO_ON_NODES, s->fe->dim, columns + (size_t)k * (size_t)lda, u));
   PetscCall(MatDenseRestoreArrayRead(s->U, &columns));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -270,8 +270,7 @@ static PetscErrorCode PutModes(HycoReducer t, const HycoBasis *modes, HycoPlace 
   PetscCall(MatDenseGetLDA(modes->V, &lda));
   for (PetscInt j = 0; j < modes->l; j++) {
     PetscCall(MatDenseGetArrayRead(modes->V, &rows));
-    PetscCall((place == HYCO_ON_CELLS ? HycoFOMFromCellRows : HycoFOMFromRows)(t->fom, n,
-                                                                               rows + (size_t)j * (size_t)lda, value));
+    PetscCall(HycoFOMFromRows(t->fom, place, n, rows + (size_t)j * (size_t)lda, value));
     PetscCall(MatDenseRestoreArrayRead(modes->V, &rows));
     PetscCall(PetscArrayzero(node, part->n_nodes * dim));
     for (PetscInt k = 0; k < part->n_cells * n && place == HYCO_ON_CELLS; k++)
@@ -422,7 +421,7 @@ static PetscErrorCode TabulateAll(HycoReducer t, PetscReal **table)
   PetscCall(MatDenseGetLDA(t->V, &lda));
   PetscCall(MatDenseGetArrayRead(t->V, &v));
   for (PetscInt j = 0; j < l; j++) {
-    PetscCall(HycoFOMFromRows(t->fom, dim, v + (size_t)j * (size_t)lda, node));
+    PetscCall(HycoFOMFromRows(t->fom, HYCO_ON_NODES, dim, v + (size_t)j * (size_t)lda, node));
     for (PetscInt k = 0; k < part->n_cells * n; k++) {
       const PetscInt cell = part->cell_whole ? part->cell_whole[k / n] : k / n;
 

@@ -41,7 +41,7 @@ static PetscErrorCode FetchModes(Sampler *s)
   PetscCall(MatDenseGetLDA(t->V, &lda));
   PetscCall(MatDenseGetArrayRead(t->V, &v));
   for (PetscInt j = 0; j < l; j++) {
-    PetscCall(HycoFOMFromRows(t->fom, s->fe->dim, v + (size_t)j * (size_t)lda, column));
+    PetscCall(HycoFOMFromRows(t->fom, HYCO_ON_NODES, s->fe->dim, v + (size_t)j * (size_t)lda, column));
     for (PetscInt i = 0; i < n_dof; i++) s->V[(size_t)i * (size_t)l + (size_t)j] = column[i];
   }
   PetscCall(MatDenseRestoreArrayRead(t->V, &v));
