@@ -71,6 +71,11 @@ PetscErrorCode HycoBanded(Mat K, PetscBool *thin);
 PetscErrorCode HycoBandedSolver(PC pc);
 /* Factors the operators of such a solver, with more workspace when MUMPS asks for it. */
 PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular);
+/* A factor of a symmetric, definite A by such a solver (-hyco_norm_...; the caller's), which A is named in the error of
+   a singular one. Collective. */
+PetscErrorCode HycoDefiniteSolver(Mat A, const char name[], KSP *ksp);
+/* A^-1 R of dense R (X: the caller's) by such a factor, which goes. Collective. */
+PetscErrorCode HycoSolveColumns(Mat A, const char name[], Mat R, Mat *X);
 
 /* Conjugate gradients with algebraic multigrid for a sparse, symmetric K, from the last solution. */
 PetscErrorCode HycoIterativeSolver(MPI_Comm comm, const char prefix[], Mat K, KSP *ksp);

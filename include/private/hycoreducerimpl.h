@@ -213,10 +213,8 @@ PetscErrorCode HycoTrainingReplayDestroy(HycoTrainingReplay *replay);
 /* B^T of the dual snapshots, and M^-1 of it with the matrix M of the H1 norm: where each force works most. Both n_dof x
    n_s, dense, rows by the distributed vectors' order, the caller's. Collective. */
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers);
-/* A^-1 R by one factor of A, which is symmetric and definite, of that name (X: the caller's); columns of unit length (0
-   where one has none, and where fixed) of dense X, rows by the distributed vectors' order, with the rows of the modes,
-   by the file's (the caller's). Collective. */
-PetscErrorCode HycoReducerSolve(HycoReducer t, Mat A, const char name[], Mat R, Mat *X);
+/* Columns of unit length (0 where one has none, and where fixed) of dense X, rows by the distributed vectors' order,
+   with the rows of the modes, by the file's (the caller's). Collective. */
 PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled);
 /* Judges the model by the held-out solutions, calibrates the estimates of its errors on them and notes both in it (rank
    0): report->held_out, and n_held, the predictions behind the estimates (0: none; too few). Collective. */

@@ -30,7 +30,6 @@ PetscErrorCode HycoNormsCreate(HycoFOM f, HycoNorms *norms)
   HycoScene scene = f->scene;
   HycoNorms h;
   PetscReal mu[HYCO_MAX_PARAMETERS];
-  PetscBool singular;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&h));
@@ -43,11 +42,8 @@ PetscErrorCode HycoNormsCreate(HycoFOM f, HycoNorms *norms)
   PetscCall(PetscArrayzero(h->fe->fixed, h->fe->n_dof)); /* prescribed displacements count in the norm */
   h->fe->plain = PETSC_TRUE;
   PetscCall(AssembleNorm(h, &h->H));
-  PetscCall(MatSetOption(h->M, MAT_SPD, PETSC_TRUE));
   PetscCall(MatCreateVecs(h->M, &h->x, &h->y));
-  PetscCall(HycoDirectSolver(HycoComm(f), "hyco_norm_", h->M, PETSC_TRUE, &h->ksp));
-  PetscCall(HycoFactor(h->ksp, &singular));
-  PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the H1 norm's matrix is singular");
+  PetscCall(HycoDefiniteSolver(h->M, "the H1 norm's matrix", &h->ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

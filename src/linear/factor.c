@@ -118,3 +118,32 @@ PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular)
   *singular = (PetscBool)(failed != PC_NOERROR);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode HycoDefiniteSolver(Mat A, const char name[], KSP *ksp)
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)A);
+  PetscBool singular;
+
+  PetscFunctionBegin;
+  PetscCall(MatSetOption(A, MAT_SPD, PETSC_TRUE));
+  PetscCall(HycoDirectSolver(comm, "hyco_norm_", A, PETSC_TRUE, ksp));
+  PetscCall(HycoFactor(*ksp, &singular));
+  PetscCheck(!singular, comm, PETSC_ERR_PLIB, "%s is singular", name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolveColumns(Mat A, const char name[], Mat R, Mat *X)
+{
+  KSP ksp;
+  Mat factor;
+  PC pc;
+
+  PetscFunctionBegin;
+  PetscCall(HycoDefiniteSolver(A, name, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCFactorGetMatrix(pc, &factor));
+  PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, X));
+  PetscCall(MatMatSolve(factor, R, *X));
+  PetscCall(KSPDestroy(&ksp));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -135,7 +135,6 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
   HycoROM m = d->model;
   const unsigned long long now =
       HycoHash(HYCO_HASH_START, m->fe->X, (size_t)(3 * m->fe->mesh->n_nodes) * sizeof(PetscReal));
-  PetscBool singular;
 
   PetscFunctionBegin;
   if (d->M_A && now == d->geometry) PetscFunctionReturn(PETSC_SUCCESS);
@@ -144,10 +143,7 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
   PetscCall(MatDestroy(&d->M_A));
   PetscCall(HycoFEAssembleH1(m->fe, d->length, d->M));
   PetscCall(MatCreateSubMatrix(d->M, d->local.is_A, d->local.is_A, MAT_INITIAL_MATRIX, &d->M_A));
-  PetscCall(MatSetOption(d->M_A, MAT_SPD, PETSC_TRUE));
-  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", d->M_A, PETSC_TRUE, &d->norm));
-  PetscCall(HycoFactor(d->norm, &singular));
-  PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the H1 norm's matrix is singular");
+  PetscCall(HycoDefiniteSolver(d->M_A, "the H1 norm's matrix", &d->norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -452,26 +452,6 @@ static PetscErrorCode SetForces(HycoReducer t, PetscInt k, Mat R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerSolve(HycoReducer t, Mat A, const char name[], Mat R, Mat *X)
-{
-  KSP ksp;
-  PetscBool singular;
-  Mat factor;
-  PC pc;
-
-  PetscFunctionBegin;
-  PetscCall(MatSetOption(A, MAT_SPD, PETSC_TRUE));
-  PetscCall(HycoDirectSolver(HycoComm(t), "hyco_norm_", A, PETSC_TRUE, &ksp));
-  PetscCall(HycoFactor(ksp, &singular));
-  PetscCheck(!singular, HycoComm(t), PETSC_ERR_PLIB, "%s is singular", name);
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCFactorGetMatrix(pc, &factor));
-  PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, X));
-  PetscCall(MatMatSolve(factor, R, *X));
-  PetscCall(KSPDestroy(&ksp));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled)
 {
   HycoMesh part = t->fom->part;
@@ -526,7 +506,7 @@ PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremize
   PetscCall(MatAssemblyEnd(R, MAT_FINAL_ASSEMBLY));
   PetscCall(HycoFECreateMatrix(f->fe, HycoComm(t), f->part->n_owned, f->part->first, &M));
   HycoOnEach(HycoComm(t), HycoFEAssembleH1(f->fe, HycoMeshLength(f->part), M));
-  PetscCall(HycoReducerSolve(t, M, "the H1 norm's matrix", R, supremizers));
+  PetscCall(HycoSolveColumns(M, "the H1 norm's matrix", R, supremizers));
   PetscCall(MatDestroy(&M));
   *forces = R;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -85,7 +85,7 @@ static PetscErrorCode HoldFloating(HycoFE fe, Mat K)
 static PetscErrorCode Factor(HycoROM m, HycoBalance b)
 {
   const HycoFE fe = m->fe_whole;
-  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, singular;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
   HycoChanges reached;
 
   PetscFunctionBegin;
@@ -96,10 +96,7 @@ static PetscErrorCode Factor(HycoROM m, HycoBalance b)
   PetscCall(KSPDestroy(&b->ksp));
   PetscCall(HycoFEAssembleStiffness(fe, b->K));
   PetscCall(HoldFloating(fe, b->K));
-  PetscCall(MatSetOption(b->K, MAT_SPD, PETSC_TRUE));
-  PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_norm_", b->K, PETSC_TRUE, &b->ksp));
-  HycoLogged(HYCO_EVENT_FACTOR, HycoFactor(b->ksp, &singular));
-  PetscCheck(!singular, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the elastic stiffness of the whole mesh is singular");
+  HycoLogged(HYCO_EVENT_FACTOR, HycoDefiniteSolver(b->K, "the elastic stiffness of the whole mesh", &b->ksp));
   PetscCall(PetscArraycpy(b->mu, fe->mu, m->scene->n_variables));
   b->factored = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

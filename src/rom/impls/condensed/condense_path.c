@@ -322,7 +322,7 @@ static PetscErrorCode TakeAnswers(HycoReducer t, HycoSnapshots store, Mat K, con
   PetscCall(PutModes(t, &modes[LOADS], HYCO_ON_NODES, R, n[0]));
   HycoOnRoot(HycoComm(t), PutContacts(t, R, n[0] + n[1]));
   PetscCall(End(R));
-  PetscCall(HycoReducerSolve(t, K, "the stiffness", R, &X));
+  PetscCall(HycoSolveColumns(K, "the stiffness", R, &X));
   PetscCall(MatDestroy(&R));
   PetscCall(HycoReducerUnitRows(t, X, &S));
   PetscCall(MatDestroy(&X));
