@@ -87,6 +87,22 @@ typedef struct {
 PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
                           HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report);
 PetscErrorCode HycoFEElasticTangent(HycoFE fe);
+
+/*
+  Steps on displacements that are known: HycoMarchBegin() from the virgin state, fe (borrowed) at the parameters of the
+  first time; HycoMarchStep() with fe at those of t1, after which `state` is that of t1 and f_int (n_dof) its internal
+  forces, whatever the report says. HycoMarchEnd() also after a failure. Not collective.
+*/
+typedef struct {
+  HycoFE fe;
+  HycoFEState state, end;
+  PetscReal *f_int;
+} HycoMarch;
+PetscErrorCode HycoMarchBegin(HycoFE fe, HycoMarch *march);
+PetscErrorCode HycoMarchStep(HycoMarch *march, const PetscReal u[], PetscReal t0, PetscReal t1,
+                             HycoFEStepReport *report);
+PetscErrorCode HycoMarchEnd(HycoMarch *march);
+
 /* The internal forces of one cell from the state's stresses, the integral of B^T sigma (f: nv x dim, overwritten). */
 PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, PetscReal f[]);
 

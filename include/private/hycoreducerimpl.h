@@ -192,7 +192,7 @@ PetscErrorCode HycoReducerFindPlane(HycoReducer t, const char **group);
   The laws again along the training paths (training_replay.c), on this rank's part, in the steps that full order took;
   between listed times displacements are linear in time. HycoTrainingReplayFollow() goes through one path (without a
   history: a point) and calls record(ctx, k) at each listed time, where k is its column of the snapshots, the part's fe
-  is at its parameters and `u` and `state` are there. displacement(ctx, k, u): that of column k at the part's nodes
+  is at its parameters and `u` and the march are there. displacement(ctx, k, u): that of column k at the part's nodes
   (n_dof) less its lifting. Both are collective, as all of it. HycoTrainingReplayDestroy() also after a failure.
 */
 typedef struct {
@@ -201,9 +201,9 @@ typedef struct {
   PetscErrorCode (*displacement)(void *ctx, PetscInt k, PetscReal u[]), (*record)(void *ctx, PetscInt k);
   void *ctx;
   PetscReal *u; /* n_dof */
-  HycoFEState state, end;
-  PetscInt column;                   /* that of `before`; -1: none */
-  PetscReal *before, *after, *f_int; /* n_dof: displacements of two listed times; nobody asks for */
+  HycoMarch march;
+  PetscInt column;           /* that of `before`; -1: none */
+  PetscReal *before, *after; /* n_dof: displacements of two listed times */
 } HycoTrainingReplay;
 PetscErrorCode HycoTrainingReplayCreate(HycoReducer t, PetscErrorCode (*displacement)(void *, PetscInt, PetscReal[]),
                                         PetscErrorCode (*record)(void *, PetscInt), void *ctx,

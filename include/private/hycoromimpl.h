@@ -125,15 +125,13 @@ PetscErrorCode HycoTraceWrite(HycoROM model, const char path[]);
 /*
   The laws again along the path of the last prediction, on `fe` (of whatever cells): HycoReplayBegin(), then of each
   accepted step k from 0 on HycoReplayMove(), with which fe stands at its time and parameters, and HycoReplayStep() with
-  fe's displacements u (n_dof) there, after which `state` is that of its end and f_int (n_dof) the internal forces;
-  fails where a law has no answer. HycoReplayTry() says so in the report instead.
+  fe's displacements u (n_dof) there, after which the march has its state and internal forces; fails where a law has no
+  answer. HycoReplayTry() says so in the report instead.
   HycoReplayEnd() also after a failure.
 */
 typedef struct {
-  HycoROM m;
-  HycoFE fe; /* both borrowed */
-  HycoFEState state, end;
-  PetscReal *f_int;
+  HycoROM m; /* borrowed */
+  HycoMarch march;
 } HycoReplay;
 PetscErrorCode HycoReplayBegin(HycoROM model, HycoFE fe, HycoReplay *replay);
 PetscErrorCode HycoReplayMove(HycoReplay *replay, PetscInt k);

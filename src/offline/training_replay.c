@@ -10,16 +10,14 @@ PetscErrorCode HycoTrainingReplayCreate(HycoReducer t, PetscErrorCode (*displace
   PetscCall(PetscMalloc1(r->fe->n_dof, &r->u));
   PetscCall(PetscMalloc1(r->fe->n_dof, &r->before));
   PetscCall(PetscMalloc1(r->fe->n_dof, &r->after));
-  PetscCall(PetscCalloc1(r->fe->n_dof, &r->f_int));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoTrainingReplayDestroy(HycoTrainingReplay *r)
 {
   PetscFunctionBegin;
-  PetscCall(HycoFEStateDestroy(&r->state));
-  PetscCall(HycoFEStateDestroy(&r->end));
-  HycoFreeAll(&r->u, &r->before, &r->after, &r->f_int);
+  PetscCall(HycoMarchEnd(&r->march));
+  HycoFreeAll(&r->u, &r->before, &r->after);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -50,20 +48,13 @@ static PetscErrorCode Displace(HycoTrainingReplay *r, PetscInt k, PetscReal time
 /* The laws from t0 to t1, which fe and u are at. */
 static PetscErrorCode Step(HycoTrainingReplay *r, PetscReal t0, PetscReal t1)
 {
-  HycoFEState state;
   HycoFEStepReport report;
 
   PetscFunctionBegin;
-  if (!r->state) {
-    PetscCall(HycoFEStateCreate(r->fe, &r->state));
-    PetscCall(HycoFEStateCreate(r->fe, &r->end));
-  }
-  state = r->state;
-  PetscCall(HycoFEStep(r->fe, r->u, t0, t1, r->state, r->end, r->f_int, PETSC_FALSE, &report));
+  if (!r->march.state) PetscCall(HycoMarchBegin(r->fe, &r->march)); /* now that fe is at the path's first time */
+  PetscCall(HycoMarchStep(&r->march, r->u, t0, t1, &report));
   HycoCheckModel(!report.failed, "the laws have no answer to the training displacements at t = %.10g: %s", (double)t1,
                  report.why);
-  r->state = r->end;
-  r->end = state;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -77,8 +68,7 @@ static PetscErrorCode Follow(HycoTrainingReplay *r, PetscInt k, const PetscReal 
   PetscInt step = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoFEStateDestroy(&r->state));
-  PetscCall(HycoFEStateDestroy(&r->end));
+  PetscCall(HycoMarchEnd(&r->march));
   for (PetscInt i = 0; i < n; i++) {
     HycoSceneSetTime(scene, mu, taken[i], all);
     PetscCall(HycoFOMSetParameters(r->t->fom, all));

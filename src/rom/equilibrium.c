@@ -135,7 +135,7 @@ static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, 
   PetscCall(HycoFELoads(fe, b->load));
   HycoFEGeneralise(fe, b->load);
   PetscCall(VecGetArray(b->r, &r));
-  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = replay->f_int[k] - b->load[k];
+  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = replay->march.f_int[k] - b->load[k];
   AddContact(m, b, j, r);
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? 0 : r[k];
   PetscCall(VecRestoreArray(b->r, &r));

@@ -146,8 +146,8 @@ static PetscErrorCode March(HycoProbe p, HycoReplay *r)
     Displace(m, p, trace->gamma + (size_t)k * (size_t)m->l, trace->U_fe + (size_t)k * (size_t)m->n_fe);
     PetscCall(HycoReplayStep(r, k, p->u));
     if (j == trace->n_listed || trace->at[j] != k) continue;
-    PetscCall(HycoFEStateFields(p->fe, r->state, p->sigma, NULL, NULL, NULL));
-    PetscCall(React(m, p, r->f_int, trace->Lambda + (size_t)j * (size_t)m->pairs.n));
+    PetscCall(HycoFEStateFields(p->fe, r->march.state, p->sigma, NULL, NULL, NULL));
+    PetscCall(React(m, p, r->march.f_int, trace->Lambda + (size_t)j * (size_t)m->pairs.n));
     PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, p->reaction, trace->step[j++].quantity));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

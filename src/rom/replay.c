@@ -11,31 +11,25 @@ PetscErrorCode HycoReplayMove(HycoReplay *r, PetscInt k)
 
   PetscFunctionBegin;
   HycoSceneSetTime(r->m->scene, r->m->fe->mu, r->m->trace.t[k], mu);
-  PetscCall(HycoFESetParameters(r->fe, mu));
+  PetscCall(HycoFESetParameters(r->march.fe, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoReplayBegin(HycoROM m, HycoFE fe, HycoReplay *r)
 {
   PetscFunctionBegin;
-  *r = (HycoReplay){.m = m, .fe = fe};
+  *r = (HycoReplay){.m = m, .march.fe = fe};
   PetscCall(HycoReplayMove(r, 0)); /* the state is made at the first temperature */
-  PetscCall(HycoFEStateCreate(fe, &r->state));
-  PetscCall(HycoFEStateCreate(fe, &r->end));
-  PetscCall(PetscCalloc1(fe->n_dof, &r->f_int));
+  PetscCall(HycoMarchBegin(fe, &r->march));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoReplayTry(HycoReplay *r, PetscInt k, const PetscReal u[], HycoFEStepReport *report)
 {
   const PetscReal *t = r->m->trace.t;
-  HycoFEState state = r->state;
 
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(r->f_int, r->fe->n_dof));
-  PetscCall(HycoFEStep(r->fe, u, t[PetscMax(k - 1, 0)], t[k], r->state, r->end, r->f_int, PETSC_FALSE, report));
-  r->state = r->end;
-  r->end = state;
+  PetscCall(HycoMarchStep(&r->march, u, t[PetscMax(k - 1, 0)], t[k], report));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -53,9 +47,7 @@ PetscErrorCode HycoReplayStep(HycoReplay *r, PetscInt k, const PetscReal u[])
 PetscErrorCode HycoReplayEnd(HycoReplay *r)
 {
   PetscFunctionBegin;
-  PetscCall(HycoFEStateDestroy(&r->state));
-  PetscCall(HycoFEStateDestroy(&r->end));
-  PetscCall(PetscFree(r->f_int));
+  PetscCall(HycoMarchEnd(&r->march));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -65,7 +57,7 @@ static HycoSeriesSource Look(const HycoReplay *r, PetscInt j)
   HycoROM m = r->m;
   const HycoSeriesSource from = {.comm = PETSC_COMM_SELF,
                                  .fe = m->fe_whole,
-                                 .state = r->state,
+                                 .state = r->march.state,
                                  .fe_surface = m->fe_whole,
                                  .pairs = &m->whole_pairs,
                                  .n_nodes = m->whole->n_nodes,

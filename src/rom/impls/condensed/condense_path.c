@@ -121,7 +121,7 @@ static PetscErrorCode Measure(Sampler *s)
     }
     if (s->flowing[e] >= 0)
       PetscCall(HycoCondensedCellForce(fe, e, s->Ke + (size_t)s->flowing[e] * (size_t)(n * n), heat, s->replay.u,
-                                       s->replay.state, q, NULL));
+                                       s->replay.march.state, q, NULL));
   }
   for (PetscInt k = 0; k < fe->n_dof; k++) s->value[LOADS][k] = fe->fixed[k] ? 0 : s->value[LOADS][k];
   PetscFunctionReturn(PETSC_SUCCESS);

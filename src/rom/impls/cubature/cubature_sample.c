@@ -93,7 +93,7 @@ static PetscErrorCode Project(Sampler *s)
 
     for (PetscInt j = 0; j < l; j++) g[j] = 0;
     if (near && near[e]) continue;
-    PetscCall(HycoFEStateForce(s->fe, s->replay.state, e, f));
+    PetscCall(HycoFEStateForce(s->fe, s->replay.march.state, e, f));
     PetscCall(HycoFEBodyForce(s->fe, e, load));
     for (PetscInt k = 0; k < n; k++)
       AddForce(s, m->cells[e * m->nv + k / m->dim] * m->dim + k % m->dim, f[k] - load[k], g);

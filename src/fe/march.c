@@ -1,0 +1,33 @@
+/* The laws along displacements that are known. */
+#include <hycoinelastic.h>
+
+PetscErrorCode HycoMarchBegin(HycoFE fe, HycoMarch *m)
+{
+  PetscFunctionBegin;
+  *m = (HycoMarch){.fe = fe};
+  PetscCall(HycoFEStateCreate(fe, &m->state));
+  PetscCall(HycoFEStateCreate(fe, &m->end));
+  PetscCall(PetscCalloc1(fe->n_dof, &m->f_int));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMarchStep(HycoMarch *m, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEStepReport *report)
+{
+  const HycoFEState state = m->state;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(m->f_int, m->fe->n_dof));
+  PetscCall(HycoFEStep(m->fe, u, t0, t1, m->state, m->end, m->f_int, PETSC_FALSE, report));
+  m->state = m->end;
+  m->end = state;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMarchEnd(HycoMarch *m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEStateDestroy(&m->state));
+  PetscCall(HycoFEStateDestroy(&m->end));
+  PetscCall(PetscFree(m->f_int));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
