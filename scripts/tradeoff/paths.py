@@ -206,10 +206,10 @@ def headline(mesh, rows):
     newton, elastic = (f["path_s"] for f in full)
     words = [f"{percent(best[k + '_max'])} % in {word.split(' of the')[0].split(' on the')[0]}" for k, word in KINDS.items()]
     return ["![error against online time for each type of model, a power ramp on a fuel rod](docs/tradeoff/rod-B.png)", "",
-            f"A power ramp on a fuel rod whose cladding creeps and yields (`examples/rod`, mesh {mesh}) takes {seconds(newton)} by full Newton, {seconds(elastic)} with the",
-            f"elastic factor kept, and {seconds(best['path_s'])} by the hybrid model: {newton / best['path_s']:.0f} and {elastic / best['path_s']:.0f} times less. At "
-            "unseen parameters, each path at its worst time,",
-            f"it is off by at most {', '.join(words[:-1])} and {words[-1]}."]
+            f"On one power ramp of a fuel rod whose cladding creeps and yields (`examples/rod`, mesh {mesh}), full order takes {seconds(newton)} by Newton's method, or {seconds(elastic)} if",
+            f"the elastic factor is kept; the hybrid model takes {seconds(best['path_s'])}, which is {newton / best['path_s']:.0f} and {elastic / best['path_s']:.0f} times less. At "
+            "unseen parameters, and for each path at its worst time,",
+            f"its errors are at most {', '.join(words[:-1])} and {words[-1]}."]
 
 
 def plot(mesh, rows, path):

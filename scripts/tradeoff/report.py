@@ -125,7 +125,7 @@ def headline(case, rows, full):
         if r:
             lines.append(line(kind, r, True))
     columns = ["", *([f"a ramp of {warm['ramp_n']:.0f} loads"] if ramps else []), "a new geometry"]
-    return [f"{case.name}; errors {words}:", "", *table(columns, lines)]
+    return [f"{case.name}; {words}:", "", *table(columns, lines)]
 
 
 def settings(rows):
