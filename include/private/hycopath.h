@@ -109,6 +109,8 @@ struct _n_HycoPath {
   HycoSeries series; /* NULL: none is asked for */
   HycoStepMonitor monitor;
   void *monitor_ctx;
+  PetscErrorCode (*interrupt)(void *ctx); /* called at each iteration on every rank; its error ends the path. NULL */
+  void *interrupt_ctx;
 };
 
 /* With the options' defaults. The caller owns it. */

@@ -100,6 +100,7 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   const PetscScalar *u;
 
   PetscFunctionBegin;
+  if (p->interrupt) PetscCall((*p->interrupt)(p->interrupt_ctx));
   PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(PetscArrayzero(p->f_local, f->fe->n_dof));
