@@ -33,6 +33,10 @@ static inline PetscInt HycoSnapshotsSteps(HycoScene scene)
 */
 PetscErrorCode HycoSnapshotsGetField(HycoSnapshots store, HycoSamples samples, const char field[], PetscInt block,
                                      Mat *S);
+/* Of a path the displacements at steps that full order took between listed times (at most five between
+   two; none in files of older versions), a column each; `rows` rows of `total` here. Collective; the caller owns it. */
+PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots store, const PetscReal mu[], PetscInt rows, PetscInt total,
+                                       Mat *U);
 /* The n values from `first` on of one field of the solution at mu, of a history at listed time k (else 0), into the
    caller's memory. Not collective. */
 PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots store, const PetscReal mu[], PetscInt k, const char field[],

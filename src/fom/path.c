@@ -221,6 +221,10 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscCall(VecCopy(p->F, p->F_old));
   PetscCall(VecCopy(p->f_int, p->f_old));
   p->now.energy_defect = PetscMax(p->now.energy_defect, defect);
+  if (p->between && p->t < p->scene->times[p->step]) {
+    PetscCall(HycoFOMGather((HycoFOM)p->ctx));
+    PetscCall((*p->between)((HycoFOM)p->ctx, p->monitor_ctx));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -385,6 +389,7 @@ PetscErrorCode HycoFOMSetStepMonitor(HycoFOM f, HycoStepMonitor monitor, void *c
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   HycoCheck(f->path, "HycoFOMSetStepMonitor: the scene has no history, and its solution no steps");
   f->path->monitor = monitor;
+  f->path->between = NULL;
   f->path->monitor_ctx = ctx;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -285,7 +285,38 @@ typedef struct {
   HycoSnapshots s;
   HycoH5 h;
   PetscReal *force, *inelastic;
+  PetscInt n_between; /* steps written that no listed time ends */
+  PetscInt slot; /* of the last of these: its part of the interval between two listed times, numbered from the path's
+                    start */
 } PathWriter;
+
+/* At most so many steps between two listed times are kept, one of each of as many equal parts of the interval. */
+#define MOST_BETWEEN 5
+
+static void NameBetween(PetscInt k, char name[HYCO_LINE])
+{
+  HycoFormat(name, "between-%04d", (int)k);
+}
+
+/* The displacements of an accepted step between listed times: more of the path for the modes, at no cost of solution.
+ */
+static PetscErrorCode WriteBetween(HycoFOM fom, void *ctx)
+{
+  PathWriter *w = (PathWriter *)ctx;
+  const HycoPath p = fom->path;
+  const PetscReal *times = fom->scene->times + p->step - 1;
+  const PetscInt slot = p->step * MOST_BETWEEN + (PetscInt)(MOST_BETWEEN * (p->t - times[0]) / (times[1] - times[0]));
+  const HycoFileOrder *rows;
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (slot == w->slot) PetscFunctionReturn(PETSC_SUCCESS);
+  w->slot = slot;
+  NameBetween(w->n_between++, name);
+  PetscCall(HycoFOMGetRows(fom, &rows));
+  PetscCall(HycoFieldWrite(w->h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, fom->fe->dim, 1, fom->u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* A HycoStepMonitor: the fields of a listed time. The forces are those that the bodies resist with, f_int. */
 static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
@@ -325,6 +356,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
 
   PetscFunctionBegin;
   PetscCall(HycoFOMSetStepMonitor(fom, WriteStep, w));
+  fom->path->between = WriteBetween;
   PetscCall(HycoFOMSolve(fom, w->s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetHistory(fom, &history));
   HycoSceneNamePoint(w->s->scene, mu, at);
@@ -546,6 +578,62 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const
   PetscCall(MatDenseRestoreArray(*S, &data));
   PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How many steps between listed times the file of mu has; of those of older versions none. */
+static PetscErrorCode CountBetween(HycoSnapshots s, const PetscReal mu[], PetscInt *n)
+{
+  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  HycoH5 h;
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  for (*n = 0;; (*n)++) {
+    NameBetween(*n, name);
+    if (!HycoH5Has(h, name)) break;
+  }
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadBetween(HycoSnapshots s, const PetscReal mu[], PetscInt n, PetscInt lo, PetscInt rows,
+                                  PetscScalar data[], PetscInt lda)
+{
+  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  ierr = CheckFingerprint(s, h, path);
+  for (PetscInt k = 0; !ierr && k < n; k++) {
+    NameBetween(k, name);
+    ierr = HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)k * (size_t)lda);
+  }
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], PetscInt rows, PetscInt total, Mat *U)
+{
+  PetscInt n = 0, lo, hi, lda;
+  PetscScalar *data;
+
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(s), CountBetween(s, mu, &n));
+  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(s)));
+  PetscCall(MatCreateDense(HycoComm(s), rows, PETSC_DECIDE, total, n, NULL, U));
+  PetscCall(MatGetOwnershipRange(*U, &lo, &hi));
+  PetscCall(MatDenseGetLDA(*U, &lda));
+  PetscCall(MatDenseGetArray(*U, &data));
+  HycoOnEach(HycoComm(s), ReadBetween(s, mu, n, lo, hi - lo, data, lda));
+  PetscCall(MatDenseRestoreArray(*U, &data));
+  PetscCall(MatAssemblyBegin(*U, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*U, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
