@@ -118,6 +118,10 @@ typedef struct {
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
 
+/* solved[n_groups]: how many points each group of ranks has solved full order in the last run; those found in the
+   snapshot folder are not counted. On every rank. Borrowed until the next run. Not collective. */
+PetscErrorCode HycoReducerGetSolved(HycoReducer reducer, PetscInt *n_groups, const PetscInt *solved[]);
+
 /* A reducer for a scene, which is referenced. Collective on `comm`. The caller owns it. */
 PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *reducer);
 /* Frees; sets the handle to NULL; NULL-safe. Collective. */

@@ -113,7 +113,8 @@ struct _p_HycoReducer {
   PetscReal *taken;
   HycoJudged *judged; /* rank 0, by sample: of HycoReducerJudge(); NULL: it was not called */
   unsigned long long fingerprint;
-  PetscBool *grown; /* every rank, greedy: cells of its part in the RIDs so far; else NULL */
+  PetscInt n_solvers, *solved; /* of the last run, every rank: groups of ranks, and the solutions of each */
+  PetscBool *grown;            /* every rank, greedy: cells of its part in the RIDs so far; else NULL */
 };
 
 /* The scene's variables where column k of the snapshots is: all of mu (HYCO_MAX_PARAMETERS). */
@@ -131,8 +132,10 @@ PetscErrorCode HycoTrainingAddFact(HycoTraining *report, const char name[], Pets
 /* Frees the bases, seeds and snapshots, and keeps the mesh; what one recipe took of the bases alone. */
 PetscErrorCode HycoReducerResetBases(HycoReducer t);
 PetscErrorCode HycoReducerDropBases(HycoReducer t);
-/* Begins a run: checks, the mesh, the store of snapshots (the caller destroys it). Collective. */
+/* Begins a run: checks, the mesh, the store of snapshots. Collective. */
 PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char path[], HycoSnapshots *store);
+/* Ends it: the store's counts are kept, and it is destroyed. Collective. */
+PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store);
 /* From the bases: the RID, the model on it, in *model on every rank (the caller's; its whole-mesh part is the reducer's
    alone), and what it gave. `useful`: refuse a model that misses its own training solutions
    or is singular in the ranges. Collective. */

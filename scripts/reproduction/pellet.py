@@ -12,12 +12,12 @@ LOADS = ",".join(f"{k / STEPS:.2f}" for k in range(1, STEPS + 1))
 RADIUS = 4.06                                     # S3
 RADII = {"S1 + S2": (4.02, 4.10), "5 radii": (4.02, 4.04, 4.05, 4.07, 4.10),
          "9 radii": (4.02, 4.03, 4.04, 4.05, 4.055, 4.07, 4.08, 4.09, 4.10)}
-VARIANTS = {"recipe": (), "no extension": ("-hyco_rid_contact_extension", 0), "no layer": ("-hyco_rid_layers", 0),
+VARIANTS = {"paper": (), "no extension": ("-hyco_rid_contact_extension", 0), "no layer": ("-hyco_rid_layers", 0),
             "2 layers": ("-hyco_rid_layers", 2)}
-PAPER, FINE = ("S1 + S2", "1e-5", "recipe"), ("9 radii", "1e-10", "recipe")
-PARTS = ("recipe", "no extension", "no layer")
-MODELS = [*[(*PAPER[:2], v) for v in PARTS], ("5 radii", "1e-5", "recipe"), ("5 radii", "1e-7", "recipe"),
-          *[("5 radii", "1e-10", v) for v in PARTS], ("9 radii", "1e-7", "recipe"),
+PAPER, FINE = ("S1 + S2", "1e-5", "paper"), ("9 radii", "1e-10", "paper")
+PARTS = ("paper", "no extension", "no layer")
+MODELS = [*[(*PAPER[:2], v) for v in PARTS], ("5 radii", "1e-5", "paper"), ("5 radii", "1e-7", "paper"),
+          *[("5 radii", "1e-10", v) for v in PARTS], ("9 radii", "1e-7", "paper"),
           *[("9 radii", "1e-10", v) for v in VARIANTS]]
 SHOWN = (0.6, 0.8, 1.0)                           # the loads at which S3's fields are asked for
 SPAN_FLOOR = 1e-9                                 # singular values below this share of the first are no directions
@@ -230,7 +230,7 @@ def in_order(values, ids, wanted):
 
 
 def contributions(runs, size, model):
-    """Cells that each basis of a recipe brings to the RID (20): those all of whose nodes lie in its points' supports."""
+    """Cells that each basis adds to the RID (20): those all of whose nodes lie in its points' supports."""
     radii, tol, _ = model
     with h5py.File(runs.path(f"{name_of(model)}.h5"), "r") as h:
         cells, group, facet_cell = h["whole/cells"][:], h["whole/facet_group"][:].ravel(), h["whole/facet_cell"][:].ravel()

@@ -54,8 +54,8 @@ def pictures(runs, size, found, out):
 
 
 def ladder(found):
-    """One model of each training set: the paper's, and the finest recipes of the others that were judged."""
-    last = {m[0]: m for m in found["entries"] if m[2] == "recipe" and "compare" in found["entries"][m]}
+    """One model of each training set: the paper's, and the finest settings of the others that were judged."""
+    last = {m[0]: m for m in found["entries"] if m[2] == "paper" and "compare" in found["entries"][m]}
     return list(last.values())
 
 
@@ -66,7 +66,7 @@ def shown_models(found):
 # ------------------------------------------------------------------------------------------------ words
 
 def numbers(found):
-    rows = [["**paper**: S1 + S2", "1e-5", "recipe", "17 / 20 / 21", "", "1", "5", "", "", "10"]]
+    rows = [["**paper**: S1 + S2", "1e-5", "paper", "17 / 20 / 21", "", "1", "5", "", "", "10"]]
     for model, entry in found["entries"].items():
         rows.append([*model, *(refused(entry) if "compare" not in entry else measured(entry, found["contact"]))])
     return ["trained on", "energy left", "RID", "modes u / sigma / F", "RID elements", "displacement", "stress 11",
@@ -148,10 +148,10 @@ def refusals(found):
 
 
 def effects(found, variant):
-    """For each training set that ran both ways: errors with the whole recipe, and without a part of it."""
+    """For each training set that ran both ways: errors with the whole RID, and without a part of it."""
     told = []
     for m, entry in found["entries"].items():
-        whole = found["entries"].get((*m[:2], "recipe"))
+        whole = found["entries"].get((*m[:2], "paper"))
         if m[2] != variant or not whole or "compare" not in whole:
             continue
         told.append([m[0], m[1], said(whole, found["contact"]),

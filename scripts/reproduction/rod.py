@@ -155,9 +155,9 @@ def report(found, size, folder):
     """The page; `folder` holds its pictures."""
     train, compare, rows = found["train"], found["compare"], converged(found)
     seconds = {"full": sum(found["full"]["history"]["seconds"]), "reduced": sum(found["reduced"]["history"]["seconds"])}
-    errors = table(["at the worst listed time of the worst of four unseen paths", "error, %"],
+    errors = table(["largest error over four unseen paths and their listed times", "%"],
                    [(label, percent(compare[f"worst_{kind}"]["max"])) for label, kind in KINDS])
-    spread = table(["of all ramps, at most", "5 %", "50 %", "95 %", "all"],
+    spread = table(["not exceeded in this share of the ramps", "5 %", "50 %", "95 %", "all"],
                    [("largest hoop stress inside the cladding, MPa", *quantiles(rows, "path_hoop")),
                     ("largest inelastic strain, %", *quantiles(rows, "largest_rid_inelastic", 100)),
                     ("largest contact force, N", *quantiles(rows, "largest_contact_force"))])
@@ -165,11 +165,11 @@ def report(found, size, folder):
     command = f"scripts/reproduce rod{' --mesh ' + size.mesh if size.mesh else ''}"
     return f"""# A power ramp on a fuel rod, a thousand times
 
-Written by `{command}`; every number is from its runs. The scene is {where}: a year of constant power, in which the cladding creeps down on the
-pellet; a ramp to the power q2 in two minutes, a day there, and to zero. Parameters: the cold gap, q2, and a factor of the creep rate.
+Written by `{command}`, with the numbers of its runs. The scene is {where}. In a year of constant power the cladding creeps onto the
+pellet. A ramp to the power q2 in two minutes follows, then a day at this power and a return to zero. The parameters are the cold gap, q2, and a factor of the creep rate.
 
 {found['full']['n_dof']} unknowns, {found['full']['n_contacts']} contacts; {train['n_samples']} training paths, {train['n_modes']} modes, an RID of {percent(train['rid_fraction'])} % of
-the cells. A path of full order takes {seconds['full']:.3g} s, a reduced one {seconds['reduced']:.3g} s (one core, beside whatever else ran).
+the cells. A path takes {seconds['full']:.3g} s at full order and {seconds['reduced']:.3g} s with the reduced model (one core of a machine that ran other programs too).
 
 {errors}
 ## One ramp: gap {POINT[0]} mm, q2 {POINT[1]} kW/m, creep {POINT[2]}
@@ -182,8 +182,8 @@ the cells. A path of full order takes {seconds['full']:.3g} s, a reduced one {se
 
     build/hyco predict -model rod.h5 -points ramps.csv -table study.csv
 
-{len(found['study'])} ramps, parameters uniform in their ranges, in {found['seconds']:.0f} s; {len(found['study']) - len(rows)} did not converge. Hoop stress is an output
-that the training names (`-output_hoop_max sigma_tt -output_hoop_group {size.inside}`); `path_hoop` in the table is its largest value over a path.
+{len(found['study'])} ramps, with parameters distributed uniformly in their ranges, take {found['seconds']:.0f} s; {len(found['study']) - len(rows)} did not converge. The hoop stress is an output
+that is named in the training (`-output_hoop_max sigma_tt -output_hoop_group {size.inside}`); `path_hoop` in the table is its largest value over a path.
 
 {spread}
 ![distribution of the largest stress and strain]({folder}/study.png)

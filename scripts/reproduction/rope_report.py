@@ -141,8 +141,8 @@ def numbers(found):
 
     grid, greedy = found["grid"], found["greedy"]
     rows.append(["**paper**, regular grid", 120, 9, 28, "0.34 / 1.13", "24 / 148", "39 / 127", "", ""])
-    ours("its recipe, fewest full-order unknowns (`-hyco_hybrid rank`)", grid["rank"])
-    ours("its recipe, all of A full order (`-hyco_hybrid all`)", grid["all"])
+    ours("its settings, fewest full-order unknowns (`-hyco_hybrid rank`)", grid["rank"])
+    ours("its settings, all of A full order (`-hyco_hybrid all`)", grid["all"])
     ours("`" + words(rope.FINE_GRID) + "`", grid["fine"])
     ours("projection-based", grid["pb9"])
     ours("projection-based, `-hyco_pod_tol 6e-9`", grid["pb14"])

@@ -82,9 +82,9 @@ def pellet(name, mesh, quick):
                  "9 radii": radii(4.02, 4.03, 4.04, 4.05, 4.065, 4.07, 4.08, 4.09, 4.1),
                  **{f"{n} Chebyshev radii": chebyshev(n) for n in (2, 4, 6, 8)}},  # even: 4.06 is no node
                 radii(*((4.06,) if name == "C" or quick else (4.06, 4.033))), ["radius", "load"], points,
-                [("on the RID u 1 % and sigma_11 5 %, largest", {"u_rid_max": 0.01, "sigma_11_max": 0.05}),
-                 ("on the RID u 0.15 % and sigma_11 0.25 %, largest", {"u_rid_max": 0.0015, "sigma_11_max": 0.0025}),
-                 ("all forces 1e-6, largest", {"lambda_max": 1e-6})])
+                [("largest errors on the RID: u 1 %, sigma_11 5 %", {"u_rid_max": 0.01, "sigma_11_max": 0.05}),
+                 ("largest errors on the RID: u 0.15 %, sigma_11 0.25 %", {"u_rid_max": 0.0015, "sigma_11_max": 0.0025}),
+                 ("largest error of all forces: 1e-6", {"lambda_max": 1e-6})])
     case.batch, case.ramp = radii(4.033, 4.06, 4.045, 4.087), ("radius", 4.06)
     if quick:
         case.training["5 radii"] = ["-values_radius", "4.02,4.04,4.07,4.1", "-values_load", "0.2,0.5,0.7,0.85,1"]

@@ -136,8 +136,8 @@ class Bench:
 
 def full_orders(bench, arguments):
     """Their rows; `status` says where and how all was measured."""
-    words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core; other work on the machine adds tens of per cent. Trained on 12 scattered paths (`-scatter 12`) where no grid is named; {len(bench.case.unseen)} "
-             "paths that no training has seen." + (" Full order's seconds are those of `scripts/bench history`." if arguments.full_order else ""))
+    words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core; other programs on the machine add tens of per cent. The models are trained on 12 scattered paths (`-scatter 12`) unless a grid is named, and judged on {len(bench.case.unseen)} "
+             "paths that no training has seen." + (" The times of full order are those of `scripts/bench history`." if arguments.full_order else ""))
     known = map(float, arguments.full_order.split(",")) if arguments.full_order else map(bench.full_order, ("tangent", "elastic"))
     return [{"id": 0, "type": "full", "label": name, "status": words, "path_s": cpu}
             for name, cpu in zip(("full order, Newton", "full order, the elastic factor kept"), known)]
@@ -186,16 +186,15 @@ def section(mesh, rows, picture):
     ok, failed, full = split(rows)
     lines = [full[0]["status"], "", f"![error against online time, {case_of(mesh).name}]({picture})", "",
              *table(["full order", "a path"], [[f["label"], seconds(f["path_s"])] for f in full]), "",
-             "Errors: median / largest over the paths, each at its worst listed time.", "",
+             "Errors are median / largest over the paths, each path at its worst listed time.", "",
              *table(["", "setting", "modes", "cells %", *(f"{words} %" for words in KINDS.values()), "a path", *EXTRA, "MB", "training, solutions known"],
                     [line_of(r, full) for r in sorted(ok, key=lambda r: r["path_s"])]), ""]
     for limits in LIMITS:
         best = min((r for r in ok if within(r, limits)), key=lambda r: r["path_s"], default=None)
-        lines.append(f"- Within {say(limits)} at all of them, the cheapest: " + (f"number {best['id']}, {line_of(best, full)[-4]} times faster than Newton, "
-                     f"{line_of(best, full)[-3]} than the elastic factor kept." if best else "none."))
-    lines += [f"- Estimates of number {r['id']}, of displacement, stress and forces: {100 * r['bounded']:.0f} % bound the error, their median is {r['ratio']:.2g} times "
-              "as large." for r in ok if "bounded" in r]
-    lines += [f"- No model, or a path without its end: {r['label']}: {r['status']}" for r in failed]
+        lines.append(f"- The cheapest setting whose largest errors are within {say(limits)}: " + (f"number {best['id']}, {line_of(best, full)[-4]} times faster than Newton's method "
+                     f"and {line_of(best, full)[-3]} times faster than the elastic factor kept." if best else "none."))
+    lines += [f"- Of the estimates of number {r['id']}, for displacement, stress and forces, {100 * r['bounded']:.0f} % bound the error; the median of estimate / error is {r['ratio']:.2g}." for r in ok if "bounded" in r]
+    lines += [f"- No model, or a path that does not reach its end: {r['label']}: {r['status']}" for r in failed]
     return lines
 
 
@@ -206,10 +205,10 @@ def headline(mesh, rows):
     newton, elastic = (f["path_s"] for f in full)
     words = [f"{percent(best[k + '_max'])} % in {word.split(' of the')[0].split(' on the')[0]}" for k, word in KINDS.items()]
     return ["![error against online time for each type of model, a power ramp on a fuel rod](docs/tradeoff/rod-B.png)", "",
-            f"A power ramp on a fuel rod whose cladding creeps and yields (`examples/rod`, mesh {mesh}) takes {seconds(newton)} by full Newton, {seconds(elastic)} with the",
-            f"elastic factor kept, and {seconds(best['path_s'])} by the hybrid model: {newton / best['path_s']:.0f} and {elastic / best['path_s']:.0f} times less. At "
-            "unseen parameters, each path at its worst time,",
-            f"it is off by at most {', '.join(words[:-1])} and {words[-1]}."]
+            f"On one power ramp of a fuel rod whose cladding creeps and yields (`examples/rod`, mesh {mesh}), full order takes {seconds(newton)} by Newton's method, or {seconds(elastic)} if",
+            f"the elastic factor is kept; the hybrid model takes {seconds(best['path_s'])}, which is {newton / best['path_s']:.0f} and {elastic / best['path_s']:.0f} times less. At "
+            "unseen parameters, and for each path at its worst time,",
+            f"its errors are at most {', '.join(words[:-1])} and {words[-1]}."]
 
 
 def plot(mesh, rows, path):

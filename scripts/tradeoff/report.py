@@ -125,7 +125,7 @@ def headline(case, rows, full):
         if r:
             lines.append(line(kind, r, True))
     columns = ["", *([f"a ramp of {warm['ramp_n']:.0f} loads"] if ramps else []), "a new geometry"]
-    return [f"{case.name}; errors {words}:", "", *table(columns, lines)]
+    return [f"{case.name}; {words}:", "", *table(columns, lines)]
 
 
 def settings(rows):
@@ -167,7 +167,7 @@ def plot(case, rows, full, path):
     for axis in axes[1]:
         axis.set_xlabel("seconds a solve, as a set")
     axes[0, 0].legend(fontsize=8, framealpha=0.9)
-    figure.suptitle(f"{case}: error against online time; the line joins what nothing beats in both")
+    figure.suptitle(f"{case}: error against online time; the line joins the Pareto-optimal settings")
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
@@ -177,10 +177,10 @@ def section(case, rows, full, words, picture):
     warm = full["warm"]
     failed = [r for r in rows if r["status"] != "ok"]
     lines = [words, "", f"![error against online time, {case.name}]({picture})", "",
-             f"**The cheapest that is accurate enough** at all unseen points (of {len(rows)} settings; number in the table below, time of a "
-             "solve in a set, speed-up over warm full order):", "", *answer(rows, warm), "", *wanted(case, rows, full), "", *full_orders(full), "",
+             f"**The cheapest of {len(rows)} settings that is accurate enough** at all unseen points: its number in the table below, the time of a "
+             "solve in a set, and the speed-up over warm full order:", "", *answer(rows, warm), "", *wanted(case, rows, full), "", *full_orders(full), "",
              *settings(finalists(case, rows))]
     if failed:
-        lines += ["", f"{len(failed)} settings gave no model or no converged answer:", "",
+        lines += ["", f"{len(failed)} settings gave no model or no converged solution:", "",
                   *(f"- {r['label']}: {r['status']}" for r in failed)]
     return lines

@@ -123,6 +123,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   PetscCall(EndTraining(t));
   PetscCall(PetscStrArrayDestroy(&t->groups));
   PetscCall(PetscFree(t->region));
+  PetscCall(PetscFree(t->solved));
   PetscCall(HycoSceneDestroy(&t->scene));
   PetscCall(PetscHeaderDestroy(reducer));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -132,6 +133,9 @@ HycoDefineMethod(HycoReducerSetSnapshotFolder, (HycoReducer t, const char folder
                  PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder))))
 HycoDefineMethod(HycoReducerChooses, (HycoReducer t, PetscBool *chooses), t, HYCO_REDUCER_CLASSID,
                  *chooses = (PetscBool)(t->prototype->ops->choosepoints != NULL))
+HycoDefineMethod(HycoReducerGetSolved, (HycoReducer t, PetscInt *n_groups, const PetscInt *solved[]), t,
+                 HYCO_REDUCER_CLASSID, *n_groups = t->n_solvers;
+                 *solved = t->solved)
 HycoDefineMethod(HycoReducerSetProgress, (HycoReducer t, HycoProgress progress, void *ctx), t, HYCO_REDUCER_CLASSID,
                  t->progress = progress;
                  t->progress_ctx = ctx)

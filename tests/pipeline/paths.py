@@ -1,6 +1,7 @@
 """Reduced models of paths: scenes with a history, on a small ring that creeps or yields while its gap closes and opens."""
 import csv
 import os
+import shutil
 import subprocess
 import unittest
 
@@ -33,6 +34,8 @@ history:
 NORTON = 'law: norton, rate: 2e-10, exponent: 3'
 J2 = 'law: j2, yield: 80, hardening: 2000'
 KINDS = ('u', 'sigma', 'lambda', 'inelastic')
+COLUMNS = ('total_contact_force', 'rid_inelastic', 'rid_mises', 'rid_u_norm2')
+POINTS = [(0.005, 0.9), (0.0075, 1.15), (0.0041, 1.2)]
 
 
 def arrays(path):
@@ -59,6 +62,37 @@ class FlowingRing(Case):
             f.write(SCENE.replace('LAW', law) + history)
         return cls.path(name)
 
+    def refused_in_one_line(self, words, *args):
+        run = self.run_raw(*args)
+        self.assertEqual(run.returncode, 1, run.stdout)
+        self.assertEqual(len(said(run)), 1, run.stderr)
+        for word in words:
+            self.assertIn(word, said(run)[0])
+
+    def table(self, model, *args):
+        self.hyco('predict', '-model', self.path(model), '-table', self.path('rows.csv'), *args)
+        with open(self.path('rows.csv'), encoding='utf-8') as f:
+            return list(csv.DictReader(f))
+
+    def same_in_any_order(self, model, points):
+        """The rows of points asked for one after the other, and backwards: the same to the last bit. Returns the last ones."""
+        tables = []
+        for k, order in enumerate((points, points[::-1])):
+            with open(self.path(f'order{k}.csv'), 'w', encoding='utf-8') as f:
+                f.write('gap,push\n' + '\n'.join(f'{a},{b}' for a, b in order) + '\n')
+            rows = self.table(model, '-points', self.path(f'order{k}.csv'))
+            tables.append({(r['gap'], r['push']): [v for c, v in r.items() if c != 'seconds'] for r in rows})
+        self.assertEqual(tables[0], tables[1])
+        return rows
+
+    def same_models(self, reports, names, histories):
+        """What two trainings report and what their models predict, to 1e-6."""
+        for name in names:
+            self.assertEqual(reports[0][name], reports[1][name], name)
+        for column in COLUMNS:
+            a, b = (np.array(h[column]) for h in histories)
+            self.assertLess(abs(a - b).max(), 1e-6 * abs(a).max(), column)
+
 
 class Paths(FlowingRing):
     @classmethod
@@ -67,11 +101,6 @@ class Paths(FlowingRing):
 
     def compare(self, scene, model, point, *args):
         return self.hyco('compare', '-scene', scene, '-model', self.path(model), '-mu', point, *args)
-
-    def rows(self, model, *args):
-        self.hyco('predict', '-model', self.path(model), '-table', self.path('rows.csv'), *args)
-        with open(self.path('rows.csv'), encoding='utf-8') as f:
-            return list(csv.DictReader(f))
 
     def test_whole_is_full_order(self):
         """Every unknown of the whole mesh: the full order's path at any parameter value, the gap closed and opened on its way."""
@@ -152,7 +181,7 @@ class Paths(FlowingRing):
             self.train(scene, name, *settings)
             predicted = self.hyco('predict', '-model', self.path(name), '-mu', '0.0052,0.93')
             reduced = {output: np.array(values) for output, values in predicted['history']['outputs'].items()}
-            row, = self.rows(name, '-values_gap', '0.0052', '-values_push', '0.93')
+            row, = self.table(name, '-values_gap', '0.0052', '-values_push', '0.93')
             self.assertEqual(reduced.keys(), full.keys())
             for key, values in full.items():
                 self.assertLess(abs(reduced[key] - values).max(), limit * abs(values).max(), (name, key))
@@ -163,15 +192,8 @@ class Paths(FlowingRing):
 
     def test_order_of_questions(self):
         """A point's path is the same to the last bit whatever was asked before it."""
-        self.train(self.norton, 'order.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9')
-        points = [(0.005, 0.9), (0.0075, 1.15), (0.0041, 1.2), (0.006, 0.8)]
-        tables = []
-        for k, order in enumerate((points, points[::-1])):
-            with open(self.path(f'order{k}.csv'), 'w', encoding='utf-8') as f:
-                f.write('gap,push\n' + '\n'.join(f'{a},{b}' for a, b in order) + '\n')
-            rows = self.rows('order.h5', '-points', self.path(f'order{k}.csv'))
-            tables.append({(r['gap'], r['push']): [v for c, v in r.items() if c != 'seconds'] for r in rows})
-        self.assertEqual(tables[0], tables[1])
+        self.train(self.norton, 'order.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', 1)
+        rows = self.same_in_any_order('order.h5', [*POINTS, (0.006, 0.8)])
         alone = self.hyco('predict', '-model', self.path('order.h5'), '-mu', '0.0041,1.2')
         last = next(r for r in rows if float(r['gap']) == 0.0041)
         self.near(max(alone['history']['rid_inelastic']), float(last['largest_rid_inelastic']), 1e-7)
@@ -181,16 +203,32 @@ class Paths(FlowingRing):
         """One and two ranks train the same model."""
         reports, histories = [], []
         for ranks in (0, 2):
-            reports.append(self.train(self.norton, f'ranks{ranks}.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9', ranks=ranks))
+            reports.append(self.train(self.norton, f'ranks{ranks}.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', 1, ranks=ranks))
             histories.append(self.hyco('predict', '-model', self.path(f'ranks{ranks}.h5'), '-mu', '0.0063,1.11')['history'])
-        for name in ('n_modes', 'rid_elements', 'rid_contacts', 'n_fe_dofs'):
-            self.assertEqual(reports[0][name], reports[1][name], name)
-        for column in ('total_contact_force', 'rid_inelastic', 'rid_mises', 'rid_u_norm2'):
-            a, b = (np.array(h[column]) for h in histories)
-            self.assertLess(abs(a - b).max(), 1e-6 * abs(a).max(), column)
+        self.same_models(reports, ('n_modes', 'rid_elements', 'rid_contacts', 'n_fe_dofs'), histories)
         one, two = (self.hyco('compare', '-scene', self.norton, '-model', self.path('ranks0.h5'), '-mu', '0.0063,1.11', ranks=ranks) for ranks in (0, 2))
         for kind in KINDS:
             self.near(two['worst_' + kind]['max'], one['worst_' + kind]['max'], 1e-4)
+
+    def test_steps_between_listed_times(self):
+        """Full order's steps between listed times are kept, at most five of an interval, and join the modes; a store of older versions has none."""
+        arguments = ['-grid', '2,2', '-hyco_pod_tol', '1e-10', '-hyco_model_type', 'projection', '-hyco_snapshots']
+        self.train(self.norton, 'between.h5', *arguments, self.path('steps'))
+        os.mkdir(self.path('without'))
+        for name in os.listdir(self.path('steps')):
+            shutil.copy(os.path.join(self.path('steps'), name), self.path('without'))
+            with h5py.File(os.path.join(self.path('without'), name), 'r+') as f:
+                between = [key for key in f if key.startswith('between')]
+                taken = f['taken'][:, 0]
+                slots = {(k, int(5 * (t - a) / (b - a))) for k, (a, b) in enumerate(zip((0, 1, 3, 6, 10, 11), (1, 3, 6, 10, 11, 12))) for t in taken if a < t < b}
+                self.assertEqual(len(between), len(slots))
+                self.assertGreater(len(between), 0)
+                for key in [*between, 'sealed']:
+                    del f[key]
+        self.train(self.norton, 'listed.h5', *arguments, self.path('without'))
+        for kind in ('u', 'sigma'):
+            kept, listed = (self.compare(self.norton, model, '0.0055,0.91')['worst_' + kind]['max'] for model in ('between.h5', 'listed.h5'))
+            self.assertLess(kept, 0.5 * listed, kind)
 
     def test_damaged(self):
         """A path file that lacks a time, or is cut short, is named in one line."""
@@ -271,11 +309,7 @@ class Paths(FlowingRing):
                 (['compare', '-scene', self.norton, '-model', model, '-mu', '0.006,1', '-history_tables_q', '0 0,1 2,12 2'], ['history_tables_q']),
                 (['predict', '-scene', self.norton, '-model', model, '-mu', '0.006,1', '-hyco_fallback'], ['-hyco_fallback', 'history']),
                 (['train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '2,2', '-hyco_checkpoint', self.path('c.h5')], ['-hyco_checkpoint'])):
-            run = self.run_raw(*args)
-            self.assertEqual(run.returncode, 1, run.stdout)
-            self.assertEqual(len(said(run)), 1, run.stderr)
-            for word in words:
-                self.assertIn(word, said(run)[0])
+            self.refused_in_one_line(words, *args)
         self.assertFalse(os.path.exists(self.path('no.h5')))
 
 

@@ -48,7 +48,7 @@ class Reproduce(Case):
             rows = {row['model']: row for row in csv.DictReader(file)}
         with open(os.path.join(out, 'all-compare.json'), encoding='utf-8') as file:
             error = json.load(file)['error_u']
-        row = rows['its recipe, all of A full order (`-hyco_hybrid all`)']
+        row = rows['its settings, all of A full order (`-hyco_hybrid all`)']
         self.assertEqual((row['snapshots'], row['modes'], row['RID nodes']), ('120', '9', '28'))  # the paper's sizes
         mean, largest = (float(v) / 100 for v in row['displacement'].split(' / '))
         self.near(mean, error['mean'], 0.06)
@@ -76,9 +76,9 @@ class Reproduce(Case):
             rows = {(row['trained on'], row['RID']): row for row in csv.DictReader(file)}
         with open(os.path.join(out, 'pellet-bounds.csv'), encoding='utf-8', newline='') as file:
             bounds = list(csv.reader(file))[1:]
-        paper, fine = rows[('S1 + S2', 'recipe')], rows[('9 radii', 'recipe')]
+        paper, fine = rows[('S1 + S2', 'paper')], rows[('9 radii', 'paper')]
         error = float(paper['displacement'])
-        with open(os.path.join(out, 'pellet-S1+S2-1e-5-recipe.csv'), encoding='ascii', newline='') as file:
+        with open(os.path.join(out, 'pellet-S1+S2-1e-5-paper.csv'), encoding='ascii', newline='') as file:
             steps = [row for row in csv.DictReader(file) if float(row['load']) > 0.46]  # contact from step 12 on
         self.assertEqual(len(steps), 14)
         self.near(error / 100, max(float(row['error_u_rid']) for row in steps), 0.06)

@@ -36,12 +36,12 @@ if 'HYCO_ALL_SOLVERS' in os.environ:
 # (scene, form, TAO types): why they do not solve alone. Whether they do on some machine is not promised.
 UNFIT = [
     ('*', '*', ['bqpip'], 'cannot take infinite bounds'),
-    ('*', 'primal', QUASI, 'stands still'),
-    ('*', 'primal', ['blmvm'], 'stands still'),
-    ('pellet A', 'primal', ['bncg'], 'stands still'),
+    ('*', 'primal', QUASI, 'no progress'),
+    ('*', 'primal', ['blmvm'], 'no progress'),
+    ('pellet A', 'primal', ['bncg'], 'no progress'),
     ('rope 100', 'dual', ['blmvm'], 'slow: round-off decides whether it ends in time'),
-    ('rope 2000', '*', FIRST_ORDER, 'stands still'),
-    ('rope 2000', 'primal', ['bntr', 'bnls', 'bntl'], 'stands still at 1e-7'),
+    ('rope 2000', '*', FIRST_ORDER, 'no progress'),
+    ('rope 2000', 'primal', ['bntr', 'bnls', 'bntl'], 'no progress at 1e-7'),
 ]
 
 
