@@ -200,10 +200,10 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
   Place p;
 
   PetscFunctionBegin;
-  HycoCheck(q->field < fe->dim, "output_%s: the mesh has %d space dimension%s, and no reaction along %c", q->name,
+  HycoCheck(q->field < fe->dim, "output_%s: the mesh has %d space dimension%s and no reaction along %c", q->name,
             (int)fe->dim, fe->dim == 1 ? "" : "s", "xyz"[q->field]);
   HycoCheck(q->field || fe->formulation != HYCO_AXISYMMETRIC,
-            "output_%s: around the circle reactions along the radius x add up to nothing; ask for y", q->name);
+            "output_%s: in an axisymmetric scene the reactions along the radius x sum to zero; use y", q->name);
   PetscCall(FindPlace(fe->scene, m, q, &p));
   n = p.group < 0 ? m->n_nodes : m->group_start[p.group + 1] - m->group_start[p.group];
   for (PetscInt k = 0; k < n; k++) {
@@ -231,7 +231,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
 
   PetscFunctionBegin;
   HycoCheck(q->field < UX || q->field > UZ || q->field - UX < fe->dim,
-            "output_%s: the mesh has %d space dimension%s, and no %s", q->name, (int)fe->dim, fe->dim == 1 ? "" : "s",
+            "output_%s: the mesh has %d space dimension%s and no %s", q->name, (int)fe->dim, fe->dim == 1 ? "" : "s",
             HycoQuantityFields[q->field]);
   PetscCall(FindPlace(fe->scene, m, q, &p));
   if (p.dim < m->dim - 1) {

@@ -39,14 +39,15 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     PetscCall(PetscStrallocpy(s->value[entry], &q->group));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoCheck(!q->given, "%s: the output %s has one of max, min, mean and reaction already; give each its own name",
+  HycoCheck(!q->given,
+            "%s: the output %s already has one of max, min, mean and reaction; give each output its own name",
             s->key[entry], name);
   q->given = PETSC_TRUE;
   q->kind = (HycoQuantityKind)field;
   if (q->kind == HYCO_QUANTITY_REACTION) {
     const char *axis = s->value[entry];
 
-    HycoCheck(axis[0] && !axis[1] && strchr("xyz", axis[0]), "%s is \"%.100s\"; a reaction is along x, y or z",
+    HycoCheck(axis[0] && !axis[1] && strchr("xyz", axis[0]), "%s is \"%.100s\"; a reaction must be along x, y or z",
               s->key[entry], axis);
     q->field = axis[0] - 'x';
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -71,7 +72,7 @@ PetscErrorCode HycoSceneCheckQuantities(HycoScene s)
               "the output %s has the name of a parameter; give it another", s->quantity[k / s->n_parameters].name);
   for (PetscInt k = 0; k < s->n_quantities; k++)
     HycoCheck(s->quantity[k].given,
-              "the output %s says no field; write output: {%s: {max: mises, group: ...}}, or min, mean or reaction",
+              "the output %s has no field; write output: {%s: {max: mises, group: ...}}, or min, mean or reaction",
               s->quantity[k].name, s->quantity[k].name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
