@@ -713,7 +713,8 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
   for (PetscInt k = s->n - 1; k > 0 && !best; k--) { /* one that is not refused for its cost */
     if (s->attempt[k].recipe.hybrid != HYCO_HYBRID_ALL) best = &s->attempt[k];
   }
-  HycoFail("none of %d recipes gave a model; one of them: %s", (int)s->n, (best ? best : &s->attempt[0])->failure);
+  HycoFail("none of %d settings gave a model; the error of one of them: %s", (int)s->n,
+           (best ? best : &s->attempt[0])->failure);
 }
 
 static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report)
