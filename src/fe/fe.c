@@ -82,10 +82,6 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
   const PetscBool has_mean = (PetscBool)(mesh->type == HYCO_QUAD4 || mesh->type == HYCO_HEX8);
 
   PetscFunctionBegin;
-  HycoCheck(!HycoMeshIsQuadratic(mesh) || !scene->n_times,
-            "the mesh has cells of second order (%s), and scenes with a history take those of first order: mesh it "
-            "with gmsh -order 1",
-            HycoCellKinds[mesh->type].name);
   HycoCheck(mesh->dim == 2 || scene->formulation == HYCO_PLANE_STRAIN,
             "scene_formulation says what a 2D scene stands for, and this mesh has %d dimension%s; take it out",
             (int)mesh->dim, mesh->dim == 1 ? "" : "s");
@@ -102,7 +98,7 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
               "free, and nothing locks",
               body->name);
     HycoCheck(
-        !flows || body->element || has_mean || mesh->dim == 1,
+        !flows || body->element || has_mean || HycoMeshIsQuadratic(mesh) || mesh->dim == 1,
         "body %s flows (law %s), which keeps its volume, and cells of tri3 or tet4 are then much too stiff; mesh it "
         "with quad4 or hex8, or write element: standard to take them all the same",
         body->name, ((PetscObject)body->law)->type_name);
