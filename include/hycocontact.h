@@ -15,6 +15,16 @@ typedef const char *HycoContactType;
 #define HYCO_CONTACT_PAIR     "pair"     /* n . (u_slave - u_master) <= gap on pairs of nodes */
 #define HYCO_CONTACT_SURFACE  "surface"  /* the same at a slave node's projection on the master's facets */
 
+/* What a contact of the scene carries. */
+typedef struct {
+  const char *name;     /* the scene's. Borrowed */
+  PetscInt n, n_active; /* contacts, those with L_i > 0 */
+  PetscReal force[3];   /* on the slave's side: the sum of -L_i n_i; on the master's the opposite */
+  PetscReal moment[3];  /* of these about the origin; 2D: the last component alone, and 0 in an axisymmetric scene */
+  PetscReal area;       /* that the contacts with L_i > 0 stand for (2D: length; 1D: 0) */
+  PetscReal pressure; /* the largest of L_i over the area that contact i stands for; 0 where the group is no surface */
+} HycoContactResult;
+
 /* n potential contacts of one HycoContact, where the bodies are at mu. */
 typedef struct {
   PetscInt n;

@@ -2,7 +2,7 @@
 #ifndef HYCOFOM_H
 #define HYCOFOM_H
 
-#include <hycoscene.h>
+#include <hycocontact.h>
 #include <hycosolver.h>
 
 #if defined(__cplusplus)
@@ -38,16 +38,6 @@ typedef struct {
   char regularised[512]; /* motions that nothing holds and -hyco_regularise took out, with "; " between */
   char free_motion[128]; /* one that contact alone prevents: "body block from moving along (0, 1, 0)"; "": none */
 } HycoSummary;
-
-/* What a contact of the scene carries. */
-typedef struct {
-  const char *name;     /* the scene's. Borrowed */
-  PetscInt n, n_active; /* contacts, those with L_i > 0 */
-  PetscReal force[3];   /* on the slave's side: the sum of -L_i n_i; on the master's the opposite */
-  PetscReal moment[3];  /* of these about the origin; 2D: the last component alone, and 0 in an axisymmetric scene */
-  PetscReal area;       /* that the contacts with L_i > 0 stand for (2D: length; 1D: 0) */
-  PetscReal pressure; /* the largest of L_i over the area that contact i stands for; 0 where the group is no surface */
-} HycoContactResult;
 
 /* What acts on the bodies: the supports of a group and the springs of a group, which hold them; all loads; all contacts
    (between bodies they add up to nothing). */

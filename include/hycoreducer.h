@@ -66,6 +66,7 @@ typedef struct {
   HycoHybrid hybrid;
   PetscBool whole;   /* the whole mesh as the RID */
   const char *plane; /* the group of a plane of symmetry whose cells the RID has; NULL: none. Borrowed from the scene */
+  PetscReal ridge;   /* hybrid all: of the interface's regression, as training has found it; < 0: not yet */
 } HycoRecipe;
 
 /* In words: "hybrid, pod_tol 1e-10, hybrid contact, layers 1, contact extension 2.5". */
@@ -80,8 +81,13 @@ typedef struct {
   PetscReal cost;          /* operations of an online solve at a new stiffness, estimated */
   PetscReal ratio;         /* the largest quotient of an error and its target: at most 1, they are met */
   HycoErrorKind worst;     /* that error */
-  HycoValidation held_out; /* errors at the held-out points */
-  char failure[512];       /* why it gave no model; "": it did */
+  HycoValidation held_out; /* errors at the held-out points that it was judged at */
+  PetscInt n_held;     /* held-out points that there are: of paths a recipe is dropped at the first of them, held_out.n
+                          in all, that it does not bring to its end, or beside whose error it cannot be chosen */
+  PetscInt dropped_at; /* that point; -1: it was judged at all */
+  PetscInt beaten_by;  /* the number of the recipe that is chosen rather than it; 0: none, or the path has no end */
+  PetscBool reopened;  /* that recipe was refused later: a later attempt has all points */
+  char failure[512];   /* why it gave no model; "": it did */
 } HycoAttempt;
 /* Called on rank 0 after each attempt. */
 typedef PetscErrorCode (*HycoAttemptMonitor)(const HycoAttempt *attempt, void *ctx);

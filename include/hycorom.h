@@ -108,6 +108,10 @@ PetscErrorCode HycoROMGetSizes(HycoROM model, PetscInt *n_contacts, PetscInt *n_
 */
 PetscErrorCode HycoROMSolveMany(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
+/* Called after each point of HycoROMSolveMany() with its number, in whatever order the points are solved: what is asked
+   for is then of that point. NULL: nothing. Not collective. */
+typedef PetscErrorCode (*HycoPointMonitor)(HycoROM model, PetscInt point, void *ctx);
+PetscErrorCode HycoROMSetPointMonitor(HycoROM model, HycoPointMonitor monitor, void *ctx);
 /* Reads -hyco_reconstruct, -hyco_reconstruct_solver, -hyco_fallback, -hyco_full_displacement, -hyco_residual;
    HycoROMLoad() does. */
 PetscErrorCode HycoROMSetFromOptions(HycoROM model);
@@ -163,6 +167,10 @@ PetscErrorCode HycoROMGetRID(HycoROM model, PetscInt *n_nodes, const PetscInt *n
    whether each is the RID's own multiplier (1) or reconstructed (0). Any output may be NULL. Borrowed. */
 PetscErrorCode HycoROMGetLambda(HycoROM model, PetscInt *n_contacts, const PetscReal *Lambda[],
                                 const PetscInt *node_ids[], const PetscInt *in_rid[]);
+/* What each contact of the scene carries in the last prediction, as HycoFOMGetContacts(): by the forces of
+   HycoROMGetLambda(), those up to 1e-10 of the largest being round-off, with full order's normals, areas and places.
+   n: 0 where the model has not the forces of all contacts (HycoROMSetReconstruct()). Borrowed until the next call. */
+PetscErrorCode HycoROMGetContacts(HycoROM model, PetscInt *n, const HycoContactResult *result[]);
 /* Displacement of the whole mesh, n_nodes x dim in the mesh file's order: reads the whole-mesh part on first use.
  * Borrowed. */
 PetscErrorCode HycoROMGetWholeU(HycoROM model, PetscInt *n_nodes, const PetscReal *U[]);

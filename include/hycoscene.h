@@ -41,6 +41,10 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
 #define HYCO_MAX_QUANTITIES 16
 PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *names[HYCO_MAX_QUANTITIES]);
 
+/* The number of the scene's contacts and, in names (room for n; may be NULL), what it calls them, in the order of
+   HycoFOMGetContacts() and HycoROMGetContacts(). Not collective. Borrowed. */
+PetscErrorCode HycoSceneGetContacts(HycoScene scene, PetscInt *n, const char *names[]);
+
 /* Whether parameter values outside the ranges are refused (default) or taken. Not collective. */
 PetscErrorCode HycoSceneSetExtrapolate(HycoScene scene, PetscBool extrapolate);
 

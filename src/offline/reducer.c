@@ -20,6 +20,7 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
   t->n_validation = -1;
   t->search = PETSC_TRUE;
   t->budget = -1;
+  t->ridge = -1;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *reducer = t;
@@ -105,7 +106,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
   }
   PetscCall(MatDestroy(&t->S));
   HycoFreeAll(&t->U_rid, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds,
-              &t->taken_start, &t->taken, &t->judged);
+              &t->taken_start, &t->taken, &t->judged, &t->judged_held);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -258,6 +259,9 @@ static PetscErrorCode ReadTraining(HycoReducer t)
                             "search model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by held-out "
                             "errors, unless given",
                             &t->search, NULL));
+  PetscCall(HycoOptionsBool("-hyco_search_exhaustive",
+                            "of paths: judge each recipe at all held-out points, also where it will not be chosen",
+                            &t->exhaustive, NULL));
   PetscCall(HycoOptionsName("-hyco_reducer_view", "the settings of the training, before it begins"));
   PetscCall(HycoOptionsFor("greedy"));
   PetscCall(HycoOptionsWord("-hyco_greedy_indicator",
