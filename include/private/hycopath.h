@@ -110,6 +110,8 @@ struct _n_HycoPath {
   HycoStepMonitor monitor;
   PetscErrorCode (*between)(HycoFOM, void *ctx); /* NULL, or called at the accepted steps that no listed time ends */
   void *monitor_ctx;                             /* of both */
+  PetscErrorCode (*interrupt)(void *ctx);        /* NULL, or called at each iteration; its error ends the path */
+  void *interrupt_ctx;
 };
 
 /* With the options' defaults. The caller owns it. */

@@ -18,7 +18,21 @@ static void ReportScan(cJSON *json, const HycoScan *s, PetscInt n_par)
   ReportVector(object, "at", n_par, s->at);
 }
 
-static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const GreedyLog *log, const Search *search)
+/* "solved_by_group": the points that each group of ranks solved full order. */
+static PetscErrorCode ReportGroups(cJSON *json, HycoReducer reducer)
+{
+  cJSON *array = cJSON_AddArrayToObject(json, "solved_by_group");
+  PetscInt n;
+  const PetscInt *solved;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerGetSolved(reducer, &n, &solved));
+  for (PetscInt k = 0; k < n; k++) cJSON_AddItemToArray(array, cJSON_CreateNumber(solved[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTraining *t, const GreedyLog *log,
+                             const Search *search)
 {
   PetscInt n_par;
   cJSON *json, *seconds;
@@ -27,6 +41,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
   PetscCall(ReportCreate("train", scene, NULL, &json));
   cJSON_AddStringToObject(json, "model_type", t->type);
   cJSON_AddNumberToObject(json, "n_samples", t->n_samples);
+  PetscCall(ReportGroups(json, reducer));
   cJSON_AddNumberToObject(json, "n_modes", t->n_modes);
   cJSON_AddNumberToObject(json, "n_dual_modes", t->n_dual_modes);
   cJSON_AddNumberToObject(json, "n_stress_modes", t->n_stress_modes);
@@ -63,8 +78,9 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
 static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
 {
   PetscFunctionBegin;
-  HycoCheck(!greedy || !search->on,
-            "-target_u and the like choose a model for a given set of points; train -greedy stops by -target");
+  HycoCheck(
+      !greedy || !search->on,
+      "-target_u and similar options choose the settings for a given set of points; for train -greedy use -target");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,12 +104,12 @@ static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool 
     PetscCall(PetscOptionsHasName(NULL, NULL, dashed, &set));
     if (!set) continue;
     if (strcmp(only, "greedy") == 0) {
-      HycoCheck(greedy, "nothing reads %s here: it is for train -greedy", dashed);
+      HycoCheck(greedy, "%s has no effect without -greedy; remove it", dashed);
       continue;
     }
-    HycoCheck(strstr(only, type), "nothing reads %s here: it is for -hyco_model_type %.*s, and the model is %s", dashed,
+    HycoCheck(strstr(only, type), "%s has no effect here: it is for -hyco_model_type %.*s, and the model is %s", dashed,
               where ? (int)(where - only) : (int)strlen(only), only, type);
-    HycoCheck(!given || !where, "nothing reads %s here: it chooses points where none are given", dashed);
+    HycoCheck(!given || !where, "%s has no effect here: it chooses points only if none are given", dashed);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -108,7 +124,7 @@ static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
   PetscCall(HycoSamplesDropTwins(samples, &dropped));
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
   if (dropped)
-    PetscCall(Say("%d of the %d %s points repeat others; each of the %d is used once\n", (int)dropped,
+    PetscCall(Say("%d of the %d %s points are duplicates; each of the %d different points is used once\n", (int)dropped,
                   (int)(n + dropped), what, (int)n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -119,7 +135,8 @@ static PetscErrorCode ReadGreedy(PetscBool *greedy)
   *greedy = PETSC_FALSE;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
   PetscCall(HycoOptionsFlag(
-      "-greedy", "add solutions where an error indicator is worst, from the corners of the ranges or -grid ...",
+      "-greedy",
+      "add solutions where an error indicator is largest, starting from the corners of the ranges or from -grid ...",
       greedy));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -199,12 +216,12 @@ PetscErrorCode CommandTrain(void)
   PetscCall(Say("\n"));
   if (t.scan.n)
     PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,
-                  (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept as asked" : ""));
+                  (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept by -hyco_keep_singular" : ""));
   PetscCall(DriverJudgeModel(&search, &t));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));
   if (greedy) PetscCall(DriverJudgeGreedy(&log));
-  PetscCall(Report(scene, &t, &log, &search));
+  PetscCall(Report(scene, reducer, &t, &log, &search));
   PetscCall(PetscFree(search.text));
   PetscCall(PetscFree(log.text));
   PetscCall(HycoSamplesDestroy(&training));

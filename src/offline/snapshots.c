@@ -19,9 +19,9 @@ static PetscErrorCode MakeFolder(const char folder[])
   HycoCheck(strlen(folder) < PETSC_MAX_PATH_LEN - 64, "the snapshot folder's name is too long");
   if (mkdir(folder, 0777) != 0) {
     HycoCheck(errno == EEXIST && stat(folder, &info) == 0 && S_ISDIR(info.st_mode),
-              "the snapshot folder %s cannot be made: is there such a place, may you write there?", folder);
+              "the snapshot folder %s cannot be created; check that its parent folder exists and is writable", folder);
   }
-  HycoCheck(access(folder, W_OK) == 0, "the snapshot folder %s cannot be written", folder);
+  HycoCheck(access(folder, W_OK) == 0, "the snapshot folder %s is not writable", folder);
   snprintf(all, sizeof(all), "%s/", folder);
   PetscCall(HycoFileSweep(all));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -38,6 +38,7 @@ static PetscErrorCode Begin(HycoSnapshots s)
 PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char folder[], HycoSnapshots *snapshots)
 {
   HycoSnapshots s;
+  PetscMPIInt size;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
@@ -46,6 +47,8 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
                               HycoSnapshotsDestroy, HycoSnapshotsView));
   PetscCall(PetscObjectReference((PetscObject)scene));
   s->scene = scene;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(PetscCalloc1(size, &s->solved));
   PetscCall(PetscStrncpy(s->folder, folder, sizeof(s->folder)));
   ierr = Begin(s);
   if (ierr) PetscCall(HycoSnapshotsDestroy(&s));
@@ -60,6 +63,7 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
   if (!snapshots || !*snapshots) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheckHandle(*snapshots, HYCO_SNAPSHOTS_CLASSID);
   HycoDereference(snapshots);
+  PetscCall(PetscFree((*snapshots)->solved));
   PetscCall(HycoSceneDestroy(&(*snapshots)->scene));
   PetscCall(PetscHeaderDestroy(snapshots));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -86,7 +90,7 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   same = strcmp(text, mine) == 0;
   PetscCall(PetscFree(text));
   HycoCheck(same,
-            "%s is a snapshot of another scene%s or mesh; remove the folder %s, or name another with -hyco_snapshots",
+            "%s is a snapshot of another scene%s or mesh; remove the folder %s, or name another by -hyco_snapshots",
             path, s->scene->n_times ? ", history" : "", s->folder);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -117,44 +121,14 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The samples that share a stiffness one after the other, in the order of the first of each, so that they share its
-   factor whatever the parameters' order. On rank 0. */
-static PetscErrorCode BringTogether(HycoSnapshots s, PetscInt n_par, const PetscReal mu[], PetscInt n, PetscInt list[])
-{
-  PetscBool reaches[HYCO_MAX_PARAMETERS];
-  PetscInt *kind, *first, *sorted, n_kinds = 0;
-
-  PetscFunctionBegin;
-  HycoSceneReaches(s->scene, reaches);
-  PetscCall(PetscMalloc3(n, &kind, n, &first, n, &sorted));
-  for (PetscInt i = 0; i < n; i++) {
-    for (kind[i] = 0; kind[i] < n_kinds; kind[i]++) {
-      const PetscReal *a = mu + first[kind[i]] * n_par, *b = mu + list[i] * n_par;
-      PetscInt p = 0;
-
-      while (p < n_par && (!reaches[p] || a[p] == b[p])) p++;
-      if (p == n_par) break;
-    }
-    if (kind[i] == n_kinds) first[n_kinds++] = list[i];
-  }
-  for (PetscInt k = 0, at = 0; k < n_kinds && n_kinds < n; k++) {
-    for (PetscInt i = 0; i < n; i++) {
-      if (kind[i] == k) sorted[at++] = list[i];
-    }
-  }
-  if (n_kinds < n) PetscCall(PetscArraycpy(list, sorted, n));
-  PetscCall(PetscFree3(kind, first, sorted));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *groups)
 {
   PetscFunctionBegin;
   PetscOptionsBegin(comm, NULL, "HycoSnapshots", NULL);
   PetscOptionsObject->options = options;
-  PetscCall(HycoOptionsInt("-hyco_groups",
-                           "groups of ranks that solve snapshots side by side (0: from the mesh's size)", 0,
-                           PETSC_MAX_INT, groups, NULL));
+  PetscCall(HycoOptionsInt(
+      "-hyco_groups", "number of groups of ranks that solve snapshots at the same time (0: from the size of the mesh)",
+      0, PETSC_MAX_INT, groups, NULL));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -189,6 +163,48 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
     while (*groups > 1 && *groups * factor > memory / 2) (*groups)--;
   }
   PetscCallMPI(MPI_Bcast(groups, 1, MPIU_INT, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* kind[i]: the first of the points list[] (n of them) that shares a stiffness with list[i], and its factor. */
+static PetscErrorCode FindKinds(HycoScene scene, PetscInt n_par, const PetscReal mu[], PetscInt n,
+                                const PetscInt list[], PetscInt kind[])
+{
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+  PetscInt *first, n_kinds = 0;
+
+  PetscFunctionBegin;
+  HycoSceneReaches(scene, reaches);
+  PetscCall(PetscMalloc1(n, &first));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt k;
+
+    for (k = 0; k < n_kinds; k++) {
+      const PetscReal *a = mu + list[first[k]] * n_par, *b = mu + list[i] * n_par;
+      PetscInt p = 0;
+
+      while (p < n_par && (!reaches[p] || a[p] == b[p])) p++;
+      if (p == n_par) break;
+    }
+    if (k == n_kinds) first[n_kinds++] = i;
+    kind[i] = first[k];
+  }
+  PetscCall(PetscFree(first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
+                                        PetscInt n, const PetscInt list[], HycoQueue *queue)
+{
+  PetscInt groups, *kind;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsChooseGroups(comm, scene, n, &groups));
+  PetscCall(PetscMalloc1(n, &kind));
+  HycoOnRoot(comm, FindKinds(scene, n_par, mu, n, list, kind));
+  HycoBcast(kind, n, MPIU_INT, comm);
+  PetscCall(HycoQueueCreate(comm, groups, n, kind, queue));
+  PetscCall(PetscFree(kind));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -344,7 +360,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   PetscCall(HycoFOMSolve(fom, w->s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetHistory(fom, &history));
   HycoSceneNamePoint(w->s->scene, mu, at);
-  HycoCheck(history.ended, "the path at %s ends at t = %.10g, beyond which its steps have become too small: %s", at,
+  HycoCheck(history.ended, "the path at %s ends at t = %.10g, because its steps became too small: %s", at,
             (double)history.t, history.why);
   HycoOnRoot(HycoComm(fom), WriteHead(w->s, w->h, mu));
   HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, "taken", history.n_taken, 1, history.taken));
@@ -360,7 +376,7 @@ static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu
 
   PetscFunctionBegin;
   PetscCheck(!fom->path->checkpoint[0], HycoComm(fom), PETSC_ERR_USER,
-             "-hyco_checkpoint is for hyco solve; training keeps each path that it has solved in its store");
+             "-hyco_checkpoint is for hyco solve; training stores each solved path in its snapshot folder");
   PetscCall(SamplePath(s, mu, path));
   PetscCall(PetscMalloc1(fom->part->n_cells, &w.inelastic));
   PetscCall(HycoH5CreateShared(HycoComm(fom), path, &w.h));
@@ -383,10 +399,10 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   }
   PetscCall(HycoFOMSolve(fom, s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
-  HycoCheck(
-      !summary.regularised[0],
-      "neither supports nor contact keep %s: full order can be regularised, a reduced model cannot; fix a component",
-      summary.regularised);
+  HycoCheck(!summary.regularised[0],
+            "neither supports nor contact keep %s: full order can be regularised, but a reduced model cannot; fix a "
+            "component",
+            summary.regularised);
   if (summary.reason < 0) {
     char at[HYCO_LINE];
 
@@ -400,86 +416,102 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The missing samples that the groups have stored by now. Each takes its run in order: next[c] is where the last look
-   at that of group c ended. */
-static PetscErrorCode CountStored(HycoSnapshots s, PetscInt groups, PetscInt n_par, const PetscReal mu[],
-                                  PetscInt n_missing, const PetscInt missing[], PetscInt next[], PetscInt *n_stored)
+/* A HycoPath's interrupt: a path may take hours. */
+static PetscErrorCode Hear(void *ctx)
 {
   PetscFunctionBegin;
-  *n_stored = 0;
-  for (PetscInt c = 0; c < groups; c++) {
-    const PetscInt first = c * n_missing / groups, last = (c + 1) * n_missing / groups;
-
-    for (next[c] = PetscMax(next[c], first); next[c] < last; next[c]++) {
-      char path[PETSC_MAX_PATH_LEN];
-
-      PetscCall(SamplePath(s, mu + missing[next[c]] * n_par, path));
-      if (access(path, F_OK) != 0) break;
-    }
-    *n_stored += next[c] - first;
-  }
+  PetscCall(HycoQueueHear((HycoQueue)ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's group solves its run of the missing samples. Rank 0 tells how many are stored, while some are not. */
-static PetscErrorCode SolveGroup(HycoSnapshots s, MPI_Comm group, PetscInt color, PetscInt groups, PetscInt n_par,
-                                 const PetscReal mu[], PetscInt n_all, PetscInt n_missing, const PetscInt missing[],
-                                 HycoProgress progress, void *ctx)
+/* What SolveMissing() has of the samples. */
+typedef struct {
+  PetscInt n_all, n_par, n, *missing;
+  const PetscReal *mu;
+  HycoProgress progress;
+  void *ctx;
+} Missing;
+
+/* This rank's group solves samples from the queue. Rank 0 tells how many are stored, while some are not. */
+static PetscErrorCode SolveQueued(HycoSnapshots s, HycoQueue queue, const Missing *m, HycoFOM fom, PetscReal force[])
 {
-  const PetscInt first = color * n_missing / groups, last = (color + 1) * n_missing / groups;
-  PetscInt *next, n_stored;
+  PetscInt k, n_stored;
   PetscMPIInt rank;
-  HycoFOM fom;
-  PetscReal *force;
-  PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
-  PetscCall(HycoFOMCreate(group, s->scene, &fom));
-  PetscCall(PetscMalloc1(fom->fe->n_dof, &force));
-  PetscCall(PetscCalloc1(groups, &next));
-  for (PetscInt k = first; !ierr && k < last; k++) {
-    ierr = SolveSample(s, fom, mu + missing[k] * n_par, force);
-    if (ierr || rank != 0 || !progress) continue;
-    ierr = CountStored(s, groups, n_par, mu, n_missing, missing, next, &n_stored);
-    if (!ierr && n_stored < n_missing) ierr = progress(n_all - n_missing + n_stored, n_all, ctx);
+  for (PetscBool first = PETSC_TRUE;; first = PETSC_FALSE) {
+    PetscCall(HycoQueueTake(queue, &k));
+    if (rank == 0 && m->progress && !first) {
+      PetscCall(HycoQueueDone(queue, &n_stored));
+      if (n_stored < m->n) PetscCall(m->progress(m->n_all - m->n + n_stored, m->n_all, m->ctx));
+    }
+    if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(SolveSample(s, fom, m->mu + m->missing[k] * m->n_par, force));
   }
-  PetscCall(PetscFree(next));
+}
+
+static PetscErrorCode SolveGroup(HycoSnapshots s, HycoQueue queue, const Missing *m)
+{
+  MPI_Comm group;
+  HycoFOM fom;
+  PetscReal *force;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoQueueGetGroup(queue, &group));
+  PetscCall(HycoFOMCreate(group, s->scene, &fom));
+  if (fom->path) {
+    fom->path->interrupt = Hear;
+    fom->path->interrupt_ctx = queue;
+  }
+  PetscCall(PetscMalloc1(fom->fe->n_dof, &force));
+  ierr = SolveQueued(s, queue, m, fom, force);
   PetscCall(PetscFree(force));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode SolveMissing(HycoSnapshots s, const Missing *m)
+{
+  PetscInt groups;
+  HycoQueue queue;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsCreateQueue(HycoComm(s), s->scene, m->n_par, m->mu, m->n, m->missing, &queue));
+  HycoOnEach(HycoComm(s), HycoQueueEnd(queue, SolveGroup(s, queue, m)));
+  PetscCall(HycoQueueCount(queue, &groups, s->solved));
+  s->n_groups = PetscMax(s->n_groups, groups);
+  PetscCall(HycoQueueDestroy(&queue));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgress progress, void *ctx)
 {
-  PetscInt n, n_par, n_missing = 0, *missing, groups = 1, color;
-  const PetscReal *mu;
-  PetscMPIInt rank, size;
-  MPI_Comm group;
+  Missing m = {.progress = progress, .ctx = ctx};
+  PetscMPIInt rank;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SNAPSHOTS_CLASSID);
-  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  HycoCheck(n > 0, "the set of samples is empty");
+  PetscCall(HycoSamplesGet(samples, &m.n_all, &m.n_par, &m.mu));
+  HycoCheck(m.n_all > 0, "the set of samples is empty");
   PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
-  PetscCallMPI(MPI_Comm_size(HycoComm(s), &size));
-  PetscCall(PetscMalloc1(n, &missing));
-  HycoOnRoot(HycoComm(s), FindMissing(s, n, n_par, mu, &n_missing, missing));
-  HycoOnRoot(HycoComm(s), BringTogether(s, n_par, mu, n_missing, missing));
-  PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, HycoComm(s)));
-  PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, HycoComm(s)));
-  if (n_missing) {
-    PetscCall(HycoSnapshotsChooseGroups(HycoComm(s), s->scene, n_missing, &groups));
-    color = (PetscInt)rank * groups / size;
-    PetscCallMPI(MPI_Comm_split(HycoComm(s), (PetscMPIInt)color, rank, &group));
-    HycoOnEach(HycoComm(s), SolveGroup(s, group, color, groups, n_par, mu, n, n_missing, missing, progress, ctx));
-    PetscCallMPI(MPI_Comm_free(&group));
-    if (rank == 0 && progress) PetscCall(progress(n, n, ctx));
+  PetscCall(PetscMalloc1(m.n_all, &m.missing));
+  HycoOnRoot(HycoComm(s), FindMissing(s, m.n_all, m.n_par, m.mu, &m.n, m.missing));
+  PetscCallMPI(MPI_Bcast(&m.n, 1, MPIU_INT, 0, HycoComm(s)));
+  HycoBcast(m.missing, m.n, MPIU_INT, HycoComm(s));
+  if (m.n) {
+    PetscCall(SolveMissing(s, &m));
+    if (rank == 0 && progress) PetscCall(progress(m.n_all, m.n_all, ctx));
   }
-  PetscCall(PetscFree(missing));
+  PetscCall(PetscFree(m.missing));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+HycoDefineMethod(HycoSnapshotsGetSolved, (HycoSnapshots s, PetscInt *n_groups, const PetscInt *solved[]), s,
+                 HYCO_SNAPSHOTS_CLASSID, *n_groups = s->n_groups;
+                 *solved = s->solved)
 
 static PetscErrorCode ReadColumns(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt lo, PetscInt rows,
                                   PetscInt total, PetscScalar data[], PetscInt lda)
@@ -501,7 +533,7 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, HycoSamples samples, const ch
     for (PetscInt j = 0; j < n_steps; j++) {
       NameField(s, j, field, name);
       PetscCall(HycoH5GetSize(h, name, &size, &one));
-      HycoCheck(size == total, "%s: %s has %d rows where other snapshots have %d; remove the folder", path, name,
+      HycoCheck(size == total, "%s: %s has %d rows, and other snapshots have %d; remove the folder", path, name,
                 (int)size, (int)total);
       PetscCall(HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)(k * n_steps + j) * (size_t)lda));
     }

@@ -199,10 +199,10 @@ static PetscErrorCode AddNodes(HycoFE fe, PetscInt field, const PetscReal u[], c
 static PetscErrorCode CheckAxis(HycoFE fe, const HycoQuantity *q, const char what[])
 {
   PetscFunctionBegin;
-  HycoCheck(q->field < fe->dim, "output_%s: the mesh has %d space dimension%s, and no %s along %c", q->name,
+  HycoCheck(q->field < fe->dim, "output_%s: the mesh has %d space dimension%s and no %s along %c", q->name,
             (int)fe->dim, fe->dim == 1 ? "" : "s", what, "xyz"[q->field]);
   HycoCheck(q->field || fe->formulation != HYCO_AXISYMMETRIC,
-            "output_%s: around the circle a %s along the radius x adds up to nothing; ask for y", q->name, what);
+            "output_%s: in an axisymmetric scene the %s along the radius x sums to zero; use y", q->name, what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -267,7 +267,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
 
   PetscFunctionBegin;
   HycoCheck(q->field < UX || q->field > UZ || q->field - UX < fe->dim,
-            "output_%s: the mesh has %d space dimension%s, and no %s", q->name, (int)fe->dim, fe->dim == 1 ? "" : "s",
+            "output_%s: the mesh has %d space dimension%s and no %s", q->name, (int)fe->dim, fe->dim == 1 ? "" : "s",
             HycoQuantityFields[q->field]);
   PetscCall(FindPlace(fe->scene, m, q, &p));
   if (p.dim < m->dim - 1) {

@@ -157,10 +157,10 @@ class Kill(Case):
         right = self.content()
         for name in glob.glob(self.path('m.h5.snapshots', '*.h5'))[::2]:
             os.remove(name)
-        self.refused(self.limited(32), 'm.h5 could not be written to its end (File too large): is the disk full?')
+        self.refused(self.limited(32), 'm.h5 could not be written completely (File too large); check the free space')
         self.assertEqual(self.content(), right, 'the previous model was touched')
         shutil.rmtree(self.path('m.h5.snapshots'))
-        self.refused(self.limited(4), '.h5 could not be written to its end (File too large): is the disk full?')
+        self.refused(self.limited(4), '.h5 could not be written completely (File too large); check the free space')
         self.assertEqual(self.content(), right, 'the previous model was touched')
         subprocess.run([HYCO, *settled(TRAIN)], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
         self.assertEqual(self.content(), right)

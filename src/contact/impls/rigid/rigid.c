@@ -2,27 +2,33 @@
   A rigid body, given by its gap as an obstacle is. It translates as one node of the mesh does, which is the master of
   all of the contact's nodes: supports, forces and springs of that node are the body's.
 */
-#include <hycocontactimpl.h>
+#include "../../facing.h"
 
 static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
 {
   HycoMesh m = fe->mesh;
   const PetscReal one = 1;
+  PetscBool *carries, shared = PETSC_FALSE;
   PetscInt g = 0, body;
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "contact", c->master, &g));
   HycoCheck(m->group_start[g + 1] == m->group_start[g] + 1,
-            "contact %s: its master is the one node that the rigid body moves with, and %s has %d nodes", c->name,
-            c->master, (int)(m->group_start[g + 1] - m->group_start[g]));
+            "contact %s: its master is the one node that the rigid body moves with, and %s has %d nodes; give a group "
+            "of one point",
+            c->name, c->master, (int)(m->group_start[g + 1] - m->group_start[g]));
   body = m->group_node[m->group_start[g]];
   PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
   PetscCall(HycoPairsReserve(pairs, m->group_start[g + 1] - m->group_start[g], 1));
+  PetscCall(PetscMalloc1(m->n_nodes, &carries));
+  HycoSurfaceCarriers(m, g, carries);
   for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
-    HycoCheck(m->group_node[k] != body, "contact %s: its slave %s has the node that the rigid body moves with (%s)",
-              c->name, c->slave, c->master);
-    HycoPairsAppend(pairs, index, m->group_node[k], 1, &body, &one);
+    if (m->group_node[k] == body) shared = PETSC_TRUE;
+    if (carries[m->group_node[k]]) HycoPairsAppend(pairs, index, m->group_node[k], 1, &body, &one);
   }
+  PetscCall(PetscFree(carries));
+  HycoCheck(!shared, "contact %s: its slave %s has the node that the rigid body moves with (%s); leave it out", c->name,
+            c->slave, c->master);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
