@@ -176,7 +176,7 @@ static PetscErrorCode SayMotions(Check *check)
   if (free.n)
     CheckWarn(check,
               "%d rigid motion%s prevented only by contact: full order can solve this if the loads press the bodies "
-              "together; a reduced model needs supports",
+              "together; a reduced model needs supports, except for a rigid body (contact type rigid)",
               (int)free.n, free.n > 1 ? "s are" : " is");
   PetscCall(HycoMotionsDestroy(&free));
   PetscFunctionReturn(PETSC_SUCCESS);
