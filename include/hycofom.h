@@ -2,7 +2,7 @@
 #ifndef HYCOFOM_H
 #define HYCOFOM_H
 
-#include <hycoscene.h>
+#include <hycocontact.h>
 #include <hycosolver.h>
 
 #if defined(__cplusplus)
@@ -38,16 +38,6 @@ typedef struct {
   char regularised[512]; /* unconstrained motions that -hyco_regularise removed, separated by "; " */
   char free_motion[128]; /* a motion that only contact prevents: "body block from moving along (0, 1, 0)"; "": none */
 } HycoSummary;
-
-/* Resultants of a contact of the scene. */
-typedef struct {
-  const char *name;     /* the scene's. Borrowed */
-  PetscInt n, n_active; /* contacts, those with L_i > 0 */
-  PetscReal force[3];   /* on the slave's side: the sum of -L_i n_i; on the master's side the opposite */
-  PetscReal moment[3];  /* of these about the origin; 2D: only the last component; 0 in an axisymmetric scene */
-  PetscReal area;       /* sum of the nodal areas of the contacts with L_i > 0 (2D: length; 1D: 0) */
-  PetscReal pressure;   /* largest L_i divided by the area of its node; 0 if the group is not a surface */
-} HycoContactResult;
 
 /* Forces on the bodies: of the supports of a group, of the springs of a group, of all loads, of all contacts (between
  * bodies their sum is zero). */

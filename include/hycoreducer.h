@@ -65,6 +65,7 @@ typedef struct {
   HycoHybrid hybrid;
   PetscBool whole;   /* the whole mesh as the RID */
   const char *plane; /* group of a plane of symmetry whose cells are in the RID; NULL: none. Borrowed from the scene */
+  PetscReal ridge;   /* hybrid all: of the interface's regression, as training has found it; < 0: not yet */
 } HycoRecipe;
 
 /* Describes settings: "hybrid, pod_tol 1e-10, hybrid contact, layers 1, contact extension 2.5". */
@@ -79,8 +80,13 @@ typedef struct {
   PetscReal cost;          /* operations of an online solve at a new stiffness, estimated */
   PetscReal ratio;         /* the largest quotient of an error and its target; at most 1 if all targets are met */
   HycoErrorKind worst;     /* that error */
-  HycoValidation held_out; /* errors at the held-out points */
-  char failure[512];       /* reason why there is no model; "": there is one */
+  HycoValidation held_out; /* errors at the held-out points that it was judged at */
+  PetscInt n_held;     /* held-out points that there are: of paths a recipe is dropped at the first of them, held_out.n
+                          in all, that it does not bring to its end, or beside whose error it cannot be chosen */
+  PetscInt dropped_at; /* that point; -1: it was judged at all */
+  PetscInt beaten_by;  /* the number of the recipe that is chosen rather than it; 0: none, or the path has no end */
+  PetscBool reopened;  /* that recipe was refused later: a later attempt has all points */
+  char failure[512];   /* reason why there is no model; "": there is one */
 } HycoAttempt;
 /* Called on rank 0 after each attempt. */
 typedef PetscErrorCode (*HycoAttemptMonitor)(const HycoAttempt *attempt, void *ctx);
@@ -116,6 +122,10 @@ typedef struct {
   HycoScan scan;                   /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
+
+/* solved[n_groups]: how many points each group of ranks has solved full order in the last run; those found in the
+   snapshot folder are not counted. On every rank. Borrowed until the next run. Not collective. */
+PetscErrorCode HycoReducerGetSolved(HycoReducer reducer, PetscInt *n_groups, const PetscInt *solved[]);
 
 /* Creates a reducer for a scene, to which it holds a reference. Collective on `comm`. The caller owns it. */
 PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *reducer);

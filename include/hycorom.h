@@ -109,6 +109,10 @@ PetscErrorCode HycoROMGetSizes(HycoROM model, PetscInt *n_contacts, PetscInt *n_
 */
 PetscErrorCode HycoROMSolveMany(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
+/* Sets a function that HycoROMSolveMany() calls after each point with its number, in the order of the solves; results
+ * are then those of that point. NULL: none. Not collective. */
+typedef PetscErrorCode (*HycoPointMonitor)(HycoROM model, PetscInt point, void *ctx);
+PetscErrorCode HycoROMSetPointMonitor(HycoROM model, HycoPointMonitor monitor, void *ctx);
 /* Reads -hyco_reconstruct, -hyco_reconstruct_solver, -hyco_fallback, -hyco_full_displacement, -hyco_residual.
  * HycoROMLoad() calls it. */
 PetscErrorCode HycoROMSetFromOptions(HycoROM model);
@@ -166,6 +170,11 @@ PetscErrorCode HycoROMGetRID(HycoROM model, PetscInt *n_nodes, const PetscInt *n
  * Borrowed. */
 PetscErrorCode HycoROMGetLambda(HycoROM model, PetscInt *n_contacts, const PetscReal *Lambda[],
                                 const PetscInt *node_ids[], const PetscInt *in_rid[]);
+/* Gets the resultants of each contact in the last prediction, like HycoFOMGetContacts(). They are computed from the
+ * forces of HycoROMGetLambda() (forces up to 1e-10 of the largest count as round-off) with the normals, areas and
+ * positions of full order. n is 0 if the model does not have the forces of all contacts (HycoROMSetReconstruct()).
+ * Borrowed until the next call. */
+PetscErrorCode HycoROMGetContacts(HycoROM model, PetscInt *n, const HycoContactResult *result[]);
 /* Gets the displacement of the whole mesh, n_nodes x dim in the mesh file's order. Reads the whole-mesh part on first
  * use. Borrowed. */
 PetscErrorCode HycoROMGetWholeU(HycoROM model, PetscInt *n_nodes, const PetscReal *U[]);

@@ -41,6 +41,10 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
 #define HYCO_MAX_QUANTITIES 16
 PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *names[HYCO_MAX_QUANTITIES]);
 
+/* Gets the number of the scene's contacts and their names (room for n; may be NULL), in the order of
+ * HycoFOMGetContacts() and HycoROMGetContacts(). Not collective. Borrowed. */
+PetscErrorCode HycoSceneGetContacts(HycoScene scene, PetscInt *n, const char *names[]);
+
 /* Whether parameter values outside the ranges are accepted (default: refused). Not collective. */
 PetscErrorCode HycoSceneSetExtrapolate(HycoScene scene, PetscBool extrapolate);
 

@@ -161,6 +161,10 @@ PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *
 void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
 /* Area (length in 2D, 1 in 1D) that each contact's slave node stands for; 0 when its group is no surface. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
+/* What the contacts of the scene carry (result: room for all of them; names borrowed from the scene) at fe's mu, with
+   the normals, areas and forces (pairs->n) of its potential contacts; those of at most `least` do not press. */
+void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
+                        const PetscReal lambda[], PetscReal least, HycoContactResult result[]);
 /* The nodes of the contacts and, where masters lie between nodes, all of the master's group. */
 PetscErrorCode HycoPairsMarkSurfaces(HycoScene scene, HycoMesh mesh, const HycoPairs *pairs, PetscBool node[]);
 

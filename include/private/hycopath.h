@@ -108,7 +108,10 @@ struct _n_HycoPath {
   Vec F_old, f_old;  /* of the last accepted time */
   HycoSeries series; /* NULL: none is asked for */
   HycoStepMonitor monitor;
-  void *monitor_ctx;
+  PetscErrorCode (*between)(HycoFOM, void *ctx); /* NULL, or called at the accepted steps that no listed time ends */
+  void *monitor_ctx;                             /* of both */
+  PetscErrorCode (*interrupt)(void *ctx);        /* NULL, or called at each iteration; its error ends the path */
+  void *interrupt_ctx;
 };
 
 /* With the options' defaults. The caller owns it. */

@@ -3,6 +3,7 @@
 #define HYCOSNAPSHOTSIMPL_H
 
 #include <hycofomimpl.h>
+#include <hycoqueue.h>
 #include <hycosnapshots.h>
 
 struct _p_HycoSnapshots {
@@ -10,7 +11,13 @@ struct _p_HycoSnapshots {
   HycoScene scene; /* referenced */
   char folder[PETSC_MAX_PATH_LEN];
   unsigned long long fingerprint;
+  PetscInt n_groups, *solved; /* most groups that have solved at a time; solutions of each (room for every rank) */
 };
+
+/* A queue of the points list[n] of mu (n_par each) for as many groups as HycoSnapshotsChooseGroups() says; those that
+   share a stiffness, and its factor, are of a kind. Everything is the same on every rank. Collective. */
+PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
+                                        PetscInt n, const PetscInt list[], HycoQueue *queue);
 
 /* Columns of a sample: 1, or the listed times of a history. */
 static inline PetscInt HycoSnapshotsSteps(HycoScene scene)
@@ -26,6 +33,10 @@ static inline PetscInt HycoSnapshotsSteps(HycoScene scene)
 */
 PetscErrorCode HycoSnapshotsGetField(HycoSnapshots store, HycoSamples samples, const char field[], PetscInt block,
                                      Mat *S);
+/* Of a path the displacements at steps that full order took between listed times (at most five between
+   two; none in files of older versions), a column each; `rows` rows of `total` here. Collective; the caller owns it. */
+PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots store, const PetscReal mu[], PetscInt rows, PetscInt total,
+                                       Mat *U);
 /* The n values from `first` on of one field of the solution at mu, of a history at listed time k (else 0), into the
    caller's memory. Not collective. */
 PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots store, const PetscReal mu[], PetscInt k, const char field[],

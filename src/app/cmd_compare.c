@@ -1,5 +1,6 @@
 /* hyco compare: the reduced model against full order over a set of points. */
 #include "driver.h"
+#include <hycosnapshotsimpl.h>
 #include <stdlib.h>
 
 enum { E_U, E_U_H1, E_U_RID, E_SIGMA, E_SIGMA_11, E_LAMBDA_RID, E_LAMBDA_RID_DUAL, E_LAMBDA, E_LAMBDA_DUAL, N_ERRORS };
@@ -69,29 +70,73 @@ static PetscErrorCode CountColumns(HycoScene scene, PetscBool *paths, PetscInt *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CompareMine(HycoScene scene, HycoROM model, MPI_Comm group, PetscInt first, PetscInt last,
-                                  PetscInt n, PetscInt n_par, const PetscReal mu[], PetscReal value[])
+/* The points of a comparison, shared out by a queue. value: rows of those that this rank's group takes. */
+typedef struct {
+  HycoScene scene;
+  HycoROM model;
+  HycoQueue queue;
+  PetscInt n, n_par, n_columns;
+  const PetscReal *mu;
+  PetscReal *value;
+  PetscBool paths;
+} Points;
+
+static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root, PetscReal unused[])
 {
-  HycoFOM fom;
+  PetscInt k, n_done;
   PetscMPIInt rank;
-  PetscReal *unused, *v;
-  PetscBool paths = PETSC_FALSE;
-  PetscInt n_columns = N_COLUMNS;
   char word[] = "points:";
 
   PetscFunctionBegin;
-  PetscCall(CountColumns(scene, &paths, &n_columns));
-  PetscCall(PetscMalloc1(n_columns, &unused));
-  PetscCall(HycoFOMCreate(group, scene, &fom));
-  PetscCallMPI(MPI_Comm_rank(group, &rank));
-  for (PetscInt k = first; k < last; k++) {
-    v = rank == 0 ? value + k * n_columns : unused;
-    PetscCall(paths ? DriverComparePath(fom, model, (PetscBool)(rank == 0), n_par, mu + k * n_par, v)
-                    : ComparePoint(scene, fom, model, n_par, mu + k * n_par, v));
-    if (first == 0 && rank == 0) PetscCall(DriverProgress((k + 1 - first) * n / (last - first), n, word));
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  for (PetscBool first = PETSC_TRUE;; first = PETSC_FALSE) {
+    PetscReal *v;
+
+    PetscCall(HycoQueueTake(p->queue, &k));
+    if (!first && rank == 0) {
+      PetscCall(HycoQueueDone(p->queue, &n_done));
+      PetscCall(DriverProgress(n_done, p->n, word));
+    }
+    if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    v = root ? p->value + k * p->n_columns : unused;
+    PetscCall(p->paths ? DriverComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, v)
+                       : ComparePoint(p->scene, fom, p->model, p->n_par, p->mu + k * p->n_par, v));
   }
+}
+
+static PetscErrorCode CompareMine(const Points *p)
+{
+  HycoFOM fom;
+  MPI_Comm group;
+  PetscMPIInt rank;
+  PetscReal *unused;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(p->n_columns, &unused));
+  PetscCall(HycoQueueGetGroup(p->queue, &group));
+  PetscCall(HycoFOMCreate(group, p->scene, &fom));
+  PetscCallMPI(MPI_Comm_rank(group, &rank));
+  PetscCall(CompareQueued(p, fom, (PetscBool)(rank == 0), unused));
   PetscCall(PetscFree(unused));
   PetscCall(HycoFOMDestroy(&fom));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On every rank, a row for each point. */
+static PetscErrorCode CompareAll(Points *p)
+{
+  PetscInt *list;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(p->n, &list));
+  for (PetscInt k = 0; k < p->n; k++) list[k] = k;
+  PetscCall(HycoSnapshotsCreateQueue(PETSC_COMM_WORLD, p->scene, p->n_par, p->mu, p->n, list, &p->queue));
+  PetscCall(PetscFree(list));
+  PetscCall(CountColumns(p->scene, &p->paths, &p->n_columns));
+  PetscCall(PetscCalloc1(p->n * p->n_columns, &p->value));
+  HycoOnEach(PETSC_COMM_WORLD, HycoQueueEnd(p->queue, CompareMine(p)));
+  HycoAllreduce(p->value, p->n * p->n_columns, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
+  PetscCall(HycoQueueDestroy(&p->queue));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -180,12 +225,8 @@ PetscErrorCode CommandCompare(void)
   HycoScene scene;
   HycoROM model = NULL;
   HycoSamples samples;
-  PetscInt n, n_par, n_columns = N_COLUMNS, groups = 0, color;
-  const PetscReal *mu;
-  PetscReal *value;
-  PetscBool given, contact, paths = PETSC_FALSE;
-  PetscMPIInt rank, size;
-  MPI_Comm group;
+  Points p = {0};
+  PetscBool given, contact;
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
@@ -200,23 +241,16 @@ PetscErrorCode CommandCompare(void)
   if (!given) PetscCall(AddOnePoint(scene, samples, &given));
   HycoCheck(given, "give the test points: -mu V,V,... for one, or -grid N,N,..., or -values_NAME V,V,... for each "
                    "parameter, or -points FILE.csv");
-  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCall(HycoSamplesGet(samples, &p.n, &p.n_par, &p.mu));
   PetscCall(DriverCheckLeftEarly());
   PetscCall(HycoSceneHasContact(scene, &contact));
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(HycoSnapshotsChooseGroups(PETSC_COMM_WORLD, scene, n, &groups));
-  color = (PetscInt)rank * groups / size;
-  PetscCallMPI(MPI_Comm_split(PETSC_COMM_WORLD, (PetscMPIInt)color, rank, &group));
-  PetscCall(CountColumns(scene, &paths, &n_columns));
-  PetscCall(PetscCalloc1(n * n_columns, &value));
-  HycoOnEach(PETSC_COMM_WORLD,
-             CompareMine(scene, model, group, color * n / groups, (color + 1) * n / groups, n, n_par, mu, value));
-  HycoAllreduce(value, n * n_columns, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
-  if (table[0] && !paths) PetscCall(DriverWriteTable(table, scene, n, mu, N_COLUMNS, columns, value));
-  PetscCall(paths ? DriverReportPaths(scene, contact, n, mu, value, table) : Report(scene, contact, n, value));
-  PetscCall(PetscFree(value));
-  PetscCallMPI(MPI_Comm_free(&group));
+  p.scene = scene;
+  p.model = model;
+  PetscCall(CompareAll(&p));
+  if (table[0] && !p.paths) PetscCall(DriverWriteTable(table, scene, p.n, p.mu, N_COLUMNS, columns, p.value));
+  PetscCall(p.paths ? DriverReportPaths(scene, contact, p.n, p.mu, p.value, table)
+                    : Report(scene, contact, p.n, p.value));
+  PetscCall(PetscFree(p.value));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoROMDestroy(&model));
   PetscCall(HycoSceneDestroy(&scene));

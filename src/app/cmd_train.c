@@ -18,7 +18,21 @@ static void ReportScan(cJSON *json, const HycoScan *s, PetscInt n_par)
   ReportVector(object, "at", n_par, s->at);
 }
 
-static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const GreedyLog *log, const Search *search)
+/* "solved_by_group": the points that each group of ranks solved full order. */
+static PetscErrorCode ReportGroups(cJSON *json, HycoReducer reducer)
+{
+  cJSON *array = cJSON_AddArrayToObject(json, "solved_by_group");
+  PetscInt n;
+  const PetscInt *solved;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerGetSolved(reducer, &n, &solved));
+  for (PetscInt k = 0; k < n; k++) cJSON_AddItemToArray(array, cJSON_CreateNumber(solved[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTraining *t, const GreedyLog *log,
+                             const Search *search)
 {
   PetscInt n_par;
   cJSON *json, *seconds;
@@ -27,6 +41,7 @@ static PetscErrorCode Report(HycoScene scene, const HycoTraining *t, const Greed
   PetscCall(ReportCreate("train", scene, NULL, &json));
   cJSON_AddStringToObject(json, "model_type", t->type);
   cJSON_AddNumberToObject(json, "n_samples", t->n_samples);
+  PetscCall(ReportGroups(json, reducer));
   cJSON_AddNumberToObject(json, "n_modes", t->n_modes);
   cJSON_AddNumberToObject(json, "n_dual_modes", t->n_dual_modes);
   cJSON_AddNumberToObject(json, "n_stress_modes", t->n_stress_modes);
@@ -206,7 +221,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));
   if (greedy) PetscCall(DriverJudgeGreedy(&log));
-  PetscCall(Report(scene, &t, &log, &search));
+  PetscCall(Report(scene, reducer, &t, &log, &search));
   PetscCall(PetscFree(search.text));
   PetscCall(PetscFree(log.text));
   PetscCall(HycoSamplesDestroy(&training));

@@ -98,16 +98,17 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
   if (!s->length) {
     PetscCall(Append(
         s, "attempt,training_points,model_type,pod_tol,rid_layers,rid_contact_extension,hybrid,rid_whole,n_modes,"
-           "rid_elements,rid_fraction"));
+           "rid_elements,rid_fraction,held_out_points"));
     for (PetscInt j = 0; j < CountKinds(s); j++) {
       snprintf(row, sizeof(row), ",error_%s,median_%s", HycoErrorKinds[j], HycoErrorKinds[j]);
       PetscCall(Append(s, row));
     }
     PetscCall(Append(s, ",not_converged,seconds,operations,meets,failure\n"));
   }
-  at = (size_t)snprintf(row, sizeof(row), "%d,%d,%s,%g,%d,%g,%s,%d,%d,%d,%.6g", (int)++s->n, (int)s->n_points, r->type,
-                        (double)r->pod_tol, (int)r->layers, (double)r->contact_extension, HycoHybrids[r->hybrid],
-                        (int)r->whole, (int)a->n_modes, (int)a->rid_elements, (double)a->rid_fraction);
+  at = (size_t)snprintf(row, sizeof(row), "%d,%d,%s,%g,%d,%g,%s,%d,%d,%d,%.6g,%d", (int)++s->n, (int)s->n_points,
+                        r->type, (double)r->pod_tol, (int)r->layers, (double)r->contact_extension,
+                        HycoHybrids[r->hybrid], (int)r->whole, (int)a->n_modes, (int)a->rid_elements,
+                        (double)a->rid_fraction, a->failure[0] ? 0 : (int)a->held_out.n);
   for (PetscInt j = 0; j < 2 * CountKinds(s); j++) {
     Number(a->failure[0] ? (PetscReal)NAN : (j % 2 ? a->held_out.median : a->held_out.largest)[j / 2], number);
     at += (size_t)snprintf(row + at, sizeof(row) - at, ",%s", number);
@@ -121,23 +122,37 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* "; meets the targets", or where and why it was dropped: " at 2 of 20 points, and dropped beside recipe 1: ...". */
+static PetscErrorCode DescribeEnd(const HycoAttempt *a, char text[DRIVER_LINE])
+{
+  PetscFunctionBegin;
+  text[0] = '\0';
+  if (a->ratio <= 1) snprintf(text, DRIVER_LINE, "; meets the targets");
+  if (a->dropped_at >= 0 && !a->beaten_by)
+    snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d, which does not reach its end", (int)a->held_out.n,
+             (int)a->n_held);
+  if (a->beaten_by)
+    snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d: settings %d are better", (int)a->held_out.n,
+             (int)a->n_held, (int)a->beaten_by);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A HycoAttemptMonitor. */
 static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
 {
   Search *s = (Search *)ctx;
-  char what[DRIVER_LINE], errors[DRIVER_LINE];
+  char what[DRIVER_LINE], errors[DRIVER_LINE], end[DRIVER_LINE];
 
   PetscFunctionBegin;
-  if (a->number == 1)
-    PetscCall(Say("settings, each judged at %d held-out points (largest errors):\n", (int)a->held_out.n));
+  if (a->number == 1) PetscCall(Say("settings, each judged at %d held-out points (largest errors):\n", (int)a->n_held));
   HycoRecipeDescribe(&a->recipe, sizeof(what), what);
   DescribeErrors(IsPath(s), a->held_out.largest, errors);
+  PetscCall(DescribeEnd(a, end));
   if (a->failure[0])
     PetscCall(Say("  %2d %s: no model: %s\n", (int)a->number, what, a->failure));
   else
     PetscCall(Say("  %2d %s: %d modes, RID %.1f %%; %s; %.3g ms%s\n", (int)a->number, what, (int)a->n_modes,
-                  100 * (double)a->rid_fraction, errors, 1e3 * (double)a->held_out.seconds,
-                  a->ratio <= 1 ? "; meets the targets" : ""));
+                  100 * (double)a->rid_fraction, errors, 1e3 * (double)a->held_out.seconds, end));
   PetscCall(AppendRow(s, a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -150,7 +150,7 @@ PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell
     PetscCall(PetscArraycpy(&mean[0][0], fe->kept_mean + (size_t)cell * (size_t)(3 * el->nv), 3 * el->nv));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscMemzero(mean, HYCO_CELL_NODES * sizeof(mean[0])));
+  PetscCall(PetscArrayzero(&mean[0][0], 3 * el->nv));
   for (PetscInt q = 0; q < el->nq; q++) {
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
     volume += w;

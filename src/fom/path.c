@@ -102,6 +102,7 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   const PetscScalar *u;
 
   PetscFunctionBegin;
+  if (p->interrupt) PetscCall((*p->interrupt)(p->interrupt_ctx));
   PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(PetscArrayzero(p->f_local, f->fe->n_dof));
@@ -222,6 +223,10 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscCall(VecCopy(p->F, p->F_old));
   PetscCall(VecCopy(p->f_int, p->f_old));
   p->now.energy_defect = PetscMax(p->now.energy_defect, defect);
+  if (p->between && p->t < p->scene->times[p->step]) {
+    PetscCall(HycoFOMGather((HycoFOM)p->ctx));
+    PetscCall((*p->between)((HycoFOM)p->ctx, p->monitor_ctx));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -386,6 +391,7 @@ PetscErrorCode HycoFOMSetStepMonitor(HycoFOM f, HycoStepMonitor monitor, void *c
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   HycoCheck(f->path, "HycoFOMSetStepMonitor: the scene has no history, and its solution has no steps");
   f->path->monitor = monitor;
+  f->path->between = NULL;
   f->path->monitor_ctx = ctx;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

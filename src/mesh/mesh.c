@@ -2,10 +2,11 @@
 #include <hycocontactimpl.h>
 #include <string.h>
 
-const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES] = {{"line2", 1, 2, 1, PETSC_FALSE}, {"tri3", 2, 3, 2, PETSC_FALSE},
-                                                       {"quad4", 2, 4, 2, PETSC_FALSE}, {"tet4", 3, 4, 3, PETSC_FALSE},
-                                                       {"hex8", 3, 8, 4, PETSC_FALSE},  {"tri6", 2, 6, 3, PETSC_TRUE},
-                                                       {"quad8", 2, 8, 3, PETSC_TRUE},  {"quad9", 2, 9, 3, PETSC_TRUE}};
+const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES] = {
+    {"line2", 1, 2, 1, 1, PETSC_FALSE}, {"tri3", 2, 3, 2, 2, PETSC_FALSE}, {"quad4", 2, 4, 2, 2, PETSC_FALSE},
+    {"tet4", 3, 4, 3, 3, PETSC_FALSE},  {"hex8", 3, 8, 4, 4, PETSC_FALSE}, {"tri6", 2, 6, 3, 2, PETSC_TRUE},
+    {"quad8", 2, 8, 3, 2, PETSC_TRUE},  {"quad9", 2, 9, 3, 2, PETSC_TRUE}, {"tet10", 3, 10, 6, 3, PETSC_TRUE},
+    {"hex20", 3, 20, 8, 4, PETSC_TRUE}, {"hex27", 3, 27, 9, 4, PETSC_TRUE}};
 
 PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
 {
@@ -146,6 +147,10 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   for (PetscInt k = 0; k < scene->n_springs; k++) PetscCall(CheckSpring(mesh, &scene->spring[k]));
   for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(HycoContactCheckGroups(scene->contact[k], mesh));
   for (PetscInt k = 0; k < scene->n_ties; k++) PetscCall(CheckTie(mesh, &scene->tie[k]));
+  HycoCheck(!scene->n_contacts || mesh->type != HYCO_HEX20,
+            "contact %s: the mesh has hex20 cells, at whose corners a uniform pressure would give tensile forces; use "
+            "hex27 cells, or a mesh file, whose hex20 cells are read as hex27",
+            scene->contact[0]->name);
   for (PetscInt k = 0; k < scene->n_contacts; k++)
     HycoCheck(!HycoMeshIsQuadratic(mesh) || !scene->contact[k]->ops->find,
               "contact %s: type surface needs first-order cells, and the mesh has %s; use matching meshes with type: "

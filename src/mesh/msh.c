@@ -296,12 +296,9 @@ static const char *GroupName(Msh *m, HycoMshGroup *g)
   return g->name;
 }
 
-#define TAKES "hyco supports line2, tri3, quad4, tet4 and hex8, and of second order tri6, quad8 and quad9: %s"
-
-static const char *Remedy(long long type)
-{
-  return type == 11 || type == 12 || type == 17 ? "mesh it with gmsh -order 1" : "mesh the bodies with one of these";
-}
+#define TAKES                                                                                                          \
+  "hyco supports line2, tri3, quad4, tet4 and hex8, and of second order tri6, quad8, quad9, tet10, hex20 and hex27: "  \
+  "mesh the bodies with one of these"
 
 /* Of a type that is refused. */
 static const char *TypeName(long long type)
@@ -311,12 +308,6 @@ static const char *TypeName(long long type)
     return "prisms";
   case 7:
     return "pyramids";
-  case 11:
-    return "tet10";
-  case 12:
-    return "hex27";
-  case 17:
-    return "hex20";
   default:
     return "not known here";
   }
@@ -328,9 +319,9 @@ static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long lo
   const PetscInt nv = type_nodes[type];
 
   PetscFunctionBegin;
-  HycoCheck(type <= 5 || (type >= 8 && type <= 10) || type == 15 || type == 16,
+  HycoCheck(type <= 5 || (type >= 8 && type <= 12) || (type >= 15 && type <= 17),
             "%s: group \"%s\" has elements of gmsh type %lld (%s); " TAKES, m->path, GroupName(m, g), type,
-            TypeName(type), Remedy(type));
+            TypeName(type));
   HycoCheck(!g->n || g->nv == nv,
             "%s: group \"%s\" mixes elements of %d and %d nodes; hyco supports one type per mesh: recombine all "
             "surfaces in gmsh, or none",
@@ -368,7 +359,7 @@ static PetscErrorCode CheckType(Msh *m, long long type)
 {
   PetscFunctionBegin;
   HycoCheck(!m->failed && type > 0 && type < 32, "the mesh %s has elements of gmsh type %lld (%s); " TAKES, m->path,
-            type, TypeName(type), Remedy(type));
+            type, TypeName(type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

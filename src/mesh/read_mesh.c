@@ -58,10 +58,13 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
     if (HycoCellKinds[t].dim == m->dim && HycoCellKinds[t].nv == nv) m->type = (HycoCellType)t;
   }
   HycoCheck(HycoCellKinds[m->type].dim == m->dim && HycoCellKinds[m->type].nv == nv,
-            "%s: cells of dimension %d with %d nodes are not supported; hyco supports line2, tri3, quad4, tet4, hex8, "
-            "tri6, quad8 and quad9",
-            scene->mesh_path, (int)m->dim, (int)nv);
-  m->nv = nv;
+            "%s: cells of dimension %d with %d nodes are not of a type that hyco supports", scene->mesh_path,
+            (int)m->dim, (int)nv);
+  if (m->type == HYCO_HEX20 && scene->n_contacts) { /* a uniform pressure would pull at the corners of quad8 */
+    PetscCall(HycoMshAddFaceNodes(scene->mesh_path, &r->file));
+    m->type = HYCO_HEX27;
+  }
+  m->nv = HycoCellKinds[m->type].nv;
   m->nf = HycoCellKinds[m->type].nf;
   m->n_cells = cells;
   PetscFunctionReturn(PETSC_SUCCESS);

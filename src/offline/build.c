@@ -527,6 +527,19 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
+{
+  const PetscInt *solved;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsGetSolved(*store, &t->n_solvers, &solved));
+  PetscCall(PetscFree(t->solved));
+  PetscCall(PetscMalloc1(t->n_solvers, &t->solved));
+  PetscCall(PetscArraycpy(t->solved, solved, t->n_solvers));
+  PetscCall(HycoSnapshotsDestroy(store));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* How many points to judge by, when nobody says: enough for a bound of 95 % of the points to come where the training is
    large enough to pay for them. */
 #define LEAST_HELD 20
@@ -599,7 +612,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   if (choose && t->prototype->ops->modes) HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->modes)(t, store));
   HycoStaged(HYCO_STAGE_REDUCTION, HycoReducerFinish(t, store, path, (PetscBool)!choose, &report));
   PetscCall(HycoReducerReset(t));
-  PetscCall(HycoSnapshotsDestroy(&store));
+  PetscCall(HycoReducerClose(t, &store));
   PetscCall(HycoSamplesDestroy(&chosen));
   report.seconds_snapshots = solved - begin;
   report.seconds_reduction = HycoNow() - solved;

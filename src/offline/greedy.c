@@ -376,7 +376,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscCall(Conclude(t, &loop, path, &report));
   report.seconds_reduction = HycoNow() - loop.begin;
   PetscCall(HycoReducerReset(t));
-  PetscCall(HycoSnapshotsDestroy(&loop.store));
+  PetscCall(HycoReducerClose(t, &loop.store));
   PetscCall(HycoSamplesDestroy(&loop.samples));
   PetscCall(PetscFree(loop.value));
   if (training_report) *training_report = report;

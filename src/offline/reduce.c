@@ -176,6 +176,21 @@ PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The columns of X into those of Y from `at` on. */
+static PetscErrorCode CopyColumns(Mat X, Mat Y, PetscInt at)
+{
+  PetscInt n;
+  Mat part;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(X, NULL, &n));
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatDenseGetSubMatrix(Y, PETSC_DECIDE, PETSC_DECIDE, at, at + n, &part));
+  PetscCall(MatCopy(X, part, SAME_NONZERO_PATTERN));
+  PetscCall(MatDenseRestoreSubMatrix(Y, &part));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The modes of the paths side by side (N rows, n_rows of them here), each path brought to the size of the largest: a
    slow one counts as much as a fast one. */
 static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, PetscInt N, PetscInt n_rows, Mat *joined)
@@ -194,14 +209,11 @@ static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, Petsc
   PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, N, PetscMax(n, 1), NULL, joined));
   for (PetscInt j = 0; j < modes->n; j++) {
     PetscInt l;
-    Mat part;
 
     if (!modes->V[j]) continue;
     PetscCall(MatGetSize(modes->V[j], NULL, &l));
     PetscCall(MatScale(modes->V[j], largest / PetscMax(modes->first[j], SLIGHT * largest)));
-    PetscCall(MatDenseGetSubMatrix(*joined, PETSC_DECIDE, PETSC_DECIDE, at, at + l, &part));
-    PetscCall(MatCopy(modes->V[j], part, SAME_NONZERO_PATTERN));
-    PetscCall(MatDenseRestoreSubMatrix(*joined, &part));
+    PetscCall(CopyColumns(modes->V[j], *joined, at));
     at += l;
   }
   PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
@@ -216,7 +228,7 @@ static PetscErrorCode TakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscInt mo
 
   PetscFunctionBegin;
   PetscCall(MatGetSize(S, &N, &n));
-  PetscCall(PetscCalloc1(t->n_s + 1, &basis->sigma));
+  PetscCall(PetscCalloc1(PetscMax(t->n_s, n) + 1, &basis->sigma));
   basis->n_sigma = PetscMin(N, n);
   PetscCall(HycoReducerPOD(t, S, tol, most, &basis->V, &basis->l, basis->sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -235,16 +247,41 @@ PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The paths of S, `n` columns each. */
-static PetscErrorCode AddPaths(HycoReducer t, Mat S, PetscInt n, PetscReal tol, HycoPathModes *modes)
+/* Path j of S, n columns of it, and of displacements (U_store not NULL) its steps between these. */
+static PetscErrorCode GetPath(HycoReducer t, Mat S, PetscInt j, PetscInt n, HycoSnapshots U_store, Mat *path)
+{
+  PetscInt n_par, N, n_rows, n_between;
+  const PetscReal *mu;
+  Mat part, between;
+
+  PetscFunctionBegin;
+  PetscCall(MatDenseGetSubMatrix(S, PETSC_DECIDE, PETSC_DECIDE, j * n, (j + 1) * n, &part));
+  if (!U_store) PetscCall(MatDuplicate(part, MAT_COPY_VALUES, path));
+  if (U_store) {
+    PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+    PetscCall(MatGetSize(S, &N, NULL));
+    PetscCall(MatGetLocalSize(S, &n_rows, NULL));
+    PetscCall(HycoSnapshotsGetBetween(U_store, mu + j * n_par, n_rows, N, &between));
+    PetscCall(RemoveLifting(t, between));
+    PetscCall(MatGetSize(between, NULL, &n_between));
+    PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, N, n + n_between, NULL, path));
+    PetscCall(CopyColumns(part, *path, 0));
+    PetscCall(CopyColumns(between, *path, n));
+    PetscCall(MatDestroy(&between));
+  }
+  PetscCall(MatDenseRestoreSubMatrix(S, &part));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The paths of S, `n` columns each. U_store: as above. */
+static PetscErrorCode AddPaths(HycoReducer t, Mat S, PetscInt n, HycoSnapshots U_store, PetscReal tol,
+                               HycoPathModes *modes)
 {
   PetscFunctionBegin;
   for (PetscInt j = 0; j < t->n_s / n; j++) {
-    Mat part, path;
+    Mat path;
 
-    PetscCall(MatDenseGetSubMatrix(S, PETSC_DECIDE, PETSC_DECIDE, j * n, (j + 1) * n, &part));
-    PetscCall(MatDuplicate(part, MAT_COPY_VALUES, &path));
-    PetscCall(MatDenseRestoreSubMatrix(S, &part));
+    PetscCall(GetPath(t, S, j, n, U_store, &path));
     PetscCall(HycoPathModesAdd(t, path, tol, modes));
     PetscCall(MatDestroy(&path));
   }
@@ -253,7 +290,7 @@ static PetscErrorCode AddPaths(HycoReducer t, Mat S, PetscInt n, PetscReal tol, 
 
 /* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. Of paths
    that of each, then of these. */
-static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool all)
+static PetscErrorCode FindBasis(HycoReducer t, HycoSnapshots store, Mat S, PetscInt kind, PetscBool all)
 {
   const PetscInt most = kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0;
   const PetscReal tol = all ? 0 : t->tol[kind];
@@ -267,7 +304,7 @@ static PetscErrorCode FindBasis(HycoReducer t, Mat S, PetscInt kind, PetscBool a
   }
   PetscCall(MatGetSize(S, &N, NULL));
   PetscCall(MatGetLocalSize(S, &n_rows, NULL));
-  PetscCall(AddPaths(t, S, HycoSnapshotsSteps(t->scene), tol, &modes));
+  PetscCall(AddPaths(t, S, HycoSnapshotsSteps(t->scene), kind == HYCO_SEED_DISPLACEMENT ? store : NULL, tol, &modes));
   PetscCall(HycoPathModesJoin(t, &modes, N, n_rows, tol, most, &t->basis[kind]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -357,7 +394,7 @@ static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, Pe
   PetscCall(FetchContacts(t));
   PetscCall(MatDuplicate(t->S, MAT_COPY_VALUES, &S));
   PetscCall(RemoveLifting(t, S));
-  PetscCall(FindBasis(t, S, HYCO_SEED_DISPLACEMENT, all));
+  PetscCall(FindBasis(t, store, S, HYCO_SEED_DISPLACEMENT, all));
   HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give a smaller value",
                  (double)t->tol[HYCO_SEED_DISPLACEMENT]);
   HycoCheckModel(basis->l,
@@ -378,7 +415,7 @@ static PetscErrorCode ReduceField(HycoReducer t, HycoSnapshots store, const char
   PetscFunctionBegin;
   if (!t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSnapshotsGetField(store, t->samples, field, 1, &S));
-  PetscCall(FindBasis(t, S, kind, all));
+  PetscCall(FindBasis(t, store, S, kind, all));
   PetscCall(MatDestroy(&S));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -407,8 +444,8 @@ static PetscErrorCode TakeDisplacements(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(CutBasis(t, HYCO_SEED_DISPLACEMENT, &V, &t->l));
   HycoCheckModel(t->l, "-hyco_pod_tol %g leaves no mode; give a smaller value", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
-  PetscCall(PetscMalloc1(t->n_s + 1, &t->sigma));
-  PetscCall(PetscArraycpy(t->sigma, basis->sigma, t->n_s + 1));
+  PetscCall(PetscMalloc1(PetscMax(t->n_s, basis->n_sigma) + 1, &t->sigma));
+  PetscCall(PetscArraycpy(t->sigma, basis->sigma, PetscMax(t->n_s, basis->n_sigma) + 1));
   PetscCall(SeedFrom(t, V, t->l, HYCO_SEED_DISPLACEMENT, t->sizes[3], &t->n_seeds_node, &t->seeds_node));
   PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
   for (PetscInt k = 0; k < t->n_s; k++)

@@ -20,6 +20,7 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
   t->n_validation = -1;
   t->search = PETSC_TRUE;
   t->budget = -1;
+  t->ridge = -1;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *reducer = t;
@@ -105,7 +106,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
   }
   PetscCall(MatDestroy(&t->S));
   HycoFreeAll(&t->U_rid, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds,
-              &t->taken_start, &t->taken, &t->judged);
+              &t->taken_start, &t->taken, &t->judged, &t->judged_held);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -123,6 +124,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   PetscCall(EndTraining(t));
   PetscCall(PetscStrArrayDestroy(&t->groups));
   PetscCall(PetscFree(t->region));
+  PetscCall(PetscFree(t->solved));
   PetscCall(HycoSceneDestroy(&t->scene));
   PetscCall(PetscHeaderDestroy(reducer));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -132,6 +134,9 @@ HycoDefineMethod(HycoReducerSetSnapshotFolder, (HycoReducer t, const char folder
                  PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder))))
 HycoDefineMethod(HycoReducerChooses, (HycoReducer t, PetscBool *chooses), t, HYCO_REDUCER_CLASSID,
                  *chooses = (PetscBool)(t->prototype->ops->choosepoints != NULL))
+HycoDefineMethod(HycoReducerGetSolved, (HycoReducer t, PetscInt *n_groups, const PetscInt *solved[]), t,
+                 HYCO_REDUCER_CLASSID, *n_groups = t->n_solvers;
+                 *solved = t->solved)
 HycoDefineMethod(HycoReducerSetProgress, (HycoReducer t, HycoProgress progress, void *ctx), t, HYCO_REDUCER_CLASSID,
                  t->progress = progress;
                  t->progress_ctx = ctx)
@@ -255,6 +260,9 @@ static PetscErrorCode ReadTraining(HycoReducer t)
       "-hyco_search",
       "choose model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by the held-out errors, unless given",
       &t->search, NULL));
+  PetscCall(HycoOptionsBool("-hyco_search_exhaustive",
+                            "for paths: judge all settings at all held-out points, also settings that cannot be chosen",
+                            &t->exhaustive, NULL));
   PetscCall(HycoOptionsName("-hyco_reducer_view", "print the settings of the training before it begins"));
   PetscCall(HycoOptionsFor("greedy"));
   PetscCall(HycoOptionsWord("-hyco_greedy_indicator",

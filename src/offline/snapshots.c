@@ -38,6 +38,7 @@ static PetscErrorCode Begin(HycoSnapshots s)
 PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char folder[], HycoSnapshots *snapshots)
 {
   HycoSnapshots s;
+  PetscMPIInt size;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
@@ -46,6 +47,8 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
                               HycoSnapshotsDestroy, HycoSnapshotsView));
   PetscCall(PetscObjectReference((PetscObject)scene));
   s->scene = scene;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(PetscCalloc1(size, &s->solved));
   PetscCall(PetscStrncpy(s->folder, folder, sizeof(s->folder)));
   ierr = Begin(s);
   if (ierr) PetscCall(HycoSnapshotsDestroy(&s));
@@ -60,6 +63,7 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
   if (!snapshots || !*snapshots) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheckHandle(*snapshots, HYCO_SNAPSHOTS_CLASSID);
   HycoDereference(snapshots);
+  PetscCall(PetscFree((*snapshots)->solved));
   PetscCall(HycoSceneDestroy(&(*snapshots)->scene));
   PetscCall(PetscHeaderDestroy(snapshots));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -117,36 +121,6 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The samples that share a stiffness one after the other, in the order of the first of each, so that they share its
-   factor whatever the parameters' order. On rank 0. */
-static PetscErrorCode BringTogether(HycoSnapshots s, PetscInt n_par, const PetscReal mu[], PetscInt n, PetscInt list[])
-{
-  PetscBool reaches[HYCO_MAX_PARAMETERS];
-  PetscInt *kind, *first, *sorted, n_kinds = 0;
-
-  PetscFunctionBegin;
-  HycoSceneReaches(s->scene, reaches);
-  PetscCall(PetscMalloc3(n, &kind, n, &first, n, &sorted));
-  for (PetscInt i = 0; i < n; i++) {
-    for (kind[i] = 0; kind[i] < n_kinds; kind[i]++) {
-      const PetscReal *a = mu + first[kind[i]] * n_par, *b = mu + list[i] * n_par;
-      PetscInt p = 0;
-
-      while (p < n_par && (!reaches[p] || a[p] == b[p])) p++;
-      if (p == n_par) break;
-    }
-    if (kind[i] == n_kinds) first[n_kinds++] = list[i];
-  }
-  for (PetscInt k = 0, at = 0; k < n_kinds && n_kinds < n; k++) {
-    for (PetscInt i = 0; i < n; i++) {
-      if (kind[i] == k) sorted[at++] = list[i];
-    }
-  }
-  if (n_kinds < n) PetscCall(PetscArraycpy(list, sorted, n));
-  PetscCall(PetscFree3(kind, first, sorted));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *groups)
 {
   PetscFunctionBegin;
@@ -189,6 +163,48 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
     while (*groups > 1 && *groups * factor > memory / 2) (*groups)--;
   }
   PetscCallMPI(MPI_Bcast(groups, 1, MPIU_INT, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* kind[i]: the first of the points list[] (n of them) that shares a stiffness with list[i], and its factor. */
+static PetscErrorCode FindKinds(HycoScene scene, PetscInt n_par, const PetscReal mu[], PetscInt n,
+                                const PetscInt list[], PetscInt kind[])
+{
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+  PetscInt *first, n_kinds = 0;
+
+  PetscFunctionBegin;
+  HycoSceneReaches(scene, reaches);
+  PetscCall(PetscMalloc1(n, &first));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt k;
+
+    for (k = 0; k < n_kinds; k++) {
+      const PetscReal *a = mu + list[first[k]] * n_par, *b = mu + list[i] * n_par;
+      PetscInt p = 0;
+
+      while (p < n_par && (!reaches[p] || a[p] == b[p])) p++;
+      if (p == n_par) break;
+    }
+    if (k == n_kinds) first[n_kinds++] = i;
+    kind[i] = first[k];
+  }
+  PetscCall(PetscFree(first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
+                                        PetscInt n, const PetscInt list[], HycoQueue *queue)
+{
+  PetscInt groups, *kind;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsChooseGroups(comm, scene, n, &groups));
+  PetscCall(PetscMalloc1(n, &kind));
+  HycoOnRoot(comm, FindKinds(scene, n_par, mu, n, list, kind));
+  HycoBcast(kind, n, MPIU_INT, comm);
+  PetscCall(HycoQueueCreate(comm, groups, n, kind, queue));
+  PetscCall(PetscFree(kind));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -269,7 +285,38 @@ typedef struct {
   HycoSnapshots s;
   HycoH5 h;
   PetscReal *force, *inelastic;
+  PetscInt n_between; /* steps written that no listed time ends */
+  PetscInt slot; /* of the last of these: its part of the interval between two listed times, numbered from the path's
+                    start */
 } PathWriter;
+
+/* At most so many steps between two listed times are kept, one of each of as many equal parts of the interval. */
+#define MOST_BETWEEN 5
+
+static void NameBetween(PetscInt k, char name[HYCO_LINE])
+{
+  HycoFormat(name, "between-%04d", (int)k);
+}
+
+/* The displacements of an accepted step between listed times: more of the path for the modes, at no cost of solution.
+ */
+static PetscErrorCode WriteBetween(HycoFOM fom, void *ctx)
+{
+  PathWriter *w = (PathWriter *)ctx;
+  const HycoPath p = fom->path;
+  const PetscReal *times = fom->scene->times + p->step - 1;
+  const PetscInt slot = p->step * MOST_BETWEEN + (PetscInt)(MOST_BETWEEN * (p->t - times[0]) / (times[1] - times[0]));
+  const HycoFileOrder *rows;
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (slot == w->slot) PetscFunctionReturn(PETSC_SUCCESS);
+  w->slot = slot;
+  NameBetween(w->n_between++, name);
+  PetscCall(HycoFOMGetRows(fom, &rows));
+  PetscCall(HycoFieldWrite(w->h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, fom->fe->dim, 1, fom->u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* A HycoStepMonitor: the fields of a listed time. The forces are those that the bodies resist with, f_int. */
 static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
@@ -309,6 +356,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
 
   PetscFunctionBegin;
   PetscCall(HycoFOMSetStepMonitor(fom, WriteStep, w));
+  fom->path->between = WriteBetween;
   PetscCall(HycoFOMSolve(fom, w->s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetHistory(fom, &history));
   HycoSceneNamePoint(w->s->scene, mu, at);
@@ -368,86 +416,102 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The missing samples that the groups have stored by now. Each takes its run in order: next[c] is where the last look
-   at that of group c ended. */
-static PetscErrorCode CountStored(HycoSnapshots s, PetscInt groups, PetscInt n_par, const PetscReal mu[],
-                                  PetscInt n_missing, const PetscInt missing[], PetscInt next[], PetscInt *n_stored)
+/* A HycoPath's interrupt: a path may take hours. */
+static PetscErrorCode Hear(void *ctx)
 {
   PetscFunctionBegin;
-  *n_stored = 0;
-  for (PetscInt c = 0; c < groups; c++) {
-    const PetscInt first = c * n_missing / groups, last = (c + 1) * n_missing / groups;
-
-    for (next[c] = PetscMax(next[c], first); next[c] < last; next[c]++) {
-      char path[PETSC_MAX_PATH_LEN];
-
-      PetscCall(SamplePath(s, mu + missing[next[c]] * n_par, path));
-      if (access(path, F_OK) != 0) break;
-    }
-    *n_stored += next[c] - first;
-  }
+  PetscCall(HycoQueueHear((HycoQueue)ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's group solves its run of the missing samples. Rank 0 tells how many are stored, while some are not. */
-static PetscErrorCode SolveGroup(HycoSnapshots s, MPI_Comm group, PetscInt color, PetscInt groups, PetscInt n_par,
-                                 const PetscReal mu[], PetscInt n_all, PetscInt n_missing, const PetscInt missing[],
-                                 HycoProgress progress, void *ctx)
+/* What SolveMissing() has of the samples. */
+typedef struct {
+  PetscInt n_all, n_par, n, *missing;
+  const PetscReal *mu;
+  HycoProgress progress;
+  void *ctx;
+} Missing;
+
+/* This rank's group solves samples from the queue. Rank 0 tells how many are stored, while some are not. */
+static PetscErrorCode SolveQueued(HycoSnapshots s, HycoQueue queue, const Missing *m, HycoFOM fom, PetscReal force[])
 {
-  const PetscInt first = color * n_missing / groups, last = (color + 1) * n_missing / groups;
-  PetscInt *next, n_stored;
+  PetscInt k, n_stored;
   PetscMPIInt rank;
-  HycoFOM fom;
-  PetscReal *force;
-  PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
-  PetscCall(HycoFOMCreate(group, s->scene, &fom));
-  PetscCall(PetscMalloc1(fom->fe->n_dof, &force));
-  PetscCall(PetscCalloc1(groups, &next));
-  for (PetscInt k = first; !ierr && k < last; k++) {
-    ierr = SolveSample(s, fom, mu + missing[k] * n_par, force);
-    if (ierr || rank != 0 || !progress) continue;
-    ierr = CountStored(s, groups, n_par, mu, n_missing, missing, next, &n_stored);
-    if (!ierr && n_stored < n_missing) ierr = progress(n_all - n_missing + n_stored, n_all, ctx);
+  for (PetscBool first = PETSC_TRUE;; first = PETSC_FALSE) {
+    PetscCall(HycoQueueTake(queue, &k));
+    if (rank == 0 && m->progress && !first) {
+      PetscCall(HycoQueueDone(queue, &n_stored));
+      if (n_stored < m->n) PetscCall(m->progress(m->n_all - m->n + n_stored, m->n_all, m->ctx));
+    }
+    if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(SolveSample(s, fom, m->mu + m->missing[k] * m->n_par, force));
   }
-  PetscCall(PetscFree(next));
+}
+
+static PetscErrorCode SolveGroup(HycoSnapshots s, HycoQueue queue, const Missing *m)
+{
+  MPI_Comm group;
+  HycoFOM fom;
+  PetscReal *force;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoQueueGetGroup(queue, &group));
+  PetscCall(HycoFOMCreate(group, s->scene, &fom));
+  if (fom->path) {
+    fom->path->interrupt = Hear;
+    fom->path->interrupt_ctx = queue;
+  }
+  PetscCall(PetscMalloc1(fom->fe->n_dof, &force));
+  ierr = SolveQueued(s, queue, m, fom, force);
   PetscCall(PetscFree(force));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode SolveMissing(HycoSnapshots s, const Missing *m)
+{
+  PetscInt groups;
+  HycoQueue queue;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsCreateQueue(HycoComm(s), s->scene, m->n_par, m->mu, m->n, m->missing, &queue));
+  HycoOnEach(HycoComm(s), HycoQueueEnd(queue, SolveGroup(s, queue, m)));
+  PetscCall(HycoQueueCount(queue, &groups, s->solved));
+  s->n_groups = PetscMax(s->n_groups, groups);
+  PetscCall(HycoQueueDestroy(&queue));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgress progress, void *ctx)
 {
-  PetscInt n, n_par, n_missing = 0, *missing, groups = 1, color;
-  const PetscReal *mu;
-  PetscMPIInt rank, size;
-  MPI_Comm group;
+  Missing m = {.progress = progress, .ctx = ctx};
+  PetscMPIInt rank;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SNAPSHOTS_CLASSID);
-  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  HycoCheck(n > 0, "the set of samples is empty");
+  PetscCall(HycoSamplesGet(samples, &m.n_all, &m.n_par, &m.mu));
+  HycoCheck(m.n_all > 0, "the set of samples is empty");
   PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
-  PetscCallMPI(MPI_Comm_size(HycoComm(s), &size));
-  PetscCall(PetscMalloc1(n, &missing));
-  HycoOnRoot(HycoComm(s), FindMissing(s, n, n_par, mu, &n_missing, missing));
-  HycoOnRoot(HycoComm(s), BringTogether(s, n_par, mu, n_missing, missing));
-  PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, HycoComm(s)));
-  PetscCallMPI(MPI_Bcast(missing, (PetscMPIInt)n_missing, MPIU_INT, 0, HycoComm(s)));
-  if (n_missing) {
-    PetscCall(HycoSnapshotsChooseGroups(HycoComm(s), s->scene, n_missing, &groups));
-    color = (PetscInt)rank * groups / size;
-    PetscCallMPI(MPI_Comm_split(HycoComm(s), (PetscMPIInt)color, rank, &group));
-    HycoOnEach(HycoComm(s), SolveGroup(s, group, color, groups, n_par, mu, n, n_missing, missing, progress, ctx));
-    PetscCallMPI(MPI_Comm_free(&group));
-    if (rank == 0 && progress) PetscCall(progress(n, n, ctx));
+  PetscCall(PetscMalloc1(m.n_all, &m.missing));
+  HycoOnRoot(HycoComm(s), FindMissing(s, m.n_all, m.n_par, m.mu, &m.n, m.missing));
+  PetscCallMPI(MPI_Bcast(&m.n, 1, MPIU_INT, 0, HycoComm(s)));
+  HycoBcast(m.missing, m.n, MPIU_INT, HycoComm(s));
+  if (m.n) {
+    PetscCall(SolveMissing(s, &m));
+    if (rank == 0 && progress) PetscCall(progress(m.n_all, m.n_all, ctx));
   }
-  PetscCall(PetscFree(missing));
+  PetscCall(PetscFree(m.missing));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+HycoDefineMethod(HycoSnapshotsGetSolved, (HycoSnapshots s, PetscInt *n_groups, const PetscInt *solved[]), s,
+                 HYCO_SNAPSHOTS_CLASSID, *n_groups = s->n_groups;
+                 *solved = s->solved)
 
 static PetscErrorCode ReadColumns(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt lo, PetscInt rows,
                                   PetscInt total, PetscScalar data[], PetscInt lda)
@@ -514,6 +578,62 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const
   PetscCall(MatDenseRestoreArray(*S, &data));
   PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How many steps between listed times the file of mu has; of those of older versions none. */
+static PetscErrorCode CountBetween(HycoSnapshots s, const PetscReal mu[], PetscInt *n)
+{
+  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  HycoH5 h;
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  for (*n = 0;; (*n)++) {
+    NameBetween(*n, name);
+    if (!HycoH5Has(h, name)) break;
+  }
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadBetween(HycoSnapshots s, const PetscReal mu[], PetscInt n, PetscInt lo, PetscInt rows,
+                                  PetscScalar data[], PetscInt lda)
+{
+  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  ierr = CheckFingerprint(s, h, path);
+  for (PetscInt k = 0; !ierr && k < n; k++) {
+    NameBetween(k, name);
+    ierr = HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)k * (size_t)lda);
+  }
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], PetscInt rows, PetscInt total, Mat *U)
+{
+  PetscInt n = 0, lo, hi, lda;
+  PetscScalar *data;
+
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(s), CountBetween(s, mu, &n));
+  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(s)));
+  PetscCall(MatCreateDense(HycoComm(s), rows, PETSC_DECIDE, total, n, NULL, U));
+  PetscCall(MatGetOwnershipRange(*U, &lo, &hi));
+  PetscCall(MatDenseGetLDA(*U, &lda));
+  PetscCall(MatDenseGetArray(*U, &data));
+  HycoOnEach(HycoComm(s), ReadBetween(s, mu, n, lo, hi - lo, data, lda));
+  PetscCall(MatDenseRestoreArray(*U, &data));
+  PetscCall(MatAssemblyBegin(*U, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*U, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

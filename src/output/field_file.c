@@ -9,9 +9,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline",        "Triangle",       "Quadrilateral",
-                                                        "Tetrahedron",     "Hexahedron",     "Triangle_6",
-                                                        "Quadrilateral_8", "Quadrilateral_9"};
+static const char *const topology[HYCO_N_CELL_TYPES] = {
+    "Polyline",        "Triangle",        "Quadrilateral",  "Tetrahedron",   "Hexahedron",   "Triangle_6",
+    "Quadrilateral_8", "Quadrilateral_9", "Tetrahedron_10", "Hexahedron_20", "Hexahedron_27"};
 
 /* The length of the ending .vtkhdf or .xdmf of a path; 0: it has neither. */
 static size_t Ending(const char path[])
@@ -89,7 +89,7 @@ static PetscErrorCode WriteHead(HycoFieldFile f)
 
   PetscFunctionBegin;
   PetscCall(HycoH5WriteText(f->h, "title", f->scene->title));
-  PetscCall(HycoH5WriteInt(f->h, "mesh/head", 2, 1, head)); /* cell type (line2, tri3, quad4, tet4, hex8), dimension */
+  PetscCall(HycoH5WriteInt(f->h, "mesh/head", 2, 1, head)); /* cell type (HycoCellType), dimension */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -111,7 +111,7 @@ PetscErrorCode HycoFieldFileOpen(HycoFieldFile f, const HycoFileOrder *order, Hy
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   HycoOnRoot(f->comm, WriteHead(f));
-  PetscCall(HycoFieldsWriteMesh(f->h, "mesh", order, mesh, X));
+  PetscCall(HycoFieldsWriteMesh(f->h, "mesh", order, mesh, X, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,8 +6,8 @@
 
 #define ROOT "VTKHDF/"
 
-/* VTK's numbers of line2, tri3, quad4, tet4, hex8, tri6, quad8, quad9. */
-static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12, 22, 23, 28};
+/* VTK's numbers of the cell types. */
+static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12, 22, 23, 28, 24, 25, 29};
 
 /* A set of one dimension of n integers, value, value + step, ... On one process. */
 static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, PetscInt value, PetscInt step)
@@ -84,7 +84,7 @@ PetscErrorCode HycoVTKWriteMesh(HycoFieldFile f, const PetscReal X[])
   HycoOnRoot(f->comm, WriteHead(f));
   if (!f->points)
     PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "Points", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
-  PetscCall(HycoFieldsWriteCells(f->h, ROOT "Connectivity", f->order, m, HYCO_H5_LINE));
+  PetscCall(HycoFieldsWriteCells(f->h, ROOT "Connectivity", f->order, m, PETSC_TRUE, HYCO_H5_LINE));
   PetscCall(WriteTypes(f));
   PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "PointData/node_id", HYCO_ON_NODES, MPIU_INT, 1,
                            HYCO_H5_LINE, m->node_id));

@@ -25,6 +25,15 @@ PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSceneGetContacts(HycoScene scene, PetscInt *n, const char *names[])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  *n = scene->n_contacts;
+  for (PetscInt k = 0; k < *n && names; k++) names[k] = scene->contact[k]->name;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 HycoDefineMethod(HycoSceneGetTitle, (HycoScene scene, const char *title[]), scene, HYCO_SCENE_CLASSID,
                  *title = scene->title)
 HycoDefineMethod(HycoSceneGetMesh, (HycoScene scene, const char *path[]), scene, HYCO_SCENE_CLASSID,

@@ -88,6 +88,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   m->ready = m->solved = m->whole_current = m->beyond_current = PETSC_FALSE;
   PetscTryTypeMethod(m, reset);
   PetscCall(HycoProbeDestroy(&m->probe));
+  PetscCall(HycoCarriedDestroy(&m->carried));
   PetscCall(HycoSolverDestroy(&m->solver));
   PetscCall(HycoFEDestroy(&m->fe_beyond));
   PetscCall(PetscFree(m->beyond));
@@ -165,6 +166,9 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
 
 HycoDefineMethod(HycoROMSetReconstruct, (HycoROM m, PetscBool reconstruct), m, HYCO_ROM_CLASSID,
                  m->reconstruct = reconstruct)
+HycoDefineMethod(HycoROMSetPointMonitor, (HycoROM m, HycoPointMonitor monitor, void *ctx), m, HYCO_ROM_CLASSID,
+                 m->point_monitor = monitor;
+                 m->point_ctx = ctx)
 HycoDefineMethod(HycoROMSetExtrapolate, (HycoROM m, PetscBool extrapolate), m, HYCO_ROM_CLASSID,
                  PetscCall(HycoSceneSetExtrapolate(m->scene, extrapolate)))
 
@@ -223,7 +227,7 @@ static void SumForces(HycoROM m, HycoPrediction *p)
     p->lambda_norm2 += m->Lambda[k] * m->Lambda[k];
   }
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt k = m->spread ? i : m->contact[i], presses = m->Lambda[k] > 1e-10 * p->lambda_max; /* no round-off */
+    const PetscInt k = m->spread ? i : m->contact[i], presses = m->Lambda[k] > HYCO_PRESSES * p->lambda_max;
 
     p->n_active += presses;
     if (m->in_rid[k]) p->n_rid_active += presses;

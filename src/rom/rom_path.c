@@ -69,7 +69,7 @@ void HycoTraceMeasure(HycoROM m, HycoStep *s)
     s->total_contact_force += m->Lambda[k];
     s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);
   }
-  for (PetscInt k = 0; k < m->pairs.n; k++) s->n_active += m->Lambda[k] > 1e-10 * s->lambda_max; /* no round-off */
+  for (PetscInt k = 0; k < m->pairs.n; k++) s->n_active += m->Lambda[k] > HYCO_PRESSES * s->lambda_max;
   for (PetscInt k = 0; k < m->fe->n_dof; k++) {
     if (m->role[k / m->fe->dim] != HYCO_ROLE_OUTSIDE) s->u_norm2 += m->U[k] * m->U[k];
   }

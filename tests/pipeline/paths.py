@@ -1,6 +1,7 @@
 """Reduced models of paths: scenes with a history, on a small ring that creeps or yields while its gap closes and opens."""
 import csv
 import os
+import shutil
 import subprocess
 import unittest
 
@@ -191,7 +192,7 @@ class Paths(FlowingRing):
 
     def test_order_of_questions(self):
         """A point's path is the same to the last bit whatever was asked before it."""
-        self.train(self.norton, 'order.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9')
+        self.train(self.norton, 'order.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', 1)
         rows = self.same_in_any_order('order.h5', [*POINTS, (0.006, 0.8)])
         alone = self.hyco('predict', '-model', self.path('order.h5'), '-mu', '0.0041,1.2')
         last = next(r for r in rows if float(r['gap']) == 0.0041)
@@ -202,12 +203,32 @@ class Paths(FlowingRing):
         """One and two ranks train the same model."""
         reports, histories = [], []
         for ranks in (0, 2):
-            reports.append(self.train(self.norton, f'ranks{ranks}.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9', ranks=ranks))
+            reports.append(self.train(self.norton, f'ranks{ranks}.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', 1, ranks=ranks))
             histories.append(self.hyco('predict', '-model', self.path(f'ranks{ranks}.h5'), '-mu', '0.0063,1.11')['history'])
         self.same_models(reports, ('n_modes', 'rid_elements', 'rid_contacts', 'n_fe_dofs'), histories)
         one, two = (self.hyco('compare', '-scene', self.norton, '-model', self.path('ranks0.h5'), '-mu', '0.0063,1.11', ranks=ranks) for ranks in (0, 2))
         for kind in KINDS:
             self.near(two['worst_' + kind]['max'], one['worst_' + kind]['max'], 1e-4)
+
+    def test_steps_between_listed_times(self):
+        """Full order's steps between listed times are kept, at most five of an interval, and join the modes; a store of older versions has none."""
+        arguments = ['-grid', '2,2', '-hyco_pod_tol', '1e-10', '-hyco_model_type', 'projection', '-hyco_snapshots']
+        self.train(self.norton, 'between.h5', *arguments, self.path('steps'))
+        os.mkdir(self.path('without'))
+        for name in os.listdir(self.path('steps')):
+            shutil.copy(os.path.join(self.path('steps'), name), self.path('without'))
+            with h5py.File(os.path.join(self.path('without'), name), 'r+') as f:
+                between = [key for key in f if key.startswith('between')]
+                taken = f['taken'][:, 0]
+                slots = {(k, int(5 * (t - a) / (b - a))) for k, (a, b) in enumerate(zip((0, 1, 3, 6, 10, 11), (1, 3, 6, 10, 11, 12))) for t in taken if a < t < b}
+                self.assertEqual(len(between), len(slots))
+                self.assertGreater(len(between), 0)
+                for key in [*between, 'sealed']:
+                    del f[key]
+        self.train(self.norton, 'listed.h5', *arguments, self.path('without'))
+        for kind in ('u', 'sigma'):
+            kept, listed = (self.compare(self.norton, model, '0.0055,0.91')['worst_' + kind]['max'] for model in ('between.h5', 'listed.h5'))
+            self.assertLess(kept, 0.5 * listed, kind)
 
     def test_damaged(self):
         """A path file that lacks a time, or is cut short, is named in one line."""

@@ -26,13 +26,13 @@ class Missed(Ring):
     def test_worst_named(self):
         """A model that misses its own paths: the line says which do not reach their end, how far they come, and which of the others is worst."""
         run = self.run_raw('train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '3,3', '-hyco_snapshots', self.path('store'),
-                           '-hyco_pod_tol', '1e-14')
+                           '-hyco_pod_tol', '1e-13', '-hyco_hybrid', 'rank', '-hyco_rid_modes', 'displacement,stress')
         self.assertEqual(run.returncode, 1)
         line, = said(run)
         missing, of = map(int, re.search(r'(\d+) of (\d+) paths do not reach their end', line).groups())
         self.assertEqual(of, 9)
         ends = re.findall(r'gap = ([\d.]+), push = ([\d.]+) \(t = ([\d.]+)\)', line)
-        self.assertEqual(len(ends), missing)
+        self.assertEqual(len(ends), min(missing, 3))
         for gap, push, t in ends:
             self.assertTrue(0.004 <= float(gap) <= 0.008 and 0.8 <= float(push) <= 1.2 and 0 < float(t) < 12, line)
         self.assertRegex(line, r'the worst of the others, by \d+ %( or more)?, at gap = [\d.]+, push = [\d.]+')
@@ -41,11 +41,11 @@ class Missed(Ring):
     def test_worst_cubature(self):
         """Every path ends: the worst alone."""
         run = self.run_raw('train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '3,3', '-hyco_snapshots', self.path('store'),
-                           '-hyco_pod_tol', '1e-13', '-hyco_model_type', 'cubature', '-hyco_cubature_tol', '0.5')
+                           '-hyco_pod_tol', '1e-13', '-hyco_model_type', 'cubature', '-hyco_cubature_tol', '0.9')
         self.assertEqual(run.returncode, 1)
         line, = said(run)
         self.assertNotIn('reach their end', line)
-        self.assertRegex(line, r'; the worst, by \d+ %, at gap = [\d.]+, push = [\d.]+')
+        self.assertRegex(line, r'; the worst, by \d+ %( or more)?, at gap = [\d.]+, push = [\d.]+')
 
 
 class Greedy(Ring):
@@ -187,7 +187,7 @@ class Targets(Ring):
         """Paths are added until the targets hold; what was judged is what compare finds at the held-out paths, at their worst time and their end."""
         with open(self.path('held.csv'), 'w', encoding='utf-8') as f:
             f.write('gap,push\n0.0045,0.85\n0.0052,1.05\n0.0061,0.95\n0.0072,1.15\n')
-        targets = {'u': 2e-3, 'inelastic': 2e-3}
+        targets = {'u': 2e-4, 'inelastic': 2e-4}
         run = [a for kind, target in targets.items() for a in ('-target_' + kind, target)]
         trained = self.train('targets.h5', *self.settings, *run, '-validation_points', 'held.csv', '-target_max_added', 8, grid='2,2')
         self.assertGreater(trained['search']['added'], 0)

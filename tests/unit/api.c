@@ -45,7 +45,8 @@ static PetscErrorCode TestNull(void)
   CHECK_FAILS(HycoROMGetPrediction(model, &prediction), "the handle is NULL; create it by HycoROMLoad()");
   CHECK_FAILS(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer), "the handle is NULL; create it by HycoSceneLoad()");
   CHECK_FAILS(HycoReducerSetFromOptions(reducer), "the handle is NULL; create it by HycoReducerCreate()");
-  CHECK_FAILS(HycoSnapshotsFill(snapshots, samples, NULL, NULL), "the handle is NULL; create it by HycoSnapshotsOpen()");
+  CHECK_FAILS(HycoSnapshotsFill(snapshots, samples, NULL, NULL),
+              "the handle is NULL; create it by HycoSnapshotsOpen()");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -5,6 +5,7 @@
 */
 #include <hycocondensed.h>
 #include <hycofields.h>
+#include <hycoqueue.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -143,26 +144,39 @@ static PetscErrorCode SolveOne(HycoReducer t, HycoSnapshots store, HycoFOM fom, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's group's run of the missing nodes. */
-static PetscErrorCode SolveGroup(HycoReducer t, HycoSnapshots store, MPI_Comm group, PetscInt color, PetscInt groups,
-                                 PetscInt n_missing, const PetscInt missing[], const Task *task)
+/* This rank's group takes nodes from the queue of the missing ones. data: room for one. */
+static PetscErrorCode SolveQueued(HycoReducer t, HycoSnapshots store, HycoQueue queue, PetscInt n_missing,
+                                  const PetscInt missing[], HycoFOM fom, const Task *task, PetscReal data[])
 {
-  const PetscInt first = color * n_missing / groups, last = (color + 1) * n_missing / groups;
-  HycoFOM fom;
-  PetscReal *data;
-  PetscErrorCode ierr = 0;
+  PetscInt k, n_done;
 
   PetscFunctionBegin;
+  for (PetscBool first = PETSC_TRUE;; first = PETSC_FALSE) {
+    PetscCall(HycoQueueTake(queue, &k));
+    if (!first && t->phase && t->rank == 0) {
+      PetscCall(HycoQueueDone(queue, &n_done));
+      PetscCall(t->phase(task->q ? "responses" : "flexibilities", n_done, n_missing, t->phase_ctx));
+    }
+    if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(SolveOne(t, store, fom, missing[k], task, data));
+  }
+}
+
+static PetscErrorCode SolveGroup(HycoReducer t, HycoSnapshots store, HycoQueue queue, PetscInt n_missing,
+                                 const PetscInt missing[], const Task *task)
+{
+  MPI_Comm group;
+  HycoFOM fom;
+  PetscReal *data;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoQueueGetGroup(queue, &group));
   PetscCall(HycoFOMCreate(group, t->scene, &fom));
   PetscCall(PetscMalloc1(task->q ? (size_t)fom->fe->n_dof * (size_t)task->q
                                  : (size_t)Condensing(t)->condensed->field[HYCO_FIELD_G].rows,
                          &data));
-  for (PetscInt k = first; !ierr && k < last; k++) {
-    ierr = SolveOne(t, store, fom, missing[k], task, data);
-    if (!ierr && t->phase && t->rank == 0) /* the other groups are as far */
-      ierr = t->phase(task->q ? "responses" : "flexibilities", (k + 1 - first) * n_missing / (last - first), n_missing,
-                      t->phase_ctx);
-  }
+  ierr = SolveQueued(t, store, queue, n_missing, missing, fom, task, data);
   PetscCall(PetscFree(data));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(ierr);
@@ -172,22 +186,19 @@ static PetscErrorCode SolveGroup(HycoReducer t, HycoSnapshots store, MPI_Comm gr
 /* All nodes of G's grid have a file. Collective. */
 static PetscErrorCode SolveMissing(HycoReducer t, HycoSnapshots store, const Task *task)
 {
-  PetscInt n_missing = 0, *missing, groups = 1, color;
-  PetscMPIInt size;
-  MPI_Comm group;
+  PetscInt n_missing = 0, *missing, groups;
+  HycoQueue queue;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(PetscMalloc1(HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor), &missing));
   HycoOnRoot(HycoComm(t), FindMissing(t, store, task, &n_missing, missing));
   PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, HycoComm(t)));
   HycoBcast(missing, n_missing, MPIU_INT, HycoComm(t));
   if (n_missing) {
     PetscCall(HycoSnapshotsChooseGroups(HycoComm(t), t->scene, n_missing, &groups));
-    color = (PetscInt)t->rank * groups / size;
-    PetscCallMPI(MPI_Comm_split(HycoComm(t), (PetscMPIInt)color, t->rank, &group));
-    HycoOnEach(HycoComm(t), SolveGroup(t, store, group, color, groups, n_missing, missing, task));
-    PetscCallMPI(MPI_Comm_free(&group));
+    PetscCall(HycoQueueCreate(HycoComm(t), groups, n_missing, NULL, &queue));
+    HycoOnEach(HycoComm(t), HycoQueueEnd(queue, SolveGroup(t, store, queue, n_missing, missing, task)));
+    PetscCall(HycoQueueDestroy(&queue));
   }
   PetscCall(PetscFree(missing));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,0 +1,216 @@
+/* HycoQueue: counters in a window of MPI-3, added to by atomic operations. */
+#include <hycoqueue.h>
+
+/* The window's counters, before those of the kinds: groups that failed, tasks done, kinds begun. */
+enum { FAILED, DONE, BEGUN, N_COUNTERS };
+
+struct _HycoQueue {
+  MPI_Comm comm, group; /* comm borrowed */
+  PetscMPIInt rank;     /* in the group */
+  PetscInt n_groups, color, n_kinds;
+  PetscInt *first, *order; /* n_kinds + 1; the tasks, kind after kind */
+  PetscInt kind;           /* whose tasks this group takes; -1: none yet */
+  PetscInt n_taken;
+  PetscBool busy, told; /* a task was taken and is not done; another group has failed */
+  MPI_Win window;       /* MPI_WIN_NULL: one group, whose ranks all count alike */
+  PetscInt *counter;    /* N_COUNTERS + n_kinds; of a window on rank 0 of comm alone */
+};
+
+/* The tasks kind after kind, in the order of their first ones. */
+static PetscErrorCode SortKinds(HycoQueue q, PetscInt n, const PetscInt kind[])
+{
+  PetscInt at = 0;
+  PetscBool *sorted;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n + 1, &q->first, n, &q->order));
+  PetscCall(PetscCalloc1(n, &sorted));
+  for (PetscInt i = 0; i < n; i++) {
+    if (sorted[i]) continue;
+    q->first[q->n_kinds++] = at;
+    for (PetscInt j = i; j < n; j++) {
+      if (sorted[j] || (kind && kind[j] != kind[i])) continue;
+      q->order[at++] = j;
+      sorted[j] = PETSC_TRUE;
+    }
+  }
+  q->first[q->n_kinds] = n;
+  PetscCall(PetscFree(sorted));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode OpenWindow(HycoQueue q)
+{
+  const PetscInt n = N_COUNTERS + q->n_kinds;
+  PetscMPIInt rank;
+
+  PetscFunctionBegin;
+  q->window = MPI_WIN_NULL;
+  if (q->n_groups == 1) {
+    PetscCall(PetscCalloc1(n, &q->counter));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCallMPI(MPI_Comm_rank(q->comm, &rank));
+  PetscCallMPI(MPI_Win_allocate(rank ? 0 : n * (MPI_Aint)sizeof(PetscInt), sizeof(PetscInt), MPI_INFO_NULL, q->comm,
+                                &q->counter, &q->window));
+  PetscCallMPI(MPI_Win_lock_all(0, q->window));
+  if (rank == 0) PetscCall(PetscArrayzero(q->counter, n));
+  PetscCallMPI(MPI_Win_sync(q->window));
+  PetscCallMPI(MPI_Barrier(q->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQueueCreate(MPI_Comm comm, PetscInt n_groups, PetscInt n, const PetscInt kind[], HycoQueue *queue)
+{
+  PetscMPIInt rank, size;
+  HycoQueue q;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&q));
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  q->comm = comm;
+  q->n_groups = n_groups;
+  q->color = (PetscInt)rank * n_groups / size;
+  q->kind = -1;
+  PetscCallMPI(MPI_Comm_split(comm, (PetscMPIInt)q->color, rank, &q->group));
+  PetscCallMPI(MPI_Comm_rank(q->group, &q->rank));
+  PetscCall(SortKinds(q, n, kind));
+  PetscCall(OpenWindow(q));
+  *queue = q;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQueueDestroy(HycoQueue *queue)
+{
+  HycoQueue q = *queue;
+
+  PetscFunctionBegin;
+  if (!q) PetscFunctionReturn(PETSC_SUCCESS);
+  if (q->window != MPI_WIN_NULL) {
+    PetscCallMPI(MPI_Win_unlock_all(q->window));
+    PetscCallMPI(MPI_Win_free(&q->window));
+  } else
+    PetscCall(PetscFree(q->counter));
+  PetscCallMPI(MPI_Comm_free(&q->group));
+  PetscCall(PetscFree2(q->first, q->order));
+  PetscCall(PetscFree(*queue));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQueueGetGroup(HycoQueue q, MPI_Comm *group)
+{
+  PetscFunctionBegin;
+  *group = q->group;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds to a counter, at once for all; what it was. */
+static PetscErrorCode Add(HycoQueue q, PetscInt counter, PetscInt more, PetscInt *before)
+{
+  PetscFunctionBegin;
+  if (q->window != MPI_WIN_NULL) {
+    PetscCallMPI(MPI_Fetch_and_op(&more, before, MPIU_INT, 0, (MPI_Aint)counter, MPI_SUM, q->window));
+    PetscCallMPI(MPI_Win_flush(0, q->window));
+  } else {
+    *before = q->counter[counter];
+    q->counter[counter] += more;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Begins a kind that is new to this group: one that nobody has begun, or the one with most tasks left; -1: none has
+   any. */
+static PetscErrorCode NextKind(HycoQueue q)
+{
+  PetscInt begun, most = 0;
+
+  PetscFunctionBegin;
+  PetscCall(Add(q, BEGUN, 1, &begun));
+  q->kind = begun < q->n_kinds ? begun : -1;
+  for (PetscInt k = 0; k < q->n_kinds && begun >= q->n_kinds; k++) {
+    PetscInt taken, left;
+
+    PetscCall(Add(q, N_COUNTERS + k, 0, &taken));
+    left = q->first[k + 1] - q->first[k] - taken;
+    if (left <= most) continue;
+    most = left;
+    q->kind = k;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The next task; -1: none. On the rank of a group that counts. */
+static PetscErrorCode TakeTask(HycoQueue q, PetscInt *task)
+{
+  PetscInt failed, done, at;
+
+  PetscFunctionBegin;
+  *task = -1;
+  if (q->busy) PetscCall(Add(q, DONE, 1, &done));
+  PetscCall(Add(q, FAILED, 0, &failed));
+  if (failed) PetscFunctionReturn(PETSC_SUCCESS);
+  if (q->kind < 0) PetscCall(NextKind(q));
+  while (q->kind >= 0 && *task < 0) {
+    PetscCall(Add(q, N_COUNTERS + q->kind, 1, &at));
+    if (q->first[q->kind] + at < q->first[q->kind + 1])
+      *task = q->order[q->first[q->kind] + at];
+    else
+      PetscCall(NextKind(q));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQueueTake(HycoQueue q, PetscInt *task)
+{
+  PetscFunctionBegin;
+  if (q->rank == 0 || q->window == MPI_WIN_NULL) PetscCall(TakeTask(q, task));
+  PetscCallMPI(MPI_Bcast(task, 1, MPIU_INT, 0, q->group));
+  q->n_taken += q->busy;
+  q->busy = (PetscBool)(*task >= 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQueueDone(HycoQueue q, PetscInt *n)
+{
+  PetscFunctionBegin;
+  PetscCall(Add(q, DONE, 0, n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQueueHear(HycoQueue q)
+{
+  PetscInt failed = 0;
+
+  PetscFunctionBegin;
+  if (q->rank == 0) PetscCall(Add(q, FAILED, 0, &failed));
+  PetscCallMPI(MPI_Bcast(&failed, 1, MPIU_INT, 0, q->group));
+  q->told = (PetscBool)(failed > 0);
+  HycoCheck(!failed, "another group of ranks has failed");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQueueEnd(HycoQueue q, PetscErrorCode error)
+{
+  PetscInt before;
+
+  PetscFunctionBegin;
+  if (!error || q->told) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Add(q, FAILED, 1, &before));
+  PetscCall(error);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQueueCount(HycoQueue q, PetscInt *n_groups, PetscInt done[])
+{
+  PetscInt *count;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(q->n_groups, &count));
+  if (q->rank == 0) count[q->color] = q->n_taken;
+  HycoAllreduce(count, q->n_groups, MPIU_INT, MPI_SUM, q->comm);
+  for (PetscInt c = 0; c < q->n_groups; c++) done[c] += count[c];
+  *n_groups = q->n_groups;
+  PetscCall(PetscFree(count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
