@@ -46,8 +46,8 @@ typedef struct {
 PetscErrorCode HycoROMComparePath(HycoROM model, HycoFOM fom, PetscInt n, const PetscReal mu[], HycoPathErrors *errors);
 
 /* Errors over a set of points, as fractions; for a path that of its worst listed time (HycoROMComparePath()). Errors of
- * contact forces (HYCO_ERROR_LAMBDA and _RID) are divided by at least a tenth of the largest force of the set.
- * PETSC_INFINITY if a solve did not converge. */
+   contact forces (HYCO_ERROR_LAMBDA and _RID) are divided by at least a tenth of the largest force of the set.
+   PETSC_INFINITY if a solve did not converge. */
 typedef struct {
   PetscInt n, not_converged;
   PetscReal largest[HYCO_N_ERRORS], median[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];
@@ -80,13 +80,13 @@ typedef struct {
   PetscReal cost;          /* operations of an online solve at a new stiffness, estimated */
   PetscReal ratio;         /* the largest quotient of an error and its target; at most 1 if all targets are met */
   HycoErrorKind worst;     /* that error */
-  HycoValidation held_out; /* errors at the held-out points that it was judged at */
-  PetscInt n_held;     /* held-out points that there are: of paths a recipe is dropped at the first of them, held_out.n
-                          in all, that it does not bring to its end, or beside whose error it cannot be chosen */
-  PetscInt dropped_at; /* that point; -1: it was judged at all */
-  PetscInt beaten_by;  /* the number of the recipe that is chosen rather than it; 0: none, or the path has no end */
-  PetscBool reopened;  /* that recipe was refused later: a later attempt has all points */
-  char failure[512];   /* reason why there is no model; "": there is one */
+  HycoValidation held_out; /* errors at the held-out points at which it was judged, held_out.n */
+  PetscInt n_held;         /* number of held-out points. Of paths, a recipe is dropped at the first of them that it does
+                              not bring to its end, or whose error excludes its choice */
+  PetscInt dropped_at;     /* that point; -1: it was judged at all */
+  PetscInt beaten_by;      /* number of the recipe that is chosen instead; 0: none, or the path has no end */
+  PetscBool reopened;      /* that recipe was refused later: a later attempt has all points */
+  char failure[512];       /* reason why there is no model; "": there is one */
 } HycoAttempt;
 /* Called on rank 0 after each attempt. */
 typedef PetscErrorCode (*HycoAttemptMonitor)(const HycoAttempt *attempt, void *ctx);
@@ -123,7 +123,7 @@ typedef struct {
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
 
-/* solved[n_groups]: how many points each group of ranks has solved full order in the last run; those found in the
+/* Gets solved[n_groups]: how many points each group of ranks has solved full order in the last run; those found in the
    snapshot folder are not counted. On every rank. Borrowed until the next run. Not collective. */
 PetscErrorCode HycoReducerGetSolved(HycoReducer reducer, PetscInt *n_groups, const PetscInt *solved[]);
 
@@ -142,29 +142,29 @@ PetscErrorCode HycoReducerChooses(HycoReducer reducer, PetscBool *chooses);
 /* Called as snapshots are solved. */
 PetscErrorCode HycoReducerSetProgress(HycoReducer reducer, HycoProgress progress, void *ctx);
 /* Called on one rank in the other long phases (flexibilities of condensed models, the search for settings): `done` of
- * n, where n is 0 if it is not known. */
+   n, where n is 0 if it is not known. */
 typedef PetscErrorCode (*HycoPhaseMonitor)(const char phase[], PetscInt done, PetscInt n, void *ctx);
 PetscErrorCode HycoReducerSetPhaseMonitor(HycoReducer reducer, HycoPhaseMonitor monitor, void *ctx);
 /* Solves the missing samples and the held-out points (HycoReducerSetValidation()), reduces, and writes the model to
- * `path` (under a temporary name, then renamed). Collective. `training` may be NULL. `samples` may be NULL for a
- * condensed model, which then chooses points until its estimate of the forces' error is below -hyco_condensed_tol; if
- * that is not reached, `missed` says so. Fails if the errors of the model on its training solutions reach one half and,
- * unless -hyco_keep_singular, if its reduced stiffness is singular inside the parameters' ranges. */
+   `path` (under a temporary name, then renamed). Collective. `training` may be NULL. `samples` may be NULL for a
+   condensed model, which then chooses points until its estimate of the forces' error is below -hyco_condensed_tol; if
+   that is not reached, `missed` says so. Fails if the errors of the model on its training solutions reach one half and,
+   unless -hyco_keep_singular, if its reduced stiffness is singular inside the parameters' ranges. */
 PetscErrorCode HycoReducerRun(HycoReducer reducer, HycoSamples samples, const char path[], HycoTraining *training);
 
 /* Sets the held-out points, none of which may be a training point; they must outlive the training. NULL (the default):
- * scattered points. */
+   scattered points. */
 PetscErrorCode HycoReducerSetValidation(HycoReducer reducer, HycoSamples validation);
 /* Sets the number of scattered held-out points over the region of the training points (-hyco_validation). < 0, the
- * default: from the number of training points. 0: none; then errors are not known, settings are not searched and
- * estimates are not calibrated. */
+   default: from the number of training points. 0: none; then errors are not known, settings are not searched and
+   estimates are not calibrated. */
 PetscErrorCode HycoReducerSetValidationCount(HycoReducer reducer, PetscInt n);
 /* Whether the settings that the options do not give are searched by these points (-hyco_search; default: true). */
 PetscErrorCode HycoReducerSetSearch(HycoReducer reducer, PetscBool search);
 PetscErrorCode HycoReducerSetAttemptMonitor(HycoReducer reducer, HycoAttemptMonitor attempt, HycoAddedMonitor added,
                                             void *ctx);
 /* Sets the largest errors allowed at the held-out points (HYCO_N_ERRORS of them; 0: no target). If no settings meet
- * them, solutions are added near the worst points, at most `budget` of them (< 0: as many as there were at first). */
+   them, solutions are added near the worst points, at most `budget` of them (< 0: as many as there were at first). */
 PetscErrorCode HycoReducerSetTargets(HycoReducer reducer, const PetscReal target[], PetscInt budget);
 
 /* -- greedy training (section 5.4) -- */

@@ -12,7 +12,7 @@ extern "C" {
 typedef struct _p_HycoSnapshots *HycoSnapshots;
 
 /* Called on rank 0 of the store's communicator after each solution of its group: at least `done` of n solutions are
- * stored, by all groups. At the end it is called once with n of n. */
+   stored, by all groups. At the end it is called once with n of n. */
 typedef PetscErrorCode (*HycoProgress)(PetscInt done, PetscInt n, void *ctx);
 
 /* Opens the folder, or creates it. Collective on `comm`. The store holds a reference to the scene. The caller owns it.
@@ -22,19 +22,18 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
 PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots);
 /*
   Solves full order at each sample that is not in the store yet. Collective. -hyco_groups G splits the communicator into
-  G groups, which take samples from a queue, so that no group waits while samples remain. Each solution is written under
-  a temporary name and renamed, so that a run that was killed can resume and loses at most the samples in progress.
-  Fails, with the sample, if a solve does not converge. The other groups then stop: a path at its next iteration,
-  another solution when it is stored.
+  G groups, which take the samples from a queue, one at a time: no group waits while a sample is left. Each solution is
+  written under a temporary name and renamed, so that a run that was killed can resume and loses at most the samples in
+  progress. Fails, with the sample, if a solve does not converge. The other groups then stop: a path at its next
+  iteration, another solution when it is stored.
 */
 PetscErrorCode HycoSnapshotsFill(HycoSnapshots snapshots, HycoSamples samples, HycoProgress progress, void *ctx);
-/* Gets the number of samples that each group of ranks has solved since the store was opened, solved[n_groups]; samples
- * that were stored before are not counted. On every rank. Borrowed until the next HycoSnapshotsFill(). Not collective.
- */
+/* solved[n_groups]: how many samples each group of ranks has solved since the store was opened; those that it had are
+   not counted. On every rank. Borrowed until the next HycoSnapshotsFill(). Not collective. */
 PetscErrorCode HycoSnapshotsGetSolved(HycoSnapshots snapshots, PetscInt *n_groups, const PetscInt *solved[]);
 
 /* Gets the number of groups of ranks that solve n samples at the same time: -hyco_groups, or as many as fit into half
- * of the memory if each factors the stiffness of its own mesh. Collective. */
+   of the memory if each factors the stiffness of its own mesh. Collective. */
 PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups);
 
 /* Describes the object on an ASCII viewer (NULL: stdout). Collective. */

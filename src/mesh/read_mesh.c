@@ -58,8 +58,8 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
     if (HycoCellKinds[t].dim == m->dim && HycoCellKinds[t].nv == nv) m->type = (HycoCellType)t;
   }
   HycoCheck(HycoCellKinds[m->type].dim == m->dim && HycoCellKinds[m->type].nv == nv,
-            "%s: cells of dimension %d with %d nodes are not of a type that hyco supports", scene->mesh_path,
-            (int)m->dim, (int)nv);
+            "%s: cells of dimension %d with %d nodes are of no type that hyco supports", scene->mesh_path, (int)m->dim,
+            (int)nv);
   if (m->type == HYCO_HEX20 && scene->n_contacts) { /* a uniform pressure would pull at the corners of quad8 */
     PetscCall(HycoMshAddFaceNodes(scene->mesh_path, &r->file));
     m->type = HYCO_HEX27;

@@ -261,7 +261,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
       "choose model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by the held-out errors, unless given",
       &t->search, NULL));
   PetscCall(HycoOptionsBool("-hyco_search_exhaustive",
-                            "for paths: judge all settings at all held-out points, also settings that cannot be chosen",
+                            "of paths: judge each recipe at all held-out points, also if it cannot be chosen",
                             &t->exhaustive, NULL));
   PetscCall(HycoOptionsName("-hyco_reducer_view", "print the settings of the training before it begins"));
   PetscCall(HycoOptionsFor("greedy"));

@@ -202,7 +202,7 @@ static PetscErrorCode CheckAxis(HycoFE fe, const HycoQuantity *q, const char wha
   HycoCheck(q->field < fe->dim, "output_%s: the mesh has %d space dimension%s and no %s along %c", q->name,
             (int)fe->dim, fe->dim == 1 ? "" : "s", what, "xyz"[q->field]);
   HycoCheck(q->field || fe->formulation != HYCO_AXISYMMETRIC,
-            "output_%s: in an axisymmetric scene a %s along the radius x sums to zero; use y", q->name, what);
+            "output_%s: in an axisymmetric scene the %s along the radius x sums to zero; use y", q->name, what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -50,10 +50,10 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     PetscCall(PetscStrallocpy(s->value[entry], place));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoCheck(
-      !q->given,
-      "%s: the output %s already has one of max, min, mean, reaction, force and moment; give each output its own name",
-      s->key[entry], name);
+  HycoCheck(!q->given,
+            "%s: the output %s already has one of max, min, mean, reaction, force and moment; give each output its own "
+            "name",
+            s->key[entry], name);
   q->given = PETSC_TRUE;
   q->kind = (HycoQuantityKind)field;
   if (field >= HYCO_QUANTITY_REACTION)
@@ -62,8 +62,7 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     PetscCall(FindField(s->key[entry], s->value[entry], &q->field));
   if (field < HYCO_QUANTITY_REACTION && strcmp(HycoQuantityFields[q->field], "contact_pressure") == 0) {
     HycoCheck(q->kind == HYCO_QUANTITY_MAX,
-              "%s: contact_pressure is available as the largest value only; write max: contact_pressure",
-              s->key[entry]);
+              "%s: only the largest contact_pressure is available; write max: contact_pressure", s->key[entry]);
     q->kind = HYCO_QUANTITY_PRESSURE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -32,8 +32,12 @@ class SearchPaths(Ring):
                 self.near(found['held_out'][kind][size], every['held_out'][kind][size], 1e-9, kind)
             for row, whole in zip(rows, full):  # at some of the paths: a lower bound
                 self.assertLessEqual(float(row['error_' + kind]), float(whole['error_' + kind]) * (1 + 1e-9))
-        _, two = self.search('two', *grid, ranks=2)
-        self.assertEqual([(r['held_out_points'], r['pod_tol'], r['hybrid']) for r in two], [(r['held_out_points'], r['pod_tol'], r['hybrid']) for r in rows])
+        report, two = self.search('two', *grid, ranks=2)
+        self.assertEqual(report['search']['chosen'], found['search']['chosen'])
+        # of modes near round-off, models on other numbers of ranks differ
+        firm = [[(r['held_out_points'], r['pod_tol'], r['hybrid']) for r in table if float(r['pod_tol']) > 1e-12] for table in (two, rows)]
+        self.assertGreater(len(firm[1]), 3)
+        self.assertEqual(*firm)
 
     def test_reason(self):
         """A line per recipe; of a dropped one where it was dropped, and beside which it is not chosen. In a file, progress names the recipe."""
