@@ -1,5 +1,5 @@
 /* HycoContact: one contact of the scene. Its entries name its type. A type is a discretisation: it determines the
- * masters of the slave nodes, their normals and gaps. */
+   masters of the slave nodes, their normals and gaps. */
 #ifndef HYCOCONTACT_H
 #define HYCOCONTACT_H
 
@@ -41,17 +41,17 @@ struct _n_HycoPairs;
 typedef struct _HycoContactOps *HycoContactOps;
 struct _HycoContactOps {
   /* Sets the slave nodes and their masters on the mesh as drawn. NULL: the nodes of `group` that have a free
-   * displacement, without masters. */
+     displacement, without masters. */
   PetscErrorCode (*setup)(HycoContact, struct _n_HycoFE *fe, PetscInt index, struct _n_HycoPairs *pairs);
   /* Finds the masters of slave nodes on surfaces that a map moves, at most `reach` away, in CSR from start[0], which is
-   * set. NULL: masters do not change. */
+     set. NULL: masters do not change. */
   PetscErrorCode (*find)(HycoContact, struct _n_HycoFE *fe, PetscReal reach, PetscInt n, const PetscInt slave[],
                          PetscInt start[], PetscInt master[], PetscReal weight[]);
   /* Computes unit normals (n x 3), outward from the slave side. NULL: from the entries normal_x, ... at the master
-   * points, or from the slave surface. */
+     points, or from the slave surface. */
   PetscErrorCode (*normal)(HycoContact, const HycoContactPoints *points, PetscReal normal[]);
   /* Computes the gaps along these normals. NULL: from the entry gap at the master points, or the distance along the
-   * normal. */
+     normal. */
   PetscErrorCode (*gap)(HycoContact, const HycoContactPoints *points, const PetscReal normal[], PetscReal gap[]);
   /* Fails if the contacts first .. last - 1 are not valid at the positions of fe's nodes. */
   PetscErrorCode (*verify)(HycoContact, struct _n_HycoFE *fe, const struct _n_HycoPairs *pairs, PetscInt first,
@@ -72,7 +72,7 @@ PetscErrorCode HycoContactGetType(HycoContact contact, HycoContactType *type);
 PetscErrorCode HycoContactView(HycoContact contact, PetscViewer viewer);
 
 /* In create(): declares an entry of the scene; messages describe it by `title`. The library reads `group` or `slave`
- * (one of them is required), `master`, `normal_x`, `normal_y`, `normal_z` and `gap` as documented for scenes. */
+   (one of them is required), `master`, `normal_x`, `normal_y`, `normal_z` and `gap` as documented for scenes. */
 PetscErrorCode HycoContactDeclare(HycoContact contact, const char name[], const char title[], HycoEntryKind kind,
                                   PetscBool required);
 /* Declares normal_x, normal_y and normal_z. */

@@ -91,7 +91,7 @@ typedef struct {
 typedef PetscErrorCode (*HycoStepMonitor)(HycoFOM fom, const HycoStep *step, void *ctx);
 
 /* Reads and distributes the scene's mesh over `comm` (which may be smaller than the scene's communicator). Collective
- * on `comm`. The model holds a reference to the scene. The caller owns the model. */
+   on `comm`. The model holds a reference to the scene. The caller owns the model. */
 PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom);
 /* Frees; sets the handle to NULL; NULL-safe. Collective. */
 PetscErrorCode HycoFOMDestroy(HycoFOM *fom);
@@ -99,10 +99,10 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom);
 PetscErrorCode HycoFOMGetSolver(HycoFOM fom, HycoSolver *solver);
 
 /* Assembles what depends on the changed parameters, and solves (16) at mu (length n). Collective. Fails, on every rank,
- * outside the ranges and if the ranks give different points. A solve that does not converge is not an error: see
- * HycoSummary.reason. A scene with a history is solved from its first time to its last (docs/history.md). The results
- * are then those of the last time that was reached; if this is not the last listed time, the reason is
- * HYCO_DIVERGED_STEP. */
+   outside the ranges and if the ranks give different points. A solve that does not converge is not an error: see
+   HycoSummary.reason. A scene with a history is solved from its first time to its last (docs/history.md). The results
+   are then those of the last time that was reached; if this is not the last listed time, the reason is
+   HYCO_DIVERGED_STEP. */
 PetscErrorCode HycoFOMSolve(HycoFOM fom, PetscInt n, const PetscReal mu[]);
 /*
   Solves K U = F - B^T Lambda at mu (length n) with given contact forces Lambda (n_contacts, read on rank 0, in the
@@ -122,11 +122,11 @@ PetscErrorCode HycoFOMGetSystem(HycoFOM fom, HycoSystem *system);
 PetscErrorCode HycoFOMGetSummary(HycoFOM fom, HycoSummary *summary);
 
 /* Gets the resultants of each contact in the last solution, in the scene's order. Collective. Borrowed until the next
- * solve. */
+   solve. */
 PetscErrorCode HycoFOMGetContacts(HycoFOM fom, PetscInt *n, const HycoContactResult *result[]);
 /* Gets the forces on the bodies in the last solution: n results, those of supports and springs in the scene's order,
- * then the loads and the contacts. balance: the largest component of their sum, divided by the sum of the magnitudes of
- * all nodal forces. Collective. Borrowed until the next solve. */
+   then the loads and the contacts. balance: the largest component of their sum, divided by the sum of the magnitudes of
+   all nodal forces. Collective. Borrowed until the next solve. */
 PetscErrorCode HycoFOMGetReactions(HycoFOM fom, PetscInt *n, const HycoReaction *result[], PetscReal *balance);
 /*
   Gets the last solution on rank 0 (empty on other ranks), in the mesh file's order (ascending tags). Collective.
@@ -137,13 +137,13 @@ PetscErrorCode HycoFOMGetReactions(HycoFOM fom, PetscInt *n, const HycoReaction 
 PetscErrorCode HycoFOMGetSolution(HycoFOM fom, PetscInt *n_nodes, const PetscReal *U[], PetscInt *n_contacts,
                                   const PetscReal *Lambda[], PetscInt *n_cells, const PetscReal *sigma[]);
 /* For a scene with a history, before it is solved: requests that the fields at its listed times (displacement, stress
- * and its von Mises value, inelastic strain, temperature, the laws' state, contact) are written to PATH.xdmf (`path`)
- * and PATH.h5, or to PATH.vtkhdf, when the path ends, also if it ends early. Collective. */
+   and its von Mises value, inelastic strain, temperature, the laws' state, contact) are written to PATH.xdmf (`path`)
+   and PATH.h5, or to PATH.vtkhdf, when the path ends, also if it ends early. Collective. */
 PetscErrorCode HycoFOMSetSeries(HycoFOM fom, const char path[]);
 /* Writes the last solution to PATH.h5 and PATH.xdmf (`path` names the latter), or to PATH.vtkhdf. Collective. */
 PetscErrorCode HycoFOMWrite(HycoFOM fom, const char path[]);
 /* Writes at most n points, as the times 0, 1, ... of one series, each with its mesh and parameters: Begin; for each
- * point HycoFOMSolve() and Add; End completes the file. Not for a scene with a history. Collective. */
+   point HycoFOMSolve() and Add; End completes the file. Not for a scene with a history. Collective. */
 PetscErrorCode HycoFOMWriteBegin(HycoFOM fom, const char path[], PetscInt n);
 PetscErrorCode HycoFOMWriteAdd(HycoFOM fom);
 PetscErrorCode HycoFOMWriteEnd(HycoFOM fom);

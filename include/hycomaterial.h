@@ -1,5 +1,5 @@
 /* HycoMaterial: a material law. A body of the scene names its type (`law:`, by default elastic) and gives its
- * constants. */
+   constants. */
 #ifndef HYCOMATERIAL_H
 #define HYCOMATERIAL_H
 
@@ -47,7 +47,7 @@ typedef struct {
   PetscReal *stress;                           /* out: n x n_strain */
   PetscReal *tangent; /* out: n x n_strain x n_strain, d stress / d strain of the step, row major, symmetric */
   /* out, n each, densities by volume. A law may omit them: then no energy is stored and all work is dissipated. If it
-   * sets only `stored`, the increment is the dissipated energy divided by the equivalent stress */
+     sets only `stored`, the increment is the dissipated energy divided by the equivalent stress */
   PetscReal *stored;     /* elastic energy at the step's end */
   PetscReal *dissipated; /* by the step: (stress0 + stress) / 2 : its inelastic strain */
   PetscReal *increment;  /* equivalent inelastic strain of the step, 0 or more */
@@ -85,28 +85,28 @@ PetscErrorCode HycoMaterialGetType(HycoMaterial material, HycoMaterialType *type
 PetscErrorCode HycoMaterialView(HycoMaterial material, PetscViewer viewer);
 
 /* In create(): declares the next constant, with `title` for messages ("Young's modulus"), its default value
- * (HYCO_REQUIRED: the scene must give it), and the open interval lo < value < hi. */
+   (HYCO_REQUIRED: the scene must give it), and the open interval lo < value < hi. */
 PetscErrorCode HycoMaterialDeclare(HycoMaterial material, const char name[], const char title[], PetscReal initial,
                                    PetscReal lo, PetscReal hi);
 PetscErrorCode HycoMaterialSetOps(HycoMaterial material, const struct _HycoMaterialOps *ops);
 /* In create(): declares an entry of the scene that is a text, such as a file name. Get returns its value, in declare().
- * Borrowed. */
+   Borrowed. */
 PetscErrorCode HycoMaterialDeclareText(HycoMaterial material, const char name[], const char title[]);
 PetscErrorCode HycoMaterialGetText(HycoMaterial material, const char name[], const char **text);
 /* Sets the number of state variables of an integration point (default: none), which are 0 at the beginning. names: for
- * outputs, or NULL. */
+   outputs, or NULL. */
 PetscErrorCode HycoMaterialSetStateSize(HycoMaterial material, PetscInt n_state);
 PetscErrorCode HycoMaterialSetStateNames(HycoMaterial material, PetscInt n_state, const char *const names[]);
 /* Whether the law uses temperatures, so that its body must have one (default: false). */
 PetscErrorCode HycoMaterialSetHeat(HycoMaterial material, PetscBool heat);
 /* Whether stress = tangent . strain with a tangent that depends on the constants only (default: true). A scene with a
- * nonlinear law needs a history. */
+   nonlinear law needs a history. */
 PetscErrorCode HycoMaterialSetLinear(HycoMaterial material, PetscBool linear);
 PetscErrorCode HycoMaterialSetData(HycoMaterial material, void *data);
 PetscErrorCode HycoMaterialGetData(HycoMaterial material, void *data);
 
 /* Evaluates the law at points whose constants are given. For a linear law the library computes the stress from the
- * tangent, for which the caller provides memory too, and the tangent from isotropic(). Not collective. */
+   tangent, for which the caller provides memory too, and the tangent from isotropic(). Not collective. */
 PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *points);
 
 #if defined(__cplusplus)

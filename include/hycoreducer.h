@@ -46,8 +46,8 @@ typedef struct {
 PetscErrorCode HycoROMComparePath(HycoROM model, HycoFOM fom, PetscInt n, const PetscReal mu[], HycoPathErrors *errors);
 
 /* Errors over a set of points, as fractions; for a path that of its worst listed time (HycoROMComparePath()). Errors of
- * contact forces (HYCO_ERROR_LAMBDA and _RID) are divided by at least a tenth of the largest force of the set.
- * PETSC_INFINITY if a solve did not converge. */
+   contact forces (HYCO_ERROR_LAMBDA and _RID) are divided by at least a tenth of the largest force of the set.
+   PETSC_INFINITY if a solve did not converge. */
 typedef struct {
   PetscInt n, not_converged;
   PetscReal largest[HYCO_N_ERRORS], median[HYCO_N_ERRORS], mean[HYCO_N_ERRORS];
@@ -142,29 +142,29 @@ PetscErrorCode HycoReducerChooses(HycoReducer reducer, PetscBool *chooses);
 /* Called as snapshots are solved. */
 PetscErrorCode HycoReducerSetProgress(HycoReducer reducer, HycoProgress progress, void *ctx);
 /* Called on one rank in the other long phases (flexibilities of condensed models, the search for settings): `done` of
- * n, where n is 0 if it is not known. */
+   n, where n is 0 if it is not known. */
 typedef PetscErrorCode (*HycoPhaseMonitor)(const char phase[], PetscInt done, PetscInt n, void *ctx);
 PetscErrorCode HycoReducerSetPhaseMonitor(HycoReducer reducer, HycoPhaseMonitor monitor, void *ctx);
 /* Solves the missing samples and the held-out points (HycoReducerSetValidation()), reduces, and writes the model to
- * `path` (under a temporary name, then renamed). Collective. `training` may be NULL. `samples` may be NULL for a
- * condensed model, which then chooses points until its estimate of the forces' error is below -hyco_condensed_tol; if
- * that is not reached, `missed` says so. Fails if the errors of the model on its training solutions reach one half and,
- * unless -hyco_keep_singular, if its reduced stiffness is singular inside the parameters' ranges. */
+   `path` (under a temporary name, then renamed). Collective. `training` may be NULL. `samples` may be NULL for a
+   condensed model, which then chooses points until its estimate of the forces' error is below -hyco_condensed_tol; if
+   that is not reached, `missed` says so. Fails if the errors of the model on its training solutions reach one half and,
+   unless -hyco_keep_singular, if its reduced stiffness is singular inside the parameters' ranges. */
 PetscErrorCode HycoReducerRun(HycoReducer reducer, HycoSamples samples, const char path[], HycoTraining *training);
 
 /* Sets the held-out points, none of which may be a training point; they must outlive the training. NULL (the default):
- * scattered points. */
+   scattered points. */
 PetscErrorCode HycoReducerSetValidation(HycoReducer reducer, HycoSamples validation);
 /* Sets the number of scattered held-out points over the region of the training points (-hyco_validation). < 0, the
- * default: from the number of training points. 0: none; then errors are not known, settings are not searched and
- * estimates are not calibrated. */
+   default: from the number of training points. 0: none; then errors are not known, settings are not searched and
+   estimates are not calibrated. */
 PetscErrorCode HycoReducerSetValidationCount(HycoReducer reducer, PetscInt n);
 /* Whether the settings that the options do not give are searched by these points (-hyco_search; default: true). */
 PetscErrorCode HycoReducerSetSearch(HycoReducer reducer, PetscBool search);
 PetscErrorCode HycoReducerSetAttemptMonitor(HycoReducer reducer, HycoAttemptMonitor attempt, HycoAddedMonitor added,
                                             void *ctx);
 /* Sets the largest errors allowed at the held-out points (HYCO_N_ERRORS of them; 0: no target). If no settings meet
- * them, solutions are added near the worst points, at most `budget` of them (< 0: as many as there were at first). */
+   them, solutions are added near the worst points, at most `budget` of them (< 0: as many as there were at first). */
 PetscErrorCode HycoReducerSetTargets(HycoReducer reducer, const PetscReal target[], PetscInt budget);
 
 /* -- greedy training (section 5.4) -- */

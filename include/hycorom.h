@@ -1,6 +1,6 @@
 /* HycoROM: a reduced model from a file. Types: hybrid hyper-reduced (38)-(41), which needs only the RID online;
- * projection-based (44), on the whole mesh; cubature, on few weighted cells; condensed on the contact forces,
- * interpolated over the parameters; regression over the parameters. */
+   projection-based (44), on the whole mesh; cubature, on few weighted cells; condensed on the contact forces,
+   interpolated over the parameters; regression over the parameters. */
 #ifndef HYCOROM_H
 #define HYCOROM_H
 
@@ -87,7 +87,7 @@ PetscErrorCode HycoROMGivesForces(HycoROM model, PetscBool *gives);
 PetscErrorCode HycoROMGetScene(HycoROM model, HycoScene *scene);
 
 /* Fails unless the model was trained on this scene and mesh (all entries except titles, ranges and options; the bytes
- * of the mesh file). Collective on the scene's communicator. */
+   of the mesh file). Collective on the scene's communicator. */
 PetscErrorCode HycoROMCheckScene(HycoROM model, HycoScene scene);
 
 /* Solves (38), (44) or the condensed problem at mu (length n) and reconstructs the contact forces, (41) or V_lambda.
@@ -95,10 +95,10 @@ PetscErrorCode HycoROMCheckScene(HycoROM model, HycoScene scene);
    HycoPrediction.reason. */
 PetscErrorCode HycoROMPredict(HycoROM model, PetscInt n, const PetscReal mu[]);
 /* Whether Predict accepts parameters outside the ranges of the training (default: no). There the estimated errors grow
- * with the distance, and are not tested. */
+   with the distance, and are not tested. */
 PetscErrorCode HycoROMSetExtrapolate(HycoROM model, PetscBool extrapolate);
 /* Gets the sizes of a prediction: contacts, nodes of the RID (with those of the contacts outside it), components. Any
- * output may be NULL. */
+   output may be NULL. */
 PetscErrorCode HycoROMGetSizes(HycoROM model, PetscInt *n_contacts, PetscInt *n_nodes, PetscInt *dim);
 /*
   Predicts at n points, mu n x n_parameters. The results are bitwise those of HycoROMPredict() (for a condensed model to
@@ -114,10 +114,10 @@ PetscErrorCode HycoROMSolveMany(HycoROM model, PetscInt n, PetscInt n_parameters
 typedef PetscErrorCode (*HycoPointMonitor)(HycoROM model, PetscInt point, void *ctx);
 PetscErrorCode HycoROMSetPointMonitor(HycoROM model, HycoPointMonitor monitor, void *ctx);
 /* Reads -hyco_reconstruct, -hyco_reconstruct_solver, -hyco_fallback, -hyco_full_displacement, -hyco_residual.
- * HycoROMLoad() calls it. */
+   HycoROMLoad() calls it. */
 PetscErrorCode HycoROMSetFromOptions(HycoROM model);
 /* -hyco_fallback and -hyco_full_displacement: whether the caller, who has the scene, should solve full order if a
- * prediction is not accurate enough, and should solve once on the whole mesh with the predicted forces. */
+   prediction is not accurate enough, and should solve once on the whole mesh with the predicted forces. */
 PetscErrorCode HycoROMGetFallback(HycoROM model, PetscBool *full_order, PetscBool *displacement);
 /* -hyco_residual: whether HycoROMGetPrediction() calls HycoROMGetEquilibrium(). */
 PetscErrorCode HycoROMWantsEquilibrium(HycoROM model, PetscBool *wants);
@@ -152,7 +152,7 @@ typedef struct {
   const char *why;
 } HycoEquilibrium;
 /* Replays the laws on the whole mesh, which is read from the file on first use. The elastic stiffness is factored
- * there, and again if a parameter changes it. Not collective. Fails for a model without a history. */
+   there, and again if a parameter changes it. Not collective. Fails for a model without a history. */
 PetscErrorCode HycoROMGetEquilibrium(HycoROM model, HycoEquilibrium *equilibrium);
 
 /* Gets the summary of the last prediction, with estimated errors. Fails before the first prediction. */
@@ -161,13 +161,13 @@ PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);
 PetscErrorCode HycoROMGetStrainEnergy(HycoROM model, PetscReal *energy);
 
 /* Gets the displacement of the RID's nodes (n_nodes x dim) and the stress of its cells (n_cells x n_sigma, as in
- * HycoFOMGetSolution), with the mesh-file tags of the nodes and cells. Any output may be NULL. Borrowed until the next
- * prediction. */
+   HycoFOMGetSolution), with the mesh-file tags of the nodes and cells. Any output may be NULL. Borrowed until the next
+   prediction. */
 PetscErrorCode HycoROMGetRID(HycoROM model, PetscInt *n_nodes, const PetscInt *node_ids[], const PetscReal *U[],
                              PetscInt *n_cells, const PetscInt *cell_ids[], const PetscReal *sigma[]);
 /* Gets the contact forces of the whole contact surface (n_contacts, in the order of HycoFOMGetSolution()), the tags of
- * the slave nodes, and whether each force is a multiplier of the RID (1) or reconstructed (0). Any output may be NULL.
- * Borrowed. */
+   the slave nodes, and whether each force is a multiplier of the RID (1) or reconstructed (0). Any output may be NULL.
+   Borrowed. */
 PetscErrorCode HycoROMGetLambda(HycoROM model, PetscInt *n_contacts, const PetscReal *Lambda[],
                                 const PetscInt *node_ids[], const PetscInt *in_rid[]);
 /* Gets the resultants of each contact of the scene in the last prediction, as HycoFOMGetContacts(): from the forces of
@@ -176,14 +176,14 @@ PetscErrorCode HycoROMGetLambda(HycoROM model, PetscInt *n_contacts, const Petsc
    call. */
 PetscErrorCode HycoROMGetContacts(HycoROM model, PetscInt *n, const HycoContactResult *result[]);
 /* Gets the displacement of the whole mesh, n_nodes x dim in the mesh file's order. Reads the whole-mesh part on first
- * use. Borrowed. */
+   use. Borrowed. */
 PetscErrorCode HycoROMGetWholeU(HycoROM model, PetscInt *n_nodes, const PetscReal *U[]);
 /* Writes the last prediction on the whole mesh to `path` (.xdmf) and the .h5 beside it, or to `path` (.vtkhdf). For a
- * path it writes all listed times, as HycoFOMSetSeries() does: the laws are replayed outside the RID, and the function
- * fails if this is not possible. */
+   path it writes all listed times, as HycoFOMSetSeries() does: the laws are replayed outside the RID, and the function
+   fails if this is not possible. */
 PetscErrorCode HycoROMWrite(HycoROM model, const char path[]);
 /* Predicts at n points (n x n_parameters) and writes them to one file, as the times 0, 1, ... of a series, each with
- * its mesh and parameters. Not for paths. */
+   its mesh and parameters. Not for paths. */
 PetscErrorCode HycoROMWriteMany(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 const char path[]);
 /*
@@ -203,7 +203,7 @@ typedef struct {
 } HycoErrors;
 
 /* Collective on the full-order model's communicator; model on its rank 0 (NULL elsewhere), where errors is set. Both
- * must have been solved at the same parameters, on the same mesh. */
+   must have been solved at the same parameters, on the same mesh. */
 PetscErrorCode HycoROMCompare(HycoROM model, HycoFOM fom, HycoErrors *errors);
 
 /* Describes the model on an ASCII viewer. */

@@ -89,12 +89,12 @@ PetscErrorCode HycoROMGetDimensions(HycoROM model, PetscInt *n_modes, PetscInt *
 /* In setup: the default set-up, in which all contacts and all of the mesh belong to the model. */
 PetscErrorCode HycoROMSetUpDefault(HycoROM model);
 /* Ends a solve at mu: sets the coefficients of the modes and the forces of all contacts, which are copied (NULL: those
- * in the model), and computes the residuals of (16) at the contacts. */
+   in the model), and computes the residuals of (16) at the contacts. */
 PetscErrorCode HycoROMSetSolution(HycoROM model, const PetscReal mu[], const PetscReal gamma[],
                                   const PetscReal Lambda[]);
 
 /* In build: gets the training points (n x n_parameters), the contact forces there (n_contacts x n column major) and the
- * modes' coefficients (n_modes x n column major). Any output may be NULL. Borrowed. Rank 0. */
+   modes' coefficients (n_modes x n column major). Any output may be NULL. Borrowed. Rank 0. */
 PetscErrorCode HycoReducerGetSolutions(HycoReducer reducer, PetscInt *n, const PetscReal *mu[],
                                        const PetscReal *Lambda[], const PetscReal *gamma[]);
 

@@ -11,7 +11,7 @@ extern "C" {
 typedef struct _p_HycoSamples *HycoSamples;
 
 /* Creates an empty set over the scene's parameters. It holds a reference to the scene. Not collective. The caller owns
- * it. */
+   it. */
 PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples);
 /* Frees; sets the handle to NULL; NULL-safe. */
 PetscErrorCode HycoSamplesDestroy(HycoSamples *samples);
@@ -23,10 +23,10 @@ PetscErrorCode HycoSamplesDestroy(HycoSamples *samples);
 */
 PetscErrorCode HycoSamplesAddGrid(HycoSamples samples, const PetscInt counts[], PetscBool closed);
 /* Appends the tensor grid of the roots of Chebyshev polynomials over each range, counts[i] >= 1 of them: nodes for
- * interpolation by polynomials, as in a condensed model. */
+   interpolation by polynomials, as in a condensed model. */
 PetscErrorCode HycoSamplesAddChebyshev(HycoSamples samples, const PetscInt counts[]);
 /* Appends the first `count` >= 1 points of Halton's sequence over the ranges. Each parameter has `count` values,
- * whereas a grid with as many points has few. A larger set contains the smaller ones. */
+   whereas a grid with as many points has few. A larger set contains the smaller ones. */
 PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count);
 /* Appends the tensor product of the lists values[i][0..counts[i]-1], the last parameter running fastest. */
 PetscErrorCode HycoSamplesAddProduct(HycoSamples samples, const PetscInt counts[], const PetscReal *const values[]);
@@ -50,7 +50,7 @@ PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt c
 PetscErrorCode HycoSamplesExcept(HycoSamples samples, HycoSamples seen, HycoSamples *rest);
 
 /* Removes duplicate points and keeps the first of each, in the same order. n_dropped: number of removed points (may be
- * NULL). Not collective. */
+   NULL). Not collective. */
 PetscErrorCode HycoSamplesDropTwins(HycoSamples samples, PetscInt *n_dropped);
 
 /* Number of points and their values, point by point (n_points x n_parameters, row major). Borrowed. */

@@ -37,7 +37,7 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
                                       const PetscReal *hi[]);
 
 /* Gets the names of the scene's `output` entries, in the order of the quantities of HycoSummary and HycoPrediction. Not
- * collective. Borrowed. */
+   collective. Borrowed. */
 #define HYCO_MAX_QUANTITIES 16
 PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *names[HYCO_MAX_QUANTITIES]);
 
@@ -71,11 +71,11 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
 PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact);
 
 /* Gets the listed times of its history, increasing, with the beginning of the path first; n is 0 for a scene without a
- * history. Either output may be NULL. Not collective. Borrowed. */
+   history. Either output may be NULL. Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetHistory(HycoScene scene, PetscInt *n, const PetscReal *times[]);
 
 /* Fails with one line if the scene has a history, for a function `what` ("hyco train") that does not support one. Not
- * collective. */
+   collective. */
 PetscErrorCode HycoSceneRefuseHistory(HycoScene scene, const char what[]);
 
 /* Gets the options of the scene (its hyco: section, overridden by the command line). Not collective. Borrowed. */

@@ -33,7 +33,7 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots snapshots, HycoSamples samples, H
 PetscErrorCode HycoSnapshotsGetSolved(HycoSnapshots snapshots, PetscInt *n_groups, const PetscInt *solved[]);
 
 /* Gets the number of groups of ranks that solve n samples at the same time: -hyco_groups, or as many as fit into half
- * of the memory if each factors the stiffness of its own mesh. Collective. */
+   of the memory if each factors the stiffness of its own mesh. Collective. */
 PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups);
 
 /* Describes the object on an ASCII viewer (NULL: stdout). Collective. */

@@ -70,7 +70,7 @@ PetscErrorCode HycoSolverSetTaoType(HycoSolver solver, const char type[]);
 /* -hyco_solver_form */
 PetscErrorCode HycoSolverSetForm(HycoSolver solver, HycoForm form);
 /* -hyco_linear; `gigabytes` (-hyco_memory): largest memory of a factor on all ranks together; 0: most of the free
- * memory. */
+   memory. */
 PetscErrorCode HycoSolverSetLinear(HycoSolver solver, HycoLinear linear, PetscReal gigabytes);
 /* -hyco_solver_rtol: the largest relative KKT residual that counts as solved (default 1e-8). */
 PetscErrorCode HycoSolverSetTolerance(HycoSolver solver, PetscReal rtol);
@@ -79,7 +79,7 @@ PetscErrorCode HycoSolverSetMaxIts(HycoSolver solver, PetscInt max_its);
 /* -hyco_solver_warm_start: start from the last solution's active set (default) or without contact. */
 PetscErrorCode HycoSolverSetWarmStart(HycoSolver solver, PetscBool warm);
 /* -hyco_solver_multilevel: in the primal form, if there are more contacts than a quarter of the unknowns and couplings
- * have one sign (a rope, a membrane), start from the active set of coarser problems (default). */
+   have one sign (a rope, a membrane), start from the active set of coarser problems (default). */
 PetscErrorCode HycoSolverSetMultilevel(HycoSolver solver, PetscBool multilevel);
 /*
   -hyco_solver_fallback: if the residuals of the chosen method are too large, try the next of TAO, active set, and
@@ -108,7 +108,7 @@ PetscErrorCode HycoSolverGetReason(HycoSolver solver, HycoReason *reason);
 PetscErrorCode HycoSolverGetIterations(HycoSolver solver, PetscInt *its);
 PetscErrorCode HycoSolverGetKKT(HycoSolver solver, HycoKKT *kkt);
 /* Gets the method of the last solve: "active_set dual", "tao tron primal, then active_set". Borrowed, until the next
- * solve. */
+   solve. */
 PetscErrorCode HycoSolverGetMethod(HycoSolver solver, const char *method[]);
 /* Gets the linear solver of the last solve: "direct: mumps, 0.9 GB estimated". Borrowed, until the next solve. */
 PetscErrorCode HycoSolverGetLinear(HycoSolver solver, const char *linear[]);

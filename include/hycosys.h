@@ -23,7 +23,7 @@ typedef struct {
 } HycoOption;
 
 /* hyco's classes are PETSc objects, with reference counts, names, options prefixes, composed data and
- * PetscObjectView(). */
+   PetscObjectView(). */
 PETSC_EXTERN PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_CLASSID, HYCO_SOLVER_CLASSID,
     HYCO_FOM_CLASSID, HYCO_SNAPSHOTS_CLASSID, HYCO_REDUCER_CLASSID, HYCO_ROM_CLASSID, HYCO_MATERIAL_CLASSID,
     HYCO_CONTACT_CLASSID;
@@ -32,8 +32,8 @@ PETSC_EXTERN PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_
 PetscErrorCode HycoInitializePackage(void);
 
 /* Initialises PETSc (if needed) and SLEPc for hyco. Collective on all processes. `argc`, `argv` may be NULL. If it
- * initialises PETSc, errors are printed as one line on stderr, "hyco: error: ...". HYCO_TRACE=1 in the environment, or
- * PetscPushErrorHandler(PetscTraceBackErrorHandler, NULL), adds PETSc's call stack. */
+   initialises PETSc, errors are printed as one line on stderr, "hyco: error: ...". HYCO_TRACE=1 in the environment, or
+   PetscPushErrorHandler(PetscTraceBackErrorHandler, NULL), adds PETSc's call stack. */
 PetscErrorCode HycoInitialize(int *argc, char ***argv);
 /* Finalises what HycoInitialize() initialised. Collective on all processes. */
 PetscErrorCode HycoFinalize(void);
@@ -42,7 +42,7 @@ PetscErrorCode HycoFinalize(void);
 const char *HycoVersion(void);
 
 /* Gets every -hyco_ option that the library's classes declare, in the order of the method, and their number `*n`. Not
- * collective. Borrowed, until a type is registered or HycoFinalize() is called. */
+   collective. Borrowed, until a type is registered or HycoFinalize() is called. */
 PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *table[]);
 
 /*
@@ -93,7 +93,7 @@ PetscErrorCode HycoOptionsName_Private(HycoOptionItems items, const char name[],
 PetscErrorCode HycoOptionsFor(const char only[]);
 
 /* Returns the name in `names[n]` nearest to `word` by edit distance, or NULL if none is close. Not collective.
- * Borrowed. */
+   Borrowed. */
 const char *HycoNearest(const char *word, PetscInt n, const char *const names[]);
 
 #if defined(__cplusplus)

@@ -132,7 +132,7 @@ static PetscErrorCode DescribeEnd(const HycoAttempt *a, char text[DRIVER_LINE])
     snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d, which does not reach its end", (int)a->held_out.n,
              (int)a->n_held);
   if (a->beaten_by)
-    snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d: recipe %d is better", (int)a->held_out.n,
+    snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d: settings %d are better", (int)a->held_out.n,
              (int)a->n_held, (int)a->beaten_by);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

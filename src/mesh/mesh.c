@@ -147,11 +147,10 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   for (PetscInt k = 0; k < scene->n_springs; k++) PetscCall(CheckSpring(mesh, &scene->spring[k]));
   for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(HycoContactCheckGroups(scene->contact[k], mesh));
   for (PetscInt k = 0; k < scene->n_ties; k++) PetscCall(CheckTie(mesh, &scene->tie[k]));
-  HycoCheck(
-      !scene->n_contacts || mesh->type != HYCO_HEX20,
-      "contact %s: the mesh has hex20, at whose corners a uniform pressure would pull; give hex27, or a mesh file, "
-      "whose hex20 are read as hex27",
-      scene->contact[0]->name);
+  HycoCheck(!scene->n_contacts || mesh->type != HYCO_HEX20,
+            "contact %s: the mesh has hex20 cells, at whose corners a uniform pressure would give tensile forces; use "
+            "hex27 cells, or a mesh file, whose hex20 cells are read as hex27",
+            scene->contact[0]->name);
   for (PetscInt k = 0; k < scene->n_contacts; k++)
     HycoCheck(!HycoMeshIsQuadratic(mesh) || !scene->contact[k]->ops->find,
               "contact %s: type surface needs first-order cells, and the mesh has %s; use matching meshes with type: "

@@ -286,7 +286,7 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
   a->dropped_at = -1;
   PetscCall(HycoSamplesGet(t->held, &a->n_held, NULL, NULL));
   HycoRecipeDescribe(recipe, sizeof(what), what);
-  HycoFormat(t->doing, "recipe %d, %s", (int)a->number, what);
+  HycoFormat(t->doing, "settings %d, %s", (int)a->number, what);
   t->most_full_order =
       t->pinned[HYCO_CHOICE_HYBRID] || recipe->hybrid != HYCO_HYBRID_ALL || recipe->plane ? 0 : MANY_UNKNOWNS;
   PetscCall(SetRecipe(t, recipe));

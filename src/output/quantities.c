@@ -244,7 +244,7 @@ static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoCo
   HycoCheck(q->kind != HYCO_QUANTITY_MOMENT || (turns && fe->formulation != HYCO_AXISYMMETRIC),
             "output_%s: there is no moment about %c%s", q->name, "xyz"[q->field],
             fe -> formulation == HYCO_AXISYMMETRIC ? " in an axisymmetric scene"
-                  : fe->dim == 2                   ? " in 2D; ask for z"
+                  : fe->dim == 2                   ? " in 2D; use z"
                                                    : " in 1D");
   *value = contact ? 0 : NAN;
   for (PetscInt c = 0; contact && c < fe->scene->n_contacts; c++) {

@@ -84,17 +84,18 @@ static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
   PetscFunctionBegin;
   HycoCheck(
       q->kind >= HYCO_QUANTITY_FORCE || !q->contact,
-      "the output %s names the contact %s; that is for force, moment and max: contact_pressure, others take a group",
+      "the output %s names the contact %s, which is for force, moment and max: contact_pressure; give a group instead",
       q->name, q->contact);
   if (q->kind < HYCO_QUANTITY_FORCE) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(!q->group, "the output %s is of a contact and names the group %s; write contact: NAME instead", q->name,
+  HycoCheck(!q->group, "the output %s is for a contact and names the group %s; write contact: NAME instead", q->name,
             q->group);
-  HycoCheck(s->n_contacts, "the output %s is of a contact, and the scene has none", q->name);
+  HycoCheck(s->n_contacts, "the output %s is for a contact, and the scene has none; remove it", q->name);
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     if (q->contact && strcmp(q->contact, s->contact[c]->name) == 0) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(HycoListAdd(list, ", ", s->contact[c]->name));
   }
-  HycoCheck(!q->contact, "the output %s names the contact %s; the scene's are: %s", q->name, q->contact, list);
+  HycoCheck(!q->contact, "the output %s names the contact %s, which does not exist; the contacts of the scene are: %s",
+            q->name, q->contact, list);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -81,7 +81,7 @@ static PetscErrorCode TestReferences(void)
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoROMLoad(hybrid, &model));
-  CHECK_FAILS(HycoROMPredict((HycoROM)fom, 2, inside), "no HycoROM");
+  CHECK_FAILS(HycoROMPredict((HycoROM)fom, 2, inside), "not a HycoROM");
   CHECK_FAILS(HycoROMPredict((HycoROM)fom, 2, inside), "create it by HycoROMLoad()");
   CHECK_FAILS(HycoROMPredict((HycoROM)none, 2, inside), "create it by HycoROMLoad()");
   CHECK_FAILS(HycoROMCheckScene(model, (HycoScene)samples), "create it by HycoSceneLoad()");
@@ -388,7 +388,7 @@ static PetscErrorCode Test(void)
     PetscCheck(rows, PETSC_COMM_SELF, PETSC_ERR_USER, "faults/api.csv cannot be written");
     fprintf(rows, "\"C API: NULL, destroyed, copies of destroyed handles, handles of another kind, wrong order, wrong "
                   "sizes, reuse after an error, two models at once\",\"refused "
-                  "by name; then the right numbers\"\n");
+                  "by name; afterwards the numbers are right\"\n");
     PetscCall(TestGrowth("create, use, destroy", Once, 1000));
     PetscCall(TestGrowth("refused", OnceRefused, 1000));
     fclose(rows);

@@ -305,7 +305,7 @@ class Faults(Case):
                 with self.subTest(values=values, ranks=ranks):
                     self.check(['predict', '-model', 'half.h5', '-extrapolate', '-values_mu1', values, '-values_mu2', '0.1',
                                 '-table', 'out.csv'], '"sqrt(0.3-mu1)+x" is not finite at', ranks)
-        ROWS.add('a point of a set where the scene has no value, met by one rank (3), on 2 and 3 ranks', 'one line, status 1, no rank left waiting')
+        ROWS.add('a point of a set at which the scene has no value, on one rank (3), on 2 and 3 ranks', 'one line, status 1, no rank left waiting')
 
     def apart(self, text, *args, other=(), folder='.'):
         """Rank 0 as it should be; ranks 1 and 2 stand in another folder or have other arguments: one line, status 1, soon."""
@@ -335,7 +335,7 @@ class Faults(Case):
         self.apart('not valid YAML for hyco', 'solve', '-scene', 'scene.yaml', '-mu', '0.07,0.17', folder='elsewhere')
         for name in ('scene.yaml', 'rope.msh', os.path.join('elsewhere', 'scene.yaml'), os.path.join('elsewhere', 'rope.h5')):
             os.remove(self.path(name))
-        ROWS.add(f'files that some ranks do not see or see damaged, entries that they alone have ({len(tries) + 1}), on 3 ranks',
+        ROWS.add(f'files that are missing or damaged on some ranks, entries that only some ranks have ({len(tries) + 1}), on 3 ranks',
                  'one line, status 1, no rank left waiting')
 
 

@@ -48,13 +48,13 @@ class Files(Case):
         self.assertNotIn('internal error', run.stderr)
 
     def test_kept_for_ever(self):
-        """Files of older formats give the numbers that they gave."""
+        """Files of older formats give the same numbers as before."""
         for name, (kind, force, active) in KEPT.items():
             report = self.hyco('predict', '-model', os.path.join(DATA, name), '-mu', '0.07,0.17', '-output', 'o.xdmf')
             self.assertEqual((report['model_type'], report['n_active']), (kind, active))
             self.near(report['total_contact_force'], force, 1e-9)
             self.solved(report)
-        ROWS.add(f'{len(KEPT)} models of formats 3 and 4, hybrid, projection, condensed, kept in tests/data', 'give the numbers that they gave')
+        ROWS.add(f'{len(KEPT)} models of formats 3 and 4, hybrid, projection, condensed, kept in tests/data', 'give the same numbers as before')
 
     def test_same_bytes(self):
         """The same training twice: the same bytes."""
@@ -102,7 +102,7 @@ class Files(Case):
         for name, shape, kind in sizes:
             with self.subTest(name=name, shape=shape):
                 self.refused(self.edited(put(name, shape, kind), 'c.h5' if 'condensed' in name else 'good.h5'), f'{name} is damaged')
-        ROWS.add(f'sizes that the file has no room for ({len(sizes)}), in 2 GB of address space', "refused by the dataset's name")
+        ROWS.add(f'sizes that are larger than the file ({len(sizes)}), in 2 GB of address space', "refused by the dataset's name")
 
     def test_condensed_values(self):
         """Numbers of a condensed model that no training writes."""
@@ -119,7 +119,7 @@ class Files(Case):
         for name, at, value in values:
             with self.subTest(name=name, at=at, value=value):
                 self.refused(self.edited(put(name, at, value), 'c.h5'), f'bad.h5: condensed/({name} (is damaged|contains)|bounds is 2 x 2, and)')
-        ROWS.add(f'numbers of a condensed model that no training writes ({len(values)})', "refused by the dataset's name")
+        ROWS.add(f'invalid numbers in a condensed model ({len(values)})', "refused by the dataset's name")
 
     def test_elsewhere(self):
         """A model that sends its reader to other files, or through filters, which HDF5 would load as code."""
@@ -175,7 +175,7 @@ class Files(Case):
         for name, at, value, text in values:
             with self.subTest(name=name, at=at, value=value):
                 self.refused(self.edited(put(name, at, value), 'held.h5' if name.startswith('training') else 'good.h5'), text)
-        ROWS.add(f'numbers of a hybrid model that no training writes ({len(values)}): NaN, out of range, other format', 'refused')
+        ROWS.add(f'invalid numbers in a hybrid model ({len(values)}): NaN, out of range, other format', 'refused')
         for old, new, text in ((b'\t', b' ', "the model's scene text is damaged"), (b'body_', b'bo y_', 'is not an entry of a scene')):
             def rewrite(f, old=old, new=new):
                 text = f['problem/scene'][:]
@@ -254,7 +254,7 @@ class Files(Case):
                         self.assertNotIn('MPI_ABORT', run.stderr)  # the other rank heard it, and was not left behind
                 with open(path, 'wb') as f:
                     f.write(good)
-        ROWS.add('snapshots whose sizes do not go together (6), on 1 and 2 ranks', 'refused by their names')
+        ROWS.add('snapshots with inconsistent sizes (6), on 1 and 2 ranks', 'refused by their names')
 
     def test_snapshots_of_another(self):
         """Solutions and flexibilities of other materials, under the names of these."""

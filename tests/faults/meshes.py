@@ -94,7 +94,7 @@ TOGETHER = [
 ]
 TEXTS = [
     ('a count too large', lambda t: t.replace('$Nodes\n18', '$Nodes\n4000000000'), 'declares 4000000000 nodes, more than the file contains'),
-    ('a negative count', lambda t: t.replace('$Elements\n16', '$Elements\n-1'), 'speaks of -1 elements'),
+    ('a negative count', lambda t: t.replace('$Elements\n16', '$Elements\n-1'), 'declares -1 elements'),
     ('a count too small', lambda t: t.replace('$Nodes\n18', '$Nodes\n17'), 'refers to node 18, which the file does not define'),
     ('a node twice', lambda t: t.replace('\n18 1 2', '\n17 1 2'), 'node 17 occurs twice'),
     ('a name of dimension 21', lambda t: t.replace('2 1 "low"', '21 1 "low"'), 'a name of a group is "21 1 "low""'),
@@ -124,10 +124,10 @@ TEXTS_41 = [
     ('a cell in two bodies', swap(LOW, '1 0 0 0 1 1 0 2 1 2 0'), 'cell 1 belongs to two bodies'),
     ('a group without elements', lambda t: t.replace('1 6 1 2\n13 10 11 \n14 11 12 \n', '').replace('$Elements\n6 16 1 16', '$Elements\n5 14 1 16'), 'contact c: the group over is empty'),
     ('a group 0', swap(LOW, '1 0 0 0 1 1 0 1 0 0'), 'is damaged: its entities'),
-    ('groups without end', swap(LOW, '1 0 0 0 1 1 0 99999 1 0'), 'speaks of 99999 groups of an entity'),
+    ('groups without end', swap(LOW, '1 0 0 0 1 1 0 99999 1 0'), 'declares 99999 groups of an entity'),
     ('a negative entity', swap('\n' + LOW, '\n-' + LOW), 'there is no entity of dimension 2 and number -1'),
     ('entities after nodes', swap('$EndElements\n', '$EndElements\n$Entities\n0 0 0 0\n$EndEntities\n'), 'a section $Entities after its nodes'),
-    ('a negative number of names', swap('$PhysicalNames\n6', '$PhysicalNames\n-6'), 'speaks of -6 names'),
+    ('a negative number of names', swap('$PhysicalNames\n6', '$PhysicalNames\n-6'), 'declares -6 names'),
     ('too many names', swap('$PhysicalNames\n6', '$PhysicalNames\n60'), 'a name of a group is "$EndPhysicalNames"'),
     ('names without end', lambda t: t[:t.index('$EndPhysicalNames')].replace('$PhysicalNames\n6', '$PhysicalNames\n7'), 'it ends among its names'),
     ('letters for a node', swap('\n7\n8\n9\n', '\n7\nx\n9\n'), 'it ends among its nodes'),
@@ -136,10 +136,10 @@ TEXTS_41 = [
     ('a node twice', swap('\n7\n8\n9\n', '\n7\n7\n9\n'), 'node 7 occurs twice'),
     ('a block of dimension 7', swap(FLOOR, '7' + FLOOR[1:]), 'there is no entity of dimension 7 and number 3'),
     ('parameters of another kind', swap(FLOOR, FLOOR.replace('1 3 0 3', '1 3 2 3')), 'a block of nodes'),
-    ('a block without end', swap(FLOOR, FLOOR.replace('1 3 0 3', '1 3 0 9999')), 'speaks of 9999 nodes of a block'),
+    ('a block without end', swap(FLOOR, FLOOR.replace('1 3 0 3', '1 3 0 9999')), 'declares 9999 nodes of a block'),
     ('more nodes than counted', swap(BLOCKS, '$Nodes\n6 17 1 18'), 'contain more nodes than it declares'),
     ('fewer nodes than counted', swap(BLOCKS, '$Nodes\n6 19 1 18'), 'contain fewer nodes than it declares'),
-    ('too many blocks', swap(BLOCKS, '$Nodes\n600 18 1 18'), 'speaks of 600 blocks of nodes'),
+    ('too many blocks', swap(BLOCKS, '$Nodes\n600 18 1 18'), 'declares 600 blocks of nodes'),
     ('letters for a coordinate', swap('\n0.5 1 0\n', '\n0.5 y 0\n'), 'the coordinates of node 8 are not numbers'),
     ('NaN', swap('\n0.5 1 0\n', '\n0.5 nan 0\n'), 'node 8 has a coordinate that is not finite'),
     ('two $Nodes', swap('$EndNodes\n', '$EndNodes\n$Nodes\n0 0 0 0\n$EndNodes\n'), 'has two sections $Nodes'),
@@ -225,7 +225,7 @@ SCENES = [
 ]
 
 
-# errors in the cells, facets or contacts of one rank alone, while the others have none: on 2 and 3 ranks
+# errors in the cells, facets or contacts of one rank only, while the others have none: on 2 and 3 ranks
 ONE_RANK = [
     (('body:\n', 'force:\n  up: {y: sqrt(x-0.9)}\nbody:\n'), 'is not finite'),
     (('body:\n', 'force:\n  low: {x: 1/(load-load)}\nbody:\n'), 'is not finite'),
@@ -293,7 +293,7 @@ class Meshes(Case):
                     os.remove(self.path('o.h5'))
                 else:
                     self.refused(text, 'bad.msh')
-        ROWS.add(f'broken meshes ({len(MESHES)})', 'one line, status 1, no file left; every third one on 2 or 3 ranks too')
+        ROWS.add(f'broken meshes ({len(MESHES)})', 'one line, status 1, no file left; every third one also on 2 or 3 ranks')
 
     def test_train(self):
         """The same meshes given to train, which reads them on rank 0 for itself."""
@@ -312,7 +312,7 @@ class Meshes(Case):
                 msh(self.path('bad.msh'), *mesh(self.nodes, self.elements, NAMES))
                 self.write('scene.yaml', scene(SCENE))
                 self.refused(text, 'bad.msh')
-        ROWS.add(f'meshes and scenes that do not go together ({len(TOGETHER)})', 'one line, status 1, no file left; every third one on 2 or 3 ranks too')
+        ROWS.add(f'meshes and scenes that are inconsistent ({len(TOGETHER)})', 'one line, status 1, no file left; every third one also on 2 or 3 ranks')
 
     def test_texts_41(self):
         subprocess.run(['gmsh', '-save', '-format', 'msh41', self.path('two.msh'), '-o', self.path('good.msh'), '-v', '1'], check=True,
@@ -324,7 +324,7 @@ class Meshes(Case):
                 self.assertNotEqual(change(good), good)
                 self.write('bad.msh', change(good))
                 self.refused(text, 'bad.msh', 12)
-        ROWS.add(f'broken mesh files of format 4.1 ({len(TEXTS_41)})', 'one line, status 1, no file left; every twelfth one on 2 or 3 ranks too')
+        ROWS.add(f'broken mesh files of format 4.1 ({len(TEXTS_41)})', 'one line, status 1, no file left; every twelfth one also on 2 or 3 ranks')
 
     def test_texts(self):
         with open(self.path('two.msh'), encoding='ascii') as f:
@@ -334,7 +334,7 @@ class Meshes(Case):
                 self.assertNotEqual(change(good), good)
                 self.write('bad.msh', change(good))
                 self.refused(text, 'bad.msh')
-        ROWS.add(f'broken mesh files ({len(TEXTS)})', 'one line, status 1, no file left; every third one on 2 or 3 ranks too')
+        ROWS.add(f'broken mesh files ({len(TEXTS)})', 'one line, status 1, no file left; every third one also on 2 or 3 ranks')
 
     def test_scenes(self):
         for (old, new), text in SCENES:
@@ -342,7 +342,7 @@ class Meshes(Case):
                 self.assertIn(old, SCENE)
                 self.write('scene.yaml', SCENE.replace(old, new, 1))
                 self.refused(text)
-        ROWS.add(f'broken scenes ({len(SCENES)})', 'one line, status 1, no file left; every third one on 2 or 3 ranks too')
+        ROWS.add(f'broken scenes ({len(SCENES)})', 'one line, status 1, no file left; every third one also on 2 or 3 ranks')
 
     def test_one_rank_only(self):
         runs = []
@@ -350,7 +350,7 @@ class Meshes(Case):
             self.write(f'one{k}.yaml', SCENE.replace(old, new, 1))
             runs += [(new, ranks, ['solve', '-scene', f'one{k}.yaml', '-mu', '0.05'], text) for ranks in (2, 3)]
         self.all_one_line(runs)
-        ROWS.add(f'errors in the cells, facets or contacts of one rank alone ({len(ONE_RANK)}), on 2 and 3 ranks', 'one line, status 1, no rank left waiting')
+        ROWS.add(f'errors in the cells, facets or contacts of one rank only ({len(ONE_RANK)}), on 2 and 3 ranks', 'one line, status 1, no rank left waiting')
 
     def test_same_in_every_format(self):
         """2.2 and 4.1, text and binary, lines that end as on Windows, a scene that does: the same answer."""

@@ -103,7 +103,7 @@ class Facing(Case):
         self.refused('a map moves node', 'apart along the surface', 'use type: surface')
         mesh(self.path('m.msh'))
         scene(self.path('moved.yaml'), 'm.msh', kind='pair')
-        self.refused('have no node of upper', 'use type: surface', yaml='moved.yaml', mu='1,0.5,10')
+        self.refused('have no node of upper', 'type: surface', yaml='moved.yaml', mu='1,0.5,10')
 
 
 if __name__ == '__main__':

@@ -169,7 +169,7 @@ class Ties(Case):
         tie = 'tie: {glue: {slave: under, master: over}}\n'
         for text, said in (('tie: {glue: {slave: under}}', 'tie glue has no master'), ('tie: {glue: {slave: under, master: under}}', 'are the same group'),
                            ('tie: {glue: {slave: under, master: nowhere}}', 'no group "nowhere"'), ('tie: {glue: {slave: under, mastre: over}}', 'a tie has: slave, master'),
-                           ('tie: {glue: {slave: under, master: low}}', 'is to be a group of dimension 1'), ('tie: {glue: {slave: top, master: over}}', '5 of the 5 nodes of top have no point'),
+                           ('tie: {glue: {slave: under, master: low}}', 'must be a group of dimension 1'), ('tie: {glue: {slave: top, master: over}}', '5 of the 5 nodes of top have no point'),
                            ('tie: {glue: {slave: under, master: over, tolerance: wide}}', 'must be a length'),
                            (tie + 'fixed_under_x: 0', 'are not fixed in the same way'), (tie + 'fixed_under_normal: 0\nfixed_under_direction_x: 1', 'are not fixed in the same way'),
                            (tie + 'contact: {c: {group: under, normal: {x: 1}, gap: 1}}', 'do not have this contact'),
