@@ -1,56 +1,31 @@
-""
-    "What each contact carries in a prediction: resultant, moment, area and largest pressure, in reports, tables and "
-    "outputs, against full order."
-    "" import csv import os import unittest
+"""What each contact carries in a prediction: resultant, moment, area and largest pressure, in reports, tables and outputs, against full order."""
+import csv
+import os
+import unittest
 
-        import h5py import numpy as np
+import h5py
+import numpy as np
 
-            from common import PELLET,
-    SOURCE, Case, square, msh from paths import NORTON,
-    FlowingRing
+from common import PELLET, SOURCE, Case, square, msh
+from paths import NORTON, FlowingRing
 
-        BLOCKS = os.path.join(SOURCE, 'examples', 'blocks') WHOLE =
-            ('-hyco_rid_whole', 'true', '-hyco_hybrid', 'all')CORNER = ""
-                                                                       "
-    scene : {mesh : mesh.msh, parameters : [ push, wedge ]} parameter:
-{
-push : {
-range:
-  [ 0.5, 2 ]
-}
-  , wedge:
-  {
-  range:
-    [ -0.002, 0.002 ]
-  }
-}
-body:
-{
-block : {
-young:
-  200, poisson : 0.3
-}
-}
-spring:
-{
-right : {
-x:
-  3, y : 3
-}
-  , high:
-  {
-  x:
-    3, y : 3
-  }
-}
-pressure : {right : push * (1 + y), high : 1 + x ^ 2} contact : wall
-    : {group : left, gap : "max(wedge, 0)*abs(y)"} floor : {group : low, gap : "-min(wedge, 0)*abs(x)"} output : lift
-    : {force : y, contact : floor} both : {force : x} turn : {moment : z, contact : wall} peak
-    : {max : contact_pressure, contact : floor} most:
-{
-max:
-  contact_pressure
-}
+BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
+WHOLE = ('-hyco_rid_whole', 'true', '-hyco_hybrid', 'all')
+CORNER = """
+scene: {mesh: mesh.msh, parameters: [push, wedge]}
+parameter: {push: {range: [0.5, 2]}, wedge: {range: [-0.002, 0.002]}}
+body: {block: {young: 200, poisson: 0.3}}
+spring: {right: {x: 3, y: 3}, high: {x: 3, y: 3}}
+pressure: {right: push*(1 + y), high: 1 + x^2}
+contact:
+  wall: {group: left, gap: "max(wedge, 0)*abs(y)"}
+  floor: {group: low, gap: "-min(wedge, 0)*abs(x)"}
+output:
+  lift: {force: y, contact: floor}
+  both: {force: x}
+  turn: {moment: z, contact: wall}
+  peak: {max: contact_pressure, contact: floor}
+  most: {max: contact_pressure}
 """
 OUTPUTS = {'weight': ('force', 'y'), 'peak': ('max', 'contact_pressure')}
 
@@ -89,14 +64,10 @@ class Carried(Case):
         self.hyco(*args, '-table', name, ranks=ranks)
         if name.endswith('.h5'):
             with h5py.File(self.path(name)) as f:
-                return
-{
-column: f[column][:, 0] for column in f
-}
-with open(self.path(name), encoding = 'utf-8') as f : rows = list(csv.DictReader(f)) return
-{
-column: np.array([float(row[column]) for row in rows]) for column in rows[0]
-}
+                return {column: f[column][:, 0] for column in f}
+        with open(self.path(name), encoding='utf-8') as f:
+            rows = list(csv.DictReader(f))
+        return {column: np.array([float(row[column]) for row in rows]) for column in rows[0]}
 
     def test_whole(self):
         """All displacements full order on the whole mesh: full order's, where the map moves nodes and turns normals, in 2D and 3D."""
