@@ -82,10 +82,6 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
   const PetscBool has_mean = (PetscBool)(mesh->type == HYCO_QUAD4 || mesh->type == HYCO_HEX8);
 
   PetscFunctionBegin;
-  HycoCheck(
-      !HycoMeshIsQuadratic(mesh) || !scene->n_times,
-      "the mesh has second-order cells (%s), and scenes with a history need first-order cells; mesh with gmsh -order 1",
-      HycoCellKinds[mesh->type].name);
   HycoCheck(mesh->dim == 2 || scene->formulation == HYCO_PLANE_STRAIN,
             "scene_formulation is for 2D scenes, and this mesh has %d dimension%s; remove it", (int)mesh->dim,
             mesh->dim == 1 ? "" : "s");
@@ -100,7 +96,7 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
     HycoCheck(!body->bbar || scene->formulation != HYCO_PLANE_STRESS,
               "body_%s_element is bbar, against volumetric locking, which does not occur under plane_stress; remove it",
               body->name);
-    HycoCheck(!flows || body->element || has_mean || mesh->dim == 1,
+    HycoCheck(!flows || body->element || has_mean || HycoMeshIsQuadratic(mesh) || mesh->dim == 1,
               "body %s has an inelastic law (%s), which preserves volume, and tri3 or tet4 cells are then much too "
               "stiff; use quad4 or hex8 cells, or write element: standard to use these cells all the same",
               body->name, ((PetscObject)body->law)->type_name);

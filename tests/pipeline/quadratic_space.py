@@ -58,6 +58,54 @@ class Solids(Case):
                 for place, corners in enumerate(VTK[LINEAR[kind]][:cells.shape[1]]):  # each node is where VTK expects it between the corners
                     np.testing.assert_allclose(x[cells[:, place]], np.mean(x[cells][:, corners], axis=1), atol=1e-14)
 
+    def tube(self, kind, n):
+        """A quarter of a tube of inner radius 1 and outer radius 3 in two rings that meet at radius 2, n cells across each."""
+        grid, around, along = Grid(), np.linspace(0, np.pi / 2, 2 * n + 1), np.linspace(0, 0.5, 2)
+        grid.box(LINEAR[kind], [np.linspace(1, 2, n + 1), around, along], lambda x: x, 'inner', {'x0': 'bore', 'x1': 'shaft', 'y0': 'y0', 'y1': 'x0', 'z0': 'ends', 'z1': 'ends'})
+        grid.box(LINEAR[kind], [np.linspace(2, 3, n + 1), around, along], lambda x: x, 'outer', {'x0': 'sleeve', 'y0': 'y0', 'y1': 'x0', 'z0': 'ends', 'z1': 'ends'})
+        nodes, elements, names = second(grid, kind)
+        return [(r * np.cos(t), r * np.sin(t), z) for r, t, z in nodes], elements, names
+
+    def test_order(self):
+        """Two rings under inner pressure p, of one material: Lame's tube, whose radial stress they meet with. The energy's error falls by 2^4, the pressure's by 2^2."""
+        mean = 1 / 8  # p a^2 / (c^2 - a^2)
+        energy = np.pi / 4 * 0.5 * (1 + NU) / E * mean * (1 - 2 * NU + 9)
+        pressure = mean * (9 / 4 - 1)
+        text = (f'scene: {{mesh: mesh.msh}}\nbody: {{inner: {{young: {E}, poisson: {NU}}}, outer: {{young: {E}, poisson: {NU}}}}}\npressure: {{bore: 1}}\n'
+                'fixed: {x0: {x: 0}, y0: {y: 0}, ends: {z: 0}}\ncontact: {fit: {type: pair, slave: shaft, master: sleeve}}\n')
+        for kind in KINDS:
+            errors, worst = [], []
+            for n in (2, 4):
+                found = self.hyco('solve', '-scene', self.written(text, self.tube(kind, n)), '-output', 'out.xdmf')
+                self.solved(found)
+                errors.append(abs(found['strain_energy'] / energy - 1))
+                at, gap = self.fields('nodes/contact_pressure', 'nodes/gap')
+                worst.append(np.max(np.abs(at[np.isfinite(gap[:, 0]), 0] / pressure - 1)))
+                self.assertEqual(found['contacts']['fit']['n_active'], found['contacts']['fit']['n'])
+            with self.subTest(kind=kind):
+                self.assertLess(errors[1], 1e-4)
+                self.assertGreater(errors[0] / errors[1], 12, errors)
+                self.assertLess(worst[1], 0.01)
+                self.assertGreater(worst[0] / worst[1], 3, worst)
+
+    def test_loads(self):
+        """What acts on a unit cube, warm and turning, with springs below: resultants are those of the closed forms, the springs' forces in balance with them."""
+        text = (f'scene: {{mesh: mesh.msh}}\nbody: {{cube: {{young: {E}, poisson: {NU}, density: 2, expansion: 1e-3, temperature: 30+z, reference_temperature: 20}}}}\n'
+                'gravity: {z: -10}\nrotation: {speed: 3, axis: {z: 1}}\nforce: {edge: {x: "1+y^2"}}\ntraction: {top: {y: x*y}}\n'
+                'spring: {base: {normal: 7, x: 1, y: 2}}\nfixed: {foot: {x: 0, y: 0}}\n')
+        for kind in KINDS:
+            grid = Grid()
+            x = np.linspace(0, 1, 3)
+            grid.box(LINEAR[kind], [x, x, x], lambda p: p, 'cube', {'z0': 'base', 'z1': 'top'})
+            edge = [i + 1 for i, p in enumerate(grid.nodes) if p[0] == p[2] == 1]
+            edge.sort(key=lambda i: grid.nodes[i - 1][1])
+            grid.elements += [(1, grid._tag('edge', 1), list(ends)) for ends in zip(edge, edge[1:])] + [(15, grid._tag('foot', 0), [1])]
+            found = self.hyco('solve', '-scene', self.written(text, second(grid, kind)))
+            with self.subTest(kind=kind):
+                self.solved(found)
+                self.assertLess(found['balance'], 1e-12)
+                np.testing.assert_allclose(found['loads']['force'], [2 * 9 / 2 + 4 / 3, 2 * 9 / 2 + 1 / 4, -20], rtol=1e-12)
+
     def blocks(self, kind, n=2):
         grid = Grid()
         x = np.linspace(0, 1, n + 1)
@@ -110,13 +158,26 @@ class Solids(Case):
     def test_refused(self):
         text = 'scene: {mesh: mesh.msh}\nbody: {block: {young: 200}, seat: {young: 200}}\nfixed: {base: {x: 0, y: 0, z: 0}, wall: {x: 0}}\n'
         for more, said in (('contact: {c: {type: surface, slave: under, master: over}}', 'for cells of first order'), ('tie: {t: {slave: under, master: over}}', 'for cells of first order'),
-                           ('history: {times: [0, 1]}', 'of second order (tet10)'), ('scene_refine: 1', 'cells of first order'), ('body_seat_element: bbar', 'is for quad4 and hex8')):
+                           ('scene_refine: 1', 'cells of first order'), ('body_seat_element: bbar', 'is for quad4 and hex8')):
             for ranks in (0, 2):
                 run = self.run_raw('solve', '-scene', self.written(text + more + '\n', self.blocks('tet10')), ranks=ranks)
                 with self.subTest(more=more, ranks=ranks):
                     self.assertEqual(run.returncode, 1, run.stdout)
                     self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
                     self.assertIn(said, run.stderr)
+
+    def test_folded(self):
+        """The middle of an edge that is drawn past the next one turns its cell inside out: one line with the cell's tag."""
+        for kind in KINDS:
+            grid = Grid()
+            grid.box(LINEAR[kind], [np.linspace(0, 1, 2)] * 3, lambda p: p, 'block', {'z0': 'base'})
+            nodes, elements, names = second(grid, kind)
+            nodes = [(1.4, 0.9, 0) if tuple(p) == (0.5, 0, 0) else p for p in nodes]
+            run = self.run_raw('check', '-scene', self.written('scene: {mesh: mesh.msh}\nbody: {block: {young: 200}}\nfixed: {base: {x: 0, y: 0, z: 0}}\n', (nodes, elements, names)))
+            with self.subTest(kind=kind):
+                self.assertEqual(run.returncode, 1, run.stdout)
+                self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
+                self.assertIn('is inverted', run.stderr)
 
 
 # The corners between which VTK has each node of a cell (vtk.org, vtkQuadraticTetra, vtkTriQuadraticHexahedron).
