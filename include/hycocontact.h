@@ -14,6 +14,7 @@ typedef const char *HycoContactType;
 #define HYCO_CONTACT_OBSTACLE "obstacle" /* n . u <= gap on the nodes of a group */
 #define HYCO_CONTACT_PAIR     "pair"     /* n . (u_slave - u_master) <= gap on pairs of nodes */
 #define HYCO_CONTACT_SURFACE  "surface"  /* the same at a slave node's projection on the master's facets */
+#define HYCO_CONTACT_RIGID    "rigid"    /* an obstacle that moves as one node does */
 
 /* Resultants of a contact of the scene. */
 typedef struct {

@@ -12,6 +12,7 @@ static PetscErrorCode AddOwn(void)
   PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_OBSTACLE, HycoContactCreate_Obstacle));
   PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_PAIR, HycoContactCreate_Pair));
   PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_SURFACE, HycoContactCreate_Surface));
+  PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_RIGID, HycoContactCreate_Rigid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -24,11 +24,12 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The master point of contact k on the moved mesh; an obstacle's is the slave itself, as is that of a slave node that
-   faces no master. */
+/* The master point of contact k on the moved mesh; an obstacle's and a rigid body's is the slave itself, as is that of
+   a slave node that faces no master. */
 static void MasterPoint(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal x[3])
 {
-  const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
+  const PetscBool rigid = fe->scene->contact[pairs->contact[k]]->rigid;
+  const PetscInt lo = pairs->master_start[k], hi = rigid ? lo : pairs->master_start[k + 1];
 
   for (PetscInt c = 0; c < 3; c++) {
     x[c] = lo == hi ? fe->X[3 * pairs->slave[k] + c] : 0;

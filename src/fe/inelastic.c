@@ -416,6 +416,7 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
     report->stored += energy;
     report->potential += energy;
   }
+  HycoFEPassTied(fe, f_int);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -153,3 +153,9 @@ void HycoTiedGeneralise(HycoFE fe, PetscReal f[])
     }
   }
 }
+
+void HycoFEPassTied(HycoFE fe, PetscReal f[])
+{
+  HycoTiedGeneralise(fe, f);
+  for (PetscInt k = 0; k < fe->mesh->n_tied * fe->dim; k++) f[fe->mesh->tied[k / fe->dim] * fe->dim + k % fe->dim] = 0;
+}

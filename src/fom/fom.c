@@ -82,7 +82,8 @@ static PetscErrorCode GatherSurface(HycoFOM f, HycoMesh part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts, and the pairs of nodes that they tie, as indices in the whole mesh. Rank 0. */
+/* The contacts, and the pairs of nodes that they tie, as indices in the whole mesh; a rigid body's node is tied to
+   none: all of its contact's surface would go to one rank. Rank 0. */
 static PetscErrorCode FindTies(HycoFOM f, PetscInt *n, PetscInt **ties)
 {
   HycoPairs *p = &f->pairs;
@@ -97,6 +98,7 @@ static PetscErrorCode FindTies(HycoFOM f, PetscInt *n, PetscInt **ties)
     PetscInt masters;
 
     HycoPairsMasters(p, k, &masters, &master, &weight);
+    if (f->scene->contact[p->contact[k]]->rigid) continue;
     for (PetscInt j = 0; j < masters; j++, (*n)++) {
       (*ties)[2 * *n] = f->surface->node_whole[HycoPairsSlave(p, k)];
       (*ties)[2 * *n + 1] = f->surface->node_whole[master[j]];

@@ -99,16 +99,17 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
 static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report)
 {
   HycoFOM f = (HycoFOM)p->ctx;
-  const PetscScalar *u;
+  PetscScalar *u;
 
   PetscFunctionBegin;
   if (p->interrupt) PetscCall((*p->interrupt)(p->interrupt_ctx));
   PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(PetscArrayzero(p->f_local, f->fe->n_dof));
-  PetscCall(VecGetArrayRead(f->U_local, &u));
+  PetscCall(VecGetArray(f->U_local, &u));
+  HycoFEComplete(f->fe, u);
   HycoOnEach(p->comm, HycoFEStep(f->fe, u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
-  PetscCall(VecRestoreArrayRead(f->U_local, &u));
+  PetscCall(VecRestoreArray(f->U_local, &u));
   PetscCall(ReduceReport(f, report));
   if (!report->failed) PetscCall(TakeForces(f));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -41,9 +41,6 @@ PetscErrorCode HycoSceneCheckTies(HycoScene s)
               tie->slave ? "master" : "slave", tie->name);
     HycoCheck(strcmp(tie->slave, tie->master),
               "tie %s: its slave and its master are the same group, %s; give two groups", tie->name, tie->slave);
-    HycoCheck(!s->n_times,
-              "tie %s: ties are for scenes without a history; let both bodies share the surface's nodes in the mesh",
-              tie->name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -174,7 +174,7 @@ class Ties(Case):
                            (tie + 'fixed_under_x: 0', 'are not fixed in the same way'), (tie + 'fixed_under_normal: 0\nfixed_under_direction_x: 1', 'are not fixed in the same way'),
                            (tie + 'contact: {c: {group: under, normal: {x: 1}, gap: 1}}', 'do not have this contact'),
                            (tie + 'contact: {c: {type: surface, slave: over, master: under}}', 'exchange slave and master of the tie'),
-                           (tie + 'history: {times: [0, 1]}', 'scenes without a history'), (tie + 'scene_refine: 1', 'cannot refine a mesh with ties'),
+                           (tie + 'scene_refine: 1', 'cannot refine a mesh with ties'),
                            (tie + 'tie_back_slave: over\ntie_back_master: under', 'is itself a slave of the tie')):
             for ranks in (0, 2):
                 run = self.run_raw('solve', '-scene', self.written(base + text + '\n', self.column('quad4', 3, 4)), ranks=ranks)
