@@ -13,6 +13,8 @@ struct _p_HycoContact {
   /* entries that the library reads, after HycoContactComplete(); borrowed */
   const char *name, *slave, *master; /* the last two: groups; master NULL: no masters */
   HycoExpr normal[3], gap;           /* NULL: not given */
+  PetscBool rigid; /* set by the type: the master is a node that a rigid body moves with, whose surface the normals and
+                      gaps at the slaves give; its equilibrium has the forces of all of the contact's nodes */
 };
 
 /* After the scene's entries are read: fails where one that is required is missing. */
@@ -27,6 +29,7 @@ PetscErrorCode HycoContactCheckGroups(HycoContact contact, HycoMesh mesh);
 PetscErrorCode HycoContactCreate_Obstacle(HycoContact contact);
 PetscErrorCode HycoContactCreate_Pair(HycoContact contact);
 PetscErrorCode HycoContactCreate_Surface(HycoContact contact);
+PetscErrorCode HycoContactCreate_Rigid(HycoContact contact);
 
 /* The scene's ties on a mesh that has all nodes and facets of their surfaces; fails for nodes that have no master, and
    where a node that others follow follows another. NULL: none. The caller destroys them. */
@@ -161,6 +164,10 @@ PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *
 void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
 /* Area (length in 2D, 1 in 1D) that each contact's slave node stands for; 0 when its group is no surface. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
+/* What the contacts of the scene carry (result: room for all of them; names borrowed from the scene) at fe's mu, with
+   the normals, areas and forces (pairs->n) of its potential contacts; those of at most `least` do not press. */
+void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
+                        const PetscReal lambda[], PetscReal least, HycoContactResult result[]);
 /* The nodes of the contacts and, where masters lie between nodes, all of the master's group. */
 PetscErrorCode HycoPairsMarkSurfaces(HycoScene scene, HycoMesh mesh, const HycoPairs *pairs, PetscBool node[]);
 

@@ -9,7 +9,7 @@
 #include <petscmat.h>
 
 /* The most quadrature points of a cell. */
-#define HYCO_CELL_POINTS 9
+#define HYCO_CELL_POINTS 27
 
 /* Shape functions at the quadrature points of the reference cell (or facet). */
 typedef struct {
@@ -18,10 +18,13 @@ typedef struct {
 } HycoElement;
 
 const HycoElement *HycoElementGet(HycoCellType type);
-/* The facet of a cell type: a point, line2, tri3, quad4 or the line of three nodes. */
+/* The facet of a cell type: a point, a line of two or three nodes, tri3 or tri6, quad4, quad8 or quad9. */
 const HycoElement *HycoElementGetFacet(HycoCellType type);
+/* The same with the nodes in place of the quadrature points, of weight 1; of second order but hex20, which no contact
+   has; else NULL. */
+const HycoElement *HycoElementGetFacetNodes(HycoCellType type);
 
-#define HYCO_MAX_CELL_DOFS 24
+#define HYCO_MAX_CELL_DOFS (3 * HYCO_CELL_NODES)
 /* Of a cell with tied nodes: HycoMeshCellNodes(). */
 #define HYCO_MAX_CELL_UNKNOWNS (3 * HYCO_MAX_CELL_NODES)
 
@@ -174,6 +177,8 @@ PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
 const HycoOblique *HycoFEOblique(HycoFE fe, PetscInt dof);
 void HycoFEComplete(HycoFE fe, PetscReal u[]);
 void HycoFEGeneralise(HycoFE fe, PetscReal f[]);
+/* Of ties alone: nodal forces of tied nodes pass to what they follow, and none is left at them. */
+void HycoFEPassTied(HycoFE fe, PetscReal f[]);
 /* Whether a support fixes an unknown, not a tie. */
 static inline PetscBool HycoFESupports(HycoFE fe, PetscInt dof)
 {

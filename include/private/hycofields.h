@@ -31,17 +31,17 @@ void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscRe
 PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal sigma[], PetscReal mises[],
                                     PetscReal principal[]);
 
-/* Nodes at X, tags, the cells with their nodes' places in the whole mesh, as sets of a group of the file. Collective
-   with an order. */
+/* Nodes at X, tags, the cells with their nodes' places in the whole mesh, as sets of a group of the file; vtk: a cell's
+   nodes stand in VTK's order, which is XDMF's too, else in gmsh's. Collective with an order. */
 PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char group[], const HycoFileOrder *order, HycoMesh mesh,
-                                   const PetscReal X[]);
+                                   const PetscReal X[], PetscBool vtk);
 /* Stress of cells (n_cells x n_sigma) at nodes: the mean over the cells around a node, by volume, of one body; where
    bodies share nodes, of the first of them. Right at the process's own nodes, all of whose cells it has. As tensors of
    XDMF's order (n_nodes x 6), with von Mises' value (n_nodes). */
 PetscErrorCode HycoNodalStress(HycoFE fe, const PetscReal sigma[], PetscReal tensor[], PetscReal mises[]);
 /* The cells alone, as a set of cols columns. */
 PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileOrder *order, HycoMesh mesh,
-                                    PetscInt cols);
+                                    PetscBool vtk, PetscInt cols);
 /* The fields of a solution's contacts by node of their mesh (vector on slaves, minus on masters), gaps and slaves' tags
    by contact; filled on rank 0, where the contacts are (surface NULL elsewhere). Collective; to be destroyed after an
    error too. */

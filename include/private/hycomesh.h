@@ -18,16 +18,22 @@ typedef enum {
   HYCO_TRI6,
   HYCO_QUAD8,
   HYCO_QUAD9,
+  HYCO_TET10,
+  HYCO_HEX20,
+  HYCO_HEX27,
   HYCO_N_CELL_TYPES
 } HycoCellType;
 
 /* The most nodes of a cell. */
-#define HYCO_CELL_NODES 9
+#define HYCO_CELL_NODES 27
+/* The most of a facet. */
+#define HYCO_FACET_NODES 9
 
-/* What is told of the types: names, dimensions, nodes of a cell and of its facets. */
+/* What is told of the types: names, dimensions, nodes of a cell and of its facets, how many of a facet's are corners,
+   which come first. */
 typedef struct {
   const char *name;
-  PetscInt dim, nv, nf;
+  PetscInt dim, nv, nf, corners;
   PetscBool quadratic;
 } HycoCellKind;
 extern const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES];
@@ -147,8 +153,8 @@ static inline PetscInt HycoMeshOwned(HycoMesh m, PetscInt node)
 
 /* The number of a facet in its cell. */
 PetscInt HycoMeshFacetNumber(HycoMesh mesh, PetscInt facet);
-/* The segments of a group of dimension 1 in space, n x 2 nodes: the edges of cells between nodes of the group. Fails
-   where they branch. The caller frees them. */
+/* The segments of a group of dimension 1 in space, n x 2 nodes, of second order n x 3 with the middles: the edges of
+   cells between nodes of the group. Fails where they branch. The caller frees them. */
 PetscErrorCode HycoMeshLine(HycoMesh mesh, PetscInt group, PetscInt *n, PetscInt **segment);
 /* The ties of the mesh's nodes, by tag (NULL: none); takes a reference. Nodes and cells must be there. */
 PetscErrorCode HycoMeshSetTies(HycoMesh mesh, HycoTies ties);

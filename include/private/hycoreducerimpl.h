@@ -59,6 +59,10 @@ struct _p_HycoReducer {
   char **groups, *region; /* n_groups, and NULL */
   const char *plane;      /* of the search for a recipe: a group more, and displacements alone seed; NULL: none */
   HycoHybrid hybrid;
+  PetscReal ridge;  /* of the search for a recipe: known from an attempt, or what this one found; < 0: to be chosen */
+  PetscBool trying; /* an attempt of that search: a model that no report tells of */
+  PetscBool exhaustive;
+  char doing[HYCO_LINE];    /* of that search, for the monitor of phases: the recipe */
   PetscInt most_full_order; /* hybrid all: the most full-order displacements; 0: no limit */
   PetscInt scan;            /* points per parameter; 0: chosen */
   PetscBool keep_singular;
@@ -88,7 +92,9 @@ struct _p_HycoReducer {
   HycoSamples samples;    /* borrowed, every rank */
   HycoSamples validation; /* given by the user (borrowed; NULL: none). Every rank */
   HycoSamples held;       /* of this run; NULL: none. Every rank */
-  PetscInt drawn;         /* unseen points drawn so far */
+  struct _n_HycoHeldOut
+      *judged_held; /* what the model just built makes of these, of paths; NULL: not known. Every rank */
+  PetscInt drawn;   /* unseen points drawn so far */
   HycoBasis basis[HYCO_N_SEEDS];
   PetscInt n_dual_seeds, *dual_seeds; /* nodes */
   HycoFOM fom;                        /* every rank: the mesh over the ranks and its contacts, without matrices */
@@ -247,7 +253,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
    worst time, and at its end; the forces' sizes, whether it converged, the features of the estimates, the time of some
    repetitions. */
 #define HYCO_HELD_REPEATS 3
-typedef struct {
+typedef struct _n_HycoHeldOut {
   PetscReal error[HYCO_N_ERRORS], end[HYCO_N_ERRORS], size, rid_size, converged, feature[HYCO_TRUST_FEATURES],
       seconds[HYCO_HELD_REPEATS];
 } HycoHeldOut;
@@ -263,24 +269,55 @@ PetscErrorCode HycoROMMeasureRID(HycoROM model, const PetscReal u[], const Petsc
 /* The errors of a path from those of its n listed times (n x HYCO_N_ERRORS). */
 void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *errors);
 
+/* Where the predictions of held-out paths end early: with the first of them, in the order of `order`, that does not
+   reach its end or has an error above `most` times its target. */
+typedef struct {
+  PetscInt *order;         /* all held-out points */
+  const PetscReal *target; /* by HycoErrorKind; 0: none */
+  PetscReal most, force;   /* PETSC_INFINITY: any; that of HycoHeldOutForce() of all points */
+  PetscBool all;           /* do not end early */
+  PetscInt n;              /* out: so many were predicted, */
+  PetscBool lost;          /* and the last of them ended it */
+} HycoHeldOutRace;
+
 /* Predicts at each held-out point, whose solution must be in the store, with the model just built; rows[n] on every
-   rank. The ranks share the points out, and of each compare their rows of the whole mesh. Collective. */
-PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM model, HycoSnapshots store, HycoHeldOut rows[]);
+   rank. The ranks share the points out, and of each compare their rows of the whole mesh. race: of paths; NULL: all
+   points. Collective. */
+PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM model, HycoSnapshots store, HycoHeldOutRace *race,
+                                         HycoHeldOut rows[]);
 /* The largest contact forces' 2-norm; a relative error, forces below a tenth of that one divided by the tenth
    (PETSC_INFINITY: not converged, or x/0); all of it in short. */
 PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[]);
 PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force);
-PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], HycoValidation *validation);
+PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscReal force, HycoValidation *validation);
 
 /* Fills numbers[] of a model as it stands: condition and mean training errors; these alone, an unsolved or wild
    prediction counting as HYCO_JUDGED_WORST. Rank 0. */
 #define HYCO_JUDGED_WORST 10.0
 PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM model);
 PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM model, PetscReal *u, PetscReal *lambda);
+/* The same of paths, of settings in a race: `best` (a row a sample) is what the best so far made of them, its worst
+   ones first come first, and `lost` says that the mean of u cannot become less, or, after some paths, that so far it is
+   not. best NULL: it is lost where the mean reaches `most`. judged: all rows, unless it is lost. Rank 0. */
+PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM model, const HycoJudged best[], PetscReal most,
+                                    HycoJudged judged[], PetscReal *u, PetscBool *lost);
+/* To the monitor of phases: what the search for a recipe does with the one that it tries, `done` of n. */
+PetscErrorCode HycoReducerTell(HycoReducer t, const char what[], PetscInt done, PetscInt n);
 /* After HycoReducerJudge(): which training solutions that model does not reach, and which it misses most. Rank 0. */
 void HycoReducerNameWorst(HycoReducer t, char text[HYCO_LINE]);
 
 /* The settings as they stand. */
 void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *recipe);
+
+/*
+  Which of n attempts is taken (choose_recipe.c): the cheapest of those that meet the targets, or of those that miss
+  them by little more than the best; NULL: none gave a model. HycoAttemptsLimit(): an attempt of that cost whose ratio
+  exceeds the limit (at least 1) is not taken, whatever comes after; *beaten: the number of the attempt that keeps it
+  from that (0: none, and the limit is PETSC_INFINITY). HycoAttemptsReopen(): an attempt that was dropped, and might be
+  taken now that others were refused; NULL: none.
+*/
+HycoAttempt *HycoAttemptsChoose(PetscInt n, HycoAttempt attempt[]);
+PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal cost, PetscInt *beaten);
+HycoAttempt *HycoAttemptsReopen(PetscInt n, HycoAttempt attempt[]);
 
 #endif

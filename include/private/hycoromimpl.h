@@ -10,6 +10,7 @@
 #include <hycosolverimpl.h>
 
 typedef struct _n_HycoProbe *HycoProbe;
+typedef struct _n_HycoCarried *HycoCarried;
 typedef struct _n_HycoBalance *HycoBalance;
 
 /* Rows of B in CSR over dofs of a mesh, and D: see HycoContactRows(). */
@@ -24,6 +25,8 @@ typedef struct {
 #define HYCO_TRUST_DISTANCE 3 /* which of them is the distance */
 /* Contact forces below this share of the largest of a set count as that much where errors are divided by them. */
 #define HYCO_SMALL_FORCE 0.1
+/* A predicted contact force up to this share of the largest is round-off. */
+#define HYCO_PRESSES 1e-10
 typedef enum { HYCO_TRUST_U, HYCO_TRUST_SIGMA, HYCO_TRUST_LAMBDA, HYCO_N_TRUST } HycoTrustKind;
 typedef struct {
   PetscInt n; /* held-out predictions behind the estimates; 0: not calibrated */
@@ -89,6 +92,9 @@ struct _p_HycoROM {
   HycoBalance balance; /* what HycoROMGetEquilibrium() keeps; NULL: it was not called */
   PetscBool balanced;  /* it is that of the last prediction */
   HycoProbe probe;     /* of the scene's quantities; made by the first prediction that is asked for */
+  HycoCarried carried; /* what the contacts carry (contact_results.c); made when somebody asks */
+  HycoPointMonitor point_monitor;
+  void *point_ctx;
   /* online */
   PetscBool full_order, full_displacement; /* what its user, who has the scene, is to do: HycoROMGetFallback() */
   PetscBool wants_equilibrium;             /* -hyco_residual: a prediction has it */
@@ -164,6 +170,9 @@ PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *ro
 PetscErrorCode HycoRowsDestroy(HycoRows *rows);
 /* Brings the rows and gaps of all contacts and U of all nodes of mesh to the last prediction. */
 PetscErrorCode HycoROMComplete(HycoROM model);
+/* The rows and gaps alone; fe: at the last prediction's parameters, on a mesh with the nodes and facets of all
+   contacts. Borrowed. */
+PetscErrorCode HycoROMBringContacts(HycoROM model, HycoFE *fe);
 /* start + B[k,:] U, after it. */
 static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start)
 {
@@ -176,7 +185,11 @@ static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start
 PetscErrorCode HycoROMMeasureQuantities(HycoROM model, HycoPrediction *prediction);
 /* Of a path: into its history's steps; done once. */
 PetscErrorCode HycoROMMeasurePath(HycoROM model);
+/* What each contact of the scene carries in forces Lambda (of all contacts) at the last prediction's parameters; NULL
+   where the model has not the forces of all. Borrowed until the next call. */
+PetscErrorCode HycoROMSumContacts(HycoROM model, const PetscReal Lambda[], const HycoContactResult *result[]);
 /* NULL-safe. */
+PetscErrorCode HycoCarriedDestroy(HycoCarried *carried);
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
 PetscErrorCode HycoBalanceDestroy(HycoBalance *balance);
 

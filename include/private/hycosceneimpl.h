@@ -111,13 +111,23 @@ typedef struct {
 typedef enum { HYCO_PLANE_STRAIN, HYCO_PLANE_STRESS, HYCO_AXISYMMETRIC } HycoFormulation;
 
 /* A number that the scene asks of each solution: the largest, smallest or mean value of a field over a group; the force
-   of its supports along an axis. */
-typedef enum { HYCO_QUANTITY_MAX, HYCO_QUANTITY_MIN, HYCO_QUANTITY_MEAN, HYCO_QUANTITY_REACTION } HycoQuantityKind;
+   of its supports along an axis; from HYCO_QUANTITY_FORCE on what a contact carries: its resultant along an axis, its
+   moment about one, its largest pressure. */
+typedef enum {
+  HYCO_QUANTITY_MAX,
+  HYCO_QUANTITY_MIN,
+  HYCO_QUANTITY_MEAN,
+  HYCO_QUANTITY_REACTION,
+  HYCO_QUANTITY_FORCE,
+  HYCO_QUANTITY_MOMENT,
+  HYCO_QUANTITY_PRESSURE
+} HycoQuantityKind;
 typedef struct {
   char *name, *group; /* group NULL: all of the mesh */
+  char *contact;      /* NULL: all of them */
   PetscBool given;    /* the kind and the field are */
   HycoQuantityKind kind;
-  PetscInt field; /* of HycoQuantityFields; of a reaction 0 to 2 */
+  PetscInt field; /* of HycoQuantityFields; along or about an axis 0 to 2 */
 } HycoQuantity;
 extern const char *const HycoQuantityFields[]; /* NULL ends */
 
@@ -184,8 +194,21 @@ PetscErrorCode HycoSceneDestroyTies(HycoScene scene);
 /* Reads an entry output_NAME_...; checks all of them. */
 PetscErrorCode HycoSceneReadQuantity(HycoScene scene, PetscInt entry, const char name[], PetscInt field);
 PetscErrorCode HycoSceneCheckQuantities(HycoScene scene);
-/* Whether one of them is a reaction. */
-PetscBool HycoSceneHasReactions(HycoScene scene);
+/* Whether one of them is of kind `first` or of one from there to `last`. */
+PetscBool HycoSceneAsks(HycoScene scene, HycoQuantityKind first, HycoQuantityKind last);
+static inline PetscBool HycoSceneHasReactions(HycoScene scene)
+{
+  return HycoSceneAsks(scene, HYCO_QUANTITY_REACTION, HYCO_QUANTITY_REACTION);
+}
+/* Whether they need the bodies' fields, what contacts carry. */
+static inline PetscBool HycoSceneAsksFields(HycoScene scene)
+{
+  return HycoSceneAsks(scene, HYCO_QUANTITY_MAX, HYCO_QUANTITY_REACTION);
+}
+static inline PetscBool HycoSceneAsksContacts(HycoScene scene)
+{
+  return HycoSceneAsks(scene, HYCO_QUANTITY_FORCE, HYCO_QUANTITY_PRESSURE);
+}
 /* Reads the history's entries, once the parameters are read. */
 PetscErrorCode HycoSceneReadHistory(HycoScene scene);
 /* Fails where the history reaches what must not change in time: the bodies' places, the rows of B. */

@@ -28,6 +28,10 @@ EXTRA = ["times faster than Newton", "than elastic"]
 # A plane of symmetry as RID, all of its displacements full order
 PLANE = (("rid_groups", "sym_y0"), ("hybrid", "all"), ("rid_modes", "displacement"))
 TIGHT = (("pod_tol", "1e-12"),)
+LOOSE = ("newton_rtol", "1e-6")  # online, too
+# The scene's times, and every 250 h while the gap may close
+CLOSE = [0, 1, 10, 100, *range(1000, 7001, 250), 8000, 9000, 10001, 10001.01, 10001.02, 10001.03333, 10001.1, 10002, 10004, 10008, 10016, 10025.03333, 10025.2,
+         10025.53333]
 LAYER = (("rid_layers", 1), ("rid_contact_extension", 1))  # mm: two and a half edges of the slice's contact
 
 
@@ -54,7 +58,7 @@ class Case:
 
 
 SLICE = [[g, q, c] for g in (0.034, 0.047, 0.058, 0.066) for q in (37.1, 43.3) for c in (0.8, 1.6)]
-SOLID = [[0.039, 42.3, 0.65], [0.049, 36.4, 1.45], [0.056, 43.6, 0.9], [0.067, 40.1, 1.85]]
+SOLID = [[0.036, 38.9, 1.2], [0.044, 44.2, 1.7], [0.053, 35.8, 0.7], [0.062, 41.1, 1.05]]
 BATCH = [["-values_gap", "0.041,0.053", "-values_q2", "38.5,44", "-values_creep", "0.7,1.3"],
          ["-values_gap", "0.041", "-values_q2", "38.5", "-values_creep", "0.7"], 8]
 
@@ -65,8 +69,10 @@ def case_of(mesh):
                     [SEARCHED, Setting("hybrid", "grid 5,2,2", (*TIGHT, *LAYER)), Setting("hybrid", "", (("pod_tol", "1e-9"), *LAYER)), Setting("hybrid", "", (*TIGHT, *LAYER)), *BASELINES,
                      *CONDENSED, Setting("regression", "", (*TIGHT, ("rid_layers", 1)))], SLICE[::7])
     scene = ["-scene", "examples/rod/3d.yaml", "-scene_mesh", f"examples/pellet/{mesh}.msh"]
-    planes = [Setting("hybrid", "", (("pod_tol", tol), *PLANE)) for tol in ("1e-8", "1e-10", "1e-12")]
+    planes = [Setting("hybrid", "", (("pod_tol", tol), *PLANE)) for tol in ("1e-8", "1e-10", "1e-12", "1e-14")]
     if mesh == "C":  # half an hour for the references, ten minutes for each setting
+        scene += ["-history_times", ",".join(map(str, CLOSE))]
+        planes = [Setting("hybrid", "", (("pod_tol", tol), *PLANE, LOOSE)) for tol in ("1e-10", "1e-12", "1e-14")]
         return Case("rod, mesh C", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2"]}, SOLID, BATCH, [*planes, cubature("1e-4", RANK)], SOLID[1:2])
     return Case(f"rod, mesh {mesh}", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2"]}, SOLID, BATCH,
                 [SEARCHED, *planes, Setting("hybrid", "grid 3,2,2", (*TIGHT, *PLANE)), Setting("hybrid", "", (*TIGHT, *PLANE, ("rid_layers", 1))), *BASELINES[:4], BASELINES[5],
@@ -97,15 +103,27 @@ class Bench:
         return statistics.median(self.hyco("solve", *self.case.scene, "-mu", ",".join(map(str, p)), "-hyco_newton", newton)[0]
                                  for p in self.case.references)
 
-    def setting(self, setting, model):
-        row = {"type": setting.type, "label": setting.label, "status": "ok"}
-        try:
+    def train(self, setting, model):
+        """CPU seconds and the report, of a model that stands there already those of its training."""
+        report = os.path.splitext(model)[0] + ".json"
+        if not (os.path.exists(model) and os.path.exists(report)):
             known = [] if setting == SEARCHED else ["-hyco_search", "false", "-validation_points", self.points]
             cpu, trained = self.hyco("train", *self.case.scene, "-model", model, *self.case.training[setting.training], "-hyco_snapshots", self.snapshots,
                                      *setting.arguments(), *known, ends=(0, 3))
-            held = trained["held_out"] if known else self.compare(model)
-            one, _ = self.hyco("predict", "-model", model, *self.case.batch[1])
-            every, predicted = self.hyco("predict", "-model", model, *self.case.batch[0])
+            with open(report, "w", encoding="utf-8") as file:
+                json.dump(trained | {"cpu": cpu}, file)
+        with open(report, encoding="utf-8") as file:
+            trained = json.load(file)
+        return trained["cpu"], trained
+
+    def setting(self, setting, model):
+        row = {"type": setting.type, "label": setting.label, "status": "ok"}
+        online = ["-model", model, *(word for name, value in setting.options if name.startswith("newton") for word in ("-hyco_" + name, value))]
+        try:
+            cpu, trained = self.train(setting, model)
+            held = self.compare(model) if setting == SEARCHED else trained["held_out"]
+            one, _ = self.hyco("predict", *online, *self.case.batch[1])
+            every, predicted = self.hyco("predict", *online, *self.case.batch[0])
         except RuntimeError as error:
             return row | {"status": str(error)}
         if held["not_converged"]:
@@ -152,8 +170,10 @@ def measure(mesh, arguments, before):
     names = [setting.label for setting in case.settings]
     rows = {row["label"]: row | {"id": names.index(row["label"]) + 1} for row in before if arguments.settings and row["label"] in names}
     bench = Bench(case, arguments.snapshots, arguments.timeout)
+    models = arguments.models or timed.folder
+    os.makedirs(models, exist_ok=True)
     for k in chosen:
-        row = bench.setting(case.settings[k - 1], os.path.join(timed.folder, "model.h5")) | {"id": k}
+        row = bench.setting(case.settings[k - 1], os.path.join(models, f"{mesh}-{k}.h5")) | {"id": k}
         rows[row["label"]] = row
         print(f"{k}/{len(names)} {row['label']}: {row['status']}" +
               (f", {seconds(row['path_s'])}, " + ", ".join(f"{kind} {percent(row[kind + '_max'])} %" for kind in KINDS if kind + "_max" in row)

@@ -36,7 +36,7 @@ static PetscErrorCode SayTrust(const HycoPrediction *p)
   }
   PetscCall(Say("estimated errors: u %s, stress %s, contact forces %s\n", words[0], words[1], words[2]));
   DriverPercent(p->beyond, words[0]);
-  if (p->beyond > 0) PetscCall(Say("EXTRAPOLATED: outside the training points by %s of a range\n", words[0]));
+  if (p->beyond > 0) PetscCall(Say("EXTRAPOLATED: outside the region of training by %s of a range\n", words[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -49,10 +49,11 @@ static void ReportRID(cJSON *json, const HycoPrediction *p)
   cJSON_AddNumberToObject(json, "rid_active", p->n_rid_active);
 }
 
-/* fallback: why it was solved full order; "": it was not. whole: u is that of the whole mesh. path: NULL, or of a
-   history. */
-static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, PetscReal energy,
-                             const char fallback[], PetscBool whole, const DriverReducedPath *path)
+/* carried: by the contacts (n_carried; 0: not known). fallback: why it was solved full order; "": it was not. whole: u
+   is that of the whole mesh. path: NULL, or of a history. */
+static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, PetscInt n_carried,
+                             const HycoContactResult carried[], PetscReal energy, const char fallback[],
+                             PetscBool whole, const DriverReducedPath *path)
 {
   cJSON *json;
 
@@ -78,6 +79,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   ReportVector(json, whole ? "u_max" : "rid_u_max", p->dim, p->u_max);
   cJSON_AddNumberToObject(json, whole ? "strain_energy" : "rid_strain_energy", energy);
   PetscCall(ReportContacts(json, p->n_contacts, p->n_facing, p->overlap, p->sliding));
+  if (n_carried) PetscCall(DriverReportCarried(json, p->dim, n_carried, carried));
   PetscCall(ReportQuantities(json, scene, p->quantity));
   ReportTrust(json, p);
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
@@ -115,7 +117,9 @@ static PetscErrorCode SayReduced(const HycoPrediction *p)
 static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, const char output[])
 {
   HycoPrediction p = {0};
-  PetscInt n;
+  HycoContactResult *own;
+  const HycoContactResult *carried;
+  PetscInt n, n_carried;
   PetscReal mu[64], energy = 0;
   char why[DRIVER_LINE], covered[64] = "";
 
@@ -134,7 +138,8 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
     PetscCall(SayReduced(&p));
     if (fallback->displacement) {
       PetscCall(DriverSolveDisplacement(fallback, model, n, mu, &p));
-      PetscCall(Say("one full solve with these forces: displacement of the whole mesh, residuals of full order\n"));
+      PetscCall(
+          Say("one full-order solve with these forces: displacements of the whole mesh, residuals of full order\n"));
     }
   }
   PetscCall(DriverCheckLeft());
@@ -158,7 +163,12 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
     energy = fallback->strain_energy;
   else
     HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
-  PetscCall(Report(scene, mu, &p, energy, why, (PetscBool)(why[0] || fallback->displacement), NULL));
+  PetscCall(DriverGetCarried(model, scene, &n_carried, &own));
+  carried = own;
+  if (why[0]) PetscCall(HycoFOMGetContacts(fallback->fom, &n_carried, &carried));
+  PetscCall(
+      Report(scene, mu, &p, n_carried, carried, energy, why, (PetscBool)(why[0] || fallback->displacement), NULL));
+  PetscCall(PetscFree(own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -167,7 +177,8 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
 {
   DriverReducedPath path = {0};
   HycoPrediction p = {0};
-  PetscInt n;
+  HycoContactResult *carried;
+  PetscInt n, n_carried;
   PetscReal mu[64], energy = 0;
   char table[PETSC_MAX_PATH_LEN];
 
@@ -192,13 +203,15 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
   PetscCall(DriverSayEquilibrium(&path));
   PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
-  PetscCall(Report(scene, mu, &p, energy, "", PETSC_FALSE, &path));
+  PetscCall(DriverGetCarried(model, scene, &n_carried, &carried));
+  PetscCall(Report(scene, mu, &p, n_carried, carried, energy, "", PETSC_FALSE, &path));
+  PetscCall(PetscFree(carried));
   PetscCall(PetscFree(path.step));
-  HycoCheck(p.reason != HYCO_DIVERGED_STEP,
-            "the history ends at t = %.10g, beyond which its steps have become too small: %s; what was reached is "
-            "written",
-            (double)path.t, path.why);
-  HycoCheck(p.reason > 0, "%s; what was reached is written", HycoReasonName(p.reason));
+  HycoCheck(
+      p.reason != HYCO_DIVERGED_STEP,
+      "the history ends at t = %.10g, because its steps became too small: %s; the results up to this time are written",
+      (double)path.t, path.why);
+  HycoCheck(p.reason > 0, "%s; the results up to this time are written", HycoReasonName(p.reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -245,34 +258,51 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "equilibrium_residual",
                                                "contact_residual"};
 
-/* own: columns without the scene's quantities, more of paths; with them; width: of paths with their extremes too. */
+/* own: columns without the scene's quantities, more of paths; with them; of paths with their extremes too; width: with
+   what the contacts carry. */
 typedef struct {
-  PetscInt own, with_quantities, width;
+  PetscInt own, with_quantities, with_extremes, width;
   char path_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
+  DriverCarried carried;
+  const char **names;
 } Shape;
 
-/* names: room for N_COLUMNS + 2 HYCO_MAX_QUANTITIES, borrowed from the scene and the shape. */
-static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s, const char *names[])
+/* The caller frees the names, by DestroyShape(). */
+static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
 {
-  PetscInt n_times;
+  PetscInt n_times, dim;
   PetscBool residual;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(HycoROMWantsEquilibrium(model, &residual));
+  PetscCall(HycoROMGetSizes(model, NULL, NULL, &dim));
+  PetscCall(DriverCarriedColumns(scene, dim, &s->carried));
+  PetscCall(PetscMalloc1(N_COLUMNS + 2 * HYCO_MAX_QUANTITIES + s->carried.n_contacts * s->carried.each, &s->names));
   s->own = n_times ? (residual ? N_COLUMNS : RESIDUAL) : PATH_FORCE;
-  PetscCall(ReportColumns(scene, s->own, columns, &s->with_quantities, names));
-  s->width = s->with_quantities;
+  PetscCall(ReportColumns(scene, s->own, columns, &s->with_quantities, s->names));
+  s->with_extremes = s->with_quantities;
   for (PetscInt c = s->own; n_times && c < s->with_quantities; c++) {
     char *name = s->path_name[c - s->own];
 
-    PetscCall(PetscSNPrintf(name, DRIVER_LINE, "path_%s", names[c]));
-    names[s->width++] = name;
+    PetscCall(PetscSNPrintf(name, DRIVER_LINE, "path_%s", s->names[c]));
+    s->names[s->with_extremes++] = name;
   }
+  s->width = s->with_extremes;
+  for (PetscInt c = 0; c < s->carried.n_contacts * s->carried.each; c++) s->names[s->width++] = s->carried.name[c];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void FillRow(const HycoPrediction *p, const Shape *s, PetscReal v[])
+static PetscErrorCode DestroyShape(Shape *s)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(s->carried.name));
+  PetscCall(PetscFree(s->names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoContactResult carried[], const Shape *s,
+                    PetscReal v[])
 {
   v[FORCE] = p->total_contact_force;
   v[LAMBDA_MAX] = p->lambda_max;
@@ -297,7 +327,33 @@ static void FillRow(const HycoPrediction *p, const Shape *s, PetscReal v[])
     v[CONTACT_RESIDUAL] = p->contact_residual;
   }
   for (PetscInt k = s->own; k < s->with_quantities; k++) v[k] = p->quantity[k - s->own];
-  for (PetscInt k = s->with_quantities; k < s->width; k++) v[k] = p->path_quantity[k - s->with_quantities];
+  for (PetscInt k = s->with_quantities; k < s->with_extremes; k++) v[k] = p->path_quantity[k - s->with_quantities];
+  DriverCarriedFill(&s->carried, n_carried, carried, v + s->with_extremes);
+}
+
+/* Of this rank's points: rows of values; which are to be solved full order. */
+typedef struct {
+  const Fallback *fallback;
+  const Shape *shape;
+  PetscReal *value;
+  PetscInt *full;
+} Rows;
+
+static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
+{
+  const Rows *rows = (const Rows *)ctx;
+  const HycoContactResult *carried;
+  HycoPrediction p;
+  PetscInt n;
+  char why[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMGetPrediction(model, &p));
+  PetscCall(HycoROMGetContacts(model, &n, &carried));
+  FillRow(&p, n, carried, rows->shape, rows->value + k * rows->shape->width);
+  DriverWantsFullOrder(rows->fallback, &p, why);
+  rows->full[k] = why[0] != '\0';
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* This rank's points. full[k]: point k is to be solved full order. */
@@ -306,22 +362,18 @@ static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, Petsc
 {
   PetscMPIInt rank, size;
   PetscInt first, count;
-  HycoPrediction *all;
-  char why[DRIVER_LINE];
+  Rows rows = {fallback, s, NULL, NULL};
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   first = (PetscInt)rank * n / size;
   count = ((PetscInt)rank + 1) * n / size - first;
-  PetscCall(PetscMalloc1(count, &all));
-  PetscCall(HycoROMSolveMany(model, count, n_par, mu + first * n_par, all, NULL, NULL));
-  for (PetscInt k = 0; k < count; k++) {
-    FillRow(&all[k], s, value + (first + k) * s->width);
-    DriverWantsFullOrder(fallback, &all[k], why);
-    full[first + k] = why[0] != '\0';
-  }
-  PetscCall(PetscFree(all));
+  rows.value = value + first * s->width;
+  rows.full = full + first;
+  PetscCall(HycoROMSetPointMonitor(model, TakePoint, &rows));
+  PetscCall(HycoROMSolveMany(model, count, n_par, mu + first * n_par, NULL, NULL, NULL));
+  PetscCall(HycoROMSetPointMonitor(model, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -330,7 +382,8 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
                                 const PetscInt full[], const Shape *s, PetscReal value[])
 {
   const PetscInt width = s->width;
-  PetscInt count = 0;
+  const HycoContactResult *carried;
+  PetscInt count = 0, n_carried;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
@@ -342,12 +395,13 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
     p.estimated_error_sigma = value[k * width + ESTIMATE_SIGMA];
     p.estimated_error_lambda = value[k * width + ESTIMATE_LAMBDA];
     p.beyond = value[k * width + BEYOND];
-    FillRow(&p, s, value + k * width);
+    PetscCall(HycoFOMGetContacts(fallback->fom, &n_carried, &carried));
+    FillRow(&p, n_carried, carried, s, value + k * width);
     value[k * width + U_NORM] = NAN; /* the whole mesh's, no RID's */
     value[k * width + FULL_ORDER] = 1;
     count++;
   }
-  if (fallback->on) PetscCall(Say("%d of the %d points were solved full order\n", (int)count, (int)n));
+  if (fallback->on) PetscCall(Say("%d of the %d points were solved at full order\n", (int)count, (int)n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -356,7 +410,6 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscInt n, n_par, *full;
   Shape s;
   const PetscReal *mu;
-  const char *names[N_COLUMNS + 2 * HYCO_MAX_QUANTITIES];
   PetscReal *value, begin;
   char table[PETSC_MAX_PATH_LEN];
 
@@ -364,7 +417,7 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(DriverCheckLeftEarly()); /* what the solver alone knows is read by the first prediction */
-  PetscCall(ShapeOf(model, scene, &s, names));
+  PetscCall(ShapeOf(model, scene, &s));
   PetscCall(PetscCalloc2(n * s.width, &value, n, &full));
   begin = HycoNow();
   HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, &s, value, full));
@@ -373,7 +426,8 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscCall(SolveRest(fallback, n, n_par, mu, full, &s, value));
   begin = HycoNow() - begin;
   if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoROMWriteMany(model, n, n_par, mu, output));
-  PetscCall(ReportSet("predict", table, scene, samples, s.width, names, value, begin));
+  PetscCall(ReportSet("predict", table, scene, samples, s.width, s.names, value, begin));
+  PetscCall(DestroyShape(&s));
   PetscCall(PetscFree2(value, full));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -384,7 +438,8 @@ static PetscErrorCode ReadExtrapolate(PetscBool *extrapolate)
   *extrapolate = PETSC_FALSE;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
   PetscCall(HycoOptionsFlag("-extrapolate",
-                            "predict outside the trained ranges too, where nothing has tested the model", extrapolate));
+                            "permit predictions outside the ranges of the training, where the model is not tested",
+                            extrapolate));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -428,16 +483,17 @@ PetscErrorCode CommandPredict(void)
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverReadFallback(model, extrapolate, &fallback));
   PetscCall(HycoROMWantsEquilibrium(model, &residual));
-  HycoCheck(!residual || n_times, "-hyco_residual is for models of paths, and the scene of %s has no history", path);
+  HycoCheck(!residual || n_times,
+            "-hyco_residual needs a model of paths, and the scene of %s has no history; remove it", path);
   if (monitor) PetscCall(HycoROMSetMonitor(model, DriverMonitor, NULL));
   PetscCall(DriverHasSamples(scene, &set));
   if (set) {
     HycoCheck(!output[0] || !n_times,
-              "-output of a model of paths is for one point (-mu); a set of points gives a -table");
+              "-output of a model of paths needs a single point (-mu); use -table for a set of points");
     HycoCheck(!output[0] || !fallback.on,
-              "-output of a set of points is the model's alone; leave out -hyco_fallback, or give one point (-mu)");
+              "-output of a set of points works without -hyco_fallback only; remove it, or give a single point (-mu)");
     HycoCheck(!fallback.displacement,
-              "-hyco_full_displacement is for one point (-mu); a set of points gives a -table, which has no fields");
+              "-hyco_full_displacement needs a single point (-mu); a set of points has only a -table, without fields");
     PetscCall(DriverGetSamples(scene, &samples, &set));
     HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples, output));
   } else {

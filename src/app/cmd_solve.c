@@ -10,37 +10,9 @@ static PetscErrorCode Remarks(const HycoSummary *s)
     PetscCall(Say("%d contact%s between fixed displacements: without effect\n", (int)s->n_still,
                   s->n_still > 1 ? "s lie" : " lies"));
   if (s->n_dependent)
-    PetscCall(Say(
-        "contact forces are not unique: %d closed contact%s on the others (more slaves than their masters' unknowns); "
-        "displacements and resultants are\n",
-        (int)s->n_dependent, s->n_dependent > 1 ? "s depend" : " depends"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* What each contact carries; in words where there are several. */
-static PetscErrorCode SayContacts(cJSON *json, HycoFOM fom, PetscInt dim)
-{
-  const HycoContactResult *r;
-  cJSON *all = cJSON_AddObjectToObject(json, "contacts");
-  PetscInt n;
-
-  PetscFunctionBegin;
-  PetscCall(HycoFOMGetContacts(fom, &n, &r));
-  for (PetscInt k = 0; k < n; k++) {
-    cJSON *one = cJSON_AddObjectToObject(all, r[k].name);
-
-    cJSON_AddNumberToObject(one, "n", r[k].n);
-    cJSON_AddNumberToObject(one, "n_active", r[k].n_active);
-    ReportVector(one, "force", dim, r[k].force);
-    if (dim == 2) ReportVector(one, "moment", 1, r[k].moment + 2);
-    if (dim == 3) ReportVector(one, "moment", 3, r[k].moment);
-    cJSON_AddNumberToObject(one, "area", r[k].area);
-    cJSON_AddNumberToObject(one, "pressure_max", r[k].pressure);
-    if (n > 1)
-      PetscCall(Say("contact %s: %d of %d active, force on the slave (%.6g, %.6g, %.6g), largest pressure %.6g\n",
-                    r[k].name, (int)r[k].n_active, (int)r[k].n, (double)r[k].force[0], (double)r[k].force[1],
-                    (double)r[k].force[2], (double)r[k].pressure));
-  }
+    PetscCall(Say("contact forces are not unique: %d closed contact%s linearly on the others (more slaves than their "
+                  "masters' unknowns); displacements and resultants are unique\n",
+                  (int)s->n_dependent, s->n_dependent > 1 ? "s depend" : " depends"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -76,6 +48,8 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   cJSON *json;
   HycoSolver solver;
   HycoHistory history;
+  const HycoContactResult *carried;
+  PetscInt n;
   const char *method, *linear;
 
   PetscFunctionBegin;
@@ -115,7 +89,8 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g, identity to %.1e\n",
                 (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
                 (double)s->energy_defect));
-  PetscCall(SayContacts(json, fom, s->dim));
+  PetscCall(HycoFOMGetContacts(fom, &n, &carried));
+  PetscCall(DriverReportCarried(json, s->dim, n, carried));
   PetscCall(SayReactions(json, fom, s->dim));
   PetscCall(ReportQuantities(json, scene, s->quantity));
   PetscCall(
@@ -175,44 +150,85 @@ static const char *const columns[N_COLUMNS] = {
     "total_contact_force", "lambda_max", "n_active", "u_norm2", "strain_energy", "kkt_max",
     "converged",           "iterations", "seconds"};
 
+/* The table of a set: those columns, the scene's quantities, what its contacts carry. */
+typedef struct {
+  PetscInt with_quantities, width;
+  DriverCarried carried;
+  const char **names;
+  PetscReal *value;
+} Table;
+
+/* Of n points, once dim is known. */
+static PetscErrorCode CreateTable(HycoScene scene, PetscInt dim, PetscInt n, Table *t)
+{
+  PetscFunctionBegin;
+  PetscCall(DriverCarriedColumns(scene, dim, &t->carried));
+  t->width = N_COLUMNS + HYCO_MAX_QUANTITIES + t->carried.n_contacts * t->carried.each;
+  PetscCall(PetscMalloc1(t->width, &t->names));
+  PetscCall(ReportColumns(scene, N_COLUMNS, columns, &t->with_quantities, t->names));
+  t->width = t->with_quantities;
+  for (PetscInt c = 0; c < t->carried.n_contacts * t->carried.each; c++) t->names[t->width++] = t->carried.name[c];
+  PetscCall(PetscCalloc1(n * t->width, &t->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode DestroyTable(Table *t)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(t->carried.name));
+  PetscCall(PetscFree(t->names));
+  PetscCall(PetscFree(t->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t, PetscReal v[])
+{
+  const HycoContactResult *carried;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  v[FORCE] = s->total_contact_force;
+  v[LAMBDA_MAX] = s->lambda_max;
+  v[ACTIVE] = s->n_active;
+  v[U_NORM] = s->u_norm2;
+  v[ENERGY] = s->strain_energy;
+  v[KKT] = HycoKKTMax(&s->kkt);
+  v[CONVERGED] = s->reason > 0;
+  v[ITERATIONS] = s->iterations;
+  v[SECONDS] = s->seconds.total;
+  PetscCall(PetscArraycpy(v + N_COLUMNS, s->quantity, t->with_quantities - N_COLUMNS));
+  PetscCall(HycoFOMGetContacts(fom, &n, &carried));
+  DriverCarriedFill(&t->carried, n, carried, v + t->with_quantities);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The points in their order, each from the last one's active contacts, all ranks together. */
 static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, const char output[], const char table[])
 {
-  PetscInt n, n_par, width;
+  PetscInt n, n_par;
   const PetscReal *mu;
-  const char *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
-  PetscReal *value, begin;
+  Table t = {0};
+  PetscReal begin;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCall(ReportColumns(scene, N_COLUMNS, columns, &width, names));
-  PetscCall(PetscCalloc1(n * width, &value));
   if (output[0]) PetscCall(HycoFOMWriteBegin(fom, output, n));
   begin = HycoNow();
   for (PetscInt k = 0; k < n; k++) {
     HycoSummary s;
-    PetscReal *v = value + k * width;
 
     PetscCall(HycoFOMSolve(fom, n_par, mu + k * n_par));
     PetscCall(HycoFOMGetSummary(fom, &s));
     if (k == 0) PetscCall(DriverCheckLeft());
     if (k == 0) PetscCall(Remarks(&s));
-    v[FORCE] = s.total_contact_force;
-    v[LAMBDA_MAX] = s.lambda_max;
-    v[ACTIVE] = s.n_active;
-    v[U_NORM] = s.u_norm2;
-    v[ENERGY] = s.strain_energy;
-    v[KKT] = HycoKKTMax(&s.kkt);
-    v[CONVERGED] = s.reason > 0;
-    v[ITERATIONS] = s.iterations;
-    v[SECONDS] = s.seconds.total;
-    PetscCall(PetscArraycpy(v + N_COLUMNS, s.quantity, width - N_COLUMNS));
+    if (k == 0) PetscCall(CreateTable(scene, s.dim, n, &t));
+    PetscCall(FillRow(fom, &s, &t, t.value + k * t.width));
     if (output[0]) PetscCall(HycoFOMWriteAdd(fom));
     PetscCall(DriverSetPhase(k + 1, n));
   }
   if (output[0]) PetscCall(HycoFOMWriteEnd(fom));
-  PetscCall(ReportSet("solve", table, scene, samples, width, names, value, HycoNow() - begin));
-  PetscCall(PetscFree(value));
+  PetscCall(ReportSet("solve", table, scene, samples, t.width, t.names, t.value, HycoNow() - begin));
+  PetscCall(DestroyTable(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -138,6 +138,22 @@ PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, 
 /* Where train keeps its solutions, with a model of this name. */
 PetscErrorCode DriverSnapshotFolder(const char model[], char folder[PETSC_MAX_PATH_LEN]);
 
+/* -- contacts.c: what each contact of the scene carries -- */
+
+/* In the report, and in words where there are several. */
+PetscErrorCode DriverReportCarried(cJSON *json, PetscInt dim, PetscInt n, const HycoContactResult r[]);
+/* Of rank 0's last prediction, on all ranks; n is 0 where the model has not the forces of all contacts. The caller
+   frees the results. Collective. */
+PetscErrorCode DriverGetCarried(HycoROM model, HycoScene scene, PetscInt *n, HycoContactResult **result);
+/* Columns of a table: CONTACT.n_active, CONTACT.force_x, ..., `each` of them a contact; the caller frees the names. */
+typedef struct {
+  PetscInt dim, n_contacts, each;
+  char (*name)[DRIVER_LINE];
+} DriverCarried;
+PetscErrorCode DriverCarriedColumns(HycoScene scene, PetscInt dim, DriverCarried *columns);
+/* Their values in a row; n = 0: not known. v: n_contacts x each. */
+void DriverCarriedFill(const DriverCarried *columns, PetscInt n, const HycoContactResult r[], PetscReal v[]);
+
 /* -- progress.c -- */
 
 /* Prints on rank 0. */

@@ -19,8 +19,8 @@ PetscErrorCode DriverReadQuiet(void)
 
   PetscFunctionBegin;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
-  PetscCall(HycoOptionsFlag("-quiet", "say nothing but errors; results are in -report and -table", &quiet));
-  PetscCall(HycoOptionsReal("-progress", "<seconds> between the lines of progress in a file", 0.01, PETSC_MAX_REAL,
+  PetscCall(HycoOptionsFlag("-quiet", "print errors only; results are in -report and -table", &quiet));
+  PetscCall(HycoOptionsReal("-progress", "<seconds> interval between progress lines in a file", 0.01, PETSC_MAX_REAL,
                             &seconds, NULL));
   PetscOptionsEnd();
   DriverBeatSetPeriod(seconds);
@@ -38,7 +38,8 @@ static void SetLastWords(const char what[])
 
   next = !next;
   snprintf(last_words[next], sizeof(last_words[next]),
-           "\nhyco: interrupted; %s solutions in %s are kept: the same command goes on from there\n", what, kept_in);
+           "\nhyco: interrupted; %s solutions are stored in %s: the same command continues from there\n", what,
+           kept_in);
   words = last_words[next];
 }
 
@@ -86,6 +87,8 @@ void DriverPercent(PetscReal share, char text[32])
   snprintf(text, 32, percent >= 99.5 && percent < 1e6 ? "%.0f %%" : "%.2g %%", percent);
 }
 
+#define TERMINAL 79 /* columns: a longer line could not be written over */
+
 /* A bar, or a line a minute (-progress); n = 0: nobody knows how many. The last line only where there was another,
  * unless `ends`.
  */
@@ -94,24 +97,28 @@ static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
   static PetscReal begin = -1, last = -1;
   static PetscInt first = 0;
   static PetscBool shown;
+  static char before[DRIVER_LINE];
   const PetscReal now = HycoNow();
   const int terminal = isatty(STDERR_FILENO);
   char share[64] = "", left[64] = "";
 
-  if (begin < 0 || done < first) {
-    begin = last = now;
+  if (last < 0) last = now;
+  if (begin < 0 || done < first || strcmp(word, before)) {
+    begin = now;
     first = done;
     shown = PETSC_FALSE;
+    snprintf(before, sizeof(before), "%s", word);
   }
   if (n) snprintf(share, sizeof(share), " of %d", (int)n);
-  if (n)
+  if (n && (done > first || done == n))
     snprintf(left, sizeof(left), ", %.0f s left",
              done > first ? (double)(now - begin) / (done - first) * (n - done) : 0.);
   if (!quiet && (done == n ? ends || shown : now - last > (terminal ? 0.2 : DriverBeatPeriod()))) {
     last = now;
     shown = PETSC_TRUE;
     DriverBeatHold();
-    fprintf(stderr, "%s%s %d%s%s%s", terminal ? "\r\033[K" : "", word, (int)done, share, left,
+    fprintf(stderr, "%s%.*s %d%s%s%s", terminal ? "\r\033[K" : "",
+            terminal ? TERMINAL - 16 - (int)(strlen(share) + strlen(left)) : DRIVER_LINE, word, (int)done, share, left,
             terminal && done != n ? "" : "\n");
     fflush(stderr);
   }
@@ -131,7 +138,7 @@ PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
 
 PetscErrorCode DriverPhase(const char phase[], PetscInt done, PetscInt n, void *ctx)
 {
-  char word[64];
+  char word[DRIVER_LINE];
 
   PetscFunctionBegin;
   (void)ctx;
@@ -155,7 +162,7 @@ PetscErrorCode DriverReadMonitor(PetscBool *monitor)
   PetscFunctionBegin;
   *monitor = PETSC_FALSE;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
-  PetscCall(HycoOptionsFlag("-hyco_monitor", "a line per iteration of the active set", monitor));
+  PetscCall(HycoOptionsFlag("-hyco_monitor", "print a line per iteration of the active set", monitor));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -11,6 +11,17 @@ PetscErrorCode HycoSurfaceNormals(HycoFE fe, PetscInt group, PetscReal normal[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoSurfaceCarriers(HycoMesh m, PetscInt group, PetscBool carries[])
+{
+  const PetscInt corners = HycoCellKinds[m->type].corners;
+
+  for (PetscInt i = 0; i < m->n_nodes; i++) carries[i] = PETSC_FALSE;
+  for (PetscInt k = m->group_start[group]; k < m->group_start[group + 1]; k++) carries[m->group_node[k]] = PETSC_TRUE;
+  for (PetscInt k = 0; k < m->n_facets * m->nf && m->type == HYCO_TET10; k++) {
+    if (m->facet_group[k / m->nf] == group && k % m->nf < corners) carries[m->facets[k]] = PETSC_FALSE;
+  }
+}
+
 PetscErrorCode HycoFacetVector(HycoFE fe, PetscInt facet, PetscReal vector[3])
 {
   const HycoElement *el = HycoElementGetFacet(fe->mesh->type);

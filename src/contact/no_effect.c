@@ -2,6 +2,7 @@
   Contacts without a free unknown: all that they touch is fixed. They have no effect, but the prescribed displacements
   may violate them, and then no solution exists.
 */
+#include "facing.h"
 #include <hycokinematics.h>
 
 static PetscReal Largest(const PetscReal v[], PetscInt n)
@@ -24,9 +25,10 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
     size = PetscMax(size, Largest(fe->X + 3 * i, 3) + Largest(fe->u0 + i * dim, dim));
   }
   HycoCheck(*left >= -1e-12 * size,
-            "contact %s: node %d is fixed%s, and its prescribed displacement penetrates by %g: no solution exists",
+            "contact %s: node %d is fixed%s, and its prescribed displacement penetrates by %g, so that no solution "
+            "exists; change the support or the gap",
             fe->scene->contact[pairs->contact[k]]->name, (int)fe->mesh->node_id[slave],
-            pairs->master_start[k + 1] > pairs->master_start[k] ? " and so is what it meets" : "", (double)-*left);
+            pairs->master_start[k + 1] > pairs->master_start[k] ? ", as is its master" : "", (double)-*left);
   *left = PetscMax(*left, 0); /* round-off */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -37,12 +39,12 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
 {
   HycoMesh m = fe->mesh;
   HycoScene s = fe->scene;
-  PetscBool *is_slave;
+  PetscBool *is_slave, *carries;
   PetscInt room = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(still, sizeof(*still)));
-  PetscCall(PetscCalloc1(m->n_nodes, &is_slave));
+  PetscCall(PetscCalloc2(m->n_nodes, &is_slave, m->n_nodes, &carries));
   for (PetscInt k = 0; k < pairs->n; k++) is_slave[pairs->slave[k]] = PETSC_TRUE;
   for (PetscInt k = 0; k < s->n_contacts; k++) room += s->contact[k]->master ? 0 : m->n_nodes;
   PetscCall(PetscMalloc1(room, &still->slave));
@@ -53,9 +55,10 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
 
     if (s->contact[k]->master) continue;
     PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k]->slave, &g));
+    HycoSurfaceCarriers(m, g, carries);
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
       const PetscInt i = m->group_node[j];
-      PetscBool fixed = (PetscBool)(!is_slave[i] && HycoMeshTied(m, i) < 0);
+      PetscBool fixed = (PetscBool)(carries[i] && !is_slave[i] && HycoMeshTied(m, i) < 0);
 
       for (PetscInt c = 0; c < fe->dim; c++) fixed = (PetscBool)(fixed && fe->fixed[i * fe->dim + c]);
       if (!fixed) continue;
@@ -63,7 +66,7 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
       still->contact[still->n++] = k;
     }
   }
-  PetscCall(PetscFree(is_slave));
+  PetscCall(PetscFree2(is_slave, carries));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

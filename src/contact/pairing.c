@@ -2,6 +2,7 @@
   The masters of a contact's slave nodes on the mesh as drawn: projections on the other surface, judged by how the two
   face each other; nodes that have none are named. What the types do apart they hand over.
 */
+#include "facing.h"
 #include "partners.h"
 #include <stdlib.h>
 #include <string.h>
@@ -125,8 +126,9 @@ static PetscErrorCode CheckApart(const HycoPartners *t, HycoContact c)
   PetscCall(PetscCalloc1(m->n_nodes, &master));
   for (PetscInt k = 0; k < t->n * t->nf; k++) master[t->node[k]] = PETSC_TRUE;
   for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++)
-    HycoCheck(!master[m->group_node[k]], "contact %s: node %d is in both %s and %s; the two surfaces must be apart",
-              c->name, (int)m->node_id[m->group_node[k]], c->slave, c->master);
+    HycoCheck(!master[m->group_node[k]],
+              "contact %s: node %d is in both %s and %s; the two surfaces must not share nodes", c->name,
+              (int)m->node_id[m->group_node[k]], c->slave, c->master);
   PetscCall(PetscFree(master));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -149,37 +151,53 @@ static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt ind
     HycoPairsAppend(p, index, m->slave[k], m->at[k].n, m->at[k].node, m->at[k].weight);
   }
   if (n_missed) PetscCall(Complain(t, c, remedy, n_missed, missed, m));
-  HycoCheck(n_alone < m->n, "contact %s: no node of %s faces %s within %g: are the two surfaces those that meet?",
-            c->name, c->slave, c->master, (double)m->tolerance);
+  HycoCheck(n_alone < m->n,
+            "contact %s: no node of %s faces %s within %g; check that these are the surfaces in contact", c->name,
+            c->slave, c->master, (double)m->tolerance);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of it, once the search is there. */
+/* All of it, once the search and the slave nodes are there. */
 static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, HycoSettle settle, HycoRemedy remedy,
-                            HycoPairs *p)
+                            HycoMatch *m, HycoPairs *p)
 {
-  HycoMesh mesh = t->fe->mesh;
-  HycoMatch m = {.n = mesh->group_start[t->slave + 1] - mesh->group_start[t->slave],
-                 .slave = mesh->group_node + mesh->group_start[t->slave]};
   Missed *missed;
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
-  HycoCheck(m.n && t->n, "contact %s: the group %s is empty", c->name, m.n ? c->master : c->slave);
-  PetscCall(HycoPairsReserve(p, m.n, t->nf));
+  HycoCheck(m->n && t->n, "contact %s: the group %s is empty", c->name, m->n ? c->master : c->slave);
+  PetscCall(HycoPairsReserve(p, m->n, t->nf));
   PetscCall(CheckApart(t, c));
-  for (PetscInt k = 0; k < m.n && !settle; k++) HycoPairsAppend(p, index, m.slave[k], 0, NULL, NULL);
+  for (PetscInt k = 0; k < m->n && !settle; k++) HycoPairsAppend(p, index, m->slave[k], 0, NULL, NULL);
   if (!settle) PetscFunctionReturn(PETSC_SUCCESS);
-  m.small = HycoSurfaceTolerance(mesh, t->slave);
-  PetscCall(HycoContactGetLength(c, "tolerance", &m.tolerance));
-  if (m.tolerance < 0) m.tolerance = m.small;
-  PetscCall(PetscMalloc3(m.n, &m.at, m.n, &m.why, m.n, &missed));
-  for (PetscInt k = 0; k < m.n && !ierr; k++)
-    ierr = HycoPartnersJudge(t, m.slave[k], m.tolerance, m.small, &m.at[k], &m.why[k]);
-  if (!ierr) ierr = (*settle)(t, c, &m);
-  if (!ierr) ierr = AppendMatched(t, c, index, remedy, &m, missed, p);
-  PetscCall(PetscFree3(m.at, m.why, missed));
+  m->small = HycoSurfaceTolerance(t->fe->mesh, t->slave);
+  PetscCall(HycoContactGetLength(c, "tolerance", &m->tolerance));
+  if (m->tolerance < 0) m->tolerance = m->small;
+  PetscCall(PetscMalloc3(m->n, &m->at, m->n, &m->why, m->n, &missed));
+  for (PetscInt k = 0; k < m->n && !ierr; k++)
+    ierr = HycoPartnersJudge(t, m->slave[k], m->tolerance, m->small, &m->at[k], &m->why[k]);
+  if (!ierr) ierr = (*settle)(t, c, m);
+  if (!ierr) ierr = AppendMatched(t, c, index, remedy, m, missed, p);
+  PetscCall(PetscFree3(m->at, m->why, missed));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The slave nodes that carry forces; the caller frees them. */
+static PetscErrorCode FindSlaves(const HycoPartners *t, PetscInt *n, PetscInt **slave)
+{
+  HycoMesh m = t->fe->mesh;
+  PetscBool *carries;
+
+  PetscFunctionBegin;
+  *n = 0;
+  PetscCall(PetscMalloc1(m->n_nodes, &carries));
+  PetscCall(PetscMalloc1(m->group_start[t->slave + 1] - m->group_start[t->slave], slave));
+  HycoSurfaceCarriers(m, t->slave, carries);
+  for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++) {
+    if (carries[m->group_node[k]]) (*slave)[(*n)++] = m->group_node[k];
+  }
+  PetscCall(PetscFree(carries));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -187,11 +205,16 @@ PetscErrorCode HycoPartnersMatch(HycoContact c, HycoFE fe, PetscInt index, Petsc
                                  HycoRemedy remedy, HycoPairs *pairs)
 {
   HycoPartners t;
+  HycoMatch m = {0};
+  PetscInt *slave;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoPartnersCreate(fe, c, nodes, &t));
-  ierr = Match(&t, c, index, settle, remedy, pairs);
+  PetscCall(FindSlaves(&t, &m.n, &slave));
+  m.slave = slave;
+  ierr = Match(&t, c, index, settle, remedy, &m, pairs);
+  PetscCall(PetscFree(slave));
   PetscCall(HycoPartnersDestroy(&t));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

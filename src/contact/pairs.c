@@ -2,6 +2,7 @@
   Potential contacts: each of the scene's contacts puts in its slave nodes with their masters, on the mesh as it stands
   in the file; on surfaces that a map moves masters are found anew wherever the nodes are.
 */
+#include "facing.h"
 #include <hycokinematics.h>
 
 PetscErrorCode HycoPairsReserve(HycoPairs *p, PetscInt contacts, PetscInt width)
@@ -155,8 +156,8 @@ static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt he
 
     if (!count[i]++) first[i] = p->contact[k];
     HycoCheck(!free || count[i] <= free,
-              "node %d is a slave of %d contacts, %s and %s among them, and has %d free displacement%s: their forces "
-              "would not be determined; take it from one",
+              "node %d is a slave of %d contacts, among them %s and %s, and has %d free displacement%s, so that the "
+              "forces would not be unique; remove it from one contact",
               (int)m->node_id[i], (int)count[i], scene->contact[first[i]]->name, scene->contact[p->contact[k]]->name,
               (int)free, free == 1 ? "" : "s");
   }
@@ -169,15 +170,21 @@ static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held
 {
   HycoMesh m = fe->mesh;
   HycoContact c = fe->scene->contact[index];
+  PetscBool *carries;
   PetscInt g = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
   HycoCheck(m->group_start[g + 1] > m->group_start[g], "contact %s: the group %s is empty", c->name, m->group_name[g]);
   PetscCall(HycoPairsReserve(p, m->group_start[g + 1] - m->group_start[g], 0));
+  PetscCall(PetscMalloc1(m->n_nodes, &carries));
+  HycoSurfaceCarriers(m, g, carries);
   for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
-    if (held[m->group_node[k]] < m->dim) HycoPairsAppend(p, index, m->group_node[k], 0, NULL, NULL);
+    const PetscInt i = m->group_node[k];
+
+    if (carries[i] && held[i] < m->dim) HycoPairsAppend(p, index, i, 0, NULL, NULL);
   }
+  PetscCall(PetscFree(carries));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

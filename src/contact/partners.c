@@ -20,15 +20,18 @@ static PetscErrorCode FindPatches(HycoPartners *t)
   PetscCall(PetscMalloc1(PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets * t->nf), &t->node));
   PetscCall(PetscCalloc1(3 * PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets), &t->normal));
   if (t->nodes) {
+    PetscBool *carries;
     PetscReal *normal;
 
-    PetscCall(PetscMalloc1(3 * m->n_nodes, &normal));
+    PetscCall(PetscMalloc2(m->n_nodes, &carries, 3 * m->n_nodes, &normal));
+    HycoSurfaceCarriers(m, gm, carries);
     if (m->dim > 1) PetscCall(HycoSurfaceNormals(t->fe, gm, normal));
     for (PetscInt k = m->group_start[gm]; k < m->group_start[gm + 1]; k++) {
+      if (!carries[m->group_node[k]]) continue;
       if (m->dim > 1) PetscCall(PetscArraycpy(t->normal + 3 * t->n, normal + 3 * m->group_node[k], 3));
       t->node[t->n++] = m->group_node[k];
     }
-    PetscCall(PetscFree(normal));
+    PetscCall(PetscFree2(carries, normal));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt f = 0; f < m->n_facets; f++) {

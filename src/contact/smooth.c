@@ -1,7 +1,8 @@
 /*
   Normals of the smooth surface behind a group's facets. A node's facets are weighted as on a circle or a sphere through
   it and its neighbours, where the normal is then exact (N. Max, J. Graphics Tools 4 (1999) 1-6): a body of revolution
-  that turns in its seat shows no normal motion, however uneven its facets are.
+  that turns in its seat shows no normal motion, however uneven its facets are. Facets of second order have a normal of
+  their own at each node, and the mean of those is taken.
 */
 #include "facing.h"
 #include <hycokinematics.h>
@@ -57,23 +58,52 @@ static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The normal of a facet at its node v, of unit length: of first order that of the facet. */
+static PetscErrorCode NormalAt(HycoFE fe, PetscInt facet, PetscInt v, PetscReal n[3])
+{
+  const HycoElement *nodes = HycoElementGetFacetNodes(fe->mesh->type);
+
+  PetscFunctionBegin;
+  if (nodes)
+    PetscCall(HycoFacetNormal(fe, nodes, facet, v, n));
+  else
+    PetscCall(HycoFacetVector(fe, facet, n));
+  HycoNormalise(n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of second order: the sums of the facets' normals at the nodes, exact[] and mean[]. */
+static PetscErrorCode AddNodeNormals(HycoFE fe, PetscInt group, Surface *s)
+{
+  HycoMesh m = fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->n_facets * m->nf; k++) {
+    PetscReal n[3];
+
+    if (m->facet_group[k / m->nf] != group) continue;
+    PetscCall(NormalAt(fe, k / m->nf, k % m->nf, n));
+    for (PetscInt c = 0; c < 3; c++) {
+      s->exact[3 * m->facets[k] + c] += n[c];
+      s->mean[3 * m->facets[k] + c] += n[c];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* bend[], from the facets' normals and their means; then for each node the largest of its facets' nodes in wide[]. */
 static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal wide[])
 {
   HycoMesh m = fe->mesh;
 
   PetscFunctionBegin;
-  for (PetscInt f = 0; f < m->n_facets; f++) {
+  for (PetscInt k = 0; k < m->n_facets * m->nf; k++) {
+    const PetscInt i = m->facets[k];
     PetscReal n[3];
 
-    if (m->facet_group[f] != group) continue;
-    PetscCall(HycoFacetVector(fe, f, n));
-    HycoNormalise(n);
-    for (PetscInt v = 0; v < m->nf; v++) {
-      const PetscInt i = m->facets[f * m->nf + v];
-
-      s->bend[i] = PetscMax(s->bend[i], 2 * HycoDistance(n, s->mean + 3 * i));
-    }
+    if (m->facet_group[k / m->nf] != group) continue;
+    PetscCall(NormalAt(fe, k / m->nf, k % m->nf, n));
+    s->bend[i] = PetscMax(s->bend[i], 2 * HycoDistance(n, s->mean + 3 * i));
   }
   for (PetscInt f = 0; f < m->n_facets; f++) {
     PetscReal most = 0;
@@ -99,7 +129,10 @@ PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], 
   PetscCall(PetscArrayzero(normal, 3 * m->n_nodes));
   PetscCall(PetscArrayzero(bend, m->n_nodes));
   PetscCall(PetscCalloc3(3 * m->n_nodes, &s.mean, m->n_nodes, &s.bend, m->n_nodes, &s.fan));
-  PetscCall(AddFacets(fe, group, &s));
+  if (HycoMeshIsQuadratic(m))
+    PetscCall(AddNodeNormals(fe, group, &s));
+  else
+    PetscCall(AddFacets(fe, group, &s));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     HycoNormalise(s.exact + 3 * i);
     HycoNormalise(s.mean + 3 * i);
@@ -108,7 +141,10 @@ PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], 
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     doubt[i] = FLAT;
     if (s.bend[i] >= EDGE) continue;
-    doubt[i] += s.fan[i] ? bend[i] : 2 * HycoDistance(s.exact + 3 * i, s.mean + 3 * i) + bend[i] * bend[i] / 2;
+    if (s.fan[i] || HycoMeshIsQuadratic(m))
+      doubt[i] += bend[i];
+    else
+      doubt[i] += 2 * HycoDistance(s.exact + 3 * i, s.mean + 3 * i) + bend[i] * bend[i] / 2;
   }
   PetscCall(PetscFree3(s.mean, s.bend, s.fan));
   PetscFunctionReturn(PETSC_SUCCESS);

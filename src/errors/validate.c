@@ -188,36 +188,110 @@ static PetscErrorCode PredictAgain(HycoROM m, HycoSnapshots store, PetscInt firs
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots store, HycoHeldOut rows[])
+/* Points of a scene without a history: a block of them for each rank, one of each block at a time. */
+static PetscErrorCode PredictPoints(Rows *r, HycoHeldOut rows[])
 {
+  HycoReducer t = r->t;
   PetscInt n, n_par, first, last;
   const PetscReal *mu;
   PetscMPIInt size, count;
-  Rows r = {t, m, store, {0}};
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->held, &n, &n_par, &mu));
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(PetscMPIIntCast(n * (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), &count));
-  PetscCall(PetscArrayzero(rows, n));
   first = t->rank * n / size;
   last = (t->rank + 1) * n / size;
-  PetscCall(HycoComparisonCreate(t->fom, m, &r.c));
-  for (PetscInt step = 0; step * size < n + size; step++) { /* one point of each rank */
+  for (PetscInt step = 0; step * size < n + size; step++) {
     const PetscInt k = first + step;
 
-    HycoOnEach(HycoComm(t), k < last ? Predict(m, store, mu + k * n_par, 0, &rows[k]) : PETSC_SUCCESS);
+    HycoOnEach(HycoComm(t), k < last ? Predict(r->m, r->store, mu + k * n_par, 0, &rows[k]) : PETSC_SUCCESS);
     for (PetscMPIInt of = 0; of < size; of++) {
       const PetscInt j = of * n / size + step;
 
-      if (j >= (of + 1) * n / size) continue;
-      PetscCall(t->scene->n_times ? ComparePath(&r, mu + j * n_par, of, &rows[j])
-                                  : Compare(&r, mu + j * n_par, of, &rows[j]));
+      if (j < (of + 1) * n / size) PetscCall(Compare(r, mu + j * n_par, of, &rows[j]));
     }
   }
-  PetscCall(HycoComparisonDestroy(&r.c));
-  if (!t->scene->n_times) HycoOnEach(HycoComm(t), PredictAgain(m, store, first, last, mu, rows));
+  HycoOnEach(HycoComm(t), PredictAgain(r->m, r->store, first, last, mu, rows));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, count, MPIU_REAL, MPI_SUM, HycoComm(t)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether it ends the race. */
+static PetscBool Loses(const HycoHeldOutRace *race, const HycoHeldOut *row)
+{
+  if (race->all) return PETSC_FALSE;
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    if (race->target[j] > 0 && HycoHeldOutError(row, (HycoErrorKind)j, race->force) > race->most * race->target[j])
+      return PETSC_TRUE;
+  }
+  return (PetscBool)(row->converged < 0.5);
+}
+
+/* Held-out paths in the order of the race, one of each rank at a time. Those behind the one that ends it count for
+   nothing, so that the number of ranks does not matter. */
+static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut rows[])
+{
+  HycoReducer t = r->t;
+  PetscInt n, n_par;
+  const PetscReal *mu;
+  PetscMPIInt size;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->held, &n, &n_par, &mu));
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
+  while (race->n < n && !race->lost) {
+    const PetscInt here = PetscMin(size, n - race->n), *point = race->order + race->n,
+                   mine = t->rank < here ? point[t->rank] : -1;
+
+    HycoOnRoot(HycoComm(t), HycoReducerTell(t, "held-out paths", race->n, n));
+    HycoOnEach(HycoComm(t), mine < 0 ? PETSC_SUCCESS : Predict(r->m, r->store, mu + mine * n_par, 0, &rows[mine]));
+    for (PetscMPIInt of = 0; of < here; of++) {
+      HycoHeldOut *row = &rows[point[of]];
+
+      if (race->lost) {
+        PetscCall(PetscMemzero(row, sizeof(*row)));
+        continue;
+      }
+      PetscCall(ComparePath(r, mu + point[of] * n_par, of, row));
+      PetscCallMPI(MPI_Bcast(row, (PetscMPIInt)(sizeof(*row) / sizeof(PetscReal)), MPIU_REAL, of, HycoComm(t)));
+      race->n++;
+      race->lost = Loses(race, row);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All of them, in their order. */
+static PetscErrorCode PredictAllPaths(Rows *r, PetscInt n, HycoHeldOut rows[])
+{
+  HycoHeldOutRace race = {.all = PETSC_TRUE};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &race.order));
+  for (PetscInt k = 0; k < n; k++) race.order[k] = k;
+  ierr = PredictPaths(r, &race, rows);
+  PetscCall(PetscFree(race.order));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots store, HycoHeldOutRace *race,
+                                         HycoHeldOut rows[])
+{
+  Rows r = {t, m, store, {0}};
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
+  PetscCall(PetscArrayzero(rows, n));
+  PetscCall(HycoComparisonCreate(t->fom, m, &r.c));
+  if (!t->scene->n_times)
+    PetscCall(PredictPoints(&r, rows));
+  else
+    PetscCall(race ? PredictPaths(&r, race, rows) : PredictAllPaths(&r, n, rows));
+  PetscCall(HycoComparisonDestroy(&r.c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -246,9 +320,8 @@ PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal
   return Divided(row, kind, force, row->error[kind]);
 }
 
-PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], HycoValidation *v)
+PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscReal force, HycoValidation *v)
 {
-  const PetscReal force = HycoHeldOutForce(n, rows);
   PetscReal *error;
 
   PetscFunctionBegin;

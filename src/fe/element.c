@@ -2,6 +2,7 @@
 #include <hycofe.h>
 
 static HycoElement table[HYCO_N_CELL_TYPES], point, line3;
+static HycoElement line3_nodes, tri6_nodes, quad9_nodes; /* at their nodes, of weight 1 */
 static PetscBool ready = PETSC_FALSE;
 
 static const PetscReal corner[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
@@ -64,33 +65,35 @@ static const PetscReal gauss[3] = {-0.77459666924148337704, 0, 0.774596669241483
 static const PetscInt node9[9][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}, {0, -1}, {1, 0}, {0, 1}, {-1, 0}, {0, 0}};
 
 /* Nodes: the ends, the middle. */
-static void Line3(HycoElement *e)
+static void Line3(HycoElement *e, PetscBool at_nodes)
 {
   static const PetscInt node[3] = {-1, 1, 0};
 
   e->dim = 1;
   e->nv = e->nq = 3;
   for (PetscInt q = 0; q < 3; q++) {
-    e->w[q] = gauss_weight[q];
+    const PetscReal x = at_nodes ? node[q] : gauss[q];
+
+    e->w[q] = at_nodes ? 1 : gauss_weight[q];
     for (PetscInt a = 0; a < 3; a++) {
-      e->N[q][a] = Quadratic(node[a], gauss[q]);
-      e->dN[q][a][0] = QuadraticSlope(node[a], gauss[q]);
+      e->N[q][a] = Quadratic(node[a], x);
+      e->dN[q][a][0] = QuadraticSlope(node[a], x);
     }
   }
 }
 
 /* Products of quadratic functions; of eight nodes (serendipity) the corners' and the sides' take in what the middle's
    is there, so that it is none. */
-static void Quad(HycoElement *e, PetscInt nv)
+static void Quad(HycoElement *e, PetscInt nv, PetscBool at_nodes)
 {
   e->dim = 2;
   e->nv = nv;
   e->nq = 9;
   for (PetscInt q = 0; q < 9; q++) {
-    const PetscReal x = gauss[q % 3], y = gauss[q / 3],
+    const PetscReal x = at_nodes ? node9[q][0] : gauss[q % 3], y = at_nodes ? node9[q][1] : gauss[q / 3],
                     f[3] = {(1 - x * x) * (1 - y * y), -2 * x * (1 - y * y), -2 * y * (1 - x * x)};
 
-    e->w[q] = gauss_weight[q % 3] * gauss_weight[q / 3];
+    e->w[q] = at_nodes ? 1 : gauss_weight[q % 3] * gauss_weight[q / 3];
     for (PetscInt a = 0; a < nv; a++) {
       const PetscInt i = node9[a][0], j = node9[a][1];
       const PetscReal share = nv == 9 ? 0 : a < 4 ? -1.0 / 4 : 1.0 / 2; /* the middle's value where a quad8 has none */
@@ -102,31 +105,121 @@ static void Quad(HycoElement *e, PetscInt nv)
   }
 }
 
-/* Barycentric functions L_a (2 L_a - 1) of the corners, 4 L_a L_b of the sides; six points of degree 4 (G. R. Cowper,
-   Int. J. Numer. Meth. Engng 7 (1973) 405-408). */
-static void Tri6(HycoElement *e)
+/* Functions of a quadratic simplex at its next point, barycentric L, of this weight: L_a (2 L_a - 1) of the corners,
+   4 L_a L_b of the sides. */
+static void AddSimplexPoint(HycoElement *e, const PetscInt side[][2], const PetscReal L[4], PetscReal weight)
+{
+  const PetscInt q = e->nq++, dim = e->dim;
+  const PetscReal slope[4][3] = {{-1, -1, -1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+  e->w[q] = weight;
+  for (PetscInt a = 0; a <= dim; a++) {
+    e->N[q][a] = L[a] * (2 * L[a] - 1);
+    for (PetscInt c = 0; c < dim; c++) e->dN[q][a][c] = (4 * L[a] - 1) * slope[a][c];
+  }
+  for (PetscInt k = 0; k < e->nv - dim - 1; k++) {
+    const PetscInt a = side[k][0], b = side[k][1], at = dim + 1 + k;
+
+    e->N[q][at] = 4 * L[a] * L[b];
+    for (PetscInt c = 0; c < dim; c++) e->dN[q][at][c] = 4 * (slope[a][c] * L[b] + L[a] * slope[b][c]);
+  }
+}
+
+/* Six points of degree 4 (G. R. Cowper, Int. J. Numer. Meth. Engng 7 (1973) 405-408). */
+static void Tri6(HycoElement *e, PetscBool at_nodes)
 {
   static const PetscReal near[2] = {0.816847572980458513080857, 0.108103018168070227363429},
-                         weight[2] = {0.109951743655321867638326, 0.223381589678011465695007},
-                         slope[3][2] = {{-1, -1}, {1, 0}, {0, 1}};
+                         weight[2] = {0.109951743655321867638326, 0.223381589678011465695007};
+  static const PetscInt side[3][2] = {{0, 1}, {1, 2}, {2, 0}};
 
   e->dim = 2;
-  e->nv = e->nq = 6;
+  e->nv = 6;
+  e->nq = 0;
   for (PetscInt q = 0; q < 6; q++) {
-    PetscReal L[3];
+    PetscReal L[4] = {0};
 
-    for (PetscInt a = 0; a < 3; a++) L[a] = a == q % 3 ? near[q / 3] : (1 - near[q / 3]) / 2;
-    e->w[q] = weight[q / 3] / 2;
     for (PetscInt a = 0; a < 3; a++) {
-      const PetscInt b = (a + 1) % 3;
-
-      e->N[q][a] = L[a] * (2 * L[a] - 1);
-      e->N[q][3 + a] = 4 * L[a] * L[b];
-      for (PetscInt c = 0; c < 2; c++) {
-        e->dN[q][a][c] = (4 * L[a] - 1) * slope[a][c];
-        e->dN[q][3 + a][c] = 4 * (slope[a][c] * L[b] + L[a] * slope[b][c]);
-      }
+      if (at_nodes)
+        L[a] = q < 3 ? a == q : a == side[q - 3][0] || a == side[q - 3][1] ? 0.5 : 0;
+      else
+        L[a] = a == q % 3 ? near[q / 3] : (1 - near[q / 3]) / 2;
     }
+    AddSimplexPoint(e, side, L, at_nodes ? 1 : weight[q / 3] / 2);
+  }
+}
+
+/* Fourteen points of degree 5, weights positive (N. J. Walkington, Quadrature on simplices of arbitrary dimension,
+   Carnegie Mellon University (2000)): two orbits of four, one of six. */
+static void Tet10(HycoElement *e)
+{
+  static const PetscReal far[2] = {0.310885919263300609797, 0.0927352503108912264023},
+                         weight[3] = {0.112687925718015850799, 0.0734930431163619495437, 0.0425460207770814664381},
+                         pair = 0.0455037041256496494919;
+  static const PetscInt side[6][2] = {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}};
+
+  e->dim = 3;
+  e->nv = 10;
+  e->nq = 0;
+  for (PetscInt q = 0; q < 14; q++) {
+    const PetscInt orbit = PetscMin(q / 4, 2);
+    PetscReal L[4];
+
+    for (PetscInt a = 0; a < 4; a++) {
+      if (orbit < 2)
+        L[a] = a == q % 4 ? 1 - 3 * far[orbit] : far[orbit];
+      else
+        L[a] = a == side[q - 8][0] || a == side[q - 8][1] ? pair : 0.5 - pair;
+    }
+    AddSimplexPoint(e, side, L, weight[orbit] / 6);
+  }
+}
+
+/* Nodes of hexahedra in gmsh's order: corners, edges, faces, the middle. */
+static const PetscInt node27[27][3] = {
+    {-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, 1}, {1, -1, 1}, {1, 1, 1},  {-1, 1, 1}, {0, -1, -1},
+    {-1, 0, -1},  {-1, -1, 0}, {1, 0, -1}, {1, -1, 0},  {0, 1, -1},  {1, 1, 0},  {-1, 1, 0}, {0, -1, 1}, {-1, 0, 1},
+    {1, 0, 1},    {0, 1, 1},   {0, 0, -1}, {0, -1, 0},  {-1, 0, 0},  {1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {0, 0, 0}};
+
+/* Of the node at r (serendipity): products, of the corners times r.x - 2. */
+static void SerendipityAt(const PetscInt r[3], const PetscReal x[3], PetscReal *N, PetscReal dN[3])
+{
+  const PetscBool at_corner = (PetscBool)(r[0] && r[1] && r[2]);
+  PetscReal f[3], slope[3], sum = at_corner ? -2 : 1;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    f[c] = r[c] ? (1 + r[c] * x[c]) / 2 : 1 - x[c] * x[c];
+    slope[c] = r[c] ? r[c] / 2.0 : -2 * x[c];
+    if (at_corner) sum += r[c] * x[c];
+  }
+  *N = f[0] * f[1] * f[2] * sum;
+  for (PetscInt c = 0; c < 3; c++) {
+    const PetscReal others = f[(c + 1) % 3] * f[(c + 2) % 3];
+
+    dN[c] = slope[c] * others * sum + (at_corner ? f[c] * others * r[c] : 0);
+  }
+}
+
+/* Of the node at r: products of quadratic functions. */
+static void ProductAt(const PetscInt r[3], const PetscReal x[3], PetscReal *N, PetscReal dN[3])
+{
+  PetscReal f[3];
+
+  for (PetscInt c = 0; c < 3; c++) f[c] = Quadratic(r[c], x[c]);
+  *N = f[0] * f[1] * f[2];
+  for (PetscInt c = 0; c < 3; c++) dN[c] = QuadraticSlope(r[c], x[c]) * f[(c + 1) % 3] * f[(c + 2) % 3];
+}
+
+static void Hex(HycoElement *e, PetscInt nv)
+{
+  e->dim = 3;
+  e->nv = nv;
+  e->nq = 27;
+  for (PetscInt q = 0; q < 27; q++) {
+    const PetscInt at[3] = {q % 3, q / 3 % 3, q / 9};
+    const PetscReal x[3] = {gauss[at[0]], gauss[at[1]], gauss[at[2]]};
+
+    e->w[q] = gauss_weight[at[0]] * gauss_weight[at[1]] * gauss_weight[at[2]];
+    for (PetscInt a = 0; a < nv; a++) (nv == 20 ? SerendipityAt : ProductAt)(node27[a], x, &e->N[q][a], e->dN[q][a]);
   }
 }
 
@@ -137,10 +230,16 @@ static void Tabulate(void)
   Tensor(&table[HYCO_HEX8], 3);
   Simplex(&table[HYCO_TRI3], 2);
   Simplex(&table[HYCO_TET4], 3);
-  Tri6(&table[HYCO_TRI6]);
-  Quad(&table[HYCO_QUAD8], 8);
-  Quad(&table[HYCO_QUAD9], 9);
-  Line3(&line3);
+  Tri6(&table[HYCO_TRI6], PETSC_FALSE);
+  Quad(&table[HYCO_QUAD8], 8, PETSC_FALSE);
+  Quad(&table[HYCO_QUAD9], 9, PETSC_FALSE);
+  Tet10(&table[HYCO_TET10]);
+  Hex(&table[HYCO_HEX20], 20);
+  Hex(&table[HYCO_HEX27], 27);
+  Line3(&line3, PETSC_FALSE);
+  Line3(&line3_nodes, PETSC_TRUE);
+  Tri6(&tri6_nodes, PETSC_TRUE);
+  Quad(&quad9_nodes, 9, PETSC_TRUE);
   point.nv = point.nq = 1;
   point.w[0] = point.N[0][0] = 1;
   ready = PETSC_TRUE;
@@ -167,7 +266,26 @@ const HycoElement *HycoElementGetFacet(HycoCellType type)
     return &line3;
   case HYCO_TET4:
     return &table[HYCO_TRI3];
+  case HYCO_TET10:
+    return &table[HYCO_TRI6];
+  case HYCO_HEX20:
+    return &table[HYCO_QUAD8];
+  case HYCO_HEX27:
+    return &table[HYCO_QUAD9];
   default:
     return &table[HYCO_QUAD4];
+  }
+}
+
+const HycoElement *HycoElementGetFacetNodes(HycoCellType type)
+{
+  if (!ready) Tabulate();
+  switch (type) {
+  case HYCO_TET10:
+    return &tri6_nodes;
+  case HYCO_HEX27:
+    return &quad9_nodes;
+  default:
+    return HycoCellKinds[type].dim == 2 && HycoCellKinds[type].quadratic ? &line3_nodes : NULL;
   }
 }

@@ -147,7 +147,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
       }
     }
   }
-  for (PetscInt i = 0; i < m->n_nodes; i++) n += sum[4 * i + 3] > 0;
+  for (PetscInt i = 0; i < m->n_nodes; i++) n += sum[4 * i + 3] != 0; /* of quad8 a corner's is negative */
   if (n != s->n) {
     PetscCall(PetscFree(s->node));
     PetscCall(PetscFree(s->share));
@@ -156,7 +156,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
     s->n = n;
   }
   for (PetscInt i = 0, k = 0; i < m->n_nodes; i++) {
-    if (!(sum[4 * i + 3] > 0)) continue;
+    if (sum[4 * i + 3] == 0) continue;
     s->node[k] = i;
     PetscCall(PetscArraycpy(s->share + 4 * k++, sum + 4 * i, 4));
   }
@@ -255,21 +255,24 @@ static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The force per unit length along a segment, by two Gauss points. */
-static PetscErrorCode AddSegment(HycoFE fe, const HycoPointLoad *load, const PetscInt node[2], Into F)
+/* The force per unit length along a segment: its ends, of second order its middle. */
+static PetscErrorCode AddSegment(HycoFE fe, const HycoPointLoad *load, const PetscInt node[], Into F)
 {
-  const HycoElement *el = HycoElementGet(HYCO_LINE2);
-  const PetscReal *a = fe->X + 3 * node[0], *b = fe->X + 3 * node[1], length = HycoDistance(a, b);
+  const HycoElement *el = HycoMeshIsQuadratic(fe->mesh) ? HycoElementGetFacet(HYCO_TRI6) : HycoElementGet(HYCO_LINE2);
 
   PetscFunctionBegin;
   for (PetscInt q = 0; q < el->nq; q++) {
-    PetscReal x[3], f;
+    PetscReal x[3] = {0, 0, 0}, slope[3] = {0, 0, 0}, f;
 
-    for (PetscInt c = 0; c < 3; c++) x[c] = el->N[q][0] * a[c] + el->N[q][1] * b[c];
+    for (PetscInt a = 0; a < el->nv; a++) {
+      for (PetscInt c = 0; c < 3; c++) x[c] += el->N[q][a] * fe->X[3 * node[a] + c];
+      for (PetscInt c = 0; c < 3; c++) slope[c] += el->dN[q][a][0] * fe->X[3 * node[a] + c];
+    }
     for (PetscInt c = 0; c < 3; c++) {
       if (!load->force[c]) continue;
       PetscCall(HycoExprEval(load->force[c], fe->mu, 1, x, &f));
-      for (PetscInt e = 0; e < 2; e++) PetscCall(AddNode(fe, node[e], c, f * el->N[q][e] * length / 2, F));
+      for (PetscInt a = 0; a < el->nv; a++)
+        PetscCall(AddNode(fe, node[a], c, f * el->w[q] * el->N[q][a] * HycoLength(slope), F));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -299,7 +302,7 @@ static PetscErrorCode AddPointLoad(HycoFE fe, const HycoPointLoad *load, Into F)
   }
   PetscCall(HycoMeshLine(m, g, &n, &segment));
   for (PetscInt k = 0; k < n; k++) {
-    PetscErrorCode ierr = AddSegment(fe, load, segment + 2 * k, F);
+    PetscErrorCode ierr = AddSegment(fe, load, segment + (HycoMeshIsQuadratic(m) ? 3 : 2) * k, F);
 
     if (ierr) PetscCall(PetscFree(segment));
     PetscCall(ierr);

@@ -96,7 +96,7 @@ PetscErrorCode HycoFEStateCopy(HycoFEState from, HycoFEState to)
 {
   PetscFunctionBegin;
   PetscCheck(from->n_cells == to->n_cells && from->start[from->n_cells] == to->start[to->n_cells], PETSC_COMM_SELF,
-             PETSC_ERR_ARG_INCOMP, "the states are of two meshes");
+             PETSC_ERR_ARG_INCOMP, "the states belong to two meshes");
   PetscCall(PetscArraycpy(to->value, from->value, from->start[from->n_cells]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -128,7 +128,8 @@ typedef struct {
   PetscInt n, cell[BATCH];
   PetscReal *memory, *x, *w, *strain0, *strain, *stress0, *stress, *temperature0, *temperature, *state0, *state;
   PetscReal *stored, *dissipated, *increment, *potential, *tangent, *constant;
-  PetscReal (*g)[HYCO_CELL_NODES][3], (*mean)[HYCO_CELL_NODES][3];
+  PetscInt nv;
+  PetscReal (*g)[3], (*mean)[3]; /* nv by point, by cell */
 } Batch;
 
 /* All of a batch's arrays in one block. */
@@ -169,7 +170,8 @@ static PetscErrorCode BatchCreate(HycoFE fe, Batch *b)
       at += part[k].size * n;
     }
   }
-  PetscCall(PetscMalloc2(n, &b->g, BATCH, &b->mean));
+  b->nv = fe->mesh->nv;
+  PetscCall(PetscMalloc2(n * b->nv, &b->g, BATCH * b->nv, &b->mean));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -192,7 +194,7 @@ static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscInt cell = b->cell[k];
 
-    if (fe->bbar[body]) PetscCall(HycoMeanGradients(fe, el, cell, b->mean[k]));
+    if (fe->bbar[body]) PetscCall(HycoMeanGradients(fe, el, cell, b->mean + k * b->nv));
     for (PetscInt q = 0; q < el->nq; q++) {
       const PetscInt i = k * el->nq + q;
       const PetscReal T = fe->temperature ? fe->temperature[cell * el->nq + q] : 0;
@@ -200,8 +202,8 @@ static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
       const Point from = PointAt(fe, b->begin, cell, q), to = PointAt(fe, b->end, cell, q);
       PetscReal strain[6];
 
-      PetscCall(HycoGradients(fe, el, cell, q, b->g[i], &b->w[i]));
-      HycoPointStrain(fe, el, cell, b->u, b->g[i], fe->bbar[body] ? b->mean[k] : NULL, strain);
+      PetscCall(HycoGradients(fe, el, cell, q, b->g + i * b->nv, &b->w[i]));
+      HycoPointStrain(fe, el, cell, b->u, b->g + i * b->nv, fe->bbar[body] ? b->mean + k * b->nv : NULL, strain);
       HycoPointPlace(fe, el, cell, q, b->x + 3 * i);
       for (PetscInt c = 0; c < ns; c++) {
         to.strain[c] = strain[c];
@@ -339,7 +341,7 @@ static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear
       for (PetscInt j = 0; j < n_state && !linear; j++) to.variable[j] = b->state[i * n_state + j];
       *to.stored = b->stored[i];
       *to.accumulated = *from.accumulated + b->increment[i];
-      HycoPointForce(fe, el, b->g[i], fe->bbar[body] ? b->mean[k] : NULL, b->w[i], s, f);
+      HycoPointForce(fe, el, b->g + i * b->nv, fe->bbar[body] ? b->mean + k * b->nv : NULL, b->w[i], s, f);
       b->report->increment = PetscMax(b->report->increment, b->increment[i]);
       if (HycoMeshOwned(fe->mesh, fe->mesh->cells[cell * fe->mesh->nv]) >= 0) Count(fe, b, i, &from, &to);
       for (PetscInt r = 0; r < ns && b->tangents && !linear; r++) {
@@ -397,8 +399,9 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCheck(begin != end, PETSC_COMM_SELF, PETSC_ERR_ARG_IDN, "a step begins and ends in one state");
-  PetscCheck(t1 >= t0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "a step from %g back to %g", (double)t0, (double)t1);
+  PetscCheck(begin != end, PETSC_COMM_SELF, PETSC_ERR_ARG_IDN, "a step begins and ends in the same state");
+  PetscCheck(t1 >= t0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "a step from %g goes back to %g", (double)t0,
+             (double)t1);
   *report = fresh;
   b.report = report;
   PetscCall(HycoFEKeepGradients(fe));
@@ -413,6 +416,7 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
     report->stored += energy;
     report->potential += energy;
   }
+  HycoFEPassTied(fe, f_int);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

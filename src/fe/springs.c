@@ -9,13 +9,14 @@
 */
 #include <hycokinematics.h>
 
-#define MAX_FACET_DOFS 12
+#define MAX_FACET_DOFS (3 * HYCO_FACET_NODES)
 
 struct _n_HycoSprings {
   PetscInt n, *start;     /* those of cell e: start[e] .. start[e + 1] - 1; n_cells + 1 */
   PetscInt *spring;       /* of the scene */
   PetscInt *facet, *node; /* one of them, the other -1 */
-  PetscReal *K;           /* n x MAX_FACET_DOFS^2: row major over the facet's or the point's unknowns */
+  PetscInt size;          /* a facet's unknowns, squared */
+  PetscReal *K;           /* n x size: row major over the facet's or the point's unknowns */
 };
 
 /* Whether a spring of the scene is at each node of its group, and not on facets. */
@@ -102,10 +103,11 @@ PetscErrorCode HycoSpringsCreate(HycoFE fe)
   PetscCall(ForEach(fe, around, Count, s));
   for (PetscInt e = 0; e < m->n_cells; e++) s->start[e + 1] += s->start[e];
   s->n = s->start[m->n_cells];
+  s->size = m->nf * m->dim * m->nf * m->dim;
   PetscCall(PetscMalloc1(s->n, &s->spring));
   PetscCall(PetscMalloc1(s->n, &s->facet));
   PetscCall(PetscMalloc1(s->n, &s->node));
-  PetscCall(PetscMalloc1(s->n * MAX_FACET_DOFS * MAX_FACET_DOFS, &s->K));
+  PetscCall(PetscMalloc1(s->n * s->size, &s->K));
   PetscCall(ForEach(fe, around, Put, s));
   for (PetscInt e = m->n_cells; e > 0; e--) s->start[e] = s->start[e - 1];
   s->start[0] = 0;
@@ -125,8 +127,8 @@ static PetscErrorCode Evaluate(HycoFE fe, const HycoSpring *spring, const PetscR
     PetscCall(HycoExprEval(spring->stiffness[c], fe->mu, 1, x, &k[c]));
     if (k[c] >= 0) continue;
     PetscCall(HycoExprPlace(spring->stiffness[c], fe->mu, x, place));
-    HycoFail("%s is %g at %s; a spring's stiffness is 0 or more", HycoExprKey(spring->stiffness[c]), (double)k[c],
-             place);
+    HycoFail("%s is %g at %s; the stiffness of a spring must be 0 or more", HycoExprKey(spring->stiffness[c]),
+             (double)k[c], place);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -185,10 +187,10 @@ PetscErrorCode HycoSpringsSet(HycoFE fe)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; s && k < s->n; k++) {
-    PetscReal *K = s->K + k * MAX_FACET_DOFS * MAX_FACET_DOFS;
+    PetscReal *K = s->K + k * s->size;
     const HycoSpring *spring = &fe->scene->spring[s->spring[k]];
 
-    PetscCall(PetscArrayzero(K, MAX_FACET_DOFS * MAX_FACET_DOFS));
+    PetscCall(PetscArrayzero(K, s->size));
     if (s->facet[k] < 0)
       PetscCall(PointMatrix(fe, spring, s->node[k], K));
     else
@@ -204,10 +206,10 @@ void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   const PetscInt *corner = m->cells + cell * m->nv, dim = m->dim, n = m->nv * dim;
 
   for (PetscInt k = s ? s->start[cell] : 0; s && k < s->start[cell + 1]; k++) {
-    const PetscReal *K = s->K + k * MAX_FACET_DOFS * MAX_FACET_DOFS;
+    const PetscReal *K = s->K + k * s->size;
     const PetscInt *node;
     const PetscInt n_nodes = Nodes(m, s, k, &node), size = n_nodes * dim;
-    PetscInt at[4];
+    PetscInt at[HYCO_FACET_NODES];
 
     for (PetscInt a = 0; a < n_nodes; a++) {
       for (at[a] = 0; corner[at[a]] != node[a];) at[a]++;
@@ -236,7 +238,7 @@ void HycoSpringsMarkVarying(HycoFE fe, const PetscBool changed[])
 static PetscReal Pull(HycoFE fe, PetscInt k, const PetscReal u[], PetscReal force[MAX_FACET_DOFS])
 {
   const HycoSprings s = fe->springs;
-  const PetscReal *K = s->K + k * MAX_FACET_DOFS * MAX_FACET_DOFS;
+  const PetscReal *K = s->K + k * s->size;
   const PetscInt *node, n = Nodes(fe->mesh, s, k, &node) * fe->dim;
   PetscReal energy = 0;
 
@@ -288,8 +290,7 @@ PetscErrorCode HycoSpringsVisit(HycoFE fe, HycoSpringVisit visit, void *ctx)
     for (PetscInt k = s->start[e]; k < s->start[e + 1]; k++) {
       const PetscInt *node, n = Nodes(fe->mesh, s, k, &node);
 
-      if (IsOwn(fe, e, k))
-        PetscCall((*visit)(fe, s->spring[k], n, node, s->K + k * MAX_FACET_DOFS * MAX_FACET_DOFS, ctx));
+      if (IsOwn(fe, e, k)) PetscCall((*visit)(fe, s->spring[k], n, node, s->K + k * s->size, ctx));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -349,7 +349,7 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
   const SpringGram *g = (const SpringGram *)ctx;
   const PetscInt size = n * fe->dim, which = g->part[node[0]];
   const Part *p = &g->parts[which];
-  PetscReal row[12][6], most = 0;
+  PetscReal row[3 * HYCO_FACET_NODES][6], most = 0;
   PetscInt n_rigid = 0;
 
   PetscFunctionBegin;

@@ -107,18 +107,39 @@ static PetscErrorCode MeasureDisplacements(HycoFOM f, HycoSummary *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective. */
+static PetscErrorCode SumContacts(HycoFOM f)
+{
+  const PetscInt n = f->scene->n_contacts;
+  HycoContactFields c;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!f->contact_result) PetscCall(PetscMalloc1(n, &f->contact_result));
+  ierr = HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c);
+  if (!ierr && f->rank == 0)
+    HycoContactResults(f->fe_surface, &f->pairs, c.normal, c.area, f->lambda, 0, f->contact_result);
+  PetscCall(HycoContactFieldsDestroy(&c));
+  PetscCall(ierr);
+  PetscCallMPI(
+      MPI_Bcast(f->contact_result, (PetscMPIInt)((size_t)n * sizeof(*f->contact_result)), MPI_BYTE, 0, HycoComm(f)));
+  for (PetscInt k = 0; k < n; k++) f->contact_result[k].name = f->scene->contact[k]->name;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMMeasureQuantities(HycoFOM f, PetscReal value[])
 {
   PetscReal *reaction = NULL;
 
   PetscFunctionBegin;
   if (!f->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoFOMStress(f));
+  if (HycoSceneAsksFields(f->scene)) PetscCall(HycoFOMStress(f));
+  if (HycoSceneAsksContacts(f->scene)) PetscCall(SumContacts(f));
   if (HycoSceneHasReactions(f->scene)) {
     PetscCall(PetscMalloc1(f->fe->n_dof, &reaction));
     PetscCall(HycoFOMReactions(f, reaction));
   }
-  PetscCall(HycoQuantitiesMeasure(HycoComm(f), f->fe, f->u, f->sigma, reaction, value));
+  PetscCall(HycoQuantitiesMeasure(HycoComm(f), f->fe, f->u, f->sigma, reaction, f->contact_result, value));
   PetscCall(PetscFree(reaction));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -151,53 +172,13 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0: contact k's share in the result of its contact of the scene. */
-static void AddContact(HycoFOM f, const HycoContactFields *c, PetscInt k, HycoContactResult *r)
-{
-  const PetscReal lambda = f->lambda[k], *x = f->fe_surface->X + 3 * f->pairs.slave[k];
-  PetscReal push[3];
-
-  r->n++;
-  if (!(lambda > 0)) return;
-  r->n_active++;
-  r->area += c->area[k];
-  if (c->area[k] > 0) r->pressure = PetscMax(r->pressure, lambda / c->area[k]);
-  for (PetscInt d = 0; d < 3; d++) push[d] = d < f->fe->dim ? -lambda * c->normal[3 * k + d] : 0;
-  if (f->fe->formulation == HYCO_AXISYMMETRIC) push[0] = 0; /* around the circle it adds up to nothing */
-  for (PetscInt d = 0; d < 3; d++) {
-    const PetscInt e = (d + 1) % 3, g = (d + 2) % 3;
-
-    r->force[d] += push[d];
-    if (f->fe->formulation != HYCO_AXISYMMETRIC) r->moment[d] += x[e] * push[g] - x[g] * push[e];
-  }
-}
-
-static PetscErrorCode SumContacts(HycoFOM f, const HycoContactFields *c)
-{
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < f->pairs.n; k++) AddContact(f, c, k, &f->contact_result[f->pairs.contact[k]]);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoFOMGetContacts(HycoFOM f, PetscInt *n, const HycoContactResult *result[])
 {
-  const PetscInt n_contacts = f->scene->n_contacts;
-  HycoContactFields c;
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetContacts()");
-  if (!f->contact_result) PetscCall(PetscMalloc1(n_contacts, &f->contact_result));
-  PetscCall(PetscArrayzero(f->contact_result, n_contacts));
-  ierr = HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c);
-  if (!ierr && f->rank == 0) PetscCall(SumContacts(f, &c));
-  PetscCall(HycoContactFieldsDestroy(&c));
-  PetscCall(ierr);
-  PetscCallMPI(MPI_Bcast(f->contact_result, (PetscMPIInt)((size_t)n_contacts * sizeof(*f->contact_result)), MPI_BYTE, 0,
-                         HycoComm(f)));
-  for (PetscInt k = 0; k < n_contacts; k++) f->contact_result[k].name = f->scene->contact[k]->name;
-  *n = n_contacts;
+  PetscCall(SumContacts(f));
+  *n = f->scene->n_contacts;
   *result = f->contact_result;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

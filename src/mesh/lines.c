@@ -2,62 +2,67 @@
   A line in space: a group of nodes of dimension 1. Its segments are the edges of cells between two nodes of the group;
   a mesh keeps no others. Where an edge cuts a corner of the line, which can be with tetrahedra, that is refused.
 */
-#include <hycomesh.h>
+#include "plex.h"
 #include <stdlib.h>
 
-/* Whether corners a < b of a cell are the ends of an edge. */
-static PetscBool IsEdge(HycoCellType type, PetscInt a, PetscInt b)
-{
-  if (type == HYCO_TET4) return PETSC_TRUE;
-  if (a < 4 && b >= 4) return (PetscBool)(b == a + 4);
-  return (PetscBool)(b - a == 1 || b - a == 3);
-}
-
-/* A segment as one number, and back. */
-static PetscInt64 Key(HycoMesh m, PetscInt a, PetscInt b)
-{
-  return (PetscInt64)PetscMin(a, b) * m->n_nodes + PetscMax(a, b);
-}
+/* An edge: its ends as one number, its middle of second order (else -1). */
+typedef struct {
+  PetscInt64 key;
+  PetscInt middle;
+} Edge;
 
 static int Ascending(const void *a, const void *b)
 {
-  const PetscInt64 x = *(const PetscInt64 *)a, y = *(const PetscInt64 *)b;
+  const PetscInt64 x = ((const Edge *)a)->key, y = ((const Edge *)b)->key;
 
   return (x > y) - (x < y);
 }
 
-/* The keys of the segments, ascending, each once. */
-static PetscErrorCode FindKeys(HycoMesh m, const PetscBool in[], PetscInt *n, PetscInt64 **key)
+/* The edge behind corner k of a cell's face. */
+static Edge EdgeOf(HycoMesh m, PetscInt cell, PetscInt number, PetscInt k)
 {
+  const PetscInt corners = HycoCellKinds[m->type].corners, *node = m->cells + cell * m->nv;
+  const signed char *of = HycoFacetNodes(m->type, number);
+  const PetscInt a = node[of[k]], b = node[of[(k + 1) % corners]];
+  const Edge edge = {(PetscInt64)PetscMin(a, b) * m->n_nodes + PetscMax(a, b),
+                     HycoMeshIsQuadratic(m) ? node[of[corners + k]] : -1};
+
+  return edge;
+}
+
+/* The edges whose nodes are all in the group, by ascending key, each once. */
+static PetscErrorCode FindEdges(HycoMesh m, const PetscBool in[], PetscInt *n, Edge **edge)
+{
+  const PetscInt corners = HycoCellKinds[m->type].corners, sides = HycoFacetCount(m->type) * corners;
   PetscInt room = 0, count = 0;
 
   PetscFunctionBegin;
   *n = 0;
-  *key = NULL;
-  for (PetscInt k = 0; k < m->n_cells * m->nv * m->nv; k++) {
-    const PetscInt *cell = m->cells + k / (m->nv * m->nv) * m->nv, a = k / m->nv % m->nv, b = k % m->nv;
+  *edge = NULL;
+  for (PetscInt k = 0; k < m->n_cells * sides; k++) {
+    const Edge e = EdgeOf(m, k / sides, k % sides / corners, k % corners);
 
-    if (a >= b || !in[cell[a]] || !in[cell[b]] || !IsEdge(m->type, a, b)) continue;
+    if (!in[e.key / m->n_nodes] || !in[e.key % m->n_nodes] || (e.middle >= 0 && !in[e.middle])) continue;
     if (count == room) {
       room = 2 * room + 64;
-      PetscCall(PetscRealloc((size_t)room * sizeof(**key), key));
+      PetscCall(PetscRealloc((size_t)room * sizeof(**edge), edge));
     }
-    (*key)[count++] = Key(m, cell[a], cell[b]);
+    (*edge)[count++] = e;
   }
-  if (count) qsort(*key, (size_t)count, sizeof(**key), Ascending);
+  if (count) qsort(*edge, (size_t)count, sizeof(**edge), Ascending);
   for (PetscInt k = 0; k < count; k++) {
-    if (!k || (*key)[k] != (*key)[k - 1]) (*key)[(*n)++] = (*key)[k];
+    if (!k || (*edge)[k].key != (*edge)[k - 1].key) (*edge)[(*n)++] = (*edge)[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* No node of this process's own has more than two segments, or two that a third closes to a triangle. */
-static PetscErrorCode CheckPath(HycoMesh m, PetscInt group, PetscInt n, const PetscInt64 key[], PetscInt next[])
+static PetscErrorCode CheckPath(HycoMesh m, PetscInt group, PetscInt n, const Edge edge[], PetscInt next[])
 {
   PetscFunctionBegin;
   for (PetscInt i = 0; i < 2 * m->n_nodes; i++) next[i] = -1;
   for (PetscInt k = 0; k < 2 * n; k++) {
-    const PetscInt ends[2] = {(PetscInt)(key[k / 2] / m->n_nodes), (PetscInt)(key[k / 2] % m->n_nodes)};
+    const PetscInt ends[2] = {(PetscInt)(edge[k / 2].key / m->n_nodes), (PetscInt)(edge[k / 2].key % m->n_nodes)};
     const PetscInt i = ends[k % 2], other = ends[1 - k % 2], place = next[2 * i] < 0 ? 0 : next[2 * i + 1] < 0 ? 1 : 2;
 
     HycoCheck(
@@ -79,25 +84,27 @@ static PetscErrorCode CheckPath(HycoMesh m, PetscInt group, PetscInt n, const Pe
 
 PetscErrorCode HycoMeshLine(HycoMesh m, PetscInt group, PetscInt *n, PetscInt **segment)
 {
+  const PetscInt width = HycoMeshIsQuadratic(m) ? 3 : 2;
   PetscBool *in;
   PetscInt *next;
-  PetscInt64 *key;
+  Edge *edge;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->n_nodes, &in));
   for (PetscInt k = m->group_start[group]; k < m->group_start[group + 1]; k++) in[m->group_node[k]] = PETSC_TRUE;
-  PetscCall(FindKeys(m, in, n, &key));
+  PetscCall(FindEdges(m, in, n, &edge));
   PetscCall(PetscFree(in));
   PetscCall(PetscMalloc1(2 * m->n_nodes, &next));
-  ierr = CheckPath(m, group, *n, key, next);
+  ierr = CheckPath(m, group, *n, edge, next);
   PetscCall(PetscFree(next));
-  if (!ierr) ierr = PetscMalloc1(2 * *n, segment);
+  if (!ierr) ierr = PetscMalloc1(width * *n, segment);
   for (PetscInt k = 0; k < *n && !ierr; k++) {
-    (*segment)[2 * k] = (PetscInt)(key[k] / m->n_nodes);
-    (*segment)[2 * k + 1] = (PetscInt)(key[k] % m->n_nodes);
+    (*segment)[width * k] = (PetscInt)(edge[k].key / m->n_nodes);
+    (*segment)[width * k + 1] = (PetscInt)(edge[k].key % m->n_nodes);
+    if (width > 2) (*segment)[width * k + 2] = edge[k].middle;
   }
-  PetscCall(PetscFree(key));
+  PetscCall(PetscFree(edge));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

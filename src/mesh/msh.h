@@ -27,6 +27,9 @@ typedef struct {
 /* Reads a file of format 2.2 or 4.1; fails unless its counts, tags, types and nodes agree. The caller destroys what it
    gives, after a failure too. One process. */
 PetscErrorCode HycoMshRead(const char path[], HycoMsh *mesh);
+/* Makes hex27 of the file's hex20, quad9 of its quad8 (face_nodes.c); new nodes have the next tags, in the order of
+   their faces' corners. */
+PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh);
 PetscErrorCode HycoMshDestroy(HycoMsh *mesh);
 
 #endif

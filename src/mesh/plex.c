@@ -7,21 +7,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The places of gmsh's nodes in DMPlex's cone of a cell; its own inverse. */
-static const signed char cone_place[HYCO_N_CELL_TYPES][HYCO_CELL_NODES] = {{0, 1},
-                                                                           {0, 1, 2},
-                                                                           {0, 1, 2, 3},
-                                                                           {1, 0, 2, 3},
-                                                                           {0, 3, 2, 1, 4, 5, 6, 7},
-                                                                           {0, 1, 2, 3, 4, 5},
-                                                                           {0, 1, 2, 3, 4, 5, 6, 7},
-                                                                           {0, 1, 2, 3, 4, 5, 6, 7, 8}};
-static const PetscInt n_faces[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 6, 3, 4, 4};
+/* The places of gmsh's nodes in DMPlex's cone of a cell; its own inverse. Cells of second order keep gmsh's order. */
+static const signed char cone_place[][8] = {{0, 1}, {0, 1, 2}, {0, 1, 2, 3}, {1, 0, 2, 3}, {0, 3, 2, 1, 4, 5, 6, 7}};
+static const PetscInt n_faces[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 6, 3, 4, 4, 4, 6, 6};
 static const DMPolytopeType plex_type[HYCO_N_CELL_TYPES] = {
-    DM_POLYTOPE_SEGMENT,    DM_POLYTOPE_TRIANGLE, DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_TETRAHEDRON,
-    DM_POLYTOPE_HEXAHEDRON, DM_POLYTOPE_TRIANGLE, DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_QUADRILATERAL};
+    DM_POLYTOPE_SEGMENT,     DM_POLYTOPE_TRIANGLE,   DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_TETRAHEDRON,
+    DM_POLYTOPE_HEXAHEDRON,  DM_POLYTOPE_TRIANGLE,   DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_QUADRILATERAL,
+    DM_POLYTOPE_TETRAHEDRON, DM_POLYTOPE_HEXAHEDRON, DM_POLYTOPE_HEXAHEDRON};
 /* The nodes of a cell's facets, in gmsh's order of the cell's nodes. */
-static const signed char face[HYCO_N_CELL_TYPES][6][4] = {
+static const signed char face[HYCO_N_CELL_TYPES][6][HYCO_FACET_NODES] = {
     {{0}, {1}},
     {{0, 1}, {1, 2}, {2, 0}},
     {{0, 1}, {1, 2}, {2, 3}, {3, 0}},
@@ -29,7 +23,31 @@ static const signed char face[HYCO_N_CELL_TYPES][6][4] = {
     {{0, 3, 2, 1}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}, {4, 5, 6, 7}},
     {{0, 1, 3}, {1, 2, 4}, {2, 0, 5}},
     {{0, 1, 4}, {1, 2, 5}, {2, 3, 6}, {3, 0, 7}},
-    {{0, 1, 4}, {1, 2, 5}, {2, 3, 6}, {3, 0, 7}}};
+    {{0, 1, 4}, {1, 2, 5}, {2, 3, 6}, {3, 0, 7}},
+    {{0, 2, 1, 6, 5, 4}, {0, 1, 3, 4, 9, 7}, {0, 3, 2, 7, 8, 6}, {1, 2, 3, 5, 8, 9}},
+    {{0, 3, 2, 1, 9, 13, 11, 8},
+     {0, 1, 5, 4, 8, 12, 16, 10},
+     {1, 2, 6, 5, 11, 14, 18, 12},
+     {2, 3, 7, 6, 13, 15, 19, 14},
+     {3, 0, 4, 7, 9, 10, 17, 15},
+     {4, 5, 6, 7, 16, 18, 19, 17}},
+    {{0, 3, 2, 1, 9, 13, 11, 8, 20},
+     {0, 1, 5, 4, 8, 12, 16, 10, 21},
+     {1, 2, 6, 5, 11, 14, 18, 12, 23},
+     {2, 3, 7, 6, 13, 15, 19, 14, 24},
+     {3, 0, 4, 7, 9, 10, 17, 15, 22},
+     {4, 5, 6, 7, 16, 18, 19, 17, 25}}};
+
+/* The place of a node of a cell in its cone; type HYCO_N_CELL_TYPES: of what is no cell. */
+static PetscInt ConePlace(HycoCellType type, PetscInt node)
+{
+  return type < HYCO_N_CELL_TYPES && !HycoCellKinds[type].quadratic ? cone_place[type][node] : node;
+}
+
+PetscInt HycoFacetCount(HycoCellType type)
+{
+  return n_faces[type];
+}
 
 const signed char *HycoFacetNodes(HycoCellType type, PetscInt number)
 {
@@ -46,7 +64,7 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
     const PetscInt *cone;
 
     PetscCall(DMPlexGetCone(dm, p, &cone));
-    for (PetscInt k = 0; k < n; k++) vertex[k] = cone[type < HYCO_N_CELL_TYPES ? cone_place[type][k] : k];
+    for (PetscInt k = 0; k < n; k++) vertex[k] = cone[ConePlace(type, k)];
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(DMPlexGetDepthStratum(dm, 0, &v0, &v1));
@@ -55,7 +73,7 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
     const PetscInt v = closure[2 * k];
 
     if (v < v0 || v >= v1) continue;
-    vertex[type < HYCO_N_CELL_TYPES ? cone_place[type][at] : at] = v;
+    vertex[ConePlace(type, at)] = v;
     at++;
   }
   PetscCall(DMPlexRestoreTransitiveClosure(dm, p, PETSC_TRUE, &size, &closure));
@@ -63,13 +81,11 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
 }
 
 /* Whether a cone of this size may be of a type, whose DMPlex's type it has: those of second order have all their nodes
-   in their cones, those of first order in DMs of edges and faces what they want, and with ties more. */
+   in their cones, those of first order at most these (in DMs of edges and faces the sides), and with ties more. */
 static PetscBool ConeIsOf(HycoCellType type, PetscInt size, PetscBool tied)
 {
-  const PetscBool quadratic = (PetscBool)(!tied && (size == 6 || size >= 8));
-
-  if (HycoCellKinds[type].dim == 3) return PETSC_TRUE;
-  return quadratic ? (PetscBool)(HycoCellKinds[type].nv == size) : (PetscBool)!HycoCellKinds[type].quadratic;
+  if (HycoCellKinds[type].quadratic) return (PetscBool)(!tied && HycoCellKinds[type].nv == size);
+  return (PetscBool)(tied || size <= HycoCellKinds[type].nv);
 }
 
 /* The HycoCellType of this process's cells; -1: there are none. */
@@ -94,8 +110,8 @@ static PetscErrorCode CellType(DM dm, PetscInt *type)
     PetscCall(DMPlexGetCellType(dm, c, &of));
     while (t < HYCO_N_CELL_TYPES && (plex_type[t] != of || !ConeIsOf((HycoCellType)t, size, tied))) t++;
     HycoCheck(t < HYCO_N_CELL_TYPES && (c == c0 || t == *type),
-              "the mesh has cells of DMPlex's type %s; hyco takes segments, triangles, quadrilaterals, tetrahedra or "
-              "hexahedra, one type per mesh",
+              "the mesh has cells of DMPlex's type %s; hyco supports segments, triangles, quadrilaterals, tetrahedra "
+              "or hexahedra, one type per mesh",
               DMPolytopeTypes[of]);
     *type = t;
   }
@@ -233,7 +249,7 @@ static PetscErrorCode SetCones(DM dm, HycoMesh m)
   for (PetscInt e = 0; m && e < m->n_cells; e++) {
     const PetscInt n = HycoMeshCellNodes(m, e, node);
 
-    for (PetscInt k = 0; k < n; k++) cone[k < m->nv ? cone_place[m->type][k] : k] = m->n_cells + node[k];
+    for (PetscInt k = 0; k < n; k++) cone[k < m->nv ? ConePlace(m->type, k) : k] = m->n_cells + node[k];
     PetscCall(DMPlexSetCone(dm, e, cone));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -268,7 +284,7 @@ PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
   if (m && !ties && !head[2]) {
     PetscCall(PetscMalloc1(m->n_cells * m->nv, &cone));
     for (PetscInt k = 0; k < m->n_cells * m->nv; k++)
-      cone[k / m->nv * m->nv + cone_place[m->type][k % m->nv]] = m->cells[k];
+      cone[k / m->nv * m->nv + ConePlace(m->type, k % m->nv)] = m->cells[k];
   }
   if (ties || head[2])
     PetscCall(FromCones(comm, head[0], m, dm));
@@ -291,7 +307,7 @@ PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
 /* -- a DM to tables -- */
 
 typedef struct {
-  PetscInt node[4], cell, number;
+  PetscInt node[HYCO_FACET_NODES], cell, number;
 } Facet;
 
 typedef struct {
@@ -455,12 +471,32 @@ static PetscErrorCode TakeNodes(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Runs through a facet's nodes the other way round: its corners, of a face from the first on, and the middles of its
+   sides, of which the k-th follows the k-th corner. */
+static void Reverse(HycoCellType type, PetscInt facet[])
+{
+  const PetscInt corners = HycoCellKinds[type].corners, first = corners > 2;
+
+  for (PetscInt k = first, last = corners - 1; k < last; k++, last--) {
+    const PetscInt keep = facet[k];
+
+    facet[k] = facet[last];
+    facet[last] = keep;
+  }
+  for (PetscInt k = corners, last = 2 * corners - 1; HycoCellKinds[type].quadratic && corners > 2 && k < last;
+       k++, last--) {
+    const PetscInt keep = facet[k];
+
+    facet[k] = facet[last];
+    facet[last] = keep;
+  }
+}
+
 /* Reverses the facet if its normal points into the cell. In 1D there is nothing to reverse. */
 static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
 {
   PetscReal inside[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, out = 0;
-  const PetscReal *p = m->xyz + 3 * facet[0], *q, *s = m->xyz + 3 * facet[m->nf - 1];
-  const PetscInt last = m->dim == 2 ? 1 : m->nf - 1; /* of the corners */
+  const PetscReal *p = m->xyz + 3 * facet[0], *q, *s = m->xyz + 3 * facet[HycoCellKinds[m->type].corners - 1];
 
   if (m->dim == 1) return;
   q = m->xyz + 3 * facet[1];
@@ -477,12 +513,7 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
     normal[c] = (q[d] - p[d]) * (s[e] - p[e]) - (q[e] - p[e]) * (s[d] - p[d]);
   }
   for (PetscInt c = 0; c < 3; c++) out += normal[c] * (p[c] - inside[c]);
-  if (out < 0) {
-    const PetscInt first = m->dim == 2 ? 0 : 1, keep = facet[first];
-
-    facet[first] = facet[last];
-    facet[last] = keep;
-  }
+  if (out < 0) Reverse(m->type, facet);
 }
 
 /* Facets beside this process's own nodes; `number` is the facet's in its cell. */
@@ -550,11 +581,11 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
   PetscCall(DMPlexGetSupport(b->dm, p, &support));
   for (PetscInt k = 0; k < b->scene->n_loads && n > 1; k++)
     HycoCheck(strcmp(b->scene->load[k].group, m->group_name[group]),
-              "the load on %s: a facet of it lies between two cells; give a group on the boundary",
+              "the load on %s: one of its facets lies between two cells; give a group on the boundary",
               m->group_name[group]);
   for (PetscInt k = 0; k < b->scene->n_springs && n > 1 && m->dim > 1; k++)
     HycoCheck(strcmp(b->scene->spring[k].group, m->group_name[group]),
-              "the spring on %s: a facet of it lies between two cells; give a group on the boundary",
+              "the spring on %s: one of its facets lies between two cells; give a group on the boundary",
               m->group_name[group]);
   if (n != 1) PetscFunctionReturn(PETSC_SUCCESS);
   cell = b->cell[support[0] - b->c0];
@@ -569,7 +600,7 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
 static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, PetscInt p)
 {
   HycoMesh m = b->m;
-  PetscInt vertex[4], node[4], depth = 0, of = 0;
+  PetscInt vertex[HYCO_FACET_NODES], node[HYCO_FACET_NODES], depth = 0, of = 0;
 
   PetscFunctionBegin;
   if (p >= b->c0 && p < b->c1) {
@@ -703,13 +734,13 @@ static PetscErrorCode TakeBodies(Builder *b)
     for (PetscInt j = m->group_cell_start[g]; j < m->group_cell_start[g + 1]; j++) {
       PetscInt *body = &m->cell_body[m->group_cell[j]];
 
-      HycoCheck(*body < 0, "cell %d lies in two bodies, %s and %s; each cell must lie in one",
+      HycoCheck(*body < 0, "cell %d belongs to two bodies, %s and %s; each cell must belong to one",
                 (int)m->cell_id[m->group_cell[j]], b->scene->body[PetscMax(*body, 0)].name, b->scene->body[k].name);
       *body = k;
     }
   }
   for (PetscInt e = 0; e < m->n_cells; e++)
-    HycoCheck(m->cell_body[e] >= 0, "cell %d lies in no body; give each cell of the mesh a label of a body's name",
+    HycoCheck(m->cell_body[e] >= 0, "cell %d belongs to no body; give each cell of the mesh the label of a body",
               (int)m->cell_id[e]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

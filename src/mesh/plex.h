@@ -30,7 +30,8 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
 PetscErrorCode HycoPlexType(DM dm, PetscInt *type);
 /* Whether a label of this name is DMPlex's own. */
 PetscBool HycoPlexOwnLabel(const char name[]);
-/* The nodes of facet `number` of a cell, in gmsh's order. */
+/* How many facets a cell has; the nodes of facet `number`, in gmsh's order: corners, middles of the sides, its own. */
+PetscInt HycoFacetCount(HycoCellType type);
 const signed char *HycoFacetNodes(HycoCellType type, PetscInt number);
 
 /* The registered PetscPartitioner type HYCO_PARTITIONER, for a mesh (this process's; NULL: no cells) with contacts,

@@ -132,7 +132,7 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, Hyc
   m->trust = trust;
   if (!chosen->number) PetscFunctionReturn(PETSC_SUCCESS);
   HycoRecipeDescribe(&chosen->recipe, sizeof(recipe), recipe);
-  snprintf(text, sizeof(text), "  recipe number %d of the %d that were tried: %s\n", (int)chosen->number,
+  snprintf(text, sizeof(text), "  settings number %d of the %d that were tried: %s\n", (int)chosen->number,
            (int)chosen->of, recipe);
   PetscCall(PetscFree(m->search));
   PetscCall(PetscStrallocpy(text, &m->search));
@@ -141,15 +141,18 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, Hyc
 
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report)
 {
-  HycoHeldOut *rows;
+  HycoHeldOut *rows = t->judged_held;
   PetscInt n = 0;
 
   PetscFunctionBegin;
+  t->judged_held = NULL;
   if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(n, &rows));
-  PetscCall(HycoReducerPredictHeldOut(t, model, store, rows));
-  PetscCall(HycoHeldOutSummarise(n, rows, &report->held_out));
+  if (!rows) {
+    PetscCall(PetscMalloc1(n, &rows));
+    PetscCall(HycoReducerPredictHeldOut(t, model, store, NULL, rows));
+  }
+  PetscCall(HycoHeldOutSummarise(n, rows, HycoHeldOutForce(n, rows), &report->held_out));
   HycoOnRoot(HycoComm(t), Conclude(t, rows, model, report));
   PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, HycoComm(t)));
   PetscCall(PetscFree(rows));

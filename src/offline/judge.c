@@ -101,6 +101,56 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, HycoJudged judged[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A race is decided after so many paths at the earliest. */
+#define RACED 3
+
+static PetscErrorCode Race(HycoReducer t, HycoROM m, PetscInt n, const PetscInt order[], const HycoJudged best[],
+                           PetscReal most, HycoJudged judged[], PetscBool *lost)
+{
+  PetscInt n_par;
+  const PetscReal *mu;
+  PetscReal mine = 0, its = 0, all = n * most;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  for (PetscInt k = 0; k < n && best; k++) all = (k ? all : 0) + best[k].u;
+  *lost = PETSC_FALSE;
+  for (PetscInt k = 0; k < n && !*lost; k++) {
+    const PetscInt i = order[k];
+
+    PetscCall(HycoReducerTell(t, "training paths", k, n));
+    PetscCall(JudgeSample(t, m, i, mu + i * n_par, &judged[i]));
+    mine += judged[i].u;
+    its += best ? best[i].u : 0;
+    *lost = (PetscBool)(mine >= all || (best && k + 1 >= RACED && mine >= its));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM m, const HycoJudged best[], PetscReal most,
+                                    HycoJudged judged[], PetscReal *u, PetscBool *lost)
+{
+  PetscInt n, *order;
+  PetscReal *key;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  PetscCall(PetscMalloc2(n, &order, n, &key));
+  for (PetscInt k = 0; k < n; k++) {
+    order[k] = k;
+    key[k] = best ? -best[k].u : 0;
+  }
+  if (best) PetscCall(PetscSortRealWithArrayInt(n, key, order));
+  m->reconstruct = PETSC_FALSE;
+  PetscCall(Race(t, m, n, order, best, most, judged, lost));
+  PetscCall(HycoROMSetSteps(m, 0, NULL));
+  m->reconstruct = PETSC_TRUE;
+  PetscCall(PetscFree2(order, key));
+  *u = 0;
+  for (PetscInt k = 0; k < n && !*lost; k++) *u += judged[k].u / n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Mean training errors of the model as it stands. */
 PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM m, PetscReal *u, PetscReal *lambda)
 {
@@ -114,12 +164,24 @@ PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
   PetscInt n;
 
   PetscFunctionBegin;
+  if (t->trying) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
   PetscCall(PetscFree(t->judged));
   PetscCall(PetscMalloc1(n, &t->judged));
   PetscCall(JudgeAll(t, m, t->judged, &m->numbers[1], &m->numbers[2]));
   m->numbers[0] = 0;
   PetscTryTypeMethod(m, condition, &m->numbers[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerTell(HycoReducer t, const char what[], PetscInt done, PetscInt n)
+{
+  char phase[2 * HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (!t->phase || !t->doing[0] || t->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  snprintf(phase, sizeof(phase), "%s: %s", t->doing, what);
+  PetscCall((*t->phase)(phase, done, n, t->phase_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

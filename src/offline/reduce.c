@@ -141,8 +141,8 @@ PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscRe
   PetscFunctionBegin;
   *l = HycoPODRank(n_sigma, sigma, tol, t->noise, max_modes);
   HycoCheckModel(*l <= found || tol == 0,
-                 "-hyco_pod_svd_type %s finds %d modes accurately, which leave out more than %g of the snapshots' "
-                 "energy; take tsqr, or a larger -hyco_pod_tol",
+                 "-hyco_pod_svd_type %s finds only %d accurate modes, which leave out more than %g of the snapshots' "
+                 "energy; use tsqr, or a larger -hyco_pod_tol",
                  t->svd_type, (int)found, (double)tol);
   *l = PetscMin(*l, found);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -444,9 +444,10 @@ static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, Pe
   if (!(t->pod_memory > 0)) PetscCall(HycoSnapshotsGetField(store, t->samples, 0, n, "U", t->sizes[3], &t->S));
   PetscCall(FetchContacts(t));
   PetscCall(FindBasis(t, store, HYCO_SEED_DISPLACEMENT, all));
-  HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",
+  HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give a smaller value",
                  (double)t->tol[HYCO_SEED_DISPLACEMENT]);
-  HycoCheckModel(basis->l, "every training solution has zero displacement; there is nothing to learn");
+  HycoCheckModel(basis->l,
+                 "every training solution has zero displacement, so that there are no modes; check the loads");
   PetscCall(PetscMalloc1(t->n_s, &t->U_norm));
   PetscCall(PetscMalloc1((size_t)basis->l * (size_t)t->n_s, &basis->coefficients));
   PetscCall(HycoReducerEachBatch(t, ProjectBatch, NULL));
@@ -484,7 +485,7 @@ static PetscErrorCode TakeDisplacements(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(CutBasis(t, HYCO_SEED_DISPLACEMENT, &V, &t->l));
-  HycoCheckModel(t->l, "-hyco_pod_tol %g leaves no mode; give less", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+  HycoCheckModel(t->l, "-hyco_pod_tol %g leaves no mode; give a smaller value", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
   PetscCall(PetscMalloc1(PetscMax(t->n_s, basis->n_sigma) + 1, &t->sigma));
   PetscCall(PetscArraycpy(t->sigma, basis->sigma, PetscMax(t->n_s, basis->n_sigma) + 1));
   PetscCall(SeedFrom(t, V, t->l, HYCO_SEED_DISPLACEMENT, t->sizes[3], &t->n_seeds_node, &t->seeds_node));

@@ -18,9 +18,8 @@
 static const PetscReal usual[HYCO_N_ERRORS] = {
     [HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2, [HYCO_ERROR_LAMBDA] = 1e-2, [HYCO_ERROR_INELASTIC] = 2e-2};
 
-#define LITTLE        1.25 /* a model that misses by so much more than the best is as good, if it is cheaper */
-#define EXTENSION     2.5  /* edges of the contact surface's facets */
-#define MANY_UNKNOWNS 600  /* of an RID; beyond, "all" is not tried by itself: its reduced matrix is dense */
+#define EXTENSION     2.5 /* edges of the contact surface's facets */
+#define MANY_UNKNOWNS 600 /* of an RID; beyond, "all" is not tried by itself: its reduced matrix is dense */
 #define STALE         3 /* attempts without progress end a kind: larger RIDs do not mend a basis that lacks solutions */
 #define PROGRESS      0.95
 #define WILD          50  /* times the target: no attempt so far is a model at all */
@@ -57,7 +56,10 @@ typedef struct {
   PetscReal target[HYCO_N_ERRORS];
   PetscInt n;
   HycoAttempt attempt[MAX_ATTEMPTS];
-  PetscReal least, *ratio; /* of the best so far, and of its held-out points */
+  HycoHeldOut *rows[MAX_ATTEMPTS]; /* of paths, of each attempt that was judged at all held-out points; else NULL */
+  PetscReal force;                 /* HycoHeldOutForce() of these */
+  PetscInt *order;                 /* held-out points, from the one where the last attempts erred most */
+  PetscReal least, *ratio;         /* of the best so far, and of its held-out points */
 } Search;
 
 void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
@@ -82,7 +84,8 @@ void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *r)
                     .contact_extension = t->extension,
                     .layers = t->layers,
                     .hybrid = t->hybrid,
-                    .whole = t->whole_rid};
+                    .whole = t->whole_rid,
+                    .ridge = -1};
 }
 
 /* The stress and force tolerances follow that of the displacement where they were the same. */
@@ -101,6 +104,7 @@ static PetscErrorCode SetRecipe(HycoReducer t, const HycoRecipe *r)
   t->hybrid = r->hybrid;
   t->whole_rid = (PetscBool)(r->whole || t->prototype->traits.whole);
   t->plane = r->plane;
+  t->ridge = r->ridge;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -137,35 +141,93 @@ static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest quotient of an error and its target, of all held-out points and, for the best so far, of each. */
-static PetscErrorCode Judge(Search *s, HycoROM model, HycoAttempt *a)
+/* The largest quotient of an error and its target at a held-out point. */
+static PetscReal Quotient(const Search *s, const HycoHeldOut *row)
 {
-  HycoReducer t = s->t;
-  HycoHeldOut *rows;
-  PetscReal force;
-  PetscInt n;
+  PetscReal ratio = 0;
+
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    if (s->target[j] > 0) ratio = PetscMax(ratio, HycoHeldOutError(row, (HycoErrorKind)j, s->force) / s->target[j]);
+  }
+  return ratio;
+}
+
+/* The errors at the held-out points that were predicted, and their largest quotient. */
+static PetscErrorCode Summarise(Search *s, const HycoHeldOutRace *race, const HycoHeldOut rows[], HycoAttempt *a)
+{
+  HycoHeldOut *some;
+  PetscReal force = s->force;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
-  PetscCall(PetscMalloc1(n, &rows));
-  PetscCall(HycoReducerPredictHeldOut(t, model, s->store, rows));
-  PetscCall(HycoHeldOutSummarise(n, rows, &a->held_out));
+  PetscCall(PetscMalloc1(race->n, &some));
+  for (PetscInt k = 0; k < race->n; k++) some[k] = race->n == a->n_held ? rows[k] : rows[race->order[k]];
+  if (race->n == a->n_held || !(force > 0)) force = HycoHeldOutForce(race->n, some);
+  PetscCall(HycoHeldOutSummarise(race->n, some, force, &a->held_out));
+  PetscCall(PetscFree(some));
+  if (race->n == a->n_held && !a->held_out.not_converged) s->force = force;
   a->ratio = 0;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
     if (!(s->target[j] > 0) || a->held_out.largest[j] / s->target[j] <= a->ratio) continue;
     a->ratio = a->held_out.largest[j] / s->target[j];
     a->worst = (HycoErrorKind)j;
   }
-  force = HycoHeldOutForce(n, rows);
-  for (PetscInt k = 0; k < n && a->ratio < s->least; k++) {
-    s->ratio[k] = 0;
-    for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
-      if (s->target[j] > 0)
-        s->ratio[k] = PetscMax(s->ratio[k], HycoHeldOutError(&rows[k], (HycoErrorKind)j, force) / s->target[j]);
-    }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The next attempt begins with the points where this one erred most, of a dropped one that where it was. */
+static PetscErrorCode Reorder(Search *s, const HycoHeldOutRace *race, const HycoHeldOut rows[], PetscInt n)
+{
+  PetscReal *key;
+  PetscInt *order = s->order, last = race->n - 1;
+
+  PetscFunctionBegin;
+  if (race->n < n) {
+    const PetscInt point = order[last];
+
+    PetscCall(PetscArraymove(order + 1, order, last));
+    order[0] = point;
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  s->least = PetscMin(s->least, a->ratio);
-  PetscCall(PetscFree(rows));
+  PetscCall(PetscMalloc1(n, &key));
+  for (PetscInt k = 0; k < n; k++) {
+    key[k] = -Quotient(s, &rows[k]);
+    order[k] = k;
+  }
+  PetscCall(PetscSortRealWithArrayInt(n, key, order));
+  PetscCall(PetscFree(key));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the model makes of the held-out points: of paths only until it is clear that the recipe will not be chosen,
+   unless `all` are asked for. */
+static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt *a)
+{
+  HycoReducer t = s->t;
+  const PetscInt n = a->n_held;
+  PetscInt beaten;
+  HycoHeldOut *rows;
+  HycoHeldOutRace race = {
+      .order = s->order, .target = s->target, .force = s->force, .all = (PetscBool)(all || t->exhaustive)};
+
+  PetscFunctionBegin;
+  race.most = HycoAttemptsLimit(s->n - 1, s->attempt, a->cost, &beaten);
+  PetscCall(PetscCalloc1(n, &rows));
+  s->rows[s->n - 1] = rows;
+  PetscCall(HycoReducerPredictHeldOut(t, model, s->store, t->scene->n_times ? &race : NULL, rows));
+  if (!t->scene->n_times) race.n = n;
+  PetscCall(Summarise(s, &race, rows, a));
+  if (race.lost) {
+    a->dropped_at = s->order[race.n - 1];
+    a->beaten_by = a->held_out.not_converged ? 0 : beaten;
+  }
+  for (PetscInt k = 0; k < race.n && a->ratio <= s->least && !a->beaten_by; k++) {
+    const PetscInt point = race.n < n ? s->order[k] : k;
+
+    s->ratio[point] = Quotient(s, &rows[point]);
+  }
+  if (!a->beaten_by) s->least = PetscMin(s->least, a->ratio);
+  if (t->scene->n_times) PetscCall(Reorder(s, &race, rows, n));
+  if (race.n < n || !t->scene->n_times) PetscCall(PetscFree(s->rows[s->n - 1]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -180,28 +242,40 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store)
 }
 
 /* Bases, RID and model of the recipe that is set, and what it is worth. */
-static PetscErrorCode BuildAndJudge(Search *s, HycoAttempt *a, HycoTraining *report)
+static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
 {
+  HycoReducer t = s->t;
+  HycoTraining report = {0};
   HycoROM model;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(TakeModes(s->t, s->store));
-  PetscCall(HycoReducerBuild(s->t, PETSC_FALSE, &model, report));
-  ierr = Judge(s, model, a); /* a model may refuse to predict */
+  PetscCall(TakeModes(t, s->store));
+  PetscCall(HycoReducerBuild(t, PETSC_FALSE, &model, &report));
+  a->n_modes = report.n_modes;
+  a->n_fe_dofs = report.n_fe_dofs;
+  a->n_flexibilities = report.n_flexibilities;
+  a->rid_nodes = report.rid_nodes;
+  a->rid_elements = report.rid_elements;
+  a->rid_contacts = report.rid_contacts;
+  a->rid_fraction = report.rid_fraction;
+  a->cost = t->prototype->ops->cost ? (*t->prototype->ops->cost)(t, a) : 0;
+  PetscCallMPI(MPI_Bcast(&t->ridge, 1, MPIU_REAL, 0, HycoComm(t)));
+  a->recipe.ridge = t->ridge;
+  ierr = Judge(s, model, all, a); /* a model may refuse to predict */
   PetscCall(HycoROMDestroy(&model));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Builds the recipe's model and judges it; what fails is an attempt that failed. Collective. */
-static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
+/* Builds the recipe's model and judges it, at all held-out points or as far as it matters; what fails is an attempt
+   that failed. Collective. */
+static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
 {
   HycoReducer t = s->t;
   HycoAttempt *a = &s->attempt[s->n];
-  HycoTraining report = {0};
   PetscErrorCode ierr;
-  char message[HYCO_LINE];
+  char message[HYCO_LINE], what[HYCO_LINE];
 
   PetscFunctionBegin;
   if (s->n == MAX_ATTEMPTS) PetscFunctionReturn(PETSC_SUCCESS);
@@ -209,26 +283,22 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe)
   a->number = ++s->n;
   a->recipe = *recipe;
   a->ratio = PETSC_INFINITY;
-  PetscCall(HycoSamplesGet(t->held, &a->held_out.n, NULL, NULL));
+  a->dropped_at = -1;
+  PetscCall(HycoSamplesGet(t->held, &a->n_held, NULL, NULL));
+  HycoRecipeDescribe(recipe, sizeof(what), what);
+  HycoFormat(t->doing, "settings %d, %s", (int)a->number, what);
   t->most_full_order =
       t->pinned[HYCO_CHOICE_HYBRID] || recipe->hybrid != HYCO_HYBRID_ALL || recipe->plane ? 0 : MANY_UNKNOWNS;
   PetscCall(SetRecipe(t, recipe));
   PetscCall(HycoCatchBegin());
-  ierr = BuildAndJudge(s, a, &report);
+  t->trying = PETSC_TRUE;
+  ierr = BuildAndJudge(s, all, a);
+  t->trying = PETSC_FALSE;
+  t->doing[0] = '\0';
   PetscCall(HycoCatchEnd(ierr, message));
   t->most_full_order = 0;
   PetscCall(HycoCatchNoModel(ierr, message));
   if (message[0]) a->ratio = PETSC_INFINITY;
-  if (!message[0]) {
-    a->n_modes = report.n_modes;
-    a->n_fe_dofs = report.n_fe_dofs;
-    a->n_flexibilities = report.n_flexibilities;
-    a->rid_nodes = report.rid_nodes;
-    a->rid_elements = report.rid_elements;
-    a->rid_contacts = report.rid_contacts;
-    a->rid_fraction = report.rid_fraction;
-    a->cost = t->prototype->ops->cost ? (*t->prototype->ops->cost)(t, a) : 0;
-  }
   PetscCall(PetscStrncpy(a->failure, message, sizeof(a->failure)));
   if (t->attempt) HycoOnRoot(HycoComm(t), t->attempt(a, t->attempt_ctx));
   if (t->phase) HycoOnRoot(HycoComm(t), t->phase("settings tried", s->n, 0, t->phase_ctx));
@@ -264,7 +334,7 @@ static PetscBool WholeIsSmall(HycoReducer t, HycoHybrid hybrid)
 }
 
 /* The sizes in their order until one meets the targets, of those that differ in what
-   the type of model reads. */
+   the type of model reads. Of paths that were dropped nobody knows whether they are progress: all sizes are tried. */
 static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid, PetscBool *met)
 {
   const PetscInt first = s->n;
@@ -286,8 +356,8 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
     }
     for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].recipe));
     if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid))) continue;
-    PetscCall(Try(s, &r));
-    stale = least > WILD || s->attempt[s->n - 1].ratio < PROGRESS * least ? 0 : stale + 1;
+    PetscCall(Try(s, &r, PETSC_FALSE));
+    stale = least > WILD || s->attempt[s->n - 1].ratio < PROGRESS * least || s->t->scene->n_times ? 0 : stale + 1;
     least = PetscMin(least, s->attempt[s->n - 1].ratio);
     *met = (PetscBool)(least <= 1);
   }
@@ -375,7 +445,7 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
     r.hybrid = HYCO_HYBRID_ALL;
     r.plane = s->plane;
     if (k && pinned[HYCO_CHOICE_TOLERANCE]) break;
-    PetscCall(Try(s, &r));
+    PetscCall(Try(s, &r, PETSC_FALSE));
     *met = (PetscBool)(s->attempt[s->n - 1].ratio <= 1);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -403,7 +473,7 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
   PetscFunctionBegin;
   r.type = type->type;
   r.rid = PETSC_FALSE;
-  PetscCall(Try(s, &r));
+  PetscCall(Try(s, &r, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -436,23 +506,20 @@ static PetscErrorCode TryAll(Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cheapest of those that meet the targets, or of those that miss them by little more than the best; NULL: no recipe
-   gave a model. */
-static HycoAttempt *Choose(Search *s)
+/* The recipe that is taken as things stand; what was dropped and might be taken now is judged first. */
+static PetscErrorCode Choose(Search *s, HycoAttempt **chosen)
 {
-  HycoAttempt *chosen = NULL;
-  PetscReal least = PETSC_INFINITY;
+  HycoAttempt *again;
 
-  for (PetscInt k = 0; k < s->n; k++) {
-    if (!s->attempt[k].failure[0]) least = PetscMin(least, s->attempt[k].ratio);
-  }
-  for (PetscInt k = 0; k < s->n; k++) {
-    HycoAttempt *a = &s->attempt[k];
+  PetscFunctionBegin;
+  while (s->n < MAX_ATTEMPTS && (again = HycoAttemptsReopen(s->n, s->attempt))) {
+    const HycoRecipe recipe = again->recipe;
 
-    if (a->failure[0] || a->ratio > PetscMax(1, LITTLE * least)) continue;
-    if (!chosen || a->cost < chosen->cost) chosen = a;
+    again->reopened = PETSC_TRUE;
+    PetscCall(Try(s, &recipe, PETSC_TRUE));
   }
-  return chosen;
+  *chosen = HycoAttemptsChoose(s->n, s->attempt);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Nothing is open, or there is nothing to judge by. */
@@ -546,6 +613,15 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What attempts have left. */
+static void Forget(Search *s)
+{
+  for (PetscInt k = 0; k < s->n; k++) (void)!PetscFree(s->rows[k]);
+  (void)!PetscFree2(s->ratio, s->order);
+  s->n = 0;
+  s->force = 0;
+}
+
 /* Every open recipe on the bases that are there. */
 static PetscErrorCode Attempts(Search *s)
 {
@@ -553,10 +629,13 @@ static PetscErrorCode Attempts(Search *s)
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(s->t->held, &n, NULL, NULL));
-  PetscCall(PetscFree(s->ratio));
-  PetscCall(PetscMalloc1(n, &s->ratio));
+  Forget(s);
+  PetscCall(PetscMalloc2(n, &s->ratio, n, &s->order));
+  for (PetscInt k = 0; k < n; k++) {
+    s->ratio[k] = 1; /* until an attempt says else */
+    s->order[k] = k;
+  }
   s->least = PETSC_INFINITY;
-  s->n = 0;
   PetscCall(TryAll(s));
   if (s->t->phase) HycoOnRoot(HycoComm(s->t), s->t->phase("settings tried", s->n, s->n, s->t->phase_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -603,14 +682,16 @@ static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report
 static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
 {
   HycoReducer t = s->t;
-  HycoAttempt *best;
+  HycoAttempt *best = NULL;
   PetscErrorCode ierr;
   char message[HYCO_LINE] = "";
 
   PetscFunctionBegin;
-  while ((best = Choose(s))) {
+  for (;;) {
     HycoTraining built = {0};
 
+    PetscCall(Choose(s, &best));
+    if (!best) break;
     PetscCall(SetRecipe(t, &best->recipe));
     PetscCall(TakeModes(t, s->store));
     PetscCall(HycoCatchBegin());
@@ -625,12 +706,15 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
     *report = built;
     report->chosen = *best;
     report->chosen.of = s->n;
+    t->judged_held = s->rows[best->number - 1];
+    s->rows[best->number - 1] = NULL;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt k = s->n - 1; k > 0 && !best; k--) { /* one that is not refused for its cost */
     if (s->attempt[k].recipe.hybrid != HYCO_HYBRID_ALL) best = &s->attempt[k];
   }
-  HycoFail("none of %d recipes gave a model; one of them: %s", (int)s->n, (best ? best : &s->attempt[0])->failure);
+  HycoFail("none of %d settings gave a model; the error of one of them: %s", (int)s->n,
+           (best ? best : &s->attempt[0])->failure);
 }
 
 static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report)
@@ -672,8 +756,9 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   s->store = store;
   PetscCall(HycoROMTypeNames(&s->types));
   ierr = Learn(s, model, grown, report);
-  PetscCall(PetscFree(s->ratio));
+  Forget(s);
   PetscCall(PetscFree(s));
+  t->ridge = -1;
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

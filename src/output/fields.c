@@ -56,22 +56,36 @@ PetscErrorCode HycoFieldWriteData(HycoH5 h, const HycoFileOrder *order, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileOrder *order, HycoMesh m, PetscInt cols)
+/* Which of gmsh's nodes of a cell is VTK's k-th. */
+static PetscInt FromGmsh(HycoCellType type, PetscInt k)
 {
-  PetscInt *cells = m->cells;
+  static const signed char tet10[10] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8},
+                           hex27[27] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  11, 13, 9,  16, 18,
+                                        19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26};
+
+  if (type == HYCO_TET10) return tet10[k];
+  return type == HYCO_HEX20 || type == HYCO_HEX27 ? hex27[k] : k;
+}
+
+PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileOrder *order, HycoMesh m, PetscBool vtk,
+                                    PetscInt cols)
+{
+  PetscInt *cells;
 
   PetscFunctionBegin;
-  if (order) {
-    PetscCall(PetscMalloc1(m->n_cells * m->nv, &cells));
-    for (PetscInt k = 0; k < m->n_cells * m->nv; k++) cells[k] = m->node_whole[m->cells[k]];
+  PetscCall(PetscMalloc1(m->n_cells * m->nv, &cells));
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
+    const PetscInt node = m->cells[k - k % m->nv + (vtk ? FromGmsh(m->type, k % m->nv) : k % m->nv)];
+
+    cells[k] = order ? m->node_whole[node] : node;
   }
   PetscCall(HycoFieldWrite(h, order, m->n_cells, name, HYCO_ON_CELLS, MPIU_INT, m->nv, cols, cells));
-  if (order) PetscCall(PetscFree(cells));
+  PetscCall(PetscFree(cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char folder[], const HycoFileOrder *order, HycoMesh m,
-                                   const PetscReal X[])
+                                   const PetscReal X[], PetscBool vtk)
 {
   char name[4][HYCO_LINE];
   static const char *const of[4] = {"xyz", "cells", "node_id", "cell_id"};
@@ -79,7 +93,7 @@ PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char folder[], const HycoFile
   PetscFunctionBegin;
   for (int k = 0; k < 4; k++) PetscCall(PetscSNPrintf(name[k], HYCO_LINE, "%s/%s", folder, of[k]));
   PetscCall(HycoFieldWrite(h, order, m->n_nodes, name[0], HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
-  PetscCall(HycoFieldsWriteCells(h, name[1], order, m, m->nv));
+  PetscCall(HycoFieldsWriteCells(h, name[1], order, m, vtk, m->nv));
   PetscCall(HycoFieldWrite(h, order, m->n_nodes, name[2], HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
   PetscCall(HycoFieldWrite(h, order, m->n_cells, name[3], HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -114,6 +128,33 @@ PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Corners of faces of six nodes have no contacts: the mean of the middles beside them, so that a picture of the
+   pressure has no holes. sum: room for 2 reals a node. */
+static PetscErrorCode FillCorners(HycoFE fe, PetscReal sum[], PetscReal pressure[])
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt corners = HycoCellKinds[m->type].corners;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < fe->scene->n_contacts; k++) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "contact", fe->scene->contact[k]->slave, &g));
+    PetscCall(PetscArrayzero(sum, 2 * m->n_nodes));
+    for (PetscInt j = 0; j < m->n_facets * corners; j++) {
+      const PetscInt *node = m->facets + j / corners * m->nf, v = j % corners;
+
+      if (m->facet_group[j / corners] != g) continue;
+      sum[2 * node[v]] += pressure[node[corners + v]] + pressure[node[corners + (v + corners - 1) % corners]];
+      sum[2 * node[v] + 1] += 2;
+    }
+    for (PetscInt i = 0; i < m->n_nodes; i++) {
+      if (sum[2 * i + 1] > 0) pressure[i] = PetscMax(pressure[i], sum[2 * i] / sum[2 * i + 1]);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* On the process of the contacts. */
 static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal lambda[],
                                    HycoContactFields *f)
@@ -143,6 +184,13 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
     if (f->area[k] > 0) f->pressure[s] = PetscMax(f->pressure[s], lambda[k] / f->area[k]);
     if (HycoPairsAlone(fe->scene, pairs, k)) f->gap[k] = NAN;
     if (!(f->gap_node[s] <= f->gap[k])) f->gap_node[s] = f->gap[k];
+  }
+  if (fe->mesh->type == HYCO_TET10) {
+    PetscReal *sum;
+
+    PetscCall(PetscMalloc1(2 * fe->mesh->n_nodes, &sum));
+    PetscCall(FillCorners(fe, sum, f->pressure));
+    PetscCall(PetscFree(sum));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -2,10 +2,12 @@
   Quantities: the largest, smallest or mean value of a field over a group. Displacements are those of nodes, stresses
   the cells' means: of a group of facets those of the cells that they bound, of points and lines those of the cells
   around them. A mean is the integral over the cells or facets of the group over their volume or area; of points, plain.
+  Beside fields: the forces of supports, what contacts carry.
 */
 #include <hycofields.h>
 #include <hycokinematics.h>
 #include <hycoquantities.h>
+#include <math.h>
 #include <string.h>
 
 enum { U, UX, UY, UZ, XX, YY, ZZ, XY, YZ, XZ, RR, TT, MISES, FIRST };
@@ -73,6 +75,7 @@ PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh m, PetscBool ne
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     Place p;
 
+    if (scene->quantity[k].kind >= HYCO_QUANTITY_FORCE) continue;
     PetscCall(FindPlace(scene, m, &scene->quantity[k], &p));
     PetscCall(PetscArrayzero(in, m->n_cells));
     if (scene->quantity[k].kind == HYCO_QUANTITY_REACTION && p.group >= 0) {
@@ -192,6 +195,17 @@ static PetscErrorCode AddNodes(HycoFE fe, PetscInt field, const PetscReal u[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A force along an axis that the scene has. */
+static PetscErrorCode CheckAxis(HycoFE fe, const HycoQuantity *q, const char what[])
+{
+  PetscFunctionBegin;
+  HycoCheck(q->field < fe->dim, "output_%s: the mesh has %d space dimension%s and no %s along %c", q->name,
+            (int)fe->dim, fe->dim == 1 ? "" : "s", what, "xyz"[q->field]);
+  HycoCheck(q->field || fe->formulation != HYCO_AXISYMMETRIC,
+            "output_%s: in an axisymmetric scene the %s along the radius x sums to zero; use y", q->name, what);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The supports' force along an axis at the nodes of a group, or at all; its weight counts what they fix. */
 static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const PetscReal reaction[], Sum *s)
 {
@@ -200,10 +214,7 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
   Place p;
 
   PetscFunctionBegin;
-  HycoCheck(q->field < fe->dim, "output_%s: the mesh has %d space dimension%s, and no reaction along %c", q->name,
-            (int)fe->dim, fe->dim == 1 ? "" : "s", "xyz"[q->field]);
-  HycoCheck(q->field || fe->formulation != HYCO_AXISYMMETRIC,
-            "output_%s: around the circle reactions along the radius x add up to nothing; ask for y", q->name);
+  PetscCall(CheckAxis(fe, q, "reaction"));
   PetscCall(FindPlace(fe->scene, m, q, &p));
   n = p.group < 0 ? m->n_nodes : m->group_start[p.group + 1] - m->group_start[p.group];
   for (PetscInt k = 0; k < n; k++) {
@@ -223,6 +234,31 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What a contact carries, or all of them. */
+static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoContactResult contact[], PetscReal *value)
+{
+  const PetscBool turns = (PetscBool)(fe->dim == 3 || (fe->dim == 2 && q->field == 2));
+
+  PetscFunctionBegin;
+  if (q->kind == HYCO_QUANTITY_FORCE) PetscCall(CheckAxis(fe, q, "force"));
+  HycoCheck(q->kind != HYCO_QUANTITY_MOMENT || (turns && fe->formulation != HYCO_AXISYMMETRIC),
+            "output_%s: there is no moment about %c%s", q->name, "xyz"[q->field],
+            fe -> formulation == HYCO_AXISYMMETRIC ? " in an axisymmetric scene"
+                  : fe->dim == 2                   ? " in 2D; use z"
+                                                   : " in 1D");
+  *value = contact ? 0 : NAN;
+  for (PetscInt c = 0; contact && c < fe->scene->n_contacts; c++) {
+    const HycoContactResult *r = &contact[c];
+
+    if (q->contact && strcmp(q->contact, r->name)) continue;
+    if (q->kind == HYCO_QUANTITY_PRESSURE)
+      *value = PetscMax(*value, r->pressure);
+    else
+      *value += q->kind == HYCO_QUANTITY_FORCE ? r->force[q->field] : r->moment[q->field];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[], Sum *s)
 {
   HycoMesh m = fe->mesh;
@@ -231,7 +267,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
 
   PetscFunctionBegin;
   HycoCheck(q->field < UX || q->field > UZ || q->field - UX < fe->dim,
-            "output_%s: the mesh has %d space dimension%s, and no %s", q->name, (int)fe->dim, fe->dim == 1 ? "" : "s",
+            "output_%s: the mesh has %d space dimension%s and no %s", q->name, (int)fe->dim, fe->dim == 1 ? "" : "s",
             HycoQuantityFields[q->field]);
   PetscCall(FindPlace(fe->scene, m, q, &p));
   if (p.dim < m->dim - 1) {
@@ -252,34 +288,44 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A quantity of fields or reactions, summed over the processes. Collective. */
+static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity *q, const PetscReal u[],
+                                    const PetscReal sigma[], const PetscReal reaction[], PetscReal *value)
+{
+  const PetscBool is_reaction = (PetscBool)(q->kind == HYCO_QUANTITY_REACTION);
+  Sum s = {-PETSC_INFINITY, PETSC_INFINITY, 0, 0};
+  PetscReal ends[2], sums[2];
+
+  PetscFunctionBegin;
+  HycoOnEach(comm, is_reaction ? AddReactions(fe, q, reaction, &s) : Measure(fe, q, u, sigma, &s));
+  ends[0] = s.most;
+  ends[1] = -s.least;
+  sums[0] = s.sum;
+  sums[1] = s.weight;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ends, 2, MPIU_REAL, MPI_MAX, comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, comm));
+  HycoCheck(sums[1] > 0 || !is_reaction, "output_%s: no support fixes %c on %s", q->name, "xyz"[q->field],
+            q -> group ? q -> group : "any group");
+  HycoCheck(sums[1] > 0, "output_%s: the group %s has no cell, facet or node", q->name,
+            q->group ? q->group : "of all cells");
+  *value = is_reaction                    ? sums[0]
+           : q->kind == HYCO_QUANTITY_MAX ? ends[0]
+           : q->kind == HYCO_QUANTITY_MIN ? -ends[1]
+                                          : sums[0] / sums[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u[], const PetscReal sigma[],
-                                     const PetscReal reaction[], PetscReal value[])
+                                     const PetscReal reaction[], const HycoContactResult contact[], PetscReal value[])
 {
   const HycoScene scene = fe->scene;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
-    const HycoQuantity *q = &scene->quantity[k];
-    Sum s = {-PETSC_INFINITY, PETSC_INFINITY, 0, 0};
-    PetscReal ends[2], sums[2];
-
-    const PetscBool is_reaction = (PetscBool)(q->kind == HYCO_QUANTITY_REACTION);
-
-    HycoOnEach(comm, is_reaction ? AddReactions(fe, q, reaction, &s) : Measure(fe, q, u, sigma, &s));
-    ends[0] = s.most;
-    ends[1] = -s.least;
-    sums[0] = s.sum;
-    sums[1] = s.weight;
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ends, 2, MPIU_REAL, MPI_MAX, comm));
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, comm));
-    HycoCheck(sums[1] > 0 || !is_reaction, "output_%s: no support fixes %c on %s", q->name, "xyz"[q->field],
-              q -> group ? q -> group : "any group");
-    HycoCheck(sums[1] > 0, "output_%s: the group %s has no cell, facet or node", q->name,
-              q->group ? q->group : "of all cells");
-    value[k] = is_reaction                    ? sums[0]
-               : q->kind == HYCO_QUANTITY_MAX ? ends[0]
-               : q->kind == HYCO_QUANTITY_MIN ? -ends[1]
-                                              : sums[0] / sums[1];
+    if (scene->quantity[k].kind >= HYCO_QUANTITY_FORCE)
+      HycoOnEach(comm, AddContacts(fe, &scene->quantity[k], contact, &value[k]));
+    else
+      PetscCall(MeasureBodies(comm, fe, &scene->quantity[k], u, sigma, reaction, &value[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -6,8 +6,8 @@
 
 #define ROOT "VTKHDF/"
 
-/* VTK's numbers of line2, tri3, quad4, tet4, hex8, tri6, quad8, quad9. */
-static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12, 22, 23, 28};
+/* VTK's numbers of the cell types. */
+static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12, 22, 23, 28, 24, 25, 29};
 
 /* A set of one dimension of n integers, value, value + step, ... On one process. */
 static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, PetscInt value, PetscInt step)
@@ -49,8 +49,8 @@ static PetscErrorCode WriteRows(HycoFieldFile f, const char set[], HycoPlace pla
 
   PetscFunctionBegin;
   HycoCheck((PetscInt64)all * times < PETSC_MAX_INT,
-            "%s: %d times of %d nodes or cells are too many for one set; give an output that ends in .xdmf", f->path,
-            (int)times, (int)all);
+            "%s: %d times of %d nodes or cells are too many for one dataset; give an output that ends in .xdmf",
+            f->path, (int)times, (int)all);
   PetscCall(HycoH5WriteRows(f->h, set, MPIU_REAL, all * times, cols, all * f->n + first, own, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -84,7 +84,7 @@ PetscErrorCode HycoVTKWriteMesh(HycoFieldFile f, const PetscReal X[])
   HycoOnRoot(f->comm, WriteHead(f));
   if (!f->points)
     PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "Points", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
-  PetscCall(HycoFieldsWriteCells(f->h, ROOT "Connectivity", f->order, m, HYCO_H5_LINE));
+  PetscCall(HycoFieldsWriteCells(f->h, ROOT "Connectivity", f->order, m, PETSC_TRUE, HYCO_H5_LINE));
   PetscCall(WriteTypes(f));
   PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "PointData/node_id", HYCO_ON_NODES, MPIU_INT, 1,
                            HYCO_H5_LINE, m->node_id));

@@ -1,10 +1,11 @@
 /* Numbers that a scene asks of each solution: output: {hoop: {max: sigma_tt, group: bore}}. */
-#include <hycosceneimpl.h>
+#include <hycocontactimpl.h>
 #include <string.h>
 
 const char *const HycoQuantityFields[] = {
-    "u",        "u_x",      "u_y",      "u_z",   "sigma_xx",    "sigma_yy",    "sigma_zz",    "sigma_xy", "sigma_yz",
-    "sigma_xz", "sigma_rr", "sigma_tt", "mises", "principal_1", "principal_2", "principal_3", NULL};
+    "u",        "u_x",         "u_y",         "u_z",         "sigma_xx",         "sigma_yy",
+    "sigma_zz", "sigma_xy",    "sigma_yz",    "sigma_xz",    "sigma_rr",         "sigma_tt",
+    "mises",    "principal_1", "principal_2", "principal_3", "contact_pressure", NULL};
 
 static PetscErrorCode FindField(const char key[], const char text[], PetscInt *field)
 {
@@ -16,6 +17,14 @@ static PetscErrorCode FindField(const char key[], const char text[], PetscInt *f
     PetscCall(HycoListAdd(list, ", ", HycoQuantityFields[*field]));
   }
   HycoFail("%s is \"%.100s\"; it must be one of %s", key, text, list);
+}
+
+static PetscErrorCode FindAxis(const char key[], const char axis[], PetscInt *field)
+{
+  PetscFunctionBegin;
+  HycoCheck(axis[0] && !axis[1] && strchr("xyz", axis[0]), "%s is \"%.100s\"; it must be one of x, y and z", key, axis);
+  *field = axis[0] - 'x';
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char name[], PetscInt field)
@@ -34,33 +43,60 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     q = &s->quantity[s->n_quantities++];
     PetscCall(PetscStrallocpy(name, &q->name));
   }
-  if (field > HYCO_QUANTITY_REACTION) {
-    PetscCall(PetscFree(q->group));
-    PetscCall(PetscStrallocpy(s->value[entry], &q->group));
+  if (field > HYCO_QUANTITY_MOMENT) {
+    char **place = field == HYCO_QUANTITY_MOMENT + 1 ? &q->group : &q->contact;
+
+    PetscCall(PetscFree(*place));
+    PetscCall(PetscStrallocpy(s->value[entry], place));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoCheck(!q->given, "%s: the output %s has one of max, min, mean and reaction already; give each its own name",
+  HycoCheck(!q->given,
+            "%s: the output %s already has one of max, min, mean, reaction, force and moment; give each output its own "
+            "name",
             s->key[entry], name);
   q->given = PETSC_TRUE;
   q->kind = (HycoQuantityKind)field;
-  if (q->kind == HYCO_QUANTITY_REACTION) {
-    const char *axis = s->value[entry];
-
-    HycoCheck(axis[0] && !axis[1] && strchr("xyz", axis[0]), "%s is \"%.100s\"; a reaction is along x, y or z",
-              s->key[entry], axis);
-    q->field = axis[0] - 'x';
-    PetscFunctionReturn(PETSC_SUCCESS);
+  if (field >= HYCO_QUANTITY_REACTION)
+    PetscCall(FindAxis(s->key[entry], s->value[entry], &q->field));
+  else
+    PetscCall(FindField(s->key[entry], s->value[entry], &q->field));
+  if (field < HYCO_QUANTITY_REACTION && strcmp(HycoQuantityFields[q->field], "contact_pressure") == 0) {
+    HycoCheck(q->kind == HYCO_QUANTITY_MAX,
+              "%s: only the largest contact_pressure is available; write max: contact_pressure", s->key[entry]);
+    q->kind = HYCO_QUANTITY_PRESSURE;
   }
-  PetscCall(FindField(s->key[entry], s->value[entry], &q->field));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool HycoSceneHasReactions(HycoScene s)
+PetscBool HycoSceneAsks(HycoScene s, HycoQuantityKind first, HycoQuantityKind last)
 {
   for (PetscInt k = 0; k < s->n_quantities; k++) {
-    if (s->quantity[k].kind == HYCO_QUANTITY_REACTION) return PETSC_TRUE;
+    if (s->quantity[k].kind >= first && s->quantity[k].kind <= last) return PETSC_TRUE;
   }
   return PETSC_FALSE;
+}
+
+/* What a contact carries names a contact of the scene or none, and no group; a field names no contact. */
+static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
+{
+  char list[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  HycoCheck(
+      q->kind >= HYCO_QUANTITY_FORCE || !q->contact,
+      "the output %s names the contact %s, which is for force, moment and max: contact_pressure; give a group instead",
+      q->name, q->contact);
+  if (q->kind < HYCO_QUANTITY_FORCE) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(!q->group, "the output %s is for a contact and names the group %s; write contact: NAME instead", q->name,
+            q->group);
+  HycoCheck(s->n_contacts, "the output %s is for a contact, and the scene has none; remove it", q->name);
+  for (PetscInt c = 0; c < s->n_contacts; c++) {
+    if (q->contact && strcmp(q->contact, s->contact[c]->name) == 0) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(HycoListAdd(list, ", ", s->contact[c]->name));
+  }
+  HycoCheck(!q->contact, "the output %s names the contact %s, which does not exist; the contacts of the scene are: %s",
+            q->name, q->contact, list);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSceneCheckQuantities(HycoScene s)
@@ -69,9 +105,12 @@ PetscErrorCode HycoSceneCheckQuantities(HycoScene s)
   for (PetscInt k = 0; k < s->n_quantities * s->n_parameters; k++)
     HycoCheck(strcasecmp(s->quantity[k / s->n_parameters].name, s->parameter[k % s->n_parameters]),
               "the output %s has the name of a parameter; give it another", s->quantity[k / s->n_parameters].name);
-  for (PetscInt k = 0; k < s->n_quantities; k++)
+  for (PetscInt k = 0; k < s->n_quantities; k++) {
     HycoCheck(s->quantity[k].given,
-              "the output %s says no field; write output: {%s: {max: mises, group: ...}}, or min, mean or reaction",
+              "the output %s has no field; write output: {%s: {max: mises, group: ...}}, or min, mean, reaction, force "
+              "or moment",
               s->quantity[k].name, s->quantity[k].name);
+    PetscCall(CheckContact(s, &s->quantity[k]));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -62,6 +62,7 @@ static PetscErrorCode SolveEach(HycoROM m, PetscInt n, const Point point[], Hyco
     const size_t at = (size_t)point[k].at, n_dof = (size_t)(m->mesh->n_nodes * m->mesh->dim);
 
     PetscCall(HycoROMPredict(m, m->scene->n_parameters, point[k].mu));
+    if (m->point_monitor) PetscCall((*m->point_monitor)(m, point[k].at, m->point_ctx));
     if (prediction) PetscCall(HycoROMGetPrediction(m, &prediction[at]));
     if (Lambda) PetscCall(PetscArraycpy(Lambda + at * (size_t)m->pairs.n, m->Lambda, m->pairs.n));
     if (U) PetscCall(HycoROMComplete(m));

@@ -73,13 +73,25 @@ PetscErrorCode HycoROMExpand(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMComplete(HycoROM m)
+PetscErrorCode HycoROMBringContacts(HycoROM m, HycoFE *fe)
 {
   PetscFunctionBegin;
-  if (m->fe->mesh == m->mesh || m->beyond_current) PetscFunctionReturn(PETSC_SUCCESS);
+  *fe = m->fe;
+  if (m->fe->mesh == m->mesh) PetscFunctionReturn(PETSC_SUCCESS);
   if (!m->beyond) PetscCall(CreateBeyond(m));
-  PetscCall(BringRows(m, m->fe_beyond, m->fe->mu));
-  Expand(m, m->fe_beyond, m->fe->n_dof);
+  if (!m->beyond_current) PetscCall(BringRows(m, m->fe_beyond, m->fe->mu));
+  *fe = m->fe_beyond;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMComplete(HycoROM m)
+{
+  HycoFE fe;
+
+  PetscFunctionBegin;
+  if (m->fe->mesh == m->mesh || m->beyond_current) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMBringContacts(m, &fe));
+  Expand(m, fe, m->fe->n_dof);
   m->beyond_current = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

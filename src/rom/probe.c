@@ -134,6 +134,24 @@ static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const Pets
   HycoFEComplete(p->fe, p->u);
 }
 
+/* The quantities of forces Lambda (of all contacts) and, where they are asked for, p's fields (p: else NULL). */
+static PetscErrorCode Measure(HycoROM m, HycoProbe p, const PetscReal Lambda[], PetscReal value[])
+{
+  const HycoContactResult *contact = NULL;
+
+  PetscFunctionBegin;
+  if (HycoSceneAsksContacts(m->scene)) PetscCall(HycoROMSumContacts(m, Lambda, &contact));
+  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p ? p->fe : m->fe, p ? p->u : NULL, p ? p->sigma : NULL,
+                                  p ? p->reaction : NULL, contact, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces of all contacts at a listed time of the path. */
+static const PetscReal *ForcesAt(HycoROM m, PetscInt listed)
+{
+  return m->trace.Lambda + (size_t)listed * (size_t)m->pairs.n;
+}
+
 /* The laws from the first time to the last, and the quantities at the listed ones. */
 static PetscErrorCode March(HycoProbe p, HycoReplay *r)
 {
@@ -147,8 +165,9 @@ static PetscErrorCode March(HycoProbe p, HycoReplay *r)
     PetscCall(HycoReplayStep(r, k, p->u));
     if (j == trace->n_listed || trace->at[j] != k) continue;
     PetscCall(HycoFEStateFields(p->fe, r->march.state, p->sigma, NULL, NULL, NULL));
-    PetscCall(React(m, p, r->march.f_int, trace->Lambda + (size_t)j * (size_t)m->pairs.n));
-    PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p->fe, p->u, p->sigma, p->reaction, trace->step[j++].quantity));
+    PetscCall(React(m, p, r->march.f_int, ForcesAt(m, j)));
+    PetscCall(Measure(m, p, ForcesAt(m, j), trace->step[j].quantity));
+    j++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -188,13 +207,13 @@ static PetscErrorCode Follow(HycoROM m, HycoProbe p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Made when somebody asks. */
+/* Made when somebody asks for fields. */
 static PetscErrorCode Make(HycoROM m)
 {
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (m->probe) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->probe || !HycoSceneAsksFields(m->scene)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMLoadWhole(m));
   PetscCall(PetscNew(&m->probe));
   ierr = Fill(m, m->probe);
@@ -203,10 +222,28 @@ static PetscErrorCode Make(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The quantities of all listed times, into the trace's steps. */
+static PetscErrorCode MeasureTimes(HycoROM m)
+{
+  HycoReplay r = {0};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!m->probe) { /* what the contacts carry, alone */
+    for (PetscInt j = 0; j < m->trace.n_listed; j++)
+      PetscCall(Measure(m, NULL, ForcesAt(m, j), m->trace.step[j].quantity));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  ierr = HycoReplayBegin(m, m->probe->fe, &r);
+  if (!ierr) ierr = March(m->probe, &r);
+  PetscCall(HycoReplayEnd(&r));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoROMMeasurePath(HycoROM m)
 {
   HycoTrace *trace = &m->trace;
-  HycoReplay r = {0};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
@@ -214,9 +251,7 @@ PetscErrorCode HycoROMMeasurePath(HycoROM m)
   PetscCall(Make(m));
   PetscCall(PetscMalloc1(trace->n_listed, &trace->step));
   PetscCall(PetscArraycpy(trace->step, trace->history.step, trace->n_listed));
-  ierr = HycoReplayBegin(m, m->probe->fe, &r);
-  if (!ierr) ierr = March(m->probe, &r);
-  PetscCall(HycoReplayEnd(&r));
+  ierr = MeasureTimes(m);
   if (ierr) PetscCall(PetscFree(trace->step));
   PetscCall(ierr);
   trace->history.step = trace->step;
@@ -233,8 +268,7 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Make(m));
-  PetscCall(Follow(m, m->probe));
-  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, m->probe->fe, m->probe->u, m->probe->sigma, m->probe->reaction,
-                                  out->quantity));
+  if (m->probe) PetscCall(Follow(m, m->probe));
+  PetscCall(Measure(m, m->probe, m->Lambda, out->quantity));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

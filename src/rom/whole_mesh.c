@@ -134,7 +134,7 @@ PetscErrorCode HycoROMWriteWhole(HycoH5 h, HycoFOM f, PetscInt l, Mat V)
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(f, &order));
   HycoOnRoot(HycoComm(f), WriteHead(h, m));
-  PetscCall(HycoFieldsWriteMesh(h, "whole", order, m, m->xyz));
+  PetscCall(HycoFieldsWriteMesh(h, "whole", order, m, m->xyz, PETSC_FALSE));
   PetscCall(HycoFieldWrite(h, order, m->n_nodes, IN("node_body"), HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_body));
   PetscCall(HycoFieldWrite(h, order, m->n_cells, IN("cell_body"), HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_body));
   PetscCall(WriteGroupNodes(HycoComm(f), h, m, f->n_nodes));

@@ -152,8 +152,32 @@ class Convert(Case):
         with open(self.path('m.msh'), encoding='ascii') as f:
             self.assertIn('\n10 10 10\n', f.read())
 
+    def test_second_order(self):
+        """A cube of one C3D20 and a tetrahedron of one C3D10, in Abaqus's order: pressure on each side S1, S2, ... has the resultant of that side, gravity that of the volume."""
+        cube = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+        tet = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+        ring = [(0, 1), (1, 2), (2, 3), (3, 0)]
+        for kind, corners, edges, volume, pushes in (
+                ('C3D20R', cube, [*ring, *((a + 4, b + 4) for a, b in ring), *((k, k + 4) for k in range(4))], 1,
+                 ((0, 0, 1), (0, 0, -1), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (1, 0, 0))),
+                ('C3D10', tet, [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)], 1 / 6, ((0, 0, .5), (0, .5, 0), (-.5, -.5, -.5), (.5, 0, 0)))):
+            places = [*corners, *(tuple((a + b) / 2 for a, b in zip(corners[i], corners[j])) for i, j in edges)]
+            numbers = [str(k + 1) for k in range(len(places))]
+            text = '*Node\n' + ''.join(f'{k}, {x}, {y}, {z}\n' for k, (x, y, z) in enumerate(places, 1))
+            text += f'*Element, type={kind}, elset=body\n1, {", ".join(numbers[:9])},\n{", ".join(numbers[9:])}\n'
+            text += ''.join(f'*Surface, type=ELEMENT, name=side{k}\n1, S{k}\n' for k in range(1, len(pushes) + 1)) + '*Nset, nset=foot\n1, 2, 3\n'
+            groups = self.convert('second.inp', text)
+            self.assertEqual(groups['BODY'], (1, {'C3D20R': 'hex20', 'C3D10': 'tet10'}[kind]))
+            for k, push in enumerate(pushes, 1):
+                with open(self.path('scene.yaml'), 'w', encoding='ascii') as f:
+                    f.write(f'scene: {{mesh: m.msh}}\nbody: {{BODY: {{young: 100, density: 3}}}}\nfixed: {{FOOT: {{x: 0, y: 0, z: 0}}}}\ngravity: {{x: 2}}\npressure: {{SIDE{k}: 1}}\n')
+                report = self.hyco('solve', '-scene', 'scene.yaml')
+                with self.subTest(kind=kind, side=k):
+                    for c in range(3):
+                        self.assertAlmostEqual(report['loads']['force'][c], push[c] + (6 * volume if c == 0 else 0), places=12)
+
     def test_refused(self):
-        for name, text, words in (('a.inp', FLAT.replace('CPE4', 'CPE8R'), 'elements of type CPE8R'), ('b.inp', '*Heading\n', 'has no cells'),
+        for name, text, words in (('a.inp', FLAT.replace('CPE4', 'C3D15'), 'elements of type C3D15'), ('g.inp', FLAT.replace('CPE4', 'CPE8R'), 'element 1 of type CPE8R has 4 nodes; 8 are expected'), ('b.inp', '*Heading\n', 'has no cells'),
                                   ('c.inp', FLAT.replace('1, 1, 2, 5, 4', '1, 1, 2, 5, 44'), 'is not as such a file should be'),
                                   ('d.inp', PARTS.replace(' 0., 1.', ' 0., 1.\n 0,0,0,0,0,1,90'), 'is rotated'),
                                   ('e.unv', UNV.replace('115', '116'), 'FE descriptor 116')):

@@ -1,4 +1,4 @@
-"""scripts/bench-scale on mesh A: what it counts on 1 and 2 ranks, and the model that it fits."""
+"""scripts/bench-scale on mesh A and a wavy block: what it counts on 1 and 2 ranks, and the model that it fits."""
 import csv
 import os
 import subprocess
@@ -10,11 +10,11 @@ from common import PATIENCE, SOURCE, Case
 
 class Scale(Case):
     def test_counts(self):
-        run = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'bench-scale'), '--refine', '0', '--ranks', '1,2', '--timeout',
+        run = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'bench-scale'), '--refine', '0', '--ranks', '1,2', '--wavy', '8', '--timeout',
                               str(60 * PATIENCE), '--output', self.folder], cwd=SOURCE, capture_output=True, text=True, timeout=120 * PATIENCE)
         self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
         with open(self.path('scale.csv'), encoding='utf-8', newline='') as file:
-            one, two = csv.DictReader(file)
+            one, two, wavy = csv.DictReader(file)
         for row in (one, two):
             self.assertEqual((row['unknowns'], row['contacts']), ('4952', '189'))
             self.assertLessEqual(int(row['most']), 40)
@@ -23,6 +23,9 @@ class Scale(Case):
         self.assertEqual((one['neighbours'], two['neighbours']), ('0', '1'))
         self.assertLessEqual(int(two['iterations']), 1.3 * int(one['iterations']))
         self.assertLess(float(two['kb_largest']), 1e-3 * 8 * 20 * int(two['ghosts']))  # what the other rank needs, some twenty times: no gathering
+        self.assertEqual((wavy['contacts'], wavy['ranks']), ('1089', '1'))
+        self.assertLessEqual(int(wavy['most']), 20)
+        self.assertLessEqual(int(wavy['sets']), 12)
         self.assertIn('Model, fitted', run.stdout)
 
 

@@ -112,7 +112,7 @@ static PetscErrorCode TestPatch(const Patch *p, HycoFE fe)
 /* Shape functions: a partition of unity, and weights that sum to the reference cell's size. */
 static void TestShapes(HycoCellType type)
 {
-  const double size[HYCO_N_CELL_TYPES] = {2, 0.5, 4, 1.0 / 6, 8, 0.5, 4, 4};
+  const double size[HYCO_N_CELL_TYPES] = {2, 0.5, 4, 1.0 / 6, 8, 0.5, 4, 4, 1.0 / 6, 8, 8};
   const HycoElement *el = HycoElementGet(type);
   double weight = 0;
 
@@ -190,6 +190,7 @@ static PetscErrorCode TestMeanDilatation(void)
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
+  PatchesComplete();
   PetscCall(TestMeanDilatation());
   for (int type = 0; type < HYCO_N_CELL_TYPES; type++) {
     HycoScene scene;

@@ -9,8 +9,8 @@
 typedef struct {
   const char *name;
   int dim, nv, nf, gmsh_cell, gmsh_facet, n_nodes, n_cells, n_facets, first_inner; /* inner nodes: the last ones */
-  double xyz[16][3];
-  int cell[12][9], facet[12][4];
+  double xyz[96][3];
+  int cell[12][27], facet[12][9];
   double volume; /* of the whole patch: 1 */
 } Patch;
 
@@ -29,7 +29,7 @@ typedef struct {
 
 /* Inner nodes: MacNeal, Harder, Finite Elem. Anal. Des. 1 (1985) 3-20, for hex8; otherwise off the centre. Facets are
    written in no consistent orientation: the library turns them outward. */
-static const Patch patches[HYCO_N_CELL_TYPES] = {
+static Patch patches[HYCO_N_CELL_TYPES] = {
     {"line2", 1, 2, 1, 1, 15, 4, 3, 2, 2, {{0}, {1}, {0.2}, {0.75}}, {{0, 2}, {2, 3}, {3, 1}}, {{0}, {1}}, 1},
     {"tri3",
      2,
@@ -166,6 +166,92 @@ static const Patch patches[HYCO_N_CELL_TYPES] = {
      {{0, 1, 6}, {1, 2, 7}, {3, 2, 8}, {3, 4, 9}, {4, 5, 10}, {0, 5, 11}},
      1},
 };
+
+/* -- second order in space: the patches of first order with nodes at the middles of edges, of hex27 of faces and cells
+   too, in gmsh's order (gmsh 4.11 manual, "Node ordering") -- */
+
+typedef struct {
+  int n, corner[8];
+} PatchPart;
+
+static const PatchPart patch_tet10[] = {{2, {0, 1}}, {2, {1, 2}}, {2, {2, 0}}, {2, {3, 0}}, {2, {2, 3}}, {2, {1, 3}}};
+static const PatchPart patch_hex27[] = {{2, {0, 1}},
+                                        {2, {0, 3}},
+                                        {2, {0, 4}},
+                                        {2, {1, 2}},
+                                        {2, {1, 5}},
+                                        {2, {2, 3}},
+                                        {2, {2, 6}},
+                                        {2, {3, 7}},
+                                        {2, {4, 5}},
+                                        {2, {4, 7}},
+                                        {2, {5, 6}},
+                                        {2, {6, 7}},
+                                        {4, {0, 3, 2, 1}},
+                                        {4, {0, 1, 5, 4}},
+                                        {4, {0, 4, 7, 3}},
+                                        {4, {1, 2, 6, 5}},
+                                        {4, {2, 3, 7, 6}},
+                                        {4, {4, 5, 6, 7}},
+                                        {8, {0, 1, 2, 3, 4, 5, 6, 7}}};
+static const PatchPart patch_tri6[] = {{2, {0, 1}}, {2, {1, 2}}, {2, {2, 0}}};
+static const PatchPart patch_quad9[] = {{2, {0, 1}}, {2, {1, 2}}, {2, {2, 3}}, {2, {3, 0}}, {4, {0, 1, 2, 3}}};
+
+/* The node at the middle of these corners, whose places stand in p; new ones are the next. */
+static inline int PatchMiddle(Patch *p, int first, const PatchPart *part, const int corner[])
+{
+  double x[3] = {0, 0, 0};
+
+  for (int k = 0; k < part->n; k++) {
+    for (int c = 0; c < 3; c++) x[c] += p->xyz[corner[part->corner[k]]][c] / part->n;
+  }
+  for (int i = first; i < p->n_nodes; i++) { /* places tell nodes apart: the patches are distorted */
+    double off = 0;
+
+    for (int c = 0; c < 3; c++) off += (p->xyz[i][c] - x[c]) * (p->xyz[i][c] - x[c]);
+    if (off < 1e-20) return i;
+  }
+  for (int c = 0; c < 3; c++) p->xyz[p->n_nodes][c] = x[c];
+  return p->n_nodes++;
+}
+
+static inline void PatchRaise(const Patch *of, const char name[], int nv, int nf, int gmsh_cell, int gmsh_facet,
+                              const PatchPart in_cell[], const PatchPart in_facet[], Patch *p)
+{
+  const int corners = of->nv, facet_corners = of->nf, n_inner = of->n_nodes - of->first_inner;
+  int at[16];
+
+  *p = *of;
+  p->name = name;
+  p->nv = nv;
+  p->nf = nf;
+  p->gmsh_cell = gmsh_cell;
+  p->gmsh_facet = gmsh_facet;
+  p->n_nodes = of->first_inner;
+  for (int f = 0; f < p->n_facets; f++) {
+    for (int k = facet_corners; k < nf; k++)
+      p->facet[f][k] = PatchMiddle(p, of->first_inner, &in_facet[k - facet_corners], p->facet[f]);
+  }
+  p->first_inner = p->n_nodes;
+  for (int i = 0; i < of->n_nodes; i++) at[i] = i < of->first_inner ? i : p->n_nodes + i - of->first_inner;
+  for (int i = 0; i < n_inner; i++) {
+    for (int c = 0; c < 3; c++) p->xyz[p->first_inner + i][c] = of->xyz[of->first_inner + i][c];
+  }
+  p->n_nodes += n_inner;
+  for (int e = 0; e < p->n_cells; e++) {
+    for (int k = 0; k < corners; k++) p->cell[e][k] = at[of->cell[e][k]];
+    for (int k = corners; k < nv; k++)
+      p->cell[e][k] = PatchMiddle(p, of->first_inner, &in_cell[k - corners], p->cell[e]);
+  }
+}
+
+/* Fills in those of second order in space. */
+static inline void PatchesComplete(void)
+{
+  PatchRaise(&patches[HYCO_TET4], "tet10", 10, 6, 11, 9, patch_tet10, patch_tri6, &patches[HYCO_TET10]);
+  PatchRaise(&patches[HYCO_HEX8], "hex20", 20, 8, 17, 16, patch_hex27, patch_quad9, &patches[HYCO_HEX20]);
+  PatchRaise(&patches[HYCO_HEX8], "hex27", 27, 9, 12, 10, patch_hex27, patch_quad9, &patches[HYCO_HEX27]);
+}
 
 static inline PetscErrorCode PatchWrite(const Patch *p, const char path[])
 {

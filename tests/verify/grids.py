@@ -80,3 +80,29 @@ def ball(grid):
         return grid * np.sqrt(1 - s[:, ::-1] / 2)
     y, z = np.roll(s, -1, axis=1), np.roll(s, -2, axis=1)
     return grid * np.sqrt(1 - y / 2 - z / 2 + y * z / 3)
+
+
+EDGES = {1: ((0, 1),), 2: ((0, 1), (1, 2), (2, 0)), 3: ((0, 1), (1, 2), (2, 3), (3, 0)), 4: ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
+         5: ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7))}          # in gmsh's order
+FACES = ((0, 3, 2, 1), (0, 1, 5, 4), (0, 4, 7, 3), (1, 2, 6, 5), (2, 3, 7, 6), (4, 5, 6, 7))
+LINEAR = {'tri6': 'tri3', 'quad8': 'quad4', 'quad9': 'quad4', 'tet10': 'tet4', 'hex20': 'hex8', 'hex27': 'hex8'}
+
+
+def second(grid, kind, place=lambda x: x):
+    """A grid of LINEAR[kind] as one of second order, for msh(); place: where the mean of an edge's (a face's, a cell's) corners is put."""
+    nodes, middles, elements = list(grid.nodes), {}, []
+    full = kind in ('quad9', 'hex27')
+    gmsh = {15: 15, 1: 8, 2: 9, 3: 10 if full else 16, 4: 11, 5: 12 if full else 17}
+
+    def middle(corners):
+        key = tuple(sorted(corners))
+        if key not in middles:
+            nodes.append(tuple(place(np.mean([grid.nodes[c - 1] for c in corners], axis=0))))
+            middles[key] = len(nodes)
+        return middles[key]
+
+    for of, tag, c in grid.elements:
+        inner = {3: (range(4),), 5: (*FACES, range(8))}.get(of, ()) if full else ()
+        parts = (*EDGES.get(of, ()), *inner)
+        elements.append((gmsh[of], tag, [*c, *(middle([c[k] for k in part]) for part in parts)]))
+    return nodes, elements, grid.names

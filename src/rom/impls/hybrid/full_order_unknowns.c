@@ -28,14 +28,14 @@ PetscErrorCode HycoHybridSetFromOptions(HycoReducer t)
   s->ridge = -1;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("hybrid"));
-  PetscCall(HycoOptionsInt("-hyco_hybrid_trials",
-                           "candidate sets judged by their training error when hybrid is rank (0: from the size)", 0,
-                           PETSC_MAX_INT / 8, &s->trials, NULL));
-  PetscCall(
-      HycoOptionsReal("-hyco_hybrid_ridge",
-                      "of the interface's regression when hybrid is all (-1: by the training error; 0: plain least "
-                      "squares)",
-                      -1, 1, &s->ridge, NULL));
+  PetscCall(HycoOptionsInt(
+      "-hyco_hybrid_trials",
+      "with -hyco_hybrid rank: number of candidate sets that are judged by their training error (0: from the size)", 0,
+      PETSC_MAX_INT / 8, &s->trials, NULL));
+  PetscCall(HycoOptionsReal("-hyco_hybrid_ridge",
+                            "with -hyco_hybrid all: strength of the ridge regression for the modes (-1: by the "
+                            "training error; 0: plain least squares)",
+                            -1, 1, &s->ridge, NULL));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -69,10 +69,10 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
   }
   PetscCall(PetscFree(taken));
   for (PetscInt k = 0; k < m->m; k++)
-    HycoCheckModel(
-        candidate[k] >= 0,
-        "the contact of node %d has no displacement in A of its own to keep full order; use -hyco_hybrid contact",
-        (int)m->slave_id[m->contact[k]]);
+    HycoCheckModel(candidate[k] >= 0,
+                   "the contact of node %d has no displacement of its own in A that could stay full order; use "
+                   "-hyco_hybrid contact",
+                   (int)m->slave_id[m->contact[k]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -366,37 +366,73 @@ static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_o
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of A, with the strength of the ridge that gives the least training error. Without an interface there is nothing
- * to regress. */
-static PetscErrorCode ChooseAll(HycoReducer t, HycoROM m, PetscInt n, const PetscInt dof[], Verdict *best)
+#define USELESS 0.5 /* mean training error with which a model is refused */
+#define LOST    3   /* ridges in a row end the race of paths: beyond the best the errors grow with the ridge */
+
+/* The ridge of paths: each takes seconds, and a ridge that is worse than the best is seen by some of them. Fails where
+   an attempt of the search misses its training by half with any. */
+static PetscErrorCode RaceRidges(HycoReducer t, HycoROM m, PetscReal *strength)
 {
-  PetscBool interface = PETSC_FALSE;
-  PetscReal strength = 0;
+  HycoJudged *judged, *its;
+  PetscInt n, in_a_row = 0;
+  PetscReal least = PETSC_MAX_REAL;
+  PetscBool any = PETSC_FALSE;
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
-    interface = (PetscBool)(interface || m->role[i] == HYCO_ROLE_INTERFACE);
-  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_ALL, n, dof));
-  best->u = best->lambda = PETSC_MAX_REAL;
-  best->rank = 1;
-  if (interface && ((Training)t->training)->ridge >= 0)
-    PetscCall(HycoGalerkinSetRidge(m, ((Training)t->training)->ridge));
-  if (!interface || ((Training)t->training)->ridge >= 0) {
-    PetscCall(HycoReducerJudgeMeans(t, m, &best->u, &best->lambda));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  for (PetscReal ridge = 1e-14; ridge < 1e-5; ridge *= 10) {
-    Verdict v;
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  PetscCall(PetscMalloc2(n, &judged, n, &its));
+  for (PetscReal ridge = 1e-14; ridge < 1e-5 && in_a_row < LOST; ridge *= 10) {
+    PetscReal u;
+    PetscBool lost;
 
     PetscCall(HycoGalerkinSetRidge(m, ridge));
-    PetscCall(HycoReducerJudgeMeans(t, m, &v.u, &v.lambda));
-    if (v.u < best->u) {
-      *best = v;
-      best->rank = 1;
-      strength = ridge;
-    }
+    PetscCall(HycoReducerJudgeRace(t, m, any ? its : NULL, t->trying ? USELESS : PETSC_INFINITY, judged, &u, &lost));
+    in_a_row += any;
+    if (lost || !(u < least)) continue;
+    PetscCall(PetscArraycpy(its, judged, n));
+    least = u;
+    *strength = ridge;
+    in_a_row = 0;
+    any = PETSC_TRUE;
   }
+  PetscCall(PetscFree2(judged, its));
+  HycoCheckModel(any, "the model misses its own training displacements by half or more");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The ridge with the least mean training error. */
+static PetscErrorCode TryRidges(HycoReducer t, HycoROM m, PetscReal *strength)
+{
+  PetscReal least = PETSC_MAX_REAL, u, lambda;
+
+  PetscFunctionBegin;
+  *strength = 0;
+  for (PetscReal ridge = 1e-14; ridge < 1e-5; ridge *= 10) {
+    PetscCall(HycoGalerkinSetRidge(m, ridge));
+    PetscCall(HycoReducerJudgeMeans(t, m, &u, &lambda));
+    if (!(u < least)) continue;
+    least = u;
+    *strength = ridge;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All of A, with the strength of the ridge that gives the least training error. Without an interface there is nothing
+ * to regress. */
+static PetscErrorCode ChooseAll(HycoReducer t, HycoROM m, PetscInt n, const PetscInt dof[])
+{
+  const PetscReal given = ((Training)t->training)->ridge;
+  PetscReal strength = given >= 0 ? given : t->ridge;
+  PetscBool interface = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_ALL, n, dof));
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
+    interface = (PetscBool)(interface || m->role[i] == HYCO_ROLE_INTERFACE);
+  if (!interface) PetscFunctionReturn(PETSC_SUCCESS);
+  if (strength < 0) PetscCall(t->scene->n_times ? RaceRidges(t, m, &strength) : TryRidges(t, m, &strength));
   PetscCall(HycoGalerkinSetRidge(m, strength));
+  if (t->trying) t->ridge = strength;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -416,13 +452,15 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
     kind = HYCO_HYBRID_CONTACT; /* no contact in the RID: plain hyper-reduction (31) */
   if (kind == HYCO_HYBRID_AUTO) kind = n_contact < n_all ? HYCO_HYBRID_CONTACT : HYCO_HYBRID_ALL;
   if (kind == HYCO_HYBRID_CONTACT && n_contact == n_all && n_contact) {
-    HycoFailNoModel("-hyco_hybrid contact leaves the modes without equation: every unknown of A is a contact's; use "
-                    "rank, all or auto");
+    HycoFailNoModel("-hyco_hybrid contact leaves no equation for the modes, because every unknown of A belongs to a "
+                    "contact; use rank, all or auto");
   }
   HycoCheckModel(kind != HYCO_HYBRID_ALL || !t->most_full_order || n_all <= t->most_full_order,
-                 "the RID has %d unknowns, too many to keep them all full order in a dense matrix", (int)n_all);
+                 "the RID has %d unknowns, too many to keep all of them full order in a dense matrix; use -hyco_hybrid "
+                 "contact or rank",
+                 (int)n_all);
   if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
-  if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all, &v));
+  if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all));
   if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));
   PetscCall(HycoReducerJudge(t, m));
   PetscCall(PetscFree2(all, contact));

@@ -1,0 +1,95 @@
+/* What each contact of the scene carries: in reports, in words, as columns of tables. */
+#include "driver.h"
+#include <math.h>
+
+PetscErrorCode DriverReportCarried(cJSON *json, PetscInt dim, PetscInt n, const HycoContactResult r[])
+{
+  cJSON *all = cJSON_AddObjectToObject(json, "contacts");
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    cJSON *one = cJSON_AddObjectToObject(all, r[k].name);
+
+    cJSON_AddNumberToObject(one, "n", r[k].n);
+    cJSON_AddNumberToObject(one, "n_active", r[k].n_active);
+    ReportVector(one, "force", dim, r[k].force);
+    if (dim == 2) ReportVector(one, "moment", 1, r[k].moment + 2);
+    if (dim == 3) ReportVector(one, "moment", 3, r[k].moment);
+    cJSON_AddNumberToObject(one, "area", r[k].area);
+    cJSON_AddNumberToObject(one, "pressure_max", r[k].pressure);
+    if (n > 1)
+      PetscCall(Say("contact %s: %d of %d active, force on the slave (%.6g, %.6g, %.6g), largest pressure %.6g\n",
+                    r[k].name, (int)r[k].n_active, (int)r[k].n, (double)r[k].force[0], (double)r[k].force[1],
+                    (double)r[k].force[2], (double)r[k].pressure));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverGetCarried(HycoROM model, HycoScene scene, PetscInt *n, HycoContactResult **result)
+{
+  const HycoContactResult *r = NULL;
+  const char **names;
+  PetscInt all;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetContacts(scene, &all, NULL));
+  PetscCall(PetscMalloc1(all, result));
+  PetscCall(PetscMalloc1(all, &names));
+  PetscCall(HycoSceneGetContacts(scene, &all, names));
+  *n = 0;
+  HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetContacts(model, n, &r));
+  if (r) PetscCall(PetscArraycpy(*result, r, *n));
+  PetscCallMPI(MPI_Bcast(n, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
+  HycoBcast(*result, *n * (PetscInt)sizeof(**result), MPI_BYTE, PETSC_COMM_WORLD);
+  for (PetscInt k = 0; k < *n; k++) (*result)[k].name = names[k];
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The numbers of a contact in a table, and what they are called after its name and a dot. */
+enum { WIDTH = 9 };
+static PetscInt List(PetscInt dim, const HycoContactResult *r, const char *name[WIDTH], PetscReal value[WIDTH])
+{
+  static const char *const force[] = {"force_x", "force_y", "force_z"}, *const moment[] = {"moment_x", "moment_y",
+                                                                                           "moment_z"};
+  PetscInt n = 0;
+
+  name[n] = "n_active", value[n++] = r->n_active;
+  for (PetscInt c = 0; c < dim; c++) name[n] = force[c], value[n++] = r->force[c];
+  for (PetscInt c = dim == 2 ? 2 : 0; dim > 1 && c < 3; c++) name[n] = moment[c], value[n++] = r->moment[c];
+  name[n] = "area", value[n++] = r->area;
+  name[n] = "pressure_max", value[n++] = r->pressure;
+  return n;
+}
+
+PetscErrorCode DriverCarriedColumns(HycoScene scene, PetscInt dim, DriverCarried *columns)
+{
+  const HycoContactResult none = {.name = NULL};
+  const char **contact, *name[WIDTH];
+  PetscReal value[WIDTH];
+
+  PetscFunctionBegin;
+  columns->dim = dim;
+  PetscCall(HycoSceneGetContacts(scene, &columns->n_contacts, NULL));
+  PetscCall(PetscMalloc1(columns->n_contacts, &contact));
+  PetscCall(HycoSceneGetContacts(scene, &columns->n_contacts, contact));
+  columns->each = List(dim, &none, name, value);
+  PetscCall(PetscMalloc1(columns->n_contacts * columns->each, &columns->name));
+  for (PetscInt k = 0; k < columns->n_contacts * columns->each; k++)
+    PetscCall(
+        PetscSNPrintf(columns->name[k], DRIVER_LINE, "%s.%s", contact[k / columns->each], name[k % columns->each]));
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void DriverCarriedFill(const DriverCarried *columns, PetscInt n, const HycoContactResult r[], PetscReal v[])
+{
+  const char *name[WIDTH];
+
+  for (PetscInt k = 0; k < columns->n_contacts; k++, v += columns->each) {
+    if (n)
+      List(columns->dim, &r[k], name, v);
+    else
+      for (PetscInt c = 0; c < columns->each; c++) v[c] = NAN;
+  }
+}

@@ -1,0 +1,148 @@
+/*
+  hex20 as hex27: a node at the middle of each face and of each cell, where the functions of quad8 and hex20 put it. The
+  triquadratic functions hold the serendipity ones, so that bodies keep their shape.
+*/
+#include "plex.h"
+#include "msh.h"
+#include <stdlib.h>
+
+#define CORNERS 8
+#define MIDDLE  6  /* in place of a face's number: of the cell */
+#define ITSELF  -1 /* of the quad8 */
+
+/* A node to come: the corners that it lies between, of a face (4) or a cell (8), ascending, after these -1; the element
+   that wants it, and for which of its faces. */
+typedef struct {
+  PetscInt corner[CORNERS], group, element, face;
+} Wanted;
+
+static int Compare(const void *a, const void *b)
+{
+  const PetscInt *p = (const PetscInt *)a, *q = (const PetscInt *)b; /* a Wanted is PetscInt throughout */
+
+  for (size_t k = 0; k < sizeof(Wanted) / sizeof(PetscInt); k++) {
+    if (p[k] != q[k]) return p[k] < q[k] ? -1 : 1;
+  }
+  return 0;
+}
+
+static PetscBool AreOne(const Wanted *a, const Wanted *b)
+{
+  for (int k = 0; k < CORNERS; k++) {
+    if (a->corner[k] != b->corner[k]) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* The nodes that tell the new one's place: n corners, then *n_sides middles of sides. */
+static PetscInt Around(const HycoMsh *mesh, const Wanted *w, PetscInt node[20], PetscInt *n_sides)
+{
+  const HycoMshGroup *g = &mesh->group[w->group];
+  const PetscInt *of = g->node + w->element * g->nv, n = w->face == MIDDLE ? 8 : 4;
+
+  *n_sides = w->face == MIDDLE ? 12 : 4;
+  for (PetscInt k = 0; k < n + *n_sides; k++)
+    node[k] = of[w->face == MIDDLE || w->face == ITSELF ? k : HycoFacetNodes(HYCO_HEX20, w->face)[k]];
+  return n;
+}
+
+/* Whether a group is of these elements; how many nodes each wants. */
+static PetscInt Wants(const HycoMshGroup *g)
+{
+  return g->dim == 3 && g->nv == 20 ? 7 : g->dim == 2 && g->nv == 8 ? 1 : 0;
+}
+
+/* All of them, those of one place together. The caller frees them. */
+static PetscErrorCode Collect(const HycoMsh *mesh, PetscInt *n, Wanted **list)
+{
+  PetscInt room = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < mesh->n_groups; k++) room += mesh->group[k].n * Wants(&mesh->group[k]);
+  PetscCall(PetscMalloc1(room, list));
+  *n = 0;
+  for (PetscInt k = 0; k < mesh->n_groups; k++) {
+    const PetscInt each = Wants(&mesh->group[k]);
+
+    for (PetscInt j = 0; j < mesh->group[k].n * each; j++) {
+      Wanted *w = &(*list)[(*n)++];
+      PetscInt node[20], n_sides, n_corners;
+
+      w->group = k;
+      w->element = j / each;
+      w->face = each == 1 ? ITSELF : j % each;
+      n_corners = Around(mesh, w, node, &n_sides);
+      for (PetscInt c = 0; c < CORNERS; c++) w->corner[c] = c < n_corners ? node[c] : -1;
+      PetscCall(PetscSortInt(n_corners, w->corner));
+    }
+  }
+  if (*n) qsort(*list, (size_t)*n, sizeof(Wanted), Compare);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the serendipity functions of a face or a cell have their middle. */
+static void Place(const HycoMsh *mesh, const Wanted *w, PetscReal x[3])
+{
+  PetscInt node[20], n_sides;
+  const PetscInt n = Around(mesh, w, node, &n_sides);
+
+  for (PetscInt c = 0; c < 3; c++) {
+    x[c] = 0;
+    for (PetscInt k = 0; k < n; k++) x[c] -= mesh->xyz[3 * node[k] + c] / 4;
+    for (PetscInt k = n; k < n + n_sides; k++) x[c] += mesh->xyz[3 * node[k] + c] * 2 / n;
+  }
+}
+
+/* Room in a group's elements for the nodes that they want. */
+static PetscErrorCode Widen(HycoMshGroup *g)
+{
+  const PetscInt nv = g->nv + Wants(g);
+  PetscInt *node;
+
+  PetscFunctionBegin;
+  if (nv == g->nv) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(g->n * nv, &node));
+  for (PetscInt e = 0; e < g->n; e++) PetscCall(PetscArraycpy(node + e * nv, g->node + e * g->nv, g->nv));
+  PetscCall(PetscFree(g->node));
+  g->node = node;
+  g->nv = nv;
+  g->room = g->n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh)
+{
+  Wanted *list;
+  PetscInt n = 0, added = 0, at = mesh->n_nodes;
+
+  PetscFunctionBegin;
+  PetscCall(Collect(mesh, &n, &list));
+  for (PetscInt k = 0; k < n; k++) added += !k || !AreOne(&list[k], &list[k - 1]);
+  if (at && mesh->tag[at - 1] >= PETSC_MAX_INT / 8 - added) {
+    PetscCall(PetscFree(list));
+    HycoFail("%s: the nodes that its hex20 cells need for contact would have tags beyond %lld; renumber the mesh", path,
+             (long long)PETSC_MAX_INT / 8);
+  }
+  PetscCall(PetscRealloc((size_t)(at + added) * sizeof(*mesh->tag), &mesh->tag));
+  PetscCall(PetscRealloc((size_t)(3 * (at + added)) * sizeof(*mesh->xyz), &mesh->xyz));
+  for (PetscInt k = 0; k < n; k++) {
+    if (k && AreOne(&list[k], &list[k - 1])) continue;
+    Place(mesh, &list[k], mesh->xyz + 3 * at);
+    mesh->tag[at] = mesh->tag[at - 1] + 1;
+    at++;
+  }
+  for (PetscInt k = 0; k < mesh->n_groups; k++) PetscCall(Widen(&mesh->group[k]));
+  at = mesh->n_nodes - 1;
+  for (PetscInt k = 0; k < n; k++) {
+    HycoMshGroup *g = &mesh->group[list[k].group];
+    const PetscInt face = list[k].face;
+
+    at += !k || !AreOne(&list[k], &list[k - 1]);
+    g->node[list[k].element * g->nv + (face == ITSELF   ? 8
+                                       : face == MIDDLE ? 26
+                                                        : HycoFacetNodes(HYCO_HEX27, face)[8])] = at;
+  }
+  mesh->n_nodes += added;
+  PetscCall(PetscFree(list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,55 @@
+"""The search for a recipe over paths drops a recipe at the first held-out path beside which it cannot be chosen: the choice is that of a search that
+judges all recipes at all of them."""
+import csv
+import unittest
+
+from rivals import Ring
+
+
+class SearchPaths(Ring):
+    newcomer = True
+
+    def search(self, name, *args, **options):
+        """The report, and the table's rows."""
+        report = self.hyco('train', '-scene', self.norton, '-model', self.path(name + '.h5'), '-hyco_snapshots', self.path('store'), '-table',
+                           self.path(name + '.csv'), *args, **options)
+        with open(self.path(name + '.csv'), newline='', encoding='utf-8') as f:
+            return report, list(csv.DictReader(f))
+
+    def test_same_choice(self):
+        """Same recipe, same errors, fewer paths; on two ranks the same recipes are dropped at the same paths."""
+        grid = ('-grid', '3,3')
+        found, rows = self.search('raced', *grid)
+        every, full = self.search('every', *grid, '-hyco_search_exhaustive')
+        self.assertEqual(found['search'], every['search'])
+        self.assertGreater(len(rows), 5)
+        self.assertEqual({r['held_out_points'] for r in full}, {'20'})
+        dropped = [k for k, r in enumerate(rows) if r['held_out_points'] != '20']
+        self.assertGreater(len(dropped), 2)
+        self.assertNotIn(found['search']['chosen'] - 1, dropped)
+        for kind in ('u', 'sigma', 'lambda', 'inelastic'):
+            for size in ('median', 'largest', 'end'):
+                self.near(found['held_out'][kind][size], every['held_out'][kind][size], 1e-9, kind)
+            for row, whole in zip(rows, full):  # at some of the paths: a lower bound
+                self.assertLessEqual(float(row['error_' + kind]), float(whole['error_' + kind]) * (1 + 1e-9))
+        report, two = self.search('two', *grid, ranks=2)
+        self.assertEqual(report['search']['chosen'], found['search']['chosen'])
+        # of modes near round-off, models on other numbers of ranks differ
+        firm = [[(r['held_out_points'], r['pod_tol'], r['hybrid']) for r in table if float(r['pod_tol']) > 1e-12] for table in (two, rows)]
+        self.assertGreater(len(firm[1]), 3)
+        self.assertEqual(*firm)
+
+    def test_reason(self):
+        """A line per recipe; of a dropped one where it was dropped, and beside which it is not chosen. In a file, progress names the recipe."""
+        run = self.run_raw('train', '-scene', self.norton, '-model', self.path('said.h5'), '-grid', '3,3', '-hyco_snapshots', self.path('store'),
+                           '-progress', '0.01')
+        self.assertEqual(run.returncode, 0, run.stderr)
+        lines = [line for line in run.stdout.splitlines() if 'dropped at held-out path' in line]
+        self.assertTrue(lines, run.stdout)
+        for line in lines:
+            self.assertRegex(line, r'dropped at held-out path \d+ of 20: settings \d+ are better')
+        self.assertRegex(run.stderr, r'(?m)^settings \d+, hybrid, pod_tol \S+, .*: held-out paths: \d+ of 20')
+
+
+if __name__ == '__main__':
+    unittest.main()
