@@ -56,11 +56,10 @@ PetscErrorCode HycoCondensedPathBegin(HycoReducer t)
 
     changed[p] = (PetscBool)(p >= s->n_parameters || s->hi[p] > s->lo[p]);
     c = HycoSceneChanges(s, changed);
-    HycoCheckModel(
-        !c.stiffness && !c.rows,
-        "%s reaches the stiffness or the contacts' directions, and a condensed model of paths has one factor "
-        "for all of them; train a hybrid model or a cubature",
-        s->parameter[p]);
+    HycoCheckModel(!c.stiffness && !c.rows,
+                   "%s reaches %s, and a condensed model of paths has one stiffness and one set of contacts for all of "
+                   "them; take -hyco_model_type hybrid or cubature",
+                   s->parameter[p], c.stiffness ? "the stiffness" : "the contacts' directions");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
