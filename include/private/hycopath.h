@@ -76,6 +76,7 @@ struct _n_HycoPath {
   /* times of the steps to be taken, instead of its own choice; NULL: none. Borrowed */
   PetscInt n_given;
   const PetscReal *given;
+  PetscInt most_cuts, n_cuts; /* steps of the path that may be cut before it ends; 0: any number; that were */
   /* state of the material at the last accepted time, and of the attempt */
   HycoFEState begin, end;
   /* as U: loads alone, of the attempt; internal forces, the same */

@@ -43,6 +43,7 @@ typedef struct {
 typedef struct {
   PetscInt n_given; /* times of steps to be taken; NULL: its own. Borrowed */
   const PetscReal *given;
+  PetscInt most_cuts; /* of HycoPath; not 0 where training judges */
   PetscInt n, room;
   PetscReal *t, *gamma, *U_fe; /* n, n x l, n x n_fe */
   PetscInt n_listed, shown;    /* reached; the one that gamma, U, Lambda are of */
@@ -126,6 +127,8 @@ PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inela
 /* Of that listed time, once m->Lambda is of all contacts: its forces, and the size of U in the RID. */
 void HycoTraceMeasure(HycoROM model, HycoStep *step);
 PetscErrorCode HycoTraceFree(HycoROM model);
+/* HycoROMSetSteps() for a path that training judges: it ends where too many of these steps are cut. */
+PetscErrorCode HycoROMSetJudgedSteps(HycoROM model, PetscInt n, const PetscReal t[]);
 /* The fields of the path at its listed times on the whole mesh, as HycoFOMSetSeries() has them (replay.c). */
 PetscErrorCode HycoTraceWrite(HycoROM model, const char path[]);
 /*

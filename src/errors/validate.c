@@ -157,7 +157,7 @@ static PetscErrorCode PredictOne(HycoROM m, HycoSnapshots store, const PetscReal
   PetscFunctionBegin;
   if (m->scene->n_times) {
     PetscCall(HycoSnapshotsReadTaken(store, mu, &n, &taken));
-    PetscCall(HycoROMSetSteps(m, n, taken));
+    PetscCall(HycoROMSetJudgedSteps(m, n, taken));
   }
   ierr = HycoROMPredict(m, m->scene->n_parameters, mu);
   if (taken) PetscCall(HycoROMSetSteps(m, 0, NULL));

@@ -110,7 +110,7 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(p->mu, mu, p->scene->n_parameters));
   p->t = p->scene->times[0];
-  p->step = p->n_steps = p->n_orders = p->n_taken = 0;
+  p->step = p->n_steps = p->n_orders = p->n_taken = p->n_cuts = 0;
   p->dt = PETSC_MAX_REAL;
   p->ended = PETSC_FALSE;
   p->why[0] = '\0';
@@ -179,7 +179,9 @@ static void Count(HycoPath p, const HycoStepAttempt *a)
   p->now.seconds_factor += a->seconds_factor;
   p->now.seconds_solve += a->seconds_solve;
   p->now.seconds_law += a->seconds_law;
-  if (!a->converged) p->now.cuts++;
+  if (a->converged) return;
+  p->now.cuts++;
+  p->n_cuts++;
 }
 
 /* One attempt at a step to `stop`, or as far as p->dt goes; p->t moves on if it is accepted. */
@@ -220,7 +222,7 @@ static PetscReal NextGiven(HycoPath p)
   return PETSC_MAX_REAL;
 }
 
-/* From the listed time before to the next; false: the step has become too small. */
+/* From the listed time before to the next; false: the step has become too small, or too many were cut. */
 static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
 {
   const HycoScene s = p->scene;
@@ -233,7 +235,7 @@ static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
 
     if (p->substeps > 1 && !p->given) p->dt = PetscMin(p->dt, (end - s->times[p->step - 1]) / (PetscReal)p->substeps);
     PetscCall(TryStep(p, stop));
-    if (p->t == t && p->dt < least) *reached = PETSC_FALSE;
+    if (p->t == t && (p->dt < least || (p->most_cuts && p->n_cuts > p->most_cuts))) *reached = PETSC_FALSE;
     if (p->t > t && p->t < end && p->ops->save) PetscCall((*p->ops->save)(p));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -65,7 +65,8 @@ static PetscErrorCode JudgeSample(HycoReducer t, HycoROM m, PetscInt k, const Pe
   const PetscBool path = (PetscBool)(m->scene->n_times > 0);
 
   PetscFunctionBegin;
-  if (path) PetscCall(HycoROMSetSteps(m, t->taken_start[k + 1] - t->taken_start[k], t->taken + t->taken_start[k]));
+  if (path)
+    PetscCall(HycoROMSetJudgedSteps(m, t->taken_start[k + 1] - t->taken_start[k], t->taken + t->taken_start[k]));
   PetscCall(HycoROMPredict(m, m->scene->n_parameters, mu));
   if (path)
     PetscCall(PathErrors(t, m, k, &j->u, &j->lambda));

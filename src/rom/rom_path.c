@@ -5,7 +5,7 @@
 PetscErrorCode HycoTraceFree(HycoROM m)
 {
   HycoTrace *r = &m->trace;
-  const HycoTrace empty = {.n_given = r->n_given, .given = r->given};
+  const HycoTrace empty = {.n_given = r->n_given, .given = r->given, .most_cuts = r->most_cuts};
 
   PetscFunctionBegin;
   HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->Lambda, &r->sigma, &r->inelastic, &r->step);
@@ -155,6 +155,17 @@ PetscErrorCode HycoROMSetSteps(HycoROM m, PetscInt n, const PetscReal t[])
   HycoCheck(m->scene->n_times, "HycoROMSetSteps: the model's scene has no history, and its solution has no steps");
   m->trace.n_given = t ? n : 0;
   m->trace.given = t;
+  m->trace.most_cuts = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define JUDGED_CUTS 16 /* full order's steps are cut by a model that is lost: it may take minutes to say so */
+
+PetscErrorCode HycoROMSetJudgedSteps(HycoROM m, PetscInt n, const PetscReal t[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetSteps(m, n, t));
+  m->trace.most_cuts = JUDGED_CUTS;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

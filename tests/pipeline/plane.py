@@ -1,4 +1,5 @@
 """Reduced paths in 3D, where the cells at a plane of symmetry are the RID: few cells that cut the bodies from side to side."""
+import csv
 import os
 import subprocess
 import unittest
@@ -33,6 +34,23 @@ class Plane(Case):
         compared = self.hyco('compare', *SCENE, '-model', 'm.h5', *BETWEEN)
         for kind, limit in (('u', 5e-3), ('sigma', 2e-2), ('inelastic', 2e-2)):
             self.assertLess(compared['worst_' + kind]['max'], limit, kind)
+
+    def test_greedy(self):
+        """The greedy loop begins with that plane's cells and their displacements of full order, as by hand; the RID grows, and the indicator falls."""
+        scene = [*SCENE[:-1], '0,1,8000,10001.03333,10025.53333']
+        start = ['-values_gap', '0.04,0.06', '-values_q2', '40', '-values_creep', '1', '-hyco_validation', '0', '-hyco_snapshots', 'store']
+        greedy = self.hyco('train', *scene, '-greedy', '-training_grid', '2,2,2', *start, '-max_snapshots', 3, '-target', '1e-9', '-model', 'greedy.h5',
+                           '-table', 'greedy.csv', status=3)
+        with open(self.path('greedy.csv'), newline='', encoding='utf-8') as f:
+            first, last = csv.DictReader(f)
+        hand = self.hyco('train', *scene, *start, '-hyco_search', 'false', '-hyco_rid_groups', 'sym_x0', '-hyco_rid_modes', 'displacement', '-hyco_hybrid',
+                         'all', '-hyco_pod_tol', '1e-13', '-model', 'hand.h5')
+        self.assertEqual((int(first['rid_elements']), int(first['modes'])), (hand['rid_elements'], hand['n_modes']))
+        self.assertEqual(int(last['rid_elements']), greedy['rid_elements'])
+        self.assertGreater(greedy['rid_elements'], hand['rid_elements'])
+        self.assertGreater(greedy['n_fe_dofs'], greedy['rid_elements'])
+        self.assertEqual((first['infinite'], last['infinite']), ('0', '0'))
+        self.assertLess(float(last['mean_eta_u']), float(first['mean_eta_u']))
 
     def between(self):
         with open(self.path('between.csv'), 'w', encoding='utf-8') as f:

@@ -175,6 +175,15 @@ static PetscErrorCode Measure(HycoROM m, HycoFEState state, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before listed time k: where its tangent is looked at, it has to be the current one. */
+static void Expect(HycoROM m, PetscInt k)
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscBool watched = (PetscBool)(g->watch.stride && k % g->watch.stride == 0);
+
+  g->path->path->method = watched ? HYCO_NEWTON_TANGENT : g->path->method;
+}
+
 /* The last tangent: whether the path comes near to where it is singular. */
 static PetscErrorCode Watch(HycoROM m, PetscInt k)
 {
@@ -184,6 +193,7 @@ static PetscErrorCode Watch(HycoROM m, PetscInt k)
   PetscInt sign;
 
   PetscFunctionBegin;
+  Expect(m, k + 1);
   if (!g->watch.stride || k % g->watch.stride) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatConvert(g->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
   PetscCall(MatDenseGetArray(dense, &a));
@@ -306,8 +316,9 @@ PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
   out->reason = HYCO_CONVERGED; /* until a listed time says else */
   p->n_given = m->trace.n_given;
   p->given = m->trace.given;
+  p->most_cuts = m->trace.most_cuts;
   p->cold = PETSC_TRUE;
-  p->method = ((HycoGalerkin)m->data)->watch.stride ? HYCO_NEWTON_TANGENT : q->method; /* what is watched is current */
+  Expect(m, 0);
   PetscCall(PetscArrayzero(q->held, m->fe->n_dof));
   PetscCall(HycoTraceBegin(m));
   PetscCall(HycoPathBegin(p, mu));
