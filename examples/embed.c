@@ -23,12 +23,12 @@ static PetscErrorCode Run(const char *folder, const char *file, PetscInt n, cons
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom)); /* full order */
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(HycoFOMGetSummary(fom, &full));
-  PetscCall(HycoSamplesCreate(scene, &samples)); /* learn from 36 solutions */
+  PetscCall(HycoSamplesCreate(scene, &samples)); /* train on 36 solutions */
   PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_FALSE));
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoReducerSetFromOptions(reducer));
   PetscCall(HycoReducerRun(reducer, samples, file, NULL));
-  PetscCall(HycoROMLoad(file, &model)); /* predict; needs the model file alone */
+  PetscCall(HycoROMLoad(file, &model)); /* predict; needs only the model file */
   PetscCall(HycoROMPredict(model, n, mu));
   PetscCall(HycoROMGetPrediction(model, &reduced));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "contact force: full order %.6f (%s), reduced %.6f (%s, %.0f us)\n",

@@ -1,5 +1,5 @@
 /* HycoMaterial: a material law. A body of the scene names its type (`law:`, by default elastic) and gives its
- * constants. */
+   constants. */
 #ifndef HYCOMATERIAL_H
 #define HYCOMATERIAL_H
 
@@ -20,21 +20,20 @@ typedef const char *HycoMaterialType;
 #define HYCO_MATERIAL_LIMBACK_ANDERSSON "limback_andersson"
 #define HYCO_MATERIAL_MFRONT            "mfront" /* from a shared library with MFront's generic C interface */
 
-/* As a constant's value for `initial`: the scene must give it. */
+/* Value of `initial` for a constant that the scene must give. */
 #define HYCO_REQUIRED PETSC_INFINITY
-/* As the lower bound of a constant that may be 0, but not negative. */
+/* Lower bound of a constant that may be 0, but not negative. */
 #define HYCO_NOT_NEGATIVE (-1e-300)
-/* As a bound that is in the interval itself, of constants from 1 on or up to it. */
+/* Bounds that include 1 in the interval. */
 #define HYCO_FROM_ONE (1 - PETSC_MACHINE_EPSILON)
 #define HYCO_TO_ONE   (1 + PETSC_MACHINE_EPSILON)
 
 /*
-  n integration points of one law. Strain and stress have n_strain components a point: 1D (xx), 2D
-  (xx, yy, zz, xy), 3D (xx, yy, zz, xy, yz, xz), shear strains as angles (gamma = 2 eps), so that stress . strain is
-  twice the energy. Strains are without the thermal strain, which the library takes out. What a caller does not have or
-  does not ask for is NULL, and a law that is not linear may be asked for its elastic tangent: strain and strain0 are
-  then the same array. A linear law is asked for its tangent alone, without strains; temperatures are NULL in a body
-  that has none.
+  n integration points of one law. Strain and stress have n_strain components per point: 1D (xx), 2D (xx, yy, zz, xy),
+  3D (xx, yy, zz, xy, yz, xz), with shear strains as angles (gamma = 2 eps), so that stress . strain is twice the
+  energy. Strains exclude the thermal strain, which the library subtracts. Arrays that the caller does not provide or
+  request are NULL. A nonlinear law may be called for its elastic tangent: strain and strain0 are then the same array. A
+  linear law is called for its tangent only, without strains. Temperatures are NULL in a body without a temperature.
 */
 typedef struct {
   PetscInt n, dim, n_strain;
@@ -47,66 +46,67 @@ typedef struct {
   PetscReal *state;                            /* out: at the step's end */
   PetscReal *stress;                           /* out: n x n_strain */
   PetscReal *tangent; /* out: n x n_strain x n_strain, d stress / d strain of the step, row major, symmetric */
-  /* out, n each, densities by volume; a law may leave them: then nothing is stored, all work is dissipated,
-     and where it stores, the increment is what is dissipated over the equivalent stress */
+  /* out, n each, densities by volume. A law may omit them: then no energy is stored and all work is dissipated. If it
+     sets only `stored`, the increment is the dissipated energy divided by the equivalent stress */
   PetscReal *stored;     /* elastic energy at the step's end */
   PetscReal *dissipated; /* by the step: (stress0 + stress) / 2 : its inelastic strain */
   PetscReal *increment;  /* equivalent inelastic strain of the step, 0 or more */
-  PetscReal *potential;  /* of which stress is the gradient by strain; left where there is none */
-  PetscReal dt_factor;   /* out: what the law would multiply the step by; 1 unless it sets it */
-  PetscInt failed;       /* out: a point where the law has no answer; -1 unless it sets it */
+  PetscReal *potential;  /* whose gradient with respect to strain is the stress; omitted if there is none */
+  PetscReal dt_factor;   /* out: factor by which the law suggests to multiply the step; 1 by default */
+  PetscInt failed;       /* out: a point where the law has no solution; -1 by default */
   const char *why;       /* out: the reason, "the yield stress is negative" */
 } HycoMaterialPoints;
 
 typedef struct _HycoMaterialOps *HycoMaterialOps;
 struct _HycoMaterialOps {
-  /* Optional: declares constants that depend on what the scene says in the law's texts, HycoMaterialDeclareText(). */
+  /* Optional: declares constants that depend on the law's text entries in the scene, HycoMaterialDeclareText(). */
   PetscErrorCode (*declare)(HycoMaterial);
-  /* Optional: refuses a space dimension, sets the number of state variables. */
+  /* Optional: checks the space dimension, sets the number of state variables. */
   PetscErrorCode (*setup)(HycoMaterial, PetscInt dim);
-  /* The law: fills what is asked for at all points; one of update and isotropic is required. */
+  /* The law: computes the requested arrays at all points. One of update and isotropic is required. */
   PetscErrorCode (*update)(HycoMaterial, HycoMaterialPoints *points);
   /* A linear law with an isotropic tangent: Lame's lambda and mu, lame[n x 2], which make the element kernels faster.
-     stress = lambda tr(eps) I + 2 mu eps; in 1D stress = mu eps. Of a law that is not linear: its elastic part. */
+     stress = lambda tr(eps) I + 2 mu eps; in 1D stress = mu eps. For a nonlinear law: its elastic part. */
   PetscErrorCode (*isotropic)(HycoMaterial, HycoMaterialPoints *points, PetscReal lame[]);
-  /* Whether the tangent changes where the constants j with changed[j] do; NULL: with any. */
+  /* Whether the tangent changes if the constants j with changed[j] change; NULL: with any constant. */
   PetscBool (*depends)(HycoMaterial, const PetscBool changed[]);
   PetscErrorCode (*destroy)(HycoMaterial);
 };
 
-/* Adds a law, which scenes then name: create() declares its constants and sets its operations. Not collective. */
+/* Adds a law that scenes can then name. create() declares its constants and sets its operations. Not collective. */
 PetscErrorCode HycoMaterialRegister(const char name[], PetscErrorCode (*create)(HycoMaterial));
 
-/* A law without type. The caller owns it. Collective. */
+/* Creates a law without a type. The caller owns it. Collective. */
 PetscErrorCode HycoMaterialCreate(MPI_Comm comm, HycoMaterial *material);
 PetscErrorCode HycoMaterialDestroy(HycoMaterial *material);
-/* Fails with the list of those that are registered. */
+/* Sets the type. Fails for an unknown type, with the list of the registered ones. */
 PetscErrorCode HycoMaterialSetType(HycoMaterial material, HycoMaterialType type);
 PetscErrorCode HycoMaterialGetType(HycoMaterial material, HycoMaterialType *type);
 PetscErrorCode HycoMaterialView(HycoMaterial material, PetscViewer viewer);
 
-/* In create(): the next constant, `title` for messages ("Young's modulus"), its value where the scene gives none
-   (HYCO_REQUIRED: it must), and the open interval lo < value < hi. */
+/* In create(): declares the next constant, with `title` for messages ("Young's modulus"), its default value
+   (HYCO_REQUIRED: the scene must give it), and the open interval lo < value < hi. */
 PetscErrorCode HycoMaterialDeclare(HycoMaterial material, const char name[], const char title[], PetscReal initial,
                                    PetscReal lo, PetscReal hi);
 PetscErrorCode HycoMaterialSetOps(HycoMaterial material, const struct _HycoMaterialOps *ops);
-/* In create(): an entry of the scene that is a text, such as a file's name; then its value, to be read in declare().
+/* In create(): declares an entry of the scene that is a text, such as a file name. Get returns its value, in declare().
    Borrowed. */
 PetscErrorCode HycoMaterialDeclareText(HycoMaterial material, const char name[], const char title[]);
 PetscErrorCode HycoMaterialGetText(HycoMaterial material, const char name[], const char **text);
-/* State variables of an integration point, 0 at the beginning; none unless set. names: for outputs, or NULL. */
+/* Sets the number of state variables of an integration point (default: none), which are 0 at the beginning. names: for
+   outputs, or NULL. */
 PetscErrorCode HycoMaterialSetStateSize(HycoMaterial material, PetscInt n_state);
 PetscErrorCode HycoMaterialSetStateNames(HycoMaterial material, PetscInt n_state, const char *const names[]);
-/* Whether the law reads temperatures, so that its body must have one; false unless set. */
+/* Whether the law uses temperatures, so that its body must have one (default: false). */
 PetscErrorCode HycoMaterialSetHeat(HycoMaterial material, PetscBool heat);
-/* Whether stress = tangent . strain with a tangent that depends on the constants alone; true unless set. A scene with a
-   body whose law is not linear needs a history. */
+/* Whether stress = tangent . strain with a tangent that depends on the constants only (default: true). A scene with a
+   nonlinear law needs a history. */
 PetscErrorCode HycoMaterialSetLinear(HycoMaterial material, PetscBool linear);
 PetscErrorCode HycoMaterialSetData(HycoMaterial material, void *data);
 PetscErrorCode HycoMaterialGetData(HycoMaterial material, void *data);
 
-/* The law at points whose constants are given. Of a linear law the library makes the stress from the tangent, which
-   then has room too, and the tangent from isotropic(). Not collective. */
+/* Evaluates the law at points whose constants are given. For a linear law the library computes the stress from the
+   tangent, for which the caller provides memory too, and the tangent from isotropic(). Not collective. */
 PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *points);
 
 #if defined(__cplusplus)

@@ -1,7 +1,7 @@
 /*
-  A type of reduced model: what HycoROM and HycoReducer ask of it. A program adds one by HycoROMRegister() before it
-  trains or loads such models; they are then trained, saved, loaded, predicted and compared by the same calls and
-  commands as the library's own (examples/ladder/model.c).
+  A type of reduced model: its operations for HycoROM and HycoReducer. A program adds a type by HycoROMRegister() before
+  it trains or loads such models. They are then trained, saved, loaded, predicted and compared by the same functions and
+  commands as the types of the library (examples/ladder/model.c).
 */
 #ifndef HYCOROMTYPE_H
 #define HYCOROMTYPE_H
@@ -13,24 +13,24 @@
 extern "C" {
 #endif
 
-/* The settings that a search for a recipe varies. */
+/* The settings that a search varies. */
 typedef enum {
-  HYCO_SETTINGS_MODES, /* how many modes */
-  HYCO_SETTINGS_RID,   /* these, the size of the RID, which displacements are full order */
+  HYCO_SETTINGS_MODES, /* the number of modes */
+  HYCO_SETTINGS_RID,   /* the same, the size of the RID, which displacements are full order */
   HYCO_SETTINGS_NONE   /* none: one attempt */
 } HycoSettings;
 
-/* What a type is, without any model of it. */
+/* Properties of a type. */
 typedef struct {
-  const char *title; /* in words: "hybrid hyper-reduced" */
+  const char *title; /* "hybrid hyper-reduced" */
   HycoSettings settings;
-  PetscBool whole;       /* the whole mesh is its RID: nothing seeds one */
-  PetscBool stiffness;   /* it has a reduced stiffness, whose condition is reported */
-  PetscBool constrains;  /* the gap of each contact of A_lambda is held nonnegative */
-  PetscBool forces;      /* it gives the forces of all contacts as those of the full order: HycoFOMSolveForces() */
-  PetscBool force_basis; /* it takes -hyco_dual nnmf and snapshots */
-  PetscBool history;     /* its solve has the paths of scenes with a history */
-  PetscBool cells; /* its mesh is of the cells that its modes choose alone, with the surfaces of contacts and loads */
+  PetscBool whole;       /* the RID is the whole mesh, so that it has no seeds */
+  PetscBool stiffness;   /* there is a reduced stiffness, whose condition is reported */
+  PetscBool constrains;  /* the gap of each contact of A_lambda is constrained to be nonnegative */
+  PetscBool forces;      /* it gives accurate forces of all contacts, for HycoFOMSolveForces() */
+  PetscBool force_basis; /* it supports -hyco_dual nnmf and snapshots */
+  PetscBool history;     /* it supports the paths of scenes with a history */
+  PetscBool cells; /* its mesh consists of the cells that its modes choose, and of the surfaces of contacts and loads */
 } HycoROMTraits;
 
 /* The system on the RID before reduction, for the indicator (43). Borrowed. */
@@ -40,55 +40,60 @@ typedef struct {
   IS is_A, is_I;
 } HycoLocal;
 
-/* NULL for what a type does not do. Not collective, unless said. */
+/* An operation that a type does not have is NULL. Not collective, unless stated. */
 typedef struct _HycoROMOps {
-  /* -- training; the reducer's state is on rank 0 -- */
+  /* -- training; the state of the reducer is on rank 0 -- */
   PetscErrorCode (*setfromoptions)(HycoReducer); /* its options of the training, on every rank */
-  PetscErrorCode (*resettraining)(HycoReducer);  /* frees what they and a run have made, on every rank */
-  PetscErrorCode (*begin)(HycoReducer);          /* before any solve: refuses what it is not for. Collective */
-  PetscErrorCode (*startpoints)(HycoReducer, HycoSamples *);                 /* chooses its own training points: */
-  PetscErrorCode (*choosepoints)(HycoReducer, HycoSnapshots, HycoSamples *); /* first ones; those. Collective */
-  PetscErrorCode (*modes)(HycoReducer, HycoSnapshots); /* modes beside or instead of the solutions' POD. Collective */
-  PetscErrorCode (*build)(HycoROM, HycoReducer); /* the model, on rank 0, its mesh, contacts and modes being there */
-  PetscErrorCode (*finish)(HycoReducer, HycoROM, HycoTraining *); /* checks over the ranges; changed on rank 0.
-                                                                     Collective */
+  PetscErrorCode (*resettraining)(HycoReducer);  /* frees what these options and a run have allocated, on every rank */
+  PetscErrorCode (*begin)(HycoReducer); /* before any solve: refuses unsupported scenes and options. Collective */
+  PetscErrorCode (*startpoints)(HycoReducer, HycoSamples *);                 /* chooses the first training points: */
+  PetscErrorCode (*choosepoints)(HycoReducer, HycoSnapshots, HycoSamples *); /* and further ones. Collective */
+  PetscErrorCode (*modes)(HycoReducer,
+                          HycoSnapshots); /* modes in addition to or instead of the solutions' POD. Collective */
+  PetscErrorCode (*build)(HycoROM,
+                          HycoReducer); /* builds the model, on rank 0, where its mesh, contacts and modes exist */
+  PetscErrorCode (*finish)(HycoReducer, HycoROM,
+                           HycoTraining *); /* checks over the ranges; may change the model, on rank 0. Collective */
   PetscErrorCode (*report)(HycoReducer, HycoROM, HycoTraining *); /* summary and facts. Rank 0 */
   PetscReal (*cost)(HycoReducer, const HycoAttempt *);            /* operations of an online solve at a new stiffness */
-  PetscBool (*offers)(HycoReducer, PetscBool targets); /* whether a search tries it unasked, -target_... given or not */
+  PetscBool (*offers)(HycoReducer,
+                      PetscBool targets); /* whether a search tries it by default, with or without -target_... */
   /* -- online -- */
-  PetscErrorCode (*options)(HycoROM);                               /* its options of a model */
-  PetscErrorCode (*setup)(HycoROM);                                 /* default: HycoROMSetUpDefault() */
-  PetscErrorCode (*reset)(HycoROM);                                 /* frees what setup and solve have made */
-  PetscErrorCode (*solve)(HycoROM, const PetscReal mu[]);           /* ends with HycoROMSetSolution() */
-  PetscErrorCode (*reconstruct)(HycoROM);                           /* forces outside A_lambda */
-  PetscErrorCode (*energy)(HycoROM, PetscReal *, PetscBool *known); /* strain energy, if it has it at hand */
-  PetscErrorCode (*condition)(HycoROM, PetscReal *);                /* of the reduced stiffness; 0: not known */
+  PetscErrorCode (*options)(HycoROM);                     /* its options of a model */
+  PetscErrorCode (*setup)(HycoROM);                       /* default: HycoROMSetUpDefault() */
+  PetscErrorCode (*reset)(HycoROM);                       /* frees what setup and solve have allocated */
+  PetscErrorCode (*solve)(HycoROM, const PetscReal mu[]); /* ends with HycoROMSetSolution() */
+  PetscErrorCode (*reconstruct)(HycoROM);                 /* forces outside A_lambda */
+  PetscErrorCode (*energy)(HycoROM, PetscReal *,
+                           PetscBool *known);        /* strain energy, if it is known without further cost */
+  PetscErrorCode (*condition)(HycoROM, PetscReal *); /* of the reduced stiffness; 0: not known */
   PetscErrorCode (*local)(HycoROM, HycoLocal *);
-  PetscErrorCode (*features)(HycoROM, PetscReal misfit[2]); /* what tells of its errors, >= 0 */
-  PetscErrorCode (*estimate)(HycoROM, HycoPrediction *);    /* its errors, where nothing was held out */
+  PetscErrorCode (*features)(HycoROM, PetscReal misfit[2]); /* features that indicate its errors, >= 0 */
+  PetscErrorCode (*estimate)(HycoROM, HycoPrediction *);    /* its errors, without held-out points */
   PetscErrorCode (*view)(HycoROM, PetscViewer);
   PetscErrorCode (*save)(HycoROM, HycoH5);
   PetscErrorCode (*load)(HycoROM, HycoH5);
-  PetscErrorCode (*destroy)(HycoROM); /* its data */
+  PetscErrorCode (*destroy)(HycoROM); /* frees its data */
 } HycoROMOps;
 
-/* Adds a type: `create` calls HycoROMSetType...() of the model that it is given. Not collective. */
+/* Adds a type: `create` calls HycoROMSetOps() for the model that it is given. Not collective. */
 PetscErrorCode HycoROMRegister(const char name[], PetscErrorCode (*create)(HycoROM));
-/* In create: what the type does, copied; its data, which ops->destroy frees. */
+/* In create: sets the operations and properties of the type, which are copied, and its data, which ops->destroy frees.
+ */
 PetscErrorCode HycoROMSetOps(HycoROM model, const HycoROMOps *ops, const HycoROMTraits *traits, void *data);
 PetscErrorCode HycoROMGetData(HycoROM model, void *data);
-/* The registered type of a model that has none yet; fails with the names where there is none of that name. */
+/* Sets the type of a model that has none yet. Fails for an unknown type, with the registered names. */
 PetscErrorCode HycoROMSetType(HycoROM model, HycoROMType type);
-/* Modes and contacts of a model under training or loaded. Any output may be NULL. */
+/* Gets the numbers of modes and contacts of a model that is in training or loaded. Any output may be NULL. */
 PetscErrorCode HycoROMGetDimensions(HycoROM model, PetscInt *n_modes, PetscInt *n_contacts);
-/* In setup: every contact the model's own, on all of its mesh; what a type without setup has. */
+/* In setup: the default set-up, in which all contacts and all of the mesh belong to the model. */
 PetscErrorCode HycoROMSetUpDefault(HycoROM model);
-/* The end of a solve at mu: coefficients of the modes and forces of all contacts, copied (NULL: as they are in the
-   model); the residuals of (16) that they leave at the contacts are measured. */
+/* Ends a solve at mu: sets the coefficients of the modes and the forces of all contacts, which are copied (NULL: those
+   in the model), and computes the residuals of (16) at the contacts. */
 PetscErrorCode HycoROMSetSolution(HycoROM model, const PetscReal mu[], const PetscReal gamma[],
                                   const PetscReal Lambda[]);
 
-/* In build: the training points (n x n_parameters), the contact forces there (n_contacts x n column major) and the
+/* In build: gets the training points (n x n_parameters), the contact forces there (n_contacts x n column major) and the
    modes' coefficients (n_modes x n column major). Any output may be NULL. Borrowed. Rank 0. */
 PetscErrorCode HycoReducerGetSolutions(HycoReducer reducer, PetscInt *n, const PetscReal *mu[],
                                        const PetscReal *Lambda[], const PetscReal *gamma[]);

@@ -10,7 +10,8 @@ extern "C" {
 
 typedef struct _p_HycoSamples *HycoSamples;
 
-/* An empty set over the scene's parameters. It keeps a reference to the scene. Not collective. The caller owns it. */
+/* Creates an empty set over the scene's parameters. It holds a reference to the scene. Not collective. The caller owns
+   it. */
 PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples);
 /* Frees; sets the handle to NULL; NULL-safe. */
 PetscErrorCode HycoSamplesDestroy(HycoSamples *samples);
@@ -21,11 +22,11 @@ PetscErrorCode HycoSamplesDestroy(HycoSamples *samples);
   closed = PETSC_TRUE: both ends included (counts[i] >= 2).
 */
 PetscErrorCode HycoSamplesAddGrid(HycoSamples samples, const PetscInt counts[], PetscBool closed);
-/* The same at the roots of Chebyshev polynomials over each range, counts[i] >= 1 of them: the nodes for interpolation
-   by polynomials, as in a condensed model. */
+/* Appends the tensor grid of the roots of Chebyshev polynomials over each range, counts[i] >= 1 of them: nodes for
+   interpolation by polynomials, as in a condensed model. */
 PetscErrorCode HycoSamplesAddChebyshev(HycoSamples samples, const PetscInt counts[]);
-/* Appends the first `count` >= 1 points of Halton's sequence over the ranges: each parameter takes `count` values where
-   a grid of as many points has few. More of them hold the fewer. */
+/* Appends the first `count` >= 1 points of Halton's sequence over the ranges. Each parameter has `count` values,
+   whereas a grid with as many points has few. A larger set contains the smaller ones. */
 PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count);
 /* Appends the tensor product of the lists values[i][0..counts[i]-1], the last parameter running fastest. */
 PetscErrorCode HycoSamplesAddProduct(HycoSamples samples, const PetscInt counts[], const PetscReal *const values[]);
@@ -36,27 +37,28 @@ PetscErrorCode HycoSamplesAddPoint(HycoSamples samples, const PetscReal mu[]);
 PetscErrorCode HycoSamplesAddFile(HycoSamples samples, const char path[]);
 
 /*
-  `count` points spread evenly over what the set reaches (from its least to its largest value of each parameter, and
-  half the widest step between two more at either end, within the scene's range), none of them in it: points to judge by
-  what is learned from the set. They are the numbers first, first + 1, ... of one sequence, so that later calls continue
-  it. slow[p] (may be NULL): a new value of this parameter is expensive; as long as others are not, `together` >= 1
-  successive points share its value. Without parameters there is none. The caller owns *unseen. Not collective.
+  Creates `count` points spread evenly over the region of the set (from the smallest to the largest value of each
+  parameter, plus half of the widest step between two values at either end, within the scene's range). None of them is
+  in the set: they are held-out points. They have the numbers first, first + 1, ... of one sequence, so that later calls
+  continue it. slow[p] (may be NULL): a new value of this parameter is expensive; if other parameters are not,
+  `together` >= 1 successive points share its value. Without parameters there are no such points. The caller owns
+  *unseen. Not collective.
 */
 PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,
                                  const PetscBool slow[], HycoSamples *unseen);
 /* The points of `samples` that are not in `seen`, in their order. The caller owns *rest. Not collective. */
 PetscErrorCode HycoSamplesExcept(HycoSamples samples, HycoSamples seen, HycoSamples *rest);
 
-/* Of points with the same values keeps the first; the order stays. n_dropped: how many went (may be NULL). Not
-   collective. */
+/* Removes duplicate points and keeps the first of each, in the same order. n_dropped: number of removed points (may be
+   NULL). Not collective. */
 PetscErrorCode HycoSamplesDropTwins(HycoSamples samples, PetscInt *n_dropped);
 
 /* Number of points and their values, point by point (n_points x n_parameters, row major). Borrowed. */
 PetscErrorCode HycoSamplesGet(HycoSamples samples, PetscInt *n_points, PetscInt *n_parameters, const PetscReal *mu[]);
 
-/* Prints it, in words, on an ASCII viewer (NULL: stdout). Collective. */
+/* Describes the object on an ASCII viewer (NULL: stdout). Collective. */
 PetscErrorCode HycoSamplesView(HycoSamples object, PetscViewer viewer);
-/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+/* Views the object as requested by the option of this name: PetscObjectViewFromOptions(). Collective. */
 PetscErrorCode HycoSamplesViewFromOptions(HycoSamples object, PetscObject owner, const char option[]);
 
 #if defined(__cplusplus)

@@ -11,34 +11,34 @@ extern "C" {
 
 typedef struct _p_HycoSnapshots *HycoSnapshots;
 
-/* Called on rank 0 of the store's communicator after each solution of its group: at least done of n are stored, by all
-   groups; at the end once with n of n. */
+/* Called on rank 0 of the store's communicator after each solution of its group: at least `done` of n solutions are
+   stored, by all groups. At the end it is called once with n of n. */
 typedef PetscErrorCode (*HycoProgress)(PetscInt done, PetscInt n, void *ctx);
 
-/* Opens (creates if missing) the folder. Collective on `comm`. It keeps a reference to the scene. The caller owns it.
+/* Opens the folder, or creates it. Collective on `comm`. The store holds a reference to the scene. The caller owns it.
  */
 PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char folder[], HycoSnapshots *snapshots);
 /* Closes; sets the handle to NULL; NULL-safe. Collective. */
 PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots);
 /*
-  Solves full order at each sample that is not in the store yet. Collective. -hyco_groups G splits the communicator:
-  G samples at a time, which the groups take from a queue, one after the other: none waits while a sample is left. Each
-  solution is written to a temporary name and renamed, so that a run that was killed resumes and loses at most the
-  samples in flight. Fails, naming the sample, when a solve does not converge; the other groups then end theirs: a path
-  with its next iteration, another solution once it is stored.
+  Solves full order at each sample that is not in the store yet. Collective. -hyco_groups G splits the communicator into
+  G groups, which take the samples from a queue, one at a time: no group waits while a sample is left. Each solution is
+  written under a temporary name and renamed, so that a run that was killed can resume and loses at most the samples in
+  progress. Fails, with the sample, if a solve does not converge. The other groups then stop: a path at its next
+  iteration, another solution when it is stored.
 */
 PetscErrorCode HycoSnapshotsFill(HycoSnapshots snapshots, HycoSamples samples, HycoProgress progress, void *ctx);
 /* solved[n_groups]: how many samples each group of ranks has solved since the store was opened; those that it had are
    not counted. On every rank. Borrowed until the next HycoSnapshotsFill(). Not collective. */
 PetscErrorCode HycoSnapshotsGetSolved(HycoSnapshots snapshots, PetscInt *n_groups, const PetscInt *solved[]);
 
-/* How many groups of ranks solve n samples side by side: -hyco_groups, or as many as fit in half the memory when each
-   factors the stiffness of its own mesh. Collective. */
+/* Gets the number of groups of ranks that solve n samples at the same time: -hyco_groups, or as many as fit into half
+   of the memory if each factors the stiffness of its own mesh. Collective. */
 PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups);
 
-/* Prints it, in words, on an ASCII viewer (NULL: stdout). Collective. */
+/* Describes the object on an ASCII viewer (NULL: stdout). Collective. */
 PetscErrorCode HycoSnapshotsView(HycoSnapshots object, PetscViewer viewer);
-/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+/* Views the object as requested by the option of this name: PetscObjectViewFromOptions(). Collective. */
 PetscErrorCode HycoSnapshotsViewFromOptions(HycoSnapshots object, PetscObject owner, const char option[]);
 
 #if defined(__cplusplus)

@@ -1,4 +1,4 @@
-/* HycoSolver: solves a HycoSystem; every method is judged by the recomputed KKT residuals. */
+/* HycoSolver: solves a HycoSystem. Convergence of every method is decided by the recomputed KKT residuals. */
 #ifndef HYCOSOLVER_H
 #define HYCOSOLVER_H
 
@@ -15,18 +15,18 @@ typedef const char *HycoSolverType;
 #define HYCO_SOLVER_TAO        "tao"        /* a solver of TAO on the same problem (HycoSolverSetTaoType()) */
 #define HYCO_SOLVER_LEMKE      "lemke"      /* Lemke's complementary pivoting on the dense dual problem */
 
-/* The unknowns in which the complementarity problem is posed. */
+/* The unknowns of the complementarity problem. */
 typedef enum {
-  HYCO_FORM_AUTO,     /* dual for few contacts, primal when there are about as many as unknowns */
+  HYCO_FORM_AUTO,     /* dual for few contacts, primal if there are about as many contacts as unknowns */
   HYCO_FORM_DUAL,     /* w = (D - B K^-1 F) + (B K^-1 Bt) L */
   HYCO_FORM_PRIMAL,   /* gap coordinates: one unknown of each contact row is replaced by its gap, a bound */
   HYCO_FORM_DUAL_FREE /* the dual with B K^-1 Bt applied, never formed: TAO's bound-constrained types, symmetric */
 } HycoForm;
 
 /*
-  Makes a form available to solvers that are created from then on: by -hyco_solver_form name, or left to itself where it
-  is the cheapest that accepts a system. `create` fills in the form's operations and data (private headers). A
-  complementarity method is added by TaoRegister() instead, and chosen by HycoSolverSetTaoType(). Not collective.
+  Makes a form available to solvers that are created later. It is used by -hyco_solver_form name, or automatically if it
+  is the cheapest that accepts a system. `create` sets the form's operations and data (private headers). A
+  complementarity method is added by TaoRegister() instead, and selected by HycoSolverSetTaoType(). Not collective.
 */
 typedef struct _n_HycoSolverForm *HycoSolverForm;
 typedef PetscErrorCode (*HycoSolverFormCreate)(HycoSolver solver, HycoSolverForm form);
@@ -34,21 +34,21 @@ PetscErrorCode HycoSolverRegister(const char name[], HycoSolverFormCreate create
 
 /* Solves with the stiffness K. */
 typedef enum {
-  HYCO_LINEAR_AUTO,     /* direct, unless the factor is estimated to take more memory than there is */
+  HYCO_LINEAR_AUTO,     /* direct, unless the factor is estimated to need more memory than is available */
   HYCO_LINEAR_DIRECT,   /* MUMPS, ordered by nested dissection */
   HYCO_LINEAR_ITERATIVE /* conjugate gradients with algebraic multigrid, the contacts as constraints */
 } HycoLinear;
 
-/* How a solve ended. Negative: not solved, x and L are the last iterate. */
+/* Reasons for the end of a solve. Negative: not solved, and x and L are the last iterate. */
 typedef enum {
-  HYCO_CONVERGED = 1,            /* KKT residuals below the tolerance */
-  HYCO_CONVERGED_FALLBACK = 2,   /* the same, by another method than the chosen one (HycoSolverGetMethod says which) */
-  HYCO_DIVERGED_RESIDUAL = -1,   /* a residual above the tolerance */
-  HYCO_DIVERGED_ITERATIONS = -2, /* the limit of iterations */
-  HYCO_DIVERGED_SINGULAR = -3,   /* K (or its active saddle point) is singular */
-  HYCO_DIVERGED_FLOATING = -4,   /* the load takes a body away from the contact that alone holds it */
+  HYCO_CONVERGED = 1,                  /* KKT residuals below the tolerance */
+  HYCO_CONVERGED_FALLBACK = 2,         /* the same, by a fallback method (HycoSolverGetMethod) */
+  HYCO_DIVERGED_RESIDUAL = -1,         /* a residual above the tolerance */
+  HYCO_DIVERGED_ITERATIONS = -2,       /* the limit of iterations */
+  HYCO_DIVERGED_SINGULAR = -3,         /* K (or its active saddle point) is singular */
+  HYCO_DIVERGED_FLOATING = -4,         /* the load lifts a body off the contacts, which alone hold it */
   HYCO_DIVERGED_NO_CONTACT_BASIS = -5, /* a reduced model without any contact force, where bodies penetrate */
-  HYCO_DIVERGED_STEP = -6              /* a history: its steps of time have become too small */
+  HYCO_DIVERGED_STEP = -6              /* a history: its time steps became too small */
 } HycoReason;
 
 /* Collective. The caller owns it. */
@@ -62,61 +62,64 @@ PetscErrorCode HycoSolverSetType(HycoSolver solver, HycoSolverType type);
 /*
   -hyco_tao_type: for the type tao. Bound-constrained (symmetric systems): gpcg, tron, bntr, bnls, bntl, blmvm, bncg,
   bqnls, bqnkls, bqnktr, bqnktl, bqpip; semismooth (any, dual form): ssils, asils, ssfls, asfls; or what the program
-  has registered by TaoRegister(), which sees a scaled problem: bounds, Hessian H, gradient H y - f (also where H is not
-  symmetric). NULL (default): gpcg for a symmetric system, ssils for another. A solve refuses a bound-constrained type
-  for a nonsymmetric system.
-  docs/solvers.md says which suits which problem.
+  has registered by TaoRegister(), which gets a scaled problem: bounds, Hessian H, gradient H y - f (also if H is not
+  symmetric). NULL (default): gpcg for a symmetric system, otherwise ssils. A solve refuses a bound-constrained type for
+  a nonsymmetric system. docs/solvers.md compares the types.
 */
 PetscErrorCode HycoSolverSetTaoType(HycoSolver solver, const char type[]);
 /* -hyco_solver_form */
 PetscErrorCode HycoSolverSetForm(HycoSolver solver, HycoForm form);
-/* -hyco_linear; `gigabytes` (-hyco_memory): what a factor may take on all ranks together, 0: most of what is free. */
+/* -hyco_linear; `gigabytes` (-hyco_memory): largest memory of a factor on all ranks together; 0: most of the free
+   memory. */
 PetscErrorCode HycoSolverSetLinear(HycoSolver solver, HycoLinear linear, PetscReal gigabytes);
 /* -hyco_solver_rtol: the largest relative KKT residual that counts as solved (default 1e-8). */
 PetscErrorCode HycoSolverSetTolerance(HycoSolver solver, PetscReal rtol);
 /* -hyco_solver_max_its: of the active set or TAO (0: chosen from the number of contacts; TAO 2000). */
 PetscErrorCode HycoSolverSetMaxIts(HycoSolver solver, PetscInt max_its);
-/* -hyco_solver_warm_start: begin from the last solution's active set (default) or from no contact. */
+/* -hyco_solver_warm_start: start from the last solution's active set (default) or without contact. */
 PetscErrorCode HycoSolverSetWarmStart(HycoSolver solver, PetscBool warm);
-/* -hyco_solver_multilevel: in the primal form, where contacts are more than a quarter of the unknowns and couplings
-   have one sign (a rope, a membrane), begin from the active set of coarser problems (default). */
+/* -hyco_solver_multilevel: in the primal form, if there are more contacts than a quarter of the unknowns and couplings
+   have one sign (a rope, a membrane), start from the active set of coarser problems (default). */
 PetscErrorCode HycoSolverSetMultilevel(HycoSolver solver, PetscBool multilevel);
 /*
-  -hyco_solver_fallback: when the residuals of the chosen method are too large, try the next of: TAO, active set,
-  Lemke's method on the dense dual (default). Without it, such a solve ends not converged.
+  -hyco_solver_fallback: if the residuals of the chosen method are too large, try the next of TAO, active set, and
+  Lemke's method on the dense dual (default). Otherwise such a solve does not converge.
 */
 PetscErrorCode HycoSolverSetFallback(HycoSolver solver, PetscBool fallback);
-/* What begins the names of its options: with "other_", -other_hyco_solver_rtol. */
+/* Sets the prefix of its options: with "other_", -other_hyco_solver_rtol. */
 PetscErrorCode HycoSolverSetOptionsPrefix(HycoSolver solver, const char prefix[]);
 /* Reads the options above, from the database of PetscObjectSetOptions() (default: the global one). Collective. */
 PetscErrorCode HycoSolverSetFromOptions(HycoSolver solver);
 
-/* Called after each iteration of the active set, on every rank: its number, active contacts, changes made. */
+/* Called after each iteration of the active set, on every rank, with its number, the active contacts and the changes.
+ */
 typedef PetscErrorCode (*HycoMonitor)(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx);
 PetscErrorCode HycoSolverSetMonitor(HycoSolver solver, HycoMonitor monitor, void *ctx);
 
 /*
-  Solves for x (length n) and L (length m; NULL without contact). Collective. What depends on K and B alone (factor,
-  flexibility) is kept between solves until a matrix changes. Not solving is no error: ask HycoSolverGetReason.
+  Solves for x (length n) and L (length m; NULL without contact). Collective. The factor and the flexibility, which
+  depend on K and B alone, are kept between solves until a matrix changes. A solve that does not converge is not an
+  error: see HycoSolverGetReason.
 */
 PetscErrorCode HycoSolverSolve(HycoSolver solver, Vec x, Vec L);
 
 PetscErrorCode HycoSolverGetReason(HycoSolver solver, HycoReason *reason);
-/* Iterations of the last solve, and the KKT residuals recomputed after it. */
+/* Gets the iterations of the last solve, and the KKT residuals recomputed after it. */
 PetscErrorCode HycoSolverGetIterations(HycoSolver solver, PetscInt *its);
 PetscErrorCode HycoSolverGetKKT(HycoSolver solver, HycoKKT *kkt);
-/* What solved, in words: "active_set dual", "tao tron primal, then active_set". Borrowed, until the next solve. */
+/* Gets the method of the last solve: "active_set dual", "tao tron primal, then active_set". Borrowed, until the next
+   solve. */
 PetscErrorCode HycoSolverGetMethod(HycoSolver solver, const char *method[]);
-/* What solved with K in the last solve, in words: "direct: mumps, 0.9 GB estimated". Borrowed, until the next solve. */
+/* Gets the linear solver of the last solve: "direct: mumps, 0.9 GB estimated". Borrowed, until the next solve. */
 PetscErrorCode HycoSolverGetLinear(HycoSolver solver, const char *linear[]);
-/* Seconds in the factorisation (and the flexibility) and in the rest of the last solve. Either may be NULL. */
+/* Gets the seconds of the factorisation (and the flexibility) and of the rest of the last solve. Either may be NULL. */
 PetscErrorCode HycoSolverGetSeconds(HycoSolver solver, PetscReal *factor, PetscReal *solve);
-/* A word for the reason, for messages. Not collective. Borrowed. */
+/* Text of a reason, for messages. Not collective. Borrowed. */
 const char *HycoReasonName(HycoReason reason);
 
-/* Prints it, in words, on an ASCII viewer (NULL: stdout). Collective. */
+/* Describes the object on an ASCII viewer (NULL: stdout). Collective. */
 PetscErrorCode HycoSolverView(HycoSolver object, PetscViewer viewer);
-/* View as an option of this name says: PetscObjectViewFromOptions(). Collective. */
+/* Views the object as requested by the option of this name: PetscObjectViewFromOptions(). Collective. */
 PetscErrorCode HycoSolverViewFromOptions(HycoSolver object, PetscObject owner, const char option[]);
 
 #if defined(__cplusplus)

@@ -1,4 +1,4 @@
-/* The package: start, stop, version, and how options are declared. */
+/* The package: initialisation, version, and declarations of options. */
 #ifndef HYCOSYS_H
 #define HYCOSYS_H
 
@@ -12,51 +12,53 @@
 extern "C" {
 #endif
 
-/* One option, as the code that reads it declares it. */
+/* An option, as declared by the code that reads it. */
 typedef struct {
   const char *name;    /* "hyco_pod_tol", without the dash; "mu_": a name follows */
   const char *value;   /* "<real>", "<a|b|c>", "" for a flag */
   const char *initial; /* the default, as text */
   const char *meaning; /* one line */
   const char *owner;   /* the class whose objects read it: "HycoReducer" */
-  const char *only;    /* what alone of these reads it: "hybrid or condensed"; "": all */
+  const char *only;    /* the types that read it: "hybrid or condensed"; "": all */
 } HycoOption;
 
-/* hyco's classes are PETSc's objects: reference counts, names, options prefixes, composed data, PetscObjectView(). */
+/* hyco's classes are PETSc objects, with reference counts, names, options prefixes, composed data and
+   PetscObjectView(). */
 PETSC_EXTERN PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_CLASSID, HYCO_SOLVER_CLASSID,
     HYCO_FOM_CLASSID, HYCO_SNAPSHOTS_CLASSID, HYCO_REDUCER_CLASSID, HYCO_ROM_CLASSID, HYCO_MATERIAL_CLASSID,
     HYCO_CONTACT_CLASSID;
 
-/* Registers the classes; whatever makes an object calls it. Not collective. */
+/* Registers the classes. Every function that creates an object calls it. Not collective. */
 PetscErrorCode HycoInitializePackage(void);
 
-/* Starts PETSc (if needed) and SLEPc for hyco. Collective on all processes. `argc`, `argv` may be NULL. Where it starts
-   PETSc, an error is one line on stderr, "hyco: error: ..."; PETSc's trace of the calls with HYCO_TRACE=1 in the
-   environment, or by PetscPushErrorHandler(PetscTraceBackErrorHandler, NULL). */
+/* Initialises PETSc (if needed) and SLEPc for hyco. Collective on all processes. `argc`, `argv` may be NULL. If it
+   initialises PETSc, errors are printed as one line on stderr, "hyco: error: ...". HYCO_TRACE=1 in the environment, or
+   PetscPushErrorHandler(PetscTraceBackErrorHandler, NULL), adds PETSc's call stack. */
 PetscErrorCode HycoInitialize(int *argc, char ***argv);
-/* Ends what HycoInitialize started. Collective on all processes. */
+/* Finalises what HycoInitialize() initialised. Collective on all processes. */
 PetscErrorCode HycoFinalize(void);
 
 /* The version as "major.minor.patch". Not collective. Borrowed. */
 const char *HycoVersion(void);
 
-/* Every -hyco_ option that the library's classes declare, in the order of the method; `*n` receives their number. Not
-   collective. Borrowed, until a type is registered, or HycoFinalize(). */
+/* Gets every -hyco_ option that the library's classes declare, in the order of the method, and their number `*n`. Not
+   collective. Borrowed, until a type is registered or HycoFinalize() is called. */
 PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *table[]);
 
 /*
-  Declarations of options, between PetscObjectOptionsBegin(object) and PetscOptionsEnd(): as PETSc's calls of like
-  names, with the object's prefix and options database, but a value that is not of the form or out of its range ends
-  with one line that names it, and numbers have a decimal point in any locale. What the object has before is the
-  default. The text is "meaning", "<form> meaning", "meaning [default]" or both: form and default as they are to be
-  told, where the call's own are not enough. `set` (may be NULL): whether it was given. Collective on the object.
+  Declarations of options, between PetscObjectOptionsBegin(object) and PetscOptionsEnd(). They work like PETSc's
+  functions of similar names, with the object's prefix and options database. A value of the wrong form or out of its
+  range is an error of one line that names the option, and numbers have a decimal point in any locale. The value before
+  the call is the default. The text is "meaning", "<form> meaning", "meaning [default]" or both, if form and default
+  should be described differently from the function's own. `set` (may be NULL): whether the option was given. Collective
+  on the object.
   - Real, Int: lo <= value <= hi
   - Bool, Flag: a flag takes no value
-  - Word: index of one of `words`, which ends with NULL; < 0 is no word
+  - Word: index of one of `words`, which ends with NULL; < 0: none
   - String: length: of value
-  - List: words with commas between: n of them and NULL, which the caller frees by PetscStrArrayDestroy(); "none": 0
-  - Name: one that something else reads: PetscObjectViewFromOptions()
-  - For: what alone reads those that follow, in words: HycoOption.only
+  - List: words separated by commas: n of them and NULL, which the caller frees by PetscStrArrayDestroy(); "none": 0
+  - Name: an option that another function reads: PetscObjectViewFromOptions()
+  - For: the types that read the following options: HycoOption.only
 */
 #if PETSC_VERSION_LT(3, 23, 0)
 typedef PetscOptionItems *HycoOptionItems;
@@ -90,7 +92,8 @@ PetscErrorCode HycoOptionsList_Private(HycoOptionItems items, const char name[],
 PetscErrorCode HycoOptionsName_Private(HycoOptionItems items, const char name[], const char text[]);
 PetscErrorCode HycoOptionsFor(const char only[]);
 
-/* The name in `names[n]` nearest to `word` by edit distance, or NULL when none is close. Not collective. Borrowed. */
+/* Returns the name in `names[n]` nearest to `word` by edit distance, or NULL if none is close. Not collective.
+   Borrowed. */
 const char *HycoNearest(const char *word, PetscInt n, const char *const names[]);
 
 #if defined(__cplusplus)

@@ -19,7 +19,7 @@ static void FillDiagonal(PetscInt n, PetscInt n_par, const PetscReal lo[], const
 static PetscErrorCode Run(void)
 {
   HycoROM model;
-  HycoScene scene; /* the one that the model carries */
+  HycoScene scene; /* the one stored in the model */
   HycoPrediction *p;
   PetscInt n = 8, n_par, m;
   const PetscReal *lo, *hi;
@@ -35,7 +35,7 @@ static PetscErrorCode Run(void)
   PetscCall(HycoROMGetSizes(model, &m, NULL, NULL));
   PetscCall(PetscMalloc3(n * n_par, &mu, n, &p, n * m, &L));
   FillDiagonal(n, n_par, lo, hi, mu);
-  PetscCall(HycoROMSolveMany(model, n, n_par, mu, p, L, NULL)); /* NULL: displacements are not asked for */
+  PetscCall(HycoROMSolveMany(model, n, n_par, mu, p, L, NULL)); /* NULL: no displacements */
   for (PetscInt k = 0; k < n; k++) {
     PetscReal largest = 0;
 

@@ -23,7 +23,7 @@ static PetscErrorCode FromCentre(HycoContact contact, const HycoContactPoints *p
   PetscFunctionReturn(0);
 }
 
-/* Out of the body, into the sphere. */
+/* The normal, out of the body and into the sphere. */
 static PetscErrorCode Normal(HycoContact contact, const HycoContactPoints *p, PetscReal normal[])
 {
   PetscFunctionBegin;
@@ -70,7 +70,7 @@ static PetscErrorCode Run(const char *path, PetscInt n, const PetscReal mu[])
   HycoSummary s;
 
   PetscFunctionBegin;
-  PetscCall(HycoContactRegister("sphere", CreateSphere)); /* before a scene that names it */
+  PetscCall(HycoContactRegister("sphere", CreateSphere)); /* before loading a scene that names it */
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMSolve(fom, n, mu));

@@ -1,4 +1,4 @@
-/* A mesh of your own: a DMPlex with labels in place of a mesh file. Here PETSc's box, whatever its options say.
+/* A mesh of your own: a DMPlex with labels in place of a mesh file. Here it is PETSc's box, as its options define it.
 
      build/ladder/dmplex SCENE -dm_plex_dim 2 -dm_plex_simplex 0 -dm_plex_box_faces 8,8
 */
@@ -29,7 +29,7 @@ static PetscErrorCode CreateMesh(DM *dm)
   PetscFunctionBegin;
   PetscCall(DMCreate(PETSC_COMM_WORLD, dm));
   PetscCall(DMSetType(*dm, DMPLEX));
-  PetscCall(DMSetFromOptions(*dm)); /* distributes it too */
+  PetscCall(DMSetFromOptions(*dm)); /* also distributes it */
   PetscCall(DMGetDimension(*dm, &dim));
   PetscCall(DMCreateLabel(*dm, "block"));
   PetscCall(DMPlexGetHeightStratum(*dm, 0, &first, &last));
@@ -50,9 +50,9 @@ static PetscErrorCode Run(const char *path)
 
   PetscFunctionBegin;
   PetscCall(CreateMesh(&dm));
-  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene)); /* without mesh: */
+  PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene)); /* a scene without an entry mesh: */
   PetscCall(HycoSceneSetDM(scene, dm));
-  PetscCall(DMDestroy(&dm)); /* the scene has a reference */
+  PetscCall(DMDestroy(&dm)); /* the scene holds a reference */
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMSolve(fom, 0, NULL));
   PetscCall(HycoFOMGetSummary(fom, &s));

@@ -56,7 +56,7 @@ static PetscErrorCode Run(const char *path, PetscInt n, const PetscReal mu[])
   HycoSummary s;
 
   PetscFunctionBegin;
-  PetscCall(HycoMaterialRegister("cubic", CreateCubic)); /* before a scene that names it */
+  PetscCall(HycoMaterialRegister("cubic", CreateCubic)); /* before loading a scene that names it */
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMSolve(fom, n, mu));

@@ -10,7 +10,7 @@
 
 typedef struct {
   PetscInt n, n_par;                         /* training points, parameters */
-  PetscReal *mu, *Lambda, *gamma;            /* n_par, n_contacts, n_modes numbers a point */
+  PetscReal *mu, *Lambda, *gamma;            /* n_par, n_contacts, n_modes numbers per point */
   PetscReal *weight, *forces, *coefficients; /* work */
 } Nearest;
 
@@ -94,7 +94,7 @@ static PetscErrorCode Solve(HycoROM model, const PetscReal mu[])
   PetscCall(HycoROMGetDimensions(model, &l, &m));
   PetscCall(Parameters(model, &n, &lo, &hi));
   for (PetscInt k = 0; k < d->n; k++) {
-    PetscReal far = 1e-12; /* a training point gives itself */
+    PetscReal far = 1e-12; /* reproduces training points */
 
     for (PetscInt p = 0; p < n; p++) far += PetscSqr((mu[p] - d->mu[k * n + p]) / (hi[p] > lo[p] ? hi[p] - lo[p] : 1));
     d->weight[k] = 1 / far;
@@ -130,7 +130,7 @@ static PetscErrorCode Load(HycoROM model, HycoH5 file)
   PetscCall(HycoROMGetData(model, &d));
   PetscCall(HycoROMGetDimensions(model, &l, &m));
   PetscCall(Parameters(model, &d->n_par, NULL, NULL));
-  d->n = -1; /* as many as there are */
+  d->n = -1; /* all of them */
   PetscCall(HycoH5LoadReal(file, "nearest/mu", &d->n, &d->n_par, &d->mu));
   PetscCall(HycoH5LoadReal(file, "nearest/Lambda", &d->n, &m, &d->Lambda));
   PetscCall(HycoH5LoadReal(file, "nearest/gamma", &d->n, &l, &d->gamma));
@@ -175,7 +175,7 @@ static PetscErrorCode Run(const char *folder, const char *file, PetscInt n, cons
   PetscInt grid[32];
 
   PetscFunctionBegin;
-  PetscCall(HycoROMRegister("nearest", CreateNearest)); /* before a reducer or a file names it */
+  PetscCall(HycoROMRegister("nearest", CreateNearest)); /* before a reducer or a file uses it */
   PetscCall(PetscOptionsSetValue(NULL, "-hyco_model_type", "nearest"));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, folder, &scene));
   PetscCall(HycoSamplesCreate(scene, &samples));

@@ -9,7 +9,7 @@
 */
 #include <hyco.h>
 
-/* L lives on rank 0, in the mesh file's order; every rank asks, for the call is collective. */
+/* L is stored on rank 0, in the mesh file's order. The call is collective: every rank makes it. */
 static PetscErrorCode PrintForces(HycoFOM fom)
 {
   PetscInt m, largest = 0;
@@ -36,7 +36,7 @@ static PetscErrorCode Run(void)
   PetscCall(PetscOptionsGetRealArray(NULL, NULL, "-mu", mu, &n, NULL));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, folder, &scene)); /* entries can be overridden: -body_rope_young 2 */
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));    /* reads the mesh */
-  PetscCall(HycoFOMSolve(fom, n, mu));                        /* -hyco_solver_view says how; -help lists the options */
+  PetscCall(HycoFOMSolve(fom, n, mu)); /* -hyco_solver_view describes it; -help lists the options */
   PetscCall(HycoFOMGetSummary(fom, &s));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s: %d of %d contacts closed, force %.10g\n", HycoReasonName(s.reason),
                         (int)s.n_active, (int)s.n_contacts, (double)s.total_contact_force));

@@ -9,7 +9,7 @@
 */
 #include <hyco.h>
 
-/* 6 x 6 points, the centres of a grid's cells; the options may say how to reduce: -hyco_pod_tol 1e-9. */
+/* 6 x 6 points, the centres of a grid's cells. Options set the reduction: -hyco_pod_tol 1e-9. */
 static PetscErrorCode Train(HycoScene scene, const char file[])
 {
   const PetscInt grid[] = {6, 6};
@@ -47,7 +47,7 @@ static PetscErrorCode Run(void)
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, folder, &scene));
   PetscCall(Train(scene, file));
   PetscCall(HycoSceneDestroy(&scene));
-  PetscCall(HycoROMLoad(file, &model)); /* on each rank for itself: a model is small */
+  PetscCall(HycoROMLoad(file, &model)); /* on each rank separately: a model is small */
   PetscCall(HycoROMPredict(model, 2, mu));
   PetscCall(HycoROMGetPrediction(model, &p));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s: force %.10g, estimated error of u %.1e\n", HycoReasonName(p.reason),

@@ -13,6 +13,8 @@ struct _p_HycoContact {
   /* entries that the library reads, after HycoContactComplete(); borrowed */
   const char *name, *slave, *master; /* the last two: groups; master NULL: no masters */
   HycoExpr normal[3], gap;           /* NULL: not given */
+  PetscBool rigid; /* set by the type: the master is a node that a rigid body moves with, whose surface the normals and
+                      gaps at the slaves give; its equilibrium has the forces of all of the contact's nodes */
 };
 
 /* After the scene's entries are read: fails where one that is required is missing. */
@@ -27,6 +29,7 @@ PetscErrorCode HycoContactCheckGroups(HycoContact contact, HycoMesh mesh);
 PetscErrorCode HycoContactCreate_Obstacle(HycoContact contact);
 PetscErrorCode HycoContactCreate_Pair(HycoContact contact);
 PetscErrorCode HycoContactCreate_Surface(HycoContact contact);
+PetscErrorCode HycoContactCreate_Rigid(HycoContact contact);
 
 /* The scene's ties on a mesh that has all nodes and facets of their surfaces; fails for nodes that have no master, and
    where a node that others follow follows another. NULL: none. The caller destroys them. */

@@ -177,6 +177,8 @@ PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
 const HycoOblique *HycoFEOblique(HycoFE fe, PetscInt dof);
 void HycoFEComplete(HycoFE fe, PetscReal u[]);
 void HycoFEGeneralise(HycoFE fe, PetscReal f[]);
+/* Of ties alone: nodal forces of tied nodes pass to what they follow, and none is left at them. */
+void HycoFEPassTied(HycoFE fe, PetscReal f[]);
 /* Whether a support fixes an unknown, not a tie. */
 static inline PetscBool HycoFESupports(HycoFE fe, PetscInt dof)
 {

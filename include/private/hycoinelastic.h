@@ -74,8 +74,8 @@ typedef struct {
   displacement u at t1 (n_dof, local order, prescribed values in their places). fe is at the parameters of t1.
 
   f_int (n_dof, local order) gets the integral of B^T sigma added, thermal strains included, at every unknown, fixed
-  ones too (reactions). This rank has all cells of its own nodes: the rows of owned nodes are complete without
-  communication, those of others are to be ignored, as with K.
+  ones too (reactions); what tied nodes have of it passes to those that they follow. This rank has all cells of its own
+  nodes: the rows of owned nodes are complete without communication, those of others are to be ignored, as with K.
 
   tangent: fe's tangents become the consistent ones, d sigma / d eps of the step, of the bodies that flow; the next
   HycoFEAssembleStiffness() gives d f_int / d u (symmetric: a law's tangent that is not is replaced by its symmetric

@@ -77,12 +77,12 @@ static PetscErrorCode Unknown(const Command *command, const HycoOptionList *own,
   PetscFunctionBegin;
   PetscCall(HycoOptionsCheckName(name));
   PetscCall(ListTakers(name, takers));
-  HycoCheck(!takers[0], "hyco %s knows no option -%s; what does: hyco %s", command->name, name, takers);
+  HycoCheck(!takers[0], "hyco %s has no option -%s; these commands have it: hyco %s", command->name, name, takers);
   near = HycoOptionNearest(name, own);
   if (near)
-    HycoFail("hyco %s knows no option -%s; did you mean -%s%s? (hyco %s -help lists them)", command->name, name, near,
+    HycoFail("hyco %s has no option -%s; did you mean -%s%s? (hyco %s -help lists them)", command->name, name, near,
              near[strlen(near) - 1] == '_' ? "NAME" : "", command->name);
-  HycoFail("hyco %s knows no option -%s (hyco %s -help lists them)", command->name, name, command->name);
+  HycoFail("hyco %s has no option -%s (hyco %s -help lists them)", command->name, name, command->name);
 }
 
 /* The commands whose objects read an option of the library, in words; NULL: any. A reducer is made by train alone. */
@@ -99,9 +99,8 @@ static PetscErrorCode CheckReaders(const Command *command, const HycoOption *opt
   const char *readers = ReadersOf(option);
 
   PetscFunctionBegin;
-  HycoCheck(!readers || strstr(readers, command->name), "hyco %s does not read -%s; what does: hyco %s%s",
-            command->name, option->name, readers,
-            strcmp(readers, "train") ? "" : ", for it decides a model when that is trained");
+  HycoCheck(!readers || strstr(readers, command->name), "hyco %s does not use -%s; these commands do: hyco %s%s",
+            command->name, option->name, readers, strcmp(readers, "train") ? "" : " (it sets the model in training)");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -123,8 +122,8 @@ static PetscErrorCode CheckName(const Command *command, const HycoOptionList *ow
       (IsSceneEntry(name) && HycoOptionListFind(own, "scene")))
     PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!previous || !IsKey(previous) || !IsSceneEntry(previous + 1),
-            "%s stands where %s expects its value, and reads as an option: a value that begins with a dash and a "
-            "letter takes a blank first, %s \" %s\", or stands in scene.yaml",
+            "%s follows %s, which expects a value, and looks like an option; write a value that begins with a dash and "
+            "a letter with a blank first, %s \" %s\", or in scene.yaml",
             word, previous, previous, word);
   PetscCall(Unknown(command, own, name));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -138,10 +137,9 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
   PetscCall(HycoOptionsRecord(&own, command->declare));
   for (int k = 2; k < argc; k++) {
     if (!IsKey(argv[k]))
-      HycoFail(
-          "\"%s\" is no option; options begin with a dash, and take one value each (values have commas between, and "
-          "no space)",
-          argv[k]);
+      HycoFail("\"%s\" is not an option; options begin with a dash and take one value (separate several numbers by "
+               "commas, without spaces)",
+               argv[k]);
     PetscCall(CheckName(command, &own, argv[k] + (argv[k][1] == '-' ? 2 : 1), argv[k], k > 2 ? argv[k - 1] : NULL));
     if (k + 1 < argc && !IsKey(argv[k + 1])) k++;
   }
@@ -170,7 +168,7 @@ static PetscErrorCode CheckLeft(PetscBool early)
       PetscCall(PetscStrncpy(first, names[k], sizeof(first)));
   }
   PetscCall(PetscOptionsLeftRestore(NULL, &n, &names, &values));
-  HycoCheck(!first[0], "nothing reads the option -%s here; take it away, or see hyco -help", first);
+  HycoCheck(!first[0], "the option -%s has no effect in this command; remove it, or see hyco -help", first);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -209,13 +207,17 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
                         "<folder> folder with scene.yaml, or the YAML file; every entry can be overridden: "
                         "-body_NAME_young 2e5",
                         scene));
-  if (model) PetscCall(DriverGet("model", "<file.h5> the reduced model: written by train, read by the others", model));
+  if (model)
+    PetscCall(DriverGet("model", "<file.h5> the reduced model: train writes it, the other commands read it", model));
   if (output)
-    PetscCall(DriverGet("output",
-                        "<file.xdmf> fields for ParaView, the numbers in the .h5 beside it; or <file.vtkhdf>, one file",
-                        output));
+    PetscCall(DriverGet(
+        "output",
+        "<file.xdmf> fields for ParaView, with the numbers in a .h5 file beside it; or <file.vtkhdf>, a single file",
+        output));
   if (report) PetscCall(DriverGet("report", "<file.json> the result as one JSON object", report));
-  if (table) PetscCall(DriverGet("table", "<file.csv> a line per point, or <file.h5>, a dataset per column", table));
+  if (table)
+    PetscCall(
+        DriverGet("table", "<file.csv> a table with a row per point; or <file.h5>, with a dataset per column", table));
   if (report) PetscCall(DriverReadQuiet());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -223,7 +225,7 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
 PetscErrorCode DriverRequire(const char name[], const char value[])
 {
   PetscFunctionBegin;
-  HycoCheck(value[0], "-%s is missing (hyco -help explains it)", name);
+  HycoCheck(value[0], "the option -%s is missing; hyco -help explains it", name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -260,8 +262,8 @@ PetscErrorCode DriverHelp(const Command *command)
   }
   printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "
          "-hyco_primal_..., -hyco_tao_monitor, -hyco_pod_svd_view.\n");
-  printf("Exit status: 0 done; 1 an error, in one line; 3 a model is written, but it misses a target or the default "
-         "bar; 130 a training was interrupted (Ctrl-C), and goes on with the same command.\n");
+  printf("Exit status: 0 success; 1 an error, in one line; 3 a model is written, but it misses a target or the default "
+         "limits; 130 a training was interrupted (Ctrl-C); the same command continues it.\n");
   printf("Under MPI: mpiexec -n 2 hyco ...; set OPENBLAS_NUM_THREADS=1.\n");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

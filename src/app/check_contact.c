@@ -82,16 +82,19 @@ static void Warn(Check *check, HycoContact c, const ContactRange *r)
   const PetscReal length = HycoMeshLength(check->whole->part);
 
   if (!r->n)
-    CheckWarn(check, "contact %s has no contact: every node of %s is wholly fixed", c->name, c->slave);
+    CheckWarn(check, "contact %s has no effect: all displacements of every node of %s are fixed", c->name, c->slave);
   else if (!r->facing_max)
-    CheckWarn(check, "contact %s never faces anything: no node of %s finds %s at any of the points that were tried",
+    CheckWarn(check,
+              "contact %s never faces its master: no node of %s faces %s at any of the points that were assembled",
               c->name, c->slave, c->master);
   else if (c->master && r->gap_min > FAR * length)
     CheckWarn(check,
-              "contact %s: the smallest gap is %.3g, %.2g of the mesh's extent; small displacements do not close it",
+              "contact %s: the smallest gap is %.3g, %.2g of the mesh's extent; small displacements cannot close it",
               c->name, (double)r->gap_min, (double)(r->gap_min / length));
   if (r->coarse > COARSER)
-    CheckWarn(check, "contact %s: the slave's facets (%s) are %.2g times the master's (%s); let the finer be the slave",
+    CheckWarn(check,
+              "contact %s: the slave's facets (%s) are %.2g times as long as the master's (%s); the finer side should "
+              "be the slave",
               c->name, c->slave, (double)r->coarse, c->master);
 }
 
@@ -103,7 +106,7 @@ static void Print(const HycoContact c, const ContactRange *r)
     PetscCallVoid(r->facing_min == r->n ? Say(", all of which face it")
                                         : Say(", %d to %d of which face it", (int)r->facing_min, (int)r->facing_max));
   if (r->facing_max) PetscCallVoid(Say("; gaps from %.4g to %.4g", (double)r->gap_min, (double)r->gap_max));
-  if (r->facing_max && r->gap_min < 0) PetscCallVoid(Say(" (below 0 they overlap before any load)"));
+  if (r->facing_max && r->gap_min < 0) PetscCallVoid(Say(" (below 0 the bodies overlap before any load)"));
   PetscCallVoid(Say("\n"));
 }
 

@@ -132,9 +132,9 @@ static PetscErrorCode SayTraining(Check *check, const Cost *cost, PetscBool give
 
   PetscFunctionBegin;
   Seconds(training, all);
-  PetscCall(Say("a training on %s%d solutions, with those that judge it: about %s of full-order solves, and %.3g MB of "
-                "solutions; the reduction is extra\n",
-                given ? "" : "say ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
+  PetscCall(Say("a training on %s%d solutions, including held-out ones: about %s of full-order solves, and %.3g MB of "
+                "solutions; the reduction is not included\n",
+                given ? "" : "for example ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
   cJSON_AddNumberToObject(object, "n_training", cost->n_training);
   cJSON_AddNumberToObject(object, "n_stiffness", cost->n_stiff);
   cJSON_AddNumberToObject(object, "seconds_training", training);
@@ -154,10 +154,10 @@ PetscErrorCode CheckSayCost(Check *check, const Cost *cost, PetscBool given)
   if (n_times && cost->solved)
     PetscCall(Say("a full-order solve of the history, as measured: %s", first));
   else
-    PetscCall(Say("%s, %s: %s, or %s where the stiffness is the last one's",
+    PetscCall(Say("%s, %s: %s, or %s if the stiffness is unchanged",
                   n_times ? "an iteration of a step of the history" : "a full-order solve",
                   cost->solved ? "as measured" : "about", first, next));
-  PetscCall(Say("; %.3g MB, of which %.3g MB are a factor\n", 1e-6 * (double)(cost->resident + cost->bytes),
+  PetscCall(Say("; %.3g MB, of which %.3g MB for the factor\n", 1e-6 * (double)(cost->resident + cost->bytes),
                 1e-6 * (double)cost->bytes));
   cJSON_AddBoolToObject(object, "measured", cost->solved);
   cJSON_AddNumberToObject(object, "factor_mb", 1e-6 * cost->bytes);

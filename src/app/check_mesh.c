@@ -130,8 +130,8 @@ PetscErrorCode CheckBodies(Check *check)
     PetscCall(Say("\n"));
     if (parts[b] > 1)
       CheckWarn(check,
-                "body %s is in %d parts that share no node; if it should be one piece, the mesh has nodes twice "
-                "(gmsh: Coherence, or BooleanFragments)",
+                "body %s consists of %d parts that share no node; if it should be one piece, the mesh has duplicate "
+                "nodes (gmsh: Coherence, or BooleanFragments)",
                 s->body[b].name, (int)parts[b]);
     if (check->stretch[b] > LONG_CELL)
       CheckWarn(check, "body %s: cell %d is %.3g times as long as wide", s->body[b].name, (int)check->stretched[b],
@@ -161,8 +161,10 @@ static void CheckTwins(Check *check, HycoMesh m)
       PetscInt common;
 
       if (strcasecmp(m->group_name[g], m->group_name[h]) == 0)
-        CheckWarn(check, "the groups %s and %s differ in letter case alone; options do not tell them apart",
-                  m->group_name[h], m->group_name[g]);
+        CheckWarn(
+            check,
+            "the groups %s and %s differ only in upper and lower case, which options do not distinguish; rename one",
+            m->group_name[h], m->group_name[g]);
       if (m->group_dim[g] != m->group_dim[h] || !n || PetscMin(n, k) < ALIKE * PetscMax(n, k)) continue;
       common = Common(m, g, h);
       if (common == n && common == k)
@@ -228,12 +230,12 @@ PetscErrorCode CheckGroups(Check *check)
   PetscCall(MarkUsed(check->fom->scene, m, used));
   for (PetscInt g = 0; g < m->n_groups; g++) {
     if (used[g] && m->group_start[g] == m->group_start[g + 1])
-      CheckWarn(check, "the group %s has no node of a body", m->group_name[g]);
+      CheckWarn(check, "the group %s has no nodes of a body", m->group_name[g]);
     if (used[g]) continue;
     cJSON_AddItemToArray(unused, cJSON_CreateString(m->group_name[g]));
     PetscCall(HycoListAdd(list, ", ", m->group_name[g]));
   }
-  if (list[0]) CheckWarn(check, "no entry of the scene names %s (of the mesh's groups)", list);
+  if (list[0]) CheckWarn(check, "no entry of the scene uses these groups of the mesh: %s", list);
   PetscCall(PetscFree(used));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

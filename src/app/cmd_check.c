@@ -139,7 +139,7 @@ static PetscErrorCode SayMesh(Check *check)
   PetscFunctionBegin;
   PetscCall(HycoSceneGetTitle(f->scene, &title));
   PetscCall(Say("scene: %s\n", title[0] ? title : "(no title)"));
-  PetscCall(Say("mesh %s: %dD, %s, %d nodes, %d cells; %d unknowns, and %d that supports%s fix\n",
+  PetscCall(Say("mesh %s: %dD, %s, %d nodes, %d cells; %d free unknowns, and %d fixed by supports%s\n",
                 f->scene->dm ? "of the program" : f->scene->mesh_path, (int)m->dim, HycoCellKinds[m->type].name,
                 (int)f->n_nodes, (int)f->n_cells, (int)f->n_free, (int)n_fixed, f->scene->n_ties ? " and ties" : ""));
   PetscCall(SayTies(check, m, &n_tied));
@@ -175,8 +175,8 @@ static PetscErrorCode SayMotions(Check *check)
   }
   if (free.n)
     CheckWarn(check,
-              "%d rigid motion%s held by contact alone: full order solves that where the loads press the "
-              "bodies together; a reduced model needs supports",
+              "%d rigid motion%s prevented only by contact: full order can solve this if the loads press the bodies "
+              "together; a reduced model needs supports, except for a rigid body (contact type rigid)",
               (int)free.n, free.n > 1 ? "s are" : " is");
   PetscCall(HycoMotionsDestroy(&free));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -244,10 +244,10 @@ static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
   if (!words[0] && p == s->n_parameters) PetscFunctionReturn(PETSC_SUCCESS); /* laws and tables have it all the same */
   PetscCall(Say("%s %s", what, s->parameter[p]));
   if (p < s->n_parameters) PetscCall(Say(" from %g to %g", (double)s->lo[p], (double)s->hi[p]));
-  PetscCall(Say(": reaches %s\n", words[0] ? words : "nothing"));
-  if (!words[0]) CheckWarn(check, "the %s %s reaches nothing: no expression reads it", what, s->parameter[p]);
+  PetscCall(Say(": affects %s\n", words[0] ? words : "nothing"));
+  if (!words[0]) CheckWarn(check, "the %s %s affects nothing: no expression uses it", what, s->parameter[p]);
   if (p < s->n_parameters && s->lo[p] == s->hi[p])
-    CheckWarn(check, "the range of the parameter %s is one value", s->parameter[p]);
+    CheckWarn(check, "the range of the parameter %s is a single value", s->parameter[p]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

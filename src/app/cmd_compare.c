@@ -35,7 +35,7 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   PetscCall(HycoFOMGetSummary(fom, &s));
   if (s.reason < 0) {
     PetscCall(DriverFormatPoint(scene, mu, words, NULL));
-    HycoFail("the full-order solution at %s: %s; there is nothing to compare with", words, HycoReasonName(s.reason));
+    HycoFail("the full-order solution at %s failed: %s; no comparison is possible", words, HycoReasonName(s.reason));
   }
   PetscCall(HycoROMPredict(model, n_par, mu));
   PetscCall(HycoROMGetPrediction(model, &p));
@@ -191,7 +191,7 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
                 (int)failed, (int)fallback, (int)undefined, (double)kkt));
   PetscCall(PetscFree(ratio));
   PetscCall(ReportWrite(&json));
-  HycoCheck(!failed, "%d of the %d predictions did not converge; the errors leave them out", (int)failed, (int)n);
+  HycoCheck(!failed, "%d of the %d predictions did not converge; the errors do not include them", (int)failed, (int)n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -36,7 +36,7 @@ static PetscErrorCode SayTrust(const HycoPrediction *p)
   }
   PetscCall(Say("estimated errors: u %s, stress %s, contact forces %s\n", words[0], words[1], words[2]));
   DriverPercent(p->beyond, words[0]);
-  if (p->beyond > 0) PetscCall(Say("EXTRAPOLATED: outside the training points by %s of a range\n", words[0]));
+  if (p->beyond > 0) PetscCall(Say("EXTRAPOLATED: outside the region of training by %s of a range\n", words[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -138,7 +138,8 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
     PetscCall(SayReduced(&p));
     if (fallback->displacement) {
       PetscCall(DriverSolveDisplacement(fallback, model, n, mu, &p));
-      PetscCall(Say("one full solve with these forces: displacement of the whole mesh, residuals of full order\n"));
+      PetscCall(
+          Say("one full-order solve with these forces: displacements of the whole mesh, residuals of full order\n"));
     }
   }
   PetscCall(DriverCheckLeft());
@@ -206,11 +207,11 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
   PetscCall(Report(scene, mu, &p, n_carried, carried, energy, "", PETSC_FALSE, &path));
   PetscCall(PetscFree(carried));
   PetscCall(PetscFree(path.step));
-  HycoCheck(p.reason != HYCO_DIVERGED_STEP,
-            "the history ends at t = %.10g, beyond which its steps have become too small: %s; what was reached is "
-            "written",
-            (double)path.t, path.why);
-  HycoCheck(p.reason > 0, "%s; what was reached is written", HycoReasonName(p.reason));
+  HycoCheck(
+      p.reason != HYCO_DIVERGED_STEP,
+      "the history ends at t = %.10g, because its steps became too small: %s; the results up to this time are written",
+      (double)path.t, path.why);
+  HycoCheck(p.reason > 0, "%s; the results up to this time are written", HycoReasonName(p.reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -400,7 +401,7 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
     value[k * width + FULL_ORDER] = 1;
     count++;
   }
-  if (fallback->on) PetscCall(Say("%d of the %d points were solved full order\n", (int)count, (int)n));
+  if (fallback->on) PetscCall(Say("%d of the %d points were solved at full order\n", (int)count, (int)n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -437,7 +438,8 @@ static PetscErrorCode ReadExtrapolate(PetscBool *extrapolate)
   *extrapolate = PETSC_FALSE;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
   PetscCall(HycoOptionsFlag("-extrapolate",
-                            "predict outside the trained ranges too, where nothing has tested the model", extrapolate));
+                            "permit predictions outside the ranges of the training, where the model is not tested",
+                            extrapolate));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -481,16 +483,17 @@ PetscErrorCode CommandPredict(void)
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverReadFallback(model, extrapolate, &fallback));
   PetscCall(HycoROMWantsEquilibrium(model, &residual));
-  HycoCheck(!residual || n_times, "-hyco_residual is for models of paths, and the scene of %s has no history", path);
+  HycoCheck(!residual || n_times,
+            "-hyco_residual needs a model of paths, and the scene of %s has no history; remove it", path);
   if (monitor) PetscCall(HycoROMSetMonitor(model, DriverMonitor, NULL));
   PetscCall(DriverHasSamples(scene, &set));
   if (set) {
     HycoCheck(!output[0] || !n_times,
-              "-output of a model of paths is for one point (-mu); a set of points gives a -table");
+              "-output of a model of paths needs a single point (-mu); use -table for a set of points");
     HycoCheck(!output[0] || !fallback.on,
-              "-output of a set of points is the model's alone; leave out -hyco_fallback, or give one point (-mu)");
+              "-output of a set of points works without -hyco_fallback only; remove it, or give a single point (-mu)");
     HycoCheck(!fallback.displacement,
-              "-hyco_full_displacement is for one point (-mu); a set of points gives a -table, which has no fields");
+              "-hyco_full_displacement needs a single point (-mu); a set of points has only a -table, without fields");
     PetscCall(DriverGetSamples(scene, &samples, &set));
     HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples, output));
   } else {

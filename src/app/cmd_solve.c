@@ -10,10 +10,9 @@ static PetscErrorCode Remarks(const HycoSummary *s)
     PetscCall(Say("%d contact%s between fixed displacements: without effect\n", (int)s->n_still,
                   s->n_still > 1 ? "s lie" : " lies"));
   if (s->n_dependent)
-    PetscCall(Say(
-        "contact forces are not unique: %d closed contact%s on the others (more slaves than their masters' unknowns); "
-        "displacements and resultants are\n",
-        (int)s->n_dependent, s->n_dependent > 1 ? "s depend" : " depends"));
+    PetscCall(Say("contact forces are not unique: %d closed contact%s linearly on the others (more slaves than their "
+                  "masters' unknowns); displacements and resultants are unique\n",
+                  (int)s->n_dependent, s->n_dependent > 1 ? "s depend" : " depends"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -78,8 +78,9 @@ static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTra
 static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
 {
   PetscFunctionBegin;
-  HycoCheck(!greedy || !search->on,
-            "-target_u and the like choose a model for a given set of points; train -greedy stops by -target");
+  HycoCheck(
+      !greedy || !search->on,
+      "-target_u and similar options choose the settings for a given set of points; for train -greedy use -target");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -103,12 +104,12 @@ static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool 
     PetscCall(PetscOptionsHasName(NULL, NULL, dashed, &set));
     if (!set) continue;
     if (strcmp(only, "greedy") == 0) {
-      HycoCheck(greedy, "nothing reads %s here: it is for train -greedy", dashed);
+      HycoCheck(greedy, "%s has no effect without -greedy; remove it", dashed);
       continue;
     }
-    HycoCheck(strstr(only, type), "nothing reads %s here: it is for -hyco_model_type %.*s, and the model is %s", dashed,
+    HycoCheck(strstr(only, type), "%s has no effect here: it is for -hyco_model_type %.*s, and the model is %s", dashed,
               where ? (int)(where - only) : (int)strlen(only), only, type);
-    HycoCheck(!given || !where, "nothing reads %s here: it chooses points where none are given", dashed);
+    HycoCheck(!given || !where, "%s has no effect here: it chooses points only if none are given", dashed);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -123,7 +124,7 @@ static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
   PetscCall(HycoSamplesDropTwins(samples, &dropped));
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
   if (dropped)
-    PetscCall(Say("%d of the %d %s points repeat others; each of the %d is used once\n", (int)dropped,
+    PetscCall(Say("%d of the %d %s points are duplicates; each of the %d different points is used once\n", (int)dropped,
                   (int)(n + dropped), what, (int)n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -134,7 +135,8 @@ static PetscErrorCode ReadGreedy(PetscBool *greedy)
   *greedy = PETSC_FALSE;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
   PetscCall(HycoOptionsFlag(
-      "-greedy", "add solutions where an error indicator is worst, from the corners of the ranges or -grid ...",
+      "-greedy",
+      "add solutions where an error indicator is largest, starting from the corners of the ranges or from -grid ...",
       greedy));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -214,7 +216,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(Say("\n"));
   if (t.scan.n)
     PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,
-                  (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept as asked" : ""));
+                  (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept by -hyco_keep_singular" : ""));
   PetscCall(DriverJudgeModel(&search, &t));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));

@@ -86,10 +86,11 @@ PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n,
   cJSON_AddNumberToObject(json, "undefined", undefined);
   cJSON_AddNumberToObject(json, "not_converged", failed);
   cJSON_AddNumberToObject(json, "kkt_max", kkt);
-  PetscCall(Say("mean seconds of a path: full order %.3g, reduced %.3g; %d not ended; largest KKT residual %.1e\n",
-                (double)seconds[0], (double)seconds[1], (int)failed, (double)kkt));
+  PetscCall(Say(
+      "mean seconds of a path: full order %.3g, reduced %.3g; %d did not reach their end; largest KKT residual %.1e\n",
+      (double)seconds[0], (double)seconds[1], (int)failed, (double)kkt));
   PetscCall(ReportWrite(&json));
-  HycoCheck(!failed, "%d of the %d reduced paths did not reach their end; the errors leave them out", (int)failed,
+  HycoCheck(!failed, "%d of the %d reduced paths did not reach their end; the errors do not include them", (int)failed,
             (int)n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

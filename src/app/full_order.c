@@ -8,9 +8,8 @@
 PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target)
 {
   static const char *const texts[HYCO_N_ERRORS] = {
-      [HYCO_ERROR_U] =
-          "<real> train: choose the cheapest model whose errors on held-out solutions are no larger; predict "
-          "-hyco_fallback: solve full order where the estimated error is",
+      [HYCO_ERROR_U] = "<real> error of the displacement: train chooses the cheapest model whose held-out errors are "
+                       "no larger; predict -hyco_fallback solves full order where the estimate is larger",
       [HYCO_ERROR_U_RID] = "<real> train: the same for the displacement over the RID, max norm",
       [HYCO_ERROR_SIGMA] = "<real> train: the same for the stress over the RID",
       [HYCO_ERROR_SIGMA_11] = "<real> train: the same for its first component, max norm",
@@ -26,7 +25,7 @@ PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target)
   if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *target = strtod(text, &end);
   HycoCheck(end != text && !*end && *target > 0 && *target <= 1,
-            "-%s is \"%s\"; it must be a relative error above 0 and at most 1: 1e-2 is one percent", name, text);
+            "-%s is \"%s\"; it must be a relative error above 0 and at most 1 (1e-2 is one per cent)", name, text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -41,21 +40,22 @@ PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback
   PetscCall(HycoROMGetType(model, &type));
   PetscCall(HycoROMGivesForces(model, &forces));
   HycoCheck(!f->displacement || forces,
-            "-hyco_full_displacement takes the contact forces of a condensed model, and this one is %s: its forces are "
-            "not good enough for that; take -hyco_fallback",
+            "-hyco_full_displacement needs the contact forces of a condensed model, and this model is %s, whose forces "
+            "are not accurate enough; use -hyco_fallback",
             type);
   PetscCall(DriverReadTarget(HYCO_ERROR_U, &f->target_u));
   PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &f->target_lambda));
   PetscCall(DriverReadFiles(path, NULL, NULL, NULL, NULL));
   HycoCheck(f->on || (!(f->target_u > 0) && !(f->target_lambda > 0)),
-            "-target_u and -target_lambda say when hyco predict solves full order instead: give -hyco_fallback too");
+            "-target_u and -target_lambda set when hyco predict solves full order instead; give -hyco_fallback too");
   HycoCheck(f->on || f->displacement || !path[0],
-            "hyco predict needs no -scene but with -hyco_fallback, which solves full order on it%s",
+            "hyco predict uses -scene only with -hyco_fallback, which solves full order on it%s; remove -scene, or add "
+            "the option",
             forces ? ", or -hyco_full_displacement" : "");
   if (!f->on && !f->displacement) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(path[0], "%s: give its -scene too",
-            f->on ? "-hyco_fallback solves full order where the reduced model is not enough"
-                  : "-hyco_full_displacement solves on the whole mesh with the predicted forces");
+            f->on ? "-hyco_fallback solves full order where the reduced model is not accurate enough"
+                  : "-hyco_full_displacement solves full order with the predicted forces");
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &f->scene));
   PetscCall(HycoSceneRefuseHistory(f->scene, "-hyco_fallback"));
   PetscCall(DriverCheckMesh(f->scene));

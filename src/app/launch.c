@@ -82,8 +82,8 @@ PetscErrorCode DriverCheckLaunch(void)
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   HycoCheck(size > 1 || !launched[0],
-            "the launcher started several ranks (%s), and each is alone: it belongs to another MPI than hyco's; take "
-            "the mpiexec (or srun --mpi=...) of the MPI that PETSc was built with",
+            "the launcher started several processes (%s) that are not connected: it belongs to another MPI than "
+            "hyco's; use the mpiexec (or srun --mpi=...) of the MPI that PETSc was built with",
             launched);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -8,23 +8,23 @@
 
 const Command commands[] = {
     {"check", CommandCheck, DeclareCheck, "hyco check -scene FOLDER [-check_solve] [-report R.json]",
-     "read all of a scene and assemble it at the corners of its ranges: what is there, what is suspicious, what a "
-     "solve and a training (-grid N,N,...) take"},
+     "read a scene and assemble it at the corners of its ranges: report its contents, likely mistakes, and the cost of "
+     "a solve and of a training (-grid N,N,...)"},
     {"solve", CommandSolve, DeclareSolve, "hyco solve -scene FOLDER -mu V,V,... [-output F.xdmf] [-report R.json]",
-     "solve full order, for one point or a set (-table T.csv)"},
+     "solve full order, for one point or for a set of points (-table T.csv)"},
     {"train", CommandTrain, DeclareTrain,
      "hyco train -scene FOLDER -grid N,N,... | -greedy -training_grid N,N,... -model M.h5 [-report R.json]",
-     "solve a set of points full order (resumable), or choose them one by one; reduce, write the model; with -target_u "
-     "1e-2 -target_lambda 5e-2 ... the cheapest that is so accurate"},
+     "solve a set of points at full order (resumable), or choose the points one by one; reduce, and write the model; "
+     "with -target_u 1e-2 -target_lambda 5e-2 ... the cheapest model of this accuracy"},
     {"predict", CommandPredict, DeclarePredict,
      "hyco predict -model M.h5 -mu V,V,... [-output F.xdmf] [-report R.json]",
-     "solve the reduced model, for one point or a set (-table T.csv), and estimate its errors; reads only the model "
-     "file, except with -hyco_fallback or -hyco_full_displacement, and -scene FOLDER"},
+     "solve the reduced model, for one point or for a set of points (-table T.csv), and estimate its errors; reads "
+     "only the model file, except with -hyco_fallback or -hyco_full_displacement, which need -scene FOLDER"},
     {"compare", CommandCompare, DeclareCompare,
      "hyco compare -scene FOLDER -model M.h5 -mu V,V,... | -grid N,N,... [-report R.json] [-table T.csv]",
-     "errors and speed-up of the reduced model against full order over a set of points"},
+     "errors and speed-up of the reduced model, relative to full order, over a set of points"},
     {"view", CommandView, DeclareView, "hyco view -model M.h5 | -scene FOLDER",
-     "what is in a model or a scene, in words"},
+     "describe the contents of a model or a scene"},
     {NULL, NULL, NULL, NULL, NULL},
 };
 
@@ -120,10 +120,10 @@ static int AnswerAtOnce(int argc, char **argv)
 
     for (; commands[n].name; n++) names[n] = commands[n].name;
     near = HycoNearest(argv[1], n, names);
-    fprintf(
-        stderr,
-        "hyco: error: there is no command \"%s\"; commands are check, solve, train, predict, compare and view%s%s%s\n",
-        argv[1], near ? "; did you mean " : "", near ? near : "", near ? "?" : "");
+    fprintf(stderr,
+            "hyco: error: there is no command \"%s\"; the commands are check, solve, train, predict, compare and "
+            "view%s%s%s\n",
+            argv[1], near ? "; did you mean " : "", near ? near : "", near ? "?" : "");
   } else
     fprintf(stderr,
             "hyco: error: give a command: check, solve, train, predict, compare or view (hyco -help explains them)\n");
@@ -160,7 +160,7 @@ static PetscErrorCode Start(int *argc, char ***argv)
   if (!ierr) return 0;
   stopped = 1;
   (void)!PetscErrorMessage(ierr, NULL, &said);
-  fprintf(stderr, "hyco: error: PETSc does not start%s%s\n", said && said[0] ? ": " : "", said ? said : "");
+  fprintf(stderr, "hyco: error: PETSc cannot be initialised%s%s\n", said && said[0] ? ": " : "", said ? said : "");
   return ierr;
 }
 

@@ -47,9 +47,9 @@ static PetscErrorCode Take(const char what[], const char path[], PetscBool outpu
     const Named *a = output ? other : taken, *b = output ? taken : other;
 
     if (!HycoFileSame(&a->identity, &b->identity)) continue;
-    HycoCheck(strcmp(a->path, b->path), "%s and %s are both %s; give each a file of its own", a->what, b->what,
+    HycoCheck(strcmp(a->path, b->path), "%s and %s are the same file, %s; give each its own file", a->what, b->what,
               b->path);
-    HycoFail("%s %s and %s %s are one file; give each a file of its own", a->what, a->path, b->what, b->path);
+    HycoFail("%s %s and %s %s are the same file; give each its own file", a->what, a->path, b->what, b->path);
   }
   n_outputs += output;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -64,7 +64,7 @@ static PetscErrorCode AddFields(const char path[])
   PetscCall(HycoFieldsCheckPath(path));
   PetscCall(HycoFieldsNumbers(path, h5));
   PetscCall(Take("-output", path, PETSC_TRUE));
-  if (strcmp(path, h5)) PetscCall(Take("the numbers of -output", h5, PETSC_TRUE));
+  if (strcmp(path, h5)) PetscCall(Take("the .h5 file of -output", h5, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -149,9 +149,10 @@ static PetscErrorCode CheckPlace(const char name[], const char path[], HycoFileK
   else
     PetscCall(PetscStrncpy(folder, ".", sizeof(folder)));
   HycoCheck(direct ? access(path, W_OK) == 0 : access(folder, W_OK | X_OK) == 0,
-            "-%s %s cannot be written: is there such a folder, may you write there?", name, path);
+            "-%s %s cannot be written; check that the folder exists and is writable", name, path);
   if (!direct && kind == HYCO_FILE_TEXT) PetscCall(HycoH5IsPrecious(path, &precious));
-  HycoCheck(!precious, "-%s %s is a model or a snapshot, and stays one; give the %s another name", name, path, name);
+  HycoCheck(!precious, "-%s %s is a model or a snapshot and is not overwritten; give the %s another name", name, path,
+            name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -16,7 +16,7 @@ static PetscErrorCode ParseNumbers(const char name[], const char text[], PetscIn
 
     (*values)[*n] = strtod(at, &end);
     HycoCheck(end != at && (*end == ',' || *end == '\0') && !PetscIsInfOrNanReal((*values)[*n]),
-              "-%s is \"%s\"; numbers with commas between are expected", name, text);
+              "-%s is \"%s\"; numbers separated by commas are expected", name, text);
     (*n)++;
     if (*end == '\0') break;
     at = end + 1;
@@ -55,7 +55,7 @@ static PetscErrorCode CheckNamed(HycoScene scene, const char prefix[])
   }
   PetscCall(PetscOptionsLeftRestore(NULL, &left, &keys, &values));
   PetscCall(ListNames(scene, list));
-  HycoCheck(!bad[0], "-%s names no parameter; the scene's are: %s", bad, list[0] ? list : "(none)");
+  HycoCheck(!bad[0], "-%s does not name a parameter; the scene's parameters are: %s", bad, list[0] ? list : "(none)");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,8 +84,8 @@ static PetscErrorCode ReadGridType(PetscInt *type)
   PetscFunctionBegin;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
   PetscCall(HycoOptionsWord("-grid_type",
-                            "cell centres; with both ends of the ranges; or the roots of Chebyshev polynomials (for a "
-                            "condensed model)",
+                            "positions of the values: cell centres; with both ends of the ranges; or roots of "
+                            "Chebyshev polynomials (for a condensed model)",
                             types, type, NULL));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -129,8 +129,10 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
   PetscReal *values[64], *all;
 
   PetscFunctionBegin;
-  PetscCall(DriverGet("mu", "<v,v,...> parameter values in declared order; or one by one: -mu_NAME v", text));
-  PetscCall(GetNamed(scene, "mu_", "<v> the parameter NAME: -mu_radius 4.06", count, values, &given, &missing));
+  PetscCall(
+      DriverGet("mu", "<v,v,...> values of all parameters, in the scene's order; or one by one: -mu_NAME v", text));
+  PetscCall(
+      GetNamed(scene, "mu_", "<v> value of the parameter NAME: -mu_radius 4.06", count, values, &given, &missing));
   if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
   PetscCall(ListNames(scene, list));
@@ -143,7 +145,7 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
   for (PetscInt p = 0; p < n; p++) {
     if (!values[p]) continue;
     HycoCheck(count[p] == 1, "-mu_%s has %d values; one is expected", names[p], (int)count[p]);
-    HycoCheck(!text[0], "-mu gives every parameter, and -mu_%s gives one of them again; take one of the two away",
+    HycoCheck(!text[0], "-mu gives every parameter, and -mu_%s gives one of them again; remove one of the two",
               names[p]);
     mu[p] = values[p][0];
     PetscCall(PetscFree(values[p]));
@@ -223,10 +225,9 @@ PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples)
 
   PetscFunctionBegin;
   PetscCall(DriverGet("training_grid",
-                      "<n,n,...> greedy: the grid of points to choose from, closed unless -grid_type says centred",
-                      text));
+                      "<n,n,...> greedy: the grid of candidate points, closed unless -grid_type is centred", text));
   if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(text[0], "give a greedy training the points to choose from: -training_grid N,N,...");
+  HycoCheck(text[0], "a greedy training needs candidate points; give -training_grid N,N,...");
   PetscCall(HycoSamplesCreate(scene, samples));
   PetscCall(AddGrid(scene, *samples, "training_grid", 1, text));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -238,13 +239,13 @@ PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples)
 
   PetscFunctionBegin;
   *samples = NULL;
-  PetscCall(
-      DriverGet("validation_grid",
-                "<n,n,...> train: the solutions to judge the model by, closed unless -grid_type says centred (else "
-                "they are drawn: -hyco_validation)",
-                grid));
-  PetscCall(DriverGet("validation_points", "<file.csv> the same, as a file of points", points));
-  HycoCheck(!grid[0] || !points[0], "give one set of points to validate by: -validation_grid or -validation_points");
+  PetscCall(DriverGet("validation_grid",
+                      "<n,n,...> train: the grid of held-out points, closed unless -grid_type is centred (default: "
+                      "scattered points, -hyco_validation)",
+                      grid));
+  PetscCall(DriverGet("validation_points", "<file.csv> train: the held-out points, as a file of points", points));
+  HycoCheck(!grid[0] || !points[0],
+            "there are two sets of held-out points; give -validation_grid or -validation_points");
   if (!grid[0] && !points[0]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesCreate(scene, samples));
   if (grid[0])
@@ -262,8 +263,9 @@ static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscInt *
   PetscReal *values[64];
 
   PetscFunctionBegin;
-  PetscCall(GetNamed(scene, "values_", "<v,v,...> a set of points: values of the parameter NAME, all combined", count,
-                     values, &given, &missing));
+  PetscCall(GetNamed(scene, "values_",
+                     "<v,v,...> a set of points: values of the parameter NAME, combined with those of the others",
+                     count, values, &given, &missing));
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   HycoCheck(given == n, "-values_ are given for %d of the %d parameters; -values_%s is missing", (int)given, (int)n,
@@ -295,18 +297,20 @@ PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool
   PetscInt n_sets = 0, n, type = 0;
 
   PetscFunctionBegin;
-  PetscCall(DriverGet("grid", "<n,n,...> a set of points: n per parameter", grid));
+  PetscCall(DriverGet("grid", "<n,n,...> a set of points: a grid with n values per parameter", grid));
   if (!scene) PetscCall(ReadGridType(&type));
   if (scene) PetscCall(HycoSamplesCreate(scene, samples));
   PetscCall(AddValues(scene, scene ? *samples : NULL, &n_sets));
-  PetscCall(DriverGet("points", "<file.csv> a set of points: a header with the names, then a point per line", points));
+  PetscCall(DriverGet(
+      "points", "<file.csv> a set of points: a header with the parameters' names, then a point per line", points));
   PetscCall(DriverGet("scatter",
-                      "<n> a set of points: n of them all over the ranges, each parameter at n values (Halton's "
-                      "sequence); for training beside 3 parameters or more",
+                      "<n> a set of points: n points of Halton's sequence over the ranges, with n values of each "
+                      "parameter; for training with 3 parameters or more",
                       scatter));
   if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
   n_sets += (grid[0] != '\0') + (points[0] != '\0') + (scatter[0] != '\0');
-  HycoCheck(n_sets <= 1, "give one set of points: -grid, or -values_NAME, or -points, or -scatter");
+  HycoCheck(n_sets <= 1,
+            "there are several sets of points; give only one of -grid, -values_NAME, -points and -scatter");
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   if (grid[0])
     PetscCall(AddGrid(scene, *samples, "grid", 0, grid));

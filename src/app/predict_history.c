@@ -42,14 +42,14 @@ PetscErrorCode DriverSayEquilibrium(const DriverReducedPath *path)
   PetscFunctionBegin;
   if (!path->balanced) PetscFunctionReturn(PETSC_SUCCESS);
   if (e->why) {
-    PetscCall(Say("equilibrium on the whole mesh: not known; %s\n", e->why));
+    PetscCall(Say("equilibrium on the whole mesh is not known: %s\n", e->why));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   DriverPercent(e->worst, words[0]);
   DriverPercent(e->n ? e->residual[e->n - 1] : 0, words[1]);
   DriverPercent(e->worst_contact, words[2]);
-  PetscCall(Say("equilibrium on the whole mesh: residual %s of the path's size at worst, at t = %.10g; %s at the end; "
-                "contact conditions missed by %s\n",
+  PetscCall(Say("equilibrium on the whole mesh: largest residual %s of the path's size, at t = %.10g; %s at the end; "
+                "residual of the contact conditions %s\n",
                 words[0], (double)path->step[e->at].t, words[1], words[2]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -19,8 +19,8 @@ PetscErrorCode DriverReadQuiet(void)
 
   PetscFunctionBegin;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
-  PetscCall(HycoOptionsFlag("-quiet", "say nothing but errors; results are in -report and -table", &quiet));
-  PetscCall(HycoOptionsReal("-progress", "<seconds> between the lines of progress in a file", 0.01, PETSC_MAX_REAL,
+  PetscCall(HycoOptionsFlag("-quiet", "print errors only; results are in -report and -table", &quiet));
+  PetscCall(HycoOptionsReal("-progress", "<seconds> interval between progress lines in a file", 0.01, PETSC_MAX_REAL,
                             &seconds, NULL));
   PetscOptionsEnd();
   DriverBeatSetPeriod(seconds);
@@ -38,7 +38,8 @@ static void SetLastWords(const char what[])
 
   next = !next;
   snprintf(last_words[next], sizeof(last_words[next]),
-           "\nhyco: interrupted; %s solutions in %s are kept: the same command goes on from there\n", what, kept_in);
+           "\nhyco: interrupted; %s solutions are stored in %s: the same command continues from there\n", what,
+           kept_in);
   words = last_words[next];
 }
 
@@ -161,7 +162,7 @@ PetscErrorCode DriverReadMonitor(PetscBool *monitor)
   PetscFunctionBegin;
   *monitor = PETSC_FALSE;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
-  PetscCall(HycoOptionsFlag("-hyco_monitor", "a line per iteration of the active set", monitor));
+  PetscCall(HycoOptionsFlag("-hyco_monitor", "print a line per iteration of the active set", monitor));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }

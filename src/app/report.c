@@ -34,12 +34,11 @@ PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facin
   cJSON_AddNumberToObject(json, "n_facing", n_facing);
   cJSON_AddNumberToObject(json, "overlap", overlap);
   cJSON_AddNumberToObject(json, "sliding", sliding);
-  if (n_contacts && !n_facing)
-    PetscCall(Say("NO CONTACT: no slave node faces a master where these parameters put the bodies\n"));
+  if (n_contacts && !n_facing) PetscCall(Say("NO CONTACT: no slave node faces a master at these parameter values\n"));
   if (overlap > 0) PetscCall(Say("largest initial overlap %.4g\n", (double)overlap));
   if (sliding > 1)
-    PetscCall(Say("LARGE SLIDING: a closed contact moves by %.2g facets along its surface; contact is searched for "
-                  "before displacement, and is good for less than one\n",
+    PetscCall(Say("LARGE SLIDING: a closed contact moves by %.2g facets along its surface; contact pairs are found "
+                  "before displacement, and are valid for less than one facet\n",
                   (double)sliding));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -67,7 +67,7 @@ static PetscErrorCode Monitor(const HycoGreedyStep *s, void *ctx)
   PetscCall(Say("greedy %3d: %d snapshots, %d modes, RID %d nodes; eta %.2e (u %.2e, forces %.2e) at %s; largest %.2e, "
                 "infinite at %d of %d\n",
                 (int)s->iteration, (int)s->n_samples, (int)s->n_modes, (int)s->rid_nodes, (double)s->eta,
-                (double)s->eta_u, (double)s->eta_lambda, s->worst ? words : "no point that is left", (double)s->max_eta,
+                (double)s->eta_u, (double)s->eta_lambda, s->worst ? words : "no remaining point", (double)s->max_eta,
                 (int)s->n_infinite, (int)s->n_points));
   snprintf(row, sizeof(row), "%d,%d,%d,%d,%d,%s%.8g,%.8g,%.8g,%.8g,%.8g,%.8g,%d,%.3f\n", (int)s->iteration,
            (int)s->n_samples, (int)s->n_modes, (int)s->rid_nodes, (int)s->rid_elements, columns, (double)s->eta,
@@ -93,16 +93,16 @@ PetscErrorCode DriverReadGreedy(HycoScene scene, HycoReducer reducer, HycoSample
   PetscCall(DriverGetTrainingGrid(scene, training));
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, log->table));
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
-  PetscCall(HycoOptionsReal("-target", "greedy: stop when the indicator is no larger anywhere on that grid", 0,
+  PetscCall(HycoOptionsReal("-target", "greedy: stop when the indicator is no larger at any point of that grid", 0,
                             PETSC_MAX_REAL, &target, NULL));
-  PetscCall(HycoOptionsInt("-max_snapshots", "greedy: stop with so many solutions (0: no limit)", 0, PETSC_MAX_INT,
+  PetscCall(HycoOptionsInt("-max_snapshots", "greedy: stop at this number of solutions (0: no limit)", 0, PETSC_MAX_INT,
                            &max_snapshots, NULL));
-  PetscCall(HycoOptionsReal("-max_seconds", "greedy: stop after the iteration in which this has passed (0: no limit)",
-                            0, PETSC_MAX_REAL, &max_seconds, NULL));
+  PetscCall(HycoOptionsReal("-max_seconds",
+                            "greedy: stop after the iteration in which this time has passed (0: no limit)", 0,
+                            PETSC_MAX_REAL, &max_seconds, NULL));
   PetscOptionsEnd();
   if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(target > 0, "-target is 0; the indicator of a greedy training is asked to fall below a positive number, as "
-                        "1e-3");
+  HycoCheck(target > 0, "-target is 0; the target of the greedy indicator must be positive, for example 1e-3");
   log->target = target;
   PetscCall(HycoReducerSetGreedyStop(reducer, target, max_snapshots, max_seconds));
   PetscCall(HycoReducerSetGreedyMonitor(reducer, Monitor, log));
@@ -117,7 +117,7 @@ PetscErrorCode DriverJudgeGreedy(const GreedyLog *log)
     PetscInt infinite;
     char stop[16];
   } end; /* known to rank 0 alone */
-  const char *why = "every point of -training_grid is solved: give a finer grid, or a recipe with more modes or layers";
+  const char *why = "every point of -training_grid is solved: give a finer grid, or settings with more modes or layers";
 
   PetscFunctionBegin;
   end.max_eta = log->max_eta;
@@ -127,9 +127,10 @@ PetscErrorCode DriverJudgeGreedy(const GreedyLog *log)
   PetscCall(PetscOptionsHasName(NULL, NULL, "-target", &asked));
   if (strcmp(end.stop, "target") == 0 || (!asked && strcmp(end.stop, "points"))) PetscFunctionReturn(PETSC_SUCCESS);
   if (strcmp(end.stop, "snapshots") == 0)
-    why = "-max_snapshots is reached: raise it, or give a recipe with more modes or layers";
-  if (strcmp(end.stop, "seconds") == 0) why = "-max_seconds have passed: the same command with more goes on from here";
-  PetscCall(DriverMissed("the greedy training's indicator is %.2e at worst (infinite at %d points) where -target is "
+    why = "-max_snapshots is reached: raise it, or give settings with more modes or layers";
+  if (strcmp(end.stop, "seconds") == 0)
+    why = "-max_seconds have passed: the same command with a larger value continues from here";
+  PetscCall(DriverMissed("the largest indicator of the greedy training is %.2e (infinite at %d points), and -target is "
                          "%g; it stopped because %s",
                          (double)end.max_eta, (int)end.infinite, (double)log->target, why));
   PetscFunctionReturn(PETSC_SUCCESS);

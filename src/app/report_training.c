@@ -14,11 +14,10 @@ PetscErrorCode DriverReadBudget(PetscInt *budget)
 {
   PetscFunctionBegin;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
-  PetscCall(
-      HycoOptionsInt("-target_max_added",
-                     "train -target_...: at most so many solutions are added to meet the targets (default: as many "
-                     "as were given) []",
-                     0, 1000000, budget, NULL));
+  PetscCall(HycoOptionsInt(
+      "-target_max_added",
+      "train -target_...: largest number of solutions added to meet the targets (default: as many as were given) []", 0,
+      1000000, budget, NULL));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -133,7 +132,7 @@ static PetscErrorCode DescribeEnd(const HycoAttempt *a, char text[DRIVER_LINE])
     snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d, which does not reach its end", (int)a->held_out.n,
              (int)a->n_held);
   if (a->beaten_by)
-    snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d: recipe %d is better", (int)a->held_out.n,
+    snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d: settings %d are better", (int)a->held_out.n,
              (int)a->n_held, (int)a->beaten_by);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -145,7 +144,7 @@ static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
   char what[DRIVER_LINE], errors[DRIVER_LINE], end[DRIVER_LINE];
 
   PetscFunctionBegin;
-  if (a->number == 1) PetscCall(Say("recipes, each judged at %d held-out points (largest errors):\n", (int)a->n_held));
+  if (a->number == 1) PetscCall(Say("settings, each judged at %d held-out points (largest errors):\n", (int)a->n_held));
   HycoRecipeDescribe(&a->recipe, sizeof(what), what);
   DescribeErrors(IsPath(s), a->held_out.largest, errors);
   PetscCall(DescribeEnd(a, end));
@@ -167,8 +166,8 @@ static PetscErrorCode Added(PetscInt n, PetscInt parameter, void *ctx)
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(s->scene, NULL, &names, NULL, NULL));
   s->n_points += n;
-  PetscCall(Say("no recipe meets the targets: %d solutions are added where the errors are largest%s%s\n", (int)n,
-                parameter < 0 ? "" : "; the training values lie too far apart in ",
+  PetscCall(Say("no settings meet the targets: %d solutions are added where the errors are largest%s%s\n", (int)n,
+                parameter < 0 ? "" : "; the training values are too far apart in ",
                 parameter < 0 ? "" : names[parameter]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -204,10 +203,9 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
                                                  : HycoErrorKinds[j],
                      t->held_out.largest[j] > PETSC_MAX_REAL / 8 ? "infinite" : reached, (int)t->held_out.n,
                      s->on ? "the target is" : "without a target it should stay below", asked,
-                     s->on ? "give more training points, a larger -target_max_added, or loosen the target"
+                     s->on ? "give more training points, a larger -target_max_added, or a looser target"
                            : "give more training points, let training add them (-target_u 5e-3 -target_lambda 3e-2), "
-                             "or say by such targets "
-                             "what is enough",
+                             "or set looser targets",
                      hybrid ? "; or try -hyco_model_type cubature (docs/models.md)" : ""));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -220,17 +218,18 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
   PetscFunctionBegin;
   if (t->chosen.number) {
     HycoRecipeDescribe(&t->chosen.recipe, sizeof(what), what);
-    PetscCall(Say("chosen: recipe %d of %d: %s\n", (int)t->chosen.number, (int)t->chosen.of, what));
+    PetscCall(Say("chosen: settings %d of %d: %s\n", (int)t->chosen.number, (int)t->chosen.of, what));
   }
   if (!t->held_out.n) {
-    PetscCall(Say("no held-out points: the errors of this model are not known, and it does not estimate them\n"));
+    PetscCall(Say("no held-out points: the errors of this model are not known, and it cannot estimate them\n"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   DescribeErrors(IsPath(s), t->held_out.median, median);
   DescribeErrors(IsPath(s), t->held_out.largest, largest);
   PetscCall(Say("errors at %d held-out points: median %s; largest %s\n", (int)t->held_out.n, median, largest));
   DescribeErrors(IsPath(s), t->held_out.end, end);
-  if (IsPath(s)) PetscCall(Say("these are of each path's worst listed time; at the end the largest are %s\n", end));
+  if (IsPath(s))
+    PetscCall(Say("these are the errors at each path's worst listed time; the largest at the end are %s\n", end));
   if (!t->n_held)
     PetscCall(Say("the model does not estimate its errors: fewer than 10 predictions of held-out solutions\n"));
   PetscCall(Misses(s, t));

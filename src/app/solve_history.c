@@ -57,7 +57,7 @@ static PetscErrorCode SayEnd(const HycoHistory *h)
     seconds[2] += s->seconds_solve;
     seconds[3] += s->seconds_law;
   }
-  PetscCall(Say("%d steps (%d cut), %d iterations with the %s stiffness, %d factors", (int)substeps, (int)cuts,
+  PetscCall(Say("%d steps (%d halved), %d iterations with the %s stiffness, %d factors", (int)substeps, (int)cuts,
                 (int)iterations, h->newton, (int)factors));
   if (h->n_orders) PetscCall(Say("; order of convergence %.2f (median of %d)", (double)h->order, (int)h->n_orders));
   PetscCall(Say("\nlargest KKT residual %.1e, energy balance to %.1e\n", (double)residual, (double)defect));
@@ -75,9 +75,9 @@ PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu
   PetscCall(DriverWriteSteps(table, scene, mu, PETSC_FALSE, h.n, h.step));
   if (h.ended) PetscCall(SayEnd(&h));
   HycoCheck(h.ended || h.n, "no solution: %s; nothing was written", h.why);
-  HycoCheck(h.ended,
-            "the history ends at t = %.10g, beyond which its steps have become too small: %s; what was reached is "
-            "written",
-            (double)h.t, h.why);
+  HycoCheck(
+      h.ended,
+      "the history ends at t = %.10g, because its steps became too small: %s; the results up to this time are written",
+      (double)h.t, h.why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -10,7 +10,7 @@ static PetscErrorCode GetProblem(Tao tao, HycoTao *t)
   PetscFunctionBegin;
   PetscCall(TaoGetApplicationContext(tao, t));
   PetscCheck(*t && (*t)->tao == tao, PetscObjectComm((PetscObject)tao), PETSC_ERR_ARG_WRONGSTATE,
-             "hyco's types of Tao solve what HycoSolver poses; use -hyco_solver_type");
+             "hyco's types of Tao work inside HycoSolver only; use -hyco_solver_type");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -57,8 +57,7 @@ static PetscErrorCode RefuseOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, P
   PetscCall(HycoContactGetLength(c, "overlap", &stated));
   HycoPairsJump(p, k, 3, fe->X, r);
   HycoFail("contact %s: before any load node %d of %s lies %.4g deep in %s (its master point is %.4g away), and %.4g "
-           "is allowed%s; are the bodies where they should be? If they overlap by design, contact_%s_overlap %.4g "
-           "allows it",
+           "is allowed%s; check the positions of the bodies, or allow an intended overlap by contact_%s_overlap %.4g",
            c->name, (int)fe->mesh->node_id[p->slave[k]], c->slave, -(double)gap, c->master, (double)HycoLength(r),
            (double)allowed, stated < 0 ? ", half of its facet" : "", c->name, -1.01 * (double)gap);
 }

@@ -12,6 +12,7 @@ static PetscErrorCode AddOwn(void)
   PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_OBSTACLE, HycoContactCreate_Obstacle));
   PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_PAIR, HycoContactCreate_Pair));
   PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_SURFACE, HycoContactCreate_Surface));
+  PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_RIGID, HycoContactCreate_Rigid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,7 +55,7 @@ PetscErrorCode HycoContactSetType(HycoContact contact, HycoContactType type)
     char list[HYCO_LINE];
 
     PetscCall(HycoRegistryList(&types, type, list));
-    HycoFail("contact %s: the type \"%s\" is not registered; it must be %s",
+    HycoFail("contact %s: the type \"%s\" is unknown; it must be %s",
              ((PetscObject)contact)->name ? ((PetscObject)contact)->name : "(none)", type, list);
   }
   PetscCall(PetscObjectChangeTypeName((PetscObject)contact, type));
@@ -177,12 +178,12 @@ PetscErrorCode HycoContactCheckGroups(HycoContact contact, HycoMesh mesh)
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(mesh, "contact", contact->slave, &group));
   HycoCheck(!HycoContactAverages(contact) || mesh->group_dim[group] == mesh->dim - 1,
-            "contact %s takes its normal from the group %s, which is no surface; give normal: {x: ..., ...}",
-            contact->name, contact->slave);
+            "contact %s: the group %s is not a surface and has no normal; give normal: {x: ..., ...}", contact->name,
+            contact->slave);
   if (!contact->master) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMeshFindGroup(mesh, "contact", contact->master, &group));
   HycoCheck(!contact->ops->find || mesh->group_dim[group] == mesh->dim - 1,
-            "contact %s projects nodes on the group %s, which has dimension %d; a group of dimension %d is needed",
-            contact->name, contact->master, (int)mesh->group_dim[group], (int)mesh->dim - 1);
+            "contact %s: the master group %s has dimension %d; a group of dimension %d is needed", contact->name,
+            contact->master, (int)mesh->group_dim[group], (int)mesh->dim - 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -25,9 +25,10 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
     size = PetscMax(size, Largest(fe->X + 3 * i, 3) + Largest(fe->u0 + i * dim, dim));
   }
   HycoCheck(*left >= -1e-12 * size,
-            "contact %s: node %d is fixed%s, and its prescribed displacement penetrates by %g: no solution exists",
+            "contact %s: node %d is fixed%s, and its prescribed displacement penetrates by %g, so that no solution "
+            "exists; change the support or the gap",
             fe->scene->contact[pairs->contact[k]]->name, (int)fe->mesh->node_id[slave],
-            pairs->master_start[k + 1] > pairs->master_start[k] ? " and so is what it meets" : "", (double)-*left);
+            pairs->master_start[k + 1] > pairs->master_start[k] ? ", as is its master" : "", (double)-*left);
   *left = PetscMax(*left, 0); /* round-off */
   PetscFunctionReturn(PETSC_SUCCESS);
 }

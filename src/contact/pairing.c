@@ -126,8 +126,9 @@ static PetscErrorCode CheckApart(const HycoPartners *t, HycoContact c)
   PetscCall(PetscCalloc1(m->n_nodes, &master));
   for (PetscInt k = 0; k < t->n * t->nf; k++) master[t->node[k]] = PETSC_TRUE;
   for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++)
-    HycoCheck(!master[m->group_node[k]], "contact %s: node %d is in both %s and %s; the two surfaces must be apart",
-              c->name, (int)m->node_id[m->group_node[k]], c->slave, c->master);
+    HycoCheck(!master[m->group_node[k]],
+              "contact %s: node %d is in both %s and %s; the two surfaces must not share nodes", c->name,
+              (int)m->node_id[m->group_node[k]], c->slave, c->master);
   PetscCall(PetscFree(master));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -150,8 +151,9 @@ static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt ind
     HycoPairsAppend(p, index, m->slave[k], m->at[k].n, m->at[k].node, m->at[k].weight);
   }
   if (n_missed) PetscCall(Complain(t, c, remedy, n_missed, missed, m));
-  HycoCheck(n_alone < m->n, "contact %s: no node of %s faces %s within %g: are the two surfaces those that meet?",
-            c->name, c->slave, c->master, (double)m->tolerance);
+  HycoCheck(n_alone < m->n,
+            "contact %s: no node of %s faces %s within %g; check that these are the surfaces in contact", c->name,
+            c->slave, c->master, (double)m->tolerance);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -156,8 +156,8 @@ static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt he
 
     if (!count[i]++) first[i] = p->contact[k];
     HycoCheck(!free || count[i] <= free,
-              "node %d is a slave of %d contacts, %s and %s among them, and has %d free displacement%s: their forces "
-              "would not be determined; take it from one",
+              "node %d is a slave of %d contacts, among them %s and %s, and has %d free displacement%s, so that the "
+              "forces would not be unique; remove it from one contact",
               (int)m->node_id[i], (int)count[i], scene->contact[first[i]]->name, scene->contact[p->contact[k]]->name,
               (int)free, free == 1 ? "" : "s");
   }

@@ -24,11 +24,12 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The master point of contact k on the moved mesh; an obstacle's is the slave itself, as is that of a slave node that
-   faces no master. */
+/* The master point of contact k on the moved mesh; an obstacle's and a rigid body's is the slave itself, as is that of
+   a slave node that faces no master. */
 static void MasterPoint(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal x[3])
 {
-  const PetscInt lo = pairs->master_start[k], hi = pairs->master_start[k + 1];
+  const PetscBool rigid = fe->scene->contact[pairs->contact[k]]->rigid;
+  const PetscInt lo = pairs->master_start[k], hi = rigid ? lo : pairs->master_start[k + 1];
 
   for (PetscInt c = 0; c < 3; c++) {
     x[c] = lo == hi ? fe->X[3 * pairs->slave[k] + c] : 0;
@@ -62,7 +63,7 @@ static PetscErrorCode Normals(HycoFE fe, HycoContact c, const HycoPairs *pairs, 
 
     for (PetscInt d = 0; d < fe->dim; d++) length += n[d] * n[d];
     length = PetscSqrtReal(length);
-    HycoCheck(length > 0, "contact %s: the normal at node %d has no length", c->name,
+    HycoCheck(length > 0, "contact %s: the normal at node %d has length zero", c->name,
               (int)fe->mesh->node_id[pairs->slave[first + i]]);
     for (PetscInt d = 0; d < 3; d++) n[d] /= length;
   }
@@ -190,8 +191,8 @@ static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k,
     HycoNormalise(base[a]);
   }
   HycoCheck(!size || HycoLength(rest) > 1e-3 * size,
-            "node %d is a slave of the contacts %s and %s, whose normals there are parallel: their forces would not be "
-            "determined; take it from one",
+            "node %d is a slave of the contacts %s and %s, whose normals there are parallel, so that the forces would "
+            "not be unique; remove it from one contact",
             (int)fe->mesh->node_id[slave], fe->scene->contact[pairs->contact[before[k]]]->name,
             fe->scene->contact[pairs->contact[k]]->name);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -44,7 +44,8 @@ static PetscErrorCode Project(HycoScene s, HycoMesh m, PetscInt k, PetscInt grou
 
     if (on[i]) continue;
     HycoCheck(found->tie[i] < 0,
-              "node %d is a slave of the ties %s and %s; a node follows one surface: exchange slave and master of one",
+              "node %d is a slave of the ties %s and %s, and a node can follow only one surface; exchange slave and "
+              "master of one tie",
               (int)m->node_id[i], s->tie[PetscMax(found->tie[i], 0)].name, tie->name);
     HycoPatchesProject(patches, m->xyz + 3 * i, NULL, &at);
     found->tie[i] = k;
@@ -54,12 +55,11 @@ static PetscErrorCode Project(HycoScene s, HycoMesh m, PetscInt k, PetscInt grou
     most = at.distance;
     farthest = i;
   }
-  HycoCheck(
-      !missed,
-      "tie %s: %d of the %d nodes of %s have no point of %s within %g, the farthest is node %d (%.4g away); let the "
-      "slave's surface end where the master's does, exchange them, or give a larger tolerance",
-      tie->name, (int)missed, (int)n, tie->slave, tie->master, (double)found->tolerance[k],
-      (int)m->node_id[PetscMax(farthest, 0)], (double)most);
+  HycoCheck(!missed,
+            "tie %s: %d of the %d nodes of %s have no point of %s within %g, the farthest is node %d (%.4g away); let "
+            "the slave's surface end where the master's ends, exchange slave and master, or give a larger tolerance",
+            tie->name, (int)missed, (int)n, tie->slave, tie->master, (double)found->tolerance[k],
+            (int)m->node_id[PetscMax(farthest, 0)], (double)most);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -97,7 +97,7 @@ static PetscErrorCode CheckChains(HycoScene s, HycoMesh m, const Found *found)
       const PetscInt other = found->tie[found->at[i].node[a]];
 
       HycoCheck(other < 0,
-                "tie %s: node %d, which nodes of %s are tied to, is itself a slave of the tie %s; exchange slave and "
+                "tie %s: node %d, to which nodes of %s are tied, is itself a slave of the tie %s; exchange slave and "
                 "master of one of them",
                 s->tie[found->tie[i]].name, (int)m->node_id[found->at[i].node[a]], s->tie[found->tie[i]].slave,
                 s->tie[PetscMax(other, 0)].name);
@@ -194,12 +194,11 @@ static PetscErrorCode Choose(HycoScene s, HycoMesh m, const HycoPairs *p, PetscI
       const PetscInt tied = HycoMeshTied(m, p->slave[j]);
 
       if (tied < 0) which[(*n)++] = j;
-      HycoCheck(
-          tied < 0 || Followed(m, tied, p->contact[k], has),
-          "contact %s: node %d is a slave of the tie %s, and what it is tied to has no such contact; exchange slave "
-          "and master of the tie, or take the node from the contact",
-          s->contact[p->contact[k]]->name, (int)m->node_id[p->slave[j]],
-          s->tie[m->ties->tie[m->tied_entry[PetscMax(tied, 0)]]].name);
+      HycoCheck(tied < 0 || Followed(m, tied, p->contact[k], has),
+                "contact %s: node %d is a slave of the tie %s, and its master nodes do not have this contact; exchange "
+                "slave and master of the tie, or remove the node from the contact",
+                s->contact[p->contact[k]]->name, (int)m->node_id[p->slave[j]],
+                s->tie[m->ties->tie[m->tied_entry[PetscMax(tied, 0)]]].name);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

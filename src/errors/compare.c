@@ -144,8 +144,8 @@ static PetscErrorCode Check(HycoROM m, HycoFOM f)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
-            "the model was trained on a mesh of %d nodes and %d cells; the scene's has %d and %d: compare on the "
-            "training mesh",
+            "the model was trained on a mesh of %d nodes and %d cells, and the scene's mesh has %d and %d; compare on "
+            "the training mesh",
             (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
   PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMCompare()");
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -106,8 +106,8 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheck(m->whole_nodes * m->mesh->dim == kept->n_dof && m->whole_cells == kept->n_cells &&
                 m->pairs.n == kept->n_contacts,
-            "the model was trained on a mesh of %d nodes and %d cells, and the scene's has %d cells: compare on the "
-            "training mesh",
+            "the model was trained on a mesh of %d nodes and %d cells, and the scene's mesh has %d cells; compare on "
+            "the training mesh",
             (int)m->whole_nodes, (int)m->whole_cells, (int)kept->n_cells);
   PetscCall(HycoROMSetSteps(m, h->n_taken, h->taken));
   ierr = HycoROMPredict(m, n, mu);
@@ -130,7 +130,7 @@ PetscErrorCode HycoROMComparePath(HycoROM m, HycoFOM f, PetscInt n, const PetscR
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
-  HycoCheck(f->path, "HycoROMComparePath: the scene has no history; HycoROMCompare() is for its solutions");
+  HycoCheck(f->path, "HycoROMComparePath: the scene has no history; use HycoROMCompare()");
   kept.n_dof = f->n_nodes * f->fe->dim;
   kept.n_sigma = f->n_cells * f->fe->n_sigma;
   kept.n_cells = f->n_cells;
@@ -144,7 +144,7 @@ PetscErrorCode HycoROMComparePath(HycoROM m, HycoFOM f, PetscInt n, const PetscR
   PetscCall(HycoFOMSetStepMonitor(f, NULL, NULL));
   PetscCall(ierr);
   PetscCall(HycoFOMGetHistory(f, &h));
-  HycoCheck(h.ended, "the full-order path ends at t = %.10g: %s; there is nothing to compare with", (double)h.t, h.why);
+  HycoCheck(h.ended, "the full-order path ends at t = %.10g: %s; no comparison is possible", (double)h.t, h.why);
   HycoOnRoot(HycoComm(f), Compare(m, n, mu, &h, &kept, e));
   PetscCall(PetscFree(kept.value));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -83,8 +83,8 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
 
   PetscFunctionBegin;
   HycoCheck(mesh->dim == 2 || scene->formulation == HYCO_PLANE_STRAIN,
-            "scene_formulation says what a 2D scene stands for, and this mesh has %d dimension%s; take it out",
-            (int)mesh->dim, mesh->dim == 1 ? "" : "s");
+            "scene_formulation is for 2D scenes, and this mesh has %d dimension%s; remove it", (int)mesh->dim,
+            mesh->dim == 1 ? "" : "s");
   for (PetscInt b = 0; b < scene->n_bodies; b++) {
     const HycoBody *body = &scene->body[b];
     const PetscBool flows = (PetscBool)!body->law->linear;
@@ -92,16 +92,14 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
     HycoCheck(!body->bbar || has_mean,
               "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (%s) the dilatation %s",
               body->name, HycoCellKinds[mesh->type].name,
-              HycoMeshIsQuadratic(mesh) ? "is free enough" : "is constant already and nothing would change");
+              HycoMeshIsQuadratic(mesh) ? "is free enough" : "is constant already");
     HycoCheck(!body->bbar || scene->formulation != HYCO_PLANE_STRESS,
-              "body_%s_element is bbar, against locking where the volume is kept; under plane_stress the thickness is "
-              "free, and nothing locks",
+              "body_%s_element is bbar, against volumetric locking, which does not occur under plane_stress; remove it",
               body->name);
-    HycoCheck(
-        !flows || body->element || has_mean || HycoMeshIsQuadratic(mesh) || mesh->dim == 1,
-        "body %s flows (law %s), which keeps its volume, and cells of tri3 or tet4 are then much too stiff; mesh it "
-        "with quad4 or hex8, or write element: standard to take them all the same",
-        body->name, ((PetscObject)body->law)->type_name);
+    HycoCheck(!flows || body->element || has_mean || HycoMeshIsQuadratic(mesh) || mesh->dim == 1,
+              "body %s has an inelastic law (%s), which preserves volume, and tri3 or tet4 cells are then much too "
+              "stiff; use quad4 or hex8 cells, or write element: standard to use these cells all the same",
+              body->name, ((PetscObject)body->law)->type_name);
     bbar[b] = body->element ? body->bbar : (PetscBool)(flows && has_mean);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -165,8 +163,8 @@ static PetscErrorCode MoveNodes(HycoFE fe)
       HycoExpr map = fe->scene->body[b].map[c];
 
       if (!map) continue;
-      HycoCheck(m->dim > c, "%s: the mesh has %d space dimension%s; there is no component %c", HycoExprKey(map),
-                (int)m->dim, m->dim == 1 ? "" : "s", "xyz"[c]);
+      HycoCheck(m->dim > c, "%s: the mesh has %d space dimension%s and no component %c; remove the entry",
+                HycoExprKey(map), (int)m->dim, m->dim == 1 ? "" : "s", "xyz"[c]);
       for (PetscInt i = 0; i < m->n_nodes; i++) {
         if (m->node_body[i] == b) PetscCall(HycoExprEval(map, fe->mu, 1, m->xyz + 3 * i, fe->X + 3 * i + c));
       }
@@ -191,11 +189,11 @@ static PetscErrorCode CheckAxis(HycoFE fe)
   for (PetscInt i = 0; fe->formulation == HYCO_AXISYMMETRIC && i < fe->mesh->n_nodes; i++) {
     const PetscReal r = fe->X[3 * i];
 
-    HycoCheck(r >= -zero, "node %d lies at x = %g; an axisymmetric scene is drawn on one side of its axis, x >= 0",
+    HycoCheck(r >= -zero, "node %d lies at x = %g; an axisymmetric scene must be drawn at x >= 0",
               (int)fe->mesh->node_id[i], (double)r);
     HycoCheck((r <= zero) == OnAxis(fe, i),
-              "the map of body %s moves node %d from x = %g to x = %g; in an axisymmetric scene nodes of the axis, x = "
-              "0, stay there, and others off it",
+              "the map of body %s moves node %d from x = %g to x = %g; in an axisymmetric scene nodes on the axis x = "
+              "0 must stay there, and other nodes must stay off it",
               fe->scene->body[fe->mesh->node_body[i]].name, (int)fe->mesh->node_id[i], (double)fe->mesh->xyz[3 * i],
               (double)r);
   }
@@ -231,10 +229,12 @@ static PetscErrorCode SetOblique(HycoFE fe)
         PetscCall(HycoTiedCheckOblique(fe, fixed, g, i));
         continue;
       }
-      HycoCheck(size > 0, "%s: its direction has no length at node %d", HycoExprKey(fixed->normal), (int)m->node_id[i]);
-      HycoCheck(!turns || !(body->map[0] || body->map[1] || body->map[2]),
-                "%s: its direction depends on the place, and the map of body %s moves node %d; give one direction",
-                HycoExprKey(fixed->normal), body->name, (int)m->node_id[i]);
+      HycoCheck(size > 0, "%s: its direction has length zero at node %d", HycoExprKey(fixed->normal),
+                (int)m->node_id[i]);
+      HycoCheck(
+          !turns || !(body->map[0] || body->map[1] || body->map[2]),
+          "%s: its direction depends on the position, and the map of body %s moves node %d; give a constant direction",
+          HycoExprKey(fixed->normal), body->name, (int)m->node_id[i]);
       PetscCall(HycoExprEval(fixed->normal, fe->mu, 1, fe->X + 3 * i, &value));
       PetscCall(HycoObliqueAdd(fe, k, i, n, value, HycoExprKey(fixed->normal)));
       fe->lifted = (PetscBool)(fe->lifted || value != 0);
@@ -267,8 +267,8 @@ static PetscErrorCode SetSupports(HycoFE fe)
         PetscCall(HycoExprEval(fixed->value[c], fe->mu, 1, fe->X + 3 * i, &value));
         HycoCheck(!fe->fixed[dof] ||
                       PetscAbsReal(value - fe->u0[dof]) <= 1e-12 * (PetscAbsReal(value) + PetscAbsReal(fe->u0[dof])),
-                  "node %d is fixed twice in %c, to %g and to %g (by %s)", (int)m->node_id[i], "xyz"[c],
-                  (double)fe -> u0[dof], (double)value, HycoExprKey(fixed->value[c]));
+                  "node %d is fixed twice in %c, to %g and to %g (by %s); remove it from one support",
+                  (int)m->node_id[i], "xyz"[c], (double)fe -> u0[dof], (double)value, HycoExprKey(fixed->value[c]));
         fe->fixed[dof] = PETSC_TRUE;
         fe->u0[dof] = value;
         fe->lifted = (PetscBool)(fe->lifted || value != 0);

@@ -30,14 +30,14 @@ static PetscErrorCode SetCell(HycoFE fe, const HycoElement *el, PetscInt cell)
 
     if (T[q] >= 0) continue;
     PetscCall(HycoExprPlace(body->temperature, fe->mu, x + 3 * q, place));
-    HycoFail("%s is %g at %s; temperatures are in kelvin and not below 0", HycoExprKey(body->temperature), (double)T[q],
+    HycoFail("%s is %g at %s; a temperature is in kelvin and not below 0", HycoExprKey(body->temperature), (double)T[q],
              place);
   }
   if (!body->expansion) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoExprEval(body->reference, fe->mu, el->nq, x, reference));
   PetscCall(HycoExprEvalHot(body->expansion, fe->mu, el->nq, x, T, expansion));
   for (PetscInt q = 0; q < el->nq; q++)
-    HycoCheck(reference[q] >= 0, "%s is %g; temperatures are in kelvin and not below 0", HycoExprKey(body->reference),
+    HycoCheck(reference[q] >= 0, "%s is %g; a temperature is in kelvin and not below 0", HycoExprKey(body->reference),
               (double)reference[q]);
   for (PetscInt q = 0; q < el->nq; q++) fe->thermal[cell * el->nq + q] = expansion[q] * (T[q] - reference[q]);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -96,7 +96,7 @@ PetscErrorCode HycoFEStateCopy(HycoFEState from, HycoFEState to)
 {
   PetscFunctionBegin;
   PetscCheck(from->n_cells == to->n_cells && from->start[from->n_cells] == to->start[to->n_cells], PETSC_COMM_SELF,
-             PETSC_ERR_ARG_INCOMP, "the states are of two meshes");
+             PETSC_ERR_ARG_INCOMP, "the states belong to two meshes");
   PetscCall(PetscArraycpy(to->value, from->value, from->start[from->n_cells]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -399,8 +399,9 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCheck(begin != end, PETSC_COMM_SELF, PETSC_ERR_ARG_IDN, "a step begins and ends in one state");
-  PetscCheck(t1 >= t0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "a step from %g back to %g", (double)t0, (double)t1);
+  PetscCheck(begin != end, PETSC_COMM_SELF, PETSC_ERR_ARG_IDN, "a step begins and ends in the same state");
+  PetscCheck(t1 >= t0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "a step from %g goes back to %g", (double)t0,
+             (double)t1);
   *report = fresh;
   b.report = report;
   PetscCall(HycoFEKeepGradients(fe));
@@ -415,6 +416,7 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
     report->stored += energy;
     report->potential += energy;
   }
+  HycoFEPassTied(fe, f_int);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

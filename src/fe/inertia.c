@@ -23,8 +23,7 @@ static PetscErrorCode SetAxis(HycoFE fe, const HycoMotion *m, HycoAcceleration *
   PetscFunctionBegin;
   for (PetscInt c = 0; c < 3; c++) {
     HycoCheck(fe->dim == 3 || !m->axis[c],
-              "%s: the axis is given in space; in one and two dimensions it is z, in an "
-              "axisymmetric scene y",
+              "%s: the axis is given in 3D only; in 1D and 2D it is z, in an axisymmetric scene y; remove the entry",
               HycoExprKey(m->axis[c]));
     HycoCheck(fe->formulation != HYCO_AXISYMMETRIC || !m->through[c],
               "%s: an axisymmetric scene rotates about its axis", HycoExprKey(m->through[c]));
@@ -35,7 +34,7 @@ static PetscErrorCode SetAxis(HycoFE fe, const HycoMotion *m, HycoAcceleration *
   PetscCall(Vector(fe, m->through, a->through));
   if (fe->dim < 3) a->axis[fe->formulation == HYCO_AXISYMMETRIC ? 1 : 2] = 1;
   length = HycoLength(a->axis);
-  HycoCheck(length > 0, "rotation has no axis; write rotation: {axis: {z: 1}}, or another direction");
+  HycoCheck(length > 0, "rotation has no axis; write rotation: {axis: {z: 1}} or another direction");
   for (PetscInt c = 0; c < 3; c++) a->axis[c] /= length;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -69,7 +68,7 @@ PetscErrorCode HycoInertiaForce(HycoFE fe, const HycoBody *body, const HycoAccel
   for (PetscInt c = 0; c < 3; c++) force[c] = 0;
   if (!a->any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoExprEval(body->density, fe->mu, 1, x, &density));
-  HycoCheck(density >= 0, "%s is %g at x = %g, y = %g, z = %g; a density is 0 or more", HycoExprKey(body->density),
+  HycoCheck(density >= 0, "%s is %g at x = %g, y = %g, z = %g; a density must be 0 or more", HycoExprKey(body->density),
             (double)density, (double)x[0], (double)x[1], (double)x[2]);
   for (PetscInt c = 0; c < 3; c++) along += (x[c] - a->through[c]) * a->axis[c];
   for (PetscInt c = 0; c < 3; c++)

@@ -60,7 +60,8 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
             (int)fe->mesh->cell_id[cell]);
   /* either sign will do, as files number cells both ways round; but the same in all of the cell */
   HycoCheck(!q || el->nv == dim + 1 || (det > 0) == (HycoDeterminant(el, node, fe->X, 0) > 0),
-            "cell %d is inverted: its volume has both signs; is its boundary folded, are its nodes in gmsh's order?",
+            "cell %d is inverted: its volume element changes sign; check its boundary and the order of its nodes "
+            "(gmsh's order)",
             (int)fe->mesh->cell_id[cell]);
   for (PetscInt a = 0; a < el->nv; a++) {
     for (PetscInt c = 0; c < 3; c++) {

@@ -78,7 +78,7 @@ static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[])
     if (!turn[b]) first[b] = e;
     if (!turn[b]) turn[b] = sign;
     HycoCheck(sign == turn[b],
-              "body %s: its map turns cell %d inside out and not cell %d; a map may mirror a whole body, not fold it",
+              "body %s: its map inverts cell %d and not cell %d; a map may mirror a whole body, but not fold it",
               fe->scene->body[b].name, (int)m->cell_id[sign < 0 ? e : first[b]],
               (int)m->cell_id[sign < 0 ? first[b] : e]);
   }
@@ -135,7 +135,7 @@ PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, seen, (PetscMPIInt)(2 * n), HYCO_MPI_BOOL, MPI_LOR, comm));
   for (PetscInt b = 0; b < n; b++) {
     HycoCheck(!seen[2 * b] || !seen[2 * b + 1],
-              "body %s: its map turns some cells inside out and not others; a map may mirror a whole body, not fold it",
+              "body %s: its map inverts some cells and not others; a map may mirror a whole body, but not fold it",
               fe->scene->body[b].name);
     fe->mirrored[b] = seen[2 * b + 1];
   }

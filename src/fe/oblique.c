@@ -48,7 +48,7 @@ static PetscErrorCode CheckSame(HycoFE fe, PetscInt node, const PetscReal n[3], 
     size = PetscMax(size, PetscAbsReal(fe->u0[node * fe->dim + d]));
   }
   HycoCheck(PetscAbsReal(rest) <= 1e-9 * size,
-            "node %d is fixed twice along the direction of %s, to values that differ by %g",
+            "node %d is fixed twice along the direction of %s, to values that differ by %g; remove it from one support",
             (int)fe->mesh->node_id[node], key, (double)rest);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -73,7 +73,8 @@ PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const 
     PetscCall(CheckSame(fe, node, n, v, PetscAbsReal(value), key));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoCheck(best > PARALLEL, "%s: at node %d its direction is nearly that of other supports; give both one direction",
+  HycoCheck(best > PARALLEL,
+            "%s: at node %d its direction is nearly parallel to that of another support; give both the same direction",
             key, (int)fe->mesh->node_id[node]);
   if (fe->n_oblique == fe->room_oblique) {
     fe->room_oblique = 2 * fe->room_oblique + 64;

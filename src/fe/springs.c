@@ -127,8 +127,8 @@ static PetscErrorCode Evaluate(HycoFE fe, const HycoSpring *spring, const PetscR
     PetscCall(HycoExprEval(spring->stiffness[c], fe->mu, 1, x, &k[c]));
     if (k[c] >= 0) continue;
     PetscCall(HycoExprPlace(spring->stiffness[c], fe->mu, x, place));
-    HycoFail("%s is %g at %s; a spring's stiffness is 0 or more", HycoExprKey(spring->stiffness[c]), (double)k[c],
-             place);
+    HycoFail("%s is %g at %s; the stiffness of a spring must be 0 or more", HycoExprKey(spring->stiffness[c]),
+             (double)k[c], place);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -21,8 +21,8 @@ PetscErrorCode HycoTiedPlace(HycoFE fe)
       for (PetscInt c = 0; c < 3; c++) at[c] += weight[j - m->tied_start[k]] * fe->X[3 * m->tied_master[j] + c];
     }
     HycoCheck(HycoDistance(X, at) <= m->ties->reach[entry],
-              "tie %s: maps bring node %d of %s %g away from what it is tied to, farther than its tolerance %g; move "
-              "both bodies alike there",
+              "tie %s: maps move node %d of %s %g away from its master, farther than the tolerance %g; move both "
+              "bodies in the same way there",
               fe->scene->tie[m->ties->tie[entry]].name, (int)m->node_id[m->tied[k]],
               fe->scene->tie[m->ties->tie[entry]].slave, (double)HycoDistance(X, at), (double)m->ties->reach[entry]);
     PetscCall(PetscArraycpy(X, at, 3));
@@ -59,8 +59,8 @@ PetscErrorCode HycoTiedFix(HycoFE fe)
       const PetscInt dof = m->tied[k] * fe->dim + c;
 
       HycoCheck(!fe->fixed[dof] || MastersHold(fe, k, c),
-                "node %d is tied (tie %s, slave %s) and held in %c, and what it is tied to is not held alike; exchange "
-                "slave and master, or take the node from the support",
+                "node %d is tied (tie %s, slave %s) and fixed in %c, and its masters are not fixed in the same way; "
+                "exchange slave and master, or remove the node from the support",
                 (int)m->node_id[m->tied[k]], tie->name, tie->slave, "xyz"[c]);
       fe->fixed[dof] = PETSC_TRUE;
       fe->u0[dof] = 0;
@@ -84,8 +84,8 @@ PetscErrorCode HycoTiedCheckOblique(HycoFE fe, const HycoFixed *fixed, PetscInt 
     alike = (PetscBool)(alike && at >= 0);
   }
   HycoCheck(alike,
-            "node %d is tied (tie %s) and held by %s, and what it is tied to is not held alike; exchange slave and "
-            "master, or take the node from the support",
+            "node %d is tied (tie %s) and fixed by %s, and its masters are not fixed in the same way; exchange slave "
+            "and master, or remove the node from the support",
             (int)m->node_id[node], fe->scene->tie[m->ties->tie[m->tied_entry[k]]].name, HycoExprKey(fixed->normal));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -152,4 +152,10 @@ void HycoTiedGeneralise(HycoFE fe, PetscReal f[])
         f[m->tied_master[j] * fe->dim + c] += weight[j - m->tied_start[k]] * f[m->tied[k] * fe->dim + c];
     }
   }
+}
+
+void HycoFEPassTied(HycoFE fe, PetscReal f[])
+{
+  HycoTiedGeneralise(fe, f);
+  for (PetscInt k = 0; k < fe->mesh->n_tied * fe->dim; k++) f[fe->mesh->tied[k / fe->dim] * fe->dim + k % fe->dim] = 0;
 }

@@ -257,7 +257,8 @@ static PetscErrorCode CheckPlace(const char path[])
   PetscFunctionBegin;
   if (access(path, F_OK)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5IsPrecious(path, &precious));
-  HycoCheck(!precious, "-hyco_checkpoint %s is a model or a snapshot, and stays one; give the checkpoint another name",
+  HycoCheck(!precious,
+            "-hyco_checkpoint %s is a model or a snapshot and is not overwritten; give the checkpoint another name",
             path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -303,14 +304,14 @@ static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content 
   PetscBool same;
 
   PetscFunctionBegin;
-  HycoCheck(HycoH5Has(h, "checkpoint/key"), "%s is no checkpoint of a history", f->path->checkpoint);
+  HycoCheck(HycoH5Has(h, "checkpoint/key"), "%s is not a checkpoint of a history", f->path->checkpoint);
   PetscCall(HycoH5LoadInt(h, "checkpoint/format", 1, FORMAT, &one, &one, &format));
   PetscCall(PetscFree(format));
   PetscCall(HycoH5LoadText(h, "checkpoint/key", &text));
   same = (PetscBool)(strcmp(text, key) == 0);
   PetscCall(PetscFree(text));
   HycoCheck(same,
-            "the checkpoint %s is of another scene, mesh or point; take away -hyco_resume, or give it another name",
+            "the checkpoint %s belongs to another scene, mesh or point; remove -hyco_resume, or name another file",
             f->path->checkpoint);
   rows = N_HEAD;
   PetscCall(HycoH5LoadReal(h, "head", &rows, &one, &c->head));
@@ -338,7 +339,7 @@ static PetscErrorCode ReadContent(HycoFOM f, const char key[], Content *c)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5OpenOr(f->path->checkpoint, "take away -hyco_resume", &h));
+  PetscCall(HycoH5OpenOr(f->path->checkpoint, "remove -hyco_resume", &h));
   ierr = ReadOpened(f, h, key, c);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);
@@ -379,7 +380,7 @@ static PetscErrorCode ReadRows(HycoFOM f, const char name[], PetscInt first, Pet
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5OpenOr(f->path->checkpoint, "take away -hyco_resume", &h));
+  PetscCall(HycoH5OpenOr(f->path->checkpoint, "remove -hyco_resume", &h));
   ierr = HycoH5ReadRows(h, name, first, n, cols, rows);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);
@@ -414,8 +415,7 @@ static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
   PetscFunctionBegin;
   PetscCall(StateCols(f, &cols));
   PetscCheck(cols == c->cell_cols, HycoComm(f), PETSC_ERR_USER,
-             "the checkpoint has %d reals a cell, the laws have %d; take away -hyco_resume", (int)c->cell_cols,
-             (int)cols);
+             "the checkpoint has %d reals a cell, the laws have %d; remove -hyco_resume", (int)c->cell_cols, (int)cols);
   PetscCall(PetscMalloc1(f->part->n_nodes * NODE_COLS(f), &mine));
   PetscCall(ReadItems(f, "node", HYCO_ON_NODES, NODE_COLS(f), mine));
   PetscCall(MoveNodes(f, PETSC_FALSE, mine));
@@ -443,7 +443,7 @@ PetscErrorCode HycoPathLoad(HycoFOM f)
 
   PetscFunctionBegin;
   PetscCheck(p->checkpoint[0], HycoComm(f), PETSC_ERR_USER,
-             "-hyco_resume goes on from a checkpoint; name it by -hyco_checkpoint FILE.h5");
+             "-hyco_resume needs a checkpoint; name it by -hyco_checkpoint FILE.h5");
   PetscCallMPI(MPI_Bcast(&there, 1, MPIU_INT, 0, HycoComm(f)));
   if (!there) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Identify(f, key));

@@ -82,7 +82,8 @@ static PetscErrorCode GatherSurface(HycoFOM f, HycoMesh part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts, and the pairs of nodes that they tie, as indices in the whole mesh. Rank 0. */
+/* The contacts, and the pairs of nodes that they tie, as indices in the whole mesh; a rigid body's node is tied to
+   none: all of its contact's surface would go to one rank. Rank 0. */
 static PetscErrorCode FindTies(HycoFOM f, PetscInt *n, PetscInt **ties)
 {
   HycoPairs *p = &f->pairs;
@@ -97,6 +98,7 @@ static PetscErrorCode FindTies(HycoFOM f, PetscInt *n, PetscInt **ties)
     PetscInt masters;
 
     HycoPairsMasters(p, k, &masters, &master, &weight);
+    if (f->scene->contact[p->contact[k]]->rigid) continue;
     for (PetscInt j = 0; j < masters; j++, (*n)++) {
       (*ties)[2 * *n] = f->surface->node_whole[HycoPairsSlave(p, k)];
       (*ties)[2 * *n + 1] = f->surface->node_whole[master[j]];
@@ -122,7 +124,7 @@ static PetscErrorCode Distribute(HycoFOM f, PetscBool *found)
   }
   PetscCall(HycoPlexToMesh(f->dm, f->scene, &mesh));
   PetscCheck(mesh->n_whole_cells >= f->size, HycoComm(f), PETSC_ERR_USER,
-             "the mesh has %d cells; run it on at most as many ranks", (int)mesh->n_whole_cells);
+             "the mesh has %d cells; use at most as many ranks", (int)mesh->n_whole_cells);
   if (!f->scene->refine) { /* else the contacts are yet to come */
     HycoOnEach(HycoComm(f), HycoMeshCheckCells(mesh));
     PetscCall(GatherSurface(f, mesh));
@@ -259,18 +261,18 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
       "-hyco_regularise", "full order: rigid motions that neither supports nor contact hold are taken out, not refused",
       &f->regularise, NULL));
   PetscCall(HycoOptionsReal("-hyco_regularise_tol",
-                            "of such a motion: the share of the loads on it that may be unbalanced", 0, 1,
+                            "with -hyco_regularise: share of the loads on such a motion that may be unbalanced", 0, 1,
                             &f->regularise_tol, NULL));
-  PetscCall(HycoOptionsWord("-hyco_partition", "cuts the mesh for the ranks; PT-Scotch also where METIS fails",
+  PetscCall(HycoOptionsWord("-hyco_partition", "partitioner of the mesh; PT-Scotch is also used if METIS fails",
                             HycoPartitioners, &f->partition, NULL));
   PetscCall(HycoOptionsString(
-      "-hyco_mesh_write", "<file.h5>: writes the mesh, refined as the scene says, in PETSc's HDF5 format of a DMPlex",
+      "-hyco_mesh_write", "<file.h5> write the mesh, with the scene's refinement, in PETSc's HDF5 format of a DMPlex",
       f->mesh_write, sizeof(f->mesh_write), NULL));
   if (!f->scene || f->scene->n_times > 0)
     PetscCall(ReadPath(f, PetscOptionsObject));
   else
     PetscCall(HycoPathRefuseOptions(f));
-  PetscCall(HycoOptionsName("-hyco_fom_view", "after each full-order solve: sizes, system, solver"));
+  PetscCall(HycoOptionsName("-hyco_fom_view", "print sizes, system and solver after each full-order solve"));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -423,8 +425,7 @@ static PetscErrorCode CountFree(HycoFOM f)
       mine += !f->fe->fixed[i * f->fe->dim + c];
   }
   PetscCallMPI(MPI_Allreduce(&mine, &f->n_free, 1, MPIU_INT, MPI_SUM, HycoComm(f)));
-  PetscCheck(f->n_free, HycoComm(f), PETSC_ERR_USER,
-             "every displacement of the scene is fixed; there is nothing to solve");
+  PetscCheck(f->n_free, HycoComm(f), PETSC_ERR_USER, "every displacement of the scene is fixed; remove a support");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -491,8 +492,9 @@ static PetscErrorCode CheckPoint(HycoFOM f, PetscInt n, const PetscReal mu[])
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, bounds, (PetscMPIInt)(2 * n), MPIU_REAL, MPI_MAX, HycoComm(f)));
   for (PetscInt p = 0; p < n; p++) {
-    HycoCheck(bounds[p] == -bounds[n + p], "%s is %.10g on one rank and %.10g on another; give all of them one point",
-              f->scene->parameter[p], (double)-bounds[n + p], (double)bounds[p]);
+    HycoCheck(bounds[p] == -bounds[n + p],
+              "%s is %.10g on one rank and %.10g on another; all ranks need the same point", f->scene->parameter[p],
+              (double)-bounds[n + p], (double)bounds[p]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

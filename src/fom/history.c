@@ -79,25 +79,27 @@ PetscErrorCode HycoPathSetFromOptions(HycoPath p, HycoOptionItems PetscOptionsOb
   PetscFunctionBegin;
   PetscCall(HycoOptionsWord("-hyco_newton",
                             "history: iterate with the tangent, with the elastic stiffness, whose factor is kept, or "
-                            "with a tangent that is kept while that is faster (auto: what takes less time by counts)",
+                            "with a tangent that is kept while this is faster (auto: the cheapest by operation counts)",
                             HycoNewtons, &p->method, NULL));
   PetscCall(HycoOptionsReal("-hyco_newton_rtol",
-                            "history: residual of equilibrium, relative to the largest of the forces", 1e-14, 1e-2,
-                            &p->rtol, NULL));
-  PetscCall(HycoOptionsInt("-hyco_newton_max_its",
-                           "history: contact systems of a step before it is cut (0: tangent 15, modified 30, elastic "
-                           "60)",
-                           0, 100000, &p->max_its, NULL));
-  PetscCall(HycoOptionsReal("-hyco_step_inelastic", "history: largest inelastic strain of a step; beyond, it is halved",
-                            1e-12, 1e3, &p->bound, NULL));
-  PetscCall(HycoOptionsReal("-hyco_step_smallest", "history: no step is cut below this share of the whole time", 1e-15,
-                            1, &p->smallest, NULL));
-  PetscCall(HycoOptionsInt("-hyco_substeps", "history: at least as many steps from one listed time to the next", 1,
+                            "history: tolerance of the residual of equilibrium, relative to the largest of the forces",
+                            1e-14, 1e-2, &p->rtol, NULL));
+  PetscCall(HycoOptionsInt(
+      "-hyco_newton_max_its",
+      "history: number of contact systems after which a step is halved (0: tangent 15, modified 30, elastic 60)", 0,
+      100000, &p->max_its, NULL));
+  PetscCall(HycoOptionsReal("-hyco_step_inelastic",
+                            "history: largest increment of inelastic strain in a step; a larger step is halved", 1e-12,
+                            1e3, &p->bound, NULL));
+  PetscCall(HycoOptionsReal("-hyco_step_smallest", "history: smallest step, as a share of the whole time", 1e-15, 1,
+                            &p->smallest, NULL));
+  PetscCall(HycoOptionsInt("-hyco_substeps", "history: smallest number of steps from one listed time to the next", 1,
                            1000000000, &p->substeps, NULL));
   PetscCall(HycoOptionsString("-hyco_checkpoint",
-                              "<file.h5> history: the last accepted step is kept there, to be resumed from",
-                              p->checkpoint, sizeof(p->checkpoint), NULL));
-  PetscCall(HycoOptionsBool("-hyco_resume", "history: go on from the checkpoint, if it is there", &p->resume, NULL));
+                              "<file.h5> history: store the last accepted step there, for -hyco_resume", p->checkpoint,
+                              sizeof(p->checkpoint), NULL));
+  PetscCall(
+      HycoOptionsBool("-hyco_resume", "history: continue from the checkpoint, if there is one", &p->resume, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -190,7 +192,7 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
   PetscCall(HycoPathAttempt(p, p->t, n > 1 ? p->t + h : stop, &a));
   if (a.converged && a.law.increment > p->bound && !p->given) {
     a.converged = PETSC_FALSE;
-    HycoFormat(a.why, "an inelastic strain of %.1e in one step", (double)a.law.increment);
+    HycoFormat(a.why, "the increment of inelastic strain is %.1e in one step", (double)a.law.increment);
     PetscCall(HycoPathRestore(p));
   }
   Count(p, &a);
@@ -249,7 +251,7 @@ static PetscErrorCode Start(HycoPath p, PetscBool *reached)
   if (a.converged)
     PetscCall(Accept(p, p->t, &a));
   else
-    HycoFormat(p->why, "at the first time, where all that acts comes at once: %s", a.why);
+    HycoFormat(p->why, "at the first time, where all loads are applied at once: %s", a.why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -64,7 +64,7 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(p->u0, fe->u0, fe->n_dof));
   for (PetscInt k = 0; k < fe->n_dof; k++) {
-    fe->u0[k] = fe->fixed[k] ? fe->u0[k] - u[k] : 0;
+    fe->u0[k] = HycoFESupports(fe, k) ? fe->u0[k] - u[k] : 0; /* what a tied node differs by stays 0 */
     count += fe->u0[k] != 0;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPIU_INT, MPI_SUM, p->comm));

@@ -15,7 +15,8 @@ PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
     PetscBool set;
 
     PetscCall(PetscOptionsHasName(f->scene->options, NULL, name[k], &set));
-    PetscCheck(!set, HycoComm(f), PETSC_ERR_USER, "%s is for scenes with a history, and this one has none", name[k]);
+    PetscCheck(!set, HycoComm(f), PETSC_ERR_USER, "%s is for scenes with a history, and this scene has none; remove it",
+               name[k]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -83,7 +84,8 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   (void)elastic;
   PetscCall(HycoFOMAssemble(f, mu));
   PetscCheck(!f->n_pins, p->comm, PETSC_ERR_USER,
-             "-hyco_regularise is for scenes without a history; fix what holds no body (%s)", f->summary.regularised);
+             "-hyco_regularise is for scenes without a history; fix the unconstrained motion (%s)",
+             f->summary.regularised);
   p->B = f->B;
   p->Bt = f->Bt;
   p->n_free = f->n_free;
@@ -97,16 +99,17 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
 static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report)
 {
   HycoFOM f = (HycoFOM)p->ctx;
-  const PetscScalar *u;
+  PetscScalar *u;
 
   PetscFunctionBegin;
   if (p->interrupt) PetscCall((*p->interrupt)(p->interrupt_ctx));
   PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(PetscArrayzero(p->f_local, f->fe->n_dof));
-  PetscCall(VecGetArrayRead(f->U_local, &u));
+  PetscCall(VecGetArray(f->U_local, &u));
+  HycoFEComplete(f->fe, u);
   HycoOnEach(p->comm, HycoFEStep(f->fe, u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
-  PetscCall(VecRestoreArrayRead(f->U_local, &u));
+  PetscCall(VecRestoreArray(f->U_local, &u));
   PetscCall(ReduceReport(f, report));
   if (!report->failed) PetscCall(TakeForces(f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -387,7 +390,7 @@ PetscErrorCode HycoFOMSetStepMonitor(HycoFOM f, HycoStepMonitor monitor, void *c
 {
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
-  HycoCheck(f->path, "HycoFOMSetStepMonitor: the scene has no history, and its solution no steps");
+  HycoCheck(f->path, "HycoFOMSetStepMonitor: the scene has no history, and its solution has no steps");
   f->path->monitor = monitor;
   f->path->between = NULL;
   f->path->monitor_ctx = ctx;

@@ -286,10 +286,10 @@ PetscErrorCode HycoFOMRelease(HycoFOM f)
   if (free.n) ierr = FindReleased(f, &free);
   PetscCall(HycoMotionsDestroy(&free));
   PetscCall(ierr);
-  HycoCheck(f->n_released <= HYCO_MAX_PINS, "%d motions are held by nothing; at most %d can be regularised",
+  HycoCheck(f->n_released <= HYCO_MAX_PINS, "%d rigid motions are unconstrained; at most %d can be regularised",
             (int)f->n_released, HYCO_MAX_PINS);
   HycoCheck(!f->pinned || f->n_pins == f->n_released,
-            "%d motions are held by nothing at this point, %d at the last one; solve such points apart",
+            "%d rigid motions are unconstrained at this point, and %d at the last one; solve such points separately",
             (int)f->n_released, (int)f->n_pins);
   if (!f->pinned && f->n_released) PetscCall(ChoosePins(f));
   f->n_pins = f->n_released;
@@ -319,8 +319,8 @@ static PetscErrorCode CheckBalance(HycoFOM f, const char forces[], PetscReal sha
   PetscFunctionBegin;
   PetscCallMPI(MPI_Bcast(f->summary.regularised, sizeof(f->summary.regularised), MPI_CHAR, 0, HycoComm(f)));
   PetscCheck(share <= f->regularise_tol, HycoComm(f), PETSC_ERR_USER,
-             "no equilibrium: nothing keeps %s, and of what the %s do there %.2g is not balanced "
-             "(-hyco_regularise_tol %g)",
+             "no equilibrium: nothing keeps %s, and the %s on this motion are unbalanced by a share of %.2g "
+             "(-hyco_regularise_tol allows %g)",
              f->summary.regularised, forces, (double)share, (double)f->regularise_tol);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -245,8 +245,8 @@ static PetscErrorCode OpenPart(HycoFOM f, PetscInt k, HycoH5 *h)
   PetscFunctionBegin;
   NamePart(f, k, path);
   HycoCheck(access(path, R_OK) == 0,
-            "there is no %s, with the fields of a time before the checkpoint: the run that wrote this had no series of "
-            "fields; start again without -hyco_resume, or resume without -output",
+            "the file %s is missing, with the fields of a time before the checkpoint (the first run had no -output); "
+            "start again without -hyco_resume, or resume without -output",
             path);
   PetscCall(HycoH5Open(path, h));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -20,7 +20,7 @@ static PetscErrorCode Envelope(Mat K, IS order, PetscReal *sum)
   PetscCall(ISGetIndices(order, &old));
   PetscCall(ISGetIndices(inverse, &new_of));
   PetscCall(MatGetRowIJ(K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_SUP, "the matrix shows no rows");
+  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_SUP, "the matrix gives no access to its rows");
   for (PetscInt i = 0; i < n; i++) {
     PetscInt first = i;
 

@@ -360,11 +360,10 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
   }
   PetscCall(PetscFree(d->id.a_loc));
   *singular = (PetscBool)(INFOG(d, 1) == -10);
-  PetscCheck(
-      INFOG(d, 1) != -13, d->comm, PETSC_ERR_USER,
-      "the factor of the stiffness does not fit in memory (%d MB estimated); use -hyco_linear iterative, or more "
-      "ranks on more machines",
-      (int)INFOG(d, 17));
+  PetscCheck(INFOG(d, 1) != -13, d->comm, PETSC_ERR_USER,
+             "the factor of the stiffness does not fit into memory (%d MB estimated); use -hyco_linear iterative, or "
+             "more ranks on more machines",
+             (int)INFOG(d, 17));
   PetscCheck(INFOG(d, 1) >= 0 || *singular, d->comm, PETSC_ERR_LIB,
              "MUMPS could not factor K (INFOG(1) = %d, INFOG(2) = %d)", (int)INFOG(d, 1), (int)INFOG(d, 2));
   if (!*singular) PetscCall(SpreadSchur(d, M));
@@ -443,7 +442,7 @@ PetscErrorCode HycoDirectSolveMany(HycoDirect d, PetscInt k, Vec r[], Vec x[])
 
   PetscFunctionBegin;
   if (!k) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(!d->n_pinned, d->comm, PETSC_ERR_SUP, "many right-hand sides with a pinned kernel");
+  PetscCheck(!d->n_pinned, d->comm, PETSC_ERR_SUP, "several right-hand sides with a fixed null space");
   if (d->rank == 0) PetscCall(PetscCalloc1(rows * (size_t)k, &all));
   for (PetscInt j = 0; j < k; j++) {
     PetscCall(Fetch(d, r[j]));

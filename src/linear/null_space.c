@@ -14,7 +14,7 @@ PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
   PetscCall(MatGetNullSpace(K, &kernel));
   if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, &constant, n, NULL));
   PetscCheck(!constant, PetscObjectComm((PetscObject)K), PETSC_ERR_SUP,
-             "give the kernel of K by vectors alone (MatNullSpaceCreate() without the constant)");
+             "give the null space of K by vectors only (MatNullSpaceCreate() without the constant)");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

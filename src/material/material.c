@@ -58,7 +58,7 @@ PetscErrorCode HycoMaterialSetType(HycoMaterial material, HycoMaterialType type)
     char list[HYCO_LINE];
 
     PetscCall(HycoRegistryList(&laws, type, list));
-    HycoFail("body %s: the law \"%s\" is not registered; it must be %s",
+    HycoFail("body %s: the law \"%s\" is unknown; it must be %s",
              ((PetscObject)material)->name ? ((PetscObject)material)->name : "(none)", type, list);
   }
   PetscCall(PetscObjectChangeTypeName((PetscObject)material, type));
@@ -197,14 +197,12 @@ PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, HycoFormul
   material->formulation = formulation;
   if (material->ops->setup) PetscCall((*material->ops->setup)(material, dim));
   HycoCheck(has_history || (material->linear && !material->n_state),
-            "body %s: its law %s is not linear, and what it answers depends on its past; give the scene a history: "
-            "{times: [...]}",
+            "body %s: its law %s is history-dependent; give the scene a history: {times: [...]}",
             ((PetscObject)material)->name, ((PetscObject)material)->type_name);
-  HycoCheck(
-      material->linear || formulation != HYCO_PLANE_STRESS,
-      "body %s: its law %s flows, and plane_stress is for linear laws; take scene_formulation plane_strain or a 3D "
-      "mesh",
-      ((PetscObject)material)->name, ((PetscObject)material)->type_name);
+  HycoCheck(material->linear || formulation != HYCO_PLANE_STRESS,
+            "body %s: its law %s is inelastic, and plane_stress is for linear laws; use scene_formulation plane_strain "
+            "or a 3D mesh",
+            ((PetscObject)material)->name, ((PetscObject)material)->type_name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

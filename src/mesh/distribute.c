@@ -48,7 +48,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   PetscFunctionBegin;
   PetscCall(DMPlexIsDistributed(*dm, &done));
   PetscCall(DMPlexGetOverlap(*dm, &overlap));
-  HycoCheck(!overlap || !scene->refine, "scene_refine: the DM has an overlap; refine it before that is added");
+  HycoCheck(!overlap || !scene->refine, "scene_refine: the DM has an overlap; refine it before the overlap is added");
   if (!done) {
     PetscCall(DMPlexGetPartitioner(*dm, &partitioner));
     PetscCall(HycoPartitionerSetMesh(partitioner, whole, n_pairs, pairs, by));
@@ -57,12 +57,12 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   }
   PetscCall(HycoPlexRefine(dm, scene, scene->refine));
   if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(!write[0] || !scene->n_ties, "hyco_mesh_write: a mesh with ties (%s) is not written as a DMPlex",
+  HycoCheck(!write[0] || !scene->n_ties, "hyco_mesh_write: a mesh with ties (%s) cannot be written as a DMPlex",
             scene->tie[0].name);
   if (write[0]) {
     PetscCall(HycoPlexType(*dm, &type));
     HycoCheck(!HycoCellKinds[PetscMax(type, 0)].quadratic,
-              "hyco_mesh_write: a mesh of %s is not written as a DMPlex; keep its gmsh file",
+              "hyco_mesh_write: a mesh of %s cannot be written as a DMPlex; keep its gmsh file",
               HycoCellKinds[PetscMax(type, 0)].name);
     PetscCall(HycoPlexWrite(*dm, write));
   }
@@ -139,7 +139,7 @@ static PetscErrorCode CheckTies(HycoScene scene)
   PetscCall(PetscStrlen(scene->mesh_path, &length));
   HycoCheck(!scene->dm && (length < 3 || strcmp(scene->mesh_path + length - 3, ".h5")),
             "tie %s: ties need the mesh as a gmsh file, not as a DMPlex", scene->tie[0].name);
-  HycoCheck(!scene->refine, "tie %s: a mesh with ties is not refined by scene_refine; refine the file (gmsh -refine)",
+  HycoCheck(!scene->refine, "tie %s: scene_refine cannot refine a mesh with ties; refine the file (gmsh -refine)",
             scene->tie[0].name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

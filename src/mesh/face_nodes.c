@@ -120,7 +120,7 @@ PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh)
   for (PetscInt k = 0; k < n; k++) added += !k || !AreOne(&list[k], &list[k - 1]);
   if (at && mesh->tag[at - 1] >= PETSC_MAX_INT - 1 - added) {
     PetscCall(PetscFree(list));
-    HycoFail("%s: the nodes that its hex20 need for contact would have tags beyond %lld; number it anew", path,
+    HycoFail("%s: the nodes that its hex20 cells need for contact would have tags beyond %lld; renumber the mesh", path,
              (long long)PETSC_MAX_INT - 1);
   }
   PetscCall(PetscRealloc((size_t)(at + added) * sizeof(*mesh->tag), &mesh->tag));

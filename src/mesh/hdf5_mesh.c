@@ -91,7 +91,7 @@ static PetscErrorCode FindTopology(const char path[], size_t room, char name[])
     if (h >= 0) H5Fclose(h);
   }
   H5E_END_TRY
-  HycoCheck(length > 0, "%s holds no mesh in PETSc's format (DMPlex, PETSC_VIEWER_HDF5_PETSC)", path);
+  HycoCheck(length > 0, "%s contains no mesh in PETSc's format (DMPlex, PETSC_VIEWER_HDF5_PETSC)", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

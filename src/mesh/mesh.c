@@ -64,7 +64,7 @@ static PetscErrorCode CheckComponents(HycoMesh mesh, HycoExpr component[3])
 {
   PetscFunctionBegin;
   for (PetscInt c = mesh->dim; c < 3; c++) {
-    HycoCheck(!component[c], "%s: the mesh has %d space dimension%s; there is no component %c",
+    HycoCheck(!component[c], "%s: the mesh has %d space dimension%s and no component %c; remove the entry",
               HycoExprKey(component[c]), (int)mesh->dim, mesh->dim > 1 ? "s" : "", "xyz"[c]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -78,7 +78,8 @@ static PetscErrorCode CheckPointLoad(HycoMesh mesh, const HycoPointLoad *load)
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(mesh, "force", load->group, &group));
   dim = mesh->group_dim[group];
-  HycoCheck(dim < mesh->dim, "the force on %s: that group has cells, and is no body of the scene", load->group);
+  HycoCheck(dim < mesh->dim, "the force on %s: that group has cells, and is not a body of the scene; add it under body",
+            load->group);
   HycoCheck(!dim || dim < mesh->dim - 1,
             "the force on %s: that group is a boundary; write traction: %s: {...} (force per unit %s)", load->group,
             load->group, mesh->dim == 3 ? "area" : "length");
@@ -106,17 +107,16 @@ static PetscErrorCode CheckTie(HycoMesh mesh, const HycoTie *tie)
 {
   PetscFunctionBegin;
   HycoCheck(!HycoMeshIsQuadratic(mesh),
-            "tie %s: ties are for cells of first order, and the mesh has %s; mesh it with gmsh -order 1", tie->name,
+            "tie %s: ties need first-order cells, and the mesh has %s; mesh with gmsh -order 1", tie->name,
             HycoCellKinds[mesh->type].name);
-  HycoCheck(mesh->dim > 1,
-            "tie %s: ties are for scenes in the plane and in space; in 1D let both bodies share the node", tie->name);
+  HycoCheck(mesh->dim > 1, "tie %s: ties are for 2D and 3D; in 1D let both bodies share the node", tie->name);
   for (PetscInt side = 0; side < 2; side++) {
     const char *name = side ? tie->master : tie->slave;
     PetscInt group = 0;
 
     PetscCall(HycoMeshFindGroup(mesh, "tie", name, &group));
     HycoCheck(mesh->group_dim[group] == mesh->dim - 1,
-              "tie %s: its %s is to be a group of dimension %d; %s has dimension %d", tie->name,
+              "tie %s: its %s must be a group of dimension %d; %s has dimension %d", tie->name,
               side ? "master" : "slave", (int)mesh->dim - 1, name, (int)mesh->group_dim[group]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -147,17 +147,15 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   for (PetscInt k = 0; k < scene->n_springs; k++) PetscCall(CheckSpring(mesh, &scene->spring[k]));
   for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(HycoContactCheckGroups(scene->contact[k], mesh));
   for (PetscInt k = 0; k < scene->n_ties; k++) PetscCall(CheckTie(mesh, &scene->tie[k]));
-  HycoCheck(
-      !scene->n_contacts || mesh->type != HYCO_HEX20,
-      "contact %s: the mesh has hex20, at whose corners a uniform pressure would pull; give hex27, or a mesh file, "
-      "whose hex20 are read as hex27",
-      scene->contact[0]->name);
+  HycoCheck(!scene->n_contacts || mesh->type != HYCO_HEX20,
+            "contact %s: the mesh has hex20 cells, at whose corners a uniform pressure would give tensile forces; use "
+            "hex27 cells, or a mesh file, whose hex20 cells are read as hex27",
+            scene->contact[0]->name);
   for (PetscInt k = 0; k < scene->n_contacts; k++)
-    HycoCheck(
-        !HycoMeshIsQuadratic(mesh) || !scene->contact[k]->ops->find,
-        "contact %s: surfaces that do not match (type surface) are for cells of first order, and the mesh has %s; "
-        "match the meshes and take type: pair, or mesh with gmsh -order 1",
-        scene->contact[k]->name, HycoCellKinds[mesh->type].name);
+    HycoCheck(!HycoMeshIsQuadratic(mesh) || !scene->contact[k]->ops->find,
+              "contact %s: type surface needs first-order cells, and the mesh has %s; use matching meshes with type: "
+              "pair, or mesh with gmsh -order 1",
+              scene->contact[k]->name, HycoCellKinds[mesh->type].name);
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     if (scene->quantity[k].group) PetscCall(HycoMeshFindGroup(mesh, "output", scene->quantity[k].group, &group));
   }

@@ -92,9 +92,10 @@ static PetscErrorCode ReadCount(Msh *m, size_t bytes, const char what[], size_t 
 
   PetscFunctionBegin;
   HycoCheck(!m->failed && value >= 0 && (unsigned long long)value <= (size_t)(m->end - m->at) / bytes,
-            "the mesh %s is damaged: it speaks of %lld %s, which it has no room for", m->path, value, what);
-  HycoCheck(value <= PETSC_MAX_INT / 8, "the mesh %s has %lld %s: more than this PETSc's integers count", m->path,
-            value, what);
+            "the mesh %s is damaged: it declares %lld %s, more than the file contains", m->path, value, what);
+  HycoCheck(value <= PETSC_MAX_INT / 8,
+            "the mesh %s has %lld %s, more than the integers of this PETSc can count; use a PETSc with 64-bit indices",
+            m->path, value, what);
   *n = (size_t)value;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -146,7 +147,7 @@ static PetscErrorCode AddCoordinates(Msh *m, size_t k)
               (long long)m->mesh->tag[k]);
     m->mesh->xyz[3 * k + c] = x;
   }
-  HycoCheck(!m->failed, "the mesh %s is damaged: the coordinates of node %lld are no numbers", m->path,
+  HycoCheck(!m->failed, "the mesh %s is damaged: the coordinates of node %lld are not numbers", m->path,
             (long long)m->mesh->tag[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -191,20 +192,21 @@ static PetscErrorCode ReadNodes4(Msh *m)
     PetscCall(CheckEntity(m, dim, tag));
     PetscCall(ReadCount(m, m->binary ? 32 : 8, "nodes of a block", &n));
     HycoCheck(parametric == 0 || parametric == 1, "the mesh %s is damaged: a block of nodes", m->path);
-    HycoCheck(done + n <= all, "the mesh %s is damaged: its blocks hold more nodes than it counts", m->path);
+    HycoCheck(done + n <= all, "the mesh %s is damaged: its blocks contain more nodes than it declares", m->path);
     for (size_t k = 0; k < n; k++) {
       const long long node = ReadInt(m, 8);
 
       PetscCall(AddNode(m, done + k, node));
-      HycoCheck(node >= least && node <= most, "the mesh %s is damaged: node %lld lies outside its tags, %lld to %lld",
-                m->path, node, least, most);
+      HycoCheck(node >= least && node <= most,
+                "the mesh %s is damaged: node %lld lies outside its range of tags, %lld to %lld", m->path, node, least,
+                most);
     }
     for (size_t k = 0; k < n; k++) {
       PetscCall(AddCoordinates(m, done + k));
       for (long long p = 0; parametric && p < dim; p++) (void)ReadDouble(m);
     }
   }
-  HycoCheck(done == all, "the mesh %s is damaged: its blocks hold fewer nodes than it counts", m->path);
+  HycoCheck(done == all, "the mesh %s is damaged: its blocks contain fewer nodes than it declares", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -247,7 +249,7 @@ static PetscErrorCode ReadNodes(Msh *m)
     PetscCall(ReadNodes2(m));
   PetscCall(SortNodes(m->mesh));
   for (PetscInt k = 1; k < m->mesh->n_nodes; k++)
-    HycoCheck(m->mesh->tag[k] != m->mesh->tag[k - 1], "%s: node %lld stands twice", m->path,
+    HycoCheck(m->mesh->tag[k] != m->mesh->tag[k - 1], "%s: node %lld occurs twice", m->path,
               (long long)m->mesh->tag[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -295,7 +297,7 @@ static const char *GroupName(Msh *m, HycoMshGroup *g)
 }
 
 #define TAKES                                                                                                          \
-  "hyco takes line2, tri3, quad4, tet4 and hex8, and of second order tri6, quad8, quad9, tet10, hex20 and hex27: "     \
+  "hyco supports line2, tri3, quad4, tet4 and hex8, and of second order tri6, quad8, quad9, tet10, hex20 and hex27: "  \
   "mesh the bodies with one of these"
 
 /* Of a type that is refused. */
@@ -321,8 +323,8 @@ static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long lo
             "%s: group \"%s\" has elements of gmsh type %lld (%s); " TAKES, m->path, GroupName(m, g), type,
             TypeName(type));
   HycoCheck(!g->n || g->nv == nv,
-            "%s: group \"%s\" mixes elements of %d and %d nodes; hyco takes one type per mesh: "
-            "recombine all surfaces in gmsh, or none",
+            "%s: group \"%s\" mixes elements of %d and %d nodes; hyco supports one type per mesh: recombine all "
+            "surfaces in gmsh, or none",
             m->path, GroupName(m, g), (int)g->nv, (int)nv);
   g->nv = nv;
   if (g->n == g->room) {
@@ -348,7 +350,7 @@ static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long
 
     HycoCheck(!m->failed, "the mesh %s is damaged: it ends among its elements", m->path);
     node[v] = FindNode(m->mesh, name);
-    HycoCheck(node[v] >= 0, "%s: element %lld names node %lld, which the file does not define", m->path, tag, name);
+    HycoCheck(node[v] >= 0, "%s: element %lld refers to node %lld, which the file does not define", m->path, tag, name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -389,8 +391,8 @@ static PetscErrorCode ReadElements2(Msh *m)
     n_tags = ReadInt(m, 4);
     PetscCall(CheckType(m, type));
     HycoCheck(!m->failed && n_tags >= 2 && n_tags <= 3,
-              "the mesh %s has an element with %lld tags; 2 are expected (is it cut for several processes? save the "
-              "whole)",
+              "the mesh %s has an element with %lld tags, and 2 are expected; if it is partitioned, save it without "
+              "partitions",
               m->path, n_tags);
     HycoCheck(follow > 0 && (size_t)follow <= n - k, "the mesh %s is damaged: a block of %lld elements", m->path,
               follow);
@@ -423,8 +425,9 @@ static PetscErrorCode ReadBlock4(Msh *m, long long dim, long long entity, long l
     PetscInt node[64];
 
     PetscCall(ReadElement(m, 8, tag, type, node));
-    HycoCheck(tag >= least && tag <= most, "the mesh %s is damaged: element %lld lies outside its tags, %lld to %lld",
-              m->path, tag, least, most);
+    HycoCheck(tag >= least && tag <= most,
+              "the mesh %s is damaged: element %lld lies outside its range of tags, %lld to %lld", m->path, tag, least,
+              most);
     for (size_t g = first; g < last; g++) {
       PetscInt at;
 
@@ -453,10 +456,10 @@ static PetscErrorCode ReadElements4(Msh *m)
     HycoCheck(dim == type_dim[type],
               "the mesh %s is damaged: elements of gmsh type %lld on an entity of dimension %lld", m->path, type, dim);
     PetscCall(ReadCount(m, 4, "elements of a block", &n));
-    HycoCheck(done + n <= all, "the mesh %s is damaged: its blocks hold more elements than it counts", m->path);
+    HycoCheck(done + n <= all, "the mesh %s is damaged: its blocks contain more elements than it declares", m->path);
     PetscCall(ReadBlock4(m, dim, entity, type, n, least, most));
   }
-  HycoCheck(done == all, "the mesh %s is damaged: its blocks hold fewer elements than it counts", m->path);
+  HycoCheck(done == all, "the mesh %s is damaged: its blocks contain fewer elements than it declares", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -554,7 +557,7 @@ static PetscErrorCode ReadNames(Msh *m)
   const long long n = line ? strtoll(line, &end, 10) : -1;
 
   PetscFunctionBegin;
-  HycoCheck(n >= 0 && n <= m->end - m->at, "the mesh %s speaks of %lld names, which it has no room for", m->path, n);
+  HycoCheck(n >= 0 && n <= m->end - m->at, "the mesh %s declares %lld names, more than the file contains", m->path, n);
   for (long long k = 0; k < n; k++) {
     long long dim, tag;
     Name name;
@@ -585,18 +588,18 @@ static PetscErrorCode ReadFormat(Msh *m)
 
   PetscFunctionBegin;
   line = line && strncmp(line, "$MeshFormat", 11) == 0 ? NextLine(m) : NULL;
-  HycoCheck(line, "%s is no gmsh mesh: it does not begin with $MeshFormat", m->path);
+  HycoCheck(line, "%s is not a gmsh mesh: it does not begin with $MeshFormat", m->path);
   version = HycoNumber(line, &end);
   binary = strtol(end, &end, 10);
   size = strtol(end, &end, 10);
   m->four = version > 4.05 && version < 4.15;
   HycoCheck((m->four || (version > 2.15 && version < 2.25)) && (binary == 0 || binary == 1) && size == 8,
-            "the mesh %s has gmsh's format %g (%ld, %ld); hyco takes 2.2 and 4.1, text (0) or binary (1), numbers of 8 "
-            "bytes: save it by gmsh -save -format msh41",
+            "the mesh %s has gmsh's format %g (%ld, %ld); hyco reads 2.2 and 4.1, text (0) or binary (1), with numbers "
+            "of 8 bytes: save it by gmsh -save -format msh41",
             m->path, version, binary, size);
   m->binary = (int)binary;
   one = m->binary ? (long)ReadInt(m, 4) : 1;
-  HycoCheck(one == 1, "the mesh %s was written on a machine of another byte order", m->path);
+  HycoCheck(one == 1, "the mesh %s was written on a machine with another byte order; save it on this machine", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -618,11 +621,11 @@ static PetscErrorCode ReadSections(Msh *m)
       PetscCall(ReadNames(m));
     else
       HycoCheck(strncmp(line, "$MeshFormat", 11) && strncmp(line, "$Parti", 6) && strncmp(line, "$Ghost", 6),
-                "the mesh %s has a section %.*s that hyco does not take", m->path,
+                "the mesh %s has a section %.*s that hyco does not support", m->path,
                 (int)PetscMin(strcspn(line, "\r\n"), 40), line);
     HycoCheck(!m->failed, "the mesh %s is damaged", m->path);
   }
-  HycoCheck(m->has_elements, "the mesh %s cannot be read: it has no $Nodes and $Elements, or ends before them",
+  HycoCheck(m->has_elements, "the mesh %s cannot be read: it has no $Nodes and $Elements, or it ends before them",
             m->path);
   HycoCheck(m->mesh->n_groups,
             "%s has no physical groups; name the bodies and surfaces in gmsh (Physical Volume, Physical Surface, ...)",
@@ -638,13 +641,16 @@ static PetscErrorCode ReadAll(Msh *m)
   size_t got;
 
   PetscFunctionBegin;
-  HycoCheck(file, "the mesh %s cannot be opened; scripts/meshes makes the examples' meshes, gmsh -3 a .geo's", m->path);
+  HycoCheck(file,
+            "the mesh %s cannot be opened; scripts/meshes makes the meshes of the examples, and gmsh -2 or -3 makes "
+            "one from a .geo file",
+            m->path);
   if (fseek(file, 0, SEEK_END) == 0) size = ftell(file);
   rewind(file);
   if (size < 0 || PetscMalloc1((size_t)size + 1, &m->text)) size = 0;
   got = size ? fread(m->text, 1, (size_t)size, file) : 0;
   fclose(file);
-  HycoCheck(got && got == (size_t)size, "%s is no gmsh mesh, or cannot be read", m->path);
+  HycoCheck(got && got == (size_t)size, "%s is not a gmsh mesh, or cannot be read", m->path);
   m->text[got] = '\0';
   m->at = m->text;
   m->end = m->text + got;

@@ -110,8 +110,8 @@ static PetscErrorCode CellType(DM dm, PetscInt *type)
     PetscCall(DMPlexGetCellType(dm, c, &of));
     while (t < HYCO_N_CELL_TYPES && (plex_type[t] != of || !ConeIsOf((HycoCellType)t, size, tied))) t++;
     HycoCheck(t < HYCO_N_CELL_TYPES && (c == c0 || t == *type),
-              "the mesh has cells of DMPlex's type %s; hyco takes segments, triangles, quadrilaterals, tetrahedra or "
-              "hexahedra, one type per mesh",
+              "the mesh has cells of DMPlex's type %s; hyco supports segments, triangles, quadrilaterals, tetrahedra "
+              "or hexahedra, one type per mesh",
               DMPolytopeTypes[of]);
     *type = t;
   }
@@ -581,11 +581,11 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
   PetscCall(DMPlexGetSupport(b->dm, p, &support));
   for (PetscInt k = 0; k < b->scene->n_loads && n > 1; k++)
     HycoCheck(strcmp(b->scene->load[k].group, m->group_name[group]),
-              "the load on %s: a facet of it lies between two cells; give a group on the boundary",
+              "the load on %s: one of its facets lies between two cells; give a group on the boundary",
               m->group_name[group]);
   for (PetscInt k = 0; k < b->scene->n_springs && n > 1 && m->dim > 1; k++)
     HycoCheck(strcmp(b->scene->spring[k].group, m->group_name[group]),
-              "the spring on %s: a facet of it lies between two cells; give a group on the boundary",
+              "the spring on %s: one of its facets lies between two cells; give a group on the boundary",
               m->group_name[group]);
   if (n != 1) PetscFunctionReturn(PETSC_SUCCESS);
   cell = b->cell[support[0] - b->c0];
@@ -734,13 +734,13 @@ static PetscErrorCode TakeBodies(Builder *b)
     for (PetscInt j = m->group_cell_start[g]; j < m->group_cell_start[g + 1]; j++) {
       PetscInt *body = &m->cell_body[m->group_cell[j]];
 
-      HycoCheck(*body < 0, "cell %d lies in two bodies, %s and %s; each cell must lie in one",
+      HycoCheck(*body < 0, "cell %d belongs to two bodies, %s and %s; each cell must belong to one",
                 (int)m->cell_id[m->group_cell[j]], b->scene->body[PetscMax(*body, 0)].name, b->scene->body[k].name);
       *body = k;
     }
   }
   for (PetscInt e = 0; e < m->n_cells; e++)
-    HycoCheck(m->cell_body[e] >= 0, "cell %d lies in no body; give each cell of the mesh a label of a body's name",
+    HycoCheck(m->cell_body[e] >= 0, "cell %d belongs to no body; give each cell of the mesh the label of a body",
               (int)m->cell_id[e]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -43,7 +43,7 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
         HycoCheck(r->group[k].dim == m->dim, "body %s is a group of dimension %d; the other bodies have dimension %d",
                   r->group[k].name, r->group[k].dim, (int)m->dim);
         HycoCheck(!nv || nv == r->group[k].nv,
-                  "%s mixes cells of %d and %d nodes; hyco takes one cell type per mesh: recombine all surfaces in "
+                  "%s mixes cells of %d and %d nodes; hyco supports one cell type per mesh: recombine all surfaces in "
                   "gmsh, or none",
                   scene->mesh_path, (int)nv, (int)r->group[k].nv);
         nv = r->group[k].nv;
@@ -58,7 +58,7 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
     if (HycoCellKinds[t].dim == m->dim && HycoCellKinds[t].nv == nv) m->type = (HycoCellType)t;
   }
   HycoCheck(HycoCellKinds[m->type].dim == m->dim && HycoCellKinds[m->type].nv == nv,
-            "%s: cells of dimension %d with %d nodes are of no type that hyco takes", scene->mesh_path, (int)m->dim,
+            "%s: cells of dimension %d with %d nodes are of no type that hyco supports", scene->mesh_path, (int)m->dim,
             (int)nv);
   if (m->type == HYCO_HEX20 && scene->n_contacts) { /* a uniform pressure would pull at the corners of quad8 */
     PetscCall(HycoMshAddFaceNodes(scene->mesh_path, &r->file));
@@ -77,7 +77,8 @@ static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m)
   const PetscInt **source;
 
   PetscFunctionBegin;
-  HycoCheck(m->n_cells <= PETSC_MAX_INT / 8, "%s: %ld cells are more than this PETSc's integers count",
+  HycoCheck(m->n_cells <= PETSC_MAX_INT / 8,
+            "%s has %ld cells, more than the integers of this PETSc can count; use a PETSc with 64-bit indices",
             scene->mesh_path, (long)m->n_cells);
   PetscCall(PetscMalloc1(m->n_cells * m->nv, &m->cells));
   PetscCall(PetscMalloc1(m->n_cells, &m->cell_id));
@@ -101,7 +102,7 @@ static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m)
   }
   PetscCall(PetscFree4(order, tag, body, source));
   for (PetscInt e = 1; e < n; e++)
-    HycoCheck(m->cell_id[e] != m->cell_id[e - 1], "%s: cell %ld lies in two bodies; each cell must lie in one",
+    HycoCheck(m->cell_id[e] != m->cell_id[e - 1], "%s: cell %ld belongs to two bodies; each cell must belong to one",
               scene->mesh_path, (long)m->cell_id[e]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -161,7 +162,7 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
 {
   PetscFunctionBegin;
   if (g->dim != m->dim - 1) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(!g->n || g->nv == m->nf, "%s: group \"%s\" has facets of %d nodes where the cells' have %d",
+  HycoCheck(!g->n || g->nv == m->nf, "%s: group \"%s\" has facets of %d nodes, and those of the cells have %d",
             scene->mesh_path, g->name, (int)g->nv, (int)m->nf);
   for (PetscInt f = 0; f < g->n; f++) {
     PetscInt *facet = m->facets + m->n_facets * m->nf, cell = -1, n = 0;
@@ -177,8 +178,8 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
         n++;
       }
     }
-    HycoCheck(n > 0, "%s: facet %ld of group \"%s\" bounds no cell of a body", scene->mesh_path, (long)g->id[f],
-              g->name);
+    HycoCheck(n > 0, "%s: facet %ld of group \"%s\" is not a facet of any cell of a body", scene->mesh_path,
+              (long)g->id[f], g->name);
     if (n > 1) { /* between two cells: no boundary, but its nodes are still in the group */
       g->inner++;
       continue;
@@ -287,8 +288,8 @@ static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m, const PetscInt sta
 
     for (PetscInt k = start[cell[0]]; k < start[cell[0] + 1]; k++) {
       HycoCheck(around[k] >= e || !CellHas(m, around[k], m->nv, cell),
-                "%s: cells %d and %d have the same nodes: is one cell in two bodies? Format 2.2 saves a cell once for "
-                "each of its groups; save as 4.1 to keep it in several",
+                "%s: cells %d and %d have the same nodes; a cell must belong to one body (format 2.2 repeats a cell "
+                "for each of its groups: save as 4.1)",
                 scene->mesh_path, (int)m->cell_id[around[k]], (int)m->cell_id[e]);
     }
   }
@@ -320,7 +321,7 @@ PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  HycoCheck(scene->mesh_path[0], "the scene names no mesh; write scene: mesh: FILE.msh, or give -scene_mesh FILE.msh");
+  HycoCheck(scene->mesh_path[0], "the scene has no mesh; write scene: mesh: FILE.msh, or give -scene_mesh FILE.msh");
   PetscCall(PetscNew(&m));
   ierr = MakeTables(scene, &r, m);
   PetscCall(HycoMshDestroy(&r.file));

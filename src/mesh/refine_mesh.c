@@ -106,8 +106,8 @@ static PetscErrorCode CheckVertices(DM dm, HycoScene scene, const char name[], D
     for (PetscInt j = 0; j < n; j++) {
       PetscCall(DMLabelGetValue(to, point[j], &value));
       HycoCheck(value == 1 || point[j] < v0 || point[j] >= v1,
-                "scene_refine: the group %s has lines in space or facets between two cells, which refinement cannot "
-                "follow; give a group of points, of boundary facets or of cells",
+                "scene_refine: the group %s has lines in 3D or facets between two cells, which refinement does not "
+                "support; give a group of points, of boundary facets or of cells",
                 name);
     }
     PetscCall(ISRestoreIndices(points, &point));
@@ -132,7 +132,7 @@ static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
   if (depth == dim) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoPlexType(*dm, &type));
   HycoCheck(!HycoCellKinds[PetscMax(type, 0)].quadratic,
-            "scene_refine halves cells of first order; the mesh has %s: refine the file (gmsh -refine)",
+            "scene_refine needs first-order cells, and the mesh has %s; refine the file (gmsh -refine)",
             HycoCellKinds[PetscMax(type, 0)].name);
   PetscCall(DMPlexInterpolate(*dm, &full));
   PetscCall(PetscObjectQuery((PetscObject)*dm, HYCO_TAGS, (PetscObject *)&tags));
@@ -216,7 +216,9 @@ static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscIn
     PetscCall(Key(dm, tag, p, depth, dim, &key[n++]));
   }
   PetscCall(HycoRankKeys(PetscObjectComm((PetscObject)dm), n, key, place, &total));
-  HycoCheck(total < PETSC_MAX_INT - *last, "the refined mesh has more nodes than this PETSc's integers count");
+  HycoCheck(
+      total < PETSC_MAX_INT - *last,
+      "the refined mesh has more nodes than the integers of this PETSc can count; use a PETSc with 64-bit indices");
   for (PetscInt k = 0; k < n; k++) new_tag[child[k]] = *last + 1 + place[k];
   *last += total;
   PetscCall(PetscFree3(key, place, child));
@@ -238,8 +240,9 @@ static PetscErrorCode TagCells(DM dm, DMPlexTransform transform, const PetscInt 
 
     PetscCall(DMPlexGetCellType(dm, c, &type));
     PetscCall(CountChildren(transform, c, type, type, &n));
-    HycoCheck(place[c - c0] < (PETSC_MAX_INT - n) / n,
-              "the refined mesh has more cells than this PETSc's integers count");
+    HycoCheck(
+        place[c - c0] < (PETSC_MAX_INT - n) / n,
+        "the refined mesh has more cells than the integers of this PETSc can count; use a PETSc with 64-bit indices");
     for (PetscInt r = 0; r < n; r++) {
       PetscCall(DMPlexTransformGetTargetPoint(transform, type, type, c, r, &child));
       new_tag[child] = 1 + place[c - c0] * n + r;

@@ -134,8 +134,8 @@ static PetscErrorCode FindTied(HycoMesh m, const PetscInt tag[], const PetscInt 
       PetscInt at;
 
       PetscCall(PetscFindInt(t->master[j], m->n_nodes, tag, &at));
-      PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "node %d is tied to a node that this part lacks",
-                 (int)t->slave[j]);
+      PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+                 "node %d is tied to a node that this part of the mesh does not have", (int)t->slave[j]);
       m->tied_master[m->tied_start[k + 1]++] = node[at];
     }
   }

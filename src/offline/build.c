@@ -19,8 +19,8 @@ static PetscErrorCode ReadMesh(HycoReducer t)
   PetscCall(HycoFOMCreateMesh(HycoComm(t), t->scene, &t->fom));
   f = t->fom;
   HycoCheck(!t->scene->n_times || !f->searches,
-            "the scene has a history, and a map moves a contact surface (type surface) whose masters are searched for: "
-            "reduced models of such paths are not there; hyco solve -mu solves them at full order");
+            "the scene has a history, and a map moves a contact surface (type surface); reduced models do not support "
+            "this: solve at full order by hyco solve -mu");
   for (PetscInt k = 0; k < t->n_groups; k++)
     HycoOnRoot(HycoComm(t), HycoMeshFindGroup(f->part, "hyco_rid_groups", t->groups[k], &group));
   t->sizes[0] = f->n_nodes;
@@ -274,7 +274,8 @@ PetscErrorCode HycoTrainingAddFact(HycoTraining *r, const char name[], PetscReal
   HycoFact *fact = &r->fact[r->n_facts++];
 
   PetscFunctionBegin;
-  PetscCheck(r->n_facts <= HYCO_MAX_FACTS, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a type of model reports too many numbers");
+  PetscCheck(r->n_facts <= HYCO_MAX_FACTS, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "a type of model reports too many quantities");
   PetscCall(PetscStrncpy(fact->name, name, sizeof(fact->name)));
   fact->n = 1;
   fact->value[0] = value;
@@ -368,11 +369,10 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
   PetscCall(HycoROMSetFromOptions(t->prototype)); /* as the model when it predicts */
   for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
-  HycoCheckModel(
-      !m->ops->reconstruct || !t->prototype->reconstruct || kept || !presses,
-      "the RID has no contact, and the training solutions press: the model would give no force; let the RID reach "
-      "the contact (-hyco_rid_modes displacement,dual or -hyco_rid_groups GROUP), or take displacements alone by "
-      "-hyco_reconstruct false");
+  HycoCheckModel(!m->ops->reconstruct || !t->prototype->reconstruct || kept || !presses,
+                 "the RID has no contact, and the training solutions have contact forces, so that the model would give "
+                 "none; extend the RID to the contact (-hyco_rid_modes displacement,dual or -hyco_rid_groups GROUP), "
+                 "or predict displacements only by -hyco_reconstruct false");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -385,8 +385,8 @@ static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
   if (!(m->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(m->numbers[1] < 0.5,
                  "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
-                 "condition %.0e)%s: enlarge the RID (-hyco_rid_layers 1, "
-                 "-hyco_rid_contact_extension LENGTH), or take fewer modes (-hyco_pod_tol)%s",
+                 "condition %.0e)%s: enlarge the RID (-hyco_rid_layers 1, -hyco_rid_contact_extension LENGTH), or use "
+                 "fewer modes (-hyco_pod_tol)%s",
                  100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0], worst,
                  m->scene->n_times ? ", or -hyco_model_type cubature" : "");
   PetscCall(CheckForces(t, m));
@@ -574,7 +574,7 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
     PetscCall(HycoSamplesExcept(t->validation, t->samples, &t->held));
     PetscCall(HycoSamplesGet(t->validation, &n, NULL, NULL));
     PetscCall(HycoSamplesGet(t->held, &m, NULL, NULL));
-    HycoCheck(m, "each of the %d validation points is a training point too; a model is judged by others", (int)n);
+    HycoCheck(m, "each of the %d held-out points is also a training point; give other held-out points", (int)n);
   } else if (t->n_validation && t->scene->n_parameters)
     PetscCall(DrawHeld(t, &t->held));
   else
@@ -596,8 +596,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   HycoCheck(samples || t->prototype->ops->choosepoints, "give the training points");
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
-              "-target_%s judges the model at held-out points, and -hyco_validation is 0: there are none",
-              HycoErrorKinds[j]);
+              "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
   if (choose) {
     PetscCall((*t->prototype->ops->startpoints)(t, &chosen));
     samples = chosen;

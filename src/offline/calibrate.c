@@ -132,7 +132,7 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, Hyc
   m->trust = trust;
   if (!chosen->number) PetscFunctionReturn(PETSC_SUCCESS);
   HycoRecipeDescribe(&chosen->recipe, sizeof(recipe), recipe);
-  snprintf(text, sizeof(text), "  recipe number %d of the %d that were tried: %s\n", (int)chosen->number,
+  snprintf(text, sizeof(text), "  settings number %d of the %d that were tried: %s\n", (int)chosen->number,
            (int)chosen->of, recipe);
   PetscCall(PetscFree(m->search));
   PetscCall(PetscStrallocpy(text, &m->search));

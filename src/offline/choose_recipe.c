@@ -6,7 +6,8 @@
 */
 #include <hycoreducerimpl.h>
 
-#define LITTLE 1.25 /* a model that misses by so much more than the best is as good, if it is cheaper */
+#define LITTLE 1.25       /* a model that misses by so much more than the best is as good, if it is cheaper */
+#define TIE    (1 + 1e-6) /* closer ratios may be in either order, on other numbers of ranks */
 
 /* It gave a model that was judged at all held-out points, or as far as it matters: a path without its end is the worst.
  */
@@ -50,7 +51,7 @@ PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal c
     by = &attempt[k];
   }
   *beaten = by && limit < PETSC_INFINITY ? by->number : 0;
-  return limit;
+  return limit * TIE;
 }
 
 HycoAttempt *HycoAttemptsReopen(PetscInt n, HycoAttempt attempt[])

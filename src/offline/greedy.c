@@ -62,9 +62,9 @@ static PetscErrorCode CheckIndicator(HycoReducer t)
 
   PetscFunctionBegin;
   HycoCheck(residual || !t->scene->n_times,
-            "the scene has a history (history_times), and paths are judged by -hyco_greedy_indicator residual alone");
+            "the scene has a history (history_times); for paths use -hyco_greedy_indicator residual");
   HycoCheck(!residual || t->scene->n_times,
-            "-hyco_greedy_indicator residual judges paths, and the scene has no history; take local or penetration");
+            "-hyco_greedy_indicator residual is for paths, and the scene has no history; use local or penetration");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -78,16 +78,15 @@ static PetscErrorCode CheckStart(HycoReducer t, PetscBool corners, HycoSamples s
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  HycoCheck(
-      !t->greedy.max_snapshots || t->greedy.max_snapshots >= n,
-      "-max_snapshots is %d; at least %d are needed: a greedy training first solves at the %d %s, and adds to these",
-      (int)t->greedy.max_snapshots, (int)n, (int)n, corners ? "corners of the parameters' ranges" : "points given");
+  HycoCheck(!t->greedy.max_snapshots || t->greedy.max_snapshots >= n,
+            "-max_snapshots is %d; at least %d are needed, because a greedy training first solves at the %d %s",
+            (int)t->greedy.max_snapshots, (int)n, (int)n,
+            corners ? "corners of the parameters' ranges" : "points given");
   if (!HycoIndicatorInterpolates(t->greedy.indicator)) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(
-      n > n_par || n == t->greedy.max_snapshots,
-      "the greedy training starts from %d point%s; its indicator interpolates over %d parameters and needs at least "
-      "%d: give more, or none (the corners)",
-      (int)n, n == 1 ? "" : "s", (int)n_par, (int)n_par + 1);
+  HycoCheck(n > n_par || n == t->greedy.max_snapshots,
+            "the greedy training starts from %d point%s, and its indicator interpolates over %d parameters, which "
+            "needs at least %d; give more points, or none (the corners are used)",
+            (int)n, n == 1 ? "" : "s", (int)n_par, (int)n_par + 1);
   PetscCall(HycoInterpolantCreate(n_par, n, mu, &interpolant));
   PetscCall(HycoInterpolantDestroy(&interpolant));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -293,10 +292,10 @@ static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
 {
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(training, &loop->n_points, &loop->n_par, &loop->points));
-  HycoCheck(loop->n_points > 1,
-            "the greedy training has %d training point; it chooses among at least two: "
-            "-training_grid 20,24",
-            (int)loop->n_points);
+  HycoCheck(
+      loop->n_points > 1,
+      "the greedy training has %d candidate point, and at least two are needed; give -training_grid 20,24, for example",
+      (int)loop->n_points);
   PetscCall(PetscMalloc1(4 * loop->n_points, &loop->value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -360,14 +359,12 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(CheckIndicator(t));
-  HycoCheck(!t->prototype->ops->choosepoints,
-            "a condensed model needs a tensor grid of training points, which -greedy does not give: use -grid, or "
-            "-values_NAME");
-  HycoCheck(
-      !t->prototype->traits.cells,
-      "train -greedy adds cells to the RID of before, and a %s model chooses all of its cells anew: train it on a "
-      "grid or on points",
-      t->prototype->traits.title);
+  HycoCheck(!t->prototype->ops->choosepoints, "a condensed model needs a tensor grid of training points, which -greedy "
+                                              "does not make; use -grid or -values_NAME");
+  HycoCheck(!t->prototype->traits.cells,
+            "train -greedy adds cells to the previous RID, and a %s model chooses all of its cells anew; train it on a "
+            "grid or on points",
+            t->prototype->traits.title);
   loop.begin = HycoNow();
   PetscCall(TakeTraining(training, &loop));
   PetscCall(Start(t, start, &loop.samples));

@@ -281,10 +281,9 @@ static PetscErrorCode EvaluateLocal(HycoIndicator d, const PetscReal mu[], HycoR
   HycoROM m = d->model;
 
   PetscFunctionBegin;
-  HycoCheck(
-      m->ops->local,
-      "-hyco_greedy_indicator local needs the system on the RID, which a %s model does not have; take penetration",
-      m->type);
+  HycoCheck(m->ops->local,
+            "-hyco_greedy_indicator local needs the system on the RID, which a %s model does not have; use penetration",
+            m->type);
   PetscUseTypeMethod(m, local, &d->local);
   if (!d->system) PetscCall(SetUp(d));
   PetscCall(AssembleNorm(d));

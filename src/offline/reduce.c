@@ -129,8 +129,8 @@ PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscRe
   PetscFunctionBegin;
   *l = HycoPODRank(n_sigma, sigma, tol, t->noise, max_modes);
   HycoCheckModel(*l <= found || tol == 0,
-                 "-hyco_pod_svd_type %s finds %d modes accurately, which leave out more than %g of the snapshots' "
-                 "energy; take tsqr, or a larger -hyco_pod_tol",
+                 "-hyco_pod_svd_type %s finds only %d accurate modes, which leave out more than %g of the snapshots' "
+                 "energy; use tsqr, or a larger -hyco_pod_tol",
                  t->svd_type, (int)found, (double)tol);
   *l = PetscMin(*l, found);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -395,9 +395,10 @@ static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, Pe
   PetscCall(MatDuplicate(t->S, MAT_COPY_VALUES, &S));
   PetscCall(RemoveLifting(t, S));
   PetscCall(FindBasis(t, store, S, HYCO_SEED_DISPLACEMENT, all));
-  HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give less",
+  HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give a smaller value",
                  (double)t->tol[HYCO_SEED_DISPLACEMENT]);
-  HycoCheckModel(basis->l, "every training solution has zero displacement; there is nothing to learn");
+  HycoCheckModel(basis->l,
+                 "every training solution has zero displacement, so that there are no modes; check the loads");
   PetscCall(PetscMalloc1(t->n_s, &t->U_norm));
   PetscCall(MatGetColumnNorms(S, NORM_2, t->U_norm));
   PetscCall(PetscMalloc1(basis->l * t->n_s, &basis->coefficients));
@@ -442,7 +443,7 @@ static PetscErrorCode TakeDisplacements(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(CutBasis(t, HYCO_SEED_DISPLACEMENT, &V, &t->l));
-  HycoCheckModel(t->l, "-hyco_pod_tol %g leaves no mode; give less", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
+  HycoCheckModel(t->l, "-hyco_pod_tol %g leaves no mode; give a smaller value", (double)t->tol[HYCO_SEED_DISPLACEMENT]);
   PetscCall(PetscMalloc1(PetscMax(t->n_s, basis->n_sigma) + 1, &t->sigma));
   PetscCall(PetscArraycpy(t->sigma, basis->sigma, PetscMax(t->n_s, basis->n_sigma) + 1));
   PetscCall(SeedFrom(t, V, t->l, HYCO_SEED_DISPLACEMENT, t->sizes[3], &t->n_seeds_node, &t->seeds_node));

@@ -176,10 +176,12 @@ PetscErrorCode HycoReducerSetGreedyStop(HycoReducer t, PetscReal target, PetscIn
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  HycoCheck(target > 0, "the target of the greedy training is %g; it must be positive, as 1e-3 is", (double)target);
-  HycoCheck(max_snapshots >= 0 && max_seconds >= 0,
-            "the greedy training may take %d snapshots and %g seconds; neither can be negative (0: no limit)",
-            (int)max_snapshots, (double)max_seconds);
+  HycoCheck(target > 0, "the target of the greedy training is %g; it must be positive, for example 1e-3",
+            (double)target);
+  HycoCheck(
+      max_snapshots >= 0 && max_seconds >= 0,
+      "the limits of the greedy training are %d snapshots and %g seconds; they must not be negative (0: no limit)",
+      (int)max_snapshots, (double)max_seconds);
   t->greedy.target = target;
   t->greedy.max_snapshots = max_snapshots;
   t->greedy.max_seconds = max_seconds;
@@ -243,38 +245,38 @@ static PetscErrorCode ReadTraining(HycoReducer t)
                       "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh, or with a "
                       "cubature on some of its cells; condensed on the contact forces; regression without a solve",
                       types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
-  PetscCall(HycoOptionsReal("-hyco_pod_tol", "energy left out of the displacement basis, the epsilon of (18)", 0, 1,
+  PetscCall(HycoOptionsReal("-hyco_pod_tol", "energy left out of the displacement basis, epsilon of (18)", 0, 1,
                             &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));
-  PetscCall(HycoOptionsReal("-hyco_pod_noise", "singular values below this share of the first are noise", 0, 1,
-                            &t->noise, NULL));
+  PetscCall(HycoOptionsReal("-hyco_pod_noise", "singular values below this share of the first are treated as round-off",
+                            0, 1, &t->noise, NULL));
   PetscCall(ReadSVDType(t, PetscOptionsObject));
-  PetscCall(HycoOptionsInt("-hyco_pod_max_modes", "at most so many displacement modes (0: no limit)", 0, PETSC_MAX_INT,
-                           &t->max_modes, NULL));
-  PetscCall(
-      HycoOptionsInt("-hyco_validation",
-                     "held-out solutions beside the training points, by which the model is judged (-1: from their "
-                     "number; 0: none)",
-                     -1, 100000, &t->n_validation, NULL));
-  PetscCall(HycoOptionsBool("-hyco_search",
-                            "search model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by held-out "
-                            "errors, unless given",
-                            &t->search, NULL));
+  PetscCall(HycoOptionsInt("-hyco_pod_max_modes", "largest number of displacement modes (0: no limit)", 0,
+                           PETSC_MAX_INT, &t->max_modes, NULL));
+  PetscCall(HycoOptionsInt(
+      "-hyco_validation",
+      "number of held-out solutions, on which the model is judged (-1: from the number of training points; 0: none)",
+      -1, 100000, &t->n_validation, NULL));
+  PetscCall(HycoOptionsBool(
+      "-hyco_search",
+      "choose model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by the held-out errors, unless given",
+      &t->search, NULL));
   PetscCall(HycoOptionsBool("-hyco_search_exhaustive",
-                            "of paths: judge each recipe at all held-out points, also where it will not be chosen",
+                            "of paths: judge each recipe at all held-out points, also if it cannot be chosen",
                             &t->exhaustive, NULL));
-  PetscCall(HycoOptionsName("-hyco_reducer_view", "the settings of the training, before it begins"));
+  PetscCall(HycoOptionsName("-hyco_reducer_view", "print the settings of the training before it begins"));
   PetscCall(HycoOptionsFor("greedy"));
   PetscCall(HycoOptionsWord("-hyco_greedy_indicator",
-                            "what train -greedy judges by: distance from a full-order problem on the RID (43), "
-                            "penetration (45), or, of paths, the residual of the full order",
+                            "error indicator of train -greedy: distance from a full-order problem on the RID (43), "
+                            "penetration (45), or for paths the residual of full order",
                             indicators, &indicator, NULL));
-  PetscCall(HycoOptionsBool("-hyco_greedy_keep", "train -greedy keeps each iteration's model beside the snapshots",
-                            &t->greedy.keep, NULL));
+  PetscCall(HycoOptionsBool("-hyco_greedy_keep",
+                            "train -greedy stores the model of each iteration beside the snapshots", &t->greedy.keep,
+                            NULL));
   PetscCall(HycoOptionsFor("hybrid, projection, cubature or condensed"));
-  PetscCall(HycoOptionsInt("-hyco_scan",
-                           "points per parameter that look for a singular reduced stiffness (0: up to some hundred in "
-                           "all)",
-                           0, 1000000, &t->scan, NULL));
+  PetscCall(HycoOptionsInt(
+      "-hyco_scan",
+      "points per parameter at which training looks for a singular reduced stiffness (0: some hundred in all)", 0,
+      1000000, &t->scan, NULL));
   PetscCall(HycoOptionsBool("-hyco_keep_singular", "keep a model whose reduced stiffness is singular inside the ranges",
                             &t->keep_singular, NULL));
   PetscOptionsEnd();
@@ -304,10 +306,11 @@ static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char ***list)
   }
   PetscCall(PetscStrArrayDestroy(list));
   t->seed[HYCO_SEED_SPRING] = (PetscBool)(t->seed[HYCO_SEED_FORCE] && t->scene && t->scene->n_springs);
-  HycoCheck(!wrong[0], "-hyco_rid_modes has \"%s\"; its words are displacement, stress, force, dual and inelastic",
+  HycoCheck(!wrong[0],
+            "-hyco_rid_modes has \"%s\"; the possible values are displacement, stress, force, dual and inelastic",
             wrong);
   HycoCheck(!t->seed[HYCO_SEED_INELASTIC] || !t->scene || t->scene->n_times,
-            "-hyco_rid_modes inelastic is for scenes with a history, and this one has none");
+            "-hyco_rid_modes inelastic is for scenes with a history, and this scene has none; remove it");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -339,8 +342,8 @@ static PetscErrorCode ReadRID(HycoReducer t)
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("hybrid, condensed or regression"));
   PetscCall(HycoOptionsList("-hyco_rid_modes",
-                            "bases whose DEIM points seed the RID: displacement, stress, force, dual, of a history "
-                            "inelastic [displacement,stress,force,inelastic]",
+                            "bases whose DEIM points seed the RID: displacement, stress, force, dual and, with a "
+                            "history, inelastic [displacement,stress,force,inelastic]",
                             &n_kinds, &kinds, &set));
   if (set) PetscCall(TakeSeedKinds(t, n_kinds, &kinds));
   PetscCall(
@@ -349,25 +352,27 @@ static PetscErrorCode ReadRID(HycoReducer t)
                             &t->tol[HYCO_SEED_STRESS], NULL));
   PetscCall(HycoOptionsReal("-hyco_rid_force_tol", "epsilon of (18) for the basis of generalised forces [hyco_pod_tol]",
                             0, 1, &t->tol[HYCO_SEED_FORCE], NULL));
-  PetscCall(HycoOptionsWord("-hyco_deim_type",
-                            "how a basis chooses the points that seed the RID: greedily, or by pivoted QR", deims,
-                            &t->deim, NULL));
+  PetscCall(
+      HycoOptionsWord("-hyco_deim_type",
+                      "selection of the points that seed the RID from a basis: greedy (DEIM), or pivoted QR (Q-DEIM)",
+                      deims, &t->deim, NULL));
   PetscCall(HycoOptionsInt("-hyco_rid_layers", "layers of elements added around the RID", 0, PETSC_MAX_INT, &t->layers,
                            &t->pinned[HYCO_CHOICE_LAYERS]));
-  PetscCall(HycoOptionsReal("-hyco_rid_contact_extension",
-                            "<length> contact nodes this close to the RID's join it with their elements", 0,
-                            PETSC_MAX_REAL, &t->extension, &t->pinned[HYCO_CHOICE_EXTENSION]));
-  PetscCall(HycoOptionsList("-hyco_rid_groups", "mesh groups whose elements join the RID (region of interest)",
+  PetscCall(
+      HycoOptionsReal("-hyco_rid_contact_extension",
+                      "<length> contact nodes within this distance of the RID's are added to it, with their elements",
+                      0, PETSC_MAX_REAL, &t->extension, &t->pinned[HYCO_CHOICE_EXTENSION]));
+  PetscCall(HycoOptionsList("-hyco_rid_groups", "mesh groups whose elements are added to the RID (region of interest)",
                             &t->n_groups, &t->groups, NULL));
   PetscCall(HycoOptionsString("-hyco_rid_region",
-                              "<expression> elements with a node where this is positive join the RID [none]", region,
-                              sizeof(region), NULL));
-  PetscCall(HycoOptionsBool("-hyco_rid_whole", "take the whole mesh as the RID", &t->whole_rid,
+                              "<expression> elements with a node where this is positive are added to the RID [none]",
+                              region, sizeof(region), NULL));
+  PetscCall(HycoOptionsBool("-hyco_rid_whole", "use the whole mesh as the RID", &t->whole_rid,
                             &t->pinned[HYCO_CHOICE_WHOLE]));
   PetscCall(HycoOptionsFor("hybrid or cubature"));
-  PetscCall(HycoOptionsWord("-hyco_hybrid",
-                            "displacements kept full order: fewest for full row rank, all contact ones, all",
-                            HycoHybrids, &hybrid, &t->pinned[HYCO_CHOICE_HYBRID]));
+  PetscCall(HycoOptionsWord(
+      "-hyco_hybrid", "displacements kept full order: the fewest for full row rank, those of the contacts, or all",
+      HycoHybrids, &hybrid, &t->pinned[HYCO_CHOICE_HYBRID]));
   PetscOptionsEnd();
   t->tol[HYCO_SEED_INELASTIC] = t->tol[HYCO_SEED_STRESS];
   t->tol[HYCO_SEED_SPRING] = t->tol[HYCO_SEED_FORCE];
@@ -389,7 +394,7 @@ static PetscErrorCode CheckType(HycoReducer t)
                  "forces",
                  dual);
   HycoCheckModel(t->prototype->traits.history || !t->scene || !t->scene->n_times,
-                 "the scene has a history (history_times), and -hyco_model_type %s has no paths; take hybrid",
+                 "the scene has a history (history_times), and -hyco_model_type %s does not support paths; use hybrid",
                  t->prototype->type);
   if (!t->prototype->traits.whole && !t->prototype->traits.cells) PetscFunctionReturn(PETSC_SUCCESS);
   t->whole_rid = t->prototype->traits.whole;
@@ -452,7 +457,7 @@ PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
   HycoReducerGetRecipe(t, &recipe);
   HycoRecipeDescribe(&recipe, sizeof(text), text);
-  PetscCall(PetscViewerASCIIPrintf(viewer, "settings: %s%s\n", text, t->search ? "; searched where not given" : ""));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "settings: %s%s\n", text, t->search ? "; searched if not given" : ""));
   PetscCall(PetscViewerASCIIPrintf(viewer, "snapshots: %s\n", t->folder[0] ? t->folder : "beside the model"));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(PETSC_SUCCESS);

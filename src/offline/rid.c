@@ -361,6 +361,19 @@ static PetscErrorCode AddLayer(Rid *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The surfaces that meet rigid bodies, and the nodes that these move with: without all of them Omega_A has no
+   equilibrium of the body, and not its load. */
+static PetscErrorCode AddRigid(Rid *r, HycoScene scene)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
+    if (!scene->contact[k]->rigid) continue;
+    PetscCall(AddGroup(r, scene->contact[k]->slave));
+    PetscCall(AddGroup(r, scene->contact[k]->master));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What each rank finds alone. */
 static PetscErrorCode AddRegions(Rid *r, const HycoRIDRecipe *recipe)
 {
@@ -375,6 +388,7 @@ static PetscErrorCode AddRegions(Rid *r, const HycoRIDRecipe *recipe)
   for (PetscInt e = 0; recipe->whole && e < r->part->n_cells; e++) PetscCall(Add(r, e));
   for (PetscInt k = 0; k < recipe->n_groups; k++) PetscCall(AddGroup(r, recipe->groups[k]));
   if (recipe->plane) PetscCall(AddGroup(r, recipe->plane));
+  PetscCall(AddRigid(r, r->f->scene));
   if (recipe->region) PetscCall(AddRegion(r, recipe->region));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -287,7 +287,7 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
   a->dropped_at = -1;
   PetscCall(HycoSamplesGet(t->held, &a->n_held, NULL, NULL));
   HycoRecipeDescribe(recipe, sizeof(what), what);
-  HycoFormat(t->doing, "recipe %d, %s", (int)a->number, what);
+  HycoFormat(t->doing, "settings %d, %s", (int)a->number, what);
   t->most_full_order =
       t->pinned[HYCO_CHOICE_HYBRID] || recipe->hybrid != HYCO_HYBRID_ALL || recipe->plane ? 0 : MANY_UNKNOWNS;
   PetscCall(SetRecipe(t, recipe));
@@ -714,7 +714,8 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
   for (PetscInt k = s->n - 1; k > 0 && !best; k--) { /* one that is not refused for its cost */
     if (s->attempt[k].recipe.hybrid != HYCO_HYBRID_ALL) best = &s->attempt[k];
   }
-  HycoFail("none of %d recipes gave a model; one of them: %s", (int)s->n, (best ? best : &s->attempt[0])->failure);
+  HycoFail("none of %d settings gave a model; the error of one of them: %s", (int)s->n,
+           (best ? best : &s->attempt[0])->failure);
 }
 
 static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report)

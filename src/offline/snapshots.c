@@ -19,9 +19,9 @@ static PetscErrorCode MakeFolder(const char folder[])
   HycoCheck(strlen(folder) < PETSC_MAX_PATH_LEN - 64, "the snapshot folder's name is too long");
   if (mkdir(folder, 0777) != 0) {
     HycoCheck(errno == EEXIST && stat(folder, &info) == 0 && S_ISDIR(info.st_mode),
-              "the snapshot folder %s cannot be made: is there such a place, may you write there?", folder);
+              "the snapshot folder %s cannot be created; check that its parent folder exists and is writable", folder);
   }
-  HycoCheck(access(folder, W_OK) == 0, "the snapshot folder %s cannot be written", folder);
+  HycoCheck(access(folder, W_OK) == 0, "the snapshot folder %s is not writable", folder);
   snprintf(all, sizeof(all), "%s/", folder);
   PetscCall(HycoFileSweep(all));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -90,7 +90,7 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   same = strcmp(text, mine) == 0;
   PetscCall(PetscFree(text));
   HycoCheck(same,
-            "%s is a snapshot of another scene%s or mesh; remove the folder %s, or name another with -hyco_snapshots",
+            "%s is a snapshot of another scene%s or mesh; remove the folder %s, or name another by -hyco_snapshots",
             path, s->scene->n_times ? ", history" : "", s->folder);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -126,9 +126,9 @@ static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *
   PetscFunctionBegin;
   PetscOptionsBegin(comm, NULL, "HycoSnapshots", NULL);
   PetscOptionsObject->options = options;
-  PetscCall(HycoOptionsInt("-hyco_groups",
-                           "groups of ranks that solve snapshots side by side (0: from the mesh's size)", 0,
-                           PETSC_MAX_INT, groups, NULL));
+  PetscCall(HycoOptionsInt(
+      "-hyco_groups", "number of groups of ranks that solve snapshots at the same time (0: from the size of the mesh)",
+      0, PETSC_MAX_INT, groups, NULL));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -360,7 +360,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   PetscCall(HycoFOMSolve(fom, w->s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetHistory(fom, &history));
   HycoSceneNamePoint(w->s->scene, mu, at);
-  HycoCheck(history.ended, "the path at %s ends at t = %.10g, beyond which its steps have become too small: %s", at,
+  HycoCheck(history.ended, "the path at %s ends at t = %.10g, because its steps became too small: %s", at,
             (double)history.t, history.why);
   HycoOnRoot(HycoComm(fom), WriteHead(w->s, w->h, mu));
   HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, "taken", history.n_taken, 1, history.taken));
@@ -376,7 +376,7 @@ static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu
 
   PetscFunctionBegin;
   PetscCheck(!fom->path->checkpoint[0], HycoComm(fom), PETSC_ERR_USER,
-             "-hyco_checkpoint is for hyco solve; training keeps each path that it has solved in its store");
+             "-hyco_checkpoint is for hyco solve; training stores each solved path in its snapshot folder");
   PetscCall(SamplePath(s, mu, path));
   PetscCall(PetscMalloc1(fom->part->n_cells, &w.inelastic));
   PetscCall(HycoH5CreateShared(HycoComm(fom), path, &w.h));
@@ -399,10 +399,10 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   }
   PetscCall(HycoFOMSolve(fom, s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
-  HycoCheck(
-      !summary.regularised[0],
-      "neither supports nor contact keep %s: full order can be regularised, a reduced model cannot; fix a component",
-      summary.regularised);
+  HycoCheck(!summary.regularised[0],
+            "neither supports nor contact keep %s: full order can be regularised, but a reduced model cannot; fix a "
+            "component",
+            summary.regularised);
   if (summary.reason < 0) {
     char at[HYCO_LINE];
 
@@ -533,7 +533,7 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, HycoSamples samples, const ch
     for (PetscInt j = 0; j < n_steps; j++) {
       NameField(s, j, field, name);
       PetscCall(HycoH5GetSize(h, name, &size, &one));
-      HycoCheck(size == total, "%s: %s has %d rows where other snapshots have %d; remove the folder", path, name,
+      HycoCheck(size == total, "%s: %s has %d rows, and other snapshots have %d; remove the folder", path, name,
                 (int)size, (int)total);
       PetscCall(HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)(k * n_steps + j) * (size_t)lda));
     }

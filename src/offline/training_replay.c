@@ -53,8 +53,8 @@ static PetscErrorCode Step(HycoTrainingReplay *r, PetscReal t0, PetscReal t1)
   PetscFunctionBegin;
   if (!r->march.state) PetscCall(HycoMarchBegin(r->fe, &r->march)); /* now that fe is at the path's first time */
   PetscCall(HycoMarchStep(&r->march, r->u, t0, t1, &report));
-  HycoCheckModel(!report.failed, "the laws have no answer to the training displacements at t = %.10g: %s", (double)t1,
-                 report.why);
+  HycoCheckModel(!report.failed, "the laws cannot be integrated along the training displacements at t = %.10g: %s",
+                 (double)t1, report.why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -29,7 +29,7 @@ PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_
   PetscFunctionBegin;
   HycoCheck(
       ending && strlen(path) < PETSC_MAX_PATH_LEN - 16,
-      "the output is named %s; give a name that ends in .xdmf (the numbers go to the .h5 beside it) or in .vtkhdf",
+      "the output is named %s; give a name that ends in .xdmf (with the numbers in a .h5 file beside it) or in .vtkhdf",
       path);
   if (ending == 5)
     snprintf(numbers, PETSC_MAX_PATH_LEN, "%.*s.h5", (int)strlen(path) - 5, path);
@@ -48,13 +48,13 @@ PetscErrorCode HycoFieldsCheckPath(const char path[])
   PetscCall(HycoFieldsNumbers(path, h5));
   if (stat(h5, &info) != 0) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(S_ISREG(info.st_mode),
-            "%s is no file (a folder, a device, a pipe), and the numbers of %s would go there; give the output another "
-            "name",
+            "%s is not a file (a folder, a device, a pipe), and the numbers of %s would be written there; give the "
+            "output another name",
             h5, path);
   PetscCall(HycoH5IsPrecious(h5, &precious));
   HycoCheck(!precious,
-            "%s is a model or a snapshot, and the numbers of %s would go there; give the output another name", h5,
-            path);
+            "%s is a model or a snapshot, and the numbers of %s would be written there; give the output another name",
+            h5, path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -197,7 +197,7 @@ PetscErrorCode HycoFieldFileAdd(HycoFieldFile f, const HycoField *field)
 PetscErrorCode HycoFieldFileBeginTime(HycoFieldFile f, PetscReal t)
 {
   PetscFunctionBegin;
-  PetscCheck(f->n < f->most, PETSC_COMM_SELF, PETSC_ERR_PLIB, "more times than the %d that were announced",
+  PetscCheck(f->n < f->most, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there are more times than the %d that were declared",
              (int)f->most);
   f->t[f->n] = t;
   f->n_fields = 0;

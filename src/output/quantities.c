@@ -199,10 +199,10 @@ static PetscErrorCode AddNodes(HycoFE fe, PetscInt field, const PetscReal u[], c
 static PetscErrorCode CheckAxis(HycoFE fe, const HycoQuantity *q, const char what[])
 {
   PetscFunctionBegin;
-  HycoCheck(q->field < fe->dim, "output_%s: the mesh has %d space dimension%s, and no %s along %c", q->name,
+  HycoCheck(q->field < fe->dim, "output_%s: the mesh has %d space dimension%s and no %s along %c", q->name,
             (int)fe->dim, fe->dim == 1 ? "" : "s", what, "xyz"[q->field]);
   HycoCheck(q->field || fe->formulation != HYCO_AXISYMMETRIC,
-            "output_%s: around the circle a %s along the radius x adds up to nothing; ask for y", q->name, what);
+            "output_%s: in an axisymmetric scene the %s along the radius x sums to zero; use y", q->name, what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -244,7 +244,7 @@ static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoCo
   HycoCheck(q->kind != HYCO_QUANTITY_MOMENT || (turns && fe->formulation != HYCO_AXISYMMETRIC),
             "output_%s: there is no moment about %c%s", q->name, "xyz"[q->field],
             fe -> formulation == HYCO_AXISYMMETRIC ? " in an axisymmetric scene"
-                  : fe->dim == 2                   ? " in 2D; ask for z"
+                  : fe->dim == 2                   ? " in 2D; use z"
                                                    : " in 1D");
   *value = contact ? 0 : NAN;
   for (PetscInt c = 0; contact && c < fe->scene->n_contacts; c++) {
@@ -267,7 +267,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
 
   PetscFunctionBegin;
   HycoCheck(q->field < UX || q->field > UZ || q->field - UX < fe->dim,
-            "output_%s: the mesh has %d space dimension%s, and no %s", q->name, (int)fe->dim, fe->dim == 1 ? "" : "s",
+            "output_%s: the mesh has %d space dimension%s and no %s", q->name, (int)fe->dim, fe->dim == 1 ? "" : "s",
             HycoQuantityFields[q->field]);
   PetscCall(FindPlace(fe->scene, m, q, &p));
   if (p.dim < m->dim - 1) {

@@ -49,8 +49,8 @@ static PetscErrorCode WriteRows(HycoFieldFile f, const char set[], HycoPlace pla
 
   PetscFunctionBegin;
   HycoCheck((PetscInt64)all * times < PETSC_MAX_INT,
-            "%s: %d times of %d nodes or cells are too many for one set; give an output that ends in .xdmf", f->path,
-            (int)times, (int)all);
+            "%s: %d times of %d nodes or cells are too many for one dataset; give an output that ends in .xdmf",
+            f->path, (int)times, (int)all);
   PetscCall(HycoH5WriteRows(f->h, set, MPIU_REAL, all * times, cols, all * f->n + first, own, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -18,8 +18,8 @@ static PetscErrorCode CheckName(HycoScene s, const char key[], const char name[]
             "%s: \"%s\" cannot name a constant; use letters, digits and _, and none of x, y, z, pi, temperature", key,
             name);
   for (PetscInt p = 0; p < s->n_variables; p++)
-    HycoCheck(strcasecmp(s->parameter[p], name), "%s: %s is the name of a parameter, of t or of a table already", key,
-              name);
+    HycoCheck(strcasecmp(s->parameter[p], name),
+              "%s: %s is already the name of a parameter, of t or of a table; rename it", key, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -41,11 +41,11 @@ static PetscErrorCode Expand(HycoScene s, const char key[], const char text[], P
     } else if (isdigit((unsigned char)*text) || *text == '.') { /* 1e5 is no e5 */
       while (isalnum((unsigned char)text[n]) || text[n] == '.') n++;
     }
-    HycoCheck(at + n + 3 < LONGEST, "%s: with its constants put in, the expression is longer than %d characters", key,
+    HycoCheck(at + n + 3 < LONGEST, "%s: with its constants inserted, the expression is longer than %d characters", key,
               LONGEST);
     if (c < s->n_constants) {
-      HycoCheck(depth < s->n_constants, "%s: the constant %s stands for itself; constants may not go in a circle", key,
-                Name(s, c));
+      HycoCheck(depth < s->n_constants,
+                "%s: the constant %s refers to itself; definitions of constants must not be circular", key, Name(s, c));
       strcpy(out + at, "(");
       PetscCall(Expand(s, key, s->value[s->constant[c]], depth + 1, out));
       at = strlen(out);

@@ -11,7 +11,8 @@ PetscErrorCode HycoDeclaredAdd(HycoDeclared *d, const char name[], const char ti
   PetscFunctionBegin;
   PetscCheck(d->n < HYCO_MAX_DECLARED, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "%s: a type has at most %d entries",
              name, HYCO_MAX_DECLARED);
-  PetscCheck(!HycoDeclaredFind(d, name), PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "the entry %s is declared twice", name);
+  PetscCheck(!HycoDeclaredFind(d, name), PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
+             "the entry %s is declared twice by its type", name);
   PetscCall(PetscStrallocpy(name, &e->name));
   PetscCall(PetscStrallocpy(title, &e->title));
   e->kind = kind;

@@ -95,7 +95,7 @@ static PetscErrorCode TakeKey(Scan *s, PetscInt column, PetscInt line, const cha
   HycoCheck(end >= 0 && length + (size_t)end + 1 < sizeof(s->path),
             "%s: the key in line %d is longer than %d characters", file, (int)line, HYCO_LINE - 2);
   for (PetscInt k = 0; k < s->n; k++)
-    HycoCheck(strcasecmp(s->key[k], s->path), "%s: %s stands twice, in line %d and in line %d; an entry has one value",
+    HycoCheck(strcasecmp(s->key[k], s->path), "%s: %s occurs twice, in line %d and in line %d; remove one of them",
               file, s->path, (int)s->line_of[k], (int)line);
   if (s->n == s->room) {
     s->room = 2 * s->room + 64;

@@ -101,11 +101,11 @@ static PetscErrorCode RefuseOthers(PetscOptions options)
   PetscCall(PetscOptionsLeftGet(options, &n, &names, &values));
   if (n) snprintf(name, sizeof(name), "%.200s", names[0]);
   PetscCall(PetscOptionsLeftRestore(options, &n, &names, &values));
-  HycoCheck(!name[0],
-            "the scene's entry \"%s\" is unknown; an entry stands under scene, parameter, constant, body, fixed, "
-            "pressure, traction, force, spring, gravity, rotation, contact, history, output or hyco, and its name has "
-            "no blank",
-            name);
+  HycoCheck(
+      !name[0],
+      "the scene's entry \"%s\" is unknown; the entries are scene, parameter, constant, body, fixed, tie, pressure, "
+      "traction, force, spring, gravity, rotation, contact, history, output and hyco, and names have no blanks",
+      name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -145,10 +145,11 @@ static PetscErrorCode FindFile(const char path[], char file[PETSC_MAX_PATH_LEN],
 
   PetscFunctionBegin;
   HycoCheck(strlen(path) + 16 < PETSC_MAX_PATH_LEN, "the scene's path is too long");
-  HycoCheck(stat(path, &info) == 0, "there is no scene %s; give a folder with scene.yaml, or a .yaml file", path);
+  HycoCheck(stat(path, &info) == 0, "the scene %s does not exist; give a folder with scene.yaml, or a .yaml file",
+            path);
   if (S_ISDIR(info.st_mode)) {
     snprintf(file, PETSC_MAX_PATH_LEN, "%s%sscene.yaml", path, path[strlen(path) - 1] == '/' ? "" : "/");
-    HycoCheck(stat(file, &info) == 0, "the folder %s holds no scene.yaml", path);
+    HycoCheck(stat(file, &info) == 0, "the folder %s has no scene.yaml", path);
   } else {
     snprintf(file, PETSC_MAX_PATH_LEN, "%s", path);
   }
@@ -210,7 +211,7 @@ static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
   PetscErrorCode caught, ierr = 0;
 
   PetscFunctionBegin;
-  HycoCheck(IsText(file), "%s is not YAML that hyco reads: it has a byte 0, or cannot be read", file);
+  HycoCheck(IsText(file), "%s is not valid YAML for hyco: it contains a zero byte, or cannot be read", file);
   PetscCall(ReadText(file, &text));
   PetscCall(PetscStrallocpy(text, &copy));
   PetscCall(HycoCatchBegin());
@@ -220,10 +221,10 @@ static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
   if (!caught && copy) ierr = HycoEntriesCheckTwice(copy, file);
   PetscCall(PetscFree(copy));
   HycoCheck(!caught || !strstr(message, "max number of options"),
-            "%s has more entries than the 512 that this PETSc (%d.%d) keeps; put what is alike into one expression, or "
-            "take a newer PETSc",
+            "%s has more than 512 entries, the limit of this PETSc (%d.%d); combine entries into one expression, or "
+            "use a newer PETSc",
             file, PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR);
-  HycoCheck(!caught, "%s is not YAML that hyco reads: %s", file, message);
+  HycoCheck(!caught, "%s is not valid YAML for hyco: %s", file, message);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -49,7 +49,7 @@ static PetscErrorCode Raise(HycoExpr e)
 
   PetscFunctionBegin;
   Shorten(e->text, text);
-  HycoFail("%s: \"%s\" is no expression: %.300s", e->key, text, mupGetErrorMsg(e->parser));
+  HycoFail("%s: \"%s\" is not an expression: %.300s", e->key, text, mupGetErrorMsg(e->parser));
 }
 
 static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const names[])
@@ -74,7 +74,7 @@ static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const na
 
       for (PetscInt p = 0; p < n; p++) PetscCall(HycoListAdd(list, ", ", names[p]));
       Shorten(e->text, text);
-      HycoFail("%s: \"%s\" names %.100s, which is unknown; known are %s, pi", e->key, text, name, list);
+      HycoFail("%s: \"%s\" uses %.100s, which is unknown; the known names are %s, pi", e->key, text, name, list);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -193,8 +193,8 @@ PetscErrorCode HycoExprRefuseHeat(HycoExpr e)
 
   PetscFunctionBegin;
   Shorten(e->text, text);
-  HycoCheck(!e->in_heat, "%s: \"%s\" names temperature, which only a law's constants and the expansion may", e->key,
-            text);
+  HycoCheck(!e->in_heat, "%s: \"%s\" uses temperature, which is allowed only in a law's constants and in expansion",
+            e->key, text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -39,7 +39,7 @@ static PetscErrorCode CheckTimes(const char key[], PetscInt n, const PetscReal t
 {
   PetscFunctionBegin;
   for (PetscInt k = 1; k < n; k++)
-    HycoCheck(t[k * stride] > t[(k - 1) * stride], "%s goes %s: %.10g follows %.10g; times increase", key,
+    HycoCheck(t[k * stride] > t[(k - 1) * stride], "%s goes %s: %.10g follows %.10g; times must increase", key,
               t[k * stride] < t[(k - 1) * stride] ? "back in time" : "on without time", (double)t[k * stride],
               (double)t[(k - 1) * stride]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -52,7 +52,8 @@ static PetscErrorCode ReadTimes(HycoScene s, const char key[], const char text[]
   PetscFunctionBegin;
   PetscCall(PetscFree(s->times));
   PetscCall(ReadRows(text, 1, &n, &s->times));
-  HycoCheck(n >= 2, "%s is \"%.200s\"; it lists at least two numbers, the time where the path begins first", key, text);
+  HycoCheck(n >= 2, "%s is \"%.200s\"; at least two numbers are expected, with the beginning of the path first", key,
+            text);
   PetscCall(CheckTimes(key, n, s->times, 1));
   s->n_times = n;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -63,8 +64,8 @@ static PetscErrorCode AddVariable(HycoScene s, const char key[], const char name
 {
   PetscFunctionBegin;
   for (PetscInt p = 0; p < s->n_variables; p++)
-    HycoCheck(strcasecmp(s->parameter[p], name), "%s: %s is the name of %s already; each variable has its own", key,
-              name,
+    HycoCheck(strcasecmp(s->parameter[p], name), "%s: %s is already the name of %s; give each variable its own name",
+              key, name,
               p < s->n_parameters    ? "a parameter"
               : p == s->n_parameters ? "the time"
                                      : "a table");
@@ -99,7 +100,8 @@ static PetscErrorCode ReadTable(HycoScene s, const char key[], const char text[]
   }
   table->n = n;
   PetscCall(PetscFree(row));
-  HycoCheck(n > 0, "%s is \"%.200s\"; a table has rows of two numbers, time and value: [[0, 1], [10, 2.5]]", key, text);
+  HycoCheck(n > 0, "%s is \"%.200s\"; a table needs rows of two numbers, time and value: [[0, 1], [10, 2.5]]", key,
+            text);
   PetscCall(CheckTimes(key, n, table->t, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -113,8 +115,7 @@ PetscErrorCode HycoSceneReadHistory(HycoScene s)
     if (strcasecmp(s->key[k], "history_times") == 0) PetscCall(ReadTimes(s, s->key[k], s->value[k]));
     if (strncasecmp(s->key[k], TABLES, strlen(TABLES)) == 0) table = s->key[k];
   }
-  HycoCheck(s->n_times || !table, "%s is a table of a history that lists no times; write history: {times: [0, ...]}",
-            table);
+  HycoCheck(s->n_times || !table, "%s is a table of a history without times; write history: {times: [0, ...]}", table);
   if (!s->n_times) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(AddVariable(s, "history_times", "t"));
   for (PetscInt k = 0; k < s->n_entries; k++) {
@@ -132,18 +133,19 @@ PetscErrorCode HycoSceneCheckHistory(HycoScene s)
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     for (PetscInt c = 0; c < 3; c++)
       HycoCheck(!HycoExprChanges(s->body[b].map[c], in_time),
-                "%s changes in time; a map says where the bodies are before the history begins",
+                "%s changes in time; a map must be constant in time, because it gives the positions before the history "
+                "begins",
                 HycoExprKey(s->body[b].map[c]));
   }
   for (PetscInt k = 0; k < 4 * s->n_springs; k++) {
     HycoExpr stiffness = s->spring[k / 4].stiffness[k % 4];
 
-    HycoCheck(!HycoExprChanges(stiffness, in_time), "%s changes in time; a spring keeps its stiffness",
-              HycoExprKey(stiffness));
+    HycoCheck(!HycoExprChanges(stiffness, in_time),
+              "%s changes in time; the stiffness of a spring must be constant in time", HycoExprKey(stiffness));
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) {
     HycoContactChanges(s->contact[k], in_time, &rows, &gaps);
-    HycoCheck(!rows, "contact %s: its normal changes in time; a history changes its gap alone",
+    HycoCheck(!rows, "contact %s: its normal changes in time; only the gap may change in time",
               ((PetscObject)s->contact[k])->name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -233,10 +235,9 @@ PetscErrorCode HycoSceneGetHistory(HycoScene s, PetscInt *n, const PetscReal *ti
 PetscErrorCode HycoSceneRefuseHistory(HycoScene s, const char what[])
 {
   PetscFunctionBegin;
-  HycoCheck(
-      !s->n_times,
-      "the scene has a history (history_times), and %s is for scenes without one; hyco solve -mu solves its paths at "
-      "full order, hyco train -grid N,N,... makes a reduced model of them",
-      what);
+  HycoCheck(!s->n_times,
+            "the scene has a history (history_times), and %s is for scenes without one; use hyco solve -mu for a path "
+            "at full order, or hyco train -grid N,N,... for a reduced model",
+            what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

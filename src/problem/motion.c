@@ -27,13 +27,13 @@ PetscErrorCode HycoSceneReadMotion(HycoScene s, PetscInt entry)
 
   PetscFunctionBegin;
   HycoCheck(expr,
-            "the scene's entry %s is unknown; there is gravity: {x: ..., y: ..., z: ...} and rotation: {speed: ..., "
-            "axis: {x: ..., y: ..., z: ...}, through: {x: ..., y: ..., z: ...}}",
+            "the scene's entry %s is unknown; the entries are gravity: {x: ..., y: ..., z: ...} and rotation: {speed: "
+            "..., axis: {x: ..., y: ..., z: ...}, through: {x: ..., y: ..., z: ...}}",
             key);
   PetscCall(HycoExprDestroy(expr)); /* the same entry in another letter case */
   PetscCall(HycoSceneExpression(s, key, s->value[entry], expr));
   PetscCall(HycoExprRefuseHeat(*expr));
-  HycoCheck(!HycoExprInSpace(*expr), "%s names x, y or z; it is the same everywhere", key);
+  HycoCheck(!HycoExprInSpace(*expr), "%s depends on x, y or z; it must be constant in space", key);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -68,11 +68,9 @@ PetscErrorCode HycoSceneCheckMotion(HycoScene s)
     if (*At(s, k)) given = HycoExprKey(*At(s, k));
     if (*At(s, k) && k > 3) place = HycoExprKey(*At(s, k));
   }
-  HycoCheck(!given || density, "%s acts on mass, and no body has a density; write body: NAME: {density: ...}", given);
+  HycoCheck(!given || density, "%s needs a density, and no body has one; write body: NAME: {density: ...}", given);
   HycoCheck(!place || s->motion.speed,
-            "%s says where the scene turns; write rotation: {speed: ...} too (radians per "
-            "unit of time)",
-            place);
+            "%s is given without a speed; write rotation: {speed: ...} too (radians per unit of time)", place);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

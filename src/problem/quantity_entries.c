@@ -51,7 +51,8 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   HycoCheck(!q->given,
-            "%s: the output %s has one of max, min, mean, reaction, force and moment already; give each its own name",
+            "%s: the output %s already has one of max, min, mean, reaction, force and moment; give each output its own "
+            "name",
             s->key[entry], name);
   q->given = PETSC_TRUE;
   q->kind = (HycoQuantityKind)field;
@@ -61,9 +62,7 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     PetscCall(FindField(s->key[entry], s->value[entry], &q->field));
   if (field < HYCO_QUANTITY_REACTION && strcmp(HycoQuantityFields[q->field], "contact_pressure") == 0) {
     HycoCheck(q->kind == HYCO_QUANTITY_MAX,
-              "%s: of contact_pressure there is the largest alone; write max: "
-              "contact_pressure",
-              s->key[entry]);
+              "%s: only the largest contact_pressure is available; write max: contact_pressure", s->key[entry]);
     q->kind = HYCO_QUANTITY_PRESSURE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -85,17 +84,18 @@ static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
   PetscFunctionBegin;
   HycoCheck(
       q->kind >= HYCO_QUANTITY_FORCE || !q->contact,
-      "the output %s names the contact %s; that is for force, moment and max: contact_pressure, others take a group",
+      "the output %s names the contact %s, which is for force, moment and max: contact_pressure; give a group instead",
       q->name, q->contact);
   if (q->kind < HYCO_QUANTITY_FORCE) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(!q->group, "the output %s is of a contact and names the group %s; write contact: NAME instead", q->name,
+  HycoCheck(!q->group, "the output %s is for a contact and names the group %s; write contact: NAME instead", q->name,
             q->group);
-  HycoCheck(s->n_contacts, "the output %s is of a contact, and the scene has none", q->name);
+  HycoCheck(s->n_contacts, "the output %s is for a contact, and the scene has none; remove it", q->name);
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     if (q->contact && strcmp(q->contact, s->contact[c]->name) == 0) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(HycoListAdd(list, ", ", s->contact[c]->name));
   }
-  HycoCheck(!q->contact, "the output %s names the contact %s; the scene's are: %s", q->name, q->contact, list);
+  HycoCheck(!q->contact, "the output %s names the contact %s, which does not exist; the contacts of the scene are: %s",
+            q->name, q->contact, list);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -106,11 +106,10 @@ PetscErrorCode HycoSceneCheckQuantities(HycoScene s)
     HycoCheck(strcasecmp(s->quantity[k / s->n_parameters].name, s->parameter[k % s->n_parameters]),
               "the output %s has the name of a parameter; give it another", s->quantity[k / s->n_parameters].name);
   for (PetscInt k = 0; k < s->n_quantities; k++) {
-    HycoCheck(
-        s->quantity[k].given,
-        "the output %s says no field; write output: {%s: {max: mises, group: ...}}, or min, mean, reaction, force "
-        "or moment",
-        s->quantity[k].name, s->quantity[k].name);
+    HycoCheck(s->quantity[k].given,
+              "the output %s has no field; write output: {%s: {max: mises, group: ...}}, or min, mean, reaction, force "
+              "or moment",
+              s->quantity[k].name, s->quantity[k].name);
     PetscCall(CheckContact(s, &s->quantity[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -70,8 +70,8 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
 
     HycoCheck(!PetscIsInfOrNanReal(mu[p]), "%s is not a finite number", scene->parameter[p]);
     HycoCheck(scene->extrapolate || (mu[p] >= scene->lo[p] - slack && mu[p] <= scene->hi[p] + slack),
-              "%s = %.10g lies outside its range [%.10g, %.10g]; -parameter_%s_range LO,HI widens it in a scene, "
-              "-extrapolate goes past it in a model",
+              "%s = %.10g lies outside its range [%.10g, %.10g]; widen the range of a scene by -parameter_%s_range "
+              "LO,HI, or permit it in a model by -extrapolate",
               scene->parameter[p], (double)mu[p], (double)scene->lo[p], (double)scene->hi[p], scene->parameter[p]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -87,7 +87,7 @@ PetscErrorCode HycoSceneSetDM(HycoScene scene, DM dm)
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMPLEX, &is_plex));
-  HycoCheck(is_plex, "HycoSceneSetDM: the DM is no DMPlex");
+  HycoCheck(is_plex, "HycoSceneSetDM: the DM is not a DMPlex");
   PetscCall(PetscObjectReference((PetscObject)dm));
   PetscCall(DMDestroy(&scene->dm));
   scene->dm = dm;

@@ -166,8 +166,9 @@ static PetscErrorCode ReadHeader(HycoSamples s, const char path[], char *line, P
     PetscInt p = 0;
 
     while (p < P && strcmp(word, s->scene->parameter[p])) p++;
-    HycoCheck(p < P && c < P, "%s: the column \"%s\" is no parameter of the scene, or too many", path, word);
-    for (PetscInt b = 0; b < c; b++) HycoCheck(column[b] != p, "%s: the column %s stands twice", path, word);
+    HycoCheck(p < P && c < P, "%s: the column \"%s\" is not a parameter of the scene, or there are too many columns",
+              path, word);
+    for (PetscInt b = 0; b < c; b++) HycoCheck(column[b] != p, "%s: the column %s occurs twice", path, word);
     column[c] = p;
   }
   HycoCheck(c == P, "%s: its first line names %d of the scene's %d parameters", path, (int)c, (int)P);
@@ -197,14 +198,14 @@ static PetscErrorCode ReadLines(HycoSamples s, const char path[], FILE *file)
       mu[column[c]] = HycoNumber(next, &end);
       end += strspn(end, " \t\r\n");
       HycoCheck(end != next && (*end == (c == P - 1 ? '\0' : ',')),
-                "%s, line %d: %d numbers with commas between are expected", path, (int)number, (int)P);
+                "%s, line %d: %d numbers separated by commas are expected", path, (int)number, (int)P);
       next = end + 1;
     }
     PetscCall(HycoSamplesAddPoint(s, mu));
   }
   HycoCheck(s->n > before,
-            "%s holds no point; a header with the parameters' names is expected, then a point per line: numbers with "
-            "commas between",
+            "%s contains no point; a header with the parameters' names is expected, then a point per line (numbers "
+            "separated by commas)",
             path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

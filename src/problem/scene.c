@@ -95,7 +95,7 @@ static PetscErrorCode NewExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
 {
   PetscFunctionBegin;
   HycoCheck(!*expr || strcasecmp(HycoExprKey(*expr), s->key[entry]) == 0,
-            "%s and %s are of the same group; say it once", HycoExprKey(*expr), s->key[entry]);
+            "%s and %s are for the same group; remove one of them", HycoExprKey(*expr), s->key[entry]);
   PetscCall(HycoExprDestroy(expr)); /* the same entry in another letter case */
   PetscCall(HycoSceneExpression(s, s->key[entry], s->value[entry], expr));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -176,7 +176,7 @@ static PetscErrorCode ReadParameters(HycoScene s)
               "scene_parameters: \"%s\" cannot name a parameter; use letters, digits and _, and none of x, y, z, pi",
               name);
     for (PetscInt q = 0; q < p; q++)
-      HycoCheck(strcasecmp(s->parameter[q], name), "scene_parameters: %s stands twice", name);
+      HycoCheck(strcasecmp(s->parameter[q], name), "scene_parameters: %s occurs twice; remove one of them", name);
     PetscCall(ReadRange(s, p));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -522,7 +522,8 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
     if (!SplitKey(key + 10, parameter_fields, name, &field))
       PetscCall(UnknownKey(key, "a parameter", NULL, parameter_fields));
     for (PetscInt p = 0; p < s->n_parameters; p++) known = (PetscBool)(known || strcasecmp(s->parameter[p], name) == 0);
-    HycoCheck(known, "the scene's entry %s is about a parameter that scene: parameters: does not list", key);
+    HycoCheck(known, "the scene's entry %s is for a parameter that scene: parameters: does not list; add it there",
+              key);
   } else if (!HycoOptionFind(key)) {
     const char *near = HycoOptionNearest(key, NULL);
 
@@ -552,9 +553,9 @@ static PetscErrorCode CheckHeat(HycoBody *body)
   for (PetscInt j = 0; j < body->law->constants.n; j++)
     reads = (PetscBool)(reads || HycoExprInHeat(body->law->constants.entry[j].expr));
   HycoCheck(!body->expansion || (body->temperature && body->reference),
-            "body %s has an expansion; it needs its temperature and its reference_temperature too", body->name);
+            "body %s has an expansion; it also needs temperature and reference_temperature", body->name);
   HycoCheck(body->expansion || !body->reference,
-            "body %s has a reference_temperature, but no expansion; give expansion: (1/K)", body->name);
+            "body %s has a reference_temperature but no expansion; give expansion: (1/K)", body->name);
   HycoCheck(!reads || body->temperature, "body %s has no temperature; its law %s needs one (K)", body->name,
             ((PetscObject)body->law)->type_name);
   body->law->temperature = body->temperature;
@@ -575,19 +576,19 @@ static PetscErrorCode CheckSupports(HycoScene s)
     for (PetscInt c = 0; c < 3; c++) {
       if (fixed->direction[c]) given = fixed->direction[c];
       HycoCheck(!HycoExprChanges(fixed->direction[c], every),
-                "%s changes with a parameter; a support keeps its direction", HycoExprKey(fixed->direction[c]));
+                "%s changes with a parameter; the direction of a support must be constant",
+                HycoExprKey(fixed->direction[c]));
     }
     HycoCheck(given || !fixed->normal,
               "%s has no direction; write fixed: %s: {normal: ..., direction: {x: ..., y: ..., z: ...}}",
               HycoExprKey(fixed->normal), fixed->group);
     HycoCheck(fixed->normal || !given,
-              "%s is the direction of no support; write fixed: %s: {normal: 0, direction: ...}", HycoExprKey(given),
+              "%s is a direction without a support; write fixed: %s: {normal: 0, direction: ...}", HycoExprKey(given),
               fixed->group);
-    HycoCheck(
-        !fixed->normal || !s->n_times,
-        "%s: supports along a direction are for scenes without a history; a stiff spring along the normal does for "
-        "a plane",
-        HycoExprKey(fixed->normal));
+    HycoCheck(!fixed->normal || !s->n_times,
+              "%s: supports along a direction are for scenes without a history; for a plane use a stiff spring along "
+              "the normal",
+              HycoExprKey(fixed->normal));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -635,7 +636,9 @@ static PetscErrorCode ReadRefine(HycoScene s)
   times = strtol(text, &end, 10);
   s->refine = *end || times < 0 || times > 12 ? -1 : (PetscInt)times;
   PetscCall(PetscFree(text));
-  HycoCheck(s->refine >= 0, "scene_refine says how many times the mesh's cells are halved: a whole number, 0 to 12");
+  HycoCheck(
+      s->refine >= 0,
+      "scene_refine is the number of times that the mesh's cells are halved; it must be a whole number from 0 to 12");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -654,7 +657,7 @@ static PetscErrorCode ReadFormulation(HycoScene s)
     known = PETSC_TRUE;
   }
   PetscCall(PetscFree(text));
-  HycoCheck(known, "scene_formulation says what a 2D scene stands for: plane_strain, plane_stress or axisymmetric");
+  HycoCheck(known, "scene_formulation must be plane_strain, plane_stress or axisymmetric");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -745,7 +748,7 @@ static PetscErrorCode FillFromEntries(HycoScene s, PetscInt n, char *const key[]
   for (PetscInt k = 0; k < n; k++) {
     char dashed[HYCO_LINE];
 
-    HycoCheck(HycoIsSceneKey(key[k]) && strlen(key[k]) < 256, "\"%.64s\" is no entry of a scene", key[k]);
+    HycoCheck(HycoIsSceneKey(key[k]) && strlen(key[k]) < 256, "\"%.64s\" is not an entry of a scene", key[k]);
     PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", key[k]));
     PetscCall(PetscOptionsSetValue(s->options, dashed, value[k]));
   }

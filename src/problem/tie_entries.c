@@ -39,11 +39,8 @@ PetscErrorCode HycoSceneCheckTies(HycoScene s)
 
     HycoCheck(tie->slave && tie->master, "tie %s has no %s; write tie: %s: {slave: GROUP, master: GROUP}", tie->name,
               tie->slave ? "master" : "slave", tie->name);
-    HycoCheck(strcmp(tie->slave, tie->master), "tie %s: its slave and its master are one group, %s", tie->name,
-              tie->slave);
-    HycoCheck(!s->n_times,
-              "tie %s: ties are for scenes without a history; let both bodies share the surface's nodes in the mesh",
-              tie->name);
+    HycoCheck(strcmp(tie->slave, tie->master),
+              "tie %s: its slave and its master are the same group, %s; give two groups", tie->name, tie->slave);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -162,7 +162,8 @@ static PetscErrorCode March(HycoROM m, HycoBalance b, HycoReplay *replay)
     HycoTraceWholeU(m, k, m->U_whole);
     PetscCall(HycoReplayTry(replay, k, m->U_whole, &report));
     if (report.failed)
-      HycoFormat(b->why, "the laws have no answer on the whole mesh at t = %.10g: %s", (double)trace->t[k], report.why);
+      HycoFormat(b->why, "the laws cannot be integrated on the whole mesh at t = %.10g: %s", (double)trace->t[k],
+                 report.why);
     if (report.failed) PetscFunctionReturn(PETSC_SUCCESS);
     if (trace->at[j] == k) PetscCall(MeasureTime(m, b, replay, j++));
   }

@@ -203,10 +203,10 @@ PetscErrorCode HycoTrustView(HycoROM m, PetscViewer viewer)
                                      median, largest));
   }
   if (t->n)
-    PetscCall(
-        PetscViewerASCIIPrintf(viewer, "  estimates its errors, by %d predictions of held-out solutions\n", (int)t->n));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  error estimates: calibrated on %d predictions of held-out solutions\n",
+                                     (int)t->n));
   else if (!m->ops->estimate)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  does not estimate its errors: not calibrated\n"));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  error estimates: none, not calibrated\n"));
   if (m->search) PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->search));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

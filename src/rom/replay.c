@@ -39,7 +39,7 @@ PetscErrorCode HycoReplayStep(HycoReplay *r, PetscInt k, const PetscReal u[])
 
   PetscFunctionBegin;
   PetscCall(HycoReplayTry(r, k, u, &report));
-  HycoCheck(!report.failed, "the laws have no answer to the predicted displacements at t = %.10g: %s",
+  HycoCheck(!report.failed, "the laws cannot be integrated along the predicted displacements at t = %.10g: %s",
             (double)r->m->trace.t[k], report.why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

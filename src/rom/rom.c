@@ -22,22 +22,22 @@ PetscErrorCode HycoROMSetFromOptions(HycoROM m)
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscObjectOptionsBegin((PetscObject)m);
   PetscCall(HycoOptionsFor("predict"));
-  PetscCall(
-      HycoOptionsBool("-hyco_fallback",
-                      "predict solves full order on -scene where the reduced solve fails or its estimated error is "
-                      "above a -target_...",
-                      &m->full_order, NULL));
+  PetscCall(HycoOptionsBool(
+      "-hyco_fallback",
+      "predict solves full order on -scene if the reduced solve fails or an estimated error is above its -target_...",
+      &m->full_order, NULL));
   PetscCall(HycoOptionsBool("-hyco_full_displacement",
-                            "predict, condensed: displacements and stresses by one full solve on -scene with the "
-                            "predicted forces",
+                            "predict, condensed: compute displacements and stresses by one full-order solve on -scene "
+                            "with the predicted forces",
                             &m->full_displacement, NULL));
-  PetscCall(HycoOptionsBool("-hyco_residual",
-                            "predict, paths: how far from equilibrium on the whole mesh, by the laws replayed there",
-                            &m->wants_equilibrium, NULL));
+  PetscCall(
+      HycoOptionsBool("-hyco_residual",
+                      "predict, paths: compute the residual of equilibrium on the whole mesh, by a replay of the laws",
+                      &m->wants_equilibrium, NULL));
   PetscCall(HycoOptionsFor(""));
   PetscCall(HycoOptionsBool("-hyco_reconstruct", "reconstruct the contact forces outside the RID by (41)",
                             &m->reconstruct, NULL));
-  PetscCall(HycoOptionsName("-hyco_rom_view", "what is in a model, when it is loaded"));
+  PetscCall(HycoOptionsName("-hyco_rom_view", "describe a model when it is loaded"));
   PetscOptionsEnd();
   PetscTryTypeMethod(m, options);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -158,10 +158,9 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
   PetscCall(HycoSceneCompareHistory(m->scene, scene, m->path));
-  HycoCheck(
-      strcmp(text, m->fingerprint) == 0,
-      "%s was trained on another scene or mesh; give the scene, the mesh and the entries that it was trained with",
-      m->path);
+  HycoCheck(strcmp(text, m->fingerprint) == 0,
+            "%s was trained on another scene or mesh; give the scene, the mesh and the entries of its training",
+            m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -186,7 +185,7 @@ static PetscErrorCode CheckSolved(HycoROM m)
 {
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before asking for its results");
+  PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before getting its results");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -457,9 +456,9 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
                                    (int)m->n_points, (double)m->numbers[1],
                                    m->traits.settings == HYCO_SETTINGS_RID ? "RID " : "", (double)m->numbers[2]));
   if (m->scene->n_times)
-    PetscCall(PetscViewerASCIIPrintf(
-        viewer, "  of paths: %d listed times from t = %g to %g%s\n", (int)m->scene->n_times, (double)m->scene->times[0],
-        (double)m->scene->times[m->scene->n_times - 1], m->traits.stiffness ? ", solved step by step" : ""));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  paths: %d listed times from t = %g to %g%s\n", (int)m->scene->n_times,
+                                     (double)m->scene->times[0], (double)m->scene->times[m->scene->n_times - 1],
+                                     m->traits.stiffness ? ", solved step by step" : ""));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
                                    (int)pod, pod ? (double)m->sigma[0] : 0., pod ? (double)m->sigma[pod - 1] : 0.));
   PetscTryTypeMethod(m, view, viewer);

@@ -417,7 +417,7 @@ static PetscErrorCode OpenWhole(HycoROM m)
 
   PetscFunctionBegin;
   if (m->whole) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(m->path[0], PETSC_COMM_SELF, PETSC_ERR_PLIB, "a model under training has no whole mesh");
+  PetscCheck(m->path[0], PETSC_COMM_SELF, PETSC_ERR_PLIB, "a model in training has no whole mesh");
   PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
   ierr = LoadWholeMesh(h, m);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
@@ -468,19 +468,19 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
   PetscInt one = 1, *format, version, same;
 
   PetscFunctionBegin;
-  HycoCheck(HycoH5Has(h, "kind"), "%s is no hyco model (fields, or a solution?); give the file that hyco train wrote",
-            path);
+  HycoCheck(HycoH5Has(h, "kind"),
+            "%s is not a hyco model (it may contain fields or a solution); give the file that hyco train wrote", path);
   PetscCall(HycoH5LoadText(h, "kind", &kind));
   same = strcmp(kind, HYCO_ROM_KIND) == 0;
   PetscCall(PetscFree(kind));
-  HycoCheck(same, "%s is no hyco model", path);
+  HycoCheck(same, "%s is not a hyco model", path);
   PetscCall(HycoH5LoadInt(h, "format", 0, PETSC_MAX_INT, &one, &one, &format));
   version = *format;
   PetscCall(PetscFree(format));
-  HycoCheck(
-      version >= HYCO_ROM_OLDEST && version <= HYCO_ROM_FORMAT,
-      "%s has model format %d; this hyco (%s) reads formats %d to %d: train it again, or use the hyco that wrote it",
-      path, (int)version, HycoVersion(), HYCO_ROM_OLDEST, HYCO_ROM_FORMAT);
+  HycoCheck(version >= HYCO_ROM_OLDEST && version <= HYCO_ROM_FORMAT,
+            "%s has model format %d, and this hyco (%s) reads formats %d to %d; train it again, or use the version "
+            "that wrote it",
+            path, (int)version, HycoVersion(), HYCO_ROM_OLDEST, HYCO_ROM_FORMAT);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -131,7 +131,7 @@ PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
   PetscFunctionBegin;
   PetscCall(CheckPath(m, "HycoROMSetStep()"));
   PetscCheck(k >= 0 && k < r->n_listed, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
-             "HycoROMSetStep: %d is no listed time that the path reached; there are %d", (int)k, (int)r->n_listed);
+             "HycoROMSetStep: %d is not a listed time that the path reached; there are %d", (int)k, (int)r->n_listed);
   at = r->at[k];
   HycoSceneSetTime(m->scene, m->fe->mu, r->t[at], mu);
   if (m->fe->mesh == m->mesh)
@@ -152,7 +152,7 @@ PetscErrorCode HycoROMSetSteps(HycoROM m, PetscInt n, const PetscReal t[])
 {
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  HycoCheck(m->scene->n_times, "HycoROMSetSteps: the model's scene has no history, and its solution no steps");
+  HycoCheck(m->scene->n_times, "HycoROMSetSteps: the model's scene has no history, and its solution has no steps");
   m->trace.n_given = t ? n : 0;
   m->trace.given = t;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -162,7 +162,8 @@ PetscErrorCode HycoROMGetInelastic(HycoROM m, PetscInt *n_cells, const PetscReal
 {
   PetscFunctionBegin;
   PetscCall(CheckPath(m, "HycoROMGetInelastic()"));
-  HycoCheck(m->scene->n_times, "HycoROMGetInelastic: the model's scene has no history, and its bodies do not flow");
+  HycoCheck(m->scene->n_times,
+            "HycoROMGetInelastic: the model's scene has no history, and its bodies have no inelastic strain");
   if (n_cells) *n_cells = m->mesh->n_cells;
   *inelastic = m->trace.inelastic + (size_t)m->trace.shown * (size_t)m->mesh->n_cells;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -40,9 +40,7 @@ PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCall(HycoRegistryFind(&types, type, &create));
-  HycoCheck(create,
-            "%s%sthere is no type of reduced model \"%s\" here; a program that has its own registers it by "
-            "HycoROMRegister()",
+  HycoCheck(create, "%s%sthe type of reduced model \"%s\" is unknown; a program can add a type by HycoROMRegister()",
             m->path, m->path[0] ? ": problem/type is damaged, or another program's: " : "", type);
   PetscCheck(!m->data, PETSC_COMM_SELF, PETSC_ERR_ORDER, "HycoROMSetType: the model has a type");
   PetscCall(create(m));

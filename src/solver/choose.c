@@ -77,8 +77,8 @@ static PetscErrorCode TakeIterative(HycoSolver s, HycoSolverForm *form)
   if (other) *form = other;
   PetscCheck(other || s->linear != HYCO_LINEAR_ITERATIVE || !asked[0] || strcmp(asked, "primal") == 0, HycoComm(s),
              PETSC_ERR_USER,
-             "-hyco_linear iterative solves the primal form or the projected one; take away -hyco_solver_form, or say "
-             "primal or projected");
+             "-hyco_linear iterative works with the forms primal and projected only; remove -hyco_solver_form, or set "
+             "one of these");
   PetscCheck(other || s->linear != HYCO_LINEAR_ITERATIVE, HycoComm(s), PETSC_ERR_USER,
              "-hyco_linear iterative needs a symmetric system, the types active_set or tao, and for each contact an "
              "unknown of its own; use -hyco_linear direct");
@@ -99,8 +99,9 @@ static PetscErrorCode DecideByMemory(HycoSolver s, HycoSolverForm *form)
   PetscCall(Limit(s, &limit));
   if (bytes > limit) PetscCall(TakeIterative(s, form));
   if (s->iterative)
-    PetscCall(PetscSNPrintf(s->why_iterative, sizeof(s->why_iterative), " (a factor would take %.3g GB of %.3g GB)",
-                            (double)(1e-9 * bytes), (double)(1e-9 * limit)));
+    PetscCall(PetscSNPrintf(s->why_iterative, sizeof(s->why_iterative),
+                            " (a factor would need %.3g GB, and %.3g GB are available)", (double)(1e-9 * bytes),
+                            (double)(1e-9 * limit)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -95,7 +95,7 @@ PetscErrorCode HycoSolverSetLinear(HycoSolver s, HycoLinear linear, PetscReal gi
 {
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  HycoCheck(gigabytes >= 0, "the memory is %g GB; it must be 0 (what is free) or more", (double)gigabytes);
+  HycoCheck(gigabytes >= 0, "the memory is %g GB; it must be 0 (the free memory) or more", (double)gigabytes);
   s->linear = linear;
   s->memory = 1e9 * gigabytes;
   s->chosen_for = 0;
@@ -136,8 +136,8 @@ static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
     if (strcmp(s->form_name, s->forms[k]->name) == 0) form = k + 1;
   }
   ierr = HycoOptionsWord("-hyco_solver_form",
-                         "full order: pose it in the forces (few contacts; _free: no matrix) or in the gaps (as many "
-                         "as unknowns)",
+                         "full order: unknowns of the problem: forces (dual, for few contacts; dual_free without a "
+                         "matrix) or gaps (primal, for as many contacts as unknowns)",
                          words, &form, NULL);
   if (!ierr) ierr = PetscStrncpy(s->form_name, form ? words[form] : "", sizeof(s->form_name));
   PetscCall(PetscFree(words));
@@ -153,12 +153,12 @@ static PetscErrorCode ReadTaoType(HycoSolver s, HycoOptionItems PetscOptionsObje
 
   PetscFunctionBegin;
   PetscCall(HycoOptionsString("-hyco_tao_type",
-                              "<gpcg|tron|...|ssils|...> with the type tao: its solver; docs/solvers.md says which for "
-                              "what (-hyco_tao_... sets its own options) [gpcg; ssils if nonsymmetric]",
+                              "<gpcg|tron|...|ssils|...> solver of the type tao, see docs/solvers.md (-hyco_tao_... "
+                              "sets its own options) [gpcg; ssils if nonsymmetric]",
                               type, sizeof(type), &given));
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!methods[s->type][0],
-            "nothing reads the option -hyco_tao_type here: the type is %s; give -hyco_solver_type tao",
+            "-hyco_tao_type has no effect here, because the solver type is %s; give -hyco_solver_type tao",
             HycoSolverTypes[s->type]);
   PetscCall(HycoTaoFindType(type, s->tao_type, list));
   HycoCheck(s->tao_type[0], "-hyco_tao_type is \"%s\"; it must be one of: %s, or one that the program registers", type,
@@ -181,30 +181,31 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
   PetscObjectOptionsBegin((PetscObject)s);
   PetscCall(
       HycoOptionsWord("-hyco_solver_type",
-                      "method for every contact problem (a model's takes active_set where a TAO type needs symmetry)",
+                      "method for every contact problem (for a model active_set is used if a TAO type needs symmetry)",
                       HycoSolverTypes, &s->type, NULL));
   PetscCall(ReadTaoType(s, PetscOptionsObject));
   PetscCall(ReadForm(s, PetscOptionsObject));
   PetscCall(HycoOptionsWord("-hyco_linear",
                             "solve with the stiffness by a factor (MUMPS), or by conjugate gradients with multigrid",
                             HycoLinearNames, &linear, NULL));
-  PetscCall(HycoOptionsReal("-hyco_memory",
-                            "<GB> what a factor may take before iterations do (0: most of what is free)", 0, 1e9,
-                            &gigabytes, NULL));
+  PetscCall(HycoOptionsReal(
+      "-hyco_memory", "<GB> memory of a factor above which the iterative solver is used (0: most of the free memory)",
+      0, 1e9, &gigabytes, NULL));
   PetscCall(HycoOptionsReal("-hyco_solver_rtol", "largest relative KKT residual that counts as solved", 1e-15, 0.1,
                             &s->rtol, NULL));
-  PetscCall(HycoOptionsInt("-hyco_solver_max_its",
-                           "iterations of the active set or TAO (0: from the number of contacts; 2000)", 0,
-                           PETSC_MAX_INT, &s->max_its, NULL));
+  PetscCall(
+      HycoOptionsInt("-hyco_solver_max_its",
+                     "largest number of iterations (0: of the active set from the number of contacts; of TAO 2000)", 0,
+                     PETSC_MAX_INT, &s->max_its, NULL));
   PetscCall(HycoOptionsBool("-hyco_solver_fallback",
-                            "what is not solved is tried again: tao, then active_set, then lemke", &s->fallback, NULL));
+                            "if a method fails, try the next: tao, then active_set, then lemke", &s->fallback, NULL));
   PetscCall(HycoOptionsBool("-hyco_solver_warm_start", "full order: start from the last solution's active contacts",
                             &s->warm, NULL));
   for (PetscInt k = 0; k < s->n_forms; k++) {
     if (s->forms[k]->ops->setfromoptions)
       PetscCall(s->forms[k]->ops->setfromoptions(s, s->forms[k], PetscOptionsObject));
   }
-  PetscCall(HycoOptionsName("-hyco_solver_view", "after each solve: form, method, tolerances, residuals"));
+  PetscCall(HycoOptionsName("-hyco_solver_view", "print form, method, tolerances and residuals after each solve"));
   PetscOptionsEnd();
   s->linear = (HycoLinear)linear;
   s->memory = 1e9 * gigabytes;
@@ -302,13 +303,14 @@ static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
 
   PetscFunctionBegin;
   HycoCheck(s->system->symmetric || !s->system->m || !(s->now.traits & HYCO_TAO_SYMMETRIC),
-            "TAO's %s needs a symmetric system and this one is not; use -hyco_tao_type ssils, asils, ssfls or asfls",
+            "TAO's %s needs a symmetric system, and this one is not symmetric; use -hyco_tao_type ssils, asils, ssfls "
+            "or asfls",
             s->now.type);
   s->iterative = PETSC_FALSE;
   PetscCall(HycoSolverAcceptingForm(s, NULL, form, why));
   s->iterative = iterative;
   if (!*form && !why[0])
-    HycoFormat(why, "the form %s does not serve this system; use -hyco_solver_form auto", s->form_name);
+    HycoFormat(why, "the form %s cannot solve this system; use -hyco_solver_form auto", s->form_name);
   PetscCheck(*form, HycoComm(s), PETSC_ERR_USER, "%s", why);
   PetscCall(HycoChooseLinear(s, form));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -470,16 +472,15 @@ const char *HycoReasonName(HycoReason reason)
   case HYCO_DIVERGED_RESIDUAL:
     return "not converged: a KKT residual is above the tolerance";
   case HYCO_DIVERGED_FLOATING:
-    return "not converged: contact alone holds a body, and this load takes it away";
+    return "not converged: a body is held by contact only, and this load lifts it off";
   case HYCO_DIVERGED_NO_CONTACT_BASIS:
-    return "not converged: the model has no contact force to give, and bodies penetrate here; train on solutions that "
-           "press";
+    return "not converged: the model has no contact forces, and bodies penetrate here; train on solutions with contact";
   case HYCO_DIVERGED_STEP:
-    return "not converged: the history goes no further, its steps have become too small";
+    return "not converged: the history cannot continue, because its steps became too small";
   case HYCO_DIVERGED_ITERATIONS:
-    return "not converged: the limit of iterations, or a cycle";
+    return "not converged: limit of iterations reached, or a cycle";
   default:
-    return "not converged: the stiffness is singular (is a body held by nothing?)";
+    return "not converged: the stiffness is singular; check that supports hold every body";
   }
 }
 

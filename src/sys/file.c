@@ -150,11 +150,11 @@ PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFi
   if (stat(path, &info) != 0) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!S_ISDIR(info.st_mode), "%s%s%s%s is a folder; give the name of a file", dash, option, blank, path);
   HycoCheck(S_ISREG(info.st_mode) || S_ISCHR(info.st_mode) || S_ISFIFO(info.st_mode),
-            "%s%s%s%s is no file, and nothing is written into it; give the name of a file", dash, option, blank, path);
+            "%s%s%s%s is not a regular file and cannot be written; give the name of a file", dash, option, blank, path);
   HycoFileFollow(path, place);
   *direct = (PetscBool)(!S_ISREG(info.st_mode) || strncmp(place, "/proc/", 6) == 0);
   HycoCheck(!*direct || kind == HYCO_FILE_TEXT,
-            "%s%s%s%s is a device or a pipe, and HDF5 writes files; give the name of a file", dash, option, blank,
+            "%s%s%s%s is a device or a pipe, and HDF5 needs a file; give the name of a file", dash, option, blank,
             path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -162,7 +162,7 @@ PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFi
 static PetscErrorCode CheckOpen(const char path[], PetscBool good)
 {
   PetscFunctionBegin;
-  HycoCheck(good, "%s cannot be written (%s): is there such a folder, may you write there, is there room?", path,
+  HycoCheck(good, "%s cannot be written (%s); check that the folder exists, is writable and has free space", path,
             strerror(errno));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -240,7 +240,7 @@ PetscErrorCode HycoFilePut(int fd, const char path[], const void *data, size_t b
 PetscErrorCode HycoFileComplain(const char shown[], int failed)
 {
   PetscFunctionBegin;
-  HycoCheck(!failed, "%s could not be written to its end (%s): is the disk full?", shown, strerror(failed));
+  HycoCheck(!failed, "%s could not be written completely (%s); check the free space", shown, strerror(failed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -94,7 +94,7 @@ PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file)
   access = InMemory();
   f->id = H5Fcreate(f->path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
   H5Pclose(access);
-  PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 does not make a file in memory");
+  PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 cannot create a file in memory");
   *file = f;
   PetscCall(HycoH5WriteInt(f, HYCO_H5_SEALED, 1, 1, &yes));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -139,7 +139,7 @@ static PetscErrorCode BeginShared(HycoH5 f)
   access = Access();
   f->id = H5Fcreate(f->scratch, H5F_ACC_TRUNC, H5P_DEFAULT, access);
   H5Pclose(access);
-  PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 does not make the file %s", f->scratch);
+  PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 cannot create the file %s", f->scratch);
   PetscCall(HycoH5WriteInt(f, HYCO_H5_SEALED, 1, 1, &yes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -149,7 +149,8 @@ static PetscErrorCode JoinShared(HycoH5 f)
 {
   PetscFunctionBegin;
   if (f->fd < 0) f->fd = open(f->scratch, O_WRONLY);
-  HycoCheck(f->fd >= 0, "%s cannot be written (%s): do all ranks see that folder?", f->path, strerror(errno));
+  HycoCheck(f->fd >= 0, "%s cannot be written (%s); check that all ranks have access to its folder", f->path,
+            strerror(errno));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -198,7 +199,7 @@ PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, Hyco
   H5Pset_file_image(access, image, size);
   f->id = H5Fopen(f->path, H5F_ACC_RDONLY, access);
   H5Pclose(access);
-  PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 does not open a file in memory");
+  PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 cannot open a file in memory");
   *file = f;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -221,7 +222,7 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
   H5Pclose(access);
   if (f->id < 0) {
     PetscCall(Free(&f));
-    HycoFail("%s is no HDF5 file, or it is damaged", path);
+    HycoFail("%s is not an HDF5 file, or it is damaged", path);
   }
   if (!sealed && HycoH5Has(f, HYCO_H5_SEALED)) {
     PetscCall(HycoH5Close(&f, PETSC_FALSE));
@@ -407,9 +408,9 @@ static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscIn
   H5Pclose(made);
   H5Pclose(links);
   H5Sclose(space);
-  HycoCheck(*set >= 0, "%s: writing %s failed: is there memory?", f->path, name);
-  HycoCheck(!f->shared || H5Fflush(f->id, H5F_SCOPE_GLOBAL) >= 0, "%s: writing %s failed: is the disk full?", f->path,
-            name);
+  HycoCheck(*set >= 0, "%s: writing %s failed; check the free memory", f->path, name);
+  HycoCheck(!f->shared || H5Fflush(f->id, H5F_SCOPE_GLOBAL) >= 0, "%s: writing %s failed; check the free disk space",
+            f->path, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -451,7 +452,7 @@ static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt ro
   PetscCall(FindSet(f, name, type, rows, cols, &set, &place));
   if (!f->shared && n && cols) failed = PutRows(set, type, cols, first, n, data);
   H5Dclose(set);
-  HycoCheck(failed >= 0, "%s: writing %s failed: is there memory?", f->path, name);
+  HycoCheck(failed >= 0, "%s: writing %s failed; check the free memory", f->path, name);
   if (f->shared) PetscCall(HycoFilePut(f->fd, f->path, data, (size_t)n * width, (size_t)place + (size_t)first * width));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -525,7 +526,7 @@ static PetscErrorCode WriteAttribute(HycoH5 f, const char at[], const char name[
     failed = made < 0 ? -1 : H5Awrite(made, type, value);
     if (made >= 0) H5Aclose(made);
   }
-  HycoCheck(failed >= 0, "%s: writing the attribute %s of %s failed: is there memory?", f->path, name, at);
+  HycoCheck(failed >= 0, "%s: writing the attribute %s of %s failed; check the free memory", f->path, name, at);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -579,7 +580,7 @@ static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, h
 
   PetscFunctionBegin;
   *set = H5Dopen2(f->id, name, f->access);
-  HycoCheck(*set >= 0, "%s holds no %s: it was not written by this version of hyco, or is damaged", f->path, name);
+  HycoCheck(*set >= 0, "%s has no %s: it was not written by this version of hyco, or it is damaged", f->path, name);
   space = H5Dget_space(*set);
   type = H5Dget_type(*set);
   rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
@@ -592,7 +593,7 @@ static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, h
       (dims[1] && dims[0] > most / dims[1]) ||
       H5Dget_storage_size(*set) < dims[0] * dims[1] * (wanted == H5T_FLOAT ? 8 : 1)) {
     H5Dclose(*set);
-    HycoFail("%s: %s is damaged (its shape or type is not what hyco writes)", f->path, name);
+    HycoFail("%s: %s is damaged (its shape or type differs from what hyco writes)", f->path, name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -615,7 +616,7 @@ static PetscErrorCode CheckSize(HycoH5 f, const char name[], const hsize_t dims[
   PetscCall(PetscSNPrintf(wanted[0], sizeof(wanted[0]), rows < 0 ? "n" : "%" PetscInt_FMT, rows));
   PetscCall(PetscSNPrintf(wanted[1], sizeof(wanted[1]), cols < 0 ? "n" : "%" PetscInt_FMT, cols));
   HycoCheck((rows < 0 || dims[0] == (hsize_t)rows) && (cols < 0 || dims[1] == (hsize_t)cols),
-            "%s: %s is %ld x %ld where %s x %s was expected: the file is damaged", f->path, name, (long)dims[0],
+            "%s: %s is %ld x %ld, and %s x %s was expected: the file is damaged", f->path, name, (long)dims[0],
             (long)dims[1], wanted[0], wanted[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -642,7 +643,7 @@ static PetscErrorCode CheckFinite(HycoH5 f, const char name[], size_t n, const P
 {
   PetscFunctionBegin;
   for (size_t k = 0; k < n; k++)
-    HycoCheck(!PetscIsInfOrNanReal(data[k]), "%s: %s holds a value that is not finite: the file is damaged", f->path,
+    HycoCheck(!PetscIsInfOrNanReal(data[k]), "%s: %s contains a value that is not finite: the file is damaged", f->path,
               name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -702,7 +703,8 @@ PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscI
 
     if (value >= lo && value <= hi) continue;
     PetscCall(PetscFree(*data));
-    HycoFail("%s: %s holds %d, outside %d to %d: the file is damaged", file->path, name, (int)value, (int)lo, (int)hi);
+    HycoFail("%s: %s contains %d, outside %d to %d: the file is damaged", file->path, name, (int)value, (int)lo,
+             (int)hi);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -717,7 +719,7 @@ PetscErrorCode HycoH5ReadRows(HycoH5 file, const char name[], PetscInt start, Pe
   if (n == 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(OpenSet(file, name, H5T_FLOAT, &set, dims));
   PetscCall(CheckSize(file, name, dims, -1, cols));
-  HycoCheck((hsize_t)(start + n) <= dims[0], "%s: %s has %ld rows, %d are needed: the file is damaged", file->path,
+  HycoCheck((hsize_t)(start + n) <= dims[0], "%s: %s has %ld rows, and %d are needed: the file is damaged", file->path,
             name, (long)dims[0], (int)(start + n));
   space = H5Dget_space(set);
   H5Sselect_hyperslab(space, H5S_SELECT_SET, offset, NULL, count, NULL);

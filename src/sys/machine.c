@@ -39,8 +39,7 @@ PetscErrorCode HycoReserveBLAS(void)
   PetscFunctionBegin;
   if (done) PetscFunctionReturn(PETSC_SUCCESS);
   probe = malloc(BLAS_BUFFER);
-  HycoCheck(probe,
-            "there is no memory: BLAS takes %d MB of address space, and that is not left; raise the limit (ulimit -v)",
+  HycoCheck(probe, "not enough memory: BLAS needs %d MB of address space; raise the limit (ulimit -v)",
             (int)(BLAS_BUFFER >> 20));
   free(probe);
   LAPACKgetrf_(&two, &two, a, &two, pivot, &info);

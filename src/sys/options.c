@@ -14,8 +14,7 @@
 static const struct {
   const char *before, *now;
 } renamed[] = {
-    {"hyco_trust_folds",
-     "-hyco_validation, the number of held-out points that the estimates of errors are calibrated on"},
+    {"hyco_trust_folds", "-hyco_validation, the number of held-out points on which the error estimates are calibrated"},
 };
 
 static HycoOptionList table;      /* the library's, once recorded */
@@ -99,7 +98,8 @@ PetscErrorCode HycoOptionsCheckName(const char name[])
 {
   PetscFunctionBegin;
   for (size_t k = 0; k < sizeof(renamed) / sizeof(renamed[0]); k++)
-    HycoCheck(strcasecmp(name, renamed[k].before), "there is no option -%s: it is now %s", name, renamed[k].now);
+    HycoCheck(strcasecmp(name, renamed[k].before), "the option -%s no longer exists; it is now %s", name,
+              renamed[k].now);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -61,10 +61,10 @@ PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, 
 
   PetscFunctionBegin;
   while (classes[k].id != classid) k++;
-  PetscCheck(handle, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL, "%s: the handle is NULL; make it by %s first", function,
+  PetscCheck(handle, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL, "%s: the handle is NULL; create it by %s first", function,
              classes[k].maker);
   PetscCheck(*classid && ((const struct _p_PetscObject *)handle)->classid == *classid, PETSC_COMM_SELF,
-             PETSC_ERR_ARG_WRONG, "%s: the handle is no %s, or was destroyed; make it by %s first", function,
+             PETSC_ERR_ARG_WRONG, "%s: the handle is not a %s, or it was destroyed; create it by %s first", function,
              classes[k].name, classes[k].maker);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -74,7 +74,7 @@ static PetscErrorCode Open(const char path[], FILE **file, size_t *size)
   HycoCheck(*file, "%s cannot be opened: no such file, or not readable", path);
   if (fstat(fileno(*file), &info) != 0 || !S_ISREG(info.st_mode)) {
     fclose(*file);
-    HycoFail("%s is no file; one that hyco has written is expected: a model of hyco train ends in .h5", path);
+    HycoFail("%s is not a file; give a file that hyco has written, for example a model (.h5) of hyco train", path);
   }
   *size = (size_t)info.st_size;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -105,6 +105,6 @@ PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed)
   if (*sealed) sum = SumFile(file, *size - HYCO_SEAL);
   fclose(file);
   if (*sealed && (LoadWord(seal + 8) != *size - HYCO_SEAL || LoadWord(seal + 16) != sum))
-    HycoFail("%s is damaged: its bytes are not those that were written (checksum)", path);
+    HycoFail("%s is damaged: its checksum does not match", path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -74,7 +74,7 @@ class Bases(Extreme):
         for name, more in (('projection', PROJECTION), ('hybrid, no contact in the RID', AWAY)):
             self.train(scene, *train, *more)
             self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,0.12')
-            self.refused(f'no force in any solution, contact tested, {name}', *touches, says='has no contact force to give')
+            self.refused(f'no force in any solution, contact tested, {name}', *touches, says='has no contact forces, and bodies')
             self.refused(f'the same, {name}, compared', 'compare', '-scene', scene, '-model', 'm.h5',
                          *points((0.05,), (0.02, 0.12)), says='1 of the 2 predictions did not converge')
             p = self.hyco(*touches, '-hyco_fallback', '-scene', scene)

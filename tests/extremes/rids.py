@@ -14,7 +14,7 @@ class Rids(Extreme):
         scene = self.scene(*blocks(crown=0.1, n=(8, 8)))
         one = (*TRAIN, '-hyco_pod_max_modes', 1, '-hyco_rid_modes', 'displacement')
         self.refused('one DEIM point, no contact in the RID', 'train', '-scene', scene, '-model', 'm.h5', *one,
-                     says='the RID has no contact, and the training solutions press')
+                     says='the RID has no contact, and the training solutions have contact forces')
         t = self.train(scene, *one, '-hyco_reconstruct', 'false')
         c = self.compare(scene, *SEEN)
         self.assertEqual((t['n_modes'], t['rid_contacts']), (1, 0))

@@ -25,8 +25,8 @@ TABLES = {
 }
 HEAD = '''# Numerical extremes: every case
 
-Written by `tests/extremes/table.py --write-doc` after `ctest -L extremes`. *found* within *bound*, or *refused* in one line with an exit status that is
-not 0. What follows from them is in [limits.md](../limits.md).
+Written by `tests/extremes/table.py --write-doc` after `ctest -L extremes`. A case gives a value *found* within its *bound*, or is *refused*: one line and an exit
+status that is not 0. [limits.md](../limits.md) has the conclusions.
 
 '''
 

@@ -40,22 +40,22 @@ static PetscErrorCode TestDestroyed(void)
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));
-  CHECK_FAILS(HycoSceneGetTitle(scene, &title), "make it by HycoSceneLoad()");
-  CHECK_FAILS(HycoSceneView(scene, PETSC_VIEWER_STDOUT_SELF), "make it by HycoSceneLoad()");
-  CHECK_FAILS(HycoSamplesAddGrid(samples, counts, PETSC_FALSE), "make it by HycoSamplesCreate()");
-  CHECK_FAILS(HycoSamplesAddPoint(samples, inside), "make it by HycoSamplesCreate()");
-  CHECK_FAILS(HycoSamplesAddFile(samples, "p.csv"), "make it by HycoSamplesCreate()");
-  CHECK_FAILS(HycoFOMGetSolver(fom, &solver), "make it by HycoFOMCreate()");
-  CHECK_FAILS(HycoFOMGetSystem(fom, &system), "make it by HycoFOMCreate()");
-  CHECK_FAILS(HycoFOMWrite(fom, "x.xdmf"), "make it by HycoFOMCreate()");
-  CHECK_FAILS(HycoFOMGetSolution(fom, NULL, NULL, NULL, NULL, NULL, NULL), "make it by HycoFOMCreate()");
-  CHECK_FAILS(HycoROMGetScene(model, &scene), "make it by HycoROMLoad()");
-  CHECK_FAILS(HycoROMSetReconstruct(model, PETSC_TRUE), "make it by HycoROMLoad()");
-  CHECK_FAILS(HycoROMGetLambda(model, NULL, NULL, NULL, NULL), "make it by HycoROMLoad()");
-  CHECK_FAILS(HycoROMGetWholeU(model, NULL, NULL), "make it by HycoROMLoad()");
-  CHECK_FAILS(HycoROMWrite(model, "x.xdmf"), "make it by HycoROMLoad()");
-  CHECK_FAILS(HycoROMView(model, PETSC_VIEWER_STDOUT_SELF), "make it by HycoROMLoad()");
-  CHECK_FAILS(HycoROMCompare(model, fom, &errors), "make it by HycoFOMCreate()");
+  CHECK_FAILS(HycoSceneGetTitle(scene, &title), "create it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSceneView(scene, PETSC_VIEWER_STDOUT_SELF), "create it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSamplesAddGrid(samples, counts, PETSC_FALSE), "create it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoSamplesAddPoint(samples, inside), "create it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoSamplesAddFile(samples, "p.csv"), "create it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoFOMGetSolver(fom, &solver), "create it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMGetSystem(fom, &system), "create it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMWrite(fom, "x.xdmf"), "create it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMGetSolution(fom, NULL, NULL, NULL, NULL, NULL, NULL), "create it by HycoFOMCreate()");
+  CHECK_FAILS(HycoROMGetScene(model, &scene), "create it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMSetReconstruct(model, PETSC_TRUE), "create it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMGetLambda(model, NULL, NULL, NULL, NULL), "create it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMGetWholeU(model, NULL, NULL), "create it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMWrite(model, "x.xdmf"), "create it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMView(model, PETSC_VIEWER_STDOUT_SELF), "create it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMCompare(model, fom, &errors), "create it by HycoFOMCreate()");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -81,10 +81,10 @@ static PetscErrorCode TestReferences(void)
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoROMLoad(hybrid, &model));
-  CHECK_FAILS(HycoROMPredict((HycoROM)fom, 2, inside), "no HycoROM");
-  CHECK_FAILS(HycoROMPredict((HycoROM)fom, 2, inside), "make it by HycoROMLoad()");
-  CHECK_FAILS(HycoROMPredict((HycoROM)none, 2, inside), "make it by HycoROMLoad()");
-  CHECK_FAILS(HycoROMCheckScene(model, (HycoScene)samples), "make it by HycoSceneLoad()");
+  CHECK_FAILS(HycoROMPredict((HycoROM)fom, 2, inside), "not a HycoROM");
+  CHECK_FAILS(HycoROMPredict((HycoROM)fom, 2, inside), "create it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMPredict((HycoROM)none, 2, inside), "create it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMCheckScene(model, (HycoScene)samples), "create it by HycoSceneLoad()");
   PetscCall(HycoSceneDestroy(&scene)); /* before those that refer to it */
   PetscCall(HycoSamplesAddPoint(samples, inside));
   PetscCall(HycoFOMSolve(fom, 2, inside));
@@ -109,7 +109,7 @@ static PetscErrorCode TestReferences(void)
   PetscCall(HycoSystemSetVectors(system, F, NULL));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
   PetscCall(HycoSolverSetSystem(solver, system));
-  CHECK_FAILS(HycoSolverSetSystem(solver, (HycoSystem)solver), "make it by HycoSystemCreate()");
+  CHECK_FAILS(HycoSolverSetSystem(solver, (HycoSystem)solver), "create it by HycoSystemCreate()");
   PetscCall(HycoSystemDestroy(&system));
   PetscCall(HycoSolverSolve(solver, x, NULL));
   PetscCall(HycoSolverGetReason(solver, &reason));
@@ -225,8 +225,8 @@ static PetscErrorCode TestTraining(void)
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, rope, &scene));
   PetscCall(HycoSamplesCreate(scene, &samples));
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
-  CHECK_FAILS(HycoReducerSetGreedyStop(reducer, 0, 0, 0), "it must be positive, as 1e-3 is");
-  CHECK_FAILS(HycoReducerSetGreedyStop(reducer, 1e-3, -1, 0), "neither can be negative");
+  CHECK_FAILS(HycoReducerSetGreedyStop(reducer, 0, 0, 0), "it must be positive, for example 1e-3");
+  CHECK_FAILS(HycoReducerSetGreedyStop(reducer, 1e-3, -1, 0), "they must not be negative");
   CHECK_FAILS(HycoReducerSetTargets(reducer, (const PetscReal[HYCO_N_ERRORS]){-1}, 0), "target of the error u is -1");
   CHECK_FAILS(HycoReducerRun(reducer, NULL, "none.h5", NULL), "give the training points");
   CHECK_FAILS(HycoReducerRun(reducer, samples, "none.h5", NULL), "the set of training points is empty");
@@ -239,7 +239,7 @@ static PetscErrorCode TestTraining(void)
   PetscCall(HycoReducerDestroy(&reducer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
-  CHECK_FAILS(HycoSolverSetLinear(solver, HYCO_LINEAR_AUTO, -1), "it must be 0 (what is free) or more");
+  CHECK_FAILS(HycoSolverSetLinear(solver, HYCO_LINEAR_AUTO, -1), "it must be 0 (the free memory) or more");
   PetscCall(HycoSolverDestroy(&solver));
   PetscCall(HycoSceneLoad(PETSC_COMM_SELF, blocks, &other));
   PetscCall(HycoFOMCreate(PETSC_COMM_SELF, other, &fom));
@@ -388,7 +388,7 @@ static PetscErrorCode Test(void)
     PetscCheck(rows, PETSC_COMM_SELF, PETSC_ERR_USER, "faults/api.csv cannot be written");
     fprintf(rows, "\"C API: NULL, destroyed, copies of destroyed handles, handles of another kind, wrong order, wrong "
                   "sizes, reuse after an error, two models at once\",\"refused "
-                  "by name; then the right numbers\"\n");
+                  "by name; afterwards the numbers are right\"\n");
     PetscCall(TestGrowth("create, use, destroy", Once, 1000));
     PetscCall(TestGrowth("refused", OnceRefused, 1000));
     fclose(rows);

@@ -105,12 +105,12 @@ static PetscErrorCode TestFlips(const char what[], const Bytes *b, PetscInt n, P
     loaded += !refused;
     other += !refused && force != right;
   }
-  printf("%s with one of %d bits flipped: %d read, %d of them with another answer\n", what, (int)n, (int)loaded,
+  printf("%s with one of %d bits flipped: %d read, %d of them with another result\n", what, (int)n, (int)loaded,
          (int)other);
   if (sealed)
     fprintf(rows, "\"%s: one bit flipped (%d)\",all refused\n", what, (int)n);
   else
-    fprintf(rows, "\"%s: one bit flipped (%d)\",\"no crash; %d are read, %d of these with another answer\"\n", what,
+    fprintf(rows, "\"%s: one bit flipped (%d)\",\"no crash; %d are read, %d of these with another result\"\n", what,
             (int)n, (int)loaded, (int)other);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

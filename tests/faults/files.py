@@ -48,13 +48,13 @@ class Files(Case):
         self.assertNotIn('internal error', run.stderr)
 
     def test_kept_for_ever(self):
-        """Files of older formats give the numbers that they gave."""
+        """Files of older formats give the same numbers as before."""
         for name, (kind, force, active) in KEPT.items():
             report = self.hyco('predict', '-model', os.path.join(DATA, name), '-mu', '0.07,0.17', '-output', 'o.xdmf')
             self.assertEqual((report['model_type'], report['n_active']), (kind, active))
             self.near(report['total_contact_force'], force, 1e-9)
             self.solved(report)
-        ROWS.add(f'{len(KEPT)} models of formats 3 and 4, hybrid, projection, condensed, kept in tests/data', 'give the numbers that they gave')
+        ROWS.add(f'{len(KEPT)} models of formats 3 and 4, hybrid, projection, condensed, kept in tests/data', 'give the same numbers as before')
 
     def test_same_bytes(self):
         """The same training twice: the same bytes."""
@@ -102,7 +102,7 @@ class Files(Case):
         for name, shape, kind in sizes:
             with self.subTest(name=name, shape=shape):
                 self.refused(self.edited(put(name, shape, kind), 'c.h5' if 'condensed' in name else 'good.h5'), f'{name} is damaged')
-        ROWS.add(f'sizes that the file has no room for ({len(sizes)}), in 2 GB of address space', "refused by the dataset's name")
+        ROWS.add(f'sizes that are larger than the file ({len(sizes)}), in 2 GB of address space', "refused by the dataset's name")
 
     def test_condensed_values(self):
         """Numbers of a condensed model that no training writes."""
@@ -118,8 +118,8 @@ class Files(Case):
                   ('bounds', (0, 1), 0), ('bounds', (0, 0), np.nan))
         for name, at, value in values:
             with self.subTest(name=name, at=at, value=value):
-                self.refused(self.edited(put(name, at, value), 'c.h5'), f'bad.h5: condensed/({name} (is damaged|holds)|bounds is 2 x 2 where)')
-        ROWS.add(f'numbers of a condensed model that no training writes ({len(values)})', "refused by the dataset's name")
+                self.refused(self.edited(put(name, at, value), 'c.h5'), f'bad.h5: condensed/({name} (is damaged|contains)|bounds is 2 x 2, and)')
+        ROWS.add(f'invalid numbers in a condensed model ({len(values)})', "refused by the dataset's name")
 
     def test_elsewhere(self):
         """A model that sends its reader to other files, or through filters, which HDF5 would load as code."""
@@ -139,7 +139,7 @@ class Files(Case):
             layout[...] = h5py.VirtualSource(self.path('other.h5'), 'problem/V', shape=shape)
             f.create_virtual_dataset('problem/V', layout)
 
-        for make, text in ((lambda f, s: f.__setitem__('problem/V', h5py.ExternalLink(self.path('other.h5'), 'problem/V')), 'holds no problem/V'),
+        for make, text in ((lambda f, s: f.__setitem__('problem/V', h5py.ExternalLink(self.path('other.h5'), 'problem/V')), 'has no problem/V'),
                            (lambda f, s: f.create_dataset('problem/V', s, 'f8', external=[(self.path('numbers'), 0, s[0] * s[1] * 8)]), 'problem/V is damaged'),
                            (virtual, 'problem/V is damaged'),
                            (lambda f, s: f.create_dataset('problem/V', s, 'f8', chunks=s, compression='gzip'), 'problem/V is damaged')):
@@ -158,9 +158,9 @@ class Files(Case):
                                       ('mesh/cells', (0, 0), -1, 'outside'), ('problem/pairs/slave', (0, 0), 99999, 'outside'),
                                       ('problem/sizes', (2, 0), 9, 'problem/sizes is damaged'),
                                       ('problem/fe_dof', (1, 0), 0, 'fe_dof is damaged'), ('format', (0, 0), 99, 'has model format 99'),
-                                      ('kind', (0, 0), 88, 'is no hyco model'), ('mesh/head', (0, 0), 77, 'outside'),
+                                      ('kind', (0, 0), 88, 'is not a hyco model'), ('mesh/head', (0, 0), 77, 'outside'),
                                       ('mesh/group_start', (1, 0), 10**6, 'damaged'),
-                                      ('training/estimates', (3, 0), np.nan, 'training/estimates holds a value that is not finite'),
+                                      ('training/estimates', (3, 0), np.nan, 'training/estimates contains a value that is not finite'),
                                       ('training/estimates', (2, 0), 0, 'training/estimates is damaged'),
                                       ('training/estimates', (0, 0), 1e300, 'training/estimates is damaged'),
                                       ('training/estimates', (0, 0), 0, 'training/estimates is damaged'),
@@ -169,14 +169,14 @@ class Files(Case):
                                       ('training/held_out', (0, 0), 0, 'training/held_out is damaged'),
                                       ('table/counts', (1, 0), 16, 'table/counts is damaged|table/parameters is'),
                                       ('table/counts', slice(None), 16, 'table/counts is damaged'),
-                                      ('table/parameters', (0, 0), np.nan, 'table/parameters holds a value that is not finite'),
+                                      ('table/parameters', (0, 0), np.nan, 'table/parameters contains a value that is not finite'),
                                       ('table/parameters', (1, 0), 0.05, 'table/parameters is damaged'),
-                                      ('table/stiffness', (1, 7), np.inf, 'table/stiffness holds a value that is not finite'))
+                                      ('table/stiffness', (1, 7), np.inf, 'table/stiffness contains a value that is not finite'))
         for name, at, value, text in values:
             with self.subTest(name=name, at=at, value=value):
                 self.refused(self.edited(put(name, at, value), 'held.h5' if name.startswith('training') else 'good.h5'), text)
-        ROWS.add(f'numbers of a hybrid model that no training writes ({len(values)}): NaN, out of range, other format', 'refused')
-        for old, new, text in ((b'\t', b' ', "the model's scene text is damaged"), (b'body_', b'bo y_', 'is no entry of a scene')):
+        ROWS.add(f'invalid numbers in a hybrid model ({len(values)}): NaN, out of range, other format', 'refused')
+        for old, new, text in ((b'\t', b' ', "the model's scene text is damaged"), (b'body_', b'bo y_', 'is not an entry of a scene')):
             def rewrite(f, old=old, new=new):
                 text = f['problem/scene'][:]
                 f['problem/scene'][...] = np.frombuffer(text.tobytes().replace(old, new), text.dtype).reshape(text.shape)
@@ -187,7 +187,7 @@ class Files(Case):
             del f['problem/scene']
             f['problem/scene'] = np.hstack([text, text])
 
-        self.refused(self.edited(pair), 'problem/scene is .* where .* was expected: the file is damaged')
+        self.refused(self.edited(pair), 'problem/scene is .*, and .* was expected: the file is damaged')
         self.refused(self.edited(put('problem/sizes', (0, 0), 101)), 'the whole mesh is damaged', 'predict', '-output', 'w.xdmf')
         shutil.copy(os.path.join(DATA, 'rope-projection-4.h5'), self.path('p.h5'))
         self.refused(self.edited(put('problem/sizes', (4, 0), 9), 'p.h5'), 'problem/dual is damaged')
@@ -241,7 +241,7 @@ class Files(Case):
                     f[name] = values[:rows]
 
         for path in (first, second):
-            for name, rows, text in (('U', 99, 'U has .* rows where other snapshots have'), ('U', 0, 'holds no U'), ('lambda', 0, 'holds no lambda')):
+            for name, rows, text in (('U', 99, 'U has .* rows, and other snapshots have'), ('U', 0, 'has no U'), ('lambda', 0, 'has no lambda')):
                 with open(path, 'rb') as f:
                     good = f.read()
                 change(path, name, rows)
@@ -254,7 +254,7 @@ class Files(Case):
                         self.assertNotIn('MPI_ABORT', run.stderr)  # the other rank heard it, and was not left behind
                 with open(path, 'wb') as f:
                     f.write(good)
-        ROWS.add('snapshots whose sizes do not go together (6), on 1 and 2 ranks', 'refused by their names')
+        ROWS.add('snapshots with inconsistent sizes (6), on 1 and 2 ranks', 'refused by their names')
 
     def test_snapshots_of_another(self):
         """Solutions and flexibilities of other materials, under the names of these."""
@@ -270,7 +270,7 @@ class Files(Case):
         try:
             run = self.run_raw(*CONDENSED)
             self.assertEqual(run.returncode, 1)
-            self.assertIn('is of another scene or mesh', run.stderr)
+            self.assertIn('belongs to another scene or mesh', run.stderr)
         finally:
             with open(path, 'wb') as f:
                 f.write(good)

@@ -109,8 +109,8 @@ class Kill(Case):
             self.assertEqual(self.content(), right, f'the model differs after kill {k} on {ranks} ranks')
         self.assertGreaterEqual(interrupted, kills // 2, 'the kills came too late to say anything')
         ROWS.add(f'`kill -9` of a rank during `train`, {kind} model, {ranks} rank{"s" if ranks > 1 else ""}: {kills} seeded moments',
-                 f'{len(names)} files of solutions; {interrupted} runs were killed; the same command goes on, solves nothing again '
-                 'that was complete, and writes the same model, byte for byte')
+                 f'{len(names)} files of solutions; {interrupted} runs were killed; the same command continues, solves only what '
+                 'was incomplete, and writes the same model, byte for byte')
 
     def test_one_rank(self):
         self.check_kills(1)
@@ -157,14 +157,14 @@ class Kill(Case):
         right = self.content()
         for name in glob.glob(self.path('m.h5.snapshots', '*.h5'))[::2]:
             os.remove(name)
-        self.refused(self.limited(32), 'm.h5 could not be written to its end (File too large): is the disk full?')
+        self.refused(self.limited(32), 'm.h5 could not be written completely (File too large); check the free space')
         self.assertEqual(self.content(), right, 'the previous model was touched')
         shutil.rmtree(self.path('m.h5.snapshots'))
-        self.refused(self.limited(4), '.h5 could not be written to its end (File too large): is the disk full?')
+        self.refused(self.limited(4), '.h5 could not be written completely (File too large); check the free space')
         self.assertEqual(self.content(), right, 'the previous model was touched')
         subprocess.run([HYCO, *settled(TRAIN)], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
         self.assertEqual(self.content(), right)
-        ROWS.add('disk full while a snapshot or the model is written', 'one line; the old model is untouched, nothing half written is left; then it goes on')
+        ROWS.add('disk full while a snapshot or the model is written', 'one line; the old model is untouched, no file is half-written; the next run continues')
 
     def test_full_disk_condensed(self):
         """Full while flexibilities are written, which are larger than solutions, on 1 and 2 ranks."""
@@ -175,7 +175,7 @@ class Kill(Case):
             self.assertFalse(os.path.exists(self.path('m.h5')))
             self.assertEqual(len([f for f in os.listdir(self.path('m.h5.snapshots')) if '-' not in f]), n)
             self.setUp()
-        ROWS.add('disk full while a flexibility is written, on 1 and 2 ranks', 'one line, no model; the solutions stay for the next run')
+        ROWS.add('disk full while a flexibility is written, on 1 and 2 ranks', 'one line, no model; the solutions are kept for the next run')
 
     def full(self, kilobytes, *args):
         """A run in which no file can grow beyond a size once it reads its options: from a pipe, which waits until that is so."""
@@ -214,7 +214,7 @@ class Kill(Case):
                     self.refused(self.full(size, *args), 'o.h5 ' if size == 4 else f'{name} ')
                     self.assertEqual({f: self.content(f) for f in os.listdir(self.folder) if f.startswith('o.')}, before)
         ROWS.add(f'disk full while -output, -report or -table is written ({2 * len(tries)}), with an older file there and without',
-                 'one line; the older file is untouched, nothing half written is left')
+                 'one line; the older file is untouched, no file is half-written')
 
     def test_folders_in_the_way(self):
         """Folders that have the names of outputs or of their .h5, on 1 and 2 ranks."""
@@ -233,7 +233,7 @@ class Kill(Case):
                     self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
                     self.assertNotIn('MPI_ABORT', run.stderr)  # the other rank heard it, and was not left behind
                     self.assertEqual({f for f in os.listdir(self.folder) if f[1] == '.' and f[0] != 'm'}, {'a.xdmf', 'b.h5', 'c.json', 'd.csv'})
-        ROWS.add(f'a folder in the place of an output or its .h5 ({len(tries)}), on 1 and 2 ranks', 'one line, nothing half written is left')
+        ROWS.add(f'a folder at the path of an output or of its .h5 ({len(tries)}), on 1 and 2 ranks', 'one line, no file is half-written')
 
     def test_unwritable(self):
         """A path that leads through a file (root may write in any folder): nothing is begun that could not end."""
@@ -252,7 +252,7 @@ class Kill(Case):
                 self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
                 self.assertNotIn('MPI_ABORT', run.stderr)
                 self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
-        ROWS.add('a path through a file, a folder in the place of the model, on 1 and 2 ranks', 'one line')
+        ROWS.add('a path through a file, a folder at the path of the model, on 1 and 2 ranks', 'one line')
 
     def test_vanishing(self):
         """The snapshot folder goes while training runs: one line, no model."""
@@ -267,7 +267,7 @@ class Kill(Case):
         self.assertEqual(said.count('hyco: error'), 1, said)
         self.assertIn('m.h5.snapshots/', said)
         self.assertFalse(os.path.exists(self.path('m.h5')))
-        ROWS.add('a snapshot folder that vanishes', 'one line, no model')
+        ROWS.add('a snapshot folder that disappears', 'one line, no model')
 
 
 if __name__ == '__main__':

@@ -71,11 +71,11 @@ class Outputs(Case):
         self.refused(self.run_raw('train', '-scene', ROPE, '-grid', '2,2', '-model', device), 'null is a device or a pipe', 'HDF5')
         os.rename(self.path(device), self.path('o.h5'))
         self.addCleanup(os.rename, self.path('o.h5'), self.path(device))
-        self.refused(self.predict('-output', 'o.xdmf'), 'o.h5 is no file')
+        self.refused(self.predict('-output', 'o.xdmf'), 'o.h5 is not a file')
 
     def test_full_device(self):
         device = self.node('full', 7)
-        self.refused(self.predict('-report', device), 'full could not be written to its end (No space left on device)')
+        self.refused(self.predict('-report', device), 'full could not be written completely (No space left on device)')
         self.assertTrue(stat.S_ISCHR(os.stat(self.path(device)).st_mode))
 
     def test_pipe(self):
@@ -132,7 +132,7 @@ class Outputs(Case):
         for name in ('hard.h5', 'soft.h5', 'here'):
             self.addCleanup(os.remove, self.path(name))
         self.before = self.content()
-        one = 'are one file'
+        one = 'are the same file'
         for name in ('./model.h5', self.path('model.h5'), 'hard.h5', 'soft.h5', 'here/model.h5', 'rope/../model.h5'):
             self.refused(self.predict('-report', name), '-report', one)
         self.refused(self.run_raw('predict', '-model', 'model.h5', '-grid', '2,2', '-table', 'here/model.h5'), '-table', one)
@@ -153,13 +153,13 @@ class Outputs(Case):
         self.refused(self.predict('-options_file', 'options', '-report', './options'), '-options_file', one)
 
     def test_each_other(self):
-        for options, words in ((('-output', 'o.xdmf', '-report', 'o.h5'), ('the numbers of -output', 'o.h5')),
-                               (('-output', 'o.xdmf', '-report', './o.xdmf'), ('-output', 'are one file'))):
+        for options, words in ((('-output', 'o.xdmf', '-report', 'o.h5'), ('the .h5 file of -output', 'o.h5')),
+                               (('-output', 'o.xdmf', '-report', './o.xdmf'), ('-output', 'are the same file'))):
             self.refused(self.predict(*options), *words)
         train = ('train', '-scene', ROPE, '-grid', '2,2', '-model', 'new.h5')
-        self.refused(self.run_raw(*train, '-report', 'rope/../new.h5'), '-model', 'are one file')
+        self.refused(self.run_raw(*train, '-report', 'rope/../new.h5'), '-model', 'are the same file')
         self.refused(self.run_raw(*train, '-report', 'new.h5.snapshots'), 'the snapshot folder')
-        self.refused(self.run_raw('solve', '-scene', ROPE, '-grid', '2,2', '-table', 't', '-report', './t'), 'are one file')
+        self.refused(self.run_raw('solve', '-scene', ROPE, '-grid', '2,2', '-table', 't', '-report', './t'), 'are the same file')
 
     def test_models_stay(self):
         """A report or a table takes the place of no model, of no solution."""

@@ -24,7 +24,7 @@ class Swallowed(Case):
         self.assertEqual(run.returncode, 1, said)
         errors = [line for line in said.splitlines() if line.startswith('hyco: error')]
         self.assertEqual(len(errors), 1, said)
-        self.assertIn('m.h5 could not be written to its end (File too large)', errors[0])
+        self.assertIn('m.h5 could not be written completely (File too large)', errors[0])
         self.assertFalse(os.path.exists(self.path('m.h5')))
         self.assertEqual(glob.glob(self.path('*.hyco-*')), [])
 

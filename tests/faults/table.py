@@ -36,8 +36,8 @@ def rows():
         with tarfile.open(os.path.join(SOURCE, 'tests', 'fuzz', 'learned.tar.gz')) as f:
             learned = sum(m.isfile() and m.name.startswith(f'corpus/{name}/') for m in f)
         found.append([f'fuzzing: {name}, {seconds} s, {runs} inputs',
-                      f'{len(crashes)} crashes, leaks or hangs; {len(kept)} inputs are kept for every test run, which makes thousands of them; '
-                      f'{learned} for the next fuzzing', '`scripts/fuzz`'])
+                      f'{len(crashes)} crashes, leaks or hangs; {len(kept)} inputs are kept for every test run, which generates thousands from them; '
+                      f'{learned} for the next fuzzing run', '`scripts/fuzz`'])
     path = os.path.join(SOURCE, 'build-sanitize', 'summary')
     if os.path.exists(path):
         with open(path, encoding='ascii') as f:

@@ -6,7 +6,7 @@ import unittest
 from common import HYCO, MPIRUN, PATIENCE, ROPE, Case
 
 PROGRAM = os.path.join(os.path.dirname(HYCO), 'tests', 'test_one_line')
-ERRORS = {'scene': 'there is no scene /no/such', 'model': '/no/such.h5', 'null': 'make it by HycoFOMCreate()', 'class': 'is no HycoFOM', 'samples': '/no/such.csv',
+ERRORS = {'scene': 'the scene /no/such', 'model': '/no/such.h5', 'null': 'create it by HycoFOMCreate()', 'class': 'is not a HycoFOM', 'samples': '/no/such.csv',
           'order': 'call HycoFOMSolve() before', 'range': 'mu1 = 9 lies outside its range', 'count': 'the scene has 2: mu1, mu2', 'petsc': 'x'}
 
 

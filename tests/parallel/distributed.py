@@ -112,7 +112,7 @@ class Distributed(Case):
         for ranks in (0, 2, 4):
             run = self.run_raw('solve', '-scene', scene, '-mu', 1, ranks=ranks)
             self.assertNotEqual(run.returncode, 0)
-            self.assertIn('body low: its map turns', run.stderr)
+            self.assertIn('body low: its map inverts', run.stderr)
 
     def test_snapshots(self):
         """The solutions that four ranks write together are those of one."""

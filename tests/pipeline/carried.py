@@ -142,9 +142,9 @@ class Carried(Case):
         self.assertTrue(np.isnan(table['under.force_y']).all())
 
     def test_refused(self):
-        for outputs, said in (('{a: {force: y, contact: roof}}', "the scene's are: "), ('{a: {force: y, group: low}}', 'write contact: NAME'),
-                              ('{a: {max: mises, contact: wall}}', 'take a group'), ('{a: {force: z}}', 'no force along z'), ('{a: {moment: x}}', 'ask for z'),
-                              ('{a: {min: contact_pressure}}', 'largest alone'), ('{a: {force: up}}', 'one of x, y and z'), ('{a: {contact: wall}}', 'says no field')):
+        for outputs, said in (('{a: {force: y, contact: roof}}', 'the contacts of the scene are: '), ('{a: {force: y, group: low}}', 'write contact: NAME'),
+                              ('{a: {max: mises, contact: wall}}', 'give a group instead'), ('{a: {force: z}}', 'no force along z'), ('{a: {moment: x}}', 'use z'),
+                              ('{a: {min: contact_pressure}}', 'only the largest'), ('{a: {force: up}}', 'one of x, y and z'), ('{a: {contact: wall}}', 'has no field')):
             for ranks in (0,) if outputs[4:7] != 'for' else (0, 2):
                 run = self.run_raw('solve', '-scene', self.corner('bad.yaml', f'output: {outputs}\n'), '-mu', '1,0', ranks=ranks)
                 with self.subTest(outputs=outputs, ranks=ranks):

@@ -127,7 +127,7 @@ class Check(Case):
             f.write(text)
         found = self.hyco('check', '-scene', 'scene')
         self.assertEqual(found['unused_groups'], ['Over'])
-        self.warned(found, 'over', 'Over', 'letter case')
+        self.warned(found, 'over', 'Over', 'upper and lower case')
         self.warned(found, 'over', 'Over', 'same nodes')
         self.warned(found, 'Over', 'no entry')
 
@@ -155,7 +155,7 @@ class Check(Case):
         self.assertEqual(len(found['free_motions']), 1)
         self.assertIn('upper', found['free_motions'][0])
         self.assertIn('(0, 1, 0)', found['free_motions'][0])
-        self.warned(found, 'contact alone')
+        self.warned(found, 'only by contact')
         with open(free, 'w', encoding='utf-8') as f:
             f.write(text.replace('  upper_sym: {x: 0}', '#'))
         for ranks in (0, 2):

@@ -61,7 +61,7 @@ class Choices(Case):
         with h5py.File(self.path('once.h5')) as a, h5py.File(self.path('twice.h5')) as b:
             np.testing.assert_array_equal(a['problem/singular_values'], b['problem/singular_values'])
         said = self.run_raw('train', '-scene', ROPE, '-points', 'twins.csv', '-model', 'twice.h5').stdout
-        self.assertIn('3 of the 18 training points repeat others; each of the 15 is used once', said)
+        self.assertIn('3 of the 18 training points are duplicates; each of the 15 different points is used once', said)
         p = self.hyco('predict', '-model', 'once.h5', '-points', 'twins.csv', '-table', 'p.csv')
         self.assertEqual(p['n_points'], 18)
 

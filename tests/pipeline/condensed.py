@@ -99,8 +99,8 @@ class Condensed(Case):
         self.assertLess(c['error_lambda']['max'], 1e-7)
         run = self.run_raw('train', '-scene', PELLET, *TYPE, '-model', 'd.h5', '-hyco_condensed_max_values', 3)
         self.assertEqual(run.returncode, 3, run.stderr)  # written, but it misses
-        said = re.search(r"-hyco_condensed_tol was not reached: the forces' error, one value left out, is (\S+), and 1.0e-07 was "
-                         r'asked; raise -hyco_condensed_max_values, which is 3,', run.stderr)
+        said = re.search(r"-hyco_condensed_tol was not reached: the error of the forces, with one value left out, is (\S+), and 1.0e-07 was "
+                         r'requested; raise -hyco_condensed_max_values, which is 3,', run.stderr)
         self.assertIn(f'forces {said[1]};', run.stdout)  # the estimate that is reported
         self.assertGreater(float(said[1]), 1e-7)
         self.refused('give the training points', 'train', '-scene', PELLET, '-model', 'h.h5')
@@ -142,16 +142,16 @@ class Condensed(Case):
         with open(self.path('points.csv'), 'w', encoding='utf-8') as f:
             f.write('radius,load\n4.02,0.5\n4.05,1\n4.1,0.5\n')
         train = ('train', *TYPE, '-model', 'no.h5', '-scene')
-        self.refused('are no tensor grid', *train, PELLET, '-points', 'points.csv')
+        self.refused('do not form a tensor grid', *train, PELLET, '-points', 'points.csv')
         self.refused('have one value of radius', *train, PELLET, '-grid', '1,3')
         self.refused('a condensed model needs one', *train, ROPE, '-grid', '2,2', '-hyco_linear', 'iterative')
         self.refused('the scene has no contact', *train, PLATE, '-grid', '2,2')
-        self.refused('-greedy does not give', *train, ROPE, '-greedy', '-training_grid', '3,3')
+        self.refused('-greedy does not make', *train, ROPE, '-greedy', '-training_grid', '3,3')
         with open(os.path.join(BLOCKS, 'scene.yaml'), encoding='utf-8') as f, \
                 open(self.path('held.yaml'), 'w', encoding='utf-8') as out:  # the top is pushed, not moved
             text = f.read().replace('blocks.msh', os.path.join(BLOCKS, 'blocks.msh'))
             out.write(re.sub(r'block_top: {y: -press}.*', '', text) + 'pressure: {block_top: 1e4*press}\n')
-        self.refused('contact alone holds it', *train, 'held.yaml', '-grid', '2,2')
+        self.refused('only contact does', *train, 'held.yaml', '-grid', '2,2')
 
     def test_damaged(self):
         """Entries that are no numbers, sizes that do not fit, values out of order."""

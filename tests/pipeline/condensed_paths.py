@@ -117,7 +117,7 @@ class CondensedPaths(Ring):
             f['condensed/inelastic'] = rows
             del f['sealed']
         for args, words in (([*line, self.path('stiff'), '-scene', stiff], ['push', 'stiffness', 'cubature']),
-                            ([*line, self.path('aging'), '-scene', aging], ['t reaches', 'stiffness']),
+                            ([*line, self.path('aging'), '-scene', aging], ['t affects', 'stiffness']),
                             ([*line, self.path('springs'), '-scene', springs], ['springs', 'hybrid']),
                             ([*line, self.path('free'), '-scene', free], ['no support keeps', 'hybrid']),
                             ([*line, self.path('yields'), '-scene', yields, '-hyco_condensed_inelastic_tol', '1e-8', '-hyco_condensed_cells', '1'], ['-hyco_condensed_cells']),

@@ -88,7 +88,7 @@ class Corners(Case):
         self.block('quad4', 0)
         base = 'scene: {mesh: mesh.msh}\nbody: {block: {young: 200}}\npressure: {x1: 1, y1: 1}\n'
         for text, said in (('contact: {a: {group: x0, gap: 0}, b: {group: y0, gap: 0, normal: {x: -1, y: 0.0001}}}', 'whose normals there are parallel'),
-                           ('fixed: {y0: {y: 0}}\ncontact: {a: {group: x0, gap: 0}, b: {group: y0, gap: 0}}', 'a slave of 2 contacts, a and b among them, and has 1 free')):
+                           ('fixed: {y0: {y: 0}}\ncontact: {a: {group: x0, gap: 0}, b: {group: y0, gap: 0}}', 'a slave of 2 contacts, among them a and b, and has 1 free')):
             for ranks in (0, 2):
                 run = self.run_raw('solve', '-scene', self.written(base + text + '\n'), ranks=ranks)
                 self.assertEqual(run.returncode, 1, run.stdout)

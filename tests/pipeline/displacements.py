@@ -52,7 +52,7 @@ class Displacements(Case):
             if scene == PELLET:
                 self.assertTrue(before is None or 10 * pairs[0][0] < before, 'the finer model says so')
                 before = pairs[0][0]
-        self.assertIn('estimates its errors by values left out\n', self.run_raw('view', '-model', 'p.h5').stdout)
+        self.assertIn('error estimates: from values left out\n', self.run_raw('view', '-model', 'p.h5').stdout)
 
     def test_estimate_beyond(self):
         """Outside the training values it grows with that of the forces; an older file has none."""
@@ -117,7 +117,7 @@ class Displacements(Case):
         point = ('-mu', '0.1,0.2')
         for model, args, words in (('r.h5', point, 'give its -scene too'),
                                    ('r.h5', (*point, '-scene', PELLET), 'another scene'),
-                                   ('r.h5', ('-grid', '2,2', '-scene', ROPE), 'is for one point'),
+                                   ('r.h5', ('-grid', '2,2', '-scene', ROPE), 'needs a single point'),
                                    ('h.h5', (*point, '-scene', ROPE), 'this one is hybrid'),
                                    ('j.h5', (*point, '-scene', ROPE), 'this one is projection')):
             run = self.run_raw('predict', '-model', model, '-hyco_full_displacement', *args)

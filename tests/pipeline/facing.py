@@ -68,7 +68,7 @@ class Facing(Case):
         self.near(self.force()['total_contact_force'], right['total_contact_force'], 1e-12)
         arcs(self.path('arcs.msh'), 20, gap=2)
         self.scene('pair')
-        self.refused('have no node of under within', 'mesh both surfaces alike, or take type: surface')
+        self.refused('have no node of under within', 'use matching meshes, or type: surface')
         self.scene('pair', ', tolerance: 6')
         self.assertEqual(self.force()['n_active'], 0)
 
@@ -100,10 +100,10 @@ class Facing(Case):
         self.scene('pair', low=', map: {x: 1.01*x}')
         self.assertGreater(self.force()['total_contact_force'], 0)
         self.scene('pair', low=', map: {x: x + press}')
-        self.refused('the map brings node', 'apart along the surface', 'take type: surface')
+        self.refused('a map moves node', 'apart along the surface', 'use type: surface')
         mesh(self.path('m.msh'))
         scene(self.path('moved.yaml'), 'm.msh', kind='pair')
-        self.refused('have no node of upper', 'take type: surface', yaml='moved.yaml', mu='1,0.5,10')
+        self.refused('have no node of upper', 'type: surface', yaml='moved.yaml', mu='1,0.5,10')
 
 
 if __name__ == '__main__':

@@ -181,20 +181,20 @@ class Greedy(Case):
                 (('-training_grid', '4,4', '-target', 'nan'), '-target is "nan"'),
                 (('-training_grid', '20,1'), 'the grid has 1 points for mu2; at least 2 are needed'),
                 (('-training_grid', '1,1'), 'the grid has 1 points for mu1; at least 2 are needed'),
-                (('-training_grid', '1,1', '-grid_type', 'centred'), 'has 1 training point'),
-                (('-training_grid', '4,4', '-max_snapshots', 3), 'at least 4 are needed: a greedy training first solves at the 4 corners'),
+                (('-training_grid', '1,1', '-grid_type', 'centred'), 'has 1 candidate point'),
+                (('-training_grid', '4,4', '-max_snapshots', 3), 'at least 4 are needed, because a greedy training first solves at the 4 corners'),
                 (('-training_grid', '4,4', '-max_snapshots', 3, '-grid', '2,3'), 'first solves at the 6 points given, and adds'),
-                (('-training_grid', '4,4', '-grid', '1,2'), 'starts from 2 points; its indicator interpolates over 2 parameters'),
+                (('-training_grid', '4,4', '-grid', '1,2'), 'starts from 2 points, and its indicator interpolates over 2 parameters'),
                 (('-training_grid', '4,4', '-points', 'line.csv'), 'the 3 points lie on one line or plane'),
                 (('-training_grid', '4,4', '-hyco_greedy_indicator', 'best'), 'local, penetration'),
-                ((), 'give a greedy training the points to choose from')):
+                ((), 'a greedy training needs candidate points')):
             run = self.run_raw('train', '-scene', ROPE, '-greedy', *options, '-model', 'bad.h5')
             self.assertEqual(run.returncode, 1, options)
             self.assertIn(words, run.stderr)
             self.assertFalse(os.path.exists(self.path('bad.h5.snapshots')))
             self.assertEqual(run.stderr.strip().count('\n'), 0, run.stderr)
         run = self.run_raw('train', '-scene', ROPE, '-grid', '2,2', '-target', 1, '-model', 'bad.h5')
-        self.assertIn('nothing reads the option -target', run.stderr)
+        self.assertIn('the option -target', run.stderr)
 
 
 if __name__ == '__main__':

@@ -55,7 +55,7 @@ class Block(Case):
     def test_taken_away(self):
         run = self.run_raw('solve', '-scene', self.scene(PAIR), '-mu', '0.04,-1', '-output', 'no.xdmf')
         self.assertEqual(run.returncode, 1)
-        self.assertIn('contact alone holds a body, and this load takes it away; no support keeps body block from moving '
+        self.assertIn('a body is held by contact only, and this load lifts it off; no support keeps body block from moving '
                       'along (0, 1, 0)', run.stderr)
         self.assertFalse(os.path.exists(self.path('no.h5')))
 

@@ -154,7 +154,7 @@ class History(Case):
         np.testing.assert_allclose(rest['history']['outputs']['most'], whole['history']['outputs']['most'], rtol=1e-12)
         other = self.run_raw('solve', *args[:-2], '-output_least_min', 'mises', *keep, '-hyco_resume')
         self.assertEqual(other.returncode, 1)
-        self.assertRegex(other.stderr, 'e.h5 is of another scene')
+        self.assertRegex(other.stderr, 'e.h5 belongs to another scene')
 
     def test_rod(self):
         """The power ramp on a slice: two to four iterations a step, quadratic; the gap closes, the ramp presses, the hold relaxes; at zero power it is open."""

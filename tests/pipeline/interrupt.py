@@ -28,7 +28,7 @@ class Interrupt(Case):
             self.assertEqual(run.returncode, 128 + number, said)
             lines = [line for line in said.splitlines() if line.startswith('hyco: ')]
             self.assertEqual(len(lines), 1, said)
-            self.assertIn('solutions in m.h5.snapshots are kept', lines[0])
+            self.assertIn('solutions are stored in m.h5.snapshots', lines[0])
             self.assertFalse(os.path.exists(self.path('m.h5')))
             before = self.stored()
             self.assertGreater(len(before), seen)

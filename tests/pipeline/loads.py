@@ -242,11 +242,11 @@ output: {low: {min: u_y}, wall: {reaction: x}}
                            ('spring: {block: {x: 1}}', 'a group of points or of dimension 1'), ('spring: {y0: {z: 1}}', 'no component z'),
                            ('spring: {y0: {stiff: 1}}', 'x, y, z, normal'), ('spring: {y9: {y: 1}}', 'no group "y9"'),
                            ('force: {y1: {y: 1}}', 'write traction: y1'), ('force: {nothing: {y: 1}}', 'no group "nothing"'),
-                           ('gravity: {y: -1}', 'no body has a density'), ('gravity: {z: -1}\nbody_block_density: 1', 'no component z'),
+                           ('gravity: {y: -1}', 'no body has one'), ('gravity: {z: -1}\nbody_block_density: 1', 'no component z'),
                            ('gravity: {down: 1}', 'gravity: {x: ...'), ('rotation: {axis: {z: 1}}\nbody_block_density: 1', 'rotation: {speed'),
-                           ('rotation: {speed: 1, axis: {x: 1}}\nbody_block_density: 1', 'the axis is given in space'),
-                           ('gravity: {y: -1}\nbody_block_density: -1', 'a density is 0 or more'), ('gravity: {y: -y}\nbody_block_density: 1', 'the same everywhere'),
-                           ('spring: {y0: {y: 1 + t}}\nhistory: {times: [0, 1]}', 'a spring keeps its stiffness'),
+                           ('rotation: {speed: 1, axis: {x: 1}}\nbody_block_density: 1', 'the axis is given in 3D only'),
+                           ('gravity: {y: -1}\nbody_block_density: -1', 'a density must be 0 or more'), ('gravity: {y: -y}\nbody_block_density: 1', 'must be constant in space'),
+                           ('spring: {y0: {y: 1 + t}}\nhistory: {times: [0, 1]}', 'the stiffness of a spring must be constant in time'),
                            ('output: {pull: {reaction: w}}', 'along x, y or z'), ('output: {pull: {reaction: y, group: corner}}', 'no support fixes y on corner')):
             for ranks in (0, 2):
                 run = self.run_raw('solve', '-scene', self.written(COUNT % '' + base + text + '\n', grid), ranks=ranks)

@@ -39,7 +39,7 @@ class Missed(Case):
                 self.assertNotIn('missed', report)
 
     def test_help(self):
-        self.assertIn('Exit status: 0 done; 1 an error, in one line; 3 ', self.run_raw('-help').stdout)
+        self.assertIn('Exit status: 0 success; 1 an error, in one line; 3 ', self.run_raw('-help').stdout)
 
 
 if __name__ == '__main__':

@@ -152,7 +152,7 @@ class Reduced(Moved):
         self.assertLess(c['error_u']['max'], 1e-6)
         run = self.run_raw('train', '-scene', 'moved.yaml', *self.TRAIN[:2], '-values_press', '0.3,0.9', '-values_modulus', '5,10', '-model', 'c.h5', '-hyco_model_type', 'condensed')
         self.assertEqual(run.returncode, 1)
-        self.assertIn('meets other facets of upper as the parameters move it', run.stderr)
+        self.assertIn('changes the facet of upper that it faces as the parameters move it', run.stderr)
         self.assertFalse(os.path.exists(self.path('c.h5')))
 
     def test_older_model(self):

@@ -126,12 +126,12 @@ class Oblique(Case):
     def test_refused(self):
         grid = self.box('quad4', np.eye(2))
         base = 'scene: {mesh: mesh.msh, parameters: [a]}\nparameter: {a: {range: [0, 1]}}\nbody: {block: {young: 200}}\n'
-        for text, said in (('fixed: {y0: {normal: 0}}', 'has no direction'), ('fixed: {y0: {direction: {x: 1}}}', 'the direction of no support'),
-                           ('fixed: {y0: {normal: 0, direction: {x: a}}}', 'keeps its direction'), ('fixed: {y0: {normal: 0, direction: {z: 1}}}', 'no component z'),
+        for text, said in (('fixed: {y0: {normal: 0}}', 'has no direction'), ('fixed: {y0: {direction: {x: 1}}}', 'a direction without a support'),
+                           ('fixed: {y0: {normal: 0, direction: {x: a}}}', 'the direction of a support must be constant'), ('fixed: {y0: {normal: 0, direction: {z: 1}}}', 'no component z'),
                            ('fixed: {y0: {x: 0, y: 0}, x0: {normal: 1, direction: {x: 1, y: 1}}}', 'fixed twice along'),
-                           ('fixed: {y0: {normal: 0, direction: {y: 1}}, x0: {normal: 0, direction: {x: 0.001, y: 1}}}', 'nearly that of other supports'),
-                           ('fixed: {y0: {normal: 0, direction: {x: 0}}}', 'has no length'),
-                           ('fixed: {y0: {normal: 0, direction: {x: 1, y: x}}}\nbody_block_map_x: x + a', 'depends on the place'),
+                           ('fixed: {y0: {normal: 0, direction: {y: 1}}, x0: {normal: 0, direction: {x: 0.001, y: 1}}}', 'nearly parallel to that of another support'),
+                           ('fixed: {y0: {normal: 0, direction: {x: 0}}}', 'has length zero'),
+                           ('fixed: {y0: {normal: 0, direction: {x: 1, y: x}}}\nbody_block_map_x: x + a', 'depends on the position'),
                            ('fixed: {y0: {normal: 0, direction: {x: 1}}}\nhistory: {times: [0, 1]}', 'scenes without a history')):
             for ranks in (0, 2):
                 run = self.run_raw('solve', '-scene', self.written(base + text + '\n', grid), '-mu', '0.5', ranks=ranks)

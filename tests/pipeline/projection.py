@@ -205,7 +205,7 @@ class Rope(Case):
             self.assertNotEqual(run.returncode, 0)
             self.assertIn(line, run.stderr)
         run = self.run_raw('predict', '-model', 'nnmf.h5', '-mu', '0.07,0.17', *TYPE)
-        self.assertIn('it decides a model when that is trained', run.stderr)
+        self.assertIn('it sets the model in training', run.stderr)
 
 
 class Pellet(Case):

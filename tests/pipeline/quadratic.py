@@ -130,9 +130,9 @@ class Quadratic(Case):
 
     def test_refused(self):
         text = 'scene: {mesh: mesh.msh}\nbody: {block: {young: 200}, seat: {young: 200}}\nfixed: {base: {x: 0, y: 0}, wall: {x: 0}}\n'
-        for more, said in (('contact: {c: {type: surface, slave: under, master: over}}', 'for cells of first order'), ('tie: {t: {slave: under, master: over}}', 'for cells of first order'),
-                           ('scene_refine: 1', 'cells of first order'), ('body_seat_element: bbar', 'is for quad4 and hex8'),
-                           ('hyco_mesh_write: m.h5', 'not written as a DMPlex')):
+        for more, said in (('contact: {c: {type: surface, slave: under, master: over}}', 'needs first-order cells'), ('tie: {t: {slave: under, master: over}}', 'ties need first-order cells'),
+                           ('scene_refine: 1', 'needs first-order cells'), ('body_seat_element: bbar', 'is for quad4 and hex8'),
+                           ('hyco_mesh_write: m.h5', 'cannot be written as a DMPlex')):
             for ranks in (0, 2):
                 run = self.run_raw('solve', '-scene', self.written(text + more + '\n', self.blocks('quad8')), ranks=ranks)
                 with self.subTest(more=more, ranks=ranks):
@@ -159,7 +159,7 @@ class Quadratic(Case):
         mixed.write(self.path('mesh.msh'))
         run = self.run_raw('check', '-scene', self.written('scene: {mesh: mesh.msh}\nbody: {block: {young: 200}}\n'))
         self.assertEqual(run.returncode, 1)
-        self.assertIn('hyco takes one type per mesh', run.stderr)
+        self.assertIn('hyco supports one type per mesh', run.stderr)
 
 
 if __name__ == '__main__':

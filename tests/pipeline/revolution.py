@@ -72,9 +72,9 @@ class Revolution(Case):
 
     def test_refused(self):
         self.refused(SCENE.replace('axisymmetric', 'axial'), 'plane_strain, plane_stress or axisymmetric')
-        self.refused(SCENE.replace('core: {', 'core: {map: {x: x - 0.1}, '), 'one side of its axis')
-        self.refused(SCENE.replace('core: {', 'core: {map: {x: x + 0.1}, '), 'nodes of the axis')
-        self.refused(SCENE.replace('axisymmetric', 'plane_stress').replace('core: {', 'core: {element: bbar, '), 'nothing locks')
+        self.refused(SCENE.replace('core: {', 'core: {map: {x: x - 0.1}, '), 'must be drawn at x >= 0')
+        self.refused(SCENE.replace('core: {', 'core: {map: {x: x + 0.1}, '), 'nodes on the axis')
+        self.refused(SCENE.replace('axisymmetric', 'plane_stress').replace('core: {', 'core: {element: bbar, '), 'volumetric locking')
         creeps = SCENE.replace('core: {', 'core: {law: norton, rate: 1e-9, exponent: 3, ') + 'history: {times: [0, 1]}\n'
         self.refused(creeps.replace('axisymmetric', 'plane_stress'), 'plane_stress is for linear laws')
         run = self.run_raw('solve', '-scene', os.path.join(SOURCE, 'examples', 'rope'), '-scene_formulation', 'plane_stress', '-mu', '0.07,0.17')

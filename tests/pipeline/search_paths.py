@@ -47,8 +47,8 @@ class SearchPaths(Ring):
         lines = [line for line in run.stdout.splitlines() if 'dropped at held-out path' in line]
         self.assertTrue(lines, run.stdout)
         for line in lines:
-            self.assertRegex(line, r'dropped at held-out path \d+ of 20: recipe \d+ is better')
-        self.assertRegex(run.stderr, r'(?m)^recipe \d+, hybrid, pod_tol \S+, .*: held-out paths: \d+ of 20')
+            self.assertRegex(line, r'dropped at held-out path \d+ of 20: settings \d+ are better')
+        self.assertRegex(run.stderr, r'(?m)^settings \d+, hybrid, pod_tol \S+, .*: held-out paths: \d+ of 20')
 
 
 if __name__ == '__main__':

@@ -84,7 +84,7 @@ class Slurm(Case):
     def test_goes_on(self):
         first = self.start(*LONG)
         self.interrupt(first)
-        self.assertIn('the same command goes on', self.finish(first, 75))
+        self.assertIn('the same command continues', self.finish(first, 75))
         self.assertFalse(os.path.exists(self.model))
         before = {path: os.stat(path).st_mtime_ns for path in self.solutions()}
         self.assertGreater(len(before), 0)

@@ -124,7 +124,7 @@ class Pellet(Case):
         self.assertRegex(self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1')['linear'], '^direct: mumps, 0.* GB')
         run = self.run_raw('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_linear', 'iterative', '-hyco_solver_form', 'dual')
         self.assertEqual(run.returncode, 1)
-        self.assertIn('-hyco_linear iterative solves the primal form', run.stderr)
+        self.assertIn('-hyco_linear iterative works with the forms primal', run.stderr)
 
     def test_no_contact_at_no_load(self):
         r = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,0')

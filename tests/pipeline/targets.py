@@ -44,7 +44,7 @@ class Targets(Case):
             self.assertLessEqual(c['error_' + name]['max'], target, name)
         said = self.run_raw('view', '-model', 'm.h5').stdout
         self.assertIn('errors at 68 held-out points', said)
-        self.assertRegex(said, r'recipe number \d+ of the \d+ that were tried: hybrid, pod_tol')
+        self.assertRegex(said, r'settings number \d+ of the \d+ that were tried: hybrid, pod_tol')
 
     def test_pellet(self):
         """Judged at two other radii and loads between the steps; what the command line says of the recipe is kept."""
@@ -71,7 +71,7 @@ class Targets(Case):
         run = self.run_raw('train', '-scene', ROPE, '-grid', '3,3', '-model', 'a.h5', '-table', 'a.csv', '-hyco_model_type', 'hybrid', '-target_u', 0.004,
                            '-target_max_added', 40, '-report', 'a.json')
         self.assertEqual(run.returncode, 0, run.stderr)
-        self.assertRegex(run.stdout, r'no recipe meets the targets: \d+ solutions are added where the errors are largest')
+        self.assertRegex(run.stdout, r'no settings meet the targets: \d+ solutions are added where the errors are largest')
         points = [int(r['training_points']) for r in self.rows('a.csv')]
         self.assertEqual(points[0], 9)
         self.assertGreater(points[-1], 9)
@@ -99,15 +99,15 @@ class Targets(Case):
         run = self.run_raw('train', '-scene', ROPE, '-points', 'line.csv', '-model', 'g.h5', '-target_u', 0.2, '-table', 'g.csv')
         self.assertEqual(run.returncode, 0, run.stderr)
         rows = self.rows('g.csv')
-        self.assertRegex(rows[0]['failure'], 'the 24 training points are no tensor grid')
+        self.assertRegex(rows[0]['failure'], 'the 24 training points do not form a tensor grid')
         self.assertEqual((rows[0]['model_type'], rows[0]['meets']), ('condensed', '0'))
 
     def test_complaints(self):
         for args, words in ((('-target_u', 0), 'a relative error above 0 and at most 1'), (('-target_sigma', -0.1), 'a relative error above 0 and at most 1'),
                             (('-target_lambda', 1.5), 'a relative error above 0 and at most 1'), (('-target_u', 'small'), 'a relative error above 0 and at most 1'),
-                            (('-target_stress', 0.1), 'knows no option -target_stress'),
-                            (('-target_u', 0.1, '-greedy', '-training_grid', '3,3'), 'stops by -target'),
-                            (('-target_u', 0.1, '-validation_grid', '3,3', '-grid_type', 'centred'), 'is a training point too')):
+                            (('-target_stress', 0.1), 'has no option -target_stress'),
+                            (('-target_u', 0.1, '-greedy', '-training_grid', '3,3'), 'for train -greedy use -target'),
+                            (('-target_u', 0.1, '-validation_grid', '3,3', '-grid_type', 'centred'), 'is also a training point')):
             run = self.run_raw('train', '-scene', ROPE, '-grid', '3,3', '-model', 'c.h5', *args)
             self.assertEqual(run.returncode, 1, args)
             self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)

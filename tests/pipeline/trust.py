@@ -87,7 +87,7 @@ class Trust(Case):
         self.assertGreater(before['estimated_error_u'], 100 * inside['estimated_error_u'])
         said = self.run_raw('predict', '-model', 'rough.h5', '-mu', '0.9,0.2', '-extrapolate').stdout
         self.assertRegex(said, r'estimated errors: u \d{2,} %, stress \d{2,} %, contact forces \d{2,} %\n')
-        self.assertIn('outside the training points by 325 % of a range', said)
+        self.assertIn('outside the region of training by 325 % of a range', said)
 
     def test_fallback(self):
         """The points whose estimate is above the target are solved full order, exactly as hyco solve does; the others not."""

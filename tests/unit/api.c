@@ -28,24 +28,25 @@ static PetscErrorCode TestNull(void)
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSnapshotsDestroy(&snapshots));
   PetscCall(HycoReducerDestroy(&reducer));
-  CHECK_FAILS(HycoSystemComputeKKT(system, NULL, NULL, &kkt), "the handle is NULL; make it by HycoSystemCreate()");
-  CHECK_FAILS(HycoSystemSetVectors(system, NULL, NULL), "the handle is NULL; make it by HycoSystemCreate()");
-  CHECK_FAILS(HycoSolverSolve(solver, NULL, NULL), "the handle is NULL; make it by HycoSolverCreate()");
-  CHECK_FAILS(HycoSolverGetReason(solver, &reason), "the handle is NULL; make it by HycoSolverCreate()");
-  CHECK_FAILS(HycoSolverSetType(solver, HYCO_SOLVER_TAO), "the handle is NULL; make it by HycoSolverCreate()");
-  CHECK_FAILS(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL), "the handle is NULL; make it by HycoSceneLoad()");
-  CHECK_FAILS(HycoSceneCheckParameters(scene, 2, point), "the handle is NULL; make it by HycoSceneLoad()");
-  CHECK_FAILS(HycoSamplesCreate(scene, &samples), "the handle is NULL; make it by HycoSceneLoad()");
-  CHECK_FAILS(HycoSamplesGet(samples, &n, NULL, &mu), "the handle is NULL; make it by HycoSamplesCreate()");
-  CHECK_FAILS(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom), "the handle is NULL; make it by HycoSceneLoad()");
-  CHECK_FAILS(HycoFOMSolve(fom, 2, point), "the handle is NULL; make it by HycoFOMCreate()");
-  CHECK_FAILS(HycoFOMSolveForces(fom, 2, point, point), "the handle is NULL; make it by HycoFOMCreate()");
-  CHECK_FAILS(HycoFOMGetSummary(fom, &summary), "the handle is NULL; make it by HycoFOMCreate()");
-  CHECK_FAILS(HycoROMPredict(model, 2, point), "the handle is NULL; make it by HycoROMLoad()");
-  CHECK_FAILS(HycoROMGetPrediction(model, &prediction), "the handle is NULL; make it by HycoROMLoad()");
-  CHECK_FAILS(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer), "the handle is NULL; make it by HycoSceneLoad()");
-  CHECK_FAILS(HycoReducerSetFromOptions(reducer), "the handle is NULL; make it by HycoReducerCreate()");
-  CHECK_FAILS(HycoSnapshotsFill(snapshots, samples, NULL, NULL), "the handle is NULL; make it by HycoSnapshotsOpen()");
+  CHECK_FAILS(HycoSystemComputeKKT(system, NULL, NULL, &kkt), "the handle is NULL; create it by HycoSystemCreate()");
+  CHECK_FAILS(HycoSystemSetVectors(system, NULL, NULL), "the handle is NULL; create it by HycoSystemCreate()");
+  CHECK_FAILS(HycoSolverSolve(solver, NULL, NULL), "the handle is NULL; create it by HycoSolverCreate()");
+  CHECK_FAILS(HycoSolverGetReason(solver, &reason), "the handle is NULL; create it by HycoSolverCreate()");
+  CHECK_FAILS(HycoSolverSetType(solver, HYCO_SOLVER_TAO), "the handle is NULL; create it by HycoSolverCreate()");
+  CHECK_FAILS(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL), "the handle is NULL; create it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSceneCheckParameters(scene, 2, point), "the handle is NULL; create it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSamplesCreate(scene, &samples), "the handle is NULL; create it by HycoSceneLoad()");
+  CHECK_FAILS(HycoSamplesGet(samples, &n, NULL, &mu), "the handle is NULL; create it by HycoSamplesCreate()");
+  CHECK_FAILS(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom), "the handle is NULL; create it by HycoSceneLoad()");
+  CHECK_FAILS(HycoFOMSolve(fom, 2, point), "the handle is NULL; create it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMSolveForces(fom, 2, point, point), "the handle is NULL; create it by HycoFOMCreate()");
+  CHECK_FAILS(HycoFOMGetSummary(fom, &summary), "the handle is NULL; create it by HycoFOMCreate()");
+  CHECK_FAILS(HycoROMPredict(model, 2, point), "the handle is NULL; create it by HycoROMLoad()");
+  CHECK_FAILS(HycoROMGetPrediction(model, &prediction), "the handle is NULL; create it by HycoROMLoad()");
+  CHECK_FAILS(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer), "the handle is NULL; create it by HycoSceneLoad()");
+  CHECK_FAILS(HycoReducerSetFromOptions(reducer), "the handle is NULL; create it by HycoReducerCreate()");
+  CHECK_FAILS(HycoSnapshotsFill(snapshots, samples, NULL, NULL),
+              "the handle is NULL; create it by HycoSnapshotsOpen()");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -189,7 +190,7 @@ static PetscErrorCode TestMany(void)
   PetscCall(PetscMalloc2(6 * n, &Lambda, 6 * n_nodes * dim, &U));
   CHECK_FAILS(HycoROMSolveMany(model, 2, 2, outside[0], NULL, NULL, NULL), "mu2 = 0.6 lies outside its range");
   PetscCall(HycoROMSolveMany(model, 6, 2, mu[0], all, Lambda, U));
-  CHECK_FAILS(HycoROMGetPrediction(model, &one), "call HycoROMPredict() before asking");
+  CHECK_FAILS(HycoROMGetPrediction(model, &one), "call HycoROMPredict() before getting");
   for (PetscInt k = 0; k < 6; k++) {
     PetscCall(HycoROMPredict(single, 2, mu[k]));
     PetscCall(HycoROMGetPrediction(single, &one));

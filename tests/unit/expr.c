@@ -87,11 +87,11 @@ static PetscErrorCode TestRefusals(void)
   PetscReal value;
 
   PetscFunctionBegin;
-  CHECK_FAILS(Value("2*(x+1", &value), "key: \"2*(x+1\" is no expression");
-  CHECK_FAILS(Value("2 3", &value), "is no expression");
-  CHECK_FAILS(Value("x +", &value), "is no expression");
+  CHECK_FAILS(Value("2*(x+1", &value), "key: \"2*(x+1\" is not an expression");
+  CHECK_FAILS(Value("2 3", &value), "is not an expression");
+  CHECK_FAILS(Value("x +", &value), "is not an expression");
   CHECK_FAILS(Value("", &value), "key is empty");
-  CHECK_FAILS(Value("x + foo", &value), "names foo, which is unknown; known are x, y, z, a, radius, pi");
+  CHECK_FAILS(Value("x + foo", &value), "uses foo, which is unknown; the known names are x, y, z, a, radius, pi");
   CHECK_FAILS(Value("1/0", &value), "is not finite");
   CHECK_FAILS(Value("1/(x-0.25)", &value), "is not finite at x = 0.25, y = -2");
   CHECK_FAILS(Value("sqrt(y)", &value), "is not finite");

@@ -63,12 +63,12 @@ static PetscErrorCode TestRoundTrip(void)
   PetscCall(HycoH5LoadText(file, "text", &text));
   CHECK(strcmp(text, "a line\nand \"another\": 7 %%") == 0, "found \"%s\"", text);
   PetscCall(PetscFree(text));
-  CHECK_FAILS(HycoH5ReadReal(file, "real", 3, 2, real), "real is 2 x 3 where 3 x 2 was expected");
-  CHECK_FAILS(HycoH5ReadReal(file, "absent", 1, 1, real), "holds no absent");
-  CHECK_FAILS(HycoH5ReadRows(file, "real", 1, 2, 3, real), "real has 2 rows, 3 are needed");
+  CHECK_FAILS(HycoH5ReadReal(file, "real", 3, 2, real), "real is 2 x 3, and 3 x 2 was expected");
+  CHECK_FAILS(HycoH5ReadReal(file, "absent", 1, 1, real), "has no absent");
+  CHECK_FAILS(HycoH5ReadRows(file, "real", 1, 2, 3, real), "real has 2 rows, and 3 are needed");
   rows = -1;
   cols = 1;
-  CHECK_FAILS(HycoH5LoadInt(file, "group/deep/whole", 0, 10, &rows, &cols, &whole), "holds -7, outside 0 to 10");
+  CHECK_FAILS(HycoH5LoadInt(file, "group/deep/whole", 0, 10, &rows, &cols, &whole), "contains -7, outside 0 to 10");
   CHECK_FAILS(HycoH5LoadReal(file, "text", &rows, &cols, &loaded), "text is damaged");
   PetscCall(HycoH5Close(&file, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -125,7 +125,7 @@ static PetscErrorCode TestDamaged(void)
   f = fopen(path, "w");
   fprintf(f, "plain text\n");
   fclose(f);
-  CHECK_FAILS(HycoH5Open(path, &file), "is no HDF5 file, or it is damaged");
+  CHECK_FAILS(HycoH5Open(path, &file), "is not an HDF5 file, or it is damaged");
   unlink(path);
   CHECK_FAILS(HycoH5Open(path, &file), "cannot be opened: no such file, or not readable");
   CHECK_FAILS(HycoH5Create("/no/such/folder/a.h5", &file), "/no/such/folder/a.h5 cannot be written");

@@ -230,7 +230,7 @@ static PetscErrorCode TestCycleThenLemke(void)
   PetscCall(VecRestoreArrayRead(c.L, &L));
   PetscCall(HycoSolverSetType(solver, HYCO_SOLVER_TAO));
   PetscCall(HycoSolverSetTaoType(solver, "tron"));
-  CHECK_FAILS(HycoSolverSolve(solver, c.x, c.L), "tron needs a symmetric system and this one is not; use");
+  CHECK_FAILS(HycoSolverSolve(solver, c.x, c.L), "tron needs a symmetric system, and this one is not symmetric; use");
   PetscCall(HycoSolverSetTaoType(solver, NULL));
   PetscCall(Expect(solver, &c, "semismooth by default", HYCO_CONVERGED, "tao ssils dual"));
   PetscCall(HycoSolverDestroy(&solver));

@@ -407,7 +407,7 @@ class Projection(Case):
         self.assertIn('25 of the 25 nodes of b_z0 have no point of a_z1 within 0.025: the farthest are nodes',
                       self.refuse())
         self.assertIn('of the 25 nodes of b_z0 have no node of a_z1 within', self.refuse('-contact_seam_type', 'pair'))
-        self.assertIn('projects nodes on the group a, which has dimension 3; a group of dimension 2 is needed',
+        self.assertIn('the master group a has dimension 3; a group of dimension 2 is needed',
                       self.refuse('-contact_seam_master', 'a'))
         self.assertIn('is in both b_z0 and b_z0', self.refuse('-contact_seam_master', 'b_z0'))
 

@@ -107,10 +107,9 @@ static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *m
       const PetscInt other = partner_of[j];
 
       PetscCall(PetscFree(partner_of));
-      HycoFail("contact %s: nodes %d and %d of %s are both nearest to node %d of %s; mesh both surfaces alike, or take "
-               "type: surface",
-               c->name, (int)m->node_id[other], (int)m->node_id[match->slave[k]], c->slave, (int)m->node_id[j],
-               c->master);
+      HycoFail(
+          "contact %s: nodes %d and %d of %s are both nearest to node %d of %s; use matching meshes, or type: surface",
+          c->name, (int)m->node_id[other], (int)m->node_id[match->slave[k]], c->slave, (int)m->node_id[j], c->master);
     }
     partner_of[j] = match->slave[k];
   }
@@ -138,7 +137,7 @@ static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const P
   (void)c;
   (void)n;
   (void)missed;
-  HycoFormat(text, "mesh both surfaces alike, or take type: surface");
+  HycoFormat(text, "use matching meshes, or type: surface");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -175,8 +174,8 @@ static PetscErrorCode Verify(HycoContact c, HycoFE fe, const HycoPairs *p, Petsc
     limit = size[p->slave[k]];
     if (!(limit > 0) || along <= HycoLength(drawn) + HYCO_APART_SHARE * limit) continue;
     PetscCall(PetscFree(size));
-    HycoFail("contact %s: the map brings node %d of %s and node %d of %s, which face each other as drawn, %.4g apart "
-             "along the surface, more than half of a facet (%.4g): a pair keeps its nodes; take type: surface",
+    HycoFail("contact %s: a map moves node %d of %s and node %d of %s, which face each other as drawn, %.4g apart "
+             "along the surface, more than half of a facet (%.4g); a pair keeps its nodes: use type: surface",
              c->name, (int)m->node_id[p->slave[k]], c->slave, (int)m->node_id[p->master[p->master_start[k]]], c->master,
              (double)along, (double)limit);
   }

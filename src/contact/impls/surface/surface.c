@@ -38,11 +38,11 @@ static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const P
   }
   if (facing)
     HycoFormat(text,
-               "draw the surfaces closer, or allow the distance by contact_%s_tolerance %.4g: nodes that face no %s "
-               "then have no contact",
+               "draw the surfaces closer, or allow the distance by contact_%s_tolerance %.4g; nodes that do not face "
+               "%s then have no contact",
                c->name, 1.01 * (double)farthest, c->master);
   else
-    HycoFormat(text, "leave nodes that face no %s out of %s, or extend %s", c->master, c->slave, c->master);
+    HycoFormat(text, "remove nodes that do not face %s from %s, or extend %s", c->master, c->slave, c->master);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

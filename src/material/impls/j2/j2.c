@@ -29,9 +29,9 @@ PetscErrorCode HycoMaterialCreate_J2(HycoMaterial material)
   PetscCall(HycoFlowBegin(material));
   PetscCall(HycoMaterialDeclare(material, "yield", "the yield stress", HYCO_REQUIRED, 0, PETSC_INFINITY));
   PetscCall(HycoMaterialDeclare(material, "hardening", "the hardening modulus", 0, HYCO_NOT_NEGATIVE, PETSC_INFINITY));
-  PetscCall(HycoMaterialDeclare(material, "saturation", "the stress that Voce's hardening adds in the end", 0,
+  PetscCall(HycoMaterialDeclare(material, "saturation", "the saturation stress of Voce's hardening", 0,
                                 HYCO_NOT_NEGATIVE, PETSC_INFINITY));
-  PetscCall(HycoMaterialDeclare(material, "rate", "the rate of Voce's hardening by plastic strain", 0,
+  PetscCall(HycoMaterialDeclare(material, "rate", "the rate of Voce's hardening with plastic strain", 0,
                                 HYCO_NOT_NEGATIVE, PETSC_INFINITY));
   PetscCall(HycoFlowEnd(material, &rule));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -16,7 +16,7 @@ static void Prepare(HycoFlowPoint *p, const char **why)
   const PetscReal T = p->temperature, modulus = p->c[MODULUS] < 0 ? 1.148e5 - 59.9 * T : p->c[MODULUS];
 
   if (!(T > 0)) *why = "creep of Limback and Andersson needs a temperature above 0 K";
-  if (!(modulus > 0)) *why = "it is too hot: the modulus 1.148e5 - 59.9 T is not positive";
+  if (!(modulus > 0)) *why = "the temperature is too high: the modulus 1.148e5 - 59.9 T is not positive";
   p->scratch[0] = *why ? 0 : p->dt * p->c[RATE] * modulus / T * PetscExpReal(-p->c[ACTIVATION] / (GAS_CONSTANT * T));
   p->scratch[1] = *why ? 0 : p->c[FACTOR] / modulus;
 }

@@ -131,8 +131,8 @@ static PetscErrorCode List(HycoMaterial law, const MFront *m, const char hypothe
   PetscFunctionBegin;
   HycoFormat(count, "n%s", what);
   HycoCheck(Find(m, hypothesis, count),
-            "body %s: the library has no symbol %s_%s; is %s a behaviour of MFront's generic interface?", BodyName(law),
-            m->behaviour, count, m->behaviour);
+            "body %s: the library has no symbol %s_%s; check that %s is a behaviour of MFront's generic interface",
+            BodyName(law), m->behaviour, count, m->behaviour);
   *n = (PetscInt)Number(m, hypothesis, count, 0);
   *names = (const char *const *)Find(m, hypothesis, what);
   HycoCheck(!*n || *names, "body %s: the library has no symbol %s_%s", BodyName(law), m->behaviour, what);
@@ -150,16 +150,15 @@ static PetscErrorCode CheckKind(HycoMaterial law, const MFront *m)
             "body %s: the library has no behaviour %s of MFront's interfaces (no symbol %s_mfront_interface)",
             BodyName(law), m->behaviour, m->behaviour);
   HycoCheck(strcmp(*interface, "Generic") == 0 && Number(m, NULL, "mfront_mkt", 0) == 1,
-            "body %s: %s is made for MFront's interface \"%s\"; make the library by mfront --interface=generic",
+            "body %s: %s is made for MFront's interface \"%s\"; build the library by mfront --interface=generic",
             BodyName(law), m->behaviour, *interface);
   HycoCheck(version == API_VERSION,
-            "body %s: %s has version %u of MFront's generic interface; hyco knows version %d (TFEL 3.4.1 and later)",
+            "body %s: %s has version %u of MFront's generic interface; hyco supports version %d (TFEL 3.4.1 and later)",
             BodyName(law), m->behaviour, version, API_VERSION);
   HycoCheck(Number(m, NULL, "BehaviourType", 0) == 1 && Number(m, NULL, "BehaviourKinematic", 0) == 1,
-            "body %s: %s is no law of small strain", BodyName(law), m->behaviour);
+            "body %s: %s is not a small-strain law", BodyName(law), m->behaviour);
   HycoCheck(!Number(m, NULL, "SymmetryType", 0),
-            "body %s: %s is orthotropic; its axes would have to be given, which hyco does not do", BodyName(law),
-            m->behaviour);
+            "body %s: %s is orthotropic, and hyco supports isotropic behaviours only", BodyName(law), m->behaviour);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -179,8 +178,8 @@ static PetscErrorCode Declare(HycoMaterial law)
   PetscCall(Load(law, library, m));
   PetscCall(CheckKind(law, m));
   PetscCall(List(law, m, "Tridimensional", "MaterialProperties", &n, &names));
-  HycoCheck(n <= HYCO_MAX_DECLARED - 2, "body %s: %s has %d material properties; hyco takes %d", BodyName(law), name,
-            (int)n, HYCO_MAX_DECLARED - 2);
+  HycoCheck(n <= HYCO_MAX_DECLARED - 2, "body %s: %s has %d material properties; hyco accepts at most %d",
+            BodyName(law), name, (int)n, HYCO_MAX_DECLARED - 2);
   for (PetscInt j = 0; j < n; j++) {
     char constant[HYCO_LINE];
     size_t at = 0;
@@ -219,8 +218,8 @@ static PetscErrorCode SetState(HycoMaterial law, const MFront *m, const char hyp
     const PetscInt size = TypeSize(type[k], dim);
 
     HycoCheck(size && total + size <= MAX_INTERNAL,
-              "body %s: %s has internal variables of a kind or a number (over %d) that hyco does not take",
-              BodyName(law), m->behaviour, MAX_INTERNAL);
+              "body %s: %s has internal variables of an unsupported kind, or more than %d of them", BodyName(law),
+              m->behaviour, MAX_INTERNAL);
     for (PetscInt c = 0; c < size; c++, total++) {
       list[total] = text[total];
       if (size == 1)
@@ -245,7 +244,7 @@ static PetscErrorCode SetUp(HycoMaterial law, PetscInt dim)
   HycoCheck(dim > 1, "body %s: laws of MFront are for 2D and 3D", BodyName(law));
   HycoFormat(symbol, "%s_%s", m->behaviour, hypothesis);
   *(void **)(&m->integrate) = dlsym(m->library, symbol);
-  HycoCheck(m->integrate, "body %s: %s is not made for the hypothesis %s (no symbol %s)", BodyName(law), m->behaviour,
+  HycoCheck(m->integrate, "body %s: %s does not support the hypothesis %s (no symbol %s)", BodyName(law), m->behaviour,
             hypothesis, symbol);
   PetscCall(List(law, m, hypothesis, "MaterialProperties", &n, &names));
   HycoCheck(n == m->n_properties, "body %s: %s has other material properties in 2D than in 3D", BodyName(law),
@@ -253,11 +252,11 @@ static PetscErrorCode SetUp(HycoMaterial law, PetscInt dim)
   PetscCall(List(law, m, hypothesis, "ExternalStateVariables", &n, &names));
   for (PetscInt k = 0; k < n; k++)
     HycoCheck(strcmp(names[k], "Temperature") == 0,
-              "body %s: %s needs the external variable %s; hyco has the temperature alone", BodyName(law), m->behaviour,
-              names[k]);
+              "body %s: %s needs the external variable %s; hyco provides the temperature only", BodyName(law),
+              m->behaviour, names[k]);
   HycoCheck(!Number(m, hypothesis, "requiresStiffnessTensor", 0) &&
                 !Number(m, hypothesis, "requiresThermalExpansionCoefficientTensor", 0),
-            "body %s: %s wants the stiffness or the thermal expansion handed in; let it compute them", BodyName(law),
+            "body %s: %s requires the stiffness or the thermal expansion as input; let it compute them", BodyName(law),
             m->behaviour);
   m->stores = (PetscBool)(Number(m, hypothesis, "ComputesInternalEnergy", 0) == 1);
   PetscCall(SetState(law, m, hypothesis, dim));

@@ -52,26 +52,24 @@ static PetscErrorCode FindGrid(HycoReducer t, HycoCondensed c)
   PetscCall(HycoSamplesGet(t->samples, &n_s, NULL, &mu));
   for (PetscInt p = 0; p < c->dim; p++) {
     PetscCall(FindValues(c, p, n_s, mu));
-    HycoCheckModel(
-        c->n[p] > 1 || t->scene->hi[p] == t->scene->lo[p],
-        "the training points have one value of %s, and nothing to interpolate over its range between: a condensed "
-        "model needs at least two",
-        t->scene->parameter[p]);
+    HycoCheckModel(c->n[p] > 1 || t->scene->hi[p] == t->scene->lo[p],
+                   "the training points have one value of %s, and a condensed model needs at least two to interpolate "
+                   "over its range",
+                   t->scene->parameter[p]);
     all *= (PetscReal)c->n[p];
   }
-  HycoCheckModel(
-      all <= (PetscReal)n_s,
-      "the %d training points are no tensor grid: a condensed model needs every combination of their values (%g "
-      "points); give them by -grid or -values_NAME",
-      (int)n_s, (double)all);
+  HycoCheckModel(all <= (PetscReal)n_s,
+                 "the %d training points do not form a tensor grid, and a condensed model needs every combination of "
+                 "their values (%g points); give them by -grid or -values_NAME",
+                 (int)n_s, (double)all);
   for (PetscInt p = 0; p < c->dim; p++) nodes *= c->n[p];
   PetscCall(PetscMalloc1(nodes, &c->sample));
   for (PetscInt k = 0; k < nodes; k++) c->sample[k] = -1;
   for (PetscInt k = 0; k < n_s; k++) c->sample[NodeOf(c, mu + k * c->dim)] = k;
   for (PetscInt k = 0; k < nodes; k++)
     HycoCheckModel(c->sample[k] >= 0,
-                   "the %d training points are no tensor grid: a condensed model needs every combination "
-                   "of their values; give them by -grid or -values_NAME",
+                   "the %d training points do not form a tensor grid, and a condensed model needs every combination of "
+                   "their values; give them by -grid or -values_NAME",
                    (int)n_s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -213,28 +211,27 @@ PetscErrorCode HycoCondensedSetFromOptions(HycoReducer t)
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("condensed"));
   PetscCall(HycoOptionsReal("-hyco_condensed_pod_tol",
-                            "condensed: energy that its displacement modes may leave out, unless -hyco_pod_tol is "
-                            "smaller",
-                            0, 1, &s->pod_tol, NULL));
+                            "condensed: energy left out of the displacement modes, unless -hyco_pod_tol is smaller", 0,
+                            1, &s->pod_tol, NULL));
   PetscCall(HycoOptionsFor("condensed where no points are given"));
-  PetscCall(HycoOptionsReal("-hyco_condensed_tol",
-                            "condensed, no points given: add values until the forces' error, one value left out, is no "
-                            "larger",
-                            0, 1, &s->tol, NULL));
+  PetscCall(HycoOptionsReal(
+      "-hyco_condensed_tol",
+      "condensed, no points given: add values until the error of the forces, with one value left out, is no larger", 0,
+      1, &s->tol, NULL));
   PetscCall(HycoOptionsInt("-hyco_condensed_max_values",
-                           "condensed, no points given: at most so many values per parameter", 3, 1000, &s->max_values,
-                           NULL));
+                           "condensed, no points given: largest number of values per parameter", 3, 1000,
+                           &s->max_values, NULL));
   PetscCall(HycoOptionsFor("condensed, of a history"));
   PetscCall(HycoOptionsReal("-hyco_condensed_inelastic_tol",
-                            "condensed, of a history: energy that the modes of the inelastic strain may leave out", 0,
-                            1, &s->path.tol, &set[0]));
-  PetscCall(
-      HycoOptionsInt("-hyco_condensed_cells",
-                     "condensed, of a history: cells with laws for each mode of the inelastic strain (0: every cell)",
-                     0, 1000000, &s->path.cells, &set[1]));
+                            "condensed, with a history: energy left out of the modes of the inelastic strain", 0, 1,
+                            &s->path.tol, &set[0]));
+  PetscCall(HycoOptionsInt(
+      "-hyco_condensed_cells",
+      "condensed, with a history: number of cells with laws for each mode of the inelastic strain (0: every cell)", 0,
+      1000000, &s->path.cells, &set[1]));
   PetscOptionsEnd();
   HycoCheck(!(set[0] || set[1]) || !t->scene || t->scene->n_times,
-            "%s is for scenes with a history, and this one has none",
+            "%s is for scenes with a history, and this scene has none; remove it",
             set[0] ? "-hyco_condensed_inelastic_tol" : "-hyco_condensed_cells");
   if (t->scene && t->scene->n_times) PetscCall(HycoCondensedTakePath(t->prototype));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -294,12 +291,11 @@ static PetscErrorCode CheckFacets(HycoReducer t)
   for (PetscInt r = 1; r < met.rows.n; r++) {
     const HycoPairs *p = &met.rows;
 
-    HycoCheckModel(
-        met.of[r] != met.of[r - 1],
-        "contact %s: node %d meets other facets of %s as the parameters move it; a condensed model interpolates "
-        "over the parameters what has kinks there: train a hybrid one",
-        t->scene->contact[p->contact[r]]->name, (int)t->fom->surface->node_id[p->slave[r]],
-        t->scene->contact[p->contact[r]]->master);
+    HycoCheckModel(met.of[r] != met.of[r - 1],
+                   "contact %s: node %d changes the facet of %s that it faces as the parameters move it, where the "
+                   "interpolation of a condensed model would have kinks; train a hybrid model",
+                   t->scene->contact[p->contact[r]]->name, (int)t->fom->surface->node_id[p->slave[r]],
+                   t->scene->contact[p->contact[r]]->master);
   }
   PetscCall(HycoMetDestroy(&met));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -317,8 +313,8 @@ PetscErrorCode HycoCondensedCheckSupports(HycoReducer t)
   if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
   PetscCall(HycoMotionsDestroy(&motions));
   HycoCheckModel(!free,
-                 "no support keeps %s: contact alone holds it, K^-1 does not exist and no condensed model with it; "
-                 "train a hybrid one",
+                 "no support keeps %s, only contact does, so that K^-1 does not exist, which a condensed model needs; "
+                 "train a hybrid model",
                  name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -358,17 +354,16 @@ PetscErrorCode HycoCondensedCheckContacts(HycoReducer t)
   PetscCall(HycoSolverSetFromOptions(solver));
   linear = solver->linear;
   PetscCall(HycoSolverDestroy(&solver));
+  HycoCheckModel(linear != HYCO_LINEAR_ITERATIVE,
+                 "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a "
+                 "hybrid model, or use -hyco_linear auto");
   HycoCheckModel(
-      linear != HYCO_LINEAR_ITERATIVE,
-      "-hyco_linear iterative makes no factor of the stiffness, and a condensed model needs one; train a hybrid "
-      "model, or take -hyco_linear auto");
-  HycoCheckModel(m > 0,
-                 "the scene has no contact, and a condensed model is one of contact forces; train a hybrid model");
-  HycoCheckModel(
-      m <= MOST_CONTACTS,
-      "the scene has %d contacts: a condensed model stores the square of their number at every training point, "
-      "and goes to %d; train a hybrid model",
-      (int)m, MOST_CONTACTS);
+      m > 0,
+      "the scene has no contact, and the unknowns of a condensed model are contact forces; train a hybrid model");
+  HycoCheckModel(m <= MOST_CONTACTS,
+                 "the scene has %d contacts; a condensed model stores the square of their number at every training "
+                 "point, and is limited to %d: train a hybrid model",
+                 (int)m, MOST_CONTACTS);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -378,9 +373,8 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
   const PetscInt m = t->sizes[2];
 
   PetscFunctionBegin;
-  HycoCheck(!t->scan && !t->keep_singular,
-            "-hyco_scan and -hyco_keep_singular are for models that are scanned, and one of "
-            "-hyco_model_type condensed is not, unless the scene has a history");
+  HycoCheck(!t->scan && !t->keep_singular, "-hyco_scan and -hyco_keep_singular have no effect on -hyco_model_type "
+                                           "condensed, unless the scene has a history; remove them");
   PetscCall(HycoCondensedCheckContacts(t));
   PetscCall(HycoCondensedFree(&Condensing(t)->condensed));
   PetscCall(ResetResponses(&Condensing(t)->responses));
@@ -389,12 +383,11 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
   c->scene = t->scene;
   PetscCall(FindGrid(t, c));
   PetscCall(Inspect(t, c));
-  HycoCheckModel(
-      (PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=
-          MOST_NUMBERS,
-      "the flexibility of %d contacts at %d training points has more than %g numbers; take fewer values of the "
-      "parameters that reach the stiffness, or train a hybrid model",
-      (int)m, (int)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), MOST_NUMBERS);
+  HycoCheckModel((PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=
+                     MOST_NUMBERS,
+                 "the flexibility of %d contacts at %d training points has more than %g numbers; use fewer values of "
+                 "the parameters that affect the stiffness, or train a hybrid model",
+                 (int)m, (int)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor), MOST_NUMBERS);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

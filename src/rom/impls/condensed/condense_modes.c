@@ -309,7 +309,7 @@ static PetscErrorCode TakeModes(HycoReducer t, Mat V, PetscInt n_sigma, PetscRea
 
   PetscFunctionBegin;
   PetscCall(HycoReducerPODRank(t, n_sigma, sigma, Tolerance(t), t->max_modes, x->r, &t->l));
-  HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give less", (double)Tolerance(t));
+  HycoCheckModel(t->l, "-hyco_condensed_pod_tol %g leaves no mode; give a smaller value", (double)Tolerance(t));
   PetscCall(PetscFree(t->sigma));
   t->sigma = sigma;
   PetscCall(PetscFree(t->VtU));

@@ -87,7 +87,7 @@ static PetscErrorCode ReadOpen(HycoSnapshots store, HycoH5 h, const char path[],
   PetscCall(HycoH5LoadText(h, "fingerprint", &text));
   same = (PetscBool)(strcmp(text, mine) == 0);
   PetscCall(PetscFree(text));
-  HycoCheck(same, "%s is of another scene or mesh; remove the folder %s, or name another with -hyco_snapshots", path,
+  HycoCheck(same, "%s belongs to another scene or mesh; remove the folder %s, or name another by -hyco_snapshots", path,
             store->folder);
   if (data) PetscCall(HycoH5ReadRows(h, name, start, n, cols, data));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -31,7 +31,7 @@ static PetscErrorCode CheckLoads(HycoScene s)
   PetscFunctionBegin;
   for (PetscInt k = 0; k < s->n_fixed; k++) oblique = (PetscBool)(oblique || s->fixed[k].normal);
   HycoCheckModel(!s->n_springs && !s->n_point_loads && !s->n_ties && !oblique,
-                 "the scene has %s, and a condensed model of paths knows none; train a hybrid one",
+                 "the scene has %s, which a condensed model of paths does not support; train a hybrid model",
                  s->n_springs       ? "springs"
                  : s->n_point_loads ? "forces on points"
                  : s->n_ties        ? "ties"
@@ -45,8 +45,7 @@ PetscErrorCode HycoCondensedPathBegin(HycoReducer t)
 
   PetscFunctionBegin;
   HycoCheckModel(t->sizes[3] > 1,
-                 "-hyco_model_type condensed with a history is for scenes in the plane and in space; on "
-                 "a line take hybrid or projection");
+                 "-hyco_model_type condensed with a history is for 2D and 3D; in 1D use hybrid or projection");
   PetscCall(HycoCondensedCheckContacts(t));
   PetscCall(HycoCondensedCheckSupports(t));
   PetscCall(CheckLoads(s));
@@ -56,11 +55,10 @@ PetscErrorCode HycoCondensedPathBegin(HycoReducer t)
 
     changed[p] = (PetscBool)(p >= s->n_parameters || s->hi[p] > s->lo[p]);
     c = HycoSceneChanges(s, changed);
-    HycoCheckModel(
-        !c.stiffness && !c.rows,
-        "%s reaches the stiffness or the contacts' directions, and a condensed model of paths has one factor "
-        "for all of them; train a hybrid model or a cubature",
-        s->parameter[p]);
+    HycoCheckModel(!c.stiffness && !c.rows,
+                   "%s affects the stiffness or the contacts' directions, and a condensed model of paths has a single "
+                   "factor; train a hybrid or a cubature model",
+                   s->parameter[p]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -332,7 +330,7 @@ static PetscErrorCode TakeAnswers(HycoReducer t, HycoSnapshots store, Mat K, con
   PetscCall(PetscCalloc1(PetscMax(all, t->n_s) + 1, &t->sigma));
   PetscCall(HycoReducerPOD(t, S, 0, 0, &t->V, &t->l, t->sigma));
   PetscCall(MatDestroy(&S));
-  HycoCheckModel(t->l, "no load and no contact force moves the bodies; there is nothing to learn");
+  HycoCheckModel(t->l, "no load and no contact force moves the bodies, so that there are no modes; check the loads");
   PetscCall(HycoReducerGetDisplacements(t, store, &S));
   PetscCall(PetscMalloc1((size_t)t->l * (size_t)t->n_s, &t->VtU));
   PetscCall(HycoReducerMultiply(t, t->V, S, t->VtU));

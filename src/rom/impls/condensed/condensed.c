@@ -231,11 +231,10 @@ static PetscErrorCode BringStiffness(HycoROM m, const PetscReal mu[])
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   c->current = PETSC_FALSE;
   PetscCall(HycoCondensedFlexibility(c, mu, -1, -1, &definite));
-  HycoCheckModel(
-      definite,
-      "the interpolated flexibility is not positive definite here (one value left out: error %.1e): train on "
-      "more values of the parameters that reach the stiffness",
-      (double)c->errors[0]);
+  HycoCheckModel(definite,
+                 "the interpolated flexibility is not positive definite here (error %.1e with one value left out); "
+                 "train on more values of the parameters that affect the stiffness",
+                 (double)c->errors[0]);
   PetscCall(HycoGridFieldEvaluate(&c->field[HYCO_FIELD_H], mu, -1, -1, c->H));
   PetscCall(PetscArraycpy(c->at, mu, c->dim));
   c->current = PETSC_TRUE;
@@ -418,13 +417,14 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
                                      c->affine[p] ? " (affine: exact)" : ""));
   if (c->exact_gap)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  from the scene itself: gaps%s\n", c->exact_loads ? ", loads" : ""));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  one value left out, relative: flexibility %.1e, gap %.1e, forces %.1e\n",
-                                   (double)c->errors[0], (double)c->errors[1], (double)c->errors[2]));
+  PetscCall(PetscViewerASCIIPrintf(
+      viewer, "  relative errors with one value left out: flexibility %.1e, gap %.1e, forces %.1e\n",
+      (double)c->errors[0], (double)c->errors[1], (double)c->errors[2]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  fields and stresses on %d of %d elements, or the whole mesh\n",
                                    (int)m->mesh->n_cells, (int)m->whole_cells));
   if (!m->trust.n)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  estimates its errors by values left out%s\n",
-                                     !c->law && c->errors_u[0] < 0 ? ", and none of u: an older file" : ""));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  error estimates: from values left out%s\n",
+                                     !c->law && c->errors_u[0] < 0 ? ", none of u (an older file)" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -453,15 +453,15 @@ static void ReportPoints(HycoReducer t, HycoCondensed c, HycoTraining *r)
   if (!c->chosen || c->target_met) return;
   if (c->hopeless < 0)
     snprintf(r->missed, sizeof(r->missed),
-             "-hyco_condensed_tol was not reached: the forces' error, one value left out, is %.1e, and %.1e was asked; "
-             "raise -hyco_condensed_max_values, which is %d, or -hyco_condensed_tol",
+             "-hyco_condensed_tol was not reached: the error of the forces, with one value left out, is %.1e, and %.1e "
+             "was requested; raise -hyco_condensed_max_values, which is %d, or -hyco_condensed_tol",
              (double)c->errors[2], (double)Condensing(t)->tol, (int)Condensing(t)->max_values);
   else
     snprintf(r->missed, sizeof(r->missed),
-             "-hyco_condensed_tol was not reached: with %d values of %s the forces' error, one of them left out, is "
-             "%.1e, and hardly falls as values are added, where %.1e was asked: the stiffness or the contacts do not "
-             "depend smoothly on %s (a kink, as of abs or max, a jump); train a hybrid model, or raise "
-             "-hyco_condensed_tol",
+             "-hyco_condensed_tol was not reached: with %d values of %s the error of the forces, with one value left "
+             "out, is %.1e and hardly falls as values are added, and %.1e was requested; the stiffness or the contacts "
+             "do not depend smoothly on %s (a jump, or a kink, for example of abs or max): train a hybrid model, or "
+             "raise -hyco_condensed_tol",
              (int)c->n[c->hopeless], name, (double)c->by_parameter[c->hopeless], (double)Condensing(t)->tol, name);
 }
 
@@ -476,11 +476,11 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscCall(HycoTrainingAddFact(r, "left_out_flexibility_gap_forces", 0));
   r->fact[r->n_facts - 1].n = 3;
   PetscCall(PetscArraycpy(r->fact[r->n_facts - 1].value, c->errors, 3));
-  snprintf(
-      r->summary, sizeof(r->summary),
-      "condensed: %d snapshots, flexibility at %d points; one training value left out, relative: flexibility %.1e, "
-      "gap %.1e, forces %.1e; %d displacement modes\n",
-      (int)r->n_samples, (int)n, (double)c->errors[0], (double)c->errors[1], (double)c->errors[2], (int)r->n_modes);
+  snprintf(r->summary, sizeof(r->summary),
+           "condensed: %d snapshots, flexibility at %d points; relative errors with one training value left out: "
+           "flexibility %.1e, gap %.1e, forces %.1e; %d displacement modes\n",
+           (int)r->n_samples, (int)n, (double)c->errors[0], (double)c->errors[1], (double)c->errors[2],
+           (int)r->n_modes);
   ReportPoints(t, c, r);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -225,7 +225,7 @@ PetscErrorCode HycoCondensedPrepareLoads(HycoCondensed c)
 
   PetscFunctionBegin;
   PetscCall(ForEach(c, NULL, Evaluate, &v));
-  HycoCheck(v.n_probes == c->n_probes, "the condensed model has %d points for its loads, and its scene asks for %d",
+  HycoCheck(v.n_probes == c->n_probes, "the condensed model has %d points for its loads, and its scene needs %d",
             (int)c->n_probes, (int)v.n_probes);
   c->n_theta = v.n_theta;
   PetscCall(NumberLoads(c));

@@ -235,7 +235,7 @@ static PetscErrorCode TakeColumns(HycoROM m, HycoReducer t, const PetscReal from
     PetscInt at = -1;
 
     PetscCall(PetscFindInt(m->mesh->cell_whole[e], t->n_seeds_cell, t->seeds_cell, &at));
-    PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a cell of the model was not chosen");
+    PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a cell of the model is not among the chosen cells");
     PetscCall(PetscArraycpy(*to + (size_t)e * size, from + (size_t)at * size, size));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -260,8 +260,8 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   if (!(m->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(m->numbers[1] < 0.5,
                  "the condensed model misses its own training displacements by %.0f %% on average (%d inelastic modes, "
-                 "%d cells)%s: take more cells (-hyco_condensed_cells; 0: all), fewer modes "
-                 "(-hyco_condensed_inelastic_tol), or train a cubature",
+                 "%d cells)%s: use more cells (-hyco_condensed_cells; 0: all), fewer modes "
+                 "(-hyco_condensed_inelastic_tol), or train a cubature model",
                  100 * (double)m->numbers[1], (int)to->n_inelastic, (int)m->mesh->n_cells, worst);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -275,12 +275,11 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscCall(HycoTrainingAddFact(r, "n_inelastic_modes", (PetscReal)c->n_inelastic));
   PetscCall(HycoTrainingAddFact(r, "n_load_modes", (PetscReal)c->n_loads));
   PetscCall(HycoTrainingAddFact(r, "inelastic_amplification", c->amplification));
-  snprintf(
-      r->summary, sizeof(r->summary),
-      "condensed: %d snapshots; %d displacement modes, which answer %d contacts, %d inelastic modes and the loads; "
-      "laws in %d of %d elements (%.1f %%)\n",
-      (int)r->n_samples, (int)r->n_modes, (int)m->pairs.n, (int)c->n_inelastic, (int)m->mesh->n_cells,
-      (int)m->whole_cells, 100 * (double)r->rid_fraction);
+  snprintf(r->summary, sizeof(r->summary),
+           "condensed: %d snapshots; %d displacement modes for %d contacts, %d inelastic modes and the loads; laws in "
+           "%d of %d elements (%.1f %%)\n",
+           (int)r->n_samples, (int)r->n_modes, (int)m->pairs.n, (int)c->n_inelastic, (int)m->mesh->n_cells,
+           (int)m->whole_cells, 100 * (double)r->rid_fraction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -291,8 +290,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer,
                                    "  contacts: %d; inelastic modes: %d, loads inside the bodies: %d\n  laws in %d of "
-                                   "%d elements (%.1f %%); what the "
-                                   "modes do not have counts up to %.3g times\n",
+                                   "%d elements (%.1f %%); an error of the modes is amplified up to %.3g times\n",
                                    (int)m->pairs.n, (int)c->n_inelastic, (int)c->n_loads, (int)m->mesh->n_cells,
                                    (int)m->whole_cells, 100. * (double)m->mesh->n_cells / (double)m->whole_cells,
                                    (double)c->amplification));

@@ -28,8 +28,8 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("cubature"));
   PetscCall(HycoOptionsReal("-hyco_cubature_tol",
-                            "what the chosen cells may miss of the training's internal forces, relative (0: all cells)",
-                            0, 1, &c->tol, NULL));
+                            "relative error of the chosen cells in the internal forces of training (0: all cells)", 0,
+                            1, &c->tol, NULL));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -52,12 +52,11 @@ static PetscErrorCode Begin(HycoReducer t)
 
   PetscFunctionBegin;
   HycoCheck(vectors || t->hybrid != HYCO_HYBRID_ALL,
-            "-hyco_hybrid all is for -hyco_model_type hybrid; a cubature has contact (all "
-            "displacements of the contacts' nodes) or rank (one for each contact)");
-  HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for scenes in the plane and in space; on a line take hybrid "
-                             "or projection");
-  HycoCheck(!t->scene->n_ties, "-hyco_model_type cubature is for scenes without ties; take hybrid, projection, "
-                               "condensed or regression");
+            "-hyco_hybrid all is for -hyco_model_type hybrid; for a cubature use contact (all displacements of the "
+            "contacts' nodes) or rank (one for each contact)");
+  HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for 2D and 3D; in 1D use hybrid or projection");
+  HycoCheck(!t->scene->n_ties,
+            "-hyco_model_type cubature is for scenes without ties; use hybrid, projection, condensed or regression");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -144,8 +143,8 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscCall(HycoTrainingAddFact(r, "cubature_error", c->error[0]));
   DescribeContact(m, contact);
   snprintf(r->summary, sizeof(r->summary),
-           "%d snapshots; %d displacement modes; %s; cubature on %d of %d elements (%.1f %%), which misses %.1e of the "
-           "training's internal forces\n",
+           "%d snapshots; %d displacement modes; %s; cubature on %d of %d elements (%.1f %%), with an error of %.1e in "
+           "the internal forces of training\n",
            (int)r->n_samples, (int)r->n_modes, contact, (int)m->mesh->n_cells, (int)m->whole_cells,
            100 * (double)r->rid_fraction, (double)c->error[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -172,8 +171,8 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
     most = PetscMax(most, c->weight[e]);
   }
   PetscCall(PetscViewerASCIIPrintf(viewer,
-                                   "  cubature: %d of %d elements (%.1f %%), weights from %.3g to %.3g; missed of the "
-                                   "training's internal forces: %.1e; %d contacts\n",
+                                   "  cubature: %d of %d elements (%.1f %%), weights from %.3g to %.3g; error of the "
+                                   "internal forces of training: %.1e; %d contacts\n",
                                    (int)m->mesh->n_cells, (int)m->whole_cells,
                                    100. * (double)m->mesh->n_cells / (double)m->whole_cells, (double)least,
                                    (double)most, (double)c->error[0], (int)m->pairs.n));

@@ -154,8 +154,8 @@ static PetscErrorCode FindWeights(HycoReducer t, PetscInt n, const PetscReal vec
   for (PetscInt e = 0; e < n_cells; e++) w[e] = near[e] > 0 ? 1 : w[e];
   Measure(n_cells, n, vectors, sigma, n_bodies, volume, body, w, c->error);
   HycoCheckModel(c->error[0] <= PetscMax(10 * c->tol, 1e-6) && c->error[1] <= 1e-3,
-                 "the cubature misses %.1e of the training's internal forces and %.1e of a body's volume: take another "
-                 "-hyco_cubature_tol, or fewer modes (-hyco_pod_tol)",
+                 "the error of the cubature is %.1e in the internal forces of training and %.1e in a body's volume; "
+                 "use another -hyco_cubature_tol, or fewer modes (-hyco_pod_tol)",
                  (double)c->error[0], (double)c->error[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -45,8 +45,8 @@ PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
   PetscCall(PetscBLASIntCast(n, &nb));
   LAPACKpotrf_("U", &lb, N, &lb, &info);
   HycoCheckModel(!info || ridge > 0,
-                 "-hyco_hybrid_ridge 0: the %d modes are not independent on the %d unknowns of A; take -1", (int)l,
-                 (int)n);
+                 "-hyco_hybrid_ridge 0: the %d modes are not linearly independent on the %d unknowns of A; use -1",
+                 (int)l, (int)n);
   if (!info) LAPACKpotrs_("U", &lb, &nb, N, &lb, X, &lb, &info);
   for (PetscInt k = 0; k < n; k++) {
     for (PetscInt j = 0; j < l; j++) g->G[j * n + k] = info ? 0 : X[k * l + j] * weight[j];
@@ -73,7 +73,7 @@ static PetscErrorCode SetUpBasis(HycoROM m)
   g->n_free = m->hybrid == HYCO_HYBRID_ALL && !g->bordered ? 0 : l;
   m->n = g->n_free + m->n_fe;
   if (!g->contact) m->n_L = m->m; /* else the type has said it */
-  HycoCheckModel(m->n > 0, "the model has no unknown: every training solution is zero");
+  HycoCheckModel(m->n > 0, "the model has no unknowns, because every training solution is zero; check the loads");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

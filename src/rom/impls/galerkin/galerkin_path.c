@@ -85,8 +85,9 @@ static PetscErrorCode Displace(HycoROM m)
   PetscCall(HycoGalerkinExpand(m));
   PetscCall(PetscArraycpy(q->u, m->U, m->fe->n_dof));
   for (PetscInt k = 0; k < m->fe->n_dof && !q->moved; k++) {
-    if (m->fe->fixed[k]) q->u[k] = q->held[k];
+    if (HycoFESupports(m->fe, k)) q->u[k] = q->held[k];
   }
+  if (!q->moved) HycoFEComplete(m->fe, q->u);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -105,6 +106,7 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
     PetscCall((*((HycoGalerkin)m->data)->forces)(m, p->end, p->f_int, &p->summands));
   else {
     HycoLinearForceAdd(q->linear, q->u, p->f_local);
+    HycoFEPassTied(m->fe, p->f_local);
     PetscCall(HycoReducedTest(m, p->f_local, p->f_int));
   }
   PetscCall(VecWAXPY(p->r, -1, p->f_int, p->F));
@@ -221,11 +223,13 @@ static PetscErrorCode ReadOptions(HycoROM m, HycoPath p)
 
 static PetscErrorCode CreateLinear(HycoROM m)
 {
+  HycoMesh mesh = m->fe->mesh;
   PetscBool *inside;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->fe->mesh->n_nodes, &inside));
-  for (PetscInt i = 0; i < m->fe->mesh->n_nodes; i++) inside[i] = (PetscBool)(m->role[i] == HYCO_ROLE_A);
+  PetscCall(PetscMalloc1(mesh->n_nodes, &inside));
+  for (PetscInt i = 0; i < mesh->n_nodes; i++) inside[i] = (PetscBool)(m->role[i] == HYCO_ROLE_A);
+  for (PetscInt k = 0; k < mesh->n_tied; k++) inside[mesh->tied[k]] = PETSC_TRUE; /* forces that pass to others */
   PetscCall(HycoLinearForceCreate(m->fe, inside, &((HycoGalerkin)m->data)->path->linear));
   PetscCall(PetscFree(inside));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -35,8 +35,8 @@ static PetscErrorCode ChooseGrid(PetscInt asked, PetscInt unknowns, PetscInt n_p
   *each = asked;
   if (!asked) *each = q > 12 || !q ? 1 : PetscMax(2, PetscMin(101, (PetscInt)PetscPowReal(most, 1 / (PetscReal)q)));
   all = PetscPowReal((PetscReal)*each, (PetscReal)q);
-  HycoCheck(all <= 1e6, "-hyco_scan %d gives %.0e points for %d parameters; give less", (int)asked, (double)all,
-            (int)q);
+  HycoCheck(all <= 1e6, "-hyco_scan %d gives %.0e points for %d parameters; give a smaller number", (int)asked,
+            (double)all, (int)q);
   *n = (PetscInt)(all + 0.5);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -169,7 +169,7 @@ static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscI
       "of %d times, and predictions near there are arbitrary; %s, or keep the model: -hyco_keep_singular",
       here, (int)s->n_singular, (int)s->n,
       ((HycoGalerkin)m->data)->forces
-          ? "take more cells (-hyco_condensed_cells; 0: all) or fewer modes (-hyco_condensed_inelastic_tol)"
+          ? "use more cells (-hyco_condensed_cells; 0: all) or fewer modes (-hyco_condensed_inelastic_tol)"
           : "enlarge the RID (-hyco_rid_layers 1), change the modes (-hyco_pod_tol)");
 }
 

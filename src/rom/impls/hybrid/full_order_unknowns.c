@@ -28,14 +28,14 @@ PetscErrorCode HycoHybridSetFromOptions(HycoReducer t)
   s->ridge = -1;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("hybrid"));
-  PetscCall(HycoOptionsInt("-hyco_hybrid_trials",
-                           "candidate sets judged by their training error when hybrid is rank (0: from the size)", 0,
-                           PETSC_MAX_INT / 8, &s->trials, NULL));
-  PetscCall(
-      HycoOptionsReal("-hyco_hybrid_ridge",
-                      "of the interface's regression when hybrid is all (-1: by the training error; 0: plain least "
-                      "squares)",
-                      -1, 1, &s->ridge, NULL));
+  PetscCall(HycoOptionsInt(
+      "-hyco_hybrid_trials",
+      "with -hyco_hybrid rank: number of candidate sets that are judged by their training error (0: from the size)", 0,
+      PETSC_MAX_INT / 8, &s->trials, NULL));
+  PetscCall(HycoOptionsReal("-hyco_hybrid_ridge",
+                            "with -hyco_hybrid all: strength of the ridge regression for the modes (-1: by the "
+                            "training error; 0: plain least squares)",
+                            -1, 1, &s->ridge, NULL));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -69,10 +69,10 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
   }
   PetscCall(PetscFree(taken));
   for (PetscInt k = 0; k < m->m; k++)
-    HycoCheckModel(
-        candidate[k] >= 0,
-        "the contact of node %d has no displacement in A of its own to keep full order; use -hyco_hybrid contact",
-        (int)m->slave_id[m->contact[k]]);
+    HycoCheckModel(candidate[k] >= 0,
+                   "the contact of node %d has no displacement of its own in A that could stay full order; use "
+                   "-hyco_hybrid contact",
+                   (int)m->slave_id[m->contact[k]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -452,11 +452,13 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
     kind = HYCO_HYBRID_CONTACT; /* no contact in the RID: plain hyper-reduction (31) */
   if (kind == HYCO_HYBRID_AUTO) kind = n_contact < n_all ? HYCO_HYBRID_CONTACT : HYCO_HYBRID_ALL;
   if (kind == HYCO_HYBRID_CONTACT && n_contact == n_all && n_contact) {
-    HycoFailNoModel("-hyco_hybrid contact leaves the modes without equation: every unknown of A is a contact's; use "
-                    "rank, all or auto");
+    HycoFailNoModel("-hyco_hybrid contact leaves no equation for the modes, because every unknown of A belongs to a "
+                    "contact; use rank, all or auto");
   }
   HycoCheckModel(kind != HYCO_HYBRID_ALL || !t->most_full_order || n_all <= t->most_full_order,
-                 "the RID has %d unknowns, too many to keep them all full order in a dense matrix", (int)n_all);
+                 "the RID has %d unknowns, too many to keep all of them full order in a dense matrix; use -hyco_hybrid "
+                 "contact or rank",
+                 (int)n_all);
   if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
   if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all));
   if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));

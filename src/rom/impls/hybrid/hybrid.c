@@ -30,10 +30,10 @@ static PetscErrorCode SetFromOptions(HycoROM m)
   PetscFunctionBegin;
   PetscObjectOptionsBegin((PetscObject)m);
   PetscCall(HycoOptionsFor(""));
-  PetscCall(HycoOptionsWord("-hyco_reconstruct_solver",
-                            "of (41): Lawson and Hanson's active set, or TAO's bnls; auto: TAO where the active set "
-                            "stops short",
-                            HycoReconstructSolvers, &h->reconstruct_solver, NULL));
+  PetscCall(HycoOptionsWord(
+      "-hyco_reconstruct_solver",
+      "solver of (41): the active set of Lawson and Hanson, or TAO's bnls; auto: TAO if the active set stops early",
+      HycoReconstructSolvers, &h->reconstruct_solver, NULL));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -61,7 +61,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
     a += m->role[i] == HYCO_ROLE_A;
   }
   for (PetscInt k = 0; k < m->pairs.n; k++) in += m->in_rid[k];
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  modes that seeded the RID besides: %d dual, %d stress, %d force\n",
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  other modes that seeded the RID: %d dual, %d stress, %d force\n",
                                    (int)m->counts[0], (int)m->counts[1], (int)m->counts[2]));
   PetscCall(PetscViewerASCIIPrintf(
       viewer, "  RID: %d of %d elements (%.1f %%), %d of %d nodes, %d in A; %d of %d contacts\n", (int)m->mesh->n_cells,

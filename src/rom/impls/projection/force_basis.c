@@ -18,15 +18,16 @@ PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
   s->max_its = 100;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor(""));
-  PetscCall(HycoOptionsWord("-hyco_dual",
-                            "forces: of the finite elements (hybrid, cubature); factorised dual snapshots, or they "
-                            "themselves (projection, cubature) [fe; nnmf if projection]",
-                            HycoDuals, &dual, NULL));
+  PetscCall(
+      HycoOptionsWord("-hyco_dual",
+                      "contact forces: finite-element multipliers (hybrid, cubature), or combinations of factorised "
+                      "dual snapshots or of the dual snapshots (projection, cubature) [fe; nnmf if projection]",
+                      HycoDuals, &dual, NULL));
   PetscCall(HycoOptionsFor("projection or cubature"));
   PetscCall(HycoOptionsInt("-hyco_nnmf_vectors",
-                           "vectors of the nonnegative factorisation (0: as many as displacement modes)", 0,
+                           "number of vectors of the nonnegative factorisation (0: that of the displacement modes)", 0,
                            PETSC_MAX_INT, &s->vectors, NULL));
-  PetscCall(HycoOptionsInt("-hyco_nnmf_max_its", "alternations of the nonnegative factorisation", 1, PETSC_MAX_INT,
+  PetscCall(HycoOptionsInt("-hyco_nnmf_max_its", "iterations of the nonnegative factorisation", 1, PETSC_MAX_INT,
                            &s->max_its, NULL));
   PetscOptionsEnd();
   s->dual = (HycoDual)dual;
@@ -233,7 +234,7 @@ PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
   if (!(m->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(m->numbers[1] < 0.5,
                  "the %s model misses its own training displacements by %.0f %% on average (%d modes, %d force "
-                 "vectors, condition %.0e)%s: take more modes (a smaller -hyco_pod_tol)%s",
+                 "vectors, condition %.0e)%s: use more modes (a smaller -hyco_pod_tol)%s",
                  m->traits.title, 100 * (double)m->numbers[1], (int)m->l, (int)p->l_lambda, (double)m->numbers[0],
                  worst, m->traits.cells ? ", or more cells (a smaller -hyco_cubature_tol)" : "");
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -92,8 +92,8 @@ PetscErrorCode HycoProjectionViewForces(HycoROM m, PetscViewer viewer)
 
   PetscFunctionBegin;
   if (m->counts[1])
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  supremizers of the dual snapshots, which join the modes: %d\n",
-                                     (int)m->counts[1]));
+    PetscCall(
+        PetscViewerASCIIPrintf(viewer, "  supremizers of the dual snapshots among the modes: %d\n", (int)m->counts[1]));
   PetscCall(PetscViewerASCIIPrintf(
       viewer, "  force vectors: %d (%s); energy of the training forces that they leave out: %.2e\n", (int)p->l_lambda,
       p->dual == HYCO_DUAL_NNMF ? "nonnegative factorisation of the dual snapshots" : "the dual snapshots",

@@ -28,7 +28,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   if (!y->K || !y->m || s->iterative) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoKernelSize(y->K, &p));
   if (p && strcmp(s->now.type, HYCO_TAO_ACTIVE_SET)) {
-    HycoFormat(why, "contact alone holds a body, and %s cannot solve that; use -hyco_solver_type active_set",
+    HycoFormat(why, "a body is held by contact only, which %s cannot solve; use -hyco_solver_type active_set",
                s->now.word);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -368,16 +368,18 @@ PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscRe
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   PetscCheck(!s->iterative, HycoComm(s), HYCO_ERR_NO_MODEL,
-             "the flexibility B K^-1 B^T needs a factor of the stiffness, and the solver chose iterations%s: give more "
-             "memory (-hyco_memory), or -hyco_linear direct",
+             "the flexibility B K^-1 B^T needs a factor of the stiffness, and the solver chose iterations%s; allow "
+             "more memory (-hyco_memory), or use -hyco_linear direct",
              s->why_iterative);
   form = HycoSolverFindForm(s, "dual");
   d = (const Dual *)form->data;
   PetscCheck(!d->p, HycoComm(s), HYCO_ERR_NO_MODEL,
-             "contact alone holds a body: K^-1 does not exist, and there is no flexibility B K^-1 B^T");
-  PetscCheck(d->S && s->stiffness.of.K && s->stiffness.of.B && s->reason != HYCO_DIVERGED_SINGULAR, HycoComm(s),
-             HYCO_ERR_NO_MODEL,
-             "the stiffness is singular (is a body held by nothing?): there is no flexibility B K^-1 B^T");
+             "a body is held by contact only, so that K^-1 does not exist and there is no flexibility B K^-1 B^T; add "
+             "a support");
+  PetscCheck(
+      d->S && s->stiffness.of.K && s->stiffness.of.B && s->reason != HYCO_DIVERGED_SINGULAR, HycoComm(s),
+      HYCO_ERR_NO_MODEL,
+      "the stiffness is singular, so that there is no flexibility B K^-1 B^T; check that supports hold every body");
   *m = d->m;
   *S = d->S;
   PetscFunctionReturn(PETSC_SUCCESS);

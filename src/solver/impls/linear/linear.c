@@ -92,8 +92,8 @@ PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[]
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   PetscCheck(!s->iterative, HycoComm(s), HYCO_ERR_NO_MODEL,
-             "a condensed model needs a factor of the stiffness, and the solver chose iterations%s: give more memory "
-             "(-hyco_memory), or -hyco_linear direct",
+             "a condensed model needs a factor of the stiffness, and the solver chose iterations%s; allow more memory "
+             "(-hyco_memory), or use -hyco_linear direct",
              s->why_iterative);
   PetscCall(HycoKernelSize(s->system->K, &p));
   PetscCheck(s->stiffness.direct && s->stiffness.of.K && !p, HycoComm(s), PETSC_ERR_ORDER,

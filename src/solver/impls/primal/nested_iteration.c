@@ -45,7 +45,7 @@ static PetscErrorCode RowsGet(Mat K, Rows *r)
   PetscFunctionBegin;
   r->K = K;
   PetscCall(MatGetRowIJ(K, 0, PETSC_FALSE, PETSC_FALSE, &r->n, &r->start, &r->col, &done));
-  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_SUP, "the matrix shows no rows");
+  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_SUP, "the matrix gives no access to its rows");
   PetscCall(MatSeqAIJGetArrayRead(K, &r->value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -353,7 +353,8 @@ static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, HycoOpti
   PetscFunctionBegin;
   (void)form;
   PetscCall(HycoOptionsBool("-hyco_solver_multilevel",
-                            "full order, every unknown a contact: start from coarser problems", &s->multilevel, NULL));
+                            "full order, if every unknown belongs to a contact: start from coarser problems",
+                            &s->multilevel, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -31,8 +31,8 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   else if (!s->system->symmetric)
     HycoFormat(why, "the form dual_free needs a symmetric system; use -hyco_solver_form dual");
   else if (p)
-    HycoFormat(why, "contact alone holds a body, and the form dual_free cannot solve that; use -hyco_solver_type "
-                    "active_set");
+    HycoFormat(
+        why, "a body is held by contact only, which the form dual_free cannot solve; use -hyco_solver_type active_set");
   else
     *cost = 4;
   PetscFunctionReturn(PETSC_SUCCESS);

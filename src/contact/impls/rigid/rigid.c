@@ -1,0 +1,47 @@
+/*
+  A rigid body, given by its gap as an obstacle is. It translates as one node of the mesh does, which is the master of
+  all of the contact's nodes: supports, forces and springs of that node are the body's.
+*/
+#include "../../facing.h"
+
+static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
+{
+  HycoMesh m = fe->mesh;
+  const PetscReal one = 1;
+  PetscBool *carries, shared = PETSC_FALSE;
+  PetscInt g = 0, body;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, "contact", c->master, &g));
+  HycoCheck(m->group_start[g + 1] == m->group_start[g] + 1,
+            "contact %s: its master is the one node that the rigid body moves with, and %s has %d nodes; give a group "
+            "of one point",
+            c->name, c->master, (int)(m->group_start[g + 1] - m->group_start[g]));
+  body = m->group_node[m->group_start[g]];
+  PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
+  PetscCall(HycoPairsReserve(pairs, m->group_start[g + 1] - m->group_start[g], 1));
+  PetscCall(PetscMalloc1(m->n_nodes, &carries));
+  HycoSurfaceCarriers(m, g, carries);
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
+    if (m->group_node[k] == body) shared = PETSC_TRUE;
+    if (carries[m->group_node[k]]) HycoPairsAppend(pairs, index, m->group_node[k], 1, &body, &one);
+  }
+  PetscCall(PetscFree(carries));
+  HycoCheck(!shared, "contact %s: its slave %s has the node that the rigid body moves with (%s); leave it out", c->name,
+            c->slave, c->master);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactCreate_Rigid(HycoContact contact)
+{
+  static const struct _HycoContactOps ops = {.setup = SetUp};
+
+  PetscFunctionBegin;
+  PetscCall(HycoContactDeclare(contact, "slave", "the nodes that may meet it", HYCO_ENTRY_GROUP, PETSC_TRUE));
+  PetscCall(HycoContactDeclare(contact, "master", "the node that it moves with", HYCO_ENTRY_GROUP, PETSC_TRUE));
+  PetscCall(HycoContactDeclareNormal(contact));
+  PetscCall(HycoContactDeclare(contact, "gap", "the initial gap", HYCO_ENTRY_EXPRESSION, PETSC_TRUE));
+  PetscCall(HycoContactSetOps(contact, &ops));
+  contact->rigid = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
