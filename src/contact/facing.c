@@ -1,5 +1,6 @@
 /* Normals and sizes of surfaces on moved nodes. */
 #include "facing.h"
+#include <hycocarriers.h>
 #include <hycokinematics.h>
 #include <hycovector.h>
 
@@ -13,12 +14,11 @@ PetscErrorCode HycoSurfaceNormals(HycoFE fe, PetscInt group, PetscReal normal[])
 
 void HycoSurfaceCarriers(HycoMesh m, PetscInt group, PetscBool carries[])
 {
-  const PetscInt corners = HycoCellKinds[m->type].corners;
-
   for (PetscInt i = 0; i < m->n_nodes; i++) carries[i] = PETSC_FALSE;
   for (PetscInt k = m->group_start[group]; k < m->group_start[group + 1]; k++) carries[m->group_node[k]] = PETSC_TRUE;
-  for (PetscInt k = 0; k < m->n_facets * m->nf && m->type == HYCO_TET10; k++) {
-    if (m->facet_group[k / m->nf] == group && k % m->nf < corners) carries[m->facets[k]] = PETSC_FALSE;
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    for (PetscInt v = 0; v < HycoMeshFirstCarrier(m) && m->facet_group[f] == group; v++)
+      carries[m->facets[f * m->nf + v]] = PETSC_FALSE;
   }
 }
 
@@ -40,15 +40,17 @@ PetscErrorCode HycoFacetVector(HycoFE fe, PetscInt facet, PetscReal vector[3])
 void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[])
 {
   HycoMesh m = fe->mesh;
-  const PetscInt nf = m->nf;
+  const PetscInt nf = m->nf, corners = HycoCellKinds[m->type].corners;
 
   for (PetscInt i = 0; i < m->n_nodes; i++) size[i] = 0;
-  for (PetscInt k = 0; k < m->n_facets * nf; k++) {
-    const PetscInt a = m->facets[k], b = m->facets[k / nf * nf + (k + 1) % nf];
-    const PetscReal length = HycoDistance(fe->X + 3 * a, fe->X + 3 * b);
+  for (PetscInt k = 0; k < m->n_facets * corners; k++) {
+    const PetscInt *node = m->facets + k / corners * nf, v = k % corners, ends[2] = {node[v], node[(v + 1) % corners]};
+    const PetscReal length = HycoDistance(fe->X + 3 * ends[0], fe->X + 3 * ends[1]);
 
-    if (m->facet_group[k / nf] != group) continue;
-    size[a] = PetscMax(size[a], length);
-    size[b] = PetscMax(size[b], length);
+    if (m->facet_group[k / corners] != group) continue;
+    for (PetscInt e = 0; e < 2; e++) size[ends[e]] = PetscMax(size[ends[e]], length);
+    for (PetscInt w = corners; w < nf; w++) { /* of second order: the middle of the edge, of the facet */
+      if (w == corners + v || w == 2 * corners) size[node[w]] = PetscMax(size[node[w]], length);
+    }
   }
 }

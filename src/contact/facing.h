@@ -9,9 +9,7 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
 PetscErrorCode HycoSurfaceNormals(HycoFE fe, PetscInt group, PetscReal normal[]);
 /* The integral of n dS over a facet. */
 PetscErrorCode HycoFacetVector(HycoFE fe, PetscInt facet, PetscReal vector[3]);
-/* Whether each node of a contact's group (carries: n_nodes; the others are PETSC_FALSE) carries its forces: all do but
-   the corners of faces of six nodes, to which a uniform pressure gives nothing. The middles of the sides have a third of
-   the face each, which integrates products of degree 2: pressures as they vary and gaps of degree 1. */
+/* Whether each node of a contact's group carries its forces (carries: n_nodes; the others are PETSC_FALSE). */
 void HycoSurfaceCarriers(HycoMesh mesh, PetscInt group, PetscBool carries[]);
 /* Fails where measured gaps overlap more than the scene allows, or a map has moved a pair's nodes apart along the
    surface. normal and gap as HycoContactGeometry() gives them. */

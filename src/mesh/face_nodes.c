@@ -118,10 +118,10 @@ PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh)
   PetscFunctionBegin;
   PetscCall(Collect(mesh, &n, &list));
   for (PetscInt k = 0; k < n; k++) added += !k || !AreOne(&list[k], &list[k - 1]);
-  if (at && mesh->tag[at - 1] >= PETSC_MAX_INT / 8 - added) {
+  if (at && mesh->tag[at - 1] >= PETSC_MAX_INT - 1 - added) {
     PetscCall(PetscFree(list));
     HycoFail("%s: the nodes that its hex20 cells need for contact would have tags beyond %lld; renumber the mesh", path,
-             (long long)PETSC_MAX_INT / 8);
+             (long long)PETSC_MAX_INT - 1);
   }
   PetscCall(PetscRealloc((size_t)(at + added) * sizeof(*mesh->tag), &mesh->tag));
   PetscCall(PetscRealloc((size_t)(3 * (at + added)) * sizeof(*mesh->xyz), &mesh->xyz));

@@ -4,6 +4,7 @@
   the other ranks, whose cells around the vertices join next. What contacts decide is decided on rank 0, which has their
   surfaces.
 */
+#include <hycocarriers.h>
 #include <hycofomimpl.h>
 #include <hycodomain.h>
 
@@ -227,7 +228,7 @@ static PetscErrorCode ExtendContact(Rid *r, const HycoPairs *pairs, PetscReal d)
       PetscInt on = 0;
 
       for (PetscInt v = 0; v < m->nv; v++) on += near[m->cells[r->around[j] * m->nv + v]] > 0;
-      if (on >= m->nf) PetscCall(Add(r, r->around[j]));
+      if (on >= m->nf - HycoMeshFirstCarrier(m)) PetscCall(Add(r, r->around[j]));
     }
   }
   PetscCall(PetscFree4(node, in, near_on, near));

@@ -121,6 +121,7 @@ static PetscReal EdgeLength(HycoMesh m, PetscInt a, PetscInt b)
 static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
 {
   const HycoMesh m = t->fom->surface;
+  const PetscInt corners = HycoCellKinds[m->type].corners;
   PetscReal sum = 0;
   PetscInt n = 0;
 
@@ -133,8 +134,8 @@ static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
       const PetscInt *node = m->facets + f * m->nf;
 
       if (m->facet_group[f] != g || m->nf < 2) continue;
-      for (PetscInt j = 0; j < m->nf; j++) sum += EdgeLength(m, node[j], node[(j + 1) % m->nf]);
-      n += m->nf;
+      for (PetscInt j = 0; j < corners; j++) sum += EdgeLength(m, node[j], node[(j + 1) % corners]);
+      n += corners;
     }
   }
   *mean = n ? sum / n : 0;
