@@ -24,6 +24,17 @@ PetscErrorCode HycoPODCreateSVD(MPI_Comm comm, SVD *svd);
 PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
                        PetscReal sigma[]);
 
+/*
+  POD of columns that come in blocks. *merged (NULL at first) becomes V diag(sigma) of [*merged S], less the modes with
+  the least energy, as many as together have at most the share `loss` of it (NULL: all are zero); *S is freed and NULL.
+  HycoPOD() of the last *merged has the singular values of all columns but for the square root of what the calls have
+  cut off. svd: of type HYCO_SVD_TSQR. Takes twice the memory of [*merged S] and that of what is left. Collective, as
+  HycoPOD().
+*/
+PetscErrorCode HycoPODMerge(SVD svd, PetscReal loss, Mat *merged, Mat *S);
+/* The columns of the dense X into those of Y, with the same rows, from `at` on. Collective. */
+PetscErrorCode HycoCopyColumns(Mat X, Mat Y, PetscInt at);
+
 /* The l of k singular values that HycoPOD() takes: the tail is summed, so that tol can be tiny. */
 PetscInt HycoPODRank(PetscInt k, const PetscReal sigma[], PetscReal tol, PetscReal noise, PetscInt max_modes);
 

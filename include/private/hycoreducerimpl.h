@@ -50,6 +50,7 @@ struct _p_HycoReducer {
   /* user parameters */
   char folder[PETSC_MAX_PATH_LEN]; /* of snapshots; "": from the model's name */
   PetscReal tol[HYCO_N_SEEDS], noise, extension;
+  PetscReal pod_memory; /* MB of all ranks for the snapshots of a field; 0: all at once */
   PetscInt max_modes, layers;
   char svd_type[32]; /* of PODs */
   PetscBool seed[HYCO_N_SEEDS], whole_rid;
@@ -87,6 +88,7 @@ struct _p_HycoReducer {
     void *ctx;
   } greedy;
   /* state of a run, rank 0 unless said */
+  HycoSnapshots store;    /* borrowed, every rank */
   HycoSamples samples;    /* borrowed, every rank */
   HycoSamples validation; /* given by the user (borrowed; NULL: none). Every rank */
   HycoSamples held;       /* of this run; NULL: none. Every rank */
@@ -103,7 +105,7 @@ struct _p_HycoReducer {
   PetscInt l;             /* modes */
   PetscReal *sigma;       /* every rank: l */
   Mat V;                  /* every rank: the modes (at least l), rows spread */
-  Mat S;                  /* every rank: displacements, n_dof x n_s, rows spread as V's */
+  Mat S;                  /* every rank: displacements, n_dof x n_s, rows spread as V's; NULL with pod_memory */
   PetscReal *U_rid;       /* of these, the rows of the model's mesh, column major */
   PetscReal *V_rid;       /* and of V */
   PetscInt *surface_node; /* by node of the contacts' surfaces: that of the model's mesh, or -1 */
@@ -173,10 +175,28 @@ PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPath
 PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N, PetscInt n_rows, PetscReal tol,
                                  PetscInt max_modes, HycoBasis *basis);
 PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes);
-/* On rank 0 (column major, the caller's; elsewhere empty) the first n_columns of S, a matrix of displacements, at nodes
-   that rank 0 gives by their numbers in the whole mesh. Collective. */
+/* On rank 0 (column major; elsewhere empty) the first n_columns of S, a matrix of displacements, at nodes that rank 0
+   gives by their numbers in the whole mesh; of all snapshots, the caller's to free. Collective. */
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
-                                    PetscReal **rows);
+                                    PetscReal rows[]);
+PetscErrorCode HycoReducerFetchSnapshots(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **rows);
+/* use(t, first, S, ctx) for all displacements, in batches of columns from `first` on: all of them, or with pod_memory
+   as many as that lets in. S is not to be changed. Collective. */
+typedef PetscErrorCode (*HycoBatchUse)(HycoReducer t, PetscInt first, Mat S, void *ctx);
+PetscErrorCode HycoReducerEachBatch(HycoReducer t, HycoBatchUse use, void *ctx);
+/* The field of the store whose modes a seed is of. */
+extern const char *const HycoSeedFields[HYCO_N_SEEDS];
+/* A field of the n samples from `first` on, displacements less their lifting; of path j, displacements with the steps
+   between its listed times. The caller's. Collective. */
+PetscErrorCode HycoReducerReadField(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscInt first, PetscInt n,
+                                    Mat *S);
+PetscErrorCode HycoReducerReadPath(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscInt j, Mat *path);
+/* POD of S into a basis; the same of a field of the store, read in batches that pod_memory bounds, of paths each as
+   HycoPathModesAdd() and HycoPathModesJoin() do. Collective. */
+PetscErrorCode HycoReducerTakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscInt most, HycoBasis *basis);
+PetscErrorCode HycoReducerStreamBasis(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscReal tol, PetscInt most);
+/* What brings a path with this first singular value to the size of the largest. */
+PetscReal HycoPathScale(PetscReal first, PetscReal largest);
 /* Displacements of all snapshots less their lifting, n_dof x n_s, the caller's; X^T Y of two matrices with the same
    rows, column major, on every rank. Collective. */
 PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, Mat *S);

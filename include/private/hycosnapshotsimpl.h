@@ -25,14 +25,16 @@ static inline PetscInt HycoSnapshotsSteps(HycoScene scene)
   return PetscMax(1, scene->n_times);
 }
 /*
-  One field of all samples as a dense matrix, a column per sample, of a scene with a history one per listed time of
-  each, sample after sample: "U" (n_nodes x dim unrolled), "lambda" (n_contacts), "sigma" (n_cells x n_sigma unrolled),
-  "force" (as U); of a history "inelastic" (n_cells, accumulated). Rows in the mesh file's order, in contiguous blocks
-  over comm, of whole blocks of rows: those of U that belong to a node stay together. Collective; the caller owns it. A
-  field without rows gives a matrix of zero rows.
+  One field of the n samples from `first` on as a dense matrix, a column per sample, of a scene with a history one per
+  listed time of each, sample after sample: "U" (n_nodes x dim unrolled), "lambda" (n_contacts), "sigma" (n_cells x
+  n_sigma unrolled), "force" (as U); of a history "inelastic" (n_cells, accumulated). Rows in the mesh file's order, in
+  contiguous blocks over comm, of whole blocks of rows: those of U that belong to a node stay together. Collective; the
+  caller owns it. A field without rows gives a matrix of zero rows.
 */
-PetscErrorCode HycoSnapshotsGetField(HycoSnapshots store, HycoSamples samples, const char field[], PetscInt block,
-                                     Mat *S);
+PetscErrorCode HycoSnapshotsGetField(HycoSnapshots store, HycoSamples samples, PetscInt first, PetscInt n,
+                                     const char field[], PetscInt block, Mat *S);
+/* The number of rows of a field. Collective. */
+PetscErrorCode HycoSnapshotsGetRows(HycoSnapshots store, HycoSamples samples, const char field[], PetscInt *n);
 /* Of a path the displacements at steps that full order took between listed times (at most five between
    two; none in files of older versions), a column each; `rows` rows of `total` here. Collective; the caller owns it. */
 PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots store, const PetscReal mu[], PetscInt rows, PetscInt total,

@@ -134,7 +134,7 @@ static PetscErrorCode SayTraining(Check *check, const Cost *cost, PetscBool give
   Seconds(training, all);
   PetscCall(Say("a training on %s%d solutions, including held-out ones: about %s of full-order solves, and %.3g MB of "
                 "solutions; the reduction is not included\n",
-                given ? "" : "say ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
+                given ? "" : "for example ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
   cJSON_AddNumberToObject(object, "n_training", cost->n_training);
   cJSON_AddNumberToObject(object, "n_stiffness", cost->n_stiff);
   cJSON_AddNumberToObject(object, "seconds_training", training);

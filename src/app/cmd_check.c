@@ -244,7 +244,7 @@ static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
   if (!words[0] && p == s->n_parameters) PetscFunctionReturn(PETSC_SUCCESS); /* laws and tables have it all the same */
   PetscCall(Say("%s %s", what, s->parameter[p]));
   if (p < s->n_parameters) PetscCall(Say(" from %g to %g", (double)s->lo[p], (double)s->hi[p]));
-  PetscCall(Say(": reaches %s\n", words[0] ? words : "nothing"));
+  PetscCall(Say(": affects %s\n", words[0] ? words : "nothing"));
   if (!words[0]) CheckWarn(check, "the %s %s affects nothing: no expression uses it", what, s->parameter[p]);
   if (p < s->n_parameters && s->lo[p] == s->hi[p])
     CheckWarn(check, "the range of the parameter %s is a single value", s->parameter[p]);

@@ -440,8 +440,9 @@ static PetscErrorCode FetchOnModel(HycoReducer t, HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscFree(t->U_rid));
   PetscCall(PetscFree(t->V_rid));
-  PetscCall(HycoReducerFetchRows(t, t->S, t->n_s, n, node, &t->U_rid));
-  PetscCall(HycoReducerFetchRows(t, t->V, t->l, n, node, &t->V_rid));
+  PetscCall(HycoReducerFetchSnapshots(t, n, node, &t->U_rid));
+  PetscCall(PetscMalloc1((size_t)n * (size_t)t->sizes[3] * (size_t)t->l + 1, &t->V_rid));
+  PetscCall(HycoReducerFetchRows(t, t->V, t->l, n, node, t->V_rid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -522,6 +523,7 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
   else
     PetscCall(PetscSNPrintf(folder, sizeof(folder), "%s.snapshots", path));
   PetscCall(HycoSnapshotsOpen(HycoComm(t), t->scene, folder, store));
+  t->store = *store;
   t->fingerprint = (*store)->fingerprint;
   PetscCall(HycoReducerViewFromOptions(t, NULL, "-hyco_reducer_view"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -536,6 +538,7 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   PetscCall(PetscFree(t->solved));
   PetscCall(PetscMalloc1(t->n_solvers, &t->solved));
   PetscCall(PetscArraycpy(t->solved, solved, t->n_solvers));
+  t->store = NULL;
   PetscCall(HycoSnapshotsDestroy(store));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -6,6 +6,8 @@
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
 
+const char *const HycoSeedFields[HYCO_N_SEEDS] = {"U", "sigma", "force", "lambda", "inelastic", "spring"};
+
 PetscErrorCode HycoReducerCount(HycoReducer t)
 {
   PetscFunctionBegin;
@@ -86,8 +88,18 @@ PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal produc
 PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, Mat *S)
 {
   PetscFunctionBegin;
-  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", t->sizes[3], S));
-  PetscCall(RemoveLifting(t, *S));
+  PetscCall(HycoReducerReadField(t, store, HYCO_SEED_DISPLACEMENT, 0, t->n_s / HycoSnapshotsSteps(t->scene), S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerReadField(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscInt first, PetscInt n,
+                                    Mat *S)
+{
+  const PetscBool moves = (PetscBool)(kind == HYCO_SEED_DISPLACEMENT);
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsGetField(store, t->samples, first, n, HycoSeedFields[kind], moves ? t->sizes[3] : 1, S));
+  if (moves) PetscCall(RemoveLifting(t, *S));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -136,8 +148,12 @@ PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Paths that move this much less than the largest are not brought to its size: they may be nothing but noise. */
-#define SLIGHT 1e-3
+PetscReal HycoPathScale(PetscReal first, PetscReal largest)
+{
+  const PetscReal slight = 1e-3; /* paths that move so much less than the largest may be nothing but noise */
+
+  return largest / PetscMax(first, slight * largest);
+}
 
 PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPathModes *modes)
 {
@@ -176,21 +192,6 @@ PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The columns of X into those of Y from `at` on. */
-static PetscErrorCode CopyColumns(Mat X, Mat Y, PetscInt at)
-{
-  PetscInt n;
-  Mat part;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetSize(X, NULL, &n));
-  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatDenseGetSubMatrix(Y, PETSC_DECIDE, PETSC_DECIDE, at, at + n, &part));
-  PetscCall(MatCopy(X, part, SAME_NONZERO_PATTERN));
-  PetscCall(MatDenseRestoreSubMatrix(Y, &part));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The modes of the paths side by side (N rows, n_rows of them here), each path brought to the size of the largest: a
    slow one counts as much as a fast one. */
 static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, PetscInt N, PetscInt n_rows, Mat *joined)
@@ -212,8 +213,8 @@ static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, Petsc
 
     if (!modes->V[j]) continue;
     PetscCall(MatGetSize(modes->V[j], NULL, &l));
-    PetscCall(MatScale(modes->V[j], largest / PetscMax(modes->first[j], SLIGHT * largest)));
-    PetscCall(CopyColumns(modes->V[j], *joined, at));
+    PetscCall(MatScale(modes->V[j], HycoPathScale(modes->first[j], largest)));
+    PetscCall(HycoCopyColumns(modes->V[j], *joined, at));
     at += l;
   }
   PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
@@ -221,8 +222,7 @@ static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* POD of S into a basis. */
-static PetscErrorCode TakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscInt most, HycoBasis *basis)
+PetscErrorCode HycoReducerTakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscInt most, HycoBasis *basis)
 {
   PetscInt N, n;
 
@@ -242,70 +242,74 @@ PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N
   PetscFunctionBegin;
   PetscCall(JoinPaths(t, modes, N, n_rows, &joined));
   PetscCall(HycoPathModesDestroy(modes));
-  PetscCall(TakeBasis(t, joined, tol, max_modes, basis));
+  PetscCall(HycoReducerTakeBasis(t, joined, tol, max_modes, basis));
   PetscCall(MatDestroy(&joined));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Path j of S, n columns of it, and of displacements (U_store not NULL) its steps between these. */
-static PetscErrorCode GetPath(HycoReducer t, Mat S, PetscInt j, PetscInt n, HycoSnapshots U_store, Mat *path)
+PetscErrorCode HycoReducerReadPath(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscInt j, Mat *path)
 {
-  PetscInt n_par, N, n_rows, n_between;
+  PetscInt n_par, N, n_rows, n[2];
   const PetscReal *mu;
-  Mat part, between;
+  Mat listed, between;
 
   PetscFunctionBegin;
-  PetscCall(MatDenseGetSubMatrix(S, PETSC_DECIDE, PETSC_DECIDE, j * n, (j + 1) * n, &part));
-  if (!U_store) PetscCall(MatDuplicate(part, MAT_COPY_VALUES, path));
-  if (U_store) {
-    PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-    PetscCall(MatGetSize(S, &N, NULL));
-    PetscCall(MatGetLocalSize(S, &n_rows, NULL));
-    PetscCall(HycoSnapshotsGetBetween(U_store, mu + j * n_par, n_rows, N, &between));
-    PetscCall(RemoveLifting(t, between));
-    PetscCall(MatGetSize(between, NULL, &n_between));
-    PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, N, n + n_between, NULL, path));
-    PetscCall(CopyColumns(part, *path, 0));
-    PetscCall(CopyColumns(between, *path, n));
-    PetscCall(MatDestroy(&between));
-  }
-  PetscCall(MatDenseRestoreSubMatrix(S, &part));
+  PetscCall(HycoReducerReadField(t, store, kind, j, 1, &listed));
+  *path = listed;
+  if (kind != HYCO_SEED_DISPLACEMENT) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  PetscCall(MatGetSize(listed, &N, &n[0]));
+  PetscCall(MatGetLocalSize(listed, &n_rows, NULL));
+  PetscCall(HycoSnapshotsGetBetween(store, mu + j * n_par, n_rows, N, &between));
+  PetscCall(RemoveLifting(t, between));
+  PetscCall(MatGetSize(between, NULL, &n[1]));
+  PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, N, n[0] + n[1], NULL, path));
+  PetscCall(HycoCopyColumns(listed, *path, 0));
+  PetscCall(HycoCopyColumns(between, *path, n[0]));
+  PetscCall(MatAssemblyBegin(*path, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*path, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatDestroy(&between));
+  PetscCall(MatDestroy(&listed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The paths of S, `n` columns each. U_store: as above. */
-static PetscErrorCode AddPaths(HycoReducer t, Mat S, PetscInt n, HycoSnapshots U_store, PetscReal tol,
-                               HycoPathModes *modes)
+/* The modes of each path, then of these. */
+static PetscErrorCode FindPathBasis(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscReal tol, PetscInt most)
 {
+  HycoPathModes modes = {0};
+  PetscInt N = 0, n_rows = 0;
+
   PetscFunctionBegin;
-  for (PetscInt j = 0; j < t->n_s / n; j++) {
+  for (PetscInt j = 0; j < t->n_s / HycoSnapshotsSteps(t->scene); j++) {
     Mat path;
 
-    PetscCall(GetPath(t, S, j, n, U_store, &path));
-    PetscCall(HycoPathModesAdd(t, path, tol, modes));
+    PetscCall(HycoReducerReadPath(t, store, kind, j, &path));
+    PetscCall(MatGetSize(path, &N, NULL));
+    PetscCall(MatGetLocalSize(path, &n_rows, NULL));
+    PetscCall(HycoPathModesAdd(t, path, tol, &modes));
     PetscCall(MatDestroy(&path));
   }
+  PetscCall(HycoPathModesJoin(t, &modes, N, n_rows, tol, most, &t->basis[kind]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. Of paths
-   that of each, then of these. */
-static PetscErrorCode FindBasis(HycoReducer t, HycoSnapshots store, Mat S, PetscInt kind, PetscBool all)
+/* POD of a field of the snapshots: every mode above the noise, or (all false) those that the tolerance takes. */
+static PetscErrorCode FindBasis(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscBool all)
 {
   const PetscInt most = kind == HYCO_SEED_DISPLACEMENT ? t->max_modes : 0;
   const PetscReal tol = all ? 0 : t->tol[kind];
-  HycoPathModes modes = {0};
-  PetscInt N, n_rows;
+  Mat S;
 
   PetscFunctionBegin;
-  if (!t->scene->n_times) {
-    PetscCall(TakeBasis(t, S, tol, most, &t->basis[kind]));
-    PetscFunctionReturn(PETSC_SUCCESS);
+  if (t->pod_memory > 0) {
+    PetscCall(HycoReducerStreamBasis(t, store, kind, tol, most));
+  } else if (t->scene->n_times) {
+    PetscCall(FindPathBasis(t, store, kind, tol, most));
+  } else {
+    PetscCall(HycoReducerReadField(t, store, kind, 0, t->n_s, &S));
+    PetscCall(HycoReducerTakeBasis(t, S, tol, most, &t->basis[kind]));
+    PetscCall(MatDestroy(&S));
   }
-  PetscCall(MatGetSize(S, &N, NULL));
-  PetscCall(MatGetLocalSize(S, &n_rows, NULL));
-  PetscCall(AddPaths(t, S, HycoSnapshotsSteps(t->scene), kind == HYCO_SEED_DISPLACEMENT ? store : NULL, tol, &modes));
-  PetscCall(HycoPathModesJoin(t, &modes, N, n_rows, tol, most, &t->basis[kind]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -328,7 +332,7 @@ static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l
 }
 
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
-                                    PetscReal **rows)
+                                    PetscReal rows[])
 {
   const PetscInt dim = t->sizes[3], n_rows = t->rank ? 0 : n * dim;
   const PetscScalar *s;
@@ -342,17 +346,48 @@ PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, Pe
   PetscCall(MatGetLayouts(S, &layout, NULL));
   PetscCall(PetscSFCreate(HycoComm(t), &sf));
   PetscCall(PetscSFSetGraphLayout(sf, layout, n_rows, NULL, PETSC_OWN_POINTER, row));
-  PetscCall(PetscMalloc1((size_t)n_rows * (size_t)n_columns + 1, rows));
   PetscCall(MatDenseGetLDA(S, &lda));
   PetscCall(MatDenseGetArrayRead(S, &s));
   for (PetscInt k = 0; k < n_columns; k++) {
-    PetscReal *column = *rows + (size_t)k * (size_t)n_rows;
+    PetscReal *column = rows + (size_t)k * (size_t)n_rows;
 
     PetscCall(HycoSFBcast(sf, MPIU_REAL, 1, s + (size_t)k * (size_t)lda, column));
   }
   PetscCall(MatDenseRestoreArrayRead(S, &s));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(PetscFree(row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What FetchBatch() is to fetch, and where it puts it. */
+typedef struct {
+  PetscInt n;
+  const PetscInt *node;
+  PetscReal *rows;
+} Fetched;
+
+/* A HycoBatchUse. */
+static PetscErrorCode FetchBatch(HycoReducer t, PetscInt first, Mat S, void *ctx)
+{
+  Fetched *f = (Fetched *)ctx;
+  const PetscInt n_rows = t->rank ? 0 : f->n * t->sizes[3];
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(S, NULL, &n));
+  PetscCall(HycoReducerFetchRows(t, S, n, f->n, f->node, f->rows + (size_t)first * (size_t)n_rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerFetchSnapshots(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **rows)
+{
+  const PetscInt n_rows = t->rank ? 0 : n * t->sizes[3];
+  Fetched f = {n, node, NULL};
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1((size_t)n_rows * (size_t)t->n_s + 1, &f.rows));
+  *rows = f.rows;
+  PetscCall(HycoReducerEachBatch(t, FetchBatch, &f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -376,9 +411,25 @@ static PetscErrorCode FetchContacts(HycoReducer t)
     t->contact_row[i] = contact[i] ? t->n_contact_nodes : -1;
     if (contact[i]) node[t->n_contact_nodes++] = surface->node_whole ? surface->node_whole[i] : i;
   }
-  PetscCall(HycoReducerFetchRows(t, t->S, t->n_s, t->n_contact_nodes, node, &t->U_contact));
+  PetscCall(HycoReducerFetchSnapshots(t, t->n_contact_nodes, node, &t->U_contact));
   PetscCall(PetscFree(node));
   PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A HycoBatchUse: norms of displacements less their lifting, and V^T of these. */
+static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *ctx)
+{
+  HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
+  Mat X;
+
+  PetscFunctionBegin;
+  (void)ctx;
+  PetscCall(MatDuplicate(S, MAT_COPY_VALUES, &X));
+  PetscCall(RemoveLifting(t, X));
+  PetscCall(MatGetColumnNorms(X, NORM_2, t->U_norm + first));
+  PetscCall(HycoReducerMultiply(t, basis->V, X, basis->coefficients + (size_t)first * (size_t)basis->l));
+  PetscCall(MatDestroy(&X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -387,36 +438,27 @@ static PetscErrorCode FetchContacts(HycoReducer t)
 static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, PetscBool all)
 {
   HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
-  Mat S;
+  const PetscInt n = t->n_s / HycoSnapshotsSteps(t->scene);
 
   PetscFunctionBegin;
-  PetscCall(HycoSnapshotsGetField(store, t->samples, "U", t->sizes[3], &t->S));
+  if (!(t->pod_memory > 0)) PetscCall(HycoSnapshotsGetField(store, t->samples, 0, n, "U", t->sizes[3], &t->S));
   PetscCall(FetchContacts(t));
-  PetscCall(MatDuplicate(t->S, MAT_COPY_VALUES, &S));
-  PetscCall(RemoveLifting(t, S));
-  PetscCall(FindBasis(t, store, S, HYCO_SEED_DISPLACEMENT, all));
+  PetscCall(FindBasis(t, store, HYCO_SEED_DISPLACEMENT, all));
   HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give a smaller value",
                  (double)t->tol[HYCO_SEED_DISPLACEMENT]);
   HycoCheckModel(basis->l,
                  "every training solution has zero displacement, so that there are no modes; check the loads");
   PetscCall(PetscMalloc1(t->n_s, &t->U_norm));
-  PetscCall(MatGetColumnNorms(S, NORM_2, t->U_norm));
-  PetscCall(PetscMalloc1(basis->l * t->n_s, &basis->coefficients));
-  PetscCall(HycoReducerMultiply(t, basis->V, S, basis->coefficients));
-  PetscCall(MatDestroy(&S));
+  PetscCall(PetscMalloc1((size_t)basis->l * (size_t)t->n_s, &basis->coefficients));
+  PetscCall(HycoReducerEachBatch(t, ProjectBatch, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Stresses (points are cells) or generalised forces, also those of springs (points are nodes), if they seed the RID. */
-static PetscErrorCode ReduceField(HycoReducer t, HycoSnapshots store, const char field[], PetscInt kind, PetscBool all)
+static PetscErrorCode ReduceField(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscBool all)
 {
-  Mat S;
-
   PetscFunctionBegin;
-  if (!t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSnapshotsGetField(store, t->samples, field, 1, &S));
-  PetscCall(FindBasis(t, store, S, kind, all));
-  PetscCall(MatDestroy(&S));
+  if (t->seed[kind]) PetscCall(FindBasis(t, store, kind, all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -664,7 +706,7 @@ static PetscErrorCode ReadForces(HycoReducer t, HycoSnapshots store)
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
   PetscCall(PetscMalloc1((size_t)m * (size_t)t->n_s + 1, &t->Lambda));
   for (PetscInt k = 0; k < t->n_s; k++)
-    PetscCall(HycoSnapshotsReadRows(store, mu + k / steps * n_par, k % steps, "lambda", 0, m,
+    PetscCall(HycoSnapshotsReadRows(store, mu + k / steps * n_par, k % steps, HycoSeedFields[HYCO_SEED_DUAL], 0, m,
                                     t->Lambda + (size_t)k * (size_t)m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -721,10 +763,10 @@ PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool a
 {
   PetscFunctionBegin;
   PetscCall(ReduceDisplacements(t, store, all));
-  PetscCall(ReduceField(t, store, "sigma", HYCO_SEED_STRESS, all));
-  PetscCall(ReduceField(t, store, "force", HYCO_SEED_FORCE, all));
-  PetscCall(ReduceField(t, store, "spring", HYCO_SEED_SPRING, all));
-  PetscCall(ReduceField(t, store, "inelastic", HYCO_SEED_INELASTIC, all));
+  PetscCall(ReduceField(t, store, HYCO_SEED_STRESS, all));
+  PetscCall(ReduceField(t, store, HYCO_SEED_FORCE, all));
+  PetscCall(ReduceField(t, store, HYCO_SEED_SPRING, all));
+  PetscCall(ReduceField(t, store, HYCO_SEED_INELASTIC, all));
   if (t->scene->n_times) HycoOnRoot(HycoComm(t), ReadTaken(t, store));
   PetscCall(ReduceForces(t, store));
   PetscCall(HycoReducerTakeBases(t));

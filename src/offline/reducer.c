@@ -249,6 +249,10 @@ static PetscErrorCode ReadTraining(HycoReducer t)
                             &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));
   PetscCall(HycoOptionsReal("-hyco_pod_noise", "singular values below this share of the first are treated as round-off",
                             0, 1, &t->noise, NULL));
+  PetscCall(HycoOptionsReal("-hyco_pod_memory",
+                            "<MB> of all ranks for the snapshots of a field while their POD is computed, in batches "
+                            "(0: all at once)",
+                            0, 1e9, &t->pod_memory, NULL));
   PetscCall(ReadSVDType(t, PetscOptionsObject));
   PetscCall(HycoOptionsInt("-hyco_pod_max_modes", "largest number of displacement modes (0: no limit)", 0,
                            PETSC_MAX_INT, &t->max_modes, NULL));

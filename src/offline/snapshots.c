@@ -513,15 +513,13 @@ HycoDefineMethod(HycoSnapshotsGetSolved, (HycoSnapshots s, PetscInt *n_groups, c
                  HYCO_SNAPSHOTS_CLASSID, *n_groups = s->n_groups;
                  *solved = s->solved)
 
-static PetscErrorCode ReadColumns(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt lo, PetscInt rows,
-                                  PetscInt total, PetscScalar data[], PetscInt lda)
+/* Rows lo .. lo + rows - 1 of the n samples at mu. */
+static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal mu[], const char field[], PetscInt lo,
+                                  PetscInt rows, PetscInt total, PetscScalar data[], PetscInt lda)
 {
-  const PetscInt n_steps = HycoSnapshotsSteps(s->scene);
-  PetscInt n, n_par;
-  const PetscReal *mu;
+  const PetscInt n_steps = HycoSnapshotsSteps(s->scene), n_par = s->scene->n_parameters;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   for (PetscInt k = 0; k < n; k++) {
     char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
     HycoH5 h;
@@ -559,22 +557,32 @@ static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt block, Mat *S)
+PetscErrorCode HycoSnapshotsGetRows(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt *n)
 {
-  PetscInt n, total = 0, blocks, own = PETSC_DECIDE, lo, hi, lda;
+  PetscFunctionBegin;
+  *n = 0;
+  HycoOnRoot(HycoComm(s), FirstSize(s, samples, field, n));
+  PetscCallMPI(MPI_Bcast(n, 1, MPIU_INT, 0, HycoComm(s)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, PetscInt first, PetscInt n,
+                                     const char field[], PetscInt block, Mat *S)
+{
+  PetscInt n_par, total = 0, blocks, own = PETSC_DECIDE, lo, hi, lda;
+  const PetscReal *mu;
   PetscScalar *data;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
-  HycoOnRoot(HycoComm(s), FirstSize(s, samples, field, &total));
-  PetscCallMPI(MPI_Bcast(&total, 1, MPIU_INT, 0, HycoComm(s)));
+  PetscCall(HycoSamplesGet(samples, NULL, &n_par, &mu));
+  PetscCall(HycoSnapshotsGetRows(s, samples, field, &total));
   blocks = total / block;
   PetscCall(PetscSplitOwnership(HycoComm(s), &own, &blocks));
   PetscCall(MatCreateDense(HycoComm(s), own * block, PETSC_DECIDE, total, n * HycoSnapshotsSteps(s->scene), NULL, S));
   PetscCall(MatGetOwnershipRange(*S, &lo, &hi));
   PetscCall(MatDenseGetLDA(*S, &lda));
   PetscCall(MatDenseGetArray(*S, &data));
-  HycoOnEach(HycoComm(s), ReadColumns(s, samples, field, lo, hi - lo, total, data, lda));
+  HycoOnEach(HycoComm(s), ReadColumns(s, n, mu + first * n_par, field, lo, hi - lo, total, data, lda));
   PetscCall(MatDenseRestoreArray(*S, &data));
   PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));

@@ -217,6 +217,71 @@ static PetscErrorCode TestTypes(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Columns first .. first + n - 1 of S. */
+static PetscErrorCode TakeColumns(Mat S, PetscInt first, PetscInt n, Mat *part)
+{
+  Mat view;
+
+  PetscFunctionBegin;
+  PetscCall(MatDenseGetSubMatrix(S, PETSC_DECIDE, PETSC_DECIDE, first, first + n, &view));
+  PetscCall(MatDuplicate(view, MAT_COPY_VALUES, part));
+  PetscCall(MatDenseRestoreSubMatrix(S, &view));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Columns that come in blocks of one or several: the modes and singular values are those of all together, as far as
+   they are above what the merges lose, and never more than that are held. */
+static PetscErrorCode TestMerged(void)
+{
+  const PetscInt N = 900, n = 40, blocks[] = {1, 7, 15, 40};
+  const PetscReal lost = 1e-11;
+  PetscReal s[16], sigma[64];
+  Mat S, V;
+  PetscInt l;
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 16; k++) s[k] = pow(10, -k);
+  PetscCall(Make(N, n, 16, s, &S));
+  for (size_t b = 0; b < sizeof(blocks) / sizeof(blocks[0]); b++) {
+    Mat merged = NULL;
+    PetscInt held = 0;
+
+    for (PetscInt first = 0; first < n; first += blocks[b]) {
+      const PetscInt count = PetscMin(blocks[b], n - first);
+      Mat part;
+
+      PetscCall(TakeColumns(S, first, count, &part));
+      PetscCall(HycoPODMerge(svd, PetscSqr(lost) * count / n, &merged, &part));
+      CHECK(!part, "the block is not freed");
+      PetscCall(MatGetSize(merged, NULL, &l));
+      held = PetscMax(held, l);
+    }
+    CHECK(held <= 14, "blocks of %d: %d columns held", (int)blocks[b], (int)held);
+    PetscCall(HycoPOD(svd, merged, 0, 3e-10, 0, &V, &l, sigma));
+    CHECK(l == 10, "blocks of %d: expected 10 modes, found %d", (int)blocks[b], (int)l);
+    for (int k = 0; k < l; k++) CHECK_NEAR(sigma[k], s[k], lost);
+    PetscCall(CheckModes(V, N, l, s, 1e-13, 1e-3));
+    PetscCall(MatDestroy(&V));
+    PetscCall(MatDestroy(&merged));
+  }
+  PetscCall(MatDestroy(&S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestMergedZeros(void)
+{
+  const PetscReal zero = 0;
+  Mat S, merged = NULL;
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 2; k++) {
+    PetscCall(Make(50, 3, 1, &zero, &S));
+    PetscCall(HycoPODMerge(svd, 1e-20, &merged, &S));
+    CHECK(!merged, "columns of zeros have modes");
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
@@ -225,6 +290,8 @@ static PetscErrorCode Test(void)
   PetscCall(TestCriterion());
   PetscCall(TestZeroAndOne());
   PetscCall(TestTypes());
+  PetscCall(TestMerged());
+  PetscCall(TestMergedZeros());
   PetscCall(SVDDestroy(&svd));
   PetscCall(TestGram());
   PetscFunctionReturn(PETSC_SUCCESS);

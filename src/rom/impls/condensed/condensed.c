@@ -492,11 +492,12 @@ static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
   return m * m * ((PetscReal)a->n_flexibilities + m / 6.0) + 2 * (PetscReal)a->n_modes * (PetscReal)a->rid_contacts;
 }
 
-/* Its samples fill a disk where the contacts are many: then only when it is asked for. */
+/* Its samples fill a disk where the contacts are many, and its POD has all columns in memory: then only when it is
+   asked for. */
 static PetscBool Offers(HycoReducer t, PetscBool targets)
 {
   (void)targets;
-  return (PetscBool)(t->sizes[2] > 0 && t->sizes[2] <= MANY_CONTACTS);
+  return (PetscBool)(t->sizes[2] > 0 && t->sizes[2] <= MANY_CONTACTS && !(t->pod_memory > 0));
 }
 
 PetscErrorCode HycoROMCreate_Condensed(HycoROM m)

@@ -141,6 +141,23 @@ static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What ProjectBatch() projects on, and where it puts it. */
+typedef struct {
+  Mat Q;
+  PetscInt n;
+  PetscReal *QtU;
+} Projected;
+
+/* A HycoBatchUse: Q^T of displacements. */
+static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *ctx)
+{
+  Projected *p = (Projected *)ctx;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerMultiply(t, p->Q, S, p->QtU + (size_t)first * (size_t)p->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V, sigma (0 for these) and
    VtU have more columns. */
 static PetscErrorCode Enrich(HycoReducer t)
@@ -164,7 +181,7 @@ static PetscErrorCode Enrich(HycoReducer t)
   ((HycoForceBasis)t->training)->n_supremizers = q;
   if (q) {
     PetscCall(PetscMalloc1(found * t->n_s, &QtU));
-    PetscCall(HycoReducerMultiply(t, Q, t->S, QtU));
+    PetscCall(HycoReducerEachBatch(t, ProjectBatch, &(Projected){Q, found, QtU}));
     PetscCall(Append(t, q, Q, found, QtU));
     PetscCall(PetscFree(QtU));
   }

@@ -1,0 +1,80 @@
+/*
+  POD of columns that come in blocks: hierarchical approximate POD along a chain (Himpele, Leibner, Rave, SIAM J. Sci.
+  Comput. 40 (2018) A3267-A3292). What has come so far is held as V diag(sigma), whose left singular vectors and values
+  are those of the columns but for what was cut off: with the energies that the blocks lose adding up to e^2, every
+  singular value is off by at most e, and so is the projection error of all columns onto the modes together.
+*/
+#include <hycoalgorithms.h>
+
+/* V diag(sigma), in the place of V. */
+static PetscErrorCode ScaleModes(Mat V, PetscInt l, const PetscReal sigma[])
+{
+  PetscInt rows, lda;
+  PetscScalar *v;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetLocalSize(V, &rows, NULL));
+  PetscCall(MatDenseGetLDA(V, &lda));
+  PetscCall(MatDenseGetArray(V, &v));
+  for (PetscInt j = 0; j < l; j++) {
+    for (PetscInt i = 0; i < rows; i++) v[(size_t)j * (size_t)lda + (size_t)i] *= sigma[j];
+  }
+  PetscCall(MatDenseRestoreArray(V, &v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCopyColumns(Mat X, Mat Y, PetscInt at)
+{
+  PetscInt n;
+  Mat part;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(X, NULL, &n));
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatDenseGetSubMatrix(Y, PETSC_DECIDE, PETSC_DECIDE, at, at + n, &part));
+  PetscCall(MatCopy(X, part, SAME_NONZERO_PATTERN));
+  PetscCall(MatDenseRestoreSubMatrix(Y, &part));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* [A B]; both are freed. */
+static PetscErrorCode Join(Mat *A, Mat *B, Mat *joined)
+{
+  PetscInt N, n[2], rows;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(*A, &N, &n[0]));
+  PetscCall(MatGetSize(*B, NULL, &n[1]));
+  PetscCall(MatGetLocalSize(*A, &rows, NULL));
+  PetscCall(MatCreateDense(PetscObjectComm((PetscObject)*A), rows, PETSC_DECIDE, N, n[0] + n[1], NULL, joined));
+  PetscCall(HycoCopyColumns(*A, *joined, 0));
+  PetscCall(HycoCopyColumns(*B, *joined, n[0]));
+  PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*joined, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatDestroy(A));
+  PetscCall(MatDestroy(B));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPODMerge(SVD svd, PetscReal loss, Mat *merged, Mat *S)
+{
+  PetscInt N, n, l;
+  PetscReal *sigma;
+  Mat all, V;
+
+  PetscFunctionBegin;
+  if (*merged)
+    PetscCall(Join(merged, S, &all));
+  else {
+    all = *S;
+    *S = NULL;
+  }
+  PetscCall(MatGetSize(all, &N, &n));
+  PetscCall(PetscMalloc1(n + 1, &sigma));
+  PetscCall(HycoPOD(svd, all, loss, 0, 0, &V, &l, sigma));
+  PetscCall(MatDestroy(&all));
+  if (l) PetscCall(ScaleModes(V, l, sigma));
+  *merged = l ? V : NULL;
+  PetscCall(PetscFree(sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,168 @@
+/*
+  Snapshots that do not fit in memory together (-hyco_pod_memory): read from the store in batches, each of which is
+  merged into the POD of those before.
+*/
+#include <hycoalgorithms.h>
+#include <hycoreducerimpl.h>
+#include <string.h>
+
+/* What a merge needs of each column: the joined matrix, its copy in the SVD, the modes that are left. */
+#define COPIES 3
+/* What batches may lose together, of the noise: less than what decides which modes are above it. */
+#define LOSS 0.1
+
+/* Columns of N rows that the memory has room for, over all ranks: the same on any number of them. */
+static PetscInt Room(HycoReducer t, PetscInt N)
+{
+  return (PetscInt)PetscMin(1e6 * t->pod_memory / (COPIES * sizeof(PetscReal) * PetscMax(1, (PetscReal)N)), 1e9);
+}
+
+PetscErrorCode HycoReducerEachBatch(HycoReducer t, HycoBatchUse use, void *ctx)
+{
+  const PetscInt n_steps = HycoSnapshotsSteps(t->scene), n = t->n_s / n_steps;
+  const PetscInt most = PetscMax(1, Room(t, t->sizes[0] * t->sizes[3]) / n_steps);
+
+  PetscFunctionBegin;
+  if (t->S) {
+    PetscCall((*use)(t, 0, t->S, ctx));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt first = 0; first < n; first += most) {
+    Mat S;
+
+    PetscCall(HycoSnapshotsGetField(t->store, t->samples, first, PetscMin(most, n - first),
+                                    HycoSeedFields[HYCO_SEED_DISPLACEMENT], t->sizes[3], &S));
+    PetscCall((*use)(t, first * n_steps, S, ctx));
+    PetscCall(MatDestroy(&S));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A basis that batches of columns of a field are merged into. */
+typedef struct {
+  HycoReducer t;
+  PetscInt kind, N, room; /* of the field: its seed, its rows, columns that have room */
+  SVD svd;
+  Mat merged;
+} Stream;
+
+/* Columns of *merged: the modes so far. */
+static PetscErrorCode CountModes(const Stream *s, PetscInt *l)
+{
+  PetscFunctionBegin;
+  *l = 0;
+  if (s->merged) PetscCall(MatGetSize(s->merged, NULL, l));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fails where n more columns have no room beside the modes so far. */
+static PetscErrorCode CheckRoom(const Stream *s, PetscInt n)
+{
+  PetscInt l;
+
+  PetscFunctionBegin;
+  PetscCall(CountModes(s, &l));
+  HycoCheck(l + n <= s->room,
+            "-hyco_pod_memory %g has room for %d columns of the field %s, and its %d modes with %d more columns "
+            "need at least %.3g; give more, or a larger -hyco_pod_noise, which keeps fewer modes",
+            (double)s->t->pod_memory, (int)s->room, HycoSeedFields[s->kind], (int)l, (int)n,
+            1e-6 * COPIES * sizeof(PetscReal) * (double)s->N * (double)(l + n) + 0.01);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Merges *S, a share of all columns, which is freed. */
+static PetscErrorCode Merge(Stream *s, PetscReal share, Mat *S)
+{
+  PetscFunctionBegin;
+  HycoLogged(HYCO_EVENT_POD, HycoPODMerge(s->svd, PetscSqr(LOSS * s->t->noise) * share, &s->merged, S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points: as many at a time as there is room for. */
+static PetscErrorCode MergePoints(Stream *s, HycoSnapshots store)
+{
+  const PetscInt n = s->t->n_s;
+  PetscInt l, count;
+  Mat S;
+
+  PetscFunctionBegin;
+  for (PetscInt first = 0; first < n; first += count) {
+    PetscCall(CheckRoom(s, 1));
+    PetscCall(CountModes(s, &l));
+    count = PetscMin(s->room - l, n - first);
+    PetscCall(HycoReducerReadField(s->t, store, s->kind, first, count, &S));
+    PetscCall(Merge(s, (PetscReal)count / (PetscReal)n, &S));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes of path j alone. */
+static PetscErrorCode ReadModes(const Stream *s, HycoSnapshots store, PetscReal tol, PetscInt j, HycoPathModes *modes)
+{
+  PetscInt n;
+  Mat path;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerReadPath(s->t, store, s->kind, j, &path));
+  PetscCall(MatGetSize(path, NULL, &n));
+  ierr = CheckRoom(s, n);
+  if (!ierr) ierr = HycoPathModesAdd(s->t, path, tol, modes);
+  PetscCall(MatDestroy(&path));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Paths, one by one: how large each is, then their modes, scaled by that. */
+static PetscErrorCode MergePaths(Stream *s, HycoSnapshots store, PetscReal tol)
+{
+  const PetscInt n = s->t->n_s / HycoSnapshotsSteps(s->t->scene);
+  PetscReal largest = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt j = 0; j < n; j++) {
+      HycoPathModes modes = {0};
+
+      PetscCall(ReadModes(s, store, tol, j, &modes));
+      if (pass && modes.V[0]) {
+        PetscCall(MatScale(modes.V[0], HycoPathScale(modes.first[0], largest)));
+        PetscCall(Merge(s, 1 / (PetscReal)n, &modes.V[0]));
+      }
+      largest = PetscMax(largest, modes.first[0]);
+      PetscCall(HycoPathModesDestroy(&modes));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The basis from what was merged, which is nothing where all was zero. */
+static PetscErrorCode EndStream(Stream *s, PetscReal tol, PetscInt most)
+{
+  HycoBasis *basis = &s->t->basis[s->kind];
+
+  PetscFunctionBegin;
+  if (s->merged)
+    PetscCall(HycoReducerTakeBasis(s->t, s->merged, tol, most, basis));
+  else
+    PetscCall(PetscCalloc1(s->t->n_s + 1, &basis->sigma));
+  PetscCall(MatDestroy(&s->merged));
+  PetscCall(SVDDestroy(&s->svd));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerStreamBasis(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscReal tol, PetscInt most)
+{
+  Stream s = {.t = t, .kind = kind};
+
+  PetscFunctionBegin;
+  HycoCheck(strcmp(t->svd_type, HYCO_SVD_TSQR) == 0,
+            "-hyco_pod_memory computes PODs by the SVD type %s, and -hyco_pod_svd_type is %s; leave one of the two out",
+            HYCO_SVD_TSQR, t->svd_type);
+  PetscCall(HycoSnapshotsGetRows(store, t->samples, HycoSeedFields[kind], &s.N));
+  s.room = Room(t, s.N);
+  PetscCall(HycoReducerCreateSVD(t, HycoComm(t), &s.svd));
+  PetscCall(t->scene->n_times ? MergePaths(&s, store, tol) : MergePoints(&s, store));
+  PetscCall(EndStream(&s, tol, most));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
