@@ -361,15 +361,20 @@ static PetscErrorCode AddLayer(Rid *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The surfaces that meet rigid bodies, and the nodes that these move with: without all of them Omega_A has no
-   equilibrium of the body, and not its load. */
+/* The cells around all nodes of contacts with rigid bodies, and around the nodes that these move with: without one of
+   them Omega_A has no equilibrium of the body, and not its load. */
 static PetscErrorCode AddRigid(Rid *r, HycoScene scene)
 {
+  HycoMesh m = r->part;
+
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < scene->n_contacts; k++) {
-    if (!scene->contact[k]->rigid) continue;
-    PetscCall(AddGroup(r, scene->contact[k]->slave));
-    PetscCall(AddGroup(r, scene->contact[k]->master));
+  for (PetscInt c = 0; c < 2 * scene->n_contacts; c++) {
+    HycoContact contact = scene->contact[c / 2];
+    PetscInt g = 0;
+
+    if (!contact->rigid) continue;
+    PetscCall(HycoMeshFindGroup(m, "contact", c % 2 ? contact->master : contact->slave, &g));
+    for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) PetscCall(AddAround(r, m->group_node[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -25,13 +25,13 @@ MODULUS = 1000 / 0.91
 
 class Rigid(Case):
     @classmethod
-    def mesh(cls, size=4., n=16, grading=1.5, tip=1):
-        """A block under the line y = 0, and a cell beside it with the group tip of its first node (or of more)."""
+    def mesh(cls, size=4., n=16, grading=1.5, kind='quad4'):
+        """A block under the line y = 0, and a cell beside it whose first node is the group tip."""
         grid, axis = Grid(), size * np.linspace(0, 1, n + 1)**grading
-        grid.box('quad4', [axis, -axis[::-1]], lambda x: x, 'block', {'x0': 'sym', 'y0': 'base', 'y1': 'top'})
+        grid.box(kind, [axis, -axis[::-1]], lambda x: x, 'block', {'x0': 'sym', 'y0': 'base', 'y1': 'top'})
         first = grid.count + 1
-        grid.box('quad4', [np.array([1.5, 1.6]) * size, np.array([0, 0.1]) * size], lambda x: x, 'tool', {})
-        grid.elements.extend((15, grid._tag('tip', 0), (first + k,)) for k in range(tip))
+        grid.box(kind, [np.array([1.5, 1.6]) * size, np.array([0, 0.1]) * size], lambda x: x, 'tool', {})
+        grid.elements.append((15, grid._tag('tip', 0), (first,)))
         grid.write(cls.path('mesh.msh'))
 
     @classmethod
@@ -93,6 +93,16 @@ class Rigid(Case):
                 full, model = (self.hyco(*args, '-mu', '17,9.3')['outputs'] for args in (('solve', '-scene', scene), ('predict', '-model', 'm.h5')))
                 self.near(model['depth'], full['depth'], bound)
                 self.near(model['push'], -17, 1e-6 if kind in ('hybrid', 'cubature') else 0.05)
+
+    def test_triangles(self):
+        """Cells that meet the surface in a node alone are in the RID too."""
+        self.mesh(n=10, kind='tri3')
+        scene = self.scene()
+        trained = self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', 't.h5', '-hyco_rid_layers', 1)
+        self.assertLess(trained['rid_fraction'], 0.6)
+        full, model = (self.hyco(*args, '-mu', '17,9.3')['outputs'] for args in (('solve', '-scene', scene), ('predict', '-model', 't.h5')))
+        for name, value in full.items():
+            self.near(model[name], value, 1e-3, name)
 
     def test_condensed(self):
         """It needs a stiffness that is definite: refused, and right with a soft spring on the body, which takes its share of the load."""
