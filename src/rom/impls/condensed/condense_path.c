@@ -56,9 +56,9 @@ PetscErrorCode HycoCondensedPathBegin(HycoReducer t)
     changed[p] = (PetscBool)(p >= s->n_parameters || s->hi[p] > s->lo[p]);
     c = HycoSceneChanges(s, changed);
     HycoCheckModel(!c.stiffness && !c.rows,
-                    "%s affects %s, and a condensed model of paths has one stiffness and one set of contacts for all "
-                    "paths; use -hyco_model_type hybrid or cubature",
-                    s->parameter[p], c.stiffness ? "the stiffness" : "the contacts' directions");
+                   "%s affects %s, and a condensed model of paths has one stiffness and one set of contacts for all "
+                   "paths; use -hyco_model_type hybrid or cubature",
+                   s->parameter[p], c.stiffness ? "the stiffness" : "the contacts' directions");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
