@@ -155,7 +155,7 @@ class Bench:
 def full_orders(bench, arguments):
     """Their rows; `status` says where and how all was measured."""
     words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core; other programs on the machine add tens of per cent. The models are trained on 12 scattered paths (`-scatter 12`) unless a grid is named, and judged on {len(bench.case.unseen)} "
-             "paths that no training has seen." + (" The times of full order are those of `scripts/bench history`." if arguments.full_order else ""))
+             "paths that no training has seen." + (" The times of full order are those of `scripts/bench history`, at the listed times of the scene." if arguments.full_order else ""))
     known = map(float, arguments.full_order.split(",")) if arguments.full_order else map(bench.full_order, ("tangent", "elastic"))
     return [{"id": 0, "type": "full", "label": name, "status": words, "path_s": cpu}
             for name, cpu in zip(("full order, Newton", "full order, the elastic factor kept"), known)]
