@@ -14,10 +14,11 @@ struct _p_HycoSnapshots {
   PetscInt n_groups, *solved; /* most groups that have solved at a time; solutions of each (room for every rank) */
 };
 
-/* A queue of the points list[n] of mu (n_par each) for as many groups as HycoSnapshotsChooseGroups() says; those that
-   share a stiffness, and its factor, are of a kind. Everything is the same on every rank. Collective. */
+/* A queue of the points list[n] of mu (n_par each) for as many groups as HycoSnapshotsChooseGroups() gives for n_all,
+   the points of the whole set: a solution does not depend on how many others are missing. Points that share a
+   stiffness, and its factor, are of one kind. Everything is the same on every rank. Collective. */
 PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
-                                        PetscInt n, const PetscInt list[], HycoQueue *queue);
+                                        PetscInt n, const PetscInt list[], PetscInt n_all, HycoQueue *queue);
 
 /* Columns of a sample: 1, or the listed times of a history. */
 static inline PetscInt HycoSnapshotsSteps(HycoScene scene)

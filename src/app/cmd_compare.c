@@ -130,7 +130,7 @@ static PetscErrorCode CompareAll(Points *p)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(p->n, &list));
   for (PetscInt k = 0; k < p->n; k++) list[k] = k;
-  PetscCall(HycoSnapshotsCreateQueue(PETSC_COMM_WORLD, p->scene, p->n_par, p->mu, p->n, list, &p->queue));
+  PetscCall(HycoSnapshotsCreateQueue(PETSC_COMM_WORLD, p->scene, p->n_par, p->mu, p->n, list, p->n, &p->queue));
   PetscCall(PetscFree(list));
   PetscCall(CountColumns(p->scene, &p->paths, &p->n_columns));
   PetscCall(PetscCalloc1(p->n * p->n_columns, &p->value));

@@ -194,12 +194,12 @@ static PetscErrorCode FindKinds(HycoScene scene, PetscInt n_par, const PetscReal
 }
 
 PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
-                                        PetscInt n, const PetscInt list[], HycoQueue *queue)
+                                        PetscInt n, const PetscInt list[], PetscInt n_all, HycoQueue *queue)
 {
   PetscInt groups, *kind;
 
   PetscFunctionBegin;
-  PetscCall(HycoSnapshotsChooseGroups(comm, scene, n, &groups));
+  PetscCall(HycoSnapshotsChooseGroups(comm, scene, n_all, &groups));
   PetscCall(PetscMalloc1(n, &kind));
   HycoOnRoot(comm, FindKinds(scene, n_par, mu, n, list, kind));
   HycoBcast(kind, n, MPIU_INT, comm);
@@ -479,7 +479,7 @@ static PetscErrorCode SolveMissing(HycoSnapshots s, const Missing *m)
   HycoQueue queue;
 
   PetscFunctionBegin;
-  PetscCall(HycoSnapshotsCreateQueue(HycoComm(s), s->scene, m->n_par, m->mu, m->n, m->missing, &queue));
+  PetscCall(HycoSnapshotsCreateQueue(HycoComm(s), s->scene, m->n_par, m->mu, m->n, m->missing, m->n_all, &queue));
   HycoOnEach(HycoComm(s), HycoQueueEnd(queue, SolveGroup(s, queue, m)));
   PetscCall(HycoQueueCount(queue, &groups, s->solved));
   s->n_groups = PetscMax(s->n_groups, groups);

@@ -116,7 +116,12 @@ class Kill(Case):
         self.check_kills(1)
 
     def test_two_ranks(self):
+        """Nor does it matter for a solution how many others are missing: one alone is solved by as many ranks."""
         self.check_kills(2)
+        right = self.content()
+        os.remove(glob.glob(self.path('m.h5.snapshots', '*.h5'))[0])
+        subprocess.run(self.command(2, TRAIN), cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
+        self.assertEqual(self.content(), right)
 
     def test_paths(self):
         """A path that was in flight is solved again, those before it are not."""
@@ -242,7 +247,7 @@ class Kill(Case):
         os.mkdir(self.path('folder.h5'))
         for arguments, text in ((['-model', 'file/m.h5'], 'file/m.h5 cannot be written'),
                                 (['-model', 'folder.h5'], 'folder.h5'),
-                                (['-hyco_snapshots', 'file'], 'the snapshot folder file cannot be made'),
+                                (['-hyco_snapshots', 'file'], 'the snapshot folder file cannot be created'),
                                 (['-hyco_snapshots', 'file/s'], 'the snapshot folder file/s cannot be made'),
                                 (['-report', 'file/r.json'], 'file/r.json cannot be written')):
             for ranks in (0, 2):

@@ -186,16 +186,17 @@ static PetscErrorCode SolveGroup(HycoReducer t, HycoSnapshots store, HycoQueue q
 /* All nodes of G's grid have a file. Collective. */
 static PetscErrorCode SolveMissing(HycoReducer t, HycoSnapshots store, const Task *task)
 {
+  const PetscInt n = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
   PetscInt n_missing = 0, *missing, groups;
   HycoQueue queue;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor), &missing));
+  PetscCall(PetscMalloc1(n, &missing));
   HycoOnRoot(HycoComm(t), FindMissing(t, store, task, &n_missing, missing));
   PetscCallMPI(MPI_Bcast(&n_missing, 1, MPIU_INT, 0, HycoComm(t)));
   HycoBcast(missing, n_missing, MPIU_INT, HycoComm(t));
   if (n_missing) {
-    PetscCall(HycoSnapshotsChooseGroups(HycoComm(t), t->scene, n_missing, &groups));
+    PetscCall(HycoSnapshotsChooseGroups(HycoComm(t), t->scene, n, &groups));
     PetscCall(HycoQueueCreate(HycoComm(t), groups, n_missing, NULL, &queue));
     HycoOnEach(HycoComm(t), HycoQueueEnd(queue, SolveGroup(t, store, queue, n_missing, missing, task)));
     PetscCall(HycoQueueDestroy(&queue));
