@@ -90,7 +90,7 @@ class Reproduce(Case):
         self.assertGreater(float(bounds[-1][2]), 1)      # the paper's error is out of reach
         self.assertLess(float(bounds[-1][2]), error)     # and a bound is none if the model beats it
         self.assertLess(float(fine['displacement']), 0.1 * error)
-        self.assertIn('; 0 of the elements found so are outside', text)
+        self.assertIn('; 0 of the elements that it finds are outside', text)
 
     def test_rod(self):
         """The power ramp: the page has the runs' numbers, the study's table every ramp, with the largest hoop stress of its path."""
