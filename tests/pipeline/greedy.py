@@ -183,7 +183,7 @@ class Greedy(Case):
                 (('-training_grid', '1,1'), 'the grid has 1 points for mu1; at least 2 are needed'),
                 (('-training_grid', '1,1', '-grid_type', 'centred'), 'has 1 candidate point'),
                 (('-training_grid', '4,4', '-max_snapshots', 3), 'at least 4 are needed, because a greedy training first solves at the 4 corners'),
-                (('-training_grid', '4,4', '-max_snapshots', 3, '-grid', '2,3'), 'first solves at the 6 points given, and adds'),
+                (('-training_grid', '4,4', '-max_snapshots', 3, '-grid', '2,3'), 'first solves at the 6 points given'),
                 (('-training_grid', '4,4', '-grid', '1,2'), 'starts from 2 points, and its indicator interpolates over 2 parameters'),
                 (('-training_grid', '4,4', '-points', 'line.csv'), 'the 3 points lie on one line or plane'),
                 (('-training_grid', '4,4', '-hyco_greedy_indicator', 'best'), 'local, penetration'),

@@ -247,7 +247,7 @@ output: {low: {min: u_y}, wall: {reaction: x}}
                            ('rotation: {speed: 1, axis: {x: 1}}\nbody_block_density: 1', 'the axis is given in 3D only'),
                            ('gravity: {y: -1}\nbody_block_density: -1', 'a density must be 0 or more'), ('gravity: {y: -y}\nbody_block_density: 1', 'must be constant in space'),
                            ('spring: {y0: {y: 1 + t}}\nhistory: {times: [0, 1]}', 'the stiffness of a spring must be constant in time'),
-                           ('output: {pull: {reaction: w}}', 'along x, y or z'), ('output: {pull: {reaction: y, group: corner}}', 'no support fixes y on corner')):
+                           ('output: {pull: {reaction: w}}', 'one of x, y and z'), ('output: {pull: {reaction: y, group: corner}}', 'no support fixes y on corner')):
             for ranks in (0, 2):
                 run = self.run_raw('solve', '-scene', self.written(COUNT % '' + base + text + '\n', grid), ranks=ranks)
                 with self.subTest(text=text, ranks=ranks):
