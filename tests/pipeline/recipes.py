@@ -32,7 +32,7 @@ class Recipes(Case):
         with open(self.path('h.csv'), encoding='utf-8') as file:
             rows = list(csv.DictReader(file))
         self.assertEqual(len(rows), t['search']['attempts'])
-        self.assertIn('facets', rows[0]['failure'])  # condensed: no polynomial follows slaves from facet to facet
+        self.assertIn('changes the facet', rows[0]['failure'])  # condensed: no polynomial follows slaves from facet to facet
         self.judged(HERTZ, 'h.h5', '2,3,2', 0.005, 0.03)
 
     def test_rope_and_blocks(self):
