@@ -88,7 +88,7 @@ class Orientation(Case):
             run = self.run_raw('solve', '-scene', BLOCKS, '-mu', '0.05,0.06', '-body_block_map_x', 'x < 10 ? x : 20 - x', ranks=ranks)
             self.assertNotEqual(run.returncode, 0)
             self.assertIn('body block', run.stderr)
-            self.assertIn('inside out', run.stderr)
+            self.assertIn('inverts', run.stderr)
             run = self.run_raw('solve', '-scene', PLATE, '-mu', '1,0.5', '-body_ring_map_x', ' -x', ranks=ranks)
             self.assertNotEqual(run.returncode, 0)
             self.assertRegex(run.stderr, 'body|bodies')

@@ -161,7 +161,7 @@ class Rivals(Ring):
         with h5py.File(self.path('damaged.h5'), 'r+') as f:
             f['cubature/weight'][0] = -1
             del f['sealed']
-        for args, words in ((['train', '-scene', ROPE, '-model', self.path('no.h5'), '-grid', '3,3', *CUBATURE], ['cubature', 'line']),
+        for args, words in ((['train', '-scene', ROPE, '-model', self.path('no.h5'), '-grid', '3,3', *CUBATURE], ['cubature', 'in 1D']),
                             ([*train, *CUBATURE, '-hyco_cubature_tol', '1', '-hyco_snapshots', self.path('store')], ['-hyco_cubature_tol', 'misses']),
                             ([*train, '-hyco_cubature_tol', '1e-3'], ['-hyco_cubature_tol', 'cubature', 'hybrid']),
                             ([*train, *CUBATURE, '-hyco_hybrid', 'all'], ['-hyco_hybrid', 'contact', 'rank']),
