@@ -43,7 +43,7 @@ class Contact(Program):
 
     def test_refused(self):
         for contact, *words in (
-                (SPHERE.replace('type: sphere', 'type: spere'), 'contact disk', 'obstacle, pair, sphere or surface', 'did you mean sphere?'),
+                (SPHERE.replace('type: sphere', 'type: spere'), 'contact disk', 'obstacle, pair, rigid, sphere or surface', 'did you mean sphere?'),
                 (SPHERE + ', gap: 1', 'contact_disk_gap', 'centre_x'),
                 (SPHERE.replace('radius:', 'raduis:'), 'contact_disk_raduis', 'did you mean radius?'),
                 (SPHERE.split(', radius')[0], 'contact disk', 'radius'),

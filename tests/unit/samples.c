@@ -83,12 +83,12 @@ static PetscErrorCode TestFile(HycoScene scene)
   CHECK(n == 2, "expected 2 points, found %d", (int)n);
   CHECK_NEAR(first[0], 0.25, 0);
   CHECK_NEAR(first[1], 2.5, 0);
-  CHECK_FAILS(FromFile(scene, "a,c\n1,1\n", &n, first), "\"c\" is no parameter");
+  CHECK_FAILS(FromFile(scene, "a,c\n1,1\n", &n, first), "\"c\" is not a parameter");
   CHECK_FAILS(FromFile(scene, "a\n1\n", &n, first), "names 1 of the scene's 2 parameters");
-  CHECK_FAILS(FromFile(scene, "a,a\n1,1\n", &n, first), "stands twice");
+  CHECK_FAILS(FromFile(scene, "a,a\n1,1\n", &n, first), "occurs twice");
   CHECK_FAILS(FromFile(scene, "a,b\n1,1\n1;2\n", &n, first), "line 3: 2 numbers");
-  CHECK_FAILS(FromFile(scene, "", &n, first), ".csv holds no point");
-  CHECK_FAILS(FromFile(scene, "a,b\n\n", &n, first), ".csv holds no point");
+  CHECK_FAILS(FromFile(scene, "", &n, first), ".csv contains no point");
+  CHECK_FAILS(FromFile(scene, "a,b\n\n", &n, first), ".csv contains no point");
   CHECK_FAILS(FromFile(scene, "a,b\n1,9\n", &n, first), "b = 9");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
