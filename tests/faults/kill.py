@@ -248,7 +248,7 @@ class Kill(Case):
         for arguments, text in ((['-model', 'file/m.h5'], 'file/m.h5 cannot be written'),
                                 (['-model', 'folder.h5'], 'folder.h5'),
                                 (['-hyco_snapshots', 'file'], 'the snapshot folder file cannot be created'),
-                                (['-hyco_snapshots', 'file/s'], 'the snapshot folder file/s cannot be made'),
+                                (['-hyco_snapshots', 'file/s'], 'the snapshot folder file/s cannot be created'),
                                 (['-report', 'file/r.json'], 'file/r.json cannot be written')):
             for ranks in (0, 2):
                 run = self.run_raw(*TRAIN, *arguments, ranks=ranks, timeout=60)

@@ -119,7 +119,7 @@ class Displacements(Case):
                                    ('r.h5', (*point, '-scene', PELLET), 'another scene'),
                                    ('r.h5', ('-grid', '2,2', '-scene', ROPE), 'needs a single point'),
                                    ('h.h5', (*point, '-scene', ROPE), 'this model is hybrid'),
-                                   ('j.h5', (*point, '-scene', ROPE), 'this one is projection')):
+                                   ('j.h5', (*point, '-scene', ROPE), 'this model is projection')):
             run = self.run_raw('predict', '-model', model, '-hyco_full_displacement', *args)
             self.assertEqual(run.returncode, 1, args)
             self.assertEqual(run.stderr.count('\n'), 1, run.stderr)
