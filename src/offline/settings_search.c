@@ -1,35 +1,37 @@
 /*
-  The search for a recipe: which of the reduction's settings give the cheapest model online whose errors at the held-out
-  points are small enough. The snapshots are read and their bases made once; an attempt cuts the bases, builds the RID
-  and the model on it and predicts the held-out points.
+  The search for settings: which settings of the reduction give the cheapest online model whose errors at the held-out
+  points are small enough. The snapshots are read and their bases made once; an attempt truncates the bases, builds the
+  RID and the model on it and predicts the held-out points.
 
-  A recipe is tried only as far as it is open: what the options say stays. Recipes of a kind come in the order of their
-  cost, and the first that meets the targets ends its kind. The cost is a count of operations, not a time, so that the
-  choice repeats on any machine and number of ranks.
+  Only settings that no option fixes are varied. The settings of a kind are tried in the order of their cost, and the
+  first that meet the targets end their kind. The cost is a count of operations, not a time, so that the choice is the
+  same on any machine and number of ranks.
 
-  Where no recipe meets targets that were asked for, solutions are added where the best one errs most, and the search
-  begins again.
+  If no settings meet the user's targets, solutions are added where the best model has the largest errors, and the
+  search starts again.
 */
 #include <hycoreducerimpl.h>
 #include <stdio.h>
 #include <string.h>
 
-/* Where no target is given: errors that most studies do not see. */
+/* Default targets: errors that most studies can ignore. */
 static const PetscReal usual[HYCO_N_ERRORS] = {
     [HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2, [HYCO_ERROR_LAMBDA] = 1e-2, [HYCO_ERROR_INELASTIC] = 2e-2};
 
 #define EXTENSION     2.5 /* edges of the contact surface's facets */
-#define MANY_UNKNOWNS 600 /* of an RID; beyond, "all" is not tried by itself: its reduced matrix is dense */
-#define STALE         3 /* attempts without progress end a kind: larger RIDs do not mend a basis that lacks solutions */
-#define PROGRESS      0.95
-#define WILD          50  /* times the target: no attempt so far is a model at all */
-#define FEW_UNKNOWNS  300 /* a dense matrix of these is cheap */
-#define MAX_ATTEMPTS  64
-#define ROUND         4   /* of the training points, one in so many is added at a time */
-#define TELLING       0.3 /* correlation above which a parameter explains the errors */
-#define WHOLE         -1
+#define MANY_UNKNOWNS 600 /* largest RID for which "all" is tried automatically: its reduced matrix is dense */
+#define STALE                                                                                                          \
+  3 /* attempts without progress that end a kind: a larger RID does not help if the basis lacks                        \
+       solutions */
+#define PROGRESS     0.95
+#define WILD         50  /* multiple of the target: above it no attempt so far gives a useful model */
+#define FEW_UNKNOWNS 300 /* a dense matrix of this size is cheap */
+#define MAX_ATTEMPTS 64
+#define ROUND        4   /* share of the training points that is added at a time, as a divisor */
+#define TELLING      0.3 /* correlation above which a parameter explains the errors */
+#define WHOLE        -1
 
-/* Sizes of RIDs and bases, from the cheapest on; layers WHOLE: the whole mesh. */
+/* Sizes of RIDs and bases, the cheapest first; layers WHOLE: the whole mesh. */
 typedef struct {
   PetscReal tol;
   PetscInt layers;
@@ -41,7 +43,7 @@ static const Size sizes[] = {{1e-5, 0, PETSC_FALSE}, {1e-5, 1, PETSC_FALSE},    
                              {1e-13, 3, PETSC_TRUE}, {1e-13, WHOLE, PETSC_FALSE}};
 enum { N_SIZES = sizeof(sizes) / sizeof(sizes[0]), FIRST_USUAL = 3 };
 
-/* Of paths, with the cells at a plane of symmetry as the RID, all displacements of A full order. */
+/* For paths, with the cells at a plane of symmetry as the RID, all displacements of A full order. */
 static const PetscReal plane_tol[] = {1e-9, 1e-12, 1e-14};
 enum { N_PLANES = sizeof(plane_tol) / sizeof(plane_tol[0]) };
 
@@ -49,17 +51,18 @@ typedef struct {
   HycoReducer t;
   HycoSnapshots store;
   const char *const *types; /* the registered ones */
-  HycoRecipe given;         /* as the options have it */
-  PetscReal extension;      /* of the recipes that extend the contact */
-  const char *plane;        /* of symmetry; NULL: none */
+  HycoRecipe given;         /* as given by the options */
+  PetscReal extension;      /* of the settings that extend the contact */
+  const char *plane;        /* plane of symmetry; NULL: none */
   PetscBool targets;        /* given by the user */
   PetscReal target[HYCO_N_ERRORS];
   PetscInt n;
   HycoAttempt attempt[MAX_ATTEMPTS];
-  HycoHeldOut *rows[MAX_ATTEMPTS]; /* of paths, of each attempt that was judged at all held-out points; else NULL */
-  PetscReal force;                 /* HycoHeldOutForce() of these */
-  PetscInt *order;                 /* held-out points, from the one where the last attempts erred most */
-  PetscReal least, *ratio;         /* of the best so far, and of its held-out points */
+  HycoHeldOut *rows[MAX_ATTEMPTS]; /* for paths: results of each attempt that was judged at all held-out points; else
+                                      NULL */
+  PetscReal force;                 /* HycoHeldOutForce() of the held-out points */
+  PetscInt *order;                 /* held-out points, those with the largest errors in the last attempts first */
+  PetscReal least, *ratio;         /* least ratio so far; ratios of the best model at its held-out points */
 } Search;
 
 void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
@@ -88,7 +91,7 @@ void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *r)
                     .ridge = -1};
 }
 
-/* The stress and force tolerances follow that of the displacement where they were the same. */
+/* The stress and force tolerances follow that of the displacement if they were equal to it. */
 static PetscErrorCode SetRecipe(HycoReducer t, const HycoRecipe *r)
 {
   PetscFunctionBegin;
@@ -175,7 +178,8 @@ static PetscErrorCode Summarise(Search *s, const HycoHeldOutRace *race, const Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next attempt begins with the points where this one erred most, of a dropped one that where it was. */
+/* Reorders the points: the next attempt begins with those where this one had the largest errors; for a dropped one,
+   with the one at which it was dropped. */
 static PetscErrorCode Reorder(Search *s, const HycoHeldOutRace *race, const HycoHeldOut rows[], PetscInt n)
 {
   PetscReal *key;
@@ -199,8 +203,8 @@ static PetscErrorCode Reorder(Search *s, const HycoHeldOutRace *race, const Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the model makes of the held-out points: of paths only until it is clear that the recipe will not be chosen,
-   unless `all` are asked for. */
+/* Judges the model at the held-out points; for paths only until it is clear that the settings will not be chosen,
+   unless `all` is set. */
 static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt *a)
 {
   HycoReducer t = s->t;
@@ -232,7 +236,7 @@ static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The bases of the recipe that is set, and the type's own modes. */
+/* Makes the bases for the current settings, and the type's own modes. */
 static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store)
 {
   PetscFunctionBegin;
@@ -242,7 +246,7 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bases, RID and model of the recipe that is set, and what it is worth. */
+/* Makes bases, RID and model for the current settings, and judges the model. */
 static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
 {
   HycoReducer t = s->t;
@@ -269,8 +273,8 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Builds the recipe's model and judges it, at all held-out points or as far as it matters; what fails is an attempt
-   that failed. Collective. */
+/* Builds a model with these settings and judges it, at all held-out points or as far as necessary; an error becomes
+   a failed attempt. Collective. */
 static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
 {
   HycoReducer t = s->t;
@@ -306,7 +310,7 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is open of a size, the rest as the options have it. */
+/* The settings of a size where no option fixes them. */
 static HycoRecipe Recipe(const Search *s, const Size *size)
 {
   const PetscBool *pinned = s->t->pinned;
@@ -326,7 +330,8 @@ static PetscBool Same(const HycoRecipe *a, const HycoRecipe *b)
                      a->plane == b->plane);
 }
 
-/* Whether the whole mesh as RID is a model: not where every unknown would be full order, but for a few. */
+/* Whether the whole mesh as RID gives a useful model: not if every unknown would be full order, unless there are
+   few. */
 static PetscBool WholeIsSmall(HycoReducer t, HycoHybrid hybrid)
 {
   const PetscBool all = (PetscBool)(hybrid == HYCO_HYBRID_ALL || 2 * t->sizes[2] > t->sizes[0]);
@@ -334,8 +339,8 @@ static PetscBool WholeIsSmall(HycoReducer t, HycoHybrid hybrid)
   return (PetscBool)(!all || t->sizes[0] * t->sizes[3] <= FEW_UNKNOWNS);
 }
 
-/* The sizes in their order until one meets the targets, of those that differ in what
-   the type of model reads. Of paths that were dropped nobody knows whether they are progress: all sizes are tried. */
+/* Tries the sizes in order until one meets the targets, without those that do not differ in the settings that the
+   type reads. Dropped attempts on paths do not show whether there is progress: all sizes are tried. */
 static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid, PetscBool *met)
 {
   const PetscInt first = s->n;
@@ -365,7 +370,7 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many contacts have their slave in a group of supports. */
+/* Counts the contacts whose slave is in a group of supports. */
 static PetscErrorCode CountContacts(HycoReducer t, const char group[], PetscInt *n)
 {
   const HycoMesh m = t->fom->surface;
@@ -383,8 +388,8 @@ static PetscErrorCode CountContacts(HycoReducer t, const char group[], PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The support that looks most like a plane of symmetry across the contacts: it holds one component at 0, and most of
-   the contacts lie in it; the first of equals; -1: none. Rank 0. */
+/* The support that is most probably a plane of symmetry across the contacts: it fixes one component at 0, and most
+   of the contacts have nodes on it; the first among equals; -1: none. Rank 0. */
 static PetscErrorCode FindPlane(HycoReducer t, PetscInt *plane)
 {
   const HycoScene s = t->scene;
@@ -427,8 +432,8 @@ PetscErrorCode HycoReducerFindPlane(HycoReducer t, const char **group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Paths: equations inside a small RID say little of modes that no load reaches there, unless the RID cuts the bodies
-   from side to side. The cells at a plane of symmetry do, and all of its nodes are inside. */
+/* For paths, the equations in a small RID hardly determine modes that no load affects there, unless the RID cuts the
+   bodies from side to side. The cells at a plane of symmetry do, and all nodes of the plane are inside. */
 static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
 {
   const PetscBool *pinned = s->t->pinned;
@@ -452,7 +457,7 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of A full order, where "auto" keeps the contacts' displacements and is not good enough. */
+/* Tries all of A full order, if "auto" keeps the contacts' displacements and is not accurate enough. */
 static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
 {
   PetscBool met = PETSC_FALSE;
@@ -465,7 +470,7 @@ static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The recipes of a type whose modes cost next to nothing online: one. */
+/* One attempt, for a type whose online cost hardly depends on the modes. */
 static PetscErrorCode TryOne(Search *s, const HycoROM type)
 {
   const Size size = {1e-12, 1, PETSC_FALSE};
@@ -499,7 +504,7 @@ static PetscErrorCode TryType(Search *s, const char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* In the order of their names. */
+/* Tries all types in the order of their names. */
 static PetscErrorCode TryAll(Search *s)
 {
   PetscFunctionBegin;
@@ -507,7 +512,7 @@ static PetscErrorCode TryAll(Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The recipe that is taken as things stand; what was dropped and might be taken now is judged first. */
+/* The attempt chosen so far; a dropped one that may be chosen now is judged first. */
 static PetscErrorCode Choose(Search *s, HycoAttempt **chosen)
 {
   HycoAttempt *again;
@@ -523,7 +528,7 @@ static PetscErrorCode Choose(Search *s, HycoAttempt **chosen)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nothing is open, or there is nothing to judge by. */
+/* Whether all settings are fixed, or there are no held-out points. */
 static PetscBool Settled(HycoReducer t)
 {
   PetscBool open = PETSC_FALSE;
@@ -559,8 +564,8 @@ static PetscReal Correlation(const Search *s, PetscInt n, const PetscReal held[]
   return square[0] > 0 && square[1] > 0 ? both / PetscSqrtReal(square[0] * square[1]) : 0;
 }
 
-/* Unseen points, each near one of the held-out points with the largest errors, which themselves stay unseen; and the
-   parameter whose training values lie too far apart (-1: none in particular). */
+/* Adds unseen points, each near one of the held-out points with the largest errors, which stay unseen; and finds the
+   parameter whose training values are too far apart (-1: none in particular). */
 static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, PetscInt *by)
 {
   HycoReducer t = s->t;
@@ -614,7 +619,7 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What attempts have left. */
+/* Frees the data of attempts. */
 static void Forget(Search *s)
 {
   for (PetscInt k = 0; k < s->n; k++) (void)!PetscFree(s->rows[k]);
@@ -623,7 +628,7 @@ static void Forget(Search *s)
   s->force = 0;
 }
 
-/* Every open recipe on the bases that are there. */
+/* Tries all settings that are not fixed, with the present bases. */
 static PetscErrorCode Attempts(Search *s)
 {
   PetscInt n;
@@ -633,7 +638,7 @@ static PetscErrorCode Attempts(Search *s)
   Forget(s);
   PetscCall(PetscMalloc2(n, &s->ratio, n, &s->order));
   for (PetscInt k = 0; k < n; k++) {
-    s->ratio[k] = 1; /* until an attempt says else */
+    s->ratio[k] = 1; /* until an attempt gives another value */
     s->order[k] = k;
   }
   s->least = PETSC_INFINITY;
@@ -642,8 +647,8 @@ static PetscErrorCode Attempts(Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Attempts, and solutions added until the targets are met or the budget is spent: in *grown, with the first ones (NULL:
-   none was added; the caller's). */
+/* Attempts, and solutions added until the targets are met or the budget is used up: in *grown, with the first ones
+   (NULL: none was added; the caller owns it). */
 static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report)
 {
   HycoReducer t = s->t;
@@ -678,8 +683,8 @@ static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The best recipe's model; of those that the scan of the ranges or its own training solutions refuse, the
-   next. */
+/* Builds the model with the best settings; if the scan of the ranges or its own training solutions refuse it, the
+   next one. */
 static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
 {
   HycoReducer t = s->t;
