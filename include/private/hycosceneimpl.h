@@ -219,9 +219,12 @@ void HycoSceneNamePoint(HycoScene scene, const PetscReal mu[], char at[HYCO_LINE
 /* The variables at time t: the parameters mu (n_parameters), t, the tables' values; out has room for n_variables. */
 void HycoSceneSetTime(HycoScene scene, const PetscReal mu[], PetscReal t, PetscReal out[]);
 /* The first time after t at which a step ends: a listed one, or a row of a table. */
-/* Fails where the history of a scene is not that which the model at `path` was trained with, naming what differs. */
-PetscErrorCode HycoSceneCompareHistory(HycoScene trained, HycoScene scene, const char path[]);
 PetscReal HycoSceneNextStop(HycoScene scene, PetscReal t);
+/* The history's entries, a line "key value" each; *text is the caller's (PetscFree). Without a history: empty. */
+PetscErrorCode HycoSceneWriteHistory(HycoScene scene, char **text);
+/* Fails where the history of a scene is not the one of the file at `path`, which was made with the lines made[] of
+   HycoSceneWriteHistory(), and names what differs. */
+PetscErrorCode HycoSceneCompareHistory(HycoScene scene, const char made[], const char path[]);
 PetscBool HycoIsVariableName(const char word[]);
 
 /* Builds a scene from n (key, value) entries; `folder` is where a relative mesh path starts. */

@@ -79,6 +79,21 @@ static PetscErrorCode SamplePath(HycoSnapshots s, const PetscReal mu[], char pat
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fails where the history is not the one that the file was made with; files of earlier versions do not say it. */
+static PetscErrorCode CheckHistory(HycoSnapshots s, HycoH5 h, const char path[])
+{
+  PetscErrorCode ierr;
+  char *made;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "history")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadText(h, "history", &made));
+  ierr = HycoSceneCompareHistory(s->scene, made, path);
+  PetscCall(PetscFree(made));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char path[])
 {
   char *text, mine[32];
@@ -89,6 +104,7 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   snprintf(mine, sizeof(mine), "%016llx", s->fingerprint);
   same = strcmp(text, mine) == 0;
   PetscCall(PetscFree(text));
+  if (!same) PetscCall(CheckHistory(s, h, path));
   HycoCheck(same,
             "%s is a snapshot of another scene%s or mesh; remove the folder %s, or name another by -hyco_snapshots",
             path, s->scene->n_times ? ", history" : "", s->folder);
@@ -211,11 +227,16 @@ PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt
 /* What rank 0 has of a solution. */
 static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
 {
-  char fingerprint[32];
+  char fingerprint[32], *history;
+  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
   snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
   PetscCall(HycoH5WriteText(h, "fingerprint", fingerprint));
+  PetscCall(HycoSceneWriteHistory(s->scene, &history));
+  if (history[0]) ierr = HycoH5WriteText(h, "history", history);
+  PetscCall(PetscFree(history));
+  PetscCall(ierr);
   PetscCall(HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
