@@ -111,6 +111,20 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The file of a parameter value, which must be of this scene; path[] gets its name. */
+static PetscErrorCode OpenSample(HycoSnapshots s, const PetscReal mu[], char path[PETSC_MAX_PATH_LEN], HycoH5 *h)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  PetscCall(HycoH5OpenOr(path, "remove it and run again", h));
+  ierr = CheckFingerprint(s, *h, path);
+  if (ierr) PetscCall(HycoH5Close(h, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* missing[]: the samples without a file, in order. On rank 0. */
 static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, const PetscReal mu[],
                                   PetscInt *n_missing, PetscInt missing[])
@@ -130,8 +144,7 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
       if (!twin) missing[(*n_missing)++] = k;
       continue;
     }
-    PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-    PetscCall(CheckFingerprint(s, h, path));
+    PetscCall(OpenSample(s, mu + k * n_par, path, &h));
     PetscCall(HycoH5Close(&h, PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -546,9 +559,7 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal m
     HycoH5 h;
     PetscInt size, one;
 
-    PetscCall(SamplePath(s, mu + k * n_par, path));
-    PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-    PetscCall(CheckFingerprint(s, h, path));
+    PetscCall(OpenSample(s, mu + k * n_par, path, &h));
     for (PetscInt j = 0; j < n_steps; j++) {
       NameField(s, j, field, name);
       PetscCall(HycoH5GetSize(h, name, &size, &one));
@@ -617,8 +628,7 @@ static PetscErrorCode CountBetween(HycoSnapshots s, const PetscReal mu[], PetscI
   HycoH5 h;
 
   PetscFunctionBegin;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  PetscCall(OpenSample(s, mu, path, &h));
   for (*n = 0;; (*n)++) {
     NameBetween(*n, name);
     if (!HycoH5Has(h, name)) break;
@@ -632,12 +642,10 @@ static PetscErrorCode ReadBetween(HycoSnapshots s, const PetscReal mu[], PetscIn
 {
   char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
   HycoH5 h;
-  PetscErrorCode ierr;
+  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  ierr = CheckFingerprint(s, h, path);
+  PetscCall(OpenSample(s, mu, path, &h));
   for (PetscInt k = 0; !ierr && k < n; k++) {
     NameBetween(k, name);
     ierr = HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)k * (size_t)lda);
@@ -674,11 +682,9 @@ PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], Pets
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  ierr = CheckFingerprint(s, h, path);
+  PetscCall(OpenSample(s, mu, path, &h));
   NameField(s, k, field, name);
-  if (!ierr) ierr = HycoH5ReadRows(h, name, first, n, 1, value);
+  ierr = HycoH5ReadRows(h, name, first, n, 1, value);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -693,10 +699,8 @@ PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], Pet
 
   PetscFunctionBegin;
   *n = -1;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  ierr = CheckFingerprint(s, h, path);
-  if (!ierr) ierr = HycoH5LoadReal(h, "taken", n, &one, taken);
+  PetscCall(OpenSample(s, mu, path, &h));
+  ierr = HycoH5LoadReal(h, "taken", n, &one, taken);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
