@@ -12,6 +12,8 @@ struct _p_HycoSnapshots {
   char folder[PETSC_MAX_PATH_LEN];
   unsigned long long fingerprint;
   PetscInt n_groups, *solved; /* most groups that have solved at a time; solutions of each (room for every rank) */
+  HycoH5 last; /* the file that was read last, checked and open; or NULL. Its name: */
+  char last_path[PETSC_MAX_PATH_LEN];
 };
 
 /* A queue of the points list[n] of mu (n_par each) for as many groups as HycoSnapshotsChooseGroups() gives for n_all,

@@ -57,12 +57,20 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CloseSample(HycoSnapshots s)
+{
+  PetscFunctionBegin;
+  if (s->last) PetscCall(HycoH5Close(&s->last, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
 {
   PetscFunctionBegin;
   if (!snapshots || !*snapshots) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheckHandle(*snapshots, HYCO_SNAPSHOTS_CLASSID);
   HycoDereference(snapshots);
+  PetscCall(CloseSample(*snapshots));
   PetscCall(PetscFree((*snapshots)->solved));
   PetscCall(HycoSceneDestroy(&(*snapshots)->scene));
   PetscCall(PetscHeaderDestroy(snapshots));
@@ -111,17 +119,25 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file of a parameter value, which must be of this scene; path[] gets its name. */
-static PetscErrorCode OpenSample(HycoSnapshots s, const PetscReal mu[], char path[PETSC_MAX_PATH_LEN], HycoH5 *h)
+/* The file of a parameter value, which must be of this scene. It is the store's, and stays open until another is
+   asked for: whoever judges a path reads a file several times for each listed time, and opening it reads all of it. */
+static PetscErrorCode OpenSample(HycoSnapshots s, const PetscReal mu[], HycoH5 *h)
 {
-  PetscErrorCode ierr;
+  char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
   PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", h));
-  ierr = CheckFingerprint(s, *h, path);
-  if (ierr) PetscCall(HycoH5Close(h, PETSC_FALSE));
-  PetscCall(ierr);
+  if (!s->last || strcmp(path, s->last_path)) {
+    PetscErrorCode ierr;
+
+    PetscCall(CloseSample(s));
+    PetscCall(HycoH5OpenOr(path, "remove it and run again", &s->last));
+    PetscCall(PetscStrncpy(s->last_path, path, sizeof(s->last_path)));
+    ierr = CheckFingerprint(s, s->last, path);
+    if (ierr) PetscCall(CloseSample(s));
+    PetscCall(ierr);
+  }
+  *h = s->last;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -144,8 +160,7 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
       if (!twin) missing[(*n_missing)++] = k;
       continue;
     }
-    PetscCall(OpenSample(s, mu + k * n_par, path, &h));
-    PetscCall(HycoH5Close(&h, PETSC_FALSE));
+    PetscCall(OpenSample(s, mu + k * n_par, &h));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -555,19 +570,18 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal m
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
-    char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+    char name[HYCO_LINE];
     HycoH5 h;
     PetscInt size, one;
 
-    PetscCall(OpenSample(s, mu + k * n_par, path, &h));
+    PetscCall(OpenSample(s, mu + k * n_par, &h));
     for (PetscInt j = 0; j < n_steps; j++) {
       NameField(s, j, field, name);
       PetscCall(HycoH5GetSize(h, name, &size, &one));
-      HycoCheck(size == total, "%s: %s has %d rows, and other snapshots have %d; remove the folder", path, name,
+      HycoCheck(size == total, "%s: %s has %d rows, and other snapshots have %d; remove the folder", s->last_path, name,
                 (int)size, (int)total);
       PetscCall(HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)(k * n_steps + j) * (size_t)lda));
     }
-    PetscCall(HycoH5Close(&h, PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -575,17 +589,15 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal m
 static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt *rows)
 {
   const PetscReal *mu;
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
   PetscInt one;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  PetscCall(OpenSample(s, mu, &h));
   NameField(s, 0, field, name);
   PetscCall(HycoH5GetSize(h, name, rows, &one));
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -624,34 +636,30 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, Petsc
 /* How many steps between listed times the file of mu has; of those of older versions none. */
 static PetscErrorCode CountBetween(HycoSnapshots s, const PetscReal mu[], PetscInt *n)
 {
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
 
   PetscFunctionBegin;
-  PetscCall(OpenSample(s, mu, path, &h));
+  PetscCall(OpenSample(s, mu, &h));
   for (*n = 0;; (*n)++) {
     NameBetween(*n, name);
     if (!HycoH5Has(h, name)) break;
   }
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode ReadBetween(HycoSnapshots s, const PetscReal mu[], PetscInt n, PetscInt lo, PetscInt rows,
                                   PetscScalar data[], PetscInt lda)
 {
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
-  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
-  PetscCall(OpenSample(s, mu, path, &h));
-  for (PetscInt k = 0; !ierr && k < n; k++) {
+  PetscCall(OpenSample(s, mu, &h));
+  for (PetscInt k = 0; k < n; k++) {
     NameBetween(k, name);
-    ierr = HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)k * (size_t)lda);
+    PetscCall(HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)k * (size_t)lda));
   }
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -677,32 +685,25 @@ PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], Pe
 PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], PetscInt k, const char field[],
                                      PetscInt first, PetscInt n, PetscReal value[])
 {
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(OpenSample(s, mu, path, &h));
+  PetscCall(OpenSample(s, mu, &h));
   NameField(s, k, field, name);
-  ierr = HycoH5ReadRows(h, name, first, n, 1, value);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
+  PetscCall(HycoH5ReadRows(h, name, first, n, 1, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], PetscInt *n, PetscReal **taken)
 {
-  char path[PETSC_MAX_PATH_LEN];
   HycoH5 h;
   PetscInt one = 1;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   *n = -1;
-  PetscCall(OpenSample(s, mu, path, &h));
-  ierr = HycoH5LoadReal(h, "taken", n, &one, taken);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
+  PetscCall(OpenSample(s, mu, &h));
+  PetscCall(HycoH5LoadReal(h, "taken", n, &one, taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
