@@ -3,6 +3,7 @@
 #define HYCOSNAPSHOTSIMPL_H
 
 #include <hycofomimpl.h>
+#include <hycoh5.h>
 #include <hycoqueue.h>
 #include <hycosnapshots.h>
 
