@@ -218,9 +218,12 @@ void HycoSceneNamePoint(HycoScene scene, const PetscReal mu[], char at[HYCO_LINE
 /* The variables at time t: the parameters mu (n_parameters), t, the tables' values; out has room for n_variables. */
 void HycoSceneSetTime(HycoScene scene, const PetscReal mu[], PetscReal t, PetscReal out[]);
 /* The first time after t at which a step ends: a listed one, or a row of a table. */
-/* Fails if the history of a scene differs from that of the model at `path`, and names the difference. */
-PetscErrorCode HycoSceneCompareHistory(HycoScene trained, HycoScene scene, const char path[]);
 PetscReal HycoSceneNextStop(HycoScene scene, PetscReal t);
+/* The history's entries, one line "key value" each; the caller frees *text (PetscFree). Without a history: empty. */
+PetscErrorCode HycoSceneWriteHistory(HycoScene scene, char **text);
+/* Fails if the history of a scene differs from that of the file at `path`, which stored the lines made[] of
+   HycoSceneWriteHistory(), and names the difference. */
+PetscErrorCode HycoSceneCompareHistory(HycoScene scene, const char made[], const char path[]);
 PetscBool HycoIsVariableName(const char word[]);
 
 /* Builds a scene from n (key, value) entries; `folder`: folder of a relative mesh path. */

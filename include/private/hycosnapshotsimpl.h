@@ -3,6 +3,7 @@
 #define HYCOSNAPSHOTSIMPL_H
 
 #include <hycofomimpl.h>
+#include <hycoh5.h>
 #include <hycoqueue.h>
 #include <hycosnapshots.h>
 
@@ -13,6 +14,8 @@ struct _p_HycoSnapshots {
   unsigned long long fingerprint;
   PetscInt n_groups, *solved; /* largest number of groups that have solved at a time; number of solutions of each
                                  (room for every rank) */
+  HycoH5 last;                /* the file that was read last, checked and open; or NULL */
+  char last_path[PETSC_MAX_PATH_LEN]; /* its name */
 };
 
 /* Creates a queue of the points list[n] of mu (n_par each) for as many groups as HycoSnapshotsChooseGroups() chooses

@@ -57,12 +57,20 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CloseSample(HycoSnapshots s)
+{
+  PetscFunctionBegin;
+  if (s->last) PetscCall(HycoH5Close(&s->last, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
 {
   PetscFunctionBegin;
   if (!snapshots || !*snapshots) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheckHandle(*snapshots, HYCO_SNAPSHOTS_CLASSID);
   HycoDereference(snapshots);
+  PetscCall(CloseSample(*snapshots));
   PetscCall(PetscFree((*snapshots)->solved));
   PetscCall(HycoSceneDestroy(&(*snapshots)->scene));
   PetscCall(PetscHeaderDestroy(snapshots));
@@ -79,6 +87,21 @@ static PetscErrorCode SamplePath(HycoSnapshots s, const PetscReal mu[], char pat
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fails if the history differs from that with which the file was made; files of earlier versions do not store it. */
+static PetscErrorCode CheckHistory(HycoSnapshots s, HycoH5 h, const char path[])
+{
+  PetscErrorCode ierr;
+  char *made;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "history")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadText(h, "history", &made));
+  ierr = HycoSceneCompareHistory(s->scene, made, path);
+  PetscCall(PetscFree(made));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char path[])
 {
   char *text, mine[32];
@@ -89,9 +112,32 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   snprintf(mine, sizeof(mine), "%016llx", s->fingerprint);
   same = strcmp(text, mine) == 0;
   PetscCall(PetscFree(text));
+  if (!same) PetscCall(CheckHistory(s, h, path));
   HycoCheck(same,
             "%s is a snapshot of another scene%s or mesh; remove the folder %s, or name another by -hyco_snapshots",
             path, s->scene->n_times ? ", history" : "", s->folder);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The file of a parameter value, which must belong to this scene. The store owns it, and keeps it open until another
+   is needed: judging a path reads a file several times for each listed time, and opening it reads all of it. */
+static PetscErrorCode OpenSample(HycoSnapshots s, const PetscReal mu[], HycoH5 *h)
+{
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  if (!s->last || strcmp(path, s->last_path)) {
+    PetscErrorCode ierr;
+
+    PetscCall(CloseSample(s));
+    PetscCall(HycoH5OpenOr(path, "remove it and run again", &s->last));
+    PetscCall(PetscStrncpy(s->last_path, path, sizeof(s->last_path)));
+    ierr = CheckFingerprint(s, s->last, path);
+    if (ierr) PetscCall(CloseSample(s));
+    PetscCall(ierr);
+  }
+  *h = s->last;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -114,9 +160,7 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
       if (!twin) missing[(*n_missing)++] = k;
       continue;
     }
-    PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-    PetscCall(CheckFingerprint(s, h, path));
-    PetscCall(HycoH5Close(&h, PETSC_FALSE));
+    PetscCall(OpenSample(s, mu + k * n_par, &h));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -211,11 +255,16 @@ PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt
 /* Writes the data of a solution that are on rank 0. */
 static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
 {
-  char fingerprint[32];
+  char fingerprint[32], *history;
+  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
   snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
   PetscCall(HycoH5WriteText(h, "fingerprint", fingerprint));
+  PetscCall(HycoSceneWriteHistory(s->scene, &history));
+  if (history[0]) ierr = HycoH5WriteText(h, "history", history);
+  PetscCall(PetscFree(history));
+  PetscCall(ierr);
   PetscCall(HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -519,21 +568,18 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal m
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
-    char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+    char name[HYCO_LINE];
     HycoH5 h;
     PetscInt size, one;
 
-    PetscCall(SamplePath(s, mu + k * n_par, path));
-    PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-    PetscCall(CheckFingerprint(s, h, path));
+    PetscCall(OpenSample(s, mu + k * n_par, &h));
     for (PetscInt j = 0; j < n_steps; j++) {
       NameField(s, j, field, name);
       PetscCall(HycoH5GetSize(h, name, &size, &one));
-      HycoCheck(size == total, "%s: %s has %d rows, and other snapshots have %d; remove the folder", path, name,
+      HycoCheck(size == total, "%s: %s has %d rows, and other snapshots have %d; remove the folder", s->last_path, name,
                 (int)size, (int)total);
       PetscCall(HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)(k * n_steps + j) * (size_t)lda));
     }
-    PetscCall(HycoH5Close(&h, PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -541,17 +587,15 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal m
 static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt *rows)
 {
   const PetscReal *mu;
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
   PetscInt one;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  PetscCall(OpenSample(s, mu, &h));
   NameField(s, 0, field, name);
   PetscCall(HycoH5GetSize(h, name, rows, &one));
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -590,37 +634,30 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, Petsc
 /* The number of steps between listed times in the file of mu; 0 for older versions. */
 static PetscErrorCode CountBetween(HycoSnapshots s, const PetscReal mu[], PetscInt *n)
 {
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
 
   PetscFunctionBegin;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  PetscCall(OpenSample(s, mu, &h));
   for (*n = 0;; (*n)++) {
     NameBetween(*n, name);
     if (!HycoH5Has(h, name)) break;
   }
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode ReadBetween(HycoSnapshots s, const PetscReal mu[], PetscInt n, PetscInt lo, PetscInt rows,
                                   PetscScalar data[], PetscInt lda)
 {
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  ierr = CheckFingerprint(s, h, path);
-  for (PetscInt k = 0; !ierr && k < n; k++) {
+  PetscCall(OpenSample(s, mu, &h));
+  for (PetscInt k = 0; k < n; k++) {
     NameBetween(k, name);
-    ierr = HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)k * (size_t)lda);
+    PetscCall(HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)k * (size_t)lda));
   }
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -646,36 +683,25 @@ PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], Pe
 PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], PetscInt k, const char field[],
                                      PetscInt first, PetscInt n, PetscReal value[])
 {
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  ierr = CheckFingerprint(s, h, path);
+  PetscCall(OpenSample(s, mu, &h));
   NameField(s, k, field, name);
-  if (!ierr) ierr = HycoH5ReadRows(h, name, first, n, 1, value);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
+  PetscCall(HycoH5ReadRows(h, name, first, n, 1, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], PetscInt *n, PetscReal **taken)
 {
-  char path[PETSC_MAX_PATH_LEN];
   HycoH5 h;
   PetscInt one = 1;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   *n = -1;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  ierr = CheckFingerprint(s, h, path);
-  if (!ierr) ierr = HycoH5LoadReal(h, "taken", n, &one, taken);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
+  PetscCall(OpenSample(s, mu, &h));
+  PetscCall(HycoH5LoadReal(h, "taken", n, &one, taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -196,33 +196,6 @@ PetscReal HycoSceneNextStop(HycoScene s, PetscReal t)
   return next;
 }
 
-/* The value of an entry, or NULL. */
-static const char *FindEntry(HycoScene s, const char key[])
-{
-  for (PetscInt k = 0; k < s->n_entries; k++) {
-    if (strcasecmp(s->key[k], key) == 0) return s->value[k];
-  }
-  return NULL;
-}
-
-PetscErrorCode HycoSceneCompareHistory(HycoScene trained, HycoScene scene, const char path[])
-{
-  HycoScene both[2] = {trained, scene};
-
-  PetscFunctionBegin;
-  for (PetscInt j = 0; j < 2; j++) {
-    for (PetscInt k = 0; k < both[j]->n_entries; k++) {
-      const char *key = both[j]->key[k], *was = FindEntry(trained, key), *is = FindEntry(scene, key);
-
-      if (strncasecmp(key, "history_", 8)) continue;
-      HycoCheck(was && is && strcmp(was, is) == 0,
-                "%s was trained with another history: %s is %.200s in the scene and %.200s in the model", path, key,
-                is ? is : "missing", was ? was : "missing");
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoSceneGetHistory(HycoScene s, PetscInt *n, const PetscReal *times[])
 {
   PetscFunctionBegin;

@@ -150,14 +150,18 @@ HycoDefineMethod(HycoROMGetScene, (HycoROM m, HycoScene *scene), m, HYCO_ROM_CLA
 PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
 {
   unsigned long long hash;
-  char text[32];
+  char text[32], *history;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
-  PetscCall(HycoSceneCompareHistory(m->scene, scene, m->path));
+  PetscCall(HycoSceneWriteHistory(m->scene, &history));
+  ierr = HycoSceneCompareHistory(scene, history, m->path);
+  PetscCall(PetscFree(history));
+  PetscCall(ierr);
   HycoCheck(strcmp(text, m->fingerprint) == 0,
             "%s was trained on another scene or mesh; give the scene, the mesh and the entries of its training",
             m->path);
