@@ -18,7 +18,7 @@ typedef struct {
   const char *region; /* expression, or NULL */
   PetscBool whole;
   PetscBool exact; /* only these cells */
-} HycoRIDRecipe;
+} HycoRIDSettings;
 
 /*
   The contacts of surfaces that a map moves, with all masters that they meet over the parameters: one row for each set
@@ -46,7 +46,7 @@ PetscErrorCode HycoMovedGroups(HycoScene scene, HycoMesh mesh, const HycoPairs *
    owns. The settings are on every rank; pairs on rank 0, by the nodes of the contacts' surfaces: every contact, and
    for moved surfaces all masters that they meet (HycoMet). Collective. */
 #define HYCO_RID 1
-PetscErrorCode HycoRIDBuild(HycoFOM mesh, const HycoPairs *pairs, const HycoRIDRecipe *recipe, DMLabel *rid);
+PetscErrorCode HycoRIDBuild(HycoFOM mesh, const HycoPairs *pairs, const HycoRIDSettings *settings, DMLabel *rid);
 
 /* The role of a node in the reduced problem. */
 enum {

@@ -315,14 +315,14 @@ PetscErrorCode HycoReducerTell(HycoReducer t, const char what[], PetscInt done, 
 void HycoReducerNameWorst(HycoReducer t, char text[HYCO_LINE]);
 
 /* The current settings. */
-void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *recipe);
+void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *settings);
 
 /*
-  Which of n attempts is chosen (choose_recipe.c): the cheapest of those that meet the targets, or of those whose errors
-  exceed the best by little; NULL: none gave a model. HycoAttemptsLimit(): an attempt of that cost whose ratio exceeds
-  the limit (at least 1) will not be chosen, whatever follows; *beaten: the number of the attempt that excludes it (0:
-  none, and the limit is PETSC_INFINITY). HycoAttemptsReopen(): an attempt that was dropped, and may be chosen now that
-  others were refused; NULL: none.
+  Which of n attempts is chosen (choose_attempt.c): the cheapest of those that meet the targets, or of those whose
+  errors exceed the best by little; NULL: none gave a model. HycoAttemptsLimit(): an attempt of that cost whose ratio
+  exceeds the limit (at least 1) will not be chosen, whatever follows; *beaten: the number of the attempt that excludes
+  it (0: none, and the limit is PETSC_INFINITY). HycoAttemptsReopen(): an attempt that was dropped, and may be chosen
+  now that others were refused; NULL: none.
 */
 HycoAttempt *HycoAttemptsChoose(PetscInt n, HycoAttempt attempt[]);
 PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal cost, PetscInt *beaten);

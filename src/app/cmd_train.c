@@ -210,7 +210,7 @@ PetscErrorCode CommandTrain(void)
     PetscCall(HycoReducerRun(reducer, given ? samples : NULL, model, &t));
   PetscCall(Say("%s", t.summary));
   if (t.missed[0]) PetscCall(DriverMissed("%s", t.missed));
-  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u, t.chosen.recipe.rid ? "RID " : "",
+  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u, t.chosen.settings.rid ? "RID " : "",
                 (double)t.error_lambda));
   if (t.condition > 0) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
   PetscCall(Say("\n"));

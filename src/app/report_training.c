@@ -92,7 +92,7 @@ static PetscErrorCode Append(Search *s, const char text[])
 static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
 {
   char row[4 * DRIVER_LINE], number[32];
-  const HycoRecipe *r = &a->recipe;
+  const HycoReducerSettings *r = &a->settings;
   size_t at;
 
   PetscFunctionBegin;
@@ -147,7 +147,7 @@ static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
 
   PetscFunctionBegin;
   if (a->number == 1) PetscCall(Say("settings, each judged at %d held-out points (largest errors):\n", (int)a->n_held));
-  HycoRecipeDescribe(&a->recipe, sizeof(what), what);
+  HycoReducerSettingsDescribe(&a->settings, sizeof(what), what);
   DescribeErrors(IsPath(s), a->held_out.largest, errors);
   PetscCall(DescribeEnd(a, end));
   if (a->failure[0])
@@ -219,7 +219,7 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
 
   PetscFunctionBegin;
   if (t->chosen.number) {
-    HycoRecipeDescribe(&t->chosen.recipe, sizeof(what), what);
+    HycoReducerSettingsDescribe(&t->chosen.settings, sizeof(what), what);
     PetscCall(Say("chosen: settings %d of %d: %s\n", (int)t->chosen.number, (int)t->chosen.of, what));
   }
   if (!t->held_out.n) {
@@ -274,11 +274,11 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
     cJSON_AddNumberToObject(search, "attempts", s->n);
     cJSON_AddNumberToObject(search, "chosen", s->n - a->of + a->number);
     cJSON_AddNumberToObject(search, "added", t->n_added);
-    cJSON_AddStringToObject(search, "model_type", a->recipe.type);
-    cJSON_AddNumberToObject(search, "pod_tol", a->recipe.pod_tol);
-    cJSON_AddNumberToObject(search, "rid_layers", a->recipe.layers);
-    cJSON_AddNumberToObject(search, "rid_contact_extension", a->recipe.contact_extension);
-    cJSON_AddStringToObject(search, "hybrid", HycoHybrids[a->recipe.hybrid]);
-    cJSON_AddBoolToObject(search, "rid_whole", a->recipe.whole);
+    cJSON_AddStringToObject(search, "model_type", a->settings.type);
+    cJSON_AddNumberToObject(search, "pod_tol", a->settings.pod_tol);
+    cJSON_AddNumberToObject(search, "rid_layers", a->settings.layers);
+    cJSON_AddNumberToObject(search, "rid_contact_extension", a->settings.contact_extension);
+    cJSON_AddStringToObject(search, "hybrid", HycoHybrids[a->settings.hybrid]);
+    cJSON_AddBoolToObject(search, "rid_whole", a->settings.whole);
   }
 }

@@ -70,14 +70,14 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
 /* The cells of the part in Omega_A; in greedy training also those of the previous RIDs. Collective. */
 static PetscErrorCode FindCells(HycoReducer t, PetscBool in[])
 {
-  const HycoRIDRecipe recipe = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell,
-                                t->layers,       t->extension,    t->n_groups,   t->groups,
-                                t->plane,        t->region,       t->whole_rid,  t->prototype->traits.cells};
+  const HycoRIDSettings settings = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell,
+                                    t->layers,       t->extension,    t->n_groups,   t->groups,
+                                    t->plane,        t->region,       t->whole_rid,  t->prototype->traits.cells};
   HycoMesh part = t->fom->part;
   DMLabel rid;
 
   PetscFunctionBegin;
-  HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->fom, t->fom->searches ? &t->met.rows : &t->fom->pairs, &recipe, &rid));
+  HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->fom, t->fom->searches ? &t->met.rows : &t->fom->pairs, &settings, &rid));
   for (PetscInt e = 0; e < part->n_cells; e++) {
     PetscCall(DMLabelStratumHasPoint(rid, HYCO_RID, part->cell_point[e], &in[e]));
     if (t->grown) t->grown[e] = in[e] = (PetscBool)(in[e] || t->grown[e]);
@@ -337,7 +337,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscFunctionBegin;
   r->n_facts = 0; /* of the previous iteration */
   r->stiffness = m->traits.stiffness;
-  r->chosen.recipe.rid = (PetscBool)(m->traits.settings == HYCO_SETTINGS_RID);
+  r->chosen.settings.rid = (PetscBool)(m->traits.settings == HYCO_SETTINGS_RID);
   r->n_samples = m->n_points;
   r->n_modes = t->l;
   r->n_dual_modes = t->counts[HYCO_SEED_DUAL];
@@ -463,7 +463,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   HycoOnRoot(HycoComm(t), BuildOnRoot(t, useful, model, report));
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
-  report->type = report->chosen.recipe.type = t->prototype->type; /* set on each rank */
+  report->type = report->chosen.settings.type = t->prototype->type; /* set on each rank */
   PetscCall(HycoROMBroadcast(HycoComm(t), model));
   if (!useful || !t->prototype->ops->finish) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_TRUE));

@@ -118,7 +118,7 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, Hyc
   const HycoValidation *v = &report->held_out;
   const HycoAttempt *chosen = &report->chosen;
   HycoTrust trust = {0};
-  char recipe[HYCO_LINE], text[2 * HYCO_LINE];
+  char settings[HYCO_LINE], text[2 * HYCO_LINE];
 
   PetscFunctionBegin;
   trust.n_held = v->n;
@@ -130,9 +130,9 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, Hyc
   report->n_held = trust.n;
   m->trust = trust;
   if (!chosen->number) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoRecipeDescribe(&chosen->recipe, sizeof(recipe), recipe);
+  HycoReducerSettingsDescribe(&chosen->settings, sizeof(settings), settings);
   snprintf(text, sizeof(text), "  settings number %d of the %d that were tried: %s\n", (int)chosen->number,
-           (int)chosen->of, recipe);
+           (int)chosen->of, settings);
   PetscCall(PetscFree(m->search));
   PetscCall(PetscStrallocpy(text, &m->search));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -302,7 +302,7 @@ static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
 
 /* The loop needs settings that are accurate for any points; those of the model itself are searched at the end. For
    paths in 3D it begins with the cells at a plane of symmetry, like that search. Collective. */
-static PetscErrorCode SetRecipe(HycoReducer t)
+static PetscErrorCode SetSettings(HycoReducer t)
 {
   const PetscBool *pinned = t->pinned;
 
@@ -370,7 +370,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscCall(Start(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
-  PetscCall(SetRecipe(t));
+  PetscCall(SetSettings(t));
   PetscCall(PetscCalloc1(t->fom->part->n_cells, &t->grown));
   PetscCall(RunLoop(t, &loop, &report));
   PetscCall(Conclude(t, &loop, path, &report));

@@ -265,7 +265,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
       "choose model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by the held-out errors, unless given",
       &t->search, NULL));
   PetscCall(HycoOptionsBool("-hyco_search_exhaustive",
-                            "of paths: judge each recipe at all held-out points, also if it cannot be chosen",
+                            "of paths: judge all settings at all held-out points, also those that cannot be chosen",
                             &t->exhaustive, NULL));
   PetscCall(HycoOptionsName("-hyco_reducer_view", "print the settings of the training before it begins"));
   PetscCall(HycoOptionsFor("greedy"));
@@ -450,7 +450,7 @@ HycoDefineMethod(HycoReducerGetType, (HycoReducer t, HycoROMType *type), t, HYCO
 
 PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 {
-  HycoRecipe recipe;
+  HycoReducerSettings settings;
   char text[HYCO_LINE];
   PetscBool ascii;
 
@@ -458,8 +458,8 @@ PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)t, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoReducerGetRecipe(t, &recipe);
-  HycoRecipeDescribe(&recipe, sizeof(text), text);
+  HycoReducerGetSettings(t, &settings);
+  HycoReducerSettingsDescribe(&settings, sizeof(text), text);
   PetscCall(PetscViewerASCIIPrintf(viewer, "settings: %s%s\n", text, t->search ? "; searched if not given" : ""));
   PetscCall(PetscViewerASCIIPrintf(viewer, "snapshots: %s\n", t->folder[0] ? t->folder : "beside the model"));
   PetscCall(PetscViewerASCIIPopTab(viewer));

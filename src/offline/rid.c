@@ -113,7 +113,7 @@ static PetscErrorCode FindInPart(PetscInt n, const PetscInt of[], PetscInt whole
 }
 
 /* Adds the cells all of whose nodes are in the union of the points' supports (20). */
-static PetscErrorCode AddSupports(Rid *r, const HycoRIDRecipe *recipe)
+static PetscErrorCode AddSupports(Rid *r, const HycoRIDSettings *settings)
 {
   HycoMesh m = r->part;
   Rid support = *r;
@@ -122,12 +122,12 @@ static PetscErrorCode AddSupports(Rid *r, const HycoRIDRecipe *recipe)
 
   PetscFunctionBegin;
   PetscCall(DMLabelCreate(PETSC_COMM_SELF, "support", &support.label));
-  for (PetscInt k = 0; k < recipe->n_nodes; k++) {
-    PetscCall(FindInPart(m->n_nodes, m->node_whole, recipe->nodes[k], &at));
+  for (PetscInt k = 0; k < settings->n_nodes; k++) {
+    PetscCall(FindInPart(m->n_nodes, m->node_whole, settings->nodes[k], &at));
     if (at >= 0) PetscCall(AddAround(&support, at));
   }
-  for (PetscInt k = 0; k < recipe->n_cells; k++) {
-    PetscCall(FindInPart(m->n_cells, m->cell_whole, recipe->cells[k], &at));
+  for (PetscInt k = 0; k < settings->n_cells; k++) {
+    PetscCall(FindInPart(m->n_cells, m->cell_whole, settings->cells[k], &at));
     if (at >= 0) PetscCall(Add(&support, at));
   }
   PetscCall(PetscMalloc1(m->n_nodes, &covered));
@@ -382,25 +382,25 @@ static PetscErrorCode AddRigid(Rid *r, HycoScene scene)
 }
 
 /* Adds the regions that each rank can find by itself. */
-static PetscErrorCode AddRegions(Rid *r, const HycoRIDRecipe *recipe)
+static PetscErrorCode AddRegions(Rid *r, const HycoRIDSettings *settings)
 {
   PetscInt at;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; recipe->exact && k < recipe->n_cells; k++) {
-    PetscCall(FindInPart(r->part->n_cells, r->part->cell_whole, recipe->cells[k], &at));
+  for (PetscInt k = 0; settings->exact && k < settings->n_cells; k++) {
+    PetscCall(FindInPart(r->part->n_cells, r->part->cell_whole, settings->cells[k], &at));
     if (at >= 0) PetscCall(Add(r, at));
   }
-  if (recipe->exact) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt e = 0; recipe->whole && e < r->part->n_cells; e++) PetscCall(Add(r, e));
-  for (PetscInt k = 0; k < recipe->n_groups; k++) PetscCall(AddGroup(r, recipe->groups[k]));
-  if (recipe->plane) PetscCall(AddGroup(r, recipe->plane));
+  if (settings->exact) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt e = 0; settings->whole && e < r->part->n_cells; e++) PetscCall(Add(r, e));
+  for (PetscInt k = 0; k < settings->n_groups; k++) PetscCall(AddGroup(r, settings->groups[k]));
+  if (settings->plane) PetscCall(AddGroup(r, settings->plane));
   PetscCall(AddRigid(r, r->f->scene));
-  if (recipe->region) PetscCall(AddRegion(r, recipe->region));
+  if (settings->region) PetscCall(AddRegion(r, settings->region));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDRecipe *recipe, DMLabel *label)
+PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDSettings *settings, DMLabel *label)
 {
   PetscInt n_rows = f->rank ? 0 : pairs->n;
   Rid r;
@@ -408,13 +408,13 @@ PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDReci
   PetscFunctionBegin;
   PetscCallMPI(MPI_Bcast(&n_rows, 1, MPIU_INT, 0, HycoComm(f)));
   PetscCall(RidCreate(f, &r));
-  HycoOnEach(HycoComm(f), AddRegions(&r, recipe));
-  if (!recipe->whole && !recipe->exact) {
-    PetscCall(AddSupports(&r, recipe));
-    if (recipe->extension > 0) PetscCall(ExtendContact(&r, pairs, recipe->extension));
+  HycoOnEach(HycoComm(f), AddRegions(&r, settings));
+  if (!settings->whole && !settings->exact) {
+    PetscCall(AddSupports(&r, settings));
+    if (settings->extension > 0) PetscCall(ExtendContact(&r, pairs, settings->extension));
     PetscCall(CompleteSlaves(&r, pairs, n_rows));
     PetscCall(CompleteMoved(&r, pairs));
-    for (PetscInt k = 0; k < recipe->layers; k++) PetscCall(AddLayer(&r));
+    for (PetscInt k = 0; k < settings->layers; k++) PetscCall(AddLayer(&r));
     PetscCall(CompleteSlaves(&r, pairs, n_rows));
     PetscCall(CompleteMoved(&r, pairs));
   }

@@ -50,11 +50,11 @@ enum { N_PLANES = sizeof(plane_tol) / sizeof(plane_tol[0]) };
 typedef struct {
   HycoReducer t;
   HycoSnapshots store;
-  const char *const *types; /* the registered ones */
-  HycoRecipe given;         /* as given by the options */
-  PetscReal extension;      /* of the settings that extend the contact */
-  const char *plane;        /* plane of symmetry; NULL: none */
-  PetscBool targets;        /* given by the user */
+  const char *const *types;  /* the registered ones */
+  HycoReducerSettings given; /* as given by the options */
+  PetscReal extension;       /* of the settings that extend the contact */
+  const char *plane;         /* plane of symmetry; NULL: none */
+  PetscBool targets;         /* given by the user */
   PetscReal target[HYCO_N_ERRORS];
   PetscInt n;
   HycoAttempt attempt[MAX_ATTEMPTS];
@@ -65,7 +65,7 @@ typedef struct {
   PetscReal least, *ratio;         /* least ratio so far; ratios of the best model at its held-out points */
 } Search;
 
-void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
+void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, char text[])
 {
   const char *kind = HycoHybrids[r->hybrid];
 
@@ -79,20 +79,20 @@ void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
              r->plane ? r->plane : "");
 }
 
-void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *r)
+void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *r)
 {
-  *r = (HycoRecipe){.type = t->prototype->type,
-                    .rid = (PetscBool)(t->prototype->traits.settings == HYCO_SETTINGS_RID),
-                    .pod_tol = t->tol[HYCO_SEED_DISPLACEMENT],
-                    .contact_extension = t->extension,
-                    .layers = t->layers,
-                    .hybrid = t->hybrid,
-                    .whole = t->whole_rid,
-                    .ridge = -1};
+  *r = (HycoReducerSettings){.type = t->prototype->type,
+                             .rid = (PetscBool)(t->prototype->traits.settings == HYCO_SETTINGS_RID),
+                             .pod_tol = t->tol[HYCO_SEED_DISPLACEMENT],
+                             .contact_extension = t->extension,
+                             .layers = t->layers,
+                             .hybrid = t->hybrid,
+                             .whole = t->whole_rid,
+                             .ridge = -1};
 }
 
 /* The stress and force tolerances follow that of the displacement if they were equal to it. */
-static PetscErrorCode SetRecipe(HycoReducer t, const HycoRecipe *r)
+static PetscErrorCode SetSettings(HycoReducer t, const HycoReducerSettings *r)
 {
   PetscFunctionBegin;
   PetscCall(HycoReducerSetType(t, r->type));
@@ -266,7 +266,7 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
   a->rid_fraction = report.rid_fraction;
   a->cost = t->prototype->ops->cost ? (*t->prototype->ops->cost)(t, a) : 0;
   PetscCallMPI(MPI_Bcast(&t->ridge, 1, MPIU_REAL, 0, HycoComm(t)));
-  a->recipe.ridge = t->ridge;
+  a->settings.ridge = t->ridge;
   ierr = Judge(s, model, all, a); /* a model may refuse to predict */
   PetscCall(HycoROMDestroy(&model));
   PetscCall(ierr);
@@ -275,7 +275,7 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
 
 /* Builds a model with these settings and judges it, at all held-out points or as far as necessary; an error becomes
    a failed attempt. Collective. */
-static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
+static PetscErrorCode Try(Search *s, const HycoReducerSettings *settings, PetscBool all)
 {
   HycoReducer t = s->t;
   HycoAttempt *a = &s->attempt[s->n];
@@ -286,15 +286,15 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
   if (s->n == MAX_ATTEMPTS) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMemzero(a, sizeof(*a)));
   a->number = ++s->n;
-  a->recipe = *recipe;
+  a->settings = *settings;
   a->ratio = PETSC_INFINITY;
   a->dropped_at = -1;
   PetscCall(HycoSamplesGet(t->held, &a->n_held, NULL, NULL));
-  HycoRecipeDescribe(recipe, sizeof(what), what);
+  HycoReducerSettingsDescribe(settings, sizeof(what), what);
   HycoFormat(t->doing, "settings %d, %s", (int)a->number, what);
   t->most_full_order =
-      t->pinned[HYCO_CHOICE_HYBRID] || recipe->hybrid != HYCO_HYBRID_ALL || recipe->plane ? 0 : MANY_UNKNOWNS;
-  PetscCall(SetRecipe(t, recipe));
+      t->pinned[HYCO_CHOICE_HYBRID] || settings->hybrid != HYCO_HYBRID_ALL || settings->plane ? 0 : MANY_UNKNOWNS;
+  PetscCall(SetSettings(t, settings));
   PetscCall(HycoCatchBegin());
   t->trying = PETSC_TRUE;
   ierr = BuildAndJudge(s, all, a);
@@ -311,10 +311,10 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
 }
 
 /* The settings of a size where no option fixes them. */
-static HycoRecipe Recipe(const Search *s, const Size *size)
+static HycoReducerSettings SettingsFor(const Search *s, const Size *size)
 {
   const PetscBool *pinned = s->t->pinned;
-  HycoRecipe r = s->given;
+  HycoReducerSettings r = s->given;
 
   if (!pinned[HYCO_CHOICE_TOLERANCE]) r.pod_tol = size->tol;
   if (!pinned[HYCO_CHOICE_LAYERS]) r.layers = PetscMax(size->layers, 0);
@@ -323,7 +323,7 @@ static HycoRecipe Recipe(const Search *s, const Size *size)
   return r;
 }
 
-static PetscBool Same(const HycoRecipe *a, const HycoRecipe *b)
+static PetscBool Same(const HycoReducerSettings *a, const HycoReducerSettings *b)
 {
   return (PetscBool)(strcmp(a->type, b->type) == 0 && a->pod_tol == b->pod_tol && a->layers == b->layers &&
                      a->whole == b->whole && a->contact_extension == b->contact_extension && a->hybrid == b->hybrid &&
@@ -349,7 +349,7 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
   PetscFunctionBegin;
   *met = PETSC_FALSE;
   for (PetscInt k = s->targets ? 0 : FIRST_USUAL, stale = 0; k < N_SIZES && stale < STALE && !*met; k++) {
-    HycoRecipe r = Recipe(s, &sizes[k]);
+    HycoReducerSettings r = SettingsFor(s, &sizes[k]);
     PetscBool done = PETSC_FALSE;
 
     r.type = type->type;
@@ -360,7 +360,7 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
       r.contact_extension = s->given.contact_extension;
       r.whole = s->given.whole;
     }
-    for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].recipe));
+    for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].settings));
     if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid))) continue;
     PetscCall(Try(s, &r, PETSC_FALSE));
     stale = least > WILD || s->attempt[s->n - 1].ratio < PROGRESS * least || s->t->scene->n_times ? 0 : stale + 1;
@@ -444,7 +444,7 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < N_PLANES && !*met; k++) {
     const Size size = {plane_tol[k], 0, PETSC_FALSE};
-    HycoRecipe r = Recipe(s, &size);
+    HycoReducerSettings r = SettingsFor(s, &size);
 
     r.type = type->type;
     r.rid = PETSC_TRUE;
@@ -474,7 +474,7 @@ static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
 static PetscErrorCode TryOne(Search *s, const HycoROM type)
 {
   const Size size = {1e-12, 1, PETSC_FALSE};
-  HycoRecipe r = Recipe(s, &size);
+  HycoReducerSettings r = SettingsFor(s, &size);
 
   PetscFunctionBegin;
   r.type = type->type;
@@ -519,10 +519,10 @@ static PetscErrorCode Choose(Search *s, HycoAttempt **chosen)
 
   PetscFunctionBegin;
   while (s->n < MAX_ATTEMPTS && (again = HycoAttemptsReopen(s->n, s->attempt))) {
-    const HycoRecipe recipe = again->recipe;
+    const HycoReducerSettings settings = again->settings;
 
     again->reopened = PETSC_TRUE;
-    PetscCall(Try(s, &recipe, PETSC_TRUE));
+    PetscCall(Try(s, &settings, PETSC_TRUE));
   }
   *chosen = HycoAttemptsChoose(s->n, s->attempt);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -698,7 +698,7 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
 
     PetscCall(Choose(s, &best));
     if (!best) break;
-    PetscCall(SetRecipe(t, &best->recipe));
+    PetscCall(SetSettings(t, &best->settings));
     PetscCall(TakeModes(t, s->store));
     PetscCall(HycoCatchBegin());
     ierr = HycoReducerBuild(t, PETSC_TRUE, model, &built);
@@ -717,7 +717,7 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt k = s->n - 1; k > 0 && !best; k--) { /* one that is not refused for its cost */
-    if (s->attempt[k].recipe.hybrid != HYCO_HYBRID_ALL) best = &s->attempt[k];
+    if (s->attempt[k].settings.hybrid != HYCO_HYBRID_ALL) best = &s->attempt[k];
   }
   HycoFail("none of %d settings gave a model; the error of one of them: %s", (int)s->n,
            (best ? best : &s->attempt[0])->failure);
@@ -729,7 +729,7 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   PetscReal edge = 0;
 
   PetscFunctionBegin;
-  HycoReducerGetRecipe(t, &s->given);
+  HycoReducerGetSettings(t, &s->given);
   HycoOnRoot(HycoComm(t), SurfaceEdge(t, &edge));
   PetscCallMPI(MPI_Bcast(&edge, 1, MPIU_REAL, 0, HycoComm(t)));
   s->extension = EXTENSION * edge;
@@ -754,7 +754,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
     PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
     PetscCall(TakeModes(t, store));
     PetscCall(HycoReducerBuild(t, PETSC_TRUE, model, report));
-    HycoReducerGetRecipe(t, &report->chosen.recipe);
+    HycoReducerGetSettings(t, &report->chosen.settings);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscNew(&s));
