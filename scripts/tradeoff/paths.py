@@ -41,7 +41,7 @@ def cubature(tolerance, *contact):
 
 RANK, VECTORS = ("hybrid", "rank"), ("dual", "nnmf")
 TRAINING = {name: ["-scatter", "12"] for name in ("", "searched")}
-SEARCHED = Setting("hybrid", "searched")  # no option: the recipe that train finds
+SEARCHED = Setting("hybrid", "searched")  # no option: the settings that train finds
 BASELINES = [Setting("projection", "", TIGHT), *(cubature(tol, *contact) for contact in ([], [RANK], [VECTORS]) for tol in ("1e-4", "1e-6"))]
 CONDENSED = [Setting("condensed", ""), Setting("condensed", "", (("condensed_inelastic_tol", "1e-14"),))]
 

@@ -24,8 +24,8 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The master point of contact k on the moved mesh; an obstacle's and a rigid body's is the slave itself, as is that of
-   a slave node that faces no master. */
+/* The master point of contact k on the moved mesh; for an obstacle, a rigid body and a slave node that faces no
+   master, the slave itself. */
 static void MasterPoint(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal x[3])
 {
   const PetscBool rigid = fe->scene->contact[pairs->contact[k]]->rigid;
@@ -75,7 +75,7 @@ PetscReal HycoContactNoGap(HycoFE fe)
   return 1e-2 * HycoMeshLength(fe->mesh);
 }
 
-/* Their gaps at these normals; the gap of one that faces no master says nothing. */
+/* Their gaps for these normals; the gap of a contact that faces no master is a placeholder. */
 static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first,
                            const HycoContactPoints *points, const PetscReal normal[], PetscReal gap[])
 {
@@ -134,7 +134,7 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a normal is of a node's unknowns, B T. */
+/* The row B T of a node's unknowns for a normal. */
 static void OfUnknowns(HycoFE fe, PetscInt node, const PetscReal normal[3], PetscReal along[3])
 {
   for (PetscInt c = 0; c < 3; c++) along[c] = normal[c];
@@ -145,7 +145,8 @@ static void OfUnknowns(HycoFE fe, PetscInt node, const PetscReal normal[3], Pets
   }
 }
 
-/* Adds `scale` times the normal at a node to a row: to its free unknowns as entries, to its fixed ones in the gap. */
+/* Adds `scale` times the normal at a node to a row: entries for its free unknowns, a change of the gap for its fixed
+   ones. */
 static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal normal[3], PetscInt *n, PetscInt dof[],
                      PetscReal value[], PetscReal *gap)
 {
@@ -165,8 +166,8 @@ static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal 
   }
 }
 
-/* Of contacts with one slave node the normals must differ: parallel ones would share a force in no definite way.
-   before: the contact before k with k's slave, -1: none. */
+/* Contacts with the same slave node must have different normals: the share of each in the force would not be unique
+   with parallel ones. before: the previous contact with k's slave, -1: none. */
 static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscInt before[],
                                   const PetscReal normal[])
 {
@@ -175,7 +176,7 @@ static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k,
   PetscInt n = 0;
 
   PetscFunctionBegin;
-  for (PetscInt j = k; j >= 0; j = before[j], n++) { /* k's own last: Gram and Schmidt from the other end */
+  for (PetscInt j = k; j >= 0; j = before[j], n++) { /* k's own last: Gram-Schmidt in reverse order */
     OfUnknowns(fe, slave, normal + 3 * j, base[n]);
     for (PetscInt c = 0; c < 3; c++) base[n][c] = c < fe->dim && !fe->fixed[slave * fe->dim + c] ? base[n][c] : 0;
   }

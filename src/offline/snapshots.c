@@ -1,4 +1,4 @@
-/* HycoSnapshots: a folder with one file per parameter value, each complete or absent. */
+/* HycoSnapshots: a folder with one file for each parameter value, complete or absent. */
 #include <hycopath.h>
 #include <hycosnapshotsimpl.h>
 #include <hycofields.h>
@@ -77,7 +77,7 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file of a parameter value. */
+/* The path of the file of a parameter value. */
 static PetscErrorCode SamplePath(HycoSnapshots s, const PetscReal mu[], char path[PETSC_MAX_PATH_LEN])
 {
   const unsigned long long hash = HycoHash(HYCO_HASH_START, mu, (size_t)s->scene->n_parameters * sizeof(PetscReal));
@@ -87,7 +87,7 @@ static PetscErrorCode SamplePath(HycoSnapshots s, const PetscReal mu[], char pat
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fails where the history is not the one that the file was made with; files of earlier versions do not say it. */
+/* Fails if the history differs from that with which the file was made; files of earlier versions do not store it. */
 static PetscErrorCode CheckHistory(HycoSnapshots s, HycoH5 h, const char path[])
 {
   PetscErrorCode ierr;
@@ -119,8 +119,8 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file of a parameter value, which must be of this scene. It is the store's, and stays open until another is
-   asked for: whoever judges a path reads a file several times for each listed time, and opening it reads all of it. */
+/* The file of a parameter value, which must belong to this scene. The store owns it, and keeps it open until another
+   is needed: judging a path reads a file several times for each listed time, and opening it reads all of it. */
 static PetscErrorCode OpenSample(HycoSnapshots s, const PetscReal mu[], HycoH5 *h)
 {
   char path[PETSC_MAX_PATH_LEN];
@@ -210,7 +210,7 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* kind[i]: the first of the points list[] (n of them) that shares a stiffness with list[i], and its factor. */
+/* kind[i]: the first of the points list[] (n of them) that shares a stiffness, and thus a factor, with list[i]. */
 static PetscErrorCode FindKinds(HycoScene scene, PetscInt n_par, const PetscReal mu[], PetscInt n,
                                 const PetscInt list[], PetscInt kind[])
 {
@@ -252,7 +252,7 @@ PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What rank 0 has of a solution. */
+/* Writes the data of a solution that are on rank 0. */
 static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
 {
   char fingerprint[32], *history;
@@ -269,7 +269,7 @@ static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The forces of springs, zero on fixed unknowns, where the scene has any. Collective. */
+/* Writes the forces of springs, zero on fixed unknowns, if the scene has any. Collective. */
 static PetscErrorCode WriteSprings(HycoFOM fom, HycoH5 h, const char name[])
 {
   const HycoFileOrder *rows;
@@ -320,7 +320,7 @@ static PetscErrorCode WriteSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "step-0003/U"; without a history the field's own name. */
+/* "step-0003/U"; without a history only the field's name. */
 static void NameField(HycoSnapshots s, PetscInt k, const char field[], char name[HYCO_LINE])
 {
   if (s->scene->n_times)
@@ -329,17 +329,16 @@ static void NameField(HycoSnapshots s, PetscInt k, const char field[], char name
     HycoFormat(name, "%s", field);
 }
 
-/* A path on its way into its file. */
+/* A path while it is written to its file. */
 typedef struct {
   HycoSnapshots s;
   HycoH5 h;
   PetscReal *force, *inelastic;
-  PetscInt n_between; /* steps written that no listed time ends */
-  PetscInt slot; /* of the last of these: its part of the interval between two listed times, numbered from the path's
-                    start */
+  PetscInt n_between; /* number of steps written that do not end at a listed time */
+  PetscInt slot;      /* of the last of these: number of its subinterval, counted from the path's start */
 } PathWriter;
 
-/* At most so many steps between two listed times are kept, one of each of as many equal parts of the interval. */
+/* At most this number of steps between two listed times are stored, one in each of as many equal subintervals. */
 #define MOST_BETWEEN 5
 
 static void NameBetween(PetscInt k, char name[HYCO_LINE])
@@ -347,8 +346,7 @@ static void NameBetween(PetscInt k, char name[HYCO_LINE])
   HycoFormat(name, "between-%04d", (int)k);
 }
 
-/* The displacements of an accepted step between listed times: more of the path for the modes, at no cost of solution.
- */
+/* Writes the displacements of an accepted step between listed times: more data for the modes without further solves. */
 static PetscErrorCode WriteBetween(HycoFOM fom, void *ctx)
 {
   PathWriter *w = (PathWriter *)ctx;
@@ -367,7 +365,7 @@ static PetscErrorCode WriteBetween(HycoFOM fom, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A HycoStepMonitor: the fields of a listed time. The forces are those that the bodies resist with, f_int. */
+/* A HycoStepMonitor: writes the fields of a listed time. The forces are the internal forces f_int. */
 static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
 {
   PathWriter *w = (PathWriter *)ctx;
@@ -380,7 +378,7 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscCall(HycoFOMStress(fom));
   PetscCall(HycoFEStateFields(fom->fe, fom->path->begin, NULL, NULL, w->inelastic, NULL));
   PetscCall(HycoFOMToLocal(fom, fom->path->f_old, w->force));
-  HycoSpringsAddForces(fom->fe, 1, fom->u, w->force); /* theirs apart */
+  HycoSpringsAddForces(fom->fe, 1, fom->u, w->force); /* the forces of springs are a field of their own */
   for (PetscInt k = 0; k < fom->fe->n_dof; k++) w->force[k] = fom->fe->fixed[k] ? 0 : w->force[k];
   NameField(w->s, step->index, "lambda", name);
   HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, name, fom->n_contacts, 1, fom->lambda));
@@ -397,7 +395,7 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves the path into its file; one that does not reach its end is no sample. */
+/* Solves the path and writes its file; a path that does not reach its end is an error. */
 static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[])
 {
   HycoHistory history;
@@ -416,7 +414,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One path by one group: solved and stored, with what its listed times have. Collective on the group. */
+/* Solves and stores one path by one group, with the fields of its listed times. Collective on the group. */
 static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], PetscReal force[])
 {
   PathWriter w = {.s = s, .force = force};
@@ -436,7 +434,7 @@ static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One sample by one group: solve, check, store. Collective on the group. */
+/* Solves, checks and stores one sample by one group. Collective on the group. */
 static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], PetscReal force[])
 {
   HycoSummary summary;
@@ -465,7 +463,7 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A HycoPath's interrupt: a path may take hours. */
+/* A HycoPath's interrupt, because a path may take hours. */
 static PetscErrorCode Hear(void *ctx)
 {
   PetscFunctionBegin;
@@ -473,7 +471,7 @@ static PetscErrorCode Hear(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What SolveMissing() has of the samples. */
+/* The samples of SolveMissing(). */
 typedef struct {
   PetscInt n_all, n_par, n, *missing;
   const PetscReal *mu;
@@ -481,7 +479,7 @@ typedef struct {
   void *ctx;
 } Missing;
 
-/* This rank's group solves samples from the queue. Rank 0 tells how many are stored, while some are not. */
+/* This rank's group solves samples from the queue. Rank 0 reports how many are stored. */
 static PetscErrorCode SolveQueued(HycoSnapshots s, HycoQueue queue, const Missing *m, HycoFOM fom, PetscReal force[])
 {
   PetscInt k, n_stored;
@@ -633,7 +631,7 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many steps between listed times the file of mu has; of those of older versions none. */
+/* The number of steps between listed times in the file of mu; 0 for older versions. */
 static PetscErrorCode CountBetween(HycoSnapshots s, const PetscReal mu[], PetscInt *n)
 {
   char name[HYCO_LINE];

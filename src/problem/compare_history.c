@@ -1,4 +1,4 @@
-/* The entries of a history as text, kept in the files that were made with it, so that a difference has a name. */
+/* The entries of a history as text, stored in the files computed with it, so that a message can name a difference. */
 #include <hycosceneimpl.h>
 #include <stdio.h>
 #include <string.h>
@@ -45,7 +45,7 @@ static const char *FindValue(const char text[], const char key[], int n_key, int
   return NULL;
 }
 
-/* Where two long values begin to be worth showing: at the entry of the list in which they differ. */
+/* Start of the part of two long values that a message shows: the entry of the list in which they first differ. */
 static int FirstDifference(const char a[], int n_a, const char b[], int n_b)
 {
   int same = 0, from = 0;
@@ -55,7 +55,7 @@ static int FirstDifference(const char a[], int n_a, const char b[], int n_b)
   return from;
 }
 
-/* The line at `line` of one of two texts, in both; what[]: the difference, or empty. */
+/* Compares the line at `line` of one of two texts in both; what[]: the difference, or empty. */
 static void CompareLine(const char line[], const char made[], const char here[], char what[HYCO_LINE])
 {
   const int n_key = (int)strcspn(line, " \n");

@@ -2,11 +2,11 @@
   The projection-based model (44), online: modes for the displacements, nonnegative vectors for the contact forces, on
   the whole mesh (Balajewicz, Amsallem, Farhat, Int. J. Numer. Meth. Engng 106 (2016) 644-663; the paper's 6.3):
 
-      V^T K V gamma + (V_lambda^T B V)^T Lambda_r = V^T F,   0 <= Lambda_r  complementary to  V_lambda^T (D - B V gamma)
-  >= 0
+    V^T K V gamma + (V_lambda^T B V)^T Lambda_r = V^T F,
+    0 <= Lambda_r  complementary to  V_lambda^T (D - B V gamma) >= 0
 
   Its stiffness is the hybrid model's with every node in A and no full-order unknown; this file adds the forces. Only
-  V_lambda^T of the gaps is held nonnegative: contacts may penetrate one by one.
+  V_lambda^T of the gaps is constrained: single contacts may penetrate.
 */
 #include <hycoprojection.h>
 #include <hycoromtypes.h>
@@ -168,7 +168,7 @@ PetscErrorCode HycoProjectionSetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the model file, or from it. */
+/* Writes to the model file, or reads from it. */
 PetscErrorCode HycoProjectionMove(HycoROM m, HycoH5 h)
 {
   HycoProjectionROM p = (HycoProjectionROM)m->data;

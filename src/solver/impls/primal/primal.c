@@ -1,16 +1,17 @@
 /*
-  The primal form, in gap coordinates: of each contact row one unknown (its pivot) is replaced by the row's value, so
+  The primal form, in gap coordinates: for each contact row one unknown (its pivot) is replaced by the row's value, so
   that B x <= D becomes the bound y_p <= D_i. With x = T y: Kg = T^T K T, f = T^T F, and the force of a contact is the
-  residual at its pivot, L_i = (f - Kg y)_p. No dense matrix appears, whatever the number of contacts.
+  residual at its pivot, L_i = (f - Kg y)_p. No dense matrix is formed, whatever the number of contacts.
 */
 #include "gap.h"
 #include <string.h>
 
-/* Contacts are many where they are more than a share of the unknowns, or so many that S would not fit. */
+/* This form is cheapest if contacts are more than a share of the unknowns, or so many that S would not fit in
+   memory. */
 #define HYCO_MANY 6000
-/* A warm start that is not over by then began too far off: coarser problems give a better one. */
+/* A warm start that has not converged by then was far from the solution: coarser problems give a better start. */
 #define HYCO_WARM_ITS 4
-/* Noise of iterative solves while the set changes, and in the last. */
+/* Noise of iterative solves while the set changes, and in the final solves. */
 #define HYCO_NOISE_FIRST 1e-5
 #define HYCO_NOISE       1e-9
 
@@ -28,20 +29,20 @@ static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the iterations share. */
+/* Data of the iterations. */
 typedef struct {
   HycoSolver s;
   const Gap *gap;
-  PetscInt n; /* this rank's contacts, without the idle ones */
+  PetscInt n; /* this rank's contacts, without idle ones */
   PetscReal *bound, *value, *force, *diagonal, *at_d;
-  PetscReal noise; /* share of the largest force and gap that iterative solves leave */
+  PetscReal noise; /* error of iterative solves, as a share of the largest force and gap */
   PetscInt *at;
   Vec y, f, rhs, residual, work;
   VecScatter scatter;
   PetscBool cold;
 } Primal;
 
-/* The values at the pivots, and the forces. */
+/* Evaluates the values at the pivots, and the forces. */
 static PetscErrorCode Evaluate(const Primal *p)
 {
   PetscFunctionBegin;
@@ -88,7 +89,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set from coarser problems, where they exist: most unknowns are contacts, coupled with one sign. */
+/* The set from coarser problems, if they exist: most unknowns are contacts, with couplings of one sign. */
 static PetscErrorCode StartFromCoarse(const Primal *p, PetscBool active[], PetscBool *made)
 {
   HycoSolver s = p->s;
@@ -114,7 +115,7 @@ static PetscErrorCode StartFromCoarse(const Primal *p, PetscBool active[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Iterative solves leave residuals of 1 % of `noise`; changes of the set below it are not to be believed. */
+/* Iterative solves stop at residuals of 1 % of `noise`; smaller violations do not change the set. */
 static PetscErrorCode SetAccuracy(Primal *p, PetscReal noise)
 {
   PetscFunctionBegin;
@@ -123,7 +124,7 @@ static PetscErrorCode SetAccuracy(Primal *p, PetscReal noise)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set settled under loose solves: now in earnest. */
+/* The set has converged with inaccurate solves: continues with accurate ones. */
 static PetscErrorCode Settled(void *ctx, PetscBool *more)
 {
   Primal *p = (Primal *)ctx;
@@ -134,7 +135,7 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last solution's set was far off. */
+/* Replaces a set from the last solution that was far from the new one. */
 static PetscErrorCode Restart(void *ctx, PetscInt its, PetscBool active[], PetscBool *fresh)
 {
   const Primal *p = (const Primal *)ctx;
@@ -145,7 +146,7 @@ static PetscErrorCode Restart(void *ctx, PetscInt its, PetscBool active[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set of a cold start: floating bodies begin closed. */
+/* The set of a cold start: floating bodies start with all contacts closed. */
 static PetscErrorCode StartCold(Primal *p, PetscBool active[])
 {
   HycoSolver s = p->s;
@@ -188,7 +189,7 @@ static PetscErrorCode ActiveSet(Primal *p, Gap *g, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A type of TAO on the same bounds. */
+/* Solves the bound-constrained problem by a Tao type. */
 static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
 {
   HycoSolver s = p->s;
@@ -212,7 +213,7 @@ static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
   PetscCall(HycoTaoSetType(g->tao, s->now.type, s->max_its));
   PetscCall(HycoTaoSolve(g->tao, g->H, p->rhs, lo, hi, p->y, &s->its, solved));
   PetscCall(Evaluate(p));
-  for (PetscInt k = 0; k < p->n; k++) { /* a value on its bound has gone through a scale and back */
+  for (PetscInt k = 0; k < p->n; k++) { /* scaling and its inverse may have moved a value from its bound */
     const PetscReal ulps = 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(p->bound[k]);
 
     g->active[k] = (PetscBool)(p->value[k] >= p->bound[k] - ulps);
@@ -265,7 +266,7 @@ static PetscErrorCode PrimalDestroy(Primal *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Left to itself where contacts are many, or where K is solved with iteratively. */
+/* Chosen automatically if there are many contacts, or if K is solved iteratively. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
 {
   Gap *g = (Gap *)form->data;
@@ -323,7 +324,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(VecSet(L, 0));
   PetscCall(VecGetArray(L, &l));
   for (PetscInt k = 0; k < p.n; k++) {
-    if (!*solved && own) /* the set has changed since: show what the residuals say of it */
+    if (!*solved && own) /* the set has changed since: use that of the last solve for the residuals */
       l[g->contact[k]] = p.force[k];
     else if (g->active[k])
       l[g->contact[k]] = PetscMax(p.force[k], 0);
