@@ -3,6 +3,20 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
+/* What tied nodes have of a surface, by node and component (v, n_nodes x width), passes to their masters, which have the
+   contact there. */
+static void PassTied(HycoMesh m, PetscInt width, PetscReal v[])
+{
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    const PetscReal *weight = m->ties->weight + m->tied_entry[k];
+
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+      for (PetscInt c = 0; c < width; c++)
+        v[m->tied_master[j] * width + c] += weight[j - m->tied_start[k]] * v[m->tied[k] * width + c];
+    }
+  }
+}
+
 PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
 {
   HycoMesh m = fe->mesh;
@@ -21,6 +35,7 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
       }
     }
   }
+  PassTied(m, 3, vector);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -255,31 +270,40 @@ PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
+/* Of each node (share, n_nodes), its part of the area of the surface `group`. */
+static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGetFacet(m->type);
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(share, m->n_nodes));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    for (PetscInt q = 0; m->facet_group[f] == group && q < el->nq; q++) {
+      PetscReal n[3];
+
+      PetscCall(HycoFacetNormal(fe, el, f, q, n));
+      for (PetscInt a = 0; a < m->nf; a++) share[m->facets[f * m->nf + a]] += el->N[q][a] * PetscSqrtReal(HycoDot(n, n));
+    }
+  }
+  PassTied(m, 1, share);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
+{
   PetscReal *share;
   PetscInt last = -1;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->n_nodes, &share));
+  PetscCall(PetscMalloc1(fe->mesh->n_nodes, &share));
   for (PetscInt k = 0; k < pairs->n; k++) {
     if (last != pairs->contact[k]) {
       PetscInt g = 0;
 
       last = pairs->contact[k];
-      PetscCall(HycoMeshFindGroup(m, "contact", fe->scene->contact[last]->slave, &g));
-      PetscCall(PetscArrayzero(share, m->n_nodes));
-      for (PetscInt f = 0; f < m->n_facets; f++) {
-        for (PetscInt q = 0; m->facet_group[f] == g && q < el->nq; q++) {
-          PetscReal n[3];
-
-          PetscCall(HycoFacetNormal(fe, el, f, q, n));
-          for (PetscInt a = 0; a < m->nf; a++)
-            share[m->facets[f * m->nf + a]] += el->N[q][a] * PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        }
-      }
+      PetscCall(HycoMeshFindGroup(fe->mesh, "contact", fe->scene->contact[last]->slave, &g));
+      PetscCall(Shares(fe, g, share));
     }
     area[k] = share[pairs->slave[k]];
   }
