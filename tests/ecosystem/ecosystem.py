@@ -1,4 +1,4 @@
-"""What others open: pyvista and meshio, from the Python package index into an environment of the test's own, read each output of hyco."""
+"""Other programs: pyvista and meshio, installed from the Python package index into the test's own environment, read each output of hyco."""
 import json
 import os
 import subprocess
@@ -92,7 +92,7 @@ class Ecosystem(Case):
 
 
     def convert(self, name, *args):
-        """What scripts/convert says of a mesh that meshio wrote: {group: (count, kind)}."""
+        """The report of scripts/convert on a mesh written by meshio: {group: (count, kind)}."""
         run = subprocess.run([self.python, os.path.join(SOURCE, 'scripts', 'convert'), name, 'm.msh', *args], cwd=self.folder,
                              capture_output=True, text=True, timeout=100 * PATIENCE)
         self.assertEqual(run.returncode, 0, run.stderr)

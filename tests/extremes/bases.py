@@ -1,5 +1,5 @@
-"""Bases at their limits: tolerances from 1 to 1e-16, snapshots that repeat, vanish or nearly depend, more modes than the
-RID holds. (Singular values down to 1e-12 of the first: tests/unit/pod.c.)"""
+"""Extreme bases: tolerances from 1 to 1e-16, snapshots that repeat, vanish or are nearly dependent, more modes than the RID
+can support. (Singular values down to 1e-12 of the first: tests/unit/pod.c.)"""
 import unittest
 
 from extreme import CONDENSED, SEEN, TRAIN, UNSEEN, Extreme, blocks, points
@@ -20,7 +20,7 @@ class Bases(Extreme):
             self.row(case, f"{model}: error with {t['n_modes']} modes", self.worst(self.compare(scene, *test)), bound)
 
     def forces(self, case, scene, train, test, *options, bound=1e-9):
-        """The condensed model's forces, which no basis limits."""
+        """The condensed model's forces, which do not depend on a basis."""
         self.train(scene, *train, '-hyco_model_type', 'condensed', *options)
         self.row(case, 'condensed: error of the forces', self.compare(scene, *test)['error_lambda']['max'] or 0, bound)
 
@@ -34,7 +34,7 @@ class Bases(Extreme):
             self.both(f'POD tolerance {tol}, at a training point', scene, TRAIN, SEEN, bound, bound, '-hyco_pod_tol', tol)
 
     def test_repeated(self):
-        """Solutions given twice, and apart by 1e-9 and 1e-13 of their size: each is found again."""
+        """Solutions repeated exactly, and with relative changes of 1e-9 and 1e-13: each is reproduced."""
         scene = self.scene(*blocks(crown=0.1, n=(6, 6)))
         for case, values in (('twice', (0.06, 0.06, 0.05)), ('apart by 1e-9', (0.06, 0.06 * (1 + 1e-9), 0.05)),
                              ('apart by 1e-13', (0.06, 0.06 * (1 + 1e-13), 0.05))):
@@ -45,7 +45,7 @@ class Bases(Extreme):
             self.forces(f'a solution {case}', scene, points(values, (0.02,)), points((0.055, 0.08), (0.02,)))
 
     def test_rank_one(self):
-        """No gap, so that every solution is a multiple of one (the paper's S1): one mode, right at any press; and zeros."""
+        """No gap, so that every solution is a multiple of one (the paper's S1): one mode, exact for any press; and zeros."""
         scene = self.scene(*blocks(press=(0, 0.1), gaps=(0, 0.2)))
         for case, train in (('no gap: solutions of rank one', (0.02, 0.04, 0.08)), ('a zero solution among them', (0, 0.04)),
                             ('one solution', (0.04,))):
@@ -60,8 +60,9 @@ class Bases(Extreme):
             self.forces(case, scene, points(train, (0,)), points((0.05,), (0,)))
 
     def test_no_force(self):
-        """No training solution presses: right where nothing presses; where it does, the hybrid model with its contacts full
-        order still keeps the gaps closed, and a model that has no force to give says so."""
+        """No training solution has contact forces: exact where there is no contact; where there is, the hybrid model with
+        full-order contact displacements still keeps the gaps closed, and a model without forces reports that it does not
+        converge."""
         scene = self.scene(*blocks(press=(0, 0.1), gaps=(0, 0.2)))
         train = points((0.02, 0.04), (0.1, 0.2))
         self.both('no force in any solution, none tested', scene, train, points((0.05,), (0.12,)), 1e-9, 1e-9)
@@ -81,7 +82,7 @@ class Bases(Extreme):
             self.assertTrue(p['full_order'])
 
     def test_too_many(self):
-        """40 solutions' modes on an RID of few nodes: the training says that its model would be no good, or it is good."""
+        """Modes of 40 solutions on an RID of few nodes: training either refuses the model, or it is accurate."""
         scene = self.scene(*blocks(crown=0.1, n=(6, 6)))
         train = points((0.04, 0.045, 0.05, 0.055, 0.06, 0.065, 0.07, 0.08), (0, 0.005, 0.01, 0.015, 0.02))
         self.refused('40 solutions, 4 cells in the RID', 'train', '-scene', scene, '-model', 'm.h5', *train, '-hyco_pod_tol', 0,

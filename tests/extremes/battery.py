@@ -1,7 +1,7 @@
-"""Random scenes, seeds fixed: cells, sizes, materials, gaps, loads, units, kinds of contact, distorted meshes. Full order is
-judged by its KKT residuals, and the model with the whole mesh and all displacements full order must be full order at an
-unseen point, to 1e-8; so must the condensed model's forces be. `battery.py 20260101 500` runs 500 from that seed, a
-table of its own; without arguments some dozens."""
+"""Random scenes with fixed seeds: cells, sizes, materials, gaps, loads, units, kinds of contact, distorted meshes. Full order is
+checked by its KKT residuals; the model with the whole mesh and all displacements full order must agree with full order at an
+unseen point, to 1e-8; and so must the condensed model's forces. `battery.py 20260101 500` runs 500 from that seed, with a table
+of its own; without arguments some dozens."""
 import sys
 import unittest
 
@@ -64,7 +64,7 @@ class Battery(Extreme):
             self.tell(done, seed + 1 - self.seed, worst, active)
 
     def tell(self, done, tried, worst, active):
-        """The table of the scenes so far: a run that is stopped leaves what it found."""
+        """The table of the scenes so far, so that an interrupted run keeps its results."""
         self.begin()
         case = f'{done} random scenes from seed {self.seed}' + (f' right of {tried}' if done < tried else '')
         for key, value in worst.items():

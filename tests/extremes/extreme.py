@@ -1,8 +1,8 @@
-"""What the tests at the extremes share: two stacked blocks of any cell type, a scene written from a dictionary, the
-models of one scene, and rows of tables.
+"""Common code of the tests of extremes: two stacked blocks of any cell type, a scene written from a dictionary, the models
+of one scene, and rows of tables.
 
-A row goes to extremes/TEST.csv under the folder where the test runs; table.py makes docs/limits.md's tables of them.
-"""
+A row is written to extremes/TEST.csv under the folder where the test runs; table.py makes the tables of docs/limits.md
+from them."""
 import csv
 import json
 import os
@@ -48,14 +48,14 @@ class Extreme(Case):
             csv.writer(f).writerow((case, what, found, bound, verdict))
 
     def row(self, case, what, found, bound, least=False):
-        """A number and what it must not exceed (least: must reach)."""
+        """A number and its upper bound (least: its lower bound)."""
         holds = bool(found >= bound if least else found <= bound)  # false for a NaN
         self.say(case, what, f'{found:.2g}', f'{"at least" if least else "at most"} {bound:g}', 'ok' if holds else 'OUT')
         with self.subTest(case=case, what=what):
             self.assertTrue(holds, f'{case}, {what}: {found!r}, bound {bound!r}')
 
     def refused(self, case, *args, says):
-        """One clear line that holds `says`, and an exit status that is not 0."""
+        """One line that contains `says`, and an exit status that is not 0."""
         run = self.run_raw(*args)
         lines = [line for line in run.stderr.splitlines() if line and not line.startswith(('snapshots: ', 'points: '))]
         self.assertNotEqual(run.returncode, 0, f'{case}: not refused')
@@ -73,7 +73,7 @@ class Extreme(Case):
         return self.folder
 
     def fields(self, scene, *args):
-        """The report of a solve that must hold its KKT conditions, the displacements and the contact forces."""
+        """The report of a solve, which must satisfy its KKT conditions, the displacements and the contact forces."""
         report = self.hyco('solve', '-scene', scene, '-output', self.path('out.xdmf'), *args)
         self.solved(report)
         with h5py.File(self.path('out.h5')) as f:
@@ -81,7 +81,7 @@ class Extreme(Case):
             return report, f['nodes/displacement'][:], lam
 
     def train(self, scene, *args, model='m.h5', **options):
-        """(Solutions are kept by scene.)"""
+        """(Solutions are stored by scene.)"""
         return self.hyco('train', '-scene', scene, '-model', model, '-hyco_snapshots', self.path(f's{self.written}'),
                          *args, **options)
 
@@ -97,9 +97,9 @@ class Extreme(Case):
 
     def models(self, case, scene, train, seen, unseen, bound=1e-8, condensed=None):
         """Full order by its KKT residuals and energies; the hybrid model with all displacements full order on the whole
-        mesh, which is full order; the projection onto the solutions and their forces, which returns a training point; the
-        condensed model, whose forces are exact where all parameters are loads and gaps, and which returns a training point
-        (condensed: its bound, where that is another; or the line by which it is refused)."""
+        mesh, which must agree with full order; the projection onto the solutions and their forces, which must reproduce a
+        training point; the condensed model, whose forces are exact if all parameters are loads and gaps, and which must
+        reproduce a training point (condensed: its bound, if it differs; or the line with which it is refused)."""
         report = self.fields(scene, '-mu', ','.join(unseen[1::2]))[0]
         self.row(case, 'full order: worst KKT residual', max(report['kkt'].values()), 1e-8)
         common = (*train, '-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-15')
@@ -116,7 +116,7 @@ class Extreme(Case):
         return report
 
     def condensed(self, scene, train, seen, unseen):
-        """The worst of its forces at unseen points, and of all at training points."""
+        """The largest error of its forces at unseen points, and of all quantities at training points."""
         self.train(scene, *train, *CONDENSED)
         return max(self.compare(scene, *unseen)['error_lambda']['max'] or 0, self.worst(self.compare(scene, *seen)))
 

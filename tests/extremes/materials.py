@@ -1,4 +1,4 @@
-"""Stiffness contrasts and Poisson's ratios near 0.5: what holds, and how low-order elements lock."""
+"""Stiffness contrasts and Poisson's ratios near 0.5: accuracy, and locking of low-order elements."""
 import unittest
 
 import h5py
@@ -58,7 +58,8 @@ class Locking(Extreme):
         return np.mean((u[at, 0] * x[at, 0] + u[at, 1] * x[at, 1]) / r[at]) / exact
 
     def test_ring(self):
-        """quad4 and hex8 lock, bbar cures them; tri3 and tet4, of constant strain, lock less here and have no cure."""
+        """quad4 and hex8 lock, and bbar prevents it; tri3 and tet4, with constant strain, lock less here, and bbar does not
+        apply."""
         found = {}
         for kind, element in (('quad4', None), ('hex8', None), ('tri3', None), ('tet4', None), ('quad4', 'bbar'),
                               ('hex8', 'bbar')):

@@ -1,4 +1,4 @@
-"""Parameters on the ends of their ranges, outside by one unit of round-off and by far, ranges of one point, six at once."""
+"""Parameters at the ends of their ranges, outside by one unit of round-off and by far, ranges of one point, six parameters."""
 import math
 import unittest
 
@@ -28,8 +28,8 @@ class Parameters(Extreme):
             self.refused(f'{name}, press = nan', *command, '-mu', 'nan,0.02', says='nan')
 
     def test_extrapolate(self):
-        """-extrapolate: the hybrid model on the whole mesh is full order anywhere, the condensed one has what is affine exactly;
-        far outside all is closed, and the force follows the press. Where numbers end, so does the command."""
+        """-extrapolate: the hybrid model on the whole mesh agrees with full order anywhere, the condensed one is exact in affine
+        parameters; far outside everything is closed, and the force is proportional to the press. The command fails on overflow."""
         scene = self.scene(*blocks(crown=0.1))
         found = {}
         for model, more in (('hybrid', ALL), ('condensed', CONDENSED), ('projection', PROJECTION)):
@@ -51,7 +51,7 @@ class Parameters(Extreme):
                 self.say(f'press = {press}, -extrapolate', model, lines[-1].removeprefix('hyco: ') if run.returncode else 'solved')
 
     def test_one_point(self):
-        """Ranges of one point: by a grid, and by the greedy loop, which has no direction to go in it."""
+        """Ranges of one point: with a grid, and with the greedy loop, which has only that point."""
         scene = self.scene(*blocks(crown=0.1, press=(0.06, 0.06)))
         for case, train in (('grid', ('-grid', '1,3', '-grid_type', 'closed')),
                             ('greedy', ('-greedy', '-training_grid', '1,5', '-max_snapshots', 4))):

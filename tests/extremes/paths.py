@@ -1,5 +1,6 @@
-"""Reduced models of paths where they may break: two blocks, one of which flows, at limit loads, with steep laws and long steps,
-with contact lost and found again, beyond what training has seen, in other units. A right answer, an honest estimate or a refusal."""
+"""Reduced models of paths in extreme cases: two blocks, one of which deforms inelastically, at limit loads, with steep laws and long steps, with
+contact that opens and closes again, outside the region of training, in other units. The result must be right, or its estimate large, or the model
+refused."""
 import os
 import unittest
 
@@ -17,8 +18,8 @@ TRAIN = ('-values_press', '0.04,0.06,0.08', '-values_gap', '0,0.01')
 
 
 def flowing(law, times, q, load=None, length=1, stress=1, time=1, **options):
-    """The stacked blocks of quad4; the lower one flows. q: the table that moves the upper one's top, or (load: mean
-    stress by `press`) of the tension across the lower one; everything times length, stress and time."""
+    """The stacked blocks of quad4; the lower one deforms inelastically. q: the table that moves the upper one's top, or (load: mean stress by
+    `press`) of the tension across the lower one; everything times length, stress and time."""
     grid, scene = blocks(n=(4, 4), length=length, stress=stress, young=(100, 400), poisson=(0.3, 0.3), **options)
     own = {'yield': stress, 'hardening': stress, 'rate': 1 / time / stress**law.get('exponent', 0)}
     scene['body']['a']['law'] = {k: v * own.get(k, 1) if isinstance(v, (int, float)) else v for k, v in law.items()}
@@ -35,14 +36,14 @@ class Paths(Extreme):
     name = 'paths'
 
     def errors(self, scene, *args):
-        """The worst of the errors of paths that all reach their end."""
+        """The largest errors of paths, all of which must reach their end."""
         report = self.hyco('compare', '-scene', scene, '-model', 'm.h5', *args)
         self.assertEqual(report['not_converged'], 0)
         return {kind: report['worst_' + kind]['max'] or 0 for kind in KINDS}
 
     def both(self, case, scene, train, mu, *steps, over=None, rid=True):
-        """The model of all unknowns on the whole mesh, which is full order; and (rid) one on an RID, whose estimates at an unseen point must not
-        lie far below its errors there, however large they are, unless training refuses it. over: a point without an answer."""
+        """The model of all unknowns on the whole mesh, which must agree with full order; and (rid) one on an RID, whose estimates at an unseen
+        point must not be far below its errors there, unless training refuses it. over: a point without a solution."""
         self.train(scene, *train, *WHOLE, *steps)
         self.row(case, 'hybrid, whole domain: worst error on the path', max(self.errors(scene, '-mu', mu, *steps).values()), 1e-7)
         if over:
@@ -63,7 +64,7 @@ class Paths(Extreme):
                 self.row(case, f'hybrid, RID: error of {kind} {found[kind]:.1g}, over its estimate', found[kind] / estimate, 4)
 
     def test_limit_load(self):
-        """Perfect plasticity up to 0.5 % below the limit load; beyond it neither full order nor a model has an answer, and both say so."""
+        """Perfect plasticity up to 0.5 % below the limit load; above it neither full order nor a model has a solution, and both report this."""
         scene = self.scene(*flowing(PERFECT, (0, 1, 2, 3), [[0, 0], [2, 1], [3, 0.5]], load=LIMIT / 0.04, press=(0.02, 0.045), gaps=(0, 0)))
         train = ('-values_press', '0.03,0.036,0.0396', '-values_gap', '0')
         self.both('perfect plasticity, 0.5 % below the limit load', scene, train, '0.0398,0', over='0.0405,0')
@@ -79,7 +80,7 @@ class Paths(Extreme):
         self.both('Norton, n = 12, steps 100 times too long', scene, TRAIN, '0.05,0.004', '-hyco_step_inelastic', '0.1', rid=False)
 
     def test_reloading(self):
-        """Loaded, unloaded until the blocks part, and loaded again further: contact is lost and comes back."""
+        """Loaded, unloaded until the blocks separate, and loaded again further: contact opens and closes again."""
         q = [[0, 0], [1, 1], [2, -0.2], [3, 1.3], [4, 0.2]]
         scene = self.scene(*flowing(J2, (0, 0.5, 1, 1.5, 2, 2.5, 3, 4), q, crown=0.1))
         self.both('J2, unloaded and loaded again', scene, TRAIN, '0.05,0.004', rid=False)
@@ -90,7 +91,7 @@ class Paths(Extreme):
         self.say('the same', 'contacts closed at the listed times', ' '.join(map(str, active)))
 
     def test_never_flowed(self):
-        """Trained below the yield stress: right there; where bodies flow at last the prediction says that training has not seen that."""
+        """Trained below the yield stress: exact there; where bodies yield, the prediction reports that this is outside the region of training."""
         scene = self.scene(*flowing({'type': 'j2', 'yield': 1.2, 'hardening': 2}, (0, 1, 2), [[0, 0], [1, 1], [2, 0.3]], press=(0.01, 0.1)))
         train = ('-values_press', '0.01,0.02,0.03', '-values_gap', '0,0.002', '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', 1)
         self.train(scene, *train)

@@ -1,4 +1,5 @@
-"""RIDs at their limits: one point, growing to the whole mesh, away from the contact, cutting a body in two; a resonance."""
+"""Extreme RIDs: one point, growing to the whole mesh, away from the contact, cutting a body in two; a singular
+stiffness."""
 import unittest
 
 from common import ROPE
@@ -10,7 +11,7 @@ class Rids(Extreme):
     CONTACT = ('-hyco_hybrid', 'contact', '-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-12')
 
     def test_one_point(self):
-        """One mode, one DEIM point, far from the contact: no force could be given."""
+        """One mode, one DEIM point, far from the contact: the model would have no forces."""
         scene = self.scene(*blocks(crown=0.1, n=(8, 8)))
         one = (*TRAIN, '-hyco_pod_max_modes', 1, '-hyco_rid_modes', 'displacement')
         self.refused('one DEIM point, no contact in the RID', 'train', '-scene', scene, '-model', 'm.h5', *one,
@@ -27,7 +28,7 @@ class Rids(Extreme):
                  self.compare(scene, *SEEN)['error_u']['max'], 0.1)
 
     def test_layers(self):
-        """More layers, until nothing is outside; the last is full order."""
+        """More layers, up to the whole mesh, which gives full order."""
         scene = self.scene(*blocks(crown=0.1, n=(8, 8)))
         before = 0
         for layers in (1, 2, 4, 8, 100):
@@ -40,8 +41,8 @@ class Rids(Extreme):
         self.assertEqual(before, 1)
 
     def test_cut(self):
-        """The RID holds all of b and two ends of a: modes alone tie them. Right at the training points, whose solutions the
-        modes hold."""
+        """The RID contains all of b and two ends of a, connected only by the modes. Exact at the training points, whose
+        solutions are in the span of the modes."""
         scene = self.scene(*blocks(crown=0.1, n=(8, 8)))
         t = self.train(scene, *TRAIN, *self.CONTACT, '-hyco_rid_modes', 'displacement', '-hyco_rid_region',
                        'y > 0.99 || x < 0.3 || x > 0.7 ? 1 : -1')
@@ -50,7 +51,7 @@ class Rids(Extreme):
                  self.worst(self.compare(scene, *SEEN)), 1e-6)
 
     def test_resonance(self):
-        """A reduced stiffness whose determinant changes sign inside the ranges is refused; kept on demand."""
+        """A reduced stiffness whose determinant changes sign inside the ranges is refused, and kept on request."""
         train = ('train', '-scene', ROPE, '-grid', '10,12', '-model', 'r.h5', '-hyco_snapshots', self.path('rope'),
                  '-hyco_deim_type', 'qdeim', '-hyco_hybrid', 'all', '-hyco_scan', 51)
         self.refused('rope, singular inside the range', *train, says='the reduced stiffness is singular inside')

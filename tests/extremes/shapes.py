@@ -1,4 +1,4 @@
-"""Elements long and flat, gaps down to round-off, overlapping surfaces, contact that just begins, all or nothing."""
+"""Long and flat elements, gaps down to round-off, overlapping surfaces, contact that just begins, all contacts or none."""
 import unittest
 
 from extreme import DIM, SEEN, TRAIN, UNSEEN, Extreme, blocks, points
@@ -26,7 +26,7 @@ class Gaps(Extreme):
     name = 'gaps'
 
     def force(self, case, mu, press, gap, bound=1e-9, scene=None, **options):
-        """The total force against the closed form, everywhere closed."""
+        """The total force compared with the closed form, with all contacts closed."""
         scene = scene or self.scene(*blocks(press=(0, 0.1), gaps=(-0.05, 0.05), **options))
         r = self.fields(scene, '-mu', mu)[0]
         exact = uniaxial('quad4', press, gap, *MATERIAL)
@@ -34,7 +34,7 @@ class Gaps(Extreme):
         self.assertEqual(r['n_active'], r['n_contacts'], case)
 
     def test_tiny(self):
-        """The gap beside a press of 0.05, and both as small as round-off of the size."""
+        """The gap small compared with a press of 0.05, and both as small as round-off of the size."""
         for gap in (0, 1e-15, 1e-12, 1e-6):
             self.force(f'gap {gap:g}, press 0.05', f'0.05,{gap!r}', 0.05, gap)
         for size in (1e-15, 1e-12, 1e-300):
@@ -64,7 +64,7 @@ class Gaps(Extreme):
                        points((0.005,), (-0.03,)), condensed=1e-5 if text else None)  # a map reaches the stiffness
 
     def test_grazing(self):
-        """Press equal to the gap: touching without force; one unit of round-off more; a thousandth."""
+        """Press equal to the gap: closed without force; larger by one unit of round-off; by a thousandth."""
         scene = self.scene(*blocks(press=(0, 0.1), gaps=(0, 0.05)))
         full = uniaxial('quad4', 0.05, 0, *MATERIAL)
         for gap, press in ((0.05, 0.05), (0.05, 0.05000000000000001), (0.05, 0.05005)):
@@ -88,7 +88,7 @@ class Gaps(Extreme):
                 self.assertEqual(r['n_active'], r['n_contacts'] if active == 'n' else active)
 
     def test_zero(self):
-        """No load at all: zero, by full order and by models trained elsewhere; a training of zeros alone is refused."""
+        """No load: zero, at full order and by models trained elsewhere; a training with only zeros is refused."""
         scene = self.scene(*blocks(press=(0, 0.1), gaps=(0, 0.05)))
         r, u, lam = self.fields(scene, '-mu', '0,0')
         self.say('no load', 'full order: largest displacement, force', f'{abs(u).max():g}, {abs(lam).max():g}')

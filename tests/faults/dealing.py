@@ -1,4 +1,4 @@
-"""Groups of ranks in a training: none waits while points are left, and a point that fails is heard by all at once."""
+"""Groups of ranks in a training: none waits while points are left, and all groups receive the error of a point that fails at once."""
 import glob
 import os
 import signal
@@ -40,13 +40,13 @@ class Queue(Case):
         return glob.glob(self.path(model + '.snapshots', '*.h5'))
 
     def wait(self, model, n, run, seconds=20):
-        """Until there are n solutions, as long as the run goes on."""
+        """Waits until there are n solutions, as long as the run continues."""
         deadline = time.monotonic() + seconds * PATIENCE
         while len(self.solutions(model)) < n and run.poll() is None and time.monotonic() < deadline:
             time.sleep(0.001)
 
     def check_held_up(self, held):
-        """Rank `held` stops within some point for as long as the other has something to do."""
+        """Rank `held` stops within some point for as long as the other has work."""
         model = f'held{held}.h5'
         command = [*MPIRUN, '2', HYCO, *settled(['train', '-scene', PELLET, *POINTS, '-hyco_groups', 2, '-model', model])]
         with subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
@@ -65,7 +65,7 @@ class Queue(Case):
         self.check_held_up(1)
 
     def test_held_up_counter(self):
-        """The rank with the queue's counters, which answers nobody then."""
+        """The rank with the queue's counters, which then does not answer."""
         self.check_held_up(0)
 
     def fails(self, scene, *points, word):
@@ -78,13 +78,13 @@ class Queue(Case):
         return len(self.solutions('m.h5'))
 
     def test_failing_point(self):
-        """The second radius has no stiffness: its group fails with its first point, and the other, with all of 4.02 to solve, ends."""
+        """The second radius has no valid stiffness: its group fails at its first point, and the other, with all of 4.02 to solve, ends."""
         scene = self.scene(os.path.join(PELLET, 'paper.yaml'), ('mesh: A.msh', f'mesh: {PELLET}/A.msh'),
                            ('young: 1e5\n    poisson: 0.3\n    map', 'young: 1e5*(radius - 4.03)/(radius - 4.03)\n    poisson: 0.3\n    map'))
         self.assertLess(self.fails(scene, *POINTS, word='young'), N // 4)
 
     def test_failing_path(self):
-        """The other group is in a long path, which it does not end."""
+        """The other group is in a long path, which it does not finish."""
         rod = os.path.join(SOURCE, 'examples', 'rod')
         scene = self.scene(os.path.join(rod, 'scene.yaml'), ('../ring', os.path.join(rod, '..', 'ring')),
                            ('young: 74700', 'young: 74700*(creep - 2)/(creep - 2)'))

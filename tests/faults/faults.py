@@ -1,4 +1,4 @@
-"""What a user does wrong: one clear line on stderr, a status that is not 0, soon, and no file left."""
+"""User errors: one clear line on stderr, a status that is not 0, soon, and no file left."""
 import glob
 import os
 import shlex
@@ -203,7 +203,7 @@ CASES = [
 # on two ranks: errors found by one rank, by all, or while files are written
 TWO = ('body_rope_young: "2*(x"', 'text.h5 is not an HDF5 file', 'must be positive', 'none.msh cannot', 'mu1 = 0.04', 'cut.h5', 'contact_clad', 'not valid YAML',
        'has no option -zzz', 'none/out.h5', '-hyco_rid_region', '-hyco_rid_groups', 'none/r.json', 'there are no modes', 'leaves no equation for the modes', 'faces clad_outer_low', 'z = 0, mu1 = 0.1', 'KKT residuals')
-# rank 0 runs $1 ... as they are; the others in the folder $OTHER_FOLDER, with $OTHER_ARGUMENTS behind
+# rank 0 runs $1 ... unchanged; the others in the folder $OTHER_FOLDER, with $OTHER_ARGUMENTS appended
 APART = '''if [ "${OMPI_COMM_WORLD_RANK:-${PMIX_RANK:-${PMI_RANK:-0}}}" -gt 0 ]; then
   cd "$OTHER_FOLDER"
   eval "set -- \\"\\$@\\" $OTHER_ARGUMENTS"
@@ -282,7 +282,7 @@ class Faults(Case):
         for name in ('out.xdmf', 'out.h5', 'out.json'):
             if os.path.exists(self.path(name)):
                 os.remove(self.path(name))
-        left -= {'out.h5.snapshots'}  # they stay for the next try
+        left -= {'out.h5.snapshots'}  # kept for the next attempt
         self.assertEqual(left, set())
 
     def test_one_process(self):
@@ -298,7 +298,7 @@ class Faults(Case):
         ROWS.add(f'wrong commands, options, values, meshes, files ({len(CASES)}), some on 2 ranks', 'one line, status not 0, nothing left')
 
     def test_one_point_of_a_set(self):
-        """A point where the stiffness has no value, met by one rank: the others have predicted theirs, and don't wait."""
+        """A point where the stiffness has no value, on one rank: the others have predicted theirs, and do not wait."""
         self.hyco('train', '-scene', ROPE, *N, '-body_rope_young', 'sqrt(0.3-mu1)+x', '-model', 'half.h5')
         for values in ('0.05,0.1,0.35', '0.35,0.05,0.1', '0.05,0.35,0.1'):
             for ranks in (2, 3):
@@ -308,7 +308,7 @@ class Faults(Case):
         ROWS.add('a point of a set at which the scene has no value, on one rank (3), on 2 and 3 ranks', 'one line, status 1, no rank left waiting')
 
     def apart(self, text, *args, other=(), folder='.'):
-        """Rank 0 as it should be; ranks 1 and 2 stand in another folder or have other arguments: one line, status 1, soon."""
+        """Rank 0 is correct; ranks 1 and 2 are in another folder or have other arguments: one line, status 1, soon."""
         run = subprocess.run([*MPIRUN, '3', 'sh', '-c', APART, 'sh', HYCO, *settled(args)], cwd=self.folder, capture_output=True, text=True, timeout=30 * PATIENCE,
                              env=dict(os.environ, OTHER_FOLDER=self.path(folder), OTHER_ARGUMENTS=shlex.join(other)))
         lines = said(run)
@@ -318,7 +318,7 @@ class Faults(Case):
         self.assertIn(text, lines[0])
 
     def test_other_ranks(self):
-        """Files that the other ranks do not see, or see damaged, and entries that they alone were given."""
+        """Files that other ranks cannot see, or see damaged, and entries that only they were given."""
         for name in ('scene.yaml', 'rope.msh'):
             shutil.copy(os.path.join(ROPE, name), self.path(name))
         shutil.copy(self.path('cut.h5'), self.path('elsewhere', 'rope.h5'))

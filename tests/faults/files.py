@@ -1,4 +1,5 @@
-"""Model and snapshot files: today's that must load for ever, damaged ones, those that point elsewhere, and where hyco writes."""
+"""Model and snapshot files: files in today's format, which must load in all later versions, damaged ones, those with links to others, and where
+hyco writes."""
 import glob
 import os
 import random
@@ -38,7 +39,7 @@ class Files(Case):
         cls.hyco(*CONDENSED)
 
     def refused(self, name, text, command='predict', *more):
-        """One line, status 1, in an address space of 2 GB (a size that a file claims must not be asked for)."""
+        """One line, status 1, in an address space of 2 GB (a size that a file declares must not be allocated)."""
         arguments = [command, '-model', name] + (['-mu', '0.07,0.17'] if command == 'predict' else []) + list(more)
         run = subprocess.run([HYCO, *settled(arguments)], cwd=self.folder, capture_output=True, text=True, timeout=60 * PATIENCE,
                              preexec_fn=None if SANITIZED else lambda: resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30)))
@@ -71,7 +72,7 @@ class Files(Case):
         return 'bad.h5'
 
     def test_unsealed_copy(self):
-        """Whoever changes a model by hand takes the mark out: then it is read as it is."""
+        """A model that was changed by hand, with the mark removed, is read as it is."""
         self.edited(lambda f: None)
         report = self.hyco('predict', '-model', 'bad.h5', '-mu', '0.07,0.17')
         self.near(report['total_contact_force'], 0.32557839822014933, 1e-9)
@@ -85,12 +86,12 @@ class Files(Case):
         self.refused('bad.h5', 'is damaged: its end is missing; if it was a model, train it again')
 
     def test_huge(self):
-        """Sizes that the file cannot hold."""
+        """Sizes larger than the file."""
 
         def put(name, shape, kind):
             def change(f):
                 del f[name]
-                f.create_dataset(name, shape=shape, dtype=kind)  # never written: takes no room
+                f.create_dataset(name, shape=shape, dtype=kind)  # never written: takes no space
             return change
 
         sizes = (('problem/V', (1 << 40, 8), 'f8'), ('problem/V', (50, 1 << 40), 'f8'),
@@ -122,7 +123,7 @@ class Files(Case):
         ROWS.add(f'invalid numbers in a condensed model ({len(values)})', "refused by the dataset's name")
 
     def test_elsewhere(self):
-        """A model that sends its reader to other files, or through filters, which HDF5 would load as code."""
+        """A model with links to other files, or with filters, which HDF5 would load as code."""
         with open(self.path('numbers'), 'wb') as f:
             f.write(np.zeros(1000).tobytes())
         shutil.copy(self.path('good.h5'), self.path('other.h5'))
@@ -231,7 +232,7 @@ class Files(Case):
         for path in glob.glob(self.path('good.h5.snapshots', '*.h5')):
             with h5py.File(path) as f:
                 point[path] = tuple(f['mu'][:].ravel())
-        first, second = sorted(point, key=point.get)[:2]  # the first alone is asked for its sizes
+        first, second = sorted(point, key=point.get)[:2]  # only the first is read for its sizes
 
         def change(path, name, rows):
             with h5py.File(path, 'r+') as f:
@@ -251,7 +252,7 @@ class Files(Case):
                         self.assertEqual(run.returncode, 1)
                         self.assertRegex(run.stderr, text)
                         self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
-                        self.assertNotIn('MPI_ABORT', run.stderr)  # the other rank heard it, and was not left behind
+                        self.assertNotIn('MPI_ABORT', run.stderr)  # the other rank received the error, and was not left waiting
                 with open(path, 'wb') as f:
                     f.write(good)
         ROWS.add('snapshots with inconsistent sizes (6), on 1 and 2 ranks', 'refused by their names')

@@ -1,4 +1,4 @@
-"""Histories that are none, and what takes no history: one line each, whatever the ranks."""
+"""Invalid histories, and features that do not support histories: one line each, on any number of ranks."""
 import glob
 import os
 import unittest
@@ -51,7 +51,7 @@ class Faults(Case):
         self.ring('-body_ring_rate', '-1', words=['rate'])
 
     def test_values_in_time(self):
-        """What goes wrong on the way is told with its time."""
+        """Errors during the path are reported with the time."""
         self.ring('-body_ring_young', '1e5-4e4*t', words=['body_ring_young', 't = '], ranks=2)
 
     def test_law_without_history(self):
@@ -63,7 +63,7 @@ class Faults(Case):
         self.fails('solve', '-scene', path, '-mu', '0.01,1', words=['ring', 'norton', 'history'])
 
     def test_no_reduced_models(self):
-        """Where a type has none of such scenes, and what takes no set of paths; nothing is solved before it is said."""
+        """Types without models of such scenes, and commands that take no set of paths; refused before anything is solved."""
         model = self.path('m.h5')
         for ranks in (0, 2):
             self.fails('train', '-scene', RING, '-grid', '2,2', '-model', model, '-hyco_model_type', 'condensed', '-body_core_young', '1e5*(1+creep)',

@@ -1,4 +1,4 @@
-"""Training that is killed at seeded moments, and disks that fill up: the same command goes on, and the model is the same."""
+"""Training that is killed at seeded moments, and full disks: the same command continues, and the model is the same."""
 import glob
 import os
 import random
@@ -37,8 +37,8 @@ def children(pid, states='RSDTtIXxZ'):
 
 
 def wait(run):
-    """Waits for a launcher whose rank was killed. Open MPI's may miss the death of one that it has just started, and sit there with dead
-    ranks: it is ended then. Ranks that live are to end by themselves."""
+    """Waits for a launcher whose rank was killed. Open MPI's may miss the death of one that it has just started, and hang with dead ranks: it is
+    then ended. Live ranks must end by themselves."""
     for _ in range(3 * PATIENCE):
         try:
             return run.wait(20)
@@ -62,7 +62,7 @@ class Kill(Case):
             return f.read()
 
     def interrupt(self, command, ranks, seconds, draw):
-        """Kills one rank after `seconds`; what the run said, and whether it had ended by itself."""
+        """Kills one rank after `seconds`; returns its output, and whether it had ended by itself."""
         log = self.path('log')
         with open(log, 'wb') as out:
             run = subprocess.Popen(command, cwd=self.folder, stdout=out, stderr=out)
@@ -116,7 +116,7 @@ class Kill(Case):
         self.check_kills(1)
 
     def test_two_ranks(self):
-        """Nor does it matter for a solution how many others are missing: one alone is solved by as many ranks."""
+        """A solution does not depend on how many others are missing: a single one is solved by as many ranks."""
         self.check_kills(2)
         right = self.content()
         os.remove(glob.glob(self.path('m.h5.snapshots', '*.h5'))[0])
@@ -124,11 +124,11 @@ class Kill(Case):
         self.assertEqual(self.content(), right)
 
     def test_paths(self):
-        """A path that was in flight is solved again, those before it are not."""
+        """A path in progress is solved again, those before it are not."""
         self.check_kills(1, 'hybrid with a history', PATHS)
 
     def test_condensed(self):
-        """Flexibilities are kept like solutions: one a value of the stiffness, and one of the modes."""
+        """Flexibilities are kept like solutions: one for each value of the stiffness, and one for the modes."""
         self.check_kills(1, 'condensed', CONDENSED)
         self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', 'flexibility-*.h5'))), 20)
         self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', 'responses-*.h5'))), 20)
@@ -136,8 +136,7 @@ class Kill(Case):
         self.check_kills(2, 'condensed', CONDENSED)
 
     def limited(self, kilobytes, train=TRAIN, ranks=1, alone=0):
-        """The run in which, once it solves, no file can grow beyond a size: what a full disk does, without one.
-        `alone` of the ranks, or all."""
+        """A run in which, once it solves, no file can grow beyond a size, which emulates a full disk. `alone`: that rank only, or all."""
         run = subprocess.Popen(self.command(ranks, train), cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         before = len(glob.glob(self.path('m.h5.snapshots', '*.h5')))
         while run.poll() is None and len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) == before:
@@ -157,7 +156,7 @@ class Kill(Case):
         self.assertEqual([f for f in glob.glob(self.path('**'), recursive=True) if 'partial' in f or 'candidate' in f], [])
 
     def test_full_disk(self):
-        """Full while a snapshot is written, and while the model is: the previous model is untouched; then it goes on."""
+        """The disk is full while a snapshot is written, and while the model is: the previous model is untouched; the next run continues."""
         subprocess.run([HYCO, *settled(TRAIN)], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
         right = self.content()
         for name in glob.glob(self.path('m.h5.snapshots', '*.h5'))[::2]:
@@ -173,7 +172,7 @@ class Kill(Case):
 
     def test_full_disk_condensed(self):
         """Full while flexibilities are written, which are larger than solutions, on 1 and 2 ranks."""
-        # long enough to be caught in; two ranks on one solution take long for each
+        # long enough to be killed in time; two ranks on one solution need more time for each
         for ranks, alone, more, grid, n in ((1, 0, [], '40,8', 320), (2, 1, [], '40,8', 320), (2, 0, ['-hyco_groups', '1'], '10,8', 80)):
             train = [a if a != '20,4' else grid for a in CONDENSED]
             self.refused(self.limited(16, train + more, ranks, alone), 'flexibility-')
@@ -183,7 +182,7 @@ class Kill(Case):
         ROWS.add('disk full while a flexibility is written, on 1 and 2 ranks', 'one line, no model; the solutions are kept for the next run')
 
     def full(self, kilobytes, *args):
-        """A run in which no file can grow beyond a size once it reads its options: from a pipe, which waits until that is so."""
+        """A run in which no file can grow beyond a size once it reads its options: from a pipe, which waits until the limit is set."""
         run = subprocess.Popen([HYCO, *settled(args), '-options_file', 'pipe'], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                text=True)
         while run.poll() is None:
@@ -199,7 +198,7 @@ class Kill(Case):
         return run.returncode, run.communicate(timeout=60 * PATIENCE)[1]
 
     def test_full_disk_outputs(self):
-        """Full while the fields, the report or the table is written: what was there before stays as it was, or nothing is."""
+        """The disk is full while the fields, the report or the table is written: an older file is unchanged, or there is none."""
         os.mkfifo(self.path('pipe'))
         self.hyco('train', '-scene', ROPE, '-grid', '3,3', '-model', 'm.h5')
         point, many = ['-mu', '0.07,0.17'], ['-grid', '10,10']
@@ -236,12 +235,12 @@ class Kill(Case):
                     self.assertEqual(run.returncode, 1)
                     self.assertIn(f'{args[-1]} ', run.stderr)
                     self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
-                    self.assertNotIn('MPI_ABORT', run.stderr)  # the other rank heard it, and was not left behind
+                    self.assertNotIn('MPI_ABORT', run.stderr)  # the other rank received the error, and was not left waiting
                     self.assertEqual({f for f in os.listdir(self.folder) if f[1] == '.' and f[0] != 'm'}, {'a.xdmf', 'b.h5', 'c.json', 'd.csv'})
         ROWS.add(f'a folder at the path of an output or of its .h5 ({len(tries)}), on 1 and 2 ranks', 'one line, no file is half-written')
 
     def test_unwritable(self):
-        """A path that leads through a file (root may write in any folder): nothing is begun that could not end."""
+        """A path that leads through a file (root may write in any folder): refused before any work."""
         with open(self.path('file'), 'w', encoding='ascii') as f:
             f.write('x')
         os.mkdir(self.path('folder.h5'))
@@ -260,7 +259,7 @@ class Kill(Case):
         ROWS.add('a path through a file, a folder at the path of the model, on 1 and 2 ranks', 'one line')
 
     def test_vanishing(self):
-        """The snapshot folder goes while training runs: one line, no model."""
+        """The snapshot folder is removed while training runs: one line, no model."""
         arguments = [a if a != '12,12' else '40,40' for a in TRAIN]
         run = subprocess.Popen([HYCO, *settled(arguments)], cwd=self.folder, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)

@@ -276,7 +276,7 @@ class Meshes(Case):
                     self.one_line(run.result(), text)
 
     def refused(self, text, mesh=None, often=3):
-        """Alone; every third one on two ranks, then three, too: what is found on one rank goes one way to the others."""
+        """On one rank; every third one also on two or three ranks: an error found on one rank reaches the others."""
         self.count += 1
         for ranks in (0, 2 + self.count // often % 2) if self.count % often == 1 else (0,):
             self.one_line(self.run_ranks(ranks, mesh), text)
@@ -353,7 +353,7 @@ class Meshes(Case):
         ROWS.add(f'errors in the cells, facets or contacts of one rank only ({len(ONE_RANK)}), on 2 and 3 ranks', 'one line, status 1, no rank left waiting')
 
     def test_same_in_every_format(self):
-        """2.2 and 4.1, text and binary, lines that end as on Windows, a scene that does: the same answer."""
+        """2.2 and 4.1, text and binary, line ends of Windows in the mesh and the scene: the same result."""
         expected = self.hyco('solve', '-scene', 'scene.yaml', '-mu', '0.05')
         self.solved(expected)
         for kind in ('msh22', 'msh41'):
@@ -374,7 +374,7 @@ class Meshes(Case):
         self.near(report['total_contact_force'], expected['total_contact_force'], 1e-12)
 
     def test_duplicate_nodes(self):
-        """Two cells of a body that meet in two nodes at one place are two pieces: held by nothing, and said so."""
+        """Two cells of a body that meet in two nodes at the same position are two parts: unconstrained, and reported."""
         nodes = self.nodes + [self.nodes[k] for k in (6, 7, 8)]  # the upper cells of the lower body, nodes 4 to 6 of its own
         twin = {4: 19, 5: 20, 6: 21}
         nodes[18:21] = [self.nodes[k - 1] for k in (4, 5, 6)]

@@ -1,4 +1,4 @@
-"""Where outputs go: devices and pipes stay what they are, links lead to their ends, and no input is written over, whatever its name."""
+"""Outputs: devices and pipes are kept, links are followed, and no input is overwritten, whatever its name."""
 import json
 import os
 import shutil
@@ -96,7 +96,7 @@ class Outputs(Case):
         self.assertTrue(stat.S_ISFIFO(os.stat(self.path('pipe')).st_mode))
 
     def test_standard_output(self):
-        """To a pipe, and to a file, where the text that went before stays."""
+        """To a pipe, and to a file, where earlier text is kept."""
         run = self.predict('-report', '/dev/stdout')
         self.assertEqual(run.returncode, 0, run.stderr)
         self.assertIn('"command":', run.stdout)
@@ -110,7 +110,7 @@ class Outputs(Case):
         self.assertIn('"command":', text)
 
     def test_links(self):
-        """What a link leads to is written, whether it is there or not; the link stays."""
+        """The target of a link is written, whether it exists or not; the link is kept."""
         os.mkdir(self.path('there'))
         self.addCleanup(shutil.rmtree, self.path('there'))
         os.symlink('there/r.json', self.path('link.json'))
@@ -162,7 +162,7 @@ class Outputs(Case):
         self.refused(self.run_raw('solve', '-scene', ROPE, '-grid', '2,2', '-table', 't', '-report', './t'), 'are the same file')
 
     def test_models_stay(self):
-        """A report or a table takes the place of no model, of no solution."""
+        """A report or a table does not overwrite a model or a solution."""
         solution = next(n for n in os.listdir(self.path('model.h5.snapshots')))
         for name in ('model.h5', f'model.h5.snapshots/{solution}'):
             self.refused(self.run_raw('solve', '-scene', ROPE, *POINT, '-report', name), 'is a model or a snapshot')

@@ -29,14 +29,14 @@ class Swallowed(Case):
         self.assertEqual(glob.glob(self.path('*.hyco-*')), [])
 
     def test_calibration(self):
-        """All solutions are there; the model is built and its estimates calibrated before it is written, once."""
+        """All solutions exist; the model is built and its estimates calibrated before it is written, once."""
         def ready():
             return len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) == 14 * 14 + 100
 
         self.full_after(ready, 'train', '-scene', ROPE, '-grid', '14,14', '-hyco_validation', 100, '-model', 'm.h5')
 
     def test_search(self):
-        """All solutions are there, and no attempt has ended."""
+        """All solutions exist, and no attempt has ended."""
         def ready():
             return len(glob.glob(self.path('m.h5.snapshots', '*.h5'))) == 48 + 30
 

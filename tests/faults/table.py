@@ -1,10 +1,9 @@
-"""The table of the faults: the rows that the tests left, printed and written to faults.md; fails when a test left none. With
---write-doc it goes into docs/limits.md, between the markers of that section:
+"""The table of the faults: the rows written by the tests, printed and written to faults.md; fails if the rows of a test are missing. With
+--write-doc it is written into docs/limits.md, between the markers of that section:
 
-    (cd build/tests && /usr/bin/python3 ../../tests/faults/table.py --write-doc)
+  (cd build/tests && /usr/bin/python3 ../../tests/faults/table.py --write-doc)
 
-What scripts/fuzz left in build-fuzz/runs/ goes in too, and scripts/sanitize in build-sanitize/summary.
-"""
+The results of scripts/fuzz in build-fuzz/runs/ are included, and those of scripts/sanitize in build-sanitize/summary."""
 import csv
 import glob
 import os

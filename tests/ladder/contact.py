@@ -1,5 +1,5 @@
-"""A contact discretisation that a program registers (examples/ladder/contact.c): a rigid disk pressed into a block, against the obstacle
-whose normal and gap are the same expressions; what a scene says of types and entries that are not there."""
+"""A contact discretisation that a program registers (examples/ladder/contact.c): a rigid disk pressed into a block, compared with the obstacle
+with the same expressions for normal and gap; messages for unknown types and entries."""
 import unittest
 
 from common import Program, msh, square
@@ -32,7 +32,8 @@ class Contact(Program):
         return self.solve(self.scene(contact), '0.06', ranks=ranks)[1:]
 
     def test_disk(self):
-        """The disk's own type gives what an obstacle of the same shape gives, on any number of ranks; a disk that floats above presses nothing."""
+        """The disk's type gives the results of an obstacle of the same shape, on any number of ranks; a disk above the block has no contact
+        forces."""
         expected = self.disk(OBSTACLE)
         self.assertGreater(expected[0], 2)
         self.assertLess(expected[0], expected[1])

@@ -1,5 +1,5 @@
-"""A mesh that a program hands over as a DMPlex (examples/ladder/dmplex.c): the numbers of the same mesh as a file, on any
-number of ranks, refined and not; and what is refused."""
+"""A mesh that a program passes as a DMPlex (examples/ladder/dmplex.c): the numbers of the same mesh as a file, on any number of
+ranks, refined and not; and refusals."""
 import unittest
 
 from common import Program, msh, square

@@ -1,4 +1,4 @@
-"""What a program of one's own says when a call fails: one line, on one rank and on two; PETSc's trace with HYCO_TRACE=1."""
+"""Errors of a user's program: one line, on one rank and on two; PETSc's trace with HYCO_TRACE=1."""
 import os
 import subprocess
 import unittest
@@ -25,7 +25,7 @@ class Errors(Case):
             self.assertEqual(run.stdout, '')
 
     def test_two_ranks(self):
-        """What all ranks agree on is said once; mpiexec has words of its own."""
+        """An error common to all ranks is printed once; mpiexec adds messages of its own."""
         for what in ('scene', 'range'):
             run = self.run_program(what, ranks=2)
             self.assertNotEqual(run.returncode, 0)

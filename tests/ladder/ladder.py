@@ -51,7 +51,7 @@ class Ladder(Case):
         self.near(self.number(said, 'forces:'), report['lambda_max'], 1e-9)
 
     def test_help(self):
-        """A program's own -help lists what its objects read, once."""
+        """A program's own -help lists the options of its objects, once."""
         said = self.step('solve', '-scene', ROPE, '-mu', '0.07,0.17', '-help')
         line = '-hyco_solver_rtol <real>: largest relative KKT residual that counts as solved [1e-8]'
         self.assertEqual(said.count(line), 1, said)
@@ -62,7 +62,7 @@ class Ladder(Case):
         report = self.hyco('predict', '-model', 'm.h5', '-mu', '0.07,0.17')
         self.assertIn(f'36 solutions, {trained["n_modes"]} modes, RID of {trained["rid_elements"]} elements', said)
         self.near(self.number(said, 'converged: force'), report['total_contact_force'], 1e-9)
-        # two digits; what is round-off differs with the kernels of the BLAS, which the command chooses anew on a young processor
+        # two digits; round-off depends on the kernels of the BLAS, which the command selects on a processor newer than the BLAS
         self.assertAlmostEqual(self.number(said, 'estimated error of u'), report['estimated_error_u'], delta=1e-12 + 0.06 * report['estimated_error_u'])
 
     def test_batch(self):

@@ -1,5 +1,5 @@
-"""A law that a program registers (examples/ladder/material.c): cubic elasticity against closed forms, and against `elastic` with equal
-constants; what a scene says of laws and their constants that are not there."""
+"""A law that a program registers (examples/ladder/material.c): cubic elasticity compared with closed forms, and with `elastic` for
+equal constants; messages for unknown laws and constants."""
 import unittest
 
 from common import Program, msh, square
@@ -52,7 +52,7 @@ class Material(Program):
                 self.assertLess(abs(lo_x) + abs(hi_y), 1e-9)
 
     def test_sheared(self):
-        """u = (gamma y, 0) on the sides: the energy density is c44 gamma^2 / 2, whatever c11 and c12 are."""
+        """u = (gamma y, 0) on the sides: the energy density is c44 gamma^2 / 2, for any c11 and c12."""
         fixed = 'left: {x: 0.01*y, y: 0}, right: {x: 0.01*y, y: 0}, low: {x: 0, y: 0}, high: {x: 0.01, y: 0}'
         scene = self.body(CUBIC % 7, fixed, '').replace('scene.yaml', 'shear.yaml')
         with open(self.path('scene.yaml'), encoding='ascii') as file:

@@ -1,4 +1,4 @@
-"""A complementarity method that a program registers (examples/ladder/method.c) against TAO's and hyco's on the same scene."""
+"""A complementarity method that a program registers (examples/ladder/method.c) compared with TAO's and hyco's on the same scene."""
 import os
 import re
 import unittest
@@ -30,7 +30,7 @@ class Method(Program):
         self.assertEqual((reason, method), ('converged by the fallback solver', 'tao projected dual, then active_set'))
 
     def test_tao_shows_it(self):
-        """TAO's monitor, view and reason are the same for TAO's types, hyco's and the program's; on two ranks they say it once."""
+        """TAO's monitor, view and reason are the same for TAO's types, hyco's and the program's; on two ranks they are printed once."""
         watch = ['-hyco_tao_monitor', '-hyco_tao_view', '-hyco_tao_converged_reason']
         for name, args in (('projected', PROJECTED), ('gpcg', ['-hyco_solver_type', 'tao', '-hyco_tao_type', 'gpcg']),
                            ('hyco_active_set', []), ('hyco_lemke', ['-hyco_solver_type', 'lemke'])):

@@ -1,5 +1,5 @@
 """A type of reduced model that a program registers (examples/ladder/model.c): trained, saved, loaded, predicted and compared by the
-library's own calls, on any number of ranks; the command, which does not have it, says so."""
+library's own functions, on any number of ranks; the command, which does not have it, reports this."""
 import unittest
 
 from common import ROPE, Program
@@ -18,7 +18,7 @@ class Model(Program):
         force, complementarity, adhesion, u, sigma, forces, estimated = first
         self.assertGreater(force, 0)
         self.assertEqual(adhesion, 0)
-        self.assertGreater(complementarity, 0)  # and the residuals tell
+        self.assertGreater(complementarity, 0)  # and the residuals show it
         for error in (u, sigma, forces):
             self.assertGreater(error, 1e-6)
             self.assertLess(error, 1)
@@ -26,7 +26,7 @@ class Model(Program):
         for a, b in zip(first, self.nearest(0.07, 0.17, ranks=3)):
             self.near(b, a, 1e-6)
         at = self.nearest(0.25, 0.5)  # the corners of the ranges are training points
-        self.assertLess(at[5], 1e-6)  # of the forces; the displacement lacks what the modes cut off
+        self.assertLess(at[5], 1e-6)  # for the forces; the displacement lacks what the modes leave out
         self.assertLess(at[3], u)
 
     def test_refused(self):

@@ -45,7 +45,7 @@ class Distributed(Case):
                 found = datasets(self.path('many.h5'))
                 self.assertEqual(sorted(found), sorted(right))
                 for name, value in right.items():
-                    if value.dtype.kind == 'f':  # a gap that is closed is round-off of the displacement
+                    if value.dtype.kind == 'f':  # a closed gap is round-off of the displacement
                         size = np.abs(right['nodes/displacement'] if 'gap' in name else np.nan_to_num(value)).max()
                         np.testing.assert_array_equal(np.isnan(found[name]), np.isnan(value), name)
                         self.assertLessEqual(np.nan_to_num(np.abs(found[name] - value)).max(), tolerance * size, name)
@@ -54,7 +54,7 @@ class Distributed(Case):
         return one
 
     def stack(self):
-        """Three blocks on one another; contact alone holds the middle one up; its foot and what it stands on do not match."""
+        """Three blocks on one another; only contact supports the middle one; its foot and the surface below do not match."""
         nodes, elements, names = [], [], {}
         for body, (name, n) in enumerate((('low', 7), ('middle', 10), ('high', 10))):
             first, wide = len(nodes) + 1, n + 1
@@ -88,7 +88,7 @@ class Distributed(Case):
         self.same(os.path.join(EXAMPLES, 'rope', 'scene.yaml'), '0.07,0.17')
 
     def test_free(self):
-        """What nothing holds has one name on all ranks."""
+        """An unconstrained motion has the same name on all ranks."""
         with open(os.path.join(PELLET, 'scene.yaml'), encoding='utf-8') as file:
             text = file.read().replace('mesh: A.msh', 'mesh: ' + os.path.join(PELLET, 'A.msh'))
         text = text.replace('  sym_x0: {x: 0}\n', '  clad_outer_high: {x: 0, y: 0}\n').replace('  sym_y0: {y: 0}\n', '')
@@ -103,7 +103,7 @@ class Distributed(Case):
         self.assertEqual(said[1:], said[:1] * 2)
 
     def test_folded(self):
-        """A map that mirrors a part of a body is refused, wherever the mesh is cut."""
+        """A map that mirrors a part of a body is refused, however the mesh is partitioned."""
         scene = self.stack()
         with open(scene, encoding='ascii') as file:
             text = file.read().replace('low: {young: 100, poisson: 0.3}', "low: {young: 100, poisson: 0.3, map: {x: '(x - 0.5)^2'}}")
@@ -130,8 +130,8 @@ class Distributed(Case):
                 self.assertLessEqual(np.abs(four[key] - value).max(), 1e-9 * np.abs(value).max(), key)
 
     def test_memory(self):
-        """What PETSc allocates at most: on no rank of four much more than on the others (with the whole mesh on rank 0, 1.14 of
-        the mean), and together not much more than on one."""
+        """PETSc's peak memory: on no rank of four much more than on the others (with the whole mesh on rank 0, 1.14 of the mean), and
+        together not much more than on one."""
         most = {}
         for ranks in (1, 4):
             run = self.run_raw('solve', '-scene', os.path.join(PELLET, 'scene.yaml'), '-scene_refine', 1, '-mu', '4.06,1', '-output',

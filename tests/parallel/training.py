@@ -1,5 +1,5 @@
-"""Training has nothing of the mesh's size on one rank: memory, and models of all types with moved or unmatched surfaces, groups and
-regions of interest, greedily or not, on 1 to 4 ranks."""
+"""Training stores nothing of the mesh's size on one rank: memory, and models of all types with moved or unmatched surfaces, groups and
+regions of interest, greedy or not, on 1 to 4 ranks."""
 import os
 import re
 import unittest
@@ -48,8 +48,8 @@ class Training(Case):
         self.same('greedy', BLOCKS, '-greedy', '-training_grid', '3,3', '-max_snapshots', 6, '-hyco_validation', 2, ranks=(3,))
 
     def test_memory(self):
-        """What PETSc allocates at most, with many modes: no rank of four has much more than the others, and together they have
-        little more than twice what one has (2.7 times, where each had the whole mesh with its modes)."""
+        """PETSc's peak memory with many modes: no rank of four has much more than the others, and together they have little more than
+        twice that of one (2.7 times, when each had the whole mesh with its modes)."""
         most = {}
         for ranks in (1, 4):
             run = self.run_raw('train', '-scene', BLOCKS, '-scene_refine', 2, '-grid', '8,8', '-hyco_groups', 1, '-hyco_search', 'false',

@@ -1,4 +1,5 @@
-"""Two runs at once that write the same files or share a folder of solutions: both end well, as each would alone; what killed runs left goes."""
+"""Two runs at once that write the same files or share a folder of solutions: both end well, as each would alone; files left by killed runs are
+removed."""
 import glob
 import os
 import shutil
@@ -71,8 +72,8 @@ class AtOnce(Case):
             self.both(predict, predict)
 
     def test_killed(self):
-        """A killed run's temporary files are gone after the next one; those of a run that lives stay."""
-        name = self.path('m.h5.hyco-00000000-1-0.candidate')  # of another machine, new: it may be at work
+        """A killed run's temporary files are removed by the next one; those of a live run are kept."""
+        name = self.path('m.h5.hyco-00000000-1-0.candidate')  # of another machine, new: it may be in use
         with open(name, 'w', encoding='ascii') as f:
             f.write('x')
         run = self.start(*TRAIN, '-model', 'm.h5')

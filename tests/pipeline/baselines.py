@@ -38,7 +38,7 @@ class Baselines(Ring):
                 self.assertLess(abs(a - b).max(), 1e-9 * abs(a).max(), (dual, column))
 
     def test_unseen(self):
-        """Few cells: what they miss of the training is what was asked; the errors at an unseen point are nearly those with all cells."""
+        """Few cells: their training error is the requested one; the errors at an unseen point are nearly those with all cells."""
         for dual in ('fe', 'nnmf'):
             settings = [*CUBATURE, '-hyco_dual', dual, '-hyco_pod_tol', '1e-8']
             self.train('all.h5', *settings, '-hyco_cubature_tol', '0')
@@ -73,12 +73,12 @@ class Baselines(Ring):
         self.assertLess(trained['rank']['rid_elements'], trained['contact']['rid_elements'])
 
     def test_without_history(self):
-        """Scenes without a history: body forces, pressure and contact integrated by few cells."""
+        """Scenes without a history: body forces, pressure and contact integrated over few cells."""
         scene = self.scene('elastic.yaml', 'law: elastic', '')
         with open(scene, encoding='utf-8') as f:
             text = f.read().replace('*q*', '*') + 'force: {core: {x: -2*push*x}}\n'
         with open(scene, 'w', encoding='utf-8') as f:
-            f.write(text + 'hyco: {rid_groups: core_outside}\n')  # no cubature's
+            f.write(text + 'hyco: {rid_groups: core_outside}\n')  # not for a cubature
         errors = {}
         for name, settings in (('whole.h5', [*CUBATURE, '-hyco_cubature_tol', '0']), ('cells.h5', [*CUBATURE, '-hyco_cubature_tol', '1e-6']),
                                ('regression.h5', REGRESSION)):
@@ -92,7 +92,7 @@ class Baselines(Ring):
         self.assertLess(errors['regression.h5']['u'], 0.02)
 
     def test_regression(self):
-        """Training values at training points; near them elsewhere, and the residuals say that nothing keeps bodies apart."""
+        """Training values at training points; near them elsewhere, and the residuals show that bodies may penetrate."""
         for kernel in ('cubic', 'thin_plate', 'linear'):
             self.train('regression.h5', *REGRESSION, '-hyco_regression_kernel', kernel, '-hyco_pod_tol', '1e-12', '-hyco_rid_layers', '1')
             report = self.compare('regression.h5', '0.006,1')
@@ -114,7 +114,7 @@ class Baselines(Ring):
         self.assertLess(report['worst_lambda']['max'], 1e-9)
 
     def test_order_of_questions(self):
-        """A point's path is the same to the last bit whatever was asked before it."""
+        """A point's path is the same to the last bit whatever was predicted before it."""
         for settings in (CUBATURE, REGRESSION):
             self.train('order.h5', *settings, '-hyco_pod_tol', '1e-8')
             self.same_in_any_order('order.h5', POINTS)
@@ -129,7 +129,7 @@ class Baselines(Ring):
             self.same_models(reports, ('n_modes', 'rid_elements', 'rid_contacts'), histories)
 
     def test_outputs(self):
-        """The series has the whole mesh's fields by replay, the view says what the model is."""
+        """The series has the whole mesh's fields by replay, view describes the model."""
         self.hyco('solve', '-scene', self.norton, '-mu', POINT, '-output', self.path('full.xdmf'))
         full = arrays(self.path('full.h5'))
         for settings, word in ((CUBATURE, 'cubature: '), (REGRESSION, 'regression: ')):
@@ -143,7 +143,7 @@ class Baselines(Ring):
             self.assertIn(word, self.run_raw('view', '-model', self.path('series.h5')).stdout)
 
     def test_refused(self):
-        """What is not there is said in one line."""
+        """Unsupported features are refused in one line."""
         train = ['train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '2,2']
         self.train('damaged.h5', *CUBATURE, grid='2,2')
         self.train('short.h5', *REGRESSION, grid='2,2')
@@ -175,7 +175,7 @@ class Baselines(Ring):
 
 
 class Judged(Ring):
-    """Held-out errors and estimates, as any other model has them."""
+    """Held-out errors and estimates, as for any other model."""
     newcomer = True
 
     def test_held_out(self):

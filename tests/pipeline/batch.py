@@ -1,4 +1,4 @@
-"""Sets of points on several ranks: one table, as CSV or HDF5, the same on any number of ranks, and what a second brings."""
+"""Sets of points on several ranks: one table, as CSV or HDF5, the same on any number of ranks, and the speed-up of a second."""
 import csv
 import os
 import unittest

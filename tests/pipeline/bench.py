@@ -1,5 +1,5 @@
-"""scripts/bench-full-order and scripts/bench-history on mesh A: its CSV, its picture, the problem it gives to other solvers, and what it does when a
-command fails or takes too long."""
+"""scripts/bench-full-order and scripts/bench-history on mesh A: the CSV, the picture, the problem passed to other solvers, and the behaviour when
+a command fails or takes too long."""
 import csv
 import importlib.machinery
 import importlib.util
@@ -61,7 +61,7 @@ class Bench(Case):
         self.assertLess(abs(distance.sum(axis=1) - 0.04).max(), 1e-6)
 
     def test_calculix_input(self):
-        """CalculiX cuts a number after 20 characters, and with it an exponent."""
+        """CalculiX truncates a number after 20 characters, and thereby an exponent."""
         bench = load()
         bench.calculix.write(self.path('input'), bench.pellet.problem(os.path.join(PELLET, 'A.msh'), 4.06, 1.0,
                                                                       self.path('text.msh')))
@@ -71,7 +71,7 @@ class Bench(Case):
         self.assertLessEqual(max(map(len, fields)), 20)
 
     def test_history(self):
-        """The rod on mesh A, and what CalculiX is given of the cladding's creep."""
+        """The rod on mesh A, and CalculiX's input for the cladding's creep."""
         run = subprocess.run([sys.executable, HISTORY, '--rod', 'A', '--newton', 'elastic', '--bound', '1e-3', '--creep', 'none',
                               '--output', self.folder], cwd=SOURCE, capture_output=True, text=True, timeout=100 * PATIENCE)
         self.assertEqual(run.returncode, 0, run.stdout + run.stderr)

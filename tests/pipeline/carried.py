@@ -1,4 +1,4 @@
-"""What each contact carries in a prediction: resultant, moment, area and largest pressure, in reports, tables and outputs, against full order."""
+"""Results of each contact in a prediction: resultant, moment, area and largest pressure, in reports, tables and outputs, compared with full order."""
 import csv
 import os
 import unittest
@@ -70,7 +70,7 @@ class Carried(Case):
         return {column: np.array([float(row[column]) for row in rows]) for column in rows[0]}
 
     def test_whole(self):
-        """All displacements full order on the whole mesh: full order's, where the map moves nodes and turns normals, in 2D and 3D."""
+        """All displacements full order on the whole mesh: agrees with full order where the map moves nodes and turns normals, in 2D and 3D."""
         for scene, train, mu in ((BLOCKS, ('-grid', '2,2'), '0.043,0.067'), (self.corner(), ('-grid', '2,2'), '1.3,0.0007')):
             self.hyco('train', '-scene', scene, *train, '-model', 'w.h5', *WHOLE)
             full = self.hyco('solve', '-scene', scene, '-mu', mu)
@@ -89,7 +89,7 @@ class Carried(Case):
         self.near(found['both'], c['floor']['force'][0] + c['wall']['force'][0], 1e-12)
 
     def test_types(self):
-        """Types that give the training's forces at its points give their resultants; others to what they are worth."""
+        """Types that reproduce the training's forces at its points reproduce their resultants; others within their accuracy."""
         scene = self.corner()
         full = self.hyco('solve', '-scene', scene, '-mu', '1.25,0.002')['contacts']
         for kind, more, bound in (('condensed', (), 1e-7), ('projection', ('-hyco_dual', 'snapshots'), 1e-7), ('regression', (), 1e-7), ('cubature', (), 0.03),
@@ -116,7 +116,7 @@ class Carried(Case):
         np.testing.assert_allclose(found['under.pressure_max'], full['under.pressure_max'], rtol=0.05)
 
     def test_table(self):
-        """The columns of sets of points are the reports' numbers, from one rank and two, as CSV and HDF5; where full order steps in, its own."""
+        """The columns of sets of points are the reports' numbers, on one rank and two, as CSV and HDF5; with the fallback those of full order."""
         scene = self.corner()
         self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', 't.h5', '-hyco_model_type', 'condensed')
         for args in (('predict', '-model', 't.h5'), ('solve', '-scene', scene), ('predict', '-model', 't.h5', '-scene', scene, '-hyco_fallback', '-target_lambda', '1e-9')):

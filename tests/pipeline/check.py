@@ -1,4 +1,4 @@
-"""hyco check: what it counts, warns of, refuses and estimates, on several ranks as on one; hyco view of what is missing."""
+"""hyco check: counts, warnings, refusals and estimates, on several ranks as on one; hyco view of a missing mesh or group."""
 import os
 import shutil
 import unittest
@@ -56,7 +56,7 @@ class Check(Case):
         self.assertTrue(any(all(w in line for w in words) for line in report['warnings']), (words, report['warnings']))
 
     def test_examples(self):
-        """Nothing is suspicious about the examples; sizes are those that solve reports."""
+        """The examples cause no warnings; sizes are those that solve reports."""
         for name, point in (('rope', '0.07,0.17'), ('blocks', '0.05,0.06'), ('hertz', '0.05,1,10'), ('plate', '1,0.5'),
                             ('roller', '0,0.5,10'), ('pellet', '4.06,1')):
             with self.subTest(name):
@@ -68,7 +68,7 @@ class Check(Case):
                     self.assertEqual(found[key], solved[key], key)
 
     def test_pellet(self):
-        """Gaps as the scene states them, 4.1 - radius; what the parameters reach; the same on three ranks."""
+        """Gaps as in the scene, 4.1 - radius; what the parameters affect; the same on three ranks."""
         found = self.hyco('check', '-scene', os.path.join(EXAMPLES, 'pellet'))
         gap, = found['contacts']
         self.assertEqual((gap['n'], gap['n_facing_min'], gap['n_facing_max']), (189, 189, 189))
@@ -132,7 +132,7 @@ class Check(Case):
         self.warned(found, 'Over', 'no entry')
 
     def test_facing(self):
-        """Where a map moves a body away, no slave node faces the master: anywhere, or at some points."""
+        """If a map moves a body away, no slave node faces the master: at all points, or at some."""
         text = SCENE.replace('{young: 100, poisson: 0.3}', '{young: 100, poisson: 0.3, map: {x: x + 8*idle}}').replace(
             ', map: {y: y*lower}', '').replace(', gap: 0.02', '')
         found = self.hyco('check', '-scene', self.scene(text=text, upper=4))
@@ -142,7 +142,7 @@ class Check(Case):
         self.warned(found, 'under', 'never faces')
 
     def test_floating(self):
-        """Motions that contact alone holds are named, and those that nothing holds are solve's error."""
+        """Motions that only contact prevents are listed, and unconstrained ones are solve's error."""
         blocks = os.path.join(EXAMPLES, 'hertz')
         free = self.path('floating.yaml')
         with open(os.path.join(blocks, 'scene.yaml'), encoding='utf-8') as f:
@@ -169,7 +169,7 @@ class Check(Case):
         self.assertIn('body upper', found['regularised'])
 
     def test_refused(self):
-        """What solve refuses: on every number of ranks, with the point where it is."""
+        """Refusals of solve: on every number of ranks, with the point."""
         scene = self.scene(text=SCENE.replace('y*lower', 'y - 30*press*x*y'))
         for ranks in (0, 2):
             run = self.run_raw('check', '-scene', scene, '-report', 'none.json', ranks=ranks)
@@ -184,7 +184,8 @@ class Check(Case):
         self.assertIn('-mu', run.stderr)
 
     def test_history(self):
-        """A history: what its time and tables reach, gaps at its ends, no training; a parameter of a law that leaves the stiffness alone."""
+        """A history: what its time and tables affect, gaps at its ends, no training; a parameter of a law that does not affect the
+        stiffness."""
         ring = os.path.join(EXAMPLES, 'ring')
         for ranks in (0, 2):
             found = self.hyco('check', '-scene', ring, ranks=ranks)

@@ -1,4 +1,4 @@
-"""The choices of a reduction on the rope, each recomputed by numpy: its points, its domain, its scan, its norms."""
+"""The choices of a reduction on the rope, each recomputed by numpy: points, domain, scan, norms."""
 import os
 import unittest
 
@@ -50,7 +50,7 @@ class Choices(Case):
         return self.cells('r.h5')
 
     def test_twins(self):
-        """Points given twice train once, and the run says so; a prediction keeps its rows."""
+        """Repeated points are used once in training, and a message says so; a prediction keeps its rows."""
         values = ('-values_mu1', '0.05,0.1,0.15,0.2,0.25', '-values_mu2', '0.1,0.2,0.3')
         once = self.hyco('train', '-scene', ROPE, *values, '-model', 'once.h5')
         with open(self.path('twins.csv'), 'w', encoding='ascii') as f:
@@ -162,7 +162,7 @@ class Choices(Case):
             self.assertEqual(self.check_scan('-hyco_hybrid', hybrid, '-hyco_hybrid_trials', 20)[1], 0)
 
     def test_resonance(self):
-        """A model that is good at all its training points and useless between them: the scan refuses it."""
+        """A model that is accurate at all its training points and useless between them: the scan refuses it."""
         t, others = self.check_scan('-hyco_deim_type', 'qdeim', '-hyco_hybrid', 'all')
         self.assertGreater(others, 0)
         self.assertLess(t['training_error_u'], 0.02)
@@ -170,7 +170,8 @@ class Choices(Case):
         self.assertGreater(c['error_u']['max'], 1)
 
     def test_all(self):
-        """hybrid all: gamma = G U[A] by least squares on V[A] with -hyco_hybrid_ridge 0; the ridge does no worse in training."""
+        """hybrid all: gamma = G U[A] by least squares on V[A] with -hyco_hybrid_ridge 0; with the ridge the training errors
+        are not larger."""
         least = self.train('least.h5', '-hyco_hybrid', 'all', '-hyco_hybrid_ridge', 0, '-hyco_keep_singular')
         with h5py.File(self.path('least.h5')) as f:
             V, G = f['problem/V'][:][f['problem/fe_dof'][:, 0]], f['problem/G'][:]
@@ -179,7 +180,7 @@ class Choices(Case):
         self.assertLess(ridge['training_error_u'], least['training_error_u'])
 
     def test_contact(self):
-        """hybrid contact on the pellet: all displacements of the contact nodes of A; rank keeps fewer, of full row rank."""
+        """hybrid contact on the pellet: all displacements of the contact nodes of A; rank uses fewer, of full row rank."""
         options = ('-values_radius', '4.02,4.10', '-values_load', '0.5,1', '-hyco_snapshots', 'pellet')
         t = self.hyco('train', '-scene', PELLET, *options, '-model', 'c.h5', '-hyco_hybrid', 'contact')
         with h5py.File(self.path('c.h5')) as f:
@@ -192,7 +193,7 @@ class Choices(Case):
         self.assertGreater(len(fe), t['rid_contacts'])
 
     def test_reconstruction(self):
-        """(41) by Lawson and Hanson and by TAO: the same forces outside the RID, which carry most of the total."""
+        """(41) by Lawson and Hanson and by TAO: the same forces outside the RID, which are most of the total."""
         force = {}
         for solver in ('auto', 'nnls', 'tao'):
             self.hyco('predict', '-model', 'base.h5', '-mu', '0.07,0.17', '-output', 'f.xdmf',
@@ -239,7 +240,7 @@ class Choices(Case):
             self.near(float(table[name]), value, 1e-7, name)
 
     def test_undefined(self):
-        """Where full order has no force and the model some, the error is undefined, and is counted under its name."""
+        """Where full order has no force and the model has some, the error is undefined, and is counted under its name."""
         c = self.hyco('compare', '-scene', ROPE, '-model', 'base.h5', '-grid', '20,24')
         names = [n for n in c if n.startswith('error_')]
         self.assertEqual(len(names), 9)

@@ -1,4 +1,4 @@
-"""Runs the hyco command in a temporary folder and reads what it wrote."""
+"""Runs the hyco command in a temporary folder and reads its output."""
 import json
 import os
 import re
@@ -18,13 +18,13 @@ PATIENCE = int(os.environ.get('HYCO_PATIENCE', '15'))  # factor of a run's limit
 
 
 def library_path(*folders):
-    """Where programs that a test makes find libraries: in these folders, and beside the .pc files of a PETSc of one's own."""
+    """Library path for programs that a test builds: these folders, and those of the .pc files of a PETSc of one's own."""
     own = [os.path.dirname(p.rstrip('/')) for p in os.environ.get('PKG_CONFIG_PATH', '').split(':') if p]
     return ':'.join([*folders, *own, *filter(None, [os.environ.get('LD_LIBRARY_PATH')])])
 
 
 def said(run):
-    """What hyco or PETSc said on stderr, by line, progress apart; launchers have words of their own, in each version others."""
+    """The lines of hyco or PETSc on stderr, without progress; launchers add lines of their own, which differ between versions."""
     return [line for line in run.stderr.splitlines() if line.startswith('hyco: ') or 'PETSC ERROR' in line]
 
 
@@ -39,7 +39,7 @@ def settled(args):
 
 
 class Case(unittest.TestCase):
-    """A test with a folder of its own for everything that hyco writes."""
+    """A test with its own folder for all files that hyco writes."""
     newcomer = False  # True: train searches its settings and judges its model, as it does for a user
 
     @classmethod
@@ -69,7 +69,7 @@ class Case(unittest.TestCase):
 
     @classmethod
     def hyco(cls, *args, status=0, **options):
-        """The JSON report of a run that must end with `status`: 0, or 3 when it writes a model that misses what was asked; None: either."""
+        """The JSON report of a run that must end with `status`: 0, or 3 if it writes a model that misses its targets; None: either."""
         report = cls.path('report.json')
         if os.path.exists(report):
             os.remove(report)
@@ -89,12 +89,12 @@ class Case(unittest.TestCase):
         self.assertLessEqual(abs(found - expected), relative * abs(expected), f'{what}: {found!r} for {expected!r}')
 
     def solved(self, report, tolerance=1e-8, energy=1e-8):
-        """The Karush-Kuhn-Tucker residuals that the run recomputed; of full order, the energy identity too."""
+        """Checks the Karush-Kuhn-Tucker residuals that the run recomputed; for full order also the energy identity."""
         self.assertTrue(report['converged'])
         for name, value in report['kkt'].items():
             self.assertLess(value, tolerance, f'KKT residual {name}')
         if report['command'] == 'solve':
-            # what rounding u alone does to the residual, it does to the energies
+            # rounding of u affects the energies as it does the residual
             self.assertLess(report['energy_defect'], max(energy, report['rounding']), 'energy identity')
 
 
@@ -126,11 +126,11 @@ def square(n, title='block', move=lambda i, j: (i, j)):
 
 
 class Program(Case):
-    """A program of examples/ladder: its name, the scene with places for what varies, what it prints."""
+    """A program of examples/ladder: its name, the scene with placeholders, its output."""
     name = scene_text = out = ''
 
     def scene(self, *parts):
-        """The path of scene.yaml with these parts in its places."""
+        """The path of scene.yaml with these parts in its placeholders."""
         path = self.path('scene.yaml')
         with open(path, 'w', encoding='ascii') as file:
             file.write(self.scene_text % parts)
@@ -142,7 +142,7 @@ class Program(Case):
         return subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE, check=False)
 
     def solve(self, *args, **options):
-        """The words of `out` in what the program prints, numbers as such."""
+        """The numbers of `out` in the program's output."""
         run = self.run_program(*args, **options)
         self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
         found = re.search(self.out, run.stdout)
@@ -150,7 +150,7 @@ class Program(Case):
         return [float(x) if re.fullmatch(r'[-+.\de]+', x) else x for x in found.groups()]
 
     def refused(self, words, *args, **options):
-        """A run that fails, and says these words."""
+        """A run that fails, with these words in its message."""
         run = self.run_program(*args, **options)
         self.assertNotEqual(run.returncode, 0)
         for word in words:

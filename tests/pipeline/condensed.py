@@ -1,4 +1,4 @@
-"""Condensed models: forces of unseen parameter values to the accuracy of the interpolation, whose estimate is held to its word."""
+"""Condensed models: forces at unseen parameter values to the accuracy of the interpolation, and its estimate compared with the errors."""
 import glob
 import os
 import re
@@ -17,7 +17,7 @@ LOADS = ('-values_load', '0.2,0.4,0.6,0.8,1')
 
 
 def full(packed, m):
-    """The symmetric matrix of which the columns of the lower triangle are stored one after the other."""
+    """The symmetric matrix from the columns of its lower triangle."""
     G = np.zeros((m, m))
     G.T[np.triu_indices(m)] = packed
     return G + np.tril(G, -1).T
@@ -33,8 +33,8 @@ class Condensed(Case):
         self.assertIn(line, run.stderr)
 
     def test_pellet(self):
-        """Three and four radii of mesh A; between them the forces are full order's to 1e-6, and the displacement has what
-        its modes can say. The estimate, of one radius less, is no less than the error."""
+        """Three and four radii of mesh A; between them the forces agree with full order to 1e-6, and the displacement to the accuracy of
+        its modes. The estimate, from one radius less, is not less than the error."""
         last = 1
         for radii in ('4.02,4.06,4.1', '4.02,4.045,4.075,4.1'):
             t = self.train('-values_radius', radii, *LOADS, '-model', 'p.h5', '-hyco_snapshots', 'p')
@@ -47,7 +47,7 @@ class Condensed(Case):
             self.assertLess(error, 1e-6)
             self.assertLess(error, estimate)
             self.assertLess(estimate, 0.1 * last)
-            self.assertLess(c['error_u']['max'], 0.06 if last == 1 else 0.01)  # the modes want more radii than the forces
+            self.assertLess(c['error_u']['max'], 0.06 if last == 1 else 0.01)  # the modes need more radii than the forces
             last = estimate
         p = self.hyco('predict', '-model', 'p.h5', '-mu', '4.06,1', '-output', 'out.xdmf')
         self.solved(p)
@@ -66,8 +66,8 @@ class Condensed(Case):
         self.assertIn('load: 5 values; degree 0 of the flexibility, 1 of the gap (affine: exact)', view)
 
     def test_closed_form(self):
-        """The rope's flexibility at each training value, by numpy from K in closed form; between them, forces by the
-        estimate; the gap is affine in mu2, of which two values are enough."""
+        """The rope's flexibility at each training value, by numpy from K in closed form; between them, forces within the estimate; the
+        gap is affine in mu2, for which two values are enough."""
         t = self.train('-grid', '14,2', '-grid_type', 'chebyshev', '-model', 'r.h5', scene=ROPE)
         self.assertEqual(t['n_flexibilities'], 14)
         with h5py.File(self.path('r.h5')) as f:
@@ -84,14 +84,14 @@ class Condensed(Case):
         self.assertLess(c['error_lambda']['max'], 2e-4)
 
     def test_affine(self):
-        """Of a parameter in which everything is affine two values are exact: the blocks' press at a trained crown."""
+        """For a parameter in which everything is affine two values are exact: the blocks' press at a trained crown."""
         self.train('-values_crown', '0.02,0.05,0.08', '-values_press', '0.02,0.08', '-model', 'b.h5', scene=BLOCKS)
         c = self.hyco('compare', '-scene', BLOCKS, '-model', 'b.h5', '-values_crown', '0.05,0.08', '-values_press',
                       '0.03,0.045,0.06')
         self.assertLess(c['error_lambda']['max'], 1e-10)
 
     def test_chosen(self):
-        """No points given: values are added until the estimate is small, and the truth is below it; or the limit is said."""
+        """No points given: values are added until the estimate is small, and the error is below it; or the limit is reported."""
         t = self.train('-model', 'c.h5')
         estimate = t['left_out_flexibility_gap_forces'][2]
         self.assertTrue(0 < estimate <= 1e-7, estimate)
@@ -129,7 +129,7 @@ class Condensed(Case):
         self.near(p['total_contact_force'], forces[0][0], 1e-12)
 
     def test_order(self):
-        """The active set starts at the last solution where that is near; what comes out is the same to the bit."""
+        """The active set starts at the last solution if that is near; the result is the same to the bit."""
         self.train('-values_radius', '4.02,4.06,4.1', '-values_load', '0.4,1', '-model', 'o.h5', '-hyco_snapshots', 'o')
         tables = []
         for loads in ('0.5,0.6,0.7,0.8,0.9', '0.9,0.6,0.8,0.5,0.7'):
@@ -154,7 +154,7 @@ class Condensed(Case):
         self.refused('only contact does', *train, 'held.yaml', '-grid', '2,2')
 
     def test_damaged(self):
-        """Entries that are no numbers, sizes that do not fit, values out of order."""
+        """Entries that are not numbers, sizes that do not match, values out of order."""
         self.train('-grid', '3,2', '-model', 'good.h5', scene=ROPE)
 
         def nan(f):
@@ -176,13 +176,13 @@ class Condensed(Case):
                 bad.write(good.read())
             with h5py.File(self.path('bad.h5'), 'r+') as f:
                 damage(f)
-                del f['sealed']  # the seal is lost with the first change
+                del f['sealed']  # the seal is invalid after the first change
             run = self.run_raw('predict', '-model', 'bad.h5', '-mu', '0.07,0.17')
             self.assertEqual(run.returncode, 1, damage.__name__)
             self.assertIn('condensed/', run.stderr, damage.__name__)
 
     def test_not_definite(self):
-        """A flexibility that is no longer definite between its nodes is refused, not solved."""
+        """A flexibility that is not definite between its nodes is refused, not solved."""
         self.train('-values_mu1', '0.05,0.15,0.25', '-values_mu2', '0,0.5', '-model', 'n.h5', scene=ROPE)
         with h5py.File(self.path('n.h5'), 'r+') as f:
             f['condensed/G'][1] *= -1

@@ -1,5 +1,6 @@
-"""Condensed models: what the scene gives is not interpolated, what reaches neither stiffness nor contact rows costs no factor,
-stresses follow the forces, estimates bound the errors closely, and a search for points in vain says why it ends."""
+"""Condensed models: quantities given by the scene are not interpolated, parameters that affect neither stiffness nor contact
+rows cost no factor, stresses follow the forces, estimates bound the errors closely, and a search for points without success
+gives its reason."""
 import csv
 import os
 import random
@@ -71,13 +72,13 @@ class Given(Case):
             return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(f)]
 
     def dented(self, order='radius, load, dent'):
-        """A gap and a load that are not smooth in parameters which reach neither K nor B."""
+        """A gap and a load that are not smooth in parameters which affect neither K nor B."""
         return self.write('dented.yaml', pellet(
             parameters=f'parameters: [{order}]', ranges='load: {range: [0.2, 1]}\n  dent: {range: [-1, 1]}',
             gap='gap: "4.1 - radius + 2e-3*abs(dent - 0.1) + 1e-3*max(0, sin(9*dent))"', top='pellet_top: "5*abs(load - 0.45)"'))
 
     def test_gaps_and_loads(self):
-        """Two values of dent and three of load, at a trained radius: full order's forces at any other."""
+        """Two values of dent and three of load, at a trained radius: the forces agree with full order at any other."""
         scene = self.dented()
         self.hyco('train', '-scene', scene, *TYPE, '-values_radius', '4.06,4.08', '-values_load', '0.3,0.5,0.9', '-values_dent',
                   '-1,1', '-model', 'dented.h5')
@@ -89,7 +90,7 @@ class Given(Case):
         self.assertIn('from the scene itself: gaps, loads', self.run_raw('view', '-model', 'dented.h5').stdout)
 
     def test_shapes(self):
-        """A load whose shape in space moves is no sum of training loads: it is interpolated, and the gap is exact still."""
+        """A load whose shape in space changes is not a sum of training loads: it is interpolated, and the gap is still exact."""
         scene = self.write('moving.yaml', pellet(top='pellet_top: "5*exp(-(x - 4*load)^2)"'))
         self.hyco('train', '-scene', scene, *TYPE, '-values_radius', '4.06,4.08', '-values_load', '0,0.25,0.5,0.75,1', '-model',
                   'moving.h5')
@@ -121,7 +122,7 @@ class Given(Case):
             self.assertLess(c['error_sigma']['max'], max(most, 10 * c['error_lambda']['max']))
 
     def test_kinks(self):
-        """A modulus with a kink in the radius: the search ends before its limit, names the parameter and the way out."""
+        """A modulus with a kink in the radius: the search ends before its limit, and names the parameter and a remedy."""
         scene = self.write('kink.yaml', pellet(cladding='cladding: {young: "1e5*(1 + 20*abs(radius - 4.067))", poisson: 0.3}'))
         run = self.run_raw('train', '-scene', scene, *TYPE, '-model', 'kink.h5', timeout=200)
         self.assertEqual(run.returncode, 3, run.stderr)
@@ -173,7 +174,7 @@ class Given(Case):
             held, ratio = self.judge(pairs)
             self.assertGreaterEqual(held, 0.9, (scene, kind, ratio))
             self.assertTrue(1 <= ratio <= 5, (scene, kind, ratio))
-            scale = sorted(t / e for e, t in pairs[:19])[-1]  # what 19 held-out solutions make of the law
+            scale = sorted(t / e for e, t in pairs[:19])[-1]  # the factor that 19 held-out solutions give for the estimate
             held, ratio = self.judge([(scale * e, t) for e, t in pairs[19:]])
             self.assertGreaterEqual(held, 0.85, (scene, kind, ratio))
             self.assertLessEqual(ratio, 5, (scene, kind))
@@ -192,7 +193,8 @@ class Given(Case):
                      '0.8,0.9,1,1.1,1.2', '-values_modulus', '1,1.4,1.9,2.4,3', '-values_push', '1,2')
 
     def test_no_estimate(self):
-        """Two values of a parameter that reaches the stiffness tell nothing of what lies between: none, not a number."""
+        """Two values of a parameter that affects the stiffness give no information on what is between: no estimate, not a
+        number."""
         self.hyco('train', '-scene', PELLET, *TYPE, '-values_radius', '4.04,4.1', '-values_load', '0.4,1', '-model', 'two.h5')
         p = self.hyco('predict', '-model', 'two.h5', '-mu', '4.06,0.5')
         self.assertIsNone(p['estimated_error_u'])

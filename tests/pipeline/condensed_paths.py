@@ -33,7 +33,8 @@ class CondensedPaths(Ring):
         return scene
 
     def test_training_point(self):
-        """Every cell and every mode: the full order's path at a training point, the gap closed and opened on its way. Creep alone: in few cells, too."""
+        """Every cell and every mode: the full order's path at a training point, with the gap closing and opening. For creep alone also with few
+        cells."""
         hot = [('core: {', HOT), ('sym_y0: {y: 0}', 'sym_y0: {y: 1e-3*q*push}'), ('\ncontact:', '\nforce: {ring: {x: -0.1*q*x}}\ncontact:')]
         for name, law, changes, each in (('norton', NORTON, [], (EVERY, FEW)), ('hot', NORTON, hot, (EVERY, FEW)), ('j2', J2, [], (EVERY,))):
             scene = self.altered(name + '-listed.yaml', law, LISTED, *changes)
@@ -72,7 +73,7 @@ class CondensedPaths(Ring):
             self.assertLess(errors[2][kind], errors[1][kind] + 1e-6)
 
     def test_order_of_questions(self):
-        """A point's path is the same to the last bit whatever was asked before it."""
+        """A point's path is the same to the last bit whatever was predicted before it."""
         self.train('order.h5', *CONDENSED)
         self.same_in_any_order('order.h5', POINTS)
 
@@ -86,7 +87,7 @@ class CondensedPaths(Ring):
             self.same_models(reports, ('n_modes', 'n_inelastic_modes', 'rid_elements', 'rid_contacts'), histories)
 
     def test_outputs(self):
-        """The series has the whole mesh's fields by replay, the view says what the model is; held-out paths judge it."""
+        """The series has the whole mesh's fields by replay, view describes the model; held-out paths judge it."""
         self.hyco('solve', '-scene', self.norton, '-mu', POINT, '-output', self.path('full.xdmf'))
         trained = self.train('series.h5', *CONDENSED, '-hyco_validation', '12', status=None)
         self.assertEqual((trained['held_out']['n'], trained['held_out']['not_converged']), (12, 0))
@@ -102,7 +103,7 @@ class CondensedPaths(Ring):
             self.assertIn(words, view)
 
     def test_refused(self):
-        """What is not there is said in one line."""
+        """Unsupported features are refused in one line."""
         line = ['train', '-model', self.path('no.h5'), '-grid', '3,1', *CONDENSED, '-hyco_snapshots']
         yields = self.scene('yields.yaml', J2)
         stiff = self.altered('stiff.yaml', NORTON, HISTORY, ('core: {young: 1e5', 'core: {young: 1e5*push'))

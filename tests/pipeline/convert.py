@@ -1,4 +1,4 @@
-"""scripts/convert: Abaqus .inp, .unv, and by meshio where it is, as scenes' meshes with their groups."""
+"""scripts/convert: Abaqus .inp, .unv, and through meshio if installed, as scenes' meshes with their groups."""
 import importlib.util
 import os
 import subprocess
@@ -11,7 +11,7 @@ CONVERT = os.path.join(SOURCE, 'scripts', 'convert')
 
 
 def block(x, y):
-    """A 2 x 1 block's nodes and cells at (x, y), in Abaqus's words."""
+    """A 2 x 1 block's nodes and cells at (x, y), in Abaqus's format."""
     nodes = '\n'.join(f'{1 + i + 3 * j}, {x + i}., {y + j}.' for j in range(2) for i in range(3))
     return f'*Node\n{nodes}\n*Element, type=CPE4\n1, 1, 2, 5, 4\n2, 2, 3, 6, 5\n'
 
@@ -106,7 +106,7 @@ right
 
 class Convert(Case):
     def convert(self, name, text, *args, status=0):
-        """What the script says of a file with this text: groups {name: (count, kind)}, or its one line of error."""
+        """The script's output for a file with this text: groups {name: (count, kind)}, or its one line of error."""
         with open(self.path(name), 'w', encoding='utf-8') as f:
             f.write(text)
         run = subprocess.run([sys.executable, CONVERT, self.path(name), self.path('m.msh'), *args], capture_output=True, text=True, timeout=20 * PATIENCE)

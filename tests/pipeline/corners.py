@@ -40,7 +40,7 @@ class Corners(Case):
         return self.folder
 
     def test_uniform(self):
-        """Pressed on the other faces: the contacts carry these pressures, the corner node its share of each face."""
+        """Pressed on the other faces: the contacts have these pressures, the corner node its share of each face."""
         n = 4
         for kind, angle, ranks in (('quad4', 0, 0), ('quad4', 45, 3), ('tri3', 30, 0), ('hex8', 0, 2), ('hex8', 45, 0)):
             faces = 'xyz' if kind == 'hex8' else 'xy'
@@ -60,7 +60,7 @@ class Corners(Case):
                 np.testing.assert_allclose(sorted(forces), share, rtol=1e-7)
 
     def test_models(self):
-        """In a V-groove whose sides open in turn: forces of both contacts at the node, against full order at other points."""
+        """In a V-groove whose sides open in turn: forces of both contacts at the node, compared with full order at other points."""
         self.block('quad4', 45, 6)
         scene = self.written(MODEL)
         bounds = {'hybrid': 0.05, 'condensed': 1e-4, 'projection': 0.05}

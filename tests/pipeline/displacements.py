@@ -29,9 +29,9 @@ class Displacements(Case):
             return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(f)]
 
     def test_modes(self):
-        """Four radii and two loads of the pellet: between them and beyond, stresses within 0.01 % and, with nearly all energy
-        of the solutions, a thousand times better. The points cross where contact closes ring after ring in a sliver of the
-        ranges (radius 4.09, load 0.55 to 0.65): modes of sampled forces that miss it are off by 0.2 %."""
+        """Four radii and two loads of the pellet: between them and beyond, stresses within 0.01 % and, with nearly all energy of the
+        solutions, a thousand times better. The points cover a small region where contact closes ring after ring (radius 4.09, load 0.55 to
+        0.65): modes of sampled forces that miss it have errors of 0.2 %."""
         for model, u, stress in (('p.h5', 5e-5, 5e-4), ('fine.h5', 1e-6, 1e-5)):
             c = self.hyco('compare', '-scene', PELLET, '-model', model, *POINTS)
             self.assertEqual((c['not_converged'], c['undefined']), (0, 0))
@@ -40,8 +40,8 @@ class Displacements(Case):
             self.assertLess(c['error_sigma_11']['mean'], 1e-4)
 
     def test_estimate(self):
-        """The estimate of u bounds the error at 85 % of unseen points at least, and tells two models apart; in the median it is
-        not larger by more than 10."""
+        """The estimate of u bounds the error at 85 % of unseen points at least, and distinguishes two models; its median is at most 10
+        times the error."""
         before = None
         for model, scene, points in (('p.h5', PELLET, POINTS), ('fine.h5', PELLET, POINTS), ('r.h5', ROPE, ('-grid', '17,15'))):
             self.hyco('predict', '-model', model, *points, '-table', 'e.csv')
@@ -70,7 +70,8 @@ class Displacements(Case):
             return {k: f[k][:] for k in ('nodes/displacement', 'cells/stress', 'contact/lambda')}
 
     def test_full_displacement(self):
-        """Off by what the forces are off by, at points between the training values; the file and the report have the whole mesh's."""
+        """The error is that caused by the forces' error, at points between the training values; the file and the report have the values on
+        the whole mesh."""
         for scene, model, points in ((PELLET, 'p.h5', ('4.06,0.93', '4.087,0.71')), (ROPE, 'r.h5', ('0.071,0.17', '0.2,0.4'))):
             for mu in points:
                 r = self.hyco('predict', '-model', model, '-mu', mu, '-scene', scene, '-hyco_full_displacement', '-output',
@@ -98,7 +99,7 @@ class Displacements(Case):
         self.near(iterative['u_norm2'], one['u_norm2'], 1e-7)
 
     def test_with_fallback(self):
-        """Together with the fallback, full order where a target is missed, the full solve with the forces elsewhere."""
+        """With the fallback, full order where a target is missed, the full solve with the forces elsewhere."""
         args = ('predict', '-model', 'p.h5', '-mu', '4.06,0.93', '-scene', PELLET, '-hyco_full_displacement', '-hyco_fallback',
                 '-target_lambda')
         for target, full in ((1e-3, False), (1e-12, True)):

@@ -1,12 +1,12 @@
 """Runs a document: its fenced blocks, in order, in an empty folder.
 
-    ```sh               commands, by bash; the block must end with status 0, or N after "```sh status N"
-    ```LANGUAGE NAME    a file of this name
-    ```text             lines that the last commands printed, most of their words, in their order; a line "..." is left out. Numbers may differ by a per cent
-                        or one in their last digit; by anything where both are below 1e-5, as counts of iterations, and where the line
-                        tells of seconds, milliseconds, megabytes or a speed-up.
+  ```sh               commands, by bash; the block must end with status 0, or N after "```sh status N"
+  ```LANGUAGE NAME    a file of this name
+  ```text             lines that the last commands printed, most of their words, in their order; a line "..." is left out. Numbers may differ by a per cent
+                      or one in their last digit; by anything where both are below 1e-5, as counts of iterations, and where the line
+                      has seconds, milliseconds, megabytes or a speed-up.
 
-Blocks without a word after the language, but sh and text, are not run: they are for reading."""
+Blocks without a word after the language, except sh and text, are not run: they are for reading."""
 import difflib
 import os
 import re

@@ -1,4 +1,4 @@
-"""What a scene may say, and how it is told where it cannot: keys twice, too many, long expressions, values with a dash; where options come from."""
+"""Entries of a scene and the messages for invalid ones: repeated keys, too many, long expressions, values with a dash; sources of options."""
 import json
 import os
 import resource
@@ -45,7 +45,7 @@ class Entries(Case):
                 self.refused(f'{key} occurs twice', args=('solve', '-scene', 'scene', *POINT), ranks=2)
 
     def test_long_keys(self):
-        """Two keys that differ after the first thousand characters are no repetition; their length is named."""
+        """Two keys that differ after the first thousand characters are not repeated; their length is named."""
         group, key = 'k' * 480, 'k' * 600  # PETSc and libyaml take these
         self.write(self.text.replace('  foundation:', f'  {group}:\n    {key}a: 1\n    {key}b: 2\n  foundation:', 1))
         self.refused('scene.yaml', 'the key in line 15 is longer than')
@@ -71,7 +71,7 @@ class Entries(Case):
         self.assertRegex(run.stderr, 'more than 512 entries|the mesh has no group "group0"')
 
     def test_long_expression(self):
-        """The reason stands in the message however long the expression is."""
+        """The message contains the reason however long the expression is."""
         long = ' + '.join(f'{k}*x' for k in range(400))
         for value, words in ((long + ' + ) 1', 'is not an expression: '), (long + ' + nosuch', 'uses nosuch, which is unknown'),
                              (long + ' + 1/(x - x)', 'is not finite at x =')):
@@ -93,7 +93,7 @@ class Entries(Case):
         self.assertEqual({item.text.split(':/')[0] for item in items}, {'a&b<c>"d\'.h5'})
 
     def test_options_from(self):
-        """What does not stand on the command line stands in the report, and nothing if there is nothing."""
+        """Options that are not on the command line are in the report, and nothing if there are none."""
         def report(*args, **environment):
             run = subprocess.run([HYCO, 'solve', '-scene', ROPE, '-mu', '0.07,0.17', '-report', 'r.json', *args], cwd=self.folder,
                                  env={**os.environ, 'HOME': self.path('home'), **environment}, capture_output=True, text=True, check=False,
@@ -116,7 +116,7 @@ class Entries(Case):
                 os.remove(self.path(name))
 
     def test_little_memory(self):
-        """Address space that BLAS does not find: a clear end, where OpenBLAS looks for ever. How much it takes depends on the libraries."""
+        """Too little address space for BLAS: a clear error, where OpenBLAS would try without end. The amount depends on the libraries."""
         failed = 0
         for megabytes in (400, 320, 250, 190, 140):
             def limit(size=megabytes << 20):

@@ -1,4 +1,4 @@
-"""Properties that make the reduced model exact: the whole mesh as RID with a basis that holds the solution."""
+"""Properties that make the reduced model exact: the whole mesh as RID with a basis that contains the solution."""
 import unittest
 
 from common import PELLET, ROPE, Case
@@ -32,7 +32,7 @@ class Exact(Case):
                   'q.h5', '-hyco_hybrid', 'contact', '-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-14', *WHOLE)
         self.same(PELLET, 'q.h5', '-values_radius', '4.06', '-values_load', '1', tolerance=1e-7)
         c = self.hyco('compare', '-scene', PELLET, '-model', 'q.h5', '-values_radius', '4.06', '-values_load', '0.8')
-        self.assertGreater(c['error_u']['max'], 1e-9)  # and not elsewhere: the test can tell
+        self.assertGreater(c['error_u']['max'], 1e-9)  # and not elsewhere: the test can distinguish
 
 
 if __name__ == '__main__':

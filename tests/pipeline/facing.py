@@ -1,4 +1,5 @@
-"""Which nodes are paired: normals oppose, partners lie in front; what overlaps or no longer faces is refused by name."""
+"""Which nodes are paired: normals oppose each other, partners are in front; overlaps and partners that no longer face each other are
+refused by name."""
 import math
 import unittest
 
@@ -55,7 +56,7 @@ class Facing(Case):
                     self.near(self.force()['total_contact_force'], surface, 0.01)
 
     def test_tolerance(self):
-        """A tolerance, however large, pairs nothing that does not face; too small, the message says what is right."""
+        """A tolerance, however large, pairs nothing that does not face the master; if it is too small, the message gives the right one."""
         arcs(self.path('arcs.msh'), 90)
         self.scene('surface', ', tolerance: 25')
         right = self.force()
@@ -73,13 +74,13 @@ class Facing(Case):
         self.assertEqual(self.force()['n_active'], 0)
 
     def test_wrong_side(self):
-        """A surface that looks away meets nothing."""
+        """A surface that faces away has no contact."""
         arcs(self.path('arcs.msh'), 20)
         self.scene('surface', ', tolerance: 25')
         self.refused('no node of over faces base within 25', more=('-contact_c_master', 'base'))
 
     def test_overlap(self):
-        """What overlaps by more than half of a facet is named, with the entry that allows it; the rest is reported."""
+        """An overlap of more than half of a facet is named, with the entry that allows it; smaller ones are reported."""
         arcs(self.path('arcs.msh'), 20, gap=-0.03)
         self.scene('surface', ', tolerance: 25')
         self.near(self.force()['overlap'], 0.06, 1e-3)
@@ -95,7 +96,7 @@ class Facing(Case):
         return 'a.h5'
 
     def test_pair_is_moved(self):
-        """A pair keeps its nodes: scaled together they face each other still, shifted by a facet they do not."""
+        """A pair keeps its nodes: scaled together they still face each other, shifted by a facet they do not."""
         arcs(self.path('arcs.msh'), 20)
         self.scene('pair', low=', map: {x: 1.01*x}')
         self.assertGreater(self.force()['total_contact_force'], 0)

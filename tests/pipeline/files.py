@@ -1,4 +1,4 @@
-"""What the files promise: a model needs nothing else, a training resumes, nothing half written is left."""
+"""Files: a model needs nothing else, a training resumes, nothing is left half-written."""
 import glob
 import os
 import shutil
@@ -76,11 +76,11 @@ class Files(Case):
         self.near(again['training_error_u'], first['training_error_u'], 1e-6)
 
     def test_other_format(self):
-        """A model of an older format is refused by its number, before anything of it is believed."""
+        """A model of an unknown format is refused by its number, before anything else is read."""
         self.train()
         with h5py.File(self.path('m.h5'), 'r+') as f:
             f['format'][...] = 1
-            del f['sealed']  # the seal is lost with the first change
+            del f['sealed']  # the seal is invalid after the first change
         run = self.run_raw('predict', '-model', 'm.h5', '-mu', '0.07,0.17')
         self.assertNotEqual(run.returncode, 0)
         self.assertIn('m.h5 has model format 1, and this hyco', run.stderr)
@@ -97,13 +97,13 @@ class Files(Case):
         self.assertIn('is a snapshot of another scene or mesh; remove the folder', run.stderr)
 
     def test_solver_options(self):
-        """Options of the solvers inside reach the snapshots of a training too, as -help promises."""
+        """Options of the inner solvers also apply to the snapshots of a training, as -help says."""
         run = self.run_raw('train', '-scene', ROPE, '-grid', '2,2', '-model', 'm.h5', '-hyco_solver_type', 'tao',
                            '-hyco_solver_form', 'dual', '-hyco_tao_type', 'bntr')
         self.assertEqual(run.returncode, 0, run.stderr)
 
     def test_points_and_tables(self):
-        """-points, and predict over a set: the table holds what single predictions tell."""
+        """-points, and predict over a set: the table has the numbers of single predictions."""
         self.train()
         with open(self.path('p.csv'), 'w', encoding='ascii') as f:
             f.write('mu2,mu1\n0.17,0.07\n0.4,0.2\n')
@@ -115,7 +115,7 @@ class Files(Case):
         self.near(table['total_contact_force'][1], one['total_contact_force'], 1e-6)
 
     def test_xdmf(self):
-        """The XDMF is XML whose every item is in the HDF5 file with the shape that it says."""
+        """The XDMF is XML whose every item is in the HDF5 file with the declared shape."""
         import xml.etree.ElementTree as xml
         self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17', '-output', 's.xdmf')
         items = [i for i in xml.parse(self.path('s.xdmf')).iter('DataItem') if i.get('Format') == 'HDF']

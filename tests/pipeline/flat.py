@@ -1,4 +1,4 @@
-"""A prediction touches the RID alone: with the same modes and RID, its cost does not grow with the mesh."""
+"""A prediction uses the RID only: with the same modes and RID, its cost does not grow with the mesh."""
 import csv
 import os
 import statistics

@@ -1,4 +1,5 @@
-"""Greedy training (section 5.4): its choices repeat, whatever the ranks and after a kill, and its errors are those of the paper's table."""
+"""Greedy training (section 5.4): its choices are reproducible, on any number of ranks and after a kill, and its errors are those of the paper's
+table."""
 import csv
 import os
 import signal
@@ -76,7 +77,7 @@ class Greedy(Case):
                 self.assertEqual(os.stat(self.path('killed.h5.snapshots', name)).st_mtime_ns, when, 'solved again')
 
     def test_target(self):
-        """The loop ends at a target that it can reach, and every iteration's model can be kept and asked."""
+        """The loop ends at a reachable target, and every iteration's model can be stored and used."""
         t = self.hyco('train', '-scene', ROPE, '-greedy', '-training_grid', '6,7', '-target', 0.5, *FINE, '-model', 't.h5',
                       '-hyco_greedy_keep', '-table', 't.csv')
         self.assertEqual(t['greedy']['stop'], 'target')
@@ -87,7 +88,7 @@ class Greedy(Case):
         n = t['greedy']['iterations']
         p = self.hyco('predict', '-model', f't.h5.snapshots/greedy-{n:03d}.h5', '-mu', '0.07,0.17')
         self.solved(p)
-        # the last model has a table of its stiffness besides, the kept one assembles
+        # the last model also has a table of its stiffness, the stored one assembles
         self.near(self.hyco('predict', '-model', 't.h5', '-mu', '0.07,0.17')['lambda_norm2'], p['lambda_norm2'], 1e-9)
 
     def test_ends(self):
@@ -171,7 +172,7 @@ class Greedy(Case):
         self.near(np.linalg.norm(np.maximum(-u - gap, 0)), float(row[7]), 1e-6)
 
     def test_refusals(self):
-        """What cannot be is one clear line, before anything is solved."""
+        """Invalid requests give one clear line, before anything is solved."""
         with open(self.path('line.csv'), 'w', encoding='ascii') as file:
             file.write('mu1,mu2\n0.05,0\n0.1,0.1\n0.15,0.2\n')
         for options, words in (

@@ -1,4 +1,4 @@
-"""Bodies that contact alone holds, and bodies that nothing holds: K is singular, the answers are not."""
+"""Floating bodies, and unconstrained bodies: K is singular, the contact problem of the former is not."""
 import os
 import subprocess
 import unittest
@@ -24,7 +24,7 @@ WIDTH = 20
 
 
 class Block(Case):
-    """Its top is pushed, not moved: only the foundation carries it."""
+    """Its top has a load instead of a prescribed displacement: only the foundation supports it."""
 
     @classmethod
     def scene(cls, contact):
@@ -35,7 +35,7 @@ class Block(Case):
         return path
 
     def test_pressed(self):
-        """The contact carries the whole load, the vertical part of it exactly."""
+        """The contact has the whole load, its vertical part exactly."""
         for ranks in (1, 2):
             for form in ('dual', 'primal'):
                 with self.subTest(ranks=ranks, form=form):
@@ -102,7 +102,7 @@ class Pellet(Case):
             table = np.isclose(x[:, 2], 0) & (force[:, 2] > 0)
             self.near(force[table, 2].sum(), 64.316, 1e-5)  # the weight of the pressures, computed independently
             gap = r['total_contact_force'] - force[table, 2].sum()
-            self.near(gap, supported['total_contact_force'], 0.05)  # the table may let go where the plane pulls
+            self.near(gap, supported['total_contact_force'], 0.05)  # the table may open where the plane would pull
 
 
 if __name__ == '__main__':

@@ -1,5 +1,5 @@
-"""examples/hertz against Hertz's formulas (K. L. Johnson, Contact Mechanics, 1985, section 4.2c), judged at the force that the
-solution carries: a^2 = 4 F R/(pi E*), p = p0 sqrt(1 - x^2/a^2), p0 = 2 F/(pi a); tests/verify/hertz.py asks for the orders."""
+"""examples/hertz compared with Hertz's formulas (K. L. Johnson, Contact Mechanics, 1985, section 4.2c), at the force of the
+solution: a^2 = 4 F R/(pi E*), p = p0 sqrt(1 - x^2/a^2), p0 = 2 F/(pi a); tests/verify/hertz.py tests the orders."""
 import os
 import unittest
 

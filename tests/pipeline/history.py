@@ -50,7 +50,7 @@ class History(Case):
         return ['solve', '-scene', self.path('pellet.yaml'), '-history_times', times, '-history_tables_q', tables]
 
     def test_elastic_path(self):
-        """Without memory each time's solution is that of a scene with its loads."""
+        """Without inelastic laws each time's solution is that of a scene with its loads."""
         report = self.hyco(*self.elastic(), '-mu', '4.06,1')
         for q, force in zip((0.2, 0.6, 1), report['history']['total_contact_force']):
             alone = self.hyco('solve', '-scene', PELLET, '-mu', f'4.06,{q}')
@@ -60,7 +60,7 @@ class History(Case):
         self.assertLess(max(report['history']['energy_defect']), 1e-10)
 
     def test_ring(self):
-        """Either iteration, any number of ranks: one answer; the tangent's converge quadratically, the other keeps its factor."""
+        """Either iteration, any number of ranks: the same result; the tangent's converge quadratically, the other keeps its factor."""
         tangent, fields = self.ring('tangent', '-hyco_newton', 'tangent')
         self.assertGreaterEqual(tangent['history']['newton_order'], 1.8)
         self.assertLessEqual(max(tangent['history']['most_iterations']), 4)
@@ -114,7 +114,7 @@ class History(Case):
         self.near(fields['step-0003/cells/inelastic'].max(), report['history']['inelastic'][-1], 1e-12)
 
     def test_resume(self):
-        """A run that is killed goes on from its last step, on another number of ranks too, and ends as if nothing had been."""
+        """A killed run continues from its last step, also on another number of ranks, and ends as if it had not been interrupted."""
         args = ['-scene', RING, '-mu', '0.01,1', '-history_times', ','.join(str(k / 20) for k in range(161)), '-hyco_newton', 'tangent']
         whole = self.hyco('solve', *args, '-output', self.path('whole.xdmf'))
         keep = ['-hyco_checkpoint', self.path('c.h5'), '-output', self.path('parts.xdmf')]

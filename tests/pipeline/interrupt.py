@@ -1,4 +1,4 @@
-"""What a person at the terminal may do: Ctrl-C during a training, which goes on with the same command; -quiet."""
+"""Interaction on the terminal: Ctrl-C during a training, which continues with the same command; -quiet."""
 import os
 import signal
 import subprocess
@@ -16,7 +16,7 @@ class Interrupt(Case):
         return {name: os.stat(os.path.join(folder, name)).st_mtime_ns for name in os.listdir(folder) if name.endswith('.h5')} if os.path.isdir(folder) else {}
 
     def test_interrupt(self):
-        """Ctrl-C, and the end that a batch system announces: one line, a status of its own; nothing that was solved is solved again."""
+        """Ctrl-C, and the signal of a batch system: one line, a status of its own; nothing that was solved is solved again."""
         seen = 0
         for number in (signal.SIGINT, signal.SIGTERM):
             run = subprocess.Popen([HYCO, *settled(TRAIN)], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -39,7 +39,7 @@ class Interrupt(Case):
         self.assertEqual({name: after[name] for name in before}, before)
 
     def test_quiet(self):
-        """No words and no progress; errors, the report and the table all the same."""
+        """No text and no progress; errors, the report and the table as always."""
         for args in (('train', '-scene', ROPE, '-grid', '3,3', '-model', 'r.h5'), ('solve', '-scene', ROPE, '-mu', '0.07,0.17'),
                      ('predict', '-model', 'r.h5', '-mu', '0.07,0.17')):
             run = self.run_raw(*args, '-quiet', '-report', 'r.json')

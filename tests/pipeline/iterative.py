@@ -1,5 +1,5 @@
-"""Iterative solves (-hyco_linear iterative): what conjugate gradients and the active set take does not grow with the mesh or the ranks, and the solution is the
-factor's. Counts, not seconds."""
+"""Iterative solves (-hyco_linear iterative): the iterations of conjugate gradients and of the active set do not grow with the mesh or the ranks,
+and the solution is that with a factor. Counts, not seconds."""
 import csv
 import os
 import re
@@ -37,16 +37,16 @@ class Iterative(Case):
         self.held(PELLET, '4.06,1', '-scene_refine', '1', ranks=(2,))
 
     def test_unseen(self):
-        """Scenes by which no setting was chosen: matching and other surfaces, 2D and 3D."""
+        """Scenes that were not used to choose a setting: matching and other surfaces, 2D and 3D."""
         for name, mu in (('hertz', '0.06,1,10'), ('roller', '0,0.6,10'), ('roller3d', '0,0.5,10'), ('blocks', '0.05,0.05')):
             self.held(os.path.join(EXAMPLES, name, 'scene.yaml'), mu, most=20)
 
     def test_overlap(self):
-        """No loads: what overlaps as drawn is all that acts."""
+        """No loads: only the overlap as drawn acts."""
         self.held(PELLET, '4.06,0', '-contact_gap_gap', '-0.01', ranks=(0,))
 
     def test_ramp(self):
-        """Several points on one K, the next from the last one's contacts; a preconditioner that is no multigrid."""
+        """Several points on one K, each starting from the last one's contacts; a preconditioner that is not a multigrid."""
         table = self.path('ramp.csv')
         for options in ((), ('-hyco_primal_pc_type', 'icc')):
             rows = []

@@ -26,7 +26,7 @@ class Launch(Case):
                 self.assertEqual(os.listdir(self.folder), [])
 
     def test_one_rank(self):
-        """A job of several ranks may start hyco alone: in a batch script of Slurm only SLURM_NTASKS says how many it has."""
+        """A job of several ranks may start hyco on one: in a batch script of Slurm only SLURM_NTASKS gives the number."""
         for name, value in (('PMI_SIZE', '1'), ('SLURM_NTASKS', '8'), ('SLURM_STEP_NUM_TASKS', '1')):
             with self.subTest(name=name):
                 self.assertEqual(self.start('view', '-model', MODEL, **{name: value}).returncode, 0)
@@ -41,11 +41,11 @@ class Launch(Case):
         return {re.sub(r'\d+', '0', line) for line in run.stderr.splitlines()}
 
     def kernels(self, command, **environment):
-        """Those that OpenBLAS says it takes, a start a line."""
+        """The kernels that OpenBLAS reports, one line for each start."""
         return re.findall(r'(?m)^Core: (\S+)', self.start(*command, OPENBLAS_VERBOSE='2', **environment).stderr)
 
     def test_young_processor(self):
-        """An OpenBLAS older than the processor takes its oldest kernels; solve and train then start anew with those that the processor runs."""
+        """An OpenBLAS older than the processor uses its oldest kernels; solve and train then restart with those that the processor supports."""
         predict, solve = self.kernels(self.COMMANDS[1]), self.kernels(self.COMMANDS[2])
         if predict != ['Prescott']:
             self.assertEqual(solve, predict)
@@ -57,7 +57,7 @@ class Launch(Case):
         self.assertEqual(self.kernels(self.COMMANDS[2], OPENBLAS_CORETYPE='Prescott'), ['Prescott'])
 
     def test_temporary_folder(self):
-        """No folder for temporary files, or one that cannot be used: Open MPI 5 wants one, crashes without it, and makes one that is missing."""
+        """No folder for temporary files, or an unusable one: Open MPI 5 needs one, crashes without it, and creates a missing one."""
         usual = self.noise()
         gone, shut, file = (self.path(name) for name in ('gone', 'shut', 'file'))
         os.mkdir(shut, 0o500)
@@ -70,7 +70,7 @@ class Launch(Case):
         self.assertFalse(os.path.exists(gone))
 
     def test_bare_machine(self):
-        """Without a network, with next to no shared memory, with nowhere for temporary files: all that one rank says is its own."""
+        """Without a network, with little shared memory, without a folder for temporary files: one rank prints only its own output."""
         alone = ('unshare', '--map-root-user', '--mount', '--net')
         if subprocess.run([*alone, 'mount', '-t', 'tmpfs', 'tmpfs', '/dev/shm'], capture_output=True, check=False).returncode:
             self.skipTest('no right to unshare')

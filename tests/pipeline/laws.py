@@ -1,5 +1,5 @@
-"""Bodies with laws in scenes: a law of a shared library with MFront's interface against the same law of hyco's own, what
-is refused and in which words, elements chosen by the law, ranks, heat in a history against the linear scene."""
+"""Bodies with laws in scenes: a law of a shared library with MFront's interface compared with the same law of hyco,
+refusals and their messages, elements chosen by the law, ranks, heat in a history compared with the linear scene."""
 import os
 import sys
 import unittest
@@ -68,7 +68,8 @@ class Laws(Case):
                 self.assertAlmostEqual(own[0][energy], theirs[0][energy], delta=1e-8 * own[0]['strain_energy'])
 
     def test_library_in_scene_folder(self):
-        """A name without a slash is found beside the scene; one that is missing, no library, or dies, is one line."""
+        """A name without a slash is found in the scene's folder; a file that is missing, not a library, or crashes, gives
+        one line."""
         for name in ('behaviours.so', 'crash.so'):
             link = self.path(name)
             if not os.path.exists(link):
@@ -99,7 +100,7 @@ class Laws(Case):
         self.refused('no_such', 'norton', 'j2', body=NORTON.replace('norton', 'no_such'))
 
     def test_elements(self):
-        """bbar where the law flows, without a word; standard where the scene says so; simplices then too."""
+        """bbar for inelastic laws by default; standard if the scene says so; then simplices too."""
         chosen, bbar, standard = (self.fields(BOTH + element) for element in ('', ', element: bbar', ', element: standard'))
         self.same(chosen[1:], bbar[1:], 0)
         self.assertGreater(abs(chosen[1] - standard[1]).max(), 1e-4 * abs(chosen[1]).max())

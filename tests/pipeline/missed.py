@@ -1,4 +1,4 @@
-"""A run that writes a model which misses what was asked says so in one line, and ends with a status of its own: 3."""
+"""A run that writes a model which misses its targets reports this in one line, and ends with status 3."""
 import json
 import unittest
 
@@ -30,7 +30,7 @@ class Missed(Case):
                     self.hyco('predict', '-model', 'm.h5', '-mu', '0.07,0.17')
 
     def test_greedy_limits_asked(self):
-        """Without -target a limit is what was asked."""
+        """Without -target, reaching a limit is a success."""
         for options, stop in ((('-max_snapshots', 5), 'snapshots'), (('-max_seconds', '1e-9'), 'seconds'), (('-target', 1e9), 'target')):
             with self.subTest(options=options):
                 run, report = self.greedy(*options)

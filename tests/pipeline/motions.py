@@ -1,4 +1,4 @@
-"""Rigid motions that neither supports nor frictionless contact hold, the same on every mesh of one geometry; contact forces that
+"""Rigid motions that neither supports nor frictionless contact prevent, the same on every mesh of one geometry; contact forces that
 are not unique."""
 import json
 import os
@@ -120,7 +120,7 @@ class HalfDisk(Case):
             self.assertIn('nor body disk from moving along (1, 0, 0)', said)
 
     def test_regularised(self):
-        """Vertical equilibrium, no mean rotation, one answer on all ranks; meshes agree as far as they resolve the contact."""
+        """Vertical equilibrium, zero mean rotation, the same result on all ranks; meshes agree within the resolution of the contact."""
         deep = []
         for n, m, ratio, width in MESHES:
             self.mesh(n, m, ratio, width)
@@ -147,7 +147,7 @@ class HalfDisk(Case):
             self.near(value, deep[0], 0.1)
 
     def test_accelerated(self):
-        """A load that turns the disk has no equilibrium; one that does so by less than the tolerance has."""
+        """A load that turns the disk has no equilibrium; one with a moment below the tolerance has."""
         self.mesh(12, 17, 1, 6)
         for ranks in (0, 2):
             said = self.refused('solve', '-scene', self.scene(load='load*(1 + 0.1*x)'), '-mu', 10, '-hyco_regularise', ranks=ranks)
@@ -174,7 +174,7 @@ class HalfDisk(Case):
         self.assertIn('fix a component', run.stderr)
 
     def test_held_by_a_support(self):
-        """A second support holds the rotation: nothing is left to regularise, and the option changes nothing."""
+        """A second support prevents the rotation: nothing is left to regularise, and the option changes nothing."""
         self.mesh(12, 17, 1, 6)
         scene = self.scene(fixed=CENTRE + 'corner: {y: 0}, ')
         plain = self.hyco('solve', '-scene', scene, '-mu', 10)
@@ -207,7 +207,7 @@ class HalfBall(Case):
 
 
 class Held(Case):
-    """What contact does hold by its shape stays as it was."""
+    """Motions that contact does prevent by its shape are not affected."""
 
     def test_crowned_block(self):
         """A whole block on a crown of 5 m radius rocks on it and is held: only sliding is free, until a node is fixed."""
@@ -223,7 +223,7 @@ class Held(Case):
         self.near(r['total_contact_force'], 20 * 60, 1e-3)
 
     def test_pellet_turning(self):
-        """The pellet without its symmetry in x and y, normals given: free to turn about its axis, and named so."""
+        """The pellet without its symmetry in x and y, normals given: free to turn about its axis, and reported so."""
         with open(os.path.join(PELLET, 'scene.yaml'), encoding='utf-8') as file:
             text = file.read().replace('mesh: A.msh', 'mesh: ' + os.path.join(PELLET, 'A.msh'))
         text = text.replace('  sym_x0: {x: 0}\n', '  clad_outer_high: {x: 0, y: 0}\n').replace('  sym_y0: {y: 0}\n', '')

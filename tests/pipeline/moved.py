@@ -1,5 +1,5 @@
-"""Contact where a map has moved the bodies: the same answers as on a mesh drawn there, full order and reduced; what faces
-nothing has no contact; what small displacements do not cover is said or refused."""
+"""Contact where a map has moved the bodies: the same results as on a mesh drawn there, full order and reduced; nodes that face no master have no
+contact; displacements that are not small are reported or refused."""
 import os
 import unittest
 
@@ -36,7 +36,7 @@ class Moved(Case):
 
 class FullOrder(Moved):
     def test_place(self):
-        """The force is that of the mesh drawn at the place, to the last digits; the pressure is under the cylinder."""
+        """The force is that of the mesh drawn at the position, to the last digits; the pressure is under the cylinder."""
         for dim, places, options in ((2, (-4, 3.3, 8), {}), (3, (4, 1.7), {'n': 20, 'm': 12, 'half': 10})):
             for swap in (False, True):
                 scene(self.path('s.yaml'), 'three.msh' if dim == 3 else 'm.msh', dim, swap=swap)
@@ -52,7 +52,7 @@ class FullOrder(Moved):
                         self.assertLess(abs(self.centre('moved.h5') - place), 0.5)
 
     def test_either_slave(self):
-        """Whichever side is the slave, wherever the cylinder is: the force of one physical problem."""
+        """Whichever side is the slave, wherever the cylinder is: the same force."""
         scene(self.path('swap.yaml'), 'm.msh', swap=True)
         for place in (0, 4):
             self.near(self.solve('swap.yaml', place)['total_contact_force'], self.solve('moved.yaml', place)['total_contact_force'], 0.02)
@@ -72,7 +72,7 @@ class FullOrder(Moved):
                 self.assertEqual((r['n_active'], r['n_facing']), (alone['n_active'], alone['n_facing']))
 
     def test_set_of_places(self):
-        """One after the other, as a set solves them, is each alone: nothing of the last place stays."""
+        """Solved one after the other as a set, each equals the single solution: no data of the last position remain."""
         self.hyco('solve', '-scene', self.path('moved.yaml'), '-values_place', '-5,3.3,0.1', '-values_press', '0.5', '-values_modulus', '10',
                   '-table', 't.csv')
         with open(self.path('t.csv'), encoding='ascii') as file:
@@ -146,7 +146,7 @@ class Reduced(Moved):
             self.near(float(row[3]), self.hyco('predict', '-model', 'm.h5', '-mu', ','.join(row[:3]))['total_contact_force'], 1e-7)
 
     def test_types(self):
-        """Projection follows; a condensed model would interpolate kinks, and says so."""
+        """Projection works; a condensed model would interpolate kinks, and is refused."""
         self.hyco('train', '-scene', 'moved.yaml', *self.TRAIN, '-model', 'p.h5', '-hyco_model_type', 'projection', '-hyco_dual', 'snapshots', '-hyco_pod_tol', '1e-18')
         c = self.hyco('compare', '-scene', 'moved.yaml', '-model', 'p.h5', *self.TRAIN)
         self.assertLess(c['error_u']['max'], 1e-6)
@@ -156,7 +156,7 @@ class Reduced(Moved):
         self.assertFalse(os.path.exists(self.path('c.h5')))
 
     def test_older_model(self):
-        """A model from before the search opens, with the masters that it has; damage to what the search needs is seen."""
+        """A model from before the search loads, with its masters; damage to the data of the search is detected."""
         self.hyco('train', '-scene', 'moved.yaml', *self.TRAIN, '-model', 'old.h5', '-hyco_rid_whole', 'true')
         with h5py.File(self.path('old.h5'), 'r+') as f:
             self.assertEqual(f['format'][0, 0], 5)

@@ -1,5 +1,5 @@
-"""A scene of one's own, written from docs/tutorial.md and docs/scenes.md alone: plane stress, named constants, gravity, an oblique support, springs on a
-list of groups, a point load, a surface contact under a mapped body beside an obstacle of a single node, outputs, units; drawn, checked, solved,
+"""A new scene, written from docs/tutorial.md and docs/scenes.md only: plane stress, named constants, gravity, an oblique support, springs on a
+list of groups, a point load, a surface contact under a mapped body beside an obstacle of a single node, outputs, units; meshed, checked, solved,
 trained, predicted, compared."""
 import os
 import subprocess
@@ -106,11 +106,11 @@ class Newcomer(Case):
         point = ['-mu', f'{LOAD},0.1,{THICKNESS}']
         full = self.hyco('solve', '-scene', 'shelf', *point, '-output', 'full.vtkhdf')
         self.solved(full)
-        # what holds the bodies up is their weight and what they bear: per unit thickness, 9810 mm/s^2
+        # the supports carry the weight and the loads: per unit thickness, 9810 mm/s^2
         weight = 9810 * 7e-10 * (550 * THICKNESS / 10 + 11 * 150) + LOAD + 0.002 * 50
         up = full['supports']['post_foot']['force'][1] + full['supports']['wall']['force'][1] + full['contacts']['stop']['force'][1]
         self.near(up, weight, 1e-10, 'vertical forces')
-        # the wall without friction pushes along (1, -1); springs alone hold the shelf along x
+        # the frictionless wall pushes along (1, -1); only springs hold the shelf along x
         wall = full['supports']['wall']['force']
         self.near(wall[0], -wall[1], 1e-10, 'the oblique support')
         self.near(full['springs']['tip']['force'][0], -wall[0], 1e-10, 'the spring at the tip')

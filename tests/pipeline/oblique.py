@@ -1,4 +1,4 @@
-"""Supports along any direction: what a scene gives does not depend on how it is turned; a sector of a ring is the ring; models; reactions."""
+"""Supports along any direction: results do not depend on the scene's orientation; a sector of a ring agrees with the ring; models; reactions."""
 import os
 import sys
 import unittest

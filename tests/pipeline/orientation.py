@@ -1,4 +1,5 @@
-"""Maps that mirror bodies: outward normals are those of the moved cells, so a scene and its mirror image have the same forces."""
+"""Maps that mirror bodies: outward normals are those of the moved cells, so that a scene and its mirror image have the same
+forces."""
 import os
 import unittest
 
@@ -28,7 +29,7 @@ class Orientation(Case):
         self.near(self.force('solve', '-scene', BLOCKS, '-mu', '0.05,0.06', *TURNED), 3115.574406, 1e-8)
 
     def test_swapped_axes(self):
-        """x and y change places: a mirror image too. The symmetry lines' and the bases' components follow."""
+        """x and y are exchanged: also a mirror image. The components of supports are exchanged too."""
         swapped = self.path('swapped.yaml')
         with open(os.path.join(BLOCKS, 'scene.yaml'), encoding='utf-8') as file:
             text = file.read().replace('blocks.msh', os.path.join(BLOCKS, 'blocks.msh'))

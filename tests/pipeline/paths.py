@@ -75,7 +75,7 @@ class FlowingRing(Case):
             return list(csv.DictReader(f))
 
     def same_in_any_order(self, model, points):
-        """The rows of points asked for one after the other, and backwards: the same to the last bit. Returns the last ones."""
+        """The rows of points predicted one after the other, and backwards: the same to the last bit. Returns the last ones."""
         tables = []
         for k, order in enumerate((points, points[::-1])):
             with open(self.path(f'order{k}.csv'), 'w', encoding='utf-8') as f:
@@ -103,7 +103,7 @@ class Paths(FlowingRing):
         return self.hyco('compare', '-scene', scene, '-model', self.path(model), '-mu', point, *args)
 
     def test_whole_is_full_order(self):
-        """Every unknown of the whole mesh: the full order's path at any parameter value, the gap closed and opened on its way."""
+        """Every unknown of the whole mesh: the full order's path at any parameter value, with the gap closing and opening."""
         for name, law in (('whole-norton', NORTON), ('whole-j2', J2)):
             scene = self.scene(name + '.yaml', law)
             self.train(scene, name + '.h5', '-grid', '1,1', '-hyco_rid_whole', '-hyco_hybrid', 'all')
@@ -158,7 +158,7 @@ class Paths(FlowingRing):
                 self.assertLess(report['worst_' + kind]['max'], bound, (dual, kind))
 
     def test_newton(self):
-        """A tangent for each iteration, one that is kept, the elastic stiffness: one answer, and far fewer factors."""
+        """A tangent for each iteration, one that is kept, the elastic stiffness: the same result, and far fewer factors."""
         self.train(self.norton, 'newton.h5', '-grid', '3,3', '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', '1')
         found = {kind: self.hyco('predict', '-model', self.path('newton.h5'), '-mu', '0.0055,0.91', '-hyco_newton', kind)['history']
                  for kind in ('tangent', 'elastic', 'modified', 'auto')}
@@ -170,7 +170,7 @@ class Paths(FlowingRing):
         self.assertLess(sum(found['modified']['factors']), sum(found['tangent']['factors']) / 2)
 
     def test_outputs(self):
-        """The outputs that a scene names are those of the replayed laws: at the listed times, at the end, their extremes in a set of points."""
+        """The outputs named in a scene are those of the replayed laws: at the listed times, at the end, their extremes in a set of points."""
         scene = self.scene('outputs.yaml', NORTON,
                            HISTORY + 'output:\n  hoop: {max: sigma_tt, group: ring}\n  out: {mean: u, group: ring_outside}\n  low: {min: sigma_tt, group: ring}\n')
         solved = self.hyco('solve', '-scene', scene, '-mu', '0.0052,0.93')
@@ -191,7 +191,7 @@ class Paths(FlowingRing):
                 self.assertAlmostEqual(float(row['path_' + key]), extreme(reduced[key]), delta=1e-6 * abs(values).max())
 
     def test_order_of_questions(self):
-        """A point's path is the same to the last bit whatever was asked before it."""
+        """A point's path is the same to the last bit whatever was predicted before it."""
         self.train(self.norton, 'order.h5', '-grid', '2,2', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', 1)
         rows = self.same_in_any_order('order.h5', [*POINTS, (0.006, 0.8)])
         alone = self.hyco('predict', '-model', self.path('order.h5'), '-mu', '0.0041,1.2')

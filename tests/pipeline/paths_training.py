@@ -24,7 +24,7 @@ history:
 
 class Missed(Ring):
     def test_worst_named(self):
-        """A model that misses its own paths: the line says which do not reach their end, how far they come, and which of the others is worst."""
+        """A model that misses its own paths: the line names those that do not reach their end, the times they reach, and the worst of the others."""
         run = self.run_raw('train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '3,3', '-hyco_snapshots', self.path('store'),
                            '-hyco_pod_tol', '1e-13', '-hyco_hybrid', 'rank', '-hyco_rid_modes', 'displacement,stress')
         self.assertEqual(run.returncode, 1)
@@ -65,8 +65,8 @@ class Greedy(Ring):
         return {kind: report['worst_' + kind]['max'] for kind in KINDS}
 
     def test_chosen(self):
-        """The indicator falls; at 9 points that take no part in it the errors are no worse than those of a grid with as many paths; it is the
-        residual that predict gives for the chosen point."""
+        """The indicator decreases; at 9 other points the errors are not larger than those of a grid with as many paths; it is the residual that
+        predict gives for the chosen point."""
         trained = self.greedy('chosen.h5', '-max_snapshots', 6, '-target', '1e-9', '-hyco_greedy_keep', status=3)
         self.assertEqual((trained['greedy']['stop'], trained['n_samples'], trained['greedy']['iterations']), ('snapshots', 6, 2))
         rows = self.rows('chosen.h5')
@@ -83,7 +83,7 @@ class Greedy(Ring):
             self.assertLess(found[kind], error, kind)
 
     def test_ranks_and_kill(self):
-        """Two ranks choose as one; a run that was killed ends with the table of one that was not, and solves nothing twice."""
+        """Two ranks choose like one; a run that was killed ends with the table of one that was not, and solves nothing twice."""
         settings = ('-max_snapshots', 6, '-target', '1e-9')
         self.greedy('one.h5', *settings, status=3)
         self.greedy('two.h5', *settings, status=3, ranks=2)
@@ -130,10 +130,11 @@ class Greedy(Ring):
 
 
 class Residual(Ring):
-    """predict -hyco_residual: how far a path is from the full order's equations."""
+    """predict -hyco_residual: the residual of the full-order equations along a path."""
 
     def test_turn(self):
-        """A path that turns where no training path has turned converges and is far off: the residual says so, and is near the errors within training."""
+        """A path that turns where no training path has turned converges with large errors: the residual shows this, and is close to the errors
+        within training."""
         with open(self.path('turn.yaml'), 'w', encoding='utf-8') as f:
             f.write(TURN)
         scene = self.path('turn.yaml')
@@ -168,7 +169,7 @@ class Residual(Ring):
         self.assertAlmostEqual(float(row['contact_residual']), alone['worst_contact'], delta=1e-6 * alone['worst'])
 
     def test_types(self):
-        """Every type of model has it. It is in an energy's norm: its size is that of the errors, not of the displacement's alone."""
+        """Every type of model has it. It is an energy norm: its size is that of the stress errors, not of the displacement's."""
         for kind in ('projection', 'cubature', 'regression'):
             self.train(kind + '.h5', '-hyco_model_type', kind, '-hyco_pod_tol', '1e-8')
             residual = self.predict(kind + '.h5', '-hyco_residual')['equilibrium']['worst']
@@ -184,7 +185,8 @@ class Targets(Ring):
                 '-hyco_rid_whole', 'false')  # the contact extension is open
 
     def test_added(self):
-        """Paths are added until the targets hold; what was judged is what compare finds at the held-out paths, at their worst time and their end."""
+        """Paths are added until the targets hold; the errors are those that compare finds at the held-out paths, at their worst time and their
+        end."""
         with open(self.path('held.csv'), 'w', encoding='utf-8') as f:
             f.write('gap,push\n0.0045,0.85\n0.0052,1.05\n0.0061,0.95\n0.0072,1.15\n')
         targets = {'u': 2e-4, 'inelastic': 2e-4}

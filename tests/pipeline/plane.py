@@ -23,7 +23,7 @@ class Plane(Case):
                        timeout=60 * PATIENCE, stdout=subprocess.DEVNULL)
 
     def test_search(self):
-        """The search tries the plane that most contacts meet first, and takes its model where that is good enough."""
+        """The search first tries the plane with most contacts, and takes its model if that is accurate enough."""
         trained = self.hyco('train', *SCENE, '-model', 'm.h5', *POINTS, '-hyco_model_type', 'hybrid', '-validation_points', self.between(),
                             '-target_u', '5e-3', '-target_sigma', '2e-2', '-target_inelastic', '2e-2', '-target_max_added', '0', '-table', 'settings.csv')
         self.assertEqual(trained['search']['attempts'], trained['search']['chosen'])
@@ -36,7 +36,8 @@ class Plane(Case):
             self.assertLess(compared['worst_' + kind]['max'], limit, kind)
 
     def test_greedy(self):
-        """The greedy loop begins with that plane's cells and their displacements of full order, as by hand; the RID grows, and the indicator falls."""
+        """The greedy loop begins with that plane's cells and their full-order displacements, as with the options; the RID grows, and the indicator
+        decreases."""
         scene = [*SCENE[:-1], '0,1,8000,10001.03333,10025.53333']
         start = ['-values_gap', '0.04,0.06', '-values_q2', '40', '-values_creep', '1', '-hyco_validation', '0', '-hyco_snapshots', 'store']
         greedy = self.hyco('train', *scene, '-greedy', '-training_grid', '2,2,2', *start, '-max_snapshots', 3, '-target', '1e-9', '-model', 'greedy.h5',

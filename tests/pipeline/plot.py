@@ -1,4 +1,5 @@
-"""scripts/plot: pictures of solutions in 1D, 2D and 3D, of a path and a study, with and without zoom: made, small, not blank; what is wrong is one line."""
+"""scripts/plot: pictures of solutions in 1D, 2D and 3D, of a path and a study, with and without zoom: written, small, not blank; errors give one
+line."""
 import os
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""-hyco_pod_svd_type: the POD by each of SLEPc's types, on one rank and two, and what one that is less accurate says."""
+"""-hyco_pod_svd_type: the POD by each of SLEPc's types, on one rank and two, and the messages of less accurate ones."""
 import unittest
 
 import h5py

@@ -1,4 +1,4 @@
-"""What a person reads while it runs: in a file a line each -progress seconds of every long phase, counts where there are counts; nothing with -quiet."""
+"""Progress: in a file a line every -progress seconds of every long phase, with counts where available; nothing with -quiet."""
 import os
 import re
 import unittest
@@ -15,7 +15,7 @@ class Progress(Case):
         return [line for line in run.stderr.splitlines() if re.match(r'after |\w[\w ]*: \d', line)]
 
     def test_long_step(self):
-        """A solve of one point has nothing to count: its steps are told."""
+        """A solve of one point has nothing to count: its steps are named."""
         args = ['solve', '-scene', PELLET, '-mu', '4.06,1', '-scene_refine', '1']
         for ranks in (0, 2):
             lines = self.lines(*args, '-progress', '0.05', ranks=ranks)

@@ -52,8 +52,8 @@ class Rope(Case):
         self.assertIn('force vectors: 9', view)
 
     def test_figure_4(self):
-        """What k vectors leave of the 120 dual snapshots: POD, which numpy recomputes, and NNMF after 100 iterations, by an
-        independent computation. NNMF has many local minima: a band of a fifth."""
+        """The error of k vectors on the 120 dual snapshots: POD, which numpy recomputes, and NNMF after 100 iterations, by an independent
+        computation. NNMF has many local minima: a band of a fifth."""
         S = []
         for name in sorted(glob.glob(self.path('snapshots', '*.h5'))):
             with h5py.File(name) as f:
@@ -117,8 +117,8 @@ class Rope(Case):
             self.assertLess(few[key]['max'], limit, key)
 
     def test_snapshots(self):
-        """All dual snapshots, the modes with their supremizers: the training solutions come back, and between them the
-        forces err less than by the factorisation."""
+        """All dual snapshots, the modes with their supremizers: the training solutions are reproduced, and between them the forces have
+        smaller errors than with the factorisation."""
         t = self.train('s.h5', '-hyco_dual', 'snapshots')
         self.assertEqual((t['n_dual_modes'], t['n_modes'] - t['n_supremizers'], t['dual_misfit']), (120, 9, 0))
         self.assertGreater(t['n_supremizers'], 9)
@@ -147,7 +147,7 @@ class Rope(Case):
         self.assertLess(c['error_lambda']['max'], 1)
 
     def test_three_types(self):
-        """The same commands, and the same C calls (examples/embed.c), train, load and ask each of the three models."""
+        """The same commands, and the same C functions (examples/embed.c), train, load and use each of the three models."""
         found = set()
         for name, options in (('hybrid', ()), ('nnmf', TYPE), ('snapshots', (*TYPE, '-hyco_dual', 'snapshots'))):
             t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', 'three.h5', *SAME, *options)
@@ -170,7 +170,7 @@ class Rope(Case):
         self.assertEqual(len(found), 3, 'three models, three answers')
 
     def test_repeats(self):
-        """Nothing is drawn: again, and on two ranks, the same vectors to the bit."""
+        """Deterministic: repeated, and on two ranks, the same vectors to the bit."""
         self.train('again.h5')
         self.train('two.h5', ranks=2)
         V = []

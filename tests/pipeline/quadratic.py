@@ -1,4 +1,4 @@
-"""Cells of second order in the plane: patch tests, bending, the order of the error, contact with forces that push, models, refusals."""
+"""Cells of second order in 2D: patch tests, bending, the order of the error, contact with compressive forces, models, refusals."""
 import os
 import subprocess
 import sys
@@ -93,7 +93,7 @@ class Quadratic(Case):
         return second(grid, kind)
 
     def test_contact(self):
-        """Uniform pressure passes a contact exactly: the nodes' forces are those of the quadratic functions, in the plane none of them pulls."""
+        """A contact transmits a uniform pressure exactly: the nodes' forces are those of the quadratic functions, none of which is tensile in 2D."""
         for kind in KINDS:
             for contact, body in (('{type: pair, slave: under, master: over}', ''), ('{group: under, normal: {y: -1}, gap: 0}', 'over: {y: 0}')):
                 text = ('scene: {mesh: mesh.msh, formulation: plane_stress}\nbody: {block: {young: 200, poisson: 0.3}, seat: {young: 200, poisson: 0.3}}\n'
@@ -141,7 +141,7 @@ class Quadratic(Case):
                     self.assertIn(said, run.stderr)
 
     def test_other_cells(self):
-        """Cells that hyco does not take, and mixed ones: one line that says what to do."""
+        """Cells that hyco does not support, and mixed ones: one line with the remedy."""
         with open(self.path('b.geo'), 'w', encoding='ascii') as f:
             f.write('Point(1) = {0,0,0,1}; Point(2) = {1,0,0,1}; Point(3) = {0,1,0,1}; Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,1}; Curve Loop(1) = {1,2,3};'
                     'Plane Surface(1) = {1}; e[] = Extrude {0,0,1} {Surface{1}; Layers{1}; Recombine;}; Physical Volume("block") = {e[1]};\n')

@@ -1,4 +1,4 @@
-"""Histories on cells of second order: flow that keeps the volume, a gap that closes and opens on a creeping ring, its reduced models."""
+"""Histories on cells of second order: isochoric flow, a gap that closes and opens on a creeping ring, its reduced models."""
 import os
 import sys
 import unittest

@@ -1,4 +1,4 @@
-"""Cells of second order in space: bending, the order of the error, contact with forces that push, output, models, refusals."""
+"""Cells of second order in 3D: bending, the order of the error, contact with compressive forces, output, models, refusals."""
 import os
 import sys
 import unittest
@@ -91,7 +91,7 @@ class Solids(Case):
                 self.assertGreater(worst[0] / worst[1], 3, worst)
 
     def test_turning(self):
-        """A ring that turns in another, on an uneven mesh: the motion is found by the curved faces' own normals, and taken out on request."""
+        """A ring that turns in another, on an irregular mesh: the motion is found by the curved faces' own normals, and removed on request."""
         angle = np.linspace(0, 2 * np.pi, 13)
         text = (f'scene: {{mesh: mesh.msh}}\nbody: {{inner: {{young: {E}, poisson: {NU}}}, outer: {{young: {E}, poisson: {NU}}}}}\npressure: {{bore: 1}}\n'
                 'fixed: {rim: {x: 0, y: 0}, ends: {z: 0}}\ncontact: {fit: {type: pair, slave: shaft, master: sleeve}}\n')
@@ -149,7 +149,8 @@ class Solids(Case):
         return second(grid, kind)
 
     def test_contact(self):
-        """Uniform pressure passes a contact exactly, pairs and obstacles, on one rank and two; hex20 are read as hex27 for it, of tet10 the sides' middles carry it."""
+        """A contact transmits a uniform pressure exactly, pairs and obstacles, on one rank and two; hex20 are read as hex27 for it, for tet10 the
+        sides' middles have the forces."""
         for kind in KINDS:
             for contact, body in (('{type: pair, slave: under, master: over}', ''), ('{group: under, normal: {z: -1}, gap: 0}', 'over: {z: 0}')):
                 text = (f'scene: {{mesh: mesh.msh}}\nbody: {{block: {{young: {E}, poisson: {NU}}}, seat: {{young: {E}, poisson: {NU}}}}}\n'
@@ -181,7 +182,7 @@ class Solids(Case):
                     found = self.hyco('compare', '-scene', scene, '-model', f'{kind}.h5', '-grid', '1,2', ranks=2)
                     self.assertLess(found['error_u']['max'], 0.02)
                     self.assertLess(found['error_u_h1']['max'], 0.05)
-                    if of == 'projection':  # its modes do not move the gaps: no force, and none at random
+                    if of == 'projection':  # its modes do not change the gaps: zero forces, not random ones
                         self.assertLess(found['error_lambda']['max'], 1 + 1e-9)
                     model = self.hyco('predict', '-model', f'{kind}.h5', '-mu', '0.27,310')
                     for name, value in full[0]['outputs'].items():
@@ -193,7 +194,7 @@ class Solids(Case):
                     self.assertLess(found[name]['max'], 1e-8, name)
 
     def test_extension(self):
-        """The RID is extended along the contact by cells that have a face there, whichever of its nodes carry the forces."""
+        """The RID is extended along the contact by cells with a face there, whichever of its nodes have contact forces."""
         for kind in ('tet10', 'hex27'):
             scene = self.written(MODEL, self.blocks(kind))
             found = [self.hyco('train', '-scene', scene, '-grid', '2,2', '-model', f'{kind}-far.h5', '-hyco_pod_tol', 1e-2, '-hyco_rid_modes', 'displacement,dual',

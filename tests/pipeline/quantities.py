@@ -77,7 +77,7 @@ class Quantities(Case):
             np.testing.assert_allclose(rows[0][3][2:], list(one.values()), rtol=1e-6)
 
     def test_polar(self):
-        """About the pellet's axis; another scene's outputs do not make snapshots anew."""
+        """About the pellet's axis; other outputs of the scene do not invalidate snapshots."""
         args = ('-scene', PELLET, '-mu', '4.06,1', '-output_hoop_max', 'sigma_tt', '-output_hoop_group', 'cladding', '-output_r_min', 'sigma_rr',
                 '-output', 'out.xdmf')
         found = self.hyco('solve', *args)['outputs']

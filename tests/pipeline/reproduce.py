@@ -1,4 +1,4 @@
-"""scripts/reproduce: a run on small grids writes the whole report, and its words carry the runs' numbers."""
+"""scripts/reproduce: a run on small grids writes the whole report, with the runs' numbers in its text."""
 import csv
 import json
 import os
@@ -61,7 +61,8 @@ class Reproduce(Case):
             self.assertGreater(float(h['u']), 0, h)
 
     def test_pellet(self):
-        """Mesh A: the table carries what compare found over the steps with contact; the span of S1 and S2 bounds their model."""
+        """Mesh A: the table has the errors that compare found over the steps with contact; the span of S1 and S2 bounds their
+        model."""
         out, docs = self.path('pellet'), self.path('pellet-docs')
         run = reproduce('pellet', '--quick', '--output', out, '--docs', docs)
         self.assertEqual(run.returncode, 0, run.stderr)
@@ -88,7 +89,7 @@ class Reproduce(Case):
         self.assertEqual([row[0] for row in bounds], ['0.6', '0.8', '1'])
         self.near(float(bounds[-1][1]), 5.5, 0.2)
         self.assertGreater(float(bounds[-1][2]), 1)      # the paper's error is out of reach
-        self.assertLess(float(bounds[-1][2]), error)     # and a bound is none if the model beats it
+        self.assertLess(float(bounds[-1][2]), error)  # and the bound is valid: the model is not below it
         self.assertLess(float(fine['displacement']), 0.1 * error)
         self.assertIn('; 0 of the elements that it finds are outside', text)
 

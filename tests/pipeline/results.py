@@ -1,4 +1,4 @@
-"""What a solution amounts to: each contact's resultant, moment, area and pressure; fields that are made of the stress."""
+"""Results of a solution: each contact's resultant, moment, area and pressure; fields derived from the stress."""
 import os
 import unittest
 

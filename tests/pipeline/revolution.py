@@ -1,4 +1,4 @@
-"""Scenes of revolution and of plane stress: models, ranks, and what is refused."""
+"""Axisymmetric scenes and plane stress: models, ranks, and refusals."""
 import os
 import sys
 import unittest
@@ -36,7 +36,7 @@ class Revolution(Case):
         return self.folder
 
     def test_models(self):
-        """Every type of model, against full order at points that it was not trained at."""
+        """Every type of model, compared with full order at points that were not used for training."""
         scene = self.written(SCENE)
         for kind, bound, force in (('hybrid', 0.01, 0.03), ('projection', 0.01, 0.3), ('condensed', 1e-6, 1e-6)):
             with self.subTest(kind=kind):
@@ -52,7 +52,7 @@ class Revolution(Case):
             self.near(second[name], first[name], 1e-10, name)
 
     def test_axis(self):
-        """Nodes on the axis are held without a word of the scene; a body pushed along it is free to move along it alone."""
+        """Nodes on the axis are held without an entry of the scene; a body under an axial load is free only along the axis."""
         scene = self.written(SCENE)
         self.hyco('solve', '-scene', scene, '-mu', '120,0.002', '-output', 'out.xdmf')
         with h5py.File(self.path('out.h5')) as f:

@@ -1,4 +1,4 @@
-"""A rigid body that presses with a given force: as the obstacle moved by what it moves, against Hertz, in models, over time; refusals."""
+"""A rigid body under a given force: agrees with the obstacle displaced by its motion, and with Hertz; in models, over time; refusals."""
 import os
 import sys
 import unittest
@@ -45,7 +45,7 @@ class Rigid(Case):
         return cls.path(name)
 
     def test_moved_obstacle(self):
-        """The contact carries the load, and all is as under the obstacle that is moved by what the body moves, on any number of ranks."""
+        """The contact has the load, and the solution is that under the obstacle displaced by the body's motion, on any number of ranks."""
         self.mesh()
         scene = self.scene()
         given = self.scene('given.yaml', obstacle=('type: rigid, slave: top, master: tip, gap: x^2/(2*radius)', 'group: top, gap: x^2/(2*radius) - depth'),
@@ -78,7 +78,7 @@ class Rigid(Case):
         self.near(-found['outputs']['depth'], radius**2 / 10, 0.05)  # of a half space; the block is 16 by 16
 
     def test_models(self):
-        """The body's whole surface is in the RID, and its motion an unknown of the model: load and depth at unseen points."""
+        """The body's whole surface is in the RID, and its motion is an unknown of the model: load and depth at unseen points."""
         self.mesh()
         scene = self.scene(mixed=('poisson: 0.3', 'poisson: 0.3 + 0.01*(radius - 10)'))
         for kind, more, bound in (('hybrid', ('-hyco_rid_layers', 1), 1e-3), ('cubature', (), 1e-3), ('projection', (), 0.02), ('regression', (), 0.02)):
@@ -96,7 +96,7 @@ class Rigid(Case):
                     self.near(model['push'], -17, 0.05 if kind == 'regression' else 1e-6)
 
     def test_triangles(self):
-        """Cells that meet the surface in a node alone are in the RID too."""
+        """Cells that touch the surface only in a node are in the RID too."""
         self.mesh(n=10, kind='tri3')
         scene = self.scene()
         trained = self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', 't.h5', '-hyco_rid_layers', 1)
@@ -106,7 +106,7 @@ class Rigid(Case):
             self.near(model[name], value, 1e-3, name)
 
     def test_condensed(self):
-        """It needs a stiffness that is definite: refused, and right with a soft spring on the body, which takes its share of the load."""
+        """It needs a definite stiffness: refused, and right with a soft spring on the body, which takes its share of the load."""
         self.mesh()
         train = ('train', '-grid', '4,4', '-model', 'c.h5', '-hyco_model_type', 'condensed')
         run = self.run_raw(*train, '-scene', self.scene())

@@ -1,4 +1,4 @@
-"""The rope of section 6 reduced: sizes of the paper, errors no worse than an independent computation has with the same RID."""
+"""The reduced rope of section 6: the paper's sizes, errors not larger than those of an independent computation with the same RID."""
 import csv
 import unittest
 
@@ -58,7 +58,7 @@ class Reduced(Case):
         self.near(table['error_u'].mean(), c['error_u']['mean'], 1e-6)
 
     def test_predict_is_compare(self):
-        """predict and compare at one point tell the same force and error."""
+        """predict and compare at one point give the same force and error."""
         p = self.hyco('predict', '-model', 'rope.h5', '-mu', '0.07,0.17', '-output', 'p.xdmf')
         self.solved(p)
         self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17', '-output', 's.xdmf')
@@ -69,8 +69,8 @@ class Reduced(Case):
                 self.near(np.linalg.norm(a - b) / np.linalg.norm(b), c[key]['max'], 1e-9, key)
 
     def test_counts(self):
-        """n_contacts and n_active count the whole surface, as full order does; rid_ those of the RID alone, whose forces are all
-        that is left without the reconstruction."""
+        """n_contacts and n_active count the whole surface, as at full order; rid_ those of the RID only, whose forces remain
+        without the reconstruction."""
         full = self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17')
         p = self.hyco('predict', '-model', 'rope.h5', '-mu', '0.07,0.17')
         alone = self.hyco('predict', '-model', 'rope.h5', '-mu', '0.07,0.17', '-hyco_reconstruct', 'false')
@@ -89,7 +89,7 @@ class Reduced(Case):
         self.assertGreater(one['error_u']['max'], 0)
 
     def test_some_fail(self):
-        """Of a set some of which do not converge: the table has all, the last line says how many, and the status is not 0."""
+        """A set with points that do not converge: the table has all, the last line gives their number, and the status is not 0."""
         for command, where, its in (('predict', ('-model', 'rope.h5'), 5), ('solve', ('-scene', ROPE), 1)):
             run = self.run_raw(command, *where, '-grid', '8,8', '-table', 'some.csv', '-hyco_solver_max_its', its,
                                '-hyco_solver_fallback', 'false')

@@ -8,7 +8,8 @@ SETTINGS = ('-hyco_pod_tol', '1e-11', '-hyco_deim_type', 'qdeim', '-hyco_rid_lay
 
 class Fine(Case):
     def test_errors(self):
-        """Asked: u 0.1 % on average and 0.5 % at worst, contact forces 3 and 15 (the paper, 28 nodes: 0.34, 1.13; 24, 148)."""
+        """Required: u 0.1 % on average and 0.5 % at worst, contact forces 3 and 15 (the paper, 28 nodes: 0.34, 1.13; 24,
+        148)."""
         t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', 'fine.h5', *SETTINGS)
         self.assertLessEqual(t['rid_nodes'], 50)
         self.assertEqual(t['n_modes'], 27)  # singular values of snapshots, far above round-off

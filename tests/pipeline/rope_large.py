@@ -1,4 +1,4 @@
-"""The rope on meshes of 1e2 to 1e5 nodes: the active set starts from coarser problems, and its iterations stay few."""
+"""The rope on meshes of 1e2 to 1e5 nodes: the active set starts from coarser problems, and needs few iterations."""
 import csv
 import unittest
 
@@ -9,7 +9,7 @@ from common import ROPE, SANITIZED, Case
 
 SIZES = [100, 1000, 10000, 100000]
 POINTS = ['0.05,-0.05', '0.07,0.17', '0.1,0.5', '0.15,0.2', '0.25,0.05']
-# A contact zone has two edges a half; each is off by a node or two on the last level. Not: two edges times n.
+# A contact zone has two edges in each half; each is wrong by a node or two on the last level, not by a share of n.
 MOST = 6
 
 
@@ -60,7 +60,7 @@ class RopeLarge(Case):
                 self.assertLess(abs(force - force_cold).max(), 1e-9 * force.max())
 
     def test_balance(self):
-        """Contact and both ends carry the inner nodes' weight, 1 - h; the tension at an end is nu u' there."""
+        """The contact forces and both ends carry the inner nodes' weight, 1 - h; the tension at an end is nu u' there."""
         for n in SIZES:
             with self.subTest(nodes=n):
                 self.rope(n, '0.07,0.17', '-output', 'rope.xdmf')
@@ -72,7 +72,7 @@ class RopeLarge(Case):
                 self.assertGreaterEqual(force.min(), 0)
 
     def test_convergence(self):
-        """The zone's edges are known to a node: the active part of the rope and the total force settle with h."""
+        """The zone's edges are known to a node: the active part of the rope and the total force converge with h."""
         r = [self.rope(n, '0.07,0.17') for n in SIZES]
         for k in range(3):
             fraction = [a['n_active'] / n for a, n in zip(r, SIZES)]
@@ -80,7 +80,8 @@ class RopeLarge(Case):
             self.near(r[k]['total_contact_force'], r[3]['total_contact_force'], 10 / SIZES[k], SIZES[k])
 
     def test_steps(self):
-        """One solver over a set of points, near ones and far ones: a few iterations from the last set, then a new start."""
+        """One solver over a set of points, near ones and distant ones: a few iterations from the last set, then a new
+        start."""
         for n in (1000, 10000):
             run = self.run_raw('solve', '-scene', ROPE, '-scene_mesh', self.path(f'{n}.msh'), '-values_mu1',
                                '0.05,0.0501,0.06,0.25,0.07', '-values_mu2', '0,0.01,0.5', '-table', 'steps.csv')

@@ -1,4 +1,4 @@
-"""scripts/bench-scale on mesh A and a wavy block: what it counts on 1 and 2 ranks, and the model that it fits."""
+"""scripts/bench-scale on mesh A and a wavy block: its counts on 1 and 2 ranks, and the model fitted to them."""
 import csv
 import os
 import subprocess

@@ -1,5 +1,5 @@
-"""Scenes written here, with solutions in closed form: confined columns (u_x = 0 at the sides) are in uniaxial strain,
-sigma_yy = M du/dy with M = lambda + 2 mu, whatever the mesh; linear cells are exact at the nodes."""
+"""Scenes with solutions in closed form: confined columns (u_x = 0 at the sides) are in uniaxial strain, sigma_yy = M
+du/dy with M = lambda + 2 mu, on any mesh; linear cells are exact at the nodes."""
 import unittest
 
 import h5py
@@ -85,7 +85,7 @@ class Scenes(Case):
                 self.near(r['u_max'][1], 1 / modulus(100), 1e-10)
 
     def test_curved_obstacle(self):
-        """A bumpy roof: contact on a part; every method finds the same."""
+        """A bumpy roof: contact on a part; every method finds the same solution."""
         self.block('quad4', 12, CONTACT % 'gap + 0.02*(x - 0.7)^2')
         forces = []
         for kind in ('active_set', 'lemke', 'tao'):
@@ -116,7 +116,7 @@ class Scenes(Case):
                         self.near(r[name], dual[name], 1e-10, name)
 
     def balance(self, report):
-        """Contact force plus the foot's reaction from the cell stresses: all of the pull (equilibrium)."""
+        """Contact force plus the foot's reaction from the cell stresses: the whole pull (equilibrium)."""
         self.hyco('solve', '-scene', self.folder, '-mu', '2.5,0.01', '-output', 'b.xdmf')
         with h5py.File(self.path('b.h5')) as f:
             x, u, cells = f['mesh/xyz'][:], f['nodes/displacement'][:], f['mesh/cells'][:]
@@ -139,8 +139,8 @@ class Scenes(Case):
         return report['total_contact_force'] + total
 
     def test_two_bodies(self):
-        """A (height 1, M_A) stands, B (height 2, M_B) hangs above it with the weight f: closing the gap g takes
-        q = (2 f / M_B - g) / (1 / M_A + 2 / M_B) a unit of width."""
+        """A (height 1, M_A) is fixed below, B (height 2, M_B) hangs above it with the weight f: closing the gap g
+        takes q = (2 f / M_B - g) / (1 / M_A + 2 / M_B) per unit of width."""
         for kind in ('quad4', 'tri3', 'tet4'):
             with self.subTest(kind=kind):
                 nodes, elements = [], []

@@ -15,7 +15,7 @@ class SettingsSearch(Case):
     newcomer = True
 
     def judged(self, scene, model, grid, u, force):
-        """Errors at unseen points, means: a newcomer's bar is 0.5 % and 3 %."""
+        """Errors at unseen points, means: the default limits are 0.5 % and 3 %."""
         c = self.hyco('compare', '-scene', scene, '-model', model, '-grid', grid)
         self.assertEqual(c['not_converged'], 0)
         self.assertLessEqual(c['error_u']['mean'], u)
@@ -49,7 +49,7 @@ class SettingsSearch(Case):
         self.judged(PLATE, 'plate.h5', '6,5', 0.005, 0)
 
     def test_held_out(self):
-        """What train prints is what compare finds at the same points, and what the model's file says."""
+        """The errors that train prints are those that compare finds at the same points, and those in the model's file."""
         run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-model', 'j.h5', '-report', 'j.json', '-hyco_model_type', 'hybrid')
         said = re.search(r'errors at (\d+) held-out points: median u ([\d.e-]+) %, .*largest u ([\d.e-]+) %', run.stdout)
         self.assertTrue(said, run.stdout)
@@ -70,7 +70,7 @@ class SettingsSearch(Case):
         self.near(float(said[3]) / 100, c['error_u']['max'], 0.1)
 
     def test_below_the_bar(self):
-        """Three solutions are no training: the model is written, one line a bar that it misses, status 3."""
+        """Three solutions are not sufficient: the model is written, with one line for each limit that it misses, status 3."""
         t = self.hyco('train', '-scene', ROPE, '-grid', '2,2', '-model', 'bad.h5', '-hyco_model_type', 'hybrid', '-hyco_rid_whole', 'false', status=3)
         self.assertTrue(all('held-out points' in line for line in t['missed']), t)
         self.assertTrue(os.path.exists(self.path('bad.h5')))

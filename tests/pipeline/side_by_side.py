@@ -1,4 +1,4 @@
-"""Runs without mpiexec side by side: each ends well, whatever the others do and whatever the folder for temporary files is like."""
+"""Runs without mpiexec side by side: each ends well, whatever the others do and whatever the state of the folder for temporary files."""
 import concurrent.futures
 import os
 import subprocess
@@ -22,7 +22,7 @@ class SideBySide(Case):
                               capture_output=True, text=True, check=False)
 
     def answer(self, run):
-        """The lines of an answer, but for its seconds."""
+        """The lines of the output, without its seconds."""
         self.assertEqual((run.returncode, run.stderr), (0, ''))
         return run.stdout.splitlines()[:-1]
 
@@ -34,7 +34,8 @@ class SideBySide(Case):
             self.assertEqual(self.answer(run), expected)
 
     def test_folder_for_temporary_files(self):
-        """Missing, a file, unset: nothing is made there, or said. Open MPI's folder for all runs of a user is what they fought over."""
+        """Missing, a file, unset: nothing is created there, or printed. Runs used to conflict over Open MPI's folder for all runs of
+        a user."""
         with open(self.path('file'), 'w', encoding='ascii') as f:
             f.write('x')
         for place in (self.path('none'), self.path('file'), None):

@@ -1,4 +1,4 @@
-"""scripts/hyco.sbatch: in a plain shell and under a Slurm made of two scripts; interrupted, it goes on where it was."""
+"""scripts/hyco.sbatch: in a plain shell and under a Slurm emulated by two scripts; interrupted, it continues where it was."""
 import glob
 import json
 import os
@@ -13,7 +13,7 @@ from common import MPIRUN, PATIENCE, PELLET, ROPE, SOURCE, Case, settled
 SCRIPT = os.path.join(SOURCE, 'scripts', 'hyco.sbatch')
 LONG = ('-scene', PELLET, '-values_radius', '4.02,4.03,4.04,4.05,4.07,4.08,4.09,4.1', '-values_load', '0.2,0.4,0.6,0.8,1')
 N_LONG = 40
-# srun without Slurm: notes its arguments, drops its options, runs the rest on as many ranks
+# srun without Slurm: records its arguments, drops its options, runs the rest on as many ranks
 SRUN = f'''#!/bin/sh
 echo "$*" >>"$NOTES/srun"
 while :; do

@@ -23,7 +23,7 @@ class Rope(Case):
                 self.solved(r)
 
     def test_equilibrium(self):
-        """The obstacle and the ends carry the weight: K u + B^T L = F, summed by hand from the written fields."""
+        """The obstacle and the ends carry the weight: K u + B^T L = F, computed from the written fields."""
         self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17', '-output', 'rope.xdmf')
         with h5py.File(self.path('rope.h5')) as f:
             x = f['mesh/xyz'][:, 0]
@@ -59,7 +59,8 @@ class Rope(Case):
         self.near(r['total_contact_force'], 0.3502256293, 1e-9)
 
     def test_override(self):
-        """An entry of the command line wins over the scene's: a rope of twice the stiffness under twice the weight."""
+        """An entry of the command line takes precedence over the scene's: a rope of twice the stiffness under twice the
+        weight."""
         twice = self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17', '-force_rope_x', '-2', '-body_rope_young',
                           'x <= 0.5 ? 2*mu1 : 0.3')
         self.near(twice['total_contact_force'], 2 * 0.3502256293, 1e-8)
@@ -112,7 +113,7 @@ class Pellet(Case):
             self.solved(r)
 
     def test_linear(self):
-        """Without a factor: by request, or because it would not fit; the report says which."""
+        """Without a factor: on request, or because it would not fit; the report says which."""
         for ranks, options in ((0, ('-hyco_linear', 'iterative')), (2, ('-hyco_memory', '0.001')),
                                (0, ('-hyco_linear', 'iterative', '-hyco_primal_pc_type', 'icc'))):
             with self.subTest(options=options):
@@ -131,7 +132,7 @@ class Pellet(Case):
         self.assertEqual((r['n_active'], r['total_contact_force'], r['strain_energy']), (0, 0, 0))
 
     def test_linear_without_gap(self):
-        """At radius 4.1 the gap is zero and the problem positively homogeneous: all grows with the load."""
+        """At radius 4.1 the gap is zero and the problem positively homogeneous: everything grows with the load."""
         half, full = (self.hyco('solve', '-scene', PELLET, '-mu', f'4.1,{load}') for load in (0.5, 1))
         self.assertEqual(half['n_active'], full['n_active'])
         self.near(2 * half['total_contact_force'], full['total_contact_force'], 1e-10)

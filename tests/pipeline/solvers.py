@@ -1,7 +1,7 @@
 """Every method and form on full-order problems, on 1 and 2 ranks: the same forces, one table (solvers.md).
 
-UNFIT names what does not solve alone, and why; it must then end not converged without a report, or, with the fallback,
-solved by another method that the report names. Nothing may give another force."""
+UNFIT lists what does not solve alone, and why; it must then end not converged without a report, or, with the fallback, solved by another method
+that the report names. No method may give another force."""
 import json
 import os
 import sys
@@ -27,7 +27,7 @@ FORMS = ('dual', 'primal', 'dual_free')
 METHODS = OURS + tao(NEWTON + FIRST_ORDER, FORMS) + tao(SEMISMOOTH, ('dual',))
 ON_TWO_RANKS = OURS + tao(['gpcg', 'tron', 'bnls'], FORMS) + tao(['ssils'], ('dual',))
 QUICK = OURS + tao(['gpcg', 'tron'], ('dual', 'primal'))
-# on the large scenes, unless HYCO_ALL_SOLVERS (scripts/solver-tables: minutes more); the rest are seen on the small ones
+# on the large scenes, unless HYCO_ALL_SOLVERS (scripts/solver-tables: minutes more); the others are tested on the small ones
 FEW = {('rope 2000', 1): QUICK, ('rope 2000', 2): QUICK,
        ('pellet A', 1): ON_TWO_RANKS + tao(['bntr', 'bntl', *FIRST_ORDER, 'asils', 'ssfls', 'asfls'], ('dual',)), ('pellet A', 2): QUICK}
 if 'HYCO_ALL_SOLVERS' in os.environ:
@@ -104,7 +104,7 @@ class Solvers(Case):
         expected = self.hyco('solve', *base)['total_contact_force']
         for ranks in (1, 2):
             for method in FEW.get((scene, ranks), ON_TWO_RANKS if ranks == 2 else [*METHODS, *further]):
-                # thousands of solves, each of two ranks' messages and little else
+                # thousands of solves, which on two ranks are mostly communication
                 slow = ranks == 2 and (method[1:] == ('dual_free', 'gpcg') or scene == 'rope 2000' and
                                        (method[1] == 'dual_free' or method[1:] == ('primal', 'bnls')))
                 if method[2] in without or slow:
@@ -133,7 +133,7 @@ class Solvers(Case):
         self.near(self.every('pellet A', ['-scene', PELLET, '-mu', '4.06,1']), 1409.70532353, 1e-8)
 
     def test_fallback(self):
-        """What does not solve alone is solved by the next method, and the report says by which."""
+        """A problem that a method does not solve alone is solved by the next method, which the report names."""
         for form in ('dual', 'primal'):
             r = self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17', '-hyco_solver_type', 'tao', '-hyco_solver_form', form,
                           '-hyco_tao_type', 'tron', '-hyco_tao_max_it', '1')

@@ -1,4 +1,4 @@
-"""Contacts between fixed displacements: without effect and said to be, or impossible and refused by name; round-off is neither."""
+"""Contacts between fixed displacements: without effect and reported, or impossible and refused by name; round-off is neither."""
 import os
 import unittest
 
@@ -41,7 +41,7 @@ class Still(Case):
         return run.stdout
 
     def test_pair(self):
-        """Both sides fixed: round-off of the drawn coordinates is no penetration; a prescribed overlap is, and is named."""
+        """Both sides fixed: round-off of the drawn coordinates is not penetration; a prescribed overlap is, and is named."""
         for ranks in (0, 2):
             held = 'lower_foot: {x: 0, y: 0}, lower_head: {x: 0, y: 0}, upper_foot: {x: 0, y: %s}, upper_head: {x: 0}'
             scene = self.scene(held % 0, PAIR)
@@ -54,7 +54,7 @@ class Still(Case):
                 self.assertIn(word, run.stderr)
 
     def test_obstacle(self):
-        """An obstacle's nodes that are wholly fixed are no contacts; they may not pass it all the same."""
+        """An obstacle's completely fixed nodes are not contacts; they must not penetrate it."""
         held = 'lower_foot: {x: 0, y: 0}, upper_foot: {x: 0, y: -0.02*press}, upper_head: {x: 0}'
         for ranks in (0, 2):
             for gap, ok in (('0.03', True), ('0.02*press', True), ('0.02*press*(1 - 1e-15)', True), ('0.01', False)):

@@ -1,5 +1,5 @@
-"""What the online phase takes from elsewhere instead of computing it: the reduced stiffness from the model's table, the
-solution without contact from those of the load ranges' ends. Answers must not depend on it."""
+"""Quantities that the online phase does not compute anew: the reduced stiffness from the model's table, the solution
+without contact from those at the ends of the load ranges. Results must not depend on it."""
 import csv
 import os
 import shutil
@@ -37,7 +37,7 @@ class Table(Case):
                 self.near(float(ours[name]), float(theirs[name]), tolerance, name)
 
     def test_pellet(self):
-        """The pellet's radius stretches it in two directions: K is quadratic in it, and three values hold it."""
+        """The pellet's radius stretches it in two directions: K is quadratic in it, and three values determine it."""
         self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.06,4.10', '-values_load', '0.4,0.7,1', '-model', 'p.h5')
         self.assertEqual(self.counts('p.h5'), [3, 1])
         self.assertIn('tabulated at 3 values of radius\n', self.run_raw('view', '-model', 'p.h5').stdout)
@@ -56,7 +56,7 @@ class Table(Case):
         self.agree('m.h5', '-values_radius', '4.03,4.09', '-values_load', '0.8')
 
     def test_none(self):
-        """A modulus that is far from a polynomial of low degree has no table; the model assembles."""
+        """A modulus far from a polynomial of low degree has no table; the model assembles."""
         self.modulus('1e5/(0.02 + (25*(radius - 4.06))^2)', 'n.h5')
         self.assertIsNone(self.counts('n.h5'))
         self.assertEqual(self.points('n.h5', '-values_radius', '4.05', '-values_load', '0.8')[0]['converged'], '1')
@@ -88,7 +88,7 @@ class Table(Case):
         self.loads('l1.h5')
 
     def test_other_load(self):
-        """A pressure that is no affine function of the load."""
+        """A pressure that is not an affine function of the load."""
         self.loads('l2.h5', '-pressure_clad_outer_low', '250*load^2', '-pressure_pellet_top', '5*sin(load)')
 
     def test_load_from_nowhere(self):

@@ -1,4 +1,4 @@
-"""train -target_...: the model that it chooses meets the targets at points that neither training nor validation has seen."""
+"""train -target_...: the model that it chooses meets the targets at points used neither for training nor for validation."""
 import csv
 import os
 import unittest
@@ -92,7 +92,7 @@ class Targets(Case):
         self.hyco('predict', '-model', 'none.h5', '-mu', '0.1,0.2')
 
     def test_no_grid(self):
-        """Points that are no tensor grid: a condensed model is an attempt that failed, and another type is chosen."""
+        """Points that are not a tensor grid: a condensed model is a failed attempt, and another type is chosen."""
         points = [(a, b) for a in (0.05, 0.1, 0.15, 0.2, 0.25) for b in (0.0, 0.1, 0.2, 0.3, 0.4)]
         with open(self.path('line.csv'), 'w', encoding='ascii') as f:
             f.write('mu1,mu2\n' + ''.join(f'{a},{b}\n' for a, b in points[:-1]))

@@ -54,7 +54,7 @@ class Ties(Case):
         return self.written(text, self.column(kind, n, m)), p * p * 2 / 2 / E
 
     def test_patch(self):
-        """Uniform stress passes where the slave's mesh is the master's or divides it; supports and slaves share nodes."""
+        """Uniform stress is transmitted where the slave's mesh is the master's or divides it; supports and slaves share nodes."""
         for kind, n, m, ranks in (('quad4', 3, 3, 0), ('tri3', 2, 4, 3), ('hex8', 2, 4, 2), ('tet4', 2, 2, 0), ('tet4', 1, 3, 2)):
             scene, energy = self.pulled(kind, n, m)
             with self.subTest(kind=kind, n=n, m=m):
@@ -68,7 +68,7 @@ class Ties(Case):
                 np.testing.assert_allclose(u[:, KINDS[kind] - 1], -1.5 / 200 * x[:, KINDS[kind] - 1], atol=1e-14)
 
     def test_not_matching(self):
-        """Meshes of any ratio: resultants are exact, the energy's error is small and falls with the facets."""
+        """Meshes of any ratio: resultants are exact, the energy's error is small and decreases with the facets."""
         for kind, ranks in (('quad4', 2), ('hex8', 0)):
             errors = []
             for k in (1, 2):
@@ -134,7 +134,7 @@ class Ties(Case):
                     np.testing.assert_allclose(u[seam[0], c], np.interp(x[seam[0], 1], x[seam[1], 1], u[seam[1], c]), atol=1e-12)
 
     def test_moved(self):
-        """A map that moves both bodies alike keeps the tie; one that parts them is refused."""
+        """A map that moves both bodies in the same way keeps the tie; one that separates them is refused."""
         grid = self.column('quad4', 3, 4)
         for maps, height in (('low: {map: {y: h*y}}, high: {map: {y: h*y}}', 2.4), ('low: {map: {y: h*y}}, high: {map: {y: y + h - 1}}', 2.2)):
             text = ('scene: {mesh: mesh.msh, parameters: [h], formulation: plane_stress}\nparameter: {h: {range: [1, 2]}}\nbody_low_young: 200\n'

@@ -1,4 +1,4 @@
-"""Ties in scenes with a history: a ring of two tied halves that creeps, against the ring of one mesh; its models."""
+"""Ties in scenes with a history: a ring of two tied halves that creeps, compared with the ring of one mesh; its models."""
 import os
 import sys
 import unittest

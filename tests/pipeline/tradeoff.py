@@ -1,5 +1,5 @@
-"""scripts/bench-tradeoff and bench-growth on little: their tables hold every setting, their pictures are there, documents that have
-no such section are not touched."""
+"""scripts/bench-tradeoff and bench-growth on small cases: their tables have every setting, their pictures are written, documents
+without such a section are not changed."""
 import csv
 import os
 import subprocess

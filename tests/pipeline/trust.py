@@ -1,4 +1,4 @@
-"""What a prediction says of its own error: against the truth at points it has not seen, outside the ranges, and what follows."""
+"""The error estimates of predictions: compared with the errors at unseen points, outside the ranges, and the actions that depend on them."""
 import csv
 import math
 import os
@@ -30,7 +30,7 @@ class Trust(Case):
             return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(f)]
 
     def bounds(self, scene, model, grid, share=0.9, ratio=8):
-        """The estimates at unseen points: no less than the error at nine of ten, and not many times as large in the median."""
+        """The estimates at unseen points: at least the error at nine of ten, and in the median not many times as large."""
         self.hyco('predict', '-model', model, '-grid', grid, '-table', 'p.csv')
         self.hyco('compare', '-scene', scene, '-model', model, '-grid', grid, '-table', 'c.csv')
         self.hyco('solve', '-scene', scene, '-grid', grid, '-table', 's.csv')
@@ -45,7 +45,7 @@ class Trust(Case):
             if max(true for _, true in pairs) < 1e-8:
                 continue  # round-off
             if 'projection' in model and 'lambda' in error:
-                continue  # its forces are right at some points and off by half at others: nothing online tells which
+                continue  # its forces are right at some points and wrong by half at others: nothing online shows which
             found = statistics.median(e / true for e, true in pairs if true > 0)
             self.assertTrue(1 <= found <= ratio, (model, error, found))
 
@@ -64,13 +64,13 @@ class Trust(Case):
         self.bounds(PELLET, 'pellet.h5', '7,6')
 
     def test_tells_models_apart(self):
-        """The fine model is some hundred times better, and says so."""
+        """The fine model is about a hundred times better, and its estimates show it."""
         rough, fine = (self.hyco('predict', '-model', m, '-mu', '0.12,0.2') for m in ('rough.h5', 'fine.h5'))
         for estimate, _ in ERRORS:
             self.assertGreater(rough[estimate], 5 * fine[estimate])
 
     def test_outside(self):
-        """Refused; with -extrapolate the estimate grows with the distance, and the report says how far it is."""
+        """Refused; with -extrapolate the estimate grows with the distance, which the report gives."""
         run = self.run_raw('predict', '-model', 'fine.h5', '-mu', '0.26,0.2')
         self.assertEqual(run.returncode, 1)
         self.assertIn('mu1 = 0.26 lies outside its range [0.05, 0.25]', run.stderr)
@@ -116,7 +116,7 @@ class Trust(Case):
         self.assertFalse(kept['full_order'])
 
     def test_no_calibration(self):
-        """Without held-out points, or with too few: no estimate, and it says so; a target then means full order."""
+        """Without held-out points, or with too few: no estimate, and this is reported; a target then means full order."""
         for name, n in (('n.h5', 0), ('f.h5', 9)):
             run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-model', name, '-hyco_snapshots', 's', '-hyco_validation', n, *ROUGH)
             self.assertIn('are not known' if n == 0 else 'does not estimate its errors', run.stdout)
@@ -128,8 +128,8 @@ class Trust(Case):
             self.assertTrue(p['full_order'])
 
     def test_unseen(self):
-        """Inside the scene's ranges but outside what training has seen: said, and the estimate of forces that training never saw
-        is none, which asks for full order."""
+        """Inside the scene's ranges but outside the region of training: reported, and there is no estimate of forces that training never had,
+        which requires full order."""
         self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.03,4.04', '-values_load', '0.1,0.2,0.3,0.4', '-model', 'few.h5', *SETTINGS,
                   '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', 1, '-hyco_hybrid', 'contact', '-hyco_rid_groups', 'pellet_top', '-hyco_rid_contact_extension', 0.1, status=None)
         near = self.hyco('predict', '-model', 'few.h5', '-mu', '4.035,0.3')

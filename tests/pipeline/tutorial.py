@@ -1,4 +1,4 @@
-"""docs/tutorial.md and docs/faq.md, line by line: their files are written, their commands run, what they print is compared."""
+"""docs/tutorial.md and docs/faq.md, line by line: their files are written, their commands run, the output is compared."""
 import glob
 import importlib.util
 import os
@@ -15,7 +15,7 @@ DOCS = os.path.join(SOURCE, 'docs')
 
 
 def drawable():
-    """Whether scripts/plot has what it takes."""
+    """Whether the packages for scripts/plot are installed."""
     return all(importlib.util.find_spec(name) for name in ('matplotlib', 'h5py', 'numpy'))
 
 

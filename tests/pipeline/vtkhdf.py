@@ -1,4 +1,4 @@
-"""-output FILE.vtkhdf: VTK's layout of HDF5, with the numbers of the .h5 beside an .xdmf; what fields are called and measured in."""
+"""-output FILE.vtkhdf: VTK's HDF5 layout, with the numbers of the .h5 beside an .xdmf; names and units of fields."""
 import os
 import unittest
 import xml.etree.ElementTree as ET

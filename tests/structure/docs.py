@@ -1,4 +1,4 @@
-"""The documents: links lead somewhere, named files exist, the theory states each equation, the glossary each word it must, the README is short."""
+"""The documents: links are valid, named files exist, the theory has each equation, the glossary each required term, the README is short."""
 import glob
 import os
 import re
@@ -32,7 +32,7 @@ class Docs(unittest.TestCase):
                     self.assertIn(anchor, anchors(text(file)), f'{path}: {target}')
 
     def test_files(self):
-        """What a page names as a source or a script is there."""
+        """Every source or script that a page names exists."""
         for page in ('theory.md', 'glossary.md', 'models.md', 'faq.md', 'tutorial.md'):
             for name in re.findall(r'`((?:src|scripts|examples|include|tests)/[\w./-]+)`', text('docs', page)):
                 self.assertTrue(os.path.exists(os.path.join(SOURCE, name)), f'{page}: {name}')

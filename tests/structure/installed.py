@@ -1,4 +1,4 @@
-"""What cmake --install puts in a folder is enough to build on: the ladder, by pkg-config and by CMake; and it shows no private symbol."""
+"""The files installed by cmake --install are sufficient to build the ladder, by pkg-config and by CMake; no private symbol is exported."""
 import glob
 import os
 import re
@@ -54,7 +54,7 @@ class Installed(unittest.TestCase):
         self.assertTrue(os.path.exists(os.path.join(os.path.dirname(self.library), soname)))
 
     def test_symbols(self):
-        """The library shows what the installed headers declare, all of it and nothing else."""
+        """The library exports the declarations of the installed headers, all of them and nothing else."""
         text = ''.join(open(name, encoding='utf-8').read() for name in self.found('include/*.h'))
         text = re.sub(r'/\*.*?\*/', '', text, flags=re.S)
         shown = {line.split()[-1].split('@')[0] for line in run('nm', '-D', '--defined-only', self.library).splitlines()
@@ -66,7 +66,7 @@ class Installed(unittest.TestCase):
         self.assertEqual(sorted(declared - shown), [])
 
     def test_manual(self):
-        """Each option of the help stands in its page, and completes."""
+        """Each option of the help is in its manual page and in the completion."""
         options = re.findall(r'^  (-[a-z]\w*) ', run(os.path.join(self.prefix, 'bin', 'hyco'), 'predict', '-help'), flags=re.M)
         with open(os.path.join(self.prefix, 'share', 'man', 'man1', 'hyco-predict.1'), encoding='utf-8') as file:
             page = file.read().replace('\\-', '-')

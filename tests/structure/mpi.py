@@ -1,4 +1,4 @@
-"""CMake refuses an MPI that is not PETSc's: here a wrapper whose mpi.h calls itself another implementation's."""
+"""CMake refuses an MPI that is not PETSc's: here a wrapper whose mpi.h declares another implementation."""
 import os
 import subprocess
 import tempfile
@@ -14,7 +14,7 @@ case ${{1:-}} in
   *) exec mpicc "$@" ;;
 esac
 """
-# compiles and links, and says that it is no Open MPI
+# compiles and links, and declares that it is not Open MPI
 OTHER = """#include_next <mpi.h>
 #undef OMPI_MAJOR_VERSION
 #define MPICH_NUMVERSION 40000000

@@ -1,5 +1,5 @@
-"""scripts/setup without the right to install: it names what is missing and the line that installs it, and goes on where only
-tests or pictures want it. Debian's tools are stand-ins."""
+"""scripts/setup without the right to install: it lists the missing packages and the command that installs them, and continues if only tests or
+pictures need them. Debian's tools are replaced by stand-ins."""
 import os
 import subprocess
 import tempfile

@@ -1,4 +1,4 @@
-"""Rules that the sources keep: who prints, who knows whom, who declares options, the public header alone."""
+"""Rules of the sources: printing, dependences between folders, declaration of options, the public header."""
 import glob
 import os
 import re
@@ -43,7 +43,7 @@ class Sources(unittest.TestCase):
             self.assertEqual(word.findall(code(path)), [], path)
 
     def test_layers(self):
-        """Algorithms, linear solves, complementarity and contact know no scene, mesh or cells; nothing but the driver includes driver.h."""
+        """Algorithms, linear solves, complementarity and contact do not include scene, mesh or cells; only the driver includes driver.h."""
         above = ('hycoscene', 'hycosceneimpl', 'hycomesh', 'hycofe', 'hycofom', 'hycodomain', 'hycorom', 'hycoreducer',
                  'hycosnapshots', 'hycosamples', 'hycofields', 'hyco')
         for folder in ('algorithms', 'solver', 'linear', 'complementarity'):
@@ -59,7 +59,7 @@ class Sources(unittest.TestCase):
             self.assertEqual([n for n in names if n in above], [], name)
 
     def test_types(self):
-        """Laws and discretisations of contact are known in their own folders alone; a scene knows the default one."""
+        """Laws and discretisations of contact are named only in their own folders; a scene names the default one."""
         for path in sources():
             if os.sep + 'material' + os.sep not in path:
                 self.assertNotRegex(code(path), r'\b(young|poisson)\b', path)
@@ -67,7 +67,7 @@ class Sources(unittest.TestCase):
                 self.assertNotRegex(code(path), r'\bHYCO_CONTACT_(PAIR|SURFACE)\b', path)
 
     def test_model_types(self):
-        """What a type of reduced model has is known in its own folder alone, and nobody asks for a type by name."""
+        """A type of reduced model is named only in its own folder, and no code queries a type by name."""
         own = re.compile(r'#include\s*[<"](hycohybrid|hycoprojection|hycocondensed|hycogalerkin|hycotable)\.h')
         for path in sources():
             if os.sep + 'impls' + os.sep in path:
@@ -76,7 +76,7 @@ class Sources(unittest.TestCase):
             self.assertNotRegex(code(path), r'[=!]=\s*HYCO_ROM_(HYBRID|PROJECTION|CONDENSED)|strcmp\([^;]*HYCO_ROM_(PROJECTION|CONDENSED)', path)
 
     def test_options(self):
-        """hyco -help lists what the code declares, once each; what is asked by name elsewhere is declared."""
+        """hyco -help lists the declarations of the code, once each; options queried by name elsewhere are declared."""
         declared, asked = [], set()
         for path in sources():
             body = re.sub(r'/\*.*?\*/', ' ', text(path), flags=re.S)

@@ -152,8 +152,8 @@ class Hertz(Verify):
         self.row(f'{title}: largest scatter of a pressure over the peak', scatter, 0, 0.1)
 
     def test_sphere(self):
-        """An eighth of a ball of radius 1 on a rigid plane. The edge, a circle, meets the cells anywhere: errors change
-        sign from mesh to mesh, hence the low bound on the orders."""
+        """An eighth of a ball of radius 1 on a rigid plane. The edge, a circle, crosses cells at arbitrary positions: errors
+        change sign from mesh to mesh, hence the low bound on the orders."""
         cells, runs, width = (2, 4, 8), [], 0.01
         for n in cells:
             along, towards = axes(width, n, 1, 20)

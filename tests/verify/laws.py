@@ -1,7 +1,6 @@
-"""The laws that flow, at a point, against closed forms: relaxation, creep under a constant stress, loading, reversed
-loading; in 1D and in 3D under uniaxial stress. The rows with their formulas are made by laws.c. `test_points cost`
-prints what a point costs.
-"""
+"""The inelastic laws at a point, compared with closed forms: relaxation, creep under a constant stress, loading,
+reversed loading; in 1D and in 3D under uniaxial stress. laws.c makes the rows with their formulas. `test_points
+cost` prints the cost of a point."""
 import os
 import subprocess
 import unittest
@@ -24,7 +23,7 @@ class Laws(Verify):
             self.row(quantity, *map(float, numbers))
 
     def test_cost(self):
-        """Printed, not judged: a machine with other work is slower."""
+        """Printed, not checked: a busy machine is slower."""
         run = subprocess.run([PROGRAM, 'cost'], capture_output=True, text=True, timeout=100 * PATIENCE, check=False)
         self.assertEqual(run.returncode, 0, run.stderr)
         self.assertIn('us a point', run.stdout)

@@ -182,7 +182,8 @@ class Patch(Held):
                               abs(m['total'] / m['p'] - 1), 1e-10)
 
     def test_not_matching(self):
-        """The bounds are twice what was measured when they were set; lower ones: the test is no exact case."""
+        """The bounds are twice the measured values at the time of writing; there are lower bounds too, so that the test is not an exact
+        case."""
         for kind, slaves, masters, local, force in (('quad4', 5, 4, 0.08, 1e-3), ('quad4', 7, 5, 0.1, 1e-3),
                                                     ('quad4', 4, 5, 0.14, 2e-3), ('tri3', 5, 4, 0.13, 1e-3),
                                                     ('tri3', 7, 5, 0.11, 1e-3), ('hex8', 3, 2, 0.21, 6e-3),
@@ -203,7 +204,7 @@ class Patch(Held):
                 self.held(f'{name}, base reaction, forces, moments', balance, 0, balance, 1e-10)
 
     def test_pressed(self):
-        """The upper block under a pressure, held by the contact alone: the nodal forces add up to it on any mesh."""
+        """The upper block under a pressure, supported only by the contact: the nodal forces sum to it on any mesh."""
         for kind, slaves, masters in (('quad4', 5, 4), ('tri3', 7, 5), ('hex8', 4, 3), ('tet4', 4, 3)):
             with self.subTest(kind=kind):
                 flat, up = KINDS[kind] == 2, 'xyz'[KINDS[kind] - 1]
@@ -336,8 +337,8 @@ class Crowned(Held):
         return f'{len(rows)} of {len(kept)} contacts'
 
     def test_hybrid(self):
-        """Trained alike, the model on meshes that do not match is at most twice as wrong as that of node pairs on
-        meshes that do; and nowhere worse than twice what was measured when the bounds were set."""
+        """Trained in the same way, the model on meshes that do not match has at most twice the errors of that with node pairs on matching
+        meshes; and at most twice the values measured when the bounds were set."""
         for kind, n, cases in (('quad4', 24, [(24, 31, 1.2e-3, 4e-2)]), ('hex8', 8, [(9, 7, 6e-4, 4e-3)]),
                                ('tet4', 7, [(6, 8, 6e-4, 8e-3), (8, 6, 4e-4, 3e-3)])):
             pair = self.model(kind, n, n, 'pair')[1]

@@ -44,7 +44,7 @@ class Punch(Verify):
             self.row(f'what the last fifth of the way adds, over the pressure, {fine}', (last - before) / LIMIT, 0, 1e-3)
 
     def test_standard(self):
-        """Not a bound to hold, but what the default saves from."""
+        """Not a requirement: shows what the default prevents."""
         before, last = self.pressures(0.05, 'element: standard, ')
         self.row('mean pressure, standard element, over the limit', last / LIMIT, 1.1, 0, least=True)
         self.row('what the last fifth of the way adds', (last - before) / LIMIT, 0.01, 0, least=True)

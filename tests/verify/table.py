@@ -1,6 +1,5 @@
-"""The table of the verification: every test's rows, aligned, printed and written to verify.md; fails when a row is out
-of its bound or a test left none. What it prints is kept in verify/new too, for the end of ctest's output.
-"""
+"""The table of the verification: every test's rows, aligned, printed and written to verify.md; fails if a row is out
+of its bound or a test's rows are missing. Its output is also stored in verify/new, for the end of ctest's output."""
 import csv
 import os
 import sys

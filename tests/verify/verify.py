@@ -1,7 +1,7 @@
-"""What the verification tests share: one line and one row of a table for each quantity, and the fitted order.
+"""Common code of the verification tests: one line and one row of a table for each quantity, and the fitted order.
 
-A row goes to verify/TEST.csv under the folder where the test runs; table.py prints them all after the last test.
-"""
+A row is written to verify/TEST.csv under the folder where the test runs; table.py prints them all after the last
+test."""
 import csv
 import os
 
@@ -32,7 +32,8 @@ class Verify(Case):
             csv.writer(f).writerow(HEAD)
 
     def row(self, quantity, computed, exact, bound, least=False):
-        """A number against its closed form: error in per cent of it, absolute when it is 0; least: more is no error."""
+        """A number compared with its closed form: error in per cent of it, absolute if it is 0; least: one-sided,
+        more is allowed."""
         difference = max(exact - computed, 0) if least else abs(computed - exact)
         unit = '%' if exact else ''
         error = 100 * difference / abs(exact) if exact else difference
@@ -61,7 +62,7 @@ class Verify(Case):
         if 'lambda' in out:
             small = 1e-9 * abs(out['nodes/displacement']).max()
             self.assertLessEqual(abs(out['gap'][out['lambda'] > 0]).max(initial=0), small)
-            self.assertGreaterEqual(np.nanmin(out['gap'], initial=0), -small)  # NaN where a slave faces nothing
+            self.assertGreaterEqual(np.nanmin(out['gap'], initial=0), -small)  # NaN where a slave faces no master
         return report, out
 
 
