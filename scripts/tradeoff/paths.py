@@ -7,7 +7,7 @@ import sys
 import time
 from dataclasses import dataclass
 
-sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "rivals"))
+sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "comparison"))
 import matplotlib
 
 matplotlib.use("Agg")
