@@ -21,12 +21,13 @@ extern const char *const HycoNewtons[]; /* NULL ends */
 /* An attempt at a step of time. */
 typedef struct {
   PetscBool converged, easy;
-  char why[HYCO_LINE]; /* else */
-  PetscInt iterations; /* contact systems solved */
-  PetscInt factors;    /* of them with a new stiffness */
-  PetscInt active_its; /* iterations within them */
-  PetscReal residual;  /* of equilibrium, relative to the largest of |f_int|, |F|, |B^T L| */
-  PetscReal order;     /* observed; 0: too few iterations to tell */
+  char why[HYCO_LINE];              /* else */
+  PetscInt iterations;              /* contact systems solved */
+  PetscInt factors;                 /* of them with a new stiffness */
+  PetscInt active_its;              /* iterations within them */
+  PetscInt linear_its, most_linear; /* of conjugate gradients; most in one solve */
+  PetscReal residual;               /* of equilibrium, relative to the largest of |f_int|, |F|, |B^T L| */
+  PetscReal order;                  /* observed; 0: too few iterations to tell */
   PetscReal seconds_factor, seconds_solve, seconds_law;
   HycoFEStepReport law; /* over all ranks */
 } HycoStepAttempt;

@@ -16,6 +16,7 @@ struct _p_HycoSystem {
   /* work of the residuals, made by the first */
   Vec work_x[2], work_L; /* as F, as D */
   PetscReal size_B;      /* its largest row sum, while B is as seen */
+  PetscReal residual;    /* 2-norm of F - K x - Bt L beyond round-off, of the last residuals */
   HycoOperatorState seen_B;
 };
 
@@ -92,6 +93,7 @@ struct _p_HycoSolver {
   char linear_method[128], why_iterative[96];
   Vec free;                   /* K^-1 F of the next solve, if known; borrowed */
   const PetscBool *start_set; /* of the next solve, if given; borrowed */
+  PetscReal target;           /* residual that the next solve is to reach by iterations; 0: by rtol alone */
   /* the attempt under way, or the last one */
   HycoSolverForm form;
   HycoMethod now;
@@ -101,6 +103,7 @@ struct _p_HycoSolver {
   HycoReason reason;
   HycoKKT kkt;
   PetscInt its;
+  PetscInt linear_its, linear_solves, linear_most; /* of conjugate gradients: in all, solves, most in one */
   char method[128];
   PetscReal seconds_factor, seconds_solve, seconds_before; /* before: of a factor made ahead of the solve */
 };
@@ -131,6 +134,8 @@ PetscBool HycoSolverNeedsSymmetry(HycoSolver s);
 PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form);
 /* Says in linear_method what solves with K: `ksp`, or (NULL) the factor of a HycoDirect. */
 PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp);
+/* Adds the iterations of a solve by conjugate gradients to the counts. */
+void HycoCountLinear(HycoSolver s, PetscInt its);
 
 /* -- a factor of K, with s->stiffness -- */
 
@@ -160,6 +165,11 @@ PetscErrorCode HycoSolverSetRefine(HycoSolver s, PetscBool refine);
 /* The contacts from which the active set of the next solve begins, m of them, with a given flexibility. Borrowed until
    then. */
 PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);
+/* The 2-norm of F - K x - Bt L that the next solve is to reach where it iterates (0: by the tolerance alone), within
+   the tolerance too; it then begins from the given x. A factor takes no notice of it. */
+PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual);
+/* Iterations of conjugate gradients in the last solve, and most in one of its linear solves; 0: a factor solved. */
+PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscInt *most);
 /* S = B K^-1 Bt of the last solve, which was in the dual form with a factor of a regular K: m x m column major, the
    same on every rank. Borrowed until a matrix changes. Collective. */
 PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[]);

@@ -14,8 +14,9 @@
 #include <hycopath.h>
 
 #define ARMIJO    1e-4
-#define SHORTENED 8 /* times that a step is halved at most */
-#define WORTH     8 /* iterations to come for which a new tangent is made (modified) */
+#define SHORTENED 8    /* times that a step is halved at most */
+#define WORTH     8    /* iterations to come for which a new tangent is made (modified) */
+#define FORCING   1e-3 /* share of the residual that a solve without a factor leaves */
 
 /* What an iteration knows of the one before. */
 typedef struct {
@@ -100,12 +101,22 @@ static PetscErrorCode AssembleK(HycoPath p, PetscBool tangent)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The residual that a solve without a factor is to leave: a share of what there is, which with a tangent falls with it,
+   so that its order of convergence stays (S. Eisenstat, H. Walker, SIAM J. Sci. Comput. 17 (1996) 16-32). */
+static PetscReal Target(HycoPath p, const Progress *now)
+{
+  const PetscReal r = now->residual[2], least = PetscMax(0.1 * p->rtol * now->size, now->floor);
+  const PetscReal share = p->tangent && r < FORCING * now->size ? r / now->size : FORCING;
+
+  return PetscMax(least, share * r);
+}
+
 /* The contact system at U: its solution in G and L_new. */
-static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, HycoStepAttempt *a)
+static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *now, HycoStepAttempt *a)
 {
   HycoReason reason;
   PetscReal factor, solve;
-  PetscInt its;
+  PetscInt its, linear, most;
 
   PetscFunctionBegin;
   PetscCall(RightSide(p));
@@ -115,16 +126,20 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, HycoStepAttempt *
   PetscCall(VecCopy(p->U, p->G));
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_new));
   if (p->cold) PetscCall(HycoSolverSetWarmStart(p->solver, PETSC_FALSE));
+  PetscCall(HycoSolverSetTarget(p->solver, Target(p, now)));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(p->solver, p->G, p->L_new));
   if (p->cold) PetscCall(HycoSolverSetWarmStart(p->solver, PETSC_TRUE));
   p->cold = PETSC_FALSE;
   PetscCall(HycoSolverGetReason(p->solver, &reason));
   PetscCall(HycoSolverGetSeconds(p->solver, &factor, &solve));
   PetscCall(HycoSolverGetIterations(p->solver, &its));
+  PetscCall(HycoSolverGetLinearIterations(p->solver, &linear, &most));
   p->kept++;
   a->iterations++;
   a->factors += factor > 0;
   a->active_its += its;
+  a->linear_its += linear;
+  a->most_linear = PetscMax(a->most_linear, most);
   a->seconds_factor += factor;
   a->seconds_solve += solve;
   if (reason < 0) HycoFormat(a->why, "%s", HycoReasonName(reason));
@@ -356,7 +371,7 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
       HycoFormat(a->why, "%s", a->law.why);
       break;
     }
-    if (tangent) Observe(&now, k, a);
+    if (tangent && !a->linear_its) Observe(&now, k, a); /* else what the solves leave decides */
     if (k && now.residual[2] <= PetscMax(p->rtol * now.size, now.floor)) {
       PetscCall(Judge(p, &now, a, &worst));
       a->converged = (PetscBool)(worst <= 1e-8);
@@ -371,7 +386,7 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
     if (method == HYCO_NEWTON_MODIFIED && k) fresh = Stalls(p, &now);
     if (tangent) PetscCall(AssembleK(p, PETSC_TRUE));
     if (fresh) PetscCall(Renew(p, t0, t1, a, &now));
-    PetscCall(SolveSystem(p, (PetscBool)(k == 0), a));
+    PetscCall(SolveSystem(p, (PetscBool)(k == 0), &now, a));
     if (a->why[0]) break;
     if (tangent)
       PetscCall(Advance(p, (PetscBool)(k > 0), a, &now));
