@@ -66,26 +66,26 @@ typedef struct {
   PetscBool whole;   /* the whole mesh as the RID */
   const char *plane; /* group of a plane of symmetry whose cells are in the RID; NULL: none. Borrowed from the scene */
   PetscReal ridge;   /* hybrid all: of the interface's regression, as training has found it; < 0: not yet */
-} HycoRecipe;
+} HycoReducerSettings;
 
 /* Describes settings: "hybrid, pod_tol 1e-10, hybrid contact, layers 1, contact extension 2.5". */
-void HycoRecipeDescribe(const HycoRecipe *recipe, size_t length, char text[]);
+void HycoReducerSettingsDescribe(const HycoReducerSettings *settings, size_t length, char text[]);
 
 /* Settings that the search tried. Borrowed by the monitor. */
 typedef struct {
   PetscInt number, of; /* number, from 1 (0: no search); for the chosen settings also the total */
-  HycoRecipe recipe;
+  HycoReducerSettings settings;
   PetscInt n_modes, n_fe_dofs, n_flexibilities, rid_nodes, rid_elements, rid_contacts;
   PetscReal rid_fraction;
   PetscReal cost;          /* operations of an online solve at a new stiffness, estimated */
   PetscReal ratio;         /* the largest quotient of an error and its target; at most 1 if all targets are met */
   HycoErrorKind worst;     /* that error */
   HycoValidation held_out; /* errors at the held-out points at which it was judged, held_out.n */
-  PetscInt n_held;         /* number of held-out points. Of paths, a recipe is dropped at the first of them that it does
-                              not bring to its end, or whose error excludes its choice */
+  PetscInt n_held;         /* number of held-out points. For paths, settings are dropped at the first of them that the
+                              model does not bring to its end, or whose error excludes their choice */
   PetscInt dropped_at;     /* that point; -1: it was judged at all */
-  PetscInt beaten_by;      /* number of the recipe that is chosen instead; 0: none, or the path has no end */
-  PetscBool reopened;      /* that recipe was refused later: a later attempt has all points */
+  PetscInt beaten_by;      /* number of the settings that are chosen instead; 0: none, or the path has no end */
+  PetscBool reopened;      /* those settings were refused later: a later attempt has all points */
   char failure[512];       /* reason why there is no model; "": there is one */
 } HycoAttempt;
 /* Called on rank 0 after each attempt. */

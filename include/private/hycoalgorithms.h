@@ -5,43 +5,45 @@
 #include <hycoimpl.h>
 #include <slepcsvd.h>
 
-/* The accurate default among the SVD's types: tall-skinny QR of a dense matrix, SVD of its triangle. */
+/* The default SVD type, accurate to round-off: tall-skinny QR of a dense matrix, then the SVD of the triangular
+   factor. */
 #define HYCO_SVD_TSQR "tsqr"
-/* Registers it beside SLEPc's types. */
+/* Registers HYCO_SVD_TSQR beside SLEPc's types. */
 PetscErrorCode HycoSVDRegisterAll(void);
-/* An SVD for HycoPOD(), of that type; the caller's. */
+/* Creates an SVD of type HYCO_SVD_TSQR for HycoPOD(). The caller owns it. */
 PetscErrorCode HycoPODCreateSVD(MPI_Comm comm, SVD *svd);
 
 /*
   POD (17)-(18) in the 2-norm of a dense matrix S (N x n_s, any row distribution). V (N x l, the caller owns it) holds
-  the first l left singular vectors with the smallest l whose energy is at least 1 - tol; singular values below noise *
+  the first l left singular vectors, with the smallest l whose energy is at least 1 - tol. Singular values below noise *
   sigma_1 are never taken, nor more than max_modes (0: no limit). sigma (room for n_s) receives min(N, n_s) singular
-  values. The sign of a mode: its entry of largest magnitude is positive. A zero matrix gives l = 0 and V = NULL.
-  svd: sets its type, settings and options prefix; its options are read here. Where the type finds modes inaccurately or
-  not at all, those from the first such are left out, and sigma has one value for all their energy, then 0; l is less
-  than HycoPODRank() says if (18) needs them. Collective on S, and on svd, which has its communicator.
+  values. Sign of a mode: its entry of largest magnitude is positive. A zero matrix gives l = 0 and V = NULL. svd: this
+  function sets its type, settings and options prefix, and reads its options. If the SVD type finds some modes
+  inaccurately or not at all, the modes from the first of these on are left out; sigma then has one value for all their
+  energy, followed by zeros; l is less than HycoPODRank() returns if (18) needs them. Collective on S, and on svd, which
+  has the communicator of S.
 */
 PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
                        PetscReal sigma[]);
 
 /*
-  POD of columns that come in blocks. *merged (NULL at first) becomes V diag(sigma) of [*merged S], less the modes with
-  the least energy, as many as together have at most the share `loss` of it (NULL: all are zero); *S is freed and NULL.
-  HycoPOD() of the last *merged has the singular values of all columns but for the square root of what the calls have
-  cut off. svd: of type HYCO_SVD_TSQR. Takes twice the memory of [*merged S] and that of what is left. Collective, as
-  HycoPOD().
+  POD of columns that arrive in blocks. *merged (NULL at first) becomes V diag(sigma) of [*merged S], without the modes
+  of least energy that together have at most the share `loss` of it (NULL: all are zero). *S is freed and set to NULL.
+  HycoPOD() of the last *merged has the singular values of all columns, up to the square root of the energy that the
+  calls have cut off. svd: of type HYCO_SVD_TSQR. Needs twice the memory of [*merged S], and that of the result.
+  Collective, as HycoPOD().
 */
 PetscErrorCode HycoPODMerge(SVD svd, PetscReal loss, Mat *merged, Mat *S);
-/* The columns of the dense X into those of Y, with the same rows, from `at` on. Collective. */
+/* Copies the columns of the dense X into Y, which has the same rows, from column `at` on. Collective. */
 PetscErrorCode HycoCopyColumns(Mat X, Mat Y, PetscInt at);
 
-/* The l of k singular values that HycoPOD() takes: the tail is summed, so that tol can be tiny. */
+/* The number l of k singular values that HycoPOD() takes. It sums the tail, so that tol can be tiny. */
 PetscInt HycoPODRank(PetscInt k, const PetscReal sigma[], PetscReal tol, PetscReal noise, PetscInt max_modes);
 
 /*
   POD from a Gram matrix G = S^T M S (n_s x n_s, column major, on every rank): coefficients W (n_s x l, column major,
-  the caller frees) such that S W is orthonormal in M. Singular values below 1e-7 of the first are out of its reach. Not
-  collective.
+  the caller frees) such that S W is orthonormal in M. Singular values below 1e-7 of the first are lost to round-off.
+  Not collective.
 */
 PetscErrorCode HycoPODGram(PetscInt n_s, const PetscReal G[], PetscReal tol, PetscReal noise, PetscReal **W,
                            PetscInt *l, PetscReal sigma[]);
@@ -53,10 +55,10 @@ PetscErrorCode HycoPODGram(PetscInt n_s, const PetscReal G[], PetscReal tol, Pet
 PetscErrorCode HycoDEIM(Mat V, PetscInt index[]);
 /*
   Q-DEIM (Drmac, Gugercin, SIAM J. Sci. Comput. 38 (2016) A631-A648): the first l pivots of QR with column pivoting of
-  V^T, which any rotation of the modes leaves the same. Ties and ranks as HycoDEIM().
+  V^T, which do not change under a rotation of the modes. Ties and ranks as in HycoDEIM().
 */
 PetscErrorCode HycoQDEIM(Mat V, PetscInt index[]);
-/* The same as far as V's rank goes, which may be less. */
+/* The same, up to the rank of V, which may be less than l. */
 PetscErrorCode HycoQDEIMRank(Mat V, PetscInt index[], PetscInt *rank);
 
 /* Rows of a dense distributed matrix (n x cols row major), on every rank. Collective. */
@@ -69,21 +71,22 @@ PetscReal HycoHalton(PetscInt k, PetscInt j);
  * Not collective. */
 PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscReal x[],
                         PetscReal *residual);
-/* Moves the k passive entries x[p[j]] towards z[j] until one meets 0: its j, or -1 when z itself is reached. */
+/* Moves the k passive entries x[p[j]] towards z[j] until one of them becomes 0: returns its j, or -1 if z itself is
+   reached. */
 PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], PetscReal x[]);
 
 /*
-  c with y <= sum_j c_j X_j + c[p] for `share` of the n > 0 rows (the quantile number ceil(share (n + 1)), at most the
-  largest), c_j >= 0 by regularised least squares over the first `telling` of them. X: n x p row major; c: p + 1. Not
-  collective.
+  Fits c such that y <= sum_j c_j X_j + c[p] for `share` of the n > 0 rows (the quantile number ceil(share (n + 1)), at
+  most the largest); c_j >= 0 by regularised least squares over the first `telling` rows. X: n x p row major; c: p + 1.
+  Not collective.
 */
 PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, PetscInt p, const PetscReal X[], const PetscReal y[],
                               PetscReal share, PetscReal c[]);
 
 /*
   Many problems over one S (m x n column major, borrowed): min 1/2 sum_k d_k (S x)_k^2 - h^T S x + shift/2 |x|^2, x >=
-  0, that is |diag(sqrt(d)) S x - b|^2 / 2 with h = sqrt(d) b. d >= 0 and h: m each. shift > 0, so that there is one
-  answer. Nothing is allocated after Create; an answer does not depend on the problems before. *solved: the optimality
+  0, that is |diag(sqrt(d)) S x - b|^2 / 2 with h = sqrt(d) b. d >= 0 and h: m each. shift > 0 makes the solution
+  unique. Nothing is allocated after Create; a solution does not depend on earlier problems. *solved: the optimality
   conditions, recomputed from S, hold to rtol of the largest entry of S^T h. Not collective.
 */
 typedef struct _n_HycoWeighted *HycoWeighted;
@@ -93,10 +96,10 @@ PetscErrorCode HycoWeightedNNLS(HycoWeighted weighted, const PetscReal d[], cons
                                 PetscReal x[], PetscBool *solved);
 
 /*
-  Nonnegative factorisation S ~ W H by at most max_its alternations from the NNDSVD start: the same S, the same W. S: m
+  Nonnegative factorisation S ~ W H by at most max_its alternations from the NNDSVD start, which is deterministic. S: m
   x n column major, no entry negative (else an error). W (room for m x k, column major) receives n_vectors <= k columns
-  of unit 2-norm, no entry negative; fewer than k when S has a smaller rank, none when S is zero. misfit = |S - W H|_F^2
-  / |S|_F^2 (0 for S = 0). A local minimum. Not collective.
+  of unit 2-norm, no entry negative; fewer than k if S has a smaller rank, none if S is zero. misfit = |S - W H|_F^2 /
+  |S|_F^2 (0 for S = 0). The result is a local minimum. Not collective.
 */
 PetscErrorCode HycoNNMF(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k, PetscInt max_its, PetscReal W[],
                         PetscInt *n_vectors, PetscReal *misfit);
@@ -114,11 +117,12 @@ PetscErrorCode HycoPseudoInverse(PetscInt m, PetscInt n, const PetscReal A[], Pe
 PetscErrorCode HycoSingularity(PetscInt n, const PetscReal A[], PetscInt *sign, PetscReal *ratio);
 
 /*
-  Interpolation in a space of dim parameters from n points (n x dim row major, distinct or not): weight[k] >= 0 of point
-  k with sum 1, such that linear functions of a point inside the hull come out exact. Multilinear when the points form a
-  grid (always with one parameter), else linear on the simplices of their Delaunay triangulation (to 8 parameters).
-  Outside: a grid takes the nearest point of its box; a triangulation the simplex whose barycentric coordinates are
-  least negative, negative ones cut to 0. Fails when the points lie on one line or plane. Not collective.
+  Interpolation in a space of dim parameters from n points (n x dim row major, repeated points allowed): weight[k] >= 0
+  of point k with sum 1, such that linear functions are reproduced exactly inside the hull. Multilinear if the points
+  form a grid (always with one parameter), else linear on the simplices of their Delaunay triangulation (up to 8
+  parameters). Outside, a grid uses the nearest point of its box; a triangulation uses the simplex whose barycentric
+  coordinates are least negative, with negative ones set to 0. Fails if the points lie on one line or plane. Not
+  collective.
 */
 #define HYCO_INTERPOLANT_MAX_DIM 32
 typedef struct _n_HycoInterpolant *HycoInterpolant;
@@ -128,7 +132,7 @@ PetscErrorCode HycoInterpolantGetWeights(HycoInterpolant interpolant, const Pets
 
 /*
   Polynomials on a tensor grid. Axis p has n[p] nodes x[p][], ascending (borrowed; not read where n[p] is 1), and a
-  degree; a grid node's number runs fastest along the last axis. Values at the grid nodes: data, a column of `rows`
+  degree; the number of a grid node runs fastest along the last axis. Values at the grid nodes: data, a column of `rows`
   numbers per node. Not collective.
 */
 #define HYCO_TENSOR_MAX_DIM 32
@@ -136,40 +140,41 @@ typedef struct {
   PetscInt dim, n[HYCO_TENSOR_MAX_DIM], degree[HYCO_TENSOR_MAX_DIM];
   const PetscReal *x[HYCO_TENSOR_MAX_DIM];
 } HycoTensor;
-/* The n roots of the Chebyshev polynomial on [lo, hi], ascending: the nodes whose interpolation is nearly best. */
+/* The n roots of the Chebyshev polynomial on [lo, hi], ascending: nearly optimal nodes for interpolation. */
 PetscErrorCode HycoChebyshevNodes(PetscInt n, PetscReal lo, PetscReal hi, PetscReal x[]);
-/* weight[k] of node k in the value at `at` of the least-squares polynomial of that degree (interpolation: n - 1, or as
-   many as there are); node `skip` is left out, its weight 0 (-1: none). */
+/* weight[k] of node k in the value at `at` of the least-squares polynomial of that degree (interpolation: n - 1), or
+   of the highest degree that the nodes allow; node `skip` is left out, with weight 0 (-1: none). */
 PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt degree, PetscInt skip, PetscReal at,
                                      PetscReal weight[]);
-/* By how much the remainder of interpolation grows from the nodes' interval to a point outside: the product of the
-   distances to the nodes over its largest value inside; 1 inside. */
+/* Growth of the interpolation remainder from the nodes' interval to a point outside: the product of the distances to
+   the nodes over its largest value inside; 1 inside. */
 PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at);
-/* Newton's form of that remainder, f[x_0 .. x_n-1, at] times a product: the product over the nodes but `skip` (-1: all)
-   of 4 |at - x| over their range, which neither grows nor falls with n where nodes are as Chebyshev's. */
+/* Newton's form of that remainder is f[x_0 .. x_n-1, at] times a product. Returns the product over the nodes except
+   `skip` (-1: all) of 4 |at - x| over their range, which neither grows nor falls with n for Chebyshev nodes. */
 PetscReal HycoPolynomialProduct(PetscInt n, const PetscReal x[], PetscInt skip, PetscReal at);
-/* How much smaller the next divided difference along `axis` is than the last, in that scale: from differences of the
-   three highest orders, the slower of their falls, 2-norms over all data; 1 where they are round-off of the data. */
+/* The ratio of the next divided difference along `axis` to the last one, in that scale, from the differences of the
+   three highest orders (the larger of their ratios); 2-norms over all data; 1 where the differences are round-off of
+   the data. */
 PetscErrorCode HycoTensorDecay(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                PetscReal *decay);
 PetscInt HycoTensorSize(const HycoTensor *t);
-/* The weights of all grid nodes; the nodes with number `skip` along `axis` left out (-1, -1: none). */
+/* The weights of all grid nodes, without those with number `skip` along `axis` (-1, -1: all). */
 PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscInt axis, PetscInt skip,
                                  PetscReal weight[]);
-/* Sets degree[axis] to the one that the leave-one-out error favours, of inner nodes where there are few, the highest
-   unless a lower one halves it; gives the error of all. */
+/* Sets degree[axis] by the leave-one-out error (of inner nodes if there are few): the highest degree, unless a lower
+   one halves the error. Returns the error of all. */
 PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                       PetscReal *error);
 
-/* Values on a grid, rows x nodes column major. Axes on which they do not depend have one node. */
+/* Values on a grid, rows x nodes column major. An axis on which they do not depend has one node. */
 typedef struct {
   HycoTensor tensor;
   PetscInt rows;
   PetscReal *data;
 } HycoGridField;
-/* The sum of the nodes' columns, each times its weight. */
+/* The sum of the nodes' columns, each multiplied by its weight. */
 PetscErrorCode HycoGridFieldSum(const HycoGridField *field, const PetscReal weight[], PetscReal value[]);
-/* All rows at `at`, the nodes with number `skip` along `axis` left out (-1, -1: none). */
+/* All rows at `at`, without the nodes with number `skip` along `axis` (-1, -1: all). */
 PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *field, const PetscReal at[], PetscInt axis, PetscInt skip,
                                      PetscReal value[]);
 

@@ -1,6 +1,6 @@
 /*
-  What differs between versions of the libraries below: the code reads as for the newest supported one, and what older
-  ones lack or spell otherwise is here. The parts for HDF5 and gmsh are for those who include its header before.
+  Differences between library versions. The code is written for the newest supported version; this file adds what older
+  ones lack or name otherwise. The parts for HDF5 and gmsh apply if their headers are included before.
 */
 #ifndef HYCOCOMPAT_H
 #define HYCOCOMPAT_H
@@ -10,21 +10,21 @@
 #if PETSC_VERSION_LT(3, 21, 0)
 #define TaoMonitorCancel TaoCancelMonitors
 #define HYCO_EDGE_WEIGHTS_ARGUMENT
-#else /* a PetscPartitioner's edges may have weights */
+#else /* edges of a PetscPartitioner can have weights */
 #define HYCO_EDGE_WEIGHTS_ARGUMENT PetscSection edge_weights __attribute__((unused)),
 #endif
 #if PETSC_VERSION_LT(3, 19, 0)
 #define PETSC_SUCCESS ((PetscErrorCode)0)
 #endif
 
-/* MPI's type of a PetscBool. */
+/* The MPI type of PetscBool. */
 #if PETSC_VERSION_LT(3, 24, 0)
 #define HYCO_MPI_BOOL MPIU_BOOL
 #else
 #define HYCO_MPI_BOOL MPI_C_BOOL
 #endif
 
-/* What a container's destructor takes, and the context in it. */
+/* Argument types of a PetscContainer's destructor and context. */
 #if PETSC_VERSION_LT(3, 23, 0)
 typedef void *HycoContained;
 #define HycoContainedContext(contained) (contained)
@@ -34,7 +34,7 @@ typedef void **HycoContained;
 #define HycoContainedContext(contained) (*(contained))
 #endif
 
-/* What PetscErrorMessage() gives. */
+/* Argument types of PetscErrorMessage(). */
 #if PETSC_VERSION_LT(3, 25, 0)
 typedef char *HycoErrorText;
 #else
@@ -56,7 +56,7 @@ typedef H5O_info_t HycoH5Info;
 
 #if defined(GMSH_API_VERSION_MAJOR) && !defined(HYCOCOMPAT_GMSH)
 #define HYCOCOMPAT_GMSH
-#if GMSH_API_VERSION_MAJOR * 100 + GMSH_API_VERSION_MINOR >= 409 /* may run the graphical interface */
+#if GMSH_API_VERSION_MAJOR * 100 + GMSH_API_VERSION_MINOR >= 409 /* one more argument */
 #define HycoGmshInitialize(initialize, ierr) initialize(0, NULL, 0, 0, ierr)
 #else
 #define HycoGmshInitialize(initialize, ierr) initialize(0, NULL, 0, ierr)

@@ -16,47 +16,49 @@
 #include <hycogalerkin.h>
 #include <hycomaterialimpl.h>
 
-/* What is tabulated. Of the n chosen cells one after the other, the columns of their unknowns. */
+/* The tabulated operators. Columns: the unknowns of the n chosen cells, one cell after the other. */
 typedef struct {
-  PetscInt n_inelastic, n_loads; /* modes */
-  PetscReal amplification;       /* 2-norm of the inverse on the chosen cells: of what the modes do not have */
+  PetscInt n_inelastic, n_loads; /* numbers of modes */
+  PetscReal amplification;       /* 2-norm of the inverse on the chosen cells: amplifies what the modes do not
+                                    represent */
   PetscReal *K;                  /* V^T K V, l x l */
-  PetscReal *inelastic, *loads;  /* l x (n nv dim) column major: their inelastic forces and loads to those on V */
+  PetscReal *inelastic, *loads;  /* l x (n nv dim) column major: map the cells' inelastic forces and loads to those
+                                    tested by V */
 } HycoCondensedTable;
 
 typedef struct _n_HycoCondensedPath {
   struct _n_HycoGalerkin galerkin;
   HycoCondensedTable table;
-  /* online */
-  PetscReal *Ke, *heat; /* by cell: elastic stiffness (nv dim square); what its thermal strains push (nv dim) */
+  /* online data */
+  PetscReal *Ke, *heat; /* by cell: elastic stiffness (nv dim square); force of its thermal strains (nv dim) */
   PetscReal *weight;    /* by cell: 2-norm of its columns of the inelastic forces */
 } * HycoCondensedPath;
 
-/* Its training, in the reducer's data beside that of the condensed model without a history. */
+/* Its training, stored in the reducer's data beside that of the condensed model without a history. */
 typedef struct {
   PetscReal tol;            /* of the inelastic modes */
-  PetscInt cells;           /* chosen for each of these; 0: every cell there is */
-  HycoCondensedTable table; /* of t->seeds_cell, ascending; every rank */
+  PetscInt cells;           /* chosen for each mode; 0: all cells */
+  HycoCondensedTable table; /* ordered as t->seeds_cell, ascending; every rank */
 } HycoCondensingPath;
 
-/* Whether a cell's body may flow. */
+/* Whether a cell's body may deform inelastically. */
 static inline PetscBool HycoCondensedFlows(HycoFE fe, PetscInt cell)
 {
   return (PetscBool)!fe->scene->body[fe->mesh->cell_body[cell]].law->linear;
 }
-/* The load of a cell from its supports and heat, K_e u0_e - heat_e by fe's elastic tangents (load: nv x dim); heat_e
-   (NULL: not asked for). */
+/* The load of a cell from its supports and heat, K_e u0_e - heat_e, with fe's elastic tangents (load: nv x dim);
+   heat_e (NULL: not wanted). */
 PetscErrorCode HycoCondensedCellLoad(HycoFE fe, PetscInt cell, PetscReal load[], PetscReal heat[]);
-/* The inelastic force of a cell in a state at u (q: nv x dim), 0 where it is round-off; Ke, heat: its own; the largest
-   of the sums of sizes that it is a difference of (NULL: not asked for). */
+/* The inelastic force of a cell in a state at u (q: nv x dim), 0 where it is round-off; Ke, heat: of the cell; the
+   largest sum of magnitudes of the terms it is the difference of (NULL: not wanted). */
 PetscErrorCode HycoCondensedCellForce(HycoFE fe, PetscInt cell, const PetscReal Ke[], const PetscReal heat[],
                                       const PetscReal u[], HycoFEState state, PetscReal q[], PetscReal *summands);
 
-/* Makes a model of the type condensed one of paths: its ops, traits and data; training: a prototype. */
+/* Turns a model of type condensed into one of paths: its ops, traits and data; training: a prototype. */
 PetscErrorCode HycoCondensedTakePath(HycoROM model);
 PetscErrorCode HycoCondensedTableFree(HycoCondensedTable *table);
 
-/* The training's part of the ops (condense_path.c). */
+/* Implementations of the training ops (condense_path.c). */
 PetscErrorCode HycoCondensedPathBegin(HycoReducer reducer);
 PetscErrorCode HycoCondensedPathModes(HycoReducer reducer, HycoSnapshots store);
 

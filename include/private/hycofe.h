@@ -1,6 +1,7 @@
 /*
   HycoFE: the scene on one mesh at one parameter value. It moves the nodes, fixes the supports, evaluates materials and
-  loads, and assembles K, F, B, D, stresses and norms over the cells it has: the whole mesh, a rank's part, or the RID.
+  loads, and assembles K, F, B, D, stresses and norms over the cells of its mesh: the whole mesh, a rank's part, or the
+  RID.
 */
 #ifndef HYCOFE_H
 #define HYCOFE_H
@@ -20,30 +21,30 @@ typedef struct {
 const HycoElement *HycoElementGet(HycoCellType type);
 /* The facet of a cell type: a point, a line of two or three nodes, tri3 or tri6, quad4, quad8 or quad9. */
 const HycoElement *HycoElementGetFacet(HycoCellType type);
-/* The same with the nodes in place of the quadrature points, of weight 1; of second order but hex20, which no contact
-   has; else NULL. */
+/* The same with the nodes as quadrature points, of weight 1; for facets of second order, except those of hex20,
+   which contacts do not support; else NULL. */
 const HycoElement *HycoElementGetFacetNodes(HycoCellType type);
 
 #define HYCO_MAX_CELL_DOFS (3 * HYCO_CELL_NODES)
-/* Of a cell with tied nodes: HycoMeshCellNodes(). */
+/* For a cell with tied nodes: HycoMeshCellNodes(). */
 #define HYCO_MAX_CELL_UNKNOWNS (3 * HYCO_MAX_CELL_NODES)
 
 typedef struct _n_HycoFE *HycoFE;
 typedef struct _n_HycoAssemblyMap *HycoAssemblyMap;
 typedef struct _n_HycoSprings *HycoSprings;
 
-/* What a uniform load gives to the nodes that carry it. */
+/* Nodal forces of a uniform load on a surface. */
 typedef struct {
-  PetscBool ready; /* for the nodes as they are */
+  PetscBool ready; /* computed for the current nodes */
   PetscInt n, *node;
-  PetscReal *share; /* n x 4: the sum of n dS, of dS */
+  PetscReal *share; /* n x 4: sums of n dS (3) and of dS at each node */
 } HycoLoadShares;
 
-/* A support along a direction, which takes the place of u_c: u_c = u0 + sum of a_d u_d at a node (oblique.c). */
+/* A support along a direction, which eliminates u_c: u_c = u0 + sum of a_d u_d at a node (oblique.c). */
 typedef struct {
-  PetscInt node, c, support; /* of the scene */
-  PetscReal a[3];            /* 0 at c, and at others that take a place */
-  PetscReal n[3];            /* its direction, of unit length */
+  PetscInt node, c, support; /* support: index in the scene */
+  PetscReal a[3];            /* 0 at c, and at other eliminated components */
+  PetscReal n[3];            /* unit vector of the direction */
 } HycoOblique;
 
 struct _n_HycoFE {
@@ -53,58 +54,59 @@ struct _n_HycoFE {
   /* sizes: space dimension, n_nodes * dim, stress components */
   PetscInt dim, n_dof, n_sigma;
   HycoFormulation formulation; /* in 1D and 3D HYCO_PLANE_STRAIN */
-  /* what no parameter reaches */
-  PetscBool *constant; /* by cell: neither its nodes nor its material */
+  /* what no parameter changes */
+  PetscBool *constant; /* by cell: neither its nodes nor its material change */
   PetscInt n_constant;
-  PetscBool fixed_constant; /* the supports' values, and the nodes that they hold */
-  PetscBool *bbar;          /* by body: the dilatation is the cells' mean */
+  PetscBool fixed_constant; /* the supports' values and nodes do not change */
+  PetscBool *bbar;          /* by body: mean dilatation of each cell (B-bar) */
   signed char *drawn_sign;  /* by cell: the sign of its volume in the mesh file's coordinates */
-  /* of a cubature (borrowed; set before anything is assembled): how often each cell's integrals count; NULL: once.
-     all_facets: loads act on facets whose cell the mesh does not have, too (2D, 3D) */
+  /* for a cubature (borrowed; set before anything is assembled): weight of each cell's integrals; NULL: 1.
+     all_facets: loads also act on facets whose cell is not in the mesh (2D, 3D) */
   const PetscReal *cell_weight;
   PetscBool all_facets;
   /* kept from one parameter value to the next */
-  HycoAssemblyMap places; /* of the entries of K; made by the second assembly into it */
+  HycoAssemblyMap places; /* positions of the element entries in K; created by the second assembly */
   PetscInt n_loads;
   HycoLoadShares *shares; /* n_loads: by load of the scene */
-  /* -hyco_regularise: unknowns held beside the scene's supports; the motions (n_turned x n_dof, orthonormal) that the
-     contacts' normals are turned to leave alone */
+  /* -hyco_regularise: unknowns fixed in addition to the scene's supports; the motions (n_turned x n_dof,
+     orthonormal) that the contacts' normals are turned not to resist */
   PetscInt n_pins, *pin, n_turned;
   PetscReal *released;
-  /* the parameters, and what the last HycoFESetParameters changed */
+  /* the parameters, and what the last HycoFESetParameters() changed */
   PetscBool ready;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscBool stiffness_changed, contact_changed;
-  PetscBool gap_changed; /* the contacts' gaps, or what the supports take from them */
+  PetscBool gap_changed; /* the gaps of the contacts, or the supports' contribution to them, have changed */
   /* geometry at mu */
   PetscReal *X;         /* n_nodes x 3, moved nodes */
-  PetscBool *mirrored;  /* by body: its map is a mirror image */
-  PetscInt place;       /* of the nodes: a number that no other place has, on this process */
-  PetscReal *kept;      /* by point, nv x 3 gradients and the weight at kept_place: HycoFEKeepGradients(); or NULL */
-  PetscReal *kept_mean; /* the same by cell of the mean gradients, nv x 3; NULL: no body is bbar */
+  PetscBool *mirrored;  /* by body: its map reverses orientation */
+  PetscInt place;       /* of the nodes: a number that is unique on this process for each position of the nodes */
+  PetscReal *kept;      /* gradients (nv x 3) and weight of each point, computed at kept_place:
+                           HycoFEKeepGradients(); or NULL */
+  PetscReal *kept_mean; /* mean gradients of each cell, nv x 3; NULL: no body uses bbar */
   PetscInt kept_place;
   /* supports at mu */
   PetscBool *fixed; /* n_dof */
-  PetscReal *u0;    /* n_dof, prescribed displacement, 0 where free; of an oblique support the offset */
-  PetscInt n_oblique, room_oblique, *oblique_at; /* by dof: which, or -1; only with n_oblique */
+  PetscReal *u0;    /* n_dof: prescribed displacement, 0 where free; the offset of an oblique support */
+  PetscInt n_oblique, room_oblique, *oblique_at; /* by dof: index in oblique, or -1; allocated if n_oblique > 0 */
   HycoOblique *oblique;
-  PetscBool lifted; /* whether any of u0 is not 0 */
-  PetscBool plain; /* matrices are those of the displacements: neither oblique supports nor ties take a place in them */
+  PetscBool lifted; /* whether any entry of u0 is not 0 */
+  PetscBool plain;  /* matrices are those of the displacements: oblique supports and ties are not eliminated */
   /* temperature and thermal strain at mu, by cell and integration point; NULL: no body has a temperature */
   PetscReal *temperature, *thermal;
   /* tangents at mu: those of cell e from tangent_start[e], tangent_size[body] reals for each of its points */
   PetscReal *tangent;
   PetscInt *tangent_start, *tangent_size;
-  HycoSprings springs; /* at mu; NULL: the scene has none */
+  HycoSprings springs; /* at mu; NULL: the scene has no springs */
 };
 
-/* Of a body's cells: whether their tangents are Lame's lambda and mu, or else n_sigma x n_sigma. */
+/* Whether the tangents of a cell's body are Lame's lambda and mu, or else n_sigma x n_sigma. */
 static inline PetscBool HycoFEIsIsotropic(HycoFE fe, PetscInt cell)
 {
   return (PetscBool)(fe->tangent_size[fe->mesh->cell_body[cell]] == 2);
 }
 
-/* The unknowns of the whole mesh, where fe's is a part or a surface of it. */
+/* The number of unknowns of the whole mesh, also where fe's mesh is a part or a surface of it. */
 static inline PetscInt HycoFEUnknowns(HycoFE fe)
 {
   return fe->mesh->n_whole_nodes ? fe->mesh->n_whole_nodes * fe->dim : fe->n_dof;
@@ -112,24 +114,24 @@ static inline PetscInt HycoFEUnknowns(HycoFE fe)
 
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
-/* For who comes to the same nodes again and again, as a path does: the shape functions' gradients are kept until the
-   nodes move. */
+/* Keeps the gradients of the shape functions until the nodes move: for paths, which evaluate the same nodes many
+   times. */
 PetscErrorCode HycoFEKeepGradients(HycoFE fe);
-/* Puts the nodes where the file has them; for geometry alone. */
+/* Puts the nodes at their coordinates in the mesh file; for geometry only. */
 PetscErrorCode HycoFESetDrawn(HycoFE fe);
-/* Fails for a cell without volume as drawn. */
+/* Fails for a cell whose volume in the mesh file is zero. */
 PetscErrorCode HycoMeshCheckCells(HycoMesh mesh);
-/* After HycoFESetParameters() on parts of a mesh: which bodies are mirrored is the same on all; fails where a map folds
-   a body between them. Collective. */
+/* After HycoFESetParameters() on the parts of a mesh: makes the mirrored bodies the same on all ranks. Fails if a
+   map folds a body across parts. Collective. */
 PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe);
-/* Brings everything to mu (length scene->n_variables), touching only what depends on what changed. */
+/* Updates everything to mu (length scene->n_variables); recomputes only what depends on the parameters that changed. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[]);
-/* What the parameters p with changed[p] reach: the bodies' maps, K, the rows of B, the gaps. */
+/* What the parameters p with changed[p] affect: the bodies' maps, K, the rows of B, the gaps. */
 typedef struct {
   PetscBool nodes, stiffness, rows, gaps;
 } HycoChanges;
 HycoChanges HycoSceneChanges(HycoScene scene, const PetscBool changed[]);
-/* Which parameters (room for n_parameters) reach the stiffness or the contacts' rows. */
+/* Which parameters (room for n_parameters) affect the stiffness or the contacts' rows. */
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[]);
 
 /* A rigid motion of one connected part of the mesh: t + omega x (X - centre) / size. */
@@ -138,7 +140,7 @@ typedef struct {
   PetscReal centre[3], size, rigid[6]; /* translations (dim), then rotations (2D: 1, 3D: 3) */
 } HycoRigid;
 
-/* Rigid motions that the supports leave free, an orthonormal basis of the kernel of K. */
+/* Rigid motions that the supports leave free: an orthonormal basis of the null space of K. */
 typedef struct {
   PetscInt n;
   PetscReal *motion;       /* n x n_dof, zero where fixed */
@@ -147,71 +149,75 @@ typedef struct {
   HycoRigid *rigid;        /* n */
 } HycoMotions;
 
-/* Holds the unknowns `component` of the nodes with these tags (those that this mesh has) beside the scene's supports,
-   in place of the last ones; n = 0: none. */
+/* Fixes the unknowns `component` of the nodes with these tags (those that this mesh has) in addition to the scene's
+   supports, and replaces the previous ones; n = 0: none. */
 PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const PetscInt component[]);
-/* Finds them on the mesh of which each process has a part; motion: of the part's unknowns. Collective. */
+/* Finds them on the distributed mesh; motion: of the unknowns of this process's part. Collective. */
 PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions);
 PetscErrorCode HycoMotionsDestroy(HycoMotions *motions);
 /* "body B from moving along ..." for the combination of motions with these coefficients. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE]);
 
-/* Element stiffness of a cell, row major, nodes outer, components inner: of its body alone, for displacements, nv * dim
-   square; with the springs on it, of the unknowns, which oblique supports and ties make others: of the nodes that
-   HycoMeshCellNodes() gives (room for HYCO_MAX_CELL_UNKNOWNS square). */
+/* Element stiffness of a cell, row major, nodes outer, components inner. HycoFEBodyStiffness(): of its body only,
+   for displacements, nv * dim square. HycoFEElementStiffness(): with its springs, of the unknowns after oblique
+   supports and ties are eliminated, at the nodes that HycoMeshCellNodes() returns (room for HYCO_MAX_CELL_UNKNOWNS
+   square). */
 PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 
-/* An empty, preallocated AIJ matrix for K or a norm over the nodes `n_owned` from `first` of the distributed numbering.
- */
+/* Creates an empty, preallocated AIJ matrix for K or a norm over the nodes `n_owned` from `first` of the distributed
+   numbering. */
 PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, PetscInt first, Mat *A);
-/* K (11): rows and columns of fixed unknowns hold only their own diagonal. Local values only: no communication but the
-   assembly's. */
+/* K (11): rows and columns of fixed unknowns have only their own diagonal. Sets local values only; the assembly
+   alone communicates. */
 PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K);
-/* F (12), with the lifting of the prescribed displacements: K u0 moved to the right, F_i = K_ii u0_i where fixed; and
-   with what the thermal strains push, unless the scene has a history (HycoFEStep() has it in f_int). */
+/* F (12), with the lifting of the prescribed displacements: K u0 moved to the right-hand side, F_i = K_ii u0_i where
+   fixed; and with the forces of thermal strains, unless the scene has a history (HycoFEStep() then has them in
+   f_int). */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
-/* Of supports along a direction: the one in the place of an unknown, or NULL. Of these and of ties: brings
-   displacements to be what they are at these places (u: n_dof); nodal forces to be those of the unknowns, T^T f. All at
-   fe's parameters. */
+/* For supports along a direction: the support that eliminates an unknown, or NULL. For these and for ties: sets the
+   eliminated displacements from the others (u: n_dof); transforms nodal forces to those of the unknowns, T^T f. All
+   at fe's parameters. */
 const HycoOblique *HycoFEOblique(HycoFE fe, PetscInt dof);
 void HycoFEComplete(HycoFE fe, PetscReal u[]);
 void HycoFEGeneralise(HycoFE fe, PetscReal f[]);
-/* Of ties alone: nodal forces of tied nodes pass to what they follow, and none is left at them. */
+/* For ties only: adds nodal forces of tied nodes to their masters, and sets them to 0 at the tied nodes. */
 void HycoFEPassTied(HycoFE fe, PetscReal f[]);
-/* Whether a support fixes an unknown, not a tie. */
+/* Whether a support (not a tie) fixes an unknown. */
 static inline PetscBool HycoFESupports(HycoFE fe, PetscInt dof)
 {
   return (PetscBool)(fe->fixed[dof] && HycoMeshTied(fe->mesh, dof / fe->dim) < 0);
 }
-/* The loads at all of fe's unknowns (n_dof; a part has all of its own nodes'), fixed ones too, without lifting. */
+/* The loads on all of fe's unknowns (n_dof; complete on the nodes that a part owns), fixed ones too, without
+   lifting. */
 PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[]);
-/* The forces of supports on the fixed unknowns (r: n_dof, 0 at the others; right at the nodes that this process owns):
-   f_int less the loads, where no contact presses. f_int: NULL: K u. Of an oblique support the component c of its
-   force, whose others are -a_d times that. */
+/* The forces of supports on the fixed unknowns (r: n_dof, 0 at the others; valid at the nodes that this process
+   owns): f_int minus the loads, where no contact presses. f_int: NULL: K u. For an oblique support, the component c
+   of its force; the others are -a_d times it. */
 PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[]);
-/* The norm matrix of H1: mass plus length^2 times gradient, fixed unknowns as in K. The length, of the whole mesh
-   (HycoMeshLength()), keeps the norm the same in any unit; it is 1 in the paper's section 6. */
+/* The norm matrix of H1: mass plus length^2 times gradient, fixed unknowns as in K. The length is that of the whole
+   mesh (HycoMeshLength()), so that the norm does not depend on the unit; it is 1 in the paper's section 6. */
 PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 
-/* Stress of u (n_dof, local order) by the elastic tangents, without the thermal strain's, averaged over each cell:
-   sigma n_cells x n_sigma. */
+/* Stress of u (n_dof, local order) from the elastic tangents, without the stress of thermal strain, averaged over
+   each cell: sigma n_cells x n_sigma. */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
 /* The volumes of the cells, of the full circle in an axisymmetric scene. */
 PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[]);
-/* What the body forces give to a cell's unknowns (f: nv x dim, added to). */
+/* Adds the nodal forces of body forces to a cell's unknowns (f: nv x dim). */
 PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal f[]);
 /* Elastic energy of each cell: 1/2 u^T K u without thermal strains and springs. */
 PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[]);
-/* What the energy identity of a linear scene has beside F.u where there is thermal strain e, of each cell: the integral
-   of e : C : (e - 2 eps(u)). */
+/* The terms of the energy identity of a linear scene that thermal strain e adds to F.u, by cell: the integral of e :
+   C : (e - 2 eps(u)). */
 PetscErrorCode HycoFEHeatWork(HycoFE fe, const PetscReal u[], PetscReal work[]);
 
-/* Springs to the ground (springs.c), at fe's parameters: f += scale (-K u), what they do to the unknowns (n_dof; a part
-   has all of its own nodes'); their energy u^T K u / 2, of those that count on this process. */
+/* Springs to the ground (springs.c), at fe's parameters: f += scale (-K u), their forces on the unknowns (n_dof;
+   complete on the nodes that a part owns); their energy u^T K u / 2, of the springs that this process counts. */
 void HycoSpringsAddForces(HycoFE fe, PetscReal scale, const PetscReal u[], PetscReal f[]);
 PetscReal HycoSpringsEnergy(HycoFE fe, const PetscReal u[]);
-/* Each that counts on this process: its number in the scene, its n nodes, its matrix (n dim square, row major). */
+/* Visits each spring that this process counts: its number in the scene, its n nodes, its matrix (n dim square, row
+   major). */
 typedef PetscErrorCode (*HycoSpringVisit)(HycoFE fe, PetscInt spring, PetscInt n, const PetscInt node[],
                                           const PetscReal K[], void *ctx);
 PetscErrorCode HycoSpringsVisit(HycoFE fe, HycoSpringVisit visit, void *ctx);

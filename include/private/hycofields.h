@@ -1,4 +1,4 @@
-/* Fields on a mesh, written to HDF5 with the XDMF that ParaView opens, or as VTKHDF. */
+/* Fields on a mesh, written to HDF5 with an XDMF file for ParaView, or as VTKHDF. */
 #ifndef HYCOFIELDS_H
 #define HYCOFIELDS_H
 
@@ -7,44 +7,45 @@
 
 typedef struct {
   const char *name;
-  HycoPlace place;     /* of a mesh that one process has, a surface's nodes are its nodes */
+  HycoPlace place;     /* if one process has the mesh, a surface's nodes are its nodes */
   PetscInt components; /* 1, 3 (vector) or 6 (symmetric tensor xx, xy, xz, yy, yz, zz) */
   const PetscReal *data;
-  PetscReal missing; /* of a surface: at the nodes off it */
+  PetscReal missing; /* for a surface: value at the nodes that are not on it */
 } HycoField;
 
-/* Values by node or cell (n, of `components` numbers each) as this rank's rows in the file's order, `missing` where no
-   process has any; without an order, `value` itself: else the caller frees them by PetscFree(). Collective. */
+/* Converts values by node or cell (n, of `components` numbers each) to this rank's rows in the file's order,
+   `missing` where no process has a value. Without an order, returns `value` itself; otherwise the caller frees them
+   by PetscFree(). Collective. */
 PetscErrorCode HycoFieldRows(const HycoFileOrder *order, PetscInt n, HycoPlace place, MPI_Datatype type,
                              PetscInt components, const void *value, PetscReal missing, void **rows);
-/* Writes `components` numbers, of type MPIU_REAL or MPIU_INT, of each node or cell in the file's order, as a set of
-   cols columns. Collective with an order; without one this process has all n of them. */
+/* Writes `components` numbers, of type MPIU_REAL or MPIU_INT, of each node or cell in the file's order, as a dataset
+   of cols columns. Collective with an order; without one this process has all n of them. */
 PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
                               MPI_Datatype type, PetscInt components, PetscInt cols, const void *value);
-/* The same of a field's data; n nodes or cells. */
+/* The same for a field's data; n nodes or cells. */
 PetscErrorCode HycoFieldWriteData(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[],
                                   const HycoField *field);
 
 /* Stress of cells (n_cells x ns: xx, yy, zz, xy, yz, xz) in XDMF's order xx, xy, xz, yy, yz, zz. */
 void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[]);
-/* Of the same stresses: von Mises' (n_cells), the principal ones (n_cells x 3), the largest first. */
+/* For the same stresses: von Mises stress (n_cells), the principal stresses (n_cells x 3), the largest first. */
 PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal sigma[], PetscReal mises[],
                                     PetscReal principal[]);
 
-/* Nodes at X, tags, the cells with their nodes' places in the whole mesh, as sets of a group of the file; vtk: a cell's
-   nodes stand in VTK's order, which is XDMF's too, else in gmsh's. Collective with an order. */
+/* Writes nodes at X, tags, and the cells with their nodes' places in the whole mesh, as datasets of a group of the
+   file; vtk: nodes of a cell in VTK's order, which is XDMF's too, else in gmsh's. Collective with an order. */
 PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char group[], const HycoFileOrder *order, HycoMesh mesh,
                                    const PetscReal X[], PetscBool vtk);
-/* Stress of cells (n_cells x n_sigma) at nodes: the mean over the cells around a node, by volume, of one body; where
-   bodies share nodes, of the first of them. Right at the process's own nodes, all of whose cells it has. As tensors of
-   XDMF's order (n_nodes x 6), with von Mises' value (n_nodes). */
+/* Stress at nodes from that of cells (n_cells x n_sigma): the mean over the cells around a node, weighted by volume,
+   of one body; where bodies share nodes, of the first one. Valid at the nodes that the process owns, all of whose
+   cells it has. As tensors in XDMF's order (n_nodes x 6), with von Mises stress (n_nodes). */
 PetscErrorCode HycoNodalStress(HycoFE fe, const PetscReal sigma[], PetscReal tensor[], PetscReal mises[]);
-/* The cells alone, as a set of cols columns. */
+/* Writes only the cells, as a dataset of cols columns. */
 PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileOrder *order, HycoMesh mesh,
                                     PetscBool vtk, PetscInt cols);
-/* The fields of a solution's contacts by node of their mesh (vector on slaves, minus on masters), gaps and slaves' tags
-   by contact; filled on rank 0, where the contacts are (surface NULL elsewhere). Collective; to be destroyed after an
-   error too. */
+/* The fields of a solution's contacts by node of their mesh (vector on slaves, negative on masters), gaps and
+   slaves' tags by contact; filled on rank 0, where the contacts are (surface NULL elsewhere). Collective; must be
+   destroyed after an error too. */
 typedef struct {
   PetscReal *force, *pressure, *gap_node, *gap, *normal, *area;
   PetscInt *slave_id;
@@ -52,18 +53,17 @@ typedef struct {
 PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
                                        const PetscReal lambda[], HycoContactFields *fields);
 PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *fields);
-/* The file of numbers of an output: PATH.h5 of PATH.xdmf, PATH.vtkhdf itself; fails for other endings. */
+/* The file of an output that has the numbers: PATH.h5 for PATH.xdmf, PATH.vtkhdf itself; fails for other endings. */
 PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_LEN]);
-/* Fails for other endings too, and where a model or a snapshot is in the place of the numbers. On this process alone.
- */
+/* Fails for other endings, and if a model or a snapshot would be overwritten. On this process alone. */
 PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /*
   A file of fields on one mesh (src/output/field_file.c): PATH.xdmf and PATH.h5, or PATH.vtkhdf, which ParaView, VTK and
-  pyvista open. Of one solution (most = 0), or of at most `most` times, or points of a set. Open begins it anew with the
-  mesh at X; then Add writes fields: of times between BeginTime and EndTime, of points between BeginPoint, which has a
-  mesh and parameters of its own, and EndTime. Commit puts it in its place; the text of an .xdmf is made then. Order,
-  mesh and scene are borrowed. All are collective on comm.
+  pyvista open. It has one solution (most = 0), or at most `most` times or points of a set. Open creates it with the
+  mesh at X; Add writes fields: those of a time between BeginTime and EndTime, those of a point between BeginPoint,
+  which has a mesh and parameters of its own, and EndTime. Commit renames it to its final name, and writes the text of
+  an .xdmf. Order, mesh and scene are borrowed. All are collective on comm.
 */
 #define HYCO_MOST_FIELDS 32
 typedef struct _n_HycoFieldFile *HycoFieldFile;
@@ -71,9 +71,9 @@ struct _n_HycoFieldFile {
   MPI_Comm comm;
   char path[PETSC_MAX_PATH_LEN], h5_path[PETSC_MAX_PATH_LEN];
   PetscBool vtk;
-  PetscInt most, n;           /* times: at most, so far */
+  PetscInt most, n;           /* times: at most, written so far */
   PetscBool points;           /* each with a mesh and parameters of its own */
-  PetscReal *t, *mu;          /* mu: n_parameters, of points each */
+  PetscReal *t, *mu;          /* mu: n_parameters, for each point */
   const HycoFileOrder *order; /* NULL: this process has all */
   HycoMesh mesh;
   HycoScene scene;
@@ -89,25 +89,26 @@ PetscErrorCode HycoFieldFileOpen(HycoFieldFile file, const HycoFileOrder *order,
 PetscErrorCode HycoFieldFileBeginTime(HycoFieldFile file, PetscReal t);
 PetscErrorCode HycoFieldFileBeginPoint(HycoFieldFile file, const PetscReal X[], const PetscReal mu[]);
 PetscErrorCode HycoFieldFileAdd(HycoFieldFile file, const HycoField *field);
-/* The same of rows in the file's order. */
+/* The same for rows in the file's order. */
 PetscErrorCode HycoFieldFileAddRows(HycoFieldFile file, const HycoField *field, const PetscReal rows[]);
 PetscErrorCode HycoFieldFileEndTime(HycoFieldFile file);
 PetscErrorCode HycoFieldFileCommit(HycoFieldFile file);
 PetscErrorCode HycoFieldFileDestroy(HycoFieldFile *file);
-/* All nodes or cells. Not collective. */
+/* Number of all nodes or cells. Not collective. */
 PetscInt HycoFieldFileCount(HycoFieldFile file, HycoPlace place);
-/* "step-0003/nodes/displacement": a field of time k in the .h5. */
+/* "step-0003/nodes/displacement": name of a field of time k in the .h5. */
 void HycoFieldName(const HycoField *field, PetscInt k, char name[HYCO_LINE]);
-/* The parts of a .vtkhdf (src/output/vtkhdf.c): the mesh, the nodes of a point, the last field of the current time with
-   the name of its set, the times. Collective. */
+/* The parts of a .vtkhdf (src/output/vtkhdf.c): the mesh, the nodes of a point, the last field of the current time
+   with the name of its dataset, the times. Collective. */
 PetscErrorCode HycoVTKWriteMesh(HycoFieldFile file, const PetscReal X[]);
 PetscErrorCode HycoVTKWritePoints(HycoFieldFile file, const PetscReal X[]);
 PetscErrorCode HycoVTKWriteField(HycoFieldFile file, const HycoField *field, const PetscReal rows[],
                                  char set[HYCO_LINE]);
 PetscErrorCode HycoVTKWriteTimes(HycoFieldFile file);
 
-/* A solution: u on fe, u_surface on the mesh of the pairs. With an order, of parts of a mesh, they are the part's and
-   rank 0's (elsewhere `surface` is NULL); NULL: this process has all. rid: marks cells, or NULL. Borrowed. */
+/* A solution: u on fe, u_surface on the mesh of the pairs. With an order, u is that of this rank's part, and the
+   surface is on rank 0 (elsewhere `surface` is NULL); order NULL: this process has everything. rid: marks cells, or
+   NULL. Borrowed. */
 typedef struct {
   const HycoFileOrder *order;
   HycoFE fe, surface;
@@ -116,13 +117,13 @@ typedef struct {
 } HycoSolution;
 
 /*
-  Writes `path` (HycoFieldFile): displacement, of each cell stress, von Mises stress, principal stresses and body, at
-  nodes the mean stress of the cells around, contact force (vector on slaves, minus on masters), contact pressure, gap
-  at the solution (NaN at nodes without a contact, or whose contact faces nothing), RID marker, and in an .h5 the
+  Writes `path` (HycoFieldFile): displacement; for each cell stress, von Mises stress, principal stresses and body; at
+  nodes the mean stress of the cells around, contact force (vector on slaves, negative on masters), contact pressure,
+  gap at the solution (NaN at nodes without a contact, or whose contact faces no master), RID marker; in an .h5 the
   parameters and the contact table. Collective with an order.
 */
 PetscErrorCode HycoSolutionWrite(const char path[], const HycoSolution *solution);
-/* The same into a file of a set of points, one solution after the other. */
+/* Adds the same to a file of a set of points, one solution after the other. */
 PetscErrorCode HycoSolutionAdd(HycoFieldFile file, const HycoSolution *solution);
 
 #endif

@@ -1,4 +1,4 @@
-/* HycoFOM, inside. */
+/* HycoFOM's struct and internal functions. */
 #ifndef HYCOFOMIMPL_H
 #define HYCOFOMIMPL_H
 
@@ -6,7 +6,7 @@
 #include <hycofom.h>
 #include <hycosolverimpl.h>
 
-/* Most rigid motions that -hyco_regularise releases. */
+/* The most rigid motions that -hyco_regularise releases. */
 #define HYCO_MAX_PINS 12
 
 typedef struct _n_HycoPath *HycoPath;
@@ -20,7 +20,8 @@ struct _p_HycoFOM {
   DM dm; /* over the ranks */
   char mesh_write[PETSC_MAX_PATH_LEN];
   HycoMesh part;     /* each rank's cells */
-  HycoMesh surface;  /* rank 0: nodes and facets of the contacts' groups (of a line all); the part on one rank */
+  HycoMesh surface;  /* rank 0: nodes and facets of the contacts' groups (of a 1D mesh all); on one rank the part
+                        itself */
   HycoFE fe;         /* on the part */
   HycoFE fe_surface; /* on the surface, rank 0 (the same as fe on one rank); NULL elsewhere */
   HycoPairs pairs;   /* rank 0, of the surface's nodes */
@@ -30,95 +31,95 @@ struct _p_HycoFOM {
   Vec U, Lambda, F, D;
   PetscInt n_nodes, n_cells, n_contacts, n_free;   /* of the whole mesh, on every rank */
   PetscInt width;                                  /* most nodes of a contact, on every rank */
-  PetscBool searches;                              /* the masters of moved surfaces, anew where they are */
+  PetscBool searches;                              /* the scene has moved surfaces, whose masters are searched anew */
   VecScatter to_local, to_surface, lambda_to_root; /* to_surface: NULL on one rank */
   Vec U_local, U_surface, lambda_root;
-  HycoFileOrder *rows; /* NULL on one rank, and until it is needed */
-  /* the last solution: displacements at the part's nodes and at the surface's (rank 0), without motions that were
-     released; stresses of the part's cells, when asked for; on rank 0 the forces and gaps */
+  HycoFileOrder *rows; /* NULL on one rank, and until it is first used */
+  /* the last solution: displacements at the part's nodes and at the surface's (rank 0), without released motions;
+     stresses of the part's cells, on request; on rank 0 the forces and gaps */
   PetscReal *u, *u_surface, *sigma, *lambda, *gap;
   struct _n_HycoFieldFile *set;      /* HycoFOMWriteBegin() */
-  HycoContactResult *contact_result; /* by contact of the scene, when asked for */
+  HycoContactResult *contact_result; /* by contact of the scene, on request */
   HycoReaction *reaction;            /* HycoFOMGetReactions() */
-  PetscReal *u_all, *sigma_all;      /* on rank 0 when asked for, in the file's order; on one rank u and sigma */
+  PetscReal *u_all, *sigma_all;      /* on rank 0, on request, in the file's order; on one rank u and sigma */
   PetscBool solved, sigma_ready, all_ready;
-  /* U under given forces: its factor of K; residuals of the whole of (16); whether the last solution is one */
+  /* U under given forces: its factor of K; residuals of the whole of (16); whether it is the last solution */
   HycoSystem given_system;
   HycoSolver given_solver;
   Vec given_F;
   HycoKKT given_kkt;
   PetscBool given;
-  /* -hyco_regularise: motions that nothing holds, orthonormal, and the unknowns pinned for them, by tag and component
-   */
-  PetscBool regularise, pinned; /* pinned: the pins are chosen */
+  /* -hyco_regularise: unconstrained rigid motions, orthonormal, and the unknowns pinned for them, by tag and
+     component */
+  PetscBool regularise, pinned; /* pinned: the pins have been chosen */
   PetscReal regularise_tol;
   PetscInt partition; /* index in HycoPartitioners */
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
-  PetscInt n_turned; /* of released: those that the contacts' normals are turned for */
+  PetscInt n_turned; /* number of released motions for which the contacts' normals are turned */
   Vec *released;
   HycoPath path;         /* of a scene with a history, else NULL */
-  HycoCompared compared; /* what comparisons with a reduced model keep (errors/compare.c); NULL: none yet */
+  HycoCompared compared; /* data kept by comparisons with a reduced model (errors/compare.c); NULL: none yet */
   HycoSummary summary;
 };
 
 /* NULL-safe. */
 PetscErrorCode HycoComparedDestroy(HycoCompared *compared);
-/* A model that has its mesh, contacts and tables alone: for training, which reads solutions of others. Collective. */
+/* A model that has only its mesh, contacts and tables: for training, which reads stored solutions. Collective. */
 PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom);
-/* group[g]: whether a contact of the scene is on it; the others are left alone. */
+/* Sets group[g] for the groups with a contact of the scene; leaves the others unchanged. */
 PetscErrorCode HycoMarkContactGroups(HycoScene scene, HycoMesh mesh, PetscBool group[]);
-/* Brings fe and fe_surface to mu. Collective. */
+/* Updates fe and fe_surface to mu. Collective. */
 PetscErrorCode HycoFOMSetParameters(HycoFOM fom, const PetscReal mu[]);
 /* K, F, B, D at mu, in the system. Collective. */
 PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);
 /* After a solve: u, u_surface and lambda of U and Lambda. Collective. */
 PetscErrorCode HycoFOMGather(HycoFOM fom);
-/* A vector's values at the part's nodes; at the surface's, on rank 0. Collective. */
+/* A vector's values at the part's nodes; at the surface's nodes, on rank 0. Collective. */
 PetscErrorCode HycoFOMToLocal(HycoFOM fom, Vec v, PetscReal value[]);
 PetscErrorCode HycoFOMToSurface(HycoFOM fom, Vec v, PetscReal value[]);
-/* The stresses of the last solution in sigma. Collective. */
+/* Computes the stresses of the last solution in sigma. Collective. */
 PetscErrorCode HycoFOMStress(HycoFOM fom);
 /* The scene's quantities of the last solution (value[scene->n_quantities]). Collective. */
 PetscErrorCode HycoFOMMeasureQuantities(HycoFOM fom, PetscReal value[]);
-/* The file's order, spread over the ranks; NULL on one. Borrowed. Collective. */
+/* The file's order, distributed over the ranks; NULL on one rank. Borrowed. Collective. */
 PetscErrorCode HycoFOMGetRows(HycoFOM fom, const HycoFileOrder **rows);
-/* The reals of this rank's rows in the file's order, so many a node or cell, at the part's nodes or cells. Collective.
- */
+/* From reals in this rank's rows in the file's order to the part's nodes or cells, `components` each. Collective. */
 PetscErrorCode HycoFOMFromRows(HycoFOM fom, HycoPlace place, PetscInt components, const PetscReal rows[],
                                PetscReal value[]);
-/* Values of the part's nodes or cells, so many of a type each, as this rank's rows in the file's order. Collective. */
+/* From values at the part's nodes or cells, `components` of a type each, to this rank's rows in the file's order.
+   Collective. */
 PetscErrorCode HycoFOMToRows(HycoFOM fom, HycoPlace place, MPI_Datatype type, PetscInt components, const void *value,
                              void *rows);
-/* Looks for rigid motions that neither supports nor contact hold, at fe's parameters: fails with their names, or pins
+/* Finds rigid motions that neither supports nor contact prevent, at fe's parameters: fails with their names, or pins
    as many unknowns, as supports of fe. Collective, before the assembly. */
 PetscErrorCode HycoFOMRelease(HycoFOM fom);
-/* Takes from F, assembled without the pins, what it does on the released motions; fails if that is not little.
+/* Removes from F, assembled without the pins, its work on the released motions; fails if that work is not small.
    Collective. */
 PetscErrorCode HycoFOMBalance(HycoFOM fom);
-/* After a solve: fails when the contact forces are not balanced on the released motions. Collective. */
+/* After a solve: fails if the contact forces are not balanced on the released motions. Collective. */
 PetscErrorCode HycoFOMCheckContactBalance(HycoFOM fom);
-/* Takes the released motions that the contacts' normals leave alone out of u. Collective. */
+/* Removes from u the released motions for which the contacts' normals are turned. Collective. */
 PetscErrorCode HycoFOMTakeOutReleased(HycoFOM fom, Vec u);
-/* How many closed contacts of the last solution depend on the others, rows of B: with any, the contact forces are not
-   unique. Rank 0. */
+/* Number of closed contacts of the last solution whose rows of B depend on the others; if it is not 0, the contact
+   forces are not unique. Rank 0. */
 PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
-/* Attaches the rigid motions that contact alone holds to K. Collective. */
+/* Attaches to K the rigid motions that only contact prevents. Collective. */
 PetscErrorCode HycoFOMSetMotions(HycoFOM fom);
-/* The forces of supports in the last solution, at the part's unknowns (its own nodes'), 0 where nothing is fixed.
-   Collective. */
+/* The forces of supports in the last solution, at the part's unknowns (valid at the nodes it owns), 0 where nothing
+   is fixed. Collective. */
 PetscErrorCode HycoFOMReactions(HycoFOM fom, PetscReal r[]);
 /* Generalised forces F - B^T Lambda of the last solution at the part's nodes, zero on fixed unknowns. Collective. */
 PetscErrorCode HycoFOMGetForces(HycoFOM fom, PetscReal forces[]);
-/* Fills strain_energy, external_work, gap_work and energy_defect from the last solution. Collective. */
+/* Sets strain_energy, external_work, gap_work and energy_defect from the last solution. Collective. */
 PetscErrorCode HycoFOMEnergy(HycoFOM fom, HycoSummary *summary);
 
 /*
-  What condensing the model on its forces takes, at mu: on rank 0, G = B K^-1 B^T as the columns of its lower triangle
-  (m (m + 1) / 2). Solves at mu in the dual form on the way. Collective.
+  The flexibility at mu for condensed models: on rank 0, G = B K^-1 B^T as the columns of its lower triangle (m (m + 1)
+  / 2). Also solves at mu in the dual form. Collective.
 */
 PetscErrorCode HycoFOMFlexibility(HycoFOM fom, const PetscReal mu[], PetscReal G[]);
-/* How the displacement answers contact forces at mu: X = K^-1 B^T P for q patterns P (n_contacts x q column major, read
-   on rank 0), at the part's unknowns, n_dof x q row major. One factor of K alone. Collective. */
+/* Displacement responses to contact forces at mu: X = K^-1 B^T P for q patterns P (n_contacts x q column major, read
+   on rank 0), at the part's unknowns, n_dof x q row major. Factors only K. Collective. */
 PetscErrorCode HycoFOMResponses(HycoFOM fom, const PetscReal mu[], PetscInt q, const PetscReal P[], PetscReal X[]);
 
 #endif

@@ -1,30 +1,31 @@
-/* Greedy training (section 5.4), inside: the indicator of a model at a parameter value. All on one process. */
+/* Greedy training (section 5.4): the indicator of a model at a parameter value. All on one process. */
 #ifndef HYCOGREEDY_H
 #define HYCOGREEDY_H
 
 #include <hycoreducerimpl.h>
 
 typedef struct {
-  PetscReal eta; /* what is to fall: eta_u + eta_lambda (43) and of paths, or I (45); infinite: x/0 or not solved */
+  PetscReal eta; /* the indicator to reduce: eta_u + eta_lambda (43), also for paths, or I (45); infinite: x/0 or not
+                    solved */
   PetscReal eta_u, eta_lambda;
-  PetscReal size; /* ranks what is infinite: the numerators' sum; infinite when not solved */
+  PetscReal size; /* orders points with an infinite eta: the sum of the numerators; infinite if not solved */
   PetscBool solved;
 } HycoIndication;
 
 typedef struct _n_HycoIndicator *HycoIndicator;
 
-/* Whether this kind judges by the interpolated solutions (43); on the whole mesh, which the model's file must have. */
+/* Whether this kind uses the interpolated solutions (43); they need the whole mesh from the model's file. */
 PetscBool HycoIndicatorInterpolates(HycoIndicatorKind kind);
 PetscBool HycoIndicatorOnWhole(HycoIndicatorKind kind);
 /*
-  The indicator of `model` (borrowed). U_at: snapshots on the unknowns of the model's mesh (n_dof x n row major) at the
-  n points (n x n_parameters); NULL unless the kind
-  interpolates; borrowed. length: of the whole mesh. Not collective.
+  Creates the indicator of `model` (borrowed). U_at: snapshots on the unknowns of the model's mesh (n_dof x n row major)
+  at the n points (n x n_parameters), borrowed; NULL unless the kind interpolates. length: of the whole mesh. Not
+  collective.
 */
 PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscInt n, const PetscReal points[],
                                    const PetscReal U_at[], PetscReal length, HycoIndicator *indicator);
 PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator);
-/* Predicts at mu and judges the prediction. What it gives does not depend on what was asked before. */
+/* Predicts at mu and computes the indicator of the prediction. The result does not depend on earlier calls. */
 PetscErrorCode HycoIndicatorEvaluate(HycoIndicator indicator, const PetscReal mu[], HycoIndication *value);
 
 #endif

@@ -8,10 +8,10 @@ typedef struct _n_HycoReconstruction *HycoReconstruction;
 
 typedef struct {
   struct _n_HycoGalerkin galerkin;
-  PetscInt n_dual;                   /* dual snapshots that are not zero */
+  PetscInt n_dual;                   /* number of dual snapshots that are not zero */
   PetscReal *S_lambda;               /* N_lambda x n_dual column major */
   PetscInt reconstruct_solver;       /* of (41), index in HycoReconstructSolvers */
-  HycoReconstruction reconstruction; /* what (41) keeps, made by the first */
+  HycoReconstruction reconstruction; /* data that (41) keeps between calls, created by the first */
 } * HycoHybridROM;
 
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
@@ -20,7 +20,7 @@ PetscErrorCode HycoHybridReconstruct(HycoROM model);
 PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction);
 extern const char *const HycoReconstructSolvers[];
 
-/* The training's part of the ops (full_order_unknowns.c): the full-order displacements are chosen. */
+/* Implementations of the training ops (full_order_unknowns.c), which choose the full-order displacements. */
 PetscErrorCode HycoHybridSetFromOptions(HycoReducer reducer);
 PetscErrorCode HycoHybridBuild(HycoROM model, HycoReducer reducer);
 

@@ -1,4 +1,4 @@
-/* What every file of the library shares: PETSc versions, errors that reach every rank, files of HDF5. */
+/* Common to every file of the library: PETSc versions, errors on every rank, HDF5 files. */
 #ifndef HYCOIMPL_H
 #define HYCOIMPL_H
 
@@ -12,8 +12,8 @@
 /* Length of a message or a name that the library builds. */
 #define HYCO_LINE 1024
 
-/* The error that says: from these solutions, with this recipe, there is no useful model. A search goes on with another
-   recipe, an estimate is left out; any other error (a disk, memory, a damaged file) ends a run. */
+/* Error code: these solutions give no useful model with these settings. A search then tries other settings, and an
+   estimate is left out; any other error (disk, memory, a damaged file) ends a run. */
 #define HYCO_ERR_NO_MODEL ((PetscErrorCode)(PETSC_ERR_MAX_VALUE + 1))
 
 /* Fails on every rank with the message of the lowest rank whose `message` is not empty, and with the error `caught`
@@ -23,10 +23,10 @@ PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char me
 /* Begin and end catching PETSc errors on this rank as text: between the two, errors print nothing. */
 PetscErrorCode HycoCatchBegin(void);
 PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE]);
-/* What was caught is raised again, unless it is HYCO_ERR_NO_MODEL. */
+/* Raises the caught error again, unless it is HYCO_ERR_NO_MODEL. */
 PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
 
-/* Runs `call` on rank 0 of comm; its error becomes the error of every rank. Collective. */
+/* Runs `call` on rank 0 of comm; its error is raised on every rank. Collective. */
 #define HycoOnRoot(comm, call)                                                                                         \
   do {                                                                                                                 \
     char message_[HYCO_LINE] = "";                                                                                     \
@@ -41,8 +41,7 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
     PetscCall(HycoErrorSync((comm), caught_, message_));                                                               \
   } while (0)
 
-/* Runs `call`, which may differ from rank to rank, on every rank; an error on any becomes the error of all. Collective.
- */
+/* Runs `call`, which may differ from rank to rank, on every rank; an error on any rank is raised on all. Collective. */
 #define HycoOnEach(comm, call)                                                                                         \
   do {                                                                                                                 \
     char message_[HYCO_LINE] = "";                                                                                     \
@@ -53,20 +52,21 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
     PetscCall(HycoErrorSync((comm), caught_, message_));                                                               \
   } while (0)
 
-/* Text as C's printf makes it, cut at HYCO_LINE. */
+/* Formats a line like printf; truncated to HYCO_LINE. */
 void HycoFormat(char line[HYCO_LINE], const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
-/* Appends `name` to a list of names, with `between` before all but the first; cut at HYCO_LINE. */
+/* Appends `name` to a list of names, with `between` before all but the first; truncated to HYCO_LINE. */
 PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const char name[]);
 
-/* A user's error on this rank: one line, its numbers as C prints them (PETSc would write 2 as "2."). */
+/* Raises a user's error on this rank: one line, with numbers as C's printf writes them (PETSc would write 2 as
+   "2."). */
 #define HycoFail(...)                                                                                                  \
   do {                                                                                                                 \
     char line_[HYCO_LINE];                                                                                             \
     HycoFormat(line_, __VA_ARGS__);                                                                                    \
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s", line_);                                                             \
   } while (0)
-/* The same, of kind HYCO_ERR_NO_MODEL. */
+/* The same with HYCO_ERR_NO_MODEL. */
 #define HycoFailNoModel(...)                                                                                           \
   do {                                                                                                                 \
     char line_[HYCO_LINE];                                                                                             \
@@ -85,9 +85,10 @@ PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const cha
 /* Fails for NULL and for an object of another class. Not collective. `classid` is one of HYCO_..._CLASSID. */
 PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, const char function[]);
 #define HycoCheckHandle(handle, classid) PetscCall(HycoHandleCheck((handle), &(classid), PETSC_FUNCTION_NAME))
-/* Begins a View: stdout where *viewer is NULL; on an ASCII viewer the object's class and name, and a tab to pop. */
+/* Begins a View: *viewer becomes stdout if it is NULL; on an ASCII viewer prints the object's class and name, and
+   pushes a tab, which the caller pops. */
 PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool *ascii);
-/* XViewFromOptions() of a class. */
+/* Defines XViewFromOptions() of a class. */
 #define HycoDefineViewFromOptions(Class, classid)                                                                      \
   PetscErrorCode Class##ViewFromOptions(Class object, PetscObject owner, const char option[])                          \
   {                                                                                                                    \
@@ -96,7 +97,7 @@ PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool 
     PetscCall(PetscObjectViewFromOptions((PetscObject)object, owner, option));                                         \
     PetscFunctionReturn(PETSC_SUCCESS);                                                                                \
   }
-/* A function of a class that sets or gets what statements say, once the handle is checked. */
+/* Defines a method of a class that executes statements once the handle is checked, for setters and getters. */
 #define HycoDefineMethod(function, arguments, object, classid, ...)                                                    \
   PetscErrorCode function arguments                                                                                    \
   {                                                                                                                    \
@@ -107,7 +108,8 @@ PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool 
   }
 /* The communicator of an object of any class. */
 #define HycoComm(object) PetscObjectComm((PetscObject)(object))
-/* Takes one reference from `*object` and clears it; returns unless that was the last. */
+/* Removes one reference from `*object` and sets it to NULL; returns from the calling function unless that was the
+   last. */
 #define HycoDereference(object)                                                                                        \
   do {                                                                                                                 \
     if (--((PetscObject) * (object))->refct > 0) {                                                                     \
@@ -116,13 +118,13 @@ PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool 
     }                                                                                                                  \
   } while (0)
 
-/* Every rank's n items of an MPI type that takes `size` bytes, one rank after the other, in *all on rank 0 (elsewhere
-   NULL, *n_all 0); PetscFree() frees it. Collective. */
+/* Concatenates every rank's n items, of an MPI type of `size` bytes, by rank, in *all on rank 0 (elsewhere NULL,
+ *n_all 0); the caller frees it by PetscFree(). Collective. */
 PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
                                PetscInt *n_all, void *all);
 
-/* MPI_Bcast() from rank 0 and MPI_Allreduce() in place, of as many items as a PetscInt says: more than MPI counts are
-   an error. */
+/* MPI_Bcast() from rank 0 and MPI_Allreduce() in place, with a PetscInt count: a count too large for MPI is an
+   error. */
 #define HycoBcast(data, n, type, comm)                                                                                 \
   do {                                                                                                                 \
     PetscMPIInt count_;                                                                                                \
@@ -140,14 +142,14 @@ PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_
 #define HYCO_HASH_START 14695981039346656037ULL
 unsigned long long HycoHash(unsigned long long hash, const void *data, size_t bytes);
 
-/* What -log_view tells of, in the order of log.c's names. */
+/* Events and stages of -log_view, in the order of the names in log.c. */
 typedef enum {
   HYCO_EVENT_MESH,
   HYCO_EVENT_ASSEMBLE, /* K */
   HYCO_EVENT_FORCE,    /* F */
   HYCO_EVENT_CONTACT,  /* B, D */
   HYCO_EVENT_REDUCE,   /* the reduced system from K, F, B, D of the RID */
-  HYCO_EVENT_FACTOR,   /* with the flexibility */
+  HYCO_EVENT_FACTOR,   /* with the computation of the flexibility */
   HYCO_EVENT_FORCES,   /* the complementarity problem: active set, Lemke, TAO */
   HYCO_EVENT_ITERATE,  /* conjugate gradients under constraints */
   HYCO_EVENT_KKT,
@@ -158,18 +160,18 @@ typedef enum {
   HYCO_EVENT_SCAN,
   HYCO_EVENT_LOAD,
   HYCO_EVENT_SETUP, /* online */
-  HYCO_EVENT_SOLVE, /* any contact system, whole */
+  HYCO_EVENT_SOLVE, /* the solve of any contact system */
   HYCO_EVENT_RECONSTRUCT,
   HYCO_N_EVENTS
 } HycoEvent;
 typedef enum { HYCO_STAGE_FULL_ORDER, HYCO_STAGE_REDUCTION, HYCO_STAGE_ONLINE, HYCO_N_STAGES } HycoStage;
 PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin);
 PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin);
-/* Whether HYCO_TRACE asks for PETSc's trace of an error. */
+/* Whether the environment variable HYCO_TRACE requests PETSc's trace of an error. */
 PetscBool HycoWantsTrace(void);
-/* What runs now, in words: the innermost event, else the stage, else NULL. From any thread. */
+/* The name of what runs now: the innermost event, else the stage, else NULL. May be called from any thread. */
 const char *HycoLogDoing(void);
-/* PetscCall(call) within the event, or the stage; both end with an error too. */
+/* PetscCall(call) within the event, or the stage; both also end on an error. */
 #define HycoLogged(event, call)                                                                                        \
   do {                                                                                                                 \
     PetscErrorCode logged_;                                                                                            \
@@ -190,18 +192,19 @@ const char *HycoLogDoing(void);
 /* The seal of a file with these bytes, to be appended to them. */
 #define HYCO_SEAL 24
 void HycoSealMake(const void *data, size_t bytes, unsigned char seal[HYCO_SEAL]);
-/* The seal of a file as it is, and its size. */
+/* Computes the seal of a file, and its size. */
 PetscErrorCode HycoSealFile(const char path[], size_t *size, unsigned char seal[HYCO_SEAL]);
-/* Size of a file, and whether it has a seal; fails when it has one and its bytes are not the sealed ones. */
+/* Size of a file, and whether it has a seal; fails if it has one that does not match its bytes. */
 PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed);
 
-/* A number with a decimal point, whatever the locale of the calling program; as strtod. */
+/* strtod() with a decimal point, whatever the locale of the calling program. */
 double HycoNumber(const char text[], char **end);
-/* Between the two, this thread reads and writes numbers with a decimal point. */
+/* Between the two calls, this thread reads and writes numbers with a decimal point. */
 void *HycoPointBegin(void);
 void HycoPointEnd(void *before);
 
-/* Makes BLAS take its memory once, or fails: where OpenBLAS finds none, it looks for ever. On this process alone. */
+/* Makes BLAS allocate its memory now, or fails: without memory, OpenBLAS would try again without end. On this
+   process alone. */
 PetscErrorCode HycoReserveBLAS(void);
 
 /* lost / size; 0/0 counts as 0, x/0 is PETSC_INFINITY. */
@@ -213,26 +216,26 @@ static inline PetscReal HycoRelative(PetscReal lost, PetscReal size)
 /* Seconds since the first call, on this rank's clock. */
 PetscReal HycoNow(void);
 
-/* Recorded declarations; the strings of an option are one block, at its name. */
+/* Recorded declarations; the strings of an option are one allocation, at its name. */
 typedef struct {
   PetscInt n, room;
   HycoOption *option;
 } HycoOptionList;
-/* Runs `declare` with an empty database, its declarations going to the list and reading nothing. */
+/* Runs `declare` with an empty database; its declarations are added to the list, and no option is read. */
 PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)(PetscOptions));
 PetscErrorCode HycoOptionListDestroy(HycoOptionList *list);
-/* The table of HycoGetOptionTable() is recorded anew when it is asked for again. */
+/* The table of HycoGetOptionTable() is recorded again at its next call. */
 PetscErrorCode HycoOptionsForgetTable(void);
-/* The option of this name (without dash; mu_ is that of mu_radius), or NULL. Borrowed. */
+/* The option of this name (without dash; the entry mu_ matches mu_radius), or NULL. Borrowed. */
 const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name[]);
-/* Makes an object of each class, which sets itself from `options`. */
+/* Creates an object of each class and calls its SetFromOptions with `options`. */
 PetscErrorCode HycoDeclareClasses(PetscOptions options);
 PetscErrorCode HycoSolverDeclare(PetscOptions options);
 PetscErrorCode HycoFOMDeclare(PetscOptions options);
 PetscErrorCode HycoSnapshotsDeclare(PetscOptions options);
 PetscErrorCode HycoReducerDeclare(PetscOptions options);
 PetscErrorCode HycoROMDeclare(PetscOptions options);
-/* Makes `object` set itself from `options`, then destroys it: what the above do. */
+/* Calls SetFromOptions of `object` with `options`, then destroys it. */
 #define HycoDeclare(object, options, set, destroy)                                                                     \
   do {                                                                                                                 \
     PetscErrorCode declared_;                                                                                          \
@@ -242,16 +245,17 @@ PetscErrorCode HycoROMDeclare(PetscOptions options);
     PetscCall(declared_);                                                                                              \
   } while (0)
 
-/* What a class declares of the option (name without the dash), or NULL. Borrowed. */
+/* What a class declares for an option (name without the dash), or NULL. Borrowed. */
 const HycoOption *HycoOptionFind(const char name[]);
-/* The name that was meant, of those that the classes declare and (if not NULL) `more`; NULL: none is near. Borrowed. */
+/* The known name nearest to `word`, of those that the classes declare and (if not NULL) those in `more`; NULL: none
+   is near. Borrowed. */
 const char *HycoOptionNearest(const char word[], const HycoOptionList *more);
-/* Fails for a name that an option had, with the one that it has. */
+/* Fails for the former name of an option, with its present name. */
 PetscErrorCode HycoOptionsCheckName(const char name[]);
-/* Whether an option's name (without dash) begins as a scene's entry does. */
+/* Whether an option's name (without dash) begins like an entry of a scene. */
 PetscBool HycoIsSceneKey(const char name[]);
 
-/* PetscFree() of each pointer, whose addresses are given. */
+/* PetscFree() of each pointer, given by its address. */
 #define HycoFreeAll(...) PetscCall(HycoFreeAll_Private((void *[]){__VA_ARGS__, NULL}))
 PetscErrorCode HycoFreeAll_Private(void *const addresses[]);
 

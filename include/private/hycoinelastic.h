@@ -1,11 +1,11 @@
 /*
-  Bodies with memory: what the finite elements do with laws that depend on the past. The state of every integration
-  point at one instant, and a step of time from one state to the next for a given displacement (implicit Euler).
+  Bodies with a history: the finite-element side of laws that depend on the past. The state of every integration point
+  at one time, and a time step from one state to the next for a given displacement (implicit Euler).
 
-      HycoFESetParameters(fe, mu at t1);
-      HycoFEStep(fe, u, t0, t1, begin, end, f_int, PETSC_TRUE, &report);      r = f_int - F + B^T L
-      HycoFEAssembleStiffness(fe, K);                                         K = d f_int / d u
-      ... accepted: HycoFEStateCopy(end, begin)
+    HycoFESetParameters(fe, mu at t1);
+    HycoFEStep(fe, u, t0, t1, begin, end, f_int, PETSC_TRUE, &report);      r = f_int - F + B^T L
+    HycoFEAssembleStiffness(fe, K);                                         K = d f_int / d u
+    ... accepted: HycoFEStateCopy(end, begin)
 */
 #ifndef HYCOINELASTIC_H
 #define HYCOINELASTIC_H
@@ -14,22 +14,22 @@
 
 typedef struct _n_HycoFEState *HycoFEState;
 
-/* The virgin state of fe's cells: no strain, no stress, no inelastic strain, at the temperature that the first step
-   begins with. The caller owns it. Not collective. */
+/* The initial state of fe's cells: no strain, no stress, no inelastic strain, at the temperature at which the first
+   step begins. The caller owns it. Not collective. */
 PetscErrorCode HycoFEStateCreate(HycoFE fe, HycoFEState *state);
 /* NULL-safe. */
 PetscErrorCode HycoFEStateDestroy(HycoFEState *state);
-/* Both made from one fe. */
+/* Both must be created from the same fe. */
 PetscErrorCode HycoFEStateCopy(HycoFEState from, HycoFEState to);
 
 /*
-  All of the state as reals: those of cell e from values[start[e]] to values[start[e + 1]] (start: n_cells + 1), in the
-  order of fe's mesh (cell_id has the tags); the integration points of a cell one after the other. What is written back
-  into `values` is the state. How many reals a cell has depends on its body's law alone. Borrowed.
+  The whole state as reals: those of cell e are values[start[e]] to values[start[e + 1]] (start: n_cells + 1), in the
+  order of fe's mesh (cell_id has the tags); the integration points of a cell one after the other. Writing to `values`
+  changes the state. The number of reals of a cell depends only on its body's law. Borrowed.
 */
 PetscErrorCode HycoFEStateGet(HycoFEState state, const PetscInt **start, PetscReal **values);
 
-/* Names of the laws' state variables, one of each, over all bodies. Borrowed. */
+/* The names of the laws' state variables over all bodies, without repetition. Borrowed. */
 PetscErrorCode HycoFEStateGetNames(HycoFEState state, PetscInt *n, const char *const *names[]);
 
 /*
@@ -45,53 +45,54 @@ PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[]
 PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name[], PetscReal value[]);
 
 /*
-  What a step says of itself, of this rank's cells. To be reduced over the ranks by the caller: the least dt_factor, the
-  largest increment, any failed; energies are summed over the cells whose first node is this rank's
-  own, so that their sum over the ranks counts each cell once.
+  Result of a step over this rank's cells. The caller reduces it over the ranks: the least dt_factor, the largest
+  increment, any failed; energies are summed over the cells whose first node this rank owns, so that their sum over the
+  ranks counts each cell once.
 
   With s_m = (s0 + s1) / 2 at each point, work = integral of s_m : (eps1 - eps0), and as an identity
 
-      work = (stored at the end) - (stored at the begin) + dissipated + thermal + moduli
+    work = (stored at the end) - (stored at the begin) + dissipated + thermal + moduli
 
-  without springs, whose energy `stored` and `potential` have, and whose forces are in f_int.
+  for the bodies without springs. The energy of springs is in `stored` and `potential`, their forces in f_int.
 */
 typedef struct {
-  PetscReal dt_factor;  /* what the laws would multiply the step by: 1, or less */
-  PetscBool failed;     /* a law has no answer at a point; `end`, f_int and K are then of no use: cut the step */
-  char why[HYCO_LINE];  /* "body clad, law j2: ... at x = ..., y = ..., z = ..." */
-  PetscReal increment;  /* largest equivalent inelastic strain of the step */
-  PetscReal work;       /* of the stresses */
-  PetscReal stored;     /* at the end: elastic energy */
-  PetscReal dissipated; /* s_m : inelastic strain of the step */
-  PetscReal thermal;    /* s_m : thermal strain of the step */
-  PetscReal moduli;     /* elastic energy that comes and goes with moduli that change in time, with its sign turned */
-  PetscBool has_potential; /* whether every law is the gradient of one */
-  PetscReal potential;     /* incremental: its gradient by u is f_int; valid with has_potential */
+  PetscReal dt_factor;     /* factor by which the laws would change the step: 1, or less */
+  PetscBool failed;        /* a law has no solution at a point; `end`, f_int and K are then invalid: reduce the step */
+  char why[HYCO_LINE];     /* "body clad, law j2: ... at x = ..., y = ..., z = ..." */
+  PetscReal increment;     /* largest equivalent inelastic strain of the step */
+  PetscReal work;          /* of the stresses */
+  PetscReal stored;        /* at the end: elastic energy */
+  PetscReal dissipated;    /* s_m : inelastic strain of the step */
+  PetscReal thermal;       /* s_m : thermal strain of the step */
+  PetscReal moduli;        /* elastic energy due to moduli that change in time, with the sign reversed */
+  PetscBool has_potential; /* whether every law has an incremental potential */
+  PetscReal potential;     /* the incremental potential: its gradient by u is f_int; valid with has_potential */
 } HycoFEStepReport;
 
 /*
-  A step from `begin` at t0 to `end` at t1 (>= t0; with t1 = t0 the laws answer at once, without creep) for the
-  displacement u at t1 (n_dof, local order, prescribed values in their places). fe is at the parameters of t1.
+  A step from `begin` at t0 to `end` at t1 (>= t0; with t1 = t0 the response is instantaneous, without creep) for the
+  displacement u at t1 (n_dof, local order, prescribed values included). fe is at the parameters of t1.
 
-  f_int (n_dof, local order) gets the integral of B^T sigma added, thermal strains included, at every unknown, fixed
-  ones too (reactions); what tied nodes have of it passes to those that they follow. This rank has all cells of its own
-  nodes: the rows of owned nodes are complete without communication, those of others are to be ignored, as with K.
+  The integral of B^T sigma, with the stress of thermal strains, is added to f_int (n_dof, local order) at every
+  unknown, fixed ones too (reactions); the forces of tied nodes are added to their masters. This rank has all cells of
+  the nodes that it owns: the rows of owned nodes are complete without communication, the others must be ignored, as
+  with K.
 
-  tangent: fe's tangents become the consistent ones, d sigma / d eps of the step, of the bodies that flow; the next
-  HycoFEAssembleStiffness() gives d f_int / d u (symmetric: a law's tangent that is not is replaced by its symmetric
-  part). HycoFEElasticTangent() puts the elastic ones back, and HycoFESetParameters() does where it changes them.
+  tangent: sets fe's tangents to the consistent ones, d sigma / d eps of the step, for the bodies with inelastic laws;
+  the next HycoFEAssembleStiffness() gives d f_int / d u (symmetric: a tangent that is not is replaced by its symmetric
+  part). HycoFEElasticTangent() restores the elastic ones, and so does HycoFESetParameters() where it changes them.
 
-  `begin` stays; begin and end differ. A point where a law has no answer is no error: report->failed. Errors: constants
-  that leave their interval, a temperature below 0 K. Not collective.
+  `begin` is not changed; begin and end must differ. A point where a law has no solution is not an error:
+  report->failed. Errors: constants outside their interval, a temperature below 0 K. Not collective.
 */
 PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
                           HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report);
 PetscErrorCode HycoFEElasticTangent(HycoFE fe);
 
 /*
-  Steps on displacements that are known: HycoMarchBegin() from the virgin state, fe (borrowed) at the parameters of the
+  Steps on known displacements: HycoMarchBegin() from the initial state, with fe (borrowed) at the parameters of the
   first time; HycoMarchStep() with fe at those of t1, after which `state` is that of t1 and f_int (n_dof) its internal
-  forces, whatever the report says. HycoMarchEnd() also after a failure. Not collective.
+  forces, even if the report says that it failed. HycoMarchEnd() also after a failure. Not collective.
 */
 typedef struct {
   HycoFE fe;
@@ -107,9 +108,9 @@ PetscErrorCode HycoMarchEnd(HycoMarch *march);
 PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, PetscReal f[]);
 
 /*
-  The same of some bodies alone: those of laws that flow, or those of linear laws, whose stress and energy do not depend
-  on the past. Of the other cells nothing is read or written, and the report leaves them out. Springs, whatever they
-  hold, go with the bodies that flow.
+  The same for some bodies only: those with inelastic laws, or those with linear laws, whose stress and energy do not
+  depend on the past. The other cells are neither read nor written, and are not in the report. Springs are included with
+  the inelastic bodies.
 */
 typedef enum { HYCO_BODIES_ALL, HYCO_BODIES_FLOWING, HYCO_BODIES_LINEAR } HycoBodies;
 PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[], PetscReal t0, PetscReal t1,
@@ -117,10 +118,10 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
                                 HycoFEStepReport *report);
 
 /*
-  What the linear bodies give to f_int at some nodes, K u less what the thermal strains push, for who comes to one time
-  again and again: a product in place of their points. `nodes` (n_nodes; NULL: all): those whose rows are wanted.
-  HycoLinearForceSet(): at fe's parameters; K: the linear bodies' tangents or the nodes' places may have changed.
-  HycoLinearForceAdd(): added to f_int (n_dof). Not collective; destroying is NULL-safe.
+  The linear bodies' contribution to f_int at some nodes, K u minus the force of thermal strains, for repeated
+  evaluations at one time: a matrix product in place of their integration points. `nodes` (n_nodes; NULL: all): the
+  nodes whose rows are wanted. HycoLinearForceSet(): at fe's parameters; K: the linear bodies' tangents or the nodes'
+  places may have changed. HycoLinearForceAdd(): adds to f_int (n_dof). Not collective; destroying is NULL-safe.
 */
 typedef struct _n_HycoLinearForce *HycoLinearForce;
 PetscErrorCode HycoLinearForceCreate(HycoFE fe, const PetscBool nodes[], HycoLinearForce *force);

@@ -1,4 +1,5 @@
-/* Complementarity problems as arrays and vectors: the active set, Lemke's method, TAO. They know no contact system. */
+/* Complementarity problems as arrays and vectors: active set, Lemke's method, TAO, independent of the contact
+   system. */
 #ifndef HYCOLCP_H
 #define HYCOLCP_H
 
@@ -12,37 +13,40 @@ typedef enum { HYCO_LCP_SOLVED, HYCO_LCP_CYCLE, HYCO_LCP_SINGULAR, HYCO_LCP_LIMI
 /* -- the active set -- */
 
 /*
-  What the loop asks of those who use it. `active` and `violates` hold this rank's n contacts, the first of which has
-  the number `first`; comm: the ranks that share the contacts, MPI_COMM_NULL where every rank has them all.
+  Functions of the problem that the active-set loop calls. `active` and `violates` hold this rank's n contacts, the
+  first of which has the number `first`; comm: the ranks that share the contacts, MPI_COMM_NULL if every rank has all of
+  them.
 */
 typedef struct {
   MPI_Comm comm;
   PetscInt first, n, max_its;
-  PetscBool one_by_one; /* a set that comes back lets contacts change singly from then on; else it ends the loop */
+  PetscBool one_by_one; /* after a set repeats, contacts change one at a time; otherwise a repeated set ends the loop */
   void *ctx;
-  /* Solves with the contacts of the set closed, the others open. Some may leave the set as dependent on others. */
+  /* Solves with the contacts of the set closed and the others open. May remove contacts from the set that depend on
+     others. */
   PetscErrorCode (*solve)(void *ctx, PetscBool active[], PetscBool *singular);
-  /* Which contacts violate in that solution: pull in the set, or penetrate outside. */
+  /* Which contacts violate a condition in that solution: tension in the set, or penetration outside it. */
   PetscErrorCode (*violations)(void *ctx, const PetscBool active[], PetscBool violates[]);
-  /* May be NULL. Before each iteration, `its` so far: *fresh where it has put another set in place. */
+  /* May be NULL. Called before each iteration, with `its` so far: *fresh if it has replaced the set. */
   PetscErrorCode (*restart)(void *ctx, PetscInt its, PetscBool active[], PetscBool *fresh);
-  /* May be NULL. No contact violates: *more where the next solve is more accurate, so that the loop goes on. */
+  /* May be NULL. Called when no contact violates: *more if the next solve is more accurate, so that the loop must
+     continue. */
   PetscErrorCode (*settled)(void *ctx, PetscBool *more);
   HycoLCPMonitor monitor; /* may be NULL */
   void *monitor_ctx;
 } HycoActiveSet;
-/* From `active` to the last set; solved: no contact violates it. Collective on comm. */
+/* Runs from `active` to the last set; solved: no contact violates a condition. Collective on comm. */
 PetscErrorCode HycoActiveSetRun(const HycoActiveSet *set, PetscBool active[], PetscInt *its, HycoLCPStatus *status);
-/* Hash of a set, for finding those that come back. */
+/* Hash of a set, to detect repeated ones. */
 unsigned long long HycoSetHash(PetscInt n, const PetscBool active[]);
 
 /* -- dense complementarity, w = q + M z >= 0, z >= 0, w.z = 0; all replicated -- */
 
 /*
-  The Cholesky factor of M_aa, M symmetric n x n, kept from one set and one right-hand side to the next until M changes
-  and it is forgotten (NULL-safe). HycoSetFactorSolve(): z_a = -M_aa^-1 q_a, 0 elsewhere; *regular: no pivot was below
-  `tol` of M's diagonal entry, and z is finite. The contacts stand in the order in which they joined, so that z depends
-  on the past by round-off.
+  The Cholesky factor of M_aa, M symmetric n x n, updated from one set and one right-hand side to the next, until
+  HycoSetFactorForget() after a change of M (NULL-safe). HycoSetFactorSolve(): z_a = -M_aa^-1 q_a, 0 elsewhere;
+  *regular: no pivot was below `tol` of M's diagonal entry, and z is finite. The contacts are ordered by the time at
+  which they joined, so that z depends on the history by round-off.
 */
 typedef struct _n_HycoSetFactor *HycoSetFactor;
 PetscErrorCode HycoSetFactorCreate(PetscInt n, HycoSetFactor *factor);
@@ -51,23 +55,24 @@ void HycoSetFactorForget(HycoSetFactor factor);
 PetscErrorCode HycoSetFactorSolve(HycoSetFactor factor, const PetscReal M[], const PetscReal q[], PetscInt k,
                                   const PetscInt a[], PetscReal tol, PetscReal z[], PetscBool *regular);
 /*
-  A dense problem: M column major, n x n. `symmetric`: it is positive semidefinite; then `factor` may be that of M's
-  last set, or one that was forgotten; NULL: each set is factored anew. With p free unknowns before the n contacts
-  (floating bodies) z = (x_pinned, L), M and q as HycoDirectFactor() and HycoDirectReduce() give them. All is borrowed.
+  A dense problem: M column major, n x n. `symmetric`: M is positive semidefinite; then `factor` may be that of M's last
+  set, or one after HycoSetFactorForget(); NULL: each set is factored anew. With p free unknowns before the n contacts
+  (floating bodies) z = (x_pinned, L), M and q as returned by HycoDirectFactor() and HycoDirectReduce(). All is
+  borrowed.
 */
 typedef struct {
   PetscInt n, p;
   const PetscReal *M, *q;
   PetscBool symmetric;
   HycoSetFactor factor;
-  PetscInt max_its; /* of the active set; 0: 50 + 4 n */
+  PetscInt max_its; /* iterations of the active set; 0: 50 + 4 n */
   HycoLCPMonitor monitor;
   void *monitor_ctx;
 } HycoLCP;
 /*
-  The active set from `active`, which returns the last set. Contacts that repeat others carry no force and leave the
-  set; when their gaps contradict each other and the choice of the smaller ones does not end it, the status is SINGULAR.
-  So it is where contact does not hold floating bodies under this load.
+  The active set method from `active`, which returns the last set. Contacts that repeat others carry no force and leave
+  the set. The status is SINGULAR if their gaps contradict each other and choosing the smaller ones does not resolve it,
+  or if contact does not hold floating bodies under this load.
 */
 PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                 HycoLCPStatus *status);
@@ -75,60 +80,60 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
 PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                    HycoLCPStatus *status);
 /*
-  z with M_aa z_a = -q_a on the set a[0..*k), 0 elsewhere. Members that depend on others leave a (their z is 0), and *k
-  becomes smaller. *singular: even the rest could not be solved. `factor` as HycoLCPActiveSet()'s.
+  z with M_aa z_a = -q_a on the set a[0..*k), 0 elsewhere. Members that depend on others are removed from a (their z is
+  0), and *k decreases. *singular: the remaining set could not be solved either. `factor` as in HycoLCPActiveSet().
 */
 PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
                                  HycoSetFactor factor, PetscInt *k, PetscInt a[], PetscReal z[], PetscBool *singular);
-/* The rank of a symmetric positive semidefinite matrix (k x k, overwritten), scaled to a unit
-   diagonal, to 1e-12. */
+/* The rank of a symmetric positive semidefinite matrix (k x k, overwritten), scaled to a unit diagonal, with
+   tolerance 1e-12. */
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
 /* Lemke's complementary pivoting. */
 PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt max_its, PetscReal z[],
                             PetscInt *its, HycoLCPStatus *status);
 
-/* -- problems posed to a Tao -- */
+/* -- problems solved by a Tao -- */
 
 #define HYCO_TAO_NAME       64
 #define HYCO_TAO_ACTIVE_SET "hyco_active_set"
 #define HYCO_TAO_LEMKE      "hyco_lemke"
 #define HYCO_TAO_BNLS       "bnls"
 
-/* What a type of Tao is and needs; 0: one that a program has registered. */
+/* Properties and requirements of a Tao type; 0: one that a program has registered. */
 enum {
   HYCO_TAO_SYMMETRIC = 1,  /* bound-constrained: H symmetric */
   HYCO_TAO_DENSE = 2,      /* the dense matrix of the dual form */
   HYCO_TAO_ENTRIES = 4,    /* reads H's entries */
-  HYCO_TAO_SEMISMOOTH = 8, /* poses it as complementarity of z and w */
+  HYCO_TAO_SEMISMOOTH = 8, /* solves the complementarity problem of z and w */
   HYCO_TAO_NEWTON = 16,    /* converges quadratically */
-  HYCO_TAO_RESTARTS = 32,  /* comes through from a second start where it stood still */
-  HYCO_TAO_OWN = 64        /* hyco's: takes the problem as it is, unscaled */
+  HYCO_TAO_RESTARTS = 32,  /* may succeed from a second start after it has stalled */
+  HYCO_TAO_OWN = 64        /* one of hyco's types: takes the problem unscaled */
 };
 int HycoTaoTraits(const char type[]);
-/* The type's name as registered, empty for an unknown one; list: TAO's types that suit contact. */
+/* The type's registered name, empty for an unknown one; list: TAO's types that are suitable for contact. */
 PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char list[HYCO_LINE]);
 /* Registers hyco's types beside TAO's. */
 PetscErrorCode HycoTaoRegisterAll(void);
 
-/* A Tao, kept between problems; its options are -hyco_tao_..., behind the prefix of its owner. */
+/* A Tao, kept from one problem to the next; its options are -hyco_tao_..., after the prefix of its owner. */
 typedef struct _n_HycoTao *HycoTao;
-/* Collective, as all that follows. `owner` (borrowed, may be NULL): of a problem that each of its ranks solves alone
-   (comm: PETSC_COMM_SELF) the first one prints what -hyco_tao_monitor and its like ask for. */
+/* Collective, as all functions below. `owner` (borrowed, may be NULL): if each of its ranks solves a problem alone
+   (comm: PETSC_COMM_SELF), the first rank prints the output of -hyco_tao_monitor and similar options. */
 PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *tao);
 /* NULL-safe. */
 PetscErrorCode HycoTaoDestroy(HycoTao *tao);
-/* max_its 0: 2000, or of hyco's types by the number of contacts. */
+/* max_its 0: 2000, or for hyco's types a number that depends on the number of contacts. */
 PetscErrorCode HycoTaoSetType(HycoTao tao, const char type[], PetscInt max_its);
 /*
-  min 1/2 y^T H y - f^T y, lo <= y <= hi, by any type but hyco's, H symmetric; or w = H y - f >= 0, y >= 0, w.y = 0
-  by a semismooth one, lo = 0, hi infinite, H assembled. Begins at y. H, f, lo, hi are scaled in place: they serve once.
-  An error inside TAO is caught: *solved is false.
+  min 1/2 y^T H y - f^T y, lo <= y <= hi, by any type but hyco's, H symmetric; or w = H y - f >= 0, y >= 0, w.y = 0 by a
+  semismooth one, lo = 0, hi infinite, H assembled. Starts from y. H, f, lo, hi are scaled in place and cannot be used
+  again. An error inside TAO is caught: *solved is false.
 */
 PetscErrorCode HycoTaoSolve(HycoTao tao, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscInt *its, PetscBool *solved);
-/* By HYCO_TAO_ACTIVE_SET; y: what the set's functions solve for. */
+/* By HYCO_TAO_ACTIVE_SET; y: the vector that the set's functions compute. */
 PetscErrorCode HycoTaoSolveSet(HycoTao tao, const HycoActiveSet *set, PetscBool active[], Vec y, PetscInt *its,
                                HycoLCPStatus *status);
-/* A dense problem by any type; hyco's active set begins at `active` and returns it, the others leave it alone. */
+/* A dense problem by any type; hyco's active set starts from `active` and returns it, the others leave it unchanged. */
 PetscErrorCode HycoTaoSolveLCP(HycoTao tao, const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                PetscBool *solved);
 /*
@@ -139,7 +144,7 @@ PetscErrorCode HycoTaoSolveLCP(HycoTao tao, const HycoLCP *lcp, PetscBool active
 PetscErrorCode HycoNNLSCheck(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], const PetscReal x[],
                              PetscReal rtol, PetscReal *residual, PetscBool *solved);
 /*
-  The same problem by a bound-constrained TAO type on the normal equations; *solved is HycoNNLSCheck()'s. Not
+  The same problem by a bound-constrained TAO type on the normal equations; *solved as computed by HycoNNLSCheck(). Not
   collective.
 */
 PetscErrorCode HycoTaoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], const char type[],

@@ -1,4 +1,4 @@
-/* HycoROM, inside. All on one process but HycoROMBroadcast(). */
+/* HycoROM's struct and internal functions. All on one process, except HycoROMBroadcast(). */
 #ifndef HYCOROMIMPL_H
 #define HYCOROMIMPL_H
 
@@ -13,17 +13,17 @@ typedef struct _n_HycoProbe *HycoProbe;
 typedef struct _n_HycoCarried *HycoCarried;
 typedef struct _n_HycoBalance *HycoBalance;
 
-/* Rows of B in CSR over dofs of a mesh, and D: see HycoContactRows(). */
+/* Rows of B in CSR over dofs of a mesh, and D, as in HycoContactRows(). */
 typedef struct {
   PetscInt *start, *dof;
   PetscReal *value, *gap;
 } HycoRows;
 
-/* What an estimate of the error is made of (error_estimate.c): log(1 + feature / floor), a coefficient each, and a
- * constant. */
+/* Terms of an error estimate (error_estimate.c): log(1 + feature / floor) with a coefficient for each feature, and a
+   constant. */
 #define HYCO_TRUST_FEATURES 5
-#define HYCO_TRUST_DISTANCE 3 /* which of them is the distance */
-/* Contact forces below this share of the largest of a set count as that much where errors are divided by them. */
+#define HYCO_TRUST_DISTANCE 3 /* index of the distance among the features */
+/* A contact force below this share of the largest of a set is replaced by that share where errors are divided by it. */
 #define HYCO_SMALL_FORCE 0.1
 /* A predicted contact force up to this share of the largest is round-off. */
 #define HYCO_PRESSES 1e-10
@@ -33,82 +33,85 @@ typedef struct {
   PetscReal floor[HYCO_TRUST_FEATURES];
   PetscBool has[HYCO_N_TRUST];                          /* whether there is an estimate of this error */
   PetscReal law[HYCO_N_TRUST][HYCO_TRUST_FEATURES + 1]; /* coefficients >= 0, then the constant */
-  PetscReal force; /* 2-norm of the largest contact forces held out: a tenth of it divides smaller ones' errors */
-  PetscInt n_held; /* held-out predictions that the model was judged by; 0: none */
-  PetscReal median[HYCO_N_TRUST], largest[HYCO_N_TRUST]; /* their relative errors; huge: not converged, or x/0 */
+  PetscReal force; /* 2-norm of the largest held-out contact forces: errors of forces below a tenth of it are divided
+                      by that tenth */
+  PetscInt n_held; /* number of held-out predictions by which the model was judged; 0: none */
+  PetscReal median[HYCO_N_TRUST], largest[HYCO_N_TRUST]; /* their relative errors; very large: not converged, or x/0 */
 } HycoTrust;
 
-/* The path of the last prediction, of a scene with a history. `room` and `n` count accepted steps, the arrays of listed
-   times have room for all of them. */
+/* The path of the last prediction, for a scene with a history. `room` and `n` count accepted steps; the arrays of
+   listed times are allocated for all of them. */
 typedef struct {
-  PetscInt n_given; /* times of steps to be taken; NULL: its own. Borrowed */
+  PetscInt n_given; /* prescribed times of the steps; NULL: chosen by the path. Borrowed */
   const PetscReal *given;
-  PetscInt most_cuts; /* of HycoPath; not 0 where training judges */
+  PetscInt most_cuts; /* as in HycoPath; not 0 where training judges */
   PetscInt n, room;
   PetscReal *t, *gamma, *U_fe; /* n, n x l, n x n_fe */
-  PetscInt n_listed, shown;    /* reached; the one that gamma, U, Lambda are of */
+  PetscInt n_listed, shown;    /* number of listed times reached; the one to which gamma, U and Lambda belong */
   PetscInt *at;                /* by listed time: its accepted step */
   PetscReal *Lambda, *sigma, *inelastic;
   HycoHistory history;
-  HycoStep *step; /* n_listed: its steps with the scene's quantities; NULL: not measured yet, or there are none */
+  HycoStep *step; /* n_listed: its steps with the scene's quantities; NULL: not evaluated yet, or there are none */
 } HycoTrace;
 
-/* What all types of reduced model have; a type's own is in `data`. */
+/* Data of all types of reduced model; a type's own data is in `data`. */
 struct _p_HycoROM {
   PETSCHEADER(HycoROMOps);
-  HycoROMType type; /* the registry's own string */
+  HycoROMType type; /* the registry's string */
   HycoROMTraits traits;
-  char path[PETSC_MAX_PATH_LEN]; /* "": never was in a file */
+  char path[PETSC_MAX_PATH_LEN]; /* "": was never in a file */
   /* the description, as in the file */
   HycoScene scene;
   HycoMesh mesh;           /* cells of Omega_A; its nodes and those of every contact */
   HycoPairs pairs;         /* all N_lambda contacts, node indices of mesh */
   PetscInt *role;          /* by node of mesh */
   PetscInt *in_rid;        /* by contact: in A_lambda */
-  PetscReal *master_reach; /* moved surfaces: how far masters may be, by contact of the scene; NULL: none is moved, or
-                              the file is older than their search */
+  PetscReal *master_reach; /* moved surfaces: largest distance of a master point, by contact of the scene; NULL: none
+                              is moved, or the file is older than this search */
   PetscInt l;              /* POD modes */
   PetscReal *V;            /* (mesh n_nodes * dim) x l, row major: the modes on the nodes of mesh */
   PetscReal *sigma;        /* l singular values */
   HycoHybrid hybrid;
-  PetscInt n_fe, *fe_dof; /* displacements that the modes do not give: dofs of mesh, ascending; hybrid models alone */
+  PetscInt n_fe, *fe_dof; /* full-order displacements: dofs of mesh, ascending; hybrid models only */
   PetscInt n_points;
   PetscReal *points; /* training points, n_points x n_parameters */
-  PetscReal *reach; /* least, then largest values that training has seen of the parameters (error_estimate.c); made when
-                       needed */
+  PetscReal *reach;  /* least, then largest parameter values of the region of training (error_estimate.c); created
+                        when needed */
   char *provenance;
   char fingerprint[32]; /* of the scene and mesh that it was trained on */
   PetscInt whole_nodes, whole_cells;
   PetscInt counts[3]; /* modes of the dual, stress and force bases that seeded the RID; projection: force vectors,
-                         supremizers among the l modes (the last, with singular value 0), 0 */
+                         supremizers among the l modes (the last ones, with singular value 0), 0 */
   HycoTrust trust;
-  char *search; /* how train -target_... chose it, in words; NULL: it was not chosen so */
-  PetscReal
-      numbers[3]; /* condition of the reduced stiffness (0: not known, or none), training errors of u and lambda */
+  char *search;         /* how train -target_... chose the settings, in words; NULL: it did not */
+  PetscReal numbers[3]; /* condition number of the reduced stiffness (0: not known, or none), training errors of u and
+                           lambda */
   /* the whole mesh, on demand */
   HycoMesh whole;
   PetscReal *V_whole, *U_whole;
   HycoFE fe_whole;
   HycoPairs whole_pairs;
-  HycoBalance balance; /* what HycoROMGetEquilibrium() keeps; NULL: it was not called */
-  PetscBool balanced;  /* it is that of the last prediction */
-  HycoProbe probe;     /* of the scene's quantities; made by the first prediction that is asked for */
-  HycoCarried carried; /* what the contacts carry (contact_results.c); made when somebody asks */
+  HycoBalance balance; /* data kept by HycoROMGetEquilibrium(); NULL: not called */
+  PetscBool balanced;  /* it belongs to the last prediction */
+  HycoProbe probe;     /* of the scene's quantities; created by the first prediction that needs it */
+  HycoCarried carried; /* results of the contacts (contact_results.c); created when needed */
   HycoPointMonitor point_monitor;
   void *point_ctx;
-  /* online */
-  PetscBool full_order, full_displacement; /* what its user, who has the scene, is to do: HycoROMGetFallback() */
-  PetscBool wants_equilibrium;             /* -hyco_residual: a prediction has it */
+  /* online data */
+  PetscBool full_order, full_displacement; /* full-order actions requested from the caller, who has the scene:
+                                              HycoROMGetFallback() */
+  PetscBool wants_equilibrium;             /* -hyco_residual: each prediction computes the residual */
   PetscBool ready, reconstruct, solved, whole_current;
-  HycoFE fe;                /* on mesh, or on its first nodes (galerkin) */
-  PetscInt n, n_L;          /* unknowns and multipliers of the reduced problem */
+  HycoFE fe;                /* on mesh, or on a mesh of its first nodes (galerkin) */
+  PetscInt n, n_L;          /* numbers of unknowns and multipliers of the reduced problem */
   PetscInt m, *contact;     /* the contacts of A_lambda: index in pairs */
-  HycoPairs *of_fe;         /* they, on fe's mesh */
+  HycoPairs *of_fe;         /* the same contacts on fe's mesh */
   PetscInt *slave_id;       /* mesh-file tag of each contact's slave */
-  HycoMesh beyond;          /* mesh without cells; NULL until somebody asks */
+  HycoMesh beyond;          /* mesh without cells; NULL until needed */
   HycoFE fe_beyond;         /* on it */
-  PetscBool beyond_current; /* U on all nodes of mesh, the rows of all contacts: HycoROMComplete() was called */
-  PetscBool spread;         /* Lambda is not 0 outside A_lambda */
+  PetscBool beyond_current; /* U on all nodes of mesh and the rows of all contacts are current: HycoROMComplete() was
+                               called */
+  PetscBool spread;         /* Lambda may be nonzero outside A_lambda */
   HycoRows rows;            /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
   HycoSolver solver;
   PetscReal *gamma, *U, *Lambda, *stress;
@@ -118,25 +121,24 @@ struct _p_HycoROM {
 };
 
 PetscErrorCode HycoROMCreate(HycoROM *model);
-/* In the solve of a type that has paths: the accepted step whose gamma and U are the model's, at fe's parameters; and,
-   of a listed time, Lambda, and the stresses (n_cells x n_sigma) and inelastic strains of the RID's cells (rom_path.c).
- */
+/* Called in the solve of a type that has paths. HycoTraceAdd(): the accepted step whose gamma and U are the model's,
+   at fe's parameters. HycoTraceList(): at a listed time, Lambda, and the stresses (n_cells x n_sigma) and inelastic
+   strains of the RID's cells (rom_path.c). */
 PetscErrorCode HycoTraceBegin(HycoROM model);
 PetscErrorCode HycoTraceAdd(HycoROM model, PetscReal t);
 PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inelastic);
-/* Of that listed time, once m->Lambda is of all contacts: its forces, and the size of U in the RID. */
+/* For that listed time, once m->Lambda has all contacts: its forces, and the norm of U in the RID. */
 void HycoTraceMeasure(HycoROM model, HycoStep *step);
 PetscErrorCode HycoTraceFree(HycoROM model);
-/* HycoROMSetSteps() for a path that training judges: it ends where too many of these steps are cut. */
+/* HycoROMSetSteps() for a path that training judges: it ends if too many of these steps are halved. */
 PetscErrorCode HycoROMSetJudgedSteps(HycoROM model, PetscInt n, const PetscReal t[]);
-/* The fields of the path at its listed times on the whole mesh, as HycoFOMSetSeries() has them (replay.c). */
+/* Writes the fields of the path at its listed times on the whole mesh, as HycoFOMSetSeries() does (replay.c). */
 PetscErrorCode HycoTraceWrite(HycoROM model, const char path[]);
 /*
-  The laws again along the path of the last prediction, on `fe` (of whatever cells): HycoReplayBegin(), then of each
-  accepted step k from 0 on HycoReplayMove(), with which fe stands at its time and parameters, and HycoReplayStep() with
-  fe's displacements u (n_dof) there, after which the march has its state and internal forces; fails where a law has no
-  answer. HycoReplayTry() says so in the report instead.
-  HycoReplayEnd() also after a failure.
+  Replay of the laws along the path of the last prediction, on `fe` (with any cells): HycoReplayBegin(), then for each
+  accepted step k from 0 on HycoReplayMove(), which sets fe to its time and parameters, and HycoReplayStep() with the
+  displacements u (n_dof) there, after which the march has its state and internal forces; fails if a law has no
+  solution. HycoReplayTry() puts this into the report instead. HycoReplayEnd() also after a failure.
 */
 typedef struct {
   HycoROM m; /* borrowed */
@@ -147,36 +149,36 @@ PetscErrorCode HycoReplayMove(HycoReplay *replay, PetscInt k);
 PetscErrorCode HycoReplayStep(HycoReplay *replay, PetscInt k, const PetscReal u[]);
 PetscErrorCode HycoReplayTry(HycoReplay *replay, PetscInt k, const PetscReal u[], HycoFEStepReport *report);
 PetscErrorCode HycoReplayEnd(HycoReplay *replay);
-/* The path's part of a prediction. */
+/* Sets the part of a prediction that describes the path. */
 void HycoTraceSummary(HycoROM model, HycoPrediction *prediction);
-/* U of the whole mesh (n_dof) from what accepted step k left of it, fe_whole being at its parameters. */
+/* U of the whole mesh (n_dof) from the stored data of accepted step k, with fe_whole at its parameters. */
 void HycoTraceWholeU(HycoROM model, PetscInt k, PetscReal U[]);
-/* Builds what the online phase needs from the description; again after the full-order set changed. */
+/* Builds the online data from the description; called again after the full-order set has changed. */
 PetscErrorCode HycoROMSetUp(HycoROM model);
-/* Frees what is online. */
+/* Frees the online data. */
 PetscErrorCode HycoROMReset(HycoROM model);
-/* The names of the registered types, in the alphabet's order; NULL ends. Borrowed, until another is registered. */
+/* The names of the registered types, in alphabetical order; NULL ends. Borrowed, until another is registered. */
 PetscErrorCode HycoROMTypeNames(const char *const **names);
-/* In a type's setup: gamma, U, Lambda, stress, slave tags and the solver, once fe is there. */
+/* In a type's setup: creates gamma, U, Lambda, stress, slave tags and the solver, once fe is set. */
 PetscErrorCode HycoROMSetUpFields(HycoROM model);
-/* In a type's solve, after HycoROMSetUpDefault(): rows and gaps at mu, as far as they have changed; U = u0 + V gamma.
- */
+/* In a type's solve, after HycoROMSetUpDefault(): updates rows and gaps to mu where they have changed; U = u0 + V
+   gamma. */
 PetscErrorCode HycoROMBringRows(HycoROM model, const PetscReal mu[]);
 PetscErrorCode HycoROMExpand(HycoROM model);
-/* Modes with a singular value: those of a POD. */
+/* The number of modes with a singular value: those of a POD. */
 PetscInt HycoROMCountPOD(HycoROM model);
 /* Sets the full-order unknowns (dofs of mesh, any order). */
 PetscErrorCode HycoROMSetFE(HycoROM model, HycoHybrid hybrid, PetscInt n, const PetscInt dof[]);
 
-/* Room for the rows of contacts. */
+/* Allocates the rows of contacts. */
 PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows);
 PetscErrorCode HycoRowsDestroy(HycoRows *rows);
-/* Brings the rows and gaps of all contacts and U of all nodes of mesh to the last prediction. */
+/* Updates the rows and gaps of all contacts, and U on all nodes of mesh, to the last prediction. */
 PetscErrorCode HycoROMComplete(HycoROM model);
-/* The rows and gaps alone; fe: at the last prediction's parameters, on a mesh with the nodes and facets of all
-   contacts. Borrowed. */
+/* Updates only the rows and gaps; fe: at the last prediction's parameters, on a mesh with the nodes and facets of
+   all contacts. Borrowed. */
 PetscErrorCode HycoROMBringContacts(HycoROM model, HycoFE *fe);
-/* start + B[k,:] U, after it. */
+/* start + B[k,:] U, after HycoROMComplete(). */
 static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start)
 {
   for (PetscInt j = model->rows.start[k]; j < model->rows.start[k + 1]; j++)
@@ -186,49 +188,50 @@ static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start
 
 /* The scene's quantities of the last prediction, of a path also those of its listed times (probe.c). */
 PetscErrorCode HycoROMMeasureQuantities(HycoROM model, HycoPrediction *prediction);
-/* Of a path: into its history's steps; done once. */
+/* For a path: evaluates them in its history's steps; done once. */
 PetscErrorCode HycoROMMeasurePath(HycoROM model);
-/* What each contact of the scene carries in forces Lambda (of all contacts) at the last prediction's parameters; NULL
-   where the model has not the forces of all. Borrowed until the next call. */
+/* Results of each contact of the scene for forces Lambda (of all contacts) at the last prediction's parameters; NULL
+   if the model does not have all forces. Borrowed until the next call. */
 PetscErrorCode HycoROMSumContacts(HycoROM model, const PetscReal Lambda[], const HycoContactResult *result[]);
 /* NULL-safe. */
 PetscErrorCode HycoCarriedDestroy(HycoCarried *carried);
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
 PetscErrorCode HycoBalanceDestroy(HycoBalance *balance);
 
-/* What tells of the last prediction's error without a full-order solution: feature[HYCO_TRUST_FEATURES], all >= 0. */
+/* Features that indicate the last prediction's error without a full-order solution: feature[HYCO_TRUST_FEATURES],
+   all >= 0. */
 PetscErrorCode HycoTrustMeasure(HycoROM model, PetscReal feature[]);
 /* The estimated errors of the last prediction, and how far outside the ranges it lies. */
 PetscErrorCode HycoTrustEstimate(HycoROM model, HycoPrediction *prediction);
 PetscErrorCode HycoTrustView(HycoROM model, PetscViewer viewer);
-/* Distance of two points, each parameter scaled to its range. */
+/* Distance of two points, with each parameter scaled to its range. */
 PetscReal HycoTrustDistance(HycoScene scene, const PetscReal a[], const PetscReal b[]);
-/* The contact forces' part of a comparison before any division: 2-norms of what is missed and of the reference, of all
-   contacts and of the RID's. */
+/* The contact forces' part of a comparison before any division: 2-norms of the error and of the reference, over all
+   contacts and over the RID's. */
 typedef struct {
   PetscReal lost, size, rid_lost, rid_size;
 } HycoForceErrors;
 
 /* Errors of the last prediction on the RID and of its forces against a full-order solution: u at the nodes of the
    model's mesh (n_nodes * dim), sigma in its cells (n_cells * n_sigma; NULL: not compared), lambda (n_contacts). The
-   errors on the whole mesh are left alone. `forces` may be NULL. */
+   errors on the whole mesh are not changed. `forces` may be NULL. */
 PetscErrorCode HycoROMCompareRID(HycoROM model, const PetscReal u[], const PetscReal sigma[], const PetscReal lambda[],
                                  HycoErrors *errors, HycoForceErrors *forces);
 
-/* Writes rank 0's model and, each rank its rows, the mesh over the ranks with its first l modes V (rows in the file's
+/* Writes rank 0's model and, each rank its rows, the distributed mesh with its first l modes V (rows in the file's
    order). Collective. */
 PetscErrorCode HycoROMSave(HycoROM model, HycoFOM mesh, PetscInt l, Mat V, const char path[]);
-/* The names of a mesh's groups, to the file or from it. */
+/* Reads or writes the names of a mesh's groups. */
 PetscErrorCode HycoMeshMoveGroupNames(HycoH5 file, const char name[], HycoMesh mesh);
 /* The whole-mesh part of the file, by rows (whole_mesh.c). Collective. */
 PetscErrorCode HycoROMWriteWhole(HycoH5 file, HycoFOM mesh, PetscInt l, Mat V);
-/* The model of rank 0, without its whole-mesh part, on every rank, as the same bytes that HycoROMSave() writes; others'
- *model is destroyed first. Collective. */
+/* Copies the model of rank 0, without its whole-mesh part, to every rank, through the bytes that HycoROMSave()
+   writes; an existing *model of another rank is destroyed first. Collective. */
 PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model);
-/* Reads the whole-mesh part, unless it is there. */
+/* Reads the whole-mesh part, unless it is already read. */
 PetscErrorCode HycoROMLoadWhole(HycoROM model);
 PetscErrorCode HycoROMFreeWhole(HycoROM model);
-/* The place of a dataset's text among words. */
+/* The index of a dataset's text in a list of words. */
 PetscErrorCode HycoROMLoadWord(HycoROM model, HycoH5 file, const char name[], const char *const words[],
                                PetscInt *index);
 

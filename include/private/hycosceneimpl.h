@@ -1,4 +1,4 @@
-/* The scene's parts: expressions, bodies, supports, loads, contacts; and how its entries are stored. */
+/* The scene's parts: expressions, bodies, supports, loads, contacts; and the storage of its entries. */
 #ifndef HYCOSCENEIMPL_H
 #define HYCOSCENEIMPL_H
 
@@ -16,18 +16,18 @@ typedef struct _n_HycoExpr *HycoExpr;
 PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, const char *const names[],
                               HycoExpr *expr);
 PetscErrorCode HycoExprDestroy(HycoExpr *expr);
-/* Where it was evaluated, for messages: the coordinates, and the parameters that it reads. */
+/* The place of an evaluation, for messages: the coordinates, and the parameters in the expression. */
 PetscErrorCode HycoExprPlace(HycoExpr expr, const PetscReal mu[], const PetscReal xyz[3], char place[HYCO_LINE]);
-/* Values at n points (n x 3 coordinates) and mu; fails on a value that is not finite. */
+/* Values at n points (n x 3 coordinates) and mu; fails for a value that is not finite. */
 PetscErrorCode HycoExprEval(HycoExpr expr, const PetscReal mu[], PetscInt n, const PetscReal xyz[], PetscReal value[]);
-/* The same of an expression that may name `temperature`, n values; NULL where it does not. */
+/* The same for an expression that may contain `temperature`, n values; NULL if it does not. */
 PetscErrorCode HycoExprEvalHot(HycoExpr expr, const PetscReal mu[], PetscInt n, const PetscReal xyz[],
                                const PetscReal temperature[], PetscReal value[]);
 /* Whether x, y or z appears; whether any parameter p with changed[p] does. NULL-safe (false). */
 PetscBool HycoExprInSpace(HycoExpr expr);
-/* Whether `temperature` does, which only a law's constants and the expansion may name. NULL-safe. */
+/* Whether `temperature` appears, which only constants of laws and the expansion may contain. NULL-safe. */
 PetscBool HycoExprInHeat(HycoExpr expr);
-/* Fails where it does. */
+/* Fails if it appears. */
 PetscErrorCode HycoExprRefuseHeat(HycoExpr expr);
 PetscBool HycoExprChanges(HycoExpr expr, const PetscBool changed[]);
 const char *HycoExprKey(HycoExpr expr);
@@ -38,10 +38,10 @@ typedef struct {
   char *name, *title; /* "young", "Young's modulus" */
   HycoEntryKind kind;
   PetscBool required;
-  HycoExpr expr;    /* of an expression that the scene gives */
+  HycoExpr expr;    /* of an expression given in the scene */
   char *text;       /* of a group, a text */
-  PetscBool heat;   /* its expression may name `temperature` */
-  PetscReal value;  /* of a length, and where the scene gives no expression */
+  PetscBool heat;   /* its expression may contain `temperature` */
+  PetscReal value;  /* of a length, or if the scene gives no expression */
   PetscReal lo, hi; /* of a law's constant: open interval */
 } HycoEntry;
 typedef struct {
@@ -49,12 +49,12 @@ typedef struct {
   HycoEntry entry[HYCO_MAX_DECLARED];
 } HycoDeclared;
 
-/* The next entry; `declared` holds it. */
+/* Adds an entry; `declared` owns it. */
 PetscErrorCode HycoDeclaredAdd(HycoDeclared *declared, const char name[], const char title[], HycoEntryKind kind,
                                PetscBool required, HycoEntry **entry);
-/* In any letter case; NULL: there is none. */
+/* In upper or lower case; NULL: there is none. */
 HycoEntry *HycoDeclaredFind(HycoDeclared *declared, const char name[]);
-/* What the scene's entry `key` says. */
+/* Reads the scene's entry `key`. */
 PetscErrorCode HycoDeclaredRead(HycoScene scene, const char key[], const char text[], HycoEntry *entry);
 PetscErrorCode HycoDeclaredView(const HycoDeclared *declared, PetscViewer viewer);
 PetscErrorCode HycoDeclaredDestroy(HycoDeclared *declared);
@@ -62,11 +62,11 @@ PetscErrorCode HycoDeclaredDestroy(HycoDeclared *declared);
 typedef struct {
   char *name;
   HycoMaterial law;
-  PetscBool bbar;    /* mean dilatation (B-bar) instead of the displacements' own at each point */
-  PetscBool element; /* whether the scene says so; if not, HycoFE chooses by the law */
+  PetscBool bbar;    /* mean dilatation (B-bar) instead of the dilatation at each point */
+  PetscBool element; /* whether the scene gives the element; if not, HycoFE chooses by the law */
   HycoExpr map[3];   /* moved coordinates; NULL: not moved */
   HycoExpr force[3]; /* body force per unit volume; NULL: none */
-  HycoExpr density;  /* mass per unit volume, of gravity and rotation; NULL: none */
+  HycoExpr density;  /* mass per unit volume, for gravity and rotation; NULL: none */
   HycoExpr temperature, reference, expansion; /* K; thermal strain expansion (temperature - reference); NULL: none */
 } HycoBody;
 
@@ -78,7 +78,7 @@ typedef struct {
 
 typedef struct {
   char *group;
-  HycoExpr pressure;    /* positive pushes against the outward normal; NULL: none */
+  HycoExpr pressure;    /* positive: acts against the outward normal; NULL: none */
   HycoExpr traction[3]; /* force per unit surface; NULL: none */
 } HycoLoad;
 
@@ -99,20 +99,19 @@ typedef struct {
   HycoExpr stiffness[4]; /* along x, y, z and the surface's normal, 0 or more; NULL: none */
 } HycoSpring;
 
-/* Surfaces of two bodies that move as one: the slave's nodes follow the master's facets. */
+/* Two surfaces tied together: the slave's nodes follow the master's facets. */
 typedef struct {
   char *name, *slave, *master;
-  PetscReal tolerance; /* largest distance as drawn; negative: by the slave's facets */
+  PetscReal tolerance; /* largest distance in the mesh file; negative: derived from the slave's facets */
 } HycoTie;
 
-/* What a 2D scene stands for: a slice of thickness 1 that does not stretch (eps_zz = 0) or is free to (sigma_zz = 0),
-   or a body of revolution about x = 0: x is the radius, y the axis, zz the hoop; all integrals are over the full
-   circle. */
+/* The formulation of a 2D scene: plane strain (thickness 1, eps_zz = 0), plane stress (sigma_zz = 0), or a body of
+   revolution about x = 0: x is the radius, y the axis, zz the hoop; all integrals are over the full circle. */
 typedef enum { HYCO_PLANE_STRAIN, HYCO_PLANE_STRESS, HYCO_AXISYMMETRIC } HycoFormulation;
 
-/* A number that the scene asks of each solution: the largest, smallest or mean value of a field over a group; the force
-   of its supports along an axis; from HYCO_QUANTITY_FORCE on what a contact carries: its resultant along an axis, its
-   moment about one, its largest pressure. */
+/* An output of the scene, a number for each solution: the largest, smallest or mean value of a field over a group;
+   the force of supports along an axis; from HYCO_QUANTITY_FORCE on, a result of a contact: its resultant along an
+   axis, its moment about one, its largest pressure. */
 typedef enum {
   HYCO_QUANTITY_MAX,
   HYCO_QUANTITY_MIN,
@@ -124,41 +123,41 @@ typedef enum {
 } HycoQuantityKind;
 typedef struct {
   char *name, *group; /* group NULL: all of the mesh */
-  char *contact;      /* NULL: all of them */
-  PetscBool given;    /* the kind and the field are */
+  char *contact;      /* NULL: all contacts */
+  PetscBool given;    /* the kind and the field are given */
   HycoQuantityKind kind;
-  PetscInt field; /* of HycoQuantityFields; along or about an axis 0 to 2 */
+  PetscInt field; /* index in HycoQuantityFields; along or about an axis 0 to 2 */
 } HycoQuantity;
 extern const char *const HycoQuantityFields[]; /* NULL ends */
 
-/* A quantity over time: linear between its rows, constant before the first and after the last. */
+/* A time table: linear between its rows, constant before the first and after the last. */
 typedef struct {
   PetscInt n;
   PetscReal *t, *value;
 } HycoTimeTable;
 
-/* What fields are measured in. */
+/* The kinds of unit of the fields. */
 enum { HYCO_UNIT_LENGTH, HYCO_UNIT_FORCE, HYCO_UNIT_STRESS, HYCO_N_UNITS };
 
 struct _p_HycoScene {
   PETSCHEADER(int);
-  PetscOptions options;                         /* every entry, the command line's already in */
+  PetscOptions options;                         /* every entry, those of the command line included */
   char *title, *mesh_path, *unit[HYCO_N_UNITS]; /* units: notes, "" where the scene has none */
-  DM dm;                                        /* the program's own mesh; NULL: mesh_path */
-  PetscInt refine;                              /* times that the mesh's cells are halved */
+  DM dm;                                        /* the mesh of a calling program; NULL: mesh_path */
+  PetscInt refine;                              /* how often the mesh's cells are halved */
   HycoFormulation formulation;
-  char *folder; /* where relative paths of entries start */
+  char *folder; /* folder of the entries' relative paths */
   /* parameters */
   PetscInt n_parameters;
-  PetscInt n_variables; /* of expressions: the parameters; with a history t and its tables' values too */
+  PetscInt n_variables; /* variables of expressions: the parameters; with a history also t and its tables' values */
   char *parameter[HYCO_MAX_PARAMETERS]; /* names of the variables, the parameters' first */
   PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS];
-  PetscBool extrapolate; /* values outside the ranges pass */
+  PetscBool extrapolate; /* values outside the ranges are accepted */
   /* history; without one n_times is 0 */
   PetscInt n_times, n_tables;
-  PetscReal *times; /* increasing; the first is where the path begins */
+  PetscReal *times; /* increasing; the first is the start of the path */
   HycoTimeTable table[HYCO_MAX_PARAMETERS];
-  /* names that stand for expressions; the texts are the entries' */
+  /* names of constants; their expressions are the entries' texts */
   PetscInt n_constants, *constant;
   /* description */
   PetscInt n_bodies, n_fixed, n_loads, n_point_loads, n_springs, n_contacts, n_ties;
@@ -172,19 +171,19 @@ struct _p_HycoScene {
   HycoTie *tie;
   PetscInt n_quantities;
   HycoQuantity *quantity;
-  /* entries, sorted by key: what a model file carries */
+  /* entries, sorted by key, as in a model file */
   PetscInt n_entries;
   char **key, **value;
 };
 
-/* Notes the entries constant_NAME, once all variables are known. */
+/* Registers the entries constant_NAME, once all variables are known. */
 PetscErrorCode HycoSceneReadConstants(HycoScene scene);
-/* The expression of an entry, with the scene's constants put in. */
+/* The expression of an entry, with the scene's constants substituted. */
 PetscErrorCode HycoSceneExpression(HycoScene scene, const char key[], const char text[], HycoExpr *expr);
-/* Reads an entry of gravity or rotation; checks them. */
+/* Reads an entry of gravity or rotation; checks all of them. */
 PetscErrorCode HycoSceneReadMotion(HycoScene scene, PetscInt entry);
 PetscErrorCode HycoSceneCheckMotion(HycoScene scene);
-/* Whether a body's mass makes a force, which changes with the parameters p with changed[p] (NULL: whether there is). */
+/* Whether a body's mass causes a force that changes with the parameters p with changed[p] (NULL: any force). */
 PetscBool HycoSceneHasInertia(HycoScene scene, const HycoBody *body, const PetscBool changed[]);
 PetscErrorCode HycoSceneDestroyMotion(HycoScene scene);
 /* Reads an entry tie_NAME_...; checks all of them. */
@@ -194,13 +193,13 @@ PetscErrorCode HycoSceneDestroyTies(HycoScene scene);
 /* Reads an entry output_NAME_...; checks all of them. */
 PetscErrorCode HycoSceneReadQuantity(HycoScene scene, PetscInt entry, const char name[], PetscInt field);
 PetscErrorCode HycoSceneCheckQuantities(HycoScene scene);
-/* Whether one of them is of kind `first` or of one from there to `last`. */
+/* Whether the scene has a quantity of kind `first`, or of a kind from `first` to `last`. */
 PetscBool HycoSceneAsks(HycoScene scene, HycoQuantityKind first, HycoQuantityKind last);
 static inline PetscBool HycoSceneHasReactions(HycoScene scene)
 {
   return HycoSceneAsks(scene, HYCO_QUANTITY_REACTION, HYCO_QUANTITY_REACTION);
 }
-/* Whether they need the bodies' fields, what contacts carry. */
+/* Whether the quantities need the bodies' fields; the results of contacts. */
 static inline PetscBool HycoSceneAsksFields(HycoScene scene)
 {
   return HycoSceneAsks(scene, HYCO_QUANTITY_MAX, HYCO_QUANTITY_REACTION);
@@ -211,7 +210,7 @@ static inline PetscBool HycoSceneAsksContacts(HycoScene scene)
 }
 /* Reads the history's entries, once the parameters are read. */
 PetscErrorCode HycoSceneReadHistory(HycoScene scene);
-/* Fails where the history reaches what must not change in time: the bodies' places, the rows of B. */
+/* Fails if time changes what must be constant: the bodies' places, the rows of B. */
 PetscErrorCode HycoSceneCheckHistory(HycoScene scene);
 PetscErrorCode HycoSceneDestroyHistory(HycoScene scene);
 /* "gap = 0.05, q2 = 40" */
@@ -219,25 +218,28 @@ void HycoSceneNamePoint(HycoScene scene, const PetscReal mu[], char at[HYCO_LINE
 /* The variables at time t: the parameters mu (n_parameters), t, the tables' values; out has room for n_variables. */
 void HycoSceneSetTime(HycoScene scene, const PetscReal mu[], PetscReal t, PetscReal out[]);
 /* The first time after t at which a step ends: a listed one, or a row of a table. */
-/* Fails where the history of a scene is not that which the model at `path` was trained with, naming what differs. */
-PetscErrorCode HycoSceneCompareHistory(HycoScene trained, HycoScene scene, const char path[]);
 PetscReal HycoSceneNextStop(HycoScene scene, PetscReal t);
+/* The history's entries, one line "key value" each; the caller frees *text (PetscFree). Without a history: empty. */
+PetscErrorCode HycoSceneWriteHistory(HycoScene scene, char **text);
+/* Fails if the history of a scene differs from that of the file at `path`, which stored the lines made[] of
+   HycoSceneWriteHistory(), and names the difference. */
+PetscErrorCode HycoSceneCompareHistory(HycoScene scene, const char made[], const char path[]);
 PetscBool HycoIsVariableName(const char word[]);
 
-/* Builds a scene from n (key, value) entries; `folder` is where a relative mesh path starts. */
+/* Builds a scene from n (key, value) entries; `folder`: folder of a relative mesh path. */
 PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[], char *const value[],
                                     const char folder[], HycoScene *scene);
 /* The entries as text, one "key\tvalue" per line, and back. The caller frees the text. */
 PetscErrorCode HycoSceneToText(HycoScene scene, char **text);
 PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *scene);
-/* What n points (n x n_parameters) reach of each parameter: from the least to the largest value, and half the widest
-   step between two more at either end, so that grids of cell centres reach the ends of the ranges; never past the
+/* The range of each parameter covered by n points (n x n_parameters): from the least to the largest value, plus half
+   the widest step between two values at either end, so that grids of cell centres cover the ranges; clipped to the
    ranges. */
 PetscErrorCode HycoSamplesReach(HycoScene scene, PetscInt n, const PetscReal mu[], PetscReal lo[], PetscReal hi[]);
 /* The scene of a set of points. Borrowed. */
 PetscErrorCode HycoSamplesGetScene(HycoSamples samples, HycoScene *scene);
-/* A hash of all that decides a full-order solution: entries (but not hyco_ ones) and the mesh file's bytes. Collective.
- */
+/* A hash of everything that determines a full-order solution: entries (except hyco_ ones) and the mesh file's bytes.
+   Collective. */
 PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash);
 
 #endif

@@ -1,8 +1,9 @@
-/* HycoSnapshots, inside. */
+/* HycoSnapshots' struct and internal functions. */
 #ifndef HYCOSNAPSHOTSIMPL_H
 #define HYCOSNAPSHOTSIMPL_H
 
 #include <hycofomimpl.h>
+#include <hycoh5.h>
 #include <hycoqueue.h>
 #include <hycosnapshots.h>
 
@@ -11,40 +12,43 @@ struct _p_HycoSnapshots {
   HycoScene scene; /* referenced */
   char folder[PETSC_MAX_PATH_LEN];
   unsigned long long fingerprint;
-  PetscInt n_groups, *solved; /* most groups that have solved at a time; solutions of each (room for every rank) */
+  PetscInt n_groups, *solved; /* largest number of groups that have solved at a time; number of solutions of each
+                                 (room for every rank) */
+  HycoH5 last;                /* the file that was read last, checked and open; or NULL */
+  char last_path[PETSC_MAX_PATH_LEN]; /* its name */
 };
 
-/* A queue of the points list[n] of mu (n_par each) for as many groups as HycoSnapshotsChooseGroups() gives for n_all,
-   the points of the whole set: a solution does not depend on how many others are missing. Points that share a
-   stiffness, and its factor, are of one kind. Everything is the same on every rank. Collective. */
+/* Creates a queue of the points list[n] of mu (n_par each) for as many groups as HycoSnapshotsChooseGroups() chooses
+   for n_all, the points of the whole set: a solution does not depend on how many others are missing. Points with a
+   common stiffness, and thus a common factor, are of one kind. Everything is the same on every rank. Collective. */
 PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
                                         PetscInt n, const PetscInt list[], PetscInt n_all, HycoQueue *queue);
 
-/* Columns of a sample: 1, or the listed times of a history. */
+/* Columns of a sample: 1, or the number of listed times of a history. */
 static inline PetscInt HycoSnapshotsSteps(HycoScene scene)
 {
   return PetscMax(1, scene->n_times);
 }
 /*
-  One field of the n samples from `first` on as a dense matrix, a column per sample, of a scene with a history one per
-  listed time of each, sample after sample: "U" (n_nodes x dim unrolled), "lambda" (n_contacts), "sigma" (n_cells x
-  n_sigma unrolled), "force" (as U); of a history "inelastic" (n_cells, accumulated). Rows in the mesh file's order, in
-  contiguous blocks over comm, of whole blocks of rows: those of U that belong to a node stay together. Collective; the
-  caller owns it. A field without rows gives a matrix of zero rows.
+  One field of the n samples from `first` on as a dense matrix, with a column per sample, for a scene with a history one
+  per listed time of each, sample after sample: "U" (n_nodes x dim unrolled), "lambda" (n_contacts), "sigma" (n_cells x
+  n_sigma unrolled), "force" (as U); with a history "inelastic" (n_cells, accumulated). Rows in the mesh file's order,
+  in contiguous blocks over comm; the rows of a node or cell stay on one rank. Collective; the caller owns it. A field
+  without rows gives a matrix of zero rows.
 */
 PetscErrorCode HycoSnapshotsGetField(HycoSnapshots store, HycoSamples samples, PetscInt first, PetscInt n,
                                      const char field[], PetscInt block, Mat *S);
 /* The number of rows of a field. Collective. */
 PetscErrorCode HycoSnapshotsGetRows(HycoSnapshots store, HycoSamples samples, const char field[], PetscInt *n);
-/* Of a path the displacements at steps that full order took between listed times (at most five between
-   two; none in files of older versions), a column each; `rows` rows of `total` here. Collective; the caller owns it. */
+/* For a path, the displacements at full order's steps between listed times (at most five between two; none in files
+   of older versions), a column each; `rows` rows of `total` on this rank. Collective; the caller owns it. */
 PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots store, const PetscReal mu[], PetscInt rows, PetscInt total,
                                        Mat *U);
-/* The n values from `first` on of one field of the solution at mu, of a history at listed time k (else 0), into the
+/* The n values from `first` on of one field of the solution at mu, with a history at listed time k (else 0), in the
    caller's memory. Not collective. */
 PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots store, const PetscReal mu[], PetscInt k, const char field[],
                                      PetscInt first, PetscInt n, PetscReal value[]);
-/* The times of the steps that the path at mu took (the caller's). Not collective. */
+/* The times of the steps of the path at mu (the caller frees them). Not collective. */
 PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots store, const PetscReal mu[], PetscInt *n, PetscReal **taken);
 
 #endif

@@ -1,4 +1,4 @@
-/* The contact system and its solver, inside. */
+/* The contact system and its solver: structs and internal functions. */
 #ifndef HYCOSOLVERIMPL_H
 #define HYCOSOLVERIMPL_H
 
@@ -9,39 +9,39 @@
 struct _p_HycoSystem {
   PETSCHEADER(int);
   Mat K, Bt, B; /* referenced; NULL where the flexibility is given */
-  Mat G;        /* referenced: the flexibility B K^-1 Bt, dense; NULL where K is given */
-  Vec F, D;     /* referenced; D: with G the gap without forces */
+  Mat G;        /* referenced: the flexibility B K^-1 Bt, dense; NULL if K is given */
+  Vec F, D;     /* referenced; D: if G is given, the gap without forces */
   PetscBool symmetric;
-  PetscInt n, m; /* unknowns, contacts */
-  /* work of the residuals, made by the first */
-  Vec work_x[2], work_L; /* as F, as D */
-  PetscReal size_B;      /* its largest row sum, while B is as seen */
-  PetscReal residual;    /* 2-norm of F - K x - Bt L beyond round-off, of the last residuals */
+  PetscInt n, m; /* numbers of unknowns, contacts */
+  /* work vectors of the residuals, created by the first */
+  Vec work_x[2], work_L; /* like F, like D */
+  PetscReal size_B;      /* its largest row sum, valid while B is unchanged */
+  PetscReal residual;    /* 2-norm of F - K x - Bt L beyond round-off, when residuals were last computed */
   HycoOperatorState seen_B;
 };
 
-/* The work vectors of a system whose vectors are set. */
+/* Creates the work vectors of a system whose vectors are set. */
 PetscErrorCode HycoSystemWork(HycoSystem system);
 
 /*
-  A form: the unknowns in which the complementarity problem is posed, one file in impls/ each. Every solver has one of
-  each registered form; s->now is the method that it is asked for.
+  A form: the unknowns in which the complementarity problem is posed, one file in impls/ each. Every solver has one
+  object of each registered form; s->now is the requested method.
 */
 struct _HycoSolverFormOps {
-  /* *cost >= 0: it accepts system and method; the cheapest is taken. Else `why` says what to use instead. `asked`: the
-     user named the form. */
+  /* *cost >= 0: the form accepts system and method; the cheapest is chosen. Else `why` says what to use instead.
+     `asked`: the user has named the form. */
   PetscErrorCode (*accepts)(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE]);
-  /* Bytes that its factor would take on all ranks together; NULL: what a factor of K takes. */
+  /* Memory of its factor on all ranks together, in bytes; NULL: that of a factor of K. */
   PetscErrorCode (*estimate)(HycoSolver s, HycoSolverForm form, PetscReal *bytes);
-  /* What K and B alone decide, unless they are as they were. */
+  /* Computes what depends only on K and B, unless they are unchanged. */
   PetscErrorCode (*setup)(HycoSolver s, HycoSolverForm form, PetscBool *singular);
-  /* Fills x and L, sets s->its; *solved: the method finished by its own account. */
+  /* Computes x and L, sets s->its; *solved: the method reports convergence. */
   PetscErrorCode (*solve)(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved);
-  /* May be NULL. After a solve that failed: *better where another one now has less round-off. */
+  /* May be NULL. After a solve that failed: *better if another solve now has less round-off. */
   PetscErrorCode (*refine)(HycoSolver s, HycoSolverForm form, PetscBool *better);
-  /* May be NULL. Ends a refinement: each solve begins alike. */
+  /* May be NULL. Ends a refinement, so that each solve starts in the same way. */
   PetscErrorCode (*reset)(HycoSolver s, HycoSolverForm form);
-  /* May be NULL. The options of this form alone. */
+  /* May be NULL. The options of this form. */
   PetscErrorCode (*setfromoptions)(HycoSolver s, HycoSolverForm form, HycoOptionItems PetscOptionsObject);
   PetscErrorCode (*destroy)(HycoSolverForm form);
 };
@@ -51,9 +51,9 @@ struct _n_HycoSolverForm {
   void *data;
 };
 
-/* How a form's complementarity problem is solved: by a type of Tao. */
+/* The method for a form's complementarity problem: a Tao type. */
 typedef struct {
-  const char *word; /* of -hyco_solver_type and the reports */
+  const char *word; /* as in -hyco_solver_type and the reports */
   char type[HYCO_TAO_NAME];
   int traits; /* HYCO_TAO_... */
 } HycoMethod;
@@ -61,12 +61,12 @@ typedef struct {
 /* A factor of K: LAPACK's where it is dense, else MUMPS's with the Schur complement. */
 typedef struct {
   HycoDirect direct;
-  PetscReal bytes; /* estimated for it, all ranks together */
+  PetscReal bytes; /* estimated memory, all ranks together */
   PetscReal *lu;   /* column major n x n */
   PetscBLASInt *ipiv, n;
-  PetscReal *X; /* its work: K^-1 Bt, n x room */
+  PetscReal *X; /* work: K^-1 Bt, n x room */
   size_t room;
-  PetscBool refined; /* solves with it are refined in twice the working precision, S too */
+  PetscBool refined; /* solves are refined in twice the working precision, and so is S */
   HycoOperatorState of;
 } HycoStiffness;
 
@@ -75,37 +75,37 @@ struct _p_HycoSolver {
   /* user parameters */
   HycoSystem system;                           /* referenced */
   PetscInt type;                               /* index in HycoSolverTypes */
-  char form_name[32], tao_type[HYCO_TAO_NAME]; /* empty: by the problem */
+  char form_name[32], tao_type[HYCO_TAO_NAME]; /* empty: chosen by the problem */
   PetscReal rtol;
   PetscInt max_its;
   PetscBool warm, fallback, multilevel, refine;
   HycoLinear linear;
-  PetscReal memory; /* bytes that factors may take, all ranks together; 0: most of what is free */
+  PetscReal memory; /* memory in bytes that factors may use, all ranks together; 0: most of the free memory */
   HycoMonitor monitor;
   void *monitor_ctx;
   /* children */
   PetscInt n_forms;
   HycoSolverForm *forms;
   HycoStiffness stiffness; /* shared by the forms that factor K */
-  /* direct or iterative, chosen for one K */
+  /* direct or iterative, chosen once for each K */
   PetscBool iterative;
   PetscObjectId chosen_for;
   char linear_method[128], why_iterative[96];
-  Vec free;                   /* K^-1 F of the next solve, if known; borrowed */
-  const PetscBool *start_set; /* of the next solve, if given; borrowed */
-  PetscReal target;           /* residual that the next solve is to reach by iterations; 0: by rtol alone */
-  /* the attempt under way, or the last one */
+  Vec free;                   /* K^-1 F for the next solve, if known; borrowed */
+  const PetscBool *start_set; /* active set for the next solve, if given; borrowed */
+  PetscReal target;           /* largest residual of the next solve without a factor; 0: by rtol alone */
+  /* the current attempt, or the last one */
   HycoSolverForm form;
   HycoMethod now;
   PetscBool falling_back;
-  PetscBool by_factor; /* its x came from a solve with K */
+  PetscBool by_factor; /* its x was computed by a solve with K */
   /* the last solve */
   HycoReason reason;
   HycoKKT kkt;
   PetscInt its;
-  PetscInt linear_its, linear_solves, linear_most; /* of conjugate gradients: in all, solves, most in one */
+  PetscInt linear_its, linear_solves, linear_most; /* of conjugate gradients: iterations, solves, most in one solve */
   char method[128];
-  PetscReal seconds_factor, seconds_solve, seconds_before; /* before: of a factor made ahead of the solve */
+  PetscReal seconds_factor, seconds_solve, seconds_before; /* before: time of a factor computed ahead of the solve */
 };
 
 extern const char *const HycoSolverTypes[]; /* active_set, tao, lemke, NULL */
@@ -119,18 +119,19 @@ PetscErrorCode HycoSolverFormCreate_Shell(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Projected(HycoSolver s, HycoSolverForm form);
 PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm form);
-/* The form of that name; NULL: there is none. */
+/* The form of that name, or NULL. */
 HycoSolverForm HycoSolverFindForm(HycoSolver s, const char name[]);
-/* The cheapest form that accepts the system by the method now; `stay` is taken if it does. NULL: none, and why. */
+/* The cheapest form that accepts the system with the current method; `stay` is preferred if it accepts. NULL: none,
+   and the reason. */
 PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSolverForm *form, char why[HYCO_LINE]);
-/* Writes into s->method what solves: "active_set dual", "tao gpcg dual". */
+/* Writes the method into s->method: "active_set dual", "tao gpcg dual". */
 PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[]);
-/* x = 0, L = 0, and the reason, for a K that has no factor. */
+/* Sets x = 0, L = 0 and the reason, for a K that cannot be factored. */
 PetscErrorCode HycoSolverGiveUp(HycoSolver s, Vec x, Vec L);
-/* Whether the chosen type of Tao serves symmetric systems alone. */
+/* Whether the chosen Tao type requires a symmetric system. */
 PetscBool HycoSolverNeedsSymmetry(HycoSolver s);
 
-/* Chooses between a factor and iterations (s->iterative), which may change the form. */
+/* Chooses between a factor and iterations (s->iterative); may change the form. */
 PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form);
 /* Says in linear_method what solves with K: `ksp`, or (NULL) the factor of a HycoDirect. */
 PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp);
@@ -139,41 +140,41 @@ void HycoCountLinear(HycoSolver s, PetscInt its);
 
 /* -- a factor of K, with s->stiffness -- */
 
-/* Factors K, and makes S = B K^-1 Bt (as HycoDirectFactor() where K has a kernel; NULL without B) unless K and B are as
-   they were. Collective, as all that follow. */
+/* Factors K, and computes S = B K^-1 Bt (as HycoDirectFactor() if K has a null space; NULL without B), unless K and
+   B are unchanged. Collective, as all functions below. */
 PetscErrorCode HycoStiffnessFactor(HycoSolver s, Mat Bt, Mat B, PetscReal S[], PetscBool *singular);
 PetscErrorCode HycoStiffnessDestroy(HycoStiffness *factor);
 /* x = K^-1 r */
 PetscErrorCode HycoStiffnessSolve(HycoSolver s, Vec r, Vec x);
-/* S = B K^-1 Bt again, of a dense K, refined where factor->refined says so. */
+/* Computes S = B K^-1 Bt again, for a dense K; refined if factor->refined is set. */
 PetscErrorCode HycoStiffnessCondense(HycoSolver s, Mat Bt, Mat B, PetscReal S[]);
-/* Refines x, K x = F - Bt L of a dense K, against what double precision does not hold. */
+/* Refines x, K x = F - Bt L for a dense K, in twice the working precision. */
 PetscErrorCode HycoStiffnessRefine(HycoSolver s, const PetscReal L[], Vec x);
-/* One step of refinement of x, K x = F - Bt L (L may be NULL), when round-off shows. */
+/* One step of refinement of x, K x = F - Bt L (L may be NULL), if its residual shows round-off. */
 PetscErrorCode HycoStiffnessCorrect(HycoSolver s, Vec L, Vec x);
 
-/* Factors K and makes S unless K and B are as they were; dual form. Collective. */
+/* Factors K and computes S, unless K and B are unchanged; dual form. Collective. */
 PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular);
 /* x = K^-1 r by that factor, refined once. Collective. */
 PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x);
-/* K^-1 F of the next solve, which takes it for granted if it uses the dual form and K is regular. Borrowed until then.
- */
+/* Passes K^-1 F of the next solve, which uses it without a check if it uses the dual form and K is regular. Borrowed
+   until then. */
 PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x);
-/* Whether what misses its residuals by round-off is solved again by solves refined in twice the working precision
-   (yes), which take hundreds of times as long: not for an iteration whose end is judged anyway. */
+/* Whether a solve that misses its residuals by round-off is repeated with refinement in twice the working precision
+   (yes). This takes hundreds of times as long, and is unnecessary for an iteration whose final result is checked
+   anyway. */
 PetscErrorCode HycoSolverSetRefine(HycoSolver s, PetscBool refine);
-/* The contacts from which the active set of the next solve begins, m of them, with a given flexibility. Borrowed until
-   then. */
+/* The m contacts from which the active set of the next solve starts, with a given flexibility. Borrowed until then. */
 PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);
-/* The 2-norm of F - K x - Bt L that the next solve is to reach where it iterates (0: by the tolerance alone), within
-   the tolerance too; it then begins from the given x. A factor takes no notice of it. */
+/* Sets the largest 2-norm of F - K x - Bt L of the next solve, beside the tolerance; it then starts from the given x.
+   0: the tolerance alone. Only iterative solves use it. */
 PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual);
-/* Iterations of conjugate gradients in the last solve, and most in one of its linear solves; 0: a factor solved. */
+/* Gets the iterations of conjugate gradients in the last solve, and most of one linear solve; 0 with a factor. */
 PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscInt *most);
 /* S = B K^-1 Bt of the last solve, which was in the dual form with a factor of a regular K: m x m column major, the
    same on every rank. Borrowed until a matrix changes. Collective. */
 PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[]);
-/* x[j] = K^-1 r[j] by the factor of the last solve, k of them. Collective. */
+/* x[j] = K^-1 r[j] with the factor of the last solve, for k right-hand sides. Collective. */
 PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[]);
 
 #endif

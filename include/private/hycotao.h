@@ -1,4 +1,4 @@
-/* Inside complementarity/: the Tao that problems are posed to, and what hyco's own types take from it. */
+/* Internal to complementarity/: the Tao that solves the problems, and the data that hyco's own types read from it. */
 #ifndef HYCOTAO_H
 #define HYCOTAO_H
 
@@ -13,25 +13,25 @@ struct _n_HycoTao {
   char type[HYCO_TAO_NAME];
   int traits;
   PetscInt max_its;
-  Tao tao;                    /* kept while type, sizes and limit stay */
+  Tao tao;                    /* kept while type, sizes and iteration limit are unchanged */
   char prefix[HYCO_TAO_NAME]; /* its options prefix */
-  PetscInt n, N;              /* its unknowns, on this rank and in all */
-  /* the problem, for hyco's own types: as it was given */
+  PetscInt n, N;              /* number of its unknowns, on this rank and on all */
+  /* the problem for hyco's own types, unscaled */
   const HycoLCP *lcp;
-  const HycoActiveSet *set; /* where it is no dense one */
+  const HycoActiveSet *set; /* if it is not a dense problem */
   PetscReal *z;
   PetscBool *active;
   PetscInt its;
   HycoLCPStatus status;
   HycoLCPMonitor monitor;
   void *monitor_ctx;
-  Vec placed; /* z, for a Tao must have a solution */
-  /* for the others: scaled */
+  Vec placed; /* z, because a Tao must have a solution vector */
+  /* the problem for the others, scaled */
   Mat H, J;    /* H borrowed; J: the semismooth types' own copy */
   Vec F, w, d; /* F borrowed; slack; scale */
   PetscReal best;
   PetscInt best_at; /* least residual so far, and its iteration */
-  Mat dense;        /* of a dense problem */
+  Mat dense;        /* H of a dense problem */
   Vec f, lo, hi, y;
 };
 

@@ -17,14 +17,14 @@ static inline PetscReal HycoDistance(const PetscReal a[3], const PetscReal b[3])
 
   return HycoLength(d);
 }
-/* To unit length; 0 stays 0. */
+/* Scales to unit length; 0 stays 0. */
 static inline void HycoNormalise(PetscReal v[3])
 {
   const PetscReal length = HycoLength(v);
 
   for (PetscInt c = 0; c < 3 && length > 0; c++) v[c] /= length;
 }
-/* The length of the part of r along the surface with normal n. */
+/* The length of the component of r tangential to the surface with normal n. */
 static inline PetscReal HycoTangentialLength(const PetscReal r[3], const PetscReal n[3])
 {
   const PetscReal height = HycoDot(r, n);

@@ -1,9 +1,9 @@
-/* An upper bound fitted to data: a log-linear law with nonnegative exponents, lifted above a share of
-   them. */
+/* An upper bound fitted to data: a log-linear model with nonnegative exponents, raised above a given share of the
+   data. */
 #include <hycoalgorithms.h>
 #include <petscsys.h>
 
-#define RIDGE 1e-1 /* of a column's own square sum: correlated features share the weight */
+#define RIDGE 1e-1 /* relative to the square sum of a column: correlated features share the weight */
 
 /* c >= 0 that minimises |X c - y|^2 about the means, regularised. */
 static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal c[])

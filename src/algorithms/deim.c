@@ -1,4 +1,4 @@
-/* The discrete empirical interpolation method (section 4.2), and its points by pivoted QR. */
+/* The discrete empirical interpolation method (section 4.2), and Q-DEIM by pivoted QR. */
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
@@ -78,7 +78,7 @@ PetscErrorCode HycoDEIM(Mat V, PetscInt index[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest of this rank's squared row lengths over all ranks; of rows equally long (to 1e-10) the lowest. */
+/* The row with the largest squared length over all ranks; among equal ones (to 1e-10) the lowest. */
 static PetscErrorCode LongestRow(Mat V, const PetscReal length2[], PetscInt *row)
 {
   PetscInt lo, hi, at = PETSC_MAX_INT;

@@ -1,4 +1,4 @@
-/* Small dense questions: pivots, singular values. */
+/* Small dense matrices: pivots, singular values. */
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
@@ -10,7 +10,7 @@ PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &norm));
   PetscCall(PetscCalloc1(n, &taken));
-  /* Gram-Schmidt with pivoting: of columns equally long (to 1e-10) the first is taken */
+  /* Gram-Schmidt with pivoting: among columns of equal length (to 1e-10) the first is taken */
   for (PetscInt step = 0; step < k; step++) {
     PetscInt best = -1;
 
@@ -82,7 +82,7 @@ PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest eigenvalue of A^T A, or with LU of A of its inverse: power iterations from a fixed start. */
+/* The largest eigenvalue of A^T A, or with the LU factors of A of its inverse: power iterations from a fixed start. */
 static PetscReal LargestOfSquare(PetscBLASInt n, const PetscReal A[], const PetscReal LU[], const PetscBLASInt ipiv[],
                                  PetscReal x[], PetscReal y[])
 {

@@ -1,5 +1,4 @@
-/* Halton's sequence (J. H. Halton, Numer. Math. 2 (1960) 84-90): points that fill a cube evenly, each after the last.
- */
+/* Halton's sequence (J. H. Halton, Numer. Math. 2 (1960) 84-90): a sequence of points that fills a cube evenly. */
 #include <hycoalgorithms.h>
 
 /* The j-th prime, from 0. */

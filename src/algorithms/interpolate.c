@@ -1,8 +1,8 @@
 /*
-  Interpolation coefficients in parameter space, the alpha of (42), by the points alone. Points that form a grid:
-  multilinear (one parameter: linear between neighbours). Others: linear on the simplices of their Delaunay
+  Interpolation coefficients in parameter space, the alpha of (42), from the points only. If the points form a grid:
+  multilinear (with one parameter: linear between neighbours). Otherwise: linear on the simplices of their Delaunay
   triangulation, by Qhull (Barber, Dobkin, Huhdanpaa, ACM Trans. Math. Softw. 22 (1996) 469-483). Each parameter is
-  scaled to the points' range first: a triangulation knows no units.
+  scaled to the points' range first, because a triangulation depends on the units.
 */
 #include <hycoalgorithms.h>
 #include <libqhull_r/qhull_ra.h>
@@ -11,19 +11,19 @@
 #include <string.h>
 
 struct _n_HycoInterpolant {
-  PetscInt dim, n;        /* parameters, different points */
-  PetscInt n_given, *own; /* own[k]: which given point is the k-th different one */
-  PetscReal *lo, *width;  /* of the points, by parameter */
+  PetscInt dim, n;        /* numbers of parameters, of different points */
+  PetscInt n_given, *own; /* own[k]: the given point that is the k-th different one */
+  PetscReal *lo, *width;  /* range of the points, by parameter */
   PetscReal *x;           /* n x dim, scaled */
-  /* a grid: axis p has count[p] ascending values; at[]: the point of each node, the last axis fastest; else NULL */
+  /* for a grid: axis p has count[p] ascending values; at[]: the point of each node, the last axis fastest; else NULL */
   PetscInt *count, *at;
   PetscReal **axis;
-  /* simplices: dim + 1 points each, and the inverse of the edges from the first (column major) */
+  /* simplices: dim + 1 points each, and the inverse of the edge vectors from the first point (column major) */
   PetscInt n_simplices, *simplex;
   PetscReal *inverse;
 };
 
-/* Below this a scaled simplex has no volume. */
+/* A scaled simplex with a smaller volume is degenerate. */
 #define FLAT 1e-12
 
 static PetscErrorCode KeepDifferent(HycoInterpolant it, const PetscReal points[])
@@ -58,7 +58,7 @@ static PetscErrorCode Scale(HycoInterpolant it, const PetscReal points[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The place of x on an axis: value[i] <= x <= value[i + 1] and the weight of i + 1; outside, that of the end. */
+/* Position of x on an axis: value[i] <= x <= value[i + 1] and the weight of i + 1; outside, that of the end. */
 static PetscInt Place(PetscInt n, const PetscReal value[], PetscReal x, PetscReal *t)
 {
   PetscInt i = 0;
@@ -68,7 +68,7 @@ static PetscInt Place(PetscInt n, const PetscReal value[], PetscReal x, PetscRea
   return i;
 }
 
-/* Axes and nodes, if every combination of the points' values is a point. */
+/* Finds axes and nodes if every combination of the points' values is a point. */
 static PetscErrorCode FindGrid(HycoInterpolant it)
 {
   PetscReal nodes = 1;
@@ -91,7 +91,7 @@ static PetscErrorCode FindGrid(HycoInterpolant it)
   }
   if (nodes != it->n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(it->n, &it->at));
-  for (PetscInt k = 0; k < it->n; k++) { /* n different points on n nodes: one each */
+  for (PetscInt k = 0; k < it->n; k++) { /* n different points on n nodes: one for each */
     PetscInt node = 0;
 
     for (PetscInt p = 0; p < it->dim; p++) {
@@ -105,7 +105,7 @@ static PetscErrorCode FindGrid(HycoInterpolant it)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Keeps a simplex with the inverse of its edges, unless it is flat. */
+/* Adds a simplex with the inverse of its edge vectors, unless it is degenerate. */
 static PetscErrorCode AddSimplex(HycoInterpolant it, const PetscInt vertex[])
 {
   const PetscInt dim = it->dim;
@@ -128,7 +128,7 @@ static PetscErrorCode AddSimplex(HycoInterpolant it, const PetscInt vertex[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The lower hull's facets, in Qhull's order, which depends on the points alone. */
+/* The lower hull's facets, in Qhull's order, which depends only on the points. */
 static PetscErrorCode TakeSimplices(HycoInterpolant it, qhT *qh)
 {
   facetT *facet;
@@ -157,7 +157,7 @@ static PetscErrorCode TakeSimplices(HycoInterpolant it, qhT *qh)
 
 static PetscErrorCode Triangulate(HycoInterpolant it)
 {
-  static char options[] = "qhull d Qbb Qc Qz Q12 Qt"; /* delaunay, triangulated, as of points that share a circle */
+  static char options[] = "qhull d Qbb Qc Qz Q12 Qt"; /* Delaunay, with points on a common circle triangulated */
   qhT qh;
   char *said = NULL;
   size_t length = 0;
@@ -169,7 +169,7 @@ static PetscErrorCode Triangulate(HycoInterpolant it)
             (int)it->dim);
   HycoCheck(it->n > it->dim, "%d points cannot be interpolated over %d parameters; at least %d are needed", (int)it->n,
             (int)it->dim, (int)it->dim + 1);
-  ear = open_memstream(&said, &length); /* what Qhull says when it fails */
+  ear = open_memstream(&said, &length); /* Qhull's error message */
   HycoCheck(ear, "there is no memory for the triangulation of %d points", (int)it->n);
   qh_zero(&qh, ear);
   failed = qh_new_qhull(&qh, (int)it->dim, (int)it->n, it->x, False, options, NULL, ear);
@@ -220,7 +220,7 @@ PetscErrorCode HycoInterpolantDestroy(HycoInterpolant *interpolant)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The corners of the box around x that have a weight. */
+/* Weights of the corners of the box around x. */
 static void GridWeights(HycoInterpolant it, const PetscReal x[], PetscReal weight[])
 {
   PetscInt place[HYCO_INTERPOLANT_MAX_DIM];
@@ -252,8 +252,8 @@ static void GridWeights(HycoInterpolant it, const PetscReal x[], PetscReal weigh
   }
 }
 
-/* Barycentric coordinates in the first simplex that has x; outside all, in the one it misses least, cut to its
-   faces. */
+/* Barycentric coordinates in the first simplex that contains x; outside all, in the one with the least negative
+   coordinates, clipped to its faces. */
 static void SimplexWeights(HycoInterpolant it, const PetscReal x[], PetscReal weight[])
 {
   const PetscInt dim = it->dim;

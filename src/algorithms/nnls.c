@@ -1,5 +1,5 @@
-/* Nonnegative least squares: Lawson and Hanson's active set, the passive columns kept in a QR factorisation that grows
- * with them. */
+/* Nonnegative least squares: Lawson and Hanson's active set method; the passive columns are kept in a QR
+   factorisation that grows with them. */
 #include <hycoalgorithms.h>
 
 /* Q R = A[:, p[0..k)], y = Q^T b; Q m x k and R column major with leading dimensions m and n. */
@@ -8,7 +8,7 @@ typedef struct {
   PetscReal *Q, *R, *y;
 } Passive;
 
-/* Appends column j of A by modified Gram-Schmidt, twice; false if it depends on those there. */
+/* Appends column j of A by modified Gram-Schmidt, twice; false if it depends on the present ones. */
 static PetscBool Append(Passive *f, const PetscReal A[], const PetscReal b[], PetscInt j)
 {
   const PetscInt m = f->m, k = f->k;
@@ -57,7 +57,7 @@ PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], Petsc
   PetscInt blocking = -1;
 
   for (PetscInt j = 0; j < k; j++) {
-    const PetscReal step = z[j] < 0 ? x[p[j]] / (x[p[j]] - z[j]) : 0; /* z = 0: it is there already */
+    const PetscReal step = z[j] < 0 ? x[p[j]] / (x[p[j]] - z[j]) : 0; /* z = 0: the entry already has this value */
 
     if (z[j] <= 0 && (blocking < 0 || step < alpha)) {
       alpha = step;
@@ -68,7 +68,7 @@ PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], Petsc
   return blocking;
 }
 
-/* Moves from x towards z until an entry meets 0, which leaves the set; true when z itself is reached. */
+/* Moves from x towards z until an entry becomes 0, which then leaves the set; true if z itself is reached. */
 static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[], const PetscReal z[], PetscReal x[],
                              PetscBool passive[])
 {
@@ -88,7 +88,7 @@ static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[
   return PETSC_FALSE;
 }
 
-#define TIE 1e-8 /* of two gradients this close neither is larger: the first column is taken */
+#define TIE 1e-8 /* gradients with a smaller relative difference count as equal: the first column is taken */
 
 /* r = b - A x = b - Q Q^T b, and the gradient w = A^T r. */
 static void Gradient(const Passive *f, const PetscReal A[], const PetscReal b[], PetscReal r[], PetscReal w[])
@@ -132,10 +132,10 @@ PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Petsc
       if (!passive[j] && !banned[j] && w[j] > tol && (best < 0 || w[j] > (1 + TIE) * w[best])) best = j;
     }
     if (best < 0) break;
-    banned[best] = PETSC_TRUE; /* until the set has changed */
+    banned[best] = PETSC_TRUE; /* until the set changes */
     if (!Append(&f, A, b, best)) continue;
     BackSolve(&f, z);
-    if (z[f.k - 1] <= 0) { /* no way down along this column */
+    if (z[f.k - 1] <= 0) { /* not a descent direction */
       f.k--;
       continue;
     }

@@ -1,17 +1,17 @@
 /*
   Nonnegative matrix factorisation S ~ W H (section 6.3): alternating nonnegative least squares, each half solved by
   projected gradients (Lin, Neural Computation 19 (2007) 2756-2779), from the NNDSVD start (Boutsidis, Gallopoulos,
-  Pattern Recognition 41 (2008) 1350-1362). Nothing is drawn: the same S gives the same factors. There are many local
+  Pattern Recognition 41 (2008) 1350-1362). Deterministic: the same S gives the same factors. There are many local
   minima; this start finds one of them.
 */
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
-#define INNER_ITS 1000  /* projected gradients in one half */
-#define STEPS     20    /* trial lengths of one projected gradient */
-#define ROUND_OFF 1e-14 /* of a gradient, S scaled to norm 1 */
+#define INNER_ITS 1000  /* projected-gradient iterations for one half */
+#define STEPS     20    /* trial step lengths of one projected gradient */
+#define ROUND_OFF 1e-14 /* norm of a gradient due to round-off, S scaled to norm 1 */
 
-/* C = op(A) op(B), m x n over k, column major, tight. */
+/* C = op(A) op(B), m x n with inner dimension k, column major, contiguous. */
 static PetscErrorCode Product(const char transpose[2], PetscInt m, PetscInt n, PetscInt k, const PetscReal A[],
                               const PetscReal B[], PetscReal C[])
 {
@@ -35,7 +35,7 @@ typedef struct {
   PetscReal *gradient, *next, *step, *Gstep;
 } Half;
 
-/* Norm of the gradient, without the entries that only hold X at 0. */
+/* Norm of the gradient, without the entries that keep X at 0. */
 static PetscReal ProjectedNorm(PetscInt n, const PetscReal gradient[], const PetscReal X[])
 {
   PetscReal sum = 0;
@@ -54,7 +54,7 @@ static PetscErrorCode Gradient(const Half *h, const PetscReal X[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* next = [X - alpha gradient]_+; whether it falls by a hundredth of what the gradient promises. */
+/* next = [X - alpha gradient]_+; whether the decrease is at least a hundredth of the linear prediction. */
 static PetscErrorCode Try(const Half *h, const PetscReal X[], PetscReal alpha, PetscBool *enough)
 {
   PetscReal slope = 0, curve = 0;
@@ -71,7 +71,7 @@ static PetscErrorCode Try(const Half *h, const PetscReal X[], PetscReal alpha, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Projected gradients on one half until their norm is below tol; the number of them. */
+/* Projected gradients on one half until their norm is below tol; returns their number. */
 static PetscErrorCode SolveHalf(const Half *h, PetscReal tol, PetscReal X[], PetscInt *its)
 {
   const PetscInt n = h->k * h->n;
@@ -84,21 +84,22 @@ static PetscErrorCode SolveHalf(const Half *h, PetscReal tol, PetscReal X[], Pet
 
     PetscCall(Gradient(h, X));
     if (!(ProjectedNorm(n, h->gradient, X) > tol)) break;
-    for (PetscInt t = 0; t < STEPS && !done; t++) { /* shorter until it falls enough, or longer while it does */
+    for (PetscInt t = 0; t < STEPS && !done; t++) { /* shorter until the decrease is sufficient, or longer as long as
+                                                       it is */
       PetscCall(Try(h, X, alpha, &enough));
       if (t == 0) shrink = (PetscBool)!enough;
       if (enough) kept = alpha;
       done = (PetscBool)(enough == shrink);
       if (!done) alpha *= shrink ? 0.1 : 10;
     }
-    if (kept == 0) break; /* nothing falls: round-off */
+    if (kept == 0) break; /* no decrease: round-off */
     alpha = kept;
     for (PetscInt i = 0; i < n; i++) X[i] = PetscMax(X[i] - alpha * h->gradient[i], 0);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of u v^T, u and v split by sign, that is larger: its sign and size. */
+/* The larger one of the parts of u v^T with u and v split by sign: its sign and size. */
 static PetscReal LargerPart(PetscInt m, const PetscReal u[], PetscInt n, const PetscReal v[], PetscInt stride,
                             PetscReal *sign, PetscReal *length_u, PetscReal *length_v)
 {
@@ -113,7 +114,7 @@ static PetscReal LargerPart(PetscInt m, const PetscReal u[], PetscInt n, const P
   return size[*sign < 0];
 }
 
-/* NNDSVD of S: Wt (k x m) and H (k x n). Columns beyond the numerical rank of S are zero and stay so. */
+/* NNDSVD of S: Wt (k x m) and H (k x n). Columns beyond the numerical rank of S are zero and stay zero. */
 static PetscErrorCode Start(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k, PetscReal Wt[], PetscReal H[])
 {
   const PetscInt r = PetscMin(m, n);
@@ -146,8 +147,8 @@ static PetscErrorCode Start(PetscInt m, PetscInt n, const PetscReal S[], PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* min over Y >= 0 of |S - Y^T X| (X given) or |S - X^T Y|: the other factor's Gram matrix and right-hand side. S: m x
-   n; `of_W`: Y is Wt, else H. */
+/* min over Y >= 0 of |S - Y^T X| (X given) or |S - X^T Y|: sets the Gram matrix and right-hand side of the other
+   factor. S: m x n; `of_W`: Y is Wt, else H. */
 static PetscErrorCode SetHalf(PetscInt m, PetscInt n, PetscInt k, const PetscReal S[], PetscBool of_W,
                               const PetscReal other[], PetscReal G[], PetscReal C[], Half *h)
 {
@@ -192,7 +193,7 @@ static PetscErrorCode Alternate(PetscInt m, PetscInt n, PetscInt k, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |S - Wt^T H|^2 / |S|^2, of the scaled S whose norm is 1. */
+/* |S - Wt^T H|^2 / |S|^2 for the scaled S, whose norm is 1. */
 static PetscErrorCode Misfit(PetscInt m, PetscInt n, PetscInt k, const PetscReal S[], const PetscReal Wt[],
                              const PetscReal H[], PetscReal *misfit)
 {

@@ -1,15 +1,16 @@
 /*
-  Proper orthogonal decomposition (section 4.1): an SVD of SLEPc's, and what is taken of its left vectors. A type of SVD
-  that iterates, or works on the cross-product matrix, finds small singular values inaccurately or not at all, whatever
-  it says: its modes are taken up to the first that fails a check, and what they leave out counts by its energy.
+  Proper orthogonal decomposition (section 4.1): an SVD by SLEPc, and the selection of its left singular vectors. An
+  iterative SVD type, or one that uses the cross-product matrix, finds small singular values inaccurately or not at all,
+  even if it reports convergence: its modes are taken up to the first that fails a check, and the energy of the others
+  counts as left out.
 */
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
-/* A mode with more is not taken: relative error of its singular value, cosine with those before it. */
+/* Limit for taking a mode: relative error of its singular value, cosine with previous modes. */
 #define ACCURATE    1e-3
 #define ORTHONORMAL 1e-9
-#define FIRST       16 /* triplets that are asked for at first; twice as many, until they suffice */
+#define FIRST       16 /* number of triplets requested at first; doubled until sufficient */
 
 PetscErrorCode HycoPODCreateSVD(MPI_Comm comm, SVD *svd)
 {
@@ -34,7 +35,7 @@ PetscInt HycoPODRank(PetscInt k, const PetscReal s[], PetscReal tol, PetscReal n
   return max_modes > 0 ? PetscMin(l, max_modes) : l;
 }
 
-/* A mode's largest entry (the first of nearly equal ones) is made positive. */
+/* Makes a mode's largest entry (the first of nearly equal ones) positive. */
 static PetscErrorCode FixSigns(Mat V, PetscInt l)
 {
   PetscInt lo, hi, lda;
@@ -63,7 +64,7 @@ static PetscErrorCode FixSigns(Mat V, PetscInt l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Runs the decomposition of S for its first `most` triplets; fixed: the options say another number. */
+/* Computes the first `most` triplets of S; fixed: the options give another number. */
 static PetscErrorCode Solve(SVD svd, Mat S, PetscInt most, PetscBool *fixed)
 {
   PetscInt N, n, asked;
@@ -75,10 +76,11 @@ static PetscErrorCode Solve(SVD svd, Mat S, PetscInt most, PetscBool *fixed)
   PetscCall(SVDReset(svd));
   PetscCall(SVDGetType(svd, &type));
   PetscCall(PetscStrncpy(name, type, sizeof(name)));
-  PetscCall(SVDSetType(svd, SVDLAPACK)); /* and back: an eigensolver inside keeps the sizes of the problem before */
+  PetscCall(SVDSetType(svd, SVDLAPACK)); /* and back: otherwise an inner eigensolver keeps the previous problem's
+                                            sizes */
   PetscCall(SVDSetType(svd, name));
   PetscCall(SVDSetOperators(svd, S, NULL));
-  PetscCall(SVDSetImplicitTranspose(svd, (PetscBool)(N >= n))); /* no second copy of S; tsqr takes a wide one's */
+  PetscCall(SVDSetImplicitTranspose(svd, (PetscBool)(N >= n))); /* no second copy of S; tsqr transposes wide matrices */
   PetscCall(SVDSetDimensions(svd, most, PETSC_DETERMINE, PETSC_DETERMINE));
   PetscCall(SVDSetWhichSingularTriplets(svd, SVD_LARGEST));
   PetscCall(SVDSetFromOptions(svd));
@@ -88,7 +90,7 @@ static PetscErrorCode Solve(SVD svd, Mat S, PetscInt most, PetscBool *fixed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first k left singular vectors, with the rows of S on their ranks. */
+/* The first k left singular vectors, distributed like the rows of S. */
 static PetscErrorCode GetVectors(SVD svd, Mat S, PetscInt k, Mat *V)
 {
   PetscInt N, rows;
@@ -106,7 +108,8 @@ static PetscErrorCode GetVectors(SVD svd, Mat S, PetscInt k, Mat *V)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many of the first k modes are orthonormal, and stretched by S^T as their singular values say. */
+/* The number of modes, of the first k, that are orthonormal and whose images under S^T have the length of their
+   singular values. */
 static PetscErrorCode CountAccurate(Mat S, Mat V, PetscInt k, const PetscReal sigma[], PetscInt *accurate)
 {
   PetscInt lo, hi, lda;
@@ -144,7 +147,7 @@ static PetscErrorCode CountAccurate(Mat S, Mat V, PetscInt k, const PetscReal si
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The k singular values of a solved problem, as found or 0. */
+/* The k singular values of a solved problem; 0 if not found. */
 static PetscErrorCode GetValues(SVD svd, PetscInt k, PetscReal sigma[], PetscInt *found)
 {
   PetscFunctionBegin;
@@ -155,8 +158,8 @@ static PetscErrorCode GetValues(SVD svd, PetscInt k, PetscReal sigma[], PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Another type than tsqr: as few triplets as the criterion needs, as far as they are accurate. What these leave out of
-   the energy size^2 becomes the next singular value, so that (18) counts it. */
+/* For types other than tsqr: as few triplets as the criterion needs, as far as they are accurate. The rest of the
+   energy size^2 becomes the next singular value, so that (18) includes it. */
 static PetscErrorCode SolveAccurate(SVD svd, Mat S, PetscReal size, PetscReal tol, PetscReal noise, PetscInt max_modes,
                                     PetscInt k, PetscReal sigma[], PetscInt *accurate)
 {
@@ -166,7 +169,7 @@ static PetscErrorCode SolveAccurate(SVD svd, Mat S, PetscReal size, PetscReal to
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)svd, SVDCYCLIC, &cyclic));
-  if (cyclic) limit = (k + 2) / 3; /* with more, SLEPc 3.18 takes zeros of round-off for triplets, over k of them */
+  if (cyclic) limit = (k + 2) / 3; /* with more, SLEPc 3.18 returns triplets beyond k, which are round-off */
   for (PetscInt most = PetscMin(limit, FIRST); more; most = PetscMin(limit, 2 * most)) {
     PetscReal rest = size * size;
 
@@ -200,8 +203,9 @@ PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt 
   PetscCall(PetscArrayzero(sigma, k));
   PetscCall(MatNorm(S, NORM_FROBENIUS, &size));
   if (!k || size == 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectTypeCompare((PetscObject)svd, HYCO_SVD_TSQR, &tsqr)); /* backward stable: nothing to check */
-  unit = PetscPowReal(2, PetscCeilReal(PetscLog2Real(size))); /* exact both ways; SLEPc has absolute tolerances */
+  PetscCall(PetscObjectTypeCompare((PetscObject)svd, HYCO_SVD_TSQR, &tsqr)); /* backward stable: no check needed */
+  unit = PetscPowReal(2, PetscCeilReal(PetscLog2Real(size))); /* exact in both directions; SLEPc's tolerances are
+                                                                 absolute */
   PetscCall(MatScale(S, 1 / unit));
   if (tsqr) {
     PetscCall(Solve(svd, S, k, &fixed));

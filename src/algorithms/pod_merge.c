@@ -1,12 +1,12 @@
 /*
-  POD of columns that come in blocks: hierarchical approximate POD along a chain (Himpele, Leibner, Rave, SIAM J. Sci.
-  Comput. 40 (2018) A3267-A3292). What has come so far is held as V diag(sigma), whose left singular vectors and values
-  are those of the columns but for what was cut off: with the energies that the blocks lose adding up to e^2, every
-  singular value is off by at most e, and so is the projection error of all columns onto the modes together.
+  POD of columns that arrive in blocks: hierarchical approximate POD along a chain (Himpele, Leibner, Rave, SIAM J. Sci.
+  Comput. 40 (2018) A3267-A3292). The columns so far are stored as V diag(sigma), with their left singular vectors and
+  values up to the truncation error: if the blocks lose energies with the sum e^2, every singular value has an error of
+  at most e, and so does the projection error of all columns onto the modes.
 */
 #include <hycoalgorithms.h>
 
-/* V diag(sigma), in the place of V. */
+/* Overwrites V by V diag(sigma). */
 static PetscErrorCode ScaleModes(Mat V, PetscInt l, const PetscReal sigma[])
 {
   PetscInt rows, lda;
@@ -37,7 +37,7 @@ PetscErrorCode HycoCopyColumns(Mat X, Mat Y, PetscInt at)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* [A B]; both are freed. */
+/* Creates [A B] and frees both. */
 static PetscErrorCode Join(Mat *A, Mat *B, Mat *joined)
 {
   PetscInt N, n[2], rows;

@@ -1,16 +1,17 @@
 /*
-  Polynomials on tensor grids by weights of their nodes: value(at) = sum of weight[k] data[k], interpolation where the
-  degree is one less than the nodes, least squares where it is lower. On each axis the weights are sums of products of
-  polynomials orthonormal on the nodes, made by Arnoldi's process on x (Brubeck, Nakatsukasa, Trefethen, SIAM Rev. 63
-  (2021) 405-415), which spans what Chebyshev polynomials span and stays well conditioned on any nodes.
+  Polynomials on tensor grids by weights of their nodes: value(at) = sum of weight[k] data[k], interpolation if the
+  degree is one less than the number of nodes, least squares if it is lower. On each axis the weights are sums of
+  products of polynomials that are orthonormal on the nodes, made by Arnoldi's process on x (Brubeck, Nakatsukasa,
+  Trefethen, SIAM Rev. 63 (2021) 405-415), which spans the same space as Chebyshev polynomials and is well conditioned
+  on any nodes.
 */
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
-/* Errors no larger than this share of the data are round-off: the lowest such degree is taken. */
+/* Errors below this share of the data are round-off: the lowest degree with such an error is taken. */
 #define ROUNDING 1e-12
-/* Between so many nodes inner ones choose the degree: to predict an end from within says little of smooth data, and
-   favours low degrees. Of more nodes the ends tell noise from data. */
+/* With at most this number of nodes, only inner ones choose the degree: extrapolation to an end is a poor test for
+   smooth data, and favours low degrees. With more nodes the ends distinguish noise from data. */
 #define FEW  5
 #define MANY 12
 
@@ -22,8 +23,8 @@ PetscErrorCode HycoChebyshevNodes(PetscInt n, PetscReal lo, PetscReal hi, PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next orthonormal polynomial, x times the last one less what lies in the span of those before, on the n nodes and,
-   as its entry n, at the point. */
+/* The next orthonormal polynomial, x times the last one orthogonalised against the previous ones, at the n nodes
+   and, as entry n, at the point. */
 static void NextPolynomial(PetscInt n, const PetscReal s[], PetscInt d, PetscReal P[])
 {
   PetscReal *p = P + d * (n + 1), length = 0;
@@ -119,7 +120,7 @@ PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], Pets
   for (PetscInt p = 0; p < t->dim; p++) {
     if (t->n[p] == 1) continue;
     PetscCall(HycoPolynomialWeights(t->n[p], t->x[p], t->degree[p], p == axis ? skip : -1, at[p], w));
-    for (PetscInt k = size - 1; k >= 0; k--) { /* from the end: the product grows in place */
+    for (PetscInt k = size - 1; k >= 0; k--) { /* from the end, because the product grows in place */
       for (PetscInt j = t->n[p] - 1; j >= 0; j--) weight[k * t->n[p] + j] = weight[k] * w[j];
     }
     size *= t->n[p];
@@ -128,7 +129,7 @@ PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Numbers between neighbours along an axis. */
+/* Distance in memory between neighbours along an axis. */
 static PetscInt Stride(const HycoTensor *t, PetscInt axis)
 {
   PetscInt stride = 1;
@@ -137,7 +138,7 @@ static PetscInt Stride(const HycoTensor *t, PetscInt axis)
   return stride;
 }
 
-/* The same for nodes first .. last along the axis. */
+/* The error for nodes first .. last along the axis. */
 static PetscErrorCode LeaveOut(const HycoTensor *t, PetscInt axis, PetscInt first_out, PetscInt last_out, PetscInt rows,
                                const PetscReal data[], PetscReal *error)
 {
@@ -171,8 +172,8 @@ static PetscErrorCode LeaveOut(const HycoTensor *t, PetscInt axis, PetscInt firs
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each node along `axis` left out and predicted by the others on its line: the largest error, 2-norm of a column, over
-   the largest column. With interpolation this is the error of one degree less. */
+/* Leaves out each node along `axis` and predicts it from the others on its line: the largest error, 2-norm of a
+   column, over the largest column. With interpolation this is the error for one degree less. */
 static PetscErrorCode LeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                   PetscReal *error)
 {
@@ -181,7 +182,7 @@ static PetscErrorCode LeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt r
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The size of the divided differences over nodes first .. first + n - 1 of all lines along an axis. */
+/* The norm of the divided differences over nodes first .. first + n - 1 of all lines along an axis. */
 static PetscReal Difference(const HycoTensor *t, PetscInt axis, PetscInt first, PetscInt n, PetscInt rows,
                             const PetscReal data[])
 {
@@ -214,7 +215,7 @@ PetscErrorCode HycoTensorDecay(const HycoTensor *t, PetscInt axis, PetscInt rows
 
   PetscFunctionBegin;
   *decay = 1;
-  for (PetscInt order = 0; order < 3 && order < n; order++) { /* the mean of both ends: one may be larger */
+  for (PetscInt order = 0; order < 3 && order < n; order++) { /* the mean of both ends, because one may be larger */
     d[order] = PetscSqrtReal(Difference(t, axis, 0, n - order, rows, data) *
                              Difference(t, axis, order, n - order, rows, data));
   }
@@ -237,12 +238,12 @@ PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt row
   *error = 0;
   if (n == 1) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LeaveOut(t, axis, first, last, rows, data, error));
-  for (PetscInt d = n - 2; d >= 0; d--) { /* n - 2, one node left out, is n - 1 once more: taken when exact */
+  for (PetscInt d = n - 2; d >= 0; d--) { /* n - 2 with one node left out is the same as n - 1: taken if exact */
     PetscReal e;
 
     t->degree[axis] = d;
     PetscCall(LeaveOut(t, axis, first, last, rows, data, &e));
-    if (e > ROUNDING && e > *error / 2) continue; /* the higher degree unless the lower one is clearly better */
+    if (e > ROUNDING && e > *error / 2) continue; /* the higher degree unless the lower one halves the error */
     best = d;
     *error = PetscMin(e, *error);
   }

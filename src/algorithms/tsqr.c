@@ -1,8 +1,9 @@
 /*
-  The SVD type HYCO_SVD_TSQR, beside SLEPc's own: tall-skinny QR (Demmel, Grigori, Hoemmen, Langou, SIAM J. Sci.
-  Comput. 34 (2012) A206-A239) of a dense matrix whose rows stay on their ranks, then the SVD of the triangle by LAPACK.
-  Backward stable: singular values accurate to 1e-7 relative at 1e-12 of the first, where the cross-product matrix
-  loses them at 1e-8. All triplets are found. Of a matrix with fewer rows than columns SLEPc hands over the transpose.
+  The SVD type HYCO_SVD_TSQR, registered with SLEPc: tall-skinny QR (Demmel, Grigori, Hoemmen, Langou, SIAM J. Sci.
+  Comput. 34 (2012) A206-A239) of a dense matrix with distributed rows, then the SVD of the triangular factor by LAPACK.
+  Backward stable: singular values of 1e-12 of the first have a relative accuracy of 1e-7, whereas the cross-product
+  matrix loses those below 1e-8. All triplets are found. For a matrix with fewer rows than columns SLEPc passes the
+  transpose.
 */
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
@@ -26,7 +27,8 @@ static PetscErrorCode SetUp(SVD svd)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's rows of the dense matrix A in B, which has as many columns: as many rows as both have, zeros below. */
+/* Copies this rank's rows of the dense matrix A to B, which has the same number of columns: as many rows as both
+   have, then zeros. */
 static PetscErrorCode CopyRows(Mat A, Mat B)
 {
   PetscInt n, rows, have, lda, ldb;
@@ -71,8 +73,8 @@ static PetscErrorCode DecomposeTriangle(PetscInt n, PetscScalar R[], PetscReal s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Q, whose n columns become orthonormal in SLEPc's tall-skinny QR: svd->U where each rank has n rows at least, which
-   that takes for granted, or else a copy with rows of zeros. */
+/* Q, whose n columns SLEPc's tall-skinny QR makes orthonormal: svd->U if each rank has at least n rows, as SLEPc
+   requires, otherwise a copy padded with rows of zeros. */
 static PetscErrorCode MakeBasis(SVD svd, BV *Q)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)svd);
@@ -99,7 +101,7 @@ static PetscErrorCode MakeBasis(SVD svd, BV *Q)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of V = Vt^T that this rank has. */
+/* Stores this rank's rows of V = Vt^T. */
 static PetscErrorCode StoreRight(BV V, PetscInt n, const PetscScalar Vt[])
 {
   Mat right;

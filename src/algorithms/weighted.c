@@ -1,8 +1,9 @@
 /*
-  Nonnegative least squares over a fixed S whose rows are weighted anew for each problem: Lawson and Hanson's active set
-  (HycoNNLS()) on the normal equations. Only the columns of the Gram matrix that become passive are formed; where the
-  set has settled, the gradient is computed from S itself and one step of refinement takes back what the normal
-  equations lost (A. Bjorck, Linear Algebra Appl. 88/89 (1987) 31-48, corrected seminormal equations).
+  Nonnegative least squares over a fixed S with row weights that differ from problem to problem: Lawson and Hanson's
+  active set method (HycoNNLS()) on the normal equations. Only the columns of the Gram matrix that become passive are
+  formed; once the set has converged, the gradient is computed from S itself and one step of refinement recovers the
+  accuracy lost by the normal equations (A. Bjorck, Linear Algebra Appl. 88/89 (1987) 31-48, corrected seminormal
+  equations).
 */
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
@@ -11,11 +12,11 @@ struct _n_HycoWeighted {
   PetscInt m, n;
   const PetscReal *S; /* m x n column major, borrowed */
   PetscReal shift;
-  const PetscReal *d, *h; /* of the problem at hand */
-  PetscInt k, *p;         /* passive columns, in the order they came */
-  PetscReal *G, *R;       /* n x n: Gram columns by column; Cholesky factor R^T R of G[p, p] by place */
+  const PetscReal *d, *h; /* of the current problem */
+  PetscInt k, *p;         /* passive columns, in the order of joining */
+  PetscReal *G, *R;       /* n x n: columns of the Gram matrix; Cholesky factor R^T R of G[p, p] by position in p */
   PetscBool *known, *passive, *banned;
-  PetscReal *g, *w, *z, *t; /* S^T h, gradient, n each; a column of S, weighted, m */
+  PetscReal *g, *w, *z, *t; /* S^T h, gradient, work, n each; a weighted column of S, m */
 };
 
 PetscErrorCode HycoWeightedCreate(PetscInt m, PetscInt n, const PetscReal S[], PetscReal shift, HycoWeighted *weighted)
@@ -71,7 +72,7 @@ static const PetscReal *Gram(HycoWeighted f, PetscInt j)
   return column;
 }
 
-/* Makes column j passive; false if it depends on those that are. */
+/* Makes column j passive; false if it depends on the passive ones. */
 static PetscBool Append(HycoWeighted f, PetscInt j)
 {
   const PetscReal *column = Gram(f, j);
@@ -91,7 +92,7 @@ static PetscBool Append(HycoWeighted f, PetscInt j)
   return PETSC_TRUE;
 }
 
-/* z = G[p, p]^-1 y[p], by place */
+/* z = G[p, p]^-1 y[p], by position in p */
 static void Solve(HycoWeighted f, const PetscReal y[], PetscReal z[])
 {
   for (PetscInt i = 0; i < f->k; i++) {
@@ -109,7 +110,7 @@ static void Solve(HycoWeighted f, const PetscReal y[], PetscReal z[])
   }
 }
 
-/* Moves from x towards z until an entry meets 0, which leaves the set; true when z itself is reached. */
+/* Moves from x towards z until an entry becomes 0, which then leaves the set; true if z itself is reached. */
 static PetscBool MoveTowards(HycoWeighted f, const PetscReal z[], PetscReal x[])
 {
   const PetscInt k = f->k;
@@ -153,7 +154,8 @@ static void TrueGradient(HycoWeighted f, const PetscReal x[])
   for (PetscInt j = 0; j < f->k; j++) f->w[f->p[j]] -= f->shift * x[f->p[j]];
 }
 
-/* One step of refinement on the passive set, then the gradient: the largest entry where it should be zero or less. */
+/* One step of refinement on the passive set, then the gradient: returns its largest entry where it should be zero or
+   negative. */
 static PetscReal Refine(HycoWeighted f, PetscReal x[])
 {
   PetscReal worst = 0;
@@ -167,7 +169,7 @@ static PetscReal Refine(HycoWeighted f, PetscReal x[])
   return worst;
 }
 
-/* The column to take in: of those free to come the one that gains most; -1: none gains more than tol. */
+/* The next column: among those allowed the one with the largest gradient; -1: none above tol. */
 static PetscInt Steepest(HycoWeighted f, PetscReal tol)
 {
   PetscInt best = -1;
@@ -205,15 +207,15 @@ PetscErrorCode HycoWeightedNNLS(HycoWeighted f, const PetscReal d[], const Petsc
   for (PetscInt it = 0; it < 3 * f->n + 10; it++) {
     PetscInt best = Steepest(f, 1e-12 * size);
 
-    if (best < 0) { /* by the normal equations; then by S */
+    if (best < 0) { /* first by the normal equations, then by S */
       worst = Refine(f, x);
       best = Steepest(f, 1e-12 * size);
     }
     if (best < 0) break;
-    f->banned[best] = PETSC_TRUE; /* until the set has changed */
+    f->banned[best] = PETSC_TRUE; /* until the set changes */
     if (!Append(f, best)) continue;
     Solve(f, f->g, f->z);
-    if (f->z[f->k - 1] <= 0) { /* no way down along this column */
+    if (f->z[f->k - 1] <= 0) { /* not a descent direction */
       f->k--;
       continue;
     }
@@ -221,7 +223,7 @@ PetscErrorCode HycoWeightedNNLS(HycoWeighted f, const PetscReal d[], const Petsc
     while (!MoveTowards(f, f->z, x)) Solve(f, f->g, f->z);
     PetscCall(PetscArrayzero(f->banned, f->n));
     Gradient(f, x);
-    worst = PETSC_MAX_REAL; /* until it is refined */
+    worst = PETSC_MAX_REAL; /* until the refinement */
   }
   *solved = (PetscBool)(worst <= rtol * size);
   PetscFunctionReturn(PETSC_SUCCESS);

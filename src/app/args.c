@@ -1,11 +1,11 @@
-/* Options of the command line: known, read, explained. Each page declares its own where it reads them. */
+/* Options of the command line: checks, values, help. Each page declares its own where it reads them. */
 #include "driver.h"
 #include <ctype.h>
 #include <stdio.h>
 #include <string.h>
 
-/* Options of PETSc, SLEPc and the solvers inside: known by their beginnings, checked by who reads them; first those of
-   the solvers that hyco makes. */
+/* Options of PETSc, SLEPc and the solvers: recognised by their prefix, checked by the code that reads them; first
+   those of the solvers that hyco creates. */
 #define OWN_SOLVERS                                                                                                    \
   "hyco_mumps_", "hyco_primal_", "hyco_norm_", "hyco_tao_", "hyco_pod_svd_", "hyco_pod_bv_", "hyco_pod_ds_"
 static const char *const own_solvers[] = {OWN_SOLVERS, NULL};
@@ -54,7 +54,7 @@ static PetscBool IsSceneEntry(const char name[])
   return (PetscBool)(HycoIsSceneKey(name) && strncasecmp(name, "hyco_", 5));
 }
 
-/* The commands that take an option of their own which this one does not: "solve, predict"; "" if none does. */
+/* The commands that have an option that this one lacks: "solve, predict"; "" if none has. */
 static PetscErrorCode ListTakers(const char name[], char list[DRIVER_LINE])
 {
   PetscFunctionBegin;
@@ -85,7 +85,7 @@ static PetscErrorCode Unknown(const Command *command, const HycoOptionList *own,
   HycoFail("hyco %s has no option -%s (hyco %s -help lists them)", command->name, name, command->name);
 }
 
-/* The commands whose objects read an option of the library, in words; NULL: any. A reducer is made by train alone. */
+/* The commands whose objects read an option of the library, in words; NULL: any. Only train creates a reducer. */
 static const char *ReadersOf(const HycoOption *option)
 {
   if (strcmp(option->owner, "HycoReducer") == 0) return "train";
@@ -93,7 +93,7 @@ static const char *ReadersOf(const HycoOption *option)
   return NULL;
 }
 
-/* An option of the library, given where no object reads it. */
+/* Fails for an option of the library that no object of the command reads. */
 static PetscErrorCode CheckReaders(const Command *command, const HycoOption *option)
 {
   const char *readers = ReadersOf(option);
@@ -147,7 +147,7 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a solver reads when it runs; an SVD has read all by then but what shows its result. */
+/* Options that a solver reads when it runs; an SVD has then read all except those that show its result. */
 static PetscBool IsReadLate(const char name[])
 {
   const PetscBool shows = (PetscBool)(strstr(name, "view") || strstr(name, "reason") || strstr(name, "error"));

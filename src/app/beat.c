@@ -1,5 +1,5 @@
-/* A sign of life where one step takes long: what is being done, a line a minute in a file, the seconds on a terminal. A
-   thread of its own, for a factorisation or a solver's iterations tell nobody. */
+/* Progress within a long step: its name, as a line a minute in a file, or with the seconds on a terminal. A separate
+   thread, because a factorisation or a solver does not report progress. */
 #include "driver.h"
 #include <pthread.h>
 #include <stdio.h>
@@ -10,7 +10,7 @@ static struct {
   pthread_t thread;
   pthread_mutex_t lock;
   pthread_cond_t ends;
-  PetscBool runs, over, bar; /* bar: a line on the terminal that has not ended */
+  PetscBool runs, over, bar; /* bar: the terminal has an unfinished line */
   double begin, last, period;
 } beat = {.lock = PTHREAD_MUTEX_INITIALIZER, .ends = PTHREAD_COND_INITIALIZER, .period = 60};
 
@@ -22,7 +22,7 @@ static double Now(void)
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Under the lock. */
+/* Called with the lock held. */
 static void Clear(void)
 {
   if (beat.bar) fprintf(stderr, "\r\033[K");
@@ -62,7 +62,8 @@ void DriverBeatBegin(void)
   MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
   if (rank) return;
   beat.begin = beat.last = Now();
-  beat.runs = (PetscBool)(pthread_create(&beat.thread, NULL, Beat, NULL) == 0); /* else there is none */
+  beat.runs = (PetscBool)(pthread_create(&beat.thread, NULL, Beat, NULL) == 0); /* otherwise there is no such
+                                                                                   progress */
 }
 
 void DriverBeatSetPeriod(PetscReal seconds)

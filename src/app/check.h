@@ -1,4 +1,4 @@
-/* hyco check: what its pages share. */
+/* hyco check: common declarations. */
 #ifndef HYCO_CHECK_H
 #define HYCO_CHECK_H
 #include "driver.h"
@@ -6,56 +6,58 @@
 
 /* One contact of the scene over the points that were checked. */
 typedef struct {
-  PetscInt n, facing_min, facing_max; /* contacts; those that may close, where they are fewest and most */
-  PetscReal gap_min, gap_max;         /* of those that may close; max < min: none anywhere */
-  PetscReal coarse; /* of most contacts: the slave's facets over the master's there; 0: not compared */
+  PetscInt n, facing_min, facing_max; /* number of contacts; of those that may close, the smallest and largest number */
+  PetscReal gap_min, gap_max;         /* gaps of those that may close; max < min: no contact may close */
+  PetscReal coarse; /* slave's facet size over the master's there, where most contacts may close; 0: not compared */
 } ContactRange;
 
-/* What was found; on rank 0, but for the first line. */
+/* Results; on rank 0, except for the first member. */
 typedef struct {
   HycoFOM fom;   /* borrowed */
-  HycoFOM whole; /* rank 0: on it alone, for what is looked at; fom on one rank */
+  HycoFOM whole; /* rank 0: the whole model on this rank, for inspection; fom on one rank */
   PetscInt n_points;
   cJSON *json, *warnings; /* the report, and its array "warnings" */
   ContactRange *contact;  /* by contact of the scene */
-  PetscReal *stretch;     /* by body: of its most stretched cell, anywhere */
+  PetscReal *stretch;     /* by body: the largest stretch of a cell */
   PetscInt *stretched;    /* tag of that cell */
-  PetscInt n_without;     /* contacts between fixed unknowns, where they are most */
+  PetscInt n_without;     /* largest number of contacts between fixed unknowns */
 } Check;
 
-/* A warning: into the report; printed at the end. On rank 0. */
+/* Adds a warning to the report; it is printed at the end. On rank 0. */
 void CheckWarn(Check *check, const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
 typedef struct {
   PetscBool solved;             /* measured by a solve at the centre, else estimated */
-  PetscReal bytes, resident;    /* of a factor; of the process as it is, all ranks */
-  PetscReal first, next;        /* seconds: a solve with a new stiffness, with that of the last */
-  PetscInt n_training, n_stiff; /* solutions of a training, held-out ones included; stiffnesses among them */
+  PetscReal bytes, resident;    /* memory of a factor; of the processes now, all ranks */
+  PetscReal first, next;        /* seconds of a solve with a new stiffness, with the last one */
+  PetscInt n_training, n_stiff; /* solutions of a training, held-out ones included; number of different stiffnesses
+                                   among them */
 } Cost;
 
 /* -- check_mesh.c, on rank 0 -- */
 
-/* Cells at fe's nodes: the most stretched of each body. */
+/* Finds the most stretched cell of each body at fe's nodes. */
 void CheckCells(Check *check, HycoFE fe);
-/* Bodies in several parts, and what is said of each; groups. */
+/* Reports bodies that consist of several parts, the description of each body; groups. */
 PetscErrorCode CheckBodies(Check *check);
 PetscErrorCode CheckGroups(Check *check);
 
 /* -- check_contact.c, on rank 0 -- */
 
-/* Gaps at fe's parameters; *first: facets of slave and master are compared, too. */
+/* Measures the gaps at fe's parameters; *first: also compares facets of slave and master. */
 PetscErrorCode CheckGaps(Check *check, HycoFE fe, PetscBool first);
-/* What the ranges of gaps say. */
+/* Reports the ranges of gaps. */
 void CheckContacts(Check *check);
 
 /* -- check_cost.c; collective -- */
 
-/* Of the system as it is assembled, which took `assembly` seconds: the factor's memory by MUMPS's analysis of the
-   stiffness with the contacts, seconds by its count of operations. */
+/* For the assembled system, which took `assembly` seconds: the factor's memory by MUMPS's analysis of the stiffness
+   with the contacts, seconds from its count of operations. */
 PetscErrorCode CheckEstimate(Check *check, PetscReal assembly, Cost *cost);
-/* Seconds by a solve at mu; fails where that does not converge. */
+/* Seconds from a solve at mu; fails if it does not converge. */
 PetscErrorCode CheckSolve(Check *check, const PetscReal mu[], Cost *cost);
-/* The training's solutions and the stiffnesses among them: those of the points that are given, or a typical number. */
+/* The number of solutions of the training and of the stiffnesses among them: for the given points, or a typical
+   number. */
 PetscErrorCode CheckCountTraining(HycoScene scene, HycoSamples samples, PetscBool given, Cost *cost);
 PetscErrorCode CheckSayCost(Check *check, const Cost *cost, PetscBool given);
 

@@ -1,15 +1,15 @@
-/* hyco check: gaps, and what faces what. */
+/* hyco check: gaps, and whether surfaces face each other. */
 #include "check.h"
 
-/* Facets of the slave larger than the master's by this factor are coarser, not merely of another shape. */
+/* Facets of the slave larger than the master's by this factor are reported as coarser. */
 #define COARSER 1.5
-/* A smallest gap beyond this share of the mesh's extent does not close by small displacements. */
+/* A smallest gap above this share of the mesh's extent does not close by small displacements. */
 #define FAR 0.1
-/* Of the mesh's extent: a gap no larger is round-off. */
+/* Share of the mesh's extent: a smaller gap is round-off. */
 #define ROUNDING 1e-12
 
-/* The slave's facets over the master's around contact k; 0: one of them is no surface. size: room for 2 reals a node.
- */
+/* Slave's facet size over the master's around contact k; 0: one of the groups is not a surface. size: room for 2
+   reals a node. */
 static PetscReal Coarseness(const HycoPairs *p, PetscInt k, PetscInt n_nodes, const PetscReal size[])
 {
   PetscReal master = 0;
@@ -19,7 +19,7 @@ static PetscReal Coarseness(const HycoPairs *p, PetscInt k, PetscInt n_nodes, co
   return master > 0 ? size[p->slave[k]] / master : 0;
 }
 
-/* The median over the contacts of one entry; types that search, whose meshes need not match. */
+/* The median over the contacts of one entry; for types with a search, whose meshes need not match. */
 static PetscErrorCode CompareFacets(Check *check, HycoFE fe, PetscInt contact)
 {
   const HycoPairs *p = &check->whole->pairs;

@@ -4,12 +4,12 @@
 #include <stdio.h>
 #include <sys/resource.h>
 
-/* Solutions of a training whose points are not given. */
+/* Assumed number of solutions if no training points are given. */
 #define TYPICAL_TRAINING 100
-/* Of a matrix product's speed: what a sparse factor reaches. */
+/* Speed of a sparse factorisation as a share of a matrix product's. */
 #define SPARSE_SHARE 0.5
 
-/* What a process holds now, on all ranks. */
+/* Memory of the process now, summed over all ranks. */
 static PetscErrorCode Resident(PetscReal *bytes)
 {
   struct rusage usage;
@@ -22,7 +22,7 @@ static PetscErrorCode Resident(PetscReal *bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Floating-point operations a second of a small matrix product, this process's. */
+/* Floating-point operations per second of a small matrix product on this process. */
 static PetscErrorCode Speed(PetscReal *flops)
 {
   const PetscBLASInt n = 256;
@@ -34,7 +34,7 @@ static PetscErrorCode Speed(PetscReal *flops)
   PetscCall(PetscMalloc1(3 * n * n, &a));
   for (PetscInt k = 0; k < 3 * n * n; k++) a[k] = 1;
   *flops = 0;
-  for (PetscInt k = 0; k < 10; k++) { /* the fastest: others use the machine, too */
+  for (PetscInt k = 0; k < 10; k++) { /* the fastest, because others may use the machine */
     begin = HycoNow();
     BLASgemm_("N", "N", &n, &n, &n, &one, a, &n, a + n * n, &n, &zero, a + 2 * n * n, &n);
     *flops = PetscMax(*flops, 2. * n * n * n / PetscMax(HycoNow() - begin, 1e-9));
@@ -97,7 +97,7 @@ PetscErrorCode CheckCountTraining(HycoScene s, HycoSamples samples, PetscBool gi
   held = PetscMin(PetscMax(n, 20), 30);
   cost->n_training = n + held;
   cost->n_stiff = any ? n : 1;
-  for (PetscInt k = 1; mu && any && k < n; k++) { /* those that were there before */
+  for (PetscInt k = 1; mu && any && k < n; k++) { /* previous ones */
     PetscBool seen = PETSC_FALSE;
 
     for (PetscInt j = 0; j < k && !seen; j++) {
@@ -107,7 +107,7 @@ PetscErrorCode CheckCountTraining(HycoScene s, HycoSamples samples, PetscBool gi
     }
     cost->n_stiff -= seen;
   }
-  if (any) cost->n_stiff += held; /* three may share one, which does not matter here */
+  if (any) cost->n_stiff += held; /* held-out points may share stiffnesses, which is neglected here */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

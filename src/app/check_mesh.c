@@ -3,9 +3,10 @@
 #include <hycokinematics.h>
 #include <string.h>
 
-/* A cell beyond this is said: the solver bears more, but what happens across the cell is hardly resolved along it. */
+/* Cells with a larger aspect ratio are reported: the solver can handle them, but they resolve poorly along their
+   length. */
 #define LONG_CELL 100
-/* Two groups that have this share of their nodes in common are alike. */
+/* Groups with this share of common nodes are reported as alike. */
 #define ALIKE 0.95
 
 /* From the reference simplex to the regular one, inverted. */
@@ -21,8 +22,8 @@ static void ToRegular(PetscInt dim, PetscReal J[3][3])
   }
 }
 
-/* How many times as long as wide a cell is at a quadrature point, 1 if it is regular there: k + sqrt(k^2 - 1) with the
-   condition number k = |J| |J^-1| / dim in Frobenius's norm of the map from the regular cell. Exact for rectangles. */
+/* Aspect ratio of a cell at a quadrature point, 1 if it is regular there: k + sqrt(k^2 - 1) with the condition
+   number k = |J| |J^-1| / dim in the Frobenius norm of the map from the regular cell. Exact for rectangles. */
 static PetscReal Stretch(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q)
 {
   const PetscInt dim = el->dim;
@@ -45,7 +46,8 @@ static PetscReal Stretch(const HycoElement *el, const PetscInt node[], const Pet
       if (c == 0) det += J[c][d] * minor;
     }
   }
-  k = PetscMax(PetscSqrtReal(norm * inverse) / (PetscAbsReal(det) * dim), 1); /* no division by 0: K is assembled */
+  k = PetscMax(PetscSqrtReal(norm * inverse) / (PetscAbsReal(det) * dim), 1); /* no division by 0, because K is
+                                                                                 assembled */
   return k + PetscSqrtReal(k * k - 1);
 }
 
@@ -60,7 +62,7 @@ void CheckCells(Check *check, HycoFE fe)
     for (PetscInt q = 0; q < (m->nv == m->dim + 1 ? 1 : el->nq); q++) {
       const PetscReal stretch = Stretch(el, m->cells + e * m->nv, fe->X, q);
 
-      if (stretch <= check->stretch[b] * (1 + 1e-6)) continue; /* of a square, a root of round-off is left */
+      if (stretch <= check->stretch[b] * (1 + 1e-6)) continue; /* round-off, whose root remains for a square */
       check->stretch[b] = stretch;
       check->stretched[b] = m->cell_id[e];
     }
@@ -73,7 +75,7 @@ static PetscInt Root(PetscInt part[], PetscInt i)
   return i;
 }
 
-/* How many parts that share no node each body is in. */
+/* The number of parts of each body that share no node. */
 static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
 {
   PetscInt *part;
@@ -141,7 +143,7 @@ PetscErrorCode CheckBodies(Check *check)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many nodes the groups g and h have in common; both ascend. */
+/* The number of common nodes of the groups g and h; both are ascending. */
 static PetscInt Common(HycoMesh m, PetscInt g, PetscInt h)
 {
   PetscInt n = 0, j = m->group_start[h];
@@ -176,7 +178,7 @@ static void CheckTwins(Check *check, HycoMesh m)
   }
 }
 
-/* Sets used[g] for the group `name`; fails where there is none. */
+/* Sets used[g] for the group `name`; fails if there is none. */
 static PetscErrorCode Use(HycoMesh m, const char key[], const char name[], PetscBool used[])
 {
   PetscInt g = 0;
@@ -187,8 +189,8 @@ static PetscErrorCode Use(HycoMesh m, const char key[], const char name[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The groups that the scene names: bodies, supports, loads, contacts with what their types declare, the region of
-   interest. */
+/* Marks the groups used in the scene: bodies, supports, loads, contacts with the entries of their types, the region
+   of interest. */
 static PetscErrorCode MarkUsed(HycoScene s, HycoMesh m, PetscBool used[])
 {
   char *region[64];

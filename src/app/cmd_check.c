@@ -1,11 +1,11 @@
-/* hyco check: reads and assembles all of a scene, solves nothing unless asked; says what is there and what it costs. */
+/* hyco check: reads and assembles a whole scene, solves only on request; reports its contents and its cost. */
 #include "check.h"
 #include <hycomaterialimpl.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-/* Up to so many parameters all corners of the ranges are tried, beyond it the ends of each alone. */
+/* Up to this number of parameters all corners of the ranges are checked, above it only the ends of each. */
 #define MOST_CORNERS 4
 
 void CheckWarn(Check *check, const char format[], ...)
@@ -19,7 +19,7 @@ void CheckWarn(Check *check, const char format[], ...)
   cJSON_AddItemToArray(check->warnings, cJSON_CreateString(line));
 }
 
-/* The centre of the ranges, then their corners, or, of many parameters, the ends of each. The caller frees mu. */
+/* The centre of the ranges, then their corners, or with many parameters the ends of each. The caller frees mu. */
 static PetscErrorCode ListPoints(HycoScene s, PetscInt *n, PetscReal **mu)
 {
   const PetscInt p = s->n_parameters;
@@ -52,7 +52,7 @@ static PetscErrorCode Measure(Check *check, const PetscReal mu[], PetscBool firs
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "radius = 4.02, load = 0, t = 1: ", of the variables v; "" of none. */
+/* "radius = 4.02, load = 0, t = 1: ", for the variables v; "" if there are none. */
 static PetscErrorCode NamePoint(HycoScene s, const PetscReal v[], char place[HYCO_LINE])
 {
   const PetscInt n = s->n_parameters + (s->n_times > 0); /* tables follow from the time */
@@ -69,7 +69,7 @@ static PetscErrorCode NamePoint(HycoScene s, const PetscReal v[], char place[HYC
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K, F, B and D for the variables v as solve makes them, with its errors, which are told with the point. Collective. */
+/* Assembles K, F, B and D for the variables v as solve does; its errors are reported with the point. Collective. */
 static PetscErrorCode Assemble(Check *check, const PetscReal v[], PetscBool first)
 {
   HycoFOM f = check->fom;
@@ -86,7 +86,7 @@ static PetscErrorCode Assemble(Check *check, const PetscReal v[], PetscBool firs
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A point of the ranges: with a history where that ends and where it begins. Collective. */
+/* Checks a point of the ranges: with a history at the end and at the begin. Collective. */
 static PetscErrorCode CheckPoint(Check *check, const PetscReal mu[], PetscBool first)
 {
   HycoScene s = check->fom->scene;
@@ -104,9 +104,9 @@ static PetscErrorCode CheckPoint(Check *check, const PetscReal mu[], PetscBool f
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- what is there: rank 0 -- */
+/* -- description of the scene: rank 0 -- */
 
-/* How many nodes follow each tie's master; *n: of all ties. */
+/* The number of nodes of each tie's slave; *n: of all ties. */
 static PetscErrorCode SayTies(Check *check, HycoMesh m, PetscInt *n)
 {
   HycoScene s = check->fom->scene;
@@ -154,8 +154,8 @@ static PetscErrorCode SayMesh(Check *check)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Motions that the supports leave free: contact alone prevents them, or -hyco_regularise takes them out; others are an
-   error of the assembly. */
+/* Reports motions that the supports leave free: contact prevents them, or -hyco_regularise removes them; others are
+   an error of the assembly. */
 static PetscErrorCode SayMotions(Check *check)
 {
   HycoFOM f = check->whole;
@@ -192,8 +192,8 @@ enum { MAPS, STIFFNESS, LAWS, TEMPERATURES, ROWS, GAPS, LOADS, SUPPORTS, N_REACH
 static const char *const reached[N_REACHED] = {"maps",         "stiffness", "laws",  "temperatures",
                                                "contact rows", "gaps",      "loads", "supports"};
 
-/* What a variable reaches by the entries that name it; a map moves what lies on its body. "laws": constants that leave
-   the elastic stiffness alone. */
+/* What a variable affects, from the entries that contain it; a map moves everything on its body. "laws": constants
+   that do not affect the elastic stiffness. */
 static void FindReach(HycoScene s, PetscInt p, PetscBool does[N_REACHED])
 {
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
@@ -225,7 +225,7 @@ static void FindReach(HycoScene s, PetscInt p, PetscBool does[N_REACHED])
                                  HycoExprChanges(s->fixed[k].normal, changed));
 }
 
-/* A parameter, or the time of a history, or one of its tables. */
+/* Reports a parameter, or the time of a history, or one of its tables. */
 static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
 {
   HycoScene s = check->fom->scene;
@@ -241,7 +241,9 @@ static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
     PetscCall(HycoListAdd(words, ", ", reached[k]));
     cJSON_AddItemToArray(list, cJSON_CreateString(reached[k]));
   }
-  if (!words[0] && p == s->n_parameters) PetscFunctionReturn(PETSC_SUCCESS); /* laws and tables have it all the same */
+  if (!words[0] && p == s->n_parameters)
+    PetscFunctionReturn(PETSC_SUCCESS); /* laws and tables depend on time in any
+                                           case */
   PetscCall(Say("%s %s", what, s->parameter[p]));
   if (p < s->n_parameters) PetscCall(Say(" from %g to %g", (double)s->lo[p], (double)s->hi[p]));
   PetscCall(Say(": affects %s\n", words[0] ? words : "nothing"));
@@ -320,7 +322,7 @@ static PetscErrorCode Create(HycoFOM fom, Check *check)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The warnings, in words and into the report, which is written. */
+/* Prints the warnings and writes the report. */
 static PetscErrorCode Finish(Check *check)
 {
   const int n = cJSON_GetArraySize(check->warnings);
@@ -338,7 +340,7 @@ static PetscErrorCode Finish(Check *check)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All points, the centre last, where the costs are measured. */
+/* Checks all points, the centre last, where the costs are measured. */
 static PetscErrorCode Visit(Check *check, PetscBool solve, Cost *cost)
 {
   const PetscInt p = check->fom->scene->n_parameters;

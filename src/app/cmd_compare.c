@@ -1,4 +1,4 @@
-/* hyco compare: the reduced model against full order over a set of points. */
+/* hyco compare: compares the reduced model with full order over a set of points. */
 #include "driver.h"
 #include <hycosnapshotsimpl.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@ static const char *const columns[N_COLUMNS] = {"error_u",
                                                "seconds_full_order",
                                                "seconds_reduced"};
 
-/* One point on one group: both solutions, their difference. */
+/* One point on one group: both solutions, and their difference. */
 static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[],
                                    PetscReal v[])
 {
@@ -58,7 +58,7 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the scene has a history, and how many numbers a point then has. */
+/* Whether the scene has a history, and the number of values per point. */
 static PetscErrorCode CountColumns(HycoScene scene, PetscBool *paths, PetscInt *n)
 {
   PetscInt n_times;
@@ -70,7 +70,7 @@ static PetscErrorCode CountColumns(HycoScene scene, PetscBool *paths, PetscInt *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points of a comparison, shared out by a queue. value: rows of those that this rank's group takes. */
+/* The points of a comparison, shared by a queue. value: rows of those that this rank's group takes. */
 typedef struct {
   HycoScene scene;
   HycoROM model;
@@ -122,7 +122,7 @@ static PetscErrorCode CompareMine(const Points *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On every rank, a row for each point. */
+/* Gathers a row for each point on every rank. */
 static PetscErrorCode CompareAll(Points *p)
 {
   PetscInt *list;

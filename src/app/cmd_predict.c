@@ -12,7 +12,7 @@ static void Estimate(cJSON *json, const char name[], PetscReal estimate)
     cJSON_AddNullToObject(json, name);
 }
 
-/* The estimated errors (null: none), and how far outside the ranges the point lies. */
+/* Reports the estimated errors (null: none), and the distance from the region of training. */
 static void ReportTrust(cJSON *json, const HycoPrediction *p)
 {
   Estimate(json, "estimated_error_u", p->estimated_error_u);
@@ -49,8 +49,8 @@ static void ReportRID(cJSON *json, const HycoPrediction *p)
   cJSON_AddNumberToObject(json, "rid_active", p->n_rid_active);
 }
 
-/* carried: by the contacts (n_carried; 0: not known). fallback: why it was solved full order; "": it was not. whole: u
-   is that of the whole mesh. path: NULL, or of a history. */
+/* carried: results of the contacts (n_carried; 0: not known). fallback: the reason for full order; "": not used.
+   whole: u is that of the whole mesh. path: NULL, or with a history. */
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, PetscInt n_carried,
                              const HycoContactResult carried[], PetscReal energy, const char fallback[],
                              PetscBool whole, const DriverReducedPath *path)
@@ -62,7 +62,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddStringToObject(json, "model_type", p->type);
   cJSON_AddNumberToObject(json, "n_dof", p->n_dof);
   cJSON_AddNumberToObject(json, "n_multipliers", p->n_multipliers);
-  cJSON_AddNumberToObject(json, "n_contacts", p->n_all_contacts); /* as hyco solve counts them */
+  cJSON_AddNumberToObject(json, "n_contacts", p->n_all_contacts); /* counted as in hyco solve */
   cJSON_AddNumberToObject(json, "n_active", p->n_active);
   cJSON_AddNumberToObject(json, "active_set_iterations", p->iterations);
   cJSON_AddStringToObject(json, "solver", p->method);
@@ -113,7 +113,8 @@ static PetscErrorCode SayReduced(const HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One point: rank 0 predicts, the others wait; all solve full order where the fallback says so, or with its forces. */
+/* One point: rank 0 predicts while the others wait; all solve full order if the fallback requires it, or with its
+   forces. */
 static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, const char output[])
 {
   HycoPrediction p = {0};
@@ -172,7 +173,7 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One path: what it reached is written, and it fails where that is not its end. */
+/* One path: writes what it reached, and fails if that is not its end. */
 static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
 {
   DriverReducedPath path = {0};
@@ -215,7 +216,7 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a set's table holds of each point. */
+/* Columns of a set's table. */
 enum {
   FORCE,
   LAMBDA_MAX,
@@ -231,10 +232,10 @@ enum {
   ESTIMATE_LAMBDA,
   BEYOND,
   FULL_ORDER,
-  PATH_FORCE, /* of paths alone */
+  PATH_FORCE, /* only for paths */
   PATH_MISES,
   PATH_INELASTIC,
-  RESIDUAL, /* where it is asked for */
+  RESIDUAL, /* if requested */
   CONTACT_RESIDUAL,
   N_COLUMNS
 };
@@ -258,8 +259,8 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "equilibrium_residual",
                                                "contact_residual"};
 
-/* own: columns without the scene's quantities, more of paths; with them; of paths with their extremes too; width: with
-   what the contacts carry. */
+/* Numbers of columns: own: without the scene's quantities, more for paths; with them; for paths with their extremes
+   too; width: with the results of contacts. */
 typedef struct {
   PetscInt own, with_quantities, with_extremes, width;
   char path_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
@@ -313,7 +314,7 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   v[CONVERGED] = p->reason > 0;
   v[ITERATIONS] = p->iterations;
   v[SECONDS] = p->seconds.total;
-  v[ESTIMATE_U] = p->estimated_error_u >= 0 ? p->estimated_error_u : NAN; /* a table's word for none */
+  v[ESTIMATE_U] = p->estimated_error_u >= 0 ? p->estimated_error_u : NAN; /* how a table marks that there is none */
   v[ESTIMATE_SIGMA] = p->estimated_error_sigma >= 0 ? p->estimated_error_sigma : NAN;
   v[ESTIMATE_LAMBDA] = p->estimated_error_lambda >= 0 ? p->estimated_error_lambda : NAN;
   v[BEYOND] = p->beyond;
@@ -331,7 +332,7 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   DriverCarriedFill(&s->carried, n_carried, carried, v + s->with_extremes);
 }
 
-/* Of this rank's points: rows of values; which are to be solved full order. */
+/* For this rank's points: rows of values; which are to be solved full order. */
 typedef struct {
   const Fallback *fallback;
   const Shape *shape;
@@ -377,7 +378,7 @@ static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All ranks together, the points where the reduced model was not enough. */
+/* Solves by all ranks together the points where the reduced model was not sufficient. */
 static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, const PetscReal mu[],
                                 const PetscInt full[], const Shape *s, PetscReal value[])
 {
@@ -391,13 +392,13 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, 
 
     if (!full[k]) continue;
     PetscCall(DriverSolveFullOrder(fallback, n_par, mu + k * n_par, &p));
-    p.estimated_error_u = value[k * width + ESTIMATE_U]; /* the model's, which asked for full order */
+    p.estimated_error_u = value[k * width + ESTIMATE_U]; /* the model's estimate, which required full order */
     p.estimated_error_sigma = value[k * width + ESTIMATE_SIGMA];
     p.estimated_error_lambda = value[k * width + ESTIMATE_LAMBDA];
     p.beyond = value[k * width + BEYOND];
     PetscCall(HycoFOMGetContacts(fallback->fom, &n_carried, &carried));
     FillRow(&p, n_carried, carried, s, value + k * width);
-    value[k * width + U_NORM] = NAN; /* the whole mesh's, no RID's */
+    value[k * width + U_NORM] = NAN; /* that of the whole mesh, not of an RID */
     value[k * width + FULL_ORDER] = 1;
     count++;
   }
@@ -416,7 +417,7 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
-  PetscCall(DriverCheckLeftEarly()); /* what the solver alone knows is read by the first prediction */
+  PetscCall(DriverCheckLeftEarly()); /* solver options are read by the first prediction */
   PetscCall(ShapeOf(model, scene, &s));
   PetscCall(PetscCalloc2(n * s.width, &value, n, &full));
   begin = HycoNow();

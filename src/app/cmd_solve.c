@@ -1,7 +1,7 @@
 /* hyco solve: full order, at one parameter value or over a set. */
 #include "driver.h"
 
-/* What a user should know beside the numbers. */
+/* Prints remarks that the user should know. */
 static PetscErrorCode Remarks(const HycoSummary *s)
 {
   PetscFunctionBegin;
@@ -16,7 +16,7 @@ static PetscErrorCode Remarks(const HycoSummary *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What holds the bodies, and how far all forces are from balance. */
+/* Reports the reactions, and the imbalance of all forces. */
 static PetscErrorCode SayReactions(cJSON *json, HycoFOM fom, PetscInt dim)
 {
   static const char *const section[] = {"supports", "springs", "loads", "contact"};
@@ -144,13 +144,13 @@ static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a set's table holds of each point. */
+/* Columns of a set's table. */
 enum { FORCE, LAMBDA_MAX, ACTIVE, U_NORM, ENERGY, KKT, CONVERGED, ITERATIONS, SECONDS, N_COLUMNS };
 static const char *const columns[N_COLUMNS] = {
     "total_contact_force", "lambda_max", "n_active", "u_norm2", "strain_energy", "kkt_max",
     "converged",           "iterations", "seconds"};
 
-/* The table of a set: those columns, the scene's quantities, what its contacts carry. */
+/* The table of a set: these columns, the scene's quantities, the results of its contacts. */
 typedef struct {
   PetscInt with_quantities, width;
   DriverCarried carried;
@@ -158,7 +158,7 @@ typedef struct {
   PetscReal *value;
 } Table;
 
-/* Of n points, once dim is known. */
+/* For n points, once dim is known. */
 static PetscErrorCode CreateTable(HycoScene scene, PetscInt dim, PetscInt n, Table *t)
 {
   PetscFunctionBegin;
@@ -202,7 +202,7 @@ static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points in their order, each from the last one's active contacts, all ranks together. */
+/* Solves the points in their order, each from the last one's active contacts, by all ranks together. */
 static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, const char output[], const char table[])
 {
   PetscInt n, n_par;

@@ -2,7 +2,7 @@
 #include "driver.h"
 #include <string.h>
 
-/* "scan": how near the reduced stiffness comes to being singular inside the parameters' ranges; null: not scanned. */
+/* "scan": how close the reduced stiffness comes to being singular within the parameters' ranges; null: not scanned. */
 static void ReportScan(cJSON *json, const HycoScan *s, PetscInt n_par)
 {
   cJSON *object;
@@ -67,14 +67,14 @@ static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTra
   if (log->scene) DriverReportGreedy(json, log);
   DriverReportModel(json, search, t);
   seconds = cJSON_AddObjectToObject(json, "seconds");
-  cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots); /* of the model that is written */
+  cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots); /* of the final model */
   cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
   cJSON_AddNumberToObject(seconds, "total", t->seconds_snapshots + t->seconds_reduction);
   PetscCall(ReportWrite(&json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Targets choose a recipe for a given set of points; -greedy has a target of its own for choosing these. */
+/* Targets choose settings for a given set of points; -greedy has its own target for choosing points. */
 static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
 {
   PetscFunctionBegin;
@@ -84,7 +84,7 @@ static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses an option of the command line that this training does not read, by what the reducer declares of it. */
+/* Refuses an option of the command line that this training does not read, according to the reducer's declarations. */
 static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool greedy)
 {
   const HycoOption *table;
@@ -114,7 +114,7 @@ static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A point given twice would be learned twice. */
+/* A repeated point would have twice the weight. */
 static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
 {
   PetscInt n = 0, dropped;
@@ -210,7 +210,7 @@ PetscErrorCode CommandTrain(void)
     PetscCall(HycoReducerRun(reducer, given ? samples : NULL, model, &t));
   PetscCall(Say("%s", t.summary));
   if (t.missed[0]) PetscCall(DriverMissed("%s", t.missed));
-  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u, t.chosen.recipe.rid ? "RID " : "",
+  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u, t.chosen.settings.rid ? "RID " : "",
                 (double)t.error_lambda));
   if (t.condition > 0) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
   PetscCall(Say("\n"));

@@ -1,4 +1,4 @@
-/* hyco view: what is in a model or a scene. */
+/* hyco view: describes a model or a scene. */
 #include "driver.h"
 #include <hycomesh.h>
 #include <petscviewer.h>
@@ -33,7 +33,7 @@ PetscErrorCode CommandView(void)
   } else {
     PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
     PetscCall(DriverCheckLeft());
-    PetscCall(HycoMeshCreate(PETSC_COMM_WORLD, scene, &mesh)); /* fails where it, or a group, is missing */
+    PetscCall(HycoMeshCreate(PETSC_COMM_WORLD, scene, &mesh)); /* fails if it, or a group, is missing */
     PetscCall(HycoMeshDestroy(&mesh));
     if (rank == 0) PetscCall(HycoSceneView(scene, PETSC_VIEWER_STDOUT_SELF));
     PetscCall(HycoSceneDestroy(&scene));

@@ -1,7 +1,7 @@
-/* hyco compare of a model of paths: the worst listed time and the end of each path, in the full order's steps. */
+/* hyco compare for a model of paths: the worst listed time and the end of each path, in full order's steps. */
 #include "driver.h"
 
-/* Errors by kind, at the worst time and at the end; then what follows. */
+/* Errors by kind, at the worst time and at the end; then further columns. */
 enum { CONVERGED = 2 * HYCO_N_ERRORS, REACHED, KKT, ITERATIONS, SECONDS_FOM, SECONDS_ROM, N_COLUMNS };
 
 PetscInt DriverPathColumns(void)
@@ -9,7 +9,7 @@ PetscInt DriverPathColumns(void)
   return N_COLUMNS;
 }
 
-/* Its full-order path and the model's, their difference; root: the one rank that predicts and whose v counts. */
+/* The full-order path and the model's, and their difference; root: the rank that predicts and whose v is used. */
 PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
                                  PetscReal v[])
 {

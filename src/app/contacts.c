@@ -1,4 +1,4 @@
-/* What each contact of the scene carries: in reports, in words, as columns of tables. */
+/* Results of each contact of the scene: in reports, in the text, as columns of tables. */
 #include "driver.h"
 #include <math.h>
 
@@ -46,7 +46,7 @@ PetscErrorCode DriverGetCarried(HycoROM model, HycoScene scene, PetscInt *n, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of a contact in a table, and what they are called after its name and a dot. */
+/* The columns of a contact in a table; their names follow the contact's name and a dot. */
 enum { WIDTH = 9 };
 static PetscInt List(PetscInt dim, const HycoContactResult *r, const char *name[WIDTH], PetscReal value[WIDTH])
 {

@@ -1,5 +1,5 @@
-/* hyco predict with the scene at hand: -hyco_fallback, full order where the reduced model cannot be trusted as far as
-   is asked; -hyco_full_displacement, one full solve with a condensed model's forces. */
+/* hyco predict with the scene: -hyco_fallback, full order where the reduced model is not accurate enough;
+   -hyco_full_displacement, one full-order solve with a condensed model's forces. */
 #include "driver.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -91,7 +91,7 @@ void DriverWantsFullOrder(const Fallback *f, const HycoPrediction *p, char why[D
              (double)p->estimated_error_lambda, (double)f->target_lambda);
 }
 
-/* What the summary says of the displacement, over the whole mesh. */
+/* Takes the displacement's part of the summary, over the whole mesh. */
 static void TakeDisplacement(Fallback *f, const HycoSummary *s, HycoPrediction *p)
 {
   p->reason = s->reason;
@@ -121,7 +121,7 @@ PetscErrorCode DriverSolveDisplacement(Fallback *f, HycoROM model, PetscInt n, c
   PetscCall(HycoFOMGetSummary(f->fom, &s));
   TakeDisplacement(f, &s, p);
   p->estimated_error_u = p->estimated_error_u_full;
-  if (s.reason > 0) p->reason = reason; /* the forces' */
+  if (s.reason > 0) p->reason = reason; /* the reason of the forces' solve */
   p->seconds.setup += s.seconds.setup;
   p->seconds.assemble += s.seconds.assemble;
   p->seconds.factor += s.seconds.factor;

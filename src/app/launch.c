@@ -1,4 +1,4 @@
-/* How the ranks were started, and what each may use of the machine. */
+/* How the ranks were started, and the resources that each may use. */
 #include "driver.h"
 #include <dlfcn.h>
 #include <stdio.h>
@@ -6,11 +6,11 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Variables by which launchers tell a process how many ranks they have started. */
+/* Environment variables in which launchers store the number of ranks. */
 static const char *const sizes[] = {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS",
                                     NULL};
 
-/* What one of them said before MPI began, which sets some itself: "NAME=VALUE"; "": one rank, or no launcher. */
+/* The value of one of them before MPI begins, which sets some itself: "NAME=VALUE"; "": one rank, or no launcher. */
 static char launched[DRIVER_LINE];
 
 void DriverNoteLaunch(void)
@@ -25,7 +25,7 @@ void DriverNoteLaunch(void)
   if (!launched[0] && rank && atol(rank) > 0) snprintf(launched, sizeof(launched), "PMIX_RANK=%s", rank);
 }
 
-/* Can a folder be made in this one? */
+/* Whether a folder can be created in this one. */
 static int HoldsFolders(const char *folder)
 {
   char path[DRIVER_LINE];
@@ -34,8 +34,8 @@ static int HoldsFolders(const char *folder)
   return folder[0] && length > 0 && length < (int)sizeof(path) && mkdtemp(path) && !rmdir(path);
 }
 
-/* Open MPI 5 makes a folder of its own for every process, in the first of these variables that is set, and crashes
-   where it cannot. */
+/* Open MPI 5 creates a folder for every process, in the first of these variables that is set, and crashes if it
+   cannot. */
 static void ChooseTemporary(void)
 {
   static const char *const asked[] = {"TMPDIR", "TEMP", "TMP", NULL};
@@ -55,13 +55,13 @@ void DriverStartAlone(void)
 {
   static const char *const launched_by[] = {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_ID", NULL};
   static const char *const settings[][2] = {
-      /* no daemon, for nothing is spawned, and no folder for that daemon's files: Open MPI 4 gives all such runs of a
-         user the same one, and each removes it under the others */
+      /* no daemon, because nothing is spawned, and no folder for its files: Open MPI 4 gives all such runs of a user
+         the same folder, and each run removes it while others use it */
       {"OMPI_MCA_ess_singleton_isolated", "1"},
       {"OMPI_MCA_orte_create_session_dirs", "0"},
-      /* nobody to talk to: no shared memory, no network; where there is none of these, Open MPI would say so */
+      /* no communication: no shared memory, no network; if these are missing, Open MPI would print warnings */
       {"OMPI_MCA_btl", "self"},
-      /* nor is a fast network looked for: psm2 measures its clock for 0.2 s first */
+      /* no search for a fast network: psm2 measures its clock for 0.2 s first */
       {"OMPI_MCA_pml", "ob1"},
       {"OMPI_MCA_if", "^posix_ipv4"},
       {"PMIX_MCA_pif", "^posix_ipv4"},
@@ -88,7 +88,7 @@ PetscErrorCode DriverCheckLaunch(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The newest kernels of OpenBLAS that this processor runs; NULL: no newer ones than Prescott's. */
+/* The newest OpenBLAS kernels that this processor supports; NULL: none newer than Prescott's. */
 static const char *KernelsOfProcessor(void)
 {
 #if defined(__x86_64__)
@@ -113,7 +113,7 @@ void DriverChooseKernels(char **argv)
   call.address = dlsym(RTLD_DEFAULT, "openblas_get_corename");
   if (!kernels || !call.address || getenv(choice) || strcmp(call.name(), "Prescott") || setenv(choice, kernels, 1))
     return;
-  execv("/proc/self/exe", argv); /* comes back only where it fails: hyco then goes on as it is */
+  execv("/proc/self/exe", argv); /* returns only after a failure: hyco then continues unchanged */
 }
 
 void DriverOneThread(void)

@@ -1,4 +1,4 @@
-/* hyco: a table of commands. */
+/* hyco: the table of commands. */
 #include "driver.h"
 #include <signal.h>
 #include <stdio.h>
@@ -30,7 +30,7 @@ const Command commands[] = {
 
 static char message[DRIVER_LINE];
 
-/* The first error's text is kept; what a person reads is one line, printed by Stop. */
+/* Keeps the first error's text; Stop() prints it as one line. */
 static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                                   PetscErrorType type, const char *text, void *ctx)
 {
@@ -45,10 +45,10 @@ static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function,
   return code;
 }
 
-static int stopped; /* for LeakSanitizer alone */
+static int stopped; /* used only by LeakSanitizer */
 
 #if defined(__SANITIZE_ADDRESS__)
-/* LeakSanitizer asks at the end: a refused run ends with what it holds. */
+/* Called by LeakSanitizer at the end: a refused run does not free its objects. */
 int __lsan_is_turned_off(void);
 int __lsan_is_turned_off(void)
 {
@@ -56,8 +56,8 @@ int __lsan_is_turned_off(void)
 }
 #endif
 
-/* Ends a failed run: one line from the lowest rank that has it. Ranks that wait in a call for this one are not left
- * hanging. */
+/* Ends a failed run: one line from the lowest rank with the error. Ranks that wait for this one in a collective call
+   are ended too. */
 static void Stop(void)
 {
   PetscMPIInt rank;
@@ -102,7 +102,7 @@ static PetscBool AsksHelp(int argc, char **argv)
   return PETSC_FALSE;
 }
 
-/* Answers that need no PETSc: no command, an unknown one, -version. Returns -1 to go on. */
+/* Output that needs no PETSc: no command, an unknown one, -version. Returns -1 to continue. */
 static int AnswerAtOnce(int argc, char **argv)
 {
   const Command *command = argc > 1 ? FindCommand(argv[1]) : NULL;
@@ -147,7 +147,7 @@ static PetscErrorCode PrintNothing(const char format[], ...)
   return 0;
 }
 
-/* PETSc reads the option files and the options; what it refuses is one line here, in place of its trace. */
+/* PETSc reads the option files and the options; an error is printed as one line instead of PETSc's trace. */
 static PetscErrorCode Start(int *argc, char ***argv)
 {
   PetscErrorCode (*const printf_of_petsc)(const char[], ...) = PetscErrorPrintf;
@@ -164,7 +164,7 @@ static PetscErrorCode Start(int *argc, char ***argv)
   return ierr;
 }
 
-/* hyco help, hyco COMMAND -help: what the classes and the commands declare, which PETSc is needed for. */
+/* hyco help, hyco COMMAND -help: the declarations of the classes and the commands, for which PETSc is needed. */
 static int Help(char **argv)
 {
   const Command *command = argv[1] ? FindCommand(argv[1]) : NULL;
@@ -182,7 +182,7 @@ static int Help(char **argv)
   return HycoFinalize() || ierr ? DRIVER_FAILED : DRIVER_DONE;
 }
 
-/* Does it solve full order? A start anew takes longer than a prediction. */
+/* Whether it solves full order. Otherwise a restart would take longer than a prediction. */
 static int Factors(const Command *command)
 {
   return command->run == CommandSolve || command->run == CommandTrain || command->run == CommandCompare;
@@ -201,14 +201,15 @@ int main(int argc, char **argv)
   DriverNoteLaunch();
   DriverStartAlone();
   if (Start(&argc, &argv)) return 1;
-  PetscPushErrorHandler(KeepMessage, NULL); /* after: PETSc's books of memory (-malloc_dump) begin with it */
-  signal(SIGPIPE, SIG_IGN);                 /* "hyco ... | head" is no error */
-  signal(SIGXFSZ, SIG_IGN);                 /* a file beyond the limit is a failed write, which is told */
+  PetscPushErrorHandler(KeepMessage, NULL); /* after PetscInitialize(), where PETSc's memory log (-malloc_dump)
+                                               begins */
+  signal(SIGPIPE, SIG_IGN);                 /* "hyco ... | head" is not an error */
+  signal(SIGXFSZ, SIG_IGN);                 /* a file beyond the size limit is reported as a failed write */
   ierr = Run(FindCommand(argv[1]), argc, argv);
   DriverBeatEnd();
   PetscPopErrorHandler();
   if (ierr) Stop();
-  PetscOptionsSetValue(NULL, "-options_left", "0"); /* what is left was checked where it matters */
+  PetscOptionsSetValue(NULL, "-options_left", "0"); /* unread options have been checked before */
   status = DriverEndStatus(ierr);
   return HycoFinalize() ? DRIVER_FAILED : status;
 }

@@ -1,4 +1,4 @@
-/* The files that a command writes and reads are told apart before any work. */
+/* Checks before any work that the files a command writes and reads are different. */
 #include "driver.h"
 #include <hycofields.h>
 #include <hycofile.h>
@@ -23,17 +23,18 @@ static PetscErrorCode Peek(const char name[], char value[PETSC_MAX_PATH_LEN])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A file that the command line names, or the scene. */
+/* A file given on the command line, or the scene. */
 typedef struct {
   const char *what; /* "-report" */
   char path[PETSC_MAX_PATH_LEN];
   HycoFileIdentity identity;
 } Named;
 
-static Named outputs[8]; /* with room for the one that is compared */
+static Named outputs[8]; /* with room for the file being compared */
 static PetscInt n_outputs;
 
-/* A file that is to be written, or (else) to be read, is none of those that are to be written, whatever its name. */
+/* Adds a file to be written, or (else) checks one to be read: it must not be one of those to be written, whatever
+   its name. */
 static PetscErrorCode Take(const char what[], const char path[], PetscBool output)
 {
   Named *taken = &outputs[n_outputs];
@@ -55,7 +56,7 @@ static PetscErrorCode Take(const char what[], const char path[], PetscBool outpu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -output: the fields, and the numbers beside them. */
+/* -output: the fields, and the file of numbers beside them. */
 static PetscErrorCode AddFields(const char path[])
 {
   char h5[PETSC_MAX_PATH_LEN];
@@ -76,7 +77,7 @@ PetscErrorCode DriverSnapshotFolder(const char model[], char folder[PETSC_MAX_PA
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where train keeps its solutions: no file may have that name. */
+/* The folder of train's solutions: no file may have that name. */
 static PetscErrorCode AddSnapshots(const char model[])
 {
   char folder[PETSC_MAX_PATH_LEN];
@@ -102,7 +103,7 @@ static PetscErrorCode CheckSceneFile(void)
 
 static const char *const written[] = {"-report", "-table", "-output", NULL};
 
-/* What is written is told from what is read, whatever the names. */
+/* Checks the written files against those that are read. */
 static PetscErrorCode CheckNames(PetscBool trains)
 {
   static const char *const read[] = {"-points", "-validation_points"};
@@ -127,13 +128,13 @@ static PetscErrorCode CheckNames(PetscBool trains)
     PetscCall(Take(read[k], path, PETSC_FALSE));
   }
   PetscCall(PetscGetArgs(&argc, &argv));
-  for (int k = 2; k < argc - 1; k++) { /* PETSc keeps no option of that name */
+  for (int k = 2; k < argc - 1; k++) { /* PETSc does not store an option of that name */
     if (strncmp(argv[k], "-options_file", 13) == 0) PetscCall(Take(argv[k], argv[k + 1], PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A file can be written at `path`: its folder is there and may be written, or it is a device. */
+/* Checks that a file can be written at `path`: its folder exists and is writable, or it is a device. */
 static PetscErrorCode CheckPlace(const char name[], const char path[], HycoFileKind kind)
 {
   char folder[PETSC_MAX_PATH_LEN];
@@ -164,7 +165,9 @@ static PetscErrorCode CheckFiles(PetscBool trains)
   PetscCall(CheckNames(trains));
   PetscCall(Peek("model", path));
   if (trains && path[0]) PetscCall(CheckPlace("model", path, HYCO_FILE_NUMBERS));
-  for (PetscInt k = 0; k < n_outputs; k++) PetscCall(HycoFileSweep(outputs[k].path)); /* what killed runs left */
+  for (PetscInt k = 0; k < n_outputs; k++)
+    PetscCall(HycoFileSweep(outputs[k].path)); /* removes files left by killed
+                                                  runs */
   for (PetscInt k = 0; written[k]; k++) {
     PetscCall(Peek(written[k] + 1, path));
     if (path[0]) PetscCall(CheckPlace(written[k] + 1, path, HYCO_FILE_TEXT));

@@ -1,9 +1,9 @@
-/* Points in the space of parameters, from the command line. */
+/* Points in the parameter space, from the command line. */
 #include "driver.h"
 #include <stdlib.h>
 #include <string.h>
 
-/* Numbers with commas between, into new memory. */
+/* Numbers separated by commas, in new memory. */
 static PetscErrorCode ParseNumbers(const char name[], const char text[], PetscInt *n, PetscReal **values)
 {
   const char *at = text;
@@ -36,7 +36,7 @@ static PetscErrorCode ListNames(HycoScene scene, char list[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -mu_foo where foo is no parameter. `prefix` is "mu_" or "values_". */
+/* Refuses -mu_foo if foo is not a parameter. `prefix` is "mu_" or "values_". */
 static PetscErrorCode CheckNamed(HycoScene scene, const char prefix[])
 {
   PetscInt n, left;
@@ -91,7 +91,7 @@ static PetscErrorCode ReadGridType(PetscInt *type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of -prefixNAME for each parameter, new memory or NULL; how many are given, and a name without. */
+/* The numbers of -prefixNAME for each parameter, in new memory, or NULL; how many are given, and a name without. */
 static PetscErrorCode GetNamed(HycoScene scene, const char prefix[], const char meaning[], PetscInt count[],
                                PetscReal *values[], PetscInt *given, const char **missing)
 {
@@ -191,8 +191,8 @@ PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The grid that the option `name` gives as `text`; its type unless -grid_type says otherwise: 0 centred, 1 closed, 2
- * Chebyshev. */
+/* The grid that the option `name` gives as `text`; `type` applies unless -grid_type is given: 0 centred, 1 closed, 2
+   Chebyshev. */
 static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char name[], PetscInt type, const char text[])
 {
   PetscInt n, m, counts[64];
@@ -255,7 +255,7 @@ PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -values_NAME for every parameter, combined. */
+/* All combinations of -values_NAME for every parameter. */
 static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscInt *n_sets)
 {
   PetscInt n, count[64], given;

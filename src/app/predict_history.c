@@ -1,4 +1,4 @@
-/* hyco predict of a model of paths: what it reached, in words, in the table, in the report. */
+/* hyco predict for a model of paths: its output as text, table and report. */
 #include "driver.h"
 
 PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path)
@@ -54,7 +54,7 @@ PetscErrorCode DriverSayEquilibrium(const DriverReducedPath *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "equilibrium": null where the laws have no answer. */
+/* "equilibrium": null if a law has no solution. */
 static void ReportEquilibrium(cJSON *json, const DriverReducedPath *path)
 {
   const HycoEquilibrium *e = &path->equilibrium;

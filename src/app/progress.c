@@ -1,4 +1,4 @@
-/* What a person at the terminal sees while it runs. */
+/* Progress on the terminal. */
 #include "driver.h"
 #include <signal.h>
 #include <stdarg.h>
@@ -27,7 +27,7 @@ PetscErrorCode DriverReadQuiet(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What an interrupted training says: made while it runs, for a signal's handler may write and do little else. */
+/* Messages of an interrupted training, prepared in advance, because a signal handler can do little more than write. */
 static char kept_in[PETSC_MAX_PATH_LEN], last_words[2][PETSC_MAX_PATH_LEN + 256];
 static const char *volatile words;
 static volatile sig_atomic_t speaks;
@@ -87,11 +87,10 @@ void DriverPercent(PetscReal share, char text[32])
   snprintf(text, 32, percent >= 99.5 && percent < 1e6 ? "%.0f %%" : "%.2g %%", percent);
 }
 
-#define TERMINAL 79 /* columns: a longer line could not be written over */
+#define TERMINAL 79 /* columns: a longer line could not be overwritten */
 
-/* A bar, or a line a minute (-progress); n = 0: nobody knows how many. The last line only where there was another,
- * unless `ends`.
- */
+/* A bar, or a line a minute (-progress); n = 0: the number is not known. The last line only if there was another,
+   unless `ends`. */
 static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
 {
   static PetscReal begin = -1, last = -1;

@@ -104,7 +104,7 @@ PetscErrorCode DriverWriteText(const char path[], const char text[])
 
   PetscFunctionBegin;
   PetscCall(HycoFileCreate(path, HYCO_FILE_TEXT, &out));
-  (void)!fputs(text, HycoFileStream(out)); /* what fails is told by Close */
+  (void)!fputs(text, HycoFileStream(out)); /* Close reports a failure */
   PetscCall(HycoFileClose(&out, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -149,7 +149,7 @@ static PetscErrorCode WriteColumn(HycoH5 file, const char name[], PetscInt n, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The table as HDF5: a dataset a column. */
+/* The table as HDF5: one dataset for each column. */
 static PetscErrorCode WriteColumns(const char path[], PetscInt n_par, const char *const par[], PetscInt n,
                                    const PetscReal mu[], PetscInt n_columns, const char *const names[],
                                    const PetscReal value[])
@@ -204,7 +204,7 @@ void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns,
     cJSON_AddNumberToObject(object, "mean", sum / used);
     cJSON_AddNumberToObject(object, "max", worst);
     (void)!Say("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(sum / used), 100 * (double)worst);
-  } else { /* no point where it is defined */
+  } else { /* defined at no point */
     cJSON_AddNullToObject(object, "mean");
     cJSON_AddNullToObject(object, "max");
     (void)!Say("  %-21s undefined at every point\n", name);

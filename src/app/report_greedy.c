@@ -1,4 +1,4 @@
-/* hyco train -greedy: the loop's options, its lines and its table. */
+/* hyco train -greedy: the loop's options, its output and its table. */
 #include "driver.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -56,7 +56,7 @@ static PetscErrorCode BeginTable(GreedyLog *log)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A HycoGreedyMonitor: a line, and the table once more with its row. */
+/* A HycoGreedyMonitor: prints a line, and writes the table again with its row. */
 static PetscErrorCode Monitor(const HycoGreedyStep *s, void *ctx)
 {
   GreedyLog *log = (GreedyLog *)ctx;
@@ -116,7 +116,7 @@ PetscErrorCode DriverJudgeGreedy(const GreedyLog *log)
     PetscReal max_eta;
     PetscInt infinite;
     char stop[16];
-  } end; /* known to rank 0 alone */
+  } end; /* known only on rank 0 */
   const char *why = "every point of -training_grid is solved: give a finer grid, or settings with more modes or layers";
 
   PetscFunctionBegin;
@@ -142,7 +142,7 @@ void DriverReportGreedy(cJSON *json, const GreedyLog *log)
 
   cJSON_AddNumberToObject(greedy, "iterations", log->iterations);
   cJSON_AddStringToObject(greedy, "stop", log->stop);
-  if (PetscIsInfReal(log->max_eta)) /* JSON has no word for it */
+  if (PetscIsInfReal(log->max_eta)) /* JSON cannot represent it */
     cJSON_AddNullToObject(greedy, "max_eta");
   else
     cJSON_AddNumberToObject(greedy, "max_eta", log->max_eta);

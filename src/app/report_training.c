@@ -1,13 +1,14 @@
 /*
-  hyco train: what it tried, what the model is worth, and whether that is enough. The recipes are tried by the library
-  (HycoReducerRun()); a line each, and a row in -table. Errors are those at held-out points, as in hyco compare.
+  hyco train: its attempts, the errors of the model, and whether they are small enough. The library tries the settings
+  (HycoReducerRun()); each attempt is a line, and a row in -table. Errors are those at held-out points, as in hyco
+  compare.
 */
 #include "driver.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-/* The least that a model should be good for, where no target is given. */
+/* The default limits if no target is given. */
 static const PetscReal bar[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 5e-3, [HYCO_ERROR_LAMBDA] = 3e-2};
 
 PetscErrorCode DriverReadBudget(PetscInt *budget)
@@ -43,7 +44,7 @@ static void Number(PetscReal value, char text[32])
     snprintf(text, 32, "%.3g", (double)value);
 }
 
-/* "u 0.12 %, stress 3.4 %, forces 5 %" of one number per kind of error. */
+/* "u 0.12 %, stress 3.4 %, forces 5 %" from one number per kind of error. */
 static void DescribeErrors(PetscBool path, const PetscReal error[], char text[DRIVER_LINE])
 {
   static const HycoErrorKind kinds[] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA, HYCO_ERROR_INELASTIC};
@@ -59,7 +60,7 @@ static void DescribeErrors(PetscBool path, const PetscReal error[], char text[DR
   }
 }
 
-/* Whether the scene has a history: there is inelastic strain then. */
+/* Whether the scene has a history, and thus inelastic strain. */
 static PetscBool IsPath(const Search *s)
 {
   PetscInt n = 0;
@@ -68,7 +69,7 @@ static PetscBool IsPath(const Search *s)
   return (PetscBool)(n > 0);
 }
 
-/* The kinds of error that there are. */
+/* The number of kinds of error. */
 static PetscInt CountKinds(const Search *s)
 {
   return IsPath(s) ? HYCO_N_ERRORS : HYCO_ERROR_INELASTIC;
@@ -91,7 +92,7 @@ static PetscErrorCode Append(Search *s, const char text[])
 static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
 {
   char row[4 * DRIVER_LINE], number[32];
-  const HycoRecipe *r = &a->recipe;
+  const HycoReducerSettings *r = &a->settings;
   size_t at;
 
   PetscFunctionBegin;
@@ -122,7 +123,8 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "; meets the targets", or where and why it was dropped: " at 2 of 20 points, and dropped beside recipe 1: ...". */
+/* "; meets the targets", or where and why the attempt was dropped: " at 2 of 20 points, and dropped beside settings
+   1: ...". */
 static PetscErrorCode DescribeEnd(const HycoAttempt *a, char text[DRIVER_LINE])
 {
   PetscFunctionBegin;
@@ -145,7 +147,7 @@ static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
 
   PetscFunctionBegin;
   if (a->number == 1) PetscCall(Say("settings, each judged at %d held-out points (largest errors):\n", (int)a->n_held));
-  HycoRecipeDescribe(&a->recipe, sizeof(what), what);
+  HycoReducerSettingsDescribe(&a->settings, sizeof(what), what);
   DescribeErrors(IsPath(s), a->held_out.largest, errors);
   PetscCall(DescribeEnd(a, end));
   if (a->failure[0])
@@ -182,7 +184,7 @@ PetscErrorCode DriverSetSearch(Search *s, HycoScene scene, HycoReducer reducer, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What was asked and is not met, a line and the exit status of a miss. */
+/* Reports targets that are not met: a line and the exit status of a miss. */
 static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
 {
   const PetscReal *limit = s->on ? s->target : bar;
@@ -217,7 +219,7 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
 
   PetscFunctionBegin;
   if (t->chosen.number) {
-    HycoRecipeDescribe(&t->chosen.recipe, sizeof(what), what);
+    HycoReducerSettingsDescribe(&t->chosen.settings, sizeof(what), what);
     PetscCall(Say("chosen: settings %d of %d: %s\n", (int)t->chosen.number, (int)t->chosen.of, what));
   }
   if (!t->held_out.n) {
@@ -272,11 +274,11 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
     cJSON_AddNumberToObject(search, "attempts", s->n);
     cJSON_AddNumberToObject(search, "chosen", s->n - a->of + a->number);
     cJSON_AddNumberToObject(search, "added", t->n_added);
-    cJSON_AddStringToObject(search, "model_type", a->recipe.type);
-    cJSON_AddNumberToObject(search, "pod_tol", a->recipe.pod_tol);
-    cJSON_AddNumberToObject(search, "rid_layers", a->recipe.layers);
-    cJSON_AddNumberToObject(search, "rid_contact_extension", a->recipe.contact_extension);
-    cJSON_AddStringToObject(search, "hybrid", HycoHybrids[a->recipe.hybrid]);
-    cJSON_AddBoolToObject(search, "rid_whole", a->recipe.whole);
+    cJSON_AddStringToObject(search, "model_type", a->settings.type);
+    cJSON_AddNumberToObject(search, "pod_tol", a->settings.pod_tol);
+    cJSON_AddNumberToObject(search, "rid_layers", a->settings.layers);
+    cJSON_AddNumberToObject(search, "rid_contact_extension", a->settings.contact_extension);
+    cJSON_AddStringToObject(search, "hybrid", HycoHybrids[a->settings.hybrid]);
+    cJSON_AddBoolToObject(search, "rid_whole", a->settings.whole);
   }
 }

@@ -1,4 +1,4 @@
-/* hyco solve on a scene with a history: what it says on the way and at the end, the report. */
+/* hyco solve on a scene with a history: its output during and after the solve, the report. */
 #include "driver.h"
 
 PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *s, void *ctx)
@@ -7,7 +7,7 @@ PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *s, void *ctx)
 
   PetscFunctionBegin;
   (void)fom;
-  if (!path->checked) PetscCall(DriverCheckLeft()); /* the solvers have read theirs */
+  if (!path->checked) PetscCall(DriverCheckLeft()); /* the solvers have read their options */
   path->checked = PETSC_TRUE;
   PetscCall(DriverSayStep(s, path->n));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,10 +1,10 @@
-/* Options that do not stand on the command line: where they come from, for the report. */
+/* Sources of options other than the command line, for the report. */
 #include "driver.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* "NAME": what the file says, if it is there and says anything. */
+/* "NAME": the options in the file, if it exists and has any. */
 static void AddFile(cJSON *object, const char path[])
 {
   FILE *file = fopen(path, "r");

@@ -1,9 +1,9 @@
-/* How the command ends: its exit status, and what it says when it misses what was asked. */
+/* The exit status of the command, and the message for missed targets. */
 #include "driver.h"
 #include <stdarg.h>
 #include <stdio.h>
 
-static cJSON *missed; /* what DriverMissed() said, an array; NULL: nothing */
+static cJSON *missed; /* messages of DriverMissed(), an array; NULL: none */
 
 PetscErrorCode DriverMissed(const char format[], ...)
 {

@@ -1,8 +1,8 @@
-/* The listed times of a path, of solve and of predict: a line each, the table, the report's history. */
+/* The listed times of a path, for solve and predict: a line each, the table, the report's history. */
 #include "driver.h"
 #include <stddef.h>
 
-/* A number of a listed time: its column with solve and with predict (NULL: no such), where in HycoStep it stands. */
+/* A quantity of a listed time: its column in solve and in predict (NULL: none), its offset in HycoStep. */
 typedef struct {
   const char *full, *reduced;
   size_t at;

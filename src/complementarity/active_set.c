@@ -1,17 +1,17 @@
 /*
-  The primal-dual active set, the paper's section 6.2 (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002) 865-888,
-  for its convergence): solve as if the contacts of the set were closed and the others open, let contacts that pull
-  leave the set and those that penetrate join it, until none does. The one loop; who uses it says how to solve on a set
-  and what counts as a violation: a dense flexibility, one with free unknowns, gap coordinates, a coarser level of
+  The primal-dual active set method, the paper's section 6.2 (convergence: Hintermueller, Ito, Kunisch, SIAM J. Optim.
+  13 (2002) 865-888): solve with the contacts of the set closed and the others open, remove contacts under tension from
+  the set and add those that penetrate, until the set does not change. This loop is used with functions for the solve on
+  a set and for the violations: with a dense flexibility, one with free unknowns, gap coordinates, or a coarser level of
   these.
 */
 #include <hycolcp.h>
 
-/* What the loop keeps. */
+/* State of the loop. */
 typedef struct {
-  unsigned long long *past; /* hashes of the sets so far */
-  PetscInt room, since;     /* of past; where the search for a repeated set begins */
-  PetscBool one;            /* a set came back: one contact at a time */
+  unsigned long long *past; /* hashes of the previous sets */
+  PetscInt room, since;     /* size of past; first iteration in which a repeated set is searched */
+  PetscBool one;            /* a set was repeated: one contact changes at a time */
   PetscBool *violates;
 } History;
 
@@ -40,7 +40,7 @@ static PetscErrorCode SetHash(const HycoActiveSet *e, const PetscBool active[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the set was met before; remembers it as that of iteration `its`. */
+/* Whether the set occurred before; stores it as that of iteration `its`. */
 static PetscErrorCode Met(const HycoActiveSet *e, const PetscBool active[], PetscInt its, History *h, PetscBool *met)
 {
   PetscFunctionBegin;
@@ -54,7 +54,7 @@ static PetscErrorCode Met(const HycoActiveSet *e, const PetscBool active[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Over the ranks that share the contacts. */
+/* Reduces over the ranks that share the contacts. */
 static PetscErrorCode Reduce(const HycoActiveSet *e, MPI_Op op, PetscInt *value)
 {
   PetscFunctionBegin;
@@ -62,8 +62,8 @@ static PetscErrorCode Reduce(const HycoActiveSet *e, MPI_Op op, PetscInt *value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Changes every contact that violates; after a cycle only the last of them, which ends in exact arithmetic (K. G.
-   Murty's least index rule). */
+/* Changes every contact with a violation; after a cycle only the last of them, which terminates in exact arithmetic
+   (K. G. Murty's least index rule). */
 static PetscErrorCode Change(const HycoActiveSet *e, const History *h, PetscBool active[], PetscInt *changes)
 {
   PetscInt last = -1;
@@ -119,7 +119,7 @@ PetscErrorCode HycoActiveSetRun(const HycoActiveSet *e, PetscBool active[], Pets
       *status = HYCO_LCP_CYCLE;
       break;
     }
-    if (met) { /* again in spite of single changes: round-off decides, and the residuals judge */
+    if (met) { /* repeated in spite of single changes: round-off decides, and the residuals are checked later */
       last = h.one;
       h.one = PETSC_TRUE;
       h.since = *its;

@@ -1,12 +1,12 @@
 /*
-  The Cholesky factor of M_aa, kept from one active set to the next. Contacts stand in the order in which they joined:
-  what leaves is mostly what came last, and the rows before the first that left need no second look.
+  The Cholesky factor of M_aa, updated from one active set to the next. The contacts are ordered by the time at which
+  they joined: those that leave are mostly recent, and the rows before the first of them stay valid.
 */
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
 struct _n_HycoSetFactor {
-  PetscInt n, k, *a;        /* contacts in all; those factored, in order */
+  PetscInt n, k, *a;        /* n contacts; k factored ones, in order */
   PetscReal *L, *x;         /* column major, leading dimension n; n */
   PetscBool *wanted, *kept; /* n */
 };
@@ -41,8 +41,8 @@ void HycoSetFactorForget(HycoSetFactor factor)
   if (factor) factor->k = 0;
 }
 
-/* Drops the first contact that is not in the set and all after it, and lists the others of the set behind the rest: how
-   many there are now; f->k of them are factored. */
+/* Drops the first contact that is not in the set and all after it, and appends the other contacts of the set:
+   returns their number; f->k of them are factored. */
 static PetscInt Rearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
 {
   PetscInt stay = 0, count;
@@ -51,7 +51,7 @@ static PetscInt Rearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
   for (PetscInt j = 0; j < k; j++) f->wanted[a[j]] = PETSC_TRUE;
   while (stay < f->k && f->wanted[f->a[stay]]) f->kept[f->a[stay++]] = PETSC_TRUE;
   count = stay;
-  for (PetscInt j = stay; j < f->k; j++) { /* in their old order */
+  for (PetscInt j = stay; j < f->k; j++) { /* in their former order */
     const PetscInt i = f->a[j];
 
     if (!f->wanted[i]) continue;
@@ -65,7 +65,7 @@ static PetscInt Rearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
   return count;
 }
 
-/* Rows f->k .. k - 1 of the factor; *regular: no pivot below `tol` of its diagonal entry. */
+/* Computes rows f->k .. k - 1 of the factor; *regular: no pivot below `tol` of its diagonal entry. */
 static PetscErrorCode Append(HycoSetFactor f, const PetscReal M[], PetscInt k, PetscReal tol, PetscBool *regular)
 {
   const PetscReal one = 1, minus = -1;

@@ -1,16 +1,16 @@
-/* The active set on dense linear complementarity, w = q + M z >= 0, z >= 0, w.z = 0. */
+/* The active set method for dense linear complementarity, w = q + M z >= 0, z >= 0, w.z = 0. */
 #include <hycolcp.h>
 
-/* What the iterations share. */
+/* Data of the iterations. */
 typedef struct {
   const HycoLCP *lcp;
   PetscReal *z, *w;
-  PetscInt k, *a, n_aside; /* the set; contacts set aside as dependent */
+  PetscInt k, *a, n_aside; /* the set; number of contacts removed as dependent */
   PetscBool *aside;
 } Dense;
 
-/* w = q + M z of the contacts that are not active (if symmetric, else of all), and the size against which its zeros are
-   round-off. */
+/* Computes w = q + M z for the contacts that are not active (all if M is not symmetric); returns the size relative
+   to which its zeros are round-off. */
 static PetscReal Slack(const Dense *d, const PetscBool active[])
 {
   const PetscInt n = d->lcp->n;
@@ -21,7 +21,7 @@ static PetscReal Slack(const Dense *d, const PetscBool active[])
     d->w[i] = q[i];
     size = PetscMax(size, PetscAbsReal(q[i]));
   }
-  if (d->lcp->symmetric && d->k > n - d->k) { /* few rows, which are columns */
+  if (d->lcp->symmetric && d->k > n - d->k) { /* few rows, read as columns of the symmetric M */
     for (PetscInt i = 0; i < n; i++) {
       const PetscReal *row = M + (size_t)i * (size_t)n;
 
@@ -37,7 +37,7 @@ static PetscReal Slack(const Dense *d, const PetscBool active[])
   return size;
 }
 
-/* A contact set aside as dependent violates only beyond what dependence leaves over. */
+/* A dependent contact violates only if it does so by more than the tolerance of the dependence. */
 static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Dense *d = (const Dense *)ctx;
@@ -54,7 +54,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contacts that depend on others of the set are set aside: they leave it, and carry no force. */
+/* Contacts that depend on others of the set are removed from it, and carry no force. */
 static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
 {
   Dense *d = (Dense *)ctx;
@@ -97,7 +97,7 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
   PetscCall(PetscMalloc3(lcp->n, &d.w, lcp->n, &d.a, lcp->n, &d.aside));
   PetscCall(HycoActiveSetRun(&e, active, its, status));
   if (*status == HYCO_LCP_CYCLE && d.n_aside)
-    *status = HYCO_LCP_SINGULAR; /* dependent contacts whose gaps contradict */
+    *status = HYCO_LCP_SINGULAR; /* dependent contacts with contradictory gaps */
   PetscCall(PetscFree3(d.w, d.a, d.aside));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -3,13 +3,13 @@
   with the lexicographic rule of Cottle, Pang, Stone, The Linear Complementarity Problem (1992), section 4.4; finite
   whenever M is a P-matrix or copositive plus.
 
-  The covering vector of the artificial variable is not (1, ..., 1): along it Murty's matrices take 2^n pivots, along a
-  vector without pattern a few.
+  The covering vector of the artificial variable is not (1, ..., 1): with that vector Murty's matrices need 2^n pivots,
+  with an irregular one a few.
 
-  The dictionary holds the nonbasic columns alone, basic = value + T nonbasic; the inverse basis that the lexicographic
-  rule compares are those of its columns that belong to a w. A pivot is a change of rank one; CHUNK of them wait in U, V
-  (T stands for T - U V^T) and are applied by one matrix product, so that a pivot costs a column and a row, not a pass
-  over the whole dictionary. The last basis is solved afresh: its round-off is that of one solve, not of all pivots.
+  The dictionary stores only the nonbasic columns, basic = value + T nonbasic; the inverse basis for the lexicographic
+  rule consists of those of its columns that belong to a w. A pivot is a change of rank one; up to CHUNK pivots are
+  collected in U, V (the dictionary is T - U V^T) and applied by one matrix product, so that a pivot costs a column and
+  a row, not the whole dictionary. The last basis is solved anew, so that its round-off is that of one solve.
 */
 #include <hycolcp.h>
 #include <petscblaslapack.h>
@@ -22,11 +22,11 @@ typedef struct {
   PetscReal *T, *U, *V;            /* column major: n x (n + 1), n x CHUNK, (n + 1) x CHUNK */
   PetscReal *value, *column, *row; /* of the basic variables (n); of the pivot (n, n + 1) */
   PetscInt *basic, *nonbasic;      /* variable of each row (n), of each column (n + 1) */
-  PetscInt *where;                 /* of each variable (2 n + 1): its row i as i, its column j as -1 - j */
+  PetscInt *where;                 /* for each variable (2 n + 1): i if it is in row i, -1 - j if it is in column j */
   PetscInt *tied;
 } Dictionary;
 
-/* Entry i of the covering vector, in [1, 2): multiples of the golden ratio, without their whole part. */
+/* Entry i of the covering vector, in [1, 2): fractional parts of multiples of the golden ratio, plus 1. */
 static PetscReal Cover(PetscInt i)
 {
   const PetscReal x = 0.6180339887498949 * (PetscReal)(i + 1);
@@ -75,7 +75,7 @@ static PetscReal Entry(const Dictionary *d, PetscInt i, PetscInt j)
   return sum;
 }
 
-/* Rows and columns of T, and the pivots that wait. */
+/* Numbers of rows and columns of T, and of collected pivots. */
 static PetscErrorCode Sizes(const Dictionary *d, PetscBLASInt *n, PetscBLASInt *cols, PetscBLASInt *waiting)
 {
   PetscFunctionBegin;
@@ -123,8 +123,8 @@ static PetscErrorCode Apply(Dictionary *d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The variable of column c becomes basic in row r; d->column holds T[:,c]. Row and column are stored, the rest waits.
- */
+/* The variable of column c becomes basic in row r; d->column has T[:,c]. Stores row and column; the pivot is
+   collected. */
 static PetscErrorCode Pivot(Dictionary *d, PetscInt r, PetscInt c)
 {
   const PetscInt n = d->n, enters = d->nonbasic[c], leaves = d->basic[r];
@@ -153,13 +153,13 @@ static PetscErrorCode Pivot(Dictionary *d, PetscInt r, PetscInt c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of the n_tied rows that leave together, the lexicographically least row of the inverse basis over the pivot. */
+/* Among n_tied rows that may leave, the lexicographically least row of the inverse basis over the pivot. */
 static PetscInt BreakTie(const Dictionary *d, PetscInt n_tied)
 {
   PetscInt *tied = d->tied;
 
   for (PetscInt t = 0; t < n_tied; t++) {
-    if (d->basic[tied[t]] == 2 * d->n) return tied[t]; /* the artificial variable leaves when it may */
+    if (d->basic[tied[t]] == 2 * d->n) return tied[t]; /* the artificial variable leaves first */
   }
   for (PetscInt w = 0; w < d->n && n_tied > 1; w++) {
     PetscReal least = PETSC_MAX_REAL;
@@ -180,7 +180,7 @@ static PetscInt BreakTie(const Dictionary *d, PetscInt n_tied)
   return tied[0];
 }
 
-/* The row that leaves when the variable of d->column grows: the first whose value reaches 0; -1: none does. */
+/* The row that leaves when the variable of d->column increases: the first whose value becomes 0; -1: none. */
 static PetscInt Leaving(Dictionary *d)
 {
   PetscReal size = 0, largest = 0, step = PETSC_MAX_REAL;
@@ -199,7 +199,7 @@ static PetscInt Leaving(Dictionary *d)
   return n_tied ? BreakTie(d, n_tied) : -1;
 }
 
-/* The pivots from the first, in row `row`, to the end. */
+/* All pivots, from the first, in row `row`, to the end. */
 static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscInt *its, HycoLCPStatus *status)
 {
   const PetscInt n = d->n;
@@ -216,7 +216,7 @@ static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscIn
       *status = HYCO_LCP_SOLVED;
       break;
     }
-    col = -1 - d->where[left < n ? left + n : left - n]; /* the complement of what left enters */
+    col = -1 - d->where[left < n ? left + n : left - n]; /* the complement of the variable that left enters */
     PetscCall(FetchColumn(d, col));
     row = Leaving(d);
     if (row < 0) {
@@ -227,7 +227,7 @@ static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Largest violation of w >= 0 over the size of q, and of z >= 0 over that of z. */
+/* Largest violation of w >= 0 relative to q, and of z >= 0 relative to z. */
 static PetscReal Violation(PetscInt n, const PetscReal M[], const PetscReal q[], const PetscReal z[])
 {
   PetscReal worst = 0, size_q = 0, size_z = 0, least_z = 0;
@@ -246,7 +246,7 @@ static PetscReal Violation(PetscInt n, const PetscReal M[], const PetscReal q[],
   return PetscMax(worst / size_q, size_z > 0 ? -least_z / size_z : 0);
 }
 
-/* z of the last basis: as the pivots left it, or solved afresh, whichever violates less. */
+/* z of the last basis: from the pivots or solved anew, whichever has the smaller violation. */
 static PetscErrorCode Unpack(const Dictionary *d, const PetscReal M[], const PetscReal q[], PetscReal scale,
                              PetscReal z[])
 {
@@ -285,7 +285,7 @@ PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[]
     size_M = PetscMax(size_M, PetscAbsReal(M[(size_t)i * (size_t)n + (size_t)i]));
     size_q = PetscMax(size_q, PetscAbsReal(q[i]));
     if (q[i] < 0 && (row < 0 || q[i] / Cover(i) <= q[row] / Cover(row)))
-      row = i; /* of equal ones the last: lexicographic */
+      row = i; /* the last of equal ones: lexicographic rule */
   }
   if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
   if (size_M == 0) size_M = 1;

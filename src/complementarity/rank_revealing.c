@@ -1,17 +1,18 @@
 /*
-  The linear problem inside a complementarity problem: on a set a of contacts, M_aa z_a = -q_a.
+  The linear problem in a complementarity method: on a set a of contacts, M_aa z_a = -q_a.
 
   Contacts may repeat each other (a node constrained twice, a surface on a symmetry plane): M_aa is then singular
-  although the displacements are not in doubt. By diagonal pivoting as many contacts are kept as M_aa has rank, those
-  with the smaller gap first where several are equally good; the others depend on them and carry no force.
+  although the displacements are unique. Diagonal pivoting keeps as many contacts as M_aa has rank, the smaller gap
+  first among equal pivots; the others depend on them and carry no force.
 */
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
-/* Pivots below this share of the (scaled) diagonal are dependence: round-off of a flexibility leaves about 1e-14. */
+/* Pivots below this share of the (scaled) diagonal count as dependent: the round-off of a flexibility is about
+   1e-14. */
 #define DEPENDENT 1e-12
 
-/* A = D M_aa D with D = |diag|^-1/2 (0 for a contact that nothing moves). */
+/* A = D M_aa D with D = |diag|^-1/2 (0 for a contact with a zero diagonal). */
 static void CopyScaled(PetscInt n, const PetscReal M[], PetscInt k, const PetscInt a[], PetscReal A[], PetscReal d[])
 {
   for (PetscInt j = 0; j < k; j++) {
@@ -26,8 +27,8 @@ static void CopyScaled(PetscInt n, const PetscReal M[], PetscInt k, const PetscI
   }
 }
 
-/* Factors A (k x k, overwritten) and solves in place; *regular: no pivot below `tol` of the largest, a finite answer.
- */
+/* Factors A (k x k, overwritten) and solves in place; *regular: no pivot below `tol` of the largest, and a finite
+   solution. */
 static PetscErrorCode Solve(PetscInt k, PetscReal A[], PetscBool symmetric, PetscReal tol, PetscReal x[],
                             PetscBool *regular)
 {
@@ -55,8 +56,8 @@ static PetscErrorCode Solve(PetscInt k, PetscReal A[], PetscBool symmetric, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next pivot: the largest diagonal; of those equal to 1e-8, the smallest gap per motion. -1: what is left depends.
- */
+/* The next pivot: the largest diagonal entry; among those equal to 1e-8, the smallest scaled gap. -1: the rest is
+   dependent. */
 static PetscInt NextPivot(PetscInt k, const PetscReal A[], const PetscReal gap[], const PetscBool kept[])
 {
   PetscReal largest = 0;
@@ -72,7 +73,7 @@ static PetscInt NextPivot(PetscInt k, const PetscReal A[], const PetscReal gap[]
   return best;
 }
 
-/* Diagonal pivoting of A (k x k, overwritten): kept[i] marks a set on which A is regular, as large as its rank. */
+/* Diagonal pivoting of A (k x k, overwritten): kept[i] marks a largest set on which A is regular. */
 static PetscErrorCode Reveal(PetscInt k, PetscReal A[], const PetscReal gap[], PetscBool kept[])
 {
   PetscReal *row;

@@ -1,19 +1,20 @@
 /*
   Floating bodies, supported only by contact: the dense problem in z = (x_pinned, L),
 
-      [ K'    A ] [x_p]   [-f']   [0]
-      [ -A^T  S ] [ L ] + [ g ] = [w],     0 <= w complementary to L >= 0
+    [ K'    A ] [x_p]   [-f']   [0]
+    [ -A^T  S ] [ L ] + [ g ] = [w],     0 <= w complementary to L >= 0
 
-  by the active set. It begins with every contact closed, which holds what contact can hold, and opens those that pull.
+  by the active set method. It starts with every contact closed, so that contact prevents rigid motions if it can, and
+  opens those under tension.
 */
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
 typedef struct {
-  PetscInt p, m, n; /* pinned, contacts, both */
+  PetscInt p, m, n; /* numbers of pinned unknowns, contacts, both */
   const PetscReal *M, *q;
-  PetscReal flexibility; /* a typical S_ii: L = L' / flexibility and K' flexibility are of order one like A */
-  PetscInt k, *a;        /* the set: the pinned, then the active */
+  PetscReal flexibility; /* a typical S_ii as scale: L = L' / flexibility and K' flexibility are of order one like A */
+  PetscInt k, *a;        /* the set: pinned unknowns, then active contacts */
   PetscReal *z, *w;
 } Floating;
 
@@ -55,7 +56,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w, and what its round-off is measured against. */
+/* Computes w; returns the size relative to which its zeros are round-off. */
 static PetscReal Slack(const Floating *h)
 {
   PetscReal size = 0;

@@ -1,21 +1,21 @@
 /*
-  Complementarity problems posed to a Tao, which is kept from one to the next. TAO's bound-constrained types minimise
+  Complementarity problems solved by a Tao, which is kept from one to the next. TAO's bound-constrained types minimise
 
-      min 1/2 y^T H y - f^T y,  lo <= y <= hi            H symmetric positive (semi)definite
+    min 1/2 y^T H y - f^T y,  lo <= y <= hi            H symmetric positive (semi)definite
 
   and its semismooth types solve the complementarity problem w = q + M z >= 0, z >= 0, w.z = 0, symmetric or not, by the
-  Fischer-Burmeister function (T. S. Munson et al., INFORMS J. Comput. 13 (2001) 294-311). Both stop on absolute sizes,
-  so the problem is scaled first: unit diagonal, right-hand side of size one. A type that a program registers sees the
-  same: solution, bounds, Hessian, objective and its gradient H y - f. hyco's own types (tao_types.c) take the problem
-  as it is. What TAO says is not evidence: the caller recomputes the residuals. A PETSC error inside TAO is caught: it
-  means not solved, like a limit of iterations.
+  Fischer-Burmeister function (T. S. Munson et al., INFORMS J. Comput. 13 (2001) 294-311). Both have absolute stopping
+  criteria, so that the problem is scaled first: unit diagonal, right-hand side of size one. A type that a program
+  registers gets the same: solution, bounds, Hessian, objective and its gradient H y - f. hyco's own types (tao_types.c)
+  get the unscaled problem. TAO's convergence flag is not relied on: the caller recomputes the residuals. A PETSc error
+  inside TAO is caught: it counts as not solved, like an iteration limit.
 */
 #include <hycotao.h>
 
 static const struct {
   const char *name;
   int traits;
-} known[] = {{HYCO_TAO_ACTIVE_SET, HYCO_TAO_OWN}, /* the first that is looked for */
+} known[] = {{HYCO_TAO_ACTIVE_SET, HYCO_TAO_OWN}, /* checked first */
              {HYCO_TAO_LEMKE, HYCO_TAO_OWN | HYCO_TAO_DENSE},
              {"gpcg", HYCO_TAO_SYMMETRIC | HYCO_TAO_NEWTON | HYCO_TAO_RESTARTS},
              {"tron", HYCO_TAO_SYMMETRIC | HYCO_TAO_NEWTON | HYCO_TAO_RESTARTS},
@@ -74,7 +74,7 @@ PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What belongs to one type and one size. */
+/* Destroys what depends on the type and the size. */
 static PetscErrorCode Reset(HycoTao t)
 {
   PetscFunctionBegin;
@@ -85,7 +85,7 @@ static PetscErrorCode Reset(HycoTao t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The copies of a dense problem. */
+/* Destroys the copies of a dense problem. */
 static PetscErrorCode ResetDense(HycoTao t)
 {
   PetscFunctionBegin;
@@ -120,7 +120,7 @@ PetscErrorCode HycoTaoSetType(HycoTao t, const char type[], PetscInt max_its)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The Tao for a problem of y's size, with the user's options; *made: it is new. */
+/* Creates the Tao for a problem of y's size, with the user's options, unless it exists; *made: it is new. */
 static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *made)
 {
   PetscInt n, N;
@@ -144,7 +144,7 @@ static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *mad
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The user's -hyco_tao_... options. -hyco_tao_type among them is HycoSolver's: it must not change the type of a
+/* Reads the user's -hyco_tao_... options. -hyco_tao_type is read by HycoSolver: it must not change the type of a
    fallback, or of another problem. */
 static PetscErrorCode ReadOptions(HycoTao t)
 {
@@ -160,13 +160,14 @@ static PetscErrorCode ReadOptions(HycoTao t)
   if (!t->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TaoMonitorCancel(t->tao));
   t->tao->printreason = PETSC_FALSE;
-  PetscCall(PetscOptionsHasName(NULL, t->prefix, "-tao_view", &given)); /* read here too, for the check of options */
+  PetscCall(PetscOptionsHasName(NULL, t->prefix, "-tao_view", &given)); /* read here too, so that the check of
+                                                                           options finds it used */
   PetscCall(PetscObjectSetOptionsPrefix((PetscObject)t->tao, "hyco_quiet_"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* So many iterations without halving the residual end a run: few once it is small, where round-off rules; many above,
-   and for first-order types, which may stand still for a while. */
+/* The number of iterations without halving the residual after which a run ends: small if the residual is small,
+   where round-off dominates; larger above, and for first-order types, which may stagnate for a while. */
 static PetscInt Patience(const HycoTao t)
 {
   if (t->best <= 1e-10) return 5;
@@ -207,7 +208,7 @@ static PetscErrorCode Slack(Tao tao, Vec z, Vec w, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The types overwrite J by their own Newton matrix: M again at each call. */
+/* The types overwrite J by their Newton matrix: each call restores M. */
 static PetscErrorCode Jacobian(Tao tao, Vec z, Mat J, Mat P, void *ctx)
 {
   HycoTao t = (HycoTao)ctx;
@@ -218,7 +219,7 @@ static PetscErrorCode Jacobian(Tao tao, Vec z, Mat J, Mat P, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TAO's own test; and an end to iterations that round-off or stagnation makes useless. */
+/* TAO's own test; also ends iterations at round-off level or without progress. */
 static PetscErrorCode Converged(Tao tao, void *ctx)
 {
   HycoTao t = (HycoTao)ctx;
@@ -238,7 +239,7 @@ static PetscErrorCode Converged(Tao tao, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* `krylov`: without a factor, which a singular H (dependent contacts) does not have. */
+/* `krylov`: without a factor, because H is singular (dependent contacts). */
 static PetscErrorCode SetBoundProblem(HycoTao t, PetscBool krylov)
 {
   PetscBool shell;
@@ -250,7 +251,7 @@ static PetscErrorCode SetBoundProblem(HycoTao t, PetscBool krylov)
   PetscCall(TaoSetTolerances(t->tao, 1e-13, 1e-14, 0));
   PetscCall(PetscObjectTypeCompare((PetscObject)t->H, MATSHELL, &shell));
   PetscCall(TaoGetKSP(t->tao, &ksp));
-  if ((shell || krylov) && ksp) { /* a shell has no entries to precondition with */
+  if ((shell || krylov) && ksp) { /* a shell matrix has no entries for a preconditioner */
     PC pc;
 
     PetscCall(KSPGetPC(ksp, &pc));
@@ -270,7 +271,8 @@ static PetscErrorCode SetComplementarity(HycoTao t, PetscBool krylov)
   PetscCall(TaoSetConstraintsRoutine(t->tao, t->w, Slack, t));
   PetscCall(TaoSetJacobianRoutine(t->tao, t->J, t->J, Jacobian, t));
   PetscCall(TaoSetTolerances(t->tao, 0, 0, 0));
-  PetscCall(TaoSetFunctionLowerBound(t->tao, 1e-12)); /* 1e-8, its default, is too coarse; 1e-20 never stops */
+  PetscCall(TaoSetFunctionLowerBound(t->tao, 1e-12)); /* its default, 1e-8, is too coarse; with 1e-20 it does not
+                                                         stop */
   PetscCall(TaoGetKSP(t->tao, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCSetType(pc, krylov ? PCNONE : PCLU));
@@ -280,7 +282,7 @@ static PetscErrorCode SetComplementarity(HycoTao t, PetscBool krylov)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What may fail inside TAO. */
+/* The part of a run that may fail inside TAO. */
 static PetscErrorCode Run(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved)
 {
   TaoConvergedReason why;
@@ -307,7 +309,8 @@ static PetscErrorCode Run(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = d size y', lo and hi alike; f' = d f / size; H' = d H d: unit diagonal, max |f'| = 1. Infinite bounds stay. */
+/* y = d size y', lo and hi likewise; f' = d f / size; H' = d H d: unit diagonal, max |f'| = 1. Infinite bounds are
+   kept. */
 static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscReal *size)
 {
   PetscInt n;
@@ -340,7 +343,7 @@ static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One run of TAO from y; an error inside it is told by *failed, and its Tao given up. y ends finite. */
+/* One run of TAO from y; after an error inside it, sets *failed and destroys its Tao. y is finite at the end. */
 static PetscErrorCode CatchRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved,
                                PetscBool *failed)
 {
@@ -386,7 +389,7 @@ static PetscErrorCode Projected(const HycoTao t, Vec lo, Vec hi, Vec y, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Newton types that stood still come through from elsewhere; the better of the two is kept. */
+/* Newton types that stagnate may converge from another start; the better of the two results is kept. */
 static PetscErrorCode SecondStart(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved)
 {
   const PetscInt first_its = *its;
@@ -429,8 +432,8 @@ PetscErrorCode HycoTaoSolve(HycoTao t, Mat H, Vec f, Vec lo, Vec hi, Vec y, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Poses what hyco's own types take as it is; y: the Tao's solution. Against a direct call an online solve of the rope's
-   models, the smallest there are, takes 1 us more of 10 to 15 us. */
+/* Solves by hyco's own types, unscaled; y: the Tao's solution. Compared with a direct call, an online solve of the
+   rope's models (the smallest ones) takes 1 us more, of 10 to 15 us. */
 static PetscErrorCode SolveOwn(HycoTao t, Vec y, PetscInt max_its)
 {
   PetscBool made;
@@ -438,7 +441,8 @@ static PetscErrorCode SolveOwn(HycoTao t, Vec y, PetscInt max_its)
   PetscFunctionBegin;
   PetscCall(Prepare(t, y, max_its, &made));
   if (made) PetscCall(ReadOptions(t));
-  PetscCall(TaoSetMaximumIterations(t->tao, max_its)); /* -hyco_tao_max_it is for TAO's own, which this may replace */
+  PetscCall(TaoSetMaximumIterations(t->tao, max_its)); /* -hyco_tao_max_it is for TAO's types, which this type may
+                                                          replace as a fallback */
   PetscCall(TaoSetSolution(t->tao, y));
   PetscCall(TaoSolve(t->tao));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -459,7 +463,7 @@ PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool ac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of each pair (z_i, w_i) the smaller is 0: a force that an interior or first-order type left where the gap is open. */
+/* Of each pair (z_i, w_i) sets the smaller to 0: interior and first-order types leave small forces at open gaps. */
 static void Clean(const HycoLCP *lcp, PetscReal z[])
 {
   const PetscInt n = lcp->n;
@@ -478,7 +482,7 @@ static void Clean(const HycoLCP *lcp, PetscReal z[])
   }
 }
 
-/* Scaled copies of M, -q and the bounds, for TAO's types. */
+/* Makes scaled copies of M, -q and the bounds, for TAO's types. */
 static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
 {
   PetscScalar *h;
@@ -509,7 +513,7 @@ static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solution vector of hyco's own types, on z itself. */
+/* Creates the solution vector of hyco's own types, with z as its array. */
 static PetscErrorCode PlaceSolution(HycoTao t, PetscInt n, PetscReal z[])
 {
   PetscInt old = -1;

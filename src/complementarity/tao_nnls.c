@@ -1,7 +1,7 @@
 /*
   Nonnegative least squares by TAO: min |A x - b|, x >= 0 is the bound-constrained quadratic problem of the normal
-  equations, A^T A x - A^T b >= 0 complementary to x >= 0. Forming them costs m n^2 once, where the active set of
-  HycoNNLS() pays m n for each column that enters; they square the condition number.
+  equations, A^T A x - A^T b >= 0 complementary to x >= 0. Forming these costs m n^2 once, whereas the active set of
+  HycoNNLS() costs m n for each column that enters; they square the condition number.
 */
 #include <hycolcp.h>
 #include <petscblaslapack.h>

@@ -1,7 +1,7 @@
 /*
-  hyco's own complementarity methods as types of Tao, beside TAO's: HYCO_TAO_ACTIVE_SET and HYCO_TAO_LEMKE. They take
-  the problem as it was handed to the HycoTao behind the Tao. Their monitor shows the active contacts as the function
-  value and the contacts that change as the residual.
+  hyco's complementarity methods as Tao types: HYCO_TAO_ACTIVE_SET and HYCO_TAO_LEMKE. They read the unscaled problem
+  from the HycoTao. Their monitor shows the number of active contacts as the function value and the number of changes as
+  the residual.
 */
 #include <hycotao.h>
 
@@ -14,7 +14,7 @@ static PetscErrorCode GetProblem(Tao tao, HycoTao *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An iteration of the active set, for TAO's monitors and the user's. */
+/* Passes an iteration of the active set to TAO's monitors and the user's. */
 static PetscErrorCode Monitor(PetscInt its, PetscInt n_active, PetscInt changes, void *ctx)
 {
   const HycoTao t = (HycoTao)ctx;

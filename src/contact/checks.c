@@ -1,10 +1,10 @@
-/* Whether a contact's geometry is one that small displacements may start from, and whether they stayed small. */
+/* Checks that a contact's geometry is suitable for small displacements, and measures whether they stay small. */
 #include "facing.h"
 #include <hycovector.h>
 
-/* Of a slave's facet: how deep surfaces may overlap before any load. */
+/* Share of a slave's facet: largest overlap of surfaces before any load. */
 #define HYCO_OVERLAP_SHARE 0.5
-/* Of the mesh's length: an overlap no larger is round-off. */
+/* Share of the mesh's length: a smaller overlap is round-off. */
 #define HYCO_ROUNDING 1e-12
 
 /* The size of facets around a node, of one surface at a time: the slave's or the master's of a contact of the scene. */
@@ -28,7 +28,8 @@ static PetscErrorCode SizeAt(HycoFE fe, const char group[], PetscInt node, Sizes
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How deep contact k may overlap before any load, and whether its gap is deeper; a gap that the scene gives may be. */
+/* The largest overlap allowed for contact k before any load, and whether its gap exceeds it; a gap given in the
+   scene may. */
 static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, PetscReal gap, Sizes *sizes,
                                      PetscReal *allowed, PetscBool *deep)
 {
@@ -47,7 +48,7 @@ static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Names the deepest contact k. */
+/* Refuses the overlap, with the name of the deepest contact k. */
 static PetscErrorCode RefuseOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, PetscReal gap, PetscReal allowed)
 {
   HycoContact c = fe->scene->contact[p->contact[k]];
@@ -94,7 +95,7 @@ PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The motion of contact k along its surface, over the size of the master's facet, or else of the slave's. */
+/* The tangential motion of contact k, over the size of the master's facet, or else of the slave's. */
 static PetscErrorCode SlidingOf(HycoFE fe, const HycoPairs *p, PetscInt k, const PetscReal normal[3],
                                 const PetscReal u[], Sizes sizes[2], PetscReal *sliding)
 {

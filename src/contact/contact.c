@@ -1,4 +1,4 @@
-/* HycoContact: the class of contacts, its registry, and what the scene's entries say of one. */
+/* HycoContact: the class of contacts, its registry, and the scene's entries of a contact. */
 #include <hycocontactimpl.h>
 #include <hycoregistry.h>
 #include <string.h>

@@ -49,7 +49,7 @@ void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[])
 
     if (m->facet_group[k / corners] != group) continue;
     for (PetscInt e = 0; e < 2; e++) size[ends[e]] = PetscMax(size[ends[e]], length);
-    for (PetscInt w = corners; w < nf; w++) { /* of second order: the middle of the edge, of the facet */
+    for (PetscInt w = corners; w < nf; w++) { /* second order: the middle of the edge, of the facet */
       if (w == corners + v || w == 2 * corners) size[node[w]] = PetscMax(size[node[w]], length);
     }
   }

@@ -1,13 +1,13 @@
 /*
-  Projection of points on a surface: its patches stand in a tree of bounding boxes that is split at the median, so that
-  n points find their nearest patch in about n log n steps, whatever the sizes of the patches.
+  Projection of points on a surface: its patches are in a tree of bounding boxes that is split at the median, so that n
+  points find their nearest patch in about n log n steps, whatever the sizes of the patches.
 */
 #include "nearest.h"
 #include <hycovector.h>
 #include <stdlib.h>
 
 #define LEAF 4
-/* A smaller weight is round-off of a projection on an edge or a node. */
+/* A smaller weight is round-off of a projection onto an edge or a node. */
 #define SNAP 1e-12
 
 typedef struct {
@@ -23,7 +23,7 @@ struct _n_HycoPatches {
   const PetscReal *X, *normal; /* borrowed, like node */
   PetscInt n, nf;
   const PetscInt *node;
-  Item *item; /* in the order of the tree's leaves */
+  Item *item; /* in the order of the leaves */
   Box *box;   /* of tree node t; its children are 2 t + 1 and 2 t + 2 */
 };
 
@@ -48,7 +48,7 @@ static int CompareZ(const void *p, const void *q)
   return Compare((const Item *)p, (const Item *)q, 2);
 }
 
-/* Box t of the items lo .. hi - 1, split at the median of the centres along its longest side. */
+/* Builds box t of the items lo .. hi - 1, split at the median of the centres along its longest side. */
 static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
 {
   static int (*const by[3])(const void *, const void *) = {CompareX, CompareY, CompareZ};
@@ -110,7 +110,7 @@ PetscErrorCode HycoPatchesDestroy(HycoPatches *patches)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Square of the distance from x to the combination w of n points. */
+/* Squared distance from x to the combination w of n points. */
 static PetscReal Distance2(PetscInt n, const PetscReal *const X[], const PetscReal w[], const PetscReal x[3])
 {
   PetscReal sum = 0;
@@ -124,7 +124,7 @@ static PetscReal Distance2(PetscInt n, const PetscReal *const X[], const PetscRe
   return sum;
 }
 
-/* The foot of the perpendicular on a triangle's plane; whether it lies inside. */
+/* The orthogonal projection onto a triangle's plane; whether it is inside the triangle. */
 static PetscBool InTriangle(const PetscReal *const X[], const PetscReal x[3], PetscReal w[4])
 {
   PetscReal a[3], b[3], r[3], aa, ab, bb, det;
@@ -145,8 +145,8 @@ static PetscBool InTriangle(const PetscReal *const X[], const PetscReal x[3], Pe
   return (PetscBool)(w[0] >= 0 && w[1] >= 0 && w[2] >= 0);
 }
 
-/* The point of a bilinear patch where its tangents are orthogonal to x - point, by Newton from its centre; whether it
-   lies inside. Where the distance is not convex the step is that of Gauss and Newton. */
+/* The point of a bilinear patch where its tangents are orthogonal to x - point, by Newton's method from its centre;
+   whether it is inside. Where the distance is not convex, a Gauss-Newton step is used. */
 static PetscBool InQuadrilateral(const PetscReal *const X[], const PetscReal x[3], PetscReal w[4])
 {
   PetscReal at[2] = {0, 0}, t[2][3], r[3], twist[3];
@@ -184,7 +184,7 @@ static PetscBool InQuadrilateral(const PetscReal *const X[], const PetscReal x[3
   return PETSC_TRUE;
 }
 
-/* The nearest point of one patch: inside it, or on one of its edges. Returns the square of its distance. */
+/* The nearest point of one patch: inside it, or on one of its edges. Returns the squared distance. */
 static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], PetscReal w[4])
 {
   const PetscInt nf = s->nf, edges = nf == 2 ? 1 : nf;
@@ -225,7 +225,7 @@ static PetscReal BoxDistance2(const Box *b, const PetscReal x[3])
   return sum;
 }
 
-/* Whether a patch counts for who asks with a normal: those without one do. */
+/* Whether a patch opposes the given normal; a patch without a normal always does. */
 static PetscBool Opposes(HycoPatches s, PetscInt patch, const PetscReal *against)
 {
   const PetscReal *n = s->normal ? s->normal + 3 * patch : NULL;
@@ -233,7 +233,8 @@ static PetscBool Opposes(HycoPatches s, PetscInt patch, const PetscReal *against
   return (PetscBool)(!against || !n || HycoDot(n, n) == 0 || HycoDot(n, against) <= HYCO_OPPOSED);
 }
 
-/* Brings (best, patch, w) down to the nearest of the items lo .. hi - 1 under box t, nearer child first. */
+/* Updates (best, patch, w) with the nearest of the items lo .. hi - 1 under box t; the nearer child is searched
+   first. */
 static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const PetscReal x[3], const PetscReal *against,
                    PetscReal *best, PetscInt *patch, PetscReal w[4])
 {

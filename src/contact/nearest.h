@@ -3,14 +3,14 @@
 #define HYCO_NEAREST_H
 #include <hycomesh.h>
 
-/* A point of a patch: sum of weight[a] times node[a]. Weights are positive and sum to 1; nodes ascend. n = 0: there is
-   none. */
+/* A point of a patch: sum of weight[a] times node[a]. Weights are positive with sum 1; nodes are in ascending order.
+   n = 0: no point. */
 typedef struct {
   PetscInt n, node[4], patch;
   PetscReal weight[4], distance;
 } HycoProjection;
 
-/* Normals oppose: their product is at most this (within 72 degrees). */
+/* Normals oppose each other if their product is at most this (within 72 degrees). */
 #define HYCO_OPPOSED -0.3
 
 typedef struct _n_HycoPatches *HycoPatches;
@@ -21,8 +21,8 @@ typedef struct _n_HycoPatches *HycoPatches;
 PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, const PetscInt node[],
                                  const PetscReal normal[], HycoPatches *patches);
 PetscErrorCode HycoPatchesDestroy(HycoPatches *patches);
-/* The patches' point nearest to x; of equally near ones that of the first patch. against: a unit normal that the patch
-   must oppose, or NULL. */
+/* The patches' point nearest to x; among equally near ones that of the first patch. against: a unit normal that the
+   patch must oppose, or NULL. */
 void HycoPatchesProject(HycoPatches patches, const PetscReal x[3], const PetscReal against[3], HycoProjection *p);
 
 #endif

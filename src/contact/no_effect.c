@@ -1,6 +1,6 @@
 /*
-  Contacts without a free unknown: all that they touch is fixed. They have no effect, but the prescribed displacements
-  may violate them, and then no solution exists.
+  Contacts without a free unknown, because all of their nodes are fixed. They have no effect, but the prescribed
+  displacements may violate them; then no solution exists.
 */
 #include "facing.h"
 #include <hycokinematics.h>
@@ -33,8 +33,8 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes of groups without masters that are wholly fixed and no contacts (HycoPairsFind() leaves them out), as
-   contacts without masters. The caller destroys it. */
+/* The completely fixed nodes of groups without masters, which HycoPairsFind() leaves out, as contacts without
+   masters. The caller destroys it. */
 static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPairs *still)
 {
   HycoMesh m = fe->mesh;
@@ -70,7 +70,7 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fails where the prescribed displacement of a fixed node passes its obstacle. */
+/* Fails if the prescribed displacement of a fixed node penetrates its obstacle. */
 static PetscErrorCode CheckObstacles(HycoFE fe, HycoPairs *still, PetscReal normal[], PetscReal gap[])
 {
   PetscFunctionBegin;

@@ -1,6 +1,6 @@
 /*
-  The masters of a contact's slave nodes on the mesh as drawn: projections on the other surface, judged by how the two
-  face each other; nodes that have none are named. What the types do apart they hand over.
+  Finds the masters of a contact's slave nodes on the mesh as drawn: projections on the other surface, checked by the
+  orientation of the two; nodes without a master are listed. The types pass functions for what differs.
 */
 #include "facing.h"
 #include "partners.h"
@@ -15,7 +15,7 @@ PetscReal HycoSurfaceTolerance(HycoMesh m, PetscInt group)
     const PetscInt *node = m->facets + f * m->nf;
 
     if (m->facet_group[f] != group) continue;
-    for (PetscInt v = 0; v < m->nf && m->nf > 1; v++) /* the last edge leads back to the first node */
+    for (PetscInt v = 0; v < m->nf && m->nf > 1; v++) /* the last edge ends at the first node */
       shortest = PetscMin(shortest, HycoDistance(m->xyz + 3 * node[v], m->xyz + 3 * node[(v + 1) % m->nf]));
   }
   return shortest < PETSC_MAX_REAL ? shortest / 10 : 0;
@@ -59,7 +59,7 @@ PetscErrorCode HycoPartnersJudge(HycoPartners *t, PetscInt slave, PetscReal tole
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Degrees between a slave's normal and the way to its master point, or by which the normals miss each other. */
+/* Angle in degrees between a slave's normal and the direction to its master point, or between opposed normals. */
 static PetscReal Angle(const HycoPartners *t, PetscInt slave, HycoVerdict why, const HycoProjection *at)
 {
   const PetscReal *out = HycoPartnersOutward(t, slave);
@@ -91,7 +91,7 @@ static PetscErrorCode Describe(HycoPartners *t, const Missed *missed, size_t roo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Names the n slave nodes that have no master, the farthest five of them, and says what to do. */
+/* Fails with the number n of slave nodes without a master, the five farthest of them, and the remedy. */
 static PetscErrorCode Complain(HycoPartners *t, HycoContact c, HycoRemedy remedy, PetscInt n, Missed missed[],
                                const HycoMatch *m)
 {
@@ -116,7 +116,7 @@ static PetscErrorCode Complain(HycoPartners *t, HycoContact c, HycoRemedy remedy
            n > 5 ? "the farthest are " : "", n > 1 ? "s" : "", list, what);
 }
 
-/* No node is on both surfaces. */
+/* Checks that no node is on both surfaces. */
 static PetscErrorCode CheckApart(const HycoPartners *t, HycoContact c)
 {
   HycoMesh m = t->fe->mesh;
@@ -133,7 +133,7 @@ static PetscErrorCode CheckApart(const HycoPartners *t, HycoContact c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Puts in each slave node with its master, or complains about those that have none. */
+/* Adds each slave node with its master, or fails for those without one. */
 static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt index, HycoRemedy remedy,
                                     const HycoMatch *m, Missed missed[], HycoPairs *p)
 {
@@ -157,7 +157,7 @@ static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt ind
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of it, once the search and the slave nodes are there. */
+/* The whole matching, once the search and the slave nodes exist. */
 static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, HycoSettle settle, HycoRemedy remedy,
                             HycoMatch *m, HycoPairs *p)
 {
@@ -183,7 +183,7 @@ static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The slave nodes that carry forces; the caller frees them. */
+/* The slave nodes that take contact forces; the caller frees them. */
 static PetscErrorCode FindSlaves(const HycoPartners *t, PetscInt *n, PetscInt **slave)
 {
   HycoMesh m = t->fe->mesh;

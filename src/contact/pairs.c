@@ -1,6 +1,6 @@
 /*
-  Potential contacts: each of the scene's contacts puts in its slave nodes with their masters, on the mesh as it stands
-  in the file; on surfaces that a map moves masters are found anew wherever the nodes are.
+  Potential contacts: each of the scene's contacts adds its slave nodes with their masters, on the mesh as drawn; on
+  surfaces that a map moves, masters are searched again whenever the nodes have moved.
 */
 #include "facing.h"
 #include <hycokinematics.h>
@@ -143,8 +143,8 @@ static PetscErrorCode CountHeld(HycoScene scene, HycoMesh m, PetscInt held[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A node may be the slave of as many contacts as it has free displacements: more would leave their forces open. A rigid
-   tool's nodes have none, and their contacts act on the masters. */
+/* A node may be the slave of at most as many contacts as it has free displacements: otherwise their forces are not
+   unique. A rigid tool's nodes have none, and their contacts act on the masters. */
 static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt held[], const HycoPairs *p)
 {
   PetscInt *count, *first;
@@ -165,7 +165,7 @@ static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt he
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes of a contact without masters, but those that are wholly fixed: they cannot meet anything. */
+/* Adds the nodes of a contact without masters, except completely fixed ones, which cannot touch anything. */
 static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held[], HycoPairs *p)
 {
   HycoMesh m = fe->mesh;
@@ -196,7 +196,7 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
 
   PetscFunctionBegin;
   PetscCall(HycoFESetDrawn(fe));
-  PetscCall(HycoMeshCheckCells(fe->mesh)); /* a broken cell explains what its facets seem to do */
+  PetscCall(HycoMeshCheckCells(fe->mesh)); /* a degenerate cell would cause misleading messages about its facets */
   PetscCall(HycoPairsSetSearch(scene, fe->mesh, pairs));
   PetscCall(PetscMalloc1(fe->mesh->n_nodes, &held));
   PetscCall(CountHeld(scene, fe->mesh, held));

@@ -1,12 +1,13 @@
-/* The surfaces of one contact where their nodes are: the master's patches in a tree, normals of both, the master's
-   border. */
+/* The surfaces of one contact on the current nodes: the master's patches in a tree, normals of both surfaces, the
+   master's border. */
 #include "facing.h"
 #include "partners.h"
 #include <stdlib.h>
 
-/* How far past the border a slave node may be, as a share of the facet's shortest edge: it has the border's point. */
+/* How far past the border a slave node may be, as a share of the facet's shortest edge: its master is then a point
+   of the border. */
 #define HYCO_PAST_BORDER 0.1
-/* Of the same edge: points no farther apart are one. */
+/* Share of the same edge: points at a smaller distance coincide. */
 #define HYCO_SAME_POINT 1e-6
 
 /* Patches and their normals: the master's nodes (pair) or facets (surface). */
@@ -92,7 +93,7 @@ void HycoPartnersProject(const HycoPartners *t, PetscInt slave, PetscBool any_si
   HycoPatchesProject(t->patches, x, NULL, &nearest);
   *at = nearest;
   if (any_side || !out || !at->n || HycoDot(out, t->normal + 3 * at->patch) <= HYCO_OPPOSED) return;
-  HycoPatchesProject(t->patches, x, out, at); /* at a corner, of the facets that have the point */
+  HycoPatchesProject(t->patches, x, out, at); /* at a corner: of the facets that contain the point */
   if (at->n && at->distance > nearest.distance + HYCO_SAME_POINT * ShortestEdge(t, at->patch)) at->n = 0;
 }
 
@@ -112,7 +113,7 @@ static int CompareEdges(const void *a, const void *b)
   return (p[1] > q[1]) - (p[1] < q[1]);
 }
 
-/* The edges (2D: ends) that one facet alone has, and their nodes. */
+/* Finds the edges (2D: ends) that belong to one facet only, and their nodes. */
 static PetscErrorCode FindBorder(HycoPartners *t)
 {
   const PetscInt nf = t->nf, edges = t->n * nf;
@@ -154,7 +155,8 @@ PetscErrorCode HycoPartnersAtBorder(HycoPartners *t, const HycoProjection *at, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What remains on the facet's plane of the way from a node past the border to its master point. */
+/* Compares the tangential part of the vector from the node to its master point, in the facet's plane, with the
+   tolerance. */
 PetscErrorCode HycoPartnersIsPast(HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscBool *past)
 {
   const PetscReal *n = t->normal + 3 * at->patch;

@@ -6,39 +6,39 @@
 #include <hycovector.h>
 
 typedef struct {
-  HycoFE fe;                  /* borrowed; its nodes are where the search is */
+  HycoFE fe;                  /* borrowed; its nodes are those of the search */
   PetscInt slave, master;     /* groups */
   PetscBool nodes;            /* whether patches are the master's nodes, or its facets */
   HycoPatches patches;        /* the master's */
   PetscInt n, nf, *node;      /* patches' nodes, n x nf */
-  PetscReal *normal;          /* n x 3, of the patches (a pair's: of its nodes); 0: unknown */
-  PetscReal *outward;         /* by node of the mesh x 3, of the slave's surface; 0: unknown */
-  PetscInt n_border, *border; /* edges (2D: ends) of one facet alone, as sorted pairs of nodes; made when asked */
-  PetscBool *at_border;       /* by node of the mesh; NULL: not made */
+  PetscReal *normal;          /* n x 3, of the patches (for a pair: of its nodes); 0: unknown */
+  PetscReal *outward;         /* by node of the mesh x 3, outward normal of the slave's surface; 0: unknown */
+  PetscInt n_border, *border; /* edges (2D: ends) of one facet only, as sorted pairs of nodes; created when needed */
+  PetscBool *at_border;       /* by node of the mesh; NULL: not created */
 } HycoPartners;
 
-/* The tolerance when none is stated: a tenth of the shortest edge between the corners of the group's facets. */
+/* The default tolerance: a tenth of the shortest edge between the corners of the group's facets. */
 PetscReal HycoSurfaceTolerance(HycoMesh mesh, PetscInt group);
-/* The search on fe's nodes. The caller destroys it. */
+/* Creates the search on fe's nodes. The caller destroys it. */
 PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact contact, PetscBool nodes, HycoPartners *partners);
 PetscErrorCode HycoPartnersDestroy(HycoPartners *partners);
-/* The slave node's outward normal; NULL: unknown, as on a group that is no surface. */
+/* The slave node's outward normal; NULL: unknown, because its group is not a surface. */
 const PetscReal *HycoPartnersOutward(const HycoPartners *partners, PetscInt slave);
-/* The nearest point of the master; n = 0 where it does not oppose the slave's normal, unless any_side. */
+/* The nearest point of the master; n = 0 if its normal does not oppose the slave's, unless any_side. */
 void HycoPartnersProject(const HycoPartners *partners, PetscInt slave, PetscBool any_side, HycoProjection *at);
-/* From the slave node to that point. */
+/* The vector from the slave node to that point. */
 void HycoPartnersAcross(const HycoPartners *partners, PetscInt slave, const HycoProjection *at, PetscReal r[3]);
-/* Whether a point lies on the master's border: on an edge that has one facet, at a node of such an edge. */
+/* Whether a point is on the master's border: on an edge with one facet, or at a node of such an edge. */
 PetscErrorCode HycoPartnersAtBorder(HycoPartners *partners, const HycoProjection *at, PetscBool *border);
-/* Whether a slave node lies past the master's border, by more than a tenth of the facet's shortest edge along it. */
+/* Whether a slave node is past the master's border, by more than a tenth of the facet's shortest edge in its plane. */
 PetscErrorCode HycoPartnersIsPast(HycoPartners *partners, PetscInt slave, const HycoProjection *at, PetscBool *past);
 
-/* How a slave node lies to the master: within reach and in front of it; too far; turned away from all of it; off to the
-   side, as of a pair that does not match; past the border. */
+/* Position of a slave node relative to the master: within reach and in front of it; too far; all of the master
+   turned away; to the side, as for a pair that does not match; past the border. */
 typedef enum { HYCO_MET, HYCO_FAR, HYCO_TURNED, HYCO_ASKEW, HYCO_PAST } HycoVerdict;
 
-/* The n slave nodes with their masters (at[k].n = 0: none), as far as `tolerance` away; closer than `small`: a tenth of
-   the slave's shortest edge: they touch. */
+/* The n slave nodes with their masters (at[k].n = 0: none), at most `tolerance` away; below `small`, a tenth of the
+   slave's shortest edge, they touch. */
 typedef struct {
   PetscInt n;
   const PetscInt *slave;
@@ -47,17 +47,17 @@ typedef struct {
   HycoVerdict *why;
 } HycoMatch;
 
-/* What a type makes of the nearest points. */
+/* A type's choice of masters from the nearest points. */
 typedef PetscErrorCode (*HycoSettle)(HycoPartners *partners, HycoContact contact, HycoMatch *match);
 /* What to do about n slave nodes without a master, as the end of a message. */
 typedef PetscErrorCode (*HycoRemedy)(HycoPartners *partners, HycoContact contact, PetscInt n, const PetscInt node[],
                                      char text[HYCO_LINE]);
 
-/* The master of one slave node, at most `tolerance` away. Farther than `small` the way to it must be as near to the
-   slave's normal as normals must oppose, and not lead past the border. */
+/* The master of one slave node, at most `tolerance` away. Beyond `small`, the direction to it must be within the
+   angle for opposed normals of the slave's normal, and must not lead past the border. */
 PetscErrorCode HycoPartnersJudge(HycoPartners *partners, PetscInt slave, PetscReal tolerance, PetscReal small,
                                  HycoProjection *at, HycoVerdict *why);
-/* Puts all slave nodes with their masters into pairs; settle NULL: without, they are searched for elsewhere. */
+/* Adds all slave nodes with their masters to pairs; settle NULL: without masters, which are searched for elsewhere. */
 PetscErrorCode HycoPartnersMatch(HycoContact contact, HycoFE fe, PetscInt index, PetscBool nodes, HycoSettle settle,
                                  HycoRemedy remedy, HycoPairs *pairs);
 /* The entries of a type with slave and master. */

@@ -1,7 +1,7 @@
-/* What each contact of the scene carries: its resultant and moment on the slave's side, area, largest pressure. */
+/* Results of each contact of the scene: its resultant and moment on the slave's side, area, largest pressure. */
 #include <hycocontactimpl.h>
 
-/* The share of potential contact k. */
+/* Adds the contribution of potential contact k. */
 static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], PetscReal area, PetscReal lambda,
                 HycoContactResult *r)
 {
@@ -12,7 +12,7 @@ static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], Pets
   r->area += area;
   if (area > 0) r->pressure = PetscMax(r->pressure, lambda / area);
   for (PetscInt d = 0; d < 3; d++) push[d] = d < fe->dim ? -lambda * normal[d] : 0;
-  if (around) push[0] = 0; /* around the circle it adds up to nothing */
+  if (around) push[0] = 0; /* the radial force is zero in the sum over the circle */
   for (PetscInt d = 0; d < 3; d++) {
     const PetscInt e = (d + 1) % 3, g = (d + 2) % 3;
 

@@ -3,6 +3,20 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
+/* What tied nodes have of a surface, by node and component (v, n_nodes x width), passes to their masters, which have the
+   contact there. */
+static void PassTied(HycoMesh m, PetscInt width, PetscReal v[])
+{
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    const PetscReal *weight = m->ties->weight + m->tied_entry[k];
+
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+      for (PetscInt c = 0; c < width; c++)
+        v[m->tied_master[j] * width + c] += weight[j - m->tied_start[k]] * v[m->tied[k] * width + c];
+    }
+  }
+}
+
 PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
 {
   HycoMesh m = fe->mesh;
@@ -21,11 +35,12 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
       }
     }
   }
+  PassTied(m, 3, vector);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The master point of contact k on the moved mesh; an obstacle's and a rigid body's is the slave itself, as is that of
-   a slave node that faces no master. */
+/* The master point of contact k on the moved mesh; for an obstacle, a rigid body and a slave node that faces no
+   master, the slave itself. */
 static void MasterPoint(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal x[3])
 {
   const PetscBool rigid = fe->scene->contact[pairs->contact[k]]->rigid;
@@ -75,7 +90,7 @@ PetscReal HycoContactNoGap(HycoFE fe)
   return 1e-2 * HycoMeshLength(fe->mesh);
 }
 
-/* Their gaps at these normals; the gap of one that faces no master says nothing. */
+/* Their gaps for these normals; the gap of a contact that faces no master is a placeholder. */
 static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first,
                            const HycoContactPoints *points, const PetscReal normal[], PetscReal gap[])
 {
@@ -134,7 +149,7 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a normal is of a node's unknowns, B T. */
+/* The row B T of a node's unknowns for a normal. */
 static void OfUnknowns(HycoFE fe, PetscInt node, const PetscReal normal[3], PetscReal along[3])
 {
   for (PetscInt c = 0; c < 3; c++) along[c] = normal[c];
@@ -145,7 +160,8 @@ static void OfUnknowns(HycoFE fe, PetscInt node, const PetscReal normal[3], Pets
   }
 }
 
-/* Adds `scale` times the normal at a node to a row: to its free unknowns as entries, to its fixed ones in the gap. */
+/* Adds `scale` times the normal at a node to a row: entries for its free unknowns, a change of the gap for its fixed
+   ones. */
 static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal normal[3], PetscInt *n, PetscInt dof[],
                      PetscReal value[], PetscReal *gap)
 {
@@ -165,8 +181,8 @@ static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal 
   }
 }
 
-/* Of contacts with one slave node the normals must differ: parallel ones would share a force in no definite way.
-   before: the contact before k with k's slave, -1: none. */
+/* Contacts with the same slave node must have different normals: the share of each in the force would not be unique
+   with parallel ones. before: the previous contact with k's slave, -1: none. */
 static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscInt before[],
                                   const PetscReal normal[])
 {
@@ -175,7 +191,7 @@ static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k,
   PetscInt n = 0;
 
   PetscFunctionBegin;
-  for (PetscInt j = k; j >= 0; j = before[j], n++) { /* k's own last: Gram and Schmidt from the other end */
+  for (PetscInt j = k; j >= 0; j = before[j], n++) { /* k's own last: Gram-Schmidt in reverse order */
     OfUnknowns(fe, slave, normal + 3 * j, base[n]);
     for (PetscInt c = 0; c < 3; c++) base[n][c] = c < fe->dim && !fe->fixed[slave * fe->dim + c] ? base[n][c] : 0;
   }
@@ -254,31 +270,40 @@ PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
+/* Of each node (share, n_nodes), its part of the area of the surface `group`. */
+static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGetFacet(m->type);
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(share, m->n_nodes));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    for (PetscInt q = 0; m->facet_group[f] == group && q < el->nq; q++) {
+      PetscReal n[3];
+
+      PetscCall(HycoFacetNormal(fe, el, f, q, n));
+      for (PetscInt a = 0; a < m->nf; a++) share[m->facets[f * m->nf + a]] += el->N[q][a] * PetscSqrtReal(HycoDot(n, n));
+    }
+  }
+  PassTied(m, 1, share);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
+{
   PetscReal *share;
   PetscInt last = -1;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->n_nodes, &share));
+  PetscCall(PetscMalloc1(fe->mesh->n_nodes, &share));
   for (PetscInt k = 0; k < pairs->n; k++) {
     if (last != pairs->contact[k]) {
       PetscInt g = 0;
 
       last = pairs->contact[k];
-      PetscCall(HycoMeshFindGroup(m, "contact", fe->scene->contact[last]->slave, &g));
-      PetscCall(PetscArrayzero(share, m->n_nodes));
-      for (PetscInt f = 0; f < m->n_facets; f++) {
-        for (PetscInt q = 0; m->facet_group[f] == g && q < el->nq; q++) {
-          PetscReal n[3];
-
-          PetscCall(HycoFacetNormal(fe, el, f, q, n));
-          for (PetscInt a = 0; a < m->nf; a++)
-            share[m->facets[f * m->nf + a]] += el->N[q][a] * PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        }
-      }
+      PetscCall(HycoMeshFindGroup(fe->mesh, "contact", fe->scene->contact[last]->slave, &g));
+      PetscCall(Shares(fe, g, share));
     }
     area[k] = share[pairs->slave[k]];
   }

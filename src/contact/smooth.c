@@ -1,19 +1,19 @@
 /*
-  Normals of the smooth surface behind a group's facets. A node's facets are weighted as on a circle or a sphere through
-  it and its neighbours, where the normal is then exact (N. Max, J. Graphics Tools 4 (1999) 1-6): a body of revolution
-  that turns in its seat shows no normal motion, however uneven its facets are. Facets of second order have a normal of
-  their own at each node, and the mean of those is taken.
+  Normals of the smooth surface that a group's facets approximate. A node's facets are weighted as on a circle or a
+  sphere through it and its neighbours, for which the normal is then exact (N. Max, J. Graphics Tools 4 (1999) 1-6): the
+  normal motion of a body of revolution that rotates in its seat is then zero, however irregular its facets are. Facets
+  of second order have their own normal at each node; their mean is used.
 */
 #include "facing.h"
 #include <hycokinematics.h>
 #include <hycovector.h>
 
-/* Facets that meet at more than this angle (40 degrees) are an edge of the body, not a curved surface. */
+/* Facets at a larger angle (40 degrees) form an edge of the body, not a curved surface. */
 #define EDGE 0.7
-/* What the coordinates of a mesh file leave of a plane. */
+/* Deviation of a plane due to the rounding of coordinates in a mesh file. */
 #define FLAT 1e-6
 
-/* The weight of a facet's normal at its corner v, with the next and the last corner. */
+/* The weight of a facet's normal at its corner v, from the next and the previous corner. */
 static PetscReal Weight(HycoFE fe, const PetscInt node[], PetscInt v)
 {
   const PetscInt nf = fe->mesh->nf, next = node[(v + 1) % nf], last = node[(v + nf - 1) % nf];
@@ -26,9 +26,9 @@ static PetscReal Weight(HycoFE fe, const PetscInt node[], PetscInt v)
 }
 
 typedef struct {
-  PetscReal *exact, *mean; /* n_nodes x 3: by Max's weights, by areas */
+  PetscReal *exact, *mean; /* n_nodes x 3: weighted by Max's weights, by areas */
   PetscReal *bend;         /* n_nodes: the largest angle between facets around the node */
-  PetscInt *fan;           /* n_nodes: 0 where the facets close around the node */
+  PetscInt *fan;           /* n_nodes: 0 if the facets form a closed ring around the node */
 } Surface;
 
 static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
@@ -51,14 +51,14 @@ static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
         s->exact[3 * node[v] + c] += weight * unit[c];
         s->mean[3 * node[v] + c] += n[c];
       }
-      /* each neighbour comes once as the next and once as the last, except at a border */
+      /* each neighbour occurs once as the next and once as the previous, except at a border */
       s->fan[node[v]] += m->nf == 2 ? (v ? 1 : -1) : node[(v + 1) % m->nf] - node[(v + m->nf - 1) % m->nf];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The normal of a facet at its node v, of unit length: of first order that of the facet. */
+/* The unit normal of a facet at its node v; for first order that of the facet. */
 static PetscErrorCode NormalAt(HycoFE fe, PetscInt facet, PetscInt v, PetscReal n[3])
 {
   const HycoElement *nodes = HycoElementGetFacetNodes(fe->mesh->type);
@@ -72,7 +72,7 @@ static PetscErrorCode NormalAt(HycoFE fe, PetscInt facet, PetscInt v, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of second order: the sums of the facets' normals at the nodes, exact[] and mean[]. */
+/* For second order: the sums of the facets' normals at the nodes, exact[] and mean[]. */
 static PetscErrorCode AddNodeNormals(HycoFE fe, PetscInt group, Surface *s)
 {
   HycoMesh m = fe->mesh;
@@ -91,7 +91,8 @@ static PetscErrorCode AddNodeNormals(HycoFE fe, PetscInt group, Surface *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* bend[], from the facets' normals and their means; then for each node the largest of its facets' nodes in wide[]. */
+/* Computes bend[] from the facets' normals and their means; then, for each node, the largest over its facets' nodes
+   in wide[]. */
 static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal wide[])
 {
   HycoMesh m = fe->mesh;

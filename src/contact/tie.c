@@ -1,18 +1,18 @@
 /*
-  The search for ties: a slave node's masters are those of the nearest point of the master's facets. And contacts on
-  tied nodes, which have no displacement of their own.
+  The search for ties: the masters of a slave node are those of the nearest point of the master's facets. Also contacts
+  on tied nodes, which have no displacement of their own.
 */
 #include "nearest.h"
 #include "partners.h"
 
-/* By node of the mesh: the tie that it is a slave of (-1: none), the point that it follows. */
+/* By node of the mesh: the tie of which it is a slave (-1: none), the point that it follows. */
 typedef struct {
   PetscInt *tie;
   HycoProjection *at;
   PetscReal *tolerance; /* by tie */
 } Found;
 
-/* The master's facets in a tree, their nodes (the caller's), whether a node is on them. */
+/* The master's facets in a tree, their nodes (the caller frees them), and whether a node is on them. */
 static PetscErrorCode MakePatches(HycoMesh m, PetscInt group, PetscInt node[], PetscBool on[], HycoPatches *patches)
 {
   PetscInt n = 0;
@@ -27,7 +27,7 @@ static PetscErrorCode MakePatches(HycoMesh m, PetscInt group, PetscInt node[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points that the slave nodes follow; nodes of both surfaces move as one without. */
+/* Finds the points that the slave nodes follow; nodes on both surfaces need none. */
 static PetscErrorCode Project(HycoScene s, HycoMesh m, PetscInt k, PetscInt group, HycoPatches patches,
                               const PetscBool on[], Found *found)
 {
@@ -88,7 +88,7 @@ static PetscErrorCode FindOne(HycoScene s, HycoMesh m, PetscInt k, Found *found)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A node that others follow follows none. */
+/* Checks that no master node is itself tied. */
 static PetscErrorCode CheckChains(HycoScene s, HycoMesh m, const Found *found)
 {
   PetscFunctionBegin;
@@ -129,7 +129,8 @@ static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties
       t->tie[n] = found->tie[i];
       t->body[n] = m->node_body[at->node[a]];
       t->weight[n] = at->weight[a];
-      t->reach[n] = PetscMax(found->tolerance[found->tie[i]], 1e-9 * HycoMeshLength(m)); /* maps have round-off */
+      t->reach[n] = PetscMax(found->tolerance[found->tie[i]], 1e-9 * HycoMeshLength(m)); /* allows for round-off of
+                                                                                            maps */
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -150,7 +151,7 @@ PetscErrorCode HycoTiesFind(HycoScene s, HycoMesh m, HycoTies *ties)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of contacts with a master surface: none of its nodes is tied. */
+/* For contacts with a master surface: checks that none of its nodes is tied. */
 static PetscErrorCode CheckMasters(HycoScene s, HycoMesh m)
 {
   PetscFunctionBegin;
@@ -172,7 +173,7 @@ static PetscErrorCode CheckMasters(HycoScene s, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether all nodes that a tied slave follows are slaves of its contact. has: by node, the last contact that it has. */
+/* Whether all masters of a tied slave are slaves of its contact. has: by node, its last contact. */
 static PetscBool Followed(HycoMesh m, PetscInt tied, PetscInt contact, const PetscInt has[])
 {
   for (PetscInt j = m->tied_start[tied]; j < m->tied_start[tied + 1]; j++) {
@@ -181,7 +182,7 @@ static PetscBool Followed(HycoMesh m, PetscInt tied, PetscInt contact, const Pet
   return PETSC_TRUE;
 }
 
-/* which: the contacts that stay. */
+/* which: the contacts that are kept. */
 static PetscErrorCode Choose(HycoScene s, HycoMesh m, const HycoPairs *p, PetscInt has[], PetscInt *n, PetscInt which[])
 {
   PetscFunctionBegin;

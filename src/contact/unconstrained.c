@@ -1,23 +1,23 @@
 /*
-  Rigid motions that neither supports nor frictionless contact hold. A motion that is tangential to a contact's surface
-  everywhere meets no resistance there: a disk that turns about its centre, a body that slides along a plane. On a mesh
-  the surface is in facets, whose normals resist by accident: what counts is the smooth surface (HycoSmoothNormals()),
-  within what faceting leaves in doubt, so that all meshes of one geometry give one answer.
+  Rigid motions that neither supports nor frictionless contact prevent. A motion that is tangential to a contact's
+  surface everywhere meets no resistance: a disk that rotates about its centre, a body that slides along a plane. On a
+  mesh, the facets' normals would resist because of the discretisation: the smooth surface is decisive
+  (HycoSmoothNormals()), within the faceting error, so that all meshes of one geometry give the same result.
 */
 #include <hycokinematics.h>
 #include <hycovector.h>
 #include <petscblaslapack.h>
 
-/* In which sense a contact may be slid along: its own (given) normals', the slave's surface's, the master's. */
+/* The normals with which a contact may be tangential: the given ones, the slave's surface's, the master's. */
 enum { GIVEN, SLAVE, MASTER, N_SENSES };
-#define MOST_CONTACTS 3 /* that choose their senses apart; more choose together */
+#define MOST_CONTACTS 3 /* contacts whose normals are chosen independently; more have a common choice */
 
 typedef struct {
   HycoFE fe;
   HycoPairs *pairs;
-  PetscInt k, m;                               /* motions, contacts */
+  PetscInt k, m;                               /* numbers of motions, contacts */
   PetscReal *d;                                /* m x k x 3: relative displacement of slave and master */
-  PetscReal *normal[N_SENSES];                 /* m x 3; zero: not in this sense */
+  PetscReal *normal[N_SENSES];                 /* m x 3; zero: not available */
   PetscReal *doubt[N_SENSES], *bend[N_SENSES]; /* m */
 } Shapes;
 
@@ -30,7 +30,7 @@ static void Relative(Shapes *s, const HycoMotions *motions)
   }
 }
 
-/* Normals of the slave's and of the master's surface at one contact's pairs; work: room for 5 reals a node. */
+/* Normals of the slave's and the master's surface at one contact's pairs; work: room for 5 reals a node. */
 static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[])
 {
   HycoContact c = s->fe->scene->contact[contact];
@@ -77,7 +77,7 @@ static PetscErrorCode FindSenses(Shapes *s)
 
     s->doubt[GIVEN][i] = PetscMax(s->doubt[SLAVE][i], 1e-6);
     s->bend[GIVEN][i] = PetscMax(s->bend[SLAVE][i], s->bend[MASTER][i]);
-    /* averaged from the facets: the slave's surface says it better */
+    /* averaged from the facets: the slave's surface is more accurate */
     for (PetscInt d = 0; d < 3 && !given && n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0; d++)
       s->normal[GIVEN][3 * i + d] = 0;
   }
@@ -109,7 +109,8 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
   PetscCall(PetscArrayzero(A, k * k));
   PetscCall(PetscArrayzero(M, k * k));
   for (PetscInt a = 0; a < k; a++)
-    M[a * k + a] = 1e-3 * (PetscReal)(s->m + 1) / HycoFEUnknowns(s->fe); /* bodies that move together */
+    M[a * k + a] = 1e-3 * (PetscReal)(s->m + 1) / HycoFEUnknowns(s->fe); /* bodies that move together have no
+                                                                            relative displacement */
   for (PetscInt i = 0; i < s->m; i++) {
     const PetscInt t = sense[s->pairs->contact[i]];
     const PetscReal *d = s->d + (size_t)i * (size_t)k * 3;
@@ -128,7 +129,7 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the combination z is tangential at every contact; the weights of those where it is not are raised. */
+/* Whether the combination z is tangential at every contact; raises the weights of the contacts where it is not. */
 static PetscBool Tangential(const Shapes *s, const PetscInt sense[], const PetscReal z[], PetscReal weight[])
 {
   const PetscReal noise = 1e-9 / PetscSqrtReal((PetscReal)HycoFEUnknowns(s->fe));
@@ -150,7 +151,7 @@ static PetscBool Tangential(const Shapes *s, const PetscInt sense[], const Petsc
   return all;
 }
 
-/* The combinations that are tangential in these senses: z (room k x k, rows of length 1), *n of them. */
+/* The combinations that are tangential for these normals: z (room k x k, rows of length 1), *n of them. */
 static PetscErrorCode Null(const Shapes *s, const PetscInt sense[], PetscReal z[], PetscInt *n)
 {
   const PetscInt k = s->k;
@@ -179,14 +180,14 @@ static PetscErrorCode Null(const Shapes *s, const PetscInt sense[], PetscReal z[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds to the orthonormal rows of `basis` what the row z brings that is new. */
+/* Adds to the orthonormal rows of `basis` the component of row z that is orthogonal to them. */
 static void Join(PetscInt k, const PetscReal z[], PetscReal basis[], PetscInt *n)
 {
   PetscReal *v = basis + *n * k, norm = 0;
 
   if (*n == k) return;
   for (PetscInt a = 0; a < k; a++) v[a] = z[a];
-  for (PetscInt b = 0; b < 2 * *n; b++) { /* twice: round-off */
+  for (PetscInt b = 0; b < 2 * *n; b++) { /* twice, against round-off */
     const PetscReal *w = basis + b % *n * k;
     PetscReal dot = 0;
 
@@ -194,12 +195,12 @@ static void Join(PetscInt k, const PetscReal z[], PetscReal basis[], PetscInt *n
     for (PetscInt a = 0; a < k; a++) v[a] -= dot * w[a];
   }
   for (PetscInt a = 0; a < k; a++) norm += v[a] * v[a];
-  if (norm < 0.04) return; /* the same motion, but for what faceting leaves in doubt */
+  if (norm < 0.04) return; /* the same motion, within the faceting error */
   for (PetscInt a = 0; a < k; a++) v[a] /= PetscSqrtReal(norm);
   (*n)++;
 }
 
-/* The senses of combination number `code`; *possible: each has normals. */
+/* The normals of choice number `code`; *possible: each contact has them. */
 static void Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *possible)
 {
   *possible = PETSC_TRUE;
@@ -215,7 +216,7 @@ static void Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *
     if (s->fe->scene->n_contacts <= MOST_CONTACTS)
       *possible = PETSC_FALSE;
     else
-      *t = *t == GIVEN ? SLAVE : GIVEN; /* together, but each as it can */
+      *t = *t == GIVEN ? SLAVE : GIVEN; /* a common choice, as far as available */
   }
 }
 
@@ -248,17 +249,17 @@ static PetscErrorCode Search(const Shapes *s, PetscInt *n_unheld, PetscReal unhe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Entry of a combination's rigid motions: of the rotations of each part, then of the translations. */
+/* Component of a combination's rigid motions: first the rotations of each part, then the translations. */
 static PetscReal Entry(const HycoMotions *motions, const PetscReal z[], PetscInt dim, PetscInt column)
 {
   const PetscInt k = motions->n, turns = dim == 1 ? 0 : dim == 2 ? 1 : 3;
   const PetscBool turn = (PetscBool)(column < k * turns);
-  const PetscInt first = turn ? column / turns : (column - k * turns) / dim; /* the part, by one of its motions */
+  const PetscInt first = turn ? column / turns : (column - k * turns) / dim; /* the part, through one of its motions */
   const PetscInt at = turn ? dim + column % turns : (column - k * turns) % dim;
   PetscReal sum = 0;
 
   for (PetscInt a = 0; a < first; a++) {
-    if (motions->rigid[a].part == motions->rigid[first].part) return 0; /* that motion's column has it */
+    if (motions->rigid[a].part == motions->rigid[first].part) return 0; /* the column of that motion contains it */
   }
   for (PetscInt a = first; a < k; a++) {
     if (motions->rigid[a].part == motions->rigid[first].part) sum += z[a] * motions->rigid[a].rigid[at];
@@ -266,7 +267,7 @@ static PetscReal Entry(const HycoMotions *motions, const PetscReal z[], PetscInt
   return sum;
 }
 
-/* Another basis of the same combinations, to be named: with as many pure translations as there are. */
+/* Changes the basis of the combinations for their names: with as many pure translations as possible. */
 static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscReal z[])
 {
   const PetscInt k = motions->n, columns = k * (dim == 1 ? 1 : dim == 2 ? 3 : 6), turns = columns - k * dim;
@@ -278,7 +279,7 @@ static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscRe
   for (PetscInt c = 0, done = 0; c < columns && done < n; c++) {
     PetscInt best = done;
 
-    /* the first that will do, as it was found */
+    /* keep the first suitable one */
     while (best < n && PetscAbsReal(Entry(motions, z + best * k, dim, c)) < 1e-3 * scale) best++;
     if (best == n) continue;
     for (PetscInt a = 0; a < k; a++) {
@@ -287,7 +288,8 @@ static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscRe
       z[done * k + a] = z[best * k + a];
       z[best * k + a] = swap;
     }
-    for (PetscInt r = c < turns ? 0 : done + 1; r < n; r++) { /* a rotation's translation says where its axis is */
+    for (PetscInt r = c < turns ? 0 : done + 1; r < n; r++) { /* the translation of a rotation gives the position of
+                                                                 its axis */
       const PetscReal share = Entry(motions, z + r * k, dim, c) / Entry(motions, z + done * k, dim, c);
 
       for (PetscInt a = 0; a < k && r != done; a++) z[r * k + a] -= share * z[done * k + a];

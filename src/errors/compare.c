@@ -2,7 +2,7 @@
 #include <hycocomparison.h>
 #include <hycoreducerimpl.h>
 
-/* Sums and maxima of one quantity, and the quotient they end in. */
+/* Sums and maxima of one quantity, and the quotient computed from them. */
 typedef struct {
   PetscReal lost2, size2, lost, size;
 } Norms;
@@ -63,12 +63,12 @@ PetscErrorCode HycoROMCompareRID(HycoROM m, const PetscReal u[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Modes, norms and star forests of the last model that a full-order one was compared with. */
+/* Modes, norms and star forests of the last model with which a full-order model was compared. */
 struct _n_HycoCompared {
   PetscObjectId id; /* the model's, on rank 0 */
   HycoComparison rows;
   HycoNorms norms;
-  PetscReal *V; /* the modes, these rows, column major */
+  PetscReal *V; /* the modes in these rows, column major */
 };
 
 PetscErrorCode HycoComparedDestroy(HycoCompared *compared)
@@ -119,7 +119,7 @@ static PetscErrorCode Fill(HycoROM m, HycoFOM f, HycoCompared k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f->compared for this model. Collective. */
+/* Sets f->compared for this model. Collective. */
 static PetscErrorCode Keep(HycoROM m, HycoFOM f)
 {
   PetscObjectId id = 0;

@@ -1,8 +1,8 @@
-/* The path of a model against that of the full order, at the listed times. */
+/* Compares the path of a model with that of full order, at the listed times. */
 #include <hycopath.h>
 #include <hycoreducerimpl.h>
 
-/* Each kind at its worst time and at the end. */
+/* Each kind of error at its worst time and at the end. */
 void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
 {
   const HycoPathErrors none = {.n = n};
@@ -25,10 +25,10 @@ void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
   }
 }
 
-/* The full-order path on rank 0, as its listed times come. */
+/* The full-order path on rank 0, stored as its listed times are reached. */
 typedef struct {
   PetscInt n_dof, n_sigma, n_cells, n_contacts, n;
-  PetscReal *value; /* of each time u, sigma, inelastic, lambda */
+  PetscReal *value; /* for each time u, sigma, inelastic, lambda */
 } Kept;
 
 static PetscReal *At(const Kept *kept, PetscInt k)
@@ -65,7 +65,7 @@ static PetscErrorCode Keep(HycoFOM f, const HycoStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the model misses of listed time k: of the whole mesh U, of the RID and the contacts the rest. */
+/* The errors of the model at listed time k: U on the whole mesh, the others on the RID and the contacts. */
 static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost lost[])
 {
   const PetscInt dim = m->mesh->dim, ns = m->fe->n_sigma;
@@ -94,7 +94,7 @@ static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The prediction in the same steps, and its errors. Rank 0. */
+/* Predicts in the same steps, and computes the errors. Rank 0. */
 static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const HycoHistory *h, Kept *kept,
                               HycoPathErrors *e)
 {

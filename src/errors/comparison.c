@@ -1,4 +1,4 @@
-/* The rows that both kinds of comparison have in common: of held-out points in training, of the command. */
+/* Comparison by rows of the whole mesh, for held-out points in training and for the command. */
 #include <hycocomparison.h>
 
 PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
@@ -59,7 +59,7 @@ PetscErrorCode HycoComparisonBring(HycoComparison *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What supports along a direction and ties say of displacements: by the ranks' parts, as all are spread. */
+/* Completes displacements by supports along a direction and ties, on the ranks' parts. */
 static PetscErrorCode Complete(HycoComparison *c)
 {
   HycoFE fe = c->f->fe;

@@ -2,7 +2,7 @@
   The norms of the paper's section 3 on the whole mesh: |u|_H1^2 = u^T H u with H the mass plus the gradient's matrix
   (times the mesh's length squared, so that units do not matter), and the norm of a force in the dual of H1 (test
   functions that vanish on the supports), sup r.v / |v|_H1 = sqrt(r^T M^-1 r) with M the part of H on the free unknowns.
-  On a mesh that the parameters move, both are those of the middle of the ranges, so that one factor serves every point.
+  On a mesh that the parameters move, both are those at the middle of the ranges, so that one factor serves every point.
 */
 #include <hycocomparison.h>
 #include <hycolinear.h>
@@ -39,7 +39,7 @@ PetscErrorCode HycoNormsCreate(HycoFOM f, HycoNorms *norms)
   HycoOnEach(HycoComm(f), HycoFECreate(scene, f->part, &h->fe));
   HycoOnEach(HycoComm(f), HycoFESetParameters(h->fe, mu));
   PetscCall(AssembleNorm(h, &h->M));
-  PetscCall(PetscArrayzero(h->fe->fixed, h->fe->n_dof)); /* prescribed displacements count in the norm */
+  PetscCall(PetscArrayzero(h->fe->fixed, h->fe->n_dof)); /* prescribed displacements are included in the norm */
   h->fe->plain = PETSC_TRUE;
   PetscCall(AssembleNorm(h, &h->H));
   PetscCall(MatCreateVecs(h->M, &h->x, &h->y));
@@ -102,7 +102,7 @@ PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B^T (L - minus) in x, the contacts' nodes being among those of the surfaces. Rank 0. */
+/* B^T (L - minus) in x; the contacts' nodes are among those of the surfaces. Rank 0. */
 static PetscErrorCode AddForces(HycoNorms h, HycoROM m, PetscBool rid_only, const PetscReal L[],
                                 const PetscReal minus[], PetscBool *any)
 {

@@ -1,7 +1,7 @@
 /*
-  A model under training against stored full-order solutions that it was not trained on: errors, what tells of them
-  online, and what an online solve takes. The ranks share the predictions out; of each, every rank makes and compares
-  its rows of the whole mesh, and hands the predicting one the solution on the RID.
+  Compares a model in training with stored full-order solutions that were not used for its training: errors, features of
+  the error estimates, and online times. The ranks share the predictions; for each, every rank computes and compares its
+  rows of the whole mesh, and sends the solution on the RID to the predicting rank.
 */
 #include <hycocomparison.h>
 #include <hycoreducerimpl.h>
@@ -17,7 +17,7 @@ typedef struct {
 
 static const char *const fields[HYCO_COMPARED] = {"U", "sigma", "inelastic"};
 
-/* step: the listed time, of a history. */
+/* Reads a solution; step: the listed time, with a history. */
 static PetscErrorCode Read(Rows *r, const PetscReal mu[], PetscInt step)
 {
   HycoComparison *c = &r->c;
@@ -29,7 +29,7 @@ static PetscErrorCode Read(Rows *r, const PetscReal mu[], PetscInt step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the process that has predicted makes of it. */
+/* The comparison on the RID, on the predicting process. */
 static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row)
 {
   HycoROM m = r->m;
@@ -53,7 +53,7 @@ static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The squares of the displacement that is missed, and of the solution's, over the whole mesh; the solution on the RID.
+/* The squares of the displacement's error, and of the solution, over the whole mesh; and the solution on the RID.
    Collective. */
 static PetscErrorCode MeasureU(Rows *r, const PetscReal mu[], PetscInt step, PetscMPIInt of, PetscReal square[2])
 {
@@ -75,7 +75,7 @@ static PetscErrorCode MeasureU(Rows *r, const PetscReal mu[], PetscInt step, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the process that has predicted makes of listed time `step`, which the model shows. */
+/* The comparison at listed time `step`, which the model has selected, on the predicting process. */
 static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, const PetscReal square[2],
                                   HycoLost lost[])
 {
@@ -90,7 +90,7 @@ static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A path in short; forces as they are before they are divided by what is large among the held-out paths. */
+/* Sets the errors of a path; those of forces before the division that depends on all held-out paths. */
 static PetscErrorCode ConcludePath(HycoROM m, PetscInt n, const HycoLost lost[], HycoHeldOut *row)
 {
   HycoPathErrors e;
@@ -112,7 +112,7 @@ static PetscErrorCode ConcludePath(HycoROM m, PetscInt n, const HycoLost lost[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last predicted path of rank `of`, at mu, at the listed times that it reached. Collective. */
+/* Compares the last predicted path of rank `of`, at mu, at the listed times that it reached. Collective. */
 static PetscErrorCode ComparePath(Rows *r, const PetscReal mu[], PetscMPIInt of, HycoHeldOut *row)
 {
   const PetscBool mine = (PetscBool)(r->t->rank == of);
@@ -135,7 +135,7 @@ static PetscErrorCode ComparePath(Rows *r, const PetscReal mu[], PetscMPIInt of,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last prediction of rank `of`, at mu, whose row it is. Collective. */
+/* Compares the last prediction of rank `of`, at mu; the row belongs to that rank. Collective. */
 static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, HycoHeldOut *row)
 {
   PetscReal square[2];
@@ -147,7 +147,7 @@ static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One held-out point; of a path in the steps that full order took. */
+/* Predicts at one held-out point; a path in the steps of full order. */
 static PetscErrorCode PredictOne(HycoROM m, HycoSnapshots store, const PetscReal mu[])
 {
   PetscReal *taken = NULL;
@@ -173,11 +173,12 @@ static PetscErrorCode Predict(HycoROM m, HycoSnapshots store, const PetscReal mu
   row->seconds[repeat] = m->prediction.seconds.total;
   if (repeat) PetscFunctionReturn(PETSC_SUCCESS);
   row->converged = m->prediction.reason > 0;
-  for (PetscInt j = 1; j < HYCO_HELD_REPEATS; j++) row->seconds[j] = row->seconds[0]; /* of a path once */
+  for (PetscInt j = 1; j < HYCO_HELD_REPEATS; j++) row->seconds[j] = row->seconds[0]; /* a path is predicted once */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points first .. last-1 in their order, several times: what a load ramp keeps from one step to the next is kept. */
+/* Predicts points first .. last-1 in their order, several times, with the data that a load ramp keeps from one step
+   to the next. */
 static PetscErrorCode PredictAgain(HycoROM m, HycoSnapshots store, PetscInt first, PetscInt last, const PetscReal mu[],
                                    HycoHeldOut rows[])
 {
@@ -188,7 +189,7 @@ static PetscErrorCode PredictAgain(HycoROM m, HycoSnapshots store, PetscInt firs
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points of a scene without a history: a block of them for each rank, one of each block at a time. */
+/* Points of a scene without a history: a block of them for each rank, one point of each block at a time. */
 static PetscErrorCode PredictPoints(Rows *r, HycoHeldOut rows[])
 {
   HycoReducer t = r->t;
@@ -228,8 +229,8 @@ static PetscBool Loses(const HycoHeldOutRace *race, const HycoHeldOut *row)
   return (PetscBool)(row->converged < 0.5);
 }
 
-/* Held-out paths in the order of the race, one of each rank at a time. Those behind the one that ends it count for
-   nothing, so that the number of ranks does not matter. */
+/* Held-out paths in the order of the race, one for each rank at a time. Those after the one that ends it are
+   ignored, so that the result does not depend on the number of ranks. */
 static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut rows[])
 {
   HycoReducer t = r->t;
@@ -303,7 +304,7 @@ PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[])
   return force;
 }
 
-/* One of row->error or row->end, divided. */
+/* One of row->error or row->end, after division. */
 static PetscReal Divided(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force, PetscReal error)
 {
   const PetscBool forces = (PetscBool)(kind == HYCO_ERROR_LAMBDA || kind == HYCO_ERROR_LAMBDA_RID);

@@ -1,6 +1,6 @@
 /*
-  Assembly into a sequential matrix whose pattern is there: each cell knows where its entries stand, so that they are
-  plain additions; cells that no parameter reaches are added up once and kept.
+  Assembly into a sequential matrix with an existing pattern: the positions of each cell's entries are known, so that
+  the entries are added directly; cells that no parameter changes are summed once and stored.
 */
 #include "assembly_map.h"
 #include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
@@ -9,8 +9,8 @@ struct _n_HycoAssemblyMap {
   PetscObjectId matrix;
   PetscObjectState pattern;
   PetscInt *start;       /* of each cell's n x n offsets, n its nodes */
-  PetscInt *offset;      /* of the first free unknown of node b in the rows of a's free unknowns */
-  PetscScalar *constant; /* values of the cells that no parameter reaches; NULL: there is none */
+  PetscInt *offset;      /* offset of the first free unknown of node b in the rows of a's free unknowns */
+  PetscScalar *constant; /* sum of the cells that no parameter changes; NULL: there are none */
 };
 
 PetscErrorCode HycoAssemblyMapDestroy(HycoAssemblyMap *places)
@@ -33,7 +33,7 @@ static PetscInt FirstFree(HycoFE fe, PetscInt node)
   return -1;
 }
 
-/* False where a row lacks an entry: the matrix was not made by cells of this mesh. */
+/* False if a row lacks an entry: then the matrix was not created for this mesh. */
 static PetscBool FindOffsets(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt offset[])
 {
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
@@ -80,7 +80,7 @@ static void Add(HycoFE fe, const PetscInt offset[], PetscInt cell, const PetscRe
   }
 }
 
-/* Adds the cells that parameters reach, or the others. */
+/* Adds the cells that parameters change, or the others. */
 static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant, const PetscInt ia[], PetscScalar a[])
 {
   PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];

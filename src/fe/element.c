@@ -2,13 +2,13 @@
 #include <hycofe.h>
 
 static HycoElement table[HYCO_N_CELL_TYPES], point, line3;
-static HycoElement line3_nodes, tri6_nodes, quad9_nodes; /* at their nodes, of weight 1 */
+static HycoElement line3_nodes, tri6_nodes, quad9_nodes; /* quadrature points at the nodes, of weight 1 */
 static PetscBool ready = PETSC_FALSE;
 
 static const PetscReal corner[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
                                        {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
 
-/* Products of linear functions on [-1, 1]^dim with two Gauss points a direction. */
+/* Products of linear functions on [-1, 1]^dim with two Gauss points in each direction. */
 static void Tensor(HycoElement *e, PetscInt dim)
 {
   const PetscReal g = 1 / PetscSqrtReal(3.0);
@@ -82,8 +82,8 @@ static void Line3(HycoElement *e, PetscBool at_nodes)
   }
 }
 
-/* Products of quadratic functions; of eight nodes (serendipity) the corners' and the sides' take in what the middle's
-   is there, so that it is none. */
+/* Products of quadratic functions. With eight nodes (serendipity), the functions of the corners and the sides
+   include the middle's, in proportion to their values there. */
 static void Quad(HycoElement *e, PetscInt nv, PetscBool at_nodes)
 {
   e->dim = 2;
@@ -96,7 +96,7 @@ static void Quad(HycoElement *e, PetscInt nv, PetscBool at_nodes)
     e->w[q] = at_nodes ? 1 : gauss_weight[q % 3] * gauss_weight[q / 3];
     for (PetscInt a = 0; a < nv; a++) {
       const PetscInt i = node9[a][0], j = node9[a][1];
-      const PetscReal share = nv == 9 ? 0 : a < 4 ? -1.0 / 4 : 1.0 / 2; /* the middle's value where a quad8 has none */
+      const PetscReal share = nv == 9 ? 0 : a < 4 ? -1.0 / 4 : 1.0 / 2; /* share of the middle's function in a quad8 */
 
       e->N[q][a] = Quadratic(i, x) * Quadratic(j, y) + share * f[0];
       e->dN[q][a][0] = QuadraticSlope(i, x) * Quadratic(j, y) + share * f[1];
@@ -105,8 +105,8 @@ static void Quad(HycoElement *e, PetscInt nv, PetscBool at_nodes)
   }
 }
 
-/* Functions of a quadratic simplex at its next point, barycentric L, of this weight: L_a (2 L_a - 1) of the corners,
-   4 L_a L_b of the sides. */
+/* Functions of a quadratic simplex at its next point, with barycentric coordinates L and this weight: L_a (2 L_a -
+   1) for corners, 4 L_a L_b for sides. */
 static void AddSimplexPoint(HycoElement *e, const PetscInt side[][2], const PetscReal L[4], PetscReal weight)
 {
   const PetscInt q = e->nq++, dim = e->dim;
@@ -180,7 +180,7 @@ static const PetscInt node27[27][3] = {
     {-1, 0, -1},  {-1, -1, 0}, {1, 0, -1}, {1, -1, 0},  {0, 1, -1},  {1, 1, 0},  {-1, 1, 0}, {0, -1, 1}, {-1, 0, 1},
     {1, 0, 1},    {0, 1, 1},   {0, 0, -1}, {0, -1, 0},  {-1, 0, 0},  {1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {0, 0, 0}};
 
-/* Of the node at r (serendipity): products, of the corners times r.x - 2. */
+/* Function of the node at r (serendipity): products, for corners times r.x - 2. */
 static void SerendipityAt(const PetscInt r[3], const PetscReal x[3], PetscReal *N, PetscReal dN[3])
 {
   const PetscBool at_corner = (PetscBool)(r[0] && r[1] && r[2]);
@@ -199,7 +199,7 @@ static void SerendipityAt(const PetscInt r[3], const PetscReal x[3], PetscReal *
   }
 }
 
-/* Of the node at r: products of quadratic functions. */
+/* Function of the node at r: products of quadratic functions. */
 static void ProductAt(const PetscInt r[3], const PetscReal x[3], PetscReal *N, PetscReal dN[3])
 {
   PetscReal f[3];

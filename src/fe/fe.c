@@ -36,7 +36,7 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cells and supports that no parameter reaches. */
+/* Finds the cells and supports that no parameter changes. */
 static PetscErrorCode FindConstant(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -75,8 +75,9 @@ static PetscErrorCode FindConstant(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The element of each body. Flow keeps the volume, and then first-order cells are too stiff: bbar unless the scene says
-   otherwise, and no simplices unless it says that they are meant. */
+/* Chooses the element of each body. Inelastic flow preserves volume, which makes first-order cells too stiff
+   (locking): bbar is used for such bodies unless the scene gives another element, and simplices are refused unless
+   the scene allows them. */
 static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool bbar[])
 {
   const PetscBool has_mean = (PetscBool)(mesh->type == HYCO_QUAD4 || mesh->type == HYCO_HEX8);
@@ -173,14 +174,14 @@ static PetscErrorCode MoveNodes(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of an axisymmetric scene: whether a node, as drawn, lies on the axis, where it cannot leave it. */
+/* In an axisymmetric scene: whether the mesh file has the node on the axis, where its radial displacement is 0. */
 static PetscBool OnAxis(HycoFE fe, PetscInt node)
 {
   return (PetscBool)(fe->formulation == HYCO_AXISYMMETRIC &&
                      PetscAbsReal(fe->mesh->xyz[3 * node]) <= 1e-9 * HycoMeshLength(fe->mesh));
 }
 
-/* Of an axisymmetric scene: no node on the other side of the axis, and those that lie on it stay there. */
+/* In an axisymmetric scene: checks that no node crosses the axis, and that those on it stay there. */
 static PetscErrorCode CheckAxis(HycoFE fe)
 {
   const PetscReal zero = 1e-9 * HycoMeshLength(fe->mesh);
@@ -200,7 +201,7 @@ static PetscErrorCode CheckAxis(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Supports along a direction, once all others are set: in the order of the scene. */
+/* Sets supports along a direction, after all others, in the order of the scene. */
 static PetscErrorCode SetOblique(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -298,7 +299,7 @@ PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const 
     }
   }
   for (PetscInt k = 0; k < fe->n_pins; k++) fe->fixed[fe->pin[k]] = PETSC_TRUE;
-  PetscCall(HycoAssemblyMapDestroy(&fe->places)); /* what it has summed knows the fixed unknowns */
+  PetscCall(HycoAssemblyMapDestroy(&fe->places)); /* its constant sum depends on the fixed unknowns */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -344,7 +345,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   fe->stiffness_changed = (PetscBool)(first || c.stiffness);
   fe->contact_changed = (PetscBool)(first || c.rows);
   fe->gap_changed = (PetscBool)(first || c.gaps || !fe->fixed_constant);
-  fe->ready = PETSC_FALSE; /* until all of it is done */
+  fe->ready = PETSC_FALSE; /* until everything is updated */
   if (first || c.nodes) {
     PetscCall(MoveNodes(fe));
     PetscCall(HycoTiedPlace(fe));

@@ -4,7 +4,7 @@
 #include <hycovector.h>
 #include <hycomaterialimpl.h>
 
-/* Where forces go: a vector in the distributed numbering, fixed unknowns left out; or all of fe's unknowns. */
+/* Where forces are added: a vector in the distributed numbering, without fixed unknowns; or all of fe's unknowns. */
 typedef struct {
   Vec vec;
   PetscReal *all; /* n_dof; NULL: the vector */
@@ -38,7 +38,7 @@ static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal va
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the body forces at point q of a cell give to its unknowns, added to value. */
+/* Adds the body forces at point q of a cell to its unknowns. */
 static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, const HycoAcceleration *motion,
                                     PetscReal value[])
 {
@@ -93,7 +93,7 @@ static PetscErrorCode AddCell(HycoFE fe, PetscInt cell, const PetscReal f[], Int
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a load acts on a facet: where its cell is another process's, that does. */
+/* Whether this process applies a load to a facet: the process that has its cell does. */
 static PetscBool Acts(HycoFE fe, PetscInt facet)
 {
   return (PetscBool)(fe->all_facets || fe->mesh->facet_cell[facet] >= 0);
@@ -147,7 +147,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
       }
     }
   }
-  for (PetscInt i = 0; i < m->n_nodes; i++) n += sum[4 * i + 3] != 0; /* of quad8 a corner's is negative */
+  for (PetscInt i = 0; i < m->n_nodes; i++) n += sum[4 * i + 3] != 0; /* the corners of quad8 have negative shares */
   if (n != s->n) {
     PetscCall(PetscFree(s->node));
     PetscCall(PetscFree(s->share));
@@ -165,7 +165,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A load that is the same everywhere: its values times the nodes' shares of the surface. */
+/* A load that is constant in space: its values times the nodes' shares of the surface. */
 static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt group, HycoLoadShares *s, Into F)
 {
   PetscReal p = 0, t[3] = {0, 0, 0};
@@ -209,7 +209,8 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
       PetscReal sum = 0;
 
       for (PetscInt j = 0; j < n; j++) sum += Ke[k * n + j] * u0[j];
-      PetscCall(VecSetValue(F.vec, global * m->dim + c, -sum, ADD_VALUES)); /* T^T K T has its share of others */
+      PetscCall(VecSetValue(F.vec, global * m->dim + c, -sum, ADD_VALUES)); /* T^T K T also has contributions of
+                                                                               other cells */
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -236,7 +237,7 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Body forces and what thermal strains push, of a cell. */
+/* Adds body forces and forces of thermal strains of a cell. */
 static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
@@ -255,7 +256,7 @@ static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The force per unit length along a segment: its ends, of second order its middle. */
+/* The force per unit length along a segment: its ends, and its middle if of second order. */
 static PetscErrorCode AddSegment(HycoFE fe, const HycoPointLoad *load, const PetscInt node[], Into F)
 {
   const HycoElement *el = HycoMeshIsQuadratic(fe->mesh) ? HycoElementGetFacet(HYCO_TRI6) : HycoElementGet(HYCO_LINE2);
@@ -336,7 +337,7 @@ static PetscErrorCode AddForces(HycoFE fe, Into F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The end of an assembly is collective: a rank that found an error takes part in it, or the others would wait. */
+/* The end of an assembly is collective: a rank with an error takes part in it, so that the others do not wait. */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
 {
   PetscErrorCode ierr;

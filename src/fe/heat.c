@@ -1,5 +1,4 @@
-/* Temperatures of the bodies, a given field, and the thermal strains they cause: expansion (T - reference), isotropic.
- */
+/* Given temperature fields of the bodies, and their thermal strains: expansion (T - reference), isotropic. */
 #include <hycokinematics.h>
 
 PetscErrorCode HycoHeatCreate(HycoFE fe)
@@ -15,7 +14,7 @@ PetscErrorCode HycoHeatCreate(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One cell: its points' temperatures and strains. */
+/* One cell: temperatures and strains at its points. */
 static PetscErrorCode SetCell(HycoFE fe, const HycoElement *el, PetscInt cell)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];

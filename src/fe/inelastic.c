@@ -1,16 +1,17 @@
 /*
-  A step of bodies with memory: strains of the displacement at the integration points, the laws there in batches, their
-  stresses as nodal forces, their consistent tangents in fe's place for tangents. A point's reals in a state are
+  A time step of bodies with a history: strains of the displacement at the integration points, evaluation of the laws in
+  batches, their stresses as nodal forces, and their consistent tangents in place of fe's. A point's reals in a state
+  are
 
-      strain (n_sigma), stress (n_sigma), temperature, thermal strain, stored energy, accumulated inelastic strain,
-      the law's state variables
+    strain (n_sigma), stress (n_sigma), temperature, thermal strain, stored energy, accumulated inelastic strain,
+    the law's state variables
 */
 #include <hycoinelastic.h>
 #include <hycokinematics.h>
 #include <hycomaterialimpl.h>
 
-#define BATCH   16 /* cells of one body whose points a law takes together */
-#define VIRGIN  -1 /* temperature of a point that no step has seen */
+#define BATCH   16 /* cells of one body whose points a law evaluates together */
+#define VIRGIN  -1 /* temperature of a point before its first step */
 #define N_PLAIN 4
 
 struct _n_HycoFEState {
@@ -20,7 +21,7 @@ struct _n_HycoFEState {
   char **name; /* of the laws' state variables */
 };
 
-/* Where a point's reals are. */
+/* The position of a point's reals. */
 typedef struct {
   PetscReal *strain, *stress, *temperature, *thermal, *stored, *accumulated, *variable;
 } Point;
@@ -51,7 +52,7 @@ PetscErrorCode HycoFEStateDestroy(HycoFEState *state)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One of each of the laws' names. */
+/* Lists the names of the laws' variables without repetition. */
 static PetscErrorCode ListNames(HycoScene scene, HycoFEState s)
 {
   PetscInt room = 0;
@@ -117,7 +118,7 @@ PetscErrorCode HycoFEStateGetNames(HycoFEState state, PetscInt *n, const char *c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points of some cells of one body: what their law reads and writes, and the kinematics that make forces of it. */
+/* The points of some cells of one body: the law's input and output, and the kinematics for its nodal forces. */
 typedef struct {
   const PetscReal *u;
   PetscReal t0, t1;
@@ -132,7 +133,7 @@ typedef struct {
   PetscReal (*g)[3], (*mean)[3]; /* nv by point, by cell */
 } Batch;
 
-/* All of a batch's arrays in one block. */
+/* Allocates all arrays of a batch at once. */
 static PetscErrorCode BatchCreate(HycoFE fe, Batch *b)
 {
   const PetscInt n = BATCH * HycoElementGet(fe->mesh->type)->nq, ns = fe->n_sigma;
@@ -183,8 +184,8 @@ static PetscErrorCode BatchDestroy(Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Strains at the end of the step, and what the state at its begin has; the law's strains are without the thermal ones.
- */
+/* Computes strains at the end of the step and reads the state at its begin; the law's strains exclude thermal
+   strain. */
 static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
 {
   const PetscInt ns = fe->n_sigma, body = fe->mesh->cell_body[b->cell[0]];
@@ -237,8 +238,8 @@ static void Linear(HycoFE fe, const HycoElement *el, Batch *b)
   }
 }
 
-/* What a law leaves: nothing is stored, all of the work is dissipated; where it stores, the equivalent inelastic strain
-   is what is dissipated over the mean equivalent stress. */
+/* Sets energies that a law does not compute: without a stored energy, all of the work is dissipated; with one, the
+   equivalent inelastic strain is the dissipation over the mean equivalent stress. */
 static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
 {
   const PetscInt ns = fe->n_sigma;
@@ -259,7 +260,7 @@ static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
   }
 }
 
-/* The batch's law; *failed: a point where it has no answer. */
+/* Evaluates the batch's law; *failed: it has no solution at a point. */
 static PetscErrorCode Update(HycoFE fe, const HycoElement *el, Batch *b, PetscBool *failed)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[b->cell[0]]];
@@ -299,7 +300,7 @@ static PetscErrorCode Update(HycoFE fe, const HycoElement *el, Batch *b, PetscBo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A point's energies, with the identity of the report. */
+/* Adds a point's energies, so that the identity of the report holds. */
 static void Count(HycoFE fe, Batch *b, PetscInt i, const Point *from, const Point *to)
 {
   HycoFEStepReport *r = b->report;
@@ -322,7 +323,7 @@ static void Count(HycoFE fe, Batch *b, PetscInt i, const Point *from, const Poin
     r->potential += b->w[i] * b->potential[i];
 }
 
-/* The batch's answers into the state, f_int, the tangents and the report. */
+/* Writes the batch's results to the state, f_int, the tangents and the report. */
 static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear)
 {
   HycoMesh m = fe->mesh;
@@ -409,7 +410,7 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
   ierr = StepAll(fe, bodies, &b);
   PetscCall(BatchDestroy(&b));
   PetscCall(ierr);
-  if (fe->springs && bodies != HYCO_BODIES_LINEAR && !report->failed) { /* once, of all bodies */
+  if (fe->springs && bodies != HYCO_BODIES_LINEAR && !report->failed) { /* once for all bodies */
     const PetscReal energy = HycoSpringsEnergy(fe, u);
 
     HycoSpringsAddForces(fe, -1, u, f_int);

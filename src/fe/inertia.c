@@ -1,5 +1,4 @@
-/* Gravity, and the centrifugal force of bodies that rotate: loads of a solution that stands still in the turning frame.
- */
+/* Gravity, and the centrifugal force of rotating bodies: the solution is static in the rotating frame. */
 #include "inertia.h"
 #include <hycovector.h>
 
@@ -15,7 +14,7 @@ static PetscErrorCode Vector(HycoFE fe, HycoExpr const e[3], PetscReal v[3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The axis: in the plane it is z, in an axisymmetric scene y; in space the scene gives it. */
+/* Sets the axis: z in 2D, y in an axisymmetric scene; in 3D the scene gives it. */
 static PetscErrorCode SetAxis(HycoFE fe, const HycoMotion *m, HycoAcceleration *a)
 {
   PetscReal length;

@@ -58,7 +58,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   det = J[0][0] * inv[0][0] + J[0][1] * inv[1][0] + J[0][2] * inv[2][0];
   HycoCheck(PetscAbsReal(det) > 1e-14 * size, "cell %d is degenerate: its volume vanishes at a quadrature point",
             (int)fe->mesh->cell_id[cell]);
-  /* either sign will do, as files number cells both ways round; but the same in all of the cell */
+  /* files number cells in either orientation: either sign is valid, but it must be the same in all of the cell */
   HycoCheck(!q || el->nv == dim + 1 || (det > 0) == (HycoDeterminant(el, node, fe->X, 0) > 0),
             "cell %d is inverted: its volume element changes sign; check its boundary and the order of its nodes "
             "(gmsh's order)",
@@ -80,7 +80,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of the cells of bodies with bbar, from the gradients that are kept. */
+/* Mean gradients of the cells of bodies with bbar, from the stored gradients. */
 static PetscErrorCode KeepMeans(HycoFE fe, const HycoElement *el)
 {
   PetscReal *mean = fe->kept_mean;
@@ -90,7 +90,7 @@ static PetscErrorCode KeepMeans(HycoFE fe, const HycoElement *el)
   for (PetscInt b = 0; b < fe->scene->n_bodies; b++) any = (PetscBool)(any || fe->bbar[b]);
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   if (!mean) PetscCall(PetscCalloc1((size_t)fe->mesh->n_cells * (size_t)(3 * el->nv), &mean));
-  fe->kept_mean = NULL; /* they are computed */
+  fe->kept_mean = NULL; /* computed below */
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     PetscReal g[HYCO_CELL_NODES][3];
 
@@ -111,7 +111,7 @@ PetscErrorCode HycoFEKeepGradients(HycoFE fe)
   PetscFunctionBegin;
   if (kept && fe->kept_place == fe->place) PetscFunctionReturn(PETSC_SUCCESS);
   if (!kept) PetscCall(PetscMalloc1(n * size + 1, &kept));
-  fe->kept = NULL; /* they are computed */
+  fe->kept = NULL; /* computed below */
   for (size_t k = 0; k < n; k++) {
     PetscReal g[HYCO_CELL_NODES][3];
     PetscErrorCode ierr =
@@ -168,7 +168,8 @@ PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet,
 {
   HycoMesh m = fe->mesh;
   const PetscInt *node = m->facets + facet * m->nf;
-  const PetscReal side = fe->mirrored[m->node_body[node[0]]] ? -1 : 1; /* facets are turned outwards as drawn */
+  const PetscReal side = fe->mirrored[m->node_body[node[0]]] ? -1 : 1; /* facets are oriented outwards in the mesh
+                                                                          file */
   PetscReal t[2][3] = {{0, 0, 0}, {0, 0, 1}};
 
   PetscFunctionBegin;
@@ -237,7 +238,7 @@ void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const Pets
 void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[HYCO_CELL_NODES][3],
                     PetscReal mean[HYCO_CELL_NODES][3], PetscReal w, const PetscReal s[6], PetscReal f[])
 {
-  static const PetscInt at[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}}; /* component of the stress's (c, d) */
+  static const PetscInt at[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}}; /* index of the stress component (c, d) */
   const PetscReal pressure = mean ? (s[0] + s[1] + s[2]) / 3 : 0;
 
   for (PetscInt a = 0; a < el->nv; a++) {

@@ -1,6 +1,6 @@
 /*
-  Internal forces of the linear bodies as a product, K u less what their thermal strains push: a path that comes to one
-  time again and again need not go through their integration points. K in blocks of the nodes that linear cells join.
+  Internal forces of the linear bodies as a matrix product, K u minus the forces of thermal strains: for repeated
+  evaluations at one time, their integration points are not needed. K is stored in blocks of the nodes of linear cells.
 */
 #include <hycoinelastic.h>
 #include <hycokinematics.h>
@@ -8,10 +8,10 @@
 
 struct _n_HycoLinearForce {
   HycoFE fe;                               /* borrowed */
-  PetscInt n_cells, *cell;                 /* those of linear bodies */
-  PetscInt n_rows, *node, *start, *column; /* nodes whose rows are wanted; theirs in `column`, ascending */
-  PetscInt *row;                           /* by node of fe's mesh: its place in `node`; -1: not wanted */
-  PetscReal *K, *heat;                     /* dim x dim a block, row major; dim a row */
+  PetscInt n_cells, *cell;                 /* cells of linear bodies */
+  PetscInt n_rows, *node, *start, *column; /* nodes whose rows are wanted; their neighbours in `column`, ascending */
+  PetscInt *row;                           /* by node of fe's mesh: its index in `node`; -1: not wanted */
+  PetscReal *K, *heat;                     /* dim x dim for each block, row major; dim for each row */
 };
 
 PetscErrorCode HycoLinearForceDestroy(HycoLinearForce *force)
@@ -30,7 +30,7 @@ static PetscBool IsLinear(HycoFE fe, PetscInt cell)
   return fe->scene->body[fe->mesh->cell_body[cell]].law->linear;
 }
 
-/* The nodes of the linear cells around node i, ascending, in list; how many is returned. */
+/* The nodes of the linear cells around node i, ascending, in list; returns their number. */
 static PetscInt Neighbours(HycoFE fe, PetscInt n, const PetscInt around[], PetscInt list[])
 {
   const PetscInt nv = fe->mesh->nv;
@@ -105,7 +105,7 @@ PetscErrorCode HycoLinearForceCreate(HycoFE fe, const PetscBool nodes[], HycoLin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The element matrices into the blocks. */
+/* Adds the element matrices to the blocks. */
 static PetscErrorCode SetStiffness(HycoLinearForce f)
 {
   const PetscInt dim = f->fe->dim, nv = f->fe->mesh->nv, n = nv * dim;
@@ -132,7 +132,7 @@ static PetscErrorCode SetStiffness(HycoLinearForce f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the thermal strains push. */
+/* Adds the forces of thermal strains. */
 static PetscErrorCode SetHeat(HycoLinearForce f)
 {
   HycoFE fe = f->fe;

@@ -1,4 +1,4 @@
-/* The laws along displacements that are known. */
+/* Integrates the laws along known displacements. */
 #include <hycoinelastic.h>
 
 PetscErrorCode HycoMarchBegin(HycoFE fe, HycoMarch *m)

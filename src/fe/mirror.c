@@ -1,6 +1,7 @@
 /*
-  Mirrored bodies: a map whose Jacobian is negative turns a body's cells and facets inside out. Facets are oriented as
-  drawn, so the normals of such a body change sign; volumes are taken as |det J| and need nothing.
+  Mirrored bodies: a map with a negative Jacobian reverses the orientation of a body's cells and facets. Facets are
+  oriented as in the mesh file, so that the normals of such a body change sign; volumes use |det J| and are not
+  affected.
 */
 #include <hycokinematics.h>
 
@@ -26,8 +27,8 @@ PetscErrorCode HycoMirrorCreate(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For a body without cells in this mesh (a model's contact surface outside its RID): det dX/dx by central differences,
-   summed over some of its nodes. */
+/* For a body without cells in this mesh (a model's contact surface outside its RID): det dX/dx by central
+   differences, summed over some of its nodes. */
 static PetscErrorCode MapTurns(HycoFE fe, PetscInt body, PetscBool *turns)
 {
   HycoMesh m = fe->mesh;
@@ -60,7 +61,7 @@ static PetscErrorCode MapTurns(HycoFE fe, PetscInt body, PetscBool *turns)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the cells of bodies with a map say: turn[b] = +-1, or 0 without a cell; fails when they disagree. */
+/* The sign from the cells of bodies with a map: turn[b] = +-1, or 0 without a cell; fails if they differ. */
 static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[])
 {
   HycoMesh m = fe->mesh;
@@ -86,7 +87,7 @@ static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bodies that share nodes are one piece: a facet's nodes may be another's. */
+/* Bodies that share nodes must have the same sign, because a facet may have nodes of both. */
 static PetscErrorCode CheckPieces(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -126,7 +127,7 @@ PetscErrorCode HycoMirrorFind(HycoFE fe)
 PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe)
 {
   const PetscInt n = fe->scene->n_bodies;
-  PetscBool *seen; /* by body: cells that are as drawn, that are mirrored */
+  PetscBool *seen; /* by body: has cells with the original orientation, with the reversed one */
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(2 * n, &seen));

@@ -1,18 +1,18 @@
 /*
-  Supports along any direction: n.u = v at a node. Of the node's displacements the one with the largest entry of n is
+  Supports along any direction: n.u = v at a node. Of the node's displacements, the one with the largest entry of n is
   expressed by the others,
 
-      u_c = o + sum of a_d u_d,    a_d = -n_d / n_c,  o = v / n_c,
+    u_c = o + sum of a_d u_d,    a_d = -n_d / n_c,  o = v / n_c,
 
-  and the unknown in its place is the offset u_c - sum of a_d u_d, which is fixed to o as the unknowns of other supports
-  are to their values. The stiffness, the loads and the contacts' rows are those of the new unknowns, T^T K T, T^T F and
-  B T; displacements are brought back by HycoFEComplete(). Several directions at a node are eliminated one by one.
+  and its unknown is replaced by the offset u_c - sum of a_d u_d, which is fixed to o, as other supports fix their
+  unknowns. The stiffness, the loads and the contacts' rows are those of the new unknowns, T^T K T, T^T F and B T;
+  HycoFEComplete() computes the displacements. Several directions at a node are eliminated one by one.
 */
 #include <hycokinematics.h>
 #include <hycovector.h>
 
-/* Of the length of n, what is left of it by other supports at the node: nothing; too little to tell two planes apart.
- */
+/* Length of n that remains after elimination of other supports at the node, relative to n: zero; too small to
+   distinguish two planes. */
 #define NOTHING  1e-9
 #define PARALLEL 1e-2
 
@@ -21,7 +21,7 @@ void HycoObliqueClear(HycoFE fe)
   fe->n_oblique = 0;
 }
 
-/* Takes from the row n.u = v what other directions at the node say already. */
+/* Eliminates from the row n.u = v the other directions at the node. */
 static void Substitute(HycoFE fe, PetscInt node, PetscReal n[3], PetscReal *v)
 {
   for (PetscInt k = 0; k < fe->n_oblique; k++) {
@@ -36,7 +36,7 @@ static void Substitute(HycoFE fe, PetscInt node, PetscReal n[3], PetscReal *v)
   }
 }
 
-/* Of a row without free displacements: whether it says what is fixed already. */
+/* For a row without free displacements: checks that it agrees with what is already fixed. */
 static PetscErrorCode CheckSame(HycoFE fe, PetscInt node, const PetscReal n[3], PetscReal v, PetscReal size,
                                 const char key[])
 {
@@ -87,7 +87,7 @@ PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const 
   for (PetscInt d = 0; d < fe->dim; d++) o->a[d] = d == c ? 0 : -n[d] / n[c];
   fe->fixed[node * fe->dim + c] = PETSC_TRUE;
   fe->u0[node * fe->dim + c] = v / n[c];
-  for (PetscInt k = 0; k < fe->n_oblique; k++) { /* what others say of u_c */
+  for (PetscInt k = 0; k < fe->n_oblique; k++) { /* substitutes u_c in other rows */
     HycoOblique *other = &fe->oblique[k];
     PetscReal share;
 

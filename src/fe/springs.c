@@ -2,31 +2,31 @@
   Springs to the ground: a traction -k u on the surface of a body (an elastic foundation), or a force -k u at points.
   The matrix of each facet,
 
-      integral of N_a N_b (diag(k_x, k_y, k_z) + k_n n n^T),
+    integral of N_a N_b (diag(k_x, k_y, k_z) + k_n n n^T),
 
-  belongs to the cell that it bounds, that of a point to a cell around it: so the cells' loops bring it into K, the
-  lifting and the RID.
+  belongs to the cell that the facet bounds, that of a point to a cell around it: the cells' loops thus add it to K, to
+  the lifting and to the RID.
 */
 #include <hycokinematics.h>
 
 #define MAX_FACET_DOFS (3 * HYCO_FACET_NODES)
 
 struct _n_HycoSprings {
-  PetscInt n, *start;     /* those of cell e: start[e] .. start[e + 1] - 1; n_cells + 1 */
-  PetscInt *spring;       /* of the scene */
-  PetscInt *facet, *node; /* one of them, the other -1 */
-  PetscInt size;          /* a facet's unknowns, squared */
+  PetscInt n, *start;     /* the springs of cell e are start[e] .. start[e + 1] - 1; n_cells + 1 */
+  PetscInt *spring;       /* index in the scene */
+  PetscInt *facet, *node; /* one of these, the other is -1 */
+  PetscInt size;          /* square of the number of a facet's unknowns */
   PetscReal *K;           /* n x size: row major over the facet's or the point's unknowns */
 };
 
-/* Whether a spring of the scene is at each node of its group, and not on facets. */
+/* Whether a spring of the scene acts at each node of its group, not on facets. */
 static PetscBool AtPoints(HycoMesh m, PetscInt group)
 {
   return (PetscBool)(m->dim == 1 || m->group_dim[group] == 0);
 }
 
-/* Calls for each facet and each point with a spring, in the order of the scene's springs; cell: that it belongs to. A
-   point counts on the process that owns it. */
+/* Visits each facet and each point with a spring, in the order of the scene's springs; cell: the cell to which it
+   belongs. A point is visited on the process that owns it. */
 static PetscErrorCode ForEach(HycoFE fe, const PetscInt around[],
                               PetscErrorCode (*visit)(HycoFE, PetscInt spring, PetscInt cell, PetscInt facet,
                                                       PetscInt node, void *),
@@ -45,7 +45,7 @@ static PetscErrorCode ForEach(HycoFE fe, const PetscInt around[],
       if (HycoMeshOwned(m, i) >= 0 && around[i] >= 0) PetscCall((*visit)(fe, s, around[i], -1, i, ctx));
     }
     for (PetscInt f = 0; f < m->n_facets && !AtPoints(m, g); f++) {
-      /* a model's contact surfaces have facets whose cells are elsewhere */
+      /* a model's contact surfaces have facets whose cells are not in the mesh */
       if (m->facet_group[f] == g && m->facet_cell[f] >= 0 && m->facet_cell[f] < m->n_cells)
         PetscCall((*visit)(fe, s, m->facet_cell[f], f, -1, ctx));
     }
@@ -61,7 +61,7 @@ static PetscErrorCode Count(HycoFE fe, PetscInt spring, PetscInt cell, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* start[cell] is where the next of the cell goes. */
+/* start[cell] is the position of the cell's next spring. */
 static PetscErrorCode Put(HycoFE fe, PetscInt spring, PetscInt cell, PetscInt facet, PetscInt node, void *ctx)
 {
   HycoSprings s = (HycoSprings)ctx;
@@ -90,7 +90,7 @@ PetscErrorCode HycoSpringsCreate(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
   HycoSprings s;
-  PetscInt *around; /* by node: its cell of the smallest tag, or -1 */
+  PetscInt *around; /* by node: its cell with the smallest tag, or -1 */
 
   PetscFunctionBegin;
   if (!fe->scene->n_springs) PetscFunctionReturn(PETSC_SUCCESS);
@@ -115,7 +115,7 @@ PetscErrorCode HycoSpringsCreate(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The four stiffnesses at a place. */
+/* The four stiffnesses at a point. */
 static PetscErrorCode Evaluate(HycoFE fe, const HycoSpring *spring, const PetscReal x[3], PetscReal k[4])
 {
   PetscFunctionBegin;
@@ -133,14 +133,14 @@ static PetscErrorCode Evaluate(HycoFE fe, const HycoSpring *spring, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes of spring k; their number. */
+/* Nodes of spring k; returns their number. */
 static PetscInt Nodes(HycoMesh m, const HycoSprings s, PetscInt k, const PetscInt *node[])
 {
   *node = s->facet[k] < 0 ? &s->node[k] : m->facets + s->facet[k] * m->nf;
   return s->facet[k] < 0 ? 1 : m->nf;
 }
 
-/* In an axisymmetric scene a point is a circle, and its stiffness that of all of it. */
+/* In an axisymmetric scene a point is a circle, with its total stiffness. */
 static PetscErrorCode PointMatrix(HycoFE fe, const HycoSpring *spring, PetscInt node, PetscReal K[])
 {
   PetscReal k[4];
@@ -234,7 +234,7 @@ void HycoSpringsMarkVarying(HycoFE fe, const PetscBool changed[])
   }
 }
 
-/* What spring k does to the unknowns of its nodes at u: -K u; returns its energy, u^T K u / 2. */
+/* Force of spring k on the unknowns of its nodes at u: -K u; returns its energy, u^T K u / 2. */
 static PetscReal Pull(HycoFE fe, PetscInt k, const PetscReal u[], PetscReal force[MAX_FACET_DOFS])
 {
   const HycoSprings s = fe->springs;
@@ -250,7 +250,7 @@ static PetscReal Pull(HycoFE fe, PetscInt k, const PetscReal u[], PetscReal forc
   return energy;
 }
 
-/* Whether spring k counts on this process. */
+/* Whether this process counts spring k. */
 static PetscBool IsOwn(HycoFE fe, PetscInt cell, PetscInt k)
 {
   const PetscInt node = fe->springs->facet[k] < 0 ? fe->springs->node[k] : fe->mesh->cells[cell * fe->mesh->nv];

@@ -1,14 +1,14 @@
 /*
-  K: the element loop over the laws' tangents C, and the matrices it fills: the sum of w B^T C B
-  over a cell's points, or for isotropic tangents products of gradients that need no B. The element bbar takes the
-  dilatation's mean over the cell (T. J. R. Hughes, Int. J. Numer. Meth. Engng 15 (1980) 1413-1418); isotropic:
+  K: the element loop over the laws' tangents C: the sum of w B^T C B over a cell's points, or for isotropic tangents
+  products of gradients that need no B. The element bbar uses the mean dilatation of the cell (T. J. R. Hughes, Int. J.
+  Numer. Meth. Engng 15 (1980) 1413-1418); isotropic:
 
-      sigma : eps = 2 mu (eps : eps - tr(eps)^2 / 3) + (lambda + 2 mu / 3) mean(tr eps)^2
+    sigma : eps = 2 mu (eps : eps - tr(eps)^2 / 3) + (lambda + 2 mu / 3) mean(tr eps)^2
 */
 #include <hycokinematics.h>
 #include "assembly_map.h"
 
-/* P[r][s] += p[r] s[s] over the upper blocks of dim x dim. */
+/* P[r][s] += p[r] s[s] in the upper blocks of dim x dim. */
 static void AddProducts(PetscInt nv, PetscInt dim, const PetscReal p[], const PetscReal s[], PetscReal P[])
 {
   const PetscInt n = nv * dim;
@@ -74,7 +74,7 @@ static PetscErrorCode AddIsotropic(HycoFE fe, const HycoElement *el, PetscInt ce
     }
     bulk += w * (lame[0] - own[0]);
     AddProducts(el->nv, dim, p, s, P);
-    if (q + 1 < el->nq && lame[0] == lame[2] && lame[1] == lame[3]) continue; /* the next point's material is this */
+    if (q + 1 < el->nq && lame[0] == lame[2] && lame[1] == lame[3]) continue; /* the next point has the same material */
     AddMaterial(el->nv, dim, own, P, Ke);
     PetscCall(PetscArrayzero(P, n * n));
   }
@@ -82,7 +82,7 @@ static PetscErrorCode AddIsotropic(HycoFE fe, const HycoElement *el, PetscInt ce
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Strain components of unit displacements at a point, B (n_sigma x n); mean: gradients that make the dilatation. */
+/* Strain components of unit displacements at a point, B (n_sigma x n); mean: gradients for the dilatation. */
 static void StrainRows(HycoFE fe, const HycoElement *el, PetscReal g[HYCO_CELL_NODES][3],
                        PetscReal mean[HYCO_CELL_NODES][3], PetscReal B[])
 {
@@ -166,7 +166,7 @@ static PetscInt Global(HycoMesh m, PetscInt node)
   return m->node_global ? m->node_global[node] : node;
 }
 
-/* Distinct neighbours of each owned node, on this rank's columns and off them. */
+/* Counts the distinct neighbours of each owned node, in this rank's columns and in the others. */
 static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt first, PetscInt on[], PetscInt off[])
 {
   PetscInt *start, *around, *seen, node[HYCO_MAX_CELL_NODES];
@@ -179,7 +179,7 @@ static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt fir
     const PetscInt row = Global(m, i) - first;
 
     if (row < 0 || row >= n_owned) continue;
-    on[row] = 1; /* its own diagonal, even of a node without cells */
+    on[row] = 1; /* the diagonal, also for a node without cells */
     seen[i] = i;
     for (PetscInt k = start[i]; k < start[i + 1]; k++) {
       const PetscInt n = HycoMeshCellNodes(m, around[k], node);
@@ -246,7 +246,7 @@ static PetscErrorCode AddElement(HycoFE fe, PetscInt cell, const PetscReal Ae[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes without cells (contact nodes outside an RID) keep a zero on the diagonal so that the matrix is square. */
+/* Nodes without cells (contact nodes outside an RID) get a zero diagonal entry, so that the matrix is square. */
 static PetscErrorCode Finish(Mat A)
 {
   PetscFunctionBegin;
@@ -271,7 +271,7 @@ static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The end of an assembly is collective: a rank that found an error takes part in it, or the others would wait. */
+/* The end of an assembly is collective: a rank with an error takes part in it, so that the others do not wait. */
 PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
 {
   PetscErrorCode ierr;
@@ -290,7 +290,7 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
   PetscReal Me[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
 
   PetscFunctionBegin;
-  PetscCall(MatSetOption(M, MAT_IGNORE_ZERO_ENTRIES, PETSC_TRUE)); /* components do not couple */
+  PetscCall(MatSetOption(M, MAT_IGNORE_ZERO_ENTRIES, PETSC_TRUE)); /* the components are not coupled */
   PetscCall(MatZeroEntries(M));
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     PetscCall(PetscArrayzero(Me, n * n));

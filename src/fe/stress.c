@@ -2,7 +2,7 @@
 #include <hycokinematics.h>
 #include <hycomaterialimpl.h>
 
-/* The shape functions' mean gradients in a cell, where its dilatation is made of them. */
+/* The mean gradients of the shape functions in a cell, if its dilatation uses them. */
 typedef struct {
   PetscBool used;
   PetscReal g[HYCO_CELL_NODES][3];
@@ -16,7 +16,7 @@ static PetscErrorCode GetMean(HycoFE fe, const HycoElement *el, PetscInt cell, M
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Elastic strain and stress at point q of a cell (components that are not n_sigma's are 0), and its volume. */
+/* Elastic strain and stress at point q of a cell (components beyond n_sigma are 0), and its volume. */
 static PetscErrorCode AtPoint(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, const PetscReal u[],
                               Mean *mean, PetscReal e[6], PetscReal s[6], PetscReal *w)
 {

@@ -1,12 +1,12 @@
 /*
-  Rigid motions that the supports leave to a connected part of the mesh: the kernel of K. Contact may hold them: then
-  K is singular and the problem is not.
+  Rigid motions that the supports leave to a connected part of the mesh: the null space of K. If contact prevents them,
+  K is singular, but the contact problem is not.
 */
 #include <hycofe.h>
 #include <petscblaslapack.h>
 #include <string.h>
 
-/* The node that stands for all that i is connected to; part leads to it. */
+/* The representative node of the part connected to i; part leads to it. */
 static PetscInt Root(PetscInt part[], PetscInt i)
 {
   while (part[i] != i) {
@@ -16,8 +16,8 @@ static PetscInt Root(PetscInt part[], PetscInt i)
   return i;
 }
 
-/* Where each process knows a piece of a part by its smallest node in the whole mesh: all learn the smallest of the
-   part. piece: of each node; label: of each piece. */
+/* Each process identifies a piece of a part by its smallest node in the whole mesh: finds the smallest of the part.
+   piece: of each node; label: of each piece. */
 static PetscErrorCode JoinPieces(MPI_Comm comm, HycoMesh m, const PetscInt piece[], PetscInt label[])
 {
   PetscInt *node, *own;
@@ -68,7 +68,7 @@ static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], Pets
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = Root(part, i);
   PetscCall(PetscMalloc2(m->n_nodes, &label, m->n_nodes, &number));
-  for (PetscInt i = 0; i < m->n_nodes; i++) { /* roots come first */
+  for (PetscInt i = 0; i < m->n_nodes; i++) { /* representatives come first */
     if (part[i] == i) label[n] = m->node_global ? m->node_whole[i] : i;
     part[i] = part[i] == i ? n++ : part[part[i]];
   }
@@ -82,8 +82,8 @@ static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A sum to twice the precision: rounded, it is the same in any order, and so is the basis of a kernel that syev chooses
-   by round-off. */
+/* A sum in twice the working precision: after rounding it is the same in any order, and so is the basis of a null
+   space that syev chooses by round-off. */
 typedef struct {
   PetscReal high, low;
 } Sum;
@@ -108,7 +108,7 @@ static void AddSums(void *in, void *inout, PetscMPIInt *n, MPI_Datatype *type)
   }
 }
 
-/* The sums over all processes, in `high`, the same bits on each. Collective. */
+/* The sums over all processes, in `high`, identical on each. Collective. */
 static PetscErrorCode Total(MPI_Comm comm, PetscInt n, Sum sum[])
 {
   MPI_Datatype type;
@@ -129,8 +129,8 @@ static PetscErrorCode Total(MPI_Comm comm, PetscInt n, Sum sum[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the rigid motions of one part do at its fixed unknowns: the Gram matrix of those rows, about a centre and in a
- * length. */
+/* The rigid motions of one part at its fixed unknowns: the Gram matrix of those rows, relative to a centre and a
+   length. */
 typedef struct {
   PetscInt body;
   PetscReal centre[3], size, gram[6][6];
@@ -153,8 +153,8 @@ static PetscInt RigidRow(PetscInt dim, const PetscReal x[3], PetscInt c, PetscRe
   return n;
 }
 
-/* "body pellet from moving along (0, 0, 1)", or from turning about an axis through a point: of a motion whose axis is
-   twenty sizes away one sees the translation. `others`: what moves with it. */
+/* "body pellet from moving along (0, 0, 1)", or from turning about an axis through a point; a motion whose axis is
+   twenty lengths away is named as a translation. `others`: bodies that move with it. */
 static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[HYCO_LINE])
 {
   const PetscReal *w = fe->dim == 3 ? r->rigid + 3 : NULL;
@@ -181,7 +181,7 @@ static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[H
     if (PetscAbsReal(d[c]) < 1e-8) d[c] = 0; /* round-off */
   }
   first = d[0] != 0 ? d[0] : d[1] != 0 ? d[1] : d[2];
-  for (PetscInt c = 0; c < 3 && first < 0; c++) d[c] = d[c] == 0 ? 0 : -d[c]; /* an axis has no sign */
+  for (PetscInt c = 0; c < 3 && first < 0; c++) d[c] = d[c] == 0 ? 0 : -d[c]; /* the sign of an axis is arbitrary */
   if (move > 400 * turn)
     HycoFormat(name, "body %s%s from moving along (%.2g, %.2g, %.2g)", fe->scene->body[r->body].name, others,
                (double)d[0], (double)d[1], (double)d[2]);
@@ -191,7 +191,7 @@ static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[H
                (double)at[1], (double)at[2]);
 }
 
-/* The combination's motion of the part that motion k belongs to; its share of the whole. */
+/* The combination's motion of the part to which motion k belongs; its share of the whole. */
 static PetscReal OfPart(const HycoMotions *motions, const PetscReal coefficient[], PetscInt k, HycoRigid *r)
 {
   PetscReal share = 0;
@@ -242,7 +242,7 @@ static PetscErrorCode Product(MPI_Comm comm, HycoFE fe, const PetscReal a[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds a motion: its values on the part's nodes, made orthonormal to the part's motions from `first`. */
+/* Adds a motion: its values on the part's nodes, orthonormalised against the part's motions from `first`. */
 static PetscErrorCode AddMotion(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt which, const Part *p,
                                 const PetscReal v[], PetscInt first, HycoMotions *motions)
 {
@@ -301,14 +301,14 @@ static PetscErrorCode PartMotions(MPI_Comm comm, HycoFE fe, const PetscInt part[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Body (of its last node), centre and size of each part. */
+/* Sets body (of its last node), centre and size of each part. */
 static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt n_parts, Part parts[])
 {
   HycoMesh m = fe->mesh;
   const PetscInt n_bodies = fe->scene->n_bodies;
   PetscInt64 *last;
   PetscReal *size;
-  Sum *sum; /* of each part: nodes, coordinates */
+  Sum *sum; /* by part: number of nodes, sums of coordinates */
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc3(n_parts, &last, n_parts, &size, 4 * n_parts, &sum));
@@ -336,7 +336,7 @@ static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Springs hold a part like supports, however stiff they are. */
+/* Springs hold a part as supports do, however small their stiffness is. */
 typedef struct {
   const PetscInt *part;
   const Part *parts;
@@ -369,7 +369,7 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gram matrix of each part. */
+/* Sums the Gram matrix of each part. */
 static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt n_parts, Part parts[])
 {
   SpringGram ctx;
@@ -400,7 +400,8 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part
   PetscCall(HycoSpringsVisit(fe, AddSpring, &ctx));
   PetscCall(Total(comm, 36 * n_parts, sum));
   for (PetscInt k = 0; k < 36 * n_parts; k++) parts[k / 36].gram[k % 36 / 6][k % 6] = sum[k].high;
-  for (PetscInt p = 0; p < n_parts && fe->formulation == HYCO_AXISYMMETRIC; p++) /* only along the axis is it rigid */
+  for (PetscInt p = 0; p < n_parts && fe->formulation == HYCO_AXISYMMETRIC; p++) /* a motion along the axis is the
+                                                                                    only rigid one */
     parts[p].gram[0][0] += 1, parts[p].gram[2][2] += 1;
   PetscCall(PetscFree(sum));
   PetscFunctionReturn(PETSC_SUCCESS);

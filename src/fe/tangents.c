@@ -2,7 +2,7 @@
 #include <hycokinematics.h>
 #include <hycomaterialimpl.h>
 
-#define BATCH 64 /* cells of one body whose points a law takes together */
+#define BATCH 64 /* cells of one body whose points a law evaluates together */
 
 PetscErrorCode HycoTangentsCreate(HycoFE fe)
 {
@@ -23,7 +23,7 @@ PetscErrorCode HycoTangentsCreate(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Room for a batch. */
+/* Work arrays of a batch. */
 typedef struct {
   PetscInt n, cell[BATCH];
   PetscReal *x, *temperature, *constant, *tangent;

@@ -1,8 +1,8 @@
 /*
-  Ties: the displacement of a tied node is that of a point of the master's surface, u_s = sum of w_m u_m. The unknown in
-  its place is what it differs by, fixed to 0, as of a support along a direction (oblique.c): stiffness, loads and norm
-  are T^T K T, T^T F; displacements are brought back by HycoFEComplete(). The node is put onto that point, so that a
-  rigid motion of the masters is one of the slaves.
+  Ties: the displacement of a tied node is that of a point of the master's surface, u_s = sum of w_m u_m. Its unknown is
+  replaced by the difference from this sum, which is fixed to 0, as for a support along a direction (oblique.c):
+  stiffness, loads and norm are T^T K T, T^T F; HycoFEComplete() computes the displacements. The node is moved to that
+  point, so that a rigid motion of the masters is also one of the slaves.
 */
 #include <hycokinematics.h>
 #include <hycovector.h>
@@ -30,7 +30,7 @@ PetscErrorCode HycoTiedPlace(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the masters of tied node k hold its component c where a support of its own does. */
+/* Whether supports fix component c of the masters of tied node k, so that its own support is redundant. */
 static PetscBool MastersHold(HycoFE fe, PetscInt k, PetscInt c)
 {
   HycoMesh m = fe->mesh;
@@ -90,7 +90,7 @@ PetscErrorCode HycoTiedCheckOblique(HycoFE fe, const HycoFixed *fixed, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A matrix of n rows as one of `to` > n, its new rows and columns 0. */
+/* Extends a matrix of n rows to `to` > n rows; the new rows and columns are 0. */
 static void Grow(PetscInt n, PetscInt to, PetscReal Ke[])
 {
   for (PetscInt r = to - 1; r >= 0; r--) {

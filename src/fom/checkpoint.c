@@ -1,7 +1,7 @@
 /*
-  A path's last accepted step, on file: displacements and forces of the nodes by their tags, the state of the cells by
-  theirs, the contact forces in the contacts' order, so that another number of ranks may go on. Written whole or not at
-  all, after each accepted step; the steps' fields for a series stand in files of their own beside it.
+  A checkpoint file with a path's last accepted step: displacements and forces of the nodes by their tags, the state of
+  the cells by their tags, the contact forces in the contacts' order, so that another number of ranks can resume.
+  Written completely or not at all, after each accepted step; the fields of a series are in separate files beside it.
 */
 #include <hycofields.h>
 #include <hycopath.h>
@@ -83,7 +83,7 @@ static void RealsToStep(HycoFOM f, const PetscReal v[], HycoStep *s)
   RealsToMembers(N_LATER, later, v + N_MEMBERS + n, s);
 }
 
-/* What the file has by item: U, F_old, f_old of a node; the state of a cell, as long as the longest. */
+/* Columns of the file: U, F_old, f_old for a node; the state of a cell, as long as the longest one. */
 #define NODE_COLS(f) (3 * (f)->part->dim)
 static PetscErrorCode StateCols(HycoFOM f, PetscInt *cols)
 {
@@ -98,7 +98,7 @@ static PetscErrorCode StateCols(HycoFOM f, PetscInt *cols)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The scene and the point that a checkpoint is of. */
+/* Identifies the scene and the point of a checkpoint. */
 static PetscErrorCode Identify(HycoFOM f, char text[HYCO_LINE])
 {
   HycoScene scene = f->scene;
@@ -107,7 +107,7 @@ static PetscErrorCode Identify(HycoFOM f, char text[HYCO_LINE])
   PetscFunctionBegin;
   PetscCall(HycoSceneFingerprint(scene, &hash));
   hash = HycoHash(hash, f->path->mu, (size_t)scene->n_parameters * sizeof(PetscReal));
-  for (PetscInt k = 0; k < scene->n_entries; k++) { /* the steps hold the outputs */
+  for (PetscInt k = 0; k < scene->n_entries; k++) { /* the stored steps contain the outputs */
     if (strncasecmp(scene->key[k], "output_", 7)) continue;
     hash = HycoHash(hash, scene->key[k], strlen(scene->key[k]) + 1);
     hash = HycoHash(hash, scene->value[k], strlen(scene->value[k]) + 1);
@@ -116,7 +116,7 @@ static PetscErrorCode Identify(HycoFOM f, char text[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes' values (n_nodes of the part x NODE_COLS) from or into the vectors; own nodes alone. */
+/* Copies nodes' values (n_nodes of the part x NODE_COLS) from or to the vectors; owned nodes only. */
 static PetscErrorCode MoveNodes(HycoFOM f, PetscBool out, PetscReal value[])
 {
   const PetscInt dim = f->part->dim, cols = NODE_COLS(f);
@@ -162,7 +162,7 @@ static PetscErrorCode MoveState(HycoFOM f, PetscBool out, PetscInt cols, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The reals that say where the path is. */
+/* Number of reals that describe the position on the path. */
 #define N_HEAD (4 + (PetscInt)(sizeof(HycoWork) / sizeof(PetscReal)) + (PetscInt)(sizeof(HycoKKT) / sizeof(PetscReal)))
 static void MoveHead(HycoPath p, PetscBool out, PetscReal head[])
 {
@@ -186,7 +186,7 @@ static void MoveHead(HycoPath p, PetscBool out, PetscReal head[])
   }
 }
 
-/* What a checkpoint has beside its nodes and cells: on rank 0; on the others after Spread(), without the forces. */
+/* The data of a checkpoint except nodes and cells: on rank 0; after Spread() on all, without the forces. */
 typedef struct {
   PetscReal *lambda, *head, *steps, *orders;
   PetscInt cell_cols, n_steps, n_orders;
@@ -206,7 +206,7 @@ static PetscErrorCode WriteContent(HycoFOM f, HycoH5 h, const Content *c, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes and cells, each rank its rows. */
+/* Writes nodes and cells, each rank its rows. */
 static PetscErrorCode WriteItems(HycoFOM f, HycoH5 h)
 {
   HycoMesh m = f->part;
@@ -236,7 +236,7 @@ static PetscErrorCode WriteAll(HycoFOM f, HycoH5 h, const Content *c, const char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lambda in the contacts' order: on rank 0, or from there. */
+/* Copies Lambda in the contacts' order to or from rank 0. */
 static PetscErrorCode MoveForces(HycoFOM f, PetscBool out, PetscReal lambda[])
 {
   const ScatterMode mode = out ? SCATTER_FORWARD : SCATTER_REVERSE;
@@ -268,7 +268,7 @@ static PetscErrorCode FreeContent(Content *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is at its place is a checkpoint, or nothing that took hours. */
+/* Refuses to overwrite a file that is not a checkpoint. */
 static PetscErrorCode CheckPlace(const char path[])
 {
   PetscBool precious;
@@ -381,7 +381,7 @@ static PetscErrorCode ReadContent(HycoFOM f, const char key[], Content *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n reals of rank 0, on every rank. */
+/* Sends n reals of rank 0 to every rank. */
 static PetscErrorCode Spread(HycoFOM f, PetscInt n, PetscReal **array)
 {
   PetscMPIInt count;
@@ -422,7 +422,7 @@ static PetscErrorCode ReadRows(HycoFOM f, const char name[], PetscInt first, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Values of all nodes or cells of the part: each rank reads its rows. */
+/* Reads values of all nodes or cells of the part, each rank its rows. */
 static PetscErrorCode ReadItems(HycoFOM f, const char name[], HycoPlace place, PetscInt cols, PetscReal value[])
 {
   const HycoFileOrder *order;
@@ -486,7 +486,7 @@ PetscErrorCode HycoPathLoad(HycoFOM f)
   PetscCall(SpreadContent(f, &c));
   PetscCall(TakeContent(f, &c));
   PetscCall(FreeContent(&c));
-  PetscCall(HycoPathAssemble(p, p->t)); /* what is asked for without another step */
+  PetscCall(HycoPathAssemble(p, p->t)); /* quantities available without another step */
   PetscCall(HycoFOMGather(f));
   PetscCall(HycoSeriesRestore(f));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,16 +1,17 @@
 /*
-  The energies of a full-order solution, and the identity that ties them. With the whole stiffness (no unknown taken
-  out), loads F, support reactions R and the gap D as drawn, K U = F + R - B^T L and L_i (D - B U)_i = 0 give
+  The energies of a full-order solution, and their identity. With the whole stiffness (no unknown eliminated), loads F,
+  support reactions R and the gap D as drawn, K U = F + R - B^T L and L_i (D - B U)_i = 0 give
 
-      2 W = F.U + R.u0 - L.D
+    2 W = F.U + R.u0 - L.D
 
-  With thermal strains, F holds what they push, and their own share is added to the work: HycoFEHeatWork().
+  With thermal strains, F includes their nodal forces, and their own work is added: HycoFEHeatWork().
 
-  W comes from the stresses, the work from F and the element matrices, so that neither can hide an error of the other.
+  W is computed from the stresses, the work from F and the element matrices, so that an error in one of them is visible.
 */
 #include <hycofomimpl.h>
 
-/* F.U over this rank's free unknowns; F holds the lifting -K u0 of the prescribed displacements, given back below. */
+/* F.U over this rank's free unknowns; F includes the lifting -K u0 of the prescribed displacements, which is added
+   back below. */
 static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
 {
   const PetscInt dim = f->part->dim;
@@ -32,7 +33,7 @@ static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* u0.K (2 u - u0) of one cell: u0.K (u - u0), which the lifting took from F.U, and the elastic part u0.K u of R.u0. */
+/* u0.K (2 u - u0) of one cell: u0.K (u - u0), removed from F.U by the lifting, and the elastic part u0.K u of R.u0. */
 static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[], PetscReal *work)
 {
   HycoMesh m = fe->mesh;
@@ -58,7 +59,7 @@ static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums strain energy, lifting and what heat does over this rank's cells: a cell counts on the rank that owns its first
+/* Sums strain energy, lifting and thermal work over this rank's cells: a cell counts on the rank that owns its first
    node. */
 static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
 {
@@ -88,7 +89,7 @@ static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0: L.D with the gap as drawn, and what contacts push on fixed unknowns, L.(B u0) over those. */
+/* On rank 0: L.D with the gap as drawn, and the work of contacts on fixed unknowns, L.(B u0) over those. */
 static PetscErrorCode ContactSums(HycoFOM f, PetscReal *gap_work, PetscReal *fixed_work)
 {
   PetscReal *normal, *gap;
@@ -105,7 +106,7 @@ static PetscErrorCode ContactSums(HycoFOM f, PetscReal *gap_work, PetscReal *fix
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sum of K_ii U_i^2: what an energy much smaller than this is a difference of. */
+/* Sum of K_ii U_i^2, to detect an energy that is a small difference. */
 static PetscErrorCode NodalEnergy(HycoFOM f, PetscReal *sum)
 {
   Vec work;
@@ -134,7 +135,7 @@ PetscErrorCode HycoFOMEnergy(HycoFOM f, HycoSummary *s)
   s->gap_work = all[2];
   largest = PetscMax(PetscMax(2 * s->strain_energy, PetscAbsReal(s->external_work)), PetscAbsReal(s->gap_work));
   PetscCall(NodalEnergy(f, &nodal));
-  largest = PetscMax(largest, 1e-6 * nodal); /* a body that only moves stores nothing but round-off */
+  largest = PetscMax(largest, 1e-6 * nodal); /* the energy of a body that only moves rigidly is round-off */
   s->energy_defect = PetscAbsReal(2 * s->strain_energy - s->external_work + s->gap_work);
   if (largest > 0) s->energy_defect /= largest;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,4 +1,4 @@
-/* HycoFOM: reads and spreads the mesh, assembles (16), solves it, brings the solution home in the file's order. */
+/* HycoFOM: reads and distributes the mesh, assembles (16), solves it, and gathers the solution in the file's order. */
 #include <hycofields.h>
 #include <hycopath.h>
 
@@ -69,7 +69,7 @@ PetscErrorCode HycoMarkContactGroups(HycoScene scene, HycoMesh mesh, PetscBool g
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts' surfaces on rank 0 (of a line all of the mesh: its facets need their cells). */
+/* Gathers the contacts' surfaces on rank 0 (in 1D all of the mesh: its facets need their cells). */
 static PetscErrorCode GatherSurface(HycoFOM f, HycoMesh part)
 {
   PetscBool *in;
@@ -82,8 +82,8 @@ static PetscErrorCode GatherSurface(HycoFOM f, HycoMesh part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts, and the pairs of nodes that they tie, as indices in the whole mesh; a rigid body's node is tied to
-   none: all of its contact's surface would go to one rank. Rank 0. */
+/* Finds the contacts, and the pairs of their nodes for the partitioner, as indices in the whole mesh; the node of a
+   rigid body is in no pair, otherwise all of its contact's surface would be on one rank. Rank 0. */
 static PetscErrorCode FindTies(HycoFOM f, PetscInt *n, PetscInt **ties)
 {
   HycoPairs *p = &f->pairs;
@@ -107,7 +107,7 @@ static PetscErrorCode FindTies(HycoFOM f, PetscInt *n, PetscInt **ties)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cuts the DM for the ranks, along no contact where those can be found before; *found: they were. */
+/* Partitions the DM so that no contact is cut, if the contacts can be found before; *found: they were. */
 static PetscErrorCode Distribute(HycoFOM f, PetscBool *found)
 {
   const HycoPartitioner cut = (HycoPartitioner)f->partition;
@@ -125,7 +125,7 @@ static PetscErrorCode Distribute(HycoFOM f, PetscBool *found)
   PetscCall(HycoPlexToMesh(f->dm, f->scene, &mesh));
   PetscCheck(mesh->n_whole_cells >= f->size, HycoComm(f), PETSC_ERR_USER,
              "the mesh has %d cells; use at most as many ranks", (int)mesh->n_whole_cells);
-  if (!f->scene->refine) { /* else the contacts are yet to come */
+  if (!f->scene->refine) { /* otherwise the contacts are found later */
     HycoOnEach(HycoComm(f), HycoMeshCheckCells(mesh));
     PetscCall(GatherSurface(f, mesh));
     HycoOnRoot(HycoComm(f), FindTies(f, &n_ties, &ties));
@@ -138,7 +138,7 @@ static PetscErrorCode Distribute(HycoFOM f, PetscBool *found)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The mesh, its parts and its contacts. */
+/* Reads the mesh, and makes its parts and its contacts. */
 static PetscErrorCode ReadMesh(HycoFOM f)
 {
   PetscInt sizes[3] = {0, 0, 0};
@@ -176,7 +176,7 @@ static PetscErrorCode ReadMesh(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Scatters of U to each rank's part and to the surfaces on rank 0; of Lambda to rank 0. */
+/* Creates the scatters of U to each rank's part and to the surfaces on rank 0, and of Lambda to rank 0. */
 static PetscErrorCode CreateScatters(HycoFOM f)
 {
   const PetscInt dim = f->part->dim, m_root = f->rank == 0 ? f->n_contacts : 0;
@@ -212,7 +212,7 @@ static PetscInt GlobalNode(HycoFOM f, PetscInt node)
   return f->surface->node_global ? f->surface->node_global[node] : node;
 }
 
-/* Composes B with its rows' slaves, which the contacts keep. Collective. */
+/* Composes B with the slaves of its rows, which do not change. Collective. */
 static PetscErrorCode TellSlaves(HycoFOM f)
 {
   Vec slaves;
@@ -228,7 +228,7 @@ static PetscErrorCode TellSlaves(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B and Bt with the pattern that any parameter gives: all components of a contact's nodes. */
+/* Creates B and Bt with the pattern for any parameters: all components of a contact's nodes. */
 static PetscErrorCode CreateB(HycoFOM f)
 {
   const PetscInt dim = f->part->dim, entries = f->width * dim;
@@ -244,7 +244,7 @@ static PetscErrorCode CreateB(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The options of paths; without a scene they are declared. */
+/* Reads the options of paths; without a scene they are only declared. */
 static PetscErrorCode ReadPath(HycoFOM f, HycoOptionItems PetscOptionsObject)
 {
   PetscFunctionBegin;
@@ -355,7 +355,7 @@ PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   (*fom)->scene = scene;
   PetscCall(PetscObjectSetOptions((PetscObject)*fom, scene->options));
   PetscCall(SetFromOptions(*fom));
-  (*fom)->mesh_write[0] = '\0'; /* that is for who solves */
+  (*fom)->mesh_write[0] = '\0'; /* only for solves */
   ierr = ReadMesh(*fom);
   if (ierr) PetscCall(HycoFOMDestroy(fom));
   PetscCall(ierr);
@@ -370,7 +370,7 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B (if what it depends on changed) and D, from rank 0. */
+/* Sets B (if the parameters that it depends on have changed) and D, from rank 0. */
 static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
 {
   PetscErrorCode ierr;
@@ -395,11 +395,11 @@ static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
 static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 {
   PetscFunctionBegin;
-  if (!f->n_contacts) { /* perhaps obstacles whose nodes are all fixed */
+  if (!f->n_contacts) { /* there may be obstacles whose nodes are all fixed */
     HycoOnRoot(HycoComm(f), HycoContactCountStill(f->fe_surface, &f->pairs, NULL, &f->summary.n_still));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (rows_changed && f->Bt && f->searches) { /* entries of masters that are left behind must not stay */
+  if (rows_changed && f->Bt && f->searches) { /* removes entries of former masters */
     PetscCall(MatDestroy(&f->B));
     PetscCall(CreateB(f));
   } else if (rows_changed && f->Bt)
@@ -410,7 +410,7 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
   if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatAssemblyBegin(f->B, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(f->B, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatDestroy(&f->Bt)); /* a normal that turns may have brought B an entry */
+  PetscCall(MatDestroy(&f->Bt)); /* a rotated normal may have added an entry to B */
   PetscCall(MatTranspose(f->B, MAT_INITIAL_MATRIX, &f->Bt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -429,7 +429,7 @@ static PetscErrorCode CountFree(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The loads at the pinned unknowns belong to the balance too. */
+/* Adds the loads at the pinned unknowns, which belong to the balance. */
 static PetscErrorCode AssembleForce(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -457,7 +457,7 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
   PetscFunctionBegin;
   f->solved = f->given = f->sigma_ready = f->all_ready = PETSC_FALSE;
   PetscCall(HycoFOMSetParameters(f, mu));
-  f->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
+  f->fe->ready = PETSC_FALSE; /* until everything that depends on it is assembled */
   if (f->fe->stiffness_changed || f->fe->contact_changed) PetscCall(HycoFOMRelease(f));
   if (!f->n_free) PetscCall(CountFree(f));
   if (f->fe->stiffness_changed) {
@@ -477,8 +477,8 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The ranks ask for one point: with several, K would be of no scene, and a rank alone in its error would leave the
-   others waiting. */
+/* Checks that all ranks pass the same point: otherwise K would be inconsistent, and a rank with an error would leave
+   the others waiting. */
 static PetscErrorCode CheckPoint(HycoFOM f, PetscInt n, const PetscReal mu[])
 {
   PetscReal bounds[2 * HYCO_MAX_PARAMETERS];
@@ -533,7 +533,8 @@ PetscErrorCode HycoFOMGetSystem(HycoFOM f, HycoSystem *system)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of the rank that has most: its own unknowns, those of others that its rows need, the ranks that these belong to. */
+/* Of the rank with the largest part: its own unknowns, those of other ranks in its rows, and the number of these
+   ranks. */
 static PetscErrorCode LargestPart(HycoFOM f, PetscInt largest[3])
 {
   const PetscInt dim = f->part->dim, *start;

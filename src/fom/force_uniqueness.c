@@ -1,7 +1,7 @@
 /*
-  Whether the contact forces are unique: they are when the rows of B of the closed contacts are independent. Slaves
-  whose own unknowns are all fixed (a rigid tool) may outnumber what their masters' unknowns can tell apart: then forces
-  can be shifted among them and nothing else changes.
+  Whether the contact forces are unique: they are if the rows of B of the closed contacts are independent. Slaves whose
+  own unknowns are all fixed (a rigid tool) may be more than their masters' unknowns can distinguish: then forces can be
+  redistributed among them without any other change.
 */
 #include <hycofomimpl.h>
 #include <hycolcp.h>
@@ -11,7 +11,7 @@ typedef struct {
   PetscReal *value, *gap;
 } Rows;
 
-/* Contacts whose gap is closed, and that have an unknown. */
+/* Marks contacts whose gap is closed, and that have an unknown. */
 static void MarkClosed(HycoFOM f, const Rows *r, PetscBool in[])
 {
   PetscReal scale = 0;
@@ -30,7 +30,7 @@ static void MarkClosed(HycoFOM f, const Rows *r, PetscBool in[])
   }
 }
 
-/* Takes out rows with an unknown that no other row has, again and again: they depend on none. */
+/* Removes repeatedly the rows with an unknown that occurs in no other row: they are independent. */
 static PetscErrorCode Peel(const Rows *r, PetscInt n_dof, PetscBool in[])
 {
   PetscInt *count;
@@ -59,7 +59,7 @@ static PetscErrorCode Peel(const Rows *r, PetscInt n_dof, PetscBool in[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n less the rank of the rows that are left. */
+/* n minus the rank of the remaining rows. */
 static PetscErrorCode Dependent(const Rows *r, PetscInt n_dof, PetscInt n, const PetscBool in[], PetscInt *dependent)
 {
   PetscReal *G, *full;

@@ -1,7 +1,7 @@
 /*
-  The path of a scene with a history: from its first time, where bodies answer at once, through the listed times, in
-  steps that are halved where they fail or flow too much and grow where they were easy. What is not accepted leaves no
-  trace: state, displacements and forces are those of the last accepted time.
+  The path of a scene with a history: from its first time, with an instantaneous response, through the listed times, in
+  steps that are halved after a failure or a large inelastic increment and grow after easy steps. A rejected step
+  changes nothing: state, displacements and forces are those of the last accepted time.
 */
 #include <hycopath.h>
 #include <hycomaterialimpl.h>
@@ -117,15 +117,15 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscCall(VecSet(p->U, 0));
   if (p->n_contacts) PetscCall(VecSet(p->Lambda, 0));
-  if (p->tangent) p->fe->ready = PETSC_FALSE; /* K is to be assembled again */
+  if (p->tangent) p->fe->ready = PETSC_FALSE; /* K must be assembled again */
   p->tangent = PETSC_FALSE;
   PetscCall(HycoFEStateDestroy(&p->begin));
   PetscCall(HycoFEStateDestroy(&p->end));
   HycoSceneSetTime(p->scene, mu, p->t, all);
-  HycoOnEach(p->comm, HycoFESetParameters(p->fe, all)); /* the state is made at the first temperature */
+  HycoOnEach(p->comm, HycoFESetParameters(p->fe, all)); /* the initial state depends on the first temperature */
   HycoOnEach(p->comm, HycoFEStateCreate(p->fe, &p->begin));
   HycoOnEach(p->comm, HycoFEStateCreate(p->fe, &p->end));
-  p->fe->ready = PETSC_FALSE; /* nothing of it is assembled yet */
+  p->fe->ready = PETSC_FALSE; /* nothing is assembled for it yet */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -152,7 +152,7 @@ static PetscErrorCode NoteTime(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The attempt becomes the state of the path at t1. */
+/* Makes the attempt the state of the path at t1. */
 static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
 {
   HycoFEState state = p->begin;
@@ -186,7 +186,7 @@ static void Count(HycoPath p, const HycoStepAttempt *a)
   p->n_cuts++;
 }
 
-/* One attempt at a step to `stop`, or as far as p->dt goes; p->t moves on if it is accepted. */
+/* One attempt at a step to `stop`, or by p->dt; advances p->t if it is accepted. */
 static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
 {
   const PetscReal rest = stop - p->t, n = PetscCeilReal(rest / p->dt - 1e-9), h = n > 1 ? rest / n : rest;
@@ -215,7 +215,7 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next of the times that are given, if any are. */
+/* The next of the prescribed times, if any. */
 static PetscReal NextGiven(HycoPath p)
 {
   for (PetscInt k = 0; p->given && k < p->n_given; k++) {
@@ -224,7 +224,7 @@ static PetscReal NextGiven(HycoPath p)
   return PETSC_MAX_REAL;
 }
 
-/* From the listed time before to the next; false: the step has become too small, or too many were cut. */
+/* From the previous listed time to the next; false: the step has become too small, or too many were halved. */
 static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
 {
   const HycoScene s = p->scene;
@@ -243,7 +243,7 @@ static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At the first time bodies answer at once: there is no step to cut. */
+/* At the first time the response is instantaneous: there is no step to halve. */
 static PetscErrorCode Start(HycoPath p, PetscBool *reached)
 {
   HycoStepAttempt a;
@@ -259,7 +259,7 @@ static PetscErrorCode Start(HycoPath p, PetscBool *reached)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A time that is told of: a listed one, or the one beyond which the path does not get. */
+/* Records a listed time, or the time beyond which the path cannot continue. */
 static PetscErrorCode Record(HycoPath p)
 {
   PetscFunctionBegin;
@@ -269,7 +269,7 @@ static PetscErrorCode Record(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the next listed time; false: no further. */
+/* To the next listed time; false: it cannot be reached. */
 static PetscErrorCode Advance(HycoPath p, PetscBool *reached)
 {
   HycoScene s = p->scene;
@@ -295,7 +295,7 @@ PetscErrorCode HycoPathRun(HycoPath p)
   PetscFunctionBegin;
   while (p->step < p->scene->n_times && reached) PetscCall(Advance(p, &reached));
   p->ended = reached;
-  if (!reached) PetscCall(HycoPathAssemble(p, p->t)); /* from the time that was not reached */
+  if (!reached) PetscCall(HycoPathAssemble(p, p->t)); /* returns from the time that was not reached */
   if (!reached && p->now.substeps) PetscCall(Record(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

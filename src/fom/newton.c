@@ -1,33 +1,34 @@
 /*
-  One step of time by Newton's method around the contact solver. With r = F - f_int(U) each iteration is one contact
-  system,
+  A time step by Newton's method around the contact solver. With r = F - f_int(U) each iteration is one contact system,
 
-      K U' + B^T L' = F - f_int(U) + K U,     0 <= L' complementary to D - B U' >= 0,
+    K U' + B^T L' = F - f_int(U) + K U,     0 <= L' complementary to D - B U' >= 0,
 
   K = d f_int / d U (tangent), or the elastic stiffness (elastic), whose factor and flexibility the solver keeps; that
   fixed-point iteration is accelerated by Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547-560; H. F. Walker, P.
-  Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735), which begins anew where contacts open or close. Where the laws are
-  gradients of a potential, tangent steps are shortened until it falls (Armijo). In between (modified) a tangent is kept
-  with its factor, over steps too, as long as the accelerated iterations contract well. What ends the iterations is the
-  recomputed residual F - f_int - B^T L relative to the largest of these three; F alone may be nothing.
+  Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735), which is restarted when contacts open or close. If the laws have a
+  potential, tangent steps are shortened until it decreases (Armijo). In the third variant (modified) a tangent is kept
+  with its factor, also from step to step, as long as the accelerated iterations contract well. The iterations end by
+  the recomputed residual F - f_int - B^T L relative to the largest of these three; F alone may be zero.
 */
 #include <hycopath.h>
 
 #define ARMIJO    1e-4
-#define SHORTENED 8    /* times that a step is halved at most */
-#define WORTH     8    /* iterations to come for which a new tangent is made (modified) */
-#define FORCING   1e-3 /* share of the residual that a solve without a factor leaves */
+#define SHORTENED 8    /* largest number of halvings of a step */
+#define WORTH     8    /* expected number of further iterations above which a new tangent is made (modified) */
+#define FORCING   1e-3 /* residual of a solve without a factor, as a share of that of the iterate */
 
-/* What an iteration knows of the one before. */
+/* Data of the previous iteration. */
 typedef struct {
-  PetscReal size, floor;             /* of forces: the largest of the three; what rounding U makes of them */
+  PetscReal size, floor;             /* of forces: the largest of the three; the effect of rounding U */
   PetscReal residual[3];             /* norms, newest last */
-  PetscReal potential, slope, share; /* at the base of the step, along it, of it that was taken */
-  PetscBool feasible, search;        /* the base is at the step's supports and gaps; and there is a potential */
+  PetscReal potential, slope, share; /* the potential at the base of the step, its slope along the step, and the
+                                        share of the step taken */
+  PetscBool feasible, search;        /* feasible: the base satisfies the step's supports and gaps; search: and there
+                                        is a potential */
 } Progress;
 
-/* The law at U: state `end`, f_int, r = F - f_int - B^T L, with `tangent` the consistent tangents; the sizes of what r
-   is made of. */
+/* Evaluates the law at U: state `end`, f_int, r = F - f_int - B^T L, with `tangent` the consistent tangents; and the
+   magnitudes of the terms of r. */
 static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoStepAttempt *a,
                                Progress *now)
 {
@@ -55,8 +56,8 @@ static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K (u0 - u) of the supports that have moved, taken from the loads of the free unknowns; K_ii (u0 - u)_i at the others.
- */
+/* K (u0 - u) of supports that have moved, subtracted from the loads of the free unknowns; K_ii (u0 - u)_i at the
+   others. */
 PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscBool *moved)
 {
   HycoFE fe = p->fe;
@@ -65,7 +66,8 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(p->u0, fe->u0, fe->n_dof));
   for (PetscInt k = 0; k < fe->n_dof; k++) {
-    fe->u0[k] = HycoFESupports(fe, k) ? fe->u0[k] - u[k] : 0; /* what a tied node differs by stays 0 */
+    fe->u0[k] = HycoFESupports(fe, k) ? fe->u0[k] - u[k] : 0; /* the difference of a tied node from its masters stays
+                                                                 0 */
     count += fe->u0[k] != 0;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPIU_INT, MPI_SUM, p->comm));
@@ -81,7 +83,7 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* rhs = K U + F - f_int: what the contact system has on its right side. */
+/* rhs = K U + F - f_int: the right-hand side of the contact system. */
 static PetscErrorCode RightSide(HycoPath p)
 {
 
@@ -101,8 +103,9 @@ static PetscErrorCode AssembleK(HycoPath p, PetscBool tangent)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual that a solve without a factor is to leave: a share of what there is, which with a tangent falls with it,
-   so that its order of convergence stays (S. Eisenstat, H. Walker, SIAM J. Sci. Comput. 17 (1996) 16-32). */
+/* The residual to which a contact system is solved without a factor: a share of that of the iterate. With a tangent the
+   share decreases with the residual, which preserves the order of convergence (S. Eisenstat, H. Walker, SIAM J. Sci.
+   Comput. 17 (1996) 16-32). */
 static PetscReal Target(HycoPath p, const Progress *now)
 {
   const PetscReal r = now->residual[2], least = PetscMax(0.1 * p->rtol * now->size, now->floor);
@@ -111,7 +114,7 @@ static PetscReal Target(HycoPath p, const Progress *now)
   return PetscMax(least, share * r);
 }
 
-/* The contact system at U: its solution in G and L_new. */
+/* Solves the contact system at U: the solution is in G and L_new. */
 static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *now, HycoStepAttempt *a)
 {
   HycoReason reason;
@@ -146,7 +149,7 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A step of Newton's method: to the system's solution; Evaluate() and Shorten() see how far. */
+/* A step of Newton's method: to the system's solution; Evaluate() and Shorten() determine the step length. */
 static PetscErrorCode Advance(HycoPath p, PetscBool feasible, const HycoStepAttempt *a, Progress *now)
 {
   PetscReal work;
@@ -157,7 +160,7 @@ static PetscErrorCode Advance(HycoPath p, PetscBool feasible, const HycoStepAtte
   now->feasible = feasible;
   now->search = (PetscBool)(feasible && a->law.has_potential);
   now->share = 1;
-  if (now->search) { /* r + B^T L = F - f_int on the free unknowns; along the others U stays */
+  if (now->search) { /* r + B^T L = F - f_int on the free unknowns; on the others U does not change */
     PetscCall(VecWAXPY(p->work, -1, p->U, p->G));
     PetscCall(VecDot(p->r, p->work, &now->slope));
     if (p->n_contacts) {
@@ -174,7 +177,7 @@ static PetscErrorCode Advance(HycoPath p, PetscBool feasible, const HycoStepAtte
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the incremental potential has fallen enough; a law that has no answer says no. */
+/* Whether the incremental potential has decreased enough; no if a law has no solution. */
 static PetscErrorCode IsLower(HycoPath p, const HycoStepAttempt *a, const Progress *now, PetscBool *lower)
 {
   PetscReal work, potential;
@@ -191,7 +194,7 @@ static PetscErrorCode IsLower(HycoPath p, const HycoStepAttempt *a, const Progre
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Halves the last step until the potential falls, and evaluates there. */
+/* Halves the last step until the potential decreases, and evaluates there. */
 static PetscErrorCode Shorten(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
 {
   PetscBool lower;
@@ -202,7 +205,7 @@ static PetscErrorCode Shorten(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
     now->share /= 2;
     PetscCall(VecAXPBY(p->U, 0.5, 0.5, p->U_last));
     if (p->n_contacts) PetscCall(VecAXPBY(p->Lambda, 0.5, 0.5, p->L_last));
-    now->residual[2] = now->residual[1]; /* that of the place before */
+    now->residual[2] = now->residual[1]; /* the previous one */
     now->residual[1] = now->residual[0];
     PetscCall(Evaluate(p, t0, t1, PETSC_TRUE, a, now));
     PetscCall(IsLower(p, a, now, &lower));
@@ -210,7 +213,7 @@ static PetscErrorCode Shorten(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a contact is closed in one of the two solutions alone. */
+/* Whether a contact is closed in exactly one of the two solutions. */
 static PetscErrorCode SetChanged(HycoPath p, Vec a, Vec b, PetscBool *changed)
 {
   const PetscScalar *x, *y;
@@ -231,7 +234,7 @@ static PetscErrorCode SetChanged(HycoPath p, Vec a, Vec b, PetscBool *changed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last differences move by one place, and the newest is `vector` - `last`. */
+/* Shifts the last differences by one place, and stores the newest, `vector` - `last`. */
 static PetscErrorCode Push(PetscInt n, Vec store[], Vec vector, Vec last)
 {
   Vec oldest = store[0];
@@ -245,7 +248,7 @@ static PetscErrorCode Push(PetscInt n, Vec store[], Vec vector, Vec last)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gamma of min |g - sum of gamma_j dG_j|, by normal equations with a trace of ridge; n <= HYCO_ANDERSON. */
+/* gamma of min |g - sum of gamma_j dG_j|, by normal equations with a small ridge; n <= HYCO_ANDERSON. */
 static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[])
 {
   PetscReal A[HYCO_ANDERSON][HYCO_ANDERSON], trace = 0;
@@ -257,7 +260,7 @@ static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[
   }
   PetscCall(VecMDot(g, n, dG, gamma));
   for (PetscInt i = 0; i < n; i++) A[i][i] += 1e-13 * trace + PETSC_SQRT_MACHINE_EPSILON * PETSC_SMALL * PETSC_SMALL;
-  for (PetscInt i = 0; i < n; i++) { /* definite: no pivots */
+  for (PetscInt i = 0; i < n; i++) { /* positive definite: no pivoting */
     for (PetscInt r = i + 1; r < n; r++) {
       const PetscReal share = A[r][i] / A[i][i];
 
@@ -272,8 +275,8 @@ static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next iterate with a K that is kept: the system's solution, mixed with those before it on the same contacts. The
-   first of a step, k = 0, is not at the step's supports and is left out; with k = 1 the mixing begins. */
+/* The next iterate with a K that is kept: the system's solution, mixed with previous ones on the same contacts. The
+   first of a step, k = 0, does not satisfy the step's supports and is left out; the mixing begins with k = 1. */
 static PetscErrorCode Mix(HycoPath p, PetscInt k)
 {
   PetscReal gamma[HYCO_ANDERSON];
@@ -305,7 +308,7 @@ static PetscErrorCode Mix(HycoPath p, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The four residuals of the nonlinear problem: with K U + F - f_int as the right side, K falls out of the first. */
+/* The four residuals of the nonlinear problem: with the right-hand side K U + F - f_int, K cancels in the first. */
 static PetscErrorCode Judge(HycoPath p, const Progress *now, HycoStepAttempt *a, PetscReal *worst)
 {
   HycoKKT *kkt = &p->kkt;
@@ -322,7 +325,7 @@ static PetscErrorCode Judge(HycoPath p, const Progress *now, HycoStepAttempt *a,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* log(r2 / r1) / log(r1 / r0), where none of the three is round-off yet. */
+/* log(r2 / r1) / log(r1 / r0), unless one of the three is round-off. */
 static void Observe(const Progress *now, PetscInt k, HycoStepAttempt *a)
 {
   const PetscReal *r = now->residual, least = 1e-13 * now->size + now->floor;
@@ -331,7 +334,7 @@ static void Observe(const Progress *now, PetscInt k, HycoStepAttempt *a)
   a->order = PetscLogReal(r[2] / r[1]) / PetscLogReal(r[1] / r[0]);
 }
 
-/* Whether a new tangent is worth its price: with the one that is kept, too many iterations would follow. */
+/* Whether a new tangent is cheaper than the iterations that the present one would need. */
 static PetscBool Stalls(HycoPath p, const Progress *now)
 {
   const PetscReal *r = now->residual, target = PetscMax(p->rtol * now->size, now->floor), rate = r[2] / r[1];
@@ -339,7 +342,7 @@ static PetscBool Stalls(HycoPath p, const Progress *now)
   return (PetscBool)(p->kept > 0 && !(rate < 1 && PetscLogReal(target / r[2]) > WORTH * PetscLogReal(rate)));
 }
 
-/* K at U, where `now` is. */
+/* Updates K at U. */
 static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
 {
   const Progress here = *now;
@@ -351,7 +354,7 @@ static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAtte
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Iterations of a step before it is cut, by HycoNewton; with half of them a step was easy. */
+/* Iterations of a step before it is halved, by HycoNewton; a step with at most half of them was easy. */
 static const PetscInt usual_its[] = {0, 15, 60, 30};
 
 static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton method, HycoStepAttempt *a)
@@ -421,8 +424,8 @@ PetscReal HycoPathFactorCost(HycoPath p)
   return (p->fe->dim == 3 ? 0.15 : 0.03) * PetscSqrtReal((PetscReal)p->n_free);
 }
 
-/* By counts alone, so that a choice repeats on any machine: the elastic variant takes up to five times as many
-   iterations. */
+/* From operation counts only, so that the choice is the same on any machine: the elastic variant needs up to five
+   times as many iterations. */
 HycoNewton HycoPathMethod(HycoPath p)
 {
   if (!p->flows) return HYCO_NEWTON_ELASTIC;

@@ -1,6 +1,6 @@
 /*
-  The full order's path: the HycoPath on its distributed vectors, with the energies of its steps, the series of fields
-  and the checkpoint.
+  The full-order path: a HycoPath on distributed vectors, with the energies of its steps, the series of fields and the
+  checkpoint.
 */
 #include <hycopath.h>
 
@@ -21,7 +21,7 @@ PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The law over all ranks. */
+/* Reduces the laws' report over all ranks. */
 static PetscErrorCode ReduceReport(HycoFOM f, HycoFEStepReport *r)
 {
   PetscReal sum[6] = {r->work, r->stored, r->dissipated, r->thermal, r->moduli, r->potential};
@@ -47,7 +47,7 @@ static PetscErrorCode ReduceReport(HycoFOM f, HycoFEStepReport *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's rows of f_local; and r = F - f_int there, 0 where fixed. */
+/* Sets this rank's rows of f_int from f_local; and r = F - f_int there, 0 where fixed. */
 static PetscErrorCode TakeForces(HycoFOM f)
 {
   HycoPath p = f->path;
@@ -74,7 +74,7 @@ static PetscErrorCode TakeForces(HycoFOM f)
   PetscCall(VecRestoreArray(p->r, &r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-/* f->fe at mu, K, B, D; the loads without what moved supports do. */
+/* Updates f->fe to mu, K, B, D; the loads without the effect of moved supports. */
 static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
 {
   HycoFOM f = (HycoFOM)p->ctx;
@@ -138,7 +138,7 @@ static PetscErrorCode Moves(HycoPath p, Vec rhs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The mean of two vectors times what U has changed by, over the free or the fixed unknowns. */
+/* The mean of two vectors times the change of U, over the free or the fixed unknowns. */
 static PetscErrorCode MeanWork(HycoFOM f, Vec before, Vec after, PetscBool on_fixed, PetscReal *work)
 {
   const PetscInt dim = f->part->dim;
@@ -167,7 +167,7 @@ static PetscErrorCode MeanWork(HycoFOM f, Vec before, Vec after, PetscBool on_fi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (L0 + L1) / 2 . B (U1 - U0): what the bodies do against the contact forces. */
+/* (L0 + L1) / 2 . B (U1 - U0): work of the bodies against the contact forces. */
 static PetscErrorCode ContactWork(HycoFOM f, PetscReal *sum)
 {
   HycoPath p = f->path;
@@ -186,9 +186,9 @@ static PetscErrorCode ContactWork(HycoFOM f, PetscReal *sum)
 /*
   The energies of the accepted step. With all forces at their mean over the step the balance
 
-      work of loads and supports = stored + dissipated + of heat and of moduli that change + work against contact
+    work of loads and supports = stored + dissipated + of heat and of moduli that change + work against contact
 
-  is an identity: its defect measures equilibrium, by energies that the laws compute and works that the loads do.
+  is an identity: its defect measures the equilibrium, since the laws give the energies and the loads give the work.
 */
 static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal *step_defect)
 {
@@ -231,7 +231,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest over the cells of all ranks. */
+/* The largest values over the cells of all ranks. */
 static PetscErrorCode Largest(HycoFOM f, HycoStep *s)
 {
   PetscReal *mises, *inelastic, most[2] = {0, 0};
@@ -275,7 +275,7 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A listed time. */
+/* Records a listed time. */
 static PetscErrorCode Record(HycoPath p)
 {
   HycoFOM f = (HycoFOM)p->ctx;

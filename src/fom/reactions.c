@@ -1,15 +1,15 @@
 /*
-  What holds the bodies of the last solution: the forces of supports on the unknowns that they fix,
+  Reactions of the last solution: the forces of supports on the unknowns that they fix,
 
-      R = f_int - F + B^T L  there,
+    R = f_int - F + B^T L  there,
 
-  with f_int = K u, of a path that of its last step; the pull of springs; the resultants of loads and of obstacles. All
-  of them together balance, in each direction that is no radius.
+  with f_int = K u, for a path that of its last step; the forces of springs; the resultants of loads and of obstacles.
+  Together they balance in each direction, except the radial one of an axisymmetric scene.
 */
 #include <hycofields.h>
 #include <hycopath.h>
 
-/* -B^T L at all unknowns of the part, fixed ones too, by the contacts of rank 0. Collective. */
+/* -B^T L at all unknowns of the part, fixed ones too, from the contacts of rank 0. Collective. */
 static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
 {
   const PetscInt dim = f->fe->dim;
@@ -38,7 +38,7 @@ static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Room for n_dof reals at contact. Collective. */
+/* contact: room for n_dof reals. Collective. */
 static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
 {
   const PetscScalar *u;
@@ -75,7 +75,7 @@ PetscErrorCode HycoFOMReactions(HycoFOM f, PetscReal r[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A nodal force in a resultant; an axisymmetric scene has none along the radius, and no moment. */
+/* Adds a nodal force to a resultant; an axisymmetric scene has no radial component, and no moment. */
 static void AddTo(HycoFE fe, PetscInt dof, PetscReal value, HycoReaction *to)
 {
   const PetscInt c = dof % fe->dim, d = (c + 1) % 3, e = (c + 2) % 3;
@@ -90,7 +90,7 @@ static void AddTo(HycoFE fe, PetscInt dof, PetscReal value, HycoReaction *to)
   to->moment[e] -= x[d] * value;
 }
 
-/* The support of each unknown: the first that the scene lists; -1: none. */
+/* The support of each unknown: the first in the scene's order; -1: none. */
 static PetscErrorCode FindSupports(HycoFOM f, PetscInt support[])
 {
   HycoMesh m = f->part;
@@ -110,7 +110,7 @@ static PetscErrorCode FindSupports(HycoFOM f, PetscInt support[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What Sums() adds up: the results, supports first, then springs, the loads, the obstacles; the sum of all sizes. */
+/* Results of Sums(): supports first, then springs, the loads, the obstacles; and the sum of all magnitudes. */
 typedef struct {
   HycoReaction *result;
   const PetscReal *u;
@@ -134,8 +134,8 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* rho of min |force - sum of rho_k n_k| over the components that no plain support fixes, by Gauss: n vectors, n <= 3.
- */
+/* rho of min |force - sum of rho_k n_k| over the components that no plain support fixes, by Gaussian elimination: n
+   vectors, n <= 3. */
 static void Resolve(PetscInt n, const HycoOblique *const o[], const PetscBool plain[3], const PetscReal force[3],
                     PetscReal rho[3])
 {
@@ -147,7 +147,7 @@ static void Resolve(PetscInt n, const HycoOblique *const o[], const PetscBool pl
       for (PetscInt d = 0; d < 3; d++) A[a][b] += plain[d] ? 0 : o[a]->n[d] * (b < n ? o[b]->n[d] : force[d]);
     }
   }
-  for (PetscInt a = 0; a < n; a++) { /* definite: no pivots */
+  for (PetscInt a = 0; a < n; a++) { /* positive definite: no pivoting */
     for (PetscInt r = a + 1; r < n; r++) {
       for (PetscInt b = n; b >= a; b--) A[r][b] -= A[r][a] / A[a][a] * A[a][b];
     }
@@ -158,7 +158,7 @@ static void Resolve(PetscInt n, const HycoOblique *const o[], const PetscBool pl
   }
 }
 
-/* The supports' force on a node, by support: r is of the unknowns, support[] of these. */
+/* The force of each support on a node: r is that of the unknowns, support[] the support of each. */
 static void AddSupports(HycoFE fe, PetscInt node, const PetscReal r[], const PetscInt support[], HycoReaction result[])
 {
   const HycoOblique *o[3];
@@ -188,7 +188,7 @@ static void AddSupports(HycoFE fe, PetscInt node, const PetscReal r[], const Pet
   }
 }
 
-/* Of this process's own nodes; work: 3 x n_dof reals. Collective. */
+/* Sums over the nodes that this process owns; work: 3 x n_dof reals. Collective. */
 static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums *s)
 {
   const PetscInt n = f->fe->n_dof, dim = f->fe->dim;
@@ -212,7 +212,7 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of them over the ranks, and how far they are from balance. Collective. */
+/* Sums over the ranks, and the imbalance of the sum. Collective. */
 static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance)
 {
   PetscReal *sum, most = 0;

@@ -1,13 +1,13 @@
 /*
-  Displacements under contact forces that are given: K U = F - B^T Lambda, (16) without its inequalities, which is what
-  a model of the forces alone leaves to be solved; and K^-1 B^T of many forces at once. The factor is of K alone,
-  without the contacts, and is kept while K is.
+  Displacements under given contact forces: K U = F - B^T Lambda, (16) without its inequalities, for models that predict
+  only forces; and K^-1 B^T for many forces at once. The factor is that of K, without contacts, and is kept while K is
+  unchanged.
 */
 #include <hycofomimpl.h>
 
-#define BLOCK 32 /* right-hand sides that are solved at once */
+#define BLOCK 32 /* right-hand sides solved at once */
 
-/* A solver of its own, for the contacts of the other are unknowns there. */
+/* Creates a solver without contacts; in the other one they are unknowns. */
 static PetscErrorCode SetUp(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -16,13 +16,13 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscCall(HycoSolverCreate(HycoComm(f), &f->given_solver));
   PetscCall(PetscObjectSetOptions((PetscObject)f->given_solver, f->scene->options));
   PetscCall(HycoSolverSetFromOptions(f->given_solver));
-  PetscCall(HycoSolverSetType(f->given_solver, HYCO_SOLVER_ACTIVE_SET)); /* none of its contacts */
+  PetscCall(HycoSolverSetType(f->given_solver, HYCO_SOLVER_ACTIVE_SET)); /* without its contacts */
   PetscCall(HycoSolverSetForm(f->given_solver, HYCO_FORM_AUTO));
   PetscCall(VecDuplicate(f->F, &f->given_F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lambda, from rank 0 in the file's order. */
+/* Sets Lambda from rank 0, in the file's order. */
 static PetscErrorCode PutForces(HycoFOM f, const PetscReal Lambda[])
 {
   PetscScalar *root;
@@ -75,7 +75,7 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A block of n patterns, from P to their columns of X (stride q). */
+/* Solves a block of n patterns, from P to their columns of X (stride q). */
 static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], PetscInt q, PetscReal X[])
 {
   PetscReal *local;
@@ -108,7 +108,7 @@ PetscErrorCode HycoFOMResponses(HycoFOM f, const PetscReal mu[], PetscInt q, con
   PetscCall(SetUp(f));
   PetscCall(HycoFOMAssemble(f, mu));
   PetscCall(VecCopy(f->F, f->given_F));
-  PetscCall(SolveGiven(f)); /* for its factor */
+  PetscCall(SolveGiven(f)); /* creates its factor */
   for (PetscInt j = 0; j < q; j += BLOCK)
     PetscCall(RespondBlock(f, PetscMin(BLOCK, q - j), P + (f->rank ? 0 : j * f->n_contacts), q, X + j));
   PetscFunctionReturn(PETSC_SUCCESS);

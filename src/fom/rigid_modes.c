@@ -1,17 +1,17 @@
 /*
-  Rigid motions and K: those that the supports leave free are its kernel, so that the solver can hold them by contact;
-  all of them are what an algebraic multigrid must know (its near-kernel).
+  Rigid motions and K: the motions that the supports leave free are its null space, so that the solver can prevent them
+  by contact; all rigid motions are the near-null space for an algebraic multigrid.
 
-  Those that contact does not hold either are refused, or released (-hyco_regularise): as many unknowns as they are get
-  pinned like supports, the contacts' normals are turned so that they stay tangential, and of the loads what is left on
-  them, checked to be little, is taken away: then the pins carry nothing, and the solution is that of the free body but
-  for these motions, which are taken out of it.
+  Motions that contact does not prevent either are refused, or released (-hyco_regularise): as many unknowns are pinned
+  like supports, the contacts' normals are turned so that these motions stay tangential, and the loads' remaining work
+  on them, which must be small, is removed. Then the pins carry no force, and the solution is that of the free body up
+  to these motions, which are removed from it.
 */
 #include <hycofomimpl.h>
 #include <limits.h>
 #include <string.h>
 
-/* The motions as distributed vectors. */
+/* Creates distributed vectors of the motions. */
 static PetscErrorCode CreateVectors(HycoFOM f, const HycoMotions *motions, Vec **v)
 {
   const PetscInt dim = f->fe->dim;
@@ -58,7 +58,8 @@ static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscRea
   }
 }
 
-/* Adds a combination to the released motions, made orthonormal to those there; what brings nothing new is left out. */
+/* Adds a combination to the released motions, orthonormalised against the existing ones; a dependent one is left
+   out. */
 static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], const PetscReal z[])
 {
   PetscReal norm, before;
@@ -69,7 +70,7 @@ static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], con
   PetscCall(VecSet(u, 0));
   PetscCall(VecMAXPY(u, n, z, (Vec *)motion));
   PetscCall(VecNorm(u, NORM_2, &before));
-  for (PetscInt k = 0; k < 2 * f->n_released; k++) { /* twice: round-off */
+  for (PetscInt k = 0; k < 2 * f->n_released; k++) { /* twice, against round-off */
     PetscScalar dot;
 
     PetscCall(VecDot(u, f->released[k % f->n_released], &dot));
@@ -85,7 +86,7 @@ static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Combinations of the motions that contact does not hold either: all of them, and those that are tangential in one
+/* Combinations of motions that contact does not prevent: all of them, and those that are tangential in the same
    sense. */
 typedef struct {
   PetscInt n, n_alike;
@@ -127,8 +128,8 @@ static PetscErrorCode BroadcastUnheld(HycoFOM f, const HycoMotions *free, Unheld
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Motions that nothing holds are released, first what is tangential in one sense: the normals can be turned for that
-   alone. */
+/* Releases unconstrained motions, first those that are tangential in the same sense: the normals can be turned only
+   for these. */
 static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
 {
   Unheld z = {0, 0, NULL, NULL};
@@ -197,8 +198,8 @@ static PetscReal RowSize(PetscInt n, const PetscReal row[])
   return size;
 }
 
-/* The longest of all ranks' rows, of equal ones that of the node of the smallest tag: its tag and component, and the
-   row. tag: of this rank's nodes. */
+/* The longest of all ranks' rows, among equal ones that of the node with the smallest tag: its tag and component,
+   and the row. tag: of this rank's nodes. */
 static PetscErrorCode LongestRow(HycoFOM f, const PetscInt tag[], const PetscReal row[], PetscInt *pin,
                                  PetscInt *component, PetscReal longest[])
 {
@@ -225,7 +226,7 @@ static PetscErrorCode LongestRow(HycoFOM f, const PetscInt tag[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* As many unknowns as are released, pivots of the motions' rows, apart from the contacts: by tag and component. */
+/* As many unknowns as released motions, pivots of the motions' rows, not at contacts: by tag and component. */
 static PetscErrorCode ChoosePins(HycoFOM f)
 {
   const PetscInt n = f->n_released, n_own = f->part->n_owned * f->fe->dim;
@@ -253,7 +254,7 @@ static PetscErrorCode ChoosePins(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The pins, on the part and on the surfaces; what the normals there are turned for. */
+/* Sets the pins, on the part and on the surfaces, and the motions for which the normals there are turned. */
 static PetscErrorCode SetPins(HycoFOM f, PetscInt n)
 {
   HycoFE fe = f->fe_surface;
@@ -298,7 +299,7 @@ PetscErrorCode HycoFOMRelease(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What forces do on a motion, and the same with no sign: how much of it is not balanced. */
+/* The work of forces on a motion, and the sum of its terms' magnitudes, which shows how much is not balanced. */
 static PetscErrorCode Work(Vec force, Vec motion, PetscReal *on, PetscReal *all)
 {
   Vec absolute;
@@ -312,8 +313,8 @@ static PetscErrorCode Work(Vec force, Vec motion, PetscReal *on, PetscReal *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The share of the forces' work on a released motion that is not balanced must be little: it would accelerate the body.
- */
+/* The share of the forces' work on a released motion that is not balanced must be small: otherwise it would
+   accelerate the body. */
 static PetscErrorCode CheckBalance(HycoFOM f, const char forces[], PetscReal share)
 {
   PetscFunctionBegin;
@@ -337,7 +338,7 @@ PetscErrorCode HycoFOMBalance(HycoFOM f)
     worst = PetscMax(worst, all > 0 ? PetscAbsReal(on) / all : 0);
   }
   PetscCall(CheckBalance(f, "loads", worst));
-  for (PetscInt k = 0; k < f->fe->n_pins; k++) { /* a support's row */
+  for (PetscInt k = 0; k < f->fe->n_pins; k++) { /* row of a support */
     const PetscInt own = HycoMeshOwned(f->part, f->fe->pin[k] / dim);
 
     if (own >= 0) PetscCall(VecSetValue(f->F, (f->part->first + own) * dim + f->fe->pin[k] % dim, 0, INSERT_VALUES));
@@ -403,7 +404,7 @@ static PetscErrorCode SetKernel(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Modified Gram-Schmidt, twice; what depends on those before goes. */
+/* Modified Gram-Schmidt, twice; dependent vectors are removed. */
 static PetscErrorCode Orthonormalize(PetscInt *n, Vec v[])
 {
   PetscInt kept = 0;
@@ -432,7 +433,7 @@ static PetscErrorCode Orthonormalize(PetscInt *n, Vec v[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Translations and rotations of the moved nodes, zero where fixed. */
+/* Sets translations and rotations of the moved nodes, zero where fixed. */
 static PetscErrorCode SetNearKernel(HycoFOM f)
 {
   const PetscInt dim = f->fe->dim;
@@ -453,7 +454,7 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
   PetscCall(VecAssemblyBegin(x));
   PetscCall(VecAssemblyEnd(x));
   PetscCall(MatNullSpaceCreateRigidBody(x, &rigid));
-  PetscCall(MatNullSpaceGetVecs(rigid, NULL, &n, &v)); /* lent for reading */
+  PetscCall(MatNullSpaceGetVecs(rigid, NULL, &n, &v)); /* borrowed */
   PetscCall(PetscMalloc1(n, &moves));
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(VecDuplicate(v[k], &moves[k]));

@@ -1,4 +1,4 @@
-/* The fields of a path at its listed times: each as it comes into one file, and into one of its own beside a
+/* The fields of a path at its listed times: each is added to one file, and written to a separate file beside a
    checkpoint. */
 #include <hycofile.h>
 #include <hycofields.h>
@@ -11,10 +11,10 @@
 struct _n_HycoSeries {
   HycoSeriesSource from; /* of the last time */
   HycoFieldFile file;
-  HycoH5 part; /* this time's alone, beside the checkpoint; NULL: none */
+  HycoH5 part; /* file of this time beside the checkpoint; NULL: none */
 };
 
-/* Writes a field of this time; missing: at nodes off its surface. */
+/* Writes a field of this time; missing: value at nodes off its surface. */
 static PetscErrorCode AddPartial(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
                                  const PetscReal value[], PetscReal missing)
 {
@@ -50,7 +50,7 @@ static PetscErrorCode AddDisplacement(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stress, its von Mises value, inelastic strain, temperature, and the laws' own variables. */
+/* Adds stress, von Mises stress, inelastic strain, temperature, and the laws' own variables. */
 static PetscErrorCode AddState(HycoSeries s)
 {
   const HycoSeriesSource *f = &s->from;
@@ -82,7 +82,7 @@ static PetscErrorCode AddState(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contact force, pressure and gap by node. */
+/* Adds contact force, pressure and gap by node. */
 static PetscErrorCode AddContacts(HycoSeries s)
 {
   const HycoSeriesSource *f = &s->from;
@@ -126,7 +126,7 @@ PetscErrorCode HycoFOMSetSeries(HycoFOM f, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the full order has at its last time. */
+/* The data of full order at its last time. */
 static PetscErrorCode Look(HycoFOM f, HycoSeriesSource *from)
 {
   HycoPath p = f->path;
@@ -168,13 +168,13 @@ PetscErrorCode HycoSeriesBegin(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One time's fields in a file of their own, beside the checkpoint. */
+/* The name of one time's separate file, beside the checkpoint. */
 static void NamePart(HycoFOM f, PetscInt k, char path[PETSC_MAX_PATH_LEN])
 {
   snprintf(path, PETSC_MAX_PATH_LEN, "%.*s.step-%04d.h5", PETSC_MAX_PATH_LEN - 32, f->path->checkpoint, (int)k);
 }
 
-/* What fields there are. */
+/* Writes the list of fields. */
 static PetscErrorCode WriteList(HycoSeries s)
 {
   char list[HYCO_LINE] = "";
@@ -185,7 +185,7 @@ static PetscErrorCode WriteList(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's rows of one field of an earlier time, from its file. */
+/* Reads this rank's rows of one field of an earlier time from its file. */
 static PetscErrorCode ReadField(HycoFOM f, HycoH5 h, const HycoFileOrder *order, const char set[],
                                 const HycoField *field, PetscReal **rows)
 {
@@ -223,7 +223,7 @@ static PetscErrorCode CopyField(HycoFOM f, HycoSeries s, HycoH5 h, const char na
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The fields that a file lists, into the series. */
+/* Copies the fields that a file lists into the series. */
 static PetscErrorCode CopyFields(HycoFOM f, HycoSeries s, HycoH5 h, PetscInt k)
 {
   char *list = NULL, *word, *rest;

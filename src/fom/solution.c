@@ -1,4 +1,4 @@
-/* The last solution of a full-order model: where its values are, what they amount to, who gets them. */
+/* The last solution of a full-order model: its values, their summary, and access to them. */
 #include <hycofields.h>
 #include <hycoquantities.h>
 #include <hycopath.h>
@@ -87,7 +87,7 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
 static PetscErrorCode MeasureDisplacements(HycoFOM f, HycoSummary *s)
 {
   const PetscInt dim = f->fe->dim;
-  PetscReal ends[6], sum = 0; /* the largest, the smallest negated */
+  PetscReal ends[6], sum = 0; /* the largest, and the negated smallest */
 
   PetscFunctionBegin;
   for (PetscInt c = 0; c < 6; c++) ends[c] = PETSC_MIN_REAL;
@@ -200,7 +200,7 @@ PetscErrorCode HycoFOMStress(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The whole solution on rank 0. */
+/* Gathers the whole solution on rank 0. */
 static PetscErrorCode BringTogether(HycoFOM f)
 {
   HycoFileOrder *all;
@@ -292,7 +292,7 @@ PetscErrorCode HycoFOMToRows(HycoFOM f, HycoPlace place, MPI_Datatype type, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last solution, as it is written. Collective. */
+/* The last solution in the form for output. Collective. */
 static PetscErrorCode Look(HycoFOM f, HycoSolution *solution)
 {
   PetscFunctionBegin;

@@ -1,9 +1,10 @@
-/* Matrices of thin bodies (ropes, strips): little fill in an order by breadth first, so that a plain factor is best. */
+/* Matrices of thin bodies (ropes, strips): reverse Cuthill-McKee order leaves little fill, so that a plain factor is
+   fastest. */
 #include <hycolinear.h>
 
-/* More entries in a row than a strip of quadrilaterals has: not worth ordering. */
+/* More entries in a row than a strip of quadrilaterals has: no order is computed. */
 #define HYCO_THIN_ROW 20
-/* Mean length of the rows of an envelope up to which PETSc's own factor beats a multifrontal one. */
+/* Largest mean row length of an envelope for which PETSc's own factor is faster than a multifrontal one. */
 #define HYCO_THIN_ENVELOPE 32
 
 /* Entries between the first nonzero of each row and its diagonal, in the order of `order`. */
@@ -34,7 +35,7 @@ static PetscErrorCode Envelope(Mat K, IS order, PetscReal *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On several ranks, without looking at an order: at most two neighbours in the mean, a mesh of lines. */
+/* On several ranks, without an order: whether there are at most two neighbours on average, as in a mesh of lines. */
 static PetscErrorCode IsLine(Mat K, PetscBool *line)
 {
   PetscInt n;
@@ -55,7 +56,7 @@ PetscErrorCode HycoBandedSolver(PC pc)
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  if (size > 1) { /* every rank factors all of it: less work than agreeing on a part */
+  if (size > 1) { /* every rank factors all of it, which takes less time than communication */
     PetscCall(PCSetType(pc, PCREDUNDANT));
     PetscCall(PCRedundantSetNumber(pc, size));
     PetscCall(PCRedundantGetKSP(pc, &each));

@@ -1,19 +1,19 @@
 /*
   Conjugate gradients on the displacements that satisfy constraints, K x + B^T l = f, B x = d, preconditioned by
-  multigrid for K alone: its hierarchy is made once for any number of sets of constraints. The constraints are coarsened
-  with it (constraint_levels.c), and each smoother and correction is projected onto the displacements that satisfy them,
-  in the way of Braess and Sarazin (Appl. Numer. Math. 23 (1997) 3-19), as multigrid for contact does (M. Adams, Numer.
+  multigrid for K: one hierarchy serves all sets of constraints. The constraints are coarsened along with it
+  (constraint_levels.c), and each smoother and correction is projected onto the displacements that satisfy them, as
+  proposed by Braess and Sarazin (Appl. Numer. Math. 23 (1997) 3-19), and as in multigrid for contact (M. Adams, Numer.
   Linear Algebra Appl. 11 (2004) 141-153; T. Wiesner et al., Int. J. Numer. Meth. Engng 122 (2021) 3751-3779).
 */
 #include "constrained.h"
 
-/* Iterations of the estimate of a level's largest eigenvalue, and what is added to it; where a smoother's interval
-   begins: PETSc's own choices for Chebyshev's method. */
+/* Iterations for the estimate of a level's largest eigenvalue, the margin added to it, and the start of a smoother's
+   interval: PETSc's defaults for Chebyshev's method. */
 #define HYCO_EIGEN_ITS    10
 #define HYCO_EIGEN_SAFETY 1.1
 #define HYCO_EIGEN_LEAST  0.1
 
-/* The share of the residual at a start that counts beside the loads: without loads the constraints alone act. */
+/* The share of the initial residual that is compared with the loads: without loads only the constraints act. */
 #define HYCO_START 0.01
 
 /* The largest eigenvalue of D^-1 K by Lanczos' method. */
@@ -48,7 +48,7 @@ static PetscErrorCode LargestEigenvalue(Mat K, PetscReal *largest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The levels of the multigrid `pc`, finest first; of another preconditioner the finest alone. */
+/* The levels of the multigrid `pc`, finest first; of another preconditioner only the finest. */
 static PetscErrorCode ReadLevels(HycoConstrained c, Mat K)
 {
   PetscBool multigrid;
@@ -109,7 +109,8 @@ PetscErrorCode HycoLevelProject(const HycoLevel *v, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* r without what constraint forces can take: the transpose of HycoLevelProject(); v->mu: these forces, negative. */
+/* Removes from r what constraint forces can balance: the transpose of HycoLevelProject(); v->mu: these forces,
+   negative. */
 static PetscErrorCode ProjectForce(const HycoLevel *v, Vec r)
 {
   PetscFunctionBegin;
@@ -121,8 +122,8 @@ static PetscErrorCode ProjectForce(const HycoLevel *v, Vec r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Chebyshev steps on K z = r, from what z is; r becomes the residual (without `residual` it is that of the last step
-   but one). */
+/* Chebyshev steps on K z = r from the current z; r becomes the residual (without `residual`, that before the last
+   step). */
 static PetscErrorCode Smooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
 {
   const PetscReal hi = HYCO_EIGEN_SAFETY * v->largest, lo = HYCO_EIGEN_LEAST * v->largest;
@@ -149,7 +150,7 @@ static PetscErrorCode Smooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The coarsest level: K z + B^T mu = r, B z = 0 by the multigrid's own solver and B K^-1 B^T. */
+/* The coarsest level: K z + B^T mu = r, B z = 0 by the multigrid's coarse solver and B K^-1 B^T. */
 static PetscErrorCode SolveCoarsest(HycoConstrained c, HycoLevel *v, Vec r, Vec z)
 {
   PetscBLASInt m, one = 1, info;
@@ -170,7 +171,7 @@ static PetscErrorCode SolveCoarsest(HycoConstrained c, HycoLevel *v, Vec r, Vec 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z = M r, M symmetric, B z = 0; r is spent. */
+/* z = M r, M symmetric, B z = 0; r is overwritten. */
 static PetscErrorCode Cycle(HycoConstrained c, PetscInt l, Vec r, Vec z)
 {
   HycoLevel *v = &c->level[l];
@@ -252,7 +253,7 @@ PetscErrorCode HycoConstrainedCreate(MPI_Comm comm, const char prefix[], Mat K, 
   PetscCall(PCShellSetView(shell, View));
   PetscCall(KSPSetPC(c->ksp, shell));
   c->shell = shell;
-  PetscCall(PCDestroy(&shell)); /* the solver has it */
+  PetscCall(PCDestroy(&shell)); /* the solver has a reference */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -307,13 +308,13 @@ PetscErrorCode HycoConstrainedSolve(HycoConstrained c, Vec f, Vec d, PetscReal a
   PetscInt n;
 
   PetscFunctionBegin;
-  if (v->m) { /* onto the constraints */
+  if (v->m) { /* projects onto the constraints */
     PetscCall(MatMult(v->B, x, v->mu));
     PetscCall(VecAYPX(v->mu, -1, d));
     PetscCall(SolveG(v, v->mu));
     PetscCall(MatMultAdd(v->DBt, v->mu, x, x));
   }
-  /* a correction, so that the constraints' forces do not drown the residual */
+  /* solves for a correction, so that the constraints' forces do not dominate the residual */
   PetscCall(MatMult(v->product, x, c->residual));
   PetscCall(VecAYPX(c->residual, -1, f));
   PetscCall(ProjectForce(v, c->residual));

@@ -1,20 +1,20 @@
 /*
-  Constraints on the levels of a multigrid for K. Each constraint belongs to a node (a contact to its slave); those
-  whose nodes lie in one aggregate become up to three on the next level, combinations such as a translation of that
-  aggregate makes: an orthonormal basis of the constraints' own normals there, as smoothed aggregation makes its
-  tentative interpolation of the rigid motions. B_{l+1} = A_l^T B_l P_l.
+  Constraints on the levels of a multigrid for K. Each constraint belongs to a node (a contact to its slave). The
+  constraints whose nodes are in one aggregate become up to three on the next level, namely the combinations caused by a
+  translation of that aggregate: an orthonormal basis of the constraints' own normals there, as smoothed aggregation
+  constructs its tentative interpolation from the rigid motions. B_{l+1} = A_l^T B_l P_l.
 */
 #include "constrained.h"
 
-/* Directions of an aggregate's normals that are smaller than this share of the largest are left out. */
+/* Directions of an aggregate's normals below this share of the largest are dropped. */
 #define HYCO_DIRECTION 0.1
-/* Up to that many constraints of a level every rank factors their matrix and solves with it: MUMPS's own exchange takes
-   longer than all else. */
+/* Up to this number of constraints on a level, every rank factors their matrix and solves with it: MUMPS's
+   communication takes longer than the rest. */
 #define HYCO_ALIKE 20000
-/* What is added to the diagonal of coarse matrices of constraints, which may depend on each other a little. */
+/* Shift of the diagonal of the coarse matrices of constraints, which may be almost dependent. */
 #define HYCO_COARSE_SHIFT 1e-8
 
-/* The constraints of a level as every rank knows them: their nodes' first unknowns, and their normals (3 each). */
+/* The constraints of a level, on every rank: their nodes' first unknowns, and their normals (3 each). */
 typedef struct {
   PetscInt m, *at;
   PetscReal *normal;
@@ -106,7 +106,7 @@ static PetscErrorCode FindAggregates(HycoLevel *fine, Mat coarse)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every rank's part of n numbers, one after the other. */
+/* Gathers every rank's part of n numbers on all ranks. */
 static PetscErrorCode AllGather(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, void *all)
 {
   PetscMPIInt size, count, *counts, *starts;
@@ -123,7 +123,7 @@ static PetscErrorCode AllGather(MPI_Comm comm, PetscInt n, const void *mine, MPI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The finest constraints: the entries of B at the node of unknown at[i] are the normal. */
+/* The constraints on the finest level: the entries of B at the node of unknown at[i] are the normal. */
 static PetscErrorCode KnownOfB(Mat K, Mat B, const PetscInt at[], Known *known)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)B);
@@ -180,8 +180,8 @@ static PetscErrorCode AggregatesAt(const HycoLevel *fine, const Known *known, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An orthonormal basis of the columns of the normals' rows i[0..n), largest first: column j of q (leading dimension 3
-   in `weight`) at each of them; the new constraints' normals. Returns their number. */
+/* An orthonormal basis of the columns of the normals' rows i[0..n), largest first: column j of q (leading dimension
+   3 in `weight`) at each of them; the new constraints' normals. Returns their number. */
 static PetscInt Basis(PetscInt n, const PetscInt i[], const PetscReal normal[], PetscReal weight[], PetscReal coarse[])
 {
   PetscReal largest = 0;
@@ -191,7 +191,7 @@ static PetscInt Basis(PetscInt n, const PetscInt i[], const PetscReal normal[], 
     PetscReal best = 0;
     PetscInt column = 0;
 
-    /* `weight` holds what is left of the columns from `made` on */
+    /* `weight` has the remaining columns from `made` on */
     for (PetscInt j = made; j < 3; j++) {
       PetscReal size = 0;
 
@@ -285,7 +285,7 @@ static PetscErrorCode CoarseB(HycoLevel *fine, const Known *known, Mat coarse_K,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A solver for G, of ones on its diagonal about, whose factor each rank has. */
+/* A solver for G, whose diagonal entries are about 1; each rank has the factor. */
 static PetscErrorCode Redundant(Mat G, KSP *ksp)
 {
   KSP inner;
@@ -305,7 +305,7 @@ static PetscErrorCode Redundant(Mat G, KSP *ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A solver for G by its size. */
+/* Chooses a solver for G by its size. */
 static PetscErrorCode SolverForG(Mat G, KSP *ksp)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)G);
@@ -322,7 +322,7 @@ static PetscErrorCode SolverForG(Mat G, KSP *ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B D^-1 B^T, inverted or factored. */
+/* Inverts or factors B D^-1 B^T. */
 static PetscErrorCode PrepareG(HycoLevel *v, PetscReal shift, PetscBool *singular)
 {
   Mat G;
@@ -361,7 +361,7 @@ static PetscErrorCode PrepareG(HycoLevel *v, PetscReal shift, PetscBool *singula
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The coarsest level's B K^-1 B^T, factored on every rank. */
+/* Factors the coarsest level's B K^-1 B^T on every rank. */
 static PetscErrorCode PrepareCoarsest(HycoConstrained c, HycoLevel *v, PetscBool *singular)
 {
   const PetscInt m = v->m;

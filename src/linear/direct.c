@@ -1,14 +1,14 @@
 /*
   The direct solver of the dual form: MUMPS (P. R. Amestoy et al., SIAM J. Matrix Anal. Appl. 23 (2001) 15-41) on
 
-      [ K  Bt ] [x]   [F]
-      [ B   0 ] [L] = [D]
+    [ K  Bt ] [x]   [F]
+    [ B   0 ] [L] = [D]
 
-  with the forces, and the unknowns that pin free bodies, as Schur variables z = (x_pinned, L): they are eliminated
-  last, so that one factorisation of K yields the flexibility, no right-hand side being solved for:
+  with the forces, and the pinned unknowns of floating bodies, as Schur variables z = (x_pinned, L): they are eliminated
+  last, so that one factorisation of K gives the flexibility without solves:
 
-      M = [ K'    A ]      q = (-f', g),     w = q + M z,     w = 0 for x_pinned,  0 <= w complementary to L >= 0
-          [ -A^T  S ]
+    M = [ K'    A ]      q = (-f', g),     w = q + M z,     w = 0 for x_pinned,  0 <= w complementary to L >= 0
+        [ -A^T  S ]
 
   with S = B K^-1 Bt and g = D - B K^-1 F when nothing is pinned.
 */
@@ -20,10 +20,10 @@ struct _n_HycoDirect {
   PetscMPIInt rank;
   PetscBool alone; /* one process */
   DMUMPS_STRUC_C id;
-  PetscBool begun;                           /* MUMPS holds an instance */
+  PetscBool begun;                           /* a MUMPS instance exists */
   PetscInt n, m, n_pinned, n_schur, *pinned; /* pinned: on every rank, ascending */
   PetscBool symmetric;
-  PetscObjectId K_id, B_id; /* whose pattern was analysed */
+  PetscObjectId K_id, B_id; /* matrices whose pattern was analysed */
   PetscObjectState K_pattern, B_pattern;
   PetscReal *rhs, *reduced; /* rank 0: n + m, n_schur */
   VecScatter to_root;
@@ -97,7 +97,7 @@ PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Entries of the saddle point in this rank's rows of K, B (and Bt): the lower triangle when symmetric. */
+/* Collects the entries of the saddle point in this rank's rows of K, B (and Bt): the lower triangle when symmetric. */
 static PetscErrorCode Entries(HycoDirect d, Mat A, PetscInt row0, PetscInt col0, PetscBool pattern, MUMPS_INT8 *at)
 {
   PetscInt lo, hi;
@@ -133,7 +133,7 @@ static PetscErrorCode AllEntries(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool p
   if (B) PetscCall(Entries(d, B, d->n, 0, pattern, &at));
   if (B && !d->symmetric) PetscCall(Entries(d, Bt, 0, d->n, pattern, &at));
   d->id.nnz_loc = at;
-  if (d->alone) { /* centralised entries: none are redistributed */
+  if (d->alone) { /* centralised entries: no communication */
     d->id.nnz = at;
     d->id.irn = d->id.irn_loc;
     d->id.jcn = d->id.jcn_loc;
@@ -142,7 +142,7 @@ static PetscErrorCode AllEntries(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Room for every entry, whether kept or not. */
+/* Allocates for all entries, including those not used. */
 static PetscErrorCode CountEntries(Mat K, Mat Bt, Mat B, size_t *n)
 {
   const Mat all[3] = {K, Bt, B};
@@ -159,7 +159,7 @@ static PetscErrorCode CountEntries(Mat K, Mat Bt, Mat B, size_t *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The order of elimination: nested dissection, the pinned unknowns and the forces last. On rank 0. */
+/* The elimination order: nested dissection, with pinned unknowns and forces last. On rank 0. */
 static PetscErrorCode PlaceLast(HycoDirect d, const PetscInt place[])
 {
   PetscInt *at, next = 0;
@@ -188,11 +188,11 @@ static PetscErrorCode Order(HycoDirect d, Mat K)
   PetscCall(HycoDissection(d->comm, K, place));
   if (d->rank == 0) PetscCall(PlaceLast(d, place));
   PetscCall(PetscFree(place));
-  ICNTL(d, 7) = 1; /* the order is given */
+  ICNTL(d, 7) = 1; /* the order is given in PERM_IN */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -hyco_mumps_icntl_K and -hyco_mumps_cntl_K, MUMPS's own controls. */
+/* -hyco_mumps_icntl_K and -hyco_mumps_cntl_K set MUMPS's controls. */
 static PetscErrorCode ReadControls(HycoDirect d)
 {
   PetscFunctionBegin;
@@ -223,16 +223,16 @@ static PetscErrorCode Begin(HycoDirect d)
   Call(d, BEGIN);
   PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB, "MUMPS could not start (INFOG(1) = %d)", (int)INFOG(d, 1));
   d->begun = PETSC_TRUE;
-  ICNTL(d, 1) = ICNTL(d, 2) = ICNTL(d, 3) = -1; /* quiet */
+  ICNTL(d, 1) = ICNTL(d, 2) = ICNTL(d, 3) = -1; /* no output */
   ICNTL(d, 4) = 0;
-  ICNTL(d, 14) = 50;                  /* per cent more workspace than estimated */
-  ICNTL(d, 18) = d->alone ? 0 : 3;    /* entries where they are */
-  ICNTL(d, 28) = 1;                   /* analysis on one process */
-  if (!d->symmetric) ICNTL(d, 8) = 0; /* no scaling: it takes a tenth of the time, and residuals are no worse */
+  ICNTL(d, 14) = 50;                  /* workspace increase over the estimate, in per cent */
+  ICNTL(d, 18) = d->alone ? 0 : 3;    /* distributed entries */
+  ICNTL(d, 28) = 1;                   /* sequential analysis */
+  if (!d->symmetric) ICNTL(d, 8) = 0; /* no scaling: it would take a tenth of the time without better residuals */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The Schur variables, their matrix centralised by rows. */
+/* Declares the Schur variables; their matrix is centralised by rows. */
 static PetscErrorCode DeclareSchur(HycoDirect d)
 {
   PetscFunctionBegin;
@@ -275,7 +275,7 @@ static PetscErrorCode Analyse(HycoDirect d, Mat K, Mat Bt, Mat B)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether K and B have the pattern that was analysed; then remember it. */
+/* Whether K and B have the analysed pattern; stores their identity. */
 static PetscErrorCode SamePattern(HycoDirect d, Mat K, Mat B, PetscBool *same)
 {
   PetscObjectId K_id, B_id = 0;
@@ -322,7 +322,7 @@ PetscReal HycoDirectOperations(HycoDirect d)
   return (PetscReal)d->id.rinfog[0];
 }
 
-/* Rank 0's Schur complement (by rows; the lower triangle when symmetric) to M on every rank, by columns. */
+/* Sends rank 0's Schur complement (by rows; the lower triangle when symmetric) to M on every rank, by columns. */
 static PetscErrorCode SpreadSchur(HycoDirect d, PetscReal M[])
 {
   const size_t n = (size_t)d->n_schur;
@@ -353,7 +353,7 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
   d->id.schur_lld = (MUMPS_INT)d->n_schur;
   for (;;) {
     Call(d, FACTOR);
-    /* -8, -9 and their like: the workspace was underestimated */
+    /* -8, -9 and similar codes: the workspace was underestimated */
     if ((INFOG(d, 1) != -8 && INFOG(d, 1) != -9 && INFOG(d, 1) != -17 && INFOG(d, 1) != -20) || ICNTL(d, 14) > 3000)
       break;
     ICNTL(d, 14) *= 4;
@@ -370,7 +370,7 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A distributed vector of n unknowns to rank 0's right-hand side, or back. */
+/* Copies a distributed vector of n unknowns to rank 0's right-hand side, or back. */
 static PetscErrorCode Fetch(HycoDirect d, Vec v)
 {
   const PetscScalar *r;

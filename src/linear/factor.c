@@ -1,4 +1,4 @@
-/* Factors of sparse stiffnesses, and knowing when they are still good. */
+/* Factors of sparse stiffness matrices, and when they can be reused. */
 #include <hycolinear.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateGet() */
 
@@ -20,14 +20,15 @@ PetscErrorCode HycoOperatorStateUpdate(HycoOperatorState *seen, Mat K, Mat B, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* MUMPS: quiet, with half as much workspace again as it asks for. */
+/* MUMPS: no output, with half as much workspace again as it requests. */
 static PetscErrorCode PrepareMumps(PC pc, Mat K, const char prefix[])
 {
   Mat factor;
 
   PetscFunctionBegin;
   PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
-  PetscCall(MatSetOptionsPrefixFactor(K, prefix)); /* before the factor is made, or it would not see its options */
+  PetscCall(MatSetOptionsPrefixFactor(K, prefix)); /* before the factor is created, which otherwise would not read
+                                                      its options */
   PetscCall(PCFactorSetUpMatSolverType(pc));
   PetscCall(PCFactorGetMatrix(pc, &factor));
   PetscCall(MatMumpsSetIcntl(factor, 1, 0));
@@ -65,7 +66,7 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc takes pivots below 2.2e-14 as zero, whatever the unit: here, below that share of the least diagonal entry. */
+/* PETSc treats pivots below 2.2e-14 as zero, whatever the unit: this scales the limit by the least diagonal entry. */
 static PetscErrorCode ScaleZeroPivot(KSP ksp, PC pc)
 {
   Mat K;
@@ -110,7 +111,7 @@ PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular)
       Mat K;
 
       PetscCall(KSPGetOperators(ksp, &K, NULL));
-      PetscCall(PetscObjectStateIncrease((PetscObject)K)); /* so that it is factored again */
+      PetscCall(PetscObjectStateIncrease((PetscObject)K)); /* forces a new factorisation */
     }
     PetscCall(KSPSetUp(ksp));
     PetscCall(PCGetFailedReason(pc, &failed));

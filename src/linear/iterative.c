@@ -1,6 +1,7 @@
 /*
-  For stiffnesses whose factor does not fit: conjugate gradients with smoothed aggregation (PETSc's GAMG), which knows
-  the rigid motions from the matrix's near-kernel. -hyco_primal_pc_type hypre takes BoomerAMG instead.
+  For stiffness matrices whose factor does not fit in memory: conjugate gradients with smoothed aggregation (PETSc's
+  GAMG), which gets the rigid motions from the matrix's near-null space. -hyco_primal_pc_type hypre selects BoomerAMG
+  instead.
 */
 #include <hycolinear.h>
 

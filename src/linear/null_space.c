@@ -1,6 +1,6 @@
 /*
-  A singular K: bodies that contact alone holds. The user of the system attaches the kernel (MatSetNullSpace()). As many
-  unknowns as it has motions, chosen so that K without them is well conditioned, are left to the dense problem.
+  A singular K: floating bodies. The owner of the system attaches the null space (MatSetNullSpace()). As many unknowns
+  as its dimension, chosen so that K without them is well conditioned, become unknowns of the dense problem.
 */
 #include <hycolinear.h>
 
@@ -18,7 +18,7 @@ PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's rows of the kernel, row major. */
+/* This rank's rows of the null space, row major. */
 static PetscErrorCode Rows(Mat K, PetscInt n, PetscInt *rows, PetscReal **row)
 {
   MatNullSpace kernel;
@@ -39,7 +39,7 @@ static PetscErrorCode Rows(Mat K, PetscInt n, PetscInt *rows, PetscReal **row)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknown whose row is longest, the lowest among equals; its row, of length 1, on every rank. */
+/* The unknown with the longest row, the lowest among equals; its row, scaled to length 1, on every rank. */
 static PetscErrorCode Longest(MPI_Comm comm, PetscInt first, PetscInt rows, PetscInt n, const PetscReal row[],
                               PetscInt *at, PetscReal unit[])
 {

@@ -1,11 +1,11 @@
 /*
-  A fill-reducing order of a sparse symmetric matrix: METIS's nested dissection of its graph of nodes (G. Karypis,
-  V. Kumar, SIAM J. Sci. Comput. 20 (1998) 359-392). Debian's MUMPS has no METIS of its own, and takes a given order.
+  A fill-reducing order of a sparse symmetric matrix: METIS's nested dissection of its graph of nodes (G. Karypis, V.
+  Kumar, SIAM J. Sci. Comput. 20 (1998) 359-392). Debian's MUMPS is built without METIS, and accepts a given order.
 */
 #include <hycolinear.h>
 #include <metis.h>
 
-/* Neighbours, by node of bs unknowns, of this rank's rows: CSR, columns global, without the node itself. */
+/* Neighbours of this rank's rows by node of bs unknowns: CSR, columns global, without the node itself. */
 static PetscErrorCode LocalGraph(Mat K, PetscInt bs, PetscInt *n_nodes, PetscInt **start, PetscInt **next)
 {
   PetscInt lo, hi, n, room, *seen, at = 0;
@@ -40,7 +40,7 @@ static PetscErrorCode LocalGraph(Mat K, PetscInt bs, PetscInt *n_nodes, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* METIS on the whole graph: degree and neighbours of each node, to place[node]. On rank 0. */
+/* METIS on the whole graph: from degree and neighbours of each node to place[node]. On rank 0. */
 static PetscErrorCode Dissect(PetscInt n, const PetscInt degree[], const PetscInt next[], PetscInt place[])
 {
   idx_t nv = (idx_t)n, *xadj, *adjncy, *perm, *iperm;

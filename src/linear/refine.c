@@ -1,7 +1,7 @@
 /*
   Iterative refinement with residuals in twice the working precision (N. J. Higham, Accuracy and Stability of Numerical
-  Algorithms (2002), chapter 12): x comes out right to round-off as long as the factors are good for anything at all,
-  condition up to some 1e15, and does not depend on the order in which a BLAS adds.
+  Algorithms (2002), chapter 12): x is accurate to round-off for condition numbers up to about 1e15, and does not depend
+  on the summation order of the BLAS.
 */
 #include <hycolinear.h>
 #include <math.h>
@@ -46,7 +46,7 @@ PetscErrorCode HycoRefine(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda,
       change = PetscMax(change, PetscAbsReal(r[i]));
       size = PetscMax(size, PetscAbsReal(x[i]));
     }
-    if (!(change < before / 2)) break; /* also where it is no number */
+    if (!(change < before / 2)) break; /* also for NaN */
     for (PetscBLASInt i = 0; i < n; i++) x[i] += r[i];
     if (change <= PETSC_MACHINE_EPSILON * size) break;
     before = change;

@@ -1,4 +1,5 @@
-/* A symmetric matrix by the blocks of its upper triangle (MATSBAIJ). MatConvert() inserts entry by entry. */
+/* A symmetric matrix stored by the blocks of its upper triangle (MATSBAIJ), created faster than by MatConvert(),
+   which inserts entry by entry. */
 #include "constrained.h"
 
 /* The columns of a block row's blocks from the diagonal on, ascending; column: room for all entries of its rows. */
@@ -21,7 +22,7 @@ static PetscErrorCode RowBlocks(Mat K, PetscInt block, PetscInt bs, PetscInt *n_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Their values, of which value[] is the room. */
+/* Copies their values; value[] has the room. */
 static PetscErrorCode CopyRow(Mat K, PetscInt block, PetscInt bs, PetscInt column[], PetscScalar value[], Mat upper)
 {
   PetscInt blocks, width;
@@ -36,7 +37,7 @@ static PetscErrorCode CopyRow(Mat K, PetscInt block, PetscInt bs, PetscInt colum
     const PetscScalar *v;
 
     PetscCall(MatGetRow(K, block * bs + r, &n, &col, &v));
-    for (PetscInt k = 0; k < n; k++) { /* both ascend */
+    for (PetscInt k = 0; k < n; k++) { /* both are ascending */
       if (col[k] / bs < block) continue;
       while (column[at] < col[k] / bs) at++;
       value[r * width + at * bs + col[k] % bs] = v[k];

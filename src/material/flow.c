@@ -2,19 +2,19 @@
   Radial return for laws of von Mises type (J. C. Simo, T. J. R. Hughes, Computational Inelasticity, 1998, chapter 3,
   for any creep and hardening): with the trial stress q_tr of a step without flow, H = 3 G (1D: H = E),
 
-      q + H dp = q_tr,   dp = dp_creep(q) + dp_plastic,   0 <= dp_plastic complementary to Y(p + dp_plastic) - q >= 0
+    q + H dp = q_tr,   dp = dp_creep(q) + dp_plastic,   0 <= dp_plastic complementary to Y(p + dp_plastic) - q >= 0
 
-  by a Newton method that a bracket guards. Points are independent of one another: a batch gives the bits that each of
-  its points gives alone.
+  by Newton's method with a bracket. The points are independent: a batch gives the same bits as each of its points
+  alone.
 */
 #include <hycoflow.h>
 
-#define ITERATIONS 500  /* with a bisection every eighth, ten times more than any bracket needs */
-#define BLOCK      32   /* points at a time */
-#define CLOSE      1e-8 /* a Newton step this small, relatively, leaves an error of its square */
+#define ITERATIONS 500  /* every eighth is a bisection: ten times more than any bracket needs */
+#define BLOCK      32   /* points evaluated together */
+#define CLOSE      1e-8 /* after a Newton step of this relative size the error is of the order of its square */
 
-/* The bracket [lo, hi] of a root, and the next iterate: `newton`, unless it leaves the bracket or it is time to bisect.
-   Whether that ends the iteration is returned. */
+/* The bracket [lo, hi] of a root, and the next iterate: `newton`, unless it leaves the bracket or a bisection is
+   due. Returns whether the iteration has converged. */
 typedef struct {
   PetscReal lo, hi;
   PetscInt iterations;
@@ -33,7 +33,7 @@ static PetscBool Advance(Bracket *b, PetscReal newton, PetscReal *q)
   return (PetscBool)(*q == b->lo || *q == b->hi || b->iterations > ITERATIONS);
 }
 
-/* A point in work: its trial state, and the iteration for the equivalent stress under creep alone. */
+/* State of a point: its trial state, and the iteration for the equivalent stress under creep alone. */
 typedef struct {
   HycoFlowPoint p;
   PetscReal H, trial, pressure, s[6]; /* trial: q_tr; s: the trial stress's deviator (1D: the stress) */
@@ -42,8 +42,7 @@ typedef struct {
   PetscBool done;
 } Work;
 
-/* The first iterate: q_tr, or where creep there is too fast, a step towards the root of the power law that touches it.
- */
+/* The first iterate: q_tr, or, if creep there is too fast, a step towards the root of the tangent power law. */
 static void StartCreep(const HycoFlowRule *rule, Work *w)
 {
   const PetscReal trial = w->trial;
@@ -67,16 +66,16 @@ static void StartCreep(const HycoFlowRule *rule, Work *w)
   }
 }
 
-/* An iteration for q + H creep(q) = q_tr, on the logarithms of H creep and q_tr - q where creep decides: a power law is
-   nearly straight there. After the last one creep follows its tangent, and the slope that of a power law: what is left
-   is of the step's square. */
+/* An iteration for q + H creep(q) = q_tr, on the logarithms of H creep and q_tr - q where creep dominates: a power
+   law is nearly linear there. After the last iteration creep is updated along its tangent, and the slope along a
+   power law: the remaining error is of second order in the step. */
 static void IterateCreep(const HycoFlowRule *rule, Work *w)
 {
   const PetscReal old = w->q, rest = w->trial - old, excess = w->H * w->creep - rest;
   PetscReal newton = old - excess / (1 + w->H * w->slope);
 
   if (w->H * w->slope > 1 && rest > 0)
-    newton = old - PetscLogReal(w->H * w->creep / rest) / (w->slope / w->creep + 1 / rest); /* NaN: creep overflows */
+    newton = old - PetscLogReal(w->H * w->creep / rest) / (w->slope / w->creep + 1 / rest); /* NaN if creep overflows */
   if (excess < 0)
     w->b.lo = old;
   else if (excess == 0) {
@@ -94,13 +93,14 @@ static void IterateCreep(const HycoFlowRule *rule, Work *w)
     w->creep = (*rule->creep)(&w->p, w->q, &w->slope);
 }
 
-/* What the flow of a step makes of a point. */
+/* Result of a step at a point. */
 typedef struct {
   PetscReal q, creep, plastic; /* equivalent stress; equivalent strains of the step */
-  PetscReal slope;             /* of both together by q_tr */
+  PetscReal slope;             /* derivative of creep + plastic by q_tr */
 } Flow;
 
-/* q = Y(plastic0 + (q_tr - q) / H - creep(q)) between the yield stress before the step and q of creep alone, f->q. */
+/* Solves q = Y(plastic0 + (q_tr - q) / H - creep(q)) between the yield stress before the step and f->q, the solution
+   for creep alone. */
 static PetscReal SolveYield(const HycoFlowRule *rule, const Work *w, PetscReal yield, Flow *f, PetscReal *slope,
                             PetscReal *hardening)
 {
@@ -123,7 +123,7 @@ static PetscReal SolveYield(const HycoFlowRule *rule, const Work *w, PetscReal y
   }
 }
 
-/* The flow of a point whose creep alone is known. */
+/* The flow of a point after the solution for creep alone. */
 static Flow Solve(const HycoFlowRule *rule, const Work *w)
 {
   Flow f = {w->q, w->creep, 0, 0};
@@ -139,7 +139,7 @@ static Flow Solve(const HycoFlowRule *rule, const Work *w)
   return f;
 }
 
-/* Trial stress without flow, deviator first: returns q_tr; s[n_strain] the deviator, *pressure the mean. */
+/* Trial stress without flow, deviator first: returns q_tr; s[n_strain]: the deviator, *pressure: the mean. */
 static PetscReal Trial(PetscInt ns, PetscReal G, PetscReal bulk, const PetscReal elastic[], PetscReal s[],
                        PetscReal *pressure)
 {
@@ -173,7 +173,7 @@ static void Tangent(PetscInt ns, PetscReal G, PetscReal bulk, PetscReal slope, P
   }
 }
 
-/* A point's energies: elastic, dissipated, and the potential: elastic and what the flow at this stress takes. */
+/* A point's energies: elastic, dissipated, and the potential, which is elastic plus that of the flow at this stress. */
 static void Energies(const HycoFlowRule *rule, const HycoFlowPoint *p, HycoMaterialPoints *m, PetscInt i, const Flow *f,
                      PetscReal elastic)
 {
@@ -210,7 +210,7 @@ static void Begin(const HycoMaterialPoints *m, PetscInt i, Work *w)
     w->trial = Trial(ns, G, young / (3 * (1 - 2 * poisson)), elastic, w->s, &w->pressure);
 }
 
-/* Point i at the step's end. */
+/* Sets point i at the end of the step. */
 static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, const Work *w)
 {
   const PetscInt ns = m->n_strain;
@@ -237,8 +237,8 @@ static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, 
   if (m->stored) Energies(rule, &w->p, m, i, &f, energy);
 }
 
-/* The law at n points from `first`: the iterations of different points go on side by side, so that a processor has more
-   to do than to wait for one logarithm after the other. */
+/* Evaluates the law at n points from `first`: the iterations of different points are interleaved, so that the
+   processor does not wait for one logarithm after the other. */
 static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt first, PetscInt n)
 {
   const PetscInt ns = m->n_strain;
@@ -309,7 +309,7 @@ static PetscErrorCode SetUp(HycoMaterial material, PetscInt dim)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The elastic part is young and poisson's. */
+/* The elastic part depends on young and poisson. */
 static PetscBool Depends(HycoMaterial material, const PetscBool changed[])
 {
   (void)material;

@@ -220,7 +220,7 @@ PetscBool HycoMaterialChanges(HycoMaterial material, const PetscBool changed[])
   return any && material->ops->depends ? (*material->ops->depends)(material, constant) : any;
 }
 
-/* Whether the law is Lame's constants alone. */
+/* Whether the law consists only of Lame's constants. */
 static PetscBool IsLame(HycoMaterial material)
 {
   return (PetscBool)(material->linear && material->ops->isotropic);
@@ -302,7 +302,7 @@ PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fails where a constant leaves its interval. */
+/* Fails if a constant is outside its interval. */
 static PetscErrorCode CheckConstant(const HycoEntry *e, const PetscReal mu[], PetscInt n, const PetscReal x[],
                                     const PetscReal value[])
 {
@@ -321,7 +321,7 @@ static PetscErrorCode CheckConstant(const HycoEntry *e, const PetscReal mu[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the part of a tangent that strains in the mesh's dimensions see (2D: without zz) is symmetric and positive
+/* Whether the part of a tangent for strains in the mesh's dimensions (2D: without zz) is symmetric and positive
    definite, by Cholesky. */
 static PetscBool IsDefinite(PetscInt dim, const PetscReal C[])
 {
@@ -362,7 +362,7 @@ PetscErrorCode HycoMaterialConstants(HycoMaterial material, const PetscReal mu[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tangents of a law that is not linear, as it answers at once at rest: without strain, state and time. */
+/* The tangents of a law that is not linear: its instantaneous response at rest, without strain, state and time. */
 static PetscErrorCode RestTangents(HycoMaterial material, HycoMaterialPoints *p)
 {
   const PetscInt n = p->n * (3 * p->n_strain + 2 * material->n_state);
@@ -381,7 +381,7 @@ static PetscErrorCode RestTangents(HycoMaterial material, HycoMaterialPoints *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lame's constants (n x 2) as tangents, in their place: in the order in which none is written before it is read. */
+/* Expands Lame's constants (n x 2) to tangents in place, in an order in which none is overwritten before it is read. */
 static void ExpandAll(PetscInt dim, PetscInt n, PetscReal tangent[])
 {
   const PetscInt size = HycoStrainSize(dim) * HycoStrainSize(dim);
@@ -393,7 +393,7 @@ static void ExpandAll(PetscInt dim, PetscInt n, PetscReal tangent[])
   }
 }
 
-/* The tangents (n x 4 x 4) where nothing holds zz: sigma_zz = 0 gives eps_zz, and its row and column vanish. */
+/* Plane stress from tangents (n x 4 x 4): sigma_zz = 0 gives eps_zz, and its row and column become 0. */
 static void ReleaseThickness(PetscInt n, PetscReal tangent[])
 {
   for (PetscInt i = 0; i < n; i++) {

@@ -1,4 +1,4 @@
-/* The mesh over the ranks: DMPlexDistribute() with this library's partitioner, and the tags sent after it. */
+/* Distributes the mesh over the ranks: DMPlexDistribute() with this library's partitioner; the tags are sent along. */
 #include "plex.h"
 #include <hycocontactimpl.h>
 #include <string.h>
@@ -20,7 +20,7 @@ PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Puts what a distribution made (NULL: nothing) in a DM's place. */
+/* Replaces a DM by its distributed version (NULL: none). */
 static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
 {
   HycoTies ties;
@@ -72,7 +72,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tags of a DM that came without: its own numbers of cells and vertices, from 1. */
+/* Creates tags for a DM without them: its own numbers of cells and vertices, from 1. */
 static PetscErrorCode NumberPoints(DM dm)
 {
   PetscInt start[2], end[2], last, *tag;
@@ -89,7 +89,7 @@ static PetscErrorCode NumberPoints(DM dm)
     const PetscInt *number;
 
     PetscCall(ISGetIndices(numbers[k], &number));
-    for (PetscInt p = start[k]; p < end[k]; p++) { /* -1 - number where another process owns the point */
+    for (PetscInt p = start[k]; p < end[k]; p++) { /* -1 - number if another process owns the point */
       const PetscInt n = number[p - start[k]];
 
       tag[p] = 1 + (n < 0 ? -1 - n : n);
@@ -100,7 +100,7 @@ static PetscErrorCode NumberPoints(DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A DM that was not made from a mesh file: tags, and labels with the closure of their points on every process. */
+/* For a DM that was not made from a mesh file: tags, and labels with the closure of their points on every process. */
 static PetscErrorCode Complete(DM dm)
 {
   PetscInt n, dim, depth;
@@ -108,7 +108,7 @@ static PetscErrorCode Complete(DM dm)
 
   PetscFunctionBegin;
   PetscCall(PetscObjectQuery((PetscObject)dm, HYCO_TAGS, &tags));
-  if (tags) PetscFunctionReturn(PETSC_SUCCESS); /* written by hyco, complete */
+  if (tags) PetscFunctionReturn(PETSC_SUCCESS); /* written by hyco, thus complete */
   PetscCall(NumberPoints(dm));
   PetscCall(DMGetDimension(dm, &dim));
   PetscCall(DMPlexGetDepth(dm, &depth));
@@ -129,7 +129,7 @@ static PetscErrorCode Complete(DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ties are found in the mesh file, before its nodes are many or anywhere else. */
+/* Ties must be found in the mesh file, before it is refined or distributed. */
 static PetscErrorCode CheckTies(HycoScene scene)
 {
   size_t length;

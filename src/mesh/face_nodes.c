@@ -1,24 +1,24 @@
 /*
-  hex20 as hex27: a node at the middle of each face and of each cell, where the functions of quad8 and hex20 put it. The
-  triquadratic functions hold the serendipity ones, so that bodies keep their shape.
+  Converts hex20 to hex27: adds a node at the middle of each face and of each cell, at the position that the functions
+  of quad8 and hex20 give. The triquadratic functions include the serendipity ones, so that bodies keep their shape.
 */
 #include "plex.h"
 #include "msh.h"
 #include <stdlib.h>
 
 #define CORNERS 8
-#define MIDDLE  6  /* in place of a face's number: of the cell */
-#define ITSELF  -1 /* of the quad8 */
+#define MIDDLE  6  /* in place of a face's number: the cell */
+#define ITSELF  -1 /* in place of a face's number: the quad8 */
 
-/* A node to come: the corners that it lies between, of a face (4) or a cell (8), ascending, after these -1; the element
-   that wants it, and for which of its faces. */
+/* A node to be created: the corners around it, of a face (4) or a cell (8), ascending, then -1; the element that
+   needs it, and for which of its faces. */
 typedef struct {
   PetscInt corner[CORNERS], group, element, face;
 } Wanted;
 
 static int Compare(const void *a, const void *b)
 {
-  const PetscInt *p = (const PetscInt *)a, *q = (const PetscInt *)b; /* a Wanted is PetscInt throughout */
+  const PetscInt *p = (const PetscInt *)a, *q = (const PetscInt *)b; /* all members of Wanted are PetscInt */
 
   for (size_t k = 0; k < sizeof(Wanted) / sizeof(PetscInt); k++) {
     if (p[k] != q[k]) return p[k] < q[k] ? -1 : 1;
@@ -34,7 +34,7 @@ static PetscBool AreOne(const Wanted *a, const Wanted *b)
   return PETSC_TRUE;
 }
 
-/* The nodes that tell the new one's place: n corners, then *n_sides middles of sides. */
+/* The nodes that determine the new node's position: n corners, then *n_sides middles of sides. */
 static PetscInt Around(const HycoMsh *mesh, const Wanted *w, PetscInt node[20], PetscInt *n_sides)
 {
   const HycoMshGroup *g = &mesh->group[w->group];
@@ -46,13 +46,13 @@ static PetscInt Around(const HycoMsh *mesh, const Wanted *w, PetscInt node[20], 
   return n;
 }
 
-/* Whether a group is of these elements; how many nodes each wants. */
+/* Whether a group has such elements; how many nodes each needs. */
 static PetscInt Wants(const HycoMshGroup *g)
 {
   return g->dim == 3 && g->nv == 20 ? 7 : g->dim == 2 && g->nv == 8 ? 1 : 0;
 }
 
-/* All of them, those of one place together. The caller frees them. */
+/* All of them; those at one position are contiguous. The caller frees them. */
 static PetscErrorCode Collect(const HycoMsh *mesh, PetscInt *n, Wanted **list)
 {
   PetscInt room = 0;
@@ -80,7 +80,7 @@ static PetscErrorCode Collect(const HycoMsh *mesh, PetscInt *n, Wanted **list)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the serendipity functions of a face or a cell have their middle. */
+/* The middle of a face or a cell by the serendipity functions. */
 static void Place(const HycoMsh *mesh, const Wanted *w, PetscReal x[3])
 {
   PetscInt node[20], n_sides;
@@ -93,7 +93,7 @@ static void Place(const HycoMsh *mesh, const Wanted *w, PetscReal x[3])
   }
 }
 
-/* Room in a group's elements for the nodes that they want. */
+/* Extends a group's elements by the nodes they need. */
 static PetscErrorCode Widen(HycoMshGroup *g)
 {
   const PetscInt nv = g->nv + Wants(g);

@@ -1,4 +1,4 @@
-/* The file's order: rows by ascending tags, in contiguous blocks over the processes, or all on rank 0. */
+/* The file's order: rows by ascending tag, in contiguous blocks over the processes, or all on rank 0. */
 #include <hycomesh.h>
 
 static PetscErrorCode CreateSF(HycoFileOrder *o, HycoPlace place, PetscInt n, const PetscInt leaf[],

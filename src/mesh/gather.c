@@ -1,9 +1,9 @@
-/* Parts of a distributed mesh brought together on rank 0: all of it, or the surfaces of some groups. */
+/* Gathers a distributed mesh on rank 0: all of it, or the surfaces of some groups. */
 #include <hycomesh.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Rows of integers that one rank sends, and what rank 0 has of all, sorted by their first entries. */
+/* Rows of integers that one rank sends; on rank 0 all rows, sorted by their first entries. */
 typedef struct {
   PetscInt width, n, room, n_all;
   PetscInt *mine, *all;
@@ -43,7 +43,7 @@ static PetscErrorCode GatherRows(MPI_Comm comm, Rows *r)
 typedef struct {
   HycoMesh part;
   const PetscBool *in;   /* by group; NULL: all of the mesh */
-  const PetscBool *keep; /* by cell, beside the groups; NULL: none */
+  const PetscBool *keep; /* by cell, in addition to the groups; NULL: none */
   PetscBool *take;       /* by node of the part */
   Rows node, cell, facet, member, region;
 } Gather;
@@ -58,9 +58,9 @@ static PetscBool Keeps(const Gather *g, PetscInt cell)
   return (PetscBool)(!g->in || (g->keep && g->keep[cell]));
 }
 
-/* A node's row: tag, 0, 0, body, numbers in the distributed vectors and in the whole mesh; a cell's, which belongs to
-   the rank of its first node: tag, 0, 0, body, number in the whole mesh, nodes' tags; a facet's: group, tag of its
-   cell, place among this rank's, nodes' tags. */
+/* The row of a node: tag, 0, 0, body, numbers in the distributed vectors and in the whole mesh; of a cell, which
+   belongs to the rank of its first node: tag, 0, 0, body, number in the whole mesh, nodes' tags; of a facet: group,
+   tag of its cell, index among this rank's, nodes' tags. */
 static PetscErrorCode Pack(Gather *g)
 {
   HycoMesh m = g->part;
@@ -79,7 +79,7 @@ static PetscErrorCode Pack(Gather *g)
 
     for (PetscInt v = 0; v < n && g->keep[e]; v++) g->take[node[v]] = PETSC_TRUE;
   }
-  for (PetscInt k = 0; k < m->n_tied; k++) { /* and what tied nodes follow */
+  for (PetscInt k = 0; k < m->n_tied; k++) { /* and the masters of tied nodes */
     for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++)
       g->take[m->tied_master[j]] = (PetscBool)(g->take[m->tied_master[j]] || g->take[m->tied[k]]);
   }
@@ -99,7 +99,7 @@ static PetscErrorCode Pack(Gather *g)
     PetscCall(AddRow(&g->cell, row));
   }
   for (PetscInt f = 0; f < m->n_facets; f++) {
-    PetscInt least = m->facets[f * m->nf]; /* the facet's rank is that of its node of the smallest tag */
+    PetscInt least = m->facets[f * m->nf]; /* a facet belongs to the rank of its node with the smallest tag */
 
     for (PetscInt v = 1; v < m->nf; v++) least = PetscMin(least, m->facets[f * m->nf + v]);
     if (!Owns(g, least) || (g->in && !g->in[m->facet_group[f]] && !Keeps(g, m->facet_cell[f]))) continue;
@@ -136,7 +136,8 @@ static PetscInt Find(PetscInt n, const PetscInt tag[], PetscInt value)
   return at < 0 ? -1 : at;
 }
 
-/* xyz of the nodes in the order of their tags: they come in the order of the ranks, as `sent` tags. */
+/* Sets the coordinates of the nodes in the order of their tags; they arrive in the order of the ranks, with tags
+   `sent`. */
 static PetscErrorCode PlaceNodes(Gather *g, HycoMesh m, PetscInt n, const PetscInt sent[], const PetscReal xyz[])
 {
   PetscFunctionBegin;
@@ -241,7 +242,7 @@ PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[]
     m->nv = part->nv;
     m->nf = part->nf;
     m->type = part->type;
-    m->n_owned = m->n_whole_nodes = part->n_whole_nodes; /* all are rank 0's */
+    m->n_owned = m->n_whole_nodes = part->n_whole_nodes; /* rank 0 owns all */
     m->n_whole_cells = part->n_whole_cells;
     m->whole_length = part->whole_length;
     m->n_groups = part->n_groups;

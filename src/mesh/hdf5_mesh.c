@@ -1,6 +1,6 @@
 /*
-  Meshes in PETSc's own HDF5 format of a DMPlex, read and written by all processes; with the tags of a mesh that was
-  read from another file, in the order of the file's points.
+  Reads and writes meshes in PETSc's HDF5 format of a DMPlex, with all processes. The tags of a mesh that was read from
+  another file are stored too, in the order of the file's points.
 */
 #include "plex.h"
 #include <hdf5.h>
@@ -10,7 +10,7 @@
 
 #define TOPOLOGY "mesh" /* the name under which hyco writes */
 
-/* The tags in the order of the points' global numbers, which go by depth first. */
+/* The tags in the order of the points' global numbers, which run by depth. */
 static PetscErrorCode OrderTags(DM dm, IS *ordered)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
@@ -28,7 +28,7 @@ static PetscErrorCode OrderTags(DM dm, IS *ordered)
   PetscCall(ISGetIndices(tags, &tag));
   PetscCall(ISGetIndices(numbers, &number));
   for (PetscInt p = 0; p < last - first; p++) {
-    if (number[p] < 0) continue; /* another process's */
+    if (number[p] < 0) continue; /* owned by another process */
     leaf[n] = p;
     to[n++] = number[p];
   }
@@ -70,8 +70,8 @@ PetscErrorCode HycoPlexWrite(DM dm, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the file has a DMPlex, and the name of its topology: the first of those there, none in the format's first
-   version. One process. */
+/* Whether the file has a DMPlex, and the name of its topology: the first one in the file; the first version of the
+   format has no name. One process. */
 static PetscErrorCode FindTopology(const char path[], size_t room, char name[])
 {
   FILE *file = fopen(path, "rb");
@@ -95,7 +95,7 @@ static PetscErrorCode FindTopology(const char path[], size_t room, char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tags that HycoPlexWrite() left, along the star forest from the file's points to the DM's. */
+/* Reads the tags written by HycoPlexWrite(), along the star forest from the file's points to the DM's. */
 static PetscErrorCode LoadTags(DM dm, PetscViewer viewer, PetscSF from_file)
 {
   PetscInt n, last, *tag;

@@ -1,11 +1,11 @@
 /*
-  A line in space: a group of nodes of dimension 1. Its segments are the edges of cells between two nodes of the group;
-  a mesh keeps no others. Where an edge cuts a corner of the line, which can be with tetrahedra, that is refused.
+  A line in space: a group of nodes of dimension 1. Its segments are the edges of cells between two nodes of the group,
+  because a mesh stores no others. An edge that cuts a corner of the line (possible with tetrahedra) is refused.
 */
 #include "plex.h"
 #include <stdlib.h>
 
-/* An edge: its ends as one number, its middle of second order (else -1). */
+/* An edge: its ends as one number, its middle node if of second order (else -1). */
 typedef struct {
   PetscInt64 key;
   PetscInt middle;
@@ -18,7 +18,7 @@ static int Ascending(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-/* The edge behind corner k of a cell's face. */
+/* The edge after corner k of a cell's face. */
 static Edge EdgeOf(HycoMesh m, PetscInt cell, PetscInt number, PetscInt k)
 {
   const PetscInt corners = HycoCellKinds[m->type].corners, *node = m->cells + cell * m->nv;
@@ -30,7 +30,7 @@ static Edge EdgeOf(HycoMesh m, PetscInt cell, PetscInt number, PetscInt k)
   return edge;
 }
 
-/* The edges whose nodes are all in the group, by ascending key, each once. */
+/* The edges with all nodes in the group, by ascending key, without repetition. */
 static PetscErrorCode FindEdges(HycoMesh m, const PetscBool in[], PetscInt *n, Edge **edge)
 {
   const PetscInt corners = HycoCellKinds[m->type].corners, sides = HycoFacetCount(m->type) * corners;
@@ -56,7 +56,7 @@ static PetscErrorCode FindEdges(HycoMesh m, const PetscBool in[], PetscInt *n, E
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* No node of this process's own has more than two segments, or two that a third closes to a triangle. */
+/* Checks that no node owned by this process has more than two segments, or two that a third closes to a triangle. */
 static PetscErrorCode CheckPath(HycoMesh m, PetscInt group, PetscInt n, const Edge edge[], PetscInt next[])
 {
   PetscFunctionBegin;

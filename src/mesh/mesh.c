@@ -59,7 +59,7 @@ PetscErrorCode HycoMeshFindGroup(HycoMesh mesh, const char key[], const char nam
   HycoFail("%s: the mesh has no group \"%s\"; its groups are: %s", key, name, list);
 }
 
-/* No expression for a component that the mesh does not have. */
+/* Refuses expressions for components that the mesh does not have. */
 static PetscErrorCode CheckComponents(HycoMesh mesh, HycoExpr component[3])
 {
   PetscFunctionBegin;
@@ -70,7 +70,7 @@ static PetscErrorCode CheckComponents(HycoMesh mesh, HycoExpr component[3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces are on points, or on lines in space: on a surface they are a traction. */
+/* Forces act on points, or on lines in space; on a surface a traction is required. */
 static PetscErrorCode CheckPointLoad(HycoMesh mesh, const HycoPointLoad *load)
 {
   PetscInt group, dim;
@@ -187,14 +187,14 @@ PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh m)
     } else
       *body = b;
   }
-  for (PetscInt k = 0; k < m->n_tied; k++) { /* masters whose own cells are elsewhere */
+  for (PetscInt k = 0; k < m->n_tied; k++) { /* masters whose cells are on other processes */
     for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
       PetscInt *body = &m->node_body[m->tied_master[j]];
 
       if (*body < 0) *body = m->ties->body[m->tied_entry[k] + j - m->tied_start[k]];
     }
   }
-  /* A mesh of the line or the plane must lie in it. */
+  /* A 1D or 2D mesh must lie on the line or in the plane. */
   for (PetscInt c = m->dim; c < 3; c++) {
     PetscReal lo = PETSC_MAX_REAL, hi = PETSC_MIN_REAL, size = 0;
 
@@ -277,8 +277,8 @@ PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* index[i] = place of whole node i in the part, or -1; nodes of cells come before the others. part->node_whole is
-   filled. */
+/* index[i]: index in the part of node i of the whole mesh, or -1; nodes of cells come before the others. Fills
+   part->node_whole. */
 static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
                                   const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh part,
                                   PetscInt index[])
@@ -294,13 +294,13 @@ static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscIn
   for (PetscInt k = 0; k < n_extra; k++) {
     if (index[extra[k]] < 0) index[extra[k]] = -2;
   }
-  for (PetscInt f = 0; f < whole->n_facets * whole->nf; f++) { /* facets that are kept for their group */
+  for (PetscInt f = 0; f < whole->n_facets * whole->nf; f++) { /* facets kept because of their group */
     PetscInt *node = &index[whole->facets[f]];
 
     for (PetscInt k = 0; k < n_all && *node == -1; k++)
       *node = whole->facet_group[f / whole->nf] == all_facets[k] ? -2 : -1;
   }
-  for (PetscInt k = 0; k < whole->n_tied; k++) { /* what tied nodes follow */
+  for (PetscInt k = 0; k < whole->n_tied; k++) { /* masters of tied nodes */
     for (PetscInt j = whole->tied_start[k]; j < whole->tied_start[k + 1]; j++) {
       PetscInt *master = &index[whole->tied_master[j]];
 
@@ -309,7 +309,7 @@ static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscIn
   }
   for (PetscInt pass = 0; pass > -3; pass -= 2) {
     for (PetscInt i = 0; i < whole->n_nodes; i++) {
-      if (index[i] == pass) index[i] = -3 - part->n_nodes++; /* a number that no pass looks for */
+      if (index[i] == pass) index[i] = -3 - part->n_nodes++; /* differs from the value of every pass */
     }
   }
   for (PetscInt i = 0; i < whole->n_nodes; i++) index[i] = index[i] < -2 ? -3 - index[i] : -1;
@@ -374,7 +374,7 @@ static PetscErrorCode SelectFacets(HycoMesh whole, PetscInt n_all, const PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* CSR lists of a group's members that survive, renumbered. */
+/* CSR lists of the members of groups that are kept, renumbered. */
 static PetscErrorCode SelectGroups(PetscInt n_groups, const PetscInt start[], const PetscInt member[],
                                    const PetscInt index[], PetscInt **new_start, PetscInt **new_member)
 {

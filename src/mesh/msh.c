@@ -1,6 +1,6 @@
 /*
-  The strict reader of gmsh's mesh files: formats 2.2 and 4.1, text and binary, in one pass. Every count is compared
-  with what the file has room for; every tag, type and node with what it may be. (gmsh 4.11 manual, "Gmsh file
+  The strict reader of gmsh's mesh files: formats 2.2 and 4.1, text and binary, in one pass. Every count is checked
+  against the size of the file, and every tag, type and node against its valid range. (gmsh 4.11 manual, "Gmsh file
   formats".)
 */
 #include "msh.h"
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Nodes and dimension of gmsh's element types 1 to 31; 0: not one that a file of hyco's could hold. */
+/* Nodes and dimension of gmsh's element types 1 to 31; 0: a type that hyco does not know. */
 static const signed char type_nodes[32] = {0, 2,  3,  4,  4, 8,  6,  5,  3,  6,  9, 10, 27, 18, 14, 1,
                                            8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5,  6,  20, 35, 56};
 static const signed char type_dim[32] = {0, 1, 2, 2, 3, 3, 3, 3, 1, 2, 2, 3, 3, 3, 3, 0,
@@ -27,7 +27,7 @@ typedef struct {
 
 typedef struct {
   const char *path;
-  char *text, *at, *end; /* all of the file, a 0 behind it */
+  char *text, *at, *end; /* the whole file, followed by a byte 0 */
   int four, binary;
   PetscBool has_nodes, has_elements, failed;
   size_t n_names, n_members, room;
@@ -36,7 +36,7 @@ typedef struct {
   HycoMsh *mesh;
 } Msh;
 
-/* What is read where the file has ended or holds no number is 0, and `failed` says so. */
+/* Returns 0 and sets `failed` at the end of the file or if there is no number. */
 static long long ReadInt(Msh *m, size_t bytes)
 {
   long long value = 0;
@@ -85,7 +85,7 @@ static double ReadDouble(Msh *m)
   return value;
 }
 
-/* A count of things that take at least `bytes` each: more than the file has room for is refused. */
+/* A count of items of at least `bytes` each; refused if the file is too short for them. */
 static PetscErrorCode ReadCount(Msh *m, size_t bytes, const char what[], size_t *n)
 {
   const long long value = ReadInt(m, 8);
@@ -100,7 +100,7 @@ static PetscErrorCode ReadCount(Msh *m, size_t bytes, const char what[], size_t 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A count of format 2.2, a line of text in binary files too. */
+/* A count in format 2.2: a line of text, in binary files too. */
 static PetscErrorCode ReadCountLine(Msh *m, size_t bytes, const char what[], size_t *n)
 {
   const int binary = m->binary;
@@ -166,7 +166,7 @@ static PetscErrorCode ReadNodes2(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A block's dimension and number, as far as gmsh's own entities go. */
+/* Checks a block's dimension and number against gmsh's entities. */
 static PetscErrorCode CheckEntity(Msh *m, long long dim, long long tag)
 {
   PetscFunctionBegin;
@@ -210,7 +210,7 @@ static PetscErrorCode ReadNodes4(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes in the order of their tags. */
+/* Sorts the nodes by tag. */
 static PetscErrorCode SortNodes(HycoMsh *mesh)
 {
   const PetscInt n = mesh->n_nodes;
@@ -261,7 +261,7 @@ static PetscInt FindNode(const HycoMsh *mesh, long long tag)
   PetscInt at;
 
   if (!n || tag < mesh->tag[0] || tag > mesh->tag[n - 1]) return -1;
-  if (mesh->tag[n - 1] - mesh->tag[0] == n - 1) return (PetscInt)tag - mesh->tag[0]; /* no tag is missing */
+  if (mesh->tag[n - 1] - mesh->tag[0] == n - 1) return (PetscInt)tag - mesh->tag[0]; /* the tags are consecutive */
   return PetscFindInt((PetscInt)tag, n, mesh->tag, &at) || at < 0 ? -1 : at;
 }
 
@@ -285,7 +285,7 @@ static PetscErrorCode FindGroup(HycoMsh *mesh, int dim, int tag, PetscInt *index
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The group's name; sets it at the first use. */
+/* The group's name, set at the first use. */
 static const char *GroupName(Msh *m, HycoMshGroup *g)
 {
   if (!g->name[0]) snprintf(g->name, sizeof(g->name), "group_%d_%d", g->dim, g->tag);
@@ -300,7 +300,7 @@ static const char *GroupName(Msh *m, HycoMshGroup *g)
   "hyco supports line2, tri3, quad4, tet4 and hex8, and of second order tri6, quad8, quad9, tet10, hex20 and hex27: "  \
   "mesh the bodies with one of these"
 
-/* Of a type that is refused. */
+/* Names of types that are refused. */
 static const char *TypeName(long long type)
 {
   switch (type) {
@@ -339,7 +339,7 @@ static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long lo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tag and the nodes of one element of a type that is known. */
+/* Reads the tag and the nodes of one element of a known type. */
 static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long type, PetscInt node[])
 {
   PetscFunctionBegin;
@@ -363,7 +363,7 @@ static PetscErrorCode CheckType(Msh *m, long long type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tags of an element of format 2.2: its group (0: none), its entity, perhaps its partition. */
+/* Reads the tags of an element in format 2.2: its group (0: none), its entity, possibly its partition. */
 static PetscErrorCode ReadTags2(Msh *m, long long n, long long *group)
 {
   PetscFunctionBegin;
@@ -411,7 +411,7 @@ static PetscErrorCode ReadElements2(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The elements of a block go to the groups of its entity. */
+/* Adds the elements of a block to the groups of its entity. */
 static PetscErrorCode ReadBlock4(Msh *m, long long dim, long long entity, long long type, size_t n, long long least,
                                  long long most)
 {
@@ -478,7 +478,7 @@ static PetscErrorCode ReadElements(Msh *m)
 
 /* -- entities and names -- */
 
-/* A list of an entity: its groups, whose sign is an orientation, or what bounds it. */
+/* Reads a list of an entity: its groups, whose sign is an orientation, or its boundary. */
 static PetscErrorCode ReadList(Msh *m, PetscBool groups, int dim, long long entity)
 {
   size_t n;
@@ -535,7 +535,7 @@ static const char *NextLine(Msh *m)
   return line;
 }
 
-/* The one name in quotes, of at most 126 bytes, that is the rest of a line. */
+/* Reads the rest of a line as one name in quotes, of at most 126 bytes. */
 static PetscBool ReadQuoted(const char *text, char name[128])
 {
   const char *end;
@@ -549,7 +549,7 @@ static PetscBool ReadQuoted(const char *text, char name[128])
   return (PetscBool)(*end == '\n' || !*end);
 }
 
-/* A line each: dimension, tag, "name"; text in binary files too. */
+/* One line each: dimension, tag, "name"; text in binary files too. */
 static PetscErrorCode ReadNames(Msh *m)
 {
   const char *line = NextLine(m);
@@ -572,7 +572,7 @@ static PetscErrorCode ReadNames(Msh *m)
               m->path, (int)PetscMin(strcspn(line, "\r\n"), 40), line);
     name.dim = (int)dim;
     name.tag = (int)tag;
-    if (!(m->n_names & (m->n_names + 1))) /* one below a power of 2: as much again */
+    if (!(m->n_names & (m->n_names + 1))) /* one below a power of 2: double the size */
       PetscCall(PetscRealloc((2 * m->n_names + 2) * sizeof(name), &m->name));
     m->name[m->n_names++] = name;
   }
@@ -603,7 +603,7 @@ static PetscErrorCode ReadFormat(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sections that are not needed ($Periodic, post-processing data) are passed over, line by line. */
+/* Skips sections that are not needed ($Periodic, post-processing data) line by line. */
 static PetscErrorCode ReadSections(Msh *m)
 {
   const char *line;

@@ -8,12 +8,12 @@
 typedef struct {
   int dim, tag;
   char name[256]; /* as in the file, or group_DIM_TAG */
-  PetscInt n, nv; /* elements, nodes of each */
-  PetscInt *id;   /* n, tags */
+  PetscInt n, nv; /* number of elements, and of nodes of each */
+  PetscInt *id;   /* n tags */
   PetscInt *node; /* n x nv, indices of the file's nodes */
   PetscInt room;
-  PetscInt body;  /* for the caller */
-  PetscInt inner; /* for the caller */
+  PetscInt body;  /* used by the caller */
+  PetscInt inner; /* used by the caller */
 } HycoMshGroup;
 
 typedef struct {
@@ -24,11 +24,11 @@ typedef struct {
   HycoMshGroup *group; /* by dimension and tag */
 } HycoMsh;
 
-/* Reads a file of format 2.2 or 4.1; fails unless its counts, tags, types and nodes agree. The caller destroys what it
-   gives, after a failure too. One process. */
+/* Reads a file of format 2.2 or 4.1; fails unless its counts, tags, types and nodes are consistent. The caller
+   destroys the result, also after a failure. One process. */
 PetscErrorCode HycoMshRead(const char path[], HycoMsh *mesh);
-/* Makes hex27 of the file's hex20, quad9 of its quad8 (face_nodes.c); new nodes have the next tags, in the order of
-   their faces' corners. */
+/* Converts the file's hex20 to hex27, and its quad8 to quad9 (face_nodes.c); new nodes get the next tags, in the
+   order of their faces' corners. */
 PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh);
 PetscErrorCode HycoMshDestroy(HycoMsh *mesh);
 

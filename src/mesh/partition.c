@@ -1,7 +1,6 @@
 /*
-  A PetscPartitioner that cuts the graph of cells that share a facet, with heavy edges between the cells on the two
-  sides of a contact, so that no cut separates them. METIS, or PT-Scotch (through PETSc) by request and where METIS
-  fails.
+  A PetscPartitioner that cuts the graph of cells that share a facet. Edges between the cells on the two sides of a
+  contact are heavy, so that no cut separates them. METIS; PT-Scotch (through PETSc) on request and if METIS fails.
 */
 #include "plex.h"
 #include <metis.h>
@@ -32,7 +31,7 @@ static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pai
              PETSC_ERR_LIB, "METIS_MeshToDual failed");
   PetscCall(PetscFree2(eptr, eind));
   PetscCall(HycoMeshNodeCells(m, &start, &around));
-  /* One tie a pair of nodes: the first cell of each. extra_of counts, tie lists both ends. */
+  /* One edge for each pair of nodes, between the first cells of the two. extra_of counts, tie lists both ends. */
   PetscCall(PetscMalloc2(m->n_cells + 1, &extra_of, 2 * n_pairs, &tie));
   PetscCall(PetscArrayzero(extra_of, m->n_cells + 1));
   for (PetscInt k = 0; k < n_pairs; k++) {
@@ -101,7 +100,7 @@ static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, Pet
     j[k] = (PetscInt)g->adjncy[k];
     weight[k] = (PetscInt)g->weight[k];
   }
-  PetscCall(MatCreateMPIAdj(PETSC_COMM_SELF, n, n, i, j, weight, &graph)); /* takes the arrays */
+  PetscCall(MatCreateMPIAdj(PETSC_COMM_SELF, n, n, i, j, weight, &graph)); /* takes ownership of the arrays */
   PetscCall(MatPartitioningCreate(PETSC_COMM_SELF, &partitioning));
   PetscCall(MatPartitioningSetAdjacency(partitioning, graph));
   PetscCall(MatPartitioningSetType(partitioning, MATPARTITIONINGPTSCOTCH));
@@ -117,9 +116,9 @@ static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What DMPlexDistribute() does not hand on: the mesh, its contacts. Borrowed. */
+/* Data that DMPlexDistribute() does not pass on: the mesh and its contacts. Borrowed. */
 typedef struct {
-  HycoMesh mesh; /* NULL where there are no cells */
+  HycoMesh mesh; /* NULL if there are no cells */
   PetscInt n_pairs;
   const PetscInt *pairs;
   HycoPartitioner by;
@@ -140,7 +139,7 @@ static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells part by part. */
+/* Lists the cells by part. */
 static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, PetscInt n, PetscInt start[],
                                 PetscInt adjacent[], PetscSection weights,
                                 HYCO_EDGE_WEIGHTS_ARGUMENT PetscSection targets, PetscSection sizes, IS *partition)
@@ -178,7 +177,7 @@ static PetscErrorCode Create(PetscPartitioner partitioner)
   PetscFunctionBegin;
   PetscCall(PetscNew(&d));
   partitioner->data = d;
-  partitioner->noGraph = PETSC_TRUE; /* DMPlex's own has an edge for each vertex that two cells share */
+  partitioner->noGraph = PETSC_TRUE; /* DMPlex's graph would have an edge for each vertex that two cells share */
   partitioner->ops->partition = Partition;
   partitioner->ops->destroy = Destroy;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,13 +1,14 @@
 /*
-  The mesh as a DMPlex: cells and vertices, a DMLabel per group, the file's tags of both in an IS. Edges and faces are
-  no points of it unless it is refined: DMPlexInterpolate() of 1e6 hexahedra takes 31 s and 935 MB, the cells and
-  vertices 0.4 s and 172 MB. A facet of a group is then the value HYCO_FACET + its number in the cell, of the cell.
+  The mesh as a DMPlex: cells and vertices, a DMLabel per group, the file's tags of both in an IS. It has no edges and
+  faces unless it is refined: DMPlexInterpolate() of 1e6 hexahedra takes 31 s and 935 MB, cells and vertices take 0.4 s
+  and 172 MB. A facet of a group is therefore stored as a label value of its cell: HYCO_FACET + its number in the cell.
 */
 #include "plex.h"
 #include <stdlib.h>
 #include <string.h>
 
-/* The places of gmsh's nodes in DMPlex's cone of a cell; its own inverse. Cells of second order keep gmsh's order. */
+/* The positions of gmsh's nodes in DMPlex's cone of a cell; the permutation is its own inverse. Cells of second
+   order keep gmsh's order. */
 static const signed char cone_place[][8] = {{0, 1}, {0, 1, 2}, {0, 1, 2, 3}, {1, 0, 2, 3}, {0, 3, 2, 1, 4, 5, 6, 7}};
 static const PetscInt n_faces[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 6, 3, 4, 4, 4, 6, 6};
 static const DMPolytopeType plex_type[HYCO_N_CELL_TYPES] = {
@@ -38,7 +39,7 @@ static const signed char face[HYCO_N_CELL_TYPES][6][HYCO_FACET_NODES] = {
      {3, 0, 4, 7, 9, 10, 17, 15, 22},
      {4, 5, 6, 7, 16, 18, 19, 17, 25}}};
 
-/* The place of a node of a cell in its cone; type HYCO_N_CELL_TYPES: of what is no cell. */
+/* The position of a node of a cell in its cone; type HYCO_N_CELL_TYPES: for points that are not cells. */
 static PetscInt ConePlace(HycoCellType type, PetscInt node)
 {
   return type < HYCO_N_CELL_TYPES && !HycoCellKinds[type].quadratic ? cone_place[type][node] : node;
@@ -80,8 +81,9 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a cone of this size may be of a type, whose DMPlex's type it has: those of second order have all their nodes
-   in their cones, those of first order at most these (in DMs of edges and faces the sides), and with ties more. */
+/* Whether a cone of this size is possible for a type, given DMPlex's type: cells of second order have all their
+   nodes in their cones, those of first order at most these (in DMs with edges and faces the sides), and with ties
+   more. */
 static PetscBool ConeIsOf(HycoCellType type, PetscInt size, PetscBool tied)
 {
   if (HycoCellKinds[type].quadratic) return (PetscBool)(!tied && HycoCellKinds[type].nv == size);
@@ -104,7 +106,7 @@ static PetscErrorCode CellType(DM dm, PetscInt *type)
     DMPolytopeType of;
     PetscInt t = 0, size;
 
-    PetscCall(DMPlexGetConeSize(dm, c, &size)); /* of these types each has its own in a dimension */
+    PetscCall(DMPlexGetConeSize(dm, c, &size)); /* unique in each dimension for these types */
     if (size == last) continue;
     last = size;
     PetscCall(DMPlexGetCellType(dm, c, &of));
@@ -128,9 +130,9 @@ PetscErrorCode HycoPlexType(DM dm, PetscInt *type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- tables to a DM -- */
+/* -- from tables to a DM -- */
 
-/* DMPlex's own labels keep their names. */
+/* Names of DMPlex's own labels are reserved. */
 PetscBool HycoPlexOwnLabel(const char name[])
 {
   return (PetscBool)(!strcmp(name, "depth") || !strcmp(name, "celltype") || !strcmp(name, "marker"));
@@ -216,7 +218,7 @@ static PetscErrorCode AddLabels(DM dm, HycoMesh m)
     if (m) PetscCall(LabelName(m->group_name[g], sizeof(name), name));
     PetscCallMPI(MPI_Bcast(name, sizeof(name), MPI_CHAR, 0, comm));
     PetscCall(DMHasLabel(dm, name, &has));
-    if (has) continue; /* of groups of one name the first is meant */
+    if (has) continue; /* of groups with the same name the first is used */
     PetscCall(DMCreateLabel(dm, name));
     PetscCall(DMGetLabel(dm, name, &label));
     if (m) PetscCall(FillLabel(label, m, g));
@@ -237,7 +239,7 @@ PetscErrorCode HycoPlexSetTags(DM dm, PetscInt tag[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cones of the cells: their nodes, after these what their tied ones follow. */
+/* Sets the cones of the cells: their nodes, then the masters of their tied nodes. */
 static PetscErrorCode SetCones(DM dm, HycoMesh m)
 {
   PetscInt node[HYCO_MAX_CELL_NODES], cone[HYCO_MAX_CELL_NODES];
@@ -255,9 +257,9 @@ static PetscErrorCode SetCones(DM dm, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The DM of a mesh with ties, or of second order. A cell's cone says which cells are around a node, wherever that is
-   asked: of ranks that share it, of the overlap, of an RID. DMPlex would tell a cell's type by the size of its cone: it
-   is told. */
+/* Creates the DM of a mesh with ties, or of second order. With the masters in a cell's cone, every query for the
+   cells around a node finds it: for shared nodes, the overlap, an RID. The types of the cells are set, because
+   DMPlex would derive them from the size of the cones. */
 static PetscErrorCode FromCones(MPI_Comm comm, PetscInt dim, HycoMesh m, DM *dm)
 {
   PetscFunctionBegin;
@@ -304,7 +306,7 @@ PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- a DM to tables -- */
+/* -- from a DM to tables -- */
 
 typedef struct {
   PetscInt node[HYCO_FACET_NODES], cell, number;
@@ -314,14 +316,14 @@ typedef struct {
   DM dm;
   HycoScene scene;
   HycoMesh m;
-  PetscInt c0, c1, v0, v1;     /* cells, vertices */
+  PetscInt c0, c1, v0, v1;     /* ranges of cells and vertices */
   PetscBool facets_are_points; /* the DM is interpolated */
   const PetscInt *tag;         /* by point */
   PetscBool *owned, all_owned; /* by vertex */
   HycoTies ties;               /* borrowed; NULL: none */
-  PetscInt *node, *cell;       /* node of each vertex, cell of each DM's cell; -1: none */
+  PetscInt *node, *cell;       /* node of each vertex, cell of each cell of the DM; -1: none */
   PetscInt n_facets, room, node_room, cell_room;
-  Facet *facet; /* of the group at hand */
+  Facet *facet; /* of the current group */
 } Builder;
 
 static PetscErrorCode FindType(Builder *b)
@@ -349,7 +351,7 @@ static PetscErrorCode Order(PetscInt n, const PetscInt key[], PetscInt place[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The vertices that are this process's own. */
+/* Finds the vertices that this process owns. */
 static PetscErrorCode FindOwned(Builder *b)
 {
   PetscSF sf;
@@ -370,7 +372,7 @@ static PetscErrorCode FindOwned(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The vertices that a cell's tied ones follow: with ties, the end of its cone. */
+/* The masters of a cell's tied nodes: with ties, the end of its cone. */
 static PetscErrorCode FollowedVertices(const Builder *b, PetscInt cell, PetscInt *n, const PetscInt *vertex[])
 {
   PetscFunctionBegin;
@@ -381,7 +383,7 @@ static PetscErrorCode FollowedVertices(const Builder *b, PetscInt cell, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells that touch a vertex of this process's own, by tag. */
+/* Collects the cells that touch a vertex owned by this process, by tag. */
 static PetscErrorCode TakeCells(Builder *b)
 {
   HycoMesh m = b->m;
@@ -421,7 +423,7 @@ static PetscErrorCode TakeCells(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Their nodes, by tag, with coordinates. */
+/* Collects their nodes, by tag, with coordinates. */
 static PetscErrorCode TakeNodes(Builder *b)
 {
   HycoMesh m = b->m;
@@ -471,8 +473,8 @@ static PetscErrorCode TakeNodes(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Runs through a facet's nodes the other way round: its corners, of a face from the first on, and the middles of its
-   sides, of which the k-th follows the k-th corner. */
+/* Reverses the orientation of a facet: its corners, of a face from the first on, and the middles of its sides, of
+   which the k-th follows the k-th corner. */
 static void Reverse(HycoCellType type, PetscInt facet[])
 {
   const PetscInt corners = HycoCellKinds[type].corners, first = corners > 2;
@@ -492,7 +494,7 @@ static void Reverse(HycoCellType type, PetscInt facet[])
   }
 }
 
-/* Reverses the facet if its normal points into the cell. In 1D there is nothing to reverse. */
+/* Reverses the facet if its normal points into the cell. In 1D nothing is done. */
 static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
 {
   PetscReal inside[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, out = 0;
@@ -516,7 +518,7 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
   if (out < 0) Reverse(m->type, facet);
 }
 
-/* Facets beside this process's own nodes; `number` is the facet's in its cell. */
+/* Adds a facet with a node that this process owns; `number` is its number in its cell. */
 static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt number, const PetscInt node[])
 {
   HycoMesh m = b->m;
@@ -569,7 +571,7 @@ static PetscErrorCode AddCell(Builder *b, PetscInt group, PetscInt cell)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A facet that is a point bounds one cell, or lies between two: no boundary then. */
+/* A facet that is a point of the DM bounds one cell, or lies between two and is then no boundary. */
 static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, const PetscInt node[])
 {
   HycoMesh m = b->m;
@@ -596,7 +598,7 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A point of a label, which has the closure of its points: to the group as a node, a cell or a facet. */
+/* Adds a point of a label, which contains the closure of its points, to the group as a node, a cell or a facet. */
 static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, PetscInt p)
 {
   HycoMesh m = b->m;
@@ -719,7 +721,7 @@ static PetscErrorCode TakeGroups(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every cell lies in the group of one body. */
+/* Assigns each cell to the group of its one body. */
 static PetscErrorCode TakeBodies(Builder *b)
 {
   HycoMesh m = b->m;
@@ -745,7 +747,7 @@ static PetscErrorCode TakeBodies(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tables of this process's part, without what only all can tell. */
+/* Makes the tables of this process's part, without the data that needs communication. */
 static PetscErrorCode MakeTables(Builder *b)
 {
   IS tags;
@@ -803,7 +805,8 @@ static PetscErrorCode Number(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The whole mesh's length; a type, and dimensions of groups, that a process without their points does not know. */
+/* Makes consistent on all ranks: the whole mesh's length; the cell type, and the dimensions of groups, which a
+   process without their points does not know. */
 static PetscErrorCode AgreeOnGroups(MPI_Comm comm, HycoMesh m)
 {
   PetscInt head[3] = {m->n_cells ? (PetscInt)m->type : -1, m->nv, m->nf};
@@ -821,7 +824,7 @@ static PetscErrorCode AgreeOnGroups(MPI_Comm comm, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The closure of a group of cells has facets: they are none of the group's. */
+/* Removes the facets in the closure of a group of cells: they do not belong to the group. */
 static void DropInnerFacets(HycoMesh m)
 {
   PetscInt n = 0;
@@ -858,7 +861,7 @@ PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh)
   if (size > 1) PetscCall(AgreeOnGroups(comm, b.m));
   DropInnerFacets(b.m);
   PetscCall(PetscStrlen(scene->mesh_path, &length));
-  if (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0)) /* no reader has seen to it */
+  if (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0)) /* no reader has checked it */
     ierr = CheckGroups(comm, b.m, scene);
   if (size > 1 && !ierr) ierr = Number(&b);
   PetscCall(PetscFree(b.owned));

@@ -1,4 +1,4 @@
-/* The mesh as a DMPlex, inside src/mesh. */
+/* The mesh as a DMPlex: private to src/mesh. */
 #ifndef PLEX_H
 #define PLEX_H
 
@@ -10,37 +10,38 @@
    interpolated). */
 #define HYCO_FACET 10
 
-/* The IS of the file's tags of all points of this process, 0 for edges and faces, that is composed with the DM. */
+/* The IS, composed with the DM, of the file's tags of all points of this process, 0 for edges and faces. */
 #define HYCO_TAGS "HycoTags"
-/* Attaches the file's tags of all points of this process (ownership passes). */
+/* Attaches the file's tags of all points of this process; takes ownership. */
 PetscErrorCode HycoPlexSetTags(DM dm, PetscInt tag[]);
-/* Rank 0's tables (NULL elsewhere) as a DM that is not distributed. Collective. */
+/* Creates a DM from rank 0's tables (NULL elsewhere), not distributed. Collective. */
 PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh mesh, DM *dm);
-/* Sends the tags of a DM's points after them, along the star forest that they took to another DM. Collective. */
+/* Sends the tags of a DM's points along the star forest of their distribution to another DM. Collective. */
 PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to);
-/* Halves all cells `times` times. Vertices that are new get tags beyond those there, in the order of their parents'.
-   The DM must have no overlap. Groups go along; fails for one of the scene's whose lines or facets the DM does not
-   know. Collective. */
+/* Halves all cells `times` times. New vertices get tags above the existing ones, in the order of their parents'. The
+   DM must have no overlap. Groups are refined too; fails for one of the scene's whose lines or facets the DM does
+   not know. Collective. */
 PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times);
-/* The vertices of a point; of a cell in gmsh's order (type: HYCO_N_CELL_TYPES for what is no cell). `interpolated`:
-   edges and faces are points of the DM. */
+/* The vertices of a point; of a cell in gmsh's order (type: HYCO_N_CELL_TYPES for points that are not cells).
+   `interpolated`: edges and faces are points of the DM. */
 PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type, PetscInt point, PetscInt n,
                                 PetscInt vertex[]);
 /* The HycoCellType of the cells. Collective. */
 PetscErrorCode HycoPlexType(DM dm, PetscInt *type);
 /* Whether a label of this name is DMPlex's own. */
 PetscBool HycoPlexOwnLabel(const char name[]);
-/* How many facets a cell has; the nodes of facet `number`, in gmsh's order: corners, middles of the sides, its own. */
+/* The number of facets of a cell; the nodes of facet `number`, in gmsh's order: corners, middles of the sides,
+   middle of the face. */
 PetscInt HycoFacetCount(HycoCellType type);
 const signed char *HycoFacetNodes(HycoCellType type, PetscInt number);
 
 /* The registered PetscPartitioner type HYCO_PARTITIONER, for a mesh (this process's; NULL: no cells) with contacts,
-   pairs of node indices. Both are borrowed until the partitioner has done its work. */
+   pairs of node indices. Both are borrowed until the partitioner has finished. */
 #define HYCO_PARTITIONER "hyco"
 PetscErrorCode HycoPartitionerSetMesh(PetscPartitioner partitioner, HycoMesh mesh, PetscInt n_pairs,
                                       const PetscInt pairs[], HycoPartitioner by);
 
-/* PETSc's own HDF5 format, with the tags. A DM that has an overlap is not for writing. Collective. */
+/* Writes PETSc's HDF5 format, with the tags. The DM must have no overlap. Collective. */
 PetscErrorCode HycoPlexWrite(DM dm, const char path[]);
 PetscErrorCode HycoPlexRead(MPI_Comm comm, const char path[], DM *dm);
 

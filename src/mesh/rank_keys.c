@@ -1,5 +1,5 @@
-/* The place of each key among all different keys of all processes: process r sorts those of the r-th share of the
- * range. */
+/* The place of each key among all different keys of all processes: process r sorts the keys of the r-th part of the
+   range. */
 #include "plex.h"
 #include <stdlib.h>
 
@@ -10,14 +10,14 @@ static int Compare(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-/* counts[r] and start[r] of what goes to process r, in n items sorted by `to`. */
+/* counts[r] and start[r] of the items for process r, in n items sorted by `to`. */
 static void Offsets(PetscMPIInt size, const PetscMPIInt counts[], PetscMPIInt start[])
 {
   start[0] = 0;
   for (PetscMPIInt r = 0; r < size; r++) start[r + 1] = start[r] + counts[r];
 }
 
-/* The places of the n keys that this process has to sort, among all of its own; *n_own of them are different. */
+/* The places of the n keys that this process sorts, among its own; *n_own of them are different. */
 static PetscErrorCode RankOwn(PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *n_own)
 {
   PetscInt64 *sorted;
@@ -54,7 +54,7 @@ PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], P
   Offsets(size, n_receive, receive);
   PetscCall(PetscMalloc4(n, &out, n, &at, n, &back, receive[size], &in));
   PetscCall(PetscMalloc1(receive[size], &ranked));
-  for (PetscInt k = 0; k < n; k++) { /* send[r] runs to the end of r's keys, and is set back below */
+  for (PetscInt k = 0; k < n; k++) { /* send[r] advances to the end of r's keys, and is reset below */
     at[k] = send[key[k] / share]++;
     out[at[k]] = key[k];
   }

@@ -1,6 +1,6 @@
 /*
-  A mesh file that has been read, checked against the scene and brought to tables on one process: cells of one type,
-  each in one body, facets that bound exactly one cell.
+  Checks a mesh file against the scene and converts it to tables on one process: cells of one type, each in one body,
+  facets that bound exactly one cell.
 */
 #include <hycomesh.h>
 #include "msh.h"
@@ -12,12 +12,12 @@ typedef struct {
   HycoMsh file;
   PetscInt n_groups;
   Group *group;             /* of the file */
-  PetscInt *index;          /* of each node of the file among the mesh's, or -1 */
-  PetscInt *last, *before;  /* of each cell its last facet, of each facet the cell's one before, or -1 */
+  PetscInt *index;          /* for each node of the file its index in the mesh, or -1 */
+  PetscInt *last, *before;  /* for each cell its last facet, for each facet the previous one of the cell, or -1 */
   PetscInt *start, *around; /* the cells around each node */
 } Reader;
 
-/* Every body is a group of cells, all of one type; other groups may be anything below. */
+/* Every body is a group of cells, all of one type; other groups may have any lower dimension. */
 static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
 {
   PetscInt cells = 0, nv = 0;
@@ -60,7 +60,8 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
   HycoCheck(HycoCellKinds[m->type].dim == m->dim && HycoCellKinds[m->type].nv == nv,
             "%s: cells of dimension %d with %d nodes are of no type that hyco supports", scene->mesh_path, (int)m->dim,
             (int)nv);
-  if (m->type == HYCO_HEX20 && scene->n_contacts) { /* a uniform pressure would pull at the corners of quad8 */
+  if (m->type == HYCO_HEX20 && scene->n_contacts) { /* the corners of quad8 would have negative forces under a
+                                                       uniform pressure */
     PetscCall(HycoMshAddFaceNodes(scene->mesh_path, &r->file));
     m->type = HYCO_HEX27;
   }
@@ -70,7 +71,7 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells in the order of their tags, with the file's nodes for now. */
+/* Collects the cells in the order of their tags, still with the file's node indices. */
 static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m)
 {
   PetscInt *order, *tag, *body, n = 0;
@@ -142,7 +143,7 @@ static PetscBool CellHas(HycoMesh m, PetscInt cell, PetscInt n, const PetscInt n
   return PETSC_TRUE;
 }
 
-/* A file may have a facet of a group several times: one counts. */
+/* Whether the facet is already in the group: a file may list it several times, and it counts once. */
 static PetscBool HasTwin(const Reader *r, HycoMesh m, PetscInt cell, PetscInt group, const PetscInt facet[])
 {
   for (PetscInt f = r->last[cell]; f >= 0; f = r->before[f]) {
@@ -180,7 +181,7 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
     }
     HycoCheck(n > 0, "%s: facet %ld of group \"%s\" is not a facet of any cell of a body", scene->mesh_path,
               (long)g->id[f], g->name);
-    if (n > 1) { /* between two cells: no boundary, but its nodes are still in the group */
+    if (n > 1) { /* between two cells: not a boundary, but its nodes are in the group */
       g->inner++;
       continue;
     }
@@ -258,7 +259,7 @@ static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A load pushes on a boundary, not between two cells, and a surface of springs holds one. */
+/* A load must act on a boundary, not between two cells, and so must a surface of springs. */
 static PetscErrorCode CheckLoads(HycoScene scene, Reader *r)
 {
   PetscFunctionBegin;
@@ -279,7 +280,7 @@ static PetscErrorCode CheckLoads(HycoScene scene, Reader *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two cells with the same nodes: a cell saved once per group, as format 2.2 does. */
+/* Detects two cells with the same nodes: format 2.2 stores a cell once for each of its groups. */
 static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m, const PetscInt start[], const PetscInt around[])
 {
   PetscFunctionBegin;

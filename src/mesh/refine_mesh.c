@@ -1,13 +1,13 @@
 /*
-  Uniform refinement. The DM is interpolated for it, so that facets are points: a group's label then has its facets and
-  cells with their closure, and DMPlex hands labels on to what the points become.
+  Uniform refinement. The DM is interpolated for it, so that facets are points: a group's label then contains its facets
+  and cells with their closure, and DMPlex transfers labels to the refined points.
 */
 #include "plex.h"
 #include <hycocontactimpl.h>
 #include <petscdmplextransform.h>
 #include <string.h>
 
-/* The facet with this number of a cell, as a point of the interpolated DM. */
+/* The facet of a cell with this number, as a point of the interpolated DM. */
 static PetscErrorCode FacetPoint(DM dm, HycoCellType type, PetscInt nv, PetscInt nf, PetscInt cell, PetscInt number,
                                  PetscInt *facet)
 {
@@ -32,7 +32,7 @@ static PetscErrorCode FacetPoint(DM dm, HycoCellType type, PetscInt nv, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points of a group itself: its cells, its facets, or its vertices where it is made of points. */
+/* The points of a group: its cells, its facets, or its vertices if it consists of points. */
 static PetscErrorCode AddOwnPoints(DM dm, HycoCellType type, PetscInt nv, PetscInt nf, DMLabel from, DMLabel to)
 {
   PetscInt dim, n_values, n, facet = -1;
@@ -67,7 +67,7 @@ static PetscErrorCode AddOwnPoints(DM dm, HycoCellType type, PetscInt nv, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the scene speaks of a group. */
+/* Whether the scene uses a group. */
 static PetscBool IsNamed(HycoScene scene, const char group[])
 {
   for (PetscInt k = 0; k < scene->n_fixed; k++) {
@@ -87,7 +87,8 @@ static PetscBool IsNamed(HycoScene scene, const char group[])
   return PETSC_FALSE;
 }
 
-/* Vertices of a group that no cell or facet of it accounts for: lines in space, or facets between cells. */
+/* Refuses vertices of a group that belong to none of its cells or facets: those of lines in space, or of facets
+   between cells. */
 static PetscErrorCode CheckVertices(DM dm, HycoScene scene, const char name[], DMLabel from, DMLabel to)
 {
   PetscInt n, v0, v1, value;
@@ -116,7 +117,7 @@ static PetscErrorCode CheckVertices(DM dm, HycoScene scene, const char name[], D
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The DM with its edges and faces, and labels of facets that are points. */
+/* Interpolates the DM, and its labels of facets. */
 static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)*dm);
@@ -163,7 +164,7 @@ static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points that one point becomes of type `type`; n = 0: none. The r-th is DMPlexTransformGetTargetPoint(). */
+/* The points of type `type` into which a point is refined; n = 0: none. The r-th is DMPlexTransformGetTargetPoint(). */
 static PetscErrorCode CountChildren(DMPlexTransform transform, PetscInt p, DMPolytopeType from, DMPolytopeType type,
                                     PetscInt *n)
 {
@@ -179,7 +180,7 @@ static PetscErrorCode CountChildren(DMPlexTransform transform, PetscInt p, DMPol
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a new vertex on a point is told from others of its kind by: the tags of two vertices, or a cell's. */
+/* The key that identifies a new vertex on a point: the tags of two vertices, or a cell's. */
 static PetscErrorCode Key(DM dm, const PetscInt tag[], PetscInt p, PetscInt depth, PetscInt dim, PetscInt64 *key)
 {
   PetscInt vertex[4], least = 0;
@@ -190,11 +191,13 @@ static PetscErrorCode Key(DM dm, const PetscInt tag[], PetscInt p, PetscInt dept
   if (depth == dim) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoPlexVertices(dm, PETSC_TRUE, HYCO_N_CELL_TYPES, p, n, vertex));
   for (PetscInt v = 1; v < n; v++) least = tag[vertex[v]] < tag[vertex[least]] ? v : least;
-  *key = (PetscInt64)tag[vertex[least]] * ((PetscInt64)1 << 31) + tag[vertex[(least + n / 2) % n]]; /* and opposite */
+  *key = (PetscInt64)tag[vertex[least]] * ((PetscInt64)1 << 31) + tag[vertex[(least + n / 2) % n]]; /* and its
+                                                                                                       opposite
+                                                                                                       vertex */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tags of the vertices in the middle of edges (depth 1), faces or cells, after those below *last. */
+/* Assigns tags to the vertices in the middle of edges (depth 1), faces or cells, after those below *last. */
 static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscInt tag[], PetscInt depth, PetscInt *last,
                                  PetscInt new_tag[])
 {
@@ -225,7 +228,7 @@ static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tags of the cells: in the order of their parents'. */
+/* Assigns tags to the cells in the order of their parents'. */
 static PetscErrorCode TagCells(DM dm, DMPlexTransform transform, const PetscInt tag[], PetscInt new_tag[])
 {
   PetscInt c0, c1, *place, total;

@@ -1,8 +1,8 @@
 /*
-  Tied nodes: u_slave = sum of weights times u_master. The unknown in the place of a slave's displacement is what it
-  differs by, which is 0, so that the bodies on both sides share the masters' unknowns. A cell with a tied node has
-  rows and columns for the nodes that this one follows: they end its cone in the DM (plex.c), and whoever asks for
-  the cells around a node finds it.
+  Tied nodes: u_slave = sum of weights times u_master. The unknown of a slave's displacement is replaced by the
+  difference from this sum, which is 0, so that the bodies on both sides share the masters' unknowns. A cell with a tied
+  node has rows and columns for its masters: they are at the end of its cone in the DM (plex.c), so that queries for the
+  cells around a node include it.
 */
 #include <hycomesh.h>
 
@@ -92,7 +92,7 @@ PetscErrorCode HycoTiesOf(DM dm, HycoTies *ties)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One past the last entry of the slave that entry k is of. */
+/* One past the last entry of the slave of entry k. */
 static PetscInt End(HycoTies t, PetscInt k)
 {
   PetscInt end = k + 1;
@@ -101,7 +101,7 @@ static PetscInt End(HycoTies t, PetscInt k)
   return end;
 }
 
-/* The tied nodes of the mesh and their masters. node: nodes by ascending tag (tag). */
+/* Finds the tied nodes of the mesh and their masters. node: nodes by ascending tag (tag). */
 static PetscErrorCode FindTied(HycoMesh m, const PetscInt tag[], const PetscInt node[])
 {
   HycoTies t = m->ties;
@@ -143,7 +143,7 @@ static PetscErrorCode FindTied(HycoMesh m, const PetscInt tag[], const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes that a cell's own follow and that are none of these, ascending; their number. */
+/* The masters of a cell's nodes that are not nodes of the cell, ascending; returns their number. */
 static PetscInt Follow(HycoMesh m, PetscInt cell, PetscInt follow[])
 {
   const PetscInt *own = m->cells + cell * m->nv;

@@ -1,13 +1,13 @@
 /*
-  The offline phase (sections 4.1, 4.2, 5): snapshots -> POD -> DEIM -> RID -> sets -> reduced model -> file.
-  The mesh and the matrices of snapshots are spread over the ranks; the reduced mesh and the model live on rank 0.
+  The offline phase (sections 4.1, 4.2, 5): snapshots -> POD -> DEIM -> RID -> sets -> reduced model -> file. The mesh
+  and the snapshot matrices are distributed over the ranks; the reduced mesh and the model are on rank 0.
 */
 #include <hycoalgorithms.h>
 #include <hycofile.h>
 #include <hycoreducerimpl.h>
 #include <string.h>
 
-/* The mesh over the ranks, its contacts on rank 0, its sizes everywhere. */
+/* Reads the distributed mesh, its contacts on rank 0, its sizes on all ranks. */
 static PetscErrorCode ReadMesh(HycoReducer t)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -31,7 +31,7 @@ static PetscErrorCode ReadMesh(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What moved surfaces meet, in t->met: every contact's masters at the training points and over the ranges, as far as
+/* For moved surfaces, finds in t->met every contact's masters at the training points and over the ranges, as far as
    contacts may close. Rank 0. */
 static PetscErrorCode Meet(HycoReducer t, HycoROM m)
 {
@@ -49,8 +49,8 @@ static PetscErrorCode Meet(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes beside the RID that the model's mesh has: those of every contact, of moved surfaces all; and the groups
-   whose facets it has, wherever their cells are. By node of the contacts' surfaces. */
+/* The nodes outside the RID that belong to the model's mesh: those of every contact, for moved surfaces all; and the
+   groups of which it has all facets, whether or not it has their cells. By node of the contacts' surfaces. */
 static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n_all, PetscInt all[])
 {
   HycoMesh surface = t->fom->surface;
@@ -67,17 +67,17 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells of the part in Omega_A, of a greedy training in those before too. Collective. */
+/* The cells of the part in Omega_A; in greedy training also those of the previous RIDs. Collective. */
 static PetscErrorCode FindCells(HycoReducer t, PetscBool in[])
 {
-  const HycoRIDRecipe recipe = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell,
-                                t->layers,       t->extension,    t->n_groups,   t->groups,
-                                t->plane,        t->region,       t->whole_rid,  t->prototype->traits.cells};
+  const HycoRIDSettings settings = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell,
+                                    t->layers,       t->extension,    t->n_groups,   t->groups,
+                                    t->plane,        t->region,       t->whole_rid,  t->prototype->traits.cells};
   HycoMesh part = t->fom->part;
   DMLabel rid;
 
   PetscFunctionBegin;
-  HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->fom, t->fom->searches ? &t->met.rows : &t->fom->pairs, &recipe, &rid));
+  HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->fom, t->fom->searches ? &t->met.rows : &t->fom->pairs, &settings, &rid));
   for (PetscInt e = 0; e < part->n_cells; e++) {
     PetscCall(DMLabelStratumHasPoint(rid, HYCO_RID, part->cell_point[e], &in[e]));
     if (t->grown) t->grown[e] = in[e] = (PetscBool)(in[e] || t->grown[e]);
@@ -86,7 +86,7 @@ static PetscErrorCode FindCells(HycoReducer t, PetscBool in[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The RID's cells and the contacts' surfaces on rank 0; elsewhere NULL. */
+/* Gathers the RID's cells and the contacts' surfaces on rank 0; elsewhere NULL. */
 static PetscErrorCode GatherCells(HycoReducer t, const PetscBool in[], HycoMesh *mesh)
 {
   HycoMesh part = t->fom->part;
@@ -107,8 +107,8 @@ static PetscErrorCode GatherCells(HycoReducer t, const PetscBool in[], HycoMesh 
 }
 
 /* The model's mesh of the cells in[] (NULL: all) of `from`: these, their nodes, the nodes and surfaces of every
-   contact; its nodes' numbers in the distributed vectors; the node of it that each of the surfaces' is (-1: none).
-   Rank 0. */
+   contact; its nodes' numbers in the distributed vectors; for each node of the surfaces its node of that mesh (-1:
+   none). Rank 0. */
 static PetscErrorCode ExtractMesh(HycoReducer t, HycoMesh from, const PetscBool in[], HycoROM m, PetscInt **global)
 {
   HycoMesh surface = t->fom->surface;
@@ -159,7 +159,7 @@ static PetscErrorCode ExtractMesh(HycoReducer t, HycoMesh from, const PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What only a node's own rank knows: whether it has a cell outside Omega_A, and which of its components are fixed. */
+/* Known only on a node's own rank: whether it has a cell outside Omega_A, and which of its components are fixed. */
 #define BESIDE 8
 
 static PetscErrorCode FetchNotes(HycoReducer t, const PetscBool in[], PetscInt n, const PetscInt global[],
@@ -188,7 +188,7 @@ static PetscErrorCode FetchNotes(HycoReducer t, const PetscBool in[], PetscInt n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model's sets by what its nodes' ranks know. Rank 0. */
+/* Sets the model's index sets from these data. Rank 0. */
 static PetscErrorCode TakeSets(HycoReducer t, HycoROM m, const PetscInt note[])
 {
   HycoFOM f = t->fom;
@@ -200,7 +200,7 @@ static PetscErrorCode TakeSets(HycoReducer t, HycoROM m, const PetscInt note[])
   for (PetscInt k = 0; k < n * dim; k++) t->fixed[k] = (PetscBool)((note[k / dim] >> k % dim & 1) != 0);
   PetscCall(PetscMalloc1(n, &m->role));
   for (PetscInt i = 0; i < n; i++) m->role[i] = HYCO_ROLE_OUTSIDE;
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) { /* connected to Omega_B, or not */
+  for (PetscInt e = 0; e < m->mesh->n_cells; e++) { /* whether connected to Omega_B */
     PetscInt node[HYCO_MAX_CELL_NODES];
     const PetscInt n_nodes = HycoMeshCellNodes(m->mesh, e, node);
 
@@ -214,7 +214,7 @@ static PetscErrorCode TakeSets(HycoReducer t, HycoROM m, const PetscInt note[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Omega_A, chosen on all ranks; on rank 0 the reduced mesh and its sets. Collective; m: on rank 0. */
+/* Chooses Omega_A on all ranks; creates on rank 0 the reduced mesh and its sets. Collective; m: on rank 0. */
 static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
 {
   HycoMesh gathered = NULL;
@@ -282,7 +282,7 @@ PetscErrorCode HycoTrainingAddFact(HycoTraining *r, const char name[], PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Greedy: more modes than unknowns in A would leave some without an equation. Collective; m: on rank 0. */
+/* Greedy: with more modes than unknowns in A, some would have no equation. Collective; m: on rank 0. */
 static PetscErrorCode LimitModes(HycoReducer t, HycoROM m)
 {
   const PetscInt dim = t->sizes[3], l = t->l;
@@ -298,7 +298,7 @@ static PetscErrorCode LimitModes(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes on the reduced mesh, the training points, where it all came from. */
+/* Stores the modes on the reduced mesh, the training points, and the origin of the data. */
 static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
 {
   const PetscInt n_dof = m->mesh->n_nodes * t->sizes[3];
@@ -325,7 +325,7 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
            PETSC_VERSION_MINOR, PETSC_VERSION_SUBMINOR);
   PetscCall(PetscStrallocpy(line, &m->provenance));
   snprintf(m->fingerprint, sizeof(m->fingerprint), "%016llx", t->fingerprint);
-  /* the model has a scene of its own, read from the text it will carry */
+  /* the model has its own scene, read from the text stored in its file */
   PetscCall(HycoSceneToText(t->scene, &text));
   PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene));
   PetscCall(PetscFree(text));
@@ -335,9 +335,9 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   PetscFunctionBegin;
-  r->n_facts = 0; /* of the iteration before */
+  r->n_facts = 0; /* of the previous iteration */
   r->stiffness = m->traits.stiffness;
-  r->chosen.recipe.rid = (PetscBool)(m->traits.settings == HYCO_SETTINGS_RID);
+  r->chosen.settings.rid = (PetscBool)(m->traits.settings == HYCO_SETTINGS_RID);
   r->n_samples = m->n_points;
   r->n_modes = t->l;
   r->n_dual_modes = t->counts[HYCO_SEED_DUAL];
@@ -359,14 +359,15 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A model that reconstructs forces from its own has none without a contact, also where its training solutions press. */
+/* Refuses a model without a contact in its RID whose training solutions have contact forces, if it reconstructs
+   forces from those in the RID. */
 static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
 {
   PetscBool presses = PETSC_FALSE, kept = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectSetOptions((PetscObject)t->prototype, t->scene->options));
-  PetscCall(HycoROMSetFromOptions(t->prototype)); /* as the model when it predicts */
+  PetscCall(HycoROMSetFromOptions(t->prototype)); /* as for the model's predictions */
   for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
   HycoCheckModel(!m->ops->reconstruct || !t->prototype->reconstruct || kept || !presses,
@@ -376,7 +377,7 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A model that misses its own training solutions by half is refused. */
+/* Refuses a model whose errors on its own training solutions reach one half. */
 static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
 {
   char worst[HYCO_LINE] = "";
@@ -393,7 +394,7 @@ static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: the model on its RID; nothing that is online. */
+/* Rank 0: builds the model on its RID, without online data. */
 static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, HycoTraining *report)
 {
   PetscFunctionBegin;
@@ -407,7 +408,7 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: a model that knows what its contacts meet. */
+/* Rank 0: creates a model with the masters that its contacts meet. */
 static PetscErrorCode BeginOnRoot(HycoReducer t, HycoROM *model)
 {
   PetscErrorCode ierr;
@@ -432,7 +433,7 @@ static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *mode
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The snapshots' and modes' rows at the nodes of the model's mesh, on rank 0. Collective. */
+/* Fetches the snapshots' and modes' rows at the nodes of the model's mesh to rank 0. Collective. */
 static PetscErrorCode FetchOnModel(HycoReducer t, HycoROM m)
 {
   const PetscInt n = m ? m->mesh->n_nodes : 0, *node = m ? m->mesh->node_whole : NULL;
@@ -462,7 +463,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   HycoOnRoot(HycoComm(t), BuildOnRoot(t, useful, model, report));
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
-  report->type = report->chosen.recipe.type = t->prototype->type; /* each rank's own */
+  report->type = report->chosen.settings.type = t->prototype->type; /* set on each rank */
   PetscCall(HycoROMBroadcast(HycoComm(t), model));
   if (!useful || !t->prototype->ops->finish) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_TRUE));
@@ -471,7 +472,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
   PetscCall(HycoROMReset(*model));
-  PetscCall(HycoROMBroadcast(HycoComm(t), model)); /* with what was found */
+  PetscCall(HycoROMBroadcast(HycoComm(t), model)); /* with the results */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -495,7 +496,7 @@ PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model's place can be written before hours of work. */
+/* Checks before the long computation that the model file can be written. */
 static PetscErrorCode CheckWritable(const char path[])
 {
   HycoFile probe;
@@ -543,11 +544,11 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many points to judge by, when nobody says: enough for a bound of 95 % of the points to come where the training is
-   large enough to pay for them. */
+/* Default number of held-out points: enough for a bound for 95 % of future points if the training is large enough to
+   justify their cost. */
 #define LEAST_HELD 20
 #define MOST_HELD  30
-#define TOGETHER   3 /* that share a stiffness, where loads or gaps are parameters too */
+#define TOGETHER   3 /* that share a stiffness, if loads or gaps are parameters too */
 
 static PetscErrorCode DrawHeld(HycoReducer t, HycoSamples *held)
 {

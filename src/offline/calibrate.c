@@ -1,11 +1,10 @@
 /*
-  What a model is worth: its predictions at held-out points beside their full-order solutions, and from these the
-  estimates of its errors online (error_estimate.c). A law is fitted to the errors and lifted above SHARE of them.
-  Held-out points are drawn as a user's points may be, all over what training reaches, so that the quantile number
-  ceil(SHARE (n
-  + 1)) of the ratios is a bound for SHARE of the points to come (split conformal prediction: Vovk, Gammerman, Shafer,
-  Algorithmic Learning in a Random World, 2005), whatever the law is worth; a good law only makes the bound tight. The
-  recipe was chosen by the same points, which MARGIN allows for.
+  The accuracy of a model: compares its predictions at held-out points with their full-order solutions, and calibrates
+  the online error estimates with the result (error_estimate.c). A log-linear formula is fitted to the errors and raised
+  above SHARE of them. Held-out points are distributed like a user's points over the region of training, so that the
+  quantile number ceil(SHARE (n + 1)) of the ratios is a bound for SHARE of future points (split conformal prediction:
+  Vovk, Gammerman, Shafer, Algorithmic Learning in a Random World, 2005), however accurate the formula is; an accurate
+  formula only makes the bound tighter. The settings were chosen with the same points, for which MARGIN allows.
 */
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
@@ -13,14 +12,14 @@
 
 #define SHARE      0.95
 #define MARGIN     1.25
-#define LEAST      10   /* predictions: with fewer there is no estimate */
-#define SMALL      1e-2 /* of a feature's median: its floor */
-#define NEGLIGIBLE 1e-3 /* of the errors' median: smaller ones count as that */
+#define LEAST      10   /* smallest number of predictions for an estimate */
+#define SMALL      1e-2 /* share of a feature's median: its floor */
+#define NEGLIGIBLE 1e-3 /* share of the errors' median: least error that is distinguished */
 
-/* The errors that are estimated, in the order of HycoTrustKind. */
+/* The estimated errors, in the order of HycoTrustKind. */
 static const HycoErrorKind errors[HYCO_N_TRUST] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
 
-/* Median of what is positive among value[0], value[stride], ..., or `otherwise`. */
+/* Median of the positive ones of value[0], value[stride], ..., or `otherwise`. */
 static PetscErrorCode Median(PetscInt n, const PetscReal value[], PetscInt stride, PetscReal otherwise,
                              PetscReal *median)
 {
@@ -60,8 +59,8 @@ static PetscErrorCode Spacing(HycoReducer t, PetscReal *spacing)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The law of one kind of error; none where an error is not finite. Where there is no error, as of forces without
-   contact, the features tell nothing of its size: these rows come last, and only lift the law. */
+/* Fits the formula for one kind of error; none if an error is not finite. Rows without an error, for example forces
+   without contact, contain no information on its size: they come last, and only raise the bound. */
 static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoTrustKind kind, HycoTrust *trust)
 {
   const PetscInt p = HYCO_TRUST_FEATURES;
@@ -91,7 +90,7 @@ static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoTrustKi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Predictions that did not converge have no features; online they say so themselves. */
+/* Predictions that did not converge have no features; online they are reported as not converged. */
 static PetscErrorCode FitAll(HycoReducer t, PetscInt n, HycoHeldOut rows[], HycoTrust *trust)
 {
   PetscInt converged = 0;
@@ -113,13 +112,13 @@ static PetscErrorCode FitAll(HycoReducer t, PetscInt n, HycoHeldOut rows[], Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fits, and notes in the model what it is worth. Rank 0. */
+/* Fits the formulas, and stores the errors in the model. Rank 0. */
 static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, HycoTraining *report)
 {
   const HycoValidation *v = &report->held_out;
   const HycoAttempt *chosen = &report->chosen;
   HycoTrust trust = {0};
-  char recipe[HYCO_LINE], text[2 * HYCO_LINE];
+  char settings[HYCO_LINE], text[2 * HYCO_LINE];
 
   PetscFunctionBegin;
   trust.n_held = v->n;
@@ -131,9 +130,9 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, Hyc
   report->n_held = trust.n;
   m->trust = trust;
   if (!chosen->number) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoRecipeDescribe(&chosen->recipe, sizeof(recipe), recipe);
+  HycoReducerSettingsDescribe(&chosen->settings, sizeof(settings), settings);
   snprintf(text, sizeof(text), "  settings number %d of the %d that were tried: %s\n", (int)chosen->number,
-           (int)chosen->of, recipe);
+           (int)chosen->of, settings);
   PetscCall(PetscFree(m->search));
   PetscCall(PetscStrallocpy(text, &m->search));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,7 +1,7 @@
 /*
-  The greedy loop of section 5.4: a model from the solutions so far, the indicator at every training point, the worst
-  point's full-order solution added. All choices follow from the stored solutions alone, so a run that was killed makes
-  them again.
+  The greedy loop of section 5.4: a model from the solutions so far, the indicator at every training point, and the
+  full-order solution of the worst point is added. All choices depend only on the stored solutions, so that a run that
+  was killed repeats them.
 */
 #include <hycoalgorithms.h>
 #include <hycogreedy.h>
@@ -9,21 +9,21 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Of two indicators this close, neither is worse. */
+/* Indicators with a smaller relative difference count as equal. */
 #define TIE      1e-9
-#define ACCURATE 1e-13 /* energy left out of the bases, where nobody says */
+#define ACCURATE 1e-13 /* default energy left out of the bases */
 
 typedef struct {
   HycoSnapshots store;
-  HycoSamples samples;      /* solved so far, in the order of the choices */
+  HycoSamples samples;      /* the points solved so far, in the order of the choices */
   PetscInt n_par, n_points; /* of the training set */
   const PetscReal *points;  /* borrowed */
   PetscReal *value;         /* n_points x 4: eta, eta_u, eta_lambda, size */
-  HycoROM model;            /* the present iteration's, on every rank */
+  HycoROM model;            /* model of the current iteration, on every rank */
   PetscReal begin;
 } Loop;
 
-/* The corners of the parameters' ranges, the last running fastest. */
+/* Adds the corners of the parameters' ranges, the last parameter fastest. */
 static PetscErrorCode AddCorners(HycoReducer t, HycoSamples samples)
 {
   const PetscInt n_par = t->scene->n_parameters;
@@ -37,7 +37,7 @@ static PetscErrorCode AddCorners(HycoReducer t, HycoSamples samples)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The loop's own set of samples, which will grow: each point once. */
+/* Creates the loop's own set of samples, which will grow: each point once. */
 static PetscErrorCode Start(HycoReducer t, HycoSamples start, HycoSamples *samples)
 {
   PetscInt n, n_par;
@@ -55,7 +55,7 @@ static PetscErrorCode Start(HycoReducer t, HycoSamples start, HycoSamples *sampl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Paths are judged by the replayed residual, solutions without a history by the others. */
+/* Checks the indicator: the replayed residual for paths, the others for solutions without a history. */
 static PetscErrorCode CheckIndicator(HycoReducer t)
 {
   const PetscBool residual = (PetscBool)(t->greedy.indicator == HYCO_INDICATOR_RESIDUAL);
@@ -68,8 +68,8 @@ static PetscErrorCode CheckIndicator(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before anything is solved: enough to start from, not more than asked for, and nothing that (42) cannot interpolate.
- */
+/* Checks before any solve: enough points to start from, not more than the limit, and points that (42) can
+   interpolate. */
 static PetscErrorCode CheckStart(HycoReducer t, PetscBool corners, HycoSamples samples)
 {
   PetscInt n, n_par;
@@ -92,7 +92,7 @@ static PetscErrorCode CheckStart(HycoReducer t, PetscBool corners, HycoSamples s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves what is missing, makes the bases and the model. The mesh stays from one iteration to the next. */
+/* Solves missing points, makes the bases and the model. The mesh is kept from one iteration to the next. */
 static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report)
 {
   PetscFunctionBegin;
@@ -116,18 +116,18 @@ static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at
     for (PetscInt k = 0; k < t->n_s; k++)
       (*U_at)[(size_t)i * (size_t)t->n_s + (size_t)k] = t->U_rid[(size_t)k * (size_t)n_dof + (size_t)i];
   }
-  for (PetscInt i = 0; i < n_dof; i++) /* by rows: a message's length is an int */
+  for (PetscInt i = 0; i < n_dof; i++) /* by rows, because a message's length is an int */
     HycoBcast(*U_at + (size_t)i * (size_t)t->n_s, t->n_s, MPIU_REAL, HycoComm(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc's infinity is a large number; the table's and the comparisons' is none. */
+/* PETSc's infinity is a large finite number; the table and comparisons need IEEE infinity. */
 static PetscReal Infinite(PetscReal value)
 {
   return value >= PETSC_INFINITY ? INFINITY : value;
 }
 
-/* This rank's share of the training points. */
+/* Evaluates this rank's share of the training points. */
 static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const PetscReal U_at[])
 {
   const PetscReal length = HycoMeshLength(t->fom->part);
@@ -153,7 +153,7 @@ static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The indicator at every training point, on every rank. */
+/* Evaluates the indicator at every training point, for every rank. */
 static PetscErrorCode Evaluate(HycoReducer t, Loop *loop)
 {
   HycoROM m = loop->model;
@@ -170,7 +170,7 @@ static PetscErrorCode Evaluate(HycoReducer t, Loop *loop)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same, of a model that is kept in greedy-NNN.h5 beside the solutions, or is there while it is judged on the whole
+/* The same for a model that is kept in greedy-NNN.h5 beside the solutions, or only while it is judged on the whole
    mesh, which each rank reads. Collective. */
 static PetscErrorCode EvaluateModel(HycoReducer t, Loop *loop, PetscInt iteration)
 {
@@ -188,7 +188,7 @@ static PetscErrorCode EvaluateModel(HycoReducer t, Loop *loop, PetscInt iteratio
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of what is infinite, the larger numerator is worse; of equals, neither. */
+/* Of infinite values, the one with the larger numerator is worse; equal values are not. */
 static PetscBool Worse(const PetscReal a[], const PetscReal b[])
 {
   const PetscInt by = PetscIsInfReal(a[0]) && PetscIsInfReal(b[0]) ? 3 : 0;
@@ -196,7 +196,7 @@ static PetscBool Worse(const PetscReal a[], const PetscReal b[])
   return (PetscBool)(PetscIsInfReal(b[by]) ? PETSC_FALSE : a[by] > b[by] * (1 + TIE));
 }
 
-/* From training point k to the nearest solution. */
+/* Distance from training point k to the nearest solution. */
 static PetscReal Distance(HycoReducer t, const Loop *loop, PetscInt k)
 {
   const PetscReal *solved;
@@ -209,8 +209,8 @@ static PetscReal Distance(HycoReducer t, const Loop *loop, PetscInt k)
   return least;
 }
 
-/* Whether training point a is to be solved before b: it is worse, or neither has a prediction and a solution near it
-   is farther away. */
+/* Whether training point a is solved before b: it is worse, or neither has a prediction and a is farther from the
+   nearest solution. */
 static PetscBool Before(HycoReducer t, const Loop *loop, PetscInt a, PetscInt b)
 {
   const PetscReal *of_a = loop->value + 4 * a, *of_b = loop->value + 4 * b;
@@ -219,7 +219,7 @@ static PetscBool Before(HycoReducer t, const Loop *loop, PetscInt a, PetscInt b)
   return (PetscBool)(Distance(t, loop, a) > Distance(t, loop, b) * (1 + TIE));
 }
 
-/* The worst point that is not solved yet (-1: none is left), and what the monitor hears. */
+/* The worst point that is not solved yet (-1: none is left), and the data for the monitor. */
 static PetscErrorCode Choose(HycoReducer t, Loop *loop, PetscInt *worst, HycoGreedyStep *step)
 {
   const PetscReal *solved;
@@ -278,8 +278,8 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   step.rid_nodes = report->rid_nodes;
   step.rid_elements = report->rid_elements;
   step.seconds = HycoNow() - loop->begin;
-  PetscCallMPI(
-      MPI_Bcast(&step.seconds, 1, MPIU_REAL, 0, HycoComm(t))); /* the ranks' clocks differ, their verdict must not */
+  PetscCallMPI(MPI_Bcast(&step.seconds, 1, MPIU_REAL, 0, HycoComm(t))); /* the ranks' clocks differ, but the decision
+                                                                           must be the same */
   step.stop = WhyStop(t, &step);
   *last = (PetscBool)(step.stop != NULL);
   if (t->greedy.monitor) HycoOnRoot(HycoComm(t), t->greedy.monitor(&step, t->greedy.ctx));
@@ -287,7 +287,7 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set that is searched, checked. */
+/* Takes and checks the set to be searched. */
 static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
 {
   PetscFunctionBegin;
@@ -300,9 +300,9 @@ static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The loop needs a recipe that is accurate wherever it leads; the model's own is searched when the solutions are there.
-   Of paths in 3D it begins with the cells at a plane of symmetry, as that search does. Collective. */
-static PetscErrorCode SetRecipe(HycoReducer t)
+/* The loop needs settings that are accurate for any points; those of the model itself are searched at the end. For
+   paths in 3D it begins with the cells at a plane of symmetry, like that search. Collective. */
+static PetscErrorCode SetSettings(HycoReducer t)
 {
   const PetscBool *pinned = t->pinned;
 
@@ -322,14 +322,14 @@ static PetscErrorCode SetRecipe(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model of the solutions that were chosen, judged by others. */
+/* Builds the model from the chosen solutions, and judges it by held-out ones. */
 static PetscErrorCode Conclude(HycoReducer t, Loop *loop, const char path[], HycoTraining *report)
 {
   const PetscBool learn = (PetscBool)(t->search && t->n_validation && t->scene->n_parameters);
 
   PetscFunctionBegin;
   PetscCall(HycoReducerHoldOut(t, loop->store));
-  if (learn) { /* each recipe has an RID and bases of its own */
+  if (learn) { /* each attempt has its own RID and bases */
     PetscCall(PetscFree(t->grown));
     PetscCall(HycoReducerResetBases(t));
   }
@@ -337,7 +337,7 @@ static PetscErrorCode Conclude(HycoReducer t, Loop *loop, const char path[], Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Iterations until one is the last. */
+/* Iterates until the loop ends. */
 static PetscErrorCode RunLoop(HycoReducer t, Loop *loop, HycoTraining *report)
 {
   PetscBool last = PETSC_FALSE;
@@ -370,7 +370,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscCall(Start(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
-  PetscCall(SetRecipe(t));
+  PetscCall(SetSettings(t));
   PetscCall(PetscCalloc1(t->fom->part->n_cells, &t->grown));
   PetscCall(RunLoop(t, &loop, &report));
   PetscCall(Conclude(t, &loop, path, &report));

@@ -1,20 +1,19 @@
 /*
-  Error indicators of section 5.4 and 6.6.2, which need no full-order solution.
+  Error indicators of sections 5.4 and 6.6.2, which need no full-order solution.
 
   (43): snapshots interpolated at mu (42) are prescribed on the RID's interface I, and the full-order problem on A
   alone,
 
-      K[A,A] U + B[A_lambda,A]^T L = F[A] - K[A,I] U_I,    0 <= L  complementary to  D - B[:,I] U_I - B[A_lambda,A] U >=
-  0
+    K[A,A] U + B[A_lambda,A]^T L = F[A] - K[A,I] U_I,    0 <= L  complementary to  D - B[:,I] U_I - B[A_lambda,A] U >= 0
 
   is one more contact system. Its distance from the model's prediction is measured in H1 on A (displacements) and in the
   dual of that space (contact forces).
 
   (45): the 2-norm of the predicted displacement's penetration, over all contacts.
 
-  Of paths: how far the predicted path is from the full order's equations, equilibrium and contact, at the worst listed
-  time of each (src/rom/equilibrium.c): targets and held-out errors are those of the worst time, too, and a sum over the
-  times would change with how densely these are listed.
+  For paths: the residual of the full-order equations (equilibrium and contact) along the predicted path, at the worst
+  listed time of each (src/rom/equilibrium.c). Targets and held-out errors refer to the worst time, too; a sum over the
+  times would depend on how densely they are listed.
 */
 #include <hycoalgorithms.h>
 #include <hycogreedy.h>
@@ -28,15 +27,15 @@ struct _n_HycoIndicator {
   PetscReal length;      /* of the whole mesh */
   HycoInterpolant interpolant;
   PetscReal *weight; /* n */
-  /* the local problem, from the first evaluation */
-  HycoLocal local;        /* the model's, as it predicted last */
-  IS contacts;            /* its rows of B, all */
-  HycoOperatorState seen; /* what K and B below are made from */
+  /* the local problem, created by the first evaluation */
+  HycoLocal local;        /* that of the model's last prediction */
+  IS contacts;            /* all of its rows of B */
+  HycoOperatorState seen; /* operators from which K and B below were made */
   Mat K, B, Bt, M, M_A;
   Vec interface, F_A, D, x, L, work, solution;
   Vec whole; /* n_dof */
   KSP norm;
-  unsigned long long geometry; /* hash of the nodes that M belongs to */
+  unsigned long long geometry; /* hash of the nodes for which M was assembled */
   HycoSystem system;
   HycoSolver solver;
 };
@@ -101,7 +100,7 @@ PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is sized by the unknowns of A, once the model stands at a parameter value. */
+/* Creates the objects whose size depends on A, once the model is at a parameter value. */
 static PetscErrorCode SetUp(HycoIndicator d)
 {
   HycoROM m = d->model;
@@ -125,11 +124,11 @@ static PetscErrorCode SetUp(HycoIndicator d)
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &d->solver));
   PetscCall(PetscObjectSetOptions((PetscObject)d->solver, m->scene->options));
   PetscCall(HycoSolverSetFromOptions(d->solver));
-  PetscCall(HycoSolverSetWarmStart(d->solver, PETSC_FALSE)); /* no history: ranks share the points out */
+  PetscCall(HycoSolverSetWarmStart(d->solver, PETSC_FALSE)); /* no warm start, because the ranks share the points */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The norm of H1 on A, when the nodes have moved. */
+/* Assembles the norm of H1 on A if the nodes have moved. */
 static PetscErrorCode AssembleNorm(HycoIndicator d)
 {
   HycoROM m = d->model;
@@ -168,7 +167,7 @@ static PetscErrorCode Interpolate(HycoIndicator d, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The local problem at the model's present parameters. Its K and B are made again when the model's were. */
+/* Solves the local problem at the model's current parameters. K and B are recomputed if the model's were. */
 static PetscErrorCode SolveLocal(HycoIndicator d, HycoReason *reason)
 {
   const HycoLocal *y = &d->local;
@@ -228,7 +227,7 @@ static PetscErrorCode NormOfForce(HycoIndicator d, Vec L, PetscReal *norm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (43), with the local solution in x and L, which are spent. */
+/* (43), with the local solution in x and L, which are overwritten. */
 static PetscErrorCode Distances(HycoIndicator d, HycoIndication *v)
 {
   HycoROM m = d->model;
@@ -275,7 +274,7 @@ static PetscReal Penetration(HycoROM m)
   return PetscSqrtReal(sum);
 }
 
-/* (43), of the last prediction. */
+/* (43) for the last prediction. */
 static PetscErrorCode EvaluateLocal(HycoIndicator d, const PetscReal mu[], HycoReason *reason, HycoIndication *v)
 {
   HycoROM m = d->model;
@@ -293,7 +292,7 @@ static PetscErrorCode EvaluateLocal(HycoIndicator d, const PetscReal mu[], HycoR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of the last predicted path; where the laws have no answer infinite. */
+/* For the last predicted path; infinite if a law has no solution. */
 static PetscErrorCode EvaluateResidual(HycoIndicator d, HycoIndication *v)
 {
   HycoEquilibrium e;

@@ -4,7 +4,7 @@
 /* The contacts with their nodes' roles. */
 typedef struct {
   const HycoPairs *pairs;
-  const PetscInt *index; /* by node of the pairs: that of the reduced mesh */
+  const PetscInt *index; /* by node of the pairs: its node of the reduced mesh */
   PetscInt n, *role;     /* of the reduced mesh */
 } Sets;
 
@@ -24,7 +24,7 @@ static PetscInt *Role(const Sets *s, PetscInt k, PetscInt j)
   return &s->role[s->index[ContactNode(s->pairs, k, j)]];
 }
 
-/* Gamma_I^C, (32): of a contact that misses a node the gap cannot be computed, nor the force on those it has. */
+/* Gamma_I^C, (32): if a contact lacks a node, neither its gap nor the force on its other nodes can be computed. */
 static void CloseIncomplete(const Sets *s)
 {
   for (PetscInt k = 0; k < s->pairs->n; k++) {
@@ -40,9 +40,10 @@ static void CloseIncomplete(const Sets *s)
 
 /*
   B[A_lambda, A_c] needs full row rank (property 1). A contact whose slave is in A has that node for itself. One whose
-  slave is on the interface acts on masters alone: it stays if it has one master that no other contact has. Of a facet's
-  masters, shared by several contacts, its force would be badly determined (errors several times larger were measured):
-  they join the interface. So do all masters of such slaves on moved surfaces, which change. *lost: nodes that left A.
+  slave is on the interface acts only on masters: it is kept if it has one master that no other contact has. With
+  masters shared by several contacts, its force would be ill determined (errors several times larger were measured):
+  these masters join the interface. So do all masters of such slaves on moved surfaces, because they change. *lost:
+  nodes removed from A.
 */
 static PetscErrorCode CloseDependent(const Sets *s, PetscInt *lost)
 {
@@ -92,7 +93,8 @@ static PetscErrorCode FindContacts(HycoFE fe, HycoPairs *pairs, const Sets *s, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of moved surfaces, whose rows are those of one place: if any node that it meets is in A and not fixed. */
+/* For moved surfaces, whose rows are those at one set of parameters: if any node that it meets is in A and not
+   fixed. */
 static void FindMovedContacts(HycoFE fe, const Sets *s, const PetscInt of[], PetscInt in_rid[])
 {
   for (PetscInt r = 0; r < s->pairs->n; r++) {

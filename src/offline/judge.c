@@ -1,10 +1,10 @@
-/* A model under training against its own training solutions. */
+/* The errors of a model in training on its own training solutions. */
 #include <hycoreducerimpl.h>
 #include <stdio.h>
 #include <string.h>
 
-/* Relative error of the last prediction against snapshot k: u on the whole mesh (by the coefficients: V is
- * orthonormal), forces on A_lambda. */
+/* Relative error of the last prediction against snapshot k: u on the whole mesh (from the coefficients, because V is
+   orthonormal), forces on A_lambda. */
 static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, PetscReal *lambda)
 {
   const PetscInt dim = t->sizes[3];
@@ -29,8 +29,8 @@ static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, P
   *lambda = size > 0 ? PetscSqrtReal(lost / size) : lost > 0 ? HYCO_JUDGED_WORST : 0;
 }
 
-/* The worst of the listed times of training path k, in the path's own steps; what is small beside the path's largest is
-   divided by a tenth of that. */
+/* The worst of the listed times of training path k, in the path's own steps; errors of quantities below a tenth of
+   the path's largest are divided by that tenth. */
 static PetscErrorCode PathErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, PetscReal *lambda)
 {
   const PetscInt n = m->scene->n_times, first = k * n;
@@ -59,7 +59,7 @@ static PetscErrorCode PathErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model as it stands at training point k. */
+/* Evaluates the current model at training point k. */
 static PetscErrorCode JudgeSample(HycoReducer t, HycoROM m, PetscInt k, const PetscReal mu[], HycoJudged *j)
 {
   const PetscBool path = (PetscBool)(m->scene->n_times > 0);
@@ -79,7 +79,7 @@ static PetscErrorCode JudgeSample(HycoReducer t, HycoROM m, PetscInt k, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Means over the samples; of each: to judged (NULL: nobody asks). */
+/* Means over the samples; the errors of each in judged (NULL: not needed). */
 static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, HycoJudged judged[], PetscReal *u, PetscReal *lambda)
 {
   PetscInt n, n_par;
@@ -102,7 +102,7 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, HycoJudged judged[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A race is decided after so many paths at the earliest. */
+/* Smallest number of paths after which a race is decided. */
 #define RACED 3
 
 static PetscErrorCode Race(HycoReducer t, HycoROM m, PetscInt n, const PetscInt order[], const HycoJudged best[],
@@ -152,7 +152,7 @@ PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM m, const HycoJudged b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mean training errors of the model as it stands. */
+/* Mean training errors of the current model. */
 PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM m, PetscReal *u, PetscReal *lambda)
 {
   PetscFunctionBegin;
@@ -186,7 +186,7 @@ PetscErrorCode HycoReducerTell(HycoReducer t, const char what[], PetscInt done, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define NAMED 3 /* a line has room for */
+#define NAMED 3 /* as many as fit in a line */
 
 /* "; 2 of 9 paths do not reach their end: gap = 0.004 (t = 3.1), gap = 0.005 (t = 6)" */
 static PetscInt NameUnsolved(HycoReducer t, PetscInt n, const PetscReal mu[], char text[HYCO_LINE])

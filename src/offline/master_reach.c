@@ -1,18 +1,19 @@
 /*
-  What slave nodes of moved surfaces meet over the parameters: at the training points, and at points spread over the
-  ranges until these bring nothing new. It is geometry alone, on a mesh of the surfaces without cells.
+  The masters that slave nodes of moved surfaces meet over the parameters: at the training points, and at points of the
+  ranges until these give no new ones. A purely geometric search, on a mesh of the surfaces without cells.
 */
 #include <hycoalgorithms.h>
 #include <hycodomain.h>
 #include <hycovector.h>
 
-#define MOST_POINTS 500 /* of the ranges */
-#define FRUITLESS   50  /* one after the other: the search ends */
-/* A contact is followed as far as this multiple of the longest way that closed in training, and a share of a facet. */
+#define MOST_POINTS 500 /* points of the ranges */
+#define FRUITLESS   50  /* successive points without a new master after which the search ends */
+/* A contact is followed up to this multiple of the longest distance that closed in training, plus a share of a
+   facet. */
 #define REACH_FACTOR 2
 #define REACH_FACET  0.5
 
-/* The slave nodes of moved surfaces on a mesh of these alone. */
+/* The slave nodes of moved surfaces, on a mesh of these surfaces. */
 typedef struct {
   HycoMesh mesh;
   HycoFE fe;
@@ -83,7 +84,7 @@ static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The way from slave k to its master point. */
+/* The distance from slave k to its master point. */
 static PetscReal Way(const Surfaces *s, PetscInt k)
 {
   PetscReal r[3];
@@ -145,7 +146,7 @@ typedef struct {
   } * row;
 } Lists;
 
-/* Adds what the contacts have now; *grown counts it. */
+/* Adds the contacts' current masters; *grown counts the new ones. */
 static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
 {
   PetscFunctionBegin;
@@ -197,7 +198,7 @@ static PetscBool Moves(HycoScene scene, PetscInt p)
   return moves;
 }
 
-/* Points of the ranges, in the parameters that move something; the others as at mu. */
+/* Adds points of the ranges, in the parameters that move something; the others as in mu. */
 static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal mu[], Lists *l)
 {
   const PetscInt n_par = scene->n_parameters;
@@ -219,7 +220,7 @@ static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The lists as contacts on the whole mesh, after those of surfaces that are not moved. */
+/* Converts the lists to contacts on the whole mesh, after those on surfaces that are not moved. */
 static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const Lists *l, HycoMet *met)
 {
   HycoPairs *out = &met->rows;

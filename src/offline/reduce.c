@@ -1,7 +1,7 @@
 /*
   Bases and interpolation points (sections 4.1, 4.2): POD of displacements, stresses, generalised forces and
-  multipliers, DEIM on each. Snapshot matrices are spread over the ranks by rows; the multipliers' norm needs rank 0
-  alone. HycoReducerReduce() reads the snapshots once; HycoReducerTakeBases() cuts the bases by the tolerances.
+  multipliers, DEIM on each. Snapshot matrices are distributed over the ranks by rows; the POD of the multipliers runs
+  on rank 0. HycoReducerReduce() reads the snapshots once; HycoReducerTakeBases() truncates the bases by the tolerances.
 */
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
@@ -28,7 +28,7 @@ PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Snapshots less their lifting r(u0): zero on the fixed unknowns. */
+/* Subtracts the lifting r(u0) from snapshots: they are then zero on the fixed unknowns. */
 static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
 {
   PetscBool *fixed;
@@ -150,7 +150,7 @@ PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscRe
 
 PetscReal HycoPathScale(PetscReal first, PetscReal largest)
 {
-  const PetscReal slight = 1e-3; /* paths that move so much less than the largest may be nothing but noise */
+  const PetscReal slight = 1e-3; /* paths with smaller relative displacements may be noise */
 
   return largest / PetscMax(first, slight * largest);
 }
@@ -192,8 +192,8 @@ PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes of the paths side by side (N rows, n_rows of them here), each path brought to the size of the largest: a
-   slow one counts as much as a fast one. */
+/* The modes of the paths side by side (N rows, n_rows on this rank), each path scaled to the size of the largest, so
+   that paths with small displacements have the same weight. */
 static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, PetscInt N, PetscInt n_rows, Mat *joined)
 {
   PetscInt n = 0, at = 0;
@@ -273,7 +273,7 @@ PetscErrorCode HycoReducerReadPath(HycoReducer t, HycoSnapshots store, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes of each path, then of these. */
+/* POD of each path, then of these modes. */
 static PetscErrorCode FindPathBasis(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscReal tol, PetscInt most)
 {
   HycoPathModes modes = {0};
@@ -313,7 +313,7 @@ static PetscErrorCode FindBasis(HycoReducer t, HycoSnapshots store, PetscInt kin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first modes of a basis, as many as the tolerance takes: V (NULL: none; the caller's), and how many. */
+/* The first modes of a basis, by the tolerance: V (NULL: none; the caller owns it), and their number. */
 static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l)
 {
   const HycoBasis *basis = &t->basis[kind];
@@ -359,7 +359,7 @@ PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What FetchBatch() is to fetch, and where it puts it. */
+/* The rows that FetchBatch() fetches, and their destination. */
 typedef struct {
   PetscInt n;
   const PetscInt *node;
@@ -391,7 +391,7 @@ PetscErrorCode HycoReducerFetchSnapshots(HycoReducer t, PetscInt n, const PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The displacements where contacts may be. */
+/* Fetches the displacements at contact nodes. */
 static PetscErrorCode FetchContacts(HycoReducer t)
 {
   HycoMesh surface = t->fom->surface;
@@ -417,7 +417,7 @@ static PetscErrorCode FetchContacts(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A HycoBatchUse: norms of displacements less their lifting, and V^T of these. */
+/* A HycoBatchUse: norms of displacements minus their lifting, and V^T of these. */
 static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *ctx)
 {
   HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
@@ -433,8 +433,8 @@ static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacements: their norms, and V^T of the snapshots less their lifting, which judge a model on the whole mesh at the
-   cost of its modes. */
+/* Displacements: their norms, and V^T of the snapshots minus their lifting, by which a model is judged on the whole
+   mesh at the cost of its modes. */
 static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, PetscBool all)
 {
   HycoBasis *basis = &t->basis[HYCO_SEED_DISPLACEMENT];
@@ -609,7 +609,7 @@ static PetscErrorCode DualGram(HycoReducer t, PetscReal G[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Brings moved surfaces to the training point where contact k presses most. Collective; k: on rank 0. */
+/* Moves surfaces to the training point with the largest force of contact k. Collective; k: on rank 0. */
 static PetscErrorCode MoveWherePresses(HycoReducer t, PetscInt k)
 {
   const size_t m = (size_t)t->sizes[2];
@@ -672,7 +672,7 @@ static void AddContactNodes(HycoReducer t, PetscInt k, PetscInt *n, PetscInt nod
   }
 }
 
-/* The nodes of the contacts that DEIM takes of the dual snapshots, on every rank. Collective. */
+/* The nodes of the contacts that DEIM selects from the dual snapshots, on every rank. Collective. */
 static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes[])
 {
   PetscReal *G;
@@ -695,7 +695,7 @@ static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The dual snapshots. Rank 0. */
+/* Reads the dual snapshots. Rank 0. */
 static PetscErrorCode ReadForces(HycoReducer t, HycoSnapshots store)
 {
   const PetscInt m = t->sizes[2], steps = HycoSnapshotsSteps(t->scene);
@@ -711,7 +711,7 @@ static PetscErrorCode ReadForces(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The dual snapshots on rank 0; their seeds, which only -hyco_rid_dual_tol decides. */
+/* Reads the dual snapshots on rank 0 and finds their seeds, which depend only on -hyco_rid_dual_tol. */
 static PetscErrorCode ReduceForces(HycoReducer t, HycoSnapshots store)
 {
   PetscFunctionBegin;
@@ -737,7 +737,7 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The times of the steps of the training paths. */
+/* Reads the times of the steps of the training paths. */
 static PetscErrorCode ReadTaken(HycoReducer t, HycoSnapshots store)
 {
   PetscInt n, n_par;

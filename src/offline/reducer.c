@@ -1,4 +1,4 @@
-/* HycoReducer: made, configured, destroyed. */
+/* HycoReducer: creation, options, destruction. */
 #include <hycoalgorithms.h>
 #include <hycomaterialimpl.h>
 #include <hycoreducerimpl.h>
@@ -27,7 +27,7 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Its options and all that it has made. */
+/* Frees the type's options and data. */
 static PetscErrorCode EndTraining(HycoReducer t)
 {
   PetscFunctionBegin;
@@ -199,7 +199,7 @@ static PetscErrorCode ReadSVDType(HycoReducer t, HycoOptionItems PetscOptionsObj
   PetscFunctionBegin;
   PetscCall(HycoSVDRegisterAll());
   PetscCall(PetscFunctionListGet(SVDList, &registered, &n));
-  while (n && !registered[n - 1]) n--; /* releases of PETSc count a NULL at the end, or do not */
+  while (n && !registered[n - 1]) n--; /* some releases of PETSc count a NULL at the end */
   PetscCall(PetscCalloc1(n + 1, &types));
   PetscCall(PetscArraycpy(types, registered, n));
   PetscCall(PetscFree(registered));
@@ -214,7 +214,7 @@ static PetscErrorCode ReadSVDType(HycoReducer t, HycoOptionItems PetscOptionsObj
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the other options of the PODs' SVD, so that a slip does not show after hours. */
+/* Reads the other options of the PODs' SVD now, so that an error is not found only after hours. */
 static PetscErrorCode CheckSVDOptions(HycoReducer t)
 {
   SVD svd;
@@ -226,7 +226,7 @@ static PetscErrorCode CheckSVDOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What train is asked for, whatever the model. */
+/* Reads the options of train that do not depend on the model. */
 static PetscErrorCode ReadTraining(HycoReducer t)
 {
   static const char *const indicators[] = {"local", "penetration", "residual", NULL};
@@ -265,7 +265,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
       "choose model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by the held-out errors, unless given",
       &t->search, NULL));
   PetscCall(HycoOptionsBool("-hyco_search_exhaustive",
-                            "of paths: judge each recipe at all held-out points, also if it cannot be chosen",
+                            "of paths: judge all settings at all held-out points, also those that cannot be chosen",
                             &t->exhaustive, NULL));
   PetscCall(HycoOptionsName("-hyco_reducer_view", "print the settings of the training before it begins"));
   PetscCall(HycoOptionsFor("greedy"));
@@ -284,7 +284,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscCall(HycoOptionsBool("-hyco_keep_singular", "keep a model whose reduced stiffness is singular inside the ranges",
                             &t->keep_singular, NULL));
   PetscOptionsEnd();
-  PetscCall(EndTraining(t)); /* its options may have changed */
+  PetscCall(EndTraining(t)); /* the type's options may have changed */
   PetscCall(HycoReducerSetType(t, types[type]));
   t->greedy.indicator = (HycoIndicatorKind)indicator;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -318,7 +318,7 @@ static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char ***list)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -hyco_rid_region, parsed now, so that a slip does not show after hours */
+/* -hyco_rid_region, parsed now, so that an error is not found only after hours */
 static PetscErrorCode TakeRegion(HycoReducer t, const char text[])
 {
   HycoExpr region = NULL;
@@ -332,7 +332,7 @@ static PetscErrorCode TakeRegion(HycoReducer t, const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The RID, and what is full order in it. */
+/* Reads the options of the RID and of its full-order displacements. */
 static PetscErrorCode ReadRID(HycoReducer t)
 {
   static const char *const deims[] = {"deim", "qdeim", NULL};
@@ -385,8 +385,7 @@ static PetscErrorCode ReadRID(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the type decides: one without a basis of forces of its own has no other; one whose RID is the whole mesh has
-   nothing that seeds it. */
+/* Settings fixed by the type: some have one basis of forces only; if the RID is the whole mesh, nothing seeds it. */
 static PetscErrorCode CheckType(HycoReducer t)
 {
   char dual[32] = "fe";
@@ -424,7 +423,7 @@ PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Its options and those of all types. */
+/* Declares the reducer's options and those of all types. */
 static PetscErrorCode DeclareAll(HycoReducer t)
 {
   const char *const *types;
@@ -451,7 +450,7 @@ HycoDefineMethod(HycoReducerGetType, (HycoReducer t, HycoROMType *type), t, HYCO
 
 PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 {
-  HycoRecipe recipe;
+  HycoReducerSettings settings;
   char text[HYCO_LINE];
   PetscBool ascii;
 
@@ -459,8 +458,8 @@ PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(HycoViewBegin((PetscObject)t, &viewer, &ascii));
   if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoReducerGetRecipe(t, &recipe);
-  HycoRecipeDescribe(&recipe, sizeof(text), text);
+  HycoReducerGetSettings(t, &settings);
+  HycoReducerSettingsDescribe(&settings, sizeof(text), text);
   PetscCall(PetscViewerASCIIPrintf(viewer, "settings: %s%s\n", text, t->search ? "; searched if not given" : ""));
   PetscCall(PetscViewerASCIIPrintf(viewer, "snapshots: %s\n", t->folder[0] ? t->folder : "beside the model"));
   PetscCall(PetscViewerASCIIPopTab(viewer));

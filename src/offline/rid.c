@@ -1,7 +1,7 @@
 /*
-  Omega_A as a label of the DM over the ranks: supports of the interpolation points, region of interest, contact
-  extension, layers. A cell that joins is labelled where it is seen; DMPlexLabelComplete() adds its closure and tells
-  the other ranks, whose cells around the vertices join next. What contacts decide is decided on rank 0, which has their
+  Omega_A as a label of the distributed DM: supports of the interpolation points, region of interest, contact extension,
+  layers. A rank labels a new cell where it finds it; DMPlexLabelComplete() adds its closure and informs the other
+  ranks, which then add their cells around the vertices. What depends on contacts is computed on rank 0, which has their
   surfaces.
 */
 #include <hycocarriers.h>
@@ -13,7 +13,7 @@ typedef struct {
   HycoMesh part;
   DMLabel label;
   PetscInt *start, *around; /* cells around the part's nodes */
-  PetscInt *own;            /* by place of this rank's nodes: room for what goes through the star forests */
+  PetscInt *own;            /* by place of this rank's nodes: room for data sent through the star forests */
   PetscSF to_part, to_surface;
 } Rid;
 
@@ -53,7 +53,7 @@ static PetscErrorCode Add(Rid *r, PetscInt cell)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells around node i of the part; where other ranks have some of these, they add them. */
+/* Adds the cells around node i of the part; other ranks add theirs. */
 static PetscErrorCode AddAround(Rid *r, PetscInt i)
 {
   PetscFunctionBegin;
@@ -61,7 +61,7 @@ static PetscErrorCode AddAround(Rid *r, PetscInt i)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part's nodes that a label has after it is completed over the ranks. Collective. */
+/* Marks the part's nodes in a label after it is completed over the ranks. Collective. */
 static PetscErrorCode MarkNodes(const Rid *r, DMLabel label, PetscBool node[])
 {
   PetscFunctionBegin;
@@ -71,7 +71,7 @@ static PetscErrorCode MarkNodes(const Rid *r, DMLabel label, PetscBool node[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Flags of the part's nodes to the surface's on rank 0, and back. Collective. */
+/* Sends flags of the part's nodes to the surface's on rank 0; the reverse. Collective. */
 static PetscErrorCode ToSurface(Rid *r, const PetscBool node[], PetscInt on[])
 {
   PetscFunctionBegin;
@@ -101,7 +101,8 @@ static PetscErrorCode FromSurface(Rid *r, const PetscInt on[], PetscInt node[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A node or cell of the whole mesh in the part; -1: it is not there. `of`: the part's in the whole mesh, ascending. */
+/* Index in the part of a node or cell of the whole mesh; -1: not in the part. `of`: the part's numbers in the whole
+   mesh, ascending. */
 static PetscErrorCode FindInPart(PetscInt n, const PetscInt of[], PetscInt whole, PetscInt *at)
 {
   PetscFunctionBegin;
@@ -111,8 +112,8 @@ static PetscErrorCode FindInPart(PetscInt n, const PetscInt of[], PetscInt whole
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cells all of whose nodes lie in the union of the points' supports (20). */
-static PetscErrorCode AddSupports(Rid *r, const HycoRIDRecipe *recipe)
+/* Adds the cells all of whose nodes are in the union of the points' supports (20). */
+static PetscErrorCode AddSupports(Rid *r, const HycoRIDSettings *settings)
 {
   HycoMesh m = r->part;
   Rid support = *r;
@@ -121,12 +122,12 @@ static PetscErrorCode AddSupports(Rid *r, const HycoRIDRecipe *recipe)
 
   PetscFunctionBegin;
   PetscCall(DMLabelCreate(PETSC_COMM_SELF, "support", &support.label));
-  for (PetscInt k = 0; k < recipe->n_nodes; k++) {
-    PetscCall(FindInPart(m->n_nodes, m->node_whole, recipe->nodes[k], &at));
+  for (PetscInt k = 0; k < settings->n_nodes; k++) {
+    PetscCall(FindInPart(m->n_nodes, m->node_whole, settings->nodes[k], &at));
     if (at >= 0) PetscCall(AddAround(&support, at));
   }
-  for (PetscInt k = 0; k < recipe->n_cells; k++) {
-    PetscCall(FindInPart(m->n_cells, m->cell_whole, recipe->cells[k], &at));
+  for (PetscInt k = 0; k < settings->n_cells; k++) {
+    PetscCall(FindInPart(m->n_cells, m->cell_whole, settings->cells[k], &at));
     if (at >= 0) PetscCall(Add(&support, at));
   }
   PetscCall(PetscMalloc1(m->n_nodes, &covered));
@@ -142,7 +143,7 @@ static PetscErrorCode AddSupports(Rid *r, const HycoRIDRecipe *recipe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The region of interest: cells of cell groups, cells behind facet groups, cells at nodes of smaller groups. */
+/* Adds the region of interest: cells of cell groups, cells behind facet groups, cells at nodes of smaller groups. */
 static PetscErrorCode AddGroup(Rid *r, const char name[])
 {
   HycoMesh m = r->part;
@@ -180,7 +181,8 @@ static PetscErrorCode AddRegion(Rid *r, const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* near[i]: a node of Gamma^C closer than d to one of it that Omega_A has (in); 2 for the others of Gamma^C. Rank 0. */
+/* near[i]: 1 for a node of Gamma^C closer than d to one of Gamma^C in Omega_A (in); 2 for the others of Gamma^C.
+   Rank 0. */
 static PetscErrorCode FindNear(HycoFOM f, const HycoPairs *pairs, PetscReal d, const PetscInt in[], PetscInt near[])
 {
   HycoMesh m = f->surface;
@@ -209,7 +211,7 @@ static PetscErrorCode FindNear(HycoFOM f, const HycoPairs *pairs, PetscReal d, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Section 7.2: cells on Gamma^C with a node closer than d to a node of Gamma^C that Omega_A has. */
+/* Section 7.2: adds cells on Gamma^C with a node closer than d to a node of Gamma^C in Omega_A. */
 static PetscErrorCode ExtendContact(Rid *r, const HycoPairs *pairs, PetscReal d)
 {
   HycoMesh m = r->part;
@@ -237,7 +239,7 @@ static PetscErrorCode ExtendContact(Rid *r, const HycoPairs *pairs, PetscReal d)
 
 #define MOST_MASTERS 4
 
-/* The masters, in the whole mesh, of the slaves that Omega_A has (in), MOST_MASTERS each, padded by -1. Rank 0. */
+/* Lists the masters, in the whole mesh, of the slaves in Omega_A (in), MOST_MASTERS each, padded by -1. Rank 0. */
 static PetscErrorCode ListMasters(HycoFOM f, const HycoPairs *pairs, const PetscInt in[], PetscInt *n, PetscInt list[])
 {
   PetscFunctionBegin;
@@ -258,7 +260,7 @@ static PetscErrorCode ListMasters(HycoFOM f, const HycoPairs *pairs, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells with all of these masters. */
+/* Adds the cells with all of these masters. */
 static PetscErrorCode AddBehind(Rid *r, const PetscInt master[])
 {
   HycoMesh m = r->part;
@@ -280,9 +282,9 @@ static PetscErrorCode AddBehind(Rid *r, const PetscInt master[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Surfaces that do not match: the cells with the masters of the slaves that Omega_A has, so that their gaps can be
-   computed. (Their other neighbours then have an interface of their own: the other way round all of Gamma^C would
-   come.) */
+/* For surfaces that do not match: adds the cells with the masters of the slaves in Omega_A, so that their gaps can
+   be computed. (The other slaves of these masters then have nodes on the interface; adding their cells too would add
+   all of Gamma^C.) */
 static PetscErrorCode CompleteSlaves(Rid *r, const HycoPairs *pairs, PetscInt n_rows)
 {
   const PetscInt n_surface = r->f->surface ? r->f->surface->n_nodes : 0;
@@ -301,7 +303,7 @@ static PetscErrorCode CompleteSlaves(Rid *r, const HycoPairs *pairs, PetscInt n_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* on[i]: node i of contacts on moved surfaces that have one in Omega_A (in). Rank 0. */
+/* on[i]: node i belongs to a contact on moved surfaces with a node in Omega_A (in). Rank 0. */
 static void MarkMet(HycoFOM f, const HycoPairs *pairs, const PetscInt in[], PetscInt on[])
 {
   for (PetscInt i = 0; i < f->surface->n_nodes; i++) on[i] = 0;
@@ -317,8 +319,8 @@ static void MarkMet(HycoFOM f, const HycoPairs *pairs, const PetscInt in[], Pets
   }
 }
 
-/* Moved surfaces: the cells around all nodes of contacts that have one in Omega_A. A slave outside would close, on its
-   way, the masters of all places to the interface, and leave no contact node of the master's body in A. */
+/* For moved surfaces: adds the cells around all nodes of contacts with a node in Omega_A. Otherwise, a slave outside
+   would put all masters that it meets on the interface, and no contact node of the master's body would remain in A. */
 static PetscErrorCode CompleteMoved(Rid *r, const HycoPairs *pairs)
 {
   const PetscInt n_surface = r->f->surface ? r->f->surface->n_nodes : 0;
@@ -346,7 +348,7 @@ static PetscErrorCode CompleteMoved(Rid *r, const HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cells that share a node with Omega_A. */
+/* Adds the cells that share a node with Omega_A. */
 static PetscErrorCode AddLayer(Rid *r)
 {
   PetscBool *node;
@@ -361,8 +363,8 @@ static PetscErrorCode AddLayer(Rid *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells around all nodes of contacts with rigid bodies, and around the nodes that these move with: without one of
-   them Omega_A has no equilibrium of the body, and not its load. */
+/* Adds the cells around all nodes of contacts with rigid bodies, and around the nodes of these bodies: if one were
+   missing, Omega_A would have neither the body's equilibrium nor its load. */
 static PetscErrorCode AddRigid(Rid *r, HycoScene scene)
 {
   HycoMesh m = r->part;
@@ -379,26 +381,26 @@ static PetscErrorCode AddRigid(Rid *r, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What each rank finds alone. */
-static PetscErrorCode AddRegions(Rid *r, const HycoRIDRecipe *recipe)
+/* Adds the regions that each rank can find by itself. */
+static PetscErrorCode AddRegions(Rid *r, const HycoRIDSettings *settings)
 {
   PetscInt at;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; recipe->exact && k < recipe->n_cells; k++) {
-    PetscCall(FindInPart(r->part->n_cells, r->part->cell_whole, recipe->cells[k], &at));
+  for (PetscInt k = 0; settings->exact && k < settings->n_cells; k++) {
+    PetscCall(FindInPart(r->part->n_cells, r->part->cell_whole, settings->cells[k], &at));
     if (at >= 0) PetscCall(Add(r, at));
   }
-  if (recipe->exact) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt e = 0; recipe->whole && e < r->part->n_cells; e++) PetscCall(Add(r, e));
-  for (PetscInt k = 0; k < recipe->n_groups; k++) PetscCall(AddGroup(r, recipe->groups[k]));
-  if (recipe->plane) PetscCall(AddGroup(r, recipe->plane));
+  if (settings->exact) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt e = 0; settings->whole && e < r->part->n_cells; e++) PetscCall(Add(r, e));
+  for (PetscInt k = 0; k < settings->n_groups; k++) PetscCall(AddGroup(r, settings->groups[k]));
+  if (settings->plane) PetscCall(AddGroup(r, settings->plane));
   PetscCall(AddRigid(r, r->f->scene));
-  if (recipe->region) PetscCall(AddRegion(r, recipe->region));
+  if (settings->region) PetscCall(AddRegion(r, settings->region));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDRecipe *recipe, DMLabel *label)
+PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDSettings *settings, DMLabel *label)
 {
   PetscInt n_rows = f->rank ? 0 : pairs->n;
   Rid r;
@@ -406,13 +408,13 @@ PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDReci
   PetscFunctionBegin;
   PetscCallMPI(MPI_Bcast(&n_rows, 1, MPIU_INT, 0, HycoComm(f)));
   PetscCall(RidCreate(f, &r));
-  HycoOnEach(HycoComm(f), AddRegions(&r, recipe));
-  if (!recipe->whole && !recipe->exact) {
-    PetscCall(AddSupports(&r, recipe));
-    if (recipe->extension > 0) PetscCall(ExtendContact(&r, pairs, recipe->extension));
+  HycoOnEach(HycoComm(f), AddRegions(&r, settings));
+  if (!settings->whole && !settings->exact) {
+    PetscCall(AddSupports(&r, settings));
+    if (settings->extension > 0) PetscCall(ExtendContact(&r, pairs, settings->extension));
     PetscCall(CompleteSlaves(&r, pairs, n_rows));
     PetscCall(CompleteMoved(&r, pairs));
-    for (PetscInt k = 0; k < recipe->layers; k++) PetscCall(AddLayer(&r));
+    for (PetscInt k = 0; k < settings->layers; k++) PetscCall(AddLayer(&r));
     PetscCall(CompleteSlaves(&r, pairs, n_rows));
     PetscCall(CompleteMoved(&r, pairs));
   }

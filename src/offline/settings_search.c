@@ -1,35 +1,37 @@
 /*
-  The search for a recipe: which of the reduction's settings give the cheapest model online whose errors at the held-out
-  points are small enough. The snapshots are read and their bases made once; an attempt cuts the bases, builds the RID
-  and the model on it and predicts the held-out points.
+  The search for settings: which settings of the reduction give the cheapest online model whose errors at the held-out
+  points are small enough. The snapshots are read and their bases made once; an attempt truncates the bases, builds the
+  RID and the model on it and predicts the held-out points.
 
-  A recipe is tried only as far as it is open: what the options say stays. Recipes of a kind come in the order of their
-  cost, and the first that meets the targets ends its kind. The cost is a count of operations, not a time, so that the
-  choice repeats on any machine and number of ranks.
+  Only settings that no option fixes are varied. The settings of a kind are tried in the order of their cost, and the
+  first that meet the targets end their kind. The cost is a count of operations, not a time, so that the choice is the
+  same on any machine and number of ranks.
 
-  Where no recipe meets targets that were asked for, solutions are added where the best one errs most, and the search
-  begins again.
+  If no settings meet the user's targets, solutions are added where the best model has the largest errors, and the
+  search starts again.
 */
 #include <hycoreducerimpl.h>
 #include <stdio.h>
 #include <string.h>
 
-/* Where no target is given: errors that most studies do not see. */
+/* Default targets: errors that most studies can ignore. */
 static const PetscReal usual[HYCO_N_ERRORS] = {
     [HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2, [HYCO_ERROR_LAMBDA] = 1e-2, [HYCO_ERROR_INELASTIC] = 2e-2};
 
 #define EXTENSION     2.5 /* edges of the contact surface's facets */
-#define MANY_UNKNOWNS 600 /* of an RID; beyond, "all" is not tried by itself: its reduced matrix is dense */
-#define STALE         3 /* attempts without progress end a kind: larger RIDs do not mend a basis that lacks solutions */
-#define PROGRESS      0.95
-#define WILD          50  /* times the target: no attempt so far is a model at all */
-#define FEW_UNKNOWNS  300 /* a dense matrix of these is cheap */
-#define MAX_ATTEMPTS  64
-#define ROUND         4   /* of the training points, one in so many is added at a time */
-#define TELLING       0.3 /* correlation above which a parameter explains the errors */
-#define WHOLE         -1
+#define MANY_UNKNOWNS 600 /* largest RID for which "all" is tried automatically: its reduced matrix is dense */
+#define STALE                                                                                                          \
+  3 /* attempts without progress that end a kind: a larger RID does not help if the basis lacks                        \
+       solutions */
+#define PROGRESS     0.95
+#define WILD         50  /* multiple of the target: above it no attempt so far gives a useful model */
+#define FEW_UNKNOWNS 300 /* a dense matrix of this size is cheap */
+#define MAX_ATTEMPTS 64
+#define ROUND        4   /* share of the training points that is added at a time, as a divisor */
+#define TELLING      0.3 /* correlation above which a parameter explains the errors */
+#define WHOLE        -1
 
-/* Sizes of RIDs and bases, from the cheapest on; layers WHOLE: the whole mesh. */
+/* Sizes of RIDs and bases, the cheapest first; layers WHOLE: the whole mesh. */
 typedef struct {
   PetscReal tol;
   PetscInt layers;
@@ -41,28 +43,29 @@ static const Size sizes[] = {{1e-5, 0, PETSC_FALSE}, {1e-5, 1, PETSC_FALSE},    
                              {1e-13, 3, PETSC_TRUE}, {1e-13, WHOLE, PETSC_FALSE}};
 enum { N_SIZES = sizeof(sizes) / sizeof(sizes[0]), FIRST_USUAL = 3 };
 
-/* Of paths, with the cells at a plane of symmetry as the RID, all displacements of A full order. */
+/* For paths, with the cells at a plane of symmetry as the RID, all displacements of A full order. */
 static const PetscReal plane_tol[] = {1e-9, 1e-12, 1e-14};
 enum { N_PLANES = sizeof(plane_tol) / sizeof(plane_tol[0]) };
 
 typedef struct {
   HycoReducer t;
   HycoSnapshots store;
-  const char *const *types; /* the registered ones */
-  HycoRecipe given;         /* as the options have it */
-  PetscReal extension;      /* of the recipes that extend the contact */
-  const char *plane;        /* of symmetry; NULL: none */
-  PetscBool targets;        /* given by the user */
+  const char *const *types;  /* the registered ones */
+  HycoReducerSettings given; /* as given by the options */
+  PetscReal extension;       /* of the settings that extend the contact */
+  const char *plane;         /* plane of symmetry; NULL: none */
+  PetscBool targets;         /* given by the user */
   PetscReal target[HYCO_N_ERRORS];
   PetscInt n;
   HycoAttempt attempt[MAX_ATTEMPTS];
-  HycoHeldOut *rows[MAX_ATTEMPTS]; /* of paths, of each attempt that was judged at all held-out points; else NULL */
-  PetscReal force;                 /* HycoHeldOutForce() of these */
-  PetscInt *order;                 /* held-out points, from the one where the last attempts erred most */
-  PetscReal least, *ratio;         /* of the best so far, and of its held-out points */
+  HycoHeldOut *rows[MAX_ATTEMPTS]; /* for paths: results of each attempt that was judged at all held-out points; else
+                                      NULL */
+  PetscReal force;                 /* HycoHeldOutForce() of the held-out points */
+  PetscInt *order;                 /* held-out points, those with the largest errors in the last attempts first */
+  PetscReal least, *ratio;         /* least ratio so far; ratios of the best model at its held-out points */
 } Search;
 
-void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
+void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, char text[])
 {
   const char *kind = HycoHybrids[r->hybrid];
 
@@ -76,20 +79,20 @@ void HycoRecipeDescribe(const HycoRecipe *r, size_t length, char text[])
              r->plane ? r->plane : "");
 }
 
-void HycoReducerGetRecipe(HycoReducer t, HycoRecipe *r)
+void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *r)
 {
-  *r = (HycoRecipe){.type = t->prototype->type,
-                    .rid = (PetscBool)(t->prototype->traits.settings == HYCO_SETTINGS_RID),
-                    .pod_tol = t->tol[HYCO_SEED_DISPLACEMENT],
-                    .contact_extension = t->extension,
-                    .layers = t->layers,
-                    .hybrid = t->hybrid,
-                    .whole = t->whole_rid,
-                    .ridge = -1};
+  *r = (HycoReducerSettings){.type = t->prototype->type,
+                             .rid = (PetscBool)(t->prototype->traits.settings == HYCO_SETTINGS_RID),
+                             .pod_tol = t->tol[HYCO_SEED_DISPLACEMENT],
+                             .contact_extension = t->extension,
+                             .layers = t->layers,
+                             .hybrid = t->hybrid,
+                             .whole = t->whole_rid,
+                             .ridge = -1};
 }
 
-/* The stress and force tolerances follow that of the displacement where they were the same. */
-static PetscErrorCode SetRecipe(HycoReducer t, const HycoRecipe *r)
+/* The stress and force tolerances follow that of the displacement if they were equal to it. */
+static PetscErrorCode SetSettings(HycoReducer t, const HycoReducerSettings *r)
 {
   PetscFunctionBegin;
   PetscCall(HycoReducerSetType(t, r->type));
@@ -175,7 +178,8 @@ static PetscErrorCode Summarise(Search *s, const HycoHeldOutRace *race, const Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next attempt begins with the points where this one erred most, of a dropped one that where it was. */
+/* Reorders the points: the next attempt begins with those where this one had the largest errors; for a dropped one,
+   with the one at which it was dropped. */
 static PetscErrorCode Reorder(Search *s, const HycoHeldOutRace *race, const HycoHeldOut rows[], PetscInt n)
 {
   PetscReal *key;
@@ -199,8 +203,8 @@ static PetscErrorCode Reorder(Search *s, const HycoHeldOutRace *race, const Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the model makes of the held-out points: of paths only until it is clear that the recipe will not be chosen,
-   unless `all` are asked for. */
+/* Judges the model at the held-out points; for paths only until it is clear that the settings will not be chosen,
+   unless `all` is set. */
 static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt *a)
 {
   HycoReducer t = s->t;
@@ -232,7 +236,7 @@ static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The bases of the recipe that is set, and the type's own modes. */
+/* Makes the bases for the current settings, and the type's own modes. */
 static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store)
 {
   PetscFunctionBegin;
@@ -242,7 +246,7 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bases, RID and model of the recipe that is set, and what it is worth. */
+/* Makes bases, RID and model for the current settings, and judges the model. */
 static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
 {
   HycoReducer t = s->t;
@@ -262,16 +266,16 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
   a->rid_fraction = report.rid_fraction;
   a->cost = t->prototype->ops->cost ? (*t->prototype->ops->cost)(t, a) : 0;
   PetscCallMPI(MPI_Bcast(&t->ridge, 1, MPIU_REAL, 0, HycoComm(t)));
-  a->recipe.ridge = t->ridge;
+  a->settings.ridge = t->ridge;
   ierr = Judge(s, model, all, a); /* a model may refuse to predict */
   PetscCall(HycoROMDestroy(&model));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Builds the recipe's model and judges it, at all held-out points or as far as it matters; what fails is an attempt
-   that failed. Collective. */
-static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
+/* Builds a model with these settings and judges it, at all held-out points or as far as necessary; an error becomes
+   a failed attempt. Collective. */
+static PetscErrorCode Try(Search *s, const HycoReducerSettings *settings, PetscBool all)
 {
   HycoReducer t = s->t;
   HycoAttempt *a = &s->attempt[s->n];
@@ -282,15 +286,15 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
   if (s->n == MAX_ATTEMPTS) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMemzero(a, sizeof(*a)));
   a->number = ++s->n;
-  a->recipe = *recipe;
+  a->settings = *settings;
   a->ratio = PETSC_INFINITY;
   a->dropped_at = -1;
   PetscCall(HycoSamplesGet(t->held, &a->n_held, NULL, NULL));
-  HycoRecipeDescribe(recipe, sizeof(what), what);
+  HycoReducerSettingsDescribe(settings, sizeof(what), what);
   HycoFormat(t->doing, "settings %d, %s", (int)a->number, what);
   t->most_full_order =
-      t->pinned[HYCO_CHOICE_HYBRID] || recipe->hybrid != HYCO_HYBRID_ALL || recipe->plane ? 0 : MANY_UNKNOWNS;
-  PetscCall(SetRecipe(t, recipe));
+      t->pinned[HYCO_CHOICE_HYBRID] || settings->hybrid != HYCO_HYBRID_ALL || settings->plane ? 0 : MANY_UNKNOWNS;
+  PetscCall(SetSettings(t, settings));
   PetscCall(HycoCatchBegin());
   t->trying = PETSC_TRUE;
   ierr = BuildAndJudge(s, all, a);
@@ -306,11 +310,11 @@ static PetscErrorCode Try(Search *s, const HycoRecipe *recipe, PetscBool all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is open of a size, the rest as the options have it. */
-static HycoRecipe Recipe(const Search *s, const Size *size)
+/* The settings of a size where no option fixes them. */
+static HycoReducerSettings SettingsFor(const Search *s, const Size *size)
 {
   const PetscBool *pinned = s->t->pinned;
-  HycoRecipe r = s->given;
+  HycoReducerSettings r = s->given;
 
   if (!pinned[HYCO_CHOICE_TOLERANCE]) r.pod_tol = size->tol;
   if (!pinned[HYCO_CHOICE_LAYERS]) r.layers = PetscMax(size->layers, 0);
@@ -319,14 +323,15 @@ static HycoRecipe Recipe(const Search *s, const Size *size)
   return r;
 }
 
-static PetscBool Same(const HycoRecipe *a, const HycoRecipe *b)
+static PetscBool Same(const HycoReducerSettings *a, const HycoReducerSettings *b)
 {
   return (PetscBool)(strcmp(a->type, b->type) == 0 && a->pod_tol == b->pod_tol && a->layers == b->layers &&
                      a->whole == b->whole && a->contact_extension == b->contact_extension && a->hybrid == b->hybrid &&
                      a->plane == b->plane);
 }
 
-/* Whether the whole mesh as RID is a model: not where every unknown would be full order, but for a few. */
+/* Whether the whole mesh as RID gives a useful model: not if every unknown would be full order, unless there are
+   few. */
 static PetscBool WholeIsSmall(HycoReducer t, HycoHybrid hybrid)
 {
   const PetscBool all = (PetscBool)(hybrid == HYCO_HYBRID_ALL || 2 * t->sizes[2] > t->sizes[0]);
@@ -334,8 +339,8 @@ static PetscBool WholeIsSmall(HycoReducer t, HycoHybrid hybrid)
   return (PetscBool)(!all || t->sizes[0] * t->sizes[3] <= FEW_UNKNOWNS);
 }
 
-/* The sizes in their order until one meets the targets, of those that differ in what
-   the type of model reads. Of paths that were dropped nobody knows whether they are progress: all sizes are tried. */
+/* Tries the sizes in order until one meets the targets, without those that do not differ in the settings that the
+   type reads. Dropped attempts on paths do not show whether there is progress: all sizes are tried. */
 static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid, PetscBool *met)
 {
   const PetscInt first = s->n;
@@ -344,7 +349,7 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
   PetscFunctionBegin;
   *met = PETSC_FALSE;
   for (PetscInt k = s->targets ? 0 : FIRST_USUAL, stale = 0; k < N_SIZES && stale < STALE && !*met; k++) {
-    HycoRecipe r = Recipe(s, &sizes[k]);
+    HycoReducerSettings r = SettingsFor(s, &sizes[k]);
     PetscBool done = PETSC_FALSE;
 
     r.type = type->type;
@@ -355,7 +360,7 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
       r.contact_extension = s->given.contact_extension;
       r.whole = s->given.whole;
     }
-    for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].recipe));
+    for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].settings));
     if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid))) continue;
     PetscCall(Try(s, &r, PETSC_FALSE));
     stale = least > WILD || s->attempt[s->n - 1].ratio < PROGRESS * least || s->t->scene->n_times ? 0 : stale + 1;
@@ -365,7 +370,7 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many contacts have their slave in a group of supports. */
+/* Counts the contacts whose slave is in a group of supports. */
 static PetscErrorCode CountContacts(HycoReducer t, const char group[], PetscInt *n)
 {
   const HycoMesh m = t->fom->surface;
@@ -383,8 +388,8 @@ static PetscErrorCode CountContacts(HycoReducer t, const char group[], PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The support that looks most like a plane of symmetry across the contacts: it holds one component at 0, and most of
-   the contacts lie in it; the first of equals; -1: none. Rank 0. */
+/* The support that is most probably a plane of symmetry across the contacts: it fixes one component at 0, and most
+   of the contacts have nodes on it; the first among equals; -1: none. Rank 0. */
 static PetscErrorCode FindPlane(HycoReducer t, PetscInt *plane)
 {
   const HycoScene s = t->scene;
@@ -427,8 +432,8 @@ PetscErrorCode HycoReducerFindPlane(HycoReducer t, const char **group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Paths: equations inside a small RID say little of modes that no load reaches there, unless the RID cuts the bodies
-   from side to side. The cells at a plane of symmetry do, and all of its nodes are inside. */
+/* For paths, the equations in a small RID hardly determine modes that no load affects there, unless the RID cuts the
+   bodies from side to side. The cells at a plane of symmetry do, and all nodes of the plane are inside. */
 static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
 {
   const PetscBool *pinned = s->t->pinned;
@@ -439,7 +444,7 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
     PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < N_PLANES && !*met; k++) {
     const Size size = {plane_tol[k], 0, PETSC_FALSE};
-    HycoRecipe r = Recipe(s, &size);
+    HycoReducerSettings r = SettingsFor(s, &size);
 
     r.type = type->type;
     r.rid = PETSC_TRUE;
@@ -452,7 +457,7 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of A full order, where "auto" keeps the contacts' displacements and is not good enough. */
+/* Tries all of A full order, if "auto" keeps the contacts' displacements and is not accurate enough. */
 static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
 {
   PetscBool met = PETSC_FALSE;
@@ -465,11 +470,11 @@ static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The recipes of a type whose modes cost next to nothing online: one. */
+/* One attempt, for a type whose online cost hardly depends on the modes. */
 static PetscErrorCode TryOne(Search *s, const HycoROM type)
 {
   const Size size = {1e-12, 1, PETSC_FALSE};
-  HycoRecipe r = Recipe(s, &size);
+  HycoReducerSettings r = SettingsFor(s, &size);
 
   PetscFunctionBegin;
   r.type = type->type;
@@ -499,7 +504,7 @@ static PetscErrorCode TryType(Search *s, const char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* In the order of their names. */
+/* Tries all types in the order of their names. */
 static PetscErrorCode TryAll(Search *s)
 {
   PetscFunctionBegin;
@@ -507,23 +512,23 @@ static PetscErrorCode TryAll(Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The recipe that is taken as things stand; what was dropped and might be taken now is judged first. */
+/* The attempt chosen so far; a dropped one that may be chosen now is judged first. */
 static PetscErrorCode Choose(Search *s, HycoAttempt **chosen)
 {
   HycoAttempt *again;
 
   PetscFunctionBegin;
   while (s->n < MAX_ATTEMPTS && (again = HycoAttemptsReopen(s->n, s->attempt))) {
-    const HycoRecipe recipe = again->recipe;
+    const HycoReducerSettings settings = again->settings;
 
     again->reopened = PETSC_TRUE;
-    PetscCall(Try(s, &recipe, PETSC_TRUE));
+    PetscCall(Try(s, &settings, PETSC_TRUE));
   }
   *chosen = HycoAttemptsChoose(s->n, s->attempt);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nothing is open, or there is nothing to judge by. */
+/* Whether all settings are fixed, or there are no held-out points. */
 static PetscBool Settled(HycoReducer t)
 {
   PetscBool open = PETSC_FALSE;
@@ -559,8 +564,8 @@ static PetscReal Correlation(const Search *s, PetscInt n, const PetscReal held[]
   return square[0] > 0 && square[1] > 0 ? both / PetscSqrtReal(square[0] * square[1]) : 0;
 }
 
-/* Unseen points, each near one of the held-out points with the largest errors, which themselves stay unseen; and the
-   parameter whose training values lie too far apart (-1: none in particular). */
+/* Adds unseen points, each near one of the held-out points with the largest errors, which stay unseen; and finds the
+   parameter whose training values are too far apart (-1: none in particular). */
 static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, PetscInt *by)
 {
   HycoReducer t = s->t;
@@ -614,7 +619,7 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What attempts have left. */
+/* Frees the data of attempts. */
 static void Forget(Search *s)
 {
   for (PetscInt k = 0; k < s->n; k++) (void)!PetscFree(s->rows[k]);
@@ -623,7 +628,7 @@ static void Forget(Search *s)
   s->force = 0;
 }
 
-/* Every open recipe on the bases that are there. */
+/* Tries all settings that are not fixed, with the present bases. */
 static PetscErrorCode Attempts(Search *s)
 {
   PetscInt n;
@@ -633,7 +638,7 @@ static PetscErrorCode Attempts(Search *s)
   Forget(s);
   PetscCall(PetscMalloc2(n, &s->ratio, n, &s->order));
   for (PetscInt k = 0; k < n; k++) {
-    s->ratio[k] = 1; /* until an attempt says else */
+    s->ratio[k] = 1; /* until an attempt gives another value */
     s->order[k] = k;
   }
   s->least = PETSC_INFINITY;
@@ -642,8 +647,8 @@ static PetscErrorCode Attempts(Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Attempts, and solutions added until the targets are met or the budget is spent: in *grown, with the first ones (NULL:
-   none was added; the caller's). */
+/* Attempts, and solutions added until the targets are met or the budget is used up: in *grown, with the first ones
+   (NULL: none was added; the caller owns it). */
 static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report)
 {
   HycoReducer t = s->t;
@@ -678,8 +683,8 @@ static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The best recipe's model; of those that the scan of the ranges or its own training solutions refuse, the
-   next. */
+/* Builds the model with the best settings; if the scan of the ranges or its own training solutions refuse it, the
+   next one. */
 static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
 {
   HycoReducer t = s->t;
@@ -693,7 +698,7 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
 
     PetscCall(Choose(s, &best));
     if (!best) break;
-    PetscCall(SetRecipe(t, &best->recipe));
+    PetscCall(SetSettings(t, &best->settings));
     PetscCall(TakeModes(t, s->store));
     PetscCall(HycoCatchBegin());
     ierr = HycoReducerBuild(t, PETSC_TRUE, model, &built);
@@ -712,7 +717,7 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt k = s->n - 1; k > 0 && !best; k--) { /* one that is not refused for its cost */
-    if (s->attempt[k].recipe.hybrid != HYCO_HYBRID_ALL) best = &s->attempt[k];
+    if (s->attempt[k].settings.hybrid != HYCO_HYBRID_ALL) best = &s->attempt[k];
   }
   HycoFail("none of %d settings gave a model; the error of one of them: %s", (int)s->n,
            (best ? best : &s->attempt[0])->failure);
@@ -724,7 +729,7 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   PetscReal edge = 0;
 
   PetscFunctionBegin;
-  HycoReducerGetRecipe(t, &s->given);
+  HycoReducerGetSettings(t, &s->given);
   HycoOnRoot(HycoComm(t), SurfaceEdge(t, &edge));
   PetscCallMPI(MPI_Bcast(&edge, 1, MPIU_REAL, 0, HycoComm(t)));
   s->extension = EXTENSION * edge;
@@ -749,7 +754,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
     PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
     PetscCall(TakeModes(t, store));
     PetscCall(HycoReducerBuild(t, PETSC_TRUE, model, report));
-    HycoReducerGetRecipe(t, &report->chosen.recipe);
+    HycoReducerGetSettings(t, &report->chosen.settings);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscNew(&s));

@@ -1,4 +1,4 @@
-/* HycoSnapshots: a folder with one file per parameter value, each complete or absent. */
+/* HycoSnapshots: a folder with one file for each parameter value, complete or absent. */
 #include <hycopath.h>
 #include <hycosnapshotsimpl.h>
 #include <hycofields.h>
@@ -57,25 +57,48 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode CloseSample(HycoSnapshots s)
+{
+  PetscFunctionBegin;
+  if (s->last) PetscCall(HycoH5Close(&s->last, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
 {
   PetscFunctionBegin;
   if (!snapshots || !*snapshots) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheckHandle(*snapshots, HYCO_SNAPSHOTS_CLASSID);
   HycoDereference(snapshots);
+  PetscCall(CloseSample(*snapshots));
   PetscCall(PetscFree((*snapshots)->solved));
   PetscCall(HycoSceneDestroy(&(*snapshots)->scene));
   PetscCall(PetscHeaderDestroy(snapshots));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file of a parameter value. */
+/* The path of the file of a parameter value. */
 static PetscErrorCode SamplePath(HycoSnapshots s, const PetscReal mu[], char path[PETSC_MAX_PATH_LEN])
 {
   const unsigned long long hash = HycoHash(HYCO_HASH_START, mu, (size_t)s->scene->n_parameters * sizeof(PetscReal));
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(path, PETSC_MAX_PATH_LEN, "%s/%016llx.h5", s->folder, hash));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fails if the history differs from that with which the file was made; files of earlier versions do not store it. */
+static PetscErrorCode CheckHistory(HycoSnapshots s, HycoH5 h, const char path[])
+{
+  PetscErrorCode ierr;
+  char *made;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "history")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadText(h, "history", &made));
+  ierr = HycoSceneCompareHistory(s->scene, made, path);
+  PetscCall(PetscFree(made));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -89,9 +112,32 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   snprintf(mine, sizeof(mine), "%016llx", s->fingerprint);
   same = strcmp(text, mine) == 0;
   PetscCall(PetscFree(text));
+  if (!same) PetscCall(CheckHistory(s, h, path));
   HycoCheck(same,
             "%s is a snapshot of another scene%s or mesh; remove the folder %s, or name another by -hyco_snapshots",
             path, s->scene->n_times ? ", history" : "", s->folder);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The file of a parameter value, which must belong to this scene. The store owns it, and keeps it open until another
+   is needed: judging a path reads a file several times for each listed time, and opening it reads all of it. */
+static PetscErrorCode OpenSample(HycoSnapshots s, const PetscReal mu[], HycoH5 *h)
+{
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(SamplePath(s, mu, path));
+  if (!s->last || strcmp(path, s->last_path)) {
+    PetscErrorCode ierr;
+
+    PetscCall(CloseSample(s));
+    PetscCall(HycoH5OpenOr(path, "remove it and run again", &s->last));
+    PetscCall(PetscStrncpy(s->last_path, path, sizeof(s->last_path)));
+    ierr = CheckFingerprint(s, s->last, path);
+    if (ierr) PetscCall(CloseSample(s));
+    PetscCall(ierr);
+  }
+  *h = s->last;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -114,9 +160,7 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
       if (!twin) missing[(*n_missing)++] = k;
       continue;
     }
-    PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-    PetscCall(CheckFingerprint(s, h, path));
-    PetscCall(HycoH5Close(&h, PETSC_FALSE));
+    PetscCall(OpenSample(s, mu + k * n_par, &h));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -166,7 +210,7 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* kind[i]: the first of the points list[] (n of them) that shares a stiffness with list[i], and its factor. */
+/* kind[i]: the first of the points list[] (n of them) that shares a stiffness, and thus a factor, with list[i]. */
 static PetscErrorCode FindKinds(HycoScene scene, PetscInt n_par, const PetscReal mu[], PetscInt n,
                                 const PetscInt list[], PetscInt kind[])
 {
@@ -208,19 +252,24 @@ PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What rank 0 has of a solution. */
+/* Writes the data of a solution that are on rank 0. */
 static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
 {
-  char fingerprint[32];
+  char fingerprint[32], *history;
+  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
   snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
   PetscCall(HycoH5WriteText(h, "fingerprint", fingerprint));
+  PetscCall(HycoSceneWriteHistory(s->scene, &history));
+  if (history[0]) ierr = HycoH5WriteText(h, "history", history);
+  PetscCall(PetscFree(history));
+  PetscCall(ierr);
   PetscCall(HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The forces of springs, zero on fixed unknowns, where the scene has any. Collective. */
+/* Writes the forces of springs, zero on fixed unknowns, if the scene has any. Collective. */
 static PetscErrorCode WriteSprings(HycoFOM fom, HycoH5 h, const char name[])
 {
   const HycoFileOrder *rows;
@@ -271,7 +320,7 @@ static PetscErrorCode WriteSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "step-0003/U"; without a history the field's own name. */
+/* "step-0003/U"; without a history only the field's name. */
 static void NameField(HycoSnapshots s, PetscInt k, const char field[], char name[HYCO_LINE])
 {
   if (s->scene->n_times)
@@ -280,17 +329,16 @@ static void NameField(HycoSnapshots s, PetscInt k, const char field[], char name
     HycoFormat(name, "%s", field);
 }
 
-/* A path on its way into its file. */
+/* A path while it is written to its file. */
 typedef struct {
   HycoSnapshots s;
   HycoH5 h;
   PetscReal *force, *inelastic;
-  PetscInt n_between; /* steps written that no listed time ends */
-  PetscInt slot; /* of the last of these: its part of the interval between two listed times, numbered from the path's
-                    start */
+  PetscInt n_between; /* number of steps written that do not end at a listed time */
+  PetscInt slot;      /* of the last of these: number of its subinterval, counted from the path's start */
 } PathWriter;
 
-/* At most so many steps between two listed times are kept, one of each of as many equal parts of the interval. */
+/* At most this number of steps between two listed times are stored, one in each of as many equal subintervals. */
 #define MOST_BETWEEN 5
 
 static void NameBetween(PetscInt k, char name[HYCO_LINE])
@@ -298,8 +346,7 @@ static void NameBetween(PetscInt k, char name[HYCO_LINE])
   HycoFormat(name, "between-%04d", (int)k);
 }
 
-/* The displacements of an accepted step between listed times: more of the path for the modes, at no cost of solution.
- */
+/* Writes the displacements of an accepted step between listed times: more data for the modes without further solves. */
 static PetscErrorCode WriteBetween(HycoFOM fom, void *ctx)
 {
   PathWriter *w = (PathWriter *)ctx;
@@ -318,7 +365,7 @@ static PetscErrorCode WriteBetween(HycoFOM fom, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A HycoStepMonitor: the fields of a listed time. The forces are those that the bodies resist with, f_int. */
+/* A HycoStepMonitor: writes the fields of a listed time. The forces are the internal forces f_int. */
 static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
 {
   PathWriter *w = (PathWriter *)ctx;
@@ -331,7 +378,7 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscCall(HycoFOMStress(fom));
   PetscCall(HycoFEStateFields(fom->fe, fom->path->begin, NULL, NULL, w->inelastic, NULL));
   PetscCall(HycoFOMToLocal(fom, fom->path->f_old, w->force));
-  HycoSpringsAddForces(fom->fe, 1, fom->u, w->force); /* theirs apart */
+  HycoSpringsAddForces(fom->fe, 1, fom->u, w->force); /* the forces of springs are a field of their own */
   for (PetscInt k = 0; k < fom->fe->n_dof; k++) w->force[k] = fom->fe->fixed[k] ? 0 : w->force[k];
   NameField(w->s, step->index, "lambda", name);
   HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, name, fom->n_contacts, 1, fom->lambda));
@@ -348,7 +395,7 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves the path into its file; one that does not reach its end is no sample. */
+/* Solves the path and writes its file; a path that does not reach its end is an error. */
 static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[])
 {
   HycoHistory history;
@@ -367,7 +414,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One path by one group: solved and stored, with what its listed times have. Collective on the group. */
+/* Solves and stores one path by one group, with the fields of its listed times. Collective on the group. */
 static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], PetscReal force[])
 {
   PathWriter w = {.s = s, .force = force};
@@ -387,7 +434,7 @@ static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One sample by one group: solve, check, store. Collective on the group. */
+/* Solves, checks and stores one sample by one group. Collective on the group. */
 static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], PetscReal force[])
 {
   HycoSummary summary;
@@ -416,7 +463,7 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A HycoPath's interrupt: a path may take hours. */
+/* A HycoPath's interrupt, because a path may take hours. */
 static PetscErrorCode Hear(void *ctx)
 {
   PetscFunctionBegin;
@@ -424,7 +471,7 @@ static PetscErrorCode Hear(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What SolveMissing() has of the samples. */
+/* The samples of SolveMissing(). */
 typedef struct {
   PetscInt n_all, n_par, n, *missing;
   const PetscReal *mu;
@@ -432,7 +479,7 @@ typedef struct {
   void *ctx;
 } Missing;
 
-/* This rank's group solves samples from the queue. Rank 0 tells how many are stored, while some are not. */
+/* This rank's group solves samples from the queue. Rank 0 reports how many are stored. */
 static PetscErrorCode SolveQueued(HycoSnapshots s, HycoQueue queue, const Missing *m, HycoFOM fom, PetscReal force[])
 {
   PetscInt k, n_stored;
@@ -521,21 +568,18 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal m
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
-    char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+    char name[HYCO_LINE];
     HycoH5 h;
     PetscInt size, one;
 
-    PetscCall(SamplePath(s, mu + k * n_par, path));
-    PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-    PetscCall(CheckFingerprint(s, h, path));
+    PetscCall(OpenSample(s, mu + k * n_par, &h));
     for (PetscInt j = 0; j < n_steps; j++) {
       NameField(s, j, field, name);
       PetscCall(HycoH5GetSize(h, name, &size, &one));
-      HycoCheck(size == total, "%s: %s has %d rows, and other snapshots have %d; remove the folder", path, name,
+      HycoCheck(size == total, "%s: %s has %d rows, and other snapshots have %d; remove the folder", s->last_path, name,
                 (int)size, (int)total);
       PetscCall(HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)(k * n_steps + j) * (size_t)lda));
     }
-    PetscCall(HycoH5Close(&h, PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -543,17 +587,15 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal m
 static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt *rows)
 {
   const PetscReal *mu;
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
   PetscInt one;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  PetscCall(OpenSample(s, mu, &h));
   NameField(s, 0, field, name);
   PetscCall(HycoH5GetSize(h, name, rows, &one));
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -589,40 +631,33 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many steps between listed times the file of mu has; of those of older versions none. */
+/* The number of steps between listed times in the file of mu; 0 for older versions. */
 static PetscErrorCode CountBetween(HycoSnapshots s, const PetscReal mu[], PetscInt *n)
 {
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
 
   PetscFunctionBegin;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
+  PetscCall(OpenSample(s, mu, &h));
   for (*n = 0;; (*n)++) {
     NameBetween(*n, name);
     if (!HycoH5Has(h, name)) break;
   }
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode ReadBetween(HycoSnapshots s, const PetscReal mu[], PetscInt n, PetscInt lo, PetscInt rows,
                                   PetscScalar data[], PetscInt lda)
 {
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  ierr = CheckFingerprint(s, h, path);
-  for (PetscInt k = 0; !ierr && k < n; k++) {
+  PetscCall(OpenSample(s, mu, &h));
+  for (PetscInt k = 0; k < n; k++) {
     NameBetween(k, name);
-    ierr = HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)k * (size_t)lda);
+    PetscCall(HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)k * (size_t)lda));
   }
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -648,36 +683,25 @@ PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], Pe
 PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], PetscInt k, const char field[],
                                      PetscInt first, PetscInt n, PetscReal value[])
 {
-  char path[PETSC_MAX_PATH_LEN], name[HYCO_LINE];
+  char name[HYCO_LINE];
   HycoH5 h;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  ierr = CheckFingerprint(s, h, path);
+  PetscCall(OpenSample(s, mu, &h));
   NameField(s, k, field, name);
-  if (!ierr) ierr = HycoH5ReadRows(h, name, first, n, 1, value);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
+  PetscCall(HycoH5ReadRows(h, name, first, n, 1, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], PetscInt *n, PetscReal **taken)
 {
-  char path[PETSC_MAX_PATH_LEN];
   HycoH5 h;
   PetscInt one = 1;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   *n = -1;
-  PetscCall(SamplePath(s, mu, path));
-  PetscCall(HycoH5OpenOr(path, "remove it and run again", &h));
-  ierr = CheckFingerprint(s, h, path);
-  if (!ierr) ierr = HycoH5LoadReal(h, "taken", n, &one, taken);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
+  PetscCall(OpenSample(s, mu, &h));
+  PetscCall(HycoH5LoadReal(h, "taken", n, &one, taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

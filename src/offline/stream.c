@@ -1,17 +1,17 @@
 /*
-  Snapshots that do not fit in memory together (-hyco_pod_memory): read from the store in batches, each of which is
-  merged into the POD of those before.
+  Snapshots that do not fit in memory together (-hyco_pod_memory): they are read from the store in batches, each of
+  which is merged into the POD of the previous ones.
 */
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
 #include <string.h>
 
-/* What a merge needs of each column: the joined matrix, its copy in the SVD, the modes that are left. */
+/* Copies of each column needed by a merge: the joined matrix, its copy in the SVD, the resulting modes. */
 #define COPIES 3
-/* What batches may lose together, of the noise: less than what decides which modes are above it. */
+/* Loss allowed for all batches, relative to the noise: smaller than what decides which modes are above it. */
 #define LOSS 0.1
 
-/* Columns of N rows that the memory has room for, over all ranks: the same on any number of them. */
+/* Number of columns of N rows that fit in memory, over all ranks: the same on any number of them. */
 static PetscInt Room(HycoReducer t, PetscInt N)
 {
   return (PetscInt)PetscMin(1e6 * t->pod_memory / (COPIES * sizeof(PetscReal) * PetscMax(1, (PetscReal)N)), 1e9);
@@ -38,15 +38,15 @@ PetscErrorCode HycoReducerEachBatch(HycoReducer t, HycoBatchUse use, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A basis that batches of columns of a field are merged into. */
+/* A basis into which batches of columns of a field are merged. */
 typedef struct {
   HycoReducer t;
-  PetscInt kind, N, room; /* of the field: its seed, its rows, columns that have room */
+  PetscInt kind, N, room; /* kind: the field's seed; its rows; number of columns that fit */
   SVD svd;
   Mat merged;
 } Stream;
 
-/* Columns of *merged: the modes so far. */
+/* Number of columns of *merged: the modes so far. */
 static PetscErrorCode CountModes(const Stream *s, PetscInt *l)
 {
   PetscFunctionBegin;
@@ -55,7 +55,7 @@ static PetscErrorCode CountModes(const Stream *s, PetscInt *l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fails where n more columns have no room beside the modes so far. */
+/* Fails if n more columns do not fit in addition to the modes so far. */
 static PetscErrorCode CheckRoom(const Stream *s, PetscInt n)
 {
   PetscInt l;
@@ -70,7 +70,7 @@ static PetscErrorCode CheckRoom(const Stream *s, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Merges *S, a share of all columns, which is freed. */
+/* Merges *S, a share of all columns, and frees it. */
 static PetscErrorCode Merge(Stream *s, PetscReal share, Mat *S)
 {
   PetscFunctionBegin;
@@ -78,7 +78,7 @@ static PetscErrorCode Merge(Stream *s, PetscReal share, Mat *S)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points: as many at a time as there is room for. */
+/* Merges points, as many at a time as fit. */
 static PetscErrorCode MergePoints(Stream *s, HycoSnapshots store)
 {
   const PetscInt n = s->t->n_s;
@@ -96,7 +96,7 @@ static PetscErrorCode MergePoints(Stream *s, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes of path j alone. */
+/* Reads the modes of path j. */
 static PetscErrorCode ReadModes(const Stream *s, HycoSnapshots store, PetscReal tol, PetscInt j, HycoPathModes *modes)
 {
   PetscInt n;
@@ -113,7 +113,7 @@ static PetscErrorCode ReadModes(const Stream *s, HycoSnapshots store, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Paths, one by one: how large each is, then their modes, scaled by that. */
+/* Merges paths one by one: first the size of each, then their modes, scaled by it. */
 static PetscErrorCode MergePaths(Stream *s, HycoSnapshots store, PetscReal tol)
 {
   const PetscInt n = s->t->n_s / HycoSnapshotsSteps(s->t->scene);
@@ -136,7 +136,7 @@ static PetscErrorCode MergePaths(Stream *s, HycoSnapshots store, PetscReal tol)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The basis from what was merged, which is nothing where all was zero. */
+/* Makes the basis from the merged columns; empty if all were zero. */
 static PetscErrorCode EndStream(Stream *s, PetscReal tol, PetscInt most)
 {
   HycoBasis *basis = &s->t->basis[s->kind];

@@ -1,4 +1,4 @@
-/* The laws again along the training paths: stress and state of each listed time, for what is sampled of them. */
+/* Replay of the laws along the training paths: gives stress and state at each listed time. */
 #include <hycoreducerimpl.h>
 
 PetscErrorCode HycoTrainingReplayCreate(HycoReducer t, PetscErrorCode (*displacement)(void *, PetscInt, PetscReal[]),
@@ -45,20 +45,20 @@ static PetscErrorCode Displace(HycoTrainingReplay *r, PetscInt k, PetscReal time
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The laws from t0 to t1, which fe and u are at. */
+/* Integrates the laws from t0 to t1, the time of fe and u. */
 static PetscErrorCode Step(HycoTrainingReplay *r, PetscReal t0, PetscReal t1)
 {
   HycoFEStepReport report;
 
   PetscFunctionBegin;
-  if (!r->march.state) PetscCall(HycoMarchBegin(r->fe, &r->march)); /* now that fe is at the path's first time */
+  if (!r->march.state) PetscCall(HycoMarchBegin(r->fe, &r->march)); /* after fe has been set to the path's first time */
   PetscCall(HycoMarchStep(&r->march, r->u, t0, t1, &report));
   HycoCheckModel(!report.failed, "the laws cannot be integrated along the training displacements at t = %.10g: %s",
                  (double)t1, report.why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The laws stepping at the n times taken[]. */
+/* Integrates the laws at the n times taken[]. */
 static PetscErrorCode Follow(HycoTrainingReplay *r, PetscInt k, const PetscReal mu[], PetscInt n,
                              const PetscReal taken[])
 {

@@ -1,6 +1,6 @@
 /*
-  Files of fields of one mesh: PATH.xdmf with its numbers in PATH.h5, or one PATH.vtkhdf; of one solution, or of several
-  times. Each rank writes its rows of the file's order.
+  Files of fields on one mesh: PATH.xdmf with its numbers in PATH.h5, or one PATH.vtkhdf; for one solution, or for
+  several times. Each rank writes its rows in the file's order.
 */
 #include <hycofields.h>
 #include <hycofile.h>
@@ -13,7 +13,7 @@ static const char *const topology[HYCO_N_CELL_TYPES] = {
     "Polyline",        "Triangle",        "Quadrilateral",  "Tetrahedron",   "Hexahedron",   "Triangle_6",
     "Quadrilateral_8", "Quadrilateral_9", "Tetrahedron_10", "Hexahedron_20", "Hexahedron_27"};
 
-/* The length of the ending .vtkhdf or .xdmf of a path; 0: it has neither. */
+/* The length of the ending .vtkhdf or .xdmf of a path; 0: another ending. */
 static size_t Ending(const char path[])
 {
   const size_t n = strlen(path);
@@ -115,7 +115,7 @@ PetscErrorCode HycoFieldFileOpen(HycoFieldFile f, const HycoFileOrder *order, Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "nodes/displacement", of times "step-0003/nodes/displacement" */
+/* "nodes/displacement", for times "step-0003/nodes/displacement" */
 static void NameSet(HycoFieldFile f, PetscInt k, const HycoField *field, char name[HYCO_LINE])
 {
   const char *folder = field->place == HYCO_ON_CELLS ? "cells" : "nodes";
@@ -131,7 +131,7 @@ void HycoFieldName(const HycoField *field, PetscInt k, char name[HYCO_LINE])
   HycoFormat(name, "step-%04d/%s/%s", (int)k, field->place == HYCO_ON_CELLS ? "cells" : "nodes", field->name);
 }
 
-/* What a field is measured in, as the scene has it, and what its components are called; of a set that is there. On one
+/* Writes the unit of a field, as given in the scene, and the names of its components, to an existing dataset. On one
    process. */
 static PetscErrorCode Describe(HycoFieldFile f, const char set[], const HycoField *field)
 {
@@ -230,7 +230,7 @@ PetscErrorCode HycoFieldFileEndTime(HycoFieldFile f)
 
 /* ------------------------------------------------------------------------------------------ XDMF */
 
-/* A name as XML has it. */
+/* Escapes a name for XML. */
 static void Escape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
 {
   static const char special[] = "&<>\"'";
@@ -253,7 +253,7 @@ static void WriteItem(FILE *out, const char kind[], PetscInt rows, PetscInt cols
           (long)cols, h5, name);
 }
 
-/* The mesh, whose cells all times share, and the fields of one. */
+/* The mesh, whose cells are common to all times, and the fields of one. */
 static void WriteGrid(HycoFieldFile f, FILE *out, const char h5[], PetscInt k)
 {
   const HycoCellType type = f->mesh->type;
@@ -285,7 +285,7 @@ static void WriteGrid(HycoFieldFile f, FILE *out, const char h5[], PetscInt k)
   fprintf(out, "  </Grid>\n");
 }
 
-/* The text, which has its place when the numbers have theirs. On rank 0. */
+/* Writes the text, which is renamed after the numbers. On rank 0. */
 static PetscErrorCode WriteText(HycoFieldFile f, HycoFile *out)
 {
   const char *slash = strrchr(f->h5_path, '/');
@@ -305,7 +305,7 @@ static PetscErrorCode WriteText(HycoFieldFile f, HycoFile *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------------------------------ the end */
+/* ------------------------------------------------------------------------------------------ end */
 
 static PetscErrorCode EndText(HycoFieldFile f, HycoFile *out)
 {
@@ -314,7 +314,7 @@ static PetscErrorCode EndText(HycoFieldFile f, HycoFile *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The parameters: a number each, of points one for each. On one process. */
+/* Writes the parameters: a number each, for points one for each point. On one process. */
 static PetscErrorCode WriteParameters(HycoFieldFile f)
 {
   const PetscInt n_par = f->scene->n_parameters, rows = f->points ? f->n : 1;
@@ -334,8 +334,7 @@ static PetscErrorCode WriteParameters(HycoFieldFile f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The files take their places, the numbers first: without them the .xdmf would point at none, or at those of another
-   run. */
+/* Renames the files, the numbers first: otherwise the .xdmf could refer to no numbers, or to those of another run. */
 static PetscErrorCode Place(HycoFieldFile f, HycoFile *out)
 {
   PetscErrorCode ierr = 0;

@@ -1,4 +1,4 @@
-/* What is written of a solution, and how rows of a mesh and its fields come into a file. */
+/* The fields of a solution, and their conversion to rows of a file. */
 #include <hycofields.h>
 #include <hycoh5.h>
 #include <hycomaterialimpl.h>
@@ -21,7 +21,7 @@ PetscErrorCode HycoFieldRows(const HycoFileOrder *order, PetscInt n, HycoPlace p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* missing: what rows get that no process has a value of. */
+/* missing: value of rows for which no process has a value. */
 static PetscErrorCode WriteRows(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
                                 MPI_Datatype type, PetscInt components, PetscInt cols, const void *value,
                                 PetscReal missing)
@@ -56,7 +56,7 @@ PetscErrorCode HycoFieldWriteData(HycoH5 h, const HycoFileOrder *order, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which of gmsh's nodes of a cell is VTK's k-th. */
+/* The gmsh node of a cell that is VTK's k-th. */
 static PetscInt FromGmsh(HycoCellType type, PetscInt k)
 {
   static const signed char tet10[10] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8},
@@ -128,8 +128,8 @@ PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Corners of faces of six nodes have no contacts: the mean of the middles beside them, so that a picture of the
-   pressure has no holes. sum: room for 2 reals a node. */
+/* Corners of six-node faces have no contacts: they get the mean of the neighbouring middle nodes, so that a plot of
+   the pressure has no holes. sum: room for 2 reals a node. */
 static PetscErrorCode FillCorners(HycoFE fe, PetscReal sum[], PetscReal pressure[])
 {
   HycoMesh m = fe->mesh;
@@ -155,7 +155,7 @@ static PetscErrorCode FillCorners(HycoFE fe, PetscReal sum[], PetscReal pressure
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On the process of the contacts. */
+/* On the process that has the contacts. */
 static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal lambda[],
                                    HycoContactFields *f)
 {
@@ -180,7 +180,7 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
         f->gap[k] += weight[j] * n * u[master[j] * fe->dim + c];
       }
     }
-    /* of a node in several contacts the largest and the smallest */
+    /* for a node in several contacts the largest and the smallest */
     if (f->area[k] > 0) f->pressure[s] = PetscMax(f->pressure[s], lambda[k] / f->area[k]);
     if (HycoPairsAlone(fe->scene, pairs, k)) f->gap[k] = NAN;
     if (!(f->gap_node[s] <= f->gap[k])) f->gap_node[s] = f->gap[k];
@@ -244,12 +244,12 @@ PetscErrorCode HycoNodalStress(HycoFE fe, const PetscReal sigma[], PetscReal ten
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The fields of the bodies. */
+/* Adds the fields of the bodies. */
 static PetscErrorCode AddBodies(HycoFieldFile file, HycoFE fe, const PetscReal u[])
 {
   HycoMesh m = fe->mesh;
   PetscReal *u3, *sigma, *tensor, *mises, *principal, *body, *nodal, *nodal_mises;
-  PetscErrorCode ierr = 0; /* a place where nothing can be written is the caller's to mend: nothing is kept for it */
+  PetscErrorCode ierr = 0; /* if the path cannot be written, the caller handles the error and no file is left */
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc5(m->n_cells * fe->n_sigma, &sigma, 6 * m->n_cells, &tensor, m->n_cells, &mises, 3 * m->n_cells,

@@ -1,8 +1,8 @@
 /*
   Quantities: the largest, smallest or mean value of a field over a group. Displacements are those of nodes, stresses
-  the cells' means: of a group of facets those of the cells that they bound, of points and lines those of the cells
-  around them. A mean is the integral over the cells or facets of the group over their volume or area; of points, plain.
-  Beside fields: the forces of supports, what contacts carry.
+  the cells' means: for a group of facets those of the cells that they bound, for points and lines those of the cells
+  around them. A mean is the integral over the cells or facets of the group over their volume or area; for points the
+  arithmetic mean. Other quantities: the forces of supports, results of contacts.
 */
 #include <hycofields.h>
 #include <hycokinematics.h>
@@ -16,10 +16,10 @@ typedef struct {
   PetscReal most, least, sum, weight;
 } Sum;
 
-/* What a quantity is of: cells (all, or of group g), facets of group g, or its nodes. */
+/* Where a quantity is evaluated: cells (all, or of group g), facets of group g, or its nodes. */
 typedef struct {
   PetscInt group, dim;
-  PetscInt body; /* that has the group's name; -1: none */
+  PetscInt body; /* the body with the group's name; -1: none */
 } Place;
 
 static PetscErrorCode FindPlace(HycoScene scene, HycoMesh m, const HycoQuantity *q, Place *p)
@@ -36,7 +36,7 @@ static PetscErrorCode FindPlace(HycoScene scene, HycoMesh m, const HycoQuantity 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* in[n_cells]: the cells of a place that is made of cells. */
+/* in[n_cells]: marks the cells of a place that consists of cells. */
 static void MarkCells(HycoMesh m, const Place *p, PetscBool in[])
 {
   for (PetscInt e = 0; e < m->n_cells; e++) in[e] = (PetscBool)(p->group < 0 || m->cell_body[e] == p->body);
@@ -45,7 +45,7 @@ static void MarkCells(HycoMesh m, const Place *p, PetscBool in[])
     in[m->group_cell[k]] = PETSC_TRUE;
 }
 
-/* in[n_cells]: the cells around the nodes of a place. */
+/* in[n_cells]: marks the cells around the nodes of a place. */
 static PetscErrorCode MarkAround(HycoMesh m, const Place *p, PetscBool in[])
 {
   PetscBool *node;
@@ -103,7 +103,7 @@ static PetscReal OfNode(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt
   return PetscSqrtReal(sum);
 }
 
-/* Of a cell; r and t: about z in 2D and 3D, of a body of revolution about its axis. */
+/* Value in a cell; r and t: about z in 2D and 3D, in an axisymmetric scene about its axis. */
 static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell, PetscReal *value)
 {
   HycoMesh m = fe->mesh;
@@ -136,7 +136,7 @@ static void Extend(Sum *s, PetscReal value)
   s->least = PetscMin(s->least, value);
 }
 
-/* A cell or facet with these nodes and the value of the cell (stress), or those of its nodes (NULL). */
+/* Adds a cell or facet with these nodes and the value of the cell (stress), or those of its nodes (NULL). */
 static PetscErrorCode AddEntity(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt cell, PetscInt facet,
                                 const PetscReal *value, Sum *s)
 {
@@ -147,7 +147,7 @@ static PetscErrorCode AddEntity(HycoFE fe, PetscInt field, const PetscReal u[], 
   PetscFunctionBegin;
   if (value) Extend(s, *value);
   for (PetscInt a = 0; a < el->nv && !value; a++) Extend(s, OfNode(fe, field, u, node[a]));
-  if (HycoMeshOwned(m, node[0]) < 0) PetscFunctionReturn(PETSC_SUCCESS); /* another's to add */
+  if (HycoMeshOwned(m, node[0]) < 0) PetscFunctionReturn(PETSC_SUCCESS); /* added by another process */
   for (PetscInt q = 0; q < el->nq; q++) {
     PetscReal g[HYCO_CELL_NODES][3], n[3], w = 0, here = value ? *value : 0;
 
@@ -165,7 +165,7 @@ static PetscErrorCode AddEntity(HycoFE fe, PetscInt field, const PetscReal u[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A group of points or lines: its nodes, or the cells around them. */
+/* Adds a group of points or lines: its nodes, or the cells around them. */
 static PetscErrorCode AddNodes(HycoFE fe, PetscInt field, const PetscReal u[], const PetscReal sigma[], const Place *p,
                                Sum *s)
 {
@@ -195,7 +195,7 @@ static PetscErrorCode AddNodes(HycoFE fe, PetscInt field, const PetscReal u[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A force along an axis that the scene has. */
+/* Checks that the scene has the axis of a force. */
 static PetscErrorCode CheckAxis(HycoFE fe, const HycoQuantity *q, const char what[])
 {
   PetscFunctionBegin;
@@ -206,7 +206,7 @@ static PetscErrorCode CheckAxis(HycoFE fe, const HycoQuantity *q, const char wha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The supports' force along an axis at the nodes of a group, or at all; its weight counts what they fix. */
+/* Adds the supports' force along an axis at the nodes of a group, or at all; the weight counts the fixed unknowns. */
 static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const PetscReal reaction[], Sum *s)
 {
   HycoMesh m = fe->mesh;
@@ -234,7 +234,7 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a contact carries, or all of them. */
+/* Adds the results of one contact, or of all of them. */
 static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoContactResult contact[], PetscReal *value)
 {
   const PetscBool turns = (PetscBool)(fe->dim == 3 || (fe->dim == 2 && q->field == 2));
@@ -288,7 +288,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A quantity of fields or reactions, summed over the processes. Collective. */
+/* A quantity from fields or reactions, summed over the processes. Collective. */
 static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity *q, const PetscReal u[],
                                     const PetscReal sigma[], const PetscReal reaction[], PetscReal *value)
 {

@@ -1,6 +1,6 @@
 /*
-  VTKHDF 2.0, an unstructured grid: VTK's own layout of HDF5 (docs.vtk.org, VTKHDF file format). Fields of several times
-  stand one after the other in one set; the mesh, which all share, is there once.
+  VTKHDF 2.0, an unstructured grid: VTK's HDF5 layout (docs.vtk.org, VTKHDF file format). Fields of several times are
+  concatenated in one dataset; the mesh, which all share, is stored once.
 */
 #include <hycofields.h>
 
@@ -9,7 +9,7 @@
 /* VTK's numbers of the cell types. */
 static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12, 22, 23, 28, 24, 25, 29};
 
-/* A set of one dimension of n integers, value, value + step, ... On one process. */
+/* Writes a one-dimensional dataset of n integers, value, value + step, ... On one process. */
 static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, PetscInt value, PetscInt step)
 {
   PetscInt *all;
@@ -40,7 +40,7 @@ static PetscErrorCode WriteHead(HycoFieldFile f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of nodes or cells at the current time, in a set that holds those of all times one after the other. */
+/* Writes rows of nodes or cells at the current time, in a dataset that concatenates those of all times. */
 static PetscErrorCode WriteRows(HycoFieldFile f, const char set[], HycoPlace place, PetscInt cols,
                                 const PetscReal rows[])
 {
@@ -55,7 +55,8 @@ static PetscErrorCode WriteRows(HycoFieldFile f, const char set[], HycoPlace pla
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells' types, and where the nodes of each begin: one more than cells, which the process of the last has. */
+/* Writes the cells' types, and the offset of each cell's nodes: one more than cells, written by the process of the
+   last. */
 static PetscErrorCode WriteTypes(HycoFieldFile f)
 {
   const HycoFileOrder *order = f->order;
@@ -135,8 +136,8 @@ PetscErrorCode HycoVTKWriteField(HycoFieldFile f, const HycoField *field, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where each time's mesh and fields begin: what does not change, at 0; a point's nodes and parameters, at its own. On
-   one process. */
+/* Writes the offset of each time's mesh and fields: 0 for constant ones, its own for a point's nodes and parameters.
+   On one process. */
 static PetscErrorCode WriteSteps(HycoFieldFile f)
 {
   static const char *const zeros[] = {"PartOffsets", "CellOffsets", "ConnectivityIdOffsets", "PointDataOffsets/node_id",

@@ -1,10 +1,11 @@
-/* Names that a scene gives to expressions, and puts into others: constant: {stiff: 2e5, soft: stiff/10}. */
+/* Named constants of a scene, which may be expressions and are substituted in other expressions: constant: {stiff:
+   2e5, soft: stiff/10}. */
 #include <hycosceneimpl.h>
 #include <ctype.h>
 #include <string.h>
 
 #define SECTION "constant_"
-#define LONGEST 16384 /* characters of an expression, its constants put in */
+#define LONGEST 16384 /* characters of an expression after substitution */
 
 static const char *Name(HycoScene s, PetscInt c)
 {
@@ -23,7 +24,7 @@ static PetscErrorCode CheckName(HycoScene s, const char key[], const char name[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends `text` with its constants put in, in brackets. depth: of constants in constants, for those in a circle. */
+/* Appends `text` with its constants substituted, in brackets. depth: nesting of constants, to detect cycles. */
 static PetscErrorCode Expand(HycoScene s, const char key[], const char text[], PetscInt depth, char out[LONGEST])
 {
   size_t at = strlen(out);
@@ -38,7 +39,7 @@ static PetscErrorCode Expand(HycoScene s, const char key[], const char text[], P
       for (c = 0; c < s->n_constants; c++) {
         if (strlen(Name(s, c)) == n && strncasecmp(Name(s, c), text, n) == 0) break;
       }
-    } else if (isdigit((unsigned char)*text) || *text == '.') { /* 1e5 is no e5 */
+    } else if (isdigit((unsigned char)*text) || *text == '.') { /* the e5 of 1e5 is not a name */
       while (isalnum((unsigned char)text[n]) || text[n] == '.') n++;
     }
     HycoCheck(at + n + 3 < LONGEST, "%s: with its constants inserted, the expression is longer than %d characters", key,
@@ -90,7 +91,7 @@ PetscErrorCode HycoSceneReadConstants(HycoScene s)
     PetscCall(CheckName(s, s->key[k], s->key[k] + strlen(SECTION)));
     s->constant[s->n_constants++] = k;
   }
-  for (PetscInt c = 0; c < s->n_constants; c++) { /* one that nothing names is read all the same */
+  for (PetscInt c = 0; c < s->n_constants; c++) { /* unused constants are checked too */
     PetscCall(HycoSceneExpression(s, s->key[s->constant[c]], s->value[s->constant[c]], &tried));
     PetscCall(HycoExprDestroy(&tried));
   }

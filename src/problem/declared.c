@@ -1,4 +1,4 @@
-/* Entries that laws and contact types declare, and what the scene says of them. */
+/* Entries that laws and contact types declare, and their values from the scene. */
 #include <hycosceneimpl.h>
 #include <petscviewer.h>
 #include <string.h>
@@ -38,7 +38,7 @@ PetscErrorCode HycoDeclaredRead(HycoScene s, const char key[], const char text[]
   PetscFunctionBegin;
   switch (e->kind) {
   case HYCO_ENTRY_EXPRESSION:
-    PetscCall(HycoExprDestroy(&e->expr)); /* the same entry in another letter case */
+    PetscCall(HycoExprDestroy(&e->expr)); /* the same entry in other letter case */
     PetscCall(HycoSceneExpression(s, key, text, &e->expr));
     if (!e->heat) PetscCall(HycoExprRefuseHeat(e->expr));
     break;

@@ -1,6 +1,6 @@
 /*
-  A key that stands twice in a YAML file: PETSc takes the last in silence. The file has been read as YAML by then,
-  so what is scanned here is well formed: block and flow mappings, scalars (quoted, plain, block), lists, comments.
+  Finds repeated keys in a YAML file, of which PETSc takes the last without a message. The file has already been read as
+  YAML, so that the text is well formed: block and flow mappings, scalars (quoted, plain, block), lists, comments.
 */
 #include "entries.h"
 #include <stdlib.h>
@@ -8,10 +8,10 @@
 
 #define DEEPEST 64
 
-/* A mapping or list that is open, or a key whose value may be a mapping. */
+/* An open mapping or list, or a key whose value may be a mapping. */
 typedef struct {
   PetscInt column; /* of a key in block style; -1: a brace or bracket */
-  size_t path;     /* length of the path up to it */
+  size_t path;     /* length of the path before it */
 } Level;
 
 typedef struct {
@@ -53,7 +53,7 @@ static void SkipLine(Scan *s)
   while (*s->at && *s->at != '\n') s->at++;
 }
 
-/* The scalar that begins here, into s->token (cut at its room); its end in s->at. */
+/* Reads the scalar at s->at into s->token (truncated to its size); s->at moves to its end. */
 static void ReadScalar(Scan *s)
 {
   const char quote = *s->at == '"' || *s->at == '\'' ? *s->at : '\0';
@@ -77,7 +77,7 @@ static void ReadScalar(Scan *s)
   s->token[n] = '\0';
 }
 
-/* A key at `column`: its path is s->path from now on. */
+/* Enters a key at `column`: its path becomes s->path. */
 static PetscErrorCode TakeKey(Scan *s, PetscInt column, PetscInt line, const char file[])
 {
   size_t length;
@@ -85,13 +85,13 @@ static PetscErrorCode TakeKey(Scan *s, PetscInt column, PetscInt line, const cha
 
   PetscFunctionBegin;
   if (s->flow) {
-    while (s->depth && s->level[s->depth - 1].column >= 0) Pop(s); /* the key before in the same braces */
+    while (s->depth && s->level[s->depth - 1].column >= 0) Pop(s); /* leaves the previous key of the same braces */
   } else {
     while (s->depth && s->level[s->depth - 1].column >= column) Pop(s);
   }
   length = strlen(s->path);
   end = snprintf(s->path + length, sizeof(s->path) - length, "%s%s", length ? "_" : "", s->token);
-  /* a scalar is cut at its room: a longer one fills it */
+  /* a truncated scalar fills the token */
   HycoCheck(end >= 0 && length + (size_t)end + 1 < sizeof(s->path),
             "%s: the key in line %d is longer than %d characters", file, (int)line, HYCO_LINE - 2);
   for (PetscInt k = 0; k < s->n; k++)
@@ -108,7 +108,7 @@ static PetscErrorCode TakeKey(Scan *s, PetscInt column, PetscInt line, const cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A block scalar's lines: those indented deeper than the key at `column`. */
+/* Skips the lines of a block scalar: those indented deeper than the key at `column`. */
 static void SkipBlock(Scan *s, PetscInt column)
 {
   SkipLine(s);
@@ -172,7 +172,7 @@ static PetscErrorCode ScanAll(Scan *s, const char file[])
 
       while (s->depth && s->level[s->depth - 1].column > column) Pop(s);
       length = strlen(s->path);
-      snprintf(s->path + length, sizeof(s->path) - length, "#%d", (int)s->line); /* each item has keys of its own */
+      snprintf(s->path + length, sizeof(s->path) - length, "#%d", (int)s->line); /* each item has its own keys */
       PetscCall(Push(s, column + 1));
       s->at++;
     } else if (strchr("&*!", *s->at))

@@ -1,6 +1,6 @@
 /*
-  A scene's entries: read from YAML into an options database of the scene's own, overridden by the command line,
-  and listed by key. Known entries are spelled SECTION_NAME_FIELD: body_pellet_young, fixed_sym_x0_x.
+  A scene's entries: read from YAML into the scene's own options database, overridden by the command line, and listed by
+  key. Known entries have the form SECTION_NAME_FIELD: body_pellet_young, fixed_sym_x0_x.
 */
 #include <hycosceneimpl.h>
 #include "entries.h"
@@ -36,7 +36,7 @@ static PetscErrorCode ListKeys(PetscOptions options, PetscBool method_only, Pets
     PetscBool set = PETSC_FALSE, seen = PETSC_FALSE;
 
     if (word[0] != '-' || !HycoIsSceneKey(word + 1)) continue;
-    /* an unknown -hyco_ option on the command line is the caller's: it may be meant for the solvers (-hyco_tao_type) */
+    /* an unknown -hyco_ option on the command line may be meant for a solver (-hyco_tao_type): the caller checks it */
     if (!options && strncasecmp(word + 1, "hyco_", 5) == 0 && !HycoOptionFind(word + 1)) continue;
     if (method_only && strncasecmp(word + 1, "hyco_", 5)) continue;
     PetscCall(PetscOptionsHasName(options, NULL, word, &set));
@@ -47,7 +47,7 @@ static PetscErrorCode ListKeys(PetscOptions options, PetscBool method_only, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads one option of any length. */
+/* Reads an option of any length. */
 static PetscErrorCode GetLong(PetscOptions options, const char key[], char **value)
 {
   char dashed[HYCO_LINE];
@@ -58,13 +58,13 @@ static PetscErrorCode GetLong(PetscOptions options, const char key[], char **val
   PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", key));
   PetscCall(PetscOptionsFindPair(options, NULL, dashed, &text, &set));
   PetscCall(PetscStrallocpy(set && text ? text : "", value));
-  for (char *c = *value; *c; c++) { /* an entry is one line: a model file carries it so */
+  for (char *c = *value; *c; c++) { /* an entry is one line in a model file */
     if (*c == '\n' || *c == '\r' || *c == '\t') *c = ' ';
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies the global database's entries over the scene's own; only those of the method when the scene is a model's. */
+/* Copies the global database's entries over the scene's own; only those of the method if the scene is a model's. */
 PetscErrorCode HycoEntriesOverride(PetscOptions options, PetscBool method_only)
 {
   PetscInt n;
@@ -91,7 +91,7 @@ static int CompareEntries(const void *a, const void *b)
   return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
-/* Every entry has been asked for by its key, but those of no section and those whose name has a blank. */
+/* Refuses entries that were not read: those of no known section, and those whose name has a blank. */
 static PetscErrorCode RefuseOthers(PetscOptions options)
 {
   PetscInt n;
@@ -119,7 +119,7 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
   qsort(keys, (size_t)n, sizeof(*keys), CompareEntries);
   PetscCall(PetscCalloc1(n, &scene->value));
   scene->key = keys;
-  for (PetscInt k = 0; k < n; k++) { /* a model file carries key, tab, value, end of line */
+  for (PetscInt k = 0; k < n; k++) { /* a model file stores key, tab, value, end of line */
     char **value = &scene->value[scene->n_entries];
 
     HycoCheck(!keys[k][strcspn(keys[k], "\t\r\n\f\v")], "the scene's entry \"%.200s\" has a blank in its name",
@@ -127,7 +127,7 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
     PetscCall(GetLong(scene->options, keys[k], value));
     keys[scene->n_entries] = keys[k];
     if (strlen(keys[k]) > 5 && strcmp(keys[k] + strlen(keys[k]) - 5, "_view") == 0 &&
-        HycoOptionFind(keys[k])) { /* of this run alone: no description of the scene */
+        HycoOptionFind(keys[k])) { /* options of this run, not part of the scene's description */
       PetscCall(PetscFree(*value));
       PetscCall(PetscFree(keys[scene->n_entries]));
     } else
@@ -162,7 +162,7 @@ static PetscErrorCode FindFile(const char path[], char file[PETSC_MAX_PATH_LEN],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* libyaml and PETSc do not agree on what ends at a byte 0. */
+/* libyaml and PETSc treat a byte 0 differently. */
 static PetscBool IsText(const char file[])
 {
   FILE *f = fopen(file, "rb");
@@ -175,7 +175,7 @@ static PetscBool IsText(const char file[])
   return (PetscBool)(byte == EOF);
 }
 
-/* The file's text, ended by a byte 0; NULL where it has none. The caller frees it. */
+/* The file's text, terminated by a byte 0; NULL if it has none. The caller frees it. */
 static PetscErrorCode ReadText(const char file[], char **text)
 {
   FILE *f = fopen(file, "rb");
@@ -194,7 +194,7 @@ static PetscErrorCode ReadText(const char file[], char **text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc reads the file itself, but for lists of lists. */
+/* PETSc reads the file itself, unless it has nested lists. */
 static PetscErrorCode Insert(PetscOptions options, const char file[], char text[])
 {
   PetscFunctionBegin;

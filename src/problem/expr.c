@@ -7,8 +7,8 @@
 
 struct _n_HycoExpr {
   char *key, *text;
-  muParserHandle_t parser; /* NULL when the text is a number */
-  double constant;         /* its value then */
+  muParserHandle_t parser; /* NULL if the text is a number */
+  double constant;         /* the value of that number */
   double x[3], mu[HYCO_MAX_PARAMETERS], temperature;
   PetscInt n_parameters;
   PetscBool in_space, in_heat, in_mu[HYCO_MAX_PARAMETERS];
@@ -25,13 +25,13 @@ PetscErrorCode HycoExprDestroy(HycoExpr *expr)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* muParser reports through a handler that is not called by default: its flag is read and cleared here. */
+/* muParser reports errors through a handler that is not called by default; this reads and clears its flag. */
 static void Quiet(muParserHandle_t parser)
 {
   (void)parser;
 }
 
-/* Of a long expression, its two ends: a message must have room for the reason. */
+/* Only the two ends of a long expression are shown, so that a message has room for the reason. */
 #define SHORT 260
 static void Shorten(const char text[], char out[SHORT])
 {
@@ -96,7 +96,9 @@ static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
   mupDefineConst(e->parser, "pi", PETSC_PI); /* muParser's own _pi has 12 digits */
   for (int c = 0; c < 3; c++) mupDefineVar(e->parser, axis[c], &e->x[c]);
   mupDefineVar(e->parser, "temperature", &e->temperature);
-  for (PetscInt p = 0; p < n; p++) mupDefineVar(e->parser, names[p], &e->mu[p]); /* one may be named temperature */
+  for (PetscInt p = 0; p < n; p++)
+    mupDefineVar(e->parser, names[p], &e->mu[p]); /* a parameter may have the name
+                                                     temperature */
   if (mupError(e->parser)) PetscCall(Raise(e));
   mupSetExpr(e->parser, e->text);
   if (mupError(e->parser)) PetscCall(Raise(e));

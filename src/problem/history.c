@@ -1,11 +1,11 @@
-/* The history of a scene: the times that it lists, its tables, and the variables that they give to expressions. */
+/* The history of a scene: its listed times, its tables, and the variables for expressions. */
 #include "entries.h"
 #include <hycocontactimpl.h>
 #include <string.h>
 
 #define TABLES "history_tables_"
 
-/* A finite number where `text` goes on; *text moves past it and the blanks behind. */
+/* Reads a finite number at `text`; *text moves past it and the following blanks. */
 static PetscBool TakeNumber(const char **text, PetscReal *value)
 {
   char *end;
@@ -16,7 +16,7 @@ static PetscBool TakeNumber(const char **text, PetscReal *value)
   return PETSC_TRUE;
 }
 
-/* "0 1,2 3": rows of `width` numbers with commas between; *n is -1 where that is not what the text says. */
+/* "0 1,2 3": rows of `width` numbers separated by commas; *n is -1 if the text has another form. */
 static PetscErrorCode ReadRows(const char text[], PetscInt width, PetscInt *n, PetscReal **value)
 {
   PetscInt room = 1;
@@ -59,7 +59,7 @@ static PetscErrorCode ReadTimes(HycoScene s, const char key[], const char text[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next variable of the scene's expressions. */
+/* Adds a variable for the scene's expressions. */
 static PetscErrorCode AddVariable(HycoScene s, const char key[], const char name[])
 {
   PetscFunctionBegin;
@@ -194,33 +194,6 @@ PetscReal HycoSceneNextStop(HycoScene s, PetscReal t)
     }
   }
   return next;
-}
-
-/* The value of an entry; NULL: there is none. */
-static const char *FindEntry(HycoScene s, const char key[])
-{
-  for (PetscInt k = 0; k < s->n_entries; k++) {
-    if (strcasecmp(s->key[k], key) == 0) return s->value[k];
-  }
-  return NULL;
-}
-
-PetscErrorCode HycoSceneCompareHistory(HycoScene trained, HycoScene scene, const char path[])
-{
-  HycoScene both[2] = {trained, scene};
-
-  PetscFunctionBegin;
-  for (PetscInt j = 0; j < 2; j++) {
-    for (PetscInt k = 0; k < both[j]->n_entries; k++) {
-      const char *key = both[j]->key[k], *was = FindEntry(trained, key), *is = FindEntry(scene, key);
-
-      if (strncasecmp(key, "history_", 8)) continue;
-      HycoCheck(was && is && strcmp(was, is) == 0,
-                "%s was trained with another history: %s is %.200s in the scene and %.200s in the model", path, key,
-                is ? is : "missing", was ? was : "missing");
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoSceneGetHistory(HycoScene s, PetscInt *n, const PetscReal *times[])

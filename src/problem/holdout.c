@@ -1,8 +1,8 @@
 /*
-  HycoSamples: unseen points, to judge a model by. They spread over what a set of training points reaches, by an
-  additive recurrence: coordinate j of point k is the fractional part of 1/2 + k phi^-(j+1), with phi the root of
-  phi^(d+1) = phi + 1 (M. Roberts' generalisation of the golden ratio to d dimensions). Every part of the sequence is
-  evenly spread, and more points continue it.
+  HycoSamples: unseen points by which a model is judged. They are distributed over the region covered by a set of
+  training points, by an additive recurrence: coordinate j of point k is the fractional part of 1/2 + k phi^-(j+1), with
+  phi the root of phi^(d+1) = phi + 1 (M. Roberts' generalisation of the golden ratio to d dimensions). Every part of
+  the sequence is evenly distributed, and it can be continued.
 */
 #include <hycosceneimpl.h>
 
@@ -27,7 +27,7 @@ PetscErrorCode HycoSamplesReach(HycoScene s, PetscInt n, const PetscReal mu[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The root of x^(dim + 1) = x + 1 above 1. */
+/* The root of x^(dim + 1) = x + 1 that is greater than 1. */
 static PetscReal Ratio(PetscInt dim)
 {
   PetscReal x = 2;

@@ -1,8 +1,8 @@
-/* Gravity and rotation: accelerations of the whole scene, which bodies with a density feel. */
+/* Gravity and rotation: accelerations of the whole scene, which act on bodies with a density. */
 #include <hycosceneimpl.h>
 #include <string.h>
 
-/* Entries and where their expressions go. */
+/* The expression of an entry. */
 static HycoExpr *Find(HycoScene s, const char key[])
 {
   HycoMotion *m = &s->motion;
@@ -30,14 +30,14 @@ PetscErrorCode HycoSceneReadMotion(HycoScene s, PetscInt entry)
             "the scene's entry %s is unknown; the entries are gravity: {x: ..., y: ..., z: ...} and rotation: {speed: "
             "..., axis: {x: ..., y: ..., z: ...}, through: {x: ..., y: ..., z: ...}}",
             key);
-  PetscCall(HycoExprDestroy(expr)); /* the same entry in another letter case */
+  PetscCall(HycoExprDestroy(expr)); /* the same entry in other letter case */
   PetscCall(HycoSceneExpression(s, key, s->value[entry], expr));
   PetscCall(HycoExprRefuseHeat(*expr));
   HycoCheck(!HycoExprInSpace(*expr), "%s depends on x, y or z; it must be constant in space", key);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The expressions in their order; NULL: one that the scene does not give. */
+/* All expressions in order; NULL: not given in the scene. */
 #define N_EXPR 10
 static HycoExpr *At(HycoScene s, PetscInt k)
 {

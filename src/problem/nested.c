@@ -1,11 +1,11 @@
 /*
-  Lists of lists in a scene's YAML, which PETSc does not read: [[0, 1], [10, 2.5]] becomes [ 0 1 ,  10 2.5 ], a list of
-  scalars "0 1" and "10 2.5", every character in its place, so that messages name the right lines.
+  Nested lists in a scene's YAML, which PETSc cannot read: [[0, 1], [10, 2.5]] becomes [ 0 1 , 10 2.5 ], a list of the
+  scalars "0 1" and "10 2.5". All characters keep their positions, so that messages have the right line numbers.
 */
 #include "entries.h"
 #include <string.h>
 
-/* Past a quoted scalar. */
+/* The position after a quoted scalar. */
 static char *SkipQuoted(char *c)
 {
   const char quote = *c++;
@@ -14,14 +14,14 @@ static char *SkipQuoted(char *c)
   return *c ? c + 1 : c;
 }
 
-/* Where a scalar, a list or a mapping may begin: after a separator, with blanks between. */
+/* Whether a scalar, a list or a mapping may begin here: after a separator and blanks. */
 static PetscBool Begins(const char text[], const char *c)
 {
   while (c > text && (c[-1] == ' ' || c[-1] == '\t')) c--;
   return (PetscBool)(c == text || strchr(":,[{-\n", c[-1]));
 }
 
-/* "- [0, 1]": an item of a block's list that is a list. */
+/* "- [0, 1]": an item of a block list that is itself a list. */
 static PetscBool IsItem(const char line[])
 {
   line += strspn(line, " \t");
@@ -30,7 +30,7 @@ static PetscBool IsItem(const char line[])
 
 PetscBool HycoEntriesFlatten(char text[])
 {
-  PetscInt depth = 0; /* of brackets */
+  PetscInt depth = 0; /* of open brackets */
   PetscBool nested = PETSC_FALSE;
   const char *line = text;
 
@@ -41,7 +41,7 @@ PetscBool HycoEntriesFlatten(char text[])
     } else if ((*c == '"' || *c == '\'') && Begins(text, c)) {
       c = SkipQuoted(c);
     } else if (*c == '[' && (depth || Begins(text, c))) {
-      /* as if the list around it had brackets */
+      /* treated as if the list around it had brackets */
       if (!depth && IsItem(line)) depth = 1;
       if (++depth == 2) {
         *c = ' ';

@@ -1,4 +1,4 @@
-/* Numbers that a scene asks of each solution: output: {hoop: {max: sigma_tt, group: bore}}. */
+/* Outputs named in a scene: output: {hoop: {max: sigma_tt, group: bore}}. */
 #include <hycocontactimpl.h>
 #include <string.h>
 
@@ -76,7 +76,7 @@ PetscBool HycoSceneAsks(HycoScene s, HycoQuantityKind first, HycoQuantityKind la
   return PETSC_FALSE;
 }
 
-/* What a contact carries names a contact of the scene or none, and no group; a field names no contact. */
+/* A quantity of contacts has a contact of the scene or none, and no group; one of a field has no contact. */
 static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
 {
   char list[HYCO_LINE] = "";

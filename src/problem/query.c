@@ -1,4 +1,4 @@
-/* What a scene answers: its parameters, its options, its words, its fingerprint. */
+/* Queries of a scene: parameters, options, words, fingerprint. */
 #include <hycocontactimpl.h>
 #include <stdio.h>
 #include <string.h>
@@ -94,7 +94,8 @@ PetscErrorCode HycoSceneSetDM(HycoScene scene, DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The places of the vertices of the program's own mesh, in an order that no number of processes changes. Collective. */
+/* Hashes the vertices' coordinates of the calling program's mesh, in an order independent of the number of
+   processes. Collective. */
 static PetscErrorCode HashDM(HycoScene scene, unsigned long long *hash)
 {
   unsigned long long all = 0, one;
@@ -127,7 +128,7 @@ static PetscErrorCode HashFile(HycoScene scene, unsigned long long *hash)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Scenes whose solutions are not those of before masters were searched for on moved surfaces. */
+/* Whether solutions may differ from those of versions that did not search for masters on moved surfaces. */
 static PetscBool MayMoveSurfaces(HycoScene scene)
 {
   PetscBool surface = PETSC_FALSE, map = PETSC_FALSE;

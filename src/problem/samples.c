@@ -82,7 +82,7 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All combinations of the values, which are freed. */
+/* All combinations of the values, which this function frees. */
 static PetscErrorCode TakeProduct(HycoSamples s, const PetscInt counts[], PetscReal *values[])
 {
   const PetscErrorCode ierr = HycoSamplesAddProduct(s, counts, (const PetscReal *const *)values);
@@ -239,7 +239,7 @@ static int CompareKeyed(const void *a, const void *b)
   return x->hash != y->hash ? (x->hash > y->hash) - (x->hash < y->hash) : (x->at > y->at) - (x->at < y->at);
 }
 
-/* twin[k]: an earlier point has the values of point k. */
+/* twin[k]: an earlier point has the same values as point k. */
 static PetscErrorCode FindTwins(HycoSamples s, PetscBool twin[])
 {
   const PetscInt P = s->scene->n_parameters;

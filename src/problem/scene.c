@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Fields of a section's members; a member's name is what stands between the section and the field. */
+/* Fields of a section's members; the name of a member is the text between the section and the field. */
 static const char *const body_fields[] = {
     "element",   "map_x",    "map_y",   "map_z", "law", "temperature", "reference_temperature",
     "expansion", "law_type", "density", NULL};
@@ -22,7 +22,8 @@ static const char *const scene_fields[] = {"title",       "mesh",       "paramet
                                            "unit_length", "unit_force", "unit_stress", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};
 
-/* Splits "body_pellet_young" after "body_" into "pellet" and the index of "young"; false if no field ends it. */
+/* Splits "body_pellet_young" after "body_" into "pellet" and the index of "young"; false if it does not end with a
+   field. */
 static PetscBool SplitKey(const char *rest, const char *const fields[], char name[HYCO_LINE], PetscInt *field)
 {
   size_t length = strlen(rest), best = 0;
@@ -42,7 +43,7 @@ static PetscBool SplitKey(const char *rest, const char *const fields[], char nam
   return PETSC_TRUE;
 }
 
-/* declared: more fields, those of a law or a contact type; or NULL. */
+/* declared: further fields, those of a law or a contact type; or NULL. */
 static PetscErrorCode UnknownKey(const char key[], const char what[], const HycoDeclared *declared,
                                  const char *const others[])
 {
@@ -96,12 +97,12 @@ static PetscErrorCode NewExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
   PetscFunctionBegin;
   HycoCheck(!*expr || strcasecmp(HycoExprKey(*expr), s->key[entry]) == 0,
             "%s and %s are for the same group; remove one of them", HycoExprKey(*expr), s->key[entry]);
-  PetscCall(HycoExprDestroy(expr)); /* the same entry in another letter case */
+  PetscCall(HycoExprDestroy(expr)); /* the same entry in other letter case */
   PetscCall(HycoSceneExpression(s, s->key[entry], s->value[entry], expr));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An expression outside the materials. */
+/* An expression that must not contain the temperature: all except constants of laws. */
 static PetscErrorCode NewColdExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
 {
   PetscFunctionBegin;
@@ -110,7 +111,7 @@ static PetscErrorCode NewColdExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two finite numbers with a comma between: PETSc's reader of arrays leaks where it refuses. */
+/* Two finite numbers separated by a comma. PETSc's own reader of arrays leaks memory when it fails. */
 static PetscBool SplitRange(const char text[], PetscReal range[2])
 {
   char *end;
@@ -196,13 +197,13 @@ static PetscErrorCode ReadElement(HycoScene s, PetscInt entry, HycoBody *body)
 
 /* A section whose members have a type that declares entries: bodies with their laws, contacts. */
 typedef struct {
-  const char *what, *const *others; /* for messages; entries beside the declared ones */
-  const char *nested;               /* what may stand before the declared ones; or NULL */
+  const char *what, *const *others; /* for messages; entries besides the declared ones */
+  const char *nested;               /* prefix allowed before the declared ones; or NULL */
   PetscErrorCode (*create)(HycoScene, const char name[], PetscObject *object, HycoDeclared **declared,
                            PetscBool *given);
 } Section;
 
-/* The type's name that the scene gives to a member. */
+/* The type's name given in the scene for a member. */
 static PetscErrorCode GetType(HycoScene s, const char section[], const char name[], const char field[],
                               const char **type, PetscBool *given)
 {
@@ -214,7 +215,7 @@ static PetscErrorCode GetType(HycoScene s, const char section[], const char name
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The law's texts, "-body_NAME_law_library" or "-body_NAME_library", which say what else it declares. */
+/* Reads the law's texts, "-body_NAME_law_library" or "-body_NAME_library", on which its other declarations depend. */
 static PetscErrorCode ReadTexts(HycoScene s, const char name[], HycoMaterial law)
 {
   PetscFunctionBegin;
@@ -235,7 +236,7 @@ static PetscErrorCode ReadTexts(HycoScene s, const char name[], HycoMaterial law
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The law that the scene gives to the body `name`. The caller owns it. */
+/* Creates the law given in the scene for the body `name`. The caller owns it. */
 static PetscErrorCode CreateLaw(HycoScene s, const char name[], PetscObject *object, HycoDeclared **declared,
                                 PetscBool *given)
 {
@@ -257,7 +258,7 @@ static PetscErrorCode CreateLaw(HycoScene s, const char name[], PetscObject *obj
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same of the contact `name`; an obstacle where the scene gives no type. */
+/* The same for the contact `name`; an obstacle if the scene gives no type. */
 static PetscErrorCode CreateContact(HycoScene s, const char name[], PetscObject *object, HycoDeclared **declared,
                                     PetscBool *given)
 {
@@ -280,8 +281,8 @@ static PetscErrorCode CreateContact(HycoScene s, const char name[], PetscObject 
 static const Section contacts = {"a contact of type", contact_fields, NULL, CreateContact};
 static const Section bodies = {"a body of law", body_fields, "law_", CreateLaw};
 
-/* "a_b_young" is b_young of a if the type of a declares it, else young of a_b: name and field; NULL where neither.
-   likely: the member that was meant, with its type, for the message; the caller destroys it. */
+/* Splits "a_b_young" into name and field: b_young of a if the type of a declares it, else young of a_b; NULL if
+   neither. likely: the member that was probably meant, with its type, for the message; the caller destroys it. */
 static PetscErrorCode SplitDeclared(HycoScene s, const Section *section, const char rest[], char name[HYCO_LINE],
                                     const char **field, PetscObject *likely, HycoDeclared **declared)
 {
@@ -310,7 +311,7 @@ static PetscErrorCode SplitDeclared(HycoScene s, const Section *section, const c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The member and the field of an entry that a type declares; fails where none does. */
+/* The member and the field of an entry that a type declares; fails if no type does. */
 static PetscErrorCode FindDeclared(HycoScene s, const Section *section, const char key[], const char rest[],
                                    char name[HYCO_LINE], const char **field)
 {
@@ -358,7 +359,7 @@ static PetscErrorCode ReadBody(HycoScene s, PetscInt entry, const char rest[])
     PetscCall(HycoDeclaredRead(s, key, s->value[entry], HycoDeclaredFind(&body->law->constants, constant)));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(FindBody(s, name, &body)); /* which reads `law` */
+  PetscCall(FindBody(s, name, &body)); /* reads `law` */
   if (field == 0) PetscCall(ReadElement(s, entry, body));
   if (field > 0 && field < 4) PetscCall(NewColdExpr(s, entry, &body->map[field - 1]));
   if (field == 5) PetscCall(NewColdExpr(s, entry, &body->temperature));
@@ -393,7 +394,7 @@ static PetscErrorCode ReadContact(HycoScene s, PetscInt entry, const char rest[]
 
   PetscFunctionBegin;
   if (SplitKey(rest, contact_fields, name, &type)) {
-    PetscCall(FindContact(s, name, &contact)); /* which reads it */
+    PetscCall(FindContact(s, name, &contact)); /* reads it */
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(FindDeclared(s, &contacts, key, rest, name, &field));
@@ -402,7 +403,7 @@ static PetscErrorCode ReadContact(HycoScene s, PetscInt entry, const char rest[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next of the groups that an entry names, "left" or "left,right"; NULL: there is none. */
+/* The next of the groups in an entry, "left" or "left,right"; NULL: no more. */
 static char *NextGroup(char names[], char **rest)
 {
   char *name = strtok_r(names, ",", rest);
@@ -413,7 +414,7 @@ static char *NextGroup(char names[], char **rest)
   return name;
 }
 
-/* Whether the scene has read a body of this name: bodies come before forces. */
+/* Whether the scene has a body of this name: bodies are read before forces. */
 static PetscBool IsBody(HycoScene s, const char name[])
 {
   for (PetscInt b = 0; b < s->n_bodies; b++) {
@@ -439,7 +440,7 @@ static PetscErrorCode ReadForce(HycoScene s, PetscInt entry, const char name[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An entry of a section whose members are groups: its expression, for each group that it names. */
+/* Reads an entry of a section whose members are groups: its expression, for each of its groups. */
 static PetscErrorCode ReadGroups(HycoScene s, PetscInt entry, char names[], PetscInt field)
 {
   const char *key = s->key[entry];
@@ -468,7 +469,7 @@ static PetscErrorCode ReadGroups(HycoScene s, PetscInt entry, char names[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One entry of a section with members. */
+/* Reads one entry of a section with members. */
 static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
 {
   const char *key = s->key[entry], *rest = strchr(key, '_') + 1, *what = NULL;
@@ -506,7 +507,7 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* scene_, parameter_ and hyco_ entries are read elsewhere; here their names are checked. */
+/* scene_, parameter_ and hyco_ entries are read elsewhere; this checks their names. */
 static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
 {
   const char *key = s->key[entry];
@@ -544,7 +545,7 @@ static PetscErrorCode CheckHistoryEntry(const char key[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Entries of heat that need one another; the law learns where its temperatures come from. */
+/* Checks thermal entries that require each other; sets the temperature of the law. */
 static PetscErrorCode CheckHeat(HycoBody *body)
 {
   PetscBool reads = body->law->heat;
@@ -562,7 +563,8 @@ static PetscErrorCode CheckHeat(HycoBody *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A direction for each displacement along one, the same at all parameter values; none over time. */
+/* Checks that each displacement along a direction has its direction, that this is constant, and that the scene has
+   no history. */
 static PetscErrorCode CheckSupports(HycoScene s)
 {
   PetscBool every[HYCO_MAX_PARAMETERS];
@@ -593,7 +595,7 @@ static PetscErrorCode CheckSupports(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A description that cannot be solved is refused here, before any mesh is read. */
+/* Refuses scenes that cannot be solved, before a mesh is read. */
 static PetscErrorCode CheckScene(HycoScene s)
 {
   PetscFunctionBegin;
@@ -668,7 +670,7 @@ static PetscErrorCode FindMesh(HycoScene s, const char folder[])
 
   PetscFunctionBegin;
   PetscCall(GetString(s, "scene_mesh", &mesh));
-  /* On the command line a relative path starts where the user stands, in the file where the scene is. */
+  /* On the command line a path is relative to the working folder, in the file to the scene's folder. */
   PetscCall(PetscOptionsHasName(NULL, NULL, "-scene_mesh", &set));
   if (set || mesh[0] == '/' || !mesh[0])
     snprintf(path, sizeof(path), "%s", mesh);
@@ -679,7 +681,7 @@ static PetscErrorCode FindMesh(HycoScene s, const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Everything after the entries are in scene->options. */
+/* Reads everything from the entries in scene->options. */
 static PetscErrorCode Build(HycoScene s, const char folder[])
 {
   PetscFunctionBegin;
@@ -704,7 +706,7 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
     else if (strncasecmp(key, "history_", 8) == 0)
       PetscCall(CheckHistoryEntry(key));
     else if (strncasecmp(key, "constant_", 9) == 0)
-      continue; /* HycoSceneReadConstants() */
+      continue; /* read by HycoSceneReadConstants() */
     else
       PetscCall(ReadMember(s, k));
   }
@@ -789,7 +791,7 @@ PetscErrorCode HycoSceneToText(HycoScene scene, char **text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cuts the text into keys and values. */
+/* Splits the text into keys and values. */
 static PetscErrorCode SplitText(char text[], PetscInt *lines, char *key[], char *value[])
 {
   char *line, *rest;

@@ -1,11 +1,11 @@
-/* Many predictions in one call: points with the same reduced stiffness follow each other, so that each is filled and
- * factored once. */
+/* Many predictions in one call: points with the same reduced stiffness are solved one after the other, so that each
+   stiffness is assembled and factored once. */
 #include <hycoromimpl.h>
 #include <stdlib.h>
 
 typedef struct {
   const PetscReal *mu;
-  const PetscInt *order; /* of the parameters: those that reach the stiffness or the contact rows first */
+  const PetscInt *order; /* of the parameters: first those that affect the stiffness or the contact rows */
   PetscInt n, at;
 } Point;
 
@@ -53,7 +53,7 @@ PetscErrorCode HycoROMGetSizes(HycoROM m, PetscInt *n_contacts, PetscInt *n_node
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points in the order that they were sorted into; the answers in the order that they came in. */
+/* Solves the points in their sorted order; the results are in the order of the input. */
 static PetscErrorCode SolveEach(HycoROM m, PetscInt n, const Point point[], HycoPrediction prediction[],
                                 PetscReal Lambda[], PetscReal U[])
 {
@@ -85,7 +85,7 @@ PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
   PetscCall(PetscMalloc1(n, &point));
   ierr = Sort(m, n, mu, order, point);
   if (!ierr) ierr = SolveEach(m, n, point, prediction, Lambda, U);
-  m->solved = PETSC_FALSE; /* whose answer would it be? */
+  m->solved = PETSC_FALSE; /* a batch leaves no current solution */
   PetscCall(PetscFree(point));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

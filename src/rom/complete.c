@@ -1,5 +1,5 @@
-/* What a prediction leaves out: the rows of contacts and the displacements beyond the part that the reduced problem
-   touches, when somebody asks. */
+/* Completes a prediction on demand: the rows of contacts and the displacements outside the part that the reduced
+   problem uses. */
 #include <hycoromimpl.h>
 
 PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows)
@@ -21,7 +21,7 @@ PetscErrorCode HycoRowsDestroy(HycoRows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The whole of mesh as nodes and surfaces alone: nobody asks for its cells' materials. */
+/* Creates mesh without its cells: their materials are not needed. */
 static PetscErrorCode CreateBeyond(HycoROM m)
 {
   PetscFunctionBegin;
@@ -33,13 +33,13 @@ static PetscErrorCode CreateBeyond(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of all contacts at mu on fe, which lives on mesh or on mesh without cells. */
+/* The rows of all contacts at mu on fe, which is on mesh or on mesh without cells. */
 static PetscErrorCode BringRows(HycoROM m, HycoFE fe, const PetscReal mu[])
 {
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(fe, mu));
   if (!fe->contact_changed && !fe->gap_changed) PetscFunctionReturn(PETSC_SUCCESS);
-  fe->ready = PETSC_FALSE; /* until its rows are there */
+  fe->ready = PETSC_FALSE; /* until its rows are computed */
   PetscCall(HycoContactRows(fe, &m->pairs, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap));
   fe->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,12 +1,12 @@
 /*
-  What each contact of the scene carries in a prediction. Normals, areas and the nodes' places are full order's at the
-  same parameters, evaluated on the model's own surfaces, anew where parameters move or turn them; the forces are the
+  Results of each contact of the scene in a prediction. Normals, areas and node positions are those of full order at the
+  same parameters, evaluated on the model's surfaces and updated when parameters change them; the forces are the
   prediction's.
 */
 #include <hycoromimpl.h>
 
 struct _n_HycoCarried {
-  PetscBool ready; /* the geometry is that of mu */
+  PetscBool ready; /* the geometry is that of the current mu */
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscReal *normal, *gap, *area; /* by potential contact */
   HycoContactResult *result;      /* by contact of the scene */
@@ -21,7 +21,7 @@ PetscErrorCode HycoCarriedDestroy(HycoCarried *carried)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Made when somebody asks. */
+/* Created on demand. */
 static PetscErrorCode Make(HycoROM m)
 {
   HycoCarried c;
@@ -37,7 +37,7 @@ static PetscErrorCode Make(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The geometry at fe's parameters, unless none of what has changed since reaches it. */
+/* Updates the geometry to fe's parameters, unless no change affects it. */
 static PetscErrorCode Bring(HycoROM m, HycoFE fe)
 {
   HycoCarried c = m->carried;
@@ -56,7 +56,7 @@ static PetscErrorCode Bring(HycoROM m, HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether Lambda is of all contacts. */
+/* Whether Lambda has the forces of all contacts. */
 static PetscBool HasAll(HycoROM m)
 {
   return (PetscBool)(!m->ops->reconstruct || m->reconstruct || m->m == m->pairs.n);

@@ -1,10 +1,10 @@
 /*
-  How far a predicted path is from the full order's equations, without a solution of these. The laws are replayed on the
-  whole mesh; at each listed time the residual of equilibrium r = f_int - F + B^T L has the size sqrt(r . K^-1 r) with
-  the elastic stiffness K at the path's first time, whose factor is kept while no parameter changes it. For bodies that
-  do not flow, and with the right contact forces, it is the energy norm of the displacement's error. The contacts' own
-  conditions 0 <= L complementary to g = D - B u >= 0 are measured by min(g, c L), with the length c L of the size of
-  the displacements at the contacts.
+  The residual of the full-order equations along a predicted path, without solving them. The laws are replayed on the
+  whole mesh; at each listed time the norm of the residual of equilibrium r = f_int - F + B^T L is sqrt(r . K^-1 r) with
+  the elastic stiffness K at the path's first time, whose factor is kept while no parameter changes it. For elastic
+  bodies and exact contact forces, it is the energy norm of the displacement's error. The residual of the contact
+  conditions 0 <= L complementary to g = D - B u >= 0 is min(g, c L), where c scales L to a length of the size of the
+  displacements at the contacts.
 */
 #include <hycolinear.h>
 #include <hycopath.h>
@@ -12,7 +12,7 @@
 
 struct _n_HycoBalance {
   PetscBool factored;
-  PetscReal mu[HYCO_MAX_PARAMETERS]; /* the variables that K is of */
+  PetscReal mu[HYCO_MAX_PARAMETERS]; /* the variables at which K was assembled */
   Mat K;
   KSP ksp;
   Vec r, x;
@@ -59,7 +59,7 @@ static PetscErrorCode Create(HycoROM m, HycoBalance b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rigid motions that contact alone holds: springs of the norm of H1 to the ground, as stiff as the bodies. */
+/* Floating bodies: adds springs to the ground, the H1 norm matrix scaled to the bodies' stiffness. */
 static PetscErrorCode HoldFloating(HycoFE fe, Mat K)
 {
   HycoMotions motions;
@@ -81,7 +81,7 @@ static PetscErrorCode HoldFloating(HycoFE fe, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The factor of K where fe is, unless it is the one that is there. */
+/* Factors K at fe's parameters, unless the present factor is valid. */
 static PetscErrorCode Factor(HycoROM m, HycoBalance b)
 {
   const HycoFE fe = m->fe_whole;
@@ -102,7 +102,7 @@ static PetscErrorCode Factor(HycoROM m, HycoBalance b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds B^T L to f, and notes the gaps and the displacements at the contacts, of listed time j. */
+/* Adds B^T L to f, and stores the gaps and the displacements at the contacts, for listed time j. */
 static void AddContact(HycoROM m, HycoBalance b, PetscInt j, PetscReal f[])
 {
   const HycoRows *B = &b->rows;
@@ -123,7 +123,7 @@ static void AddContact(HycoROM m, HycoBalance b, PetscInt j, PetscReal f[])
   b->approach[j] = PetscSqrtReal(b->approach[j]);
 }
 
-/* |r| at listed time j, where the replay is, and |u|, both in the energy norm. */
+/* |r| at listed time j of the replay, and |u|, both in the energy norm. */
 static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, PetscInt j)
 {
   const HycoFE fe = m->fe_whole;
@@ -148,7 +148,7 @@ static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The laws from the first time to the last; a law without an answer ends it. */
+/* Replays the laws from the first time to the last; ends where a law has no solution. */
 static PetscErrorCode March(HycoROM m, HycoBalance b, HycoReplay *replay)
 {
   const HycoTrace *trace = &m->trace;
@@ -193,7 +193,7 @@ static PetscReal ContactResidual(HycoROM m, const HycoBalance b, PetscInt j, Pet
   return PetscSqrtReal(sum);
 }
 
-/* What the times amount to beside the path's largest. */
+/* Sets the results from all times, relative to the path's largest values. */
 static void Summarise(HycoROM m, HycoBalance b, HycoEquilibrium *e)
 {
   const PetscInt n = m->trace.n_listed;
@@ -218,7 +218,7 @@ static PetscErrorCode Measure(HycoROM m, HycoBalance b, HycoEquilibrium *e)
   PetscFunctionBegin;
   b->why[0] = '\0';
   if (!b->K) PetscCall(Create(m, b));
-  m->whole_current = PETSC_FALSE; /* U_whole is the replay's */
+  m->whole_current = PETSC_FALSE; /* the replay overwrites U_whole */
   ierr = HycoReplayBegin(m, m->fe_whole, &replay);
   if (!ierr) ierr = March(m, b, &replay);
   PetscCall(HycoReplayEnd(&replay));

@@ -1,17 +1,17 @@
 /*
-  How far a prediction can be trusted: an estimate of its error from what is known online, calibrated at training on
-  held-out solutions (calibrate.c). log e = c_0 + sum_j c_j log(1 + f_j / floor_j), c_j >= 0, of five features:
+  An estimate of the error of a prediction from quantities known online, calibrated in training on held-out solutions
+  (calibrate.c). log e = c_0 + sum_j c_j log(1 + f_j / floor_j), c_j >= 0, of five features:
 
-    0  misfit       distance of the full-order displacements from what the modes alone give there, over their size;
-                    condensed: the law of the forces' interpolation (condensed_estimate.c)
-    1  penetration  of the contacts that (38) does not constrain, over the size of B U; condensed: the law of u
-    2  adhesion     forces of these contacts where the predicted displacement leaves a gap, over the size of the forces
+    0  misfit       relative distance of the full-order displacements from the values that the modes alone give there;
+                    condensed: the estimate of the forces' interpolation error (condensed_estimate.c)
+    1  penetration  at the contacts that (38) does not constrain, relative to B U; condensed: the estimate for u
+    2  adhesion     forces of these contacts where the predicted displacement leaves a gap, relative to the forces
     3  distance     to the nearest training point, each parameter scaled to its range
-    4  tail         the last quarter of the modes' coefficients over all of them: what the modes cut off is of this kind
+    4  tail         the last quarter of the modes' coefficients relative to all: indicates the error of truncation
 
-  Outside what training has seen the estimate is multiplied by (1 + b / d)^2, b the scaled distance from it and d the
-  training points' spacing. K's rows on the interface are cut off with the RID's elements, so that no residual can be
-  formed there; the misfit says instead how far the two sides of the interface disagree.
+  Outside the region of training the estimate is multiplied by (1 + b / d)^2, b the scaled distance from it and d the
+  spacing of the training points. K's rows on the interface lack the cells outside the RID, so that no residual can be
+  computed there; the misfit measures the disagreement between the two sides of the interface instead.
 */
 #include <hycoalgorithms.h>
 #include <hycoromimpl.h>
@@ -71,7 +71,7 @@ PetscReal HycoTrustDistance(HycoScene s, const PetscReal a[], const PetscReal b[
   return PetscSqrtReal(sum);
 }
 
-/* Of the POD modes: supremizers have no singular value. */
+/* Tail of the POD modes only: supremizers have no singular value. */
 static PetscReal Tail(HycoROM m)
 {
   PetscReal last = 0, all = 0;
@@ -84,7 +84,7 @@ static PetscReal Tail(HycoROM m)
   return Quotient(last, all);
 }
 
-/* Of the solution as it stands, of a path of the listed time that is shown. */
+/* For the current solution; for a path at the listed time that is selected. */
 static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
 {
   const PetscInt n_par = m->scene->n_parameters;
@@ -93,7 +93,7 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
   PetscCall(HycoROMComplete(m));
   feature[MISFIT] = feature[PENETRATION] = feature[ADHESION] = 0;
   if (m->ops->features)
-    PetscUseTypeMethod(m, features, feature); /* the first two */
+    PetscUseTypeMethod(m, features, feature); /* features 0 and 1 */
   else {
     feature[MISFIT] = Misfit(m);
     Contacts(m, &feature[PENETRATION], &feature[ADHESION]);
@@ -105,7 +105,7 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of a path the largest of its listed times. */
+/* For a path the largest values over its listed times. */
 PetscErrorCode HycoTrustMeasure(HycoROM m, PetscReal feature[])
 {
   const PetscInt shown = m->trace.shown;
@@ -126,7 +126,7 @@ PetscErrorCode HycoTrustMeasure(HycoROM m, PetscReal feature[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What training has seen of each parameter, least and largest. */
+/* The range of each parameter covered by training. */
 static PetscErrorCode FindReach(HycoROM m)
 {
   const PetscInt n_par = m->scene->n_parameters;
@@ -138,7 +138,7 @@ static PetscErrorCode FindReach(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nearest point of what training has seen, and how far outside it mu is. */
+/* The nearest point of the region of training, and the distance of mu from it. */
 static PetscReal Beyond(HycoROM m, const PetscReal mu[], PetscReal nearest[])
 {
   const HycoScene s = m->scene;

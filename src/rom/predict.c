@@ -1,4 +1,4 @@
-/* A prediction: the parameters checked, the type's solve, what it has not reconstructed. And what types share. */
+/* A prediction: checks the parameters, solves by the type's op, reconstructs; and functions common to the types. */
 #include <hycoromimpl.h>
 
 PetscErrorCode HycoROMSetUpFields(HycoROM m)
@@ -35,7 +35,7 @@ PetscErrorCode HycoROMSetUp(HycoROM m)
 {
   PetscFunctionBegin;
   if (m->ready) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoROMReset(m)); /* what a refusal has left half made */
+  PetscCall(HycoROMReset(m)); /* removes incomplete data after a refusal */
   if (m->ops->setup)
     PetscUseTypeMethod(m, setup);
   else
@@ -58,14 +58,15 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   p->seconds.setup = HycoNow() - begin;
   begin = HycoNow();
   PetscUseTypeMethod(m, solve, mu);
-  if (m->ops->reconstruct && m->reconstruct && p->reason > 0 && !m->scene->n_times) /* of a path at its times */
+  if (m->ops->reconstruct && m->reconstruct && p->reason > 0 && !m->scene->n_times) /* a path is reconstructed at its
+                                                                                       listed times */
     HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   p->seconds.total = HycoNow() - begin;
   m->solved = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residuals at the contacts, recomputed, of a model that solves no system; equilibrium is what it stands for. */
+/* Recomputes the residuals at the contacts for a model that solves no system; its equilibrium is not measured. */
 static void MeasureContacts(HycoROM m, HycoKKT *kkt)
 {
   PetscReal size = 0, most = 0, in = 0, pulls = 0, both = 0;

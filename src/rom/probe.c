@@ -1,6 +1,6 @@
 /*
-  The scene's quantities of a prediction: displacements and stresses of the cells that they need, wherever these are,
-  from the modes there, U = r(u0) + V gamma (30); of a path the laws are replayed there, once for all listed times.
+  The scene's quantities of a prediction: displacements and stresses of the cells that they need, inside the RID or not,
+  from the modes there, U = r(u0) + V gamma (30); for a path the laws are replayed there, once for all listed times.
 */
 #include <hycofields.h>
 #include <hycoinelastic.h>
@@ -8,12 +8,12 @@
 #include <hycoromimpl.h>
 
 struct _n_HycoProbe {
-  HycoMesh mesh; /* the cells */
+  HycoMesh mesh; /* with these cells */
   HycoFE fe;
   PetscReal *V, *u, *sigma; /* n_dof x l; n_dof; n_cells x n_sigma */
-  PetscInt *fe_at;          /* by full-order displacement: its place in u; -1: none */
-  PetscReal *reaction;      /* n_dof, of supports; NULL: no quantity asks for them */
-  PetscBool *touched;       /* by node: of a contact; then too */
+  PetscInt *fe_at;          /* by full-order displacement: its index in u; -1: none */
+  PetscReal *reaction;      /* n_dof, of supports; NULL: no quantity needs them */
+  PetscBool *touched;       /* by node: belongs to a contact; allocated with reaction */
 };
 
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
@@ -43,7 +43,7 @@ static PetscErrorCode Extract(HycoROM m, HycoProbe p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Room for reactions, and the nodes where contact forces may be part of them. */
+/* Allocates reactions, and marks the nodes where contact forces may be part of them. */
 static PetscErrorCode PrepareReactions(HycoROM m, HycoProbe p)
 {
   PetscBool *in;
@@ -59,7 +59,7 @@ static PetscErrorCode PrepareReactions(HycoROM m, HycoProbe p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes what contacts press on fixed unknowns from the reactions there. */
+/* Subtracts contact forces on fixed unknowns from the reactions there. */
 static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda[])
 {
   const PetscInt dim = p->fe->dim;
@@ -84,7 +84,7 @@ static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f_int: NULL: of a prediction without a history. */
+/* f_int: NULL: for a prediction without a history. */
 static PetscErrorCode React(HycoROM m, HycoProbe p, const PetscReal f_int[], const PetscReal Lambda[])
 {
   PetscFunctionBegin;
@@ -121,7 +121,7 @@ static PetscErrorCode Fill(HycoROM m, HycoProbe p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* p->u of these coefficients and full-order displacements. */
+/* Sets p->u from these coefficients and full-order displacements. */
 static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const PetscReal U_fe[])
 {
   for (PetscInt k = 0; k < p->fe->n_dof; k++) {
@@ -134,7 +134,7 @@ static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const Pets
   HycoFEComplete(p->fe, p->u);
 }
 
-/* The quantities of forces Lambda (of all contacts) and, where they are asked for, p's fields (p: else NULL). */
+/* The quantities for forces Lambda (of all contacts) and, where needed, p's fields (p: else NULL). */
 static PetscErrorCode Measure(HycoROM m, HycoProbe p, const PetscReal Lambda[], PetscReal value[])
 {
   const HycoContactResult *contact = NULL;
@@ -152,7 +152,7 @@ static const PetscReal *ForcesAt(HycoROM m, PetscInt listed)
   return m->trace.Lambda + (size_t)listed * (size_t)m->pairs.n;
 }
 
-/* The laws from the first time to the last, and the quantities at the listed ones. */
+/* Replays the laws from the first time to the last, and evaluates the quantities at the listed ones. */
 static PetscErrorCode March(HycoProbe p, HycoReplay *r)
 {
   HycoROM m = r->m;
@@ -172,7 +172,7 @@ static PetscErrorCode March(HycoProbe p, HycoReplay *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the listed times have: the one that is shown, and their largest (of `min` the smallest). */
+/* Sets the results from the listed times: the selected one, and the largest (for `min` the smallest). */
 static void CollectPath(HycoROM m, HycoPrediction *out)
 {
   const HycoTrace *trace = &m->trace;
@@ -191,7 +191,7 @@ static void CollectPath(HycoROM m, HycoPrediction *out)
   }
 }
 
-/* p->u and p->sigma of a prediction without a history. */
+/* Sets p->u and p->sigma for a prediction without a history. */
 static PetscErrorCode Follow(HycoROM m, HycoProbe p)
 {
   PetscReal *U_fe;
@@ -207,7 +207,7 @@ static PetscErrorCode Follow(HycoROM m, HycoProbe p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Made when somebody asks for fields. */
+/* Created when fields are needed. */
 static PetscErrorCode Make(HycoROM m)
 {
   PetscErrorCode ierr;
@@ -222,14 +222,14 @@ static PetscErrorCode Make(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The quantities of all listed times, into the trace's steps. */
+/* Evaluates the quantities at all listed times, in the trace's steps. */
 static PetscErrorCode MeasureTimes(HycoROM m)
 {
   HycoReplay r = {0};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (!m->probe) { /* what the contacts carry, alone */
+  if (!m->probe) { /* only results of contacts */
     for (PetscInt j = 0; j < m->trace.n_listed; j++)
       PetscCall(Measure(m, NULL, ForcesAt(m, j), m->trace.step[j].quantity));
     PetscFunctionReturn(PETSC_SUCCESS);

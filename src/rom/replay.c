@@ -1,6 +1,6 @@
 /*
-  Replay: stress and state outside the RID of a predicted path. A law is pointwise: with the displacement V gamma(t) at
-  each accepted time it gives the state of every cell, without a solve; of the whole mesh into a series of fields.
+  Replay: stress and state outside the RID of a predicted path. A law is pointwise: the displacement V gamma(t) at each
+  accepted time gives the state of every cell, without a solve. Also writes the series of fields on the whole mesh.
 */
 #include <hycopath.h>
 #include <hycoromimpl.h>
@@ -19,7 +19,7 @@ PetscErrorCode HycoReplayBegin(HycoROM m, HycoFE fe, HycoReplay *r)
 {
   PetscFunctionBegin;
   *r = (HycoReplay){.m = m, .march.fe = fe};
-  PetscCall(HycoReplayMove(r, 0)); /* the state is made at the first temperature */
+  PetscCall(HycoReplayMove(r, 0)); /* the initial state depends on the first temperature */
   PetscCall(HycoMarchBegin(fe, &r->march));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -51,7 +51,7 @@ PetscErrorCode HycoReplayEnd(HycoReplay *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the series shows of listed time j, where the replay is. */
+/* The fields of the series at listed time j, the current time of the replay. */
 static HycoSeriesSource Look(const HycoReplay *r, PetscInt j)
 {
   HycoROM m = r->m;
@@ -99,7 +99,7 @@ PetscErrorCode HycoTraceWrite(HycoROM m, const char path[])
 
   PetscFunctionBegin;
   PetscCall(HycoROMLoadWhole(m));
-  m->whole_current = PETSC_FALSE; /* U_whole is the replay's */
+  m->whole_current = PETSC_FALSE; /* the replay overwrites U_whole */
   PetscCall(HycoSeriesCreate(PETSC_COMM_SELF, path, m->trace.n_listed, &series));
   ierr = HycoReplayBegin(m, m->fe_whole, &r);
   if (!ierr) ierr = WriteTimes(&r, series);

@@ -1,4 +1,4 @@
-/* HycoROM: made, asked, destroyed. */
+/* HycoROM: creation, access, destruction. */
 #include <hycofields.h>
 #include <hycoromimpl.h>
 #include <hycoromtypes.h>
@@ -43,7 +43,7 @@ PetscErrorCode HycoROMSetFromOptions(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Its options and those of all types. */
+/* Declares its options and those of all types. */
 static PetscErrorCode DeclareAll(HycoROM m)
 {
   const char *const *types;
@@ -150,14 +150,18 @@ HycoDefineMethod(HycoROMGetScene, (HycoROM m, HycoScene *scene), m, HYCO_ROM_CLA
 PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
 {
   unsigned long long hash;
-  char text[32];
+  char text[32], *history;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
-  PetscCall(HycoSceneCompareHistory(m->scene, scene, m->path));
+  PetscCall(HycoSceneWriteHistory(m->scene, &history));
+  ierr = HycoSceneCompareHistory(scene, history, m->path);
+  PetscCall(PetscFree(history));
+  PetscCall(ierr);
   HycoCheck(strcmp(text, m->fingerprint) == 0,
             "%s was trained on another scene or mesh; give the scene, the mesh and the entries of its training",
             m->path);
@@ -211,7 +215,7 @@ PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums over the contacts that may carry a force. */
+/* Sums over the contacts that may have a force. */
 static void SumForces(HycoROM m, HycoPrediction *p)
 {
   const PetscInt n = m->spread ? m->pairs.n : m->m;
@@ -248,7 +252,7 @@ static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where it is asked for; else -1. */
+/* If requested; else -1. */
 static PetscErrorCode MeasureEquilibrium(HycoROM m, HycoPrediction *p)
 {
   HycoEquilibrium e;
@@ -262,7 +266,7 @@ static PetscErrorCode MeasureEquilibrium(HycoROM m, HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stresses of the RID's cells and the numbers that need them or the reconstruction. */
+/* Completes the stresses of the RID's cells and the results that need them or the reconstruction. */
 PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
 {
   HycoPrediction *p;
@@ -340,7 +344,7 @@ PetscErrorCode HycoROMGetLambda(HycoROM m, PetscInt *n_contacts, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U = r(u0) + V gamma (30), with the full-order values where there are any. */
+/* U = r(u0) + V gamma (30), with the full-order values if there are any. */
 PetscErrorCode HycoROMGetWholeU(HycoROM m, PetscInt *n_nodes, const PetscReal *U[])
 {
   PetscFunctionBegin;
@@ -366,7 +370,7 @@ PetscErrorCode HycoROMGetWholeU(HycoROM m, PetscInt *n_nodes, const PetscReal *U
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last prediction, as it is written. `rid` is the caller's to free. */
+/* The last prediction in the form for output. The caller frees `rid`. */
 static PetscErrorCode Look(HycoROM m, HycoSolution *solution, PetscReal **rid)
 {
   const PetscReal *U;

@@ -1,23 +1,23 @@
 /*
-  The model file, and the same bytes in memory, by which a model goes from rank 0 to the others. Groups: /mesh and
-  /problem (what the online phase opens), /reconstruction, /training, /whole (read only when a field on the whole mesh
-  is asked for). Every index is checked on load.
+  The model file, and the same bytes in memory, by which a model is sent from rank 0 to the others. Groups: /mesh and
+  /problem (read for the online phase), /reconstruction, /training, /whole (read only for a field on the whole mesh).
+  Every index is checked on load.
 */
 #include <hycoromimpl.h>
 #include <string.h>
 
-/* The file's own version: raised when a reader of the old must not read the new. 2: contacts have weighted masters.
-   3: problem/type; what has none is hybrid. 4: the type may be condensed. 5: surfaces that a map moves are searched for
-   their masters, and a slave node may face none; models without such are written as 4. 6: of scenes with a history. The
-   kind is every type's, so
-   that an older reader tells the format. */
+/* The file's format version, raised when a reader of older versions must not read the file. 2: contacts have
+   weighted masters. 3: problem/type; a file without it is hybrid. 4: the type may be condensed. 5: masters are
+   searched on surfaces that a map moves, and a slave node may face none; models without such surfaces are written as
+   4. 6: models of scenes with a history. The kind is common to all types, so that an older reader can report the
+   format. */
 #define HYCO_ROM_FORMAT 6
 #define HYCO_ROM_MOVED  5
 #define HYCO_ROM_STILL  4
 #define HYCO_ROM_OLDEST 2
 #define HYCO_ROM_KIND   "hyco hybrid model"
 
-/* The groups' names, a line each. */
+/* The groups' names, one on each line. */
 PetscErrorCode HycoMeshMoveGroupNames(HycoH5 h, const char name[], HycoMesh m)
 {
   char *names, *word, *rest;
@@ -50,7 +50,7 @@ static const char *At(const char prefix[], const char name[], char path[128])
   return path;
 }
 
-/* To the file, or from it: then *mesh is made. */
+/* Writes a mesh, or reads it and creates *mesh. */
 static PetscErrorCode MoveMesh(HycoH5 h, const char prefix[], PetscInt n_bodies, HycoMesh *mesh)
 {
   HycoMesh m;
@@ -90,7 +90,7 @@ static PetscErrorCode MoveMesh(HycoH5 h, const char prefix[], PetscInt n_bodies,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The ties of the whole mesh, which a model without has not; they go to its meshes. */
+/* Moves the ties of the whole mesh, if there are any; sets them in the model's meshes. */
 static PetscErrorCode MoveTies(HycoH5 h, HycoROM m)
 {
   HycoTies t = m->mesh->ties;
@@ -303,7 +303,7 @@ static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The search of moved surfaces; files before format 5 have none, and keep the masters as drawn. */
+/* The search for masters on moved surfaces; files before format 5 have none, and keep the masters as drawn. */
 static PetscErrorCode MoveReach(HycoH5 h, HycoROM m)
 {
   PetscFunctionBegin;
@@ -330,7 +330,7 @@ static PetscErrorCode MoveScene(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The type with what it has of its own. */
+/* Moves the type and its data. */
 static PetscErrorCode MoveType(HycoH5 h, HycoROM m)
 {
   PetscFunctionBegin;
@@ -340,7 +340,7 @@ static PetscErrorCode MoveType(HycoH5 h, HycoROM m)
   }
   PetscCall(HycoH5WriteText(h, "problem/type", m->type));
   PetscTryTypeMethod(m, save, h);
-  if (!HycoH5Has(h, "reconstruction")) /* older readers ask every type for it */
+  if (!HycoH5Has(h, "reconstruction")) /* older readers require it for every type */
     PetscCall(HycoH5WriteReal(h, "reconstruction/S_lambda", 0, m->pairs.n, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -362,7 +362,7 @@ static PetscErrorCode MoveProvenance(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All but the whole mesh, to the file or from it. */
+/* Moves everything except the whole mesh. */
 static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
 {
   PetscInt n_dof, *nodes;
@@ -394,7 +394,7 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The whole mesh and the modes on it. */
+/* Reads the whole mesh and the modes on it. */
 static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoROM m)
 {
   PetscInt n_dof;
@@ -409,7 +409,7 @@ static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The whole-mesh part, from where the model came from. */
+/* Opens the whole-mesh part in the file or image of the model. */
 static PetscErrorCode OpenWhole(HycoROM m)
 {
   HycoH5 h;
@@ -425,7 +425,7 @@ static PetscErrorCode OpenWhole(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All but the whole mesh. */
+/* Writes everything except the whole mesh. */
 static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
 {
   PetscInt format = m->pairs.room ? HYCO_ROM_MOVED : HYCO_ROM_STILL;
@@ -484,7 +484,7 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From an open file, which is closed; no model is left of one that is refused. `path`: what messages call it. */
+/* Reads from an open file, and closes it; a refused file leaves no model. `path`: its name in messages. */
 static PetscErrorCode Load(HycoH5 *h, const char path[], HycoROM *model)
 {
   HycoROM m;
@@ -535,7 +535,7 @@ static PetscErrorCode MakeImage(HycoROM m, void **image, size_t *size)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A model of these bytes. */
+/* Reads a model from these bytes. */
 static PetscErrorCode FromImage(void *image, size_t size, HycoROM *model)
 {
   HycoH5 h;
@@ -546,7 +546,7 @@ static PetscErrorCode FromImage(void *image, size_t size, HycoROM *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A message's length is an int. */
+/* Largest message: an MPI count is an int. */
 #define MOST_BYTES ((size_t)1 << 30)
 
 PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model)
@@ -596,12 +596,12 @@ static PetscErrorCode LoadWhole(HycoROM m)
   PetscCall(OpenWhole(m));
   PetscCall(HycoFECreate(m->scene, m->whole, &m->fe_whole));
   PetscCall(PetscMalloc1((size_t)m->whole->n_nodes * (size_t)m->whole->dim, &m->U_whole));
-  /* the contacts again, in the whole mesh's numbers */
+  /* the contacts with the node numbers of the whole mesh */
   PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of the whole mesh's part, or nothing: the next try begins anew. */
+/* All of the whole-mesh part, or nothing, so that the next attempt starts anew. */
 PetscErrorCode HycoROMLoadWhole(HycoROM m)
 {
   PetscErrorCode ierr;

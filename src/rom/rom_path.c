@@ -1,5 +1,5 @@
-/* What a model of paths keeps of the last prediction: displacements at all accepted times, all that is asked for at the
-   listed ones. */
+/* Data that a model of paths keeps of the last prediction: displacements at all accepted times, further results at
+   the listed ones. */
 #include <hycoromimpl.h>
 
 PetscErrorCode HycoTraceFree(HycoROM m)
@@ -159,7 +159,9 @@ PetscErrorCode HycoROMSetSteps(HycoROM m, PetscInt n, const PetscReal t[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define JUDGED_CUTS 16 /* full order's steps are cut by a model that is lost: it may take minutes to say so */
+#define JUDGED_CUTS                                                                                                    \
+  16 /* limit of halved steps when training judges a model, which otherwise could take minutes to                      \
+        fail */
 
 PetscErrorCode HycoROMSetJudgedSteps(HycoROM m, PetscInt n, const PetscReal t[])
 {

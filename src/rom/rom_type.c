@@ -1,4 +1,4 @@
-/* The types of reduced models: registered, set, described. */
+/* The types of reduced models: registration, selection, description. */
 #include <hycoregistry.h>
 #include <hycoromimpl.h>
 #include <hycoromtypes.h>

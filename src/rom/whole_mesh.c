@@ -1,12 +1,12 @@
-/* The whole-mesh part of a model file, which training has by rows on all ranks: the mesh in the file's order, and the
-   modes on it. */
+/* The whole-mesh part of a model file, written by rows from all ranks: the mesh in the file's order, and the modes
+   on it. */
 #include <hycofields.h>
 #include <hycoromimpl.h>
 #include <string.h>
 
 #define IN(name) "whole/" name
 
-/* n integers of `width` each, whose places among all ranks' are given. Collective. */
+/* Writes n integers of `width` each, at given places among all ranks'. Collective. */
 static PetscErrorCode WritePlaced(MPI_Comm comm, HycoH5 h, const char name[], PetscInt all, PetscInt width, PetscInt n,
                                   const PetscInt place[], const PetscInt value[])
 {
@@ -30,7 +30,7 @@ static PetscErrorCode WritePlaced(MPI_Comm comm, HycoH5 h, const char name[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes of groups, group by group. Collective. */
+/* Writes the nodes of groups, group by group. Collective. */
 static PetscErrorCode WriteGroupNodes(MPI_Comm comm, HycoH5 h, HycoMesh m, PetscInt n_nodes)
 {
   PetscInt64 *key;
@@ -61,7 +61,7 @@ static PetscErrorCode WriteGroupNodes(MPI_Comm comm, HycoH5 h, HycoMesh m, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The facets, group by group in the order of their cells. Collective. */
+/* Writes the facets, group by group in the order of their cells. Collective. */
 static PetscErrorCode WriteFacets(MPI_Comm comm, HycoH5 h, HycoMesh m, PetscInt n_cells)
 {
   PetscInt64 *key;
@@ -72,7 +72,7 @@ static PetscErrorCode WriteFacets(MPI_Comm comm, HycoH5 h, HycoMesh m, PetscInt 
                          m->n_facets, &place));
   for (PetscInt f = 0; f < m->n_facets; f++) {
     const PetscInt *node = m->facets + f * m->nf, e = m->facet_cell[f];
-    PetscInt least = node[0]; /* the facet's rank is that of its node of the smallest tag */
+    PetscInt least = node[0]; /* a facet belongs to the rank of its node with the smallest tag */
 
     for (PetscInt v = 1; v < m->nf; v++) least = PetscMin(least, node[v]);
     if (HycoMeshOwned(m, least) < 0) continue;
@@ -90,7 +90,7 @@ static PetscErrorCode WriteFacets(MPI_Comm comm, HycoH5 h, HycoMesh m, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is small. On one process. */
+/* Writes the small datasets. On one process. */
 static PetscErrorCode WriteHead(HycoH5 h, HycoMesh m)
 {
   PetscInt head[2] = {(PetscInt)m->type, m->dim};
@@ -102,7 +102,7 @@ static PetscErrorCode WriteHead(HycoH5 h, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first l columns of V, row by row. Collective. */
+/* Writes the first l columns of V, row by row. Collective. */
 static PetscErrorCode WriteModes(HycoH5 h, PetscInt l, Mat V)
 {
   PetscInt all, first, last, lda;

@@ -1,4 +1,4 @@
-/* Direct or iterative, by the memory that a factor of K is estimated to take. */
+/* Chooses a direct or an iterative solver, by the estimated memory of a factor of K. */
 #include <hycosolverimpl.h>
 #include <stdio.h>
 #include <string.h>
@@ -6,10 +6,10 @@
 
 const char *const HycoLinearNames[] = {"auto", "direct", "iterative", NULL};
 
-/* Rows no longer than a plane mesh has: the factor stays near the size of the matrix, and need not be estimated. */
+/* Rows of at most a plane mesh's length: the factor's size is close to that of the matrix, and is not estimated. */
 #define HYCO_PLANE_ROW 20
 
-/* Bytes that this machine could still give. */
+/* Free memory of this machine in bytes. */
 static PetscReal Available(void)
 {
   FILE *file = fopen("/proc/meminfo", "r");
@@ -23,7 +23,7 @@ static PetscReal Available(void)
   return kb > 0 ? 1024 * kb : (PetscReal)sysconf(_SC_PHYS_PAGES) * (PetscReal)sysconf(_SC_PAGESIZE) / 2;
 }
 
-/* The same for all machines that the ranks are on, four fifths of it. */
+/* Four fifths of the free memory of all machines of the ranks, the same on every rank. */
 static PetscErrorCode Limit(HycoSolver s, PetscReal *bytes)
 {
   MPI_Comm node;
@@ -41,7 +41,7 @@ static PetscErrorCode Limit(HycoSolver s, PetscReal *bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the form's factor would take: its own word, or that of a factor of K. */
+/* Memory of the form's factor: its own estimate, or that of a factor of K. */
 static PetscErrorCode Estimate(HycoSolver s, HycoSolverForm form, PetscReal *bytes)
 {
   HycoDirect probe = NULL;
@@ -61,7 +61,7 @@ static PetscErrorCode Estimate(HycoSolver s, HycoSolverForm form, PetscReal *byt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Iterations need a form that accepts them: of the built-in ones, linear without contact, else primal. */
+/* Iterations need a form that supports them: of the built-in ones, linear without contact, else primal. */
 static PetscErrorCode TakeIterative(HycoSolver s, HycoSolverForm *form)
 {
   char why[HYCO_LINE], asked[sizeof(s->form_name)];
@@ -85,7 +85,8 @@ static PetscErrorCode TakeIterative(HycoSolver s, HycoSolverForm *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether an automatic choice is iterative. Estimates of free memory change as it fills: each K is asked about once. */
+/* Whether an automatic choice is iterative. The free memory changes as it is used, so that the choice is made once
+   for each K. */
 static PetscErrorCode DecideByMemory(HycoSolver s, HycoSolverForm *form)
 {
   PetscReal bytes, limit;
@@ -150,7 +151,7 @@ PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
   PetscCall(KSPGetType(ksp, &method));
   PetscCall(KSPGetPC(ksp, &handle));
   PetscCall(PCGetType(handle, &pc));
-  if (strcmp(pc, PCSHELL) == 0) PetscCall(PCShellGetName(handle, &pc)); /* what it makes use of */
+  if (strcmp(pc, PCSHELL) == 0) PetscCall(PCShellGetName(handle, &pc)); /* the preconditioner inside the shell */
   if (!s->iterative) PetscCall(PCFactorGetMatSolverType(handle, &package));
   if (package)
     PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: %s by %s", pc, package));

@@ -1,10 +1,10 @@
-/* The forms of the contact system that are registered, and a solver's own. */
+/* The registered forms of the contact system, and those of a solver. */
 #include <hycoregistry.h>
 #include <hycosolverimpl.h>
 #include <string.h>
 
 static PetscErrorCode AddOwn(void);
-static HycoRegistry forms = {.add_own = AddOwn}; /* tried in the order of registration */
+static HycoRegistry forms = {.add_own = AddOwn}; /* searched in the order of registration */
 
 static PetscErrorCode AddOwn(void)
 {

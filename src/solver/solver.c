@@ -1,15 +1,15 @@
-/* HycoSolver: tries forms and methods in order, and judges each by the recomputed residuals. */
+/* HycoSolver: tries forms and methods in order, and checks each by the recomputed residuals. */
 #include <hycosolverimpl.h>
 #include <string.h>
 
-/* By their place in `methods`, where the type of Tao is empty for the user's. */
+/* In the order of `methods`, where an empty Tao type means the user's. */
 const char *const HycoSolverTypes[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, HYCO_SOLVER_LEMKE, NULL};
 static const char *const methods[] = {HYCO_TAO_ACTIVE_SET, "", HYCO_TAO_LEMKE};
-/* What failed is followed by what comes next here. */
+/* The order in which methods are tried after a failure. */
 static const PetscInt order[] = {1, 0, 2};
 #define N_METHODS ((PetscInt)(sizeof(order) / sizeof(order[0])))
 
-/* The forms, by the values of HycoForm. */
+/* The names of the forms, by the values of HycoForm. */
 static const char *const form_names[] = {"", "dual", "primal", "dual_free"};
 
 PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
@@ -145,7 +145,7 @@ static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -hyco_tao_type: one of TAO's that suit contact, or one that the program registers. */
+/* -hyco_tao_type: one of TAO's types that are suitable for contact, or one that the program registers. */
 static PetscErrorCode ReadTaoType(HycoSolver s, HycoOptionItems PetscOptionsObject)
 {
   char type[HYCO_TAO_NAME] = "", list[HYCO_LINE];
@@ -247,7 +247,7 @@ PetscErrorCode HycoSolverGiveUp(HycoSolver s, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The method of that number, for this system. */
+/* Sets the method of that number for this system. */
 static PetscErrorCode SetMethod(HycoSolver s, PetscInt type)
 {
   const char *tao = methods[type];
@@ -269,7 +269,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscReal *cost
 
 PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSolverForm *form, char why[HYCO_LINE])
 {
-  const PetscBool posed = (PetscBool)(s->system->K && s->system->m); /* there is a choice */
+  const PetscBool posed = (PetscBool)(s->system->K && s->system->m); /* whether there is a choice */
   PetscReal cost = -1, least = PETSC_MAX_REAL;
 
   PetscFunctionBegin;
@@ -295,7 +295,7 @@ PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The form of the first attempt: what the user named, or the cheapest; then direct or iterative. */
+/* The form of the first attempt: the user's, or the cheapest; then direct or iterative. */
 static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
 {
   const PetscBool iterative = s->iterative;
@@ -323,13 +323,13 @@ static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
   if (HycoKKTMax(&s->kkt) <= s->rtol)
     s->reason = HYCO_CONVERGED;
   else if (s->by_factor && !(s->kkt.stationarity <= 1e-3))
-    s->reason = HYCO_DIVERGED_SINGULAR; /* K x = r was not even nearly solved */
+    s->reason = HYCO_DIVERGED_SINGULAR; /* K x = r was solved with a large residual */
   else if (s->reason != HYCO_DIVERGED_SINGULAR)
     s->reason = solved || s->kkt.stationarity > s->rtol ? HYCO_DIVERGED_RESIDUAL : HYCO_DIVERGED_ITERATIONS;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The method now on that form, judged; its iterations are added. */
+/* Solves with the current method on that form, and checks the result; adds its iterations. */
 static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
 {
   const PetscInt its = s->its;
@@ -346,7 +346,7 @@ static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Attempts in order, from the chosen method on, until one has solved. */
+/* Tries attempts in order, from the chosen method on, until one converges. */
 static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
 {
   PetscInt k = 0;

@@ -1,8 +1,8 @@
-/* A factor of K for the forms: LAPACK's where K is dense, with refinement in twice the working precision where
- * round-off is lost, or MUMPS's, which brings the flexibility along. */
+/* A factor of K for the forms: LAPACK's if K is dense, with refinement in twice the working precision where
+   round-off is too large; otherwise MUMPS's, which also gives the flexibility. */
 #include <hycosolverimpl.h>
 
-/* A residual below this share of F needs no refinement: the residuals are judged by 1e-8. */
+/* A residual below this share of F needs no refinement: the tolerance of the residuals is 1e-8. */
 #define REFINE 1e-10
 
 PetscErrorCode HycoStiffnessDestroy(HycoStiffness *f)
@@ -15,7 +15,7 @@ PetscErrorCode HycoStiffnessDestroy(HycoStiffness *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A zero pivot is singular, not an error. */
+/* A zero pivot means that K is singular; it is not an error. */
 static PetscErrorCode FactorDense(HycoStiffness *f, Mat K, PetscBool *singular)
 {
   const PetscScalar *k;
@@ -45,7 +45,7 @@ static PetscErrorCode FactorSparse(HycoSolver s, Mat Bt, Mat B, PetscReal S[], P
 {
   HycoStiffness *f = &s->stiffness;
   HycoSystem y = s->system;
-  PetscReal *unused = NULL; /* a kernel's Schur complement, where nobody asks for it */
+  PetscReal *unused = NULL; /* receives the Schur complement of a null space, which is not needed */
   PetscInt p;
 
   PetscFunctionBegin;
@@ -60,7 +60,7 @@ static PetscErrorCode FactorSparse(HycoSolver s, Mat Bt, Mat B, PetscReal S[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n right-hand sides b and their solutions x, refined; low: what b could not hold, NULL where that is nothing. */
+/* Refines the solutions x of n right-hand sides b; low: the part of b below its precision, NULL if zero. */
 static PetscErrorCode RefineDense(HycoSolver s, PetscInt n, const PetscReal b[], const PetscReal low[], PetscReal x[])
 {
   const HycoStiffness *f = &s->stiffness;
@@ -78,7 +78,7 @@ static PetscErrorCode RefineDense(HycoSolver s, PetscInt n, const PetscReal b[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* S = B X, each entry rounded once; symmetric where it should be. */
+/* S = B X, each entry rounded once; made symmetric. */
 static void RefineProduct(HycoSolver s, const PetscReal B[], const PetscReal X[], PetscReal S[])
 {
   const size_t m = (size_t)s->system->m, n = (size_t)s->stiffness.n;
@@ -213,7 +213,7 @@ PetscErrorCode HycoStiffnessFactor(HycoSolver s, Mat Bt, Mat B, PetscReal S[], P
   *singular = PETSC_FALSE;
   PetscCall(HycoOperatorStateUpdate(&f->of, K, B, &same));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
-  f->of.K = 0; /* until it is done */
+  f->of.K = 0; /* invalid until completed */
   PetscCall(PetscObjectTypeCompare((PetscObject)K, MATSEQDENSE, &dense));
   if (!dense)
     HycoLogged(HYCO_EVENT_FACTOR, FactorSparse(s, Bt, B, S, singular));

@@ -1,4 +1,4 @@
-/* HycoSystem: holds K, Bt, B, F, D; recomputes the KKT residuals. */
+/* HycoSystem: references K, Bt, B, F, D; recomputes the KKT residuals. */
 #include <hycosolverimpl.h>
 
 PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
@@ -157,7 +157,8 @@ static PetscReal Quotient(PetscReal a, PetscReal b)
   return a == 0 ? 0 : b > 0 ? a / b : PETSC_MAX_REAL;
 }
 
-/* Takes out of r what rounding x alone can make, entries of at most 16 eps (|K_ii x_i| + |F_i|); their norm. */
+/* Removes from r the part due to the rounding of x, entries of at most 16 eps (|K_ii x_i| + |F_i|); returns their
+   norm. */
 static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, PetscReal *dropped)
 {
   PetscInt n;
@@ -210,7 +211,7 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residuals of w = g + G L. Equilibrium is no unknown there: it holds by what G is. */
+/* The residuals of w = g + G L. Equilibrium has no residual here: it is satisfied by the definition of G. */
 static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
 {
   const PetscInt m = s->m;
@@ -225,7 +226,7 @@ static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
   PetscCall(VecGetArrayRead(s->D, &g));
   PetscCall(VecGetArrayRead(L, &l));
   PetscCall(VecGetArray(s->work_L, &w));
-  for (PetscInt j = 0; j < m; j++) { /* few forces are not zero */
+  for (PetscInt j = 0; j < m; j++) { /* few forces are nonzero */
     const PetscScalar *column = G + (size_t)j * (size_t)m;
 
     most = PetscMax(most, PetscAbsReal(l[j]));
@@ -241,7 +242,7 @@ static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
     worst[0] = PetscMax(worst[0], -w[i]);
     worst[1] = PetscMax(worst[1], -l[i]);
     if (l[i] != 0 && size > 0)
-      worst[2] = PetscMax(worst[2], PetscAbsReal(w[i] / size * (l[i] / most))); /* no overflow */
+      worst[2] = PetscMax(worst[2], PetscAbsReal(w[i] / size * (l[i] / most))); /* avoids overflow */
   }
   PetscCall(VecRestoreArray(s->work_L, &w));
   PetscCall(VecRestoreArrayRead(L, &l));

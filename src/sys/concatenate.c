@@ -1,4 +1,4 @@
-/* What every rank has, brought together on rank 0. */
+/* Gathers arrays of all ranks on rank 0. */
 #include <hycoimpl.h>
 
 PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,

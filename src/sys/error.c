@@ -1,4 +1,4 @@
-/* Errors: caught as one line of text, and agreed on by all ranks so that none is left waiting. */
+/* Errors are caught as one line of text and synchronised over all ranks, so that no rank waits for a failed one. */
 #include <hycoimpl.h>
 #include <stdarg.h>
 #include <time.h>

@@ -1,4 +1,4 @@
-/* Files that are written whole or not at all. */
+/* Files that are written either completely or not at all. */
 #include <hycofile.h>
 #include <dirent.h>
 #include <errno.h>
@@ -9,18 +9,17 @@
 #include <time.h>
 #include <unistd.h>
 
-#define OLD (7 * 24 * 3600) /* seconds after which a temporary file of another machine is no longer in use */
+#define OLD (7 * 24 * 3600) /* seconds after which a temporary file of another machine is considered unused */
 
 struct _n_HycoFile {
   FILE *stream;
   HycoFileKind kind;
-  PetscBool direct; /* written where it stands: a device, a pipe, an open descriptor */
-  char path[PETSC_MAX_PATH_LEN], shown[HYCO_FILE_NAME]; /* as given, and as messages name it */
+  PetscBool direct;                                     /* written in place: a device, a pipe, an open descriptor */
+  char path[PETSC_MAX_PATH_LEN], shown[HYCO_FILE_NAME]; /* as given, and as shown in messages */
   char place[PETSC_MAX_PATH_LEN], temporary[HYCO_FILE_NAME];
 };
 
-/* Stands for the machine, since it was started, and the space in which its process ids count: containers have their
-   own. */
+/* Identifies the machine since its last start, and the space of its process ids: each container has its own. */
 static unsigned Node(void)
 {
   static unsigned node;
@@ -43,7 +42,7 @@ static unsigned Node(void)
   return node;
 }
 
-/* Where ".hyco-NODE-PID-NUMBER." begins in a file's name, and what it says; NULL: nowhere. */
+/* The position of ".hyco-NODE-PID-NUMBER." in a file's name, with its numbers; NULL: not found. */
 static const char *FindTag(const char name[], unsigned *node, long *pid)
 {
   unsigned number;
@@ -72,7 +71,7 @@ static void Temporary(const char place[], const char kind[], char name[HYCO_FILE
   snprintf(name, HYCO_FILE_NAME, "%s.hyco-%08x-%ld-%u.%s", place, Node(), (long)getpid(), number++, kind);
 }
 
-/* Whether the file of that name was left by a process that is dead. */
+/* Whether the file of that name was left by a process that no longer exists. */
 static PetscBool IsLeft(const char path[], unsigned node, long pid)
 {
   struct stat info;
@@ -213,7 +212,7 @@ FILE *HycoFileStream(HycoFile file)
   return file->stream;
 }
 
-/* All that was written has gone to the file. Returns 0, or errno. */
+/* Flushes everything written to the file. Returns 0, or errno. */
 static int Flush(HycoFile f)
 {
   errno = 0;

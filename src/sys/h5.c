@@ -1,8 +1,8 @@
 /*
-  HDF5. What one process writes is made in memory and goes to the disk in one piece, sealed: HDF5 itself, when a disk is
-  full, can neither finish a file nor close it. What several write, each its rows, is laid out on the disk by rank 0's
-  HDF5, set by set, where there is room for it; the numbers go to their places past HDF5, whose parallel part cannot say
-  that a disk is full.
+  HDF5 files. A file written by one process is built in memory and then written to the disk in one piece, sealed: if a
+  disk is full, HDF5 itself can neither finish a file nor close it. If several processes write, each its rows, rank 0's
+  HDF5 creates the datasets on the disk one by one, after checking that there is space; the processes then write the
+  numbers to their positions without HDF5, because parallel HDF5 cannot report a full disk.
 */
 #include <hycofile.h>
 #include <hycoh5.h>
@@ -13,26 +13,26 @@
 #include <unistd.h>
 
 struct _n_HycoH5 {
-  hid_t id, access; /* the file; how datasets are opened */
-  HycoFile out;     /* while writing, else NULL */
-  size_t size;      /* of the file that is read */
+  hid_t id, access; /* the file; property list with which datasets are opened */
+  HycoFile out;     /* while writing; else NULL */
+  size_t size;      /* size of the file that is read */
   PetscBool reads;
   char path[PETSC_MAX_PATH_LEN];
-  /* of a file that several processes write */
+  /* data of a file that several processes write */
   PetscBool shared;
-  MPI_Comm comm; /* the caller's */
-  int fd;        /* of the file on the disk, until it is in its place */
+  MPI_Comm comm; /* owned by the caller */
+  int fd;        /* of the file on the disk, until it is renamed */
   char scratch[HYCO_FILE_NAME];
 };
 
-/* What the description of a set takes at most, and the first of a file. */
+/* Upper bounds for the bytes of a dataset's description, and of the file's first one. */
 #define ROOM 4096
 
-/* A dataset that says that the file ends with a seal: one that has lost it is damaged, not old. */
+/* A dataset stating that the file ends with a seal: a file that has lost its seal is then damaged, not old. */
 #define HYCO_H5_SEALED "sealed"
 #define NATIVE_INT     (sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32)
 
-/* A file may not send its reader to another one. */
+/* Refuses links to other files. */
 static herr_t RefuseLink(const char *parent_file, const char *parent_group, const char *child_file,
                          const char *child_object, unsigned *flags, hid_t access, void *ctx)
 {
@@ -67,14 +67,14 @@ static hid_t Access(void)
 {
   hid_t access = H5Pcreate(H5P_FILE_ACCESS);
 
-  /* one format whatever the library: HDF5 2's own default puts the time into each group, and no two files would be
-     alike */
+  /* one format for all library versions: the default of HDF5 2 stores the time in each group, so that no two files
+     would be equal */
   H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_LATEST);
   H5Pset_fclose_degree(access, H5F_CLOSE_STRONG); /* closing the file closes what a refusal left open in it */
   return access;
 }
 
-/* How the bytes of a file in memory are held; they go nowhere by themselves. */
+/* A property list for files in memory, which are not written to the disk automatically. */
 static hid_t InMemory(void)
 {
   hid_t access = Access();
@@ -111,8 +111,8 @@ PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the disk takes the description of one more set, and the file may become as long as `bytes` of numbers make
-   it. Rank 0. */
+/* Checks that there is space for the description of one more dataset, and for a file with `bytes` of numbers. Rank
+   0. */
 static PetscErrorCode MakeRoom(HycoH5 f, size_t bytes)
 {
   static const char zeros[ROOM];
@@ -144,7 +144,7 @@ static PetscErrorCode BeginShared(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On the others. */
+/* On the other ranks. */
 static PetscErrorCode JoinShared(HycoH5 f)
 {
   PetscFunctionBegin;
@@ -278,8 +278,8 @@ PetscErrorCode HycoH5GetImage(HycoH5 f, void **image, size_t *size)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file in memory, its seal behind it. Fails where there is no memory for a copy; a disk that is full is told when
-   the file is closed. */
+/* Writes the image of the file in memory, followed by its seal. Fails if there is no memory for a copy; a full disk
+   is reported when the file is closed. */
 static PetscErrorCode WriteImage(HycoH5 f)
 {
   unsigned char seal[HYCO_SEAL];
@@ -295,7 +295,7 @@ static PetscErrorCode WriteImage(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every rank's numbers are on the disk. */
+/* Waits until every rank's numbers are on the disk. */
 static PetscErrorCode Sync(HycoH5 f)
 {
   int failed = 0;
@@ -308,7 +308,7 @@ static PetscErrorCode Sync(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Seals the file and puts it in its place. On rank 0. */
+/* Seals the file and renames it. On rank 0. */
 static PetscErrorCode Place(HycoH5 f)
 {
   unsigned char seal[HYCO_SEAL];
@@ -327,7 +327,7 @@ static PetscErrorCode Place(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0's HDF5 has laid out all. */
+/* Rank 0's HDF5 has created all datasets. */
 static PetscErrorCode EndLayout(HycoH5 f)
 {
   const hid_t id = f->id;
@@ -383,13 +383,13 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The bytes of a row. */
+/* The number of bytes of a row. */
 static size_t Width(hid_t type, PetscInt cols)
 {
   return (cols == HYCO_H5_LINE ? 1 : (size_t)cols) * H5Tget_size(type);
 }
 
-/* A new set of rows x cols numbers, or of one dimension. Of a shared file there is room for it on the disk. */
+/* Creates a dataset of rows x cols numbers, or of one dimension. For a shared file, reserves its space on the disk. */
 static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, hid_t *set)
 {
   hsize_t dims[2] = {(hsize_t)rows, (hsize_t)cols};
@@ -401,7 +401,7 @@ static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscIn
   links = H5Pcreate(H5P_LINK_CREATE);
   H5Pset_create_intermediate_group(links, 1);
   made = H5Pcreate(H5P_DATASET_CREATE);
-  H5Pset_obj_track_times(made, 0); /* the same model is the same file, byte for byte */
+  H5Pset_obj_track_times(made, 0); /* the same model must give the same file, byte for byte */
   if (f->shared) H5Pset_alloc_time(made, H5D_ALLOC_TIME_EARLY);
   if (f->shared) H5Pset_fill_time(made, H5D_FILL_TIME_NEVER);
   *set = H5Dcreate2(f->id, name, type, space, links, made, H5P_DEFAULT);
@@ -414,7 +414,7 @@ static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set of that name, made where it is not there yet. Of a shared file, its place on the disk. */
+/* The dataset of that name, created if it does not exist. For a shared file, its position on the disk. */
 static PetscErrorCode FindSet(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, hid_t *set,
                               long long *place)
 {
@@ -425,7 +425,7 @@ static PetscErrorCode FindSet(HycoH5 f, const char name[], hid_t type, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows first .. first + n - 1 of a set, into the file in memory. */
+/* Writes the rows first .. first + n - 1 of a dataset into the file in memory. */
 static herr_t PutRows(hid_t set, hid_t type, PetscInt cols, PetscInt first, PetscInt n, const void *data)
 {
   const hsize_t start[2] = {(hsize_t)first, 0}, count[2] = {(hsize_t)n, (hsize_t)cols};
@@ -439,7 +439,7 @@ static herr_t PutRows(hid_t set, hid_t type, PetscInt cols, PetscInt first, Pets
   return failed;
 }
 
-/* The rows first .. first + n - 1 of a set of so many rows; a set that is not there yet is made. */
+/* Writes the rows first .. first + n - 1 of a dataset with `rows` rows; creates the dataset if it does not exist. */
 static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, PetscInt first,
                             PetscInt n, const void *data)
 {
@@ -457,7 +457,7 @@ static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt ro
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The type of PetscReal (MPIU_REAL), PetscInt (MPIU_INT) or byte numbers. */
+/* The HDF5 type for PetscReal (MPIU_REAL), PetscInt (MPIU_INT) or bytes. */
 static hid_t NumberType(MPI_Datatype type)
 {
   return type == MPIU_REAL ? H5T_NATIVE_DOUBLE : type == MPI_UNSIGNED_CHAR ? H5T_NATIVE_UCHAR : NATIVE_INT;
@@ -513,7 +513,7 @@ PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An attribute; one that is there stays. */
+/* Writes an attribute; an existing one is kept. */
 static PetscErrorCode WriteAttribute(HycoH5 f, const char at[], const char name[], hid_t type, hid_t space,
                                      const void *value)
 {
@@ -558,7 +558,8 @@ PetscErrorCode HycoH5WriteAttributeInt(HycoH5 f, const char at[], const char nam
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the set's numbers stand in this very file, as they are: a filter would be code that the file names. */
+/* Whether the dataset's numbers are stored in this file, without a filter: a filter could load code that the file
+   names. */
 static PetscBool IsPlain(hid_t set)
 {
   hid_t made = H5Dget_create_plist(set);
@@ -570,7 +571,7 @@ static PetscBool IsPlain(hid_t set)
   return plain;
 }
 
-/* Opens a two-dimensional dataset of the wanted class and gives its size. */
+/* Opens a two-dimensional dataset of the wanted class and returns its size. */
 static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, hid_t *set, hsize_t dims[2])
 {
   const hsize_t most = PetscMin((hsize_t)PETSC_MAX_INT, (hsize_t)f->size);
@@ -588,7 +589,7 @@ static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, h
   if (rank == 2) H5Sget_simple_extent_dims(space, dims, NULL);
   if (space >= 0) H5Sclose(space);
   if (type >= 0) H5Tclose(type);
-  /* What the set claims must lie in the file: a damaged size must not become a wild allocation. */
+  /* The declared size must fit in the file: a damaged size must not cause a huge allocation. */
   if (rank != 2 || class != wanted || !IsPlain(*set) || dims[0] > most || dims[1] > most ||
       (dims[1] && dims[0] > most / dims[1]) ||
       H5Dget_storage_size(*set) < dims[0] * dims[1] * (wanted == H5T_FLOAT ? 8 : 1)) {
@@ -661,7 +662,7 @@ PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A dataset in new memory (*data), whose numbers take `size` bytes each, with room for one more. */
+/* Reads a dataset into new memory (*data), `size` bytes per number, with room for one more. */
 static PetscErrorCode LoadSet(HycoH5 f, const char name[], H5T_class_t class, hid_t type, size_t size, PetscInt *rows,
                               PetscInt *cols, void *data)
 {

@@ -1,4 +1,4 @@
-/* Start and end of the package, and how a program that starts by it tells an error: in one line. */
+/* Start and end of the package, and the error handler of a program started by it: one line per error. */
 #include <hycoimpl.h>
 #include <slepcsys.h>
 #include <stdio.h>
@@ -15,7 +15,7 @@ PetscBool HycoWantsTrace(void)
   return (PetscBool)(trace && trace[0] && strcmp(trace, "0") != 0);
 }
 
-/* A message of hyco's own, or PETSc's with its place. On rank 0 of what has the error. */
+/* Prints hyco's own message, or PETSc's with its location. On rank 0 of the object with the error. */
 static void Tell(MPI_Comm comm, int line, const char function[], const char file[], PetscErrorCode code,
                  const char text[])
 {
@@ -33,8 +33,8 @@ static void Tell(MPI_Comm comm, int line, const char function[], const char file
   fflush(stderr);
 }
 
-/* Where PETSc's own handler prints a trace of calls. In main() PETSc aborts by MPI; a process alone ends without the
-   words that launchers have for that. */
+/* Replaces PETSc's error handler, which prints a call trace. In main() PETSc aborts by MPI; a process that runs
+   alone exits without the messages that launchers add to an abort. */
 static PetscErrorCode OneLine(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                               PetscErrorType type, const char *text, void *ctx)
 {

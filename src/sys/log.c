@@ -1,4 +1,4 @@
-/* Stages and events of -log_view, registered by the first that is asked for. */
+/* Stages and events of -log_view, registered at the first use. */
 #include <hycoimpl.h>
 
 static const char *const event_names[HYCO_N_EVENTS] = {
@@ -27,7 +27,7 @@ static const char *const stage_names[HYCO_N_STAGES] = {"hyco full order", "hyco 
 static PetscLogEvent events[HYCO_N_EVENTS];
 static PetscLogStage stages[HYCO_N_STAGES];
 static PetscBool registered = PETSC_FALSE;
-/* What runs, the innermost last: another thread may look. */
+/* The running events, innermost last; another thread may read them. */
 #define DEEPEST 16
 static volatile int depth, running[DEEPEST];
 static const char *volatile stage_runs;
@@ -45,7 +45,7 @@ static void Note(HycoEvent event, PetscBool begin)
   depth += begin ? 1 : -1;
 }
 
-/* A name that cannot be registered leaves its time to what contains it. */
+/* If a name cannot be registered, its time counts for the enclosing event. */
 static PetscErrorCode Register(void)
 {
   PetscClassId id;

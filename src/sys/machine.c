@@ -1,10 +1,10 @@
-/* What the program around the library, or the machine, may withhold: a decimal point, memory for BLAS. */
+/* Checks of the environment: a locale with a decimal point, memory for BLAS. */
 #include <hycoimpl.h>
 #include <locale.h>
 #include <petscblaslapack.h>
 #include <stdlib.h>
 
-/* OpenBLAS asks for this much address space at its first call, and asks for ever where there is none. */
+/* OpenBLAS allocates this much address space at its first call, and tries without end if it cannot. */
 #define BLAS_BUFFER (((size_t)136) << 20)
 
 void *HycoPointBegin(void)

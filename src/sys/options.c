@@ -1,8 +1,9 @@
 /*
-  Options. The code that reads an option declares it, between PetscObjectOptionsBegin() and PetscOptionsEnd(), by the
-  calls below: its name, the form of its value, its meaning, its default (what the object has before), its range. A
-  declaration pass makes an object of each class, has it declare what it reads, and records that: the table of
-  HycoGetOptionTable(), from which come hyco -help, the check of what a user types and of the scene's hyco: section.
+  Options. The code that reads an option declares it, between PetscObjectOptionsBegin() and PetscOptionsEnd(), with the
+  functions below: its name, the form of its value, its meaning, its default (the object's value before), its range. A
+  declaration pass creates an object of each class, calls its SetFromOptions, and records the declarations: the table of
+  HycoGetOptionTable(). hyco -help, the check of the user's options and that of the scene's hyco: section use this
+  table.
 */
 #include <hycoimpl.h>
 #include <ctype.h>
@@ -10,16 +11,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Names that options had. */
+/* Former names of options. */
 static const struct {
   const char *before, *now;
 } renamed[] = {
     {"hyco_trust_folds", "-hyco_validation, the number of held-out points on which the error estimates are calibrated"},
 };
 
-static HycoOptionList table;      /* the library's, once recorded */
-static HycoOptionList told;       /* what -help has printed */
-static HycoOptionList *recording; /* where declarations go instead of being read; NULL: they are read */
+static HycoOptionList table;      /* the library's options, once recorded */
+static HycoOptionList told;       /* options that -help has printed */
+static HycoOptionList *recording; /* list that receives declarations instead of reading them; NULL: options are read */
 static const char *readers = "";  /* HycoOptionsFor() */
 
 static PetscErrorCode ForgetTable(void)
@@ -33,7 +34,9 @@ static PetscErrorCode ForgetTable(void)
 PetscErrorCode HycoOptionListDestroy(HycoOptionList *list)
 {
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < list->n; k++) PetscCall(PetscFree(list->option[k].name)); /* one block with the others */
+  for (PetscInt k = 0; k < list->n; k++)
+    PetscCall(PetscFree(list->option[k].name)); /* allocated together with the
+                                                   others */
   PetscCall(PetscFree(list->option));
   list->n = list->room = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -151,7 +154,7 @@ const char *HycoOptionNearest(const char word[], const HycoOptionList *more)
   for (int l = 0; l < 2; l++) {
     for (PetscInt k = 0; lists[l] && k < lists[l]->n && n < 256; k++) {
       names[n] = lists[l]->option[k].name;
-      if (strncasecmp(names[n++], word, strlen(word)) == 0) return names[n - 1]; /* its beginning */
+      if (strncasecmp(names[n++], word, strlen(word)) == 0) return names[n - 1]; /* an abbreviation */
     }
   }
   return HycoNearest(word, n, names);
@@ -164,7 +167,7 @@ PetscErrorCode HycoOptionsFor(const char only[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A text "<form> meaning [default]" taken apart; what it leaves out is as given. All in one block. */
+/* Splits a text "<form> meaning [default]"; missing parts are as given. One allocation. */
 static PetscErrorCode MakeOption(const char name[], const char text[], const char form[], const char initial[],
                                  const char owner[], HycoOption *o)
 {
@@ -197,7 +200,7 @@ static PetscErrorCode MakeOption(const char name[], const char text[], const cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Declared twice, as by two types of a class, an option stands in the list once. */
+/* An option that is declared twice, for example by two types of a class, is listed once. */
 static PetscErrorCode Append(HycoOptionList *list, HycoOption *option)
 {
   PetscFunctionBegin;
@@ -214,11 +217,11 @@ static PetscErrorCode Append(HycoOptionList *list, HycoOption *option)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The option with the object's prefix, for messages; without the dash. */
+/* The option with the object's prefix, without the dash, for messages. */
 #define NAMED(items, name) (items)->prefix ? (items)->prefix : "", (name) + 1
 
-/* Records or prints the declaration, or finds the value's text: with the object's prefix, in its own options or, if it
-   has a prefix, in the global ones. */
+/* Records or prints the declaration, or finds the value's text: with the object's prefix, in its own options or, if
+   it has a prefix, in the global ones. */
 static PetscErrorCode Find(HycoOptionItems items, const char name[], const char text[], const char form[],
                            const char initial[], size_t room, const char **value, PetscBool *set)
 {
@@ -229,7 +232,7 @@ static PetscErrorCode Find(HycoOptionItems items, const char name[], const char 
   PetscFunctionBegin;
   *set = PETSC_FALSE;
   *value = NULL;
-  if (!recording) PetscCall(PetscOptionsHasHelp(NULL, &help)); /* a scene's options know of no -help */
+  if (!recording) PetscCall(PetscOptionsHasHelp(NULL, &help)); /* the options of a scene do not contain -help */
   if (recording || (help && items->count == 1 && (items->prefix || !HycoOptionListFind(&told, name + 1)))) {
     PetscCall(MakeOption(name, text, form, initial, owner, &option));
     if (help && !told.n) PetscCall(PetscRegisterFinalize(ForgetTable));
@@ -294,7 +297,7 @@ PetscErrorCode HycoOptionsInt_Private(HycoOptionItems items, const char name[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The place of `word` in `words`, which ends with NULL. */
+/* The index of `word` in `words`, which ends with NULL. */
 static PetscErrorCode FindWord(HycoOptionItems items, const char name[], const char word[], const char *const words[],
                                PetscInt *index)
 {

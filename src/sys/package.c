@@ -1,11 +1,11 @@
-/* The package: its classes, registered by whatever comes first, and the check of what a caller hands over. */
+/* The package: its classes, registered at the first use of any of them, and the check of handles passed by a caller. */
 #include <hycoimpl.h>
 #include <string.h>
 
 PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_CLASSID, HYCO_SOLVER_CLASSID, HYCO_FOM_CLASSID,
     HYCO_SNAPSHOTS_CLASSID, HYCO_REDUCER_CLASSID, HYCO_ROM_CLASSID, HYCO_MATERIAL_CLASSID, HYCO_CONTACT_CLASSID;
 
-/* Each class with the call that makes its objects, for messages. */
+/* Each class with the function that creates its objects, for messages. */
 static const struct {
   PetscClassId *id;
   const char *name, *maker;
@@ -23,7 +23,7 @@ static const struct {
 };
 static PetscBool initialized = PETSC_FALSE;
 
-/* PETSc numbers classes anew after PetscFinalize(). */
+/* PETSc assigns class ids anew after PetscFinalize(). */
 static PetscErrorCode Forget(void)
 {
   PetscFunctionBegin;

@@ -1,12 +1,12 @@
-/* Where a path leads, whether or not a file is there. */
+/* Resolves paths, whether or not the file exists. */
 #include <hycofile.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define LINKS 40 /* followed at most, as the system does */
+#define LINKS 40 /* the system's limit on links */
 
-/* Where a link at `at` points, from where `at` stands; false: it is none. */
+/* The target of a link at `at`, relative to the same folder as `at`; false: it is not a link. */
 static PetscBool ReadLink(const char at[], char end[PETSC_MAX_PATH_LEN])
 {
   char target[PETSC_MAX_PATH_LEN];

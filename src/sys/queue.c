@@ -1,22 +1,22 @@
-/* HycoQueue: counters in a window of MPI-3, added to by atomic operations. */
+/* HycoQueue: counters in an MPI-3 window, updated by atomic operations. */
 #include <hycoqueue.h>
 
-/* The window's counters, before those of the kinds: groups that failed, tasks done, kinds begun. */
+/* The first counters of the window, followed by those of the kinds: groups that failed, tasks done, kinds begun. */
 enum { FAILED, DONE, BEGUN, N_COUNTERS };
 
 struct _HycoQueue {
   MPI_Comm comm, group; /* comm borrowed */
-  PetscMPIInt rank;     /* in the group */
+  PetscMPIInt rank;     /* rank in the group */
   PetscInt n_groups, color, n_kinds;
-  PetscInt *first, *order; /* n_kinds + 1; the tasks, kind after kind */
-  PetscInt kind;           /* whose tasks this group takes; -1: none yet */
+  PetscInt *first, *order; /* n_kinds + 1; the tasks, ordered by kind */
+  PetscInt kind;           /* the kind whose tasks this group takes; -1: none yet */
   PetscInt n_taken;
-  PetscBool busy, told; /* a task was taken and is not done; another group has failed */
-  MPI_Win window;       /* MPI_WIN_NULL: one group, whose ranks all count alike */
-  PetscInt *counter;    /* N_COUNTERS + n_kinds; of a window on rank 0 of comm alone */
+  PetscBool busy, told; /* busy: a task was taken and is not done; told: another group has failed */
+  MPI_Win window;       /* MPI_WIN_NULL: one group, whose ranks all have the same counters */
+  PetscInt *counter;    /* N_COUNTERS + n_kinds; with a window only on rank 0 of comm */
 };
 
-/* The tasks kind after kind, in the order of their first ones. */
+/* Orders the tasks by kind, the kinds by their first tasks. */
 static PetscErrorCode SortKinds(HycoQueue q, PetscInt n, const PetscInt kind[])
 {
   PetscInt at = 0;
@@ -105,7 +105,7 @@ PetscErrorCode HycoQueueGetGroup(HycoQueue q, MPI_Comm *group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds to a counter, at once for all; what it was. */
+/* Adds to a counter atomically; returns its former value. */
 static PetscErrorCode Add(HycoQueue q, PetscInt counter, PetscInt more, PetscInt *before)
 {
   PetscFunctionBegin;
@@ -119,7 +119,7 @@ static PetscErrorCode Add(HycoQueue q, PetscInt counter, PetscInt more, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Begins a kind that is new to this group: one that nobody has begun, or the one with most tasks left; -1: none has
+/* Chooses the next kind for this group: one that no group has begun, or the one with most tasks left; -1: none has
    any. */
 static PetscErrorCode NextKind(HycoQueue q)
 {
@@ -140,7 +140,7 @@ static PetscErrorCode NextKind(HycoQueue q)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next task; -1: none. On the rank of a group that counts. */
+/* The next task; -1: none. On the group's rank that accesses the counters. */
 static PetscErrorCode TakeTask(HycoQueue q, PetscInt *task)
 {
   PetscInt failed, done, at;

@@ -2,9 +2,9 @@
 #include <hycoregistry.h>
 #include <string.h>
 
-static HycoRegistry *all = NULL; /* that have begun */
+static HycoRegistry *all = NULL; /* list of the registries in use */
 
-/* PETSc may begin again after PetscFinalize(). */
+/* PETSc may be initialised again after PetscFinalize(). */
 static PetscErrorCode ForgetAll(void)
 {
   PetscFunctionBegin;
@@ -33,7 +33,7 @@ static PetscErrorCode Begin(HycoRegistry *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the name is; -1: nowhere. */
+/* The index of a name; -1: not found. */
 static PetscInt Place(const HycoRegistry *r, const char name[])
 {
   for (PetscInt k = 0; k < r->n; k++) {

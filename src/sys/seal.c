@@ -1,6 +1,7 @@
 /*
-  The seal: 24 bytes after a file's last, "hyco-sum", its length and the checksum of its bytes, 8 each, little-endian.
-  HDF5 1.10 checks its structure, but not the numbers: a bit that flips in them would become an answer.
+  The seal: the last 24 bytes of a file: "hyco-sum", the length and the checksum of the bytes before it, 8 bytes each,
+  little-endian. HDF5 1.10 checks the structure of a file but not its numbers: a flipped bit there would change a result
+  unnoticed.
 */
 #include <hycoimpl.h>
 #include <stdio.h>
@@ -22,15 +23,15 @@ static void StoreWord(unsigned long long word, unsigned char byte[8])
   for (int k = 0; k < 8; k++, word >>= 8) byte[k] = (unsigned char)(word & 255);
 }
 
-/* FNV-1a by words in place of bytes (eight times as fast), the rest by bytes. Each step is a bijection of the hash and
-   of the word: damage inside one word is always seen. `bytes` a multiple of 8 but in the last call. */
+/* FNV-1a by words instead of bytes (eight times as fast), the rest by bytes. Each step is a bijection of the hash
+   and of the word: damage within one word is always detected. `bytes` is a multiple of 8, except in the last call. */
 static unsigned long long Sum(unsigned long long sum, const unsigned char *data, size_t bytes)
 {
   size_t k = 0;
 
   for (; k + 8 <= bytes; k += 8) {
     sum = (sum ^ LoadWord(data + k)) * 1099511628211ULL;
-    sum ^= sum >> 29; /* high bits come down again, or damage in two high bits could cancel */
+    sum ^= sum >> 29; /* mixes high bits into low ones, otherwise damage in two high bits could cancel */
   }
   return HycoHash(sum, data + k, bytes - k);
 }
@@ -49,7 +50,7 @@ static PetscBool ReadSeal(FILE *file, long long size, unsigned char seal[HYCO_SE
                      fread(seal, 1, HYCO_SEAL, file) == HYCO_SEAL && memcmp(seal, magic, 8) == 0);
 }
 
-/* The sum of the first `left` bytes of an open file. */
+/* The checksum of the first `left` bytes of an open file. */
 static unsigned long long SumFile(FILE *file, size_t left)
 {
   unsigned char buffer[65536];

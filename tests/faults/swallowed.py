@@ -1,4 +1,4 @@
-"""A fault while the estimates are calibrated, or while a search tries a recipe, ends the training: no model with less than was asked for."""
+"""A fault while the estimates are calibrated, or while a search tries settings, ends the training: no model is written without what was requested."""
 import glob
 import os
 import resource

@@ -48,7 +48,7 @@ class AtOnce(Case):
             os.remove(self.path('m.h5'))
 
     def test_one_folder(self):
-        """Two recipes, searches and greedy trainings on the same solutions."""
+        """Two sets of settings, searches and greedy trainings on the same solutions."""
         for train, one, two in ((TRAIN, ('-hyco_pod_tol', '1e-5'), ('-hyco_pod_tol', '1e-9')),
                                 (GREEDY, ('-hyco_hybrid', 'all', '-hyco_pod_tol', '1e-12'), ('-hyco_hybrid', 'all', '-hyco_pod_tol', '1e-8'))):
             self.setUp()

@@ -29,8 +29,8 @@ def said(run):
 
 
 def settled(args):
-    """The arguments, and for a training: without search for a recipe and without held-out solutions: with the settings that the test gives, the paper's
-    for its scenes, or the plain ones."""
+    """The arguments; for a training without search and without held-out solutions: the settings are the test's, those of the paper for its
+    scenes, or the defaults."""
     args = [str(a) for a in args]
     if not args or args[0] != 'train':
         return args
@@ -40,7 +40,7 @@ def settled(args):
 
 class Case(unittest.TestCase):
     """A test with a folder of its own for everything that hyco writes."""
-    newcomer = False  # True: train finds its own recipe and judges its model, as it does for a user
+    newcomer = False  # True: train searches its settings and judges its model, as it does for a user
 
     @classmethod
     def setUpClass(cls):

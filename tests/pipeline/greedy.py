@@ -11,7 +11,7 @@ import numpy as np
 
 from common import HYCO, ROPE, Case, settled
 
-# the rope's recipe for small errors: nearly all energy, every displacement of A full order, a layer around the RID
+# settings for small errors on the rope: nearly all energy, every displacement of A full order, a layer around the RID
 FINE = ('-hyco_pod_tol', '1e-14', '-hyco_hybrid', 'all', '-hyco_rid_dual_tol', '5e-2', '-hyco_rid_layers', 1)
 SHORT = ('train', '-scene', ROPE, '-greedy', '-training_grid', '8,10', '-max_snapshots', 14, '-target', '1e-6', *FINE)
 
@@ -29,7 +29,7 @@ class Greedy(Case):
     def test_paper(self):
         """50 iterations on 20 x 24 points. 100 x 120 points: u 0.001/0.03 %, forces in the RID and reconstructed 0.1/3 %.
 
-        An independent computation of the same recipe at 1e-13 has 0.0007/0.023, 0.058/2.3 and 0.058/2.3; the paper, with
+        An independent computation with the same settings at 1e-13 has 0.0007/0.023, 0.058/2.3 and 0.058/2.3; the paper, with
         a smaller RID, 0.004/0.077, 0.34/10 and 1.3/18.
         """
         t = self.hyco('train', '-scene', ROPE, '-greedy', '-training_grid', '20,24', '-max_snapshots', 54, '-target',

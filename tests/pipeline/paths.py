@@ -304,9 +304,14 @@ class Paths(FlowingRing):
         """What is not there is said in one line; a history that is not the model's is named."""
         self.train(self.norton, 'refused.h5', '-grid', '1,1', '-hyco_rid_whole')
         model = self.path('refused.h5')
+        store = model + '.snapshots'
         for args, words in (
                 (['compare', '-scene', self.norton, '-model', model, '-mu', '0.006,1', '-history_times', '0,1,12'], ['history_times', '0,1,12']),
                 (['compare', '-scene', self.norton, '-model', model, '-mu', '0.006,1', '-history_tables_q', '0 0,1 2,12 2'], ['history_tables_q']),
+                (['train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '1,1', '-hyco_snapshots', store, '-history_times', '0,1,12'],
+                 ['refused.h5.snapshots/', 'history_times is 0,1,12 in the scene']),
+                (['train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '1,1', '-hyco_snapshots', store, '-body_ring_young', '1'],
+                 ['is a snapshot of another scene, history or mesh', store]),
                 (['predict', '-scene', self.norton, '-model', model, '-mu', '0.006,1', '-hyco_fallback'], ['-hyco_fallback', 'history']),
                 (['train', '-scene', self.norton, '-model', self.path('no.h5'), '-grid', '2,2', '-hyco_checkpoint', self.path('c.h5')], ['-hyco_checkpoint'])):
             self.refused_in_one_line(words, *args)

@@ -25,7 +25,7 @@ class Plane(Case):
     def test_search(self):
         """The search tries the plane that most contacts meet first, and takes its model where that is good enough."""
         trained = self.hyco('train', *SCENE, '-model', 'm.h5', *POINTS, '-hyco_model_type', 'hybrid', '-validation_points', self.between(),
-                            '-target_u', '5e-3', '-target_sigma', '2e-2', '-target_inelastic', '2e-2', '-target_max_added', '0', '-table', 'recipes.csv')
+                            '-target_u', '5e-3', '-target_sigma', '2e-2', '-target_inelastic', '2e-2', '-target_max_added', '0', '-table', 'settings.csv')
         self.assertEqual(trained['search']['attempts'], trained['search']['chosen'])
         self.assertEqual(trained['search']['hybrid'], 'all')
         self.assertLess(trained['rid_fraction'], 0.5)

@@ -92,7 +92,8 @@ class Rigid(Case):
                     self.assertLess(trained['rid_fraction'], 0.8)
                 full, model = (self.hyco(*args, '-mu', '17,9.3')['outputs'] for args in (('solve', '-scene', scene), ('predict', '-model', 'm.h5')))
                 self.near(model['depth'], full['depth'], bound)
-                self.near(model['push'], -17, 1e-6 if kind in ('hybrid', 'cubature') else 0.05)
+                if kind != 'projection':  # whose force vectors need not balance
+                    self.near(model['push'], -17, 0.05 if kind == 'regression' else 1e-6)
 
     def test_triangles(self):
         """Cells that meet the surface in a node alone are in the RID too."""

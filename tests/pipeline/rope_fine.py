@@ -1,15 +1,15 @@
-"""The accurate recipe on the rope: 10 x 12 snapshots and at most 50 RID nodes, over the 100 x 120 grid."""
+"""Accurate settings on the rope: 10 x 12 snapshots and at most 50 RID nodes, over the 100 x 120 grid."""
 import unittest
 
 from common import ROPE, Case
 
-RECIPE = ('-hyco_pod_tol', '1e-11', '-hyco_deim_type', 'qdeim', '-hyco_rid_layers', 1, '-hyco_hybrid', 'all')
+SETTINGS = ('-hyco_pod_tol', '1e-11', '-hyco_deim_type', 'qdeim', '-hyco_rid_layers', 1, '-hyco_hybrid', 'all')
 
 
 class Fine(Case):
     def test_errors(self):
         """Asked: u 0.1 % on average and 0.5 % at worst, contact forces 3 and 15 (the paper, 28 nodes: 0.34, 1.13; 24, 148)."""
-        t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', 'fine.h5', *RECIPE)
+        t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', 'fine.h5', *SETTINGS)
         self.assertLessEqual(t['rid_nodes'], 50)
         self.assertEqual(t['n_modes'], 27)  # singular values of snapshots, far above round-off
         self.assertEqual(t['scan']['points_of_other_sign'], 0)

@@ -1,5 +1,5 @@
-"""The search for a recipe over paths drops a recipe at the first held-out path beside which it cannot be chosen: the choice is that of a search that
-judges all recipes at all of them."""
+"""The search for settings over paths drops settings at the first held-out path that excludes their choice: the result is that of a search that
+judges all settings at all of them."""
 import csv
 import unittest
 
@@ -17,7 +17,7 @@ class SearchPaths(Ring):
             return report, list(csv.DictReader(f))
 
     def test_same_choice(self):
-        """Same recipe, same errors, fewer paths; on two ranks the same recipes are dropped at the same paths."""
+        """Same settings, same errors, fewer paths; on two ranks the same settings are dropped at the same paths."""
         grid = ('-grid', '3,3')
         found, rows = self.search('raced', *grid)
         every, full = self.search('every', *grid, '-hyco_search_exhaustive')
@@ -40,7 +40,7 @@ class SearchPaths(Ring):
         self.assertEqual(*firm)
 
     def test_reason(self):
-        """A line per recipe; of a dropped one where it was dropped, and beside which it is not chosen. In a file, progress names the recipe."""
+        """A line per attempt; for a dropped one where it was dropped, and which one is better. In a file, progress names the settings."""
         run = self.run_raw('train', '-scene', self.norton, '-model', self.path('said.h5'), '-grid', '3,3', '-hyco_snapshots', self.path('store'),
                            '-progress', '0.01')
         self.assertEqual(run.returncode, 0, run.stderr)

@@ -47,7 +47,7 @@ class Targets(Case):
         self.assertRegex(said, r'settings number \d+ of the \d+ that were tried: hybrid, pod_tol')
 
     def test_pellet(self):
-        """Judged at two other radii and loads between the steps; what the command line says of the recipe is kept."""
+        """Judged at two other radii and loads between the steps; settings of the command line are kept."""
         targets = {'u': 1e-2, 'sigma': 5e-2, 'lambda': 5e-2}
         args = [a for k, v in targets.items() for a in (f'-target_{k}', v)]
         t = self.hyco('train', '-scene', PELLET, '-values_radius', RADII, '-values_load', STEPS, '-model', 'p.h5', '-table',
@@ -80,7 +80,7 @@ class Targets(Case):
         self.assertLess(c['error_u']['mean'], 0.004)
 
     def test_missed(self):
-        """Targets that no recipe meets: the best model is written with its errors, one line says what is missed, status 3."""
+        """Targets that no settings meet: the best model is written with its errors, one line gives the missed targets, status 3."""
         t = self.hyco('train', '-scene', ROPE, '-grid', '6,6', '-model', 'none.h5', '-table', 'none.csv', '-target_u',
                       1e-9, '-hyco_model_type', 'projection', '-target_max_added', 0, status=3)
         self.assertEqual(len(t['missed']), 1)

@@ -8,9 +8,9 @@ import unittest
 from common import PELLET, ROPE, SOURCE, Case
 
 BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
-RECIPE = ('-hyco_model_type', 'hybrid', '-hyco_rid_contact_extension', 0)
-ROUGH = (*RECIPE, '-hyco_pod_tol', '1e-7', '-hyco_rid_layers', 0, '-hyco_hybrid', 'all')
-FINE = (*RECIPE, '-hyco_pod_tol', '1e-11', '-hyco_deim_type', 'qdeim', '-hyco_rid_layers', 1, '-hyco_hybrid', 'all')
+SETTINGS = ('-hyco_model_type', 'hybrid', '-hyco_rid_contact_extension', 0)
+ROUGH = (*SETTINGS, '-hyco_pod_tol', '1e-7', '-hyco_rid_layers', 0, '-hyco_hybrid', 'all')
+FINE = (*SETTINGS, '-hyco_pod_tol', '1e-11', '-hyco_deim_type', 'qdeim', '-hyco_rid_layers', 1, '-hyco_hybrid', 'all')
 ERRORS = (('estimated_error_u', 'error_u'), ('estimated_error_lambda', 'error_lambda'))
 
 
@@ -20,8 +20,8 @@ class Trust(Case):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        for name, recipe in (('rough.h5', ROUGH), ('fine.h5', FINE)):
-            t = cls.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', name, '-hyco_snapshots', 'rope.snapshots', *recipe,
+        for name, settings in (('rough.h5', ROUGH), ('fine.h5', FINE)):
+            t = cls.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', name, '-hyco_snapshots', 'rope.snapshots', *settings,
                          status=3 if name == 'rough.h5' else None)
             assert t['held_out_predictions'] == 30 == t['held_out']['n']
 
@@ -130,7 +130,7 @@ class Trust(Case):
     def test_unseen(self):
         """Inside the scene's ranges but outside what training has seen: said, and the estimate of forces that training never saw
         is none, which asks for full order."""
-        self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.03,4.04', '-values_load', '0.1,0.2,0.3,0.4', '-model', 'few.h5', *RECIPE,
+        self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.03,4.04', '-values_load', '0.1,0.2,0.3,0.4', '-model', 'few.h5', *SETTINGS,
                   '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', 1, '-hyco_hybrid', 'contact', '-hyco_rid_groups', 'pellet_top', '-hyco_rid_contact_extension', 0.1, status=None)
         near = self.hyco('predict', '-model', 'few.h5', '-mu', '4.035,0.3')
         self.assertFalse(near['extrapolated'])

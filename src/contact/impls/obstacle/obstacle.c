@@ -1,4 +1,4 @@
-/* Obstacles: the nodes of a group do not move farther than the gap along the normal. */
+/* Obstacles: the displacement of a group's nodes along the normal is at most the gap. */
 #include <hycocontactimpl.h>
 
 PetscErrorCode HycoContactCreate_Obstacle(HycoContact contact)

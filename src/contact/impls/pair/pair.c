@@ -1,11 +1,11 @@
-/* Pairs: a slave node's master is one node of the other surface, and stays it. */
+/* Pairs: the master of a slave node is one fixed node of the other surface. */
 #include "../../facing.h"
 #include "../../partners.h"
 
-/* Of a slave's facet: how far a map may move partners along it. */
+/* Share of a slave's facet: the largest tangential distance of a pair's nodes on moved nodes. */
 #define HYCO_APART_SHARE 0.5
 
-/* Whether each slave node (but those that need none) has a master of its own at most `far` away. */
+/* Whether each slave node (except those that need none) has its own master at most `far` away. */
 static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at[], const PetscBool *needs,
                                  PetscReal far, PetscBool *matched)
 {
@@ -23,8 +23,8 @@ static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The master node that lies most along the mean of both normals from a slave node: mirrored surfaces match so, however
-   far apart they are. n = 0 where it misses that line by more than `small`. */
+/* The master node closest to the line through a slave node along the mean of both normals: this matches mirrored
+   surfaces at any distance. n = 0 if it is farther than `small` from that line. */
 static void ProjectAlong(const HycoPartners *t, PetscInt slave, PetscReal small, HycoProjection *at)
 {
   const PetscReal *out = HycoPartnersOutward(t, slave);
@@ -38,7 +38,7 @@ static void ProjectAlong(const HycoPartners *t, PetscInt slave, PetscReal small,
 
     for (PetscInt c = 0; c < 3; c++) mean[c] = out[c] - n[c];
     mm = HycoDot(mean, mean);
-    if (HycoDot(n, n) == 0 || mm < 1e-2) continue; /* of no direction */
+    if (HycoDot(n, n) == 0 || mm < 1e-2) continue; /* no direction */
     HycoPartnersAcross(t, slave, &here, r);
     rr = HycoDot(r, r);
     off = PetscMax(rr - HycoDot(r, mean) * HycoDot(r, mean) / mm, 0);
@@ -49,8 +49,7 @@ static void ProjectAlong(const HycoPartners *t, PetscInt slave, PetscReal small,
   }
 }
 
-/* How far apart the nodes of a pair may lie along their normals: as said; else at any distance if the surfaces touch
-   somewhere. */
+/* The largest distance of a pair's nodes along their normals: as given; else any, if the surfaces touch somewhere. */
 static PetscReal Farthest(PetscReal stated, const HycoMatch *m)
 {
   if (stated >= 0) return stated;
@@ -60,8 +59,8 @@ static PetscReal Farthest(PetscReal stated, const HycoMatch *m)
   return m->small;
 }
 
-/* The nodes of surfaces that do not coincide as drawn, along the normals, where those match all slave nodes that face
-   the master one by one; the others have no contact (n = 0). */
+/* For surfaces that do not coincide as drawn: matches nodes along the normals, if all slave nodes that face the
+   master are matched one to one; the others have no contact (n = 0). */
 static PetscErrorCode MatchAlong(HycoPartners *t, HycoContact c, HycoMatch *m)
 {
   HycoProjection *along;
@@ -91,7 +90,7 @@ static PetscErrorCode MatchAlong(HycoPartners *t, HycoContact c, HycoMatch *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A master has one slave. */
+/* Checks that each master has one slave. */
 static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *match)
 {
   PetscInt *partner_of;
@@ -117,7 +116,7 @@ static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nearest nodes, where those match one by one; else the nodes along the normals, where those do. */
+/* Nearest nodes, if they match one to one; else nodes along the normals, if these do. */
 static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
 {
   PetscBool matched;
@@ -148,7 +147,7 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes still face each other where a map has moved them. */
+/* Checks that the nodes of pairs still face each other after a map has moved them. */
 static PetscErrorCode Verify(HycoContact c, HycoFE fe, const HycoPairs *p, PetscInt first, PetscInt last,
                              const PetscReal normal[])
 {

@@ -1,6 +1,6 @@
 /*
-  A rigid body, given by its gap as an obstacle is. It translates as one node of the mesh does, which is the master of
-  all of the contact's nodes: supports, forces and springs of that node are the body's.
+  A rigid body, whose surface is given by its gap like an obstacle's. It translates with one node of the mesh, which is
+  the master of all of the contact's nodes: supports, forces and springs of that node are those of the body.
 */
 #include "../../facing.h"
 

@@ -1,11 +1,11 @@
 /*
-  Surface contacts: a slave node's master is its projection on the master's facets. On surfaces that a map moves it is
-  searched for where the nodes are: a slave node has one if the master's nearest point opposes its normal, is within
-  reach, and the node is not past the master's border.
+  Surface contacts: the master of a slave node is its projection on the master's facets. On surfaces that a map moves,
+  the projection is computed on the moved nodes: a slave node has a master if the nearest point's normal opposes its
+  own, that point is within reach, and the node is not past the master's border.
 */
 #include "../../partners.h"
 
-/* Where the scene states how far masters may be, a node that faces none has no contact. */
+/* If the scene gives a largest distance of masters, a node that faces none has no contact. */
 static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
 {
   PetscReal stated;
@@ -21,7 +21,7 @@ static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What to do about nodes without a master. */
+/* What the user can do about nodes without a master. */
 static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const PetscInt missed[], char text[HYCO_LINE])
 {
   PetscBool facing = PETSC_FALSE;

@@ -1,5 +1,5 @@
-/* Plasticity without rate: von Mises, isotropic hardening Y(p) = yield + hardening p + saturation (1 - exp(-rate p)).
- */
+/* Rate-independent plasticity: von Mises, isotropic hardening Y(p) = yield + hardening p + saturation (1 - exp(-rate
+   p)). */
 #include <hycoflow.h>
 
 enum { YIELD, HARDENING, SATURATION, RATE, N_CONSTANTS };

@@ -29,7 +29,7 @@ static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
   return p->scratch[0] * sh * sh;
 }
 
-/* sinh(2 x) / 4 - x / 2, by its series where that is a difference of like numbers. */
+/* sinh(2 x) / 4 - x / 2, by its series where the difference cancels. */
 static PetscReal CreepIntegral(const HycoFlowPoint *p, PetscReal q)
 {
   const PetscReal x = p->scratch[1] * q, y = x * x;
@@ -51,7 +51,9 @@ PetscErrorCode HycoMaterialCreate_LimbackAndersson(HycoMaterial material)
   PetscCall(HycoMaterialDeclare(material, "factor", "the factor of the stress", 650, 0, PETSC_INFINITY));
   PetscCall(HycoMaterialDeclare(material, "activation", "the activation energy (J/mol)", 201000, HYCO_NOT_NEGATIVE,
                                 PETSC_INFINITY));
-  PetscCall(HycoMaterialDeclare(material, "modulus", "the modulus E' of creep", -1, 0, PETSC_INFINITY)); /* -1: of T */
+  PetscCall(HycoMaterialDeclare(material, "modulus", "the modulus E' of creep", -1, 0, PETSC_INFINITY)); /* -1: a
+                                                                                                            function
+                                                                                                            of T */
   PetscCall(HycoMaterialSetHeat(material, PETSC_TRUE));
   PetscCall(HycoFlowEnd(material, &rule));
   PetscFunctionReturn(PETSC_SUCCESS);

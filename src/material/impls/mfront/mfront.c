@@ -1,10 +1,11 @@
 /*
-  A user's law from a shared library with the generic C interface of MFront (https://tfel.sourceforge.net), version 1 of
-  it: TFEL 3.4.1 and later, 4.x, 5.x. Nothing of TFEL is linked. What is relied on was read in the public headers of the
+  A user's law from a shared library with the generic C interface of MFront (https://tfel.sourceforge.net), version 1:
+  TFEL 3.4.1 and later, 4.x, 5.x. Nothing of TFEL is linked. The declarations follow the public headers of the
   MFrontGenericInterfaceSupport: include/MGIS/Behaviour/BehaviourDataView.hxx and StateView.hxx for the structs,
   LibrariesManager.cxx for the symbols.
 
-  Small strain, a strain in and a stress out; symmetric tensors as xx, yy, zz, xy, xz, yz with shear times sqrt(2).
+  Small strain: a strain is the input and a stress the output; symmetric tensors as xx, yy, zz, xy, xz, yz with shear
+  times sqrt(2).
 */
 #include <hycomaterialimpl.h>
 #include <dlfcn.h>
@@ -14,13 +15,14 @@
 #include <unistd.h>
 
 #define API_VERSION    1
-#define NO_TEMPERATURE 293.15 /* of a body without one, for laws that do not care */
-#define MESSAGE        512    /* room that the interface asks for */
-#define CONSISTENT     4.     /* in K[0]: integrate, with the consistent tangent */
-#define ELASTIC        -1.    /* in K[0]: the elastic tangent alone */
+#define NO_TEMPERATURE 293.15 /* for a body without a temperature; for laws that do not depend on it */
+#define MESSAGE        512    /* size required by the interface */
+#define CONSISTENT     4.     /* in K[0]: integrate, and return the consistent tangent */
+#define ELASTIC        -1.    /* in K[0]: return only the elastic tangent */
 #define MAX_INTERNAL   64
 
-/* The interface's structs: what points to the begin of a step, to its end, and both with what is asked for. */
+/* The interface's structs: pointers to the state at the begin of a step, to that at its end, and both with the
+   request. */
 typedef struct {
   const double *gradients, *forces, *density, *properties, *internal, *stored, *dissipated, *external;
 } StateBegin;
@@ -43,11 +45,11 @@ typedef struct {
   int (*integrate)(Data *);
   char *behaviour; /* its name */
   PetscInt n_properties;
-  PetscBool stores; /* it computes the stored energy */
+  PetscBool stores; /* whether it computes the stored energy */
   char message[MESSAGE];
 } MFront;
 
-/* Signals that a library may die of while it is loaded: they end the loading, not the process. */
+/* Signals that may occur while a library is loaded: they end the loading, not the process. */
 static const int deadly[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 #define N_DEADLY ((int)(sizeof(deadly) / sizeof(deadly[0])))
 static sigjmp_buf alive;
@@ -57,7 +59,7 @@ static void Escape(int signal)
   siglongjmp(alive, signal);
 }
 
-/* dlopen(); *died: the signal that it ended with, or 0. */
+/* dlopen(); *died: the signal by which it ended, or 0. */
 static void *Open(const char path[], int *died)
 {
   struct sigaction mine, before[N_DEADLY];
@@ -78,8 +80,8 @@ static const char *BodyName(HycoMaterial law)
   return ((PetscObject)law)->name;
 }
 
-/* A name with a slash is a path from the scene's folder, or else from where the user stands; one without may lie beside
-   the scene too, and else is looked for where the system looks. */
+/* Loads the library. A name with a slash is a path relative to the scene's folder, or else to the working folder;
+   one without a slash is searched in the scene's folder, and else in the system's library path. */
 static PetscErrorCode Load(HycoMaterial law, const char name[], MFront *m)
 {
   char path[HYCO_LINE];
@@ -122,7 +124,7 @@ static unsigned Number(const MFront *m, const char hypothesis[], const char what
   return value ? *value : absent;
 }
 
-/* A list of names with the number of them under the same name with an n before. */
+/* Reads a list of names; their number is the symbol of the same name preceded by n. */
 static PetscErrorCode List(HycoMaterial law, const MFront *m, const char hypothesis[], const char what[], PetscInt *n,
                            const char *const **names)
 {
@@ -139,7 +141,7 @@ static PetscErrorCode List(HycoMaterial law, const MFront *m, const char hypothe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the behaviour is of a kind that the finite elements can use. */
+/* Checks that the behaviour is of a kind that the finite elements can use. */
 static PetscErrorCode CheckKind(HycoMaterial law, const MFront *m)
 {
   const char *const *interface = (const char *const *)Find(m, NULL, "mfront_interface");
@@ -162,7 +164,7 @@ static PetscErrorCode CheckKind(HycoMaterial law, const MFront *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Both texts are read: the material properties become constants, H[1] by the name H_1. */
+/* After both texts are read: declares the material properties as constants, H[1] under the name H_1. */
 static PetscErrorCode Declare(HycoMaterial law)
 {
   MFront *m = (MFront *)law->data;
@@ -194,7 +196,7 @@ static PetscErrorCode Declare(HycoMaterial law)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Components of an internal variable by its type: scalar, symmetric tensor, vector, tensor. */
+/* Number of components of an internal variable by its type: scalar, symmetric tensor, vector, tensor. */
 static PetscInt TypeSize(int type, PetscInt dim)
 {
   static const PetscInt size[4][2] = {{1, 1}, {4, 6}, {2, 3}, {5, 9}};
@@ -263,14 +265,14 @@ static PetscErrorCode SetUp(HycoMaterial law, PetscInt dim)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The interface's component of ours, and the factor of shear. */
+/* The interface's index of our components; shear has a factor. */
 static const PetscInt theirs[6] = {0, 1, 2, 3, 5, 4};
 static PetscReal Root(PetscInt c)
 {
   return c < 3 ? 1 : PetscSqrtReal(2);
 }
 
-/* One point; false where the behaviour has no answer, with its message. */
+/* Integrates one point; false, with the behaviour's message, if it has no solution. */
 static PetscBool Integrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, PetscInt n_state, char message[MESSAGE])
 {
   const PetscInt ns = p->n_strain;

@@ -1,4 +1,4 @@
-/* Norton's creep, rate q^exponent by time; with a yield stress J2 plasticity with linear hardening beside it. */
+/* Norton creep, rate q^exponent in time; with a yield stress, J2 plasticity with linear hardening in addition. */
 #include <hycoflow.h>
 
 enum { RATE, EXPONENT, YIELD, HARDENING, N_CONSTANTS };

@@ -1,9 +1,9 @@
 /*
-  Creep that slows down as it goes: at a constant stress p = rate q^exponent t^time_exponent, under another stress as if
-  the strain so far had come under that one (strain hardening). A step takes its end's stress as constant and is then
-  exact: with m the time exponent,
+  Primary creep with strain hardening: at a constant stress p = rate q^exponent t^time_exponent; under a varying stress,
+  the rate depends on the accumulated strain and the current stress. A step treats the stress at its end as constant and
+  is then exact: with m the time exponent,
 
-      dp = (p0^(1/m) + dt (rate q^exponent)^(1/m))^m - p0
+    dp = (p0^(1/m) + dt (rate q^exponent)^(1/m))^m - p0
 */
 #include <hycoflow.h>
 

@@ -1,17 +1,19 @@
 /*
-  Training of the condensed model. After the snapshots, at every combination of values of the parameters that reach K or
-  B: a factorisation for G = B K^-1 B^T, and one for the responses K^-1 B^T P that make the modes (condense_modes.c) and
-  with them H = V^T K^-1 B^T. The rest follows from the snapshots without a solve: their gaps D - B U = g + G L, and
-  V^T U = a - H L.
+  Training of the condensed model. After the snapshots, for every combination of values of the parameters that change K
+  or B: a factorisation for G = B K^-1 B^T, and one for the responses K^-1 B^T P, from which the modes are made
+  (condense_modes.c), and H = V^T K^-1 B^T. The rest follows from the snapshots without a solve: their gaps D - B U = g
+  + G L, and V^T U = a - H L.
 */
 #include <hycocondensed.h>
 
-/* m^2 numbers a point, and m^3 operations an active set: beyond this it is no model for many predictions. */
+/* A point has m^2 numbers, and an active set costs m^3 operations: more contacts do not pay in many predictions. */
 #define MOST_CONTACTS 4000
-#define MOST_NUMBERS  1e9   /* of G at all nodes: 8 GB */
-#define NO_LOAD       1e-11 /* of the contacts' displacements: what is left of them without forces is round-off */
+#define MOST_NUMBERS  1e9 /* entries of G at all nodes: 8 GB */
+#define NO_LOAD                                                                                                        \
+  1e-11 /* share of the contacts' displacements below which their part without forces is                               \
+           round-off */
 
-/* The values of parameter p among the samples, ascending, each once. */
+/* The values of parameter p among the samples, ascending, without repetition. */
 static PetscErrorCode FindValues(HycoCondensed c, PetscInt p, PetscInt n_s, const PetscReal mu[])
 {
   PetscInt n = 0;
@@ -41,7 +43,7 @@ static PetscInt NodeOf(HycoCondensed c, const PetscReal mu[])
   return node;
 }
 
-/* The samples as a tensor grid: each combination of their values stands among them. */
+/* Checks that the samples form a tensor grid: each combination of their values is a sample. */
 static PetscErrorCode FindGrid(HycoReducer t, HycoCondensed c)
 {
   const PetscReal *mu;
@@ -88,14 +90,15 @@ static PetscErrorCode Loads(HycoReducer t, const PetscReal mu[], PetscReal data[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a third value of p gives what two others say of F, the other parameters at a share of their ranges. */
+/* Whether F at a third value of p follows from two others by linear interpolation, with the other parameters at a
+   share of their ranges. */
 static PetscErrorCode AffineAt(HycoReducer t, PetscInt p, PetscReal share, PetscBool *affine)
 {
   static const PetscReal at[3] = {0.06, 0.93, 0.47};
   const PetscInt n = t->fom->part->n_owned * t->fom->fe->dim;
   const PetscReal a = (at[1] - at[2]) / (at[1] - at[0]);
   HycoScene s = t->scene;
-  PetscReal mu[HYCO_MAX_PARAMETERS], *v[3], most[2] = {0, 0}; /* what is lost, and the size */
+  PetscReal mu[HYCO_MAX_PARAMETERS], *v[3], most[2] = {0, 0}; /* most: error, and size */
 
   PetscFunctionBegin;
   for (PetscInt q = 0; q < s->n_parameters; q++) mu[q] = s->lo[q] + share * (s->hi[q] - s->lo[q]);
@@ -114,11 +117,12 @@ static PetscErrorCode AffineAt(HycoReducer t, PetscInt p, PetscReal share, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the load at mu, at node s of the stiffness, is the sum of its training loads that values say. Collective. */
+/* Whether the load at mu, at node s of the stiffness, is the sum of its training loads given by the weights.
+   Collective. */
 static PetscErrorCode CheckSum(HycoReducer t, HycoCondensed c, PetscInt s, const PetscReal mu[], PetscBool *exact)
 {
   const PetscInt n = t->fom->part->n_owned * t->fom->fe->dim, nodes = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
-  PetscReal *weight, *rest, *F, at[HYCO_MAX_PARAMETERS], most[2] = {0, 0}; /* what is lost, and the size */
+  PetscReal *weight, *rest, *F, at[HYCO_MAX_PARAMETERS], most[2] = {0, 0}; /* most: error, and size */
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(c->n_load, &weight, n, &rest, n, &F));
@@ -141,8 +145,8 @@ static PetscErrorCode CheckSum(HycoReducer t, HycoCondensed c, PetscInt s, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether loads come as sums of training loads: at several points for the values of all, for the first and the last
-   stiffness assembled. Collective. */
+/* Whether loads are sums of training loads: checks the values at several points, and the assembled loads for the
+   first and the last stiffness. Collective. */
 static PetscErrorCode FindExactLoads(HycoReducer t, HycoCondensed c)
 {
   static const PetscReal share[3] = {0.31, 0.77, 0.53};
@@ -247,7 +251,7 @@ PetscErrorCode HycoCondensedResetTraining(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts' nodes and slave facets, and the gaps' place in the condensed model under training. Rank 0. */
+/* Takes the contacts' nodes and slave facets, and the place of the gaps in the condensed model in training. Rank 0. */
 static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
 {
   HycoMesh surface = t->fom->surface;
@@ -277,7 +281,7 @@ static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where slaves slide from facet to facet B has kinks, and no polynomial follows it. Rank 0. */
+/* Where slaves slide from facet to facet, B is not smooth, and polynomials do not converge. Rank 0. */
 static PetscErrorCode CheckFacets(HycoReducer t)
 {
   PetscInt n;
@@ -319,7 +323,7 @@ PetscErrorCode HycoCondensedCheckSupports(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which parameters reach what; that the scene is one for this model. Collective. */
+/* Finds what each parameter affects, and checks that the scene is suitable for this model. Collective. */
 static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
 {
   PetscBool reaches[HYCO_MAX_PARAMETERS];
@@ -391,8 +395,7 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -B K^-1 F = -B U - G L of one snapshot (U at the contacts' nodes); 0 where it is the difference of what is much
-   larger. */
+/* -B K^-1 F = -B U - G L of one snapshot (U at the contacts' nodes); set to 0 if it is a small difference. */
 static PetscErrorCode FreeGap(HycoReducer t, const PetscReal mu[], const PetscReal U[], const PetscReal L[],
                               const PetscReal packed[], PetscReal g[])
 {
@@ -426,7 +429,8 @@ static PetscErrorCode FreeGap(HycoReducer t, const PetscReal mu[], const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* H = V^T K^-1 B^T at the nodes of the stiffness, of all modes: the responses' coefficients, on the patterns' span. */
+/* H = V^T K^-1 B^T at the nodes of the stiffness, for all modes: the coefficients of the responses, on the span of
+   the patterns. */
 static PetscErrorCode FromResponses(HycoReducer t, HycoCondensed c)
 {
   const HycoResponses *x = &Condensing(t)->responses;
@@ -458,7 +462,7 @@ static PetscErrorCode FromResponses(HycoReducer t, HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* g, V^T U and the training forces at the nodes of the whole grid. */
+/* Fills g, V^T U and the training forces at the nodes of the whole grid. */
 static PetscErrorCode FromSnapshots(HycoReducer t, HycoCondensed c)
 {
   HycoGridField *gap = &c->field[HYCO_FIELD_GAP], *unloaded = &c->field[HYCO_FIELD_FREE];
@@ -487,7 +491,8 @@ static PetscErrorCode FromSnapshots(HycoReducer t, HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Degrees by leaving values out, one where the data are affine; errors of G and g, added up over the parameters. */
+/* Chooses degrees by leaving values out, and degree 1 where the data are affine; errors of G and g, summed over the
+   parameters. */
 static PetscErrorCode ChooseDegrees(HycoCondensed c)
 {
   PetscFunctionBegin;
@@ -523,7 +528,7 @@ PetscErrorCode HycoCondensedFillFields(HycoReducer t, PetscBool modes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of all modes the first l, which the model has: the rows of H and the entries of a come mode by mode. */
+/* Keeps the first l modes: the rows of H and the entries of a are ordered by mode. */
 static PetscErrorCode CutModes(HycoCondensed c, PetscInt l)
 {
   const PetscInt rows[2] = {l * c->m, l}, of[2] = {HYCO_FIELD_H, HYCO_FIELD_FREE};

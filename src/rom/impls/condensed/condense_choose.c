@@ -1,23 +1,25 @@
 /*
-  The condensed model's training points, chosen: Leja points of each range, which interpolate about as well as
-  Chebyshev's and are nested, so that no solution is in vain. The parameter whose values, left out one by one, cost the
-  forces most gets another value until the sum over the parameters is below the target, or until its error falls so
-  slowly that values within the limit cannot bring it there: polynomials converge geometrically where the dependence is
-  smooth, and algebraically where it has a kink. The modes come when the points stand.
+  Choice of the condensed model's training points: Leja points of each range, which interpolate about as well as
+  Chebyshev points and are nested, so that every solution is reused. The parameter whose left-out values cause the
+  largest error of the forces gets another value until the sum over the parameters is below the target, or until its
+  error decreases so slowly that the target cannot be reached within the limit: polynomials converge geometrically if
+  the dependence is smooth, and algebraically if it has a kink. The modes are computed for the final points.
 */
 #include <hycocondensed.h>
 
-/* Of a parameter in which everything is affine two values are exact; the modes need solutions in between. */
+/* If everything is affine in a parameter, two values are exact; the modes need solutions in between. */
 #define AFFINE_VALUES 5
 #define FIRST_VALUES  3
 #define LEJA_GRID     2000
-#define TIE           1e-6 /* relative: of parameters that cost nearly the same the first is refined */
+#define TIE           1e-6 /* relative: among nearly equal errors the first parameter is refined */
 
-#define LOOK_BACK 4   /* values over which an error's fall is measured, from twice as many on */
-#define SLOW      0.7 /* a fall per value that no smooth dependence has */
-#define BEYOND    1.5 /* of the most values: what a fall that stays would ask for */
+#define LOOK_BACK                                                                                                      \
+  4                /* number of values over which the decrease of an error is measured, with at least twice as         \
+                      many */
+#define SLOW   0.7 /* ratio per value above which the dependence is not smooth */
+#define BEYOND 1.5 /* multiple of the largest number of values that the present decrease would require */
 
-/* n Leja points of [lo, hi]: the ends, then each where the product of the distances to those before is largest. */
+/* n Leja points of [lo, hi]: the ends, then each point maximises the product of the distances to the previous ones. */
 static void LejaPoints(PetscInt n, PetscReal lo, PetscReal hi, PetscReal x[])
 {
   for (PetscInt k = 0; k < n; k++) {
@@ -51,7 +53,7 @@ static PetscErrorCode MakeSamples(HycoScene s, const PetscInt counts[], HycoSamp
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Another set of points, on the mesh that is there. */
+/* Takes another set of points on the same mesh. */
 static PetscErrorCode TakeSamples(HycoReducer t, const PetscInt counts[], HycoSamples *samples)
 {
   PetscFunctionBegin;
@@ -64,7 +66,7 @@ static PetscErrorCode TakeSamples(HycoReducer t, const PetscInt counts[], HycoSa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solutions, flexibilities and what leaving values out costs, by parameter. */
+/* Computes solutions, flexibilities and the errors of leaving values out, by parameter. */
 static PetscErrorCode Estimate(HycoReducer t, HycoSnapshots store)
 {
   HycoCondensed c = Condensing(t)->condensed;
@@ -95,13 +97,13 @@ static PetscInt Choose(HycoReducer t, PetscBool *met)
   return *met ? -1 : worst;
 }
 
-/* The parameter's error at so many values. */
+/* The errors of the parameters by number of values. */
 typedef struct {
   PetscInt most;
   PetscReal *error; /* dim x (most + 1) */
 } History;
 
-/* Whether more values of p are in vain: at the rate at which its error has fallen the target is out of reach. */
+/* Whether more values of p are useless: with the decrease of its error so far the target cannot be reached. */
 static PetscBool IsHopeless(HycoReducer t, const History *h, PetscInt p)
 {
   HycoCondensed c = Condensing(t)->condensed;
@@ -110,7 +112,7 @@ static PetscBool IsHopeless(HycoReducer t, const History *h, PetscInt p)
   PetscReal best = e[n], before = e[n - LOOK_BACK > 0 ? n - LOOK_BACK : 0], rate;
 
   if (n < 2 * LOOK_BACK || !(before > 0)) return PETSC_FALSE;
-  for (PetscInt k = n - 1; k > n - 2; k--) best = PetscMin(best, e[k]); /* every second value may be a little worse */
+  for (PetscInt k = n - 1; k > n - 2; k--) best = PetscMin(best, e[k]); /* every second value may be slightly worse */
   rate = PetscPowReal(best / before, 1.0 / LOOK_BACK);
   if (rate < SLOW) return PETSC_FALSE;
   return (PetscBool)(rate >= 1 || (PetscReal)n + PetscLogReal(Condensing(t)->tol / best) / PetscLogReal(rate) >

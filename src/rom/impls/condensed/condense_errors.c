@@ -1,26 +1,26 @@
 /*
-  What a condensed model estimates its errors by: each value of each parameter that is not affine is left out and its
+  The error estimates of a condensed model: each value of each parameter that is not affine is left out, and its
   training points are predicted from the others, forces and displacements; relative to the point's own size, or a share
-  of the largest. The largest, added up over the parameters, are what training reports. An error at a value that was
-  left out is a divided difference times the product of the distances to the other values: the differences, and how they
-  decay from one order to the next, make the law of the errors between the values (condensed_estimate.c).
+  of the largest. Training reports the largest errors, summed over the parameters. The error at a left-out value is a
+  divided difference times the product of the distances to the other values: these differences, and their decay with the
+  order, give the estimate of the errors between the values (condensed_estimate.c).
 */
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
 
-#define SMALL 1e-2 /* of the largest: what smaller ones are divided by */
-#define LAST  4    /* one of so many patterns of forces, the last, tells how those displace that are none */
-#define CUT   1.3  /* the modes' part on top of the largest in training */
-#define SHARE 0.9  /* of the divided differences along a parameter that the law's are no smaller than */
+#define SMALL 1e-2 /* share of the largest by which smaller sizes are replaced in a division */
+#define LAST  4    /* the last of this many parts of the force patterns stands for forces outside the patterns */
+#define CUT   1.3  /* margin of the modes' part over the largest in training */
+#define SHARE 0.9  /* quantile of the divided differences along a parameter that the estimate uses */
 
 typedef struct {
-  PetscInt p, i;                /* parameter, number of the value that is left out */
+  PetscInt p, i;                /* parameter, index of the left-out value */
   PetscReal largest, largest_u; /* forces, displacements in training */
-  PetscInt last;                /* node of the flexibility that M holds, and whether it is definite */
+  PetscInt last;                /* last: node whose flexibility is in M; and whether it is definite */
   PetscBool definite;
   PetscReal *L, *d;           /* work: forces, coefficients */
-  PetscReal force;            /* the error of a point's forces */
-  PetscReal law[HYCO_N_LAWS]; /* and those that make the law */
+  PetscReal force;            /* error of a point's forces */
+  PetscReal law[HYCO_N_LAWS]; /* and the errors for the estimate */
   PetscInt n_differences;
   PetscReal *difference[HYCO_N_LAWS]; /* along the parameter */
 } Work;
@@ -39,7 +39,7 @@ static PetscReal Relative(PetscReal lost, PetscReal size, PetscReal least)
   return size > 0 ? lost / size : lost > 0 ? 1 : 0;
 }
 
-/* The forces at node k of the whole grid without the nodes with that value; *solved: there are any. */
+/* The forces at node k of the whole grid without the nodes with that value; *solved: the problem was solved. */
 static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal mu[], Work *w, PetscBool *solved)
 {
   const PetscReal *own = c->Lambda + (size_t)k * (size_t)c->m;
@@ -56,8 +56,8 @@ static PetscErrorCode PredictForces(HycoCondensed c, PetscInt k, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The error of the displacement, of all modes, by the fields without that value; and that of H (L - own), of the
-   forces' error alone. */
+/* The error of the displacement, with all modes, by the fields without that value; and that of H (L - own), caused
+   by the forces' error alone. */
 static PetscErrorCode PredictDisplacement(HycoReducer t, HycoCondensed c, PetscInt k, const PetscReal mu[], Work *w)
 {
   const PetscInt s = c->sample[k], r = c->l, m = c->m;
@@ -107,17 +107,17 @@ static PetscErrorCode LeaveOutOne(HycoReducer t, HycoCondensed c, PetscInt k, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the remainder along p vanishes at the nodes: the fields that it is of have the highest degree. */
+/* Whether the remainder along p vanishes at the nodes: the fields have the highest degree. */
 static PetscBool Interpolates(HycoCondensed c, PetscInt p)
 {
   return (PetscBool)(c->field[c->stiff[p] ? HYCO_FIELD_G : HYCO_FIELD_GAP].tensor.degree[p] == c->n[p] - 1);
 }
 
-/* The law along p, from the divided differences that leaving out has found; less than three values tell no decay. */
+/* Fits the estimate along p from the divided differences; with less than three values the decay is not known. */
 static PetscErrorCode FitLaw(HycoCondensed c, PetscInt p, Work *w)
 {
   const HycoGridField *G = &c->field[HYCO_FIELD_G], *gap = &c->field[HYCO_FIELD_GAP];
-  static const PetscReal margin[HYCO_N_LAWS] = {0.7, 1.5, 1.5}; /* by scenes in 2D and 3D */
+  static const PetscReal margin[HYCO_N_LAWS] = {0.7, 1.5, 1.5}; /* chosen from scenes in 2D and 3D */
   PetscReal decay = 1, other = 0;
 
   PetscFunctionBegin;
@@ -136,7 +136,7 @@ static PetscErrorCode FitLaw(HycoCondensed c, PetscInt p, Work *w)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The values of parameter p, one after the other. */
+/* Leaves out the values of parameter p one after the other. */
 static PetscErrorCode LeaveOutParameter(HycoReducer t, HycoCondensed c, PetscInt p, Work *w)
 {
   const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor);
@@ -168,8 +168,8 @@ static PetscErrorCode LeaveOutParameter(HycoReducer t, HycoCondensed c, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the first l modes miss of the training solutions, and the patterns of the forces between them: these displace by
-   no more than the last patterns do, force by force. */
+/* The error of the first l modes on the training solutions and on the force patterns between them: forces outside
+   the patterns displace at most as the last patterns do, for the same force. */
 static PetscReal ModesError(HycoReducer t, HycoCondensed c, Work *w)
 {
   const HycoResponses *x = &Condensing(t)->responses;

@@ -1,26 +1,30 @@
 /*
-  The modes of a condensed model. u(mu) = K^-1 (F - B^T L) is nearly a polynomial in the parameters that reach K and B
-  for forces L that stay, so that the solutions at the nodes of the stiffness span what lies between, if each node has
-  answered the forces of all others too. Solutions of training alone do not: POD of them misses what a force of one node
-  does at the next. So the forces are sampled over what training has seen, where a complementarity problem of their size
-  is all that they cost; POD leaves some patterns; each node answers these; and the modes are a POD of snapshots and
-  answers together.
+  The modes of a condensed model. u(mu) = K^-1 (F - B^T L) is nearly a polynomial in the parameters that change K and B
+  for constant forces L, so that the solutions at the nodes of the stiffness span the solutions in between if each node
+  has responses to the forces of all others. Training solutions alone are not sufficient: their POD lacks the
+  displacements under a force of one node at the next node. Therefore, the forces are sampled over the region of
+  training, where a sample costs only a complementarity problem; POD gives a few patterns of them; the responses to
+  these are computed at each node; and the modes are a POD of snapshots and responses together.
 */
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
 
-#define SAMPLES        480 /* points where the forces are sampled: half all over, half where contacts close or open */
-#define WAYS           16  /* on so many ways between points */
-#define LEAST_SAMPLES  16
-#define FREE_CONTACTS  700 /* beyond so many contacts fewer, by the square: a sample's cost grows with it, at least */
-#define HELD           4   /* one of so many samples is held out of the patterns, and judges them */
-#define SHARE          0.95
-#define ACTIVE         1e-8    /* of the largest training force: contacts of a sample with less are open */
-#define LEAST_STEP     0x1p-11 /* of the training values' box: ways are not halved further */
-#define MOST_RESPONSES 5e7     /* numbers of all responses: 400 MB */
+#define SAMPLES       480 /* number of force samples: half over the whole region, half where contacts close or open */
+#define WAYS          16  /* number of line segments between points */
+#define LEAST_SAMPLES 16
+#define FREE_CONTACTS                                                                                                  \
+  700           /* with more contacts fewer samples, in inverse proportion to the square, because of their             \
+                   cost; at least */
+#define HELD  4 /* one of this many samples is held out of the patterns to judge them */
+#define SHARE 0.95
+#define ACTIVE                                                                                                         \
+  1e-8                         /* share of the largest training force: contacts of a sample with a smaller force are   \
+                                  open */
+#define LEAST_STEP     0x1p-11 /* share of the training values' box: shorter segments are not bisected */
+#define MOST_RESPONSES 5e7     /* numbers in all responses: 400 MB */
 #define SMALL          1e-2
 
-/* What the modes are chosen by: stresses lose the derivative's share of digits, and forces have many. */
+/* Tolerance for the modes: stresses lose digits by the derivative, and forces need more. */
 static PetscReal Tolerance(HycoReducer t)
 {
   return PetscMin(Condensing(t)->pod_tol, t->tol[HYCO_SEED_DISPLACEMENT]);
@@ -31,8 +35,8 @@ static PetscInt Corners(HycoCondensed c)
   return 1 << PetscMin(c->dim, 5);
 }
 
-/* Sample number `number` of what training has seen, half a step beyond its values, within the ranges: the corners, then
-   points all over. */
+/* Sample number `number` of the region of training, half a step beyond its values, within the ranges: first the
+   corners, then points over the whole region. */
 static void SamplePoint(HycoReducer t, PetscInt number, PetscReal mu[])
 {
   const HycoCondensed c = Condensing(t)->condensed;
@@ -48,13 +52,13 @@ static void SamplePoint(HycoReducer t, PetscInt number, PetscReal mu[])
   }
 }
 
-/* Whether a sample stays out of the patterns, to judge them. */
+/* Whether a sample is held out of the patterns to judge them. */
 static PetscBool Held(HycoCondensed c, PetscInt number)
 {
   return (PetscBool)(number >= Corners(c) && number % HELD == 0);
 }
 
-/* The forces at mu by the interpolated problem; zero where it is not solved. */
+/* The forces at mu from the interpolated problem; zero if it is not solved. */
 static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscReal L[])
 {
   const PetscReal *nearest = c->Lambda + (size_t)HycoCondensedNearest(c, mu, NULL) * (size_t)c->m;
@@ -69,9 +73,8 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts that are active at one of two samples alone. What counts as active has one measure for all samples:
-   where gaps and loads vanish together, the forces are round-off, which differs from one number of ranks to the next.
- */
+/* The number of contacts that are active in exactly one of two samples. All samples have the same threshold: where
+   gaps and loads vanish together, the forces are round-off, which depends on the number of ranks. */
 static PetscInt Differ(PetscInt m, const PetscReal a[], const PetscReal b[], PetscReal least)
 {
   PetscInt n = 0;
@@ -80,7 +83,7 @@ static PetscInt Differ(PetscInt m, const PetscReal a[], const PetscReal b[], Pet
   return n;
 }
 
-/* The distance of two samples, each parameter scaled to its training values. */
+/* The distance of two samples, with each parameter scaled to its training values. */
 static PetscReal Apart(HycoCondensed c, const PetscReal a[], const PetscReal b[])
 {
   PetscReal most = 0;
@@ -91,14 +94,16 @@ static PetscReal Apart(HycoCondensed c, const PetscReal a[], const PetscReal b[]
   return most;
 }
 
-/* A part of a way between two samples, and by how many active contacts these differ; 0: it is short enough. */
+/* A part of a segment between two samples, and the number of active contacts in which these differ; 0: not bisected
+   further. */
 typedef struct {
   PetscInt from, to, differ;
 } Way;
 
-/* The point of sample k: halfway between the two neighbours on a way whose active contacts differ most, and which are
-   then neighbours no more; where none differ, the next point all over. Forces are affine in the parameters of affine
-   kind as long as a set stays, so that sets are what the patterns need, and many may pass in a small part of a way. */
+/* The point of sample k: halfway between the two neighbours on a segment whose active contacts differ most; the
+   segment is then divided. If none differ, the next point of the whole region. For a constant active set, forces are
+   affine in the affine parameters, so that the patterns depend on the active sets, of which there may be many in a
+   small part of a segment. */
 static void PointBetween(HycoReducer t, PetscInt k, Way way[], PetscInt *n_ways, PetscReal mu[])
 {
   const PetscInt dim = Condensing(t)->condensed->dim;
@@ -110,7 +115,7 @@ static void PointBetween(HycoReducer t, PetscInt k, Way way[], PetscInt *n_ways,
     return;
   }
   for (PetscInt p = 0; p < dim; p++) mu[k * dim + p] = (mu[way[best].from * dim + p] + mu[way[best].to * dim + p]) / 2;
-  way[(*n_ways)++] = (Way){k, way[best].to, 0}; /* both are counted when the forces are there */
+  way[(*n_ways)++] = (Way){k, way[best].to, 0}; /* both are counted once the forces are known */
   way[best].to = k;
   way[best].differ = 0;
 }
@@ -156,7 +161,7 @@ static PetscErrorCode SampleAll(HycoReducer t, PetscInt n, PetscReal mu[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of a force outside the patterns' span. */
+/* Norm of the part of a force outside the patterns' span. */
 static PetscReal Missed(const HycoResponses *x, PetscInt m, PetscReal L[])
 {
   PetscReal rest = 0;
@@ -171,7 +176,7 @@ static PetscReal Missed(const HycoResponses *x, PetscInt m, PetscReal L[])
   return PetscSqrtReal(rest);
 }
 
-/* Patterns of n forces (m x n), scaled so that all the samples count as the snapshots do. Rank 0. */
+/* Patterns of n forces (m x n), scaled so that all the samples have the weight of the snapshots. Rank 0. */
 static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
 {
   HycoResponses *x = &Condensing(t)->responses;
@@ -200,8 +205,8 @@ static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the held samples miss of the patterns, over the displacement of the nearest snapshot or a hundredth of the
-   largest: no less than SHARE of them do. */
+/* The error of the patterns on the held-out samples, over the displacement of the nearest snapshot or a hundredth of
+   the largest: the SHARE quantile. */
 static PetscErrorCode JudgePatterns(HycoReducer t, PetscInt n, const PetscReal mu[], PetscReal L[])
 {
   HycoCondensed c = Condensing(t)->condensed;
@@ -247,7 +252,7 @@ static PetscErrorCode FindPatterns(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The patterns on every rank. */
+/* Sends the patterns to every rank. */
 static PetscErrorCode SpreadPatterns(HycoReducer t)
 {
   HycoResponses *x = &Condensing(t)->responses;
@@ -265,7 +270,7 @@ static PetscErrorCode SpreadPatterns(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Snapshots and responses, side by side. */
+/* Snapshots and responses as columns of one matrix. */
 static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
 {
   HycoResponses *x = &Condensing(t)->responses;
@@ -302,7 +307,7 @@ static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* l, sigma, V and VtU from all r modes V. */
+/* Sets l, sigma, V and VtU from all r modes V. */
 static PetscErrorCode TakeModes(HycoReducer t, Mat V, PetscInt n_sigma, PetscReal sigma[])
 {
   HycoResponses *x = &Condensing(t)->responses;

@@ -1,7 +1,7 @@
 /*
-  What a condensed training solves at the nodes of its stiffness: G = B K^-1 B^T, and later X = K^-1 B^T P for patterns
-  P of forces. Each is a file beside the snapshots, named by the node's parameters (and the patterns), so that a run
-  that was killed solves what is missing.
+  Solves at the nodes of the stiffness for a condensed training: G = B K^-1 B^T, and later X = K^-1 B^T P for patterns P
+  of forces. Each is a file beside the snapshots, named by the node's parameters (and the patterns), so that after an
+  interrupted run only the missing ones are solved.
 */
 #include <hycocondensed.h>
 #include <hycofields.h>
@@ -9,13 +9,14 @@
 #include <string.h>
 #include <unistd.h>
 
-/* What is solved: G (q = 0), or the responses to q patterns (m x q, on every rank). */
+/* The quantity solved for: G (q = 0), or the responses to q patterns (m x q, on every rank). */
 typedef struct {
   PetscInt q;
   const PetscReal *P;
 } Task;
 
-/* The parameters of node k of G's grid (the first training value where G does not depend on one), and of the file. */
+/* The parameters of node k of G's grid (the first training value where G does not depend on a parameter), and those
+   of the file. */
 static void StiffPoint(HycoCondensed c, PetscInt k, PetscReal mu[], PetscReal key[])
 {
   const HycoTensor *t = &c->field[HYCO_FIELD_G].tensor;
@@ -43,7 +44,7 @@ static PetscErrorCode Path(HycoReducer t, HycoSnapshots store, PetscInt k, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* G, which rank 0 has, or X at the unknowns of each rank's part. Collective. */
+/* Writes G, which rank 0 has, or X at the unknowns of each rank's part. Collective. */
 static PetscErrorCode WriteData(HycoSnapshots store, HycoFOM fom, HycoH5 h, PetscInt q, PetscInt n_G,
                                 const PetscReal data[])
 {
@@ -75,7 +76,7 @@ static PetscErrorCode WriteOne(HycoSnapshots store, HycoFOM fom, const char path
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n rows from `start`; data NULL: only that it is of this scene. */
+/* Reads n rows from `start`; data NULL: only checks that the file belongs to this scene. */
 static PetscErrorCode ReadOpen(HycoSnapshots store, HycoH5 h, const char path[], const char name[], PetscInt start,
                                PetscInt n, PetscInt cols, PetscReal data[])
 {
@@ -126,7 +127,7 @@ static PetscErrorCode FindMissing(HycoReducer t, HycoSnapshots store, const Task
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One node of G's grid, solved and written. data: room for it. */
+/* Solves and writes one node of G's grid. data: room for it. */
 static PetscErrorCode SolveOne(HycoReducer t, HycoSnapshots store, HycoFOM fom, PetscInt node, const Task *task,
                                PetscReal data[])
 {
@@ -183,7 +184,7 @@ static PetscErrorCode SolveGroup(HycoReducer t, HycoSnapshots store, HycoQueue q
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All nodes of G's grid have a file. Collective. */
+/* Solves all nodes of G's grid without a file. Collective. */
 static PetscErrorCode SolveMissing(HycoReducer t, HycoSnapshots store, const Task *task)
 {
   const PetscInt n = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
@@ -205,7 +206,7 @@ static PetscErrorCode SolveMissing(HycoReducer t, HycoSnapshots store, const Tas
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* G at all nodes, from the files. Rank 0. */
+/* Reads G at all nodes from the files. Rank 0. */
 static PetscErrorCode ReadFlexibilities(HycoReducer t, HycoSnapshots store, const Task *task)
 {
   HycoGridField *G = &Condensing(t)->condensed->field[HYCO_FIELD_G];
@@ -232,7 +233,7 @@ PetscErrorCode HycoCondensedFlexibilities(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The columns of S from `first` on, this rank's rows: those of each node's file. */
+/* Reads the columns of S from `first` on, this rank's rows of each node's file. */
 static PetscErrorCode ReadResponses(HycoReducer t, HycoSnapshots store, const Task *task, Mat S, PetscInt first)
 {
   const PetscInt n = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor), q = task->q;

@@ -1,29 +1,29 @@
 /*
   Training of the condensed model of paths (hycocondensedpath.h). A replay of the training paths gives, at each listed
-  time, the inelastic forces of all cells, what heat, supports and body forces give to each, and the loads of all nodes.
-  POD leaves modes of each; one factor of K the answers to those of inelastic forces and loads, and to each contact; an
-  orthonormal basis of all answers is V. Q-DEIM on the modes of the cells' forces chooses the cells.
+  time, the inelastic forces of all cells, the forces of heat, supports and body forces on each, and the loads of all
+  nodes. POD gives modes of each; one factor of K gives the responses to those of inelastic forces and loads, and to
+  each contact; an orthonormal basis of all responses is V. Q-DEIM on the modes of the cells' forces chooses the cells.
 */
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
 
 enum { INELASTIC, INSIDE, LOADS, N_SAMPLED }; /* by cell; by cell; by node */
 
-/* A replay's record. */
+/* Data of a replay. */
 typedef struct {
   HycoReducer t;
   HycoTrainingReplay replay;
   HycoFE fe;         /* this rank's part */
-  PetscInt *flowing; /* by cell: its place among those that flow, or -1 */
-  PetscReal *Ke;     /* of these, nv dim square */
+  PetscInt *flowing; /* by cell: its index among the inelastic ones, or -1 */
+  PetscReal *Ke;     /* of these cells, nv dim square */
   PetscReal *value[N_SAMPLED];
-  Mat S[N_SAMPLED]; /* of a path, a column for each listed time; rows by the file's order */
-  Mat U;            /* displacements less their lifting */
+  Mat S[N_SAMPLED]; /* for a path, a column for each listed time; rows in the file's order */
+  Mat U;            /* displacements minus their lifting */
 } Sampler;
 
-/* -- what it is not for -- */
+/* -- unsupported scenes -- */
 
-/* A load or support that is neither a sum over cells nor one over facets. */
+/* Refuses a load or support that is neither a sum over cells nor one over facets. */
 static PetscErrorCode CheckLoads(HycoScene s)
 {
   PetscBool oblique = PETSC_FALSE;
@@ -98,7 +98,7 @@ static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The forces of all cells of the part where the replay is, and the loads of its nodes. */
+/* Computes the forces of all cells of the part at the replay's time, and the loads of its nodes. */
 static PetscErrorCode Measure(Sampler *s)
 {
   HycoFE fe = s->fe;
@@ -125,7 +125,7 @@ static PetscErrorCode Measure(Sampler *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The column of a listed time. Collective. */
+/* Stores the column of a listed time. Collective. */
 static PetscErrorCode Record(void *ctx, PetscInt k)
 {
   Sampler *s = (Sampler *)ctx;
@@ -147,7 +147,7 @@ static PetscErrorCode Record(void *ctx, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The elastic stiffness of the cells that flow. */
+/* Computes the elastic stiffness of the inelastic cells. */
 static PetscErrorCode FindFlowing(Sampler *s)
 {
   const PetscInt n_cells = s->fe->mesh->n_cells, n = s->fe->mesh->nv * s->fe->dim;
@@ -206,7 +206,7 @@ static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes of all that is sampled, path by path. Collective. */
+/* Computes the modes of all sampled quantities, path by path. Collective. */
 static PetscErrorCode Sample(HycoReducer t, HycoSnapshots store, HycoBasis basis[N_SAMPLED])
 {
   const PetscReal tol[N_SAMPLED] = {Condensing(t)->path.tol, 0, 0};
@@ -231,9 +231,9 @@ static PetscErrorCode Sample(HycoReducer t, HycoSnapshots store, HycoBasis basis
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- answers -- */
+/* -- responses -- */
 
-/* Values of the part's unknowns as column j of A, rows by the distributed vectors' order. */
+/* Sets column j of A from values at the part's unknowns, rows in the distributed vectors' order. */
 static PetscErrorCode PutColumn(HycoReducer t, const PetscReal value[], Mat A, PetscInt j)
 {
   HycoMesh part = t->fom->part;
@@ -253,7 +253,7 @@ static PetscErrorCode PutColumn(HycoReducer t, const PetscReal value[], Mat A, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A mode of cells' forces, at the part's cells, summed at its nodes; a mode of nodes as it is. */
+/* Sums a mode of cells' forces, at the part's cells, at its nodes; a mode of nodes is unchanged. */
 static PetscErrorCode PutModes(HycoReducer t, const HycoBasis *modes, HycoPlace place, Mat A, PetscInt first)
 {
   HycoMesh part = t->fom->part;
@@ -263,7 +263,7 @@ static PetscErrorCode PutModes(HycoReducer t, const HycoBasis *modes, HycoPlace 
   PetscInt lda;
 
   PetscFunctionBegin;
-  if (!modes->l) PetscFunctionReturn(PETSC_SUCCESS); /* and perhaps no V */
+  if (!modes->l) PetscFunctionReturn(PETSC_SUCCESS); /* V may be NULL */
   PetscCall(PetscMalloc2(PetscMax(part->n_cells * part->nv, part->n_nodes) * dim, &value, part->n_nodes * dim, &node));
   PetscCall(MatDenseGetLDA(modes->V, &lda));
   for (PetscInt j = 0; j < modes->l; j++) {
@@ -279,7 +279,7 @@ static PetscErrorCode PutModes(HycoReducer t, const HycoBasis *modes, HycoPlace 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B^T, a column for each contact. Rank 0. */
+/* Sets B^T, a column for each contact. Rank 0. */
 static PetscErrorCode PutContacts(HycoReducer t, Mat A, PetscInt first)
 {
   HycoMesh surface = t->fom->surface;
@@ -308,7 +308,7 @@ static PetscErrorCode CreateColumns(HycoReducer t, PetscInt n, Mat *A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* l, sigma, V and VtU anew: a basis of the answers by K. Collective. */
+/* Replaces l, sigma, V and VtU: a basis of the responses. Collective. */
 static PetscErrorCode TakeAnswers(HycoReducer t, HycoSnapshots store, Mat K, const HycoBasis modes[N_SAMPLED])
 {
   const PetscInt n[3] = {modes[INELASTIC].l, modes[LOADS].l, t->sizes[2]}, all = n[0] + n[1] + n[2];
@@ -340,7 +340,7 @@ static PetscErrorCode TakeAnswers(HycoReducer t, HycoSnapshots store, Mat K, con
 
 /* -- tables -- */
 
-/* 0 in the rows of some cells, n each. */
+/* Sets the rows of some cells to 0, n each. */
 static PetscErrorCode ZeroCells(Mat V, PetscInt n, PetscInt n_cells, const PetscInt cell[])
 {
   PetscInt lo, hi, l, lda;
@@ -360,8 +360,8 @@ static PetscErrorCode ZeroCells(Mat V, PetscInt n, PetscInt n_cells, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells of a basis' Q-DEIM points, then of those of its rows in the other cells, and so on: `rounds` times a cell
-   for each mode, as far as the rank goes. cell[]: room for them. Collective. */
+/* The cells of a basis' Q-DEIM points, then of those of its rows in the remaining cells, and so on: `rounds` times a
+   cell for each mode, up to the rank. cell[]: room for them. Collective. */
 static PetscErrorCode ChooseFor(const HycoBasis *modes, PetscInt n, PetscInt rounds, PetscInt *count, PetscInt cell[])
 {
   PetscInt found = 1;
@@ -383,7 +383,7 @@ static PetscErrorCode ChooseFor(const HycoBasis *modes, PetscInt n, PetscInt rou
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model's cells, ascending: all, or those of the modes. Collective. */
+/* Chooses the model's cells, ascending: all, or those of the modes. Collective. */
 static PetscErrorCode ChooseCells(HycoReducer t, const HycoBasis modes[N_SAMPLED])
 {
   const PetscInt n = t->fom->part->nv * t->sizes[3], each = Condensing(t)->path.cells;
@@ -396,7 +396,7 @@ static PetscErrorCode ChooseCells(HycoReducer t, const HycoBasis modes[N_SAMPLED
   count += more;
   PetscCall(ChooseFor(&modes[INSIDE], n, PetscMin(each, 1), &more, cell + count));
   count += more;
-  if (!count) cell[count++] = 0; /* nothing flows or has loads inside: a mesh wants a cell */
+  if (!count) cell[count++] = 0; /* no inelastic cell and no load inside: a mesh needs a cell */
   PetscCall(PetscSortRemoveDupsInt(&count, cell));
   PetscCall(PetscFree(t->seeds_cell));
   t->seeds_cell = cell;
@@ -404,7 +404,7 @@ static PetscErrorCode ChooseCells(HycoReducer t, const HycoBasis modes[N_SAMPLED
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every cell's forces as they are: the rows of V at its nodes. Collective. */
+/* The table without modes: the rows of V at the nodes of each cell. Collective. */
 static PetscErrorCode TabulateAll(HycoReducer t, PetscReal **table)
 {
   HycoMesh part = t->fom->part;
@@ -433,7 +433,7 @@ static PetscErrorCode TabulateAll(HycoReducer t, PetscReal **table)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* V^T of the sums at the nodes of modes of cells' forces, times the pseudo-inverse of the modes in the chosen cells: l
+/* V^T of the nodal sums of the modes of cells' forces, times the pseudo-inverse of the modes in the chosen cells: l
    x columns. `smallest`: the modes' smallest singular value there. Collective. */
 static PetscErrorCode Tabulate(HycoReducer t, const HycoBasis *modes, Mat V, PetscReal **table, PetscReal *smallest)
 {
@@ -472,7 +472,7 @@ static PetscErrorCode Tabulate(HycoReducer t, const HycoBasis *modes, Mat V, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* V^T K V and the cells' tables. Collective. */
+/* Computes V^T K V and the cells' tables. Collective. */
 static PetscErrorCode FillTable(HycoReducer t, Mat K, const HycoBasis modes[N_SAMPLED])
 {
   HycoCondensedTable *c = &Condensing(t)->path.table;
@@ -502,7 +502,7 @@ static PetscErrorCode FillTable(HycoReducer t, Mat K, const HycoBasis modes[N_SA
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of it, by one factor. Collective. */
+/* The whole training, with one factor. Collective. */
 static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, const HycoBasis modes[N_SAMPLED])
 {
   HycoFOM f = t->fom;

@@ -1,9 +1,9 @@
 /*
   The condensed model, online: the exact dual problem of linear elasticity, small and dense in the forces, with its
-  matrix and vector interpolated over the parameters (hycocondensed.h). Interpolated entry by entry, G may lose its
-  definiteness between nodes: bounds of the nodes' matrices by one of them, found in training, show that it does not, or
-  else a Cholesky factorisation looks; a point where it does is refused. A definite G gives one solution, so the start
-  of the active set, the forces of the nearest training point, decides nothing but the time.
+  matrix and vector interpolated over the parameters (hycocondensed.h). Interpolated entry by entry, G may be indefinite
+  between nodes: bounds of the nodes' matrices by one of them, computed in training, may prove that it is not; otherwise
+  a Cholesky factorisation checks it, and an indefinite point is refused. With a definite G the solution is unique, so
+  that the start of the active set, the forces of the nearest training point, affects only the time.
 */
 #include <hycocondensed.h>
 #include <hycoromtypes.h>
@@ -12,7 +12,7 @@
 
 const char *const HycoGridFieldNames[] = {"G", "g", "H", "a"};
 
-/* An eigenvalue of G that is less negative than this share of its largest diagonal entry is round-off. */
+/* An eigenvalue of G less negative than this share of its largest diagonal entry is round-off. */
 #define SEMIDEFINITE  1e-12
 #define MANY_CONTACTS 600
 
@@ -100,7 +100,7 @@ PetscInt HycoCondensedNode(HycoCondensed c, const HycoGridField *f, PetscInt k)
 
 #define TILE 64
 
-/* Both triangles of M from the columns of the lower one, by tiles, so that the transposed entries stay near. */
+/* Expands the columns of the lower triangle to both triangles of M, by tiles for cache locality. */
 static void Unpack(PetscInt m, const PetscReal packed[], PetscReal M[])
 {
   for (PetscInt jb = 0; jb < m; jb += TILE) {
@@ -134,7 +134,8 @@ static PetscErrorCode HasFactor(HycoCondensed c, const PetscReal packed[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The narrowest of some intervals about the ratio of the traces with lower R <= G_k <= upper R, R the middle node's. */
+/* The narrowest of some intervals about the ratio of the traces with lower R <= G_k <= upper R, R the middle node's
+   matrix. */
 static PetscErrorCode BoundNode(HycoCondensed c, const PetscReal R[], const PetscReal G[], PetscReal bound[2])
 {
   static const PetscReal widths[] = {0.01, 0.05, 0.2, 0.5};
@@ -143,7 +144,7 @@ static PetscErrorCode BoundNode(HycoCondensed c, const PetscReal R[], const Pets
   PetscBool definite = PETSC_FALSE;
 
   PetscFunctionBegin;
-  bound[0] = bound[1] = 0; /* none */
+  bound[0] = bound[1] = 0; /* not found */
   PetscCall(PetscMalloc1(rows, &difference));
   for (PetscInt j = 0, at = 0; j < c->m; at += c->m - j++) {
     trace[0] += R[at];
@@ -187,7 +188,7 @@ PetscErrorCode HycoCondensedBound(HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether sum of w_k G_k >= (sum of w_k times its lower or, where w_k < 0, upper bound) R is definite by that alone. */
+/* Whether sum of w_k G_k >= (sum of w_k times its lower or, where w_k < 0, upper bound) R proves definiteness. */
 static PetscErrorCode KnownDefinite(HycoCondensed c, const PetscReal mu[], PetscInt axis, PetscInt skip,
                                     PetscBool *known)
 {
@@ -220,7 +221,7 @@ PetscErrorCode HycoCondensedFlexibility(HycoCondensed c, const PetscReal mu[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* G and H, unless their parameters are as they were. */
+/* Updates G and H, unless their parameters are unchanged. */
 static PetscErrorCode BringStiffness(HycoROM m, const PetscReal mu[])
 {
   HycoCondensed c = (HycoCondensed)m->data;
@@ -264,8 +265,8 @@ PetscInt HycoCondensedNearest(HycoCondensed c, const PetscReal mu[], PetscReal *
   return node;
 }
 
-/* The active contacts of the nearest training point, or of the last prediction where that is nearer. The solution does
-   not depend on it: it is that of the last set's equations. */
+/* The active contacts of the nearest training point, or of the last prediction if that is nearer. The solution does
+   not depend on it, because the equations of the final set determine it. */
 static void StartSet(HycoCondensed c, const PetscReal mu[])
 {
   PetscReal there, back = 0;
@@ -276,7 +277,7 @@ static void StartSet(HycoCondensed c, const PetscReal mu[])
     c->active[i] = (PetscBool)(c->Lambda[(size_t)node * (size_t)c->m + (size_t)i] > 0);
 }
 
-/* The forces are in model->Lambda. */
+/* The result is in model->Lambda. */
 static PetscErrorCode SolveForces(HycoROM m, const PetscReal mu[])
 {
   HycoCondensed c = (HycoCondensed)m->data;
@@ -330,14 +331,14 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   PetscCall(PetscArraycpy(c->last, mu, c->dim));
   p->seconds.solve = HycoNow() - solve;
   PetscCall(Displacements(m, mu));
-  p->interpolation_error = c->errors[2]; /* of an older file: HycoTrustEstimate() has newer ones' */
+  p->interpolation_error = c->errors[2]; /* in older files; HycoTrustEstimate() sets that of newer ones */
   for (PetscInt q = 0; q < c->dim; q++) {
     if (!c->affine[q]) p->interpolation_error *= HycoPolynomialGrowth(c->n[q], c->x[q], mu[q]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The system of M and g, for this solver; forces: where they are to be (m, borrowed), or NULL. */
+/* Creates the system of M and g for this solver; forces: array for the result (m, borrowed), or NULL. */
 static PetscErrorCode CreateSystem(HycoCondensed c, PetscReal forces[], HycoSolver solver)
 {
   Vec g;
@@ -372,7 +373,7 @@ PetscErrorCode HycoCondensedSolveForces(HycoCondensed c, PetscReal forces[], Pet
   HycoReason reason;
 
   PetscFunctionBegin;
-  if (!c->solver) { /* samples are many, and one that is not solved is left out: no other method is tried */
+  if (!c->solver) { /* there are many samples, and one that is not solved is left out: no other method is tried */
     PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &c->solver));
     PetscCall(HycoSolverSetType(c->solver, HYCO_SOLVER_ACTIVE_SET));
     PetscCall(HycoSolverSetFallback(c->solver, PETSC_FALSE));
@@ -445,7 +446,7 @@ static PetscErrorCode Destroy(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points of training are chosen where none are given: they are reported. */
+/* Reports the training points if they were chosen by this type. */
 static void ReportPoints(HycoReducer t, HycoCondensed c, HycoTraining *r)
 {
   const char *name = c->hopeless < 0 ? "" : t->scene->parameter[c->hopeless];
@@ -492,8 +493,8 @@ static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
   return m * m * ((PetscReal)a->n_flexibilities + m / 6.0) + 2 * (PetscReal)a->n_modes * (PetscReal)a->rid_contacts;
 }
 
-/* Its samples fill a disk where the contacts are many, and its POD has all columns in memory: then only when it is
-   asked for. */
+/* With many contacts its samples need much disk space, and its POD holds all columns in memory: then it must be
+   requested. */
 static PetscBool Offers(HycoReducer t, PetscBool targets)
 {
   (void)targets;

@@ -1,9 +1,9 @@
 /*
   The estimated errors of a condensed model. Along a parameter with n training values x_k the interpolation's remainder
-  is f[x_1 .. x_n, mu] times the product of mu - x_k: training finds the divided difference of the errors by leaving
-  values out, one order lower, and its decay (condense_errors.c); the product is known at any point. Summed over the
-  parameters that is the law, of the forces as of the displacement, to which comes what the modes cut off. Held-out
-  solutions, where there are any, give the scale by which the law is multiplied; without, it stands alone.
+  is f[x_1 .. x_n, mu] times the product of mu - x_k: training finds the divided differences of the errors by leaving
+  values out, one order lower, and their decay (condense_errors.c); the product is known at any point. The sum over the
+  parameters is the estimate, for the forces and for the displacement, plus the truncation error of the modes. Held-out
+  solutions, if there are any, calibrate it by a factor.
 */
 #include <hycocondensed.h>
 
@@ -23,7 +23,7 @@ static void Law(HycoCondensed c, const PetscReal mu[], PetscReal law[])
   if (law[HYCO_LAW_U] >= 0) law[HYCO_LAW_U] += c->cut;
 }
 
-/* What tells of the errors: the laws of the forces and of the displacement. */
+/* Features of the error: the estimates for the forces and for the displacement. */
 PetscErrorCode HycoCondensedFeatures(HycoROM m, PetscReal misfit[2])
 {
   PetscReal law[HYCO_N_LAWS];

@@ -2,7 +2,7 @@
 #include <hycocondensed.h>
 #include <stdio.h>
 
-#define SETTLED "condensed/settled" /* -B K^-1 F, which older files have in "condensed/g" with D */
+#define SETTLED "condensed/settled" /* -B K^-1 F; in older files "condensed/g" includes D */
 
 static void Dataset(HycoCondensed c, PetscInt f, char path[64])
 {
@@ -12,7 +12,7 @@ static void Dataset(HycoCondensed c, PetscInt f, char path[64])
     (void)snprintf(path, 64, "condensed/%s", HycoGridFieldNames[f]);
 }
 
-/* How gaps and loads come from the scene. */
+/* How gaps and loads are evaluated from the scene. */
 static PetscErrorCode MoveGiven(HycoH5 h, HycoCondensed c)
 {
   PetscFunctionBegin;
@@ -39,7 +39,7 @@ static PetscErrorCode MoveValues(HycoH5 h, HycoROM m, PetscInt p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The law of the estimated errors, which older files do not have. */
+/* The data of the estimated errors, which older files do not have. */
 static PetscErrorCode MoveLaw(HycoH5 h, HycoCondensed c)
 {
   PetscFunctionBegin;
@@ -73,7 +73,7 @@ PetscErrorCode HycoCondensedMove(HycoROM m, HycoH5 h)
   PetscInt n;
 
   PetscFunctionBegin;
-  if (m->scene->n_times) { /* it is read: a model of a path has its own */
+  if (m->scene->n_times) { /* already read: a model of paths has its own */
     PetscCall(HycoCondensedTakePath(m));
     PetscCall((*m->ops->load)(m, h));
     PetscFunctionReturn(PETSC_SUCCESS);

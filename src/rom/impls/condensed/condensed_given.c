@@ -1,23 +1,24 @@
 /*
-  What a condensed model takes from the scene as it is, at any parameter value: the gaps D, evaluated on the contact
-  surfaces; and the loads, by what they are of the training loads. F is linear in the values theta that the scene's
-  expressions of loads, body forces and prescribed displacements give. With the values T (n_theta x n_load) of the
-  training loads at one value of the parameters that reach K or B, T c = theta(mu) gives F = sum of c_k F_k, and with
-  the same c, of least norm, the solutions K^-1 F. What is left to interpolate is K^-1 alone. Where an expression's
-  shape in space changes with the parameters F is no such sum: training finds out, and interpolates.
+  Quantities that a condensed model evaluates from the scene at any parameter value: the gaps D, on the contact
+  surfaces; and the loads, as combinations of the training loads. F is linear in the values theta of the scene's
+  expressions for loads, body forces and prescribed displacements. With the values T (n_theta x n_load) of the training
+  loads at one value of the parameters that change K or B, T c = theta(mu) gives F = sum of c_k F_k, and with the same
+  c, of least norm, the solutions K^-1 F. Only K^-1 is interpolated. Where the shape in space of an expression changes
+  with the parameters, F is no such sum: training detects this, and interpolates.
 */
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
 
-#define PROBES   6     /* nodes where an expression in space is evaluated */
-#define SINGULAR 1e-9  /* singular values below this share of the first are none */
-#define EXACT    1e-11 /* of the largest value of a load's expression */
-#define ROUNDING 1e-14 /* of the largest gap: smaller ones are closed */
+#define PROBES   6     /* nodes at which an expression in space is evaluated */
+#define SINGULAR 1e-9  /* singular values below this share of the first count as 0 */
+#define EXACT    1e-11 /* tolerance, as a share of the largest value of a load's expression */
+#define ROUNDING 1e-14 /* share of the largest gap: smaller gaps are closed */
 
 typedef PetscErrorCode (*Visit)(HycoCondensed c, HycoExpr expr, HycoMesh mesh, PetscInt group, PetscInt body,
                                 void *ctx);
 
-/* Each expression that F is linear in. With a mesh the group of the nodes where it acts, or else the body, is found. */
+/* Visits each expression in which F is linear. With a mesh, finds the group of nodes on which it acts, or else the
+   body. */
 static PetscErrorCode ForEach(HycoCondensed c, HycoMesh mesh, Visit visit, void *ctx)
 {
   const HycoScene s = c->scene;
@@ -52,15 +53,16 @@ static PetscErrorCode ForEach(HycoCondensed c, HycoMesh mesh, Visit visit, void 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the expressions allow it, and how many values they have; the points where those in space are evaluated. */
+/* Whether the expressions allow it, and the number of their values; the points at which those in space are
+   evaluated. */
 typedef struct {
   HycoFOM fom;
   PetscBool fit;
   PetscInt n_theta, n_probes;
 } Survey;
 
-/* Points of the nodes of a group (or, where that is < 0, of a body), spread over them in the file's order, the first
-   and the last among them. Collective. */
+/* Nodes of a group (or, where that is < 0, of a body), evenly chosen in the file's order, with the first and the
+   last. Collective. */
 static PetscErrorCode ProbeNodes(HycoFOM f, PetscInt group, PetscInt body, PetscReal probe[3 * PROBES])
 {
   HycoMesh m = f->part;
@@ -100,7 +102,9 @@ static PetscErrorCode Inspect(HycoCondensed c, HycoExpr expr, HycoMesh mesh, Pet
     s->n_theta++;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (HycoExprChanges(expr, stiff)) s->fit = PETSC_FALSE; /* its shape may follow a map, and need not be finite here */
+  if (HycoExprChanges(expr, stiff))
+    s->fit = PETSC_FALSE; /* its shape may depend on a map, and may not be finite
+                             here */
   PetscCall(PetscRealloc(sizeof(PetscReal) * 3 * (size_t)(s->n_probes + PROBES), &c->probe));
   PetscCall(ProbeNodes(s->fom, body < 0 ? group : -1, body, c->probe + 3 * s->n_probes));
   s->n_probes += PROBES;
@@ -108,11 +112,11 @@ static PetscErrorCode Inspect(HycoCondensed c, HycoExpr expr, HycoMesh mesh, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The values at mu, one after the other. */
+/* The values at mu in order. */
 typedef struct {
   const PetscReal *mu;
   PetscInt n_theta, n_probes;
-  PetscReal *theta; /* NULL: they are counted */
+  PetscReal *theta; /* NULL: only counted */
 } Values;
 
 static PetscErrorCode Evaluate(HycoCondensed c, HycoExpr expr, HycoMesh mesh, PetscInt group, PetscInt body, void *ctx)
@@ -150,7 +154,7 @@ void HycoCondensedPoint(HycoCondensed c, PetscInt k, PetscReal mu[])
   }
 }
 
-/* Each node's node of the stiffness, and its number among those that share it. */
+/* Each node's node of the stiffness, and its number among those with the same one. */
 static PetscErrorCode NumberLoads(HycoCondensed c)
 {
   const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor),
@@ -172,7 +176,7 @@ static PetscErrorCode NumberLoads(HycoCondensed c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The loads at the nodes: each stiffness's T, scaled by rows, and its pseudo-inverse. */
+/* Computes T of each stiffness, scaled by rows, and its pseudo-inverse. */
 static PetscErrorCode InvertLoads(HycoCondensed c)
 {
   const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor), n_stiff = n / c->n_load;
@@ -210,7 +214,7 @@ PetscErrorCode HycoCondensedSurveyLoads(HycoCondensed c, HycoFOM fom, PetscBool 
   PetscFunctionBegin;
   PetscCall(PetscFree(c->probe));
   for (PetscInt b = 0; b < c->scene->n_bodies; b++) {
-    /* products of expressions, of which F is no sum */
+    /* products of expressions, so that F is not a sum */
     if (HycoSceneHasInertia(c->scene, &c->scene->body[b], NULL)) s.fit = PETSC_FALSE;
   }
   PetscCall(ForEach(c, fom->part, Inspect, &s));
@@ -260,7 +264,7 @@ PetscErrorCode HycoCondensedLoadWeights(HycoCondensed c, const PetscReal mu[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The weights of all nodes of the whole grid: those of G's nodes, times what the load is of each of theirs. */
+/* The weights of all nodes of the whole grid: those of G's nodes, times the weights of the loads of each. */
 static PetscErrorCode Weights(HycoCondensed c, const PetscReal mu[], PetscInt axis, PetscInt skip,
                               const HycoTensor *degrees, PetscReal weight[])
 {
@@ -327,7 +331,7 @@ PetscErrorCode HycoCondensedFreeGap(HycoCondensed c, const PetscReal mu[], Petsc
       c->g[i] += c->given.rows.gap[i];
     }
   }
-  for (PetscInt i = 0; i < c->m; i++) { /* a closed gap without load is 0, not round-off that presses or not */
+  for (PetscInt i = 0; i < c->m; i++) { /* a closed gap without load is set to 0, so that round-off causes no force */
     if (PetscAbsReal(c->g[i]) <= ROUNDING * size) c->g[i] = 0;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,12 +1,12 @@
-/* The condensed model of paths, online: a Galerkin model of the whole mesh by tables, its laws in few cells
-   (hycocondensedpath.h). */
+/* The condensed model of paths, online: a Galerkin model of the whole mesh with tabulated operators and laws in few
+   cells (hycocondensedpath.h). */
 #include <hycocondensed.h>
 #include <hycocondensedpath.h>
 #include <hycokinematics.h>
 #include <petscblaslapack.h>
 #include <petscviewer.h>
 
-#define ROUNDING 256 /* units of it, in sums of a cell's forces */
+#define ROUNDING 256 /* units of round-off in sums of a cell's forces */
 
 /* -- a cell's forces -- */
 
@@ -65,9 +65,9 @@ PetscErrorCode HycoCondensedCellForce(HycoFE fe, PetscInt e, const PetscReal Ke[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- online: what the path asks for -- */
+/* -- online: operations of the path -- */
 
-/* kr -= R_e lost V_e, `lost` of the stiffness of cell e. */
+/* kr -= R_e lost V_e, `lost` is the reduction of the stiffness of cell e. */
 static PetscErrorCode Soften(HycoROM m, PetscInt e, const PetscReal lost[], PetscScalar kr[])
 {
   HycoCondensedPath c = (HycoCondensedPath)m->data;
@@ -94,7 +94,7 @@ static PetscErrorCode Soften(HycoROM m, PetscInt e, const PetscReal lost[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Kr: V^T K V, less what the tangents of the chosen cells have lost. */
+/* Kr: V^T K V minus the reduction of the stiffness by the tangents of the chosen cells. */
 static PetscErrorCode Stiffness(HycoROM m)
 {
   HycoCondensedPath c = (HycoCondensedPath)m->data;
@@ -146,7 +146,7 @@ static PetscErrorCode AddLoads(HycoROM m)
 
   PetscFunctionBegin;
   if (!c->heat) PetscCall(PetscMalloc1(mesh->n_cells * n + 1, &c->heat));
-  PetscCall(HycoFEElasticTangent(m->fe)); /* heat pushes by them */
+  PetscCall(HycoFEElasticTangent(m->fe)); /* thermal forces use these */
   PetscCall(VecGetArray(c->galerkin.Fr, &f));
   for (PetscInt e = 0; e < mesh->n_cells; e++) {
     PetscReal load[HYCO_MAX_CELL_DOFS], body[HYCO_MAX_CELL_DOFS] = {0};
@@ -222,7 +222,7 @@ static PetscErrorCode Reset(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- built, told, stored -- */
+/* -- creation, report, file -- */
 
 /* The chosen cells' columns in the order of the model's mesh. */
 static PetscErrorCode TakeColumns(HycoROM m, HycoReducer t, const PetscReal from[], PetscReal **to)
@@ -241,7 +241,7 @@ static PetscErrorCode TakeColumns(HycoROM m, HycoReducer t, const PetscReal from
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every node is tested, every contact is the model's. */
+/* Every node is in A, and every contact belongs to the model. */
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   const HycoCondensedTable *from = &Condensing(t)->path.table;
@@ -298,7 +298,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the model file, or from it. */
+/* Writes to the model file, or reads from it. */
 static PetscErrorCode Move(HycoROM m, HycoH5 h)
 {
   HycoCondensedTable *c = &((HycoCondensedPath)m->data)->table;

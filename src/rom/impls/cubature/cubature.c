@@ -1,15 +1,15 @@
 /*
-  The cubature's model: modes are tested by themselves over all of the bodies, but integrals over the bodies are sums
-  over few cells,
+  The cubature model: the modes are also the test functions over all of the bodies, but integrals over the bodies are
+  sums over few cells,
 
-      V^T f_int = sum of w_e V_e^T f_e over chosen cells e,   w_e > 0
+    V^T f_int = sum of w_e V_e^T f_e over chosen cells e,   w_e > 0
 
   so that the reduced stiffness stays symmetric and, as a sum of the cells' with positive weights, semidefinite. Contact
-  is the hybrid model's (-hyco_dual fe): a finite-element multiplier for each contact, and the displacements of the
-  contacts' nodes full order (39)-(40), whose equations are those of the cells around them, each of which has w = 1.
-  With every cell once it is the hybrid model with the whole mesh as its RID. Or it is the projection-based model's,
-  nonnegative vectors of forces (44): then with every cell once it is that one. Loads on surfaces are those of the whole
-  mesh.
+  is that of the hybrid model (-hyco_dual fe): a finite-element multiplier for each contact, and full-order
+  displacements of the contacts' nodes (39)-(40), whose equations are those of the cells around them, each of which has
+  w = 1. With all cells of weight 1 it is the hybrid model with the whole mesh as its RID. Or contact is that of the
+  projection-based model, nonnegative force vectors (44): with all cells of weight 1 it is then that model. Loads on
+  surfaces are those of the whole mesh.
 */
 #include <hycocubature.h>
 #include <hycoromtypes.h>
@@ -60,7 +60,7 @@ static PetscErrorCode Begin(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The force basis' modes, then the cells. Collective. */
+/* The modes of the force basis, then the cells. Collective. */
 static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
@@ -78,14 +78,14 @@ static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
   PetscCall(HycoCubatureSample(t, store, c->tol * c->tol, &W, &n, &sigma));
   if (n)
     PetscCall(HycoCubatureChoose(t, W, n, sigma));
-  else /* contacts are everywhere */
+  else /* contacts on all nodes */
     PetscCall(HycoCubatureChooseAll(t));
   PetscCall(MatDestroy(&W));
   PetscCall(PetscFree(sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With finite-element multipliers nothing of the force vectors is asked for. */
+/* With finite-element multipliers the functions of force vectors are not used. */
 static void TakeContact(HycoROM m)
 {
   HycoProjectionROM p = (HycoProjectionROM)m->data;
@@ -95,7 +95,7 @@ static void TakeContact(HycoROM m)
   m->traits.constrains = PETSC_TRUE;
 }
 
-/* Every node is tested, every contact is the model's; the cells' weights. */
+/* Every node is in A, and every contact belongs to the model; sets the cells' weights. */
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   const HycoCubatureTraining c = (HycoCubatureTraining)t->training;
@@ -182,7 +182,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the model file, or from it. */
+/* Writes to the model file, or reads from it. */
 static PetscErrorCode Move(HycoROM m, HycoH5 h)
 {
   HycoCubatureROM c = (HycoCubatureROM)m->data;

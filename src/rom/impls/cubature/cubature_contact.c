@@ -1,13 +1,13 @@
 /*
-  The cubature's full-order displacements (39)-(40), where each contact has its finite-element multiplier: so that the
-  rows of B have full rank on them, all of the contacts' nodes (-hyco_hybrid contact), or one for each contact (rank):
-  the component of its slave, or else of a master, that the row acts on most and no other contact has. Their equations
-  are the finite elements', so that the cells around them are once in the sum, as are those with springs and point
+  The cubature model's full-order displacements (39)-(40), if each contact has its finite-element multiplier. For full
+  row rank of B on them: all of the contacts' nodes (-hyco_hybrid contact), or one for each contact (rank): the
+  component of its slave, or else of a master, with the largest entry of the row that no other contact uses. Their
+  equations are the finite elements', so that the cells around them have weight 1, as do those with springs and point
   loads.
 */
 #include <hycocubature.h>
 
-/* All of the contacts' nodes. */
+/* Takes all of the contacts' nodes. */
 static PetscErrorCode TakeAll(HycoReducer t, PetscBool take[])
 {
   HycoFE fe = t->fom->fe_surface;
@@ -21,7 +21,7 @@ static PetscErrorCode TakeAll(HycoReducer t, PetscBool take[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The entry of a row that is largest, those of the slave before the others; -1: none is free. */
+/* The largest entry of a row, those of the slave first; -1: none is free. */
 static PetscInt Largest(HycoFE fe, PetscInt slave, PetscInt n, const PetscInt dof[], const PetscReal value[],
                         const PetscBool take[])
 {
@@ -38,7 +38,7 @@ static PetscInt Largest(HycoFE fe, PetscInt slave, PetscInt n, const PetscInt do
   return best < 0 ? -1 : dof[best];
 }
 
-/* One for each contact. */
+/* Takes one unknown for each contact. */
 static PetscErrorCode TakeOneEach(HycoReducer t, PetscBool take[])
 {
   const HycoPairs *pairs = &t->fom->pairs;
@@ -59,7 +59,7 @@ static PetscErrorCode TakeOneEach(HycoReducer t, PetscBool take[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* c->full, and the nodes of these by their numbers in the whole mesh, ascending. Rank 0. */
+/* Sets c->full, and their nodes by their numbers in the whole mesh, ascending. Rank 0. */
 static PetscErrorCode ListFull(HycoReducer t, PetscInt *n, PetscInt node[])
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
@@ -82,7 +82,7 @@ static PetscErrorCode ListFull(HycoReducer t, PetscInt *n, PetscInt node[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part's cells with a node of a group. */
+/* Marks the part's cells with a node of a group. */
 static PetscErrorCode MarkGroup(HycoMesh part, const char key[], const char name[], PetscBool near[])
 {
   PetscBool *in;
@@ -99,7 +99,7 @@ static PetscErrorCode MarkGroup(HycoMesh part, const char key[], const char name
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Springs and point loads belong to cells, or to their nodes, and are no integrals over the bodies. */
+/* Marks the cells of springs and point loads, which are not integrals over the bodies. */
 static PetscErrorCode MarkSprings(HycoReducer t, PetscBool near[])
 {
   const HycoScene s = t->scene;

@@ -1,22 +1,23 @@
 /*
-  What the cubature has to integrate: with a state of the laws at a training point, each cell e gives V_e^T f_e to the
-  reduced internal forces, f_e the integral of B^T sigma over the cell less its body forces. States come from a replay
-  of the laws along the training paths, on the displacements r(u0) + V gamma of the snapshots' coefficients (between
-  listed times linear in time), in the steps that full order took. A column for each mode and listed time; a time counts
-  by its size, as errors are judged. Of each path the singular vectors, then of these.
+  Samples for the cubature: with a state of the laws at a training point, each cell e contributes V_e^T f_e to the
+  reduced internal forces, f_e the integral of B^T sigma over the cell minus its body forces. The states come from a
+  replay of the laws along the training paths, on the displacements r(u0) + V gamma of the snapshots' coefficients
+  (between listed times linear in time), in the steps of full order. There is a column for each mode and listed time,
+  with the columns of a time divided by their size, as in the errors. The singular vectors are computed for each path,
+  then of these.
 */
 #include <hycocubature.h>
 
-#define SHARE 1e-2 /* of the energy that may be missed, what the vectors leave out */
+#define SHARE 1e-2 /* share of the energy tolerance for the truncation of the vectors */
 
 typedef struct {
   HycoReducer t;
   HycoTrainingReplay replay;
   HycoFE fe;        /* this rank's part */
-  PetscReal *V, *g; /* the modes there, n_dof x l row major; cells x l */
+  PetscReal *V, *g; /* the modes on this part, n_dof x l row major; cells x l */
   PetscInt n_rows;  /* this rank's cells in the file's order */
   PetscReal *rows;  /* n_rows x l row major */
-  Mat J;            /* of the training point that is followed */
+  Mat J;            /* of the current training point */
 } Sampler;
 
 static PetscErrorCode Destroy(Sampler *s)
@@ -27,7 +28,7 @@ static PetscErrorCode Destroy(Sampler *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes at the nodes of the part. Collective. */
+/* Fetches the modes at the nodes of the part. Collective. */
 static PetscErrorCode FetchModes(Sampler *s)
 {
   HycoReducer t = s->t;
@@ -66,7 +67,7 @@ static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* g += f V[dof,:], by the unknowns in the place of a displacement that a support along a direction gives. */
+/* g += f V[dof,:], for the unknowns after the elimination of supports along a direction. */
 static void AddForce(const Sampler *s, PetscInt dof, PetscReal f, PetscReal g[])
 {
   const PetscInt l = s->t->l, node = dof / s->fe->dim;
@@ -80,7 +81,7 @@ static void AddForce(const Sampler *s, PetscInt dof, PetscReal f, PetscReal g[])
   }
 }
 
-/* g: V_e^T f_e of the part's cells; 0 of those that are in the sum once. */
+/* g: V_e^T f_e of the part's cells; 0 for cells with weight 1. */
 static PetscErrorCode Project(Sampler *s)
 {
   HycoMesh m = s->fe->mesh;
@@ -101,7 +102,7 @@ static PetscErrorCode Project(Sampler *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The l columns of a listed time. Collective. */
+/* Stores the l columns of a listed time. Collective. */
 static PetscErrorCode Record(void *ctx, PetscInt k)
 {
   Sampler *s = (Sampler *)ctx;
@@ -139,8 +140,7 @@ static PetscErrorCode Create(HycoReducer t, Sampler *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each listed time's columns divided by their size, small ones by the tenth of the largest that errors are divided by.
-   Collective. */
+/* Divides each listed time's columns by their size, or by a tenth of the largest size if that is larger. Collective. */
 static PetscErrorCode Balance(HycoReducer t, Mat J)
 {
   const PetscInt l = t->l, n = HycoSnapshotsSteps(t->scene);
@@ -170,8 +170,8 @@ static PetscErrorCode Balance(HycoReducer t, Mat J)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The singular vectors of J in *W (NULL: none; the caller's), as many as the tolerance takes, and the singular values.
-   Collective. */
+/* The singular vectors of J in *W (NULL: none; the caller owns it), as many as the tolerance takes, and the singular
+   values. Collective. */
 static PetscErrorCode Decompose(HycoReducer t, Mat J, PetscReal tol, Mat *W, PetscInt *n, PetscReal **sigma)
 {
   PetscInt cells, columns;
@@ -213,7 +213,7 @@ static PetscErrorCode SamplePoint(Sampler *s, HycoSnapshots store, PetscInt k, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All points' vectors side by side. Collective. */
+/* Joins all points' vectors in one matrix. Collective. */
 static PetscErrorCode Join(Sampler *s, HycoSnapshots store, PetscReal tol, Mat *joined)
 {
   HycoReducer t = s->t;

@@ -1,18 +1,18 @@
 /*
-  Empirical cubature (Hernandez, Caicedo, Ferrer, Comput. Methods Appl. Mech. Engrg. 313 (2017) 687-722; its conditions
-  as ECSW's: Farhat, Avery, Chapman, Cortial, Int. J. Numer. Meth. Engng 98 (2014) 625-662): few cells and weights w >=
-  0 with
+  Empirical cubature (Hernandez, Caicedo, Ferrer, Comput. Methods Appl. Mech. Engrg. 313 (2017) 687-722; with the
+  conditions of ECSW: Farhat, Avery, Chapman, Cortial, Int. J. Numer. Meth. Engng 98 (2014) 625-662): few cells and
+  weights w >= 0 with
 
-      W^T w = W^T 1,    sum of w_e vol_e over a body = its volume,
+    W^T w = W^T 1,    sum of w_e vol_e over a body = its volume,
 
-  W the leading singular vectors of what cells give to the reduced internal forces. w = 1 is an answer; nonnegative
-  least squares find one with no more cells than there are equations.
-  Cells at contacts with full-order displacements have w = 1 and stand in none of them.
+  W the leading singular vectors of the cells' contributions to the reduced internal forces. w = 1 is a solution;
+  nonnegative least squares find one with at most as many cells as equations. Cells at contacts with full-order
+  displacements have w = 1 and are not in these equations.
 */
 #include <hycoalgorithms.h>
 #include <hycocubature.h>
 
-/* Column j of A (rows spread) on rank 0. Collective. */
+/* Gathers column j of A (rows distributed) on rank 0. Collective. */
 static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
 {
   const PetscScalar *value;
@@ -35,7 +35,8 @@ static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define N_NOTES 3 /* of a cell: its volume, 0 if it is in the sum once; its body; whether it is in the sum once */
+#define N_NOTES 3 /* of a cell: its volume, 0 if its weight is fixed to 1; its body; whether its weight is fixed to 1  \
+                   */
 
 /* By cell of the part. */
 static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal value[])
@@ -57,7 +58,7 @@ static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal val
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The notes, a column each, rows in the file's order. Collective. */
+/* These data, a column each, rows in the file's order. Collective. */
 static PetscErrorCode Notes(HycoReducer t, PetscInt n_rows, Mat *X)
 {
   HycoFE fe = t->fom->fe;
@@ -82,8 +83,8 @@ static PetscErrorCode Notes(HycoReducer t, PetscInt n_rows, Mat *X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A: a column per cell, the n leading entries of its row of W (columns of n_cells in `vectors`), then a row per body of
-   volumes over their 2-norm; b = A 1. */
+/* A: a column per cell, the n leading entries of its row of W (columns of n_cells in `vectors`), then a row per body
+   of volumes over their 2-norm; b = A 1. */
 static void FillSystem(PetscInt n_cells, PetscInt n, const PetscReal vectors[], PetscInt n_bodies,
                        const PetscReal volume[], const PetscReal body[], PetscReal A[], PetscReal b[])
 {
@@ -106,7 +107,7 @@ static void FillSystem(PetscInt n_cells, PetscInt n, const PetscReal vectors[], 
   }
 }
 
-/* What the weights miss of all n vectors' integrals, and of the volumes: relative. */
+/* The relative errors of the weights on all n vectors' integrals, and on the volumes. */
 static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], const PetscReal sigma[], PetscInt n_bodies,
                     const PetscReal volume[], const PetscReal body[], const PetscReal w[], PetscReal error[2])
 {
@@ -136,7 +137,7 @@ static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], con
   }
 }
 
-/* The weights of all cells. On rank 0. */
+/* Finds the weights of all cells. On rank 0. */
 static PetscErrorCode FindWeights(HycoReducer t, PetscInt n, const PetscReal vectors[], const PetscReal sigma[],
                                   const PetscReal notes[], PetscReal w[])
 {
@@ -160,7 +161,7 @@ static PetscErrorCode FindWeights(HycoReducer t, PetscInt n, const PetscReal vec
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells whose weight is positive, on every rank. Collective; w: on rank 0. */
+/* Stores the cells with positive weights on every rank. Collective; w: on rank 0. */
 static PetscErrorCode Take(HycoReducer t, const PetscReal w[])
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;

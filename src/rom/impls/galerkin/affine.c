@@ -1,8 +1,8 @@
 /*
-  The reduced stiffness as a polynomial of the parameters that reach it. Moduli enter K linearly, and maps that stretch
-  a body along its axes quadratically; the reduced matrix, sums of K's entries with constant weights, is then a
-  polynomial too, and its values at few parameter values give it everywhere, without any cell of the RID. Training
-  finds the degrees, checks them, and keeps the values in the file (affine_fit.c).
+  The reduced stiffness as a polynomial of the parameters on which it depends. K is linear in moduli, and quadratic in
+  maps that stretch a body along its axes; the reduced matrix consists of sums of K's entries with constant weights, so
+  that it is a polynomial too, determined by its values at few parameter values without the cells of the RID. Training
+  finds the degrees, checks them, and stores the values in the file (affine_fit.c).
 */
 #include <hycotable.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
@@ -133,7 +133,7 @@ PetscErrorCode HycoTableSave(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ascending, as many as `count` says for each parameter. */
+/* Checks that the values are ascending, `count` of them for each parameter. */
 static PetscErrorCode CheckParameters(HycoROM m, const PetscInt count[], const PetscReal x[])
 {
   PetscFunctionBegin;
@@ -144,7 +144,7 @@ static PetscErrorCode CheckParameters(HycoROM m, const PetscInt count[], const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of a sparse matrix: they lie one behind the other, their columns ascend. */
+/* Reads and checks the rows of a sparse matrix: contiguous, with ascending columns. */
 static PetscErrorCode LoadPattern(HycoROM m, HycoH5 h)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -166,7 +166,7 @@ static PetscErrorCode LoadPattern(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The table, without a sparse matrix's rows; the caller frees what was read, of a refused file too. */
+/* Reads the table, without a sparse matrix's rows; the caller frees the arrays, also after a refused file. */
 static PetscErrorCode LoadValues(HycoROM m, HycoH5 h, PetscInt **count, PetscReal **x, PetscReal **data)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;

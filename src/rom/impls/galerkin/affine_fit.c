@@ -1,16 +1,16 @@
 /*
-  The table of the reduced stiffness (model/table.c). Each parameter that reaches it gets as many values as its entries
-  need to be polynomials along its range, then all combinations; points in between must agree with the assembled matrix,
-  or there is no table and predictions assemble.
+  Creates the table of the reduced stiffness (affine.c). Each parameter on which it depends gets as many values as the
+  entries need to be polynomials along its range, then all combinations; the table must agree with the assembled matrix
+  at points in between, otherwise there is no table and predictions assemble.
 */
 #include <hycotable.h>
 
-#define MOST     5       /* values of one parameter */
-#define ENTRIES  5000000 /* numbers in the table: 40 MB */
-#define AGREES   1e-12   /* of the largest entry of its row */
+#define MOST     5       /* largest number of values of one parameter */
+#define ENTRIES  5000000 /* largest number of entries in the table: 40 MB */
+#define AGREES   1e-12   /* tolerance, as a share of the largest entry of a row */
 #define N_CHECKS 3
 
-/* The matrix at mu, as the reduced system has it. */
+/* The assembled matrix at mu. */
 static PetscErrorCode Sample(HycoROM m, const PetscReal mu[], PetscInt entries, PetscReal value[])
 {
   PetscScalar *a;
@@ -24,7 +24,7 @@ static PetscErrorCode Sample(HycoROM m, const PetscReal mu[], PetscInt entries, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the table gives the matrix at mu. */
+/* Whether the table reproduces the matrix at mu. */
 static PetscErrorCode Agrees(HycoROM m, HycoTable t, const PetscReal mu[], PetscBool *agrees)
 {
   const PetscInt entries = t->values.rows;
@@ -63,7 +63,7 @@ static PetscErrorCode FillTable(HycoROM m, HycoTable t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A table with n[p] values of each parameter, and whether it holds at some points off its nodes. */
+/* Creates a table with n[p] values of each parameter, and checks it at some points off its nodes. */
 static PetscErrorCode Try(HycoROM m, const PetscInt n[], PetscInt entries, PetscInt varied, HycoTable *table,
                           PetscBool *holds)
 {
@@ -90,7 +90,7 @@ static PetscErrorCode Try(HycoROM m, const PetscInt n[], PetscInt entries, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The fewest values of parameter p that give the matrix along its range; 0: more than MOST. */
+/* The smallest number of values of parameter p that reproduce the matrix along its range; 0: more than MOST. */
 static PetscErrorCode CountValues(HycoROM m, PetscInt p, PetscInt entries, PetscInt *count)
 {
   PetscInt n[HYCO_MAX_PARAMETERS];
@@ -134,7 +134,7 @@ PetscErrorCode HycoGalerkinTabulate(HycoROM m, const PetscBool reaches[])
     if (nodes > HYCO_TABLE_NODES || (PetscReal)nodes * (PetscReal)entries > ENTRIES) nodes = 0;
   }
   if (!nodes) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Try(m, n, entries, -1, &table, &holds)); /* while the model has none, it assembles */
+  PetscCall(Try(m, n, entries, -1, &table, &holds)); /* without a table, the model assembles */
   if (holds) PetscCall(HycoTableKeepPattern(m, table));
   if (holds)
     g->table = table;

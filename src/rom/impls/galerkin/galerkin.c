@@ -1,20 +1,20 @@
 /*
-  The online phase: the hybrid system (38) assembled on the RID alone and solved.
+  The online phase: the hybrid system (38) is assembled on the RID only and solved.
 
-  x = (gamma, U_fe): POD coefficients and full-order unknowns. With the modes zeroed on the full-order unknowns,
+    x = (gamma, U_fe): POD coefficients and full-order unknowns. With the modes zeroed on the full-order unknowns,
 
-      U[A u I] = Vp gamma + E x_fe      test space: the same restricted to A      (39)-(40)
+    U[A u I] = Vp gamma + E x_fe      test space: the same restricted to A      (39)-(40)
 
-  (hybrid all: every unknown of A is full order and gamma = G U[A] is no unknown; of a large path's it is one, with
-  these as equations: the matrix is sparse then.) reduced_system.c fills the system.
+  (hybrid all: every unknown of A is full order and gamma = G U[A] is not an unknown; in a large model of paths it is
+  one, with these as equations, and the matrix is sparse.) reduced_system.c fills the system.
 */
 #include <hycoalgorithms.h>
 #include <hycotable.h>
 #include <petscblaslapack.h>
 
-/* Beyond this many unknowns the reduced matrix is stored sparse (a dense border of l modes). */
+/* With more unknowns the reduced matrix is stored sparse (with a dense border of l modes). */
 #define HYCO_DENSE_MAX 700
-/* Of a path with all of A full order: its iterations multiply by the matrix again and again. */
+/* For a path with all of A full order, because its iterations multiply by the matrix many times. */
 #define BORDERED_MIN 300
 
 PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
@@ -55,7 +55,7 @@ PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Places of the full-order unknowns, modes zeroed on them. */
+/* Indices of the full-order unknowns; the modes are set to zero on them. */
 static PetscErrorCode SetUpBasis(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -72,7 +72,7 @@ static PetscErrorCode SetUpBasis(HycoROM m)
   g->bordered = (PetscBool)(g->G && m->scene->n_times && l + m->n_fe > BORDERED_MIN);
   g->n_free = m->hybrid == HYCO_HYBRID_ALL && !g->bordered ? 0 : l;
   m->n = g->n_free + m->n_fe;
-  if (!g->contact) m->n_L = m->m; /* else the type has said it */
+  if (!g->contact) m->n_L = m->m; /* otherwise set by the type */
   HycoCheckModel(m->n > 0, "the model has no unknowns, because every training solution is zero; check the loads");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -123,8 +123,8 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   }
   PetscCall(HycoROMSetUpFields(m));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &g->system));
-  /* the reduced problem is not symmetric and may have several solutions: the dual form, no history; a TAO type that
-     needs symmetry is meant for the full order */
+  /* the reduced problem is not symmetric and may have several solutions: the dual form, without warm start; a TAO
+     type that needs symmetry is only for the full order */
   PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
   PetscCall(HycoSolverSetWarmStart(m->solver, PETSC_FALSE));
   if (HycoSolverNeedsSymmetry(m->solver)) PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
@@ -175,14 +175,14 @@ static PetscErrorCode Assemble(HycoROM m, const PetscReal mu[])
   m->beyond_current = PETSC_FALSE;
   first = (PetscBool)!g->system->K;
   PetscCall(HycoFESetParameters(m->fe, mu));
-  m->fe->ready = PETSC_FALSE; /* until all that depends on it is assembled */
+  m->fe->ready = PETSC_FALSE; /* until everything that depends on it is assembled */
   if (m->fe->stiffness_changed) HycoLoadsForget(g->loads);
   if (m->fe->stiffness_changed && g->table) {
     PetscCall(HycoReducedPrepare(m));
     HycoLogged(HYCO_EVENT_REDUCE, HycoTableFill(m, mu));
   } else if (m->fe->stiffness_changed) {
     HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, g->K));
-    if (first && m->fe->n_constant) /* again in the order of all that come: the same sums to the last bit */
+    if (first && m->fe->n_constant) /* assembled again as in later assemblies, so that the sums have the same bits */
       HycoLogged(HYCO_EVENT_ASSEMBLE, HycoFEAssembleStiffness(m->fe, g->K));
     HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillStiffness(m));
   }
@@ -209,7 +209,7 @@ PetscErrorCode HycoGalerkinAssemble(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gamma, and U on the nodes of fe's mesh. */
+/* Sets gamma, and U on the nodes of fe's mesh. */
 PetscErrorCode HycoGalerkinExpand(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -233,7 +233,7 @@ PetscErrorCode HycoGalerkinExpand(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gamma, U on the nodes of mesh, Lambda on A_lambda. */
+/* Sets gamma, U on the nodes of mesh, Lambda on A_lambda. */
 PetscErrorCode HycoGalerkinUnpack(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -301,7 +301,7 @@ PetscErrorCode HycoGalerkinCondition(HycoROM m, PetscReal *condition)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of U's free unknowns u^T K u / 2, and the same without K's couplings: what round-off is relative to. */
+/* u^T K u / 2 over the free unknowns, and the same without K's couplings, to which round-off is relative. */
 static PetscErrorCode QuadraticForm(HycoROM m, PetscReal *energy, PetscReal *size)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -329,8 +329,8 @@ static PetscErrorCode QuadraticForm(HycoROM m, PetscReal *energy, PetscReal *siz
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of the RID's cells: from K, unless it lacks the supports' part or a rigid motion drowns it: beyond 1e-5 round-off
-   would leave fewer than ten digits. */
+/* The energy of the RID's cells: from K, unless the supports' part is missing or a rigid motion dominates: above a
+   ratio of 1e5 fewer than ten digits would be accurate. */
 PetscErrorCode HycoGalerkinEnergy(HycoROM m, PetscReal *energy, PetscBool *known)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;

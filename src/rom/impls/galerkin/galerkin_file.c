@@ -1,4 +1,4 @@
-/* What hybrid and projection-based models have in the model file, and what they say of it. */
+/* The data of hybrid and projection-based models in the model file, and their description. */
 #include <hycotable.h>
 #include <petscviewer.h>
 
@@ -58,7 +58,7 @@ PetscErrorCode HycoGalerkinView(HycoROM m, PetscViewer viewer)
   HycoGalerkin g = (HycoGalerkin)m->data;
 
   PetscFunctionBegin;
-  if (m->numbers[0] > 0) /* else too large to be known */
+  if (m->numbers[0] > 0) /* otherwise not computed, because the matrix is too large */
     PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
   if (g->table) PetscCall(HycoTableView(m, viewer));
   if (!g->symmetric) PetscCall(ViewScan(m, viewer));

@@ -1,11 +1,12 @@
 /*
-  The path of a hybrid or projection-based model: the full order's steps of time and Newton's method (src/fom) on the
-  reduced unknowns. The laws step at the integration points of the RID's cells alone; an iteration is one contact system
+  The path of a hybrid or projection-based model: the time stepping and Newton's method of full order (src/fom) on the
+  reduced unknowns. The laws are integrated only at the integration points of the RID's cells; an iteration is one
+  contact system
 
-      V[A]^T K_t[A,A+I] V[A+I] x' + V[A_c]^T B^T L = V[A]^T (F - f_int) + V[A]^T K_t V x
+    V[A]^T K_t[A,A+I] V[A+I] x' + V[A_c]^T B^T L = V[A]^T (F - f_int) + V[A]^T K_t V x
 
-  with K_t = d f_int / d U, the true derivative, so that the iterations stay quadratic. The reduced problem has no
-  potential: steps are judged by their residual. Each path begins with no contact closed, whatever was solved before.
+  with K_t = d f_int / d U, the true derivative, so that the convergence is quadratic. The reduced problem has no
+  potential: steps are accepted by their residual. Each path starts with no contact closed, whatever was solved before.
 */
 #include <hycoalgorithms.h>
 #include <hycogalerkin.h>
@@ -14,12 +15,13 @@
 struct _n_HycoGalerkinPath {
   HycoPath path;
   HycoNewton method;      /* of predictions */
-  HycoLinearForce linear; /* of the bodies that do not flow, on A */
-  PetscReal *held, *u;    /* of fe's unknowns: prescribed displacements of the last accepted time; of an iteration */
-  PetscBool moved;        /* the attempt's own are in U */
+  HycoLinearForce linear; /* of the linear bodies, on A */
+  PetscReal *held, *u;    /* fe's unknowns: prescribed displacements at the last accepted time; displacements of an
+                             iteration */
+  PetscBool moved;        /* the attempt's prescribed displacements are in U */
 };
 
-/* K and Kr. The first assembly again, in the order of all that come: the same sums to the last bit. */
+/* K and Kr. The first one is assembled again as in later assemblies, so that the sums have the same bits. */
 static PetscErrorCode Stiffness(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -36,7 +38,7 @@ static PetscErrorCode Stiffness(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The loads alone, without what moved supports do. */
+/* The loads only, without the effect of moved supports. */
 static PetscErrorCode Loads(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -61,8 +63,8 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
 
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(fe, mu));
-  fe->ready = PETSC_FALSE;                         /* until all that depends on it is assembled */
-  g->path->moved = (PetscBool)(g->forces != NULL); /* their loads have all that supports do */
+  fe->ready = PETSC_FALSE;                         /* until everything that depends on it is assembled */
+  g->path->moved = (PetscBool)(g->forces != NULL); /* their loads include all effects of supports */
   m->beyond_current = PETSC_FALSE;
   if (fe->stiffness_changed && (elastic || !p->n_taken)) PetscCall(Stiffness(p)); /* the first is the elastic one */
   if (!g->forces) PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
@@ -75,8 +77,8 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U of the iteration in path->u: supports are where the last time left them until the first contact system of the step
-   has moved them. */
+/* U of the iteration in path->u: the supports have their values of the last accepted time until the first contact
+   system of the step has moved them. */
 static PetscErrorCode Displace(HycoROM m)
 {
   HycoGalerkinPath q = ((HycoGalerkin)m->data)->path;
@@ -145,7 +147,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The linear bodies' part of the state at the accepted time, and of its energy. */
+/* Completes the state at the accepted time, and its energy, for the linear bodies. */
 static PetscErrorCode CompleteState(HycoROM m, HycoPath p)
 {
   HycoFEStepReport report;
@@ -157,7 +159,7 @@ static PetscErrorCode CompleteState(HycoROM m, HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a listed time amounts to, over the RID and all contacts. */
+/* Results at a listed time, over the RID and all contacts. */
 static PetscErrorCode Measure(HycoROM m, HycoFEState state, HycoStep *s)
 {
   PetscReal *sigma, *inelastic, *mises;
@@ -175,7 +177,7 @@ static PetscErrorCode Measure(HycoROM m, HycoFEState state, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before listed time k: where its tangent is looked at, it has to be the current one. */
+/* Called before listed time k: if its tangent is monitored, it must be the current one. */
 static void Expect(HycoROM m, PetscInt k)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -184,7 +186,7 @@ static void Expect(HycoROM m, PetscInt k)
   g->path->path->method = watched ? HYCO_NEWTON_TANGENT : g->path->method;
 }
 
-/* The last tangent: whether the path comes near to where it is singular. */
+/* Monitors the last tangent: whether the path comes close to a singular one. */
 static PetscErrorCode Watch(HycoROM m, PetscInt k)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -239,7 +241,9 @@ static PetscErrorCode CreateLinear(HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(mesh->n_nodes, &inside));
   for (PetscInt i = 0; i < mesh->n_nodes; i++) inside[i] = (PetscBool)(m->role[i] == HYCO_ROLE_A);
-  for (PetscInt k = 0; k < mesh->n_tied; k++) inside[mesh->tied[k]] = PETSC_TRUE; /* forces that pass to others */
+  for (PetscInt k = 0; k < mesh->n_tied; k++)
+    inside[mesh->tied[k]] = PETSC_TRUE; /* whose forces are added to the
+                                           masters */
   PetscCall(HycoLinearForceCreate(m->fe, inside, &((HycoGalerkin)m->data)->path->linear));
   PetscCall(PetscFree(inside));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -291,7 +295,7 @@ PetscErrorCode HycoGalerkinPathDestroy(HycoGalerkinPath *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the path as a whole amounts to. */
+/* Sets the results of the whole path. */
 static void Summarise(HycoPath p, HycoPrediction *out)
 {
   out->kkt = p->kkt;
@@ -313,7 +317,7 @@ PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
   PetscFunctionBegin;
   out->iterations = 0;
   out->seconds.assemble = out->seconds.factor = out->seconds.solve = 0;
-  out->reason = HYCO_CONVERGED; /* until a listed time says else */
+  out->reason = HYCO_CONVERGED; /* unless a listed time changes it */
   p->n_given = m->trace.n_given;
   p->given = m->trace.given;
   p->most_cuts = m->trace.most_cuts;

@@ -1,18 +1,18 @@
 /*
-  Loads and supports enter F affinely in most scenes. The solutions without contact under F at the least values of the
-  parameters that no stiffness and no contact row depends on, and under what each one's range adds to it, then give that
-  of any load by a sum, once for each stiffness:
+  In most scenes F is affine in loads and supports. The solutions without contact for F at the least values of the
+  parameters on which neither the stiffness nor a contact row depends, and for the change of F over each one's range,
+  give that of any load as a sum, once for each stiffness:
 
-      K^-1 F(mu) = X_0 + sum_j t_j X_j,    t_j = (mu_j - lo_j) / (hi_j - lo_j)
+    K^-1 F(mu) = X_0 + sum_j t_j X_j,    t_j = (mu_j - lo_j) / (hi_j - lo_j)
 
-  They are chosen by the ranges, not by what came before, so that answers do not depend on the order of the questions.
-  F itself is assembled at each mu: where it is not that sum, its system is solved.
+  They depend on the ranges, not on earlier predictions, so that results do not depend on the order of the points. F
+  itself is assembled at each mu: if it is not that sum, its system is solved.
 */
 #include <hycogalerkin.h>
 
-/* More parameters would cost a single prediction more than a ramp gains. */
+/* With more parameters a single prediction would cost more than a ramp gains. */
 #define MAX_LOADS 3
-/* F is the sum if nothing is left beyond this share of its largest entry. */
+/* F is the sum if the remainder is below this share of its largest entry. */
 #define AFFINE 1e-13
 
 struct _n_HycoLoads {
@@ -107,7 +107,7 @@ static PetscErrorCode IsSum(HycoROM m, const PetscReal t[], PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* m->Fr at the parameters mu, which differ from the current ones in loads alone. */
+/* m->Fr at the parameters mu, which differ from the current ones only in loads. */
 static PetscErrorCode ForceAt(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -118,7 +118,7 @@ static PetscErrorCode ForceAt(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The vectors F, and whether the middle of the ranges is their sum. */
+/* Samples the vectors F, and checks whether that at the middle of the ranges is their sum. */
 static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -158,7 +158,7 @@ static PetscErrorCode Renew(HycoROM m, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(HycoSolverFactor(m->solver, &singular));
   ierr = SampleForces(m, mu);
-  if (ierr) m->fe->ready = PETSC_FALSE; /* its parameters are others */
+  if (ierr) m->fe->ready = PETSC_FALSE; /* it is at other parameters */
   PetscCall(ierr);
   p->affine = (PetscBool)(p->affine && !singular);
   for (PetscInt j = 0; j <= p->n && p->affine; j++) {

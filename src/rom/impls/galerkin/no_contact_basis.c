@@ -1,6 +1,6 @@
 /*
-  A model without a contact force: no training solution pressed, so that it has no force vector (44), or none of its
-  contacts is in the RID. It is right where nothing presses; where its displacement penetrates, it has no answer.
+  A model without contact forces: no training solution had any, so that it has no force vector (44), or none of its
+  contacts is in the RID. It is valid where no contact presses; where its displacement penetrates, it does not converge.
 */
 #include <hycogalerkin.h>
 

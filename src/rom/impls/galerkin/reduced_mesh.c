@@ -1,12 +1,12 @@
 /*
-  What of the model's mesh the reduced problem touches, apart from what only reconstruction, estimates and outputs ask
-  for. The mesh has the nodes of every contact, the reduced problem only those of its cells and of A_lambda: they come
-  first in the mesh, and a prediction costs the same whatever lies beyond.
+  The part of the model's mesh that the reduced problem uses, without what only reconstruction, estimates and outputs
+  need. The mesh has the nodes of every contact, the reduced problem only those of its cells and of A_lambda: they come
+  first in the mesh, so that the cost of a prediction does not depend on the others.
 */
 #include <hycogalerkin.h>
 
-/* One past the last node that matters: of a cell or a load in Omega_A, of a contact of A_lambda, of a facet whose
-   normal counts there. */
+/* One past the last node that is needed: of a cell or a load in Omega_A, of a contact of A_lambda, of a facet whose
+   normal is needed there. */
 static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
 {
   HycoMesh mesh = m->mesh;
@@ -35,7 +35,7 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
     for (PetscInt a = 0; a < mesh->nf; a++) any = (PetscBool)(any || slave[mesh->facets[f * mesh->nf + a]]);
     for (PetscInt a = 0; any && a < mesh->nf; a++) *n = PetscMax(*n, mesh->facets[f * mesh->nf + a] + 1);
   }
-  for (PetscInt k = 0; k < mesh->n_tied && mesh->tied[k] < *n; k++) { /* which follow nodes; more of them come in */
+  for (PetscInt k = 0; k < mesh->n_tied && mesh->tied[k] < *n; k++) { /* their masters may add nodes */
     for (PetscInt j = mesh->tied_start[k]; j < mesh->tied_start[k + 1]; j++)
       *n = PetscMax(*n, mesh->tied_master[j] + 1);
   }
@@ -43,7 +43,7 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A view of mesh with its first n nodes: it has facets and groups of its own, and shares the rest. */
+/* A view of mesh with its first n nodes: it has its own facets and groups, and shares the rest. */
 static PetscErrorCode ViewMesh(HycoMesh mesh, PetscInt n, HycoMesh *own)
 {
   HycoMesh o;
@@ -80,7 +80,7 @@ static PetscErrorCode ViewMesh(HycoMesh mesh, PetscInt n, HycoMesh *own)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts of A_lambda, in the order of all. */
+/* Selects the contacts of A_lambda, in the order of all. */
 static PetscErrorCode SelectPairs(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -112,7 +112,7 @@ PetscErrorCode HycoGalerkinCreateOwn(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Unknowns of fe's mesh that are free and have a role. */
+/* Free unknowns of fe's mesh with a role. */
 static PetscErrorCode CreateUnknowns(HycoROM m, PetscInt role, IS *is)
 {
   PetscInt n = 0, *dof;
@@ -138,7 +138,7 @@ PetscErrorCode HycoGalerkinCreateSets(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A'_c, the unknowns that the rows act on, and A_c, those of them in A. */
+/* A'_c, the unknowns on which the rows act, and A_c, those of them in A. */
 static PetscErrorCode CreateContactSets(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;

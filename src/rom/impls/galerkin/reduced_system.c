@@ -1,16 +1,15 @@
 /*
-  The reduced system's matrices and vectors from those on the RID. Row i of K meets the reduced stiffness once:
-  y = K[i,:] Vp gives its part on the modes, its entries on full-order unknowns the rest. Rows that no parameter reaches
-  are summed once and kept.
+  The reduced system's matrices and vectors from those on the RID. Row i of K is used once: y = K[i,:] Vp gives its part
+  on the modes, its entries on full-order unknowns the rest. Rows that no parameter changes are summed once and stored.
 */
 #include <hycogalerkin.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
 #include <petscblaslapack.h>
 
 struct _n_HycoReduced {
-  PetscInt n_rows, n_constant, *row; /* free unknowns of A: those that no parameter reaches come first */
-  PetscBool dense;                   /* Kr */
-  PetscScalar *constant;             /* Kr's values of the first n_constant rows; NULL: there is none */
+  PetscInt n_rows, n_constant, *row; /* free unknowns of A: first those that no parameter changes */
+  PetscBool dense;                   /* whether Kr is dense */
+  PetscScalar *constant;             /* contribution of the first n_constant rows to Kr; NULL: there is none */
   PetscReal *y, *value, *modes, *Y;  /* l; a row; n_free x n row major; hybrid all: n_fe x l row major */
   PetscInt *index;
 };
@@ -124,7 +123,7 @@ static PetscInt ReducedRow(HycoROM m, PetscInt n, const PetscInt col[], const Pe
   return count;
 }
 
-/* The pattern of a sparse Kr: full rows of the modes, the modes and the neighbours in the others. */
+/* The pattern of a sparse Kr: full rows of the modes; the modes and the neighbours in the others. */
 static PetscErrorCode SetPattern(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[])
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -150,8 +149,8 @@ static PetscErrorCode SetPattern(HycoROM m, const PetscInt ia[], const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows first .. last - 1 of the list. Those of full-order unknowns go to their place in kr (start: Kr's rows, when
-   sparse), the others are tested by the modes: modes += Vp_i^T (y, entries). */
+/* Rows first .. last - 1 of the list. Those of full-order unknowns are stored in kr (start: Kr's rows, when sparse),
+   the others are tested by the modes: modes += Vp_i^T (y, entries). */
 static void AddRows(HycoROM m, PetscInt first, PetscInt last, const PetscInt ia[], const PetscInt ja[],
                     const PetscScalar a[], const PetscInt start[], PetscScalar kr[])
 {
@@ -177,7 +176,7 @@ static void AddRows(HycoROM m, PetscInt first, PetscInt last, const PetscInt ia[
   }
 }
 
-/* The rows of the modes, which lie before the others. */
+/* Stores the rows of the modes, which come before the others. */
 static void PutModes(HycoROM m, const PetscInt start[], PetscScalar kr[])
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -241,11 +240,11 @@ static PetscErrorCode Create(HycoROM m, const PetscInt ia[], const PetscInt ja[]
   PetscCall(ListRows(m, r));
   PetscCall(PetscMalloc5(m->l, &r->y, m->n + 100, &r->value, m->n + 100, &r->index, g->n_free * m->n, &r->modes,
                          g->G && !g->bordered ? m->n_fe * m->l : 0, &r->Y));
-  if (!r->dense && ia) PetscCall(SetPattern(m, ia, ja, a)); /* else the table gave it */
+  if (!r->dense && ia) PetscCall(SetPattern(m, ia, ja, a)); /* otherwise set from the table */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Kr's values, those of the constant rows kept from the first time on; n: how many there are. */
+/* Fills Kr's n values; those of the constant rows are kept from the first time on. */
 static PetscErrorCode FillRows(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[],
                                const PetscInt start[], PetscScalar kr[])
 {
@@ -285,7 +284,7 @@ PetscErrorCode HycoReducedEntries(HycoROM m, PetscInt *n, PetscScalar *a[])
     *n = m->n * m->n;
     PetscCall(MatDenseGetArray(g->Kr, &all));
     *a = all;
-    PetscCall(MatDenseRestoreArray(g->Kr, &all)); /* they stay where they are */
+    PetscCall(MatDenseRestoreArray(g->Kr, &all)); /* they stay at the same address */
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(MatGetRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &rows, &start, &columns, &done));

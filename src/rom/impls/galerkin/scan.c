@@ -1,15 +1,16 @@
 /*
-  Resonance inside the parameters' ranges. The reduced stiffness Vbar[A]^T K[A, A u I] Vbar[A u I] is not symmetric: its
-  determinant may change sign between two training points where the model looks good, and between them predictions are
-  arbitrary. A grid over the ranges of the parameters that reach the stiffness, spread over the ranks, shows the sign
-  and the smallest singular value. Two crossings between neighbouring points go unseen: a finer grid sees them.
+  Scan for singular reduced stiffness matrices within the parameters' ranges. The reduced stiffness Vbar[A]^T K[A, A u
+  I] Vbar[A u I] is not symmetric: its determinant may change sign between two training points although the model is
+  accurate at both; near the zero predictions are arbitrary. A grid over the ranges of the parameters that change the
+  stiffness, distributed over the ranks, gives the sign and the smallest singular value. Two sign changes between
+  neighbouring points are not detected; a finer grid detects them.
 */
 #include <hycoalgorithms.h>
 #include <hycotable.h>
 
-#define LARGEST 2500 /* unknowns: beyond, a dense factor at every point takes minutes */
+#define LARGEST 2500 /* number of unknowns above which a dense factor at every point takes minutes */
 
-/* The parameters over whose ranges the reduced stiffness is looked at. */
+/* The parameters over whose ranges the reduced stiffness is scanned. */
 static PetscErrorCode FindParameters(HycoROM m, PetscBool reaches[])
 {
   const HycoScene s = m->scene;
@@ -21,8 +22,8 @@ static PetscErrorCode FindParameters(HycoROM m, PetscBool reaches[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* So many points for each parameter that reaches the stiffness: as asked; else some hundred in all, fewer where the
-   factors of that many unknowns would take more than seconds. */
+/* Number of points for each parameter that changes the stiffness: the given one; else some hundred in all, fewer if
+   the factors of that many unknowns would take more than seconds. */
 static PetscErrorCode ChooseGrid(PetscInt asked, PetscInt unknowns, PetscInt n_par, const PetscBool reaches[],
                                  PetscInt *each, PetscInt *n)
 {
@@ -41,7 +42,7 @@ static PetscErrorCode ChooseGrid(PetscInt asked, PetscInt unknowns, PetscInt n_p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Point k of the closed grid; the middle of the range for what does not matter, and for a grid of one point. */
+/* Point k of the closed grid; the middle of the range for other parameters, and for a grid of one point. */
 static void GridPoint(HycoScene s, const PetscBool reaches[], PetscInt each, PetscInt k, PetscReal mu[])
 {
   for (PetscInt p = s->n_parameters - 1; p >= 0; p--) {
@@ -87,7 +88,7 @@ static void Say(HycoScene s, const PetscReal mu[], char text[HYCO_LINE])
   snprintf(text + at, HYCO_LINE - at, s->n_parameters ? ")" : "()");
 }
 
-/* Keeps what the scan found in the model; fails where the determinant changes sign. */
+/* Stores the result of the scan in the model; fails if the determinant changes sign. */
 static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches[], PetscInt each,
                                const PetscReal sign[], const PetscReal ratio[])
 {
@@ -118,7 +119,7 @@ static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches
       here, there);
 }
 
-/* Paths first .. last-1 of the training, looked at on their way. */
+/* Monitors the training paths first .. last-1. */
 static PetscErrorCode ScanMyPaths(HycoReducer t, HycoROM m, PetscInt first, PetscInt last, PetscInt each,
                                   PetscInt stride, PetscReal sign[], PetscReal ratio[])
 {
@@ -140,7 +141,7 @@ static PetscErrorCode ScanMyPaths(HycoReducer t, HycoROM m, PetscInt first, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What was seen of n tangents, `each` of them along one training path. */
+/* The result for n tangents, `each` of them along one training path. */
 static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscInt each, const PetscReal sign[],
                                     const PetscReal ratio[])
 {
@@ -153,7 +154,7 @@ static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscI
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
   s->n = 0;
   for (PetscInt k = 0; k < n; k++) {
-    if (sign[k] == 0) continue; /* not looked at */
+    if (sign[k] == 0) continue; /* not computed */
     s->n++;
     positive += sign[k] > 0;
     if (ratio[k] < ratio[worst] || sign[worst] == 0) worst = k;
@@ -173,7 +174,7 @@ static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscI
           : "enlarge the RID (-hyco_rid_layers 1), change the modes (-hyco_pod_tol)");
 }
 
-/* Of a scene with a history: the tangents along the training paths; of long paths and large models some of them. */
+/* For a scene with a history: the tangents along the training paths; for long paths and large models some of them. */
 static PetscErrorCode ScanPaths(HycoReducer t, HycoROM m)
 {
   const PetscInt each = t->scene->n_times + 1;

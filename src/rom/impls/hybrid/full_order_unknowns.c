@@ -1,21 +1,21 @@
 /*
-  Which displacements are full order (section 5.2). A full row rank alone is not enough: choices that have it differ a
-  hundredfold in error. A choice is judged by the conditioning of its basis and by the error of the model it gives on
+  The choice of full-order displacements (section 5.2). Full row rank is not a sufficient criterion: choices that
+  satisfy it differ a hundredfold in error. A choice is judged by the condition of its basis and by the model's error on
   the training snapshots.
 
-  rank: the fewest that give B[A_lambda, A_c] Vbar[A_c,:] full row rank. Start: the contacts whose balance rows K V
-  depend on those of others; then exchange one for one while the mean training error of u falls. all: the modes'
-  coefficients follow from U[A] by ridge regression, its strength chosen by the same error.
+  rank: the smallest number that gives B[A_lambda, A_c] Vbar[A_c,:] full row rank. Start: the contacts whose balance
+  rows K V depend on those of others; then exchanges one by one while the mean training error of u decreases. all: the
+  modes' coefficients follow from U[A] by ridge regression, whose ridge is chosen by the same error.
 */
 #include <hycoalgorithms.h>
 #include <hycohybrid.h>
 
 #define WORST HYCO_JUDGED_WORST
 
-/* What the options of this type say. */
+/* The options of this type. */
 typedef struct {
-  PetscInt trials; /* rank: the most choices that are judged; 0: chosen */
-  PetscReal ridge; /* all; < 0: chosen */
+  PetscInt trials; /* rank: largest number of choices that are judged; 0: automatic */
+  PetscReal ridge; /* all; < 0: automatic */
 } * Training;
 
 PetscErrorCode HycoHybridSetFromOptions(HycoReducer t)
@@ -40,7 +40,7 @@ PetscErrorCode HycoHybridSetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknown of each contact of A_lambda that could be full order: its largest entry in A that no other has taken. */
+/* The unknown of each contact of A_lambda that may be full order: its largest entry in A not taken by another. */
 static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -50,7 +50,7 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->mesh->n_nodes * dim, &taken));
   for (PetscInt k = 0; k < m->m; k++) candidate[k] = -1;
-  for (PetscInt pass = 0; pass < 2; pass++) { /* those whose slave is in A first: the others have shared masters only */
+  for (PetscInt pass = 0; pass < 2; pass++) { /* first those with slave in A: the others have only shared masters */
     for (PetscInt k = 0; k < m->m; k++) {
       const PetscInt slave = HycoPairsSlave(&m->pairs, m->contact[k]);
       PetscReal best = 0;
@@ -76,7 +76,7 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Smallest singular value of B[A_lambda, A_c] Vbar[A_c,:] over its largest, for the model's present choice. */
+/* Smallest singular value of B[A_lambda, A_c] Vbar[A_c,:] over its largest, for the current choice. */
 static PetscErrorCode RowRank(HycoROM m, PetscReal *ratio)
 {
   HycoGalerkin g = (HycoGalerkin)m->data;
@@ -96,7 +96,7 @@ static PetscErrorCode RowRank(HycoROM m, PetscReal *ratio)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model at the middle of the parameters' ranges, with no full-order unknown, so that rows can be looked at. */
+/* The model at the middle of the parameters' ranges, without full-order unknowns, to inspect its rows. */
 static PetscErrorCode Assembled(HycoReducer t, HycoROM m)
 {
   PetscInt n_par;
@@ -112,7 +112,7 @@ static PetscErrorCode Assembled(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A V on some rows and columns of A: P[k * l + j] of row k and mode j. */
+/* A V on some rows and columns of A: P[k * l + j] for row k and mode j. */
 static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscReal P[])
 {
   Mat Vt, V, part, modes, product;
@@ -195,7 +195,7 @@ static PetscErrorCode ResolvedContacts(HycoROM m, const PetscInt candidate[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One candidate set, judged; remembered by its hash so that none is judged twice. */
+/* A judged set of candidates; stored by its hash, so that none is judged twice. */
 typedef struct {
   PetscReal u, lambda, rank;
 } Verdict;
@@ -217,13 +217,13 @@ static PetscBool Better(const Verdict *a, const Verdict *b)
   return (PetscBool)(a->u <= b->u * (1 + 1e-6) && a->rank > b->rank * (1 + 1e-6));
 }
 
-/* Exchanges one full-order unknown for one candidate outside while that helps. chosen[k]: whether candidate k is full
- * order. */
+/* Exchanges one full-order unknown for one candidate while the error decreases. chosen[k]: candidate k is full
+   order. */
 static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt n, const PetscInt candidate[], PetscBool chosen[],
                                Verdict *best)
 {
   const PetscInt N = m->m;
-  /* a trial solves every snapshot: bounded by the work, so that a large model is not judged for hours */
+  /* a trial solves every snapshot: their number is limited by the work, so that a large model does not take hours */
   const PetscInt limit = ((Training)t->training)->trials ? ((Training)t->training)->trials
                                                          : 1 + (PetscInt)(1e6 / ((PetscReal)t->n_s * (PetscReal)m->n));
   PetscInt trials = 1, n_seen = 0, *dof;
@@ -276,8 +276,8 @@ static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt n, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One start, then exchanges. Starts 0 and 1: the contacts that the modes do not resolve, by balance rows and by contact
-   rows; later ones: as many, spread evenly. */
+/* One start, then exchanges. Starts 0 and 1: the contacts that the modes do not resolve, by balance rows and by
+   contact rows; later ones: the same number, evenly distributed. */
 static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, PetscInt *n, PetscInt dof[],
                                  Verdict *verdict)
 {
@@ -307,7 +307,7 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The best end of several starts; of the first alone when a trial is expensive. */
+/* The best result of several starts; of one if a trial is expensive. */
 static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
 {
   const PetscInt room = m->pairs.n, starts = (PetscReal)t->n_s * (PetscReal)m->l < 1e4 ? 5 : 1;
@@ -328,7 +328,7 @@ static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes of the model's mesh that a contact has, of moved surfaces in any place. */
+/* Marks nodes of the model's mesh that belong to a contact, on moved surfaces at any parameters. */
 static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
 {
   const PetscInt n = t->fom->surface->n_nodes;
@@ -366,11 +366,13 @@ static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_o
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define USELESS 0.5 /* mean training error with which a model is refused */
-#define LOST    3   /* ridges in a row end the race of paths: beyond the best the errors grow with the ridge */
+#define USELESS 0.5 /* mean training error from which a model is refused */
+#define LOST                                                                                                           \
+  3 /* number of successive worse ridges that end the race of paths: above the best the errors grow                    \
+       with the ridge */
 
-/* The ridge of paths: each takes seconds, and a ridge that is worse than the best is seen by some of them. Fails where
-   an attempt of the search misses its training by half with any. */
+/* The ridge for paths: each trial takes seconds, and some of the paths suffice to reject a ridge that is worse than
+   the best. Fails if an attempt of the search has training errors of one half with any ridge. */
 static PetscErrorCode RaceRidges(HycoReducer t, HycoROM m, PetscReal *strength)
 {
   HycoJudged *judged, *its;
@@ -417,8 +419,7 @@ static PetscErrorCode TryRidges(HycoReducer t, HycoROM m, PetscReal *strength)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of A, with the strength of the ridge that gives the least training error. Without an interface there is nothing
- * to regress. */
+/* Takes all of A, with the ridge of the least training error. Without an interface there is no regression. */
 static PetscErrorCode ChooseAll(HycoReducer t, HycoROM m, PetscInt n, const PetscInt dof[])
 {
   const PetscReal given = ((Training)t->training)->ridge;
@@ -436,7 +437,7 @@ static PetscErrorCode ChooseAll(HycoReducer t, HycoROM m, PetscInt n, const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The full-order displacements, and the training errors that come with them. */
+/* Chooses the full-order displacements; sets the training errors with this choice. */
 static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
 {
   PetscInt n_all, n_contact, *all, *contact;

@@ -1,9 +1,10 @@
-/* The hybrid hyper-reduced model (38)-(41): the reduced system with the true multipliers of the RID's contacts. */
+/* The hybrid hyper-reduced model (38)-(41): the reduced system with the finite-element multipliers of the RID's
+   contacts. */
 #include <hycohybrid.h>
 #include <hycoromtypes.h>
 #include <petscviewer.h>
 
-/* Where nothing else is said. */
+/* The default type. */
 static PetscBool Offers(HycoReducer t, PetscBool targets)
 {
   (void)t, (void)targets;
@@ -46,7 +47,7 @@ static PetscErrorCode Reset(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The RID, what is full order in it, what the reconstruction has. */
+/* Prints the RID, its full-order displacements, and the data of the reconstruction. */
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
   static const char *const words[] = {"auto", "rank: the fewest that give full row rank",
@@ -77,7 +78,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the model file, or from it. */
+/* Writes to the model file, or reads from it. */
 static PetscErrorCode Move(HycoROM m, HycoH5 file)
 {
   HycoHybridROM h = (HycoHybridROM)m->data;

@@ -1,18 +1,18 @@
 /*
   Contact forces outside the RID, (41): the nonnegative combination of dual snapshots that agrees with the RID's forces
-  and vanishes where the predicted displacement leaves a gap. ([B D - D]_- in the paper's print is [B U - D]_-.)
-  With many snapshots (41) has many minimisers that round-off would choose among: a small weight on the coefficients
-  picks the one near the least norm.
+  and vanishes where the predicted displacement leaves a gap. ([B D - D]_- in the printed paper is [B U - D]_-.) With
+  many snapshots (41) has many minimisers, among which round-off would choose: a small weight on the coefficients
+  selects one close to the least norm.
 */
 #include <hycoalgorithms.h>
 #include <hycohybrid.h>
 
 const char *const HycoReconstructSolvers[] = {"auto", "nnls", "tao", NULL};
 enum { SOLVER_AUTO, SOLVER_NNLS, SOLVER_TAO };
-#define RTOL 1e-8 /* of the optimality conditions, recomputed */
+#define RTOL 1e-8 /* tolerance of the optimality conditions, recomputed */
 
-/* Least squares written out: Lawson and Hanson's active set, or TAO; with auto or tao the other one where the first
- * stops short. */
+/* Explicit least squares: Lawson and Hanson's active set method, or TAO; with auto or tao the other one if the first
+   does not converge. */
 static PetscErrorCode Solve(PetscInt solver, PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[],
                             PetscReal c[])
 {
@@ -31,9 +31,9 @@ static PetscErrorCode Solve(PetscInt solver, PetscInt m, PetscInt n, const Petsc
 /* The weight, relative to the largest snapshot force in the RID. */
 #define SMALL 1e-3
 
-/* What does not change from one prediction to the next. Contacts without force in every snapshot have no say. */
+/* Data that are constant over predictions, without the contacts whose force is zero in every snapshot. */
 struct _n_HycoReconstruction {
-  PetscInt n, *contact; /* contacts with a say, indices in pairs */
+  PetscInt n, *contact; /* these contacts, indices in pairs */
   PetscReal *S;         /* n x n_dual column major: their rows of S_lambda */
   PetscReal scale;      /* the largest snapshot force in the RID */
   PetscReal *open, *d, *h, *c;
@@ -85,8 +85,7 @@ PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (41) as least squares written out: A has a row for each contact of the RID, each open contact and each coefficient.
- */
+/* (41) as explicit least squares: A has a row for each contact of the RID, each open contact and each coefficient. */
 static PetscErrorCode SolveWrittenOut(HycoROM m)
 {
   HycoHybridROM h = (HycoHybridROM)m->data;

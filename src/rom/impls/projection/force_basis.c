@@ -2,8 +2,8 @@
   The nonnegative basis of the contact forces of a projection-based model (6.3, 6.4), made from the dual snapshots:
   their nonnegative factorisation, by default with as many vectors as there are displacement modes (the extended
   necessary condition l_u >= l_lambda), or the snapshots themselves (Haasdonk, Salomon, Wohlmuth, SIAM J. Numer. Anal.
-  50 (2012) 2656-2676). With these the modes take in the snapshots' supremizers, without which they would be fewer than
-  the forces to determine.
+  50 (2012) 2656-2676). With the snapshots the supremizers are added to the modes, which otherwise would be too few to
+  determine the forces.
 */
 #include <hycoalgorithms.h>
 #include <hycoprojection.h>
@@ -48,14 +48,14 @@ PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where targets are given, with which it is the last resort. */
+/* Offered as a last resort if targets are given. */
 PetscBool HycoProjectionOffers(HycoReducer t, PetscBool targets)
 {
   (void)t;
   return targets;
 }
 
-/* Supremizers of unit length: this share of them beyond the modes is round-off. */
+/* Supremizers of unit length: a smaller share outside the modes is round-off. */
 #define NEW 1e-8
 
 /* X -= V V^T X twice. */
@@ -90,7 +90,7 @@ static PetscErrorCode RemoveModes(HycoReducer t, Mat X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first n columns of A from column `first` of B on, which has the same rows. */
+/* Copies the first n columns of A to B from column `first` on; both have the same rows. */
 static PetscErrorCode CopyColumns(Mat A, PetscInt n, Mat B, PetscInt first)
 {
   PetscInt rows, lda[2];
@@ -110,8 +110,8 @@ static PetscErrorCode CopyColumns(Mat A, PetscInt n, Mat B, PetscInt first)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The reducer's modes, their singular values and the snapshots' coefficients, with q more columns of Q, and of these
-   the coefficients QtU (n_q x n_s column major). */
+/* Appends q columns of Q to the reducer's modes, with their singular values and the snapshots' coefficients, of
+   which QtU are those of Q (n_q x n_s column major). */
 static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, const PetscReal QtU[])
 {
   const PetscInt l = t->l, both = l + q;
@@ -141,7 +141,7 @@ static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What ProjectBatch() projects on, and where it puts it. */
+/* The basis and the result of ProjectBatch(). */
 typedef struct {
   Mat Q;
   PetscInt n;
@@ -158,8 +158,8 @@ static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends to the modes what the supremizers of the dual snapshots add to them, so that l, V, sigma (0 for these) and
-   VtU have more columns. */
+/* Appends to the modes the components of the supremizers of the dual snapshots that are orthogonal to them: l, V,
+   sigma (0 for these) and VtU then have more columns. */
 static PetscErrorCode Enrich(HycoReducer t)
 {
   PetscReal *QtU, *size;
@@ -229,7 +229,7 @@ PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
   p->dual = s->dual;
   PetscCall(HycoReducerDualSnapshots(t, &n, &S));
   k = s->vectors ? PetscMin(s->vectors, PetscMin(N, n)) : m->l;
-  for (PetscInt i = 0; i < N * n; i++) S[i] = PetscMax(S[i], 0); /* round-off of iterative solves */
+  for (PetscInt i = 0; i < N * n; i++) S[i] = PetscMax(S[i], 0); /* negative by round-off of iterative solves */
   PetscCall(PetscMalloc1(N * PetscMax(n, k) + 1, &p->V_lambda));
   if (p->dual == HYCO_DUAL_SNAPSHOTS)
     PetscCall(FromSnapshots(m, n, S));

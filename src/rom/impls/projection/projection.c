@@ -2,17 +2,36 @@
   The projection-based model (44), online: modes for the displacements, nonnegative vectors for the contact forces, on
   the whole mesh (Balajewicz, Amsallem, Farhat, Int. J. Numer. Meth. Engng 106 (2016) 644-663; the paper's 6.3):
 
-      V^T K V gamma + (V_lambda^T B V)^T Lambda_r = V^T F,   0 <= Lambda_r  complementary to  V_lambda^T (D - B V gamma)
-  >= 0
+    V^T K V gamma + (V_lambda^T B V)^T Lambda_r = V^T F,
+    0 <= Lambda_r  complementary to  V_lambda^T (D - B V gamma) >= 0
 
   Its stiffness is the hybrid model's with every node in A and no full-order unknown; this file adds the forces. Only
-  V_lambda^T of the gaps is held nonnegative: contacts may penetrate one by one.
+  V_lambda^T of the gaps is constrained: single contacts may penetrate.
 */
 #include <hycoprojection.h>
 #include <hycoromtypes.h>
 #include <petscviewer.h>
 
+/* Of B V, relative to its largest terms: that of the snapshots over a mode's singular value, which -hyco_pod_tol keeps
+   above 1e-7 of the first. */
+#define ROUNDOFF 1e-8
+
 const char *const HycoDuals[] = {"fe", "nnmf", "snapshots", NULL};
+
+/* Entries of V_lambda^T B V that are round-off: where modes do not move the gaps, they would give forces at random. */
+static void DropRoundoff(HycoROM m, const PetscReal largest[], PetscScalar b[])
+{
+  const HycoProjectionROM p = (HycoProjectionROM)m->data;
+
+  for (PetscInt i = 0; i < p->l_lambda; i++) {
+    PetscReal sum = 0;
+
+    for (PetscInt c = 0; c < m->m; c++) sum += p->V_lambda[(size_t)i * (size_t)m->pairs.n + (size_t)m->contact[c]];
+    for (PetscInt j = 0; j < m->l; j++) {
+      if (PetscAbsScalar(b[j * p->l_lambda + i]) <= ROUNDOFF * sum * largest[j]) b[j * p->l_lambda + i] = 0;
+    }
+  }
+}
 
 /* V_lambda^T B V and its transpose. */
 static PetscErrorCode FillContact(HycoROM m)
@@ -21,11 +40,11 @@ static PetscErrorCode FillContact(HycoROM m)
   HycoGalerkin g = (HycoGalerkin)m->data;
   const PetscInt l = m->l, n = p->l_lambda;
   const HycoRows *rows = &g->own_rows;
-  PetscReal *BV;
+  PetscReal *BV, *size, *largest; /* of a contact: B V, the sums of absolute terms in it, and their largest of all */
   PetscScalar *b, *bt;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(l, &BV));
+  PetscCall(PetscCalloc3(l, &BV, l, &size, l, &largest));
   PetscCall(MatZeroEntries(g->Br));
   PetscCall(MatDenseGetArray(g->Br, &b));
   PetscCall(MatDenseGetArray(g->Btr, &bt));
@@ -33,19 +52,48 @@ static PetscErrorCode FillContact(HycoROM m)
     const PetscInt k = m->contact[c];
 
     PetscCall(PetscArrayzero(BV, l));
+    PetscCall(PetscArrayzero(size, l));
     for (PetscInt t = rows->start[c]; t < rows->start[c + 1]; t++) {
-      for (PetscInt j = 0; j < l; j++) BV[j] += rows->value[t] * g->Vp[(size_t)rows->dof[t] * (size_t)l + (size_t)j];
+      for (PetscInt j = 0; j < l; j++) {
+        const PetscReal term = rows->value[t] * g->Vp[(size_t)rows->dof[t] * (size_t)l + (size_t)j];
+
+        BV[j] += term;
+        size[j] += PetscAbsReal(term);
+      }
     }
     for (PetscInt j = 0; j < l; j++) {
+      largest[j] = PetscMax(largest[j], size[j]);
       for (PetscInt i = 0; i < n; i++) b[j * n + i] += p->V_lambda[(size_t)i * (size_t)m->pairs.n + (size_t)k] * BV[j];
     }
   }
+  DropRoundoff(m, largest, b);
   for (PetscInt j = 0; j < l; j++) {
     for (PetscInt i = 0; i < n; i++) bt[i * l + j] = b[j * n + i];
   }
   PetscCall(MatDenseRestoreArray(g->Btr, &bt));
   PetscCall(MatDenseRestoreArray(g->Br, &b));
-  PetscCall(PetscFree(BV));
+  PetscCall(PetscFree3(BV, size, largest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where no mode moves a row's gap, it is open: no force can satisfy or violate it. */
+static PetscErrorCode OpenUnmoved(HycoROM m, PetscScalar d[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->data;
+  const PetscInt n = ((HycoProjectionROM)m->data)->l_lambda;
+  const PetscScalar *b;
+  PetscReal largest = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < n; i++) largest = PetscMax(largest, PetscAbsScalar(d[i]));
+  PetscCall(MatDenseGetArrayRead(g->Br, &b));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt j = 0;
+
+    while (j < m->l && b[j * n + i] == 0) j++;
+    if (j == m->l) d[i] = largest > 0 ? largest : 1;
+  }
+  PetscCall(MatDenseRestoreArrayRead(g->Br, &b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -64,6 +112,7 @@ static PetscErrorCode FillGap(HycoROM m)
     d[i] = 0;
     for (PetscInt c = 0; c < m->m; c++) d[i] += v[m->contact[c]] * g->own_rows.gap[c];
   }
+  PetscCall(OpenUnmoved(m, d));
   PetscCall(VecRestoreArray(g->Dr, &d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -119,7 +168,7 @@ PetscErrorCode HycoProjectionSetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the model file, or from it. */
+/* Writes to the model file, or reads from it. */
 PetscErrorCode HycoProjectionMove(HycoROM m, HycoH5 h)
 {
   HycoProjectionROM p = (HycoProjectionROM)m->data;

@@ -1,13 +1,13 @@
 /*
-  The regression: every coefficient, contact force, stress and inelastic strain is a function of the parameters, of a
-  history one at each listed time, by radial basis functions with a linear tail,
+  The regression model: every coefficient, contact force, stress and inelastic strain is a function of the parameters,
+  with a history one at each listed time, by radial basis functions with a linear polynomial,
 
-      y(mu) = sum over the training points k of c_k phi(|mu - mu_k|) + a + b . mu,    sum of c_k (1, mu_k) = 0
+    y(mu) = sum over the training points k of c_k phi(|mu - mu_k|) + a + b . mu,    sum of c_k (1, mu_k) = 0
 
-  parameters scaled by their ranges, which has the training values at the training points. All of it is one set of
-  weights, y(mu) = sum of w_k(mu) y_k. Contact forces and inelastic strains are cut at 0. No law is evaluated and no
-  equation solved: nothing keeps bodies from penetrating, as the residuals at the contacts say. It shows what the
-  others' physics is worth.
+  with the parameters scaled by their ranges, which reproduces the training values. All functions have the same weights,
+  y(mu) = sum of w_k(mu) y_k. Contact forces and inelastic strains are cut off at 0. No law is evaluated and no equation
+  solved, so that bodies may penetrate, as the residuals at the contacts show. It is a baseline without mechanics for
+  the other models.
 */
 #include <hycoalgorithms.h>
 #include <hycomaterialimpl.h>
@@ -23,14 +23,14 @@ typedef struct {
   PetscInt kernel;
 } * Training;
 
-/* Values: a column for each training point, of a history one for each of its listed times, point after point. */
+/* Values: a column for each training point, with a history one for each of its listed times, point after point. */
 typedef struct {
   PetscInt kernel, n_columns;
   PetscReal *gamma, *Lambda;    /* l, N_lambda rows */
-  PetscReal *sigma, *inelastic; /* of a history: n_cells x n_sigma, n_cells rows */
-  PetscReal *inverse;           /* online: of the system for c, a, b (symmetric) */
-  PetscReal *right, *weight;    /* its right side; the points' weights, with those of a, b */
-  PetscReal largest;            /* contact force of the training */
+  PetscReal *sigma, *inelastic; /* with a history: n_cells x n_sigma, n_cells rows */
+  PetscReal *inverse;           /* online: inverse of the system for c, a, b (symmetric) */
+  PetscReal *right, *weight;    /* its right-hand side; the points' weights, followed by those of a, b */
+  PetscReal largest;            /* largest contact force in training */
   HycoStep *step;               /* by listed time */
 } * Regression;
 
@@ -59,7 +59,7 @@ static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A field of the training paths in the model's cells, `width` numbers each. */
+/* Reads a field of the training paths in the model's cells, `width` numbers each. */
 static PetscErrorCode ReadCells(HycoReducer t, HycoROM m, const char field[], PetscInt width, PetscReal value[])
 {
   const HycoSnapshots store = ((Training)t->training)->store;
@@ -123,7 +123,7 @@ static PetscReal Kernel(PetscInt kernel, PetscReal r)
   return r > 0 ? r * r * PetscLogReal(r) : 0;
 }
 
-/* The system's column of a point: kernels to the training points, 1, the scaled parameters. */
+/* The system's column of a point: kernels at the training points, 1, the scaled parameters. */
 static void Column(HycoROM m, const PetscReal mu[], PetscReal column[])
 {
   const HycoScene s = m->scene;
@@ -136,9 +136,9 @@ static void Column(HycoROM m, const PetscReal mu[], PetscReal column[])
     column[n + 1 + p] = (mu[p] - s->lo[p]) / (s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1);
 }
 
-#define SINGULAR 1e-13 /* points on one plane leave the polynomial open: its least norm is taken */
+#define SINGULAR 1e-13 /* points on one plane do not determine the polynomial: its least norm is taken */
 
-/* The inverse of the system, the tail's columns below and beside the kernels'. */
+/* The inverse of the system, with the polynomial's columns beside and below the kernels'. */
 static PetscErrorCode Invert(HycoROM m)
 {
   Regression r = (Regression)m->data;
@@ -198,7 +198,8 @@ static void Weigh(HycoROM m, const PetscReal mu[])
   }
 }
 
-/* The weighted sum of the points' columns of listed time `step`, `rows` numbers each; at least `least`. */
+/* The weighted sum of the points' columns of listed time `step`, `rows` numbers each; values below `least` are
+   raised to it. */
 static void Sum(HycoROM m, PetscInt step, PetscInt rows, const PetscReal data[], PetscReal least, PetscReal value[])
 {
   const Regression r = (Regression)m->data;
@@ -213,9 +214,9 @@ static void Sum(HycoROM m, PetscInt step, PetscInt rows, const PetscReal data[],
   for (PetscInt i = 0; i < rows; i++) value[i] = PetscMax(value[i], least);
 }
 
-#define NO_FORCE 1e-12 /* of the largest in training: round-off */
+#define NO_FORCE 1e-12 /* share of the largest in training: round-off */
 
-/* Displacement and forces at mu (all variables), where the history is at listed time `step`. */
+/* Displacement and forces at mu (all variables), with a history at listed time `step`. */
 static PetscErrorCode Evaluate(HycoROM m, PetscInt step, const PetscReal mu[])
 {
   const Regression r = (Regression)m->data;
@@ -229,7 +230,7 @@ static PetscErrorCode Evaluate(HycoROM m, PetscInt step, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The listed time where the model is, with the fields of its cells. */
+/* Adds the current listed time, with the fields of its cells. */
 static PetscErrorCode List(HycoROM m, PetscInt step, PetscReal t)
 {
   const Regression r = (Regression)m->data;
@@ -242,7 +243,7 @@ static PetscErrorCode List(HycoROM m, PetscInt step, PetscReal t)
   s->index = step;
   s->t = t;
   s->kkt = HycoKKTMax(&m->prediction.kkt);
-  s->stored = NAN; /* nobody knows */
+  s->stored = NAN; /* not known */
   PetscCall(HycoTraceAdd(m, t));
   PetscCall(HycoTraceList(m, &sigma, &inelastic));
   Sum(m, step, n_cells * ns, r->sigma, PETSC_MIN_REAL, sigma);
@@ -305,9 +306,9 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- file, words -- */
+/* -- file, description -- */
 
-/* To the model file, or from it. */
+/* Writes to the model file, or reads from it. */
 static PetscErrorCode Move(HycoROM m, HycoH5 h)
 {
   Regression r = (Regression)m->data;

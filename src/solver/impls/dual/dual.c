@@ -1,20 +1,21 @@
 /*
   The dual form: the flexibility S = B K^-1 Bt and the gap without forces g = D - B K^-1 F, from one factorisation, and
-  the complementarity problem w = g + S L in the contact forces alone, small and dense on every rank.
+  the complementarity problem w = g + S L in the contact forces only, small and dense on every rank.
 */
 #include <hycosolverimpl.h>
 #include <string.h>
 
-/* Lemke's dictionary has m^2 entries, and each of its some m pivots changes them all: beyond this it is no fallback,
-   nor is S where another form was chosen. */
+/* Lemke's dictionary has m^2 entries, all of which change in each of about m pivots: above this number of contacts
+   it is not used as a fallback, and neither is the dual form where another form was chosen. */
 #define HYCO_FALLBACK_MAX 3000
 
 typedef struct {
-  PetscInt m, p; /* contacts; unknowns pinned because K is singular: they come before the contacts in S, g and L */
+  PetscInt m, p; /* numbers of contacts, and of unknowns pinned because K is singular: these come before the contacts
+                    in S, g and L */
   PetscReal *S, *g, *L;
   PetscBool *active;
-  PetscBool started; /* active holds a solution's set */
-  HycoTao tao;       /* of each rank alone: the problem is replicated */
+  PetscBool started; /* active is the set of a solution */
+  HycoTao tao;       /* on each rank alone, because the problem is replicated */
 } Dual;
 
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
@@ -48,11 +49,11 @@ static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscRea
   if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
   PetscCall(HycoDirectPinKernel(f->direct, y->K));
   PetscCall(
-      HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation goes on from it */
+      HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation reuses the analysis */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes room for m contacts and p pinned unknowns; a change forgets the last solution's set. */
+/* Allocates for m contacts and p pinned unknowns; a change drops the last solution's set. */
 static PetscErrorCode Resize(Dual *d, PetscInt m, PetscInt p)
 {
   const PetscInt n = m + p;
@@ -85,7 +86,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A distributed vector, whole on every rank. */
+/* Gathers a distributed vector on every rank. */
 static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
 {
   PetscMPIInt size, count, *counts, *offsets;
@@ -139,7 +140,7 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The dense problem by the method now. Floating bodies begin with every contact closed. */
+/* Solves the dense problem by the current method. Floating bodies start with every contact closed. */
 static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
 {
   const HycoLCP lcp = {.n = d->m,
@@ -157,7 +158,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
   for (PetscInt i = 0; i < d->m && (!s->warm || !d->started); i++) d->active[i] = (PetscBool)(d->p > 0);
   PetscCall(HycoTaoSetType(d->tao, s->now.type, s->max_its));
   PetscCall(HycoTaoSolveLCP(d->tao, &lcp, d->active, d->L, &s->its, solved));
-  for (PetscInt i = 0; i < d->m; i++) { /* round-off below zero; the residuals are recomputed */
+  for (PetscInt i = 0; i < d->m; i++) { /* negative by round-off; the residuals are recomputed */
     PetscReal *L = d->L + d->p + i;
 
     *L = d->p && !d->active[i] ? 0 : PetscMax(*L, 0);
@@ -167,7 +168,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's part of the forces that every rank has. */
+/* Sets this rank's part of the forces, which every rank has. */
 static PetscErrorCode SetForces(const Dual *d, Vec L)
 {
   PetscInt lo, hi;
@@ -181,7 +182,7 @@ static PetscErrorCode SetForces(const Dual *d, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x = K^-1 F - K^-1 Bt L, the first of them known. */
+/* x = K^-1 F - K^-1 Bt L; the first term is known. */
 static PetscErrorCode AddForces(HycoSolver s, Vec x, Vec L)
 {
   HycoSystem y = s->system;
@@ -221,7 +222,7 @@ static PetscErrorCode Recover(HycoSolver s, const Dual *d, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The forces change by dL (m), and x with them. */
+/* Changes the forces by dL (m), and x accordingly. */
 static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
 {
   Vec change, force, move;
@@ -246,8 +247,7 @@ static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where K is ill conditioned, x misses the gaps under the forces by more than S and g know: S dL = D - B x closes them.
- */
+/* If K is ill conditioned, the gaps of x are less accurate than those from S and g: S dL = D - B x corrects them. */
 static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
 {
   HycoSystem y = s->system;
@@ -276,10 +276,10 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where refinement changes S by no more than this share of its largest entry, nothing was lost to round-off. */
+/* If refinement changes S by at most this share of its largest entry, it had no relevant round-off. */
 #define SAME_FLEXIBILITY 1e-12
 
-/* A small dense K: S again, by solves refined in twice the working precision. */
+/* For a small dense K: computes S again, by solves refined in twice the working precision. */
 static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *better)
 {
   Dual *d = (Dual *)form->data;

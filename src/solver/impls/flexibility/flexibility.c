@@ -1,13 +1,13 @@
 /*
-  Systems whose flexibility is given: w = g + G L, dense on one process, without displacements. The factor of G on the
-  active contacts is kept from one solve to the next while G stays.
+  Systems with a given flexibility: w = g + G L, dense on one process, without displacements. The factor of G on the
+  active contacts is kept from one solve to the next while G is unchanged.
 */
 #include <hycosolverimpl.h>
 
 typedef struct {
   PetscInt m;
   PetscBool *active;
-  PetscBool started; /* active holds a solution's set */
+  PetscBool started; /* active is the set of a solution */
   HycoSetFactor factor;
   HycoOperatorState of;
   HycoTao tao;
@@ -64,7 +64,9 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(VecGetArray(L, &l));
   PetscCall(HycoTaoSetType(f->tao, s->now.type, s->max_its));
   PetscCall(HycoTaoSolveLCP(f->tao, &lcp, f->active, l, &s->its, solved));
-  for (PetscInt i = 0; i < f->m; i++) l[i] = PetscMax(l[i], 0); /* round-off below zero; the residuals are recomputed */
+  for (PetscInt i = 0; i < f->m; i++)
+    l[i] = PetscMax(l[i], 0); /* negative by round-off; the residuals are
+                                 recomputed */
   PetscCall(VecRestoreArray(L, &l));
   PetscCall(VecRestoreArrayRead(y->D, &lcp.q));
   PetscCall(MatDenseRestoreArrayRead(y->G, &lcp.M));

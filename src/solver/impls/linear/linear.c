@@ -11,7 +11,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionBegin;
   (void)form, (void)asked, (void)why;
   *cost = s->system->K && !s->system->m ? 0 : -1;
-  if (s->iterative && s->linear != HYCO_LINEAR_ITERATIVE) *cost = -1; /* iterations are to be asked for */
+  if (s->iterative && s->linear != HYCO_LINEAR_ITERATIVE) *cost = -1; /* iterations only on request */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,5 @@
 /*
-  Gap coordinates: of each contact row one unknown (its pivot) is replaced by the row's value, so that B x <= D becomes
+  Gap coordinates: for each contact row one unknown (its pivot) is replaced by the row's value, so that B x <= D becomes
   the bound y_p <= D_i. x = T y, Kg = T^T K T.
 */
 #include "gap.h"
@@ -18,7 +18,7 @@ PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
   const PetscScalar *shared;
 
   PetscFunctionBegin;
-  /* the number of contacts of each unknown, fetched for the unknowns of this rank's rows */
+  /* the number of contacts of each unknown in this rank's rows */
   PetscCall(MatCreateVecs(Bt, NULL, &count));
   PetscCall(MatGetOwnershipRange(Bt, &first, &last));
   PetscCall(VecGetArray(count, &c));
@@ -110,7 +110,7 @@ static PetscErrorCode OneEach(Mat B, PetscBool *diagonal)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Kg = T^T K T for contacts that are each on one unknown: no product of matrices. */
+/* Kg = T^T K T if each contact is on one unknown: without a matrix product. */
 static PetscErrorCode ScaleOnly(HycoSystem y, Gap *s)
 {
   PetscInt lo, hi, n;
@@ -140,7 +140,7 @@ static PetscErrorCode ScaleOnly(HycoSystem y, Gap *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* T = I, but in a pivot's row: x_p = (y_p - sum_j B_ij y_j) / B_ip. */
+/* T = I, except in a pivot's row: x_p = (y_p - sum_j B_ij y_j) / B_ip. */
 static PetscErrorCode BuildT(HycoSystem y, Gap *s)
 {
   PetscInt lo, hi, first, last, bs;
@@ -189,7 +189,7 @@ static PetscErrorCode BuildT(HycoSystem y, Gap *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Leaves out the idle contacts: pivot and contact then hold the others, and so does the active set. */
+/* Removes the idle contacts from pivot, contact and the active set. */
 static PetscErrorCode DropIdle(Gap *s, PetscInt n)
 {
   PetscFunctionBegin;
@@ -204,7 +204,7 @@ static PetscErrorCode DropIdle(Gap *s, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = T^-1 x: each pivot holds its contact's B x. */
+/* y = T^-1 x: at each pivot the contact's B x. */
 static PetscErrorCode ToGaps(HycoSystem s, const Gap *q, Vec x, Vec y)
 {
   Vec gap;
@@ -223,7 +223,7 @@ static PetscErrorCode ToGaps(HycoSystem s, const Gap *q, Vec x, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Attaches K's near-kernel to Kw, in gap coordinates, for multigrid. */
+/* Attaches K's near-null space to Kw, in gap coordinates, for multigrid. */
 static PetscErrorCode NearKernel(HycoSystem s, const Gap *g)
 {
   MatNullSpace near = NULL, mine;
@@ -255,7 +255,7 @@ static PetscErrorCode NearKernel(HycoSystem s, const Gap *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solver of Kw, which was made anew: with what it has learned where sizes stay. */
+/* Sets the new Kw in the solver, which keeps its data if the sizes are unchanged. */
 static PetscErrorCode RenewSolver(HycoSolver s, Gap *g)
 {
   PetscInt n_old = -1;
@@ -339,7 +339,7 @@ static PetscErrorCode SolveRefined(Mat Kw, KSP ksp, Vec rhs, Vec y)
 
   PetscFunctionBegin;
   PetscCall(KSPSolve(ksp, rhs, y));
-  PetscCall(KSPGetInitialGuessNonzero(ksp, &iterative)); /* of its own accuracy */
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &iterative)); /* an iterative solver has its own accuracy */
   if (iterative) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(y, &r));
   PetscCall(VecDuplicate(y, &dy));

@@ -1,24 +1,25 @@
 /*
-  Where the active set starts when most unknowns are contacts: nested iteration. From no contact, the edges of a contact
-  zone move by about one node an iteration, so that their number grows with the mesh. Coarser problems, made from the
-  matrix alone, are solved first, each from the set of the coarser one; then an edge is off by a few nodes at most.
+  Initial active set by nested iteration if most unknowns are contacts. Starting without contact, the edges of a contact
+  zone move by about one node in an iteration, so that the number of iterations grows with the mesh. Coarser problems,
+  derived from the matrix, are solved first, each from the set of the next coarser one; an edge is then wrong by a few
+  nodes at most.
 
-  Coarsening is classical: a maximal independent set of the strong couplings, taken breadth first, stays; the others are
-  interpolated from it (J. Ruge, K. Stueben, Algebraic multigrid, in: Multigrid methods, SIAM 1987: direct
-  interpolation); the coarse matrix is P^T K P. Coarse unknowns are unknowns of the finer level, so that their bounds
-  are too. All of this needs couplings of one sign, K_ij <= 0 off the diagonal once some unknowns are counted negative:
-  membranes and ropes have them. Elasticity in 2D and 3D does not, and then no start is offered.
+  Classical coarsening: a maximal independent set of the strong couplings, chosen breadth first, is kept; the other
+  unknowns are interpolated from it (J. Ruge, K. Stueben, Algebraic multigrid, in: Multigrid methods, SIAM 1987: direct
+  interpolation); the coarse matrix is P^T K P. Coarse unknowns are unknowns of the finer level, with their bounds. This
+  requires couplings of one sign, K_ij <= 0 off the diagonal after a change of sign of some unknowns: membranes and
+  ropes have them. Elasticity in 2D and 3D does not, and then no initial set is computed.
 
-  The levels live on rank 0: together they take as much room as the finest one.
+  The levels are on rank 0; the coarser ones together need as much memory as the finest.
 */
 #include "gap.h"
 
-/* The coarsest problem is solved from no contact at all. */
+/* A problem of this size is solved from no contact. */
 #define HYCO_COARSEST   24
 #define HYCO_MAX_LEVELS 64
-/* A coarse problem is only a start: this many iterations without an end are enough. */
+/* Limit of iterations on a coarse level, which only gives an initial set. */
 #define HYCO_LEVEL_ITS 40
-/* A coupling is strong above this part of the row's largest. */
+/* A coupling is strong above this share of the row's largest. */
 #define HYCO_STRONG 0.25
 
 typedef struct {
@@ -27,7 +28,7 @@ typedef struct {
   Vec f;
   PetscReal *bound;    /* PETSC_INFINITY: none */
   PetscBool *active;   /* at its bound */
-  PetscInt *coarse_of; /* number in the next coarser level, -1: interpolated from it */
+  PetscInt *coarse_of; /* number in the next coarser level, -1: interpolated from that level */
 } Level;
 
 /* The rows of a sequential matrix, borrowed. */
@@ -60,7 +61,7 @@ static PetscErrorCode RowsRestore(Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Counts unknowns without a bound negative where that makes all couplings <= 0: sign[i] = 1 or -1. */
+/* Changes the sign of unknowns without a bound if this makes all couplings <= 0: sign[i] = 1 or -1. */
 static PetscErrorCode FindSigns(const Rows *r, const PetscReal bound[], PetscReal sign[], PetscBool *found)
 {
   PetscInt *queue;
@@ -69,7 +70,7 @@ static PetscErrorCode FindSigns(const Rows *r, const PetscReal bound[], PetscRea
   *found = PETSC_TRUE;
   PetscCall(PetscMalloc1(r->n, &queue));
   for (PetscInt i = 0; i < r->n; i++) sign[i] = 0;
-  for (PetscInt pass = 0; pass < 2; pass++) { /* from the bounded ones, then what they do not reach */
+  for (PetscInt pass = 0; pass < 2; pass++) { /* from those with a bound, then the ones not reached */
     for (PetscInt s = 0; s < r->n; s++) {
       PetscInt head = 0, tail = 0;
 
@@ -104,7 +105,7 @@ static PetscErrorCode FindSigns(const Rows *r, const PetscReal bound[], PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The weakest strong coupling of a row, as a negative number; 0: the row is alone. */
+/* The weakest strong coupling of a row, as a negative number; 0: the row has no couplings. */
 static PetscReal Strong(const Rows *r, PetscInt i)
 {
   PetscReal least = 0;
@@ -155,7 +156,7 @@ static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* P: identity on what stays; elsewhere w_ij = -(sum_k K_ik / sum of its strong coarse K_ij) K_ij / K_ii. */
+/* P: identity on the unknowns kept; elsewhere w_ij = -(sum_k K_ik / sum of its strong coarse K_ij) K_ij / K_ii. */
 static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], PetscInt n_coarse, Mat *P)
 {
   PetscInt *length, *col, longest = 1;
@@ -205,7 +206,7 @@ static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next coarser level; *made is false where the matrix is small, or does not coarsen. */
+/* The next coarser level; *made is false if the matrix is small, or cannot be coarsened. */
 static PetscErrorCode Coarsen(Level *fine, Level *coarse, PetscBool *made)
 {
   Rows r;
@@ -232,7 +233,7 @@ static PetscErrorCode Coarsen(Level *fine, Level *coarse, PetscBool *made)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the iterations on a level share. */
+/* Data of the iterations on a level. */
 typedef struct {
   const Level *level;
   Vec y, rhs, residual, diagonal;
@@ -288,7 +289,8 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The active set from l->active; y is the last solution. It is a start only: how it ends does not matter. */
+/* The active set method from l->active; y is the last solution. Only the set is used, whether or not it has
+   converged. */
 static PetscErrorCode SolveLevel(Level *l, Vec y)
 {
   Solve p = {.level = l, .y = y};
@@ -320,8 +322,8 @@ static PetscErrorCode SolveLevel(Level *l, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The finer set: what stays keeps its state; what is interpolated is relaxed once, and held if that passes its bound.
- */
+/* The finer set: coarse unknowns keep their state; interpolated ones are relaxed once, and closed if this exceeds
+   the bound. */
 static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
 {
   Vec fine_y, diagonal;
@@ -359,7 +361,7 @@ static PetscErrorCode LevelDestroy(Level *l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Down to the coarsest level, and up again to level 0, which is not solved. */
+/* From level 0 to the coarsest level and back; level 0 is not solved. */
 static PetscErrorCode Cascade(Level level[], PetscBool *made)
 {
   PetscInt n = 1;
@@ -422,7 +424,7 @@ static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The whole matrix on rank 0, an empty one elsewhere. */
+/* Gathers the whole matrix on rank 0, an empty one elsewhere. */
 static PetscErrorCode GatherMatrix(MPI_Comm comm, Mat K, Mat *whole)
 {
   PetscMPIInt rank, size;

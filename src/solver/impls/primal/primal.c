@@ -1,16 +1,17 @@
 /*
-  The primal form, in gap coordinates: of each contact row one unknown (its pivot) is replaced by the row's value, so
+  The primal form, in gap coordinates: for each contact row one unknown (its pivot) is replaced by the row's value, so
   that B x <= D becomes the bound y_p <= D_i. With x = T y: Kg = T^T K T, f = T^T F, and the force of a contact is the
-  residual at its pivot, L_i = (f - Kg y)_p. No dense matrix appears, whatever the number of contacts.
+  residual at its pivot, L_i = (f - Kg y)_p. No dense matrix is formed, whatever the number of contacts.
 */
 #include "gap.h"
 #include <string.h>
 
-/* Contacts are many where they are more than a share of the unknowns, or so many that S would not fit. */
+/* This form is cheapest if contacts are more than a share of the unknowns, or so many that S would not fit in
+   memory. */
 #define HYCO_MANY 6000
-/* A warm start that is not over by then began too far off: coarser problems give a better one. */
+/* A warm start that has not converged by then was far from the solution: coarser problems give a better start. */
 #define HYCO_WARM_ITS 4
-/* Noise of iterative solves while the set changes, and in the last; the least where a residual asks for more. */
+/* Noise of iterative solves while the set changes, and in the final solves; the least, if a residual requires it. */
 #define HYCO_NOISE_FIRST 1e-5
 #define HYCO_NOISE       1e-9
 #define HYCO_NOISE_LEAST 1e-13
@@ -29,13 +30,13 @@ static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the iterations share. */
+/* Data of the iterations. */
 typedef struct {
   HycoSolver s;
   const Gap *gap;
-  PetscInt n; /* this rank's contacts, without the idle ones */
+  PetscInt n; /* this rank's contacts, without idle ones */
   PetscReal *bound, *value, *force, *diagonal, *at_d;
-  PetscReal noise; /* share of the largest force and gap that iterative solves leave */
+  PetscReal noise; /* error of iterative solves, as a share of the largest force and gap */
   PetscInt *at;
   Vec x, L; /* the caller's */
   Vec y, f, rhs, residual, work;
@@ -43,7 +44,7 @@ typedef struct {
   PetscBool cold;
 } Primal;
 
-/* The values at the pivots, and the forces. */
+/* Evaluates the values at the pivots, and the forces. */
 static PetscErrorCode Evaluate(const Primal *p)
 {
   PetscFunctionBegin;
@@ -92,7 +93,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set from coarser problems, where they exist: most unknowns are contacts, coupled with one sign. */
+/* The set from coarser problems, if they exist: most unknowns are contacts, with couplings of one sign. */
 static PetscErrorCode StartFromCoarse(const Primal *p, PetscBool active[], PetscBool *made)
 {
   HycoSolver s = p->s;
@@ -118,7 +119,7 @@ static PetscErrorCode StartFromCoarse(const Primal *p, PetscBool active[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Iterative solves leave residuals of 1 % of `noise`; changes of the set below it are not to be believed. */
+/* Iterative solves stop at residuals of 1 % of `noise`; smaller violations do not change the set. */
 static PetscErrorCode SetAccuracy(Primal *p, PetscReal noise)
 {
   PetscFunctionBegin;
@@ -127,7 +128,7 @@ static PetscErrorCode SetAccuracy(Primal *p, PetscReal noise)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x and the forces of the set, none of them negative if `clean`. */
+/* Writes x and the forces of the set, without negative ones if `clean`. */
 static PetscErrorCode Fill(const Primal *p, PetscBool clean)
 {
   const Gap *g = p->gap;
@@ -147,7 +148,7 @@ static PetscErrorCode Fill(const Primal *p, PetscBool clean)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set settled under loose solves: now in earnest, and as far as the residual that is to be reached asks for. */
+/* The set has converged with inaccurate solves: continues with accurate ones, up to the target of the residual. */
 static PetscErrorCode Settled(void *ctx, PetscBool *more)
 {
   Primal *p = (Primal *)ctx;
@@ -165,7 +166,7 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last solution's set was far off. */
+/* Replaces a set from the last solution that was far from the new one. */
 static PetscErrorCode Restart(void *ctx, PetscInt its, PetscBool active[], PetscBool *fresh)
 {
   const Primal *p = (const Primal *)ctx;
@@ -176,7 +177,7 @@ static PetscErrorCode Restart(void *ctx, PetscInt its, PetscBool active[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set of a cold start: floating bodies begin closed. */
+/* The set of a cold start: floating bodies start with all contacts closed. */
 static PetscErrorCode StartCold(Primal *p, PetscBool active[])
 {
   HycoSolver s = p->s;
@@ -219,7 +220,7 @@ static PetscErrorCode ActiveSet(Primal *p, Gap *g, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A type of TAO on the same bounds. */
+/* Solves the bound-constrained problem by a Tao type. */
 static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
 {
   HycoSolver s = p->s;
@@ -243,7 +244,7 @@ static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
   PetscCall(HycoTaoSetType(g->tao, s->now.type, s->max_its));
   PetscCall(HycoTaoSolve(g->tao, g->H, p->rhs, lo, hi, p->y, &s->its, solved));
   PetscCall(Evaluate(p));
-  for (PetscInt k = 0; k < p->n; k++) { /* a value on its bound has gone through a scale and back */
+  for (PetscInt k = 0; k < p->n; k++) { /* scaling and its inverse may have moved a value from its bound */
     const PetscReal ulps = 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(p->bound[k]);
 
     g->active[k] = (PetscBool)(p->value[k] >= p->bound[k] - ulps);
@@ -296,7 +297,7 @@ static PetscErrorCode PrimalDestroy(Primal *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Left to itself where contacts are many, or where K is solved with iteratively. */
+/* Chosen automatically if there are many contacts, or if K is solved iteratively. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
 {
   Gap *g = (Gap *)form->data;
@@ -349,7 +350,8 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(HycoSolverNameMethod(s, "primal"));
   PetscCall(own ? ActiveSet(&p, g, solved) : BoundQP(&p, g, solved));
   PetscCall(HycoNameLinear(s, g->ksp));
-  PetscCall(Fill(&p, (PetscBool)(*solved || !own))); /* not solved: the set has changed since; the residuals show it */
+  /* if not solved, the set has changed since: its last forces show in the residuals */
+  PetscCall(Fill(&p, (PetscBool)(*solved || !own)));
   PetscCall(PrimalDestroy(&p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

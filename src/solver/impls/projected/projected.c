@@ -1,45 +1,46 @@
 /*
-  The projected form: the active set in the displacements themselves, each set by conjugate gradients on those that
-  close its contacts, with multigrid for K alone (linear/constrained.c). Nothing is factored, K is not copied, and the
-  multigrid serves every set. Solves are loose while the set changes and become more accurate when it has settled.
+  The projected form: the active set method in the displacements, each set solved by conjugate gradients on the
+  displacements that close its contacts, with multigrid for K (linear/constrained.c). Nothing is factored, K is not
+  copied, and one multigrid serves every set. Solves are inaccurate while the set changes and become accurate when it
+  has converged.
 */
 #include "../primal/gap.h"
 #include <string.h>
 
-/* Accuracy of the first solves, and what each settled set makes of it. */
+/* Accuracy of the first solves, and its factor after each converged set. */
 #define HYCO_FIRST   1e-3
 #define HYCO_SHARPEN 3e-4
-/* The last accuracy that every solution has; more where its residual asks for it. */
+/* Accuracy of the final solves; increased if the residual requires it. */
 #define HYCO_LAST  1e-10
 #define HYCO_LEAST 1e-15
-/* Changes of the set that are believed, as a multiple of the accuracy; the least of them. */
+/* Violations that change the set, as a multiple of the accuracy; the least of them. */
 #define HYCO_BELIEVED 30
 #define HYCO_NOISE    1e-9
 
-/* What the form keeps. */
+/* Data of the form. */
 typedef struct {
   HycoConstrained constrained;
-  HycoOperatorState made, seen; /* K of the multigrid; B about which `possible` and `node` were found */
+  HycoOperatorState made, seen; /* K of the multigrid; B from which `possible` and `node` were computed */
   PetscBool possible;
-  PetscInt *node, *contact, n; /* this rank's contacts that are not idle: their nodes' unknowns, their rows */
+  PetscInt *node, *contact, n; /* contacts of this rank that are not idle: an unknown of their nodes, their rows */
   PetscBool *active;           /* of this rank's n */
-  PetscBool started;           /* active holds a solution's set */
+  PetscBool started;           /* active is the set of a solution */
   HycoTao tao;
 } Projected;
 
-/* What the iterations share. */
+/* Data of the iterations. */
 typedef struct {
   HycoSolver s;
   Projected *form;
   PetscReal *bound, *value, *force;
-  PetscReal accuracy, size; /* relative accuracy of solves; of what acts */
+  PetscReal accuracy, size; /* relative accuracy of solves; size of the loads */
   PetscInt *at;             /* work */
   PetscBool *solved;        /* the set of the last solve */
-  PetscInt n_sets;          /* that were solved on so far */
-  Vec x, d, l, r, gap;      /* d, l: of the active rows */
+  PetscInt n_sets;          /* number of sets so far */
+  Vec x, d, l, r, gap;      /* d, l: for the active rows */
 } Run;
 
-/* The node that each contact belongs to: its slave where B says so, else that of an entry no other contact has. */
+/* The node of each contact: its slave if B has one, else that of an entry that no other contact has. */
 static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
 {
   PetscInt lo, hi, *pivot;
@@ -76,7 +77,7 @@ static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The active rows of B and their nodes become the constraints. */
+/* Sets the active rows of B and their nodes as constraints. */
 static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool *singular)
 {
   const Projected *f = p->form;
@@ -118,7 +119,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts' B x, and the forces of the active ones. */
+/* Evaluates the contacts' B x, and the forces of the active ones. */
 static PetscErrorCode Evaluate(Run *p, const PetscBool active[])
 {
   const Projected *f = p->form;
@@ -181,7 +182,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The forces of the set, none of them negative, in L. */
+/* Sets L to the forces of the set, without negative ones. */
 static PetscErrorCode FillForces(const Run *p, PetscBool clean, const PetscBool active[], Vec L)
 {
   PetscScalar *l;
@@ -196,7 +197,7 @@ static PetscErrorCode FillForces(const Run *p, PetscBool clean, const PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The accuracy of the last solve, times a factor; a start may have been more accurate than was asked for. */
+/* Reduces the accuracy by a factor. A given start may already be more accurate than the present one. */
 static PetscErrorCode Sharpen(Run *p, PetscReal factor)
 {
   KSP ksp;
@@ -210,8 +211,8 @@ static PetscErrorCode Sharpen(Run *p, PetscReal factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set settled: solve more accurately, to the last accuracy and as far as the residual then asks for; at once where
-   a residual is to be reached on the set of the solve before. */
+/* The set has converged: solves more accurately, to the final accuracy and further if the residual requires it. With a
+   target of the residual, the set of the previous solve goes there directly. */
 static PetscErrorCode Settled(void *ctx, PetscBool *more)
 {
   Run *p = (Run *)ctx;
@@ -262,8 +263,8 @@ static PetscErrorCode RunDestroy(Run *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For solves without a factor, by the active set; an obstacle under a whole body is left to the primal form, which
-   starts from coarser problems. */
+/* For solves without a factor, by the active set method; an obstacle along a whole body is left to the primal form,
+   which starts from coarser problems. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
 {
   Projected *f = (Projected *)form->data;
@@ -305,7 +306,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Says in the report what conjugate gradients took. */
+/* Writes the number of conjugate-gradient iterations into the report. */
 static PetscErrorCode NameSolves(HycoSolver s, const Projected *f)
 {
   KSP ksp;
@@ -348,7 +349,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   if (status == HYCO_LCP_SINGULAR) s->reason = HYCO_DIVERGED_SINGULAR;
   f->started = *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   PetscCall(NameSolves(s, f));
-  PetscCall(FillForces(&p, *solved, p.solved, L)); /* not solved: the set has changed since */
+  PetscCall(FillForces(&p, *solved, p.solved, L)); /* if not solved, the set has changed since */
   PetscCall(RunDestroy(&p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

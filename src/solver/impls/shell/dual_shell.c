@@ -1,13 +1,13 @@
 /*
-  The dual form without its matrix: S v = B K^-1 Bt v, one solve with K's factor for each product. TAO's
-  bound-constrained types need no more. For so many contacts that S would not fit, on any number of ranks.
+  The dual form without its matrix: S v = B K^-1 Bt v, one solve with K's factor for each product, which is sufficient
+  for TAO's bound-constrained types. For so many contacts that S would not fit in memory, on any number of ranks.
 */
 #include <hycosolverimpl.h>
 
 typedef struct {
   HycoSolver s;
-  Vec force, motion; /* of K's unknowns */
-  Vec diagonal;      /* an estimate of S's */
+  Vec force, motion; /* like K's unknowns */
+  Vec diagonal;      /* an estimate of S's diagonal */
   HycoTao tao;
 } Shell;
 
@@ -60,7 +60,7 @@ static PetscErrorCode DiagonalS(Mat S, Vec d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The diagonal of B diag(K)^-1 B^T, which knows the units of each contact. */
+/* The diagonal of B diag(K)^-1 B^T, which has the unit of each contact. */
 static PetscErrorCode LocalDiagonal(HycoSystem y, Vec d)
 {
   Mat scaled;
@@ -108,7 +108,7 @@ static PetscErrorCode EstimateDiagonal(Mat S, Shell *f)
   PetscCall(VecDuplicate(f->diagonal, &Sv));
   PetscCall(VecGetOwnershipRange(v, &lo, &hi));
   PetscCall(VecGetArray(v, &p));
-  for (PetscInt i = lo; i < hi; i++) /* signs without pattern, the same on any number of ranks */
+  for (PetscInt i = lo; i < hi; i++) /* irregular signs, the same on any number of ranks */
     p[i - lo] = HycoHash(HYCO_HASH_START, &i, sizeof(i)) >> 32 & 1 ? 1 : -1;
   PetscCall(VecRestoreArray(v, &p));
   PetscCall(MatMult(S, v, Sv));
@@ -147,7 +147,7 @@ static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *sol
   PetscCall(VecSet(L, 0));
   PetscCall(HycoTaoSetType(p->tao, s->now.type, s->max_its));
   PetscCall(HycoTaoSolve(p->tao, S, f, lo, hi, L, &s->its, solved));
-  PetscCall(VecPointwiseMax(L, L, lo)); /* lo is 0 in any scale */
+  PetscCall(VecPointwiseMax(L, L, lo)); /* lo is 0 */
   PetscCall(VecDestroy(&f));
   PetscCall(VecDestroy(&lo));
   PetscCall(VecDestroy(&hi));
@@ -191,7 +191,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(VecGetLocalSize(L, &m));
   PetscCall(MatCreateShell(HycoComm(s), m, m, y->m, y->m, f, &S));
   PetscCall(MatShellSetOperation(S, MATOP_MULT, (void (*)(void))MultS));
-  PetscCall(MatShellSetOperation(S, MATOP_MULT_TRANSPOSE, (void (*)(void))MultS)); /* symmetric */
+  PetscCall(MatShellSetOperation(S, MATOP_MULT_TRANSPOSE, (void (*)(void))MultS)); /* S is symmetric */
   PetscCall(MatShellSetOperation(S, MATOP_GET_DIAGONAL, (void (*)(void))DiagonalS));
   PetscCall(MatSetOption(S, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(VecDuplicate(y->F, &f->force));

@@ -1,5 +1,5 @@
-"""The first command of a newcomer, train without any option of the method: it finds its recipe, judges its model at points that it was
-not trained on, and says loudly when that is not good enough."""
+"""train without any option of the method: it searches its settings, judges its model at points that were not used for training, and
+reports when the model is not accurate enough."""
 import csv
 import os
 import re
@@ -11,7 +11,7 @@ from common import ROPE, SOURCE, Case
 BLOCKS, HERTZ, PLATE = (os.path.join(SOURCE, 'examples', n) for n in ('blocks', 'hertz', 'plate'))
 
 
-class Recipes(Case):
+class SettingsSearch(Case):
     newcomer = True
 
     def judged(self, scene, model, grid, u, force):
@@ -23,7 +23,7 @@ class Recipes(Case):
             self.assertLessEqual(c['error_lambda']['mean'], force)
 
     def test_hertz(self):
-        """Surfaces that do not match and move, three parameters: a hybrid model is chosen of several recipes."""
+        """Surfaces that do not match and move, three parameters: a hybrid model is chosen from several settings."""
         t = self.hyco('train', '-scene', HERTZ, '-grid', '4,4,3', '-model', 'h.h5', '-table', 'h.csv', timeout=300)
         self.assertEqual(t['model_type'], 'hybrid')
         self.assertEqual(t['held_out']['n'], 30)
@@ -83,7 +83,7 @@ class Recipes(Case):
         self.assertLess(c['error_lambda']['mean'], 1e-2)
 
     def test_same_on_ranks(self):
-        """The recipe, and the errors at the held-out points, on one rank and on two."""
+        """The settings, and the errors at the held-out points, on one rank and on two."""
         found = [self.hyco('train', '-scene', ROPE, '-grid', '4,4', '-model', f'{ranks}.h5', '-hyco_model_type', 'hybrid', ranks=ranks,
                            status=None) for ranks in (0, 2)]
         self.assertEqual(found[0]['search'], found[1]['search'])

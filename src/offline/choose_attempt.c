@@ -1,16 +1,19 @@
 /*
-  Which recipe of a search is taken, and which cannot be any more. `ratio` is the largest quotient of an error and its
-  target, of an attempt that was dropped a lower bound of it. Taken is the cheapest of those whose ratio is at most
-  max(1, LITTLE times the least ratio). That bound only falls as attempts come: what exceeds it stays out. So does what
-  exceeds 1 and the ratio of a recipe that is no dearer: where that one is out, it is out too.
+  Which settings of a search are chosen, and which can no longer be chosen. `ratio` is the largest quotient of an error
+  and its target; for an attempt that was dropped, a lower bound of it. The choice is the cheapest attempt whose ratio
+  is at most max(1, LITTLE times the least ratio). This bound only decreases with further attempts: settings that exceed
+  it are excluded for good. So are settings whose ratio exceeds 1 and the ratio of settings that are not more expensive:
+  if those are excluded, so are these.
 */
 #include <hycoreducerimpl.h>
 
-#define LITTLE 1.25       /* a model that misses by so much more than the best is as good, if it is cheaper */
-#define TIE    (1 + 1e-6) /* closer ratios may be in either order, on other numbers of ranks */
+#define LITTLE                                                                                                         \
+  1.25                 /* a model whose ratio exceeds the best by at most this factor is acceptable if it is           \
+                          cheaper */
+#define TIE (1 + 1e-6) /* closer ratios may be in another order on other numbers of ranks */
 
-/* It gave a model that was judged at all held-out points, or as far as it matters: a path without its end is the worst.
- */
+/* Whether it gave a model that was judged at all held-out points, or as far as necessary: a path that does not reach
+   its end has the worst ratio. */
 static PetscBool Complete(const HycoAttempt *a)
 {
   return (PetscBool)(!a->failure[0] && !a->beaten_by);
