@@ -61,7 +61,8 @@ typedef struct {
   PetscInt substeps, cuts;                                              /* time steps; attempts that were halved */
   PetscInt iterations, most_iterations, factors, active_set_iterations; /* contact systems, most in a substep; with a
                                                                            new stiffness; iterations inside them */
-  PetscInt n_active;                                                    /* contacts with L_i > 0 */
+  PetscInt linear_iterations, most_linear_iterations; /* of conjugate gradients, most in one solve; 0: factors solve */
+  PetscInt n_active;                                  /* contacts with L_i > 0 */
   PetscReal total_contact_force, lambda_max, u_norm2;
   PetscReal mises, inelastic; /* largest of the cells' means: von Mises stress, accumulated inelastic strain */
   PetscReal residual, kkt;    /* largest of the substeps: of equilibrium, relative to the forces; of all four */

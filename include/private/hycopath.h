@@ -21,12 +21,13 @@ extern const char *const HycoNewtons[]; /* NULL ends */
 /* An attempt at a time step. */
 typedef struct {
   PetscBool converged, easy;
-  char why[HYCO_LINE]; /* otherwise: the reason */
-  PetscInt iterations; /* number of contact systems solved */
-  PetscInt factors;    /* number of these with a new stiffness */
-  PetscInt active_its; /* iterations of the contact solver within them */
-  PetscReal residual;  /* of equilibrium, relative to the largest of |f_int|, |F|, |B^T L| */
-  PetscReal order;     /* observed order of convergence; 0: too few iterations */
+  char why[HYCO_LINE];              /* otherwise: the reason */
+  PetscInt iterations;              /* number of contact systems solved */
+  PetscInt factors;                 /* number of these with a new stiffness */
+  PetscInt active_its;              /* iterations of the contact solver within them */
+  PetscInt linear_its, most_linear; /* iterations of conjugate gradients: in all, most in one solve */
+  PetscReal residual;               /* of equilibrium, relative to the largest of |f_int|, |F|, |B^T L| */
+  PetscReal order;                  /* observed order of convergence; 0: too few iterations */
   PetscReal seconds_factor, seconds_solve, seconds_law;
   HycoFEStepReport law; /* reduced over all ranks */
 } HycoStepAttempt;

@@ -16,6 +16,7 @@ struct _p_HycoSystem {
   /* work vectors of the residuals, created by the first */
   Vec work_x[2], work_L; /* like F, like D */
   PetscReal size_B;      /* its largest row sum, valid while B is unchanged */
+  PetscReal residual;    /* 2-norm of F - K x - Bt L beyond round-off, when residuals were last computed */
   HycoOperatorState seen_B;
 };
 
@@ -92,6 +93,7 @@ struct _p_HycoSolver {
   char linear_method[128], why_iterative[96];
   Vec free;                   /* K^-1 F for the next solve, if known; borrowed */
   const PetscBool *start_set; /* active set for the next solve, if given; borrowed */
+  PetscReal target;           /* largest residual of the next solve without a factor; 0: by rtol alone */
   /* the current attempt, or the last one */
   HycoSolverForm form;
   HycoMethod now;
@@ -101,6 +103,7 @@ struct _p_HycoSolver {
   HycoReason reason;
   HycoKKT kkt;
   PetscInt its;
+  PetscInt linear_its, linear_solves, linear_most; /* of conjugate gradients: iterations, solves, most in one solve */
   char method[128];
   PetscReal seconds_factor, seconds_solve, seconds_before; /* before: time of a factor computed ahead of the solve */
 };
@@ -132,6 +135,8 @@ PetscBool HycoSolverNeedsSymmetry(HycoSolver s);
 PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form);
 /* Says in linear_method what solves with K: `ksp`, or (NULL) the factor of a HycoDirect. */
 PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp);
+/* Adds the iterations of a solve by conjugate gradients to the counts. */
+void HycoCountLinear(HycoSolver s, PetscInt its);
 
 /* -- a factor of K, with s->stiffness -- */
 
@@ -161,6 +166,11 @@ PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x);
 PetscErrorCode HycoSolverSetRefine(HycoSolver s, PetscBool refine);
 /* The m contacts from which the active set of the next solve starts, with a given flexibility. Borrowed until then. */
 PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);
+/* Sets the largest 2-norm of F - K x - Bt L of the next solve, beside the tolerance; it then starts from the given x.
+   0: the tolerance alone. Only iterative solves use it. */
+PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual);
+/* Gets the iterations of conjugate gradients in the last solve, and most of one linear solve; 0 with a factor. */
+PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscInt *most);
 /* S = B K^-1 Bt of the last solve, which was in the dual form with a factor of a regular K: m x m column major, the
    same on every rank. Borrowed until a matrix changes. Collective. */
 PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[]);

@@ -30,6 +30,8 @@ static const Column columns[] = {
     BOTH("most_iterations", most_iterations, PETSC_TRUE),
     BOTH("factors", factors, PETSC_TRUE),
     BOTH("active_set_iterations", active_set_iterations, PETSC_TRUE),
+    FULL_ONLY("linear_iterations", linear_iterations, PETSC_TRUE),
+    FULL_ONLY("most_linear_iterations", most_linear_iterations, PETSC_TRUE),
     BOTH("n_active", n_active, PETSC_TRUE),
     BOTH("total_contact_force", total_contact_force, PETSC_FALSE),
     BOTH("lambda_max", lambda_max, PETSC_FALSE),

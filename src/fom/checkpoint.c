@@ -37,31 +37,50 @@ static const Member member[] = {INT(index),          REAL(t),
                                 REAL(thermal),       REAL(energy_defect),
                                 REAL(seconds),       REAL(seconds_factor),
                                 REAL(seconds_solve), REAL(seconds_law)};
+/* Behind the quantities: what older checkpoints do not have. */
+static const Member later[] = {INT(linear_iterations), INT(most_linear_iterations)};
 #define N_MEMBERS ((PetscInt)(sizeof(member) / sizeof(member[0])))
+#define N_LATER   ((PetscInt)(sizeof(later) / sizeof(later[0])))
 
-#define STEP_COLS(f) (N_MEMBERS + (f)->scene->n_quantities)
+#define STEP_COLS(f) (N_MEMBERS + (f)->scene->n_quantities + N_LATER)
 
-static void StepToReals(HycoFOM f, const HycoStep *s, PetscReal v[])
+static void MembersToReals(PetscInt n, const Member m[], const HycoStep *s, PetscReal v[])
 {
-  for (PetscInt j = 0; j < N_MEMBERS; j++) {
-    const char *at = (const char *)s + member[j].at;
+  for (PetscInt j = 0; j < n; j++) {
+    const char *at = (const char *)s + m[j].at;
 
-    v[j] = member[j].is_int ? (PetscReal) * (const PetscInt *)(const void *)at : *(const PetscReal *)(const void *)at;
+    v[j] = m[j].is_int ? (PetscReal) * (const PetscInt *)(const void *)at : *(const PetscReal *)(const void *)at;
   }
-  for (PetscInt k = 0; k < f->scene->n_quantities; k++) v[N_MEMBERS + k] = s->quantity[k];
 }
 
-static void RealsToStep(HycoFOM f, const PetscReal v[], HycoStep *s)
+static void RealsToMembers(PetscInt n, const Member m[], const PetscReal v[], HycoStep *s)
 {
-  for (PetscInt j = 0; j < N_MEMBERS; j++) {
-    char *at = (char *)s + member[j].at;
+  for (PetscInt j = 0; j < n; j++) {
+    char *at = (char *)s + m[j].at;
 
-    if (member[j].is_int)
+    if (m[j].is_int)
       *(PetscInt *)(void *)at = (PetscInt)v[j];
     else
       *(PetscReal *)(void *)at = v[j];
   }
-  for (PetscInt k = 0; k < f->scene->n_quantities; k++) s->quantity[k] = v[N_MEMBERS + k];
+}
+
+static void StepToReals(HycoFOM f, const HycoStep *s, PetscReal v[])
+{
+  const PetscInt n = f->scene->n_quantities;
+
+  MembersToReals(N_MEMBERS, member, s, v);
+  for (PetscInt k = 0; k < n; k++) v[N_MEMBERS + k] = s->quantity[k];
+  MembersToReals(N_LATER, later, s, v + N_MEMBERS + n);
+}
+
+static void RealsToStep(HycoFOM f, const PetscReal v[], HycoStep *s)
+{
+  const PetscInt n = f->scene->n_quantities;
+
+  RealsToMembers(N_MEMBERS, member, v, s);
+  for (PetscInt k = 0; k < n; k++) s->quantity[k] = v[N_MEMBERS + k];
+  RealsToMembers(N_LATER, later, v + N_MEMBERS + n, s);
 }
 
 /* Columns of the file: U, F_old, f_old for a node; the state of a cell, as long as the longest one. */
@@ -297,6 +316,23 @@ PetscErrorCode HycoPathSave(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What an older checkpoint does not have is 0. */
+static PetscErrorCode LoadSteps(HycoFOM f, HycoH5 h, PetscInt *rows, PetscReal **steps)
+{
+  const PetscInt full = STEP_COLS(f);
+  PetscInt cols;
+  PetscReal *found;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5GetSize(h, "steps", rows, &cols));
+  if (cols != full - N_LATER) cols = full;
+  PetscCall(HycoH5LoadReal(h, "steps", rows, &cols, &found));
+  PetscCall(PetscCalloc1(*rows * full + 1, steps));
+  for (PetscInt k = 0; k < *rows; k++) PetscCall(PetscArraycpy(*steps + k * full, found + k * cols, cols));
+  PetscCall(PetscFree(found));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content *c)
 {
   char *text = NULL;
@@ -315,8 +351,7 @@ static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content 
             f->path->checkpoint);
   rows = N_HEAD;
   PetscCall(HycoH5LoadReal(h, "head", &rows, &one, &c->head));
-  rows = -1;
-  PetscCall(HycoH5LoadReal(h, "steps", &rows, (PetscInt[]){STEP_COLS(f)}, &c->steps));
+  PetscCall(LoadSteps(f, h, &rows, &c->steps));
   c->n_steps = rows - 1;
   HycoCheck(c->n_steps >= 0 && c->n_steps <= f->scene->n_times && c->head[2] >= 0 &&
                 c->head[2] <= (PetscReal)f->scene->n_times && c->head[3] == (PetscReal)c->n_steps,

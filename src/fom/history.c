@@ -176,6 +176,8 @@ static void Count(HycoPath p, const HycoStepAttempt *a)
   p->now.iterations += a->iterations;
   p->now.factors += a->factors;
   p->now.active_set_iterations += a->active_its;
+  p->now.linear_iterations += a->linear_its;
+  p->now.most_linear_iterations = PetscMax(p->now.most_linear_iterations, a->most_linear);
   p->now.seconds_factor += a->seconds_factor;
   p->now.seconds_solve += a->seconds_solve;
   p->now.seconds_law += a->seconds_law;

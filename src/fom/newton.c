@@ -13,8 +13,9 @@
 #include <hycopath.h>
 
 #define ARMIJO    1e-4
-#define SHORTENED 8 /* largest number of halvings of a step */
-#define WORTH     8 /* expected number of further iterations above which a new tangent is made (modified) */
+#define SHORTENED 8    /* largest number of halvings of a step */
+#define WORTH     8    /* expected number of further iterations above which a new tangent is made (modified) */
+#define FORCING   1e-3 /* residual of a solve without a factor, as a share of that of the iterate */
 
 /* Data of the previous iteration. */
 typedef struct {
@@ -102,12 +103,23 @@ static PetscErrorCode AssembleK(HycoPath p, PetscBool tangent)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The residual to which a contact system is solved without a factor: a share of that of the iterate. With a tangent the
+   share decreases with the residual, which preserves the order of convergence (S. Eisenstat, H. Walker, SIAM J. Sci.
+   Comput. 17 (1996) 16-32). */
+static PetscReal Target(HycoPath p, const Progress *now)
+{
+  const PetscReal r = now->residual[2], least = PetscMax(0.1 * p->rtol * now->size, now->floor);
+  const PetscReal share = p->tangent && r < FORCING * now->size ? r / now->size : FORCING;
+
+  return PetscMax(least, share * r);
+}
+
 /* Solves the contact system at U: the solution is in G and L_new. */
-static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, HycoStepAttempt *a)
+static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *now, HycoStepAttempt *a)
 {
   HycoReason reason;
   PetscReal factor, solve;
-  PetscInt its;
+  PetscInt its, linear, most;
 
   PetscFunctionBegin;
   PetscCall(RightSide(p));
@@ -117,16 +129,20 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, HycoStepAttempt *
   PetscCall(VecCopy(p->U, p->G));
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_new));
   if (p->cold) PetscCall(HycoSolverSetWarmStart(p->solver, PETSC_FALSE));
+  PetscCall(HycoSolverSetTarget(p->solver, Target(p, now)));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(p->solver, p->G, p->L_new));
   if (p->cold) PetscCall(HycoSolverSetWarmStart(p->solver, PETSC_TRUE));
   p->cold = PETSC_FALSE;
   PetscCall(HycoSolverGetReason(p->solver, &reason));
   PetscCall(HycoSolverGetSeconds(p->solver, &factor, &solve));
   PetscCall(HycoSolverGetIterations(p->solver, &its));
+  PetscCall(HycoSolverGetLinearIterations(p->solver, &linear, &most));
   p->kept++;
   a->iterations++;
   a->factors += factor > 0;
   a->active_its += its;
+  a->linear_its += linear;
+  a->most_linear = PetscMax(a->most_linear, most);
   a->seconds_factor += factor;
   a->seconds_solve += solve;
   if (reason < 0) HycoFormat(a->why, "%s", HycoReasonName(reason));
@@ -358,7 +374,7 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
       HycoFormat(a->why, "%s", a->law.why);
       break;
     }
-    if (tangent) Observe(&now, k, a);
+    if (tangent && !a->linear_its) Observe(&now, k, a); /* else what the solves leave decides */
     if (k && now.residual[2] <= PetscMax(p->rtol * now.size, now.floor)) {
       PetscCall(Judge(p, &now, a, &worst));
       a->converged = (PetscBool)(worst <= 1e-8);
@@ -373,7 +389,7 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
     if (method == HYCO_NEWTON_MODIFIED && k) fresh = Stalls(p, &now);
     if (tangent) PetscCall(AssembleK(p, PETSC_TRUE));
     if (fresh) PetscCall(Renew(p, t0, t1, a, &now));
-    PetscCall(SolveSystem(p, (PetscBool)(k == 0), a));
+    PetscCall(SolveSystem(p, (PetscBool)(k == 0), &now, a));
     if (a->why[0]) break;
     if (tangent)
       PetscCall(Advance(p, (PetscBool)(k > 0), a, &now));

@@ -128,6 +128,13 @@ PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoCountLinear(HycoSolver s, PetscInt its)
+{
+  s->linear_its += its;
+  s->linear_solves++;
+  s->linear_most = PetscMax(s->linear_most, its);
+}
+
 PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
 {
   KSPType method;

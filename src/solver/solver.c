@@ -389,7 +389,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   PetscCheck(s->system && (s->system->F || s->system->G), PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
   s->seconds_factor = s->seconds_before;
-  s->its = 0;
+  s->its = s->linear_its = s->linear_solves = s->linear_most = 0;
   s->falling_back = PETSC_FALSE;
   PetscCall(Attempts(s, x, L));
   for (PetscInt k = 0; k < s->n_forms; k++) {
@@ -399,6 +399,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   if (n_free) s->reason = HYCO_DIVERGED_FLOATING;
   s->free = NULL;
   s->start_set = NULL;
+  s->target = 0;
   s->seconds_solve = HycoNow() - begin - (s->seconds_factor - s->seconds_before);
   s->seconds_before = 0;
   PetscCall(HycoSolverViewFromOptions(s, NULL, "-hyco_solver_view"));
@@ -443,6 +444,21 @@ PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[])
 {
   PetscFunctionBegin;
   s->start_set = active;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual)
+{
+  PetscFunctionBegin;
+  s->target = residual;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscInt *most)
+{
+  PetscFunctionBegin;
+  *its = s->linear_its;
+  *most = s->linear_most;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

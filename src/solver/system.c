@@ -205,6 +205,7 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value,
   PetscCall(VecAXPY(Kx, -1, s->F));
   PetscCall(DropRounding(s, x, Kx, BtL, &dropped));
   PetscCall(VecNorm(Kx, NORM_2, &nr));
+  s->residual = nr;
   *value = Quotient(nr, PetscMax(nK, PetscMax(nB, nF)));
   *rounding = Quotient(dropped, PetscMax(nK, PetscMax(nB, nF)));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -27,6 +27,8 @@ static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *
 {
   KSPConvergedReason why;
   PetscBool same;
+  PetscInt its;
+  PetscReal size;
 
   PetscFunctionBegin;
   PetscCall(HycoOperatorStateUpdate(&l->of, s->system->K, NULL, &same));
@@ -34,9 +36,16 @@ static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *
     PetscCall(KSPDestroy(&l->ksp));
     PetscCall(HycoIterativeSolver(HycoComm(s), "hyco_primal_", s->system->K, &l->ksp));
   }
-  PetscCall(VecSet(x, 0));
+  if (s->target > 0) {
+    PetscCall(VecNorm(s->system->F, NORM_2, &size));
+    PetscCall(KSPSetNormType(l->ksp, KSP_NORM_UNPRECONDITIONED));
+    PetscCall(KSPSetTolerances(l->ksp, 0, PetscMin(s->target, 0.3 * s->rtol * size), PETSC_DEFAULT, PETSC_DEFAULT));
+  } else
+    PetscCall(VecSet(x, 0));
   PetscCall(KSPSolve(l->ksp, s->system->F, x));
   PetscCall(KSPGetConvergedReason(l->ksp, &why));
+  PetscCall(KSPGetIterationNumber(l->ksp, &its));
+  HycoCountLinear(s, its);
   PetscCall(HycoNameLinear(s, l->ksp));
   *solved = (PetscBool)(why > 0);
   PetscFunctionReturn(PETSC_SUCCESS);

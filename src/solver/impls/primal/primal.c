@@ -11,9 +11,10 @@
 #define HYCO_MANY 6000
 /* A warm start that has not converged by then was far from the solution: coarser problems give a better start. */
 #define HYCO_WARM_ITS 4
-/* Noise of iterative solves while the set changes, and in the final solves. */
+/* Noise of iterative solves while the set changes, and in the final solves; the least, if a residual requires it. */
 #define HYCO_NOISE_FIRST 1e-5
 #define HYCO_NOISE       1e-9
+#define HYCO_NOISE_LEAST 1e-13
 
 /* The value of a distributed vector at this rank's pivots. */
 static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, PetscReal out[])
@@ -37,6 +38,7 @@ typedef struct {
   PetscReal *bound, *value, *force, *diagonal, *at_d;
   PetscReal noise; /* error of iterative solves, as a share of the largest force and gap */
   PetscInt *at;
+  Vec x, L; /* the caller's */
   Vec y, f, rhs, residual, work;
   VecScatter scatter;
   PetscBool cold;
@@ -57,7 +59,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
 {
   const Primal *p = (const Primal *)ctx;
   const Gap *g = p->gap;
-  PetscInt n = 0;
+  PetscInt n = 0, its;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < p->n; k++) {
@@ -66,6 +68,8 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
     p->at_d[n++] = p->bound[k];
   }
   PetscCall(HycoSolveOnSet(g->Kg, g->Kw, g->ksp, p->f, n, p->at, p->at_d, p->rhs, p->y, singular));
+  PetscCall(KSPGetIterationNumber(g->ksp, &its));
+  if (p->s->iterative) HycoCountLinear(p->s, its);
   if (!*singular) PetscCall(Evaluate(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -124,14 +128,41 @@ static PetscErrorCode SetAccuracy(Primal *p, PetscReal noise)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set has converged with inaccurate solves: continues with accurate ones. */
+/* Writes x and the forces of the set, without negative ones if `clean`. */
+static PetscErrorCode Fill(const Primal *p, PetscBool clean)
+{
+  const Gap *g = p->gap;
+  PetscScalar *l;
+
+  PetscFunctionBegin;
+  PetscCall(MatMult(g->T, p->y, p->x));
+  PetscCall(VecSet(p->L, 0));
+  PetscCall(VecGetArray(p->L, &l));
+  for (PetscInt k = 0; k < p->n; k++) {
+    if (!clean)
+      l[g->contact[k]] = p->force[k];
+    else if (g->active[k])
+      l[g->contact[k]] = PetscMax(p->force[k], 0);
+  }
+  PetscCall(VecRestoreArray(p->L, &l));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The set has converged with inaccurate solves: continues with accurate ones, up to the target of the residual. */
 static PetscErrorCode Settled(void *ctx, PetscBool *more)
 {
   Primal *p = (Primal *)ctx;
+  HycoSolver s = p->s;
+  HycoKKT kkt;
 
   PetscFunctionBegin;
   *more = (PetscBool)(p->noise > HYCO_NOISE);
   if (*more) PetscCall(SetAccuracy(p, HYCO_NOISE));
+  if (*more || !s->iterative || !(s->target > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Fill(p, PETSC_TRUE));
+  PetscCall(HycoSystemComputeKKT(s->system, p->x, p->L, &kkt));
+  *more = (PetscBool)(s->system->residual > s->target && p->noise > HYCO_NOISE_LEAST);
+  if (*more) PetscCall(SetAccuracy(p, p->noise * PetscMin(0.03, 0.3 * s->target / s->system->residual)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -310,8 +341,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
 {
   Gap *g = (Gap *)form->data;
   const PetscBool own = (PetscBool)(s->now.traits & HYCO_TAO_OWN);
-  Primal p = {.noise = 0};
-  PetscScalar *l;
+  Primal p = {.noise = 0, .x = x, .L = L};
 
   PetscFunctionBegin;
   s->by_factor = own;
@@ -320,16 +350,8 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(HycoSolverNameMethod(s, "primal"));
   PetscCall(own ? ActiveSet(&p, g, solved) : BoundQP(&p, g, solved));
   PetscCall(HycoNameLinear(s, g->ksp));
-  PetscCall(MatMult(g->T, p.y, x));
-  PetscCall(VecSet(L, 0));
-  PetscCall(VecGetArray(L, &l));
-  for (PetscInt k = 0; k < p.n; k++) {
-    if (!*solved && own) /* the set has changed since: use that of the last solve for the residuals */
-      l[g->contact[k]] = p.force[k];
-    else if (g->active[k])
-      l[g->contact[k]] = PetscMax(p.force[k], 0);
-  }
-  PetscCall(VecRestoreArray(L, &l));
+  /* if not solved, the set has changed since: its last forces show in the residuals */
+  PetscCall(Fill(&p, (PetscBool)(*solved || !own)));
   PetscCall(PrimalDestroy(&p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

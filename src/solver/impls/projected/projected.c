@@ -33,12 +33,11 @@ typedef struct {
   HycoSolver s;
   Projected *form;
   PetscReal *bound, *value, *force;
-  PetscReal accuracy, size;   /* relative accuracy of solves; size of the loads */
-  PetscInt *at;               /* work */
-  PetscBool *solved;          /* the set of the last solve */
-  PetscBool any;              /* there was a solve */
-  PetscInt solves, its, most; /* of conjugate gradients */
-  Vec x, d, l, r, gap;        /* d, l: for the active rows */
+  PetscReal accuracy, size; /* relative accuracy of solves; size of the loads */
+  PetscInt *at;             /* work */
+  PetscBool *solved;        /* the set of the last solve */
+  PetscInt n_sets;          /* number of sets so far */
+  Vec x, d, l, r, gap;      /* d, l: for the active rows */
 } Run;
 
 /* The node of each contact: its slave if B has one, else that of an entry that no other contact has. */
@@ -84,7 +83,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
   const Projected *f = p->form;
   Mat B = p->s->system->B, rows;
   PetscInt n = 0, lo, *row;
-  PetscMPIInt differs = (PetscMPIInt)!p->any, any;
+  PetscMPIInt differs = (PetscMPIInt)!p->n_sets, any;
   PetscScalar *d;
   IS is;
 
@@ -93,7 +92,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
   for (PetscInt k = 0; k < f->n; k++) differs = differs || p->solved[k] != active[k];
   PetscCallMPI(MPI_Allreduce(&differs, &any, 1, MPI_INT, MPI_MAX, HycoComm(p->s)));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
-  p->any = PETSC_TRUE;
+  p->n_sets++;
   PetscCall(PetscArraycpy(p->solved, active, f->n));
   PetscCall(MatGetOwnershipRange(B, &lo, NULL));
   PetscCall(PetscMalloc1(f->n, &row));
@@ -159,9 +158,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   if (*singular) PetscFunctionReturn(PETSC_SUCCESS);
   if (p->size < 0) PetscCall(HycoConstrainedSize(p->form->constrained, p->s->system->F, &p->size));
   PetscCall(HycoConstrainedSolve(p->form->constrained, p->s->system->F, p->d, p->accuracy, &p->size, p->x, &its));
-  p->solves++;
-  p->its += its;
-  p->most = PetscMax(p->most, its);
+  HycoCountLinear(p->s, its);
   PetscCall(Evaluate(p, active));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -170,7 +167,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
 {
   const Run *p = (const Run *)ctx;
   const Projected *f = p->form;
-  const PetscReal noise = PetscMax(HYCO_BELIEVED * p->accuracy, HYCO_NOISE);
+  const PetscReal noise = PetscMax(HYCO_BELIEVED * p->accuracy, p->s->target > 0 ? 0 : HYCO_NOISE);
   PetscReal size[2] = {0, 0}, sizes[2];
 
   PetscFunctionBegin;
@@ -200,22 +197,41 @@ static PetscErrorCode FillForces(const Run *p, PetscBool clean, const PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set has converged: solves more accurately, to the final accuracy and further if the residual requires it. */
+/* Reduces the accuracy by a factor. A given start may already be more accurate than the present one. */
+static PetscErrorCode Sharpen(Run *p, PetscReal factor)
+{
+  KSP ksp;
+  PetscReal left;
+
+  PetscFunctionBegin;
+  PetscCall(HycoConstrainedGetKSP(p->form->constrained, &ksp));
+  PetscCall(KSPGetResidualNorm(ksp, &left));
+  if (p->s->target > 0 && p->size > 0) p->accuracy = PetscMin(p->accuracy, left / p->size);
+  p->accuracy = PetscMax(p->accuracy * factor, 0.03 * HYCO_LEAST);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The set has converged: solves more accurately, to the final accuracy and further if the residual requires it. With a
+   target of the residual, the set of the previous solve goes there directly. */
 static PetscErrorCode Settled(void *ctx, PetscBool *more)
 {
   Run *p = (Run *)ctx;
+  HycoSolver s = p->s;
   HycoKKT kkt;
+  PetscReal missing;
 
   PetscFunctionBegin;
   *more = PETSC_TRUE;
-  if (p->accuracy > 2 * HYCO_LAST) {
+  if (p->accuracy > 2 * HYCO_LAST && !(s->target > 0 && p->n_sets == 1)) {
     p->accuracy = PetscMax(HYCO_LAST, HYCO_SHARPEN * p->accuracy);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(FillForces(p, PETSC_TRUE, p->solved, p->gap));
-  PetscCall(HycoSystemComputeKKT(p->s->system, p->x, p->gap, &kkt));
-  *more = (PetscBool)(kkt.stationarity > 0.3 * p->s->rtol && p->accuracy > HYCO_LEAST);
-  p->accuracy *= *more ? 0.03 : 1;
+  PetscCall(HycoSystemComputeKKT(s->system, p->x, p->gap, &kkt));
+  missing = kkt.stationarity / (0.3 * s->rtol);
+  if (s->target > 0) missing = PetscMax(missing, s->system->residual / s->target);
+  *more = (PetscBool)(missing > 1 && p->accuracy > HYCO_LEAST);
+  if (*more) PetscCall(Sharpen(p, PetscMin(0.03, 0.3 / missing)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -230,7 +246,7 @@ static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
   PetscCall(VecGetArrayRead(y->D, &d));
   for (PetscInt k = 0; k < f->n; k++) p->bound[k] = d[f->contact[k]];
   PetscCall(VecRestoreArrayRead(y->D, &d));
-  PetscCall(VecSet(x, 0));
+  if (!(s->target > 0)) PetscCall(VecSet(x, 0));
   PetscCall(VecDuplicate(x, &p->r));
   PetscCall(VecDuplicate(y->D, &p->gap));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -291,17 +307,16 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
 }
 
 /* Writes the number of conjugate-gradient iterations into the report. */
-static PetscErrorCode NameSolves(const Run *p)
+static PetscErrorCode NameSolves(HycoSolver s, const Projected *f)
 {
-  HycoSolver s = p->s;
   KSP ksp;
   char words[64];
 
   PetscFunctionBegin;
-  PetscCall(HycoConstrainedGetKSP(p->form->constrained, &ksp));
+  PetscCall(HycoConstrainedGetKSP(f->constrained, &ksp));
   PetscCall(HycoNameLinear(s, ksp));
-  PetscCall(PetscSNPrintf(words, sizeof(words), "; %d iterations in %d solves, at most %d", (int)p->its, (int)p->solves,
-                          (int)p->most));
+  PetscCall(PetscSNPrintf(words, sizeof(words), "; %d iterations in %d solves, at most %d", (int)s->linear_its,
+                          (int)s->linear_solves, (int)s->linear_most));
   PetscCall(PetscStrlcat(s->linear_method, words, sizeof(s->linear_method)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -333,7 +348,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(HycoTaoSolveSet(f->tao, &set, f->active, x, &s->its, &status));
   if (status == HYCO_LCP_SINGULAR) s->reason = HYCO_DIVERGED_SINGULAR;
   f->started = *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
-  PetscCall(NameSolves(&p));
+  PetscCall(NameSolves(s, f));
   PetscCall(FillForces(&p, *solved, p.solved, L)); /* if not solved, the set has changed since */
   PetscCall(RunDestroy(&p));
   PetscFunctionReturn(PETSC_SUCCESS);
