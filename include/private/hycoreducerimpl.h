@@ -260,7 +260,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
    of some repetitions. */
 #define HYCO_HELD_REPEATS 3
 typedef struct _n_HycoHeldOut {
-  PetscReal error[HYCO_N_ERRORS], end[HYCO_N_ERRORS], size, rid_size, converged, feature[HYCO_TRUST_FEATURES],
+  PetscReal error[HYCO_N_ERRORS], end[HYCO_N_ERRORS], size, rid_size, converged, feature[HYCO_ESTIMATE_FEATURES],
       seconds[HYCO_HELD_REPEATS];
 } HycoHeldOut;
 /* By HycoErrorKind, the norm of the error of a prediction, and that of the reference. */

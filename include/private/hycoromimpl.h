@@ -21,23 +21,24 @@ typedef struct {
 
 /* Terms of an error estimate (error_estimate.c): log(1 + feature / floor) with a coefficient for each feature, and a
    constant. */
-#define HYCO_TRUST_FEATURES 5
-#define HYCO_TRUST_DISTANCE 3 /* index of the distance among the features */
+#define HYCO_ESTIMATE_FEATURES 5
+#define HYCO_ESTIMATE_DISTANCE 3 /* index of the distance among the features */
 /* A contact force below this share of the largest of a set is replaced by that share where errors are divided by it. */
 #define HYCO_SMALL_FORCE 0.1
 /* A predicted contact force up to this share of the largest is round-off. */
 #define HYCO_PRESSES 1e-10
-typedef enum { HYCO_TRUST_U, HYCO_TRUST_SIGMA, HYCO_TRUST_LAMBDA, HYCO_N_TRUST } HycoTrustKind;
+typedef enum { HYCO_ESTIMATE_U, HYCO_ESTIMATE_SIGMA, HYCO_ESTIMATE_LAMBDA, HYCO_N_ESTIMATES } HycoEstimateKind;
 typedef struct {
   PetscInt n; /* held-out predictions behind the estimates; 0: not calibrated */
-  PetscReal floor[HYCO_TRUST_FEATURES];
-  PetscBool has[HYCO_N_TRUST];                          /* whether there is an estimate of this error */
-  PetscReal law[HYCO_N_TRUST][HYCO_TRUST_FEATURES + 1]; /* coefficients >= 0, then the constant */
+  PetscReal floor[HYCO_ESTIMATE_FEATURES];
+  PetscBool has[HYCO_N_ESTIMATES];                             /* whether there is an estimate of this error */
+  PetscReal law[HYCO_N_ESTIMATES][HYCO_ESTIMATE_FEATURES + 1]; /* coefficients >= 0, then the constant */
   PetscReal force; /* 2-norm of the largest held-out contact forces: errors of forces below a tenth of it are divided
                       by that tenth */
   PetscInt n_held; /* number of held-out predictions by which the model was judged; 0: none */
-  PetscReal median[HYCO_N_TRUST], largest[HYCO_N_TRUST]; /* their relative errors; very large: not converged, or x/0 */
-} HycoTrust;
+  PetscReal median[HYCO_N_ESTIMATES],
+      largest[HYCO_N_ESTIMATES]; /* their relative errors; very large: not converged, or x/0 */
+} HycoEstimates;
 
 /* The path of the last prediction, for a scene with a history. `room` and `n` count accepted steps; the arrays of
    listed times are allocated for all of them. */
@@ -82,7 +83,7 @@ struct _p_HycoROM {
   PetscInt whole_nodes, whole_cells;
   PetscInt counts[3]; /* modes of the dual, stress and force bases that seeded the RID; projection: force vectors,
                          supremizers among the l modes (the last ones, with singular value 0), 0 */
-  HycoTrust trust;
+  HycoEstimates estimates;
   char *search;         /* how train -target_... chose the settings, in words; NULL: it did not */
   PetscReal numbers[3]; /* condition number of the reduced stiffness (0: not known, or none), training errors of u and
                            lambda */
@@ -198,14 +199,14 @@ PetscErrorCode HycoCarriedDestroy(HycoCarried *carried);
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
 PetscErrorCode HycoBalanceDestroy(HycoBalance *balance);
 
-/* Features that indicate the last prediction's error without a full-order solution: feature[HYCO_TRUST_FEATURES],
+/* Features that indicate the last prediction's error without a full-order solution: feature[HYCO_ESTIMATE_FEATURES],
    all >= 0. */
-PetscErrorCode HycoTrustMeasure(HycoROM model, PetscReal feature[]);
+PetscErrorCode HycoEstimatesFeatures(HycoROM model, PetscReal feature[]);
 /* The estimated errors of the last prediction, and how far outside the ranges it lies. */
-PetscErrorCode HycoTrustEstimate(HycoROM model, HycoPrediction *prediction);
-PetscErrorCode HycoTrustView(HycoROM model, PetscViewer viewer);
+PetscErrorCode HycoEstimatesEvaluate(HycoROM model, HycoPrediction *prediction);
+PetscErrorCode HycoEstimatesView(HycoROM model, PetscViewer viewer);
 /* Distance of two points, with each parameter scaled to its range. */
-PetscReal HycoTrustDistance(HycoScene scene, const PetscReal a[], const PetscReal b[]);
+PetscReal HycoEstimatesDistance(HycoScene scene, const PetscReal a[], const PetscReal b[]);
 /* The contact forces' part of a comparison before any division: 2-norms of the error and of the reference, over all
    contacts and over the RID's. */
 typedef struct {

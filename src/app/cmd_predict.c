@@ -13,7 +13,7 @@ static void Estimate(cJSON *json, const char name[], PetscReal estimate)
 }
 
 /* Reports the estimated errors (null: none), and the distance from the region of training. */
-static void ReportTrust(cJSON *json, const HycoPrediction *p)
+static void ReportEstimates(cJSON *json, const HycoPrediction *p)
 {
   Estimate(json, "estimated_error_u", p->estimated_error_u);
   Estimate(json, "estimated_error_sigma", p->estimated_error_sigma);
@@ -22,7 +22,7 @@ static void ReportTrust(cJSON *json, const HycoPrediction *p)
   cJSON_AddNumberToObject(json, "beyond", p->beyond);
 }
 
-static PetscErrorCode SayTrust(const HycoPrediction *p)
+static PetscErrorCode SayEstimates(const HycoPrediction *p)
 {
   const PetscReal estimate[3] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
   char words[3][32];
@@ -81,7 +81,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   PetscCall(ReportContacts(json, p->n_contacts, p->n_facing, p->overlap, p->sliding));
   if (n_carried) PetscCall(DriverReportCarried(json, p->dim, n_carried, carried));
   PetscCall(ReportQuantities(json, scene, p->quantity));
-  ReportTrust(json, p);
+  ReportEstimates(json, p);
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
   if (p->gives_forces) {
@@ -158,7 +158,7 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   PetscCall(Say("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
                 (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
                 (double)p.kkt.complementarity));
-  if (!why[0]) PetscCall(SayTrust(&p));
+  if (!why[0]) PetscCall(SayEstimates(&p));
   PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   if (why[0] || fallback->displacement)
     energy = fallback->strain_energy;
@@ -200,7 +200,7 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
       Say("%d iterations; KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
           (int)p.iterations, (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
           (double)p.kkt.complementarity));
-  PetscCall(SayTrust(&p));
+  PetscCall(SayEstimates(&p));
   PetscCall(DriverSayEquilibrium(&path));
   PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));

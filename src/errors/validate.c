@@ -49,7 +49,7 @@ static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row
   row->size = f.size;
   row->rid_size = f.rid_size;
   PetscCall(PetscFree(lambda));
-  if (row->converged > 0) PetscCall(HycoTrustMeasure(m, row->feature));
+  if (row->converged > 0) PetscCall(HycoEstimatesFeatures(m, row->feature));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -108,7 +108,7 @@ static PetscErrorCode ConcludePath(HycoROM m, PetscInt n, const HycoLost lost[],
     row->error[j] = e.worst[j] * by;
     row->end[j] = e.end[j] * by;
   }
-  if (row->converged > 0) PetscCall(HycoTrustMeasure(m, row->feature));
+  if (row->converged > 0) PetscCall(HycoEstimatesFeatures(m, row->feature));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -16,8 +16,8 @@
 #define SMALL      1e-2 /* share of a feature's median: its floor */
 #define NEGLIGIBLE 1e-3 /* share of the errors' median: least error that is distinguished */
 
-/* The estimated errors, in the order of HycoTrustKind. */
-static const HycoErrorKind errors[HYCO_N_TRUST] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
+/* The estimated errors, in the order of HycoEstimateKind. */
+static const HycoErrorKind errors[HYCO_N_ESTIMATES] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
 
 /* Median of the positive ones of value[0], value[stride], ..., or `otherwise`. */
 static PetscErrorCode Median(PetscInt n, const PetscReal value[], PetscInt stride, PetscReal otherwise,
@@ -49,7 +49,7 @@ static PetscErrorCode Spacing(HycoReducer t, PetscReal *spacing)
   PetscCall(PetscCalloc1(n, &nearest));
   for (PetscInt k = 0; n_par && k < n; k++) {
     for (PetscInt j = 0; j < n; j++) {
-      const PetscReal d = HycoTrustDistance(t->scene, mu + k * n_par, mu + j * n_par);
+      const PetscReal d = HycoEstimatesDistance(t->scene, mu + k * n_par, mu + j * n_par);
 
       if (d > 0 && (nearest[k] == 0 || d < nearest[k])) nearest[k] = d;
     }
@@ -61,9 +61,9 @@ static PetscErrorCode Spacing(HycoReducer t, PetscReal *spacing)
 
 /* Fits the formula for one kind of error; none if an error is not finite. Rows without an error, for example forces
    without contact, contain no information on its size: they come last, and only raise the bound. */
-static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoTrustKind kind, HycoTrust *trust)
+static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoEstimateKind kind, HycoEstimates *estimates)
 {
-  const PetscInt p = HYCO_TRUST_FEATURES;
+  const PetscInt p = HYCO_ESTIMATE_FEATURES;
   PetscReal *X, *y, *error, least;
   PetscInt filled = 0, telling = 0;
   PetscBool finite = PETSC_TRUE;
@@ -71,44 +71,44 @@ static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoTrustKi
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(n * p, &X, n, &y, n, &error));
   for (PetscInt i = 0; i < n; i++) {
-    error[i] = HycoHeldOutError(&rows[i], errors[kind], trust->force);
+    error[i] = HycoHeldOutError(&rows[i], errors[kind], estimates->force);
     finite = (PetscBool)(finite && !PetscIsInfOrNanReal(error[i]));
   }
   PetscCall(Median(n, error, 1, PETSC_SMALL, &least));
   for (PetscInt pass = 0; finite && pass < 2; pass++) {
     for (PetscInt i = 0; i < n; i++) {
       if ((error[i] > NEGLIGIBLE * least) != (pass == 0)) continue;
-      for (PetscInt j = 0; j < p; j++) X[filled * p + j] = PetscLogReal(1 + rows[i].feature[j] / trust->floor[j]);
+      for (PetscInt j = 0; j < p; j++) X[filled * p + j] = PetscLogReal(1 + rows[i].feature[j] / estimates->floor[j]);
       y[filled++] = PetscLogReal(PetscMax(error[i], NEGLIGIBLE * least));
       if (pass == 0) telling = filled;
     }
   }
-  trust->has[kind] = (PetscBool)(finite && (kind != HYCO_TRUST_LAMBDA || trust->force > 0));
-  if (trust->has[kind]) PetscCall(HycoUpperBound(n, telling ? telling : n, p, X, y, SHARE, trust->law[kind]));
-  trust->law[kind][p] += PetscLogReal(MARGIN);
+  estimates->has[kind] = (PetscBool)(finite && (kind != HYCO_ESTIMATE_LAMBDA || estimates->force > 0));
+  if (estimates->has[kind]) PetscCall(HycoUpperBound(n, telling ? telling : n, p, X, y, SHARE, estimates->law[kind]));
+  estimates->law[kind][p] += PetscLogReal(MARGIN);
   PetscCall(PetscFree3(X, y, error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Predictions that did not converge have no features; online they are reported as not converged. */
-static PetscErrorCode FitAll(HycoReducer t, PetscInt n, HycoHeldOut rows[], HycoTrust *trust)
+static PetscErrorCode FitAll(HycoReducer t, PetscInt n, HycoHeldOut rows[], HycoEstimates *estimates)
 {
   PetscInt converged = 0;
 
   PetscFunctionBegin;
-  trust->force = HycoHeldOutForce(n, rows);
+  estimates->force = HycoHeldOutForce(n, rows);
   for (PetscInt i = 0; i < n; i++) {
     if (rows[i].converged > 0.5) rows[converged++] = rows[i];
   }
   if (converged < LEAST) PetscFunctionReturn(PETSC_SUCCESS);
-  trust->n = converged;
-  for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) {
+  estimates->n = converged;
+  for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) {
     PetscCall(Median(converged, rows[0].feature + j, (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), 1 / SMALL,
-                     &trust->floor[j]));
-    trust->floor[j] *= SMALL;
+                     &estimates->floor[j]));
+    estimates->floor[j] *= SMALL;
   }
-  PetscCall(Spacing(t, &trust->floor[HYCO_TRUST_DISTANCE]));
-  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) PetscCall(FitError(converged, rows, (HycoTrustKind)e, trust));
+  PetscCall(Spacing(t, &estimates->floor[HYCO_ESTIMATE_DISTANCE]));
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) PetscCall(FitError(converged, rows, (HycoEstimateKind)e, estimates));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -117,18 +117,18 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, Hyc
 {
   const HycoValidation *v = &report->held_out;
   const HycoAttempt *chosen = &report->chosen;
-  HycoTrust trust = {0};
+  HycoEstimates estimates = {0};
   char settings[HYCO_LINE], text[2 * HYCO_LINE];
 
   PetscFunctionBegin;
-  trust.n_held = v->n;
-  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
-    trust.median[e] = v->median[errors[e]];
-    trust.largest[e] = v->largest[errors[e]];
+  estimates.n_held = v->n;
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
+    estimates.median[e] = v->median[errors[e]];
+    estimates.largest[e] = v->largest[errors[e]];
   }
-  PetscCall(FitAll(t, v->n, rows, &trust));
-  report->n_held = trust.n;
-  m->trust = trust;
+  PetscCall(FitAll(t, v->n, rows, &estimates));
+  report->n_held = estimates.n;
+  m->estimates = estimates;
   if (!chosen->number) PetscFunctionReturn(PETSC_SUCCESS);
   HycoReducerSettingsDescribe(&chosen->settings, sizeof(settings), settings);
   snprintf(text, sizeof(text), "  settings number %d of the %d that were tried: %s\n", (int)chosen->number,

@@ -205,7 +205,7 @@ static PetscReal Distance(HycoReducer t, const Loop *loop, PetscInt k)
 
   if (HycoSamplesGet(loop->samples, &n, NULL, &solved)) return 0;
   for (PetscInt j = 0; j < n; j++)
-    least = PetscMin(least, HycoTrustDistance(t->scene, solved + j * loop->n_par, loop->points + k * loop->n_par));
+    least = PetscMin(least, HycoEstimatesDistance(t->scene, solved + j * loop->n_par, loop->points + k * loop->n_par));
   return least;
 }
 

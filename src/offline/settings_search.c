@@ -603,7 +603,7 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
     PetscInt at = -1;
 
     for (PetscInt j = 0; j < m; j++) {
-      const PetscReal d = HycoTrustDistance(t->scene, held + order[k] * n_par, mu + j * n_par);
+      const PetscReal d = HycoEstimatesDistance(t->scene, held + order[k] * n_par, mu + j * n_par);
 
       if (used[j] || d == 0 || d >= least) continue;
       least = d;

@@ -18,7 +18,7 @@
 #include <petscviewer.h>
 #include <stdio.h>
 
-enum { MISFIT, PENETRATION, ADHESION, DISTANCE = HYCO_TRUST_DISTANCE, TAIL };
+enum { MISFIT, PENETRATION, ADHESION, DISTANCE = HYCO_ESTIMATE_DISTANCE, TAIL };
 
 static PetscReal Quotient(PetscReal part2, PetscReal size2)
 {
@@ -59,7 +59,7 @@ static void Contacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
   *adhesion = Quotient(stuck, force);
 }
 
-PetscReal HycoTrustDistance(HycoScene s, const PetscReal a[], const PetscReal b[])
+PetscReal HycoEstimatesDistance(HycoScene s, const PetscReal a[], const PetscReal b[])
 {
   PetscReal sum = 0;
 
@@ -101,26 +101,26 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
   feature[TAIL] = Tail(m);
   feature[DISTANCE] = m->n_points && n_par ? PETSC_MAX_REAL : 0;
   for (PetscInt k = 0; n_par && k < m->n_points; k++)
-    feature[DISTANCE] = PetscMin(feature[DISTANCE], HycoTrustDistance(m->scene, m->fe->mu, m->points + k * n_par));
+    feature[DISTANCE] = PetscMin(feature[DISTANCE], HycoEstimatesDistance(m->scene, m->fe->mu, m->points + k * n_par));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* For a path the largest values over its listed times. */
-PetscErrorCode HycoTrustMeasure(HycoROM m, PetscReal feature[])
+PetscErrorCode HycoEstimatesFeatures(HycoROM m, PetscReal feature[])
 {
   const PetscInt shown = m->trace.shown;
-  PetscReal one[HYCO_TRUST_FEATURES];
+  PetscReal one[HYCO_ESTIMATE_FEATURES];
 
   PetscFunctionBegin;
   if (!m->trace.n_listed) {
     PetscCall(MeasureOne(m, feature));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscArrayzero(feature, HYCO_TRUST_FEATURES));
+  PetscCall(PetscArrayzero(feature, HYCO_ESTIMATE_FEATURES));
   for (PetscInt k = 0; k < m->trace.n_listed; k++) {
     PetscCall(HycoROMSetStep(m, k));
     PetscCall(MeasureOne(m, one));
-    for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) feature[j] = PetscMax(feature[j], one[j]);
+    for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) feature[j] = PetscMax(feature[j], one[j]);
   }
   PetscCall(HycoROMSetStep(m, shown));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -153,18 +153,19 @@ static PetscReal Beyond(HycoROM m, const PetscReal mu[], PetscReal nearest[])
   return most > 1e-12 ? most : 0;
 }
 
-static PetscReal Estimate(const HycoTrust *t, const PetscReal coefficient[], const PetscReal feature[])
+static PetscReal Estimate(const HycoEstimates *t, const PetscReal coefficient[], const PetscReal feature[])
 {
-  PetscReal sum = coefficient[HYCO_TRUST_FEATURES];
+  PetscReal sum = coefficient[HYCO_ESTIMATE_FEATURES];
 
-  for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) sum += coefficient[j] * PetscLogReal(1 + feature[j] / t->floor[j]);
+  for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++)
+    sum += coefficient[j] * PetscLogReal(1 + feature[j] / t->floor[j]);
   return PetscExpReal(PetscMin(sum, 200));
 }
 
-PetscErrorCode HycoTrustEstimate(HycoROM m, HycoPrediction *p)
+PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
 {
-  const HycoTrust *t = &m->trust;
-  PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_TRUST_FEATURES], outside, estimate[HYCO_N_TRUST];
+  const HycoEstimates *t = &m->estimates;
+  PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_ESTIMATE_FEATURES], outside, estimate[HYCO_N_ESTIMATES];
 
   PetscFunctionBegin;
   p->estimated_error_u = p->estimated_error_lambda = p->estimated_error_sigma = -1;
@@ -173,26 +174,26 @@ PetscErrorCode HycoTrustEstimate(HycoROM m, HycoPrediction *p)
   p->estimated_error_u_full = -1;
   if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
   if (!t->n || p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoTrustMeasure(m, feature));
-  outside = 1 + (p->beyond > 0 ? HycoTrustDistance(m->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
-  for (PetscInt e = 0; e < HYCO_N_TRUST; e++)
+  PetscCall(HycoEstimatesFeatures(m, feature));
+  outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++)
     estimate[e] = t->has[e] ? Estimate(t, t->law[e], feature) * outside * outside : -1;
-  p->estimated_error_u = estimate[HYCO_TRUST_U];
-  p->estimated_error_sigma = estimate[HYCO_TRUST_SIGMA];
-  p->estimated_error_lambda = estimate[HYCO_TRUST_LAMBDA];
+  p->estimated_error_u = estimate[HYCO_ESTIMATE_U];
+  p->estimated_error_sigma = estimate[HYCO_ESTIMATE_SIGMA];
+  p->estimated_error_lambda = estimate[HYCO_ESTIMATE_LAMBDA];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* "u 1.2e-04, stress 3e-03, contact forces 2e-02" */
 static void DescribeErrors(const PetscReal error[], char text[HYCO_LINE])
 {
-  snprintf(text, HYCO_LINE, "u %.2g, stress %.2g, contact forces %.2g", (double)error[HYCO_TRUST_U],
-           (double)error[HYCO_TRUST_SIGMA], (double)error[HYCO_TRUST_LAMBDA]);
+  snprintf(text, HYCO_LINE, "u %.2g, stress %.2g, contact forces %.2g", (double)error[HYCO_ESTIMATE_U],
+           (double)error[HYCO_ESTIMATE_SIGMA], (double)error[HYCO_ESTIMATE_LAMBDA]);
 }
 
-PetscErrorCode HycoTrustView(HycoROM m, PetscViewer viewer)
+PetscErrorCode HycoEstimatesView(HycoROM m, PetscViewer viewer)
 {
-  const HycoTrust *t = &m->trust;
+  const HycoEstimates *t = &m->estimates;
   char median[HYCO_LINE], largest[HYCO_LINE];
 
   PetscFunctionBegin;

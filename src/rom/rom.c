@@ -305,7 +305,7 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   }
   p->u_norm2 = PetscSqrtReal(p->u_norm2);
   PetscCall(MeasureContacts(m, p));
-  PetscCall(HycoTrustEstimate(m, p));
+  PetscCall(HycoEstimatesEvaluate(m, p));
   PetscCall(HycoROMMeasureQuantities(m, p));
   PetscCall(MeasureEquilibrium(m, p));
   *out = *p;
@@ -466,7 +466,7 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
   PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
                                    (int)pod, pod ? (double)m->sigma[0] : 0., pod ? (double)m->sigma[pod - 1] : 0.));
   PetscTryTypeMethod(m, view, viewer);
-  PetscCall(HycoTrustView(m, viewer));
+  PetscCall(HycoEstimatesView(m, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->provenance));
   PetscCall(HycoSceneView(m->scene, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -165,34 +165,34 @@ static PetscErrorCode LoadType(HycoH5 h, HycoROM m)
 /* training/held_out: the number of predictions, medians and largest errors. training/estimates: the number behind them,
    the largest force, the floors, and for each error whether it has an estimate, the coefficients, the constant. */
 enum {
-  HELD_NUMBERS = 1 + 2 * HYCO_N_TRUST,
-  TRUST_NUMBERS = 2 + HYCO_TRUST_FEATURES + HYCO_N_TRUST * (2 + HYCO_TRUST_FEATURES)
+  HELD_NUMBERS = 1 + 2 * HYCO_N_ESTIMATES,
+  ESTIMATE_NUMBERS = 2 + HYCO_ESTIMATE_FEATURES + HYCO_N_ESTIMATES * (2 + HYCO_ESTIMATE_FEATURES)
 };
 
-static PetscErrorCode SaveTrust(HycoH5 h, HycoROM m)
+static PetscErrorCode SaveEstimates(HycoH5 h, HycoROM m)
 {
-  const HycoTrust *t = &m->trust;
-  PetscReal numbers[TRUST_NUMBERS], *at = numbers;
+  const HycoEstimates *t = &m->estimates;
+  PetscReal numbers[ESTIMATE_NUMBERS], *at = numbers;
 
   PetscFunctionBegin;
   if (m->search) PetscCall(HycoH5WriteText(h, "training/search", m->search));
   if (t->n_held) {
     numbers[0] = (PetscReal)t->n_held;
-    for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+    for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
       numbers[1 + e] = PetscMin(t->median[e], PETSC_MAX_REAL);
-      numbers[1 + HYCO_N_TRUST + e] = PetscMin(t->largest[e], PETSC_MAX_REAL);
+      numbers[1 + HYCO_N_ESTIMATES + e] = PetscMin(t->largest[e], PETSC_MAX_REAL);
     }
     PetscCall(HycoH5WriteReal(h, "training/held_out", HELD_NUMBERS, 1, numbers));
   }
   if (!t->n) PetscFunctionReturn(PETSC_SUCCESS);
   *at++ = (PetscReal)t->n;
   *at++ = t->force;
-  for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) *at++ = t->floor[j];
-  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+  for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) *at++ = t->floor[j];
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
     *at++ = t->has[e];
-    for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) *at++ = t->law[e][j];
+    for (PetscInt j = 0; j <= HYCO_ESTIMATE_FEATURES; j++) *at++ = t->law[e][j];
   }
-  PetscCall(HycoH5WriteReal(h, "training/estimates", TRUST_NUMBERS, 1, numbers));
+  PetscCall(HycoH5WriteReal(h, "training/estimates", ESTIMATE_NUMBERS, 1, numbers));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,7 +203,7 @@ static PetscBool IsCount(PetscReal x)
 
 static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
 {
-  HycoTrust *t = &m->trust;
+  HycoEstimates *t = &m->estimates;
   PetscReal *numbers;
   PetscInt n = HELD_NUMBERS, one = 1;
   PetscBool good;
@@ -213,9 +213,9 @@ static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
   PetscCall(HycoH5LoadReal(h, "training/held_out", &n, &one, &numbers));
   good = IsCount(numbers[0]);
   t->n_held = good ? (PetscInt)numbers[0] : 0;
-  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
     t->median[e] = numbers[1 + e];
-    t->largest[e] = numbers[1 + HYCO_N_TRUST + e];
+    t->largest[e] = numbers[1 + HYCO_N_ESTIMATES + e];
     good = (PetscBool)(good && t->median[e] >= 0 && t->largest[e] >= t->median[e]);
   }
   PetscCall(PetscFree(numbers));
@@ -224,10 +224,10 @@ static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
 }
 
 /* training/trust of older files: no tail, no stress; count, floors, coefficients of u and of the forces, force. */
-static PetscErrorCode LoadOldTrust(HycoH5 h, HycoROM m)
+static PetscErrorCode LoadOldEstimates(HycoH5 h, HycoROM m)
 {
-  const PetscInt features = HYCO_TRUST_FEATURES - 1;
-  HycoTrust *t = &m->trust;
+  const PetscInt features = HYCO_ESTIMATE_FEATURES - 1;
+  HycoEstimates *t = &m->estimates;
   PetscReal *numbers, *at;
   PetscInt n = 2 + features + 2 * (features + 1), one = 1;
   PetscBool good;
@@ -244,30 +244,30 @@ static PetscErrorCode LoadOldTrust(HycoH5 h, HycoROM m)
     good = (PetscBool)(good && t->floor[j] > 0);
   }
   for (PetscInt k = 0; k < 2; k++) {
-    PetscReal *law = t->law[k ? HYCO_TRUST_LAMBDA : HYCO_TRUST_U];
+    PetscReal *law = t->law[k ? HYCO_ESTIMATE_LAMBDA : HYCO_ESTIMATE_U];
 
     for (PetscInt j = 0; j < features; j++) law[j] = *at++;
-    law[HYCO_TRUST_FEATURES] = *at++;
+    law[HYCO_ESTIMATE_FEATURES] = *at++;
   }
   t->force = *at;
-  t->has[HYCO_TRUST_U] = PETSC_TRUE;
-  t->has[HYCO_TRUST_LAMBDA] = (PetscBool)(t->force > 0); /* without a force nothing was calibrated */
+  t->has[HYCO_ESTIMATE_U] = PETSC_TRUE;
+  t->has[HYCO_ESTIMATE_LAMBDA] = (PetscBool)(t->force > 0); /* without a force nothing was calibrated */
   PetscCall(PetscFree(numbers));
   HycoCheck(good && t->force >= 0, "%s: training/trust is damaged", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode LoadTrust(HycoH5 h, HycoROM m)
+static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
 {
-  HycoTrust *t = &m->trust;
+  HycoEstimates *t = &m->estimates;
   PetscReal *numbers, *at;
-  PetscInt n = TRUST_NUMBERS, one = 1;
+  PetscInt n = ESTIMATE_NUMBERS, one = 1;
   PetscBool good;
 
   PetscFunctionBegin;
   if (HycoH5Has(h, "training/search")) PetscCall(HycoH5LoadText(h, "training/search", &m->search));
   PetscCall(LoadHeldOut(h, m));
-  if (HycoH5Has(h, "training/trust")) PetscCall(LoadOldTrust(h, m));
+  if (HycoH5Has(h, "training/trust")) PetscCall(LoadOldEstimates(h, m));
   if (!HycoH5Has(h, "training/estimates")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5LoadReal(h, "training/estimates", &n, &one, &numbers));
   at = numbers;
@@ -275,13 +275,13 @@ static PetscErrorCode LoadTrust(HycoH5 h, HycoROM m)
   t->n = good ? (PetscInt)*at : 0;
   at++;
   t->force = *at++;
-  for (PetscInt j = 0; j < HYCO_TRUST_FEATURES; j++) {
+  for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) {
     t->floor[j] = *at++;
     good = (PetscBool)(good && t->floor[j] > 0);
   }
-  for (PetscInt e = 0; e < HYCO_N_TRUST; e++) {
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
     t->has[e] = (PetscBool)(*at++ > 0.5);
-    for (PetscInt j = 0; j <= HYCO_TRUST_FEATURES; j++) t->law[e][j] = *at++;
+    for (PetscInt j = 0; j <= HYCO_ESTIMATE_FEATURES; j++) t->law[e][j] = *at++;
   }
   PetscCall(PetscFree(numbers));
   HycoCheck(good && t->force >= 0, "%s: training/estimates is damaged", m->path);
@@ -389,7 +389,7 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
   PetscCall(MoveType(h, m));
   PetscCall(HycoH5Real(h, "training/points", &m->n_points, m->scene->n_parameters, &m->points));
   PetscCall(HycoH5Reals(h, "training/numbers", 3, m->numbers));
-  PetscCall(HycoH5Reads(h) ? LoadTrust(h, m) : SaveTrust(h, m));
+  PetscCall(HycoH5Reads(h) ? LoadEstimates(h, m) : SaveEstimates(h, m));
   PetscCall(MoveProvenance(h, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

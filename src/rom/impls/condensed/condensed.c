@@ -331,7 +331,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   PetscCall(PetscArraycpy(c->last, mu, c->dim));
   p->seconds.solve = HycoNow() - solve;
   PetscCall(Displacements(m, mu));
-  p->interpolation_error = c->errors[2]; /* in older files; HycoTrustEstimate() sets that of newer ones */
+  p->interpolation_error = c->errors[2]; /* in older files; HycoEstimatesEvaluate() sets that of newer ones */
   for (PetscInt q = 0; q < c->dim; q++) {
     if (!c->affine[q]) p->interpolation_error *= HycoPolynomialGrowth(c->n[q], c->x[q], mu[q]);
   }
@@ -423,7 +423,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
       (double)c->errors[0], (double)c->errors[1], (double)c->errors[2]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  fields and stresses on %d of %d elements, or the whole mesh\n",
                                    (int)m->mesh->n_cells, (int)m->whole_cells));
-  if (!m->trust.n)
+  if (!m->estimates.n)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  error estimates: from values left out%s\n",
                                      !c->law && c->errors_u[0] < 0 ? ", none of u (an older file)" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -130,7 +130,7 @@ static void Column(HycoROM m, const PetscReal mu[], PetscReal column[])
   const PetscInt n = m->n_points, n_par = s->n_parameters;
 
   for (PetscInt k = 0; k < n; k++)
-    column[k] = Kernel(((Regression)m->data)->kernel, HycoTrustDistance(s, mu, m->points + k * n_par));
+    column[k] = Kernel(((Regression)m->data)->kernel, HycoEstimatesDistance(s, mu, m->points + k * n_par));
   column[n] = 1;
   for (PetscInt p = 0; p < n_par; p++)
     column[n + 1 + p] = (mu[p] - s->lo[p]) / (s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1);
