@@ -1,5 +1,5 @@
-# A shared library shows the functions and class ids that include/*.h declares. They are read from there, so that nothing has to be
-# kept in step: a linker script with their names, and "local" for all others.
+# A shared library exports the functions and class ids that include/*.h declares, and no others: the names are read from the headers and
+# written to a version script of the linker.
 function(hyco_export_public target)
   get_target_property(type ${target} TYPE)
   if(NOT type STREQUAL SHARED_LIBRARY)

@@ -1,5 +1,5 @@
-# cmake --install build --prefix FOLDER: the library, its headers, the command, its pages and completion, pkg-config's and CMake's files, the
-# examples; cpack makes a Debian package of the same.
+# cmake --install build --prefix FOLDER installs the library, its headers, the command, its manual pages and completion, the files for pkg-config
+# and CMake, and the examples; cpack makes a Debian package of the same files.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -20,7 +20,7 @@ file(RELATIVE_PATH HYCO_PC_TO_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 configure_file(cmake/hyco.pc.in hyco.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/hyco.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
-# Manual pages and the shell's completion are made of what the commands print as help.
+# Manual pages and the shell completion are made from the help of the commands.
 install(CODE "execute_process(COMMAND sh \"${PROJECT_SOURCE_DIR}/cmake/manual\" \"$<TARGET_FILE:hyco_command>\" \"${PROJECT_BINARY_DIR}/manual\"
                               RESULT_VARIABLE failed)
 if(failed)
@@ -34,7 +34,7 @@ install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} FILES_MATCHING PATTER
 install(PROGRAMS scripts/meshes scripts/plot scripts/convert scripts/hyco.sbatch DESTINATION ${CMAKE_INSTALL_DOCDIR}/scripts)
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN *.msh EXCLUDE PATTERN *.h5 EXCLUDE PATTERN *.xdmf EXCLUDE)
 
-# What whoever links hyco needs is recommended: a command alone runs without headers.
+# The headers of PETSc and SLEPc are needed only by programs that link hyco; the package therefore only recommends them.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME hyco)
 set(CPACK_PACKAGE_VENDOR "the hyco authors")

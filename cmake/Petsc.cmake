@@ -1,6 +1,6 @@
-# What must be PETSc's own in a process that uses it: one MPI, one BLAS.
+# Finds MPI, BLAS and HDF5. A process must use the same MPI and BLAS as PETSc.
 
-# Stops where the MPI that CMake found is another one than PETSc's: petscsys.h compares them.
+# Stops if the MPI that CMake found is not the MPI of PETSc: petscsys.h compares them.
 function(hyco_check_mpi)
   include(CheckCSourceCompiles)
   set(CMAKE_REQUIRED_LIBRARIES PkgConfig::PETSC MPI::MPI_C)
@@ -8,15 +8,15 @@ function(hyco_check_mpi)
   check_c_source_compiles("#include <petscsys.h>
 int main(int argc, char **argv) { return PetscInitialize(&argc, &argv, 0, 0); }" HYCO_MPI_IS_PETSCS)
   if(NOT HYCO_MPI_IS_PETSCS)
-    unset(HYCO_MPI_IS_PETSCS CACHE) # to be looked at again, with another MPI
+    unset(HYCO_MPI_IS_PETSCS CACHE) # checked again in the next run, with another MPI
     message(FATAL_ERROR "A program with PETSc ${PETSC_VERSION} (${PETSC_PREFIX}) and the MPI of ${MPI_C_COMPILER} does not compile or "
             "link: is that MPI another one than PETSc's? Take PETSc's own: -DMPI_C_COMPILER=/path/to/its/mpicc "
             "(CMakeFiles/CMakeError.log or CMakeConfigureLog.yaml in the build folder has the compiler's words.)")
   endif()
 endfunction()
 
-# The BLAS and LAPACK that PETSc was linked with, by the names that its pkg-config file gives: two of them in one process
-# would share their symbols.
+# Finds the BLAS and LAPACK that PETSc was linked with, by the names in its pkg-config file: two BLAS in one process would
+# define the same symbols.
 function(hyco_find_blas out)
   foreach(name ${PETSC_STATIC_LIBRARIES})
     if(name MATCHES "^(lib)?(f2c|ref|sci|s|c)?(lapack|blas|lapacke|openblas.*|flexiblas|blis.*|mkl_.*|atlas|acml|essl|nvpl_.*)$")
@@ -24,7 +24,7 @@ function(hyco_find_blas out)
       list(APPEND found ${HYCO_BLAS_${name}})
     endif()
   endforeach()
-  if(NOT found) # PETSc's file names none
+  if(NOT found) # the pkg-config file contains none
     find_package(LAPACK REQUIRED)
     set(found ${LAPACK_LIBRARIES})
   endif()
@@ -32,9 +32,10 @@ function(hyco_find_blas out)
   set(${out} ${found} PARENT_SCOPE)
 endfunction()
 
-# HDF5, by its compiler wrapper or (it takes no path with a blank) its pkg-config file; without what a shared one brings itself.
+# Finds HDF5 by its compiler wrapper, or by its pkg-config file, since the wrapper does not accept paths with a blank. The dependencies of
+# a shared HDF5 are left out.
 function(hyco_find_hdf5 out includes)
-  set(HDF5_PREFER_PARALLEL ON) # PETSc's own
+  set(HDF5_PREFER_PARALLEL ON) # the HDF5 of PETSc
   find_package(HDF5 QUIET COMPONENTS C)
   if(NOT HDF5_FOUND)
     pkg_search_module(HYCO_HDF5_PC REQUIRED hdf5-openmpi hdf5-mpich hdf5-mpi hdf5)

@@ -1,7 +1,7 @@
-// A block [0, a] x [0, h] on a foundation [0, b] x [-d, 0], right half of both, triangles; the two lines of contact
-// coincide and are meshed alike, or not. gmsh -2 blocks.geo -setnumber n 24 -setnumber m 17 -o out.msh
-// n, m: elements of the contact line of the block and of the foundation (0: n). Each body has points of its own and nothing is made coherent, so that gmsh does not
-// merge the two lines.
+// A block [0, a] x [0, h] on a foundation [0, b] x [-d, 0], right half of both, triangles. The two contact lines coincide, with
+// matching or non-matching meshes. gmsh -2 blocks.geo -setnumber n 24 -setnumber m 17 -o out.msh
+// n, m: elements of the contact line of the block and of the foundation (0: n). The bodies share no points and Coherence is not used, so
+// that gmsh does not merge the two lines.
 Geometry.AutoCoherence = 0;
 DefineConstant[ n = {24}, m = {0}, a = {20}, h = {16}, b = {40}, d = {24} ];
 fine = a/n;

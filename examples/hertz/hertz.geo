@@ -1,7 +1,7 @@
-// Two quarter-disks of radius r (above) and s (below) that touch at the origin, right half of a pair of half-disks, triangles;
-// their lines of contact are not meshed alike. gmsh -2 hertz.geo -setnumber n 40 -setnumber m 31 -o out.msh
-// n, m: elements of the contact line of the upper and of the lower disk; c: how far these lines reach. Each disk has points of
-// its own and nothing is made coherent, so that gmsh does not merge the two.
+// Two quarter-disks of radius r (above) and s (below) that touch at the origin, right half of a pair of half-disks, triangles. The
+// meshes of the contact lines do not match. gmsh -2 hertz.geo -setnumber n 40 -setnumber m 31 -o out.msh
+// n, m: elements of the contact line of the upper and of the lower disk; c: length of these lines. The disks share no points and
+// Coherence is not used, so that gmsh does not merge the two.
 Geometry.AutoCoherence = 0;
 Mesh.MeshSizeExtendFromBoundary = 1;
 DefineConstant[ n = {40}, m = {31}, r = {10}, s = {10}, c = {1} ];

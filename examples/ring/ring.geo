@@ -1,7 +1,7 @@
-// A ring [a, b] around a solid core of radius a, a quarter, quadrilaterals; the two circles of contact coincide and are meshed
-// alike, or not. gmsh -2 ring.geo -setnumber n 4 -setnumber m 7 -o out.msh
-// n: elements through the ring; m: elements of the core's circle per 45 degrees (0: as the ring has). Each body has points of
-// its own and nothing is made coherent, so that gmsh does not merge the circles.
+// A quarter of a ring [a, b] around a solid core of radius a, quadrilaterals. The two contact circles coincide, with matching or
+// non-matching meshes. gmsh -2 ring.geo -setnumber n 4 -setnumber m 7 -o out.msh
+// n: elements through the ring; m: elements of the core's circle per 45 degrees (0: as for the ring). The bodies share no points and
+// Coherence is not used, so that gmsh does not merge the circles.
 Geometry.AutoCoherence = 0;
 DefineConstant[ n = {4}, m = {0}, a = {4.1}, b = {4.7} ];
 s = Sqrt(0.5);
