@@ -156,12 +156,13 @@ PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u
 /*
   Finds the combinations of `motions` that frictionless contact does not prevent because of the surfaces' shape: the
   motion is tangential at every contact, to within the faceting error, to a normal, the slave's surface, the master's,
-  or the plane of the given normal. unheld: coefficients (n x motions->n, orthonormal) of all of them; names by
+  or the plane of the given normal. unconstrained: coefficients (n x motions->n, orthonormal) of all of them; names by
   HycoMotionsName() of each. alike: those of the largest set that is tangential in the same sense, which turned normals
   can release. The caller frees both.
 */
-PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions, PetscInt *n_unheld,
-                                PetscReal **unheld, PetscInt *n_alike, PetscReal **alike);
+PetscErrorCode HycoFEFindUnconstrained(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions,
+                                       PetscInt *n_unconstrained, PetscReal **unconstrained, PetscInt *n_alike,
+                                       PetscReal **alike);
 /* The longest edge around each node (n_nodes) of the facets of `group`; 0 where it has none. */
 void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
 /* Tributary area (length in 2D, 1 in 1D) of each contact's slave node; 0 if its group is no surface. */

@@ -121,7 +121,7 @@ PetscErrorCode HycoLoadsSetFree(HycoROM model, const PetscReal mu[]);
 
 /* A model without a basis of contact forces: sets the reason to not converged if its displacement penetrates; the
    prediction's U is current. */
-PetscErrorCode HycoGalerkinCheckForceless(HycoROM model);
+PetscErrorCode HycoGalerkinCheckContactBasis(HycoROM model);
 
 /* Creates the part of the model's mesh that the reduced problem uses, and its contacts (reduced_mesh.c): the nodes
    of cells and of A_lambda, and those needed for measured normals there. A prediction without reconstruction

@@ -220,7 +220,7 @@ static void Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *
   }
 }
 
-static PetscErrorCode Search(const Shapes *s, PetscInt *n_unheld, PetscReal unheld[], PetscInt *n_alike,
+static PetscErrorCode Search(const Shapes *s, PetscInt *n_unconstrained, PetscReal unconstrained[], PetscInt *n_alike,
                              PetscReal alike[])
 {
   const PetscInt n_contacts = s->fe->scene->n_contacts, k = s->k;
@@ -241,8 +241,8 @@ static PetscErrorCode Search(const Shapes *s, PetscInt *n_unheld, PetscReal unhe
       *n_alike = 0;
       for (PetscInt a = 0; a < n; a++) Join(k, z + a * k, alike, n_alike);
     }
-    before = *n_unheld;
-    for (PetscInt a = 0; a < n; a++) Join(k, z + a * k, unheld, n_unheld);
+    before = *n_unconstrained;
+    for (PetscInt a = 0; a < n; a++) Join(k, z + a * k, unconstrained, n_unconstrained);
     if (before == k) break;
   }
   PetscCall(PetscFree2(sense, z));
@@ -298,23 +298,24 @@ static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscRe
   }
 }
 
-PetscErrorCode HycoFEFindUnheld(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions, PetscInt *n_unheld,
-                                PetscReal **unheld, PetscInt *n_alike, PetscReal **alike)
+PetscErrorCode HycoFEFindUnconstrained(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions,
+                                       PetscInt *n_unconstrained, PetscReal **unconstrained, PetscInt *n_alike,
+                                       PetscReal **alike)
 {
   Shapes s = {fe, pairs, motions->n, pairs->n, NULL, {NULL}, {NULL}, {NULL}};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  *n_unheld = *n_alike = 0;
-  PetscCall(PetscCalloc1((s.k + 1) * s.k, unheld));
+  *n_unconstrained = *n_alike = 0;
+  PetscCall(PetscCalloc1((s.k + 1) * s.k, unconstrained));
   PetscCall(PetscCalloc1((s.k + 1) * s.k, alike));
   PetscCall(PetscMalloc1((size_t)s.m * (size_t)s.k * 3, &s.d));
   for (PetscInt t = 0; t < N_SENSES; t++)
     PetscCall(PetscCalloc3(3 * s.m, &s.normal[t], s.m, &s.doubt[t], s.m, &s.bend[t]));
   Relative(&s, motions);
   ierr = FindSenses(&s);
-  if (!ierr) ierr = Search(&s, n_unheld, *unheld, n_alike, *alike);
-  if (!ierr) Reduce(motions, fe->dim, *n_unheld, *unheld);
+  if (!ierr) ierr = Search(&s, n_unconstrained, *unconstrained, n_alike, *alike);
+  if (!ierr) Reduce(motions, fe->dim, *n_unconstrained, *unconstrained);
   for (PetscInt t = 0; t < N_SENSES; t++) PetscCall(PetscFree3(s.normal[t], s.doubt[t], s.bend[t]));
   PetscCall(PetscFree(s.d));
   PetscCall(ierr);

@@ -44,14 +44,14 @@ static PetscErrorCode ToSurface(HycoFOM f, PetscInt n, const Vec v[], PetscReal 
 }
 
 /* "body upper from turning about (0, 0, 1) through (0, 10, 0); nor body ..." */
-static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscReal unheld[], const char between[],
+static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscReal unconstrained[], const char between[],
                   size_t room, char list[])
 {
   list[0] = '\0';
   for (PetscInt k = 0; k < n; k++) {
     char name[HYCO_LINE];
 
-    HycoMotionsName(f->fe, free, unheld + k * free->n, name);
+    HycoMotionsName(f->fe, free, unconstrained + k * free->n, name);
     if (strlen(list) + strlen(name) + strlen(between) + 1 > room) break;
     if (k) strcat(list, between);
     strcat(list, name);
@@ -91,15 +91,15 @@ static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], con
 typedef struct {
   PetscInt n, n_alike;
   PetscReal *all, *alike;
-} Unheld;
+} Unconstrained;
 
 /* Finds them (rank 0), and refuses them unless they are to be released. */
-static PetscErrorCode FindUnheld(HycoFOM f, const HycoMotions *free, Unheld *z)
+static PetscErrorCode FindUnconstrained(HycoFOM f, const HycoMotions *free, Unconstrained *z)
 {
   char list[HYCO_LINE / 2];
 
   PetscFunctionBegin;
-  PetscCall(HycoFEFindUnheld(f->fe_surface, &f->pairs, free, &z->n, &z->all, &z->n_alike, &z->alike));
+  PetscCall(HycoFEFindUnconstrained(f->fe_surface, &f->pairs, free, &z->n, &z->all, &z->n_alike, &z->alike));
   Names(f, free, z->n, z->all, "; nor ", sizeof(list), list);
   Names(f, free, z->n, z->all, "; ", sizeof(f->summary.regularised), f->summary.regularised);
   HycoCheck(!z->n || f->regularise,
@@ -109,13 +109,13 @@ static PetscErrorCode FindUnheld(HycoFOM f, const HycoMotions *free, Unheld *z)
 }
 
 /* The same from rank 0 to all. */
-static PetscErrorCode BroadcastUnheld(HycoFOM f, const HycoMotions *free, Unheld *z)
+static PetscErrorCode BroadcastUnconstrained(HycoFOM f, const HycoMotions *free, Unconstrained *z)
 {
   const PetscInt k = free->n;
   PetscInt n[2];
 
   PetscFunctionBegin;
-  HycoOnRoot(HycoComm(f), FindUnheld(f, free, z));
+  HycoOnRoot(HycoComm(f), FindUnconstrained(f, free, z));
   n[0] = z->n;
   n[1] = z->n_alike;
   PetscCallMPI(MPI_Bcast(n, 2, MPIU_INT, 0, HycoComm(f)));
@@ -132,7 +132,7 @@ static PetscErrorCode BroadcastUnheld(HycoFOM f, const HycoMotions *free, Unheld
    for these. */
 static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
 {
-  Unheld z = {0, 0, NULL, NULL};
+  Unconstrained z = {0, 0, NULL, NULL};
   HycoMotions at_surface = *free;
   PetscErrorCode ierr;
   Vec *motion;
@@ -140,7 +140,7 @@ static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
   PetscFunctionBegin;
   PetscCall(CreateVectors(f, free, &motion));
   PetscCall(ToSurface(f, free->n, motion, &at_surface.motion));
-  ierr = BroadcastUnheld(f, &at_surface, &z);
+  ierr = BroadcastUnconstrained(f, &at_surface, &z);
   if (!ierr) PetscCall(PetscMalloc1(z.n + z.n_alike, &f->released));
   for (PetscInt k = 0; !ierr && k < z.n_alike && z.n; k++)
     PetscCall(AddReleased(f, free->n, motion, z.alike + k * free->n));

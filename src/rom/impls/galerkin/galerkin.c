@@ -278,7 +278,7 @@ PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
   PetscCall(HycoSolverGetMethod(m->solver, &method));
   PetscCall(PetscStrncpy(p->method, method, sizeof(p->method)));
   PetscCall(HycoGalerkinUnpack(m));
-  PetscCall(HycoGalerkinCheckForceless(m));
+  PetscCall(HycoGalerkinCheckContactBasis(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

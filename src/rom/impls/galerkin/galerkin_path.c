@@ -213,7 +213,7 @@ static PetscErrorCode Record(HycoPath p)
   PetscFunctionBegin;
   PetscCall(Watch(m, p->n_steps));
   PetscCall(HycoGalerkinUnpack(m));
-  PetscCall(HycoGalerkinCheckForceless(m));
+  PetscCall(HycoGalerkinCheckContactBasis(m));
   PetscCall(CompleteState(m, p));
   if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   PetscCall(Measure(m, p->begin, &p->now));

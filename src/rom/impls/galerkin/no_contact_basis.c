@@ -4,7 +4,7 @@
 */
 #include <hycogalerkin.h>
 
-PetscErrorCode HycoGalerkinCheckForceless(HycoROM m)
+PetscErrorCode HycoGalerkinCheckContactBasis(HycoROM m)
 {
   HycoPrediction *p = &m->prediction;
   PetscReal in = 0, size = 0;

@@ -14,7 +14,7 @@ FINE = (*SETTINGS, '-hyco_pod_tol', '1e-11', '-hyco_deim_type', 'qdeim', '-hyco_
 ERRORS = (('estimated_error_u', 'error_u'), ('estimated_error_lambda', 'error_lambda'))
 
 
-class Trust(Case):
+class Estimates(Case):
     newcomer = True
 
     @classmethod
