@@ -1,6 +1,6 @@
-/* In every program under sanitizers: a library once opened stays. LeakSanitizer looks at the very end, when Open MPI has closed its
-   plug-ins: it would not know by name who kept what, and would read the map of the process again for each address without a name, which
-   takes most of its time. */
+/* Loaded by every program under sanitizers: keeps opened libraries loaded. LeakSanitizer runs at the very end, when
+   Open MPI has closed its plug-ins: it could not resolve the names of their functions, and would read the process's
+   memory map again for each such address, which takes most of its time. */
 #include <dlfcn.h>
 
 int dlclose(void *handle)

@@ -1,4 +1,4 @@
-"""Section 7: what is run, and what numpy makes of the solutions. Pictures and words are made from these elsewhere."""
+"""Section 7: the runs, and the quantities computed from the solutions by numpy. Other files make pictures and text from these."""
 import csv
 import glob
 import os
@@ -19,12 +19,12 @@ PARTS = ("paper", "no extension", "no layer")
 MODELS = [*[(*PAPER[:2], v) for v in PARTS], ("5 radii", "1e-5", "paper"), ("5 radii", "1e-7", "paper"),
           *[("5 radii", "1e-10", v) for v in PARTS], ("9 radii", "1e-7", "paper"),
           *[("9 radii", "1e-10", v) for v in VARIANTS]]
-SHOWN = (0.6, 0.8, 1.0)                           # the loads at which S3's fields are asked for
-SPAN_FLOOR = 1e-9                                 # singular values below this share of the first are no directions
+SHOWN = (0.6, 0.8, 1.0)  # the loads at which S3's fields are written
+SPAN_FLOOR = 1e-9  # singular values below this share of the first count as zero
 
 
 class Size:
-    """Mesh C and every model, or mesh A and the models that the pictures need."""
+    """Mesh C and every model, or mesh A and the models for the pictures."""
 
     def __init__(self, quick):
         self.mesh = "A" if quick else "C"
@@ -42,7 +42,7 @@ def store(runs, size):
 
 
 def train(runs, size, model, ranks=1):
-    """The report, or of a model that hyco refuses to write the reason."""
+    """The report, or, for a model that hyco refuses to write, the reason."""
     radii, tol, variant = model
     path = runs.path(f"{name_of(model)}.h5")
     if os.path.exists(path):
@@ -57,7 +57,7 @@ def train(runs, size, model, ranks=1):
 
 
 def compare(runs, size, model):
-    """S3 beside full order over all steps: the report and its table by columns."""
+    """S3 compared with full order over all steps: the report and its table by columns."""
     table = runs.path(f"{name_of(model)}.csv")
     report = runs.hyco(f"{name_of(model)}-compare", "compare", *size.scene, "-model", runs.path(f"{name_of(model)}.h5"),
                        "-values_radius", RADIUS, "-values_load", LOADS, "-table", table)
@@ -103,7 +103,7 @@ def predicted(runs, model):
 # ------------------------------------------------------------------------------------------------ errors
 
 def worst(entry, contact):
-    """Over the steps with contact: the largest errors, times, what did not converge."""
+    """Over the steps with contact: the largest errors, times, steps that did not converge."""
     table = entry["table"]
     steps = contact & (table["converged"] > 0.5)
     found = {key: largest(table[key][steps]) for key in ("error_u_rid", "error_sigma_11", "error_lambda_rid", "error_u")}
@@ -116,7 +116,7 @@ def worst(entry, contact):
 
 
 def shares(runs, model, loads=SHOWN):
-    """Of the full-order contact force of S3, what the contacts of a model's RID carry."""
+    """Share of the full-order contact force of S3 in a model's RID."""
     found = []
     with h5py.File(runs.path(f"{name_of(model)}.h5"), "r") as h:
         slave, own = h["problem/pairs/slave"][:].ravel(), h["problem/in_rid"][:].ravel() > 0
@@ -129,12 +129,12 @@ def shares(runs, model, loads=SHOWN):
 
 
 def largest(values):
-    """The largest of defined errors; None where no step has one (x/0 is written as a number beyond all others)."""
+    """The largest of the defined errors; None if no step has one (x/0 is written as a very large number)."""
     values = values[np.isfinite(values) & (values < 1e300)]
     return values.max() if len(values) else None
 
 
-# ------------------------------------------------------------------------------------------------ what snapshots span
+# ------------------------------------------------------------------------------------------------ span of the snapshots
 
 def snapshots(runs, size, radii, field):
     """Solutions as columns, radius by radius, each in the order of the loads."""
@@ -156,13 +156,13 @@ def basis(S):
 
 
 def kept(s, tol):
-    """(18): the fewest modes that leave no more than tol of the energy."""
+    """(18): the smallest number of modes that leave at most tol of the energy."""
     left = np.append(np.cumsum((s**2)[::-1])[::-1][1:], 0)
     return int(np.argmax(left <= tol * (s**2).sum())) + 1
 
 
 def deim(V):
-    """The interpolation points of a basis; of equal residuals, the first."""
+    """The interpolation points of a basis; among equal residuals the first."""
     index = []
     for k in range(V.shape[1]):
         r = V[:, k].copy()
@@ -173,8 +173,8 @@ def deim(V):
 
 
 def least_maximum(A, b, its=300):
-    """A lower bound of min over c of max |b - A c|, and the maximum at the best c met (Lawson's weights): whatever the
-    weights, of sum 1, the weighted mean square at its own minimum is no more than the square of the least maximum."""
+    """A lower bound of min over c of max |b - A c|, and the maximum at the best c found (Lawson's weights): for any weights
+    with sum 1, the minimum of the weighted mean square is at most the square of the least maximum."""
     weight, low, high = np.full(len(b), 1 / len(b)), 0.0, np.inf
     for _ in range(its):
         root = np.sqrt(weight)
@@ -187,9 +187,9 @@ def least_maximum(A, b, its=300):
 
 
 def bounds(runs, size, loads=SHOWN):
-    """What the solutions of S1 and S2 can tell of S3 at best: the projection on the whole mesh, and the least error that
-    any coefficients leave on those unknowns of the paper's RID that its modes describe, and in its cells of the cladding
-    made of them (the pellet's strains depend on its radius, so that its stresses are not those of the snapshots)."""
+    """The best possible approximation of S3 from the solutions of S1 and S2: the projection on the whole mesh, and the least
+    error of any coefficients on the unknowns of the paper's RID that its modes describe, and in the cladding's cells that
+    depend only on these (the pellet's strains depend on its radius, so that its stresses are not those of the snapshots)."""
     radii = RADII["S1 + S2"]
     (U, s), sigma = basis(snapshots(runs, size, radii, "U")), snapshots(runs, size, radii, "sigma")
     U, (S, t) = U[:, s > SPAN_FLOOR * s[0]], basis(sigma)
@@ -199,7 +199,7 @@ def bounds(runs, size, loads=SHOWN):
         order_n, order_c = h["whole/node_id"][:].ravel(), h["whole/cell_id"][:].ravel()
         clad = outside(h["whole/xyz"][:][h["whole/cells"][:]])[cell]
         role, full, cells = h["problem/role"][:].ravel(), h["problem/fe_dof"][:].ravel(), h["mesh/cells"][:]
-    inside = role > 0                                          # the RID's own nodes; others only carry contacts
+    inside = role > 0  # nodes of the RID; the others only belong to contacts
     modal = np.ones((len(node), 3), bool)
     modal.reshape(-1)[full] = False
     rows = (3 * node[:, None] + np.arange(3))[modal & inside[:, None]]
@@ -224,13 +224,13 @@ def outside(corners):
 
 
 def in_order(values, ids, wanted):
-    """Rows keyed by the mesh file's numbers, in the order of other such numbers."""
+    """Rows with keys of the mesh file, reordered by a list of keys."""
     place = np.argsort(ids)
     return values[place[np.searchsorted(ids, wanted, sorter=place)]]
 
 
 def contributions(runs, size, model):
-    """Cells that each basis adds to the RID (20): those all of whose nodes lie in its points' supports."""
+    """Cells that each basis adds to the RID (20): those with all nodes in its points' supports."""
     radii, tol, _ = model
     with h5py.File(runs.path(f"{name_of(model)}.h5"), "r") as h:
         cells, group, facet_cell = h["whole/cells"][:], h["whole/facet_group"][:].ravel(), h["whole/facet_cell"][:].ravel()
@@ -250,7 +250,7 @@ def contributions(runs, size, model):
 
 
 def history_of_contact(runs, size):
-    """S1 is a multiple of one solution (the second singular value over the first); the steps at which S2 touches."""
+    """Whether S1 is a multiple of one solution (the second singular value over the first); the steps with contact of S2."""
     s = basis(snapshots(runs, size, (4.10,), "U"))[1]
     touching = (snapshots(runs, size, (4.02,), "lambda") > 0).any(axis=0)
     return s[1] / s[0], int(touching.sum())

@@ -1,11 +1,11 @@
-"""Section 7: the pictures, by scripts/plot where it has them."""
+"""Section 7: the pictures, with functions of scripts/plot."""
 import matplotlib.pyplot as plt
 import numpy as np
 import pellet
 from matplotlib.colors import Normalize
 from rope_pictures import ORANGE, VIOLET, plot
 
-VIEW, OUTSIDE = (22, -125), (22, 40)               # from the axis; from outside, where the pressures are
+VIEW, OUTSIDE = (22, -125), (22, 40)  # seen from the axis; from outside, where the pressures act
 GHOST = {"facecolors": (0.6, 0.6, 0.6, 0.10), "edgecolors": "none"}
 COLOURS = {"U": plot.RED, "sigma": plot.BLUE, "force": plot.GREEN, "top": ORANGE}
 STYLE = {"S1 + S2": (plot.RED, "o-"), "5 radii": (ORANGE, "s-"), "9 radii": (plot.BLUE, "^-")}
@@ -19,14 +19,14 @@ def panels(rows, columns, width=3.0, height=3.5, right=0.98):
 
 
 def bare(ax, xyz, view=VIEW):
-    """The frame of a panel that needs no numbers: its proportions only."""
+    """The frame of a panel without numbers: only its proportions."""
     plot.frame_3d(ax, xyz, view)
     ax.set_axis_off()
     ax.set_box_aspect(np.ptp(xyz, axis=0), zoom=1.02)
 
 
 def ghost(ax, mesh, chosen):
-    """The cells around what is shown, without lines."""
+    """The surrounding cells, without lines."""
     faces, _ = mesh.skin(chosen)
     plot.draw_faces(ax, mesh.xyz, faces, 3, **GHOST)
 
@@ -38,7 +38,7 @@ def solid(ax, mesh, chosen, colour):
 
 
 def coloured(ax, mesh, chosen, values, on_cells, norm, cmap):
-    """Values on the skin of chosen cells; returns what a colour bar needs."""
+    """Draws values on the skin of chosen cells; returns the object for a colour bar."""
     faces, owner = mesh.skin(chosen)
     shown = plot.face_values(values, on_cells, faces, owner)
     drawn = plot.draw_faces(ax, mesh.xyz, faces, 3, cmap=cmap, norm=norm, edgecolors="none")
@@ -128,7 +128,7 @@ def figure_14(runs, model, pictures):
 
 
 def spectrum(fig, ax, runs):
-    """In the last panel's place: the singular values of the kept modes."""
+    """In the place of the last panel: the singular values of the modes."""
     place = ax.get_position()
     ax.remove()
     flat = fig.add_axes([place.x0 + 0.05, place.y0 + 0.1, place.width - 0.06, place.height - 0.14])
@@ -146,7 +146,7 @@ def spectrum(fig, ax, runs):
 # ------------------------------------------------------------------------------------------------ figures 15 and 16
 
 def side_by_side(runs, models, field, component, label, cladding, pictures, name):
-    """Full order, and each model on its RID; below each model its difference from full order there."""
+    """Full order, and each model on its RID; below each model its difference from full order."""
     full = plot.Solution(runs.path(f"{pellet.field_name(1.0)}.h5"))
     reduced = [(m, plot.Solution(runs.path(f"{pellet.name_of(m)}-S3.h5"))) for m in models]
     a, on_cells, _ = full.field(field, component)

@@ -1,4 +1,4 @@
-"""Section 7: the runs in their order, the pictures, and the words beside them. Every number of ours is a run's."""
+"""Section 7: the order of the runs, the pictures, and the text. Every number of hyco comes from a run."""
 
 import numpy as np
 import pellet
@@ -9,8 +9,8 @@ from runs import RunError
 
 
 def run(runs, size):
-    """All runs; what the report needs of them."""
-    first = pellet.train(runs, size, pellet.FINE, ranks=2)       # alone, on both cores: its solutions serve the others
+    """All runs; returns the data for the report."""
+    first = pellet.train(runs, size, pellet.FINE, ranks=2)  # alone, on both cores, because the others use its solutions
     full = runs.later(pellet.full_order, runs, size)
     shown = [runs.later(pellet.fields, runs, size, load) for load in pellet.SHOWN]
     entries = {m: runs.later(pellet.judged, runs, size, m, first if m == pellet.FINE else None) for m in size.models}
@@ -31,7 +31,7 @@ def run(runs, size):
 
 
 def fields_of(runs, model):
-    """Whether S3 at full load was predicted; hyco writes no fields of what did not converge."""
+    """Whether S3 at full load was predicted; hyco writes no fields of a prediction that did not converge."""
     try:
         return pellet.predicted(runs, model)
     except RunError:
@@ -54,7 +54,7 @@ def pictures(runs, size, found, out):
 
 
 def ladder(found):
-    """One model of each training set: the paper's, and the finest settings of the others that were judged."""
+    """One model for each training set: the paper's, and the most accurate settings of the others that were judged."""
     last = {m[0]: m for m in found["entries"] if m[2] == "paper" and "compare" in found["entries"][m]}
     return list(last.values())
 
@@ -63,7 +63,7 @@ def shown_models(found):
     return [m for m in ladder(found) if found["fields"][m]]
 
 
-# ------------------------------------------------------------------------------------------------ words
+# ------------------------------------------------------------------------------------------------ text
 
 def numbers(found):
     rows = [["**paper**: S1 + S2", "1e-5", "paper", "17 / 20 / 21", "", "1", "5", "", "", "10"]]
@@ -112,7 +112,7 @@ def write_tables(runs, found):
 
 
 def report(runs, size, found, folder):
-    """The Markdown text; `folder` is where its pictures are."""
+    """The Markdown text; `folder` contains its pictures."""
     write_tables(runs, found)
     contact, b = found["contact"], found["bounds"]
     second, touching = found["history"]
@@ -131,7 +131,7 @@ def report(runs, size, found, folder):
 
 
 def bound_values(b):
-    """The largest bounds of the steps, and which of the paper's numbers they exclude."""
+    """The largest bounds over the steps, and which of the paper's numbers they exclude."""
     u, sigma = (max(s[key] for s in b["steps"]) for key in ("u", "sigma"))
     excluded = [name for name, low, paper in (("displacement", u, 0.01), ("stress", sigma, 0.05)) if low > paper]
     return {"least": percent(u), "least_sigma": percent(sigma), "excluded": " and ".join(excluded) or "neither"}
@@ -142,13 +142,13 @@ def radii_of(name):
 
 
 def refusals(found):
-    """What hyco refused, in its own words."""
+    """The messages with which hyco refused models."""
     lines = [f"- {', '.join(m)}: {e['train']['refused']}" for m, e in found["entries"].items() if "compare" not in e]
     return ("Refused, in hyco's words:\n\n" + "\n".join(lines) + "\n\n") if lines else ""
 
 
 def effects(found, variant):
-    """For each training set that ran both ways: errors with the whole RID, and without a part of it."""
+    """For each training set that was run both ways: errors with the whole RID, and without a part of it."""
     told = []
     for m, entry in found["entries"].items():
         whole = found["entries"].get((*m[:2], "paper"))
@@ -166,7 +166,7 @@ def said(entry, contact):
 
 
 def part_values(found):
-    """Sizes of the contributions, and whether what the script computed is part of what hyco chose."""
+    """Sizes of the contributions, and whether the script's elements are part of hyco's RID."""
     parts, modes = found["parts"][pellet.FINE]
     paper_parts, paper_modes = found["parts"][pellet.PAPER]
     outside = int((parts["all"] & ~parts["rid"]).sum() + (paper_parts["all"] & ~paper_parts["rid"]).sum())

@@ -1,4 +1,4 @@
-"""Section 7: the words of the report; numbers of ours are filled in from the runs."""
+"""Section 7: the text of the report; hyco's numbers are filled in from the runs."""
 
 TEXT = """\
 # Section 7: the pellet in its cladding

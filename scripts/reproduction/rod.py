@@ -1,4 +1,4 @@
-"""The power ramp on a fuel rod: a reduced model of paths beside full order, and a study of a thousand ramps; its page and pictures."""
+"""The power ramp on a fuel rod: a reduced model of paths compared with full order, and a study of a thousand ramps; its page and pictures."""
 import csv
 import os
 import random
@@ -13,9 +13,9 @@ from runs import SOURCE
 
 RED, GREEN, BLUE, GREY = draw.plot.RED, draw.plot.GREEN, draw.plot.BLUE, "#777777"
 NAMES, RANGES = ("gap", "q2", "creep"), ((0.03, 0.07), (35, 45), (0.5, 2))
-POINT = (0.047, 41, 0.9)                                   # whose paths are drawn
+POINT = (0.047, 41, 0.9)  # the point whose paths are drawn
 UNSEEN = {"gap": (0.034, 0.058), "q2": (41,), "creep": (0.8, 1.6)}
-RAMP = 10001                                               # h, when the power rises
+RAMP = 10001  # h, start of the ramp
 SHOWN = {6000: "6000 h", 10001: "10001 h, the ramp begins", 10001.03333: "2 min later", 10004: "3 h later", 10025.03333: "24 h later"}
 SEED = 7
 KINDS = (("displacement", "u"), ("stress in the RID", "sigma"), ("contact forces", "lambda"), ("inelastic strain", "inelastic"))
@@ -39,7 +39,7 @@ class Size:
 
 
 def run(runs, size):
-    """The reports, and the file of the study's points."""
+    """Runs everything; returns the reports, and the file of the study's points."""
     name = f"rod-{size.mesh or 'slice'}"
     model, mu = runs.path(f"{name}.h5"), ",".join(map(str, POINT))
     found = {"name": name, "train": runs.hyco(f"{name}-train", "train", *size.scene, "-grid", size.training, "-model", model,
@@ -64,7 +64,7 @@ def draw_points(path, n):
 
 
 class Series:
-    """What a series has on the contact surface: by listed time the pressure and the gap of its nodes."""
+    """The fields of a series on the contact surface: the pressure and the gap of its nodes by listed time."""
 
     def __init__(self, path, size):
         with h5py.File(path) as file:
@@ -78,7 +78,7 @@ class Series:
         self.at, self.pressure, self.gap = self.at[order], self.pressure[:, order], self.gap[:, order]
 
     def mean_along(self, k):
-        """Pressure over the places, nodes of one place together."""
+        """Pressure over the coordinate, averaged over nodes with the same one."""
         places = np.unique(np.round(self.at, 6))
         return places, np.array([self.pressure[k][np.abs(self.at - p) < 1e-5].mean() for p in places])
 
@@ -91,7 +91,7 @@ def pictures(runs, size, found, out):
 
 
 def history(found, both, out):
-    """Closed gap, force and hoop stress: the years before the ramp, and the day after it began."""
+    """Gap, force and hoop stress: the year before the ramp, and the day after its start."""
     rows = (("smallest gap, mm", lambda word: both[word].gap.min(axis=1)),
             ("contact force, N", lambda word: np.array(found[word]["history"]["total_contact_force"])),
             ("largest hoop stress, MPa", lambda word: np.array(found[word]["history"]["outputs"]["hoop"])))
@@ -152,7 +152,7 @@ def quantiles(rows, column, factor=1.0):
 
 
 def report(found, size, folder):
-    """The page; `folder` holds its pictures."""
+    """The page; `folder` contains its pictures."""
     train, compare, rows = found["train"], found["compare"], converged(found)
     seconds = {"full": sum(found["full"]["history"]["seconds"]), "reduced": sum(found["reduced"]["history"]["seconds"])}
     errors = table(["largest error over four unseen paths and their listed times", "%"],

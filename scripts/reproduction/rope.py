@@ -1,4 +1,4 @@
-"""Section 6: what is run. Each function returns reports; pictures and words are made from them elsewhere."""
+"""Section 6: the runs. Each function returns reports; other files make pictures and text from them."""
 import csv
 import os
 
@@ -23,7 +23,7 @@ GREEDY = {"greedy-paper": PAPER_GREEDY, "greedy-1e-12": (*PAPER_GREEDY, "-hyco_p
 
 
 class Size:
-    """How much is run: the paper's sizes, or a few seconds to see that everything works."""
+    """The extent of the runs: the paper's sizes, or a few seconds as a test."""
 
     def __init__(self, quick):
         self.test_grid = "10,12" if quick else "100,120"
@@ -36,7 +36,7 @@ class Size:
         self.slow_its = 200 if quick else 10000
 
     def kept(self):
-        """The iterations whose models the histories judge."""
+        """The iterations whose models are judged for the histories."""
         return sorted({*range(0, self.iterations + 1, self.every), self.iterations})
 
 
@@ -77,7 +77,7 @@ def solutions(runs):
 # ------------------------------------------------------------------------------------------------ figure 4
 
 def grid_snapshots(runs):
-    """Displacements and forces of the grid's solutions, one a row."""
+    """Displacements and forces of the grid's solutions, one in each row."""
     folder = runs.path("grid.snapshots")
     U, forces = [], []
     for name in sorted(os.listdir(folder)):
@@ -104,7 +104,7 @@ def left_by_nnmf(runs, k, its):
 # ------------------------------------------------------------------------------------------------ greedy
 
 def greedy(runs, name, size):
-    """A greedy training that keeps the model of each iteration, and the comparison of the last one."""
+    """A greedy training that stores the model of each iteration, and the comparison of the last one."""
     train = runs.hyco(f"{name}-train", "train", *SCENE, "-greedy", "-training_grid", size.training_grid, "-max_snapshots",
                       4 + size.iterations, "-target", "1e-30", "-hyco_greedy_keep", "-model", runs.path(f"{name}.h5"),
                       "-table", runs.path(f"{name}-history.csv"), *GREEDY[name])
@@ -122,12 +122,12 @@ def judge(runs, name, model, size):
 
 
 def judge_kept(runs, name, iteration, size):
-    """The mean errors of the model that an iteration kept."""
+    """The mean errors of the stored model of an iteration."""
     return judge(runs, f"{name}-{iteration:03d}", kept_model(runs, name, iteration), size)
 
 
 def judge_other(runs, name, iteration, options, size):
-    """The mean errors of a model of another kind made from the solutions that an iteration had."""
+    """The mean errors of a model of another type from the solutions of an iteration."""
     this = f"{name}-other-{iteration:03d}"
     with h5py.File(kept_model(runs, name, iteration), "r") as h:
         points = h["training/points"][:]

@@ -1,4 +1,4 @@
-"""Section 6: the pictures, by scripts/plot where it has them."""
+"""Section 6: the pictures, with functions of scripts/plot."""
 import io
 import os
 
@@ -21,7 +21,7 @@ class Pictures:
         os.makedirs(folder, exist_ok=True)
 
     def save(self, fig, name):
-        """Large ones in 256 colours: a third of the bytes."""
+        """Large ones in 256 colours, with a third of the bytes."""
         whole = io.BytesIO()
         fig.savefig(whole, format="png", dpi=100)
         plt.close(fig)
@@ -60,7 +60,7 @@ def figure_3(runs, pictures):
 
 
 def figure_4(curves, pictures):
-    """curves: name, k, what is left, style, colour."""
+    """curves: name, k, error, style, colour."""
     fig, ax = plt.subplots(figsize=(8, 5), constrained_layout=True)
     for name, k, left, style, colour in curves:
         ax.semilogy(k, left, style, ms=5, color=colour, label=name)
@@ -120,8 +120,8 @@ def point_solutions(runs, pictures, name, models):
 
 
 def history(panels, pictures, name):
-    """panels: a title and curves (label, iterations, values, style, colour), two panels a row; perhaps one more curve, that
-    has its own axis."""
+    """panels: a title and curves (label, iterations, values, style, colour), two panels in a row; optionally one more
+    curve with its own axis."""
     rows = (len(panels) + 1) // 2
     fig, axes = plt.subplots(rows, 2, figsize=(12, 4.4 * rows), squeeze=False, constrained_layout=True)
     for ax, (title, curves, *other) in zip(axes.ravel(), panels):

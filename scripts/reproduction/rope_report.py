@@ -1,4 +1,4 @@
-"""Section 6: the runs in their order, the pictures, and the words beside them. Every number of ours is a run's."""
+"""Section 6: the order of the runs, the pictures, and the text. Every number of hyco comes from a run."""
 import csv
 
 import numpy as np
@@ -30,8 +30,8 @@ def write_csv(path, head, rows):
 # ------------------------------------------------------------------------------------------------ runs
 
 def run(runs, size):
-    """All runs; what the report needs of them."""
-    said = rope.train_regular(runs, "rank")          # first, alone: its snapshots serve the others
+    """All runs; returns the data for the report."""
+    said = rope.train_regular(runs, "rank")  # first and alone, because the others use its snapshots
     trained = {name: runs.later(rope.greedy, runs, name, size) for name in reversed(rope.GREEDY)}
     slow = [runs.later(rope.left_by_nnmf, runs, k, size.slow_its) for k in reversed(size.slow_vectors)]
     grid = {name: runs.later(rope.regular, runs, name, size) for name in rope.REGULAR}
@@ -48,7 +48,7 @@ def run(runs, size):
 
 
 def history_tasks(runs, size):
-    """Mean errors of the kept models, and of the other method's models made from the same solutions."""
+    """Mean errors of the stored models, and of the other method's models from the same solutions."""
     def kept(name):
         return [(k, runs.later(rope.judge_kept, runs, name, k, size)) for k in size.kept()]
 
@@ -128,10 +128,10 @@ def figure_11(runs, found):
             panel("B: contact forces, 2-norm", "error_lambda_rid", "error_lambda")]
 
 
-# ------------------------------------------------------------------------------------------------ words
+# ------------------------------------------------------------------------------------------------ text
 
 def numbers(found):
-    """The table of numbers: mean / max in percent over the test grid, the paper's in their own rows."""
+    """The table of numbers: mean / max in percent over the test grid, the paper's in separate rows."""
     rows = []
 
     def ours(label, r):
@@ -207,7 +207,7 @@ def write_tables(runs, size, found):
 
 
 def report(runs, size, found, folder):
-    """The Markdown text; `folder` is where its pictures are."""
+    """The Markdown text; `folder` contains its pictures."""
     write_tables(runs, size, found)
     values = {"folder": folder, "test_grid": size.test_grid.replace(",", " x "), "iterations": size.iterations,
               "history_grid": size.history_grid.replace(",", " x "), "numbers": table(*numbers(found)),
@@ -236,7 +236,7 @@ def regular_values(found):
 
 
 def greedy_values(runs, found):
-    """What the histories end with, how often the indicator is above the error, where the last models are worst."""
+    """The final values of the histories, how often the indicator is above the error, where the last models have the largest errors."""
     last = {name: some[-1][1] for name, some in found["histories"].items()}
     values = {f"{key}_{name.replace('-', '_')}": percent(v[f"error_{key}"])
               for name, v in last.items() for key in ("u_h1", "u", "lambda_rid", "lambda_rid_dual")}

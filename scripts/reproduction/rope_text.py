@@ -1,4 +1,4 @@
-"""Section 6: the words of the report; numbers of ours are filled in from the runs."""
+"""Section 6: the text of the report; hyco's numbers are filled in from the runs."""
 
 TEXT = """\
 # Reproduction of the paper's figures and tables: the rope (section 6)

@@ -1,4 +1,4 @@
-"""Runs of hyco, in their own folder, as many at once as there are workers; their reports."""
+"""Runs of hyco in a folder, several at a time, and their reports."""
 import concurrent.futures
 import importlib.machinery
 import importlib.util
@@ -14,7 +14,7 @@ ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROO
 
 
 class RunError(Exception):
-    """A run that wrote no report, in one line; `reason` is hyco's own."""
+    """A run without a report, in one line; `reason` is hyco's message."""
 
     def __init__(self, what, reason):
         super().__init__(f"{what}: {reason}")
@@ -22,14 +22,14 @@ class RunError(Exception):
 
 
 def reason_of(stderr):
-    """The line with which hyco ended; the last line where it had none."""
+    """The message with which hyco ended; without one the last line."""
     lines = stderr.strip().splitlines() or ["no message"]
     own = [line.split("hyco: error: ", 1)[1] for line in lines if "hyco: error: " in line]
     return (own or lines)[-1]
 
 
 class Runs:
-    """Everything that hyco writes goes to a folder; reports come back as dictionaries."""
+    """All files of hyco are written to a folder; reports are returned as dictionaries."""
 
     def __init__(self, folder, workers=2):
         self.folder = folder
@@ -40,8 +40,8 @@ class Runs:
         return os.path.join(self.folder, *names)
 
     def hyco(self, name, command, *options, ranks=1):
-        """The report NAME.json of one run. A comparison with points that did not converge ends with an error and still
-        has a report, which counts them; any other command must succeed, or write a model that misses its target (status 3), which is measured here."""
+        """The report NAME.json of one run. A comparison with points that did not converge ends with an error and still has a report, which counts
+        them; any other command must succeed, or write a model that misses its target (status 3), which is measured here."""
         report = self.path(f"{name}.json")
         if os.path.exists(report):
             os.remove(report)
@@ -58,12 +58,12 @@ class Runs:
         return self.pool.submit(function, *arguments)
 
     def close(self):
-        """Forgets what has not begun, so that an error ends the script soon."""
+        """Cancels runs that have not started, so that an error ends the script soon."""
         self.pool.shutdown(cancel_futures=True)
 
 
 def load_script(name):
-    """A script of scripts/ without .py, as a module."""
+    """A script of scripts/ without the ending .py, as a module."""
     loader = importlib.machinery.SourceFileLoader(name, os.path.join(SOURCE, "scripts", name))
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
     loader.exec_module(module)

@@ -1,4 +1,4 @@
-"""What the sweep tries: the scenes' training and test points, and the settings of training."""
+"""The settings of the sweep: the scenes' training and test points, and the options of training."""
 import itertools
 import math
 import random
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Setting:
-    """One way to train: the model's type, and its options by name (without -hyco_)."""
+    """One set of options: the model's type, and its options by name (without -hyco_)."""
     type: str
     training: str          # the case's training set
     options: tuple = ()
@@ -26,13 +26,13 @@ class Case:
     name: str
     scene: list            # arguments that name the scene and its mesh
     training: dict         # name: arguments of the training points
-    test: list             # arguments of the unseen points, in runs that share a stiffness where the scene allows it
+    test: list  # arguments of the unseen points, in runs that share a stiffness where the scene has such points
     names: list            # the parameters
-    single: list           # points, each with a stiffness of its own
-    wanted: list = field(default_factory=list)      # (words, {error: bound}): what an engineer may ask for at once
+    single: list  # points, each with its own stiffness
+    wanted: list = field(default_factory=list)  # (text, {error: bound}): combined requirements of an engineer
     settings: list = field(default_factory=list)
     batch: list = None     # the set that is timed; None: test
-    ramp: tuple = ()       # a parameter and its value at which the set holds a ramp of the others, after another value
+    ramp: tuple = ()  # a parameter and its value at which the set has a ramp of the others, after another value
 
 
 def combine(type_, training, **choices):
@@ -80,7 +80,7 @@ def pellet(name, mesh, quick):
     case = Case(f"pellet, mesh {name}", ["-scene", "examples/pellet/paper.yaml", "-scene_mesh", mesh],
                 {"5 radii": radii(4.02, 4.04, 4.055, 4.075, 4.1),
                  "9 radii": radii(4.02, 4.03, 4.04, 4.05, 4.065, 4.07, 4.08, 4.09, 4.1),
-                 **{f"{n} Chebyshev radii": chebyshev(n) for n in (2, 4, 6, 8)}},  # even: 4.06 is no node
+                 **{f"{n} Chebyshev radii": chebyshev(n) for n in (2, 4, 6, 8)}},  # even numbers, so that 4.06 is not a node
                 radii(*((4.06,) if name == "C" or quick else (4.06, 4.033))), ["radius", "load"], points,
                 [("largest errors on the RID: u 1 %, sigma_11 5 %", {"u_rid_max": 0.01, "sigma_11_max": 0.05}),
                  ("largest errors on the RID: u 0.15 %, sigma_11 0.25 %", {"u_rid_max": 0.0015, "sigma_11_max": 0.0025}),

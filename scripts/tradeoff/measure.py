@@ -1,4 +1,4 @@
-"""Runs hyco for the sweep: what each setting costs before and during use, and how far it is off."""
+"""Runs hyco for the sweep: the offline and online cost of each setting, and its errors."""
 import csv
 import json
 import os
@@ -11,7 +11,7 @@ ERRORS = {"u": "error_u", "u_rid": "error_u_rid", "sigma": "error_sigma", "sigma
 
 
 class Refused(Exception):
-    """hyco ended with an error: its line."""
+    """hyco ended with an error: its message."""
 
 
 class Bench:
@@ -44,7 +44,7 @@ class Bench:
             return found, list(csv.DictReader(file))
 
     def train(self, setting, model):
-        """Trains; offline seconds count the solutions that settings share as if each had made them."""
+        """Trains; offline seconds count shared solutions for each setting."""
         kind = "condensed" if setting.type == "condensed" else "solutions"
         key = (setting.training, kind)
         folder = self.path("-".join(key).replace(" ", ""))
@@ -63,7 +63,7 @@ class Bench:
         return out
 
     def online(self, model):
-        """Seconds a solve: points that share their stiffness solved as a set, and points that do not, one by one."""
+        """Seconds per solve: points that share their stiffness as a set, and points that do not, one by one."""
         r, batch = self.hyco("predict", "-model", model, *(self.case.batch or self.case.test))
         _, rows = self.hyco("predict", "-model", model, "-points", self.points)
         return {"batch_s": r["seconds_total"] / r["n_points"],
@@ -79,7 +79,7 @@ class Bench:
         return {"ramp_s": sum(mine), "ramp_n": len(mine)} if len(mine) > 1 else {}
 
     def full(self, *options, ramps=True):
-        """The same of full order; a process that has read and paired its mesh. Without ramps: of single points alone."""
+        """The same for full order, in a process that has already read and paired its mesh. Without ramps: only single points."""
         r, rows = self.hyco("solve", *self.case.scene, *(self.case.batch or self.case.test if ramps else ["-points", self.points]), *options)
         _, single = self.hyco("solve", *self.case.scene, "-points", self.points, *options) if ramps else (r, rows)
         return {"batch_s": sum(float(row["seconds"]) for row in rows) / len(rows),

@@ -7,7 +7,7 @@ import sys
 import time
 from dataclasses import dataclass
 
-sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "rivals"))
+sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "comparison"))
 import matplotlib
 
 matplotlib.use("Agg")
@@ -233,8 +233,8 @@ def headline(mesh, rows):
     words = [f"{percent(best[k + '_max'])} % in {word.split(' of the')[0].split(' on the')[0]}" for k, word in KINDS.items()]
     return ["![error against online time for each type of model, a power ramp on a fuel rod](docs/tradeoff/rod-B.png)", "",
             f"On one power ramp of a fuel rod whose cladding creeps and yields (`examples/rod`, mesh {mesh}), full order takes {seconds(newton)} by Newton's method, or {seconds(elastic)} if",
-            f"the elastic factor is kept; the hybrid model takes {seconds(best['path_s'])}, which is {newton / best['path_s']:.0f} and {elastic / best['path_s']:.0f} times less. At "
-            "unseen parameters, and for each path at its worst time,",
+            f"the elastic factor is kept; the hybrid model takes {seconds(best['path_s'])}, which is {newton / best['path_s']:.0f} and {elastic / best['path_s']:.0f} times less. On "
+            f"{len(case_of(mesh).unseen)} paths that no training has seen, each at its worst time,",
             f"its errors are at most {', '.join(words[:-1])} and {words[-1]}."]
 
 

@@ -1,4 +1,4 @@
-"""The sweep's tables and its Pareto picture."""
+"""The sweep's tables and its Pareto diagram."""
 import matplotlib
 
 matplotlib.use("Agg")
@@ -18,7 +18,7 @@ def good(rows):
 
 
 def pareto(rows, error, time="batch_s"):
-    """Those that no other beats in both."""
+    """The rows that no other row dominates in both quantities."""
     front, best = [], float("inf")
     for row in sorted(good(rows), key=lambda r: (r[time], r[error])):
         if row[error] < best:
@@ -32,20 +32,20 @@ def cheapest(rows, error, level, time="batch_s"):
 
 
 def recommended(rows):
-    """(quantity, type, level): the cheapest whose largest error is no larger, or None."""
+    """(quantity, type, level): the cheapest row whose largest error is within the level, or None."""
     return {(q, kind, level): cheapest([r for r in rows if r["type"] == kind], f"{q}_max", level) for q, _ in QUANTITIES
             for kind in COLORS for level in LEVELS}
 
 
 def joint(rows, bounds, kind=None):
-    """The cheapest of a type (any: None) within all bounds."""
+    """The cheapest row of a type (any: None) within all bounds."""
     return min((r for r in good(rows) if kind in (None, r["type"]) and all(r[e] <= b for e, b in bounds.items())),
                key=lambda r: r["batch_s"], default=None)
 
 
 def finalists(case, rows):
-    """All that a table names: the recommended, the fronts of the mean errors, what is wanted at once. Of equals in the sweep's
-    times; where the paired timing turns two round, the one that it has not seen shows a single time."""
+    """All rows of the tables: the recommended ones, the fronts of the mean errors, the combined requirements. Among rows with equal times in the
+    sweep, paired timing may change the order; a row that it has not timed shows a single time."""
     named = [*recommended(rows).values(), *(r for q, _ in QUANTITIES for r in pareto(rows, f"{q}_mean")),
              *(joint(rows, bounds, kind) for _, bounds in case.wanted for kind in COLORS)]
     named = [r for r in named if r]
@@ -86,7 +86,7 @@ def times(row, name):
 
 
 def wanted(case, rows, full):
-    """What meets several bounds at once, the cheapest of each type: speed-ups over both full orders."""
+    """The cheapest row of each type that meets several bounds at once: speed-ups over both full orders."""
     lines = []
     for words, bounds in case.wanted:
         for kind in COLORS:
@@ -108,7 +108,7 @@ def ramp(row, full):
 
 
 def headline(case, rows, full):
-    """A table for the README: what is asked for, and what each type takes for it, in brackets how much faster than warm full order."""
+    """A table for the README: the requirement, and the time of each type, in brackets the speed-up over warm full order."""
     words, bounds = case.wanted[1]
     warm = full["warm"]
     ramps = "ramp_s" in warm
@@ -173,7 +173,7 @@ def plot(case, rows, full, path):
 
 
 def section(case, rows, full, words, picture):
-    """What docs/tradeoff.md says of one case."""
+    """The text of docs/tradeoff.md for one case."""
     warm = full["warm"]
     failed = [r for r in rows if r["status"] != "ok"]
     lines = [words, "", f"![error against online time, {case.name}]({picture})", "",

@@ -3,8 +3,8 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
-/* What tied nodes have of a surface, by node and component (v, n_nodes x width), passes to their masters, which have the
-   contact there. */
+/* Adds the values of tied nodes on a surface, by node and component (v, n_nodes x width), to their masters, which
+   have the contact there. */
 static void PassTied(HycoMesh m, PetscInt width, PetscReal v[])
 {
   for (PetscInt k = 0; k < m->n_tied; k++) {
@@ -270,7 +270,7 @@ PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of each node (share, n_nodes), its part of the area of the surface `group`. */
+/* The part of each node (share, n_nodes) in the area of the surface `group`. */
 static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
 {
   HycoMesh m = fe->mesh;
@@ -283,7 +283,8 @@ static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
       PetscReal n[3];
 
       PetscCall(HycoFacetNormal(fe, el, f, q, n));
-      for (PetscInt a = 0; a < m->nf; a++) share[m->facets[f * m->nf + a]] += el->N[q][a] * PetscSqrtReal(HycoDot(n, n));
+      for (PetscInt a = 0; a < m->nf; a++)
+        share[m->facets[f * m->nf + a]] += el->N[q][a] * PetscSqrtReal(HycoDot(n, n));
     }
   }
   PassTied(m, 1, share);

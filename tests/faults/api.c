@@ -1,6 +1,6 @@
 /*
-  The C API used wrongly: every public call with NULL, after Destroy, with sizes that do not match; reused after an
-  error; two models at once; made and destroyed a thousand times without growth. Messages on every rank.
+  Wrong use of the C API: every public call with NULL, after Destroy, with sizes that do not match; reuse after an
+  error; two models at once; creation and destruction a thousand times without growth. Messages on every rank.
 */
 #include "../unit/check.h"
 #include <hyco.h>
@@ -10,7 +10,7 @@
 
 static char geo[PETSC_MAX_PATH_LEN], data[PETSC_MAX_PATH_LEN], rope[PETSC_MAX_PATH_LEN], hybrid[PETSC_MAX_PATH_LEN],
     blocks[PETSC_MAX_PATH_LEN], projection[PETSC_MAX_PATH_LEN];
-static FILE *rows; /* faults/api.csv: what table.py puts into docs/limits.md */
+static FILE *rows; /* faults/api.csv: rows that table.py puts into docs/limits.md */
 static const PetscReal inside[2] = {0.07, 0.17}, outside[2] = {0.04, 0.17};
 
 /* A handle that was destroyed is NULL, and NULL is refused by name. */
@@ -59,8 +59,8 @@ static PetscErrorCode TestDestroyed(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Objects keep what they refer to: whoever made the scene or the system may destroy it first. An object of another
-   class, or none, is refused by name. */
+/* Objects reference what they use: the scene or the system may be destroyed first by its creator. An object of
+   another class, or none, is refused by name. */
 static PetscErrorCode TestReferences(void)
 {
   char none[1024] = {0};
@@ -85,7 +85,7 @@ static PetscErrorCode TestReferences(void)
   CHECK_FAILS(HycoROMPredict((HycoROM)fom, 2, inside), "create it by HycoROMLoad()");
   CHECK_FAILS(HycoROMPredict((HycoROM)none, 2, inside), "create it by HycoROMLoad()");
   CHECK_FAILS(HycoROMCheckScene(model, (HycoScene)samples), "create it by HycoSceneLoad()");
-  PetscCall(HycoSceneDestroy(&scene)); /* before those that refer to it */
+  PetscCall(HycoSceneDestroy(&scene)); /* before the objects that reference it */
   PetscCall(HycoSamplesAddPoint(samples, inside));
   PetscCall(HycoFOMSolve(fom, 2, inside));
   PetscCall(HycoReducerDestroy(&reducer));
@@ -121,7 +121,7 @@ static PetscErrorCode TestReferences(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* NULL where an address is expected. */
+/* NULL where an address is required. */
 static PetscErrorCode TestNullPlaces(void)
 {
   HycoScene scene = NULL;
@@ -141,7 +141,7 @@ static PetscErrorCode TestNullPlaces(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets of points that cannot be: no value, too many, a part of them that leaves nothing; then the set is as it was. */
+/* Invalid sets of points: no value, too many, an empty part of them; the set is then unchanged. */
 static PetscErrorCode TestSamples(void)
 {
   const PetscReal value[1] = {0.1}, *const values[2] = {value, value};
@@ -167,7 +167,7 @@ static PetscErrorCode TestSamples(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The wrong order, sizes that do not match, then the right call on the same handle gives the right numbers. */
+/* The wrong order, sizes that do not match; then the right call on the same handle gives the right numbers. */
 static PetscErrorCode TestAfterError(void)
 {
   const PetscReal nan[2] = {NAN, 0.1};
@@ -199,7 +199,7 @@ static PetscErrorCode TestAfterError(void)
     CHECK_FAILS(HycoFOMWrite(fom, "/no/such/folder/x.xdmf"), "cannot be written");
     PetscCall(HycoROMPredict(model, 2, inside));
     PetscCall(HycoROMGetPrediction(model, &p));
-    CHECK_NEAR(p.total_contact_force, 0.32557839822014933, 1e-12); /* what it gave when it was written */
+    CHECK_NEAR(p.total_contact_force, 0.32557839822014933, 1e-12); /* the result when the test was written */
     CHECK_FAILS(HycoROMWrite(model, "/no/such/folder/x.xdmf"), "cannot be written");
   }
   PetscCall(HycoROMDestroy(&model));
@@ -208,7 +208,7 @@ static PetscErrorCode TestAfterError(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A training without points, with settings that cannot be; a full-order problem of another mesh. */
+/* A training without points, with invalid settings; a full-order problem of another mesh. */
 static PetscErrorCode TestTraining(void)
 {
   const PetscReal shift[2] = {0.05, 0.06};
@@ -254,7 +254,7 @@ static PetscErrorCode TestTraining(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two models, asked in turn, do not disturb each other. */
+/* Two models, used in turn, are independent. */
 static PetscErrorCode TestTwo(void)
 {
   HycoROM a, b;
@@ -272,7 +272,7 @@ static PetscErrorCode TestTwo(void)
     CHECK_NEAR(p.total_contact_force, 0.32557839822014933, 1e-12);
     CHECK(strcmp(p.type, HYCO_ROM_HYBRID) == 0 && strcmp(q.type, HYCO_ROM_PROJECTION) == 0, "types %s, %s", p.type,
           q.type);
-    if (!k) CHECK_NEAR(q.total_contact_force, 0.350993482, 1e-9); /* as printed when the file was written */
+    if (!k) CHECK_NEAR(q.total_contact_force, 0.350993482, 1e-9); /* the result when the file was written */
   }
   PetscCall(HycoROMDestroy(&a));
   PetscCall(HycoROMPredict(b, 2, inside));
@@ -325,8 +325,8 @@ static PetscErrorCode Once(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refusals too must give back what they took: a file that is no model, a folder without a scene, 1000 times.
-   (A scene.yaml that libyaml refuses costs 64 kB in PETSc 3.18, which does not free its parser.) */
+/* Refusals must free their memory too: a file that is not a model, a folder without a scene, 1000 times. (A
+   scene.yaml that libyaml refuses leaves 64 kB in PETSc 3.18, which does not free its parser.) */
 static PetscErrorCode OnceRefused(void)
 {
   HycoScene scene = NULL;
@@ -348,7 +348,7 @@ static PetscErrorCode TestGrowth(const char what[], PetscErrorCode (*once)(void)
   long before, after;
 
   PetscFunctionBegin;
-  for (int k = 0; k < 100; k++) PetscCall(once()); /* what libraries keep, they have by now */
+  for (int k = 0; k < 100; k++) PetscCall(once()); /* libraries have allocated their permanent memory by now */
   before = Resident();
   for (int k = 0; k < 1000; k++) PetscCall(once());
   after = Resident();

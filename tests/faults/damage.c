@@ -1,7 +1,7 @@
 /*
-  Files cut at many lengths and with seeded flipped bits, in one process whose address space is limited: what is sealed
-  is refused whatever bit changed; a file of format 3, which has no seal, is refused where cut, and where a bit flipped
-  is refused or read, without a crash and without wild memory. Prints the counts that docs/limits.md quotes.
+  Files truncated at many lengths and with seeded flipped bits, in one process with limited address space: a sealed file
+  is refused whatever bit changed; a file of format 3, without a seal, is refused if truncated; with a flipped bit it is
+  refused or read, without a crash and without a huge allocation. Prints the counts for docs/limits.md.
 */
 #include "../unit/check.h"
 #include <hyco.h>
@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 static char path[128];
-static FILE *rows; /* faults/damage.csv: what table.py puts into docs/limits.md */
+static FILE *rows; /* faults/damage.csv: rows that table.py puts into docs/limits.md */
 
 typedef struct {
   unsigned char *bytes;
@@ -41,7 +41,7 @@ static void WriteBytes(const unsigned char *bytes, size_t size)
   if (!file || fwrite(bytes, 1, size, file) != size || fclose(file)) abort();
 }
 
-/* Whether the model is refused; its prediction if not. A refusal must say which file. */
+/* Whether the model is refused; its prediction if not. The message must name the file. */
 static PetscErrorCode Try(PetscBool *refused, PetscReal *force)
 {
   const PetscReal mu[2] = {0.07, 0.17};
@@ -120,7 +120,7 @@ static double Seconds(void)
   return (double)clock() / CLOCKS_PER_SEC;
 }
 
-/* What the seal costs in a file of the size of a large model: it is told, and a small part. */
+/* The cost of the seal for a file of the size of a large model: printed, and small. */
 static PetscErrorCode TestSealTime(void)
 {
   const PetscInt n = 37000000 / 8;
@@ -160,7 +160,7 @@ static PetscErrorCode TestSealTime(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Trained in /tmp: today's format. */
+/* Trained in /tmp, in the current format. */
 static PetscErrorCode Train(const char source[], const char model[])
 {
   const PetscInt grid[] = {3, 3};

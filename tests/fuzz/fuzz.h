@@ -1,6 +1,6 @@
-/* What the fuzz targets share. A target is LLVMFuzzerTestOneInput(): one input, which may be refused, but may not
-   crash, leak, hang or take wild memory. libFuzzer drives it (scripts/fuzz), or replay.c over the kept corpus (ctest).
- */
+/* Common code of the fuzz targets. A target is LLVMFuzzerTestOneInput(): one input, which may be refused, but may
+   not crash, leak, hang or allocate without bounds. Run by libFuzzer (scripts/fuzz), or by replay.c over the stored
+   corpus (ctest). */
 #ifndef FUZZ_H
 #define FUZZ_H
 
@@ -15,7 +15,7 @@
 int LLVMFuzzerInitialize(int *argc, char ***argv);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-static char fuzz_folder[64]; /* of this process: the input as a file, and what it needs beside it */
+static char fuzz_folder[64]; /* of this process: the input as a file, and further files */
 
 /* A file in the process's folder. */
 static inline void FuzzPath(const char name[], char path[128])
@@ -30,7 +30,7 @@ static inline void FuzzWrite(const char path[], const void *data, size_t size)
   if (!file || fwrite(data, 1, size, file) != size || fclose(file)) abort();
 }
 
-/* At the end of the process: its folder and the files in it. */
+/* At the end of the process: removes its folder and the files in it. */
 static inline void FuzzRemove(void)
 {
   DIR *folder = opendir(fuzz_folder);
@@ -46,13 +46,13 @@ static inline void FuzzRemove(void)
 
 static inline void FuzzStart(void)
 {
-  setenv("PETSC_OPTIONS", "-no_signal_handler", 1); /* signals are the fuzzer's */
+  setenv("PETSC_OPTIONS", "-no_signal_handler", 1); /* the fuzzer handles signals */
   setenv("OMPI_MCA_opal_signal", "", 1);
   snprintf(fuzz_folder, sizeof(fuzz_folder), "/tmp/hyco-fuzz-XXXXXX");
   if (!mkdtemp(fuzz_folder) || atexit(FuzzRemove) || HycoInitialize(NULL, NULL)) abort();
 }
 
-/* Runs `call`, whose refusal is welcome; an error that is PETSc's own and no line of hyco's is not. */
+/* Runs `call`, which may be refused; an error of PETSc without a message of hyco is a failure. */
 #define FUZZ_TRY(code, call)                                                                                           \
   do {                                                                                                                 \
     char line_[HYCO_LINE];                                                                                             \

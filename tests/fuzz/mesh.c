@@ -1,5 +1,6 @@
-/* Fuzz target: the bytes are a gmsh mesh. A mesh that is accepted is assembled and solved. The scene is fixed: bodies
-   "a" and, where the mesh speaks of "b", "b", in contact from "up" to "low"; "held" is fixed, "pushed" pressed. */
+/* Fuzz target: the bytes are a gmsh mesh. A mesh that is accepted is assembled and solved. The scene is fixed:
+   bodies "a" and, if the mesh contains the word "b", "b", in contact from "up" to "low"; "held" is fixed, "pushed"
+   has a pressure. */
 #include "fuzz.h"
 #include <hycofom.h>
 #include <hycosceneimpl.h>

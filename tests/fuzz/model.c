@@ -1,8 +1,8 @@
 /*
-  Fuzz target: the bytes change what the datasets of a good model file hold. First byte: which of the models of
-  tests/data; then records of 12 bytes: dataset (1), spare (1), item (2, modulo the dataset's length), value (8). The
-  file keeps its structure, and gets a seal that fits, so that the reader's checks of the values are met, not HDF5's of
-  the structure. What loads predicts, on the whole mesh too.
+  Fuzz target: the bytes change the datasets of a valid model file. First byte: which of the models of tests/data; then
+  records of 12 bytes: dataset (1), unused (1), item (2, modulo the dataset's length), value (8). The file keeps its
+  structure, and gets a valid seal, so that the reader's checks of the values are tested, not HDF5's checks of the
+  structure. A model that loads then predicts, also on the whole mesh.
 */
 #include "fuzz.h"
 #include <hdf5.h>
@@ -13,7 +13,7 @@
 #define RECORD   12
 
 typedef struct {
-  size_t at, bytes, item; /* where the values stand in the file, how many bytes, of one value */
+  size_t at, bytes, item; /* offset of the values in the file, their bytes, bytes of one value */
 } Set;
 
 typedef struct {

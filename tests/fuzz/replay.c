@@ -1,11 +1,11 @@
 /*
-  Runs a fuzz target without the fuzzer: replay COUNT FILE...; first over the files, so that what was found once stays
-  found, then over COUNT inputs that are made from them by changing, cutting out, cutting off and joining bytes, by the
-  same pseudo-random numbers in every run. It says which input it is at, so that a crash names it.
+  Runs a fuzz target without the fuzzer: replay COUNT FILE...; first over the files, which have failed once, then over
+  COUNT inputs made from them by changing, removing, truncating and joining bytes, with the same pseudo-random numbers
+  in every run. It prints the current input, so that a crash can be attributed.
 */
 #include "fuzz.h"
 
-#define ROOM 65536 /* of an input that is made, in bytes */
+#define ROOM 65536 /* size of a generated input in bytes */
 
 typedef struct {
   uint8_t *data;
@@ -32,7 +32,7 @@ static Input Read(const char path[])
   return in;
 }
 
-/* Puts `size` bytes into `out` before its byte `at`, as far as there is room. */
+/* Inserts `size` bytes into `out` before its byte `at`, as far as there is room. */
 static void Insert(Input *out, size_t at, const uint8_t *data, size_t size)
 {
   if (size > ROOM - out->size) size = ROOM - out->size;

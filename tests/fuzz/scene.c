@@ -1,5 +1,5 @@
-/* Fuzz target: the bytes are a scene.yaml. What loads goes through its text form and back, and is solved on a rope of
-   eight elements (whatever mesh it names). */
+/* Fuzz target: the bytes are a scene.yaml. A scene that loads is converted to its text form and back, and solved on
+   a rope of eight elements (whatever mesh it names). */
 #include "fuzz.h"
 #include <hycofom.h>
 #include <hycosceneimpl.h>
@@ -63,7 +63,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
   FUZZ_TRY(code, HycoSceneLoad(PETSC_COMM_SELF, yaml, &scene));
   if (code) return 0;
   FUZZ_TRY(code, RoundTrip(scene));
-  if (code) abort(); /* what a scene can hold, a model file must carry */
+  if (code) abort(); /* a scene that is accepted must fit into a model file */
   FUZZ_TRY(code, Solve(scene, &fom));
   if (HycoFOMDestroy(&fom) || HycoSceneDestroy(&scene)) abort();
   return 0;

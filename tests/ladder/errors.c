@@ -1,4 +1,4 @@
-/* A program as a user writes it: the error that its first argument names. */
+/* A program as a user writes it, with the error selected by its first argument. */
 #include <hyco.h>
 #include <string.h>
 

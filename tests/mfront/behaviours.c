@@ -1,8 +1,8 @@
 /*
-  A shared library by hand that exports what MFront's generic C interface does (the symbols and structs that
-  src/material/impls/mfront/mfront.c names; no MFront was there to make it): Norton's creep of exponent 1 with implicit
-  Euler, which has its solution in closed form. Its symmetric tensors are xx, yy, zz, xy, xz, yz with shear times
-  sqrt(2). Built with -DCRASH it dies when it is loaded.
+  A shared library written by hand with the symbols of MFront's generic C interface (the symbols and structs listed in
+  src/material/impls/mfront/mfront.c; MFront itself was not available): Norton's creep of exponent 1 with implicit
+  Euler, which has a solution in closed form. Its symmetric tensors are xx, yy, zz, xy, xz, yz with shear times sqrt(2).
+  Built with -DCRASH it crashes when it is loaded.
 */
 #include <math.h>
 #include <stdlib.h>

@@ -28,7 +28,7 @@ def load(script=SCRIPT):
 
 class Bench(Case):
     def test_mesh_a(self):
-        run = subprocess.run([sys.executable, SCRIPT, '--meshes', 'A', '--rivals', 'A', '--repeat', '1',
+        run = subprocess.run([sys.executable, SCRIPT, '--meshes', 'A', '--others', 'A', '--repeat', '1',
                               '--timeout', str(60 * PATIENCE), '--output', self.folder], cwd=SOURCE, capture_output=True, text=True, timeout=180 * PATIENCE)
         self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
         with open(self.path('full-order.csv'), encoding='utf-8', newline='') as file:

@@ -5,7 +5,7 @@ import unittest
 import h5py
 
 from paths import HISTORY, J2, KINDS, NORTON, POINTS, arrays
-from rivals import POINT, Ring
+from baselines import POINT, Ring
 
 CONDENSED = ['-hyco_model_type', 'condensed']
 EVERY = [*CONDENSED, '-hyco_condensed_cells', '0', '-hyco_condensed_inelastic_tol', '0']

@@ -9,7 +9,7 @@ import unittest
 
 from common import HYCO, said, settled
 from paths import KINDS, NORTON, SCENE
-from rivals import Ring
+from baselines import Ring
 
 GREEDY = ('-greedy', '-training_grid', '5,5', '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', 1)
 UNSEEN = ('-values_gap', '0.0043,0.0055,0.0077', '-values_push', '0.83,0.97,1.17')  # of no grid here

@@ -1,4 +1,4 @@
-"""The projection-based rival (6.3), (44), and the reduced basis of dual snapshots: figure 4, the rope's bands, the pellet."""
+"""The projection-based baseline (6.3), (44), and the reduced basis of dual snapshots: figure 4, the rope's bands, the pellet."""
 import glob
 import os
 import re

@@ -3,7 +3,7 @@ judges all settings at all of them."""
 import csv
 import unittest
 
-from rivals import Ring
+from baselines import Ring
 
 
 class SearchPaths(Ring):

@@ -1,4 +1,4 @@
-/* The public classes called in the wrong order or with NULL: the named message, on every rank. */
+/* The public classes called in the wrong order or with NULL: the message, on every rank. */
 #include "check.h"
 #include <hyco.h>
 
@@ -85,8 +85,8 @@ static PetscErrorCode TestSolverOrder(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On the rope: nothing may be asked before Solve; a point outside the ranges; then the numbers of an independent
- * computation. */
+/* On the rope: queries before Solve fail; a point outside the ranges; then the numbers of an independent
+   computation. */
 static PetscErrorCode TestFOMOrder(void)
 {
   const PetscReal inside[2] = {0.07, 0.17}, outside[2] = {0.04, 0.17};
@@ -117,7 +117,8 @@ static PetscErrorCode TestFOMOrder(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The forces of a solution given back: its displacement, its residuals, on the rope; others give others, and say so. */
+/* The forces of a solution given to HycoFOMSolveForces(): its displacement, its residuals, on the rope; other forces
+   give other results, with larger residuals. */
 static PetscErrorCode TestForces(void)
 {
   const PetscReal mu[2] = {0.07, 0.17};
@@ -143,13 +144,13 @@ static PetscErrorCode TestForces(void)
   CHECK(summary.reason == HYCO_CONVERGED && HycoKKTMax(&summary.kkt) < 1e-9, "reason %d", (int)summary.reason);
   CHECK_NEAR(summary.u_norm2, one.u_norm2, 1e-10);
   CHECK_NEAR(summary.total_contact_force, one.total_contact_force, 1e-15);
-  for (PetscInt k = 0; k < n; k++) forces[k] *= 0.9; /* equilibrium with them, and the rope in the obstacle */
+  for (PetscInt k = 0; k < n; k++) forces[k] *= 0.9; /* equilibrium holds, and the rope penetrates the obstacle */
   PetscCall(HycoFOMSolveForces(fom, 2, mu, forces));
   PetscCall(HycoFOMGetSummary(fom, &summary));
   CHECK(summary.reason == HYCO_CONVERGED && summary.kkt.stationarity < 1e-9, "reason %d", (int)summary.reason);
   CHECK(summary.kkt.penetration > 1e-3, "penetration %g", (double)summary.kkt.penetration);
   CHECK_NEAR(summary.total_contact_force, 0.9 * one.total_contact_force, 1e-14);
-  PetscCall(HycoFOMSolve(fom, 2, mu)); /* and nothing of it stays */
+  PetscCall(HycoFOMSolve(fom, 2, mu)); /* and later solves are not affected */
   PetscCall(HycoFOMGetSummary(fom, &summary));
   CHECK_NEAR(summary.total_contact_force, one.total_contact_force, 1e-14);
   CHECK(HycoKKTMax(&summary.kkt) < 1e-9, "residuals of another solve");
@@ -159,7 +160,7 @@ static PetscErrorCode TestForces(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A batch in a scrambled order, stiffnesses repeated: each answer is the one of a single call, to the last bit. */
+/* A batch in arbitrary order, with repeated stiffnesses: each result equals that of a single call, to the last bit. */
 static PetscErrorCode TestMany(void)
 {
   const PetscReal mu[6][2] = {{0.2, 0.3}, {0.07, 0.17}, {0.2, -0.02}, {0.11, 0.4}, {0.07, 0.45}, {0.2, 0.3}};

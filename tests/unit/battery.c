@@ -1,8 +1,8 @@
 /*
-  Every complementarity method through HycoSolver on every class of problems. The table `rules` says which method is fit
-  for which class: a fit one must solve alone, to the tolerance, the known solution; an unfit one must say so (a
-  refusal, or not converged), never give another answer. What was found is written as a table: battery.md, by column a
-  class.
+  Every complementarity method through HycoSolver on every class of problems. The table `rules` defines which method is
+  suitable for which class: a suitable one must find the known solution alone, to the tolerance; an unsuitable one must
+  report this (a refusal, or not converged), and never return another result. The results are written as a table:
+  battery.md, one column for each class.
 */
 #include "check.h"
 #include <fnmatch.h>
@@ -19,7 +19,7 @@ static const PetscInt sizes[] = {1, 2, 3, 5, 10, 50, 200, 500, 2000};
 typedef struct {
   MPI_Comm comm;
   Mat K, B, Bt;
-  Vec F, D, x, L, reference; /* reference: the displacements, known or (unknown) of the first method that solved */
+  Vec F, D, x, L, reference; /* reference: the displacements, known or (unknown) of the first method that converged */
   PetscBool known;
   HycoSystem system;
 } Problem;
@@ -56,7 +56,8 @@ static PetscErrorCode ProblemDestroy(Problem *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solution is chosen: x, forces L and open gaps w (one of the two zero); F = K x + Bt L, D = B x + w. */
+/* Constructs a problem from its solution: x, forces L and open gaps w (one of the two zero); F = K x + Bt L, D = B x
+   + w. */
 static PetscErrorCode Choose(Problem *p, PetscReal (*force)(PetscInt), PetscReal (*open)(PetscInt))
 {
   PetscInt lo, hi;
@@ -92,7 +93,7 @@ static PetscReal Size(PetscInt i)
   return 1.2 + sin(3.1 * (double)i);
 }
 
-/* Every second one pressed, the others open. */
+/* Every second contact has a force, the others are open. */
 static PetscReal Force(PetscInt i)
 {
   return i % 2 == 0 ? Size(i) : 0;
@@ -103,7 +104,7 @@ static PetscReal Open(PetscInt i)
   return i % 2 == 0 ? 0 : Size(i);
 }
 
-/* One third pressed, one third open, one third neither: touching without force. */
+/* One third has a force, one third is open, one third neither: closed without force. */
 static PetscReal ForceThird(PetscInt i)
 {
   return i % 3 == 0 ? Size(i) : 0;
@@ -122,7 +123,7 @@ static PetscErrorCode Dense(PetscInt rows, PetscInt cols, Mat *A, PetscScalar **
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nonsymmetric by way of Bt: K = 2 I, B = I, Bt = 2 M, so that B K^-1 Bt = M. */
+/* Nonsymmetric through Bt: K = 2 I, B = I, Bt = 2 M, so that B K^-1 Bt = M. */
 static PetscErrorCode Nonsymmetric(PetscInt n, PetscErrorCode (*fill)(PetscInt, PetscScalar[]), Problem *p)
 {
   PetscScalar *a;
@@ -229,8 +230,8 @@ static PetscErrorCode MakeSPD(PetscInt n, Problem *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The half-space (Boussinesq): a patch of points with unit spacing moves another by 1/distance, itself by 4 ln(1+sqrt
-   2) (the mean over its square). R: the Cholesky factor. */
+/* The half-space (Boussinesq): a patch of points with unit spacing displaces another by 1/distance, itself by 4
+   ln(1+sqrt 2) (the mean over its square). R: the Cholesky factor. */
 static PetscErrorCode MakeHalfSpace(PetscInt n, Problem *p)
 {
   const PetscInt side = (PetscInt)ceil(sqrt((double)n));
@@ -423,8 +424,8 @@ static int ListMethods(Method list[])
   return n;
 }
 
-/* Which method is fit for which class, by patterns; the first that matches counts; none: fit for every size.
-   fit: up to this size; 0: unfit, it ends not converged or, where the reason says so, in a refusal. */
+/* Which method is suitable for which class, by patterns; the first match applies; none: suitable for every size.
+   fit: up to this size; 0: unsuitable, it ends not converged or, if the reason says so, with a refusal. */
 typedef struct {
   const char *method, *class;
   PetscInt fit;
@@ -442,15 +443,16 @@ static const Rule rules[] = {
     {"* primal", "twice", 0, "refused, contacts share unknowns"},
     {"tao bqpip dual_free", "*", 0, "refused, reads the matrix"},
     {"tao bqpip *", "*", 0, "cannot take infinite bounds"},
-    /* first-order and quasi-Newton types: where they stop depends on round-off, which differs from BLAS to BLAS */
+    /* first-order and quasi-Newton types: their convergence depends on round-off, which differs between BLAS
+       libraries */
     {"tao bqn* *", "*", 0, "convergence depends on round-off"},
     {"tao blmvm *", "*", 0, "convergence depends on round-off"},
     {"tao bncg *", "*", 0, "convergence depends on round-off"},
-    /* from here on: fit up to a size */
+    /* from here on: suitable up to a size */
     {"tao [sa]sils *", "murty", 200, ""},
     {"tao [sa]sfls *", "obstacle", 200, ""},
-    {"tao [sa]s* *", "twice", 200, ""}, /* with 500, some processors' kernels end at residuals of 3e-8 */
-    {"tao [sa]s* *", "*", 500, ""},     /* beyond, a factor each iteration takes the test's time */
+    {"tao [sa]s* *", "twice", 200, ""}, /* with 500, the kernels for some processors end at residuals of 3e-8 */
+    {"tao [sa]s* *", "*", 500, ""},     /* above, one factor in each iteration takes too long for the test */
     {"tao tron dual", "twice", 50, ""}, /* singular: PETSc 3.22's ends at residuals of 3e-7 with 200 */
     {"tao b[ln]* *", "halfspace", 500, ""},
     {"tao bn* primal", "obstacle", 500, ""},
@@ -472,7 +474,7 @@ static PetscInt Fit(const char method[], const Class *c, const char *reason[])
 /* -- runs -- */
 
 typedef struct {
-  PetscInt runs, solved, largest, its; /* of the largest size that it is fit for: its iterations and seconds */
+  PetscInt runs, solved, largest, its; /* at the largest size for which it is suitable: its iterations and seconds */
   PetscReal seconds, worst;            /* worst residual of all sizes */
 } Cell;
 
@@ -522,8 +524,8 @@ static PetscErrorCode Solve(Problem *p, HycoSolver solver, const Method *m, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One method on one problem of size n: what the rules promise. Beyond the sizes that it is fit for, it counts in no
- * cell. */
+/* One method on one problem of size n: checks the rules. Above the sizes for which it is suitable, it is not
+   counted. */
 static PetscErrorCode Try(Problem *p, HycoSolver solver, const Method *m, const Class *c, PetscInt n, PetscBool fit,
                           const char reason[], Cell *cell)
 {
@@ -558,8 +560,8 @@ static PetscErrorCode Try(Problem *p, HycoSolver solver, const Method *m, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On problems beyond 500, which take most of the time, the methods that hyco chooses or falls back on; HYCO_ALL_SOLVERS
-   (scripts/solver-tables): all. */
+/* On problems above 500, which take most of the time, only the methods that hyco chooses or uses as a fallback;
+   HYCO_ALL_SOLVERS (scripts/solver-tables): all. */
 static PetscBool Large(const Method *m)
 {
   if (!m->tao || getenv("HYCO_ALL_SOLVERS")) return PETSC_TRUE;
@@ -585,7 +587,7 @@ static PetscErrorCode RunClass(const Class *c, PetscInt largest, PetscBool few, 
       const PetscInt fit = Fit(methods[m].name, c, &reason);
 
       if ((few && methods[m].many) || (sizes[k] > 500 && !Large(&methods[m]))) continue;
-      /* an unfit one, on small problems or the next larger one, must not pretend */
+      /* an unsuitable one, on small problems or the next larger one, must not report convergence with a wrong result */
       if (sizes[k] <= (fit ? fit : 50) || (fit < 500 && k && sizes[k - 1] == fit))
         PetscCall(Try(&p, solver, &methods[m], c, sizes[k], (PetscBool)(sizes[k] <= fit), reason, &cells[m]));
     }
@@ -642,20 +644,20 @@ static PetscErrorCode Test(void)
   Method methods[64];
   const int n = ListMethods(methods);
   Cell *cells;
-  PetscInt largest = PETSC_MAX_INT; /* -largest N: no problems beyond */
+  PetscInt largest = PETSC_MAX_INT; /* -largest N: no larger problems */
   PetscMPIInt size, rank;
   char path[32];
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (size > 1) largest = 200; /* MUMPS and messages take the time */
+  if (size > 1) largest = 200; /* MUMPS and communication take the time */
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-largest", &largest, NULL));
   PetscCall(PetscCalloc1(N_CLASSES * n, &cells));
   for (int c = 0; c < N_CLASSES; c++) {
     const PetscReal begin = HycoNow();
 
-    if (size > 1 && !classes[c].sparse) continue; /* dense systems live on one process */
+    if (size > 1 && !classes[c].sparse) continue; /* dense systems are on one process */
     PetscCall(RunClass(&classes[c], largest, (PetscBool)(size > 1), n, methods, cells + c * n));
     if (!rank) printf("%s: %.1f s\n", classes[c].name, HycoNow() - begin);
   }

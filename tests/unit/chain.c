@@ -1,6 +1,6 @@
 /*
-  Falling back, link by link: TAO, the active set, Lemke's method, and the end of the chain. K = 2 I, B = I, Bt = 2 M
-  and F = 0 make the complementarity problem w = D + M L of a small matrix M.
+  The order of fallbacks: TAO, the active set, Lemke's method, and the end. K = 2 I, B = I, Bt = 2 M and F = 0 make the
+  complementarity problem w = D + M L of a small matrix M.
 */
 #include "check.h"
 #include <hycosolver.h>
@@ -65,7 +65,7 @@ static PetscErrorCode End(Case *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves with gaps q; the methods and the reason must be these, and what converged has small residuals. */
+/* Solves with gaps q; checks the methods, the reason, and the residuals if converged. */
 static PetscErrorCode Solve(Case *c, const PetscReal q[N], const char methods[], PetscBool converged, HycoReason reason)
 {
   const char *method;
@@ -102,8 +102,8 @@ static PetscErrorCode Forces(const Case *c, PetscReal a, PetscReal b, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* I. Ben Gharbia, J. C. Gilbert, Math. Programming 134 (2012) 349-364: from the set {1} the active set cycles. A first
-   solve leaves that set, the second starts warm from it. */
+/* I. Ben Gharbia, J. C. Gilbert, Math. Programming 134 (2012) 349-364: from the set {1} the active set cycles. A
+   first solve ends with that set, and the second starts from it. */
 static const PetscReal cycling[N][N] = {{1, 0, 2}, {2, 1, 0}, {0, 2, 1}}, inside[N] = {-1, 9, 9}, all[N] = {-1, -1, -1};
 static const PetscReal spd[N][N] = {{2, -1, 0}, {-1, 2, -1}, {0, -1, 2}};
 
@@ -127,8 +127,8 @@ static PetscErrorCode TestActiveSet(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* bqpip takes no infinite bounds: the active set solves z = M^-1 e = (3, 4, 3)/2, closed form. Cut to one iteration
-   that needs two (the free end opens), the active set leaves it to Lemke. */
+/* bqpip cannot take infinite bounds: the active set solves z = M^-1 e = (3, 4, 3)/2, closed form. Limited to one
+   iteration where it needs two (the free end opens), the active set fails and Lemke's method follows. */
 static PetscErrorCode TestTao(void)
 {
   const PetscReal mixed[N] = {-1, -1, 3};
@@ -152,7 +152,7 @@ static PetscErrorCode TestTao(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The end of the chain: w = -1 - z >= 0 has no solution, and nobody says that it has one. */
+/* The end: w = -1 - z >= 0 has no solution, and no method reports one. */
 static PetscErrorCode TestNone(void)
 {
   const PetscReal minus[N][N] = {{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
@@ -165,7 +165,7 @@ static PetscErrorCode TestNone(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* No P-matrix (symmetric, indefinite), several solutions: Lemke's method finds one; no gap at all: no force. */
+/* Not a P-matrix (symmetric, indefinite), several solutions: Lemke's method finds one; zero gaps: no force. */
 static PetscErrorCode TestSeveral(void)
 {
   const PetscReal several[N][N] = {{1, 2, 0}, {2, 1, 0}, {0, 0, 1}}, zero[N] = {0, 0, 0};
@@ -182,9 +182,9 @@ static PetscErrorCode TestSeveral(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A string of 20 cells pulled onto an obstacle, cut to one iteration where the contact needs several: solves by a
-   factor go on with Lemke's method, iterative ones (as where a factor would not fit) end, for its dual form is made by
-   a factor. */
+/* A string of 20 cells pulled onto an obstacle, limited to one iteration where the contact needs several: after
+   solves by a factor Lemke's method follows, after iterative ones (as if a factor would not fit in memory) none,
+   because its dual form needs a factor. */
 #define NODES 19
 
 static PetscErrorCode BeginString(HycoLinear linear, Case *c)
@@ -231,7 +231,7 @@ static PetscErrorCode TestIterative(void)
 
   PetscFunctionBegin;
   for (int k = 0; k < 3; k++) {
-    const PetscBool lemke = (PetscBool)(k == 1); /* 0: iterative, not cut; 1: direct, cut; 2: iterative, cut */
+    const PetscBool lemke = (PetscBool)(k == 1); /* 0: iterative, no limit; 1: direct, limited; 2: iterative, limited */
 
     PetscCall(BeginString(linear[k != 1], &c));
     if (k) PetscCall(HycoSolverSetMaxIts(c.solver, 1));

@@ -1,4 +1,4 @@
-/* What every unit test shares: checks that print what was expected and found, and a fixed sequence of numbers. */
+/* Common code of the unit tests: checks that print expected and found values, and a fixed sequence of numbers. */
 #ifndef CHECK_H
 #define CHECK_H
 
@@ -9,7 +9,8 @@
 
 static int check_failures;
 
-/* CHECK(condition, format, ...): on failure says where, what, and the given text (expected and found). */
+/* CHECK(condition, format, ...): on failure prints the place, the condition, and the given text (expected and
+   found). */
 #define CHECK(condition, ...)                                                                                          \
   do {                                                                                                                 \
     if (!(condition)) {                                                                                                \
@@ -27,7 +28,7 @@ static int check_failures;
     CHECK(PetscAbsReal(found_ - expected_) <= (tol), "%s: expected %.17g, found %.17g", #found, expected_, found_);    \
   } while (0)
 
-/* `call` fails and its message holds `text`. */
+/* `call` fails and its message contains `text`. */
 #define CHECK_FAILS(call, text)                                                                                        \
   do {                                                                                                                 \
     char line_[HYCO_LINE];                                                                                             \
@@ -45,7 +46,7 @@ static inline double Draw(unsigned long long *state)
   return 2 * ((double)*state / (double)(1ULL << 48)) - 1;
 }
 
-/* main: runs Test() under hyco; 0 when every check held. */
+/* main: runs Test() under hyco; 0 if every check passed. */
 #define TEST_MAIN                                                                                                      \
   int main(int argc, char **argv)                                                                                      \
   {                                                                                                                    \

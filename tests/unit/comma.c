@@ -1,4 +1,4 @@
-/* A program whose locale writes 0,5 for 0.5 reads scenes, meshes, points and options as any other. */
+/* A program whose locale writes 0,5 for 0.5 reads scenes, meshes, points and options correctly. */
 #include "check.h"
 #include <hyco.h>
 #include <locale.h>
@@ -6,7 +6,7 @@
 
 static char model_path[128], points_path[128];
 
-/* A locale with a comma; false: this machine has none. */
+/* Sets a locale with a comma; false: this machine has none. */
 static PetscBool SetComma(void)
 {
   static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8",  "fr_FR.UTF-8", "fr_FR.utf8", "es_ES.UTF-8",

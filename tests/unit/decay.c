@@ -1,10 +1,10 @@
-/* How fast divided differences fall; a pseudo-inverse. */
+/* The decay of divided differences; a pseudo-inverse. */
 #include "check.h"
 #include <hycoalgorithms.h>
 #include <math.h>
 
-/* 1/(x + 1.5): differences of order k are c (x0 + 1.5)^-1 ..., whose fall tends to 1 / (1.5 + sqrt(1.25)) in units of
-   a quarter of the range; |x| has none that lasts. */
+/* 1/(x + 1.5): differences of order k are c (x0 + 1.5)^-1 ..., whose ratio tends to 1 / (1.5 + sqrt(1.25)) in units
+   of a quarter of the range; those of |x| do not decay in the long run. */
 static PetscErrorCode Decays(void)
 {
   PetscReal x[9], smooth[9], kink[9], decay[2];

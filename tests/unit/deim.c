@@ -1,4 +1,5 @@
-/* DEIM and Q-DEIM on a basis small enough to follow by hand, pivoted columns and singular values. On any ranks. */
+/* DEIM and Q-DEIM on a basis small enough to compute by hand, pivoted columns and singular values. On any number of
+   ranks. */
 #include "check.h"
 #include <hycoalgorithms.h>
 #include <math.h>
@@ -45,8 +46,9 @@ static PetscErrorCode TestByHand(void)
 }
 
 /*
-  Q-DEIM on rows (1 1), (0 2), (3 0), (0 -2): the longest is row 2; taking (1 0) out of the others leaves (0 1), (0 2),
-  (0 -2): row 1, which ties with row 3. Turning the modes changes nothing (DEIM's points it would).
+  Q-DEIM on rows (1 1), (0 2), (3 0), (0 -2): the longest is row 2; orthogonalising the others against (1 0) leaves (0
+  1), (0 2), (0 -2): row 1, which ties with row 3. A rotation of the modes changes nothing (it would change DEIM's
+  points).
 */
 static PetscErrorCode TestPivotedQR(void)
 {
@@ -140,7 +142,7 @@ static PetscErrorCode TestSingularity(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Columns (1 0), (0 3), (2 2), (0 3): the longest is column 1 (|.|^2 = 9; column 3 ties); what is left of the others is
+/* Columns (1 0), (0 3), (2 2), (0 3): the longest is column 1 (|.|^2 = 9; column 3 ties); the rest of the others is
    (1 0), (2 0), 0: then column 2. Singular values of diag(3, 4): 3 and 4; of [1 1; 0 1]: the golden ratio and its
    inverse. */
 static PetscErrorCode TestDense(void)

@@ -1,5 +1,5 @@
-/* The direct solver against dense algebra: S = B K^-1 B^T, g = D - B K^-1 F, x = K^-1 (F - B^T L), on any number of
- * ranks. */
+/* The direct solver compared with dense algebra: S = B K^-1 B^T, g = D - B K^-1 F, x = K^-1 (F - B^T L), on any
+   number of ranks. */
 #include "check.h"
 #include <hycosolverimpl.h>
 
@@ -165,7 +165,7 @@ static PetscErrorCode CheckAll(HycoDirect direct, Mat K, Mat Bt, Mat B)
   PetscCall(HycoDirectExpand(direct, L, U));
   Exact(L, x);
   PetscCall(CheckVec(U, x));
-  PetscCall(HycoDirectSolve(direct, F, U)); /* K alone, after the reduction as before it */
+  PetscCall(HycoDirectSolve(direct, F, U)); /* K alone, after the reduction and before it */
   Exact(NULL, x);
   PetscCall(CheckVec(U, x));
   PetscCall(VecDestroy(&F));
@@ -173,7 +173,7 @@ static PetscErrorCode CheckAll(HycoDirect direct, Mat K, Mat Bt, Mat B)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A free chain: its kernel is the constant; one unknown is pinned, and M is the bordered matrix. */
+/* A free chain: its null space is the constant; one unknown is pinned, and M is the bordered matrix. */
 static PetscErrorCode TestPinned(void)
 {
   Mat K, B, Bt;
@@ -200,8 +200,8 @@ static PetscErrorCode TestPinned(void)
   PetscCall(HycoDirectAnalyse(direct, K, Bt, B, PETSC_TRUE, &bytes));
   PetscCall(HycoDirectFactor(direct, K, Bt, B, M_, &singular));
   CHECK(!singular, "K without the pinned unknown is regular");
-  CHECK_NEAR(M_[0], 0, 1e-12);       /* a rigid motion takes no force */
-  for (PetscInt i = 0; i < M; i++) { /* and opens every row by B 1 = 0.5, with opposite signs in the border */
+  CHECK_NEAR(M_[0], 0, 1e-12);       /* a rigid motion needs no force */
+  for (PetscInt i = 0; i < M; i++) { /* and changes every row by B 1 = 0.5, with opposite signs in the border */
     CHECK_NEAR(M_[1 + i], -0.5, 1e-12);
     CHECK_NEAR(M_[(1 + i) * (M + 1)], 0.5, 1e-12);
   }
@@ -222,7 +222,7 @@ static PetscErrorCode Test(void)
   PetscFunctionBegin;
   PetscCall(HycoDirectCreate(PETSC_COMM_WORLD, &direct));
   PetscCall(MakeB(&B, &Bt));
-  for (int k = 0; k < 3; k++) { /* values change, then the pattern */
+  for (int k = 0; k < 3; k++) { /* first the values change, then the pattern */
     PetscCall(MakeK(k == 1 ? 3 : 1, (PetscBool)(k == 2), &K));
     PetscCall(CheckAll(direct, K, Bt, B));
     PetscCall(MatScale(K, 2));

@@ -130,7 +130,7 @@ static void TestShapes(HycoCellType type)
   CHECK_NEAR(weight, size[type], 1e-14);
 }
 
-/* A dilatation that varies in the cells: K and the energies tell the same work. */
+/* A dilatation that varies in the cells: the energies from K and from the cells agree. */
 static PetscErrorCode TestEnergy(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -157,7 +157,7 @@ static PetscErrorCode TestEnergy(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The element bbar: for quad4 and hex8 it passes what the standard one passes; for the others it is refused. */
+/* The element bbar: for quad4 and hex8 it passes the tests of the standard one; for the others it is refused. */
 static PetscErrorCode TestMeanDilatation(void)
 {
   PetscFunctionBegin;

@@ -1,4 +1,4 @@
-/* Errors: what says that there is no useful model is told from all others, on every rank. */
+/* Errors: HYCO_ERR_NO_MODEL is distinguished from all others, on every rank. */
 #include "check.h"
 #include <string.h>
 

@@ -1,4 +1,4 @@
-/* Expressions of a scene: values, pi, what they depend on, and what is refused. */
+/* Expressions of a scene: values, pi, dependence on variables, and refusals. */
 #include "check.h"
 #include <hycosceneimpl.h>
 #include <math.h>
@@ -55,7 +55,7 @@ static PetscErrorCode TestValues(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Many points at once, and the questions that decide what is assembled again. */
+/* Many points at once, and the queries that decide what is assembled again. */
 static PetscErrorCode TestDependence(void)
 {
   const PetscReal xyz[6] = {1, 2, 3, 4, 5, 6};

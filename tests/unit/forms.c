@@ -1,4 +1,4 @@
-/* Forms of HycoSolver: a system whose flexibility is given, and a form that the program registers. */
+/* Forms of HycoSolver: a system with a given flexibility, and a form that the program registers. */
 #include "check.h"
 #include <hycosolverimpl.h>
 
@@ -22,7 +22,7 @@ static PetscErrorCode TestFlexibility(void)
   PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, 2, L, &forces));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
   PetscCall(HycoSystemSetFlexibility(system, matrix, free_gap));
-  L[0] = 0.25; /* w = (-1/2, 5/4): half of the size of g too deep, and pressed there */
+  L[0] = 0.25; /* w = (-1/2, 5/4): penetration of half of the size of g, with a force */
   L[1] = 0;
   PetscCall(HycoSystemComputeKKT(system, NULL, forces, &kkt));
   CHECK_NEAR(kkt.stationarity, 0, 0);
@@ -33,7 +33,7 @@ static PetscErrorCode TestFlexibility(void)
     PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
     PetscCall(HycoSolverSetSystem(solver, system));
     PetscCall(HycoSolverSetType(solver, types[t]));
-    for (int scale = 1; scale <= 2; scale++) { /* a factor that is kept must not outlive G */
+    for (int scale = 1; scale <= 2; scale++) { /* a stored factor must not be used after G has changed */
       PetscCall(MatScale(matrix, scale));
       PetscCall(HycoSolverSolve(solver, NULL, forces));
       PetscCall(HycoSolverGetReason(solver, &reason));
@@ -52,14 +52,14 @@ static PetscErrorCode TestFlexibility(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Its answer to everything: data[0] is x and L. */
+/* Its result for everything: data[0] is x and L. */
 static PetscErrorCode SolveMine(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   PetscFunctionBegin;
   PetscCall(VecSet(x, *(PetscReal *)form->data));
   PetscCall(VecSet(L, *(PetscReal *)form->data));
   s->its = 1;
-  s->by_factor = PETSC_FALSE; /* a wrong answer does not mean that K is singular */
+  s->by_factor = PETSC_FALSE; /* a wrong result does not mean that K is singular */
   *solved = PETSC_TRUE;
   PetscCall(HycoSolverNameMethod(s, form->name));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -87,8 +87,8 @@ static PetscErrorCode CreateMine(HycoSolver s, HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x + L = 2, x <= 1: x = L = 1. The cheapest form is taken; what it gets wrong goes on to the next method, and to
-   another form where it does not accept that. */
+/* x + L = 2, x <= 1: x = L = 1. The cheapest form is chosen; after a wrong result the next method is tried, on
+   another form if this one does not accept it. */
 static PetscErrorCode TestRegistered(void)
 {
   static const struct {

@@ -1,4 +1,4 @@
-/* Files: what is written comes back, a commit is a rename, and damaged files are refused in one line. */
+/* Files: written data are read back, a commit is a rename, and damaged files are refused in one line. */
 #include "check.h"
 #include <hycoh5.h>
 #include <hycofile.h>
@@ -74,7 +74,7 @@ static PetscErrorCode TestRoundTrip(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A read that was refused must not keep the file open: HDF5 would answer from memory when it is opened again. */
+/* A refused read must close the file: otherwise HDF5 would return data from memory when it is opened again. */
 static PetscErrorCode TestReleased(void)
 {
   HycoH5 file = NULL;
@@ -88,7 +88,7 @@ static PetscErrorCode TestReleased(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every length of the file but the whole one is refused when it is opened or read; and no such file, no HDF5 file. */
+/* Every truncation of the file is refused when it is opened or read; also a missing file, and one that is not HDF5. */
 static PetscErrorCode TestDamaged(void)
 {
   HycoH5 file = NULL;
@@ -132,8 +132,8 @@ static PetscErrorCode TestDamaged(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Temporary names: of this process alone, told from other files, swept when their process is dead. */
-/* The temporary name of a file just begun; among `before` names that were there. */
+/* Temporary names: unique to this process, distinguished from other files, removed when their process has ended. */
+/* The temporary name of a file just begun; `before` names existed already. */
 static PetscErrorCode Begin(size_t before, HycoFile *file, char name[HYCO_FILE_NAME])
 {
   glob_t found;

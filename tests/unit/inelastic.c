@@ -1,7 +1,7 @@
 /*
-  A step of bodies with memory on small distorted meshes: nodal forces against differences of the potential, the tangent
-  stiffness against differences of the forces, the energies' identity, the elastic tangents back, states and their
-  copies.
+  A step of bodies with a history on small distorted meshes: nodal forces compared with differences of the potential,
+  the tangent stiffness with differences of the forces, the identity of energies, restoring the elastic tangents, states
+  and their copies.
 */
 #include "check.h"
 #include <hycoinelastic.h>
@@ -75,7 +75,7 @@ static PetscErrorCode Step(Model *m, PetscBool tangent, PetscReal f[], HycoFESte
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The stiffness with fe's tangents as they are, dense. */
+/* The stiffness with fe's current tangents, dense. */
 static PetscErrorCode Stiffness(Model *m, PetscReal **K)
 {
   const PetscInt n = m->fe->n_dof;
@@ -146,7 +146,7 @@ static PetscErrorCode TestDerivatives(const Patch *p, const char element[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A step that is taken again gives the same bits; the state's reals are all there is of it. */
+/* A repeated step gives the same bits; the state's reals describe it completely. */
 static PetscErrorCode TestState(void)
 {
   const PetscInt *start;
@@ -185,7 +185,7 @@ static PetscErrorCode TestState(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A program's law that tells stress, state and tangent alone: a Maxwell element. */
+/* A program's law that computes only stress, state and tangent: a Maxwell element. */
 static PetscErrorCode UpdateMaxwell(HycoMaterial law, HycoMaterialPoints *p)
 {
   const PetscReal *young = p->constant[0], *rate = p->constant[1];

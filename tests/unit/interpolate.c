@@ -1,4 +1,4 @@
-/* Interpolation in parameter space: exact for what it must be exact for, and a rule outside the points. */
+/* Interpolation in parameter space: exactness, and the rule outside the points. */
 #include "check.h"
 #include <hycoalgorithms.h>
 #include <math.h>
@@ -21,7 +21,8 @@ static PetscReal Size(PetscInt p)
   return size[p];
 }
 
-/* At random x of the box: weights are shares of one, and linear functions come out; at the points, their own alone. */
+/* At random x of the box: weights are nonnegative with sum 1, and linear functions are exact; at a point only its
+   own weight is nonzero. */
 static PetscErrorCode CheckLinear(PetscInt dim, PetscInt n, const PetscReal points[], const char what[])
 {
   HycoInterpolant it;
@@ -74,8 +75,8 @@ static PetscErrorCode TestScattered(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A grid, one of its points in the middle of the list's order taken away (a triangulation with many points on one
-   circle), and with a point twice. */
+/* A grid without one of its points in the middle of the list's order (a triangulation with many points on one
+   circle), and with a repeated point. */
 static PetscErrorCode TestGrid(void)
 {
   PetscFunctionBegin;
@@ -92,7 +93,8 @@ static PetscErrorCode TestGrid(void)
     PetscCall(CheckLinear(dim, n, points, "grid"));
     PetscCall(HycoInterpolantCreate(dim, n, points, &it));
     for (PetscInt p = 0; p < dim; p++) x[p] = 0.5 * Size(p);
-    PetscCall(HycoInterpolantGetWeights(it, x, w)); /* multilinear: the middle of a cell takes its corners alike */
+    PetscCall(HycoInterpolantGetWeights(it, x, w)); /* multilinear: equal weights of the corners in the middle of a
+                                                       cell */
     for (PetscInt k = 0; k < n; k++) square += w[k] * w[k];
     CHECK_NEAR(square, 1. / (1 << dim), 1e-14);
     PetscCall(HycoInterpolantDestroy(&it));
@@ -141,7 +143,7 @@ static PetscErrorCode TestOutside(void)
   CHECK_NEAR(w[1], 0.5 / 3, 1e-14);
   CHECK_NEAR(w[2], 0, 0);
   PetscCall(HycoInterpolantDestroy(&it));
-  PetscCall(HycoInterpolantCreate(1, 4, twice, &it)); /* 0 stands twice: the first has its weight */
+  PetscCall(HycoInterpolantCreate(1, 4, twice, &it)); /* 0 occurs twice: the first one has the weight */
   PetscCall(HycoInterpolantGetWeights(it, twice, w));
   CHECK(w[0] == 1 && w[1] == 0 && w[2] == 0 && w[3] == 0, "a point twice: %g %g %g %g", w[0], w[1], w[2], w[3]);
   PetscCall(HycoInterpolantDestroy(&it));
@@ -150,7 +152,7 @@ static PetscErrorCode TestOutside(void)
   CHECK_FAILS(HycoInterpolantCreate(2, 2, flat, &it), "at least 3 are needed");
   PetscCall(HycoInterpolantDestroy(&it));
   CHECK_FAILS(HycoInterpolantCreate(0, 2, flat, &it), "2 points in 0 parameters cannot be interpolated");
-  for (PetscInt k = 0; k < 10; k++) { /* the origin and the unit vectors of 9 dimensions: no grid */
+  for (PetscInt k = 0; k < 10; k++) { /* the origin and the unit vectors of 9 dimensions: not a grid */
     for (PetscInt p = 0; p < 9; p++) many[k * 9 + p] = k == p + 1;
   }
   CHECK_FAILS(HycoInterpolantCreate(9, 10, many, &it), "interpolated for up to 8 parameters; here are 9");

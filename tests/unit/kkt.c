@@ -93,7 +93,7 @@ static PetscErrorCode TestResiduals(Case *c)
     CHECK_NEAR(kkt.stationarity, k ? 256 * PETSC_MACHINE_EPSILON / 5 : 0, 1e-18);
     CHECK_NEAR(kkt.rounding, k ? 0 : 4 * PETSC_MACHINE_EPSILON / 5, 1e-18);
   }
-  /* not finite is no solution */
+  /* a value that is not finite is not a solution */
   PetscCall(SetState(c, NAN, 1, 2));
   PetscCall(HycoSystemComputeKKT(c->system, c->x, c->L, &kkt));
   CHECK(HycoKKTMax(&kkt) > 1, "NaN must not pass: %g", (double)HycoKKTMax(&kkt));
@@ -116,7 +116,7 @@ static PetscErrorCode TestSolvers(Case *c)
       HycoReason reason;
       const PetscReal *x, *L;
 
-      if (t == 2 && forms[f] == HYCO_FORM_PRIMAL) continue; /* Lemke's is a method of the dual form */
+      if (t == 2 && forms[f] == HYCO_FORM_PRIMAL) continue; /* Lemke's method is one of the dual form */
       PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
       PetscCall(HycoSolverSetSystem(solver, c->system));
       PetscCall(HycoSolverSetType(solver, types[t]));
@@ -140,7 +140,7 @@ static PetscErrorCode TestSolvers(Case *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A singular K is told, not solved. */
+/* A singular K is reported, not solved. */
 static PetscErrorCode TestSingular(Case *c)
 {
   HycoSolver solver;
@@ -159,7 +159,7 @@ static PetscErrorCode TestSingular(Case *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- the chain of methods: each link -- */
+/* -- the order of the methods -- */
 
 /* A dense system K = I, B = I, Bt = M, F = 0: w = D + M L. M by columns, or NULL: M = 0 and B = 0. */
 static PetscErrorCode ChainCreate(PetscInt n, const PetscReal M[], Case *c)
@@ -238,7 +238,8 @@ static PetscErrorCode TestCycleThenLemke(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nothing can open a gap of -1 (B = 0): the set is singular, Lemke ends on a ray, the solve says so. */
+/* Nothing can open a gap of -1 (B = 0): the set is singular, Lemke's method ends on a ray, and the solve reports
+   this. */
 static PetscErrorCode TestRay(void)
 {
   HycoSolver solver;
@@ -259,7 +260,7 @@ static PetscErrorCode TestRay(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One iteration is too few for TAO and for the active set; Lemke solves. And what cannot be asked for is refused. */
+/* One iteration is too few for TAO and for the active set; Lemke's method solves. Invalid requests are refused. */
 static PetscErrorCode TestChain(Case *c)
 {
   HycoSolver solver;

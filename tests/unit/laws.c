@@ -1,6 +1,6 @@
 /*
-  The laws that flow, at points: tangents against differences of the stress, stresses against those of the potential,
-  the scalar equation itself, the same bits in batches of any size, far trial states, what is refused.
+  The inelastic laws at points: tangents compared with differences of the stress, stresses with those of the potential,
+  the scalar equation, the same bits in batches of any size, far trial states, refusals.
 */
 #include "check.h"
 #include <hycomaterialimpl.h>
@@ -10,7 +10,7 @@
 typedef struct {
   const char *type;
   PetscReal constant[6];           /* after young and poisson, in the order of their declaration */
-  PetscReal temperature, dt, size; /* of strains, so that it flows */
+  PetscReal temperature, dt, size; /* size of strains that cause inelastic flow */
   PetscBool potential;
 } Case;
 
@@ -74,7 +74,7 @@ static PetscErrorCode Begin(const Case *c, PetscInt dim, One *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A strain of the size, and a step: the state becomes the begin of the next one. */
+/* Draws a strain of the size, and takes a step: the state becomes the begin of the next one. */
 static PetscErrorCode Drawn(One *o, PetscReal size, unsigned long long *seed)
 {
   PetscFunctionBegin;
@@ -92,7 +92,7 @@ static PetscErrorCode Accept(One *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Central differences of stress and potential by strain; points within a step of the yield surface are left out. */
+/* Central differences of stress and potential by strain; points within a step of the yield surface are skipped. */
 static PetscErrorCode TestTangent(const Case *c, PetscInt dim)
 {
   unsigned long long seed = 7;
@@ -140,7 +140,7 @@ static PetscErrorCode TestTangent(const Case *c, PetscInt dim)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Far from the yield surface, and with trial stresses that overflow creep: the flow rule still holds. */
+/* Far from the yield surface, and with trial stresses that overflow creep: the flow rule is satisfied. */
 static PetscErrorCode TestFar(const Case *c)
 {
   One o;
@@ -236,7 +236,7 @@ static char *const cold_values[] = {"j2", "1e5 - temperature", "250", "0.3"};
 static char *const values[] = {"norton",  "1e-10*q", "4",  "1e5-10*temperature", "300+t", "0,1",
                                "0 1,1 2", "1e-5",    "293"};
 
-/* Entries of a nested law; what changes the elastic tangent and what does not; constants that leave their interval. */
+/* Entries of a nested law; which changes affect the elastic tangent; constants outside their interval. */
 static PetscErrorCode TestScene(void)
 {
   const PetscBool t_alone[2] = {PETSC_TRUE, PETSC_FALSE}, q_alone[2] = {PETSC_FALSE, PETSC_TRUE};

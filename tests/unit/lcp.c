@@ -33,7 +33,7 @@ static PetscBool Symmetric(PetscInt n, const PetscReal M[])
   return PETSC_TRUE;
 }
 
-/* HycoLCPActiveSet() with a factor of its own where M is symmetric. */
+/* HycoLCPActiveSet() with its own factor if M is symmetric. */
 static PetscErrorCode ActiveSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
                                 PetscInt max_its, PetscBool active[], PetscReal z[], PetscInt *its,
                                 HycoLCPStatus *status)
@@ -47,7 +47,7 @@ static PetscErrorCode ActiveSet(PetscInt n, const PetscReal M[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Both methods from the empty set; Lemke must solve; the active set must solve or say that it did not. */
+/* Both methods from the empty set; Lemke's must solve; the active set must solve or report that it did not. */
 static PetscErrorCode Both(const char what[], PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool must,
                            PetscReal z_lemke[])
 {
@@ -181,7 +181,7 @@ static PetscErrorCode TestString(void)
     PetscCall(PetscArrayzero(q, n));
     PetscCall(Both("string, no load, no gap", n, M, q, PETSC_TRUE, z));
     for (PetscInt i = 0; i < n; i++) CHECK_NEAR(z[i], 0, 0);
-    /* the load pushes up on one half, down on the other: zero gaps everywhere */
+    /* the load pushes up on one half, down on the other: all gaps zero */
     for (PetscInt i = 0; i < n; i++) {
       q[i] = 0;
       for (PetscInt j = 0; j < n; j++) q[i] -= M[j * n + i] * (2 * j < n ? 1 : -1);
@@ -192,7 +192,7 @@ static PetscErrorCode TestString(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* No solution: M = 0 and q < 0; both methods must say so. */
+/* No solution: M = 0 and q < 0; both methods must report it. */
 static PetscErrorCode TestNone(void)
 {
   const PetscReal M[4] = {0, 0, 0, 0}, q[2] = {-1, 1};
@@ -209,8 +209,8 @@ static PetscErrorCode TestNone(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A factor taken from set to set, growing, shrinking and at random, solves as one that begins with each; a matrix that
-   is not definite on the set is noticed, and what comes after is right again. */
+/* A factor updated from set to set, growing, shrinking and at random, gives the same solutions as a new one for
+   each; a matrix that is not definite on the set is detected, and later solutions are right again. */
 static PetscErrorCode TestFactor(void)
 {
   enum { n = 60 };
@@ -266,7 +266,7 @@ static PetscErrorCode TestFactor(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two contacts that are one: the smaller gap decides; one of them may carry the force, the other none. */
+/* Two identical contacts: the smaller gap is decisive; one of them may carry the force, the other none. */
 static PetscErrorCode TestTwice(void)
 {
   const PetscReal M[4] = {2, 2, 2, 2}, q[4][2] = {{-4, -4}, {-4, -6}, {-6, -4}, {-4, 1}};
@@ -293,9 +293,8 @@ static PetscErrorCode TestTwice(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* M = C C^T with the rows e1, e2, (e1 + e2): the third repeats the first two together; pushed at by all three, with
-   gaps that agree (-1, -1, -2) or not. Two independent contacts then hold x = -C^T z, and Violation() sees the third.
- */
+/* M = C C^T with the rows e1, e2, (e1 + e2): the third is the sum of the first two; all three have negative gaps,
+   consistent (-1, -1, -2) or not. Two independent contacts then give x = -C^T z, and Violation() checks the third. */
 static PetscErrorCode TestThree(void)
 {
   const PetscReal M[9] = {1, 0, 1, 0, 1, 1, 1, 1, 2}, q[4][3] = {{-1, -1, -2}, {-1, -1, -3}, {-1, -1, -1}, {-2, 1, -2}};

@@ -66,8 +66,8 @@ static PetscErrorCode TestForces(const Patch *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* u = 1 + x in x: |u|^2 = integral (1 + x)^2 = 7/3, |grad u|^2 = 1. The quadrature is exact but on the distorted hex8,
-   where the integrand has degree 4 in a direction and two Gauss points reach 3. */
+/* u = 1 + x in x: |u|^2 = integral (1 + x)^2 = 7/3, |grad u|^2 = 1. The quadrature is exact except on the distorted
+   hex8, where the integrand has degree 4 in a direction and two Gauss points are exact up to 3. */
 static PetscErrorCode TestH1(const Patch *p)
 {
   HycoScene scene;
@@ -96,7 +96,7 @@ static PetscErrorCode TestH1(const Patch *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prescribed displacements: with u = 1 on the skin the lifted force is K u0 moved: solving gives u = 1 inside too. */
+/* Prescribed displacements: with u = 1 on the skin the lifted force is -K u0: the solution is u = 1 inside too. */
 static PetscErrorCode TestLifting(const Patch *p)
 {
   HycoScene scene;

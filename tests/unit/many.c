@@ -1,9 +1,9 @@
-/* Errors in the middle of many points, and points that differ between ranks: nothing is lost, no rank waits. */
+/* Errors in the middle of many points, and points that differ between ranks: no memory is lost, no rank waits. */
 #include "check.h"
 #include <hyco.h>
 #include <unistd.h>
 
-/* Positive where training goes, to mu1 = 0.25; a point beyond 0.3 fails when the stiffness is assembled. */
+/* Positive in the range of training, up to mu1 = 0.25; above 0.3 the assembly of the stiffness fails. */
 #define YOUNG "x <= 0.5 ? 0.3 - mu1 : 0.15"
 
 static char rope[PETSC_MAX_PATH_LEN];
@@ -32,7 +32,7 @@ static PetscErrorCode Train(HycoROMType type, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* mu of n points fails at the third in the order of its work; what PETSc holds before and after is the same. */
+/* The third of n points fails in the order of solution; PETSc's memory before and after is the same. */
 static PetscErrorCode FailInTheMiddle(HycoROM m, PetscInt n, const PetscReal mu[], const PetscReal expected[])
 {
   HycoPrediction p[4];
@@ -43,14 +43,16 @@ static PetscErrorCode FailInTheMiddle(HycoROM m, PetscInt n, const PetscReal mu[
   PetscFunctionBegin;
   PetscCall(HycoROMGetSizes(m, &n_contacts, &n_nodes, &dim));
   PetscCall(PetscMalloc2(n * n_contacts, &Lambda, n * n_nodes * dim, &U));
-  CHECK_FAILS(HycoROMSolveMany(m, n, 2, mu, p, Lambda, U), "Young's modulus must be positive"); /* makes what is lazy */
+  CHECK_FAILS(HycoROMSolveMany(m, n, 2, mu, p, Lambda, U), "Young's modulus must be positive"); /* creates objects
+                                                                                                   that are created
+                                                                                                   lazily */
   PetscCall(PetscMallocGetCurrentUsage(&before));
   CHECK_FAILS(HycoROMSolveMany(m, n, 2, mu, p, Lambda, U), "Young's modulus must be positive");
   PetscCall(PetscMallocGetCurrentUsage(&after));
   CHECK(before > 0, "PETSc keeps no books of its memory");
   CHECK(after == before, "%g bytes held before the error, %g after", before, after);
   CHECK_FAILS(HycoROMGetPrediction(m, p), "call HycoROMPredict() before");
-  PetscCall(HycoROMSolveMany(m, 2, 2, mu, p, Lambda, NULL)); /* the two good ones: the model has not changed */
+  PetscCall(HycoROMSolveMany(m, 2, 2, mu, p, Lambda, NULL)); /* the two valid ones: the model has not changed */
   for (PetscInt k = 0; k < 2; k++) {
     CHECK(p[k].total_contact_force == expected[k], "force %.17g, before the error %.17g",
           (double)p[k].total_contact_force, (double)expected[k]);
@@ -61,8 +63,8 @@ static PetscErrorCode FailInTheMiddle(HycoROM m, PetscInt n, const PetscReal mu[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points that come in another order than that of the work: each answer stands where its point does, and the work goes
-   by stiffness, so that both points before 0.35 are done when that one fails. */
+/* Points in another order than that of solution: each result is in the place of its point; the points are solved by
+   stiffness, so that both points before 0.35 are done when that one fails. */
 static PetscErrorCode Unsorted(HycoROM m)
 {
   const PetscReal mu[8] = {0.2, 0.3, 0.1, 0.3, 0.2, 0.1, 0.1, 0.1}, failing[6] = {0.35, 0.1, 0.2, 0.3, 0.1, 0.1};
@@ -119,7 +121,8 @@ static PetscErrorCode TestMany(HycoROMType type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A point for each rank, or one of them outside: every rank hears it, and then one point for all is solved. */
+/* A different point on each rank, or one of them outside: every rank gets the error, and then one point is solved by
+   all. */
 static PetscErrorCode TestOnePoint(void)
 {
   PetscReal here[2] = {0.07, 0.17};
@@ -165,7 +168,7 @@ static PetscErrorCode Test(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc keeps books of its memory only when it is asked to before it starts. */
+/* PETSc records its memory only if this is requested before it starts. */
 int main(int argc, char **argv)
 {
   static char books[] = "-malloc_debug";

@@ -1,5 +1,5 @@
-/* Material laws: `elastic` against Hooke's law, and a law with memory through the same interface, a Maxwell element in
-   1D: at constant strain n steps of implicit Euler leave the stress E eps / (1 + E A dt)^n. */
+/* Material laws: `elastic` compared with Hooke's law, and a history-dependent law through the same interface, a
+   Maxwell element in 1D: at constant strain n steps of implicit Euler give the stress E eps / (1 + E A dt)^n. */
 #include "check.h"
 #include <hycofe.h>
 #include <hycomaterialimpl.h>
@@ -21,7 +21,7 @@ static PetscErrorCode UpdateMaxwell(HycoMaterial law, HycoMaterialPoints *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* `shift` does not reach the tangent. */
+/* The tangent does not depend on `shift`. */
 static PetscBool DependsMaxwell(HycoMaterial law, const PetscBool changed[])
 {
   (void)law;
@@ -107,7 +107,7 @@ static char *const keys[] = {"scene_parameters", "parameter_a_range", "body_rod_
                              "body_rod_young",   "body_rod_rate",     "body_rod_shift"};
 static char *const values[] = {"a", "0,1", "maxwell", "100", "1e-3", "a/10"};
 
-/* What a scene makes of it: which parameters reach the tangent; the library solves with linear laws. */
+/* The law in a scene: which parameters affect the tangent; the library solves with linear laws. */
 static PetscErrorCode TestScene(void)
 {
   const PetscBool changed[1] = {PETSC_TRUE};

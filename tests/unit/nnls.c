@@ -84,7 +84,7 @@ static PetscErrorCode TestByHand(void)
   CHECK_NEAR(x[0] + x[1] + x[2] + residual, 0, 0);
   PetscCall(CheckKKT(3, 2, twice, b, &norm)); /* both columns push the same way: |r|^2 with x = 0 is best */
   CHECK_NEAR(norm, sqrt(4 + 9 + 0.25), 1e-14);
-  PetscCall(HycoNNLS(3, 2, alike, sum, x, NULL)); /* round-off does not choose between columns that are alike */
+  PetscCall(HycoNNLS(3, 2, alike, sum, x, NULL)); /* round-off does not affect the choice between equal columns */
   CHECK_NEAR(x[0], 1, 1e-9);
   CHECK_NEAR(x[1], 0, 0);
   PetscCall(CheckKKT(3, 2, nothing, b, &norm));
@@ -93,9 +93,8 @@ static PetscErrorCode TestByHand(void)
 }
 
 /*
-  The problem of the reconstruction: bumps that move, agreement where they are asked, a small weight on the
-  coefficients, which makes the solution unique. The active set and each Newton or gradient-projection type of TAO
-  agree.
+  The problem of the reconstruction: moving bumps, agreement where required, a small weight on the coefficients, which
+  makes the solution unique. The active set and each Newton or gradient-projection type of TAO agree.
 */
 static PetscErrorCode TestTao(void)
 {
@@ -137,8 +136,8 @@ static PetscErrorCode TestTao(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = 2 x_0 + noise in [0, 1], x_1 without weight, x_2 with a negative one: c_0 near 2, the others 0, and nine tenths
-   of the rows below the bound, neither fewer nor many more. */
+/* y = 2 x_0 + noise in [0, 1], x_1 without weight, x_2 with a negative one: c_0 near 2, the others 0, and nine
+   tenths of the rows below the bound, neither fewer nor many more. */
 static PetscErrorCode TestBound(void)
 {
   enum { N = 400 };
@@ -169,7 +168,7 @@ static PetscErrorCode TestBound(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Weights on the rows of one S: the answers of the same problems written out, whatever was solved before. */
+/* Weights on the rows of one S: the results of the same problems in explicit form, whatever was solved before. */
 static PetscErrorCode TestWeighted(void)
 {
   const PetscInt N = 60, n = 100, m = N + n;
@@ -205,7 +204,7 @@ static PetscErrorCode TestWeighted(void)
     for (PetscInt j = 0; j < n; j++)
       CHECK(fabs(x[j] - y[j]) <= 1e-9 * largest, "problem %d: x[%d] = %.12g for %.12g", (int)t, (int)j, y[j], x[j]);
     if (t == 0) PetscCall(PetscArraycpy(first, y, n));
-    for (PetscInt j = 0; j < n && t == 8; j++) CHECK_NEAR(y[j], first[j], 0); /* no history */
+    for (PetscInt j = 0; j < n && t == 8; j++) CHECK_NEAR(y[j], first[j], 0); /* no dependence on earlier problems */
   }
   PetscCall(HycoWeightedDestroy(&weighted));
   PetscCall(PetscFree4(S, d, h, first));

@@ -1,4 +1,4 @@
-/* S ~ W H, W, H >= 0: known factorisations, the first vector's optimum, the fall of the misfit, degenerate matrices. */
+/* S ~ W H, W, H >= 0: known factorisations, the optimum for one vector, decrease of the misfit, degenerate matrices. */
 #include "check.h"
 #include <hycoalgorithms.h>
 #include <math.h>
@@ -24,8 +24,7 @@ static void Multiply(PetscInt m, PetscInt n, PetscInt k, const PetscReal W[], co
   }
 }
 
-/* No entry negative, columns of unit length; the misfit returned is not below what the best H >= 0 for this W leaves.
- */
+/* No entry negative, columns of unit length; the returned misfit is at least that of the best H >= 0 for this W. */
 static PetscErrorCode CheckFactors(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k, const PetscReal W[],
                                    PetscReal misfit)
 {
@@ -53,7 +52,7 @@ static PetscErrorCode CheckFactors(PetscInt m, PetscInt n, const PetscReal S[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Separable factors (each column of W alone owns a row) are recovered: the columns themselves, whatever their order. */
+/* Separable factors (each column of W has a row of its own) are recovered: the columns themselves, in any order. */
 static PetscErrorCode TestRecovered(void)
 {
   const PetscInt m = 30, n = 40, k = 4;
@@ -65,7 +64,7 @@ static PetscErrorCode TestRecovered(void)
   PetscCall(PetscMalloc4(m * k, &T, k * n, &H, m * n, &S, m * k, &W));
   Fill(&state, m * k, 0, T);
   Fill(&state, k * n, 3, H);
-  for (PetscInt c = 0; c < k; c++) { /* blocks of seven rows of their own, two that all share */
+  for (PetscInt c = 0; c < k; c++) { /* blocks of seven rows for each column, two rows common to all */
     for (PetscInt i = 0; i < m - 2; i++) T[c * m + i] = i / 7 == c ? T[c * m + i] + 0.1 : 0;
   }
   Multiply(m, n, k, T, H, S);
@@ -88,8 +87,8 @@ static PetscErrorCode TestRecovered(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* k = 1: by Perron and Frobenius the first singular vector is nonnegative, so the misfit is that of the SVD. Then it
-   falls with k and with the iterations, never below the SVD's; twice the same call, twice the same bits. */
+/* k = 1: by Perron and Frobenius the first singular vector is nonnegative, so that the misfit is that of the SVD. It
+   decreases with k and with the iterations, never below the SVD's; repeated calls give the same bits. */
 static PetscErrorCode TestMisfits(void)
 {
   const PetscInt m = 25, n = 35, ks[4] = {1, 3, 6, 12}, its[3] = {1, 10, 200};
@@ -133,7 +132,7 @@ static PetscErrorCode TestMisfits(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Zero; one column; one row; rank 1 with more vectors asked than there are; a negative entry. */
+/* Zero; one column; one row; rank 1 with more vectors requested; a negative entry. */
 static PetscErrorCode TestDegenerate(void)
 {
   PetscReal S[12] = {0}, W[16], misfit, T[3] = {1, 0, 2}, H[4] = {1, 3, 0, 0.5};

@@ -2,7 +2,7 @@
 #include "check.h"
 #include <hycosolverimpl.h>
 
-/* nx x ny inner nodes of the unit square (ny 1: of the unit interval), held at the border, pulled down by `load`. */
+/* nx x ny inner nodes of the unit square (ny 1: of the unit interval), fixed at the border, pulled down by `load`. */
 typedef struct {
   PetscInt nx, ny, stride; /* node k has the number (stride k) mod n */
   PetscReal load;
@@ -121,7 +121,7 @@ static PetscErrorCode CaseDestroy(Case *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves; the iterations, and whether coarser problems gave the start. */
+/* Solves; returns the iterations, and whether the start came from coarser problems. */
 static PetscErrorCode Run(Case *c, PetscInt *its, PetscBool *coarse)
 {
   HycoReason reason;
@@ -178,8 +178,8 @@ static PetscReal Part(PetscReal x, PetscReal y)
 }
 
 /*
-  A string of tension 1 under the load 1 over a flat obstacle at depth d: it hangs as -(a x - x^2 / 2) up to x = a, a^2
-  = 2 d, and lies on the obstacle from there. Linear cells are exact at the nodes when a is one: a = 1/5 here.
+  A string of tension 1 under the load 1 over a flat obstacle at depth d: its shape is -(a x - x^2 / 2) up to x = a, a^2
+  = 2 d, and it lies on the obstacle from there. Linear cells are exact at the nodes if a is one: a = 1/5 here.
 */
 static PetscErrorCode TestString(PetscInt cells, PetscInt stride)
 {
@@ -206,7 +206,7 @@ static PetscErrorCode TestString(PetscInt cells, PetscInt stride)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Any obstacle: as without the start, in at most `most` iterations where that takes at least `cold`. */
+/* Any obstacle: the same result as without the start, in at most `most` iterations where that takes at least `cold`. */
 static PetscErrorCode TestSame(const Shape *s, PetscInt most, PetscInt cold)
 {
   Case c;
@@ -227,7 +227,7 @@ static PetscErrorCode TestSame(const Shape *s, PetscInt most, PetscInt cold)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Load steps: a small one goes on from the last set, a large one falls back on the coarser problems. */
+/* Load steps: a small one continues from the last set, a large one starts from the coarser problems. */
 static PetscErrorCode TestSteps(void)
 {
   const Shape s = {1999, 1, 1, 1, Flat, 0};
@@ -248,7 +248,7 @@ static PetscErrorCode TestSteps(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Positive couplings, as in elasticity: no start is made, and the solution is the active set's alone. */
+/* Positive couplings, as in elasticity: there is no such start, and the active set alone gives the solution. */
 static PetscErrorCode TestRefused(void)
 {
   const Shape s = {24, 24, 1, 8, Flat, 0.25};

@@ -1,19 +1,18 @@
-/* Options as the classes declare them: each is honoured, by its prefix and from its database; views.
- */
+/* Options as declared by the classes: each is effective, with its prefix and from its database; views. */
 #include "check.h"
 #include <hyco.h>
 #include <hycoromtype.h>
 #include <hycosolverimpl.h>
 #include <unistd.h>
 
-/* What can be refused when it is read: a folder, a group or a viewer is any word. */
+/* Whether an invalid value is refused when it is read: a folder, a group or a viewer may be any word. */
 static PetscBool Refuses(const HycoOption *o)
 {
   return (PetscBool)(strcmp(o->value, "<folder>") && strncmp(o->value, "<file", 5) && strcmp(o->value, "<viewer>") &&
                      strcmp(o->name, "hyco_rid_groups"));
 }
 
-/* A value that no option has ends with one line that names the option. */
+/* An invalid value of any option gives one line that names the option. */
 static PetscErrorCode TestHonoured(void)
 {
   const HycoOption *table;
@@ -60,7 +59,7 @@ static PetscErrorCode CreateLate(HycoROM model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A type that is registered after the options were asked for has its options too, and its name among the types'. */
+/* A type that is registered after the options were listed has its options too, and its name is in the list of types. */
 static PetscErrorCode TestLate(void)
 {
   const HycoOption *table, *types;
@@ -94,7 +93,7 @@ static PetscErrorCode TestPrefix(void)
   PetscCall(HycoSolverSetFromOptions(other));
   CHECK_NEAR(plain->rtol, 1e-5, 0);
   CHECK_NEAR(other->rtol, 1e-4, 0);
-  PetscCall(PetscOptionsCreate(&own)); /* a scene's: the prefix is looked for on the command line too */
+  PetscCall(PetscOptionsCreate(&own)); /* a scene's: the prefix is also searched on the command line */
   PetscCall(PetscOptionsSetValue(own, "-hyco_solver_rtol", "1e-6"));
   PetscCall(PetscOptionsSetValue(NULL, "-other_hyco_solver_rtol", "1e-3"));
   PetscCall(PetscObjectSetOptions((PetscObject)plain, own));

@@ -27,8 +27,8 @@ typedef struct {
     0.5, 0.5                                                                                                           \
   }
 
-/* Inner nodes: MacNeal, Harder, Finite Elem. Anal. Des. 1 (1985) 3-20, for hex8; otherwise off the centre. Facets are
-   written in no consistent orientation: the library turns them outward. */
+/* Inner nodes: MacNeal, Harder, Finite Elem. Anal. Des. 1 (1985) 3-20, for hex8; otherwise off the centre. Facets
+   are written without consistent orientation: the library orients them outward. */
 static Patch patches[HYCO_N_CELL_TYPES] = {
     {"line2", 1, 2, 1, 1, 15, 4, 3, 2, 2, {{0}, {1}, {0.2}, {0.75}}, {{0, 2}, {2, 3}, {3, 1}}, {{0}, {1}}, 1},
     {"tri3",
@@ -167,8 +167,8 @@ static Patch patches[HYCO_N_CELL_TYPES] = {
      1},
 };
 
-/* -- second order in space: the patches of first order with nodes at the middles of edges, of hex27 of faces and cells
-   too, in gmsh's order (gmsh 4.11 manual, "Node ordering") -- */
+/* -- second order in 3D: the first-order patches with nodes at the middles of edges, for hex27 also of faces and
+   cells, in gmsh's order (gmsh 4.11 manual, "Node ordering") -- */
 
 typedef struct {
   int n, corner[8];
@@ -197,7 +197,7 @@ static const PatchPart patch_hex27[] = {{2, {0, 1}},
 static const PatchPart patch_tri6[] = {{2, {0, 1}}, {2, {1, 2}}, {2, {2, 0}}};
 static const PatchPart patch_quad9[] = {{2, {0, 1}}, {2, {1, 2}}, {2, {2, 3}}, {2, {3, 0}}, {4, {0, 1, 2, 3}}};
 
-/* The node at the middle of these corners, whose places stand in p; new ones are the next. */
+/* The node at the middle of these corners, whose coordinates are in p; new nodes get the next numbers. */
 static inline int PatchMiddle(Patch *p, int first, const PatchPart *part, const int corner[])
 {
   double x[3] = {0, 0, 0};
@@ -205,7 +205,7 @@ static inline int PatchMiddle(Patch *p, int first, const PatchPart *part, const 
   for (int k = 0; k < part->n; k++) {
     for (int c = 0; c < 3; c++) x[c] += p->xyz[corner[part->corner[k]]][c] / part->n;
   }
-  for (int i = first; i < p->n_nodes; i++) { /* places tell nodes apart: the patches are distorted */
+  for (int i = first; i < p->n_nodes; i++) { /* coordinates identify nodes, because the patches are distorted */
     double off = 0;
 
     for (int c = 0; c < 3; c++) off += (p->xyz[i][c] - x[c]) * (p->xyz[i][c] - x[c]);
@@ -245,7 +245,7 @@ static inline void PatchRaise(const Patch *of, const char name[], int nv, int nf
   }
 }
 
-/* Fills in those of second order in space. */
+/* Creates the patches of second order in 3D. */
 static inline void PatchesComplete(void)
 {
   PatchRaise(&patches[HYCO_TET4], "tet10", 10, 6, 11, 9, patch_tet10, patch_tri6, &patches[HYCO_TET10]);

@@ -1,4 +1,5 @@
-/* POD (17)-(18): known singular values, orthonormality, the energy criterion, small and tall paths. On any ranks. */
+/* POD (17)-(18): known singular values, orthonormality, the energy criterion, the Gram and the tall path. On any
+   number of ranks. */
 #include "check.h"
 #include <hycoalgorithms.h>
 #include <math.h>
@@ -171,13 +172,13 @@ static PetscErrorCode TestGram(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* SLEPc's types: the modes that (18) takes are tsqr's; where the type finds them inaccurately, it gives fewer, and
-   these are right. S has singular values 1, 0.1, ..., 1e-12, in units where they are tiny. */
+/* SLEPc's types: the modes that (18) takes are those of tsqr; if the type finds them inaccurately, it returns fewer,
+   and these are right. S has singular values 1, 0.1, ..., 1e-12, in units where they are tiny. */
 static PetscErrorCode TestTypes(void)
 {
   const struct {
     const char *type;
-    PetscInt least; /* so many are accurate, at least */
+    PetscInt least; /* this many are accurate, at least */
   } types[] = {{SVDLAPACK, 11}, {SVDTRLANCZOS, 7}, {SVDCROSS, 6}, {SVDCYCLIC, 5}, {SVDRANDOMIZED, 7}};
   const PetscInt sizes[][2] = {{20, 40}, {600, 14}};
   PetscMPIInt ranks;
@@ -191,7 +192,7 @@ static PetscErrorCode TestTypes(void)
   for (size_t t = 0; t < sizeof(types) / sizeof(types[0]); t++) {
     SVD other;
 
-    /* on several ranks SLEPc 3.25 says that it converged to nothing, which HycoPOD() refuses */
+    /* on several ranks SLEPc 3.25 reports convergence without a triplet, which HycoPOD() refuses */
     if (ranks > 1 && SLEPC_VERSION_GE(3, 22, 0) && !strcmp(types[t].type, SVDRANDOMIZED)) continue;
     PetscCall(HycoPODCreateSVD(PETSC_COMM_WORLD, &other));
     PetscCall(SVDSetType(other, types[t].type));
@@ -229,8 +230,8 @@ static PetscErrorCode TakeColumns(Mat S, PetscInt first, PetscInt n, Mat *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Columns that come in blocks of one or several: the modes and singular values are those of all together, as far as
-   they are above what the merges lose, and never more than that are held. */
+/* Columns that arrive in blocks of one or several: the modes and singular values are those of all together, above
+   the loss of the merges, and never more than that are stored. */
 static PetscErrorCode TestMerged(void)
 {
   const PetscInt N = 900, n = 40, blocks[] = {1, 7, 15, 40};

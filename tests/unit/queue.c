@@ -1,10 +1,11 @@
-/* HycoQueue: each task once, no group idle while one is left, kinds kept together, a failure heard. A group a rank. */
+/* HycoQueue: each task once, no group idle while one is left, tasks of a kind in one group, failures reported. One
+   rank in each group. */
 #include "check.h"
 #include <hycoqueue.h>
 
 static PetscMPIInt rank, size;
 
-/* Takes all that is left; once[]: how often this rank took each. */
+/* Takes all remaining tasks; once[]: how often this rank took each. */
 static PetscErrorCode TakeAll(HycoQueue queue, PetscInt once[])
 {
   PetscInt k;
@@ -49,7 +50,7 @@ static PetscErrorCode EachOnce(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whatever one group's task takes, the others do all the rest: it is done with its first once nothing else is left. */
+/* However long one group's task takes, the others do all the rest: it ends its first one when nothing else is left. */
 static PetscErrorCode NoneIdle(void)
 {
   const PetscInt n = 40;
@@ -71,7 +72,7 @@ static PetscErrorCode NoneIdle(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One group takes a kind after the other, each in order; several begin with kinds of their own. */
+/* One group takes a kind after the other, each in order; several begin with different kinds. */
 static PetscErrorCode Kinds(void)
 {
   const PetscInt kind[9] = {5, 2, 5, 9, 2, 9, 5, 2, 9}, sorted[9] = {0, 2, 6, 1, 4, 7, 3, 5, 8};
@@ -95,7 +96,7 @@ static PetscErrorCode Kinds(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last group fails with its first task, while the others are in theirs. */
+/* The last group fails in its first task, while the others are in theirs. */
 static PetscErrorCode FailOne(HycoQueue queue)
 {
   PetscInt k;
@@ -113,7 +114,7 @@ static PetscErrorCode FailSynced(HycoQueue queue)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All end with the error of the group that failed, and nothing is taken any more. */
+/* All end with the error of the group that failed, and no further task is taken. */
 static PetscErrorCode Failure(void)
 {
   PetscInt k;

@@ -93,7 +93,7 @@ static PetscErrorCode TestFile(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The text that a model carries gives the same scene again; the fields of the scene are what was written. */
+/* The text stored in a model gives the same scene again; the fields of the scene have the written values. */
 static PetscErrorCode TestScene(HycoScene scene)
 {
   HycoScene again;
@@ -120,7 +120,7 @@ static PetscErrorCode TestScene(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* 3 x 2 points, given twice and one more between: each stays where it came first. */
+/* 3 x 2 points, repeated, with one more between: each is kept at its first place. */
 static PetscErrorCode TestTwins(HycoScene scene)
 {
   const PetscInt counts[2] = {3, 2};
@@ -150,8 +150,8 @@ static PetscErrorCode TestTwins(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Unseen points: in the reach of the set (cell centres of the ranges reach their ends), none of them in it, evenly
-   spread (each quarter of the box has its share), three together on one value of an expensive parameter; more points
+/* Unseen points: within the region of the set (cell centres of the ranges cover these), none of them in it, evenly
+   distributed (each quarter of the box has its share), three on each value of an expensive parameter; more points
    continue the sequence. */
 static PetscErrorCode TestUnseen(HycoScene scene)
 {

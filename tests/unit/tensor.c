@@ -1,5 +1,4 @@
-/* Polynomials on tensor grids: exact for what they must be exact for, converging as theory says, honest when a node is
-   left out. */
+/* Polynomials on tensor grids: exactness, convergence as in theory, and the leave-one-out error. */
 #include "check.h"
 #include <hycoalgorithms.h>
 #include <math.h>

@@ -1,6 +1,6 @@
 /*
-  The energies of full-order solutions, one line a point: test_energy SCENE V,V V,V ... [options]. One factorisation for
-  all points that share their stiffness, so that a whole ramp costs little more than one solve.
+  The energies of full-order solutions, one line for each point: test_energy SCENE V,V V,V ... [options]. Points with
+  the same stiffness share a factorisation, so that a ramp costs little more than one solve.
 */
 #include <hyco.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /*
-  Points of the laws that flow along paths with closed forms, one line a row: name, computed, exact, bound in per cent
-  (absolute where exact is 0). test_points cost prints instead what a point costs, in microseconds.
+  Points of the inelastic laws along paths with closed forms, one line for each row: name, computed, exact, bound in per
+  cent (absolute where exact is 0). test_points cost prints instead the cost of a point in microseconds.
 */
 #include <hyco.h>
 #include <math.h>
@@ -33,7 +33,7 @@ static PetscErrorCode Begin(const char type[], PetscInt dim, PetscInt n, const P
   PetscFunctionReturn(0);
 }
 
-/* A step of time dt to a strain, from the accepted state; accept: it becomes that. */
+/* A step of time dt to a strain, from the accepted state; accept: it becomes the accepted state. */
 static PetscErrorCode Step(Point *a, PetscReal dt, const PetscReal strain[], PetscBool accept, PetscReal stress[],
                            PetscReal tangent[])
 {
@@ -67,12 +67,13 @@ static PetscErrorCode Step(Point *a, PetscReal dt, const PetscReal strain[], Pet
   PetscFunctionReturn(0);
 }
 
-/* A step in which the strain along x is given (or, with held false, the stress), and in 3D no stress acts across. */
+/* A step with a given strain along x (or, with held false, stress), and in 3D no transverse stress. */
 static PetscErrorCode Uniaxial(Point *a, PetscReal dt, PetscBool held, PetscReal value)
 {
   PetscReal strain[6], stress[6], C[36];
 
-  const PetscReal elastic = (value - a->stress[0]) / a->constant[0]; /* from the yield surface, in or out */
+  const PetscReal elastic = (value - a->stress[0]) / a->constant[0]; /* distance from the yield surface, elastic or
+                                                                        not */
 
   PetscFunctionBegin;
   for (PetscInt c = 0; c < 6; c++) strain[c] = a->strain[c] + (held || c > 2 ? 0 : c ? -0.3 * elastic : elastic);
@@ -146,7 +147,7 @@ static PetscErrorCode Rows(const char name[], Path path, PetscInt first, PetscRe
   PetscFunctionReturn(0);
 }
 
-/* Norton, the strain held: s = s0 (1 + (n-1) E A s0^(n-1) t)^(-1/(n-1)); s0 = 100, t = 1000. */
+/* Norton, constant strain: s = s0 (1 + (n-1) E A s0^(n-1) t)^(-1/(n-1)); s0 = 100, t = 1000. */
 static const PetscReal norton[2] = {1e-14, 4}, steep[2] = {1e-30, 12};
 
 static PetscErrorCode Relaxation(PetscInt dim, PetscInt n, const PetscReal constant[2], PetscReal *value)
@@ -184,8 +185,8 @@ static PetscReal Relaxed(const PetscReal constant[2])
   return s0 * pow(1 + (n - 1) * 1e5 * constant[0] * pow(s0, n - 1) * 1000, -1 / (n - 1));
 }
 
-/* Strain hardening, n = 1, m = 1/2: p dp/dt = (A s)^2 / 2. Held at s0 until p0 = A s0 sqrt(100), then relaxing with
-   s = s0 - E (p - p0):  (p0 + s0/E) (1/s - 1/s0) - ln(s0/s) / E = E A^2 t / 2. */
+/* Strain hardening, n = 1, m = 1/2: p dp/dt = (A s)^2 / 2. At the stress s0 until p0 = A s0 sqrt(100), then relaxing
+   with s = s0 - E (p - p0): (p0 + s0/E) (1/s - 1/s0) - ln(s0/s) / E = E A^2 t / 2. */
 static PetscErrorCode RelaxationHardening(PetscInt dim, PetscInt n, PetscReal *value)
 {
   const PetscReal constant[3] = {2e-7, 1, 0.5};
@@ -210,7 +211,7 @@ static PetscReal RelaxedHardening(void)
   return 1 / x;
 }
 
-/* Limback-Andersson, the strain held: ds/dt = -E a sinh(b s)^2, coth(b s) - coth(b s0) = E a b t. */
+/* Limback-Andersson, constant strain: ds/dt = -E a sinh(b s)^2, coth(b s) - coth(b s0) = E a b t. */
 static PetscErrorCode RelaxationSinh(PetscInt dim, PetscInt n, PetscReal *value)
 {
   const PetscReal constant[4] = {1.08e9, 650, 201000, -1};
@@ -233,7 +234,7 @@ static PetscReal RelaxedSinh(void)
   return atanh(1 / (1 / tanh(b * 200) + 1e5 * rate * b * 1000)) / b;
 }
 
-/* Maxwell with n = 1 under a strain that grows evenly: s = eps' / A (1 - exp(-E A t)). */
+/* Maxwell with n = 1 at a constant strain rate: s = eps' / A (1 - exp(-E A t)). */
 static PetscErrorCode Pulled(PetscInt dim, PetscInt n, PetscReal *value)
 {
   const PetscReal constant[4] = {2e-8, 1, -1, 0};
@@ -283,8 +284,8 @@ static PetscErrorCode Creep(void)
   PetscFunctionReturn(0);
 }
 
-/* J2 pulled, and pulled, pushed and pulled again: isotropic hardening by the accumulated plastic strain, exact at any
-   step. Of Voce's hardening the strain at a given stress is known: p = -ln(1 - (s - Y)/S)/r. */
+/* J2 in tension, and in tension, compression and tension again: isotropic hardening by the accumulated plastic
+   strain, exact at any step. With Voce's hardening the strain at a given stress is known: p = -ln(1 - (s - Y)/S)/r. */
 static PetscErrorCode Plastic(void)
 {
   const PetscReal linear[4] = {250, 2000, 0, 0}, perfect[4] = {250, 0, 0, 0}, voce[4] = {250, 0, 100, 50};
@@ -321,7 +322,7 @@ static PetscErrorCode Plastic(void)
     p = -log(1 - 0.8) / 50;
     snprintf(line, sizeof(line), "J2, Voce, %dD: strain at 330", (int)dim);
     Row(line, a.strain[0], 330 / E + p, 1e-6);
-    for (PetscInt k = 0; k <= 34; k++) /* to -340, with p as far as if it had been pulled to 340 */
+    for (PetscInt k = 0; k <= 34; k++) /* to -340, with p as in tension up to 340 */
       PetscCall(Uniaxial(&a, 1, PETSC_FALSE, -10 * (PetscReal)k));
     snprintf(line, sizeof(line), "J2, Voce, %dD: strain at -340 after it", (int)dim);
     Row(line, a.strain[0], -340 / E + p - (-log(1 - 0.9) / 50 - p), 1e-6);
@@ -330,8 +331,8 @@ static PetscErrorCode Plastic(void)
   PetscFunctionReturn(0);
 }
 
-/* Norton with a yield stress: held above it, it relaxes from the yield stress as Norton alone; pulled at a constant
-   rate, perfect plasticity takes what creep at the yield stress does not. */
+/* Norton with a yield stress: at a constant strain beyond yield, it relaxes from the yield stress like Norton alone;
+   at a constant strain rate, perfect plasticity takes the part that creep at the yield stress does not. */
 static PetscErrorCode Both(void)
 {
   const PetscReal constant[4] = {1e-14, 4, 200, 0};
@@ -360,7 +361,8 @@ static double Seconds(void)
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Microseconds a point, stress, state and tangent, in 3D, 1000 points at a time; most flow, by less than 1e-2. */
+/* Microseconds per point for stress, state and tangent in 3D, 1000 points at a time; most deform inelastically, by
+   less than 1e-2. */
 static PetscErrorCode Cost(const char type[], const char name[], PetscInt n_constants, const PetscReal own[])
 {
   enum { N = 1000 };

@@ -35,8 +35,8 @@ static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define N_NOTES 3 /* of a cell: its volume, 0 if its weight is fixed to 1; its body; whether its weight is fixed to 1  \
-                   */
+/* Data of a cell: its volume, 0 if its weight is fixed to 1; its body; whether its weight is fixed to 1. */
+#define N_NOTES 3
 
 /* By cell of the part. */
 static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal value[])

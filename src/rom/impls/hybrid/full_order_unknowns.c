@@ -311,20 +311,20 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
 static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
 {
   const PetscInt room = m->pairs.n, starts = (PetscReal)t->n_s * (PetscReal)m->l < 1e4 ? 5 : 1;
-  PetscInt n = 0, other = 0, *dof, *rival;
+  PetscInt n = 0, other = 0, *dof, *trial;
   Verdict verdict;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(room, &dof, room, &rival));
+  PetscCall(PetscMalloc2(room, &dof, room, &trial));
   for (PetscInt start = 0; start < starts; start++) {
-    PetscCall(SearchFrom(t, m, start, &other, rival, &verdict));
+    PetscCall(SearchFrom(t, m, start, &other, trial, &verdict));
     if (start && !Better(&verdict, best)) continue;
     *best = verdict;
     n = other;
-    PetscCall(PetscArraycpy(dof, rival, n));
+    PetscCall(PetscArraycpy(dof, trial, n));
   }
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, n, dof));
-  PetscCall(PetscFree2(dof, rival));
+  PetscCall(PetscFree2(dof, trial));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -12,13 +12,14 @@
 #include <hycoromtypes.h>
 #include <petscviewer.h>
 
-/* Of B V, relative to its largest terms: that of the snapshots over a mode's singular value, which -hyco_pod_tol keeps
-   above 1e-7 of the first. */
+/* Round-off of B V, relative to its largest terms: that of the snapshots over a mode's singular value, which
+   -hyco_pod_tol keeps above 1e-7 of the first. */
 #define ROUNDOFF 1e-8
 
 const char *const HycoDuals[] = {"fe", "nnmf", "snapshots", NULL};
 
-/* Entries of V_lambda^T B V that are round-off: where modes do not move the gaps, they would give forces at random. */
+/* Sets entries of V_lambda^T B V that are round-off to 0: where modes do not change the gaps, they would give random
+   forces. */
 static void DropRoundoff(HycoROM m, const PetscReal largest[], PetscScalar b[])
 {
   const HycoProjectionROM p = (HycoProjectionROM)m->data;
@@ -40,7 +41,8 @@ static PetscErrorCode FillContact(HycoROM m)
   HycoGalerkin g = (HycoGalerkin)m->data;
   const PetscInt l = m->l, n = p->l_lambda;
   const HycoRows *rows = &g->own_rows;
-  PetscReal *BV, *size, *largest; /* of a contact: B V, the sums of absolute terms in it, and their largest of all */
+  PetscReal *BV, *size, *largest; /* for each contact: B V, the sums of absolute terms in it, and the largest of
+                                     these sums */
   PetscScalar *b, *bt;
 
   PetscFunctionBegin;
@@ -76,7 +78,7 @@ static PetscErrorCode FillContact(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where no mode moves a row's gap, it is open: no force can satisfy or violate it. */
+/* If no mode changes the gap of a row, the gap is set open: no force can satisfy or violate it. */
 static PetscErrorCode OpenUnmoved(HycoROM m, PetscScalar d[])
 {
   HycoGalerkin g = (HycoGalerkin)m->data;

@@ -25,7 +25,7 @@ class Ring(FlowingRing):
         return self.hyco('predict', '-model', self.path(model), '-mu', POINT, *args)
 
 
-class Rivals(Ring):
+class Baselines(Ring):
     def test_all_cells(self):
         """Every cell once, to round-off: the hybrid model on the whole mesh; with force vectors the projection-based one."""
         for dual, other in (('fe', ['-hyco_rid_whole', '-hyco_hybrid', 'contact']), ('nnmf', ['-hyco_model_type', 'projection'])):

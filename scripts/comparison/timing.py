@@ -1,4 +1,4 @@
-"""Commands with their time and memory; timed.folder is where their output goes."""
+"""Commands with their time and memory; timed.folder contains their output."""
 import os
 import signal
 import subprocess
@@ -7,7 +7,7 @@ import time
 
 
 def stop(process, late, done):
-    """mpiexec takes its ranks along only if it is asked to end; whoever does not is killed."""
+    """mpiexec ends its ranks only if it is asked to end; remaining processes are killed."""
     late.set()
     os.killpg(process.pid, signal.SIGTERM)
     if not done.wait(10):
@@ -15,7 +15,7 @@ def stop(process, late, done):
 
 
 def timed(command, timeout, folder=None):
-    """Wall and CPU seconds (with the processes that it waited for), peak MB of the largest one, None or what went wrong."""
+    """Wall and CPU seconds (with child processes), peak MB of the largest one, None or the error."""
     begin = time.monotonic()
     with open(os.path.join(timed.folder, "log"), "wb") as log:
         with subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, start_new_session=True) as process:

@@ -1,14 +1,14 @@
-"""CalculiX on the arrays of a problem: its input file, and what its output says of the contact. Hexahedra C3D8 (full
-integration), nodal forces, and a gap element GAPUNI between the two nodes of a pair with the given normal and gap."""
+"""CalculiX on the arrays of a problem: its input file, and the contact in its output. Hexahedra C3D8 (full integration),
+nodal forces, and a gap element GAPUNI between the two nodes of a pair with the given normal and gap."""
 import numpy as np
 
-STIFFNESS = 1e7  # N/mm of a closed gap: stiff beside the bodies; more would drown the overlap in the digits that are printed
-YIELD = 1e12  # never reached: CalculiX iterates on gap elements only where something else is nonlinear (or the geometry)
+STIFFNESS = 1e7  # N/mm of a closed gap: stiff compared with the bodies; with more the overlap would be below the digits that are printed
+YIELD = 1e12  # never reached: CalculiX iterates on gap elements only if another part is nonlinear (or the geometry)
 
 
 def write(path, p, creep=None):
-    """The input file path.inp for ccx -i path. CalculiX reads no more than 20 characters of a number: 12 digits fit.
-    creep: rate and exponent of the cladding's Norton law, and the end of time, in steps; else all is elastic."""
+    """Writes the input file path.inp for ccx -i path. CalculiX reads at most 20 characters of a number: 12 digits fit.
+    creep: rate and exponent of the cladding's Norton law, and the end of time, in steps; else everything is elastic."""
     with open(path + ".inp", "w", encoding="ascii") as file:
         file.write("*NODE, NSET=ALL\n")
         for i, x in enumerate(p["xyz"]):
@@ -56,7 +56,7 @@ def displacements(path, n):
 
 
 def contact(p, u):
-    """Total contact force and active pairs from the overlap of the pairs, which the stiffness turns into force."""
+    """Total contact force and active pairs from the overlap of the pairs times the stiffness."""
     overlap = np.einsum("ix,ix->i", p["normal"], u[p["slave"]] - u[p["master"]]) - p["gap"]
     force = STIFFNESS * np.maximum(overlap, 0)
     return float(force.sum()), int((force > 1e-6 * force.max()).sum())

@@ -12,7 +12,7 @@ FROM_GMSH = [0, 1, 3, 2, 4, 5, 7, 6]
 
 
 def space(xyz, hexes):
-    """First-order displacements, and node_of_dof for their components: GetFEM numbers as it likes."""
+    """First-order displacements, and node_of_dof for their components, because GetFEM chooses its own numbering."""
     mesh = gf.Mesh("empty", 3)
     mesh.add_convex(gf.GeoTrans("GT_QK(3,1)"), xyz[hexes[:, FROM_GMSH]].transpose(2, 1, 0))
     field = gf.MeshFem(mesh, 3)
@@ -72,7 +72,7 @@ def main():
     matrix = contact_matrix(p, first, n)
     begin, cpu = time.monotonic(), time.process_time()
     model = build(p, mesh, field, force, fixed, matrix)
-    # full Newton steps: the default damping takes twice as many
+    # full Newton steps: the default damping needs twice as many
     answer = model.solve("lsolver", "mumps", "max_iter", 60, "max_res", 1e-8, "lsearch", "simplest", "alpha max ratio", 1e10,
                          "alpha min", 1.0, "alpha mult", 0.6)
     contact = -model.variable("pressure")

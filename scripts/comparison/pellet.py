@@ -1,6 +1,6 @@
-"""The discrete problem of examples/pellet as arrays, for solvers other than hyco: the moved mesh, fixed components,
-consistent nodal forces, pairs of nodes with their normal and gap. Written apart from hyco's own code, so that agreement
-means something."""
+"""The discrete problem of examples/pellet as arrays, for other solvers: the moved mesh, fixed components, consistent
+nodal forces, pairs of nodes with their normal and gap. It does not use hyco's code, so that the comparison is
+independent."""
 import subprocess
 
 import numpy as np
@@ -13,7 +13,7 @@ QUAD, HEX = 3, 5  # gmsh's numbers of the cell types
 
 
 def read_mesh(path, copy):
-    """Nodes (n x 3) and {group: cells, nodes from 0}; copy: where gmsh writes the mesh as text of version 2.2."""
+    """Nodes (n x 3) and {group: cells, nodes from 0}; copy: path of the mesh that gmsh writes as text of version 2.2."""
     subprocess.run(["gmsh", path, "-save", "-format", "msh22", "-o", copy, "-v", "1"], check=True, stdout=subprocess.DEVNULL)
     with open(copy, encoding="ascii") as file:
         lines = file.read().splitlines()
@@ -59,7 +59,7 @@ def pairs(xyz, slave, master):
 
 
 def problem(mesh, radius, load, copy, pressures=None):
-    """Everything as a dictionary of arrays; of the cells the pellet's come first."""
+    """Everything as a dictionary of arrays; the pellet's cells come first."""
     drawn, groups = read_mesh(mesh, copy)
     slave, master = pairs(drawn, groups["contact_pellet"], groups["contact_clad"])
     xyz = drawn.copy()
