@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define PIECES      16 /* of a rank: points that cost more than others leave no rank idle for long */
-#define LEAST_PIECE 64 /* points */
+#define PIECES      16 /* number of pieces of a set for each rank: expensive points delay the end by at most one piece */
+#define LEAST_PIECE 64 /* number of points in a piece, unless a rank has fewer */
 
 static void Estimate(cJSON *json, const char name[], PetscReal estimate)
 {
@@ -336,7 +336,7 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   DriverCarriedFill(&s->carried, n_carried, carried, v + s->with_extremes);
 }
 
-/* What a point of a piece writes its row from. */
+/* Data for the rows of a piece. */
 typedef struct {
   const Fallback *fallback;
   const Shape *shape;
@@ -359,12 +359,12 @@ static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
   PetscCall(HycoROMGetContacts(model, &n, &carried));
   FillRow(&p, n, carried, t->shape, v);
   DriverWantsFullOrder(t->fallback, &p, why);
-  v[FULL_ORDER] = why[0] != '\0'; /* until SolveRest(): is to be */
+  v[FULL_ORDER] = why[0] != '\0'; /* required; SolveRest() solves it */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points of a piece. Points of one stiffness, which follow each other in grids, share its factor within a piece; a path
-   is worth a piece of its own. */
+/* Number of points in a piece. In grids, consecutive points have one stiffness and share its factor within a piece; a
+   path can be a piece of its own. */
 static PetscInt PieceSize(PetscInt n, PetscInt size, PetscBool paths)
 {
   const PetscInt share = (n + size - 1) / size, least = paths ? 1 : LEAST_PIECE;
