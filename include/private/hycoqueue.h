@@ -28,6 +28,9 @@ PetscErrorCode HycoQueueGetGroup(HycoQueue queue, MPI_Comm *group);
 PetscErrorCode HycoQueueTake(HycoQueue queue, PetscInt *task);
 /* Number of tasks that all groups have done. Not collective, one rank of a group at a time. */
 PetscErrorCode HycoQueueDone(HycoQueue queue, PetscInt *n);
+/* Lets other groups take tasks: to be called within a long task, where the network has no atomic operations of its own.
+   Not collective. */
+PetscErrorCode HycoQueueServe(HycoQueue queue);
 /* Fails if another group has failed: call it within a long task, which then ends with this error. Collective on the
    group. */
 PetscErrorCode HycoQueueHear(HycoQueue queue);

@@ -226,6 +226,8 @@ PetscErrorCode CommandCompare(void)
   HycoROM model = NULL;
   HycoSamples samples;
   Points p = {0};
+  DriverPiece all;
+  DriverRows rows;
   PetscBool given, contact;
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
@@ -247,7 +249,8 @@ PetscErrorCode CommandCompare(void)
   p.scene = scene;
   p.model = model;
   PetscCall(CompareAll(&p));
-  if (table[0] && !p.paths) PetscCall(DriverWriteTable(table, scene, p.n, p.mu, N_COLUMNS, columns, p.value));
+  rows = DriverRowsOfRoot(p.n, N_COLUMNS, p.value, &all);
+  if (table[0] && !p.paths) PetscCall(DriverWriteTable(table, scene, p.mu, columns, &rows));
   PetscCall(p.paths ? DriverReportPaths(scene, contact, p.n, p.mu, p.value, table)
                     : Report(scene, contact, p.n, p.value));
   PetscCall(PetscFree(p.value));

@@ -1,8 +1,12 @@
 /* hyco predict: the reduced model at one point, or over a set. */
 #include "driver.h"
+#include <hycoqueue.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+
+#define PIECES      16 /* number of pieces of a set for each rank: expensive points delay the end by at most one piece */
+#define LEAST_PIECE 64 /* number of points in a piece, unless a rank has fewer */
 
 static void Estimate(cJSON *json, const char name[], PetscReal estimate)
 {
@@ -332,86 +336,158 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   DriverCarriedFill(&s->carried, n_carried, carried, v + s->with_extremes);
 }
 
-/* For this rank's points: rows of values; which are to be solved full order. */
+/* Data for the rows of a piece. */
 typedef struct {
   const Fallback *fallback;
   const Shape *shape;
-  PetscReal *value;
-  PetscInt *full;
-} Rows;
+  HycoQueue queue;
+  PetscReal *value; /* of the piece */
+} Taken;
 
 static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
 {
-  const Rows *rows = (const Rows *)ctx;
+  const Taken *t = (const Taken *)ctx;
+  PetscReal *v = t->value + (size_t)k * (size_t)t->shape->width;
   const HycoContactResult *carried;
   HycoPrediction p;
   PetscInt n;
   char why[DRIVER_LINE];
 
   PetscFunctionBegin;
+  PetscCall(HycoQueueServe(t->queue));
   PetscCall(HycoROMGetPrediction(model, &p));
   PetscCall(HycoROMGetContacts(model, &n, &carried));
-  FillRow(&p, n, carried, rows->shape, rows->value + k * rows->shape->width);
-  DriverWantsFullOrder(rows->fallback, &p, why);
-  rows->full[k] = why[0] != '\0';
+  FillRow(&p, n, carried, t->shape, v);
+  DriverWantsFullOrder(t->fallback, &p, why);
+  v[FULL_ORDER] = why[0] != '\0'; /* required; SolveRest() solves it */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's points. full[k]: point k is to be solved full order. */
-static PetscErrorCode PredictMine(HycoROM model, const Fallback *fallback, PetscInt n, PetscInt n_par,
-                                  const PetscReal mu[], const Shape *s, PetscReal value[], PetscInt full[])
+/* Number of points in a piece. In grids, consecutive points have one stiffness and share its factor within a piece; a
+   path can be a piece of its own. */
+static PetscInt PieceSize(PetscInt n, PetscInt size, PetscBool paths)
 {
-  PetscMPIInt rank, size;
-  PetscInt first, count;
-  Rows rows = {fallback, s, NULL, NULL};
+  const PetscInt share = (n + size - 1) / size, least = paths ? 1 : LEAST_PIECE;
+
+  return size == 1 ? PetscMax(1, n) : PetscMax((share + PIECES - 1) / PIECES, PetscMin(least, share));
+}
+
+/* Predicts the pieces that this rank takes from the queue. */
+static PetscErrorCode PredictQueued(HycoROM model, PetscInt each, PetscInt n_par, const PetscReal mu[], Taken *t,
+                                    DriverRows *rows)
+{
+  PetscInt piece;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  first = (PetscInt)rank * n / size;
-  count = ((PetscInt)rank + 1) * n / size - first;
-  rows.value = value + first * s->width;
-  rows.full = full + first;
-  PetscCall(HycoROMSetPointMonitor(model, TakePoint, &rows));
-  PetscCall(HycoROMSolveMany(model, count, n_par, mu + first * n_par, NULL, NULL, NULL));
+  PetscCall(HycoROMSolveMany(model, 0, n_par, mu, NULL, NULL, NULL)); /* sets up, also if no piece is left */
+  PetscCall(HycoROMSetPointMonitor(model, TakePoint, t));
+  for (;;) {
+    PetscInt first, n;
+
+    PetscCall(HycoQueueTake(t->queue, &piece));
+    if (piece < 0) break;
+    first = piece * each;
+    n = PetscMin(each, rows->n - first);
+    PetscCall(DriverRowsAdd(rows, first, n, &t->value));
+    PetscCall(HycoROMSolveMany(model, n, n_par, mu + first * n_par, NULL, NULL, NULL));
+  }
   PetscCall(HycoROMSetPointMonitor(model, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves by all ranks together the points where the reduced model was not sufficient. */
-static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n, PetscInt n_par, const PetscReal mu[],
-                                const PetscInt full[], const Shape *s, PetscReal value[])
+/* Predicts all points; each rank keeps the rows of those that it took. */
+static PetscErrorCode PredictAll(HycoROM model, const Fallback *fallback, PetscInt n_par, const PetscReal mu[],
+                                 const Shape *s, DriverRows *rows)
 {
-  const PetscInt width = s->width;
-  const HycoContactResult *carried;
-  PetscInt count = 0, n_carried;
+  Taken taken = {.fallback = fallback, .shape = s};
+  PetscMPIInt size;
+  PetscInt each;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < n; k++) {
-    HycoPrediction p = {0};
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  each = PieceSize(rows->n, size, (PetscBool)(s->own > PATH_FORCE));
+  PetscCall(HycoQueueCreate(PETSC_COMM_WORLD, size, (rows->n + each - 1) / each, NULL, &taken.queue));
+  HycoOnEach(PETSC_COMM_WORLD, HycoQueueEnd(taken.queue, PredictQueued(model, each, n_par, mu, &taken, rows)));
+  PetscCall(HycoQueueDestroy(&taken.queue));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    if (!full[k]) continue;
-    PetscCall(DriverSolveFullOrder(fallback, n_par, mu + k * n_par, &p));
-    p.estimated_error_u = value[k * width + ESTIMATE_U]; /* the model's estimate, which required full order */
-    p.estimated_error_sigma = value[k * width + ESTIMATE_SIGMA];
-    p.estimated_error_lambda = value[k * width + ESTIMATE_LAMBDA];
-    p.beyond = value[k * width + BEYOND];
-    PetscCall(HycoFOMGetContacts(fallback->fom, &n_carried, &carried));
-    FillRow(&p, n_carried, carried, s, value + k * width);
-    value[k * width + U_NORM] = NAN; /* that of the whole mesh, not of an RID */
-    value[k * width + FULL_ORDER] = 1;
-    count++;
+/* The points of all ranks that are to be solved at full order, ascending. The caller frees them. */
+static PetscErrorCode ListRest(const DriverRows *rows, PetscInt *n, PetscInt **list)
+{
+  const MPI_Comm comm = PETSC_COMM_WORLD;
+  PetscMPIInt rank, length;
+  PetscInt count = 0, room = 0, *mine;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < rows->n_pieces; p++) room += rows->piece[p].n;
+  PetscCall(PetscMalloc1(room, &mine));
+  for (PetscInt p = 0; p < rows->n_pieces; p++) {
+    const DriverPiece *piece = &rows->piece[p];
+
+    for (PetscInt k = 0; k < piece->n; k++) {
+      if (piece->value[(size_t)k * (size_t)rows->width + FULL_ORDER] > 0) mine[count++] = piece->first + k;
+    }
   }
-  if (fallback->on) PetscCall(Say("%d of the %d points were solved at full order\n", (int)count, (int)n));
+  PetscCall(HycoConcatenate(comm, count, mine, MPIU_INT, sizeof(PetscInt), n, list));
+  PetscCall(PetscFree(mine));
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Bcast(n, 1, MPIU_INT, 0, comm));
+  if (rank) PetscCall(PetscMalloc1(*n, list));
+  PetscCall(PetscMPIIntCast(*n, &length));
+  PetscCallMPI(MPI_Bcast(*list, length, MPIU_INT, 0, comm));
+  PetscCall(PetscSortInt(*n, *list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The row of point k; NULL: it is on another rank. */
+static PetscReal *FindRow(const DriverRows *rows, PetscInt k)
+{
+  for (PetscInt p = 0; p < rows->n_pieces; p++) {
+    const DriverPiece *piece = &rows->piece[p];
+
+    if (k >= piece->first && k < piece->first + piece->n)
+      return piece->value + (size_t)(k - piece->first) * (size_t)rows->width;
+  }
+  return NULL;
+}
+
+/* Solves by all ranks together the points where the reduced model was not sufficient. */
+static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscReal mu[], const Shape *s,
+                                const DriverRows *rows)
+{
+  const HycoContactResult *carried;
+  PetscInt n, n_carried, *list;
+
+  PetscFunctionBegin;
+  if (!fallback->on) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ListRest(rows, &n, &list));
+  for (PetscInt i = 0; i < n; i++) {
+    HycoPrediction p = {0};
+    PetscReal *v = FindRow(rows, list[i]);
+
+    PetscCall(DriverSolveFullOrder(fallback, n_par, mu + list[i] * n_par, &p));
+    PetscCall(HycoFOMGetContacts(fallback->fom, &n_carried, &carried));
+    if (!v) continue;
+    p.estimated_error_u = v[ESTIMATE_U]; /* the model's estimate, which required full order */
+    p.estimated_error_sigma = v[ESTIMATE_SIGMA];
+    p.estimated_error_lambda = v[ESTIMATE_LAMBDA];
+    p.beyond = v[BEYOND];
+    FillRow(&p, n_carried, carried, s, v);
+    v[U_NORM] = NAN; /* that of the whole mesh, not of an RID */
+  }
+  PetscCall(Say("%d of the %d points were solved at full order\n", (int)n, (int)rows->n));
+  PetscCall(PetscFree(list));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples, const char output[])
 {
-  PetscInt n, n_par, *full;
+  PetscInt n, n_par;
   Shape s;
+  DriverRows rows = {0};
   const PetscReal *mu;
-  PetscReal *value, begin;
+  PetscReal begin;
   char table[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
@@ -419,17 +495,16 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(DriverCheckLeftEarly()); /* solver options are read by the first prediction */
   PetscCall(ShapeOf(model, scene, &s));
-  PetscCall(PetscCalloc2(n * s.width, &value, n, &full));
+  rows.n = n;
+  rows.width = s.width;
   begin = HycoNow();
-  HycoOnEach(PETSC_COMM_WORLD, PredictMine(model, fallback, n, n_par, mu, &s, value, full));
-  HycoAllreduce(value, n * s.width, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
-  HycoAllreduce(full, n, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD);
-  PetscCall(SolveRest(fallback, n, n_par, mu, full, &s, value));
+  PetscCall(PredictAll(model, fallback, n_par, mu, &s, &rows));
+  PetscCall(SolveRest(fallback, n_par, mu, &s, &rows));
   begin = HycoNow() - begin;
   if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoROMWriteMany(model, n, n_par, mu, output));
-  PetscCall(ReportSet("predict", table, scene, samples, s.width, s.names, value, begin));
+  PetscCall(ReportSet("predict", table, scene, samples, s.names, &rows, begin));
   PetscCall(DestroyShape(&s));
-  PetscCall(PetscFree2(value, full));
+  PetscCall(DriverRowsFree(&rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -208,6 +208,8 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
   PetscInt n, n_par;
   const PetscReal *mu;
   Table t = {0};
+  DriverPiece all;
+  DriverRows rows;
   PetscReal begin;
 
   PetscFunctionBegin;
@@ -227,7 +229,8 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     PetscCall(DriverSetPhase(k + 1, n));
   }
   if (output[0]) PetscCall(HycoFOMWriteEnd(fom));
-  PetscCall(ReportSet("solve", table, scene, samples, t.width, t.names, t.value, HycoNow() - begin));
+  rows = DriverRowsOfRoot(n, t.width, t.value, &all);
+  PetscCall(ReportSet("solve", table, scene, samples, t.names, &rows, HycoNow() - begin));
   PetscCall(DestroyTable(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -53,17 +53,19 @@ static PetscErrorCode NameColumns(char names[][64], const char *columns[])
 }
 
 PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal mu[],
-                                 const PetscReal value[], const char table[])
+                                 PetscReal value[], const char table[])
 {
   char names[N_COLUMNS][64];
   const char *columns[N_COLUMNS];
+  DriverPiece all;
+  const DriverRows rows = DriverRowsOfRoot(n, N_COLUMNS, value, &all);
   PetscReal seconds[2] = {0, 0}, kkt = 0;
   PetscInt failed = 0, undefined = 0;
   cJSON *json;
 
   PetscFunctionBegin;
   PetscCall(NameColumns(names, columns));
-  if (table[0]) PetscCall(DriverWriteTable(table, scene, n, mu, N_COLUMNS, columns, value));
+  if (table[0]) PetscCall(DriverWriteTable(table, scene, mu, columns, &rows));
   PetscCall(ReportCreate("compare", scene, NULL, &json));
   cJSON_AddNumberToObject(json, "n_points", n);
   PetscCall(Say("%d path%s, each at its worst listed time and at its end\n", (int)n, n == 1 ? "" : "s"));

@@ -124,17 +124,37 @@ void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns,
                  PetscInt column, PetscInt converged, PetscInt *all_undefined);
 /* Adds memory_mb and the missed targets, writes to -report (if given) on rank 0 and frees. */
 PetscErrorCode ReportWrite(cJSON **json);
-/* The report of a set of points, n rows of values by column (one named "converged"), and their table at `table` ("":
-   none); fails if a point did not converge. */
-PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
-                         PetscInt n_columns, const char *const columns[], const PetscReal value[], PetscReal seconds);
 /* Writes text to a file, completely or not at all, or to a device. On this process alone. */
 PetscErrorCode DriverWriteText(const char path[], const char text[]);
 
-/* Writes a CSV: the parameters of each point, then its columns (n x n_columns row major); for a path that ends in
-   .h5 one dataset for each. Collective. */
-PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, const PetscReal mu[],
-                                PetscInt n_columns, const char *const names[], const PetscReal value[]);
+/* -- table.c: rows of results, one for each point -- */
+
+/* Rows first .. first + n - 1, n x width row major. */
+typedef struct {
+  PetscInt first, n;
+  PetscReal *value;
+} DriverPiece;
+/* The rows of a table that this rank has, in ascending pieces; every row is on one rank. */
+typedef struct {
+  PetscInt n, width; /* rows on all ranks; columns */
+  PetscInt n_pieces;
+  DriverPiece *piece;
+} DriverRows;
+
+/* Adds a piece after the others; value: its n x width zeros, which the rows own. */
+PetscErrorCode DriverRowsAdd(DriverRows *rows, PetscInt first, PetscInt n, PetscReal **value);
+/* Frees the pieces that DriverRowsAdd() made. */
+PetscErrorCode DriverRowsFree(DriverRows *rows);
+/* All n rows as those of rank 0, whatever the other ranks have; value and piece are borrowed. */
+DriverRows DriverRowsOfRoot(PetscInt n, PetscInt width, PetscReal value[], DriverPiece *piece);
+/* Writes a CSV: the parameters of each point (mu: of all points), then its columns; for a path that ends in .h5 one
+   dataset for each, to which each rank writes its rows. Collective. */
+PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, const PetscReal mu[], const char *const names[],
+                                const DriverRows *rows);
+/* The report of a set of points from the rows of their values (one column is named "converged"), and their table at
+   `table` ("": none); fails if a point did not converge. Collective. */
+PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
+                         const char *const columns[], const DriverRows *rows, PetscReal seconds);
 
 /* The folder of train's solutions for a model of this name. */
 PetscErrorCode DriverSnapshotFolder(const char model[], char folder[PETSC_MAX_PATH_LEN]);
@@ -315,7 +335,7 @@ PetscInt DriverPathColumns(void);
 PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
                                  PetscReal v[]);
 PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal mu[],
-                                 const PetscReal value[], const char table[]);
+                                 PetscReal value[], const char table[]);
 
 PetscErrorCode CommandCheck(void);
 PetscErrorCode CommandSolve(void);

@@ -1,7 +1,6 @@
 /* The JSON report. */
 #include "driver.h"
 #include <hycofile.h>
-#include <hycoh5.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/resource.h>
@@ -109,78 +108,6 @@ PetscErrorCode DriverWriteText(const char path[], const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The table as CSV. */
-static PetscErrorCode WriteRows(const char path[], PetscInt n_par, const char *const par[], PetscInt n,
-                                const PetscReal mu[], PetscInt n_columns, const char *const names[],
-                                const PetscReal value[])
-{
-  char *text;
-  size_t at = 0, room;
-
-  PetscFunctionBegin;
-  room = (size_t)(n + 1) * (size_t)(n_par + n_columns) * 64 + 64;
-  PetscCall(PetscMalloc1(room, &text));
-  for (PetscInt p = 0; p < n_par; p++) at += (size_t)snprintf(text + at, room - at, "%s,", par[p]);
-  for (PetscInt c = 0; c < n_columns; c++)
-    at += (size_t)snprintf(text + at, room - at, "%s%s", names[c], c < n_columns - 1 ? "," : "\n");
-  for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt p = 0; p < n_par; p++)
-      at += (size_t)snprintf(text + at, room - at, "%.10g,", (double)mu[k * n_par + p]);
-    for (PetscInt c = 0; c < n_columns; c++)
-      at += (size_t)snprintf(text + at, room - at, "%.8g%s", (double)value[k * n_columns + c],
-                             c < n_columns - 1 ? "," : "\n");
-  }
-  PetscCall(DriverWriteText(path, text));
-  PetscCall(PetscFree(text));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Column `c` of n rows as a dataset. */
-static PetscErrorCode WriteColumn(HycoH5 file, const char name[], PetscInt n, PetscInt width, PetscInt c,
-                                  const PetscReal value[])
-{
-  PetscReal *column;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n, &column));
-  for (PetscInt k = 0; k < n; k++) column[k] = value[k * width + c];
-  PetscCall(HycoH5WriteReal(file, name, n, 1, column));
-  PetscCall(PetscFree(column));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The table as HDF5: one dataset for each column. */
-static PetscErrorCode WriteColumns(const char path[], PetscInt n_par, const char *const par[], PetscInt n,
-                                   const PetscReal mu[], PetscInt n_columns, const char *const names[],
-                                   const PetscReal value[])
-{
-  HycoH5 file;
-  PetscErrorCode ierr = 0;
-
-  PetscFunctionBegin;
-  PetscCall(HycoH5Create(path, &file));
-  for (PetscInt p = 0; p < n_par && !ierr; p++) ierr = WriteColumn(file, par[p], n, n_par, p, mu);
-  for (PetscInt c = 0; c < n_columns && !ierr; c++) ierr = WriteColumn(file, names[c], n, n_columns, c, value);
-  if (ierr) PetscCall(HycoH5Close(&file, PETSC_FALSE));
-  PetscCall(ierr);
-  PetscCall(HycoH5Close(&file, PETSC_TRUE));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, PetscInt n, const PetscReal mu[],
-                                PetscInt n_columns, const char *const names[], const PetscReal value[])
-{
-  PetscInt n_par;
-  const char *const *par;
-  const char *dot = strrchr(path, '.');
-  const PetscBool h5 = (PetscBool)(dot && strcmp(dot, ".h5") == 0);
-
-  PetscFunctionBegin;
-  PetscCall(HycoSceneGetParameters(scene, &n_par, &par, NULL, NULL));
-  HycoOnRoot(PETSC_COMM_WORLD, (h5 ? WriteColumns : WriteRows)(path, n_par, par, n, mu, n_columns, names, value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
                  PetscInt column, PetscInt converged, PetscInt *all_undefined)
 {
@@ -221,17 +148,21 @@ static PetscInt FindConverged(PetscInt n_columns, const char *const columns[])
 }
 
 PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
-                         PetscInt n_columns, const char *const columns[], const PetscReal value[], PetscReal seconds)
+                         const char *const columns[], const DriverRows *rows, PetscReal seconds)
 {
-  const PetscInt converged = FindConverged(n_columns, columns);
+  const PetscInt converged = FindConverged(rows->width, columns);
   PetscInt n, failed = 0;
   const PetscReal *mu;
   cJSON *json;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
-  for (PetscInt k = 0; k < n; k++) failed += value[k * n_columns + converged] < 0.5;
-  if (table[0]) PetscCall(DriverWriteTable(table, scene, n, mu, n_columns, columns, value));
+  for (PetscInt p = 0; p < rows->n_pieces; p++) {
+    for (PetscInt k = 0; k < rows->piece[p].n; k++)
+      failed += rows->piece[p].value[(size_t)k * (size_t)rows->width + (size_t)converged] < 0.5;
+  }
+  HycoAllreduce(&failed, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD);
+  if (table[0]) PetscCall(DriverWriteTable(table, scene, mu, columns, rows));
   PetscCall(Say("%d points in %.3f s (%.3g a second), %d not converged%s\n", (int)n, (double)seconds,
                 seconds > 0 ? (double)(n / seconds) : 0., (int)failed,
                 table[0] ? "" : "; -table FILE.csv writes their results"));

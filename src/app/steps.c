@@ -79,6 +79,8 @@ PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const Petsc
   const char *own[N_COLUMNS], *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
   PetscReal *value, *point;
   PetscInt n_par, n_own = 0, width;
+  DriverPiece all;
+  DriverRows rows;
 
   PetscFunctionBegin;
   if (!n || !table[0]) PetscFunctionReturn(PETSC_SUCCESS);
@@ -97,7 +99,8 @@ PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const Petsc
     PetscCall(PetscArraycpy(v, step[k].quantity, width - n_own));
     PetscCall(PetscArraycpy(point + k * n_par, mu, n_par));
   }
-  PetscCall(DriverWriteTable(table, scene, n, point, width, names, value));
+  rows = DriverRowsOfRoot(n, width, value, &all);
+  PetscCall(DriverWriteTable(table, scene, point, names, &rows));
   PetscCall(PetscFree2(value, point));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -178,6 +178,16 @@ PetscErrorCode HycoQueueDone(HycoQueue q, PetscInt *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoQueueServe(HycoQueue q)
+{
+  int found;
+
+  PetscFunctionBegin;
+  if (q->window != MPI_WIN_NULL)
+    PetscCallMPI(MPI_Iprobe(MPI_ANY_SOURCE, MPI_ANY_TAG, q->group, &found, MPI_STATUS_IGNORE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoQueueHear(HycoQueue q)
 {
   PetscInt failed = 0;

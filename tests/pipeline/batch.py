@@ -10,6 +10,29 @@ from common import ROPE, Case
 
 
 class Batch(Case):
+    def rows(self, name):
+        """A table as CSV, without its times."""
+        with open(self.path(name), encoding='utf-8', newline='') as file:
+            return [{key: value for key, value in row.items() if key != 'seconds'} for row in csv.DictReader(file)]
+
+    def test_pieces(self):
+        """Rows that several ranks hold and write, whatever pieces they took: the CSV of one rank, also where full order replaces some."""
+        self.run_raw('train', '-scene', ROPE, '-grid', '3,4', '-hyco_validation', 12, '-model', 'p.h5')  # may miss the default target
+        predict = ('predict', '-model', 'p.h5', '-scatter', 300)
+        self.hyco(*predict, '-table', 'one.csv')
+        estimates = sorted(float(row['estimated_error_u']) for row in self.rows('one.csv'))
+        predict += ('-scene', ROPE, '-hyco_fallback', '-target_u', min(0.9, (estimates[270] + estimates[271]) / 2))
+        self.hyco(*predict, '-table', 'one.csv')
+        one = self.rows('one.csv')
+        full = [k for k, row in enumerate(one) if row['full_order'] == '1']
+        self.assertEqual(len(full), 29)
+        for ranks in (2, 3):
+            with self.subTest(ranks=ranks):
+                self.hyco(*predict, '-table', 'many.csv', ranks=ranks)
+                for k, (here, there) in enumerate(zip(self.rows('many.csv'), one, strict=True)):
+                    for name, value in there.items():
+                        np.testing.assert_allclose(float(here[name]), float(value), rtol=1e-6, atol=1e-8, err_msg=f'{name} of row {k}')
+
     def test_table(self):
         self.hyco('train', '-scene', ROPE, '-grid', '3,4', '-model', 'r.h5')
         predict = ('predict', '-model', 'r.h5', '-grid', '40,25')

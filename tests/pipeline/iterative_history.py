@@ -3,6 +3,8 @@ iterations. Counts, not seconds."""
 import os
 import unittest
 
+import h5py
+
 from common import PELLET, SOURCE, Case
 
 RING = os.path.join(SOURCE, 'examples', 'ring')
@@ -53,6 +55,20 @@ class IterativeHistory(Case):
         direct, _ = self.paths('-scene', ROD, '-mu', '0.05,40,1', runs=((0, ()), (0, ('-hyco_newton', 'modified'))))
         self.assertIn(0, direct['n_active'])
         self.assertGreater(max(direct['n_active']), 0)
+
+    def test_checkpoint(self):
+        """The counts are resumed; a checkpoint from before there were any has zeros."""
+        args = ('solve', '-scene', RING, '-mu', '0.01,1', '-history_times', '0,1,3', '-hyco_linear', 'iterative', '-hyco_checkpoint', 'c.h5')
+        history = self.hyco(*args)['history']
+        names = ('iterations', 'linear_iterations', 'most_linear_iterations')
+        again = self.hyco(*args, '-hyco_resume')['history']
+        self.assertEqual([again[name] for name in names], [history[name] for name in names])
+        with h5py.File(self.path('c.h5'), 'a') as file:
+            steps = file['steps'][:, :-2]
+            del file['steps'], file['sealed']
+            file['steps'] = steps
+        old = self.hyco(*args, '-hyco_resume')['history']
+        self.assertEqual([old[name] for name in names], [history['iterations'], [0] * 3, [0] * 3])
 
 
 if __name__ == '__main__':

@@ -14,6 +14,7 @@ static PetscErrorCode TakeAll(HycoQueue queue, PetscInt once[])
   for (;;) {
     PetscCall(HycoQueueTake(queue, &k));
     if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(HycoQueueServe(queue));
     once[k]++;
   }
 }
