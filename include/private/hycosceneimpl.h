@@ -145,6 +145,7 @@ struct _p_HycoScene {
   PetscOptions options;                         /* every entry, the command line's already in */
   char *title, *mesh_path, *unit[HYCO_N_UNITS]; /* units: notes, "" where the scene has none */
   DM dm;                                        /* the program's own mesh; NULL: mesh_path */
+  PetscBool face_nodes;                         /* rank 0, once the mesh is read: its hex20 cells are read as hex27 */
   PetscInt refine;                              /* times that the mesh's cells are halved */
   HycoFormulation formulation;
   char *folder; /* where relative paths of entries start */

@@ -63,6 +63,7 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
   if (m->type == HYCO_HEX20 && scene->n_contacts) { /* a uniform pressure would pull at the corners of quad8 */
     PetscCall(HycoMshAddFaceNodes(scene->mesh_path, &r->file));
     m->type = HYCO_HEX27;
+    scene->face_nodes = PETSC_TRUE;
   }
   m->nv = HycoCellKinds[m->type].nv;
   m->nf = HycoCellKinds[m->type].nf;
